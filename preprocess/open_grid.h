@@ -1,0 +1,29 @@
+// Opens whatever grid the user names: finds the format, and matches scalars by name.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "preprocess/grid_source.h"
+#include "preprocess/plot3d_layout.h"
+
+namespace curvisplat {
+
+struct OpenGridOptions {
+  std::filesystem::path grid;
+  std::vector<std::filesystem::path> solutions;  // Q and function files; may be empty
+  std::filesystem::path temporary_folder;        // ASCII is spooled to binary here
+  Plot3dForce force;                             // what the user says of the layout, over what is detected
+};
+
+/// Throws Error naming the file, what was expected and what was found.
+std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options);
+
+/// Positions in the description's scalars of `names` (a name, or a number for a function file's variable); no
+/// names: the first scalar. Throws UsageError that lists the names there are.
+std::vector<uint32_t> scalarsNamed(const GridDescription& description, const std::vector<std::string>& names);
+
+}  // namespace curvisplat

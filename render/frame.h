@@ -1,0 +1,71 @@
+// One frame: the pipeline of design section 6, as a call.
+//
+//   plan (the cut, back to front) -> read -> prepare (workers: decode, project, sort) -> draw (the GL thread)
+//   -> image
+//
+// Bricks are prepared by workers in any order and drawn in the cut's order; what is prepared and not yet
+// drawn is bounded. The same cache, view and options give the same image bit for bit, for any number of
+// threads.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <optional>
+
+#include "render/camera.h"
+#include "render/image.h"
+#include "render/transfer_function.h"
+#include "stream/cache_reader.h"
+#include "stream/progress.h"
+
+namespace curvisplat {
+
+enum class Classification { pixel, flat };  // flat: one colour and extinction a splat, as in the paper
+
+struct WorldBox {
+  glm::dvec3 lower{0.0}, upper{0.0};
+};
+
+struct FrameOptions {
+  ImageSize size;
+  Classification classification = Classification::pixel;
+  double lod_pixels = 1;  // screen-space error allowed; 0 is the finest level
+  glm::dvec3 scale{1.0};  // stretches the data: D S Dᵀ, V det D, about the world's origin
+  std::optional<WorldBox>
+      clip_box;  // in data coordinates, before `scale`: splats whose centre is outside are not drawn
+  glm::vec4 background{1, 1, 1, 1};  // premultiplied
+  double low_pass_px2 = 1.5;         // added to S2's diagonal; design section 3
+  unsigned threads = 0;              // workers; 0: one a core
+  uint64_t memory_bytes = 512 << 20;
+};
+
+/// Seconds are summed over threads for the workers' stages.
+struct FrameStatistics {
+  double plan_s = 0, read_s = 0, decode_s = 0, project_s = 0, sort_s = 0, upload_s = 0, draw_s = 0,
+         total_s = 0;
+  double workers_waited_s = 0, painter_waited_s = 0;
+  uint64_t bricks_drawn = 0, bricks_culled = 0, splats_read = 0, splats_drawn = 0, bytes_read = 0;
+  int largest_level = 0;
+};
+
+/// Draws frames of one variable of one cache. Owns the GL thread and its context, and the workers. One caller
+/// at a time.
+class FrameRenderer {
+ public:
+  /// Starts the GL thread. Throws Error if there is no context to be had: which library was tried, and what
+  /// it said.
+  FrameRenderer(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function);
+  ~FrameRenderer();
+
+  Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
+               Progress* progress = nullptr);
+  /// "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
+  const std::string& backendName() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,48 @@
+// Opens a splat cache and reads bricks. Opening reads the manifest and the tables, checks every size against
+// the real files and every link of the octree; it never reads payloads. After that a CacheReader is
+// immutable: any number of threads may read.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "stream/brick.h"
+#include "stream/manifest.h"
+#include "stream/splats.h"
+
+namespace curvisplat {
+
+class CacheReader {
+ public:
+  /// Throws Error naming the file, what was expected and what was found.
+  explicit CacheReader(const std::filesystem::path& cache);
+  ~CacheReader();
+  CacheReader(CacheReader&&) noexcept;
+  CacheReader& operator=(CacheReader&&) noexcept;
+
+  const std::filesystem::path& path() const;
+  const Manifest& manifest() const;
+
+  /// The octree, level by level, root (brick 0, or the root's consecutive bricks) first.
+  std::span<const Brick> bricks() const;
+  /// [brick], for the variable at `variable` of manifest().variables.
+  std::span<const BrickVariable> brickVariables(size_t variable) const;
+
+  /// Position in manifest().variables of the variable `name`; the empty name is the first. Throws UsageError
+  /// that lists the names there are.
+  size_t variableNamed(std::string_view name) const;
+
+  /// Reads, verifies and decodes. Throws Error naming the brick and the file where the disk fails or a
+  /// checksum does not match.
+  void readGeometry(uint32_t brick, SplatGeometry& out, std::vector<NodeRun>* runs = nullptr) const;
+  void readVariable(uint32_t brick, size_t variable, SplatVariable& out) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,50 @@
+// What goes wrong outside the program (a file, a disk, an argument) is thrown as an Error, where it is known,
+// with the place and what to do; the subcommand catches it once and prints it as one line. What goes wrong
+// inside the program (a broken invariant of ours) is a failed CURVISPLAT_CHECK: it prints both values and
+// aborts.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace curvisplat {
+
+/// The work failed: exit status 1. The text is one line: what, where, what was expected and found, what to
+/// do.
+class Error : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+
+  template <typename... Args>
+  explicit Error(fmt::format_string<Args...> format, Args&&... args)
+      : std::runtime_error(fmt::format(format, std::forward<Args>(args)...)) {}
+};
+
+/// The command line asks for something that does not exist or does not fit together: exit status 2.
+class UsageError : public Error {
+ public:
+  using Error::Error;
+};
+
+[[noreturn]] void checkFailed(const char* file, int line, const char* expression, const std::string& values);
+
+}  // namespace curvisplat
+
+/// Aborts, in release too, when `condition` is false: for our own bugs, never for bad input.
+#define CURVISPLAT_CHECK(condition)                                                  \
+  do {                                                                               \
+    if (!(condition)) ::curvisplat::checkFailed(__FILE__, __LINE__, #condition, ""); \
+  } while (false)
+
+/// As CURVISPLAT_CHECK(a op b), and prints both values.
+#define CURVISPLAT_CHECK_OP(a, op, b)                                        \
+  do {                                                                       \
+    const auto& check_a = (a);                                               \
+    const auto& check_b = (b);                                               \
+    if (!(check_a op check_b))                                               \
+      ::curvisplat::checkFailed(__FILE__, __LINE__, #a " " #op " " #b,       \
+                                fmt::format("{} and {}", check_a, check_b)); \
+  } while (false)

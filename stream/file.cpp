@@ -1,0 +1,209 @@
+#include "stream/file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+#include "stream/error.h"
+
+namespace curvisplat {
+namespace {
+
+SystemCalls posix_calls;
+std::atomic<SystemCalls*> current_calls{&posix_calls};
+
+// Linux transfers at most 0x7ffff000 bytes a call; stay on a whole page below it.
+constexpr size_t kLargestTransfer = size_t{1} << 30;
+
+std::string reason() {
+  return std::strerror(errno);
+}
+
+int openRetrying(const std::filesystem::path& path, int flags, unsigned mode) {
+  int fd;
+  do {
+    fd = SystemCalls::current().open(path.c_str(), flags | O_CLOEXEC, mode);
+  } while (fd < 0 && errno == EINTR);
+  return fd;
+}
+
+void syncRetrying(int fd, const std::filesystem::path& path) {
+  int result;
+  do {
+    result = SystemCalls::current().fsync(fd);
+  } while (result < 0 && errno == EINTR);
+  // Some file systems cannot sync a directory or a pipe and say so; that is not a failed disk.
+  if (result < 0 && errno != EINVAL && errno != ENOTSUP)
+    throw Error("{}: cannot be flushed to the disk: {}", path.string(), reason());
+}
+
+}  // namespace
+
+int SystemCalls::open(const char* path, int flags, unsigned mode) {
+  return ::open(path, flags, mode);
+}
+int SystemCalls::close(int fd) {
+  return ::close(fd);
+}
+ssize_t SystemCalls::pread(int fd, void* to, size_t count, int64_t offset) {
+  return ::pread(fd, to, count, offset);
+}
+ssize_t SystemCalls::pwrite(int fd, const void* from, size_t count, int64_t offset) {
+  return ::pwrite(fd, from, count, offset);
+}
+int SystemCalls::fsync(int fd) {
+  return ::fsync(fd);
+}
+int SystemCalls::rename(const char* from, const char* to) {
+  return std::rename(from, to);
+}
+SystemCalls& SystemCalls::current() {
+  return *current_calls.load(std::memory_order_acquire);
+}
+
+ScopedSystemCalls::ScopedSystemCalls(SystemCalls& calls) : previous_(current_calls.exchange(&calls)) {}
+ScopedSystemCalls::~ScopedSystemCalls() {
+  current_calls.store(previous_);
+}
+
+InputFile::InputFile(std::filesystem::path path) : path_(std::move(path)) {
+  fd_ = openRetrying(path_, O_RDONLY, 0);
+  if (fd_ < 0) throw Error("{}: cannot be opened for reading: {}", path_.string(), reason());
+  struct stat status {};
+  if (::fstat(fd_, &status) < 0 || !S_ISREG(status.st_mode)) {
+    ::close(std::exchange(fd_, -1));
+    throw Error("{}: is not a regular file", path_.string());
+  }
+  size_ = static_cast<uint64_t>(status.st_size);
+}
+
+InputFile::InputFile(InputFile&& other) noexcept
+    : path_(std::move(other.path_)), fd_(std::exchange(other.fd_, -1)), size_(other.size_) {}
+
+InputFile& InputFile::operator=(InputFile&& other) noexcept {
+  std::swap(path_, other.path_);
+  std::swap(fd_, other.fd_);
+  std::swap(size_, other.size_);
+  return *this;
+}
+
+InputFile::~InputFile() {
+  if (fd_ >= 0) SystemCalls::current().close(fd_);
+}
+
+void InputFile::readAt(uint64_t offset, std::span<std::byte> to) const {
+  size_t done = 0;
+  while (done < to.size()) {
+    const size_t count = std::min(to.size() - done, kLargestTransfer);
+    const ssize_t got =
+        SystemCalls::current().pread(fd_, to.data() + done, count, static_cast<int64_t>(offset + done));
+    if (got < 0) {
+      if (errno == EINTR) continue;
+      throw Error("{}: reading {} bytes at offset {} failed: {}", path_.string(), count, offset + done,
+                  reason());
+    }
+    if (got == 0)
+      throw Error("{}: ends at byte {} where {} bytes from offset {} were expected; the file is truncated",
+                  path_.string(), offset + done, to.size(), offset);
+    done += static_cast<size_t>(got);
+  }
+}
+
+OutputFile::OutputFile(std::filesystem::path path) : path_(std::move(path)) {
+  fd_ = openRetrying(path_, O_RDWR | O_CREAT | O_TRUNC, 0666);
+  if (fd_ < 0) throw Error("{}: cannot be opened for writing: {}", path_.string(), reason());
+}
+
+OutputFile::OutputFile(OutputFile&& other) noexcept
+    : path_(std::move(other.path_)), fd_(std::exchange(other.fd_, -1)), size_(other.size_.load()) {}
+
+OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
+  std::swap(path_, other.path_);
+  std::swap(fd_, other.fd_);
+  size_ = other.size_.exchange(size_.load());
+  return *this;
+}
+
+OutputFile::~OutputFile() {
+  if (fd_ >= 0) SystemCalls::current().close(fd_);
+}
+
+void OutputFile::append(std::span<const std::byte> from) {
+  writeAt(size_, from);
+}
+
+void OutputFile::writeAt(uint64_t offset, std::span<const std::byte> from) {
+  size_t done = 0;
+  while (done < from.size()) {
+    const size_t count = std::min(from.size() - done, kLargestTransfer);
+    const ssize_t put =
+        SystemCalls::current().pwrite(fd_, from.data() + done, count, static_cast<int64_t>(offset + done));
+    if (put < 0) {
+      if (errno == EINTR) continue;
+      throw Error("{}: writing {} bytes at offset {} failed: {}", path_.string(), count, offset + done,
+                  reason());
+    }
+    done += static_cast<size_t>(put);
+  }
+  const uint64_t end = offset + from.size();
+  uint64_t size = size_.load();
+  while (size < end && !size_.compare_exchange_weak(size, end)) {
+  }
+}
+
+void OutputFile::close() {
+  CURVISPLAT_CHECK(fd_ >= 0);
+  syncRetrying(fd_, path_);
+  if (SystemCalls::current().close(std::exchange(fd_, -1)) < 0 && errno != EINTR)
+    throw Error("{}: closing it failed: {}", path_.string(), reason());
+}
+
+std::string readTextFile(const std::filesystem::path& path, uint64_t limit) {
+  const InputFile file(path);
+  if (file.size() > limit)
+    throw Error("{}: has {} bytes, more than the {} such a file can have", path.string(), file.size(), limit);
+  std::string text(file.size(), '\0');
+  file.readAt(0, std::span(text.data(), text.size()));
+  return text;
+}
+
+void writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  std::filesystem::path temporary = path;
+  temporary += ".part";
+  try {
+    OutputFile file(temporary);
+    file.append(bytes);
+    file.close();
+    if (SystemCalls::current().rename(temporary.c_str(), path.c_str()) < 0)
+      throw Error("{}: cannot be put into place: {}", path.string(), reason());
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove(temporary, ignored);
+    throw;
+  }
+}
+
+void writeFileAtomically(const std::filesystem::path& path, const std::string& text) {
+  writeFileAtomically(path, std::as_bytes(std::span(text)));
+}
+
+void syncDirectory(const std::filesystem::path& path) {
+  const int fd = openRetrying(path, O_RDONLY | O_DIRECTORY, 0);
+  if (fd < 0) throw Error("{}: cannot be opened: {}", path.string(), reason());
+  try {
+    syncRetrying(fd, path);
+  } catch (...) {
+    SystemCalls::current().close(fd);
+    throw;
+  }
+  SystemCalls::current().close(fd);
+}
+
+}  // namespace curvisplat

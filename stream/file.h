@@ -1,0 +1,114 @@
+// Positional file access: all I/O of our own goes through these two classes, and they go through one table of
+// system calls, so that a test can put a failing disk in its place. Every failure is an Error that names the
+// path, the byte offset and the system's reason. Short transfers and EINTR are retried; they are not
+// failures.
+#pragma once
+
+#include <sys/types.h>
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+
+namespace curvisplat {
+
+/// The system calls that files are made of. The default is POSIX. Set errno and return -1 to fail.
+class SystemCalls {
+ public:
+  virtual ~SystemCalls() = default;
+  virtual int open(const char* path, int flags, unsigned mode);
+  virtual int close(int fd);
+  virtual ssize_t pread(int fd, void* to, size_t count, int64_t offset);
+  virtual ssize_t pwrite(int fd, const void* from, size_t count, int64_t offset);
+  virtual int fsync(int fd);
+  virtual int rename(const char* from, const char* to);
+
+  static SystemCalls& current();
+};
+
+/// Puts `calls` in the place of the system's until the end of the scope. For tests; not while other threads
+/// do I/O.
+class ScopedSystemCalls {
+ public:
+  explicit ScopedSystemCalls(SystemCalls& calls);
+  ~ScopedSystemCalls();
+  ScopedSystemCalls(const ScopedSystemCalls&) = delete;
+  ScopedSystemCalls& operator=(const ScopedSystemCalls&) = delete;
+
+ private:
+  SystemCalls* previous_;
+};
+
+/// A file that is read by position. Any number of threads may read at once.
+class InputFile {
+ public:
+  /// Throws Error if `path` is missing, not a regular file, or not readable.
+  explicit InputFile(std::filesystem::path path);
+  InputFile(InputFile&& other) noexcept;
+  InputFile& operator=(InputFile&& other) noexcept;
+  ~InputFile();
+
+  const std::filesystem::path& path() const { return path_; }
+  /// Bytes, when it was opened.
+  uint64_t size() const { return size_; }
+
+  /// Fills `to` from `offset`. Throws Error if the file ends before that, or the disk fails.
+  void readAt(uint64_t offset, std::span<std::byte> to) const;
+
+  template <typename T>
+  void readAt(uint64_t offset, std::span<T> to) const {
+    readAt(offset, std::as_writable_bytes(to));
+  }
+
+ private:
+  std::filesystem::path path_;
+  int fd_ = -1;
+  uint64_t size_ = 0;
+};
+
+/// A new file that is written by position, or at its end. Threads may write at once to separate ranges;
+/// append() is for one thread at a time. The destructor closes without a word: call close() to learn of a
+/// failure.
+class OutputFile {
+ public:
+  /// Creates `path`, or empties it if it exists. Throws Error.
+  explicit OutputFile(std::filesystem::path path);
+  OutputFile(OutputFile&& other) noexcept;
+  OutputFile& operator=(OutputFile&& other) noexcept;
+  ~OutputFile();
+
+  const std::filesystem::path& path() const { return path_; }
+  /// The end of what was written so far.
+  uint64_t size() const { return size_; }
+
+  void append(std::span<const std::byte> from);
+  void writeAt(uint64_t offset, std::span<const std::byte> from);
+  /// fsync and close. Nothing may be written after it.
+  void close();
+
+  template <typename T>
+  void append(std::span<const T> from) {
+    append(std::as_bytes(from));
+  }
+
+ private:
+  std::filesystem::path path_;
+  int fd_ = -1;
+  std::atomic<uint64_t> size_ = 0;
+};
+
+/// The whole of a small file (at most `limit` bytes, else an Error).
+std::string readTextFile(const std::filesystem::path& path, uint64_t limit = 64 << 20);
+
+/// Writes `text` beside `path`, syncs it and renames it into place: afterwards `path` is the old file or the
+/// whole new one, whatever happens.
+void writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
+void writeFileAtomically(const std::filesystem::path& path, const std::string& text);
+
+/// fsync of a directory, so that the names in it survive a power loss.
+void syncDirectory(const std::filesystem::path& path);
+
+}  // namespace curvisplat

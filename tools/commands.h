@@ -1,0 +1,15 @@
+// The subcommands. Each file adds one to the application: its options, and a callback that does the work and
+// throws what goes wrong.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace curvisplat {
+
+void addConvert(CLI::App& app);
+void addInfo(CLI::App& app);
+void addRender(CLI::App& app);
+void addGenerate(CLI::App& app);
+void addCompare(CLI::App& app);
+
+}  // namespace curvisplat

@@ -1,0 +1,34 @@
+// The `curvisplat` program: one subcommand a file, errors caught here and nowhere else.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+
+#include "stream/error.h"
+#include "tools/commands.h"
+
+int main(int argc, char** argv) {
+  using namespace curvisplat;
+  CLI::App app("curvisplat shows curvilinear simulation grids that are larger than memory.", "curvisplat");
+  app.set_version_flag("--version", "curvisplat " CURVISPLAT_VERSION);
+  app.require_subcommand(1);
+  app.set_help_all_flag("--help-all", "Help of every subcommand");
+
+  try {
+    app.parse(argc, argv);
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    const int status = app.exit(error);
+    return status == 0 ? 0 : 2;
+  } catch (const UsageError& error) {
+    fmt::print(stderr, "curvisplat: {}\n", error.what());
+    return 2;
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr, "curvisplat: out of memory; give the machine more, or ask for less with --memory\n");
+    return 1;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "curvisplat: {}\n", error.what());
+    return 1;
+  }
+}
