@@ -18,7 +18,6 @@ constexpr Magic kMagics[] = {
     {"<VTKFile"sv, "a VTK XML file, which is not read yet"},
     {"<?xml"sv, "an XML file (VTK?), which is not read yet"},
     {"\x89HDF\r\n\x1a\n"sv, "an HDF5 file (CGNS?), which is not read yet"},
-    {"@(#)ADF Database"sv, "a CGNS (ADF) file, which is not read yet"},
     {"CDF\x01"sv, "a NetCDF file, which is not read"},
     {"CDF\x02"sv, "a NetCDF file, which is not read"},
     {"CDF\x05"sv, "a NetCDF file, which is not read"},
@@ -47,6 +46,8 @@ std::optional<std::string> foreignFormat(const InputFile& file) {
   file.readAt(0, std::span(begin.data(), begin.size()));
   for (const Magic& magic : kMagics)
     if (begin.starts_with(magic.bytes)) return magic.words;
+  // Its first four bytes differ between versions.
+  if (begin.find("ADF Database") == 4) return "a CGNS (ADF) file, which is not read yet";
   return std::nullopt;
 }
 

@@ -141,8 +141,11 @@ class Detection {
   DetectedPlot3d run(const std::filesystem::path* grid_path, const std::vector<Plot3dBlock>* grid_blocks) {
     Plot3dFits found = fitPlot3d(candidates_);
     if (found.fits.empty()) failUnfit(found.misfits, grid_blocks);
-    if (grid_blocks) keepMatching(found.fits, *grid_path, *grid_blocks);
+    if (grid_blocks) keepMatching(found.fits, *grid_blocks);
     keepExact(found.fits);
+    keepThreeDimensional(found.fits);
+    if (grid_blocks && !matches(found.fits.front(), *grid_blocks))
+      failMismatch(found.fits.front(), *grid_path, *grid_blocks);
     keepPlausible(found.fits);
     if (found.fits.size() > 1) failAmbiguous(found.fits);
     Plot3dFit& fit = found.fits.front();
@@ -162,14 +165,22 @@ class Detection {
     return force_.precision_bytes.value_or(digits_ > kDigitsOfFloat ? 8 : 4);
   }
 
-  void keepMatching(std::vector<Plot3dFit>& fits, const std::filesystem::path& grid_path,
-                    const std::vector<Plot3dBlock>& grid_blocks) const {
-    const auto matches = [&](const Plot3dFit& fit) { return sameDimensions(fit.blocks, grid_blocks); };
-    if (std::none_of(fits.begin(), fits.end(), matches))
-      throw Error("{}: this {} has {}, but the grid {} has {}; give a solution of the same grid", path_,
-                  curvisplat::inWords(fits.front().layout.kind), curvisplat::inWords(fits.front().blocks),
-                  grid_path.string(), curvisplat::inWords(grid_blocks));
-    std::erase_if(fits, [&](const Plot3dFit& fit) { return !matches(fit); });
+  static bool matches(const Plot3dFit& fit, const std::vector<Plot3dBlock>& grid_blocks) {
+    return !fit.layout.two_dimensional && sameDimensions(fit.blocks, grid_blocks);
+  }
+
+  /// If any has the grid's dimensions, only those.
+  static void keepMatching(std::vector<Plot3dFit>& fits, const std::vector<Plot3dBlock>& grid_blocks) {
+    const auto suits = [&](const Plot3dFit& fit) { return matches(fit, grid_blocks); };
+    if (std::any_of(fits.begin(), fits.end(), suits))
+      std::erase_if(fits, [&](const Plot3dFit& fit) { return !suits(fit); });
+  }
+
+  [[noreturn]] void failMismatch(const Plot3dFit& fit, const std::filesystem::path& grid_path,
+                                 const std::vector<Plot3dBlock>& grid_blocks) const {
+    throw Error("{}: this {} has {}, but the grid {} has {}; give a solution of the same grid", path_,
+                curvisplat::inWords(fit.layout.kind), curvisplat::inWords(fit.blocks), grid_path.string(),
+                curvisplat::inWords(grid_blocks));
   }
 
   static bool sameDimensions(const std::vector<Plot3dBlock>& a, const std::vector<Plot3dBlock>& b) {
@@ -182,6 +193,14 @@ class Detection {
     const auto exact = [](const Plot3dFit& fit) { return fit.trailing_bytes == 0; };
     if (std::any_of(fits.begin(), fits.end(), exact))
       std::erase_if(fits, [&](const Plot3dFit& fit) { return !exact(fit); });
+  }
+
+  void keepThreeDimensional(std::vector<Plot3dFit>& fits) const {
+    const auto flat = [](const Plot3dFit& fit) { return fit.layout.two_dimensional; };
+    if (std::all_of(fits.begin(), fits.end(), flat))
+      throw Error("{}: is a 2-D {} ({}); only 3-D files are read", path_,
+                  curvisplat::inWords(fits.front().layout.kind), curvisplat::inWords(fits.front().layout));
+    std::erase_if(fits, flat);
   }
 
   /// A single solution of the grid's dimensions is taken whatever its values: fields may well have fill
@@ -224,7 +243,7 @@ class Detection {
     const auto furthest = std::max_element(misfits.begin(), misfits.end(),
                                            [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
     std::string finding = "no header of plausible dimensions was found";
-    if (furthest != misfits.end() && furthest->reached >= Plot3dMisfit::first_record) {
+    if (furthest != misfits.end() && furthest->reached >= LayoutMisfit::first_record) {
       finding = fmt::format("read as {} {}: {}", attemptInWords(furthest->layout),
                             curvisplat::inWords(furthest->layout.kind), furthest->reason);
     }

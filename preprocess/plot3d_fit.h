@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "preprocess/payload_file.h"
+#include "preprocess/plot3d_header.h"
 #include "preprocess/plot3d_layout.h"
 #include "stream/file.h"
 
@@ -24,8 +25,7 @@ struct Plot3dFit {
 
 /// Why a layout does not fit, and how far it did: of all of them the furthest tells most of the file.
 struct Plot3dMisfit {
-  enum Reached { nothing, first_record, dimensions, known_structure };
-  Reached reached = nothing;
+  LayoutMisfit::Reached reached = LayoutMisfit::nothing;
   Plot3dLayout layout;  // as far as it was decided
   std::string reason;
   std::vector<Plot3dBlock> blocks;  // from `dimensions` on
@@ -46,8 +46,10 @@ struct Plot3dFits {
 };
 
 /// Trailing bytes are accepted up to an eighth of what a C file should have, so that a truncated file of a
-/// larger layout does not pass as a smaller one; behind records any number is. Throws Error if the disk
+/// larger layout does not pass as a smaller one; behind records any
+/// number is. Throws Error if the disk
 /// fails.
+/// 2-D files fit as such (exact sizes only), so that they can be told and refused.
 Plot3dFits fitPlot3d(const Plot3dCandidates& candidates);
 
 }  // namespace curvisplat

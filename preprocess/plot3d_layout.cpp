@@ -36,6 +36,7 @@ std::string inWords(const Plot3dLayout& layout) {
     words += layout.precision_bytes == 8 ? ", double precision" : ", single precision";
   }
   words += layout.multi_block ? ", multi-block" : ", single-block";
+  if (layout.two_dimensional) words += ", 2-D";
   if (layout.kind == Plot3dKind::grid) words += layout.blanking ? ", iblank" : ", no iblank";
   return words;
 }

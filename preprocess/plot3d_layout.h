@@ -38,7 +38,8 @@ struct Plot3dLayout {
   RecordMarkers records = RecordMarkers::none;
   int precision_bytes = 4;
   bool multi_block = false;
-  bool blanking = false;  // grids only
+  bool blanking = false;         // grids only
+  bool two_dimensional = false;  // no nk, no z: recognised, not read
 
   uint64_t integerBytes() const { return ascii ? 8 : 4; }
 };
