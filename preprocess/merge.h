@@ -41,19 +41,33 @@ class VoxelMerger {
   double detail(size_t voxel) const;
 
  private:
+  // Sums about the first splat's position and means: e and d. Each term times the splat's weight.
+  struct GeometrySums {
+    double weight = 0;
+    glm::dvec3 centre{0.0};  // e
+    Symmetric3 centre2;      // e e^T
+    Symmetric3 shape;        // S
+  };
+  struct VariableSums {
+    double mean = 0;        // d
+    glm::dvec3 slope{0.0};  // h + 12 e d
+    double variance = 0;    // t + d^2
+  };
   struct Cluster {
     uint32_t count = 0;
     bool weighted =
-        false;  // a weight > 0 has come: sums are weighted, and splats of weight 0 count for nothing
+        false;  // a weight > 0 has come; until then each splat counts as 1, from then on by its weight
   };
 
-  double* sums(size_t voxel) { return sums_.data() + voxel * stride_; }
-  const double* sums(size_t voxel) const { return sums_.data() + voxel * stride_; }
+  void accumulate(size_t voxel, const glm::dvec3& position, const Splat& splat, const SplatScalar* values);
+  void clearSums(size_t voxel);
 
   size_t variables_;
-  size_t stride_;
   std::vector<Cluster> clusters_;
-  std::vector<double> sums_;  // [voxel][stride]
+  std::vector<Splat> first_;                 // [voxel], of its first splat
+  std::vector<SplatScalar> first_values_;    // [voxel][variable]
+  std::vector<GeometrySums> sums_;           // [voxel], valid from the second splat on
+  std::vector<VariableSums> variable_sums_;  // [voxel][variable], as sums_
 };
 
 /// One cluster. As VoxelMerger.

@@ -56,6 +56,10 @@ class HalfAnnulus : public Scene {
                       0.0, 1.0);
   }
 
+  std::pair<glm::dvec3, glm::dvec3> bounds() const override {
+    return {{-kOuter, -kOuter, -kWave * kOuter}, {0, kOuter, 1 + kWave * kOuter}};
+  }
+
   double volume() const override { return 0.5 * pi * (square(kOuter) - square(kInner)); }
 
  private:
@@ -130,6 +134,10 @@ class Wake : public Scene {
                          square(std::sin(phase));
     const double street = behind * age * (upper + lower + 0.7 * braid);
     return std::clamp(std::max({layer, 0.8 * shear, street}), 0.0, 1.0);
+  }
+
+  std::pair<glm::dvec3, glm::dvec3> bounds() const override {
+    return {{kDownstream - kOuter, -kOuter, 0}, {kDownstream + kOuter, kOuter, kSpan}};
   }
 
   double volume() const override { return pi * (square(kOuter) - square(kWall)) * kSpan; }

@@ -11,6 +11,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "preprocess/grid_source.h"
@@ -35,6 +36,9 @@ class Scene {
   virtual double scalar(const glm::dvec3& world) const = 0;
   /// Of the image of the unit cube, world units.
   virtual double volume() const = 0;
+
+  /// The corners of a box that holds the scene, tightly.
+  virtual std::pair<glm::dvec3, glm::dvec3> bounds() const = 0;
 
   /// The parts of position(): join(alongU(u), alongV(v), alongW(w)) is the position of (u, v, w).
   virtual glm::dvec3 alongU(double u) const = 0;

@@ -25,6 +25,7 @@ struct CellShape {
   std::array<double, 3> axis;   // as Splat's
   std::array<double, 3> shear;  // as Splat's
   glm::dmat3 rotation;          // Q, orthogonal, GLM's columns. The slope is Q ∇_c f
+  double determinant;           // of J as it came, with its sign; 0 if J is singular up to rounding
   bool floored;                 // a singular value was raised
 };
 

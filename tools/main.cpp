@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.set_help_all_flag("--help-all", "Help of every subcommand");
   addGenerate(app);
+  addCompare(app);
 
   try {
     app.parse(argc, argv);

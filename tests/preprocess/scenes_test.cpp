@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <random>
@@ -52,6 +53,25 @@ TEST_P(EveryScene, IsTheInverseOfItsPositions) {
 TEST_P(EveryScene, HasTheVolumeItSays) {
   const auto scene = makeScene(GetParam());
   EXPECT_NEAR(volumeByJacobians(*scene, 400) / scene->volume(), 1, 1e-3);
+}
+
+TEST_P(EveryScene, TouchesAndKeepsItsBounds) {
+  const auto scene = makeScene(GetParam());
+  const auto [lower, upper] = scene->bounds();
+  glm::dvec3 least(1e9), most(-1e9);
+  for (int i = 0; i <= 120; ++i)
+    for (int j = 0; j <= 10; ++j)
+      for (int k = 0; k <= 1; ++k) {
+        const glm::dvec3 p = scene->position({i / 120.0, j / 10.0, k});
+        least = glm::min(least, p);
+        most = glm::max(most, p);
+      }
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(least[axis], lower[axis], 5e-3);
+    EXPECT_NEAR(most[axis], upper[axis], 5e-3);
+    EXPECT_GE(least[axis], lower[axis] - 1e-12);
+    EXPECT_LE(most[axis], upper[axis] + 1e-12);
+  }
 }
 
 TEST_P(EveryScene, HasAScalarWithinItsRange) {
