@@ -15,6 +15,8 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.set_help_all_flag("--help-all", "Help of every subcommand");
   addRender(app);
+  addGenerate(app);
+  addCompare(app);
 
   try {
     app.parse(argc, argv);
