@@ -92,6 +92,15 @@ void checkWords(const RenderWords& words) {
   if (!words.statistics.empty()) checkOutputFolder("--stats", words.statistics);
 }
 
+/// A scalar that the cache lacks is bad input, not wrong usage: the cache decides.
+size_t chooseVariable(const CacheReader& cache, const std::string& name) {
+  try {
+    return cache.variableNamed(name);
+  } catch (const UsageError& error) {
+    throw Error("{}: {}", cache.path().string(), error.what());
+  }
+}
+
 Camera chooseCamera(const RenderWords& words, const glm::dvec3& lower, const glm::dvec3& upper,
                     ImageSize size) {
   const auto projection = words.view_angle ? Projection::perspective : Projection::orthographic;
@@ -213,7 +222,7 @@ void render(const RenderWords& words) {
 
   const CacheReader cache(words.cache);
   const Manifest& manifest = cache.manifest();
-  const size_t variable = cache.variableNamed(words.scalar);
+  const size_t variable = chooseVariable(cache, words.scalar);
   const VariableInfo& info = manifest.variables[variable];
   const glm::dvec3 lower = manifest.lower * options.scale, upper = manifest.upper * options.scale;
   const Camera camera = chooseCamera(words, lower, upper, options.size);
