@@ -21,6 +21,8 @@
 #include "preprocess/splat_record.h"
 #include "stream/cache_writer.h"
 #include "stream/error.h"
+#include "stream/file.h"
+#include "stream/manifest.h"
 
 namespace curvisplat {
 namespace {
@@ -38,10 +40,6 @@ std::filesystem::path temporaryFolder(const ConvertOptions& options) {
   return options.temporary_folder.empty() ? folderOf(options.output) : options.temporary_folder;
 }
 
-std::string nameOf(const std::filesystem::path& output) {
-  return (output.has_filename() ? output : output.parent_path()).filename().string();
-}
-
 /// A conversion under way: what each pass leaves for the next.
 class Conversion {
  public:
@@ -53,7 +51,7 @@ class Conversion {
         progress_(progress),
         reader_(source, options.scalars, options.blank_value),
         nodes_(nodesOf(source.description())),
-        scratch_(temporaryFolder(options), nameOf(options.output) + ".tmp") {}
+        scratch_(temporaryFolder(options), options.output.filename().string() + ".tmp") {}
 
   ConvertReport run() {
     struct Pass {
@@ -123,6 +121,12 @@ class Conversion {
   void finish() {
     writer_->finish(manifest());
     writer_.reset();
+    const std::filesystem::path path = options_.output / "manifest.json";
+    const Manifest written = Manifest::fromJson(readTextFile(path), path);
+    report_.bricks = written.bricks;
+    report_.levels = written.levels;
+    report_.volume = written.volume;
+    for (const FileInfo& file : written.files) report_.files.push_back({file.name, file.size});
   }
 
   std::vector<VariableInfo> variables() const {
@@ -138,7 +142,7 @@ class Conversion {
   Manifest manifest() const {
     const GridDescription& description = source_.description();
     Manifest manifest;
-    manifest.title = options_.title.empty() ? nameOf(options_.output) : options_.title;
+    manifest.title = options_.title.empty() ? options_.output.filename().string() : options_.title;
     manifest.program = "curvisplat " CURVISPLAT_VERSION;
     manifest.sources = description.files;
     manifest.reader = description.format;

@@ -14,7 +14,7 @@
 namespace curvisplat {
 
 struct ConvertOptions {
-  std::filesystem::path output;            // NAME.splats
+  std::filesystem::path output;            // NAME.splats, without a slash behind it
   bool overwrite = false;                  // what stands there goes, once the new cache is whole
   std::vector<uint32_t> scalars;           // positions in the source's description; the cache's variables
   std::optional<double> blank_value;       // nodes with this value of a scalar are not there

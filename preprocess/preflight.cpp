@@ -61,8 +61,7 @@ DiskNeeds diskNeeds(uint64_t nodes, size_t variables) {
 }
 
 std::filesystem::path folderOf(const std::filesystem::path& path) {
-  const std::filesystem::path plain = path.has_filename() ? path : path.parent_path();
-  return plain.has_parent_path() ? plain.parent_path() : std::filesystem::path(".");
+  return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
 }
 
 void checkOutput(const std::filesystem::path& output, bool overwrite,

@@ -25,7 +25,7 @@ void checkOutput(const std::filesystem::path& output, bool overwrite,
 void checkDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
                     const std::filesystem::path& temporary_folder);
 
-/// The folder that holds `path`, "." for a plain name. A trailing slash of `path` counts for nothing.
+/// The folder that holds `path`, "." for a plain name.
 std::filesystem::path folderOf(const std::filesystem::path& path);
 
 }  // namespace curvisplat
