@@ -15,6 +15,7 @@
 
 #include "render/camera.h"
 #include "render/image.h"
+#include "render/projection.h"
 #include "render/transfer_function.h"
 #include "stream/cache_reader.h"
 #include "stream/progress.h"
@@ -22,10 +23,6 @@
 namespace curvisplat {
 
 enum class Classification { pixel, flat };  // flat: one colour and extinction a splat, as in the paper
-
-struct WorldBox {
-  glm::dvec3 lower{0.0}, upper{0.0};
-};
 
 struct FrameOptions {
   ImageSize size;
