@@ -38,8 +38,7 @@ std::vector<std::array<float, 2>> footprintTexels() {
   const auto table = footprintTable(kFootprintSteps);
   std::vector<std::array<float, 2>> texels;
   for (size_t step = 0; step + 1 < table.size(); ++step)
-    texels.push_back({static_cast<float>(table[step].integral),
-                      static_cast<float>(table[step + 1].integral - table[step].integral)});
+    texels.push_back({static_cast<float>(table[step]), static_cast<float>(table[step + 1] - table[step])});
   return texels;
 }
 

@@ -10,22 +10,18 @@ namespace {
 
 constexpr double kKnot = 0.889392;  // where the kernel's two pieces meet
 
-/// ∫ K(√(rho² + t²)) tⁿ dt over [from, to] for n = 0 and 2, inside one piece of K: Gauss-Legendre with 8
-/// points.
-void addMoments(double rho, double from, double to, double& zeroth, double& second) {
+/// ∫ K(√(rho² + t²)) dt over [from, to], inside one piece of K: Gauss-Legendre with 8 points.
+double integral(double rho, double from, double to) {
   static constexpr double kAt[4] = {0.1834346424956498, 0.5255324099163290, 0.7966664774136267,
                                     0.9602898564975363};
   static constexpr double kWeight[4] = {0.3626837833783620, 0.3137066458778873, 0.2223810344533745,
                                         0.1012285362903763};
   const double middle = 0.5 * (from + to), half = 0.5 * (to - from);
-  for (int point = 0; point < 4; ++point) {
-    for (const double side : {-1.0, 1.0}) {
-      const double t = middle + side * half * kAt[point];
-      const double value = half * kWeight[point] * kernel(std::sqrt(rho * rho + t * t));
-      zeroth += value;
-      second += value * t * t;
-    }
-  }
+  double sum = 0;
+  for (int point = 0; point < 4; ++point)
+    for (const double t : {middle - half * kAt[point], middle + half * kAt[point]})
+      sum += half * kWeight[point] * kernel(std::hypot(rho, t));
+  return sum;
 }
 
 }  // namespace
@@ -39,24 +35,24 @@ double kernel(double r) {
   return 0;
 }
 
-Footprint footprint(double rho) {
-  if (rho >= kKernelSupport) return {};
+double footprint(double rho) {
+  if (rho >= kKernelSupport) return 0;
   // r³ is not smooth in t where rho is small, so the pieces are cut up.
   constexpr int kPanels = 16;
   const double end = std::sqrt(kKernelSupport * kKernelSupport - rho * rho);
   const double knot = std::sqrt(std::max(0.0, kKnot * kKnot - rho * rho));
-  double zeroth = 0, second = 0;
+  double sum = 0;
   for (int panel = 0; panel < kPanels; ++panel) {
     const double from = static_cast<double>(panel) / kPanels, to = static_cast<double>(panel + 1) / kPanels;
-    addMoments(rho, knot * from, knot * to, zeroth, second);
-    addMoments(rho, knot + (end - knot) * from, knot + (end - knot) * to, zeroth, second);
+    sum += integral(rho, knot * from, knot * to) +
+           integral(rho, knot + (end - knot) * from, knot + (end - knot) * to);
   }
-  return {2 * zeroth, zeroth > 0 ? std::sqrt(second / zeroth) / kKernelSigma : 0.0};
+  return 2 * sum;
 }
 
-std::vector<Footprint> footprintTable(int steps) {
+std::vector<double> footprintTable(int steps) {
   CURVISPLAT_CHECK_OP(steps, >=, 1);
-  std::vector<Footprint> table(static_cast<size_t>(steps) + 1);
+  std::vector<double> table(static_cast<size_t>(steps) + 1, 0.0);
   for (int step = 0; step < steps; ++step)
     table[static_cast<size_t>(step)] =
         footprint(kKernelSupport * std::sqrt(static_cast<double>(step) / steps));

@@ -12,18 +12,12 @@ inline constexpr double kKernelSigma = 0.44655;     // standard deviation along 
 /// K(r), r >= 0. Its integral over space is 1.
 double kernel(double r);
 
-/// What a splat's kernel leaves on a ray that passes its centre at distance rho, and how the rest of it lies
-/// along that ray.
-struct Footprint {
-  double integral = 0;   // F(rho) = ∫ K(√(rho² + t²)) dt
-  double deviation = 0;  // of t under K, as a multiple of kKernelSigma
-};
+/// F(rho) = ∫ K(√(rho² + t²)) dt, rho >= 0: what a splat's kernel leaves on a ray that passes its centre at
+/// the distance rho. By quadrature.
+double footprint(double rho);
 
-/// By quadrature in double precision; rho >= 0.
-Footprint footprint(double rho);
-
-/// Footprints at equal steps of rho² over [0, kKernelSupport²]: both are smooth in rho², and drawing then
+/// F at equal steps of rho² over [0, kKernelSupport²]: [steps + 1]. F is smooth in rho², and drawing then
 /// needs no square root. Linear interpolation is good to 1e-5 from 512 steps on.
-std::vector<Footprint> footprintTable(int steps);
+std::vector<double> footprintTable(int steps);
 
 }  // namespace curvisplat
