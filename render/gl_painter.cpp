@@ -7,13 +7,13 @@
 #include "render/gl_objects.h"
 #include "render/kernel.h"
 #include "render/splat_shader.h"
+#include "render/stage_timer.h"
 #include "stream/error.h"
 
 namespace curvisplat {
 namespace {
 
-constexpr int kFootprintSteps = 512;
-constexpr size_t kSplatsPerDraw = 65536;
+constexpr int kFootprintSteps = 1024;
 constexpr GLint kFootprintUnit = 0, kClassesUnit = 1;
 
 /// A table that shaders read by index, exactly: no filtering, no size limit worth a thought.
@@ -64,6 +64,7 @@ struct GlPainter::State {
   GlObject instances, vertex_array;
   GlObject framebuffer, colour;
   ImageSize size{0, 0};
+  double upload_s = 0, draw_s = 0;
 
   void allocate(ImageSize wanted);
   void use(const GlProgram& program, const ClassificationTable& table) const;
@@ -136,6 +137,7 @@ void GlPainter::State::use(const GlProgram& program, const ClassificationTable& 
 void GlPainter::begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
                       bool per_pixel) {
   const GlFunctions& gl = state_->gl;
+  state_->upload_s = state_->draw_s = 0;
   state_->allocate(size);
   state_->classes.fill(gl, kClassesUnit, GL_RGBA32F, table.cumulative());
   state_->use(per_pixel ? (table.logScale() ? state_->per_pixel_log : state_->per_pixel)
@@ -148,22 +150,34 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
 }
 
 void GlPainter::draw(std::span<const ScreenSplat> splats) {
+  if (splats.empty()) return;
   const GlFunctions& gl = state_->gl;
-  while (!splats.empty()) {
-    const auto part = splats.first(std::min(splats.size(), kSplatsPerDraw));
-    splats = splats.subspan(part.size());
-    gl.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(part.size_bytes()), part.data(), GL_STREAM_DRAW);
-    gl.DrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(part.size()));
-    gl.check("drawing splats");
+  {
+    // Fresh storage each time: the driver keeps what it still draws from.
+    const StageTimer timer(state_->upload_s);
+    gl.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(splats.size_bytes()), splats.data(),
+                  GL_STREAM_DRAW);
   }
+  const StageTimer timer(state_->draw_s);
+  gl.DrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(splats.size()));
+  gl.check("drawing splats");
 }
 
 Image GlPainter::end() {
   const GlFunctions& gl = state_->gl;
+  const StageTimer timer(state_->draw_s);
   Image image(state_->size);
   gl.ReadPixels(0, 0, image.size.width, image.size.height, GL_RGBA, GL_FLOAT, image.rgba.data());
   gl.check("reading the picture");
   return image;
+}
+
+double GlPainter::uploadSeconds() const {
+  return state_->upload_s;
+}
+
+double GlPainter::drawSeconds() const {
+  return state_->draw_s;
 }
 
 }  // namespace curvisplat

@@ -31,6 +31,11 @@ class GlPainter {
   /// Waits for the drawing and reads the picture.
   Image end();
 
+  /// Of the calling thread, since begin(). OpenGL may draw later than it is told to: end() waits for it, and
+  /// counts as drawing.
+  double uploadSeconds() const;
+  double drawSeconds() const;
+
  private:
   struct State;
   std::unique_ptr<State> state_;

@@ -17,7 +17,7 @@ double kernel(double r);
 double footprint(double rho);
 
 /// F at equal steps of rho² over [0, kKernelSupport²]: [steps + 1]. F is smooth in rho², and drawing then
-/// needs no square root. Linear interpolation is good to 1e-5 from 512 steps on.
+/// needs no square root. Linear interpolation is good to 1e-5 from 1024 steps on.
 std::vector<double> footprintTable(int steps);
 
 }  // namespace curvisplat

@@ -201,16 +201,6 @@ bool projectWith(const Map& map, const LocalBox& clip, const SplatGeometry& geom
 
 }  // namespace
 
-ProjectionCounts& ProjectionCounts::operator+=(const ProjectionCounts& other) {
-  read += other.read;
-  clipped += other.clipped;
-  off_screen += other.off_screen;
-  transparent += other.transparent;
-  drawn += other.drawn;
-  pieces += other.pieces;
-  return *this;
-}
-
 double largestReach(double low_pass_px2) {
   // The slope along L's columns is at most √(x (x + λ)) / (x + ε) times |w|, x the squared extent of the
   // splat on the screen; x below is where that is largest.
@@ -218,6 +208,11 @@ double largestReach(double low_pass_px2) {
   if (low_pass_px2 <= 2 * kEpsilon) return kKernelSupport;
   const double x = low_pass_px2 * kEpsilon / (low_pass_px2 - 2 * kEpsilon);
   return kKernelSupport * std::sqrt(x * (x + low_pass_px2)) / (x + kEpsilon);
+}
+
+BrickProjector::BrickProjector() {
+  splats_.reserve(kMostSplats);
+  depths_.reserve(kMostSplats);
 }
 
 void BrickProjector::project(const ProjectionSettings& settings, const ClassificationTable& table,

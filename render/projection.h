@@ -16,6 +16,7 @@
 
 #include "render/classification.h"
 #include "render/screen_view.h"
+#include "stream/brick.h"
 #include "stream/splats.h"
 
 namespace curvisplat {
@@ -47,8 +48,6 @@ struct ProjectionCounts {
   uint64_t transparent = 0;  // without extinction in the transfer function, or without weight
   uint64_t drawn = 0;        // of those read
   uint64_t pieces = 0;       // that the drawn ones were drawn as: more where perspective splats were cut up
-
-  ProjectionCounts& operator+=(const ProjectionCounts& other);
 };
 
 /// What to do with every splat of a frame.
@@ -58,12 +57,16 @@ struct ProjectionSettings {
   std::optional<WorldBox> clip_box;
 };
 
-/// Projects bricks. Keeps its output between calls, so that frames do not allocate. One thread each.
+/// Projects bricks. One thread each.
 class BrickProjector {
  public:
   /// A brick gives at most kMaxBrickSplats splats plus this many pieces; where perspective would cut more, it
   /// cuts coarser and drops more of what is close to the eye.
   static constexpr size_t kMostPieces = 65536;
+  static constexpr size_t kMostSplats = kMaxBrickSplats + kMostPieces;
+
+  /// Takes the memory it will ever need.
+  BrickProjector();
 
   /// Projects all splats of a brick whose cell's minimum corner is `cell_min`, and leaves out what cannot be
   /// seen. Splats that reach behind the near plane or span a wide angle are cut along their longest column

@@ -4,9 +4,15 @@
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 
+#include "render/kernel.h"
 #include "stream/error.h"
 
 namespace curvisplat {
+namespace {
+
+constexpr double kLeastLowPass = 0.01;
+
+}  // namespace
 
 ScreenView ScreenView::of(const Camera& camera, ImageSize size, const glm::dvec3& scale, double low_pass_px2,
                           double near) {
@@ -16,6 +22,11 @@ ScreenView ScreenView::of(const Camera& camera, ImageSize size, const glm::dvec3
   for (int axis = 0; axis < 3; ++axis)
     if (!(scale[axis] > 0 && std::isfinite(scale[axis])))
       throw UsageError("the scale along {} is {}; it must be positive", "xyz"[axis], scale[axis]);
+
+  // At 0 a splat seen edge-on would be infinitely opaque.
+  if (!(low_pass_px2 >= kLeastLowPass))
+    throw UsageError("a low-pass of {} px² is too little to draw with; use at least {}", low_pass_px2,
+                     kLeastLowPass);
 
   ScreenView view;
   view.projection = camera.projection;
@@ -48,6 +59,31 @@ ScreenView ScreenView::of(const Camera& camera, ImageSize size, const glm::dvec3
 glm::dvec3 ScreenView::viewFromData(const glm::dvec3& data) const {
   const glm::dvec3 from_eye = scale * data - eye;
   return {glm::dot(right, from_eye), glm::dot(down, from_eye), glm::dot(forward, from_eye)};
+}
+
+CutView ScreenView::cutView() const {
+  CutView cut;
+  cut.perspective = projection == Projection::perspective;
+  cut.scale = scale;
+  cut.eye = eye;
+  cut.towards_viewer = -forward;
+  cut.pixels = focal_px;
+  const double reach = kKernelSupport * std::sqrt(low_pass_px2);
+  const double edge_x = (0.5 * size.width + reach) / focal_px,
+               edge_y = (0.5 * size.height + reach) / focal_px;
+  for (const glm::dvec3& side : {edge_x * right, -edge_x * right, edge_y * down, -edge_y * down}) {
+    // Where the edge lies: at `side` from the eye's axis; in perspective, at distance 1 along it.
+    const double edge = glm::length(side);
+    const glm::dvec3 outwards = side / edge;
+    if (cut.perspective) {
+      const glm::dvec3 normal = glm::normalize(edge * forward - outwards);
+      cut.planes.push_back({normal, -glm::dot(normal, eye)});
+    } else {
+      cut.planes.push_back({-outwards, glm::dot(outwards, eye) + edge});
+    }
+  }
+  if (cut.perspective) cut.planes.push_back({forward, -glm::dot(forward, eye) - near});
+  return cut;
 }
 
 glm::dvec2 ScreenView::pixelFromView(const glm::dvec3& view) const {

@@ -9,6 +9,7 @@
 #include <glm/vec3.hpp>
 
 #include "render/camera.h"
+#include "stream/cut.h"
 
 namespace curvisplat {
 
@@ -29,6 +30,9 @@ struct ScreenView {
 
   /// A point of the data in view axes (right, down, forward), stretched units, from the eye.
   glm::dvec3 viewFromData(const glm::dvec3& data) const;
+  /// The same view in the words of the cut; the image's edges are moved out by the low-pass' reach.
+  CutView cutView() const;
+
   /// Where a point in view axes lies in the image; perspective: in front of the eye.
   glm::dvec2 pixelFromView(const glm::dvec3& view) const;
 };

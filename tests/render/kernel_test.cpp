@@ -61,9 +61,9 @@ TEST(Footprint, IsTheIntegralAlongTheRay) {
 }
 
 TEST(Footprint, TableIsGoodToAHundredThousandth) {
-  const int steps = 512;
+  const int steps = 1024;
   const auto table = footprintTable(steps);
-  ASSERT_EQ(table.size(), 513u);
+  ASSERT_EQ(table.size(), 1025u);
   for (double rho = 0; rho < kKernelSupport; rho += 0.00123) {
     const double at = rho * rho / (kKernelSupport * kKernelSupport) * steps;
     const auto cell = static_cast<size_t>(at);
