@@ -130,6 +130,16 @@ TEST(OpacityCurve, BetweenItIsVtksHermiteCurve) {
   EXPECT_DOUBLE_EQ(between(0.7, 0.7, 0.4), 0.4);
 }
 
+TEST(OpacityCurve, EndsGoOnAndJumpsHoldTheirFirst) {
+  const OpacityPoint points[] = {{0, 0.1}, {1, 0.3}, {1, 0.9}, {2, 0.5}};
+  const OpacityCurve curve(points);
+  EXPECT_DOUBLE_EQ(curve.at(-1), 0.1);
+  EXPECT_DOUBLE_EQ(curve.at(0.5), 0.2);
+  EXPECT_DOUBLE_EQ(curve.at(1), 0.3);
+  EXPECT_NEAR(curve.at(1 + 1e-9), 0.9, 1e-8);
+  EXPECT_DOUBLE_EQ(curve.at(3), 0.5);
+}
+
 TEST(OpacityCurve, NeverLeavesTheRangeOfItsEnds) {
   for (int s = 0; s <= 20; ++s)
     for (int m = 0; m <= 10; ++m)
