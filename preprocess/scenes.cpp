@@ -113,27 +113,14 @@ class Wake : public Scene {
     return glm::dvec3(turnOf(std::atan2(world.y, world.x - s * kDownstream)) / (2 * pi), v, w);
   }
 
-  // The strength of the vortices: rollers shed in turn from above and below, which wave along the span, the
-  // braids between them, and the shear layers that leave the wall.
+  // The strength of the vortices: rollers shed in turn from above and below, each a core and an arm wound
+  // around it, waving along the span; braids between them; and the layers that leave the wall.
   double scalar(const glm::dvec3& p) const override {
-    const double x = p.x, y = p.y, z = p.z;
-    const double radius = std::hypot(x, y);
-    const double layer = std::exp(-square((radius - kWall - 0.02) / 0.06)) * (0.75 - 0.35 * x / radius);
-    const double shear =
-        bump((std::abs(y) - 0.5 - 0.06 * x) / 0.11) * smoothStep((x + 0.1) / 0.5) * smoothStep((2 - x) / 1.2);
-
-    const double behind = smoothStep((x - 0.5) / 1.6);
-    if (behind == 0) return std::clamp(std::max(layer, 0.8 * shear), 0.0, 1.0);
-    const double age = std::exp(-0.1 * x);
-    const double height = 0.45 + 0.035 * x, width = 0.3 + 0.02 * x;
-    const double phase = 2 * pi * (x - 0.28 * std::sin(2 * pi * z / 2.0 + 0.35 * x)) / 2.6;
-    const double upper = bump((y - height) / width) * periodicBump(phase, 3.0);
-    const double lower = bump((y + height) / width) * periodicBump(phase + pi, 3.0);
-    const double braid = bump((y - height * std::cos(phase)) / 0.17) *
-                         periodicBump(2 * pi * z / 1.0 + (std::sin(phase) > 0 ? 0.0 : pi), 5.0) *
-                         square(std::sin(phase));
-    const double street = behind * age * (upper + lower + 0.7 * braid);
-    return std::clamp(std::max({layer, 0.8 * shear, street}), 0.0, 1.0);
+    const double radius = std::hypot(p.x, p.y);
+    const double layer = bump((radius - kWall - 0.03) / 0.07) * (0.7 - 0.3 * p.x / radius);
+    const double separated = 0.7 * bump((std::abs(p.y) - 0.5 - 0.05 * p.x) / 0.12) *
+                             smoothStep((p.x + 0.1) / 0.5) * smoothStep((1.9 - p.x) / 1.2);
+    return std::clamp(std::max({layer, separated, street(p)}), 0.0, 1.0);
   }
 
   std::pair<glm::dvec3, glm::dvec3> bounds() const override {
@@ -143,7 +130,30 @@ class Wake : public Scene {
   double volume() const override { return pi * (square(kOuter) - square(kWall)) * kSpan; }
 
  private:
-  static constexpr double kWall = 0.5, kOuter = 5.5, kDownstream = 3.6, kSpan = 4, kGathering = 0.6;
+  static constexpr double kWall = 0.5, kOuter = 4.0, kDownstream = 3.0, kSpan = 4, kGathering = 0.6,
+                          kWaveLength = 2.5;
+
+  double street(const glm::dvec3& p) const {
+    const double behind = smoothStep((p.x - 0.6) / 1.4);
+    if (behind == 0) return 0;
+    const double height = 0.42 + 0.03 * p.x;
+    const double along = p.x - 0.22 * std::sin(pi * p.z + 0.4 * p.x);
+    const double upper = roller(along, p.y - height, 1),
+                 lower = roller(along + 0.5 * kWaveLength, height + p.y, -1);
+    const double phase = 2 * pi * along / kWaveLength;
+    const double braid = bump((p.y - 1.2 * height * std::cos(phase)) / 0.16) *
+                         periodicBump(2 * pi * p.z + (std::sin(phase) > 0 ? 0.0 : pi), 4.0) *
+                         square(std::sin(phase));
+    return behind * std::exp(-0.05 * p.x) * (upper + lower + 0.75 * braid);
+  }
+
+  // A core and a spiral arm around each multiple of the wave length.
+  static double roller(double along, double above, double turning) {
+    const double x = along - kWaveLength * std::round(along / kWaveLength);
+    const double radius = std::hypot(x, above);
+    const double arm = 0.5 + 0.5 * std::cos(std::atan2(turning * above, x) - 2 * pi * radius / 0.42);
+    return bump(radius / 0.22) + 0.75 * bump(radius / 0.57) * (1 - bump(radius / 0.25)) * square(arm);
+  }
 
   static double bump(double x) { return std::exp(-x * x); }
   // 1 at multiples of 2 pi, and the narrower in between the larger the concentration.

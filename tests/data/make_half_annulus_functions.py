@@ -45,7 +45,7 @@ SCALARS = {
 for kappa, scalars in SCALARS.items():
     points = []
     for f in scalars:
-        points += [round(f, 9), round(-math.expm1(-kappa(f) * UNIT), 12), 0.5, 0.0]
+        points += [round(f, 9), round(abs(math.expm1(-kappa(f) * UNIT)), 12), 0.5, 0.0]
     preset = {
         "Name": f"half-annulus {kappa.__name__}",
         "ColorSpace": "RGB",

@@ -1,0 +1,122 @@
+#include "stream/file.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "stream/error.h"
+#include "tests/support/faulty_system_calls.h"
+
+namespace curvisplat {
+namespace {
+
+using testing::FaultySystemCalls;
+
+class FileTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder =
+        std::filesystem::path(::testing::TempDir()) /
+        (std::string("curvisplat_file_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::remove_all(folder);
+    std::filesystem::create_directory(folder);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder); }
+
+  std::vector<std::byte> someBytes(size_t count) {
+    std::vector<std::byte> bytes(count);
+    for (size_t n = 0; n < count; ++n) bytes[n] = static_cast<std::byte>(n * 7 + n / 256);
+    return bytes;
+  }
+  static std::string messageOf(const std::function<void()>& work) {
+    try {
+      work();
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  std::filesystem::path folder;
+};
+
+TEST_F(FileTest, ShortAndInterruptedTransfersAreCompleted) {
+  FaultySystemCalls faulty;
+  faulty.largest_transfer = 7;
+  faulty.interrupt_every = 3;
+  const ScopedSystemCalls scope(faulty);
+  const std::vector<std::byte> bytes = someBytes(1000);
+  OutputFile out(folder / "file");
+  out.append(std::span(bytes).first(400));
+  out.append(std::span(bytes).subspan(400));
+  EXPECT_EQ(out.size(), 1000u);
+  out.close();
+
+  const InputFile in(folder / "file");
+  std::vector<std::byte> back(990);
+  in.readAt(10, std::span(back));
+  EXPECT_TRUE(std::equal(back.begin(), back.end(), bytes.begin() + 10));
+  EXPECT_GT(faulty.reads, 100);
+}
+
+TEST_F(FileTest, FailuresNameThePathTheOffsetAndTheReason) {
+  const std::vector<std::byte> bytes = someBytes(100);
+  FaultySystemCalls faulty;
+  faulty.largest_transfer = 40;
+  faulty.fail_write_at = 2;
+  const ScopedSystemCalls scope(faulty);
+  OutputFile out(folder / "full");
+  const std::string full = messageOf([&] { out.append(std::span(bytes)); });
+  EXPECT_NE(full.find((folder / "full").string()), std::string::npos) << full;
+  EXPECT_NE(full.find("offset 80"), std::string::npos) << full;
+  EXPECT_NE(full.find("No space left"), std::string::npos) << full;
+
+  faulty.fail_sync_at = 0;
+  faulty.error = EIO;
+  EXPECT_NE(messageOf([&] { out.close(); }).find("Input/output error"), std::string::npos);
+}
+
+TEST_F(FileTest, ReadingPastTheEndSaysWhereTheFileEnds) {
+  OutputFile out(folder / "short");
+  out.append(std::span<const std::byte>(someBytes(10)));
+  out.close();
+  const InputFile in(folder / "short");
+  std::vector<std::byte> to(20);
+  const std::string message = messageOf([&] { in.readAt(4, std::span(to)); });
+  EXPECT_NE(message.find("ends at byte 10"), std::string::npos) << message;
+}
+
+TEST_F(FileTest, MissingFilesAndFoldersAreRefused) {
+  EXPECT_THROW(InputFile(folder / "none"), Error);
+  EXPECT_THROW(InputFile{folder}, Error);
+  EXPECT_THROW(OutputFile(folder / "none" / "file"), Error);
+}
+
+TEST_F(FileTest, AnAtomicWriteThatFailsLeavesTheOldFile) {
+  writeFileAtomically(folder / "file", std::string("old"));
+  for (const char* stage : {"write", "sync", "rename"}) {
+    FaultySystemCalls faulty;
+    (stage[0] == 'w'   ? faulty.fail_write_at
+     : stage[0] == 's' ? faulty.fail_sync_at
+                       : faulty.fail_rename_at) = 0;
+    {
+      const ScopedSystemCalls scope(faulty);
+      EXPECT_THROW(writeFileAtomically(folder / "file", std::string("new")), Error) << stage;
+    }
+    EXPECT_EQ(readTextFile(folder / "file"), "old") << stage;
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1) << stage;
+  }
+  writeFileAtomically(folder / "file", std::string("new"));
+  EXPECT_EQ(readTextFile(folder / "file"), "new");
+}
+
+TEST_F(FileTest, ATextFileIsBounded) {
+  writeFileAtomically(folder / "file", std::string(100, 'x'));
+  EXPECT_THROW(readTextFile(folder / "file", 99), Error);
+}
+
+}  // namespace
+}  // namespace curvisplat
