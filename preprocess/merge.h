@@ -1,37 +1,89 @@
 // Moment matching: several splats become one that stands for all of them. Design section 3, "Merging".
+//
+// Sums are kept about the first splat added, so that a cluster far from the origin loses no digits. They
+// depend, in their last bits, on the order of the calls. A cluster of any size takes 216 bytes and 80 a
+// variable.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <span>
+#include <vector>
 
+#include "preprocess/shape.h"
 #include "stream/splats.h"
 
 namespace curvisplat {
 
-/// Collects splats (in the order of the calls: sums depend on it in their last bits) and gives the one that
-/// stands for all. Positions are taken from a common origin near them, in world units.
-class SplatMerger {
+/// Many clusters side by side, in a few flat arrays: the voxels of an inner brick. Not for several threads at
+/// once.
+class VoxelMerger {
  public:
-  explicit SplatMerger(size_t variables);
+  VoxelMerger(size_t variables, size_t voxels);
+  /// Empties every voxel. Costs 8 bytes of writing a voxel.
   void clear();
-  /// `position` goes before splat.position. `values` has one element a variable.
-  void add(const glm::dvec3& position, const Splat& splat, std::span<const SplatScalar> values);
 
-  size_t count() const { return count_; }
-  /// Overwrites `splat` (position from the common origin) and `values`. A single splat comes back as it went
-  /// in. If all weights are zero the average is unweighted and the weight is zero. A degenerate axis gets the
-  /// floor of node_splats. At least one splat must have been added.
-  void finish(Splat& splat, std::span<SplatScalar> values) const;
+  /// Adds a splat to cluster `voxel`. `position` goes before splat.position: world units from any origin that
+  /// is common to the voxel's splats. `values` has one element a variable.
+  void add(size_t voxel, const glm::dvec3& position, const Splat& splat, std::span<const SplatScalar> values);
+
+  size_t voxels() const { return clusters_.size(); }
+  /// Splats added to `voxel`. finish() and detail() are for voxels that have some.
+  uint32_t count(size_t voxel) const { return clusters_[voxel].count; }
+
+  /// Overwrites `splat` (position from the same origin) and `values`. A single splat comes back as it went
+  /// in, to the bit. If all weights are zero the average is unweighted and the weight is zero. Degenerate
+  /// axes are floored as in shape.h.
+  void finish(size_t voxel, Splat& splat, std::span<SplatScalar> values) const;
+
   /// World units: the square root of the largest eigenvalue of 12 x the covariance of the merged centres (n³
   /// unit cells: √(n² - 1)). 0 for a single splat. What Brick::error is the largest of.
-  double detail() const;
+  double detail(size_t voxel) const;
 
  private:
-  // sums of weights and moments; to be laid out by the implementation
-  size_t count_ = 0;
+  // Sums about the first splat's position and means: e and d. Each term times the splat's weight.
+  struct GeometrySums {
+    double weight = 0;
+    glm::dvec3 centre{0.0};  // e
+    Symmetric3 centre2;      // e e^T
+    Symmetric3 shape;        // S
+  };
+  struct VariableSums {
+    double mean = 0;        // d
+    glm::dvec3 slope{0.0};  // h + 12 e d
+    double variance = 0;    // t + d^2
+  };
+  struct Cluster {
+    uint32_t count = 0;
+    bool weighted =
+        false;  // a weight > 0 has come; until then each splat counts as 1, from then on by its weight
+  };
+
+  void accumulate(size_t voxel, const glm::dvec3& position, const Splat& splat, const SplatScalar* values);
+  void clearSums(size_t voxel);
+
+  size_t variables_;
+  std::vector<Cluster> clusters_;
+  std::vector<Splat> first_;                 // [voxel], of its first splat
+  std::vector<SplatScalar> first_values_;    // [voxel][variable]
+  std::vector<GeometrySums> sums_;           // [voxel], valid from the second splat on
+  std::vector<VariableSums> variable_sums_;  // [voxel][variable], as sums_
 };
 
-/// A from S = A Aᵀ (lower triangle given: xx, xy, yy, xz, yz, zz), with every singular value floored at
-/// kAxisFloor of the largest. A zero matrix gives a factor of `smallest` on its diagonal.
-inline constexpr double kAxisFloor = 1e-6;
+/// One cluster. As VoxelMerger.
+class SplatMerger {
+ public:
+  explicit SplatMerger(size_t variables) : one_(variables, 1) {}
+  void clear() { one_.clear(); }
+  void add(const glm::dvec3& position, const Splat& splat, std::span<const SplatScalar> values) {
+    one_.add(0, position, splat, values);
+  }
+  size_t count() const { return one_.count(0); }
+  void finish(Splat& splat, std::span<SplatScalar> values) const { one_.finish(0, splat, values); }
+  double detail() const { return one_.detail(0); }
+
+ private:
+  VoxelMerger one_;
+};
 
 }  // namespace curvisplat

@@ -1,4 +1,8 @@
 // Nodes to splats: design section 3. Each node that is there gives one splat, the piece of space around it.
+//
+// A missing neighbour (the block ends, or the node there is blank) makes the node's cell a half cell along
+// that axis: the Jacobian's column is half of the one difference there is, and the splat sits a quarter cell
+// inwards. Without any neighbour along an axis the column is zero.
 #pragma once
 
 #include <cstdint>
@@ -17,15 +21,17 @@ struct NodeSplat {
   bool regular = true;            // weight is a0 a1 a2, and every variable's variance is 0
   bool on_block_face = false;     // may coincide with a node of another face: to be merged by SeamMerger
   glm::dvec3 node_position{0.0};  // where the node itself is
-  double spacing = 0;  // the smallest distance > 0 to a neighbour along an axis; the seams' tolerance
+  double spacing = 0;  // on a block face: the smallest distance > 0 to a neighbour along an axis, 0 if there
+                       // is none; the seams' tolerance. Elsewhere 0
 };
 
 /// The splats of some rows of one block. Values are [splat * variables + variable].
 struct NodeSplats {
   std::vector<NodeSplat> splats;  // in node order
   std::vector<SplatScalar> values;
-  uint64_t degenerate = 0;  // splats with a floored axis
-  uint64_t inverted = 0;    // det J has the other sign than most of the block's: counted, drawn
+  uint64_t degenerate = 0;    // splats with a floored axis
+  uint64_t right_handed = 0;  // of the others: det J > 0
+  uint64_t left_handed = 0;   // det J < 0. The smaller of a whole block's two sums counts its inverted cells
 };
 
 /// A window of one block: `nodes` holds `window`, which is `box` and a halo of one plane in j and k where the

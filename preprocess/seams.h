@@ -12,21 +12,29 @@
 
 namespace curvisplat {
 
-/// Takes the splats of block-face nodes in any order, and gives them back merged, in an order that depends on
-/// the splats alone. Bounded memory: an external sort by the position along one generic direction, in sorted
-/// runs on disk once `memory_bytes` are full, and a sweep over them.
+/// Takes the splats of block-face nodes in any order, and gives them back merged, in an order and with sums
+/// that depend on the splats alone. Bounded memory: an external sort by the position along one generic
+/// direction, in sorted runs on disk once `memory_bytes` are full, and a sweep over them.
 class SeamMerger {
  public:
+  /// The temporary file, if one is needed, has no name in `temporary_folder` once it is open: it vanishes
+  /// with the process, however that ends.
   SeamMerger(size_t variables, uint64_t memory_bytes, std::filesystem::path temporary_folder);
   ~SeamMerger();
+  SeamMerger(SeamMerger&&) noexcept;
+  SeamMerger& operator=(SeamMerger&&) noexcept;
 
-  /// One thread at a time. Every splat is one with on_block_face set.
+  /// One thread at a time. Every splat is one with on_block_face set. Throws Error if the disk fails.
   void add(const NodeSplat& splat, std::span<const SplatScalar> values);
 
-  /// Calls `sink` for each merged splat; its node is the lowest of those merged. Returns how many nodes were
-  /// merged into another one. Nodes merge if they lie within 1e-3 of the smaller of their spacings, or within
-  /// the rounding of their coordinates (4 units in the last place of a coordinate of `coordinate_bytes`
-  /// bytes).
+  /// Calls `sink` for each merged splat: its node (and node_position) is the lowest of those merged, regular
+  /// is false. A node that has no other to merge with comes out as it went in. Returns how many nodes were
+  /// merged into another one. To be called once. Throws Error if the disk fails, and what `sink` throws.
+  ///
+  /// Two nodes merge if they lie within the tolerance of both: 1e-3 of the node's spacing, or the rounding of
+  /// its coordinates (4 units in the last place, for coordinates of `coordinate_bytes` bytes) but then at
+  /// most 0.4 of its spacing, so that neighbours along a grid line never merge, however thin the boundary
+  /// layer, unless they coincide.
   uint64_t finish(int coordinate_bytes,
                   const std::function<void(const NodeSplat&, std::span<const SplatScalar>)>& sink);
 

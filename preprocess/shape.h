@@ -1,0 +1,48 @@
+// The linear algebra of a splat's shape: 3x3, double, and total. Singular, badly scaled and left-handed
+// matrices are everyday input here (polar axes, boundary layers of aspect ratio 1e5), so nothing is squared
+// that need not be and nothing divides by what may be zero.
+#pragma once
+
+#include <array>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+
+#include "stream/splats.h"
+
+namespace curvisplat {
+
+/// The smallest axis of a splat, relative to its largest: singular values of A below are raised to it.
+/// Thinner cells than this are degenerate; cells of a boundary layer (1e-5) are not, and stay as they are.
+inline constexpr double kAxisFloor = 1e-6;
+
+/// A symmetric matrix: its lower triangle.
+struct Symmetric3 {
+  double xx = 0, xy = 0, yy = 0, xz = 0, yz = 0, zz = 0;
+};
+
+/// The shape of a cell: A and the rotation that belongs to it, from J = A Q.
+struct CellShape {
+  std::array<double, 3> axis;   // as Splat's
+  std::array<double, 3> shear;  // as Splat's
+  glm::dmat3 rotation;          // Q, orthogonal, GLM's columns. The slope is Q ∇_c f
+  double determinant;           // of J as it came, with its sign; 0 if J is singular up to rounding
+  bool floored;                 // a singular value was raised
+};
+
+/// A and Q from a Jacobian of any rank, its singular values raised to kAxisFloor of the largest. The zero
+/// matrix gives `smallest` (> 0) on A's diagonal. Throws nothing.
+CellShape shapeFromJacobian(const glm::dmat3& jacobian, double smallest);
+
+/// A (into `splat`'s axis and shear) from S = A Aᵀ, positive semi-definite up to rounding. The floor as
+/// above.
+void setShape(Splat& splat, const Symmetric3& s, double smallest);
+
+/// S = A Aᵀ of a splat.
+Symmetric3 shapeMatrix(const Splat& splat);
+
+/// The singular values of `m`, largest first: the semi-axes of the ellipsoid that `m` makes of the unit
+/// sphere. Of a splat: singularValues(splat.factor()). Exact to a few units in the last place of each for
+/// matrices whose columns are badly scaled, and of the largest otherwise.
+std::array<double, 3> singularValues(const glm::dmat3& m);
+
+}  // namespace curvisplat
