@@ -28,7 +28,16 @@ struct GridBlock {
 
 struct GridScalar {
   std::string name;
-  std::string unit;  // may be empty
+  std::string unit;                  // may be empty
+  std::vector<std::string> aliases;  // other names it answers to
+  uint32_t number = 0;               // of the variable in its function file, from 1; 0: it has none
+};
+
+/// The four numbers before a block's values in a PLOT3D Q file.
+struct FlowConditions {
+  std::string file;
+  uint32_t block = 0;
+  double mach = 0, alpha = 0, reynolds = 0, time = 0;
 };
 
 /// What a source is, for `info` and the manifest.
@@ -37,6 +46,7 @@ struct GridDescription {
   std::vector<std::string> files;
   std::vector<GridBlock> blocks;
   std::vector<GridScalar> scalars;    // all that can be asked for
+  std::vector<FlowConditions> flow;   // of every block of every file that tells
   int coordinate_bytes = 4;           // 4 or 8: the precision of the coordinates as stored
   std::vector<std::string> warnings;  // "bluntfinq.bin: 484 trailing bytes ignored"
 };

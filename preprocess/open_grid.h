@@ -15,7 +15,7 @@ namespace curvisplat {
 struct OpenGridOptions {
   std::filesystem::path grid;
   std::vector<std::filesystem::path> solutions;  // Q and function files; may be empty
-  std::filesystem::path temporary_folder;        // ASCII is spooled to binary here
+  std::filesystem::path temporary_folder;        // ASCII is spooled to binary here; empty: the system's
   Plot3dForce force;                             // what the user says of the layout, over what is detected
 };
 

@@ -39,6 +39,7 @@ struct EncodedBrick {
   std::vector<std::byte> geometry;
   std::vector<std::vector<std::byte>> values;  // [variable]
   std::vector<BrickVariable> variables;        // [variable], without file offsets
+  double weight = 0;                           // sum over the splats, as decoded
 };
 
 /// Encodes `brick` (1 .. kMaxBrickSplats splats) and replaces its contents by what decoding gives, in double.

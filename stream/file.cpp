@@ -64,6 +64,9 @@ int SystemCalls::fsync(int fd) {
 int SystemCalls::rename(const char* from, const char* to) {
   return std::rename(from, to);
 }
+int SystemCalls::exchange(const char* a, const char* b) {
+  return ::renameat2(AT_FDCWD, a, AT_FDCWD, b, RENAME_EXCHANGE);
+}
 SystemCalls& SystemCalls::current() {
   return *current_calls.load(std::memory_order_acquire);
 }

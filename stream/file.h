@@ -25,6 +25,8 @@ class SystemCalls {
   virtual ssize_t pwrite(int fd, const void* from, size_t count, int64_t offset);
   virtual int fsync(int fd);
   virtual int rename(const char* from, const char* to);
+  /// Swaps two names in one step (Linux renameat2).
+  virtual int exchange(const char* a, const char* b);
 
   static SystemCalls& current();
 };

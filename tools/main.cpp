@@ -14,6 +14,9 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", "curvisplat " CURVISPLAT_VERSION);
   app.require_subcommand(1);
   app.set_help_all_flag("--help-all", "Help of every subcommand");
+  addInfo(app);
+  addGenerate(app);
+  addCompare(app);
 
   try {
     app.parse(argc, argv);

@@ -1,0 +1,127 @@
+#include "stream/brick_grids.h"
+
+#include <openvdb/io/File.h>
+#include <openvdb/io/Stream.h>
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <mutex>
+#include <sstream>
+
+#include "stream/checksum.h"
+#include "stream/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kMostFindings = 16;
+constexpr openvdb::Int32 kBackground = -1;
+
+void initialize() {
+  static std::once_flag once;
+  std::call_once(once, [] { openvdb::initialize(); });
+}
+
+std::string gridName(uint32_t level) {
+  return fmt::format("level {}", level);
+}
+
+openvdb::Coord coordOf(const Cell& cell) {
+  return {static_cast<int>(cell.at[0]), static_cast<int>(cell.at[1]), static_cast<int>(cell.at[2])};
+}
+
+bool firstOfItsCell(std::span<const Brick> bricks, size_t brick) {
+  return brick == 0 || !(bricks[brick - 1].cell == bricks[brick].cell);
+}
+
+/// OpenVDB puts a random UUID into each file it writes. A UUID made of the contents keeps the bytes the same.
+void replaceUuid(std::string& file) {
+  constexpr size_t kOffset =
+      21;  // behind magic (8), file, library major and minor version (4 each), flag (1)
+  constexpr size_t kLength = 36;
+  CURVISPLAT_CHECK_OP(file.size(), >, kOffset + kLength);
+  CURVISPLAT_CHECK(file[kOffset + 8] == '-' && file[kOffset + 23] == '-');
+  const auto bytes = std::as_bytes(std::span(file));
+  const uint64_t head = checksumOf(bytes.first(kOffset)), tail = checksumOf(bytes.subspan(kOffset + kLength));
+  const std::string hex = fmt::format("{:016x}{:016x}", head, tail);
+  const std::string uuid = hex.substr(0, 8) + '-' + hex.substr(8, 4) + '-' + hex.substr(12, 4) + '-' +
+                           hex.substr(16, 4) + '-' + hex.substr(20, 12);
+  file.replace(kOffset, kLength, uuid);
+}
+
+}  // namespace
+
+std::vector<std::byte> brickGridsFile(const RootCube& root, std::span<const Brick> bricks) {
+  initialize();
+  openvdb::GridPtrVec grids;
+  openvdb::Int32Grid::Ptr grid;
+  for (size_t n = 0; n < bricks.size(); ++n) {
+    const Cell& cell = bricks[n].cell;
+    if (n == 0 || cell.level != bricks[n - 1].cell.level) {
+      grid = openvdb::Int32Grid::create(kBackground);
+      grid->setName(gridName(cell.level));
+      const double size = root.cellSize(cell.level);
+      const auto transform = openvdb::math::Transform::createLinearTransform(size);
+      // An index is the middle of its voxel.
+      transform->postTranslate(openvdb::Vec3d(root.min.x, root.min.y, root.min.z) +
+                               openvdb::Vec3d(0.5 * size));
+      grid->setTransform(transform);
+      grids.push_back(grid);
+    }
+    if (firstOfItsCell(bricks, n)) grid->tree().setValue(coordOf(cell), static_cast<openvdb::Int32>(n));
+  }
+  std::ostringstream stream(std::ios::binary);
+  openvdb::io::Stream(stream).write(grids);
+  std::string file = std::move(stream).str();
+  replaceUuid(file);
+  const auto bytes = std::as_bytes(std::span(file));
+  return {bytes.begin(), bytes.end()};
+}
+
+std::vector<std::string> compareBrickGrids(const std::filesystem::path& path, std::span<const Brick> bricks) {
+  initialize();
+  openvdb::GridPtrVecPtr grids;
+  try {
+    openvdb::io::File file(path.string());
+    file.open(/*delayLoad=*/false);
+    grids = file.getGrids();
+    file.close();
+  } catch (const openvdb::Exception& error) {
+    throw Error("{}: OpenVDB cannot read it: {}", path.string(), error.what());
+  }
+  std::vector<std::string> findings;
+  const auto find = [&](std::string finding) {
+    if (findings.size() < kMostFindings) findings.push_back(path.string() + ": " + std::move(finding));
+  };
+  std::vector<openvdb::Int32Grid::Ptr> levels(bricks.back().cell.level + 1);
+  for (const auto& grid : *grids) {
+    const auto ints = openvdb::gridPtrCast<openvdb::Int32Grid>(grid);
+    uint32_t level = 0;
+    while (level < levels.size() && grid->getName() != gridName(level)) ++level;
+    if (!ints || level == levels.size())
+      find(fmt::format("a grid '{}' that is none of the octree's levels", grid->getName()));
+    else
+      levels[level] = ints;
+  }
+  std::vector<uint64_t> cells(levels.size());
+  for (size_t n = 0; n < bricks.size(); ++n) {
+    if (!firstOfItsCell(bricks, n)) continue;
+    const Cell& cell = bricks[n].cell;
+    ++cells[cell.level];
+    if (!levels[cell.level]) continue;
+    const auto value = levels[cell.level]->tree().getValue(coordOf(cell));
+    if (value != static_cast<openvdb::Int32>(n))
+      find(fmt::format("level {}, cell {} {} {} says brick {}, bricks.bin {}", cell.level, cell.at[0],
+                       cell.at[1], cell.at[2], value, n));
+  }
+  for (size_t level = 0; level < levels.size(); ++level) {
+    if (!levels[level])
+      find(fmt::format("no grid '{}'", gridName(static_cast<uint32_t>(level))));
+    else if (levels[level]->activeVoxelCount() != cells[level])
+      find(fmt::format("level {} has {} cells, bricks.bin {}", level, levels[level]->activeVoxelCount(),
+                       cells[level]));
+  }
+  return findings;
+}
+
+}  // namespace curvisplat

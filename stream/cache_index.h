@@ -1,0 +1,27 @@
+// Reads the tables of a cache and refuses whatever cannot be: afterwards every link of the octree leads where
+// it should, every extent lies in its file and apart from the others, and every number is finite. What a
+// damaged disk or a hostile file could do to the program, it would have to do here.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "stream/brick.h"
+#include "stream/file.h"
+#include "stream/manifest.h"
+
+namespace curvisplat {
+
+std::string variableFileName(const VariableInfo& variable);
+
+/// bricks.bin of the folder `cache`, checked in itself and against the manifest. Throws Error.
+std::vector<Brick> readBricks(const std::filesystem::path& cache, const Manifest& manifest);
+
+/// The table of a var.<number>.bin. Throws Error.
+std::vector<BrickVariable> readVariableTable(const InputFile& file, const Manifest& manifest, size_t bricks);
+
+/// Throws Error unless the manifest lists `file` with the size it has.
+const FileInfo& checkFile(const InputFile& file, const Manifest& manifest);
+
+}  // namespace curvisplat

@@ -1,0 +1,246 @@
+#include "stream/cache_writer.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <optional>
+
+#include "stream/brick_grids.h"
+#include "stream/cache_format.h"
+#include "stream/cache_index.h"
+#include "stream/checksum.h"
+#include "stream/error.h"
+#include "stream/file.h"
+#include "stream/partial_folder.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr std::array<std::byte, kPageBytes> kZeros{};
+
+/// Appends zeros up to `offset`.
+void padTo(OutputFile& file, uint64_t offset) {
+  CURVISPLAT_CHECK_OP(offset - file.size(), <=, kPageBytes);
+  file.append(std::span(kZeros).first(offset - file.size()));
+}
+
+/// Appends a stream where cache_format.h wants it. Returns its offset.
+uint64_t appendStream(OutputFile& file, std::span<const std::byte> stream) {
+  padTo(file, streamOffset(file.size(), stream.size()));
+  const uint64_t offset = file.size();
+  file.append(stream);
+  return offset;
+}
+
+template <typename Record>
+std::span<const std::byte> bytesOf(const std::vector<Record>& records) {
+  return std::as_bytes(std::span(records));
+}
+
+template <typename Record>
+std::span<const std::byte> bytesOf(const Record& record) {
+  return std::as_bytes(std::span(&record, 1));
+}
+
+/// Positions in `bricks`, level by level and in Morton order; equal cells as they were appended.
+std::vector<uint32_t> indexOrder(const std::vector<Brick>& bricks) {
+  std::vector<uint32_t> order(bricks.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+    const Cell &cell = bricks[a].cell, &other = bricks[b].cell;
+    return cell.level != other.level ? cell.level < other.level : mortonLess(cell, other);
+  });
+  return order;
+}
+
+/// Links parents and children of `bricks`, which are in index order. A brick without a parent, and two bricks
+/// of one cell that are not leaves, are bugs of whoever appended them.
+void linkOctree(std::vector<Brick>& bricks) {
+  CURVISPLAT_CHECK_OP(bricks.front().cell.level, ==, 0u);
+  // Parents and children go through their levels in the same order.
+  uint32_t parent = 0;
+  for (uint32_t n = 0; n < bricks.size(); ++n) {
+    const Cell& cell = bricks[n].cell;
+    if (cell.level == 0) continue;
+    while (parent < n && !(bricks[parent].cell == cell.parent())) ++parent;
+    CURVISPLAT_CHECK(parent < n && "every brick's parent has been appended");
+    Brick& above = bricks[parent];
+    if (above.child_count == 0) above.first_child = n;
+    ++above.child_count;
+    bricks[n].parent = parent;
+  }
+  for (uint32_t n = 1; n < bricks.size(); ++n)
+    if (bricks[n].cell == bricks[n - 1].cell)
+      CURVISPLAT_CHECK(bricks[n].isLeaf() && bricks[n - 1].isLeaf() && "only leaves share a cell");
+}
+
+}  // namespace
+
+struct CacheWriter::State {
+  State(std::filesystem::path cache, bool overwrite, const RootCube& root_cube,
+        std::vector<VariableInfo> variable_infos)
+      : folder(std::move(cache), overwrite),
+        root(root_cube),
+        variables(std::move(variable_infos)),
+        geometry(folder.path() / "geometry.bin"),
+        tables(variables.size()) {
+    for (const VariableInfo& variable : variables) {
+      values.emplace_back(folder.path() / variableFileName(variable));
+      values.back().append(bytesOf(VariableHeader{}));  // its place; finish() fills it in
+    }
+  }
+
+  FileInfo writeIndex(const std::vector<Brick>& ordered);
+  FileInfo writeTable(size_t variable, const std::vector<uint32_t>& order);
+  FileInfo writeGrids(const std::vector<Brick>& ordered);
+  FileInfo closeGeometry(const std::vector<Brick>& ordered);
+
+  PartialFolder folder;
+  RootCube root;
+  std::vector<VariableInfo> variables;
+  OutputFile geometry;
+  std::vector<OutputFile> values;                  // [variable]
+  std::vector<Brick> bricks;                       // as appended
+  std::vector<double> weights;                     // [brick]
+  std::vector<std::vector<BrickVariable>> tables;  // [variable][brick]
+  // For readBack; opened when it is first asked for.
+  std::optional<InputFile> geometry_input;
+  std::vector<InputFile> values_input;
+};
+
+CacheWriter::CacheWriter(std::filesystem::path cache, bool overwrite, RootCube root,
+                         std::vector<VariableInfo> variables)
+    : state_(std::make_unique<State>(std::move(cache), overwrite, root, std::move(variables))) {}
+
+CacheWriter::~CacheWriter() = default;
+
+uint64_t CacheWriter::append(EncodedBrick&& encoded, float error) {
+  State& s = *state_;
+  CURVISPLAT_CHECK_OP(encoded.values.size(), ==, s.variables.size());
+  Brick brick = encoded.brick;
+  brick.error = error;
+  brick.geometry.offset = appendStream(s.geometry, encoded.geometry);
+  for (size_t v = 0; v < encoded.values.size(); ++v) {
+    encoded.variables[v].values.offset = appendStream(s.values[v], encoded.values[v]);
+    s.tables[v].push_back(encoded.variables[v]);
+  }
+  s.bricks.push_back(brick);
+  s.weights.push_back(encoded.weight);
+  return s.bricks.size() - 1;
+}
+
+BrickSplats CacheWriter::readBack(uint64_t id) const {
+  State& s = *state_;
+  CURVISPLAT_CHECK_OP(id, <, s.bricks.size());
+  if (!s.geometry_input) {
+    s.geometry_input.emplace(s.geometry.path());
+    for (const OutputFile& file : s.values) s.values_input.emplace_back(file.path());
+  }
+  const Brick& brick = s.bricks[id];
+  const auto read = [](const InputFile& file, const Extent& extent) {
+    std::vector<std::byte> bytes(extent.length);
+    file.readAt(extent.offset, std::span(bytes));
+    return bytes;
+  };
+  const std::vector<std::byte> geometry = read(*s.geometry_input, brick.geometry);
+  std::vector<BrickVariable> variables;
+  std::vector<std::vector<std::byte>> values;
+  for (size_t v = 0; v < s.variables.size(); ++v) {
+    variables.push_back(s.tables[v][id]);
+    values.push_back(read(s.values_input[v], variables.back().values));
+  }
+  return decodeForMerging(s.root, brick, geometry, variables, values);
+}
+
+void CacheWriter::finish(Manifest manifest) {
+  State& s = *state_;
+  if (s.bricks.empty())
+    throw Error("{}: there is nothing to write: no brick has a splat", s.folder.path().string());
+  const std::vector<uint32_t> order = indexOrder(s.bricks);
+  std::vector<Brick> ordered;
+  ordered.reserve(order.size());
+  for (uint32_t id : order) ordered.push_back(s.bricks[id]);
+  linkOctree(ordered);
+
+  manifest.root = s.root;
+  manifest.bricks = ordered.size();
+  manifest.levels = ordered.back().cell.level + 1;
+  manifest.splats = 0;
+  manifest.volume = 0;
+  for (size_t n = 0; n < ordered.size(); ++n) {
+    if (!ordered[n].isLeaf()) continue;
+    manifest.splats += ordered[n].splats;
+    manifest.volume += s.weights[order[n]];
+  }
+  if (manifest.variables.empty()) manifest.variables = s.variables;
+  CURVISPLAT_CHECK_OP(manifest.variables.size(), ==, s.variables.size());
+  if (manifest.steps.empty()) manifest.steps.emplace_back();
+  manifest.steps.front().variables.clear();
+  for (size_t v = 0; v < s.variables.size(); ++v) {
+    CURVISPLAT_CHECK_OP(manifest.variables[v].number, ==, s.variables[v].number);
+    manifest.steps.front().variables.push_back(s.variables[v].number);
+  }
+
+  manifest.files.clear();
+  manifest.files.push_back(s.writeIndex(ordered));
+  manifest.files.push_back(s.closeGeometry(ordered));
+  for (size_t v = 0; v < s.variables.size(); ++v) manifest.files.push_back(s.writeTable(v, order));
+  manifest.files.push_back(s.writeGrids(ordered));
+  writeFileAtomically(s.folder.path() / "manifest.json", manifest.toJson());
+  s.folder.putIntoPlace();
+}
+
+FileInfo CacheWriter::State::writeIndex(const std::vector<Brick>& ordered) {
+  std::vector<BrickRecord> records;
+  records.reserve(ordered.size());
+  for (const Brick& brick : ordered) records.push_back(recordOf(brick));
+  BricksHeader header;
+  header.record_bytes = sizeof(BrickRecord);
+  header.bricks = ordered.size();
+  OutputFile file(folder.path() / "bricks.bin");
+  file.append(bytesOf(header));
+  file.append(bytesOf(records));
+  Checksum checksum;
+  checksum.add(bytesOf(header));
+  checksum.add(bytesOf(records));
+  const FileInfo info{"bricks.bin", file.size(), checksum.value()};
+  file.close();
+  return info;
+}
+
+FileInfo CacheWriter::State::closeGeometry(const std::vector<Brick>& ordered) {
+  padTo(geometry, (geometry.size() + kPageBytes - 1) / kPageBytes * kPageBytes);
+  const FileInfo info{"geometry.bin", geometry.size(), geometryChecksum(ordered)};
+  geometry.close();
+  return info;
+}
+
+FileInfo CacheWriter::State::writeTable(size_t variable, const std::vector<uint32_t>& order) {
+  std::vector<VariableRecord> records;
+  records.reserve(order.size());
+  for (uint32_t id : order) records.push_back(recordOf(tables[variable][id]));
+  OutputFile& file = values[variable];
+  padTo(file, (file.size() + kPageBytes - 1) / kPageBytes * kPageBytes);
+  VariableHeader header;
+  header.record_bytes = sizeof(VariableRecord);
+  header.bricks = order.size();
+  header.table_offset = file.size();
+  file.append(bytesOf(records));
+  file.writeAt(0, bytesOf(header));
+  Checksum checksum;
+  checksum.add(bytesOf(header));
+  checksum.add(bytesOf(records));
+  const FileInfo info{variableFileName(variables[variable]), file.size(), checksum.value()};
+  file.close();
+  return info;
+}
+
+FileInfo CacheWriter::State::writeGrids(const std::vector<Brick>& ordered) {
+  const std::vector<std::byte> bytes = brickGridsFile(root, ordered);
+  OutputFile file(folder.path() / "bricks.vdb");
+  file.append(std::span(bytes));
+  file.close();
+  return {"bricks.vdb", bytes.size(), checksumOf(bytes)};
+}
+
+}  // namespace curvisplat

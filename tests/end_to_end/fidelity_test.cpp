@@ -1,0 +1,184 @@
+// The whole program against the specification: generate, convert and render the half-annulus of design
+// section 9, and compare with the reference ray march of the analytic field.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+
+#include "preprocess/scenes.h"
+#include "render/image.h"
+#include "stream/file.h"
+#include "tests/support/reference_march.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr ImageSize kSize{256, 256};
+
+std::string words(const glm::dvec3& v) {
+  return fmt::format("{},{},{}", v.x, v.y, v.z);
+}
+
+Image toImage(const ReferenceImage& reference) {
+  Image image(reference.size);
+  for (size_t n = 0; n < reference.pixels.size(); ++n) {
+    for (int c = 0; c < 3; ++c)
+      image.rgba[4 * n + static_cast<size_t>(c)] = static_cast<float>(reference.pixels[n].colour[c]);
+    image.rgba[4 * n + 3] = 1;
+  }
+  return image;
+}
+
+Image absoluteDifference(const Image& a, const Image& b) {
+  Image difference(a.size);
+  for (size_t n = 0; n < a.rgba.size(); ++n)
+    difference.rgba[n] = n % 4 == 3 ? 1 : 20 * std::abs(a.rgba[n] - b.rgba[n]);
+  return difference;
+}
+
+// What a person needs to see what went wrong: the picture, what it should be, and 20 times the difference.
+void leavePictures(const std::string& name, const Image& picture, const Image& reference) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "curvisplat_fidelity";
+  std::filesystem::create_directories(folder);
+  writeImage(picture, folder / (name + "_picture.png"));
+  writeImage(reference, folder / (name + "_reference.png"));
+  writeImage(absoluteDifference(picture, reference), folder / (name + "_difference_x20.png"));
+  ADD_FAILURE() << "pictures are in " << folder;
+}
+
+class Fidelity : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { folder_ = std::make_unique<TemporaryFolder>(); }
+  static void TearDownTestSuite() { folder_.reset(); }
+
+  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
+
+  static void run(const std::vector<std::string>& arguments) {
+    const ProgramResult result = runProgram(arguments);
+    ASSERT_EQ(result.status, 0) << result.err;
+    ASSERT_EQ(result.err, "");
+  }
+
+  /// The cache of a scene of 128 x 64 x 64 nodes, converted by the first who asks.
+  static std::string cacheOf(const std::string& scene) {
+    const std::string cache = file(scene + ".splats");
+    if (!std::filesystem::exists(cache)) {
+      run({"generate", scene, "--size", "128x64x64", "-o", file(scene)});
+      run({"convert", file(scene + ".xyz"), file(scene + ".fun"), "-o", cache});
+    }
+    return cache;
+  }
+
+  static void render(const std::string& scene, const std::string& function, const std::string& output,
+                     std::vector<std::string> more = {}) {
+    const Camera camera = halfAnnulusCamera();
+    std::vector<std::string> arguments{"render",
+                                       cacheOf(scene),
+                                       "-o",
+                                       output,
+                                       "--size",
+                                       fmt::format("{}x{}", kSize.width, kSize.height),
+                                       "--tf",
+                                       fmt::format("{}/half_annulus_{}.json", CURVISPLAT_TEST_DATA, function),
+                                       "--position",
+                                       words(camera.position),
+                                       "--focal-point",
+                                       words(camera.focal_point),
+                                       "--view-up",
+                                       words(camera.view_up),
+                                       "--parallel-scale",
+                                       fmt::format("{}", camera.parallel_scale),
+                                       "--background",
+                                       "white",
+                                       "--lod-pixels",
+                                       "0",
+                                       "--classify",
+                                       "pixel"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    run(arguments);
+  }
+
+  static void expectPsnr(const std::string& name, const OpticalFunction& function, double least_db) {
+    render("half-annulus", name, file(name + ".pfm"));
+    if (HasFatalFailure()) return;
+    const Image picture = readImage(file(name + ".pfm"));
+    const Image reference =
+        toImage(referenceMarch(*makeScene("half-annulus"), function, halfAnnulusCamera(), kSize));
+    const double psnr_db = compareImages(picture, reference).psnr_db;
+    RecordProperty("psnr_db", fmt::format("{:.2f}", psnr_db));
+    fmt::print("{}: {:.2f} dB\n", name, psnr_db);
+    EXPECT_GE(psnr_db, least_db);
+    if (psnr_db < least_db) leavePictures(name, picture, reference);
+  }
+
+  static std::unique_ptr<TemporaryFolder> folder_;
+};
+
+std::unique_ptr<TemporaryFolder> Fidelity::folder_;
+
+// Whether every pixel within `distance` of (x, y) is one that sees the scene.
+bool insideSilhouette(const ReferenceImage& reference, int x, int y, int distance) {
+  for (int dy = -distance; dy <= distance; ++dy)
+    for (int dx = -distance; dx <= distance; ++dx) {
+      if (dx * dx + dy * dy > distance * distance) continue;
+      const int nx = x + dx, ny = y + dy;
+      if (nx < 0 || ny < 0 || nx >= reference.size.width || ny >= reference.size.height) return false;
+      if (reference.at(nx, ny).transmittance == 1) return false;
+    }
+  return true;
+}
+
+TEST_F(Fidelity, ConstantFieldHasTheAnalyticTransmittance) {
+  render("half-annulus-constant", "smooth", file("constant.pfm"));
+  if (HasFatalFailure()) return;
+  const Image picture = readImage(file("constant.pfm"));
+  const ReferenceImage reference =
+      referenceMarch(*makeScene("half-annulus-constant"), smoothFunction, halfAnnulusCamera(), kSize);
+  double largest = 0;
+  int pixels = 0, worst_x = 0, worst_y = 0;
+  for (int y = 0; y < kSize.height; ++y)
+    for (int x = 0; x < kSize.width; ++x) {
+      if (!insideSilhouette(reference, x, y, 4)) continue;
+      ++pixels;
+      // f = 0.5 has no blue, so that the blue over white is the transmittance.
+      const double error = std::abs(picture.pixel(x, y)[2] - reference.at(x, y).transmittance);
+      if (error > largest) {
+        largest = error;
+        worst_x = x;
+        worst_y = y;
+      }
+    }
+  fmt::print("constant: largest error {:.5f} at ({}, {}) of {} pixels\n", largest, worst_x, worst_y, pixels);
+  EXPECT_GT(pixels, 10000);
+  EXPECT_LE(largest, 0.015);
+  if (largest > 0.015) leavePictures("constant", picture, toImage(reference));
+}
+
+TEST_F(Fidelity, SmoothFunction) {
+  expectPsnr("smooth", smoothFunction, 57);
+}
+
+TEST_F(Fidelity, NarrowBand) {
+  expectPsnr("band", bandFunction, 57);
+}
+
+TEST_F(Fidelity, Step) {
+  expectPsnr("step", stepFunction, 52);
+}
+
+TEST_F(Fidelity, IsTheSameBytesForAnyThreadsAndAgain) {
+  render("half-annulus", "smooth", file("one.png"), {"--threads", "1"});
+  render("half-annulus", "smooth", file("two.png"), {"--threads", "2"});
+  render("half-annulus", "smooth", file("again.png"), {"--threads", "2"});
+  if (HasFatalFailure()) return;
+  const std::string one = readTextFile(file("one.png"));
+  EXPECT_EQ(one == readTextFile(file("two.png")), true);
+  EXPECT_EQ(one == readTextFile(file("again.png")), true);
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,262 @@
+// Writing a cache and reading it again; what an unfinished, overwritten or damaged one does.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "stream/cache_format.h"
+#include "stream/cache_reader.h"
+#include "stream/error.h"
+#include "tests/stream/test_bricks.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The message of the Error that `work` throws.
+template <typename Work>
+std::string errorOf(Work work) {
+  try {
+    work();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+bool says(const std::string& message, const std::string& words) {
+  return message.find(words) != std::string::npos;
+}
+
+TEST(Cache, GivesBackWhatWasAppended) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.splats";
+  SmallCache cache;
+  cache.write(path);
+  const CacheReader reader(path);
+  ASSERT_EQ(reader.bricks().size(), 10u);
+  EXPECT_EQ(reader.manifest().levels, 2u);
+  EXPECT_EQ(reader.manifest().title, "small");
+  EXPECT_EQ(reader.variableNamed(""), 0u);
+  EXPECT_EQ(reader.variableNamed("mach"), 1u);
+  EXPECT_THROW(reader.variableNamed("nothing"), UsageError);
+
+  const Brick& root = reader.bricks()[0];
+  EXPECT_EQ(root.first_child, 1u);
+  EXPECT_EQ(root.child_count, 9u);
+  EXPECT_FLOAT_EQ(root.error, 0.5f);
+
+  uint64_t splats = 0;
+  double volume = 0;
+  for (uint32_t n = 1; n < 10; ++n) {
+    const Brick& brick = reader.bricks()[n];
+    const BrickSplats& leaf = cache.leaves[n - 1];
+    ASSERT_EQ(brick.cell, leaf.cell);
+    ASSERT_EQ(brick.splats, leaf.size());
+    EXPECT_EQ(brick.parent, 0u);
+    EXPECT_TRUE(brick.isLeaf());
+    SplatGeometry geometry;
+    std::vector<NodeRun> runs;
+    reader.readGeometry(n, geometry, &runs);
+    EXPECT_EQ(runs, leaf.runs);
+    SplatVariable values;
+    reader.readVariable(n, 1, values);
+    const glm::dvec3 corner = reader.manifest().root.cellMin(brick.cell);
+    for (size_t s = 0; s < leaf.size(); ++s) {
+      ASSERT_NEAR(corner.x + geometry.x[s], leaf.splats[s].position.x, 1e-6);
+      ASSERT_NEAR(corner.z + geometry.z[s], leaf.splats[s].position.z, 1e-6);
+      ASSERT_FLOAT_EQ(geometry.axis1[s], static_cast<float>(leaf.splats[s].axis[1]));
+      ASSERT_FLOAT_EQ(geometry.weight[s], static_cast<float>(leaf.splats[s].weight));
+      ASSERT_FLOAT_EQ(values.mean[s], static_cast<float>(leaf.variables[1][s].mean));
+      ASSERT_LE(reader.brickVariables(1)[n].min, values.mean[s]);
+      volume += leaf.splats[s].weight;
+    }
+    splats += leaf.size();
+  }
+  EXPECT_EQ(reader.manifest().splats, splats);
+  EXPECT_NEAR(reader.manifest().volume, volume, 1e-12 * volume);
+}
+
+TEST(Cache, StreamsKeepToTheirPages) {
+  const TemporaryFolder folder;
+  SmallCache().write(folder.path() / "a.splats");
+  const CacheReader reader(folder.path() / "a.splats");
+  for (const Brick& brick : reader.bricks()) {
+    const Extent& extent = brick.geometry;
+    const uint64_t pages =
+        (extent.offset + extent.length + kPageBytes - 1) / kPageBytes - extent.offset / kPageBytes;
+    EXPECT_EQ(pages, (extent.length + kPageBytes - 1) / kPageBytes);
+  }
+  EXPECT_EQ(fs::file_size(folder.path() / "a.splats/geometry.bin") % kPageBytes, 0u);
+}
+
+TEST(Cache, ReadsBackWhileWriting) {
+  const TemporaryFolder folder;
+  SmallCache cache;
+  CacheWriter writer(folder.path() / "a.splats", false, cache.root,
+                     {{0, "density", "", 0, 1}, {1, "mach", "", 0, 1}});
+  cache.append(writer, 1);
+  const BrickSplats back = writer.readBack(2);
+  const BrickSplats& leaf = cache.leaves[2];
+  EXPECT_EQ(back.positions, leaf.positions);
+  EXPECT_EQ(back.runs, leaf.runs);
+  for (size_t s = 0; s < leaf.size(); ++s) {
+    ASSERT_EQ(back.splats[s].axis, leaf.splats[s].axis);
+    ASSERT_EQ(back.splats[s].shear, leaf.splats[s].shear);
+    ASSERT_EQ(back.splats[s].weight, leaf.splats[s].weight);
+    ASSERT_EQ(back.variables[1][s].mean, leaf.variables[1][s].mean);
+    ASSERT_EQ(back.variables[1][s].slope, leaf.variables[1][s].slope);
+    ASSERT_EQ(back.variables[1][s].variance, leaf.variables[1][s].variance);
+  }
+}
+
+TEST(Cache, EqualAppendsGiveEqualBytes) {
+  const TemporaryFolder folder;
+  SmallCache().write(folder.path() / "a.splats");
+  SmallCache().write(folder.path() / "b.splats");
+  size_t files = 0;
+  for (const auto& entry : fs::directory_iterator(folder.path() / "a.splats")) {
+    EXPECT_EQ(bytesOfFile(entry.path()), bytesOfFile(folder.path() / "b.splats" / entry.path().filename()))
+        << entry.path();
+    ++files;
+  }
+  EXPECT_EQ(files, 6u);  // manifest, bricks, grids, geometry, two variables: the lock is gone
+}
+
+TEST(Cache, SeveralBricksMayShareTheRoot) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.splats";
+  SmallCache cache;
+  {
+    CacheWriter writer(path, false, cache.root, {});
+    RandomBrick like;
+    like.variables = 0;
+    for (uint64_t n = 0; n < 3; ++n) {
+      BrickSplats brick = randomBrick(like, Cell{}, n);
+      writer.append(encodeBrick(cache.root, brick), 0);
+    }
+    writer.finish(cache.manifest());
+  }
+  const CacheReader reader(path);
+  EXPECT_EQ(reader.bricks().size(), 3u);
+  EXPECT_EQ(reader.manifest().splats, 3000u);
+  EXPECT_EQ(reader.manifest().levels, 1u);
+}
+
+TEST(Cache, UnfinishedDoesNotOpenAndIsRemoved) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.splats";
+  {
+    SmallCache cache;
+    CacheWriter writer(path, false, cache.root, {{0, "density", "", 0, 1}, {1, "mach", "", 0, 1}});
+    cache.append(writer, 1);
+    EXPECT_THROW(CacheReader reader(path), Error);
+    EXPECT_THROW(CacheReader reader(folder.path() / "a.splats.partial"), Error);
+  }
+  EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
+TEST(Cache, TwoConversionsToOneOutputRefuse) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.splats";
+  const CacheWriter first(path, false, RootCube{}, {});
+  EXPECT_PRED2(says, errorOf([&] { CacheWriter second(path, true, RootCube{}, {}); }), "running");
+  // Named with a slash it is the same output.
+  EXPECT_PRED2(says, errorOf([&] { CacheWriter second(path / "", true, RootCube{}, {}); }), "running");
+}
+
+TEST(Cache, ADeadConversionsRestIsCleared) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder.path() / "a.splats.partial/inner");
+  overwriteFile(folder.path() / "a.splats.partial/lock", "");
+  overwriteFile(folder.path() / "a.splats.partial/var.7.bin", "rest");
+  SmallCache().write(folder.path() / "a.splats");
+  EXPECT_FALSE(fs::exists(folder.path() / "a.splats/var.7.bin"));
+  CacheReader reader(folder.path() / "a.splats");
+}
+
+TEST(Cache, OverwritingKeepsTheOldCacheUntilFinish) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.splats";
+  SmallCache().write(path);
+  const std::string old = bytesOfFile(path / "geometry.bin");
+  EXPECT_PRED2(says, errorOf([&] { SmallCache().write(path); }), "exists already");
+  {
+    SmallCache cache;
+    CacheWriter writer(path, true, cache.root, {{0, "density", "", 0, 1}, {1, "mach", "", 0, 1}});
+    cache.append(writer, 2);
+    CacheReader reader(path);
+    EXPECT_EQ(bytesOfFile(path / "geometry.bin"), old);
+  }
+  EXPECT_EQ(bytesOfFile(path / "geometry.bin"), old);
+  SmallCache().write(path, true, 2);
+  EXPECT_NE(bytesOfFile(path / "geometry.bin"), old);
+  CacheReader reader(path);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
+}
+
+TEST(Cache, OverwritesNothingButCaches) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "mine";
+  fs::create_directory(path);
+  overwriteFile(path / "thesis.tex", "years");
+  EXPECT_PRED2(says, errorOf([&] { SmallCache().write(path, true); }), "not a whole splat cache");
+  EXPECT_TRUE(fs::exists(path / "thesis.tex"));
+}
+
+TEST(Cache, AnUnwritableOutputIsAnError) {
+  EXPECT_PRED2(says, errorOf([] { SmallCache().write("/proc/a.splats"); }), "/proc/a.splats");
+}
+
+TEST(Cache, ADamagedPayloadNamesItsBrick) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.splats";
+  SmallCache().write(path);
+  const Extent extent = CacheReader(path).bricks()[4].geometry;
+  std::string bytes = bytesOfFile(path / "geometry.bin");
+  bytes[extent.offset + extent.length / 2] ^= 4;
+  overwriteFile(path / "geometry.bin", bytes);
+  const CacheReader reader(path);  // payloads are not read
+  SplatGeometry geometry;
+  reader.readGeometry(3, geometry);
+  const std::string error = errorOf([&] { reader.readGeometry(4, geometry); });
+  EXPECT_PRED2(says, error, "brick 4");
+  EXPECT_PRED2(says, error, "geometry.bin");
+}
+
+/// Each table's every bit: flipped, the cache must not open. (The manifest's texts and numbers are not all
+/// covered by a checksum: its own test is in manifest_test.)
+TEST(Cache, DamagedTablesAreRefused) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.splats";
+  SmallCache().write(path);
+  const uint64_t table = fs::file_size(path / "var.0.bin") - 10 * sizeof(VariableRecord);
+  for (const auto& [name, from] : {std::pair<std::string, uint64_t>{"bricks.bin", 0}, {"var.0.bin", table}}) {
+    const std::string good = bytesOfFile(path / name);
+    for (uint64_t byte = from; byte < good.size(); byte += 3) {
+      std::string bad = good;
+      bad[byte] ^= static_cast<char>(1 << byte % 8);
+      overwriteFile(path / name, bad);
+      ASSERT_THROW(CacheReader reader(path), Error) << name << " byte " << byte;
+    }
+    overwriteFile(path / name, good);
+  }
+  CacheReader reader(path);
+}
+
+TEST(Cache, TruncatedFilesAreRefused) {
+  const TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.splats";
+  SmallCache().write(path);
+  for (const std::string name : {"bricks.bin", "geometry.bin", "var.0.bin", "var.1.bin", "bricks.vdb"}) {
+    const std::string good = bytesOfFile(path / name);
+    overwriteFile(path / name, good.substr(0, good.size() - 1));
+    EXPECT_PRED2(says, errorOf([&] { CacheReader reader(path); }), name);
+    fs::remove(path / name);
+    EXPECT_PRED2(says, errorOf([&] { CacheReader reader(path); }), name);
+    overwriteFile(path / name, good);
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,102 @@
+#include "tests/support/run_program.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <system_error>
+
+extern char** environ;
+
+namespace curvisplat {
+namespace {
+
+void require(bool condition, int error, const char* what) {
+  if (!condition) throw std::system_error(error, std::generic_category(), what);
+}
+
+struct Pipe {
+  int read_end = -1, write_end = -1;
+
+  Pipe() {
+    int ends[2];
+    require(pipe2(ends, O_CLOEXEC) == 0, errno, "pipe2");
+    read_end = ends[0];
+    write_end = ends[1];
+  }
+  ~Pipe() {
+    closeEnd(read_end);
+    closeEnd(write_end);
+  }
+  Pipe(const Pipe&) = delete;
+  Pipe& operator=(const Pipe&) = delete;
+
+  static void closeEnd(int& end) {
+    if (end >= 0) close(end);
+    end = -1;
+  }
+};
+
+// Reads both pipes to their ends, whichever has something, so that the program never waits on a full one.
+void drain(Pipe& out, std::string& out_text, Pipe& err, std::string& err_text) {
+  std::array<Pipe*, 2> pipes{&out, &err};
+  std::array<std::string*, 2> texts{&out_text, &err_text};
+  while (out.read_end >= 0 || err.read_end >= 0) {
+    std::array<pollfd, 2> waiting{{{out.read_end, POLLIN, 0}, {err.read_end, POLLIN, 0}}};
+    if (poll(waiting.data(), waiting.size(), -1) < 0) {
+      require(errno == EINTR, errno, "poll");
+      continue;
+    }
+    for (size_t n = 0; n < 2; ++n) {
+      if (waiting[n].revents == 0) continue;
+      std::array<char, 4096> buffer;
+      const ssize_t got = read(pipes[n]->read_end, buffer.data(), buffer.size());
+      if (got > 0)
+        texts[n]->append(buffer.data(), static_cast<size_t>(got));
+      else if (got == 0 || errno != EINTR)
+        Pipe::closeEnd(pipes[n]->read_end);
+    }
+  }
+}
+
+}  // namespace
+
+ProgramResult runProgram(const std::vector<std::string>& arguments) {
+  std::vector<std::string> words{CURVISPLAT_PROGRAM};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+
+  Pipe out, err;
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, out.write_end, STDOUT_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, err.write_end, STDERR_FILENO);
+  pid_t child = -1;
+  const int failed = posix_spawn(&child, CURVISPLAT_PROGRAM, &actions, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  require(failed == 0, failed, CURVISPLAT_PROGRAM);
+  Pipe::closeEnd(out.write_end);
+  Pipe::closeEnd(err.write_end);
+
+  ProgramResult result;
+  drain(out, result.out, err, result.err);
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0) require(errno == EINTR, errno, "waitpid");
+  result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  return result;
+}
+
+int lineCount(const std::string& text) {
+  const auto ends = std::count(text.begin(), text.end(), '\n');
+  return static_cast<int>(ends) + (!text.empty() && text.back() != '\n');
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,21 @@
+// Runs the real curvisplat program, as a person at a terminal would, and keeps what it said.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace curvisplat {
+
+struct ProgramResult {
+  int status = -1;  // the exit status; 128 + the signal's number if one ended it, as in a shell
+  std::string out, err;
+};
+
+/// Runs CURVISPLAT_PROGRAM with `arguments` (no shell in between) and waits for its end. Its standard input
+/// is empty and its output and error are pipes, so that it draws no progress bar.
+ProgramResult runProgram(const std::vector<std::string>& arguments);
+
+/// The number of lines in `text`; an unfinished last line counts.
+int lineCount(const std::string& text);
+
+}  // namespace curvisplat

@@ -1,0 +1,48 @@
+#include "tools/grid_options.h"
+
+#include <map>
+#include <string>
+
+namespace curvisplat {
+namespace {
+
+constexpr const char* kGroup = "How PLOT3D files are written (detected if not given)";
+
+/// An option whose words stand for values of `target`.
+template <typename Value>
+void addWords(CLI::App& app, const char* name, const char* help, const std::map<std::string, Value>& words,
+              std::optional<Value>& target) {
+  std::vector<std::string> spellings;
+  for (const auto& [word, value] : words) spellings.push_back(word);
+  app.add_option_function<std::string>(
+         name, [words, &target](const std::string& word) { target = words.at(word); }, help)
+      ->check(CLI::IsMember(spellings))
+      ->group(kGroup);
+}
+
+}  // namespace
+
+void addGridOptions(CLI::App& app, OpenGridOptions& options) {
+  Plot3dForce& force = options.force;
+  addWords<ByteOrder>(app, "--byte-order", "Byte order",
+                      {{"little", ByteOrder::little}, {"big", ByteOrder::big}}, force.byte_order);
+  addWords<RecordMarkers>(
+      app, "--records", "Bytes of Fortran's record markers; none: a C file",
+      {{"none", RecordMarkers::none}, {"4", RecordMarkers::bytes4}, {"8", RecordMarkers::bytes8}},
+      force.records);
+  addWords<int>(app, "--precision", "Precision of the numbers", {{"single", 4}, {"double", 8}},
+                force.precision_bytes);
+  addWords<bool>(app, "--blocks", "multi: a block count comes first", {{"single", false}, {"multi", true}},
+                 force.multi_block);
+  addWords<bool>(app, "--iblank", "Whether the grid has an iblank array", {{"no", false}, {"yes", true}},
+                 force.blanking);
+  CLI::Option* const ascii = app.add_flag_callback(
+                                    "--ascii", [&force] { force.ascii = true; }, "Texts")
+                                 ->group(kGroup);
+  app.add_flag_callback(
+         "--binary", [&force] { force.ascii = false; }, "No texts")
+      ->group(kGroup)
+      ->excludes(ascii);
+}
+
+}  // namespace curvisplat
