@@ -23,15 +23,19 @@ struct Camera {
   double parallel_scale = 1;   // orthographic: half the image's height, world units
   double view_angle_deg = 30;  // perspective: the angle over the image's height
 
-  /// Looks at the box [lower, upper] from a named direction, all of it in the image: iso (from +x +y +z, z
-  /// up, as in PyVista), +x, -x, +y, -y (z up), +z, -z (y up); "+x" looks from +x towards -x. Throws
-  /// UsageError for another name.
+  /// Looks at the box [lower, upper] from a named direction, all of it in the image with a small margin: iso
+  /// (from +x +y +z, z up, as in PyVista), +x, -x, +y, -y (z up), +z, -z (y up); "+x" looks from +x towards
+  /// -x. The position is outside the box. Throws UsageError for another name.
   static Camera named(std::string_view view, const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size,
-                      Projection projection);
+                      Projection projection, double view_angle_deg = 30);
+
+  /// The parallel_scale at which this camera, orthographic, has the box [lower, upper] in the image, with the
+  /// margin of named().
+  double parallelScaleFor(const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size) const;
 
   /// Right-handed view space: x right, y up, the viewer looks along -z; for both projections the origin is
   /// `position`. Throws UsageError if position and focal point coincide; an up vector along the view is
-  /// replaced as VTK does.
+  /// replaced as VTK does: (x, y, z) by (-z, x, y).
   glm::dmat4 viewFromWorld() const;
 };
 

@@ -10,11 +10,14 @@
 
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "render/camera.h"
 #include "render/image.h"
+#include "render/projection.h"
 #include "render/transfer_function.h"
 #include "stream/cache_reader.h"
 #include "stream/progress.h"
@@ -23,17 +26,12 @@ namespace curvisplat {
 
 enum class Classification { pixel, flat };  // flat: one colour and extinction a splat, as in the paper
 
-struct WorldBox {
-  glm::dvec3 lower{0.0}, upper{0.0};
-};
-
 struct FrameOptions {
   ImageSize size;
   Classification classification = Classification::pixel;
-  double lod_pixels = 1;  // screen-space error allowed; 0 is the finest level
-  glm::dvec3 scale{1.0};  // stretches the data: D S Dᵀ, V det D, about the world's origin
-  std::optional<WorldBox>
-      clip_box;  // in data coordinates, before `scale`: splats whose centre is outside are not drawn
+  double lod_pixels = 1;             // screen-space error allowed; 0 is the finest level
+  glm::dvec3 scale{1.0};             // stretches the data: D S Dᵀ, V det D, about the world's origin
+  std::optional<WorldBox> clip_box;  // splats whose centre is outside are not drawn
   glm::vec4 background{1, 1, 1, 1};  // premultiplied
   double low_pass_px2 = 1.5;         // added to S2's diagonal; design section 3
   unsigned threads = 0;              // workers; 0: one a core
@@ -45,12 +43,19 @@ struct FrameStatistics {
   double plan_s = 0, read_s = 0, decode_s = 0, project_s = 0, sort_s = 0, upload_s = 0, draw_s = 0,
          total_s = 0;
   double workers_waited_s = 0, painter_waited_s = 0;
-  uint64_t bricks_drawn = 0, bricks_culled = 0, splats_read = 0, splats_drawn = 0, bytes_read = 0;
+  uint64_t bricks_drawn = 0;
+  uint64_t bricks_culled = 0;  // each stands for all below it; those are
+  uint64_t bricks_out_of_image = 0, bricks_transparent = 0;
+  uint64_t splats_read = 0;
+  uint64_t splats_clipped = 0, splats_off_screen = 0, splats_transparent = 0;  // read, and not drawn, since
+  uint64_t splats_drawn = 0;
+  uint64_t bytes_read = 0;
   int largest_level = 0;
+  unsigned workers = 0;
 };
 
-/// Draws frames of one variable of one cache. Owns the GL thread and its context, and the workers. One caller
-/// at a time.
+/// Draws frames of one variable of one cache. Owns the GL thread and its context. One caller at a time; the
+/// cache outlives it.
 class FrameRenderer {
  public:
   /// Starts the GL thread. Throws Error if there is no context to be had: which library was tried, and what
@@ -58,6 +63,9 @@ class FrameRenderer {
   FrameRenderer(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function);
   ~FrameRenderer();
 
+  /// Throws UsageError for a view that makes no picture and for too little memory (how much it takes), Error
+  /// where reading or drawing fails; the renderer can be used again after either. `statistics` is
+  /// overwritten.
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                Progress* progress = nullptr);
   /// "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"

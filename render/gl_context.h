@@ -1,0 +1,34 @@
+// An OpenGL context to draw in without a window, from whatever library the machine has.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "render/gl_functions.h"
+
+namespace curvisplat {
+
+/// Current on the thread that made it, and used and destroyed there only.
+class GlContext {
+ public:
+  virtual ~GlContext() = default;
+  GlContext(const GlContext&) = delete;
+  GlContext& operator=(const GlContext&) = delete;
+
+  const GlFunctions& functions() const { return functions_; }
+  /// "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
+  const std::string& name() const { return name_; }
+
+ protected:
+  GlContext(const std::string& library, const GlFunctions::Lookup& lookup);
+
+ private:
+  GlFunctions functions_;
+  std::string name_;
+};
+
+/// A core context of OpenGL 3.3 or newer, made current on the calling thread. Throws Error: which libraries
+/// were tried and what each of them said.
+std::unique_ptr<GlContext> makeOffscreenContext();
+
+}  // namespace curvisplat

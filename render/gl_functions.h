@@ -1,0 +1,83 @@
+// The OpenGL entry points that the program uses, fetched from the context's own getProcAddress. No GL library
+// is linked: which one serves is decided when a context is made.
+#pragma once
+
+#include <GL/glcorearb.h>
+
+#include <functional>
+#include <string_view>
+
+namespace curvisplat {
+
+// name without its gl, and its type in glcorearb.h
+#define CURVISPLAT_GL_FUNCTIONS(X)                             \
+  X(ActiveTexture, PFNGLACTIVETEXTUREPROC)                     \
+  X(AttachShader, PFNGLATTACHSHADERPROC)                       \
+  X(BindBuffer, PFNGLBINDBUFFERPROC)                           \
+  X(BindFramebuffer, PFNGLBINDFRAMEBUFFERPROC)                 \
+  X(BindRenderbuffer, PFNGLBINDRENDERBUFFERPROC)               \
+  X(BindTexture, PFNGLBINDTEXTUREPROC)                         \
+  X(BindVertexArray, PFNGLBINDVERTEXARRAYPROC)                 \
+  X(BlendFunc, PFNGLBLENDFUNCPROC)                             \
+  X(BufferData, PFNGLBUFFERDATAPROC)                           \
+  X(BufferSubData, PFNGLBUFFERSUBDATAPROC)                     \
+  X(CheckFramebufferStatus, PFNGLCHECKFRAMEBUFFERSTATUSPROC)   \
+  X(Clear, PFNGLCLEARPROC)                                     \
+  X(ClearColor, PFNGLCLEARCOLORPROC)                           \
+  X(CompileShader, PFNGLCOMPILESHADERPROC)                     \
+  X(CreateProgram, PFNGLCREATEPROGRAMPROC)                     \
+  X(CreateShader, PFNGLCREATESHADERPROC)                       \
+  X(DeleteBuffers, PFNGLDELETEBUFFERSPROC)                     \
+  X(DeleteFramebuffers, PFNGLDELETEFRAMEBUFFERSPROC)           \
+  X(DeleteProgram, PFNGLDELETEPROGRAMPROC)                     \
+  X(DeleteRenderbuffers, PFNGLDELETERENDERBUFFERSPROC)         \
+  X(DeleteShader, PFNGLDELETESHADERPROC)                       \
+  X(DeleteTextures, PFNGLDELETETEXTURESPROC)                   \
+  X(DeleteVertexArrays, PFNGLDELETEVERTEXARRAYSPROC)           \
+  X(DrawArraysInstanced, PFNGLDRAWARRAYSINSTANCEDPROC)         \
+  X(Enable, PFNGLENABLEPROC)                                   \
+  X(EnableVertexAttribArray, PFNGLENABLEVERTEXATTRIBARRAYPROC) \
+  X(Finish, PFNGLFINISHPROC)                                   \
+  X(FramebufferRenderbuffer, PFNGLFRAMEBUFFERRENDERBUFFERPROC) \
+  X(GenBuffers, PFNGLGENBUFFERSPROC)                           \
+  X(GenFramebuffers, PFNGLGENFRAMEBUFFERSPROC)                 \
+  X(GenRenderbuffers, PFNGLGENRENDERBUFFERSPROC)               \
+  X(GenTextures, PFNGLGENTEXTURESPROC)                         \
+  X(GenVertexArrays, PFNGLGENVERTEXARRAYSPROC)                 \
+  X(GetError, PFNGLGETERRORPROC)                               \
+  X(GetIntegerv, PFNGLGETINTEGERVPROC)                         \
+  X(GetProgramInfoLog, PFNGLGETPROGRAMINFOLOGPROC)             \
+  X(GetProgramiv, PFNGLGETPROGRAMIVPROC)                       \
+  X(GetShaderInfoLog, PFNGLGETSHADERINFOLOGPROC)               \
+  X(GetShaderiv, PFNGLGETSHADERIVPROC)                         \
+  X(GetString, PFNGLGETSTRINGPROC)                             \
+  X(GetUniformLocation, PFNGLGETUNIFORMLOCATIONPROC)           \
+  X(LinkProgram, PFNGLLINKPROGRAMPROC)                         \
+  X(ReadPixels, PFNGLREADPIXELSPROC)                           \
+  X(RenderbufferStorage, PFNGLRENDERBUFFERSTORAGEPROC)         \
+  X(ShaderSource, PFNGLSHADERSOURCEPROC)                       \
+  X(TexBuffer, PFNGLTEXBUFFERPROC)                             \
+  X(Uniform1f, PFNGLUNIFORM1FPROC)                             \
+  X(Uniform1i, PFNGLUNIFORM1IPROC)                             \
+  X(Uniform2f, PFNGLUNIFORM2FPROC)                             \
+  X(Uniform4f, PFNGLUNIFORM4FPROC)                             \
+  X(UseProgram, PFNGLUSEPROGRAMPROC)                           \
+  X(VertexAttribDivisor, PFNGLVERTEXATTRIBDIVISORPROC)         \
+  X(VertexAttribPointer, PFNGLVERTEXATTRIBPOINTERPROC)         \
+  X(Viewport, PFNGLVIEWPORTPROC)
+
+/// Valid as long as the context is, on the thread where the context is current.
+struct GlFunctions {
+#define CURVISPLAT_GL_MEMBER(name, type) type name = nullptr;
+  CURVISPLAT_GL_FUNCTIONS(CURVISPLAT_GL_MEMBER)
+#undef CURVISPLAT_GL_MEMBER
+
+  using Lookup = std::function<void*(const char* name)>;
+  /// Throws Error naming the first function that `lookup` does not know.
+  explicit GlFunctions(const Lookup& lookup);
+
+  /// Throws Error if a call has failed since the last check: "OpenGL failed while <doing>: <error>".
+  void check(std::string_view doing) const;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,239 @@
+#include "render/projection.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/kernel.h"
+#include "render/splat_cutter.h"
+#include "render/splat_ellipse.h"
+#include "render/splat_maps.h"
+#include "stream/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kBlock = 256;  // splats at a time: the arrays between the two loops stay in the L1 cache
+constexpr auto kSupport = static_cast<float>(kKernelSupport);
+
+/// What the arithmetic loop hands to the loop that chooses.
+struct Block {
+  float x[kBlock], y[kBlock], depth[kBlock];
+  float l11[kBlock], l21[kBlock], l22[kBlock];
+  float amplitude[kBlock];
+  float slope0[kBlock], slope1[kBlock], half_width[kBlock];
+  int32_t clipped[kBlock];
+  int32_t too_wide[kBlock];  // perspective: to be cut up, or before the near plane
+
+  [[gnu::always_inline]] void set(size_t n, const Ellipse& ellipse) {
+    l11[n] = ellipse.l11;
+    l21[n] = ellipse.l21;
+    l22[n] = ellipse.l22;
+    amplitude[n] = ellipse.amplitude;
+    slope0[n] = ellipse.slope0;
+    slope1[n] = ellipse.slope1;
+    half_width[n] = ellipse.half_width;
+  }
+};
+
+ScreenSplat screenSplat(float x, float y, const Ellipse& e, float mean) {
+  return {x, y, e.l11, e.l21, e.l22, e.amplitude, mean, e.slope0, e.slope1, e.half_width};
+}
+
+/// The clip box from the brick's origin, in float.
+struct LocalBox {
+  glm::vec3 lower{-INFINITY}, upper{INFINITY};
+
+  LocalBox(const std::optional<WorldBox>& box, const glm::dvec3& origin) {
+    if (!box) return;
+    lower = glm::vec3(box->lower - origin);
+    upper = glm::vec3(box->upper - origin);
+  }
+  [[gnu::always_inline]] bool excludes(float x, float y, float z) const {
+    return (x < lower.x) | (x > upper.x) | (y < lower.y) | (y > upper.y) | (z < lower.z) | (z > upper.z);
+  }
+};
+
+void computeBlock(const OrthographicMap& map, const LocalBox& clip, const SplatGeometry& geometry,
+                  const SplatVariable& variable, size_t begin, size_t count, Block& block) {
+#pragma GCC ivdep
+  for (size_t n = 0; n < count; ++n) {
+    const size_t i = begin + n;
+    const float x = geometry.x[i], y = geometry.y[i], z = geometry.z[i];
+    block.x[n] = map.x + map.rows.x0 * x + map.rows.y0 * y + map.rows.z0 * z;
+    block.y[n] = map.y + map.rows.x1 * x + map.rows.y1 * y + map.rows.z1 * z;
+    block.depth[n] = map.depth.x * x + map.depth.y * y + map.depth.z * z;
+    block.clipped[n] = clip.excludes(x, y, z);
+    block.too_wide[n] = 0;
+    block.set(n, ellipseOf(map.rows, shapeOf(geometry, i), slopeOf(variable, i), variable.variance[i],
+                           geometry.weight[i] * map.volume, map.low_pass_px2));
+  }
+}
+
+void computeBlock(const PerspectiveMap& map, const LocalBox& clip, const SplatGeometry& geometry,
+                  const SplatVariable& variable, size_t begin, size_t count, Block& block) {
+#pragma GCC ivdep
+  for (size_t n = 0; n < count; ++n) {
+    const size_t i = begin + n;
+    const float x = geometry.x[i], y = geometry.y[i], z = geometry.z[i];
+    const PerspectiveMap::Centre centre = map.centreOf(x, y, z);
+    const Shape shape = shapeOf(geometry, i);
+    block.x[n] = map.pixelX(centre);
+    block.y[n] = map.pixelY(centre);
+    block.depth[n] = centre.distance;
+    block.clipped[n] = clip.excludes(x, y, z);
+    block.too_wide[n] = map.tooWide(centre, map.radiusOf(shape));
+    block.set(n, ellipseOf(map.rowsAt(centre), shape, slopeOf(variable, i), variable.variance[i],
+                           geometry.weight[i] * map.volumeAt(centre), map.low_pass_px2));
+  }
+}
+
+/// Decides about one projected splat after the other, and keeps what can be seen.
+class Chooser {
+ public:
+  enum class Fate { off_screen, transparent, kept };
+
+  Chooser(const ProjectionSettings& settings, const ClassificationTable& table,
+          std::vector<ScreenSplat>& splats, std::vector<float>& depths)
+      : table_(table),
+        width_(static_cast<float>(settings.view.size.width)),
+        height_(static_cast<float>(settings.view.size.height)),
+        reach_(1.001f * static_cast<float>(largestReach(settings.view.low_pass_px2))),
+        per_pixel_(settings.per_pixel),
+        splats_(splats),
+        depths_(depths) {}
+
+  Fate choose(ScreenSplat splat, float depth) {
+    const float reach_x = kSupport * splat.l11;
+    const float reach_y = kSupport * (std::abs(splat.l21) + splat.l22);
+    const bool on_screen = splat.x + reach_x > 0 && splat.x - reach_x < width_ && splat.y + reach_y > 0 &&
+                           splat.y - reach_y < height_;
+    if (!on_screen) return Fate::off_screen;
+    if (!per_pixel_) splat.slope0 = splat.slope1 = splat.half_width = 0;
+    const float spread = kSupport * (std::abs(splat.slope0) + std::abs(splat.slope1)) + splat.half_width;
+    if (!(splat.amplitude > 0) || table_.fullyTransparent(splat.mean - spread, splat.mean + spread))
+      return Fate::transparent;
+    splats_.push_back(splat);
+    depths_.push_back(depth);
+    return Fate::kept;
+  }
+
+  /// Whether no piece of a splat could be seen, wherever it is.
+  bool transparentThroughout(float mean, const Slope& w, float variance) const {
+    const float slope = std::sqrt(w.w0 * w.w0 + w.w1 * w.w1 + w.w2 * w.w2);
+    const float spread = reach_ * slope + std::sqrt(3 * (slope * slope + variance));
+    return table_.fullyTransparent(mean - spread, mean + spread);
+  }
+
+ private:
+  const ClassificationTable& table_;
+  const float width_, height_;
+  const float reach_;
+  const bool per_pixel_;
+  std::vector<ScreenSplat>& splats_;
+  std::vector<float>& depths_;
+};
+
+/// What cutting needs beside the arithmetic loop's results; orthographic splats are never cut.
+std::optional<Chooser::Fate> chooseCut(const OrthographicMap&, const SplatGeometry&, const SplatVariable&,
+                                       size_t, Chooser&, size_t&) {
+  return Chooser::Fate::off_screen;
+}
+
+/// Cuts splat `i` up and chooses among its pieces: the best fate of any. Nothing if there are more pieces
+/// than `pieces_left`, which it counts down.
+std::optional<Chooser::Fate> chooseCut(const PerspectiveMap& map, const SplatGeometry& geometry,
+                                       const SplatVariable& variable, size_t i, Chooser& chooser,
+                                       size_t& pieces_left) {
+  const SplatPiece whole{{geometry.x[i], geometry.y[i], geometry.z[i]},
+                         shapeOf(geometry, i),
+                         slopeOf(variable, i),
+                         variable.mean[i],
+                         geometry.weight[i]};
+  if (chooser.transparentThroughout(whole.mean, whole.slope, variable.variance[i]))
+    return Chooser::Fate::transparent;
+  auto best = Chooser::Fate::off_screen;
+  const auto take = [&](const SplatPiece& piece, const PerspectiveMap::Centre& centre) {
+    if (pieces_left == 0) return false;
+    const Ellipse ellipse = ellipseOf(map.rowsAt(centre), piece.shape, piece.slope, variable.variance[i],
+                                      piece.weight * map.volumeAt(centre), map.low_pass_px2);
+    const auto fate = chooser.choose(screenSplat(map.pixelX(centre), map.pixelY(centre), ellipse, piece.mean),
+                                     centre.distance);
+    if (fate == Chooser::Fate::kept) --pieces_left;
+    best = std::max(best, fate);
+    return true;
+  };
+  if (!cutUp(map, whole, take)) return {};
+  return best;
+}
+
+/// False if the brick would give too many pieces.
+template <typename Map>
+bool projectWith(const Map& map, const LocalBox& clip, const SplatGeometry& geometry,
+                 const SplatVariable& variable, Chooser& chooser, ProjectionCounts& counts) {
+  Block block;
+  size_t pieces_left = BrickProjector::kMostPieces;
+  for (size_t begin = 0; begin < geometry.size(); begin += kBlock) {
+    const size_t count = std::min(kBlock, geometry.size() - begin);
+    computeBlock(map, clip, geometry, variable, begin, count, block);
+    for (size_t n = 0; n < count; ++n) {
+      if (block.clipped[n]) {
+        ++counts.clipped;
+        continue;
+      }
+      Chooser::Fate fate;
+      if (block.too_wide[n]) {
+        const auto cut_fate = chooseCut(map, geometry, variable, begin + n, chooser, pieces_left);
+        if (!cut_fate) return false;
+        fate = *cut_fate;
+      } else {
+        fate = chooser.choose(
+            {block.x[n], block.y[n], block.l11[n], block.l21[n], block.l22[n], block.amplitude[n],
+             variable.mean[begin + n], block.slope0[n], block.slope1[n], block.half_width[n]},
+            block.depth[n]);
+      }
+      counts.off_screen += fate == Chooser::Fate::off_screen;
+      counts.transparent += fate == Chooser::Fate::transparent;
+      counts.drawn += fate == Chooser::Fate::kept;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+double largestReach(double low_pass_px2) {
+  // The slope along L's columns is at most √(x (x + λ)) / (x + ε) times |w|, x the squared extent of the
+  // splat on the screen; x below is where that is largest.
+  constexpr double kEpsilon = kSlopeLowPass;
+  if (low_pass_px2 <= 2 * kEpsilon) return kKernelSupport;
+  const double x = low_pass_px2 * kEpsilon / (low_pass_px2 - 2 * kEpsilon);
+  return kKernelSupport * std::sqrt(x * (x + low_pass_px2)) / (x + kEpsilon);
+}
+
+BrickProjector::BrickProjector() {
+  splats_.reserve(kMostSplats);
+  depths_.reserve(kMostSplats);
+}
+
+void BrickProjector::project(const ProjectionSettings& settings, const ClassificationTable& table,
+                             const glm::dvec3& cell_min, const SplatGeometry& geometry,
+                             const SplatVariable& variable) {
+  CURVISPLAT_CHECK_OP(geometry.size(), ==, variable.size());
+  const LocalBox clip(settings.clip_box, cell_min);
+  Chooser chooser(settings, table, splats_, depths_);
+  bool complete = false;
+  for (float coarseness = 1; !complete; coarseness *= 2) {
+    splats_.clear();
+    depths_.clear();
+    counts_ = {};
+    complete = settings.view.projection == Projection::orthographic
+                   ? projectWith(OrthographicMap(settings.view, cell_min), clip, geometry, variable, chooser,
+                                 counts_)
+                   : projectWith(PerspectiveMap(settings.view, cell_min, coarseness), clip, geometry,
+                                 variable, chooser, counts_);
+  }
+  counts_.read = geometry.size();
+  counts_.pieces = splats_.size();
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,16 @@
+// The GLSL of a splat: what the fields of ScreenSplat mean, as code.
+#pragma once
+
+#include <string>
+
+namespace curvisplat {
+
+struct SplatShaderKind {
+  bool per_pixel;  // mean and extent of the scalar at every pixel, else the splat's mean for all of it
+  bool log_scale;  // of the transfer function
+};
+
+std::string splatVertexShader();
+std::string splatFragmentShader(SplatShaderKind kind);
+
+}  // namespace curvisplat

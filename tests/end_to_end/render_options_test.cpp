@@ -1,0 +1,320 @@
+// `curvisplat render`, option by option, on a small half-annulus.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <glm/vec4.hpp>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "preprocess/plot3d_writer.h"
+#include "preprocess/scenes.h"
+#include "render/image.h"
+#include "stream/file.h"
+#include "stream/progress.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+const glm::dvec3 kScale(1, 0.5, 3);
+
+/// The scene with its coordinates stretched, as another grid.
+class StretchedSource : public GridSource {
+ public:
+  explicit StretchedSource(const GridSource& source) : source_(source) {}
+  const GridDescription& description() const override { return source_.description(); }
+  void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+            NodeArrays& out) const override {
+    source_.read(block, box, scalars, out);
+    for (double& x : out.x) x *= kScale.x;
+    for (double& y : out.y) y *= kScale.y;
+    for (double& z : out.z) z *= kScale.z;
+  }
+
+ private:
+  const GridSource& source_;
+};
+
+class RenderOptions : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    const SceneGridSource scene(makeScene("half-annulus", std::nullopt), {48, 24, 24});
+    convert(scene, "plain");
+    convert(StretchedSource(scene), "stretched");
+  }
+  static void TearDownTestSuite() { folder_.reset(); }
+
+  static void convert(const GridSource& source, const std::string& name) {
+    Progress progress;
+    writePlot3d(source, *folder_ / name, progress);
+    const ProgramResult result =
+        runProgram({"convert", file(name + ".xyz"), file(name + ".fun"), "-o", cache(name)});
+    ASSERT_EQ(result.status, 0) << result.err;
+  }
+  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
+  static std::string cache(const std::string& name = "plain") { return file(name + ".splats"); }
+
+  /// Renders the plain cache at 96x96 (the last of several --size holds) and expects success.
+  static Image render(std::vector<std::string> options, const std::string& output = "a.exr",
+                      const std::string& which = "plain") {
+    options.insert(options.begin(), {"render", cache(which), "-o", file(output)});
+    if (std::find(options.begin(), options.end(), "--size") == options.end())
+      options.insert(options.end(), {"--size", "96x96"});
+    last_ = runProgram(options);
+    EXPECT_EQ(last_.status, 0) << last_.err;
+    return last_.status == 0 ? readImage(file(output)) : Image({1, 1});
+  }
+  /// Expects one line on stderr with `word` in it, this exit status, and no picture.
+  static void expectRefused(std::vector<std::string> arguments, int status, const std::string& word) {
+    const ProgramResult result = runProgram(arguments);
+    EXPECT_EQ(result.status, status) << result.err;
+    EXPECT_EQ(lineCount(result.err), 1) << result.err;
+    EXPECT_NE(result.err.find(word), std::string::npos) << result.err << "lacks " << word;
+    EXPECT_EQ(result.out, "");
+  }
+  static void expectUsageError(std::vector<std::string> options, const std::string& word) {
+    options.insert(options.begin(), {"render", cache(), "-o", file("refused.png")});
+    expectRefused(options, 2, word);
+    EXPECT_FALSE(std::filesystem::exists(file("refused.png")));
+  }
+
+  static std::unique_ptr<TemporaryFolder> folder_;
+  static ProgramResult last_;
+};
+
+std::unique_ptr<TemporaryFolder> RenderOptions::folder_;
+ProgramResult RenderOptions::last_;
+
+void expectPixel(const Image& image, int x, int y, const glm::vec4& expected, float tolerance = 0) {
+  for (int c = 0; c < 4; ++c) EXPECT_NEAR(image.pixel(x, y)[c], expected[c], tolerance) << "channel " << c;
+}
+
+size_t pixelsOtherThan(const Image& image, const glm::vec4& background) {
+  size_t count = 0;
+  for (int y = 0; y < image.size.height; ++y)
+    for (int x = 0; x < image.size.width; ++x)
+      count += !std::equal(image.pixel(x, y), image.pixel(x, y) + 4, &background[0]);
+  return count;
+}
+
+TEST_F(RenderOptions, DefaultsGiveAPictureAndOneLine) {
+  const Image image = render({}, "a.png");
+  EXPECT_EQ(last_.err, "");
+  EXPECT_EQ(lineCount(last_.out), 1) << last_.out;
+  EXPECT_GT(pixelsOtherThan(image, {1, 1, 1, 1}), 96u * 96 / 10);
+}
+
+TEST_F(RenderOptions, SizeIsThePictures) {
+  const Image image = render({"--size", "120x40"});
+  EXPECT_EQ(image.size.width, 120);
+  EXPECT_EQ(image.size.height, 40);
+}
+
+TEST_F(RenderOptions, BackgroundShowsWhereNothingIs) {
+  expectPixel(render({"--background", "white"}), 0, 0, {1, 1, 1, 1});
+  expectPixel(render({"--background", "black"}), 0, 0, {0, 0, 0, 1});
+  expectPixel(render({"--background", "#ff8000"}), 0, 0, {1, 128 / 255.0f, 0, 1}, 1e-6f);
+}
+
+TEST_F(RenderOptions, TransparentPngHasTheDatasAlpha) {
+  const Image transparent = render({"--background", "transparent"}, "a.png");
+  const Image black = render({"--background", "black"}, "b.png");
+  expectPixel(transparent, 0, 0, {0, 0, 0, 0});
+  bool translucent = false;
+  for (size_t n = 0; n < transparent.rgba.size(); n += 4) {
+    const float alpha = transparent.rgba[n + 3];
+    translucent |= alpha > 0.2f && alpha < 0.8f;
+    // PNG's colours are not multiplied by alpha: their rounding shrinks with it, black's does not.
+    for (size_t c = 0; c < 3; ++c)
+      ASSERT_NEAR(transparent.rgba[n + c], black.rgba[n + c], 2.0 / 255) << "at " << n;
+  }
+  EXPECT_TRUE(translucent);
+}
+
+TEST_F(RenderOptions, ClipBoxLeavesTheRestEmpty) {
+  const std::vector<std::string> camera{"--view", "+z", "--parallel-scale", "1.2"};
+  std::vector<std::string> clipped = camera;
+  clipped.insert(clipped.end(), {"--clip-box", "-2,2,-2,0,-2,2"});
+  const Image whole = render(camera), half = render(clipped);
+  // Seen along z with y up and its centre, 0, in the middle: what is left is in the lower half.
+  size_t above = 0, below_differs = 0, above_whole = 0;
+  for (int y = 0; y < 96; ++y)
+    for (int x = 0; x < 96; ++x) {
+      const bool drawn = half.pixel(x, y)[0] != 1 || half.pixel(x, y)[1] != 1 || half.pixel(x, y)[2] != 1;
+      above += y < 43 && drawn;
+      above_whole += y < 43 && whole.pixel(x, y)[1] != 1;
+      below_differs += y > 53 && std::abs(half.pixel(x, y)[1] - whole.pixel(x, y)[1]) > 1e-5;
+    }
+  EXPECT_GT(above_whole, 500u);
+  EXPECT_EQ(above, 0u);
+  EXPECT_EQ(below_differs, 0u);
+}
+
+TEST_F(RenderOptions, ScaleIsTheScaledGrid) {
+  const Image scaled = render({"--scale", fmt::format("{},{},{}", kScale.x, kScale.y, kScale.z)}, "a.exr");
+  const Image grid = render({}, "b.exr", "stretched");
+  EXPECT_GT(compareImages(scaled, grid).psnr_db, 50);
+  EXPECT_LT(compareImages(render({}), grid).psnr_db, 30) << "scaling changes nothing";
+}
+
+TEST_F(RenderOptions, ExrPfmAndPngAgree) {
+  const Image exr = render({}, "a.exr"), pfm = render({}, "a.pfm"), png = render({}, "a.png");
+  EXPECT_EQ(compareImages(exr, pfm).largest, 0);
+  EXPECT_LE(compareImages(exr, png).largest, 0.5 / 255 + 1e-6);
+}
+
+TEST_F(RenderOptions, NarrowPerspectiveIsNearlyOrthographic) {
+  const Image parallel = render({}), narrow = render({"--view-angle", "0.5"});
+  EXPECT_GT(compareImages(parallel, narrow).psnr_db, 40);
+  const Image wide = render({"--view-angle", "60"});
+  EXPECT_LT(compareImages(parallel, wide).psnr_db, 30);
+}
+
+TEST_F(RenderOptions, APlacedCameraIsTheNamedOne) {
+  // From a corner direction at the data's centre, (-0.5, 0, 0.5), z up, all of it in view: what iso does.
+  const Image iso = render({}, "a.exr"), placed = render({"--position", "9.5,10,10.5"}, "b.exr");
+  EXPECT_GT(compareImages(iso, placed).psnr_db, 60);
+  const Image aside = render({"--position", "9.5,10,10.5", "--focal-point", "-0.4,0,0.5", "--view-up",
+                              "0,1,0", "--parallel-scale", "2"});
+  EXPECT_LT(compareImages(iso, aside).psnr_db, 30);
+}
+
+TEST_F(RenderOptions, ARangeThatMissesTheScalarIsWarnedOf) {
+  render({"--range", "5,6"});
+  EXPECT_NE(last_.err.find("warning: the range 5..6"), std::string::npos) << last_.err;
+  EXPECT_NE(last_.err.find("the picture is empty"), std::string::npos) << last_.err;
+  EXPECT_NE(last_.err.find("fully transparent"), std::string::npos) << last_.err;
+  render({"--range", "-6,-5"});
+  EXPECT_NE(last_.err.find("warning: the range -6..-5"), std::string::npos) << last_.err;
+  EXPECT_EQ(last_.err.find("empty"), std::string::npos) << last_.err;
+}
+
+TEST_F(RenderOptions, AnEmptyPictureSaysWhy) {
+  EXPECT_EQ(pixelsOtherThan(render({"--clip-box", "5,6,5,6,5,6"}), {1, 1, 1, 1}), 0u);
+  EXPECT_NE(last_.err.find("--clip-box has nothing"), std::string::npos) << last_.err;
+  EXPECT_EQ(
+      pixelsOtherThan(render({"--position", "9,0,0", "--focal-point", "9,9,0", "--parallel-scale", "1"}),
+                      {1, 1, 1, 1}),
+      0u);
+  EXPECT_NE(last_.err.find("does not see the data's box"), std::string::npos) << last_.err;
+  render({"--opacity-unit", "1e12"}, "a.png");
+  EXPECT_NE(last_.err.find("--opacity-unit"), std::string::npos) << last_.err;
+}
+
+TEST_F(RenderOptions, TransferFunctionFilesAreUsedAndTheirNotesTold) {
+  std::ofstream(file("red.json")) << R"([{"Name": "red", "RGBPoints": [0,1,0,0, 1,1,0,0]}])";
+  const Image image = render({"--tf", file("red.json"), "--background", "black"});
+  EXPECT_EQ(lineCount(last_.err), 1) << last_.err;
+  EXPECT_NE(last_.err.find("note: "), std::string::npos) << last_.err;
+  EXPECT_NE(last_.err.find("no Points"), std::string::npos) << last_.err;
+  float red = 0, others = 0;
+  for (size_t n = 0; n < image.rgba.size(); n += 4) {
+    red = std::max(red, image.rgba[n]);
+    others = std::max({others, image.rgba[n + 1], image.rgba[n + 2]});
+  }
+  EXPECT_GT(red, 0.1f);
+  EXPECT_EQ(others, 0.0f);
+
+  std::ofstream(file("bad.json")) << R"([{"Name": "bad", "RGBPoints": [0,1,0]}])";
+  expectRefused({"render", cache(), "-o", file("refused.png"), "--tf", file("bad.json")}, 1,
+                "field RGBPoints");
+}
+
+TEST_F(RenderOptions, FlatClassificationAndLodDiffer) {
+  const Image pixel = render({"--lod-pixels", "0"});
+  EXPECT_GT(compareImages(pixel, render({"--lod-pixels", "0", "--classify", "flat"})).largest, 1e-3);
+}
+
+TEST_F(RenderOptions, WrongWordsAreUsageErrors) {
+  const struct {
+    std::vector<std::string> options;
+    const char* word;
+  } cases[] = {{{"--view", "iso", "--position", "1,2,3"}, "--view"},
+               {{"--view", "iso", "--view-up", "0,0,1"}, "--view"},
+               {{"--focal-point", "1,2,3"}, "--position"},
+               {{"--view-up", "1,2,3"}, "--position"},
+               {{"--position", "1,2,3", "--focal-point", "1,2,3"}, "focal point"},
+               {{"--position", "1,2,3", "--view-up", "0,0,0"}, "--view-up"},
+               {{"--position", "1,2"}, "x,y,z"},
+               {{"--parallel-scale", "1", "--view-angle", "20"}, "--parallel-scale"},
+               {{"--parallel-scale", "0"}, "--parallel-scale"},
+               {{"--view-angle", "180"}, "--view-angle"},
+               {{"--view", "front"}, "iso"},
+               {{"--size", "600"}, "WIDTHxHEIGHT"},
+               {{"--size", "0x600"}, "WIDTHxHEIGHT"},
+               {{"--size", "100000x600"}, "--size"},
+               {{"--range", "1,1"}, "--range"},
+               {{"--range", "2"}, "LO,HI"},
+               {{"--range", "nan,1"}, "finite"},
+               {{"--opacity-unit", "-1"}, "--opacity-unit"},
+               {{"--lod-pixels", "-1"}, "--lod-pixels"},
+               {{"--classify", "both"}, "--classify"},
+               {{"--scale", "1,0,1"}, "--scale"},
+               {{"--clip-box", "1,0,0,1,0,1"}, "--clip-box"},
+               {{"--clip-box", "0,1,0,1"}, "x0,x1,y0,y1,z0,z1"},
+               {{"--background", "pink"}, "#rrggbb"},
+               {{"--background", "#12345g"}, "#rrggbb"},
+               {{"--backend", "egl"}, "not in this version"},
+               {{"--memory", "lots"}, "512M"},
+               {{"--tf", "rainbow"}, "viridis"}};
+  for (const auto& c : cases) {
+    SCOPED_TRACE(c.options[0] + " " + c.options[1]);
+    expectUsageError(c.options, c.word);
+  }
+  expectRefused({"render", cache(), "-o", file("a.jpg")}, 2, ".png");
+  expectRefused({"render", cache(), "-o", file("a.pfm"), "--background", "transparent"}, 2, "transparent");
+}
+
+TEST_F(RenderOptions, BadInputAndOutputAreOneLine) {
+  expectRefused({"render", cache(), "-o", file("a.png"), "--scalar", "entropy"}, 1, "entropy");
+  expectRefused({"render", cache("missing"), "-o", file("a.png")}, 1, "missing.splats");
+  expectRefused({"render", file("plain.xyz"), "-o", file("a.png")}, 1, "plain.xyz");
+  expectRefused({"render", cache(), "-o", file("no/a.png")}, 1, "no");
+  expectRefused({"render", cache(), "-o", file("a.png"), "--stats", file("no/a.json")}, 1, "--stats");
+  expectRefused({"render", cache(), "-o", file("a.png"), "--tf", file("missing.json")}, 1, "missing.json");
+  std::filesystem::create_directory(file("folder.png"));
+  expectRefused({"render", cache(), "-o", file("folder.png")}, 1, "folder.png");
+}
+
+TEST_F(RenderOptions, AnUnknownScalarNamesThoseThereAre) {
+  const ProgramResult result = runProgram({"render", cache(), "-o", file("a.png"), "--scalar", "entropy"});
+  EXPECT_NE(result.err.find("'f'"), std::string::npos) << result.err;
+  EXPECT_EQ(lineCount(render({"--scalar", "f"}).rgba.empty() ? "" : last_.err), 0) << last_.err;
+}
+
+TEST_F(RenderOptions, StatisticsTellWhatWasDone) {
+  const std::string stats = file("stats.json");
+  render({"--stats", stats, "--threads", "2", "--view-angle", "25", "--scale", "1,1,2", "--memory", "64M"});
+  const auto json = nlohmann::json::parse(readTextFile(stats));
+  for (const char* key : {"program", "version", "command", "peak_memory_bytes", "cache", "scalar", "image",
+                          "backend", "threads", "memory_bytes", "lod_pixels", "classify", "scale", "clip_box",
+                          "background", "camera", "transfer_function", "frame"})
+    EXPECT_TRUE(json.contains(key)) << key;
+  for (const char* key : {"seconds", "bricks_drawn", "bricks_culled", "splats_read", "splats_drawn",
+                          "bytes_read", "largest_level"})
+    EXPECT_TRUE(json["frame"].contains(key)) << key;
+  for (const char* key : {"plan", "read", "decode", "project", "sort", "upload", "draw", "total",
+                          "workers_waited", "painter_waited"})
+    EXPECT_TRUE(json["frame"]["seconds"][key].is_number()) << key;
+  EXPECT_EQ(json["command"][1], "render");
+  EXPECT_EQ(json["threads"], 2);
+  EXPECT_EQ(json["memory_bytes"], 64 << 20);
+  EXPECT_EQ(json["image"]["width"], 96);
+  EXPECT_EQ(json["camera"]["projection"], "perspective");
+  EXPECT_EQ(json["camera"]["view_angle_deg"], 25);
+  EXPECT_EQ(json["scale"][2], 2);
+  EXPECT_EQ(json["transfer_function"]["name"], "viridis");
+  EXPECT_GT(json["peak_memory_bytes"], 1 << 20);
+  EXPECT_GT(json["frame"]["splats_drawn"], 0);
+  EXPECT_GT(json["frame"]["bytes_read"], 0);
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,64 @@
+#include "render/segment_ring.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <random>
+#include <thread>
+#include <vector>
+
+namespace curvisplat {
+namespace {
+
+ScreenSplat numbered(size_t number) {
+  ScreenSplat splat{};
+  splat.x = static_cast<float>(number);
+  return splat;
+}
+
+TEST(SegmentRing, HandsOverEverythingInSequence) {
+  constexpr size_t kSegments = 3000, kCapacity = 100;
+  for (const int workers : {1, 2, 5}) {
+    std::mt19937 random(4);
+    std::vector<size_t> counts(kSegments);
+    for (size_t& count : counts) count = random() % 7 == 0 ? 0 : random() % (kCapacity + 1);
+    SegmentRing ring(kCapacity);
+    std::atomic<size_t> next = 0;
+    std::vector<std::thread> threads;
+    for (int n = 0; n < workers; ++n)
+      threads.emplace_back([&] {
+        for (size_t sequence; (sequence = next++) < kSegments;) {
+          const auto segment = ring.acquire(sequence, counts[sequence]);
+          ASSERT_TRUE(segment);
+          ASSERT_EQ(segment->size(), counts[sequence]);
+          for (ScreenSplat& splat : *segment) splat = numbered(sequence);
+          ring.commit(sequence);
+        }
+      });
+    for (size_t sequence = 0; sequence < kSegments; ++sequence) {
+      const auto segment = ring.next();
+      ASSERT_TRUE(segment);
+      ASSERT_EQ(segment->size(), counts[sequence]);
+      for (const ScreenSplat& splat : *segment) ASSERT_EQ(splat.x, static_cast<float>(sequence));
+      ring.release();
+    }
+    for (auto& thread : threads) thread.join();
+  }
+}
+
+TEST(SegmentRing, ClosingWakesAllWhoWait) {
+  SegmentRing ring(10);
+  ASSERT_TRUE(ring.acquire(0, 10));
+  std::thread full([&] { EXPECT_FALSE(ring.acquire(1, 1)); });
+  std::thread early([&] { EXPECT_FALSE(ring.acquire(7, 1)); });
+  std::thread painter([&] { EXPECT_FALSE(ring.next()); });
+  ring.close();
+  full.join();
+  early.join();
+  painter.join();
+  ring.commit(0);
+  EXPECT_FALSE(ring.next());
+}
+
+}  // namespace
+}  // namespace curvisplat

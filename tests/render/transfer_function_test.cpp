@@ -1,0 +1,451 @@
+#include "render/transfer_function.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "stream/error.h"
+
+namespace curvisplat {
+namespace {
+
+using Json = nlohmann::json;
+
+void expectColour(const glm::dvec3& found, const glm::dvec3& expected, double tolerance) {
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(found[c], expected[c], tolerance) << "channel " << c;
+}
+
+/// Colours as VTK prints them, in bytes.
+void expectBytes(const glm::dvec3& found, int red, int green, int blue) {
+  EXPECT_EQ(std::lround(255 * found.r), red);
+  EXPECT_EQ(std::lround(255 * found.g), green);
+  EXPECT_EQ(std::lround(255 * found.b), blue);
+}
+
+double opacityOf(const TransferFunction& function, double scalar) {
+  return -std::expm1(-function.at(scalar).extinction * function.opacityUnit());
+}
+
+ColourMap redToBlue(ColourSpace space) {
+  const ColourPoint points[] = {{0, {1, 0, 0}}, {1, {0, 0, 1}}};
+  return ColourMap(points, space);
+}
+
+TEST(ColourMap, RgbIsLinear) {
+  expectColour(redToBlue(ColourSpace::rgb).at(0.25), {0.75, 0, 0.25}, 1e-12);
+}
+
+TEST(ColourMap, StepHasTheUpperEndsColour) {
+  const ColourMap map = redToBlue(ColourSpace::step);
+  expectBytes(map.at(0), 255, 0, 0);
+  expectBytes(map.at(1e-9), 0, 0, 255);
+  expectBytes(map.at(0.5), 0, 0, 255);  // as in VTK's own test
+}
+
+TEST(ColourMap, HsvTakesTheShorterWayRound) {
+  // Red is hue 0, blue hue 2/3: the short way leads through magenta, the long one through green.
+  expectBytes(redToBlue(ColourSpace::hsv).at(0.5), 255, 0, 255);
+  expectBytes(redToBlue(ColourSpace::hsv_no_wrap).at(0.5), 0, 255, 0);
+}
+
+TEST(ColourMap, HsvKeepsEndsOfEveryHue) {
+  for (int hue = 0; hue < 64; ++hue) {
+    const glm::dvec3 rgb((hue & 3) / 3.0, (hue >> 2 & 3) / 3.0, (hue >> 4 & 3) / 3.0);
+    for (const auto space : {ColourSpace::hsv, ColourSpace::lab, ColourSpace::diverging}) {
+      const ColourPoint points[] = {{0, {0.2, 0.5, 0.1}}, {1, rgb}, {2, {0.7, 0.1, 0.4}}};
+      expectColour(ColourMap(points, space).at(1), rgb, 2e-3);
+    }
+  }
+}
+
+TEST(ColourMap, LabMeetsCie) {
+  // Half way in L*a*b* between sRGB black and white is L* = 50: the grey of byte 119.
+  const ColourPoint grey[] = {{0, glm::dvec3(0)}, {1, glm::dvec3(1)}};
+  expectBytes(ColourMap(grey, ColourSpace::lab).at(0.5), 119, 119, 119);
+  // Red is (53.24, 80.09, 67.20), blue (32.30, 79.19, -107.86): half way in sRGB, computed from CIE's
+  // formulas.
+  expectBytes(redToBlue(ColourSpace::lab).at(0.5), 202, 0, 136);
+}
+
+TEST(ColourMap, DivergingIsParaViewsCoolToWarm) {
+  // Moreland's table of the map (9 of its 33 rows), which two points in Msh space with white between define.
+  const ColourPoint points[] = {{0, glm::dvec3(59, 76, 192) / 255.0}, {1, glm::dvec3(180, 4, 38) / 255.0}};
+  const int rows[9][3] = {{59, 76, 192},   {98, 130, 234},  {141, 176, 254}, {184, 208, 249}, {221, 221, 221},
+                          {245, 196, 173}, {244, 154, 123}, {222, 96, 77},   {180, 4, 38}};
+  const ColourMap map(points, ColourSpace::diverging);
+  for (int n = 0; n < 9; ++n)
+    expectColour(map.at(n / 8.0), glm::dvec3(rows[n][0], rows[n][1], rows[n][2]) / 255.0, 1.5 / 255);
+}
+
+TEST(ColourMap, DivergingOfLikeHuesStaysBetweenThem) {
+  const ColourPoint points[] = {{0, {0.8, 0.1, 0.1}}, {1, {0.9, 0.3, 0.2}}};
+  const glm::dvec3 middle = ColourMap(points, ColourSpace::diverging).at(0.5);
+  EXPECT_LT(middle.g, 0.3) << "no white in between";
+  EXPECT_GT(middle.r, 0.8);
+}
+
+TEST(ColourMap, EndsGoOnAndJumpsHoldTheirFirst) {
+  const ColourPoint points[] = {
+      {0, glm::dvec3(0.1)}, {1, glm::dvec3(0.3)}, {1, glm::dvec3(0.9)}, {2, glm::dvec3(0.5)}};
+  const ColourMap map(points, ColourSpace::rgb);
+  EXPECT_DOUBLE_EQ(map.at(-5).r, 0.1);
+  EXPECT_DOUBLE_EQ(map.at(7).r, 0.5);
+  EXPECT_DOUBLE_EQ(map.at(1).r, 0.3);
+  EXPECT_NEAR(map.at(1 + 1e-9).r, 0.9, 1e-8);
+  EXPECT_DOUBLE_EQ(map.at(-INFINITY).r, 0.1);
+  EXPECT_DOUBLE_EQ(map.at(INFINITY).r, 0.5);
+}
+
+double between(double x, double midpoint, double sharpness) {
+  const OpacityPoint points[] = {{0, 0.2, midpoint, sharpness}, {1, 0.6, 0.5, 0}};
+  return OpacityCurve(points).at(x);
+}
+
+TEST(OpacityCurve, SharpnessZeroIsTwoLinesThroughTheMidpoint) {
+  EXPECT_DOUBLE_EQ(between(0.25, 0.5, 0), 0.3);
+  EXPECT_DOUBLE_EQ(between(0.8, 0.8, 0), 0.4);
+  EXPECT_DOUBLE_EQ(between(0.4, 0.8, 0), 0.3);
+  EXPECT_DOUBLE_EQ(between(0.9, 0.8, 0.009), 0.5);
+}
+
+TEST(OpacityCurve, SharpnessOneIsAStepAtTheMidpoint) {
+  EXPECT_DOUBLE_EQ(between(0.2999, 0.3, 1), 0.2);
+  EXPECT_DOUBLE_EQ(between(0.3, 0.3, 1), 0.6);
+  EXPECT_DOUBLE_EQ(between(0.3, 0, 1), 0.6);
+}
+
+TEST(OpacityCurve, BetweenItIsVtksHermiteCurve) {
+  // By hand for sharpness 0.5, x = 0.25: s = 0.5 (0.5)^6 = 0.0078125; h2 + h3 t + h4 t with t = 0.5 is
+  // 3s² - 2s³ + 0.5 (2s³ - 3s² + s) = 0.00399733
+  EXPECT_NEAR(between(0.25, 0.5, 0.5), 0.2 + 0.4 * 0.00399733, 1e-8);
+  EXPECT_NEAR(between(0.75, 0.5, 0.5), 0.6 - 0.4 * 0.00399733, 1e-8);
+  // Sharpness 0.1: s = 0.5 (0.5)^2 = 0.125, t = 0.9: 0.04296875 + 0.9 * 0.08203125
+  EXPECT_NEAR(between(0.25, 0.5, 0.1), 0.2 + 0.4 * 0.116796875, 1e-12);
+  EXPECT_DOUBLE_EQ(between(0.7, 0.7, 0.4), 0.4);
+}
+
+TEST(OpacityCurve, EndsGoOnAndJumpsHoldTheirFirst) {
+  const OpacityPoint points[] = {{0, 0.1}, {1, 0.3}, {1, 0.9}, {2, 0.5}};
+  const OpacityCurve curve(points);
+  EXPECT_DOUBLE_EQ(curve.at(-1), 0.1);
+  EXPECT_DOUBLE_EQ(curve.at(0.5), 0.2);
+  EXPECT_DOUBLE_EQ(curve.at(1), 0.3);
+  EXPECT_NEAR(curve.at(1 + 1e-9), 0.9, 1e-8);
+  EXPECT_DOUBLE_EQ(curve.at(3), 0.5);
+}
+
+TEST(OpacityCurve, NeverLeavesTheRangeOfItsEnds) {
+  for (int s = 0; s <= 20; ++s)
+    for (int m = 0; m <= 10; ++m)
+      for (int x = 0; x <= 100; ++x) {
+        const double opacity = between(x / 100.0, m / 10.0, s / 20.0);
+        EXPECT_TRUE(opacity >= 0.2 && opacity <= 0.6) << opacity;
+      }
+}
+
+TEST(TransferFunction, PresetsMatchTheirMapsAndShowMoreWhereTheScalarIsHigh) {
+  const struct {
+    const char* name;
+    glm::dvec3 low, middle, high;  // matplotlib's and ParaView's own values
+  } expected[] = {
+      {"viridis",
+       {0.267004, 0.004874, 0.329415},
+       {0.127568, 0.566949, 0.550556},
+       {0.993248, 0.906157, 0.143936}},
+      {"inferno",
+       {0.001462, 0.000466, 0.013866},
+       {0.735683, 0.215906, 0.330245},
+       {0.988362, 0.998364, 0.644924}},
+      {"plasma",
+       {0.050383, 0.029803, 0.527975},
+       {0.798216, 0.280197, 0.469538},
+       {0.940015, 0.975158, 0.131326}},
+      {"cool-warm", {0.231373, 0.298039, 0.752941}, {0.865, 0.865, 0.865}, {0.705882, 0.015686, 0.149020}},
+      {"grey", {0, 0, 0}, {0.5, 0.5, 0.5}, {1, 1, 1}}};
+  for (const auto& e : expected) {
+    const TransferFunction function = TransferFunction::preset(e.name, -10, 30, 2);
+    EXPECT_EQ(function.range(), std::pair(-10.0, 30.0));
+    expectColour(function.at(-10).colour, e.low, 0.003);
+    expectColour(function.at(-10 + 40 * 128 / 255.0).colour, e.middle, 0.005);
+    expectColour(function.at(30).colour, e.high, 0.003);
+    EXPECT_GT(function.at(30).extinction, function.at(12).extinction);
+    EXPECT_TRUE(function.notes().empty());
+  }
+  EXPECT_EQ(TransferFunction::preset("viridis", 0, 1, 1).at(0).extinction, 0);
+  const TransferFunction diverging = TransferFunction::preset("cool-warm", 0, 1, 1);
+  EXPECT_EQ(diverging.at(0.5).extinction, 0);
+  EXPECT_EQ(diverging.at(0).extinction, diverging.at(1).extinction);
+}
+
+TEST(TransferFunction, AnUnknownPresetNamesThoseThereAre) {
+  try {
+    TransferFunction::preset("rainbow", 0, 1, 1);
+    FAIL() << "accepted";
+  } catch (const UsageError& error) {
+    EXPECT_NE(std::string(error.what()).find("viridis, inferno, plasma, cool-warm, grey"), std::string::npos)
+        << error.what();
+  }
+}
+
+TEST(TransferFunction, AConstantScalarGetsTheMiddle) {
+  for (const double value : {0.0, -7.0, 1e-12}) {
+    const TransferFunction function = TransferFunction::preset("grey", value, value, 1);
+    expectColour(function.at(value).colour, glm::dvec3(0.5), 1e-6);
+    ASSERT_EQ(function.notes().size(), 1u);
+  }
+}
+
+TEST(TransferFunction, NanHasNoExtinction) {
+  EXPECT_EQ(TransferFunction::preset("grey", 0, 1, 1).at(NAN).extinction, 0);
+}
+
+class TransferFunctionFile : public testing::Test {
+ protected:
+  TransferFunctionFile() : path_(testing::TempDir() + fmt::format("tf_{}.json", getpid())) {}
+  ~TransferFunctionFile() override { std::filesystem::remove(path_); }
+
+  TransferFunction open(const std::string& text, const std::pair<double, double>* range = nullptr,
+                        double unit = 0) {
+    std::ofstream(path_) << text;
+    return TransferFunction::fromFile(path_, range, unit, 5.0);
+  }
+  TransferFunction open(const Json& preset, const std::pair<double, double>* range = nullptr,
+                        double unit = 0) {
+    return open(Json::array({preset}).dump(), range, unit);
+  }
+  /// Opens, and expects an Error that names the file and has all of `words`.
+  template <typename Input>
+  void expectError(const Input& input, const std::vector<std::string>& words) {
+    try {
+      open(input);
+      ADD_FAILURE() << "accepted: " << input;
+    } catch (const Error& error) {
+      const std::string message = error.what();
+      EXPECT_NE(message.find(path_.string()), std::string::npos) << message;
+      EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+      for (const std::string& word : words) EXPECT_NE(message.find(word), std::string::npos) << message;
+    }
+  }
+
+  const std::filesystem::path path_;
+  const Json plain_ = {{"Name", "plain"},
+                       {"ColorSpace", "RGB"},
+                       {"RGBPoints", {10, 0, 0, 0, 20, 1, 0.5, 0}},
+                       {"Points", {10, 0.1, 0.5, 0, 20, 0.9, 0.5, 0}}};
+};
+
+TEST_F(TransferFunctionFile, IsTakenAsItIs) {
+  const TransferFunction function = open(plain_);
+  EXPECT_EQ(function.name(), "plain");
+  EXPECT_EQ(function.range(), std::pair(10.0, 20.0));
+  EXPECT_TRUE(function.notes().empty());
+  expectColour(function.at(15).colour, {0.5, 0.25, 0}, 1e-12);
+  EXPECT_NEAR(opacityOf(function, 15), 0.5, 1e-12);
+  EXPECT_NEAR(function.at(15).extinction, -std::log(0.5) / 5, 1e-12);
+}
+
+TEST_F(TransferFunctionFile, AListsFirstPresetIsUsedAndSaidSo) {
+  Json other = plain_;
+  other["Name"] = "other";
+  const TransferFunction function = open(Json::array({plain_, other}).dump());
+  EXPECT_EQ(function.name(), "plain");
+  ASSERT_EQ(function.notes().size(), 1u);
+  EXPECT_NE(function.notes()[0].find("2 presets"), std::string::npos);
+  EXPECT_EQ(open(plain_.dump()).name(), "plain") << "an object instead of a list";
+}
+
+TEST_F(TransferFunctionFile, StretchesColoursAndOpacitiesEachByTheirOwnEnds) {
+  Json preset = plain_;
+  preset["Points"] = {0, 0, 0.5, 0, 0.5, 0.8, 0.5, 0, 1, 0, 0.5, 0};
+  const std::pair<double, double> range(-1, 3);
+  const TransferFunction function = open(preset, &range);
+  EXPECT_EQ(function.range(), range);
+  expectColour(function.at(0).colour, {0.25, 0.125, 0}, 1e-12);
+  EXPECT_NEAR(opacityOf(function, 1), 0.8, 1e-12);
+  EXPECT_NEAR(opacityOf(function, 0), 0.4, 1e-12);
+}
+
+TEST_F(TransferFunctionFile, RangeSpansOpacitiesToo) {
+  Json preset = plain_;
+  preset["Points"] = {5, 0, 0.5, 0, 40, 1, 0.5, 0};
+  EXPECT_EQ(open(preset).range(), std::pair(5.0, 40.0));
+}
+
+TEST_F(TransferFunctionFile, UnsortedPointsAreSorted) {
+  Json preset = plain_;
+  preset["RGBPoints"] = {20, 1, 0.5, 0, 10, 0, 0, 0};
+  preset["Points"] = {20, 0.9, 0.5, 0, 10, 0.1, 0.5, 0};
+  const TransferFunction function = open(preset);
+  EXPECT_EQ(function.range(), std::pair(10.0, 20.0));
+  expectColour(function.at(15).colour, {0.5, 0.25, 0}, 1e-12);
+}
+
+TEST_F(TransferFunctionFile, OpacityUnitByPrecedence) {
+  EXPECT_EQ(open(plain_).opacityUnit(), 5);
+  Json preset = plain_;
+  preset["ScalarOpacityUnitDistance"] = 0.25;
+  EXPECT_EQ(open(preset).opacityUnit(), 0.25);
+  EXPECT_EQ(open(preset, nullptr, 3).opacityUnit(), 3);
+}
+
+TEST_F(TransferFunctionFile, OpacityOneIsCapped) {
+  Json preset = plain_;
+  preset["Points"] = {10, 1, 0.5, 0, 20, 1, 0.5, 0};
+  EXPECT_NEAR(open(preset, nullptr, 2).at(12).extinction, -std::log(1e-4) / 2, 1e-9);
+}
+
+TEST_F(TransferFunctionFile, WithoutPointsGetsTheDefaultRampAndSaysSo) {
+  Json preset = plain_;
+  preset.erase("Points");
+  const TransferFunction function = open(preset);
+  ASSERT_EQ(function.notes().size(), 1u);
+  EXPECT_NE(function.notes()[0].find("no Points"), std::string::npos);
+  const TransferFunction grey = TransferFunction::preset("grey", 10, 20, 5);
+  for (double x = 9; x < 22; x += 0.5) EXPECT_NEAR(function.at(x).extinction, grey.at(x).extinction, 1e-12);
+}
+
+TEST_F(TransferFunctionFile, ColourSpacesAreHonoured) {
+  Json preset = plain_;
+  preset["RGBPoints"] = {0, 1, 0, 0, 1, 0, 0, 1};
+  const std::pair<const char*, ColourSpace> spaces[] = {{"RGB", ColourSpace::rgb},
+                                                        {"HSV", ColourSpace::hsv},
+                                                        {"HSVNoWrap", ColourSpace::hsv_no_wrap},
+                                                        {"Lab", ColourSpace::lab},
+                                                        {"Diverging", ColourSpace::diverging},
+                                                        {"Step", ColourSpace::step}};
+  for (const auto& [name, space] : spaces) {
+    preset["ColorSpace"] = name;
+    expectColour(open(preset).at(0.3).colour, redToBlue(space).at(0.3), 1e-12);
+  }
+  preset["ColorSpace"] = "HSV";
+  preset["HSVWrap"] = 0;
+  expectColour(open(preset).at(0.3).colour, redToBlue(ColourSpace::hsv_no_wrap).at(0.3), 1e-12);
+}
+
+TEST_F(TransferFunctionFile, LogScaleInterpolatesInTheLogarithm) {
+  for (const char* field : {"UseLogScale", "LogScale"}) {
+    Json preset = plain_;
+    preset[field] = 1;
+    preset["RGBPoints"] = {1, 0, 0, 0, 100, 1, 1, 1};
+    preset["Points"] = {1, 0, 0.5, 0, 100, 0.8, 0.5, 0};
+    const TransferFunction function = open(preset);
+    EXPECT_TRUE(function.logScale());
+    EXPECT_NEAR(function.at(10).colour.r, 0.5, 1e-12);
+    EXPECT_NEAR(opacityOf(function, 10), 0.4, 1e-12);
+    EXPECT_EQ(function.at(0).colour.r, 0) << "zero and below: the lower end goes on";
+    EXPECT_EQ(function.at(-3).extinction, 0);
+    const std::pair<double, double> range(1e-3, 1e5);
+    EXPECT_NEAR(open(preset, &range).at(10).colour.r, 0.5, 1e-12);
+  }
+}
+
+TEST_F(TransferFunctionFile, LogScaleOverAnUnstatedIntervalFollowsTheRange) {
+  Json preset = plain_;
+  preset["UseLogScale"] = true;
+  preset["RGBPoints"] = {0, 0, 0, 0, 1, 1, 1, 1};
+  preset.erase("Points");
+  const std::pair<double, double> range(1, 100);
+  const TransferFunction function = open(preset, &range);
+  EXPECT_NEAR(function.at(10).colour.r, 0.5, 1e-12);
+  const TransferFunction grey = TransferFunction::preset("grey", 0, 2, 5);
+  EXPECT_NEAR(function.at(10).extinction, grey.at(1).extinction, 1e-12) << "the ramp is in the logarithm too";
+}
+
+TEST_F(TransferFunctionFile, LogScaleNeedsPositiveScalars) {
+  Json preset = plain_;
+  preset["UseLogScale"] = 1;
+  preset["RGBPoints"] = {0, 0, 0, 0, 20, 1, 0.5, 0};
+  expectError(preset, {"UseLogScale", "begin at 0", "--range"});
+  const std::pair<double, double> negative(-1, 1), positive(1, 2);
+  EXPECT_THROW(open(preset, &negative), UsageError);
+  EXPECT_NO_THROW(open(preset, &positive));
+  preset["RGBPoints"] = {1, 0, 0, 0, 20, 1, 0.5, 0};
+  preset["Points"] = {-1, 0, 0.5, 0, 20, 1, 0.5, 0};
+  expectError(preset, {"UseLogScale", "begin at -1"});
+}
+
+TEST_F(TransferFunctionFile, AReversedRangeIsWrongUsage) {
+  const std::pair<double, double> range(3, 2);
+  EXPECT_THROW(open(plain_, &range), UsageError);
+}
+
+TEST_F(TransferFunctionFile, NanColorIsReadAndItsIdlenessSaid) {
+  Json preset = plain_;
+  preset["NanColor"] = {0.25, 0, 1};
+  const TransferFunction function = open(preset);
+  expectColour(function.at(NAN).colour, {0.25, 0, 1}, 0);
+  EXPECT_EQ(function.at(NAN).extinction, 0);
+  ASSERT_EQ(function.notes().size(), 1u);
+  EXPECT_NE(function.notes()[0].find("NanColor"), std::string::npos);
+}
+
+TEST_F(TransferFunctionFile, MalformedFieldsAreNamed) {
+  const struct {
+    const char* field;
+    Json value;
+    const char* found;
+  } cases[] = {{"RGBPoints", {1, 2, 3, 4, 5}, "5 numbers"},
+               {"RGBPoints", Json::array(), "0 numbers"},
+               {"RGBPoints", "viridis", "\"viridis\""},
+               {"RGBPoints", {0, 0, "a", 0}, "position 2"},
+               {"RGBPoints", {0, 0, 0, 0, 1, 1, 1.5, 1}, "1.5"},
+               {"RGBPoints", {0, 0, 0, 0, 0, 1, 1, 1}, "2 at 0"},
+               {"RGBPoints", {0, 0, 0, 0}, "1 at 0"},
+               {"Points", {0, 1, 0.5}, "3 numbers"},
+               {"Points", {0, -0.1, 0.5, 0, 1, 1, 0.5, 0}, "-0.1"},
+               {"Points", {0, 0, 1.5, 0, 1, 1, 0.5, 0}, "midpoints"},
+               {"Points", {0, 0, 0.5, 2, 1, 1, 0.5, 0}, "sharpnesses"},
+               {"Points", nullptr, "null"},
+               {"ColorSpace", "CMYK", "CMYK"},
+               {"ColorSpace", 3, "3"},
+               {"UseLogScale", "yes", "yes"},
+               {"UseLogScale", 2, "2"},
+               {"NanColor", {1, 0}, "2 numbers"},
+               {"NanColor", {1, 0, 0, 1, 0, 0}, "6"},
+               {"NanColor", {1, 0, 7}, "7"},
+               {"ScalarOpacityUnitDistance", 0, "0"},
+               {"ScalarOpacityUnitDistance", "far", "far"},
+               {"Name", 12, "12"}};
+  for (const auto& c : cases) {
+    Json preset = plain_;
+    preset[c.field] = c.value;
+    SCOPED_TRACE(preset.dump());
+    expectError(preset, {std::string("field ") + c.field, c.found});
+  }
+  Json preset = plain_;
+  preset.erase("RGBPoints");
+  expectError(preset, {"field RGBPoints", "no such field"});
+}
+
+TEST_F(TransferFunctionFile, CategoriesAreRefused) {
+  Json preset = {{"Name", "elements"}, {"IndexedColors", {1, 0, 0, 0, 1, 0}}};
+  expectError(preset, {"IndexedColors", "continuous"});
+  preset = plain_;
+  preset["IndexedColors"] = {1, 0, 0};
+  EXPECT_NO_THROW(open(preset)) << "there is a continuous map beside them";
+  preset["IndexedLookup"] = 1;
+  expectError(preset, {"IndexedColors"});
+}
+
+TEST_F(TransferFunctionFile, OtherFilesAreRefused) {
+  expectError(std::string(), {"JSON"});
+  expectError(std::string("<ColorMap name=\"x\"/>"), {"JSON"});
+  expectError(std::string("[]"), {"empty list"});
+  expectError(std::string("[3]"), {"object"});
+  expectError(std::string("\"text\""), {"object"});
+  expectError(std::string("[{\"Name\": \"a\", \"RGBPoints\": [0,0,0,0, 1e999,1,1,1]}]"), {"JSON"});
+  const std::string whole = Json::array({plain_}).dump();
+  for (size_t length = 0; length < whole.size(); ++length) expectError(whole.substr(0, length), {"JSON"});
+  expectError(std::string("[{\"Name\": \"a\\nb\"}]"), {"a b", "RGBPoints"});
+  std::filesystem::remove(path_);
+  EXPECT_THROW(TransferFunction::fromFile(path_, nullptr, 0, 1), Error);
+}
+
+}  // namespace
+}  // namespace curvisplat

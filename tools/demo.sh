@@ -1,0 +1,39 @@
+#!/usr/bin/env bash
+# Shows what curvisplat does, from nothing: sets up, builds, converts a grid and renders it.
+#
+#   tools/demo.sh                   a generated wake behind a cylinder
+#   tools/demo.sh GRID SOLUTION     your PLOT3D files: grid, and Q solution or function file
+#
+# Caches and pictures go to out/.
+set -euo pipefail
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+
+if [[ $# -ne 0 && $# -ne 2 ]] || [[ ${1-} == -* ]]; then
+  sed -n '2,7s/^# \?//p' "${BASH_SOURCE[0]}" >&2
+  exit 2
+fi
+for file in "$@"; do
+  if [[ ! -r $file || -d $file ]]; then
+    echo "demo: $file: not a readable file" >&2
+    exit 2
+  fi
+done
+
+"$root/tools/build.sh" curvisplat
+curvisplat=$root/build/release/tools/curvisplat
+out=$root/out
+mkdir -p "$out"
+
+if [[ $# -eq 2 ]]; then
+  inputs=("$1" "$2")
+  name=$(basename "${1%.*}")
+else
+  "$curvisplat" generate wake --size 128x96x96 -o "$out/wake"
+  inputs=("$out/wake.xyz" "$out/wake.fun")
+  name=demo
+fi
+
+"$curvisplat" convert "${inputs[@]}" -o "$out/$name.splats" --overwrite
+"$curvisplat" render "$out/$name.splats" -o "$out/$name.png" --size 600x600
+echo "The picture is $out/$name.png"

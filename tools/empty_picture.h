@@ -1,0 +1,36 @@
+// Why a picture has nothing on it, or less than the user may think: the transfer function, the clip box or
+// the camera. People otherwise see a white image and no reason.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "render/camera.h"
+#include "render/frame.h"
+#include "render/image.h"
+#include "render/transfer_function.h"
+#include "stream/manifest.h"
+
+namespace curvisplat {
+
+/// Whether no pixel differs from the background.
+bool isEmpty(const Image& image, const glm::vec4& background);
+
+/// What was rendered, for a reason to be found in it.
+struct RenderedScene {
+  const Manifest& manifest;
+  const VariableInfo& variable;
+  const TransferFunction& transfer_function;
+  const Camera& camera;
+  const FrameOptions& options;
+  const FrameStatistics& statistics;
+};
+
+/// The reasons for an empty picture, in the order in which one should look into them; never none.
+std::vector<std::string> whyEmpty(const RenderedScene& scene);
+
+/// A warning if the transfer function's range has no value of the scalar in it, so that everything has the
+/// colour and opacity of one end; empty otherwise.
+std::string rangeMissesScalar(const VariableInfo& variable, const TransferFunction& transfer_function);
+
+}  // namespace curvisplat

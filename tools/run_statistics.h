@@ -1,0 +1,20 @@
+// What every `--stats FILE.json` begins with, and how it is written.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string_view>
+
+namespace curvisplat {
+
+/// {"program", "version", "command": [the arguments], "peak_memory_bytes": VmHWM of this process so far}.
+nlohmann::json runStatistics();
+
+/// Writes one JSON object, whole or not at all. Throws Error.
+void writeStatistics(const std::filesystem::path& path, const nlohmann::json& statistics);
+
+/// Throws Error if the folder that `path`, the value of `option`, is to be written to does not exist: for
+/// use before long work.
+void checkOutputFolder(std::string_view option, const std::filesystem::path& path);
+
+}  // namespace curvisplat

@@ -1,0 +1,51 @@
+#!/usr/bin/env bash
+# Installs what building and testing curvisplat needs, by package name, on Debian 12 and its like. Does nothing
+# where everything is there already.
+set -euo pipefail
+
+packages=(
+  # compiler and build
+  g++ cmake ninja-build pkg-config
+  # octree and conversion; OpenVDB's CMake module asks for Boost's iostreams
+  libopenvdb-dev libboost-iostreams-dev libtbb-dev libzstd-dev libxxhash-dev
+  # vectors, texts, command line, manifests
+  libglm-dev libfmt-dev libcli11-dev nlohmann-json3-dev
+  # pictures, and OpenGL without a display
+  libpng-dev libtinyexr-dev libosmesa6-dev libgl-dev
+  # tests and benchmarks
+  libgtest-dev libbenchmark-dev
+)
+
+if ! command -v dpkg-query >/dev/null; then
+  echo "setup: this is no Debian system; install the equivalents of: ${packages[*]}" >&2
+  exit 1
+fi
+
+missing=()
+for package in "${packages[@]}"; do
+  status=$(dpkg-query --show --showformat='${db:Status-Status}' "$package" 2>/dev/null || true)
+  [[ $status == installed ]] || missing+=("$package")
+done
+[[ ${#missing[@]} -gt 0 ]] || exit 0
+
+as_root=()
+if [[ $(id -u) -ne 0 ]]; then
+  if ! command -v sudo >/dev/null; then
+    echo "setup: needs root to install; as root run: apt-get install ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo)
+fi
+
+echo "setup: installing ${missing[*]}"
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+apt() {
+  if ! "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get --quiet --yes "$@" </dev/null >"$log" 2>&1; then
+    cat "$log" >&2
+    echo "setup: apt-get $1 failed" >&2
+    exit 1
+  fi
+}
+apt update
+apt install --no-install-recommends "${missing[@]}"
