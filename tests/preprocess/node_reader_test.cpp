@@ -91,6 +91,28 @@ TEST(NodeReader, BlanksEveryNodeThatIsNotThere) {
   EXPECT_EQ(counts.not_finite, expected.not_finite);
 }
 
+/// A single bad node has no other one near it that makes the reader look closer.
+TEST(NodeReader, FindsASingleBadNodeAnywhere) {
+  for (const size_t count : {1, 3, 16, 37, 4101}) {
+    const NodeArrays ordinary = ordinaryNodes(count, 1);
+    for (size_t bad = count > 100 ? count - 40 : 0; bad < count; ++bad)
+      for (int where = 0; where < 5; ++where) {
+        NodeArrays nodes = ordinary;
+        std::vector<double>* const axes[] = {&nodes.x, &nodes.y, &nodes.z};
+        if (where < 3) (*axes[where])[bad] = kInfinity;
+        if (where == 3) nodes.scalars[0][bad] = std::numeric_limits<float>::quiet_NaN();
+        if (where == 4) nodes.scalars[0][bad] = 5.5f;
+        const GivenNodes source(nodes);
+        NodeArrays out;
+        const BlankCounts counts = NodeReader(source, {0}, 5.5).read(0, kAll, out);
+        ASSERT_EQ(counts.by_value, where == 4);
+        ASSERT_EQ(counts.not_finite, where != 4);
+        ASSERT_EQ(out.blank[bad], 1) << bad << " of " << count;
+        ASSERT_EQ(std::count(out.blank.begin(), out.blank.end(), 1), 1);
+      }
+  }
+}
+
 TEST(NodeReader, LooksOnlyAtTheScalarsAskedFor) {
   NodeArrays nodes = ordinaryNodes(100, 2);
   nodes.scalars[1][7] = std::numeric_limits<float>::infinity();
