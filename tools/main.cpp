@@ -14,6 +14,8 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", "curvisplat " CURVISPLAT_VERSION);
   app.require_subcommand(1);
   app.set_help_all_flag("--help-all", "Help of every subcommand");
+  addConvert(app);
+  addInfo(app);
   addRender(app);
   addGenerate(app);
   addCompare(app);

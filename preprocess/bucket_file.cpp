@@ -1,0 +1,218 @@
+#include "preprocess/bucket_file.h"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <atomic>
+#include <condition_variable>
+#include <cstring>
+#include <deque>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "stream/error.h"
+#include "stream/file.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kNoChunk = UINT64_MAX;
+
+struct ChunkHeader {
+  uint64_t previous;
+  uint64_t bytes;
+};
+static_assert(sizeof(ChunkHeader) == 16);
+
+/// Writes chunks in a thread of its own, so that no worker waits for the disk unless it is far behind.
+class ChunkWriter {
+ public:
+  struct Chunk {
+    uint64_t offset = 0;
+    std::vector<std::byte> bytes;
+  };
+
+  explicit ChunkWriter(OutputFile& file) : file_(&file), thread_([this] { writeAll(); }) {}
+  ~ChunkWriter() { stop(); }
+
+  /// Waits while too many chunks wait. Throws what writing threw.
+  void write(Chunk chunk) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return waiting_.size() < BucketFile::kWaitingChunks || error_; });
+    if (error_) std::rethrow_exception(error_);
+    waiting_.push_back(std::move(chunk));
+    changed_.notify_all();
+  }
+
+  /// A used buffer, emptied, or a new one.
+  std::vector<std::byte> buffer() {
+    const std::lock_guard lock(mutex_);
+    if (free_.empty()) return {};
+    std::vector<std::byte> buffer = std::move(free_.back());
+    free_.pop_back();
+    return buffer;
+  }
+
+  /// Writes what waits. Throws what writing threw.
+  void finish() {
+    stop();
+    free_ = {};
+    if (error_) std::rethrow_exception(error_);
+  }
+
+ private:
+  void stop() {
+    {
+      const std::lock_guard lock(mutex_);
+      stopped_ = true;
+    }
+    changed_.notify_all();
+    if (thread_.joinable()) thread_.join();
+  }
+
+  void writeAll() {
+    pthread_setname_np(pthread_self(), "bucket-writer");
+    std::unique_lock lock(mutex_);
+    for (;;) {
+      changed_.wait(lock, [this] { return stopped_ || !waiting_.empty(); });
+      if (waiting_.empty() || error_) return;
+      Chunk chunk = std::move(waiting_.front());
+      lock.unlock();
+      std::exception_ptr error;
+      try {
+        file_->writeAt(chunk.offset, chunk.bytes);
+      } catch (...) {
+        error = std::current_exception();
+      }
+      chunk.bytes.clear();
+      lock.lock();
+      waiting_.pop_front();
+      free_.push_back(std::move(chunk.bytes));
+      if (error) error_ = error;
+      changed_.notify_all();
+    }
+  }
+
+  OutputFile* file_;
+  std::mutex mutex_;  // guards all below
+  std::condition_variable changed_;
+  std::deque<Chunk> waiting_;
+  std::vector<std::vector<std::byte>> free_;
+  bool stopped_ = false;
+  std::exception_ptr error_;
+  std::thread thread_;  // last: it uses the others
+};
+
+struct Bucket {
+  std::mutex mutex;               // guards the rest, until close()
+  std::vector<std::byte> buffer;  // a chunk in the making, header first; empty: none
+  uint64_t last_chunk = kNoChunk;
+  uint64_t bytes = 0;
+};
+
+}  // namespace
+
+struct BucketFile::State {
+  State(const std::filesystem::path& path, uint32_t bucket_count, size_t chunk)
+      : output(path), chunk_bytes(chunk), buckets(bucket_count), writer(output) {}
+
+  OutputFile output;
+  const size_t chunk_bytes;
+  std::vector<Bucket> buckets;
+  std::atomic<uint64_t> end = 0;
+  ChunkWriter writer;
+  std::optional<InputFile> input;  // after close()
+
+  /// For the holder of the bucket's mutex.
+  void flush(Bucket& bucket) {
+    const ChunkHeader header{bucket.last_chunk, bucket.buffer.size() - sizeof(ChunkHeader)};
+    std::memcpy(bucket.buffer.data(), &header, sizeof header);
+    bucket.last_chunk = end.fetch_add(bucket.buffer.size());
+    bucket.bytes += header.bytes;
+    writer.write({bucket.last_chunk, std::move(bucket.buffer)});
+    bucket.buffer = {};
+  }
+
+  /// Calls use(offset, bytes) for the records of each chunk.
+  template <typename Use>
+  void forEachChunk(uint32_t number, Use use) const {
+    CURVISPLAT_CHECK(input.has_value());
+    uint64_t at = buckets[number].last_chunk;
+    while (at != kNoChunk) {
+      ChunkHeader header;
+      input->readAt(at, std::span(&header, 1));
+      use(at + sizeof header, header.bytes);
+      at = header.previous;
+    }
+  }
+};
+
+BucketFile::BucketFile(const std::filesystem::path& path, uint32_t buckets, size_t chunk_bytes)
+    : state_(std::make_unique<State>(path, buckets, chunk_bytes)) {}
+
+BucketFile::~BucketFile() {
+  const std::filesystem::path path = state_->output.path();
+  state_.reset();
+  std::error_code ignored;
+  std::filesystem::remove(path, ignored);
+}
+
+uint32_t BucketFile::buckets() const {
+  return static_cast<uint32_t>(state_->buckets.size());
+}
+
+void BucketFile::append(uint32_t number, std::span<const std::byte> records) {
+  const size_t room = state_->chunk_bytes - sizeof(ChunkHeader);
+  CURVISPLAT_CHECK_OP(records.size(), <=, room);
+  Bucket& bucket = state_->buckets[number];
+  const std::lock_guard lock(bucket.mutex);
+  if (bucket.buffer.size() + records.size() > state_->chunk_bytes) state_->flush(bucket);
+  if (bucket.buffer.empty()) {
+    bucket.buffer = state_->writer.buffer();
+    bucket.buffer.reserve(state_->chunk_bytes);
+    bucket.buffer.resize(sizeof(ChunkHeader));
+  }
+  bucket.buffer.insert(bucket.buffer.end(), records.begin(), records.end());
+}
+
+void BucketFile::close() {
+  for (Bucket& bucket : state_->buckets)
+    if (!bucket.buffer.empty()) state_->flush(bucket);
+  state_->writer.finish();
+  state_->input.emplace(state_->output.path());
+}
+
+uint64_t BucketFile::bytes(uint32_t bucket) const {
+  return state_->buckets[bucket].bytes;
+}
+
+uint64_t BucketFile::size() const {
+  return state_->end;
+}
+
+void BucketFile::read(uint32_t bucket, std::vector<std::byte>& out) const {
+  if (out.capacity() < bytes(bucket)) out = {};  // or old and new would be in memory together
+  out.resize(bytes(bucket));
+  size_t done = 0;
+  state_->forEachChunk(bucket, [&](uint64_t offset, uint64_t bytes) {
+    CURVISPLAT_CHECK_OP(done + bytes, <=, out.size());
+    state_->input->readAt(offset, std::span(out).subspan(done, bytes));
+    done += bytes;
+  });
+  CURVISPLAT_CHECK_OP(done, ==, out.size());
+}
+
+void BucketFile::forEachChunk(uint32_t bucket,
+                              const std::function<void(std::span<const std::byte>)>& use) const {
+  std::vector<std::byte> chunk;
+  state_->forEachChunk(bucket, [&](uint64_t offset, uint64_t bytes) {
+    CURVISPLAT_CHECK_OP(bytes, <=, state_->chunk_bytes);
+    chunk.resize(bytes);
+    state_->input->readAt(offset, std::span(chunk));
+    use(chunk);
+  });
+}
+
+}  // namespace curvisplat

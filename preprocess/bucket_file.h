@@ -1,0 +1,54 @@
+// The temporary data of conversion: one file, in which each bucket's records form a chain of chunks. A chunk
+// is what one bucket's buffer held when it was full, so writes are large whatever order the splats come in,
+// and the memory of a bucket is its buffer and one offset.
+//
+//    chunk:  offset of the bucket's chunk before, or kNoChunk   uint64
+//            bytes of records that follow                       uint64
+//            whole records
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace curvisplat {
+
+class BucketFile {
+ public:
+  /// Makes `path`. A bucket's buffer has `chunk_bytes`; it is there while the bucket has something in it.
+  /// Four more may wait for the disk.
+  BucketFile(const std::filesystem::path& path, uint32_t buckets, size_t chunk_bytes);
+  /// Removes the file.
+  ~BucketFile();
+
+  static constexpr size_t kWaitingChunks = 4;
+
+  uint32_t buckets() const;
+
+  /// Adds whole records, of chunk_bytes at most, to a bucket. Any thread; waits while the disk is behind.
+  /// Throws Error once the disk has failed.
+  void append(uint32_t bucket, std::span<const std::byte> records);
+
+  /// Writes what is left in the buffers and frees them. Reading is possible from here on, by any thread;
+  /// nothing is appended.
+  void close();
+
+  uint64_t bytes(uint32_t bucket) const;
+  /// All records of a bucket; the order is not to be relied on. Overwrites `out` and keeps its capacity.
+  void read(uint32_t bucket, std::vector<std::byte>& out) const;
+  /// The same, a chunk at a time.
+  void forEachChunk(uint32_t bucket, const std::function<void(std::span<const std::byte>)>& use) const;
+
+  /// Bytes of the whole file.
+  uint64_t size() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace curvisplat

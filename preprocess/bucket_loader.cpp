@@ -1,0 +1,101 @@
+#include "preprocess/bucket_loader.h"
+
+#include <algorithm>
+
+#include "preprocess/splat_record.h"
+#include "stream/brick.h"
+
+namespace curvisplat {
+namespace {
+
+/// Finds the unit of one record after the other; neighbours are mostly in the same leaf.
+class UnitFinder {
+ public:
+  explicit UnitFinder(const BucketTree& tree) : tree_(&tree) {}
+  uint32_t unitOf(const RootPosition& position) {
+    if (unit_ == BucketTree::kNone || !(*tree_)[unit_].cell.contains(position))
+      unit_ = buildUnitOf(*tree_, tree_->leafOf(position));
+    return unit_;
+  }
+
+ private:
+  const BucketTree* tree_;
+  uint32_t unit_ = BucketTree::kNone;
+};
+
+/// The first cell of kMaxLevel in `cell`: disjoint cells of any levels compare as these do.
+Cell firstDeepest(const Cell& cell) {
+  Cell deepest{static_cast<uint32_t>(kMaxLevel), {}};
+  for (int axis = 0; axis < 3; ++axis) deepest.at[axis] = cell.at[axis] << (kMaxLevel - cell.level);
+  return deepest;
+}
+
+}  // namespace
+
+uint32_t buildUnitOf(const BucketTree& tree, uint32_t leaf) {
+  uint32_t unit = leaf;
+  for (uint32_t above = tree[leaf].parent; above != BucketTree::kNone; above = tree[above].parent) {
+    const CellContents& contents = tree[above].contents;
+    if (contents.splats > kMaxBrickSplats && !contents.coincide()) break;
+    unit = above;
+  }
+  return unit;
+}
+
+BucketLoader::BucketLoader(const BucketTree& tree, const BucketFile& file, size_t variables, uint32_t first,
+                           uint64_t most_bytes)
+    : tree_(&tree),
+      file_(&file),
+      variables_(variables),
+      position_(first),
+      most_bytes_(most_bytes),
+      ahead_([this](LoadedBucket& loaded) { return fill(loaded); }) {}
+
+bool BucketLoader::fill(LoadedBucket& loaded) {
+  while (position_ < file_->buckets() && file_->bytes(position_) == 0) ++position_;
+  if (position_ == file_->buckets() || ended_) return false;
+  loaded.bucket = position_++;
+  loaded.too_large = ended_ = file_->bytes(loaded.bucket) > most_bytes_;
+  loaded.parts.clear();
+  if (loaded.too_large) return true;
+  file_->read(loaded.bucket, loaded.bytes);
+  group(loaded);
+  return true;
+}
+
+void BucketLoader::group(LoadedBucket& loaded) const {
+  // Counted first and placed then, so that no second array of the bucket's size is needed.
+  UnitFinder finder(*tree_);
+  std::vector<LoadedBucket::Part>& parts = loaded.parts;
+  std::vector<uint32_t> part_of(tree_->size(), BucketTree::kNone);
+  const auto forEachRecord = [&](auto use) {
+    for (size_t at = 0; at < loaded.bytes.size(); at += recordBytes(&loaded.bytes[at], variables_))
+      use(at, finder.unitOf(recordPosition(&loaded.bytes[at])));
+  };
+  size_t records = 0;
+  forEachRecord([&](size_t, uint32_t unit) {
+    if (part_of[unit] == BucketTree::kNone) {
+      part_of[unit] = static_cast<uint32_t>(parts.size());
+      parts.push_back({unit, 0, 0});
+    }
+    ++parts[part_of[unit]].count;
+    ++records;
+  });
+  std::sort(parts.begin(), parts.end(), [&](const auto& a, const auto& b) {
+    return mortonLess(firstDeepest((*tree_)[a.unit].cell), firstDeepest((*tree_)[b.unit].cell));
+  });
+  std::vector<size_t> next(parts.size());
+  size_t begin = 0;
+  for (size_t part = 0; part < parts.size(); ++part) {
+    part_of[parts[part].unit] = static_cast<uint32_t>(part);
+    parts[part].begin = next[part] = begin;
+    begin += parts[part].count;
+  }
+  if (loaded.places.capacity() < records) loaded.places = {};
+  loaded.places.resize(records);
+  forEachRecord([&](size_t at, uint32_t unit) {
+    loaded.places[next[part_of[unit]]++] = static_cast<uint32_t>(at / 4);
+  });
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,82 @@
+#include "preprocess/memory_plan.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "preprocess/splat_record.h"
+#include "stream/brick.h"
+#include "stream/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kMiB = uint64_t{1} << 20;
+
+// The program with its libraries, thread stacks, the index records, and what the allocator holds back.
+constexpr uint64_t kProgramBytes = 64 * kMiB;
+// Buckets are built from at least so many splats: some bricks at a time for each thread to work on.
+constexpr uint64_t kLeastBucketSplats = 4 * kMaxBrickSplats;
+constexpr uint64_t kLeastChunkBytes = kMiB / 8, kMostChunkBytes = kMiB;
+constexpr uint32_t kMostBuckets = 4096;
+
+/// Making a brick of kMaxBrickSplats: its splats in double, what the codec lays beside them, and the voxels
+/// that they merge into.
+uint64_t brickScratchBytes(size_t variables) {
+  return kMaxBrickSplats * (200 + 100 * variables);
+}
+
+/// A splat of a bucket: its record, its place in two orders, and what is encoded of it.
+uint64_t bucketBytesPerSplat(size_t variables) {
+  return regularRecordBytes(variables) + 2 * sizeof(uint32_t) + 12 + 10 * variables;
+}
+
+}  // namespace
+
+uint64_t leastMemory(size_t variables) {
+  const uint64_t two_buckets = 2 * kLeastBucketSplats * bucketBytesPerSplat(variables);
+  const uint64_t exact = kProgramBytes + brickScratchBytes(variables) + two_buckets;
+  return (exact + 16 * kMiB - 1) / (16 * kMiB) * (16 * kMiB);
+}
+
+uint64_t defaultMemory() {
+  const auto pages = static_cast<uint64_t>(::sysconf(_SC_PHYS_PAGES));
+  const auto page_bytes = static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
+  return std::min<uint64_t>(2048 * kMiB, pages * page_bytes / 4);
+}
+
+MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads) {
+  if (cap_bytes < leastMemory(variables))
+    throw Error("--memory: conversion of {} scalars takes at least {} MiB; {} MiB were given", variables,
+                leastMemory(variables) / kMiB, cap_bytes / kMiB);
+  const uint64_t bytes = cap_bytes - kProgramBytes;
+
+  MemoryPlan plan;
+  plan.slab_bytes = std::min(bytes / 8, 256 * kMiB);
+  plan.counting_bytes = bytes / 8;
+  plan.seam_bytes = bytes / 8;
+
+  plan.chunk_buffer_bytes = bytes / 4;
+  plan.most_buckets =
+      static_cast<uint32_t>(std::min<uint64_t>(plan.chunk_buffer_bytes / kLeastChunkBytes, kMostBuckets));
+
+  const uint64_t scratch = brickScratchBytes(variables);
+  const uint64_t least_buckets = 2 * kLeastBucketSplats * bucketBytesPerSplat(variables);
+  const uint64_t affordable = std::max<uint64_t>(1, (bytes - least_buckets) / (2 * scratch));
+  plan.threads = static_cast<unsigned>(std::min<uint64_t>(std::max(1u, threads), affordable));
+  plan.bucket_splats = (bytes - plan.threads * scratch) / (2 * bucketBytesPerSplat(variables));
+  plan.bucket_splats = std::min<uint64_t>(plan.bucket_splats, uint64_t{1} << 24);
+  plan.bucket_bytes = plan.bucket_splats * regularRecordBytes(variables);
+  return plan;
+}
+
+void MemoryPlan::limitBuckets(uint64_t splats, size_t variables) {
+  bucket_splats = std::min(bucket_splats, splats);
+  bucket_bytes = bucket_splats * regularRecordBytes(variables);
+}
+
+size_t MemoryPlan::chunkBytes(uint32_t buckets) const {
+  return std::clamp(chunk_buffer_bytes / std::max(1u, buckets), kLeastChunkBytes, kMostChunkBytes);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,42 @@
+// How conversion splits the bytes it is given among what it keeps in memory. The passes follow one another,
+// so each may have nearly all; what lives through several (the program itself) comes off first.
+//
+//    scan, count   2 slabs | counting grid
+//    scatter       2 slabs | chunk buffers | seams | a task's splats a thread
+//    seams         chunk buffers | seams
+//    build         2 buckets (one is read while the other is built) | a brick's scratch a thread
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace curvisplat {
+
+struct MemoryPlan {
+  uint64_t slab_bytes = 0;      // each of two
+  uint64_t counting_bytes = 0;  // the counting grid
+  uint64_t seam_bytes = 0;
+  uint64_t chunk_buffer_bytes = 0;  // the write buffers of all buckets
+  uint32_t most_buckets = 0;        // of one temporary file, so that buffers stay large enough to write well
+  uint64_t bucket_splats = 0;       // a bucket of more is divided again before it is built
+  uint64_t bucket_bytes = 0;        // the records of such a bucket
+  unsigned threads = 0;             // that may work at once: each has its scratch
+
+  /// `threads` is what the user grants. Throws Error if `cap_bytes` is less than leastMemory().
+  static MemoryPlan of(uint64_t cap_bytes, size_t variables, unsigned threads);
+
+  /// Makes buckets smaller than they could be.
+  void limitBuckets(uint64_t splats, size_t variables);
+  /// A bucket's write buffer, where a file has so many buckets.
+  size_t chunkBytes(uint32_t buckets) const;
+  /// What is planned for, with room for the splats that counts of nodes do not foresee.
+  uint64_t plannedBucketSplats() const { return bucket_splats - bucket_splats / 5; }
+};
+
+/// The smallest cap that conversion of so many variables keeps.
+uint64_t leastMemory(size_t variables);
+
+/// 2 GiB or a quarter of the machine's memory, the smaller.
+uint64_t defaultMemory();
+
+}  // namespace curvisplat

@@ -1,0 +1,91 @@
+#include "preprocess/preflight.h"
+
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <optional>
+
+#include "preprocess/splat_record.h"
+#include "stream/error.h"
+
+namespace curvisplat {
+namespace {
+
+// What a node with one scalar takes in the cache, levels of detail included, on grids that compress badly;
+// and each further scalar.
+constexpr uint64_t kCacheBytesPerNode = 16, kCacheBytesPerScalar = 5;
+// Chunk headers, chunks that are not full, and the records of seams, which are longer.
+constexpr uint64_t kTemporaryMarginPercent = 5;
+
+void checkWritable(const std::filesystem::path& folder, const char* hint) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(folder, error))
+    throw Error("{}: is not a folder{}", folder.string(), hint);
+  if (::access(folder.c_str(), W_OK | X_OK) != 0)
+    throw Error("{}: cannot be written to: {}{}", folder.string(), std::strerror(errno), hint);
+}
+
+struct Disk {
+  dev_t device;
+  uint64_t free_bytes;
+};
+
+std::optional<Disk> diskOf(const std::filesystem::path& folder) {
+  struct stat status {};
+  struct statvfs disk {};
+  if (::stat(folder.c_str(), &status) != 0 || ::statvfs(folder.c_str(), &disk) != 0) return std::nullopt;
+  return Disk{status.st_dev, uint64_t{disk.f_bavail} * disk.f_frsize};
+}
+
+std::string gigabytes(uint64_t bytes) {
+  return fmt::format("{:.1f} GiB", static_cast<double>(bytes) / static_cast<double>(uint64_t{1} << 30));
+}
+
+void checkRoom(const std::filesystem::path& folder, const Disk& disk, uint64_t bytes, const char* what,
+               const char* hint) {
+  if (disk.free_bytes < bytes)
+    throw Error("{}: {} need about {}, and {} are free; {}", folder.string(), what, gigabytes(bytes),
+                gigabytes(disk.free_bytes), hint);
+}
+
+}  // namespace
+
+DiskNeeds diskNeeds(uint64_t nodes, size_t variables) {
+  const uint64_t temporary = nodes * regularRecordBytes(variables);
+  const uint64_t further = variables > 1 ? variables - 1 : 0;
+  return {temporary + temporary * kTemporaryMarginPercent / 100,
+          nodes * (kCacheBytesPerNode + further * kCacheBytesPerScalar)};
+}
+
+std::filesystem::path folderOf(const std::filesystem::path& path) {
+  return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+}
+
+void checkOutput(const std::filesystem::path& output, bool overwrite,
+                 const std::filesystem::path& temporary_folder) {
+  std::error_code error;
+  if (!overwrite && std::filesystem::exists(std::filesystem::symlink_status(output, error)))
+    throw Error("{}: exists; remove it, name another output, or say --overwrite", output.string());
+  checkWritable(folderOf(output), "");
+  checkWritable(temporary_folder, "; name another folder with --tmp");
+}
+
+void checkDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
+                    const std::filesystem::path& temporary_folder) {
+  const std::filesystem::path folder = folderOf(output);
+  const std::optional<Disk> cache = diskOf(folder), temporary = diskOf(temporary_folder);
+  if (!cache || !temporary) return;  // a file system that does not tell is no reason to refuse
+  if (cache->device == temporary->device) {
+    checkRoom(folder, *cache, needs.cache_bytes + needs.temporary_bytes, "the cache and temporary files",
+              "make room, or name a folder on another disk with --tmp");
+    return;
+  }
+  checkRoom(folder, *cache, needs.cache_bytes, "the cache's files", "make room");
+  checkRoom(temporary_folder, *temporary, needs.temporary_bytes, "temporary files",
+            "make room, or name another folder with --tmp");
+}
+
+}  // namespace curvisplat

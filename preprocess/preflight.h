@@ -1,0 +1,31 @@
+// What would make a long conversion fail at its end is asked at its beginning: is the output's name free, can
+// the folders be written, and is there room on their disks.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+
+namespace curvisplat {
+
+/// Bytes that conversion of a grid will need on disk: the temporary data for certain, the cache by
+/// experience.
+struct DiskNeeds {
+  uint64_t temporary_bytes = 0;
+  uint64_t cache_bytes = 0;
+};
+DiskNeeds diskNeeds(uint64_t nodes, size_t variables);
+
+/// Throws Error if something stands at `output` that may not be replaced, or if its folder or
+/// `temporary_folder` is missing or not writable. Changes nothing.
+void checkOutput(const std::filesystem::path& output, bool overwrite,
+                 const std::filesystem::path& temporary_folder);
+
+/// Throws Error if the disks of `output` and `temporary_folder` (one, perhaps) have too little room.
+void checkDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
+                    const std::filesystem::path& temporary_folder);
+
+/// The folder that holds `path`, "." for a plain name.
+std::filesystem::path folderOf(const std::filesystem::path& path);
+
+}  // namespace curvisplat

@@ -1,0 +1,42 @@
+// The first two passes of conversion: what is in the grid, and where it is dense.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <limits>
+#include <vector>
+
+#include "preprocess/counting_grid.h"
+#include "preprocess/node_reader.h"
+#include "stream/octree.h"
+#include "stream/progress.h"
+
+namespace curvisplat {
+
+struct ScalarRange {
+  double min = std::numeric_limits<double>::infinity();
+  double max = -std::numeric_limits<double>::infinity();
+};
+
+/// Of the nodes that are there.
+struct GridSurvey {
+  uint64_t nodes = 0;  // of the grid, blanked ones included
+  BlankCounts blanked;
+  glm::dvec3 lower{std::numeric_limits<double>::infinity()};
+  glm::dvec3 upper{-std::numeric_limits<double>::infinity()};
+  std::vector<ScalarRange> ranges;  // [scalar]
+};
+
+/// Reads all nodes once. Memory: two slabs. Throws Error if no node is there, or if the grid is larger or
+/// smaller than single precision can say.
+GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, Progress& progress);
+
+/// Counts the nodes that are there by cells of `root`, reading coordinates alone: a node that is blanked for
+/// its scalar's sake is counted, which makes the plan no worse than a little uneven.
+void countNodes(const GridSource& source, const RootCube& root, uint64_t slab_bytes, CountingGrid& counts,
+                Progress& progress);
+
+/// The level to begin counting at: some levels finer than evenly spread nodes would need.
+uint32_t countingLevel(uint64_t nodes);
+
+}  // namespace curvisplat

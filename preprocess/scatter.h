@@ -1,0 +1,54 @@
+// The pass that makes splats: reads the grid once more, with a halo, and sends each splat to the bucket of
+// the cell that it lies in. Nodes of block faces go through the seam merger first.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "preprocess/bucket_file.h"
+#include "preprocess/bucket_tree.h"
+#include "preprocess/node_reader.h"
+#include "preprocess/seams.h"
+#include "stream/octree.h"
+#include "stream/progress.h"
+
+namespace curvisplat {
+
+/// Sends records to their buckets and keeps account of the leaves' contents. One a thread; the tree and the
+/// file are shared.
+class RecordRouter {
+ public:
+  RecordRouter(const BucketTree& tree, BucketFile& file)
+      : tree_(&tree), file_(&file), contents_(tree.size()) {}
+
+  void add(std::span<const std::byte> record, const RootPosition& position);
+  /// Sends what is gathered. To be called at the end.
+  void flush();
+  /// [node of the tree]: what went to each leaf.
+  const std::vector<CellContents>& contents() const { return contents_; }
+
+ private:
+  const BucketTree* tree_;
+  BucketFile* file_;
+  std::vector<CellContents> contents_;
+  uint32_t leaf_ = BucketTree::kNone;
+  std::vector<std::byte> gathered_;  // for the leaf's bucket
+};
+
+struct ScatterCounts {
+  uint64_t degenerate = 0;  // splats with a floored axis
+  uint64_t inverted = 0;    // cells of the handedness that fewer of their block's cells have
+};
+
+/// Routes all splats but those of block faces, which go to `seams`. Adds to `contents` ([node of the tree]).
+ScatterCounts scatterSplats(const NodeReader& reader, const RootCube& root, uint64_t slab_bytes,
+                            const BucketTree& tree, BucketFile& file, std::vector<CellContents>& contents,
+                            SeamMerger& seams, Progress& progress);
+
+/// Routes the splats of block faces, merged. Returns how many nodes were merged into another one.
+uint64_t scatterSeams(SeamMerger& seams, int coordinate_bytes, const RootCube& root, const BucketTree& tree,
+                      BucketFile& file, std::vector<CellContents>& contents, Progress& progress);
+
+}  // namespace curvisplat

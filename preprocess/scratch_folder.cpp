@@ -1,0 +1,25 @@
+#include "preprocess/scratch_folder.h"
+
+#include <unistd.h>
+
+#include <atomic>
+
+#include "stream/error.h"
+
+namespace curvisplat {
+
+ScratchFolder::ScratchFolder(const std::filesystem::path& parent, const std::string& name) {
+  static std::atomic<unsigned> made = 0;  // several conversions in one process, as in tests
+  path_ = parent / fmt::format("{}.{}.{}", name, ::getpid(), made++);
+  std::error_code error;
+  if (!std::filesystem::create_directories(path_, error) || error)
+    throw Error("{}: the folder for temporary files cannot be made: {}; name another place with --tmp",
+                path_.string(), error ? error.message() : "it exists");
+}
+
+ScratchFolder::~ScratchFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,80 @@
+#include "preprocess/splat_record.h"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+
+#include "stream/error.h"
+
+namespace curvisplat {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "48-bit words are the low bytes of 64-bit words");
+
+float toFloat(double value) {
+  constexpr double kLargest = std::numeric_limits<float>::max();
+  return static_cast<float>(std::clamp(value, -kLargest, kLargest));
+}
+
+double product(const std::array<double, 3>& axis) {
+  return axis[0] * axis[1] * axis[2];
+}
+
+}  // namespace
+
+void packRecord(const NodeSplat& in, std::span<const SplatScalar> values, const RootPosition& position,
+                std::vector<std::byte>& out) {
+  CURVISPLAT_CHECK_OP(in.node, <, kMaxNodes);
+  const size_t bytes = in.regular ? regularRecordBytes(values.size()) : irregularRecordBytes(values.size());
+  const size_t start = out.size();
+  out.resize(start + bytes);
+  std::byte* at = out.data() + start;
+
+  const auto putWord48 = [&at](uint64_t word) {
+    std::memcpy(at, &word, 6);
+    at += 6;
+  };
+  const auto putFloat = [&at](double value) {
+    const float single = toFloat(value);
+    std::memcpy(at, &single, sizeof single);
+    at += sizeof single;
+  };
+  putWord48(in.node | uint64_t{!in.regular} << 47);
+  for (const uint64_t coordinate : position.at) putWord48(coordinate);
+  for (const double axis : in.splat.axis) putFloat(std::max<double>(axis, std::numeric_limits<float>::min()));
+  for (const double shear : in.splat.shear) putFloat(shear);
+  for (const SplatScalar& value : values) {
+    putFloat(value.mean);
+    for (int axis = 0; axis < 3; ++axis) putFloat(value.slope[axis]);
+  }
+  if (!in.regular) {
+    const double cell = product(in.splat.axis);
+    putFloat(cell > 0 ? in.splat.weight / cell : 0);
+    for (const SplatScalar& value : values) putFloat(value.variance);
+  }
+}
+
+void unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScalar> values) {
+  const bool irregular = recordIsIrregular(record);
+  const std::byte* at = record + 24;
+  const auto takeFloat = [&at] {
+    float single;
+    std::memcpy(&single, at, sizeof single);
+    at += sizeof single;
+    return static_cast<double>(single);
+  };
+  for (double& axis : splat.axis) axis = takeFloat();
+  for (double& shear : splat.shear) shear = takeFloat();
+  for (SplatScalar& value : values) {
+    value.mean = takeFloat();
+    for (int axis = 0; axis < 3; ++axis) value.slope[axis] = takeFloat();
+    value.variance = 0;
+  }
+  splat.weight = product(splat.axis);
+  if (irregular) {
+    splat.weight *= takeFloat();
+    for (SplatScalar& value : values) value.variance = takeFloat();
+  }
+}
+
+}  // namespace curvisplat

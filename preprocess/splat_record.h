@@ -1,0 +1,62 @@
+// A splat as conversion keeps it in temporary files and in a bucket's memory: 48 + 16 v bytes for v
+// variables, 4-byte aligned, in the machine's own byte order.
+//
+//    0   node number: 47 bits, and bit 47 says "irregular"     3 x uint16
+//    6   position: x, y, z of 48 bits                          9 x uint16
+//   24   a0 a1 a2 l10 l20 l21                                  6 x float
+//   48   mean w0 w1 w2                                         4 x float a variable
+//        irregular: weight / (a0 a1 a2)                        1 x float
+//                   variance                                   1 x float a variable
+//
+// What is not stored of a regular splat (nearly all are) follows from the rest: its weight is a0 a1 a2 and
+// its variances are 0. Records of one bucket follow one another; their lengths are known from their flag.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include "preprocess/node_splats.h"
+#include "stream/octree.h"
+#include "stream/splats.h"
+
+namespace curvisplat {
+
+/// A grid may have so many nodes.
+inline constexpr uint64_t kMaxNodes = uint64_t{1} << 47;
+
+inline constexpr size_t regularRecordBytes(size_t variables) {
+  return 48 + 16 * variables;
+}
+inline constexpr size_t irregularRecordBytes(size_t variables) {
+  return regularRecordBytes(variables) + 4 + 4 * variables;
+}
+
+/// Appends the record of a splat. Numbers beyond float's range become its largest.
+void packRecord(const NodeSplat& splat, std::span<const SplatScalar> values, const RootPosition& position,
+                std::vector<std::byte>& out);
+
+inline uint64_t recordWord48(const std::byte* at) {
+  uint64_t word = 0;
+  std::memcpy(&word, at, 6);
+  return word;
+}
+inline bool recordIsIrregular(const std::byte* record) {
+  return (recordWord48(record) >> 47) != 0;
+}
+inline uint64_t recordNode(const std::byte* record) {
+  return recordWord48(record) & (kMaxNodes - 1);
+}
+inline RootPosition recordPosition(const std::byte* record) {
+  return {{recordWord48(record + 6), recordWord48(record + 12), recordWord48(record + 18)}};
+}
+inline size_t recordBytes(const std::byte* record, size_t variables) {
+  return recordIsIrregular(record) ? irregularRecordBytes(variables) : regularRecordBytes(variables);
+}
+
+/// Reads a record's splat (but for its position) and its values, one a variable.
+void unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScalar> values);
+
+}  // namespace curvisplat

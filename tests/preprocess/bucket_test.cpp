@@ -1,0 +1,215 @@
+// The temporary data of conversion: records, the file they lie in, the cells they belong to, memory.
+#include <gtest/gtest.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <map>
+#include <random>
+#include <set>
+
+#include "preprocess/bucket_file.h"
+#include "preprocess/bucket_tree.h"
+#include "preprocess/memory_plan.h"
+#include "preprocess/splat_record.h"
+#include "stream/error.h"
+#include "tests/support/faulty_system_calls.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+NodeSplat someSplat(std::mt19937_64& random) {
+  std::uniform_real_distribution<double> unit(0.1, 1);
+  NodeSplat splat;
+  splat.node = random() >> 17;
+  for (double& axis : splat.splat.axis) axis = unit(random);
+  for (double& shear : splat.splat.shear) shear = unit(random) - 0.5;
+  splat.splat.weight = splat.splat.axis[0] * splat.splat.axis[1] * splat.splat.axis[2];
+  return splat;
+}
+
+TEST(SplatRecord, RoundTripsToSinglePrecision) {
+  std::mt19937_64 random(1);
+  std::vector<std::byte> record;
+  for (int n = 0; n < 200; ++n) {
+    NodeSplat splat = someSplat(random);
+    splat.regular = n % 2 == 0;
+    if (!splat.regular) splat.splat.weight *= 3;
+    std::vector<SplatScalar> values{{0.25, {1, 2, 3}, 0}, {-7, {0.5, 0, -1}, 0}};
+    if (!splat.regular) values[1].variance = 0.125;
+    const RootPosition position{{random() >> 16, random() >> 16, random() >> 16}};
+    record.clear();
+    packRecord(splat, values, position, record);
+    ASSERT_EQ(record.size(), splat.regular ? 80u : 92u);
+    EXPECT_EQ(recordBytes(record.data(), 2), record.size());
+    EXPECT_EQ(recordNode(record.data()), splat.node);
+    EXPECT_EQ(recordPosition(record.data()), position);
+    Splat back;
+    std::vector<SplatScalar> values_back(2);
+    unpackRecord(record.data(), back, values_back);
+    for (int axis = 0; axis < 3; ++axis) {
+      EXPECT_FLOAT_EQ(back.axis[axis], splat.splat.axis[axis]);
+      EXPECT_FLOAT_EQ(back.shear[axis], splat.splat.shear[axis]);
+    }
+    EXPECT_NEAR(back.weight, splat.splat.weight, 1e-6 * splat.splat.weight);
+    for (int v = 0; v < 2; ++v) {
+      EXPECT_EQ(values_back[v].mean, values[v].mean);
+      EXPECT_EQ(values_back[v].slope, values[v].slope);
+      EXPECT_EQ(values_back[v].variance, values[v].variance);
+    }
+  }
+}
+
+TEST(SplatRecord, KeepsEveryNumberFinite) {
+  NodeSplat splat;
+  splat.regular = false;
+  splat.splat.axis = {1e-60, 1e-60, 1e-60};
+  splat.splat.weight = 0;
+  const std::vector<SplatScalar> values{{1e300, {-1e300, 0, 0}, 1e300}};
+  std::vector<std::byte> record;
+  packRecord(splat, values, {}, record);
+  Splat back;
+  std::vector<SplatScalar> values_back(1);
+  unpackRecord(record.data(), back, values_back);
+  EXPECT_GT(back.axis[0], 0);
+  EXPECT_EQ(back.weight, 0);
+  EXPECT_TRUE(std::isfinite(values_back[0].mean) && std::isfinite(values_back[0].variance));
+}
+
+TEST(BucketFile, GivesBackEachBucketsRecordsWhoeverWroteThem) {
+  const TemporaryFolder folder;
+  constexpr uint32_t kBuckets = 7, kRecords = 20000;
+  BucketFile file(folder / "buckets.bin", kBuckets, 4096);
+  tbb::parallel_for(uint32_t{0}, kRecords, [&](uint32_t n) {
+    const std::array<uint32_t, 2> record{n, ~n};
+    if (n % kBuckets != 3) file.append(n % kBuckets, std::as_bytes(std::span(record)));
+  });
+  file.close();
+  for (uint32_t bucket = 0; bucket < kBuckets; ++bucket) {
+    std::vector<std::byte> bytes;
+    file.read(bucket, bytes);
+    EXPECT_EQ(bytes.size(), file.bytes(bucket));
+    std::multiset<uint32_t> found, in_chunks, expected;
+    for (size_t at = 0; at < bytes.size(); at += 8) {
+      std::array<uint32_t, 2> record;
+      std::memcpy(&record, &bytes[at], 8);
+      ASSERT_EQ(record[0], ~record[1]);
+      found.insert(record[0]);
+    }
+    file.forEachChunk(bucket, [&](std::span<const std::byte> chunk) {
+      for (size_t at = 0; at < chunk.size(); at += 8) {
+        uint32_t first;
+        std::memcpy(&first, &chunk[at], 4);
+        in_chunks.insert(first);
+      }
+    });
+    for (uint32_t n = bucket; n < kRecords && bucket != 3; n += kBuckets) expected.insert(n);
+    EXPECT_EQ(found, expected);
+    EXPECT_EQ(in_chunks, expected);
+  }
+}
+
+TEST(BucketFile, IsGoneAfterwards) {
+  const TemporaryFolder folder;
+  { const BucketFile file(folder / "buckets.bin", 1, 4096); }
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST(BucketFile, TellsOfAFullDisk) {
+  const TemporaryFolder folder;
+  testing::FaultySystemCalls disk;
+  disk.fail_write_at = 5;
+  const ScopedSystemCalls scope(disk);
+  BucketFile file(folder / "buckets.bin", 2, 4096);
+  const std::vector<std::byte> record(1000);
+  EXPECT_THROW(
+      {
+        for (int n = 0; n < 1000; ++n) file.append(n % 2, record);
+        file.close();
+      },
+      Error);
+}
+
+TEST(BucketTree, SplitsWhereThereIsMuchAndFindsTheLeaf) {
+  const auto count = [](const Cell& cell) -> uint64_t {
+    return cell.at == std::array<uint32_t, 3>{0, 0, 0} ? 1000 >> cell.level : 1;
+  };
+  BucketTree tree;
+  tree.split(0, count, 100, 24);
+  const std::vector<uint32_t> leaves = tree.leavesBelow(0);
+  EXPECT_EQ(leaves.size(), 4 * 7 + 1u);  // 1000, 500, 250 and 125 are split; 62 is not
+  EXPECT_EQ(tree[leaves.front()].cell.level, 4u);
+  std::mt19937_64 random(5);
+  for (int n = 0; n < 1000; ++n) {
+    const RootPosition position{{random() >> (16 + n % 8), random() >> (16 + n % 8), random() >> 16}};
+    const uint32_t leaf = tree.leafOf(position);
+    EXPECT_TRUE(tree[leaf].isLeaf());
+    EXPECT_TRUE(tree[leaf].cell.contains(position));
+  }
+  for (size_t n = 1; n < leaves.size(); ++n) {
+    RootPosition before, after;
+    for (int axis = 0; axis < 3; ++axis) {
+      before.at[axis] = uint64_t{tree[leaves[n - 1]].cell.at[axis]} << (48 - tree[leaves[n - 1]].cell.level);
+      after.at[axis] = uint64_t{tree[leaves[n]].cell.at[axis]} << (48 - tree[leaves[n]].cell.level);
+    }
+    EXPECT_TRUE(mortonLess(Cell::of(before, 24), Cell::of(after, 24)));
+  }
+}
+
+TEST(BucketTree, BucketsShareUpToTheCapacity) {
+  BucketTree tree;
+  tree.split(
+      0, [](const Cell& cell) { return cell.level < 2 ? 1000u : 10u; }, 100, 24);
+  const auto leaves = tree.leavesBelow(0);
+  const uint32_t buckets = tree.assignBuckets(
+      leaves, [](uint32_t) { return 10u; }, 100);
+  EXPECT_EQ(buckets, 7u);  // 64 leaves, ten a bucket
+  uint32_t last = 0;
+  for (const uint32_t leaf : leaves) {
+    EXPECT_TRUE(tree[leaf].bucket == last || tree[leaf].bucket == last + 1);
+    last = tree[leaf].bucket;
+  }
+}
+
+TEST(BucketTree, ContentsSumUpwards) {
+  BucketTree tree;
+  tree.split(
+      0, [](const Cell& cell) { return cell.level == 0 ? 1000u : 10u; }, 100, 24);
+  std::vector<CellContents> contents(tree.size());
+  const RootPosition low{{0, 0, 0}}, high{{(1ull << 48) - 1, 5, 7}};
+  contents[tree.leafOf(low)].add(low);
+  contents[tree.leafOf(high)].add(high);
+  contents[tree.leafOf(high)].add(high);
+  tree.setContents(tree.leavesBelow(0), contents);
+  EXPECT_EQ(tree[0].contents.splats, 3u);
+  EXPECT_EQ(tree[0].contents.lower, low);
+  EXPECT_EQ(tree[0].contents.upper, high);
+  EXPECT_FALSE(tree[0].contents.coincide());
+  EXPECT_TRUE(tree[tree.leafOf(high)].contents.coincide());
+}
+
+TEST(MemoryPlan, StaysWithinTheCap) {
+  for (const size_t variables : {size_t{0}, size_t{1}, size_t{5}}) {
+    for (const unsigned threads : {1u, 2u, 16u, 256u}) {
+      for (uint64_t cap = leastMemory(variables); cap < uint64_t{64} << 30; cap *= 2) {
+        const MemoryPlan plan = MemoryPlan::of(cap, variables, threads);
+        EXPECT_GE(plan.threads, 1u);
+        EXPECT_LE(plan.threads, threads);
+        EXPECT_GE(plan.bucket_splats, 4 * 65536u);
+        const uint64_t scan = 2 * plan.slab_bytes + plan.counting_bytes;
+        const uint64_t scatter = 2 * plan.slab_bytes + plan.chunk_buffer_bytes + plan.seam_bytes;
+        const uint64_t build = 2 * (plan.bucket_bytes + 4 * plan.bucket_splats);
+        EXPECT_LT(std::max({scan, scatter, build}), cap);
+        EXPECT_LE(plan.most_buckets * plan.chunkBytes(plan.most_buckets), plan.chunk_buffer_bytes);
+      }
+    }
+  }
+}
+
+TEST(MemoryPlan, RefusesLessThanTheLeast) {
+  EXPECT_THROW(MemoryPlan::of(leastMemory(1) - 1, 1, 1), Error);
+  EXPECT_LE(leastMemory(1), uint64_t{256} << 20);
+}
+
+}  // namespace
+}  // namespace curvisplat

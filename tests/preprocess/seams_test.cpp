@@ -1,0 +1,321 @@
+#include "preprocess/seams.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <map>
+#include <random>
+#include <string>
+
+#include "preprocess/shape.h"
+#include "stream/error.h"
+#include "stream/file.h"
+#include "tests/support/mapped_block.h"
+
+namespace curvisplat {
+namespace {
+
+struct Piece {
+  NodeSplat node;
+  SplatScalar value;
+};
+
+/// A folder of the test's own, removed with it.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "seams_test_XXXXXX").string();
+    if (!mkdtemp(name.data())) throw Error("{}: cannot be made", name);
+    path_ = name;
+  }
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+class Seams : public testing::Test {
+ protected:
+  std::vector<Piece> merge(const std::vector<Piece>& faces, uint64_t memory_bytes = 64 << 20,
+                           int coordinate_bytes = 8) {
+    SeamMerger seams(1, memory_bytes, folder_.path());
+    for (const Piece& face : faces) seams.add(face.node, {&face.value, 1});
+    std::vector<Piece> out;
+    merged_ = seams.finish(coordinate_bytes, [&](const NodeSplat& node, std::span<const SplatScalar> values) {
+      out.push_back({node, values[0]});
+    });
+    EXPECT_EQ(out.size() + merged_, faces.size());
+    return out;
+  }
+
+  /// All splats of the blocks, merged along their faces, by position in 1/1024.
+  using Places = std::map<std::array<long, 3>, Piece>;
+  Places mergeBlocks(const std::vector<MappedBlock>& blocks) {
+    std::vector<Piece> all, faces;
+    for (const MappedBlock& block : blocks) {
+      const NodeSplats splats = block.splats();
+      for (size_t n = 0; n < splats.splats.size(); ++n)
+        (splats.splats[n].on_block_face ? faces : all).push_back({splats.splats[n], splats.values[n]});
+    }
+    const std::vector<Piece> joined = merge(faces);
+    all.insert(all.end(), joined.begin(), joined.end());
+    Places places;
+    for (const Piece& piece : all) {
+      const glm::dvec3 p = piece.node.splat.position * 1024.0;
+      EXPECT_TRUE(
+          places.emplace(std::array{std::lround(p.x), std::lround(p.y), std::lround(p.z)}, piece).second);
+    }
+    return places;
+  }
+
+  TemporaryFolder folder_;
+  uint64_t merged_ = 0;
+};
+
+double field(const glm::dvec3& p) {
+  return 1 + p.x - 2 * p.y + 0.5 * p.z;
+}
+
+/// Nodes [i0, i0+ni) x ... of an affine grid.
+MappedBlock affineBlock(std::array<uint64_t, 3> first, std::array<uint64_t, 3> count, uint64_t first_node) {
+  MappedBlock block(count[0], count[1], count[2], [&](double i, double j, double k) {
+    const glm::dvec3 c(i + static_cast<double>(first[0]), j + static_cast<double>(first[1]),
+                       k + static_cast<double>(first[2]));
+    return glm::dvec3(c.x + 0.25 * c.y, c.y - 0.5 * c.z, 0.5 * c.z);
+  });
+  block.addScalar(field);
+  block.first_node = first_node;
+  return block;
+}
+
+void expectSame(const std::map<std::array<long, 3>, Piece>& found,
+                const std::map<std::array<long, 3>, Piece>& expected) {
+  ASSERT_EQ(found.size(), expected.size());
+  for (const auto& [place, whole] : expected) {
+    const auto at = found.find(place);
+    ASSERT_NE(at, found.end());
+    const Piece& piece = at->second;
+    EXPECT_NEAR(piece.node.splat.weight, whole.node.splat.weight, 1e-9);
+    for (int n = 0; n < 3; ++n) {
+      EXPECT_NEAR(piece.node.splat.axis[n], whole.node.splat.axis[n], 1e-9);
+      EXPECT_NEAR(piece.node.splat.shear[n], whole.node.splat.shear[n], 1e-9);
+    }
+    EXPECT_NEAR(piece.value.mean, whole.value.mean, 1e-9);
+    EXPECT_LT(glm::distance(piece.value.slope, whole.value.slope), 1e-9);
+    EXPECT_NEAR(piece.value.variance, 0, 1e-9);
+  }
+}
+
+TEST_F(Seams, OfTwoBlocksVanish) {
+  const Places whole = mergeBlocks({affineBlock({0, 0, 0}, {9, 5, 6}, 0)});
+  EXPECT_EQ(merged_, 0u);
+  const Places cut =
+      mergeBlocks({affineBlock({0, 0, 0}, {4, 5, 6}, 0), affineBlock({3, 0, 0}, {6, 5, 6}, 4 * 5 * 6)});
+  EXPECT_EQ(merged_, 30u);
+  expectSame(cut, whole);
+}
+
+TEST_F(Seams, OfEightBlocksVanishAtTheirCommonCornerToo) {
+  std::vector<MappedBlock> blocks;
+  for (int octant = 0; octant < 8; ++octant) {
+    std::array<uint64_t, 3> first{}, count{};
+    for (int axis = 0; axis < 3; ++axis) {
+      const bool upper = octant >> axis & 1;
+      first[axis] = upper ? 3 : 0;
+      count[axis] = upper ? 5 : 4;
+    }
+    blocks.push_back(affineBlock(first, count, blocks.empty() ? 0 : blocks.back().first_node + 1000));
+  }
+  const Places cut = mergeBlocks(blocks);
+  EXPECT_EQ(merged_, 9u * 9 * 9 - 8 * 8 * 8);
+  expectSame(cut, mergeBlocks({affineBlock({0, 0, 0}, {8, 8, 8}, 0)}));
+  // The corner's node is the lowest of the eight.
+  const glm::dvec3 corner = affineBlock({3, 3, 3}, {1, 1, 1}, 0).splats().splats[0].node_position * 1024.0;
+  const Piece& piece = cut.at({std::lround(corner.x), std::lround(corner.y), std::lround(corner.z)});
+  EXPECT_EQ(piece.node.node, blocks[0].at(3, 3, 3));
+  EXPECT_FALSE(piece.node.regular);
+}
+
+/// The splats of block faces, out of all.
+std::vector<Piece> facesOf(const MappedBlock& block) {
+  const NodeSplats splats = block.splats();
+  std::vector<Piece> faces;
+  for (size_t n = 0; n < splats.splats.size(); ++n)
+    if (splats.splats[n].on_block_face) faces.push_back({splats.splats[n], splats.values[n]});
+  return faces;
+}
+
+/// A pipe whose wall layer begins at radius 1 with `spacing`, closed along i after 128 steps. In float
+/// arithmetic, as a grid generator would.
+MappedBlock pipe(float spacing) {
+  MappedBlock block(129, 7, 5, [&](double i, double j, double k) {
+    const float theta = static_cast<float>(i) * (6.2831853f / 128.0f);
+    const float r = 1.0f + spacing * static_cast<float>(j);
+    return glm::dvec3(r * std::cos(theta), r * std::sin(theta), static_cast<float>(k));
+  });
+  block.addScalar([](const glm::dvec3& p) { return p.z; });
+  return block;
+}
+
+TEST_F(Seams, OfAPeriodicAxisCloseThoughRoundedDifferently) {
+  const MappedBlock block = pipe(0.1f);
+  ASSERT_NE(block.nodes.y[block.at(0, 2, 2)], block.nodes.y[block.at(128, 2, 2)]);
+  const std::vector<Piece> out = merge(facesOf(block), 64 << 20, 4);
+  EXPECT_EQ(merged_, 7u * 5u);
+
+  // A node of the seam comes out as its neighbours around the pipe, up to the angle's square.
+  const NodeSplats splats = block.splats();
+  const NodeSplat& beside = splats.splats[block.at(1, 3, 2)];
+  const auto seam = std::find_if(out.begin(), out.end(),
+                                 [&](const Piece& piece) { return piece.node.node == block.at(0, 3, 2); });
+  ASSERT_NE(seam, out.end());
+  EXPECT_NEAR(seam->node.splat.weight / beside.splat.weight, 1, 1e-3);
+  const auto found = singularValues(seam->node.splat.factor()),
+             expected = singularValues(beside.splat.factor());
+  for (int n = 0; n < 3; ++n) EXPECT_NEAR(found[n] / expected[n], 1, 2e-3);
+}
+
+TEST_F(Seams, DoNotJoinTheNodesOfAWallLayer) {
+  // Eight units in the last place apart: still the seam's 35 pairs and no others.
+  merge(facesOf(pipe(1e-6f)), 64 << 20, 4);
+  EXPECT_EQ(merged_, 7u * 5u);
+  // In double precision, far below any float's rounding.
+  MappedBlock thin(5, 9, 5, [](double i, double j, double k) { return glm::dvec3(100 + i, 1e-10 * j, k); });
+  thin.addScalar(field);
+  merge(facesOf(thin), 64 << 20, 4);
+  EXPECT_EQ(merged_, 0u);
+}
+
+TEST_F(Seams, LeaveSinglesAsTheyAre) {
+  const std::vector<Piece> faces = facesOf(affineBlock({0, 0, 0}, {3, 3, 3}, 10));
+  std::vector<Piece> out = merge(faces);
+  EXPECT_EQ(merged_, 0u);
+  std::sort(out.begin(), out.end(), [](const Piece& a, const Piece& b) { return a.node.node < b.node.node; });
+  for (size_t n = 0; n < faces.size(); ++n) {
+    EXPECT_EQ(out[n].node.node, faces[n].node.node);
+    EXPECT_EQ(out[n].node.splat.position, faces[n].node.splat.position);
+    EXPECT_EQ(out[n].node.splat.axis, faces[n].node.splat.axis);
+    EXPECT_TRUE(out[n].node.regular);
+  }
+}
+
+TEST_F(Seams, JoinAPolarAxisIntoOneSplatANode) {
+  MappedBlock block(25, 4, 6, [](double i, double j, double k) {
+    return glm::dvec3(5 + 0.1 * j * std::cos(i * M_PI / 12), 0.1 * j * std::sin(i * M_PI / 12), 0.2 * k);
+  });
+  block.addScalar(field);
+  const std::vector<Piece> out = merge(facesOf(block));
+  EXPECT_EQ(merged_, 24u * 6u + 3 * 6u);
+  size_t on_axis = 0;
+  for (const Piece& piece : out) {
+    if (piece.node.node_position.x != 5 || piece.node.node_position.y != 0) continue;
+    ++on_axis;
+    EXPECT_EQ(piece.node.splat.weight, 0);
+    EXPECT_NEAR(piece.node.splat.position.x, 5, 2e-3);
+    const auto sigma = singularValues(piece.node.splat.factor());
+    EXPECT_LE(sigma[0], 0.2001);
+    EXPECT_GE(sigma[2], 0.05);
+    EXPECT_TRUE(std::isfinite(glm::length(piece.value.slope)));
+  }
+  EXPECT_EQ(on_axis, 6u);
+}
+
+std::vector<Piece> randomFaces(size_t count, uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::vector<Piece> faces(count);
+  for (size_t n = 0; n < count; ++n) {
+    NodeSplat& node = faces[n].node;
+    node.node = n;
+    node.on_block_face = true;
+    node.regular = n % 3 == 0;
+    node.spacing = 0.01;
+    // Places on a lattice, each taken a few times: some exactly, others off by less than the tolerance.
+    const double off = n % 2 == 0 ? 0.0 : 1e-6;
+    const auto place = [&] { return 0.01 * std::floor(10 * unit(random)) + off * unit(random); };
+    node.node_position = {place(), place(), place()};
+    node.splat.position = node.node_position + glm::dvec3(1e-3 * unit(random));
+    node.splat.weight = unit(random);
+    faces[n].value = {unit(random), {unit(random), unit(random), unit(random)}, unit(random)};
+  }
+  return faces;
+}
+
+void expectIdentical(const std::vector<Piece>& a, const std::vector<Piece>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (size_t n = 0; n < a.size(); ++n) {
+    EXPECT_EQ(a[n].node.node, b[n].node.node);
+    EXPECT_EQ(a[n].node.regular, b[n].node.regular);
+    EXPECT_EQ(a[n].node.on_block_face, b[n].node.on_block_face);
+    EXPECT_EQ(a[n].node.node_position, b[n].node.node_position);
+    EXPECT_EQ(a[n].node.spacing, b[n].node.spacing);
+    EXPECT_EQ(a[n].node.splat.position, b[n].node.splat.position);
+    EXPECT_EQ(a[n].node.splat.axis, b[n].node.splat.axis);
+    EXPECT_EQ(a[n].node.splat.shear, b[n].node.splat.shear);
+    EXPECT_EQ(a[n].node.splat.weight, b[n].node.splat.weight);
+    EXPECT_EQ(a[n].value.mean, b[n].value.mean);
+    EXPECT_EQ(a[n].value.slope, b[n].value.slope);
+    EXPECT_EQ(a[n].value.variance, b[n].value.variance);
+  }
+}
+
+TEST_F(Seams, DependNeitherOnTheOrderNorOnTheMemory) {
+  std::vector<Piece> faces = randomFaces(3000, 1);
+  const std::vector<Piece> expected = merge(faces);
+  EXPECT_GT(expected.size(), 900u);
+  EXPECT_LE(expected.size(), 1000u);
+  std::mt19937_64 random(2);
+  for (const uint64_t memory_bytes : {uint64_t{1}, uint64_t{1000}, uint64_t{100000}, uint64_t{64} << 20}) {
+    std::shuffle(faces.begin(), faces.end(), random);
+    expectIdentical(merge(faces, memory_bytes), expected);
+    EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
+  }
+}
+
+TEST_F(Seams, JoinACrowdInOnePoint) {
+  std::vector<Piece> faces = randomFaces(100000, 3);
+  double weight = 0;
+  for (Piece& face : faces) {
+    face.node.node_position = {0.1, 0.2, 0.3};
+    weight += face.node.splat.weight;
+  }
+  const std::vector<Piece> out = merge(faces, 1 << 20);
+  ASSERT_EQ(out.size(), 1u);
+  EXPECT_NEAR(out[0].node.splat.weight / weight, 1, 1e-9);
+  EXPECT_EQ(out[0].node.node, 0u);
+
+  // A collapsed block knows no spacing: exact coincidence counts.
+  for (Piece& face : faces) face.node.spacing = 0;
+  faces[77].node.node_position.x = std::nextafter(0.1, 1.0);
+  EXPECT_EQ(merge(faces).size(), 2u);
+}
+
+TEST_F(Seams, OfNothingAreNothing) {
+  EXPECT_TRUE(merge({}).empty());
+}
+
+TEST_F(Seams, SayWhenTheDiskIsFull) {
+  struct FullDisk : SystemCalls {
+    ssize_t pwrite(int, const void*, size_t, int64_t) override {
+      errno = ENOSPC;
+      return -1;
+    }
+  } full;
+  const std::vector<Piece> faces = randomFaces(100, 4);
+  const ScopedSystemCalls scope(full);
+  SeamMerger seams(1, 1000, folder_.path());
+  try {
+    for (const Piece& face : faces) seams.add(face.node, {&face.value, 1});
+    FAIL() << "a full disk went unnoticed";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find(folder_.path().string()), std::string::npos) << error.what();
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,162 @@
+// `curvisplat convert`: a grid in, a cache out.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "preprocess/convert.h"
+#include "preprocess/open_grid.h"
+#include "stream/error.h"
+#include "stream/progress.h"
+#include "tools/commands.h"
+#include "tools/grid_options.h"
+#include "tools/option_parsers.h"
+#include "tools/run_statistics.h"
+
+namespace curvisplat {
+namespace {
+
+/// The command line's words, as given.
+struct ConvertWords {
+  OpenGridOptions grid;
+  std::vector<std::string> scalars;
+  std::filesystem::path output, temporary_folder, statistics;
+  std::optional<double> blank_value;
+  std::optional<std::string> memory;
+  unsigned threads = 0;
+  bool overwrite = false;
+};
+
+/// A scalar that the files lack is bad input, not wrong usage: the files decide.
+std::vector<uint32_t> chooseScalars(const ConvertWords& words, const GridDescription& description) {
+  try {
+    return scalarsNamed(description, words.scalars);
+  } catch (const UsageError& error) {
+    throw Error("{}: {}", words.grid.grid.string(), error.what());
+  }
+}
+
+uint64_t bytesOf(const ConvertReport& report) {
+  uint64_t bytes = 0;
+  for (const FileReport& file : report.files) bytes += file.bytes;
+  return bytes;
+}
+
+double secondsOf(const Progress& progress) {
+  double seconds = 0;
+  for (const Progress::Phase& phase : progress.phases()) seconds += phase.seconds;
+  return seconds;
+}
+
+double mebibytes(uint64_t bytes) {
+  return static_cast<double>(bytes) / static_cast<double>(1 << 20);
+}
+
+void printSummary(const ConvertWords& words, const ConvertReport& report, double seconds,
+                  uint64_t peak_memory_bytes) {
+  const auto nodes = static_cast<double>(report.nodes);
+  const uint64_t bytes = bytesOf(report);
+  fmt::print("{}: {} nodes, {} splats in {} bricks, {} levels\n", words.output.string(), report.nodes,
+             report.splats, report.bricks, report.levels);
+  fmt::print("{:.1f} s, {:.2f} M nodes/s, {:.1f} MiB, {:.2f} bytes a node, peak memory {:.0f} MiB\n", seconds,
+             1e-6 * nodes / seconds, mebibytes(bytes), static_cast<double>(bytes) / nodes,
+             mebibytes(peak_memory_bytes));
+}
+
+/// What a person should know of the grid, on stderr: it is odd, not wrong.
+void printWarnings(const GridDescription& description, const ConvertReport& report) {
+  for (const std::string& warning : description.warnings)
+    fmt::print(stderr, "curvisplat: warning: {}\n", warning);
+  const auto note = [](uint64_t count, const char* what) {
+    if (count > 0) fmt::print(stderr, "curvisplat: note: {} {}\n", count, what);
+  };
+  note(report.blanked.by_grid, "nodes are blanked by the grid");
+  note(report.blanked.by_value, "nodes have the blank value");
+  note(report.blanked.not_finite, "nodes are not finite numbers, and are blanked");
+  note(report.degenerate, "cells are degenerate: drawn with a thickness of their own");
+  note(report.inverted, "cells are inverted: of the other handedness than most of their block");
+  note(report.merged_nodes, "face nodes coincide with others, and were merged into them");
+}
+
+nlohmann::json statistics(const ConvertReport& report, const Progress& progress) {
+  nlohmann::json json = runStatistics();
+  json["threads"] = report.threads;
+  json["memory_bytes"] = report.memory_bytes;
+  json["nodes"] = report.nodes;
+  json["blanked"] = {{"by_grid", report.blanked.by_grid},
+                     {"by_value", report.blanked.by_value},
+                     {"not_finite", report.blanked.not_finite}};
+  json["degenerate"] = report.degenerate;
+  json["inverted"] = report.inverted;
+  json["merged_nodes"] = report.merged_nodes;
+  json["splats"] = report.splats;
+  json["bricks"] = report.bricks;
+  json["levels"] = report.levels;
+  json["volume"] = report.volume;
+  json["temporary_bytes"] = report.temporary_bytes;
+  json["seconds"] = secondsOf(progress);
+  for (const Progress::Phase& phase : progress.phases())
+    json["phases"].push_back(
+        {{"name", phase.name}, {"seconds", phase.seconds}, {"steps", phase.steps}, {"unit", phase.unit}});
+  for (const FileReport& file : report.files) json["files"][file.name] = file.bytes;
+  json["cache_bytes"] = bytesOf(report);
+  return json;
+}
+
+void runConvert(ConvertWords words) {
+  if (!words.output.has_filename()) words.output = words.output.parent_path();  // "NAME.splats/"
+  if (!words.statistics.empty()) checkOutputFolder("--stats", words.statistics);
+  checkOutputFolder("-o", words.output);
+  ConvertOptions options;
+  options.output = words.output;
+  options.overwrite = words.overwrite;
+  options.temporary_folder = words.temporary_folder;
+  options.blank_value = words.blank_value;
+  options.threads = words.threads;
+  if (words.memory) options.memory_bytes = parseByteSize("--memory", *words.memory);
+
+  OpenGridOptions grid = words.grid;
+  grid.temporary_folder =
+      words.temporary_folder.empty() ? words.output.parent_path() : words.temporary_folder;
+  if (grid.temporary_folder.empty()) grid.temporary_folder = ".";
+  const auto source = openGrid(grid);
+  options.scalars = chooseScalars(words, source->description());
+  options.title = words.grid.grid.stem().string();
+
+  Progress progress;
+  const ConvertReport report = convert(*source, options, progress);
+  const nlohmann::json numbers = statistics(report, progress);
+  printWarnings(source->description(), report);
+  printSummary(words, report, secondsOf(progress), numbers["peak_memory_bytes"]);
+  if (!words.statistics.empty()) writeStatistics(words.statistics, numbers);
+}
+
+}  // namespace
+
+void addConvert(CLI::App& app) {
+  auto words = std::make_shared<ConvertWords>();
+  CLI::App* command = app.add_subcommand("convert", "Make a splat cache of a grid, in bounded memory");
+  command->add_option("GRID", words->grid.grid, "Grid file")->required();
+  command->add_option("SOLUTION", words->grid.solutions, "Solution (Q) and function files");
+  command->add_option("-o,--output", words->output, "The cache to write, NAME.splats: a folder")->required();
+  command->add_option("--scalar", words->scalars, "Scalars by name or number (default: the first)")
+      ->take_all()
+      ->allow_extra_args(false);
+  command->add_option("--blank", words->blank_value, "Nodes with this value are not there");
+  command->add_option("--memory", words->memory,
+                      "Cap on this process's memory, as 512M (default: 2G or a quarter of the machine's)");
+  command->add_option("--threads", words->threads, "Threads that work (default: all)");
+  command->add_option("--tmp", words->temporary_folder, "Folder for temporary files (default: the output's)");
+  command->add_flag("--overwrite", words->overwrite, "Replace the output if it is a cache");
+  command->add_option("--stats", words->statistics, "Write times, bytes and counts to FILE.json");
+  addGridOptions(*command, words->grid);
+  command->callback([words] { runConvert(*words); });
+}
+
+}  // namespace curvisplat
