@@ -99,7 +99,7 @@ void BucketLoader::group(LoadedBucket& loaded) {
   loaded.places.resize(tags_.size());
   size_t at = 0;
   for (const uint32_t tag : tags_) {
-    loaded.places[next[tag / 2]++] = static_cast<uint32_t>(at / 4);
+    loaded.places[next[tag / 2]++] = static_cast<uint32_t>(at);
     at += tag % 2 ? irregularRecordBytes(variables_) : regularRecordBytes(variables_);
   }
   std::sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.begin < b.begin; });
