@@ -33,6 +33,10 @@ void OctreeBuilder::build(const BucketFile& file) {
 }
 
 void OctreeBuilder::buildBuckets(const BucketFile& file, const std::vector<uint32_t>& leaves) {
+  // Now, since dividing one of the buckets gives its leaves numbers in another file.
+  std::vector<std::vector<uint32_t>> leaves_of(file.buckets());
+  for (const uint32_t leaf : leaves)
+    if ((*tree_)[leaf].contents.splats > 0) leaves_of[(*tree_)[leaf].bucket].push_back(leaf);
   uint32_t next = 0;
   while (next < file.buckets()) {
     bool too_large = false;
@@ -45,7 +49,9 @@ void OctreeBuilder::buildBuckets(const BucketFile& file, const std::vector<uint3
         if (!too_large) buildLoaded(*loaded);
       }
     }
-    if (too_large) buildTooLarge(file, next++, leaves);
+    if (!too_large) continue;
+    buildTooLarge(file, next, leaves_of[next]);
+    ++next;
   }
 }
 
@@ -88,16 +94,13 @@ void OctreeBuilder::buildLoaded(LoadedBucket& loaded) {
 
 void OctreeBuilder::buildTooLarge(const BucketFile& file, uint32_t bucket,
                                   const std::vector<uint32_t>& leaves) {
-  std::vector<uint32_t> own;
-  for (const uint32_t leaf : leaves)
-    if ((*tree_)[leaf].bucket == bucket && (*tree_)[leaf].contents.splats > 0) own.push_back(leaf);
-  const BucketTree::Node& first = (*tree_)[own.front()];
-  if (own.size() == 1 && (first.cell.level == kMaxLevel || first.contents.coincide())) {
-    buildCoincident(file, bucket, own.front());
+  const BucketTree::Node& first = (*tree_)[leaves.front()];
+  if (leaves.size() == 1 && (first.cell.level == kMaxLevel || first.contents.coincide())) {
+    buildCoincident(file, bucket, leaves.front());
     return;
   }
   const std::filesystem::path path = temporary_folder_ / fmt::format("divided{}.bin", files_made_++);
-  const DividedBucket divided = divideBucket(file, bucket, own, variables_, plan_, path, *tree_);
+  const DividedBucket divided = divideBucket(file, bucket, leaves, variables_, plan_, path, *tree_);
   buildBuckets(*divided.file, divided.leaves);
 }
 

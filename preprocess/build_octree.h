@@ -45,8 +45,6 @@ class OctreeBuilder {
   void buildBuckets(const BucketFile& file, const std::vector<uint32_t>& leaves);
   void buildLoaded(LoadedBucket& loaded);
   void buildTooLarge(const BucketFile& file, uint32_t bucket, const std::vector<uint32_t>& leaves);
-  std::vector<uint32_t> splitLeaves(const BucketFile& file, uint32_t bucket,
-                                    const std::vector<uint32_t>& leaves, uint32_t& buckets);
   void buildCoincident(const BucketFile& file, uint32_t bucket, uint32_t leaf);
   void append(uint32_t node, BuiltCell&& cell);
   void completeParents(uint32_t node);

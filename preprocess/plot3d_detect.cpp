@@ -4,20 +4,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <optional>
 
 #include "preprocess/ascii_spool.h"
-#include "preprocess/plot3d_file.h"
+#include "preprocess/plot3d_plausibility.h"
 #include "stream/error.h"
 
 namespace curvisplat {
 namespace {
-
-// Noise is what most numbers of another byte order or precision look like.
-constexpr double kNoiseBelow = 1e-36, kNoiseAbove = 1e30;
-constexpr double kNoiseShare = 0.25;
-constexpr int32_t kLargestIblank = 1'000'000;  // a block or grid number, at most
 
 bool looksLikeText(const InputFile& file) {
   std::array<char, 4096> bytes;
@@ -25,75 +18,6 @@ bool looksLikeText(const InputFile& file) {
   file.readAt(0, std::span(bytes.data(), count));
   return std::all_of(bytes.begin(), bytes.begin() + static_cast<ptrdiff_t>(count),
                      [](char c) { return (c >= ' ' && c <= '~') || (c >= '\t' && c <= '\r'); });
-}
-
-/// Up to 32 rows spread over a block.
-std::vector<NodeBox> sampleRows(const Plot3dBlock& block) {
-  constexpr uint64_t kRows = 32;
-  const uint64_t rows = block.nj * block.nk;
-  std::vector<NodeBox> boxes;
-  for (uint64_t n = 0; n < std::min(kRows, rows); ++n) {
-    const uint64_t row = rows <= kRows ? n : n * ((rows - 1) / (kRows - 1));
-    boxes.push_back({row % block.nj, row % block.nj + 1, row / block.nj, row / block.nj + 1});
-  }
-  return boxes;
-}
-
-std::vector<uint32_t> sampleBlocks(size_t blocks) {
-  std::vector<uint32_t> sample;
-  const size_t step = std::max<size_t>(1, blocks / 8);
-  for (size_t b = 0; b < blocks; b += step) sample.push_back(static_cast<uint32_t>(b));
-  return sample;
-}
-
-/// Nothing, or what is wrong with the values, in words.
-std::optional<std::string> implausibility(const Plot3dFit& fit) {
-  const Plot3dFile file(fit);
-  uint64_t finite = 0, noise = 0;
-  double example = 0;
-  std::vector<double> values;
-  std::vector<int32_t> iblank;
-  for (const uint32_t b : sampleBlocks(fit.blocks.size()))
-    for (const NodeBox& row : sampleRows(fit.blocks[b])) {
-      values.resize(fit.blocks[b].ni);
-      for (uint32_t component = 0; component < fit.components; ++component) {
-        file.read(b, component, row, values);
-        for (const double value : values) {
-          if (!std::isfinite(value)) continue;
-          ++finite;
-          const double size = std::abs(value);
-          if (size == 0 || (size >= kNoiseBelow && size <= kNoiseAbove)) continue;
-          ++noise;
-          example = value;
-        }
-      }
-      if (!fit.layout.blanking) continue;
-      iblank.resize(fit.blocks[b].ni);
-      file.readIblank(b, row, iblank);
-      for (const int32_t value : iblank)
-        if (value > kLargestIblank || value < -kLargestIblank)
-          return fmt::format("an iblank of {} in block {}", value, b + 1);
-    }
-  if (static_cast<double>(noise) > kNoiseShare * static_cast<double>(finite))
-    return fmt::format("{} of {} sampled values are like {}", noise, finite, example);
-  return std::nullopt;
-}
-
-/// Bytes behind coordinates without iblank that could be the first part of an iblank array: a truncated file.
-bool trailingLooksLikeIblank(const Plot3dFit& fit) {
-  if (fit.layout.kind != Plot3dKind::grid || fit.layout.blanking || fit.layout.ascii ||
-      fit.layout.records != RecordMarkers::none || fit.trailing_bytes < 4)
-    return false;
-  Plot3dFit behind = fit;  // the trailing bytes as the iblank of a block of one row
-  const uint64_t count = std::min<uint64_t>(fit.trailing_bytes / 4, 1024);
-  behind.blocks = {{count, 1, 1, fit.payload.size() - fit.trailing_bytes}};
-  behind.components = 0;
-  behind.layout.blanking = true;
-  std::vector<int32_t> values(count);
-  Plot3dFile(behind).readIblank(0, {0, 1, 0, 1}, values);
-  const bool small = std::all_of(values.begin(), values.end(),
-                                 [](int32_t v) { return v <= kLargestIblank && v >= -kLargestIblank; });
-  return small && std::any_of(values.begin(), values.end(), [](int32_t v) { return v != 0; });
 }
 
 /// The options whose values differ between layouts: what the user can say to decide.
@@ -203,10 +127,11 @@ class Detection {
     std::erase_if(fits, flat);
   }
 
-  /// A single solution of the grid's dimensions is taken whatever its values: fields may well have fill
-  /// values and be denormal.
+  /// A single solution of the grid's dimensions and the exact size is taken whatever its values: fields may
+  /// well have fill values and be denormal.
   void keepPlausible(std::vector<Plot3dFit>& fits) const {
-    if (fits.size() == 1 && fits.front().layout.kind != Plot3dKind::grid) return;
+    const bool solution = fits.front().layout.kind != Plot3dKind::grid;
+    if (fits.size() == 1 && solution && fits.front().trailing_bytes == 0) return;
     if (force_.byte_order && force_.precision_bytes && force_.records) return;
     std::vector<Plot3dFit> kept;
     std::string reason;
@@ -238,7 +163,9 @@ class Detection {
                               const std::vector<Plot3dBlock>* grid_blocks) const {
     const std::string expected = inWords(candidates_.kinds);
     const auto rank = [&](const Plot3dMisfit& misfit) {
-      return 2 * misfit.reached + (grid_blocks && sameDimensions(misfit.blocks, *grid_blocks) ? 1 : 0);
+      const bool of_grid = grid_blocks && sameDimensions(misfit.blocks, *grid_blocks);
+      const bool markers_agree = misfit.layout.records != RecordMarkers::none;
+      return 4 * misfit.reached + 2 * of_grid + markers_agree;
     };
     const auto furthest = std::max_element(misfits.begin(), misfits.end(),
                                            [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
@@ -247,8 +174,7 @@ class Detection {
       finding = fmt::format("read as {} {}: {}", attemptInWords(furthest->layout),
                             curvisplat::inWords(furthest->layout.kind), furthest->reason);
     }
-    throw Error("{}: its {} bytes fit no PLOT3D {}; {}{}", path_, file_size_, expected, finding,
-                forcedHint());
+    throw Error("{}: its {} bytes fit no PLOT3D {}; {}{}", path_, file_size_, expected, finding, hint());
   }
 
   /// Only what was decided before the sizes were looked at.
@@ -260,17 +186,17 @@ class Detection {
     return words + (layout.multi_block ? " multi-block" : " single-block");
   }
 
-  /// Names the layout that fits if it is an option that excludes it.
-  std::string forcedHint() const {
-    if (!force_.byte_order && !force_.records && !force_.precision_bytes && !force_.multi_block &&
-        !force_.blanking)
-      return "";
-    Plot3dCandidates unforced = candidates_;
-    unforced.force = {};
-    const Plot3dFits found = fitPlot3d(unforced);
-    if (found.fits.empty()) return "";
-    return fmt::format("; without the options it would be {}",
-                       curvisplat::inWords(found.fits.front().layout));
+  /// What the file would be without the options, or as another kind.
+  std::string hint() const {
+    Plot3dCandidates others = candidates_;
+    others.kinds = {Plot3dKind::grid, Plot3dKind::q, Plot3dKind::function};
+    others.force = {};
+    const Plot3dFits found = fitPlot3d(others);
+    for (const Plot3dFit& fit : found.fits)
+      if (fit.trailing_bytes == 0 && !fit.layout.two_dimensional)
+        return fmt::format("; it would fit as a {} of {}, {}", curvisplat::inWords(fit.layout.kind),
+                           curvisplat::inWords(fit.blocks), curvisplat::inWords(fit.layout));
+    return "";
   }
 
   std::string path_;

@@ -5,6 +5,7 @@
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
+#include <cmath>
 #include <mutex>
 #include <sstream>
 
@@ -16,6 +17,7 @@ namespace {
 
 constexpr size_t kMostFindings = 16;
 constexpr openvdb::Int32 kBackground = -1;
+constexpr const char* kWorldUnits = "world_units";
 
 void initialize() {
   static std::once_flag once;
@@ -49,21 +51,31 @@ void replaceUuid(std::string& file) {
   file.replace(kOffset, kLength, uuid);
 }
 
+/// OpenVDB refuses voxels of less than about 1e-5 units: an octree of smaller cells is written in units of a
+/// power of two, so many world units each.
+double worldUnits(double smallest_cell) {
+  constexpr double kSmallestVoxel = 0x1p-14;
+  return smallest_cell >= kSmallestVoxel ? 1
+                                         : std::exp2(std::floor(std::log2(smallest_cell / kSmallestVoxel)));
+}
+
 }  // namespace
 
 std::vector<std::byte> brickGridsFile(const RootCube& root, std::span<const Brick> bricks) {
   initialize();
   openvdb::GridPtrVec grids;
+  const double world_units = worldUnits(root.cellSize(bricks.back().cell.level));
   openvdb::Int32Grid::Ptr grid;
   for (size_t n = 0; n < bricks.size(); ++n) {
     const Cell& cell = bricks[n].cell;
     if (n == 0 || cell.level != bricks[n - 1].cell.level) {
       grid = openvdb::Int32Grid::create(kBackground);
       grid->setName(gridName(cell.level));
-      const double size = root.cellSize(cell.level);
+      grid->insertMeta(kWorldUnits, openvdb::DoubleMetadata(world_units));
+      const double size = root.cellSize(cell.level) / world_units;
       const auto transform = openvdb::math::Transform::createLinearTransform(size);
       // An index is the middle of its voxel.
-      transform->postTranslate(openvdb::Vec3d(root.min.x, root.min.y, root.min.z) +
+      transform->postTranslate(openvdb::Vec3d(root.min.x, root.min.y, root.min.z) / world_units +
                                openvdb::Vec3d(0.5 * size));
       grid->setTransform(transform);
       grids.push_back(grid);

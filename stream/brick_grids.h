@@ -1,6 +1,7 @@
 // bricks.vdb: the octree as OpenVDB Int32Grids, for any tool that reads VDB files. One grid a level, named
 // "level 0", "level 1", ...: a voxel is a cell, its value the first brick of that cell, the background -1;
-// the transform puts voxels where the cells are in the world.
+// the transform puts voxels where the cells are in the world, in units of so many world units as the grid's
+// metadata "world_units" says: 1, unless OpenVDB would refuse the smallest cells.
 #pragma once
 
 #include <cstddef>

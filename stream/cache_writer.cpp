@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
-#include <optional>
 
 #include "stream/brick_grids.h"
 #include "stream/cache_format.h"
@@ -83,10 +82,12 @@ struct CacheWriter::State {
         root(root_cube),
         variables(std::move(variable_infos)),
         geometry(folder.path() / "geometry.bin"),
-        tables(variables.size()) {
+        tables(variables.size()),
+        geometry_input(geometry.path()) {
     for (const VariableInfo& variable : variables) {
       values.emplace_back(folder.path() / variableFileName(variable));
       values.back().append(bytesOf(VariableHeader{}));  // its place; finish() fills it in
+      values_input.emplace_back(values.back().path());
     }
   }
 
@@ -103,8 +104,8 @@ struct CacheWriter::State {
   std::vector<Brick> bricks;                       // as appended
   std::vector<double> weights;                     // [brick]
   std::vector<std::vector<BrickVariable>> tables;  // [variable][brick]
-  // For readBack; opened when it is first asked for.
-  std::optional<InputFile> geometry_input;
+  // For readBack; opened at once, since any number of threads may ask.
+  InputFile geometry_input;
   std::vector<InputFile> values_input;
 };
 
@@ -130,19 +131,15 @@ uint64_t CacheWriter::append(EncodedBrick&& encoded, float error) {
 }
 
 BrickSplats CacheWriter::readBack(uint64_t id) const {
-  State& s = *state_;
+  const State& s = *state_;
   CURVISPLAT_CHECK_OP(id, <, s.bricks.size());
-  if (!s.geometry_input) {
-    s.geometry_input.emplace(s.geometry.path());
-    for (const OutputFile& file : s.values) s.values_input.emplace_back(file.path());
-  }
   const Brick& brick = s.bricks[id];
   const auto read = [](const InputFile& file, const Extent& extent) {
     std::vector<std::byte> bytes(extent.length);
     file.readAt(extent.offset, std::span(bytes));
     return bytes;
   };
-  const std::vector<std::byte> geometry = read(*s.geometry_input, brick.geometry);
+  const std::vector<std::byte> geometry = read(s.geometry_input, brick.geometry);
   std::vector<BrickVariable> variables;
   std::vector<std::vector<std::byte>> values;
   for (size_t v = 0; v < s.variables.size(); ++v) {

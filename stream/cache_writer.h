@@ -29,7 +29,8 @@ class CacheWriter {
   /// id in order of appending.
   uint64_t append(EncodedBrick&& brick, float error);
 
-  /// Reads back what append() has written under `id`, for merging the levels above.
+  /// Reads back what append() has written under `id`, for merging the levels above. Any number of threads may
+  /// read at once, while nothing is appended.
   BrickSplats readBack(uint64_t id) const;
 
   /// Sorts the records by level and Morton order, links parents and children, writes bricks.bin, the

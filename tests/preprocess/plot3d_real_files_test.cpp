@@ -6,6 +6,8 @@
 
 #include "preprocess/node_reader.h"
 #include "preprocess/open_grid.h"
+#include "preprocess/plot3d_detect.h"
+#include "preprocess/plot3d_file.h"
 #include "stream/error.h"
 
 namespace curvisplat {
@@ -110,6 +112,15 @@ TEST_F(RealFiles, LoxPostDrawsNegativeIblank) {
   const Content content = readAll(*source);
   EXPECT_EQ(content.nodes, 109'744u);
   EXPECT_EQ(content.blank.total(), 0u);
+  EXPECT_EQ(content.scalars[0].min, 1);
+  EXPECT_EQ(content.scalars[0].max, 1);
+
+  const auto file = std::make_shared<InputFile>(kShared / "lox_post/postxyz.bin");
+  const Plot3dFile grid(detectPlot3dGrid(file, {}, std::filesystem::temp_directory_path()).fit);
+  std::vector<int32_t> iblank(content.nodes);
+  grid.readIblank(0, {0, 76, 0, 38}, iblank);
+  EXPECT_EQ(std::count(iblank.begin(), iblank.end(), -1), 4'332);
+  EXPECT_EQ(std::count(iblank.begin(), iblank.end(), 1), 105'412);
 }
 
 TEST_F(RealFiles, Combustor) {

@@ -38,10 +38,29 @@ Bytes prefixOf(const Bytes& bytes, size_t length) {
   return {bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(length)};
 }
 
+using Decode = Image (*)(std::span<const std::byte>, const std::string&);
+
+// Any byte may be anything: an error or a picture, never a crash (the sanitizers look on) nor much memory.
+void expectToSurviveFlippedBits(const Bytes& bytes, Decode decode) {
+  std::mt19937 random(5);
+  for (int n = 0; n < 3000; ++n) {
+    Bytes damaged = bytes;
+    // Half of the damage goes to the header, where the sizes are.
+    const size_t end = n % 2 == 0 ? std::min<size_t>(bytes.size(), 400) : bytes.size();
+    for (int flips = 0; flips < 1 + n % 3; ++flips)
+      damaged[random() % end] ^= static_cast<std::byte>(1u << random() % 8);
+    try {
+      const Image image = decode(damaged, "damaged");
+      EXPECT_LE(image.rgba.size(), size_t{4} * 8 * 1032 * bytes.size());
+    } catch (const Error&) {
+    }
+  }
+}
+
 struct FormatCase {
   const char* name;
   Bytes (*encode)(const Image&);
-  Image (*decode)(std::span<const std::byte>, const std::string&);
+  Decode decode;
   bool exact;
   bool has_alpha;
 };
@@ -82,22 +101,8 @@ TEST_P(EveryFormat, RefusesEveryTruncatedPrefix) {
     EXPECT_THROW(GetParam().decode(prefixOf(bytes, length), "prefix"), Error) << length;
 }
 
-// Any byte may be anything: an error or a picture, never a crash (the sanitizers look on) nor much memory.
 TEST_P(EveryFormat, SurvivesFlippedBits) {
-  const Bytes bytes = GetParam().encode(randomImage({9, 21}, true, 4));
-  std::mt19937 random(5);
-  for (int n = 0; n < 3000; ++n) {
-    Bytes damaged = bytes;
-    // Half of the damage goes to the header, where the sizes are.
-    const size_t end = n % 2 == 0 ? std::min<size_t>(bytes.size(), 400) : bytes.size();
-    for (int flips = 0; flips < 1 + n % 3; ++flips)
-      damaged[random() % end] ^= static_cast<std::byte>(1u << random() % 8);
-    try {
-      const Image image = GetParam().decode(damaged, "damaged");
-      EXPECT_LE(image.rgba.size(), size_t{4} * 8 * 1032 * bytes.size());
-    } catch (const Error&) {
-    }
-  }
+  expectToSurviveFlippedBits(GetParam().encode(randomImage({9, 21}, true, 4)), GetParam().decode);
 }
 
 TEST(Png, KeepsEightBitValuesExactly) {
@@ -202,7 +207,24 @@ TEST(Exr, ReadsOtherCompressionsAndHalves) {
       }
       for (size_t length = 0; length < bytes.size(); length += 7)
         EXPECT_THROW(decodeExr(prefixOf(bytes, length), "prefix"), Error);
+      expectToSurviveFlippedBits(bytes, decodeExr);
     }
+}
+
+TEST(Exr, RefusesAChunkThatIsTooShort) {
+  const int width = 5, height = 3;
+  Bytes bytes = exrWith(TINYEXR_COMPRESSIONTYPE_NONE, false, width, height, std::vector<float>(15, 0.5f));
+  ASSERT_NO_THROW(decodeExr(bytes, "whole"));
+  // The last chunk: line, size, pixels.
+  const size_t size_at = bytes.size() - width * 12 - 4;
+  ASSERT_EQ(bytes[size_at], std::byte{width * 12});
+  bytes[size_at] = std::byte{width * 12 - 4};
+  try {
+    decodeExr(bytes, "short");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("chunk 2"), std::string::npos) << error.what();
+  }
 }
 
 TEST(Exr, RefusesWhatItDoesNotCheck) {
