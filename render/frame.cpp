@@ -8,13 +8,11 @@
 #include "render/classification.h"
 #include "render/frame_budget.h"
 #include "render/frame_workers.h"
-#include "render/gl_painter.h"
-#include "render/gl_thread.h"
 #include "render/kernel.h"
 #include "render/screen_view.h"
 #include "render/segment_ring.h"
-#include "stream/stage_timer.h"
 #include "stream/cut.h"
+#include "stream/stage_timer.h"
 
 namespace curvisplat {
 namespace {
@@ -50,16 +48,13 @@ TransparentBounds transparentIn(const ClassificationTable& table, const Projecti
 }  // namespace
 
 struct FrameRenderer::State {
-  State(const CacheReader& cache_, size_t variable_, const TransferFunction& transfer_function)
+  State(const CacheReader& cache_, size_t variable_, const TransferFunction& transfer_function,
+        Backend backend_)
       : cache(cache_),
         variable(variable_),
         table(tableFor(cache, variable, transfer_function)),
-        subtrees(subtreeBounds(cache.bricks(), cache.brickVariables(variable))) {
-    gl.run([this](const GlContext& context) { painter = std::make_unique<GlPainter>(context); });
-  }
-  ~State() {
-    gl.run([this](const GlContext&) { painter.reset(); });
-  }
+        subtrees(subtreeBounds(cache.bricks(), cache.brickVariables(variable))),
+        backend(makeBackend(backend_)) {}
 
   Cut plan(const ProjectionSettings& settings, double lod_pixels) const {
     return chooseCut(cache.manifest().root, cache.bricks(), cache.brickVariables(variable), subtrees,
@@ -75,18 +70,17 @@ struct FrameRenderer::State {
   const size_t variable;
   const ClassificationTable table;
   const std::vector<ValueBounds> subtrees;
-  GlThread gl;
-  std::unique_ptr<GlPainter> painter;  // made, used and destroyed on the GL thread
+  const std::unique_ptr<PaintingBackend> backend;
 };
 
 FrameRenderer::FrameRenderer(const CacheReader& cache, size_t variable,
-                             const TransferFunction& transfer_function)
-    : state_(std::make_unique<State>(cache, variable, transfer_function)) {}
+                             const TransferFunction& transfer_function, Backend backend)
+    : state_(std::make_unique<State>(cache, variable, transfer_function, backend)) {}
 
 FrameRenderer::~FrameRenderer() = default;
 
 const std::string& FrameRenderer::backendName() const {
-  return state_->gl.contextName();
+  return state_->backend->name();
 }
 
 Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
@@ -97,8 +91,10 @@ Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, F
   {
     const StageTimer total(statistics.total_s);
     const ProjectionSettings settings = settingsFor(state.cache.manifest(), camera, options);
-    const FrameBudget budget =
-        FrameBudget::of(options.memory_bytes, state.indexBytes(), options.size, options.threads);
+    const PaintResources resources{.threads = options.threads};
+    const FrameBudget budget = FrameBudget::of(
+        options.memory_bytes, state.indexBytes() + state.backend->bytes(options.size, resources),
+        options.size, options.threads);
     Cut cut;
     {
       const StageTimer timer(statistics.plan_s);
@@ -109,8 +105,8 @@ Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, F
     SegmentRing ring(budget.ring_splats);
     FrameWorkers workers({state.cache, state.variable, cut.bricks, settings, state.table}, ring,
                          budget.workers);
-    state.gl.run([&](const GlContext&) {
-      state.painter->begin(options.size, options.background, state.table, settings.per_pixel);
+    state.backend->run([&](Painter& painter) {
+      painter.begin(options.size, options.background, state.table, settings.per_pixel, resources);
       for (size_t drawn = 0; drawn < cut.bricks.size(); ++drawn) {
         std::optional<std::span<const ScreenSplat>> segment;
         {
@@ -118,17 +114,17 @@ Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, F
           segment = ring.next();
         }
         if (!segment) return;  // a worker has failed
-        state.painter->draw(*segment);
+        painter.draw(*segment);
         ring.release();
         if (progress) progress->advance(1);
       }
-      image = state.painter->end();
+      image = painter.end();
+      statistics.upload_s = painter.uploadSeconds();
+      statistics.draw_s = painter.drawSeconds();
     });
     workers.finish(statistics);
     if (progress) progress->end();
 
-    statistics.upload_s = state.painter->uploadSeconds();
-    statistics.draw_s = state.painter->drawSeconds();
     statistics.bricks_drawn = cut.bricks.size();
     statistics.bricks_out_of_image = cut.out_of_image;
     statistics.bricks_transparent = cut.transparent;

@@ -1,6 +1,6 @@
 // One frame: the pipeline of design section 6, as a call.
 //
-//   plan (the cut, back to front) -> read -> prepare (workers: decode, project, sort) -> draw (the GL thread)
+//   plan (the cut, back to front) -> read -> prepare (workers: decode, project, sort) -> draw (a painter)
 //   -> image
 //
 // Bricks are prepared by workers in any order and drawn in the cut's order; what is prepared and not yet
@@ -15,6 +15,7 @@
 #include <optional>
 #include <string>
 
+#include "render/backend.h"
 #include "render/camera.h"
 #include "render/image.h"
 #include "render/projection.h"
@@ -54,13 +55,13 @@ struct FrameStatistics {
   unsigned workers = 0;
 };
 
-/// Draws frames of one variable of one cache. Owns the GL thread and its context. One caller at a time; the
-/// cache outlives it.
+/// Draws frames of one variable of one cache. Owns what draws. One caller at a time; the cache outlives
+/// it.
 class FrameRenderer {
  public:
-  /// Starts the GL thread. Throws Error if there is no context to be had: which library was tried, and what
-  /// it said.
-  FrameRenderer(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function);
+  /// Throws Error if there is no such backend to be had: which library was tried, and what it said.
+  FrameRenderer(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function,
+                Backend backend = Backend::automatic);
   ~FrameRenderer();
 
   /// Throws UsageError for a view that makes no picture and for too little memory (how much it takes), Error
@@ -68,7 +69,7 @@ class FrameRenderer {
   /// overwritten.
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                Progress* progress = nullptr);
-  /// "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
+  /// "CPU, AVX3"; "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
   const std::string& backendName() const;
 
  private:

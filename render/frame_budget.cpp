@@ -24,11 +24,10 @@ constexpr uint64_t kMostRingBytes = 64 << 20;
 
 }  // namespace
 
-FrameBudget FrameBudget::of(uint64_t memory_bytes, uint64_t index_bytes, ImageSize size, unsigned threads) {
-  // Once in OpenGL's framebuffer and once as the result.
-  const uint64_t image_bytes = uint64_t{2} * 4 * sizeof(float) * static_cast<uint64_t>(size.width) *
-                               static_cast<uint64_t>(size.height);
-  const uint64_t fixed = index_bytes + image_bytes + kLeastRingBytes;
+FrameBudget FrameBudget::of(uint64_t memory_bytes, uint64_t fixed_bytes, ImageSize size, unsigned threads) {
+  const uint64_t image_bytes =
+      uint64_t{4} * sizeof(float) * static_cast<uint64_t>(size.width) * static_cast<uint64_t>(size.height);
+  const uint64_t fixed = fixed_bytes + image_bytes + kLeastRingBytes;
   const uint64_t least = fixed + kWorkerBytes;
   if (memory_bytes < least)
     throw UsageError(

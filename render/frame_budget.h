@@ -12,9 +12,9 @@ struct FrameBudget {
   unsigned workers = 1;
   size_t ring_splats = 0;
 
-  /// The largest shares within `memory_bytes`, for at most `threads` workers (0: one a core). `index_bytes`
-  /// is what the octree takes already. Throws UsageError saying how much the least is.
-  static FrameBudget of(uint64_t memory_bytes, uint64_t index_bytes, ImageSize size, unsigned threads);
+  /// The largest shares within `memory_bytes`, for at most `threads` workers (0: one a core). `fixed_bytes`
+  /// is what the octree takes already and the painter will. Throws UsageError saying how much the least is.
+  static FrameBudget of(uint64_t memory_bytes, uint64_t fixed_bytes, ImageSize size, unsigned threads);
 };
 
 }  // namespace curvisplat

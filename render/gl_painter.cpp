@@ -7,8 +7,8 @@
 #include "render/gl_objects.h"
 #include "render/kernel.h"
 #include "render/splat_shader.h"
-#include "stream/stage_timer.h"
 #include "stream/error.h"
+#include "stream/stage_timer.h"
 
 namespace curvisplat {
 namespace {
@@ -135,7 +135,7 @@ void GlPainter::State::use(const GlProgram& program, const ClassificationTable& 
 }
 
 void GlPainter::begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
-                      bool per_pixel) {
+                      bool per_pixel, const PaintResources&) {
   const GlFunctions& gl = state_->gl;
   state_->upload_s = state_->draw_s = 0;
   state_->allocate(size);

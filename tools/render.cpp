@@ -74,6 +74,13 @@ FrameOptions frameOptions(const RenderWords& words) {
   return options;
 }
 
+Backend parseBackend(const std::string& text) {
+  if (text == "auto") return Backend::automatic;
+  if (text == "osmesa") return Backend::osmesa;
+  if (text == "cpu") return Backend::cpu;
+  throw UsageError("--backend {}: not in this version, which has auto, osmesa and cpu", text);
+}
+
 /// What contradicts itself whatever the cache holds.
 void checkWords(const RenderWords& words) {
   checkImageName(words.output);
@@ -86,8 +93,7 @@ void checkWords(const RenderWords& words) {
         "--parallel-scale is for an orthographic camera, --view-angle for perspective: give one");
   if (words.background == "transparent" && words.output.extension() == ".pfm")
     throw UsageError("--background transparent: a .pfm has no transparency; write .png or .exr");
-  if (words.backend != "auto" && words.backend != "osmesa")
-    throw UsageError("--backend {}: not in this version, which has auto and osmesa", words.backend);
+  parseBackend(words.backend);
   checkOutputFolder("-o", words.output);
   if (!words.statistics.empty()) checkOutputFolder("--stats", words.statistics);
 }
@@ -237,7 +243,7 @@ void render(const RenderWords& words) {
   const std::string range_warning = rangeMissesScalar(info, transfer_function);
   if (!range_warning.empty()) tell("warning", range_warning);
 
-  FrameRenderer renderer(cache, variable, transfer_function);
+  FrameRenderer renderer(cache, variable, transfer_function, parseBackend(words.backend));
   Progress progress;
   FrameStatistics statistics;
   const Image image = renderer.render(camera, options, statistics, &progress);
@@ -314,7 +320,9 @@ void addRender(CLI::App& app) {
       ->group(where);
 
   const std::string how = "Resources";
-  command->add_option("--backend", words->backend, "auto or osmesa")->capture_default_str()->group(how);
+  command->add_option("--backend", words->backend, "auto, osmesa or cpu: what draws")
+      ->capture_default_str()
+      ->group(how);
   command->add_option("--memory", words->memory, "Memory for the data in flight: 512M, 2G")
       ->capture_default_str()
       ->group(how);
