@@ -66,7 +66,7 @@ void paint(benchmark::State& state, Backend which) {
 }
 
 void arguments(benchmark::internal::Benchmark* bench) {
-  bench->ArgNames({"radius", "kind"})->UseRealTime()->Unit(benchmark::kMillisecond);
+  bench->ArgNames({"radius", "kind"})->MeasureProcessCPUTime()->UseRealTime()->Unit(benchmark::kMillisecond);
   for (const int kind : {kFlat, kSmooth, kSteps})
     for (const int radius : {2, 4, 8, 16}) bench->Args({radius, kind});
 }

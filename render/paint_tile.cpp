@@ -1,3 +1,6 @@
+#include <hwy/cache_control.h>
+
+#include <algorithm>
 #include <cmath>
 
 #include "render/kernel.h"
@@ -9,342 +12,281 @@
 #include <hwy/foreach_target.h>  // before highway.h
 #include <hwy/highway.h>
 
+#include "render/paint_blocks-inl.h"
+#include "render/paint_shade-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace curvisplat {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Floats = hn::CappedTag<float, kBlockPixels>;
-using V = hn::Vec<Floats>;
+constexpr auto kSupport = static_cast<float>(kKernelSupport);
 
-// How far the mean of extinction, and of colour times extinction, may be from the table's: this part of the
-// extinction there is, or this optical depth.
-constexpr float kRelativeError = 1.0f / 1024;
-constexpr float kDepthError = 1e-5f;
+/// Sixteen splats of a tile, ready to be painted.
+struct Visits {
+  Row x, y, a, b, c, amplitude;  // Ellipse
+  Row tp, tq;                    // Scalar's
+  Pieces pieces;                 // all of the splat that is in the tile
+  Row l11, l21, l22;
+  IntRow x0, y0, x1, y1;  // blocks, the last included; empty where x0 > x1 or y0 > y1
 
-constexpr float kPeak = 0.69995f;  // F(0), and a little
-
-// The offsets of a block's pixels from its first.
-alignas(64) constexpr float kLaneX[kBlockPixels] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
-alignas(64) constexpr float kLaneY[kBlockPixels] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
-
-/// An ellipse as its pixels need it. With d the offset from the centre, p = a dx and q = b dx + c dy are u
-/// over the support's radius: the footprint ends where p² + q² = 1.
-struct Ellipse {
-  float x, y;  // the centre, from that of the tile's first pixel
-  float a, b, c;
-  float amplitude;
-
-  // How the scalar changes: mean + reach t, with t = tp p + tq q in [-1, 1] where there is a footprint.
-  float mean, reach, tp, tq, half_width;
-};
-
-struct Range {
-  float from, to;
-};
-
-/// Pixels or blocks of a tile, the last included.
-struct Box {
-  int x0, y0, x1, y1;
-};
-
-/// Colour times extinction, and extinction, over a piece of a splat: at + by t.
-struct Shade {
-  ShadingTable::Value at, by;
-};
-
-enum class Fit { nothing, constant, linear, none };
-
-HWY_INLINE Ellipse ellipseOf(const ScreenSplat& splat, const TileWork& work) {
-  constexpr auto kSupport = static_cast<float>(kKernelSupport);
-  constexpr float kInverse = 1 / kSupport;
-  Ellipse e;
-  e.x = splat.x - (static_cast<float>(work.x) + 0.5f);
-  e.y = splat.y - (static_cast<float>(work.y) + 0.5f);
-  e.a = kInverse / splat.l11;
-  e.c = kInverse / splat.l22;
-  e.b = -splat.l21 * e.a / splat.l22;
-  e.amplitude = splat.amplitude;
-  e.mean = splat.mean;
-  if (work.per_pixel) {
-    const float slope = std::sqrt(splat.slope0 * splat.slope0 + splat.slope1 * splat.slope1);
-    const float inverse = slope > 0 ? 1 / slope : 0.0f;
-    e.reach = kSupport * slope;
-    e.tp = splat.slope0 * inverse;
-    e.tq = splat.slope1 * inverse;
-    e.half_width = splat.half_width;
-  } else {
-    e.reach = e.tp = e.tq = e.half_width = 0;
+  HWY_INLINE Ellipse ellipse(size_t n) const {
+    return {x.at[n], y.at[n], a.at[n], b.at[n], c.at[n], amplitude.at[n]};
   }
-  return e;
-}
-
-/// What a pixel with this mean sees, in cells: never less than a cell.
-HWY_INLINE Range seen(const ShadingTable& table, float mean, float half_width) {
-  const float from = table.cellsOf(mean - half_width), to = table.cellsOf(mean + half_width);
-  const float widen = std::max(0.0f, 0.5f * (1 - (to - from)));
-  return {from - widen, to + widen};
-}
-
-/// A straight line, or less, for t in `over`, if that is good enough.
-HWY_INLINE Fit fit(const ShadingTable& table, const Ellipse& e, Range over, Shade& shade) {
-  const Range low = seen(table, e.mean + e.reach * over.from, e.half_width);
-  const Range high = seen(table, e.mean + e.reach * over.to, e.half_width);
-  const float move = std::max(high.to - low.to, high.from - low.from);
-  const float width = low.to - low.from;
-  const ShadingTable::Value a = table.mean(low.from, low.to), b = table.mean(high.from, high.to);
-  float error = 0.25f * move * std::min(1.0f, move / width) * table.bend(low.from, high.to);
-  float change = 0;
-  for (int c = 0; c < 4; ++c) change = std::max(change, std::abs(b.of[c] - a.of[c]));
-  // The logarithm bends by move² / (8 scale) cells.
-  if (table.logScale()) error += 0.5f * change * move / table.scale();
-  const float most = std::max(a.of[3], b.of[3]);
-  const float allowed = std::max(kRelativeError * most, kDepthError / (kPeak * e.amplitude));
-  if (error > allowed) return Fit::none;
-  if (most == 0) return Fit::nothing;
-  if (error + 0.5f * change <= allowed) {
-    for (int c = 0; c < 4; ++c) shade.at.of[c] = 0.5f * (a.of[c] + b.of[c]);
-    return Fit::constant;
+  HWY_INLINE Scalar scalar(size_t n) const {
+    return {pieces.mean.at[n], pieces.reach.at[n], tp.at[n], tq.at[n], pieces.half_width.at[n]};
   }
-  const float per_t = 1 / (over.to - over.from);
-  for (int c = 0; c < 4; ++c) {
-    shade.by.of[c] = (b.of[c] - a.of[c]) * per_t;
-    shade.at.of[c] = a.of[c] - shade.by.of[c] * over.from;
-  }
-  return Fit::linear;
+};
+
+HWY_INLINE V gather(const TileWork& work, hn::Vec<Ints> offsets, size_t member) {
+  return hn::GatherIndex(Floats(), reinterpret_cast<const float*>(work.splats.data()) + member, offsets);
 }
 
 /// The t of the pixels in a box.
-HWY_INLINE Range tOver(const Ellipse& e, float x0, float x1, float y0, float y1) {
-  const float by_x = e.tp * e.a + e.tq * e.b, by_y = e.tq * e.c;
-  const float middle = by_x * (0.5f * (x0 + x1) - e.x) + by_y * (0.5f * (y0 + y1) - e.y);
-  const float half = 0.5f * (std::abs(by_x) * (x1 - x0) + std::abs(by_y) * (y1 - y0));
-  return {std::max(middle - half, -1.0f), std::min(middle + half, 1.0f)};
-}
-
-/// The pixels of the tile that lie in the ellipse's own rectangle.
-HWY_INLINE Box pixelsOf(const ScreenSplat& splat, const Ellipse& e) {
-  constexpr auto kSupport = static_cast<float>(kKernelSupport);
-  constexpr float kLast = kTileSide - 1;
-  const float reach_x = kSupport * splat.l11;
-  const float reach_y = kSupport * std::sqrt(splat.l21 * splat.l21 + splat.l22 * splat.l22);
-  return {static_cast<int>(std::clamp(std::ceil(e.x - reach_x), 0.0f, kLast + 1)),
-          static_cast<int>(std::clamp(std::ceil(e.y - reach_y), 0.0f, kLast + 1)),
-          static_cast<int>(std::clamp(std::floor(e.x + reach_x), -1.0f, kLast)),
-          static_cast<int>(std::clamp(std::floor(e.y + reach_y), -1.0f, kLast))};
-}
-
-/// 1 - exp(-x), x >= 0, over x: relative error below 1e-6 for any x.
-template <bool kThin>
-HWY_INLINE V absorbedOf(V x) {
+HWY_INLINE Range tOver(V by_x, V by_y, V middle_x, V middle_y, V half_x, V half_y) {
   const Floats d;
-  // exp(-x) = 2^-n exp(r), |r| <= ln 2 / 2
-  V r = hn::Neg(x), scale = hn::Set(d, 1.0f);
-  if constexpr (!kThin) {
-    const V held = hn::Min(x, hn::Set(d, 80.0f));
-    const V n = hn::Round(hn::Mul(held, hn::Set(d, 1.44269504f)));
-    r = hn::MulSub(n, hn::Set(d, 0.693147181f), held);
-    const hn::RebindToSigned<Floats> di;
-    scale = hn::BitCast(d, hn::ShiftLeft<23>(hn::Sub(hn::Set(di, 127), hn::ConvertTo(di, n))));
-  }
-  V series = hn::MulAdd(r, hn::Set(d, 1.0f / 720), hn::Set(d, 1.0f / 120));
-  series = hn::MulAdd(series, r, hn::Set(d, 1.0f / 24));
-  series = hn::MulAdd(series, r, hn::Set(d, 1.0f / 6));
-  series = hn::MulAdd(series, r, hn::Set(d, 1.0f / 2));
-  series = hn::MulAdd(series, r, hn::Set(d, 1.0f));
-  if constexpr (kThin) return series;
-  const V absorbed = hn::NegMulAdd(hn::Mul(scale, series), r, hn::Sub(hn::Set(d, 1.0f), scale));
-  return hn::Div(absorbed, hn::Max(x, hn::Set(d, 1e-30f)));
+  const V middle = hn::MulAdd(by_x, middle_x, hn::Mul(by_y, middle_y));
+  const V half = hn::MulAdd(hn::Abs(by_x), half_x, hn::Mul(hn::Abs(by_y), half_y));
+  const V one = hn::Set(d, 1.0f);
+  return {hn::Clamp(hn::Sub(middle, half), hn::Neg(one), one),
+          hn::Clamp(hn::Add(middle, half), hn::Neg(one), one)};
 }
 
-/// Optical depth per unit of extinction, zero outside of the footprint; and t.
-struct Pixels {
-  V depth, p, q;
-};
-
-HWY_INLINE Pixels pixelsAt(const Ellipse& e, const float* footprint, V dx, V dy) {
+/// From the splats with these numbers.
+HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) {
+  static_assert(sizeof(ScreenSplat) == 10 * sizeof(float));
   const Floats d;
-  const V p = hn::Mul(hn::Set(d, e.a), dx);
-  const V q = hn::MulAdd(hn::Set(d, e.b), dx, hn::Mul(hn::Set(d, e.c), dy));
-  const V x = hn::Max(hn::NegMulAdd(q, q, hn::NegMulAdd(p, p, hn::Set(d, 1.0f))), hn::Zero(d));
-  V f = hn::Set(d, footprint[kFootprintTerms - 1]);
-  for (int n = kFootprintTerms - 2; n >= 0; --n) f = hn::MulAdd(f, x, hn::Set(d, footprint[n]));
-  return {hn::Mul(hn::Mul(f, hn::Set(d, e.amplitude)), hn::Mul(x, x)), p, q};
-}
+  const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f);
+  const V support = hn::Set(d, kSupport), last_pixel = hn::Set(d, kTileSide - 1);
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    const auto store = [&](V value, Row& row) HWY_ATTR { hn::Store(value, d, row.at + lane); };
+    const auto offsets = hn::Mul(hn::Load(Ints(), numbers.at + lane), hn::Set(Ints(), 10));
+    const V l11 = gather(work, offsets, 2), l21 = gather(work, offsets, 3), l22 = gather(work, offsets, 4);
+    store(l11, out.l11);
+    store(l21, out.l21);
+    store(l22, out.l22);
+    const V x = hn::Sub(gather(work, offsets, 0), hn::Set(d, static_cast<float>(work.x) + 0.5f));
+    const V y = hn::Sub(gather(work, offsets, 1), hn::Set(d, static_cast<float>(work.y) + 0.5f));
+    const V a = hn::Div(one, hn::Mul(support, l11)), c = hn::Div(one, hn::Mul(support, l22));
+    const V b = hn::Neg(hn::Mul(hn::Mul(l21, support), hn::Mul(a, c)));
+    store(x, out.x);
+    store(y, out.y);
+    store(a, out.a);
+    store(b, out.b);
+    store(c, out.c);
+    store(gather(work, offsets, 5), out.amplitude);
 
-/// Blends over one vector of a block's pixels.
-template <bool kThin>
-HWY_INLINE void blend(float* at, V depth, const V& red, const V& green, const V& blue, const V& extinction) {
-  const Floats d;
-  // A straight line may end a rounding error below zero.
-  const V tau = hn::Max(hn::Mul(depth, extinction), hn::Zero(d));
-  const V part = absorbedOf<kThin>(tau);
-  const V weight = hn::Mul(depth, part);
-  const V through = hn::NegMulAdd(tau, part, hn::Set(d, 1.0f));
-  const auto channel = [&](int c, V colour) HWY_ATTR {
-    float* place = at + c * kBlockPixels;
-    hn::Store(hn::MulAdd(hn::Load(d, place), through, hn::Mul(colour, weight)), d, place);
-  };
-  channel(0, red);
-  channel(1, green);
-  channel(2, blue);
-  float* place = at + 3 * kBlockPixels;
-  hn::Store(hn::Mul(hn::Load(d, place), through), d, place);
-}
+    // The pixels of the tile that lie in the ellipse's own rectangle.
+    const V reach_x = hn::Mul(support, l11);
+    const V reach_y = hn::Mul(support, hn::Sqrt(hn::MulAdd(l21, l21, hn::Mul(l22, l22))));
+    const V x0 = hn::Clamp(hn::Ceil(hn::Sub(x, reach_x)), zero, hn::Set(d, kTileSide));
+    const V y0 = hn::Clamp(hn::Ceil(hn::Sub(y, reach_y)), zero, hn::Set(d, kTileSide));
+    const V x1 = hn::Clamp(hn::Floor(hn::Add(x, reach_x)), hn::Neg(one), last_pixel);
+    const V y1 = hn::Clamp(hn::Floor(hn::Add(y, reach_y)), hn::Neg(one), last_pixel);
+    const V block = hn::Set(d, 1.0f / kBlockSide);
+    const auto storeBlocks = [&](V value, IntRow& row) HWY_ATTR {
+      hn::Store(hn::ConvertTo(Ints(), hn::Floor(hn::Mul(value, block))), Ints(), row.at + lane);
+    };
+    // A rectangle between two pixels' centres has x0 > x1, but may lie within a block.
+    const V nothing_x = hn::IfThenElseZero(hn::Gt(x0, x1), hn::Set(d, kTileSide));
+    const V nothing_y = hn::IfThenElseZero(hn::Gt(y0, y1), hn::Set(d, kTileSide));
+    storeBlocks(hn::Add(x0, nothing_x), out.x0);
+    storeBlocks(hn::Add(y0, nothing_y), out.y0);
+    storeBlocks(x1, out.x1);
+    storeBlocks(y1, out.y1);
 
-/// One block. `x`, `y`: of its first pixel, in the tile.
-template <bool kLinear, bool kThin>
-HWY_INLINE void paintBlock(const Ellipse& e, const Shade& shade, const float* footprint, float* block,
-                           float x, float y) {
-  const Floats d;
-  const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
-  for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
-    const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
-                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
-    V values[4];
-    if constexpr (kLinear) {
-      const V t = hn::MulAdd(hn::Set(d, e.tp), pixels.p, hn::Mul(hn::Set(d, e.tq), pixels.q));
-      for (int c = 0; c < 4; ++c)
-        values[c] = hn::MulAdd(hn::Set(d, shade.by.of[c]), t, hn::Set(d, shade.at.of[c]));
-    } else {
-      for (int c = 0; c < 4; ++c) values[c] = hn::Set(d, shade.at.of[c]);
+    store(gather(work, offsets, 6), out.pieces.mean);
+    if (!work.per_pixel) {
+      for (Row* row : {&out.pieces.reach, &out.pieces.half_width, &out.pieces.from, &out.pieces.to})
+        store(zero, *row);
+      continue;
     }
-    blend<kThin>(block + lane, pixels.depth, values[0], values[1], values[2], values[3]);
+    const V slope0 = gather(work, offsets, 7), slope1 = gather(work, offsets, 8);
+    const V slope = hn::Sqrt(hn::MulAdd(slope0, slope0, hn::Mul(slope1, slope1)));
+    const V inverse = hn::Div(one, hn::Max(slope, hn::Set(d, 1e-37f)));
+    const V tp = hn::Mul(slope0, inverse), tq = hn::Mul(slope1, inverse);
+    store(tp, out.tp);
+    store(tq, out.tq);
+    store(hn::Mul(support, slope), out.pieces.reach);
+    store(gather(work, offsets, 9), out.pieces.half_width);
+    const Range t =
+        tOver(hn::MulAdd(tp, a, hn::Mul(tq, b)), hn::Mul(tq, c), hn::Sub(hn::Mul(half, hn::Add(x0, x1)), x),
+              hn::Sub(hn::Mul(half, hn::Add(y0, y1)), y), hn::Mul(half, hn::Sub(x1, x0)),
+              hn::Mul(half, hn::Sub(y1, y0)));
+    store(t.from, out.pieces.from);
+    store(t.to, out.pieces.to);
   }
 }
 
-/// One block, with two look-ups for each of its pixels.
-HWY_INLINE void paintBlockExactly(const Ellipse& e, const ShadingTable& table, const float* footprint,
-                                  float* block, float x, float y) {
-  const Floats d;
-  const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
-  alignas(64) float depths[kBlockPixels], means[kBlockPixels], values[4][kBlockPixels];
-  for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
-    const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
-                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
-    const V t = hn::MulAdd(hn::Set(d, e.tp), pixels.p, hn::Mul(hn::Set(d, e.tq), pixels.q));
-    hn::Store(pixels.depth, d, depths + lane);
-    hn::Store(hn::MulAdd(hn::Set(d, e.reach), t, hn::Set(d, e.mean)), d, means + lane);
-  }
-  for (int n = 0; n < kBlockPixels; ++n) {
-    if (depths[n] > 0) {
-      const Range range = seen(table, means[n], e.half_width);
-      const ShadingTable::Value value = table.mean(range.from, range.to);
-      for (int c = 0; c < 4; ++c) values[c][n] = value.of[c];
-    } else {
-      for (int c = 0; c < 4; ++c) values[c][n] = 0;
-    }
-  }
-  for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d))
-    blend<false>(block + lane, hn::Load(d, depths + lane), hn::Load(d, values[0] + lane),
-                 hn::Load(d, values[1] + lane), hn::Load(d, values[2] + lane), hn::Load(d, values[3] + lane));
-}
-
-HWY_INLINE bool isThin(const Ellipse& e, const Shade& shade, Fit kind) {
-  float most = shade.at.of[3];
-  if (kind == Fit::linear) most += std::abs(shade.by.of[3]);
-  return e.amplitude * kPeak * most < 0.34f;
-}
-
-/// The blocks of a splat in a tile, row by row: those of its rectangle that its ellipse touches.
+/// The blocks of a visit, row by row: those of its rectangle that its ellipse touches.
 class BlockRows {
  public:
-  HWY_INLINE BlockRows(const ScreenSplat& splat, const Ellipse& e, const Box& pixels)
-      : box_{pixels.x0 / kBlockSide, pixels.y0 / kBlockSide, pixels.x1 / kBlockSide, pixels.y1 / kBlockSide} {
-    trimmed_ = box_.y1 - box_.y0 > 1 && box_.x1 > box_.x0;
-    if (!trimmed_) return;
-    // A row at dy is dx = lean dy ± span √(reach² - dy²); farthest right at dy = tip.
-    constexpr auto kSupport = static_cast<float>(kKernelSupport);
-    const float s11 = splat.l21 * splat.l21 + splat.l22 * splat.l22;
-    const float inverse = 1 / s11;
-    const float lean = splat.l11 * splat.l21 * inverse, span = splat.l11 * splat.l22 * inverse;
-    const float reach2 = kSupport * kSupport * s11, tip = kSupport * splat.l21;
-    for (int row = 0; row < kTileBlocks; ++row) {
-      const float top = static_cast<float>(row * kBlockSide) - e.y;
-      const float bottom = top + (kBlockSide - 1);
-      const float right = std::clamp(tip, top, bottom), left = std::clamp(-tip, top, bottom);
-      const float to = lean * right + span * std::sqrt(std::max(0.0f, reach2 - right * right));
-      const float from = lean * left - span * std::sqrt(std::max(0.0f, reach2 - left * left));
-      from_[row] = (e.x + from - 0.01f) * (1.0f / kBlockSide) - (kBlockSide - 1.0f) / kBlockSide;
-      to_[row] = (e.x + to + 0.01f) * (1.0f / kBlockSide);
-    }
+  HWY_INLINE BlockRows(const Visits& visits, size_t n)
+      : x0_(visits.x0.at[n]),
+        y0_(visits.y0.at[n]),
+        x1_(visits.x1.at[n]),
+        y1_(visits.y1.at[n]),
+        trimmed_(y1_ - y0_ > 1 && x1_ > x0_) {
+    if (trimmed_) trim(visits, n);
   }
+
   template <typename Paint>
   HWY_INLINE void each(const Paint& paint) const {
-    for (int row = box_.y0; row <= box_.y1; ++row) {
-      int from = box_.x0, to = box_.x1;
-      if (trimmed_) {
-        from = std::max(from, static_cast<int>(std::ceil(std::clamp(from_[row], -1.0f, float{kTileBlocks}))));
-        to = std::min(to, static_cast<int>(std::floor(std::clamp(to_[row], -1.0f, float{kTileBlocks}))));
-      }
+    for (int row = y0_; row <= y1_; ++row) {
+      const int from = trimmed_ ? std::max(x0_, from_.at[row]) : x0_;
+      const int to = trimmed_ ? std::min(x1_, to_.at[row]) : x1_;
       for (int column = from; column <= to; ++column) paint(column, row);
     }
   }
 
  private:
-  Box box_;
+  // Of pixels at dy, the ellipse covers lean dy ± span √(reach² - dy²); it goes farthest right at dy = tip.
+  HWY_INLINE void trim(const Visits& visits, size_t n) {
+    const Floats d;
+    const float l11 = visits.l11.at[n], l21 = visits.l21.at[n], l22 = visits.l22.at[n];
+    const float s11 = l21 * l21 + l22 * l22;
+    const V lean = hn::Set(d, l11 * l21 / s11), span = hn::Set(d, l11 * l22 / s11);
+    const V reach2 = hn::Set(d, kSupport * kSupport * s11), tip = hn::Set(d, kSupport * l21);
+    const V x = hn::Set(d, visits.x.at[n]), y = hn::Set(d, visits.y.at[n]);
+    const V block = hn::Set(d, 1.0f / kBlockSide), none = hn::Set(d, kTileBlocks);
+    for (size_t lane = 0; lane < kTileBlocks; lane += hn::Lanes(d)) {
+      const V top = hn::Sub(hn::Mul(hn::Iota(d, static_cast<float>(lane)), hn::Set(d, kBlockSide)), y);
+      const V bottom = hn::Add(top, hn::Set(d, kBlockSide - 1));
+      const V right = hn::Clamp(tip, top, bottom), left = hn::Clamp(hn::Neg(tip), top, bottom);
+      const auto width = [&](V dy) HWY_ATTR {
+        return hn::Mul(span, hn::Sqrt(hn::Max(hn::NegMulAdd(dy, dy, reach2), hn::Zero(d))));
+      };
+      const V to = hn::Add(x, hn::MulAdd(lean, right, width(right)));
+      const V from = hn::Add(x, hn::MulSub(lean, left, width(left)));
+      // A hundredth of a pixel is for rounding.
+      const V last = hn::Floor(hn::Mul(hn::Add(to, hn::Set(d, 0.01f)), block));
+      const V first = hn::Ceil(hn::Mul(hn::Sub(from, hn::Set(d, kBlockSide - 1 + 0.01f)), block));
+      hn::Store(hn::ConvertTo(Ints(), hn::Clamp(first, hn::Zero(d), none)), Ints(), from_.at + lane);
+      hn::Store(hn::ConvertTo(Ints(), hn::Clamp(last, hn::Set(d, -1.0f), none)), Ints(), to_.at + lane);
+    }
+  }
+
+  int x0_, y0_, x1_, y1_;
   bool trimmed_;
-  float from_[kTileBlocks], to_[kTileBlocks];  // in blocks
+  IntRow from_, to_;
 };
 
-template <bool kLinear, bool kThin>
+HWY_INLINE float* blockAt(const TileWork& work, int column, int row) {
+  return work.tile + (row * kTileBlocks + column) * kBlockFloats;
+}
+
+HWY_INLINE float pixelOf(int block) {
+  return static_cast<float>(block * kBlockSide);
+}
+
+template <bool kConstant, bool kThin>
 HWY_INLINE void paintBlocks(const TileWork& work, const BlockRows& rows, const Ellipse& e, const Shade& shade,
                             const float* footprint) {
   rows.each([&](int column, int row) HWY_ATTR {
-    paintBlock<kLinear, kThin>(e, shade, footprint, work.tile + (row * kTileBlocks + column) * kBlockFloats,
-                               static_cast<float>(column * kBlockSide), static_cast<float>(row * kBlockSide));
+    paintBlock<kConstant, kThin>(e, shade, footprint, blockAt(work, column, row), pixelOf(column),
+                                 pixelOf(row));
   });
 }
 
-/// Where one straight line does not do for all of the tile: one for every block, if that does.
+HWY_INLINE bool isThin(const Ellipse& e, const Shade& shade) {
+  return e.amplitude * kPeak * shade.most < 0.34f;
+}
+
+/// From along t to along p and q.
+HWY_INLINE void turn(const Scalar& scalar, Shade& shade) {
+  shade.sp *= scalar.tp;
+  shade.sq *= scalar.tq;
+}
+
+/// Where one parabola does not do for all of the tile: one for every block, if that does.
 HWY_NOINLINE void paintBlockByBlock(const TileWork& work, const BlockRows& rows, const Ellipse& e,
-                                    const float* footprint) {
+                                    const Scalar& scalar, const float* footprint) {
+  const Floats d;
+  const float by_x = scalar.tp * e.a + scalar.tq * e.b, by_y = scalar.tq * e.c;
+  constexpr float kHalf = 0.5f * (kBlockSide - 1);
+  Pieces pieces;
+  Fits fits;
+  int fitted_row = -1;
   rows.each([&](int column, int row) HWY_ATTR {
-    float* block = work.tile + (row * kTileBlocks + column) * kBlockFloats;
-    const auto x = static_cast<float>(column * kBlockSide), y = static_cast<float>(row * kBlockSide);
-    const Range over = tOver(e, x, x + kBlockSide - 1, y, y + kBlockSide - 1);
-    if (over.from > over.to) return;
+    if (row != fitted_row) {
+      fitted_row = row;
+      for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+        const V middle_x = hn::MulAdd(hn::Iota(d, static_cast<float>(lane)), hn::Set(d, kBlockSide),
+                                      hn::Set(d, kHalf - e.x));
+        const Range t = tOver(hn::Set(d, by_x), hn::Set(d, by_y), middle_x,
+                              hn::Set(d, pixelOf(row) + kHalf - e.y), hn::Set(d, kHalf), hn::Set(d, kHalf));
+        hn::Store(t.from, d, pieces.from.at + lane);
+        hn::Store(t.to, d, pieces.to.at + lane);
+        hn::Store(hn::Set(d, scalar.mean), d, pieces.mean.at + lane);
+        hn::Store(hn::Set(d, scalar.reach), d, pieces.reach.at + lane);
+        hn::Store(hn::Set(d, scalar.half_width), d, pieces.half_width.at + lane);
+      }
+      fitPieces(work.table, pieces, fits);
+    }
+    const float x = pixelOf(column), y = pixelOf(row);
+    float* block = blockAt(work, column, row);
     Shade shade;
-    switch (fit(work.table, e, over, shade)) {
+    switch (shadeOf(work.table, pieces, fits, static_cast<size_t>(column), e.amplitude, shade)) {
       case Fit::nothing:
         return;
       case Fit::constant:
-        return paintBlock<false, false>(e, shade, footprint, block, x, y);
-      case Fit::linear:
         return paintBlock<true, false>(e, shade, footprint, block, x, y);
+      case Fit::parabola:
+        turn(scalar, shade);
+        return paintBlock<false, false>(e, shade, footprint, block, x, y);
       case Fit::none:
-        return paintBlockExactly(e, work.table, footprint, block, x, y);
+        return paintBlockExactly(e, scalar, work.table, footprint, block, x, y);
     }
   });
 }
 
+HWY_INLINE void paintVisit(const TileWork& work, const Visits& visits, const Fits& fits, size_t n,
+                           const float* footprint) {
+  if (visits.x0.at[n] > visits.x1.at[n] || visits.y0.at[n] > visits.y1.at[n]) return;
+  const Ellipse e = visits.ellipse(n);
+  Shade shade;
+  Fit fit;
+  if (work.per_pixel) {
+    fit = shadeOf(work.table, visits.pieces, fits, n, e.amplitude, shade);
+  } else {
+    meanOver(work.table, fits.low, n, shade.at);
+    shade.most = shade.at[3];
+    fit = shade.most > 0 ? Fit::constant : Fit::nothing;
+  }
+  if (fit == Fit::nothing) return;
+  const BlockRows rows(visits, n);
+  if (fit == Fit::constant) {
+    if (isThin(e, shade)) return paintBlocks<true, true>(work, rows, e, shade, footprint);
+    return paintBlocks<true, false>(work, rows, e, shade, footprint);
+  }
+  const Scalar scalar = visits.scalar(n);
+  if (fit == Fit::none) return paintBlockByBlock(work, rows, e, scalar, footprint);
+  turn(scalar, shade);
+  if (isThin(e, shade)) return paintBlocks<false, true>(work, rows, e, shade, footprint);
+  return paintBlocks<false, false>(work, rows, e, shade, footprint);
+}
+
 void paintTile(const TileWork& work) {
+  const Floats d;
   const float* footprint = footprintPolynomial();
-  for (const uint32_t index : work.order) {
-    const ScreenSplat& splat = work.splats[index];
-    const Ellipse e = ellipseOf(splat, work);
-    const Box pixels = pixelsOf(splat, e);
-    if (pixels.x0 > pixels.x1 || pixels.y0 > pixels.y1) continue;
-    const Range over = tOver(e, static_cast<float>(pixels.x0), static_cast<float>(pixels.x1),
-                             static_cast<float>(pixels.y0), static_cast<float>(pixels.y1));
-    if (over.from > over.to) continue;
-    Shade shade;
-    const Fit kind = fit(work.table, e, over, shade);
-    if (kind == Fit::nothing) continue;
-    const BlockRows rows(splat, e, pixels);
-    if (kind == Fit::none) {
-      paintBlockByBlock(work, rows, e, footprint);
-    } else if (isThin(e, shade, kind)) {
-      if (kind == Fit::constant)
-        paintBlocks<false, true>(work, rows, e, shade, footprint);
-      else
-        paintBlocks<true, true>(work, rows, e, shade, footprint);
+  Visits visits;
+  Fits fits;
+  for (size_t begin = 0; begin < work.order.size(); begin += kLanes) {
+    const size_t count = std::min(kLanes, work.order.size() - begin);
+    // The next sixteen come from anywhere in the batch.
+    const size_t end = std::min(begin + 2 * kLanes, work.order.size());
+    for (size_t n = begin + count; n < end; ++n) hwy::Prefetch(&work.splats[work.order[n]]);
+    IntRow numbers;
+    for (size_t n = 0; n < kLanes; ++n)
+      numbers.at[n] = static_cast<int32_t>(work.order[begin + std::min(n, count - 1)]);
+    setUp(work, numbers, visits);
+    if (work.per_pixel) {
+      fitPieces(work.table, visits.pieces, fits);
     } else {
-      if (kind == Fit::constant)
-        paintBlocks<false, false>(work, rows, e, shade, footprint);
-      else
-        paintBlocks<true, false>(work, rows, e, shade, footprint);
+      for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d))
+        locate(work.table, hn::Load(d, visits.pieces.mean.at + lane), hn::Zero(d), lane, fits.low);
     }
+    for (size_t n = 0; n < count; ++n) paintVisit(work, visits, fits, n, footprint);
   }
 }
 

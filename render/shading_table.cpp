@@ -1,5 +1,6 @@
 #include "render/shading_table.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace curvisplat {
@@ -8,6 +9,10 @@ namespace {
 ShadingTable::Value toValue(const glm::dvec4& v) {
   return {
       {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z), static_cast<float>(v.w)}};
+}
+
+double largest(const glm::dvec4& v) {
+  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z), std::abs(v.w)});
 }
 
 }  // namespace
@@ -26,14 +31,13 @@ ShadingTable::ShadingTable(const ClassificationTable& table)
     if (n > kCells) return integral.back() + density(n);
     return integral[static_cast<size_t>(n)];
   };
-  double bend = 0;
+  const auto second = [&](int n) { return density(n + 1) - 2.0 * density(n) + density(n - 1); };
+  double bend = 0, twist = 0;
   for (int n = -1; n <= kCells + 1; ++n) {
     cells_.push_back({toValue(start(n)), toValue(density(n))});
-    bend_.push_back(static_cast<float>(bend));
-    const glm::dvec4 difference = density(n + 1) - 2.0 * density(n) + density(n - 1);
-    double largest = 0;
-    for (int c = 0; c < 4; ++c) largest = std::max(largest, std::abs(difference[c]));
-    bend += largest;
+    bends_.push_back({static_cast<float>(bend), static_cast<float>(twist)});
+    bend += largest(second(n));
+    twist += largest(second(n + 1) - second(n));
   }
 }
 
