@@ -33,6 +33,8 @@ unsigned threadsOf(const PaintResources& resources) {
 
 struct CpuPainter::State {
   ImageSize size{0, 0};
+  unsigned threads = 0;
+  size_t batch_splats = 0;
   hwy::AlignedFreeUniquePtr<float[]> tiles;
   std::optional<SplatBins> bins;
   std::optional<ShadingTable> table;
@@ -52,6 +54,7 @@ struct CpuPainter::State {
           tbb::simple_partitioner());
     });
   }
+  void allocate(ImageSize wanted, unsigned threads_, size_t batch_splats_);
   void paintBatch();
 };
 
@@ -65,19 +68,29 @@ void CpuPainter::begin(ImageSize size, const glm::vec4& background, const Classi
   const unsigned threads = threadsOf(resources);
   state.upload_s = state.draw_s = 0;
   state.per_pixel = per_pixel;
-  state.arena.emplace(static_cast<int>(threads));
   state.table.emplace(table);
-  state.bins.emplace(size, resources.batch_splats, kEntriesASplat * resources.batch_splats, threads);
-  if (!state.tiles || tileCount(size) != tileCount(state.size))
-    state.tiles = hwy::AllocateAligned<float>(tileCount(size) * kTileFloats);
-  if (!state.tiles) throw std::bad_alloc();
-  state.size = size;
+  if (size.width != state.size.width || size.height != state.size.height || threads != state.threads ||
+      resources.batch_splats != state.batch_splats)
+    state.allocate(size, threads, resources.batch_splats);
   const float clear[4] = {background.r, background.g, background.b, 1 - background.a};
   state.forTiles([&](size_t number) {
     float* at = state.tile(number);
     for (int block = 0; block < kTileBlocks * kTileBlocks; ++block)
       for (const float value : clear) at = std::fill_n(at, kBlockPixels, value);
   });
+}
+
+void CpuPainter::State::allocate(ImageSize wanted, unsigned threads_, size_t batch_splats_) {
+  size = {0, 0};
+  bins.reset();
+  tiles.reset();
+  tiles = hwy::AllocateAligned<float>(tileCount(wanted) * kTileFloats);
+  if (!tiles) throw std::bad_alloc();
+  bins.emplace(wanted, batch_splats_, kEntriesASplat * batch_splats_, threads_);
+  arena.emplace(static_cast<int>(threads_));
+  size = wanted;
+  threads = threads_;
+  batch_splats = batch_splats_;
 }
 
 void CpuPainter::State::paintBatch() {

@@ -25,8 +25,9 @@ SplatBins::SplatBins(ImageSize size, size_t splats, size_t entries, unsigned pie
     : columns_(tilesAlong(size.width)),
       rows_(tilesAlong(size.height)),
       most_splats_(splats),
+      most_entries_(std::max(entries, tileCount(size))),
       pieces_(pieces),
-      entries_(std::max(entries, tileCount(size))),
+      entries_(std::make_unique_for_overwrite<uint32_t[]>(most_entries_)),
       begins_(tileCount(size) + 1),
       piece_ends_(pieces * tileCount(size)) {
   splats_.reserve(splats);
@@ -63,7 +64,7 @@ size_t SplatBins::add(std::span<const ScreenSplat> splats) {
   size_t added = 0;
   for (; added < count; ++added) {
     const Tiles tiles = tilesOf(splats[added]);
-    if (entry_count_ + tiles.count() > entries_.size()) break;
+    if (entry_count_ + tiles.count() > most_entries_) break;
     entry_count_ += tiles.count();
     tiles_.push_back(tiles);
   }

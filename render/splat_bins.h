@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -34,7 +35,7 @@ class SplatBins {
   /// [splats()] of one tile, after sort().
   std::span<const uint32_t> tile(int number) const {
     const size_t begin = begins_[static_cast<size_t>(number)];
-    return {entries_.data() + begin, begins_[static_cast<size_t>(number) + 1] - begin};
+    return {entries_.get() + begin, begins_[static_cast<size_t>(number) + 1] - begin};
   }
   void clear();
 
@@ -49,12 +50,12 @@ class SplatBins {
   void forPiece(size_t piece, const Visit& visit) const;
 
   const int columns_, rows_;
-  const size_t most_splats_;
+  const size_t most_splats_, most_entries_;
   const unsigned pieces_;
   std::vector<ScreenSplat> splats_;
   std::vector<Tiles> tiles_;  // [splats_]
   size_t entry_count_ = 0;
-  std::vector<uint32_t> entries_;
+  std::unique_ptr<uint32_t[]> entries_;
   std::vector<size_t> begins_;        // [tiles + 1]
   std::vector<uint32_t> piece_ends_;  // [piece][tile]: counts, then where the piece goes on writing
 };
