@@ -33,7 +33,7 @@ struct alignas(64) IntRow {
 
 // How far the mean of extinction, and of colour times extinction, may be from the table's: this part of the
 // extinction there is, or this optical depth.
-constexpr float kRelativeError = 1.0f / 128;
+constexpr float kRelativeError = 1.0f / 256;
 constexpr float kDepthError = 2e-5f;
 
 constexpr float kPeak = 0.69995f;  // F(0), and a little

@@ -198,6 +198,11 @@ HWY_INLINE void turn(const Scalar& scalar, Shade& shade) {
   shade.sq *= scalar.tq;
 }
 
+// Blocks are fitted two rows of a tile at a time.
+static_assert(kLanes == 2 * kTileBlocks);
+alignas(64) constexpr float kFittedX[kLanes] = {0, 4, 8, 12, 16, 20, 24, 28, 0, 4, 8, 12, 16, 20, 24, 28};
+alignas(64) constexpr float kFittedY[kLanes] = {0, 0, 0, 0, 0, 0, 0, 0, 4, 4, 4, 4, 4, 4, 4, 4};
+
 /// Where one parabola does not do for all of the tile: one for every block, if that does.
 HWY_NOINLINE void paintBlockByBlock(const TileWork& work, const BlockRows& rows, const Ellipse& e,
                                     const Scalar& scalar, const float* footprint) {
@@ -206,15 +211,15 @@ HWY_NOINLINE void paintBlockByBlock(const TileWork& work, const BlockRows& rows,
   constexpr float kHalf = 0.5f * (kBlockSide - 1);
   Pieces pieces;
   Fits fits;
-  int fitted_row = -1;
+  int fitted_row = -2;  // and the one after it
   rows.each([&](int column, int row) HWY_ATTR {
-    if (row != fitted_row) {
+    if (row > fitted_row + 1) {
       fitted_row = row;
       for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-        const V middle_x = hn::MulAdd(hn::Iota(d, static_cast<float>(lane)), hn::Set(d, kBlockSide),
-                                      hn::Set(d, kHalf - e.x));
-        const Range t = tOver(hn::Set(d, by_x), hn::Set(d, by_y), middle_x,
-                              hn::Set(d, pixelOf(row) + kHalf - e.y), hn::Set(d, kHalf), hn::Set(d, kHalf));
+        const V middle_x = hn::Add(hn::Load(d, kFittedX + lane), hn::Set(d, kHalf - e.x));
+        const V middle_y = hn::Add(hn::Load(d, kFittedY + lane), hn::Set(d, pixelOf(row) + kHalf - e.y));
+        const Range t = tOver(hn::Set(d, by_x), hn::Set(d, by_y), middle_x, middle_y, hn::Set(d, kHalf),
+                              hn::Set(d, kHalf));
         hn::Store(t.from, d, pieces.from.at + lane);
         hn::Store(t.to, d, pieces.to.at + lane);
         hn::Store(hn::Set(d, scalar.mean), d, pieces.mean.at + lane);
@@ -226,7 +231,8 @@ HWY_NOINLINE void paintBlockByBlock(const TileWork& work, const BlockRows& rows,
     const float x = pixelOf(column), y = pixelOf(row);
     float* block = blockAt(work, column, row);
     Shade shade;
-    switch (shadeOf(work.table, pieces, fits, static_cast<size_t>(column), e.amplitude, shade)) {
+    const auto piece = static_cast<size_t>(column + (row - fitted_row) * kTileBlocks);
+    switch (shadeOf(work.table, pieces, fits, piece, e.amplitude, shade)) {
       case Fit::nothing:
         return;
       case Fit::constant:

@@ -103,17 +103,27 @@ class Fidelity : public testing::Test {
     run(arguments);
   }
 
+  /// With every backend; and how far they are from each other.
   static void expectPsnr(const std::string& name, const OpticalFunction& function, double least_db) {
-    render("half-annulus", name, file(name + ".pfm"));
-    if (HasFatalFailure()) return;
-    const Image picture = readImage(file(name + ".pfm"));
     const Image reference =
         toImage(referenceMarch(*makeScene("half-annulus"), function, halfAnnulusCamera(), kSize));
-    const double psnr_db = compareImages(picture, reference).psnr_db;
-    RecordProperty("psnr_db", fmt::format("{:.2f}", psnr_db));
-    fmt::print("{}: {:.2f} dB\n", name, psnr_db);
-    EXPECT_GE(psnr_db, least_db);
-    if (psnr_db < least_db) leavePictures(name, picture, reference);
+    std::vector<Image> pictures;
+    for (const std::string backend : {"osmesa", "cpu"}) {
+      const std::string picture_name = name + "_" + backend;
+      render("half-annulus", name, file(picture_name + ".pfm"), {"--backend", backend});
+      if (HasFatalFailure()) return;
+      pictures.push_back(readImage(file(picture_name + ".pfm")));
+      const double psnr_db = compareImages(pictures.back(), reference).psnr_db;
+      RecordProperty("psnr_db_" + backend, fmt::format("{:.2f}", psnr_db));
+      fmt::print("{}, {}: {:.2f} dB\n", name, backend, psnr_db);
+      EXPECT_GE(psnr_db, least_db) << backend;
+      if (psnr_db < least_db) leavePictures(picture_name, pictures.back(), reference);
+    }
+    const ImageDifference difference = compareImages(pictures[0], pictures[1]);
+    fmt::print("{}: {:.2f} dB, {:.5f} at the most from each other\n", name, difference.psnr_db,
+               difference.largest);
+    EXPECT_GE(difference.psnr_db, 70);
+    EXPECT_LT(difference.largest, 1.0 / 255);
   }
 
   static std::unique_ptr<TemporaryFolder> folder_;
@@ -193,13 +203,42 @@ TEST_F(Fidelity, Step) {
 }
 
 TEST_F(Fidelity, IsTheSameBytesForAnyThreadsAndAgain) {
-  render("half-annulus", "smooth", file("one.png"), {"--threads", "1"});
-  render("half-annulus", "smooth", file("two.png"), {"--threads", "2"});
-  render("half-annulus", "smooth", file("again.png"), {"--threads", "2"});
-  if (HasFatalFailure()) return;
-  const std::string one = readTextFile(file("one.png"));
-  EXPECT_EQ(one == readTextFile(file("two.png")), true);
-  EXPECT_EQ(one == readTextFile(file("again.png")), true);
+  for (const std::string backend : {"osmesa", "cpu"}) {
+    render("half-annulus", "smooth", file("one.exr"), {"--threads", "1", "--backend", backend});
+    render("half-annulus", "smooth", file("two.exr"), {"--threads", "2", "--backend", backend});
+    render("half-annulus", "smooth", file("again.exr"), {"--threads", "2", "--backend", backend});
+    if (HasFatalFailure()) return;
+    const std::string one = readTextFile(file("one.exr"));
+    EXPECT_EQ(one == readTextFile(file("two.exr")), true) << backend;
+    EXPECT_EQ(one == readTextFile(file("again.exr")), true) << backend;
+  }
+}
+
+TEST_F(Fidelity, BothBackendsDrawABluntFinAlike) {
+  const std::filesystem::path folder = std::filesystem::path(CURVISPLAT_SHARED_DATA) / "bluntfin";
+  if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << "needs " << folder;
+  const ProgramResult converted =
+      runProgram({"convert", (folder / "bluntfinxyz.bin").string(), (folder / "bluntfinq.bin").string(), "-o",
+                  file("fin.splats"), "--scalar", "density"});
+  ASSERT_EQ(converted.status, 0) << converted.err;
+  // The second camera stands inside of the data.
+  const std::vector<std::vector<std::string>> views{
+      {"--lod-pixels", "0"}, {"--position", "2,3,2", "--focal-point", "0,0,0", "--view-angle", "70"}};
+  for (const std::vector<std::string>& view : views)
+    for (const std::string classify : {"pixel", "flat"}) {
+      std::vector<Image> pictures;
+      for (const std::string backend : {"osmesa", "cpu"}) {
+        std::vector<std::string> arguments{"render",     file("fin.splats"), "-o",        file("fin.pfm"),
+                                           "--classify", classify,           "--backend", backend};
+        arguments.insert(arguments.end(), view.begin(), view.end());
+        run(arguments);
+        if (HasFatalFailure()) return;
+        pictures.push_back(readImage(file("fin.pfm")));
+      }
+      const ImageDifference difference = compareImages(pictures[0], pictures[1]);
+      EXPECT_GE(difference.psnr_db, 70) << classify;
+      EXPECT_LT(difference.largest, 1.0 / 255) << classify;
+    }
 }
 
 }  // namespace
