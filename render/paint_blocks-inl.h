@@ -120,7 +120,7 @@ HWY_INLINE void paintBlockExactly(const Ellipse& e, const Scalar& scalar, const 
                                   float y) {
   const Floats d;
   const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
-  Row depths, values[4];
+  Row depths;
   Intervals intervals;
   for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
     const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
@@ -130,15 +130,13 @@ HWY_INLINE void paintBlockExactly(const Ellipse& e, const Scalar& scalar, const 
     locate(table, hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean)),
            hn::Set(d, scalar.half_width), lane, intervals);
   }
-  for (size_t n = 0; n < kLanes; ++n) {
-    alignas(16) float value[4];
-    meanOver(table, intervals, n, value);
-    for (int c = 0; c < 4; ++c) values[c].at[n] = value[c];
+  alignas(64) float values[4 * kLanes];  // of one pixel after the other
+  for (size_t n = 0; n < kLanes; ++n) meanOver(table, intervals, n, values + 4 * n);
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    V red, green, blue, extinction;
+    hn::LoadInterleaved4(d, values + 4 * lane, red, green, blue, extinction);
+    blend<false>(block + lane, hn::Load(d, depths.at + lane), red, green, blue, extinction);
   }
-  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d))
-    blend<false>(block + lane, hn::Load(d, depths.at + lane), hn::Load(d, values[0].at + lane),
-                 hn::Load(d, values[1].at + lane), hn::Load(d, values[2].at + lane),
-                 hn::Load(d, values[3].at + lane));
 }
 
 }  // namespace HWY_NAMESPACE

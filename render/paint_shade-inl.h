@@ -141,7 +141,8 @@ HWY_INLINE void fitPieces(const ShadingTable& table, const Pieces& pieces, Fits&
 struct Shade {
   alignas(16) float at[4], by[4], bend[4];
   float s0, sp, sq;
-  float most;  // extinction
+  float most;    // extinction
+  float excess;  // where nothing fits: the error, in what is allowed
 };
 
 enum class Fit { nothing, constant, parabola, none };
@@ -166,7 +167,10 @@ HWY_INLINE Fit shadeOf(const ShadingTable& table, const Pieces& pieces, const Fi
   const float change = std::max({changes[0], changes[1], changes[2], changes[3]});
   const float error = fits.error.at[n] + change * fits.log_error.at[n];
   const float allowed = std::max(kRelativeError * most, kDepthError / (kPeak * amplitude));
-  if (!(error <= allowed)) return Fit::none;
+  if (!(error <= allowed)) {
+    shade.excess = error / allowed;
+    return Fit::none;
+  }
   if (most == 0) return Fit::nothing;
   shade.most = 1.25f * most;  // a parabola's between its three points
   if (error + change <= allowed) return Fit::constant;

@@ -246,6 +246,15 @@ HWY_NOINLINE void paintBlockByBlock(const TileWork& work, const BlockRows& rows,
   });
 }
 
+/// Where not even that is to be hoped for.
+HWY_NOINLINE void paintPixelByPixel(const TileWork& work, const BlockRows& rows, const Ellipse& e,
+                                    const Scalar& scalar, const float* footprint) {
+  rows.each([&](int column, int row) HWY_ATTR {
+    paintBlockExactly(e, scalar, work.table, footprint, blockAt(work, column, row), pixelOf(column),
+                      pixelOf(row));
+  });
+}
+
 HWY_INLINE void paintVisit(const TileWork& work, const Visits& visits, const Fits& fits, size_t n,
                            const float* footprint) {
   if (visits.x0.at[n] > visits.x1.at[n] || visits.y0.at[n] > visits.y1.at[n]) return;
@@ -266,7 +275,15 @@ HWY_INLINE void paintVisit(const TileWork& work, const Visits& visits, const Fit
     return paintBlocks<true, false>(work, rows, e, shade, footprint);
   }
   const Scalar scalar = visits.scalar(n);
-  if (fit == Fit::none) return paintBlockByBlock(work, rows, e, scalar, footprint);
+  if (fit == Fit::none) {
+    // A parabola's error falls with the square of its length, or faster.
+    const float length = visits.pieces.to.at[n] - visits.pieces.from.at[n];
+    const float block_length =
+        (kBlockSide - 1) * (std::abs(scalar.tp * e.a + scalar.tq * e.b) + std::abs(scalar.tq * e.c));
+    if (shade.excess * block_length * block_length < 2 * length * length)
+      return paintBlockByBlock(work, rows, e, scalar, footprint);
+    return paintPixelByPixel(work, rows, e, scalar, footprint);
+  }
   turn(scalar, shade);
   if (isThin(e, shade)) return paintBlocks<false, true>(work, rows, e, shade, footprint);
   return paintBlocks<false, false>(work, rows, e, shade, footprint);
