@@ -62,8 +62,12 @@ HWY_INLINE Pixels pixelsAt(const Ellipse& e, const float* HWY_RESTRICT footprint
   const V p = hn::Mul(hn::Set(d, e.a), dx);
   const V q = hn::MulAdd(hn::Set(d, e.b), dx, hn::Mul(hn::Set(d, e.c), dy));
   const V x = hn::Max(hn::NegMulAdd(q, q, hn::NegMulAdd(p, p, hn::Set(d, 1.0f))), hn::Zero(d));
-  V f = hn::Set(d, footprint[kFootprintTerms - 1]);
-  for (int n = kFootprintTerms - 2; n >= 0; --n) f = hn::MulAdd(f, x, hn::Set(d, footprint[n]));
+  const V x2 = hn::Mul(x, x), x4 = hn::Mul(x2, x2);
+  const auto pair = [&](int n) HWY_ATTR {
+    return hn::MulAdd(hn::Set(d, footprint[n + 1]), x, hn::Set(d, footprint[n]));
+  };
+  const V lo = hn::MulAdd(pair(2), x2, pair(0)), hi = hn::MulAdd(pair(6), x2, pair(4));
+  const V f = hn::MulAdd(hn::MulAdd(hn::Set(d, footprint[8]), x4, hi), x4, lo);
   return {hn::Mul(hn::Mul(f, hn::Set(d, e.amplitude)), hn::Mul(x, x)), p, q};
 }
 
