@@ -106,7 +106,10 @@ class Addition {
   void scan() {
     pass("scan", manifest().nodes, "nodes", &Addition::survey);
     if (survey_.blanked.by_grid < manifest().blanked_nodes) {
+      // Older scalars have blanked nodes that the grid does not: only the cache knows them.
       pass("drawn nodes", manifest().bricks, "bricks", &Addition::findDrawnNodes);
+      if (manifest().splats < manifest().nodes - manifest().blanked_nodes)
+        pass("merged nodes", manifest().nodes, "nodes", &Addition::findMergedNodes);
       pass("scan again", manifest().nodes, "nodes", &Addition::survey);
     }
     checkSurvey();
@@ -114,11 +117,8 @@ class Addition {
 
   void survey() { survey_ = surveyGrid(reader_, plan_.slab_bytes, progress_); }
 
-  /// Older scalars have blanked nodes that the grid does not: only the cache knows them.
-  void findDrawnNodes() {
-    const bool faces_merge = manifest().splats < manifest().nodes - manifest().blanked_nodes;
-    grid_.restrictTo(std::make_unique<DrawnNodes>(cache_, plan_, scratch_.path(), progress_), faces_merge);
-  }
+  void findMergedNodes() { grid_.addMergedFaces(plan_, scratch_.path(), progress_); }
+  void findDrawnNodes() { grid_.restrictTo(cache_, plan_, scratch_.path(), progress_); }
 
   void checkSurvey() const {
     const uint64_t missing = survey_.blanked.by_value + survey_.blanked.not_finite;

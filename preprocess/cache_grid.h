@@ -3,11 +3,15 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <vector>
 
 #include "preprocess/drawn_nodes.h"
 #include "preprocess/grid_source.h"
+#include "preprocess/memory_plan.h"
+#include "stream/cache_reader.h"
+#include "stream/progress.h"
 
 namespace curvisplat {
 
@@ -17,9 +21,13 @@ class CacheGrid : public GridSource {
   /// scalars had values everywhere else. `source` must outlive it.
   explicit CacheGrid(const GridSource& source);
 
-  /// Blanks nodes that the cache does not draw, too. Nodes of block faces may have been merged into others,
-  /// and are there all the same if `faces_merge`.
-  void restrictTo(std::unique_ptr<const DrawnNodes> drawn, bool faces_merge);
+  /// Blanks nodes that `cache` has no splat of, too. Throws Error if a disk fails.
+  void restrictTo(const CacheReader& cache, const MemoryPlan& plan,
+                  const std::filesystem::path& temporary_folder, Progress& progress);
+  /// Takes back those that were merged into others at seams, by merging the grid's faces again. To be called
+  /// after restrictTo(), and while nobody reads.
+  void addMergedFaces(const MemoryPlan& plan, const std::filesystem::path& temporary_folder,
+                      Progress& progress);
 
   const GridDescription& description() const override { return source_->description(); }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
@@ -30,8 +38,8 @@ class CacheGrid : public GridSource {
 
   const GridSource* source_;
   std::vector<uint64_t> first_nodes_;  // [block]
-  std::unique_ptr<const DrawnNodes> drawn_;
-  bool faces_merge_ = false;
+  std::unique_ptr<DrawnNodes> drawn_;
+  bool all_faces_ = false;  // while merged ones are looked for: nodes of block faces are not restricted
 };
 
 }  // namespace curvisplat

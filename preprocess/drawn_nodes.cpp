@@ -23,7 +23,7 @@ constexpr size_t kPieceBytes = 64 << 10;
 
 DrawnNodes::DrawnNodes(const CacheReader& cache, const MemoryPlan& plan,
                        const std::filesystem::path& temporary_folder, Progress& progress)
-    : path_(temporary_folder / "drawn.bin") {
+    : written_(temporary_folder / "drawn.bin"), bits_(written_.path()) {
   const Manifest& manifest = cache.manifest();
   const uint64_t bytes = (manifest.nodes + 7) / 8;
   const uint64_t bucket_bytes = std::max(kBucketBytes, bytes / plan.most_buckets + 1);
@@ -51,7 +51,6 @@ DrawnNodes::DrawnNodes(const CacheReader& cache, const MemoryPlan& plan,
   }
   runs_file.close();
 
-  OutputFile bits_file(path_);
   std::vector<uint8_t> bits;
   for (uint32_t bucket = 0; bucket < buckets; ++bucket) {
     bits.assign(std::min(bucket_bytes, bytes - bucket * bucket_bytes), 0);
@@ -65,14 +64,26 @@ DrawnNodes::DrawnNodes(const CacheReader& cache, const MemoryPlan& plan,
         }
       }
     });
-    bits_file.append(std::span<const uint8_t>(bits));
+    written_.append(std::span<const uint8_t>(bits));
   }
-  bits_ = std::make_unique<InputFile>(path_);
 }
 
 DrawnNodes::~DrawnNodes() {
   std::error_code ignored;
-  std::filesystem::remove(path_, ignored);
+  std::filesystem::remove(written_.path(), ignored);
+}
+
+bool DrawnNodes::holds(uint64_t node) const {
+  uint8_t bits = 0;
+  bits_.readAt(node / 8, std::span(&bits, 1));
+  return (bits >> (node % 8) & 1) != 0;
+}
+
+void DrawnNodes::add(uint64_t node) {
+  uint8_t bits = 0;
+  bits_.readAt(node / 8, std::span(&bits, 1));
+  bits |= static_cast<uint8_t>(1u << (node % 8));
+  written_.writeAt(node / 8, std::as_bytes(std::span(&bits, 1)));
 }
 
 void DrawnNodes::blankOthers(uint64_t first, std::span<uint8_t> blank) const {
@@ -81,7 +92,7 @@ void DrawnNodes::blankOthers(uint64_t first, std::span<uint8_t> blank) const {
     const uint64_t begin = first + done;
     const size_t count = std::min<size_t>(blank.size() - done, 8 * kPieceBytes);
     bits.resize((begin + count + 7) / 8 - begin / 8);
-    bits_->readAt(begin / 8, std::span(bits));
+    bits_.readAt(begin / 8, std::span(bits));
     for (size_t n = 0; n < count; ++n) {
       const size_t bit = begin % 8 + n;
       blank[done + n] |= ~bits[bit / 8] >> (bit % 8) & 1;

@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <span>
 #include <vector>
 
@@ -27,9 +26,13 @@ class DrawnNodes {
   /// Sets blank[n] for each node first + n that is not drawn. Any thread.
   void blankOthers(uint64_t first, std::span<uint8_t> blank) const;
 
+  bool holds(uint64_t node) const;
+  /// Not while others read.
+  void add(uint64_t node);
+
  private:
-  std::filesystem::path path_;
-  std::unique_ptr<InputFile> bits_;  // bit n % 8 of byte n / 8
+  OutputFile written_;
+  InputFile bits_;  // bit n % 8 of byte n / 8
 };
 
 }  // namespace curvisplat
