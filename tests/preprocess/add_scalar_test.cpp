@@ -319,6 +319,20 @@ TEST_F(ToAnExistingCache, RefusesAnotherGrid) {
   expectRefused(FunctionGridSource({block}, 3, mirrored), options, "not the one the cache was made from");
 }
 
+TEST_F(ToAnExistingCache, RefusesOtherNodesInTheSamePlace) {
+  const auto allButOne = [this](uint64_t missing) {
+    return changed([=](const GridNode& node, NodeValues& values) {
+      values.position = glm::dvec3(1, 2, 3);
+      values.blank = node.i == missing && node.j == 5 && node.k == 5;
+    });
+  };
+  fs::remove_all(cache);
+  convertTo(cache, allButOne(9), {0});
+  before = filesOf(cache);
+  expectRefused(allButOne(10), adding(cache, {1}),
+                "it has node 10 5 5 of block 0, and the grid puts node 9 5 5");
+}
+
 TEST_F(ToAnExistingCache, RefusesMissingValues) {
   const auto lacking = changed([](const GridNode& node, NodeValues& values) {
     if (node.i == 3 && node.j == 4) values.scalars[1] = kNotANumber;
