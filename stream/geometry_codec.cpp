@@ -136,7 +136,7 @@ class GeometryEncoder {
         !encodeLogs([](const Splat& s) { return std::log(s.axis[1]); }, kAxisStep, header_.log_axis1, axis1,
                     decoded_.axis[1]) ||
         !encodeLogs(
-            [](const Splat& s) { return std::log(s.axis[0]) + std::log(s.axis[1]) + std::log(s.axis[2]); },
+            [](const Splat& s) { return std::log(s.axis[0] * s.axis[1] * s.axis[2]); },
             kVolumeStep, header_.log_volume, volume, decoded_.axis[2]))
       return false;
     for (size_t n = 0; n < count_; ++n) decoded_.axis[2][n] /= decoded_.axis[0][n] * decoded_.axis[1][n];

@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.set_help_all_flag("--help-all", "Help of every subcommand");
   addConvert(app);
+  addInfo(app);
   addRender(app);
   addGenerate(app);
   addCompare(app);

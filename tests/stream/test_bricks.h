@@ -1,7 +1,6 @@
 // Bricks and caches for tests, all from a seed.
 #pragma once
 
-#include <unistd.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,26 +12,9 @@
 
 #include "stream/brick_codec.h"
 #include "stream/cache_writer.h"
+#include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
-
-/// A new folder, removed at the end of the scope.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "curvisplat-XXXXXX").string();
-    if (!::mkdtemp(name.data())) throw std::runtime_error("no temporary folder");
-    path_ = name;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 inline std::string bytesOfFile(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
@@ -115,7 +97,7 @@ struct SmallCache {
     manifest.reader = "none";
     manifest.lower = root.min;
     manifest.upper = root.min + root.size;
-    manifest.blocks = {{"block 1", 5, 30, 40}};
+    manifest.blocks = {{"block 1", 50, 30, 40}};
     manifest.nodes = 6000;
     return manifest;
   }

@@ -1,0 +1,143 @@
+// What verifyCache finds, and what probing finds.
+#include "stream/cache_verify.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "stream/cache_format.h"
+#include "stream/checksum.h"
+#include "stream/probe.h"
+#include "tests/stream/test_bricks.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool anySays(const std::vector<std::string>& findings, const std::string& words) {
+  return std::any_of(findings.begin(), findings.end(),
+                     [&](const std::string& finding) { return finding.find(words) != std::string::npos; });
+}
+
+class VerifyCache : public testing::Test {
+ protected:
+  VerifyCache() { SmallCache().write(path); }
+  std::vector<std::string> findings() const { return verifyCache(CacheReader(path)); }
+
+  /// Changes the record of brick `n`, and makes every checksum fit again: a writer's bug, not a disk's.
+  template <typename Change>
+  void changeRecord(size_t n, Change change) {
+    std::string bytes = bytesOfFile(path / "bricks.bin");
+    BrickRecord record;
+    std::memcpy(&record, &bytes[sizeof(BricksHeader) + n * sizeof record], sizeof record);
+    change(record);
+    std::memcpy(&bytes[sizeof(BricksHeader) + n * sizeof record], &record, sizeof record);
+    overwriteFile(path / "bricks.bin", bytes);
+    Manifest manifest = Manifest::fromJson(bytesOfFile(path / "manifest.json"), "manifest.json");
+    manifest.files[0].checksum = checksumOf(std::as_bytes(std::span(bytes)));
+    overwriteFile(path / "manifest.json", manifest.toJson());
+  }
+
+  TemporaryFolder folder;
+  const fs::path path = folder.path() / "a.splats";
+};
+
+TEST_F(VerifyCache, FindsNothingInASoundCache) {
+  EXPECT_EQ(findings(), std::vector<std::string>{});
+}
+
+TEST_F(VerifyCache, FindsDamagedPayloads) {
+  for (const std::string name : {"geometry.bin", "var.1.bin", "bricks.vdb"}) {
+    const std::string good = bytesOfFile(path / name);
+    std::string bad = good;
+    bad[100] ^= 1;
+    overwriteFile(path / name, bad);
+    const auto found = findings();
+    ASSERT_EQ(found.size(), 1u) << name;
+    EXPECT_TRUE(anySays(found, name)) << found[0];
+    overwriteFile(path / name, good);
+  }
+}
+
+TEST_F(VerifyCache, FindsRecordsThatDoNotFitTheirBricks) {
+  changeRecord(2, [](BrickRecord& r) { r.upper[1] -= 0.3 * (r.upper[1] - r.lower[1]); });
+  changeRecord(3, [](BrickRecord& r) { r.largest_radius *= 0.9f; });
+  changeRecord(5, [](BrickRecord& r) {
+    std::swap(r.octant_splats[0], r.octant_splats[7]), ++r.octant_splats[1], --r.octant_splats[2];
+  });
+  const auto found = findings();
+  EXPECT_TRUE(anySays(found, "brick 2 "));
+  EXPECT_TRUE(anySays(found, "brick 3 "));
+  EXPECT_TRUE(anySays(found, "brick 5 "));
+  EXPECT_FALSE(anySays(found, "brick 4 "));
+}
+
+TEST_F(VerifyCache, FindsInnerBricksThatLoseWeight) {
+  // A root over other children: its weights are no longer theirs.
+  const fs::path other = folder.path() / "b.splats";
+  SmallCache cache;
+  {
+    CacheWriter writer(other, false, cache.root, {});
+    RandomBrick like;
+    like.variables = 0;
+    BrickSplats leaf = randomBrick(like, Cell{}.child(0), 1);
+    writer.append(encodeBrick(cache.root, leaf), 0);
+    like.leaf = false;
+    like.splats = 1;
+    BrickSplats inner = randomBrick(like, Cell{}, 2);
+    double weight = 0;
+    for (const Splat& splat : leaf.splats) weight += splat.weight;
+    inner.splats[0].weight = 1.003 * weight;
+    writer.append(encodeBrick(cache.root, inner), 1);
+    writer.finish(cache.manifest());
+  }
+  const auto found = verifyCache(CacheReader(other));
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_TRUE(anySays(found, "its children's")) << found[0];
+}
+
+TEST(Probe, FindsTheNodeAndItsValue) {
+  // A row of four cubes of side 1, with a scalar that is x.
+  const TemporaryFolder folder;
+  const RootCube root{{0, 0, 0}, 8};
+  BrickSplats brick;
+  for (int n = 0; n < 4; ++n) {
+    Splat splat;
+    splat.weight = 1;
+    brick.splats.push_back(splat);
+    brick.positions.push_back(root.fromWorld({n + 1.5, 2.5, 2.5}));
+  }
+  brick.runs = {{0, 5, 1, 2, 2}, {1, 9, 0, 0, 2}};
+  brick.variables = {{}};
+  for (int n = 0; n < 4; ++n) brick.variables[0].push_back({n + 1.5, {1, 0, 0}, 0});
+  {
+    CacheWriter writer(folder / "a.splats", false, root, {{0, "x", "m", 1, 5}});
+    writer.append(encodeBrick(root, brick), 0);
+    Manifest manifest;
+    manifest.nodes = 4;
+    manifest.blocks = {{"one", 10, 2, 3}, {"two", 11, 1, 1}};
+    writer.finish(manifest);
+  }
+  const CacheReader reader(folder / "a.splats");
+  EXPECT_EQ(verifyCache(reader), std::vector<std::string>{});
+  const size_t variable = 0;
+  const auto second = probe(reader, std::span(&variable, 1), {2.7, 2.4, 2.5});
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->block, 0u);
+  EXPECT_EQ(second->i, 6u);
+  EXPECT_EQ(second->j, 1u);
+  EXPECT_EQ(second->k, 2u);
+  EXPECT_NEAR(second->variables[0].value, 2.7, 0.05);
+  EXPECT_NEAR(second->variables[0].mean, 2.5, 1e-4);
+  EXPECT_NEAR(second->distance, std::hypot(0.2, 0.1), 0.05);
+  const auto last = probe(reader, {}, {4.9, 2.5, 2.5});
+  ASSERT_TRUE(last);
+  EXPECT_EQ(last->block, 1u);
+  EXPECT_EQ(last->i, 10u);
+  EXPECT_FALSE(probe(reader, {}, {4.5, 6, 2.5}));
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,150 @@
+// The manifest is strict: a field that is missing, of another type or out of range is an error that names it.
+#include "stream/manifest.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "stream/error.h"
+
+namespace curvisplat {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Manifest example() {
+  Manifest m;
+  m.title = "blunt fin";
+  m.program = "curvisplat 0.1.0";
+  m.sources = {"bluntfinxyz.bin", "bluntfinq.bin"};
+  m.reader = "PLOT3D";
+  m.root = {{-1, 0.1, 2}, 3.5};
+  m.lower = {-1, 0.1, 2};
+  m.upper = {2, 3, 5};
+  m.blocks = {{"block 1", 40, 32, 32}, {"block 2", uint64_t{1} << 40, 1, 1}};
+  m.nodes = (uint64_t{1} << 40) + 40960;
+  m.blanked_nodes = 7;
+  m.splats = 40953;
+  m.bricks = 3;
+  m.levels = 2;
+  m.volume = 1.0 / 3;
+  m.variables = {{0, "density", "kg/m3", 0.19, 4.98}, {3, "mach", "", -1e-300, 2.95}};
+  m.steps = {{0.25, "geometry.bin", {0, 3}}};
+  m.files = {{"bricks.bin", 456, 0x0123456789abcdef}, {"geometry.bin", uint64_t{1} << 50, ~uint64_t{0}}};
+  return m;
+}
+
+TEST(Manifest, RoundTrips) {
+  const Manifest m = example();
+  const Manifest back = Manifest::fromJson(m.toJson(), "manifest.json");
+  EXPECT_EQ(back.toJson(), m.toJson());
+  EXPECT_EQ(back.volume, m.volume);
+  EXPECT_EQ(back.root.min, m.root.min);
+  EXPECT_EQ(back.variables[1].min, -1e-300);
+  EXPECT_EQ(back.variables[1].number, 3u);
+  EXPECT_EQ(back.files[1].size, uint64_t{1} << 50);
+  EXPECT_EQ(back.files[1].checksum, ~uint64_t{0});
+  EXPECT_EQ(back.blocks[1].ni, uint64_t{1} << 40);
+  EXPECT_EQ(back.steps[0].variables, m.steps[0].variables);
+}
+
+TEST(Manifest, KeepsNamesThatAreNotUtf8Readable) {
+  Manifest m = example();
+  m.sources = {"gr\xfcn.xyz"};  // Latin-1
+  EXPECT_EQ(Manifest::fromJson(m.toJson(), "m").sources.size(), 1u);
+}
+
+/// Applies `call` to every value in the JSON tree, innermost included, with its path.
+void everywhere(Json& json, const std::string& path,
+                const std::function<void(Json&, const std::string&)>& call) {
+  for (auto it = json.begin(); it != json.end(); ++it) {
+    const std::string here =
+        json.is_object() ? path + "/" + it.key() : path + "/" + std::to_string(it - json.begin());
+    call(*it, here);
+    if (it->is_structured()) everywhere(*it, here, call);
+  }
+}
+
+TEST(Manifest, RefusesAnyOtherType) {
+  Json json = Json::parse(example().toJson());
+  everywhere(json, "", [&](Json& value, const std::string& path) {
+    const Json kept = value;
+    for (const Json& other :
+         {Json(nullptr), Json("x"), Json(true), Json::object(), Json::array({Json::array()})}) {
+      if (other.type() == kept.type() && !kept.is_structured() && path != "/format" &&
+          path.find("checksum") == std::string::npos)
+        continue;  // another text is a text
+      value = other;
+      if (kept.is_object() && other.is_object() && !kept.empty()) value = Json::object();
+      EXPECT_THROW(Manifest::fromJson(json.dump(), "m"), Error) << path << " as " << other;
+      value = kept;
+    }
+  });
+}
+
+TEST(Manifest, RefusesMissingFields) {
+  Json json = Json::parse(example().toJson());
+  const auto removeEach = [&](Json& object) {
+    const Json kept = object;
+    for (auto it = kept.begin(); it != kept.end(); ++it) {
+      object.erase(it.key());
+      try {
+        Manifest::fromJson(json.dump(), "m.json");
+        ADD_FAILURE() << it.key();
+      } catch (const Error& error) {
+        EXPECT_NE(std::string(error.what()).find(it.key()), std::string::npos) << error.what();
+        EXPECT_NE(std::string(error.what()).find("m.json"), std::string::npos) << error.what();
+      }
+      object = kept;
+    }
+  };
+  removeEach(json);
+  removeEach(json["root"]);
+  for (const char* list : {"blocks", "variables", "steps", "files"}) removeEach(json[list][0]);
+}
+
+TEST(Manifest, RefusesWhatIsOutOfRange) {
+  const auto refused = [](const std::function<void(Json&)>& change) {
+    Json json = Json::parse(example().toJson());
+    change(json);
+    EXPECT_THROW(Manifest::fromJson(json.dump(), "m"), Error) << json.dump();
+  };
+  refused([](Json& j) { j["version"] = 1; });
+  refused([](Json& j) { j["root"]["size"] = 0; });
+  refused([](Json& j) { j["root"]["size"] = -1; });
+  refused([](Json& j) { j["root"]["min"] = {1, 2}; });
+  refused([](Json& j) { j["lower"][1] = 1e9; });
+  refused([](Json& j) { j["blocks"][0]["ni"] = 0; });
+  refused([](Json& j) { j["blocks"][0]["ni"] = -5; });
+  refused([](Json& j) { j["nodes"] = 1.5; });
+  refused([](Json& j) { j["blanked_nodes"] = j["nodes"].get<uint64_t>() + 1; });
+  refused([](Json& j) { j["splats"] = 0; });
+  refused([](Json& j) { j["bricks"] = uint64_t{1} << 32; });
+  refused([](Json& j) { j["levels"] = 26; });
+  refused([](Json& j) { j["levels"] = 0; });
+  refused([](Json& j) { j["volume"] = -1; });
+  refused([](Json& j) { j["variables"][1]["number"] = 0; });
+  refused([](Json& j) { j["variables"][1]["name"] = "density"; });
+  refused([](Json& j) { j["steps"] = Json::array(); });
+  refused([](Json& j) { j["steps"][0]["variables"] = {1}; });
+  refused([](Json& j) { j["files"][1]["name"] = "bricks.bin"; });
+  refused([](Json& j) { j["files"][0]["checksum"] = "0123"; });
+  refused([](Json& j) { j["files"][0]["checksum"] = "0123456789abcdeg"; });
+  for (const char* name : {"", ".", "..", "../secret", "/etc/passwd", "a/b"}) {
+    refused([&](Json& j) { j["files"][0]["name"] = name; });
+    refused([&](Json& j) { j["steps"][0]["geometry"] = name; });
+  }
+}
+
+TEST(Manifest, RefusesTextThatIsNotJson) {
+  const std::string text = example().toJson();
+  for (size_t length = 0; length + 2 < text.size(); length += 7)
+    EXPECT_THROW(Manifest::fromJson(text.substr(0, length), "m"), Error);
+  EXPECT_THROW(Manifest::fromJson(std::string(100000, '['), "m"), Error);
+  EXPECT_THROW(Manifest::fromJson("[]", "m"), Error);
+  EXPECT_THROW(Manifest::fromJson("{\"version\": 1e999}", "m"), Error);
+}
+
+}  // namespace
+}  // namespace curvisplat
