@@ -74,11 +74,10 @@ SeamSorter::SeamSorter(size_t variables, uint64_t memory_bytes, std::filesystem:
 void SeamSorter::add(const SeamNode& node, std::span<const SplatScalar> values) {
   CURVISPLAT_CHECK_OP(values.size(), ==, variables_);
   if (entries_.size() == capacity_) spill();
-  if (entries_.size() == entries_.capacity()) {
-    // Doubles, but never past what memory allows.
-    const size_t wanted = std::min(capacity_, std::max<size_t>(64, 2 * entries_.size()));
-    entries_.reserve(wanted);
-    records_.reserve(wanted * record_size_);
+  if (entries_.empty()) {
+    // All at once: growing would hold the old and the new. Pages that are never touched cost nothing.
+    entries_.reserve(capacity_);
+    records_.reserve(capacity_ * record_size_);
   }
   entries_.push_back({node.along, node.splat.node, entries_.size()});
 
@@ -154,14 +153,14 @@ void SeamSorter::drain(const Visit& visit) {
     unpack(records_.data() + entry.record * record_size_, node, values);
     visit(node, values);
   }
-  entries_ = {};
-  records_ = {};
+  entries_ = std::vector<Entry>();
+  records_ = std::vector<double>();
 }
 
 void SeamSorter::drainRuns(const Visit& visit) {
   if (!entries_.empty()) spill();
-  entries_ = {};
-  records_ = {};
+  entries_ = std::vector<Entry>();
+  records_ = std::vector<double>();
 
   const size_t buffer_records =
       std::max<uint64_t>(1, memory_bytes_ / runs_.size() / (record_size_ * sizeof(double)));

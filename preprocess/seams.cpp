@@ -58,7 +58,7 @@ class Sweep {
   struct Cluster {
     glm::dvec3 leader;  // position
     double tolerance;
-    NodeSplat lowest;  // the node of the lowest number; the smallest spacing
+    NodeSplat lowest;  // the node of the lowest number
     std::vector<SplatScalar> values;
     std::optional<SplatMerger> merger;  // from the second node on
   };
@@ -118,9 +118,7 @@ void Sweep::join(Cluster& cluster, const NodeSplat& node, std::span<const SplatS
     cluster.merger->add(cluster.lowest.splat.position, cluster.lowest.splat, cluster.values);
   }
   cluster.merger->add(node.splat.position, node.splat, values);
-  const double spacing = std::min(cluster.lowest.spacing, node.spacing);
   if (node.node < cluster.lowest.node) cluster.lowest = node;
-  cluster.lowest.spacing = spacing;
   ++merged_;
 }
 

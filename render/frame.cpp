@@ -13,7 +13,7 @@
 #include "render/kernel.h"
 #include "render/screen_view.h"
 #include "render/segment_ring.h"
-#include "render/stage_timer.h"
+#include "stream/stage_timer.h"
 #include "stream/cut.h"
 
 namespace curvisplat {

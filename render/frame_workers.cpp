@@ -1,8 +1,8 @@
 #include "render/frame_workers.h"
 
 #include "render/depth_sort.h"
-#include "render/stage_timer.h"
 #include "render/thread_name.h"
+#include "stream/stage_timer.h"
 
 namespace curvisplat {
 
@@ -41,6 +41,7 @@ void FrameWorkers::finish(FrameStatistics& sum) {
   threads_.clear();
   for (const FrameStatistics& part : statistics_) {
     sum.read_s += part.read_s;
+    sum.decode_s += part.decode_s;
     sum.project_s += part.project_s;
     sum.sort_s += part.sort_s;
     sum.workers_waited_s += part.workers_waited_s;
@@ -75,11 +76,11 @@ void FrameWorkers::loop(FrameStatistics& statistics) {
 bool FrameWorkers::prepare(WorkerScratch& scratch, uint64_t sequence, FrameStatistics& statistics) {
   const uint32_t id = work_.bricks[sequence];
   const Brick& brick = work_.cache.bricks()[id];
-  {
-    const StageTimer timer(statistics.read_s);
-    work_.cache.readGeometry(id, scratch.geometry);
-    work_.cache.readVariable(id, work_.variable, scratch.values);
-  }
+  ReadTimes times;
+  work_.cache.readGeometry(id, scratch.geometry, nullptr, &times);
+  work_.cache.readVariable(id, work_.variable, scratch.values, &times);
+  statistics.read_s += times.read_s;
+  statistics.decode_s += times.decode_s;
   {
     const StageTimer timer(statistics.project_s);
     scratch.projector.project(work_.settings, work_.table, work_.cache.manifest().root.cellMin(brick.cell),

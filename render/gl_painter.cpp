@@ -7,7 +7,7 @@
 #include "render/gl_objects.h"
 #include "render/kernel.h"
 #include "render/splat_shader.h"
-#include "render/stage_timer.h"
+#include "stream/stage_timer.h"
 #include "stream/error.h"
 
 namespace curvisplat {

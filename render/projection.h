@@ -54,7 +54,7 @@ struct ProjectionCounts {
 struct ProjectionSettings {
   ScreenView view;
   bool per_pixel = true;  // false: flat splats; slopes and widths are left out
-  std::optional<WorldBox> clip_box;
+  std::optional<WorldBox> clip_box = std::nullopt;
 };
 
 /// Projects bricks. One thread each.

@@ -54,15 +54,15 @@ const std::vector<Preset>& presets() {
       {"cool-warm",
        ColourSpace::diverging,
        {{0, fromHex(0x3b4cc0)}, {0.5, glm::dvec3(0.865)}, {1, fromHex(0xb40426)}},
-       {{0, 0.3},
-        {0.125, 0.12},
-        {0.25, 0.04},
-        {0.375, 0.005},
+       {{0, 0.4},
+        {0.125, 0.2},
+        {0.25, 0.08},
+        {0.375, 0.02},
         {0.5, 0},
-        {0.625, 0.005},
-        {0.75, 0.04},
-        {0.875, 0.12},
-        {1, 0.3}}},
+        {0.625, 0.02},
+        {0.75, 0.08},
+        {0.875, 0.2},
+        {1, 0.4}}},
       {"grey", ColourSpace::rgb, {{0, glm::dvec3(0)}, {1, glm::dvec3(1)}}, defaultOpacityRamp(0, 1)},
   };
   return all;
@@ -70,11 +70,12 @@ const std::vector<Preset>& presets() {
 
 }  // namespace
 
-// Roughly 0.3 t³, per hundredth of the data's diagonal if the user says nothing else. Rays cross some 60 such
+// Roughly 0.4 t², per hundredth of the data's diagonal if the user says nothing else. Rays cross some 60 such
 // units, so that the lower quarter of the scalar's range is a haze through which the upper half stands out: a
-// linear ramp that shows the top at all hides it behind fog.
+// linear ramp that shows the top at all hides it behind fog, and a cubic one leaves everything else too
+// faint.
 std::vector<OpacityPoint> defaultOpacityRamp(double low, double high) {
-  std::vector<OpacityPoint> points{{0, 0}, {0.25, 0.005}, {0.5, 0.04}, {0.75, 0.12}, {1, 0.3}};
+  std::vector<OpacityPoint> points{{0, 0}, {0.25, 0.02}, {0.5, 0.08}, {0.75, 0.2}, {1, 0.4}};
   for (OpacityPoint& point : points) point.x = low + point.x * (high - low);
   return points;
 }

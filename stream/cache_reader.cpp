@@ -9,6 +9,7 @@
 #include "stream/checksum.h"
 #include "stream/error.h"
 #include "stream/file.h"
+#include "stream/stage_timer.h"
 
 namespace curvisplat {
 namespace {
@@ -40,7 +41,9 @@ struct CacheReader::State {
   }
 
   /// The bytes of a brick's stream, in the thread's scratch, verified.
-  std::span<const std::byte> read(const InputFile& file, uint32_t brick, const Extent& extent) const {
+  std::span<const std::byte> read(const InputFile& file, uint32_t brick, const Extent& extent,
+                                  ReadTimes& times) const {
+    const StageTimer timer(times.read_s);
     thread_local std::vector<std::byte> scratch;
     scratch.resize(extent.length);
     file.readAt(extent.offset, std::span(scratch));
@@ -94,10 +97,14 @@ size_t CacheReader::variableNamed(std::string_view name) const {
   throw UsageError("{}: the cache has no scalar '{}'; it has {}", path().string(), name, names);
 }
 
-void CacheReader::readGeometry(uint32_t brick, SplatGeometry& out, std::vector<NodeRun>* runs) const {
+void CacheReader::readGeometry(uint32_t brick, SplatGeometry& out, std::vector<NodeRun>* runs,
+                               ReadTimes* times) const {
+  ReadTimes ignored;
+  ReadTimes& sums = times ? *times : ignored;
   CURVISPLAT_CHECK_OP(brick, <, state_->bricks.size());
   const Brick& record = state_->bricks[brick];
-  const auto bytes = state_->read(state_->geometry, brick, record.geometry);
+  const auto bytes = state_->read(state_->geometry, brick, record.geometry, sums);
+  const StageTimer timer(sums.decode_s);
   try {
     decodeGeometry(state_->manifest.root, record, bytes, out, runs);
   } catch (const Error& error) {
@@ -105,11 +112,14 @@ void CacheReader::readGeometry(uint32_t brick, SplatGeometry& out, std::vector<N
   }
 }
 
-void CacheReader::readVariable(uint32_t brick, size_t variable, SplatVariable& out) const {
+void CacheReader::readVariable(uint32_t brick, size_t variable, SplatVariable& out, ReadTimes* times) const {
+  ReadTimes ignored;
+  ReadTimes& sums = times ? *times : ignored;
   CURVISPLAT_CHECK_OP(brick, <, state_->bricks.size());
   CURVISPLAT_CHECK_OP(variable, <, state_->tables.size());
   const BrickVariable& record = state_->tables[variable][brick];
-  const auto bytes = state_->read(state_->values[variable], brick, record.values);
+  const auto bytes = state_->read(state_->values[variable], brick, record.values, sums);
+  const StageTimer timer(sums.decode_s);
   try {
     decodeVariable(state_->bricks[brick], record, bytes, out);
   } catch (const Error& error) {

@@ -15,6 +15,12 @@
 
 namespace curvisplat {
 
+/// Where reading bricks spends its time; added to.
+struct ReadTimes {
+  double read_s = 0;  // the disk's, and the checksum
+  double decode_s = 0;
+};
+
 class CacheReader {
  public:
   /// Throws Error naming the file, what was expected and what was found.
@@ -37,8 +43,9 @@ class CacheReader {
 
   /// Reads, verifies and decodes. Throws Error naming the brick and the file where the disk fails or a
   /// checksum does not match.
-  void readGeometry(uint32_t brick, SplatGeometry& out, std::vector<NodeRun>* runs = nullptr) const;
-  void readVariable(uint32_t brick, size_t variable, SplatVariable& out) const;
+  void readGeometry(uint32_t brick, SplatGeometry& out, std::vector<NodeRun>* runs = nullptr,
+                    ReadTimes* times = nullptr) const;
+  void readVariable(uint32_t brick, size_t variable, SplatVariable& out, ReadTimes* times = nullptr) const;
 
  private:
   struct State;

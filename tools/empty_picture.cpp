@@ -100,13 +100,13 @@ std::vector<std::string> whyEmpty(const RenderedScene& scene) {
           "smaller than {} makes it more opaque",
           thickest, scene.transfer_function.opacityUnit()));
   }
+  const FrameStatistics& s = scene.statistics;
   if (reasons.empty())
-    reasons.push_back(
-        fmt::format("{} bricks were drawn and {} left out, {} splats were read and {} drawn, none of which "
-                    "reaches a pixel; "
-                    "try --view iso, another --range or another --clip-box",
-                    scene.statistics.bricks_drawn, scene.statistics.bricks_culled,
-                    scene.statistics.splats_read, scene.statistics.splats_drawn));
+    reasons.push_back(fmt::format(
+        "of {} splats read, {} are outside of --clip-box, {} off the screen, {} transparent and {} drawn, "
+        "none of "
+        "which reaches a pixel; try --view iso, another --range or another --clip-box",
+        s.splats_read, s.splats_clipped, s.splats_off_screen, s.splats_transparent, s.splats_drawn));
   return reasons;
 }
 

@@ -97,7 +97,7 @@ size_t chooseVariable(const CacheReader& cache, const std::string& name) {
   try {
     return cache.variableNamed(name);
   } catch (const UsageError& error) {
-    throw Error("{}: {}", cache.path().string(), error.what());
+    throw Error("{}", error.what());
   }
 }
 
@@ -180,10 +180,16 @@ nlohmann::json toJson(const FrameStatistics& s) {
             {"painter_waited", s.painter_waited_s}}},
           {"bricks_drawn", s.bricks_drawn},
           {"bricks_culled", s.bricks_culled},
+          {"bricks_out_of_image", s.bricks_out_of_image},
+          {"bricks_transparent", s.bricks_transparent},
           {"splats_read", s.splats_read},
+          {"splats_clipped", s.splats_clipped},
+          {"splats_off_screen", s.splats_off_screen},
+          {"splats_transparent", s.splats_transparent},
           {"splats_drawn", s.splats_drawn},
           {"bytes_read", s.bytes_read},
-          {"largest_level", s.largest_level}};
+          {"largest_level", s.largest_level},
+          {"workers", s.workers}};
 }
 
 nlohmann::json statisticsOf(const RenderWords& words, const RenderedScene& scene,

@@ -285,8 +285,8 @@ TEST_F(RenderOptions, BadInputAndOutputAreOneLine) {
 
 TEST_F(RenderOptions, AnUnknownScalarNamesThoseThereAre) {
   const ProgramResult result = runProgram({"render", cache(), "-o", file("a.png"), "--scalar", "entropy"});
-  EXPECT_NE(result.err.find("'f'"), std::string::npos) << result.err;
-  EXPECT_EQ(lineCount(render({"--scalar", "f"}).rgba.empty() ? "" : last_.err), 0) << last_.err;
+  EXPECT_NE(result.err.find("it has f"), std::string::npos) << result.err;
+  render({"--scalar", "f"});
 }
 
 TEST_F(RenderOptions, StatisticsTellWhatWasDone) {

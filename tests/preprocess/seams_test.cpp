@@ -234,8 +234,9 @@ std::vector<Piece> randomFaces(size_t count, uint64_t seed) {
     node.on_block_face = true;
     node.regular = n % 3 == 0;
     node.spacing = 0.01;
-    // Places on a lattice, each taken a few times, off by less than the tolerance.
-    const auto place = [&] { return 0.01 * std::floor(10 * unit(random)) + 1e-6 * unit(random); };
+    // Places on a lattice, each taken a few times: some exactly, others off by less than the tolerance.
+    const double off = n % 2 == 0 ? 0.0 : 1e-6;
+    const auto place = [&] { return 0.01 * std::floor(10 * unit(random)) + off * unit(random); };
     node.node_position = {place(), place(), place()};
     node.splat.position = node.node_position + glm::dvec3(1e-3 * unit(random));
     node.splat.weight = unit(random);

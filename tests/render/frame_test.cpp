@@ -1,0 +1,290 @@
+#include "render/frame.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <numeric>
+
+#include "render/depth_sort.h"
+#include "render/gl_painter.h"
+#include "render/gl_thread.h"
+#include "stream/error.h"
+#include "stream/file.h"
+#include "tests/support/lattice_cache.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+/// From outside, at the middle of the lattice.
+Camera cameraFrom(const glm::dvec3& direction, double parallel_scale = 24) {
+  Camera camera;
+  camera.focal_point = glm::dvec3(0.5 * kLatticeSide);
+  camera.position = camera.focal_point + 80.0 * direction;
+  camera.view_up = std::abs(direction.z) > 0.9 ? glm::dvec3(0, 1, 0) : glm::dvec3(0, 0, 1);
+  camera.parallel_scale = parallel_scale;
+  return camera;
+}
+
+class FrameTest : public testing::Test {
+ protected:
+  /// Writes and opens a lattice.
+  const CacheReader& lattice(double constant, const glm::dvec3& gradient) {
+    writeLatticeCache(path(), constant, gradient);
+    cache_ = std::make_unique<CacheReader>(path());
+    return *cache_;
+  }
+  std::filesystem::path path() const { return folder_ / "lattice.splats"; }
+
+  /// Points [scalar, red, green, blue] and [scalar, opacity per unit length], as ParaView has them.
+  TransferFunction function(const std::string& colours, const std::string& opacities) {
+    const auto file = folder_ / "function.json";
+    writeFileAtomically(file, "[{\"ColorSpace\": \"RGB\", \"Name\": \"test\", \"RGBPoints\": [" + colours +
+                                  "], \"Points\": [" + opacities + "]}]");
+    return TransferFunction::fromFile(file, nullptr, 1.0, 1.0);
+  }
+  /// Black, everywhere equally opaque.
+  TransferFunction uniform(double extinction) {
+    const double opacity = -std::expm1(-extinction);
+    return function("0, 0, 0, 0, 1, 0, 0, 0", fmt::format("0, {0}, 0.5, 0, 1, {0}, 0.5, 0", opacity));
+  }
+  TransferFunction redToBlue() {
+    return function("0, 1, 0, 0, 1, 0, 0, 1", "0, 0.05, 0.5, 0, 1, 0.05, 0.5, 0");
+  }
+
+  static FrameOptions options(double lod_pixels = 0) {
+    FrameOptions made;
+    made.size = {120, 100};
+    made.lod_pixels = lod_pixels;
+    return made;
+  }
+
+  TemporaryFolder folder_;
+  std::unique_ptr<CacheReader> cache_;
+};
+
+TEST_F(FrameTest, AConstantFieldIsFlat) {
+  const double extinction = 0.03;
+  FrameRenderer renderer(lattice(0.5, glm::dvec3(0)), 0, uniform(extinction));
+  FrameStatistics statistics;
+  // Leaves, and the merged root alone.
+  for (const double lod_pixels : {0.0, 1e3}) {
+    const Image image = renderer.render(cameraFrom({0, 0, 1}), options(lod_pixels), statistics);
+    EXPECT_EQ(statistics.bricks_drawn, lod_pixels == 0 ? 64u : 1u);
+    EXPECT_EQ(statistics.splats_drawn, 512 * statistics.bricks_drawn);
+    const double expected = std::exp(-extinction * kLatticeSide);
+    const double px = 100 / 48.0;  // a unit's pixels
+    const double margin = lod_pixels == 0 ? 3 * px : 8 * px;
+    for (int y = 0; y < 100; ++y)
+      for (int x = 0; x < 120; ++x) {
+        const double inside = 16 * px - std::max(std::abs(x + 0.5 - 60), std::abs(y + 0.5 - 50));
+        if (inside > margin) {
+          EXPECT_NEAR(image.pixel(x, y)[0], expected, 0.01 * expected) << x << ' ' << y;
+        }
+        if (inside < -margin) {
+          EXPECT_EQ(image.pixel(x, y)[0], 1.0f) << x << ' ' << y;
+        }
+      }
+  }
+}
+
+TEST_F(FrameTest, PerspectiveRaysOfAConstantFieldHaveTheirLength) {
+  const double extinction = 0.03;
+  FrameRenderer renderer(lattice(0.5, glm::dvec3(0)), 0, uniform(extinction));
+  Camera camera = cameraFrom({0, 0, 1});
+  camera.projection = Projection::perspective;
+  camera.view_angle_deg = 80;
+  FrameStatistics statistics;
+  // From outside, and from inside of the data, looking at the corner of a wide image.
+  for (const double height : {34.0, 20.0}) {
+    camera.position = {16, 16, height};
+    const Image image = renderer.render(camera, options(), statistics);
+    for (const int x : {40, 60, 62}) {
+      const double tangent = (x + 0.5 - 60) / (50 / std::tan(40 * M_PI / 180));
+      const double length = std::min(height, 32.0) * std::hypot(1, tangent);
+      const double expected = std::exp(-extinction * length);
+      ASSERT_LT(std::abs(tangent * height), 12);
+      EXPECT_NEAR(image.pixel(x, 50)[0], expected, 0.015 * expected) << height << ' ' << x;
+    }
+  }
+}
+
+TEST_F(FrameTest, TheNearSideHidesTheFarSide) {
+  FrameRenderer renderer(lattice(0, {1.0 / kLatticeSide, 0, 0}), 0,
+                         function("0, 1, 0, 0, 1, 0, 0, 1", "0, 0.9, 0.5, 0, 1, 0.9, 0.5, 0"));
+  FrameStatistics statistics;
+  for (const double lod_pixels : {0.0, 4.0}) {
+    const Image from_low = renderer.render(cameraFrom({-1, 0, 0}), options(lod_pixels), statistics);
+    const Image from_high = renderer.render(cameraFrom({1, 0, 0}), options(lod_pixels), statistics);
+    EXPECT_GT(from_low.pixel(60, 50)[0], 0.9f);
+    EXPECT_LT(from_low.pixel(60, 50)[2], 0.1f);
+    EXPECT_LT(from_high.pixel(60, 50)[0], 0.1f);
+    EXPECT_GT(from_high.pixel(60, 50)[2], 0.9f);
+  }
+}
+
+TEST_F(FrameTest, IsTheSameForAnyThreadsAndMemory) {
+  FrameRenderer renderer(lattice(0, {0.02, 0.01, 0}), 0, redToBlue());
+  Camera camera = cameraFrom(glm::dvec3(0.6, 0.64, 0.48));
+  for (const Projection projection : {Projection::orthographic, Projection::perspective}) {
+    camera.projection = projection;
+    camera.view_angle_deg = 35;
+    FrameStatistics statistics;
+    std::vector<float> first;
+    for (const unsigned threads : {1u, 2u, 4u, 3u})
+      for (const uint64_t memory : {uint64_t{1} << 30, uint64_t{40} << 20}) {
+        FrameOptions wanted = options(2);
+        wanted.threads = threads;
+        wanted.memory_bytes = memory;
+        const Image image = renderer.render(camera, wanted, statistics);
+        if (first.empty()) first = image.rgba;
+        EXPECT_EQ(image.rgba, first) << threads << " threads, " << memory << " bytes";
+      }
+    EXPECT_GT(*std::max_element(first.begin(), first.end()) - *std::min_element(first.begin(), first.end()),
+              0.2f);
+  }
+}
+
+TEST_F(FrameTest, DiffersLittleFromOneGlobalDepthSort) {
+  const CacheReader& cache = lattice(0, {0.02, 0.01, 0});
+  const TransferFunction transfer_function = redToBlue();
+  const Camera camera = cameraFrom(glm::dvec3(0.6, 0.64, 0.48));
+  FrameStatistics statistics;
+  const Image image = FrameRenderer(cache, 0, transfer_function).render(camera, options(), statistics);
+
+  const auto table = ClassificationTable::of(transfer_function, 0, 1);
+  const ProjectionSettings settings{ScreenView::of(camera, options().size, glm::dvec3(1), 1.5, 1)};
+  std::vector<ScreenSplat> splats;
+  std::vector<float> depths;
+  for (uint32_t id = 0; id < cache.bricks().size(); ++id) {
+    if (!cache.bricks()[id].isLeaf()) continue;
+    SplatGeometry geometry;
+    SplatVariable variable;
+    cache.readGeometry(id, geometry);
+    cache.readVariable(id, 0, variable);
+    const glm::dvec3 corner = cache.manifest().root.cellMin(cache.bricks()[id].cell);
+    BrickProjector projector;
+    projector.project(settings, table, corner, geometry, variable);
+    const auto brick_depth = static_cast<float>(settings.view.viewFromData(corner).z);
+    splats.insert(splats.end(), projector.splats().begin(), projector.splats().end());
+    for (const float depth : projector.depths()) depths.push_back(brick_depth + depth);
+  }
+  DepthSorter sorter;
+  std::vector<ScreenSplat> sorted;
+  for (const uint32_t index : sorter.farthestFirst(depths)) sorted.push_back(splats[index]);
+  Image global;
+  GlThread gl;
+  gl.run([&](const GlContext& context) {
+    GlPainter painter(context);
+    painter.begin(options().size, options().background, table, true);
+    painter.draw(sorted);
+    global = painter.end();
+  });
+  EXPECT_GT(compareImages(image, global).psnr_db, 60);
+}
+
+TEST_F(FrameTest, SaysWhereSplatsWent) {
+  const CacheReader& cache = lattice(0, {1.0 / kLatticeSide, 0, 0});
+  FrameStatistics statistics;
+  // Only the half from 0.5 on can be seen; slopes reach a little further.
+  FrameRenderer half(cache, 0,
+                     function("0, 1, 0, 0, 1, 0, 0, 1", "0, 0, 0.5, 0, 0.9, 0, 0.5, 0, 1, 0.5, 0.5, 0"));
+  half.render(cameraFrom({0, 0, 1}), options(), statistics);
+  EXPECT_GT(statistics.bricks_transparent, 0u);
+  EXPECT_EQ(statistics.bricks_culled, statistics.bricks_transparent);
+  EXPECT_LT(statistics.bricks_drawn, 64u);
+  EXPECT_GT(statistics.splats_drawn, 0u);
+  EXPECT_GT(statistics.splats_transparent, 0u);
+  EXPECT_EQ(statistics.splats_read, statistics.splats_drawn + statistics.splats_transparent);
+  EXPECT_GT(statistics.bytes_read, 0u);
+
+  FrameRenderer all(cache, 0, uniform(0.1));
+  FrameOptions clipped = options();
+  clipped.clip_box = WorldBox{glm::dvec3(0), glm::dvec3(16, 32, 32)};
+  all.render(cameraFrom({0, 0, 1}), clipped, statistics);
+  EXPECT_EQ(statistics.splats_clipped, 16u * 32 * 32);
+  EXPECT_EQ(statistics.splats_drawn, 16u * 32 * 32);
+
+  Camera away = cameraFrom({0, 0, 1});
+  away.focal_point += glm::dvec3(1000, 0, 0);
+  away.position += glm::dvec3(1000, 0, 0);
+  const Image empty = all.render(away, options(), statistics);
+  EXPECT_EQ(statistics.bricks_drawn, 0u);
+  EXPECT_GT(statistics.bricks_out_of_image, 0u);
+  EXPECT_TRUE(std::all_of(empty.rgba.begin(), empty.rgba.end(), [](float value) { return value == 1; }));
+}
+
+TEST_F(FrameTest, CullingChangesNothingInThePicture) {
+  // A camera close by sees some bricks; with the clip box around all data nothing else changes.
+  FrameRenderer renderer(
+      lattice(0, {0.02, 0.01, 0}), 0,
+      function("0, 1, 0, 0, 1, 0, 0, 1", "0, 0, 0.5, 0, 0.4, 0, 0.5, 0, 0.5, 0.5, 0.5, 0"));
+  FrameStatistics near_statistics, far_statistics;
+  FrameOptions small = options(), large = options();
+  small.size = {40, 40};
+  large.size = {240, 240};
+  const Image near = renderer.render(cameraFrom({0, 0, 1}, 4), small, near_statistics);
+  const Image far = renderer.render(cameraFrom({0, 0, 1}, 24), large, far_statistics);
+  EXPECT_LT(near_statistics.bricks_drawn, far_statistics.bricks_drawn);
+  double largest = 0;
+  for (int y = 0; y < 40; ++y)
+    for (int x = 0; x < 40; ++x)
+      largest = std::max<double>(largest, std::abs(near.pixel(x, y)[0] - far.pixel(x + 100, y + 100)[0]));
+  EXPECT_LT(largest, 1e-4);
+}
+
+TEST_F(FrameTest, StretchesTheData) {
+  FrameRenderer renderer(lattice(0.5, glm::dvec3(0)), 0, uniform(0.01));
+  FrameOptions stretched = options();
+  stretched.scale = {1, 1, 3};
+  FrameStatistics statistics;
+  Camera camera = cameraFrom({0, 0, 1});
+  camera.position.z = 200;
+  const Image image = renderer.render(camera, stretched, statistics);
+  EXPECT_NEAR(image.pixel(60, 50)[0], std::exp(-0.01 * 3 * kLatticeSide), 5e-3);
+  stretched.scale = {0.5, 1, 1};
+  const Image narrow = renderer.render(cameraFrom({0, 0, 1}), stretched, statistics);
+  EXPECT_EQ(narrow.pixel(85, 50)[0], 1.0f);
+}
+
+TEST_F(FrameTest, ADamagedBrickEndsTheFrameWithItsName) {
+  lattice(0, {0.02, 0.01, 0});
+  const Brick brick = cache_->bricks()[40];
+  {
+    std::fstream file(path() / "geometry.bin", std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(brick.geometry.offset));
+    file.put('\x55').put('\x55').put('\x55');
+  }
+  FrameRenderer renderer(*cache_, 0, redToBlue());
+  FrameStatistics statistics;
+  for (const unsigned threads : {1u, 4u}) {
+    FrameOptions wanted = options();
+    wanted.threads = threads;
+    try {
+      renderer.render(cameraFrom({0, 0, 1}), wanted, statistics);
+      ADD_FAILURE() << "a damaged brick was drawn";
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("brick 40"), std::string::npos) << error.what();
+    }
+  }
+  // What is whole can still be drawn.
+  EXPECT_NO_THROW(renderer.render(cameraFrom({0, 0, 1}), options(1e3), statistics));
+}
+
+TEST_F(FrameTest, SaysHowMuchMemoryItTakes) {
+  FrameRenderer renderer(lattice(0.5, glm::dvec3(0)), 0, uniform(0.1));
+  FrameOptions little = options();
+  little.memory_bytes = 1 << 20;
+  FrameStatistics statistics;
+  try {
+    renderer.render(cameraFrom({0, 0, 1}), little, statistics);
+    ADD_FAILURE() << "a megabyte was enough";
+  } catch (const UsageError& error) {
+    EXPECT_NE(std::string(error.what()).find("--memory"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat
