@@ -7,6 +7,7 @@
 #include "preprocess/splat_record.h"
 #include "stream/brick.h"
 #include "stream/error.h"
+#include "stream/file.h"
 
 namespace curvisplat {
 namespace {
@@ -78,7 +79,9 @@ void MemoryPlan::limitBuckets(uint64_t splats, size_t variables) {
 }
 
 size_t MemoryPlan::chunkBytes(uint32_t buckets) const {
-  return std::clamp(chunk_buffer_bytes / std::max(1u, buckets), kLeastChunkBytes, kMostChunkBytes);
+  const uint64_t bytes =
+      std::clamp(chunk_buffer_bytes / std::max(1u, buckets), kLeastChunkBytes, kMostChunkBytes);
+  return bytes / kDirectAlignment * kDirectAlignment;
 }
 
 }  // namespace curvisplat
