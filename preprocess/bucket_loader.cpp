@@ -1,6 +1,7 @@
 #include "preprocess/bucket_loader.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "preprocess/splat_record.h"
 #include "stream/brick.h"
@@ -17,6 +18,7 @@ class UnitFinder {
       unit_ = buildUnitOf(*tree_, tree_->leafOf(position));
     return unit_;
   }
+  uint32_t unit() const { return unit_; }
 
  private:
   const BucketTree* tree_;
@@ -63,39 +65,44 @@ bool BucketLoader::fill(LoadedBucket& loaded) {
   return true;
 }
 
-void BucketLoader::group(LoadedBucket& loaded) const {
-  // Counted first and placed then, so that no second array of the bucket's size is needed.
+void BucketLoader::group(LoadedBucket& loaded) {
+  // Looks at each record once: its part and its length are all that placing it takes.
   UnitFinder finder(*tree_);
   std::vector<LoadedBucket::Part>& parts = loaded.parts;
   std::vector<uint32_t> part_of(tree_->size(), BucketTree::kNone);
-  const auto forEachRecord = [&](auto use) {
-    for (size_t at = 0; at < loaded.bytes.size(); at += recordBytes(&loaded.bytes[at], variables_))
-      use(at, finder.unitOf(recordPosition(&loaded.bytes[at])));
-  };
-  size_t records = 0;
-  forEachRecord([&](size_t, uint32_t unit) {
-    if (part_of[unit] == BucketTree::kNone) {
-      part_of[unit] = static_cast<uint32_t>(parts.size());
-      parts.push_back({unit, 0, 0});
+  tags_.clear();
+  for (size_t at = 0; at < loaded.bytes.size();) {
+    const std::byte* record = &loaded.bytes[at];
+    uint32_t& part = part_of[finder.unitOf(recordPosition(record))];
+    if (part == BucketTree::kNone) {
+      part = static_cast<uint32_t>(parts.size());
+      parts.push_back({finder.unit(), 0, 0});
     }
-    ++parts[part_of[unit]].count;
-    ++records;
-  });
-  std::sort(parts.begin(), parts.end(), [&](const auto& a, const auto& b) {
-    return mortonLess(firstDeepest((*tree_)[a.unit].cell), firstDeepest((*tree_)[b.unit].cell));
+    ++parts[part].count;
+    const bool irregular = recordIsIrregular(record);
+    tags_.push_back(2 * part + irregular);
+    at += irregular ? irregularRecordBytes(variables_) : regularRecordBytes(variables_);
+  }
+
+  std::vector<uint32_t> in_order(parts.size());
+  std::iota(in_order.begin(), in_order.end(), 0u);
+  std::sort(in_order.begin(), in_order.end(), [&](uint32_t a, uint32_t b) {
+    return mortonLess(firstDeepest((*tree_)[parts[a].unit].cell), firstDeepest((*tree_)[parts[b].unit].cell));
   });
   std::vector<size_t> next(parts.size());
   size_t begin = 0;
-  for (size_t part = 0; part < parts.size(); ++part) {
-    part_of[parts[part].unit] = static_cast<uint32_t>(part);
+  for (const uint32_t part : in_order) {
     parts[part].begin = next[part] = begin;
     begin += parts[part].count;
   }
-  if (loaded.places.capacity() < records) loaded.places = {};
-  loaded.places.resize(records);
-  forEachRecord([&](size_t at, uint32_t unit) {
-    loaded.places[next[part_of[unit]]++] = static_cast<uint32_t>(at / 4);
-  });
+  if (loaded.places.capacity() < tags_.size()) loaded.places = {};
+  loaded.places.resize(tags_.size());
+  size_t at = 0;
+  for (const uint32_t tag : tags_) {
+    loaded.places[next[tag / 2]++] = static_cast<uint32_t>(at);
+    at += tag % 2 ? irregularRecordBytes(variables_) : regularRecordBytes(variables_);
+  }
+  std::sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.begin < b.begin; });
 }
 
 }  // namespace curvisplat

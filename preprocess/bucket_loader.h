@@ -36,7 +36,8 @@ struct LoadedBucket {
 };
 
 /// Loads the buckets from `first` on that are not empty, in order. Ends after one that is too large, so that
-/// its division has the memory for itself. Two buckets of `most_bytes`, and 4 bytes a record, are in memory.
+/// its division has the memory for itself. Two buckets of `most_bytes`, and 4 bytes a record
+/// of three, are in memory.
 /// Tree and file must not change meanwhile.
 class BucketLoader {
  public:
@@ -48,7 +49,7 @@ class BucketLoader {
 
  private:
   bool fill(LoadedBucket& loaded);
-  void group(LoadedBucket& loaded) const;
+  void group(LoadedBucket& loaded);
 
   const BucketTree* tree_;
   const BucketFile* file_;
@@ -56,6 +57,7 @@ class BucketLoader {
   uint32_t position_;
   const uint64_t most_bytes_;
   bool ended_ = false;
+  std::vector<uint32_t> tags_;  // [record]: 2 x its part, and 1 if it is irregular
   ReadAhead<LoadedBucket> ahead_;
 };
 

@@ -50,11 +50,26 @@ void sortByNode(RecordSpan records) {
   struct Key {
     uint64_t node;
     uint32_t place;
-    bool operator<(const Key& other) const { return node < other.node; }
   };
-  std::vector<Key> keys(records.size());
-  for (size_t n = 0; n < records.size(); ++n) keys[n] = {recordNode(records[n]), records.places[n]};
-  std::sort(keys.begin(), keys.end());
+  // Nodes of a cell lie close together: a radix sort of what they differ in takes two or three passes.
+  constexpr int kDigitBits = 11;
+  std::vector<Key> keys(records.size()), sorted(records.size());
+  uint64_t least = UINT64_MAX, most = 0;
+  for (size_t n = 0; n < records.size(); ++n) {
+    keys[n] = {recordNode(records[n]), records.places[n]};
+    least = std::min(least, keys[n].node);
+    most = std::max(most, keys[n].node);
+  }
+  for (int shift = 0; (most - least) >> shift != 0; shift += kDigitBits) {
+    const auto digitOf = [&](const Key& key) {
+      return (key.node - least) >> shift & ((uint64_t{1} << kDigitBits) - 1);
+    };
+    std::array<uint32_t, (size_t{1} << kDigitBits) + 1> begins{};
+    for (const Key& key : keys) ++begins[digitOf(key) + 1];
+    for (size_t digit = 1; digit < begins.size(); ++digit) begins[digit] += begins[digit - 1];
+    for (const Key& key : keys) sorted[begins[digitOf(key)]++] = key;
+    keys.swap(sorted);
+  }
   for (size_t n = 0; n < records.size(); ++n) records.places[n] = keys[n].place;
 }
 

@@ -29,12 +29,12 @@ struct BuiltCell {
   double error = 0;
 };
 
-/// Records in memory: each begins 4 x its place in `places` after `base`.
+/// Records in memory: each begins its place in `places` after `base`, in bytes.
 struct RecordSpan {
   const std::byte* base = nullptr;
   std::span<uint32_t> places;
 
-  const std::byte* operator[](size_t n) const { return base + 4 * size_t{places[n]}; }
+  const std::byte* operator[](size_t n) const { return base + places[n]; }
   size_t size() const { return places.size(); }
   RecordSpan subspan(size_t begin, size_t count) const { return {base, places.subspan(begin, count)}; }
 };

@@ -46,7 +46,7 @@ NodeRange nodesIn(const BucketFile& file, uint32_t bucket, size_t variables) {
 std::vector<uint32_t> placesOfRecords(std::span<const std::byte> records, size_t variables) {
   std::vector<uint32_t> places;
   forEachRecord(records, variables, [&](std::span<const std::byte> record) {
-    places.push_back(static_cast<uint32_t>((record.data() - records.data()) / 4));
+    places.push_back(static_cast<uint32_t>(record.data() - records.data()));
   });
   return places;
 }

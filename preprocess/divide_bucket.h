@@ -16,7 +16,7 @@
 
 namespace curvisplat {
 
-/// Where each record in `records` begins, in units of 4 bytes.
+/// Where each record in `records` begins.
 std::vector<uint32_t> placesOfRecords(std::span<const std::byte> records, size_t variables);
 
 struct DividedBucket {

@@ -65,7 +65,9 @@ MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads
   const uint64_t affordable = std::max<uint64_t>(1, (bytes - least_buckets) / (2 * scratch));
   plan.threads = static_cast<unsigned>(std::min<uint64_t>(std::max(1u, threads), affordable));
   plan.bucket_splats = (bytes - plan.threads * scratch) / (2 * bucketBytesPerSplat(variables));
-  plan.bucket_splats = std::min<uint64_t>(plan.bucket_splats, uint64_t{1} << 24);
+  // More makes nothing faster; and places in a bucket are of 32 bits.
+  plan.bucket_splats = std::min<uint64_t>(
+      {plan.bucket_splats, uint64_t{1} << 24, UINT32_MAX / irregularRecordBytes(variables)});
   plan.bucket_bytes = plan.bucket_splats * regularRecordBytes(variables);
   return plan;
 }

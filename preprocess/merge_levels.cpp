@@ -11,6 +11,7 @@ namespace {
 
 constexpr int kOctantBits = kLatticeBits - 1;  // voxels along an edge of a child's cell
 constexpr size_t kOctantVoxels = size_t{1} << (3 * kOctantBits);
+constexpr uint64_t kOctantMask = (uint64_t{1} << kOctantBits) - 1;
 
 }  // namespace
 
@@ -30,17 +31,16 @@ void OctantMerger::begin(const Cell& child) {
 
 size_t OctantMerger::voxelOf(const RootPosition& position) const {
   size_t voxel = 0;
-  for (int bit = kOctantBits - 1; bit >= 0; --bit)
-    for (int axis = 2; axis >= 0; --axis) voxel = voxel * 2 + (position.at[axis] >> (shift_ + bit) & 1);
+  for (int axis = 2; axis >= 0; --axis)
+    voxel = voxel << kOctantBits | (position.at[axis] >> shift_ & kOctantMask);
   return voxel;
 }
 
 RootPosition OctantMerger::voxelCorner(size_t voxel) const {
   RootPosition corner;
   for (int axis = 0; axis < 3; ++axis) {
-    uint64_t at = child_.at[axis];
-    for (int bit = kOctantBits - 1; bit >= 0; --bit) at = at * 2 + (voxel >> (3 * bit + axis) & 1);
-    corner.at[axis] = at << shift_;
+    const uint64_t in_octant = voxel >> (axis * kOctantBits) & kOctantMask;
+    corner.at[axis] = (uint64_t{child_.at[axis]} << kOctantBits | in_octant) << shift_;
   }
   return corner;
 }

@@ -19,8 +19,6 @@ namespace {
 /// half the difference of the two is then the Jacobian's column in every case.
 struct Neighbours {
   std::array<ptrdiff_t, 3> before{}, after{};  // along i, j, k; <= 0 and >= 0
-
-  bool halfCell(int axis) const { return (before[axis] == 0) != (after[axis] == 0); }
 };
 
 /// What the nodes of a window have in common.
@@ -117,10 +115,15 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   for (int axis = 0; axis < 3; ++axis)
     jacobian[axis] = 0.5 * (position(at + neighbours.after[axis]) - position(at + neighbours.before[axis]));
 
-  // The middle of a half cell, in cells: a quarter of the one difference there is, inwards.
+  // Where the middle of the cell is from the node, in cells. The cell reaches half way to either neighbour,
+  // at distances a and b: its middle is (b - a) / 4 away, of a length of (a + b) / 2. With one neighbour
+  // only, that is a quarter of the difference, inwards.
   glm::dvec3 middle(0.0);
-  for (int axis = 0; axis < 3; ++axis)
-    if (neighbours.halfCell(axis)) middle[axis] = neighbours.before[axis] == 0 ? 0.5 : -0.5;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double a = glm::distance(node.node_position, position(at + neighbours.before[axis]));
+    const double b = glm::distance(node.node_position, position(at + neighbours.after[axis]));
+    if (a + b > 0) middle[axis] = 0.5 * (b - a) / (a + b);
+  }
   node.splat.position = node.node_position + jacobian * middle;
 
   const auto set_values = [&](const auto& rotate) {

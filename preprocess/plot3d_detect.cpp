@@ -75,9 +75,9 @@ class Detection {
     Plot3dFit& fit = found.fits.front();
     if (fit.trailing_bytes > 0 && !force_.blanking && trailingLooksLikeIblank(fit))
       throw Error(
-          "{}: {} of {} are followed by {} bytes that look like a truncated iblank; get the whole file, or "
-          "read it "
-          "without with --iblank no",
+          "{}: {} of {} is followed by {} bytes that look like a truncated iblank; get the whole file, or "
+          "read "
+          "it without iblank (--iblank no)",
           path_, curvisplat::inWords(fit.layout), curvisplat::inWords(fit.blocks), fit.trailing_bytes);
     return {std::move(fit), writtenPrecision(fit.layout)};
   }

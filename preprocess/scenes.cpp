@@ -214,7 +214,7 @@ SceneGridSource::SceneGridSource(std::shared_ptr<const Scene> scene, SceneGridSi
   CURVISPLAT_CHECK(coordinate_bytes == 4 || coordinate_bytes == 8);
   description_.format = fmt::format("analytic scene {}", scene_->name());
   description_.blocks = {{"block 1", size.ni, size.nj, size.nk, false}};
-  description_.scalars = {{"f", ""}};
+  description_.scalars = {{"f", "", {}}};
   description_.coordinate_bytes = coordinate_bytes;
   for (uint64_t i = 0; i < size.ni; ++i) of_i_.push_back(scene_->alongU(nodeCoordinate(i, size.ni)));
   for (uint64_t j = 0; j < size.nj; ++j) of_j_.push_back(scene_->alongV(nodeCoordinate(j, size.nj)));

@@ -9,11 +9,25 @@
 namespace curvisplat {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "48-bit words are the low bytes of 64-bit words");
+static_assert(std::endian::native == std::endian::little,
+              "words of 24 and 48 bits are the low bytes of larger ones");
 
 float toFloat(double value) {
   constexpr double kLargest = std::numeric_limits<float>::max();
   return static_cast<float>(std::clamp(value, -kLargest, kLargest));
+}
+
+// The 24 bits of a positive float that a record keeps of an axis.
+constexpr int kDroppedBits = 7;
+
+uint32_t axisBits(double axis) {
+  constexpr float kLargest = 0x1p127f;  // rounds up to no infinity
+  const float single = std::clamp(toFloat(axis), std::numeric_limits<float>::min(), kLargest);
+  return (std::bit_cast<uint32_t>(single) + (1u << (kDroppedBits - 1))) >> kDroppedBits;
+}
+
+double axisOf(uint32_t bits) {
+  return std::bit_cast<float>(bits << kDroppedBits);
 }
 
 double product(const std::array<double, 3>& axis) {
@@ -41,7 +55,11 @@ void packRecord(const NodeSplat& in, std::span<const SplatScalar> values, const 
   };
   putWord48(in.node | uint64_t{!in.regular} << 47);
   for (const uint64_t coordinate : position.at) putWord48(coordinate);
-  for (const double axis : in.splat.axis) putFloat(std::max<double>(axis, std::numeric_limits<float>::min()));
+  for (const double axis : in.splat.axis) {
+    const uint32_t bits = axisBits(axis);
+    std::memcpy(at, &bits, 3);
+    at += 3;
+  }
   for (const double shear : in.splat.shear) putFloat(shear);
   for (const SplatScalar& value : values) {
     putFloat(value.mean);
@@ -63,7 +81,12 @@ void unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScalar> 
     at += sizeof single;
     return static_cast<double>(single);
   };
-  for (double& axis : splat.axis) axis = takeFloat();
+  for (double& axis : splat.axis) {
+    uint32_t bits = 0;
+    std::memcpy(&bits, at, 3);
+    at += 3;
+    axis = axisOf(bits);
+  }
   for (double& shear : splat.shear) shear = takeFloat();
   for (SplatScalar& value : values) {
     value.mean = takeFloat();

@@ -1,15 +1,18 @@
-// A splat as conversion keeps it in temporary files and in a bucket's memory: 48 + 16 v bytes for v
-// variables, 4-byte aligned, in the machine's own byte order.
+// A splat as conversion keeps it in temporary files and in a bucket's memory: 45 + 16 v bytes for v
+// variables, not aligned, in the machine's own byte order.
 //
-//    0   node number: 47 bits, and bit 47 says "irregular"     3 x uint16
-//    6   position: x, y, z of 48 bits                          9 x uint16
-//   24   a0 a1 a2 l10 l20 l21                                  6 x float
-//   48   mean w0 w1 w2                                         4 x float a variable
+//    0   node number: 47 bits, and bit 47 says "irregular"     48 bits
+//    6   position: x, y, z                                     3 x 48 bits
+//   24   a0 a1 a2: floats > 0 without sign and last 7 bits     3 x 24 bits
+//   33   l10 l20 l21                                           3 x float
+//   45   mean w0 w1 w2                                         4 x float a variable
 //        irregular: weight / (a0 a1 a2)                        1 x float
 //                   variance                                   1 x float a variable
 //
 // What is not stored of a regular splat (nearly all are) follows from the rest: its weight is a0 a1 a2 and
 // its variances are 0. Records of one bucket follow one another; their lengths are known from their flag.
+// Axes are good to 8e-6; shears need all of float's digits, since a thin cell multiplies them by its aspect
+// ratio.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +31,7 @@ namespace curvisplat {
 inline constexpr uint64_t kMaxNodes = uint64_t{1} << 47;
 
 inline constexpr size_t regularRecordBytes(size_t variables) {
-  return 48 + 16 * variables;
+  return 45 + 16 * variables;
 }
 inline constexpr size_t irregularRecordBytes(size_t variables) {
   return regularRecordBytes(variables) + 4 + 4 * variables;

@@ -12,7 +12,7 @@
 // the next page. So small neighbours share a page, none is split without need, and a direct read fetches the
 // fewest pages. The gaps are zeros.
 //
-// The streams themselves are laid out in brick_codec.cpp and values_codec.cpp.
+// The streams themselves are laid out in geometry_codec.h and values_codec.h.
 #pragma once
 
 #include <array>

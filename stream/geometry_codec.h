@@ -22,15 +22,10 @@
 #include <vector>
 
 #include "stream/brick_codec.h"
+#include "stream/planes.h"
 #include "stream/prediction.h"
 
 namespace curvisplat {
-
-struct ArrayCode {
-  Predictor predictor = Predictor::none;
-  uint8_t planes = 0;
-};
-static_assert(sizeof(ArrayCode) == 2);
 
 inline constexpr uint8_t kRawShapes = 1, kRawWeights = 2;
 inline constexpr size_t kLargestGeometryArrays = 3 + 12 + 2;

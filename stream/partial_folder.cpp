@@ -45,9 +45,15 @@ PartialFolder::PartialFolder(fs::path target, bool overwrite)
   if (::mkdir(path_.c_str(), 0777) < 0 && errno != EEXIST)
     throw Error("{}: the folder cannot be made: {}; choose another output", path_.string(), reason());
   lock();
-  // What a killed conversion left goes; the lock stays.
-  for (const auto& entry : fs::directory_iterator(path_))
-    if (entry.path().filename() != kLockName) removeFolder(entry.path(), "rest of an unfinished conversion");
+  try {
+    // What a killed conversion left goes; the lock stays.
+    for (const auto& entry : fs::directory_iterator(path_))
+      if (entry.path().filename() != kLockName)
+        removeFolder(entry.path(), "rest of an unfinished conversion");
+  } catch (...) {
+    ::close(lock_);
+    throw;
+  }
 }
 
 PartialFolder::~PartialFolder() {

@@ -110,7 +110,7 @@ std::span<const std::byte> PlaneReader::bytes(size_t count) {
 }
 
 void PlaneReader::values(uint8_t planes, std::span<uint32_t> values) {
-  if (planes > 4) throw Error("an array of {} byte planes, where at most 4 fit", planes);
+  CURVISPLAT_CHECK_OP(planes, <=, 4);
   const size_t count = values.size();
   const auto* p = reinterpret_cast<const uint8_t*>(bytes(planes * count).data());
   uint32_t* v = values.data();

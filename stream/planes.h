@@ -8,7 +8,21 @@
 #include <span>
 #include <vector>
 
+#include "stream/prediction.h"
+
 namespace curvisplat {
+
+/// How one array is coded: a byte each in a stream's header.
+struct ArrayCode {
+  Predictor predictor = Predictor::none;
+  uint8_t planes = 0;
+};
+static_assert(sizeof(ArrayCode) == 2);
+
+/// False if untrusted bytes say something that no encoder would.
+inline bool isPossible(const ArrayCode& code) {
+  return static_cast<int>(code.predictor) < kPredictors && code.planes <= 4;
+}
 
 /// Collects bytes and planes, and compresses them behind a header. Uses one zstd context a thread.
 class PlaneWriter {

@@ -146,7 +146,8 @@ Predictor bestPredictor(std::span<const Row> sample, std::span<const double> val
   return cheapest([&](Predictor predictor) {
     uint64_t bits = 0;
     predictRows(predictor, sample, values.data(), [&](uint32_t n, double predicted) {
-      // A double's bits, exponent before mantissa, are its logarithm drawn with a ruler. Not a number is most.
+      // A double's bits, exponent before mantissa, are its logarithm drawn with a ruler. Not a number is
+      // most.
       bits += std::bit_cast<uint64_t>(1 + std::abs(values[n] - predicted) / steps[n]) >> 44;
       return values[n];
     });

@@ -158,8 +158,7 @@ void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, SplatV
   if (header.rows_bytes > kMostRowBytes * count) throw Error("its header is impossible");
   size_t unpacked = header.rows_bytes;
   for (const ArrayCode& array : header.arrays) {
-    if (static_cast<int>(array.predictor) >= kPredictors || array.planes > 4)
-      throw Error("its header is impossible");
+    if (!isPossible(array)) throw Error("its header is impossible");
     unpacked += size_t{array.planes} * count;
   }
   PlaneReader planes(bytes.subspan(sizeof header), unpacked);

@@ -17,7 +17,7 @@
 #include <span>
 #include <vector>
 
-#include "stream/geometry_codec.h"
+#include "stream/planes.h"
 #include "stream/prediction.h"
 #include "stream/splats.h"
 

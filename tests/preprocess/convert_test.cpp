@@ -336,10 +336,10 @@ TEST(Convert, LosesNothingWhenTheDiskIsFull) {
   convertQuietly(before_source, optionsFor(before_source, folder / "a.splats"));
   const auto before = filesOf(folder / "a.splats");
 
-  const FunctionGridSource source = bentBoxSource(60, 60, 60);
+  const FunctionGridSource source = bentBoxSource(44, 44, 44);
   ConvertOptions options = optionsFor(source, folder / "a.splats");
   options.overwrite = true;
-  options.bucket_splats = 40000;
+  options.bucket_splats = 20000;
   testing::FaultySystemCalls disk;
   {
     const ScopedSystemCalls scope(disk);
@@ -350,7 +350,7 @@ TEST(Convert, LosesNothingWhenTheDiskIsFull) {
   }
   const int64_t writes = disk.writes;
   ASSERT_GT(writes, 20);
-  for (int64_t at = 0; at < writes; at += std::max<int64_t>(1, writes / 25)) {
+  for (int64_t at = 0; at < writes; at += std::max<int64_t>(1, writes / 12)) {
     testing::FaultySystemCalls full;
     full.fail_write_at = at;
     const ScopedSystemCalls scope(full);

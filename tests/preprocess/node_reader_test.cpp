@@ -59,12 +59,13 @@ TEST(NodeReader, LeavesOrdinaryNodesThere) {
 
 /// Each reason at every place modulo the vector width and at the ends of the pieces; each node counts once.
 TEST(NodeReader, BlanksEveryNodeThatIsNotThere) {
-  constexpr size_t kCount = 9'000;
+  constexpr size_t kCount = 9'003;  // no multiple of a vector
   NodeArrays nodes = ordinaryNodes(kCount, 2);
   std::mt19937_64 random(5);
   BlankCounts expected;
   std::vector<uint8_t> blank(kCount);
-  for (const size_t n : {0ul, 1ul, 4095ul, 4096ul, 4097ul, 8191ul, 8192ul, 8999ul}) blank[n] = 1;
+  for (const size_t n : {0ul, 1ul, 4095ul, 4096ul, 4097ul, 8191ul, 8192ul, 8999ul, 9000ul, 9001ul, 9002ul})
+    blank[n] = 1;
   for (int n = 0; n < 60; ++n) blank[random() % kCount] = 1;
   for (size_t n = 0; n < kCount; ++n) {
     if (!blank[n]) continue;
@@ -88,6 +89,28 @@ TEST(NodeReader, BlanksEveryNodeThatIsNotThere) {
   EXPECT_EQ(counts.by_grid, expected.by_grid);
   EXPECT_EQ(counts.by_value, expected.by_value);
   EXPECT_EQ(counts.not_finite, expected.not_finite);
+}
+
+/// A single bad node has no other one near it that makes the reader look closer.
+TEST(NodeReader, FindsASingleBadNodeAnywhere) {
+  for (const size_t count : {1, 3, 16, 37, 4101}) {
+    const NodeArrays ordinary = ordinaryNodes(count, 1);
+    for (size_t bad = count > 100 ? count - 40 : 0; bad < count; ++bad)
+      for (int where = 0; where < 5; ++where) {
+        NodeArrays nodes = ordinary;
+        std::vector<double>* const axes[] = {&nodes.x, &nodes.y, &nodes.z};
+        if (where < 3) (*axes[where])[bad] = kInfinity;
+        if (where == 3) nodes.scalars[0][bad] = std::numeric_limits<float>::quiet_NaN();
+        if (where == 4) nodes.scalars[0][bad] = 5.5f;
+        const GivenNodes source(nodes);
+        NodeArrays out;
+        const BlankCounts counts = NodeReader(source, {0}, 5.5).read(0, kAll, out);
+        ASSERT_EQ(counts.by_value, where == 4);
+        ASSERT_EQ(counts.not_finite, where != 4);
+        ASSERT_EQ(out.blank[bad], 1) << bad << " of " << count;
+        ASSERT_EQ(std::count(out.blank.begin(), out.blank.end(), 1), 1);
+      }
+  }
 }
 
 TEST(NodeReader, LooksOnlyAtTheScalarsAskedFor) {

@@ -57,7 +57,7 @@ TEST(NodeSplats, OfAnAffineGridAreItsCellsAndSumToItsVolume) {
     EXPECT_EQ(inner.node, grid.at(2, 1, 3));
     EXPECT_TRUE(inner.regular);
     EXPECT_FALSE(inner.on_block_face);
-    EXPECT_EQ(inner.splat.position, inner.node_position);
+    EXPECT_LT(glm::distance(inner.splat.position, inner.node_position), 1e-13);
     EXPECT_LT(shapeError(inner.splat, jacobian), 1e-13);
 
     // A node of the edge i = 4, k = 0: half cells along i and k.
@@ -71,6 +71,23 @@ TEST(NodeSplats, OfAnAffineGridAreItsCellsAndSumToItsVolume) {
                 std::min({glm::length(jacobian[0]), glm::length(jacobian[1]), glm::length(jacobian[2])}),
                 1e-13);
   }
+}
+
+// Spectral elements: neighbouring cells 1.6 times as long as one another, again and again. Splats at the
+// nodes would lie at uneven distances, and a constant field would show stripes.
+TEST(NodeSplats, OfAnUnevenGridTileIt) {
+  const std::vector<double> x{0, 1, 2.6, 3.6, 4.3, 5.4, 6.1, 6.6};
+  const MappedBlock grid(
+      8, 3, 3, [&](double i, double j, double k) { return glm::dvec3(x[static_cast<size_t>(i)], j, k); });
+  const NodeSplats out = grid.splats();
+  double end = 0;
+  for (size_t i = 0; i < x.size(); ++i) {
+    const NodeSplat& node = out.splats[grid.at(i, 1, 1)];
+    EXPECT_NEAR(node.splat.position.x - 0.5 * node.splat.axis[0], end, 1e-12) << i;
+    end = node.splat.position.x + 0.5 * node.splat.axis[0];
+    EXPECT_NEAR(node.splat.position.y, 1, 1e-12);
+  }
+  EXPECT_NEAR(end, x.back(), 1e-12);
 }
 
 glm::dvec3 halfAnnulus(double u, double v, double w) {

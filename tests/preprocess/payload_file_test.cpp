@@ -80,9 +80,10 @@ TEST(PayloadFile, EveryMarkerIsChecked) {
       PayloadFile payload = openPayload(folder.write("records", damaged), layout);
       EXPECT_THROW(payload.nextRecord(), RecordMismatch) << byte;
     }
-  // The sign of a trailing marker, and a record that goes on for ever.
-  Bytes damaged = file;
-  damaged[44 + 3] ^= std::byte{0x80};
+  // A second subrecord that says it is a first one, and a record that goes on behind the end.
+  Bytes damaged = file, positive;
+  appendNumber(positive, 16, ByteOrder::little);
+  std::copy(positive.begin(), positive.end(), damaged.begin() + 44);
   EXPECT_THROW(openPayload(folder.write("records", damaged), layout).nextRecord(), RecordMismatch);
   damaged = file;
   damaged.resize(48);

@@ -2,6 +2,7 @@
 // refuses them in words, or says in a warning what it has ignored; it never reads shifted data.
 #include <gtest/gtest.h>
 
+#include <cerrno>
 #include <random>
 
 #include "preprocess/open_grid.h"
@@ -233,6 +234,38 @@ TEST(Plot3dDamage, WrongKindsAreNamed) {
   layout.kind = Plot3dKind::q;
   const std::string as_grid = errorOf(folder, plot3dBytes(layout, {testBlock(6, 5, 4, 5)}));
   EXPECT_NE(as_grid.find("it would fit as a Q solution of 1 block of 6x5x4"), std::string::npos) << as_grid;
+}
+
+/// A disk whose blocks from some offset on cannot be read.
+class BadDisk : public SystemCalls {
+ public:
+  explicit BadDisk(int64_t good_bytes) : good_bytes_(good_bytes) {}
+  ssize_t pread(int fd, void* to, size_t count, int64_t offset) override {
+    if (offset + static_cast<int64_t>(count) <= good_bytes_) return SystemCalls::pread(fd, to, count, offset);
+    errno = EIO;
+    return -1;
+  }
+
+ private:
+  int64_t good_bytes_;
+};
+
+TEST(Plot3dDamage, AFailingDiskIsNoQuestionOfLayout) {
+  const TestFolder folder("bad-disk");
+  const Plot3dLayout layout{Plot3dKind::grid, false, kBig, kFortran, 4, true, false};
+  const Bytes file = plot3dBytes(layout, {testBlock(9, 8, 7, 0), testBlock(3, 3, 3, 0)});
+  for (const int64_t good : {2, 20, 70, 6000, 6200}) {
+    OpenGridOptions options;
+    options.grid = folder.write("grid", file);
+    BadDisk disk(good);
+    const ScopedSystemCalls scope(disk);
+    try {
+      openGrid(options);
+      FAIL() << good;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("reading"), std::string::npos) << error.what();
+    }
+  }
 }
 
 TEST(Plot3dDamage, EmptyFilesAreNamed) {

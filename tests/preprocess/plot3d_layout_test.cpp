@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <thread>
 
 #include "preprocess/open_grid.h"
 #include "stream/error.h"
@@ -172,6 +173,23 @@ TEST(Plot3dLayouts, ForcingAnythingElseIsRefusedAndTheLayoutNamed) {
     if (force.ascii) continue;
     EXPECT_NE(error.find(inWords(layout)), std::string::npos) << error;
   }
+}
+
+TEST(Plot3dLayouts, ThreadsReadAtOnce) {
+  const TestFolder folder("threads");
+  const Plot3dLayout layout{Plot3dKind::grid, false, ByteOrder::big, RecordMarkers::bytes4, 4, true, true};
+  const auto blocks = blocksFor(layout, 5);
+  folder.write("a.xyz", plot3dBytes(layout, blocks, 101));
+  const auto source = openGrid(optionsFor(folder, "a.xyz"));
+  std::vector<std::thread> threads;
+  for (uint32_t t = 0; t < 4; ++t)
+    threads.emplace_back([&, t] {
+      for (uint32_t n = 0; n < 50; ++n) {
+        const uint32_t b = (n + t) % 3;
+        expectBox(*source, b, {0, blocks[b].nj, n % blocks[b].nk, blocks[b].nk}, blocks[b], true, {}, {});
+      }
+    });
+  for (std::thread& thread : threads) thread.join();
 }
 
 /// Small sizes make coincidences between layouts likely.

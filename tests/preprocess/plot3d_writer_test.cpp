@@ -34,7 +34,7 @@ class NumberedGrid : public GridSource {
  public:
   NumberedGrid() {
     description_.blocks = {{"block 1", 2, 3, 4, false}, {"block 2", 5, 2, 2, true}};
-    description_.scalars = {{"p", ""}, {"T", "K"}};
+    description_.scalars = {{"p", "", {}}, {"T", "K", {}}};
   }
   const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,

@@ -7,6 +7,7 @@
 #include "stream/cache_reader.h"
 #include "stream/error.h"
 #include "tests/stream/test_bricks.h"
+#include "tests/support/faulty_system_calls.h"
 
 namespace curvisplat {
 namespace {
@@ -206,6 +207,56 @@ TEST(Cache, OverwritesNothingButCaches) {
 
 TEST(Cache, AnUnwritableOutputIsAnError) {
   EXPECT_PRED2(says, errorOf([] { SmallCache().write("/proc/a.splats"); }), "/proc/a.splats");
+}
+
+/// Each write, sync and rename fails in turn: an Error, the old cache as it was, and nothing left behind.
+TEST(Cache, AFullDiskLosesNothing) {
+  const TemporaryFolder folder;
+  const fs::path path = folder / "a.splats";
+  SmallCache().write(path);
+  const std::string old = bytesOfFile(path / "manifest.json") + bytesOfFile(path / "geometry.bin");
+  for (int64_t testing::FaultySystemCalls::*const failing :
+       {&testing::FaultySystemCalls::fail_write_at, &testing::FaultySystemCalls::fail_sync_at,
+        &testing::FaultySystemCalls::fail_rename_at}) {
+    int64_t number = 0;
+    for (bool failed = true; failed; ++number) {
+      testing::FaultySystemCalls calls;
+      calls.*failing = number;
+      const ScopedSystemCalls scoped(calls);
+      const std::string error = errorOf([&] { SmallCache().write(path, true, 2); });
+      failed = !error.empty();
+      if (failed) {
+        ASSERT_PRED2(says, error, "No space left");
+      }
+      // The last sync comes after the cache is in its place.
+      const std::string now = bytesOfFile(path / "manifest.json") + bytesOfFile(path / "geometry.bin");
+      if (failed && calls.renames < 2) {
+        ASSERT_EQ(now, old);
+      }
+      ASSERT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
+    }
+    EXPECT_GT(number, 2);
+    SmallCache().write(path, true);
+  }
+}
+
+class NoExchange : public SystemCalls {
+  int exchange(const char*, const char*) override {
+    errno = EINVAL;
+    return -1;
+  }
+};
+
+TEST(Cache, OverwritesWhereNamesCannotBeSwapped) {
+  const TemporaryFolder folder;
+  const fs::path path = folder / "a.splats";
+  SmallCache().write(path);
+  const std::string old = bytesOfFile(path / "geometry.bin");
+  NoExchange calls;
+  const ScopedSystemCalls scoped(calls);
+  SmallCache().write(path, true, 2);
+  EXPECT_NE(bytesOfFile(path / "geometry.bin"), old);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
 }
 
 TEST(Cache, ADamagedPayloadNamesItsBrick) {

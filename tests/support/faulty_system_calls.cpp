@@ -41,4 +41,10 @@ int FaultySystemCalls::rename(const char* from, const char* to) {
   return SystemCalls::rename(from, to);
 }
 
+int FaultySystemCalls::exchange(const char* a, const char* b) {
+  const int64_t number = renames++;
+  if (fail_rename_at >= 0 && number >= fail_rename_at) return fail();
+  return SystemCalls::exchange(a, b);
+}
+
 }  // namespace curvisplat::testing

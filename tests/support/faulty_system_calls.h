@@ -26,6 +26,7 @@ class FaultySystemCalls : public SystemCalls {
   ssize_t pwrite(int fd, const void* from, size_t count, int64_t offset) override;
   int fsync(int fd) override;
   int rename(const char* from, const char* to) override;
+  int exchange(const char* a, const char* b) override;  // counts as a rename
 
  private:
   bool interrupted();
