@@ -13,7 +13,8 @@ namespace {
 
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
-// The program with its libraries, thread stacks and index records; and of the cap what the allocator holds back.
+// The program with its libraries, thread stacks and index records; and of the cap what the allocator holds
+// back.
 constexpr uint64_t kProgramBytes = 64 * kMiB;
 constexpr uint64_t kAllocatorShare = 16;
 // Buckets are built from at least so many splats: some bricks at a time for each thread to work on.
