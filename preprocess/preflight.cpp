@@ -11,6 +11,7 @@
 #include "preprocess/splat_record.h"
 #include "preprocess/value_record.h"
 #include "stream/error.h"
+#include "stream/partial_folder.h"
 
 namespace curvisplat {
 namespace {
@@ -74,9 +75,7 @@ void checkWritable(const std::filesystem::path& folder, const char* hint) {
 
 void checkOutput(const std::filesystem::path& output, bool overwrite,
                  const std::filesystem::path& temporary_folder) {
-  std::error_code error;
-  if (!overwrite && std::filesystem::exists(std::filesystem::symlink_status(output, error)))
-    throw Error("{}: exists; remove it, name another output, or say --overwrite", output.string());
+  checkReplaceable(output, overwrite);
   checkWritable(folderOf(output), "");
   checkWritable(temporary_folder, "; name another folder with --tmp");
 }

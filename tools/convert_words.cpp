@@ -31,8 +31,11 @@ double secondsOf(const Progress& progress) {
 void addPhases(const Progress& progress, nlohmann::json& json) {
   json["seconds"] = secondsOf(progress);
   for (const Progress::Phase& phase : progress.phases())
-    json["phases"].push_back(
-        {{"name", phase.name}, {"seconds", phase.seconds}, {"steps", phase.steps}, {"unit", phase.unit}});
+    json["phases"].push_back({{"name", phase.name},
+                              {"seconds", phase.seconds},
+                              {"cpu_seconds", phase.cpu_seconds},
+                              {"steps", phase.steps},
+                              {"unit", phase.unit}});
 }
 
 double mebibytes(uint64_t bytes) {
