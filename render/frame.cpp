@@ -13,8 +13,9 @@
 #include "render/kernel.h"
 #include "render/screen_view.h"
 #include "render/segment_ring.h"
-#include "stream/stage_timer.h"
 #include "stream/cut.h"
+#include "stream/error.h"
+#include "stream/stage_timer.h"
 
 namespace curvisplat {
 namespace {
@@ -22,6 +23,11 @@ namespace {
 // The perspective near plane's distance, in diagonals of the data. What is nearer would fill the image many
 // times over, cut into very many pieces.
 constexpr double kNearInDiagonals = 1e-4;
+
+// What a first picture is made of: little enough for a tenth of a second of reading from a slow disk, and of
+// drawing in software.
+constexpr uint64_t kFirstPictureBytes = 4 << 20;
+constexpr uint64_t kFirstPictureSplats = 200'000;
 
 ClassificationTable tableFor(const CacheReader& cache, size_t variable,
                              const TransferFunction& transfer_function) {
@@ -47,6 +53,13 @@ TransparentBounds transparentIn(const ClassificationTable& table, const Projecti
   };
 }
 
+CutOptions limitsOf(const FrameOptions& options) {
+  CutOptions limits;
+  limits.lod_pixels = options.lod_pixels;
+  limits.max_splats = options.max_splats.value_or(CutOptions::kNoLimit);
+  return limits;
+}
+
 }  // namespace
 
 struct FrameRenderer::State {
@@ -61,10 +74,15 @@ struct FrameRenderer::State {
     gl.run([this](const GlContext&) { painter.reset(); });
   }
 
-  Cut plan(const ProjectionSettings& settings, double lod_pixels) const {
-    return chooseCut(cache.manifest().root, cache.bricks(), cache.brickVariables(variable), subtrees,
-                     settings.view.cutView(), transparentIn(table, settings), lod_pixels);
+  Cut plan(const ProjectionSettings& settings, const CutOptions& options) const {
+    const CutTree tree{cache.manifest().root, cache.bricks(), cache.brickVariables(variable), subtrees};
+    return chooseCut(tree, settings.view.cutView(), transparentIn(table, settings), options);
   }
+
+  /// Draws what `limits` leave of the frame. Overwrites `statistics`. `complete`: whether they left all of
+  /// it.
+  Image draw(const Camera& camera, const FrameOptions& options, const CutOptions& limits,
+             FrameStatistics& statistics, Progress* progress, bool& complete);
 
   uint64_t indexBytes() const {
     return cache.bricks().size() *
@@ -89,54 +107,76 @@ const std::string& FrameRenderer::backendName() const {
   return state_->gl.contextName();
 }
 
-Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
-                            Progress* progress) {
-  State& state = *state_;
+Image FrameRenderer::State::draw(const Camera& camera, const FrameOptions& options, const CutOptions& limits,
+                                 FrameStatistics& statistics, Progress* progress, bool& complete) {
   statistics = {};
   Image image;
   {
     const StageTimer total(statistics.total_s);
-    const ProjectionSettings settings = settingsFor(state.cache.manifest(), camera, options);
+    const ProjectionSettings settings = settingsFor(cache.manifest(), camera, options);
     const FrameBudget budget =
-        FrameBudget::of(options.memory_bytes, state.indexBytes(), options.size, options.threads);
+        FrameBudget::of(options.memory_bytes, indexBytes(), options.size, options.threads);
     Cut cut;
     {
       const StageTimer timer(statistics.plan_s);
-      cut = state.plan(settings, options.lod_pixels);
+      cut = plan(settings, limits);
     }
-    if (progress) progress->begin("drawing", cut.bricks.size(), "bricks");
+    if (options.max_splats && cut.splats > *options.max_splats)
+      throw UsageError(
+          "{} splats are too few: the coarsest picture of this cache takes {}; give --max-splats that",
+          *options.max_splats, cut.splats);
+    complete = cut.complete;
+    if (progress) progress->begin("drawing", cut.parts.size(), "bricks");
 
     SegmentRing ring(budget.ring_splats);
-    FrameWorkers workers({state.cache, state.variable, cut.bricks, settings, state.table}, ring,
-                         budget.workers);
-    state.gl.run([&](const GlContext&) {
-      state.painter->begin(options.size, options.background, state.table, settings.per_pixel);
-      for (size_t drawn = 0; drawn < cut.bricks.size(); ++drawn) {
+    FrameWorkers workers({cache, variable, cut.parts, settings, table}, ring, budget.workers);
+    gl.run([&](const GlContext&) {
+      painter->begin(options.size, options.background, table, settings.per_pixel);
+      for (size_t drawn = 0; drawn < cut.parts.size(); ++drawn) {
         std::optional<std::span<const ScreenSplat>> segment;
         {
           const StageTimer timer(statistics.painter_waited_s);
           segment = ring.next();
         }
         if (!segment) return;  // a worker has failed
-        state.painter->draw(*segment);
+        painter->draw(*segment);
         ring.release();
         if (progress) progress->advance(1);
       }
-      image = state.painter->end();
+      image = painter->end();
     });
     workers.finish(statistics);
     if (progress) progress->end();
 
-    statistics.upload_s = state.painter->uploadSeconds();
-    statistics.draw_s = state.painter->drawSeconds();
-    statistics.bricks_drawn = cut.bricks.size();
+    statistics.upload_s = painter->uploadSeconds();
+    statistics.draw_s = painter->drawSeconds();
+    statistics.bricks_drawn = cut.parts.size();
     statistics.bricks_out_of_image = cut.out_of_image;
     statistics.bricks_transparent = cut.transparent;
     statistics.bricks_culled = cut.out_of_image + cut.transparent;
     statistics.largest_level = static_cast<int>(cut.deepest_level);
+    statistics.largest_error_px = cut.largest_error_px;
     statistics.workers = budget.workers;
   }
   return image;
+}
+
+Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
+                            Progress* progress) {
+  bool complete = false;
+  return state_->draw(camera, options, limitsOf(options), statistics, progress, complete);
+}
+
+void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions& options,
+                                        FrameStatistics& statistics, const ShowPicture& show,
+                                        Progress* progress) {
+  CutOptions first = limitsOf(options);
+  first.max_splats = std::min(first.max_splats, kFirstPictureSplats);
+  first.max_bytes = kFirstPictureBytes;
+  bool complete = false;
+  const Image image = state_->draw(camera, options, first, statistics, progress, complete);
+  show(image, complete);
+  if (!complete) show(render(camera, options, statistics, progress), true);
 }
 
 }  // namespace curvisplat
