@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "render/classification.h"
+#include "render/first_picture.h"
 #include "render/frame_budget.h"
 #include "render/frame_workers.h"
 #include "render/gl_painter.h"
@@ -23,11 +24,6 @@ namespace {
 // The perspective near plane's distance, in diagonals of the data. What is nearer would fill the image many
 // times over, cut into very many pieces.
 constexpr double kNearInDiagonals = 1e-4;
-
-// What a first picture is made of: little enough for a tenth of a second of reading from a slow disk, and of
-// drawing in software.
-constexpr uint64_t kFirstPictureBytes = 4 << 20;
-constexpr uint64_t kFirstPictureSplats = 200'000;
 
 ClassificationTable tableFor(const CacheReader& cache, size_t variable,
                              const TransferFunction& transfer_function) {
@@ -74,15 +70,11 @@ struct FrameRenderer::State {
     gl.run([this](const GlContext&) { painter.reset(); });
   }
 
-  Cut plan(const ProjectionSettings& settings, const CutOptions& options) const {
-    const CutTree tree{cache.manifest().root, cache.bricks(), cache.brickVariables(variable), subtrees};
-    return chooseCut(tree, settings.view.cutView(), transparentIn(table, settings), options);
-  }
-
-  /// Draws what `limits` leave of the frame. Overwrites `statistics`. `complete`: whether they left all of
-  /// it.
-  Image draw(const Camera& camera, const FrameOptions& options, const CutOptions& limits,
-             FrameStatistics& statistics, Progress* progress, bool& complete);
+  Cut planFor(const Camera& camera, const FrameOptions& options, const CutOptions& limits,
+              FrameStatistics& statistics) const;
+  /// Adds to `statistics`.
+  Image draw(const Camera& camera, const FrameOptions& options, const Cut& cut, FrameStatistics& statistics,
+             Progress* progress);
 
   uint64_t indexBytes() const {
     return cache.bricks().size() *
@@ -107,76 +99,86 @@ const std::string& FrameRenderer::backendName() const {
   return state_->gl.contextName();
 }
 
-Image FrameRenderer::State::draw(const Camera& camera, const FrameOptions& options, const CutOptions& limits,
-                                 FrameStatistics& statistics, Progress* progress, bool& complete) {
-  statistics = {};
+Cut FrameRenderer::State::planFor(const Camera& camera, const FrameOptions& options, const CutOptions& limits,
+                                  FrameStatistics& statistics) const {
+  const StageTimer timer(statistics.plan_s);
+  const CutTree tree{cache.manifest().root, cache.bricks(), cache.brickVariables(variable), subtrees};
+  const ProjectionSettings settings = settingsFor(cache.manifest(), camera, options);
+  Cut cut = chooseCut(tree, settings.view.cutView(), transparentIn(table, settings), limits);
+  if (options.max_splats && cut.splats > *options.max_splats)
+    throw UsageError(
+        "{} splats are too few: the coarsest picture of this cache takes {}; give --max-splats that",
+        *options.max_splats, cut.splats);
+  return cut;
+}
+
+Image FrameRenderer::State::draw(const Camera& camera, const FrameOptions& options, const Cut& cut,
+                                 FrameStatistics& statistics, Progress* progress) {
   Image image;
-  {
-    const StageTimer total(statistics.total_s);
-    const ProjectionSettings settings = settingsFor(cache.manifest(), camera, options);
-    const FrameBudget budget =
-        FrameBudget::of(options.memory_bytes, indexBytes(), options.size, options.threads);
-    Cut cut;
-    {
-      const StageTimer timer(statistics.plan_s);
-      cut = plan(settings, limits);
-    }
-    if (options.max_splats && cut.splats > *options.max_splats)
-      throw UsageError(
-          "{} splats are too few: the coarsest picture of this cache takes {}; give --max-splats that",
-          *options.max_splats, cut.splats);
-    complete = cut.complete;
-    if (progress) progress->begin("drawing", cut.parts.size(), "bricks");
+  const ProjectionSettings settings = settingsFor(cache.manifest(), camera, options);
+  const FrameBudget budget =
+      FrameBudget::of(options.memory_bytes, indexBytes(), options.size, options.threads);
+  if (progress) progress->begin("drawing", cut.parts.size(), "bricks");
 
-    SegmentRing ring(budget.ring_splats);
-    FrameWorkers workers({cache, variable, cut.parts, settings, table}, ring, budget.workers);
-    gl.run([&](const GlContext&) {
-      painter->begin(options.size, options.background, table, settings.per_pixel);
-      for (size_t drawn = 0; drawn < cut.parts.size(); ++drawn) {
-        std::optional<std::span<const ScreenSplat>> segment;
-        {
-          const StageTimer timer(statistics.painter_waited_s);
-          segment = ring.next();
-        }
-        if (!segment) return;  // a worker has failed
-        painter->draw(*segment);
-        ring.release();
-        if (progress) progress->advance(1);
+  SegmentRing ring(budget.ring_splats);
+  FrameWorkers workers({cache, variable, cut.parts, settings, table}, ring, budget.workers);
+  gl.run([&](const GlContext&) {
+    painter->begin(options.size, options.background, table, settings.per_pixel);
+    for (size_t drawn = 0; drawn < cut.parts.size(); ++drawn) {
+      std::optional<std::span<const ScreenSplat>> segment;
+      {
+        const StageTimer timer(statistics.painter_waited_s);
+        segment = ring.next();
       }
-      image = painter->end();
-    });
-    workers.finish(statistics);
-    if (progress) progress->end();
+      if (!segment) return;  // a worker has failed
+      painter->draw(*segment);
+      ring.release();
+      if (progress) progress->advance(1);
+    }
+    image = painter->end();
+  });
+  workers.finish(statistics);
+  if (progress) progress->end();
 
-    statistics.upload_s = painter->uploadSeconds();
-    statistics.draw_s = painter->drawSeconds();
-    statistics.bricks_drawn = cut.parts.size();
-    statistics.bricks_out_of_image = cut.out_of_image;
-    statistics.bricks_transparent = cut.transparent;
-    statistics.bricks_culled = cut.out_of_image + cut.transparent;
-    statistics.largest_level = static_cast<int>(cut.deepest_level);
-    statistics.largest_error_px = cut.largest_error_px;
-    statistics.workers = budget.workers;
-  }
+  statistics.upload_s = painter->uploadSeconds();
+  statistics.draw_s = painter->drawSeconds();
+  statistics.bricks_drawn = cut.parts.size();
+  statistics.bricks_out_of_image = cut.out_of_image;
+  statistics.bricks_transparent = cut.transparent;
+  statistics.bricks_culled = cut.out_of_image + cut.transparent;
+  statistics.largest_level = static_cast<int>(cut.deepest_level);
+  statistics.largest_error_px = cut.largest_error_px;
+  statistics.workers = budget.workers;
   return image;
 }
 
 Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                             Progress* progress) {
-  bool complete = false;
-  return state_->draw(camera, options, limitsOf(options), statistics, progress, complete);
+  statistics = {};
+  const StageTimer total(statistics.total_s);
+  const Cut cut = state_->planFor(camera, options, limitsOf(options), statistics);
+  return state_->draw(camera, options, cut, statistics, progress);
 }
 
 void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions& options,
                                         FrameStatistics& statistics, const ShowPicture& show,
                                         Progress* progress) {
-  CutOptions first = limitsOf(options);
-  first.max_splats = std::min(first.max_splats, kFirstPictureSplats);
-  first.max_bytes = kFirstPictureBytes;
-  bool complete = false;
-  const Image image = state_->draw(camera, options, first, statistics, progress, complete);
-  show(image, complete);
-  if (!complete) show(render(camera, options, statistics, progress), true);
+  statistics = {};
+  Image first;
+  bool is_final = false;
+  {
+    const StageTimer total(statistics.total_s);
+    const Cut cut = state_->planFor(camera, options, firstPictureLimits(limitsOf(options)), statistics);
+    is_final = cut.complete;
+    const ReducedSize reduced(options.size, is_final ? 0 : cut.largest_error_px);
+    FrameOptions first_options = options;
+    first_options.size = reduced.size();
+    first = state_->draw(camera, first_options, cut, statistics, progress);
+    if (!reduced.isWhole()) first = reduced.enlarge(first);
+  }
+  show(first, is_final);
+  first = Image();
+  if (!is_final) show(render(camera, options, statistics, progress), true);
 }
 
 }  // namespace curvisplat
