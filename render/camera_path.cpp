@@ -78,18 +78,19 @@ Camera orbited(const Camera& camera, double degrees) {
   return moved;
 }
 
-CameraPath::CameraPath(std::vector<KeyFrame> key_frames, const std::string& name)
-    : key_frames_(std::move(key_frames)) {
-  if (key_frames_.empty()) throw Error("{}: a camera path needs one key frame or more, found none", name);
+CameraPath::CameraPath(std::vector<KeyFrame> key_frames, std::string name)
+    : key_frames_(std::move(key_frames)), name_(std::move(name)) {
+  if (key_frames_.empty()) throw Error("{}: a camera path needs one key frame or more, found none", name_);
   for (size_t n = 1; n < key_frames_.size(); ++n) {
     if (!(key_frames_[n].time - key_frames_[n - 1].time >= kLeastSpan))
       throw Error(
-          "{}: key frame {} is at time {} and the one before it at {}; times must increase by a microsecond or "
+          "{}: key frame {} is at time {} and the one before it at {}; times must increase by a microsecond "
+          "or "
           "more",
-          name, n, key_frames_[n].time, key_frames_[n - 1].time);
+          name_, n, key_frames_[n].time, key_frames_[n - 1].time);
     if (key_frames_[n].camera.projection != key_frames_[0].camera.projection)
       throw Error(
-          "{}: key frame {} is {} and the first one is not; a path has one kind of camera", name, n,
+          "{}: key frame {} is {} and the first one is not; a path has one kind of camera", name_, n,
           key_frames_[n].camera.projection == Projection::perspective ? "perspective" : "orthographic");
   }
 }
@@ -109,6 +110,10 @@ Camera CameraPath::at(double time) const {
   Camera camera = a.camera;
   camera.position = track.position;
   camera.focal_point = track.focal_point;
+  if (camera.position == camera.focal_point)
+    throw Error(
+        "{}: at time {}, after key frame {}, the camera passes through its focal point; add a key frame",
+        name_, time, n);
   if (camera.projection == Projection::orthographic)
     camera.parallel_scale = std::exp(track.zoom);
   else

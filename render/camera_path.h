@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "render/camera.h"
@@ -28,8 +29,9 @@ struct KeyFrame {
 /// speed, so that it never loses its length; between opposite ones it rolls about the line of sight.
 class CameraPath {
  public:
-  /// At least one key frame; times increase by a microsecond or more; all of one projection. `name` is for messages. Throws Error.
-  CameraPath(std::vector<KeyFrame> key_frames, const std::string& name);
+  /// At least one key frame; times increase by a microsecond or more; all of one projection. `name` is for
+  /// messages. Throws Error.
+  CameraPath(std::vector<KeyFrame> key_frames, std::string name);
 
   /// Reads the JSON that render/README.md describes. Throws Error naming the file, the key frame and the
   /// field.
@@ -37,11 +39,13 @@ class CameraPath {
 
   double begin() const { return key_frames_.front().time; }
   double end() const { return key_frames_.back().time; }
-  /// Before begin() as at begin(), and after end() as at end().
+  /// Before begin() as at begin(), and after end() as at end(). Throws Error where the way leads the camera
+  /// into its focal point.
   Camera at(double time) const;
 
  private:
   std::vector<KeyFrame> key_frames_;
+  std::string name_;
 };
 
 }  // namespace curvisplat

@@ -31,10 +31,11 @@ ClassificationTable tableFor(const CacheReader& cache, size_t variable,
   return ClassificationTable::of(transfer_function, info.min, info.max);
 }
 
-ProjectionSettings settingsFor(const Manifest& manifest, const Camera& camera, const FrameOptions& options) {
+ProjectionSettings settingsFor(const Manifest& manifest, const Camera& camera, const FrameOptions& options,
+                               ImageSize size) {
   const double diagonal = glm::length(options.scale * (manifest.upper - manifest.lower));
   const double near = kNearInDiagonals * (diagonal > 0 ? diagonal : manifest.root.size);
-  return {ScreenView::of(camera, options.size, options.scale, options.low_pass_px2, near),
+  return {ScreenView::of(camera, size, options.scale, options.low_pass_px2, near),
           options.classification == Classification::pixel, options.clip_box};
 }
 
@@ -70,11 +71,11 @@ struct FrameRenderer::State {
     gl.run([this](const GlContext&) { painter.reset(); });
   }
 
-  Cut planFor(const Camera& camera, const FrameOptions& options, const CutOptions& limits,
-              FrameStatistics& statistics) const;
-  /// Adds to `statistics`.
-  Image draw(const Camera& camera, const FrameOptions& options, const Cut& cut, FrameStatistics& statistics,
-             Progress* progress);
+  /// Throws UsageError if options.max_splats are too few.
+  Cut plan(const ProjectionSettings& settings, const FrameOptions& options, const CutOptions& limits) const;
+  /// The picture has the size of settings.view; memory is shared out for one of options.size.
+  Image draw(const Cut& cut, const ProjectionSettings& settings, const FrameOptions& options,
+             FrameStatistics& statistics, Progress* progress);
 
   uint64_t indexBytes() const {
     return cache.bricks().size() *
@@ -99,11 +100,9 @@ const std::string& FrameRenderer::backendName() const {
   return state_->gl.contextName();
 }
 
-Cut FrameRenderer::State::planFor(const Camera& camera, const FrameOptions& options, const CutOptions& limits,
-                                  FrameStatistics& statistics) const {
-  const StageTimer timer(statistics.plan_s);
+Cut FrameRenderer::State::plan(const ProjectionSettings& settings, const FrameOptions& options,
+                               const CutOptions& limits) const {
   const CutTree tree{cache.manifest().root, cache.bricks(), cache.brickVariables(variable), subtrees};
-  const ProjectionSettings settings = settingsFor(cache.manifest(), camera, options);
   Cut cut = chooseCut(tree, settings.view.cutView(), transparentIn(table, settings), limits);
   if (options.max_splats && cut.splats > *options.max_splats)
     throw UsageError(
@@ -112,10 +111,10 @@ Cut FrameRenderer::State::planFor(const Camera& camera, const FrameOptions& opti
   return cut;
 }
 
-Image FrameRenderer::State::draw(const Camera& camera, const FrameOptions& options, const Cut& cut,
-                                 FrameStatistics& statistics, Progress* progress) {
+Image FrameRenderer::State::draw(const Cut& cut, const ProjectionSettings& settings,
+                                 const FrameOptions& options, FrameStatistics& statistics,
+                                 Progress* progress) {
   Image image;
-  const ProjectionSettings settings = settingsFor(cache.manifest(), camera, options);
   const FrameBudget budget =
       FrameBudget::of(options.memory_bytes, indexBytes(), options.size, options.threads);
   if (progress) progress->begin("drawing", cut.parts.size(), "bricks");
@@ -123,7 +122,7 @@ Image FrameRenderer::State::draw(const Camera& camera, const FrameOptions& optio
   SegmentRing ring(budget.ring_splats);
   FrameWorkers workers({cache, variable, cut.parts, settings, table}, ring, budget.workers);
   gl.run([&](const GlContext&) {
-    painter->begin(options.size, options.background, table, settings.per_pixel);
+    painter->begin(settings.view.size, options.background, table, settings.per_pixel);
     for (size_t drawn = 0; drawn < cut.parts.size(); ++drawn) {
       std::optional<std::span<const ScreenSplat>> segment;
       {
@@ -156,8 +155,13 @@ Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, F
                             Progress* progress) {
   statistics = {};
   const StageTimer total(statistics.total_s);
-  const Cut cut = state_->planFor(camera, options, limitsOf(options), statistics);
-  return state_->draw(camera, options, cut, statistics, progress);
+  const ProjectionSettings settings = settingsFor(state_->cache.manifest(), camera, options, options.size);
+  Cut cut;
+  {
+    const StageTimer timer(statistics.plan_s);
+    cut = state_->plan(settings, options, limitsOf(options));
+  }
+  return state_->draw(cut, settings, options, statistics, progress);
 }
 
 void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions& options,
@@ -168,12 +172,17 @@ void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions
   bool is_final = false;
   {
     const StageTimer total(statistics.total_s);
-    const Cut cut = state_->planFor(camera, options, firstPictureLimits(limitsOf(options)), statistics);
+    const Manifest& manifest = state_->cache.manifest();
+    ProjectionSettings settings = settingsFor(manifest, camera, options, options.size);
+    Cut cut;
+    {
+      const StageTimer timer(statistics.plan_s);
+      cut = state_->plan(settings, options, firstPictureLimits(limitsOf(options)));
+    }
     is_final = cut.complete;
     const ReducedSize reduced(options.size, is_final ? 0 : cut.largest_error_px);
-    FrameOptions first_options = options;
-    first_options.size = reduced.size();
-    first = state_->draw(camera, first_options, cut, statistics, progress);
+    if (!reduced.isWhole()) settings = settingsFor(manifest, camera, options, reduced.size());
+    first = state_->draw(cut, settings, options, statistics, progress);
     if (!reduced.isWhole()) first = reduced.enlarge(first);
   }
   show(first, is_final);
