@@ -102,8 +102,11 @@ nlohmann::json statistics(const ConvertReport& report, const Progress& progress)
   json["temporary_bytes"] = report.temporary_bytes;
   json["seconds"] = secondsOf(progress);
   for (const Progress::Phase& phase : progress.phases())
-    json["phases"].push_back(
-        {{"name", phase.name}, {"seconds", phase.seconds}, {"steps", phase.steps}, {"unit", phase.unit}});
+    json["phases"].push_back({{"name", phase.name},
+                              {"seconds", phase.seconds},
+                              {"cpu_seconds", phase.cpu_seconds},
+                              {"steps", phase.steps},
+                              {"unit", phase.unit}});
   for (const FileReport& file : report.files) json["files"][file.name] = file.bytes;
   json["cache_bytes"] = bytesOf(report);
   return json;
