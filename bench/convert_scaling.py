@@ -74,7 +74,8 @@ def report(results):
               f"cap {result['memory_bytes'] / 2**20:.0f} MiB")
         print(f"  rate        {nodes / result['seconds'] / 1e6:8.2f} M nodes/s ({result['seconds']:.1f} s)")
         for phase in result["phases"]:
-            print(f"  {phase['name']:<10}  {phase['seconds']:8.2f} s  {100 * phase['seconds'] / result['seconds']:5.1f} %")
+            print(f"  {phase['name']:<10}  {phase['seconds']:8.2f} s  {100 * phase['seconds'] / result['seconds']:5.1f} %  "
+                  f"{phase['cpu_seconds']:8.2f} s of CPU")
         print(f"  peak        {result['peak_memory_bytes'] / 2**20:8.1f} MiB")
         print(f"  temporary   {result['temporary_bytes'] / nodes:8.2f} bytes a node")
         for name, size in result["files"].items():
