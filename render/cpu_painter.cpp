@@ -2,6 +2,7 @@
 
 #include <hwy/aligned_allocator.h>
 #include <hwy/highway.h>
+#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
 #include <tbb/task_arena.h>
@@ -87,7 +88,8 @@ void CpuPainter::State::allocate(ImageSize wanted, unsigned threads_, size_t bat
   tiles = hwy::AllocateAligned<float>(tileCount(wanted) * kTileFloats);
   if (!tiles) throw std::bad_alloc();
   bins.emplace(wanted, batch_splats_, kEntriesASplat * batch_splats_, threads_);
-  arena.emplace(static_cast<int>(threads_));
+  // TBB warns of more than there are cores.
+  arena.emplace(std::min(static_cast<int>(threads_), tbb::info::default_concurrency()));
   size = wanted;
   threads = threads_;
   batch_splats = batch_splats_;

@@ -249,7 +249,8 @@ TEST_F(Fidelity, BothBackendsDrawABluntFinAlike) {
       std::vector<Image> pictures;
       for (const std::string backend : {"osmesa", "cpu"}) {
         std::vector<std::string> arguments{"render",     file("fin.splats"), "-o",        file("fin.pfm"),
-                                           "--classify", classify,           "--backend", backend};
+                                           "--classify", classify,           "--backend", backend,
+                                           "--size",     "300x300"};
         arguments.insert(arguments.end(), view.begin(), view.end());
         run(arguments);
         if (HasFatalFailure()) return;
