@@ -10,6 +10,7 @@
 
 #include "preprocess/splat_record.h"
 #include "stream/error.h"
+#include "stream/partial_folder.h"
 
 namespace curvisplat {
 namespace {
@@ -66,9 +67,7 @@ std::filesystem::path folderOf(const std::filesystem::path& path) {
 
 void checkOutput(const std::filesystem::path& output, bool overwrite,
                  const std::filesystem::path& temporary_folder) {
-  std::error_code error;
-  if (!overwrite && std::filesystem::exists(std::filesystem::symlink_status(output, error)))
-    throw Error("{}: exists; remove it, name another output, or say --overwrite", output.string());
+  checkReplaceable(output, overwrite);
   checkWritable(folderOf(output), "");
   checkWritable(temporary_folder, "; name another folder with --tmp");
 }
