@@ -12,6 +12,7 @@
 #include <optional>
 #include <thread>
 
+#include "stream/checksum.h"
 #include "stream/error.h"
 #include "stream/file.h"
 
@@ -21,10 +22,11 @@ namespace {
 constexpr uint64_t kNoChunk = UINT64_MAX;
 
 struct ChunkHeader {
+  uint64_t checksum;
   uint64_t previous;
   uint64_t bytes;
 };
-static_assert(sizeof(ChunkHeader) == 16);
+static_assert(sizeof(ChunkHeader) == 24);
 
 /// Writes chunks in a thread of its own, so that no worker waits for the disk unless it is far behind.
 class ChunkWriter {
@@ -82,6 +84,8 @@ class ChunkWriter {
       lock.unlock();
       std::exception_ptr error;
       try {
+        const uint64_t checksum = checksumOf(std::span(chunk.bytes).subspan(sizeof checksum));
+        std::memcpy(chunk.bytes.data(), &checksum, sizeof checksum);
         file_->writeAt(chunk.offset, chunk.bytes);
       } catch (...) {
         error = std::current_exception();
@@ -115,48 +119,93 @@ struct Bucket {
 }  // namespace
 
 struct BucketFile::State {
-  State(const std::filesystem::path& path, uint32_t bucket_count, size_t chunk)
-      : output(path), chunk_bytes(chunk), buckets(bucket_count), writer(output) {}
+  State(const std::filesystem::path& file, uint32_t bucket_count, size_t chunk)
+      : path(file), chunk_bytes(chunk), buckets(bucket_count), output(file), writer(*output) {}
+  State(const std::filesystem::path& file, const BucketChains& chains)
+      : path(file), chunk_bytes(chains.chunk_bytes), buckets(chains.chains.size()), end(chains.size) {
+    for (size_t n = 0; n < buckets.size(); ++n) {
+      buckets[n].last_chunk = chains.chains[n].last_chunk;
+      buckets[n].bytes = chains.chains[n].bytes;
+    }
+  }
 
-  OutputFile output;
+  const std::filesystem::path path;
   const size_t chunk_bytes;
   std::vector<Bucket> buckets;
   std::atomic<uint64_t> end = 0;
-  ChunkWriter writer;
-  std::optional<InputFile> input;  // after close()
+  std::optional<OutputFile> output;   // of a new file
+  std::optional<ChunkWriter> writer;  // to it
+  std::optional<InputFile> input;     // after close(), or of another's file
+  bool leave = false;
 
   /// For the holder of the bucket's mutex.
   void flush(Bucket& bucket) {
-    const ChunkHeader header{bucket.last_chunk, bucket.buffer.size() - sizeof(ChunkHeader)};
+    const ChunkHeader header{0, bucket.last_chunk, bucket.buffer.size() - sizeof(ChunkHeader)};
     std::memcpy(bucket.buffer.data(), &header, sizeof header);
     bucket.last_chunk = end.fetch_add(bucket.buffer.size());
     bucket.bytes += header.bytes;
-    writer.write({bucket.last_chunk, std::move(bucket.buffer)});
+    writer->write({bucket.last_chunk, std::move(bucket.buffer)});
     bucket.buffer = {};
   }
 
-  /// Calls use(offset, bytes) for the records of each chunk.
-  template <typename Use>
-  void forEachChunk(uint32_t number, Use use) const {
+  /// Reads the records of each chunk to where room(bytes) says, and calls use(records).
+  template <typename Room, typename Use>
+  void forEachChunk(uint32_t number, Room room, Use use) const {
     CURVISPLAT_CHECK(input.has_value());
     uint64_t at = buckets[number].last_chunk;
     while (at != kNoChunk) {
       ChunkHeader header;
+      require(at + sizeof header <= end, at);
       input->readAt(at, std::span(&header, 1));
-      use(at + sizeof header, header.bytes);
+      require(header.bytes <= chunk_bytes && header.bytes <= end - at - sizeof header, at);
+      const std::span<std::byte> records = room(header.bytes, at);
+      input->readAt(at + sizeof header, records);
+      if (!output) require(checksumOf(header, records) == header.checksum, at);
+      use(std::span<const std::byte>(records));
       at = header.previous;
     }
+  }
+
+  static uint64_t checksumOf(const ChunkHeader& header, std::span<const std::byte> records) {
+    Checksum checksum;
+    checksum.add(std::as_bytes(std::span(&header, 1)).subspan(sizeof header.checksum));
+    checksum.add(records);
+    return checksum.value();
+  }
+
+  /// What is in the file at `offset` must be as it was written.
+  void require(bool condition, uint64_t offset) const {
+    if (!condition)
+      throw LostBuckets("{}: is damaged at byte {}; convert the grid again", path.string(), offset);
   }
 };
 
 BucketFile::BucketFile(const std::filesystem::path& path, uint32_t buckets, size_t chunk_bytes)
     : state_(std::make_unique<State>(path, buckets, chunk_bytes)) {}
 
+BucketFile::BucketFile(const std::filesystem::path& path, BucketChains chains)
+    : state_(std::make_unique<State>(path, chains)) {
+  if (!std::filesystem::exists(path)) throw LostBuckets("{}: is gone; convert the grid again", path.string());
+  state_->input.emplace(path);
+  state_->require(state_->input->size() >= chains.size, state_->input->size());
+}
+
 BucketFile::~BucketFile() {
-  const std::filesystem::path path = state_->output.path();
+  const std::filesystem::path path = state_->path;
+  const bool leave = state_->leave;
   state_.reset();
   std::error_code ignored;
-  std::filesystem::remove(path, ignored);
+  if (!leave) std::filesystem::remove(path, ignored);
+}
+
+void BucketFile::leave() {
+  state_->leave = true;
+}
+
+BucketChains BucketFile::chains() const {
+  BucketChains chains{state_->chunk_bytes, state_->end, {}};
+  for (const Bucket& bucket : state_->buckets) chains.chains.push_back({bucket.last_chunk, bucket.bytes});
+  return chains;
 }
 
 uint32_t BucketFile::buckets() const {
@@ -170,7 +219,7 @@ void BucketFile::append(uint32_t number, std::span<const std::byte> records) {
   const std::lock_guard lock(bucket.mutex);
   if (bucket.buffer.size() + records.size() > state_->chunk_bytes) state_->flush(bucket);
   if (bucket.buffer.empty()) {
-    bucket.buffer = state_->writer.buffer();
+    bucket.buffer = state_->writer->buffer();
     bucket.buffer.reserve(state_->chunk_bytes);
     bucket.buffer.resize(sizeof(ChunkHeader));
   }
@@ -180,8 +229,8 @@ void BucketFile::append(uint32_t number, std::span<const std::byte> records) {
 void BucketFile::close() {
   for (Bucket& bucket : state_->buckets)
     if (!bucket.buffer.empty()) state_->flush(bucket);
-  state_->writer.finish();
-  state_->input.emplace(state_->output.path());
+  state_->writer->finish();
+  state_->input.emplace(state_->path);
 }
 
 uint64_t BucketFile::bytes(uint32_t bucket) const {
@@ -196,23 +245,22 @@ void BucketFile::read(uint32_t bucket, std::vector<std::byte>& out) const {
   if (out.capacity() < bytes(bucket)) out = {};  // or old and new would be in memory together
   out.resize(bytes(bucket));
   size_t done = 0;
-  state_->forEachChunk(bucket, [&](uint64_t offset, uint64_t bytes) {
-    CURVISPLAT_CHECK_OP(done + bytes, <=, out.size());
-    state_->input->readAt(offset, std::span(out).subspan(done, bytes));
-    done += bytes;
-  });
+  const auto room = [&](uint64_t bytes, uint64_t at) {
+    state_->require(bytes <= out.size() - done, at);
+    return std::span(out).subspan(done, bytes);
+  };
+  state_->forEachChunk(bucket, room, [&](std::span<const std::byte> records) { done += records.size(); });
   CURVISPLAT_CHECK_OP(done, ==, out.size());
 }
 
 void BucketFile::forEachChunk(uint32_t bucket,
                               const std::function<void(std::span<const std::byte>)>& use) const {
   std::vector<std::byte> chunk;
-  state_->forEachChunk(bucket, [&](uint64_t offset, uint64_t bytes) {
-    CURVISPLAT_CHECK_OP(bytes, <=, state_->chunk_bytes);
+  const auto room = [&](uint64_t bytes, uint64_t) {
     chunk.resize(bytes);
-    state_->input->readAt(offset, std::span(chunk));
-    use(chunk);
-  });
+    return std::span(chunk);
+  };
+  state_->forEachChunk(bucket, room, use);
 }
 
 }  // namespace curvisplat

@@ -35,8 +35,9 @@ struct Worker {
 class Scatter {
  public:
   Scatter(const NodeReader& reader, const RootCube& root, const BucketTree& tree, BucketFile& file,
-          SeamMerger& seams)
-      : blocks_(&reader.source().description().blocks),
+          SeamMerger& seams, const Progress& progress)
+      : progress_(&progress),
+        blocks_(&reader.source().description().blocks),
         variables_(reader.scalars()),
         root_(root),
         seams_(&seams),
@@ -50,6 +51,7 @@ class Scatter {
     const BlockWindow window{block, slab.first_node, slab.window, &loaded.nodes};
     const std::vector<NodeBox> tasks = cutForTasks(block, slab.box, kNodesPerTask);
     tbb::parallel_for(size_t{0}, tasks.size(), [&](size_t task) {
+      progress_->throwIfStopped();
       Worker& worker = workers_.local();
       computeNodeSplats(window, tasks[task], worker.splats);
       worker.degenerate += worker.splats.degenerate;
@@ -100,6 +102,7 @@ class Scatter {
       if (splats.splats[n].on_block_face) seams_->add(splats.splats[n], valuesOf(splats, n));
   }
 
+  const Progress* progress_;
   const std::vector<GridBlock>* blocks_;
   const size_t variables_;
   const RootCube root_;
@@ -129,7 +132,7 @@ void RecordRouter::flush() {
 ScatterCounts scatterSplats(const NodeReader& reader, const RootCube& root, uint64_t slab_bytes,
                             const BucketTree& tree, BucketFile& file, std::vector<CellContents>& contents,
                             SeamMerger& seams, Progress& progress) {
-  Scatter scatter(reader, root, tree, file, seams);
+  Scatter scatter(reader, root, tree, file, seams, progress);
   SlabStream slabs(reader, slab_bytes, true);
   while (const LoadedSlab* loaded = slabs.next()) {
     scatter.scatter(*loaded);

@@ -19,7 +19,7 @@ ScratchFolder::ScratchFolder(const std::filesystem::path& parent, const std::str
 
 ScratchFolder::~ScratchFolder() {
   std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
+  if (!leave_) std::filesystem::remove_all(path_, ignored);
 }
 
 }  // namespace curvisplat
