@@ -44,7 +44,7 @@ ConversionWorkspace::ConversionWorkspace(const fs::path& output, bool overwrite,
                   partial_->path().string(), difference);
     resumed_ = true;
     if (fs::is_directory(journal_.scratch)) {
-      scratch_ = std::make_unique<ScratchFolder>(journal_.scratch);
+      scratch_ = std::make_unique<ScratchFolder>(journal_.scratch, ScratchFolder::Folder::kTakeOver);
       removeDividedBuckets();
       partial_->leave(false);
       return;
@@ -54,9 +54,11 @@ ConversionWorkspace::ConversionWorkspace(const fs::path& output, bool overwrite,
     removeScratch(journal_, output);
     partial_->clear();
   }
-  scratch_ = std::make_unique<ScratchFolder>(fs::absolute(temporary_folder), scratchName(output));
-  journal_ = {std::move(facts), scratch_->path(), std::nullopt};
+  // Noted before it is made: no kill leaves one behind that no one knows of.
+  journal_ = {std::move(facts), ScratchFolder::newPath(fs::absolute(temporary_folder), scratchName(output)),
+              std::nullopt};
   writeJournalNow();
+  scratch_ = std::make_unique<ScratchFolder>(journal_.scratch, ScratchFolder::Folder::kMake);
 }
 
 void ConversionWorkspace::removeDividedBuckets() const {

@@ -172,8 +172,8 @@ class Conversion {
     writer_->finish(manifest());
     writer_.reset();
     file_.reset();
-    workspace_.clearFinished();
     reportCache(options_.output, report_);
+    workspace_.clearFinished();
     report_.blanked = splats_.survey.blanked;
     report_.degenerate = splats_.counts.degenerate;
     report_.inverted = splats_.counts.inverted;

@@ -4,16 +4,17 @@
 
 #include <filesystem>
 #include <string>
-#include <utility>
 
 namespace curvisplat {
 
 class ScratchFolder {
  public:
-  /// Makes `parent`/`name`.<process number>. Throws Error if it cannot.
-  ScratchFolder(const std::filesystem::path& parent, const std::string& name);
-  /// Takes over a folder that was left.
-  explicit ScratchFolder(std::filesystem::path left) : path_(std::move(left)) {}
+  /// A name that no other process uses: `parent`/`name`.<process number>.<n>
+  static std::filesystem::path newPath(const std::filesystem::path& parent, const std::string& name);
+
+  enum class Folder { kMake, kTakeOver };
+  /// Makes the folder, which must not exist, or takes over one that was left. Throws Error if it cannot.
+  ScratchFolder(std::filesystem::path path, Folder folder);
   ~ScratchFolder();
   ScratchFolder(const ScratchFolder&) = delete;
   ScratchFolder& operator=(const ScratchFolder&) = delete;
