@@ -49,7 +49,6 @@ ConversionWorkspace::ConversionWorkspace(const fs::path& output, bool overwrite,
       partial_->leave(false);
       return;
     }
-    partial_->leave(false);
   } else {
     removeScratch(journal_, output);
     partial_->clear();
@@ -59,6 +58,7 @@ ConversionWorkspace::ConversionWorkspace(const fs::path& output, bool overwrite,
               std::nullopt};
   writeJournalNow();
   scratch_ = std::make_unique<ScratchFolder>(journal_.scratch, ScratchFolder::Folder::kMake);
+  partial_->leave(false);
 }
 
 void ConversionWorkspace::removeDividedBuckets() const {

@@ -65,9 +65,11 @@ void printSummary(const ConvertWords& words, const ConvertReport& report, double
   const uint64_t bytes = bytesOf(report);
   fmt::print("{}: {} nodes, {} splats in {} bricks, {} levels\n", words.output.string(), report.nodes,
              report.splats, report.bricks, report.levels);
-  fmt::print("{:.1f} s, {:.2f} M nodes/s, {:.1f} MiB, {:.2f} bytes a node, peak memory {:.0f} MiB\n", seconds,
-             1e-6 * nodes / seconds, mebibytes(bytes), static_cast<double>(bytes) / nodes,
-             mebibytes(peak_memory_bytes));
+  // Of a resumed conversion, another has done a part.
+  const std::string rate =
+      report.resumed ? " since it was resumed" : fmt::format(", {:.2f} M nodes/s", 1e-6 * nodes / seconds);
+  fmt::print("{:.1f} s{}, {:.1f} MiB, {:.2f} bytes a node, peak memory {:.0f} MiB\n", seconds, rate,
+             mebibytes(bytes), static_cast<double>(bytes) / nodes, mebibytes(peak_memory_bytes));
 }
 
 /// What a person should know of the grid, on stderr: it is odd, not wrong.

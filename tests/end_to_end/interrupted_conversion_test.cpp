@@ -218,7 +218,9 @@ TEST_F(InterruptedConversion, OnAFullDiskLosesNothing) {
   output_ = folder_ / "disk/a.splats";
   fs::copy(*inputs_ / "a.splats", output_);
   const auto program = startedUntil(0, {"--overwrite"});
+  program->signal(SIGSTOP);
   disk.fill();
+  program->signal(SIGCONT);
   const ProgramResult failed = program->wait();
   EXPECT_EQ(failed.status, 1);
   EXPECT_EQ(lineCount(failed.err), 1) << failed.err;
@@ -232,7 +234,9 @@ TEST_F(InterruptedConversion, OnAFullDiskKeepsWhatIsToBeResumed) {
   if (!disk.mounted()) GTEST_SKIP() << "no small disk can be mounted: " << disk.why();
   output_ = folder_ / "disk/a.splats";
   const auto program = startedUntil(1, {"--resume"});
+  program->signal(SIGSTOP);
   disk.fill();
+  program->signal(SIGCONT);
   const ProgramResult failed = program->wait();
   EXPECT_EQ(failed.status, 1);
   EXPECT_EQ(lineCount(failed.err), 1) << failed.err;
