@@ -74,7 +74,8 @@ class Addition {
         cache_(options.cache),
         grid_(source),
         reader_(grid_, options.scalars, options.blank_value),
-        scratch_(temporaryFolder(options), options.cache.filename().string() + ".tmp") {
+        scratch_(ScratchFolder::newPath(temporaryFolder(options), options.cache.filename().string() + ".tmp"),
+                 ScratchFolder::Folder::kMake) {
     for (const uint32_t scalar : options.scalars)
       report_.scalars.push_back(source.description().scalars[scalar].name);
     report_.nodes = manifest().nodes;

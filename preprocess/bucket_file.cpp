@@ -13,6 +13,7 @@
 #include <optional>
 #include <thread>
 
+#include "stream/checksum.h"
 #include "stream/error.h"
 #include "stream/file.h"
 
@@ -22,10 +23,11 @@ namespace {
 constexpr uint64_t kNoChunk = UINT64_MAX;
 
 struct ChunkHeader {
+  uint64_t checksum;
   uint64_t previous;
   uint64_t bytes;
 };
-static_assert(sizeof(ChunkHeader) == 16);
+static_assert(sizeof(ChunkHeader) == 24);
 
 template <typename T>
 struct DirectAllocator {
@@ -98,6 +100,11 @@ class ChunkWriter {
       lock.unlock();
       std::exception_ptr error;
       try {
+        ChunkHeader header;
+        std::memcpy(&header, chunk.bytes.data(), sizeof header);
+        header.checksum = checksumOf(
+            std::span(chunk.bytes).first(sizeof header + header.bytes).subspan(sizeof header.checksum));
+        std::memcpy(chunk.bytes.data(), &header, sizeof header);
         file_->writeAt(chunk.offset, chunk.bytes);
       } catch (...) {
         error = std::current_exception();
@@ -131,27 +138,40 @@ struct Bucket {
 }  // namespace
 
 struct BucketFile::State {
-  State(const std::filesystem::path& path, uint32_t bucket_count, size_t chunk)
-      : output(path, Caching::direct), chunk_bytes(chunk), buckets(bucket_count), writer(output) {
+  State(const std::filesystem::path& file, uint32_t bucket_count, size_t chunk)
+      : path(file),
+        chunk_bytes(chunk),
+        buckets(bucket_count),
+        output(std::in_place, file, Caching::direct),
+        writer(*output) {
     CURVISPLAT_CHECK_OP(chunk_bytes % kDirectAlignment, ==, 0u);
   }
+  State(const std::filesystem::path& file, const BucketChains& chains)
+      : path(file), chunk_bytes(chains.chunk_bytes), buckets(chains.chains.size()), end(chains.size) {
+    for (size_t n = 0; n < buckets.size(); ++n) {
+      buckets[n].last_chunk = chains.chains[n].last_chunk;
+      buckets[n].bytes = chains.chains[n].bytes;
+    }
+  }
 
-  OutputFile output;
+  const std::filesystem::path path;
   const size_t chunk_bytes;
   std::vector<Bucket> buckets;
   std::atomic<uint64_t> end = 0;
-  ChunkWriter writer;
-  std::optional<InputFile> input;  // after close()
+  std::optional<OutputFile> output;   // of a new file
+  std::optional<ChunkWriter> writer;  // to it
+  std::optional<InputFile> input;     // after close(), or of another's file
+  bool leave = false;
 
   /// For the holder of the bucket's mutex.
   void flush(Bucket& bucket) {
-    const ChunkHeader header{bucket.last_chunk, bucket.buffer.size() - sizeof(ChunkHeader)};
+    const ChunkHeader header{0, bucket.last_chunk, bucket.buffer.size() - sizeof(ChunkHeader)};
     std::memcpy(bucket.buffer.data(), &header, sizeof header);
     const size_t pages = (bucket.buffer.size() + kDirectAlignment - 1) / kDirectAlignment;
     bucket.buffer.resize(pages * kDirectAlignment);
     bucket.last_chunk = end.fetch_add(bucket.buffer.size());
     bucket.bytes += header.bytes;
-    writer.write({bucket.last_chunk, std::move(bucket.buffer)});
+    writer->write({bucket.last_chunk, std::move(bucket.buffer)});
     bucket.buffer = {};
   }
 
@@ -167,21 +187,54 @@ struct BucketFile::State {
       input->readAt(at, whole);
       ChunkHeader header;
       std::memcpy(&header, whole.data(), sizeof header);
-      CURVISPLAT_CHECK_OP(header.bytes, <=, whole.size() - sizeof header);
-      use(std::span<const std::byte>(whole).subspan(sizeof header, header.bytes));
+      require(header.bytes <= whole.size() - sizeof header, at);
+      const auto records = std::span<const std::byte>(whole).subspan(sizeof header, header.bytes);
+      if (!output) require(checksumOf(header, records) == header.checksum, at);
+      use(records);
       at = header.previous;
     }
+  }
+
+  static uint64_t checksumOf(const ChunkHeader& header, std::span<const std::byte> records) {
+    Checksum checksum;
+    checksum.add(std::as_bytes(std::span(&header, 1)).subspan(sizeof header.checksum));
+    checksum.add(records);
+    return checksum.value();
+  }
+
+  /// What is in the file at `offset` must be as it was written.
+  void require(bool condition, uint64_t offset) const {
+    if (!condition)
+      throw LostBuckets("{}: is damaged at byte {}; convert the grid again", path.string(), offset);
   }
 };
 
 BucketFile::BucketFile(const std::filesystem::path& path, uint32_t buckets, size_t chunk_bytes)
     : state_(std::make_unique<State>(path, buckets, chunk_bytes)) {}
 
+BucketFile::BucketFile(const std::filesystem::path& path, BucketChains chains)
+    : state_(std::make_unique<State>(path, chains)) {
+  if (!std::filesystem::exists(path)) throw LostBuckets("{}: is gone; convert the grid again", path.string());
+  state_->input.emplace(path, Caching::direct);
+  state_->require(state_->input->size() >= chains.size, state_->input->size());
+}
+
 BucketFile::~BucketFile() {
-  const std::filesystem::path path = state_->output.path();
+  const std::filesystem::path path = state_->path;
+  const bool leave = state_->leave;
   state_.reset();
   std::error_code ignored;
-  std::filesystem::remove(path, ignored);
+  if (!leave) std::filesystem::remove(path, ignored);
+}
+
+void BucketFile::leave() {
+  state_->leave = true;
+}
+
+BucketChains BucketFile::chains() const {
+  BucketChains chains{state_->chunk_bytes, state_->end, {}};
+  for (const Bucket& bucket : state_->buckets) chains.chains.push_back({bucket.last_chunk, bucket.bytes});
+  return chains;
 }
 
 uint32_t BucketFile::buckets() const {
@@ -195,7 +248,7 @@ void BucketFile::append(uint32_t number, std::span<const std::byte> records) {
   const std::lock_guard lock(bucket.mutex);
   if (bucket.buffer.size() + records.size() > state_->chunk_bytes) state_->flush(bucket);
   if (bucket.buffer.empty()) {
-    bucket.buffer = state_->writer.buffer();
+    bucket.buffer = state_->writer->buffer();
     bucket.buffer.reserve(state_->chunk_bytes);
     bucket.buffer.resize(sizeof(ChunkHeader));
   }
@@ -205,8 +258,8 @@ void BucketFile::append(uint32_t number, std::span<const std::byte> records) {
 void BucketFile::close() {
   for (Bucket& bucket : state_->buckets)
     if (!bucket.buffer.empty()) state_->flush(bucket);
-  state_->writer.finish();
-  state_->input.emplace(state_->output.path(), Caching::direct);
+  state_->writer->finish();
+  state_->input.emplace(state_->path, Caching::direct);
 }
 
 uint64_t BucketFile::bytes(uint32_t bucket) const {

@@ -29,6 +29,18 @@ uint32_t BucketTree::leafOf(const RootPosition& position) const {
   return node;
 }
 
+uint32_t BucketTree::nodeOf(const Cell& cell) const {
+  RootPosition corner;
+  for (int axis = 0; axis < 3; ++axis)
+    corner.at[axis] = uint64_t{cell.at[axis]} << (kPositionBits - cell.level);
+  uint32_t node = 0;
+  while (nodes_[node].cell.level < cell.level) {
+    if (nodes_[node].isLeaf()) return kNone;
+    node = nodes_[node].first_child + static_cast<uint32_t>(octantOf(corner, nodes_[node].cell));
+  }
+  return node;
+}
+
 void BucketTree::split(uint32_t leaf, const std::function<uint64_t(const Cell&)>& count, uint64_t capacity,
                        uint32_t deepest) {
   const Cell cell = nodes_[leaf].cell;
@@ -84,6 +96,29 @@ void BucketTree::setContents(const std::vector<uint32_t>& leaves, const std::vec
       sum.add(nodes_[nodes_[node].first_child + octant].contents);
     nodes_[node].contents = sum;
   }
+}
+
+std::vector<BucketTree::Link> BucketTree::links() const {
+  std::vector<Link> links;
+  for (const Node& node : nodes_) links.push_back({node.first_child, node.bucket});
+  return links;
+}
+
+BucketTree BucketTree::fromLinks(const std::vector<Link>& links) {
+  BucketTree tree;
+  // Children have higher numbers than their parent.
+  tree.nodes_.resize(links.size());
+  for (uint32_t node = 0; node < links.size(); ++node) {
+    tree.nodes_[node].first_child = links[node].first_child;
+    tree.nodes_[node].bucket = links[node].bucket;
+    if (tree.nodes_[node].isLeaf()) continue;
+    for (uint32_t octant = 0; octant < 8; ++octant) {
+      Node& child = tree.nodes_[links[node].first_child + octant];
+      child.parent = node;
+      child.cell = tree.nodes_[node].cell.child(static_cast<int>(octant));
+    }
+  }
+  return tree;
 }
 
 }  // namespace curvisplat

@@ -46,6 +46,8 @@ class BucketTree {
 
   /// The leaf that holds `position`.
   uint32_t leafOf(const RootPosition& position) const;
+  /// The node of `cell`; kNone if the tree is not so deep there.
+  uint32_t nodeOf(const Cell& cell) const;
 
   /// Splits `leaf` and its children as long as `count` of a cell is above `capacity`, down to `deepest`
   /// level.
@@ -62,6 +64,13 @@ class BucketTree {
 
   /// Sets the contents of `leaves`, given for each node of the tree, and of all nodes above them.
   void setContents(const std::vector<uint32_t>& leaves, const std::vector<CellContents>& contents);
+
+  /// A tree as numbers, and back: [node] first_child, or kNone and the bucket.
+  struct Link {
+    uint32_t first_child = kNone, bucket = kNone;
+  };
+  std::vector<Link> links() const;
+  static BucketTree fromLinks(const std::vector<Link>& links);
 
  private:
   std::vector<Node> nodes_;

@@ -80,8 +80,13 @@ struct CellBuilder::State {
     OctantMerger merger;
   };
 
-  State(const RootCube& root_cube, const std::vector<GridBlock>& grid_blocks, size_t variable_count)
-      : root(root_cube), blocks(&grid_blocks), variables(variable_count), scratch([this] {
+  State(const RootCube& root_cube, const std::vector<GridBlock>& grid_blocks, size_t variable_count,
+        const Progress& stopping)
+      : root(root_cube),
+        blocks(&grid_blocks),
+        variables(variable_count),
+        progress(&stopping),
+        scratch([this] {
           return Scratch{{}, OctantMerger(root, variables)};
         }) {
     uint64_t node = 0;
@@ -101,12 +106,14 @@ struct CellBuilder::State {
   const RootCube root;
   const std::vector<GridBlock>* blocks;
   const size_t variables;
+  const Progress* progress;
   std::vector<uint64_t> first_nodes;  // [block]
   tbb::enumerable_thread_specific<Scratch> scratch;
 };
 
 Subtree CellBuilder::State::build(const Cell& cell, RecordSpan records, bool is_top) {
   CURVISPLAT_CHECK(records.size() > 0);
+  progress->throwIfStopped();
   if (records.size() <= kMaxBrickSplats || cell.level == kMaxLevel || coincide(records))
     return buildLeaf(cell, records, is_top);
   return buildInner(cell, records, is_top);
@@ -194,8 +201,9 @@ void CellBuilder::State::addToRuns(uint64_t node, std::vector<NodeRun>& runs) co
       {number, in_block % block.ni, in_block / block.ni % block.nj, in_block / block.ni / block.nj, 1});
 }
 
-CellBuilder::CellBuilder(const RootCube& root, const std::vector<GridBlock>& blocks, size_t variables)
-    : state_(std::make_unique<State>(root, blocks, variables)) {}
+CellBuilder::CellBuilder(const RootCube& root, const std::vector<GridBlock>& blocks, size_t variables,
+                         const Progress& progress)
+    : state_(std::make_unique<State>(root, blocks, variables, progress)) {}
 
 CellBuilder::~CellBuilder() = default;
 

@@ -13,6 +13,7 @@
 #include "preprocess/grid_source.h"
 #include "stream/brick_codec.h"
 #include "stream/octree.h"
+#include "stream/progress.h"
 
 namespace curvisplat {
 
@@ -44,13 +45,15 @@ void sortByNode(RecordSpan records);
 
 class CellBuilder {
  public:
-  /// `blocks` must outlive it.
-  CellBuilder(const RootCube& root, const std::vector<GridBlock>& blocks, size_t variables);
+  /// `blocks` and `progress`, which can stop it, must outlive it.
+  CellBuilder(const RootCube& root, const std::vector<GridBlock>& blocks, size_t variables,
+              const Progress& progress);
   ~CellBuilder();
 
   /// Builds `cell` from its records (one at least), whose places it reorders. A cell is a leaf if it has at
   /// most kMaxBrickSplats; a cell of more that cannot be divided (level kMaxLevel, or all its splats
-  /// coincide) is a leaf of several bricks. Throws nothing but bad_alloc. Any thread.
+  /// coincide) is a leaf of several bricks. Throws nothing but bad_alloc and Interrupted. Any
+  /// thread.
   BuiltCell build(const Cell& cell, RecordSpan records);
 
  private:

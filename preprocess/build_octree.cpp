@@ -25,19 +25,66 @@ OctreeBuilder::OctreeBuilder(const RootCube& root, const std::vector<GridBlock>&
       writer_(&writer),
       temporary_folder_(std::move(temporary_folder)),
       progress_(&progress),
-      cells_(root, blocks, variables) {}
+      cells_(root, blocks, variables, progress) {}
 
 void OctreeBuilder::build(const BucketFile& file) {
-  buildBuckets(file, tree_->leavesBelow(0));
+  const std::vector<uint32_t> leaves = tree_->leavesBelow(0);
+  takeUpBricks();
+  buildBuckets(file, leaves, finishTakenUp(leaves, file.buckets()));
   CURVISPLAT_CHECK_OP(carried_.size(), ==, 0u);
 }
 
-void OctreeBuilder::buildBuckets(const BucketFile& file, const std::vector<uint32_t>& leaves) {
+/// How many bricks of its own a node that has splats gets, if it is not below the unit that they are built
+/// in.
+uint64_t OctreeBuilder::bricksOf(uint32_t node) const {
+  const CellContents& contents = (*tree_)[node].contents;
+  if ((*tree_)[node].cell.level < kMaxLevel && !contents.coincide()) return 1;
+  return (contents.splats + kMaxBrickSplats - 1) / kMaxBrickSplats;
+}
+
+/// Notes which nodes the writer's bricks are of. Those behind the last that completes a node are of one that
+/// is to be built again.
+void OctreeBuilder::takeUpBricks() {
+  built_.resize(tree_->size());
+  const std::span<const Brick> bricks = writer_->bricks();
+  uint64_t complete = 0;
+  for (uint64_t id = 0; id < bricks.size(); ++id) {
+    const uint32_t node = tree_->nodeOf(bricks[id].cell);
+    if (node == BucketTree::kNone) continue;  // of a cell below a leaf
+    Built& built = built_[node];
+    if (built.bricks++ == 0) built.first_brick = id;
+    built.error = std::max<double>(built.error, bricks[id].error);
+    if (built.bricks == bricksOf(node)) complete = id + 1;
+  }
+  for (Built& built : built_)
+    if (built.first_brick + built.bricks > complete) built = {};
+  writer_->keep(complete);
+}
+
+/// Builds the parents that the bricks taken up lack. Returns the first bucket with more to build.
+uint32_t OctreeBuilder::finishTakenUp(const std::vector<uint32_t>& leaves, uint32_t buckets) {
+  uint32_t last = BucketTree::kNone;
+  for (const uint32_t leaf : leaves) {
+    if ((*tree_)[leaf].contents.splats == 0) continue;
+    const uint32_t unit = buildUnitOf(*tree_, leaf);
+    if (!isBuilt(unit)) {
+      buckets = (*tree_)[leaf].bucket;
+      break;
+    }
+    if (unit != last) progress_->skip((*tree_)[unit].contents.splats);
+    last = unit;
+  }
+  if (last != BucketTree::kNone) completeParents(last);
+  return buckets;
+}
+
+void OctreeBuilder::buildBuckets(const BucketFile& file, const std::vector<uint32_t>& leaves,
+                                 uint32_t first) {
   // Now, since dividing one of the buckets gives its leaves numbers in another file.
   std::vector<std::vector<uint32_t>> leaves_of(file.buckets());
   for (const uint32_t leaf : leaves)
     if ((*tree_)[leaf].contents.splats > 0) leaves_of[(*tree_)[leaf].bucket].push_back(leaf);
-  uint32_t next = 0;
+  uint32_t next = first;
   while (next < file.buckets()) {
     bool too_large = false;
     {
@@ -66,6 +113,7 @@ void OctreeBuilder::buildLoaded(LoadedBucket& loaded) {
   completed.reserve(loaded.parts.size());
   completed_places.reserve(loaded.parts.size());
   for (const LoadedBucket::Part& part : loaded.parts) {
+    if (isBuilt(part.unit)) continue;
     const RecordSpan records = loaded.records(part);
     const uint64_t expected = (*tree_)[part.unit].contents.splats;
     if (records.size() == expected) {
@@ -95,13 +143,15 @@ void OctreeBuilder::buildLoaded(LoadedBucket& loaded) {
 void OctreeBuilder::buildTooLarge(const BucketFile& file, uint32_t bucket,
                                   const std::vector<uint32_t>& leaves) {
   const BucketTree::Node& first = (*tree_)[leaves.front()];
+  const auto leafIsBuilt = [this](uint32_t leaf) { return isBuilt(buildUnitOf(*tree_, leaf)); };
+  if (std::all_of(leaves.begin(), leaves.end(), leafIsBuilt)) return;
   if (leaves.size() == 1 && (first.cell.level == kMaxLevel || first.contents.coincide())) {
     buildCoincident(file, bucket, leaves.front());
     return;
   }
   const std::filesystem::path path = temporary_folder_ / fmt::format("divided{}.bin", files_made_++);
   const DividedBucket divided = divideBucket(file, bucket, leaves, variables_, plan_, path, *tree_);
-  buildBuckets(*divided.file, divided.leaves);
+  buildBuckets(*divided.file, divided.leaves, 0);
 }
 
 void OctreeBuilder::buildCoincident(const BucketFile& file, uint32_t bucket, uint32_t leaf) {
@@ -140,8 +190,7 @@ void OctreeBuilder::append(uint32_t node, BuiltCell&& cell) {
 bool OctreeBuilder::childrenAreBuilt(uint32_t node) const {
   for (uint32_t octant = 0; octant < 8; ++octant) {
     const uint32_t child = (*tree_)[node].first_child + octant;
-    if ((*tree_)[child].contents.splats > 0 && (child >= built_.size() || built_[child].bricks == 0))
-      return false;
+    if ((*tree_)[child].contents.splats > 0 && !isBuilt(child)) return false;
   }
   return true;
 }
@@ -150,7 +199,7 @@ void OctreeBuilder::completeParents(uint32_t node) {
   for (uint32_t parent = (*tree_)[node].parent; parent != BucketTree::kNone;
        parent = (*tree_)[parent].parent) {
     if (!childrenAreBuilt(parent)) return;
-    buildParent(parent);
+    if (!isBuilt(parent)) buildParent(parent);
   }
 }
 

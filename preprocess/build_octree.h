@@ -5,7 +5,9 @@
 //                  |                                                                               |
 //                  +-- too large: divided into a temporary file of its own            readBack, merge, append
 //
-// Bricks come out in post-order of the octree whatever the buckets are.
+// Bricks come out in post-order of the octree whatever the buckets are. So the bricks that an interrupted
+// conversion has appended are the first ones of any other's, and only the rest is built: from the first
+// bucket on that has a cell whose bricks are not all there.
 #pragma once
 
 #include <cstddef>
@@ -31,8 +33,8 @@ class OctreeBuilder {
                 const MemoryPlan& plan, BucketTree& tree, CacheWriter& writer,
                 std::filesystem::path temporary_folder, Progress& progress);
 
-  /// Builds and appends everything in `file`, which holds the splats of all of the tree. Throws Error if a
-  /// disk fails.
+  /// Builds and appends what is in `file`, which holds the splats of all of the tree, and not yet in the
+  /// writer. Throws Error if a disk fails.
   void build(const BucketFile& file);
 
  private:
@@ -42,7 +44,11 @@ class OctreeBuilder {
     double error = 0;
   };
 
-  void buildBuckets(const BucketFile& file, const std::vector<uint32_t>& leaves);
+  void takeUpBricks();
+  uint32_t finishTakenUp(const std::vector<uint32_t>& leaves, uint32_t buckets);
+  uint64_t bricksOf(uint32_t node) const;
+  bool isBuilt(uint32_t node) const { return node < built_.size() && built_[node].bricks > 0; }
+  void buildBuckets(const BucketFile& file, const std::vector<uint32_t>& leaves, uint32_t first);
   void buildLoaded(LoadedBucket& loaded);
   void buildTooLarge(const BucketFile& file, uint32_t bucket, const std::vector<uint32_t>& leaves);
   void buildCoincident(const BucketFile& file, uint32_t bucket, uint32_t leaf);

@@ -6,17 +6,19 @@
 
 #include <algorithm>
 #include <memory>
+#include <span>
 
 #include "preprocess/bucket_file.h"
 #include "preprocess/bucket_tree.h"
 #include "preprocess/build_octree.h"
+#include "preprocess/conversion_workspace.h"
 #include "preprocess/counting_grid.h"
 #include "preprocess/memory_plan.h"
 #include "preprocess/plan_buckets.h"
 #include "preprocess/preflight.h"
 #include "preprocess/scan.h"
 #include "preprocess/scatter.h"
-#include "preprocess/scratch_folder.h"
+#include "preprocess/scattered_splats.h"
 #include "preprocess/seams.h"
 #include "preprocess/splat_record.h"
 #include "stream/cache_writer.h"
@@ -40,31 +42,80 @@ std::filesystem::path temporaryFolder(const ConvertOptions& options) {
   return options.temporary_folder.empty() ? folderOf(options.output) : options.temporary_folder;
 }
 
+Unfinished unfinishedOf(const ConvertOptions& options) {
+  if (options.resume) return Unfinished::kResume;
+  return options.overwrite ? Unfinished::kRemove : Unfinished::kRefuse;
+}
+
+/// What a cache's manifest tells.
+void reportCache(const std::filesystem::path& cache, ConvertReport& report) {
+  const std::filesystem::path path = cache / "manifest.json";
+  const Manifest written = Manifest::fromJson(readTextFile(path), path);
+  report.nodes = written.nodes;
+  report.splats = written.splats;
+  report.bricks = written.bricks;
+  report.levels = written.levels;
+  report.volume = written.volume;
+  for (const FileInfo& file : written.files) report.files.push_back({file.name, file.size});
+}
+
 /// A conversion under way: what each pass leaves for the next.
 class Conversion {
  public:
   Conversion(const GridSource& source, const ConvertOptions& options, const MemoryPlan& plan,
-             Progress& progress)
+             std::vector<ConversionFact> facts, Progress& progress)
       : source_(source),
         options_(options),
         plan_(plan),
         progress_(progress),
         reader_(source, options.scalars, options.blank_value),
         nodes_(nodesOf(source.description())),
-        scratch_(temporaryFolder(options), options.output.filename().string() + ".tmp") {}
+        workspace_(options.output, options.overwrite, unfinishedOf(options), temporaryFolder(options),
+                   std::move(facts)) {}
 
   ConvertReport run() {
-    struct Pass {
-      const char* name;
-      const char* unit;
-      uint64_t steps;  // 0: not known
-      void (Conversion::*run)();
+    const Pass scatter_grid[] = {
+        {"scan", "nodes", nodes_, &Conversion::scan},
+        {"count", "nodes", nodes_, &Conversion::count},
+        {"scatter", "nodes", nodes_, &Conversion::scatter},
+        {"seams", "nodes", 0, &Conversion::mergeSeams},
     };
-    const Pass passes[] = {
-        {"scan", "nodes", nodes_, &Conversion::scan},       {"count", "nodes", nodes_, &Conversion::count},
-        {"scatter", "nodes", nodes_, &Conversion::scatter}, {"seams", "nodes", 0, &Conversion::mergeSeams},
-        {"build", "nodes", nodes_, &Conversion::build},     {"finish", "bricks", 0, &Conversion::finish},
+    const Pass take_up_splats[] = {{"check", "bricks", 0, &Conversion::takeUpSplats}};
+    const Pass build_cache[] = {
+        {"build", "nodes", nodes_, &Conversion::build},
+        {"finish", "bricks", 0, &Conversion::finish},
     };
+    checkRoom();
+    if (workspace_.splats()) {
+      try {
+        runPasses(take_up_splats);
+        runPasses(build_cache);
+        return std::move(report_);
+      } catch (const LostBuckets&) {
+        // The machine went down before all was on its disk. The bricks that are whole still count.
+        forgetSplats();
+      }
+    }
+    runPasses(scatter_grid);
+    runPasses(build_cache);
+    return std::move(report_);
+  }
+
+  /// After run() has thrown: whether there is something to resume, which then stays.
+  bool leaveForResuming() {
+    if (file_) file_->leave();
+    return workspace_.leaveForResuming();
+  }
+
+ private:
+  struct Pass {
+    const char* name;
+    const char* unit;
+    uint64_t steps;  // 0: not known
+    void (Conversion::*run)();
+  };
+
+  void runPasses(std::span<const Pass> passes) {
     for (const Pass& pass : passes) {
       progress_.begin(pass.name, pass.steps, pass.unit);
       (this->*pass.run)();
@@ -72,69 +123,92 @@ class Conversion {
       malloc_trim(0);
     }
     progress_.end();
-    return std::move(report_);
   }
 
- private:
   void scan() {
-    survey_ = surveyGrid(reader_, plan_.slab_bytes, progress_);
-    root_ = RootCube::around(survey_.lower, survey_.upper);
-    report_.nodes = survey_.nodes;
-    report_.blanked = survey_.blanked;
-    writer_ = std::make_unique<CacheWriter>(options_.output, options_.overwrite, root_, variables());
+    splats_.survey = surveyGrid(reader_, plan_.slab_bytes, progress_);
+    openWriter();
   }
 
   void count() {
     CountingGrid counts(countingLevel(nodes_), plan_.counting_bytes);
     countNodes(source_, root_, plan_.slab_bytes, counts, progress_);
     counts.close();
-    const uint32_t buckets = planBuckets(counts, plan_, tree_);
-    file_ = std::make_unique<BucketFile>(scratch_.path() / "splats.bin", buckets, plan_.chunkBytes(buckets));
-    contents_.resize(tree_.size());
+    const uint32_t buckets = planBuckets(counts, plan_, splats_.tree);
+    file_ = std::make_unique<BucketFile>(workspace_.splatsFile(), buckets, plan_.chunkBytes(buckets));
+    contents_.resize(splats_.tree.size());
   }
 
   void scatter() {
-    seams_ = std::make_unique<SeamMerger>(options_.scalars.size(), plan_.seam_bytes, scratch_.path());
-    const ScatterCounts counts =
-        scatterSplats(reader_, root_, plan_.slab_bytes, tree_, *file_, contents_, *seams_, progress_);
-    report_.degenerate = counts.degenerate;
-    report_.inverted = counts.inverted;
+    seams_ = std::make_unique<SeamMerger>(options_.scalars.size(), plan_.seam_bytes, workspace_.scratch());
+    splats_.counts =
+        scatterSplats(reader_, root_, plan_.slab_bytes, splats_.tree, *file_, contents_, *seams_, progress_);
   }
 
   void mergeSeams() {
-    report_.merged_nodes = scatterSeams(*seams_, source_.description().coordinate_bytes, root_, tree_, *file_,
-                                        contents_, progress_);
+    splats_.merged_nodes = scatterSeams(*seams_, source_.description().coordinate_bytes, root_, splats_.tree,
+                                        *file_, contents_, progress_);
     seams_.reset();
     file_->close();
-    report_.temporary_bytes = file_->size();
-    tree_.setContents(tree_.leavesBelow(0), contents_);
-    report_.splats = tree_[0].contents.splats;
+    splats_.buckets = file_->chains();
+    splats_.tree.setContents(splats_.tree.leavesBelow(0), contents_);
+    workspace_.noteSplats(splats_);
+  }
+
+  /// In the place of all before: the splats of a conversion that was interrupted.
+  void takeUpSplats() {
+    splats_ = *workspace_.splats();
+    file_ = std::make_unique<BucketFile>(workspace_.splatsFile(), splats_.buckets);
+    openWriter();
   }
 
   void build() {
-    OctreeBuilder builder(root_, source_.description().blocks, options_.scalars.size(), plan_, tree_,
-                          *writer_, scratch_.path(), progress_);
+    OctreeBuilder builder(root_, source_.description().blocks, options_.scalars.size(), plan_, splats_.tree,
+                          *writer_, workspace_.scratch(), progress_);
     builder.build(*file_);
-    file_.reset();
   }
 
   void finish() {
     writer_->finish(manifest());
     writer_.reset();
-    const std::filesystem::path path = options_.output / "manifest.json";
-    const Manifest written = Manifest::fromJson(readTextFile(path), path);
-    report_.bricks = written.bricks;
-    report_.levels = written.levels;
-    report_.volume = written.volume;
-    for (const FileInfo& file : written.files) report_.files.push_back({file.name, file.size});
+    file_.reset();
+    reportCache(options_.output, report_);
+    workspace_.clearFinished();
+    report_.blanked = splats_.survey.blanked;
+    report_.degenerate = splats_.counts.degenerate;
+    report_.inverted = splats_.counts.inverted;
+    report_.merged_nodes = splats_.merged_nodes;
+    report_.temporary_bytes = splats_.buckets.size;
+    report_.resumed = workspace_.resumed();
+  }
+
+  void checkRoom() const {
+    DiskNeeds needs = diskNeeds(nodes_, options_.scalars.size());
+    if (workspace_.splats()) needs.temporary_bytes = 0;
+    needs.cache_bytes -= std::min(needs.cache_bytes, workspace_.bytesInPartial());
+    checkDiskSpace(needs, options_.output, temporaryFolder(options_));
+  }
+
+  /// Needs the survey.
+  void openWriter() {
+    root_ = RootCube::around(splats_.survey.lower, splats_.survey.upper);
+    if (writer_) return;
+    writer_ = std::make_unique<CacheWriter>(workspace_.partial(), root_, variables(), progress_);
+    report_.resumed_bricks = writer_->bricks().size();
+  }
+
+  void forgetSplats() {
+    workspace_.forgetSplats();
+    file_.reset();
+    splats_ = {};
   }
 
   std::vector<VariableInfo> variables() const {
     std::vector<VariableInfo> variables;
     for (size_t n = 0; n < options_.scalars.size(); ++n) {
       const GridScalar& scalar = source_.description().scalars[options_.scalars[n]];
-      variables.push_back(
-          {static_cast<uint32_t>(n), scalar.name, scalar.unit, survey_.ranges[n].min, survey_.ranges[n].max});
+      variables.push_back({static_cast<uint32_t>(n), scalar.name, scalar.unit, splats_.survey.ranges[n].min,
+                           splats_.survey.ranges[n].max});
     }
     return variables;
   }
@@ -147,12 +221,12 @@ class Conversion {
     manifest.sources = description.files;
     manifest.reader = description.format;
     if (options_.blank_value) manifest.reader += fmt::format(", blank value {}", *options_.blank_value);
-    manifest.lower = survey_.lower;
-    manifest.upper = survey_.upper;
+    manifest.lower = splats_.survey.lower;
+    manifest.upper = splats_.survey.upper;
     for (const GridBlock& block : description.blocks)
       manifest.blocks.push_back({block.name, block.ni, block.nj, block.nk});
-    manifest.nodes = survey_.nodes;
-    manifest.blanked_nodes = survey_.blanked.total();
+    manifest.nodes = splats_.survey.nodes;
+    manifest.blanked_nodes = splats_.survey.blanked.total();
     manifest.variables = variables();
     StepInfo step;
     for (const VariableInfo& variable : manifest.variables) step.variables.push_back(variable.number);
@@ -166,16 +240,31 @@ class Conversion {
   Progress& progress_;
   const NodeReader reader_;
   const uint64_t nodes_;
-  const ScratchFolder scratch_;  // before what has files in it
-  GridSurvey survey_;
+  ConversionWorkspace workspace_;  // before what has files in it
+  ScatteredSplats splats_;
   RootCube root_;
-  BucketTree tree_;
-  std::vector<CellContents> contents_;  // [node of tree_], while they are being scattered
+  std::vector<CellContents> contents_;  // [node of the tree], while they are being scattered
   std::unique_ptr<BucketFile> file_;
   std::unique_ptr<SeamMerger> seams_;
   std::unique_ptr<CacheWriter> writer_;
   ConvertReport report_;
 };
+
+/// Runs it. What is to be resumed stays when it is stopped, and on an Error if that is wanted.
+ConvertReport runOrLeave(Conversion& conversion, const ConvertOptions& options) {
+  try {
+    return conversion.run();
+  } catch (const Interrupted& interrupted) {
+    const char* what = conversion.leaveForResuming()
+                           ? "interrupted; the same command with --resume goes on from here"
+                           : "interrupted before there was anything to resume; its temporary files are gone";
+    throw Interrupted(interrupted.signal(), fmt::format("{}: {}", options.output.string(), what));
+  } catch (const Error& error) {
+    if (options.resume && conversion.leaveForResuming())
+      throw Error("{}; what is done is kept, and --resume goes on from it", error.what());
+    throw;
+  }
+}
 
 }  // namespace
 
@@ -186,12 +275,18 @@ ConvertReport convert(const GridSource& source, const ConvertOptions& options, P
   MemoryPlan plan = MemoryPlan::of(memory, options.scalars.size(), asked);
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
 
-  checkOutput(options.output, options.overwrite, temporaryFolder(options));
-  checkDiskSpace(diskNeeds(nodesOf(source.description()), options.scalars.size()), options.output,
-                 temporaryFolder(options));
-
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, plan.threads);
-  ConvertReport report = Conversion(source, options, plan, progress).run();
+  std::vector<ConversionFact> facts = factsOf(source.description(), options.scalars, options.blank_value);
+  ConvertReport report;
+  if (options.resume && ConversionWorkspace::clearIfFinished(options.output, facts)) {
+    report.resumed = true;
+    reportCache(options.output, report);
+    report.resumed_bricks = report.bricks;
+  } else {
+    checkOutput(options.output, options.overwrite, temporaryFolder(options));
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, plan.threads);
+    Conversion conversion(source, options, plan, std::move(facts), progress);
+    report = runOrLeave(conversion, options);
+  }
   report.threads = plan.threads;
   report.memory_bytes = memory;
   return report;

@@ -16,6 +16,7 @@ namespace curvisplat {
 struct ConvertOptions {
   std::filesystem::path output;            // NAME.splats, without a slash behind it
   bool overwrite = false;                  // what stands there goes, once the new cache is whole
+  bool resume = false;                     // go on from an interrupted conversion, if there is one
   std::vector<uint32_t> scalars;           // positions in the source's description; the cache's variables
   std::optional<double> blank_value;       // nodes with this value of a scalar are not there
   uint64_t memory_bytes = 0;               // 0: defaultMemory()
@@ -44,6 +45,8 @@ struct ConvertReport {
   uint32_t levels = 0;
   double volume = 0;
   uint64_t temporary_bytes = 0;  // of the scattered splats
+  bool resumed = false;          // from an interrupted conversion, which had made
+  uint64_t resumed_bricks = 0;   // so many of the bricks
   unsigned threads = 0;          // that worked: memory may allow fewer than asked for
   uint64_t memory_bytes = 0;     // the cap that held
   std::vector<FileReport> files;
@@ -54,6 +57,12 @@ struct ConvertReport {
 /// alone. Throws Error (and UsageError) if something outside fails; then no temporary file and no partial
 /// cache is left, and what stood at the output is as it was. Peak memory, everything counted:
 /// options.memory_bytes.
+///
+/// Killed at any moment it leaves something that is no cache, and that `resume` goes on from. So does
+/// progress.stop(), soon after which this throws Interrupted; and an Error, if `resume` was set: who asks for
+/// it wants to keep what is done. An unfinished conversion to the same output is an Error unless `resume` or
+/// `overwrite` (which then begins anew) is set. What has not come so far that something would be lost is
+/// removed in all of these cases.
 ConvertReport convert(const GridSource& source, const ConvertOptions& options, Progress& progress);
 
 }  // namespace curvisplat

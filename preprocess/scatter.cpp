@@ -22,8 +22,10 @@ struct Handedness {
 /// Makes splats of slabs.
 class SplatStream {
  public:
-  SplatStream(const NodeReader& reader, const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams)
-      : blocks_(&reader.source().description().blocks),
+  SplatStream(const NodeReader& reader, const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams,
+              const Progress& progress)
+      : progress_(&progress),
+        blocks_(&reader.source().description().blocks),
         variables_(reader.scalars()),
         sink_of_thread_(&sink_of_thread),
         seams_(&seams),
@@ -37,6 +39,7 @@ class SplatStream {
     const BlockWindow window{block, slab.first_node, slab.window, &loaded.nodes};
     const std::vector<NodeBox> tasks = cutForTasks(block, slab.box, kNodesPerTask);
     tbb::parallel_for(size_t{0}, tasks.size(), [&](size_t task) {
+      progress_->throwIfStopped();
       Worker& worker = workers_.local();
       computeNodeSplats(window, tasks[task], worker.splats);
       worker.degenerate += worker.splats.degenerate;
@@ -87,6 +90,7 @@ class SplatStream {
       if (splats.splats[n].on_block_face) seams_->add(splats.splats[n], valuesOf(splats, n));
   }
 
+  const Progress* progress_;
   const std::vector<GridBlock>* blocks_;
   const size_t variables_;
   const std::function<SplatSink&()>* sink_of_thread_;
@@ -141,7 +145,7 @@ void RecordRouter::flush() {
 ScatterCounts streamSplats(const NodeReader& reader, uint64_t slab_bytes,
                            const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams,
                            Progress& progress) {
-  SplatStream splats(reader, sink_of_thread, seams);
+  SplatStream splats(reader, sink_of_thread, seams, progress);
   SlabStream slabs(reader, slab_bytes, true);
   while (const LoadedSlab* loaded = slabs.next()) {
     splats.add(*loaded);

@@ -1,23 +1,31 @@
-// The folder of a conversion's temporary files: made for it, and removed with all in it when it ends, however
-// it ends.
+// The folder of a conversion's temporary files: made for it, and removed with all in it when it ends, unless
+// another is to go on with them.
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 namespace curvisplat {
 
 class ScratchFolder {
  public:
-  /// Makes `parent`/`name`.<process number>. Throws Error if it cannot.
-  ScratchFolder(const std::filesystem::path& parent, const std::string& name);
+  /// A name that no other process uses: `parent`/`name`.<process number>.<n>
+  static std::filesystem::path newPath(const std::filesystem::path& parent, const std::string& name);
+
+  enum class Folder { kMake, kTakeOver };
+  /// Makes the folder, which must not exist, or takes over one that was left. Throws Error if it cannot.
+  ScratchFolder(std::filesystem::path path, Folder folder);
   ~ScratchFolder();
   ScratchFolder(const ScratchFolder&) = delete;
   ScratchFolder& operator=(const ScratchFolder&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
+  /// The destructor leaves the folder.
+  void leave() { leave_ = true; }
 
  private:
   std::filesystem::path path_;
+  bool leave_ = false;
 };
 
 }  // namespace curvisplat

@@ -4,12 +4,12 @@
 #include <numeric>
 
 #include "stream/brick_grids.h"
+#include "stream/brick_log.h"
 #include "stream/cache_format.h"
 #include "stream/cache_index.h"
 #include "stream/checksum.h"
 #include "stream/error.h"
 #include "stream/file.h"
-#include "stream/partial_folder.h"
 #include "stream/stream_file.h"
 
 namespace curvisplat {
@@ -50,27 +50,33 @@ void linkOctree(std::vector<Brick>& bricks) {
 }  // namespace
 
 struct CacheWriter::State {
-  State(std::filesystem::path cache, bool overwrite, const RootCube& root_cube,
-        std::vector<VariableInfo> variable_infos)
-      : folder(std::move(cache), overwrite),
+  State(PartialFolder& partial, const RootCube& root_cube, std::vector<VariableInfo> variable_infos)
+      : folder(partial),
         root(root_cube),
         variables(std::move(variable_infos)),
-        geometry(folder.path() / "geometry.bin"),
+        geometry(folder.path() / "geometry.bin", Caching::pages, OutputFile::Existing::kKeep),
         tables(variables.size()),
-        geometry_input(geometry.path()) {
+        geometry_input(geometry.path()),
+        log(folder.path(), variables.size()) {
     for (const VariableInfo& variable : variables) {
-      values.emplace_back(folder.path() / variableFileName(variable));
-      beginVariableFile(values.back());
+      values.emplace_back(folder.path() / variableFileName(variable), Caching::pages,
+                          OutputFile::Existing::kKeep);
       values_input.emplace_back(values.back().path());
     }
   }
+
+  void add(AppendedBrick&& appended);
+  void takeUp(Progress& progress);
+  bool isWhole(const AppendedBrick& appended) const;
+  void keep(uint64_t count);
 
   FileInfo writeIndex(const std::vector<Brick>& ordered);
   FileInfo writeTable(size_t variable, const std::vector<uint32_t>& order);
   FileInfo writeGrids(const std::vector<Brick>& ordered);
   FileInfo closeGeometry(const std::vector<Brick>& ordered);
 
-  PartialFolder folder;
+  std::unique_ptr<PartialFolder> own_folder;  // if no one else has it
+  PartialFolder& folder;
   RootCube root;
   std::vector<VariableInfo> variables;
   OutputFile geometry;
@@ -81,26 +87,91 @@ struct CacheWriter::State {
   // For readBack; opened at once, since any number of threads may ask.
   InputFile geometry_input;
   std::vector<InputFile> values_input;
+  BrickLog log;
 };
 
+void CacheWriter::State::add(AppendedBrick&& appended) {
+  bricks.push_back(appended.brick);
+  weights.push_back(appended.weight);
+  for (size_t v = 0; v < variables.size(); ++v) tables[v].push_back(appended.variables[v]);
+}
+
+/// Whether the files have the brick's streams, as they were written.
+bool CacheWriter::State::isWhole(const AppendedBrick& appended) const {
+  std::vector<std::byte> bytes;
+  const auto has = [&](const InputFile& file, const Extent& extent) {
+    if (extent.offset > file.size() || extent.length > file.size() - extent.offset) return false;
+    bytes.resize(extent.length);
+    file.readAt(extent.offset, std::span(bytes));
+    return checksumOf(bytes) == extent.checksum;
+  };
+  if (!has(geometry_input, appended.brick.geometry)) return false;
+  for (size_t v = 0; v < variables.size(); ++v)
+    if (!has(values_input[v], appended.variables[v].values)) return false;
+  return true;
+}
+
+void CacheWriter::State::takeUp(Progress& progress) {
+  for (AppendedBrick& appended : readBrickLog(folder.path(), variables.size())) {
+    if (!isWhole(appended)) break;
+    add(std::move(appended));
+    progress.advance(1);
+  }
+  keep(bricks.size());
+}
+
+void CacheWriter::State::keep(uint64_t count) {
+  CURVISPLAT_CHECK_OP(count, <=, bricks.size());
+  const auto endOf = [](const Extent& last) { return last.offset + last.length; };
+  bricks.resize(count);
+  weights.resize(count);
+  log.keep(count);
+  geometry.truncate(count > 0 ? endOf(bricks.back().geometry) : 0);
+  for (size_t v = 0; v < variables.size(); ++v) {
+    tables[v].resize(count);
+    values[v].truncate(count > 0 ? endOf(tables[v].back().values) : 0);
+    if (count == 0) beginVariableFile(values[v]);
+  }
+}
+
 CacheWriter::CacheWriter(std::filesystem::path cache, bool overwrite, RootCube root,
-                         std::vector<VariableInfo> variables)
-    : state_(std::make_unique<State>(std::move(cache), overwrite, root, std::move(variables))) {}
+                         std::vector<VariableInfo> variables) {
+  auto folder = std::make_unique<PartialFolder>(std::move(cache), overwrite);
+  state_ = std::make_unique<State>(*folder, root, std::move(variables));
+  state_->own_folder = std::move(folder);
+  state_->keep(0);
+}
+
+CacheWriter::CacheWriter(PartialFolder& folder, RootCube root, std::vector<VariableInfo> variables,
+                         Progress& progress)
+    : state_(std::make_unique<State>(folder, root, std::move(variables))) {
+  // What an interrupted finish() has left: a manifest, whole though it may be, is older than what follows.
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path()))
+    if (entry.path().filename() == "manifest.json" || entry.path().extension() == ".part")
+      std::filesystem::remove(entry.path());
+  state_->takeUp(progress);
+}
 
 CacheWriter::~CacheWriter() = default;
+
+std::span<const Brick> CacheWriter::bricks() const {
+  return state_->bricks;
+}
+
+void CacheWriter::keep(uint64_t count) {
+  state_->keep(count);
+}
 
 uint64_t CacheWriter::append(EncodedBrick&& encoded, float error) {
   State& s = *state_;
   CURVISPLAT_CHECK_OP(encoded.values.size(), ==, s.variables.size());
-  Brick brick = encoded.brick;
-  brick.error = error;
-  brick.geometry.offset = appendStream(s.geometry, encoded.geometry);
-  for (size_t v = 0; v < encoded.values.size(); ++v) {
-    encoded.variables[v].values.offset = appendStream(s.values[v], encoded.values[v]);
-    s.tables[v].push_back(encoded.variables[v]);
-  }
-  s.bricks.push_back(brick);
-  s.weights.push_back(encoded.weight);
+  AppendedBrick appended{encoded.brick, encoded.weight, std::move(encoded.variables)};
+  appended.brick.error = error;
+  appended.brick.geometry.offset = appendStream(s.geometry, encoded.geometry);
+  for (size_t v = 0; v < encoded.values.size(); ++v)
+    appended.variables[v].values.offset = appendStream(s.values[v], encoded.values[v]);
+  s.log.append(appended);  // last: what it tells of is there
+  s.add(std::move(appended));
   return s.bricks.size() - 1;
 }
 
@@ -159,6 +230,8 @@ void CacheWriter::finish(Manifest manifest) {
   manifest.files.push_back(s.writeGrids(ordered));
   writeFileAtomically(s.folder.path() / "manifest.json", manifest.toJson());
   s.folder.putIntoPlace();
+  std::error_code ignored;
+  std::filesystem::remove(s.folder.target() / kBrickLogName, ignored);
 }
 
 FileInfo CacheWriter::State::writeIndex(const std::vector<Brick>& ordered) {

@@ -75,6 +75,9 @@ ssize_t SystemCalls::pread(int fd, void* to, size_t count, int64_t offset) {
 ssize_t SystemCalls::pwrite(int fd, const void* from, size_t count, int64_t offset) {
   return ::pwrite(fd, from, count, offset);
 }
+int SystemCalls::truncate(int fd, int64_t size) {
+  return ::ftruncate(fd, size);
+}
 int SystemCalls::fsync(int fd) {
   return ::fsync(fd);
 }
@@ -136,9 +139,18 @@ void InputFile::readAt(uint64_t offset, std::span<std::byte> to) const {
   }
 }
 
-OutputFile::OutputFile(std::filesystem::path path, Caching caching) : path_(std::move(path)) {
-  fd_ = openWith(caching, path_, O_RDWR | O_CREAT | O_TRUNC, 0666);
+OutputFile::OutputFile(std::filesystem::path path, Caching caching, Existing existing)
+    : path_(std::move(path)) {
+  const int empty = existing == Existing::kEmpty ? O_TRUNC : 0;
+  fd_ = openWith(caching, path_, O_RDWR | O_CREAT | empty, 0666);
   if (fd_ < 0) throw Error("{}: cannot be opened for writing: {}", path_.string(), reason());
+  struct stat status {};
+  if (::fstat(fd_, &status) < 0) {
+    const std::string why = reason();
+    SystemCalls::current().close(std::exchange(fd_, -1));
+    throw Error("{}: its size cannot be told: {}", path_.string(), why);
+  }
+  size_ = static_cast<uint64_t>(status.st_size);
 }
 
 OutputFile::OutputFile(OutputFile&& other) noexcept
@@ -176,6 +188,16 @@ void OutputFile::writeAt(uint64_t offset, std::span<const std::byte> from) {
   uint64_t size = size_.load();
   while (size < end && !size_.compare_exchange_weak(size, end)) {
   }
+}
+
+void OutputFile::truncate(uint64_t size) {
+  CURVISPLAT_CHECK_OP(size, <=, size_.load());
+  int result;
+  do {
+    result = SystemCalls::current().truncate(fd_, static_cast<int64_t>(size));
+  } while (result < 0 && errno == EINTR);
+  if (result < 0) throw Error("{}: cannot be cut to {} bytes: {}", path_.string(), size, reason());
+  size_ = size;
 }
 
 void OutputFile::close() {

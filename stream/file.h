@@ -23,6 +23,7 @@ class SystemCalls {
   virtual int close(int fd);
   virtual ssize_t pread(int fd, void* to, size_t count, int64_t offset);
   virtual ssize_t pwrite(int fd, const void* from, size_t count, int64_t offset);
+  virtual int truncate(int fd, int64_t size);
   virtual int fsync(int fd);
   virtual int rename(const char* from, const char* to);
   /// Swaps two names in one step (Linux renameat2).
@@ -77,13 +78,16 @@ class InputFile {
   uint64_t size_ = 0;
 };
 
-/// A new file that is written by position, or at its end. Threads may write at once to separate ranges;
+/// A file that is written by position, or at its end. Threads may write at once to separate ranges;
 /// append() is for one thread at a time. The destructor closes without a word: call close() to learn of a
 /// failure.
 class OutputFile {
  public:
-  /// Creates `path`, or empties it if it exists. Throws Error.
-  explicit OutputFile(std::filesystem::path path, Caching caching = Caching::pages);
+  enum class Existing { kEmpty, kKeep };
+
+  /// Creates `path`; if it exists, empties it or keeps its bytes. Throws Error.
+  explicit OutputFile(std::filesystem::path path, Caching caching = Caching::pages,
+                      Existing existing = Existing::kEmpty);
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&& other) noexcept;
   ~OutputFile();
@@ -94,6 +98,8 @@ class OutputFile {
 
   void append(std::span<const std::byte> from);
   void writeAt(uint64_t offset, std::span<const std::byte> from);
+  /// Cuts off what lies behind the first `size` bytes.
+  void truncate(uint64_t size);
   /// fsync and close. Nothing may be written after it.
   void close();
 

@@ -53,7 +53,7 @@ void checkReplaceable(const fs::path& target, bool overwrite) {
   }
 }
 
-PartialFolder::PartialFolder(fs::path target, bool overwrite)
+PartialFolder::PartialFolder(fs::path target, bool overwrite, Rest rest)
     // "cache/" has an empty file name; what is beside it belongs to "cache".
     : target_(target.has_filename() ? std::move(target) : target.parent_path()),
       path_(withSuffix(target_, ".partial")) {
@@ -62,20 +62,26 @@ PartialFolder::PartialFolder(fs::path target, bool overwrite)
     throw Error("{}: the folder cannot be made: {}; choose another output", path_.string(), reason());
   lock();
   try {
-    // What a killed conversion left goes; the lock stays.
-    for (const auto& entry : fs::directory_iterator(path_))
-      if (entry.path().filename() != kLockName)
-        removeFolder(entry.path(), "rest of an unfinished conversion");
+    if (rest == Rest::kRemove)
+      clear();
+    else
+      leave();
   } catch (...) {
     ::close(lock_);
     throw;
   }
 }
 
+void PartialFolder::clear() {
+  leave_ = false;
+  for (const auto& entry : fs::directory_iterator(path_))
+    if (entry.path().filename() != kLockName) removeFolder(entry.path(), "rest of an unfinished conversion");
+}
+
 PartialFolder::~PartialFolder() {
   if (lock_ < 0) return;
   std::error_code ignored;
-  fs::remove_all(path_, ignored);
+  if (!leave_) fs::remove_all(path_, ignored);
   ::close(lock_);
 }
 

@@ -39,13 +39,18 @@ void Progress::begin(std::string phase, uint64_t total, std::string unit) {
   phase_ = std::move(phase);
   unit_ = std::move(unit);
   total_ = total;
-  done_ = 0;
+  done_ = skipped_ = 0;
   next_draw_ms_ = 0;
   start_ = std::chrono::steady_clock::now();
   cpu_start_s_ = processCpuSeconds();
 }
 
+void Progress::skip(uint64_t steps) {
+  skipped_ += steps;
+}
+
 void Progress::advance(uint64_t steps) {
+  throwIfStopped();
   done_.fetch_add(steps, std::memory_order_relaxed);
   if (!terminal_) return;
   const auto now_ms = static_cast<int64_t>(secondsSince(start_) * 1000);
@@ -66,10 +71,13 @@ void Progress::draw() {
   const double seconds = std::max(1e-3, secondsSince(start_));
   std::string line = fmt::format("{:<10}", phase_);
   if (total_ > 0) {
-    const double part = std::min(1.0, done / static_cast<double>(total_));
+    const double skipped = static_cast<double>(skipped_.load());
+    const double total = static_cast<double>(total_);
+    const double part = std::min(1.0, (skipped + done) / total);
     const auto width = static_cast<int>(part * 30);
     line += fmt::format("[{:<30}] {:3.0f} %  ", std::string(static_cast<size_t>(width), '='), part * 100);
-    if (part > 0) line += fmt::format("{:.0f} s left  ", seconds / part - seconds);
+    if (done > 0)
+      line += fmt::format("{:.0f} s left  ", seconds / done * std::max(0.0, total - skipped - done));
   }
   line += fmt::format("{}{}/s", withUnit(done / seconds), unit_);
   fmt::print(stderr, "\r\033[K{}", line);

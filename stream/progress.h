@@ -1,4 +1,5 @@
-// Tells a person how long work goes on: a bar on a terminal, nothing in a pipe.
+// Tells a person how long work goes on: a bar on a terminal, nothing in a pipe. And tells the work that a
+// person wants it to stop.
 #pragma once
 
 #include <atomic>
@@ -9,7 +10,20 @@
 #include <string>
 #include <vector>
 
+#include "stream/error.h"
+
 namespace curvisplat {
+
+/// The job was asked to stop, and did: not a failure, but an end.
+class Interrupted : public Error {
+ public:
+  Interrupted(int signal, const std::string& text) : Error(text), signal_(signal) {}
+  /// What Progress::stop() was given.
+  int signal() const { return signal_; }
+
+ private:
+  int signal_;
+};
 
 /// Progress of a job in phases. begin() is for the thread that runs the job; advance() is for any thread and
 /// costs an atomic addition. Draws to stderr at most ten times a second, and only if stderr is a terminal.
@@ -21,16 +35,28 @@ class Progress {
   /// Ends the phase before and begins `phase`, of `total` steps of `unit` ("nodes", "bricks"). 0 is
   /// "unknown".
   void begin(std::string phase, uint64_t total, std::string unit);
+  /// Throws Interrupted after stop().
   void advance(uint64_t steps);
+  /// Counts steps that were done before the job began: for the percentage, not for the rate.
+  void skip(uint64_t steps);
   /// Ends the last phase and clears the line.
   void end();
+
+  /// Asks the job to stop, for the signal's sake, at its next throwIfStopped(). Any thread, and safe in a
+  /// signal handler.
+  void stop(int signal) { stop_signal_ = signal; }
+  /// Throws Interrupted after stop(). Any thread; costs a load.
+  void throwIfStopped() const {
+    if (const int signal = stop_signal_.load(std::memory_order_relaxed))
+      throw Interrupted(signal, "interrupted");
+  }
 
   struct Phase {
     std::string name;
     std::string unit;
     double seconds = 0;
     double cpu_seconds = 0;  // of all threads of the process, in the program and in the system
-    uint64_t steps = 0;
+    uint64_t steps = 0;      // without those that were skipped
   };
   /// The phases that have ended, for --stats.
   const std::vector<Phase>& phases() const { return phases_; }
@@ -41,7 +67,9 @@ class Progress {
   const bool terminal_;
   std::string phase_, unit_;
   uint64_t total_ = 0;
-  std::atomic<uint64_t> done_ = 0;
+  std::atomic<uint64_t> done_ = 0, skipped_ = 0;
+  std::atomic<int> stop_signal_ = 0;  // 0: go on
+  static_assert(std::atomic<int>::is_always_lock_free);
   std::atomic<int64_t> next_draw_ms_ = 0;
   std::chrono::steady_clock::time_point start_;
   double cpu_start_s_ = 0;

@@ -19,6 +19,7 @@
 #include "tools/grid_options.h"
 #include "tools/option_parsers.h"
 #include "tools/run_statistics.h"
+#include "tools/stop_signals.h"
 
 namespace curvisplat {
 namespace {
@@ -35,9 +36,11 @@ void printSummary(const ConvertWords& words, const ConvertReport& report, double
   const uint64_t bytes = bytesOf(report);
   fmt::print("{}: {} nodes, {} splats in {} bricks, {} levels\n", words.output.string(), report.nodes,
              report.splats, report.bricks, report.levels);
-  fmt::print("{:.1f} s, {:.2f} M nodes/s, {:.1f} MiB, {:.2f} bytes a node, peak memory {:.0f} MiB\n", seconds,
-             1e-6 * nodes / seconds, mebibytes(bytes), static_cast<double>(bytes) / nodes,
-             mebibytes(peak_memory_bytes));
+  // Of a resumed conversion, another has done a part.
+  const std::string rate =
+      report.resumed ? " since it was resumed" : fmt::format(", {:.2f} M nodes/s", 1e-6 * nodes / seconds);
+  fmt::print("{:.1f} s{}, {:.1f} MiB, {:.2f} bytes a node, peak memory {:.0f} MiB\n", seconds, rate,
+             mebibytes(bytes), static_cast<double>(bytes) / nodes, mebibytes(peak_memory_bytes));
 }
 
 /// What a person should know of the grid, on stderr: it is odd, not wrong.
@@ -47,6 +50,9 @@ void printWarnings(const GridDescription& description, const ConvertReport& repo
   const auto note = [](uint64_t count, const char* what) {
     if (count > 0) fmt::print(stderr, "curvisplat: note: {} {}\n", count, what);
   };
+  if (report.resumed)
+    fmt::print(stderr, "curvisplat: note: resumed with {} of {} bricks done\n", report.resumed_bricks,
+               report.bricks);
   note(report.blanked.by_grid, "nodes are blanked by the grid");
   note(report.blanked.by_value, "nodes have the blank value");
   note(report.blanked.not_finite, "nodes are not finite numbers, and are blanked");
@@ -59,6 +65,8 @@ nlohmann::json statistics(const ConvertReport& report, const Progress& progress)
   nlohmann::json json = runStatistics();
   json["threads"] = report.threads;
   json["memory_bytes"] = report.memory_bytes;
+  json["resumed"] = report.resumed;
+  json["resumed_bricks"] = report.resumed_bricks;
   json["nodes"] = report.nodes;
   json["blanked"] = {{"by_grid", report.blanked.by_grid},
                      {"by_value", report.blanked.by_value},
@@ -85,6 +93,7 @@ void runConvert(ConvertWords words) {
   ConvertOptions options;
   options.output = words.output;
   options.overwrite = words.overwrite;
+  options.resume = words.resume;
   options.temporary_folder = words.temporary_folder;
   options.blank_value = words.blank_value;
   options.threads = words.threads;
@@ -95,6 +104,7 @@ void runConvert(ConvertWords words) {
   options.title = words.grid.grid.stem().string();
 
   Progress progress;
+  const StopOnSignals stopping(progress);
   const ConvertReport report = convert(*source, options, progress);
   const nlohmann::json numbers = statistics(report, progress);
   printWarnings(source->description(), report);
@@ -124,7 +134,10 @@ void addConvert(CLI::App& app) {
                       "Cap on this process's memory, as 512M (default: 2G or a quarter of the machine's)");
   command->add_option("--threads", words->threads, "Threads that work (default: all)");
   command->add_option("--tmp", words->temporary_folder, "Folder for temporary files (default: the output's)");
-  command->add_flag("--overwrite", words->overwrite, "Replace the output if it is a cache");
+  command->add_flag("--resume", words->resume,
+                    "Go on from an interrupted conversion, if there is one; keep what is done on errors");
+  command->add_flag("--overwrite", words->overwrite,
+                    "Replace the output if it is a cache; drop an interrupted conversion, unless --resume");
   command->add_option("--stats", words->statistics, "Write times, bytes and counts to FILE.json");
   addGridOptions(*command, words->grid);
   command->callback([words] {

@@ -22,7 +22,7 @@ struct ConvertWords {
   std::optional<double> blank_value;
   std::optional<std::string> memory;
   unsigned threads = 0;
-  bool overwrite = false;
+  bool overwrite = false, resume = false;
 };
 
 /// How to open the grid: temporary files go where the words say, else beside `cache`.

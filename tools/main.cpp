@@ -6,6 +6,7 @@
 #include <exception>
 
 #include "stream/error.h"
+#include "stream/progress.h"
 #include "tools/commands.h"
 
 int main(int argc, char** argv) {
@@ -29,6 +30,9 @@ int main(int argc, char** argv) {
   } catch (const UsageError& error) {
     fmt::print(stderr, "curvisplat: {}\n", error.what());
     return 2;
+  } catch (const Interrupted& interrupted) {
+    fmt::print(stderr, "curvisplat: {}\n", interrupted.what());
+    return 128 + interrupted.signal();  // as a shell says of a process that the signal has ended
   } catch (const std::bad_alloc&) {
     fmt::print(stderr, "curvisplat: out of memory; give the machine more, or ask for less with --memory\n");
     return 1;

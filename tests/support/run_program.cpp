@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <poll.h>
+#include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -66,32 +67,53 @@ void drain(Pipe& out, std::string& out_text, Pipe& err, std::string& err_text) {
 
 }  // namespace
 
-ProgramResult runProgram(const std::vector<std::string>& arguments) {
-  std::vector<std::string> words{CURVISPLAT_PROGRAM};
+struct RunningProgram::Pipes {
+  Pipe out, err;
+};
+
+RunningProgram::RunningProgram(const std::vector<std::string>& arguments, const std::string& program)
+    : pipes_(std::make_unique<Pipes>()) {
+  std::vector<std::string> words{program};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
 
-  Pipe out, err;
+  Pipe &out = pipes_->out, &err = pipes_->err;
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, out.write_end, STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, err.write_end, STDERR_FILENO);
-  pid_t child = -1;
-  const int failed = posix_spawn(&child, CURVISPLAT_PROGRAM, &actions, nullptr, argv.data(), environ);
+  const int failed = posix_spawn(&child_, program.c_str(), &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
-  require(failed == 0, failed, CURVISPLAT_PROGRAM);
+  require(failed == 0, failed, program.c_str());
   Pipe::closeEnd(out.write_end);
   Pipe::closeEnd(err.write_end);
+}
 
+RunningProgram::~RunningProgram() {
+  if (child_ < 0) return;
+  kill(child_, SIGKILL);
+  waitpid(child_, nullptr, 0);
+}
+
+void RunningProgram::signal(int number) const {
+  require(kill(child_, number) == 0, errno, "kill");
+}
+
+ProgramResult RunningProgram::wait() {
   ProgramResult result;
-  drain(out, result.out, err, result.err);
+  drain(pipes_->out, result.out, pipes_->err, result.err);
   int status = 0;
-  while (waitpid(child, &status, 0) < 0) require(errno == EINTR, errno, "waitpid");
+  while (waitpid(child_, &status, 0) < 0) require(errno == EINTR, errno, "waitpid");
+  child_ = -1;
   result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   return result;
+}
+
+ProgramResult runProgram(const std::vector<std::string>& arguments) {
+  return RunningProgram(arguments).wait();
 }
 
 int lineCount(const std::string& text) {

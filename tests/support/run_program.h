@@ -1,6 +1,9 @@
 // Runs the real curvisplat program, as a person at a terminal would, and keeps what it said.
 #pragma once
 
+#include <sys/types.h>
+
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -14,6 +17,25 @@ struct ProgramResult {
 /// Runs CURVISPLAT_PROGRAM with `arguments` (no shell in between) and waits for its end. Its standard input
 /// is empty and its output and error are pipes, so that it draws no progress bar.
 ProgramResult runProgram(const std::vector<std::string>& arguments);
+
+/// A program on its way; one that no one waited for is killed.
+class RunningProgram {
+ public:
+  explicit RunningProgram(const std::vector<std::string>& arguments,
+                          const std::string& program = CURVISPLAT_PROGRAM);
+  ~RunningProgram();
+  RunningProgram(const RunningProgram&) = delete;
+  RunningProgram& operator=(const RunningProgram&) = delete;
+
+  void signal(int number) const;
+  /// What it said, once it has ended. To be called once.
+  ProgramResult wait();
+
+ private:
+  struct Pipes;
+  std::unique_ptr<Pipes> pipes_;
+  pid_t child_ = -1;
+};
 
 /// The number of lines in `text`; an unfinished last line counts.
 int lineCount(const std::string& text);

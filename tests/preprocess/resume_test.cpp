@@ -1,0 +1,363 @@
+// Interrupted conversions: whatever is left of one, it is no cache, and what goes on from it gives the same
+// bytes. The process that dies is another one: see tests/programs/dying_convert.cpp.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <fstream>
+#include <functional>
+#include <map>
+#include <random>
+
+#include "preprocess/conversion_journal.h"
+#include "preprocess/convert.h"
+#include "preprocess/memory_plan.h"
+#include "preprocess/open_grid.h"
+#include "preprocess/plot3d_writer.h"
+#include "preprocess/scenes.h"
+#include "stream/brick_log.h"
+#include "stream/cache_reader.h"
+#include "stream/error.h"
+#include "tests/support/faulty_system_calls.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+using Files = std::map<std::string, std::string>;
+
+std::string bytesOf(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void overwrite(const fs::path& path, const std::string& bytes) {
+  std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
+}
+
+Files filesOf(const fs::path& folder) {
+  Files files;
+  for (const auto& entry : fs::directory_iterator(folder))
+    files[entry.path().filename().string()] = bytesOf(entry.path());
+  return files;
+}
+
+/// No test pulls the plug, and syncing takes most of the time.
+class UnsyncedSystemCalls : public SystemCalls {
+  int fsync(int) override { return 0; }
+};
+
+/// Stops the job at a write.
+class StoppingSystemCalls : public SystemCalls {
+ public:
+  StoppingSystemCalls(Progress& progress, int64_t stop_at) : progress_(progress), stop_at_(stop_at) {}
+  ssize_t pwrite(int fd, const void* from, size_t count, int64_t offset) override {
+    if (writes_++ == stop_at_) progress_.stop(SIGINT);
+    return SystemCalls::pwrite(fd, from, count, offset);
+  }
+
+ private:
+  Progress& progress_;
+  const int64_t stop_at_;
+  std::atomic<int64_t> writes_ = 0;
+};
+
+class Resume : public ::testing::Test {
+ protected:
+  static constexpr uint64_t kBucketSplats = 9000;  // of the process that dies
+
+  Resume() : unsynced_(calls_) {
+    Progress progress;
+    writePlot3d(SceneGridSource(makeScene("wake"), {50, 40, 36}), folder_ / "in", progress);
+    source_ = openGrid({grid_, {function_}, folder_.path(), {}});
+    work_ = folder_ / "work";
+    fs::create_directory(work_);
+    output_ = work_ / "a.splats";
+    convertNow({});
+    expected_ = filesOf(output_);
+    fs::remove_all(output_);
+  }
+
+  struct Words {
+    bool resume = false, overwrite = false;
+    std::optional<uint64_t> bucket_splats;
+  };
+
+  ConvertOptions optionsFor(const Words& words) const {
+    ConvertOptions options;
+    options.output = output_;
+    options.scalars = {0};
+    options.title = "killed";
+    options.memory_bytes = uint64_t{1} << 30;
+    options.resume = words.resume;
+    options.overwrite = words.overwrite;
+    options.bucket_splats = words.bucket_splats;
+    return options;
+  }
+
+  ConvertReport convertNow(const Words& words) const {
+    Progress progress;
+    return convert(*source_, optionsFor(words), progress);
+  }
+
+  /// Runs a conversion that is killed at a call. Its output, if it is not killed.
+  std::optional<std::string> killedAt(int64_t call, std::vector<std::string> words = {"writes"}) const {
+    std::vector<std::string> arguments{grid_, function_, output_, std::to_string(kBucketSplats),
+                                       std::to_string(call)};
+    arguments.insert(arguments.end(), words.begin(), words.end());
+    const ProgramResult result = RunningProgram(arguments, CURVISPLAT_DYING_CONVERT).wait();
+    if (result.status == 128 + SIGKILL) return std::nullopt;
+    EXPECT_EQ(result.status, 0) << result.err;
+    return result.out;
+  }
+
+  int64_t callsOfAll(const std::vector<std::string>& words) {
+    const int64_t calls = std::stoll(killedAt(-1, words).value());
+    fs::remove_all(output_);
+    return calls;
+  }
+
+  /// Kills a conversion when about `part` of its bricks are there.
+  void killInBuild(double part = 0.6) {
+    const int64_t calls = callsOfAll({"writes"});
+    killedAt(static_cast<int64_t>(static_cast<double>(calls) * part));
+    ASSERT_TRUE(readJournal(partial())->splats);
+    ASSERT_GT(readBrickLog(partial(), 1).size(), 2u);
+  }
+
+  fs::path partial() const { return work_ / "a.splats.partial"; }
+  fs::path scratch() const { return readJournal(partial())->scratch; }
+
+  /// What is there now is the cache, as if nothing had happened, and nothing else.
+  void expectWhole() const {
+    for (const auto& entry : fs::directory_iterator(work_)) EXPECT_EQ(entry.path(), output_);
+    const Files files = filesOf(output_);
+    EXPECT_EQ(files.size(), expected_.size());
+    for (const auto& [name, bytes] : expected_)
+      EXPECT_TRUE(files.contains(name) && files.at(name) == bytes) << name;
+  }
+
+  /// It does not open as a cache, unless it has all that the cache has.
+  void expectUnfinishedOrWhole(const fs::path& path) const {
+    try {
+      const CacheReader reader(path);
+    } catch (const Error&) {
+      return;
+    }
+    const Files files = filesOf(path);
+    for (const auto& [name, bytes] : expected_)
+      EXPECT_TRUE(files.contains(name) && files.at(name) == bytes) << path << ": " << name;
+  }
+
+  void expectRefused(const Words& words, const std::string& saying) const {
+    const Files before = filesOf(partial());
+    try {
+      convertNow(words);
+      ADD_FAILURE() << "no error that says " << saying;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find(saying), std::string::npos) << error.what();
+    }
+    EXPECT_TRUE(filesOf(partial()) == before);
+  }
+
+  UnsyncedSystemCalls calls_;
+  const ScopedSystemCalls unsynced_;
+  const TemporaryFolder folder_;
+  const fs::path grid_ = folder_ / "in.xyz", function_ = folder_ / "in.fun";
+  fs::path work_, output_;
+  std::unique_ptr<GridSource> source_;
+  Files expected_;
+};
+
+TEST_F(Resume, CompletesWhateverCallWasTheLast) {
+  const std::optional<uint64_t> bucket_splats[] = {kBucketSplats, std::nullopt, 3000};
+  int resumed = 0;
+  int64_t call = 0;
+  for (; !killedAt(call); ++call) {
+    SCOPED_TRACE(call);
+    expectUnfinishedOrWhole(partial());
+    expectUnfinishedOrWhole(output_);
+    resumed += convertNow({true, false, bucket_splats[call % 3]}).resumed;
+    expectWhole();
+    if (HasFailure()) return;
+    fs::remove_all(output_);
+  }
+  EXPECT_GT(call, 60);
+  EXPECT_GT(resumed, 30);
+  expectWhole();
+}
+
+TEST_F(Resume, ReplacesAnOldCacheAtOnce) {
+  const Files old{{"manifest.json", ""}, {"geometry.bin", ""}};
+  const int64_t calls = callsOfAll({"writes"});
+  for (int64_t call = calls / 8; call <= calls + 1; call += call < calls - 12 ? calls / 8 : 1) {
+    SCOPED_TRACE(call);
+    Words other{false, true, std::nullopt};
+    ConvertOptions options = optionsFor(other);
+    options.title = "old";
+    Progress progress;
+    convert(*source_, options, progress);
+    killedAt(call, {"writes", "overwrite"});
+    const CacheReader reader(output_);  // the old one, or the new
+    convertNow({true, true, std::nullopt});
+    expectWhole();
+    if (HasFailure()) return;
+  }
+}
+
+TEST_F(Resume, CompletesAfterBeingKilledAgainAndAgain) {
+  const int64_t calls = callsOfAll({"all"});
+  std::mt19937_64 random(7);
+  for (int turn = 0; turn < 4; ++turn) {
+    SCOPED_TRACE(turn);
+    bool killed = true;
+    for (int kill = 0; kill < 4 && killed; ++kill)
+      killed = !killedAt(static_cast<int64_t>(random() % static_cast<uint64_t>(calls)), {"all", "resume"});
+    if (killed) convertNow({true, false, std::nullopt});
+    expectWhole();
+    fs::remove_all(output_);
+  }
+}
+
+TEST_F(Resume, MakesAgainWhatTheDiskHasLost) {
+  const auto cut = [](const fs::path& path, uint64_t left) { fs::resize_file(path, left); };
+  const auto flip = [](const fs::path& path, size_t byte) {
+    std::string bytes = bytesOf(path);
+    bytes.at(byte) ^= 0x10;
+    overwrite(path, bytes);
+  };
+  const std::pair<const char*, std::function<void()>> losses[] = {
+      {"the end of the splats", [&] { cut(scratch() / "splats.bin", 100000); }},
+      {"all of the splats", [&] { cut(scratch() / "splats.bin", 0); }},
+      {"the file of splats", [&] { fs::remove(scratch() / "splats.bin"); }},
+      {"the folder of splats", [&] { fs::remove_all(scratch()); }},
+      {"a bit of the last splats",
+       [&] { flip(scratch() / "splats.bin", fs::file_size(scratch() / "splats.bin") - 100); }},
+      {"every page of the splats",
+       [&] {
+         const auto size = fs::file_size(scratch() / "splats.bin");
+         overwrite(scratch() / "splats.bin", std::string(size, '\0'));
+       }},
+      {"the end of the geometry", [&] { cut(partial() / "geometry.bin", 5000); }},
+      {"all of the geometry", [&] { fs::remove(partial() / "geometry.bin"); }},
+      {"a bit of the geometry", [&] { flip(partial() / "geometry.bin", 9000); }},
+      {"a bit of a variable", [&] { flip(partial() / "var.0.bin", 600); }},
+      {"all of a variable", [&] { cut(partial() / "var.0.bin", 0); }},
+      {"the end of the log", [&] { cut(partial() / "bricks.log", 3 * 200 + 77); }},
+      {"a bit of the log", [&] { flip(partial() / "bricks.log", 2 * 200 + 150); }},
+      {"the log", [&] { fs::remove(partial() / "bricks.log"); }},
+      {"a bit of the journal", [&] { flip(partial() / "journal", 300); }},
+      {"the end of the journal", [&] { cut(partial() / "journal", 300); }},
+      {"the journal", [&] { fs::remove(partial() / "journal"); }},
+  };
+  for (const auto& [what, lose] : losses) {
+    SCOPED_TRACE(what);
+    killInBuild();
+    const fs::path temporary = scratch();
+    lose();
+    convertNow({true, false, std::nullopt});
+    fs::remove_all(temporary);  // without the journal no one knows of it
+    expectWhole();
+    fs::remove_all(output_);
+  }
+}
+
+TEST_F(Resume, TellsWhatWasDone) {
+  killInBuild();
+  const size_t done = readBrickLog(partial(), 1).size();
+  Progress progress;
+  const ConvertReport report = convert(*source_, optionsFor({true, false, std::nullopt}), progress);
+  EXPECT_TRUE(report.resumed);
+  EXPECT_EQ(report.resumed_bricks, done);
+  EXPECT_EQ(report.nodes, 72000u);
+  EXPECT_GT(report.merged_nodes, 0u);
+  EXPECT_GT(report.temporary_bytes, 61u * 70000);
+  // The grid is not read again.
+  std::vector<std::string> phases;
+  for (const Progress::Phase& phase : progress.phases()) phases.push_back(phase.name);
+  EXPECT_EQ(phases, (std::vector<std::string>{"check", "build", "finish"}));
+  EXPECT_LT(progress.phases()[1].steps, 70000u);
+  EXPECT_GT(progress.phases()[1].steps, 0u);
+}
+
+TEST_F(Resume, RefusesAnotherConversion) {
+  killInBuild();
+  expectRefused({}, "--resume");
+  ConvertOptions options = optionsFor({true, false, std::nullopt});
+  options.blank_value = -1;
+  Progress progress;
+  EXPECT_THROW(convert(*source_, options, progress), Error);
+  const auto time = fs::last_write_time(function_);
+  fs::last_write_time(function_, time + std::chrono::seconds(1));
+  expectRefused({true, false, std::nullopt}, "in.fun");
+  fs::last_write_time(function_, time);
+  const ConvertReport report = convertNow({true, false, std::nullopt});
+  EXPECT_TRUE(report.resumed);
+  expectWhole();
+}
+
+TEST_F(Resume, BeginsAnewIfOverwritingIsAllowed) {
+  killInBuild();
+  const ConvertReport report = convertNow({false, true, std::nullopt});
+  EXPECT_FALSE(report.resumed);
+  expectWhole();
+}
+
+TEST_F(Resume, NeedsNothingToResume) {
+  const ConvertReport report = convertNow({true, false, std::nullopt});
+  EXPECT_FALSE(report.resumed);
+  expectWhole();
+  EXPECT_THROW(convertNow({true, false, std::nullopt}), Error);  // it stands there, whole
+}
+
+TEST_F(Resume, AStoppedConversionLeavesWhatIsWorthIt) {
+  testing::FaultySystemCalls counting;
+  {
+    const ScopedSystemCalls scope(counting);
+    convertNow({false, false, kBucketSplats});
+    fs::remove_all(output_);
+  }
+  int left = 0, removed = 0;
+  for (int64_t at = 0; at < counting.writes - 12; at += 5) {
+    SCOPED_TRACE(at);
+    Progress progress;
+    {
+      StoppingSystemCalls calls(progress, at);
+      const ScopedSystemCalls scope(calls);
+      EXPECT_THROW(convert(*source_, optionsFor({false, false, kBucketSplats}), progress), Interrupted);
+    }
+    EXPECT_FALSE(fs::exists(output_));
+    const bool resumable = fs::exists(partial());
+    (resumable ? left : removed) += 1;
+    if (!resumable) {
+      EXPECT_TRUE(fs::is_empty(work_));
+    }
+    EXPECT_EQ(convertNow({true, false, std::nullopt}).resumed, resumable);
+    expectWhole();
+    fs::remove_all(output_);
+  }
+  EXPECT_GT(left, 3);
+  EXPECT_GT(removed, 0);
+}
+
+TEST_F(Resume, KeepsWhatIsDoneOnAFullDiskIfAskedTo) {
+  killInBuild(0.5);
+  testing::FaultySystemCalls full;
+  full.fail_write_at = 10;
+  {
+    const ScopedSystemCalls scope(full);
+    try {
+      convertNow({true, false, kBucketSplats});
+      ADD_FAILURE();
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("No space left"), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("--resume"), std::string::npos) << error.what();
+    }
+  }
+  EXPECT_TRUE(convertNow({true, false, std::nullopt}).resumed);
+  expectWhole();
+}
+
+}  // namespace
+}  // namespace curvisplat
