@@ -18,6 +18,7 @@
 #include "stream/cache_reader.h"
 #include "stream/error.h"
 #include "tests/support/faulty_system_calls.h"
+#include "tests/support/function_grid.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 
@@ -65,13 +66,17 @@ class StoppingSystemCalls : public SystemCalls {
 
 class Resume : public ::testing::Test {
  protected:
-  static constexpr uint64_t kBucketSplats = 9000;  // of the process that dies
+  static constexpr uint64_t kBucketSplats = 9000;
 
-  Resume() : unsynced_(calls_) {
+  Resume() : unsynced_(calls_) { setUp(SceneGridSource(makeScene("wake"), {50, 40, 36})); }
+
+  /// Makes the grid, and the cache that is expected of it.
+  void setUp(const GridSource& grid) {
     Progress progress;
-    writePlot3d(SceneGridSource(makeScene("wake"), {50, 40, 36}), folder_ / "in", progress);
+    writePlot3d(grid, folder_ / "in", progress);
     source_ = openGrid({grid_, {function_}, folder_.path(), {}});
     work_ = folder_ / "work";
+    fs::remove_all(work_);
     fs::create_directory(work_);
     output_ = work_ / "a.splats";
     convertNow({});
@@ -103,7 +108,7 @@ class Resume : public ::testing::Test {
 
   /// Runs a conversion that is killed at a call. Its output, if it is not killed.
   std::optional<std::string> killedAt(int64_t call, std::vector<std::string> words = {"writes"}) const {
-    std::vector<std::string> arguments{grid_, function_, output_, std::to_string(kBucketSplats),
+    std::vector<std::string> arguments{grid_, function_, output_, std::to_string(dying_bucket_splats_),
                                        std::to_string(call)};
     arguments.insert(arguments.end(), words.begin(), words.end());
     const ProgramResult result = RunningProgram(arguments, CURVISPLAT_DYING_CONVERT).wait();
@@ -165,6 +170,7 @@ class Resume : public ::testing::Test {
   const ScopedSystemCalls unsynced_;
   const TemporaryFolder folder_;
   const fs::path grid_ = folder_ / "in.xyz", function_ = folder_ / "in.fun";
+  uint64_t dying_bucket_splats_ = kBucketSplats;
   fs::path work_, output_;
   std::unique_ptr<GridSource> source_;
   Files expected_;
@@ -186,6 +192,44 @@ TEST_F(Resume, CompletesWhateverCallWasTheLast) {
   EXPECT_GT(call, 60);
   EXPECT_GT(resumed, 30);
   expectWhole();
+}
+
+/// Where all is one bucket, its bricks are worth nothing until the topmost is there; unless the splats are
+/// lost, and the new plan knows smaller cells.
+TEST_F(Resume, TakesUpOrDropsTheBricksOfALargeCell) {
+  dying_bucket_splats_ = 1'000'000;
+  const int64_t calls = callsOfAll({"writes"});
+  size_t most = 0;
+  for (int64_t call = calls - 46; call < calls - 12; call += 2) {
+    SCOPED_TRACE(call);
+    killedAt(call);
+    if (readJournal(partial())->splats) most = std::max(most, readBrickLog(partial(), 1).size());
+    if (call % 3 == 0) fs::remove_all(scratch());
+    convertNow({true, false, call % 4 < 2 ? std::optional<uint64_t>(kBucketSplats) : std::nullopt});
+    expectWhole();
+    if (HasFailure()) return;
+    fs::remove_all(output_);
+  }
+  EXPECT_GT(most, 5u);
+}
+
+/// A cell of several bricks, which no division parts.
+TEST_F(Resume, TakesNodesThatAllCoincide) {
+  setUp(FunctionGridSource({gridBlock(50, 50, 60)}, 1, [](const GridNode& node) {
+    return NodeValues{glm::dvec3(1, 2, 3), {static_cast<float>(node.i)}, false};
+  }));
+  const int64_t calls = callsOfAll({"writes"});
+  size_t most = 0;
+  for (int64_t call = calls - 30; call < calls - 14; ++call) {
+    SCOPED_TRACE(call);
+    killedAt(call);
+    most = std::max(most, readBrickLog(partial(), 1).size());
+    convertNow({true, false, call % 2 ? std::optional<uint64_t>(30000) : std::nullopt});
+    expectWhole();
+    if (HasFailure()) return;
+    fs::remove_all(output_);
+  }
+  EXPECT_EQ(most, 3u);
 }
 
 TEST_F(Resume, ReplacesAnOldCacheAtOnce) {
