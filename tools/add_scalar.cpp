@@ -9,6 +9,7 @@
 #include "stream/error.h"
 #include "tools/option_parsers.h"
 #include "tools/run_statistics.h"
+#include "tools/stop_signals.h"
 
 namespace curvisplat {
 namespace {
@@ -23,6 +24,7 @@ void checkWords(const ConvertWords& words) {
   refuse(!words.output.empty(), "--output");
   refuse(!words.scalars.empty(), "--scalar");
   refuse(words.overwrite, "--overwrite");
+  refuse(words.resume, "--resume");
 }
 
 uint64_t bytesOf(const AddScalarReport& report) {
@@ -71,6 +73,7 @@ void runAddScalar(ConvertWords words) {
   const auto source = openGrid(gridOptions(words, words.to));
   options.scalars = chooseScalars(words, words.added_scalars, source->description());
   Progress progress;
+  const StopOnSignals stopping(progress);
   const AddScalarReport report = addScalars(*source, options, progress);
   const nlohmann::json numbers = statistics(report, progress);
   for (const std::string& warning : source->description().warnings)

@@ -116,6 +116,19 @@ TEST_F(FileTest, MissingFilesAndFoldersAreRefused) {
   EXPECT_THROW(OutputFile(folder / "none" / "file"), Error);
 }
 
+TEST_F(FileTest, GoesOnWithAFileThatIsThere) {
+  writeFileAtomically(folder / "file", std::string("0123456789"));
+  OutputFile out(folder / "file", Caching::pages, OutputFile::Existing::kKeep);
+  EXPECT_EQ(out.size(), 10u);
+  out.truncate(4);
+  EXPECT_EQ(out.size(), 4u);
+  out.append(std::as_bytes(std::span("ab", 2)));
+  out.close();
+  EXPECT_EQ(readTextFile(folder / "file"), "0123ab");
+  OutputFile emptied(folder / "file");
+  EXPECT_EQ(emptied.size(), 0u);
+}
+
 TEST_F(FileTest, AnAtomicWriteThatFailsLeavesTheOldFile) {
   writeFileAtomically(folder / "file", std::string("old"));
   for (const char* stage : {"write", "sync", "rename"}) {

@@ -99,6 +99,7 @@ RunningProgram::~RunningProgram() {
 }
 
 void RunningProgram::signal(int number) const {
+  require(child_ > 0, ESRCH, "kill");  // -1 would be everyone
   require(kill(child_, number) == 0, errno, "kill");
 }
 
