@@ -9,6 +9,7 @@
 #include <cmath>
 #include <filesystem>
 #include <glm/matrix.hpp>
+#include <ostream>
 #include <string>
 
 #include "preprocess/open_grid.h"
@@ -28,6 +29,10 @@ struct RealGrid {
   const char* solution;
   const char* scalar;
 };
+
+void PrintTo(const RealGrid& grid, std::ostream* out) {
+  *out << grid.name;
+}
 
 constexpr RealGrid kBluntfin{"bluntfin", "bluntfin/bluntfinxyz.bin", "bluntfin/bluntfinq.bin", "density"};
 constexpr RealGrid kCombustor{"combustor", "combustor/combxyz.bin", "combustor/combq.bin", "density"};
