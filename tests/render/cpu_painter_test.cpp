@@ -108,6 +108,22 @@ TEST_P(OnEveryTarget, DrawsOpaqueSplatsAsSpecified) {
   }
 }
 
+// Parabolas may end below zero there by a rounding error, which is no optical depth.
+TEST_P(OnEveryTarget, IsRightWhereExtinctionEnds) {
+  const ImageSize size{80, 80};
+  const ClassificationTable ramp(
+      [](double f) {
+        return TransferFunction::Value{{f, 1 - f, 0.5}, 40 * std::max(0.0, f - 0.3)};
+      },
+      0, 1);
+  for (const float slope : {0.01f, 0.1f}) {
+    const auto splats = randomSplats(400, 17, size, slope, 5);
+    EXPECT_LT(
+        largestDifference(paint(splats, ramp, true, size), compositeSplats(splats, ramp, true, size, kWhite)),
+        4e-3);
+  }
+}
+
 TEST_P(OnEveryTarget, KeepsVeryThinSplats) {
   // Many layers whose optical depth a float next to 1 hardly tells from nothing.
   const ClassificationTable table([](double) { return TransferFunction::Value{glm::dvec3(0.0), 1}; }, 0, 1);
