@@ -73,6 +73,7 @@ void CpuPainter::begin(ImageSize size, const glm::vec4& background, const Classi
   if (size.width != state.size.width || size.height != state.size.height || threads != state.threads ||
       resources.batch_splats != state.batch_splats)
     state.allocate(size, threads, resources.batch_splats);
+  state.bins->clear();  // of a frame that was not ended
   const float clear[4] = {background.r, background.g, background.b, 1 - background.a};
   state.forTiles([&](size_t number) {
     float* at = state.tile(number);

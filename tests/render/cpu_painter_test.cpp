@@ -205,6 +205,16 @@ TEST(CpuPainter, DrawsFrameAfterFrame) {
   EXPECT_EQ(images[1].size.width, 32);
 }
 
+TEST(CpuPainter, ForgetsAFrameThatWasNotEnded) {
+  const ImageSize size{40, 30};
+  const std::vector<ScreenSplat> splats = randomSplats(50, 3, size);
+  CpuPainter painter;
+  painter.begin(size, kWhite, lively(), true, {});
+  painter.draw(splats);
+  painter.begin(size, kWhite, lively(), true, {});
+  EXPECT_EQ(painter.end().rgba, paint({}, lively(), true, size).rgba);
+}
+
 TEST(CpuPainter, FootprintIsClose) {
   const float* terms = footprintPolynomial();
   for (int n = 0; n <= 1000; ++n) {
