@@ -75,7 +75,8 @@ def report(results):
         print(f"  rate        {nodes / result['seconds'] / 1e6:8.2f} M nodes/s ({result['seconds']:.1f} s)")
         for phase in result["phases"]:
             print(f"  {phase['name']:<10}  {phase['seconds']:8.2f} s  {100 * phase['seconds'] / result['seconds']:5.1f} %  "
-                  f"{phase['cpu_seconds']:8.2f} s of CPU")
+                  f"{phase['cpu_seconds']:8.2f} s of CPU  {phase['bytes_read'] / nodes:6.1f} + {phase['bytes_written'] / nodes:5.1f} "
+                  f"bytes a node read + written  {phase['peak_memory_bytes'] / 2**20:6.1f} MiB peak so far")
         print(f"  peak        {result['peak_memory_bytes'] / 2**20:8.1f} MiB")
         print(f"  temporary   {result['temporary_bytes'] / nodes:8.2f} bytes a node")
         for name, size in result["files"].items():

@@ -1,7 +1,6 @@
 #include "stream/progress.h"
 
 #include <fmt/format.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,12 +11,6 @@ namespace {
 
 double secondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-double processCpuSeconds() {
-  timespec time{};
-  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
 std::string withUnit(double count) {
@@ -42,7 +35,7 @@ void Progress::begin(std::string phase, uint64_t total, std::string unit) {
   done_ = skipped_ = 0;
   next_draw_ms_ = 0;
   start_ = std::chrono::steady_clock::now();
-  cpu_start_s_ = processCpuSeconds();
+  usage_at_start_ = ProcessUsage::now();
 }
 
 void Progress::skip(uint64_t steps) {
@@ -60,7 +53,11 @@ void Progress::advance(uint64_t steps) {
 
 void Progress::end() {
   if (phase_.empty()) return;
-  phases_.push_back({phase_, unit_, secondsSince(start_), processCpuSeconds() - cpu_start_s_, done_});
+  ProcessUsage usage = ProcessUsage::now();
+  usage.cpu_seconds -= usage_at_start_.cpu_seconds;
+  usage.bytes_read -= usage_at_start_.bytes_read;
+  usage.bytes_written -= usage_at_start_.bytes_written;
+  phases_.push_back({phase_, unit_, secondsSince(start_), done_, usage});
   phase_.clear();
   if (terminal_) fmt::print(stderr, "\r\033[K");
 }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "stream/error.h"
+#include "stream/process_usage.h"
 
 namespace curvisplat {
 
@@ -55,8 +56,8 @@ class Progress {
     std::string name;
     std::string unit;
     double seconds = 0;
-    double cpu_seconds = 0;  // of all threads of the process, in the program and in the system
-    uint64_t steps = 0;      // without those that were skipped
+    uint64_t steps = 0;  // without those that were skipped
+    ProcessUsage usage;  // during the phase; but the peak of memory is that of all until its end
   };
   /// The phases that have ended, for --stats.
   const std::vector<Phase>& phases() const { return phases_; }
@@ -72,7 +73,7 @@ class Progress {
   static_assert(std::atomic<int>::is_always_lock_free);
   std::atomic<int64_t> next_draw_ms_ = 0;
   std::chrono::steady_clock::time_point start_;
-  double cpu_start_s_ = 0;
+  ProcessUsage usage_at_start_;
   std::mutex drawing_;  // guards the terminal
   std::vector<Phase> phases_;
 };

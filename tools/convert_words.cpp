@@ -33,9 +33,12 @@ void addPhases(const Progress& progress, nlohmann::json& json) {
   for (const Progress::Phase& phase : progress.phases())
     json["phases"].push_back({{"name", phase.name},
                               {"seconds", phase.seconds},
-                              {"cpu_seconds", phase.cpu_seconds},
+                              {"cpu_seconds", phase.usage.cpu_seconds},
                               {"steps", phase.steps},
-                              {"unit", phase.unit}});
+                              {"unit", phase.unit},
+                              {"bytes_read", phase.usage.bytes_read},
+                              {"bytes_written", phase.usage.bytes_written},
+                              {"peak_memory_bytes", phase.usage.peak_memory_bytes}});
 }
 
 double mebibytes(uint64_t bytes) {

@@ -12,6 +12,7 @@
 
 #include "stream/error.h"
 #include "stream/file.h"
+#include "stream/process_usage.h"
 
 namespace curvisplat {
 namespace {
@@ -22,13 +23,6 @@ std::vector<std::string> commandLine() {
   std::vector<std::string> arguments;
   for (std::string argument; std::getline(file, argument, '\0');) arguments.push_back(argument);
   return arguments;
-}
-
-uint64_t peakMemoryBytes() {
-  std::ifstream file("/proc/self/status");
-  for (std::string line; std::getline(file, line);)
-    if (line.starts_with("VmHWM:")) return std::stoull(line.substr(6)) * 1024;
-  throw Error("/proc/self/status: has no VmHWM, the peak of memory that --stats reports");
 }
 
 /// Field 22 of /proc/self/stat, in clock ticks since the machine's start. Field 2, the program's name in
@@ -59,7 +53,7 @@ nlohmann::json runStatistics() {
   return {{"program", "curvisplat"},
           {"version", CURVISPLAT_VERSION},
           {"command", commandLine()},
-          {"peak_memory_bytes", peakMemoryBytes()}};
+          {"peak_memory_bytes", ProcessUsage::now().peak_memory_bytes}};
 }
 
 void writeStatistics(const std::filesystem::path& path, const nlohmann::json& statistics) {
