@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "render/classification.h"
+#include "render/first_picture.h"
 #include "render/frame_budget.h"
 #include "render/frame_workers.h"
 #include "render/gl_painter.h"
@@ -13,8 +14,9 @@
 #include "render/kernel.h"
 #include "render/screen_view.h"
 #include "render/segment_ring.h"
-#include "stream/stage_timer.h"
 #include "stream/cut.h"
+#include "stream/error.h"
+#include "stream/stage_timer.h"
 
 namespace curvisplat {
 namespace {
@@ -29,10 +31,11 @@ ClassificationTable tableFor(const CacheReader& cache, size_t variable,
   return ClassificationTable::of(transfer_function, info.min, info.max);
 }
 
-ProjectionSettings settingsFor(const Manifest& manifest, const Camera& camera, const FrameOptions& options) {
+ProjectionSettings settingsFor(const Manifest& manifest, const Camera& camera, const FrameOptions& options,
+                               ImageSize size) {
   const double diagonal = glm::length(options.scale * (manifest.upper - manifest.lower));
   const double near = kNearInDiagonals * (diagonal > 0 ? diagonal : manifest.root.size);
-  return {ScreenView::of(camera, options.size, options.scale, options.low_pass_px2, near),
+  return {ScreenView::of(camera, size, options.scale, options.low_pass_px2, near),
           options.classification == Classification::pixel, options.clip_box};
 }
 
@@ -45,6 +48,13 @@ TransparentBounds transparentIn(const ClassificationTable& table, const Projecti
     return table.fullyTransparent(static_cast<float>(values.min - spread),
                                   static_cast<float>(values.max + spread));
   };
+}
+
+CutOptions limitsOf(const FrameOptions& options) {
+  CutOptions limits;
+  limits.lod_pixels = options.lod_pixels;
+  limits.max_splats = options.max_splats.value_or(CutOptions::kNoLimit);
+  return limits;
 }
 
 }  // namespace
@@ -61,10 +71,11 @@ struct FrameRenderer::State {
     gl.run([this](const GlContext&) { painter.reset(); });
   }
 
-  Cut plan(const ProjectionSettings& settings, double lod_pixels) const {
-    return chooseCut(cache.manifest().root, cache.bricks(), cache.brickVariables(variable), subtrees,
-                     settings.view.cutView(), transparentIn(table, settings), lod_pixels);
-  }
+  /// Throws UsageError if options.max_splats are too few.
+  Cut plan(const ProjectionSettings& settings, const FrameOptions& options, const CutOptions& limits) const;
+  /// The picture has the size of settings.view; memory is shared out for one of options.size.
+  Image draw(const Cut& cut, const ProjectionSettings& settings, const FrameOptions& options,
+             FrameStatistics& statistics, Progress* progress);
 
   uint64_t indexBytes() const {
     return cache.bricks().size() *
@@ -89,54 +100,94 @@ const std::string& FrameRenderer::backendName() const {
   return state_->gl.contextName();
 }
 
+Cut FrameRenderer::State::plan(const ProjectionSettings& settings, const FrameOptions& options,
+                               const CutOptions& limits) const {
+  const CutTree tree{cache.manifest().root, cache.bricks(), cache.brickVariables(variable), subtrees};
+  Cut cut = chooseCut(tree, settings.view.cutView(), transparentIn(table, settings), limits);
+  if (options.max_splats && cut.splats > *options.max_splats)
+    throw UsageError(
+        "{} splats are too few: the coarsest picture of this cache takes {}; give --max-splats that",
+        *options.max_splats, cut.splats);
+  return cut;
+}
+
+Image FrameRenderer::State::draw(const Cut& cut, const ProjectionSettings& settings,
+                                 const FrameOptions& options, FrameStatistics& statistics,
+                                 Progress* progress) {
+  Image image;
+  const FrameBudget budget =
+      FrameBudget::of(options.memory_bytes, indexBytes(), options.size, options.threads);
+  if (progress) progress->begin("drawing", cut.parts.size(), "bricks");
+
+  SegmentRing ring(budget.ring_splats);
+  FrameWorkers workers({cache, variable, cut.parts, settings, table}, ring, budget.workers);
+  gl.run([&](const GlContext&) {
+    painter->begin(settings.view.size, options.background, table, settings.per_pixel);
+    for (size_t drawn = 0; drawn < cut.parts.size(); ++drawn) {
+      std::optional<std::span<const ScreenSplat>> segment;
+      {
+        const StageTimer timer(statistics.painter_waited_s);
+        segment = ring.next();
+      }
+      if (!segment) return;  // a worker has failed
+      painter->draw(*segment);
+      ring.release();
+      if (progress) progress->advance(1);
+    }
+    image = painter->end();
+  });
+  workers.finish(statistics);
+  if (progress) progress->end();
+
+  statistics.upload_s = painter->uploadSeconds();
+  statistics.draw_s = painter->drawSeconds();
+  statistics.bricks_drawn = cut.parts.size();
+  statistics.bricks_out_of_image = cut.out_of_image;
+  statistics.bricks_transparent = cut.transparent;
+  statistics.bricks_culled = cut.out_of_image + cut.transparent;
+  statistics.largest_level = static_cast<int>(cut.deepest_level);
+  statistics.largest_error_px = cut.largest_error_px;
+  statistics.workers = budget.workers;
+  return image;
+}
+
 Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                             Progress* progress) {
-  State& state = *state_;
   statistics = {};
-  Image image;
+  const StageTimer total(statistics.total_s);
+  const ProjectionSettings settings = settingsFor(state_->cache.manifest(), camera, options, options.size);
+  Cut cut;
+  {
+    const StageTimer timer(statistics.plan_s);
+    cut = state_->plan(settings, options, limitsOf(options));
+  }
+  return state_->draw(cut, settings, options, statistics, progress);
+}
+
+void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions& options,
+                                        FrameStatistics& statistics, const ShowPicture& show,
+                                        Progress* progress) {
+  statistics = {};
+  Image first;
+  bool is_final = false;
   {
     const StageTimer total(statistics.total_s);
-    const ProjectionSettings settings = settingsFor(state.cache.manifest(), camera, options);
-    const FrameBudget budget =
-        FrameBudget::of(options.memory_bytes, state.indexBytes(), options.size, options.threads);
+    const Manifest& manifest = state_->cache.manifest();
+    ProjectionSettings settings = settingsFor(manifest, camera, options, options.size);
     Cut cut;
     {
       const StageTimer timer(statistics.plan_s);
-      cut = state.plan(settings, options.lod_pixels);
+      cut = state_->plan(settings, options, firstPictureLimits(limitsOf(options)));
     }
-    if (progress) progress->begin("drawing", cut.bricks.size(), "bricks");
-
-    SegmentRing ring(budget.ring_splats);
-    FrameWorkers workers({state.cache, state.variable, cut.bricks, settings, state.table}, ring,
-                         budget.workers);
-    state.gl.run([&](const GlContext&) {
-      state.painter->begin(options.size, options.background, state.table, settings.per_pixel);
-      for (size_t drawn = 0; drawn < cut.bricks.size(); ++drawn) {
-        std::optional<std::span<const ScreenSplat>> segment;
-        {
-          const StageTimer timer(statistics.painter_waited_s);
-          segment = ring.next();
-        }
-        if (!segment) return;  // a worker has failed
-        state.painter->draw(*segment);
-        ring.release();
-        if (progress) progress->advance(1);
-      }
-      image = state.painter->end();
-    });
-    workers.finish(statistics);
-    if (progress) progress->end();
-
-    statistics.upload_s = state.painter->uploadSeconds();
-    statistics.draw_s = state.painter->drawSeconds();
-    statistics.bricks_drawn = cut.bricks.size();
-    statistics.bricks_out_of_image = cut.out_of_image;
-    statistics.bricks_transparent = cut.transparent;
-    statistics.bricks_culled = cut.out_of_image + cut.transparent;
-    statistics.largest_level = static_cast<int>(cut.deepest_level);
-    statistics.workers = budget.workers;
+    is_final = cut.complete;
+    const ReducedSize reduced(options.size, is_final ? 0 : cut.largest_error_px);
+    if (!reduced.isWhole()) settings = settingsFor(manifest, camera, options, reduced.size());
+    first = state_->draw(cut, settings, options, statistics, progress);
+    if (!reduced.isWhole()) first = reduced.enlarge(first);
   }
-  return image;
+  show(first, is_final);
+  first = Image();
+  if (!is_final) show(render(camera, options, statistics, progress), true);
 }
 
 }  // namespace curvisplat

@@ -6,9 +6,13 @@
 // Bricks are prepared by workers in any order and drawn in the cut's order; what is prepared and not yet
 // drawn is bounded. The same cache, view and options give the same image bit for bit, for any number of
 // threads.
+//
+// A progressive frame is two: a first picture of the coarse levels, little enough to be read and drawn in a
+// fraction of a second whatever the size of the cache, and then the frame that render() draws.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 #include <memory>
@@ -29,12 +33,13 @@ enum class Classification { pixel, flat };  // flat: one colour and extinction a
 struct FrameOptions {
   ImageSize size;
   Classification classification = Classification::pixel;
-  double lod_pixels = 1;             // screen-space error allowed; 0 is the finest level
-  glm::dvec3 scale{1.0};             // stretches the data: D S Dᵀ, V det D, about the world's origin
-  std::optional<WorldBox> clip_box;  // splats whose centre is outside are not drawn
-  glm::vec4 background{1, 1, 1, 1};  // premultiplied
-  double low_pass_px2 = 1.5;         // added to S2's diagonal; design section 3
-  unsigned threads = 0;              // workers; 0: one a core
+  double lod_pixels = 1;               // screen-space error allowed; 0 is the finest level
+  std::optional<uint64_t> max_splats;  // read at most these, from the levels that make the best of them
+  glm::dvec3 scale{1.0};               // stretches the data: D S Dᵀ, V det D, about the world's origin
+  std::optional<WorldBox> clip_box;    // splats whose centre is outside are not drawn
+  glm::vec4 background{1, 1, 1, 1};    // premultiplied
+  double low_pass_px2 = 1.5;           // added to S2's diagonal; design section 3
+  unsigned threads = 0;                // workers; 0: one a core
   uint64_t memory_bytes = 512 << 20;
 };
 
@@ -43,7 +48,7 @@ struct FrameStatistics {
   double plan_s = 0, read_s = 0, decode_s = 0, project_s = 0, sort_s = 0, upload_s = 0, draw_s = 0,
          total_s = 0;
   double workers_waited_s = 0, painter_waited_s = 0;
-  uint64_t bricks_drawn = 0;
+  uint64_t bricks_drawn = 0;   // in whole or in part; one that is drawn in several parts counts for each
   uint64_t bricks_culled = 0;  // each stands for all below it; those are
   uint64_t bricks_out_of_image = 0, bricks_transparent = 0;
   uint64_t splats_read = 0;
@@ -51,6 +56,7 @@ struct FrameStatistics {
   uint64_t splats_drawn = 0;
   uint64_t bytes_read = 0;
   int largest_level = 0;
+  double largest_error_px = 0;  // on the screen, of what is drawn; infinite around a perspective eye
   unsigned workers = 0;
 };
 
@@ -63,11 +69,19 @@ class FrameRenderer {
   FrameRenderer(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function);
   ~FrameRenderer();
 
-  /// Throws UsageError for a view that makes no picture and for too little memory (how much it takes), Error
-  /// where reading or drawing fails; the renderer can be used again after either. `statistics` is
-  /// overwritten.
+  /// Throws UsageError for a view that makes no picture and for too little memory or max_splats (how much it
+  /// takes), Error where reading or drawing fails; the renderer can be used again after either. `statistics`
+  /// is overwritten.
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                Progress* progress = nullptr);
+
+  using ShowPicture = std::function<void(const Image& image, bool is_final)>;
+  /// Calls `show` with a first, coarse picture and then with the one that render() returns, bit for bit; once
+  /// if the first is as fine. `statistics` is of the picture shown, and set before each call. Throws what
+  /// render() and `show` throw.
+  void renderProgressively(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
+                           const ShowPicture& show, Progress* progress = nullptr);
+
   /// "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
   const std::string& backendName() const;
 

@@ -61,7 +61,7 @@ void FrameWorkers::loop(FrameStatistics& statistics) {
     WorkerScratch scratch;
     while (true) {
       const uint64_t sequence = next_++;
-      if (sequence >= work_.bricks.size()) return;
+      if (sequence >= work_.parts.size()) return;
       if (!prepare(scratch, sequence, statistics)) return;
     }
   } catch (...) {
@@ -74,7 +74,7 @@ void FrameWorkers::loop(FrameStatistics& statistics) {
 }
 
 bool FrameWorkers::prepare(WorkerScratch& scratch, uint64_t sequence, FrameStatistics& statistics) {
-  const uint32_t id = work_.bricks[sequence];
+  const auto [id, octants] = work_.parts[sequence];
   const Brick& brick = work_.cache.bricks()[id];
   ReadTimes times;
   work_.cache.readGeometry(id, scratch.geometry, nullptr, &times);
@@ -83,8 +83,9 @@ bool FrameWorkers::prepare(WorkerScratch& scratch, uint64_t sequence, FrameStati
   statistics.decode_s += times.decode_s;
   {
     const StageTimer timer(statistics.project_s);
+    const SplatRanges ranges(brick, octants);
     scratch.projector.project(work_.settings, work_.table, work_.cache.manifest().root.cellMin(brick.cell),
-                              scratch.geometry, scratch.values);
+                              scratch.geometry, scratch.values, {ranges.begin(), ranges.end()});
   }
   const std::vector<ScreenSplat>& splats = scratch.projector.splats();
   std::span<const uint32_t> order;

@@ -1,5 +1,5 @@
-// The workers of a frame: they take the cut's bricks in sequence and read, decode, project and sort each into
-// its segment of the ring.
+// The workers of a frame: they take the cut's bricks, or parts of them, in sequence and read, decode, project
+// and sort each into its segment of the ring.
 #pragma once
 
 #include <atomic>
@@ -23,7 +23,7 @@ namespace curvisplat {
 struct FrameWork {
   const CacheReader& cache;
   size_t variable;
-  std::span<const uint32_t> bricks;  // in drawing order
+  std::span<const BrickPart> parts;  // in drawing order
   const ProjectionSettings& settings;
   const ClassificationTable& table;
 };
@@ -37,7 +37,7 @@ class FrameWorkers {
   FrameWorkers(const FrameWorkers&) = delete;
   FrameWorkers& operator=(const FrameWorkers&) = delete;
 
-  /// Waits for the workers' end: all bricks are in the ring, it was closed, or one of them failed, which
+  /// Waits for the workers' end: all parts are in the ring, it was closed, or one of them failed, which
   /// closes it. Rethrows the first failure. Adds what they did to `statistics`. Once.
   void finish(FrameStatistics& statistics);
 
@@ -49,7 +49,7 @@ class FrameWorkers {
 
   const FrameWork work_;
   SegmentRing& ring_;
-  std::atomic<uint64_t> next_ = 0;  // sequence number that nobody has taken
+  std::atomic<uint64_t> next_ = 0;  // sequence number of a part that nobody has taken
   std::mutex failing_;              // guards first_failure_
   std::exception_ptr first_failure_;
   std::vector<FrameStatistics> statistics_;  // [thread]
