@@ -53,8 +53,9 @@ struct LocalBox {
   }
 };
 
-void computeBlock(const OrthographicMap& map, const LocalBox& clip, const SplatGeometry& geometry,
-                  const SplatVariable& variable, size_t begin, size_t count, Block& block) {
+void computeBlock(const OrthographicMap& map, const LocalBox& clip,
+                  const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
+                  size_t begin, size_t count, Block& block) {
 #pragma GCC ivdep
   for (size_t n = 0; n < count; ++n) {
     const size_t i = begin + n;
@@ -69,8 +70,9 @@ void computeBlock(const OrthographicMap& map, const LocalBox& clip, const SplatG
   }
 }
 
-void computeBlock(const PerspectiveMap& map, const LocalBox& clip, const SplatGeometry& geometry,
-                  const SplatVariable& variable, size_t begin, size_t count, Block& block) {
+void computeBlock(const PerspectiveMap& map, const LocalBox& clip,
+                  const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
+                  size_t begin, size_t count, Block& block) {
 #pragma GCC ivdep
   for (size_t n = 0; n < count; ++n) {
     const size_t i = begin + n;
@@ -134,16 +136,16 @@ class Chooser {
 };
 
 /// What cutting needs beside the arithmetic loop's results; orthographic splats are never cut.
-std::optional<Chooser::Fate> chooseCut(const OrthographicMap&, const SplatGeometry&, const SplatVariable&,
-                                       size_t, Chooser&, size_t&) {
+std::optional<Chooser::Fate> chooseCut(const OrthographicMap&, const GeometryArrays<const float>&,
+                                       const VariableArrays<const float>&, size_t, Chooser&, size_t&) {
   return Chooser::Fate::off_screen;
 }
 
 /// Cuts splat `i` up and chooses among its pieces: the best fate of any. Nothing if there are more pieces
 /// than `pieces_left`, which it counts down.
-std::optional<Chooser::Fate> chooseCut(const PerspectiveMap& map, const SplatGeometry& geometry,
-                                       const SplatVariable& variable, size_t i, Chooser& chooser,
-                                       size_t& pieces_left) {
+std::optional<Chooser::Fate> chooseCut(const PerspectiveMap& map, const GeometryArrays<const float>& geometry,
+                                       const VariableArrays<const float>& variable, size_t i,
+                                       Chooser& chooser, size_t& pieces_left) {
   const SplatPiece whole{{geometry.x[i], geometry.y[i], geometry.z[i]},
                          shapeOf(geometry, i),
                          slopeOf(variable, i),
@@ -168,8 +170,8 @@ std::optional<Chooser::Fate> chooseCut(const PerspectiveMap& map, const SplatGeo
 
 /// False if the brick would give too many pieces.
 template <typename Map>
-bool projectWith(const Map& map, const LocalBox& clip, const SplatGeometry& geometry,
-                 const SplatVariable& variable, Chooser& chooser, ProjectionCounts& counts) {
+bool projectWith(const Map& map, const LocalBox& clip, const GeometryArrays<const float>& geometry,
+                 const VariableArrays<const float>& variable, Chooser& chooser, ProjectionCounts& counts) {
   Block block;
   size_t pieces_left = BrickProjector::kMostPieces;
   for (size_t begin = 0; begin < geometry.size(); begin += kBlock) {
@@ -216,8 +218,8 @@ BrickProjector::BrickProjector() {
 }
 
 void BrickProjector::project(const ProjectionSettings& settings, const ClassificationTable& table,
-                             const glm::dvec3& cell_min, const SplatGeometry& geometry,
-                             const SplatVariable& variable) {
+                             const glm::dvec3& cell_min, const GeometryArrays<const float>& geometry,
+                             const VariableArrays<const float>& variable) {
   CURVISPLAT_CHECK_OP(geometry.size(), ==, variable.size());
   const LocalBox clip(settings.clip_box, cell_min);
   Chooser chooser(settings, table, splats_, depths_);

@@ -73,7 +73,12 @@ class BrickProjector {
   /// into two that merge into them exactly, until they are small for their distance; what then lies before
   /// the near plane is dropped. Overwrites splats() and depths(). Pure.
   void project(const ProjectionSettings& settings, const ClassificationTable& table,
-               const glm::dvec3& cell_min, const SplatGeometry& geometry, const SplatVariable& variable);
+               const glm::dvec3& cell_min, const GeometryArrays<const float>& geometry,
+               const VariableArrays<const float>& variable);
+  void project(const ProjectionSettings& settings, const ClassificationTable& table,
+               const glm::dvec3& cell_min, const SplatGeometry& geometry, const SplatVariable& variable) {
+    project(settings, table, cell_min, arraysOf(geometry), arraysOf(variable));
+  }
 
   /// In the brick's order.
   const std::vector<ScreenSplat>& splats() const { return splats_; }
