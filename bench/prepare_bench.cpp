@@ -1,8 +1,8 @@
-// What a frame's worker does with one brick after the other, on one core, from memory: verify, decode, project
-// and sort, each alone and all together. Items are splats.
+// What a frame's worker does with one brick after the other, on one core, from memory: verify, decode,
+// project and sort, each alone and all together. Items are splats.
 //
-// The bricks are those of a cache: CURVISPLAT_BENCH_CACHE=CACHE names it; otherwise a half annulus of 2 M nodes
-// in single precision is converted first, into the temporary folder.
+// The bricks are those of a cache: CURVISPLAT_BENCH_CACHE=CACHE names it; otherwise a half annulus of 2 M
+// nodes in single precision is converted first, into the temporary folder.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
@@ -18,8 +18,8 @@
 #include "render/projection.h"
 #include "render/transfer_function.h"
 #include "stream/brick_codec.h"
-#include "stream/cache_reader.h"
 #include "stream/cache_index.h"
+#include "stream/cache_reader.h"
 #include "stream/checksum.h"
 #include "stream/file.h"
 #include "stream/progress.h"
@@ -168,8 +168,9 @@ void prepare(benchmark::State& state, bool decode, bool sort) {
         decodeOne(n, 0);
       }
       const size_t from = decode ? 0 : n;
-      projector.project(view.settings, view.table, cache.manifest().root.cellMin(cache.bricks()[brick.id].cell),
-                        geometry[from], values[from]);
+      projector.project(view.settings, view.table,
+                        cache.manifest().root.cellMin(cache.bricks()[brick.id].cell), geometry[from],
+                        values[from]);
       drawn += projector.counts().drawn;
       if (!sort) continue;
       const auto order = sorter.farthestFirst(projector.depths());
@@ -189,10 +190,10 @@ void projectAndSort(benchmark::State& state) {
 void decodeProjectAndSort(benchmark::State& state) {
   prepare(state, true, true);
 }
-#define CURVISPLAT_PREPARE(name)                  \
-  BENCHMARK(name)                                 \
-      ->ArgNames({"leaves", "perspective"})       \
-      ->ArgsProduct({{1, 0}, {0, 1}})             \
+#define CURVISPLAT_PREPARE(name)            \
+  BENCHMARK(name)                           \
+      ->ArgNames({"leaves", "perspective"}) \
+      ->ArgsProduct({{1, 0}, {0, 1}})       \
       ->Unit(benchmark::kMillisecond)
 CURVISPLAT_PREPARE(project);
 CURVISPLAT_PREPARE(projectAndSort);

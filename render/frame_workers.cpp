@@ -1,7 +1,7 @@
 #include "render/frame_workers.h"
 
 #include "render/depth_sort.h"
-#include "render/thread_name.h"
+#include "stream/thread_name.h"
 #include "stream/stage_timer.h"
 
 namespace curvisplat {
