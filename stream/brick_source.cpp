@@ -162,8 +162,7 @@ void BrickSource::stop() {
   pager_.stop();
 }
 
-FetchStatistics BrickSource::finish() {
-  FetchStatistics statistics;
+void BrickSource::finish(FetchStatistics& statistics) {
   const PagerStatistics after = pager_.statistics();
   pager_.stop();
   pins_.clear();
@@ -177,7 +176,6 @@ FetchStatistics BrickSource::finish() {
   statistics.bricks_read = reads_;
   statistics.cache_peak_bytes = cached_.statistics().peak_bytes;
   statistics.pager_peak_bytes = after.peak_bytes;
-  return statistics;
 }
 
 }  // namespace curvisplat

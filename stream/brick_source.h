@@ -70,9 +70,9 @@ class BrickSource {
 
   /// Wakes who waits in take() or prefetchNext(). Any thread.
   void stop();
-  /// After the last take() of a frame: lets go of what was not taken. The part of what was counted since
-  /// start(); the workers' sums are left out.
-  FetchStatistics finish();
+  /// After the last take() of a frame: lets go of what was not taken. Tells what was counted since start();
+  /// the workers' sums are left as they are.
+  void finish(FetchStatistics& statistics);
 
   const BrickCache& cached() const { return cached_; }
 
