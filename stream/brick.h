@@ -63,6 +63,7 @@ struct SplatRange {
 /// are at most four.
 class SplatRanges {
  public:
+  explicit SplatRanges(const SplatRange& range) { add(range); }
   SplatRanges(const Brick& brick, uint8_t octants) {
     if (octants == kAllOctants) {
       add({0, brick.splats});

@@ -39,6 +39,7 @@ struct RenderWords {
   std::optional<std::string> range, opacity_unit, clip_box, frame_rate;
   std::optional<uint64_t> max_splats;
   unsigned threads = 0;
+  bool keep_going = false;
 };
 
 WorldBox parseClipBox(const std::string& text) {
@@ -68,6 +69,7 @@ FrameOptions frameOptions(const RenderWords& words) {
   options.background = parseBackground("--background", words.background);
   options.threads = words.threads;
   options.memory_bytes = parseByteSize("--memory", words.memory);
+  options.keep_going = words.keep_going;
   return options;
 }
 
@@ -133,7 +135,7 @@ class FrameRun {
     if (moves) progress_.begin("drawing", motion.frames, "frames");
     for (uint64_t number = 0; number < motion.frames; ++number) {
       try {
-        draw(number, motion.camera(number), moves ? nullptr : &progress_);
+        draw(motion, number, moves ? nullptr : &progress_);
       } catch (const UsageError& error) {
         if (moves) throw UsageError("frame {}: {}", number, error.what());
         throw;
@@ -148,10 +150,13 @@ class FrameRun {
   }
 
  private:
-  void draw(uint64_t number, const Camera& camera, Progress* progress) {
+  void draw(const CameraMotion& motion, uint64_t number, Progress* progress) {
+    const Camera camera = motion.camera(number);
     FrameStatistics statistics;
     if (number > 0 || words_.first_image.empty()) {
-      finish(number, camera, renderer_.render(camera, report_.options, statistics, progress), statistics);
+      const Image image = renderer_.render(camera, report_.options, statistics, progress);
+      if (number + 1 < motion.frames) prefetch(motion, number + 1);
+      finish(number, camera, image, statistics);
       return;
     }
     const auto show = [&](const Image& image, bool is_final) {
@@ -165,14 +170,29 @@ class FrameRun {
     renderer_.renderProgressively(camera, report_.options, statistics, show, progress);
   }
 
+  /// A frame's bricks come in while the picture before it is written.
+  void prefetch(const CameraMotion& motion, uint64_t number) {
+    try {
+      renderer_.prefetch(motion.camera(number), report_.options);
+    } catch (const Error&) {
+      // Told when it is that frame's turn.
+    }
+  }
+
   void finish(uint64_t number, const Camera& camera, const Image& image, const FrameStatistics& statistics) {
     output_.write(number, image);
     if (number == 0 && !report_.first_image) report_.time_to_first_image_s = secondsSinceStart();
     report_.frames.push_back({camera, statistics});
+    const std::string which = words_.camera.moves() ? fmt::format(" of frame {}", number) : "";
+    if (!statistics.bricks_unreadable.empty()) {
+      progress_.end();
+      tell("warning", fmt::format("{} of {} bricks{} cannot be read, and are drawn coarser or left out: {}",
+                                  statistics.bricks_unreadable.size(), statistics.bricks_drawn, which,
+                                  statistics.bricks_unreadable.front().reason));
+    }
     if (said_empty_ || !isEmpty(image, report_.options.background)) return;
     said_empty_ = true;
     progress_.end();
-    const std::string which = words_.camera.moves() ? fmt::format(" of frame {}", number) : "";
     const RenderedScene scene{manifest_, report_.variable, report_.transfer_function,
                               camera,    report_.options,  statistics};
     for (const std::string& reason : whyEmpty(scene))
@@ -311,6 +331,11 @@ void addRender(CLI::App& app) {
       ->group(how);
   command->add_option("--threads", words->threads, "Workers; 0: one a core")
       ->capture_default_str()
+      ->group(how);
+  command
+      ->add_flag(
+          "--keep-going", words->keep_going,
+          "Draw bricks that cannot be read from a coarser level, and say so; otherwise they are errors")
       ->group(how);
   command
       ->add_option("--first-image", words->first_image,

@@ -1,7 +1,6 @@
 #include "tools/render_statistics.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -12,35 +11,48 @@ namespace {
 
 using Json = nlohmann::json;
 
-struct Seconds {
+template <typename T>
+struct Named {
   const char* name;
-  double FrameStatistics::*value;
+  T (*value)(const FrameStatistics&);
 };
-constexpr std::array<Seconds, 10> kSeconds{{{"plan", &FrameStatistics::plan_s},
-                                            {"read", &FrameStatistics::read_s},
-                                            {"decode", &FrameStatistics::decode_s},
-                                            {"project", &FrameStatistics::project_s},
-                                            {"sort", &FrameStatistics::sort_s},
-                                            {"upload", &FrameStatistics::upload_s},
-                                            {"draw", &FrameStatistics::draw_s},
-                                            {"total", &FrameStatistics::total_s},
-                                            {"workers_waited", &FrameStatistics::workers_waited_s},
-                                            {"painter_waited", &FrameStatistics::painter_waited_s}}};
 
-struct Count {
-  const char* name;
-  uint64_t FrameStatistics::*value;
+constexpr Named<double> kSeconds[] = {
+    {"plan", [](const FrameStatistics& s) { return s.plan_s; }},
+    {"read", [](const FrameStatistics& s) { return s.read_s; }},
+    {"verify", [](const FrameStatistics& s) { return s.fetch.verify_s; }},
+    {"decode", [](const FrameStatistics& s) { return s.decode_s; }},
+    {"project", [](const FrameStatistics& s) { return s.project_s; }},
+    {"sort", [](const FrameStatistics& s) { return s.sort_s; }},
+    {"upload", [](const FrameStatistics& s) { return s.upload_s; }},
+    {"draw", [](const FrameStatistics& s) { return s.draw_s; }},
+    {"total", [](const FrameStatistics& s) { return s.total_s; }},
+    {"workers_waited_for_reads", [](const FrameStatistics& s) { return s.fetch.waited_s; }},
+    {"workers_waited_for_painter", [](const FrameStatistics& s) { return s.workers_waited_s; }},
+    {"painter_waited", [](const FrameStatistics& s) { return s.painter_waited_s; }},
 };
-constexpr std::array<Count, 10> kCounts{{{"bricks_drawn", &FrameStatistics::bricks_drawn},
-                                         {"bricks_culled", &FrameStatistics::bricks_culled},
-                                         {"bricks_out_of_image", &FrameStatistics::bricks_out_of_image},
-                                         {"bricks_transparent", &FrameStatistics::bricks_transparent},
-                                         {"splats_read", &FrameStatistics::splats_read},
-                                         {"splats_clipped", &FrameStatistics::splats_clipped},
-                                         {"splats_off_screen", &FrameStatistics::splats_off_screen},
-                                         {"splats_transparent", &FrameStatistics::splats_transparent},
-                                         {"splats_drawn", &FrameStatistics::splats_drawn},
-                                         {"bytes_read", &FrameStatistics::bytes_read}}};
+
+constexpr Named<uint64_t> kCounts[] = {
+    {"bricks_drawn", [](const FrameStatistics& s) { return s.bricks_drawn; }},
+    {"bricks_cached", [](const FrameStatistics& s) { return s.fetch.bricks_cached; }},
+    {"bricks_read", [](const FrameStatistics& s) { return s.fetch.bricks_read; }},
+    {"bricks_culled", [](const FrameStatistics& s) { return s.bricks_culled; }},
+    {"bricks_out_of_image", [](const FrameStatistics& s) { return s.bricks_out_of_image; }},
+    {"bricks_transparent", [](const FrameStatistics& s) { return s.bricks_transparent; }},
+    {"splats_read", [](const FrameStatistics& s) { return s.splats_read; }},
+    {"splats_clipped", [](const FrameStatistics& s) { return s.splats_clipped; }},
+    {"splats_off_screen", [](const FrameStatistics& s) { return s.splats_off_screen; }},
+    {"splats_transparent", [](const FrameStatistics& s) { return s.splats_transparent; }},
+    {"splats_drawn", [](const FrameStatistics& s) { return s.splats_drawn; }},
+    {"bytes_read", [](const FrameStatistics& s) { return s.bytes_read; }},
+    {"read_requests", [](const FrameStatistics& s) { return s.fetch.read_requests; }},
+    {"cache_peak_bytes", [](const FrameStatistics& s) { return s.fetch.cache_peak_bytes; }},
+    {"pager_peak_bytes", [](const FrameStatistics& s) { return s.fetch.pager_peak_bytes; }},
+    {"ring_peak_bytes", [](const FrameStatistics& s) { return s.ring_peak_bytes; }},
+};
+
+constexpr Named<double> kQueueDepth{"mean_queue_depth",
+                                    [](const FrameStatistics& s) { return s.fetch.mean_queue_depth; }};
 
 Json toJson(const glm::dvec3& v) {
   return {v.x, v.y, v.z};
@@ -69,20 +81,25 @@ Json toJson(const TransferFunction& function) {
 
 Json toJson(const FrameStatistics& statistics) {
   Json json;
-  for (const Seconds& seconds : kSeconds) json["seconds"][seconds.name] = statistics.*seconds.value;
-  for (const Count& count : kCounts) json[count.name] = statistics.*count.value;
+  for (const auto& seconds : kSeconds) json["seconds"][seconds.name] = seconds.value(statistics);
+  for (const auto& count : kCounts) json[count.name] = count.value(statistics);
+  json[kQueueDepth.name] = kQueueDepth.value(statistics);
+  json["read_by"] = statistics.fetch.way;
   json["largest_level"] = statistics.largest_level;
   json["largest_error_px"] = nullptr;  // around a perspective eye
   if (std::isfinite(statistics.largest_error_px)) json["largest_error_px"] = statistics.largest_error_px;
   json["workers"] = statistics.workers;
+  json["bricks_unreadable"] = Json::array();
+  for (const BrickFailure& failure : statistics.bricks_unreadable)
+    json["bricks_unreadable"].push_back({{"brick", failure.brick}, {"reason", failure.reason}});
   return json;
 }
 
 /// Percentiles are values that occur: the smallest that as many frames do not exceed.
 template <typename T>
-Json spread(const std::vector<FrameReport>& frames, T FrameStatistics::*value) {
+Json spread(const std::vector<FrameReport>& frames, const Named<T>& of) {
   std::vector<T> values;
-  for (const FrameReport& frame : frames) values.push_back(frame.statistics.*value);
+  for (const FrameReport& frame : frames) values.push_back(of.value(frame.statistics));
   std::sort(values.begin(), values.end());
   const auto percentile = [&](size_t percent) { return values[(values.size() * percent + 99) / 100 - 1]; };
   return {{"p50", percentile(50)}, {"p95", percentile(95)}, {"max", values.back()}};
@@ -90,8 +107,9 @@ Json spread(const std::vector<FrameReport>& frames, T FrameStatistics::*value) {
 
 Json overFrames(const std::vector<FrameReport>& frames) {
   Json json{{"frames", frames.size()}};
-  for (const Seconds& seconds : kSeconds) json["seconds"][seconds.name] = spread(frames, seconds.value);
-  for (const Count& count : kCounts) json[count.name] = spread(frames, count.value);
+  for (const auto& seconds : kSeconds) json["seconds"][seconds.name] = spread(frames, seconds);
+  for (const auto& count : kCounts) json[count.name] = spread(frames, count);
+  json[kQueueDepth.name] = spread(frames, kQueueDepth);
   return json;
 }
 
