@@ -51,7 +51,8 @@ class ClassificationTable {
   bool logScale() const { return log_scale_; }
   float scale() const { return static_cast<float>(scale_); }
   float bias() const { return static_cast<float>(bias_); }
-  std::span<const glm::vec4> cumulative() const { return cumulative_; }  // [kCells + 1]
+  std::span<const glm::vec4> cumulative() const { return cumulative_; }   // [kCells + 1]
+  std::span<const glm::dvec4> exactCumulative() const { return exact_; }  // the same, not rounded
   glm::vec4 below() const { return glm::vec4(below_); }
   glm::vec4 above() const { return glm::vec4(above_); }
 

@@ -17,8 +17,8 @@ auto timed(double& seconds, const Work& work) {
 }  // namespace
 
 struct FrameRenderer::State {
-  State(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function)
-      : planner(cache, variable, transfer_function), pipeline(cache, variable, planner) {}
+  State(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function, Backend backend)
+      : planner(cache, variable, transfer_function), pipeline(cache, variable, planner, backend) {}
 
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                Progress* progress) {
@@ -33,8 +33,8 @@ struct FrameRenderer::State {
 };
 
 FrameRenderer::FrameRenderer(const CacheReader& cache, size_t variable,
-                             const TransferFunction& transfer_function)
-    : state_(std::make_unique<State>(cache, variable, transfer_function)) {}
+                             const TransferFunction& transfer_function, Backend backend)
+    : state_(std::make_unique<State>(cache, variable, transfer_function, backend)) {}
 
 FrameRenderer::~FrameRenderer() = default;
 

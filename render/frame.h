@@ -1,6 +1,6 @@
 // One frame: the pipeline of design section 6, as a call.
 //
-//   plan (the cut, back to front) -> read -> prepare (workers: decode, project, sort) -> draw (the GL thread)
+//   plan (the cut, back to front) -> read -> prepare (workers: decode, project, sort) -> draw (a painter)
 //   -> image
 //
 // Bricks are prepared by workers in any order and drawn in the cut's order; what is prepared and not yet
@@ -21,6 +21,7 @@
 #include <string>
 #include <vector>
 
+#include "render/backend.h"
 #include "render/camera.h"
 #include "render/image.h"
 #include "render/projection.h"
@@ -82,14 +83,14 @@ struct FrameStatistics {
   std::vector<BrickFailure> bricks_unreadable;  // with keep_going; by number
 };
 
-/// Draws frames of one variable of one cache. Owns the GL thread and its context, the pager and the workers,
-/// and the memory that they share: decoded bricks stay for the next frame. One caller at a time (but see
-/// cancel()); the cache outlives it.
+/// Draws frames of one variable of one cache. Owns what reads, prepares and draws, and the memory that
+/// they share: decoded bricks stay for the next frame. One caller at a time (but see cancel()); the cache
+/// outlives it.
 class FrameRenderer {
  public:
-  /// Starts the GL thread. Throws Error if there is no context to be had: which library was tried, and what
-  /// it said.
-  FrameRenderer(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function);
+  /// Throws Error if there is no such backend to be had: which library was tried, and what it said.
+  FrameRenderer(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function,
+                Backend backend = Backend::automatic);
   ~FrameRenderer();
 
   /// Throws UsageError for a view that makes no picture and for too little memory or max_splats (how much it
@@ -114,7 +115,7 @@ class FrameRenderer {
   /// is told before render().
   void prefetch(const Camera& camera, const FrameOptions& options);
 
-  /// "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
+  /// "CPU, AVX3"; "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
   const std::string& backendName() const;
 
  private:

@@ -22,17 +22,16 @@ constexpr uint64_t kLeastRingBytes = BrickProjector::kMostSplats * sizeof(Screen
 // More does not make a frame faster: they only bridge bricks that take unequally long.
 constexpr uint64_t kMostRingBytes = 64 << 20;
 constexpr uint64_t kMostPagerBytes = 32 << 20;
-// Shares of the image and the index are whole sixteenths of the memory where there is enough: then a picture
-// of another size finds the cache as the one before has left it.
+// Shares of the image, the painter and the index are whole sixteenths of the memory where there is enough:
+// then a picture of another size finds the cache as the one before has left it.
 constexpr uint64_t kParts = 16;
 
 }  // namespace
 
 FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned threads) {
-  // Once in OpenGL's framebuffer and once as the result.
-  const uint64_t image_bytes = uint64_t{2} * 4 * sizeof(float) * static_cast<uint64_t>(fixed.size.width) *
+  const uint64_t image_bytes = uint64_t{4} * sizeof(float) * static_cast<uint64_t>(fixed.size.width) *
                                static_cast<uint64_t>(fixed.size.height);
-  const uint64_t exact = fixed.index_bytes + image_bytes;
+  const uint64_t exact = fixed.index_bytes + fixed.painter_bytes + image_bytes;
   const uint64_t pools = kLeastRingBytes + fixed.least_pager_bytes;
   const uint64_t least = exact + pools + kWorkerBytes;
   if (memory_bytes < least)

@@ -18,6 +18,7 @@ struct FrameBudget {
   struct Fixed {
     uint64_t index_bytes = 0;        // the octree, and what a frame notes about its bricks
     uint64_t least_pager_bytes = 0;  // the largest brick's
+    uint64_t painter_bytes = 0;      // beside the picture
     ImageSize size;
   };
   /// The shares within `memory_bytes`, for at most `threads` workers (0: one a core): workers first, then the

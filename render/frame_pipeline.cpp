@@ -12,6 +12,13 @@
 #include "stream/stage_timer.h"
 
 namespace curvisplat {
+namespace {
+
+PaintResources resourcesOf(const FrameOptions& options) {
+  return {.threads = options.threads};
+}
+
+}  // namespace
 
 /// What frames share, sized from the budget.
 struct FramePipeline::Pools {
@@ -29,14 +36,12 @@ struct FramePipeline::Pools {
   FrameWorkers workers;
 };
 
-FramePipeline::FramePipeline(const CacheReader& cache, size_t variable, const FramePlanner& planner)
-    : cache_(cache), variable_(variable), planner_(planner) {
-  gl_.run([this](const GlContext& context) { painter_ = std::make_unique<GlPainter>(context); });
-}
+FramePipeline::FramePipeline(const CacheReader& cache, size_t variable, const FramePlanner& planner,
+                             Backend backend)
+    : cache_(cache), variable_(variable), planner_(planner), backend_(makeBackend(backend)) {}
 
 FramePipeline::~FramePipeline() {
   endPrefetch();
-  gl_.run([this](const GlContext&) { painter_.reset(); });
 }
 
 FramePipeline::Running::Running(FramePipeline& pipeline) : pipeline_(pipeline) {
@@ -51,9 +56,9 @@ FramePipeline::Running::~Running() {
 }
 
 void FramePipeline::makePools(const FrameOptions& options) {
-  const FrameBudget budget = FrameBudget::of(
-      options.memory_bytes, {planner_.bytes(), BrickPager::leastBufferBytes(cache_, variable_), options.size},
-      options.threads);
+  const FrameBudget::Fixed fixed{planner_.bytes(), BrickPager::leastBufferBytes(cache_, variable_),
+                                 backend_->bytes(options.size, resourcesOf(options)), options.size};
+  const FrameBudget budget = FrameBudget::of(options.memory_bytes, fixed, options.threads);
   PagerOptions pager;
   pager.buffer_bytes = budget.pager_bytes;
   pager.way = options.read_by;
@@ -118,9 +123,10 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
 Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
                            Progress* progress) {
   Image image;
-  gl_.run([&](const GlContext&) {
+  backend_->run([&](Painter& painter) {
     SegmentRing& ring = pools_->ring;
-    painter_->begin(plan.settings.view.size, options.background, planner_.table(), plan.settings.per_pixel);
+    painter.begin(plan.settings.view.size, options.background, planner_.table(), plan.settings.per_pixel,
+                  resourcesOf(options));
     for (size_t drawn = 0; drawn < plan.cut.parts.size(); ++drawn) {
       std::optional<std::span<const ScreenSplat>> segment;
       {
@@ -128,13 +134,13 @@ Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, F
         segment = ring.next();
       }
       if (!segment) return;
-      painter_->draw(*segment);
+      painter.draw(*segment);
       ring.release();
       if (progress) progress->advance(1);
     }
-    image = painter_->end();
-    statistics.upload_s = painter_->uploadSeconds();
-    statistics.draw_s = painter_->drawSeconds();
+    image = painter.end();
+    statistics.upload_s = painter.uploadSeconds();
+    statistics.draw_s = painter.drawSeconds();
   });
   return image;
 }

@@ -15,11 +15,9 @@
 #include <memory>
 #include <mutex>
 
-#include "render/classification.h"
+#include "render/backend.h"
 #include "render/frame.h"
 #include "render/frame_plan.h"
-#include "render/gl_painter.h"
-#include "render/gl_thread.h"
 #include "stream/cache_reader.h"
 #include "stream/progress.h"
 
@@ -28,9 +26,9 @@ namespace curvisplat {
 /// One caller at a time, but for cancel().
 class FramePipeline {
  public:
-  /// Draws what `planner` plans for that variable of the cache; both outlive it. Starts the GL thread. Throws
-  /// Error if there is no context to be had.
-  FramePipeline(const CacheReader& cache, size_t variable, const FramePlanner& planner);
+  /// Draws what `planner` plans for that variable of the cache; both outlive it. Throws Error if there is no
+  /// such backend to be had.
+  FramePipeline(const CacheReader& cache, size_t variable, const FramePlanner& planner, Backend backend);
   ~FramePipeline();
 
   /// While there is one, cancel() is heard. Ends a prefetch.
@@ -56,7 +54,7 @@ class FramePipeline {
   /// Begins to fetch for such a frame, in the background. Throws UsageError for too little memory.
   void prefetch(const FramePlan& plan, const FrameOptions& options);
 
-  const std::string& backendName() const { return gl_.contextName(); }
+  const std::string& backendName() const { return backend_->name(); }
 
  private:
   struct Pools;
@@ -69,8 +67,7 @@ class FramePipeline {
   const CacheReader& cache_;
   const size_t variable_;
   const FramePlanner& planner_;
-  GlThread gl_;
-  std::unique_ptr<GlPainter> painter_;  // made, used and destroyed on the GL thread
+  const std::unique_ptr<PaintingBackend> backend_;
 
   enum class Phase { idle, running, cancelled };
   std::mutex mutex_;  // guards the two below; cancel() comes from another thread

@@ -143,7 +143,7 @@ void GlPainter::State::use(const GlProgram& program, const ClassificationTable& 
 }
 
 void GlPainter::begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
-                      bool per_pixel) {
+                      bool per_pixel, const PaintResources&) {
   const GlFunctions& gl = state_->gl;
   state_->upload_s = state_->draw_s = 0;
   state_->in_flight.clear();  // of a frame that was not ended

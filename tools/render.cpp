@@ -73,6 +73,13 @@ FrameOptions frameOptions(const RenderWords& words) {
   return options;
 }
 
+Backend parseBackend(const std::string& text) {
+  if (text == "auto") return Backend::automatic;
+  if (text == "osmesa") return Backend::osmesa;
+  if (text == "cpu") return Backend::cpu;
+  throw UsageError("--backend {}: not in this version, which has auto, osmesa and cpu", text);
+}
+
 /// What contradicts itself whatever the cache holds.
 void checkWords(const RenderWords& words, ImageSize size) {
   checkCameraWords(words.camera);
@@ -83,8 +90,7 @@ void checkWords(const RenderWords& words, ImageSize size) {
       words.output.extension() != ".exr")
     throw UsageError("--background transparent: a {} has no transparency; write .png or .exr",
                      words.output.extension().string());
-  if (words.backend != "auto" && words.backend != "osmesa")
-    throw UsageError("--backend {}: not in this version, which has auto and osmesa", words.backend);
+  parseBackend(words.backend);
   checkOutputFolder("-o", words.output);
   if (!words.first_image.empty()) {
     checkImageName(words.first_image);
@@ -239,7 +245,7 @@ void render(const RenderWords& words) {
   if (!range_warning.empty()) tell("warning", range_warning);
 
   const auto output = makeFrameOutput(words.output, words.camera.moves(), options.size, frames_per_s);
-  FrameRenderer renderer(cache, variable, transfer_function);
+  FrameRenderer renderer(cache, variable, transfer_function, parseBackend(words.backend));
   RenderReport report{
       words.cache, words.output, info, transfer_function, options, renderer.backendName(), {}, 0, {}};
   FrameRun(words, manifest, renderer, *output, report).draw(motion);
@@ -325,7 +331,9 @@ void addRender(CLI::App& app) {
       ->group(where);
 
   const std::string how = "Resources";
-  command->add_option("--backend", words->backend, "auto or osmesa")->capture_default_str()->group(how);
+  command->add_option("--backend", words->backend, "auto, osmesa or cpu: what draws")
+      ->capture_default_str()
+      ->group(how);
   command->add_option("--memory", words->memory, "Memory for the data in flight: 512M, 2G")
       ->capture_default_str()
       ->group(how);

@@ -28,7 +28,7 @@ constexpr Named<double> kSeconds[] = {
     {"draw", [](const FrameStatistics& s) { return s.draw_s; }},
     {"total", [](const FrameStatistics& s) { return s.total_s; }},
     {"workers_waited_for_reads", [](const FrameStatistics& s) { return s.fetch.waited_s; }},
-    {"workers_waited_for_painter", [](const FrameStatistics& s) { return s.workers_waited_s; }},
+    {"workers_waited", [](const FrameStatistics& s) { return s.workers_waited_s; }},
     {"painter_waited", [](const FrameStatistics& s) { return s.painter_waited_s; }},
 };
 

@@ -14,6 +14,8 @@ packages=(
   libglm-dev libfmt-dev libcli11-dev nlohmann-json3-dev
   # pictures, and OpenGL without a display
   libpng-dev libtinyexr-dev libosmesa6-dev libgl-dev
+  # drawing on the processor, in whatever vectors it has
+  libhwy-dev
   # tests and benchmarks
   libgtest-dev libbenchmark-dev
 )

@@ -104,14 +104,30 @@ class Fidelity : public testing::Test {
     run(arguments);
   }
 
-  /// Least fidelity from the finest level, from the root alone, and that detail never costs any.
+  /// OpenGL draws the same picture, and no better.
+  static void expectOpenGlAlike(const std::string& name, const Image& picture, const Image& reference,
+                                double psnr_db, const std::string& lod_pixels) {
+    render("half-annulus", name, file("gl.pfm"), {"--backend", "osmesa"}, lod_pixels);
+    if (HasFatalFailure()) return;
+    const Image by_gl = readImage(file("gl.pfm"));
+    EXPECT_GE(psnr_db, compareImages(by_gl, reference).psnr_db - 0.05) << "at " << lod_pixels << " pixels";
+    const ImageDifference difference = compareImages(picture, by_gl);
+    fmt::print("{} at {} pixels: {:.1f} dB, {:.5f} at the most from OpenGL\n", name, lod_pixels,
+               difference.psnr_db, difference.largest);
+    EXPECT_GE(difference.psnr_db, 70);
+    EXPECT_LT(difference.largest, 1.0 / 255);
+  }
+
+  /// Of the processor's painter: least fidelity from the finest level, from the root alone, and that detail
+  /// never costs any.
   static void expectPsnr(const std::string& name, const OpticalFunction& function, double least_db,
                          double least_of_root_db) {
     const Image reference =
         toImage(referenceMarch(*makeScene("half-annulus"), function, halfAnnulusCamera(), kSize));
     double coarser_db = least_of_root_db;
     for (const char* lod_pixels : {"1000", "8", "4", "2", "1", "0"}) {
-      render("half-annulus", name, file(name + ".pfm"), {"--stats", file("stats.json")}, lod_pixels);
+      render("half-annulus", name, file(name + ".pfm"), {"--backend", "cpu", "--stats", file("stats.json")},
+             lod_pixels);
       if (HasFatalFailure()) return;
       const auto stats = nlohmann::json::parse(readTextFile(file("stats.json")))["frames"][0];
       const Image picture = readImage(file(name + ".pfm"));
@@ -125,6 +141,8 @@ class Fidelity : public testing::Test {
       EXPECT_GE(psnr_db, expected_db - 1e-6) << "at " << lod_pixels << " pixels";
       if (psnr_db < expected_db - 1e-6) leavePictures(name, picture, reference);
       coarser_db = psnr_db;
+      if (lod_pixels == std::string("4") || lod_pixels == std::string("0"))
+        expectOpenGlAlike(name, picture, reference, psnr_db, lod_pixels);
     }
   }
 
@@ -205,13 +223,43 @@ TEST_F(Fidelity, Step) {
 }
 
 TEST_F(Fidelity, IsTheSameBytesForAnyThreadsAndAgain) {
-  render("half-annulus", "smooth", file("one.png"), {"--threads", "1"});
-  render("half-annulus", "smooth", file("two.png"), {"--threads", "2"});
-  render("half-annulus", "smooth", file("again.png"), {"--threads", "2"});
-  if (HasFatalFailure()) return;
-  const std::string one = readTextFile(file("one.png"));
-  EXPECT_EQ(one == readTextFile(file("two.png")), true);
-  EXPECT_EQ(one == readTextFile(file("again.png")), true);
+  for (const std::string backend : {"osmesa", "cpu"}) {
+    render("half-annulus", "smooth", file("one.exr"), {"--threads", "1", "--backend", backend});
+    render("half-annulus", "smooth", file("two.exr"), {"--threads", "2", "--backend", backend});
+    render("half-annulus", "smooth", file("again.exr"), {"--threads", "2", "--backend", backend});
+    if (HasFatalFailure()) return;
+    const std::string one = readTextFile(file("one.exr"));
+    EXPECT_EQ(one == readTextFile(file("two.exr")), true) << backend;
+    EXPECT_EQ(one == readTextFile(file("again.exr")), true) << backend;
+  }
+}
+
+TEST_F(Fidelity, BothBackendsDrawABluntFinAlike) {
+  const std::filesystem::path folder = std::filesystem::path(CURVISPLAT_SHARED_DATA) / "bluntfin";
+  if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << "needs " << folder;
+  const ProgramResult converted =
+      runProgram({"convert", (folder / "bluntfinxyz.bin").string(), (folder / "bluntfinq.bin").string(), "-o",
+                  file("fin.splats"), "--scalar", "density"});
+  ASSERT_EQ(converted.status, 0) << converted.err;
+  // The second camera stands inside of the data.
+  const std::vector<std::vector<std::string>> views{
+      {"--lod-pixels", "0"}, {"--position", "2,3,2", "--focal-point", "0,0,0", "--view-angle", "70"}};
+  for (const std::vector<std::string>& view : views)
+    for (const std::string classify : {"pixel", "flat"}) {
+      std::vector<Image> pictures;
+      for (const std::string backend : {"osmesa", "cpu"}) {
+        std::vector<std::string> arguments{"render",     file("fin.splats"), "-o",        file("fin.pfm"),
+                                           "--classify", classify,           "--backend", backend,
+                                           "--size",     "300x300"};
+        arguments.insert(arguments.end(), view.begin(), view.end());
+        run(arguments);
+        if (HasFatalFailure()) return;
+        pictures.push_back(readImage(file("fin.pfm")));
+      }
+      const ImageDifference difference = compareImages(pictures[0], pictures[1]);
+      EXPECT_GE(difference.psnr_db, 70) << classify;
+      EXPECT_LT(difference.largest, 1.0 / 255) << classify;
+    }
 }
 
 }  // namespace

@@ -200,7 +200,7 @@ TEST_F(Frames, StatisticsListFramesAndTheirPercentiles) {
   EXPECT_EQ(summary["p95"], totals[18]);
   EXPECT_EQ(summary["max"], totals[19]);
   for (const char* key : {"plan", "read", "decode", "project", "sort", "upload", "draw",
-                          "workers_waited_for_reads", "workers_waited_for_painter"})
+                          "workers_waited_for_reads", "workers_waited"})
     EXPECT_TRUE(stats["summary"]["seconds"][key]["p95"].is_number()) << key;
   for (const char* key : {"bricks_drawn", "bricks_cached", "splats_drawn", "bytes_read", "mean_queue_depth"})
     EXPECT_TRUE(stats["summary"][key]["p50"].is_number()) << key;

@@ -315,7 +315,7 @@ TEST_F(RenderOptions, StatisticsTellWhatWasDone) {
         "cache_peak_bytes", "pager_peak_bytes", "ring_peak_bytes", "bricks_unreadable"})
     EXPECT_TRUE(frame.contains(key)) << key;
   for (const char* key : {"plan", "read", "decode", "project", "sort", "upload", "draw", "total",
-                          "workers_waited_for_reads", "workers_waited_for_painter", "painter_waited"})
+                          "workers_waited_for_reads", "workers_waited", "painter_waited"})
     EXPECT_TRUE(frame["seconds"][key].is_number()) << key;
   EXPECT_EQ(json["command"][1], "render");
   EXPECT_EQ(json["threads"], 2);

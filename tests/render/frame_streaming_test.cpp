@@ -22,7 +22,8 @@ namespace fs = std::filesystem;
 using testing::FaultySystemCalls;
 using Way = PagerOptions::Way;
 
-class FrameStreamingTest : public ::testing::Test {
+/// With each backend.
+class FrameStreamingTest : public ::testing::TestWithParam<Backend> {
  protected:
   FrameStreamingTest() {
     writeRandomCache(path(), 3);
@@ -66,8 +67,13 @@ class FrameStreamingTest : public ::testing::Test {
   std::unique_ptr<CacheReader> cache_;
 };
 
-TEST_F(FrameStreamingTest, IsTheSameForAnyMemoryThreadsWayAndHistory) {
-  FrameRenderer reference(*cache_, 0, function());
+INSTANTIATE_TEST_SUITE_P(Backends, FrameStreamingTest, ::testing::Values(Backend::osmesa, Backend::cpu),
+                         [](const ::testing::TestParamInfo<Backend>& tested) {
+                           return tested.param == Backend::osmesa ? "osmesa" : "cpu";
+                         });
+
+TEST_P(FrameStreamingTest, IsTheSameForAnyMemoryThreadsWayAndHistory) {
+  FrameRenderer reference(*cache_, 0, function(), GetParam());
   FrameStatistics statistics;
   FrameOptions plain = options();
   plain.threads = 1;
@@ -77,7 +83,7 @@ TEST_F(FrameStreamingTest, IsTheSameForAnyMemoryThreadsWayAndHistory) {
   const uint64_t least = leastMemory(reference, camera("iso"));
   EXPECT_LT(least, uint64_t{64} << 20);
 
-  FrameRenderer renderer(*cache_, 0, function());
+  FrameRenderer renderer(*cache_, 0, function(), GetParam());
   for (const uint64_t memory : {least, least + (2 << 20), uint64_t{4} << 30})
     for (const unsigned threads : {1u, 2u, 4u})
       for (const Way way : {Way::automatic, Way::threads}) {
@@ -102,8 +108,8 @@ TEST_F(FrameStreamingTest, IsTheSameForAnyMemoryThreadsWayAndHistory) {
       }
 }
 
-TEST_F(FrameStreamingTest, AnotherImageSizeFindsTheCacheWarm) {
-  FrameRenderer renderer(*cache_, 0, function());
+TEST_P(FrameStreamingTest, AnotherImageSizeFindsTheCacheWarm) {
+  FrameRenderer renderer(*cache_, 0, function(), GetParam());
   FrameStatistics statistics;
   FrameOptions wanted = options();
   renderer.render(camera("iso"), wanted, statistics);
@@ -112,11 +118,11 @@ TEST_F(FrameStreamingTest, AnotherImageSizeFindsTheCacheWarm) {
   EXPECT_EQ(statistics.fetch.bricks_read, 0u);
 }
 
-TEST_F(FrameStreamingTest, PrefetchingMakesTheNextFrameWarm) {
-  FrameRenderer renderer(*cache_, 0, function());
+TEST_P(FrameStreamingTest, PrefetchingMakesTheNextFrameWarm) {
+  FrameRenderer renderer(*cache_, 0, function(), GetParam());
   FrameStatistics statistics;
   const Image expected = renderer.render(camera("iso"), options(), statistics);
-  FrameRenderer prefetched(*cache_, 0, function());
+  FrameRenderer prefetched(*cache_, 0, function(), GetParam());
   FrameOptions wanted = options();
   wanted.threads = 2;
   prefetched.prefetch(camera("iso"), wanted);
@@ -128,8 +134,8 @@ TEST_F(FrameStreamingTest, PrefetchingMakesTheNextFrameWarm) {
   prefetched.prefetch(camera("-x"), wanted);  // and is left behind
 }
 
-TEST_F(FrameStreamingTest, CanBeCancelledAtAnyMoment) {
-  FrameRenderer renderer(*cache_, 0, function());
+TEST_P(FrameStreamingTest, CanBeCancelledAtAnyMoment) {
+  FrameRenderer renderer(*cache_, 0, function(), GetParam());
   FrameStatistics statistics;
   FrameOptions wanted = options();
   wanted.size = {24, 20};
@@ -172,17 +178,18 @@ TEST_F(FrameStreamingTest, CanBeCancelledAtAnyMoment) {
   EXPECT_EQ(renderer.render(camera("iso"), wanted, statistics).rgba, expected.rgba);
 }
 
-TEST_F(FrameStreamingTest, PartsOfBricksArePagedAndKept) {
-  FrameRenderer reference(*cache_, 0, function());
+TEST_P(FrameStreamingTest, PartsOfBricksArePagedAndKept) {
+  FrameRenderer reference(*cache_, 0, function(), GetParam());
   FrameStatistics statistics;
   const Image whole = reference.render(camera("+x"), options(), statistics);
   const uint64_t splats = statistics.splats_read;
   const uint64_t least = leastMemory(reference, camera("+x"));
-  FrameRenderer renderer(*cache_, 0, function());
+  FrameRenderer renderer(*cache_, 0, function(), GetParam());
   for (const uint64_t sixteenths : {6, 9, 11, 14}) {
     FrameOptions wanted = options();
     wanted.max_splats = splats * sixteenths / 16;
-    const Image expected = FrameRenderer(*cache_, 0, function()).render(camera("+x"), wanted, statistics);
+    const Image expected =
+        FrameRenderer(*cache_, 0, function(), GetParam()).render(camera("+x"), wanted, statistics);
     EXPECT_NE(expected.rgba, whole.rgba);
     for (const uint64_t memory : {least, uint64_t{4} << 30})
       for (const unsigned threads : {1u, 4u}) {
@@ -198,10 +205,10 @@ TEST_F(FrameStreamingTest, PartsOfBricksArePagedAndKept) {
   }
 }
 
-TEST_F(FrameStreamingTest, AFailingDiskEndsTheFrameOnce) {
+TEST_P(FrameStreamingTest, AFailingDiskEndsTheFrameOnce) {
   FaultySystemCalls faulty;
   const ScopedSystemCalls scope(faulty);
-  FrameRenderer renderer(*cache_, 0, function());
+  FrameRenderer renderer(*cache_, 0, function(), GetParam());
   FrameStatistics statistics;
   for (const unsigned threads : {1u, 4u}) {
     FrameOptions wanted = options();
@@ -215,16 +222,17 @@ TEST_F(FrameStreamingTest, AFailingDiskEndsTheFrameOnce) {
   }
 }
 
-TEST_F(FrameStreamingTest, KeepsGoingFromTheAncestorIfAsked) {
+TEST_P(FrameStreamingTest, KeepsGoingFromTheAncestorIfAsked) {
   FrameStatistics statistics;
-  const Image whole = FrameRenderer(*cache_, 0, function()).render(camera("iso"), options(), statistics);
+  const Image whole =
+      FrameRenderer(*cache_, 0, function(), GetParam()).render(camera("iso"), options(), statistics);
   EXPECT_TRUE(statistics.bricks_unreadable.empty());
   const uint64_t splats = statistics.splats_read;
   const uint32_t last = static_cast<uint32_t>(cache_->bricks().size()) - 1;
   overwrite(cache_->geometryPath(), cache_->bricks()[last].geometry.offset);
   overwrite(cache_->valuesPath(0), cache_->brickVariables(0)[last - 7].values.offset);
 
-  FrameRenderer renderer(*cache_, 0, function());
+  FrameRenderer renderer(*cache_, 0, function(), GetParam());
   EXPECT_THROW(renderer.render(camera("iso"), options(), statistics), Error);
   FrameOptions wanted = options();
   wanted.keep_going = true;
@@ -245,7 +253,7 @@ TEST_F(FrameStreamingTest, KeepsGoingFromTheAncestorIfAsked) {
 
   // With nothing to be read at all there is the background, and a report of every brick.
   fs::resize_file(cache_->geometryPath(), 0);
-  FrameRenderer blind(*cache_, 0, function());
+  FrameRenderer blind(*cache_, 0, function(), GetParam());
   const Image empty = blind.render(camera("iso"), wanted, statistics);
   EXPECT_EQ(statistics.bricks_unreadable.size(), statistics.bricks_drawn);
   EXPECT_TRUE(std::all_of(empty.rgba.begin(), empty.rgba.end(), [](float value) { return value == 1; }));
@@ -264,8 +272,8 @@ TEST_F(FrameStreamingTest, KeepsGoingFromTheAncestorIfAsked) {
   EXPECT_TRUE(in_parts);
 }
 
-TEST_F(FrameStreamingTest, AFileThatShrinksEndsTheFrameWithItsBrick) {
-  FrameRenderer renderer(*cache_, 0, function());
+TEST_P(FrameStreamingTest, AFileThatShrinksEndsTheFrameWithItsBrick) {
+  FrameRenderer renderer(*cache_, 0, function(), GetParam());
   fs::resize_file(cache_->valuesPath(0), fs::file_size(cache_->valuesPath(0)) / 3);
   FrameStatistics statistics;
   try {

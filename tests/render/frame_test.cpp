@@ -8,8 +8,6 @@
 #include <numeric>
 
 #include "render/depth_sort.h"
-#include "render/gl_painter.h"
-#include "render/gl_thread.h"
 #include "stream/error.h"
 #include "stream/file.h"
 #include "tests/support/lattice_cache.h"
@@ -28,7 +26,8 @@ Camera cameraFrom(const glm::dvec3& direction, double parallel_scale = 24) {
   return camera;
 }
 
-class FrameTest : public testing::Test {
+/// The pipeline, with each backend.
+class FrameTest : public testing::TestWithParam<Backend> {
  protected:
   /// Writes and opens a lattice.
   const CacheReader& lattice(double constant, const glm::dvec3& gradient) {
@@ -65,9 +64,14 @@ class FrameTest : public testing::Test {
   std::unique_ptr<CacheReader> cache_;
 };
 
-TEST_F(FrameTest, AConstantFieldIsFlat) {
+INSTANTIATE_TEST_SUITE_P(Backends, FrameTest, testing::Values(Backend::osmesa, Backend::cpu),
+                         [](const testing::TestParamInfo<Backend>& tested) {
+                           return tested.param == Backend::osmesa ? "osmesa" : "cpu";
+                         });
+
+TEST_P(FrameTest, AConstantFieldIsFlat) {
   const double extinction = 0.03;
-  FrameRenderer renderer(lattice(0.5, glm::dvec3(0)), 0, uniform(extinction));
+  FrameRenderer renderer(lattice(0.5, glm::dvec3(0)), 0, uniform(extinction), GetParam());
   FrameStatistics statistics;
   // Leaves, and the merged root alone.
   for (const double lod_pixels : {0.0, 1e3}) {
@@ -90,9 +94,9 @@ TEST_F(FrameTest, AConstantFieldIsFlat) {
   }
 }
 
-TEST_F(FrameTest, PerspectiveRaysOfAConstantFieldHaveTheirLength) {
+TEST_P(FrameTest, PerspectiveRaysOfAConstantFieldHaveTheirLength) {
   const double extinction = 0.03;
-  FrameRenderer renderer(lattice(0.5, glm::dvec3(0)), 0, uniform(extinction));
+  FrameRenderer renderer(lattice(0.5, glm::dvec3(0)), 0, uniform(extinction), GetParam());
   Camera camera = cameraFrom({0, 0, 1});
   camera.projection = Projection::perspective;
   camera.view_angle_deg = 80;
@@ -111,9 +115,9 @@ TEST_F(FrameTest, PerspectiveRaysOfAConstantFieldHaveTheirLength) {
   }
 }
 
-TEST_F(FrameTest, TheNearSideHidesTheFarSide) {
+TEST_P(FrameTest, TheNearSideHidesTheFarSide) {
   FrameRenderer renderer(lattice(0, {1.0 / kLatticeSide, 0, 0}), 0,
-                         function("0, 1, 0, 0, 1, 0, 0, 1", "0, 0.9, 0.5, 0, 1, 0.9, 0.5, 0"));
+                         function("0, 1, 0, 0, 1, 0, 0, 1", "0, 0.9, 0.5, 0, 1, 0.9, 0.5, 0"), GetParam());
   FrameStatistics statistics;
   for (const double lod_pixels : {0.0, 4.0}) {
     const Image from_low = renderer.render(cameraFrom({-1, 0, 0}), options(lod_pixels), statistics);
@@ -125,8 +129,8 @@ TEST_F(FrameTest, TheNearSideHidesTheFarSide) {
   }
 }
 
-TEST_F(FrameTest, IsTheSameForAnyThreadsAndMemory) {
-  FrameRenderer renderer(lattice(0, {0.02, 0.01, 0}), 0, redToBlue());
+TEST_P(FrameTest, IsTheSameForAnyThreadsAndMemory) {
+  FrameRenderer renderer(lattice(0, {0.02, 0.01, 0}), 0, redToBlue(), GetParam());
   Camera camera = cameraFrom(glm::dvec3(0.6, 0.64, 0.48));
   for (const Projection projection : {Projection::orthographic, Projection::perspective}) {
     camera.projection = projection;
@@ -147,12 +151,13 @@ TEST_F(FrameTest, IsTheSameForAnyThreadsAndMemory) {
   }
 }
 
-TEST_F(FrameTest, DiffersLittleFromOneGlobalDepthSort) {
+TEST_P(FrameTest, DiffersLittleFromOneGlobalDepthSort) {
   const CacheReader& cache = lattice(0, {0.02, 0.01, 0});
   const TransferFunction transfer_function = redToBlue();
   const Camera camera = cameraFrom(glm::dvec3(0.6, 0.64, 0.48));
   FrameStatistics statistics;
-  const Image image = FrameRenderer(cache, 0, transfer_function).render(camera, options(), statistics);
+  const Image image =
+      FrameRenderer(cache, 0, transfer_function, GetParam()).render(camera, options(), statistics);
 
   const auto table = ClassificationTable::of(transfer_function, 0, 1);
   const ProjectionSettings settings{ScreenView::of(camera, options().size, glm::dvec3(1), 1.5, 1)};
@@ -175,9 +180,7 @@ TEST_F(FrameTest, DiffersLittleFromOneGlobalDepthSort) {
   std::vector<ScreenSplat> sorted;
   for (const uint32_t index : sorter.farthestFirst(depths)) sorted.push_back(splats[index]);
   Image global;
-  GlThread gl;
-  gl.run([&](const GlContext& context) {
-    GlPainter painter(context);
+  makeBackend(GetParam())->run([&](Painter& painter) {
     painter.begin(options().size, options().background, table, true);
     painter.draw(sorted);
     global = painter.end();
@@ -185,12 +188,13 @@ TEST_F(FrameTest, DiffersLittleFromOneGlobalDepthSort) {
   EXPECT_GT(compareImages(image, global).psnr_db, 60);
 }
 
-TEST_F(FrameTest, SaysWhereSplatsWent) {
+TEST_P(FrameTest, SaysWhereSplatsWent) {
   const CacheReader& cache = lattice(0, {1.0 / kLatticeSide, 0, 0});
   FrameStatistics statistics;
   // Only the half from 0.5 on can be seen; slopes reach a little further.
   FrameRenderer half(cache, 0,
-                     function("0, 1, 0, 0, 1, 0, 0, 1", "0, 0, 0.5, 0, 0.9, 0, 0.5, 0, 1, 0.5, 0.5, 0"));
+                     function("0, 1, 0, 0, 1, 0, 0, 1", "0, 0, 0.5, 0, 0.9, 0, 0.5, 0, 1, 0.5, 0.5, 0"),
+                     GetParam());
   half.render(cameraFrom({0, 0, 1}), options(), statistics);
   EXPECT_GT(statistics.bricks_transparent, 0u);
   EXPECT_EQ(statistics.bricks_culled, statistics.bricks_transparent);
@@ -200,7 +204,7 @@ TEST_F(FrameTest, SaysWhereSplatsWent) {
   EXPECT_EQ(statistics.splats_read, statistics.splats_drawn + statistics.splats_transparent);
   EXPECT_GT(statistics.bytes_read, 0u);
 
-  FrameRenderer all(cache, 0, uniform(0.1));
+  FrameRenderer all(cache, 0, uniform(0.1), GetParam());
   FrameOptions clipped = options();
   clipped.clip_box = WorldBox{glm::dvec3(0), glm::dvec3(16, 32, 32)};
   all.render(cameraFrom({0, 0, 1}), clipped, statistics);
@@ -216,11 +220,11 @@ TEST_F(FrameTest, SaysWhereSplatsWent) {
   EXPECT_TRUE(std::all_of(empty.rgba.begin(), empty.rgba.end(), [](float value) { return value == 1; }));
 }
 
-TEST_F(FrameTest, CullingChangesNothingInThePicture) {
+TEST_P(FrameTest, CullingChangesNothingInThePicture) {
   // A camera close by sees some bricks; with the clip box around all data nothing else changes.
-  FrameRenderer renderer(
-      lattice(0, {0.02, 0.01, 0}), 0,
-      function("0, 1, 0, 0, 1, 0, 0, 1", "0, 0, 0.5, 0, 0.4, 0, 0.5, 0, 0.5, 0.5, 0.5, 0"));
+  FrameRenderer renderer(lattice(0, {0.02, 0.01, 0}), 0,
+                         function("0, 1, 0, 0, 1, 0, 0, 1", "0, 0, 0.5, 0, 0.4, 0, 0.5, 0, 0.5, 0.5, 0.5, 0"),
+                         GetParam());
   FrameStatistics near_statistics, far_statistics;
   FrameOptions small = options(), large = options();
   small.size = {40, 40};
@@ -232,11 +236,13 @@ TEST_F(FrameTest, CullingChangesNothingInThePicture) {
   for (int y = 0; y < 40; ++y)
     for (int x = 0; x < 40; ++x)
       largest = std::max<double>(largest, std::abs(near.pixel(x, y)[0] - far.pixel(x + 100, y + 100)[0]));
-  EXPECT_LT(largest, 1e-4);
+  // Where a splat is cut by the edge of a tile or of the image, the processor's fits to the classification
+  // differ.
+  EXPECT_LT(largest, GetParam() == Backend::cpu ? 1e-3 : 1e-4);
 }
 
-TEST_F(FrameTest, StretchesTheData) {
-  FrameRenderer renderer(lattice(0.5, glm::dvec3(0)), 0, uniform(0.01));
+TEST_P(FrameTest, StretchesTheData) {
+  FrameRenderer renderer(lattice(0.5, glm::dvec3(0)), 0, uniform(0.01), GetParam());
   FrameOptions stretched = options();
   stretched.scale = {1, 1, 3};
   FrameStatistics statistics;
@@ -249,7 +255,7 @@ TEST_F(FrameTest, StretchesTheData) {
   EXPECT_EQ(narrow.pixel(85, 50)[0], 1.0f);
 }
 
-TEST_F(FrameTest, ADamagedBrickEndsTheFrameWithItsName) {
+TEST_P(FrameTest, ADamagedBrickEndsTheFrameWithItsName) {
   lattice(0, {0.02, 0.01, 0});
   const Brick brick = cache_->bricks()[40];
   {
@@ -257,7 +263,7 @@ TEST_F(FrameTest, ADamagedBrickEndsTheFrameWithItsName) {
     file.seekp(static_cast<std::streamoff>(brick.geometry.offset));
     file.put('\x55').put('\x55').put('\x55');
   }
-  FrameRenderer renderer(*cache_, 0, redToBlue());
+  FrameRenderer renderer(*cache_, 0, redToBlue(), GetParam());
   FrameStatistics statistics;
   for (const unsigned threads : {1u, 4u}) {
     FrameOptions wanted = options();
@@ -273,8 +279,8 @@ TEST_F(FrameTest, ADamagedBrickEndsTheFrameWithItsName) {
   EXPECT_NO_THROW(renderer.render(cameraFrom({0, 0, 1}), options(1e3), statistics));
 }
 
-TEST_F(FrameTest, SaysHowMuchMemoryItTakes) {
-  FrameRenderer renderer(lattice(0.5, glm::dvec3(0)), 0, uniform(0.1));
+TEST_P(FrameTest, SaysHowMuchMemoryItTakes) {
+  FrameRenderer renderer(lattice(0.5, glm::dvec3(0)), 0, uniform(0.1), GetParam());
   FrameOptions little = options();
   little.memory_bytes = 1 << 20;
   FrameStatistics statistics;

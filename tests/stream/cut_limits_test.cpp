@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "stream/cut.h"
@@ -108,7 +109,7 @@ TEST(CutLimits, AHigherLimitRefinesTheSameCut) {
   for (int n = 0; n < 10; ++n) {
     const CutView view = randomView(random, n % 2 == 0);
     Cut coarse = tree.cut(view, limited(0.3, tree.bricks[0].splats));
-    for (uint64_t limit = tree.bricks[0].splats; limit < 40'000; limit += 97) {
+    for (uint64_t limit = tree.bricks[0].splats; limit < 40'000; limit += 397) {
       const Cut fine = tree.cut(view, limited(0.3, limit));
       // Each part of the fine cut lies in a part of the coarse one: it, or an octant above it.
       const std::vector<BrickPart> parts = sorted(coarse.parts);
@@ -156,6 +157,96 @@ TEST(CutLimits, RefinesTheLargestErrorFirst) {
         for (uint32_t up = tree.bricks[part.brick].parent; up != kNoBrick; up = tree.bricks[up].parent)
           least_refined = std::min<double>(least_refined, tree.bricks[up].error * px);
       EXPECT_GE(least_refined, cut.largest_error_px);
+    }
+  }
+}
+
+/// What a cut under limits is, by its definition: all totals are counted anew after each step.
+std::map<uint32_t, uint8_t> refinedStepByStep(const CutTestTree& tree, const CutView& view,
+                                              const TransparentBounds& transparent,
+                                              const CutOptions& options) {
+  // With one brick for a tree, the cut says whether that brick's subtree can be seen.
+  const auto visible = [&](uint32_t id) {
+    Brick root = tree.bricks[id];
+    root.parent = kNoBrick;
+    root.child_count = 0;
+    const BrickVariable low_and_high[] = {{{}, -1e9f, 1e9f, 0, 0}};
+    const Cut seen = chooseCut({tree.root, {&root, 1}, low_and_high, {&tree.subtrees[id], 1}}, view,
+                               transparent, CutOptions{});
+    return seen.parts.size() == 1;
+  };
+  const auto drawn = [&](uint32_t id) {
+    const BrickVariable& values = tree.variables[id];
+    return !transparent({values.min, values.max, values.largest_slope, values.largest_deviation});
+  };
+  const auto error = [&](uint32_t id) {
+    const double scale = std::max({view.scale.x, view.scale.y, view.scale.z});
+    return tree.bricks[id].error * scale * view.pixels;
+  };
+  using Octants = std::map<uint32_t, uint8_t>;  // drawn, by brick
+  const auto fits = [&](const Octants& octants) {
+    uint64_t splats = 0, bytes = 0;
+    for (const auto& [id, mask] : octants) {
+      const Brick& brick = tree.bricks[id];
+      uint64_t own = mask == kAllOctants ? brick.splats : 0;
+      for (int octant = 0; mask != kAllOctants && octant < 8; ++octant)
+        if (mask >> octant & 1) own += brick.octant_splats[octant];
+      if (own == 0 || !drawn(id)) continue;
+      splats += own;
+      bytes += brick.geometry.length + tree.variables[id].values.length;
+    }
+    return splats <= options.max_splats && bytes <= options.max_bytes;
+  };
+
+  Octants cut;
+  std::set<uint32_t> waiting;
+  if (visible(0)) cut[0] = kAllOctants, waiting.insert(0);
+  while (true) {
+    uint32_t next = kNoBrick;
+    for (const uint32_t id : waiting)  // of equal errors the lowest number
+      if (!tree.bricks[id].isLeaf() && (next == kNoBrick || error(id) > error(next))) next = id;
+    if (next == kNoBrick) return cut;
+    waiting.erase(next);
+    for (int octant = 0; octant < 8; ++octant) {
+      Octants refined = cut;
+      refined[next] &= static_cast<uint8_t>(~(1 << octant));
+      std::vector<uint32_t> added;
+      const Brick& brick = tree.bricks[next];
+      for (uint32_t child = brick.first_child; child < brick.first_child + brick.child_count; ++child)
+        if (tree.bricks[child].cell.octantInParent() == octant && visible(child)) added.push_back(child);
+      for (const uint32_t child : added) refined[child] = kAllOctants;
+      if (!fits(refined)) return cut;
+      cut = refined;
+      waiting.insert(added.begin(), added.end());
+    }
+  }
+}
+
+TEST(CutLimits, AreUsedUpStepByStep) {
+  std::mt19937 random(17);
+  const CutTestTree tree(31);
+  for (int n = 0; n < 12; ++n) {
+    CutView view = randomView(random, false);
+    if (n % 3 > 0) view.planes = {{randomDirection(random), 0.3}};
+    const TransparentBounds low = [&](const ValueBounds& values) { return n % 2 == 1 && values.max < 0.6f; };
+    for (const uint64_t limit : {100u, 237u, 501u, 1099u}) {
+      for (const CutOptions& options : {limited(0, limit), limited(0, CutOptions::kNoLimit, 20 * limit)}) {
+        std::map<uint32_t, uint8_t> octants;
+        for (const BrickPart& part : tree.cut(view, options, low).parts) octants[part.brick] |= part.octants;
+        std::map<uint32_t, uint8_t> expected;
+        for (const auto& [id, mask] : refinedStepByStep(tree, view, low, options)) {
+          const Brick& brick = tree.bricks[id];
+          const bool transparent = low({tree.variables[id].min, tree.variables[id].max, 0.01f, 0.01f});
+          if (!transparent && SplatRanges(brick, mask).splats() > 0) expected[id] = mask;
+        }
+        // Octants without a splat may be named or not.
+        for (auto* masks : {&octants, &expected})
+          for (auto& [id, mask] : *masks)
+            for (int octant = 0; octant < 8 && !tree.bricks[id].isLeaf(); ++octant)
+              if (tree.bricks[id].octant_splats[octant] == 0) mask &= static_cast<uint8_t>(~(1 << octant));
+        EXPECT_EQ(octants, expected) << "view " << n << ", " << options.max_splats << " splats, "
+                                     << options.max_bytes << " bytes";
+      }
     }
   }
 }

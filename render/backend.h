@@ -1,0 +1,35 @@
+// The ways there are to draw, and the thread that each is to be used on.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "render/painter.h"
+
+namespace curvisplat {
+
+enum class Backend {
+  automatic,  // OpenGL where a graphics card draws, else the processor
+  osmesa,     // OpenGL in software
+  cpu
+};
+
+/// A painter, and where it may be used.
+class PaintingBackend {
+ public:
+  virtual ~PaintingBackend() = default;
+
+  using Job = std::function<void(Painter&)>;
+  /// Runs `job` on the painter's thread and waits for its end. Throws what it throws. One caller at a time.
+  virtual void run(const Job& job) = 0;
+  /// For people: "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
+  virtual const std::string& name() const = 0;
+  /// Beside the result, for a frame of this size.
+  virtual uint64_t bytes(ImageSize size, const PaintResources& resources) const = 0;
+};
+
+/// Throws Error if that cannot be had: which library was tried, and what it said.
+std::unique_ptr<PaintingBackend> makeBackend(Backend backend);
+
+}  // namespace curvisplat

@@ -1,0 +1,47 @@
+// Draws screen splats on the processor's cores: batches of splats, sorted into the tiles that they touch;
+// every tile painted by one thread, in vectors (tile.h). Design section 7.
+//
+// The picture's bits depend neither on threads nor on batches: a pixel's splats are blended one after the
+// other, in their order.
+//
+// Any thread, one at a time; works in a TBB arena of its own.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "render/painter.h"
+
+namespace curvisplat {
+
+class CpuPainter final : public Painter {
+ public:
+  CpuPainter();
+  ~CpuPainter() override;
+
+  void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table, bool per_pixel,
+             const PaintResources& resources = {}) override;
+  void draw(std::span<const ScreenSplat> splats) override;
+  Image end() override;
+
+  double uploadSeconds() const override;
+  double drawSeconds() const override;
+
+  /// What it takes for a frame beside the picture itself.
+  static uint64_t frameBytes(ImageSize size);
+  static uint64_t batchBytes(ImageSize size, const PaintResources& resources);
+  /// "CPU, AVX3"
+  static std::string name();
+  /// Highway's numbers of the instruction sets that it can paint with here, the best first.
+  static std::vector<int64_t> targets();
+  /// Whether one has fused multiply-adds. All that do draw the same bits.
+  static bool fuses(int64_t target);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace curvisplat

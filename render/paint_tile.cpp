@@ -1,0 +1,330 @@
+#include <hwy/cache_control.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/kernel.h"
+#include "render/tile.h"
+
+// Once for every instruction set that a processor may have, from here to HWY_AFTER_NAMESPACE.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "render/paint_tile.cpp"
+#include <hwy/foreach_target.h>  // before highway.h
+#include <hwy/highway.h>
+
+#include "render/paint_blocks-inl.h"
+#include "render/paint_shade-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace curvisplat {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr auto kSupport = static_cast<float>(kKernelSupport);
+
+/// Sixteen splats of a tile, ready to be painted.
+struct Visits {
+  Row x, y, a, b, c, amplitude;  // Ellipse
+  Row tp, tq;                    // Scalar's
+  Pieces pieces;                 // all of the splat that is in the tile
+  Row l11, l21, l22;
+  IntRow x0, y0, x1, y1;  // blocks, the last included; empty where x0 > x1 or y0 > y1
+
+  HWY_INLINE Ellipse ellipse(size_t n) const {
+    return {x.at[n], y.at[n], a.at[n], b.at[n], c.at[n], amplitude.at[n]};
+  }
+  HWY_INLINE Scalar scalar(size_t n) const {
+    return {pieces.mean.at[n], pieces.reach.at[n], tp.at[n], tq.at[n], pieces.half_width.at[n]};
+  }
+};
+
+HWY_INLINE V gather(const TileWork& work, hn::Vec<Ints> offsets, size_t member) {
+  return hn::GatherIndex(Floats(), reinterpret_cast<const float*>(work.splats.data()) + member, offsets);
+}
+
+/// The t of the pixels in a box.
+HWY_INLINE Range tOver(V by_x, V by_y, V middle_x, V middle_y, V half_x, V half_y) {
+  const Floats d;
+  const V middle = hn::MulAdd(by_x, middle_x, hn::Mul(by_y, middle_y));
+  const V half = hn::MulAdd(hn::Abs(by_x), half_x, hn::Mul(hn::Abs(by_y), half_y));
+  const V one = hn::Set(d, 1.0f);
+  return {hn::Clamp(hn::Sub(middle, half), hn::Neg(one), one),
+          hn::Clamp(hn::Add(middle, half), hn::Neg(one), one)};
+}
+
+/// From the splats with these numbers.
+HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) {
+  static_assert(sizeof(ScreenSplat) == 10 * sizeof(float));
+  const Floats d;
+  const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f);
+  const V support = hn::Set(d, kSupport), last_pixel = hn::Set(d, kTileSide - 1);
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    const auto store = [&](V value, Row& row) HWY_ATTR { hn::Store(value, d, row.at + lane); };
+    const auto offsets = hn::Mul(hn::Load(Ints(), numbers.at + lane), hn::Set(Ints(), 10));
+    const V l11 = gather(work, offsets, 2), l21 = gather(work, offsets, 3), l22 = gather(work, offsets, 4);
+    store(l11, out.l11);
+    store(l21, out.l21);
+    store(l22, out.l22);
+    const V x = hn::Sub(gather(work, offsets, 0), hn::Set(d, static_cast<float>(work.x) + 0.5f));
+    const V y = hn::Sub(gather(work, offsets, 1), hn::Set(d, static_cast<float>(work.y) + 0.5f));
+    const V a = hn::Div(one, hn::Mul(support, l11)), c = hn::Div(one, hn::Mul(support, l22));
+    const V b = hn::Neg(hn::Mul(hn::Mul(l21, support), hn::Mul(a, c)));
+    store(x, out.x);
+    store(y, out.y);
+    store(a, out.a);
+    store(b, out.b);
+    store(c, out.c);
+    store(gather(work, offsets, 5), out.amplitude);
+
+    // The pixels of the tile that lie in the ellipse's own rectangle.
+    const V reach_x = hn::Mul(support, l11);
+    const V reach_y = hn::Mul(support, hn::Sqrt(hn::MulAdd(l21, l21, hn::Mul(l22, l22))));
+    const V x0 = hn::Clamp(hn::Ceil(hn::Sub(x, reach_x)), zero, hn::Set(d, kTileSide));
+    const V y0 = hn::Clamp(hn::Ceil(hn::Sub(y, reach_y)), zero, hn::Set(d, kTileSide));
+    const V x1 = hn::Clamp(hn::Floor(hn::Add(x, reach_x)), hn::Neg(one), last_pixel);
+    const V y1 = hn::Clamp(hn::Floor(hn::Add(y, reach_y)), hn::Neg(one), last_pixel);
+    const V block = hn::Set(d, 1.0f / kBlockSide);
+    const auto storeBlocks = [&](V value, IntRow& row) HWY_ATTR {
+      hn::Store(hn::ConvertTo(Ints(), hn::Floor(hn::Mul(value, block))), Ints(), row.at + lane);
+    };
+    // A rectangle between two pixels' centres has x0 > x1, but may lie within a block.
+    const V nothing_x = hn::IfThenElseZero(hn::Gt(x0, x1), hn::Set(d, kTileSide));
+    const V nothing_y = hn::IfThenElseZero(hn::Gt(y0, y1), hn::Set(d, kTileSide));
+    storeBlocks(hn::Add(x0, nothing_x), out.x0);
+    storeBlocks(hn::Add(y0, nothing_y), out.y0);
+    storeBlocks(x1, out.x1);
+    storeBlocks(y1, out.y1);
+
+    store(gather(work, offsets, 6), out.pieces.mean);
+    if (!work.per_pixel) {
+      for (Row* row : {&out.pieces.reach, &out.pieces.half_width, &out.pieces.from, &out.pieces.to})
+        store(zero, *row);
+      continue;
+    }
+    const V slope0 = gather(work, offsets, 7), slope1 = gather(work, offsets, 8);
+    const V slope = hn::Sqrt(hn::MulAdd(slope0, slope0, hn::Mul(slope1, slope1)));
+    const V inverse = hn::Div(one, hn::Max(slope, hn::Set(d, 1e-37f)));
+    const V tp = hn::Mul(slope0, inverse), tq = hn::Mul(slope1, inverse);
+    store(tp, out.tp);
+    store(tq, out.tq);
+    store(hn::Mul(support, slope), out.pieces.reach);
+    store(gather(work, offsets, 9), out.pieces.half_width);
+    const Range t =
+        tOver(hn::MulAdd(tp, a, hn::Mul(tq, b)), hn::Mul(tq, c), hn::Sub(hn::Mul(half, hn::Add(x0, x1)), x),
+              hn::Sub(hn::Mul(half, hn::Add(y0, y1)), y), hn::Mul(half, hn::Sub(x1, x0)),
+              hn::Mul(half, hn::Sub(y1, y0)));
+    store(t.from, out.pieces.from);
+    store(t.to, out.pieces.to);
+  }
+}
+
+/// The blocks of a visit, row by row: those of its rectangle that its ellipse touches.
+class BlockRows {
+ public:
+  HWY_INLINE BlockRows(const Visits& visits, size_t n)
+      : x0_(visits.x0.at[n]),
+        y0_(visits.y0.at[n]),
+        x1_(visits.x1.at[n]),
+        y1_(visits.y1.at[n]),
+        trimmed_(y1_ - y0_ > 1 && x1_ > x0_) {
+    if (trimmed_) trim(visits, n);
+  }
+
+  template <typename Paint>
+  HWY_INLINE void each(const Paint& paint) const {
+    for (int row = y0_; row <= y1_; ++row) {
+      const int from = trimmed_ ? std::max(x0_, from_.at[row]) : x0_;
+      const int to = trimmed_ ? std::min(x1_, to_.at[row]) : x1_;
+      for (int column = from; column <= to; ++column) paint(column, row);
+    }
+  }
+
+ private:
+  // Of pixels at dy, the ellipse covers lean dy ± span √(reach² - dy²); it goes farthest right at dy = tip.
+  HWY_INLINE void trim(const Visits& visits, size_t n) {
+    const Floats d;
+    const float l11 = visits.l11.at[n], l21 = visits.l21.at[n], l22 = visits.l22.at[n];
+    const float s11 = l21 * l21 + l22 * l22;
+    const V lean = hn::Set(d, l11 * l21 / s11), span = hn::Set(d, l11 * l22 / s11);
+    const V reach2 = hn::Set(d, kSupport * kSupport * s11), tip = hn::Set(d, kSupport * l21);
+    const V x = hn::Set(d, visits.x.at[n]), y = hn::Set(d, visits.y.at[n]);
+    const V block = hn::Set(d, 1.0f / kBlockSide), none = hn::Set(d, kTileBlocks);
+    for (size_t lane = 0; lane < kTileBlocks; lane += hn::Lanes(d)) {
+      const V top = hn::Sub(hn::Mul(hn::Iota(d, static_cast<float>(lane)), hn::Set(d, kBlockSide)), y);
+      const V bottom = hn::Add(top, hn::Set(d, kBlockSide - 1));
+      const V right = hn::Clamp(tip, top, bottom), left = hn::Clamp(hn::Neg(tip), top, bottom);
+      const auto width = [&](V dy) HWY_ATTR {
+        return hn::Mul(span, hn::Sqrt(hn::Max(hn::NegMulAdd(dy, dy, reach2), hn::Zero(d))));
+      };
+      const V to = hn::Add(x, hn::MulAdd(lean, right, width(right)));
+      const V from = hn::Add(x, hn::MulSub(lean, left, width(left)));
+      // A hundredth of a pixel is for rounding.
+      const V last = hn::Floor(hn::Mul(hn::Add(to, hn::Set(d, 0.01f)), block));
+      const V first = hn::Ceil(hn::Mul(hn::Sub(from, hn::Set(d, kBlockSide - 1 + 0.01f)), block));
+      hn::Store(hn::ConvertTo(Ints(), hn::Clamp(first, hn::Zero(d), none)), Ints(), from_.at + lane);
+      hn::Store(hn::ConvertTo(Ints(), hn::Clamp(last, hn::Set(d, -1.0f), none)), Ints(), to_.at + lane);
+    }
+  }
+
+  int x0_, y0_, x1_, y1_;
+  bool trimmed_;
+  IntRow from_, to_;
+};
+
+HWY_INLINE float* blockAt(const TileWork& work, int column, int row) {
+  return work.tile + (row * kTileBlocks + column) * kBlockFloats;
+}
+
+HWY_INLINE float pixelOf(int block) {
+  return static_cast<float>(block * kBlockSide);
+}
+
+template <bool kConstant, bool kThin>
+HWY_INLINE void paintBlocks(const TileWork& work, const BlockRows& rows, const Ellipse& e, const Shade& shade,
+                            const float* footprint) {
+  rows.each([&](int column, int row) HWY_ATTR {
+    paintBlock<kConstant, kThin>(e, shade, footprint, blockAt(work, column, row), pixelOf(column),
+                                 pixelOf(row));
+  });
+}
+
+HWY_INLINE bool isThin(const Ellipse& e, const Shade& shade) {
+  return e.amplitude * kPeak * shade.most < 0.34f;
+}
+
+/// From along t to along p and q.
+HWY_INLINE void turn(const Scalar& scalar, Shade& shade) {
+  shade.sp *= scalar.tp;
+  shade.sq *= scalar.tq;
+}
+
+// Blocks are fitted two rows of a tile at a time.
+static_assert(kLanes == 2 * kTileBlocks);
+alignas(64) constexpr float kFittedX[kLanes] = {0, 4, 8, 12, 16, 20, 24, 28, 0, 4, 8, 12, 16, 20, 24, 28};
+alignas(64) constexpr float kFittedY[kLanes] = {0, 0, 0, 0, 0, 0, 0, 0, 4, 4, 4, 4, 4, 4, 4, 4};
+
+/// Where one parabola does not do for all of the tile: one for every block, if that does.
+HWY_NOINLINE void paintBlockByBlock(const TileWork& work, const BlockRows& rows, const Ellipse& e,
+                                    const Scalar& scalar, const float* footprint) {
+  const Floats d;
+  const float by_x = scalar.tp * e.a + scalar.tq * e.b, by_y = scalar.tq * e.c;
+  constexpr float kHalf = 0.5f * (kBlockSide - 1);
+  Pieces pieces;
+  Fits fits;
+  int fitted_row = -2;  // and the one after it
+  rows.each([&](int column, int row) HWY_ATTR {
+    if (row > fitted_row + 1) {
+      fitted_row = row;
+      for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+        const V middle_x = hn::Add(hn::Load(d, kFittedX + lane), hn::Set(d, kHalf - e.x));
+        const V middle_y = hn::Add(hn::Load(d, kFittedY + lane), hn::Set(d, pixelOf(row) + kHalf - e.y));
+        const Range t = tOver(hn::Set(d, by_x), hn::Set(d, by_y), middle_x, middle_y, hn::Set(d, kHalf),
+                              hn::Set(d, kHalf));
+        hn::Store(t.from, d, pieces.from.at + lane);
+        hn::Store(t.to, d, pieces.to.at + lane);
+        hn::Store(hn::Set(d, scalar.mean), d, pieces.mean.at + lane);
+        hn::Store(hn::Set(d, scalar.reach), d, pieces.reach.at + lane);
+        hn::Store(hn::Set(d, scalar.half_width), d, pieces.half_width.at + lane);
+      }
+      fitPieces(work.table, pieces, fits);
+    }
+    const float x = pixelOf(column), y = pixelOf(row);
+    float* block = blockAt(work, column, row);
+    Shade shade;
+    const auto piece = static_cast<size_t>(column + (row - fitted_row) * kTileBlocks);
+    switch (shadeOf(work.table, pieces, fits, piece, e.amplitude, shade)) {
+      case Fit::nothing:
+        return;
+      case Fit::constant:
+        return paintBlock<true, false>(e, shade, footprint, block, x, y);
+      case Fit::parabola:
+        turn(scalar, shade);
+        return paintBlock<false, false>(e, shade, footprint, block, x, y);
+      case Fit::none:
+        return paintBlockExactly(e, scalar, work.table, footprint, block, x, y);
+    }
+  });
+}
+
+/// Where not even that is to be hoped for.
+HWY_NOINLINE void paintPixelByPixel(const TileWork& work, const BlockRows& rows, const Ellipse& e,
+                                    const Scalar& scalar, const float* footprint) {
+  rows.each([&](int column, int row) HWY_ATTR {
+    paintBlockExactly(e, scalar, work.table, footprint, blockAt(work, column, row), pixelOf(column),
+                      pixelOf(row));
+  });
+}
+
+HWY_INLINE void paintVisit(const TileWork& work, const Visits& visits, const Fits& fits, size_t n,
+                           const float* footprint) {
+  if (visits.x0.at[n] > visits.x1.at[n] || visits.y0.at[n] > visits.y1.at[n]) return;
+  const Ellipse e = visits.ellipse(n);
+  Shade shade;
+  Fit fit;
+  if (work.per_pixel) {
+    fit = shadeOf(work.table, visits.pieces, fits, n, e.amplitude, shade);
+  } else {
+    meanOver(work.table, fits.low, n, shade.at);
+    shade.most = shade.at[3];
+    fit = shade.most > 0 ? Fit::constant : Fit::nothing;
+  }
+  if (fit == Fit::nothing) return;
+  const BlockRows rows(visits, n);
+  if (fit == Fit::constant) {
+    if (isThin(e, shade)) return paintBlocks<true, true>(work, rows, e, shade, footprint);
+    return paintBlocks<true, false>(work, rows, e, shade, footprint);
+  }
+  const Scalar scalar = visits.scalar(n);
+  if (fit == Fit::none) {
+    // A parabola's error falls with the square of its length, or faster.
+    const float length = visits.pieces.to.at[n] - visits.pieces.from.at[n];
+    const float block_length =
+        (kBlockSide - 1) * (std::abs(scalar.tp * e.a + scalar.tq * e.b) + std::abs(scalar.tq * e.c));
+    if (shade.excess * block_length * block_length < 2 * length * length)
+      return paintBlockByBlock(work, rows, e, scalar, footprint);
+    return paintPixelByPixel(work, rows, e, scalar, footprint);
+  }
+  turn(scalar, shade);
+  if (isThin(e, shade)) return paintBlocks<false, true>(work, rows, e, shade, footprint);
+  return paintBlocks<false, false>(work, rows, e, shade, footprint);
+}
+
+void paintTile(const TileWork& work) {
+  const Floats d;
+  const float* footprint = footprintPolynomial();
+  Visits visits;
+  Fits fits;
+  for (size_t begin = 0; begin < work.order.size(); begin += kLanes) {
+    const size_t count = std::min(kLanes, work.order.size() - begin);
+    // The next sixteen come from anywhere in the batch.
+    const size_t end = std::min(begin + 2 * kLanes, work.order.size());
+    for (size_t n = begin + count; n < end; ++n) hwy::Prefetch(&work.splats[work.order[n]]);
+    IntRow numbers;
+    for (size_t n = 0; n < kLanes; ++n)
+      numbers.at[n] = static_cast<int32_t>(work.order[begin + std::min(n, count - 1)]);
+    setUp(work, numbers, visits);
+    if (work.per_pixel) {
+      fitPieces(work.table, visits.pieces, fits);
+    } else {
+      for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d))
+        locate(work.table, hn::Load(d, visits.pieces.mean.at + lane), hn::Zero(d), lane, fits.low);
+    }
+    for (size_t n = 0; n < count; ++n) paintVisit(work, visits, fits, n, footprint);
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace curvisplat
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace curvisplat {
+
+HWY_EXPORT(paintTile);
+
+void paintTile(const TileWork& work) {
+  HWY_DYNAMIC_DISPATCH(paintTile)(work);
+}
+
+}  // namespace curvisplat
+#endif

@@ -1,0 +1,44 @@
+// What draws screen splats, whatever with: OpenGL or the processor.
+//
+//   begin -> draw, draw, ... (farthest first) -> end
+//
+// Colours are premultiplied. One frame at a time, on the thread that the painter's backend says.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec4.hpp>
+#include <span>
+
+#include "render/classification.h"
+#include "render/image.h"
+#include "render/projection.h"
+
+namespace curvisplat {
+
+/// What a painter may take for a frame. OpenGL takes what its driver takes.
+struct PaintResources {
+  unsigned threads = 0;         // 0: one a core
+  size_t batch_splats = 65536;  // that may be kept back, to be drawn together
+};
+
+class Painter {
+ public:
+  virtual ~Painter() = default;
+
+  /// Begins a frame filled with `background`; one that was not ended is forgotten. `per_pixel`: classify
+  /// every pixel by the splat's slope and width, else one colour and extinction a splat. `table` outlives the
+  /// frame. Throws Error where the image is larger than the painter's limit, which it names.
+  virtual void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
+                     bool per_pixel, const PaintResources& resources = {}) = 0;
+  /// Blends `splats` over the frame in their order: farthest first. The span is free when the call returns.
+  virtual void draw(std::span<const ScreenSplat> splats) = 0;
+  /// Waits for the drawing and gives the picture.
+  virtual Image end() = 0;
+
+  /// Of the calling thread, since begin(): taking splats over, and drawing them. OpenGL may draw later than
+  /// it is told to: end() waits for it, and counts as drawing.
+  virtual double uploadSeconds() const = 0;
+  virtual double drawSeconds() const = 0;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,182 @@
+// The real grids, from their files to a picture: what the program makes of each is whole, fills its volume,
+// has no pixel that is not a number, and leaves empty what is blank. They lie in a folder beside the project;
+// without it these tests skip.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <glm/matrix.hpp>
+#include <string>
+
+#include "preprocess/open_grid.h"
+#include "render/image.h"
+#include "stream/cache_reader.h"
+#include "stream/file.h"
+#include "stream/probe.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+struct RealGrid {
+  const char* name;
+  const char* grid;
+  const char* solution;
+  const char* scalar;
+};
+
+constexpr RealGrid kBluntfin{"bluntfin", "bluntfin/bluntfinxyz.bin", "bluntfin/bluntfinq.bin", "density"};
+constexpr RealGrid kCombustor{"combustor", "combustor/combxyz.bin", "combustor/combq.bin", "density"};
+constexpr RealGrid kLoxPost{"lox_post", "lox_post/postxyz.bin", "lox_post/postq.bin", "momentum_x"};
+constexpr RealGrid kNek{"nek", "nek/Combined_PressureSide_Block.xyz", "nek/pressure.fun", "4"};
+constexpr RealGrid kNemo{"nemo", "nemo_northsea/nemo_northsea_u.xyz", "nemo_northsea/nemo_northsea_u.fun",
+                         "uo"};
+
+std::filesystem::path dataFile(const char* name) {
+  return std::filesystem::path(CURVISPLAT_SHARED_DATA) / name;
+}
+
+/// All nodes of the first block.
+NodeArrays nodesOf(const RealGrid& grid, GridBlock& block) {
+  OpenGridOptions options;
+  options.grid = dataFile(grid.grid);
+  const auto source = openGrid(options);
+  block = source->description().blocks.at(0);
+  NodeArrays nodes;
+  source->read(0, {0, block.nj, 0, block.nk}, {}, nodes);
+  return nodes;
+}
+
+/// The sum of the volumes of the trilinear hexahedra: two Gauss points an axis integrate their Jacobian
+/// exactly.
+double hexahedronVolumes(const GridBlock& block, const NodeArrays& nodes) {
+  const std::array<uint64_t, 3> strides{1, block.ni, block.ni * block.nj};
+  double sum = 0;
+  for (uint64_t k = 0; k + 1 < block.nk; ++k)
+    for (uint64_t j = 0; j + 1 < block.nj; ++j)
+      for (uint64_t i = 0; i + 1 < block.ni; ++i) {
+        const uint64_t corner = i * strides[0] + j * strides[1] + k * strides[2];
+        std::array<glm::dvec3, 8> at;
+        for (uint64_t c = 0; c < 8; ++c) {
+          const uint64_t n =
+              corner + (c & 1) * strides[0] + (c >> 1 & 1) * strides[1] + (c >> 2) * strides[2];
+          at[c] = {nodes.x[n], nodes.y[n], nodes.z[n]};
+        }
+        double volume = 0;
+        for (int point = 0; point < 8; ++point) {
+          std::array<double, 3> u;
+          for (int axis = 0; axis < 3; ++axis)
+            u[axis] = 0.5 + (point >> axis & 1 ? 0.5 : -0.5) / std::sqrt(3.0);
+          glm::dmat3 jacobian(0.0);
+          for (int c = 0; c < 8; ++c)
+            for (int axis = 0; axis < 3; ++axis) {
+              double derivative = c >> axis & 1 ? 1 : -1;
+              for (int other = 0; other < 3; ++other)
+                if (other != axis) derivative *= c >> other & 1 ? u[other] : 1 - u[other];
+              jacobian[axis] += derivative * at[static_cast<size_t>(c)];
+            }
+          volume += glm::determinant(jacobian) / 8;
+        }
+        sum += std::abs(volume);
+      }
+  return sum;
+}
+
+class RealGrids : public testing::TestWithParam<RealGrid> {
+ protected:
+  void SetUp() override {
+    for (const char* file : {GetParam().grid, GetParam().solution})
+      if (!std::filesystem::exists(dataFile(file))) GTEST_SKIP() << "needs " << dataFile(file);
+    const ProgramResult result =
+        runProgram({"convert", dataFile(GetParam().grid), dataFile(GetParam().solution), "-o", cache(),
+                    "--scalar", GetParam().scalar});
+    ASSERT_EQ(result.status, 0) << result.err;
+  }
+
+  std::string cache() const { return folder_ / "grid.splats"; }
+
+  TemporaryFolder folder_;
+};
+
+TEST_P(RealGrids, MakeAWholeCacheAndAPictureThatRepeats) {
+  const ProgramResult verified = runProgram({"info", cache(), "--verify"});
+  EXPECT_EQ(verified.status, 0) << verified.err << verified.out;
+
+  for (const std::string view : {"iso", "+z", "-y"}) {
+    const std::string picture = folder_ / "picture.pfm", again = folder_ / "again.pfm";
+    const std::vector<std::string> render{"render", cache(), "--view", view, "--size", "300x300", "-o"};
+    for (const auto& [file, threads] : {std::pair{picture, "1"}, std::pair{again, "2"}}) {
+      std::vector<std::string> arguments = render;
+      arguments.insert(arguments.end(), {file, "--threads", threads});
+      const ProgramResult result = runProgram(arguments);
+      ASSERT_EQ(result.status, 0) << result.err;
+    }
+    EXPECT_EQ(readTextFile(picture), readTextFile(again)) << view;
+
+    const Image image = readImage(picture);
+    size_t drawn = 0;
+    for (size_t n = 0; n < image.rgba.size(); ++n) {
+      ASSERT_TRUE(std::isfinite(image.rgba[n])) << view << " at float " << n;
+      ASSERT_GE(image.rgba[n], 0) << view;
+      ASSERT_LE(image.rgba[n], 1 + 1e-5) << view;
+      drawn += n % 4 == 0 && image.rgba[n] < 0.99f;
+    }
+    EXPECT_GT(drawn, 500u) << view;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Shared, RealGrids, testing::Values(kBluntfin, kCombustor, kLoxPost, kNek, kNemo),
+                         [](const auto& grid) { return std::string(grid.param.name); });
+
+class RealVolumes : public RealGrids {};
+
+TEST_P(RealVolumes, AreTheSumsOfTheWeights) {
+  GridBlock block;
+  const NodeArrays nodes = nodesOf(GetParam(), block);
+  const double ratio = CacheReader(cache()).manifest().volume / hexahedronVolumes(block, nodes);
+  fmt::print("{}: weights / hexahedra = {:.6f}\n", GetParam().name, ratio);
+  EXPECT_NEAR(ratio, 1, 0.01);
+}
+
+INSTANTIATE_TEST_SUITE_P(Shared, RealVolumes, testing::Values(kBluntfin, kCombustor, kLoxPost),
+                         [](const auto& grid) { return std::string(grid.param.name); });
+
+class RealLand : public RealGrids {};
+
+// Nodes all of whose neighbours within three are blank are in no splat; water in the midst of water is.
+TEST_P(RealLand, IsEmpty) {
+  GridBlock block;
+  const NodeArrays nodes = nodesOf(GetParam(), block);
+  const CacheReader reader(cache());
+  const size_t variable = 0;
+  constexpr int64_t kAround = 3;
+  int land = 0, water = 0;
+  for (uint64_t k = kAround; k + kAround < block.nk; k += 7)
+    for (uint64_t j = kAround; j + kAround < block.nj; j += 13)
+      for (uint64_t i = kAround; i + kAround < block.ni; i += 11) {
+        int blank = 0;
+        for (int64_t dk = -kAround; dk <= kAround; ++dk)
+          for (int64_t dj = -kAround; dj <= kAround; ++dj)
+            for (int64_t di = -kAround; di <= kAround; ++di)
+              blank += nodes.blank[(i + di) + block.ni * ((j + dj) + block.nj * (k + dk))];
+        constexpr int kAll = (2 * kAround + 1) * (2 * kAround + 1) * (2 * kAround + 1);
+        if (blank != 0 && blank != kAll) continue;
+        if (blank == kAll ? land >= 40 : water >= 40) continue;
+        const uint64_t n = i + block.ni * (j + block.nj * k);
+        const auto found = probe(reader, std::span(&variable, 1), {nodes.x[n], nodes.y[n], nodes.z[n]});
+        EXPECT_EQ(found.has_value(), blank == 0) << i << ", " << j << ", " << k;
+        ++(blank == 0 ? water : land);
+      }
+  EXPECT_EQ(land, 40);
+  EXPECT_EQ(water, 40);
+}
+
+INSTANTIATE_TEST_SUITE_P(Shared, RealLand, testing::Values(kNemo),
+                         [](const auto& grid) { return std::string(grid.param.name); });
+
+}  // namespace
+}  // namespace curvisplat

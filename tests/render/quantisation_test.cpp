@@ -1,0 +1,172 @@
+// What the codec's rounding costs in the picture: the same splats of the half-annulus, drawn as they were
+// computed and as a cache gives them back, against the reference march. Painter, order and levels are the
+// same for both.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <numeric>
+#include <vector>
+
+#include "preprocess/node_splats.h"
+#include "preprocess/scenes.h"
+#include "render/gl_painter.h"
+#include "render/gl_thread.h"
+#include "render/image.h"
+#include "render/projection.h"
+#include "stream/brick_codec.h"
+#include "tests/support/reference_march.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr ImageSize kSize{256, 256};
+constexpr SceneGridSize kNodes{128, 64, 64};
+
+struct Splats {
+  SplatGeometry geometry;
+  SplatVariable variable;
+};
+
+/// What a brick of double-precision splats is in the arrays that are projected.
+Splats inArrays(const RootCube& root, const BrickSplats& brick) {
+  Splats out;
+  SplatGeometry& geometry = out.geometry;
+  SplatVariable& variable = out.variable;
+  geometry.resize(brick.size());
+  variable.resize(brick.size());
+  for (size_t n = 0; n < brick.size(); ++n) {
+    const glm::dvec3 position = root.toWorld(brick.positions[n]) - root.cellMin(brick.cell);
+    const Splat& splat = brick.splats[n];
+    const SplatScalar& scalar = brick.variables[0][n];
+    geometry.x[n] = static_cast<float>(position.x);
+    geometry.y[n] = static_cast<float>(position.y);
+    geometry.z[n] = static_cast<float>(position.z);
+    geometry.axis0[n] = static_cast<float>(splat.axis[0]);
+    geometry.axis1[n] = static_cast<float>(splat.axis[1]);
+    geometry.axis2[n] = static_cast<float>(splat.axis[2]);
+    geometry.shear10[n] = static_cast<float>(splat.shear[0]);
+    geometry.shear20[n] = static_cast<float>(splat.shear[1]);
+    geometry.shear21[n] = static_cast<float>(splat.shear[2]);
+    geometry.weight[n] = static_cast<float>(splat.weight);
+    variable.mean[n] = static_cast<float>(scalar.mean);
+    variable.slope0[n] = static_cast<float>(scalar.slope.x);
+    variable.slope1[n] = static_cast<float>(scalar.slope.y);
+    variable.slope2[n] = static_cast<float>(scalar.slope.z);
+    variable.variance[n] = static_cast<float>(scalar.variance);
+  }
+  return out;
+}
+
+/// The half-annulus' splats, in bricks of planes of nodes; every brick's cell is the root.
+std::vector<BrickSplats> halfAnnulusBricks(RootCube& root) {
+  const SceneGridSource source(makeScene("half-annulus"), kNodes);
+  const NodeBox all{0, kNodes.nj, 0, kNodes.nk};
+  NodeArrays nodes;
+  const uint32_t scalar = 0;
+  source.read(0, all, std::span(&scalar, 1), nodes);
+  const auto range = [](const std::vector<double>& values) {
+    return std::minmax_element(values.begin(), values.end());
+  };
+  const auto [x0, x1] = range(nodes.x);
+  const auto [y0, y1] = range(nodes.y);
+  const auto [z0, z1] = range(nodes.z);
+  root = RootCube::around({*x0, *y0, *z0}, {*x1, *y1, *z1});
+
+  std::vector<BrickSplats> bricks;
+  const BlockWindow window{source.description().blocks[0], 0, all, &nodes};
+  const uint64_t planes = kMaxBrickSplats / (kNodes.ni * kNodes.nj);
+  NodeSplats splats;
+  for (uint64_t k = 0; k < kNodes.nk; k += planes) {
+    computeNodeSplats(window, {0, kNodes.nj, k, std::min(k + planes, kNodes.nk)}, splats);
+    BrickSplats& brick = bricks.emplace_back();
+    brick.variables.resize(1);
+    brick.variables[0] = splats.values;
+    for (const NodeSplat& node : splats.splats) {
+      brick.positions.push_back(root.fromWorld(node.splat.position));
+      brick.splats.push_back(node.splat);
+    }
+    for (uint64_t row = 0; row < splats.splats.size() / kNodes.ni; ++row)
+      brick.runs.push_back({0, 0, row % kNodes.nj, k + row / kNodes.nj, kNodes.ni});
+  }
+  return bricks;
+}
+
+class Quantisation : public testing::Test {
+ protected:
+  static TransferFunction function(const std::string& name) {
+    return TransferFunction::fromFile(fmt::format("{}/half_annulus_{}.json", CURVISPLAT_TEST_DATA, name),
+                                      nullptr, 0, 0.01);
+  }
+
+  /// All splats in one order: farthest first.
+  Image paint(const RootCube& root, const std::vector<BrickSplats>& bricks,
+              const ClassificationTable& table) {
+    const ProjectionSettings settings{ScreenView::of(halfAnnulusCamera(), kSize, glm::dvec3(1), 1.5, 1e-4)};
+    BrickProjector projector;
+    std::vector<ScreenSplat> splats;
+    std::vector<float> depths;
+    for (const BrickSplats& brick : bricks) {
+      const Splats arrays = inArrays(root, brick);
+      projector.project(settings, table, root.cellMin(brick.cell), arrays.geometry, arrays.variable);
+      splats.insert(splats.end(), projector.splats().begin(), projector.splats().end());
+      depths.insert(depths.end(), projector.depths().begin(), projector.depths().end());
+    }
+    std::vector<uint32_t> order(splats.size());
+    std::iota(order.begin(), order.end(), 0u);
+    std::stable_sort(order.begin(), order.end(),
+                     [&](uint32_t a, uint32_t b) { return depths[a] > depths[b]; });
+    std::vector<ScreenSplat> sorted;
+    for (const uint32_t n : order) sorted.push_back(splats[n]);
+
+    Image image;
+    gl_.run([&](const GlContext& context) {
+      GlPainter painter(context);
+      painter.begin(kSize, {1, 1, 1, 1}, table, true);
+      painter.draw(sorted);
+      image = painter.end();
+    });
+    return image;
+  }
+
+  void expectCheap(const std::string& name, const OpticalFunction& exact) {
+    RootCube root;
+    std::vector<BrickSplats> bricks = halfAnnulusBricks(root);
+    const ClassificationTable table = ClassificationTable::of(function(name), 0, 1);
+    const ReferenceImage march =
+        referenceMarch(*makeScene("half-annulus"), exact, halfAnnulusCamera(), kSize);
+    Image reference(kSize);
+    for (size_t n = 0; n < march.pixels.size(); ++n)
+      for (size_t c = 0; c < 4; ++c)
+        reference.rgba[4 * n + c] =
+            c == 3 ? 1.0f : static_cast<float>(march.pixels[n].colour[static_cast<glm::length_t>(c)]);
+
+    const double computed_db = compareImages(paint(root, bricks, table), reference).psnr_db;
+    uint64_t bytes = 0;
+    for (BrickSplats& brick : bricks) {
+      const EncodedBrick encoded = encodeBrick(root, brick);
+      bytes += encoded.geometry.size() + encoded.values[0].size();
+    }
+    const double decoded_db = compareImages(paint(root, bricks, table), reference).psnr_db;
+    fmt::print("{}: {:.2f} dB as computed, {:.2f} dB through the codec, {:.2f} bytes a splat\n", name,
+               computed_db, decoded_db,
+               static_cast<double>(bytes) / static_cast<double>(kNodes.ni * kNodes.nj * kNodes.nk));
+    EXPECT_GT(computed_db, 50);
+    EXPECT_LT(computed_db - decoded_db, 1);
+  }
+
+  GlThread gl_;
+};
+
+TEST_F(Quantisation, OfASmoothFunctionCostsLessThanADecibel) {
+  expectCheap("smooth", smoothFunction);
+}
+TEST_F(Quantisation, OfANarrowBandCostsLessThanADecibel) {
+  expectCheap("band", bandFunction);
+}
+TEST_F(Quantisation, OfAStepCostsLessThanADecibel) {
+  expectCheap("step", stepFunction);
+}
+
+}  // namespace
+}  // namespace curvisplat
