@@ -62,10 +62,13 @@ struct BenchCache {
     CutView view;
     view.towards_viewer = {octant & 1 ? 1 : -1, octant & 2 ? 1 : -1, octant & 4 ? 1 : -1};
     const auto bounds = subtreeBounds(reader->bricks(), reader->brickVariables(0));
-    return chooseCut(
-               root, reader->bricks(), reader->brickVariables(0), bounds, view,
-               [](const ValueBounds&) { return false; }, 0)
-        .bricks;
+    CutOptions options;
+    options.lod_pixels = 0;
+    const CutTree tree{root, reader->bricks(), reader->brickVariables(0), bounds};
+    const auto all = [](const ValueBounds&) { return false; };
+    std::vector<uint32_t> bricks;
+    for (const BrickPart& part : chooseCut(tree, view, all, options).parts) bricks.push_back(part.brick);
+    return bricks;
   }
 
   const std::filesystem::path path;

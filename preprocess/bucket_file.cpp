@@ -9,6 +9,7 @@
 #include <deque>
 #include <exception>
 #include <mutex>
+#include <new>
 #include <optional>
 #include <thread>
 
@@ -26,12 +27,27 @@ struct ChunkHeader {
 };
 static_assert(sizeof(ChunkHeader) == 16);
 
+template <typename T>
+struct DirectAllocator {
+  using value_type = T;
+  DirectAllocator() = default;
+  template <typename U>
+  DirectAllocator(const DirectAllocator<U>&) {}
+  T* allocate(size_t count) {
+    return static_cast<T*>(::operator new (count * sizeof(T), std::align_val_t{kDirectAlignment}));
+  }
+  void deallocate(T* at, size_t) { ::operator delete (at, std::align_val_t{kDirectAlignment}); }
+  bool operator==(const DirectAllocator&) const { return true; }
+};
+/// A chunk in memory, at an address for direct transfers.
+using ChunkBuffer = std::vector<std::byte, DirectAllocator<std::byte>>;
+
 /// Writes chunks in a thread of its own, so that no worker waits for the disk unless it is far behind.
 class ChunkWriter {
  public:
   struct Chunk {
     uint64_t offset = 0;
-    std::vector<std::byte> bytes;
+    ChunkBuffer bytes;
   };
 
   explicit ChunkWriter(OutputFile& file) : file_(&file), thread_([this] { writeAll(); }) {}
@@ -47,10 +63,10 @@ class ChunkWriter {
   }
 
   /// A used buffer, emptied, or a new one.
-  std::vector<std::byte> buffer() {
+  ChunkBuffer buffer() {
     const std::lock_guard lock(mutex_);
     if (free_.empty()) return {};
-    std::vector<std::byte> buffer = std::move(free_.back());
+    ChunkBuffer buffer = std::move(free_.back());
     free_.pop_back();
     return buffer;
   }
@@ -99,15 +115,15 @@ class ChunkWriter {
   std::mutex mutex_;  // guards all below
   std::condition_variable changed_;
   std::deque<Chunk> waiting_;
-  std::vector<std::vector<std::byte>> free_;
+  std::vector<ChunkBuffer> free_;
   bool stopped_ = false;
   std::exception_ptr error_;
   std::thread thread_;  // last: it uses the others
 };
 
 struct Bucket {
-  std::mutex mutex;               // guards the rest, until close()
-  std::vector<std::byte> buffer;  // a chunk in the making, header first; empty: none
+  std::mutex mutex;    // guards the rest, until close()
+  ChunkBuffer buffer;  // a chunk in the making, header first; empty: none
   uint64_t last_chunk = kNoChunk;
   uint64_t bytes = 0;
 };
@@ -116,7 +132,9 @@ struct Bucket {
 
 struct BucketFile::State {
   State(const std::filesystem::path& path, uint32_t bucket_count, size_t chunk)
-      : output(path), chunk_bytes(chunk), buckets(bucket_count), writer(output) {}
+      : output(path, Caching::direct), chunk_bytes(chunk), buckets(bucket_count), writer(output) {
+    CURVISPLAT_CHECK_OP(chunk_bytes % kDirectAlignment, ==, 0u);
+  }
 
   OutputFile output;
   const size_t chunk_bytes;
@@ -129,21 +147,28 @@ struct BucketFile::State {
   void flush(Bucket& bucket) {
     const ChunkHeader header{bucket.last_chunk, bucket.buffer.size() - sizeof(ChunkHeader)};
     std::memcpy(bucket.buffer.data(), &header, sizeof header);
+    const size_t pages = (bucket.buffer.size() + kDirectAlignment - 1) / kDirectAlignment;
+    bucket.buffer.resize(pages * kDirectAlignment);
     bucket.last_chunk = end.fetch_add(bucket.buffer.size());
     bucket.bytes += header.bytes;
     writer.write({bucket.last_chunk, std::move(bucket.buffer)});
     bucket.buffer = {};
   }
 
-  /// Calls use(offset, bytes) for the records of each chunk.
+  /// Calls use(records) for each chunk.
   template <typename Use>
   void forEachChunk(uint32_t number, Use use) const {
     CURVISPLAT_CHECK(input.has_value());
+    ChunkBuffer chunk(chunk_bytes);
     uint64_t at = buckets[number].last_chunk;
     while (at != kNoChunk) {
+      // The next chunk's beginning comes along with a short one.
+      const std::span<std::byte> whole = std::span(chunk).first(std::min<uint64_t>(chunk_bytes, end - at));
+      input->readAt(at, whole);
       ChunkHeader header;
-      input->readAt(at, std::span(&header, 1));
-      use(at + sizeof header, header.bytes);
+      std::memcpy(&header, whole.data(), sizeof header);
+      CURVISPLAT_CHECK_OP(header.bytes, <=, whole.size() - sizeof header);
+      use(std::span<const std::byte>(whole).subspan(sizeof header, header.bytes));
       at = header.previous;
     }
   }
@@ -181,7 +206,7 @@ void BucketFile::close() {
   for (Bucket& bucket : state_->buckets)
     if (!bucket.buffer.empty()) state_->flush(bucket);
   state_->writer.finish();
-  state_->input.emplace(state_->output.path());
+  state_->input.emplace(state_->output.path(), Caching::direct);
 }
 
 uint64_t BucketFile::bytes(uint32_t bucket) const {
@@ -196,23 +221,17 @@ void BucketFile::read(uint32_t bucket, std::vector<std::byte>& out) const {
   if (out.capacity() < bytes(bucket)) out = {};  // or old and new would be in memory together
   out.resize(bytes(bucket));
   size_t done = 0;
-  state_->forEachChunk(bucket, [&](uint64_t offset, uint64_t bytes) {
-    CURVISPLAT_CHECK_OP(done + bytes, <=, out.size());
-    state_->input->readAt(offset, std::span(out).subspan(done, bytes));
-    done += bytes;
+  state_->forEachChunk(bucket, [&](std::span<const std::byte> records) {
+    CURVISPLAT_CHECK_OP(done + records.size(), <=, out.size());
+    std::copy(records.begin(), records.end(), out.begin() + static_cast<ptrdiff_t>(done));
+    done += records.size();
   });
   CURVISPLAT_CHECK_OP(done, ==, out.size());
 }
 
 void BucketFile::forEachChunk(uint32_t bucket,
                               const std::function<void(std::span<const std::byte>)>& use) const {
-  std::vector<std::byte> chunk;
-  state_->forEachChunk(bucket, [&](uint64_t offset, uint64_t bytes) {
-    CURVISPLAT_CHECK_OP(bytes, <=, state_->chunk_bytes);
-    chunk.resize(bytes);
-    state_->input->readAt(offset, std::span(chunk));
-    use(chunk);
-  });
+  state_->forEachChunk(bucket, use);
 }
 
 }  // namespace curvisplat

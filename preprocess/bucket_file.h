@@ -5,6 +5,9 @@
 //    chunk:  offset of the bucket's chunk before, or kNoChunk   uint64
 //            bytes of records that follow                       uint64
 //            whole records
+//            zeros up to a multiple of kDirectAlignment
+//
+// It is written once and read once, and is larger than memory: it goes past the page cache.
 #pragma once
 
 #include <cstddef>
@@ -19,8 +22,8 @@ namespace curvisplat {
 
 class BucketFile {
  public:
-  /// Makes `path`. A bucket's buffer has `chunk_bytes`; it is there while the bucket has something in it.
-  /// Four more may wait for the disk.
+  /// Makes `path`. A bucket's buffer has `chunk_bytes`, a multiple of kDirectAlignment; it is there while the
+  /// bucket has something in it. Four more may wait for the disk.
   BucketFile(const std::filesystem::path& path, uint32_t buckets, size_t chunk_bytes);
   /// Removes the file.
   ~BucketFile();

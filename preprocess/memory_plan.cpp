@@ -7,14 +7,17 @@
 #include "preprocess/splat_record.h"
 #include "stream/brick.h"
 #include "stream/error.h"
+#include "stream/file.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
-// The program with its libraries, thread stacks, the index records, and what the allocator holds back.
+// The program with its libraries, thread stacks and index records; and of the cap what the allocator holds
+// back.
 constexpr uint64_t kProgramBytes = 64 * kMiB;
+constexpr uint64_t kAllocatorShare = 16;
 // Buckets are built from at least so many splats: some bricks at a time for each thread to work on.
 constexpr uint64_t kLeastBucketSplats = 4 * kMaxBrickSplats;
 constexpr uint64_t kLeastChunkBytes = kMiB / 8, kMostChunkBytes = kMiB;
@@ -36,7 +39,8 @@ uint64_t bucketBytesPerSplat(size_t variables) {
 uint64_t leastMemory(size_t variables) {
   const uint64_t two_buckets = 2 * kLeastBucketSplats * bucketBytesPerSplat(variables);
   const uint64_t exact = kProgramBytes + brickScratchBytes(variables) + two_buckets;
-  return (exact + 16 * kMiB - 1) / (16 * kMiB) * (16 * kMiB);
+  const uint64_t held_back = exact / (kAllocatorShare - 1) + 1;
+  return (exact + held_back + 16 * kMiB - 1) / (16 * kMiB) * (16 * kMiB);
 }
 
 uint64_t defaultMemory() {
@@ -49,7 +53,7 @@ MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads
   if (cap_bytes < leastMemory(variables))
     throw Error("--memory: conversion of {} scalars takes at least {} MiB; {} MiB were given", variables,
                 leastMemory(variables) / kMiB, cap_bytes / kMiB);
-  const uint64_t bytes = cap_bytes - kProgramBytes;
+  const uint64_t bytes = cap_bytes - cap_bytes / kAllocatorShare - kProgramBytes;
 
   MemoryPlan plan;
   plan.slab_bytes = std::min(bytes / 8, 256 * kMiB);
@@ -78,7 +82,9 @@ void MemoryPlan::limitBuckets(uint64_t splats, size_t variables) {
 }
 
 size_t MemoryPlan::chunkBytes(uint32_t buckets) const {
-  return std::clamp(chunk_buffer_bytes / std::max(1u, buckets), kLeastChunkBytes, kMostChunkBytes);
+  const uint64_t bytes =
+      std::clamp(chunk_buffer_bytes / std::max(1u, buckets), kLeastChunkBytes, kMostChunkBytes);
+  return bytes / kDirectAlignment * kDirectAlignment;
 }
 
 }  // namespace curvisplat

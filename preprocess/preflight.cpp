@@ -9,7 +9,9 @@
 #include <optional>
 
 #include "preprocess/splat_record.h"
+#include "preprocess/value_record.h"
 #include "stream/error.h"
+#include "stream/partial_folder.h"
 
 namespace curvisplat {
 namespace {
@@ -19,14 +21,6 @@ namespace {
 constexpr uint64_t kCacheBytesPerNode = 16, kCacheBytesPerScalar = 5;
 // Chunk headers, chunks that are not full, and the records of seams, which are longer.
 constexpr uint64_t kTemporaryMarginPercent = 5;
-
-void checkWritable(const std::filesystem::path& folder, const char* hint) {
-  std::error_code error;
-  if (!std::filesystem::is_directory(folder, error))
-    throw Error("{}: is not a folder{}", folder.string(), hint);
-  if (::access(folder.c_str(), W_OK | X_OK) != 0)
-    throw Error("{}: cannot be written to: {}{}", folder.string(), std::strerror(errno), hint);
-}
 
 struct Disk {
   dev_t device;
@@ -51,24 +45,37 @@ void checkRoom(const std::filesystem::path& folder, const Disk& disk, uint64_t b
                 gigabytes(disk.free_bytes), hint);
 }
 
+uint64_t withMargin(uint64_t temporary) {
+  return temporary + temporary * kTemporaryMarginPercent / 100;
+}
+
 }  // namespace
 
 DiskNeeds diskNeeds(uint64_t nodes, size_t variables) {
-  const uint64_t temporary = nodes * regularRecordBytes(variables);
   const uint64_t further = variables > 1 ? variables - 1 : 0;
-  return {temporary + temporary * kTemporaryMarginPercent / 100,
+  return {withMargin(nodes * regularRecordBytes(variables)),
           nodes * (kCacheBytesPerNode + further * kCacheBytesPerScalar)};
+}
+
+DiskNeeds diskNeedsOfAdding(uint64_t splats, size_t variables) {
+  return {withMargin(splats * leastValueRecordBytes(variables)), splats * variables * kCacheBytesPerScalar};
 }
 
 std::filesystem::path folderOf(const std::filesystem::path& path) {
   return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
 }
 
+void checkWritable(const std::filesystem::path& folder, const char* hint) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(folder, error))
+    throw Error("{}: is not a folder{}", folder.string(), hint);
+  if (::access(folder.c_str(), W_OK | X_OK) != 0)
+    throw Error("{}: cannot be written to: {}{}", folder.string(), std::strerror(errno), hint);
+}
+
 void checkOutput(const std::filesystem::path& output, bool overwrite,
                  const std::filesystem::path& temporary_folder) {
-  std::error_code error;
-  if (!overwrite && std::filesystem::exists(std::filesystem::symlink_status(output, error)))
-    throw Error("{}: exists; remove it, name another output, or say --overwrite", output.string());
+  checkReplaceable(output, overwrite);
   checkWritable(folderOf(output), "");
   checkWritable(temporary_folder, "; name another folder with --tmp");
 }

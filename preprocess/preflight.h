@@ -15,11 +15,16 @@ struct DiskNeeds {
   uint64_t cache_bytes = 0;
 };
 DiskNeeds diskNeeds(uint64_t nodes, size_t variables);
+/// The same for adding variables to a cache of so many splats.
+DiskNeeds diskNeedsOfAdding(uint64_t splats, size_t variables);
 
 /// Throws Error if something stands at `output` that may not be replaced, or if its folder or
 /// `temporary_folder` is missing or not writable. Changes nothing.
 void checkOutput(const std::filesystem::path& output, bool overwrite,
                  const std::filesystem::path& temporary_folder);
+
+/// Throws Error if `folder` is missing or cannot be written; `hint` says what to do about it.
+void checkWritable(const std::filesystem::path& folder, const char* hint);
 
 /// Throws Error if the disks of `output` and `temporary_folder` (one, perhaps) have too little room.
 void checkDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,

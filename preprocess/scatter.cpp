@@ -15,36 +15,23 @@ namespace {
 constexpr uint64_t kNodesPerTask = 4096;
 constexpr size_t kGatheredBytes = 32 << 10;
 
-void addContents(std::vector<CellContents>& to, const std::vector<CellContents>& from) {
-  for (size_t node = 0; node < to.size(); ++node) to[node].add(from[node]);
-}
-
 struct Handedness {
   uint64_t right = 0, left = 0;
 };
 
-/// What a thread has for itself.
-struct Worker {
-  RecordRouter router;
-  NodeSplats splats;
-  std::vector<std::byte> record;
-  uint64_t degenerate = 0;
-  std::vector<Handedness> handedness;  // [block]
-};
-
-class Scatter {
+/// Makes splats of slabs.
+class SplatStream {
  public:
-  Scatter(const NodeReader& reader, const RootCube& root, const BucketTree& tree, BucketFile& file,
-          SeamMerger& seams)
+  SplatStream(const NodeReader& reader, const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams)
       : blocks_(&reader.source().description().blocks),
         variables_(reader.scalars()),
-        root_(root),
+        sink_of_thread_(&sink_of_thread),
         seams_(&seams),
-        workers_([this, &tree, &file] {
-          return Worker{RecordRouter(tree, file), {}, {}, 0, std::vector<Handedness>(blocks_->size())};
+        workers_([this] {
+          return Worker{{}, 0, std::vector<Handedness>(blocks_->size())};
         }) {}
 
-  void scatter(const LoadedSlab& loaded) {
+  void add(const LoadedSlab& loaded) {
     const Slab& slab = loaded.slab;
     const GridBlock& block = (*blocks_)[slab.block];
     const BlockWindow window{block, slab.first_node, slab.window, &loaded.nodes};
@@ -55,16 +42,14 @@ class Scatter {
       worker.degenerate += worker.splats.degenerate;
       worker.handedness[slab.block].right += worker.splats.right_handed;
       worker.handedness[slab.block].left += worker.splats.left_handed;
-      route(worker);
+      send(worker.splats);
     });
   }
 
-  ScatterCounts finish(std::vector<CellContents>& contents) {
+  ScatterCounts counts() const {
     ScatterCounts counts;
     std::vector<Handedness> of_blocks(blocks_->size());
-    for (Worker& worker : workers_) {
-      worker.router.flush();
-      addContents(contents, worker.router.contents());
+    for (const Worker& worker : workers_) {
       counts.degenerate += worker.degenerate;
       for (size_t block = 0; block < of_blocks.size(); ++block) {
         of_blocks[block].right += worker.handedness[block].right;
@@ -76,23 +61,25 @@ class Scatter {
   }
 
  private:
+  /// What a thread has for itself.
+  struct Worker {
+    NodeSplats splats;
+    uint64_t degenerate = 0;
+    std::vector<Handedness> handedness;  // [block]
+  };
+
   std::span<const SplatScalar> valuesOf(const NodeSplats& splats, size_t n) const {
     return std::span(splats.values).subspan(n * variables_, variables_);
   }
 
-  void route(Worker& worker) {
-    const NodeSplats& splats = worker.splats;
+  void send(const NodeSplats& splats) {
+    SplatSink& sink = (*sink_of_thread_)();
     bool has_faces = false;
     for (size_t n = 0; n < splats.splats.size(); ++n) {
-      const NodeSplat& splat = splats.splats[n];
-      if (splat.on_block_face) {
+      if (splats.splats[n].on_block_face)
         has_faces = true;
-        continue;
-      }
-      const RootPosition position = root_.fromWorld(splat.splat.position);
-      worker.record.clear();
-      packRecord(splat, valuesOf(splats, n), position, worker.record);
-      worker.router.add(worker.record, position);
+      else
+        sink.add(splats.splats[n], valuesOf(splats, n));
     }
     if (!has_faces) return;
     const std::lock_guard lock(adding_to_seams_);
@@ -102,10 +89,35 @@ class Scatter {
 
   const std::vector<GridBlock>* blocks_;
   const size_t variables_;
-  const RootCube root_;
+  const std::function<SplatSink&()>* sink_of_thread_;
   std::mutex adding_to_seams_;  // guards *seams_
   SeamMerger* seams_;
   tbb::enumerable_thread_specific<Worker> workers_;
+};
+
+/// Packs splats and routes their records. One a thread.
+class RecordSink : public SplatSink {
+ public:
+  RecordSink(const RootCube& root, const BucketTree& tree, BucketFile& file)
+      : root_(root), router_(tree, file) {}
+
+  void add(const NodeSplat& splat, std::span<const SplatScalar> values) override {
+    const RootPosition position = root_.fromWorld(splat.splat.position);
+    record_.clear();
+    packRecord(splat, values, position, record_);
+    router_.add(record_, position);
+  }
+
+  /// Sends what is gathered, and adds what was sent to `contents`.
+  void finish(std::vector<CellContents>& contents) {
+    router_.flush();
+    for (size_t node = 0; node < contents.size(); ++node) contents[node].add(router_.contents()[node]);
+  }
+
+ private:
+  const RootCube root_;
+  RecordRouter router_;
+  std::vector<std::byte> record_;
 };
 
 }  // namespace
@@ -126,33 +138,38 @@ void RecordRouter::flush() {
   gathered_.clear();
 }
 
-ScatterCounts scatterSplats(const NodeReader& reader, const RootCube& root, uint64_t slab_bytes,
-                            const BucketTree& tree, BucketFile& file, std::vector<CellContents>& contents,
-                            SeamMerger& seams, Progress& progress) {
-  Scatter scatter(reader, root, tree, file, seams);
+ScatterCounts streamSplats(const NodeReader& reader, uint64_t slab_bytes,
+                           const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams,
+                           Progress& progress) {
+  SplatStream splats(reader, sink_of_thread, seams);
   SlabStream slabs(reader, slab_bytes, true);
   while (const LoadedSlab* loaded = slabs.next()) {
-    scatter.scatter(*loaded);
+    splats.add(*loaded);
     const GridBlock& block = reader.source().description().blocks[loaded->slab.block];
     progress.advance(rowsOf(loaded->slab.box) * block.ni);
   }
-  return scatter.finish(contents);
+  return splats.counts();
+}
+
+ScatterCounts scatterSplats(const NodeReader& reader, const RootCube& root, uint64_t slab_bytes,
+                            const BucketTree& tree, BucketFile& file, std::vector<CellContents>& contents,
+                            SeamMerger& seams, Progress& progress) {
+  tbb::enumerable_thread_specific<RecordSink> sinks([&] { return RecordSink(root, tree, file); });
+  const ScatterCounts counts = streamSplats(
+      reader, slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, seams, progress);
+  for (RecordSink& sink : sinks) sink.finish(contents);
+  return counts;
 }
 
 uint64_t scatterSeams(SeamMerger& seams, int coordinate_bytes, const RootCube& root, const BucketTree& tree,
                       BucketFile& file, std::vector<CellContents>& contents, Progress& progress) {
-  RecordRouter router(tree, file);
-  std::vector<std::byte> record;
+  RecordSink sink(root, tree, file);
   const uint64_t merged =
       seams.finish(coordinate_bytes, [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
-        const RootPosition position = root.fromWorld(splat.splat.position);
-        record.clear();
-        packRecord(splat, values, position, record);
-        router.add(record, position);
+        sink.add(splat, values);
         progress.advance(1);
       });
-  router.flush();
-  addContents(contents, router.contents());
+  sink.finish(contents);
   return merged;
 }
 

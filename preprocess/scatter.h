@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -37,10 +38,24 @@ class RecordRouter {
   std::vector<std::byte> gathered_;  // for the leaf's bucket
 };
 
+/// Where a pass sends its splats.
+class SplatSink {
+ public:
+  virtual ~SplatSink() = default;
+  /// One value a scalar of the reader.
+  virtual void add(const NodeSplat& splat, std::span<const SplatScalar> values) = 0;
+};
+
 struct ScatterCounts {
   uint64_t degenerate = 0;  // splats with a floored axis
   uint64_t inverted = 0;    // cells of the handedness that fewer of their block's cells have
 };
+
+/// Makes all splats, in parallel. Those of block faces go to `seams`, the others to what `sink_of_thread`
+/// gives: a sink of the calling thread's own, always the same one.
+ScatterCounts streamSplats(const NodeReader& reader, uint64_t slab_bytes,
+                           const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams,
+                           Progress& progress);
 
 /// Routes all splats but those of block faces, which go to `seams`. Adds to `contents` ([node of the tree]).
 ScatterCounts scatterSplats(const NodeReader& reader, const RootCube& root, uint64_t slab_bytes,

@@ -45,7 +45,8 @@ double slackOf(const NodeSplat& node) {
 /// within it, leaders are found by `across`.
 class Sweep {
  public:
-  using Sink = std::function<void(const NodeSplat&, std::span<const SplatScalar>)>;
+  /// Gets the merged splat, its values, and the nodes that it is merged of; none if it is of one.
+  using Sink = std::function<void(const NodeSplat&, std::span<const SplatScalar>, std::span<const uint64_t>)>;
 
   Sweep(size_t variables, int coordinate_bytes, const Sink& sink)
       : variables_(variables), coordinate_bytes_(coordinate_bytes), sink_(sink) {}
@@ -61,6 +62,7 @@ class Sweep {
     NodeSplat lowest;  // the node of the lowest number
     std::vector<SplatScalar> values;
     std::optional<SplatMerger> merger;  // from the second node on
+    std::vector<uint64_t> nodes;        // the same
   };
   using Clusters = std::multimap<double, Cluster>;  // by `across` of the leader
 
@@ -92,7 +94,8 @@ void Sweep::add(const SeamNode& node, std::span<const SplatScalar> values) {
   if (found != clusters_.end()) return join(found->second, node.splat, values);
   const auto cluster = clusters_.emplace(
       node.across,
-      Cluster{node.splat.node_position, tolerance, node.splat, {values.begin(), values.end()}, std::nullopt});
+      Cluster{
+          node.splat.node_position, tolerance, node.splat, {values.begin(), values.end()}, std::nullopt, {}});
   leaving_.push({node.along + tolerance + slackOf(node.splat), sequence_++, cluster});
 }
 
@@ -116,7 +119,9 @@ void Sweep::join(Cluster& cluster, const NodeSplat& node, std::span<const SplatS
   if (!cluster.merger) {
     cluster.merger.emplace(variables_);
     cluster.merger->add(cluster.lowest.splat.position, cluster.lowest.splat, cluster.values);
+    cluster.nodes.push_back(cluster.lowest.node);
   }
+  cluster.nodes.push_back(node.node);
   cluster.merger->add(node.splat.position, node.splat, values);
   if (node.node < cluster.lowest.node) cluster.lowest = node;
   ++merged_;
@@ -132,7 +137,7 @@ void Sweep::release(double before) {
       cluster.merger->finish(cluster.lowest.splat, cluster.values);
       cluster.lowest.regular = false;
     }
-    sink_(cluster.lowest, cluster.values);
+    sink_(cluster.lowest, cluster.values, cluster.nodes);
     clusters_.erase(at);
   }
 }
@@ -142,6 +147,13 @@ void Sweep::release(double before) {
 struct SeamMerger::State {
   size_t variables;
   SeamSorter sorter;
+
+  uint64_t sweep(int coordinate_bytes, const Sweep::Sink& sink) {
+    Sweep sweep(variables, coordinate_bytes, sink);
+    sorter.drain([&](const SeamNode& node, std::span<const SplatScalar> values) { sweep.add(node, values); });
+    sweep.release(std::numeric_limits<double>::infinity());
+    return sweep.merged();
+  }
 };
 
 SeamMerger::SeamMerger(size_t variables, uint64_t memory_bytes, std::filesystem::path temporary_folder)
@@ -157,11 +169,20 @@ void SeamMerger::add(const NodeSplat& splat, std::span<const SplatScalar> values
 
 uint64_t SeamMerger::finish(int coordinate_bytes,
                             const std::function<void(const NodeSplat&, std::span<const SplatScalar>)>& sink) {
-  Sweep sweep(state_->variables, coordinate_bytes, sink);
-  state_->sorter.drain(
-      [&](const SeamNode& node, std::span<const SplatScalar> values) { sweep.add(node, values); });
-  sweep.release(std::numeric_limits<double>::infinity());
-  return sweep.merged();
+  return state_->sweep(coordinate_bytes, [&](const NodeSplat& splat, std::span<const SplatScalar> values,
+                                             std::span<const uint64_t>) { sink(splat, values); });
+}
+
+void SeamMerger::forEachSet(int coordinate_bytes,
+                            const std::function<void(std::span<const uint64_t>)>& visit) {
+  std::vector<uint64_t> rising;
+  state_->sweep(coordinate_bytes,
+                [&](const NodeSplat&, std::span<const SplatScalar>, std::span<const uint64_t> nodes) {
+                  if (nodes.empty()) return;
+                  rising.assign(nodes.begin(), nodes.end());
+                  std::sort(rising.begin(), rising.end());
+                  visit(rising);
+                });
 }
 
 }  // namespace curvisplat

@@ -38,6 +38,9 @@ class SeamMerger {
   uint64_t finish(int coordinate_bytes,
                   const std::function<void(const NodeSplat&, std::span<const SplatScalar>)>& sink);
 
+  /// In place of finish(): calls `visit` for each set of nodes that it would merge, in rising order.
+  void forEachSet(int coordinate_bytes, const std::function<void(std::span<const uint64_t>)>& visit);
+
  private:
   struct State;
   std::unique_ptr<State> state_;

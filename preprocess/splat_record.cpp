@@ -12,17 +12,12 @@ namespace {
 static_assert(std::endian::native == std::endian::little,
               "words of 24 and 48 bits are the low bytes of larger ones");
 
-float toFloat(double value) {
-  constexpr double kLargest = std::numeric_limits<float>::max();
-  return static_cast<float>(std::clamp(value, -kLargest, kLargest));
-}
-
 // The 24 bits of a positive float that a record keeps of an axis.
 constexpr int kDroppedBits = 7;
 
 uint32_t axisBits(double axis) {
   constexpr float kLargest = 0x1p127f;  // rounds up to no infinity
-  const float single = std::clamp(toFloat(axis), std::numeric_limits<float>::min(), kLargest);
+  const float single = std::clamp(recordFloat(axis), std::numeric_limits<float>::min(), kLargest);
   return (std::bit_cast<uint32_t>(single) + (1u << (kDroppedBits - 1))) >> kDroppedBits;
 }
 
@@ -49,7 +44,7 @@ void packRecord(const NodeSplat& in, std::span<const SplatScalar> values, const 
     at += 6;
   };
   const auto putFloat = [&at](double value) {
-    const float single = toFloat(value);
+    const float single = recordFloat(value);
     std::memcpy(at, &single, sizeof single);
     at += sizeof single;
   };

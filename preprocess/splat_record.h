@@ -15,9 +15,11 @@
 // ratio.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -35,6 +37,12 @@ inline constexpr size_t regularRecordBytes(size_t variables) {
 }
 inline constexpr size_t irregularRecordBytes(size_t variables) {
   return regularRecordBytes(variables) + 4 + 4 * variables;
+}
+
+/// A number as records keep it: beyond float's range it becomes the largest.
+inline float recordFloat(double value) {
+  constexpr double kLargest = std::numeric_limits<float>::max();
+  return static_cast<float>(std::clamp(value, -kLargest, kLargest));
 }
 
 /// Appends the record of a splat. Numbers beyond float's range become its largest.

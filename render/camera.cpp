@@ -52,6 +52,15 @@ glm::dvec3 usableUp(const glm::dvec3& up, const glm::dvec3& forward) {
   return {0, 1, 0};  // not reached: z and y are not both along the view
 }
 
+glm::dvec3 directionOf(const Camera& camera) {
+  const glm::dvec3 towards = camera.focal_point - camera.position;
+  const double distance = glm::length(towards);
+  if (!(distance > 0))
+    throw UsageError("the camera's position and its focal point are both ({}, {}, {})", camera.position.x,
+                     camera.position.y, camera.position.z);
+  return towards / distance;
+}
+
 }  // namespace
 
 Camera Camera::named(std::string_view view, const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size,
@@ -92,13 +101,12 @@ double Camera::parallelScaleFor(const glm::dvec3& lower, const glm::dvec3& upper
   return scale > 0 ? kMargin * scale : 1;
 }
 
+glm::dvec3 Camera::usableViewUp() const {
+  return usableUp(view_up, directionOf(*this));
+}
+
 glm::dmat4 Camera::viewFromWorld() const {
-  const glm::dvec3 towards = focal_point - position;
-  const double distance = glm::length(towards);
-  if (!(distance > 0))
-    throw UsageError("the camera's position and its focal point are both ({}, {}, {})", position.x,
-                     position.y, position.z);
-  const glm::dvec3 forward = towards / distance;
+  const glm::dvec3 forward = directionOf(*this);
   const glm::dvec3 right = glm::normalize(glm::cross(forward, usableUp(view_up, forward)));
   const glm::dvec3 up = glm::cross(right, forward);
   glm::dmat4 view_from_world(1);

@@ -33,6 +33,9 @@ struct Camera {
   /// margin of named().
   double parallelScaleFor(const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size) const;
 
+  /// The direction that viewFromWorld() takes for up: view_up, or what replaces it.
+  glm::dvec3 usableViewUp() const;
+
   /// Right-handed view space: x right, y up, the viewer looks along -z; for both projections the origin is
   /// `position`. Throws UsageError if position and focal point coincide; an up vector along the view is
   /// replaced as VTK does: (x, y, z) by (-z, x, y).

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "render/classification.h"
+#include "render/first_picture.h"
 #include "render/frame_budget.h"
 #include "render/frame_workers.h"
 #include "render/gl_painter.h"
@@ -15,6 +16,7 @@
 #include "render/screen_view.h"
 #include "render/segment_ring.h"
 #include "stream/cut.h"
+#include "stream/error.h"
 #include "stream/stage_timer.h"
 
 namespace curvisplat {
@@ -32,10 +34,11 @@ ClassificationTable tableFor(const CacheReader& cache, size_t variable,
   return ClassificationTable::of(transfer_function, info.min, info.max);
 }
 
-ProjectionSettings settingsFor(const Manifest& manifest, const Camera& camera, const FrameOptions& options) {
+ProjectionSettings settingsFor(const Manifest& manifest, const Camera& camera, const FrameOptions& options,
+                               ImageSize size) {
   const double diagonal = glm::length(options.scale * (manifest.upper - manifest.lower));
   const double near = kNearInDiagonals * (diagonal > 0 ? diagonal : manifest.root.size);
-  return {ScreenView::of(camera, options.size, options.scale, options.low_pass_px2, near),
+  return {ScreenView::of(camera, size, options.scale, options.low_pass_px2, near),
           options.classification == Classification::pixel, options.clip_box};
 }
 
@@ -66,6 +69,13 @@ struct Pools {
   FrameWorkers workers;
 };
 
+CutOptions limitsOf(const FrameOptions& options) {
+  CutOptions limits;
+  limits.lod_pixels = options.lod_pixels;
+  limits.max_splats = options.max_splats.value_or(CutOptions::kNoLimit);
+  return limits;
+}
+
 }  // namespace
 
 struct FrameRenderer::State {
@@ -81,10 +91,11 @@ struct FrameRenderer::State {
     gl.run([this](const GlContext&) { painter.reset(); });
   }
 
-  Cut plan(const ProjectionSettings& settings, double lod_pixels) const {
-    return chooseCut(cache.manifest().root, cache.bricks(), cache.brickVariables(variable), subtrees,
-                     settings.view.cutView(), transparentIn(table, settings), lod_pixels);
-  }
+  /// Throws UsageError if options.max_splats are too few.
+  Cut plan(const ProjectionSettings& settings, const FrameOptions& options, const CutOptions& limits) const;
+  /// The picture has the size of settings.view; memory is shared out for one of options.size.
+  Image draw(const Cut& cut, const ProjectionSettings& settings, const FrameOptions& options,
+             FrameStatistics& statistics, Progress* progress);
 
   uint64_t indexBytes() const {
     return cache.bricks().size() *
@@ -95,8 +106,9 @@ struct FrameRenderer::State {
   /// Pools for such a frame: those there are, if they are of the size.
   void makePools(const FrameOptions& options);
   void endPrefetch();
-  Image draw(const Cut& cut, const ProjectionSettings& settings, const FrameOptions& options,
-             FrameStatistics& statistics, Progress* progress);
+  /// FrameRenderer::render(), with Running in the caller's hands.
+  Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
+               Progress* progress);
 
   const CacheReader& cache;
   const size_t variable;
@@ -140,6 +152,17 @@ const std::string& FrameRenderer::backendName() const {
   return state_->gl.contextName();
 }
 
+Cut FrameRenderer::State::plan(const ProjectionSettings& settings, const FrameOptions& options,
+                               const CutOptions& limits) const {
+  const CutTree tree{cache.manifest().root, cache.bricks(), cache.brickVariables(variable), subtrees};
+  Cut cut = chooseCut(tree, settings.view.cutView(), transparentIn(table, settings), limits);
+  if (options.max_splats && cut.splats > *options.max_splats)
+    throw UsageError(
+        "{} splats are too few: the coarsest picture of this cache takes {}; give --max-splats that",
+        *options.max_splats, cut.splats);
+  return cut;
+}
+
 void FrameRenderer::State::makePools(const FrameOptions& options) {
   const FrameBudget budget = FrameBudget::of(
       options.memory_bytes, {indexBytes(), BrickPager::leastBufferBytes(cache, variable), options.size},
@@ -164,22 +187,23 @@ void FrameRenderer::State::endPrefetch() {
 Image FrameRenderer::State::draw(const Cut& cut, const ProjectionSettings& settings,
                                  const FrameOptions& options, FrameStatistics& statistics,
                                  Progress* progress) {
-  const FrameWork work{cache, cut.bricks, settings, table, options.keep_going};
+  const FrameWork work{cache, cut.parts, settings, table, options.keep_going};
   {
     const std::lock_guard lock(running_mutex);
     if (cancelled) throw Cancelled();
     makePools(options);
     pools->ring.reset();
-    pools->source.start(cut.bricks);
+    pools->source.start(cut.parts);
   }
+  if (progress) progress->begin("drawing", cut.parts.size(), "bricks");
   SegmentRing& ring = pools->ring;
   pools->workers.start(work);
   Image image;
   std::exception_ptr failure;
   try {
     gl.run([&](const GlContext&) {
-      painter->begin(options.size, options.background, table, settings.per_pixel);
-      for (size_t drawn = 0; drawn < cut.bricks.size(); ++drawn) {
+      painter->begin(settings.view.size, options.background, table, settings.per_pixel);
+      for (size_t drawn = 0; drawn < cut.parts.size(); ++drawn) {
         std::optional<std::span<const ScreenSplat>> segment;
         {
           const StageTimer timer(statistics.painter_waited_s);
@@ -202,42 +226,71 @@ Image FrameRenderer::State::draw(const Cut& cut, const ProjectionSettings& setti
   } catch (...) {
     if (!failure) failure = std::current_exception();
   }
-  pools->source.finish(statistics.fetch);
+  pools->source.finish(statistics);
   if (failure) std::rethrow_exception(failure);
-  const std::lock_guard lock(running_mutex);
-  if (cancelled) throw Cancelled();
+  {
+    const std::lock_guard lock(running_mutex);
+    if (cancelled) throw Cancelled();
+  }
+  if (progress) progress->end();
 
-  statistics.read_s = statistics.fetch.reading_s;
-  statistics.decode_s = statistics.fetch.decode_s;
-  statistics.bytes_read = statistics.fetch.bytes_read;
   statistics.ring_peak_bytes = ring.peakSplats() * sizeof(ScreenSplat);
   statistics.upload_s = painter->uploadSeconds();
   statistics.draw_s = painter->drawSeconds();
-  statistics.bricks_drawn = cut.bricks.size();
+  statistics.bricks_drawn = cut.parts.size();
   statistics.bricks_out_of_image = cut.out_of_image;
   statistics.bricks_transparent = cut.transparent;
   statistics.bricks_culled = cut.out_of_image + cut.transparent;
   statistics.largest_level = static_cast<int>(cut.deepest_level);
+  statistics.largest_error_px = cut.largest_error_px;
   statistics.workers = pools->budget.workers;
   return image;
 }
 
 Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                             Progress* progress) {
-  State& state = *state_;
-  const State::Running running(state);
+  const State::Running running(*state_);
+  return state_->render(camera, options, statistics, progress);
+}
+
+Image FrameRenderer::State::render(const Camera& camera, const FrameOptions& options,
+                                   FrameStatistics& statistics, Progress* progress) {
   statistics = {};
   const StageTimer total(statistics.total_s);
-  const ProjectionSettings settings = settingsFor(state.cache.manifest(), camera, options);
+  const ProjectionSettings settings = settingsFor(cache.manifest(), camera, options, options.size);
   Cut cut;
   {
     const StageTimer timer(statistics.plan_s);
-    cut = state.plan(settings, options.lod_pixels);
+    cut = plan(settings, options, limitsOf(options));
   }
-  if (progress) progress->begin("drawing", cut.bricks.size(), "bricks");
-  Image image = state.draw(cut, settings, options, statistics, progress);
-  if (progress) progress->end();
-  return image;
+  return draw(cut, settings, options, statistics, progress);
+}
+
+void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions& options,
+                                        FrameStatistics& statistics, const ShowPicture& show,
+                                        Progress* progress) {
+  const State::Running running(*state_);
+  statistics = {};
+  Image first;
+  bool is_final = false;
+  {
+    const StageTimer total(statistics.total_s);
+    const Manifest& manifest = state_->cache.manifest();
+    ProjectionSettings settings = settingsFor(manifest, camera, options, options.size);
+    Cut cut;
+    {
+      const StageTimer timer(statistics.plan_s);
+      cut = state_->plan(settings, options, firstPictureLimits(limitsOf(options)));
+    }
+    is_final = cut.complete;
+    const ReducedSize reduced(options.size, is_final ? 0 : cut.largest_error_px);
+    if (!reduced.isWhole()) settings = settingsFor(manifest, camera, options, reduced.size());
+    first = state_->draw(cut, settings, options, statistics, progress);
+    if (!reduced.isWhole()) first = reduced.enlarge(first);
+  }
+  show(first, is_final);
+  first = Image();
+  if (!is_final) show(state_->render(camera, options, statistics, progress), true);
 }
 
 void FrameRenderer::cancel() {
@@ -252,10 +305,10 @@ void FrameRenderer::cancel() {
 void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options) {
   State& state = *state_;
   state.endPrefetch();
-  const ProjectionSettings settings = settingsFor(state.cache.manifest(), camera, options);
-  const Cut cut = state.plan(settings, options.lod_pixels);
+  const ProjectionSettings settings = settingsFor(state.cache.manifest(), camera, options, options.size);
+  const Cut cut = state.plan(settings, options, limitsOf(options));
   state.makePools(options);
-  state.pools->source.startPrefetch(cut.bricks);
+  state.pools->source.startPrefetch(cut.parts);
   state.pools->workers.startPrefetch();
 }
 

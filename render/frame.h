@@ -6,9 +6,13 @@
 // Bricks are prepared by workers in any order and drawn in the cut's order; what is prepared and not yet
 // drawn is bounded. The same cache, view and options give the same image bit for bit, for any number of
 // threads, any memory, and whatever was drawn before.
+//
+// A progressive frame is two: a first picture of the coarse levels, little enough to be read and drawn in a
+// fraction of a second whatever the size of the cache, and then the frame that render() draws.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 #include <memory>
@@ -32,12 +36,13 @@ enum class Classification { pixel, flat };  // flat: one colour and extinction a
 struct FrameOptions {
   ImageSize size;
   Classification classification = Classification::pixel;
-  double lod_pixels = 1;             // screen-space error allowed; 0 is the finest level
-  glm::dvec3 scale{1.0};             // stretches the data: D S Dᵀ, V det D, about the world's origin
-  std::optional<WorldBox> clip_box;  // splats whose centre is outside are not drawn
-  glm::vec4 background{1, 1, 1, 1};  // premultiplied
-  double low_pass_px2 = 1.5;         // added to S2's diagonal; design section 3
-  unsigned threads = 0;              // workers; 0: one a core
+  double lod_pixels = 1;               // screen-space error allowed; 0 is the finest level
+  std::optional<uint64_t> max_splats;  // read at most these, from the levels that make the best of them
+  glm::dvec3 scale{1.0};               // stretches the data: D S Dᵀ, V det D, about the world's origin
+  std::optional<WorldBox> clip_box;    // splats whose centre is outside are not drawn
+  glm::vec4 background{1, 1, 1, 1};    // premultiplied
+  double low_pass_px2 = 1.5;           // added to S2's diagonal; design section 3
+  unsigned threads = 0;                // workers; 0: one a core
   uint64_t memory_bytes = 512 << 20;
   bool keep_going = false;  // draw bricks that cannot be read from an ancestor, and report them
   PagerOptions::Way read_by = PagerOptions::Way::automatic;
@@ -56,22 +61,20 @@ class Cancelled : public std::runtime_error {
   Cancelled() : std::runtime_error("the frame was cancelled") {}
 };
 
-/// Seconds are summed over threads for the workers' stages; read_s is the time with a read under way.
-struct FrameStatistics {
-  double plan_s = 0, read_s = 0, decode_s = 0, project_s = 0, sort_s = 0, upload_s = 0, draw_s = 0,
-         total_s = 0;
-  double workers_waited_s = 0;  // for room in the ring: the painter is slower; for reads: fetch.waited_s
+/// Seconds are summed over threads for the workers' stages.
+struct FrameStatistics : FetchStatistics {
+  double plan_s = 0, project_s = 0, sort_s = 0, upload_s = 0, draw_s = 0, total_s = 0;
+  double workers_waited_s = 0;  // for room in the ring; for reads: read_waited_s
   double painter_waited_s = 0;  // for the workers
-  uint64_t bricks_drawn = 0;
-  uint64_t bricks_culled = 0;  // each stands for all below it; those are
+  uint64_t bricks_drawn = 0;    // in whole or in part; one that is drawn in several parts counts for each
+  uint64_t bricks_culled = 0;   // each stands for all below it; those are
   uint64_t bricks_out_of_image = 0, bricks_transparent = 0;
   uint64_t splats_read = 0;
   uint64_t splats_clipped = 0, splats_off_screen = 0, splats_transparent = 0;  // read, and not drawn, since
   uint64_t splats_drawn = 0;
-  uint64_t bytes_read = 0;
   int largest_level = 0;
+  double largest_error_px = 0;  // on the screen, of what is drawn; infinite around a perspective eye
   unsigned workers = 0;
-  FetchStatistics fetch;
   uint64_t ring_peak_bytes = 0;
   std::vector<BrickFailure> bricks_unreadable;  // with keep_going; by number
 };
@@ -86,19 +89,28 @@ class FrameRenderer {
   FrameRenderer(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function);
   ~FrameRenderer();
 
-  /// Throws UsageError for a view that makes no picture and for too little memory (how much it takes), Error
-  /// where reading or drawing fails, Cancelled; the renderer can be used again after each. `statistics` is
-  /// overwritten.
+  /// Throws UsageError for a view that makes no picture and for too little memory or max_splats (how much it
+  /// takes), Error where reading or drawing fails, Cancelled; the renderer can be used again after each.
+  /// `statistics` is overwritten.
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                Progress* progress = nullptr);
-  /// Makes the render() that is under way throw Cancelled soon: within what a worker takes for a brick and
-  /// the painter for a segment. One that has not begun is not affected. Any thread.
+
+  using ShowPicture = std::function<void(const Image& image, bool is_final)>;
+  /// Calls `show` with a first, coarse picture and then with the one that render() returns, bit for bit; once
+  /// if the first is as fine. `statistics` is of the picture shown, and set before each call. Throws what
+  /// render() and `show` throw.
+  void renderProgressively(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
+                           const ShowPicture& show, Progress* progress = nullptr);
+
+  /// Makes the render() or renderProgressively() that is under way throw Cancelled soon: within what a worker
+  /// takes for a brick and the painter for a segment. One that has not begun is not affected. Any thread.
   void cancel();
 
   /// Begins to read and decode, in the background, what a render() of the same arguments will need, as far as
-  /// the cache of bricks has room for it. The next render() or prefetch() ends it; nothing that goes wrong in
-  /// it is told before render(). Throws UsageError as render() does.
+  /// the cache of bricks has room for it. The next call ends it; nothing that goes wrong in it is told before
+  /// render(). Throws UsageError as render() does.
   void prefetch(const Camera& camera, const FrameOptions& options);
+
   /// "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
   const std::string& backendName() const;
 

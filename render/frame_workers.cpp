@@ -42,9 +42,9 @@ void FrameWorkers::finish(FrameStatistics& sum) {
   team_.wait();
   for (const auto& worker : workers_) {
     const FrameStatistics& part = worker->statistics;
-    sum.fetch.verify_s += worker->scratch.times.verify_s;
-    sum.fetch.decode_s += worker->scratch.times.decode_s;
-    sum.fetch.waited_s += worker->scratch.waited_s;
+    sum.verify_s += worker->scratch.times.verify_s;
+    sum.decode_s += worker->scratch.times.decode_s;
+    sum.read_waited_s += worker->scratch.waited_s;
     sum.project_s += part.project_s;
     sum.sort_s += part.sort_s;
     sum.workers_waited_s += part.workers_waited_s;
@@ -57,6 +57,11 @@ void FrameWorkers::finish(FrameStatistics& sum) {
   }
   std::sort(sum.bricks_unreadable.begin(), sum.bricks_unreadable.end(),
             [](const BrickFailure& a, const BrickFailure& b) { return a.brick < b.brick; });
+  // One that is drawn in several parts failed for each.
+  const auto again =
+      std::unique(sum.bricks_unreadable.begin(), sum.bricks_unreadable.end(),
+                  [](const BrickFailure& a, const BrickFailure& b) { return a.brick == b.brick; });
+  sum.bricks_unreadable.erase(again, sum.bricks_unreadable.end());
   if (first_failure_) std::rethrow_exception(first_failure_);
 }
 
@@ -80,7 +85,7 @@ void FrameWorkers::loop(Worker& worker) {
   try {
     while (true) {
       const uint64_t sequence = next_++;
-      if (sequence >= work_->bricks.size() || !prepare(worker, sequence)) return;
+      if (sequence >= work_->parts.size() || !prepare(worker, sequence)) return;
     }
   } catch (...) {
     {
@@ -97,14 +102,9 @@ std::optional<BrickSource::Splats> FrameWorkers::fetch(Worker& worker, uint64_t 
     return source_.take(sequence, worker.scratch);
   } catch (const Error& error) {
     if (!work_->keep_going) throw;
-    const uint32_t brick = work_->bricks[sequence];
-    worker.statistics.bricks_unreadable.push_back({brick, error.what()});
-    if (auto splats = source_.standIn(brick, worker.scratch)) return splats;
-    worker.scratch.geometry.resize(0);
-    worker.scratch.values.resize(0);
-    return BrickSource::Splats{arraysOf(std::as_const(worker.scratch.geometry)),
-                               arraysOf(std::as_const(worker.scratch.values)),
-                               work_->cache.bricks()[brick].cell, std::nullopt};
+    const BrickPart& part = work_->parts[sequence];
+    worker.statistics.bricks_unreadable.push_back({part.brick, error.what()});
+    return source_.standIn(part, worker.scratch);
   }
 }
 
@@ -116,7 +116,7 @@ bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
     const StageTimer timer(statistics.project_s);
     worker.projector.project(work_->settings, work_->table,
                              work_->cache.manifest().root.cellMin(fetched->cell), fetched->geometry,
-                             fetched->values);
+                             fetched->values, fetched->ranges);
   }
   const std::vector<ScreenSplat>& splats = worker.projector.splats();
   std::span<const uint32_t> order;

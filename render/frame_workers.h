@@ -1,5 +1,5 @@
-// The workers of a frame: they take the cut's bricks in sequence, decoded, and project and sort each into its
-// segment of the ring. Between frames they can fill the cache of decoded bricks.
+// The workers of a frame: they take the cut's bricks, or parts of them, in sequence and decoded, and project
+// and sort each into its segment of the ring. Between frames they can fill the cache of decoded bricks.
 #pragma once
 
 #include <atomic>
@@ -22,7 +22,7 @@ namespace curvisplat {
 /// What all workers of a frame look at and none changes; outlives the frame.
 struct FrameWork {
   const CacheReader& cache;
-  std::span<const uint32_t> bricks;  // in drawing order: those that the source was started with
+  std::span<const BrickPart> parts;  // in drawing order: those that the source was started with
   const ProjectionSettings& settings;
   const ClassificationTable& table;
   bool keep_going = false;
@@ -38,7 +38,7 @@ class FrameWorkers {
 
   /// Begins a frame; ring and source are ready for it.
   void start(const FrameWork& work);
-  /// Waits for the workers' end: all bricks are in the ring, ring or source were stopped, or one of them
+  /// Waits for the workers' end: all parts are in the ring, ring or source were stopped, or one of them
   /// failed, which stops both. Rethrows the first failure. Adds what they did to `statistics`.
   void finish(FrameStatistics& statistics);
 
@@ -58,7 +58,7 @@ class FrameWorkers {
   BrickSource& source_;
   SegmentRing& ring_;
   const FrameWork* work_ = nullptr;
-  std::atomic<uint64_t> next_ = 0;  // sequence number that nobody has taken
+  std::atomic<uint64_t> next_ = 0;  // sequence number of a part that nobody has taken
   std::mutex failing_;              // guards first_failure_
   std::exception_ptr first_failure_;
   std::vector<std::unique_ptr<Worker>> workers_;  // [thread]

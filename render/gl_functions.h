@@ -20,10 +20,10 @@ namespace curvisplat {
   X(BindVertexArray, PFNGLBINDVERTEXARRAYPROC)                 \
   X(BlendFunc, PFNGLBLENDFUNCPROC)                             \
   X(BufferData, PFNGLBUFFERDATAPROC)                           \
-  X(BufferSubData, PFNGLBUFFERSUBDATAPROC)                     \
   X(CheckFramebufferStatus, PFNGLCHECKFRAMEBUFFERSTATUSPROC)   \
   X(Clear, PFNGLCLEARPROC)                                     \
   X(ClearColor, PFNGLCLEARCOLORPROC)                           \
+  X(ClientWaitSync, PFNGLCLIENTWAITSYNCPROC)                   \
   X(CompileShader, PFNGLCOMPILESHADERPROC)                     \
   X(CreateProgram, PFNGLCREATEPROGRAMPROC)                     \
   X(CreateShader, PFNGLCREATESHADERPROC)                       \
@@ -32,12 +32,13 @@ namespace curvisplat {
   X(DeleteProgram, PFNGLDELETEPROGRAMPROC)                     \
   X(DeleteRenderbuffers, PFNGLDELETERENDERBUFFERSPROC)         \
   X(DeleteShader, PFNGLDELETESHADERPROC)                       \
+  X(DeleteSync, PFNGLDELETESYNCPROC)                           \
   X(DeleteTextures, PFNGLDELETETEXTURESPROC)                   \
   X(DeleteVertexArrays, PFNGLDELETEVERTEXARRAYSPROC)           \
   X(DrawArraysInstanced, PFNGLDRAWARRAYSINSTANCEDPROC)         \
   X(Enable, PFNGLENABLEPROC)                                   \
   X(EnableVertexAttribArray, PFNGLENABLEVERTEXATTRIBARRAYPROC) \
-  X(Finish, PFNGLFINISHPROC)                                   \
+  X(FenceSync, PFNGLFENCESYNCPROC)                             \
   X(FramebufferRenderbuffer, PFNGLFRAMEBUFFERRENDERBUFFERPROC) \
   X(GenBuffers, PFNGLGENBUFFERSPROC)                           \
   X(GenFramebuffers, PFNGLGENFRAMEBUFFERSPROC)                 \

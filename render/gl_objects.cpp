@@ -60,4 +60,13 @@ GlProgram::~GlProgram() {
   if (name_) gl_->DeleteProgram(name_);
 }
 
+void GlFence::wait() const {
+  constexpr GLuint64 kNanoseconds = 1'000'000'000;
+  GLenum result;
+  do {
+    result = gl_->ClientWaitSync(sync_, GL_SYNC_FLUSH_COMMANDS_BIT, kNanoseconds);
+  } while (result == GL_TIMEOUT_EXPIRED);
+  if (result == GL_WAIT_FAILED) gl_->check("waiting for a fence");
+}
+
 }  // namespace curvisplat

@@ -66,4 +66,22 @@ class GlProgram {
   GLuint name_ = 0;
 };
 
+/// A point in the stream of commands that can be waited for.
+class GlFence {
+ public:
+  explicit GlFence(const GlFunctions& gl) : gl_(&gl), sync_(gl.FenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0)) {}
+  ~GlFence() {
+    if (sync_) gl_->DeleteSync(sync_);
+  }
+  GlFence(GlFence&& other) noexcept : gl_(other.gl_), sync_(std::exchange(other.sync_, nullptr)) {}
+  GlFence& operator=(GlFence&&) = delete;
+
+  /// Until all before it is done.
+  void wait() const;
+
+ private:
+  const GlFunctions* gl_;
+  GLsync sync_;
+};
+
 }  // namespace curvisplat

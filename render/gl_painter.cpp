@@ -1,19 +1,25 @@
 #include "render/gl_painter.h"
 
+#include <algorithm>
 #include <array>
+#include <deque>
 #include <string>
 #include <vector>
 
 #include "render/gl_objects.h"
 #include "render/kernel.h"
 #include "render/splat_shader.h"
-#include "stream/stage_timer.h"
 #include "stream/error.h"
+#include "stream/stage_timer.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr int kFootprintSteps = 1024;
+// llvmpipe sets up triangles far ahead of drawing them, at 640 bytes a splat: unbounded, half a million
+// splats took 330 MiB. Two draws under way keep all its threads busy.
+constexpr size_t kSplatsPerDraw = 16384;
+constexpr size_t kDrawsInFlight = 2;
 constexpr GLint kFootprintUnit = 0, kClassesUnit = 1;
 
 /// A table that shaders read by index, exactly: no filtering, no size limit worth a thought.
@@ -64,9 +70,11 @@ struct GlPainter::State {
   GlObject instances, vertex_array;
   GlObject framebuffer, colour;
   ImageSize size{0, 0};
+  std::deque<GlFence> in_flight;
   double upload_s = 0, draw_s = 0;
 
   void allocate(ImageSize wanted);
+  void drawPart(std::span<const ScreenSplat> splats);
   void use(const GlProgram& program, const ClassificationTable& table) const;
 };
 
@@ -138,6 +146,7 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
                       bool per_pixel) {
   const GlFunctions& gl = state_->gl;
   state_->upload_s = state_->draw_s = 0;
+  state_->in_flight.clear();  // of a frame that was not ended
   state_->allocate(size);
   state_->classes.fill(gl, kClassesUnit, GL_RGBA32F, table.cumulative());
   state_->use(per_pixel ? (table.logScale() ? state_->per_pixel_log : state_->per_pixel)
@@ -150,17 +159,28 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
 }
 
 void GlPainter::draw(std::span<const ScreenSplat> splats) {
-  if (splats.empty()) return;
-  const GlFunctions& gl = state_->gl;
+  while (!splats.empty()) {
+    const auto part = splats.first(std::min(splats.size(), kSplatsPerDraw));
+    splats = splats.subspan(part.size());
+    state_->drawPart(part);
+  }
+}
+
+void GlPainter::State::drawPart(std::span<const ScreenSplat> splats) {
   {
     // Fresh storage each time: the driver keeps what it still draws from.
-    const StageTimer timer(state_->upload_s);
+    const StageTimer timer(upload_s);
     gl.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(splats.size_bytes()), splats.data(),
                   GL_STREAM_DRAW);
   }
-  const StageTimer timer(state_->draw_s);
+  const StageTimer timer(draw_s);
   gl.DrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(splats.size()));
   gl.check("drawing splats");
+  in_flight.emplace_back(gl);
+  if (in_flight.size() > kDrawsInFlight) {
+    in_flight.front().wait();
+    in_flight.pop_front();
+  }
 }
 
 Image GlPainter::end() {

@@ -103,6 +103,11 @@ void requirePlausibleSize(int64_t width, int64_t height, uint64_t bytes_per_pixe
         name, width, height, packed_bytes);
 }
 
+uint8_t toByte(float value) {
+  if (!(value > 0)) return 0;  // NaN too
+  return static_cast<uint8_t>(std::min(value, 1.0f) * 255 + 0.5f);
+}
+
 bool isOpaque(const Image& image) {
   for (size_t n = 3; n < image.rgba.size(); n += 4)
     if (image.rgba[n] != 1) return false;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
@@ -29,6 +30,9 @@ Image decodePfm(std::span<const std::byte> bytes, const std::string& name);
 /// an image of `bytes_per_pixel` that was compressed by at most `largest_ratio`.
 void requirePlausibleSize(int64_t width, int64_t height, uint64_t bytes_per_pixel, uint64_t packed_bytes,
                           uint64_t largest_ratio, const std::string& name);
+
+/// A channel of 8 bits: rounded, values beyond 0 and 1 cut off, 0 for what is no number.
+uint8_t toByte(float value);
 
 /// Whether every alpha is 1.
 bool isOpaque(const Image& image);

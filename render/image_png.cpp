@@ -114,11 +114,6 @@ std::vector<png_bytep> rowPointers(std::vector<png_byte>& pixels, size_t rows) {
   return pointers;
 }
 
-png_byte toByte(float value) {
-  if (!(value > 0)) return 0;  // NaN too
-  return static_cast<png_byte>(std::min(value, 1.0f) * 255 + 0.5f);
-}
-
 }  // namespace
 
 Bytes encodePng(const Image& image) {

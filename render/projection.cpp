@@ -168,14 +168,14 @@ std::optional<Chooser::Fate> chooseCut(const PerspectiveMap& map, const Geometry
   return best;
 }
 
-/// False if the brick would give too many pieces.
+/// False if the brick would give more than `pieces_left`, which it counts down.
 template <typename Map>
-bool projectWith(const Map& map, const LocalBox& clip, const GeometryArrays<const float>& geometry,
-                 const VariableArrays<const float>& variable, Chooser& chooser, ProjectionCounts& counts) {
+bool projectRange(const Map& map, const LocalBox& clip, const GeometryArrays<const float>& geometry,
+                  const VariableArrays<const float>& variable, const SplatRange& range, Chooser& chooser,
+                  size_t& pieces_left, ProjectionCounts& counts) {
   Block block;
-  size_t pieces_left = BrickProjector::kMostPieces;
-  for (size_t begin = 0; begin < geometry.size(); begin += kBlock) {
-    const size_t count = std::min(kBlock, geometry.size() - begin);
+  for (size_t begin = range.begin; begin < range.end; begin += kBlock) {
+    const size_t count = std::min(kBlock, range.end - begin);
     computeBlock(map, clip, geometry, variable, begin, count, block);
     for (size_t n = 0; n < count; ++n) {
       if (block.clipped[n]) {
@@ -201,6 +201,16 @@ bool projectWith(const Map& map, const LocalBox& clip, const GeometryArrays<cons
   return true;
 }
 
+template <typename Map>
+bool projectWith(const Map& map, const LocalBox& clip, const GeometryArrays<const float>& geometry,
+                 const VariableArrays<const float>& variable, std::span<const SplatRange> ranges,
+                 Chooser& chooser, ProjectionCounts& counts) {
+  size_t pieces_left = BrickProjector::kMostPieces;
+  return std::all_of(ranges.begin(), ranges.end(), [&](const SplatRange& range) {
+    return projectRange(map, clip, geometry, variable, range, chooser, pieces_left, counts);
+  });
+}
+
 }  // namespace
 
 double largestReach(double low_pass_px2) {
@@ -218,9 +228,18 @@ BrickProjector::BrickProjector() {
 }
 
 void BrickProjector::project(const ProjectionSettings& settings, const ClassificationTable& table,
+                             const glm::dvec3& cell_min, const SplatGeometry& geometry,
+                             const SplatVariable& variable) {
+  const SplatRange all{0, static_cast<uint32_t>(geometry.size())};
+  project(settings, table, cell_min, arraysOf(geometry), arraysOf(variable), {&all, 1});
+}
+
+void BrickProjector::project(const ProjectionSettings& settings, const ClassificationTable& table,
                              const glm::dvec3& cell_min, const GeometryArrays<const float>& geometry,
-                             const VariableArrays<const float>& variable) {
+                             const VariableArrays<const float>& variable,
+                             std::span<const SplatRange> ranges) {
   CURVISPLAT_CHECK_OP(geometry.size(), ==, variable.size());
+  for (const SplatRange& range : ranges) CURVISPLAT_CHECK_OP(range.end, <=, geometry.size());
   const LocalBox clip(settings.clip_box, cell_min);
   Chooser chooser(settings, table, splats_, depths_);
   bool complete = false;
@@ -229,12 +248,12 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
     depths_.clear();
     counts_ = {};
     complete = settings.view.projection == Projection::orthographic
-                   ? projectWith(OrthographicMap(settings.view, cell_min), clip, geometry, variable, chooser,
-                                 counts_)
+                   ? projectWith(OrthographicMap(settings.view, cell_min), clip, geometry, variable, ranges,
+                                 chooser, counts_)
                    : projectWith(PerspectiveMap(settings.view, cell_min, coarseness), clip, geometry,
-                                 variable, chooser, counts_);
+                                 variable, ranges, chooser, counts_);
   }
-  counts_.read = geometry.size();
+  for (const SplatRange& range : ranges) counts_.read += range.size();
   counts_.pieces = splats_.size();
 }
 

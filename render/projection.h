@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "render/classification.h"
@@ -42,7 +43,7 @@ struct WorldBox {
 
 /// Where splats went; an empty picture is explained by these.
 struct ProjectionCounts {
-  uint64_t read = 0;         // in the bricks
+  uint64_t read = 0;         // in the bricks, or the parts of them that are drawn
   uint64_t clipped = 0;      // centre outside the clip box
   uint64_t off_screen = 0;   // outside the image, or before the near plane
   uint64_t transparent = 0;  // without extinction in the transfer function, or without weight
@@ -68,19 +69,18 @@ class BrickProjector {
   /// Takes the memory it will ever need.
   BrickProjector();
 
-  /// Projects all splats of a brick whose cell's minimum corner is `cell_min`, and leaves out what cannot be
-  /// seen. Splats that reach behind the near plane or span a wide angle are cut along their longest column
-  /// into two that merge into them exactly, until they are small for their distance; what then lies before
-  /// the near plane is dropped. Overwrites splats() and depths(). Pure.
+  /// Projects the splats of a brick that `ranges` hold; `cell_min` is the minimum corner of its cell. Leaves
+  /// out what cannot be seen. Splats that reach behind the near plane or span a wide angle are cut along
+  /// their longest column into two that merge into them exactly, until they are small for their distance;
+  /// what then lies before the near plane is dropped. Overwrites splats() and depths(). Pure.
   void project(const ProjectionSettings& settings, const ClassificationTable& table,
                const glm::dvec3& cell_min, const GeometryArrays<const float>& geometry,
-               const VariableArrays<const float>& variable);
+               const VariableArrays<const float>& variable, std::span<const SplatRange> ranges);
+  /// All splats of a brick.
   void project(const ProjectionSettings& settings, const ClassificationTable& table,
-               const glm::dvec3& cell_min, const SplatGeometry& geometry, const SplatVariable& variable) {
-    project(settings, table, cell_min, arraysOf(geometry), arraysOf(variable));
-  }
+               const glm::dvec3& cell_min, const SplatGeometry& geometry, const SplatVariable& variable);
 
-  /// In the brick's order.
+  /// In the order of the ranges.
   const std::vector<ScreenSplat>& splats() const { return splats_; }
   /// [splats()], larger is farther: orthographic, distance along the view from any origin; perspective,
   /// distance from the eye.

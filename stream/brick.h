@@ -39,6 +39,65 @@ struct Brick {
   bool isLeaf() const { return child_count == 0; }
 };
 
+inline constexpr uint8_t kAllOctants = 0xff;
+
+/// A brick, or those of its octants that are drawn from it: bit n stands for octant n. Part of an inner brick
+/// stands in for children that are not drawn while the others are; a leaf is drawn whole.
+struct BrickPart {
+  uint32_t brick = 0;
+  uint8_t octants = kAllOctants;
+  bool operator==(const BrickPart&) const = default;
+
+  bool whole() const { return octants == kAllOctants; }
+};
+
+/// Splats begin .. end - 1 of a brick, in the order in which they are stored.
+struct SplatRange {
+  uint32_t begin = 0, end = 0;
+  bool operator==(const SplatRange&) const = default;
+
+  uint32_t size() const { return end - begin; }
+};
+
+/// Where the splats of a part of a brick lie: octants that follow one another make one range, so that there
+/// are at most four.
+class SplatRanges {
+ public:
+  SplatRanges(const Brick& brick, uint8_t octants) {
+    if (octants == kAllOctants) {
+      add({0, brick.splats});
+      return;
+    }
+    uint32_t begin = 0;
+    for (int octant = 0; octant < 8; ++octant) {
+      const uint32_t end = begin + brick.octant_splats[octant];
+      if (octants >> octant & 1) add({begin, end});
+      begin = end;
+    }
+  }
+
+  const SplatRange* begin() const { return ranges_.data(); }
+  const SplatRange* end() const { return ranges_.data() + count_; }
+  size_t size() const { return count_; }
+  uint32_t splats() const {
+    uint32_t sum = 0;
+    for (const SplatRange& range : *this) sum += range.size();
+    return sum;
+  }
+
+ private:
+  void add(const SplatRange& range) {
+    if (range.size() == 0) return;
+    if (count_ > 0 && ranges_[count_ - 1].end == range.begin)
+      ranges_[count_ - 1].end = range.end;
+    else
+      ranges_[count_++] = range;
+  }
+
+  std::array<SplatRange, 4> ranges_;
+  size_t count_ = 0;
+};
+
 /// What a variable's table says of a brick.
 struct BrickVariable {
   Extent values;

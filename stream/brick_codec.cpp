@@ -7,6 +7,7 @@
 #include "stream/checksum.h"
 #include "stream/error.h"
 #include "stream/geometry_codec.h"
+#include "stream/prediction.h"
 #include "stream/shape_extent.h"
 #include "stream/values_codec.h"
 
@@ -104,6 +105,14 @@ Extent extentOf(std::span<const std::byte> bytes) {
   return {0, static_cast<uint32_t>(bytes.size()), checksumOf(bytes)};
 }
 
+EncodedValues encodeInRows(std::span<const Row> rows, std::span<SplatScalar> values) {
+  EncodedValues encoded;
+  encoded.bytes = encodeValuesStream(rows, values);
+  encoded.variable = summaryOf(values);
+  encoded.variable.values = extentOf(encoded.bytes);
+  return encoded;
+}
+
 void checkCount(const Brick& brick) {
   const auto& at = brick.cell.at;
   if (brick.splats == 0 || brick.splats > kMaxBrickSplats || brick.cell.level > kMaxLevel)
@@ -156,11 +165,15 @@ EncodedBrick encodeBrick(const RootCube& root, BrickSplats& brick) {
   encoded.brick.geometry = extentOf(encoded.geometry);
   for (const Splat& splat : brick.splats) encoded.weight += splat.weight;
   for (auto& values : brick.variables) {
-    encoded.values.push_back(encodeValuesStream(decoded.rows, values));
-    encoded.variables.push_back(summaryOf(values));
-    encoded.variables.back().values = extentOf(encoded.values.back());
+    EncodedValues of_variable = encodeInRows(decoded.rows, values);
+    encoded.values.push_back(std::move(of_variable.bytes));
+    encoded.variables.push_back(of_variable.variable);
   }
   return encoded;
+}
+
+EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<SplatScalar> values) {
+  return encodeInRows(rowsOf(runs, values.size()), values);
 }
 
 void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,

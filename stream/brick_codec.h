@@ -46,6 +46,16 @@ struct EncodedBrick {
 /// Pure: any thread. Throws nothing but bad_alloc.
 EncodedBrick encodeBrick(const RootCube& root, BrickSplats& brick);
 
+/// One variable of a brick.
+struct EncodedValues {
+  std::vector<std::byte> bytes;
+  BrickVariable variable;  // without file offset
+};
+
+/// Encodes the values of one variable, as encodeBrick does, and replaces them by what decoding gives. They
+/// are finite. `runs`: the brick's. Pure: any thread. Throws nothing but bad_alloc.
+EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<SplatScalar> values);
+
 /// Decodes the geometry stream of `brick`. Bytes are untrusted: throws Error (naming the brick) for anything
 /// that does not decode to exactly brick.splats finite splats inside the cell; allocates no more than that
 /// many. `runs`, if not null, receives the node runs of a leaf. Pure: any thread.

@@ -1,18 +1,24 @@
 // The bricks of a frame, decoded, in the hands of whoever projects them: from the cache of decoded bricks
 // where they are there, else from the disk by the pager.
 //
-//   start(bricks)        cache: pin what is there      pager: read the others ahead
+//   start(parts)         cache: pin what is there      pager: read the others ahead
 //   take(n)  workers     the pin, or: wait for the bytes, verify, decode (into the cache where it has room)
 //
-// Which bricks come from where shows in the times alone: decoding gives the same numbers always.
+// A brick that is drawn in several parts is read once: whoever comes first decodes it, the others wait. Which
+// bricks come from where shows in the times alone: decoding gives the same numbers always.
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <cstdint>
+#include <mutex>
 #include <optional>
+#include <span>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
+#include "stream/brick.h"
 #include "stream/brick_cache.h"
 #include "stream/cache_reader.h"
 #include "stream/pager.h"
@@ -20,16 +26,16 @@
 
 namespace curvisplat {
 
-/// What the bricks of one frame cost.
+/// What the bricks of one frame cost. Seconds of several workers are summed.
 struct FetchStatistics {
-  std::string way;              // how the pager reads: "io_uring, direct"
-  double reading_s = 0;         // with a read under way
-  double mean_queue_depth = 0;  // during that
+  double read_s = 0;  // with a read under way
+  double verify_s = 0, decode_s = 0;
+  double read_waited_s = 0;     // workers for reads
+  double mean_queue_depth = 0;  // while a read was under way
   uint64_t bytes_read = 0, read_requests = 0;
   uint64_t bricks_cached = 0, bricks_read = 0;
   uint64_t cache_peak_bytes = 0, pager_peak_bytes = 0;  // so far
-  double verify_s = 0, decode_s = 0;                    // summed over workers
-  double waited_s = 0;                                  // workers for reads, summed
+  std::string read_by;                                  // "io_uring, direct"
 };
 
 class BrickSource {
@@ -49,21 +55,22 @@ class BrickSource {
   struct Splats {
     GeometryArrays<const float> geometry;  // from the minimum corner of `cell`
     VariableArrays<const float> values;
+    SplatRanges ranges;  // those of the part
     Cell cell;
     std::optional<BrickCache::Pin> pin;
   };
 
   /// Begins a frame. Nobody may be in take() any more.
-  void start(std::vector<uint32_t> bricks);
-  /// The `sequence`-th brick; each once, any thread. Nothing once stopped. Throws Error naming the brick
-  /// where the disk fails, a file has shrunk, or a checksum does not match.
+  void start(std::span<const BrickPart> parts);
+  /// The brick of the `sequence`-th part; each once, any thread. Nothing once stopped. Throws Error naming
+  /// the brick where the disk fails, a file has shrunk, or a checksum does not match.
   std::optional<Splats> take(uint64_t sequence, Scratch& scratch);
-  /// For a brick that take() has failed on: the part of the nearest ancestor that can be read which stands
-  /// for the brick's cell. Nothing if none can be read.
-  std::optional<Splats> standIn(uint32_t brick, Scratch& scratch) const;
+  /// For a part that take() has failed on: what stands for its space in the nearest ancestor that can be
+  /// read. No splats if none can be read.
+  Splats standIn(const BrickPart& part, Scratch& scratch) const;
 
   /// Begins to fill the cache with what it lacks of `bricks`, as far as there is room without them.
-  void startPrefetch(const std::vector<uint32_t>& bricks);
+  void startPrefetch(std::span<const BrickPart> parts);
   /// Takes the next brick of the prefetch. False: none is left, there is no more room, or it was stopped.
   /// Throws as take() does.
   bool prefetchNext(Scratch& scratch);
@@ -77,22 +84,46 @@ class BrickSource {
   const BrickCache& cached() const { return cached_; }
 
  private:
+  /// A brick that several parts want and the cache does not have.
+  struct Shared {
+    enum class State {
+      untouched,  // -> coming, by the first who takes it
+      coming,     // -> kept or alone
+      kept,       // in the cache, pinned
+      alone,      // not kept, or damaged: each reads it for himself
+    };
+    State state = State::untouched;
+    uint32_t left = 0;  // parts that have not been taken
+    std::optional<BrickCache::Pin> pin;
+  };
+
+  std::optional<Splats> takeShared(Shared& shared, const BrickPart& part, uint64_t miss, Scratch& scratch);
+  std::optional<Splats> read(const BrickPart& part, uint64_t miss, Scratch& scratch);
+  Splats readAlone(const BrickPart& part, Scratch& scratch) const;
+  Splats splatsOf(BrickCache::Pin pin, const BrickPart& part) const;
+  Splats splatsOf(const Scratch& scratch, const BrickPart& part) const;
   void decode(uint32_t brick, const PagedBrick& bytes, const GeometryArrays<float>& geometry,
               const VariableArrays<float>& values, Scratch& scratch) const;
   std::optional<PagedBrick> await(uint64_t miss, Scratch& scratch);
-  void keepOctant(uint32_t brick, uint32_t ancestor, Scratch& scratch) const;
+  void keepPart(const BrickPart& part, uint32_t ancestor, Scratch& scratch) const;
 
   const CacheReader& cache_;
   const size_t variable_;
   BrickCache cached_;
   BrickPager pager_;
 
-  std::vector<uint32_t> bricks_;
+  std::vector<BrickPart> parts_;                      // [sequence]
   std::vector<std::optional<BrickCache::Pin>> pins_;  // [sequence]
   std::vector<uint32_t> misses_;                      // [sequence]: place among those read
-  uint64_t reads_ = 0;                                // bricks that the pager was asked for
+  std::vector<uint32_t> to_prefetch_;
+  uint64_t reads_ = 0, hits_ = 0;  // bricks that the pager was asked for, and that it was not
   std::atomic<uint64_t> next_prefetch_ = 0;
   PagerStatistics before_;
+
+  std::mutex sharing_;                           // guards stopped_, and what shared_ holds
+  std::condition_variable shared_changed_;       // a state, or stopped_
+  std::unordered_map<uint32_t, Shared> shared_;  // by brick
+  bool stopped_ = false;
 };
 
 }  // namespace curvisplat

@@ -1,7 +1,6 @@
 #include "stream/cache_writer.h"
 
 #include <algorithm>
-#include <array>
 #include <numeric>
 
 #include "stream/brick_grids.h"
@@ -11,35 +10,10 @@
 #include "stream/error.h"
 #include "stream/file.h"
 #include "stream/partial_folder.h"
+#include "stream/stream_file.h"
 
 namespace curvisplat {
 namespace {
-
-constexpr std::array<std::byte, kPageBytes> kZeros{};
-
-/// Appends zeros up to `offset`.
-void padTo(OutputFile& file, uint64_t offset) {
-  CURVISPLAT_CHECK_OP(offset - file.size(), <=, kPageBytes);
-  file.append(std::span(kZeros).first(offset - file.size()));
-}
-
-/// Appends a stream where cache_format.h wants it. Returns its offset.
-uint64_t appendStream(OutputFile& file, std::span<const std::byte> stream) {
-  padTo(file, streamOffset(file.size(), stream.size()));
-  const uint64_t offset = file.size();
-  file.append(stream);
-  return offset;
-}
-
-template <typename Record>
-std::span<const std::byte> bytesOf(const std::vector<Record>& records) {
-  return std::as_bytes(std::span(records));
-}
-
-template <typename Record>
-std::span<const std::byte> bytesOf(const Record& record) {
-  return std::as_bytes(std::span(&record, 1));
-}
 
 /// Positions in `bricks`, level by level and in Morton order; equal cells as they were appended.
 std::vector<uint32_t> indexOrder(const std::vector<Brick>& bricks) {
@@ -86,7 +60,7 @@ struct CacheWriter::State {
         geometry_input(geometry.path()) {
     for (const VariableInfo& variable : variables) {
       values.emplace_back(folder.path() / variableFileName(variable));
-      values.back().append(bytesOf(VariableHeader{}));  // its place; finish() fills it in
+      beginVariableFile(values.back());
       values_input.emplace_back(values.back().path());
     }
   }
@@ -206,30 +180,17 @@ FileInfo CacheWriter::State::writeIndex(const std::vector<Brick>& ordered) {
 }
 
 FileInfo CacheWriter::State::closeGeometry(const std::vector<Brick>& ordered) {
-  padTo(geometry, (geometry.size() + kPageBytes - 1) / kPageBytes * kPageBytes);
+  padToPage(geometry);
   const FileInfo info{"geometry.bin", geometry.size(), geometryChecksum(ordered)};
   geometry.close();
   return info;
 }
 
 FileInfo CacheWriter::State::writeTable(size_t variable, const std::vector<uint32_t>& order) {
-  std::vector<VariableRecord> records;
-  records.reserve(order.size());
-  for (uint32_t id : order) records.push_back(recordOf(tables[variable][id]));
-  OutputFile& file = values[variable];
-  padTo(file, (file.size() + kPageBytes - 1) / kPageBytes * kPageBytes);
-  VariableHeader header;
-  header.record_bytes = sizeof(VariableRecord);
-  header.bricks = order.size();
-  header.table_offset = file.size();
-  file.append(bytesOf(records));
-  file.writeAt(0, bytesOf(header));
-  Checksum checksum;
-  checksum.add(bytesOf(header));
-  checksum.add(bytesOf(records));
-  const FileInfo info{variableFileName(variables[variable]), file.size(), checksum.value()};
-  file.close();
-  return info;
+  std::vector<BrickVariable> table;
+  table.reserve(order.size());
+  for (uint32_t id : order) table.push_back(tables[variable][id]);
+  return finishVariableFile(values[variable], variableFileName(variables[variable]), table);
 }
 
 FileInfo CacheWriter::State::writeGrids(const std::vector<Brick>& ordered) {

@@ -7,13 +7,17 @@
 // farther along every axis comes first). A cell that cannot be split has several consecutive bricks: they are
 // taken in the index's order, since their splats lie within 2^-24 of the root of each other.
 //
-// Costs about 100 ns a brick looked at.
+// Under a limit of splats or bytes the brick with the largest error on the screen is refined first, octant by
+// octant, until the next octant's children would not fit. That sequence does not depend on the limit: a
+// larger limit gives a refinement of the same cut. At most one brick is drawn in part: the last one.
+//
+// Costs about 35 ns a brick looked at, under a limit 70 to 150 (bench/cut_bench.cpp).
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -50,20 +54,41 @@ struct ValueBounds {
 std::vector<ValueBounds> subtreeBounds(std::span<const Brick> bricks,
                                        std::span<const BrickVariable> variables);
 
+/// An octree with the values of one variable.
+struct CutTree {
+  RootCube root;
+  std::span<const Brick> bricks;
+  std::span<const BrickVariable> variables;
+  std::span<const ValueBounds> subtrees;  // from subtreeBounds()
+};
+
+enum class DrawingOrder { back_to_front, front_to_back };
+
+struct CutOptions {
+  static constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max();
+
+  double lod_pixels = 1;  // error allowed on the screen; at 0 only leaves are taken
+  DrawingOrder order = DrawingOrder::back_to_front;
+  /// What the cut may hold, and what its bricks' streams may take on disk. The root is drawn even where it
+  /// alone is more.
+  uint64_t max_splats = kNoLimit, max_bytes = kNoLimit;
+};
+
 struct Cut {
-  std::vector<uint32_t> bricks;  // farthest first; back to front. Reversed, front to back
+  std::vector<BrickPart> parts;  // in drawing order
   uint64_t splats = 0;
+  uint64_t bytes = 0;  // of the parts' streams; a brick in several parts counts once
   uint32_t deepest_level = 0;
-  uint64_t out_of_image = 0;  // bricks left out, each standing for all below it
+  bool complete = true;         // false: a limit keeps some of it coarser than lod_pixels asks for
+  double largest_error_px = 0;  // on the screen, of what is drawn; infinite around a perspective eye
+  uint64_t out_of_image = 0;    // bricks left out, each standing for all below it
   uint64_t transparent = 0;
 };
 
 /// Says whether nothing of a brick with such values can be seen.
 using TransparentBounds = std::function<bool(const ValueBounds&)>;
 
-/// `subtrees` from subtreeBounds(). `lod_pixels`: error allowed on the screen; at 0 only leaves are taken.
-Cut chooseCut(const RootCube& root, std::span<const Brick> bricks, std::span<const BrickVariable> variables,
-              std::span<const ValueBounds> subtrees, const CutView& view,
-              const TransparentBounds& transparent, double lod_pixels);
+Cut chooseCut(const CutTree& tree, const CutView& view, const TransparentBounds& transparent,
+              const CutOptions& options);
 
 }  // namespace curvisplat

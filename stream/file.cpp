@@ -34,6 +34,23 @@ int openRetrying(const std::filesystem::path& path, int flags, unsigned mode) {
   return fd;
 }
 
+/// As openRetrying. File systems without direct transfers refuse the flag, and do without.
+int openWith(Caching caching, const std::filesystem::path& path, int flags, unsigned mode) {
+  if (caching == Caching::direct) {
+    const int fd = openRetrying(path, flags | O_DIRECT, mode);
+    if (fd >= 0 || errno != EINVAL) return fd;
+  }
+  return openRetrying(path, flags, mode);
+}
+
+/// After a transfer was refused: whether it was for its alignment, which will not be asked for again. A
+/// transfer that was cut short goes on at any byte.
+bool stoppedBeingDirect(int fd) {
+  if (errno != EINVAL) return false;
+  const int flags = ::fcntl(fd, F_GETFL);
+  return flags >= 0 && (flags & O_DIRECT) != 0 && ::fcntl(fd, F_SETFL, flags & ~O_DIRECT) == 0;
+}
+
 void syncRetrying(int fd, const std::filesystem::path& path) {
   int result;
   do {
@@ -80,8 +97,8 @@ ScopedSystemCalls::~ScopedSystemCalls() {
   current_calls.store(previous_);
 }
 
-InputFile::InputFile(std::filesystem::path path) : path_(std::move(path)) {
-  fd_ = openRetrying(path_, O_RDONLY, 0);
+InputFile::InputFile(std::filesystem::path path, Caching caching) : path_(std::move(path)) {
+  fd_ = openWith(caching, path_, O_RDONLY, 0);
   if (fd_ < 0) throw Error("{}: cannot be opened for reading: {}", path_.string(), reason());
   struct stat status {};
   if (::fstat(fd_, &status) < 0 || !S_ISREG(status.st_mode)) {
@@ -112,7 +129,7 @@ void InputFile::readAt(uint64_t offset, std::span<std::byte> to) const {
     const ssize_t got =
         SystemCalls::current().pread(fd_, to.data() + done, count, static_cast<int64_t>(offset + done));
     if (got < 0) {
-      if (errno == EINTR) continue;
+      if (errno == EINTR || stoppedBeingDirect(fd_)) continue;
       throw Error("{}: reading {} bytes at offset {} failed: {}", path_.string(), count, offset + done,
                   reason());
     }
@@ -123,8 +140,8 @@ void InputFile::readAt(uint64_t offset, std::span<std::byte> to) const {
   }
 }
 
-OutputFile::OutputFile(std::filesystem::path path) : path_(std::move(path)) {
-  fd_ = openRetrying(path_, O_RDWR | O_CREAT | O_TRUNC, 0666);
+OutputFile::OutputFile(std::filesystem::path path, Caching caching) : path_(std::move(path)) {
+  fd_ = openWith(caching, path_, O_RDWR | O_CREAT | O_TRUNC, 0666);
   if (fd_ < 0) throw Error("{}: cannot be opened for writing: {}", path_.string(), reason());
 }
 
@@ -153,7 +170,7 @@ void OutputFile::writeAt(uint64_t offset, std::span<const std::byte> from) {
     const ssize_t put =
         SystemCalls::current().pwrite(fd_, from.data() + done, count, static_cast<int64_t>(offset + done));
     if (put < 0) {
-      if (errno == EINTR) continue;
+      if (errno == EINTR || stoppedBeingDirect(fd_)) continue;
       throw Error("{}: writing {} bytes at offset {} failed: {}", path_.string(), count, offset + done,
                   reason());
     }

@@ -46,11 +46,17 @@ class ScopedSystemCalls {
   SystemCalls* previous_;
 };
 
+/// Whether transfers go through the page cache, or straight between disk and memory where the file system can
+/// (else through the page cache after all). Straight ones need offsets, sizes and addresses that are
+/// multiples of kDirectAlignment; they are for large files that are written once and read once.
+enum class Caching { pages, direct };
+inline constexpr size_t kDirectAlignment = 4096;
+
 /// A file that is read by position. Any number of threads may read at once.
 class InputFile {
  public:
   /// Throws Error if `path` is missing, not a regular file, or not readable.
-  explicit InputFile(std::filesystem::path path);
+  explicit InputFile(std::filesystem::path path, Caching caching = Caching::pages);
   InputFile(InputFile&& other) noexcept;
   InputFile& operator=(InputFile&& other) noexcept;
   ~InputFile();
@@ -79,7 +85,7 @@ class InputFile {
 class OutputFile {
  public:
   /// Creates `path`, or empties it if it exists. Throws Error.
-  explicit OutputFile(std::filesystem::path path);
+  explicit OutputFile(std::filesystem::path path, Caching caching = Caching::pages);
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&& other) noexcept;
   ~OutputFile();

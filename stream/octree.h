@@ -36,7 +36,11 @@ struct Cell {
       cell.at[axis] = static_cast<uint32_t>(position.at[axis] >> (kPositionBits - level));
     return cell;
   }
-  bool contains(const RootPosition& position) const { return of(position, level) == *this; }
+  bool contains(const RootPosition& position) const {
+    const int shift = kPositionBits - static_cast<int>(level);
+    return (position.at[0] >> shift == at[0]) & (position.at[1] >> shift == at[1]) &
+           (position.at[2] >> shift == at[2]);
+  }
   /// Of the root: the root.
   Cell parent() const { return level == 0 ? *this : Cell{level - 1, {at[0] >> 1, at[1] >> 1, at[2] >> 1}}; }
   /// Octant: bit 0 is x, bit 1 is y, bit 2 is z.

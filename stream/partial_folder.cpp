@@ -37,11 +37,27 @@ void removeFolder(const fs::path& path, const char* what) {
 
 }  // namespace
 
+void checkReplaceable(const fs::path& target, bool overwrite) {
+  if (target.empty()) throw UsageError("the output has no name");
+  if (!fs::exists(fs::symlink_status(target))) return;
+  if (!overwrite)
+    throw Error("{}: exists already; choose another output, or allow overwriting (--overwrite)",
+                target.string());
+  try {
+    const fs::path manifest = target / "manifest.json";
+    Manifest::fromJson(readTextFile(manifest), manifest);
+  } catch (const Error&) {
+    throw Error(
+        "{}: is not a whole splat cache and will not be overwritten; remove it, or choose another output",
+        target.string());
+  }
+}
+
 PartialFolder::PartialFolder(fs::path target, bool overwrite)
     // "cache/" has an empty file name; what is beside it belongs to "cache".
     : target_(target.has_filename() ? std::move(target) : target.parent_path()),
       path_(withSuffix(target_, ".partial")) {
-  refuseUnlessCache(overwrite);
+  checkReplaceable(target_, overwrite);
   if (::mkdir(path_.c_str(), 0777) < 0 && errno != EEXIST)
     throw Error("{}: the folder cannot be made: {}; choose another output", path_.string(), reason());
   lock();
@@ -61,21 +77,6 @@ PartialFolder::~PartialFolder() {
   std::error_code ignored;
   fs::remove_all(path_, ignored);
   ::close(lock_);
-}
-
-void PartialFolder::refuseUnlessCache(bool overwrite) const {
-  if (target_.empty()) throw UsageError("the output has no name");
-  if (!fs::exists(fs::symlink_status(target_))) return;
-  if (!overwrite)
-    throw Error("{}: exists already; choose another output, or allow overwriting", target_.string());
-  try {
-    const fs::path manifest = target_ / "manifest.json";
-    Manifest::fromJson(readTextFile(manifest), manifest);
-  } catch (const Error&) {
-    throw Error(
-        "{}: is not a whole splat cache and will not be overwritten; remove it, or choose another output",
-        target_.string());
-  }
 }
 
 void PartialFolder::lock() {

@@ -12,10 +12,13 @@
 
 namespace curvisplat {
 
+/// Throws Error if something stands at `target`, and `overwrite` is false or it is no cache.
+void checkReplaceable(const std::filesystem::path& target, bool overwrite);
+
 class PartialFolder {
  public:
-  /// Makes and locks the folder. Throws Error if `target` exists and `overwrite` is false, if it exists and
-  /// is no cache, or if another conversion to the same target is running.
+  /// Makes and locks the folder. Throws Error unless checkReplaceable(), or if another conversion to the same
+  /// target is running.
   PartialFolder(std::filesystem::path target, bool overwrite);
   /// Removes the folder, unless it has been put into place.
   ~PartialFolder();
@@ -31,7 +34,6 @@ class PartialFolder {
 
  private:
   void lock();
-  void refuseUnlessCache(bool overwrite) const;
 
   std::filesystem::path target_, path_;
   int lock_ = -1;

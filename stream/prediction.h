@@ -21,6 +21,7 @@ inline constexpr uint32_t kNoRow = 0xffffffff;
 /// (above < first; the others' follow it), or kNoRow.
 struct Row {
   uint32_t first = 0, count = 0, above = kNoRow;
+  bool operator==(const Row&) const = default;
 };
 
 enum class Predictor : uint8_t {

@@ -1,6 +1,7 @@
 #include "stream/progress.h"
 
 #include <fmt/format.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -11,6 +12,12 @@ namespace {
 
 double secondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+double processCpuSeconds() {
+  timespec time{};
+  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
 std::string withUnit(double count) {
@@ -35,6 +42,7 @@ void Progress::begin(std::string phase, uint64_t total, std::string unit) {
   done_ = 0;
   next_draw_ms_ = 0;
   start_ = std::chrono::steady_clock::now();
+  cpu_start_s_ = processCpuSeconds();
 }
 
 void Progress::advance(uint64_t steps) {
@@ -47,7 +55,7 @@ void Progress::advance(uint64_t steps) {
 
 void Progress::end() {
   if (phase_.empty()) return;
-  phases_.push_back({phase_, unit_, secondsSince(start_), done_});
+  phases_.push_back({phase_, unit_, secondsSince(start_), processCpuSeconds() - cpu_start_s_, done_});
   phase_.clear();
   if (terminal_) fmt::print(stderr, "\r\033[K");
 }

@@ -29,6 +29,7 @@ class Progress {
     std::string name;
     std::string unit;
     double seconds = 0;
+    double cpu_seconds = 0;  // of all threads of the process, in the program and in the system
     uint64_t steps = 0;
   };
   /// The phases that have ended, for --stats.
@@ -43,6 +44,7 @@ class Progress {
   std::atomic<uint64_t> done_ = 0;
   std::atomic<int64_t> next_draw_ms_ = 0;
   std::chrono::steady_clock::time_point start_;
+  double cpu_start_s_ = 0;
   std::mutex drawing_;  // guards the terminal
   std::vector<Phase> phases_;
 };

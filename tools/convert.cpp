@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,7 +13,9 @@
 #include "preprocess/open_grid.h"
 #include "stream/error.h"
 #include "stream/progress.h"
+#include "tools/add_scalar.h"
 #include "tools/commands.h"
+#include "tools/convert_words.h"
 #include "tools/grid_options.h"
 #include "tools/option_parsers.h"
 #include "tools/run_statistics.h"
@@ -22,40 +23,10 @@
 namespace curvisplat {
 namespace {
 
-/// The command line's words, as given.
-struct ConvertWords {
-  OpenGridOptions grid;
-  std::vector<std::string> scalars;
-  std::filesystem::path output, temporary_folder, statistics;
-  std::optional<double> blank_value;
-  std::optional<std::string> memory;
-  unsigned threads = 0;
-  bool overwrite = false;
-};
-
-/// A scalar that the files lack is bad input, not wrong usage: the files decide.
-std::vector<uint32_t> chooseScalars(const ConvertWords& words, const GridDescription& description) {
-  try {
-    return scalarsNamed(description, words.scalars);
-  } catch (const UsageError& error) {
-    throw Error("{}: {}", words.grid.grid.string(), error.what());
-  }
-}
-
 uint64_t bytesOf(const ConvertReport& report) {
   uint64_t bytes = 0;
   for (const FileReport& file : report.files) bytes += file.bytes;
   return bytes;
-}
-
-double secondsOf(const Progress& progress) {
-  double seconds = 0;
-  for (const Progress::Phase& phase : progress.phases()) seconds += phase.seconds;
-  return seconds;
-}
-
-double mebibytes(uint64_t bytes) {
-  return static_cast<double>(bytes) / static_cast<double>(1 << 20);
 }
 
 void printSummary(const ConvertWords& words, const ConvertReport& report, double seconds,
@@ -100,16 +71,14 @@ nlohmann::json statistics(const ConvertReport& report, const Progress& progress)
   json["levels"] = report.levels;
   json["volume"] = report.volume;
   json["temporary_bytes"] = report.temporary_bytes;
-  json["seconds"] = secondsOf(progress);
-  for (const Progress::Phase& phase : progress.phases())
-    json["phases"].push_back(
-        {{"name", phase.name}, {"seconds", phase.seconds}, {"steps", phase.steps}, {"unit", phase.unit}});
+  addPhases(progress, json);
   for (const FileReport& file : report.files) json["files"][file.name] = file.bytes;
   json["cache_bytes"] = bytesOf(report);
   return json;
 }
 
 void runConvert(ConvertWords words) {
+  if (words.output.empty()) throw UsageError("--output is required, or --add-scalar and --to");
   if (!words.output.has_filename()) words.output = words.output.parent_path();  // "NAME.splats/"
   if (!words.statistics.empty()) checkOutputFolder("--stats", words.statistics);
   checkOutputFolder("-o", words.output);
@@ -121,12 +90,8 @@ void runConvert(ConvertWords words) {
   options.threads = words.threads;
   if (words.memory) options.memory_bytes = parseByteSize("--memory", *words.memory);
 
-  OpenGridOptions grid = words.grid;
-  grid.temporary_folder =
-      words.temporary_folder.empty() ? words.output.parent_path() : words.temporary_folder;
-  if (grid.temporary_folder.empty()) grid.temporary_folder = ".";
-  const auto source = openGrid(grid);
-  options.scalars = chooseScalars(words, source->description());
+  const auto source = openGrid(gridOptions(words, words.output));
+  options.scalars = chooseScalars(words, words.scalars, source->description());
   options.title = words.grid.grid.stem().string();
 
   Progress progress;
@@ -144,10 +109,16 @@ void addConvert(CLI::App& app) {
   CLI::App* command = app.add_subcommand("convert", "Make a splat cache of a grid, in bounded memory");
   command->add_option("GRID", words->grid.grid, "Grid file")->required();
   command->add_option("SOLUTION", words->grid.solutions, "Solution (Q) and function files");
-  command->add_option("-o,--output", words->output, "The cache to write, NAME.splats: a folder")->required();
+  command->add_option("-o,--output", words->output, "The cache to write, NAME.splats: a folder");
   command->add_option("--scalar", words->scalars, "Scalars by name or number (default: the first)")
       ->take_all()
       ->allow_extra_args(false);
+  command
+      ->add_option("--add-scalar", words->added_scalars,
+                   "Add scalars, by name or number, to the cache --to, whose grid this is")
+      ->take_all()
+      ->allow_extra_args(false);
+  command->add_option("--to", words->to, "The cache that --add-scalar changes");
   command->add_option("--blank", words->blank_value, "Nodes with this value are not there");
   command->add_option("--memory", words->memory,
                       "Cap on this process's memory, as 512M (default: 2G or a quarter of the machine's)");
@@ -156,7 +127,10 @@ void addConvert(CLI::App& app) {
   command->add_flag("--overwrite", words->overwrite, "Replace the output if it is a cache");
   command->add_option("--stats", words->statistics, "Write times, bytes and counts to FILE.json");
   addGridOptions(*command, words->grid);
-  command->callback([words] { runConvert(*words); });
+  command->callback([words] {
+    const bool adds = !words->added_scalars.empty() || !words->to.empty();
+    adds ? runAddScalar(*words) : runConvert(*words);
+  });
 }
 
 }  // namespace curvisplat

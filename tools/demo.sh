@@ -28,12 +28,15 @@ mkdir -p "$out"
 if [[ $# -eq 2 ]]; then
   inputs=("$1" "$2")
   name=$(basename "${1%.*}")
+  look=()
 else
-  "$curvisplat" generate wake --size 128x96x96 -o "$out/wake"
+  "$curvisplat" generate wake --size 192x128x96 -o "$out/wake"
   inputs=("$out/wake.xyz" "$out/wake.fun")
   name=demo
+  look=(--tf inferno --background black --opacity-unit 0.034 --position 7.2,-10,8 --focal-point 3.2,0,2
+        --view-up 0,0,1 --view-angle 34)
 fi
 
 "$curvisplat" convert "${inputs[@]}" -o "$out/$name.splats" --overwrite
-"$curvisplat" render "$out/$name.splats" -o "$out/$name.png" --size 600x600
+"$curvisplat" render "$out/$name.splats" -o "$out/$name.png" --size 600x600 "${look[@]}"
 echo "The picture is $out/$name.png"

@@ -37,6 +37,12 @@ double parseNumber(std::string_view option, std::string_view text) {
   return parseNumbers(option, text, "a number").front();
 }
 
+double parsePositive(std::string_view option, std::string_view text) {
+  const double value = parseNumber(option, text);
+  if (!(value > 0)) throw UsageError("{} {}: expected a number above zero", option, text);
+  return value;
+}
+
 std::vector<double> parseNumbers(std::string_view option, std::string_view text, std::string_view form) {
   std::vector<double> numbers;
   for (const std::string_view part : split(text, ',')) {

@@ -15,6 +15,8 @@ namespace curvisplat {
 
 /// One finite number.
 double parseNumber(std::string_view option, std::string_view text);
+/// One finite number above zero.
+double parsePositive(std::string_view option, std::string_view text);
 /// As many finite numbers as `form` ("x,y,z") names, separated by commas.
 std::vector<double> parseNumbers(std::string_view option, std::string_view text, std::string_view form);
 /// "x,y,z".

@@ -1,28 +1,30 @@
-// `curvisplat render`: a cache in, a picture out.
+// `curvisplat render`: a cache in, pictures out.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <glm/geometric.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 
-#include "render/camera.h"
 #include "render/frame.h"
 #include "render/image.h"
 #include "render/transfer_function.h"
 #include "stream/cache_reader.h"
 #include "stream/error.h"
 #include "stream/progress.h"
+#include "tools/camera_motion.h"
 #include "tools/commands.h"
 #include "tools/empty_picture.h"
+#include "tools/frame_output.h"
 #include "tools/option_parsers.h"
+#include "tools/render_statistics.h"
 #include "tools/run_statistics.h"
 
 namespace curvisplat {
@@ -30,20 +32,16 @@ namespace {
 
 /// The command line's words, as given.
 struct RenderWords {
-  std::filesystem::path cache, output, statistics;
+  std::filesystem::path cache, output, first_image, statistics;
+  CameraWords camera;
   std::string size = "600x600", scalar, transfer_function = "viridis", background = "white";
   std::string classify = "pixel", scale = "1,1,1", backend = "auto", memory = "512M";
   std::string lod_pixels = "1";
-  std::optional<std::string> range, opacity_unit, view, position, focal_point, view_up, parallel_scale,
-      view_angle, clip_box;
+  std::optional<std::string> range, opacity_unit, clip_box, frame_rate;
+  std::optional<uint64_t> max_splats;
   unsigned threads = 0;
+  bool keep_going = false;
 };
-
-double parsePositive(std::string_view option, const std::string& text) {
-  const double value = parseNumber(option, text);
-  if (!(value > 0)) throw UsageError("{} {}: expected a number above zero", option, text);
-  return value;
-}
 
 WorldBox parseClipBox(const std::string& text) {
   const auto n = parseNumbers("--clip-box", text, "x0,x1,y0,y1,z0,z1");
@@ -61,6 +59,7 @@ FrameOptions frameOptions(const RenderWords& words) {
   options.lod_pixels = parseNumber("--lod-pixels", words.lod_pixels);
   if (options.lod_pixels < 0)
     throw UsageError("--lod-pixels {}: expected 0 (the finest level) or more", words.lod_pixels);
+  options.max_splats = words.max_splats;
   if (words.classify != "pixel" && words.classify != "flat")
     throw UsageError("--classify {}: expected pixel or flat", words.classify);
   options.classification = words.classify == "pixel" ? Classification::pixel : Classification::flat;
@@ -71,24 +70,27 @@ FrameOptions frameOptions(const RenderWords& words) {
   options.background = parseBackground("--background", words.background);
   options.threads = words.threads;
   options.memory_bytes = parseByteSize("--memory", words.memory);
+  options.keep_going = words.keep_going;
   return options;
 }
 
 /// What contradicts itself whatever the cache holds.
-void checkWords(const RenderWords& words) {
-  checkImageName(words.output);
-  if (words.view && (words.position || words.focal_point || words.view_up))
-    throw UsageError("--view names a camera; --position, --focal-point and --view-up place one: give either");
-  if (!words.position && (words.focal_point || words.view_up))
-    throw UsageError("{} needs --position", words.focal_point ? "--focal-point" : "--view-up");
-  if (words.parallel_scale && words.view_angle)
-    throw UsageError(
-        "--parallel-scale is for an orthographic camera, --view-angle for perspective: give one");
-  if (words.background == "transparent" && words.output.extension() == ".pfm")
-    throw UsageError("--background transparent: a .pfm has no transparency; write .png or .exr");
+void checkWords(const RenderWords& words, ImageSize size) {
+  checkCameraWords(words.camera);
+  checkOutputName(words.output, words.camera.moves(), size);
+  if (words.frame_rate && !isMovieName(words.output))
+    throw UsageError("--frame-rate is for a movie, -o NAME.mp4");
+  if (words.background == "transparent" && words.output.extension() != ".png" &&
+      words.output.extension() != ".exr")
+    throw UsageError("--background transparent: a {} has no transparency; write .png or .exr",
+                     words.output.extension().string());
   if (words.backend != "auto" && words.backend != "osmesa")
     throw UsageError("--backend {}: not in this version, which has auto and osmesa", words.backend);
   checkOutputFolder("-o", words.output);
+  if (!words.first_image.empty()) {
+    checkImageName(words.first_image);
+    checkOutputFolder("--first-image", words.first_image);
+  }
   if (!words.statistics.empty()) checkOutputFolder("--stats", words.statistics);
 }
 
@@ -99,30 +101,6 @@ size_t chooseVariable(const CacheReader& cache, const std::string& name) {
   } catch (const UsageError& error) {
     throw Error("{}", error.what());
   }
-}
-
-Camera chooseCamera(const RenderWords& words, const glm::dvec3& lower, const glm::dvec3& upper,
-                    ImageSize size) {
-  const auto projection = words.view_angle ? Projection::perspective : Projection::orthographic;
-  const double angle = words.view_angle ? parsePositive("--view-angle", *words.view_angle) : 30;
-  if (angle >= 180) throw UsageError("--view-angle {}: expected less than 180 degrees", *words.view_angle);
-
-  Camera camera;
-  if (words.position) {
-    camera.position = parsePoint("--position", *words.position);
-    camera.focal_point =
-        words.focal_point ? parsePoint("--focal-point", *words.focal_point) : 0.5 * (lower + upper);
-    camera.view_up = words.view_up ? parsePoint("--view-up", *words.view_up) : glm::dvec3(0, 0, 1);
-    if (glm::length(camera.view_up) == 0)
-      throw UsageError("--view-up {}: expected a direction", *words.view_up);
-    camera.projection = projection;
-    camera.view_angle_deg = angle;
-    camera.parallel_scale = camera.parallelScaleFor(lower, upper, size);
-  } else {
-    camera = Camera::named(words.view.value_or("iso"), lower, upper, size, projection, angle);
-  }
-  if (words.parallel_scale) camera.parallel_scale = parsePositive("--parallel-scale", *words.parallel_scale);
-  return camera;
 }
 
 TransferFunction chooseTransferFunction(const RenderWords& words, const VariableInfo& variable,
@@ -141,126 +119,142 @@ TransferFunction chooseTransferFunction(const RenderWords& words, const Variable
                                   range ? range->second : variable.max, unit > 0 ? unit : default_unit);
 }
 
-nlohmann::json toJson(const glm::dvec3& v) {
-  return {v.x, v.y, v.z};
-}
-
-nlohmann::json toJson(const Camera& camera) {
-  nlohmann::json json{{"position", toJson(camera.position)},
-                      {"focal_point", toJson(camera.focal_point)},
-                      {"view_up", toJson(camera.view_up)}};
-  if (camera.projection == Projection::orthographic) {
-    json["projection"] = "orthographic";
-    json["parallel_scale"] = camera.parallel_scale;
-  } else {
-    json["projection"] = "perspective";
-    json["view_angle_deg"] = camera.view_angle_deg;
-  }
-  return json;
-}
-
-nlohmann::json toJson(const TransferFunction& function) {
-  return {{"name", function.name()},
-          {"range", {function.range().first, function.range().second}},
-          {"log_scale", function.logScale()},
-          {"opacity_unit", function.opacityUnit()}};
-}
-
-nlohmann::json toJson(const FrameStatistics& s) {
-  return {{"seconds",
-           {{"plan", s.plan_s},
-            {"read", s.read_s},
-            {"decode", s.decode_s},
-            {"project", s.project_s},
-            {"sort", s.sort_s},
-            {"upload", s.upload_s},
-            {"draw", s.draw_s},
-            {"total", s.total_s},
-            {"workers_waited", s.workers_waited_s},
-            {"painter_waited", s.painter_waited_s}}},
-          {"bricks_drawn", s.bricks_drawn},
-          {"bricks_culled", s.bricks_culled},
-          {"bricks_out_of_image", s.bricks_out_of_image},
-          {"bricks_transparent", s.bricks_transparent},
-          {"splats_read", s.splats_read},
-          {"splats_clipped", s.splats_clipped},
-          {"splats_off_screen", s.splats_off_screen},
-          {"splats_transparent", s.splats_transparent},
-          {"splats_drawn", s.splats_drawn},
-          {"bytes_read", s.bytes_read},
-          {"largest_level", s.largest_level},
-          {"workers", s.workers}};
-}
-
-nlohmann::json statisticsOf(const RenderWords& words, const RenderedScene& scene,
-                            const std::string& backend) {
-  const FrameOptions& options = scene.options;
-  nlohmann::json json = runStatistics();
-  json["cache"] = words.cache.string();
-  json["scalar"] = {{"name", scene.variable.name}, {"range", {scene.variable.min, scene.variable.max}}};
-  json["image"] = {
-      {"file", words.output.string()}, {"width", options.size.width}, {"height", options.size.height}};
-  json["backend"] = backend;
-  json["threads"] = options.threads;
-  json["memory_bytes"] = options.memory_bytes;
-  json["lod_pixels"] = options.lod_pixels;
-  json["classify"] = words.classify;
-  json["scale"] = toJson(options.scale);
-  json["clip_box"] = nullptr;
-  if (options.clip_box)
-    json["clip_box"] = {{"lower", toJson(options.clip_box->lower)},
-                        {"upper", toJson(options.clip_box->upper)}};
-  json["background"] = words.background;
-  json["camera"] = toJson(scene.camera);
-  json["transfer_function"] = toJson(scene.transfer_function);
-  json["frame"] = toJson(scene.statistics);
-  return json;
-}
-
 void tell(const char* kind, const std::string& text) {
   fmt::print(stderr, "curvisplat: {}: {}\n", kind, text);
 }
 
+/// One run: draws frame after frame and keeps what there is to report.
+class FrameRun {
+ public:
+  FrameRun(const RenderWords& words, const Manifest& manifest, FrameRenderer& renderer, FrameOutput& output,
+           RenderReport& report)
+      : words_(words), manifest_(manifest), renderer_(renderer), output_(output), report_(report) {}
+
+  /// Pictures that were written stay if a later frame fails.
+  void draw(const CameraMotion& motion) {
+    const bool moves = words_.camera.moves();
+    if (moves) progress_.begin("drawing", motion.frames, "frames");
+    for (uint64_t number = 0; number < motion.frames; ++number) {
+      try {
+        draw(number, motion, moves ? nullptr : &progress_);
+      } catch (const UsageError& error) {
+        if (moves) throw UsageError("frame {}: {}", number, error.what());
+        throw;
+      } catch (const Error& error) {
+        if (moves) throw Error("frame {}: {}", number, error.what());
+        throw;
+      }
+      if (moves) progress_.advance(1);
+    }
+    output_.finish();
+    progress_.end();
+  }
+
+ private:
+  void draw(uint64_t number, const CameraMotion& motion, Progress* progress) {
+    const Camera camera = motion.camera(number);
+    FrameStatistics statistics;
+    if (number > 0 || words_.first_image.empty()) {
+      const Image image = renderer_.render(camera, report_.options, statistics, progress);
+      // Read while the picture is written.
+      if (number + 1 < motion.frames) renderer_.prefetch(motion.camera(number + 1), report_.options);
+      finish(number, camera, image, statistics);
+      return;
+    }
+    const auto show = [&](const Image& image, bool is_final) {
+      if (!report_.first_image) {
+        writeImage(image, words_.first_image);
+        report_.time_to_first_image_s = secondsSinceStart();
+        report_.first_image = statistics;
+      }
+      if (is_final) finish(number, camera, image, statistics);
+    };
+    renderer_.renderProgressively(camera, report_.options, statistics, show, progress);
+  }
+
+  void finish(uint64_t number, const Camera& camera, const Image& image, const FrameStatistics& statistics) {
+    output_.write(number, image);
+    if (number == 0 && !report_.first_image) report_.time_to_first_image_s = secondsSinceStart();
+    report_.frames.push_back({camera, statistics});
+    tellUnreadable(statistics);
+    if (said_empty_ || !isEmpty(image, report_.options.background)) return;
+    said_empty_ = true;
+    progress_.end();
+    const std::string which = words_.camera.moves() ? fmt::format(" of frame {}", number) : "";
+    const RenderedScene scene{manifest_, report_.variable, report_.transfer_function,
+                              camera,    report_.options,  statistics};
+    for (const std::string& reason : whyEmpty(scene))
+      tell("warning", fmt::format("the picture{} is empty: {}", which, reason));
+  }
+
+  /// Each brick once a run.
+  void tellUnreadable(const FrameStatistics& statistics) {
+    for (const BrickFailure& failure : statistics.bricks_unreadable) {
+      if (!said_unreadable_.insert(failure.brick).second) continue;
+      progress_.end();
+      tell("warning", "drawn from a coarser level: " + failure.reason);
+    }
+  }
+
+  const RenderWords& words_;
+  const Manifest& manifest_;
+  FrameRenderer& renderer_;
+  FrameOutput& output_;
+  RenderReport& report_;
+  Progress progress_;
+  bool said_empty_ = false;
+  std::set<uint32_t> said_unreadable_;  // bricks
+};
+
+void tellResult(const RenderReport& report) {
+  const FrameStatistics& last = report.frames.back().statistics;
+  if (report.frames.size() == 1) {
+    fmt::print("{}: {} splats of {} in {} bricks, {:.2f} s, {}\n", report.output.string(), last.splats_drawn,
+               report.variable.name, last.bricks_drawn, last.total_s, report.backend);
+    return;
+  }
+  double total_s = 0;
+  for (const FrameReport& frame : report.frames) total_s += frame.statistics.total_s;
+  fmt::print("{}: {} frames of {}, {:.2f} s a frame, {}\n", report.output.string(), report.frames.size(),
+             report.variable.name, total_s / static_cast<double>(report.frames.size()), report.backend);
+}
+
 void render(const RenderWords& words) {
-  checkWords(words);
   FrameOptions options = frameOptions(words);
+  checkWords(words, options.size);
   if (options.threads == 0) options.threads = std::max(1u, std::thread::hardware_concurrency());
+  const double frames_per_s = words.frame_rate ? parsePositive("--frame-rate", *words.frame_rate) : 25;
 
   const CacheReader cache(words.cache);
   const Manifest& manifest = cache.manifest();
   const size_t variable = chooseVariable(cache, words.scalar);
   const VariableInfo& info = manifest.variables[variable];
   const glm::dvec3 lower = manifest.lower * options.scale, upper = manifest.upper * options.scale;
-  const Camera camera = chooseCamera(words, lower, upper, options.size);
+  const CameraMotion motion = chooseCameraMotion(words.camera, lower, upper, options.size);
   const TransferFunction transfer_function = chooseTransferFunction(words, info, glm::length(upper - lower));
   for (const std::string& note : transfer_function.notes()) tell("note", note);
   const std::string range_warning = rangeMissesScalar(info, transfer_function);
   if (!range_warning.empty()) tell("warning", range_warning);
 
+  const auto output = makeFrameOutput(words.output, words.camera.moves(), options.size, frames_per_s);
   FrameRenderer renderer(cache, variable, transfer_function);
-  Progress progress;
-  FrameStatistics statistics;
-  const Image image = renderer.render(camera, options, statistics, &progress);
-  progress.end();
-  const RenderedScene scene{manifest, info, transfer_function, camera, options, statistics};
-  if (isEmpty(image, options.background))
-    for (const std::string& reason : whyEmpty(scene)) tell("warning", "the picture is empty: " + reason);
-
-  writeImage(image, words.output);
-  if (!words.statistics.empty())
-    writeStatistics(words.statistics, statisticsOf(words, scene, renderer.backendName()));
-  fmt::print("{}: {} splats of {} in {} bricks, {:.2f} s, {}\n", words.output.string(),
-             statistics.splats_drawn, info.name, statistics.bricks_drawn, statistics.total_s,
-             renderer.backendName());
+  RenderReport report{
+      words.cache, words.output, info, transfer_function, options, renderer.backendName(), {}, 0, {}};
+  FrameRun(words, manifest, renderer, *output, report).draw(motion);
+  if (!words.statistics.empty()) writeStatistics(words.statistics, statisticsOf(report));
+  tellResult(report);
 }
 
 }  // namespace
 
 void addRender(CLI::App& app) {
   auto words = std::make_shared<RenderWords>();
-  CLI::App* command = app.add_subcommand("render", "Render a cache to a picture");
+  CLI::App* command = app.add_subcommand("render", "Render a cache to a picture, or to a movie");
   command->add_option("CACHE", words->cache, "The splat cache, a folder NAME.splats")->required();
-  command->add_option("-o,--output", words->output, "The picture: .png, .exr or .pfm")->required();
+  command
+      ->add_option("-o,--output", words->output,
+                   "The picture: .png, .exr or .pfm; of several frames: frame_%04d.png, or NAME.mp4 (ffmpeg)")
+      ->required();
   command->add_option("--size", words->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
   command->add_option("--scalar", words->scalar, "Name of the scalar; the cache's first otherwise");
 
@@ -287,6 +281,10 @@ void addRender(CLI::App& app) {
   command->add_option("--lod-pixels", words->lod_pixels, "Detail that may be merged away, in pixels; 0: none")
       ->capture_default_str()
       ->group(what);
+  command
+      ->add_option("--max-splats", words->max_splats,
+                   "Read at most so many, where they show most; as many as --lod-pixels takes otherwise")
+      ->group(what);
   command->add_option("--scale", words->scale, "sx,sy,sz: stretch the data")
       ->capture_default_str()
       ->group(what);
@@ -299,18 +297,29 @@ void addRender(CLI::App& app) {
       ->group(what);
 
   const std::string where = "Camera";
-  command->add_option("--view", words->view, "iso, +x, -x, +y, -y, +z or -z; iso otherwise")->group(where);
-  command->add_option("--position", words->position, "x,y,z of the camera, after --scale")->group(where);
-  command->add_option("--focal-point", words->focal_point, "x,y,z it looks at; the data's centre otherwise")
+  CameraWords* camera = &words->camera;
+  command->add_option("--view", camera->view, "iso, +x, -x, +y, -y, +z or -z; iso otherwise")->group(where);
+  command->add_option("--position", camera->position, "x,y,z of the camera, after --scale")->group(where);
+  command->add_option("--focal-point", camera->focal_point, "x,y,z it looks at; the data's centre otherwise")
       ->group(where);
-  command->add_option("--view-up", words->view_up, "x,y,z that points up; 0,0,1 otherwise")->group(where);
+  command->add_option("--view-up", camera->view_up, "x,y,z that points up; 0,0,1 otherwise")->group(where);
   command
-      ->add_option("--parallel-scale", words->parallel_scale,
+      ->add_option("--parallel-scale", camera->parallel_scale,
                    "Half the picture's height in world units; all of the data otherwise")
       ->group(where);
   command
-      ->add_option("--view-angle", words->view_angle,
+      ->add_option("--view-angle", camera->view_angle,
                    "Perspective, with this angle over the picture's height, in degrees")
+      ->group(where);
+
+  command->add_option("--orbit", camera->orbit, "Degrees to move around the focal point, about view-up")
+      ->group(where);
+  command
+      ->add_option("--path", camera->path,
+                   "Key frames to move through, FILE.json; render/README.md describes it")
+      ->group(where);
+  command->add_option("--frames", camera->frames, "How many pictures of --orbit or --path")->group(where);
+  command->add_option("--frame-rate", words->frame_rate, "Frames a second of a movie; 25 otherwise")
       ->group(where);
 
   const std::string how = "Resources";
@@ -320,6 +329,14 @@ void addRender(CLI::App& app) {
       ->group(how);
   command->add_option("--threads", words->threads, "Workers; 0: one a core")
       ->capture_default_str()
+      ->group(how);
+  command
+      ->add_option("--first-image", words->first_image,
+                   "Write a coarse picture as soon as there is one: .png, .exr or .pfm")
+      ->group(how);
+  command
+      ->add_flag("--keep-going", words->keep_going,
+                 "Draw what cannot be read from a coarser level, and say so, instead of failing")
       ->group(how);
   command->add_option("--stats", words->statistics, "Write what was done, and how long it took, to FILE.json")
       ->group(how);

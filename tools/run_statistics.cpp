@@ -1,7 +1,11 @@
 #include "tools/run_statistics.h"
 
+#include <time.h>
+#include <unistd.h>
+
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -27,7 +31,29 @@ uint64_t peakMemoryBytes() {
   throw Error("/proc/self/status: has no VmHWM, the peak of memory that --stats reports");
 }
 
+/// Field 22 of /proc/self/stat, in clock ticks since the machine's start. Field 2, the program's name in
+/// brackets, may hold anything.
+double startTicks() {
+  std::ifstream file("/proc/self/stat");
+  std::string line;
+  std::getline(file, line);
+  std::istringstream fields(line.substr(line.rfind(')') + 1));
+  std::string field;
+  for (int n = 3; n < 22; ++n) fields >> field;
+  double ticks = 0;
+  if (!(fields >> ticks))
+    throw Error("/proc/self/stat: has no field 22, the time at which the process started");
+  return ticks;
+}
+
 }  // namespace
+
+double secondsSinceStart() {
+  timespec now;
+  clock_gettime(CLOCK_BOOTTIME, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec) -
+         startTicks() / static_cast<double>(sysconf(_SC_CLK_TCK));
+}
 
 nlohmann::json runStatistics() {
   return {{"program", "curvisplat"},

@@ -263,6 +263,16 @@ TEST_F(RenderOptions, WrongWordsAreUsageErrors) {
                {{"--background", "#12345g"}, "#rrggbb"},
                {{"--backend", "egl"}, "not in this version"},
                {{"--memory", "lots"}, "512M"},
+               {{"--max-splats", "10"}, "--max-splats"},
+               {{"--first-image", "a.jpg"}, ".png"},
+               {{"--orbit", "90"}, "--frames"},
+               {{"--path", "a.json"}, "--frames"},
+               {{"--frames", "3"}, "--orbit or --path"},
+               {{"--orbit", "90", "--path", "a.json", "--frames", "3"}, "give one"},
+               {{"--path", "a.json", "--frames", "3", "--view", "iso"}, "key frames place the camera"},
+               {{"--orbit", "90", "--frames", "0"}, "1 to 100000"},
+               {{"--orbit", "90", "--frames", "3"}, "without a %d"},
+               {{"--frame-rate", "24"}, "NAME.mp4"},
                {{"--tf", "rainbow"}, "viridis"}};
   for (const auto& c : cases) {
     SCOPED_TRACE(c.options[0] + " " + c.options[1]);
@@ -295,25 +305,33 @@ TEST_F(RenderOptions, StatisticsTellWhatWasDone) {
   const auto json = nlohmann::json::parse(readTextFile(stats));
   for (const char* key : {"program", "version", "command", "peak_memory_bytes", "cache", "scalar", "image",
                           "backend", "threads", "memory_bytes", "lod_pixels", "classify", "scale", "clip_box",
-                          "background", "camera", "transfer_function", "frame"})
+                          "background", "transfer_function", "time_to_first_image_s", "frames", "summary"})
     EXPECT_TRUE(json.contains(key)) << key;
+  ASSERT_EQ(json["frames"].size(), 1u);
+  const auto& frame = json["frames"][0];
   for (const char* key : {"seconds", "bricks_drawn", "bricks_culled", "splats_read", "splats_drawn",
                           "bytes_read", "largest_level"})
-    EXPECT_TRUE(json["frame"].contains(key)) << key;
+    EXPECT_TRUE(frame.contains(key)) << key;
   for (const char* key : {"plan", "read", "decode", "project", "sort", "upload", "draw", "total",
                           "workers_waited", "painter_waited"})
-    EXPECT_TRUE(json["frame"]["seconds"][key].is_number()) << key;
+    EXPECT_TRUE(frame["seconds"][key].is_number()) << key;
   EXPECT_EQ(json["command"][1], "render");
   EXPECT_EQ(json["threads"], 2);
   EXPECT_EQ(json["memory_bytes"], 64 << 20);
   EXPECT_EQ(json["image"]["width"], 96);
-  EXPECT_EQ(json["camera"]["projection"], "perspective");
-  EXPECT_EQ(json["camera"]["view_angle_deg"], 25);
+  EXPECT_EQ(frame["camera"]["projection"], "perspective");
+  EXPECT_EQ(frame["camera"]["view_angle_deg"], 25);
   EXPECT_EQ(json["scale"][2], 2);
   EXPECT_EQ(json["transfer_function"]["name"], "viridis");
   EXPECT_GT(json["peak_memory_bytes"], 1 << 20);
-  EXPECT_GT(json["frame"]["splats_drawn"], 0);
-  EXPECT_GT(json["frame"]["bytes_read"], 0);
+  EXPECT_GT(frame["splats_drawn"], 0);
+  EXPECT_GT(frame["bytes_read"], 0);
+  EXPECT_GT(json["time_to_first_image_s"], 0);
+  EXPECT_FALSE(json.contains("first_image"));
+  for (const char* of : {"p50", "p95", "max"}) {
+    EXPECT_EQ(json["summary"]["seconds"]["total"][of], frame["seconds"]["total"]);
+    EXPECT_EQ(json["summary"]["splats_drawn"][of], frame["splats_drawn"]);
+  }
 }
 
 }  // namespace

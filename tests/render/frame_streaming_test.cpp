@@ -88,16 +88,16 @@ TEST_F(FrameStreamingTest, IsTheSameForAnyMemoryThreadsWayAndHistory) {
         wanted.direct_reads = threads != 2;
         const std::string what = fmt::format("{} bytes, {} threads", memory, threads);
         EXPECT_EQ(renderer.render(camera("iso"), wanted, statistics).rgba, iso.rgba) << what << ", cold";
-        EXPECT_EQ(statistics.fetch.bricks_cached, 0u);
+        EXPECT_EQ(statistics.bricks_cached, 0u);
         EXPECT_GT(statistics.bytes_read, 0u);
         EXPECT_EQ(renderer.render(camera("-x"), wanted, statistics).rgba, side.rgba) << what << ", turned";
         EXPECT_EQ(renderer.render(camera("iso"), wanted, statistics).rgba, iso.rgba) << what << ", warm";
         if (memory > least + (2 << 20)) {
-          EXPECT_EQ(statistics.fetch.bricks_read, 0u);
+          EXPECT_EQ(statistics.bricks_read, 0u);
           EXPECT_EQ(statistics.bytes_read, 0u);
         }
-        const FetchStatistics& fetch = statistics.fetch;
-        EXPECT_LE(fetch.cache_peak_bytes + fetch.pager_peak_bytes + statistics.ring_peak_bytes, memory);
+        EXPECT_LE(statistics.cache_peak_bytes + statistics.pager_peak_bytes + statistics.ring_peak_bytes,
+                  memory);
         EXPECT_GT(statistics.ring_peak_bytes, 0u);
       }
 }
@@ -109,7 +109,7 @@ TEST_F(FrameStreamingTest, AnotherImageSizeFindsTheCacheWarm) {
   renderer.render(camera("iso"), wanted, statistics);
   wanted.size = {90, 75};
   renderer.render(camera("iso"), wanted, statistics);
-  EXPECT_EQ(statistics.fetch.bricks_read, 0u);
+  EXPECT_EQ(statistics.bricks_read, 0u);
 }
 
 TEST_F(FrameStreamingTest, PrefetchingMakesTheNextFrameWarm) {
@@ -124,7 +124,7 @@ TEST_F(FrameStreamingTest, PrefetchingMakesTheNextFrameWarm) {
   prefetched.prefetch(camera("iso"), wanted);
   // However far it has come: what it has done is not done again, and the picture is the same.
   EXPECT_EQ(prefetched.render(camera("iso"), wanted, statistics).rgba, expected.rgba);
-  EXPECT_EQ(statistics.fetch.bricks_read + statistics.fetch.bricks_cached, statistics.bricks_drawn);
+  EXPECT_EQ(statistics.bricks_read + statistics.bricks_cached, statistics.bricks_drawn);
   prefetched.prefetch(camera("-x"), wanted);  // and is left behind
 }
 

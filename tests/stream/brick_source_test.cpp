@@ -63,11 +63,17 @@ class BrickSourceTest : public ::testing::Test {
            same(values_[brick], splats.values);
   }
 
+  static std::vector<BrickPart> partsOf(const std::vector<uint32_t>& bricks) {
+    std::vector<BrickPart> parts;
+    for (const uint32_t brick : bricks) parts.push_back({brick, kAllOctants});
+    return parts;
+  }
+
   /// Takes a frame of `order` on some threads. Returns how many bricks were as they should be; an error ends
   /// it, and is thrown.
   size_t takeAll(BrickSource& source, const std::vector<uint32_t>& order, unsigned threads,
                  FetchStatistics& statistics) const {
-    source.start(order);
+    source.start(partsOf(order));
     std::atomic<size_t> next = 0, good = 0, errors = 0;
     std::exception_ptr error;
     const auto work = [&] {
@@ -132,18 +138,31 @@ TEST_F(BrickSourceTest, GivesWhatTheReaderReadsColdAndWarmWithAnyCache) {
   }
 }
 
-TEST_F(BrickSourceTest, ABrickMayBeAskedForTwice) {
-  BrickSource source(*cache_, 0, pagerOptions(), decoded_bytes_ / 2);
-  std::vector<uint32_t> twice;
-  for (const uint32_t brick : order_) twice.insert(twice.end(), {brick, brick / 2});
-  FetchStatistics statistics;
-  EXPECT_EQ(takeAll(source, twice, 3, statistics), twice.size());
-  EXPECT_EQ(takeAll(source, twice, 3, statistics), twice.size());
+TEST_F(BrickSourceTest, ABrickInSeveralPartsIsReadOnce) {
+  std::vector<uint32_t> often;
+  for (const uint32_t brick : order_) often.insert(often.end(), {brick, brick / 2, brick / 2});
+  for (const uint64_t cache_bytes : {uint64_t{0}, decoded_bytes_ / 3, decoded_bytes_ + (1 << 20)}) {
+    BrickSource source(*cache_, 0, pagerOptions(), cache_bytes);
+    for (const unsigned threads : {4u, 1u}) {
+      FetchStatistics statistics;
+      EXPECT_EQ(takeAll(source, often, threads, statistics), often.size());
+      EXPECT_EQ(statistics.bricks_read + statistics.bricks_cached, order_.size());
+    }
+  }
+
+  BrickSource source(*cache_, 0, pagerOptions(), decoded_bytes_);
+  const uint32_t inner = 3;
+  ASSERT_FALSE(cache_->bricks()[inner].isLeaf());
+  source.start(std::vector<BrickPart>{{inner, 0x0f}, {inner, 0xf0}});
+  BrickSource::Scratch scratch;
+  uint32_t splats = 0;
+  for (size_t n = 0; n < 2; ++n) splats += source.take(n, scratch)->ranges.splats();
+  EXPECT_EQ(splats, cache_->bricks()[inner].splats);
 }
 
 TEST_F(BrickSourceTest, PrefetchingFillsTheCache) {
   BrickSource source(*cache_, 0, pagerOptions(), decoded_bytes_ + (1 << 20));
-  source.startPrefetch(order_);
+  source.startPrefetch(partsOf(order_));
   BrickSource::Scratch scratch;
   while (source.prefetchNext(scratch)) {
   }
@@ -153,7 +172,7 @@ TEST_F(BrickSourceTest, PrefetchingFillsTheCache) {
 
   // What does not fit is left to the frame, and a prefetch can be broken off.
   BrickSource little(*cache_, 0, pagerOptions(), decoded_bytes_ / 4);
-  little.startPrefetch(order_);
+  little.startPrefetch(partsOf(order_));
   EXPECT_TRUE(little.prefetchNext(scratch));
   little.stop();
   EXPECT_FALSE(little.prefetchNext(scratch));
@@ -220,13 +239,12 @@ TEST_F(BrickSourceTest, DamageIsFoundAndStoodInFor) {
     EXPECT_EQ(source.cached().statistics().bricks, 0u);
 
     BrickSource::Scratch scratch;
-    const auto stand_in = source.standIn(damaged, scratch);
-    ASSERT_TRUE(stand_in);
+    const auto stand_in = source.standIn({damaged, kAllOctants}, scratch);
     // The parent of a leaf is whole at first; when it is not, the root stands in.
     const Brick& parent = bricks[bricks[damaged].parent];
-    EXPECT_EQ(stand_in->cell, parent.cell);
+    EXPECT_EQ(stand_in.cell, parent.cell);
     const int octant = bricks[damaged].cell.octantInParent();
-    EXPECT_EQ(stand_in->geometry.size(), parent.octant_splats[static_cast<size_t>(octant)]);
+    EXPECT_EQ(stand_in.geometry.size(), parent.octant_splats[static_cast<size_t>(octant)]);
     double weight = 0, expected = 0;
     const uint32_t id = bricks[damaged].parent;
     const double half = cache_->manifest().root.cellSize(parent.cell.level + 1);
@@ -235,7 +253,7 @@ TEST_F(BrickSourceTest, DamageIsFoundAndStoodInFor) {
                      (geometry_[id].z[n] >= half) << 2;
       if (at == octant) expected += geometry_[id].weight[n];
     }
-    for (size_t n = 0; n < stand_in->geometry.size(); ++n) weight += stand_in->geometry.weight[n];
+    for (size_t n = 0; n < stand_in.geometry.size(); ++n) weight += stand_in.geometry.weight[n];
     if (damaged == twin)
       expected *= double(bricks[twin].splats) / (bricks[twin].splats + bricks[twin + 1].splats);
     EXPECT_NEAR(weight, expected, 1e-5 * expected);
@@ -244,9 +262,8 @@ TEST_F(BrickSourceTest, DamageIsFoundAndStoodInFor) {
   // The leaf and its parent are damaged now: the root stands in, where the leaf is and nowhere else.
   BrickSource source(*cache_, 0, pagerOptions(), 0);
   BrickSource::Scratch scratch;
-  const auto stand_in = source.standIn(leaf, scratch);
-  ASSERT_TRUE(stand_in);
-  EXPECT_EQ(stand_in->cell, Cell{});
+  const auto stand_in = source.standIn({leaf, kAllOctants}, scratch);
+  EXPECT_EQ(stand_in.cell, Cell{});
   const RootCube& root = cache_->manifest().root;
   const glm::dvec3 lower = root.cellMin(bricks[leaf].cell) - root.min;
   const double size = root.cellSize(bricks[leaf].cell.level);
@@ -258,14 +275,32 @@ TEST_F(BrickSourceTest, DamageIsFoundAndStoodInFor) {
   for (size_t n = 0; n < geometry_[0].size(); ++n)
     expected += inside(geometry_[0].x[n], geometry_[0].y[n], geometry_[0].z[n]);
   EXPECT_GT(expected, 0u);
-  EXPECT_EQ(stand_in->geometry.size(), expected);
-  for (size_t n = 0; n < stand_in->geometry.size(); ++n)
-    EXPECT_TRUE(inside(stand_in->geometry.x[n], stand_in->geometry.y[n], stand_in->geometry.z[n]));
+  EXPECT_EQ(stand_in.geometry.size(), expected);
+  for (size_t n = 0; n < stand_in.geometry.size(); ++n)
+    EXPECT_TRUE(inside(stand_in.geometry.x[n], stand_in.geometry.y[n], stand_in.geometry.z[n]));
+
+  // Parts of the leaf's parent, which is damaged as well, are stood in for by what the root has there.
+  const uint32_t parent = bricks[leaf].parent;
+  const uint32_t whole = source.standIn({parent, kAllOctants}, scratch).ranges.splats();
+  uint32_t parts = 0;
+  for (const int octants : {0x01, 0x16, 0xe8}) {
+    const auto part = source.standIn({parent, static_cast<uint8_t>(octants)}, scratch);
+    for (size_t n = 0; n < part.geometry.size(); ++n) {
+      const glm::dvec3 at(part.geometry.x[n], part.geometry.y[n], part.geometry.z[n]);
+      const glm::dvec3 in_cell = at - (root.cellMin(bricks[parent].cell) - root.min);
+      const int octant = (in_cell.x >= size) | (in_cell.y >= size) << 1 | (in_cell.z >= size) << 2;
+      EXPECT_TRUE(octants >> octant & 1) << octant;
+    }
+    parts += part.ranges.splats();
+  }
+  EXPECT_EQ(parts, whole);
+  EXPECT_EQ(whole,
+            cache_->bricks()[0].octant_splats[static_cast<size_t>(bricks[parent].cell.octantInParent())]);
 
   // Without the root there is nothing left.
   overwrite(cache_->geometryPath(), bricks[0].geometry.offset);
-  EXPECT_FALSE(source.standIn(leaf, scratch));
-  EXPECT_FALSE(source.standIn(0, scratch));
+  EXPECT_EQ(source.standIn({leaf, kAllOctants}, scratch).ranges.splats(), 0u);
+  EXPECT_EQ(source.standIn({0, kAllOctants}, scratch).ranges.splats(), 0u);
 }
 
 TEST_F(BrickSourceTest, CanBeStoppedAtAnyMoment) {
@@ -275,7 +310,7 @@ TEST_F(BrickSourceTest, CanBeStoppedAtAnyMoment) {
     std::vector<uint32_t> order = order_;
     std::shuffle(order.begin(), order.end(), random);
     order.resize(1 + random() % order.size());
-    source.start(order);
+    source.start(partsOf(order));
     // Some worker stops all when it comes to this brick; others may be anywhere.
     const size_t stop_at = random() % order.size();
     std::atomic<size_t> next = 0, wrong = 0;

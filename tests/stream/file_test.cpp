@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -60,6 +61,26 @@ TEST_F(FileTest, ShortAndInterruptedTransfersAreCompleted) {
   in.readAt(10, std::span(back));
   EXPECT_TRUE(std::equal(back.begin(), back.end(), bytes.begin() + 10));
   EXPECT_GT(faulty.reads, 100);
+}
+
+TEST_F(FileTest, DirectTransfersThatAreCutShortGoOnThroughThePageCache) {
+  constexpr size_t kPages = 5;
+  struct alignas(kDirectAlignment) Page {
+    std::array<std::byte, kDirectAlignment> bytes;
+  };
+  std::vector<Page> pages(kPages), back(kPages);
+  for (size_t n = 0; n < kPages; ++n) pages[n].bytes.fill(static_cast<std::byte>(n + 1));
+  for (const size_t largest_transfer : {SIZE_MAX, size_t{1000}}) {
+    FaultySystemCalls faulty;
+    faulty.largest_transfer = largest_transfer;
+    const ScopedSystemCalls scope(faulty);
+    OutputFile out(folder / "file", Caching::direct);
+    out.append(std::as_bytes(std::span(pages)));
+    out.close();
+    const InputFile in(folder / "file", Caching::direct);
+    in.readAt(0, std::as_writable_bytes(std::span(back)));
+    for (size_t n = 0; n < kPages; ++n) EXPECT_EQ(back[n].bytes, pages[n].bytes) << n;
+  }
 }
 
 TEST_F(FileTest, FailuresNameThePathTheOffsetAndTheReason) {

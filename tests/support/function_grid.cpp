@@ -1,5 +1,7 @@
 #include "tests/support/function_grid.h"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 namespace curvisplat {
@@ -12,7 +14,7 @@ FunctionGridSource::FunctionGridSource(std::vector<GridBlock> blocks, size_t sca
   description_.coordinate_bytes = 8;
   for (size_t n = 0; n < scalars; ++n) {
     GridScalar scalar;
-    scalar.name = "s" + std::to_string(n);
+    scalar.name = fmt::format("s{}", n);
     description_.scalars.push_back(scalar);
   }
 }

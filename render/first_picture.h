@@ -1,0 +1,32 @@
+// The first picture of a progressive frame: so little of the cache, at so few pixels, that it is there within
+// a fraction of a second whatever the size of the cache and of the image, drawn in software too.
+//
+// A coarse level of depth n voxels covers each pixel about 10 n times, which takes longer than all else; but
+// it has no detail finer than its voxels. It is drawn with two pixels a voxel and enlarged.
+#pragma once
+
+#include "render/camera.h"
+#include "render/image.h"
+#include "stream/cut.h"
+
+namespace curvisplat {
+
+/// `whole` with less of everything.
+CutOptions firstPictureLimits(CutOptions whole);
+
+/// An image with fewer pixels than `size` that shows what a camera shows in one of `size`.
+class ReducedSize {
+ public:
+  /// By how much may be reduced what has no detail finer than `detail_px`: from 1 to 8 times.
+  ReducedSize(ImageSize size, double detail_px);
+
+  bool isWhole() const { return reduced_.height == whole_.height; }
+  ImageSize size() const { return reduced_; }
+  /// A picture of size() as one of the whole size: linear between its pixels.
+  Image enlarge(const Image& picture) const;
+
+ private:
+  ImageSize whole_, reduced_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,100 @@
+// The convert subcommand, option by option, on the real program.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "preprocess/plot3d_writer.h"
+#include "preprocess/scenes.h"
+#include "stream/file.h"
+#include "stream/progress.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+class ConvertOptionsTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    Progress progress;
+    writePlot3d(SceneGridSource(makeScene("wake"), {60, 50, 40}), folder_ / "wake", progress);
+  }
+
+  std::string file(const std::string& name) const { return (folder_ / name).string(); }
+
+  ProgramResult convert(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(),
+                     {"convert", file("wake.xyz"), file("wake.fun"), "-o", file("wake.splats")});
+    return runProgram(arguments);
+  }
+
+  std::map<std::string, std::string> cacheFiles() const {
+    std::map<std::string, std::string> files;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_ / "wake.splats"))
+      files[entry.path().filename().string()] = readTextFile(entry.path());
+    return files;
+  }
+
+  const TemporaryFolder folder_;
+};
+
+TEST_F(ConvertOptionsTest, SaysWhatItDid) {
+  const ProgramResult result = convert({"--stats", file("stats.json")});
+  ASSERT_EQ(result.status, 0) << result.err;
+  EXPECT_EQ(lineCount(result.out), 2) << result.out;
+  EXPECT_NE(result.out.find("120000 nodes, 118000 splats"), std::string::npos) << result.out;
+  EXPECT_NE(result.err.find("2000 face nodes coincide"), std::string::npos) << result.err;
+
+  const auto stats = nlohmann::json::parse(readTextFile(folder_ / "stats.json"));
+  EXPECT_EQ(stats["nodes"], 120000);
+  EXPECT_EQ(stats["merged_nodes"], 2000);
+  EXPECT_GT(stats["peak_memory_bytes"], 0);
+  EXPECT_LE(stats["temporary_bytes"], 64 * 120000);
+  std::vector<std::string> phases;
+  for (const auto& phase : stats["phases"]) phases.push_back(phase["name"]);
+  EXPECT_EQ(phases, (std::vector<std::string>{"scan", "count", "scatter", "seams", "build", "finish"}));
+  uint64_t bytes = 0;
+  for (const auto& [name, size] : stats["files"].items()) {
+    EXPECT_EQ(size, std::filesystem::file_size(folder_ / "wake.splats" / name));
+    bytes += size.get<uint64_t>();
+  }
+  EXPECT_EQ(stats["cache_bytes"], bytes);
+}
+
+TEST_F(ConvertOptionsTest, GivesTheSameCacheForAnyThreadsAndMemory) {
+  ASSERT_EQ(convert({"--threads", "1", "--memory", "200M"}).status, 0);
+  const auto one = cacheFiles();
+  const ProgramResult result = convert({"--threads", "2", "--memory", "8G", "--overwrite"});
+  ASSERT_EQ(result.status, 0) << result.err;
+  EXPECT_TRUE(cacheFiles() == one);
+}
+
+TEST_F(ConvertOptionsTest, PutsTemporaryFilesWhereItIsToldAndTakesThemAway) {
+  std::filesystem::create_directory(folder_ / "tmp");
+  ASSERT_EQ(convert({"--tmp", file("tmp")}).status, 0);
+  EXPECT_TRUE(std::filesystem::is_empty(folder_ / "tmp"));
+  const ProgramResult result = convert({"--tmp", file("none"), "--overwrite"});
+  EXPECT_EQ(result.status, 1);
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  EXPECT_NE(result.err.find("--tmp"), std::string::npos) << result.err;
+}
+
+TEST_F(ConvertOptionsTest, RefusesLessMemoryThanItNeeds) {
+  const ProgramResult result = convert({"--memory", "10M"});
+  EXPECT_EQ(result.status, 1);
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  EXPECT_NE(result.err.find("--memory"), std::string::npos) << result.err;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "wake.splats"));
+}
+
+TEST_F(ConvertOptionsTest, TakesATrailingSlash) {
+  const ProgramResult result =
+      runProgram({"convert", file("wake.xyz"), file("wake.fun"), "-o", file("slash.splats/")});
+  ASSERT_EQ(result.status, 0) << result.err;
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "slash.splats" / "manifest.json"));
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,302 @@
+// `curvisplat render` with several pictures: orbits, paths, movies, first images and their statistics.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "render/image.h"
+#include "stream/file.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Puts another value in the place of an environment variable's, until the end of the scope.
+class ScopedEnvironment {
+ public:
+  ScopedEnvironment(const char* name, const std::string& value) : name_(name), before_(std::getenv(name)) {
+    setenv(name, value.c_str(), 1);
+  }
+  ~ScopedEnvironment() { setenv(name_, before_.c_str(), 1); }
+  ScopedEnvironment(const ScopedEnvironment&) = delete;
+  ScopedEnvironment& operator=(const ScopedEnvironment&) = delete;
+
+ private:
+  const char* name_;
+  const std::string before_;
+};
+
+class Frames : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    makeCache("small", "half-annulus", "48x24x24");
+  }
+  static void TearDownTestSuite() { folder_.reset(); }
+
+  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
+  static std::string cache(const std::string& name = "small") { return file(name + ".splats"); }
+
+  static void makeCache(const std::string& name, const std::string& scene, const std::string& size) {
+    ProgramResult result = runProgram({"generate", scene, "--size", size, "-o", file(name)});
+    ASSERT_EQ(result.status, 0) << result.err;
+    result = runProgram({"convert", file(name + ".xyz"), file(name + ".fun"), "-o", cache(name)});
+    ASSERT_EQ(result.status, 0) << result.err;
+  }
+
+  /// Of 2 M nodes; made by the first who asks.
+  static std::string large() {
+    if (!fs::exists(cache("large"))) makeCache("large", "half-annulus", "256x128x64");
+    return cache("large");
+  }
+
+  /// Draws small pictures of the small cache; a later --size holds.
+  static ProgramResult render(const std::vector<std::string>& options) {
+    std::vector<std::string> arguments{"render", cache()};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    if (std::find(options.begin(), options.end(), "--size") == options.end())
+      arguments.insert(arguments.end(), {"--size", "64x48"});
+    return runProgram(arguments);
+  }
+  static void expectDrawn(const std::vector<std::string>& options) {
+    const ProgramResult result = render(options);
+    EXPECT_EQ(result.status, 0) << result.err;
+    EXPECT_EQ(result.err, "");
+    EXPECT_EQ(lineCount(result.out), 1) << result.out;
+  }
+  static void expectRefused(const std::vector<std::string>& options, int status, const std::string& word) {
+    const ProgramResult result = render(options);
+    EXPECT_EQ(result.status, status) << result.err;
+    EXPECT_EQ(lineCount(result.err), 1) << result.err;
+    EXPECT_NE(result.err.find(word), std::string::npos) << result.err << "lacks " << word;
+  }
+  static nlohmann::json json(const std::string& name) {
+    return nlohmann::json::parse(readTextFile(file(name)));
+  }
+  static std::string bytes(const std::string& name) { return readTextFile(file(name)); }
+
+  /// A program of that name in a folder of its own, which becomes all of PATH but for the system's.
+  static std::string folderWith(const std::string& program, const std::string& script) {
+    const std::string folder = file("path_" + program);
+    fs::create_directories(folder);
+    std::ofstream(folder + "/" + program) << "#!/bin/sh\n" << script;
+    fs::permissions(folder + "/" + program, fs::perms::owner_all);
+    return folder + ":/usr/bin:/bin";
+  }
+
+  static std::unique_ptr<TemporaryFolder> folder_;
+};
+
+std::unique_ptr<TemporaryFolder> Frames::folder_;
+
+TEST_F(Frames, AnOrbitOfTwoTurnsDrawsEachPictureTwice) {
+  expectDrawn({"-o", file("turn_%03d.png"), "--orbit", "720", "--frames", "8"});
+  for (int n = 0; n < 8; ++n) ASSERT_TRUE(fs::exists(file(fmt::format("turn_{:03}.png", n)))) << n;
+  EXPECT_FALSE(fs::exists(file("turn_008.png")));
+  EXPECT_EQ(bytes("turn_000.png"), bytes("turn_004.png"));
+  EXPECT_EQ(bytes("turn_001.png"), bytes("turn_005.png"));
+  EXPECT_LT(compareImages(readImage(file("turn_000.png")), readImage(file("turn_001.png"))).psnr_db, 35);
+}
+
+TEST_F(Frames, AnOrbitBeginsAtTheCameraThatWasGiven) {
+  const std::vector<std::string> camera{"--view", "+x", "--view-angle", "25"};
+  std::vector<std::string> orbit{"-o", file("o%d.exr"), "--orbit", "90", "--frames", "2"},
+      still{"-o", file("still.exr")}, aside{"-o", file("aside.exr"), "--view", "+y", "--view-angle", "25"};
+  orbit.insert(orbit.end(), camera.begin(), camera.end());
+  still.insert(still.end(), camera.begin(), camera.end());
+  expectDrawn(orbit);
+  expectDrawn(still);
+  EXPECT_EQ(bytes("o0.exr"), bytes("still.exr"));
+  // 180 degrees in two steps: the second looks from +y.
+  orbit[3] = "180";
+  orbit[1] = file("p%d.exr");
+  orbit.insert(orbit.end(), {"--stats", file("p.json")});
+  expectDrawn(orbit);
+  const auto position = json("p.json")["frames"][1]["camera"]["position"];
+  const auto focal_point = json("p.json")["frames"][1]["camera"]["focal_point"];
+  EXPECT_NEAR(position[0].get<double>(), focal_point[0].get<double>(), 1e-9);
+  EXPECT_GT(position[1].get<double>(), focal_point[1].get<double>() + 1);
+}
+
+TEST_F(Frames, AnOrbitKeepsAllOfTheDataInEveryPicture) {
+  expectDrawn({"-o", file("all_%d.exr"), "--orbit", "360", "--frames", "5", "--view", "+x", "--stats",
+               file("all.json")});
+  for (const auto& frame : json("all.json")["frames"]) {
+    EXPECT_EQ(frame["splats_off_screen"], 0);
+    EXPECT_EQ(frame["camera"]["parallel_scale"], json("all.json")["frames"][0]["camera"]["parallel_scale"]);
+  }
+}
+
+TEST_F(Frames, NamesWithoutOneNumberAreWrongUsage) {
+  for (const char* name : {"a.png", "a%d%d.png", "a%s.png", "a%.png", "a%5.png", "a%x.png", "a%-3d.png",
+                           "a%ld.png", "a%0100d.png", "a%%d.png", "a%d_%04d.exr"})
+    expectRefused({"-o", file(name), "--orbit", "90", "--frames", "2"}, 2, "frame_%04d.png");
+  expectRefused({"-o", file("a%d.jpg"), "--orbit", "90", "--frames", "2"}, 2, ".png");
+  expectDrawn({"-o", file("100%%_%2d.png"), "--orbit", "90", "--frames", "1"});
+  EXPECT_TRUE(fs::exists(file("100%_ 0.png")));
+  // One picture is written to the name as it is.
+  expectDrawn({"-o", file("a%d.png")});
+  EXPECT_TRUE(fs::exists(file("a%d.png")));
+}
+
+TEST_F(Frames, APathGoesThroughItsKeyFrames) {
+  std::ofstream(file("path.json")) << R"({"key_frames": [
+    {"time": 0, "position": [5, 0, 0.5], "focal_point": [-0.4, 0, 0.5], "view_up": [0, 0, 1],
+     "parallel_scale": 1.5},
+    {"time": 1, "position": [4, 3, 1.5], "focal_point": [-0.4, 0, 0.5], "view_up": [0, 0, 1],
+     "parallel_scale": 1.2},
+    {"time": 4, "position": [0, 5, 0.5], "focal_point": [-0.4, 0, 0.5], "view_up": [0, 1, 1],
+     "parallel_scale": 0.9}]})";
+  expectDrawn({"-o", file("path_%d.png"), "--path", file("path.json"), "--frames", "5"});
+  expectDrawn({"-o", file("key_1.png"), "--position", "4,3,1.5", "--focal-point", "-0.4,0,0.5", "--view-up",
+               "0,0,1", "--parallel-scale", "1.2"});
+  expectDrawn({"-o", file("key_2.png"), "--position", "0,5,0.5", "--focal-point", "-0.4,0,0.5", "--view-up",
+               "0,1,1", "--parallel-scale", "0.9"});
+  EXPECT_EQ(bytes("path_1.png"), bytes("key_1.png"));
+  EXPECT_EQ(bytes("path_4.png"), bytes("key_2.png"));
+  EXPECT_NE(bytes("path_2.png"), bytes("path_3.png"));
+  std::ofstream(file("broken.json")) << R"({"key_frames": [{"time": 0, "position": [5, 0]}]})";
+  expectRefused({"-o", file("broken_%d.png"), "--path", file("broken.json"), "--frames", "5"}, 1,
+                "key frame 0, field position");
+  expectRefused({"-o", file("broken_%d.png"), "--path", file("none.json"), "--frames", "5"}, 1, "none.json");
+}
+
+TEST_F(Frames, AFailingFrameIsNamedAndTheOnesBeforeItStay) {
+  // Half way the camera passes through its focal point.
+  std::ofstream(file("through.json")) << R"({"key_frames": [
+    {"time": 0, "position": [4, 0, 0], "focal_point": [0, 0, 0], "view_up": [0, 0, 1], "parallel_scale": 2},
+    {"time": 4, "position": [-4, 0, 0], "focal_point": [0, 0, 0], "view_up": [0, 0, 1], "parallel_scale": 2}]})";
+  expectRefused({"-o", file("through_%d.png"), "--path", file("through.json"), "--frames", "5"}, 1,
+                "frame 2:");
+  EXPECT_TRUE(fs::exists(file("through_1.png")));
+  EXPECT_FALSE(fs::exists(file("through_2.png")));
+
+  fs::create_directory(file("disk_3.png"));  // nothing can be written there
+  expectRefused({"-o", file("disk_%d.png"), "--orbit", "90", "--frames", "5"}, 1, "frame 3:");
+  EXPECT_TRUE(fs::exists(file("disk_2.png")));
+  EXPECT_FALSE(fs::exists(file("disk_4.png")));
+}
+
+TEST_F(Frames, StatisticsListFramesAndTheirPercentiles) {
+  expectDrawn({"-o", file("s_%d.png"), "--orbit", "90", "--frames", "20", "--size", "16x16", "--stats",
+               file("s.json")});
+  const auto stats = json("s.json");
+  ASSERT_EQ(stats["frames"].size(), 20u);
+  EXPECT_EQ(stats["summary"]["frames"], 20);
+  std::vector<double> totals;
+  for (const auto& frame : stats["frames"]) totals.push_back(frame["seconds"]["total"]);
+  std::sort(totals.begin(), totals.end());
+  const auto& summary = stats["summary"]["seconds"]["total"];
+  EXPECT_EQ(summary["p50"], totals[9]);
+  EXPECT_EQ(summary["p95"], totals[18]);
+  EXPECT_EQ(summary["max"], totals[19]);
+  for (const char* key : {"plan", "read", "decode", "project", "sort", "upload", "draw", "workers_waited"})
+    EXPECT_TRUE(stats["summary"]["seconds"][key]["p95"].is_number()) << key;
+  for (const char* key : {"bricks_drawn", "splats_drawn", "bytes_read"})
+    EXPECT_TRUE(stats["summary"][key]["p50"].is_number()) << key;
+}
+
+TEST_F(Frames, MaxSplatsHolds) {
+  const auto draw = [](const std::string& output, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{
+        "render",       large(), "-o",     file(output), "--stats", file("splats.json"),
+        "--lod-pixels", "0",     "--size", "64x64"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const ProgramResult result = runProgram(arguments);
+    EXPECT_EQ(result.status, 0) << result.err;
+  };
+  draw("few.exr", {"--max-splats", "123456"});
+  EXPECT_LE(json("splats.json")["frames"][0]["splats_read"], 123456);
+  EXPECT_EQ(json("splats.json")["max_splats"], 123456);
+  draw("many.exr", {"--max-splats", "9000000"});
+  draw("free.exr", {});
+  EXPECT_EQ(bytes("many.exr"), bytes("free.exr"));
+  EXPECT_NE(bytes("few.exr"), bytes("free.exr"));
+}
+
+TEST_F(Frames, AFirstImageIsThereBeforeAndLikeTheFinalOne) {
+  const std::vector<std::string> direct{"render", large(), "-o", file("direct.exr"), "--size", "256x256"};
+  std::vector<std::string> progressive = direct;
+  progressive[3] = file("final.exr");
+  progressive.insert(progressive.end(), {"--first-image", file("first.exr"), "--stats", file("first.json")});
+  for (const auto& arguments : {direct, progressive}) {
+    const ProgramResult result = runProgram(arguments);
+    ASSERT_EQ(result.status, 0) << result.err;
+  }
+  EXPECT_EQ(bytes("final.exr"), bytes("direct.exr"));
+
+  const double psnr_db = compareImages(readImage(file("first.exr")), readImage(file("final.exr"))).psnr_db;
+  const auto stats = json("first.json");
+  const auto &first = stats["first_image"], &final = stats["frames"][0];
+  fmt::print("first image: {:.1f} dB, {} of {} splats\n", psnr_db, first["splats_read"].get<uint64_t>(),
+             final["splats_read"].get<uint64_t>());
+  EXPECT_GE(psnr_db, 25);
+  EXPECT_GT(final["splats_read"], 1'000'000);
+  EXPECT_LE(first["splats_read"], 100'000);
+  EXPECT_LE(first["bytes_read"], 4 << 20);
+  EXPECT_GT(stats["time_to_first_image_s"], 0);
+}
+
+TEST_F(Frames, AMovieIsRawFramesToFfmpeg) {
+  // A stand-in that keeps its arguments and what it is given; its last argument is file:OUTPUT.
+  const ScopedEnvironment path(
+      "PATH", folderWith("ffmpeg", "for word; do echo \"$word\"; last=$word; done > '" + file("words") +
+                                       "'\nexec cat > \"${last#file:}\"\n"));
+  expectDrawn({"-o", file("movie.mp4"), "--orbit", "90", "--frames", "3", "--frame-rate", "12.5"});
+  expectDrawn({"-o", file("movie_%d.png"), "--orbit", "90", "--frames", "3"});
+  const std::string movie = bytes("movie.mp4"), words = bytes("words");
+  ASSERT_EQ(movie.size(), 3u * 64 * 48 * 3);
+  for (const char* word : {"\n64x48\n", "\n12.5\n", "\nrgb24\n", "\nrawvideo\n"})
+    EXPECT_NE(words.find(word), std::string::npos) << word << "is not in " << words;
+  for (int frame = 0; frame < 3; ++frame) {
+    const Image picture = readImage(file(fmt::format("movie_{}.png", frame)));
+    for (size_t pixel = 0; pixel < 64 * 48; ++pixel)
+      for (size_t c = 0; c < 3; ++c)
+        ASSERT_EQ(static_cast<uint8_t>(movie[(frame * 64 * 48 + pixel) * 3 + c]),
+                  std::lround(picture.rgba[4 * pixel + c] * 255))
+            << frame << ' ' << pixel;
+  }
+}
+
+TEST_F(Frames, AMovieThatFailsLeavesNothing) {
+  const std::vector<std::string> movie{"-o", file("failed.mp4"), "--orbit", "90", "--frames", "3"};
+  {
+    const ScopedEnvironment path("PATH",
+                                 folderWith("ffmpeg", "echo 'no such encoder' >&2\necho more >&2\nexit 3\n"));
+    expectRefused(movie, 1, "ffmpeg ended with status 3 before the movie was whole: no such encoder");
+  }
+  {
+    const ScopedEnvironment path("PATH", folderWith("ffmpeg", "cat > /dev/null\nkill -9 $$\n"));
+    expectRefused(movie, 1, "signal 9");
+  }
+  {
+    const ScopedEnvironment path("PATH", file("empty"));
+    expectRefused(movie, 1, "ffmpeg, which is not installed");
+  }
+  for (const auto& entry : fs::directory_iterator(folder_->path()))
+    EXPECT_EQ(entry.path().filename().string().find("failed"), std::string::npos) << entry.path();
+  expectRefused({"-o", file("failed.mp4")}, 2, "--orbit or --path");
+  expectRefused({"-o", file("failed.mp4"), "--orbit", "9", "--frames", "2", "--size", "65x48"}, 2, "even");
+  expectRefused({"-o", file("failed.mp4"), "--orbit", "9", "--frames", "2", "--background", "transparent"}, 2,
+                "transparent");
+  expectRefused({"-o", file("failed.mp4"), "--orbit", "9", "--frames", "2", "--frame-rate", "0"}, 2,
+                "--frame-rate");
+}
+
+TEST_F(Frames, AMovieIsMadeWhereThereIsFfmpeg) {
+  if (std::system("command -v ffmpeg > /dev/null") != 0) GTEST_SKIP() << "needs ffmpeg";
+  expectDrawn({"-o", file("real.mp4"), "--orbit", "90", "--frames", "10"});
+  const std::string head = bytes("real.mp4").substr(0, 12);
+  EXPECT_EQ(head.substr(4, 4), "ftyp");
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,428 @@
+// Adding scalars to a cache: it must come out as if it had been made with all of them at once.
+#include "preprocess/add_scalar.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <numbers>
+
+#include "preprocess/convert.h"
+#include "preprocess/memory_plan.h"
+#include "stream/cache_lock.h"
+#include "stream/cache_reader.h"
+#include "stream/cache_verify.h"
+#include "stream/error.h"
+#include "tests/support/faulty_system_calls.h"
+#include "tests/support/function_grid.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
+constexpr float kBlank = 9999;
+
+using Files = std::map<std::string, std::string>;
+
+Files filesOf(const fs::path& folder) {
+  Files files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    std::ifstream file(entry.path(), std::ios::binary);
+    files[entry.path().filename().string()] = std::string(std::istreambuf_iterator<char>(file), {});
+  }
+  return files;
+}
+
+void convertTo(const fs::path& output, const GridSource& source, std::vector<uint32_t> scalars) {
+  ConvertOptions options;
+  options.output = output;
+  options.scalars = std::move(scalars);
+  options.memory_bytes = uint64_t{1} << 30;
+  options.blank_value = kBlank;
+  options.title = "a title";
+  Progress progress;
+  convert(source, options, progress);
+}
+
+AddScalarOptions adding(const fs::path& cache, std::vector<uint32_t> scalars) {
+  AddScalarOptions options;
+  options.cache = cache;
+  options.scalars = std::move(scalars);
+  options.memory_bytes = uint64_t{1} << 30;
+  options.blank_value = kBlank;
+  return options;
+}
+
+AddScalarReport addQuietly(const GridSource& source, const AddScalarOptions& options) {
+  Progress progress;
+  return addScalars(source, options, progress);
+}
+
+/// What adding throws, as text; empty if it does not.
+std::string refusal(const GridSource& source, const AddScalarOptions& options) {
+  try {
+    addQuietly(source, options);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+/// That `files` has all payload and index files of `others`, byte for byte.
+void expectHolds(const Files& files, const Files& others, const char* when) {
+  for (const auto& [name, bytes] : others) {
+    if (name == "manifest.json") continue;
+    EXPECT_TRUE(files.contains(name) && files.at(name) == bytes) << when << ": " << name;
+  }
+}
+
+/// Converts `source` with scalar 0, adds 1 and 2, and compares with converting all three. `source` has three.
+void expectAsAtOnce(const GridSource& source) {
+  const TemporaryFolder folder;
+  convertTo(folder / "all.splats", source, {0, 1, 2});
+  convertTo(folder / "first.splats", source, {0});
+  const Files all = filesOf(folder / "all.splats"), first = filesOf(folder / "first.splats");
+  const CacheReader expected(folder / "all.splats");
+
+  struct Way {
+    const char* name;
+    unsigned threads;
+    uint64_t memory_bytes;
+    std::optional<uint64_t> bucket_splats;
+    std::optional<uint32_t> most_buckets;
+  };
+  const Way ways[] = {{"plain", 2, uint64_t{1} << 30, {}, {}},
+                      {"one thread", 1, uint64_t{1} << 30, {}, {}},
+                      {"the least memory", 2, leastMemory(2), {}, {}},
+                      {"small buckets", 2, uint64_t{1} << 30, 20000, {}},
+                      {"tiny buckets, divided twice", 2, uint64_t{1} << 30, 500, 3}};
+  for (const Way& way : ways) {
+    const fs::path cache = folder / "added.splats";
+    fs::copy(folder / "first.splats", cache);
+    AddScalarOptions options = adding(cache, {1, 2});
+    options.threads = way.threads;
+    options.memory_bytes = way.memory_bytes;
+    options.bucket_splats = way.bucket_splats;
+    options.most_buckets = way.most_buckets;
+    const AddScalarReport report = addQuietly(source, options);
+    EXPECT_EQ(report.splats, expected.manifest().splats);
+
+    const Files added = filesOf(cache);
+    EXPECT_EQ(added.size(), all.size()) << way.name;
+    expectHolds(added, all, way.name);
+    expectHolds(added, first, way.name);
+
+    const CacheReader reader(cache);
+    ASSERT_EQ(reader.manifest().variables.size(), 3u);
+    for (size_t v = 0; v < 3; ++v) {
+      const VariableInfo &found = reader.manifest().variables[v], &wanted = expected.manifest().variables[v];
+      EXPECT_EQ(found.number, wanted.number);
+      EXPECT_EQ(found.name, wanted.name);
+      EXPECT_EQ(found.min, wanted.min);
+      EXPECT_EQ(found.max, wanted.max);
+    }
+    EXPECT_EQ(reader.manifest().steps.front().variables, expected.manifest().steps.front().variables);
+    for (const std::string& finding : verifyCache(reader, nullptr)) ADD_FAILURE() << way.name << finding;
+    fs::remove_all(cache);
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 2) << way.name;
+  }
+}
+
+std::vector<float> scalarsAt(const glm::dvec3& x) {
+  return {static_cast<float>(std::sin(2 * x.x) * x.y), static_cast<float>(300 + 5 * x.z - x.x * x.y),
+          static_cast<float>(std::cos(3 * x.y) + 0.1 * std::sin(40 * x.x))};
+}
+
+NodeValues bentBox(const GridNode& node, const GridBlock& block) {
+  const auto part = [](uint64_t index, uint64_t count) {
+    return static_cast<double>(index) / static_cast<double>(std::max<uint64_t>(count - 1, 1));
+  };
+  const double u = part(node.i, block.ni), v = part(node.j, block.nj), w = part(node.k, block.nk);
+  const glm::dvec3 position(u + 0.1 * std::sin(3 * v), v, w + 0.1 * u * v);
+  return {position, scalarsAt(position), false};
+}
+
+FunctionGridSource bentBoxSource(uint64_t ni, uint64_t nj, uint64_t nk) {
+  const GridBlock block = gridBlock(ni, nj, nk);
+  return {{block}, 3, [=](const GridNode& node) { return bentBox(node, block); }};
+}
+
+/// An O-grid that closes on itself along i, and has a singular line at j = 0.
+NodeValues ring(const GridNode& node, const GridBlock& block) {
+  const double angle =
+      2 * std::numbers::pi * static_cast<double>(node.i % (block.ni - 1)) / static_cast<double>(block.ni - 1);
+  const double radius = 0.05 * std::pow(static_cast<double>(node.j), 1.3);
+  const glm::dvec3 position(radius * std::cos(angle), radius * std::sin(angle),
+                            0.1 * static_cast<double>(node.k));
+  return {position, scalarsAt(position), false};
+}
+
+TEST(AddScalar, GivesTheBytesOfOneConversion) {
+  expectAsAtOnce(bentBoxSource(80, 60, 70));
+}
+
+TEST(AddScalar, MergesSeamsAsConversionDid) {
+  const GridBlock block = gridBlock(97, 40, 50);
+  expectAsAtOnce(FunctionGridSource({block}, 3, [=](const GridNode& node) { return ring(node, block); }));
+}
+
+TEST(AddScalar, TakesManyBlocks) {
+  // 6 x 5 x 4 blocks of 12³ nodes that share their faces.
+  const std::vector<GridBlock> blocks(120, gridBlock(12, 12, 12));
+  expectAsAtOnce(FunctionGridSource(blocks, 3, [](const GridNode& node) {
+    const glm::dvec3 at(11 * (node.block % 6) + node.i, 11 * (node.block / 6 % 5) + node.j,
+                        11 * (node.block / 30) + node.k);
+    return NodeValues{at, scalarsAt(0.1 * at), false};
+  }));
+}
+
+TEST(AddScalar, TakesCoincidentNodes) {
+  const GridBlock block = gridBlock(60, 50, 60);
+  // All in one place: a root of several bricks.
+  expectAsAtOnce(FunctionGridSource({block}, 3, [](const GridNode& node) {
+    const auto at = static_cast<float>(node.i + 2 * node.j);
+    return NodeValues{glm::dvec3(1, 2, 3), {at, std::sin(at), at * at}, false};
+  }));
+  // A cluster in a grid: several bricks of one cell, below others.
+  expectAsAtOnce(FunctionGridSource({block}, 3, [&](const GridNode& node) {
+    NodeValues values = bentBox(node, block);
+    if (node.k >= 10 && node.k < 50) values.position = glm::dvec3(0.5);
+    return values;
+  }));
+}
+
+TEST(AddScalar, LeavesOutWhatTheGridBlanks) {
+  const GridBlock block = gridBlock(50, 40, 40);
+  expectAsAtOnce(FunctionGridSource({block}, 3, [&](const GridNode& node) {
+    NodeValues values = bentBox(node, block);
+    values.blank = node.i < 3 || (node.j == 20 && node.k > 5);
+    if (node.i == 7) values.position.x = std::numeric_limits<double>::quiet_NaN();
+    if (values.blank) values.scalars.assign(3, kNotANumber);
+    return values;
+  }));
+}
+
+TEST(AddScalar, LeavesOutWhatOlderScalarsBlanked) {
+  // The added ones have values in some of these nodes, and none in others.
+  const auto blanked = [](const GridNode& node, NodeValues values) {
+    const bool here = (node.i + node.j + node.k) % 11 == 0 || node.j == 13;
+    if (here) values.scalars[0] = node.k % 2 ? kNotANumber : kBlank;
+    if (here && node.k % 3 == 0) values.scalars[1] = kNotANumber;
+    return values;
+  };
+  const GridBlock box = gridBlock(50, 40, 40), o_grid = gridBlock(65, 40, 30);
+  // Without seams, and with one where only the older scalar and the cache know which nodes are there.
+  expectAsAtOnce(
+      FunctionGridSource({box}, 3, [=](const GridNode& node) { return blanked(node, bentBox(node, box)); }));
+  expectAsAtOnce(FunctionGridSource({o_grid}, 3, [=](const GridNode& node) {
+    GridNode on_ring = node;
+    on_ring.i = node.j == 0 ? 0 : node.i % (o_grid.ni - 1);
+    return blanked(on_ring, ring(node, o_grid));
+  }));
+}
+
+TEST(AddScalar, RefusesWhatTheCacheDoesNotTell) {
+  // Of nodes that coincide, the older scalar blanked some: were the others merged, or blanked too?
+  const TemporaryFolder folder;
+  const GridBlock block = gridBlock(33, 20, 10);
+  const FunctionGridSource source({block}, 2, [=](const GridNode& node) {
+    NodeValues values = ring(node, block);
+    if (node.j == 0 && node.i > 5 && node.i < 9) values.scalars[0] = kNotANumber;
+    return values;
+  });
+  convertTo(folder / "a.splats", source, {0});
+  const Files before = filesOf(folder / "a.splats");
+  EXPECT_NE(refusal(source, adding(folder / "a.splats", {1})).find("convert again with all scalars"),
+            std::string::npos);
+  EXPECT_TRUE(filesOf(folder / "a.splats") == before);
+}
+
+TEST(AddScalar, AddsOneAfterTheOther) {
+  const TemporaryFolder folder;
+  const FunctionGridSource source = bentBoxSource(30, 30, 30);
+  convertTo(folder / "all.splats", source, {0, 1, 2});
+  convertTo(folder / "a.splats", source, {0});
+  addQuietly(source, adding(folder / "a.splats", {1}));
+  addQuietly(source, adding(folder / "a.splats", {2}));
+  const Files all = filesOf(folder / "all.splats"), added = filesOf(folder / "a.splats");
+  expectHolds(added, all, "one after the other");
+  EXPECT_EQ(added.size(), all.size());
+  const CacheReader reader(folder / "a.splats");
+  EXPECT_EQ(reader.manifest().sources, std::vector<std::string>{"function"});
+}
+
+/// A cache of a bent box with scalar 0, and what it was.
+class ToAnExistingCache : public ::testing::Test {
+ protected:
+  ToAnExistingCache() { convertTo(cache, source, {0}), before = filesOf(cache); }
+
+  /// That adding is refused with these words, and changes nothing.
+  void expectRefused(const GridSource& from, const AddScalarOptions& options, const std::string& words) {
+    const std::string text = refusal(from, options);
+    EXPECT_NE(text.find(words), std::string::npos) << text;
+    EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+    expectUnchanged("after a refusal");
+  }
+
+  void expectUnchanged(const std::string& when) {
+    EXPECT_TRUE(filesOf(cache) == before) << when;
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1) << when;
+  }
+
+  /// The box, with something changed.
+  FunctionGridSource changed(std::function<void(const GridNode&, NodeValues&)> change) const {
+    return {{block}, 3, [this, change](const GridNode& node) {
+              NodeValues values = bentBox(node, block);
+              change(node, values);
+              return values;
+            }};
+  }
+
+  const TemporaryFolder folder;
+  const fs::path cache = folder / "a.splats";
+  const GridBlock block = gridBlock(44, 44, 44);
+  const FunctionGridSource source = bentBoxSource(44, 44, 44);
+  Files before;
+};
+
+TEST_F(ToAnExistingCache, RefusesNamesThatItHas) {
+  EXPECT_THROW(addQuietly(source, adding(cache, {1, 0})), UsageError);
+  expectRefused(source, adding(cache, {0}), "has a scalar 's0' already; it has s0");
+}
+
+TEST_F(ToAnExistingCache, RefusesAnotherGrid) {
+  const AddScalarOptions options = adding(cache, {1});
+  expectRefused(bentBoxSource(44, 44, 45), options, "44x44x44 nodes, and of this one 44x44x45");
+  expectRefused(
+      FunctionGridSource({block, block}, 3, [&](const GridNode& node) { return bentBox(node, block); }),
+      options, "grid of 1 blocks");
+  expectRefused(changed([](const GridNode&, NodeValues& values) { values.position *= 1.5; }), options,
+                "spans");
+  expectRefused(changed([](const GridNode& node, NodeValues& values) { values.blank = node.i == 9; }),
+                options, "not the one the cache was made from");
+  // The same bounds and counts from here on. A node elsewhere in its cell, or in another's cell:
+  for (const double shift : {0.01, 0.4}) {
+    expectRefused(changed([&](const GridNode& node, NodeValues& values) {
+                    if (node.i == 20 && node.j == 20 && node.k == 20) values.position.x += shift;
+                  }),
+                  options, "not the one the cache was made from");
+  }
+  // Nodes in another order.
+  const auto mirrored = [this](const GridNode& node) {
+    return bentBox({node.block, node.i, node.j, block.nk - 1 - node.k}, block);
+  };
+  expectRefused(FunctionGridSource({block}, 3, mirrored), options, "not the one the cache was made from");
+}
+
+TEST_F(ToAnExistingCache, RefusesOtherNodesInTheSamePlace) {
+  const auto allButOne = [this](uint64_t missing) {
+    return changed([=](const GridNode& node, NodeValues& values) {
+      values.position = glm::dvec3(1, 2, 3);
+      values.blank = node.i == missing && node.j == 5 && node.k == 5;
+    });
+  };
+  fs::remove_all(cache);
+  convertTo(cache, allButOne(9), {0});
+  before = filesOf(cache);
+  expectRefused(allButOne(10), adding(cache, {1}),
+                "it has node 10 5 5 of block 0, and the grid puts node 9 5 5");
+}
+
+TEST_F(ToAnExistingCache, RefusesMissingValues) {
+  const auto lacking = changed([](const GridNode& node, NodeValues& values) {
+    if (node.i == 3 && node.j == 4) values.scalars[1] = kNotANumber;
+    if (node.i == 5 && node.j == 4) values.scalars[2] = kBlank;
+  });
+  expectRefused(lacking, adding(cache, {1}),
+                "44 of the nodes that it draws have no value of s1 (44 not finite");
+  expectRefused(lacking, adding(cache, {1, 2}), "88 of the nodes that it draws have no value of s1, s2");
+}
+
+TEST_F(ToAnExistingCache, RefusesWhatIsNoCache) {
+  fs::create_directory(folder / "empty");
+  EXPECT_NE(refusal(source, adding(folder / "empty", {1})), "");
+  EXPECT_NE(refusal(source, adding(folder / "missing", {1})), "");
+  AddScalarOptions options = adding(cache, {1});
+  options.temporary_folder = folder / "missing";
+  EXPECT_NE(refusal(source, options).find("--tmp"), std::string::npos);
+}
+
+TEST_F(ToAnExistingCache, RefusesWhileAnotherChangesIt) {
+  {
+    const CacheLock lock(cache);
+    expectRefused(source, adding(cache, {1}), "another program is changing this cache");
+  }
+  EXPECT_EQ(refusal(source, adding(cache, {1})), "");
+}
+
+TEST_F(ToAnExistingCache, RefusesDamagedGeometry) {
+  std::fstream file(cache / "geometry.bin", std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(500);
+  file.put(static_cast<char>(before["geometry.bin"][500] ^ 1));
+  file.close();
+  before = filesOf(cache);
+  expectRefused(source, adding(cache, {1}), "checksum");
+}
+
+TEST_F(ToAnExistingCache, ClearsWhatAKilledOneLeft) {
+  std::ofstream(cache / "var.1.bin.part") << "rest";
+  std::ofstream(cache / "var.2.bin.part") << "rest";
+  EXPECT_TRUE(verifyCache(CacheReader(cache), nullptr).empty());
+  addQuietly(source, adding(cache, {1}));
+  const Files after = filesOf(cache);
+  EXPECT_EQ(after.size(), before.size() + 1);
+  EXPECT_TRUE(after.contains("var.1.bin"));
+}
+
+TEST_F(ToAnExistingCache, IsAsItWasWhenADiskFails) {
+  using testing::FaultySystemCalls;
+  AddScalarOptions options = adding(cache, {1, 2});
+  options.bucket_splats = 20000;
+  FaultySystemCalls counting;
+  const fs::path copy = folder / "copy.splats";
+  fs::copy(cache, copy);
+  {
+    const ScopedSystemCalls scope(counting);
+    AddScalarOptions of_copy = options;
+    of_copy.cache = copy;
+    addQuietly(source, of_copy);
+  }
+  const Files whole = filesOf(copy);
+  fs::remove_all(copy);
+
+  struct Kind {
+    const char* name;
+    int64_t FaultySystemCalls::*fail_at;
+    int64_t count;
+  };
+  for (const Kind& kind : {Kind{"write", &FaultySystemCalls::fail_write_at, counting.writes},
+                           Kind{"read", &FaultySystemCalls::fail_read_at, counting.reads},
+                           Kind{"rename", &FaultySystemCalls::fail_rename_at, counting.renames},
+                           Kind{"sync", &FaultySystemCalls::fail_sync_at, counting.syncs}}) {
+    ASSERT_GE(kind.count, 3) << kind.name;
+    for (int64_t at = 0; at < kind.count; at += std::max<int64_t>(1, kind.count / 20)) {
+      FaultySystemCalls failing;
+      failing.*kind.fail_at = at;
+      failing.error = EIO;
+      const std::string when = fmt::format("{} {} of {}", kind.name, at, kind.count);
+      {
+        const ScopedSystemCalls scope(failing);
+        EXPECT_NE(refusal(source, options), "") << when;
+      }
+      // The last sync comes when the new manifest is in place.
+      if (filesOf(cache) == whole) {
+        EXPECT_EQ(when, fmt::format("sync {0} of {1}", kind.count - 1, kind.count));
+        break;
+      }
+      expectUnchanged(when);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,217 @@
+// Frames of a converted scene: coarse ones first, limited ones, and all of them against one global sort.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "preprocess/convert.h"
+#include "preprocess/scenes.h"
+#include "render/classification.h"
+#include "render/depth_sort.h"
+#include "render/frame.h"
+#include "render/gl_painter.h"
+#include "render/gl_thread.h"
+#include "stream/error.h"
+#include "tests/support/reference_march.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+class ProgressiveTest : public testing::Test {
+ protected:
+  /// The half-annulus of 128 x 64 x 64 nodes: 524,288 splats, three levels.
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    const SceneGridSource scene(makeScene("half-annulus"), {128, 64, 64});
+    ConvertOptions options;
+    options.output = *folder_ / "scene.splats";
+    options.scalars = {0};
+    options.memory_bytes = 512 << 20;
+    Progress progress;
+    convert(scene, options, progress);
+    cache_ = std::make_unique<CacheReader>(options.output);
+  }
+  static void TearDownTestSuite() {
+    cache_.reset();
+    folder_.reset();
+  }
+
+  static Camera camera(Projection projection) {
+    Camera camera = halfAnnulusCamera();
+    camera.projection = projection;
+    camera.view_angle_deg = 40;
+    if (projection == Projection::perspective)
+      camera.position = camera.focal_point + 3.0 * (camera.position - camera.focal_point) /
+                                                 glm::length(camera.position - camera.focal_point);
+    return camera;
+  }
+  static TransferFunction function() {
+    return TransferFunction::fromFile(std::string(CURVISPLAT_TEST_DATA) + "/half_annulus_smooth.json",
+                                      nullptr, 0, 1);
+  }
+  static FrameOptions options(double lod_pixels) {
+    FrameOptions made;
+    made.size = {160, 120};
+    made.lod_pixels = lod_pixels;
+    return made;
+  }
+
+  static std::unique_ptr<TemporaryFolder> folder_;
+  static std::unique_ptr<CacheReader> cache_;
+};
+
+std::unique_ptr<TemporaryFolder> ProgressiveTest::folder_;
+std::unique_ptr<CacheReader> ProgressiveTest::cache_;
+
+TEST_F(ProgressiveTest, TheLastPictureIsTheFrameBitForBit) {
+  FrameRenderer renderer(*cache_, 0, function());
+  for (const Projection projection : {Projection::orthographic, Projection::perspective}) {
+    FrameStatistics statistics;
+    const Image direct = renderer.render(camera(projection), options(0.3), statistics);
+    const uint64_t splats = statistics.splats_read;
+    std::vector<Image> shown;
+    std::vector<bool> finals;
+    std::vector<uint64_t> read;
+    renderer.renderProgressively(camera(projection), options(0.3), statistics,
+                                 [&](const Image& image, bool is_final) {
+                                   shown.push_back(image);
+                                   finals.push_back(is_final);
+                                   read.push_back(statistics.splats_read);
+                                 });
+    ASSERT_EQ(finals, (std::vector<bool>{false, true}));
+    EXPECT_EQ(shown[1].rgba, direct.rgba);
+    EXPECT_EQ(read[1], splats);
+    EXPECT_LE(read[0], 100'000u);
+    EXPECT_GT(read[0], 0u);
+    EXPECT_LT(read[0], splats);
+    EXPECT_EQ(shown[0].size.width, direct.size.width);
+    EXPECT_EQ(shown[0].size.height, direct.size.height);
+    EXPECT_GT(compareImages(shown[0], direct).psnr_db, 30);
+  }
+}
+
+TEST_F(ProgressiveTest, WhatIsCoarseAnywayIsShownOnce) {
+  FrameRenderer renderer(*cache_, 0, function());
+  FrameStatistics statistics;
+  const Image direct = renderer.render(camera(Projection::orthographic), options(100), statistics);
+  int calls = 0;
+  renderer.renderProgressively(camera(Projection::orthographic), options(100), statistics,
+                               [&](const Image& image, bool is_final) {
+                                 ++calls;
+                                 EXPECT_TRUE(is_final);
+                                 EXPECT_EQ(image.rgba, direct.rgba);
+                               });
+  EXPECT_EQ(calls, 1);
+}
+
+TEST_F(ProgressiveTest, WhatShowThrowsEndsTheFrame) {
+  FrameRenderer renderer(*cache_, 0, function());
+  FrameStatistics statistics;
+  EXPECT_THROW(renderer.renderProgressively(camera(Projection::orthographic), options(0.3), statistics,
+                                            [](const Image&, bool) { throw Error("the disk is full"); }),
+               Error);
+  EXPECT_NO_THROW(renderer.render(camera(Projection::orthographic), options(4), statistics));
+}
+
+TEST_F(ProgressiveTest, MoreSplatsMakeABetterPictureAndNeverMoreThanAsked) {
+  FrameRenderer renderer(*cache_, 0, function());
+  FrameStatistics statistics;
+  const Image whole = renderer.render(camera(Projection::orthographic), options(0), statistics);
+  double last_db = 0;
+  for (const uint64_t limit : {10'000u, 60'000u, 150'000u, 300'000u, 500'000u}) {
+    FrameOptions limited = options(0);
+    limited.max_splats = limit;
+    const Image image = renderer.render(camera(Projection::orthographic), limited, statistics);
+    EXPECT_LE(statistics.splats_read, limit);
+    EXPECT_GT(statistics.splats_read, limit / 2);
+    const double psnr_db = compareImages(image, whole).psnr_db;
+    fmt::print("{} splats: {:.2f} dB\n", statistics.splats_read, psnr_db);
+    EXPECT_GT(psnr_db, last_db);
+    last_db = psnr_db;
+  }
+}
+
+TEST_F(ProgressiveTest, SaysHowManySplatsTheCoarsestPictureTakes) {
+  FrameRenderer renderer(*cache_, 0, function());
+  FrameStatistics statistics;
+  FrameOptions few = options(0);
+  few.max_splats = 10;
+  try {
+    renderer.render(camera(Projection::orthographic), few, statistics);
+    ADD_FAILURE() << "ten splats were enough";
+  } catch (const UsageError& error) {
+    const std::string root = fmt::format("{}", cache_->bricks()[0].splats);
+    EXPECT_NE(std::string(error.what()).find(root), std::string::npos) << error.what();
+  }
+}
+
+/// The same splats as a frame's, sorted all together.
+Image globallySorted(const CacheReader& cache, const TransferFunction& function, const Camera& camera,
+                     const FrameOptions& options, FrameStatistics& statistics) {
+  const VariableInfo& info = cache.manifest().variables[0];
+  const auto table = ClassificationTable::of(function, info.min, info.max);
+  const ProjectionSettings settings{
+      ScreenView::of(camera, options.size, options.scale, options.low_pass_px2, 1e-3)};
+  const auto subtrees = subtreeBounds(cache.bricks(), cache.brickVariables(0));
+  CutOptions wanted;
+  wanted.lod_pixels = options.lod_pixels;
+  wanted.max_splats = options.max_splats.value_or(CutOptions::kNoLimit);
+  const Cut cut = chooseCut(
+      {cache.manifest().root, cache.bricks(), cache.brickVariables(0), subtrees}, settings.view.cutView(),
+      [](const ValueBounds&) { return false; }, wanted);
+  std::vector<ScreenSplat> splats, sorted;
+  std::vector<float> depths;
+  BrickProjector projector;
+  for (const BrickPart& part : cut.parts) {
+    SplatGeometry geometry;
+    SplatVariable values;
+    cache.readGeometry(part.brick, geometry);
+    cache.readVariable(part.brick, 0, values);
+    const Brick& brick = cache.bricks()[part.brick];
+    const glm::dvec3 corner = cache.manifest().root.cellMin(brick.cell);
+    const SplatRanges ranges(brick, part.octants);
+    projector.project(settings, table, corner, arraysOf(geometry), arraysOf(values),
+                      {ranges.begin(), ranges.end()});
+    splats.insert(splats.end(), projector.splats().begin(), projector.splats().end());
+    const bool perspective = camera.projection == Projection::perspective;  // else from the cell's corner
+    const auto from = static_cast<float>(perspective ? 0 : settings.view.viewFromData(corner).z);
+    for (const float depth : projector.depths()) depths.push_back(from + depth);
+  }
+  EXPECT_EQ(splats.size(), statistics.splats_drawn);
+  DepthSorter sorter;
+  for (const uint32_t index : sorter.farthestFirst(depths)) sorted.push_back(splats[index]);
+  Image image;
+  GlThread gl;
+  gl.run([&](const GlContext& context) {
+    GlPainter painter(context);
+    painter.begin(options.size, options.background, table, settings.per_pixel);
+    painter.draw(sorted);
+    image = painter.end();
+  });
+  return image;
+}
+
+TEST_F(ProgressiveTest, BricksInOrderDifferLittleFromOneGlobalSort) {
+  const TransferFunction transfer_function = function();
+  FrameRenderer renderer(*cache_, 0, transfer_function);
+  for (const Projection projection : {Projection::orthographic, Projection::perspective})
+    // Leaves; several levels; and a brick of which some octants are drawn.
+    for (const auto& [lod_pixels, limit] :
+         {std::pair{0.0, 1'000'000u}, std::pair{2.0, 1'000'000u}, std::pair{0.0, 123'456u}}) {
+      FrameOptions wanted = options(lod_pixels);
+      wanted.max_splats = limit;
+      FrameStatistics statistics;
+      const Image image = renderer.render(camera(projection), wanted, statistics);
+      const Image global = globallySorted(*cache_, transfer_function, camera(projection), wanted, statistics);
+      const double psnr_db = compareImages(image, global).psnr_db;
+      fmt::print("{} splats: {:.2f} dB\n", statistics.splats_drawn, psnr_db);
+      EXPECT_GE(psnr_db, 60);
+    }
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,147 @@
+// Rows, predictors and planes by themselves: known answers, and bytes that lie.
+#include "stream/prediction.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <random>
+
+#include "stream/error.h"
+#include "stream/planes.h"
+#include "stream/values_codec.h"
+
+namespace curvisplat {
+namespace {
+
+TEST(Rows, LieUnderTheRunsBefore) {
+  //   j = 0:   i 10 .. 19                       splats 0 .. 9
+  //   j = 1:   i 8 .. 11, i 15 .. 24            splats 10 .. 13, 14 .. 23
+  //   k + 1, j = 1:  i 9 .. 16                  splats 24 .. 31: no row at j - 1, so k - 1
+  const std::vector<NodeRun> runs{{0, 10, 0, 0, 10}, {0, 8, 1, 0, 4}, {0, 15, 1, 0, 10}, {0, 9, 1, 1, 8}};
+  const std::vector<Row> expected{{0, 10, kNoRow}, {10, 2, kNoRow}, {12, 2, 0},      {14, 5, 5},
+                                  {19, 5, kNoRow}, {24, 3, 11},     {27, 3, kNoRow}, {30, 2, 14}};
+  EXPECT_TRUE(rowsOf(runs, 32) == expected);
+}
+
+TEST(Rows, OfRunsOutOfOrderHaveNoneAbove) {
+  const std::vector<NodeRun> runs{{0, 0, 1, 0, 4}, {0, 0, 0, 0, 4}, {0, 0, 2, 0, 4}};
+  EXPECT_TRUE(rowsOf(runs, 12) == (std::vector<Row>{{0, 4, kNoRow}, {4, 4, kNoRow}, {8, 4, kNoRow}}));
+  EXPECT_TRUE(rowsOf({}, 7) == (std::vector<Row>{{0, 7, kNoRow}}));
+}
+
+TEST(Predictor, OfSmoothDataMissesNothing) {
+  // v = 5 + 3 i + 100 j + i j: linear along i, its difference from the row above linear as well.
+  std::vector<NodeRun> runs;
+  std::vector<uint32_t> values;
+  for (uint64_t j = 0; j < 6; ++j) {
+    runs.push_back({0, 0, j, 0, 8});
+    for (uint32_t i = 0; i < 8; ++i)
+      values.push_back(5 + 3 * i + 100 * static_cast<uint32_t>(j) + i * static_cast<uint32_t>(j));
+  }
+  const std::vector<Row> rows = rowsOf(runs, values.size());
+  const auto misses = [&](Predictor predictor) {
+    size_t count = 0;
+    predictRows(predictor, rows, values.data(), [&](uint32_t n, uint32_t predicted) {
+      count += predicted != values[n];
+      return values[n];
+    });
+    return count;
+  };
+  EXPECT_EQ(misses(Predictor::none), 48u);
+  EXPECT_EQ(misses(Predictor::linear), 12u);        // each row's first two
+  EXPECT_EQ(misses(Predictor::above), 2 + 5 * 8u);  // the slope along i is another in each row
+  EXPECT_EQ(misses(Predictor::above_linear), 2 + 5 * 2u);
+}
+
+TEST(Predictor, WrapsAround) {
+  std::mt19937 random(1);
+  std::vector<NodeRun> runs;
+  for (uint64_t j = 0; j < 10; ++j) runs.push_back({0, j % 3, j, 0, 10});
+  std::vector<uint32_t> values(100);
+  for (uint32_t& value : values) value = random();
+  const std::vector<Row> rows = rowsOf(runs, 100);
+  for (int p = 0; p < kPredictors; ++p) {
+    std::vector<uint32_t> coded(100);
+    predictRows(static_cast<Predictor>(p), rows, values.data(), [&](uint32_t n, uint32_t predicted) {
+      coded[n] = unzigzag(zigzag(values[n] - predicted));
+      return values[n];
+    });
+    predictRows(static_cast<Predictor>(p), rows, coded.data(),
+                [&](uint32_t n, uint32_t predicted) { return coded[n] += predicted; });
+    EXPECT_EQ(coded, values) << p;
+  }
+}
+
+TEST(Planes, RoundTrip) {
+  PlaneWriter writer;
+  const std::vector<uint32_t> none(50, 0), one(50, 255), two(50, 256), four(50, 0xfedcba98);
+  EXPECT_EQ(writer.add(none), 0);
+  EXPECT_EQ(writer.add(one), 1);
+  EXPECT_EQ(writer.add(two), 2);
+  EXPECT_EQ(writer.add(four), 4);
+  const std::vector<std::byte> frame = writer.compress({});
+  PlaneReader reader(frame, 50 * 7);
+  std::vector<uint32_t> back(50);
+  reader.values(0, back);
+  EXPECT_EQ(back, none);
+  reader.values(1, back);
+  EXPECT_EQ(back, one);
+  reader.values(2, back);
+  EXPECT_EQ(back, two);
+  reader.values(4, back);
+  EXPECT_EQ(back, four);
+  EXPECT_THROW(reader.values(1, back), Error);
+  EXPECT_THROW(PlaneReader(frame, 50 * 7 + 1), Error);
+  EXPECT_THROW(PlaneReader(frame, 50 * 7 - 1), Error);
+}
+
+TEST(Varint, RoundTripsAndRefuses) {
+  for (const uint64_t value : {uint64_t{0}, uint64_t{127}, uint64_t{128}, uint64_t{1} << 63, ~uint64_t{0}}) {
+    std::vector<std::byte> bytes;
+    appendVarint(bytes, value);
+    std::span<const std::byte> rest(bytes);
+    EXPECT_EQ(takeVarint(rest), value);
+    EXPECT_TRUE(rest.empty());
+    for (size_t length = 0; length < bytes.size(); ++length) {
+      std::span<const std::byte> prefix = std::span(bytes).first(length);
+      EXPECT_THROW(takeVarint(prefix), Error);
+    }
+  }
+  const std::vector<std::byte> endless(20, std::byte{0xff});
+  std::span<const std::byte> rest(endless);
+  EXPECT_THROW(takeVarint(rest), Error);
+}
+
+/// A values stream of `count` values whose rows are `rows`, as no encoder would write them.
+std::vector<std::byte> valuesWithRows(uint32_t count, const std::vector<uint64_t>& rows) {
+  PlaneWriter planes;
+  std::vector<std::byte> bytes;
+  for (const uint64_t number : rows) appendVarint(bytes, number);
+  planes.addBytes(bytes);
+  ValuesHeader header{};
+  header.upper = 1;
+  header.rows_bytes = static_cast<uint32_t>(bytes.size());
+  const std::vector<uint32_t> ones(count, 1);
+  for (ArrayCode& array : header.arrays) array = {Predictor::above_linear, planes.add(ones)};
+  return planes.compress(std::as_bytes(std::span(&header, 1)));
+}
+
+TEST(Values, RefuseRowsThatLie) {
+  SplatVariable values;
+  values.resize(8);
+  const VariableArrays<float> out = arraysOf(values);
+  EXPECT_NO_THROW(decodeValuesStream(8, valuesWithRows(8, {4, 0, 4, 4}), out));
+  EXPECT_NO_THROW(decodeValuesStream(8, valuesWithRows(8, {2, 0, 6, 1}), out));  // odd, and harmless
+  for (const std::vector<uint64_t>& rows : std::vector<std::vector<uint64_t>>{{4, 0, 4, 5},
+                                                                              {4, 1, 4, 0},
+                                                                              {4, 0},
+                                                                              {4, 0, 5, 0},
+                                                                              {0, 0, 8, 0},
+                                                                              {~uint64_t{0}, 0},
+                                                                              {4, 0, 4, ~uint64_t{0}},
+                                                                              {4, 0, 4}})
+    EXPECT_THROW(decodeValuesStream(8, valuesWithRows(8, rows), out), Error);
+}
+
+}  // namespace
+}  // namespace curvisplat

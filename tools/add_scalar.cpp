@@ -1,0 +1,82 @@
+#include "tools/add_scalar.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "preprocess/add_scalar.h"
+#include "stream/error.h"
+#include "tools/option_parsers.h"
+#include "tools/run_statistics.h"
+
+namespace curvisplat {
+namespace {
+
+void checkWords(const ConvertWords& words) {
+  if (words.to.empty()) throw UsageError("--add-scalar: name the cache with --to");
+  if (words.added_scalars.empty()) throw UsageError("--to: name scalars with --add-scalar");
+  const auto refuse = [](bool given, const char* option) {
+    if (given)
+      throw UsageError("{} makes a new cache, and --add-scalar changes one: leave one of them out", option);
+  };
+  refuse(!words.output.empty(), "--output");
+  refuse(!words.scalars.empty(), "--scalar");
+  refuse(words.overwrite, "--overwrite");
+}
+
+uint64_t bytesOf(const AddScalarReport& report) {
+  uint64_t bytes = 0;
+  for (const FileReport& file : report.files) bytes += file.bytes;
+  return bytes;
+}
+
+void printSummary(const ConvertWords& words, const AddScalarReport& report, double seconds,
+                  uint64_t peak_memory_bytes) {
+  const auto nodes = static_cast<double>(report.nodes);
+  std::string names;
+  for (const std::string& name : report.scalars) names += (names.empty() ? "" : ", ") + name;
+  fmt::print("{}: added {} to {} splats\n", words.to.string(), names, report.splats);
+  fmt::print("{:.1f} s, {:.2f} M nodes/s, {:.1f} MiB, {:.2f} bytes a node, peak memory {:.0f} MiB\n", seconds,
+             1e-6 * nodes / seconds, mebibytes(bytesOf(report)), static_cast<double>(bytesOf(report)) / nodes,
+             mebibytes(peak_memory_bytes));
+}
+
+nlohmann::json statistics(const AddScalarReport& report, const Progress& progress) {
+  nlohmann::json json = runStatistics();
+  json["threads"] = report.threads;
+  json["memory_bytes"] = report.memory_bytes;
+  json["scalars"] = report.scalars;
+  json["nodes"] = report.nodes;
+  json["splats"] = report.splats;
+  json["temporary_bytes"] = report.temporary_bytes;
+  addPhases(progress, json);
+  for (const FileReport& file : report.files) json["files"][file.name] = file.bytes;
+  return json;
+}
+
+}  // namespace
+
+void runAddScalar(ConvertWords words) {
+  checkWords(words);
+  if (!words.to.has_filename()) words.to = words.to.parent_path();  // "NAME.splats/"
+  if (!words.statistics.empty()) checkOutputFolder("--stats", words.statistics);
+  AddScalarOptions options;
+  options.cache = words.to;
+  options.temporary_folder = words.temporary_folder;
+  options.blank_value = words.blank_value;
+  options.threads = words.threads;
+  if (words.memory) options.memory_bytes = parseByteSize("--memory", *words.memory);
+
+  const auto source = openGrid(gridOptions(words, words.to));
+  options.scalars = chooseScalars(words, words.added_scalars, source->description());
+  Progress progress;
+  const AddScalarReport report = addScalars(*source, options, progress);
+  const nlohmann::json numbers = statistics(report, progress);
+  for (const std::string& warning : source->description().warnings)
+    fmt::print(stderr, "curvisplat: warning: {}\n", warning);
+  printSummary(words, report, secondsOf(progress), numbers["peak_memory_bytes"]);
+  if (!words.statistics.empty()) writeStatistics(words.statistics, numbers);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,45 @@
+#include "tools/convert_words.h"
+
+#include <nlohmann/json.hpp>
+
+#include "stream/error.h"
+
+namespace curvisplat {
+
+OpenGridOptions gridOptions(const ConvertWords& words, const std::filesystem::path& cache) {
+  OpenGridOptions grid = words.grid;
+  grid.temporary_folder = words.temporary_folder.empty() ? cache.parent_path() : words.temporary_folder;
+  if (grid.temporary_folder.empty()) grid.temporary_folder = ".";
+  return grid;
+}
+
+std::vector<uint32_t> chooseScalars(const ConvertWords& words, const std::vector<std::string>& names,
+                                    const GridDescription& description) {
+  try {
+    return scalarsNamed(description, names);
+  } catch (const UsageError& error) {
+    throw Error("{}: {}", words.grid.grid.string(), error.what());
+  }
+}
+
+double secondsOf(const Progress& progress) {
+  double seconds = 0;
+  for (const Progress::Phase& phase : progress.phases()) seconds += phase.seconds;
+  return seconds;
+}
+
+void addPhases(const Progress& progress, nlohmann::json& json) {
+  json["seconds"] = secondsOf(progress);
+  for (const Progress::Phase& phase : progress.phases())
+    json["phases"].push_back({{"name", phase.name},
+                              {"seconds", phase.seconds},
+                              {"cpu_seconds", phase.cpu_seconds},
+                              {"steps", phase.steps},
+                              {"unit", phase.unit}});
+}
+
+double mebibytes(uint64_t bytes) {
+  return static_cast<double>(bytes) / static_cast<double>(1 << 20);
+}
+
+}  // namespace curvisplat

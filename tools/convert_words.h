@@ -1,0 +1,43 @@
+// What `curvisplat convert` was asked for, and what its two ways of working (a new cache, or scalars added to
+// one) have in common.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "preprocess/open_grid.h"
+#include "stream/progress.h"
+
+namespace curvisplat {
+
+/// The command line's words, as given.
+struct ConvertWords {
+  OpenGridOptions grid;
+  std::vector<std::string> scalars, added_scalars;
+  std::filesystem::path output, to, temporary_folder, statistics;
+  std::optional<double> blank_value;
+  std::optional<std::string> memory;
+  unsigned threads = 0;
+  bool overwrite = false;
+};
+
+/// How to open the grid: temporary files go where the words say, else beside `cache`.
+OpenGridOptions gridOptions(const ConvertWords& words, const std::filesystem::path& cache);
+
+/// Positions of the scalars called `names`. One that the files lack is bad input, not wrong usage, since the
+/// files decide: throws Error.
+std::vector<uint32_t> chooseScalars(const ConvertWords& words, const std::vector<std::string>& names,
+                                    const GridDescription& description);
+
+/// Of all phases.
+double secondsOf(const Progress& progress);
+/// Sets "seconds" and "phases".
+void addPhases(const Progress& progress, nlohmann::json& json);
+
+double mebibytes(uint64_t bytes);
+
+}  // namespace curvisplat
