@@ -3,7 +3,6 @@
 #include <malloc.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/global_control.h>
-#include <tbb/info.h>
 
 #include <algorithm>
 #include <memory>
@@ -221,10 +220,7 @@ class Addition {
 }  // namespace
 
 AddScalarReport addScalars(const GridSource& source, const AddScalarOptions& options, Progress& progress) {
-  const unsigned asked =
-      options.threads > 0 ? options.threads : static_cast<unsigned>(tbb::info::default_concurrency());
-  const uint64_t memory = options.memory_bytes > 0 ? options.memory_bytes : defaultMemory();
-  MemoryPlan plan = MemoryPlan::of(memory, options.scalars.size(), asked);
+  MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
   if (options.most_buckets) plan.most_buckets = *options.most_buckets;
 
@@ -234,7 +230,7 @@ AddScalarReport addScalars(const GridSource& source, const AddScalarOptions& opt
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, plan.threads);
   AddScalarReport report = Addition(source, options, plan, progress).run();
   report.threads = plan.threads;
-  report.memory_bytes = memory;
+  report.memory_bytes = plan.cap_bytes;
   return report;
 }
 

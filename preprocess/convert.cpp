@@ -2,7 +2,6 @@
 
 #include <malloc.h>
 #include <tbb/global_control.h>
-#include <tbb/info.h>
 
 #include <algorithm>
 #include <memory>
@@ -269,10 +268,7 @@ ConvertReport runOrLeave(Conversion& conversion, const ConvertOptions& options) 
 }  // namespace
 
 ConvertReport convert(const GridSource& source, const ConvertOptions& options, Progress& progress) {
-  const unsigned asked =
-      options.threads > 0 ? options.threads : static_cast<unsigned>(tbb::info::default_concurrency());
-  const uint64_t memory = options.memory_bytes > 0 ? options.memory_bytes : defaultMemory();
-  MemoryPlan plan = MemoryPlan::of(memory, options.scalars.size(), asked);
+  MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
 
   std::vector<ConversionFact> facts = factsOf(source.description(), options.scalars, options.blank_value);
@@ -288,7 +284,7 @@ ConvertReport convert(const GridSource& source, const ConvertOptions& options, P
     report = runOrLeave(conversion, options);
   }
   report.threads = plan.threads;
-  report.memory_bytes = memory;
+  report.memory_bytes = plan.cap_bytes;
   return report;
 }
 

@@ -1,5 +1,6 @@
 #include "preprocess/memory_plan.h"
 
+#include <tbb/info.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -56,6 +57,7 @@ MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads
   const uint64_t bytes = cap_bytes - cap_bytes / kAllocatorShare - kProgramBytes;
 
   MemoryPlan plan;
+  plan.cap_bytes = cap_bytes;
   plan.slab_bytes = std::min(bytes / 8, 256 * kMiB);
   plan.counting_bytes = bytes / 8;
   plan.seam_bytes = bytes / 8;
@@ -74,6 +76,11 @@ MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads
       {plan.bucket_splats, uint64_t{1} << 24, UINT32_MAX / irregularRecordBytes(variables)});
   plan.bucket_bytes = plan.bucket_splats * regularRecordBytes(variables);
   return plan;
+}
+
+MemoryPlan MemoryPlan::ofOptions(uint64_t cap_bytes, size_t variables, unsigned threads) {
+  return of(cap_bytes > 0 ? cap_bytes : defaultMemory(), variables,
+            threads > 0 ? threads : static_cast<unsigned>(tbb::info::default_concurrency()));
 }
 
 void MemoryPlan::limitBuckets(uint64_t splats, size_t variables) {

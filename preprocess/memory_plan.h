@@ -13,6 +13,7 @@
 namespace curvisplat {
 
 struct MemoryPlan {
+  uint64_t cap_bytes = 0;       // that all of it keeps
   uint64_t slab_bytes = 0;      // each of two
   uint64_t counting_bytes = 0;  // the counting grid
   uint64_t seam_bytes = 0;
@@ -24,6 +25,9 @@ struct MemoryPlan {
 
   /// `threads` is what the user grants. Throws Error if `cap_bytes` is less than leastMemory().
   static MemoryPlan of(uint64_t cap_bytes, size_t variables, unsigned threads);
+
+  /// The same, of options as they are given: 0 is defaultMemory(), or as many threads as the machine has.
+  static MemoryPlan ofOptions(uint64_t cap_bytes, size_t variables, unsigned threads);
 
   /// Makes buckets smaller than they could be.
   void limitBuckets(uint64_t splats, size_t variables);

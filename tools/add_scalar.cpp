@@ -27,12 +27,6 @@ void checkWords(const ConvertWords& words) {
   refuse(words.resume, "--resume");
 }
 
-uint64_t bytesOf(const AddScalarReport& report) {
-  uint64_t bytes = 0;
-  for (const FileReport& file : report.files) bytes += file.bytes;
-  return bytes;
-}
-
 void printSummary(const ConvertWords& words, const AddScalarReport& report, double seconds,
                   uint64_t peak_memory_bytes) {
   const auto nodes = static_cast<double>(report.nodes);
@@ -40,8 +34,8 @@ void printSummary(const ConvertWords& words, const AddScalarReport& report, doub
   for (const std::string& name : report.scalars) names += (names.empty() ? "" : ", ") + name;
   fmt::print("{}: added {} to {} splats\n", words.to.string(), names, report.splats);
   fmt::print("{:.1f} s, {:.2f} M nodes/s, {:.1f} MiB, {:.2f} bytes a node, peak memory {:.0f} MiB\n", seconds,
-             1e-6 * nodes / seconds, mebibytes(bytesOf(report)), static_cast<double>(bytesOf(report)) / nodes,
-             mebibytes(peak_memory_bytes));
+             1e-6 * nodes / seconds, mebibytes(totalBytes(report.files)),
+             static_cast<double>(totalBytes(report.files)) / nodes, mebibytes(peak_memory_bytes));
 }
 
 nlohmann::json statistics(const AddScalarReport& report, const Progress& progress) {

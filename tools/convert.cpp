@@ -24,16 +24,10 @@
 namespace curvisplat {
 namespace {
 
-uint64_t bytesOf(const ConvertReport& report) {
-  uint64_t bytes = 0;
-  for (const FileReport& file : report.files) bytes += file.bytes;
-  return bytes;
-}
-
 void printSummary(const ConvertWords& words, const ConvertReport& report, double seconds,
                   uint64_t peak_memory_bytes) {
   const auto nodes = static_cast<double>(report.nodes);
-  const uint64_t bytes = bytesOf(report);
+  const uint64_t bytes = totalBytes(report.files);
   fmt::print("{}: {} nodes, {} splats in {} bricks, {} levels\n", words.output.string(), report.nodes,
              report.splats, report.bricks, report.levels);
   // Of a resumed conversion, another has done a part.
@@ -81,7 +75,7 @@ nlohmann::json statistics(const ConvertReport& report, const Progress& progress)
   json["temporary_bytes"] = report.temporary_bytes;
   addPhases(progress, json);
   for (const FileReport& file : report.files) json["files"][file.name] = file.bytes;
-  json["cache_bytes"] = bytesOf(report);
+  json["cache_bytes"] = totalBytes(report.files);
   return json;
 }
 

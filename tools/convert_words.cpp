@@ -41,6 +41,12 @@ void addPhases(const Progress& progress, nlohmann::json& json) {
                               {"peak_memory_bytes", phase.usage.peak_memory_bytes}});
 }
 
+uint64_t totalBytes(std::span<const FileReport> files) {
+  uint64_t bytes = 0;
+  for (const FileReport& file : files) bytes += file.bytes;
+  return bytes;
+}
+
 double mebibytes(uint64_t bytes) {
   return static_cast<double>(bytes) / static_cast<double>(1 << 20);
 }

@@ -6,9 +6,11 @@
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "preprocess/convert.h"
 #include "preprocess/open_grid.h"
 #include "stream/progress.h"
 
@@ -38,6 +40,7 @@ double secondsOf(const Progress& progress);
 /// Sets "seconds" and "phases".
 void addPhases(const Progress& progress, nlohmann::json& json);
 
+uint64_t totalBytes(std::span<const FileReport> files);
 double mebibytes(uint64_t bytes);
 
 }  // namespace curvisplat

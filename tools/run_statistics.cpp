@@ -50,10 +50,13 @@ double secondsSinceStart() {
 }
 
 nlohmann::json runStatistics() {
+  const uint64_t peak_memory_bytes = ProcessUsage::now().peak_memory_bytes;
+  if (peak_memory_bytes == 0)
+    throw Error("/proc/self/status: has no VmHWM, the peak of memory that --stats reports");
   return {{"program", "curvisplat"},
           {"version", CURVISPLAT_VERSION},
           {"command", commandLine()},
-          {"peak_memory_bytes", ProcessUsage::now().peak_memory_bytes}};
+          {"peak_memory_bytes", peak_memory_bytes}};
 }
 
 void writeStatistics(const std::filesystem::path& path, const nlohmann::json& statistics) {
