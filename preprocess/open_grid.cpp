@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 
+#include "preprocess/cgns_source.h"
 #include "preprocess/foreign_formats.h"
 #include "preprocess/plot3d_source.h"
 #include "stream/error.h"
@@ -17,7 +18,14 @@ struct GridFormat {
   std::unique_ptr<GridSource> (*open)(const OpenGridOptions& options);
 };
 
-constexpr std::array<GridFormat, 0> kFormats{};
+template <typename Source>
+std::unique_ptr<GridSource> openAs(const OpenGridOptions& options) {
+  return std::make_unique<Source>(options);
+}
+
+constexpr std::array kFormats{
+    GridFormat{CgnsFile::recognises, openAs<CgnsSource>},
+};
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {
   if (std::filesystem::is_directory(path))

@@ -10,6 +10,8 @@ packages=(
   libopenvdb-dev libboost-iostreams-dev libtbb-dev libzstd-dev libxxhash-dev
   # reads without waiting
   liburing-dev
+  # grid files
+  libcgns-dev
   # vectors, texts, command line, manifests
   libglm-dev libfmt-dev libcli11-dev nlohmann-json3-dev
   # pictures, and OpenGL without a display
