@@ -2,7 +2,7 @@
 """Rendering at a fixed view and error from caches of growing size: time, splats, bytes, first picture, memory.
 
     bench/stream_scaling.py FOLDER [--program build/release/tools/curvisplat] [--scene wake]
-                            [--nodes 1M,8M,64M] [--large] [--lod-pixels 1,2,4] [--max-splats N]
+                            [--nodes 1M,8M,64M] [--large] [--lod-pixels 1,2,3] [--max-splats N]
                             [--size 600x600] [--memory 256M] [--repeats 3] [--json OUT.json] [--plot OUT.svg]
 
 Generates and converts the scene in FOLDER (caches are kept there and used again, grids are not; --large adds 512 M
@@ -127,7 +127,7 @@ def main():
     parser.add_argument("--scene", default="wake")
     parser.add_argument("--nodes", default="1M,8M,64M")
     parser.add_argument("--large", action="store_true", help="512 M nodes as well")
-    parser.add_argument("--lod-pixels", default="1,2,4")
+    parser.add_argument("--lod-pixels", default="1,2,3")
     parser.add_argument("--max-splats")
     parser.add_argument("--size", default="600x600")
     parser.add_argument("--memory", default="256M")
