@@ -18,6 +18,7 @@ class GlBackend final : public PaintingBackend {
   void run(const Job& job) override {
     gl_.run([&](const GlContext&) { job(*painter_); });
   }
+  DrawingOrder order() const override { return painter_->order(); }
   const std::string& name() const override { return gl_.contextName(); }
   uint64_t bytes(ImageSize size, const PaintResources&) const override {
     return uint64_t{4} * sizeof(float) * static_cast<uint64_t>(size.width) *
@@ -33,6 +34,7 @@ class GlBackend final : public PaintingBackend {
 class CpuBackend final : public PaintingBackend {
  public:
   void run(const Job& job) override { job(painter_); }
+  DrawingOrder order() const override { return painter_.order(); }
   const std::string& name() const override { return name_; }
   uint64_t bytes(ImageSize size, const PaintResources& resources) const override {
     return CpuPainter::frameBytes(size) + CpuPainter::batchBytes(size, resources);

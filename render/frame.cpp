@@ -48,8 +48,9 @@ TransparentBounds transparentIn(const ClassificationTable& table, const Projecti
   };
 }
 
-CutOptions limitsOf(const FrameOptions& options) {
+CutOptions limitsOf(const FrameOptions& options, DrawingOrder order) {
   CutOptions limits;
+  limits.order = order;
   limits.lod_pixels = options.lod_pixels;
   limits.max_splats = options.max_splats.value_or(CutOptions::kNoLimit);
   return limits;
@@ -116,7 +117,7 @@ Image FrameRenderer::State::draw(const Cut& cut, const ProjectionSettings& setti
   if (progress) progress->begin("drawing", cut.parts.size(), "bricks");
 
   SegmentRing ring(budget.ring_splats);
-  FrameWorkers workers({cache, variable, cut.parts, settings, table}, ring, budget.workers);
+  FrameWorkers workers({cache, variable, cut.parts, settings, table, backend->order()}, ring, budget.workers);
   backend->run([&](Painter& painter) {
     painter.begin(settings.view.size, options.background, table, settings.per_pixel, resources);
     for (size_t drawn = 0; drawn < cut.parts.size(); ++drawn) {
@@ -155,7 +156,7 @@ Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, F
   Cut cut;
   {
     const StageTimer timer(statistics.plan_s);
-    cut = state_->plan(settings, options, limitsOf(options));
+    cut = state_->plan(settings, options, limitsOf(options, state_->backend->order()));
   }
   return state_->draw(cut, settings, options, statistics, progress);
 }
@@ -173,7 +174,7 @@ void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions
     Cut cut;
     {
       const StageTimer timer(statistics.plan_s);
-      cut = state_->plan(settings, options, firstPictureLimits(limitsOf(options)));
+      cut = state_->plan(settings, options, firstPictureLimits(limitsOf(options, state_->backend->order())));
     }
     is_final = cut.complete;
     const ReducedSize reduced(options.size, is_final ? 0 : cut.largest_error_px);

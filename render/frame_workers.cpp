@@ -91,7 +91,7 @@ bool FrameWorkers::prepare(WorkerScratch& scratch, uint64_t sequence, FrameStati
   std::span<const uint32_t> order;
   {
     const StageTimer timer(statistics.sort_s);
-    order = scratch.sorter.farthestFirst(scratch.projector.depths());
+    order = scratch.sorter.sort(scratch.projector.depths(), work_.order);
   }
   std::optional<std::span<ScreenSplat>> segment;
   {

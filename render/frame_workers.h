@@ -26,6 +26,7 @@ struct FrameWork {
   std::span<const BrickPart> parts;  // in drawing order
   const ProjectionSettings& settings;
   const ClassificationTable& table;
+  DrawingOrder order;
 };
 
 class FrameWorkers {
