@@ -1,6 +1,7 @@
 // One frame: the pipeline of design section 6, as a call.
 //
-//   plan (the cut, in the painter's order) -> read -> prepare (workers: decode, project, sort) -> draw (a painter)
+//   plan (the cut, in the painter's order) -> read -> prepare (workers: decode, project, sort) -> draw (a
+//   painter)
 //   -> image
 //
 // Bricks are prepared by workers in any order and drawn in the cut's order; what is prepared and not yet

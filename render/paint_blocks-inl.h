@@ -90,10 +90,20 @@ HWY_INLINE V blendUnder(float* HWY_RESTRICT at, V depth, const V (&value)[4]) {
   return after;
 }
 
-/// What one parabola, or one colour, does for: at + s (by + s bend), with s = s0 + sp p + sq q.
+/// s = s0 + sp p + sq q.
+struct Along {
+  float s0, sp, sq;
+
+  HWY_INLINE V at(const Pixels& pixels) const {
+    const Floats d;
+    return hn::MulAdd(hn::Set(d, sp), pixels.p, hn::MulAdd(hn::Set(d, sq), pixels.q, hn::Set(d, s0)));
+  }
+};
+
+/// One parabola, or one colour: at + s (by + s bend).
 struct Shade {
   float at[4], by[4], bend[4];
-  float s0, sp, sq;
+  Along s;
 };
 
 HWY_INLINE bool isSaturated(V transmittance) {
@@ -112,8 +122,7 @@ HWY_INLINE bool paintBlock(const Ellipse& e, const Shade& shade, const float* HW
                                    hn::Add(hn::Load(d, kLaneY + lane), from_y));
     V value[4];
     if constexpr (kFitted) {
-      const V s = hn::MulAdd(hn::Set(d, shade.sp), pixels.p,
-                             hn::MulAdd(hn::Set(d, shade.sq), pixels.q, hn::Set(d, shade.s0)));
+      const V s = shade.s.at(pixels);
       for (int c = 0; c < 4; ++c)
         value[c] = hn::MulAdd(hn::MulAdd(hn::Set(d, shade.bend[c]), s, hn::Set(d, shade.by[c])), s,
                               hn::Set(d, shade.at[c]));
@@ -121,6 +130,41 @@ HWY_INLINE bool paintBlock(const Ellipse& e, const Shade& shade, const float* HW
       for (int c = 0; c < 4; ++c) value[c] = hn::Set(d, shade.at[c]);
     }
     most = hn::Max(most, blendUnder<kThin>(block + lane, pixels.depth, value));
+  }
+  return isSaturated(most);
+}
+
+HWY_INLINE V lookUp(const Row& row, hn::Vec<Ints> n) {
+  const Floats d;
+  if constexpr (hn::MaxLanes(d) == kLanes) {
+    return hn::TableLookupLanes(hn::Load(d, row.at), hn::IndicesFromVec(d, n));
+  } else if constexpr (2 * hn::MaxLanes(d) == kLanes) {
+    const auto half = hn::Set(Ints(), kLanes / 2);
+    const auto in_half = hn::IndicesFromVec(d, hn::And(n, hn::Set(Ints(), kLanes / 2 - 1)));
+    return hn::IfThenElse(hn::RebindMask(d, hn::Lt(n, half)),
+                          hn::TableLookupLanes(hn::Load(d, row.at), in_half),
+                          hn::TableLookupLanes(hn::Load(d, row.at + kLanes / 2), in_half));
+  } else {
+    return hn::GatherIndex(d, row.at, n);
+  }
+}
+
+/// One block, by a polyline. Whether it is saturated now.
+HWY_INLINE bool paintBlock(const Ellipse& e, const Polyline& line, const Along& along,
+                           const float* HWY_RESTRICT footprint, float* HWY_RESTRICT block, float x, float y) {
+  const Floats d;
+  const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
+  V most = hn::Zero(d);
+  for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
+    const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
+                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
+    const V s = hn::Clamp(along.at(pixels), hn::Zero(d), hn::Set(d, Polyline::kParts));
+    const auto n = hn::ConvertTo(Ints(), s);
+    const V part = hn::Sub(s, hn::ConvertTo(d, n));
+    V value[4];
+    for (int c = 0; c < 4; ++c)
+      value[c] = hn::MulAdd(lookUp(line.step.of[c], n), part, lookUp(line.at.of[c], n));
+    most = hn::Max(most, blendUnder<false>(block + lane, pixels.depth, value));
   }
   return isSaturated(most);
 }

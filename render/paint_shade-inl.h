@@ -111,13 +111,13 @@ struct Pieces {
   Row amplitude;
 };
 
-enum Fit : int32_t { kNothing, kConstant, kParabola, kNone };
+enum Fit : int32_t { kNothing, kConstant, kParabola, kOther };
 
 /// What does for a piece: at + s (by + s bend), with s = -1 to 1 from end to end.
 struct Fits {
   Values at, by, bend;
   Row most;    // extinction
-  Row excess;  // of kNone: the error, in what is allowed
+  Row excess;  // of kOther: the error, in what is allowed
   IntRow fit;
 };
 
@@ -187,12 +187,86 @@ HWY_INLINE void fitPieces(const ShadingTable& table, const Pieces& pieces, size_
     const auto code = [&](Fit fit) HWY_ATTR { return hn::Set(d, static_cast<float>(fit)); };
     V fit = hn::IfThenElse(hn::Le(hn::Add(off, change), allowed), code(kConstant), code(kParabola));
     fit = hn::IfThenElse(hn::Eq(most, hn::Zero(d)), code(kNothing), fit);
-    fit = hn::IfThenElse(hn::Le(off, allowed), fit, code(kNone));
+    fit = hn::IfThenElse(hn::Le(off, allowed), fit, code(kOther));
     hn::Store(hn::ConvertTo(Ints(), fit), Ints(), fits.fit.at + lane);
     hn::Store(hn::Div(off, allowed), d, fits.excess.at + lane);
     // A parabola's most lies between its three points.
     hn::Store(hn::Mul(hn::Set(d, 1.25f), most), d, fits.most.at + lane);
   }
+}
+
+/// Where a parabola does not do for a piece: a line of fifteen parts, at[n] + (s - n) step[n], n the whole
+/// part of s, with s = 0 to 15 from end to end.
+struct Polyline {
+  static constexpr float kParts = kLanes - 1;
+
+  Values at, step;
+};
+
+/// A row, and its last element again: to be read from its second.
+struct alignas(64) LongRow {
+  float at[2 * kLanes];
+
+  HWY_INLINE void repeatLast() { at[kLanes] = at[kLanes - 1]; }
+};
+
+/// Of one piece. Whether it is good enough. Over a move by h cells a straight line is off by at most 0.25 h m
+/// sum of |second differences| (shading_table.h); and on a logarithmic scale, where the move itself is bent,
+/// by an eighth of r (of twice that, since r <= 0.3 changes within the move) times the largest slope.
+HWY_INLINE bool fitPolyline(const ShadingTable& table, const Pieces& pieces, size_t n, Polyline& line) {
+  const Floats d;
+  const float from = pieces.from.at[n], per_part = (pieces.to.at[n] - from) / Polyline::kParts;
+  const V mean = hn::Set(d, pieces.mean.at[n]), reach = hn::Set(d, pieces.reach.at[n]);
+  const V half_width = hn::Set(d, pieces.half_width.at[n]);
+  Intervals intervals;
+  LongRow begins, ends, values[4];
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    const V t = hn::MulAdd(hn::Iota(d, static_cast<float>(lane)), hn::Set(d, per_part), hn::Set(d, from));
+    const Range range = locate(table, hn::MulAdd(reach, t, mean), half_width, lane, intervals);
+    hn::Store(range.from, d, begins.at + lane);
+    hn::Store(range.to, d, ends.at + lane);
+  }
+  begins.repeatLast();
+  ends.repeatLast();
+  alignas(64) float integrals[4 * kLanes];
+  integrate(table, intervals, kLanes, integrals);
+  V most = hn::Zero(d);
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    V value[4];
+    meansOf(integrals, hn::Load(d, intervals.scale.at + lane), lane, value);
+    for (size_t c = 0; c < 4; ++c) hn::Store(value[c], d, values[c].at + lane);
+    most = hn::Max(most, value[3]);
+  }
+  for (LongRow& row : values) row.repeatLast();
+
+  V error = hn::Zero(d);
+  const float* bends = &table.bends()->second;
+  const V quarter = hn::Set(d, 0.25f), log_unit = hn::Set(d, table.logScale() ? 1 / table.scale() : 0.0f);
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    V change = hn::Zero(d);
+    for (size_t c = 0; c < 4; ++c) {
+      const V at = hn::Load(d, values[c].at + lane);
+      const V step = hn::Sub(hn::LoadU(d, values[c].at + lane + 1), at);
+      hn::Store(at, d, line.at.of[c].at + lane);
+      hn::Store(step, d, line.step.of[c].at + lane);
+      change = hn::Max(change, hn::Abs(step));
+    }
+    const V begin = hn::Load(d, begins.at + lane), end = hn::LoadU(d, ends.at + lane + 1);
+    const V move = hn::Max(hn::Sub(hn::LoadU(d, begins.at + lane + 1), begin),
+                           hn::Sub(end, hn::Load(d, ends.at + lane)));
+    const auto first = hn::ShiftLeft<1>(element(hn::Sub(begin, hn::Set(d, 1.0f))));
+    const auto last = hn::ShiftLeft<1>(hn::Add(element(hn::Add(end, hn::Set(d, 1.0f))), hn::Set(Ints(), 1)));
+    const V second = hn::Sub(hn::GatherIndex(d, bends, last), hn::GatherIndex(d, bends, first));
+    const V m = hn::Min(hn::Mul(move, hn::Load(d, intervals.scale.at + lane)), hn::Set(d, 1.0f));
+    const V bend = hn::Mul(hn::Mul(move, m), second);
+    const V r = hn::Mul(move, log_unit);
+    V off = hn::Mul(quarter, hn::MulAdd(r, hn::Add(change, bend), bend));
+    off = hn::IfThenElse(hn::Gt(r, hn::Set(d, 0.3f)), hn::Set(d, 1e30f), off);
+    error = hn::Max(error, off);
+  }
+  const float largest = hn::GetLane(hn::MaxOfLanes(d, most));
+  const float allowed = std::max(kRelativeError * largest, kDepthError / (kPeak * pieces.amplitude.at[n]));
+  return hn::GetLane(hn::MaxOfLanes(d, error)) <= allowed;
 }
 
 /// Flat splats: `at`, `most` and `fit`, of their means alone.

@@ -195,7 +195,7 @@ HWY_INLINE BlockMask paintBlocks(const TileWork& work, BlockMask blocks, const E
   return saturated;
 }
 
-/// Where a parabola is not to be hoped for. A few blocks are looked up before they are blended: what was
+/// With a look-up for every pixel. A few blocks are looked up before they are blended: what was
 /// written as many narrow vectors is not ready at once to be read as a wide one.
 HWY_NOINLINE BlockMask paintPixelByPixel(const TileWork& work, BlockMask blocks, const Ellipse& e,
                                          const Scalar& scalar, const float* footprint) {
@@ -216,75 +216,32 @@ HWY_NOINLINE BlockMask paintPixelByPixel(const TileWork& work, BlockMask blocks,
   return saturated;
 }
 
-HWY_INLINE Shade shadeOf(const Fits& fits, size_t n, const Pieces& pieces, const Scalar& scalar) {
+/// From `begin` to `end` over piece n.
+HWY_INLINE Along along(const Pieces& pieces, size_t n, const Scalar& scalar, float begin, float end) {
+  const float from = pieces.from.at[n];
+  const float per_t = (end - begin) / (pieces.to.at[n] - from);
+  return {begin - from * per_t, per_t * scalar.tp, per_t * scalar.tq};
+}
+
+HWY_INLINE Shade shadeOf(const Fits& fits, size_t n) {
   Shade shade;
   for (int c = 0; c < 4; ++c) {
     shade.at[c] = fits.at.of[c].at[n];
     shade.by[c] = fits.by.of[c].at[n];
     shade.bend[c] = fits.bend.of[c].at[n];
   }
-  const float from = pieces.from.at[n], to = pieces.to.at[n];
-  const float per_t = 2 / (to - from);
-  shade.s0 = -0.5f * (from + to) * per_t;
-  shade.sp = per_t * scalar.tp;
-  shade.sq = per_t * scalar.tq;
   return shade;
 }
 
-HWY_INLINE Shade shadeOf(const Fits& fits, size_t n) {
-  Shade shade;
-  for (int c = 0; c < 4; ++c) shade.at[c] = fits.at.of[c].at[n];
-  return shade;
-}
-
-/// Where one parabola does not do for all of the tile: one for every block, if that does.
-HWY_NOINLINE BlockMask paintBlockByBlock(const TileWork& work, BlockMask blocks, const Ellipse& e,
-                                         const Scalar& scalar, const float* footprint) {
-  const Floats d;
-  const float by_x = scalar.tp * e.a + scalar.tq * e.b, by_y = scalar.tq * e.c;
-  const V half = hn::Set(d, 0.5f * (kBlockSide - 1));
-  Pieces pieces;
-  Fits fits;
-  BlockMask saturated = 0, not_fitted = 0;
+HWY_NOINLINE BlockMask paintPolyline(const TileWork& work, BlockMask blocks, const Ellipse& e,
+                                     const Polyline& line, const Along& s, const float* footprint) {
+  BlockMask saturated = 0;
   while (blocks != 0) {
-    IntRow numbers;
-    Row x, y;
-    size_t count = 0;
-    for (; blocks != 0 && count < kLanes; ++count) {
-      numbers.at[count] = takeFirst(blocks);
-      x.at[count] = xOf(numbers.at[count]);
-      y.at[count] = yOf(numbers.at[count]);
-    }
-    for (size_t n = count; n < kLanes; ++n) x.at[n] = y.at[n] = 0;
-    for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-      const V middle_x = hn::Add(hn::Sub(hn::Load(d, x.at + lane), hn::Set(d, e.x)), half);
-      const V middle_y = hn::Add(hn::Sub(hn::Load(d, y.at + lane), hn::Set(d, e.y)), half);
-      const Range t = tOver(hn::Set(d, by_x), hn::Set(d, by_y), middle_x, middle_y, half, half);
-      hn::Store(t.from, d, pieces.from.at + lane);
-      hn::Store(t.to, d, pieces.to.at + lane);
-      hn::Store(hn::Set(d, scalar.mean), d, pieces.mean.at + lane);
-      hn::Store(hn::Set(d, scalar.reach), d, pieces.reach.at + lane);
-      hn::Store(hn::Set(d, scalar.half_width), d, pieces.half_width.at + lane);
-      hn::Store(hn::Set(d, e.amplitude), d, pieces.amplitude.at + lane);
-    }
-    fitPieces(work.table, pieces, count, fits);
-    for (size_t n = 0; n < count; ++n) {
-      const BlockMask block = BlockMask{1} << numbers.at[n];
-      switch (fits.fit.at[n]) {
-        case kNothing:
-          break;
-        case kConstant:
-          saturated |= paintBlocks<false, false>(work, block, e, shadeOf(fits, n), footprint);
-          break;
-        case kParabola:
-          saturated |= paintBlocks<true, false>(work, block, e, shadeOf(fits, n, pieces, scalar), footprint);
-          break;
-        case kNone:
-          not_fitted |= block;
-      }
-    }
+    const int block = takeFirst(blocks);
+    if (paintBlock(e, line, s, footprint, work.tile + block * kBlockFloats, xOf(block), yOf(block)))
+      saturated |= BlockMask{1} << block;
   }
-  return saturated | paintPixelByPixel(work, not_fitted, e, scalar, footprint);
+  return saturated;
 }
 
 HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, const Visits& visits,
@@ -298,16 +255,17 @@ HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, const Vi
   }
   const Scalar scalar = visits.scalar(n);
   if (fits.fit.at[n] == kParabola) {
-    const Shade shade = shadeOf(fits, n, visits.pieces, scalar);
+    Shade shade = shadeOf(fits, n);
+    shade.s = along(visits.pieces, n, scalar, -1, 1);
     if (thin) return paintBlocks<true, true>(work, blocks, e, shade, footprint);
     return paintBlocks<true, false>(work, blocks, e, shade, footprint);
   }
-  // A parabola's error falls with the square of its length, or faster.
-  const float length = visits.pieces.to.at[n] - visits.pieces.from.at[n];
-  const float block_length =
-      (kBlockSide - 1) * (std::abs(scalar.tp * e.a + scalar.tq * e.b) + std::abs(scalar.tq * e.c));
-  if (fits.excess.at[n] * block_length * block_length < 2 * length * length)
-    return paintBlockByBlock(work, blocks, e, scalar, footprint);
+  // A polyline's error is a 25th of a parabola's or so, where it does not fall much faster; and it is as much
+  // work as a block looked up.
+  Polyline line;
+  if (fits.excess.at[n] < 25 && std::popcount(blocks) > 1 && fitPolyline(work.table, visits.pieces, n, line))
+    return paintPolyline(work, blocks, e, line, along(visits.pieces, n, scalar, 0, Polyline::kParts),
+                         footprint);
   return paintPixelByPixel(work, blocks, e, scalar, footprint);
 }
 
