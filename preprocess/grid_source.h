@@ -26,11 +26,15 @@ struct GridBlock {
   uint64_t nodes() const { return ni * nj * nk; }
 };
 
+/// Where a scalar's values stand.
+enum class Centring { node, cell };
+
 struct GridScalar {
-  std::string name;
+  std::string name;                  // "density"; of a vector's components "Velocity:mag", "Velocity:x"
   std::string unit;                  // may be empty
   std::vector<std::string> aliases;  // other names it answers to
   uint32_t number = 0;               // of the variable in its function file, from 1; 0: it has none
+  Centring centring = Centring::node;
 };
 
 /// The four numbers before a block's values in a PLOT3D Q file.
@@ -48,11 +52,15 @@ struct GridDescription {
   std::vector<GridScalar> scalars;    // all that can be asked for
   std::vector<FlowConditions> flow;   // of every block of every file that tells
   int coordinate_bytes = 4;           // 4 or 8: the precision of the coordinates as stored
+  std::vector<double> times;          // of every time step there is; empty: the files tell of none
+  uint32_t time_step = 0;             // the one that was opened, from 0
   std::vector<std::string> warnings;  // "bluntfinq.bin: 484 trailing bytes ignored"
 };
 
 /// The nodes of a NodeBox, i fastest, then j, then k. Arrays are resized by the source and keep their
-/// capacity.
+/// capacity. The value of a cell stands at the cell's lowest node, (i, j, k) of its corners (i..i+1, j..j+1,
+/// k..k+1); it is NaN where there is no such cell (at the last i, j and k of the block) and where the cell is
+/// blanked.
 struct NodeArrays {
   std::vector<double> x, y, z;              // world units
   std::vector<uint8_t> blank;               // 1: not there. Always filled

@@ -1,14 +1,31 @@
 #include "preprocess/open_grid.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 
+#include "preprocess/cgns_source.h"
 #include "preprocess/foreign_formats.h"
 #include "preprocess/plot3d_source.h"
 #include "stream/error.h"
 
 namespace curvisplat {
 namespace {
+
+/// A file format with a reader of its own. What none recognises is taken for PLOT3D, which has no mark.
+struct GridFormat {
+  bool (*recognises)(const InputFile& file);
+  std::unique_ptr<GridSource> (*open)(const OpenGridOptions& options);
+};
+
+template <typename Source>
+std::unique_ptr<GridSource> openAs(const OpenGridOptions& options) {
+  return std::make_unique<Source>(options);
+}
+
+constexpr std::array kFormats{
+    GridFormat{CgnsFile::recognises, openAs<CgnsSource>},
+};
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {
   if (std::filesystem::is_directory(path))
@@ -66,11 +83,16 @@ std::string namesIn(const GridDescription& description) {
 }  // namespace
 
 std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options) {
-  refuseForeign(options.grid, "a PLOT3D grid file");
-  for (const std::filesystem::path& path : options.solutions)
-    refuseForeign(path, "a PLOT3D Q or function file");
   OpenGridOptions complete = options;
   if (complete.temporary_folder.empty()) complete.temporary_folder = std::filesystem::temp_directory_path();
+  if (std::filesystem::is_regular_file(options.grid)) {
+    const InputFile file(options.grid);
+    for (const GridFormat& format : kFormats)
+      if (format.recognises(file)) return format.open(complete);
+  }
+  refuseForeign(options.grid, "a grid file");
+  for (const std::filesystem::path& path : options.solutions)
+    refuseForeign(path, "a PLOT3D Q or function file");
   return std::make_unique<Plot3dSource>(complete);
 }
 

@@ -40,8 +40,12 @@ class Painter {
   virtual void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
                      bool per_pixel, const PaintResources& resources = {}) = 0;
   /// Blends `splats` into the frame, in their order and behind or before all drawn so far: as order() says.
-  /// The span is free when the call returns.
+  /// The span is free when the call returns, but for those that drawsUnderWay() counts.
   virtual void draw(std::span<const ScreenSplat> splats) = 0;
+  /// The last so many draws may still read their splats, where those lie in PaintingBackend::splatMemory().
+  virtual size_t drawsUnderWay() const { return 0; }
+  /// Waits until none is.
+  virtual void finishDraws() {}
   /// Whether splats whose footprints lie in `box` change nothing, if they are drawn from now on: what would
   /// be seen of them is hidden. The picture's bits do not depend on whether they are drawn. Any thread,
   /// between begin() and end().

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "render/gl_thread.h"
 #include "stream/error.h"
 #include "tests/support/painted_splats.h"
@@ -22,6 +24,39 @@ TEST(GlPainter, RefusesAnImageBeyondTheLimitAndGoesOn) {
     }
     painter.begin({8, 8}, glm::vec4(1), table, true);
     EXPECT_EQ(painter.end().pixel(4, 4)[0], 1.0f);
+  });
+}
+
+TEST(GlPainter, DrawsFromMappedMemoryWithoutCopying) {
+  const ImageSize size{160, 120};
+  const auto splats = randomSplats(3000, 8, size);
+  const auto table = lively();
+  GlThread gl;
+  gl.run([&](const GlContext& context) {
+    GlPainter painter(context);
+    painter.begin(size, glm::vec4(1), table, true);
+    painter.draw(splats);
+    const Image copied = painter.end();
+    for (int repetition = 0; repetition < 2; ++repetition) {
+      const std::span<ScreenSplat> mapped = painter.mapSplats(splats.size() + 7);
+      ASSERT_EQ(mapped.size(), splats.size() + 7) << painter.drawsUnderWay();
+      std::copy(splats.begin(), splats.end(), mapped.begin() + 5);
+      painter.begin(size, glm::vec4(1), table, true);
+      for (size_t begin = 0; begin < splats.size(); begin += 500) {
+        painter.draw(mapped.subspan(5 + begin, 500));
+        EXPECT_LE(painter.drawsUnderWay(), begin / 500 + 1);
+        EXPECT_LT(painter.drawsUnderWay(), 4u);
+      }
+      EXPECT_EQ(painter.end().rgba, copied.rgba);
+      EXPECT_EQ(painter.uploadSeconds(), 0);
+      painter.finishDraws();
+      EXPECT_EQ(painter.drawsUnderWay(), 0u);
+      // What lies elsewhere is copied all the same.
+      painter.begin(size, glm::vec4(1), table, true);
+      painter.draw(splats);
+      EXPECT_EQ(painter.end().rgba, copied.rgba);
+      EXPECT_GT(painter.uploadSeconds(), 0);
+    }
   });
 }
 
