@@ -18,6 +18,7 @@ class GlBackend final : public PaintingBackend {
   void run(const Job& job) override {
     gl_.run([&](const GlContext&) { job(*painter_); });
   }
+  DrawingOrder order() const override { return painter_->order(); }
   const std::string& name() const override { return gl_.contextName(); }
   std::span<ScreenSplat> splatMemory(size_t count) override {
     std::span<ScreenSplat> mapped;
@@ -38,6 +39,7 @@ class GlBackend final : public PaintingBackend {
 class CpuBackend final : public PaintingBackend {
  public:
   void run(const Job& job) override { job(painter_); }
+  DrawingOrder order() const override { return painter_.order(); }
   const std::string& name() const override { return name_; }
   uint64_t bytes(ImageSize size, const PaintResources& resources) const override {
     return CpuPainter::frameBytes(size) + CpuPainter::batchBytes(size, resources);

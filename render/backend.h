@@ -24,6 +24,8 @@ class PaintingBackend {
   using Job = std::function<void(Painter&)>;
   /// Runs `job` on the painter's thread and waits for its end. Throws what it throws. One caller at a time.
   virtual void run(const Job& job) = 0;
+  /// The painter's.
+  virtual DrawingOrder order() const = 0;
   /// For people: "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
   virtual const std::string& name() const = 0;
   /// Memory for so many splats, to be drawn from without copying them where the painter can. It takes the

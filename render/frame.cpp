@@ -24,7 +24,8 @@ struct FrameRenderer::State {
                Progress* progress) {
     statistics = {};
     const StageTimer total(statistics.total_s);
-    const FramePlan plan = timed(statistics.plan_s, [&] { return planner.plan(camera, options); });
+    const FramePlan plan =
+        timed(statistics.plan_s, [&] { return planner.plan(camera, options, pipeline.order()); });
     return pipeline.draw(plan, options, statistics, progress);
   }
 
@@ -57,8 +58,9 @@ void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions
   bool is_final = false;
   {
     const StageTimer total(statistics.total_s);
-    const FirstPicturePlan first =
-        timed(statistics.plan_s, [&] { return state_->planner.planFirst(camera, options); });
+    const FirstPicturePlan first = timed(statistics.plan_s, [&] {
+      return state_->planner.planFirst(camera, options, state_->pipeline.order());
+    });
     picture = state_->pipeline.draw(first.plan, options, statistics, progress);
     if (!first.size.isWhole()) picture = first.size.enlarge(picture);
     is_final = first.isFinal();
@@ -75,7 +77,7 @@ void FrameRenderer::cancel() {
 
 void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options) {
   try {
-    state_->pipeline.prefetch(state_->planner.plan(camera, options), options);
+    state_->pipeline.prefetch(state_->planner.plan(camera, options, state_->pipeline.order()), options);
   } catch (const Error&) {
     // render() will say it.
   }

@@ -1,6 +1,7 @@
 // One frame: the pipeline of design section 6, as a call.
 //
-//   plan (the cut, back to front) -> read -> prepare (workers: decode, project, sort) -> draw (a painter)
+//   plan (the cut, in the painter's order) -> read -> prepare (workers: decode, project, sort) -> draw (a
+//   painter)
 //   -> image
 //
 // Bricks are prepared by workers in any order and drawn in the cut's order; what is prepared and not yet
@@ -73,6 +74,10 @@ struct FrameStatistics : FetchStatistics {
   uint64_t splats_read = 0;
   uint64_t splats_clipped = 0, splats_off_screen = 0, splats_transparent = 0;  // read, and not drawn, since
   uint64_t splats_drawn = 0;
+  /// Parts that were left out because what is before them hides them, and splats handed to the painter for
+  /// which it found that. How many depends on how far the stages are ahead of one another; the picture does
+  /// not.
+  uint64_t bricks_hidden = 0, splats_hidden = 0;
   int largest_level = 0;
   double largest_error_px = 0;  // on the screen, of what is drawn; infinite around a perspective eye
   unsigned workers = 0;

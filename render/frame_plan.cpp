@@ -34,8 +34,9 @@ TransparentBounds transparentIn(const ClassificationTable& table, const Projecti
   };
 }
 
-CutOptions limitsOf(const FrameOptions& options) {
+CutOptions limitsOf(const FrameOptions& options, DrawingOrder order) {
   CutOptions limits;
+  limits.order = order;
   limits.lod_pixels = options.lod_pixels;
   limits.max_splats = options.max_splats.value_or(CutOptions::kNoLimit);
   return limits;
@@ -76,14 +77,15 @@ Cut FramePlanner::chooseCut(const ProjectionSettings& settings, const FrameOptio
   return cut;
 }
 
-FramePlan FramePlanner::plan(const Camera& camera, const FrameOptions& options) const {
+FramePlan FramePlanner::plan(const Camera& camera, const FrameOptions& options, DrawingOrder order) const {
   const ProjectionSettings settings = settingsFor(camera, options, options.size);
-  return {settings, chooseCut(settings, options, limitsOf(options))};
+  return {settings, chooseCut(settings, options, limitsOf(options, order))};
 }
 
-FirstPicturePlan FramePlanner::planFirst(const Camera& camera, const FrameOptions& options) const {
+FirstPicturePlan FramePlanner::planFirst(const Camera& camera, const FrameOptions& options,
+                                         DrawingOrder order) const {
   const ProjectionSettings settings = settingsFor(camera, options, options.size);
-  Cut cut = chooseCut(settings, options, firstPictureLimits(limitsOf(options)));
+  Cut cut = chooseCut(settings, options, firstPictureLimits(limitsOf(options, order)));
   const ReducedSize size(options.size, cut.complete ? 0 : cut.largest_error_px);
   return {{size.isWhole() ? settings : settingsFor(camera, options, size.size()), std::move(cut)}, size};
 }

@@ -34,8 +34,8 @@ class FramePlanner {
   FramePlanner(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function);
 
   /// Throws UsageError for a view that makes no picture, and if options.max_splats are too few.
-  FramePlan plan(const Camera& camera, const FrameOptions& options) const;
-  FirstPicturePlan planFirst(const Camera& camera, const FrameOptions& options) const;
+  FramePlan plan(const Camera& camera, const FrameOptions& options, DrawingOrder order) const;
+  FirstPicturePlan planFirst(const Camera& camera, const FrameOptions& options, DrawingOrder order) const;
 
   const ClassificationTable& table() const { return table_; }
   /// What the octree takes, and what plans and the later stages note about its bricks.
