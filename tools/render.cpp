@@ -12,6 +12,7 @@
 #include <string>
 #include <thread>
 
+#include "render/annotations.h"
 #include "render/frame.h"
 #include "render/image.h"
 #include "render/transfer_function.h"
@@ -39,6 +40,7 @@ struct RenderWords {
   std::optional<std::string> range, opacity_unit, clip_box, frame_rate;
   std::optional<uint64_t> max_splats;
   unsigned threads = 0;
+  Annotations annotations;
 };
 
 WorldBox parseClipBox(const std::string& text) {
@@ -74,8 +76,9 @@ FrameOptions frameOptions(const RenderWords& words) {
 Backend parseBackend(const std::string& text) {
   if (text == "auto") return Backend::automatic;
   if (text == "osmesa") return Backend::osmesa;
+  if (text == "egl") return Backend::egl;
   if (text == "cpu") return Backend::cpu;
-  throw UsageError("--backend {}: not in this version, which has auto, osmesa and cpu", text);
+  throw UsageError("--backend {}: expected auto, osmesa, egl or cpu", text);
 }
 
 /// What contradicts itself whatever the cache holds.
@@ -162,7 +165,7 @@ class FrameRun {
     }
     const auto show = [&](const Image& image, bool is_final) {
       if (!report_.first_image) {
-        writeImage(image, words_.first_image);
+        writeImage(annotated(image, camera), words_.first_image);
         report_.time_to_first_image_s = secondsSinceStart();
         report_.first_image = statistics;
       }
@@ -172,7 +175,7 @@ class FrameRun {
   }
 
   void finish(uint64_t number, const Camera& camera, const Image& image, const FrameStatistics& statistics) {
-    output_.write(number, image);
+    output_.write(number, annotated(image, camera));
     if (number == 0 && !report_.first_image) report_.time_to_first_image_s = secondsSinceStart();
     report_.frames.push_back({camera, statistics});
     if (said_empty_ || !isEmpty(image, report_.options.background)) return;
@@ -183,6 +186,18 @@ class FrameRun {
                               camera,    report_.options,  statistics};
     for (const std::string& reason : whyEmpty(scene))
       tell("warning", fmt::format("the picture{} is empty: {}", which, reason));
+  }
+
+  Image annotated(Image image, const Camera& camera) const {
+    const FrameOptions& options = report_.options;
+    const double near = 1e-4 * glm::length(options.scale * (manifest_.upper - manifest_.lower));
+    const ScreenView view = ScreenView::of(camera, options.size, options.scale, options.low_pass_px2, near);
+    const VariableInfo& variable = report_.variable;
+    const std::string title =
+        variable.unit.empty() ? variable.name : fmt::format("{} [{}]", variable.name, variable.unit);
+    annotate(image, words_.annotations,
+             {view, report_.transfer_function, title, manifest_.lower, manifest_.upper, options.background});
+    return image;
   }
 
   const RenderWords& words_;
@@ -284,6 +299,11 @@ void addRender(CLI::App& app) {
       ->capture_default_str()
       ->group(what);
 
+  command->add_flag("--scalar-bar", words->annotations.scalar_bar, "Draw which colour stands for which value")
+      ->group(what);
+  command->add_flag("--axes", words->annotations.axes, "Draw where x, y and z point")->group(what);
+  command->add_flag("--outline", words->annotations.outline, "Draw the box around the data")->group(what);
+
   const std::string where = "Camera";
   CameraWords* camera = &words->camera;
   command->add_option("--view", camera->view, "iso, +x, -x, +y, -y, +z or -z; iso otherwise")->group(where);
@@ -311,7 +331,7 @@ void addRender(CLI::App& app) {
       ->group(where);
 
   const std::string how = "Resources";
-  command->add_option("--backend", words->backend, "auto, osmesa or cpu: what draws")
+  command->add_option("--backend", words->backend, "auto, osmesa, egl or cpu: what draws; see info --system")
       ->capture_default_str()
       ->group(how);
   command->add_option("--memory", words->memory, "Memory for the data in flight: 512M, 2G")

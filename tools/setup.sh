@@ -11,7 +11,9 @@ packages=(
   # vectors, texts, command line, manifests
   libglm-dev libfmt-dev libcli11-dev nlohmann-json3-dev
   # pictures, and OpenGL without a display
-  libpng-dev libtinyexr-dev libosmesa6-dev libgl-dev
+  libpng-dev libtinyexr-dev libosmesa6-dev libgl-dev libegl-dev libegl1
+  # text and lines over pictures
+  libcairo2-dev fonts-dejavu-core
   # drawing on the processor, in whatever vectors it has
   libhwy-dev
   # tests and benchmarks

@@ -53,7 +53,7 @@ class GlPainterTest : public testing::Test {
     return image;
   }
 
-  GlThread gl_;
+  GlThread gl_{GlLibrary::osmesa};
 };
 
 TEST_F(GlPainterTest, DrawsOneSplatAsSpecified) {
@@ -156,7 +156,7 @@ TEST_F(GlPainterTest, RefusesAnImageBeyondTheLimitAndGoesOn) {
 }
 
 TEST(GlThread, HandsErrorsToTheCaller) {
-  GlThread gl;
+  GlThread gl(GlLibrary::osmesa);
   EXPECT_NE(gl.contextName().find("OpenGL"), std::string::npos) << gl.contextName();
   EXPECT_THROW(gl.run([](const GlContext&) { throw Error("no"); }), Error);
   bool ran = false;
