@@ -229,4 +229,8 @@ void annotate(Image& image, const Annotations& annotations, const AnnotatedScene
   canvas.layOver(image);
 }
 
+std::string scalarTitle(const std::string& name, const std::string& unit) {
+  return unit.empty() ? name : fmt::format("{} [{}]", name, unit);
+}
+
 }  // namespace curvisplat

@@ -32,4 +32,7 @@ struct AnnotatedScene {
 /// image is larger than Cairo draws (32,767 pixels a side).
 void annotate(Image& image, const Annotations& annotations, const AnnotatedScene& scene);
 
+/// "density [kg/m3]"; "density" where the unit is unknown.
+std::string scalarTitle(const std::string& name, const std::string& unit);
+
 }  // namespace curvisplat

@@ -1,5 +1,7 @@
 #include "render/segment_ring.h"
 
+#include <algorithm>
+
 #include "stream/error.h"
 
 namespace curvisplat {
@@ -21,6 +23,7 @@ std::optional<std::span<ScreenSplat>> SegmentRing::acquire(uint64_t sequence, si
   if (closed_) return {};
   segments_.push_back({begin, count, false});
   end_ = begin + count;
+  peak_ = std::max(peak_, static_cast<size_t>(end_ - segments_.front().begin));
   granted_.notify_all();
   return std::span(&splats_[begin % capacity_], count);
 }
@@ -44,6 +47,19 @@ void SegmentRing::release() {
   segments_.pop_front();
   ++first_sequence_;
   granted_.notify_all();
+}
+
+void SegmentRing::reset() {
+  const std::lock_guard lock(mutex_);
+  segments_.clear();
+  end_ = first_sequence_ = 0;
+  closed_ = false;
+  peak_ = 0;
+}
+
+size_t SegmentRing::peakSplats() const {
+  const std::lock_guard lock(mutex_);
+  return peak_;
 }
 
 void SegmentRing::close() {

@@ -40,6 +40,11 @@ class SegmentRing {
   void release();
 
   void close();
+  /// Begins anew, open and empty, from sequence number 0 on. Nobody may use the ring meanwhile.
+  void reset();
+
+  /// The most splats that were held at once, since reset().
+  size_t peakSplats() const;
 
  private:
   struct Segment {
@@ -51,7 +56,7 @@ class SegmentRing {
   const size_t capacity_;
   const std::unique_ptr<ScreenSplat[]> splats_;
 
-  std::mutex mutex_;                   // guards all below, not the splats
+  mutable std::mutex mutex_;           // guards all below, not the splats
   std::condition_variable granted_;    // a segment was granted or released, or the ring closed
   std::condition_variable committed_;  // the first segment may be ready, or the ring closed
   // Positions count on for ever; modulo the capacity they are places in the ring. What does not fit before
@@ -60,6 +65,7 @@ class SegmentRing {
   uint64_t end_ = 0;              // of the last segment granted
   uint64_t first_sequence_ = 0;   // of segments_.front()
   bool closed_ = false;
+  size_t peak_ = 0;
 };
 
 }  // namespace curvisplat
