@@ -32,23 +32,22 @@ class Canvas {
 
   cairo_t* get() const { return cairo_.get(); }
 
-  void layOver(Image& image) const {
+  /// Calls `use` with the channels of every pixel that was drawn on, colours multiplied by alpha, 0..1.
+  template <typename Use>
+  void forEachPixel(const Use& use) const {
     cairo_surface_flush(surface_.get());
     const unsigned char* const bytes = cairo_image_surface_get_data(surface_.get());
     const int stride = cairo_image_surface_get_stride(surface_.get());
-    for (int y = 0; y < image.size.height; ++y) {
+    const int width = cairo_image_surface_get_width(surface_.get());
+    const int height = cairo_image_surface_get_height(surface_.get());
+    for (int y = 0; y < height; ++y) {
       // 32-bit numbers in the machine's byte order: alpha, red, green, blue from the highest byte.
       const auto* const row = reinterpret_cast<const uint32_t*>(bytes + static_cast<ptrdiff_t>(y) * stride);
-      for (int x = 0; x < image.size.width; ++x) {
+      for (int x = 0; x < width; ++x) {
         const uint32_t argb = row[x];
         if (argb == 0) continue;
         const auto channel = [&](int shift) { return static_cast<float>(argb >> shift & 255) / 255; };
-        const float through = 1 - channel(24);
-        float* const pixel = image.pixel(x, y);
-        pixel[0] = channel(16) + through * pixel[0];
-        pixel[1] = channel(8) + through * pixel[1];
-        pixel[2] = channel(0) + through * pixel[2];
-        pixel[3] = channel(24) + through * pixel[3];
+        use(x, y, glm::vec4(channel(16), channel(8), channel(0), channel(24)));
       }
     }
   }
@@ -214,19 +213,39 @@ void drawScalarBar(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3
   cairo_show_text(cairo, scene.title.c_str());
 }
 
-}  // namespace
-
-void annotate(Image& image, const Annotations& annotations, const AnnotatedScene& scene) {
-  CURVISPLAT_CHECK(image.size.width == scene.view.size.width && image.size.height == scene.view.size.height);
-  if (!annotations.any()) return;
-  const Canvas canvas(image.size);
+Canvas drawn(const Annotations& annotations, const AnnotatedScene& scene) {
+  Canvas canvas(scene.view.size);
   cairo_t* const cairo = canvas.get();
-  cairo_set_font_size(cairo, fontSize(image.size));
+  cairo_set_font_size(cairo, fontSize(scene.view.size));
   const glm::dvec3 ink = inkFor(scene.background);
   if (annotations.outline) drawOutline(cairo, scene, ink);
   if (annotations.axes) drawAxes(cairo, scene.view, ink);
   if (annotations.scalar_bar) drawScalarBar(cairo, scene, ink);
-  canvas.layOver(image);
+  return canvas;
+}
+
+}  // namespace
+
+void annotate(Image& image, const Annotations& annotations, const AnnotatedScene& scene) {
+  CURVISPLAT_CHECK(image.size.width == scene.view.size.width &&
+                   image.size.height == scene.view.size.height);
+  if (!annotations.any()) return;
+  drawn(annotations, scene).forEachPixel([&](int x, int y, const glm::vec4& over) {
+    float* const pixel = image.pixel(x, y);
+    for (int c = 0; c < 4; ++c) pixel[c] = over[c] + (1 - over.a) * pixel[c];
+  });
+}
+
+std::vector<uint8_t> annotationLayer(const Annotations& annotations, const AnnotatedScene& scene) {
+  const size_t width = static_cast<size_t>(scene.view.size.width);
+  std::vector<uint8_t> layer(4 * width * static_cast<size_t>(scene.view.size.height), 0);
+  if (!annotations.any()) return layer;
+  drawn(annotations, scene).forEachPixel([&](int x, int y, const glm::vec4& over) {
+    uint8_t* const pixel = &layer[4 * (static_cast<size_t>(y) * width + static_cast<size_t>(x))];
+    for (int c = 0; c < 3; ++c) pixel[c] = static_cast<uint8_t>(std::min(over[c] / over.a, 1.0f) * 255 + 0.5f);
+    pixel[3] = static_cast<uint8_t>(over.a * 255 + 0.5f);
+  });
+  return layer;
 }
 
 std::string scalarTitle(const std::string& name, const std::string& unit) {

@@ -2,9 +2,11 @@
 // around the data. The same in `render` and in the window.
 #pragma once
 
+#include <cstdint>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 #include <string>
+#include <vector>
 
 #include "render/image.h"
 #include "render/screen_view.h"
@@ -19,9 +21,9 @@ struct Annotations {
   bool any() const { return scalar_bar || axes || outline; }
 };
 
-/// What there is to annotate. All of it outlives the call.
+/// What there is to annotate. The function outlives the call.
 struct AnnotatedScene {
-  const ScreenView& view;
+  ScreenView view;
   const TransferFunction& transfer_function;
   std::string title;                  // of the scalar bar: "density [kg/m3]"
   glm::dvec3 lower{0.0}, upper{0.0};  // the box around the data, before --scale
@@ -31,6 +33,10 @@ struct AnnotatedScene {
 /// Draws over `image`, of the size of scene.view. Text is sized by the image's height. Throws Error where the
 /// image is larger than Cairo draws (32,767 pixels a side).
 void annotate(Image& image, const Annotations& annotations, const AnnotatedScene& scene);
+
+/// The annotations alone: four bytes a pixel, red, green, blue, alpha, colours not multiplied. Throws as
+/// annotate() does.
+std::vector<uint8_t> annotationLayer(const Annotations& annotations, const AnnotatedScene& scene);
 
 /// "density [kg/m3]"; "density" where the unit is unknown.
 std::string scalarTitle(const std::string& name, const std::string& unit);

@@ -11,8 +11,9 @@
 
 namespace curvisplat {
 
-/// `whole` with less of everything.
-CutOptions firstPictureLimits(CutOptions whole);
+/// A hundredth of a second of a disk, a twentieth of a second of drawing in software.
+inline constexpr uint64_t kFirstPictureBytes = 4 << 20;
+inline constexpr uint64_t kFirstPictureSplats = 100'000;
 
 /// An image with fewer pixels than `size` that shows what a camera shows in one of `size`.
 class ReducedSize {

@@ -1,5 +1,6 @@
 #include "render/frame.h"
 
+#include "render/first_picture.h"
 #include "render/frame_pipeline.h"
 #include "render/frame_plan.h"
 #include "stream/error.h"
@@ -28,6 +29,19 @@ struct FrameRenderer::State {
     return pipeline.draw(plan, options, statistics, progress);
   }
 
+  Image renderQuickly(const Camera& camera, const FrameOptions& options, uint64_t max_splats,
+                      uint64_t max_bytes, double detail_px, FrameStatistics& statistics, bool& is_final,
+                      Progress* progress) {
+    statistics = {};
+    const StageTimer total(statistics.total_s);
+    const QuickPlan quick = timed(statistics.plan_s, [&] {
+      return planner.planQuick(camera, options, max_splats, max_bytes, detail_px);
+    });
+    is_final = quick.isFinal();
+    Image picture = pipeline.draw(quick.plan, options, statistics, progress);
+    return quick.size.isWhole() ? picture : quick.size.enlarge(picture);
+  }
+
   FramePlanner planner;
   FramePipeline pipeline;
 };
@@ -52,21 +66,20 @@ void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions
                                         FrameStatistics& statistics, const ShowPicture& show,
                                         Progress* progress) {
   const FramePipeline::Running running(state_->pipeline);
-  statistics = {};
-  Image picture;
   bool is_final = false;
-  {
-    const StageTimer total(statistics.total_s);
-    const FirstPicturePlan first =
-        timed(statistics.plan_s, [&] { return state_->planner.planFirst(camera, options); });
-    picture = state_->pipeline.draw(first.plan, options, statistics, progress);
-    if (!first.size.isWhole()) picture = first.size.enlarge(picture);
-    is_final = first.isFinal();
-  }
+  Image picture = state_->renderQuickly(camera, options, kFirstPictureSplats, kFirstPictureBytes, 0,
+                                        statistics, is_final, progress);
   show(picture, is_final);
   if (is_final) return;
   picture = Image();
   show(state_->render(camera, options, statistics, progress), true);
+}
+
+Image FrameRenderer::renderQuickly(const Camera& camera, const FrameOptions& options, uint64_t max_splats,
+                                   double detail_px, FrameStatistics& statistics, bool& is_final) {
+  const FramePipeline::Running running(state_->pipeline);
+  return state_->renderQuickly(camera, options, max_splats, CutOptions::kNoLimit, detail_px, statistics,
+                               is_final, nullptr);
 }
 
 void FrameRenderer::cancel() {

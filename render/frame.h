@@ -103,7 +103,14 @@ class FrameRenderer {
   void renderProgressively(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                            const ShowPicture& show, Progress* progress = nullptr);
 
-  /// Makes what is under way, render() or renderProgressively(), throw Cancelled soon: within what a worker
+  /// The best picture that at most `max_splats` make (the coarsest bricks if those are more), drawn with
+  /// fewer pixels and enlarged where it has no detail for all of them, or needs none finer than `detail_px`:
+  /// for a camera that moves. `is_final` is set to whether it is the one that render() returns. Throws as
+  /// render() does.
+  Image renderQuickly(const Camera& camera, const FrameOptions& options, uint64_t max_splats,
+                      double detail_px, FrameStatistics& statistics, bool& is_final);
+
+  /// Makes what is under way, of the three above, throw Cancelled soon: within what a worker
   /// takes for a brick and the painter for a segment. One that has not begun is not affected. Any thread.
   void cancel();
 

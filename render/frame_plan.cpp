@@ -1,5 +1,6 @@
 #include "render/frame_plan.h"
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <utility>
@@ -89,10 +90,14 @@ FramePlan FramePlanner::plan(const Camera& camera, const FrameOptions& options) 
   return {settings, chooseCut(settings, options, limitsOf(options))};
 }
 
-FirstPicturePlan FramePlanner::planFirst(const Camera& camera, const FrameOptions& options) const {
+QuickPlan FramePlanner::planQuick(const Camera& camera, const FrameOptions& options, uint64_t max_splats,
+                                  uint64_t max_bytes, double detail_px) const {
   const ProjectionSettings settings = settingsFor(camera, options, options.size);
-  Cut cut = chooseCut(settings, options, firstPictureLimits(limitsOf(options)));
-  const ReducedSize size(options.size, cut.complete ? 0 : cut.largest_error_px);
+  CutOptions limits = limitsOf(options);
+  limits.max_splats = std::min(limits.max_splats, max_splats);
+  limits.max_bytes = std::min(limits.max_bytes, max_bytes);
+  Cut cut = chooseCut(settings, options, limits);
+  const ReducedSize size(options.size, std::max(detail_px, cut.complete ? 0 : cut.largest_error_px));
   return {{size.isWhole() ? settings : settingsFor(camera, options, size.size()), std::move(cut)}, size};
 }
 

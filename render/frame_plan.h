@@ -19,13 +19,13 @@ struct FramePlan {
   Cut cut;
 };
 
-/// Of the first picture of a progressive frame.
-struct FirstPicturePlan {
+/// Of a picture that is to be had quickly.
+struct QuickPlan {
   FramePlan plan;
   ReducedSize size;
 
   /// Whether there is nothing to refine.
-  bool isFinal() const { return plan.cut.complete; }
+  bool isFinal() const { return plan.cut.complete && size.isWhole(); }
 };
 
 /// Plans frames of one variable of one cache, which outlives it. Any number of threads may plan.
@@ -35,7 +35,10 @@ class FramePlanner {
 
   /// Throws UsageError for a view that makes no picture, and if options.max_splats are too few.
   FramePlan plan(const Camera& camera, const FrameOptions& options) const;
-  FirstPicturePlan planFirst(const Camera& camera, const FrameOptions& options) const;
+  /// The best picture of at most `max_splats` and `max_bytes`, or of the coarsest bricks, that needs no
+  /// detail finer than `detail_px`.
+  QuickPlan planQuick(const Camera& camera, const FrameOptions& options, uint64_t max_splats,
+                      uint64_t max_bytes, double detail_px) const;
 
   /// For the plans to come, while nobody plans or draws.
   void setTransferFunction(const TransferFunction& transfer_function);

@@ -194,8 +194,8 @@ TransferFunctionDefinition parseParaViewPreset(const std::string& text, const st
   definition.colour_space = readColourSpace(preset);
   definition.colours = readColours(preset);
   definition.log_scale = preset.flag("UseLogScale", false) || preset.flag("LogScale", false);
-  const auto note = [&](std::string text) {
-    definition.notes.push_back(fmt::format("{}: {}", path.string(), text));
+  const auto note = [&](std::string words) {
+    definition.notes.push_back(fmt::format("{}: {}", path.string(), words));
   };
   if (file.is_array() && file.size() > 1)
     note(fmt::format("holds {} presets; the first, '{}', is used", file.size(), preset.name()));

@@ -76,14 +76,6 @@ FrameOptions frameOptions(const RenderWords& words) {
   return options;
 }
 
-Backend parseBackend(const std::string& text) {
-  if (text == "auto") return Backend::automatic;
-  if (text == "osmesa") return Backend::osmesa;
-  if (text == "egl") return Backend::egl;
-  if (text == "cpu") return Backend::cpu;
-  throw UsageError("--backend {}: expected auto, osmesa, egl or cpu", text);
-}
-
 /// What contradicts itself whatever the cache holds.
 void checkWords(const RenderWords& words, ImageSize size) {
   checkCameraWords(words.camera);

@@ -24,13 +24,13 @@ Camera cameraOf(Projection projection) {
 }
 
 glm::dvec2 pixelOf(const Camera& camera, const glm::dvec3& point) {
-  const ScreenView view = ScreenView::of(camera, kSize, glm::dvec3(1), 0, 1e-6);
+  const ScreenView view = ScreenView::of(camera, kSize, glm::dvec3(1), 1, 1e-6);
   return view.pixelFromView(view.viewFromData(point));
 }
 
 void expectNear(const glm::dvec3& a, const glm::dvec3& b, double slack = 1e-9) {
-  EXPECT_LE(glm::length(a - b), slack) << a.x << ' ' << a.y << ' ' << a.z << " is not " << b.x << ' ' << b.y
-                                       << ' ' << b.z;
+  EXPECT_LE(glm::length(a - b), slack)
+      << a.x << ' ' << a.y << ' ' << a.z << " is not " << b.x << ' ' << b.y << ' ' << b.z;
 }
 
 class CameraControls : public testing::TestWithParam<Projection> {
@@ -82,8 +82,8 @@ TEST_P(CameraControls, RefittingShowsAllOfTheBox) {
   const glm::dvec3 lower(-10, 2, 3), upper(20, 5, 9);
   const Camera camera = refitted(camera_, lower, upper, kSize);
   for (int n = 0; n < 8; ++n) {
-    const glm::dvec2 pixel = pixelOf(
-        camera, {n & 1 ? upper.x : lower.x, n & 2 ? upper.y : lower.y, n & 4 ? upper.z : lower.z});
+    const glm::dvec2 pixel =
+        pixelOf(camera, {n & 1 ? upper.x : lower.x, n & 2 ? upper.y : lower.y, n & 4 ? upper.z : lower.z});
     EXPECT_GE(pixel.x, 0);
     EXPECT_GE(pixel.y, 0);
     EXPECT_LE(pixel.x, kSize.width);
@@ -95,12 +95,11 @@ TEST_P(CameraControls, RefittingShowsAllOfTheBox) {
 
 TEST_P(CameraControls, FlyingMovesAlongTheView) {
   const Camera after = flown(camera_, {0, 0, 2});
-  expectNear(after.position - camera_.position,
-             2.0 * glm::normalize(camera_.focal_point - camera_.position));
+  expectNear(after.position - camera_.position, 2.0 * glm::normalize(camera_.focal_point - camera_.position));
   expectNear(after.focal_point - after.position, camera_.focal_point - camera_.position);
 }
 
-TEST(CameraControls, LookingTurnsOnTheSpotByTheViewAngle) {
+TEST(CameraLooking, TurnsOnTheSpotByTheViewAngle) {
   const Camera camera = cameraOf(Projection::perspective);
   const Camera after = looking(camera, {0, static_cast<double>(kSize.height)}, kSize);
   expectNear(after.position, camera.position);

@@ -36,8 +36,7 @@ EditedFunction::EditedFunction(const TransferFunctionDefinition& definition, dou
       opacity_unit_(definition.opacity_unit > 0 ? definition.opacity_unit : default_opacity_unit) {
   range_ = TransferFunction(definition, nullptr, opacity_unit_).range();  // it checks the logarithm
   if (definition_.opacities.empty())
-    definition_.opacities =
-        defaultOpacityRamp(definition_.colours.front().x, definition_.colours.back().x);
+    definition_.opacities = defaultOpacityRamp(definition_.colours.front().x, definition_.colours.back().x);
   const auto coordinate = [&](double x) { return definition_.log_scale ? std::log10(x) : x; };
   const double begin = coordinate(range_.first), length = coordinate(range_.second) - begin;
   const auto toUnit = [&](double x) { return std::clamp((coordinate(x) - begin) / length, 0.0, 1.0); };

@@ -1,5 +1,5 @@
-// A transfer function in a person's hands: opacity points that are dragged, colours from a preset or a file, a
-// range, a unit.
+// A transfer function in a person's hands: opacity points that are dragged, colours from a preset or a file,
+// a range, a unit.
 //
 // Points stand on [0, 1], which is stretched over the range, in the logarithm if the scale is logarithmic.
 // There is always an opacity point at 0 and one at 1. Values only; not for several threads at once.

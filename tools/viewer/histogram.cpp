@@ -48,7 +48,8 @@ std::vector<double> histogramOf(const CacheReader& cache, size_t variable, doubl
       if (!(value >= low && value <= high)) continue;
       const double part =
           log_scale ? std::log(value / low) / std::log(high / low) : (value - low) / (high - low);
-      volumes[std::min(bins - 1, static_cast<size_t>(part * static_cast<double>(bins)))] += geometry.weight[n];
+      volumes[std::min(bins - 1, static_cast<size_t>(part * static_cast<double>(bins)))] +=
+          geometry.weight[n];
     }
   }
   if (total > 0)

@@ -107,7 +107,8 @@ double defaultOpacityUnit(const Manifest& manifest, const glm::dvec3& scale) {
 /// One word of a shell command.
 std::string quoted(const std::string& word) {
   const bool plain = !word.empty() && std::all_of(word.begin(), word.end(), [](unsigned char c) {
-    return std::isalnum(c) || std::string_view("_-./,:=+@%").find(static_cast<char>(c)) != std::string_view::npos;
+    return std::isalnum(c) ||
+           std::string_view("_-./,:=+@%").find(static_cast<char>(c)) != std::string_view::npos;
   });
   if (plain) return word;
   std::string text = "'";
@@ -136,8 +137,7 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
 ViewState firstViewOf(const Manifest& manifest, ImageSize size) {
   if (manifest.variables.empty()) throw Error("{}: the cache holds no scalar to look at", manifest.title);
   const VariableInfo& variable = manifest.variables.front();
-  return {variable.name,
-          Camera::named("iso", manifest.lower, manifest.upper, size, Projection::orthographic),
+  return {variable.name, Camera::named("iso", manifest.lower, manifest.upper, size, Projection::orthographic),
           EditedFunction("viridis", variable.min, variable.max, defaultOpacityUnit(manifest, glm::dvec3(1)))};
 }
 
@@ -195,8 +195,8 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
                           defaultOpacityUnit(manifest, scale));
   if (const std::string preset = fields.text("preset"); !preset.empty()) {
     try {
-      function = EditedFunction(preset, function.range().first, function.range().second,
-                                function.opacityUnit());
+      function =
+          EditedFunction(preset, function.range().first, function.range().second, function.opacityUnit());
     } catch (const UsageError&) {
       fields.fail("preset", fmt::format("one of {}", presetNames()));
     }
@@ -223,7 +223,8 @@ std::string renderCommand(const ViewState& state, const std::filesystem::path& c
   std::string command = "curvisplat render " + quoted(cache.string()) + " -o picture.png";
   const auto add = [&](const std::string& option, const std::string& value) {
     // A value that begins with a minus sign would be taken for an option.
-    command += value.starts_with('-') ? " " + option + "=" + quoted(value) : " " + option + " " + quoted(value);
+    command +=
+        value.starts_with('-') ? " " + option + "=" + quoted(value) : " " + option + " " + quoted(value);
   };
   add("--size", fmt::format("{}x{}", size.width, size.height));
   add("--scalar", state.variable);

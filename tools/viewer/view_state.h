@@ -24,7 +24,7 @@ struct ViewState {
   uint64_t memory_bytes = 512 << 20;
   Classification classification = Classification::pixel;
   glm::dvec3 scale{1.0};
-  std::optional<WorldBox> clip_box;
+  std::optional<WorldBox> clip_box = std::nullopt;
   bool dark = false;  // background
   Annotations annotations{true, true, true};
 
