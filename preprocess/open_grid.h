@@ -17,7 +17,7 @@ struct OpenGridOptions {
   std::vector<std::filesystem::path> solutions;  // Q and function files; may be empty
   std::filesystem::path temporary_folder;        // ASCII is spooled to binary here; empty: the system's
   Plot3dForce force;                             // what the user says of the layout, over what is detected
-  std::optional<uint32_t> time_step;             // from 0; none: the first
+  std::optional<uint32_t> time_step = {};        // from 0; none: the first
 };
 
 /// Throws Error naming the file, what was expected and what was found.

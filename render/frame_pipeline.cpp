@@ -1,13 +1,14 @@
 #include "render/frame_pipeline.h"
 
 #include <exception>
-#include <optional>
 #include <span>
 
 #include "render/frame_budget.h"
 #include "render/frame_workers.h"
+#include "render/segment_drawer.h"
 #include "render/segment_ring.h"
 #include "stream/brick_source.h"
+#include "stream/error.h"
 #include "stream/pager.h"
 #include "stream/stage_timer.h"
 
@@ -18,14 +19,33 @@ PaintResources resourcesOf(const FrameOptions& options) {
   return {.threads = options.threads};
 }
 
+/// However a frame ends: the ring's memory is the next one's, then.
+class DrawsFinished {
+ public:
+  explicit DrawsFinished(Painter& painter) : painter_(painter) {}
+  ~DrawsFinished() {
+    try {
+      painter_.finishDraws();
+    } catch (const Error&) {
+      // The next begin() meets it again.
+    }
+  }
+  DrawsFinished(const DrawsFinished&) = delete;
+  DrawsFinished& operator=(const DrawsFinished&) = delete;
+
+ private:
+  Painter& painter_;
+};
+
 }  // namespace
 
 /// What frames share, sized from the budget.
 struct FramePipeline::Pools {
-  Pools(const CacheReader& cache, size_t variable, const FrameBudget& budget_, const PagerOptions& pager_)
+  Pools(const CacheReader& cache, size_t variable, const FrameBudget& budget_, const PagerOptions& pager_,
+        std::span<ScreenSplat> splats)
       : budget(budget_),
         pager(pager_),
-        ring(budget.ring_splats),
+        ring(splats),
         source(cache, variable, pager, budget.cache_bytes),
         workers(source, ring, budget.workers) {}
 
@@ -67,7 +87,8 @@ void FramePipeline::makePools(const FrameOptions& options) {
       pools_->pager.direct == pager.direct)
     return;
   pools_.reset();  // before the new ones take their memory
-  pools_ = std::make_unique<Pools>(cache_, variable_, budget, pager);
+  pools_ =
+      std::make_unique<Pools>(cache_, variable_, budget, pager, backend_->splatMemory(budget.ring_splats));
 }
 
 Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
@@ -121,18 +142,12 @@ Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, F
                            Progress* progress) {
   Image image;
   backend_->run([&](Painter& painter) {
-    SegmentRing& ring = pools_->ring;
+    const DrawsFinished finished(painter);
     painter.begin(plan.settings.view.size, options.background, planner_.table(), plan.settings.per_pixel,
                   resourcesOf(options));
+    SegmentDrawer drawer(painter, pools_->ring, statistics.painter_waited_s);
     for (size_t drawn = 0; drawn < plan.cut.parts.size(); ++drawn) {
-      std::optional<std::span<const ScreenSplat>> segment;
-      {
-        const StageTimer timer(statistics.painter_waited_s);
-        segment = ring.next();
-      }
-      if (!segment) return;
-      painter.draw(*segment);
-      ring.release();
+      if (!drawer.drawNext()) return;
       if (progress) progress->advance(1);
     }
     image = painter.end();

@@ -10,8 +10,12 @@ packages=(
   libopenvdb-dev libboost-iostreams-dev libtbb-dev libzstd-dev libxxhash-dev
   # reads without waiting
   liburing-dev
+  # grid files
+  libcgns-dev
   # vectors, texts, command line, manifests
   libglm-dev libfmt-dev libcli11-dev nlohmann-json3-dev
+  # VTK's files
+  libpugixml-dev zlib1g-dev liblz4-dev
   # pictures, and OpenGL without a display
   libpng-dev libtinyexr-dev libosmesa6-dev libgl-dev libegl-dev libegl1
   # text and lines over pictures
