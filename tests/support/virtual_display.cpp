@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -48,14 +49,18 @@ VirtualDisplay::VirtualDisplay(ImageSize size) {
   name_ = ":" + std::to_string(number);
   const std::string screen = std::to_string(size.width) + "x" + std::to_string(size.height) + "x24";
   server_ = std::make_unique<RunningProgram>(
-      std::vector<std::string>{"Xvfb", name_, "-screen", "0", screen, "-nolisten", "tcp"}, kEnv);
-  const fs::path socket = "/tmp/.X11-unix/X" + std::to_string(number);
-  if (!eventually([&] { return fs::exists(socket); })) throw std::runtime_error("Xvfb does not start");
+      std::vector<std::string>{"Xvfb", name_, "-screen", "0", screen, "-noreset", "-nolisten", "tcp"}, kEnv);
   setenv("DISPLAY", name_.c_str(), 1);
+  const auto answers = [] {
+    return RunningProgram({"xdotool", "getmouselocation"}, kEnv).wait().status == 0;
+  };
+  if (!eventually(answers)) throw std::runtime_error("Xvfb does not start");
 }
 
 VirtualDisplay::~VirtualDisplay() {
   unsetenv("DISPLAY");
+  server_->signal(SIGTERM);  // it takes its socket away
+  server_->wait();
 }
 
 void VirtualDisplay::act(const std::vector<std::string>& words) const {
@@ -70,13 +75,15 @@ Image VirtualDisplay::screenshot() const {
   const ProgramResult result = RunningProgram({"xwd", "-root", "-silent"}, kEnv).wait();
   if (result.status != 0) throw std::runtime_error("xwd: " + result.err);
   const std::string& bytes = result.out;
-  const uint32_t header = bigEndian(bytes, 0), bits = bigEndian(bytes, 11), stride = bigEndian(bytes, 12);
+  const uint32_t header = bigEndian(bytes, 0), stride = bigEndian(bytes, 12);
   const uint32_t colours = bigEndian(bytes, 19);
-  if (bits != 32) throw std::runtime_error("the screenshot has not 32 bits a pixel");
   Image image({static_cast<int>(bigEndian(bytes, 4)), static_cast<int>(bigEndian(bytes, 5))});
+  const size_t pixel_bytes = bigEndian(bytes, 11) / 8;
+  if (pixel_bytes < 3) throw std::runtime_error("the screenshot has a colour table");
   for (int y = 0; y < image.size.height; ++y)
     for (int x = 0; x < image.size.width; ++x) {
-      const size_t at = header + 12 * colours + static_cast<size_t>(y) * stride + 4 * static_cast<size_t>(x);
+      const size_t at =
+          header + 12 * colours + static_cast<size_t>(y) * stride + pixel_bytes * static_cast<size_t>(x);
       for (size_t c = 0; c < 3; ++c)  // blue, green, red
         image.pixel(x, y)[2 - c] = static_cast<float>(static_cast<unsigned char>(bytes.at(at + c))) / 255;
       image.pixel(x, y)[3] = 1;

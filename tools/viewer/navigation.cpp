@@ -16,6 +16,7 @@ namespace {
 constexpr double kRestAfter_s = 0.2;        // without movement
 constexpr double kWheelFactor = 1.1;        // a notch
 constexpr double kDragFactor = 1.01;        // a pixel
+constexpr double kWheelFlight = 0.02;       // diagonals of the data a notch
 constexpr double kFlightDiagonals_s = 0.2;  // diagonals of the data a second
 
 }  // namespace
@@ -24,36 +25,32 @@ bool Navigation::isMoving() const {
   return holds_ || (moved_at_s_ >= 0 && ImGui::GetTime() - moved_at_s_ < kRestAfter_s);
 }
 
-bool Navigation::update(const Window& window, Camera& camera, ImageSize size) {
-  const bool moved = drag(camera, size, window.pixelScale()) | (flies_ && fly(window, camera));
+bool Navigation::update(Window& window, Camera& camera, ImageSize size) {
+  const bool moved = drag(window, camera, size) | (flies_ && fly(window, camera));
   if (moved) moved_at_s_ = ImGui::GetTime();
   return moved;
 }
 
-bool Navigation::drag(Camera& camera, ImageSize size, double pixel_scale) {
-  const ImGuiIO& io = ImGui::GetIO();
+bool Navigation::drag(Window& window, Camera& camera, ImageSize size) {
   bool moved = false;
-  if (!io.WantCaptureMouse && io.MouseWheel != 0) {
-    const double factor = std::pow(kWheelFactor, io.MouseWheel);
+  if (const double notches = window.takeWheel(); notches != 0) {
     if (flies_)
-      camera = flown(camera, {0, 0, std::log(factor) * glm::length(upper_ - lower_) * 0.2});
+      camera = flown(camera, {0, 0, notches * kWheelFlight * glm::length(upper_ - lower_)});
     else
-      camera = zoomed(camera, factor);
+      camera = zoomed(camera, std::pow(kWheelFactor, notches));
     moved = true;
   }
-  const bool any = io.MouseDown[0] || io.MouseDown[1] || io.MouseDown[2];
-  const bool began = (ImGui::IsMouseClicked(0) || ImGui::IsMouseClicked(1) || ImGui::IsMouseClicked(2)) &&
-                     !io.WantCaptureMouse;
-  holds_ = any && (holds_ || began);
-  if (!holds_ || began || (io.MouseDelta.x == 0 && io.MouseDelta.y == 0)) return moved;
-  const glm::dvec2 movement = pixel_scale * glm::dvec2(io.MouseDelta.x, io.MouseDelta.y);
-  if (io.MouseDown[2] || (io.MouseDown[0] && io.KeyShift))
-    camera = panned(camera, movement, size);
-  else if (io.MouseDown[1])
-    camera = zoomed(camera, std::pow(kDragFactor, -movement.y));
-  else
-    camera = flies_ ? looking(camera, movement, size) : rotated(camera, movement, size);
-  return true;
+  for (const Window::Drag& drag : window.takeDrags()) {
+    if (drag.button == GLFW_MOUSE_BUTTON_MIDDLE || (drag.button == GLFW_MOUSE_BUTTON_LEFT && drag.shift))
+      camera = panned(camera, drag.movement, size);
+    else if (drag.button == GLFW_MOUSE_BUTTON_RIGHT)
+      camera = zoomed(camera, std::pow(kDragFactor, -drag.movement.y));
+    else if (drag.button == GLFW_MOUSE_BUTTON_LEFT)
+      camera = flies_ ? looking(camera, drag.movement, size) : rotated(camera, drag.movement, size);
+    moved = true;
+  }
+  holds_ = window.isDragging();
+  return moved;
 }
 
 bool Navigation::fly(const Window& window, Camera& camera) {

@@ -18,7 +18,7 @@ class Navigation {
   void setBounds(const glm::dvec3& lower, const glm::dvec3& upper) { lower_ = lower, upper_ = upper; }
 
   /// What was done since the last frame of Dear ImGui, which must have begun; true if it moved the camera.
-  bool update(const Window& window, Camera& camera, ImageSize size);
+  bool update(Window& window, Camera& camera, ImageSize size);
   /// True if the key is one of navigation's and moved the camera or changed its mode.
   bool press(const Window::Key& key, Camera& camera, ImageSize size);
 
@@ -27,12 +27,12 @@ class Navigation {
   bool flies() const { return flies_; }
 
  private:
-  bool drag(Camera& camera, ImageSize size, double pixel_scale);
+  bool drag(Window& window, Camera& camera, ImageSize size);
   bool fly(const Window& window, Camera& camera);
 
   glm::dvec3 lower_{0.0}, upper_{1.0};
   bool flies_ = false;
-  bool holds_ = false;      // a button that went down over the picture
+  bool holds_ = false;      // a button
   double moved_at_s_ = -1;  // Dear ImGui's clock
 };
 

@@ -115,6 +115,7 @@ class Viewer {
     facts.backend = frames_.backendName();
     facts.said = said_;
     PanelWishes wishes;
+    window_.setPictureLeft(panelWidth());
     if (panels_shown_) wishes = panels_.draw(state_, variable(), facts);
     dragging_ = wishes.dragging;
     bool changed = wishes.changed;

@@ -51,7 +51,11 @@ Window::Window(const std::string& title, ImageSize size) : library_(std::make_un
   context_name_ = fmt::format("{}, {}", reinterpret_cast<const char*>(gl_->GetString(GL_VERSION)),
                               reinterpret_cast<const char*>(gl_->GetString(GL_RENDERER)));
   glfwSetWindowUserPointer(window_, this);
-  glfwSetKeyCallback(window_, onKey);  // Dear ImGui's goes before it, and calls it
+  // Dear ImGui's callbacks go before these, and call them.
+  glfwSetKeyCallback(window_, onKey);
+  glfwSetMouseButtonCallback(window_, onButton);
+  glfwSetCursorPosCallback(window_, onMove);
+  glfwSetScrollCallback(window_, onWheel);
 
   ImGui::CreateContext();
   ImGui::GetIO().IniFilename = nullptr;
@@ -127,6 +131,43 @@ std::vector<Window::Key> Window::takeKeys() {
   std::vector<Key> keys = std::exchange(keys_, {});
   if (ImGui::GetIO().WantTextInput) keys.clear();
   return keys;
+}
+
+bool Window::overPicture() const {
+  return mouse_.x >= picture_left_;
+}
+
+void Window::onButton(GLFWwindow* window, int button, int action, int mods) {
+  auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
+  if (action == GLFW_PRESS && !self->isDragging()) {
+    glfwGetCursorPos(window, &self->mouse_.x, &self->mouse_.y);
+    if (!self->overPicture()) return;
+    self->dragged_button_ = button;
+    self->dragged_with_shift_ = (mods & GLFW_MOD_SHIFT) != 0;
+  } else if (action == GLFW_RELEASE && button == self->dragged_button_) {
+    self->dragged_button_ = -1;
+  }
+}
+
+void Window::onMove(GLFWwindow* window, double x, double y) {
+  auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
+  const glm::dvec2 movement = self->pixelScale() * (glm::dvec2(x, y) - self->mouse_);
+  self->mouse_ = {x, y};
+  if (self->isDragging())
+    self->drags_.push_back({self->dragged_button_, self->dragged_with_shift_, movement});
+}
+
+void Window::onWheel(GLFWwindow* window, double, double y) {
+  auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
+  if (self->overPicture()) self->wheel_ += y;
+}
+
+std::vector<Window::Drag> Window::takeDrags() {
+  return std::exchange(drags_, {});
+}
+
+double Window::takeWheel() {
+  return std::exchange(wheel_, 0.0);
 }
 
 bool Window::isDown(int key) const {

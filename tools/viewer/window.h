@@ -47,6 +47,21 @@ class Window {
   std::vector<Key> takeKeys();
   bool isDown(int key) const;
 
+  /// Movement of the mouse with a button down that went down over the picture. Every event counts with the
+  /// buttons of its own time, so that nothing is lost where frames are slow.
+  struct Drag {
+    int button = 0;  // GLFW_MOUSE_BUTTON_...
+    bool shift = false;
+    glm::dvec2 movement{0.0};  // pixels
+  };
+  std::vector<Drag> takeDrags();
+  /// Notches of the wheel over the picture, away from the user.
+  double takeWheel();
+  /// Whether a drag is under way.
+  bool isDragging() const { return dragged_button_ >= 0; }
+  /// The picture is right of this: units of Dear ImGui.
+  void setPictureLeft(double left) { picture_left_ = left; }
+
   void setClipboard(const std::string& text);
   const GlFunctions& gl() const { return *gl_; }
   /// "4.5 (Core Profile) Mesa 22.3.6, llvmpipe ..."
@@ -54,6 +69,10 @@ class Window {
 
  private:
   static void onKey(GLFWwindow* window, int key, int scancode, int action, int mods);
+  static void onButton(GLFWwindow* window, int button, int action, int mods);
+  static void onMove(GLFWwindow* window, double x, double y);
+  static void onWheel(GLFWwindow* window, double x, double y);
+  bool overPicture() const;
 
   struct Library;  // GLFW, from initialisation to termination
   std::unique_ptr<Library> library_;
@@ -61,6 +80,13 @@ class Window {
   std::unique_ptr<GlFunctions> gl_;
   std::string context_name_;
   std::vector<Key> keys_;
+
+  double picture_left_ = 0;
+  glm::dvec2 mouse_{0.0};
+  int dragged_button_ = -1;
+  bool dragged_with_shift_ = false;
+  std::vector<Drag> drags_;
+  double wheel_ = 0;
 };
 
 }  // namespace curvisplat
