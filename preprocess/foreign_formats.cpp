@@ -14,9 +14,9 @@ struct Magic {
 using namespace std::string_view_literals;
 
 constexpr Magic kMagics[] = {
-    {"# vtk DataFile"sv, "a legacy VTK file, which is not read yet"},
-    {"<VTKFile"sv, "a VTK XML file, which is not read yet"},
-    {"<?xml"sv, "an XML file (VTK?), which is not read yet"},
+    {"# vtk DataFile"sv, "a legacy VTK file"},
+    {"<VTKFile"sv, "a VTK XML file"},
+    {"<?xml"sv, "an XML file"},
     {"\x89HDF\r\n\x1a\n"sv, "an HDF5 file"},
     {"CDF\x01"sv, "a NetCDF file, which is not read"},
     {"CDF\x02"sv, "a NetCDF file, which is not read"},

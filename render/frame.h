@@ -24,6 +24,7 @@
 
 #include "render/backend.h"
 #include "render/camera.h"
+#include "render/first_picture.h"
 #include "render/image.h"
 #include "render/projection.h"
 #include "render/transfer_function.h"
@@ -108,7 +109,13 @@ class FrameRenderer {
   void renderProgressively(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                            const ShowPicture& show, Progress* progress = nullptr);
 
-  /// Makes what is under way, render() or renderProgressively(), throw Cancelled soon: within what a worker
+  /// The best picture within `limits`, drawn with fewer pixels and enlarged where it has no detail for all of
+  /// them: for a camera that moves. `is_final` is set to whether it is the one that render() returns. Throws
+  /// as render() does.
+  Image renderQuickly(const Camera& camera, const FrameOptions& options, const QuickLimits& limits,
+                      FrameStatistics& statistics, bool& is_final);
+
+  /// Makes what is under way, of the three above, throw Cancelled soon: within what a worker
   /// takes for a brick and the painter for a segment. One that has not begun is not affected. Any thread.
   void cancel();
 
@@ -116,6 +123,12 @@ class FrameRenderer {
   /// the cache of bricks has room for it. The next frame or prefetch() ends it; nothing that goes wrong in it
   /// is told before render().
   void prefetch(const Camera& camera, const FrameOptions& options);
+
+  /// For the frames to come; decoded bricks stay. Ends a prefetch.
+  void setTransferFunction(const TransferFunction& transfer_function);
+
+  /// How such a frame comes to the screen. Throws UsageError as render() does.
+  ScreenView screenView(const Camera& camera, const FrameOptions& options) const;
 
   /// "CPU, AVX3"; "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
   const std::string& backendName() const;
