@@ -7,6 +7,7 @@
 #include <charconv>
 
 #include "preprocess/foreign_formats.h"
+#include "preprocess/plot3d_meta.h"
 #include "preprocess/plot3d_source.h"
 #include "preprocess/scalar_names.h"
 #include "stream/error.h"
@@ -20,7 +21,7 @@ struct GridFormat {
   std::unique_ptr<GridSource> (*open)(const OpenGridOptions& options);
 };
 
-constexpr std::array<GridFormat, 0> kFormats{};
+constexpr std::array kFormats{GridFormat{isPlot3dMeta, openPlot3dMeta}};
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {
   if (std::filesystem::is_directory(path))
