@@ -6,10 +6,14 @@
 #include <array>
 #include <charconv>
 
+#include "preprocess/cgns_source.h"
 #include "preprocess/foreign_formats.h"
 #include "preprocess/plot3d_meta.h"
 #include "preprocess/plot3d_source.h"
 #include "preprocess/scalar_names.h"
+#include "preprocess/time_steps.h"
+#include "preprocess/vtk_legacy.h"
+#include "preprocess/vtk_xml.h"
 #include "stream/error.h"
 
 namespace curvisplat {
@@ -21,7 +25,17 @@ struct GridFormat {
   std::unique_ptr<GridSource> (*open)(const OpenGridOptions& options);
 };
 
-constexpr std::array kFormats{GridFormat{isPlot3dMeta, openPlot3dMeta}};
+template <typename Source>
+std::unique_ptr<GridSource> openAs(const OpenGridOptions& options) {
+  return std::make_unique<Source>(options);
+}
+
+constexpr GridFormat kFormats[] = {
+    {isVtkXml, openVtkXml},
+    {isVtkLegacy, openVtkLegacy},
+    {isPlot3dMeta, openPlot3dMeta},
+    {CgnsFile::recognises, openAs<CgnsSource>},
+};
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {
   if (std::filesystem::is_directory(path))
@@ -78,20 +92,31 @@ std::string namesIn(const GridDescription& description) {
   return names;
 }
 
-}  // namespace
-
-std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options) {
+std::unique_ptr<GridSource> openFormat(const OpenGridOptions& options) {
   OpenGridOptions complete = options;
   if (complete.temporary_folder.empty()) complete.temporary_folder = std::filesystem::temp_directory_path();
   if (std::filesystem::is_regular_file(options.grid)) {
     const InputFile file(options.grid);
     for (const GridFormat& format : kFormats)
-      if (format.recognises(file)) return format.open(complete);
+      if (format.recognises(file)) {
+        if (!options.solutions.empty())
+          throw Error("{}: holds scalars itself; leave out {}, which goes with a PLOT3D grid",
+                      options.grid.string(), options.solutions.front().string());
+        return format.open(complete);
+      }
   }
   refuseForeign(options.grid, "a grid file");
   for (const std::filesystem::path& path : options.solutions)
     refuseForeign(path, "a PLOT3D Q or function file");
   return std::make_unique<Plot3dSource>(complete);
+}
+
+}  // namespace
+
+std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options) {
+  std::unique_ptr<GridSource> source = openFormat(options);
+  chosenTimeStep(options.grid.string(), source->description().times, options.time_step);
+  return source;
 }
 
 std::vector<uint32_t> scalarsNamed(const GridDescription& description,
