@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 
+#include "preprocess/block_overlap.h"
 #include "preprocess/bucket_file.h"
 #include "preprocess/bucket_tree.h"
 #include "preprocess/build_octree.h"
@@ -128,6 +129,8 @@ class Conversion {
   void scan() {
     splats_.survey = surveyGrid(reader_, plan_.slab_bytes, progress_);
     openWriter();
+    const std::vector<BlockOverlap> overlaps = findOverlaps(source_, plan_.slab_bytes, progress_);
+    if (!overlaps.empty()) report_.warnings.push_back(overlapWarning(source_.description(), overlaps));
   }
 
   void count() {

@@ -23,7 +23,7 @@ constexpr Magic kMagics[] = {
     {"CDF\x05"sv, "a NetCDF file, which is not read"},
     {"#!TDV"sv, "a Tecplot binary file, which is not read"},
     {"C Binary"sv, "an EnSight file, which is not read"},
-    {"{"sv, "a JSON file: of a .p3d description, give the grid and solution files it names"},
+    {"{"sv, "a JSON file: a .p3d description is given alone, in the grid's place"},
     {"\x89PNG"sv, "a PNG picture"},
     {"\xff\xd8\xff"sv, "a JPEG picture"},
     {"%PDF"sv, "a PDF document"},

@@ -8,6 +8,7 @@
 
 #include "preprocess/cgns_source.h"
 #include "preprocess/foreign_formats.h"
+#include "preprocess/plot3d_meta.h"
 #include "preprocess/plot3d_source.h"
 #include "preprocess/scalar_names.h"
 #include "preprocess/time_steps.h"
@@ -32,6 +33,7 @@ std::unique_ptr<GridSource> openAs(const OpenGridOptions& options) {
 constexpr GridFormat kFormats[] = {
     {isVtkXml, openVtkXml},
     {isVtkLegacy, openVtkLegacy},
+    {isPlot3dMeta, openPlot3dMeta},
     {CgnsFile::recognises, openAs<CgnsSource>},
 };
 

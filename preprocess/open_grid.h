@@ -18,6 +18,7 @@ struct OpenGridOptions {
   std::filesystem::path temporary_folder;        // ASCII is spooled to binary here; empty: the system's
   Plot3dForce force;                             // what the user says of the layout, over what is detected
   std::optional<uint32_t> time_step = {};        // from 0; none: the first
+  std::vector<std::string> function_names = {};  // of function files' variables, over their .nam files
 };
 
 /// Throws Error naming the file, what was expected and what was found.

@@ -44,6 +44,7 @@ void printSummary(const ConvertWords& words, const ConvertReport& report, double
 void printWarnings(const GridDescription& description, const ConvertReport& report) {
   for (const std::string& warning : description.warnings)
     fmt::print(stderr, "curvisplat: warning: {}\n", warning);
+  for (const std::string& warning : report.warnings) fmt::print(stderr, "curvisplat: warning: {}\n", warning);
   const auto note = [](uint64_t count, const char* what) {
     if (count > 0) fmt::print(stderr, "curvisplat: note: {} {}\n", count, what);
   };
