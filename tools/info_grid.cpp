@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "preprocess/node_reader.h"
+#include "preprocess/time_steps.h"
 #include "stream/progress.h"
 
 namespace curvisplat {
@@ -123,13 +124,22 @@ nlohmann::ordered_json asJson(const GridDescription& description, const GridStat
                             {"alpha", flow.alpha},
                             {"reynolds", flow.reynolds},
                             {"time", flow.time}});
+  if (!description.times.empty()) {
+    json["times"] = description.times;
+    json["time_step"] = description.time_step;
+  }
   json["warnings"] = description.warnings;
   return json;
 }
 
-void printAsText(const GridDescription& description, const GridStatistics& statistics) {
+void printAsText(const GridDescription& description, std::optional<uint32_t> time_step,
+                 const GridStatistics& statistics) {
   fmt::print("{}\n", description.format);
   for (const std::string& warning : description.warnings) fmt::print("warning: {}\n", warning);
+  if (const auto note = timeStepNote(description, time_step)) fmt::print("note: {}\n", *note);
+  if (!description.times.empty())
+    fmt::print("time      {:g}, step {} of 0..{}\n", description.times[description.time_step],
+               description.time_step, description.times.size() - 1);
   const BlankCounts blank = statistics.totalBlank();
   fmt::print("nodes     {} in {} block{}; {} blanked by iblank, {} not finite\n", nodesOf(description),
              description.blocks.size(), description.blocks.size() == 1 ? "" : "s", blank.by_grid,
@@ -166,7 +176,7 @@ void printGridInfo(const OpenGridOptions& options, bool json) {
   if (json)
     fmt::print("{}\n", asJson(source->description(), statistics).dump(2));
   else
-    printAsText(source->description(), statistics);
+    printAsText(source->description(), options.time_step, statistics);
 }
 
 }  // namespace curvisplat
