@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 
+#include "preprocess/cgns_source.h"
 #include "preprocess/foreign_formats.h"
 #include "preprocess/plot3d_source.h"
 #include "preprocess/time_steps.h"
@@ -20,9 +21,15 @@ struct GridFormat {
   std::unique_ptr<GridSource> (*open)(const OpenGridOptions& options);
 };
 
-constexpr GridFormat kFormats[] = {
-    {isVtkXml, openVtkXml},
-    {isVtkLegacy, openVtkLegacy},
+template <typename Source>
+std::unique_ptr<GridSource> openAs(const OpenGridOptions& options) {
+  return std::make_unique<Source>(options);
+}
+
+constexpr std::array kFormats{
+    GridFormat{isVtkXml, openVtkXml},
+    GridFormat{isVtkLegacy, openVtkLegacy},
+    GridFormat{CgnsFile::recognises, openAs<CgnsSource>},
 };
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <vector>
 
 #include "preprocess/node_reader.h"
@@ -31,9 +31,16 @@ struct Range {
       max = std::max<double>(max, values[n]);
     }
   }
+  void addFinite(const std::vector<float>& values) {
+    for (const float value : values) {
+      if (!std::isfinite(value)) continue;
+      min = std::min<double>(min, value);
+      max = std::max<double>(max, value);
+    }
+  }
 };
 
-/// Of the nodes that are drawn.
+/// Of the nodes that are drawn; of scalars in cells, of all that are finite.
 struct GridStatistics {
   std::vector<BlankCounts> blank;  // of each block
   std::array<Range, 3> bounds;
@@ -54,20 +61,24 @@ uint64_t nodesOf(const GridDescription& description) {
 
 GridStatistics measure(const GridSource& source) {
   const GridDescription& description = source.description();
-  std::vector<uint32_t> scalars(description.scalars.size());
-  std::iota(scalars.begin(), scalars.end(), 0u);
-  const NodeReader reader(source, scalars, std::nullopt);
+  std::vector<uint32_t> of_nodes, of_cells;
+  for (uint32_t n = 0; n < description.scalars.size(); ++n)
+    (description.scalars[n].centring == Centring::node ? of_nodes : of_cells).push_back(n);
+  const NodeReader reader(source, of_nodes, std::nullopt);
 
   GridStatistics statistics;
-  statistics.scalars.resize(scalars.size());
-  NodeArrays nodes;
+  statistics.scalars.resize(description.scalars.size());
+  NodeArrays nodes, cells;
   Progress progress;
   progress.begin("reading", nodesOf(description), "nodes");
   const auto addBox = [&](uint32_t block, const NodeBox& box) {
     statistics.blank.back() += reader.read(block, box, nodes);
     const std::vector<double>* const axes[] = {&nodes.x, &nodes.y, &nodes.z};
     for (size_t axis = 0; axis < 3; ++axis) statistics.bounds[axis].add(*axes[axis], nodes.blank);
-    for (size_t s = 0; s < scalars.size(); ++s) statistics.scalars[s].add(nodes.scalars[s], nodes.blank);
+    for (size_t s = 0; s < of_nodes.size(); ++s)
+      statistics.scalars[of_nodes[s]].add(nodes.scalars[s], nodes.blank);
+    if (!of_cells.empty()) source.read(block, box, of_cells, cells);
+    for (size_t s = 0; s < of_cells.size(); ++s) statistics.scalars[of_cells[s]].addFinite(cells.scalars[s]);
     progress.advance(nodes.x.size());
   };
   for (uint32_t b = 0; b < description.blocks.size(); ++b) {
@@ -110,9 +121,11 @@ nlohmann::ordered_json asJson(const GridDescription& description, const GridStat
   }
   json["scalars"] = nlohmann::ordered_json::array();
   for (size_t s = 0; s < description.scalars.size(); ++s) {
-    nlohmann::ordered_json scalar = {{"name", description.scalars[s].name},
-                                     {"min", statistics.scalars[s].min},
-                                     {"max", statistics.scalars[s].max}};
+    nlohmann::ordered_json scalar = {
+        {"name", description.scalars[s].name},
+        {"min", statistics.scalars[s].min},
+        {"max", statistics.scalars[s].max},
+        {"of", description.scalars[s].centring == Centring::cell ? "cells" : "nodes"}};
     if (description.scalars[s].number > 0) scalar["number"] = description.scalars[s].number;
     json["scalars"].push_back(std::move(scalar));
   }
@@ -157,9 +170,9 @@ void printAsText(const GridDescription& description, std::optional<uint32_t> tim
   for (size_t s = 0; s < description.scalars.size(); ++s) {
     const GridScalar& scalar = description.scalars[s];
     const bool named = scalar.number > 0 && scalar.name != std::to_string(scalar.number);
-    fmt::print("scalar    {}{}: {:.6g} .. {:.6g}\n", scalar.name,
+    fmt::print("scalar    {}{}: {:.6g} .. {:.6g}{}\n", scalar.name,
                named ? fmt::format(" ({})", scalar.number) : "", statistics.scalars[s].min,
-               statistics.scalars[s].max);
+               statistics.scalars[s].max, scalar.centring == Centring::cell ? ", in cells" : "");
   }
   for (size_t n = 0; n < std::min(kBlocksListed, description.flow.size()); ++n) {
     const FlowConditions& flow = description.flow[n];

@@ -145,7 +145,8 @@ std::vector<DamagedFile> damagedFiles() {
     // has no checksum: a whole block may change, 50 numbers, each vector with its magnitude.
     if (encoding.format == VtsEncoding::Format::appended_raw) file.most_changed = 2;
     if (encoding.format == VtsEncoding::Format::appended_base64) file.most_changed = 4;
-    if (encoding.compressor == VtsEncoding::Compressor::lz4) file.most_changed = 2 * 50 + 2;
+    if (encoding.compressor == VtsEncoding::Compressor::lz4 && file.most_changed > 0)
+      file.most_changed = 2 * 50 + 2;
     if (encoding.compressor == VtsEncoding::Compressor::zlib) file.most_changed = 0;
     files.push_back(std::move(file));
   }
