@@ -159,7 +159,7 @@ void printAsText(const GridDescription& description, std::optional<uint32_t> tim
              blank.not_finite);
   for (size_t b = 0; b < std::min(kBlocksListed, description.blocks.size()); ++b) {
     const GridBlock& block = description.blocks[b];
-    fmt::print("  {:<10}{}x{}x{}{}\n", block.name, block.ni, block.nj, block.nk,
+    fmt::print("  {:<9} {}x{}x{}{}\n", block.name, block.ni, block.nj, block.nk,
                block.has_blanking ? fmt::format(", iblank blanks {}", statistics.blank[b].by_grid) : "");
   }
   if (description.blocks.size() > kBlocksListed)

@@ -134,11 +134,12 @@ TEST(VtkEncodings, AllTypesOfNumbersAreRead) {
   }
 }
 
-std::map<std::string, uint64_t> checksumsOf(const GridSource& source, const std::filesystem::path& output) {
+std::map<std::string, uint64_t> checksumsOf(const GridSource& source, const std::vector<std::string>& scalars,
+                                            const std::filesystem::path& output) {
   ConvertOptions options;
   options.output = output;
   options.memory_bytes = uint64_t{256} << 20;
-  options.scalars = scalarsNamed(source.description(), {"p", "U:mag"});
+  options.scalars = scalarsNamed(source.description(), scalars);
   options.title = "grid";
   Progress progress;
   convert(source, options, progress);
@@ -156,12 +157,48 @@ TEST(VtkEncodings, AllGiveTheSameCache) {
   for (const VtsEncoding& encoding : allVtsEncodings()) {
     if (encoding.header_bytes == 8 && !encoding.big_endian) continue;
     SCOPED_TRACE(encoding.inWords());
-    const auto checksums =
-        checksumsOf(*openText(folder, vtsFile(grid, encoding)), folder.path() / "grid.splats");
+    const auto checksums = checksumsOf(*openText(folder, vtsFile(grid, encoding)), {"p", "U:mag"},
+                                       folder.path() / "grid.splats");
     if (first.empty()) first = checksums;
     EXPECT_EQ(checksums, first);
   }
   EXPECT_GE(first.size(), 4u);
+}
+
+// An ocean's temperature in cells, from the files that others have encoded, and encoded again by the tests.
+TEST(VtkEncodings, FacesOfAnOceanGiveTheSameCacheInEachEncoding) {
+  const std::filesystem::path faces = std::filesystem::path(CURVISPLAT_SHARED_DATA) / "vts_encodings";
+  if (!std::filesystem::is_directory(faces)) GTEST_SKIP() << "needs " << faces;
+  using Format = VtsEncoding::Format;
+  using Compressor = VtsEncoding::Compressor;
+  const TestFolder folder("vts-faces");
+  for (const char* const name : {"face1_ascii.vts", "face6_appended_raw_lz4_u64.vts"}) {
+    OpenGridOptions options;
+    options.grid = faces / name;
+    options.temporary_folder = folder.path();
+    const auto source = openGrid(options);
+    const GridBlock& block = source->description().blocks[0];
+    const NodeArrays nodes = allNodes(*source, 0);
+    VtsGrid grid;
+    grid.extent = {0, 32, 0, 32, 0, 15};
+    for (size_t n = 0; n < nodes.x.size(); ++n)
+      for (const double x : {nodes.x[n], nodes.y[n], nodes.z[n]}) grid.points.values.push_back(x);
+    const std::vector<float> cells =
+        cellValues(block, nodes.scalars[scalarsNamed(source->description(), {"T"})[0]]);
+    grid.cell_data = {{"T", "Float32", 1, {cells.begin(), cells.end()}}};
+    const auto expected = checksumsOf(*source, {"T"}, folder.path() / "grid.splats");
+    EXPECT_GE(expected.size(), 4u);
+    for (const VtsEncoding& encoding :
+         {VtsEncoding{Format::ascii}, VtsEncoding{Format::inline_base64, Compressor::zlib},
+          VtsEncoding{Format::appended_raw, Compressor::none, 4, true},
+          VtsEncoding{Format::appended_base64, Compressor::zlib},
+          VtsEncoding{Format::appended_raw, Compressor::zlib},
+          VtsEncoding{Format::appended_raw, Compressor::lz4, 8}}) {
+      SCOPED_TRACE(encoding.inWords());
+      const auto again = openText(folder, vtsFile(grid, encoding));
+      EXPECT_EQ(checksumsOf(*again, {"T"}, folder.path() / "grid.splats"), expected);
+    }
+  }
 }
 
 // Writers other than VTK make one block of all. One of zlib's is unpacked on disk; LZ4's cannot be, in
