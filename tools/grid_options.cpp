@@ -23,6 +23,8 @@ void addWords(CLI::App& app, const char* name, const char* help, const std::map<
 }  // namespace
 
 void addGridOptions(CLI::App& app, OpenGridOptions& options) {
+  app.add_option("--time-step", options.time_step,
+                 "Of several time steps the one to take, from 0 (default: the first)");
   Plot3dForce& force = options.force;
   addWords<ByteOrder>(app, "--byte-order", "Byte order",
                       {{"little", ByteOrder::little}, {"big", ByteOrder::big}}, force.byte_order);
