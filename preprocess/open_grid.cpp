@@ -6,6 +6,7 @@
 
 #include "preprocess/cgns_source.h"
 #include "preprocess/foreign_formats.h"
+#include "preprocess/netcdf_source.h"
 #include "preprocess/plot3d_source.h"
 #include "stream/error.h"
 
@@ -24,7 +25,8 @@ std::unique_ptr<GridSource> openAs(const OpenGridOptions& options) {
 }
 
 constexpr std::array kFormats{
-    GridFormat{CgnsFile::recognises, openAs<CgnsSource>},
+    GridFormat{CgnsFile::recognises, openAs<CgnsSource>},  // before NetCDF, which takes all HDF5 files
+    GridFormat{NetcdfFile::recognises, openAs<NetcdfSource>},
 };
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {
@@ -32,16 +34,6 @@ void refuseForeign(const std::filesystem::path& path, const char* expected) {
     throw Error("{}: is a folder where {} was expected", path.string(), expected);
   if (const auto format = foreignFormat(InputFile(path)))
     throw Error("{}: is {}; expected {}", path.string(), *format, expected);
-}
-
-/// Names are the same if they differ in case, spaces and underscores only.
-std::string simplified(const std::string& name) {
-  std::string simple;
-  for (const char c : name) {
-    if (c == ' ' || c == '_' || c == '-') continue;
-    simple += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  }
-  return simple;
 }
 
 /// Positions of the scalars that `matches` is true for.
@@ -61,9 +53,9 @@ std::vector<uint32_t> candidatesFor(const GridDescription& description, const st
   const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
   if (error == std::errc{} && end == name.data() + name.size() && number > 0)
     return positionsOf(description, [&](const GridScalar& scalar) { return scalar.number == number; });
-  const std::string simple = simplified(name);
+  const std::string simple = simplifiedName(name);
   return positionsOf(description, [&](const GridScalar& scalar) {
-    return simplified(scalar.name) == simple ||
+    return simplifiedName(scalar.name) == simple ||
            std::find(scalar.aliases.begin(), scalar.aliases.end(), simple) != scalar.aliases.end();
   });
 }
@@ -94,6 +86,15 @@ std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options) {
   for (const std::filesystem::path& path : options.solutions)
     refuseForeign(path, "a PLOT3D Q or function file");
   return std::make_unique<Plot3dSource>(complete);
+}
+
+std::string simplifiedName(const std::string& name) {
+  std::string simple;
+  for (const char c : name) {
+    if (c == ' ' || c == '_' || c == '-') continue;
+    simple += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  }
+  return simple;
 }
 
 std::vector<uint32_t> scalarsNamed(const GridDescription& description,

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "preprocess/globe.h"
 #include "preprocess/grid_source.h"
 #include "preprocess/plot3d_layout.h"
 
@@ -17,7 +18,9 @@ struct OpenGridOptions {
   std::vector<std::filesystem::path> solutions;  // Q and function files; may be empty
   std::filesystem::path temporary_folder;        // ASCII is spooled to binary here; empty: the system's
   Plot3dForce force;                             // what the user says of the layout, over what is detected
-  std::optional<uint32_t> time_step;             // from 0; none: the first
+  std::optional<uint32_t> time_step = {};        // from 0; none: the first
+  GlobeOptions globe = {};                       // of grids in degrees
+  std::vector<std::string> scalars = {};         // that are wanted: they choose among several grids of a file
 };
 
 /// Throws Error naming the file, what was expected and what was found.
@@ -26,5 +29,8 @@ std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options);
 /// Positions in the description's scalars of `names` (a name, or a number for a function file's variable); no
 /// names: the first scalar. Throws UsageError that lists the names there are.
 std::vector<uint32_t> scalarsNamed(const GridDescription& description, const std::vector<std::string>& names);
+
+/// Names are the same if they differ in case, spaces, hyphens and underscores only: without them.
+std::string simplifiedName(const std::string& name);
 
 }  // namespace curvisplat

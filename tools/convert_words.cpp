@@ -10,6 +10,8 @@ OpenGridOptions gridOptions(const ConvertWords& words, const std::filesystem::pa
   OpenGridOptions grid = words.grid;
   grid.temporary_folder = words.temporary_folder.empty() ? cache.parent_path() : words.temporary_folder;
   if (grid.temporary_folder.empty()) grid.temporary_folder = ".";
+  grid.scalars = words.scalars;
+  grid.scalars.insert(grid.scalars.end(), words.added_scalars.begin(), words.added_scalars.end());
   return grid;
 }
 

@@ -8,7 +8,8 @@
 namespace curvisplat {
 
 /// Adds --byte-order, --records, --precision, --blocks, --iblank, --ascii and --binary to `app`; parsing sets
-/// options.force. `options` must live until then.
+/// options.force. Adds --sphere, --flat and --vertical-scale, which set options.globe. `options` must live
+/// until then.
 void addGridOptions(CLI::App& app, OpenGridOptions& options);
 
 }  // namespace curvisplat

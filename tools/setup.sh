@@ -9,7 +9,7 @@ packages=(
   # octree and conversion; OpenVDB's CMake module asks for Boost's iostreams
   libopenvdb-dev libboost-iostreams-dev libtbb-dev libzstd-dev libxxhash-dev
   # grid files
-  libcgns-dev
+  libcgns-dev libnetcdf-dev
   # vectors, texts, command line, manifests
   libglm-dev libfmt-dev libcli11-dev nlohmann-json3-dev
   # pictures, and OpenGL without a display

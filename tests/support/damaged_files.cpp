@@ -204,4 +204,13 @@ DamageReport openCorrupted(const std::filesystem::path& file, int count, uint64_
   return trials.report;
 }
 
+std::string harm(const char* what, const DamageReport& report) {
+  fmt::print("{}: {} the same, {} changed, {} refused, {} crashes of libraries\n", what, report.same,
+             report.changed, report.refused, report.library_crashes.size());
+  for (const std::string& crash : report.library_crashes) fmt::print("  crash of a library: {}\n", crash);
+  std::string failures;
+  for (const std::string& failure : report.failures) failures += failure + "\n";
+  return failures;
+}
+
 }  // namespace curvisplat
