@@ -19,6 +19,11 @@ class GlBackend final : public PaintingBackend {
     gl_.run([&](const GlContext&) { job(*painter_); });
   }
   const std::string& name() const override { return gl_.contextName(); }
+  std::span<ScreenSplat> splatMemory(size_t count) override {
+    std::span<ScreenSplat> mapped;
+    gl_.run([&](const GlContext&) { mapped = painter_->mapSplats(count); });
+    return mapped.empty() ? PaintingBackend::splatMemory(count) : mapped;
+  }
   uint64_t bytes(ImageSize size, const PaintResources&) const override {
     return uint64_t{4} * sizeof(float) * static_cast<uint64_t>(size.width) *
            static_cast<uint64_t>(size.height);  // the framebuffer
@@ -44,6 +49,12 @@ class CpuBackend final : public PaintingBackend {
 };
 
 }  // namespace
+
+std::span<ScreenSplat> PaintingBackend::splatMemory(size_t count) {
+  splats_.reset();
+  splats_ = std::make_unique_for_overwrite<ScreenSplat[]>(count);
+  return {splats_.get(), count};
+}
 
 std::unique_ptr<PaintingBackend> makeBackend(Backend backend) {
   // The only OpenGL so far is OSMesa, which is software.

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "render/painter.h"
@@ -25,8 +26,14 @@ class PaintingBackend {
   virtual void run(const Job& job) = 0;
   /// For people: "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
   virtual const std::string& name() const = 0;
+  /// Memory for so many splats, to be drawn from without copying them where the painter can. It takes the
+  /// place of what was given before.
+  virtual std::span<ScreenSplat> splatMemory(size_t count);
   /// Beside the result, for a frame of this size.
   virtual uint64_t bytes(ImageSize size, const PaintResources& resources) const = 0;
+
+ private:
+  std::unique_ptr<ScreenSplat[]> splats_;
 };
 
 /// Throws Error if that cannot be had: which library was tried, and what it said.

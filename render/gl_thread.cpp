@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "render/thread_name.h"
+#include "stream/thread_name.h"
 
 namespace curvisplat {
 

@@ -30,8 +30,13 @@ class Painter {
   /// is larger than the painter's limit, which it names.
   virtual void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
                      bool per_pixel, const PaintResources& resources = {}) = 0;
-  /// Blends `splats` over the frame in their order: farthest first. The span is free when the call returns.
+  /// Blends `splats` over the frame in their order: farthest first. The span is free when the call returns,
+  /// but for those that drawsUnderWay() counts.
   virtual void draw(std::span<const ScreenSplat> splats) = 0;
+  /// The last so many draws may still read their splats, where those lie in PaintingBackend::splatMemory().
+  virtual size_t drawsUnderWay() const { return 0; }
+  /// Waits until none is.
+  virtual void finishDraws() {}
   /// Waits for the drawing and gives the picture.
   virtual Image end() = 0;
 

@@ -142,7 +142,8 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const As
   fmt::print("bounds     {} .. {}\n           {} .. {}\n           {} .. {}\n", m.lower.x, m.upper.x,
              m.lower.y, m.upper.y, m.lower.z, m.upper.z);
   fmt::print("volume     {:.8g}\n", m.volume);
-  fmt::print("nodes      {} in {} blocks, {} blanked\n", m.nodes, m.blocks.size(), m.blanked_nodes);
+  fmt::print("{}      {} in {} blocks, {} blanked\n", m.cells ? "cells" : "nodes", m.nodes, m.blocks.size(),
+             m.blanked_nodes);
   fmt::print("splats     {} at the finest level\n", m.splats);
   fmt::print("steps      {}\n", m.steps.size());
   for (const VariableInfo& variable : m.variables)
@@ -153,7 +154,7 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const As
   for (size_t n = 0; n < levels.size(); ++n)
     fmt::print("{:>5} {:>9} {:>9} {:>13} {:>12} {:>12} {:>10.3g}\n", n, levels[n].bricks, levels[n].leaves,
                levels[n].splats, levels[n].geometry_bytes, levels[n].values_bytes, levels[n].largest_error);
-  fmt::print("\nfile                      bytes   a node drawn\n");
+  fmt::print("\nfile                      bytes   a {} drawn\n", m.cells ? "cell" : "node");
   for (const FileInfo& file : m.files)
     fmt::print("{:<18} {:>12} {:>14.3f}\n", file.name, file.size, perNode(m, file.size));
   fmt::print("{:<18} {:>12} {:>14.3f}\n", "all", totalBytes(m), perNode(m, totalBytes(m)));

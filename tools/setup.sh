@@ -8,6 +8,8 @@ packages=(
   g++ cmake ninja-build pkg-config
   # octree and conversion; OpenVDB's CMake module asks for Boost's iostreams
   libopenvdb-dev libboost-iostreams-dev libtbb-dev libzstd-dev libxxhash-dev
+  # reads without waiting
+  liburing-dev
   # grid files
   libcgns-dev libnetcdf-dev
   # vectors, texts, command line, manifests

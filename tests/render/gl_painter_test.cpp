@@ -67,6 +67,38 @@ TEST_F(GlPainterTest, DrawsOneSplatAsSpecified) {
   }
 }
 
+TEST_F(GlPainterTest, DrawsFromMappedMemoryWithoutCopying) {
+  const ImageSize size{160, 120};
+  const auto splats = randomSplats(3000, 8, 160, 120);
+  const auto table = lively();
+  gl_.run([&](const GlContext& context) {
+    GlPainter painter(context);
+    painter.begin(size, kWhite, table, true);
+    painter.draw(splats);
+    const Image copied = painter.end();
+    for (int repetition = 0; repetition < 2; ++repetition) {
+      const std::span<ScreenSplat> mapped = painter.mapSplats(splats.size() + 7);
+      ASSERT_EQ(mapped.size(), splats.size() + 7) << painter.drawsUnderWay();
+      std::copy(splats.begin(), splats.end(), mapped.begin() + 5);
+      painter.begin(size, kWhite, table, true);
+      for (size_t begin = 0; begin < splats.size(); begin += 500) {
+        painter.draw(mapped.subspan(5 + begin, 500));
+        EXPECT_LE(painter.drawsUnderWay(), begin / 500 + 1);
+        EXPECT_LT(painter.drawsUnderWay(), 4u);
+      }
+      EXPECT_EQ(painter.end().rgba, copied.rgba);
+      EXPECT_EQ(painter.uploadSeconds(), 0);
+      painter.finishDraws();
+      EXPECT_EQ(painter.drawsUnderWay(), 0u);
+      // What lies elsewhere is copied all the same.
+      painter.begin(size, kWhite, table, true);
+      painter.draw(splats);
+      EXPECT_EQ(painter.end().rgba, copied.rgba);
+      EXPECT_GT(painter.uploadSeconds(), 0);
+    }
+  });
+}
+
 TEST_F(GlPainterTest, TopOfTheImageIsTheFirstRow) {
   const ScreenSplat splat{10, 3, 2, 0, 2, 1, 0.9f, 0, 0, 0};
   const Image image = paint({&splat, 1}, lively(), false, {20, 20});
