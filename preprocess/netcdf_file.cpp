@@ -3,6 +3,7 @@
 #include <netcdf.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <functional>
@@ -11,19 +12,21 @@
 #include <numeric>
 
 #include "preprocess/data_library_lock.h"
+#include "preprocess/netcdf_classic.h"
 #include "stream/error.h"
 
 namespace curvisplat {
 namespace {
 
 // For each open variable: a slab's rows lie in a few chunks, as a rule.
-constexpr size_t kChunkCacheBytes = size_t{8} << 20;
+constexpr size_t kChunkCacheBytes = size_t{2} << 20;
 constexpr size_t kChunkCacheSlots = 1009;
 constexpr float kChunkCachePreemption = 0.75f;
 // Texts and lists of numbers: descriptions, not data.
 constexpr size_t kMostAttributeValues = size_t{1} << 20;
 // Deflate makes a thousandth of zeros.
-constexpr uint64_t kMostCompression = 1100;
+constexpr double kMostCompression = 1100;
+constexpr const char* kNetcdf4 = "NetCDF-4";
 
 bool isClassic(std::string_view mark) {
   return mark.starts_with("CDF\x01") || mark.starts_with("CDF\x02") || mark.starts_with("CDF\x05");
@@ -101,7 +104,11 @@ bool NetcdfFile::recognises(const InputFile& file) {
 }
 
 NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
-  const uint64_t bytes = InputFile(path).size();
+  const InputFile file(path);
+  const uint64_t bytes = file.size();
+  std::array<char, 4> begin{};
+  if (bytes >= begin.size()) file.readAt(0, std::span<char>(begin));
+  if (isClassic({begin.data(), begin.size()})) checkClassicNetcdf(file);
   const std::lock_guard lock(dataLibraryMutex());
   nc_set_chunk_cache(kChunkCacheBytes, kChunkCacheSlots, kChunkCachePreemption);
   // A relative path might look like an address of the network.
@@ -110,7 +117,7 @@ NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
     fail("the file", status);
   try {
     readHeader();
-    checkSize(bytes);
+    if (kind_ == kNetcdf4) checkSizes(bytes);
   } catch (...) {
     nc_close(file_);
     throw;
@@ -132,7 +139,7 @@ void NetcdfFile::readHeader() {
   int status = nc_inq(file_, &dimensions, &variables, &attributes, &unlimited);
   if (status == NC_NOERR) status = nc_inq_format(file_, &format);
   if (status != NC_NOERR) fail("the header", status);
-  kind_ = format == NC_FORMAT_NETCDF4 || format == NC_FORMAT_NETCDF4_CLASSIC ? "NetCDF-4" : "NetCDF classic";
+  kind_ = format == NC_FORMAT_NETCDF4 || format == NC_FORMAT_NETCDF4_CLASSIC ? kNetcdf4 : "NetCDF classic";
 
   std::vector<int> ids(static_cast<size_t>(std::max(0, dimensions)));
   // NetCDF-4 numbers its dimensions as it likes.
@@ -208,21 +215,17 @@ void NetcdfFile::readAttributes(int id, int count, NetcdfVariable& variable) con
   }
 }
 
-/// NetCDF reads zeros behind the end of a classic file, and believes lengths.
-void NetcdfFile::checkSize(uint64_t file_bytes) const {
-  const double most =
-      static_cast<double>(file_bytes) * static_cast<double>(kind_ == "NetCDF-4" ? kMostCompression : 1);
-  double needed = 0;
+void NetcdfFile::checkSizes(uint64_t file_bytes) const {
+  const double most = static_cast<double>(file_bytes) * kMostCompression;
   for (const NetcdfVariable& variable : variables_) {
     auto bytes = static_cast<double>(variable.value_bytes);
     for (const size_t dim : variable.dims) bytes *= static_cast<double>(dimensions_[dim].length);
-    needed = kind_ == "NetCDF-4" ? std::max(needed, bytes) : needed + bytes;
+    if (bytes > most)
+      throw Error(
+          "{}: {} should have {:.0f} bytes, more than a file of {} can hold; the file is damaged: copy "
+          "or write it again",
+          path_.string(), variable.name, bytes, file_bytes);
   }
-  if (needed > most)
-    throw Error(
-        "{}: its variables need {:.0f} bytes, and it has {}: it is truncated or damaged; copy or write "
-        "it again",
-        path_.string(), needed, file_bytes);
 }
 
 NetcdfFile::Packing NetcdfFile::packingOf(const NetcdfVariable& variable) const {

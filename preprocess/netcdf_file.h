@@ -61,7 +61,7 @@ class NetcdfFile {
   static bool recognises(const InputFile& file);
 
   const std::filesystem::path& path() const { return path_; }
-  const std::string& kind() const { return kind_; }  // "classic", "NetCDF-4"
+  const std::string& kind() const { return kind_; }  // "NetCDF classic", "NetCDF-4"
   const std::vector<NetcdfDimension>& dimensions() const { return dimensions_; }
   const std::vector<NetcdfVariable>& variables() const { return variables_; }
   const NetcdfVariable* find(std::string_view name) const;
@@ -84,7 +84,7 @@ class NetcdfFile {
   void readHeader();
   void readVariable(int id);
   void readAttributes(int id, int count, NetcdfVariable& variable) const;
-  void checkSize(uint64_t file_bytes) const;
+  void checkSizes(uint64_t file_bytes) const;
   Packing packingOf(const NetcdfVariable& variable) const;
   template <typename Value>
   static void unpack(const Packing& packing, std::span<Value> values);

@@ -33,8 +33,7 @@ TEST_P(NetcdfDamage, TruncatedFilesAreRefused) {
 TEST_P(NetcdfDamage, FilesWithAWrongByteAreRefusedOrRead) {
   const DamageReport report = openCorrupted(path_, 1000, 23, open);
   EXPECT_EQ(harm("a wrong byte", report), "");
-  EXPECT_GT(report.refused, 10);
-  EXPECT_GT(report.changed, 10);
+  EXPECT_GT(report.refused, 50);
 }
 
 INSTANTIATE_TEST_SUITE_P(Types, NetcdfDamage,
