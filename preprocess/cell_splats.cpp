@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "preprocess/hexahedron.h"
+#include "preprocess/lattice_gradient.h"
 #include "preprocess/lq.h"
 #include "preprocess/node_reader.h"
 #include "preprocess/shape.h"
@@ -17,8 +18,6 @@ namespace {
 
 // A hexahedron whose volume is so far from its Jacobian's is folded: its axes stay as they are.
 constexpr double kMostVolumeRatio = 8;
-// Centres of neighbours that lie in a plane, up to this, say nothing of the slope across it.
-constexpr double kFlat = 1e-7;
 
 /// What the cells of a box have in common.
 class Cells {
@@ -96,41 +95,6 @@ double smallestAxis(const glm::dvec3& centre) {
   return std::max(kAxisFloor * (length > 0 ? length : 1.0), std::numeric_limits<double>::min());
 }
 
-/// Differences along i, j, k of a cell and its neighbours to differences across this cell: of the linear
-/// field that has them. `steps`: columns are how far apart the neighbours' centres are.
-class CellGradient {
- public:
-  CellGradient(const glm::dmat3& steps, const glm::dmat3& jacobian) : jacobian_(jacobian) {
-    duals_[0] = glm::cross(steps[1], steps[2]);
-    duals_[1] = glm::cross(steps[2], steps[0]);
-    duals_[2] = glm::cross(steps[0], steps[1]);
-    const double determinant = glm::dot(steps[0], duals_[0]);
-    const double size = glm::length(steps[0]) * glm::length(steps[1]) * glm::length(steps[2]);
-    solves_ = std::abs(determinant) > kFlat * size;
-    if (solves_) {
-      for (int axis = 0; axis < 3; ++axis) duals_[axis] /= determinant;
-      return;
-    }
-    for (int axis = 0; axis < 3; ++axis) {
-      const double step = glm::length(steps[axis]);
-      scale_[axis] = step > 0 ? std::min(glm::length(jacobian[axis]) / step, 2.0) : 0.0;
-    }
-  }
-
-  glm::dvec3 operator()(const glm::dvec3& differences) const {
-    if (!solves_) return differences * scale_;
-    const glm::dvec3 gradient =
-        differences.x * duals_[0] + differences.y * duals_[1] + differences.z * duals_[2];
-    return gradient * jacobian_;
-  }
-
- private:
-  const glm::dmat3& jacobian_;
-  std::array<glm::dvec3, 3> duals_;
-  glm::dvec3 scale_{1.0};
-  bool solves_;
-};
-
 void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
   const size_t node = nodeAt(i, j, k), cell = cellAt(i, j, k);
   const Hexahedron hexahedron(corners(node));
@@ -161,14 +125,14 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
                                           scratch_.centre[has_before ? cell - cell_strides[axis] : cell])
                       : jacobian[axis];
   }
-  const CellGradient across(steps, jacobian);
+  const LatticeGradient gradient_of(steps);
   const auto set_values = [&](double scale, const auto& rotate) {
     SplatScalar* value = out_.values.data() + count_ * in_.nodes->scalars.size();
     for (const std::vector<float>& f : in_.nodes->scalars) {
       glm::dvec3 differences;
       for (int axis = 0; axis < 3; ++axis)
         differences[axis] = per_step[axis] * (double{f[after[axis]]} - double{f[before[axis]]});
-      *value++ = {f[node], scale * rotate(across(differences)), 0.0};
+      *value++ = {f[node], scale * rotate(gradient_of(differences) * jacobian), 0.0};
     }
   };
   // Axes that have the volume of the hexahedron, where they are near it; a weight of its own elsewhere.

@@ -52,9 +52,6 @@ bool empty(const CgnsBox& box) {
 
 CgnsSource::CgnsSource(const OpenGridOptions& options)
     : file_(options.grid), tree_(readCgnsTree(file_, options.time_step.value_or(0))) {
-  if (!options.solutions.empty())
-    throw Error("{}: is given with the CGNS file {}, which has its own solutions: give it alone",
-                options.solutions.front().string(), options.grid.string());
   description_.files.push_back(options.grid.string());
   description_.times = tree_.times;
   description_.time_step = options.time_step.value_or(0);

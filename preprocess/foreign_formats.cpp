@@ -14,13 +14,13 @@ struct Magic {
 using namespace std::string_view_literals;
 
 constexpr Magic kMagics[] = {
-    {"# vtk DataFile"sv, "a legacy VTK file, which is not read yet"},
-    {"<VTKFile"sv, "a VTK XML file, which is not read yet"},
-    {"<?xml"sv, "an XML file (VTK?), which is not read yet"},
-    {"\x89HDF\r\n\x1a\n"sv, "an HDF5 file (CGNS or NetCDF?), which has its own grid: give it alone"},
-    {"CDF\x01"sv, "a NetCDF file, which has its own grid: give it alone"},
-    {"CDF\x02"sv, "a NetCDF file, which has its own grid: give it alone"},
-    {"CDF\x05"sv, "a NetCDF file, which has its own grid: give it alone"},
+    {"# vtk DataFile"sv, "a legacy VTK file"},
+    {"<VTKFile"sv, "a VTK XML file"},
+    {"<?xml"sv, "an XML file"},
+    {"\x89HDF\r\n\x1a\n"sv, "an HDF5 file"},
+    {"CDF\x01"sv, "a NetCDF file"},
+    {"CDF\x02"sv, "a NetCDF file"},
+    {"CDF\x05"sv, "a NetCDF file"},
     {"#!TDV"sv, "a Tecplot binary file, which is not read"},
     {"C Binary"sv, "an EnSight file, which is not read"},
     {"{"sv, "a JSON file: of a .p3d description, give the grid and solution files it names"},
@@ -47,7 +47,7 @@ std::optional<std::string> foreignFormat(const InputFile& file) {
   for (const Magic& magic : kMagics)
     if (begin.starts_with(magic.bytes)) return magic.words;
   // Its first four bytes differ between versions.
-  if (begin.find("ADF Database") == 4) return "a CGNS (ADF) file, which has its own grid: give it alone";
+  if (begin.find("ADF Database") == 4) return "a CGNS (ADF) file";
   return std::nullopt;
 }
 

@@ -7,6 +7,8 @@
 #include <map>
 
 #include "preprocess/cf_roles.h"
+#include "preprocess/scalar_names.h"
+#include "preprocess/time_steps.h"
 #include "stream/error.h"
 
 namespace curvisplat {
@@ -66,9 +68,6 @@ NetcdfSource::NetcdfSource(const OpenGridOptions& options)
 
 CfGrid NetcdfSource::chooseGrid(const NetcdfFile& file, const OpenGridOptions& options,
                                 GridDescription& description, size_t& mask) {
-  if (!options.solutions.empty())
-    throw Error("{}: is given with the NetCDF file {}, which has its own variables: give it alone",
-                options.solutions.front().string(), options.grid.string());
   CfGrids found = findCfGrids(file, options.time_step.value_or(0));
   if (found.grids.empty()) {
     std::string why = "it has no variable of three dimensions in space";
@@ -123,12 +122,11 @@ Globe NetcdfSource::globeOf(const GlobeOptions& options) const {
 
 void NetcdfSource::describe(const OpenGridOptions& options) {
   description_.files.push_back(options.grid.string());
-  description_.time_step = options.time_step.value_or(0);
   description_.times = cfTimes(file_, grid_);
-  const size_t steps = grid_.dims.time ? description_.times.size() : 1;
-  if (description_.time_step >= steps)
-    throw Error("{}: has {} time step{}, numbered from 0; --time-step {} is none of them",
-                file_.path().string(), steps, steps == 1 ? "" : "s", description_.time_step);
+  if (grid_.dims.time && description_.times.empty())
+    throw Error("{}: has no values yet: there are none along {}", file_.path().string(),
+                file_.dimensions()[*grid_.dims.time].name);
+  description_.time_step = chosenTimeStep(file_.path().string(), description_.times, options.time_step);
 
   const auto length = [&](size_t axis) { return file_.dimensions()[grid_.dims.axes[axis]].length; };
   description_.blocks.push_back({dimensionsInWords(file_, grid_), length(0), length(1), length(2), true});
@@ -150,7 +148,8 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
                                     grid_.longitude.variable().name, grid_.latitude.variable().name, shape,
                                     grid_.vertical.words(), options.globe.vertical_scale);
   if (grid_.dims.time)
-    description_.format += fmt::format(", time step {} of {}", description_.time_step, steps);
+    description_.format +=
+        fmt::format(", time step {} of {}", description_.time_step, description_.times.size());
 }
 
 void NetcdfSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,

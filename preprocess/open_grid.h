@@ -26,11 +26,13 @@ struct OpenGridOptions {
 /// Throws Error naming the file, what was expected and what was found.
 std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options);
 
-/// Positions in the description's scalars of `names` (a name, or a number for a function file's variable); no
-/// names: the first scalar. Throws UsageError that lists the names there are.
+/// Positions in the description's scalars of `names` (a name, or a number: of a function file's variable, or
+/// PLOT3D's of a function); no names: the first scalar, if the files hold any. Throws UsageError that lists
+/// the names there are.
 std::vector<uint32_t> scalarsNamed(const GridDescription& description, const std::vector<std::string>& names);
 
-/// Names are the same if they differ in case, spaces, hyphens and underscores only: without them.
-std::string simplifiedName(const std::string& name);
+/// What a person may not expect of the numbers among `names`: a line for each that means two scalars.
+std::vector<std::string> notesOnNumbers(const GridDescription& description,
+                                        const std::vector<std::string>& names);
 
 }  // namespace curvisplat

@@ -1,5 +1,6 @@
 #include "render/frame.h"
 
+#include "render/first_picture.h"
 #include "render/frame_pipeline.h"
 #include "render/frame_plan.h"
 #include "stream/error.h"
@@ -24,11 +25,23 @@ struct FrameRenderer::State {
                Progress* progress) {
     statistics = {};
     const StageTimer total(statistics.total_s);
-    const FramePlan plan = timed(statistics.plan_s, [&] { return planner.plan(camera, options); });
+    const FramePlan plan =
+        timed(statistics.plan_s, [&] { return planner.plan(camera, options, pipeline.order()); });
     return pipeline.draw(plan, options, statistics, progress);
   }
 
-  const FramePlanner planner;
+  Image renderQuickly(const Camera& camera, const FrameOptions& options, const QuickLimits& limits,
+                      FrameStatistics& statistics, bool& is_final, Progress* progress) {
+    statistics = {};
+    const StageTimer total(statistics.total_s);
+    const QuickPlan quick = timed(
+        statistics.plan_s, [&] { return planner.planQuick(camera, options, limits, pipeline.order()); });
+    is_final = quick.isFinal();
+    Image picture = pipeline.draw(quick.plan, options, statistics, progress);
+    return quick.size.isWhole() ? picture : quick.size.enlarge(picture);
+  }
+
+  FramePlanner planner;
   FramePipeline pipeline;
 };
 
@@ -52,21 +65,18 @@ void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions
                                         FrameStatistics& statistics, const ShowPicture& show,
                                         Progress* progress) {
   const FramePipeline::Running running(state_->pipeline);
-  statistics = {};
-  Image picture;
   bool is_final = false;
-  {
-    const StageTimer total(statistics.total_s);
-    const FirstPicturePlan first =
-        timed(statistics.plan_s, [&] { return state_->planner.planFirst(camera, options); });
-    picture = state_->pipeline.draw(first.plan, options, statistics, progress);
-    if (!first.size.isWhole()) picture = first.size.enlarge(picture);
-    is_final = first.isFinal();
-  }
+  Image picture = state_->renderQuickly(camera, options, kFirstPicture, statistics, is_final, progress);
   show(picture, is_final);
   if (is_final) return;
   picture = Image();
   show(state_->render(camera, options, statistics, progress), true);
+}
+
+Image FrameRenderer::renderQuickly(const Camera& camera, const FrameOptions& options,
+                                   const QuickLimits& limits, FrameStatistics& statistics, bool& is_final) {
+  const FramePipeline::Running running(state_->pipeline);
+  return state_->renderQuickly(camera, options, limits, statistics, is_final, nullptr);
 }
 
 void FrameRenderer::cancel() {
@@ -75,10 +85,19 @@ void FrameRenderer::cancel() {
 
 void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options) {
   try {
-    state_->pipeline.prefetch(state_->planner.plan(camera, options), options);
+    state_->pipeline.prefetch(state_->planner.plan(camera, options, state_->pipeline.order()), options);
   } catch (const Error&) {
     // render() will say it.
   }
+}
+
+void FrameRenderer::setTransferFunction(const TransferFunction& transfer_function) {
+  const FramePipeline::Running running(state_->pipeline);
+  state_->planner.setTransferFunction(transfer_function);
+}
+
+ScreenView FrameRenderer::screenView(const Camera& camera, const FrameOptions& options) const {
+  return state_->planner.screenView(camera, options, options.size);
 }
 
 }  // namespace curvisplat

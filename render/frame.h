@@ -1,6 +1,7 @@
 // One frame: the pipeline of design section 6, as a call.
 //
-//   plan (the cut, back to front) -> read -> prepare (workers: decode, project, sort) -> draw (a painter)
+//   plan (the cut, in the painter's order) -> read -> prepare (workers: decode, project, sort) -> draw (a
+//   painter)
 //   -> image
 //
 // Bricks are prepared by workers in any order and drawn in the cut's order; what is prepared and not yet
@@ -23,6 +24,7 @@
 
 #include "render/backend.h"
 #include "render/camera.h"
+#include "render/first_picture.h"
 #include "render/image.h"
 #include "render/projection.h"
 #include "render/transfer_function.h"
@@ -73,6 +75,10 @@ struct FrameStatistics : FetchStatistics {
   uint64_t splats_read = 0;
   uint64_t splats_clipped = 0, splats_off_screen = 0, splats_transparent = 0;  // read, and not drawn, since
   uint64_t splats_drawn = 0;
+  /// Parts that were left out because what is before them hides them, and splats handed to the painter for
+  /// which it found that. How many depends on how far the stages are ahead of one another; the picture does
+  /// not.
+  uint64_t bricks_hidden = 0, splats_hidden = 0;
   int largest_level = 0;
   double largest_error_px = 0;  // on the screen, of what is drawn; infinite around a perspective eye
   unsigned workers = 0;
@@ -103,7 +109,13 @@ class FrameRenderer {
   void renderProgressively(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                            const ShowPicture& show, Progress* progress = nullptr);
 
-  /// Makes what is under way, render() or renderProgressively(), throw Cancelled soon: within what a worker
+  /// The best picture within `limits`, drawn with fewer pixels and enlarged where it has no detail for all of
+  /// them: for a camera that moves. `is_final` is set to whether it is the one that render() returns. Throws
+  /// as render() does.
+  Image renderQuickly(const Camera& camera, const FrameOptions& options, const QuickLimits& limits,
+                      FrameStatistics& statistics, bool& is_final);
+
+  /// Makes what is under way, of the three above, throw Cancelled soon: within what a worker
   /// takes for a brick and the painter for a segment. One that has not begun is not affected. Any thread.
   void cancel();
 
@@ -111,6 +123,12 @@ class FrameRenderer {
   /// the cache of bricks has room for it. The next frame or prefetch() ends it; nothing that goes wrong in it
   /// is told before render().
   void prefetch(const Camera& camera, const FrameOptions& options);
+
+  /// For the frames to come; decoded bricks stay. Ends a prefetch.
+  void setTransferFunction(const TransferFunction& transfer_function);
+
+  /// How such a frame comes to the screen. Throws UsageError as render() does.
+  ScreenView screenView(const Camera& camera, const FrameOptions& options) const;
 
   /// "CPU, AVX3"; "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
   const std::string& backendName() const;

@@ -2,6 +2,7 @@
 
 #include <exception>
 #include <span>
+#include <utility>
 
 #include "render/frame_budget.h"
 #include "render/frame_workers.h"
@@ -93,13 +94,19 @@ void FramePipeline::makePools(const FrameOptions& options) {
 
 Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
                           Progress* progress) {
-  const FrameWork work{cache_, plan.cut.parts, plan.settings, planner_.table(), options.keep_going};
+  const FrameWork work{cache_,  plan.cut.parts, plan.settings,     planner_.table(),
+                       order(), hidden_,        options.keep_going};
   {
     const std::lock_guard lock(mutex_);
     if (phase_ == Phase::cancelled) throw Cancelled();
     makePools(options);
     pools_->ring.reset();
-    pools_->source.start(plan.cut.parts);
+    hidden_.begin(cache_.bricks(), plan.settings.view);
+    // Back to front, nothing ever is.
+    BrickPager::Unneeded unneeded;
+    if (order() == DrawingOrder::front_to_back)
+      unneeded = [this](uint32_t brick) { return hidden_.hides(brick); };
+    pools_->source.start(plan.cut.parts, std::move(unneeded));
   }
   if (progress) progress->begin("drawing", plan.cut.parts.size(), "bricks");
   pools_->workers.start(work);
@@ -127,7 +134,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
 
   const Cut& cut = plan.cut;
   statistics.ring_peak_bytes = pools_->ring.peakSplats() * sizeof(ScreenSplat);
-  statistics.bricks_drawn = cut.parts.size();
+  statistics.bricks_drawn = cut.parts.size() - statistics.bricks_hidden;
   statistics.bricks_out_of_image = cut.out_of_image;
   statistics.bricks_transparent = cut.transparent;
   statistics.bricks_culled = cut.out_of_image + cut.transparent;
@@ -145,12 +152,14 @@ Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, F
     const DrawsFinished finished(painter);
     painter.begin(plan.settings.view.size, options.background, planner_.table(), plan.settings.per_pixel,
                   resourcesOf(options));
+    hidden_.ask(&painter);
     SegmentDrawer drawer(painter, pools_->ring, statistics.painter_waited_s);
     for (size_t drawn = 0; drawn < plan.cut.parts.size(); ++drawn) {
       if (!drawer.drawNext()) return;
       if (progress) progress->advance(1);
     }
     image = painter.end();
+    statistics.splats_hidden = painter.hiddenSplats();
     statistics.upload_s = painter.uploadSeconds();
     statistics.draw_s = painter.drawSeconds();
   });

@@ -18,6 +18,7 @@
 #include "render/backend.h"
 #include "render/frame.h"
 #include "render/frame_plan.h"
+#include "render/hidden_bricks.h"
 #include "stream/cache_reader.h"
 #include "stream/progress.h"
 
@@ -54,6 +55,8 @@ class FramePipeline {
   /// Begins to fetch for such a frame, in the background. Throws UsageError for too little memory.
   void prefetch(const FramePlan& plan, const FrameOptions& options);
 
+  /// In which it wants the cut.
+  DrawingOrder order() const { return backend_->order(); }
   const std::string& backendName() const { return backend_->name(); }
 
  private:
@@ -68,6 +71,7 @@ class FramePipeline {
   const size_t variable_;
   const FramePlanner& planner_;
   const std::unique_ptr<PaintingBackend> backend_;
+  HiddenBricks hidden_;
 
   enum class Phase { idle, running, cancelled };
   std::mutex mutex_;  // guards the two below; cancel() comes from another thread

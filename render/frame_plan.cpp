@@ -1,5 +1,6 @@
 #include "render/frame_plan.h"
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <utility>
@@ -34,8 +35,9 @@ TransparentBounds transparentIn(const ClassificationTable& table, const Projecti
   };
 }
 
-CutOptions limitsOf(const FrameOptions& options) {
+CutOptions limitsOf(const FrameOptions& options, DrawingOrder order) {
   CutOptions limits;
+  limits.order = order;
   limits.lod_pixels = options.lod_pixels;
   limits.max_splats = options.max_splats.value_or(CutOptions::kNoLimit);
   return limits;
@@ -56,13 +58,21 @@ uint64_t FramePlanner::bytes() const {
           kFrameBytesABrick);
 }
 
-ProjectionSettings FramePlanner::settingsFor(const Camera& camera, const FrameOptions& options,
-                                             ImageSize size) const {
+void FramePlanner::setTransferFunction(const TransferFunction& transfer_function) {
+  table_ = tableFor(cache_, variable_, transfer_function);
+}
+
+ScreenView FramePlanner::screenView(const Camera& camera, const FrameOptions& options, ImageSize size) const {
   const Manifest& manifest = cache_.manifest();
   const double diagonal = glm::length(options.scale * (manifest.upper - manifest.lower));
   const double near = kNearInDiagonals * (diagonal > 0 ? diagonal : manifest.root.size);
-  return {ScreenView::of(camera, size, options.scale, options.low_pass_px2, near),
-          options.classification == Classification::pixel, options.clip_box};
+  return ScreenView::of(camera, size, options.scale, options.low_pass_px2, near);
+}
+
+ProjectionSettings FramePlanner::settingsFor(const Camera& camera, const FrameOptions& options,
+                                             ImageSize size) const {
+  return {screenView(camera, options, size), options.classification == Classification::pixel,
+          options.clip_box};
 }
 
 Cut FramePlanner::chooseCut(const ProjectionSettings& settings, const FrameOptions& options,
@@ -76,15 +86,19 @@ Cut FramePlanner::chooseCut(const ProjectionSettings& settings, const FrameOptio
   return cut;
 }
 
-FramePlan FramePlanner::plan(const Camera& camera, const FrameOptions& options) const {
+FramePlan FramePlanner::plan(const Camera& camera, const FrameOptions& options, DrawingOrder order) const {
   const ProjectionSettings settings = settingsFor(camera, options, options.size);
-  return {settings, chooseCut(settings, options, limitsOf(options))};
+  return {settings, chooseCut(settings, options, limitsOf(options, order))};
 }
 
-FirstPicturePlan FramePlanner::planFirst(const Camera& camera, const FrameOptions& options) const {
+QuickPlan FramePlanner::planQuick(const Camera& camera, const FrameOptions& options, const QuickLimits& quick,
+                                  DrawingOrder order) const {
   const ProjectionSettings settings = settingsFor(camera, options, options.size);
-  Cut cut = chooseCut(settings, options, firstPictureLimits(limitsOf(options)));
-  const ReducedSize size(options.size, cut.complete ? 0 : cut.largest_error_px);
+  CutOptions limits = limitsOf(options, order);
+  limits.max_splats = std::min(limits.max_splats, quick.max_splats);
+  limits.max_bytes = std::min(limits.max_bytes, quick.max_bytes);
+  Cut cut = chooseCut(settings, options, limits);
+  const ReducedSize size(options.size, std::max(quick.detail_px, cut.complete ? 0 : cut.largest_error_px));
   return {{size.isWhole() ? settings : settingsFor(camera, options, size.size()), std::move(cut)}, size};
 }
 

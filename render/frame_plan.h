@@ -19,23 +19,29 @@ struct FramePlan {
   Cut cut;
 };
 
-/// Of the first picture of a progressive frame.
-struct FirstPicturePlan {
+/// Of a picture that is to be had quickly.
+struct QuickPlan {
   FramePlan plan;
   ReducedSize size;
 
   /// Whether there is nothing to refine.
-  bool isFinal() const { return plan.cut.complete; }
+  bool isFinal() const { return plan.cut.complete && size.isWhole(); }
 };
 
-/// Plans frames of one variable of one cache, which outlives it. Any thread.
+/// Plans frames of one variable of one cache, which outlives it. Any number of threads may plan.
 class FramePlanner {
  public:
   FramePlanner(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function);
 
   /// Throws UsageError for a view that makes no picture, and if options.max_splats are too few.
-  FramePlan plan(const Camera& camera, const FrameOptions& options) const;
-  FirstPicturePlan planFirst(const Camera& camera, const FrameOptions& options) const;
+  FramePlan plan(const Camera& camera, const FrameOptions& options, DrawingOrder order) const;
+  /// The best picture within `limits`.
+  QuickPlan planQuick(const Camera& camera, const FrameOptions& options, const QuickLimits& limits,
+                      DrawingOrder order) const;
+
+  /// For the plans to come, while nobody plans or draws.
+  void setTransferFunction(const TransferFunction& transfer_function);
+  ScreenView screenView(const Camera& camera, const FrameOptions& options, ImageSize size) const;
 
   const ClassificationTable& table() const { return table_; }
   /// What the octree takes, and what plans and the later stages note about its bricks.
@@ -48,7 +54,7 @@ class FramePlanner {
 
   const CacheReader& cache_;
   const size_t variable_;
-  const ClassificationTable table_;
+  ClassificationTable table_;
   const std::vector<ValueBounds> subtrees_;
 };
 

@@ -53,6 +53,7 @@ void FrameWorkers::finish(FrameStatistics& sum) {
     sum.splats_off_screen += part.splats_off_screen;
     sum.splats_transparent += part.splats_transparent;
     sum.splats_drawn += part.splats_drawn;
+    sum.bricks_hidden += part.bricks_hidden;
     for (const BrickFailure& failure : part.bricks_unreadable) sum.bricks_unreadable.push_back(failure);
   }
   std::sort(sum.bricks_unreadable.begin(), sum.bricks_unreadable.end(),
@@ -108,11 +109,28 @@ std::optional<BrickSource::Splats> FrameWorkers::fetch(Worker& worker, uint64_t 
   }
 }
 
+/// A part that is hidden. False if the ring was stopped.
+bool FrameWorkers::passOver(Worker& worker, uint64_t sequence) {
+  {
+    const StageTimer timer(worker.statistics.workers_waited_s);
+    if (!ring_.acquire(sequence, 0)) return false;
+  }
+  ring_.commit(sequence);
+  ++worker.statistics.bricks_hidden;
+  return true;
+}
+
 bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
   FrameStatistics& statistics = worker.statistics;
+  const uint32_t brick = work_->parts[sequence].brick;
+  if (work_->hidden.hides(brick)) {
+    source_.pass(sequence);
+    return passOver(worker, sequence);
+  }
   {
     const std::optional<BrickSource::Splats> fetched = fetch(worker, sequence);
     if (!fetched) return false;
+    if (work_->hidden.hides(brick)) return passOver(worker, sequence);
     const StageTimer timer(statistics.project_s);
     worker.projector.project(work_->settings, work_->table,
                              work_->cache.manifest().root.cellMin(fetched->cell), fetched->geometry,
@@ -122,7 +140,7 @@ bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
   std::span<const uint32_t> order;
   {
     const StageTimer timer(statistics.sort_s);
-    order = worker.sorter.farthestFirst(worker.projector.depths());
+    order = worker.sorter.sort(worker.projector.depths(), work_->order);
   }
   std::optional<std::span<ScreenSplat>> segment;
   {

@@ -12,6 +12,7 @@
 
 #include "render/classification.h"
 #include "render/frame.h"
+#include "render/hidden_bricks.h"
 #include "render/projection.h"
 #include "render/segment_ring.h"
 #include "stream/brick_source.h"
@@ -25,6 +26,8 @@ struct FrameWork {
   std::span<const BrickPart> parts;  // in drawing order: those that the source was started with
   const ProjectionSettings& settings;
   const ClassificationTable& table;
+  DrawingOrder order;  // of the parts, and to be their splats
+  const HiddenBricks& hidden;
   bool keep_going = false;
 };
 
@@ -53,6 +56,7 @@ class FrameWorkers {
   void loop(Worker& worker);
   /// False if ring or source were stopped.
   bool prepare(Worker& worker, uint64_t sequence);
+  bool passOver(Worker& worker, uint64_t sequence);
   std::optional<BrickSource::Splats> fetch(Worker& worker, uint64_t sequence);
 
   BrickSource& source_;

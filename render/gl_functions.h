@@ -58,6 +58,8 @@ namespace curvisplat {
   X(RenderbufferStorage, PFNGLRENDERBUFFERSTORAGEPROC)         \
   X(ShaderSource, PFNGLSHADERSOURCEPROC)                       \
   X(TexBuffer, PFNGLTEXBUFFERPROC)                             \
+  X(TexImage2D, PFNGLTEXIMAGE2DPROC)                           \
+  X(TexParameteri, PFNGLTEXPARAMETERIPROC)                     \
   X(Uniform1f, PFNGLUNIFORM1FPROC)                             \
   X(Uniform1i, PFNGLUNIFORM1IPROC)                             \
   X(Uniform2f, PFNGLUNIFORM2FPROC)                             \

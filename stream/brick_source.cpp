@@ -33,7 +33,7 @@ BrickSource::BrickSource(const CacheReader& cache, size_t variable, const PagerO
                          uint64_t cache_bytes)
     : cache_(cache), variable_(variable), cached_(cache_bytes), pager_(cache, variable, pager) {}
 
-void BrickSource::start(std::span<const BrickPart> parts) {
+void BrickSource::start(std::span<const BrickPart> parts, BrickPager::Unneeded unneeded) {
   parts_.assign(parts.begin(), parts.end());
   const std::vector<uint32_t> bricks = bricksOf(parts);
   cached_.beginTurn(bricks);
@@ -60,7 +60,7 @@ void BrickSource::start(std::span<const BrickPart> parts) {
   before_ = pager_.statistics();
   reads_ = to_read.size();
   hits_ = place.size() - reads_;
-  pager_.start(std::move(to_read));
+  pager_.start(std::move(to_read), std::move(unneeded));
 }
 
 std::optional<BrickSource::Splats> BrickSource::take(uint64_t sequence, Scratch& scratch) {
@@ -70,6 +70,18 @@ std::optional<BrickSource::Splats> BrickSource::take(uint64_t sequence, Scratch&
   const auto shared = shared_.find(part.brick);
   return shared == shared_.end() ? read(part, misses_[sequence], scratch)
                                  : takeShared(shared->second, part, misses_[sequence], scratch);
+}
+
+void BrickSource::pass(uint64_t sequence) {
+  if (std::exchange(pins_[sequence], {})) return;
+  if (const auto found = shared_.find(parts_[sequence].brick); found != shared_.end()) {
+    Shared& shared = found->second;
+    const std::lock_guard lock(sharing_);
+    if (--shared.left == 0) shared.pin.reset();
+    if (shared.state != Shared::State::untouched) return;
+    shared.state = Shared::State::alone;  // whoever wants it all the same
+  }
+  pager_.take(misses_[sequence]);
 }
 
 std::optional<BrickSource::Splats> BrickSource::takeShared(Shared& shared, const BrickPart& part,
@@ -109,6 +121,12 @@ std::optional<BrickSource::Splats> BrickSource::takeShared(Shared& shared, const
 std::optional<BrickSource::Splats> BrickSource::read(const BrickPart& part, uint64_t miss, Scratch& scratch) {
   std::optional<PagedBrick> bytes = await(miss, scratch);
   if (!bytes) return {};
+  if (bytes->isLeftOut()) {
+    scratch.geometry.resize(0);
+    scratch.values.resize(0);
+    return Splats{arraysOf(std::as_const(scratch.geometry)), arraysOf(std::as_const(scratch.values)),
+                  SplatRanges(Brick(), kAllOctants), cache_.bricks()[part.brick].cell, std::nullopt};
+  }
   if (!bytes->readable()) {
     // The read may have failed for a neighbour's sake. If not, this says what is wrong.
     bytes.reset();
@@ -267,7 +285,9 @@ void BrickSource::finish(FetchStatistics& statistics) {
   statistics.bytes_read = after.bytes - before_.bytes;
   statistics.read_requests = after.requests - before_.requests;
   statistics.bricks_cached = hits_;
-  statistics.bricks_read = reads_;
+  statistics.bricks_left_out = after.bricks_left_out - before_.bricks_left_out;
+  statistics.bytes_left_out = after.bytes_left_out - before_.bytes_left_out;
+  statistics.bricks_read = reads_ - statistics.bricks_left_out;
   statistics.cache_peak_bytes = cached_.statistics().peak_bytes;
   statistics.pager_peak_bytes = after.peak_bytes;
 }

@@ -34,6 +34,7 @@ struct FetchStatistics {
   double mean_queue_depth = 0;  // while a read was under way
   uint64_t bytes_read = 0, read_requests = 0;
   uint64_t bricks_cached = 0, bricks_read = 0;          // one in several parts counts once
+  uint64_t bricks_left_out = 0, bytes_left_out = 0;     // not read, since nobody needed them any more
   uint64_t cache_peak_bytes = 0, pager_peak_bytes = 0;  // so far
   std::string read_by;                                  // "io_uring, direct"
 };
@@ -60,11 +61,14 @@ class BrickSource {
     std::optional<BrickCache::Pin> pin;
   };
 
-  /// Begins a frame. Nobody may be in take() any more.
-  void start(std::span<const BrickPart> parts);
+  /// Begins a frame. Nobody may be in take() any more. `unneeded` as the pager has it.
+  void start(std::span<const BrickPart> parts, BrickPager::Unneeded unneeded = {});
   /// The brick of the `sequence`-th part; each once, any thread. Nothing once stopped. Throws Error naming
   /// the brick where the disk fails, a file has shrunk, or a checksum does not match.
+  /// No splats where `unneeded` has said so.
   std::optional<Splats> take(uint64_t sequence, Scratch& scratch);
+  /// Instead of take(), for a part of a brick that `unneeded` is true of: lets go of it.
+  void pass(uint64_t sequence);
   /// For a part that take() has failed on: what stands for its space in the nearest ancestor that can be
   /// read. No splats if none can be read.
   Splats standIn(const BrickPart& part, Scratch& scratch) const;

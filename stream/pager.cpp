@@ -39,6 +39,7 @@ PagedBrick::PagedBrick(PagedBrick&& other) noexcept
     : pager_(std::exchange(other.pager_, nullptr)),
       sequence_(other.sequence_),
       readable_(other.readable_),
+      left_out_(other.left_out_),
       geometry_(other.geometry_),
       values_(other.values_) {}
 
@@ -79,7 +80,7 @@ uint64_t BrickPager::leastBufferBytes(const CacheReader& cache, size_t variable)
   return most;
 }
 
-void BrickPager::start(std::vector<uint32_t> bricks) {
+void BrickPager::start(std::vector<uint32_t> bricks, Unneeded unneeded) {
   std::unique_lock lock(mutex_);
   stopped_ = true;
   idle_.wait(lock, [this] { return failure_ || reads_under_way_ == 0; });
@@ -90,9 +91,12 @@ void BrickPager::start(std::vector<uint32_t> bricks) {
   batches_.clear();
   waiting_.reset();
   planned_ = end_ = 0;
+  bricks_ = std::move(bricks);
+  unneeded_ = std::move(unneeded);
+  left_out_.assign(bricks_.size(), 0);
   extents_.clear();
-  extents_.reserve(bricks.size());
-  for (const uint32_t brick : bricks) extents_.push_back(extentsOf(cache_, variable_, brick));
+  extents_.reserve(bricks_.size());
+  for (const uint32_t brick : bricks_) extents_.push_back(extentsOf(cache_, variable_, brick));
   stopped_ = false;
   reads_->wake();
 }
@@ -109,6 +113,7 @@ std::optional<PagedBrick> BrickPager::take(uint64_t sequence) {
   arrived_.wait(lock, [&] { return failure_ || stopped_ || hasArrived(sequence); });
   if (failure_) std::rethrow_exception(failure_);
   if (stopped_) return {};
+  if (left_out_[sequence]) return PagedBrick::leftOut();
   const Batch& batch = batchOf(sequence);
   const size_t n = sequence - batch.first;
   const BatchBrick& brick = batch.plan.bricks[n];
@@ -157,10 +162,13 @@ void BrickPager::loop() {
 
 void BrickPager::planAhead() {
   wants_space_ = false;
+  if (unneeded_) waiting_.reset();  // some of it may be unneeded by now
   while (planned_ < extents_.size()) {
-    if (!waiting_)
-      waiting_ =
-          planBatch(std::span<const BrickExtents>(extents_).subspan(planned_), capacity_ / kBatchesInBuffer);
+    if (!waiting_) {
+      const std::span<const BrickExtents> needed = nextNeeded();
+      if (needed.empty()) return;
+      waiting_ = planBatch(needed, capacity_ / kBatchesInBuffer);
+    }
     const auto begin = spaceFor(waiting_->bytes);
     if (!begin) {
       wants_space_ = true;
@@ -178,6 +186,23 @@ void BrickPager::planAhead() {
     end_ = *begin + batch.plan.bytes;
     statistics_.peak_bytes = std::max(statistics_.peak_bytes, end_ - batches_.front().begin);
   }
+}
+
+/// Leaves out what is not needed of the bricks not planned yet; those that then follow one another.
+std::span<const BrickExtents> BrickPager::nextNeeded() {
+  const std::span<const BrickExtents> all(extents_);
+  if (!unneeded_) return all.subspan(planned_);
+  const uint64_t before = planned_;
+  while (planned_ < all.size() && unneeded_(bricks_[planned_])) {
+    for (const Extent& extent : all[planned_]) statistics_.bytes_left_out += extent.length;
+    ++statistics_.bricks_left_out;
+    left_out_[planned_++] = 1;
+  }
+  if (planned_ > before) arrived_.notify_all();
+  size_t count = 0;
+  while (count < kMostBatchBricks && planned_ + count < all.size() && !unneeded_(bricks_[planned_ + count]))
+    ++count;
+  return all.subspan(planned_, count);
 }
 
 std::optional<uint64_t> BrickPager::spaceFor(uint64_t bytes) const {
@@ -255,6 +280,7 @@ void BrickPager::finishRead(Batch& batch, uint32_t read, bool good) {
 
 bool BrickPager::hasArrived(uint64_t sequence) {
   if (sequence >= planned_) return false;
+  if (left_out_[sequence]) return true;
   const Batch& batch = batchOf(sequence);
   return batch.missing[sequence - batch.first] == 0;
 }

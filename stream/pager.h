@@ -20,6 +20,7 @@
 #include <cstdlib>
 #include <deque>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -51,6 +52,8 @@ struct PagerStatistics {
   uint64_t requests = 0;           // to the kernel
   double depth_s = 0;              // requests under way, times seconds: over reading_s it is the mean depth
   uint64_t bricks_unreadable = 0;  // handed over without bytes
+  uint64_t bricks_left_out = 0;    // were not read, since they were not needed any more
+  uint64_t bytes_left_out = 0;     // of their streams
   uint64_t peak_bytes = 0;         // of the buffer
 };
 
@@ -62,19 +65,26 @@ class PagedBrick {
   PagedBrick(BrickPager& pager, uint64_t sequence, bool readable, std::span<const std::byte> geometry,
              std::span<const std::byte> values)
       : pager_(&pager), sequence_(sequence), readable_(readable), geometry_(geometry), values_(values) {}
+  /// One that was not read because it was not needed any more.
+  static PagedBrick leftOut() { return PagedBrick(); }
   ~PagedBrick();
   PagedBrick(PagedBrick&& other) noexcept;
   PagedBrick& operator=(PagedBrick&&) = delete;
 
   /// False where a read failed or the file ended: there are no bytes.
   bool readable() const { return readable_; }
+  /// Nobody wants it: there are no bytes.
+  bool isLeftOut() const { return left_out_; }
   std::span<const std::byte> geometry() const { return geometry_; }
   std::span<const std::byte> values() const { return values_; }
 
  private:
-  BrickPager* pager_;
-  uint64_t sequence_;
-  bool readable_;
+  PagedBrick() : left_out_(true) {}
+
+  BrickPager* pager_ = nullptr;
+  uint64_t sequence_ = 0;
+  bool readable_ = false;
+  bool left_out_ = false;
   std::span<const std::byte> geometry_, values_;
 };
 
@@ -91,8 +101,13 @@ class BrickPager {
   /// The buffer that the largest brick needs: it can then be read, one after the other.
   static uint64_t leastBufferBytes(const CacheReader& cache, size_t variable);
 
+  /// Says of a brick that nobody needs it any more; it stays so.
+  using Unneeded = std::function<bool(uint32_t brick)>;
+
   /// Begins to read `bricks`. What was begun before is stopped, and all of it must have been given back.
-  void start(std::vector<uint32_t> bricks);
+  /// `unneeded`, if there is one, is asked on the pager's thread, just before a brick would be read, and not
+  /// after stop().
+  void start(std::vector<uint32_t> bricks, Unneeded unneeded = {});
   /// Waits for the `sequence`-th of the bricks; each once, by any thread. Nothing once stopped. Throws Error
   /// where reading broke off altogether.
   std::optional<PagedBrick> take(uint64_t sequence);
@@ -126,6 +141,7 @@ class BrickPager {
 
   void loop();
   void planAhead();
+  std::span<const BrickExtents> nextNeeded();
   std::optional<uint64_t> spaceFor(uint64_t bytes) const;
   void submitReads();
   void submit(uint64_t batch, uint32_t read, bool direct);
@@ -147,11 +163,14 @@ class BrickPager {
   std::unique_ptr<std::byte, Free> buffer_;
   std::unique_ptr<AsyncReads> reads_;
 
-  mutable std::mutex mutex_;         // guards all below, and not the buffer's bytes
-  std::condition_variable arrived_;  // a brick is complete, or all has stopped
-  std::condition_variable idle_;     // no read is under way
-  std::vector<BrickExtents> extents_;
-  uint64_t planned_ = 0;              // bricks in batches so far
+  mutable std::mutex mutex_;           // guards all below, and not the buffer's bytes
+  std::condition_variable arrived_;    // a brick is complete, or all has stopped
+  std::condition_variable idle_;       // no read is under way
+  std::vector<uint32_t> bricks_;       // [sequence]
+  std::vector<BrickExtents> extents_;  // [sequence]
+  Unneeded unneeded_;
+  std::vector<uint8_t> left_out_;     // [sequence]
+  uint64_t planned_ = 0;              // bricks in batches so far, or left out
   std::optional<ReadBatch> waiting_;  // the next batch, which has no space yet
   // Batches that hold space, in order. Positions count on for ever, as in a SegmentRing; modulo the capacity
   // they are places in the buffer.

@@ -102,7 +102,7 @@ void runConvert(ConvertWords words) {
   options.threads = words.threads;
   if (words.memory) options.memory_bytes = parseByteSize("--memory", *words.memory);
 
-  const auto source = openGrid(gridOptions(words, words.output));
+  const auto source = openSource(words, words.output);
   options.scalars = chooseScalars(words, words.scalars, source->description());
   options.title = words.grid.grid.stem().string();
 
@@ -123,7 +123,10 @@ void addConvert(CLI::App& app) {
   command->add_option("GRID", words->grid.grid, "Grid file")->required();
   command->add_option("SOLUTION", words->grid.solutions, "Solution (Q) and function files");
   command->add_option("-o,--output", words->output, "The cache to write, NAME.splats: a folder");
-  command->add_option("--scalar", words->scalars, "Scalars by name or number (default: the first)")
+  command
+      ->add_option("--scalar", words->scalars,
+                   "Scalars by name, or by number of a function file's variable or of PLOT3D's "
+                   "functions (default: the first)")
       ->take_all()
       ->allow_extra_args(false);
   command
@@ -143,6 +146,7 @@ void addConvert(CLI::App& app) {
                     "Replace the output if it is a cache; drop an interrupted conversion, unless --resume");
   command->add_option("--stats", words->statistics, "Write times, bytes and counts to FILE.json");
   addGridOptions(*command, words->grid);
+  addGasOptions(*command, words->gas);
   command->callback([words] {
     const bool adds = !words->added_scalars.empty() || !words->to.empty();
     adds ? runAddScalar(*words) : runConvert(*words);

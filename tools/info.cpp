@@ -18,6 +18,7 @@
 #include "tools/commands.h"
 #include "tools/grid_options.h"
 #include "tools/info_grid.h"
+#include "tools/info_system.h"
 
 namespace curvisplat {
 namespace {
@@ -29,6 +30,7 @@ struct InfoOptions {
   OpenGridOptions grid;  // grid.grid is the cache where that is a folder
   bool json = false;
   bool verify = false;
+  bool system = false;
   std::vector<double> point;  // empty, or x, y, z
 };
 
@@ -179,6 +181,9 @@ void printCacheInfo(const InfoOptions& options) {
 }
 
 void printInfo(const InfoOptions& options) {
+  if (options.system != options.grid.grid.empty())
+    throw UsageError("info: expected a cache, a grid file or --system, and one of them");
+  if (options.system) return printSystem(options.json);
   if (fs::is_directory(options.grid.grid)) return printCacheInfo(options);
   if (options.verify || !options.point.empty())
     throw UsageError("{}: --verify and --probe are for caches, and this is not a folder",
@@ -191,9 +196,10 @@ void printInfo(const InfoOptions& options) {
 void addInfo(CLI::App& app) {
   CLI::App* info = app.add_subcommand("info", "Prints what a cache or grid files hold");
   const auto options = std::make_shared<InfoOptions>();
-  info->add_option("path", options->grid.grid, "A splat cache (a folder), or a grid file")->required();
+  info->add_option("path", options->grid.grid, "A splat cache (a folder), or a grid file");
   info->add_option("solution", options->grid.solutions, "Solution or function files of the grid");
   info->add_flag("--json", options->json, "One JSON object");
+  info->add_flag("--system", options->system, "What this machine has to draw with, instead");
   info->add_flag("--verify", options->verify,
                  "Read the whole cache and look for damage; exit 1 if there is any");
   info->add_option("--probe", options->point, "The value at x,y,z, and the block, i, j, k it comes from")

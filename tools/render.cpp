@@ -13,6 +13,7 @@
 #include <string>
 #include <thread>
 
+#include "render/annotations.h"
 #include "render/frame.h"
 #include "render/image.h"
 #include "render/transfer_function.h"
@@ -41,6 +42,7 @@ struct RenderWords {
   std::optional<uint64_t> max_splats;
   unsigned threads = 0;
   bool keep_going = false;
+  Annotations annotations;
 };
 
 WorldBox parseClipBox(const std::string& text) {
@@ -72,13 +74,6 @@ FrameOptions frameOptions(const RenderWords& words) {
   options.memory_bytes = parseByteSize("--memory", words.memory);
   options.keep_going = words.keep_going;
   return options;
-}
-
-Backend parseBackend(const std::string& text) {
-  if (text == "auto") return Backend::automatic;
-  if (text == "osmesa") return Backend::osmesa;
-  if (text == "cpu") return Backend::cpu;
-  throw UsageError("--backend {}: not in this version, which has auto, osmesa and cpu", text);
 }
 
 /// What contradicts itself whatever the cache holds.
@@ -168,7 +163,7 @@ class FrameRun {
     }
     const auto show = [&](const Image& image, bool is_final) {
       if (!report_.first_image) {
-        writeImage(image, words_.first_image);
+        writeImage(annotated(image, camera), words_.first_image);
         report_.time_to_first_image_s = secondsSinceStart();
         report_.first_image = statistics;
       }
@@ -187,7 +182,7 @@ class FrameRun {
   }
 
   void finish(uint64_t number, const Camera& camera, const Image& image, const FrameStatistics& statistics) {
-    output_.write(number, image);
+    output_.write(number, annotated(image, camera));
     if (number == 0 && !report_.first_image) report_.time_to_first_image_s = secondsSinceStart();
     report_.frames.push_back({camera, statistics});
     const std::string which = words_.camera.moves() ? fmt::format(" of frame {}", number) : "";
@@ -199,6 +194,15 @@ class FrameRun {
                               camera,    report_.options,  statistics};
     for (const std::string& reason : whyEmpty(scene))
       tell("warning", fmt::format("the picture{} is empty: {}", which, reason));
+  }
+
+  Image annotated(Image image, const Camera& camera) const {
+    const FrameOptions& options = report_.options;
+    annotate(image, words_.annotations,
+             {renderer_.screenView(camera, options), report_.transfer_function,
+              scalarTitle(report_.variable.name, report_.variable.unit), manifest_.lower, manifest_.upper,
+              options.background});
+    return image;
   }
 
   /// A line for a frame with bricks that no frame before it had: the first of them.
@@ -313,6 +317,11 @@ void addRender(CLI::App& app) {
       ->capture_default_str()
       ->group(what);
 
+  command->add_flag("--scalar-bar", words->annotations.scalar_bar, "Draw which colour stands for which value")
+      ->group(what);
+  command->add_flag("--axes", words->annotations.axes, "Draw where x, y and z point")->group(what);
+  command->add_flag("--outline", words->annotations.outline, "Draw the box around the data")->group(what);
+
   const std::string where = "Camera";
   CameraWords* camera = &words->camera;
   command->add_option("--view", camera->view, "iso, +x, -x, +y, -y, +z or -z; iso otherwise")->group(where);
@@ -340,7 +349,7 @@ void addRender(CLI::App& app) {
       ->group(where);
 
   const std::string how = "Resources";
-  command->add_option("--backend", words->backend, "auto, osmesa or cpu: what draws")
+  command->add_option("--backend", words->backend, "auto, osmesa, egl or cpu: what draws; see info --system")
       ->capture_default_str()
       ->group(how);
   command->add_option("--memory", words->memory, "Memory for the data in flight: 512M, 2G")

@@ -33,18 +33,22 @@ struct Count {
   const char* name;
   uint64_t FrameStatistics::*value;
 };
-constexpr std::array<Count, 16> kCounts{{{"bricks_drawn", &FrameStatistics::bricks_drawn},
+constexpr std::array<Count, 20> kCounts{{{"bricks_drawn", &FrameStatistics::bricks_drawn},
                                          {"bricks_culled", &FrameStatistics::bricks_culled},
                                          {"bricks_out_of_image", &FrameStatistics::bricks_out_of_image},
                                          {"bricks_transparent", &FrameStatistics::bricks_transparent},
+                                         {"bricks_hidden", &FrameStatistics::bricks_hidden},
                                          {"splats_read", &FrameStatistics::splats_read},
                                          {"splats_clipped", &FrameStatistics::splats_clipped},
                                          {"splats_off_screen", &FrameStatistics::splats_off_screen},
                                          {"splats_transparent", &FrameStatistics::splats_transparent},
                                          {"splats_drawn", &FrameStatistics::splats_drawn},
+                                         {"splats_hidden", &FrameStatistics::splats_hidden},
                                          {"bytes_read", &FrameStatistics::bytes_read},
                                          {"read_requests", &FrameStatistics::read_requests},
                                          {"bricks_read", &FrameStatistics::bricks_read},
+                                         {"bricks_left_out", &FrameStatistics::bricks_left_out},
+                                         {"bytes_left_out", &FrameStatistics::bytes_left_out},
                                          {"bricks_cached", &FrameStatistics::bricks_cached},
                                          {"ring_peak_bytes", &FrameStatistics::ring_peak_bytes},
                                          {"pager_peak_bytes", &FrameStatistics::pager_peak_bytes},

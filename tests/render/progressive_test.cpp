@@ -206,7 +206,7 @@ Image globallySorted(const CacheReader& cache, const TransferFunction& function,
   DepthSorter sorter;
   for (const uint32_t index : sorter.farthestFirst(depths)) sorted.push_back(splats[index]);
   Image image;
-  GlThread gl;
+  GlThread gl(GlLibrary::osmesa);
   gl.run([&](const GlContext& context) {
     GlPainter painter(context);
     painter.begin(options.size, options.background, table, settings.per_pixel);

@@ -334,5 +334,42 @@ TEST_F(BrickSourceTest, CanBeStoppedAtAnyMoment) {
   EXPECT_EQ(takeAll(source, order_, 2, statistics), order_.size());
 }
 
+// Bricks in two parts, of which one, both or none are passed over.
+TEST_F(BrickSourceTest, PassesOverWhatIsNotNeeded) {
+  std::vector<BrickPart> parts;
+  for (const uint32_t brick : order_) {
+    parts.push_back({brick, 0x0f});
+    if (!cache_->bricks()[brick].isLeaf()) parts.push_back({brick, 0xf0});
+  }
+  for (const uint64_t cache_bytes : {uint64_t{0}, 2 * decoded_bytes_}) {
+    BrickSource source(*cache_, 0, pagerOptions(), cache_bytes);
+    BrickSource::Scratch scratch;
+    FetchStatistics statistics;
+    for (int frame = 0; frame < 4; ++frame) {
+      source.start(parts, [](uint32_t brick) { return brick % 4 == 3; });
+      for (uint64_t n = 0; n < parts.size(); ++n) {
+        const uint32_t brick = parts[n].brick;
+        const bool unneeded = brick % 4 == 3;
+        if (unneeded && (n + static_cast<uint64_t>(frame)) % 2 == 0) {
+          source.pass(n);
+          continue;
+        }
+        const auto splats = source.take(n, scratch);
+        ASSERT_TRUE(splats);
+        if (splats->geometry.size() == 0) {
+          EXPECT_TRUE(unneeded);
+          EXPECT_EQ(splats->ranges.splats(), 0u);
+        } else {
+          EXPECT_TRUE(same(geometry_[brick], splats->geometry)) << brick;
+          EXPECT_TRUE(same(values_[brick], splats->values)) << brick;
+        }
+      }
+      source.finish(statistics);
+      EXPECT_GT(statistics.bricks_left_out, 0u);
+      EXPECT_EQ(statistics.bricks_read == 0, cache_bytes > 0 && frame > 0);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace curvisplat

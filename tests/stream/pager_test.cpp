@@ -275,5 +275,31 @@ TEST_F(PagerTest, AFileThatShrinksMarksWhatIsGone) {
   }
 }
 
+TEST_F(PagerTest, LeavesOutWhatIsNotNeeded) {
+  const std::vector<uint32_t> order = inOrder();
+  for (const Way way : {Way::automatic, Way::threads})
+    for (const uint64_t buffer : {BrickPager::leastBufferBytes(*cache_, 0), uint64_t{64} << 20}) {
+      BrickPager pager(*cache_, 0, optionsOf(way, false, buffer));
+      const auto unneeded = [](uint32_t brick) { return brick % 3 == 1 || (brick > 20 && brick < 40); };
+      pager.start(order, unneeded);
+      uint64_t left_out = 0, bytes = 0;
+      for (const uint32_t brick : order) {
+        const std::optional<PagedBrick> paged = pager.take(brick);
+        ASSERT_TRUE(paged);
+        EXPECT_EQ(paged->isLeftOut(), unneeded(brick)) << brick;
+        EXPECT_EQ(areOf(*cache_, brick, *paged), !unneeded(brick)) << brick;
+        if (!unneeded(brick)) continue;
+        ++left_out;
+        bytes += cache_->bricks()[brick].geometry.length + cache_->brickVariables(0)[brick].values.length;
+      }
+      EXPECT_EQ(pager.statistics().bricks_left_out, left_out);
+      EXPECT_EQ(pager.statistics().bytes_left_out, bytes);
+      pager.start(order, [](uint32_t) { return true; });
+      for (const uint32_t brick : order) EXPECT_TRUE(pager.take(brick)->isLeftOut());
+      pager.start(order);  // and it is forgotten
+      for (const uint32_t brick : order) EXPECT_TRUE(areOf(*cache_, brick, *pager.take(brick)));
+    }
+}
+
 }  // namespace
 }  // namespace curvisplat
