@@ -233,6 +233,26 @@ TEST_P(Cgns, StepsAreThoseOfTheIterativeData) {
       << errorOf(3);
 }
 
+TEST_P(Cgns, ZonesMayBeThereAtSomeStepsOnly) {
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.baseSteps({100, 200}, {{"First", "Always"}, {"Always", "Second"}}, true);
+    for (const char* zone : {"First", "Always", "Second"}) {
+      file.zone(zone, {3, 2, 2});
+      file.coordinates("GridCoordinates", cartesian());
+    }
+  }
+  const auto first = open(), second = open(1);
+  EXPECT_EQ(first->description().times, (std::vector<double>{100, 200}));
+  ASSERT_EQ(first->description().blocks.size(), 2u);
+  EXPECT_EQ(first->description().blocks[0].name, "First");
+  EXPECT_EQ(first->description().blocks[1].name, "Always");
+  ASSERT_EQ(second->description().blocks.size(), 2u);
+  EXPECT_EQ(second->description().blocks[0].name, "Always");
+  EXPECT_EQ(second->description().blocks[1].name, "Second");
+}
+
 TEST_P(Cgns, SolutionsWithoutTimesFollowOneAnother) {
   {
     CgnsWriter file = writer();
