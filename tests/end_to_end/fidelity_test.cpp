@@ -25,16 +25,6 @@ std::string words(const glm::dvec3& v) {
   return fmt::format("{},{},{}", v.x, v.y, v.z);
 }
 
-Image toImage(const ReferenceImage& reference) {
-  Image image(reference.size);
-  for (size_t n = 0; n < reference.pixels.size(); ++n) {
-    for (int c = 0; c < 3; ++c)
-      image.rgba[4 * n + static_cast<size_t>(c)] = static_cast<float>(reference.pixels[n].colour[c]);
-    image.rgba[4 * n + 3] = 1;
-  }
-  return image;
-}
-
 Image absoluteDifference(const Image& a, const Image& b) {
   Image difference(a.size);
   for (size_t n = 0; n < a.rgba.size(); ++n)
