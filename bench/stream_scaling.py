@@ -2,11 +2,12 @@
 """Rendering at a fixed view and error from caches of growing size: time, splats, bytes, first picture, memory.
 
     bench/stream_scaling.py FOLDER [--program build/release/tools/curvisplat] [--scene wake]
-                            [--nodes 1M,8M,64M] [--large] [--lod-pixels 1] [--max-splats N] [--size 600x600]
-                            [--memory 256M] [--repeats 3] [--json OUT.json]
+                            [--nodes 1M,8M,64M] [--large] [--lod-pixels 1,2,3] [--max-splats N]
+                            [--size 600x600] [--memory 256M] [--repeats 3] [--json OUT.json] [--plot OUT.svg]
 
 Generates and converts the scene in FOLDER (caches are kept there and used again, grids are not; --large adds 512 M
-nodes: 8 GB of grid while it is converted). Each size is rendered --repeats times; the table has medians.
+nodes: 8 GB of grid while it is converted). Each size is rendered --repeats times with each error of --lod-pixels; the
+tables have medians, the plot has a line for each error.
 "first" is the time from the start of the process to a first, coarse picture in a file; the cache's files were put out
 of the page cache before ("cold"), the program's own were not. "frame" is the whole picture after that. "peak" is the
 largest memory of the process (VmHWM), and "above" what of it is more than with a cache of a few splats: program,
@@ -22,6 +23,7 @@ import subprocess
 import sys
 
 from convert_scaling import count_of, run
+from line_plot import write_line_plot
 
 
 def convert(arguments, name, size):
@@ -49,13 +51,13 @@ def forget(cache):
             os.close(descriptor)
 
 
-def render(arguments, cache):
+def render(arguments, cache, lod_pixels):
     """One run's --stats."""
     output = os.path.join(arguments.folder, "stream_scaling")
     forget(cache)
     command = [arguments.program, "render", cache, "-o", output + ".png", "--first-image", output + "_first.png",
                "--stats", output + ".json", "--size", arguments.size, "--memory", arguments.memory,
-               "--lod-pixels", arguments.lod_pixels]
+               "--lod-pixels", lod_pixels]
     if arguments.max_splats:
         command += ["--max-splats", arguments.max_splats]
     run(command)
@@ -76,11 +78,11 @@ def median(results, *keys):
     return statistics.median(values)
 
 
-def measure(arguments, name, size):
+def measure(arguments, name, size, lod_pixels):
     cache = convert(arguments, name, size)
     with open(os.path.join(cache, "manifest.json")) as file:
         nodes = json.load(file)["nodes"]
-    runs = [render(arguments, cache) for _ in range(arguments.repeats)]
+    runs = [render(arguments, cache, lod_pixels) for _ in range(arguments.repeats)]
     return {
         "size": size,
         "nodes": nodes,
@@ -97,7 +99,8 @@ def measure(arguments, name, size):
     }
 
 
-def report(results, baseline):
+def report(results, baseline, lod_pixels):
+    print(f"\n{lod_pixels} pixels of error, {results[0]['backend']}")
     print(f"{'nodes':>12} {'cache MiB':>10} {'first s':>8} {'frame s':>8} {'M splats':>9} {'bricks':>7} "
           f"{'read MiB':>9} {'peak MiB':>9} {'above MiB':>10}")
     for result in [baseline] + results:
@@ -115,7 +118,6 @@ def report(results, baseline):
         print(f"frame at {after['size']} / frame at {before['size']}: {after['frame_s'] / before['frame_s']:.2f}")
     for result in results:
         print(f"first picture at {result['size']} against the whole one: {result['first_image_against_final']}")
-    print(results[0]["backend"])
 
 
 def main():
@@ -125,26 +127,33 @@ def main():
     parser.add_argument("--scene", default="wake")
     parser.add_argument("--nodes", default="1M,8M,64M")
     parser.add_argument("--large", action="store_true", help="512 M nodes as well")
-    parser.add_argument("--lod-pixels", default="1")
+    parser.add_argument("--lod-pixels", default="1,2,3")
     parser.add_argument("--max-splats")
     parser.add_argument("--size", default="600x600")
     parser.add_argument("--memory", default="256M")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--json")
+    parser.add_argument("--plot")
     arguments = parser.parse_args()
     os.makedirs(arguments.folder, exist_ok=True)
     if shutil.which(arguments.program) is None:
         sys.exit(f"{arguments.program}: is no program; build it, or give --program")
 
-    baseline = measure(arguments, f"{arguments.scene}_tiny", "2x2x2")
-    results = []
-    for nodes in arguments.nodes.split(",") + (["512M"] if arguments.large else []):
-        edge = round(count_of(nodes) ** (1 / 3))
-        results.append(measure(arguments, f"{arguments.scene}_{edge}", f"{edge}x{edge}x{edge}"))
-    report(results, baseline)
+    edges = [round(count_of(nodes) ** (1 / 3)) for nodes in arguments.nodes.split(",")]
+    if arguments.large:
+        edges.append(800)
+    all_results, lines = {}, {}
+    for lod_pixels in arguments.lod_pixels.split(","):
+        baseline = measure(arguments, f"{arguments.scene}_tiny", "2x2x2", lod_pixels)
+        results = [measure(arguments, f"{arguments.scene}_{edge}", f"{edge}x{edge}x{edge}", lod_pixels) for edge in edges]
+        report(results, baseline, lod_pixels)
+        all_results[lod_pixels] = {"baseline": baseline, "sizes": results}
+        lines[f"{lod_pixels} px of error"] = [(result["nodes"], result["frame_s"]) for result in results]
     if arguments.json:
         with open(arguments.json, "w") as file:
-            json.dump({"baseline": baseline, "sizes": results}, file, indent=1)
+            json.dump(all_results, file, indent=1)
+    if arguments.plot:
+        write_line_plot(arguments.plot, lines, "nodes in the cache", "seconds a frame, cold")
 
 
 if __name__ == "__main__":

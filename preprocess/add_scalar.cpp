@@ -80,6 +80,7 @@ class Addition {
     report_.nodes = manifest().nodes;
     report_.splats = manifest().splats;
     checkBlocks(source.description(), cache_);
+    checkCentring();
     checkNames(report_.scalars, cache_);
     checkDiskSpace(diskNeedsOfAdding(manifest().splats, options.scalars.size()), options.cache,
                    temporaryFolder(options));
@@ -124,16 +125,17 @@ class Addition {
     const uint64_t missing = survey_.blanked.by_value + survey_.blanked.not_finite;
     if (survey_.blanked.by_grid != manifest().blanked_nodes)
       throw Error(
-          "{}: leaves out {} nodes of its grid, and of this one it would be {}; this grid is not the one "
+          "{}: leaves out {} {} of its grid, and of this one it would be {}; this grid is not the one "
           "the cache was made from, or scalars were missing at nodes where blocks meet: convert again with "
           "all scalars",
-          cache_.path().string(), manifest().blanked_nodes, survey_.blanked.by_grid);
+          cache_.path().string(), manifest().blanked_nodes, manifest().cells ? "cells" : "nodes",
+          survey_.blanked.by_grid);
     if (missing > 0)
       throw Error(
-          "{}: {} of the nodes that it draws have no value of {} ({} not finite, {} the blank value), and "
+          "{}: {} of the {} that it draws have no value of {} ({} not finite, {} the blank value), and "
           "a splat cannot be without; convert again with all scalars",
-          cache_.path().string(), missing, joined(report_.scalars), survey_.blanked.not_finite,
-          survey_.blanked.by_value);
+          cache_.path().string(), missing, manifest().cells ? "cells" : "nodes", joined(report_.scalars),
+          survey_.blanked.not_finite, survey_.blanked.by_value);
     if (survey_.lower != manifest().lower || survey_.upper != manifest().upper)
       throw Error(
           "{}: its grid spans ({}, {}, {}) to ({}, {}, {}), and this one ({}, {}, {}) to ({}, {}, {}): it "
@@ -141,6 +143,14 @@ class Addition {
           cache_.path().string(), manifest().lower.x, manifest().lower.y, manifest().lower.z,
           manifest().upper.x, manifest().upper.y, manifest().upper.z, survey_.lower.x, survey_.lower.y,
           survey_.lower.z, survey_.upper.x, survey_.upper.y, survey_.upper.z);
+  }
+
+  void checkCentring() const {
+    const auto words = [](bool cells) { return cells ? "in cells" : "at nodes"; };
+    const bool cells = reader_.centring() == Centring::cell;
+    if (cells != manifest().cells)
+      throw Error("{}: its scalars stand {}, and {} {}; convert it to a cache of its own",
+                  cache_.path().string(), words(manifest().cells), joined(report_.scalars), words(cells));
   }
 
   void scatter() {

@@ -56,12 +56,6 @@ bool parseFortranNumber(std::string_view token, double& value) {
   return end == spelling.c_str() + spelling.size() && !hexadecimal;
 }
 
-bool parseNumber(const char* begin, const char* end, double& value) {
-  const auto [stop, error] = std::from_chars(begin, end, value);
-  if (error == std::errc{} && stop == end) return true;
-  return begin != end && parseFortranNumber({begin, static_cast<size_t>(end - begin)}, value);
-}
-
 class Spooler {
  public:
   Spooler(const InputFile& text, const std::filesystem::path& folder)
@@ -137,7 +131,7 @@ class Spooler {
         const auto [count_end, error] = std::from_chars(at, star, repeats);
         if (error != std::errc{} || count_end != star || repeats == 0) fail(begin, at, stop);
       }
-      if (!parseNumber(number, stop, value)) fail(begin, at, stop);
+      if (!parseNumber({number, static_cast<size_t>(stop - number)}, value)) fail(begin, at, stop);
       if (sampled_ < kDigitSamples) {
         ++sampled_;
         significant_digits_ =
@@ -191,6 +185,12 @@ class Spooler {
 };
 
 }  // namespace
+
+bool parseNumber(std::string_view text, double& value) {
+  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error == std::errc{} && stop == text.data() + text.size()) return true;
+  return !text.empty() && parseFortranNumber(text, value);
+}
 
 AsciiSpool spoolAscii(const InputFile& text, const std::filesystem::path& folder) {
   return Spooler(text, folder).run();

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <string_view>
 
 #include "stream/file.h"
 
@@ -18,6 +19,9 @@ struct AsciiSpool {
   uint64_t count = 0;          // of doubles. InputFile::size() was taken before they were written
   int significant_digits = 0;  // most that a number among the first ones was written with
 };
+
+/// A number as C, C++ or Fortran writes it. False if `text` is none, or not only one.
+bool parseNumber(std::string_view text, double& value);
 
 /// The temporary file has no name any more when this returns: it goes when its last user does, however the
 /// program ends. Throws Error naming the line that is no number, or if `folder` is too small.

@@ -1,6 +1,7 @@
 #include "preprocess/cache_grid.h"
 
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "preprocess/node_reader.h"
@@ -56,7 +57,17 @@ void CacheGrid::read(uint32_t block, const NodeBox& box, std::span<const uint32_
   source_->read(block, box, scalars, out);
   for (size_t n = 0; n < out.x.size(); ++n)
     out.blank[n] |= !(std::isfinite(out.x[n]) && std::isfinite(out.y[n]) && std::isfinite(out.z[n]));
-  if (drawn_) restrict(block, box, out.blank);
+  if (!drawn_) return;
+  const bool cells = !scalars.empty() && description().scalars[scalars.front()].centring == Centring::cell;
+  if (!cells) {
+    restrict(block, box, out.blank);
+    return;
+  }
+  std::vector<uint8_t> no_cell(out.blank.size(), 0);
+  restrict(block, box, no_cell);
+  for (std::vector<float>& values : out.scalars)
+    for (size_t n = 0; n < values.size(); ++n)
+      if (no_cell[n]) values[n] = std::numeric_limits<float>::quiet_NaN();
 }
 
 void CacheGrid::restrict(uint32_t number, const NodeBox& box, std::vector<uint8_t>& blank) const {

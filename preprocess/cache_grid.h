@@ -1,5 +1,6 @@
 // A grid with the nodes that a cache has drawn, whatever scalars are read from it now: blank is what the
-// cache has no splat of, so that every cell comes out as it did when the cache was made.
+// cache has no splat of, so that every cell comes out as it did when the cache was made. Where splats stand
+// for cells, those that the cache has not have no value (NaN).
 #pragma once
 
 #include <cstdint>

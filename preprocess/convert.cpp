@@ -50,6 +50,7 @@ Unfinished unfinishedOf(const ConvertOptions& options) {
 void reportCache(const std::filesystem::path& cache, ConvertReport& report) {
   const std::filesystem::path path = cache / "manifest.json";
   const Manifest written = Manifest::fromJson(readTextFile(path), path);
+  report.centring = written.cells ? Centring::cell : Centring::node;
   report.nodes = written.nodes;
   report.splats = written.splats;
   report.bricks = written.bricks;
@@ -224,6 +225,7 @@ class Conversion {
     manifest.upper = splats_.survey.upper;
     for (const GridBlock& block : description.blocks)
       manifest.blocks.push_back({block.name, block.ni, block.nj, block.nk});
+    manifest.cells = reader_.centring() == Centring::cell;
     manifest.nodes = splats_.survey.nodes;
     manifest.blanked_nodes = splats_.survey.blanked.total();
     manifest.variables = variables();

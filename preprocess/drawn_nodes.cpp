@@ -25,7 +25,9 @@ DrawnNodes::DrawnNodes(const CacheReader& cache, const MemoryPlan& plan,
                        const std::filesystem::path& temporary_folder, Progress& progress)
     : written_(temporary_folder / "drawn.bin"), bits_(written_.path()) {
   const Manifest& manifest = cache.manifest();
-  const uint64_t bytes = (manifest.nodes + 7) / 8;
+  uint64_t nodes = 0;  // of the blocks, also where splats stand for cells
+  for (const BlockInfo& block : manifest.blocks) nodes += block.ni * block.nj * block.nk;
+  const uint64_t bytes = (nodes + 7) / 8;
   const uint64_t bucket_bytes = std::max(kBucketBytes, bytes / plan.most_buckets + 1);
   const uint64_t bucket_nodes = 8 * bucket_bytes;
   const auto buckets = static_cast<uint32_t>((bytes + bucket_bytes - 1) / bucket_bytes);

@@ -14,10 +14,10 @@ struct Magic {
 using namespace std::string_view_literals;
 
 constexpr Magic kMagics[] = {
-    {"# vtk DataFile"sv, "a legacy VTK file, which is not read yet"},
-    {"<VTKFile"sv, "a VTK XML file, which is not read yet"},
-    {"<?xml"sv, "an XML file (VTK?), which is not read yet"},
-    {"\x89HDF\r\n\x1a\n"sv, "an HDF5 file (CGNS?), which is not read yet"},
+    {"# vtk DataFile"sv, "a legacy VTK file"},
+    {"<VTKFile"sv, "a VTK XML file"},
+    {"<?xml"sv, "an XML file"},
+    {"\x89HDF\r\n\x1a\n"sv, "an HDF5 file"},
     {"CDF\x01"sv, "a NetCDF file, which is not read"},
     {"CDF\x02"sv, "a NetCDF file, which is not read"},
     {"CDF\x05"sv, "a NetCDF file, which is not read"},
@@ -47,7 +47,7 @@ std::optional<std::string> foreignFormat(const InputFile& file) {
   for (const Magic& magic : kMagics)
     if (begin.starts_with(magic.bytes)) return magic.words;
   // Its first four bytes differ between versions.
-  if (begin.find("ADF Database") == 4) return "a CGNS (ADF) file, which is not read yet";
+  if (begin.find("ADF Database") == 4) return "a CGNS (ADF) file, which has its own grid: give it alone";
   return std::nullopt;
 }
 

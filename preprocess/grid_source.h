@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -26,11 +27,17 @@ struct GridBlock {
   uint64_t nodes() const { return ni * nj * nk; }
 };
 
+/// Where a scalar's values stand.
+enum class Centring { node, cell };
+
 struct GridScalar {
-  std::string name;
+  std::string name;                  // "density"; of a vector's components "Velocity:mag", "Velocity:x"
   std::string unit;                  // may be empty
   std::vector<std::string> aliases;  // other names it answers to
   uint32_t number = 0;               // of the variable in its function file, from 1; 0: it has none
+  Centring centring = Centring::node;
+  uint32_t function = 0;  // PLOT3D's number of the quantity; 0: it has none
+  bool derived = false;   // not in the files: computed from other scalars and the grid
 };
 
 /// The four numbers before a block's values in a PLOT3D Q file.
@@ -40,6 +47,12 @@ struct FlowConditions {
   double mach = 0, alpha = 0, reynolds = 0, time = 0;
 };
 
+/// A perfect gas. Nothing: not known.
+struct GasModel {
+  std::optional<double> gamma;     // ratio of specific heats
+  std::optional<double> constant;  // the gas constant R
+};
+
 /// What a source is, for `info` and the manifest.
 struct GridDescription {
   std::string format;  // "PLOT3D grid + Q, big-endian, C, single precision, 1 block"
@@ -47,12 +60,17 @@ struct GridDescription {
   std::vector<GridBlock> blocks;
   std::vector<GridScalar> scalars;    // all that can be asked for
   std::vector<FlowConditions> flow;   // of every block of every file that tells
+  GasModel gas;                       // what the files tell of it
   int coordinate_bytes = 4;           // 4 or 8: the precision of the coordinates as stored
+  std::vector<double> times;          // of every time step there is; empty: the files tell of none
+  uint32_t time_step = 0;             // the one that was opened, from 0
   std::vector<std::string> warnings;  // "bluntfinq.bin: 484 trailing bytes ignored"
 };
 
 /// The nodes of a NodeBox, i fastest, then j, then k. Arrays are resized by the source and keep their
-/// capacity.
+/// capacity. The value of a cell stands at the cell's lowest node, (i, j, k) of its corners (i..i+1, j..j+1,
+/// k..k+1); it is NaN where there is no such cell (at the last i, j and k of the block) and where the cell is
+/// blanked.
 struct NodeArrays {
   std::vector<double> x, y, z;              // world units
   std::vector<uint8_t> blank;               // 1: not there. Always filled

@@ -5,6 +5,8 @@
 #include <numeric>
 #include <span>
 
+#include "stream/error.h"
+
 namespace curvisplat {
 namespace {
 
@@ -45,6 +47,38 @@ uint64_t blankMarked(std::span<const uint8_t> mark, std::span<uint8_t> blank) {
   return blanked;
 }
 
+Centring centringOf(const GridDescription& description, const std::vector<uint32_t>& scalars) {
+  if (scalars.empty()) return Centring::node;
+  const GridScalar& first = description.scalars.at(scalars.front());
+  for (const uint32_t scalar : scalars) {
+    const GridScalar& other = description.scalars.at(scalar);
+    if (other.centring == first.centring) continue;
+    const bool cells = first.centring == Centring::cell;
+    throw Error(
+        "{} stands at nodes and {} in cells: a cache's splats stand for one or the other; convert them to "
+        "two caches",
+        cells ? other.name : first.name, cells ? first.name : other.name);
+  }
+  return first.centring;
+}
+
+void markCells(std::optional<double> blank_value, NodeArrays& out) {
+  for (size_t n = 0; n < out.x.size(); ++n) {
+    const bool finite = std::isfinite(out.x[n]) && std::isfinite(out.y[n]) && std::isfinite(out.z[n]);
+    out.blank[n] = out.blank[n] != 0 || !finite ? kNoNode : 0;
+  }
+  const float wanted = static_cast<float>(blank_value.value_or(0));
+  for (const std::vector<float>& scalar : out.scalars)
+    for (size_t n = 0; n < scalar.size(); ++n) {
+      if (std::isnan(scalar[n]))
+        out.blank[n] |= kNoValue;
+      else if (blank_value && scalar[n] == wanted)
+        out.blank[n] |= kBlankValue;
+      else if (std::isinf(scalar[n]))
+        out.blank[n] |= kValueNotFinite;
+    }
+}
+
 }  // namespace
 
 BlankCounts& BlankCounts::operator+=(const BlankCounts& other) {
@@ -56,11 +90,18 @@ BlankCounts& BlankCounts::operator+=(const BlankCounts& other) {
 
 NodeReader::NodeReader(const GridSource& source, std::vector<uint32_t> scalars,
                        std::optional<double> blank_value)
-    : source_(&source), scalars_(std::move(scalars)), blank_value_(blank_value) {}
+    : source_(&source),
+      scalars_(std::move(scalars)),
+      blank_value_(blank_value),
+      centring_(centringOf(source.description(), scalars_)) {}
 
 BlankCounts NodeReader::read(uint32_t block, const NodeBox& box, NodeArrays& out) const {
   source_->read(block, box, scalars_, out);
   BlankCounts counts;
+  if (centring_ == Centring::cell) {
+    markCells(blank_value_, out);
+    return counts;
+  }
   std::array<uint8_t, kPiece> mark_buffer;
   for (size_t first = 0; first < out.x.size(); first += kPiece) {
     const size_t count = std::min(kPiece, out.x.size() - first);

@@ -1,30 +1,45 @@
 #include "preprocess/open_grid.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <array>
 #include <charconv>
 
+#include "preprocess/cgns_source.h"
 #include "preprocess/foreign_formats.h"
 #include "preprocess/plot3d_source.h"
+#include "preprocess/scalar_names.h"
+#include "preprocess/time_steps.h"
+#include "preprocess/vtk_legacy.h"
+#include "preprocess/vtk_xml.h"
 #include "stream/error.h"
 
 namespace curvisplat {
 namespace {
+
+/// A file format with a reader of its own. What none recognises is taken for PLOT3D, which has no mark.
+struct GridFormat {
+  bool (*recognises)(const InputFile& file);
+  std::unique_ptr<GridSource> (*open)(const OpenGridOptions& options);
+};
+
+template <typename Source>
+std::unique_ptr<GridSource> openAs(const OpenGridOptions& options) {
+  return std::make_unique<Source>(options);
+}
+
+constexpr GridFormat kFormats[] = {
+    {isVtkXml, openVtkXml},
+    {isVtkLegacy, openVtkLegacy},
+    {CgnsFile::recognises, openAs<CgnsSource>},
+};
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {
   if (std::filesystem::is_directory(path))
     throw Error("{}: is a folder where {} was expected", path.string(), expected);
   if (const auto format = foreignFormat(InputFile(path)))
     throw Error("{}: is {}; expected {}", path.string(), *format, expected);
-}
-
-/// Names are the same if they differ in case, spaces and underscores only.
-std::string simplified(const std::string& name) {
-  std::string simple;
-  for (const char c : name) {
-    if (c == ' ' || c == '_' || c == '-') continue;
-    simple += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  }
-  return simple;
 }
 
 /// Positions of the scalars that `matches` is true for.
@@ -36,19 +51,31 @@ std::vector<uint32_t> positionsOf(const GridDescription& description, const Matc
   return positions;
 }
 
-/// The first of: the exact name, a number, the simplified name or alias.
+/// A whole number above 0, if the name is one.
+std::optional<uint32_t> numberIn(const std::string& name) {
+  uint32_t number = 0;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
+  if (error != std::errc{} || end != name.data() + name.size() || number == 0) return std::nullopt;
+  return number;
+}
+
+/// The first of: the exact name, a number (of a function file's variable, else PLOT3D's), the simplified name
+/// or alias of what files hold, or of what is derived from it.
 std::vector<uint32_t> candidatesFor(const GridDescription& description, const std::string& name) {
   const auto exact = positionsOf(description, [&](const GridScalar& scalar) { return scalar.name == name; });
   if (!exact.empty()) return exact;
-  uint32_t number = 0;
-  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
-  if (error == std::errc{} && end == name.data() + name.size() && number > 0)
-    return positionsOf(description, [&](const GridScalar& scalar) { return scalar.number == number; });
-  const std::string simple = simplified(name);
-  return positionsOf(description, [&](const GridScalar& scalar) {
-    return simplified(scalar.name) == simple ||
-           std::find(scalar.aliases.begin(), scalar.aliases.end(), simple) != scalar.aliases.end();
-  });
+  if (const auto number = numberIn(name)) {
+    const auto variables = positionsOf(description, [&](const GridScalar& s) { return s.number == *number; });
+    if (!variables.empty()) return variables;
+    return positionsOf(description, [&](const GridScalar& s) { return s.function == *number; });
+  }
+  const std::string simple = simplifiedName(name);
+  const auto named = [&](bool derived) {
+    return positionsOf(description,
+                       [&](const GridScalar& s) { return s.derived == derived && answersTo(s, simple); });
+  };
+  const auto stored = named(false);
+  return stored.empty() ? named(true) : stored;
 }
 
 std::string namesIn(const GridDescription& description) {
@@ -57,27 +84,45 @@ std::string namesIn(const GridDescription& description) {
   for (size_t n = 0; n < description.scalars.size(); ++n) {
     const GridScalar& scalar = description.scalars[n];
     names += (n ? ", " : "") + scalar.name;
-    if (scalar.number > 0 && scalar.name != std::to_string(scalar.number))
-      names += " (" + std::to_string(scalar.number) + ")";
+    const uint32_t number = scalar.number > 0 ? scalar.number : scalar.function;
+    if (number > 0 && scalar.name != std::to_string(number)) names += " (" + std::to_string(number) + ")";
   }
   return names;
+}
+
+std::unique_ptr<GridSource> openFormat(const OpenGridOptions& options) {
+  OpenGridOptions complete = options;
+  if (complete.temporary_folder.empty()) complete.temporary_folder = std::filesystem::temp_directory_path();
+  if (std::filesystem::is_regular_file(options.grid)) {
+    const InputFile file(options.grid);
+    for (const GridFormat& format : kFormats)
+      if (format.recognises(file)) {
+        if (!options.solutions.empty())
+          throw Error("{}: holds scalars itself; leave out {}, which goes with a PLOT3D grid",
+                      options.grid.string(), options.solutions.front().string());
+        return format.open(complete);
+      }
+  }
+  refuseForeign(options.grid, "a grid file");
+  for (const std::filesystem::path& path : options.solutions)
+    refuseForeign(path, "a PLOT3D Q or function file");
+  return std::make_unique<Plot3dSource>(complete);
 }
 
 }  // namespace
 
 std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options) {
-  refuseForeign(options.grid, "a PLOT3D grid file");
-  for (const std::filesystem::path& path : options.solutions)
-    refuseForeign(path, "a PLOT3D Q or function file");
-  OpenGridOptions complete = options;
-  if (complete.temporary_folder.empty()) complete.temporary_folder = std::filesystem::temp_directory_path();
-  return std::make_unique<Plot3dSource>(complete);
+  std::unique_ptr<GridSource> source = openFormat(options);
+  chosenTimeStep(options.grid.string(), source->description().times, options.time_step);
+  return source;
 }
 
 std::vector<uint32_t> scalarsNamed(const GridDescription& description,
                                    const std::vector<std::string>& names) {
   if (names.empty()) {
-    if (description.scalars.empty()) throw UsageError("no scalar to choose: {}", namesIn(description));
+    const bool none_stored = description.scalars.empty() || description.scalars.front().derived;
+    if (none_stored)
+      throw UsageError("the files hold no scalar; ask for one with --scalar: {}", namesIn(description));
     return {0};
   }
   std::vector<uint32_t> positions;
@@ -91,6 +136,23 @@ std::vector<uint32_t> scalarsNamed(const GridDescription& description,
     positions.push_back(candidates.front());
   }
   return positions;
+}
+
+std::vector<std::string> notesOnNumbers(const GridDescription& description,
+                                        const std::vector<std::string>& names) {
+  std::vector<std::string> notes;
+  for (const std::string& name : names) {
+    const auto number = numberIn(name);
+    if (!number) continue;
+    const auto variables = positionsOf(description, [&](const GridScalar& s) { return s.number == *number; });
+    const auto functions =
+        positionsOf(description, [&](const GridScalar& s) { return s.function == *number; });
+    if (!variables.empty() && !functions.empty())
+      notes.push_back(
+          fmt::format("{} is taken as variable {} of the function file; for PLOT3D's function {} ask for {}",
+                      name, name, name, description.scalars[functions.front()].name));
+  }
+  return notes;
 }
 
 }  // namespace curvisplat

@@ -17,13 +17,19 @@ struct OpenGridOptions {
   std::vector<std::filesystem::path> solutions;  // Q and function files; may be empty
   std::filesystem::path temporary_folder;        // ASCII is spooled to binary here; empty: the system's
   Plot3dForce force;                             // what the user says of the layout, over what is detected
+  std::optional<uint32_t> time_step = {};        // from 0; none: the first
 };
 
 /// Throws Error naming the file, what was expected and what was found.
 std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options);
 
-/// Positions in the description's scalars of `names` (a name, or a number for a function file's variable); no
-/// names: the first scalar. Throws UsageError that lists the names there are.
+/// Positions in the description's scalars of `names` (a name, or a number: of a function file's variable, or
+/// PLOT3D's of a function); no names: the first scalar, if the files hold any. Throws UsageError that lists
+/// the names there are.
 std::vector<uint32_t> scalarsNamed(const GridDescription& description, const std::vector<std::string>& names);
+
+/// What a person may not expect of the numbers among `names`: a line for each that means two scalars.
+std::vector<std::string> notesOnNumbers(const GridDescription& description,
+                                        const std::vector<std::string>& names);
 
 }  // namespace curvisplat

@@ -10,6 +10,7 @@
 #include <glm/common.hpp>
 #include <optional>
 
+#include "preprocess/cell_survey.h"
 #include "preprocess/slabs.h"
 #include "stream/error.h"
 
@@ -55,14 +56,15 @@ Bounds united(Bounds a, const Bounds& b) {
   return a;
 }
 
-void checkExtent(const GridSurvey& survey, const GridDescription& description) {
+void checkExtent(const GridSurvey& survey, const NodeReader& reader) {
+  const GridDescription& description = reader.source().description();
   const std::string file = description.files.empty() ? description.format : description.files.front();
   if (survey.nodes == survey.blanked.total())
     throw Error(
-        "{}: every one of the {} nodes is blanked ({} by the grid, {} by value, {} not finite): there is "
-        "nothing "
-        "to draw",
-        file, survey.nodes, survey.blanked.by_grid, survey.blanked.by_value, survey.blanked.not_finite);
+        "{}: every one of the {} {} is blanked ({} by the grid, {} by value, {} not finite): there is "
+        "nothing to draw",
+        file, survey.nodes, reader.centring() == Centring::cell ? "cells" : "nodes", survey.blanked.by_grid,
+        survey.blanked.by_value, survey.blanked.not_finite);
   const glm::dvec3 extent = survey.upper - survey.lower;
   const double largest = std::max({extent.x, extent.y, extent.z});
   if (largest > 0 && !(largest >= kSmallestExtent && largest <= kLargestExtent))
@@ -73,10 +75,15 @@ void checkExtent(const GridSurvey& survey, const GridDescription& description) {
 }  // namespace
 
 GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, Progress& progress) {
+  if (reader.centring() == Centring::cell) {
+    const GridSurvey survey = surveyCells(reader, slab_bytes, progress);
+    checkExtent(survey, reader);
+    return survey;
+  }
   GridSurvey survey;
   Bounds total;
   total.ranges.resize(reader.scalars());
-  SlabStream slabs(reader, slab_bytes, false);
+  SlabStream slabs(reader, slab_bytes, kNoHalo);
   while (const LoadedSlab* loaded = slabs.next()) {
     const size_t count = loaded->nodes.x.size();
     survey.nodes += count;
@@ -94,14 +101,14 @@ GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, Progress& p
   survey.lower = total.lower;
   survey.upper = total.upper;
   survey.ranges = std::move(total.ranges);
-  checkExtent(survey, reader.source().description());
+  checkExtent(survey, reader);
   return survey;
 }
 
 void countNodes(const GridSource& source, const RootCube& root, uint64_t slab_bytes, CountingGrid& counts,
                 Progress& progress) {
   const NodeReader coordinates(source, {}, std::nullopt);
-  SlabStream slabs(coordinates, slab_bytes, false);
+  SlabStream slabs(coordinates, slab_bytes, kNoHalo);
   while (const LoadedSlab* loaded = slabs.next()) {
     const NodeArrays& nodes = loaded->nodes;
     const size_t tasks = (nodes.x.size() + kNodesPerTask - 1) / kNodesPerTask;

@@ -18,9 +18,9 @@ struct ScalarRange {
   double max = -std::numeric_limits<double>::infinity();
 };
 
-/// Of the nodes that are there.
+/// Of the nodes that are there; of cell-centred scalars, of the cells that are (corners, for the bounds).
 struct GridSurvey {
-  uint64_t nodes = 0;  // of the grid, blanked ones included
+  uint64_t nodes = 0;  // or cells; of the grid, blanked ones included
   BlankCounts blanked;
   glm::dvec3 lower{std::numeric_limits<double>::infinity()};
   glm::dvec3 upper{-std::numeric_limits<double>::infinity()};

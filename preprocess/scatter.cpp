@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <mutex>
 
+#include "preprocess/cell_splats.h"
 #include "preprocess/slabs.h"
 #include "preprocess/splat_record.h"
 
@@ -27,10 +28,11 @@ class SplatStream {
       : progress_(&progress),
         blocks_(&reader.source().description().blocks),
         variables_(reader.scalars()),
+        centring_(reader.centring()),
         sink_of_thread_(&sink_of_thread),
         seams_(&seams),
         workers_([this] {
-          return Worker{{}, 0, std::vector<Handedness>(blocks_->size())};
+          return Worker{{}, {}, 0, std::vector<Handedness>(blocks_->size())};
         }) {}
 
   void add(const LoadedSlab& loaded) {
@@ -41,7 +43,10 @@ class SplatStream {
     tbb::parallel_for(size_t{0}, tasks.size(), [&](size_t task) {
       progress_->throwIfStopped();
       Worker& worker = workers_.local();
-      computeNodeSplats(window, tasks[task], worker.splats);
+      if (centring_ == Centring::cell)
+        computeCellSplats(window, tasks[task], worker.cells, worker.splats);
+      else
+        computeNodeSplats(window, tasks[task], worker.splats);
       worker.degenerate += worker.splats.degenerate;
       worker.handedness[slab.block].right += worker.splats.right_handed;
       worker.handedness[slab.block].left += worker.splats.left_handed;
@@ -67,6 +72,7 @@ class SplatStream {
   /// What a thread has for itself.
   struct Worker {
     NodeSplats splats;
+    CellScratch cells;
     uint64_t degenerate = 0;
     std::vector<Handedness> handedness;  // [block]
   };
@@ -93,6 +99,7 @@ class SplatStream {
   const Progress* progress_;
   const std::vector<GridBlock>* blocks_;
   const size_t variables_;
+  const Centring centring_;
   const std::function<SplatSink&()>* sink_of_thread_;
   std::mutex adding_to_seams_;  // guards *seams_
   SeamMerger* seams_;
@@ -146,7 +153,7 @@ ScatterCounts streamSplats(const NodeReader& reader, uint64_t slab_bytes,
                            const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams,
                            Progress& progress) {
   SplatStream splats(reader, sink_of_thread, seams, progress);
-  SlabStream slabs(reader, slab_bytes, true);
+  SlabStream slabs(reader, slab_bytes, reader.centring() == Centring::cell ? kCellHalo : kNodeHalo);
   while (const LoadedSlab* loaded = slabs.next()) {
     splats.add(*loaded);
     const GridBlock& block = reader.source().description().blocks[loaded->slab.block];

@@ -51,8 +51,9 @@ struct ScatterCounts {
   uint64_t inverted = 0;    // cells of the handedness that fewer of their block's cells have
 };
 
-/// Makes all splats, in parallel. Those of block faces go to `seams`, the others to what `sink_of_thread`
-/// gives: a sink of the calling thread's own, always the same one.
+/// Makes all splats, of nodes or of cells as the reader's scalars are, in parallel. Those of block faces go
+/// to `seams`, the others to what `sink_of_thread` gives: a sink of the calling thread's own, always the same
+/// one.
 ScatterCounts streamSplats(const NodeReader& reader, uint64_t slab_bytes,
                            const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams,
                            Progress& progress);

@@ -12,8 +12,14 @@
 
 namespace curvisplat {
 
-/// Some rows of one block. With a halo, `window` is `box` and one more row and plane on each side where the
-/// block goes on; without, it is `box`.
+/// Rows and planes that are read on either side of a box, where the block goes on.
+struct Halo {
+  uint64_t before = 0, after = 0;
+};
+inline constexpr Halo kNoHalo{0, 0};
+inline constexpr Halo kNodeHalo{1, 1};  // a node's neighbours
+
+/// Some rows of one block. `window` is `box` and its halo.
 struct Slab {
   uint32_t block = 0;
   uint64_t first_node = 0;  // of the block, in the whole grid
@@ -32,7 +38,7 @@ inline uint64_t slabBytesPerNode(size_t scalars) {
 /// Cuts all blocks, in order, into boxes that cover each node once and whose windows have at most
 /// `window_nodes` nodes: whole planes where a few of them fit, else strips of rows that are as long in k as
 /// in j, so that little is read twice. Throws Error if a row and its neighbours do not fit.
-std::vector<Slab> cutIntoSlabs(const std::vector<GridBlock>& blocks, uint64_t window_nodes, bool halo);
+std::vector<Slab> cutIntoSlabs(const std::vector<GridBlock>& blocks, uint64_t window_nodes, Halo halo);
 
 /// Cuts `box` into boxes of about `nodes` nodes: the work of one task.
 std::vector<NodeBox> cutForTasks(const GridBlock& block, const NodeBox& box, uint64_t nodes);
@@ -48,7 +54,7 @@ struct LoadedSlab {
 /// memory.
 class SlabStream {
  public:
-  SlabStream(const NodeReader& reader, uint64_t slab_bytes, bool halo);
+  SlabStream(const NodeReader& reader, uint64_t slab_bytes, Halo halo);
 
   /// The next slab, until the next call; null at the end. Throws Error if a slab cannot be read.
   const LoadedSlab* next() { return ahead_.next(); }

@@ -1,4 +1,4 @@
-// Numbers as files store them: either byte order, 4 or 8 bytes, unaligned.
+// Numbers as files store them: either byte order, 1 to 8 bytes, unaligned.
 #pragma once
 
 #include <algorithm>
@@ -15,6 +15,12 @@ namespace curvisplat {
 inline constexpr ByteOrder kMachineByteOrder =
     std::endian::native == std::endian::big ? ByteOrder::big : ByteOrder::little;
 
+inline uint8_t byteSwapped(uint8_t bits) {
+  return bits;
+}
+inline uint16_t byteSwapped(uint16_t bits) {
+  return __builtin_bswap16(bits);
+}
 inline uint32_t byteSwapped(uint32_t bits) {
   return __builtin_bswap32(bits);
 }
@@ -22,10 +28,15 @@ inline uint64_t byteSwapped(uint64_t bits) {
   return __builtin_bswap64(bits);
 }
 
-/// The number at `from`. Stored: a 4- or 8-byte arithmetic type.
+template <size_t kBytes>
+using UnsignedOfBytes = std::conditional_t<
+    kBytes == 8, uint64_t,
+    std::conditional_t<kBytes == 4, uint32_t, std::conditional_t<kBytes == 2, uint16_t, uint8_t>>>;
+
+/// The number at `from`. Stored: an arithmetic type of 1, 2, 4 or 8 bytes.
 template <typename Stored>
 Stored loadStored(const std::byte* from, bool swap) {
-  using Bits = std::conditional_t<sizeof(Stored) == 8, uint64_t, uint32_t>;
+  using Bits = UnsignedOfBytes<sizeof(Stored)>;
   static_assert(sizeof(Stored) == sizeof(Bits));
   Bits bits;
   std::memcpy(&bits, from, sizeof bits);

@@ -8,6 +8,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <atomic>
 #include <optional>
 #include <thread>
 
@@ -26,6 +27,32 @@ size_t tileCount(ImageSize size) {
   return along(size.width) * along(size.height);
 }
 
+/// Blocks along one side of the image; none where first > last.
+struct BlockRange {
+  int first, last;
+
+  /// Bit n: block n of those along a tile's side.
+  BlockMask inTile(int tile) const {
+    const int from = std::max(first - tile * kTileBlocks, 0);
+    const int to = std::min(last - tile * kTileBlocks, kTileBlocks - 1);
+    return from > to ? 0 : (2u << to) - (1u << from);
+  }
+};
+
+BlockRange blocksAlong(float from, float to, int pixels) {
+  const auto end = static_cast<float>(pixels);
+  if (to < 0 || from >= end) return {0, -1};
+  return {static_cast<int>(std::max(from, 0.0f)) / kBlockSide,
+          static_cast<int>(std::min(to, end - 1)) / kBlockSide};
+}
+
+BlockMask blocksOf(BlockMask columns, BlockMask rows) {
+  BlockMask blocks = 0;
+  for (int row = 0; row < kTileBlocks; ++row)
+    if (rows >> row & 1) blocks |= columns << row * kTileBlocks;
+  return blocks;
+}
+
 unsigned threadsOf(const PaintResources& resources) {
   return resources.threads ? resources.threads : std::max(1u, std::thread::hardware_concurrency());
 }
@@ -34,9 +61,11 @@ unsigned threadsOf(const PaintResources& resources) {
 
 struct CpuPainter::State {
   ImageSize size{0, 0};
+  glm::vec4 background{0};
   unsigned threads = 0;
   size_t batch_splats = 0;
   hwy::AlignedFreeUniquePtr<float[]> tiles;
+  std::unique_ptr<std::atomic<BlockMask>[]> open;  // [tile]: written by who paints it, read by anyone
   std::optional<SplatBins> bins;
   std::optional<ShadingTable> table;
   std::optional<tbb::task_arena> arena;
@@ -55,6 +84,7 @@ struct CpuPainter::State {
           tbb::simple_partitioner());
     });
   }
+  void clear(size_t number);
   void allocate(ImageSize wanted, unsigned threads_, size_t batch_splats_);
   void paintBatch();
 };
@@ -73,13 +103,27 @@ void CpuPainter::begin(ImageSize size, const glm::vec4& background, const Classi
   if (size.width != state.size.width || size.height != state.size.height || threads != state.threads ||
       resources.batch_splats != state.batch_splats)
     state.allocate(size, threads, resources.batch_splats);
+  state.background = background;
   state.bins->clear();  // of a frame that was not ended
-  const float clear[4] = {background.r, background.g, background.b, 1 - background.a};
-  state.forTiles([&](size_t number) {
-    float* at = state.tile(number);
-    for (int block = 0; block < kTileBlocks * kTileBlocks; ++block)
-      for (const float value : clear) at = std::fill_n(at, kBlockPixels, value);
-  });
+  state.bins->open();
+  state.forTiles([&](size_t number) { state.clear(number); });
+}
+
+/// Nothing in it; what lies outside of the image is saturated from the beginning.
+void CpuPainter::State::clear(size_t number) {
+  const auto columns = static_cast<size_t>(bins->columns());
+  const int columns_left = size.width - static_cast<int>(number % columns) * kTileSide;
+  const int rows_left = size.height - static_cast<int>(number / columns) * kTileSide;
+  BlockMask in_image = 0;
+  float* at = tile(number);
+  for (int block = 0; block < kTileBlocks * kTileBlocks; ++block) {
+    const int x = block % kTileBlocks * kBlockSide, y = block / kTileBlocks * kBlockSide;
+    if (x < columns_left && y < rows_left) in_image |= BlockMask{1} << block;
+    at = std::fill_n(at, 3 * kBlockPixels, 0.0f);
+    for (int pixel = 0; pixel < kBlockPixels; ++pixel)
+      *at++ = x + pixel % kBlockSide < columns_left && y + pixel / kBlockSide < rows_left;
+  }
+  open[number].store(in_image, std::memory_order_relaxed);
 }
 
 void CpuPainter::State::allocate(ImageSize wanted, unsigned threads_, size_t batch_splats_) {
@@ -88,6 +132,7 @@ void CpuPainter::State::allocate(ImageSize wanted, unsigned threads_, size_t bat
   tiles.reset();
   tiles = hwy::AllocateAligned<float>(tileCount(wanted) * kTileFloats);
   if (!tiles) throw std::bad_alloc();
+  open = std::make_unique<std::atomic<BlockMask>[]>(tileCount(wanted));
   bins.emplace(wanted, batch_splats_, kEntriesASplat * batch_splats_, threads_);
   // TBB warns of more than there are cores.
   arena.emplace(std::min(static_cast<int>(threads_), tbb::info::default_concurrency()));
@@ -103,8 +148,12 @@ void CpuPainter::State::paintBatch() {
     const std::span<const uint32_t> order = bins->tile(static_cast<int>(number));
     if (order.empty()) return;
     const auto columns = static_cast<size_t>(bins->columns());
-    paintTile({tile(number), static_cast<int>(number % columns) * kTileSide,
-               static_cast<int>(number / columns) * kTileSide, bins->splats(), order, *table, per_pixel});
+    const BlockMask left =
+        paintTile({tile(number), static_cast<int>(number % columns) * kTileSide,
+                   static_cast<int>(number / columns) * kTileSide,
+                   open[number].load(std::memory_order_relaxed), bins->splats(), order, *table, per_pixel});
+    open[number].store(left, std::memory_order_relaxed);
+    if (left == 0) bins->close(static_cast<int>(number));
   });
   bins->clear();
 }
@@ -122,6 +171,20 @@ void CpuPainter::draw(std::span<const ScreenSplat> splats) {
   }
 }
 
+bool CpuPainter::hides(const ScreenBox& box) const {
+  if (!(box.x0 <= box.x1 && box.y0 <= box.y1)) return false;
+  const BlockRange columns = blocksAlong(box.x0, box.x1, state_->size.width);
+  const BlockRange rows = blocksAlong(box.y0, box.y1, state_->size.height);
+  const auto tiles_a_row = static_cast<size_t>((state_->size.width + kTileSide - 1) / kTileSide);
+  for (int row = rows.first / kTileBlocks; row <= rows.last / kTileBlocks; ++row)
+    for (int column = columns.first / kTileBlocks; column <= columns.last / kTileBlocks; ++column) {
+      const BlockMask touched = blocksOf(columns.inTile(column), rows.inTile(row));
+      const size_t number = static_cast<size_t>(row) * tiles_a_row + static_cast<size_t>(column);
+      if (state_->open[number].load(std::memory_order_relaxed) & touched) return false;
+    }
+  return true;
+}
+
 Image CpuPainter::end() {
   State& state = *state_;
   if (!state.bins->empty()) state.paintBatch();
@@ -137,8 +200,9 @@ Image CpuPainter::end() {
         const float* block = tile + (y / kBlockSide * kTileBlocks + x / kBlockSide) * kBlockFloats;
         const float* from = block + y % kBlockSide * kBlockSide + x % kBlockSide;
         float* to = image.pixel(x0 + x, y0 + y);
-        for (int c = 0; c < 3; ++c) to[c] = from[c * kBlockPixels];
-        to[3] = 1 - from[3 * kBlockPixels];
+        const float through = from[3 * kBlockPixels];
+        for (int c = 0; c < 3; ++c) to[c] = from[c * kBlockPixels] + through * state.background[c];
+        to[3] = 1 - through * (1 - state.background[3]);
       }
   });
   return image;
@@ -152,8 +216,12 @@ double CpuPainter::drawSeconds() const {
   return state_->draw_s;
 }
 
+uint64_t CpuPainter::hiddenSplats() const {
+  return state_->bins ? state_->bins->hidden() : 0;
+}
+
 uint64_t CpuPainter::frameBytes(ImageSize size) {
-  return tileCount(size) * kTileFloats * sizeof(float);
+  return tileCount(size) * (kTileFloats * sizeof(float) + sizeof(std::atomic<BlockMask>));
 }
 
 uint64_t CpuPainter::batchBytes(ImageSize size, const PaintResources& resources) {

@@ -1,6 +1,10 @@
 // Draws screen splats on the processor's cores: batches of splats, sorted into the tiles that they touch;
 // every tile painted by one thread, in vectors (tile.h). Design section 7.
 //
+// Nearest first, each under what is there; what can hardly be seen any more is left out, by less than 1/4096
+// of any channel (tile.h). That is the only way it works, since it costs less even where nothing is hidden:
+// two multiplications fewer a pixel.
+//
 // The picture's bits depend neither on threads nor on batches: a pixel's splats are blended one after the
 // other, in their order.
 //
@@ -21,13 +25,16 @@ class CpuPainter final : public Painter {
   CpuPainter();
   ~CpuPainter() override;
 
+  DrawingOrder order() const override { return DrawingOrder::front_to_back; }
   void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table, bool per_pixel,
              const PaintResources& resources = {}) override;
   void draw(std::span<const ScreenSplat> splats) override;
+  bool hides(const ScreenBox& box) const override;
   Image end() override;
 
   double uploadSeconds() const override;
   double drawSeconds() const override;
+  uint64_t hiddenSplats() const override;
 
   /// What it takes for a frame beside the picture itself.
   static uint64_t frameBytes(ImageSize size);

@@ -1,5 +1,6 @@
 #include "render/depth_sort.h"
 
+#include <algorithm>
 #include <bit>
 
 namespace curvisplat {
@@ -39,7 +40,7 @@ void DepthSorter::sortItems() {
   }
 }
 
-std::span<const uint32_t> DepthSorter::farthestFirst(std::span<const float> depths) {
+std::span<const uint32_t> DepthSorter::sort(std::span<const float> depths, DrawingOrder order) {
   items_.resize(depths.size());
   other_.resize(depths.size());
   for (uint32_t i = 0; i < depths.size(); ++i) items_[i] = {farthestFirstKey(depths[i]), i};
@@ -50,6 +51,7 @@ std::span<const uint32_t> DepthSorter::farthestFirst(std::span<const float> dept
   }
   order_.resize(depths.size());
   for (size_t i = 0; i < items_.size(); ++i) order_[i] = items_[i].index;
+  if (order == DrawingOrder::front_to_back) std::reverse(order_.begin(), order_.end());
   return order_;
 }
 

@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "stream/cut.h"
+
 namespace curvisplat {
 
 /// Keeps its memory between calls. One thread each.
@@ -13,7 +15,11 @@ class DepthSorter {
  public:
   /// The indices of `depths` (finite, at most 2^32 - 1), farthest (largest) first; equal depths in index
   /// order. Valid until the next call.
-  std::span<const uint32_t> farthestFirst(std::span<const float> depths);
+  std::span<const uint32_t> farthestFirst(std::span<const float> depths) {
+    return sort(depths, DrawingOrder::back_to_front);
+  }
+  /// Back to front as farthestFirst(); front to back the same from end to beginning.
+  std::span<const uint32_t> sort(std::span<const float> depths, DrawingOrder order);
 
  private:
   struct Item {

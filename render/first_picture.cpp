@@ -9,10 +9,6 @@
 namespace curvisplat {
 namespace {
 
-// A hundredth of a second of a disk, a twentieth of a second of drawing in software.
-constexpr uint64_t kMostBytes = 4 << 20;
-constexpr uint64_t kMostSplats = 100'000;
-
 constexpr double kPixelsToDetail = 2;
 constexpr double kMostReduction = 8;
 
@@ -34,12 +30,6 @@ std::vector<Between> positions(int whole, int reduced, double scale) {
 }
 
 }  // namespace
-
-CutOptions firstPictureLimits(CutOptions whole) {
-  whole.max_splats = std::min(whole.max_splats, kMostSplats);
-  whole.max_bytes = std::min(whole.max_bytes, kMostBytes);
-  return whole;
-}
 
 ReducedSize::ReducedSize(ImageSize size, double detail_px) : whole_(size), reduced_(size) {
   const double reduction = std::clamp(detail_px / kPixelsToDetail, 1.0, kMostReduction);

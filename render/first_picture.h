@@ -11,8 +11,15 @@
 
 namespace curvisplat {
 
-/// `whole` with less of everything.
-CutOptions firstPictureLimits(CutOptions whole);
+/// What a picture may cost that is to be had quickly; the coarsest bricks are drawn whatever they cost.
+struct QuickLimits {
+  uint64_t max_splats = CutOptions::kNoLimit;
+  uint64_t max_bytes = CutOptions::kNoLimit;  // to be read
+  double detail_px = 0;                       // the finest detail that is needed
+};
+
+/// A hundredth of a second of a disk, a twentieth of a second of drawing in software.
+inline constexpr QuickLimits kFirstPicture{100'000, 4 << 20, 0};
 
 /// An image with fewer pixels than `size` that shows what a camera shows in one of `size`.
 class ReducedSize {

@@ -1,47 +1,50 @@
 #include "render/frame_workers.h"
 
+#include <algorithm>
+
 #include "render/depth_sort.h"
-#include "render/thread_name.h"
+#include "stream/error.h"
 #include "stream/stage_timer.h"
 
 namespace curvisplat {
 
 /// What a worker keeps from brick to brick, so that preparing one allocates nothing.
-class WorkerScratch {
- public:
-  SplatGeometry geometry;
-  SplatVariable values;
+struct FrameWorkers::Worker {
+  BrickSource::Scratch scratch;
   BrickProjector projector;
   DepthSorter sorter;
+  FrameStatistics statistics;
 };
 
-FrameWorkers::FrameWorkers(const FrameWork& work, SegmentRing& ring, unsigned count)
-    : work_(work), ring_(ring), statistics_(count) {
-  try {
-    for (FrameStatistics& statistics : statistics_)
-      threads_.emplace_back([this, &statistics] { loop(statistics); });
-  } catch (...) {
-    join();
-    throw;
-  }
+FrameWorkers::FrameWorkers(BrickSource& source, SegmentRing& ring, unsigned count)
+    : source_(source), ring_(ring), team_(count, "prepare") {
+  for (unsigned n = 0; n < count; ++n) workers_.push_back(std::make_unique<Worker>());
 }
 
 FrameWorkers::~FrameWorkers() {
-  join();
+  ring_.close();
+  source_.stop();
 }
 
-void FrameWorkers::join() {
-  ring_.close();
-  for (std::thread& thread : threads_) thread.join();
-  threads_.clear();
+void FrameWorkers::start(const FrameWork& work) {
+  work_ = &work;
+  next_ = 0;
+  first_failure_ = nullptr;
+  for (auto& worker : workers_) {
+    worker->statistics = {};
+    worker->scratch.times = {};
+    worker->scratch.waited_s = 0;
+  }
+  team_.start([this](unsigned number) { loop(*workers_[number]); });
 }
 
 void FrameWorkers::finish(FrameStatistics& sum) {
-  for (std::thread& thread : threads_) thread.join();
-  threads_.clear();
-  for (const FrameStatistics& part : statistics_) {
-    sum.read_s += part.read_s;
-    sum.decode_s += part.decode_s;
+  team_.wait();
+  for (const auto& worker : workers_) {
+    const FrameStatistics& part = worker->statistics;
+    sum.verify_s += worker->scratch.times.verify_s;
+    sum.decode_s += worker->scratch.times.decode_s;
+    sum.read_waited_s += worker->scratch.waited_s;
     sum.project_s += part.project_s;
     sum.sort_s += part.sort_s;
     sum.workers_waited_s += part.workers_waited_s;
@@ -50,19 +53,40 @@ void FrameWorkers::finish(FrameStatistics& sum) {
     sum.splats_off_screen += part.splats_off_screen;
     sum.splats_transparent += part.splats_transparent;
     sum.splats_drawn += part.splats_drawn;
-    sum.bytes_read += part.bytes_read;
+    sum.bricks_hidden += part.bricks_hidden;
+    for (const BrickFailure& failure : part.bricks_unreadable) sum.bricks_unreadable.push_back(failure);
   }
+  std::sort(sum.bricks_unreadable.begin(), sum.bricks_unreadable.end(),
+            [](const BrickFailure& a, const BrickFailure& b) { return a.brick < b.brick; });
+  // One that is drawn in several parts failed for each.
+  const auto again =
+      std::unique(sum.bricks_unreadable.begin(), sum.bricks_unreadable.end(),
+                  [](const BrickFailure& a, const BrickFailure& b) { return a.brick == b.brick; });
+  sum.bricks_unreadable.erase(again, sum.bricks_unreadable.end());
   if (first_failure_) std::rethrow_exception(first_failure_);
 }
 
-void FrameWorkers::loop(FrameStatistics& statistics) {
-  nameThisThread("prepare");
+void FrameWorkers::startPrefetch() {
+  team_.start([this](unsigned number) {
+    try {
+      while (source_.prefetchNext(workers_[number]->scratch)) {
+      }
+    } catch (...) {
+      // A damaged brick is the frame's to report; the others can wait for it too.
+      source_.stop();
+    }
+  });
+}
+
+void FrameWorkers::finishPrefetch() {
+  team_.wait();
+}
+
+void FrameWorkers::loop(Worker& worker) {
   try {
-    WorkerScratch scratch;
     while (true) {
       const uint64_t sequence = next_++;
-      if (sequence >= work_.parts.size()) return;
-      if (!prepare(scratch, sequence, statistics)) return;
+      if (sequence >= work_->parts.size() || !prepare(worker, sequence)) return;
     }
   } catch (...) {
     {
@@ -70,28 +94,53 @@ void FrameWorkers::loop(FrameStatistics& statistics) {
       if (!first_failure_) first_failure_ = std::current_exception();
     }
     ring_.close();
+    source_.stop();
   }
 }
 
-bool FrameWorkers::prepare(WorkerScratch& scratch, uint64_t sequence, FrameStatistics& statistics) {
-  const auto [id, octants] = work_.parts[sequence];
-  const Brick& brick = work_.cache.bricks()[id];
-  ReadTimes times;
-  work_.cache.readGeometry(id, scratch.geometry, nullptr, &times);
-  work_.cache.readVariable(id, work_.variable, scratch.values, &times);
-  statistics.read_s += times.read_s;
-  statistics.decode_s += times.decode_s;
-  {
-    const StageTimer timer(statistics.project_s);
-    const SplatRanges ranges(brick, octants);
-    scratch.projector.project(work_.settings, work_.table, work_.cache.manifest().root.cellMin(brick.cell),
-                              scratch.geometry, scratch.values, {ranges.begin(), ranges.end()});
+std::optional<BrickSource::Splats> FrameWorkers::fetch(Worker& worker, uint64_t sequence) {
+  try {
+    return source_.take(sequence, worker.scratch);
+  } catch (const Error& error) {
+    if (!work_->keep_going) throw;
+    const BrickPart& part = work_->parts[sequence];
+    worker.statistics.bricks_unreadable.push_back({part.brick, error.what()});
+    return source_.standIn(part, worker.scratch);
   }
-  const std::vector<ScreenSplat>& splats = scratch.projector.splats();
+}
+
+/// A part that is hidden. False if the ring was stopped.
+bool FrameWorkers::passOver(Worker& worker, uint64_t sequence) {
+  {
+    const StageTimer timer(worker.statistics.workers_waited_s);
+    if (!ring_.acquire(sequence, 0)) return false;
+  }
+  ring_.commit(sequence);
+  ++worker.statistics.bricks_hidden;
+  return true;
+}
+
+bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
+  FrameStatistics& statistics = worker.statistics;
+  const uint32_t brick = work_->parts[sequence].brick;
+  if (work_->hidden.hides(brick)) {
+    source_.pass(sequence);
+    return passOver(worker, sequence);
+  }
+  {
+    const std::optional<BrickSource::Splats> fetched = fetch(worker, sequence);
+    if (!fetched) return false;
+    if (work_->hidden.hides(brick)) return passOver(worker, sequence);
+    const StageTimer timer(statistics.project_s);
+    worker.projector.project(work_->settings, work_->table,
+                             work_->cache.manifest().root.cellMin(fetched->cell), fetched->geometry,
+                             fetched->values, fetched->ranges);
+  }
+  const std::vector<ScreenSplat>& splats = worker.projector.splats();
   std::span<const uint32_t> order;
   {
     const StageTimer timer(statistics.sort_s);
-    order = scratch.sorter.farthestFirst(scratch.projector.depths());
+    order = worker.sorter.sort(worker.projector.depths(), work_->order);
   }
   std::optional<std::span<ScreenSplat>> segment;
   {
@@ -105,14 +154,12 @@ bool FrameWorkers::prepare(WorkerScratch& scratch, uint64_t sequence, FrameStati
   }
   ring_.commit(sequence);
 
-  const ProjectionCounts& counts = scratch.projector.counts();
+  const ProjectionCounts& counts = worker.projector.counts();
   statistics.splats_read += counts.read;
   statistics.splats_clipped += counts.clipped;
   statistics.splats_off_screen += counts.off_screen;
   statistics.splats_transparent += counts.transparent;
   statistics.splats_drawn += counts.drawn;
-  statistics.bytes_read +=
-      brick.geometry.length + work_.cache.brickVariables(work_.variable)[id].values.length;
   return true;
 }
 

@@ -18,6 +18,8 @@ class GlContext {
   const GlFunctions& functions() const { return functions_; }
   /// "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
   const std::string& name() const { return name_; }
+  /// Whether the processor draws: no graphics card does.
+  bool isSoftware() const { return software_; }
 
  protected:
   GlContext(const std::string& library, const GlFunctions::Lookup& lookup);
@@ -25,10 +27,14 @@ class GlContext {
  private:
   GlFunctions functions_;
   std::string name_;
+  bool software_ = true;
 };
 
-/// A core context of OpenGL 3.3 or newer, made current on the calling thread. Throws Error: which libraries
-/// were tried and what each of them said.
-std::unique_ptr<GlContext> makeOffscreenContext();
+/// The libraries that give a context without a window.
+enum class GlLibrary { osmesa, egl };
+
+/// A core context of OpenGL 3.3 or newer, made current on the calling thread. Throws Error: what was tried,
+/// and what it said.
+std::unique_ptr<GlContext> makeOffscreenContext(GlLibrary library);
 
 }  // namespace curvisplat

@@ -30,6 +30,21 @@ GlFunctions::GlFunctions(const Lookup& lookup) {
   if (!name) throw Error("the OpenGL library has no function gl" #name "; OpenGL 3.3 or newer is needed");
   CURVISPLAT_GL_FUNCTIONS(CURVISPLAT_GL_FETCH)
 #undef CURVISPLAT_GL_FETCH
+#define CURVISPLAT_GL_FETCH(name, type) name = reinterpret_cast<type>(lookup("gl" #name));
+  CURVISPLAT_GL_4_4_FUNCTIONS(CURVISPLAT_GL_FETCH)
+#undef CURVISPLAT_GL_FETCH
+}
+
+bool GlFunctions::has44() const {
+  GLint major = 0, minor = 0;
+  GetIntegerv(GL_MAJOR_VERSION, &major);
+  GetIntegerv(GL_MINOR_VERSION, &minor);
+  if (major < 4 || (major == 4 && minor < 4)) return false;
+#define CURVISPLAT_GL_HAS(name, type) \
+  if (!name) return false;
+  CURVISPLAT_GL_4_4_FUNCTIONS(CURVISPLAT_GL_HAS)
+#undef CURVISPLAT_GL_HAS
+  return true;
 }
 
 void GlFunctions::check(std::string_view doing) const {

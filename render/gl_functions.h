@@ -58,6 +58,8 @@ namespace curvisplat {
   X(RenderbufferStorage, PFNGLRENDERBUFFERSTORAGEPROC)         \
   X(ShaderSource, PFNGLSHADERSOURCEPROC)                       \
   X(TexBuffer, PFNGLTEXBUFFERPROC)                             \
+  X(TexImage2D, PFNGLTEXIMAGE2DPROC)                           \
+  X(TexParameteri, PFNGLTEXPARAMETERIPROC)                     \
   X(Uniform1f, PFNGLUNIFORM1FPROC)                             \
   X(Uniform1i, PFNGLUNIFORM1IPROC)                             \
   X(Uniform2f, PFNGLUNIFORM2FPROC)                             \
@@ -67,15 +69,26 @@ namespace curvisplat {
   X(VertexAttribPointer, PFNGLVERTEXATTRIBPOINTERPROC)         \
   X(Viewport, PFNGLVIEWPORTPROC)
 
+// Null, or refused, where the context is older: see has44().
+#define CURVISPLAT_GL_4_4_FUNCTIONS(X)                                         \
+  X(BufferStorage, PFNGLBUFFERSTORAGEPROC)                                     \
+  X(DrawArraysInstancedBaseInstance, PFNGLDRAWARRAYSINSTANCEDBASEINSTANCEPROC) \
+  X(MapBufferRange, PFNGLMAPBUFFERRANGEPROC)
+
 /// Valid as long as the context is, on the thread where the context is current.
 struct GlFunctions {
 #define CURVISPLAT_GL_MEMBER(name, type) type name = nullptr;
   CURVISPLAT_GL_FUNCTIONS(CURVISPLAT_GL_MEMBER)
+  CURVISPLAT_GL_4_4_FUNCTIONS(CURVISPLAT_GL_MEMBER)
 #undef CURVISPLAT_GL_MEMBER
 
   using Lookup = std::function<void*(const char* name)>;
   /// Throws Error naming the first function that `lookup` does not know.
   explicit GlFunctions(const Lookup& lookup);
+
+  /// Whether the functions of OpenGL 4.4 can be called. Some libraries have functions that their contexts
+  /// refuse.
+  bool has44() const;
 
   /// Throws Error if a call has failed since the last check: "OpenGL failed while <doing>: <error>".
   void check(std::string_view doing) const;

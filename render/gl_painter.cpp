@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <deque>
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,6 +41,29 @@ struct TableTexture {
   }
 };
 
+/// Splats as the shader's instances: ScreenSplat's ten floats as 4 + 4 + 2. Leaves itself bound.
+struct InstanceBuffer {
+  GlObject buffer, vertex_array;
+
+  explicit InstanceBuffer(const GlFunctions& gl) : buffer(makeBuffer(gl)), vertex_array(makeVertexArray(gl)) {
+    static constexpr GLint kComponents[] = {4, 4, 2};
+    bind(gl);
+    size_t offset = 0;
+    for (GLuint attribute = 0; attribute < 3; ++attribute) {
+      gl.EnableVertexAttribArray(attribute);
+      gl.VertexAttribPointer(attribute, kComponents[attribute], GL_FLOAT, GL_FALSE, sizeof(ScreenSplat),
+                             reinterpret_cast<const void*>(offset));
+      gl.VertexAttribDivisor(attribute, 1);
+      offset += static_cast<size_t>(kComponents[attribute]) * sizeof(float);
+    }
+  }
+
+  void bind(const GlFunctions& gl) const {
+    gl.BindVertexArray(vertex_array.name());
+    gl.BindBuffer(GL_ARRAY_BUFFER, buffer.name());
+  }
+};
+
 /// Value and step to the next value, so that linear interpolation needs one fetch.
 std::vector<std::array<float, 2>> footprintTexels() {
   const auto table = footprintTable(kFootprintSteps);
@@ -59,22 +84,29 @@ struct GlPainter::State {
         flat_log(gl, splatVertexShader(), splatFragmentShader({.per_pixel = false, .log_scale = true})),
         footprint(gl),
         classes(gl),
-        instances(makeBuffer(gl)),
-        vertex_array(makeVertexArray(gl)),
+        copied(gl),
         framebuffer(makeFramebuffer(gl)),
         colour(makeRenderbuffer(gl)) {}
 
   const GlFunctions& gl;
   GlProgram per_pixel, per_pixel_log, flat, flat_log;
   TableTexture footprint, classes;
-  GlObject instances, vertex_array;
+  InstanceBuffer copied;                 // what lies elsewhere is copied here to be drawn
+  std::optional<InstanceBuffer> mapped;  // what lies here is not
+  std::span<ScreenSplat> mapped_splats;
   GlObject framebuffer, colour;
   ImageSize size{0, 0};
-  std::deque<GlFence> in_flight;
+  struct InFlight {
+    GlFence fence;
+    uint64_t draw;
+  };
+  std::deque<InFlight> in_flight;
+  uint64_t draws = 0;  // calls of draw()
   double upload_s = 0, draw_s = 0;
 
   void allocate(ImageSize wanted);
   void drawPart(std::span<const ScreenSplat> splats);
+  void finishOldest();
   void use(const GlProgram& program, const ClassificationTable& table) const;
 };
 
@@ -83,18 +115,6 @@ GlPainter::GlPainter(const GlContext& context) : state_(std::make_unique<State>(
   const auto texels = footprintTexels();
   state_->footprint.fill<std::array<float, 2>>(gl, kFootprintUnit, GL_RG32F, texels);
 
-  gl.BindVertexArray(state_->vertex_array.name());
-  gl.BindBuffer(GL_ARRAY_BUFFER, state_->instances.name());
-  // ScreenSplat's ten floats as 4 + 4 + 2.
-  static constexpr GLint kComponents[] = {4, 4, 2};
-  size_t offset = 0;
-  for (GLuint attribute = 0; attribute < 3; ++attribute) {
-    gl.EnableVertexAttribArray(attribute);
-    gl.VertexAttribPointer(attribute, kComponents[attribute], GL_FLOAT, GL_FALSE, sizeof(ScreenSplat),
-                           reinterpret_cast<const void*>(offset));
-    gl.VertexAttribDivisor(attribute, 1);
-    offset += static_cast<size_t>(kComponents[attribute]) * sizeof(float);
-  }
   gl.Enable(GL_BLEND);
   gl.BlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
   gl.check("setting up the painter");
@@ -145,8 +165,8 @@ void GlPainter::State::use(const GlProgram& program, const ClassificationTable& 
 void GlPainter::begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
                       bool per_pixel, const PaintResources&) {
   const GlFunctions& gl = state_->gl;
+  finishDraws();  // of a frame that was not ended
   state_->upload_s = state_->draw_s = 0;
-  state_->in_flight.clear();  // of a frame that was not ended
   state_->allocate(size);
   state_->classes.fill(gl, kClassesUnit, GL_RGBA32F, table.cumulative());
   state_->use(per_pixel ? (table.logScale() ? state_->per_pixel_log : state_->per_pixel)
@@ -158,7 +178,25 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
   gl.check("beginning a frame");
 }
 
+std::span<ScreenSplat> GlPainter::mapSplats(size_t count) {
+  State& state = *state_;
+  const GlFunctions& gl = state.gl;
+  finishDraws();
+  state.mapped.reset();
+  state.mapped_splats = {};
+  if (!gl.has44()) return {};
+  state.mapped.emplace(gl);
+  const auto bytes = static_cast<GLsizeiptr>(count * sizeof(ScreenSplat));
+  constexpr GLbitfield kHow = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
+  gl.BufferStorage(GL_ARRAY_BUFFER, bytes, nullptr, kHow);
+  void* const memory = gl.MapBufferRange(GL_ARRAY_BUFFER, 0, bytes, kHow);
+  gl.check("mapping memory for splats");
+  state.mapped_splats = {static_cast<ScreenSplat*>(memory), count};
+  return state.mapped_splats;
+}
+
 void GlPainter::draw(std::span<const ScreenSplat> splats) {
+  ++state_->draws;
   while (!splats.empty()) {
     const auto part = splats.first(std::min(splats.size(), kSplatsPerDraw));
     splats = splats.subspan(part.size());
@@ -167,20 +205,44 @@ void GlPainter::draw(std::span<const ScreenSplat> splats) {
 }
 
 void GlPainter::State::drawPart(std::span<const ScreenSplat> splats) {
-  {
-    // Fresh storage each time: the driver keeps what it still draws from.
-    const StageTimer timer(upload_s);
-    gl.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(splats.size_bytes()), splats.data(),
-                  GL_STREAM_DRAW);
+  const auto count = static_cast<GLsizei>(splats.size());
+  const std::less_equal<const ScreenSplat*> not_after;
+  if (!mapped_splats.empty() && not_after(mapped_splats.data(), splats.data()) &&
+      not_after(splats.data() + splats.size(), mapped_splats.data() + mapped_splats.size())) {
+    const StageTimer timer(draw_s);
+    mapped->bind(gl);
+    gl.DrawArraysInstancedBaseInstance(GL_TRIANGLE_STRIP, 0, 4, count,
+                                       static_cast<GLuint>(splats.data() - mapped_splats.data()));
+  } else {
+    copied.bind(gl);
+    {
+      // Fresh storage each time: the driver keeps what it still draws from.
+      const StageTimer timer(upload_s);
+      gl.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(splats.size_bytes()), splats.data(),
+                    GL_STREAM_DRAW);
+    }
+    const StageTimer timer(draw_s);
+    gl.DrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, count);
   }
   const StageTimer timer(draw_s);
-  gl.DrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(splats.size()));
   gl.check("drawing splats");
-  in_flight.emplace_back(gl);
-  if (in_flight.size() > kDrawsInFlight) {
-    in_flight.front().wait();
-    in_flight.pop_front();
-  }
+  in_flight.push_back({GlFence(gl), draws});
+  if (in_flight.size() > kDrawsInFlight) finishOldest();
+}
+
+void GlPainter::State::finishOldest() {
+  in_flight.front().fence.wait();
+  in_flight.pop_front();
+}
+
+size_t GlPainter::drawsUnderWay() const {
+  const State& state = *state_;
+  return state.in_flight.empty() ? 0 : state.draws - state.in_flight.front().draw + 1;
+}
+
+void GlPainter::finishDraws() {
+  const StageTimer timer(state_->draw_s);
+  while (!state_->in_flight.empty()) state_->finishOldest();
 }
 
 Image GlPainter::end() {

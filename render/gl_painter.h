@@ -18,13 +18,20 @@ class GlPainter final : public Painter {
   explicit GlPainter(const GlContext& context);
   ~GlPainter() override;
 
+  DrawingOrder order() const override { return DrawingOrder::back_to_front; }
   void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table, bool per_pixel,
              const PaintResources& resources = {}) override;
   void draw(std::span<const ScreenSplat> splats) override;
+  size_t drawsUnderWay() const override;
+  void finishDraws() override;
   Image end() override;
 
   double uploadSeconds() const override;
   double drawSeconds() const override;
+
+  /// A buffer of OpenGL's for so many splats, mapped for as long as it is there: until the next call. Empty
+  /// where OpenGL is older than 4.4.
+  std::span<ScreenSplat> mapSplats(size_t count);
 
  private:
   struct State;

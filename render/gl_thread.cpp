@@ -2,12 +2,15 @@
 
 #include <utility>
 
-#include "render/thread_name.h"
+#include "stream/thread_name.h"
 
 namespace curvisplat {
 
-GlThread::GlThread() {
-  const Job first = [this](const GlContext& context) { context_name_ = context.name(); };
+GlThread::GlThread(GlLibrary library) : library_(library) {
+  const Job first = [this](const GlContext& context) {
+    context_name_ = context.name();
+    software_ = context.isSoftware();
+  };
   job_ = &first;  // loop() makes the context before it runs a job
   thread_ = std::thread([this] { loop(); });
   std::unique_lock lock(mutex_);
@@ -46,7 +49,7 @@ void GlThread::loop() {
     lock.unlock();
     std::exception_ptr error;
     try {
-      if (!context) context = makeOffscreenContext();
+      if (!context) context = makeOffscreenContext(library_);
       job(*context);
     } catch (...) {
       error = std::current_exception();

@@ -17,7 +17,7 @@ namespace curvisplat {
 class GlThread {
  public:
   /// Starts the thread, named "gl", and makes the context on it. Throws what makeOffscreenContext() throws.
-  GlThread();
+  explicit GlThread(GlLibrary library);
   ~GlThread();
   GlThread(const GlThread&) = delete;
   GlThread& operator=(const GlThread&) = delete;
@@ -26,8 +26,9 @@ class GlThread {
   /// Runs `job` on the thread and waits for its end. Throws what it throws. One caller at a time.
   void run(const Job& job);
 
-  /// Of the context, for people.
+  /// Of the context: GlContext::name() and isSoftware().
   const std::string& contextName() const { return context_name_; }
+  bool isSoftware() const { return software_; }
 
  private:
   void loop();
@@ -38,7 +39,9 @@ class GlThread {
   std::exception_ptr error_;  // of the last job
   bool stopping_ = false;
 
+  const GlLibrary library_;
   std::string context_name_;
+  bool software_ = true;
   std::thread thread_;
 };
 

@@ -71,46 +71,102 @@ HWY_INLINE Pixels pixelsAt(const Ellipse& e, const float* HWY_RESTRICT footprint
   return {hn::Mul(hn::Mul(f, hn::Set(d, e.amplitude)), hn::Mul(x, x)), p, q};
 }
 
-/// Blends over one vector of a block's pixels.
+/// Blends one vector of a block's pixels under what is there. What then still comes through.
 template <bool kThin>
-HWY_INLINE void blend(float* HWY_RESTRICT at, V depth, V red, V green, V blue, V extinction) {
+HWY_INLINE V blendUnder(float* HWY_RESTRICT at, V depth, const V (&value)[4]) {
   const Floats d;
   // A parabola may end below zero, by its error.
-  const V tau = hn::Max(hn::Mul(depth, extinction), hn::Zero(d));
+  const V tau = hn::Max(hn::Mul(depth, value[3]), hn::Zero(d));
   const V part = absorbedOf<kThin>(tau);
-  const V weight = hn::Mul(depth, part);
-  const V through = hn::NegMulAdd(tau, part, hn::Set(d, 1.0f));
-  const auto channel = [&](int c, V colour) HWY_ATTR {
+  float* transmittance = at + 3 * kBlockPixels;
+  const V before = hn::Load(d, transmittance);
+  const V weight = hn::Mul(hn::Mul(depth, part), before);
+  const V after = hn::NegMulAdd(hn::Mul(tau, part), before, before);
+  for (int c = 0; c < 3; ++c) {
     float* place = at + c * kBlockPixels;
-    hn::Store(hn::MulAdd(hn::Load(d, place), through, hn::Mul(colour, weight)), d, place);
-  };
-  channel(0, red);
-  channel(1, green);
-  channel(2, blue);
-  float* place = at + 3 * kBlockPixels;
-  hn::Store(hn::Mul(hn::Load(d, place), through), d, place);
+    hn::Store(hn::MulAdd(value[c], weight, hn::Load(d, place)), d, place);
+  }
+  hn::Store(after, d, transmittance);
+  return after;
 }
 
-/// One block. `x`, `y`: of its first pixel, in the tile.
-template <bool kConstant, bool kThin>
-HWY_INLINE void paintBlock(const Ellipse& e, const Shade& shade, const float* HWY_RESTRICT footprint,
+/// s = s0 + sp p + sq q.
+struct Along {
+  float s0, sp, sq;
+
+  HWY_INLINE V at(const Pixels& pixels) const {
+    const Floats d;
+    return hn::MulAdd(hn::Set(d, sp), pixels.p, hn::MulAdd(hn::Set(d, sq), pixels.q, hn::Set(d, s0)));
+  }
+};
+
+/// One parabola, or one colour: at + s (by + s bend).
+struct Shade {
+  float at[4], by[4], bend[4];
+  Along s;
+};
+
+HWY_INLINE bool isSaturated(V transmittance) {
+  return hn::AllTrue(Floats(), hn::Lt(transmittance, hn::Set(Floats(), kSaturated)));
+}
+
+/// One block. `x`, `y`: of its first pixel, in the tile. Whether it is saturated now.
+template <bool kFitted, bool kThin>
+HWY_INLINE bool paintBlock(const Ellipse& e, const Shade& shade, const float* HWY_RESTRICT footprint,
                            float* HWY_RESTRICT block, float x, float y) {
   const Floats d;
   const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
+  V most = hn::Zero(d);
   for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
     const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
                                    hn::Add(hn::Load(d, kLaneY + lane), from_y));
-    V s = hn::Zero(d);
-    if constexpr (!kConstant)
-      s = hn::MulAdd(hn::Set(d, shade.sp), pixels.p,
-                     hn::MulAdd(hn::Set(d, shade.sq), pixels.q, hn::Set(d, shade.s0)));
-    const auto value = [&](int c) HWY_ATTR {
-      if constexpr (kConstant) return hn::Set(d, shade.at[c]);
-      return hn::MulAdd(hn::MulAdd(hn::Set(d, shade.bend[c]), s, hn::Set(d, shade.by[c])), s,
-                        hn::Set(d, shade.at[c]));
-    };
-    blend<kThin>(block + lane, pixels.depth, value(0), value(1), value(2), value(3));
+    V value[4];
+    if constexpr (kFitted) {
+      const V s = shade.s.at(pixels);
+      for (int c = 0; c < 4; ++c)
+        value[c] = hn::MulAdd(hn::MulAdd(hn::Set(d, shade.bend[c]), s, hn::Set(d, shade.by[c])), s,
+                              hn::Set(d, shade.at[c]));
+    } else {
+      for (int c = 0; c < 4; ++c) value[c] = hn::Set(d, shade.at[c]);
+    }
+    most = hn::Max(most, blendUnder<kThin>(block + lane, pixels.depth, value));
   }
+  return isSaturated(most);
+}
+
+HWY_INLINE V lookUp(const Row& row, hn::Vec<Ints> n) {
+  const Floats d;
+  if constexpr (hn::MaxLanes(d) == kLanes) {
+    return hn::TableLookupLanes(hn::Load(d, row.at), hn::IndicesFromVec(d, n));
+  } else if constexpr (2 * hn::MaxLanes(d) == kLanes) {
+    const auto half = hn::Set(Ints(), kLanes / 2);
+    const auto in_half = hn::IndicesFromVec(d, hn::And(n, hn::Set(Ints(), kLanes / 2 - 1)));
+    return hn::IfThenElse(hn::RebindMask(d, hn::Lt(n, half)),
+                          hn::TableLookupLanes(hn::Load(d, row.at), in_half),
+                          hn::TableLookupLanes(hn::Load(d, row.at + kLanes / 2), in_half));
+  } else {
+    return hn::GatherIndex(d, row.at, n);
+  }
+}
+
+/// One block, by a polyline. Whether it is saturated now.
+HWY_INLINE bool paintBlock(const Ellipse& e, const Polyline& line, const Along& along,
+                           const float* HWY_RESTRICT footprint, float* HWY_RESTRICT block, float x, float y) {
+  const Floats d;
+  const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
+  V most = hn::Zero(d);
+  for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
+    const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
+                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
+    const V s = hn::Clamp(along.at(pixels), hn::Zero(d), hn::Set(d, Polyline::kParts));
+    const auto n = hn::ConvertTo(Ints(), s);
+    const V part = hn::Sub(s, hn::ConvertTo(d, n));
+    V value[4];
+    for (int c = 0; c < 4; ++c)
+      value[c] = hn::MulAdd(lookUp(line.step.of[c], n), part, lookUp(line.at.of[c], n));
+    most = hn::Max(most, blendUnder<false>(block + lane, pixels.depth, value));
+  }
+  return isSaturated(most);
 }
 
 /// The scalar: mean + reach (tp p + tq q), ± half_width.
@@ -118,29 +174,38 @@ struct Scalar {
   float mean, reach, tp, tq, half_width;
 };
 
-/// One block, with a look-up for each of its pixels.
-HWY_INLINE void paintBlockExactly(const Ellipse& e, const Scalar& scalar, const ShadingTable& table,
-                                  const float* HWY_RESTRICT footprint, float* HWY_RESTRICT block, float x,
-                                  float y) {
+/// A block of which every pixel is looked up.
+struct LookedUp {
+  Row depth, scale;
+  alignas(64) float integrals[4 * kLanes];  // of one pixel after the other
+};
+
+HWY_INLINE void lookUpBlock(const Ellipse& e, const Scalar& scalar, const ShadingTable& table,
+                            const float* HWY_RESTRICT footprint, float x, float y, LookedUp& out) {
   const Floats d;
   const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
-  Row depths;
   Intervals intervals;
   for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
     const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
                                    hn::Add(hn::Load(d, kLaneY + lane), from_y));
     const V t = hn::MulAdd(hn::Set(d, scalar.tp), pixels.p, hn::Mul(hn::Set(d, scalar.tq), pixels.q));
-    hn::Store(pixels.depth, d, depths.at + lane);
+    hn::Store(pixels.depth, d, out.depth.at + lane);
     locate(table, hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean)),
            hn::Set(d, scalar.half_width), lane, intervals);
+    hn::Store(hn::Load(d, intervals.scale.at + lane), d, out.scale.at + lane);
   }
-  alignas(64) float values[4 * kLanes];  // of one pixel after the other
-  for (size_t n = 0; n < kLanes; ++n) meanOver(table, intervals, n, values + 4 * n);
+  integrate(table, intervals, kLanes, out.integrals);
+}
+
+HWY_INLINE bool paintLookedUp(const LookedUp& in, float* HWY_RESTRICT block) {
+  const Floats d;
+  V most = hn::Zero(d);
   for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-    V red, green, blue, extinction;
-    hn::LoadInterleaved4(d, values + 4 * lane, red, green, blue, extinction);
-    blend<false>(block + lane, hn::Load(d, depths.at + lane), red, green, blue, extinction);
+    V value[4];
+    meansOf(in.integrals, hn::Load(d, in.scale.at + lane), lane, value);
+    most = hn::Max(most, blendUnder<false>(block + lane, hn::Load(d, in.depth.at + lane), value));
   }
+  return isSaturated(most);
 }
 
 }  // namespace HWY_NAMESPACE

@@ -1,6 +1,7 @@
 #include <hwy/cache_control.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "render/kernel.h"
@@ -24,14 +25,14 @@ constexpr auto kSupport = static_cast<float>(kKernelSupport);
 
 /// Sixteen splats of a tile, ready to be painted.
 struct Visits {
-  Row x, y, a, b, c, amplitude;  // Ellipse
-  Row tp, tq;                    // Scalar's
-  Pieces pieces;                 // all of the splat that is in the tile
+  Row x, y, a, b, c;  // Ellipse
+  Row tp, tq;         // Scalar's
+  Pieces pieces;      // all of the splat that is in the tile
   Row l11, l21, l22;
   IntRow x0, y0, x1, y1;  // blocks, the last included; empty where x0 > x1 or y0 > y1
 
   HWY_INLINE Ellipse ellipse(size_t n) const {
-    return {x.at[n], y.at[n], a.at[n], b.at[n], c.at[n], amplitude.at[n]};
+    return {x.at[n], y.at[n], a.at[n], b.at[n], c.at[n], pieces.amplitude.at[n]};
   }
   HWY_INLINE Scalar scalar(size_t n) const {
     return {pieces.mean.at[n], pieces.reach.at[n], tp.at[n], tq.at[n], pieces.half_width.at[n]};
@@ -74,7 +75,7 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
     store(a, out.a);
     store(b, out.b);
     store(c, out.c);
-    store(gather(work, offsets, 5), out.amplitude);
+    store(gather(work, offsets, 5), out.pieces.amplitude);
 
     // The pixels of the tile that lie in the ellipse's own rectangle.
     const V reach_x = hn::Mul(support, l11);
@@ -118,183 +119,162 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
   }
 }
 
-/// The blocks of a visit, row by row: those of its rectangle that its ellipse touches.
-class BlockRows {
- public:
-  HWY_INLINE BlockRows(const Visits& visits, size_t n)
-      : x0_(visits.x0.at[n]),
-        y0_(visits.y0.at[n]),
-        x1_(visits.x1.at[n]),
-        y1_(visits.y1.at[n]),
-        trimmed_(y1_ - y0_ > 1 && x1_ > x0_) {
-    if (trimmed_) trim(visits, n);
-  }
-
-  template <typename Paint>
-  HWY_INLINE void each(const Paint& paint) const {
-    for (int row = y0_; row <= y1_; ++row) {
-      const int from = trimmed_ ? std::max(x0_, from_.at[row]) : x0_;
-      const int to = trimmed_ ? std::min(x1_, to_.at[row]) : x1_;
-      for (int column = from; column <= to; ++column) paint(column, row);
-    }
-  }
-
- private:
-  // Of pixels at dy, the ellipse covers lean dy ± span √(reach² - dy²); it goes farthest right at dy = tip.
-  HWY_INLINE void trim(const Visits& visits, size_t n) {
-    const Floats d;
-    const float l11 = visits.l11.at[n], l21 = visits.l21.at[n], l22 = visits.l22.at[n];
-    const float s11 = l21 * l21 + l22 * l22;
-    const V lean = hn::Set(d, l11 * l21 / s11), span = hn::Set(d, l11 * l22 / s11);
-    const V reach2 = hn::Set(d, kSupport * kSupport * s11), tip = hn::Set(d, kSupport * l21);
-    const V x = hn::Set(d, visits.x.at[n]), y = hn::Set(d, visits.y.at[n]);
-    const V block = hn::Set(d, 1.0f / kBlockSide), none = hn::Set(d, kTileBlocks);
-    for (size_t lane = 0; lane < kTileBlocks; lane += hn::Lanes(d)) {
-      const V top = hn::Sub(hn::Mul(hn::Iota(d, static_cast<float>(lane)), hn::Set(d, kBlockSide)), y);
-      const V bottom = hn::Add(top, hn::Set(d, kBlockSide - 1));
-      const V right = hn::Clamp(tip, top, bottom), left = hn::Clamp(hn::Neg(tip), top, bottom);
-      const auto width = [&](V dy) HWY_ATTR {
-        return hn::Mul(span, hn::Sqrt(hn::Max(hn::NegMulAdd(dy, dy, reach2), hn::Zero(d))));
-      };
-      const V to = hn::Add(x, hn::MulAdd(lean, right, width(right)));
-      const V from = hn::Add(x, hn::MulSub(lean, left, width(left)));
-      // A hundredth of a pixel is for rounding.
-      const V last = hn::Floor(hn::Mul(hn::Add(to, hn::Set(d, 0.01f)), block));
-      const V first = hn::Ceil(hn::Mul(hn::Sub(from, hn::Set(d, kBlockSide - 1 + 0.01f)), block));
-      hn::Store(hn::ConvertTo(Ints(), hn::Clamp(first, hn::Zero(d), none)), Ints(), from_.at + lane);
-      hn::Store(hn::ConvertTo(Ints(), hn::Clamp(last, hn::Set(d, -1.0f), none)), Ints(), to_.at + lane);
-    }
-  }
-
-  int x0_, y0_, x1_, y1_;
-  bool trimmed_;
-  IntRow from_, to_;
-};
-
-HWY_INLINE float* blockAt(const TileWork& work, int column, int row) {
-  return work.tile + (row * kTileBlocks + column) * kBlockFloats;
-}
-
-HWY_INLINE float pixelOf(int block) {
-  return static_cast<float>(block * kBlockSide);
-}
-
-template <bool kConstant, bool kThin>
-HWY_INLINE void paintBlocks(const TileWork& work, const BlockRows& rows, const Ellipse& e, const Shade& shade,
-                            const float* footprint) {
-  rows.each([&](int column, int row) HWY_ATTR {
-    paintBlock<kConstant, kThin>(e, shade, footprint, blockAt(work, column, row), pixelOf(column),
-                                 pixelOf(row));
-  });
-}
-
-HWY_INLINE bool isThin(const Ellipse& e, const Shade& shade) {
-  return e.amplitude * kPeak * shade.most < 0.34f;
-}
-
-/// From along t to along p and q.
-HWY_INLINE void turn(const Scalar& scalar, Shade& shade) {
-  shade.sp *= scalar.tp;
-  shade.sq *= scalar.tq;
-}
-
-// Blocks are fitted two rows of a tile at a time.
-static_assert(kLanes == 2 * kTileBlocks);
-alignas(64) constexpr float kFittedX[kLanes] = {0, 4, 8, 12, 16, 20, 24, 28, 0, 4, 8, 12, 16, 20, 24, 28};
-alignas(64) constexpr float kFittedY[kLanes] = {0, 0, 0, 0, 0, 0, 0, 0, 4, 4, 4, 4, 4, 4, 4, 4};
-
-/// Where one parabola does not do for all of the tile: one for every block, if that does.
-HWY_NOINLINE void paintBlockByBlock(const TileWork& work, const BlockRows& rows, const Ellipse& e,
-                                    const Scalar& scalar, const float* footprint) {
+/// The blocks of a visit's rectangle that its ellipse touches, row by row: those from `from` to `to`.
+HWY_INLINE void trim(const Visits& visits, size_t n, IntRow& from_block, IntRow& to_block) {
   const Floats d;
-  const float by_x = scalar.tp * e.a + scalar.tq * e.b, by_y = scalar.tq * e.c;
-  constexpr float kHalf = 0.5f * (kBlockSide - 1);
-  Pieces pieces;
-  Fits fits;
-  int fitted_row = -2;  // and the one after it
-  rows.each([&](int column, int row) HWY_ATTR {
-    if (row > fitted_row + 1) {
-      fitted_row = row;
-      for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
-        const V middle_x = hn::Add(hn::Load(d, kFittedX + lane), hn::Set(d, kHalf - e.x));
-        const V middle_y = hn::Add(hn::Load(d, kFittedY + lane), hn::Set(d, pixelOf(row) + kHalf - e.y));
-        const Range t = tOver(hn::Set(d, by_x), hn::Set(d, by_y), middle_x, middle_y, hn::Set(d, kHalf),
-                              hn::Set(d, kHalf));
-        hn::Store(t.from, d, pieces.from.at + lane);
-        hn::Store(t.to, d, pieces.to.at + lane);
-        hn::Store(hn::Set(d, scalar.mean), d, pieces.mean.at + lane);
-        hn::Store(hn::Set(d, scalar.reach), d, pieces.reach.at + lane);
-        hn::Store(hn::Set(d, scalar.half_width), d, pieces.half_width.at + lane);
-      }
-      fitPieces(work.table, pieces, fits);
-    }
-    const float x = pixelOf(column), y = pixelOf(row);
-    float* block = blockAt(work, column, row);
-    Shade shade;
-    const auto piece = static_cast<size_t>(column + (row - fitted_row) * kTileBlocks);
-    switch (shadeOf(work.table, pieces, fits, piece, e.amplitude, shade)) {
-      case Fit::nothing:
-        return;
-      case Fit::constant:
-        return paintBlock<true, false>(e, shade, footprint, block, x, y);
-      case Fit::parabola:
-        turn(scalar, shade);
-        return paintBlock<false, false>(e, shade, footprint, block, x, y);
-      case Fit::none:
-        return paintBlockExactly(e, scalar, work.table, footprint, block, x, y);
-    }
-  });
-}
-
-/// Where not even that is to be hoped for.
-HWY_NOINLINE void paintPixelByPixel(const TileWork& work, const BlockRows& rows, const Ellipse& e,
-                                    const Scalar& scalar, const float* footprint) {
-  rows.each([&](int column, int row) HWY_ATTR {
-    paintBlockExactly(e, scalar, work.table, footprint, blockAt(work, column, row), pixelOf(column),
-                      pixelOf(row));
-  });
-}
-
-HWY_INLINE void paintVisit(const TileWork& work, const Visits& visits, const Fits& fits, size_t n,
-                           const float* footprint) {
-  if (visits.x0.at[n] > visits.x1.at[n] || visits.y0.at[n] > visits.y1.at[n]) return;
-  const Ellipse e = visits.ellipse(n);
-  Shade shade;
-  Fit fit;
-  if (work.per_pixel) {
-    fit = shadeOf(work.table, visits.pieces, fits, n, e.amplitude, shade);
-  } else {
-    meanOver(work.table, fits.low, n, shade.at);
-    shade.most = shade.at[3];
-    fit = shade.most > 0 ? Fit::constant : Fit::nothing;
+  // Of pixels at dy, the ellipse covers lean dy ± span √(reach² - dy²); it goes farthest right at dy = tip.
+  const float l11 = visits.l11.at[n], l21 = visits.l21.at[n], l22 = visits.l22.at[n];
+  const float s11 = l21 * l21 + l22 * l22;
+  const V lean = hn::Set(d, l11 * l21 / s11), span = hn::Set(d, l11 * l22 / s11);
+  const V reach2 = hn::Set(d, kSupport * kSupport * s11), tip = hn::Set(d, kSupport * l21);
+  const V x = hn::Set(d, visits.x.at[n]), y = hn::Set(d, visits.y.at[n]);
+  const V block = hn::Set(d, 1.0f / kBlockSide), none = hn::Set(d, kTileBlocks);
+  for (size_t lane = 0; lane < kTileBlocks; lane += hn::Lanes(d)) {
+    const V top = hn::Sub(hn::Mul(hn::Iota(d, static_cast<float>(lane)), hn::Set(d, kBlockSide)), y);
+    const V bottom = hn::Add(top, hn::Set(d, kBlockSide - 1));
+    const V right = hn::Clamp(tip, top, bottom), left = hn::Clamp(hn::Neg(tip), top, bottom);
+    const auto width = [&](V dy) HWY_ATTR {
+      return hn::Mul(span, hn::Sqrt(hn::Max(hn::NegMulAdd(dy, dy, reach2), hn::Zero(d))));
+    };
+    const V to = hn::Add(x, hn::MulAdd(lean, right, width(right)));
+    const V from = hn::Add(x, hn::MulSub(lean, left, width(left)));
+    // A hundredth of a pixel is for rounding.
+    const V last = hn::Floor(hn::Mul(hn::Add(to, hn::Set(d, 0.01f)), block));
+    const V first = hn::Ceil(hn::Mul(hn::Sub(from, hn::Set(d, kBlockSide - 1 + 0.01f)), block));
+    hn::Store(hn::ConvertTo(Ints(), hn::Clamp(first, hn::Zero(d), none)), Ints(), from_block.at + lane);
+    hn::Store(hn::ConvertTo(Ints(), hn::Clamp(last, hn::Set(d, -1.0f), none)), Ints(), to_block.at + lane);
   }
-  if (fit == Fit::nothing) return;
-  const BlockRows rows(visits, n);
-  if (fit == Fit::constant) {
-    if (isThin(e, shade)) return paintBlocks<true, true>(work, rows, e, shade, footprint);
-    return paintBlocks<true, false>(work, rows, e, shade, footprint);
+}
+
+/// Of a row: `from` to `to`, none where from > to.
+HWY_INLINE BlockMask blocksOfRow(int from, int to) {
+  return from > to ? 0 : (BlockMask{2} << to) - (BlockMask{1} << from);
+}
+
+HWY_INLINE BlockMask blocksOf(const Visits& visits, size_t n) {
+  const int x0 = visits.x0.at[n], y0 = visits.y0.at[n], x1 = visits.x1.at[n], y1 = visits.y1.at[n];
+  BlockMask blocks = 0;
+  if (x0 > x1 || y0 > y1) return blocks;
+  if (y1 - y0 <= 1 || x0 == x1) {
+    const BlockMask row = blocksOfRow(x0, x1);
+    for (int y = y0; y <= y1; ++y) blocks |= row << y * kTileBlocks;
+    return blocks;
+  }
+  IntRow from, to;
+  trim(visits, n, from, to);
+  for (int y = y0; y <= y1; ++y)
+    blocks |= blocksOfRow(std::max(x0, from.at[y]), std::min(x1, to.at[y])) << y * kTileBlocks;
+  return blocks;
+}
+
+HWY_INLINE int takeFirst(BlockMask& blocks) {
+  const int first = std::countr_zero(blocks);
+  blocks &= blocks - 1;
+  return first;
+}
+
+HWY_INLINE float xOf(int block) {
+  return static_cast<float>(block % kTileBlocks * kBlockSide);
+}
+HWY_INLINE float yOf(int block) {
+  return static_cast<float>(block / kTileBlocks * kBlockSide);
+}
+
+// These paint `blocks`, and return those of them that are saturated then.
+
+template <bool kFitted, bool kThin>
+HWY_INLINE BlockMask paintBlocks(const TileWork& work, BlockMask blocks, const Ellipse& e, const Shade& shade,
+                                 const float* footprint) {
+  BlockMask saturated = 0;
+  while (blocks != 0) {
+    const int block = takeFirst(blocks);
+    if (paintBlock<kFitted, kThin>(e, shade, footprint, work.tile + block * kBlockFloats, xOf(block),
+                                   yOf(block)))
+      saturated |= BlockMask{1} << block;
+  }
+  return saturated;
+}
+
+/// With a look-up for every pixel. A few blocks are looked up before they are blended: what was
+/// written as many narrow vectors is not ready at once to be read as a wide one.
+HWY_NOINLINE BlockMask paintPixelByPixel(const TileWork& work, BlockMask blocks, const Ellipse& e,
+                                         const Scalar& scalar, const float* footprint) {
+  constexpr int kAtOnce = 8;
+  LookedUp looked_up[kAtOnce];
+  int numbers[kAtOnce];
+  BlockMask saturated = 0;
+  while (blocks != 0) {
+    int count = 0;
+    for (; blocks != 0 && count < kAtOnce; ++count) {
+      const int block = numbers[count] = takeFirst(blocks);
+      lookUpBlock(e, scalar, work.table, footprint, xOf(block), yOf(block), looked_up[count]);
+    }
+    for (int n = 0; n < count; ++n)
+      if (paintLookedUp(looked_up[n], work.tile + numbers[n] * kBlockFloats))
+        saturated |= BlockMask{1} << numbers[n];
+  }
+  return saturated;
+}
+
+/// From `begin` to `end` over piece n.
+HWY_INLINE Along along(const Pieces& pieces, size_t n, const Scalar& scalar, float begin, float end) {
+  const float from = pieces.from.at[n];
+  const float per_t = (end - begin) / (pieces.to.at[n] - from);
+  return {begin - from * per_t, per_t * scalar.tp, per_t * scalar.tq};
+}
+
+HWY_INLINE Shade shadeOf(const Fits& fits, size_t n) {
+  Shade shade;
+  for (int c = 0; c < 4; ++c) {
+    shade.at[c] = fits.at.of[c].at[n];
+    shade.by[c] = fits.by.of[c].at[n];
+    shade.bend[c] = fits.bend.of[c].at[n];
+  }
+  return shade;
+}
+
+HWY_NOINLINE BlockMask paintPolyline(const TileWork& work, BlockMask blocks, const Ellipse& e,
+                                     const Polyline& line, const Along& s, const float* footprint) {
+  BlockMask saturated = 0;
+  while (blocks != 0) {
+    const int block = takeFirst(blocks);
+    if (paintBlock(e, line, s, footprint, work.tile + block * kBlockFloats, xOf(block), yOf(block)))
+      saturated |= BlockMask{1} << block;
+  }
+  return saturated;
+}
+
+HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, const Visits& visits,
+                                const Fits& fits, size_t n, const float* footprint) {
+  const Ellipse e = visits.ellipse(n);
+  const bool thin = e.amplitude * kPeak * fits.most.at[n] < 0.34f;
+  if (fits.fit.at[n] == kConstant) {
+    const Shade shade = shadeOf(fits, n);
+    if (thin) return paintBlocks<false, true>(work, blocks, e, shade, footprint);
+    return paintBlocks<false, false>(work, blocks, e, shade, footprint);
   }
   const Scalar scalar = visits.scalar(n);
-  if (fit == Fit::none) {
-    // A parabola's error falls with the square of its length, or faster.
-    const float length = visits.pieces.to.at[n] - visits.pieces.from.at[n];
-    const float block_length =
-        (kBlockSide - 1) * (std::abs(scalar.tp * e.a + scalar.tq * e.b) + std::abs(scalar.tq * e.c));
-    if (shade.excess * block_length * block_length < 2 * length * length)
-      return paintBlockByBlock(work, rows, e, scalar, footprint);
-    return paintPixelByPixel(work, rows, e, scalar, footprint);
+  if (fits.fit.at[n] == kParabola) {
+    Shade shade = shadeOf(fits, n);
+    shade.s = along(visits.pieces, n, scalar, -1, 1);
+    if (thin) return paintBlocks<true, true>(work, blocks, e, shade, footprint);
+    return paintBlocks<true, false>(work, blocks, e, shade, footprint);
   }
-  turn(scalar, shade);
-  if (isThin(e, shade)) return paintBlocks<false, true>(work, rows, e, shade, footprint);
-  return paintBlocks<false, false>(work, rows, e, shade, footprint);
+  // A polyline's error is a 25th of a parabola's or so, where it does not fall much faster; and it is as much
+  // work as a block looked up.
+  Polyline line;
+  if (fits.excess.at[n] < 25 && std::popcount(blocks) > 1 && fitPolyline(work.table, visits.pieces, n, line))
+    return paintPolyline(work, blocks, e, line, along(visits.pieces, n, scalar, 0, Polyline::kParts),
+                         footprint);
+  return paintPixelByPixel(work, blocks, e, scalar, footprint);
 }
 
-void paintTile(const TileWork& work) {
-  const Floats d;
+BlockMask paintTile(const TileWork& work) {
   const float* footprint = footprintPolynomial();
+  BlockMask open = work.open;
   Visits visits;
   Fits fits;
-  for (size_t begin = 0; begin < work.order.size(); begin += kLanes) {
+  for (size_t begin = 0; begin < work.order.size() && open != 0; begin += kLanes) {
     const size_t count = std::min(kLanes, work.order.size() - begin);
     // The next sixteen come from anywhere in the batch.
     const size_t end = std::min(begin + 2 * kLanes, work.order.size());
@@ -303,14 +283,17 @@ void paintTile(const TileWork& work) {
     for (size_t n = 0; n < kLanes; ++n)
       numbers.at[n] = static_cast<int32_t>(work.order[begin + std::min(n, count - 1)]);
     setUp(work, numbers, visits);
-    if (work.per_pixel) {
-      fitPieces(work.table, visits.pieces, fits);
-    } else {
-      for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d))
-        locate(work.table, hn::Load(d, visits.pieces.mean.at + lane), hn::Zero(d), lane, fits.low);
+    if (work.per_pixel)
+      fitPieces(work.table, visits.pieces, count, fits);
+    else
+      fitMeans(work.table, visits.pieces, count, fits);
+    for (size_t n = 0; n < count; ++n) {
+      if (fits.fit.at[n] == kNothing) continue;
+      const BlockMask blocks = blocksOf(visits, n) & open;
+      if (blocks != 0) open &= ~paintVisit(work, blocks, visits, fits, n, footprint);
     }
-    for (size_t n = 0; n < count; ++n) paintVisit(work, visits, fits, n, footprint);
   }
+  return open;
 }
 
 }  // namespace HWY_NAMESPACE
@@ -322,8 +305,8 @@ namespace curvisplat {
 
 HWY_EXPORT(paintTile);
 
-void paintTile(const TileWork& work) {
-  HWY_DYNAMIC_DISPATCH(paintTile)(work);
+BlockMask paintTile(const TileWork& work) {
+  return HWY_DYNAMIC_DISPATCH(paintTile)(work);
 }
 
 }  // namespace curvisplat

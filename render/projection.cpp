@@ -53,8 +53,9 @@ struct LocalBox {
   }
 };
 
-void computeBlock(const OrthographicMap& map, const LocalBox& clip, const SplatGeometry& geometry,
-                  const SplatVariable& variable, size_t begin, size_t count, Block& block) {
+void computeBlock(const OrthographicMap& map, const LocalBox& clip,
+                  const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
+                  size_t begin, size_t count, Block& block) {
 #pragma GCC ivdep
   for (size_t n = 0; n < count; ++n) {
     const size_t i = begin + n;
@@ -69,8 +70,9 @@ void computeBlock(const OrthographicMap& map, const LocalBox& clip, const SplatG
   }
 }
 
-void computeBlock(const PerspectiveMap& map, const LocalBox& clip, const SplatGeometry& geometry,
-                  const SplatVariable& variable, size_t begin, size_t count, Block& block) {
+void computeBlock(const PerspectiveMap& map, const LocalBox& clip,
+                  const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
+                  size_t begin, size_t count, Block& block) {
 #pragma GCC ivdep
   for (size_t n = 0; n < count; ++n) {
     const size_t i = begin + n;
@@ -134,16 +136,16 @@ class Chooser {
 };
 
 /// What cutting needs beside the arithmetic loop's results; orthographic splats are never cut.
-std::optional<Chooser::Fate> chooseCut(const OrthographicMap&, const SplatGeometry&, const SplatVariable&,
-                                       size_t, Chooser&, size_t&) {
+std::optional<Chooser::Fate> chooseCut(const OrthographicMap&, const GeometryArrays<const float>&,
+                                       const VariableArrays<const float>&, size_t, Chooser&, size_t&) {
   return Chooser::Fate::off_screen;
 }
 
 /// Cuts splat `i` up and chooses among its pieces: the best fate of any. Nothing if there are more pieces
 /// than `pieces_left`, which it counts down.
-std::optional<Chooser::Fate> chooseCut(const PerspectiveMap& map, const SplatGeometry& geometry,
-                                       const SplatVariable& variable, size_t i, Chooser& chooser,
-                                       size_t& pieces_left) {
+std::optional<Chooser::Fate> chooseCut(const PerspectiveMap& map, const GeometryArrays<const float>& geometry,
+                                       const VariableArrays<const float>& variable, size_t i,
+                                       Chooser& chooser, size_t& pieces_left) {
   const SplatPiece whole{{geometry.x[i], geometry.y[i], geometry.z[i]},
                          shapeOf(geometry, i),
                          slopeOf(variable, i),
@@ -168,8 +170,8 @@ std::optional<Chooser::Fate> chooseCut(const PerspectiveMap& map, const SplatGeo
 
 /// False if the brick would give more than `pieces_left`, which it counts down.
 template <typename Map>
-bool projectRange(const Map& map, const LocalBox& clip, const SplatGeometry& geometry,
-                  const SplatVariable& variable, const SplatRange& range, Chooser& chooser,
+bool projectRange(const Map& map, const LocalBox& clip, const GeometryArrays<const float>& geometry,
+                  const VariableArrays<const float>& variable, const SplatRange& range, Chooser& chooser,
                   size_t& pieces_left, ProjectionCounts& counts) {
   Block block;
   for (size_t begin = range.begin; begin < range.end; begin += kBlock) {
@@ -200,9 +202,9 @@ bool projectRange(const Map& map, const LocalBox& clip, const SplatGeometry& geo
 }
 
 template <typename Map>
-bool projectWith(const Map& map, const LocalBox& clip, const SplatGeometry& geometry,
-                 const SplatVariable& variable, std::span<const SplatRange> ranges, Chooser& chooser,
-                 ProjectionCounts& counts) {
+bool projectWith(const Map& map, const LocalBox& clip, const GeometryArrays<const float>& geometry,
+                 const VariableArrays<const float>& variable, std::span<const SplatRange> ranges,
+                 Chooser& chooser, ProjectionCounts& counts) {
   size_t pieces_left = BrickProjector::kMostPieces;
   return std::all_of(ranges.begin(), ranges.end(), [&](const SplatRange& range) {
     return projectRange(map, clip, geometry, variable, range, chooser, pieces_left, counts);
@@ -229,12 +231,13 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
                              const glm::dvec3& cell_min, const SplatGeometry& geometry,
                              const SplatVariable& variable) {
   const SplatRange all{0, static_cast<uint32_t>(geometry.size())};
-  project(settings, table, cell_min, geometry, variable, {&all, 1});
+  project(settings, table, cell_min, arraysOf(geometry), arraysOf(variable), {&all, 1});
 }
 
 void BrickProjector::project(const ProjectionSettings& settings, const ClassificationTable& table,
-                             const glm::dvec3& cell_min, const SplatGeometry& geometry,
-                             const SplatVariable& variable, std::span<const SplatRange> ranges) {
+                             const glm::dvec3& cell_min, const GeometryArrays<const float>& geometry,
+                             const VariableArrays<const float>& variable,
+                             std::span<const SplatRange> ranges) {
   CURVISPLAT_CHECK_OP(geometry.size(), ==, variable.size());
   for (const SplatRange& range : ranges) CURVISPLAT_CHECK_OP(range.end, <=, geometry.size());
   const LocalBox clip(settings.clip_box, cell_min);

@@ -74,8 +74,8 @@ class BrickProjector {
   /// their longest column into two that merge into them exactly, until they are small for their distance;
   /// what then lies before the near plane is dropped. Overwrites splats() and depths(). Pure.
   void project(const ProjectionSettings& settings, const ClassificationTable& table,
-               const glm::dvec3& cell_min, const SplatGeometry& geometry, const SplatVariable& variable,
-               std::span<const SplatRange> ranges);
+               const glm::dvec3& cell_min, const GeometryArrays<const float>& geometry,
+               const VariableArrays<const float>& variable, std::span<const SplatRange> ranges);
   /// All splats of a brick.
   void project(const ProjectionSettings& settings, const ClassificationTable& table,
                const glm::dvec3& cell_min, const SplatGeometry& geometry, const SplatVariable& variable);

@@ -5,8 +5,9 @@
 // and freed in sequence order too.
 //
 //   worker n     acquire(sequence, count) -> fill -> commit(sequence)
-//   painter      next() -> draw -> release()
+//   painter      next() -> draw -> release(), or several next() before their release(): OpenGL draws later
 //
+// The memory is the painter's (PaintingBackend::splatMemory()): what workers write there is drawn from there.
 // close() wakes everyone: nothing is granted or handed out after it.
 #pragma once
 
@@ -14,7 +15,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -25,8 +25,8 @@ namespace curvisplat {
 
 class SegmentRing {
  public:
-  /// `capacity` in splats, at least that of the largest segment.
-  explicit SegmentRing(size_t capacity);
+  /// `memory` is at least as large as the largest segment, and outlives the ring.
+  explicit SegmentRing(std::span<ScreenSplat> memory) : splats_(memory) {}
 
   /// Space for `count` splats, which may be 0, of the brick that is `sequence` in the drawing order, from 0
   /// on. Nothing once the ring is closed. Any thread; each sequence number once, and each in time.
@@ -34,12 +34,20 @@ class SegmentRing {
   /// The segment is filled.
   void commit(uint64_t sequence);
 
-  /// The next segment in sequence. Nothing once the ring is closed. The painter's thread.
+  /// The next segment in sequence. Nothing once the ring is closed. The painter's thread. Who has not
+  /// released all segments before it may wait for ever, since it may need their space.
   std::optional<std::span<const ScreenSplat>> next();
-  /// Gives back what next() gave.
+  /// The same, without waiting: nothing if it is not there yet.
+  std::optional<std::span<const ScreenSplat>> nextIfReady();
+  /// Gives back the first segment handed out that has not been.
   void release();
 
   void close();
+  /// Begins anew, open and empty, from sequence number 0 on. Nobody may use the ring meanwhile.
+  void reset();
+
+  /// The most splats that were held at once, since reset().
+  size_t peakSplats() const;
 
  private:
   struct Segment {
@@ -48,10 +56,12 @@ class SegmentRing {
     bool committed;
   };
 
-  const size_t capacity_;
-  const std::unique_ptr<ScreenSplat[]> splats_;
+  bool isReady() const;
+  std::span<const ScreenSplat> handOut();
 
-  std::mutex mutex_;                   // guards all below, not the splats
+  const std::span<ScreenSplat> splats_;
+
+  mutable std::mutex mutex_;           // guards all below, not the splats
   std::condition_variable granted_;    // a segment was granted or released, or the ring closed
   std::condition_variable committed_;  // the first segment may be ready, or the ring closed
   // Positions count on for ever; modulo the capacity they are places in the ring. What does not fit before
@@ -59,7 +69,9 @@ class SegmentRing {
   std::deque<Segment> segments_;  // granted and not released, in sequence
   uint64_t end_ = 0;              // of the last segment granted
   uint64_t first_sequence_ = 0;   // of segments_.front()
+  size_t handed_out_ = 0;         // the first so many of segments_
   bool closed_ = false;
+  size_t peak_ = 0;
 };
 
 }  // namespace curvisplat

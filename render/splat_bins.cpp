@@ -29,7 +29,8 @@ SplatBins::SplatBins(ImageSize size, size_t splats, size_t entries, unsigned pie
       pieces_(pieces),
       entries_(std::make_unique_for_overwrite<uint32_t[]>(most_entries_)),
       begins_(tileCount(size) + 1),
-      piece_ends_(pieces * tileCount(size)) {
+      piece_ends_(pieces * tileCount(size)),
+      closed_(tileCount(size)) {
   splats_.reserve(splats);
   tiles_.reserve(splats);
 }
@@ -37,7 +38,7 @@ SplatBins::SplatBins(ImageSize size, size_t splats, size_t entries, unsigned pie
 uint64_t SplatBins::bytes(ImageSize size, size_t splats, size_t entries, unsigned pieces) {
   return splats * (sizeof(ScreenSplat) + sizeof(Tiles)) +
          sizeof(uint32_t) * (std::max(entries, tileCount(size)) + pieces * tileCount(size)) +
-         sizeof(size_t) * (tileCount(size) + 1);
+         sizeof(size_t) * (tileCount(size) + 1) + tileCount(size);
 }
 
 SplatBins::Tiles SplatBins::tilesOf(const ScreenSplat& splat) const {
@@ -59,16 +60,26 @@ SplatBins::Tiles SplatBins::tilesOf(const ScreenSplat& splat) const {
           static_cast<uint16_t>(y1)};
 }
 
+bool SplatBins::allClosed(const Tiles& tiles) const {
+  for (int y = tiles.y0; y <= tiles.y1; ++y)
+    for (int x = tiles.x0; x <= tiles.x1; ++x)
+      if (!closed_[static_cast<size_t>(y * columns_ + x)]) return false;
+  return true;
+}
+
 size_t SplatBins::add(std::span<const ScreenSplat> splats) {
-  const size_t count = std::min(splats.size(), most_splats_ - splats_.size());
   size_t added = 0;
-  for (; added < count; ++added) {
+  for (; added < splats.size() && splats_.size() < most_splats_; ++added) {
     const Tiles tiles = tilesOf(splats[added]);
+    if (allClosed(tiles)) {
+      ++hidden_;
+      continue;
+    }
     if (entry_count_ + tiles.count() > most_entries_) break;
     entry_count_ += tiles.count();
     tiles_.push_back(tiles);
+    splats_.push_back(splats[added]);
   }
-  splats_.insert(splats_.end(), splats.begin(), splats.begin() + static_cast<std::ptrdiff_t>(added));
   return added;
 }
 
@@ -78,8 +89,10 @@ void SplatBins::forPiece(size_t piece, const Visit& visit) const {
   for (size_t n = begin; n < end; ++n) {
     const Tiles& tiles = tiles_[n];
     for (int y = tiles.y0; y <= tiles.y1; ++y)
-      for (int x = tiles.x0; x <= tiles.x1; ++x)
-        visit(static_cast<size_t>(y) * static_cast<size_t>(columns_) + static_cast<size_t>(x), n);
+      for (int x = tiles.x0; x <= tiles.x1; ++x) {
+        const auto tile = static_cast<size_t>(y * columns_ + x);
+        if (!closed_[tile]) visit(tile, n);
+      }
   }
 }
 
@@ -104,6 +117,11 @@ void SplatBins::sort() {
   }
   begins_[tiles] = sum;
   forPieces([this](uint32_t& end, size_t n) { entries_[end++] = static_cast<uint32_t>(n); });
+}
+
+void SplatBins::open() {
+  std::fill(closed_.begin(), closed_.end(), 0);
+  hidden_ = 0;
 }
 
 void SplatBins::clear() {

@@ -2,6 +2,7 @@
 //
 // A counting sort: splats are counted tile by tile in a few pieces of the batch at a time, in parallel, and
 // each piece then writes where its counts say. The lists do not depend on how many pieces there were.
+// Tiles can be closed: they take no more, and splats that touch no other tiles are left out.
 // Takes 48 bytes a splat, 4 an entry, 4 a tile and piece, all at its construction.
 #pragma once
 
@@ -24,8 +25,8 @@ class SplatBins {
   int columns() const { return columns_; }
   int rows() const { return rows_; }
 
-  /// Adds what fits of `splats` behind those there are, and says how much that was. Something always fits
-  /// while empty().
+  /// Adds what fits of `splats` behind those there are, and says how much that was, with those that were left
+  /// out. Something always fits while empty().
   size_t add(std::span<const ScreenSplat> splats);
   bool empty() const { return splats_.empty(); }
   std::span<const ScreenSplat> splats() const { return splats_; }
@@ -39,6 +40,12 @@ class SplatBins {
   }
   void clear();
 
+  /// Opens all tiles. hidden() counts from here.
+  void open();
+  void close(int tile) { closed_[static_cast<size_t>(tile)] = true; }
+  /// Splats that were left out.
+  uint64_t hidden() const { return hidden_; }
+
  private:
   /// Tiles, the last included; empty where first > last.
   struct Tiles {
@@ -46,6 +53,7 @@ class SplatBins {
     size_t count() const { return x0 > x1 || y0 > y1 ? 0 : (x1 - x0 + size_t{1}) * (y1 - y0 + size_t{1}); }
   };
   Tiles tilesOf(const ScreenSplat& splat) const;
+  bool allClosed(const Tiles& tiles) const;
   template <typename Visit>
   void forPiece(size_t piece, const Visit& visit) const;
 
@@ -58,6 +66,8 @@ class SplatBins {
   std::unique_ptr<uint32_t[]> entries_;
   std::vector<size_t> begins_;        // [tiles + 1]
   std::vector<uint32_t> piece_ends_;  // [piece][tile]: counts, then where the piece goes on writing
+  std::vector<uint8_t> closed_;       // [tile]
+  uint64_t hidden_ = 0;
 };
 
 }  // namespace curvisplat

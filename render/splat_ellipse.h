@@ -22,12 +22,12 @@ struct Slope {
   float w0, w1, w2;
 };
 
-inline Shape shapeOf(const SplatGeometry& geometry, size_t i) {
+inline Shape shapeOf(const GeometryArrays<const float>& geometry, size_t i) {
   return {geometry.axis0[i],   geometry.axis1[i],   geometry.axis2[i],
           geometry.shear10[i], geometry.shear20[i], geometry.shear21[i]};
 }
 
-inline Slope slopeOf(const SplatVariable& variable, size_t i) {
+inline Slope slopeOf(const VariableArrays<const float>& variable, size_t i) {
   return {variable.slope0[i], variable.slope1[i], variable.slope2[i]};
 }
 

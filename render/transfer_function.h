@@ -93,5 +93,9 @@ std::vector<OpacityPoint> defaultOpacityRamp(double low, double high);
 
 /// Reads the first preset of a ParaView colour-map file. Throws Error naming the file and the field.
 TransferFunctionDefinition readParaViewPreset(const std::filesystem::path& path);
+/// The same from a text; `path` is where it comes from, for messages.
+TransferFunctionDefinition parseParaViewPreset(const std::string& text, const std::filesystem::path& path);
+/// A colour-map file with this one preset, which readParaViewPreset() and ParaView read.
+std::string toParaViewPreset(const TransferFunctionDefinition& definition);
 
 }  // namespace curvisplat

@@ -127,6 +127,24 @@ std::vector<OpacityPoint> readOpacities(const PresetObject& preset) {
   return points;
 }
 
+const char* nameOf(ColourSpace space) {
+  switch (space) {
+    case ColourSpace::hsv:
+      return "HSV";
+    case ColourSpace::hsv_no_wrap:
+      return "HSVNoWrap";
+    case ColourSpace::lab:
+      return "Lab";
+    case ColourSpace::diverging:
+      return "Diverging";
+    case ColourSpace::step:
+      return "Step";
+    case ColourSpace::rgb:
+      break;
+  }
+  return "RGB";
+}
+
 ColourSpace readColourSpace(const PresetObject& preset) {
   const Json* field = preset.find("ColorSpace");
   if (!field) return ColourSpace::rgb;
@@ -149,9 +167,9 @@ void refuseCategories(const PresetObject& preset) {
                 "colours of categories, which have no order along a scalar; choose another preset");
 }
 
-Json parse(const std::filesystem::path& path) {
+Json parse(const std::string& text, const std::filesystem::path& path) {
   try {
-    return Json::parse(readTextFile(path));
+    return Json::parse(text);
   } catch (const Json::exception& error) {
     throw Error("{}: expected a ParaView colour-map preset in JSON: {}", path.string(), error.what());
   }
@@ -160,7 +178,11 @@ Json parse(const std::filesystem::path& path) {
 }  // namespace
 
 TransferFunctionDefinition readParaViewPreset(const std::filesystem::path& path) {
-  const Json file = parse(path);
+  return parseParaViewPreset(readTextFile(path), path);
+}
+
+TransferFunctionDefinition parseParaViewPreset(const std::string& text, const std::filesystem::path& path) {
+  const Json file = parse(text, path);
   if (file.is_array() && file.empty())
     throw Error("{}: expected a colour-map preset, found an empty list", path.string());
   const PresetObject preset(path, file.is_array() ? file.front() : file);
@@ -172,8 +194,8 @@ TransferFunctionDefinition readParaViewPreset(const std::filesystem::path& path)
   definition.colour_space = readColourSpace(preset);
   definition.colours = readColours(preset);
   definition.log_scale = preset.flag("UseLogScale", false) || preset.flag("LogScale", false);
-  const auto note = [&](std::string text) {
-    definition.notes.push_back(fmt::format("{}: {}", path.string(), text));
+  const auto note = [&](std::string words) {
+    definition.notes.push_back(fmt::format("{}: {}", path.string(), words));
   };
   if (file.is_array() && file.size() > 1)
     note(fmt::format("holds {} presets; the first, '{}', is used", file.size(), preset.name()));
@@ -196,6 +218,23 @@ TransferFunctionDefinition readParaViewPreset(const std::filesystem::path& path)
   if (preset.flag("UseBelowRangeColor", false) || preset.flag("UseAboveRangeColor", false))
     note("colours for scalars below and above the range are not used: the ends' colours go on");
   return definition;
+}
+
+std::string toParaViewPreset(const TransferFunctionDefinition& definition) {
+  nlohmann::ordered_json preset = {{"Name", definition.name},
+                                   {"ColorSpace", nameOf(definition.colour_space)},
+                                   {"UseLogScale", definition.log_scale ? 1 : 0}};
+  if (definition.opacity_unit > 0) preset["ScalarOpacityUnitDistance"] = definition.opacity_unit;
+  auto& colours = preset["RGBPoints"] = nlohmann::ordered_json::array();
+  for (const ColourPoint& point : definition.colours)
+    for (const double number : {point.x, point.rgb.x, point.rgb.y, point.rgb.z}) colours.push_back(number);
+  if (!definition.opacities.empty()) {
+    auto& opacities = preset["Points"] = nlohmann::ordered_json::array();
+    for (const OpacityPoint& point : definition.opacities)
+      for (const double number : {point.x, point.opacity, point.midpoint, point.sharpness})
+        opacities.push_back(number);
+  }
+  return nlohmann::ordered_json::array({preset}).dump(1) + "\n";
 }
 
 }  // namespace curvisplat

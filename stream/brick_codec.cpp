@@ -113,13 +113,18 @@ EncodedValues encodeInRows(std::span<const Row> rows, std::span<SplatScalar> val
   return encoded;
 }
 
-/// Decodes, and puts the brick's cell before what goes wrong.
-template <typename Decode>
-void decodeNaming(const Brick& brick, const char* stream, Decode decode) {
+void checkCount(const Brick& brick) {
   const auto& at = brick.cell.at;
   if (brick.splats == 0 || brick.splats > kMaxBrickSplats || brick.cell.level > kMaxLevel)
     throw Error("the brick of level {}, cell {} {} {} has {} splats, not 1 to {}", brick.cell.level, at[0],
                 at[1], at[2], brick.splats, kMaxBrickSplats);
+}
+
+/// Decodes, and puts the brick's cell before what goes wrong.
+template <typename Decode>
+void decodeNaming(const Brick& brick, const char* stream, Decode decode) {
+  checkCount(brick);
+  const auto& at = brick.cell.at;
   try {
     decode();
   } catch (const Error& error) {
@@ -128,27 +133,24 @@ void decodeNaming(const Brick& brick, const char* stream, Decode decode) {
   }
 }
 
-void toFloats(const std::vector<double>& from, std::vector<float>& to) {
+void toFloats(const std::vector<double>& from, float* to) {
   const double* f = from.data();
-  float* t = to.data();
-  for (size_t n = 0; n < from.size(); ++n) t[n] = static_cast<float>(f[n]);
+  for (size_t n = 0; n < from.size(); ++n) to[n] = static_cast<float>(f[n]);
 }
 
 /// An axis too small for a float becomes the smallest one that divisions can bear.
-void toAxisFloats(const std::vector<double>& from, std::vector<float>& to) {
+void toAxisFloats(const std::vector<double>& from, float* to) {
   const double* f = from.data();
-  float* t = to.data();
   for (size_t n = 0; n < from.size(); ++n)
-    t[n] = std::max(static_cast<float>(f[n]), std::numeric_limits<float>::min());
+    to[n] = std::max(static_cast<float>(f[n]), std::numeric_limits<float>::min());
 }
 
 /// The middles of the intervals, from the cell's minimum corner; rounding must not carry them out of the
 /// cell.
-void toCoordinates(const std::vector<uint32_t>& from, double interval, float inside, std::vector<float>& to) {
+void toCoordinates(const std::vector<uint32_t>& from, double interval, float inside, float* to) {
   const uint32_t* f = from.data();
-  float* t = to.data();
   for (size_t n = 0; n < from.size(); ++n)
-    t[n] = std::min(static_cast<float>((f[n] + 0.5) * interval), inside);
+    to[n] = std::min(static_cast<float>((f[n] + 0.5) * interval), inside);
 }
 
 }  // namespace
@@ -175,10 +177,10 @@ EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<SplatScalar>
 }
 
 void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,
-                    SplatGeometry& out, std::vector<NodeRun>* runs) {
+                    const GeometryArrays<float>& out) {
+  CURVISPLAT_CHECK_OP(out.size(), ==, brick.splats);
   DecodedGeometry& decoded = scratchGeometry();
   decodeNaming(brick, "geometry", [&] { decodeGeometryStream(brick.cell, brick.splats, bytes, decoded); });
-  out.resize(brick.splats);
   const double size = root.cellSize(brick.cell.level);
   const double interval = std::ldexp(size, -decoded.position_bits);
   const float rounded = static_cast<float>(size);
@@ -193,12 +195,26 @@ void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const st
   toFloats(decoded.shear[1], out.shear20);
   toFloats(decoded.shear[2], out.shear21);
   toFloats(decoded.weight, out.weight);
-  if (runs) *runs = decoded.runs;
+}
+
+void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,
+                    SplatGeometry& out, std::vector<NodeRun>* runs) {
+  checkCount(brick);
+  out.resize(brick.splats);
+  decodeGeometry(root, brick, bytes, arraysOf(out));
+  if (runs) *runs = scratchGeometry().runs;
+}
+
+void decodeVariable(const Brick& brick, std::span<const std::byte> bytes, const VariableArrays<float>& out) {
+  CURVISPLAT_CHECK_OP(out.size(), ==, brick.splats);
+  decodeNaming(brick, "values", [&] { decodeValuesStream(brick.splats, bytes, out); });
 }
 
 void decodeVariable(const Brick& brick, const BrickVariable&, std::span<const std::byte> bytes,
                     SplatVariable& out) {
-  decodeNaming(brick, "values", [&] { decodeValuesStream(brick.splats, bytes, out); });
+  checkCount(brick);
+  out.resize(brick.splats);
+  decodeVariable(brick, bytes, arraysOf(out));
 }
 
 BrickSplats decodeForMerging(const RootCube& root, const Brick& brick, std::span<const std::byte> geometry,

@@ -66,6 +66,11 @@ void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const st
 void decodeVariable(const Brick& brick, const BrickVariable& variable, std::span<const std::byte> bytes,
                     SplatVariable& out);
 
+/// The same two, into arrays of brick.splats elements.
+void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,
+                    const GeometryArrays<float>& out);
+void decodeVariable(const Brick& brick, std::span<const std::byte> bytes, const VariableArrays<float>& out);
+
 /// Both, in double and with exact positions, as conversion merges them.
 BrickSplats decodeForMerging(const RootCube& root, const Brick& brick, std::span<const std::byte> geometry,
                              std::span<const BrickVariable> variables,

@@ -40,20 +40,41 @@ struct CacheReader::State {
     checkFile(InputFile(path / "bricks.vdb"), manifest);
   }
 
-  /// The bytes of a brick's stream, in the thread's scratch, verified.
-  std::span<const std::byte> read(const InputFile& file, uint32_t brick, const Extent& extent,
-                                  ReadTimes& times) const {
+  /// The bytes of a brick's stream, in the thread's scratch.
+  static std::span<const std::byte> read(const InputFile& file, uint32_t brick, const Extent& extent,
+                                         ReadTimes& times) {
     const StageTimer timer(times.read_s);
     thread_local std::vector<std::byte> scratch;
     scratch.resize(extent.length);
-    file.readAt(extent.offset, std::span(scratch));
-    const uint64_t found = checksumOf(scratch);
+    try {
+      file.readAt(extent.offset, std::span(scratch));
+    } catch (const Error& error) {
+      throw Error("brick {} cannot be read: {}", brick, error.what());
+    }
+    return scratch;
+  }
+
+  static void verify(const InputFile& file, uint32_t brick, const Extent& extent,
+                     std::span<const std::byte> bytes, ReadTimes& times) {
+    const StageTimer timer(times.verify_s);
+    CURVISPLAT_CHECK_OP(bytes.size(), ==, extent.length);
+    const uint64_t found = checksumOf(bytes);
     if (found != extent.checksum)
       throw Error(
           "{}: brick {} at offset {} ({} bytes) has the checksum {:016x}, expected {:016x}; the file is "
           "damaged: convert again",
           file.path().string(), brick, extent.offset, extent.length, found, extent.checksum);
-    return scratch;
+  }
+
+  /// Runs `work`, which decodes a verified stream, and puts its place before what goes wrong.
+  template <typename Work>
+  static void decode(const InputFile& file, uint32_t brick, ReadTimes& times, const Work& work) {
+    const StageTimer timer(times.decode_s);
+    try {
+      work();
+    } catch (const Error& error) {
+      throw Error("{}: brick {}: {}", file.path().string(), brick, error.what());
+    }
   }
 
   fs::path path;
@@ -97,19 +118,25 @@ size_t CacheReader::variableNamed(std::string_view name) const {
   throw UsageError("{}: the cache has no scalar '{}'; it has {}", path().string(), name, names);
 }
 
+const fs::path& CacheReader::geometryPath() const {
+  return state_->geometry.path();
+}
+
+const fs::path& CacheReader::valuesPath(size_t variable) const {
+  CURVISPLAT_CHECK_OP(variable, <, state_->values.size());
+  return state_->values[variable].path();
+}
+
 void CacheReader::readGeometry(uint32_t brick, SplatGeometry& out, std::vector<NodeRun>* runs,
                                ReadTimes* times) const {
   ReadTimes ignored;
   ReadTimes& sums = times ? *times : ignored;
   CURVISPLAT_CHECK_OP(brick, <, state_->bricks.size());
   const Brick& record = state_->bricks[brick];
-  const auto bytes = state_->read(state_->geometry, brick, record.geometry, sums);
-  const StageTimer timer(sums.decode_s);
-  try {
-    decodeGeometry(state_->manifest.root, record, bytes, out, runs);
-  } catch (const Error& error) {
-    throw Error("{}: brick {}: {}", state_->geometry.path().string(), brick, error.what());
-  }
+  const auto bytes = State::read(state_->geometry, brick, record.geometry, sums);
+  State::verify(state_->geometry, brick, record.geometry, bytes, sums);
+  State::decode(state_->geometry, brick, sums,
+                [&] { decodeGeometry(state_->manifest.root, record, bytes, out, runs); });
 }
 
 void CacheReader::readVariable(uint32_t brick, size_t variable, SplatVariable& out, ReadTimes* times) const {
@@ -118,13 +145,28 @@ void CacheReader::readVariable(uint32_t brick, size_t variable, SplatVariable& o
   CURVISPLAT_CHECK_OP(brick, <, state_->bricks.size());
   CURVISPLAT_CHECK_OP(variable, <, state_->tables.size());
   const BrickVariable& record = state_->tables[variable][brick];
-  const auto bytes = state_->read(state_->values[variable], brick, record.values, sums);
-  const StageTimer timer(sums.decode_s);
-  try {
-    decodeVariable(state_->bricks[brick], record, bytes, out);
-  } catch (const Error& error) {
-    throw Error("{}: brick {}: {}", state_->values[variable].path().string(), brick, error.what());
-  }
+  const InputFile& file = state_->values[variable];
+  const auto bytes = State::read(file, brick, record.values, sums);
+  State::verify(file, brick, record.values, bytes, sums);
+  State::decode(file, brick, sums, [&] { decodeVariable(state_->bricks[brick], record, bytes, out); });
+}
+
+void CacheReader::decode(uint32_t brick, std::span<const std::byte> geometry,
+                         const GeometryArrays<float>& out, ReadTimes& times) const {
+  CURVISPLAT_CHECK_OP(brick, <, state_->bricks.size());
+  const Brick& record = state_->bricks[brick];
+  State::verify(state_->geometry, brick, record.geometry, geometry, times);
+  State::decode(state_->geometry, brick, times,
+                [&] { decodeGeometry(state_->manifest.root, record, geometry, out); });
+}
+
+void CacheReader::decode(uint32_t brick, size_t variable, std::span<const std::byte> values,
+                         const VariableArrays<float>& out, ReadTimes& times) const {
+  CURVISPLAT_CHECK_OP(brick, <, state_->bricks.size());
+  CURVISPLAT_CHECK_OP(variable, <, state_->tables.size());
+  const InputFile& file = state_->values[variable];
+  State::verify(file, brick, state_->tables[variable][brick].values, values, times);
+  State::decode(file, brick, times, [&] { decodeVariable(state_->bricks[brick], values, out); });
 }
 
 }  // namespace curvisplat

@@ -17,8 +17,8 @@ namespace curvisplat {
 
 /// Where reading bricks spends its time; added to.
 struct ReadTimes {
-  double read_s = 0;  // the disk's, and the checksum
-  double decode_s = 0;
+  double read_s = 0;  // the disk's
+  double verify_s = 0, decode_s = 0;
 };
 
 class CacheReader {
@@ -46,6 +46,16 @@ class CacheReader {
   void readGeometry(uint32_t brick, SplatGeometry& out, std::vector<NodeRun>* runs = nullptr,
                     ReadTimes* times = nullptr) const;
   void readVariable(uint32_t brick, size_t variable, SplatVariable& out, ReadTimes* times = nullptr) const;
+
+  /// Where the streams are, for who reads them himself.
+  const std::filesystem::path& geometryPath() const;
+  const std::filesystem::path& valuesPath(size_t variable) const;
+  /// Verifies and decodes such bytes: those of bricks()[brick].geometry, those of the variable's values.
+  /// Arrays of as many elements as the brick has splats. Throws as reading does.
+  void decode(uint32_t brick, std::span<const std::byte> geometry, const GeometryArrays<float>& out,
+              ReadTimes& times) const;
+  void decode(uint32_t brick, size_t variable, std::span<const std::byte> values,
+              const VariableArrays<float>& out, ReadTimes& times) const;
 
  private:
   struct State;

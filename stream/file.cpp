@@ -91,6 +91,10 @@ SystemCalls& SystemCalls::current() {
   return *current_calls.load(std::memory_order_acquire);
 }
 
+bool SystemCalls::areReal() {
+  return current_calls.load(std::memory_order_acquire) == &posix_calls;
+}
+
 ScopedSystemCalls::ScopedSystemCalls(SystemCalls& calls) : previous_(current_calls.exchange(&calls)) {}
 ScopedSystemCalls::~ScopedSystemCalls() {
   current_calls.store(previous_);

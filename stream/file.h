@@ -30,6 +30,8 @@ class SystemCalls {
   virtual int exchange(const char* a, const char* b);
 
   static SystemCalls& current();
+  /// Whether no double is in their place: reads may then go past this table (io_uring).
+  static bool areReal();
 };
 
 /// Puts `calls` in the place of the system's until the end of the scope. For tests; not while other threads

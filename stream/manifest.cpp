@@ -149,6 +149,15 @@ void readRoot(const Fields& fields, Manifest& manifest, const Json& json) {
     if (manifest.lower[axis] > manifest.upper[axis]) fields.fail("lower", "at most 'upper'", json["lower"]);
 }
 
+/// Whether splats stand for cells.
+bool readCentring(const Fields& fields, const Json& json) {
+  if (!json.contains("centring")) return false;
+  const std::string centring = fields.text("centring");
+  if (centring != "node" && centring != "cell")
+    fields.fail("centring", "\"node\" or \"cell\"", json["centring"]);
+  return centring == "cell";
+}
+
 void readVariables(const Fields& fields, Manifest& manifest, const Json& json) {
   std::vector<uint32_t> numbers;
   std::vector<std::string> names;
@@ -209,6 +218,7 @@ std::string Manifest::toJson() const {
   json["blocks"] = Json::array();
   for (const BlockInfo& block : blocks)
     json["blocks"].push_back({{"name", block.name}, {"ni", block.ni}, {"nj", block.nj}, {"nk", block.nk}});
+  if (cells) json["centring"] = "cell";
   json["nodes"] = nodes;
   json["blanked_nodes"] = blanked_nodes;
   json["splats"] = splats;
@@ -258,6 +268,7 @@ Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path
     manifest.blocks.push_back({block.text("name"), block.count("ni", 1, kAny), block.count("nj", 1, kAny),
                                block.count("nk", 1, kAny)});
   });
+  manifest.cells = readCentring(fields, json);
   manifest.nodes = fields.count("nodes", 0, kAny);
   manifest.blanked_nodes = fields.count("blanked_nodes", 0, manifest.nodes);
   manifest.splats = fields.count("splats", 1, kAny);

@@ -49,7 +49,9 @@ struct Manifest {
   RootCube root;
   glm::dvec3 lower{0.0}, upper{0.0};  // bounds of the grid's nodes
   std::vector<BlockInfo> blocks;
-  uint64_t nodes = 0;          // of the grid
+  bool cells = false;          // each splat stands for a cell of the grid, not for a node; runs tell its
+                               // lowest node
+  uint64_t nodes = 0;          // of the grid, or its cells
   uint64_t blanked_nodes = 0;  // of those, not drawn: iblank, --blank and non-finite together
   uint64_t splats = 0;         // at the finest level
   uint64_t bricks = 0;

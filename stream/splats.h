@@ -25,6 +25,7 @@
 #include <cstdint>
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
+#include <type_traits>
 #include <vector>
 
 #include "stream/octree.h"
@@ -70,6 +71,22 @@ struct SplatGeometry {
   void resize(size_t count);
 };
 
+/// The geometry's arrays, borrowed: where a decoder writes (T = float) or a projector reads (T = const
+/// float).
+template <typename T>
+struct GeometryArrays {
+  T *x, *y, *z;
+  T *axis0, *axis1, *axis2;
+  T *shear10, *shear20, *shear21;
+  T* weight;
+  size_t count;
+
+  size_t size() const { return count; }
+  operator GeometryArrays<const float>() const requires(!std::is_const_v<T>) {
+    return {x, y, z, axis0, axis1, axis2, shear10, shear20, shear21, weight, count};
+  }
+};
+
 /// One variable of a brick's splats, decoded. The same order as the geometry.
 struct SplatVariable {
   std::vector<float> mean;
@@ -79,5 +96,26 @@ struct SplatVariable {
   size_t size() const { return mean.size(); }
   void resize(size_t count);
 };
+
+/// As GeometryArrays.
+template <typename T>
+struct VariableArrays {
+  T* mean;
+  T *slope0, *slope1, *slope2;
+  T* variance;
+  size_t count;
+
+  size_t size() const { return count; }
+  operator VariableArrays<const float>() const requires(!std::is_const_v<T>) {
+    return {mean, slope0, slope1, slope2, variance, count};
+  }
+};
+
+/// To write into; what they borrow lives until the next resize().
+GeometryArrays<float> arraysOf(SplatGeometry& geometry);
+VariableArrays<float> arraysOf(SplatVariable& variable);
+/// To read from.
+GeometryArrays<const float> arraysOf(const SplatGeometry& geometry);
+VariableArrays<const float> arraysOf(const SplatVariable& variable);
 
 }  // namespace curvisplat

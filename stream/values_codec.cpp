@@ -151,7 +151,7 @@ std::vector<std::byte> encodeValuesStream(std::span<const Row> rows, std::span<S
   return ValuesEncoder(rows, values).encode();
 }
 
-void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, SplatVariable& out) {
+void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, const VariableArrays<float>& out) {
   ValuesHeader header;
   if (bytes.size() < sizeof header) throw Error("it has {} bytes, fewer than its header", bytes.size());
   std::memcpy(&header, bytes.data(), sizeof header);
@@ -164,20 +164,18 @@ void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, SplatV
   PlaneReader planes(bytes.subspan(sizeof header), unpacked);
   const std::vector<Row> rows = rowsFrom(planes.bytes(header.rows_bytes), count);
 
-  out.resize(count);
   thread_local std::vector<uint32_t> scratch;
   scratch.resize(count);
   uint32_t* codes = scratch.data();
   const Scale scale(header);
-  const auto decode = [&](size_t array, std::vector<float>& to, auto value) {
+  const auto decode = [&](size_t array, float* values, auto value) {
     planes.values(header.arrays[array].planes, scratch);
     for (size_t n = 0; n < count; ++n) codes[n] = unzigzag(codes[n]);
     if (header.arrays[array].predictor != Predictor::none)
       predictRows(header.arrays[array].predictor, rows, codes,
                   [codes](uint32_t n, uint32_t predicted) { return codes[n] += predicted; });
-    float* values = to.data();
     for (size_t n = 0; n < count; ++n) values[n] = value(codes[n]);
-    if (!allFinite(to)) throw Error("a value in it is not finite");
+    if (!allFinite({values, count})) throw Error("a value in it is not finite");
   };
   const auto slope = [&](uint32_t code) { return scale.slope(code); };
   decode(0, out.mean, [&](uint32_t code) { return scale.mean(code); });

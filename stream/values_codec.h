@@ -35,7 +35,7 @@ static_assert(sizeof(ValuesHeader) == 40);
 /// Encodes `values` and replaces them by what decodeValuesStream will give. `rows` as the geometry's.
 std::vector<std::byte> encodeValuesStream(std::span<const Row> rows, std::span<SplatScalar> values);
 
-/// Bytes are untrusted: throws Error for anything but `count` finite values.
-void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, SplatVariable& out);
+/// Bytes are untrusted: throws Error for anything but `count` finite values. `out`: [count].
+void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, const VariableArrays<float>& out);
 
 }  // namespace curvisplat

@@ -64,7 +64,7 @@ void runAddScalar(ConvertWords words) {
   options.threads = words.threads;
   if (words.memory) options.memory_bytes = parseByteSize("--memory", *words.memory);
 
-  const auto source = openGrid(gridOptions(words, words.to));
+  const auto source = openSource(words, words.to);
   options.scalars = chooseScalars(words, words.added_scalars, source->description());
   Progress progress;
   const StopOnSignals stopping(progress);

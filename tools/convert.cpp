@@ -28,13 +28,16 @@ void printSummary(const ConvertWords& words, const ConvertReport& report, double
                   uint64_t peak_memory_bytes) {
   const auto nodes = static_cast<double>(report.nodes);
   const uint64_t bytes = totalBytes(report.files);
-  fmt::print("{}: {} nodes, {} splats in {} bricks, {} levels\n", words.output.string(), report.nodes,
-             report.splats, report.bricks, report.levels);
+  const bool cells = report.centring == Centring::cell;
+  fmt::print("{}: {} {}, {} splats in {} bricks, {} levels\n", words.output.string(), report.nodes,
+             cells ? "cells" : "nodes", report.splats, report.bricks, report.levels);
   // Of a resumed conversion, another has done a part.
   const std::string rate =
-      report.resumed ? " since it was resumed" : fmt::format(", {:.2f} M nodes/s", 1e-6 * nodes / seconds);
-  fmt::print("{:.1f} s{}, {:.1f} MiB, {:.2f} bytes a node, peak memory {:.0f} MiB\n", seconds, rate,
-             mebibytes(bytes), static_cast<double>(bytes) / nodes, mebibytes(peak_memory_bytes));
+      report.resumed ? " since it was resumed"
+                     : fmt::format(", {:.2f} M {}/s", 1e-6 * nodes / seconds, cells ? "cells" : "nodes");
+  fmt::print("{:.1f} s{}, {:.1f} MiB, {:.2f} bytes a {}, peak memory {:.0f} MiB\n", seconds, rate,
+             mebibytes(bytes), static_cast<double>(bytes) / nodes, cells ? "cell" : "node",
+             mebibytes(peak_memory_bytes));
 }
 
 /// What a person should know of the grid, on stderr: it is odd, not wrong.
@@ -47,9 +50,15 @@ void printWarnings(const GridDescription& description, const ConvertReport& repo
   if (report.resumed)
     fmt::print(stderr, "curvisplat: note: resumed with {} of {} bricks done\n", report.resumed_bricks,
                report.bricks);
-  note(report.blanked.by_grid, "nodes are blanked by the grid");
-  note(report.blanked.by_value, "nodes have the blank value");
-  note(report.blanked.not_finite, "nodes are not finite numbers, and are blanked");
+  if (report.centring == Centring::cell) {
+    note(report.blanked.by_grid, "cells have a blanked corner or no value");
+    note(report.blanked.by_value, "cells have the blank value");
+    note(report.blanked.not_finite, "cells have an infinite value, and are blanked");
+  } else {
+    note(report.blanked.by_grid, "nodes are blanked by the grid");
+    note(report.blanked.by_value, "nodes have the blank value");
+    note(report.blanked.not_finite, "nodes are not finite numbers, and are blanked");
+  }
   note(report.degenerate, "cells are degenerate: drawn with a thickness of their own");
   note(report.inverted, "cells are inverted: of the other handedness than most of their block");
   note(report.merged_nodes, "face nodes coincide with others, and were merged into them");
@@ -61,7 +70,7 @@ nlohmann::json statistics(const ConvertReport& report, const Progress& progress)
   json["memory_bytes"] = report.memory_bytes;
   json["resumed"] = report.resumed;
   json["resumed_bricks"] = report.resumed_bricks;
-  json["nodes"] = report.nodes;
+  json[report.centring == Centring::cell ? "cells" : "nodes"] = report.nodes;
   json["blanked"] = {{"by_grid", report.blanked.by_grid},
                      {"by_value", report.blanked.by_value},
                      {"not_finite", report.blanked.not_finite}};
@@ -93,7 +102,7 @@ void runConvert(ConvertWords words) {
   options.threads = words.threads;
   if (words.memory) options.memory_bytes = parseByteSize("--memory", *words.memory);
 
-  const auto source = openGrid(gridOptions(words, words.output));
+  const auto source = openSource(words, words.output);
   options.scalars = chooseScalars(words, words.scalars, source->description());
   options.title = words.grid.grid.stem().string();
 
@@ -114,7 +123,10 @@ void addConvert(CLI::App& app) {
   command->add_option("GRID", words->grid.grid, "Grid file")->required();
   command->add_option("SOLUTION", words->grid.solutions, "Solution (Q) and function files");
   command->add_option("-o,--output", words->output, "The cache to write, NAME.splats: a folder");
-  command->add_option("--scalar", words->scalars, "Scalars by name or number (default: the first)")
+  command
+      ->add_option("--scalar", words->scalars,
+                   "Scalars by name, or by number of a function file's variable or of PLOT3D's "
+                   "functions (default: the first)")
       ->take_all()
       ->allow_extra_args(false);
   command
@@ -134,6 +146,7 @@ void addConvert(CLI::App& app) {
                     "Replace the output if it is a cache; drop an interrupted conversion, unless --resume");
   command->add_option("--stats", words->statistics, "Write times, bytes and counts to FILE.json");
   addGridOptions(*command, words->grid);
+  addGasOptions(*command, words->gas);
   command->callback([words] {
     const bool adds = !words->added_scalars.empty() || !words->to.empty();
     adds ? runAddScalar(*words) : runConvert(*words);

@@ -1,21 +1,27 @@
 #include "tools/convert_words.h"
 
+#include <fmt/format.h>
+
+#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "stream/error.h"
+#include "tools/grid_options.h"
 
 namespace curvisplat {
 
-OpenGridOptions gridOptions(const ConvertWords& words, const std::filesystem::path& cache) {
+std::unique_ptr<GridSource> openSource(const ConvertWords& words, const std::filesystem::path& cache) {
   OpenGridOptions grid = words.grid;
   grid.temporary_folder = words.temporary_folder.empty() ? cache.parent_path() : words.temporary_folder;
   if (grid.temporary_folder.empty()) grid.temporary_folder = ".";
-  return grid;
+  return openWithDerived(grid, {words.gas, words.blank_value});
 }
 
 std::vector<uint32_t> chooseScalars(const ConvertWords& words, const std::vector<std::string>& names,
                                     const GridDescription& description) {
   try {
+    for (const std::string& note : notesOnNumbers(description, names))
+      fmt::print(stderr, "curvisplat: note: {}\n", note);
     return scalarsNamed(description, names);
   } catch (const UsageError& error) {
     throw Error("{}: {}", words.grid.grid.string(), error.what());

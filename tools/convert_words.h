@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
@@ -19,6 +20,7 @@ namespace curvisplat {
 /// The command line's words, as given.
 struct ConvertWords {
   OpenGridOptions grid;
+  GasModel gas;
   std::vector<std::string> scalars, added_scalars;
   std::filesystem::path output, to, temporary_folder, statistics;
   std::optional<double> blank_value;
@@ -27,11 +29,11 @@ struct ConvertWords {
   bool overwrite = false, resume = false;
 };
 
-/// How to open the grid: temporary files go where the words say, else beside `cache`.
-OpenGridOptions gridOptions(const ConvertWords& words, const std::filesystem::path& cache);
+/// Opens the grid: temporary files go where the words say, else beside `cache`.
+std::unique_ptr<GridSource> openSource(const ConvertWords& words, const std::filesystem::path& cache);
 
 /// Positions of the scalars called `names`. One that the files lack is bad input, not wrong usage, since the
-/// files decide: throws Error.
+/// files decide: throws Error. Prints notes on numbers that mean two of them.
 std::vector<uint32_t> chooseScalars(const ConvertWords& words, const std::vector<std::string>& names,
                                     const GridDescription& description);
 

@@ -45,4 +45,16 @@ void addGridOptions(CLI::App& app, OpenGridOptions& options) {
       ->excludes(ascii);
 }
 
+void addGasOptions(CLI::App& app, GasModel& gas) {
+  constexpr const char* kGasGroup = "The gas that derived quantities are of";
+  app.add_option("--gamma", gas.gamma, "Ratio of specific heats (default: the files', else 1.4)")
+      ->group(kGasGroup);
+  app.add_option("--gas-constant", gas.constant, "Gas constant R (default: the files', else 1)")
+      ->group(kGasGroup);
+}
+
+std::unique_ptr<GridSource> openWithDerived(const OpenGridOptions& grid, const DerivedOptions& derived) {
+  return std::make_unique<DerivedSource>(openGrid(grid), derived);
+}
+
 }  // namespace curvisplat

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "preprocess/derived_source.h"
 #include "preprocess/open_grid.h"
 
 namespace curvisplat {
@@ -10,5 +11,11 @@ namespace curvisplat {
 /// Adds --byte-order, --records, --precision, --blocks, --iblank, --ascii and --binary to `app`; parsing sets
 /// options.force. `options` must live until then.
 void addGridOptions(CLI::App& app, OpenGridOptions& options);
+
+/// Adds --gamma and --gas-constant.
+void addGasOptions(CLI::App& app, GasModel& gas);
+
+/// What openGrid() gives, with the scalars that can be derived from it.
+std::unique_ptr<GridSource> openWithDerived(const OpenGridOptions& grid, const DerivedOptions& derived);
 
 }  // namespace curvisplat

@@ -18,6 +18,7 @@
 #include "tools/commands.h"
 #include "tools/grid_options.h"
 #include "tools/info_grid.h"
+#include "tools/info_system.h"
 
 namespace curvisplat {
 namespace {
@@ -29,6 +30,7 @@ struct InfoOptions {
   OpenGridOptions grid;  // grid.grid is the cache where that is a folder
   bool json = false;
   bool verify = false;
+  bool system = false;
   std::vector<double> point;  // empty, or x, y, z
 };
 
@@ -142,7 +144,8 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const As
   fmt::print("bounds     {} .. {}\n           {} .. {}\n           {} .. {}\n", m.lower.x, m.upper.x,
              m.lower.y, m.upper.y, m.lower.z, m.upper.z);
   fmt::print("volume     {:.8g}\n", m.volume);
-  fmt::print("nodes      {} in {} blocks, {} blanked\n", m.nodes, m.blocks.size(), m.blanked_nodes);
+  fmt::print("{}      {} in {} blocks, {} blanked\n", m.cells ? "cells" : "nodes", m.nodes, m.blocks.size(),
+             m.blanked_nodes);
   fmt::print("splats     {} at the finest level\n", m.splats);
   fmt::print("steps      {}\n", m.steps.size());
   for (const VariableInfo& variable : m.variables)
@@ -153,7 +156,7 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const As
   for (size_t n = 0; n < levels.size(); ++n)
     fmt::print("{:>5} {:>9} {:>9} {:>13} {:>12} {:>12} {:>10.3g}\n", n, levels[n].bricks, levels[n].leaves,
                levels[n].splats, levels[n].geometry_bytes, levels[n].values_bytes, levels[n].largest_error);
-  fmt::print("\nfile                      bytes   a node drawn\n");
+  fmt::print("\nfile                      bytes   a {} drawn\n", m.cells ? "cell" : "node");
   for (const FileInfo& file : m.files)
     fmt::print("{:<18} {:>12} {:>14.3f}\n", file.name, file.size, perNode(m, file.size));
   fmt::print("{:<18} {:>12} {:>14.3f}\n", "all", totalBytes(m), perNode(m, totalBytes(m)));
@@ -178,6 +181,9 @@ void printCacheInfo(const InfoOptions& options) {
 }
 
 void printInfo(const InfoOptions& options) {
+  if (options.system != options.grid.grid.empty())
+    throw UsageError("info: expected a cache, a grid file or --system, and one of them");
+  if (options.system) return printSystem(options.json);
   if (fs::is_directory(options.grid.grid)) return printCacheInfo(options);
   if (options.verify || !options.point.empty())
     throw UsageError("{}: --verify and --probe are for caches, and this is not a folder",
@@ -190,9 +196,10 @@ void printInfo(const InfoOptions& options) {
 void addInfo(CLI::App& app) {
   CLI::App* info = app.add_subcommand("info", "Prints what a cache or grid files hold");
   const auto options = std::make_shared<InfoOptions>();
-  info->add_option("path", options->grid.grid, "A splat cache (a folder), or a grid file")->required();
+  info->add_option("path", options->grid.grid, "A splat cache (a folder), or a grid file");
   info->add_option("solution", options->grid.solutions, "Solution or function files of the grid");
   info->add_flag("--json", options->json, "One JSON object");
+  info->add_flag("--system", options->system, "What this machine has to draw with, instead");
   info->add_flag("--verify", options->verify,
                  "Read the whole cache and look for damage; exit 1 if there is any");
   info->add_option("--probe", options->point, "The value at x,y,z, and the block, i, j, k it comes from")

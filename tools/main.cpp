@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
   addConvert(app);
   addInfo(app);
   addRender(app);
+  addView(app);
   addGenerate(app);
   addCompare(app);
 

@@ -113,4 +113,12 @@ glm::vec4 parseBackground(std::string_view option, std::string_view text) {
   throw UsageError("{} {}: expected white, black, transparent or #rrggbb", option, text);
 }
 
+Backend parseBackend(std::string_view text) {
+  if (text == "auto") return Backend::automatic;
+  if (text == "osmesa") return Backend::osmesa;
+  if (text == "egl") return Backend::egl;
+  if (text == "cpu") return Backend::cpu;
+  throw UsageError("--backend {}: expected auto, osmesa, egl or cpu", text);
+}
+
 }  // namespace curvisplat

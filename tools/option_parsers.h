@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "render/backend.h"
 #include "render/camera.h"
 
 namespace curvisplat {
@@ -29,5 +30,8 @@ ImageSize parseImageSize(std::string_view option, std::string_view text);
 uint64_t parseByteSize(std::string_view option, std::string_view text);
 /// "white", "black", "transparent" or "#rrggbb"; premultiplied red, green, blue, alpha.
 glm::vec4 parseBackground(std::string_view option, std::string_view text);
+
+/// "auto", "osmesa", "egl" or "cpu", of --backend.
+Backend parseBackend(std::string_view text);
 
 }  // namespace curvisplat

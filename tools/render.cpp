@@ -9,9 +9,11 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 
+#include "render/annotations.h"
 #include "render/frame.h"
 #include "render/image.h"
 #include "render/transfer_function.h"
@@ -39,6 +41,8 @@ struct RenderWords {
   std::optional<std::string> range, opacity_unit, clip_box, frame_rate;
   std::optional<uint64_t> max_splats;
   unsigned threads = 0;
+  bool keep_going = false;
+  Annotations annotations;
 };
 
 WorldBox parseClipBox(const std::string& text) {
@@ -68,14 +72,8 @@ FrameOptions frameOptions(const RenderWords& words) {
   options.background = parseBackground("--background", words.background);
   options.threads = words.threads;
   options.memory_bytes = parseByteSize("--memory", words.memory);
+  options.keep_going = words.keep_going;
   return options;
-}
-
-Backend parseBackend(const std::string& text) {
-  if (text == "auto") return Backend::automatic;
-  if (text == "osmesa") return Backend::osmesa;
-  if (text == "cpu") return Backend::cpu;
-  throw UsageError("--backend {}: not in this version, which has auto, osmesa and cpu", text);
 }
 
 /// What contradicts itself whatever the cache holds.
@@ -139,7 +137,7 @@ class FrameRun {
     if (moves) progress_.begin("drawing", motion.frames, "frames");
     for (uint64_t number = 0; number < motion.frames; ++number) {
       try {
-        draw(number, motion.camera(number), moves ? nullptr : &progress_);
+        draw(number, motion, moves ? nullptr : &progress_);
       } catch (const UsageError& error) {
         if (moves) throw UsageError("frame {}: {}", number, error.what());
         throw;
@@ -154,15 +152,18 @@ class FrameRun {
   }
 
  private:
-  void draw(uint64_t number, const Camera& camera, Progress* progress) {
+  void draw(uint64_t number, const CameraMotion& motion, Progress* progress) {
+    const Camera camera = motion.camera(number);
     FrameStatistics statistics;
     if (number > 0 || words_.first_image.empty()) {
-      finish(number, camera, renderer_.render(camera, report_.options, statistics, progress), statistics);
+      const Image image = renderer_.render(camera, report_.options, statistics, progress);
+      if (number + 1 < motion.frames) prefetch(motion, number + 1);
+      finish(number, camera, image, statistics);
       return;
     }
     const auto show = [&](const Image& image, bool is_final) {
       if (!report_.first_image) {
-        writeImage(image, words_.first_image);
+        writeImage(annotated(image, camera), words_.first_image);
         report_.time_to_first_image_s = secondsSinceStart();
         report_.first_image = statistics;
       }
@@ -171,18 +172,49 @@ class FrameRun {
     renderer_.renderProgressively(camera, report_.options, statistics, show, progress);
   }
 
+  /// A frame's bricks come in while the picture before it is written.
+  void prefetch(const CameraMotion& motion, uint64_t number) {
+    try {
+      renderer_.prefetch(motion.camera(number), report_.options);
+    } catch (const Error&) {
+      // A camera that cannot be is told when it is that frame's turn.
+    }
+  }
+
   void finish(uint64_t number, const Camera& camera, const Image& image, const FrameStatistics& statistics) {
-    output_.write(number, image);
+    output_.write(number, annotated(image, camera));
     if (number == 0 && !report_.first_image) report_.time_to_first_image_s = secondsSinceStart();
     report_.frames.push_back({camera, statistics});
+    const std::string which = words_.camera.moves() ? fmt::format(" of frame {}", number) : "";
+    tellUnreadable(which, statistics);
     if (said_empty_ || !isEmpty(image, report_.options.background)) return;
     said_empty_ = true;
     progress_.end();
-    const std::string which = words_.camera.moves() ? fmt::format(" of frame {}", number) : "";
     const RenderedScene scene{manifest_, report_.variable, report_.transfer_function,
                               camera,    report_.options,  statistics};
     for (const std::string& reason : whyEmpty(scene))
       tell("warning", fmt::format("the picture{} is empty: {}", which, reason));
+  }
+
+  Image annotated(Image image, const Camera& camera) const {
+    const FrameOptions& options = report_.options;
+    annotate(image, words_.annotations,
+             {renderer_.screenView(camera, options), report_.transfer_function,
+              scalarTitle(report_.variable.name, report_.variable.unit), manifest_.lower, manifest_.upper,
+              options.background});
+    return image;
+  }
+
+  /// A line for a frame with bricks that no frame before it had: the first of them.
+  void tellUnreadable(const std::string& which, const FrameStatistics& statistics) {
+    const BrickFailure* first = nullptr;
+    for (const BrickFailure& failure : statistics.bricks_unreadable)
+      if (said_unreadable_.insert(failure.brick).second && !first) first = &failure;
+    if (!first) return;
+    progress_.end();
+    tell("warning",
+         fmt::format("{} of {} bricks{} cannot be read, and are drawn coarser or left out: {}",
+                     statistics.bricks_unreadable.size(), statistics.bricks_drawn, which, first->reason));
   }
 
   const RenderWords& words_;
@@ -192,6 +224,7 @@ class FrameRun {
   RenderReport& report_;
   Progress progress_;
   bool said_empty_ = false;
+  std::set<uint32_t> said_unreadable_;  // bricks
 };
 
 void tellResult(const RenderReport& report) {
@@ -284,6 +317,11 @@ void addRender(CLI::App& app) {
       ->capture_default_str()
       ->group(what);
 
+  command->add_flag("--scalar-bar", words->annotations.scalar_bar, "Draw which colour stands for which value")
+      ->group(what);
+  command->add_flag("--axes", words->annotations.axes, "Draw where x, y and z point")->group(what);
+  command->add_flag("--outline", words->annotations.outline, "Draw the box around the data")->group(what);
+
   const std::string where = "Camera";
   CameraWords* camera = &words->camera;
   command->add_option("--view", camera->view, "iso, +x, -x, +y, -y, +z or -z; iso otherwise")->group(where);
@@ -311,7 +349,7 @@ void addRender(CLI::App& app) {
       ->group(where);
 
   const std::string how = "Resources";
-  command->add_option("--backend", words->backend, "auto, osmesa or cpu: what draws")
+  command->add_option("--backend", words->backend, "auto, osmesa, egl or cpu: what draws; see info --system")
       ->capture_default_str()
       ->group(how);
   command->add_option("--memory", words->memory, "Memory for the data in flight: 512M, 2G")
@@ -323,6 +361,10 @@ void addRender(CLI::App& app) {
   command
       ->add_option("--first-image", words->first_image,
                    "Write a coarse picture as soon as there is one: .png, .exr or .pfm")
+      ->group(how);
+  command
+      ->add_flag("--keep-going", words->keep_going,
+                 "Draw what cannot be read from a coarser level, and say so, instead of failing")
       ->group(how);
   command->add_option("--stats", words->statistics, "Write what was done, and how long it took, to FILE.json")
       ->group(how);

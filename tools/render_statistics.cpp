@@ -16,8 +16,9 @@ struct Seconds {
   const char* name;
   double FrameStatistics::*value;
 };
-constexpr std::array<Seconds, 10> kSeconds{{{"plan", &FrameStatistics::plan_s},
+constexpr std::array<Seconds, 12> kSeconds{{{"plan", &FrameStatistics::plan_s},
                                             {"read", &FrameStatistics::read_s},
+                                            {"verify", &FrameStatistics::verify_s},
                                             {"decode", &FrameStatistics::decode_s},
                                             {"project", &FrameStatistics::project_s},
                                             {"sort", &FrameStatistics::sort_s},
@@ -25,22 +26,35 @@ constexpr std::array<Seconds, 10> kSeconds{{{"plan", &FrameStatistics::plan_s},
                                             {"draw", &FrameStatistics::draw_s},
                                             {"total", &FrameStatistics::total_s},
                                             {"workers_waited", &FrameStatistics::workers_waited_s},
+                                            {"workers_waited_for_reads", &FrameStatistics::read_waited_s},
                                             {"painter_waited", &FrameStatistics::painter_waited_s}}};
 
 struct Count {
   const char* name;
   uint64_t FrameStatistics::*value;
 };
-constexpr std::array<Count, 10> kCounts{{{"bricks_drawn", &FrameStatistics::bricks_drawn},
+constexpr std::array<Count, 20> kCounts{{{"bricks_drawn", &FrameStatistics::bricks_drawn},
                                          {"bricks_culled", &FrameStatistics::bricks_culled},
                                          {"bricks_out_of_image", &FrameStatistics::bricks_out_of_image},
                                          {"bricks_transparent", &FrameStatistics::bricks_transparent},
+                                         {"bricks_hidden", &FrameStatistics::bricks_hidden},
                                          {"splats_read", &FrameStatistics::splats_read},
                                          {"splats_clipped", &FrameStatistics::splats_clipped},
                                          {"splats_off_screen", &FrameStatistics::splats_off_screen},
                                          {"splats_transparent", &FrameStatistics::splats_transparent},
                                          {"splats_drawn", &FrameStatistics::splats_drawn},
-                                         {"bytes_read", &FrameStatistics::bytes_read}}};
+                                         {"splats_hidden", &FrameStatistics::splats_hidden},
+                                         {"bytes_read", &FrameStatistics::bytes_read},
+                                         {"read_requests", &FrameStatistics::read_requests},
+                                         {"bricks_read", &FrameStatistics::bricks_read},
+                                         {"bricks_left_out", &FrameStatistics::bricks_left_out},
+                                         {"bytes_left_out", &FrameStatistics::bytes_left_out},
+                                         {"bricks_cached", &FrameStatistics::bricks_cached},
+                                         {"ring_peak_bytes", &FrameStatistics::ring_peak_bytes},
+                                         {"pager_peak_bytes", &FrameStatistics::pager_peak_bytes},
+                                         {"cache_peak_bytes", &FrameStatistics::cache_peak_bytes}}};
+
+constexpr const char* kQueueDepth = "mean_queue_depth";
 
 Json toJson(const glm::dvec3& v) {
   return {v.x, v.y, v.z};
@@ -75,6 +89,11 @@ Json toJson(const FrameStatistics& statistics) {
   json["largest_error_px"] = nullptr;  // around a perspective eye
   if (std::isfinite(statistics.largest_error_px)) json["largest_error_px"] = statistics.largest_error_px;
   json["workers"] = statistics.workers;
+  json["read_by"] = statistics.read_by;
+  json[kQueueDepth] = statistics.mean_queue_depth;
+  json["bricks_unreadable"] = Json::array();
+  for (const BrickFailure& failure : statistics.bricks_unreadable)
+    json["bricks_unreadable"].push_back({{"brick", failure.brick}, {"reason", failure.reason}});
   return json;
 }
 
@@ -92,6 +111,7 @@ Json overFrames(const std::vector<FrameReport>& frames) {
   Json json{{"frames", frames.size()}};
   for (const Seconds& seconds : kSeconds) json["seconds"][seconds.name] = spread(frames, seconds.value);
   for (const Count& count : kCounts) json[count.name] = spread(frames, count.value);
+  json[kQueueDepth] = spread<double>(frames, &FrameStatistics::mean_queue_depth);
   return json;
 }
 

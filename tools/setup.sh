@@ -8,14 +8,26 @@ packages=(
   g++ cmake ninja-build pkg-config
   # octree and conversion; OpenVDB's CMake module asks for Boost's iostreams
   libopenvdb-dev libboost-iostreams-dev libtbb-dev libzstd-dev libxxhash-dev
+  # reads without waiting
+  liburing-dev
+  # grid files
+  libcgns-dev
   # vectors, texts, command line, manifests
   libglm-dev libfmt-dev libcli11-dev nlohmann-json3-dev
+  # VTK's files
+  libpugixml-dev zlib1g-dev liblz4-dev
   # pictures, and OpenGL without a display
-  libpng-dev libtinyexr-dev libosmesa6-dev libgl-dev
+  libpng-dev libtinyexr-dev libosmesa6-dev libgl-dev libegl-dev libegl1
+  # text and lines over pictures
+  libcairo2-dev fonts-dejavu-core
+  # the window
+  libglfw3-dev libimgui-dev
   # drawing on the processor, in whatever vectors it has
   libhwy-dev
   # tests and benchmarks
   libgtest-dev libbenchmark-dev
+  # the window under test: a display without a screen, its input and its pictures
+  xvfb xdotool x11-apps libgl1-mesa-dri
 )
 
 if ! command -v dpkg-query >/dev/null; then

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "render/image.h"
+#include "stream/cache_reader.h"
 #include "stream/file.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
@@ -198,10 +199,19 @@ TEST_F(Frames, StatisticsListFramesAndTheirPercentiles) {
   EXPECT_EQ(summary["p50"], totals[9]);
   EXPECT_EQ(summary["p95"], totals[18]);
   EXPECT_EQ(summary["max"], totals[19]);
-  for (const char* key : {"plan", "read", "decode", "project", "sort", "upload", "draw", "workers_waited"})
+  for (const char* key : {"plan", "read", "decode", "project", "sort", "upload", "draw",
+                          "workers_waited_for_reads", "workers_waited"})
     EXPECT_TRUE(stats["summary"]["seconds"][key]["p95"].is_number()) << key;
-  for (const char* key : {"bricks_drawn", "splats_drawn", "bytes_read"})
+  for (const char* key : {"bricks_drawn", "bricks_cached", "splats_drawn", "bytes_read", "mean_queue_depth"})
     EXPECT_TRUE(stats["summary"][key]["p50"].is_number()) << key;
+  // All of it stays in memory: the frames read every brick at most once.
+  uint64_t bricks_read = 0;
+  for (const auto& frame : stats["frames"]) {
+    bricks_read += frame["bricks_read"].get<uint64_t>();
+    EXPECT_EQ(frame["bricks_read"].get<uint64_t>() + frame["bricks_cached"].get<uint64_t>(),
+              frame["bricks_drawn"]);
+  }
+  EXPECT_LE(bricks_read, CacheReader(cache()).bricks().size());
 }
 
 TEST_F(Frames, MaxSplatsHolds) {

@@ -309,11 +309,13 @@ TEST_F(RenderOptions, StatisticsTellWhatWasDone) {
     EXPECT_TRUE(json.contains(key)) << key;
   ASSERT_EQ(json["frames"].size(), 1u);
   const auto& frame = json["frames"][0];
-  for (const char* key : {"seconds", "bricks_drawn", "bricks_culled", "splats_read", "splats_drawn",
-                          "bytes_read", "largest_level"})
+  for (const char* key :
+       {"seconds", "bricks_drawn", "bricks_culled", "splats_read", "splats_drawn", "bytes_read",
+        "largest_level", "bricks_cached", "bricks_read", "read_requests", "mean_queue_depth", "read_by",
+        "cache_peak_bytes", "pager_peak_bytes", "ring_peak_bytes", "bricks_unreadable"})
     EXPECT_TRUE(frame.contains(key)) << key;
   for (const char* key : {"plan", "read", "decode", "project", "sort", "upload", "draw", "total",
-                          "workers_waited", "painter_waited"})
+                          "workers_waited_for_reads", "workers_waited", "painter_waited"})
     EXPECT_TRUE(frame["seconds"][key].is_number()) << key;
   EXPECT_EQ(json["command"][1], "render");
   EXPECT_EQ(json["threads"], 2);
@@ -326,6 +328,12 @@ TEST_F(RenderOptions, StatisticsTellWhatWasDone) {
   EXPECT_GT(json["peak_memory_bytes"], 1 << 20);
   EXPECT_GT(frame["splats_drawn"], 0);
   EXPECT_GT(frame["bytes_read"], 0);
+  EXPECT_GT(frame["read_requests"], 0);
+  EXPECT_GT(frame["mean_queue_depth"], 0);
+  EXPECT_EQ(frame["bricks_read"], frame["bricks_drawn"]);
+  EXPECT_LE(frame["cache_peak_bytes"].get<uint64_t>() + frame["pager_peak_bytes"].get<uint64_t>() +
+                frame["ring_peak_bytes"].get<uint64_t>(),
+            json["memory_bytes"].get<uint64_t>());
   EXPECT_GT(json["time_to_first_image_s"], 0);
   EXPECT_FALSE(json.contains("first_image"));
   for (const char* of : {"p50", "p95", "max"}) {

@@ -248,10 +248,10 @@ TEST_F(RealFiles, SolutionOfAnotherGridNamesBoth) {
 }
 
 TEST_F(RealFiles, ForeignFilesAreNamed) {
-  EXPECT_NE(errorOf("vtk/SampleStructGrid.vtk").find("legacy VTK"), std::string::npos);
-  EXPECT_NE(errorOf("vtk/StructuredGrid.vts").find("XML"), std::string::npos);
-  EXPECT_NE(errorOf("cgns/sqnz_s.hdf.cgns").find("HDF5"), std::string::npos);
-  EXPECT_NE(errorOf("cgns/sqnz_s.adf.cgns").find("ADF"), std::string::npos);
+  EXPECT_NE(errorOf("bluntfin/bluntfinxyz.bin", {"vtk/SampleStructGrid.vtk"}).find("legacy VTK"), std::string::npos);
+  EXPECT_NE(errorOf("bluntfin/bluntfinxyz.bin", {"vtk/StructuredGrid.vts"}).find("XML"), std::string::npos);
+  EXPECT_NE(errorOf("bluntfin/bluntfinxyz.bin", {"cgns/sqnz_s.adf.cgns"}).find("ADF"), std::string::npos);
+  EXPECT_NE(errorOf("bluntfin/bluntfinxyz.bin", {"cgns/sqnz_s.hdf.cgns"}).find("HDF5"), std::string::npos);
   EXPECT_NE(errorOf("plot3d_multi/multi.p3d").find("JSON"), std::string::npos);
   EXPECT_NE(errorOf("README.md").find("a number was expected"), std::string::npos);
   EXPECT_NE(errorOf("bluntfin").find("is a folder"), std::string::npos);

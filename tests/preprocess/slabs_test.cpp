@@ -20,16 +20,15 @@ uint64_t nodesIn(const GridBlock& block, const NodeBox& box) {
 }
 
 /// Each row in exactly one box, windows within the limit, halos there where the block goes on.
-void checkSlabs(const std::vector<GridBlock>& blocks, uint64_t window_nodes, bool halo) {
+void checkSlabs(const std::vector<GridBlock>& blocks, uint64_t window_nodes, Halo halo) {
   std::vector<std::map<std::pair<uint64_t, uint64_t>, int>> seen(blocks.size());
   for (const Slab& slab : cutIntoSlabs(blocks, window_nodes, halo)) {
     const GridBlock& of = blocks[slab.block];
     EXPECT_LE(nodesIn(of, slab.window), window_nodes);
-    const uint64_t margin = halo ? 1 : 0;
-    EXPECT_EQ(slab.window.j0, std::max(slab.box.j0, margin) - margin);
-    EXPECT_EQ(slab.window.k0, std::max(slab.box.k0, margin) - margin);
-    EXPECT_EQ(slab.window.j1, std::min(slab.box.j1 + margin, of.nj));
-    EXPECT_EQ(slab.window.k1, std::min(slab.box.k1 + margin, of.nk));
+    EXPECT_EQ(slab.window.j0, std::max(slab.box.j0, halo.before) - halo.before);
+    EXPECT_EQ(slab.window.k0, std::max(slab.box.k0, halo.before) - halo.before);
+    EXPECT_EQ(slab.window.j1, std::min(slab.box.j1 + halo.after, of.nj));
+    EXPECT_EQ(slab.window.k1, std::min(slab.box.k1 + halo.after, of.nk));
     for (uint64_t k = slab.box.k0; k < slab.box.k1; ++k)
       for (uint64_t j = slab.box.j0; j < slab.box.j1; ++j) ++seen[slab.block][{j, k}];
   }
@@ -41,12 +40,13 @@ void checkSlabs(const std::vector<GridBlock>& blocks, uint64_t window_nodes, boo
 
 TEST(Slabs, CoverEveryNodeOnceWithinTheLimit) {
   const std::vector<GridBlock> blocks{block(7, 11, 13), block(1, 1, 1), block(30, 1, 40), block(2, 50, 1)};
-  for (const bool halo : {false, true})
-    for (const uint64_t limit : {270u, 300u, 500u, 1000u, 5000u, 100000u}) checkSlabs(blocks, limit, halo);
+  for (const Halo halo : {kNoHalo, kNodeHalo, Halo{0, 1}, Halo{1, 2}})
+    for (const uint64_t limit : {halo.after < 2 ? 270u : 480u, 500u, 1000u, 5000u, 100000u})
+      checkSlabs(blocks, limit, halo);
 }
 
 TEST(Slabs, ReadPlanesWholeWhereTheyFit) {
-  const auto slabs = cutIntoSlabs({block(10, 10, 100)}, 1000, true);
+  const auto slabs = cutIntoSlabs({block(10, 10, 100)}, 1000, kNodeHalo);
   for (const Slab& slab : slabs) EXPECT_EQ(slab.box.j1 - slab.box.j0, 10u);
   EXPECT_EQ(slabs.front().box.k1, 8u);
 }
@@ -54,13 +54,13 @@ TEST(Slabs, ReadPlanesWholeWhereTheyFit) {
 TEST(Slabs, ReadLittleTwiceWherePlanesDoNotFit) {
   uint64_t read = 0;
   const GridBlock wide = block(100, 1000, 1000);
-  for (const Slab& slab : cutIntoSlabs({wide}, 100 * 1000, true)) read += nodesIn(wide, slab.window);
+  for (const Slab& slab : cutIntoSlabs({wide}, 100 * 1000, kNodeHalo)) read += nodesIn(wide, slab.window);
   EXPECT_LT(static_cast<double>(read), 1.2 * static_cast<double>(wide.nodes()));
 }
 
 TEST(Slabs, RefuseARowThatDoesNotFit) {
-  EXPECT_THROW(cutIntoSlabs({block(1000, 5, 5)}, 8999, true), Error);
-  EXPECT_NO_THROW(cutIntoSlabs({block(1000, 5, 5)}, 9000, true));
+  EXPECT_THROW(cutIntoSlabs({block(1000, 5, 5)}, 8999, kNodeHalo), Error);
+  EXPECT_NO_THROW(cutIntoSlabs({block(1000, 5, 5)}, 9000, kNodeHalo));
 }
 
 TEST(Slabs, TasksCoverTheBox) {

@@ -11,6 +11,7 @@
 #include "stream/error.h"
 #include "stream/file.h"
 #include "tests/support/lattice_cache.h"
+#include "tests/support/painted_splats.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -181,9 +182,7 @@ TEST_P(FrameTest, DiffersLittleFromOneGlobalDepthSort) {
   for (const uint32_t index : sorter.farthestFirst(depths)) sorted.push_back(splats[index]);
   Image global;
   makeBackend(GetParam())->run([&](Painter& painter) {
-    painter.begin(options().size, options().background, table, true);
-    painter.draw(sorted);
-    global = painter.end();
+    global = paintFrame(painter, sorted, table, true, options().size, options().background);
   });
   EXPECT_GT(compareImages(image, global).psnr_db, 60);
 }

@@ -117,6 +117,27 @@ TEST_F(ProgressiveTest, WhatShowThrowsEndsTheFrame) {
   EXPECT_NO_THROW(renderer.render(camera(Projection::orthographic), options(4), statistics));
 }
 
+TEST_F(ProgressiveTest, CanBeCancelledBetweenItsPicturesAndBeginsFromTheCacheOfBricks) {
+  const Camera iso = camera(Projection::orthographic);
+  FrameRenderer renderer(*cache_, 0, function());
+  FrameStatistics statistics;
+  int shown = 0;
+  EXPECT_THROW(renderer.renderProgressively(iso, options(0.3), statistics,
+                                            [&](const Image&, bool) {
+                                              ++shown;
+                                              EXPECT_GT(statistics.bricks_read, 0u);
+                                              renderer.cancel();
+                                            }),
+               Cancelled);
+  EXPECT_EQ(shown, 1);
+  const auto expectWarm = [&](const Image&, bool is_final) {
+    ++shown;
+    EXPECT_TRUE(is_final || statistics.bricks_read == 0);
+  };
+  renderer.renderProgressively(iso, options(0.3), statistics, expectWarm);
+  EXPECT_EQ(shown, 3);
+}
+
 TEST_F(ProgressiveTest, MoreSplatsMakeABetterPictureAndNeverMoreThanAsked) {
   FrameRenderer renderer(*cache_, 0, function());
   FrameStatistics statistics;
@@ -174,7 +195,8 @@ Image globallySorted(const CacheReader& cache, const TransferFunction& function,
     const Brick& brick = cache.bricks()[part.brick];
     const glm::dvec3 corner = cache.manifest().root.cellMin(brick.cell);
     const SplatRanges ranges(brick, part.octants);
-    projector.project(settings, table, corner, geometry, values, {ranges.begin(), ranges.end()});
+    projector.project(settings, table, corner, arraysOf(geometry), arraysOf(values),
+                      {ranges.begin(), ranges.end()});
     splats.insert(splats.end(), projector.splats().begin(), projector.splats().end());
     const bool perspective = camera.projection == Projection::perspective;  // else from the cell's corner
     const auto from = static_cast<float>(perspective ? 0 : settings.view.viewFromData(corner).z);
@@ -184,7 +206,7 @@ Image globallySorted(const CacheReader& cache, const TransferFunction& function,
   DepthSorter sorter;
   for (const uint32_t index : sorter.farthestFirst(depths)) sorted.push_back(splats[index]);
   Image image;
-  GlThread gl;
+  GlThread gl(GlLibrary::osmesa);
   gl.run([&](const GlContext& context) {
     GlPainter painter(context);
     painter.begin(options.size, options.background, table, settings.per_pixel);

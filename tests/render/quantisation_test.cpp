@@ -155,7 +155,7 @@ class Quantisation : public testing::Test {
     EXPECT_LT(computed_db - decoded_db, 1);
   }
 
-  GlThread gl_;
+  GlThread gl_{GlLibrary::osmesa};
 };
 
 TEST_F(Quantisation, OfASmoothFunctionCostsLessThanADecibel) {

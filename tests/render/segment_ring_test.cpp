@@ -22,7 +22,8 @@ TEST(SegmentRing, HandsOverEverythingInSequence) {
     std::mt19937 random(4);
     std::vector<size_t> counts(kSegments);
     for (size_t& count : counts) count = random() % 7 == 0 ? 0 : random() % (kCapacity + 1);
-    SegmentRing ring(kCapacity);
+    std::vector<ScreenSplat> memory(kCapacity);
+    SegmentRing ring(memory);
     std::atomic<size_t> next = 0;
     std::vector<std::thread> threads;
     for (int n = 0; n < workers; ++n)
@@ -46,8 +47,42 @@ TEST(SegmentRing, HandsOverEverythingInSequence) {
   }
 }
 
+TEST(SegmentRing, KeepsWhatIsHandedOutUntilItIsReleased) {
+  std::vector<ScreenSplat> memory(10);
+  SegmentRing ring(memory);
+  const auto fill = [&](uint64_t sequence, size_t count) {
+    const auto segment = ring.acquire(sequence, count);
+    ASSERT_TRUE(segment);
+    for (ScreenSplat& splat : *segment) splat = numbered(sequence);
+    ring.commit(sequence);
+  };
+  EXPECT_FALSE(ring.nextIfReady());
+  fill(0, 4);
+  fill(1, 4);
+  const auto first = ring.nextIfReady();
+  const auto second = ring.nextIfReady();
+  ASSERT_TRUE(first && second);
+  EXPECT_FALSE(ring.nextIfReady());
+  fill(2, 2);
+  std::thread worker([&] { fill(3, 4); });  // waits for the first's place
+  const auto third = ring.nextIfReady();
+  ASSERT_TRUE(third);
+  for (size_t n = 0; n < 4; ++n) {
+    EXPECT_EQ((*first)[n].x, 0);
+    EXPECT_EQ((*second)[n].x, 1);
+  }
+  ring.release();
+  const auto fourth = ring.next();
+  ASSERT_TRUE(fourth);
+  EXPECT_EQ(fourth->data(), first->data());
+  EXPECT_EQ((*fourth)[0].x, 3);
+  EXPECT_EQ((*second)[0].x, 1);
+  worker.join();
+}
+
 TEST(SegmentRing, ClosingWakesAllWhoWait) {
-  SegmentRing ring(10);
+  std::vector<ScreenSplat> memory(10);
+  SegmentRing ring(memory);
   ASSERT_TRUE(ring.acquire(0, 10));
   std::thread full([&] { EXPECT_FALSE(ring.acquire(1, 1)); });
   std::thread early([&] { EXPECT_FALSE(ring.acquire(7, 1)); });

@@ -49,6 +49,16 @@ TEST(Manifest, RoundTrips) {
   EXPECT_EQ(back.steps[0].variables, m.steps[0].variables);
 }
 
+TEST(Manifest, TellsOfCells) {
+  Manifest m = example();
+  EXPECT_FALSE(Manifest::fromJson(m.toJson(), "m").cells);
+  m.cells = true;
+  EXPECT_TRUE(Manifest::fromJson(m.toJson(), "m").cells);
+  Json json = Json::parse(m.toJson());
+  json["centring"] = "edge";
+  EXPECT_THROW(Manifest::fromJson(json.dump(), "m"), Error);
+}
+
 TEST(Manifest, KeepsNamesThatAreNotUtf8Readable) {
   Manifest m = example();
   m.sources = {"gr\xfcn.xyz"};  // Latin-1

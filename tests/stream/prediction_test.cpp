@@ -127,7 +127,9 @@ std::vector<std::byte> valuesWithRows(uint32_t count, const std::vector<uint64_t
 }
 
 TEST(Values, RefuseRowsThatLie) {
-  SplatVariable out;
+  SplatVariable values;
+  values.resize(8);
+  const VariableArrays<float> out = arraysOf(values);
   EXPECT_NO_THROW(decodeValuesStream(8, valuesWithRows(8, {4, 0, 4, 4}), out));
   EXPECT_NO_THROW(decodeValuesStream(8, valuesWithRows(8, {2, 0, 6, 1}), out));  // odd, and harmless
   for (const std::vector<uint64_t>& rows : std::vector<std::vector<uint64_t>>{{4, 0, 4, 5},

@@ -1,5 +1,7 @@
 #include "tests/support/faulty_system_calls.h"
 
+#include <fcntl.h>
+
 #include <algorithm>
 
 namespace curvisplat::testing {
@@ -15,10 +17,24 @@ int FaultySystemCalls::fail() const {
   return -1;
 }
 
+int FaultySystemCalls::open(const char* path, int flags, unsigned mode) {
+  if (refuse_direct_open && (flags & O_DIRECT)) {
+    errno = EINVAL;
+    return -1;
+  }
+  const int fd = SystemCalls::open(path, flags, mode);
+  if (flags & O_DIRECT) direct_.insert(fd);
+  return fd;
+}
+
 ssize_t FaultySystemCalls::pread(int fd, void* to, size_t count, int64_t offset) {
   if (interrupted()) return -1;
+  if (refuse_direct_reads && direct_.contains(fd)) {
+    errno = EINVAL;
+    return -1;
+  }
   const int64_t number = reads++;
-  if (fail_read_at >= 0 && number >= fail_read_at) return fail();
+  if ((fail_read_at >= 0 && number >= fail_read_at) || number == fail_only_read_at) return fail();
   return SystemCalls::pread(fd, to, std::min(count, largest_transfer), offset);
 }
 

@@ -1,4 +1,4 @@
-#include "render/thread_name.h"
+#include "stream/thread_name.h"
 
 #include <pthread.h>
 

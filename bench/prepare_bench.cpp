@@ -1,0 +1,203 @@
+// What a frame's worker does with one brick after the other, on one core, from memory: verify, decode,
+// project and sort, each alone and all together. Items are splats.
+//
+// The bricks are those of a cache: CURVISPLAT_BENCH_CACHE=CACHE names it; otherwise a half annulus of 2 M
+// nodes in single precision is converted first, into the temporary folder.
+#include <benchmark/benchmark.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "preprocess/convert.h"
+#include "preprocess/scenes.h"
+#include "render/depth_sort.h"
+#include "render/projection.h"
+#include "render/transfer_function.h"
+#include "stream/brick_codec.h"
+#include "stream/cache_index.h"
+#include "stream/cache_reader.h"
+#include "stream/checksum.h"
+#include "stream/file.h"
+#include "stream/progress.h"
+
+namespace curvisplat {
+namespace {
+
+/// A cache's bricks of one kind, read once.
+class Bricks {
+ public:
+  static const Bricks& leaves() {
+    static const Bricks bricks(true);
+    return bricks;
+  }
+  static const Bricks& inner() {
+    static const Bricks bricks(false);
+    return bricks;
+  }
+
+  struct Bytes {
+    uint32_t id;
+    std::vector<std::byte> geometry, values;
+  };
+  std::vector<Bytes> bytes;
+  int64_t splats = 0;
+
+  static const CacheReader& cache() {
+    static const CacheReader reader(path());
+    return reader;
+  }
+
+ private:
+  explicit Bricks(bool leaves) {
+    const InputFile geometry(cache().path() / cache().manifest().steps.front().geometry);
+    const InputFile values(cache().path() / variableFileName(cache().manifest().variables.front()));
+    for (uint32_t id = 0; id < cache().bricks().size() && splats < (int64_t{4} << 20); ++id) {
+      const Brick& brick = cache().bricks()[id];
+      if (brick.isLeaf() != leaves) continue;
+      const Extent& of_values = cache().brickVariables(0)[id].values;
+      Bytes& read = bytes.emplace_back();
+      read.id = id;
+      read.geometry.resize(brick.geometry.length);
+      read.values.resize(of_values.length);
+      geometry.readAt(brick.geometry.offset, std::span(read.geometry));
+      values.readAt(of_values.offset, std::span(read.values));
+      splats += brick.splats;
+    }
+  }
+
+  static std::filesystem::path path() {
+    if (const char* named = std::getenv("CURVISPLAT_BENCH_CACHE")) return named;
+    const SceneGridSource source(makeScene("half-annulus"), {128, 128, 128}, 4);
+    ConvertOptions options;
+    options.output = std::filesystem::temp_directory_path() /
+                     ("curvisplat-bench-" + std::to_string(::getpid()) + ".splats");
+    options.scalars = {0};
+    Progress progress;
+    convert(source, options, progress);
+    static const struct Remover {
+      std::filesystem::path path;
+      ~Remover() { std::filesystem::remove_all(path); }
+    } remover{options.output};
+    return options.output;
+  }
+};
+
+/// A view of all the data, and the colours to see it in.
+struct View {
+  explicit View(Projection projection)
+      : settings{ScreenView::of(camera(projection), {600, 600}, glm::dvec3(1), 1.5, 1e-3)},
+        table(ClassificationTable::of(function(), info().min, info().max)) {}
+
+  static const VariableInfo& info() { return Bricks::cache().manifest().variables.front(); }
+  static TransferFunction function() {
+    return TransferFunction::preset("viridis", info().min, info().max, 1);
+  }
+  static Camera camera(Projection projection) {
+    const Manifest& manifest = Bricks::cache().manifest();
+    return Camera::named("iso", manifest.lower, manifest.upper, {600, 600}, projection, 30);
+  }
+
+  ProjectionSettings settings;
+  ClassificationTable table;
+};
+
+void verify(benchmark::State& state) {
+  const Bricks& bricks = state.range(0) ? Bricks::leaves() : Bricks::inner();
+  for (auto _ : state)
+    for (const auto& brick : bricks.bytes)
+      benchmark::DoNotOptimize(checksumOf(brick.geometry) ^ checksumOf(brick.values));
+  state.SetItemsProcessed(state.iterations() * bricks.splats);
+}
+BENCHMARK(verify)->ArgName("leaves")->Arg(1)->Arg(0)->Unit(benchmark::kMillisecond);
+
+void decodeGeometryBench(benchmark::State& state) {
+  const Bricks& bricks = state.range(0) ? Bricks::leaves() : Bricks::inner();
+  SplatGeometry geometry;
+  for (auto _ : state)
+    for (const auto& brick : bricks.bytes)
+      decodeGeometry(Bricks::cache().manifest().root, Bricks::cache().bricks()[brick.id], brick.geometry,
+                     geometry);
+  state.SetItemsProcessed(state.iterations() * bricks.splats);
+}
+BENCHMARK(decodeGeometryBench)
+    ->Name("decodeGeometry")
+    ->ArgName("leaves")
+    ->Arg(1)
+    ->Arg(0)
+    ->Unit(benchmark::kMillisecond);
+
+void decodeValues(benchmark::State& state) {
+  const Bricks& bricks = state.range(0) ? Bricks::leaves() : Bricks::inner();
+  SplatVariable values;
+  for (auto _ : state)
+    for (const auto& brick : bricks.bytes)
+      decodeVariable(Bricks::cache().bricks()[brick.id], Bricks::cache().brickVariables(0)[brick.id],
+                     brick.values, values);
+  state.SetItemsProcessed(state.iterations() * bricks.splats);
+}
+BENCHMARK(decodeValues)->ArgName("leaves")->Arg(1)->Arg(0)->Unit(benchmark::kMillisecond);
+
+/// Projects, or projects and sorts; decoding is not counted where `decode` is false.
+void prepare(benchmark::State& state, bool decode, bool sort) {
+  const Bricks& bricks = state.range(0) ? Bricks::leaves() : Bricks::inner();
+  const View view(state.range(1) ? Projection::perspective : Projection::orthographic);
+  const CacheReader& cache = Bricks::cache();
+  std::vector<SplatGeometry> geometry(bricks.bytes.size());
+  std::vector<SplatVariable> values(bricks.bytes.size());
+  const auto decodeOne = [&](size_t n, size_t to) {
+    const auto& brick = bricks.bytes[n];
+    decodeGeometry(cache.manifest().root, cache.bricks()[brick.id], brick.geometry, geometry[to]);
+    decodeVariable(cache.bricks()[brick.id], cache.brickVariables(0)[brick.id], brick.values, values[to]);
+  };
+  if (!decode)
+    for (size_t n = 0; n < bricks.bytes.size(); ++n) decodeOne(n, n);
+  BrickProjector projector;
+  DepthSorter sorter;
+  std::vector<ScreenSplat> out(BrickProjector::kMostSplats);
+  uint64_t drawn = 0;
+  for (auto _ : state) {
+    drawn = 0;
+    for (size_t n = 0; n < bricks.bytes.size(); ++n) {
+      const auto& brick = bricks.bytes[n];
+      if (decode) {
+        benchmark::DoNotOptimize(checksumOf(brick.geometry) ^ checksumOf(brick.values));
+        decodeOne(n, 0);
+      }
+      const size_t from = decode ? 0 : n;
+      projector.project(view.settings, view.table,
+                        cache.manifest().root.cellMin(cache.bricks()[brick.id].cell), geometry[from],
+                        values[from]);
+      drawn += projector.counts().drawn;
+      if (!sort) continue;
+      const auto order = sorter.farthestFirst(projector.depths());
+      for (size_t i = 0; i < order.size(); ++i) out[i] = projector.splats()[order[i]];
+      benchmark::DoNotOptimize(out.data());
+    }
+  }
+  state.SetItemsProcessed(state.iterations() * bricks.splats);
+  state.counters["drawn"] = static_cast<double>(drawn) / static_cast<double>(bricks.splats);
+}
+void project(benchmark::State& state) {
+  prepare(state, false, false);
+}
+void projectAndSort(benchmark::State& state) {
+  prepare(state, false, true);
+}
+void decodeProjectAndSort(benchmark::State& state) {
+  prepare(state, true, true);
+}
+#define CURVISPLAT_PREPARE(name)            \
+  BENCHMARK(name)                           \
+      ->ArgNames({"leaves", "perspective"}) \
+      ->ArgsProduct({{1, 0}, {0, 1}})       \
+      ->Unit(benchmark::kMillisecond)
+CURVISPLAT_PREPARE(project);
+CURVISPLAT_PREPARE(projectAndSort);
+CURVISPLAT_PREPARE(decodeProjectAndSort);
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,91 @@
+#include "preprocess/cell_survey.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <glm/common.hpp>
+
+#include "preprocess/hexahedron.h"
+#include "preprocess/slabs.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kNodesPerTask = 16384;
+constexpr Halo kCorners{0, 1};
+
+void addCell(const NodeArrays& nodes, size_t at, size_t row_stride, size_t plane_stride, GridSurvey& survey) {
+  ++survey.nodes;
+  const uint8_t own = nodes.blank[at];
+  if ((cornerMarks(nodes.blank.data(), at, row_stride, plane_stride) & kNoNode) || (own & kNoValue)) {
+    ++survey.blanked.by_grid;
+    return;
+  }
+  if (own & kBlankValue) {
+    ++survey.blanked.by_value;
+    return;
+  }
+  if (own & kValueNotFinite) {
+    ++survey.blanked.not_finite;
+    return;
+  }
+  for (const glm::dvec3& corner :
+       cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at, row_stride, plane_stride)) {
+    survey.lower = glm::min(survey.lower, corner);
+    survey.upper = glm::max(survey.upper, corner);
+  }
+  for (size_t scalar = 0; scalar < survey.ranges.size(); ++scalar) {
+    const double value = nodes.scalars[scalar][at];
+    survey.ranges[scalar].min = std::min(survey.ranges[scalar].min, value);
+    survey.ranges[scalar].max = std::max(survey.ranges[scalar].max, value);
+  }
+}
+
+GridSurvey united(GridSurvey a, const GridSurvey& b) {
+  a.nodes += b.nodes;
+  a.blanked += b.blanked;
+  a.lower = glm::min(a.lower, b.lower);
+  a.upper = glm::max(a.upper, b.upper);
+  for (size_t scalar = 0; scalar < a.ranges.size(); ++scalar) {
+    a.ranges[scalar].min = std::min(a.ranges[scalar].min, b.ranges[scalar].min);
+    a.ranges[scalar].max = std::max(a.ranges[scalar].max, b.ranges[scalar].max);
+  }
+  return a;
+}
+
+}  // namespace
+
+GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, Progress& progress) {
+  GridSurvey nothing;
+  nothing.ranges.resize(reader.scalars());
+  GridSurvey survey = nothing;
+  SlabStream slabs(reader, slab_bytes, kCorners);
+  while (const LoadedSlab* loaded = slabs.next()) {
+    const Slab& slab = loaded->slab;
+    const GridBlock& block = reader.source().description().blocks[slab.block];
+    const size_t plane_stride = block.ni * (slab.window.j1 - slab.window.j0);
+    const uint64_t rows = slab.box.j1 - slab.box.j0;
+    const auto add_row = [&](size_t row, GridSurvey& to) {
+      const uint64_t j = slab.box.j0 + row % rows, k = slab.box.k0 + row / rows;
+      if (j + 1 == block.nj || k + 1 == block.nk) return;
+      const size_t first = (k - slab.window.k0) * plane_stride + (j - slab.window.j0) * block.ni;
+      for (uint64_t i = 0; i + 1 < block.ni; ++i)
+        addCell(loaded->nodes, first + i, block.ni, plane_stride, to);
+    };
+    // Counts, the smallest and the largest do not depend on how the work is divided.
+    survey =
+        united(std::move(survey),
+               tbb::parallel_reduce(
+                   tbb::blocked_range<size_t>(0, rowsOf(slab.box), kNodesPerTask / block.ni + 1), nothing,
+                   [&](const tbb::blocked_range<size_t>& range, GridSurvey of_range) {
+                     for (size_t row = range.begin(); row < range.end(); ++row) add_row(row, of_range);
+                     return of_range;
+                   },
+                   united));
+    progress.advance(rowsOf(slab.box) * block.ni);
+  }
+  return survey;
+}
+
+}  // namespace curvisplat

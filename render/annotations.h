@@ -1,0 +1,44 @@
+// What is drawn over a picture so that people can read it: the scalar bar, the axes' directions, the box
+// around the data. The same in `render` and in the window.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <string>
+#include <vector>
+
+#include "render/image.h"
+#include "render/screen_view.h"
+#include "render/transfer_function.h"
+
+namespace curvisplat {
+
+struct Annotations {
+  bool scalar_bar = false;
+  bool axes = false;
+  bool outline = false;
+  bool any() const { return scalar_bar || axes || outline; }
+};
+
+/// What there is to annotate. The function outlives the call.
+struct AnnotatedScene {
+  ScreenView view;
+  const TransferFunction& transfer_function;
+  std::string title;                  // of the scalar bar: "density [kg/m3]"
+  glm::dvec3 lower{0.0}, upper{0.0};  // the box around the data, before --scale
+  glm::vec4 background{1, 1, 1, 1};   // text and lines are black on a light one, white on a dark one
+};
+
+/// Draws over `image`, of the size of scene.view. Text is sized by the image's height. Throws Error where the
+/// image is larger than Cairo draws (32,767 pixels a side).
+void annotate(Image& image, const Annotations& annotations, const AnnotatedScene& scene);
+
+/// The annotations alone: four bytes a pixel, red, green, blue, alpha, colours not multiplied. Throws as
+/// annotate() does.
+std::vector<uint8_t> annotationLayer(const Annotations& annotations, const AnnotatedScene& scene);
+
+/// "density [kg/m3]"; "density" where the unit is unknown.
+std::string scalarTitle(const std::string& name, const std::string& unit);
+
+}  // namespace curvisplat

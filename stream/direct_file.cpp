@@ -1,0 +1,38 @@
+#include "stream/direct_file.h"
+
+#include <fcntl.h>
+
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "stream/error.h"
+#include "stream/file.h"
+
+namespace curvisplat {
+namespace {
+
+int openRetrying(const std::filesystem::path& path, int flags) {
+  int fd;
+  do {
+    fd = SystemCalls::current().open(path.c_str(), flags | O_CLOEXEC, 0);
+  } while (fd < 0 && errno == EINTR);
+  return fd;
+}
+
+}  // namespace
+
+DirectFile::DirectFile(std::filesystem::path path, bool direct) : path_(std::move(path)) {
+  buffered_fd_ = openRetrying(path_, O_RDONLY);
+  if (buffered_fd_ < 0)
+    throw Error("{}: cannot be opened for reading: {}", path_.string(), std::strerror(errno));
+  ::posix_fadvise(buffered_fd_, 0, 0, POSIX_FADV_RANDOM);  // advice: a refusal changes nothing
+  if (direct) direct_fd_ = openRetrying(path_, O_RDONLY | O_DIRECT);
+}
+
+DirectFile::~DirectFile() {
+  if (direct_fd_ >= 0) SystemCalls::current().close(direct_fd_);
+  SystemCalls::current().close(buffered_fd_);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,116 @@
+// What `render` draws over a picture, and the ways there are to draw it.
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "render/image.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+class Annotations : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    run({"generate", "half-annulus", "--size", "24x12x12", "-o", file("a")});
+    run({"convert", file("a.xyz"), file("a.fun"), "-o", file("a.splats")});
+  }
+  static void TearDownTestSuite() { folder_.reset(); }
+
+  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
+  static void run(const std::vector<std::string>& arguments) {
+    const ProgramResult result = runProgram(arguments);
+    ASSERT_EQ(result.status, 0) << result.err;
+  }
+  static Image render(std::vector<std::string> options, const std::string& output = "a.exr") {
+    options.insert(options.begin(), {"render", file("a.splats"), "-o", file(output), "--size", "200x160"});
+    run(options);
+    return readImage(file(output));
+  }
+
+  /// Pixels of [x0, x1) x [y0, y1) that differ between `a` and `b`.
+  static int changed(const Image& a, const Image& b, int x0, int x1, int y0, int y1) {
+    int count = 0;
+    for (int y = y0; y < y1; ++y)
+      for (int x = x0; x < x1; ++x) count += !std::equal(a.pixel(x, y), a.pixel(x, y) + 3, b.pixel(x, y));
+    return count;
+  }
+
+  static std::unique_ptr<TemporaryFolder> folder_;
+};
+std::unique_ptr<TemporaryFolder> Annotations::folder_;
+
+TEST_F(Annotations, EachIsDrawnInItsPlace) {
+  const Image plain = render({});
+  const Image bar = render({"--scalar-bar"});
+  EXPECT_GT(changed(plain, bar, 140, 200, 0, 160), 500);
+  EXPECT_EQ(changed(plain, bar, 0, 140, 0, 160), 0);
+  const Image axes = render({"--axes"});
+  EXPECT_GT(changed(plain, axes, 0, 80, 90, 160), 50);
+  EXPECT_EQ(changed(plain, axes, 80, 200, 0, 160), 0);
+  EXPECT_EQ(changed(plain, axes, 0, 80, 0, 80), 0);
+  const Image outline = render({"--outline"});
+  EXPECT_GT(changed(plain, outline, 0, 200, 0, 160), 300);
+}
+
+TEST_F(Annotations, TheScalarBarHasTheFunctionsColoursTheHighestOnTop) {
+  const Image grey = render({"--scalar-bar", "--tf", "grey", "--background", "#ff0000"});
+  // Down the first column that is all grey and not the frame.
+  std::vector<float> shades;
+  for (int x = 140; x < 200; ++x) {
+    shades.clear();
+    for (int y = 40; y < 120; ++y) {
+      const float* const p = grey.pixel(x, y);
+      if (p[0] == p[1] && p[1] == p[2]) shades.push_back(p[0]);
+    }
+    if (shades.size() >= 60 && shades.front() != shades.back()) break;
+  }
+  ASSERT_GE(shades.size(), 60u);
+  for (size_t n = 1; n < shades.size(); ++n) EXPECT_LE(shades[n], shades[n - 1]);
+  EXPECT_GT(shades.front() - shades.back(), 0.5f);
+}
+
+TEST_F(Annotations, InkStandsOutFromTheBackground) {
+  const auto darkest = [](const Image& image) {
+    float least = 1;
+    for (int y = 100; y < 160; ++y)
+      for (int x = 0; x < 60; ++x)
+        least = std::min(least, std::max({image.pixel(x, y)[0], image.pixel(x, y)[1], image.pixel(x, y)[2]}));
+    return least;
+  };
+  EXPECT_LT(darkest(render({"--axes", "--background", "white"})), 0.3f);
+  const Image black = render({"--axes", "--background", "black"});
+  float lightest = 0;
+  for (int y = 100; y < 160; ++y)
+    for (int x = 0; x < 60; ++x)
+      lightest =
+          std::max(lightest, std::min({black.pixel(x, y)[0], black.pixel(x, y)[1], black.pixel(x, y)[2]}));
+  EXPECT_GT(lightest, 0.7f);
+}
+
+TEST_F(Annotations, OverTransparencyTheyAreOpaque) {
+  const Image image = render({"--axes", "--background", "transparent"}, "t.png");
+  float most = 0;
+  for (int y = 100; y < 160; ++y)
+    for (int x = 0; x < 60; ++x) most = std::max(most, image.pixel(x, y)[3]);
+  EXPECT_EQ(most, 1);
+  EXPECT_EQ(image.pixel(199, 0)[3], 0);
+}
+
+TEST_F(Annotations, EglDrawsWhatOsMesaDraws) {
+  const ProgramResult system = runProgram({"info", "--system", "--json"});
+  ASSERT_EQ(system.status, 0) << system.err;
+  for (const auto& backend : nlohmann::json::parse(system.out).at("backends"))
+    if (!backend.at("works").get<bool>()) GTEST_SKIP() << backend.dump();
+  const ImageDifference difference =
+      compareImages(render({"--backend", "egl"}), render({"--backend", "osmesa"}, "b.exr"));
+  EXPECT_GE(difference.psnr_db, 50);
+}
+
+}  // namespace
+}  // namespace curvisplat

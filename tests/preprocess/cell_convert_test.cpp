@@ -1,0 +1,189 @@
+// Conversion of scalars that stand in cells, as a whole.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <map>
+
+#include "preprocess/add_scalar.h"
+#include "preprocess/convert.h"
+#include "preprocess/memory_plan.h"
+#include "preprocess/scenes.h"
+#include "stream/cache_reader.h"
+#include "stream/cache_verify.h"
+#include "stream/error.h"
+#include "tests/support/cell_grid.h"
+#include "tests/support/function_grid.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+using Files = std::map<std::string, std::string>;
+
+Files filesOf(const std::filesystem::path& folder) {
+  Files files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    std::ifstream file(entry.path(), std::ios::binary);
+    files[entry.path().filename().string()] = std::string(std::istreambuf_iterator<char>(file), {});
+  }
+  return files;
+}
+
+ConvertOptions optionsFor(const std::filesystem::path& output, std::vector<uint32_t> scalars) {
+  ConvertOptions options;
+  options.output = output;
+  options.memory_bytes = uint64_t{1} << 30;
+  options.scalars = std::move(scalars);
+  options.title = "cells";
+  return options;
+}
+
+ConvertReport convertQuietly(const GridSource& source, const ConvertOptions& options) {
+  Progress progress;
+  return convert(source, options, progress);
+}
+
+AddScalarReport addQuietly(const GridSource& source, const std::filesystem::path& cache, uint32_t scalar) {
+  AddScalarOptions options;
+  options.cache = cache;
+  options.scalars = {scalar};
+  options.memory_bytes = uint64_t{1} << 30;
+  Progress progress;
+  return addScalars(source, options, progress);
+}
+
+template <typename Work>
+std::string errorOf(const Work& work) {
+  try {
+    work();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+double field(const GridCell& cell) {
+  return std::sin(3 * cell.centre.x) * cell.centre.y + cell.centre.z;
+}
+
+/// Scalars "f" at nodes, and "c0", "c1" in cells.
+struct CellScene {
+  SceneGridSource nodes{makeScene("half-annulus"), {33, 40, 37}};
+  CellGridSource source{nodes, {field, [](const GridCell& cell) { return cell.centre.x; }}};
+};
+
+TEST(CellConvert, KeepsEveryCellAndTheVolumeOfTheHexahedra) {
+  const TemporaryFolder folder;
+  const CellScene scene;
+  const ConvertReport report = convertQuietly(scene.source, optionsFor(folder / "c.splats", {1}));
+  EXPECT_EQ(report.centring, Centring::cell);
+  EXPECT_EQ(report.nodes, 32u * 39 * 36);
+  EXPECT_EQ(report.splats, report.nodes);
+  EXPECT_EQ(report.merged_nodes, 0u);
+  EXPECT_EQ(report.blanked.total(), 0u);
+  // Of the mapping: chords cut off (dθ)²/6 of an annulus.
+  EXPECT_NEAR(report.volume / makeScene("half-annulus")->volume(), 1 - std::pow(M_PI / 32, 2) / 6, 1e-5);
+  const CacheReader cache(folder / "c.splats");
+  EXPECT_TRUE(cache.manifest().cells);
+  EXPECT_EQ(cache.manifest().blocks[0].ni, 33u);
+  EXPECT_TRUE(verifyCache(cache, nullptr).empty());
+}
+
+TEST(CellConvert, HasTheSameBytesForAnyThreadsAndMemory) {
+  const TemporaryFolder folder;
+  const SceneGridSource nodes(makeScene("half-annulus"), {90, 90, 60});
+  const CellGridSource source(nodes, {field});
+  Files expected;
+  for (const unsigned threads : {2u, 1u}) {
+    ConvertOptions options = optionsFor(folder / "c.splats", {1});
+    options.overwrite = true;
+    options.threads = threads;
+    if (threads == 1) {
+      options.memory_bytes = leastMemory(1);
+      options.bucket_splats = 30'000;
+    }
+    convertQuietly(source, options);
+    const Files files = filesOf(options.output);
+    if (expected.empty()) expected = files;
+    EXPECT_TRUE(files == expected) << threads;
+  }
+}
+
+TEST(CellConvert, LeavesOutCellsWithoutACornerOrAValue) {
+  const TemporaryFolder folder;
+  const FunctionGridSource nodes({gridBlock(9, 9, 9), gridBlock(3, 3, 3)}, 0, [](const GridNode& node) {
+    const bool blank = node.block == 0 && node.i == 4 && node.j == 4 && node.k == 4;
+    return NodeValues{glm::dvec3(node.i + 20.0 * node.block, node.j, node.k), {}, blank};
+  });
+  const CellGridSource source(nodes, {[](const GridCell& cell) {
+                                const double x = cell.centre.x;
+                                if (cell.j > 0 || cell.k > 0) return x;
+                                if (cell.i == 0) return std::numeric_limits<double>::quiet_NaN();
+                                if (cell.i == 1) return std::numeric_limits<double>::infinity();
+                                return cell.i == 2 ? -99.0 : x;
+                              }});
+  ConvertOptions options = optionsFor(folder / "c.splats", {0});
+  options.blank_value = -99;
+  const ConvertReport report = convertQuietly(source, options);
+  EXPECT_EQ(report.nodes, 512u + 8);
+  EXPECT_EQ(report.blanked.by_grid, 8u + 2);
+  EXPECT_EQ(report.blanked.by_value, 1u);
+  EXPECT_EQ(report.blanked.not_finite, 2u);
+  EXPECT_EQ(report.splats, 520u - 13);
+  EXPECT_NEAR(report.volume, 520 - 13, 0.1);
+  const Manifest manifest = CacheReader(folder / "c.splats").manifest();
+  EXPECT_EQ(manifest.lower, glm::dvec3(0));
+  EXPECT_EQ(manifest.upper, glm::dvec3(22, 8, 8));
+  EXPECT_EQ(manifest.blanked_nodes, 13u);
+}
+
+TEST(CellConvert, RefusesNodesAndCellsInOneCache) {
+  const TemporaryFolder folder;
+  const CellScene scene;
+  const std::string error = errorOf([&] {
+    convertQuietly(scene.source, optionsFor(folder / "c.splats", {0, 1}));
+  });
+  EXPECT_NE(error.find("f stands at nodes and c0 in cells"), std::string::npos) << error;
+  EXPECT_FALSE(std::filesystem::exists(folder / "c.splats"));
+}
+
+TEST(CellConvert, AddsAScalarAsIfItHadBeenThereFromTheStart) {
+  const TemporaryFolder folder;
+  const CellScene scene;
+  convertQuietly(scene.source, optionsFor(folder / "both.splats", {1, 2}));
+  convertQuietly(scene.source, optionsFor(folder / "one.splats", {1}));
+  const AddScalarReport report = addQuietly(scene.source, folder / "one.splats", 2);
+  EXPECT_EQ(report.splats, 32u * 39 * 36);
+  Files both = filesOf(folder / "both.splats"), one = filesOf(folder / "one.splats");
+  both.erase("manifest.json");
+  one.erase("manifest.json");
+  EXPECT_TRUE(both == one);
+
+  const std::string error = errorOf([&] { addQuietly(scene.source, folder / "one.splats", 0); });
+  EXPECT_NE(error.find("stand in cells, and f at nodes"), std::string::npos) << error;
+}
+
+TEST(CellConvert, AddsToTheCellsThatOlderScalarsLeft) {
+  const TemporaryFolder folder;
+  const SceneGridSource nodes(makeScene("half-annulus"), {33, 40, 37});
+  const auto holes = [](const GridCell& cell) {
+    return (cell.i + cell.j + cell.k) % 17 == 0 ? std::numeric_limits<double>::quiet_NaN() : field(cell);
+  };
+  const CellGridSource source(nodes, {holes, field});
+  convertQuietly(source, optionsFor(folder / "both.splats", {1, 2}));
+  convertQuietly(source, optionsFor(folder / "one.splats", {1}));
+  addQuietly(source, folder / "one.splats", 2);
+  Files both = filesOf(folder / "both.splats"), one = filesOf(folder / "one.splats");
+  EXPECT_TRUE(both["var.1.bin"] == one["var.1.bin"]);
+  EXPECT_TRUE(both["geometry.bin"] == one["geometry.bin"]);
+
+  // The other way round a value is missing.
+  convertQuietly(source, optionsFor(folder / "whole.splats", {2}));
+  EXPECT_NE(errorOf([&] { addQuietly(source, folder / "whole.splats", 1); }).find("convert again"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,262 @@
+#include "preprocess/cell_splats.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <random>
+
+#include "preprocess/hexahedron.h"
+#include "preprocess/node_reader.h"
+#include "tests/support/mapped_block.h"
+
+namespace curvisplat {
+namespace {
+
+/// A block whose scalars stand in cells: a function of the cell's centre.
+struct CellBlock : MappedBlock {
+  using MappedBlock::MappedBlock;
+
+  glm::dvec3 centre(uint64_t i, uint64_t j, uint64_t k) const {
+    glm::dvec3 sum(0.0);
+    for (size_t corner = 0; corner < 8; ++corner) {
+      const size_t n = at(i + (corner & 1), j + (corner >> 1 & 1), k + (corner >> 2));
+      sum += glm::dvec3(nodes.x[n], nodes.y[n], nodes.z[n]);
+    }
+    return sum / 8.0;
+  }
+
+  void addCellScalar(const std::function<double(const glm::dvec3&)>& f) {
+    auto& values = nodes.scalars.emplace_back(block.nodes(), NAN);
+    for (uint64_t k = 0; k + 1 < block.nk; ++k)
+      for (uint64_t j = 0; j + 1 < block.nj; ++j)
+        for (uint64_t i = 0; i + 1 < block.ni; ++i)
+          values[at(i, j, k)] = static_cast<float>(f(centre(i, j, k)));
+  }
+
+  /// As a NodeReader marks them.
+  void mark() {
+    for (size_t n = 0; n < block.nodes(); ++n)
+      for (const auto& values : nodes.scalars) nodes.blank[n] |= std::isnan(values[n]) ? kNoValue : 0;
+  }
+
+  NodeSplats cellSplats() {
+    mark();
+    NodeSplats out;
+    CellScratch scratch;
+    computeCellSplats(window(), {0, block.nj, 0, block.nk}, scratch, out);
+    return out;
+  }
+};
+
+glm::dvec3 halfAnnulus(double u, double v, double w) {
+  const double theta = M_PI * u, r = 0.3 + 0.7 * std::expm1(2.5 * v) / std::expm1(2.5);
+  return {-r * std::sin(theta), r * std::cos(theta), w + 0.15 * r * std::sin(3 * theta)};
+}
+
+const NodeSplat* splatOf(const NodeSplats& splats, uint64_t node) {
+  for (const NodeSplat& splat : splats.splats)
+    if (splat.node == node) return &splat;
+  return nullptr;
+}
+
+/// The trilinear map's Jacobian, integrated by two Gauss points an axis: exact.
+double integratedVolume(const std::array<glm::dvec3, 8>& corner) {
+  double volume = 0;
+  for (int point = 0; point < 8; ++point) {
+    std::array<double, 3> u;
+    for (int axis = 0; axis < 3; ++axis) u[axis] = 0.5 + (point >> axis & 1 ? 0.5 : -0.5) / std::sqrt(3.0);
+    glm::dmat3 jacobian(0.0);
+    for (int c = 0; c < 8; ++c)
+      for (int axis = 0; axis < 3; ++axis) {
+        double derivative = c >> axis & 1 ? 1 : -1;
+        for (int other = 0; other < 3; ++other)
+          if (other != axis) derivative *= c >> other & 1 ? u[other] : 1 - u[other];
+        jacobian[axis] += derivative * corner[static_cast<size_t>(c)];
+      }
+    volume += glm::determinant(jacobian) / 8;
+  }
+  return volume;
+}
+
+TEST(Hexahedron, HasTheVolumeOfItsTrilinearMap) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  for (int n = 0; n < 50; ++n) {
+    std::array<glm::dvec3, 8> corner;
+    for (glm::dvec3& c : corner) c = {normal(random), normal(random), normal(random)};
+    EXPECT_NEAR(Hexahedron(corner).volume(), integratedVolume(corner), 1e-12);
+  }
+}
+
+TEST(CellSplats, OfAnAffineGridAreItsCells) {
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  for (int n = 0; n < 20; ++n) {
+    glm::dmat3 jacobian(1.0);
+    for (int column = 0; column < 3 && n > 0; ++column)
+      jacobian[column] = glm::dvec3(normal(random), normal(random), normal(random));
+    CellBlock grid(5, 4, 6, [&](double i, double j, double k) { return jacobian * glm::dvec3(i, j, k); });
+    grid.addCellScalar([](const glm::dvec3& p) { return p.x; });
+    const NodeSplats out = grid.cellSplats();
+    ASSERT_EQ(out.splats.size(), 4u * 3 * 5);
+    const double determinant = glm::determinant(jacobian);
+    EXPECT_NEAR(totalWeight(out) / std::abs(60 * determinant), 1, 1e-9);
+    EXPECT_EQ(out.right_handed, determinant > 0 ? 60u : 0u);
+    EXPECT_EQ(out.left_handed, determinant > 0 ? 0u : 60u);
+    EXPECT_EQ(out.degenerate, 0u);
+    // One at the block's end is a whole cell as well.
+    for (const uint64_t i : {1u, 3u}) {
+      const NodeSplat* cell = splatOf(out, grid.at(i, 2, 4));
+      ASSERT_NE(cell, nullptr);
+      EXPECT_TRUE(cell->regular);
+      EXPECT_FALSE(cell->on_block_face);
+      EXPECT_LT(glm::distance(cell->splat.position, jacobian * glm::dvec3(i + 0.5, 2.5, 4.5)), 1e-12);
+      const glm::dmat3 a = cell->splat.factor();
+      const glm::dmat3 difference = a * glm::transpose(a) - jacobian * glm::transpose(jacobian);
+      for (int column = 0; column < 3; ++column) EXPECT_LT(glm::length(difference[column]), 1e-11);
+    }
+  }
+}
+
+TEST(CellSplats, OfAnyGridSumToItsHexahedra) {
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> off(-0.2, 0.2);
+  CellBlock grid(6, 7, 5, [&](double i, double j, double k) {
+    return halfAnnulus(i / 5, j / 6, k / 4) + 0.05 * glm::dvec3(off(random), off(random), off(random));
+  });
+  grid.addCellScalar([](const glm::dvec3&) { return 1; });
+  double volume = 0;
+  for (uint64_t k = 0; k < 4; ++k)
+    for (uint64_t j = 0; j < 6; ++j)
+      for (uint64_t i = 0; i < 5; ++i)
+        volume += std::abs(
+            integratedVolume(cornersAt(grid.nodes.x.data(), grid.nodes.y.data(), grid.nodes.z.data(),
+                                       grid.at(i, j, k), grid.block.ni, grid.block.ni * grid.block.nj)));
+  const NodeSplats out = grid.cellSplats();
+  EXPECT_NEAR(totalWeight(out), volume, 1e-12 * volume);
+  // The density of a constant field is the same in every cell.
+  for (const NodeSplat& cell : out.splats) {
+    const auto& axis = cell.splat.axis;
+    EXPECT_TRUE(cell.regular);
+    EXPECT_NEAR(cell.splat.weight / (axis[0] * axis[1] * axis[2]), 1, 1e-12);
+  }
+}
+
+TEST(CellSplats, OfALinearFieldCarryItExactly) {
+  // On any grid, at its ends and beside blanked cells: the slope is Aᵀ∇f, whatever the neighbours' distances.
+  const glm::dvec3 gradient(0.5, -2, 0.25);
+  CellBlock grid(12, 7, 9, [](double i, double j, double k) { return halfAnnulus(i / 11, j / 6, k / 8); });
+  grid.addCellScalar([](const glm::dvec3& p) { return p.x; });
+  grid.addCellScalar([&](const glm::dvec3& p) { return 1.5 + glm::dot(gradient, p); });
+  grid.nodes.scalars[1][grid.at(4, 3, 3)] = NAN;
+  const NodeSplats out = grid.cellSplats();
+  ASSERT_EQ(out.splats.size(), 11u * 6 * 8 - 1);
+  ASSERT_EQ(out.values.size(), 2 * out.splats.size());
+  for (size_t n = 0; n < out.splats.size(); ++n) {
+    const Splat& splat = out.splats[n].splat;
+    const SplatScalar& value = out.values[2 * n + 1];
+    EXPECT_NEAR(value.mean, 1.5 + glm::dot(gradient, splat.position), 1e-6);
+    EXPECT_LT(glm::distance(value.slope, glm::transpose(splat.factor()) * gradient), 2e-5);
+    EXPECT_EQ(value.variance, 0);
+    EXPECT_NEAR(out.values[2 * n].mean, splat.position.x, 1e-6);
+  }
+}
+
+TEST(CellSplats, AreNotThereWithoutACornerOrAValue) {
+  CellBlock grid(7, 7, 7, [](double i, double j, double k) { return glm::dvec3(i, j, k); });
+  grid.addCellScalar([](const glm::dvec3& p) { return p.x * p.x; });
+  grid.nodes.blank[grid.at(3, 3, 3)] = kNoNode;
+  grid.nodes.x[grid.at(3, 3, 3)] = NAN;
+  grid.nodes.blank[grid.at(0, 0, 5)] = kBlankValue;
+  const NodeSplats out = grid.cellSplats();
+  ASSERT_EQ(out.splats.size(), 216u - 8 - 1);
+  EXPECT_TRUE(allFinite(out));
+  EXPECT_NEAR(totalWeight(out), 207, 1e-12);
+  for (const uint64_t i : {2u, 3u}) EXPECT_EQ(splatOf(out, grid.at(i, 2, 3)), nullptr);
+  EXPECT_EQ(splatOf(out, grid.at(0, 0, 5)), nullptr);
+  // Its neighbour after is gone: (1.5² - 0.5²) / 1.
+  const NodeSplat* beside = splatOf(out, grid.at(1, 2, 3));
+  ASSERT_NE(beside, nullptr);
+  EXPECT_NEAR(out.values[static_cast<size_t>(beside - out.splats.data())].slope.x, 2, 1e-6);
+}
+
+TEST(CellSplats, OfWindowsAreThoseOfTheWhole) {
+  CellBlock grid(6, 8, 9, [](double i, double j, double k) { return halfAnnulus(i / 5, j / 7, k / 8); });
+  grid.addCellScalar([](const glm::dvec3& p) { return p.x * p.y + p.z; });
+  grid.nodes.blank[grid.at(2, 4, 4)] = kNoNode;
+  const NodeSplats whole = grid.cellSplats();
+  size_t n = 0;
+  for (uint64_t k = 0; k < 9; ++k)
+    for (uint64_t j = 0; j < 8; j += 3) {
+      const NodeBox box{j, std::min<uint64_t>(j + 3, 8), k, k + 1};
+      const NodeBox window{box.j0 - std::min<uint64_t>(box.j0, 1), std::min<uint64_t>(box.j1 + 2, 8),
+                           k - std::min<uint64_t>(k, 1), std::min<uint64_t>(k + 3, 9)};
+      NodeArrays nodes;
+      nodes.scalars.resize(1);
+      for (uint64_t kk = window.k0; kk < window.k1; ++kk)
+        for (uint64_t jj = window.j0; jj < window.j1; ++jj)
+          for (uint64_t i = 0; i < 6; ++i) {
+            const size_t at = grid.at(i, jj, kk);
+            nodes.x.push_back(grid.nodes.x[at]);
+            nodes.y.push_back(grid.nodes.y[at]);
+            nodes.z.push_back(grid.nodes.z[at]);
+            nodes.blank.push_back(grid.nodes.blank[at]);
+            nodes.scalars[0].push_back(grid.nodes.scalars[0][at]);
+          }
+      NodeSplats part;
+      CellScratch scratch;
+      computeCellSplats({grid.block, 0, window, &nodes}, box, scratch, part);
+      for (size_t m = 0; m < part.splats.size(); ++m) {
+        size_t same = 0;
+        while (same < whole.splats.size() && whole.splats[same].node != part.splats[m].node) ++same;
+        ASSERT_LT(same, whole.splats.size());
+        EXPECT_EQ(part.splats[m].splat.position, whole.splats[same].splat.position);
+        EXPECT_EQ(part.splats[m].splat.axis, whole.splats[same].splat.axis);
+        EXPECT_EQ(part.splats[m].splat.weight, whole.splats[same].splat.weight);
+        EXPECT_EQ(part.values[m].slope, whole.values[same].slope);
+      }
+      n += part.splats.size();
+    }
+  EXPECT_EQ(n, whole.splats.size());
+}
+
+TEST(CellSplats, OfSingularAndFoldedCellsAreFinite) {
+  // A polar axis: wedges, not degenerate, with the volume of the prism.
+  CellBlock polar(9, 4, 3, [](double i, double j, double k) {
+    const double angle = i * M_PI / 4;
+    return glm::dvec3(j * std::cos(angle), j * std::sin(angle), k);
+  });
+  polar.addCellScalar([](const glm::dvec3& p) { return p.z; });
+  const NodeSplats wedges = polar.cellSplats();
+  EXPECT_TRUE(allFinite(wedges));
+  EXPECT_EQ(wedges.degenerate, 0u);
+  EXPECT_NEAR(totalWeight(wedges), 2 * 8 * 0.5 * 9 * std::sin(M_PI / 4), 1e-9);
+
+  for (const int kind : {0, 1, 2}) {  // a sheet, a line, a point
+    CellBlock flat(4, 4, 4, [&](double i, double j, double k) {
+      return glm::dvec3(kind < 2 ? i : 0, kind < 1 ? j : 0, 0 * k);
+    });
+    flat.addCellScalar([](const glm::dvec3&) { return 1; });
+    const NodeSplats out = flat.cellSplats();
+    EXPECT_EQ(out.splats.size(), 27u);
+    EXPECT_EQ(out.degenerate, 27u);
+    EXPECT_TRUE(allFinite(out)) << kind;
+    EXPECT_EQ(totalWeight(out), 0);
+  }
+
+  CellBlock folded(3, 3, 3, [](double i, double j, double k) {
+    const bool twisted = i == 1 && j == 1 && k == 1;
+    return twisted ? glm::dvec3(-2.4, 1.7, 2.9) : glm::dvec3(i, j, k);
+  });
+  folded.addCellScalar([](const glm::dvec3& p) { return p.y; });
+  EXPECT_TRUE(allFinite(folded.cellSplats()));
+
+  CellBlock sheet(4, 4, 1, [](double i, double j, double k) { return glm::dvec3(i, j, k); });
+  sheet.addCellScalar([](const glm::dvec3&) { return 1; });
+  EXPECT_TRUE(sheet.cellSplats().splats.empty());
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,408 @@
+// CGNS files written by libcgns' upper layer, as other programs write them, HDF5 and ADF: what is read is
+// what was written, wherever it stands in the file, and what cannot be drawn is said in words.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <thread>
+
+#include "preprocess/open_grid.h"
+#include "stream/error.h"
+#include "tests/support/cgns_writer.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+CgnsFunction linear(double scale, double offset = 0) {
+  return [=](int64_t i, int64_t j, int64_t k) {
+    return offset + scale * static_cast<double>(i + 100 * j + 10'000 * k);
+  };
+}
+
+std::vector<CgnsWriterField> cartesian(double offset = 0) {
+  return {
+      {"CoordinateX", linear(0.25, offset)}, {"CoordinateY", linear(-1)}, {"CoordinateZ", linear(3, 0.5)}};
+}
+
+class Cgns : public testing::TestWithParam<CgnsFileType> {
+ protected:
+  CgnsWriter writer() const { return CgnsWriter(path_, GetParam()); }
+
+  std::unique_ptr<GridSource> open(std::optional<uint32_t> step = {}) const {
+    OpenGridOptions options;
+    options.grid = path_;
+    options.time_step = step;
+    return openGrid(options);
+  }
+
+  std::string errorOf(std::optional<uint32_t> step = {}) const {
+    try {
+      open(step);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  static NodeArrays readAll(const GridSource& source, uint32_t block, const std::vector<uint32_t>& scalars) {
+    NodeArrays nodes;
+    const GridBlock& dims = source.description().blocks.at(block);
+    source.read(block, {0, dims.nj, 0, dims.nk}, scalars, nodes);
+    return nodes;
+  }
+
+  TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_ / "grid.cgns";
+};
+
+/// Every node of `box` has the values of the functions; of a cell's, NaN where there is no cell.
+void expectValues(const GridSource& source, uint32_t block, const NodeBox& box, uint32_t scalar,
+                  const CgnsFunction& value, double x_offset = 0) {
+  const GridBlock& dims = source.description().blocks.at(block);
+  NodeArrays nodes;
+  source.read(block, box, std::span(&scalar, 1), nodes);
+  ASSERT_EQ(nodes.x.size(), dims.ni * (box.j1 - box.j0) * (box.k1 - box.k0));
+  const bool cells = source.description().scalars.at(scalar).centring == Centring::cell;
+  const std::vector<CgnsWriterField> axes = cartesian(x_offset);
+  size_t n = 0;
+  for (uint64_t k = box.k0; k < box.k1; ++k)
+    for (uint64_t j = box.j0; j < box.j1; ++j)
+      for (uint64_t i = 0; i < dims.ni; ++i, ++n) {
+        const auto ii = static_cast<int64_t>(i), jj = static_cast<int64_t>(j), kk = static_cast<int64_t>(k);
+        ASSERT_EQ(nodes.x[n], axes[0].value(ii, jj, kk)) << i << ", " << j << ", " << k;
+        ASSERT_EQ(nodes.y[n], axes[1].value(ii, jj, kk)) << i << ", " << j << ", " << k;
+        ASSERT_EQ(nodes.z[n], axes[2].value(ii, jj, kk)) << i << ", " << j << ", " << k;
+        ASSERT_EQ(nodes.blank[n], 0);
+        if (cells && (i + 1 == dims.ni || j + 1 == dims.nj || k + 1 == dims.nk))
+          ASSERT_TRUE(std::isnan(nodes.scalars[0][n])) << i << ", " << j << ", " << k;
+        else
+          ASSERT_EQ(nodes.scalars[0][n], static_cast<float>(value(ii, jj, kk)))
+              << i << ", " << j << ", " << k;
+      }
+}
+
+void expectAllBoxes(const GridSource& source, uint32_t scalar, const CgnsFunction& value) {
+  const GridBlock& dims = source.description().blocks.at(0);
+  for (uint64_t j0 = 0; j0 < dims.nj; ++j0)
+    for (uint64_t j1 = j0 + 1; j1 <= dims.nj; ++j1)
+      for (uint64_t k0 = 0; k0 < dims.nk; ++k0)
+        for (uint64_t k1 = k0 + 1; k1 <= dims.nk; ++k1)
+          ASSERT_NO_FATAL_FAILURE(expectValues(source, 0, {j0, j1, k0, k1}, scalar, value));
+}
+
+TEST_P(Cgns, VertexAndCellSolutionsAreReadByAnyBox) {
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.family("Wing");
+    file.zone("Zone 1", {5, 4, 3});
+    file.coordinates("GridCoordinates", cartesian());
+    file.solution("Nodes", "Vertex", {{"Density", linear(2)}, {"Pressure", linear(0.5, 9)}});
+    file.solution("Cells", "CellCenter", {{"Temperature", linear(7)}});
+  }
+  const auto source = open();
+  const GridDescription& description = source->description();
+  ASSERT_EQ(description.blocks.size(), 1u);
+  EXPECT_EQ(description.blocks[0].name, "Zone 1");
+  EXPECT_EQ(description.blocks[0].ni, 5u);
+  EXPECT_EQ(description.blocks[0].nj, 4u);
+  EXPECT_EQ(description.blocks[0].nk, 3u);
+  EXPECT_EQ(description.coordinate_bytes, 8);
+  EXPECT_TRUE(description.times.empty());
+  EXPECT_TRUE(description.warnings.empty());
+  ASSERT_EQ(description.scalars.size(), 3u);
+  EXPECT_EQ(description.scalars[1].centring, Centring::node);
+  EXPECT_EQ(description.scalars[2].centring, Centring::cell);
+  expectAllBoxes(*source, 1, linear(0.5, 9));
+  expectAllBoxes(*source, 2, linear(7));
+}
+
+TEST_P(Cgns, RindPlanesAreDropped) {
+  const CgnsRind grid{1, 2, 0, 3, 2, 1}, nodes{0, 1, 2, 0, 1, 1}, cells{1, 1, 1, 0, 0, 2};
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.zone("Zone", {4, 3, 3});
+    file.coordinates("GridCoordinates", cartesian(), grid);
+    file.solution("Nodes", "Vertex", {{"Density", linear(2)}}, nodes);
+    file.solution("Cells", "CellCenter", {{"Temperature", linear(7)}}, cells);
+  }
+  const auto source = open();
+  expectAllBoxes(*source, 0, linear(2));
+  expectAllBoxes(*source, 1, linear(7));
+}
+
+TEST_P(Cgns, LargePlanesAreReadInPieces) {
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.zone("Zone", {300, 301, 2});
+    file.coordinates("GridCoordinates", cartesian());
+    file.solution("Nodes", "Vertex",
+                  {{"MomentumX", linear(3)},
+                   {"MomentumY", linear(4)},
+                   {"MomentumZ", [](int64_t, int64_t, int64_t) { return 0.0; }}});
+  }
+  const auto source = open();
+  expectValues(*source, 0, {0, 301, 0, 2}, 0, linear(3));
+  const std::vector<uint32_t> length = scalarsNamed(source->description(), {"Momentum:mag"});
+  expectValues(*source, 0, {0, 301, 0, 2}, length.at(0), linear(5));
+}
+
+TEST_P(Cgns, NumbersOfAnyTypeAreConverted) {
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.zone("Zone", {3, 3, 3});
+    file.coordinates("GridCoordinates", cartesian());
+    file.solution("Nodes", "Vertex",
+                  {{"Single", linear(0.5), CgnsNumbers::single_precision},
+                   {"Integer", linear(3), CgnsNumbers::integer},
+                   {"Double", linear(0.1), CgnsNumbers::double_precision}});
+  }
+  const auto source = open();
+  expectAllBoxes(*source, 0, linear(0.5));
+  expectAllBoxes(*source, 1, linear(3));
+  expectAllBoxes(*source, 2, linear(0.1));
+}
+
+TEST_P(Cgns, UnitsAreTheFilesOrTheStandards) {
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.dimensional();
+    file.zone("Zone", {2, 2, 2});
+    file.coordinates("GridCoordinates", cartesian());
+    file.solution(
+        "Nodes", "Vertex",
+        {{"Density", linear(1)}, {"Mine", linear(1)}, {"Pressure", linear(1)}, {"Other", linear(1)}});
+    file.fieldUnits(2, {0, 2, -3, 0, 0});
+    file.fieldUnits(3, {});
+  }
+  const auto source = open();
+  const std::vector<GridScalar>& scalars = source->description().scalars;
+  EXPECT_EQ(scalars.at(0).unit, "kg m-3");
+  EXPECT_EQ(scalars.at(1).unit, "m2 s-3");
+  EXPECT_EQ(scalars.at(2).unit, "");  // nondimensional
+  EXPECT_EQ(scalars.at(3).unit, "");  // nothing tells
+}
+
+TEST_P(Cgns, ZonesOfAllBasesAreBlocks) {
+  {
+    CgnsWriter file = writer();
+    file.base("Near");
+    file.zone("Zone", {2, 3, 4});
+    file.coordinates("GridCoordinates", cartesian());
+    file.solution("Nodes", "Vertex", {{"Density", linear(1)}});
+    file.base("Surface", 2, 3);
+    file.base("Far");
+    file.zone("Zone", {5, 2, 2});
+    file.coordinates("GridCoordinates", cartesian(8));
+    file.solution("Nodes", "Vertex", {{"Density", linear(2)}});
+  }
+  const auto source = open();
+  ASSERT_EQ(source->description().blocks.size(), 2u);
+  EXPECT_EQ(source->description().blocks[0].name, "Near/Zone");
+  EXPECT_EQ(source->description().blocks[1].name, "Far/Zone");
+  ASSERT_EQ(source->description().scalars.size(), 1u);
+  expectValues(*source, 0, {0, 3, 0, 4}, 0, linear(1));
+  expectValues(*source, 1, {0, 2, 0, 2}, 0, linear(2), 8);
+}
+
+TEST_P(Cgns, StepsAreThoseOfTheIterativeData) {
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.baseSteps({0.5, 1.5, 2.5});
+    file.zone("Moving", {3, 2, 2});
+    file.coordinates("GridCoordinates", cartesian());
+    file.coordinates("Grid 2", cartesian(64));
+    file.solution("S 1", "Vertex", {{"Density", linear(1)}});
+    file.solution("S 2", "Vertex", {{"Density", linear(2)}});
+    file.zoneSteps({"S 2", "S 1", "Null"}, {"GridCoordinates", "Grid 2", "Grid 2"});
+  }
+  const auto first = open();
+  EXPECT_EQ(first->description().times, (std::vector<double>{0.5, 1.5, 2.5}));
+  EXPECT_EQ(first->description().time_step, 0u);
+  expectValues(*first, 0, {0, 2, 0, 2}, 0, linear(2));
+  const auto second = open(1);
+  EXPECT_EQ(second->description().time_step, 1u);
+  expectValues(*second, 0, {0, 2, 0, 2}, 0, linear(1), 64);
+  EXPECT_TRUE(open(2)->description().scalars.empty());
+  EXPECT_NE(errorOf(3).find("3 time steps, numbered from 0; --time-step 3"), std::string::npos) << errorOf(3);
+}
+
+TEST_P(Cgns, SolutionsWithoutTimesFollowOneAnother) {
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.zone("Zone", {3, 2, 2});
+    file.coordinates("GridCoordinates", cartesian());
+    file.solution("First", "Vertex", {{"Density", linear(1)}});
+    file.solution("Turbulence", "Vertex", {{"ViscosityEddy", linear(5)}});
+    file.solution("Cells", "CellCenter", {{"Density", linear(6)}});
+    file.solution("Second", "Vertex", {{"Density", linear(2)}});
+    file.zone("Steady", {3, 2, 2});
+    file.coordinates("GridCoordinates", cartesian());
+    file.solution("Only", "Vertex", {{"Density", linear(3)}});
+  }
+  const auto first = open();
+  EXPECT_EQ(first->description().times, (std::vector<double>{0, 1}));
+  ASSERT_EQ(first->description().scalars.size(), 3u);
+  EXPECT_EQ(first->description().scalars[0].name, "Density:node");
+  EXPECT_EQ(first->description().scalars[2].name, "Density:cell");
+  expectValues(*first, 0, {0, 2, 0, 2}, 0, linear(1));
+  expectValues(*first, 0, {0, 2, 0, 2}, 1, linear(5));
+  expectValues(*first, 0, {0, 2, 0, 2}, 2, linear(6));
+  const auto second = open(1);
+  ASSERT_EQ(second->description().scalars.size(), 1u);
+  EXPECT_EQ(second->description().scalars[0].name, "Density");
+  expectValues(*second, 0, {0, 2, 0, 2}, 0, linear(2));
+  expectValues(*second, 1, {0, 2, 0, 2}, 0, linear(3));
+}
+
+TEST_P(Cgns, ZonesWithoutTheFieldAreNotDrawnAndNamed) {
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.zone("Full", {3, 2, 2});
+    file.coordinates("GridCoordinates", cartesian());
+    file.solution("Nodes", "Vertex", {{"Density", linear(1)}});
+    file.zone("Bare", {2, 2, 2});
+    file.coordinates("GridCoordinates", cartesian());
+  }
+  const auto source = open();
+  ASSERT_EQ(source->description().warnings.size(), 1u);
+  EXPECT_EQ(source->description().warnings[0],
+            "1 of 2 zones (Bare) have no Density: with it, they are not drawn");
+  const NodeArrays full = readAll(*source, 0, {0}), bare = readAll(*source, 1, {0});
+  for (const float value : full.scalars[0]) EXPECT_FALSE(std::isnan(value));
+  for (const float value : bare.scalars[0]) EXPECT_TRUE(std::isnan(value));
+}
+
+TEST_P(Cgns, WhatIsNotDrawnIsNamed) {
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.unstructuredZone("Tetrahedra");
+    file.zone("Plane", {4, 3, 1});
+    file.coordinates("GridCoordinates", cartesian());
+    file.zone("Empty", {2, 2, 2});
+    file.zone("Zone", {3, 3, 2});
+    file.coordinates("GridCoordinates", cartesian());
+    file.solution("Faces", "IFaceCenter", {{"Flux", linear(1)}});
+  }
+  const auto source = open();
+  ASSERT_EQ(source->description().blocks.size(), 1u);
+  EXPECT_TRUE(source->description().scalars.empty());
+  const std::vector<std::string> expected = {
+      "Base/Zone/Faces is left out: its values stand at IFaceCenter; those at Vertex and CellCenter are read",
+      "left out: 1 zone of a single plane of nodes (volumes are needed): Base/Plane (4x3x1)",
+      "left out: 1 zone unstructured (structured ones are read): Base/Tetrahedra",
+      "left out: 1 zone without coordinates: Base/Empty"};
+  EXPECT_EQ(source->description().warnings, expected);
+}
+
+TEST_P(Cgns, NothingToDrawIsAnError) {
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.unstructuredZone("Tetrahedra");
+  }
+  EXPECT_NE(errorOf().find("1 zone unstructured (structured ones are read): Base/Tetrahedra"),
+            std::string::npos)
+      << errorOf();
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+  }
+  EXPECT_NE(errorOf().find("has no zones"), std::string::npos) << errorOf();
+  { CgnsWriter file = writer(); }
+  EXPECT_NE(errorOf().find("no CGNSBase_t"), std::string::npos) << errorOf();
+}
+
+TEST_P(Cgns, CylindricalCoordinatesAreRefused) {
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.zone("Zone", {3, 3, 2});
+    file.coordinates(
+        "GridCoordinates",
+        {{"CoordinateR", linear(1)}, {"CoordinateTheta", linear(2)}, {"CoordinateZ", linear(3)}});
+  }
+  EXPECT_NE(errorOf().find("coordinates CoordinateR, CoordinateTheta, CoordinateZ; only Cartesian"),
+            std::string::npos)
+      << errorOf();
+}
+
+TEST_P(Cgns, NamesOfPlot3dAndOfComponentsServe) {
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.zone("Zone", {2, 2, 2});
+    file.coordinates("GridCoordinates", cartesian());
+    file.solution("Nodes", "Vertex",
+                  {{"Density", linear(1)},
+                   {"MomentumX", linear(1)},
+                   {"MomentumY", linear(1)},
+                   {"MomentumZ", linear(1)},
+                   {"EnergyStagnationDensity", linear(1)}});
+  }
+  const auto source = open();
+  EXPECT_EQ(
+      scalarsNamed(source->description(), {"rho", "momentum_x", "Momentum:y", "momentum:mag", "energy"}),
+      (std::vector<uint32_t>{0, 1, 2, 5, 4}));
+}
+
+TEST_P(Cgns, ASolutionFileBesideItIsRefused) {
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.zone("Zone", {2, 2, 2});
+    file.coordinates("GridCoordinates", cartesian());
+  }
+  OpenGridOptions options;
+  options.grid = path_;
+  options.solutions = {"more.q"};
+  try {
+    openGrid(options);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("holds scalars itself"), std::string::npos) << error.what();
+  }
+}
+
+TEST_P(Cgns, ThreadsMayReadAtOnce) {
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.zone("Zone", {20, 20, 20});
+    file.coordinates("GridCoordinates", cartesian());
+    file.solution("Nodes", "Vertex", {{"Density", linear(2)}});
+  }
+  const auto source = open();
+  std::vector<std::thread> threads;
+  for (uint64_t n = 0; n < 4; ++n)
+    threads.emplace_back([&source, n] {
+      for (uint64_t k = n; k < 20; ++k) expectValues(*source, 0, {0, 20, k, k + 1}, 0, linear(2));
+    });
+  for (std::thread& thread : threads) thread.join();
+}
+
+TEST_P(Cgns, AnHdf5FileOfAnyNameIsRecognised) {
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.zone("Zone", {2, 2, 2});
+    file.coordinates("GridCoordinates", cartesian());
+  }
+  std::filesystem::rename(path_, folder_ / "flow.h5");
+  path_ = folder_ / "flow.h5";
+  EXPECT_EQ(open()->description().blocks.size(), 1u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Types, Cgns, testing::Values(CgnsFileType::adf, CgnsFileType::hdf5),
+                         [](const auto& type) { return type.param == CgnsFileType::adf ? "Adf" : "Hdf5"; });
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,42 @@
+#include "render/axis_ticks.h"
+
+#include <gtest/gtest.h>
+
+namespace curvisplat {
+namespace {
+
+std::vector<std::string> labels(double low, double high, int wanted, bool log_scale = false) {
+  std::vector<std::string> texts;
+  for (const AxisTick& tick : axisTicks(low, high, wanted, log_scale)) texts.push_back(tick.label);
+  return texts;
+}
+using Labels = std::vector<std::string>;
+
+TEST(AxisTicks, StandAtRoundNumbers) {
+  EXPECT_EQ(labels(0, 1, 6), (Labels{"0.0", "0.2", "0.4", "0.6", "0.8", "1.0"}));
+  EXPECT_EQ(labels(0.193, 4.98, 6), (Labels{"1", "2", "3", "4"}));
+  EXPECT_EQ(labels(-2.1, 29.4, 5), (Labels{"0", "10", "20"}));
+  EXPECT_EQ(labels(101300, 101345, 4), (Labels{"101300", "101320", "101340"}));
+  EXPECT_EQ(labels(0, 3e-7, 4), (Labels{"0e+00", "1e-07", "2e-07", "3e-07"}));
+  EXPECT_EQ(labels(1e7, 1.0003e7, 4), (Labels{"1.0000e+07", "1.0001e+07", "1.0002e+07", "1.0003e+07"}));
+}
+
+TEST(AxisTicks, KeepTheirEndsThoughRoundingMovesThem) {
+  const auto ticks = axisTicks(0.1, 0.3, 3, false);
+  ASSERT_EQ(ticks.size(), 3u);
+  EXPECT_EQ(ticks.front().label, "0.1");
+  EXPECT_EQ(ticks.back().label, "0.3");
+}
+
+TEST(AxisTicks, OfALogarithmStandAtPowersOfTen) {
+  EXPECT_EQ(labels(1, 10000, 5, true), (Labels{"1", "10", "100", "1000", "10000"}));
+  EXPECT_EQ(labels(1, 100, 8, true), (Labels{"1", "2", "5", "10", "20", "50", "100"}));
+  EXPECT_LE(labels(1e-12, 1e12, 6, true).size(), 8u);
+}
+
+TEST(AxisTicks, OfARangeWithoutLengthIsOne) {
+  EXPECT_EQ(labels(3, 3, 5), Labels{"3"});
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,299 @@
+// The pipeline behind a frame: whatever is read, kept, cancelled or damaged, a picture is whole and right, or
+// there is none.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <thread>
+
+#include "render/frame.h"
+#include "stream/error.h"
+#include "tests/support/faulty_system_calls.h"
+#include "tests/support/random_cache.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::FaultySystemCalls;
+using Way = PagerOptions::Way;
+
+/// With each backend.
+class FrameStreamingTest : public ::testing::TestWithParam<Backend> {
+ protected:
+  FrameStreamingTest() {
+    writeRandomCache(path(), 3);
+    cache_ = std::make_unique<CacheReader>(path());
+  }
+
+  fs::path path() const { return folder_ / "a.splats"; }
+  static TransferFunction function() { return TransferFunction::preset("viridis", -1, 1, 0.02); }
+  static FrameOptions options() {
+    FrameOptions made;
+    made.size = {60, 50};
+    made.lod_pixels = 0;
+    made.memory_bytes = 256 << 20;
+    return made;
+  }
+  Camera camera(const char* view) const {
+    const Manifest& manifest = cache_->manifest();
+    return Camera::named(view, manifest.lower, manifest.upper, options().size, Projection::orthographic, 30);
+  }
+  /// As little memory as renders at all.
+  static uint64_t leastMemory(FrameRenderer& renderer, const Camera& camera) {
+    FrameOptions wanted = options();
+    wanted.memory_bytes = 1 << 20;
+    FrameStatistics statistics;
+    try {
+      renderer.render(camera, wanted, statistics);
+    } catch (const UsageError& error) {
+      const std::string message = error.what();
+      return std::stoull(message.substr(message.find("at least ") + 9)) << 20;
+    }
+    return wanted.memory_bytes;
+  }
+
+  void overwrite(const fs::path& file, uint64_t offset) const {
+    std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
+    stream.seekp(static_cast<std::streamoff>(offset));
+    stream.put('\x55').put('\x5a').put('\xa5');
+  }
+
+  TemporaryFolder folder_;
+  std::unique_ptr<CacheReader> cache_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Backends, FrameStreamingTest, ::testing::Values(Backend::osmesa, Backend::cpu),
+                         [](const ::testing::TestParamInfo<Backend>& tested) {
+                           return tested.param == Backend::osmesa ? "osmesa" : "cpu";
+                         });
+
+TEST_P(FrameStreamingTest, IsTheSameForAnyMemoryThreadsWayAndHistory) {
+  FrameRenderer reference(*cache_, 0, function(), GetParam());
+  FrameStatistics statistics;
+  FrameOptions plain = options();
+  plain.threads = 1;
+  const Image iso = reference.render(camera("iso"), plain, statistics);
+  const Image side = reference.render(camera("-x"), plain, statistics);
+  ASSERT_NE(iso.rgba, side.rgba);
+  const uint64_t least = leastMemory(reference, camera("iso"));
+  EXPECT_LT(least, uint64_t{64} << 20);
+
+  FrameRenderer renderer(*cache_, 0, function(), GetParam());
+  for (const uint64_t memory : {least, least + (2 << 20), uint64_t{4} << 30})
+    for (const unsigned threads : {1u, 2u, 4u})
+      for (const Way way : {Way::automatic, Way::threads}) {
+        FrameOptions wanted = options();
+        wanted.memory_bytes = memory;
+        wanted.threads = threads;
+        wanted.read_by = way;
+        wanted.direct_reads = threads != 2;
+        const std::string what = fmt::format("{} bytes, {} threads", memory, threads);
+        EXPECT_EQ(renderer.render(camera("iso"), wanted, statistics).rgba, iso.rgba) << what << ", cold";
+        EXPECT_EQ(statistics.bricks_cached, 0u);
+        EXPECT_GT(statistics.bytes_read, 0u);
+        EXPECT_EQ(renderer.render(camera("-x"), wanted, statistics).rgba, side.rgba) << what << ", turned";
+        EXPECT_EQ(renderer.render(camera("iso"), wanted, statistics).rgba, iso.rgba) << what << ", warm";
+        if (memory > least + (2 << 20)) {
+          EXPECT_EQ(statistics.bricks_read, 0u);
+          EXPECT_EQ(statistics.bytes_read, 0u);
+        }
+        EXPECT_LE(statistics.cache_peak_bytes + statistics.pager_peak_bytes + statistics.ring_peak_bytes,
+                  memory);
+        EXPECT_GT(statistics.ring_peak_bytes, 0u);
+      }
+}
+
+TEST_P(FrameStreamingTest, AnotherImageSizeFindsTheCacheWarm) {
+  FrameRenderer renderer(*cache_, 0, function(), GetParam());
+  FrameStatistics statistics;
+  FrameOptions wanted = options();
+  renderer.render(camera("iso"), wanted, statistics);
+  wanted.size = {90, 75};
+  renderer.render(camera("iso"), wanted, statistics);
+  EXPECT_EQ(statistics.bricks_read, 0u);
+}
+
+TEST_P(FrameStreamingTest, PrefetchingMakesTheNextFrameWarm) {
+  FrameRenderer renderer(*cache_, 0, function(), GetParam());
+  FrameStatistics statistics;
+  const Image expected = renderer.render(camera("iso"), options(), statistics);
+  FrameRenderer prefetched(*cache_, 0, function(), GetParam());
+  FrameOptions wanted = options();
+  wanted.threads = 2;
+  prefetched.prefetch(camera("iso"), wanted);
+  prefetched.prefetch(camera("-x"), wanted);
+  prefetched.prefetch(camera("iso"), wanted);
+  // However far it has come: what it has done is not done again, and the picture is the same.
+  EXPECT_EQ(prefetched.render(camera("iso"), wanted, statistics).rgba, expected.rgba);
+  EXPECT_EQ(statistics.bricks_read + statistics.bricks_cached, statistics.bricks_drawn);
+  prefetched.prefetch(camera("-x"), wanted);  // and is left behind
+}
+
+TEST_P(FrameStreamingTest, CanBeCancelledAtAnyMoment) {
+  FrameRenderer renderer(*cache_, 0, function(), GetParam());
+  FrameStatistics statistics;
+  FrameOptions wanted = options();
+  wanted.size = {24, 20};
+  wanted.memory_bytes = leastMemory(renderer, camera("iso")) + (40 << 20);
+  wanted.threads = 3;
+  const Image expected = renderer.render(camera("iso"), wanted, statistics);
+
+  constexpr int kRounds = 1000;
+  std::atomic<int> round = -1, ended = -1;
+  std::thread canceller([&] {
+    std::mt19937 random(5);
+    for (int n = 0; n < kRounds; ++n) {
+      for (int now; (now = round.load()) < n;) round.wait(now);
+      // Some moment of the frame, and again and again until it has ended.
+      for (uint32_t turns = random() % (random() % 2 ? 100'000 : 2'000'000); turns > 0 && ended < n;
+           --turns) {
+      }
+      for (; ended < n; std::this_thread::yield()) renderer.cancel();
+    }
+  });
+  int cancelled = 0, whole = 0;
+  for (int n = 0; n < kRounds; ++n) {
+    wanted.read_by = n / 50 % 2 ? Way::threads : Way::automatic;
+    round = n;
+    round.notify_one();
+    try {
+      const Image image = renderer.render(camera("iso"), wanted, statistics);
+      EXPECT_EQ(image.rgba, expected.rgba);
+      ++whole;
+    } catch (const Cancelled&) {
+      ++cancelled;
+    }
+    ended = n;
+    if (n % 7 == 0) renderer.prefetch(camera("+z"), wanted);
+  }
+  canceller.join();
+  EXPECT_EQ(cancelled + whole, kRounds);
+  EXPECT_GT(cancelled, 0);
+  renderer.cancel();  // nothing is under way
+  EXPECT_EQ(renderer.render(camera("iso"), wanted, statistics).rgba, expected.rgba);
+}
+
+TEST_P(FrameStreamingTest, PartsOfBricksArePagedAndKept) {
+  FrameRenderer reference(*cache_, 0, function(), GetParam());
+  FrameStatistics statistics;
+  const Image whole = reference.render(camera("+x"), options(), statistics);
+  const uint64_t splats = statistics.splats_read;
+  const uint64_t least = leastMemory(reference, camera("+x"));
+  FrameRenderer renderer(*cache_, 0, function(), GetParam());
+  bool in_parts = false;  // a brick, which is then read once all the same
+  for (const uint64_t sixteenths : {6, 9, 11, 14}) {
+    FrameOptions wanted = options();
+    wanted.max_splats = splats * sixteenths / 16;
+    const Image expected =
+        FrameRenderer(*cache_, 0, function(), GetParam()).render(camera("+x"), wanted, statistics);
+    EXPECT_NE(expected.rgba, whole.rgba);
+    const uint64_t bricks = statistics.bricks_read;
+    in_parts |= bricks < statistics.bricks_drawn;
+    for (const uint64_t memory : {least, uint64_t{4} << 30})
+      for (const unsigned threads : {1u, 4u}) {
+        wanted.memory_bytes = memory;
+        wanted.threads = threads;
+        for (const char* when : {"cold", "warm"}) {
+          EXPECT_EQ(renderer.render(camera("+x"), wanted, statistics).rgba, expected.rgba) << when;
+          EXPECT_EQ(statistics.bricks_read + statistics.bricks_cached, bricks);
+        }
+        renderer.prefetch(camera("+x"), wanted);
+        EXPECT_EQ(renderer.render(camera("+x"), wanted, statistics).rgba, expected.rgba);
+      }
+  }
+  EXPECT_TRUE(in_parts);
+}
+
+TEST_P(FrameStreamingTest, AFailingDiskEndsTheFrameOnce) {
+  FaultySystemCalls faulty;
+  const ScopedSystemCalls scope(faulty);
+  FrameRenderer renderer(*cache_, 0, function(), GetParam());
+  FrameStatistics statistics;
+  for (const unsigned threads : {1u, 4u}) {
+    FrameOptions wanted = options();
+    wanted.threads = threads;
+    faulty.reads = 0;
+    faulty.fail_read_at = 1;
+    faulty.error = EIO;
+    EXPECT_THROW(renderer.render(camera("iso"), wanted, statistics), Error);
+    faulty.fail_read_at = -1;
+    EXPECT_NO_THROW(renderer.render(camera("iso"), wanted, statistics));
+  }
+}
+
+TEST_P(FrameStreamingTest, KeepsGoingFromTheAncestorIfAsked) {
+  FrameStatistics statistics;
+  const Image whole =
+      FrameRenderer(*cache_, 0, function(), GetParam()).render(camera("iso"), options(), statistics);
+  EXPECT_TRUE(statistics.bricks_unreadable.empty());
+  const uint64_t splats = statistics.splats_read;
+  const uint32_t last = static_cast<uint32_t>(cache_->bricks().size()) - 1;
+  overwrite(cache_->geometryPath(), cache_->bricks()[last].geometry.offset);
+  overwrite(cache_->valuesPath(0), cache_->brickVariables(0)[last - 7].values.offset);
+
+  FrameRenderer renderer(*cache_, 0, function(), GetParam());
+  EXPECT_THROW(renderer.render(camera("iso"), options(), statistics), Error);
+  FrameOptions wanted = options();
+  wanted.keep_going = true;
+  std::vector<float> first;
+  for (const unsigned threads : {1u, 4u}) {
+    wanted.threads = threads;
+    const Image image = renderer.render(camera("iso"), wanted, statistics);
+    ASSERT_EQ(statistics.bricks_unreadable.size(), 2u);
+    EXPECT_EQ(statistics.bricks_unreadable[0].brick, last - 7);
+    EXPECT_EQ(statistics.bricks_unreadable[1].brick, last);
+    EXPECT_NE(statistics.bricks_unreadable[1].reason.find("brick " + std::to_string(last)),
+              std::string::npos);
+    EXPECT_NE(image.rgba, whole.rgba);
+    if (first.empty()) first = image.rgba;
+    EXPECT_EQ(image.rgba, first) << threads;
+    EXPECT_GT(compareImages(image, whole).psnr_db, 15);
+  }
+
+  // With nothing to be read at all there is the background, and a report of every brick.
+  fs::resize_file(cache_->geometryPath(), 0);
+  FrameRenderer blind(*cache_, 0, function(), GetParam());
+  const Image empty = blind.render(camera("iso"), wanted, statistics);
+  EXPECT_EQ(statistics.bricks_unreadable.size(), statistics.bricks_drawn);
+  EXPECT_TRUE(std::all_of(empty.rgba.begin(), empty.rgba.end(), [](float value) { return value == 1; }));
+
+  // A brick in several parts is reported once.
+  bool in_parts = false;
+  for (uint64_t sixteenths = 4; sixteenths < 16; ++sixteenths) {
+    wanted.max_splats = splats * sixteenths / 16;
+    blind.render(camera("+x"), wanted, statistics);
+    const auto& failures = statistics.bricks_unreadable;
+    EXPECT_EQ(std::adjacent_find(failures.begin(), failures.end(),
+                                 [](const auto& a, const auto& b) { return a.brick == b.brick; }),
+              failures.end());
+    in_parts |= failures.size() < statistics.bricks_drawn;
+  }
+  EXPECT_TRUE(in_parts);
+}
+
+TEST_P(FrameStreamingTest, AFileThatShrinksEndsTheFrameWithItsBrick) {
+  FrameRenderer renderer(*cache_, 0, function(), GetParam());
+  fs::resize_file(cache_->valuesPath(0), fs::file_size(cache_->valuesPath(0)) / 3);
+  FrameStatistics statistics;
+  try {
+    renderer.render(camera("iso"), options(), statistics);
+    ADD_FAILURE() << "a brick was drawn that is not there";
+  } catch (const Error& error) {
+    const std::string message = error.what();
+    EXPECT_NE(message.find("brick "), std::string::npos) << message;
+    EXPECT_NE(message.find("var.0.bin"), std::string::npos) << message;
+    EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+  }
+  FrameOptions wanted = options();
+  wanted.keep_going = true;
+  EXPECT_NO_THROW(renderer.render(camera("iso"), wanted, statistics));
+  EXPECT_FALSE(statistics.bricks_unreadable.empty());
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,128 @@
+// What every painter must do, with each backend that there is.
+#include "render/painter.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "render/backend.h"
+#include "render/kernel.h"
+#include "tests/support/painted_splats.h"
+#include "tests/support/splat_compositor.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr glm::vec4 kWhite{1, 1, 1, 1};
+
+class PainterTest : public testing::TestWithParam<Backend> {
+ protected:
+  Image paint(std::span<const ScreenSplat> splats, const ClassificationTable& table, bool per_pixel,
+              ImageSize size, const glm::vec4& background = kWhite) {
+    Image image;
+    backend_->run(
+        [&](Painter& painter) { image = paintFrame(painter, splats, table, per_pixel, size, background); });
+    return image;
+  }
+
+  const std::unique_ptr<PaintingBackend> backend_ = makeBackend(GetParam());
+};
+
+INSTANTIATE_TEST_SUITE_P(Painters, PainterTest, testing::Values(Backend::cpu, Backend::osmesa),
+                         [](const auto& with) { return with.param == Backend::cpu ? "Cpu" : "OsMesa"; });
+
+TEST_P(PainterTest, DrawsOneSplatAsSpecified) {
+  const ImageSize size{48, 40};
+  const ScreenSplat splat{21.3f, 17.8f, 9.0f, -4.0f, 5.0f, 0.8f, 0.55f, 0.2f, -0.1f, 0.03f};
+  for (const bool per_pixel : {true, false}) {
+    const auto difference = compareImages(paint({&splat, 1}, lively(), per_pixel, size),
+                                          compositeSplats({&splat, 1}, lively(), per_pixel, size, kWhite));
+    EXPECT_GT(difference.psnr_db, 85) << "per pixel: " << per_pixel;
+  }
+}
+
+TEST_P(PainterTest, DrawsRandomSplatsAsSpecified) {
+  const ImageSize size{70, 50};
+  const glm::vec4 background(0.1f, 0.2f, 0.05f, 0.3f);
+  const auto splats = randomSplats(300, 7, size);
+  for (const bool per_pixel : {true, false})
+    for (const bool log_scale : {true, false})
+      for (const auto& table : {lively(log_scale), smooth(log_scale)}) {
+        const Image drawn = paint(splats, table, per_pixel, size, background);
+        const Image specified = compositeSplats(splats, table, per_pixel, size, background);
+        EXPECT_GT(compareImages(drawn, specified).psnr_db, 70)
+            << "per pixel: " << per_pixel << ", log: " << log_scale;
+        for (const int n : {0, 1234, 3499}) {
+          const auto alpha = static_cast<size_t>(4 * n + 3);
+          EXPECT_NEAR(drawn.rgba[alpha], specified.rgba[alpha], 1e-3);
+        }
+      }
+}
+
+TEST_P(PainterTest, TopOfTheImageIsTheFirstRow) {
+  const ScreenSplat splat{10, 3, 2, 0, 2, 1, 0.9f, 0, 0, 0};
+  const Image image = paint({&splat, 1}, lively(), false, {20, 20});
+  EXPECT_LT(image.pixel(10, 3)[2], 0.8f);
+  EXPECT_EQ(image.pixel(10, 16)[2], 1.0f);
+}
+
+TEST_P(PainterTest, BlendsNearerSplatsOverFartherOnes) {
+  const ClassificationTable table(
+      [](double f) {
+        return TransferFunction::Value{{f > 0.5, 0, f < 0.5}, 100};
+      },
+      0, 1);
+  const std::vector<ScreenSplat> splats{{10, 10, 4, 0, 4, 1, 0.2f, 0, 0, 0},
+                                        {10, 10, 4, 0, 4, 1, 0.8f, 0, 0, 0}};
+  const Image image = paint(splats, table, true, {20, 20});
+  EXPECT_NEAR(image.pixel(10, 10)[0], 1, 1e-5);
+  EXPECT_NEAR(image.pixel(10, 10)[2], 0, 1e-5);
+}
+
+TEST_P(PainterTest, KeepsVeryThinSplats) {
+  // Many layers whose optical depth a float next to 1 hardly tells from nothing.
+  const ClassificationTable table([](double) { return TransferFunction::Value{glm::dvec3(0.0), 1}; }, 0, 1);
+  std::mt19937 random(2);
+  std::uniform_real_distribution<float> amplitude(1e-5f, 3e-5f);
+  std::vector<ScreenSplat> splats;
+  double depth = 0;
+  for (int layer = 0; layer < 50000; ++layer) {
+    splats.push_back({2.5f, 2.5f, 1e4f, 0, 1e4f, amplitude(random), 0.5f, 0, 0, 0});
+    depth += splats.back().amplitude * footprint(0);
+  }
+  const Image image = paint(splats, table, true, {5, 5});
+  EXPECT_NEAR(image.pixel(2, 2)[0], std::exp(-depth), 2e-4);
+}
+
+TEST_P(PainterTest, DrawsTheSameTwice) {
+  const ImageSize size{200, 200};
+  const auto splats = randomSplats(2000, 3, size);
+  EXPECT_EQ(paint(splats, lively(), true, size).rgba, paint(splats, lively(), true, size).rgba);
+}
+
+TEST_P(PainterTest, DrawsFrameAfterFrame) {
+  const auto splats = randomSplats(100, 5, {64, 64});
+  std::vector<Image> images;
+  for (const int side : {64, 32, 64}) images.push_back(paint(splats, lively(), true, {side, side}));
+  EXPECT_EQ(images[0].rgba, images[2].rgba);
+  EXPECT_EQ(images[1].size.width, 32);
+}
+
+TEST_P(PainterTest, ForgetsAFrameThatWasNotEnded) {
+  const ImageSize size{40, 30};
+  const auto splats = randomSplats(50, 3, size);
+  const auto table = lively();
+  const Image empty = paint({}, table, true, size);
+  backend_->run([&](Painter& painter) {
+    painter.begin(size, kWhite, table, true);
+    painter.draw(splats);
+    painter.begin(size, kWhite, table, true);
+    EXPECT_EQ(painter.end().rgba, empty.rgba);
+  });
+}
+
+}  // namespace
+}  // namespace curvisplat

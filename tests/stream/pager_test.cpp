@@ -1,0 +1,305 @@
+#include "stream/pager.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <numeric>
+#include <random>
+#include <thread>
+#include <vector>
+
+#include "stream/cache_format.h"
+#include "stream/checksum.h"
+#include "stream/error.h"
+#include "stream/file.h"
+#include "tests/support/faulty_system_calls.h"
+#include "tests/support/random_cache.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::FaultySystemCalls;
+using Way = PagerOptions::Way;
+
+bool uringWorks() {
+  return makeUringReads(4) != nullptr;
+}
+
+PagerOptions optionsOf(Way way, bool direct, uint64_t buffer_bytes) {
+  PagerOptions options;
+  options.way = way;
+  options.direct = direct;
+  options.buffer_bytes = buffer_bytes;
+  return options;
+}
+
+class PagerTest : public ::testing::Test {
+ protected:
+  PagerTest() {
+    writeRandomCache(folder_ / "a.splats");
+    cache_ = std::make_unique<CacheReader>(folder_ / "a.splats");
+  }
+
+  uint32_t bricks() const { return static_cast<uint32_t>(cache_->bricks().size()); }
+  std::vector<uint32_t> inOrder() const {
+    std::vector<uint32_t> order(bricks());
+    std::iota(order.begin(), order.end(), 0u);
+    return order;
+  }
+
+  /// Whether these are the bytes of the brick: the index has their checksums.
+  static bool areOf(const CacheReader& cache, uint32_t brick, const PagedBrick& bytes) {
+    return bytes.readable() && checksumOf(bytes.geometry()) == cache.bricks()[brick].geometry.checksum &&
+           checksumOf(bytes.values()) == cache.brickVariables(0)[brick].values.checksum;
+  }
+
+  /// Takes all of `order` on some threads, and counts the bricks that came as they are.
+  static size_t takeAll(BrickPager& pager, const CacheReader& cache, const std::vector<uint32_t>& order,
+                        unsigned threads) {
+    pager.start(order);
+    std::atomic<size_t> next = 0, good = 0;
+    const auto work = [&] {
+      for (size_t n; (n = next++) < order.size();) {
+        const auto bytes = pager.take(n);
+        good += bytes && areOf(cache, order[n], *bytes);
+      }
+    };
+    std::vector<std::thread> team;
+    for (unsigned n = 1; n < threads; ++n) team.emplace_back(work);
+    work();
+    for (std::thread& thread : team) thread.join();
+    return good;
+  }
+
+  TemporaryFolder folder_;
+  std::unique_ptr<CacheReader> cache_;
+};
+
+TEST_F(PagerTest, BatchesBringEveryStreamOnce) {
+  std::mt19937_64 random(1);
+  for (int round = 0; round < 200; ++round) {
+    // Streams in file order, some touching, some far apart; asked for in any order.
+    std::vector<BrickExtents> bricks(1 + random() % 300);
+    uint64_t ends[kBrickStreams] = {0, 0};
+    for (BrickExtents& brick : bricks)
+      for (size_t stream = 0; stream < kBrickStreams; ++stream) {
+        brick[stream].length = static_cast<uint32_t>(1 + random() % (random() % 8 == 0 ? 300'000 : 9'000));
+        brick[stream].offset = streamOffset(ends[stream], brick[stream].length);
+        if (random() % 10 == 0) brick[stream].offset += random() % 200 * kPageBytes;
+        ends[stream] = brick[stream].offset + brick[stream].length;
+      }
+    std::shuffle(bricks.begin(), bricks.end(), random);
+    const uint64_t limit = 1 + random() % 2'000'000;
+    const ReadBatch batch = planBatch(bricks, limit);
+    ASSERT_GE(batch.bricks.size(), 1u);
+    ASSERT_LE(batch.bytes, batch.bricks.size() == 1 ? pagedBytes(bricks[0]) : 2 * limit);
+    uint64_t place = 0;
+    for (const BatchRead& read : batch.reads) {
+      ASSERT_EQ(read.offset % kPageBytes, 0u);
+      ASSERT_EQ(read.length % kPageBytes, 0u);
+      ASSERT_LE(read.needed, read.length);
+      ASSERT_GT(read.needed + kPageBytes, read.length);
+      ASSERT_EQ(read.place, place);
+      place += read.length;
+    }
+    ASSERT_EQ(place, batch.bytes);
+    for (size_t n = 0; n < batch.bricks.size(); ++n)
+      for (size_t stream = 0; stream < kBrickStreams; ++stream) {
+        const BatchRead& read = batch.reads.at(batch.bricks[n].read[stream]);
+        const Extent& extent = bricks[n][stream];
+        ASSERT_EQ(read.stream, stream);
+        ASSERT_GE(extent.offset, read.offset);
+        ASSERT_LE(extent.offset + extent.length, read.offset + read.needed);
+        ASSERT_EQ(batch.bricks[n].place[stream], read.place + extent.offset - read.offset);
+        ASSERT_LE(read.first, n);
+      }
+  }
+}
+
+TEST_F(PagerTest, NeighboursBecomeOneRead) {
+  std::vector<BrickExtents> bricks(16);
+  for (size_t n = 0; n < bricks.size(); ++n) {
+    bricks[n][0] = {n * 10 * kPageBytes, 9 * kPageBytes + 5, 0};
+    bricks[n][1] = {n * 1000, 1000, 0};
+  }
+  std::reverse(bricks.begin(), bricks.end());
+  const ReadBatch batch = planBatch(bricks, 1 << 20);
+  ASSERT_EQ(batch.bricks.size(), 16u);
+  ASSERT_EQ(batch.reads.size(), 2u);
+  EXPECT_EQ(batch.reads[0].length, 160 * kPageBytes);
+  EXPECT_EQ(batch.reads[1].length, 4 * kPageBytes);
+}
+
+TEST_F(PagerTest, ReadsTheSameBytesAsPlainReads) {
+  std::vector<fs::path> caches{folder_ / "a.splats"};
+  const fs::path in_memory = "/dev/shm/curvisplat_pager_test_" + std::to_string(::getpid());
+  if (fs::is_directory("/dev/shm")) {
+    fs::copy(caches[0], in_memory);
+    caches.push_back(in_memory);
+  }
+  for (const fs::path& path : caches) {
+    const CacheReader cache(path);
+    const uint64_t least = BrickPager::leastBufferBytes(cache, 0);
+    std::mt19937 random(2);
+    for (const Way way : {Way::io_uring, Way::threads})
+      for (const bool direct : {true, false})
+        for (const uint64_t buffer : {least, least + 5 * kPageBytes, uint64_t{2} << 20}) {
+          if (way == Way::io_uring && !uringWorks()) continue;
+          BrickPager pager(cache, 0, optionsOf(way, direct, buffer));
+          for (int round = 0; round < 3; ++round) {
+            std::vector<uint32_t> order(inOrder());
+            if (round > 0) std::shuffle(order.begin(), order.end(), random);
+            if (round > 1) order.insert(order.end(), order.begin(), order.begin() + 10);
+            EXPECT_EQ(takeAll(pager, cache, order, 1 + static_cast<unsigned>(round)), order.size())
+                << path << ' ' << pager.way() << ' ' << buffer;
+          }
+          const PagerStatistics statistics = pager.statistics();
+          EXPECT_LE(statistics.peak_bytes, pager.bufferBytes());
+          EXPECT_GE(statistics.bytes, 3 * fs::file_size(path / "geometry.bin"));
+          EXPECT_GT(statistics.requests, 0u);
+          EXPECT_GT(statistics.depth_s, 0);
+          EXPECT_EQ(statistics.bricks_unreadable, 0u);
+        }
+  }
+  fs::remove_all(in_memory);
+}
+
+TEST_F(PagerTest, JoinsReads) {
+  BrickPager pager(*cache_, 0, {});
+  EXPECT_EQ(takeAll(pager, *cache_, inOrder(), 1), bricks());
+  EXPECT_LT(pager.statistics().requests, bricks() / 2);
+}
+
+TEST_F(PagerTest, GoesThroughTheDoubleOfTheSystem) {
+  FaultySystemCalls faulty;
+  const ScopedSystemCalls scope(faulty);
+  BrickPager pager(*cache_, 0, {});
+  EXPECT_EQ(takeAll(pager, *cache_, inOrder(), 2), bricks());
+  EXPECT_GT(faulty.reads, 0);
+  EXPECT_NE(pager.way().find("pread on 8 threads"), std::string::npos) << pager.way();
+}
+
+TEST_F(PagerTest, CompletesShortAndInterruptedReads) {
+  for (const size_t largest : {size_t{4096}, size_t{777}, size_t{5000}}) {
+    FaultySystemCalls faulty;
+    faulty.largest_transfer = largest;
+    faulty.interrupt_every = 3;
+    const ScopedSystemCalls scope(faulty);
+    BrickPager pager(*cache_, 0, {});
+    EXPECT_EQ(takeAll(pager, *cache_, inOrder(), 2), bricks()) << largest;
+  }
+}
+
+TEST_F(PagerTest, GoesThroughThePageCacheWhereDirectReadsAreRefused) {
+  for (const bool at_open : {true, false}) {
+    FaultySystemCalls faulty;
+    (at_open ? faulty.refuse_direct_open : faulty.refuse_direct_reads) = true;
+    const ScopedSystemCalls scope(faulty);
+    BrickPager pager(*cache_, 0, {});
+    EXPECT_EQ(takeAll(pager, *cache_, inOrder(), 2), bricks());
+    EXPECT_NE(pager.way().find("page cache"), std::string::npos) << pager.way();
+  }
+}
+
+TEST_F(PagerTest, AFailingDiskMarksBricksAndHangsNobody) {
+  for (const int64_t at : {0, 1, 3}) {
+    FaultySystemCalls faulty;
+    faulty.fail_read_at = at;
+    faulty.error = EIO;
+    const ScopedSystemCalls scope(faulty);
+    BrickPager pager(*cache_, 0, optionsOf(Way::automatic, true, BrickPager::leastBufferBytes(*cache_, 0)));
+    EXPECT_LT(takeAll(pager, *cache_, inOrder(), 3), bricks());
+    EXPECT_GT(pager.statistics().bricks_unreadable, 0u);
+  }
+}
+
+TEST_F(PagerTest, StoppingWakesAllWhoWaitAndStartingBeginsAnew) {
+  std::mt19937 random(7);
+  for (const Way way : {Way::io_uring, Way::threads}) {
+    if (way == Way::io_uring && !uringWorks()) continue;
+    BrickPager pager(*cache_, 0, optionsOf(way, true, BrickPager::leastBufferBytes(*cache_, 0)));
+    for (int round = 0; round < 100; ++round) {
+      std::vector<uint32_t> order = inOrder();
+      std::shuffle(order.begin(), order.end(), random);
+      pager.start(order);
+      const size_t taken = random() % order.size();
+      std::thread other([&] {
+        // Never gets its turn: the buffer is too small for all that come before.
+        EXPECT_FALSE(pager.take(order.size() - 1));
+      });
+      {
+        std::vector<PagedBrick> held;
+        for (size_t n = 0; n < taken / 8; ++n) {
+          const auto bytes = pager.take(n);
+          ASSERT_TRUE(bytes && areOf(*cache_, order[n], *bytes)) << n;
+        }
+      }
+      pager.stop();
+      other.join();
+      EXPECT_FALSE(pager.take(0));
+    }
+    EXPECT_EQ(takeAll(pager, *cache_, inOrder(), 2), bricks());
+  }
+}
+
+TEST_F(PagerTest, AFileThatShrinksMarksWhatIsGone) {
+  const auto order = inOrder();
+  for (const Way way : {Way::io_uring, Way::threads}) {
+    if (way == Way::io_uring && !uringWorks()) continue;
+    BrickPager pager(*cache_, 0, optionsOf(way, true, 1 << 20));
+    ASSERT_EQ(takeAll(pager, *cache_, order, 2), bricks());
+    const uint64_t size = fs::file_size(cache_->geometryPath());
+    const std::string whole = [&] {
+      std::string bytes(size, '\0');
+      InputFile(cache_->geometryPath()).readAt(0, std::span(bytes.data(), bytes.size()));
+      return bytes;
+    }();
+    fs::resize_file(cache_->geometryPath(), size / 2);
+    pager.start(order);
+    for (size_t n = 0; n < order.size(); ++n) {
+      const Extent& extent = cache_->bricks()[order[n]].geometry;
+      const auto bytes = pager.take(n);
+      ASSERT_TRUE(bytes);
+      if (extent.offset + extent.length > size / 2) {
+        EXPECT_FALSE(bytes->readable()) << n;
+      }
+      EXPECT_TRUE(!bytes->readable() || areOf(*cache_, order[n], *bytes)) << n;
+    }
+    fs::resize_file(cache_->geometryPath(), 0);
+    OutputFile file(cache_->geometryPath());
+    file.append(std::as_bytes(std::span(whole)));
+    file.close();
+  }
+}
+
+TEST_F(PagerTest, LeavesOutWhatIsNotNeeded) {
+  const std::vector<uint32_t> order = inOrder();
+  for (const Way way : {Way::automatic, Way::threads})
+    for (const uint64_t buffer : {BrickPager::leastBufferBytes(*cache_, 0), uint64_t{64} << 20}) {
+      BrickPager pager(*cache_, 0, optionsOf(way, false, buffer));
+      const auto unneeded = [](uint32_t brick) { return brick % 3 == 1 || (brick > 20 && brick < 40); };
+      pager.start(order, unneeded);
+      uint64_t left_out = 0, bytes = 0;
+      for (const uint32_t brick : order) {
+        const std::optional<PagedBrick> paged = pager.take(brick);
+        ASSERT_TRUE(paged);
+        EXPECT_EQ(paged->isLeftOut(), unneeded(brick)) << brick;
+        EXPECT_EQ(areOf(*cache_, brick, *paged), !unneeded(brick)) << brick;
+        if (!unneeded(brick)) continue;
+        ++left_out;
+        bytes += cache_->bricks()[brick].geometry.length + cache_->brickVariables(0)[brick].values.length;
+      }
+      EXPECT_EQ(pager.statistics().bricks_left_out, left_out);
+      EXPECT_EQ(pager.statistics().bytes_left_out, bytes);
+      pager.start(order, [](uint32_t) { return true; });
+      for (const uint32_t brick : order) EXPECT_TRUE(pager.take(brick)->isLeftOut());
+      pager.start(order);  // and it is forgotten
+      for (const uint32_t brick : order) EXPECT_TRUE(areOf(*cache_, brick, *pager.take(brick)));
+    }
+}
+
+}  // namespace
+}  // namespace curvisplat

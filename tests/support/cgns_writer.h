@@ -1,0 +1,64 @@
+// Writes small CGNS files by libcgns' upper layer, the one that the programs of others write with (the reader
+// stands on the lower one). Values are functions of a node's place, so that tests know them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace curvisplat {
+
+enum class CgnsFileType { adf, hdf5 };
+enum class CgnsNumbers { single_precision, double_precision, integer };
+
+/// Of indices from 0 in the zone itself; negative, or beyond the zone, on rind planes.
+using CgnsFunction = std::function<double(int64_t i, int64_t j, int64_t k)>;
+using CgnsRind = std::array<int, 6>;  // planes before and behind along i, j, k
+
+struct CgnsWriterField {
+  std::string name;
+  CgnsFunction value;
+  CgnsNumbers numbers = CgnsNumbers::double_precision;
+};
+
+/// What follows on from a call is added to what that call began: a zone to the last base, a solution to the
+/// last zone.
+class CgnsWriter {
+ public:
+  CgnsWriter(const std::filesystem::path& path, CgnsFileType type);
+  ~CgnsWriter();  // closes the file
+  CgnsWriter(const CgnsWriter&) = delete;
+  CgnsWriter& operator=(const CgnsWriter&) = delete;
+
+  void base(const std::string& name, int cell_dimension = 3, int space_dimension = 3);
+  void family(const std::string& name);
+  void zone(const std::string& name, const std::array<int, 3>& nodes);
+  void unstructuredZone(const std::string& name);
+  /// `name`: "GridCoordinates" for the first.
+  void coordinates(const std::string& name, const std::vector<CgnsWriterField>& axes,
+                   const CgnsRind& rind = {});
+  /// `location`: Vertex, CellCenter, IFaceCenter.
+  void solution(const std::string& name, const std::string& location,
+                const std::vector<CgnsWriterField>& fields, const CgnsRind& rind = {});
+
+  /// Units of kilogram, meter, second, Kelvin, radian, for all of the base.
+  void dimensional();
+  /// The exponents of a field of the last solution; it is dimensionless if `exponents` are empty.
+  void fieldUnits(int field, const std::vector<float>& exponents);
+
+  void baseSteps(const std::vector<double>& times);
+  /// For each step the name of a solution and, unless `grids` is empty, of coordinates.
+  void zoneSteps(const std::vector<std::string>& solutions, const std::vector<std::string>& grids = {});
+
+ private:
+  void writeArray(const std::string& name, const CgnsWriterField& field, const std::array<int, 3>& values,
+                  const CgnsRind& rind);
+
+  int file_ = 0, base_ = 0, zone_ = 0, solution_ = 0;
+  std::array<int, 3> nodes_{};
+};
+
+}  // namespace curvisplat

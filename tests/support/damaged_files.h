@@ -1,0 +1,35 @@
+// Opens damaged copies of a file in processes of their own, so that a crash, a hang or a wish for too much
+// memory is counted and ends nothing.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "preprocess/grid_source.h"
+
+namespace curvisplat {
+
+/// How many of the copies ended how.
+struct DamageReport {
+  int same = 0, changed = 0;  // read; as the whole file, or with other values
+  int refused = 0;            // an Error of one line that names the file
+  /// What must not be: which copy, and how it ended.
+  std::vector<std::string> failures;
+  /// Crashes inside of a library that reads the format.
+  std::vector<std::string> library_crashes;
+};
+
+/// What is to be done with a copy: opens it as a grid.
+using OpenDamaged = std::function<std::unique_ptr<GridSource>(const std::filesystem::path& file)>;
+
+/// The first bytes of `file`, cut at `count` places all over it.
+DamageReport openTruncated(const std::filesystem::path& file, int count, const OpenDamaged& open);
+
+/// `count` copies of `file` with one byte changed, seeded.
+DamageReport openCorrupted(const std::filesystem::path& file, int count, uint64_t seed,
+                           const OpenDamaged& open);
+
+}  // namespace curvisplat

@@ -1,0 +1,36 @@
+// A display without a screen, and the hands and eyes of who sits before it: Xvfb, xdotool, xwd.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "render/image.h"
+#include "tests/support/run_program.h"
+
+namespace curvisplat {
+
+class VirtualDisplay {
+ public:
+  /// What is not installed of what it needs, or empty.
+  static std::string missing();
+
+  /// Starts it, and sets DISPLAY for programs to come; the destructor ends it.
+  explicit VirtualDisplay(ImageSize size);
+  ~VirtualDisplay();
+
+  /// xdotool's words: {"mousemove", "10", "20"}, {"key", "p"}. Throws where it fails.
+  void act(const std::vector<std::string>& words) const;
+  /// What is on the screen.
+  Image screenshot() const;
+
+ private:
+  std::string name_;  // ":1234"
+  std::unique_ptr<RunningProgram> server_;
+};
+
+/// Asks again and again until `holds` or `seconds` have passed; whether it held.
+bool eventually(const std::function<bool()>& holds, double seconds = 60);
+
+}  // namespace curvisplat

@@ -1,0 +1,112 @@
+#include "tools/viewer/camera_controls.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "render/screen_view.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr ImageSize kSize{300, 200};
+
+Camera cameraOf(Projection projection) {
+  Camera camera;
+  camera.position = {4, -3, 2};
+  camera.focal_point = {0.5, 0.25, -0.5};
+  camera.view_up = {0, 0, 1};
+  camera.projection = projection;
+  camera.parallel_scale = 1.7;
+  camera.view_angle_deg = 40;
+  return camera;
+}
+
+glm::dvec2 pixelOf(const Camera& camera, const glm::dvec3& point) {
+  const ScreenView view = ScreenView::of(camera, kSize, glm::dvec3(1), 1, 1e-6);
+  return view.pixelFromView(view.viewFromData(point));
+}
+
+void expectNear(const glm::dvec3& a, const glm::dvec3& b, double slack = 1e-9) {
+  EXPECT_LE(glm::length(a - b), slack)
+      << a.x << ' ' << a.y << ' ' << a.z << " is not " << b.x << ' ' << b.y << ' ' << b.z;
+}
+
+class CameraControls : public testing::TestWithParam<Projection> {
+ protected:
+  const Camera camera_ = cameraOf(GetParam());
+};
+INSTANTIATE_TEST_SUITE_P(, CameraControls,
+                         testing::Values(Projection::orthographic, Projection::perspective));
+
+TEST_P(CameraControls, APointAtTheFocalDepthFollowsThePan) {
+  const Camera after = panned(camera_, {31, -17}, kSize);
+  const glm::dvec2 movement = pixelOf(after, camera_.focal_point) - pixelOf(camera_, camera_.focal_point);
+  EXPECT_NEAR(movement.x, 31, 1e-9);
+  EXPECT_NEAR(movement.y, -17, 1e-9);
+}
+
+TEST_P(CameraControls, RotationKeepsDistanceAndFocalPoint) {
+  const Camera after = rotated(camera_, {40, 25}, kSize);
+  expectNear(after.focal_point, camera_.focal_point);
+  EXPECT_NEAR(glm::length(after.position - after.focal_point),
+              glm::length(camera_.position - camera_.focal_point), 1e-12);
+}
+
+TEST_P(CameraControls, RotationTurnsWhatIsInFrontWithTheMouse) {
+  const glm::dvec3 front = camera_.focal_point + 0.1 * (camera_.position - camera_.focal_point);
+  const glm::dvec2 before = pixelOf(camera_, front);
+  EXPECT_GT(pixelOf(rotated(camera_, {20, 0}, kSize), front).x, before.x + 1);
+  EXPECT_GT(pixelOf(rotated(camera_, {0, 20}, kSize), front).y, before.y + 1);
+}
+
+TEST_P(CameraControls, RotationGoesOverThePoleAndBack) {
+  Camera camera = camera_;
+  for (int n = 0; n < 36; ++n) camera = rotated(camera, {0, kSize.height * 10.0 / 200}, kSize);
+  expectNear(camera.position, camera_.position, 1e-9);
+}
+
+TEST_P(CameraControls, ZoomScalesTheFocalPlane) {
+  EXPECT_NEAR(unitsPerPixel(zoomed(camera_, 2), kSize), unitsPerPixel(camera_, kSize) / 2, 1e-15);
+}
+
+TEST_P(CameraControls, TheOtherProjectionKeepsTheFocalPlane) {
+  const Camera other = withOtherProjection(camera_);
+  EXPECT_NE(other.projection, camera_.projection);
+  EXPECT_NEAR(unitsPerPixel(other, kSize), unitsPerPixel(camera_, kSize), 1e-15);
+  EXPECT_NEAR(unitsPerPixel(withOtherProjection(other), kSize), unitsPerPixel(camera_, kSize), 1e-15);
+}
+
+TEST_P(CameraControls, RefittingShowsAllOfTheBox) {
+  const glm::dvec3 lower(-10, 2, 3), upper(20, 5, 9);
+  const Camera camera = refitted(camera_, lower, upper, kSize);
+  for (int n = 0; n < 8; ++n) {
+    const glm::dvec2 pixel =
+        pixelOf(camera, {n & 1 ? upper.x : lower.x, n & 2 ? upper.y : lower.y, n & 4 ? upper.z : lower.z});
+    EXPECT_GE(pixel.x, 0);
+    EXPECT_GE(pixel.y, 0);
+    EXPECT_LE(pixel.x, kSize.width);
+    EXPECT_LE(pixel.y, kSize.height);
+  }
+  expectNear(glm::normalize(camera.focal_point - camera.position),
+             glm::normalize(camera_.focal_point - camera_.position));
+}
+
+TEST_P(CameraControls, FlyingMovesAlongTheView) {
+  const Camera after = flown(camera_, {0, 0, 2});
+  expectNear(after.position - camera_.position, 2.0 * glm::normalize(camera_.focal_point - camera_.position));
+  expectNear(after.focal_point - after.position, camera_.focal_point - camera_.position);
+}
+
+TEST(CameraLooking, TurnsOnTheSpotByTheViewAngle) {
+  const Camera camera = cameraOf(Projection::perspective);
+  const Camera after = looking(camera, {0, static_cast<double>(kSize.height)}, kSize);
+  expectNear(after.position, camera.position);
+  const double cosine = glm::dot(glm::normalize(after.focal_point - after.position),
+                                 glm::normalize(camera.focal_point - camera.position));
+  EXPECT_NEAR(std::acos(cosine) * 180 / 3.14159265358979, camera.view_angle_deg, 1e-6);
+}
+
+}  // namespace
+}  // namespace curvisplat

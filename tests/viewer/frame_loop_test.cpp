@@ -1,0 +1,182 @@
+#include "tools/viewer/frame_loop.h"
+
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+
+#include "preprocess/convert.h"
+#include "preprocess/scenes.h"
+#include "stream/error.h"
+#include "stream/progress.h"
+#include "tests/support/reference_march.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+class FrameLoopTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    const SceneGridSource scene(makeScene("half-annulus"), {128, 64, 64});
+    ConvertOptions options;
+    options.output = *folder_ / "scene.splats";
+    options.scalars = {0};
+    options.memory_bytes = 512 << 20;
+    Progress progress;
+    convert(scene, options, progress);
+  }
+  static void TearDownTestSuite() { folder_.reset(); }
+
+  static FrameRequest requestOf(double parallel_scale = 1.25) {
+    FrameRequest request{0, 1, TransferFunction::preset("viridis", 0, 1, 0.05), halfAnnulusCamera(), {}};
+    request.camera.parallel_scale = parallel_scale;
+    request.options.size = {160, 120};
+    request.options.lod_pixels = 0.3;
+    return request;
+  }
+
+  /// Waits for the loop's next word.
+  void wait() {
+    std::unique_lock lock(mutex_);
+    woken_.wait(lock, [this] { return wakes_ > 0; });
+    wakes_ = 0;
+  }
+  std::function<void()> waker() {
+    return [this] {
+      const std::lock_guard lock(mutex_);
+      ++wakes_;
+      woken_.notify_all();
+    };
+  }
+  /// Frames until the loop rests.
+  std::vector<ShownFrame> all(FrameLoop& loop) {
+    std::vector<ShownFrame> frames;
+    while (true) {
+      const bool busy = loop.busy();
+      while (auto frame = loop.take()) frames.push_back(std::move(*frame));
+      if (!busy) return frames;
+      wait();
+    }
+  }
+
+  static std::unique_ptr<TemporaryFolder> folder_;
+  const CacheReader cache_{*folder_ / "scene.splats"};
+  std::mutex mutex_;
+  std::condition_variable woken_;
+  int wakes_ = 0;
+};
+std::unique_ptr<TemporaryFolder> FrameLoopTest::folder_;
+
+TEST_F(FrameLoopTest, RefinesToThePictureThatRenderDraws) {
+  FrameLoop loop(cache_, Backend::cpu, waker());
+  const FrameRequest request = requestOf();
+  const uint64_t number = loop.request(request);
+  const std::vector<ShownFrame> frames = all(loop);
+  ASSERT_FALSE(frames.empty());
+  EXPECT_TRUE(frames.back().is_final);
+  EXPECT_EQ(frames.back().request, number);
+  FrameRenderer renderer(cache_, 0, request.function, Backend::cpu);
+  FrameStatistics statistics;
+  EXPECT_EQ(frames.back().image.rgba, renderer.render(request.camera, request.options, statistics).rgba);
+}
+
+TEST_F(FrameLoopTest, AMovingPictureIsOneAndCoarse) {
+  FrameLoop loop(cache_, Backend::cpu, waker());
+  FrameRequest request = requestOf();
+  request.moving = true;
+  loop.request(request);
+  const std::vector<ShownFrame> frames = all(loop);
+  ASSERT_EQ(frames.size(), 1u);
+  EXPECT_FALSE(frames[0].is_final);
+  EXPECT_LE(frames[0].statistics.splats_read, 100'000u);
+  EXPECT_EQ(frames[0].image.size.width, 160);
+}
+
+TEST_F(FrameLoopTest, TheNewestRequestCounts) {
+  FrameLoop loop(cache_, Backend::cpu, waker());
+  uint64_t newest = 0;
+  for (int n = 0; n < 50; ++n) newest = loop.request(requestOf(1 + 0.01 * n));
+  const std::vector<ShownFrame> frames = all(loop);
+  ASSERT_FALSE(frames.empty());
+  EXPECT_EQ(frames.back().request, newest);
+  EXPECT_TRUE(frames.back().is_final);
+}
+
+TEST_F(FrameLoopTest, AnotherFunctionChangesThePicture) {
+  FrameLoop loop(cache_, Backend::cpu, waker());
+  FrameRequest request = requestOf();
+  loop.request(request);
+  const Image viridis = all(loop).back().image;
+  request.function = TransferFunction::preset("inferno", 0, 1, 0.05);
+  request.function_version = 2;
+  loop.request(request);
+  const Image inferno = all(loop).back().image;
+  EXPECT_NE(viridis.rgba, inferno.rgba);
+  FrameRenderer renderer(cache_, 0, request.function, Backend::cpu);
+  FrameStatistics statistics;
+  EXPECT_EQ(inferno.rgba, renderer.render(request.camera, request.options, statistics).rgba);
+}
+
+TEST_F(FrameLoopTest, TooLittleMemoryEndsTheRequestOnly) {
+  FrameLoop loop(cache_, Backend::cpu, waker());
+  FrameRequest request = requestOf();
+  request.options.memory_bytes = 1 << 20;
+  loop.request(request);
+  EXPECT_THROW(all(loop), UsageError);
+  request.options.memory_bytes = 512 << 20;
+  loop.request(request);
+  EXPECT_TRUE(all(loop).back().is_final);
+}
+
+TEST_F(FrameLoopTest, ADamagedCacheEndsTheLoop) {
+  const std::filesystem::path copy = *folder_ / "copy.splats";
+  std::filesystem::copy(*folder_ / "scene.splats", copy);
+  const CacheReader reader(copy);
+  std::filesystem::resize_file(copy / "geometry.bin", 100);
+  FrameLoop loop(reader, Backend::cpu, waker());
+  loop.request(requestOf());
+  EXPECT_THROW(all(loop), Error);
+  EXPECT_FALSE(loop.busy());
+  EXPECT_THROW(loop.take(), Error);
+}
+
+TEST_F(FrameLoopTest, EndsInTheMiddleOfAPicture) {
+  for (int n = 0; n < 20; ++n) {
+    FrameLoop loop(cache_, Backend::cpu, waker());
+    loop.request(requestOf());
+    if (n % 2) wait();
+  }
+}
+
+TEST(Effort, LearnsFromTime) {
+  Effort effort(1000);
+  const uint64_t first = effort.splats();
+  effort.learn(0.2, 0.1, false);
+  EXPECT_EQ(effort.splats(), first / 2);
+  effort.learn(0.01, 0.1, false);
+  EXPECT_EQ(effort.splats(), first);
+  effort.learn(0.01, 0.1, true);  // there are no more splats to draw
+  EXPECT_EQ(effort.splats(), first);
+  EXPECT_EQ(effort.detailPixels(), 0);
+}
+
+TEST(Effort, TakesFewerPixelsWhereFewerSplatsDoNotHelp) {
+  Effort effort(1000);
+  const uint64_t first = effort.splats();
+  effort.learn(0.4, 0.1, true);
+  EXPECT_EQ(effort.splats(), first);
+  EXPECT_DOUBLE_EQ(effort.detailPixels(), 4);  // a quarter of the pixels
+  effort.learn(0.05, 0.1, true);
+  effort.learn(0.05, 0.1, true);
+  EXPECT_EQ(effort.detailPixels(), 0);
+  for (int n = 0; n < 100; ++n) effort.learn(100, 0.1, false);
+  EXPECT_EQ(effort.splats(), 1000u);
+  EXPECT_EQ(effort.detailPixels(), 16);
+}
+
+}  // namespace
+}  // namespace curvisplat

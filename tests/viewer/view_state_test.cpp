@@ -1,0 +1,111 @@
+#include "tools/viewer/view_state.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "stream/error.h"
+
+namespace curvisplat {
+namespace {
+
+Manifest manifest() {
+  Manifest made;
+  made.lower = {0, 0, 0};
+  made.upper = {2, 1, 1};
+  made.variables = {{0, "density", "kg/m3", 0.5, 3}, {1, "u v", "", -1, 1}};
+  return made;
+}
+
+ViewState changedState() {
+  ViewState state = firstViewOf(manifest(), {300, 200});
+  chooseVariable(state, manifest(), "u v");
+  state.camera.position = {0.1, -3, 2.0 / 3};
+  state.function.addPoint(0.3, 0.7);
+  state.lod_pixels = 2.5;
+  state.scale = {1, 1, 50};
+  state.clip_box = WorldBox{{0, -0.5, 0.25}, {1, 1, 1}};
+  state.dark = true;
+  state.annotations.axes = false;
+  state.classification = Classification::flat;
+  return state;
+}
+
+TEST(ViewState, ComesBackFromItsText) {
+  const std::string text = toJson(changedState());
+  const auto before = nlohmann::json::parse(text).flatten();
+  const auto after = nlohmann::json::parse(toJson(viewStateFromJson(text, "a.json", manifest()))).flatten();
+  ASSERT_EQ(before.size(), after.size());
+  for (const auto& [field, value] : before.items()) {
+    ASSERT_TRUE(after.contains(field)) << field;
+    if (value.is_number())
+      EXPECT_NEAR(value.get<double>(), after.at(field).get<double>(), 1e-12)
+          << field;  // moved to 0..1 and back
+    else
+      EXPECT_EQ(value, after.at(field)) << field;
+  }
+}
+
+TEST(ViewState, APresetStaysOne) {
+  ViewState state = firstViewOf(manifest(), {300, 200});
+  state.function.setRange(1, 2);
+  const ViewState again = viewStateFromJson(toJson(state), "a.json", manifest());
+  EXPECT_EQ(again.function.preset(), "viridis");
+  EXPECT_EQ(again.function.range(), std::pair(1.0, 2.0));
+}
+
+TEST(ViewState, ErrorsNameFileAndField) {
+  const auto expectError = [](const char* pointer, const nlohmann::json& value, const std::string& word) {
+    nlohmann::json json = nlohmann::json::parse(toJson(changedState()));
+    json[nlohmann::json::json_pointer(pointer)] = value;
+    try {
+      viewStateFromJson(json.dump(), "a.json", manifest());
+      ADD_FAILURE() << "no error for " << pointer << " = " << value;
+    } catch (const Error& error) {
+      const std::string what = error.what();
+      EXPECT_NE(what.find("a.json"), std::string::npos) << what;
+      EXPECT_NE(what.find(word), std::string::npos) << what;
+    }
+  };
+  expectError("/curvisplat_view", 2, "curvisplat_view");
+  expectError("/variable", "pressure", "variable");
+  expectError("/variable", 3, "variable");
+  expectError("/camera/position", nlohmann::json::array({1, 2}), "camera.position");
+  expectError("/camera/view_angle", 180, "camera.view_angle");
+  expectError("/camera/parallel_scale", -1, "camera.parallel_scale");
+  expectError("/camera", nullptr, "camera");
+  expectError("/scale", nlohmann::json::array({1, 1, 0}), "scale");
+  expectError("/clip_box/lower", nlohmann::json::array({5, 0, 0}), "clip_box.lower");
+  expectError("/dark", "yes", "dark");
+  expectError("/function", 5, "preset");
+  expectError("/preset", "rainbow", "preset");
+  expectError("/memory_bytes", -1, "memory_bytes");
+  EXPECT_THROW(viewStateFromJson("{", "a.json", manifest()), Error);
+  EXPECT_THROW(viewStateFromJson("[]", "a.json", manifest()), Error);
+}
+
+TEST(ViewState, VariablesKeepTheFunctionOverTheirOwnRange) {
+  ViewState state = firstViewOf(manifest(), {300, 200});
+  EXPECT_EQ(state.function.range(), std::pair(0.5, 3.0));
+  ASSERT_TRUE(state.function.setLogScale(true));
+  chooseVariable(state, manifest(), "u v");
+  EXPECT_EQ(state.function.range(), std::pair(-1.0, 1.0));
+  EXPECT_FALSE(state.function.logScale());
+  EXPECT_THROW(chooseVariable(state, manifest(), "w"), UsageError);
+}
+
+TEST(ViewState, TheCommandSaysAll) {
+  ViewState state = firstViewOf(manifest(), {300, 200});
+  EXPECT_EQ(renderCommand(state, "a b.splats", {300, 200}, "f.json").substr(0, 109),
+            "curvisplat render 'a b.splats' -o picture.png --size 300x200 --scalar density --tf viridis "
+            "--range 0.5,3 --op");
+  const std::string command = renderCommand(changedState(), "it's.splats", {30, 20}, "f.json");
+  for (const char* part :
+       {"'it'\\''s.splats'", "--scalar 'u v'", "--tf f.json", "--scale 1,1,50",
+        "--clip-box 0,1,-0.5,1,0.25,1", "--background black", "--classify flat", "--lod-pixels 2.5",
+        "--scalar-bar --outline", "--position 0.1,-3,0.6666666666666666"})
+    EXPECT_NE(command.find(part), std::string::npos) << command << " lacks " << part;
+}
+
+}  // namespace
+}  // namespace curvisplat

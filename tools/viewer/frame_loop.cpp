@@ -1,0 +1,167 @@
+#include "tools/viewer/frame_loop.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "stream/error.h"
+#include "stream/thread_name.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kRefinement = 4;  // times the splats of the picture before
+
+/// What the coarsest bricks have.
+uint64_t coarsestSplats(const CacheReader& cache) {
+  uint64_t splats = 0;
+  for (const Brick& brick : cache.bricks())
+    if (brick.parent == kNoBrick) splats += brick.splats;
+  return splats;
+}
+
+}  // namespace
+
+// Slower than wanted: fewer splats, as long as that helps, then fewer pixels. Faster: the other way round.
+void Effort::learn(double seconds, double target, bool complete) {
+  const double factor = std::clamp(target / std::max(seconds, 1e-6), 0.25, 2.0);
+  const bool splats_help = !complete && splats_ > least_;
+  if (factor < 1 && !splats_help)
+    reduction_ = std::min(kMostReduction, reduction_ / std::sqrt(factor));
+  else if (factor > 1 && reduction_ > 1)
+    reduction_ = std::max(1.0, reduction_ / std::sqrt(factor));
+  else if (factor < 1 || !complete)
+    splats_ = std::clamp(static_cast<uint64_t>(static_cast<double>(splats_) * factor), least_,
+                         std::max(least_, kMost));
+}
+
+/// What the loop's thread keeps from request to request.
+struct FrameLoop::Drawing {
+  explicit Drawing(uint64_t coarsest) : effort(coarsest) {}
+
+  std::unique_ptr<FrameRenderer> renderer;  // of one variable
+  size_t variable = 0;
+  uint64_t function_version = 0;
+  Effort effort;
+};
+
+FrameLoop::FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake)
+    : cache_(cache), backend_(backend), wake_(std::move(wake)), thread_([this] { loop(); }) {}
+
+FrameLoop::~FrameLoop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+    if (drawing_) drawing_->cancel();
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+uint64_t FrameLoop::request(FrameRequest request) {
+  const std::lock_guard lock(mutex_);
+  waiting_ = std::move(request);
+  if (drawing_ && may_give_up_) drawing_->cancel();
+  changed_.notify_all();
+  return ++newest_;
+}
+
+std::optional<ShownFrame> FrameLoop::take() {
+  const std::lock_guard lock(mutex_);
+  if (failure_) std::rethrow_exception(ended_ ? failure_ : std::exchange(failure_, nullptr));
+  // A frame that was just about to begin when its request was superseded has not heard of it.
+  if (waiting_ && drawing_ && may_give_up_) drawing_->cancel();
+  return std::exchange(shown_, std::nullopt);
+}
+
+bool FrameLoop::busy() const {
+  const std::lock_guard lock(mutex_);
+  return !ended_ && (waiting_ || serving_);
+}
+
+std::string FrameLoop::backendName() const {
+  const std::lock_guard lock(mutex_);
+  return backend_name_;
+}
+
+bool FrameLoop::superseded(uint64_t number) const {
+  const std::lock_guard lock(mutex_);
+  return stopping_ || number != newest_;
+}
+
+void FrameLoop::publish(ShownFrame frame) {
+  {
+    const std::lock_guard lock(mutex_);
+    shown_ = std::move(frame);
+  }
+  wake_();
+}
+
+void FrameLoop::loop() {
+  nameThisThread("frames");
+  Drawing drawing(coarsestSplats(cache_));
+  std::unique_lock lock(mutex_);
+  while (true) {
+    changed_.wait(lock, [this] { return waiting_ || stopping_; });
+    if (stopping_) return;
+    const FrameRequest request = *std::exchange(waiting_, std::nullopt);
+    const uint64_t number = newest_;
+    serving_ = true;
+    lock.unlock();
+    std::exception_ptr failure;
+    bool ends = false;
+    try {
+      serve(drawing, request, number);
+    } catch (const Cancelled&) {
+    } catch (const UsageError&) {
+      failure = std::current_exception();
+    } catch (...) {
+      failure = std::current_exception();
+      ends = true;
+    }
+    lock.lock();
+    serving_ = false;
+    drawing_ = nullptr;
+    if (failure) failure_ = failure;
+    ended_ = ends;
+    lock.unlock();
+    wake_();
+    if (ends) return;
+    lock.lock();
+  }
+}
+
+void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t number) {
+  if (!drawing.renderer || drawing.variable != request.variable) {
+    drawing.renderer.reset();  // its memory goes before there is another
+    drawing.renderer = std::make_unique<FrameRenderer>(cache_, request.variable, request.function, backend_);
+    drawing.variable = request.variable;
+  } else if (drawing.function_version != request.function_version) {
+    drawing.renderer->setTransferFunction(request.function);
+  }
+  drawing.function_version = request.function_version;
+  FrameRenderer& renderer = *drawing.renderer;
+  {
+    const std::lock_guard lock(mutex_);
+    drawing_ = &renderer;
+    may_give_up_ = !request.moving;
+    backend_name_ = renderer.backendName();
+  }
+
+  Effort& effort = drawing.effort;
+  const double detail_px = request.moving ? effort.detailPixels() : 0;
+  for (uint64_t splats = effort.splats();; splats *= kRefinement) {
+    ShownFrame frame;
+    frame.request = number;
+    frame.image = renderer.renderQuickly(request.camera, request.options,
+                                         {.max_splats = splats, .detail_px = detail_px}, frame.statistics,
+                                         frame.is_final);
+    if (request.moving)
+      effort.learn(frame.statistics.total_s, request.target_s, frame.statistics.splats_read < splats / 2);
+    const bool is_final = frame.is_final;
+    publish(std::move(frame));
+    if (is_final || request.moving || superseded(number)) return;
+  }
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,98 @@
+#include "tools/viewer/navigation.h"
+
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "tools/viewer/camera_controls.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr double kRestAfter_s = 0.2;        // without movement
+constexpr double kWheelFactor = 1.1;        // a notch
+constexpr double kDragFactor = 1.01;        // a pixel
+constexpr double kWheelFlight = 0.02;       // diagonals of the data a notch
+constexpr double kFlightDiagonals_s = 0.2;  // diagonals of the data a second
+
+}  // namespace
+
+bool Navigation::isMoving() const {
+  return holds_ || (moved_at_s_ >= 0 && ImGui::GetTime() - moved_at_s_ < kRestAfter_s);
+}
+
+bool Navigation::update(Window& window, Camera& camera, ImageSize size) {
+  const bool moved = drag(window, camera, size) | (flies_ && fly(window, camera));
+  if (moved) moved_at_s_ = ImGui::GetTime();
+  return moved;
+}
+
+bool Navigation::drag(Window& window, Camera& camera, ImageSize size) {
+  bool moved = false;
+  if (const double notches = window.takeWheel(); notches != 0) {
+    if (flies_)
+      camera = flown(camera, {0, 0, notches * kWheelFlight * glm::length(upper_ - lower_)});
+    else
+      camera = zoomed(camera, std::pow(kWheelFactor, notches));
+    moved = true;
+  }
+  for (const Window::Drag& drag : window.takeDrags()) {
+    if (drag.button == GLFW_MOUSE_BUTTON_MIDDLE || (drag.button == GLFW_MOUSE_BUTTON_LEFT && drag.shift))
+      camera = panned(camera, drag.movement, size);
+    else if (drag.button == GLFW_MOUSE_BUTTON_RIGHT)
+      camera = zoomed(camera, std::pow(kDragFactor, -drag.movement.y));
+    else if (drag.button == GLFW_MOUSE_BUTTON_LEFT)
+      camera = flies_ ? looking(camera, drag.movement, size) : rotated(camera, drag.movement, size);
+    moved = true;
+  }
+  holds_ = window.isDragging();
+  return moved;
+}
+
+bool Navigation::fly(const Window& window, Camera& camera) {
+  const auto towards = [&](int plus, int minus) {
+    return static_cast<double>(window.isDown(plus)) - static_cast<double>(window.isDown(minus));
+  };
+  const glm::dvec3 direction(towards(GLFW_KEY_D, GLFW_KEY_A), towards(GLFW_KEY_E, GLFW_KEY_Q),
+                             towards(GLFW_KEY_W, GLFW_KEY_S));
+  if (direction == glm::dvec3(0.0)) return false;
+  const double passed_s = std::min(0.1, static_cast<double>(ImGui::GetIO().DeltaTime));
+  camera = flown(camera, passed_s * kFlightDiagonals_s * glm::length(upper_ - lower_) * direction);
+  return true;
+}
+
+bool Navigation::press(const Window::Key& key, Camera& camera, ImageSize size) {
+  if (key.control) return false;
+  const auto along = [&](const char* plus, const char* minus) {
+    camera = Camera::named(key.shift ? minus : plus, lower_, upper_, size, camera.projection,
+                           camera.view_angle_deg);
+    return true;
+  };
+  switch (key.code) {
+    case GLFW_KEY_R:
+      camera = refitted(camera, lower_, upper_, size);
+      return true;
+    case GLFW_KEY_X:
+      return along("+x", "-x");
+    case GLFW_KEY_Y:
+      return along("+y", "-y");
+    case GLFW_KEY_Z:
+      return along("+z", "-z");
+    case GLFW_KEY_O:
+      camera = withOtherProjection(camera);
+      flies_ = flies_ && camera.projection == Projection::perspective;
+      return true;
+    case GLFW_KEY_F:
+      flies_ = !flies_;
+      if (flies_ && camera.projection == Projection::orthographic) camera = withOtherProjection(camera);
+      return true;
+    default:
+      return false;
+  }
+}
+
+}  // namespace curvisplat

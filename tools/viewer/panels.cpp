@@ -1,0 +1,170 @@
+#include "tools/viewer/panels.h"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "stream/process_usage.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr double kMiB = 1 << 20;
+
+void row(const char* name, const std::string& value) {
+  ImGui::TableNextRow();
+  ImGui::TableNextColumn();
+  ImGui::TextUnformatted(name);
+  ImGui::TableNextColumn();
+  ImGui::TextUnformatted(value.c_str());
+}
+
+std::string milliseconds(double seconds) {
+  return fmt::format("{:.1f} ms", 1000 * seconds);
+}
+
+std::string count(uint64_t number) {
+  if (number < 10'000) return fmt::format("{}", number);
+  if (number < 10'000'000) return fmt::format("{:.1f} k", static_cast<double>(number) / 1e3);
+  return fmt::format("{:.1f} M", static_cast<double>(number) / 1e6);
+}
+
+}  // namespace
+
+float Panels::width() {
+  constexpr float kFontSize = 13;  // of Dear ImGui's own font; a frame need not have begun
+  return 26 * kFontSize * ImGui::GetIO().FontGlobalScale;
+}
+
+PanelWishes Panels::draw(ViewState& state, size_t variable, const PanelFacts& facts) {
+  PanelWishes wishes;
+  ImGui::SetNextWindowPos({0, 0});
+  ImGui::SetNextWindowSize({width(), ImGui::GetIO().DisplaySize.y});
+  constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
+                                      ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoSavedSettings;
+  ImGui::Begin("curvisplat", nullptr, kFixed);
+  ImGui::PushItemWidth(0.62f * ImGui::GetContentRegionAvail().x);
+  if (ImGui::BeginCombo("scalar", state.variable.c_str())) {
+    for (const VariableInfo& one : cache_.manifest().variables) {
+      const bool chosen = one.name == state.variable;
+      if (!ImGui::Selectable(scalarTitle(one.name, one.unit).c_str(), chosen) || chosen) continue;
+      chooseVariable(state, cache_.manifest(), one.name);
+      wishes.changed = true;
+    }
+    ImGui::EndCombo();
+  }
+  // A variable that was chosen just now is drawn from the next frame on.
+  if (cache_.manifest().variables[variable].name == state.variable)
+    wishes.changed |= function_.draw(state.function, variable);
+  wishes.dragging |= function_.isDragging();
+  if (ImGui::CollapsingHeader("View", ImGuiTreeNodeFlags_DefaultOpen)) drawView(state, wishes, facts);
+  if (ImGui::CollapsingHeader("Detail", ImGuiTreeNodeFlags_DefaultOpen)) drawDetail(state, wishes);
+  if (ImGui::CollapsingHeader("Clip box")) drawClipBox(state, wishes);
+  if (ImGui::CollapsingHeader("Statistics", ImGuiTreeNodeFlags_DefaultOpen)) drawStatistics(state, facts);
+  if (!facts.said.empty()) ImGui::TextWrapped("%s", facts.said.c_str());
+  ImGui::PopItemWidth();
+  ImGui::End();
+  return wishes;
+}
+
+void Panels::drawView(ViewState& state, PanelWishes& wishes, const PanelFacts& facts) {
+  if (ImGui::Button("all (r)")) wishes.reset_camera = true;
+  ImGui::SameLine();
+  const bool perspective = state.camera.projection == Projection::perspective;
+  if (ImGui::Button(perspective ? "orthographic (o)" : "perspective (o)")) wishes.other_projection = true;
+  ImGui::SameLine();
+  if (ImGui::Button(facts.flies ? "orbit (f)" : "fly (f)")) wishes.toggle_flight = true;
+  if (perspective) {
+    float angle = static_cast<float>(state.camera.view_angle_deg);
+    if (ImGui::SliderFloat("view angle", &angle, 10, 120, "%.0f deg")) {
+      state.camera.view_angle_deg = static_cast<double>(angle);
+      wishes.changed = true;
+    }
+  }
+  wishes.changed |= ImGui::Checkbox("scalar bar", &state.annotations.scalar_bar);
+  ImGui::SameLine();
+  wishes.changed |= ImGui::Checkbox("axes", &state.annotations.axes);
+  ImGui::SameLine();
+  wishes.changed |= ImGui::Checkbox("outline", &state.annotations.outline);
+  ImGui::SameLine();
+  wishes.changed |= ImGui::Checkbox("dark", &state.dark);
+  if (ImGui::Button("save picture (p)")) wishes.save_picture = true;
+  ImGui::SameLine();
+  if (ImGui::Button("copy command (c)")) wishes.copy_command = true;
+}
+
+void Panels::drawDetail(ViewState& state, PanelWishes& wishes) {
+  float lod = static_cast<float>(state.lod_pixels);
+  if (ImGui::SliderFloat("error, pixels", &lod, 0, 16, "%.2f", ImGuiSliderFlags_Logarithmic)) {
+    state.lod_pixels = static_cast<double>(lod);
+    wishes.changed = true;
+  }
+  wishes.dragging |= ImGui::IsItemActive();
+  int mebibytes = static_cast<int>(static_cast<double>(state.memory_bytes) / kMiB);
+  if (ImGui::SliderInt("memory, MiB", &mebibytes, 64, 65536, "%d", ImGuiSliderFlags_Logarithmic))
+    state.memory_bytes = static_cast<uint64_t>(mebibytes) << 20;
+  wishes.changed |= ImGui::IsItemDeactivatedAfterEdit();
+  bool per_pixel = state.classification == Classification::pixel;
+  if (ImGui::Checkbox("classify every pixel", &per_pixel)) {
+    state.classification = per_pixel ? Classification::pixel : Classification::flat;
+    wishes.changed = true;
+  }
+}
+
+void Panels::drawClipBox(ViewState& state, PanelWishes& wishes) {
+  const Manifest& manifest = cache_.manifest();
+  bool on = state.clip_box.has_value();
+  if (ImGui::Checkbox("clip", &on)) {
+    if (on)
+      state.clip_box = WorldBox{manifest.lower, manifest.upper};
+    else
+      state.clip_box.reset();
+    wishes.changed = true;
+  }
+  if (!state.clip_box) return;
+  for (int axis = 0; axis < 3; ++axis) {
+    constexpr std::array<const char*, 3> kNames{"x", "y", "z"};
+    const float lowest = static_cast<float>(manifest.lower[axis]);
+    const float highest = static_cast<float>(manifest.upper[axis]);
+    float lower = static_cast<float>(state.clip_box->lower[axis]);
+    float upper = static_cast<float>(state.clip_box->upper[axis]);
+    if (ImGui::DragFloatRange2(kNames[static_cast<size_t>(axis)], &lower, &upper, (highest - lowest) / 500,
+                               lowest, highest, "%.4g", "%.4g", ImGuiSliderFlags_AlwaysClamp)) {
+      state.clip_box->lower[axis] = static_cast<double>(lower);
+      state.clip_box->upper[axis] = static_cast<double>(std::max(lower, upper));
+      wishes.changed = true;
+    }
+    wishes.dragging |= ImGui::IsItemActive();
+  }
+}
+
+void Panels::drawStatistics(const ViewState& state, const PanelFacts& facts) {
+  if (!ImGui::BeginTable("statistics", 2, ImGuiTableFlags_SizingFixedFit)) return;
+  row("picture", !facts.statistics ? "none yet"
+                 : facts.is_final  ? "final"
+                 : facts.busy      ? "refining"
+                                   : "coarse");
+  if (const FrameStatistics* s = facts.statistics) {
+    row("frame", milliseconds(s->total_s));
+    row("plan", milliseconds(s->plan_s));
+    row("read, decode",
+        fmt::format("{}, {}", milliseconds(s->read_s), milliseconds(s->verify_s + s->decode_s)));
+    row("project, sort", fmt::format("{}, {}", milliseconds(s->project_s), milliseconds(s->sort_s)));
+    row("upload, draw", fmt::format("{}, {}", milliseconds(s->upload_s), milliseconds(s->draw_s)));
+    row("splats", fmt::format("{} drawn of {}", count(s->splats_drawn), count(s->splats_read)));
+    row("bricks", fmt::format("{} drawn, {} in memory", count(s->bricks_drawn), count(s->bricks_cached)));
+    const double mebibytes = static_cast<double>(s->bytes_read) / kMiB;
+    row("read",
+        fmt::format("{:.1f} MiB, {:.0f} MiB/s", mebibytes, s->total_s > 0 ? mebibytes / s->total_s : 0));
+    row("error", fmt::format("{:.2f} pixels", s->largest_error_px));
+  }
+  row("memory",
+      fmt::format("{:.0f} of data, {:.0f} MiB in all", static_cast<double>(state.memory_bytes) / kMiB,
+                  static_cast<double>(ProcessUsage::now().peak_memory_bytes) / kMiB));
+  row("drawn by", facts.backend);
+  ImGui::EndTable();
+}
+
+}  // namespace curvisplat

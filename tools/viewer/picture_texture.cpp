@@ -1,0 +1,41 @@
+#include "tools/viewer/picture_texture.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "stream/error.h"
+
+namespace curvisplat {
+
+PictureTexture::PictureTexture(const GlFunctions& gl) : gl_(gl) {
+  gl_.GenTextures(1, &texture_);
+  gl_.BindTexture(GL_TEXTURE_2D, texture_);
+  gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+}
+
+PictureTexture::~PictureTexture() {
+  gl_.DeleteTextures(1, &texture_);
+}
+
+void PictureTexture::set(const Image& opaque) {
+  std::vector<uint8_t> bytes(opaque.rgba.size());
+  std::transform(opaque.rgba.begin(), opaque.rgba.end(), bytes.begin(), [](float channel) {
+    return static_cast<uint8_t>(std::clamp(channel, 0.0f, 1.0f) * 255 + 0.5f);
+  });
+  set(bytes, opaque.size);
+}
+
+void PictureTexture::set(std::span<const uint8_t> rgba, ImageSize size) {
+  CURVISPLAT_CHECK_OP(rgba.size(), ==,
+                      size_t{4} * static_cast<size_t>(size.width) * static_cast<size_t>(size.height));
+  gl_.BindTexture(GL_TEXTURE_2D, texture_);
+  gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, size.width, size.height, 0, GL_RGBA, GL_UNSIGNED_BYTE,
+                 rgba.data());
+  gl_.check("showing a picture");
+  size_ = size;
+}
+
+}  // namespace curvisplat
