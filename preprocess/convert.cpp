@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 
+#include "preprocess/block_overlap.h"
 #include "preprocess/bucket_file.h"
 #include "preprocess/bucket_tree.h"
 #include "preprocess/build_octree.h"
@@ -128,6 +129,8 @@ class Conversion {
   void scan() {
     splats_.survey = surveyGrid(reader_, plan_.slab_bytes, progress_);
     openWriter();
+    const std::vector<BlockOverlap> overlaps = findOverlaps(source_, plan_.slab_bytes, progress_);
+    if (!overlaps.empty()) report_.warnings.push_back(overlapWarning(source_.description(), overlaps));
   }
 
   void count() {
@@ -230,6 +233,7 @@ class Conversion {
     manifest.blanked_nodes = splats_.survey.blanked.total();
     manifest.variables = variables();
     StepInfo step;
+    if (!description.times.empty()) step.time = description.times[description.time_step];
     for (const VariableInfo& variable : manifest.variables) step.variables.push_back(variable.number);
     manifest.steps = {step};
     return manifest;

@@ -97,6 +97,7 @@ void DerivedSource::describe() {
     if (flow.block < freestream_mach_.size() && freestream_mach_[flow.block] == 0)
       freestream_mach_[flow.block] = flow.mach;
   const size_t of_source = description_.scalars.size();
+  if (inputs_.density) description_.scalars[*inputs_.density].function = 100;
   for (const QuantityInfo& quantity : flowQuantities()) {
     if (!offers(quantity)) continue;
     // What the files hold under that name is not computed; it is what the number means.

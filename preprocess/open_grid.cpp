@@ -8,6 +8,8 @@
 
 #include "preprocess/cgns_source.h"
 #include "preprocess/foreign_formats.h"
+#include "preprocess/netcdf_source.h"
+#include "preprocess/plot3d_meta.h"
 #include "preprocess/plot3d_source.h"
 #include "preprocess/scalar_names.h"
 #include "preprocess/time_steps.h"
@@ -32,7 +34,9 @@ std::unique_ptr<GridSource> openAs(const OpenGridOptions& options) {
 constexpr GridFormat kFormats[] = {
     {isVtkXml, openVtkXml},
     {isVtkLegacy, openVtkLegacy},
-    {CgnsFile::recognises, openAs<CgnsSource>},
+    {isPlot3dMeta, openPlot3dMeta},
+    {CgnsFile::recognises, openAs<CgnsSource>},  // before NetCDF, which takes all HDF5 files
+    {NetcdfFile::recognises, openAs<NetcdfSource>},
 };
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {

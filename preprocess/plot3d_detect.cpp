@@ -189,7 +189,7 @@ class Detection {
   /// What the file would be without the options, or as another kind.
   std::string hint() const {
     Plot3dCandidates others = candidates_;
-    others.kinds = {Plot3dKind::grid, Plot3dKind::q, Plot3dKind::function};
+    others.kinds = {Plot3dKind::grid, Plot3dKind::q, Plot3dKind::overflow, Plot3dKind::function};
     others.force = {};
     const Plot3dFits found = fitPlot3d(others);
     for (const Plot3dFit& fit : found.fits)
@@ -217,7 +217,8 @@ DetectedPlot3d detectPlot3dSolution(std::shared_ptr<const InputFile> file, const
                                     const std::filesystem::path& temporary_folder,
                                     const std::filesystem::path& grid_path,
                                     const std::vector<Plot3dBlock>& grid_blocks) {
-  return Detection(std::move(file), force, temporary_folder, {Plot3dKind::q, Plot3dKind::function})
+  return Detection(std::move(file), force, temporary_folder,
+                   {Plot3dKind::q, Plot3dKind::overflow, Plot3dKind::function})
       .run(&grid_path, &grid_blocks);
 }
 

@@ -13,6 +13,10 @@ namespace {
 // Half of a second-level cache: bytes are converted before they leave it.
 constexpr size_t kBufferBytes = size_t{256} << 10;
 
+// OVERFLOW's parameters: Mach, alpha, Reynolds, time, gamma, beta, T of the freestream | an integer | three
+// total enthalpies, gas constants, Mach, and two of turbulence.
+constexpr size_t kBeforeInteger = 7, kBehindInteger = 6;
+
 std::span<std::byte> threadBuffer() {
   thread_local std::vector<std::byte> buffer(kBufferBytes);
   return buffer;
@@ -107,18 +111,41 @@ void Plot3dFile::readIblank(uint32_t block, const NodeBox& box, std::span<int32_
   readIntegers(block, box, out);
 }
 
+/// The numbers before a block's values, without the integer among OVERFLOW's.
+std::vector<double> Plot3dFile::parameters(uint32_t block) const {
+  const Plot3dLayout& layout = fit_.layout;
+  CURVISPLAT_CHECK(layout.kind == Plot3dKind::q || layout.kind == Plot3dKind::overflow);
+  const bool overflow = layout.kind == Plot3dKind::overflow;
+  const auto width = static_cast<size_t>(layout.precision_bytes);
+  const size_t before = overflow ? kBeforeInteger : 4;
+  const size_t behind = overflow ? kBehindInteger + std::max(2u, fit_.species) : 0;
+  const size_t integer = overflow ? 4 : 0;
+  const uint64_t begin = fit_.blocks[block].values_offset - ((before + behind) * width + integer);
+  std::vector<double> values(before + behind);
+  const auto read = [&](uint64_t offset, std::span<double> to) {
+    std::vector<std::byte> bytes(to.size() * width);
+    fit_.payload.readAt(offset, bytes);
+    const bool swap = layout.byte_order != kMachineByteOrder;
+    if (width == 8)
+      convertStored<double>(bytes.data(), to.size(), swap, to.data());
+    else
+      convertStored<float>(bytes.data(), to.size(), swap, to.data());
+  };
+  read(begin, std::span(values).first(before));
+  read(begin + before * width + integer, std::span(values).subspan(before));
+  return values;
+}
+
 FlowConditions Plot3dFile::conditions(uint32_t block) const {
-  CURVISPLAT_CHECK(fit_.layout.kind == Plot3dKind::q);
-  const auto width = static_cast<size_t>(fit_.layout.precision_bytes);
-  std::array<std::byte, 32> bytes;
-  fit_.payload.readAt(fit_.blocks[block].values_offset - 4 * width, std::span(bytes).first(4 * width));
-  std::array<double, 4> values;
-  const bool swap = fit_.layout.byte_order != kMachineByteOrder;
-  if (width == 8)
-    convertStored<double>(bytes.data(), 4, swap, values.data());
-  else
-    convertStored<float>(bytes.data(), 4, swap, values.data());
-  return {"", block, values[0], values[1], values[2], values[3]};
+  const std::vector<double> values = parameters(block);
+  // OVERFLOW's first Mach number is what the solution is normalised by; the freestream's comes third last.
+  const double freestream = fit_.layout.kind == Plot3dKind::overflow ? values[values.size() - 3] : 0;
+  return {"", block, freestream > 0 ? freestream : values[0], values[1], values[2], values[3]};
+}
+
+double Plot3dFile::freestreamGamma() const {
+  CURVISPLAT_CHECK(fit_.layout.kind == Plot3dKind::overflow);
+  return parameters(0)[4];
 }
 
 }  // namespace curvisplat

@@ -29,10 +29,14 @@ class Plot3dFile {
   void readBlank(uint32_t block, const NodeBox& box, std::span<uint8_t> out) const;
   /// The iblank values as they are. For statistics and plausibility.
   void readIblank(uint32_t block, const NodeBox& box, std::span<int32_t> out) const;
-  /// Mach, alpha, Reynolds number and time of a Q file, without the file's name.
+  /// Mach, alpha, Reynolds number and time of a Q file (OVERFLOW's too), without the file's name.
   FlowConditions conditions(uint32_t block) const;
+  uint32_t species() const { return fit_.species; }
+  /// Ratio of specific heats of the freestream in an OVERFLOW file.
+  double freestreamGamma() const;
 
  private:
+  std::vector<double> parameters(uint32_t block) const;
   template <typename Convert>
   void readRanges(uint32_t block, const NodeBox& box, uint64_t array_offset, uint64_t width,
                   const Convert& convert) const;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "preprocess/plot3d_header.h"
@@ -11,9 +12,16 @@
 namespace curvisplat {
 namespace {
 
-/// Mach, alpha, Reynolds number and time come before the values of a Q file's block.
-uint64_t conditionBytes(const Plot3dLayout& layout) {
-  return layout.kind == Plot3dKind::q ? 4u * static_cast<uint64_t>(layout.precision_bytes) : 0;
+/// Mach, alpha, Reynolds number and time come before the values of a Q file's block; before those of an
+/// OVERFLOW file, thirteen numbers, one integer, and a gas constant for each of at least two species.
+uint64_t conditionBytes(const Plot3dLayout& layout, uint32_t species) {
+  const auto precision = static_cast<uint64_t>(layout.precision_bytes);
+  if (layout.kind == Plot3dKind::overflow) return (13 + std::max(2u, species)) * precision + 4;
+  return layout.kind == Plot3dKind::q ? 4 * precision : 0;
+}
+
+bool hasConditions(const Plot3dLayout& layout) {
+  return layout.kind == Plot3dKind::q || layout.kind == Plot3dKind::overflow;
 }
 
 uint64_t valueBytes(const Plot3dLayout& layout, uint64_t nodes, uint32_t components) {
@@ -58,7 +66,7 @@ std::vector<std::vector<uint64_t>> hopRecords(PayloadFile& payload, const Plot3d
                                               const std::vector<Plot3dBlock>& blocks) {
   std::vector<std::vector<uint64_t>> records(blocks.size());
   for (size_t b = 0; b < blocks.size(); ++b) {
-    const size_t count = layout.kind == Plot3dKind::q ? 2 : 1;
+    const size_t count = hasConditions(layout) ? 2 : 1;
     for (size_t r = 0; r < count; ++r) {
       try {
         records[b].push_back(payload.nextRecord());
@@ -103,13 +111,13 @@ void fitRecords(const std::vector<Plot3dLayout>& layouts, PayloadFile payload, c
   }
   bool fits = false;
   for (const Plot3dLayout& layout : layouts) {
-    Plot3dFit fit{layout, payload, header.blocks, header.components, payload.bytesBehind()};
+    Plot3dFit fit{layout, payload, header.blocks, header.components, payload.bytesBehind(), header.species};
     uint64_t offset = header.bytes;
     bool exact = true;
     for (size_t b = 0; b < header.blocks.size(); ++b) {
       exact &= records[b].back() == valueBytes(layout, header.blocks[b].nodes(), header.components);
-      if (layout.kind == Plot3dKind::q) exact &= records[b].front() == conditionBytes(layout);
-      offset += conditionBytes(layout);
+      if (hasConditions(layout)) exact &= records[b].front() == conditionBytes(layout, header.species);
+      offset += conditionBytes(layout, header.species);
       fit.blocks[b].values_offset = offset;
       offset += records[b].back();
     }
@@ -126,7 +134,7 @@ void fitSize(const std::vector<Plot3dLayout>& layouts, const PayloadFile& payloa
   const auto expected = [&](const Plot3dLayout& layout) {
     uint64_t bytes = header.bytes;
     for (const Plot3dBlock& block : header.blocks)
-      bytes += conditionBytes(layout) + valueBytes(layout, block.nodes(), header.components);
+      bytes += conditionBytes(layout, header.species) + valueBytes(layout, block.nodes(), header.components);
     return bytes;
   };
   bool fits = false;
@@ -134,10 +142,10 @@ void fitSize(const std::vector<Plot3dLayout>& layouts, const PayloadFile& payloa
     const uint64_t bytes = expected(layout);
     const uint64_t most_trailing = layout.two_dimensional ? 0 : bytes / 8;
     if (payload.size() < bytes || payload.size() - bytes > most_trailing) continue;
-    Plot3dFit fit{layout, payload, header.blocks, header.components, payload.size() - bytes};
+    Plot3dFit fit{layout, payload, header.blocks, header.components, payload.size() - bytes, header.species};
     uint64_t offset = header.bytes;
     for (Plot3dBlock& block : fit.blocks) {
-      block.values_offset = offset + conditionBytes(layout);
+      block.values_offset = offset + conditionBytes(layout, header.species);
       offset = block.values_offset + valueBytes(layout, block.nodes(), header.components);
     }
     found.fits.push_back(std::move(fit));
@@ -188,6 +196,7 @@ Plot3dFits fitPlot3d(const Plot3dCandidates& candidates) {
         layout.multi_block = multi_block;
         layout.two_dimensional = two_dimensional;
         if (candidates.ascii) {
+          if (kind == Plot3dKind::overflow) continue;
           layout.ascii = true;
           layout.byte_order = kMachineByteOrder;
           layout.precision_bytes = 8;
@@ -198,6 +207,8 @@ Plot3dFits fitPlot3d(const Plot3dCandidates& candidates) {
           if (force.byte_order.value_or(order) != order) continue;
           for (const auto records : {RecordMarkers::none, RecordMarkers::bytes4, RecordMarkers::bytes8}) {
             if (force.records.value_or(records) != records) continue;
+            // OVERFLOW is a Fortran program.
+            if (kind == Plot3dKind::overflow && records == RecordMarkers::none) continue;
             layout.byte_order = order;
             layout.records = records;
             fitHeader(candidates, layout, found);

@@ -19,8 +19,9 @@ struct Plot3dFit {
   Plot3dLayout layout;
   PayloadFile payload;
   std::vector<Plot3dBlock> blocks;
-  uint32_t components = 3;  // grid 3, Q 5, function file its variables
+  uint32_t components = 3;  // grid 3, Q 5, OVERFLOW and function files their own
   uint64_t trailing_bytes = 0;
+  uint32_t species = 0;  // of an OVERFLOW file
 };
 
 /// Why a layout does not fit, and how far it did: of all of them the furthest tells most of the file.

@@ -71,9 +71,6 @@ std::string explainDimensionRecord(const Plot3dLayout& layout, uint64_t blocks, 
   if (layout.two_dimensional) return "";
   if (layout.kind == Plot3dKind::function && bytes == 12 * blocks)
     return "; the number of variables is missing";
-  if (layout.kind == Plot3dKind::q && bytes == 12 * blocks + 8)
-    return "; that is a Q file as OVERFLOW writes it, which is not read: convert it to a plain Q or function "
-           "file";
   return "";
 }
 
@@ -94,6 +91,19 @@ uint64_t checkedNodes(const Plot3dLayout& layout, const int64_t* dimensions, uin
   return nodes;
 }
 
+/// How many quantities and how many species a node of an OVERFLOW file has.
+void readQuantities(const std::vector<int64_t>& numbers, uint64_t nodes_left, uint64_t file_size,
+                    Plot3dHeader& header) {
+  const int64_t quantities = numbers[0], species = numbers[1];
+  const uint64_t nodes = file_size - nodes_left;
+  if (quantities < 5 || static_cast<uint64_t>(quantities) > file_size / nodes || species < 0 ||
+      species > quantities)
+    throw LayoutMisfit{LayoutMisfit::first_record,
+                       fmt::format("{} quantities of {} species are impossible", quantities, species)};
+  header.components = static_cast<uint32_t>(quantities);
+  header.species = static_cast<uint32_t>(species);
+}
+
 }  // namespace
 
 Plot3dHeader readPlot3dHeader(PayloadFile& payload, const Plot3dLayout& layout, uint64_t file_size) {
@@ -101,14 +111,16 @@ Plot3dHeader readPlot3dHeader(PayloadFile& payload, const Plot3dLayout& layout, 
   const uint64_t count = readBlockCount(reader, layout, file_size);
   const uint64_t axes = layout.two_dimensional ? 2 : 3;
   const uint64_t numbers = axes + (layout.kind == Plot3dKind::function ? 1 : 0);
-  if (const auto bytes = reader.record(); bytes && *bytes != 4 * numbers * count) {
+  const uint64_t overall = layout.kind == Plot3dKind::overflow ? 2 : 0;  // nq and nqc
+  if (const auto bytes = reader.record(); bytes && *bytes != 4 * (numbers * count + overall)) {
     const std::string explanation = explainDimensionRecord(layout, count, *bytes);
-    throw LayoutMisfit{
-        explanation.empty() ? LayoutMisfit::first_record : LayoutMisfit::known_structure,
-        fmt::format("the dimension record has {} bytes where {} block{} of a {} need {}{}", *bytes, count,
-                    count == 1 ? "" : "s", inWords(layout.kind), 4 * numbers * count, explanation)};
+    throw LayoutMisfit{explanation.empty() ? LayoutMisfit::first_record : LayoutMisfit::known_structure,
+                       fmt::format("the dimension record has {} bytes where {} block{} of a {} need {}{}",
+                                   *bytes, count, count == 1 ? "" : "s", inWords(layout.kind),
+                                   4 * (numbers * count + overall), explanation)};
   }
   const std::vector<int64_t> dimensions = reader.integers(numbers * count);
+  const std::vector<int64_t> quantities = reader.integers(overall);
 
   Plot3dHeader header;
   header.components = static_cast<uint32_t>(layout.kind == Plot3dKind::q ? axes + 2 : axes);
@@ -130,6 +142,7 @@ Plot3dHeader readPlot3dHeader(PayloadFile& payload, const Plot3dLayout& layout, 
                                                                b + 1, variables, header.components)};
     header.components = static_cast<uint32_t>(variables);
   }
+  if (layout.kind == Plot3dKind::overflow) readQuantities(quantities, nodes_left, file_size, header);
   header.bytes = reader.offset();
   return header;
 }

@@ -24,7 +24,8 @@ struct LayoutMisfit {
 
 struct Plot3dHeader {
   std::vector<Plot3dBlock> blocks;  // without offsets
-  uint32_t components = 3;          // grid 3, Q 5, function file its variables; 2-D: 2 and 4
+  uint32_t components = 3;          // grid 3, Q 5, OVERFLOW and function files their own; 2-D: 2 and 4
+  uint32_t species = 0;             // of an OVERFLOW file
   uint64_t bytes = 0;               // of the payload
 };
 

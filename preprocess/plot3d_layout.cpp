@@ -10,6 +10,8 @@ std::string inWords(Plot3dKind kind) {
       return "grid";
     case Plot3dKind::q:
       return "Q solution";
+    case Plot3dKind::overflow:
+      return "OVERFLOW Q solution";
     case Plot3dKind::function:
       break;
   }

@@ -2,7 +2,8 @@
 //
 //   grid       [blocks] dims(ni nj nk) x blocks, then per block   x... y... z... [iblank...]
 //   Q          [blocks] dims(ni nj nk) x blocks, then per block   mach alpha re time | 5 components
-//   function   [blocks] dims(ni nj nk nvar) x blocks, then per block   nvar components
+//   OVERFLOW   [blocks] dims(ni nj nk) x blocks nq nqc, then per block   15 or more parameters | nq
+//   components function   [blocks] dims(ni nj nk nvar) x blocks, then per block   nvar components
 //
 // i is fastest. Fortran writes each of: the block count, all dims, the four conditions, a block's values, as
 // one record. "Whole" format only: the rarer "planes" format has a record for each k.
@@ -17,7 +18,7 @@ namespace curvisplat {
 
 enum class ByteOrder { little, big };
 enum class RecordMarkers { none, bytes4, bytes8 };
-enum class Plot3dKind { grid, q, function };
+enum class Plot3dKind { grid, q, overflow, function };
 
 /// What the user says of a layout; the rest is detected.
 struct Plot3dForce {
@@ -50,7 +51,7 @@ struct Plot3dBlock {
   uint64_t nodes() const { return ni * nj * nk; }
 };
 
-/// "grid", "Q solution", "function file".
+/// "grid", "Q solution", "OVERFLOW Q solution", "function file".
 std::string inWords(Plot3dKind kind);
 /// "big-endian, C (no record markers), single precision, one block, no iblank"; the options that force it use
 /// the same words.

@@ -40,7 +40,7 @@ std::vector<std::string> variableNames(const std::filesystem::path& path) {
 }  // namespace
 
 Plot3dSource::Plot3dSource(const OpenGridOptions& options)
-    : grid_path_(options.grid), grid_(openGridFile(options)) {
+    : grid_path_(options.grid), function_names_(options.function_names), grid_(openGridFile(options)) {
   for (const std::filesystem::path& path : options.solutions) addSolution(path, options);
   makeNamesUnique();
 }
@@ -65,8 +65,9 @@ void Plot3dSource::addSolution(const std::filesystem::path& path, const OpenGrid
   describe(path, file);
   for (uint32_t component = 0; component < file.components(); ++component)
     components_.push_back({solutions_.size(), component});
-  if (file.layout().kind == Plot3dKind::q) {
+  if (file.layout().kind != Plot3dKind::function) {
     description_.scalars.insert(description_.scalars.end(), qScalars().begin(), qScalars().end());
+    if (file.layout().kind == Plot3dKind::overflow) addOverflowScalars(file);
     for (uint32_t block = 0; block < file.blocks().size(); ++block) {
       description_.flow.push_back(file.conditions(block));
       description_.flow.back().file = path.string();
@@ -78,12 +79,31 @@ void Plot3dSource::addSolution(const std::filesystem::path& path, const OpenGrid
   solution_paths_.push_back(path);
 }
 
+/// What an OVERFLOW file has behind the five of every Q file.
+void Plot3dSource::addOverflowScalars(const Plot3dFile& file) {
+  const auto add = [&](std::string name) {
+    GridScalar scalar;
+    scalar.name = std::move(name);
+    description_.scalars.push_back(std::move(scalar));
+  };
+  if (const double gamma = file.freestreamGamma(); gamma > 1 && gamma < 10) description_.gas.gamma = gamma;
+  if (file.components() == 5) return;
+  add("gamma");
+  for (uint32_t n = 6; n < file.components(); ++n)
+    add(n - 6 < file.species() ? fmt::format("species_{}", n - 5)
+                               : fmt::format("turbulence_{}", n - 5 - file.species()));
+  description_.warnings.push_back(
+      fmt::format("{}: gamma differs from node to node; derived quantities take one for all, --gamma",
+                  description_.files.back()));
+}
+
 void Plot3dSource::addFunctionNames(const std::filesystem::path& path, const Plot3dFile& file) {
   std::filesystem::path names_path = path;
   names_path.replace_extension(".nam");
-  std::vector<std::string> names;
-  if (std::filesystem::exists(names_path)) {
-    names = variableNames(names_path);
+  std::vector<std::string> names = function_names_;
+  if (!names.empty()) names_path = path;
+  if (names.empty() && std::filesystem::exists(names_path)) names = variableNames(names_path);
+  if (!names.empty()) {
     if (names.size() != file.components())
       description_.warnings.push_back(fmt::format("{}: has {} names for the {} variables of {}",
                                                   names_path.string(), names.size(), file.components(),

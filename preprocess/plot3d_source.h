@@ -7,7 +7,8 @@
 
 namespace curvisplat {
 
-/// Q files offer density, momentum_x, momentum_y, momentum_z and energy; function files the names of their
+/// Q files offer density, momentum_x, momentum_y, momentum_z and energy, those of OVERFLOW also gamma,
+/// species_1, ... and turbulence_1, ...; function files the names of their
 /// .nam file (beside them, one a line), else the numbers of their variables. Names that two files share are
 /// written FILE:NAME, FILE being the file's stem.
 class Plot3dSource final : public GridSource {
@@ -27,12 +28,14 @@ class Plot3dSource final : public GridSource {
 
   Plot3dFile openGridFile(const OpenGridOptions& options);
   void addSolution(const std::filesystem::path& path, const OpenGridOptions& options);
+  void addOverflowScalars(const Plot3dFile& file);
   void addFunctionNames(const std::filesystem::path& path, const Plot3dFile& file);
   void describe(const std::filesystem::path& path, const Plot3dFile& file);
   void makeNamesUnique();
 
   GridDescription description_;
   std::filesystem::path grid_path_;
+  std::vector<std::string> function_names_;
   Plot3dFile grid_;
   std::vector<Plot3dFile> solutions_;
   std::vector<std::filesystem::path> solution_paths_;

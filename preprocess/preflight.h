@@ -18,6 +18,14 @@ DiskNeeds diskNeeds(uint64_t nodes, size_t variables);
 /// The same for adding variables to a cache of so many splats.
 DiskNeeds diskNeedsOfAdding(uint64_t splats, size_t variables);
 
+/// What conversion with one scalar takes, as a rule of thumb from grids that were measured: it differs with
+/// the grid's shape, the scalar and the machine.
+struct ConversionEstimate {
+  uint64_t cache_bytes = 0, bytes_per_further_scalar = 0;
+  double seconds = 0;
+};
+ConversionEstimate estimateConversion(uint64_t splats, unsigned threads);
+
 /// Throws Error if something stands at `output` that may not be replaced, or if its folder or
 /// `temporary_folder` is missing or not writable. Changes nothing.
 void checkOutput(const std::filesystem::path& output, bool overwrite,

@@ -27,6 +27,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 struct InfoOptions {
+  GasModel gas;
   OpenGridOptions grid;  // grid.grid is the cache where that is a folder
   bool json = false;
   bool verify = false;
@@ -188,7 +189,7 @@ void printInfo(const InfoOptions& options) {
   if (options.verify || !options.point.empty())
     throw UsageError("{}: --verify and --probe are for caches, and this is not a folder",
                      options.grid.grid.string());
-  printGridInfo(options.grid, options.json);
+  printGridInfo(options.grid, {options.gas, std::nullopt}, options.json);
 }
 
 }  // namespace
@@ -206,6 +207,7 @@ void addInfo(CLI::App& app) {
       ->delimiter(',')
       ->expected(3);
   addGridOptions(*info, options->grid);
+  addGasOptions(*info, options->gas);
   info->callback([options] { printInfo(*options); });
 }
 

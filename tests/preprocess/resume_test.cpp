@@ -74,7 +74,11 @@ class Resume : public ::testing::Test {
   void setUp(const GridSource& grid) {
     Progress progress;
     writePlot3d(grid, folder_ / "in", progress);
-    source_ = openGrid({grid_, {function_}, folder_.path(), {}});
+    OpenGridOptions options;
+    options.grid = grid_;
+    options.solutions = {function_};
+    options.temporary_folder = folder_.path();
+    source_ = openGrid(options);
     work_ = folder_ / "work";
     fs::remove_all(work_);
     fs::create_directory(work_);

@@ -1,0 +1,113 @@
+// Blocks in one another are found with their volume, and blocks side by side are not.
+#include "preprocess/block_overlap.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+
+#include "preprocess/open_grid.h"
+#include "tests/support/function_grid.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kSlabBytes = 200'000;
+
+std::vector<BlockOverlap> overlapsIn(const GridSource& source, uint64_t slab_bytes = kSlabBytes) {
+  return findOverlaps(source, slab_bytes, Progress());
+}
+
+/// Boxes of even nodes: from `lower`, `size` long along each axis.
+struct TestBox {
+  glm::dvec3 lower, size;
+  uint64_t n;
+};
+FunctionGridSource boxes(const std::vector<TestBox>& all, glm::dmat3 turn = glm::dmat3(1.0)) {
+  std::vector<GridBlock> blocks;
+  for (const TestBox& box : all) {
+    blocks.push_back(gridBlock(box.n, box.n + 1, box.n + 2));
+    blocks.back().name = "box " + std::to_string(blocks.size());
+  }
+  return {blocks, 0, [=](const GridNode& node) {
+            const TestBox& box = all[node.block];
+            const auto n = static_cast<double>(box.n);
+            const glm::dvec3 u(node.i / (n - 1), node.j / n, node.k / (n + 1));
+            return NodeValues{turn * (box.lower + u * box.size), {}, false};
+          }};
+}
+
+TEST(BlockOverlap, IsFoundWithItsVolume) {
+  const glm::dmat3 turn(0.8, 0.6, 0, -0.6, 0.8, 0, 0, 0, 1);
+  const auto source =
+      boxes({{{0, 0, 0}, {2, 2, 2}, 24}, {{1.5, 0.5, 0}, {2, 2, 2}, 31}, {{9, 9, 9}, {1, 1, 1}, 5}}, turn);
+  const auto overlaps = overlapsIn(source);
+  ASSERT_EQ(overlaps.size(), 1u);
+  EXPECT_EQ(overlaps[0].first, 0u);
+  EXPECT_EQ(overlaps[0].second, 1u);
+  EXPECT_NEAR(overlaps[0].volume, 0.5 * 1.5 * 2, 0.15);
+  EXPECT_NEAR(overlaps[0].share, overlaps[0].volume / 8, 0.01);
+  const std::string warning = overlapWarning(source.description(), overlaps);
+  EXPECT_NE(warning.find("box 1 and box 2"), std::string::npos) << warning;
+  EXPECT_EQ(warning.find("box 3"), std::string::npos) << warning;
+  // However it is read.
+  EXPECT_EQ(overlapsIn(source, 20'000)[0].volume, overlaps[0].volume);
+}
+
+TEST(BlockOverlap, OfASmallBlockWithinACellIsItsOwnVolume) {
+  const auto overlaps = overlapsIn(boxes({{{0, 0, 0}, {100, 100, 100}, 4}, {{40, 40, 40}, {1, 1, 1}, 9}}));
+  ASSERT_EQ(overlaps.size(), 1u);
+  EXPECT_NEAR(overlaps[0].volume, 1, 0.05);
+  EXPECT_NEAR(overlaps[0].share, 1, 0.05);
+}
+
+TEST(BlockOverlap, IsNoneOfBlocksThatAbut) {
+  EXPECT_TRUE(
+      overlapsIn(boxes({{{0, 0, 0}, {1, 1, 1}, 9}, {{1, 0, 0}, {1, 1, 1}, 14}, {{0, 1, 0}, {2, 1, 1}, 6}}))
+          .empty());
+  // A curved face that two blocks cut differently: rings around an axis, wall cells a thousand times thinner.
+  const FunctionGridSource rings({gridBlock(20, 15, 4), gridBlock(47, 10, 5)}, 0, [](const GridNode& node) {
+    const bool outer = node.block == 1;
+    const double turn = node.i / (outer ? 46.0 : 19.0) * 1.5;
+    const double v = node.j / (outer ? 9.0 : 14.0);
+    const double r = outer ? 2 + std::expm1(5 * v) / std::expm1(5.0) : 1 + v;
+    const double z = node.k / (outer ? 4.0 : 3.0);
+    return NodeValues{{r * std::cos(turn), r * std::sin(turn), z}, {}, false};
+  });
+  EXPECT_TRUE(overlapsIn(rings).empty());
+  EXPECT_TRUE(overlapsIn(boxes({{{0, 0, 0}, {1, 1, 1}, 9}})).empty());
+}
+
+TEST(BlockOverlap, IsNoneWhereOneIsBlanked) {
+  const FunctionGridSource source(
+      {gridBlock(11, 11, 11), gridBlock(11, 11, 11)}, 0, [](const GridNode& node) {
+        const double shift = node.block == 1 ? 5.0 : 0.0;
+        const bool blank = node.block == 0 && node.i > 5;
+        return NodeValues{
+            {static_cast<double>(node.i) + shift, static_cast<double>(node.j), static_cast<double>(node.k)},
+            {},
+            blank};
+      });
+  EXPECT_TRUE(overlapsIn(source).empty());
+}
+
+TEST(BlockOverlap, OfRealOversetGrids) {
+  const std::filesystem::path folder = std::filesystem::path(CURVISPLAT_SHARED_DATA) / "overset";
+  if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << "needs " << folder;
+  const auto of = [&](const char* name) {
+    OpenGridOptions options;
+    options.grid = folder / name;
+    const auto source = openGrid(options);
+    const auto overlaps = overlapsIn(*source, 1 << 20);
+    for (const BlockOverlap& o : overlaps)
+      std::printf("%s: blocks %u and %u: %g, %g of the smaller\n", name, o.first, o.second, o.volume,
+                  o.share);
+    return overlaps;
+  };
+  EXPECT_TRUE(of("cylinder_chimera_abutting.x").empty());
+  EXPECT_FALSE(of("cylinder_chimera_overlapping_singledonor.x").empty());
+}
+
+}  // namespace
+}  // namespace curvisplat
