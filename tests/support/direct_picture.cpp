@@ -14,6 +14,7 @@
 #include "render/cpu_painter.h"
 #include "render/depth_sort.h"
 #include "render/projection.h"
+#include "tests/support/painted_splats.h"
 
 namespace curvisplat {
 namespace {
@@ -134,9 +135,7 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
     sorted.push_back(splat);
   }
   CpuPainter painter;
-  painter.begin(size, {1, 1, 1, 1}, table, options.per_pixel);
-  painter.draw(sorted);
-  return painter.end();
+  return paintFrame(painter, sorted, table, options.per_pixel, size);
 }
 
 }  // namespace curvisplat
