@@ -11,6 +11,7 @@
 
 #include "preprocess/cgns_steps.h"
 #include "preprocess/cgns_units.h"
+#include "preprocess/time_steps.h"
 #include "stream/error.h"
 
 namespace curvisplat {
@@ -47,7 +48,6 @@ class TreeReader {
   UnitContext below(const Nodes& children, UnitContext units) const;
   CgnsArray arrayOf(const CgnsNode& node, const Dims& dims, const std::array<uint64_t, 6>& rind) const;
   std::array<uint64_t, 6> rindOf(const Nodes& children) const;
-  void checkStep() const;
   void warnOfOmissions();
 
   const CgnsFile& file_;
@@ -72,7 +72,7 @@ CgnsTree TreeReader::read() {
   } else if (implied_steps_ > 1) {
     for (size_t n = 0; n < implied_steps_; ++n) tree_.times.push_back(static_cast<double>(n));
   }
-  checkStep();
+  chosenTimeStep(file_.path().string(), tree_.times, step_);
   warnOfOmissions();
   return std::move(tree_);
 }
@@ -242,13 +242,6 @@ std::array<uint64_t, 6> TreeReader::rindOf(const Nodes& children) const {
     }
   }
   return rind;
-}
-
-void TreeReader::checkStep() const {
-  const size_t steps = std::max<size_t>(1, tree_.times.size());
-  if (step_ >= steps)
-    throw Error("{}: has {} time step{}, numbered from 0; --time-step {} is none of them",
-                file_.path().string(), steps, steps == 1 ? "" : "s", step_);
 }
 
 void TreeReader::warnOfOmissions() {

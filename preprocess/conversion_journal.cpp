@@ -161,6 +161,8 @@ std::vector<ConversionFact> factsOf(const GridDescription& description, const st
   uint64_t nodes = 0;
   for (const GridBlock& block : description.blocks) nodes += block.nodes();
   facts.push_back({"the layout", fmt::format("{}, {} nodes", description.format, nodes)});
+  if (description.times.size() > 1)
+    facts.push_back({"--time-step", std::to_string(description.time_step)});
   facts.push_back({"--scalar", names.empty() ? "none" : names});
   facts.push_back({"--blank", blank_value ? fmt::format("{}", *blank_value) : "none"});
   return facts;

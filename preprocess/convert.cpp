@@ -233,6 +233,7 @@ class Conversion {
     manifest.blanked_nodes = splats_.survey.blanked.total();
     manifest.variables = variables();
     StepInfo step;
+    if (!description.times.empty()) step.time = description.times[description.time_step];
     for (const VariableInfo& variable : manifest.variables) step.variables.push_back(variable.number);
     manifest.steps = {step};
     return manifest;

@@ -18,9 +18,9 @@ constexpr Magic kMagics[] = {
     {"<VTKFile"sv, "a VTK XML file"},
     {"<?xml"sv, "an XML file"},
     {"\x89HDF\r\n\x1a\n"sv, "an HDF5 file"},
-    {"CDF\x01"sv, "a NetCDF file, which is not read"},
-    {"CDF\x02"sv, "a NetCDF file, which is not read"},
-    {"CDF\x05"sv, "a NetCDF file, which is not read"},
+    {"CDF\x01"sv, "a NetCDF file"},
+    {"CDF\x02"sv, "a NetCDF file"},
+    {"CDF\x05"sv, "a NetCDF file"},
     {"#!TDV"sv, "a Tecplot binary file, which is not read"},
     {"C Binary"sv, "an EnSight file, which is not read"},
     {"{"sv, "a JSON file: a .p3d description is given alone, in the grid's place"},
@@ -47,7 +47,7 @@ std::optional<std::string> foreignFormat(const InputFile& file) {
   for (const Magic& magic : kMagics)
     if (begin.starts_with(magic.bytes)) return magic.words;
   // Its first four bytes differ between versions.
-  if (begin.find("ADF Database") == 4) return "a CGNS (ADF) file, which has its own grid: give it alone";
+  if (begin.find("ADF Database") == 4) return "a CGNS (ADF) file";
   return std::nullopt;
 }
 

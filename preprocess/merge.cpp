@@ -57,8 +57,9 @@ double largestEigenvalue(const Symmetric3& s) {
 
 }  // namespace
 
-VoxelMerger::VoxelMerger(size_t variables, size_t voxels)
+VoxelMerger::VoxelMerger(size_t variables, size_t voxels, double spread)
     : variables_(variables),
+      spread_(spread),
       clusters_(voxels),
       first_(voxels),
       first_values_(voxels * variables),
@@ -133,8 +134,8 @@ void VoxelMerger::finish(size_t voxel, Splat& splat, std::span<SplatScalar> valu
   const glm::dvec3 centre = share * sums.centre;
   Symmetric3 shape;
   addScaled(shape, share, sums.shape);
-  addScaled(shape, 12 * share, sums.centre2);
-  addSquare(shape, -12, centre);
+  addScaled(shape, spread_ * share, sums.centre2);
+  addSquare(shape, -spread_, centre);
   setShape(splat, shape, first.axis[0]);
   splat.position = first.position + centre;
   splat.weight = clusters_[voxel].weighted ? sums.weight : 0.0;

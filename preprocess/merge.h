@@ -19,7 +19,9 @@ namespace curvisplat {
 /// once.
 class VoxelMerger {
  public:
-  VoxelMerger(size_t variables, size_t voxels);
+  /// `spread`: what the covariance of the centres counts in a merged shape. 12 makes n³ unit cells one of
+  /// shape n² I; other values are for tests.
+  VoxelMerger(size_t variables, size_t voxels, double spread = 12);
   /// Empties every voxel. Costs 8 bytes of writing a voxel.
   void clear();
 
@@ -63,6 +65,7 @@ class VoxelMerger {
   void clearSums(size_t voxel);
 
   size_t variables_;
+  double spread_;
   std::vector<Cluster> clusters_;
   std::vector<Splat> first_;                 // [voxel], of its first splat
   std::vector<SplatScalar> first_values_;    // [voxel][variable]

@@ -24,8 +24,9 @@ struct Neighbours {
 /// What the nodes of a window have in common.
 class Window {
  public:
-  Window(const BlockWindow& in, NodeSplats& out)
+  Window(const BlockWindow& in, const NodeSplatCorrections& corrections, NodeSplats& out)
       : in_(in),
+        corrections_(corrections),
         x_(in.nodes->x.data()),
         y_(in.nodes->y.data()),
         z_(in.nodes->z.data()),
@@ -49,6 +50,7 @@ class Window {
   double smallestAxis(ptrdiff_t at, const Neighbours& neighbours) const;
 
   const BlockWindow& in_;
+  const NodeSplatCorrections corrections_;
   const double *x_, *y_, *z_;
   const uint8_t* blank_;
   std::vector<const float*> scalars_;
@@ -119,21 +121,44 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   // at distances a and b: its middle is (b - a) / 4 away, of a length of (a + b) / 2. With one neighbour
   // only, that is a quarter of the difference, inwards.
   glm::dvec3 middle(0.0);
+  glm::dvec3 bend(0.0);  // the sum of the positions' second differences
+  double weight_factor = 1;
   for (int axis = 0; axis < 3; ++axis) {
-    const double a = glm::distance(node.node_position, position(at + neighbours.before[axis]));
-    const double b = glm::distance(node.node_position, position(at + neighbours.after[axis]));
-    if (a + b > 0) middle[axis] = 0.5 * (b - a) / (a + b);
+    const glm::dvec3 to_before = node.node_position - position(at + neighbours.before[axis]);
+    const glm::dvec3 to_after = position(at + neighbours.after[axis]) - node.node_position;
+    const double a = glm::length(to_before), b = glm::length(to_after);
+    const bool whole = neighbours.before[axis] != 0 && neighbours.after[axis] != 0;
+    if (whole) bend += to_after - to_before;
+    if (a + b > 0 && (corrections_.middles || !whole)) middle[axis] = 0.5 * (b - a) / (a + b);
+    if (!whole && !corrections_.half_cells) {
+      jacobian[axis] *= 2.0;
+      middle[axis] = 0;
+      weight_factor *= 0.5;
+    }
   }
   node.splat.position = node.node_position + jacobian * middle;
 
-  const auto set_values = [&](const auto& rotate) {
+  // `rotate` gives Q's image of a vector; `to_factor` A⁻¹ of one.
+  const auto set_values = [&](const auto& rotate, const auto& to_factor, bool correct_bends) {
+    const glm::dvec3 bend_in_cells = correct_bends ? to_factor(bend) : glm::dvec3(0.0);
     SplatScalar* value = out_.values.data() + count_ * scalars_.size();
     for (const float* f : scalars_) {
+      const double here = f[at];
       glm::dvec3 gradient;
-      for (int axis = 0; axis < 3; ++axis)
-        gradient[axis] =
-            0.5 * (double{f[at + neighbours.after[axis]]} - double{f[at + neighbours.before[axis]]});
-      *value++ = {f[at] + glm::dot(gradient, middle), rotate(gradient), 0.0};
+      double second = 0, least = here, most = here;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double before = f[at + neighbours.before[axis]], after = f[at + neighbours.after[axis]];
+        gradient[axis] = 0.5 * (after - before);
+        if (neighbours.before[axis] != 0 && neighbours.after[axis] != 0)
+          second += (after - here) - (here - before);
+        least = std::min({least, before, after});
+        most = std::max({most, before, after});
+      }
+      const glm::dvec3 slope = rotate(gradient);
+      double mean = here + glm::dot(gradient, middle);
+      if (correct_bends)
+        mean = std::clamp(mean + kBend * (second - glm::dot(slope, bend_in_cells)), least, most);
+      *value++ = {mean, slope, 0.0};
     }
   };
 
@@ -144,18 +169,25 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   if (surelyAboveFloor(a)) {
     node.splat.axis = {a.a00, a.a11, a.a22};
     node.splat.shear = {a.a10 * lq.inverse_a00, a.a20 * lq.inverse_a00, a.a21 * lq.inverse_a11};
-    node.splat.weight = a.a00 * a.a11 * a.a22;
-    node.regular = true;
+    node.splat.weight = a.a00 * a.a11 * a.a22 * weight_factor;
+    node.regular = weight_factor == 1;
     (lq.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
-    set_values([&](const glm::dvec3& gradient) { return lq.rotate(gradient); });
+    set_values([&](const glm::dvec3& gradient) { return lq.rotate(gradient); },
+               [&](const glm::dvec3& v) {
+                 const double v0 = v.x * lq.inverse_a00, v1 = (v.y - a.a10 * v0) * lq.inverse_a11;
+                 return glm::dvec3(v0, v1, (v.z - a.a20 * v0 - a.a21 * v1) / a.a22);
+               },
+               corrections_.bends);
   } else {
     const CellShape shape = shapeFromJacobian(jacobian, smallestAxis(at, neighbours));
     node.splat.axis = shape.axis;
     node.splat.shear = shape.shear;
-    node.splat.weight = std::abs(shape.determinant);
+    node.splat.weight = std::abs(shape.determinant) * weight_factor;
     node.regular = !shape.floored;
     (shape.floored ? out_.degenerate : shape.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
-    set_values([&](const glm::dvec3& gradient) { return shape.rotation * gradient; });
+    // Where an axis was raised there is no telling a bend of the scalar from one of the coordinates.
+    set_values([&](const glm::dvec3& gradient) { return shape.rotation * gradient; },
+               [](const glm::dvec3& v) { return v; }, false);
   }
   ++count_;
 }
@@ -180,7 +212,8 @@ double Window::smallestAxis(ptrdiff_t at, const Neighbours& neighbours) const {
 
 }  // namespace
 
-void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeSplats& out) {
+void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeSplats& out,
+                       const NodeSplatCorrections& corrections) {
   const NodeBox& window = in.window;
   CURVISPLAT_CHECK(window.j0 <= (box.j0 > 0 ? box.j0 - 1 : 0) && window.k0 <= (box.k0 > 0 ? box.k0 - 1 : 0));
   CURVISPLAT_CHECK(std::min(box.j1 + 1, in.block.nj) <= window.j1 &&
@@ -194,7 +227,7 @@ void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeSplats& ou
   out.values.resize(most * variables);
   out.degenerate = out.right_handed = out.left_handed = 0;
 
-  Window rows(in, out);
+  Window rows(in, corrections, out);
   for (uint64_t k = box.k0; k < box.k1; ++k)
     for (uint64_t j = box.j0; j < box.j1; ++j) rows.addRow(j, k);
   out.splats.resize(rows.count());

@@ -4,6 +4,12 @@
 // that is the node; where spacing changes quickly (spectral elements: a factor of 1.6 from cell to cell)
 // splats at the nodes themselves would draw stripes of +-30 %, and those in the middles draw a third of that.
 //
+// A splat says what the scalar is at its middle and how it changes from there: a tangent. Tangents of the
+// neighbours do not meet where the scalar bends, and their weighted mean is off by half the second
+// derivative times the kernel's variance. So much is taken off beforehand: a tenth of each second difference,
+// once what bent coordinates make of a straight scalar is left out; the mean stays within the range of the
+// node and its neighbours.
+//
 // A missing neighbour (the block ends, or the node there is blank) makes the cell a half cell along that
 // axis: the Jacobian's column is half of the one difference there is, and the splat sits a quarter cell
 // inwards. Without any neighbour along an axis the column is zero.
@@ -17,6 +23,9 @@
 #include "stream/splats.h"
 
 namespace curvisplat {
+
+/// Half the variance of the kernel along an axis: 0.44655², as in render/kernel.h, which is not for here.
+inline constexpr double kBend = 0.5 * 0.44655 * 0.44655;
 
 /// A node's splat on its way into the cache.
 struct NodeSplat {
@@ -47,8 +56,17 @@ struct BlockWindow {
   const NodeArrays* nodes = nullptr;  // i fastest; scalars in the order of the cache's variables
 };
 
+/// What is done beyond the linear part of the mapping at the node. Conversion does all of it; tests switch
+/// one off and see what it is worth.
+struct NodeSplatCorrections {
+  bool half_cells = true;  // else a border's node has a whole cell of half the weight, around itself
+  bool middles = true;     // else splats sit at nodes, but for half cells
+  bool bends = true;       // of the scalar
+};
+
 /// Computes the splats of the nodes of `box` that are not blank. Overwrites `out` and keeps its capacity.
 /// Pure: any thread. Throws nothing but bad_alloc.
-void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeSplats& out);
+void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeSplats& out,
+                       const NodeSplatCorrections& corrections = {});
 
 }  // namespace curvisplat

@@ -8,6 +8,7 @@
 
 #include "preprocess/cgns_source.h"
 #include "preprocess/foreign_formats.h"
+#include "preprocess/netcdf_source.h"
 #include "preprocess/plot3d_meta.h"
 #include "preprocess/plot3d_source.h"
 #include "preprocess/scalar_names.h"
@@ -34,7 +35,8 @@ constexpr GridFormat kFormats[] = {
     {isVtkXml, openVtkXml},
     {isVtkLegacy, openVtkLegacy},
     {isPlot3dMeta, openPlot3dMeta},
-    {CgnsFile::recognises, openAs<CgnsSource>},
+    {CgnsFile::recognises, openAs<CgnsSource>},  // before NetCDF, which takes all HDF5 files
+    {NetcdfFile::recognises, openAs<NetcdfSource>},
 };
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "preprocess/globe.h"
 #include "preprocess/grid_source.h"
 #include "preprocess/plot3d_layout.h"
 
@@ -19,6 +20,8 @@ struct OpenGridOptions {
   Plot3dForce force;                             // what the user says of the layout, over what is detected
   std::optional<uint32_t> time_step = {};        // from 0; none: the first
   std::vector<std::string> function_names = {};  // of function files' variables, over their .nam files
+  GlobeOptions globe = {};                       // of grids in degrees
+  std::vector<std::string> scalars = {};         // that are wanted: they choose among several grids of a file
 };
 
 /// Throws Error naming the file, what was expected and what was found.

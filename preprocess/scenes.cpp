@@ -22,17 +22,43 @@ bool inUnitInterval(double x) {
   return x >= 0 && x <= 1;
 }
 
-// Design section 9. Half a pipe around the z axis, on the side of negative x; its floor waves with the angle.
-class HalfAnnulus : public Scene {
+// What of a pipe around the z axis a grid fills.
+struct PipeShape {
+  double turns;  // 0.5: half of it, on the side of negative x; 1: all around
+  double inner;  // radius; at 0 the nodes of j = 0 lie on the axis, all i of them in one place
+  double clustering;
+};
+
+double halfAnnulusField(const glm::dvec3& p) {
+  const glm::dvec3 to_wide = p - glm::dvec3(-0.5, 0.3, 0.5), to_narrow = p - glm::dvec3(-0.4, -0.4, 0.3);
+  return std::clamp(0.2 + std::exp(-8 * glm::dot(to_wide, to_wide)) +
+                        0.8 * std::exp(-20 * glm::dot(to_narrow, to_narrow)) +
+                        0.06 * std::sin(9 * p.x) * std::cos(8 * p.y + 2 * p.z),
+                    0.0, 1.0);
+}
+
+// A layer on the inner wall, 0.004 thick: with the scene's own clustering, five of 64 cells.
+double boundaryLayer(const glm::dvec3& p) {
+  const double angle = std::atan2(-p.x, p.y);
+  return (0.8 + 0.2 * std::cos(5 * angle + 3 * p.z)) *
+         std::exp(-square((std::hypot(p.x, p.y) - 0.3) / 0.004));
+}
+
+// Design section 9's grid, and others of its kind: a pipe around the z axis whose floor waves with the angle.
+class Pipe : public Scene {
  public:
-  HalfAnnulus(std::string name, double clustering)
-      : Scene(std::move(name)), clustering_(clustering), growth_(std::expm1(clustering)) {}
+  using Field = double (*)(const glm::dvec3&);
+
+  Pipe(std::string name, const PipeShape& shape, Field field)
+      : Scene(std::move(name)), shape_(shape), growth_(std::expm1(shape.clustering)), field_(field) {}
 
   glm::dvec3 alongU(double u) const override {
-    return {-std::sin(pi * u), std::cos(pi * u), kWave * std::sin(3 * pi * u)};
+    // All around, u = 1 is the very point of u = 0.
+    const double angle = 2 * pi * shape_.turns * (shape_.turns == 1 ? u - std::floor(u) : u);
+    return {-std::sin(angle), std::cos(angle), kWave * std::sin(3 * angle)};
   }
   glm::dvec3 alongV(double v) const override {
-    return glm::dvec3(kInner + (kOuter - kInner) * std::expm1(clustering_ * v) / growth_);
+    return glm::dvec3(shape_.inner + (kOuter - shape_.inner) * std::expm1(shape_.clustering * v) / growth_);
   }
   glm::dvec3 alongW(double w) const override { return {0, 0, w}; }
   glm::dvec3 join(const glm::dvec3& of_u, const glm::dvec3& of_v, const glm::dvec3& of_w) const override {
@@ -41,36 +67,62 @@ class HalfAnnulus : public Scene {
 
   std::optional<glm::dvec3> inverse(const glm::dvec3& world) const override {
     const double radius = std::hypot(world.x, world.y);
-    const double u = std::atan2(-world.x, world.y) / pi;
-    const double stretched = (radius - kInner) / (kOuter - kInner);
-    const double w = world.z - kWave * radius * std::sin(3 * pi * u);
+    double angle = std::atan2(-world.x, world.y);
+    if (shape_.turns == 1 && angle < 0) angle += 2 * pi;
+    const double u = angle / (2 * pi * shape_.turns);
+    const double stretched = (radius - shape_.inner) / (kOuter - shape_.inner);
+    const double w = world.z - kWave * radius * std::sin(3 * angle);
     if (!inUnitInterval(u) || !inUnitInterval(stretched) || !inUnitInterval(w)) return std::nullopt;
-    return glm::dvec3(u, std::log1p(stretched * growth_) / clustering_, w);
+    return glm::dvec3(u, std::log1p(stretched * growth_) / shape_.clustering, w);
   }
 
-  double scalar(const glm::dvec3& p) const override {
-    const glm::dvec3 to_wide = p - glm::dvec3(-0.5, 0.3, 0.5), to_narrow = p - glm::dvec3(-0.4, -0.4, 0.3);
-    return std::clamp(0.2 + std::exp(-8 * glm::dot(to_wide, to_wide)) +
-                          0.8 * std::exp(-20 * glm::dot(to_narrow, to_narrow)) +
-                          0.06 * std::sin(9 * p.x) * std::cos(8 * p.y + 2 * p.z),
-                      0.0, 1.0);
-  }
+  double scalar(const glm::dvec3& p) const override { return field_(p); }
 
   std::pair<glm::dvec3, glm::dvec3> bounds() const override {
-    return {{-kOuter, -kOuter, -kWave * kOuter}, {0, kOuter, 1 + kWave * kOuter}};
+    return {{-kOuter, -kOuter, -kWave * kOuter},
+            {shape_.turns == 1 ? kOuter : 0.0, kOuter, 1 + kWave * kOuter}};
   }
 
-  double volume() const override { return 0.5 * pi * (square(kOuter) - square(kInner)); }
+  double volume() const override { return shape_.turns * pi * (square(kOuter) - square(shape_.inner)); }
 
  private:
-  static constexpr double kInner = 0.3, kOuter = 1.0, kWave = 0.15;
-  double clustering_, growth_;
+  static constexpr double kOuter = 1.0, kWave = 0.15;
+  PipeShape shape_;
+  double growth_;
+  Field field_;
 };
 
-class ConstantHalfAnnulus : public HalfAnnulus {
+// A parallelepiped of strongly sheared cells, with waves as in Marschner and Lobb, "An Evaluation of
+// Reconstruction Filters for Volume Rendering", 1994, whose frequency is lower here.
+class ShearedWaves : public Scene {
  public:
-  using HalfAnnulus::HalfAnnulus;
-  double scalar(const glm::dvec3&) const override { return 0.5; }
+  explicit ShearedWaves(std::string name) : Scene(std::move(name)) {}
+
+  glm::dvec3 alongU(double u) const override { return {2 * u - 1, 0, 0}; }
+  glm::dvec3 alongV(double v) const override { return (2 * v - 1) * glm::dvec3(kXY, 1, 0); }
+  glm::dvec3 alongW(double w) const override { return (2 * w - 1) * glm::dvec3(kXZ, kYZ, 1); }
+  glm::dvec3 join(const glm::dvec3& of_u, const glm::dvec3& of_v, const glm::dvec3& of_w) const override {
+    return of_u + of_v + of_w;
+  }
+  std::optional<glm::dvec3> inverse(const glm::dvec3& world) const override {
+    const double c = world.z, b = world.y - kYZ * c, a = world.x - kXY * b - kXZ * c;
+    const glm::dvec3 uvw = 0.5 * (glm::dvec3(a, b, c) + 1.0);
+    if (!inUnitInterval(uvw.x) || !inUnitInterval(uvw.y) || !inUnitInterval(uvw.z)) return std::nullopt;
+    return uvw;
+  }
+  double scalar(const glm::dvec3& p) const override {
+    constexpr double kFrequency = 4, kWaves = 0.25;
+    const double wave = std::cos(2 * pi * kFrequency * std::cos(0.5 * pi * std::hypot(p.x, p.y)));
+    return (1 - std::sin(0.5 * pi * p.z) + kWaves * (1 + wave)) / (2 * (1 + kWaves));
+  }
+  std::pair<glm::dvec3, glm::dvec3> bounds() const override {
+    const glm::dvec3 corner(1 + kXY + kXZ, 1 + kYZ, 1);
+    return {-corner, corner};
+  }
+  double volume() const override { return 8; }
+
+ private:
+  static constexpr double kXY = 1.2, kXZ = 0.8, kYZ = 1.0;
 };
 
 // An O-grid around a cylinder along z: circles from the wall outwards, whose centres move downstream (+x).
@@ -192,16 +244,25 @@ double nodeCoordinate(uint64_t index, uint64_t nodes) {
 }  // namespace
 
 std::vector<std::string> sceneNames() {
-  return {"half-annulus", "half-annulus-constant", "wake"};
+  return {"half-annulus", "half-annulus-constant", "shell", "o-grid", "axis", "sheared-waves", "wake"};
 }
 
 std::unique_ptr<Scene> makeScene(std::string_view name, std::optional<double> clustering) {
   if (clustering && !(*clustering > 0 && *clustering <= 20))
     throw UsageError("clustering {} is not between 0 and 20", *clustering);
-  if (name == "half-annulus")
-    return std::make_unique<HalfAnnulus>(std::string(name), clustering.value_or(2.5));
-  if (name == "half-annulus-constant")
-    return std::make_unique<ConstantHalfAnnulus>(std::string(name), clustering.value_or(2.5));
+  const auto pipe = [&](double turns, double inner, double own_clustering, Pipe::Field field) {
+    return std::make_unique<Pipe>(std::string(name),
+                                  PipeShape{turns, inner, clustering.value_or(own_clustering)}, field);
+  };
+  if (name == "half-annulus") return pipe(0.5, 0.3, 2.5, halfAnnulusField);
+  if (name == "half-annulus-constant") return pipe(0.5, 0.3, 2.5, [](const glm::dvec3&) { return 0.5; });
+  if (name == "shell") return pipe(0.5, 0.3, 4, boundaryLayer);
+  if (name == "o-grid") return pipe(1, 0.3, 2.5, halfAnnulusField);
+  if (name == "axis") return pipe(1, 0, 1, halfAnnulusField);
+  if (name == "sheared-waves") {
+    if (clustering) throw UsageError("scene '{}' has even cells; leave its clustering out", name);
+    return std::make_unique<ShearedWaves>(std::string(name));
+  }
   if (name == "wake") return std::make_unique<Wake>(std::string(name), clustering.value_or(9));
   throw UsageError("there is no scene '{}'; there are {}", name, fmt::join(sceneNames(), ", "));
 }

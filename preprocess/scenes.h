@@ -55,13 +55,17 @@ class Scene {
 
 /// half-annulus           design section 9: half a pipe with a wavy floor, cells clustered towards the inside
 /// half-annulus-constant  the same grid, f = 0.5 everywhere
+/// shell                  the same grid, f a thin layer on the inner wall
+/// o-grid                 the whole annulus, with half-annulus' field; i closes on itself
+/// axis                   the same down to the axis: j = 0 is a line, and all i are in one place there
+/// sheared-waves          a parallelepiped of even, strongly sheared cells, with waves
 /// wake                   an O-grid around a cylinder with a vortex street behind it; i closes on itself, and
 ///                        wall cells are e^clustering times thinner than the outermost ones
 std::vector<std::string> sceneNames();
 
 /// `clustering`: the outermost cells along j are about e^clustering times as long as the innermost; none: the
-/// scene's own (2.5 and, for wake, 9). Throws UsageError for another name (it lists the names there are) and
-/// for a clustering that is not in (0, 20].
+/// scene's own (2.5; shell 4, axis 1, wake 9). Throws UsageError for another name (it lists the names there
+/// are) and for a clustering that is not in (0, 20], or that the scene does not have.
 std::unique_ptr<Scene> makeScene(std::string_view name, std::optional<double> clustering = std::nullopt);
 
 struct SceneGridSize {

@@ -308,11 +308,11 @@ class LegacyReader {
         continue;
       }
       // The first two bits of a length tell how many bytes it has: 8, 4, 2 or 1.
+      std::byte first;
+      file_->readAt(text_.offset(), std::span(&first, 1));
+      const auto bytes = size_t{8} >> std::to_integer<unsigned>(first >> 6);
       std::array<std::byte, 8> length{};
-      file_->readAt(text_.offset(), std::span(length).first(1));
-      const auto bytes = size_t{8} >> std::to_integer<unsigned>(length[0] >> 6);
       file_->readAt(text_.offset(), std::span(length).last(bytes));
-      std::rotate(length.begin(), length.begin(), length.end());
       length[8 - bytes] &= std::byte{0x3f};
       const auto skipped = loadStored<uint64_t>(length.data(), kMachineByteOrder != ByteOrder::big);
       if (skipped > file_->size() - text_.offset() - bytes)

@@ -44,7 +44,7 @@ struct FrameOptions {
   glm::dvec3 scale{1.0};               // stretches the data: D S Dᵀ, V det D, about the world's origin
   std::optional<WorldBox> clip_box;    // splats whose centre is outside are not drawn
   glm::vec4 background{1, 1, 1, 1};    // premultiplied
-  double low_pass_px2 = 1.5;           // added to S2's diagonal; design section 3
+  double low_pass_px2 = kLowPass;      // added to S2's diagonal
   unsigned threads = 0;                // workers; 0: one a core
   uint64_t memory_bytes = 512 << 20;
   bool keep_going = false;  // draw bricks that cannot be read from an ancestor, and report them

@@ -66,7 +66,7 @@ void computeBlock(const OrthographicMap& map, const LocalBox& clip,
     block.clipped[n] = clip.excludes(x, y, z);
     block.too_wide[n] = 0;
     block.set(n, ellipseOf(map.rows, shapeOf(geometry, i), slopeOf(variable, i), variable.variance[i],
-                           geometry.weight[i] * map.volume, map.low_pass_px2));
+                           geometry.weight[i] * map.volume, map.low_pass_px2, map.slope_low_pass_px2));
   }
 }
 
@@ -85,7 +85,7 @@ void computeBlock(const PerspectiveMap& map, const LocalBox& clip,
     block.clipped[n] = clip.excludes(x, y, z);
     block.too_wide[n] = map.tooWide(centre, map.radiusOf(shape));
     block.set(n, ellipseOf(map.rowsAt(centre), shape, slopeOf(variable, i), variable.variance[i],
-                           geometry.weight[i] * map.volumeAt(centre), map.low_pass_px2));
+                           geometry.weight[i] * map.volumeAt(centre), map.low_pass_px2, map.slope_low_pass_px2));
   }
 }
 
@@ -157,7 +157,7 @@ std::optional<Chooser::Fate> chooseCut(const PerspectiveMap& map, const Geometry
   const auto take = [&](const SplatPiece& piece, const PerspectiveMap::Centre& centre) {
     if (pieces_left == 0) return false;
     const Ellipse ellipse = ellipseOf(map.rowsAt(centre), piece.shape, piece.slope, variable.variance[i],
-                                      piece.weight * map.volumeAt(centre), map.low_pass_px2);
+                                      piece.weight * map.volumeAt(centre), map.low_pass_px2, map.slope_low_pass_px2);
     const auto fate = chooser.choose(screenSplat(map.pixelX(centre), map.pixelY(centre), ellipse, piece.mean),
                                      centre.distance);
     if (fate == Chooser::Fate::kept) --pieces_left;

@@ -11,10 +11,6 @@
 
 namespace curvisplat {
 
-/// Added to S2 where the slope is projected, pixels squared: keeps it invertible, and no more. The slope is
-/// the field's, not the pixel's.
-inline constexpr float kSlopeLowPass = 0.01f;
-
 /// A, as in stream/splats.h: column n is axis n times (1, l10, l20), (0, 1, l21), (0, 0, 1).
 struct Shape {
   float axis0, axis1, axis2;
@@ -48,7 +44,8 @@ struct Ellipse {
 
 /// `volume`: V times the map's determinant, depth included; pixels² times length.
 [[gnu::always_inline]] inline Ellipse ellipseOf(const ScreenRows& p, const Shape& s, const Slope& w,
-                                                float variance, float volume, float low_pass_px2) {
+                                                float variance, float volume, float low_pass_px2,
+                                                float slope_low_pass_px2) {
   // B = P A, by rows.
   const float b00 = s.axis0 * (p.x0 + p.y0 * s.shear10 + p.z0 * s.shear20);
   const float b01 = s.axis1 * (p.y0 + p.z0 * s.shear21);
@@ -63,7 +60,7 @@ struct Ellipse {
   const float n0 = b01 * b12 - b02 * b11, n1 = b02 * b10 - b00 * b12, n2 = b00 * b11 - b01 * b10;
   const float nn = n0 * n0 + n1 * n1 + n2 * n2;  // det S2
   const float determinant = nn + low_pass_px2 * (s00 + s11 + low_pass_px2);
-  const float slope_determinant = nn + kSlopeLowPass * (s00 + s11 + kSlopeLowPass);
+  const float slope_determinant = nn + slope_low_pass_px2 * (s00 + s11 + slope_low_pass_px2);
 
   Ellipse e;
   e.l11 = std::sqrt(s00 + low_pass_px2);
@@ -77,8 +74,8 @@ struct Ellipse {
   const float m0 = n1 * w.w2 - n2 * w.w1, m1 = n2 * w.w0 - n0 * w.w2, m2 = n0 * w.w1 - n1 * w.w0;
   const float h0 = b00 * w.w0 + b01 * w.w1 + b02 * w.w2;
   const float h1 = b10 * w.w0 + b11 * w.w1 + b12 * w.w2;
-  const float g0 = (b10 * m0 + b11 * m1 + b12 * m2 + kSlopeLowPass * h0) / slope_determinant;
-  const float g1 = (kSlopeLowPass * h1 - (b00 * m0 + b01 * m1 + b02 * m2)) / slope_determinant;
+  const float g0 = (b10 * m0 + b11 * m1 + b12 * m2 + slope_low_pass_px2 * h0) / slope_determinant;
+  const float g1 = (slope_low_pass_px2 * h1 - (b00 * m0 + b01 * m1 + b02 * m2)) / slope_determinant;
   e.slope0 = e.l11 * g0 + e.l21 * g1;
   e.slope1 = e.l22 * g1;
 

@@ -15,7 +15,7 @@ struct OrthographicMap {
   ScreenRows rows;  // pixels to a unit of the data
   glm::vec3 depth;  // stretched units along the view
   float volume;     // pixels² and stretched depth to a unit cubed of the data
-  float low_pass_px2;
+  float low_pass_px2, slope_low_pass_px2;
 
   OrthographicMap(const ScreenView& view, const glm::dvec3& origin);
 };
@@ -23,10 +23,6 @@ struct OrthographicMap {
 /// The local affine map of each splat (Zwicker et al., "EWA Volume Splatting", 2001), with the distance from
 /// the eye as depth: det M = focal² |c| / z³ at c in view axes.
 struct PerspectiveMap {
-  /// Radius of a splat's support over its distance, from which on it is cut: the map of a smaller one is off
-  /// by at most 2 % of the splat's size at one deviation from the centre.
-  static constexpr float kWidest = 0.4f;
-
   struct Centre {
     float x, y, z;   // view axes: right, down, forward; stretched units
     float distance;  // from the eye
@@ -38,11 +34,11 @@ struct PerspectiveMap {
   float middle_x, middle_y, focal_px;
   float volume;  // the stretch's
   float near, widest;
-  float low_pass_px2;
+  float low_pass_px2, slope_low_pass_px2;
   float tangent_x, tangent_y;  // of the image's edges, the low-pass' reach added
   float slant_x, slant_y;      // √(1 + tangent²)
 
-  /// `coarseness` multiplies the near plane's distance and kWidest.
+  /// `coarseness` multiplies the near plane's distance and the view's `widest`.
   PerspectiveMap(const ScreenView& view, const glm::dvec3& origin, float coarseness);
 
   Centre centreOf(float x_, float y_, float z_) const {

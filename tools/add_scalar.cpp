@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "preprocess/add_scalar.h"
+#include "preprocess/time_steps.h"
 #include "stream/error.h"
 #include "tools/option_parsers.h"
 #include "tools/run_statistics.h"
@@ -72,6 +73,8 @@ void runAddScalar(ConvertWords words) {
   const nlohmann::json numbers = statistics(report, progress);
   for (const std::string& warning : source->description().warnings)
     fmt::print(stderr, "curvisplat: warning: {}\n", warning);
+  if (const auto note = timeStepNote(source->description(), words.grid.time_step))
+    fmt::print(stderr, "curvisplat: note: {}\n", *note);
   printSummary(words, report, secondsOf(progress), numbers["peak_memory_bytes"]);
   if (!words.statistics.empty()) writeStatistics(words.statistics, numbers);
 }

@@ -11,6 +11,7 @@
 
 #include "preprocess/convert.h"
 #include "preprocess/open_grid.h"
+#include "preprocess/time_steps.h"
 #include "stream/error.h"
 #include "stream/progress.h"
 #include "tools/add_scalar.h"
@@ -41,10 +42,13 @@ void printSummary(const ConvertWords& words, const ConvertReport& report, double
 }
 
 /// What a person should know of the grid, on stderr: it is odd, not wrong.
-void printWarnings(const GridDescription& description, const ConvertReport& report) {
+void printWarnings(const GridDescription& description, std::optional<uint32_t> time_step,
+                   const ConvertReport& report) {
   for (const std::string& warning : description.warnings)
     fmt::print(stderr, "curvisplat: warning: {}\n", warning);
   for (const std::string& warning : report.warnings) fmt::print(stderr, "curvisplat: warning: {}\n", warning);
+  if (const auto note = timeStepNote(description, time_step))
+    fmt::print(stderr, "curvisplat: note: {}\n", *note);
   const auto note = [](uint64_t count, const char* what) {
     if (count > 0) fmt::print(stderr, "curvisplat: note: {} {}\n", count, what);
   };
@@ -111,7 +115,7 @@ void runConvert(ConvertWords words) {
   const StopOnSignals stopping(progress);
   const ConvertReport report = convert(*source, options, progress);
   const nlohmann::json numbers = statistics(report, progress);
-  printWarnings(source->description(), report);
+  printWarnings(source->description(), words.grid.time_step, report);
   printSummary(words, report, secondsOf(progress), numbers["peak_memory_bytes"]);
   if (!words.statistics.empty()) writeStatistics(words.statistics, numbers);
 }

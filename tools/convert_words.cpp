@@ -14,6 +14,8 @@ std::unique_ptr<GridSource> openSource(const ConvertWords& words, const std::fil
   OpenGridOptions grid = words.grid;
   grid.temporary_folder = words.temporary_folder.empty() ? cache.parent_path() : words.temporary_folder;
   if (grid.temporary_folder.empty()) grid.temporary_folder = ".";
+  grid.scalars = words.scalars;
+  grid.scalars.insert(grid.scalars.end(), words.added_scalars.begin(), words.added_scalars.end());
   return openWithDerived(grid, {words.gas, words.blank_value});
 }
 

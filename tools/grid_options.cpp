@@ -1,5 +1,7 @@
 #include "tools/grid_options.h"
 
+#include <charconv>
+#include <cmath>
 #include <map>
 #include <string>
 
@@ -7,6 +9,7 @@ namespace curvisplat {
 namespace {
 
 constexpr const char* kGroup = "How PLOT3D files are written (detected if not given)";
+constexpr const char* kGlobeGroup = "Where grids of the earth lie (NetCDF; kilometres)";
 
 /// An option whose words stand for values of `target`.
 template <typename Value>
@@ -20,9 +23,37 @@ void addWords(CLI::App& app, const char* name, const char* help, const std::map<
       ->group(kGroup);
 }
 
+void addGlobeOptions(CLI::App& app, GlobeOptions& globe) {
+  // A flag that may have a value, not an option: the next word is the grid's name.
+  const std::string sphere_help =
+      "Longitude and latitude lie on a sphere, the default; --sphere=KM: of that radius";
+  CLI::Option* const sphere =
+      app.add_flag("--sphere{6371}", sphere_help)
+          ->each([&globe](const std::string& radius) {
+            globe.shape = GlobeOptions::Shape::sphere;
+            const char* const end = radius.data() + radius.size();
+            const auto [parsed, error] = std::from_chars(radius.data(), end, globe.radius_km);
+            if (error != std::errc{} || parsed != end || !(globe.radius_km > 0) ||
+                !std::isfinite(globe.radius_km))
+              throw CLI::ValidationError(radius + " is no radius; expected kilometres, as 6371");
+          })
+          ->group(kGlobeGroup);
+  app.add_flag_callback(
+         "--flat", [&globe] { globe.shape = GlobeOptions::Shape::flat; },
+         "They are a flat map's, of equal kilometres a degree")
+      ->group(kGlobeGroup)
+      ->excludes(sphere);
+  app.add_option("--vertical-scale", globe.vertical_scale, "Depth and height are so many times as large (1)")
+      ->check(CLI::Number)
+      ->group(kGlobeGroup);
+}
+
 }  // namespace
 
 void addGridOptions(CLI::App& app, OpenGridOptions& options) {
+  app.add_option("--time-step", options.time_step,
+                 "Of several time steps the one to take, from 0 (default: the first)");
+  addGlobeOptions(app, options.globe);
   Plot3dForce& force = options.force;
   addWords<ByteOrder>(app, "--byte-order", "Byte order",
                       {{"little", ByteOrder::little}, {"big", ByteOrder::big}}, force.byte_order);

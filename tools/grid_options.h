@@ -8,8 +8,9 @@
 
 namespace curvisplat {
 
-/// Adds --byte-order, --records, --precision, --blocks, --iblank, --ascii and --binary to `app`; parsing sets
-/// options.force. `options` must live until then.
+/// Adds --time-step, --byte-order, --records, --precision, --blocks, --iblank, --ascii and --binary to `app`;
+/// parsing sets options.time_step and options.force. Adds --sphere, --flat and --vertical-scale, which set
+/// options.globe. `options` must live until then.
 void addGridOptions(CLI::App& app, OpenGridOptions& options);
 
 /// Adds --gamma and --gas-constant.

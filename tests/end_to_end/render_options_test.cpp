@@ -261,7 +261,7 @@ TEST_F(RenderOptions, WrongWordsAreUsageErrors) {
                {{"--clip-box", "0,1,0,1"}, "x0,x1,y0,y1,z0,z1"},
                {{"--background", "pink"}, "#rrggbb"},
                {{"--background", "#12345g"}, "#rrggbb"},
-               {{"--backend", "egl"}, "not in this version"},
+               {{"--backend", "metal"}, "auto, osmesa, egl or cpu"},
                {{"--memory", "lots"}, "512M"},
                {{"--max-splats", "10"}, "--max-splats"},
                {{"--first-image", "a.jpg"}, ".png"},

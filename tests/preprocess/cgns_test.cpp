@@ -229,7 +229,28 @@ TEST_P(Cgns, StepsAreThoseOfTheIterativeData) {
   EXPECT_EQ(second->description().time_step, 1u);
   expectValues(*second, 0, {0, 2, 0, 2}, 0, linear(1), 64);
   EXPECT_TRUE(open(2)->description().scalars.empty());
-  EXPECT_NE(errorOf(3).find("3 time steps, numbered from 0; --time-step 3"), std::string::npos) << errorOf(3);
+  EXPECT_NE(errorOf(3).find("has 3 time steps; --time-step 3 is none of them"), std::string::npos)
+      << errorOf(3);
+}
+
+TEST_P(Cgns, ZonesMayBeThereAtSomeStepsOnly) {
+  {
+    CgnsWriter file = writer();
+    file.base("Base");
+    file.baseSteps({100, 200}, {{"First", "Always"}, {"Always", "Second"}}, true);
+    for (const char* zone : {"First", "Always", "Second"}) {
+      file.zone(zone, {3, 2, 2});
+      file.coordinates("GridCoordinates", cartesian());
+    }
+  }
+  const auto first = open(), second = open(1);
+  EXPECT_EQ(first->description().times, (std::vector<double>{100, 200}));
+  ASSERT_EQ(first->description().blocks.size(), 2u);
+  EXPECT_EQ(first->description().blocks[0].name, "First");
+  EXPECT_EQ(first->description().blocks[1].name, "Always");
+  ASSERT_EQ(second->description().blocks.size(), 2u);
+  EXPECT_EQ(second->description().blocks[0].name, "Always");
+  EXPECT_EQ(second->description().blocks[1].name, "Second");
 }
 
 TEST_P(Cgns, SolutionsWithoutTimesFollowOneAnother) {

@@ -278,5 +278,34 @@ TEST(NodeSplats, CountsInvertedCells) {
   EXPECT_TRUE(allFinite(out));
 }
 
+// The weighted mean of tangents x² about the nodes: at a node it must be the node's own value, wherever the
+// cells grow.
+TEST(NodeSplats, MeansMakeUpForWhatTangentsMiss) {
+  for (const double growth : {1.0, 1.1}) {
+    const auto x = [&](double i) { return growth == 1 ? i : (std::pow(growth, i) - 1) / (growth - 1); };
+    MappedBlock block(9, 5, 5, [&](double i, double j, double k) { return glm::dvec3(x(i), j, k); });
+    block.addScalar([](const glm::dvec3& p) { return p.x * p.x; });
+    const NodeSplats splats = block.splats();
+    for (uint64_t i = 1; i + 1 < 9; ++i) {
+      const size_t n = block.at(i, 2, 2);
+      const Splat& splat = splats.splats[n].splat;
+      const double spacing = splat.axis[0], here = splat.position.x;
+      // Half the second derivative, 1, times the kernel's variance.
+      EXPECT_NEAR(splats.values[n].mean, here * here + 0.1994 * spacing * spacing,
+                  growth == 1 ? 1e-4 * here * here : 0.02 * spacing * spacing)
+          << growth << " " << i;
+    }
+  }
+}
+
+TEST(NodeSplats, MeansStayWithinTheNeighboursValues) {
+  MappedBlock block(9, 9, 9, [](double i, double j, double k) { return glm::dvec3(i, j, k); });
+  block.addScalar([](const glm::dvec3& p) { return p.x + p.y > 8 ? 1.0 : 0.0; });
+  for (const SplatScalar& value : block.splats().values) {
+    EXPECT_GE(value.mean, 0);
+    EXPECT_LE(value.mean, 1);
+  }
+}
+
 }  // namespace
 }  // namespace curvisplat

@@ -164,9 +164,11 @@ TEST(MakeScene, RefusesWhatThereIsNot) {
     makeScene("pipe");
     FAIL();
   } catch (const UsageError& error) {
-    EXPECT_NE(std::string(error.what()).find("half-annulus, half-annulus-constant, wake"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("half-annulus, half-annulus-constant, shell, "),
+              std::string::npos);
   }
   EXPECT_THROW(makeScene("wake", 0), UsageError);
+  EXPECT_THROW(makeScene("sheared-waves", 2), UsageError);
   EXPECT_THROW(makeScene("wake", std::nan("")), UsageError);
   EXPECT_THROW(SceneGridSource(makeScene("wake"), {1, 9, 9}), UsageError);
 }

@@ -22,13 +22,19 @@ std::vector<Value> valuesOf(const CgnsWriterField& field, const std::array<int, 
   return all;
 }
 
-/// At the node that was gone to, a name of 32 characters a column.
-void writeNames(const char* array, const std::vector<std::string>& names) {
-  constexpr size_t kName = 32;
+constexpr size_t kName = 32;
+
+/// Names of 32 characters each.
+std::string padded(const std::vector<std::string>& names) {
   std::string all;
   for (const std::string& name : names) all += name + std::string(kName - name.size(), ' ');
+  return all;
+}
+
+/// At the node that was gone to, a name a column.
+void writeNames(const char* array, const std::vector<std::string>& names) {
   const cgsize_t dims[2] = {kName, static_cast<cgsize_t>(names.size())};
-  check(cg_array_write(array, CGNS_ENUMV(Character), 2, dims, all.data()));
+  check(cg_array_write(array, CGNS_ENUMV(Character), 2, dims, padded(names).data()));
 }
 
 }  // namespace
@@ -129,11 +135,22 @@ void CgnsWriter::fieldUnits(int field, const std::vector<float>& exponents) {
     check(cg_exponents_write(CGNS_ENUMV(RealSingle), exponents.data()));
 }
 
-void CgnsWriter::baseSteps(const std::vector<double>& times) {
+void CgnsWriter::baseSteps(const std::vector<double>& times,
+                           const std::vector<std::vector<std::string>>& zones, bool iterations) {
   check(cg_biter_write(file_, base_, "TimeSteps", static_cast<int>(times.size())));
   check(cg_goto(file_, base_, "BaseIterativeData_t", 1, "end"));
   const auto count = static_cast<cgsize_t>(times.size());
-  check(cg_array_write("TimeValues", CGNS_ENUMV(RealDouble), 1, &count, times.data()));
+  if (iterations) {
+    const std::vector<int> numbers(times.begin(), times.end());
+    check(cg_array_write("IterationValues", CGNS_ENUMV(Integer), 1, &count, numbers.data()));
+  } else {
+    check(cg_array_write("TimeValues", CGNS_ENUMV(RealDouble), 1, &count, times.data()));
+  }
+  if (zones.empty()) return;
+  std::string all;
+  for (const auto& step : zones) all += padded(step);
+  const cgsize_t dims[3] = {kName, static_cast<cgsize_t>(zones[0].size()), count};
+  check(cg_array_write("ZonePointers", CGNS_ENUMV(Character), 3, dims, all.data()));
 }
 
 void CgnsWriter::zoneSteps(const std::vector<std::string>& solutions, const std::vector<std::string>& grids) {

@@ -49,7 +49,10 @@ class CgnsWriter {
   /// The exponents of a field of the last solution; it is dimensionless if `exponents` are empty.
   void fieldUnits(int field, const std::vector<float>& exponents);
 
-  void baseSteps(const std::vector<double>& times);
+  /// `zones`: the names of those that there are at each step, as many at each; empty: not told. Where
+  /// `iterations`, times are told as whole numbers of those.
+  void baseSteps(const std::vector<double>& times, const std::vector<std::vector<std::string>>& zones = {},
+                 bool iterations = false);
   /// For each step the name of a solution and, unless `grids` is empty, of coordinates.
   void zoneSteps(const std::vector<std::string>& solutions, const std::vector<std::string>& grids = {});
 

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <new>
@@ -46,7 +47,11 @@ void onCrash(int) {
     Dl_info info{};
     if (!::dladdr(frames[n], &info) || !info.dli_fname) continue;
     for (const char* library : {"libcgns", "libhdf5", "libnetcdf", "libz.", "libsz."})
-      if (std::strstr(info.dli_fname, library)) ::_exit(kLibraryCrash);
+      if (std::strstr(info.dli_fname, library)) {
+        ::dprintf(STDERR_FILENO, "%s, %s", library,
+                  info.dli_sname ? info.dli_sname : "a function of its own");
+        ::_exit(kLibraryCrash);
+      }
     for (const char* library : {"libc.so", "libasan", "libubsan", "ld-linux", "libstdc++", "libgcc"})
       if (std::strstr(info.dli_fname, library)) goto next;
     break;
@@ -149,10 +154,11 @@ class Trials {
   DamageReport report;
 
  private:
-  void count(int status, const std::string& name, const std::string& words) {
+  void count(int status, const std::string& name, std::string words) {
+    std::replace(words.begin(), words.end(), '\n', ' ');
     const int ending = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
     if (ending == kLibraryCrash) {
-      report.library_crashes.push_back(name);
+      report.library_crashes.push_back(name + ": " + words);
       return;
     }
     if (ending == kSame) ++report.same;
@@ -202,6 +208,15 @@ DamageReport openCorrupted(const std::filesystem::path& file, int count, uint64_
     trials.tryBytes(damaged, fmt::format("byte {} from {:#04x} to {:#04x}", at, before, after));
   }
   return trials.report;
+}
+
+std::string harm(const char* what, const DamageReport& report) {
+  fmt::print("{}: {} the same, {} changed, {} refused, {} crashes of libraries\n", what, report.same,
+             report.changed, report.refused, report.library_crashes.size());
+  for (const std::string& crash : report.library_crashes) fmt::print("  crash of a library: {}\n", crash);
+  std::string failures;
+  for (const std::string& failure : report.failures) failures += failure + "\n";
+  return failures;
 }
 
 }  // namespace curvisplat

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -31,5 +32,8 @@ DamageReport openTruncated(const std::filesystem::path& file, int count, const O
 /// `count` copies of `file` with one byte changed, seeded.
 DamageReport openCorrupted(const std::filesystem::path& file, int count, uint64_t seed,
                            const OpenDamaged& open);
+
+/// The failures, a line each. Prints the counts, and the crashes of libraries, which are no failures of ours.
+std::string harm(const char* what, const DamageReport& report);
 
 }  // namespace curvisplat

@@ -1,7 +1,5 @@
 #include "tests/support/painted_splats.h"
 
-#include <gtest/gtest.h>
-
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -53,7 +51,7 @@ Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const Cl
 double largestDifference(const Image& a, const Image& b) {
   double largest = 0;
   for (size_t n = 0; n < a.rgba.size(); ++n) {
-    EXPECT_TRUE(std::isfinite(a.rgba[n]));
+    if (!std::isfinite(a.rgba[n])) return INFINITY;
     largest = std::max<double>(largest, std::abs(a.rgba[n] - b.rgba[n]));
   }
   return largest;

@@ -28,7 +28,7 @@ Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const Cl
                  bool per_pixel, ImageSize size, const glm::vec4& background = {1, 1, 1, 1},
                  const PaintResources& resources = {});
 
-/// Of any channel of any pixel; all of `a` are finite, or the test fails.
+/// Of any channel of any pixel; infinite where `a` is not finite.
 double largestDifference(const Image& a, const Image& b);
 
 }  // namespace curvisplat

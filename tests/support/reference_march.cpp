@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
+#include <memory>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -55,34 +57,47 @@ std::optional<std::pair<double, double>> partInBox(const Ray& ray, const glm::dv
 
 class Marcher {
  public:
-  Marcher(const Scene& scene, const OpticalFunction& function, const Ray& ray)
-      : scene_(scene), function_(function), ray_(ray) {}
+  Marcher(const ReferenceField& field, const OpticalFunction& function, const Ray& ray)
+      : probe_(field.probe()), function_(function), ray_(ray) {}
 
-  ReferencePixel march(double begin, double end, double step) {
-    const auto steps = static_cast<int64_t>(std::ceil((end - begin) / step));
-    const auto at = [&](int64_t n) {
-      return begin + (end - begin) * static_cast<double>(n) / static_cast<double>(steps);
-    };
-    bool was_inside = inside(at(0));
-    for (int64_t n = 0; n < steps; ++n) {
-      const bool is_inside = inside(at(n + 1));
-      if (was_inside && is_inside)
-        add(at(n), at(n + 1));
-      else if (was_inside)
-        add(at(n), face(at(n), at(n + 1)));
-      else if (is_inside)
-        add(face(at(n + 1), at(n)), at(n + 1));
-      was_inside = is_inside;
+  ReferencePixel march(double begin, double end, const MarchSteps& steps) {
+    double t = begin;
+    bool is_inside = inside(t);
+    while (t < end) {
+      double step = steps.step;
+      if (is_inside)
+        step = std::clamp(steps.cells * probe_->cellLength(ray_.direction), kLeastStep * step, step);
+      const double next = std::min(end, t + step);
+      const bool next_inside = inside(next);
+      if (is_inside && next_inside) {
+        add(t, next);
+        t = next;
+      } else if (is_inside) {
+        add(t, face(t, next));
+        t = next;
+      } else if (next_inside) {
+        t = face(next, t);  // and then in steps of the cells that are there
+        inside(t);
+      } else {
+        t = next;
+      }
+      is_inside = next_inside;
     }
     return {colour_ + transmittance_, transmittance_};
   }
 
  private:
-  bool inside(double t) const { return scene_.contains(ray_.at(t)); }
-  OpticalProperties properties(double t) const { return function_(scene_.scalar(ray_.at(t))); }
+  static constexpr double kLeastStep = 1e-5;  // of the largest
 
-  // Where the scene ends between a point inside and one outside, to the last bits.
-  double face(double in, double out) const {
+  bool inside(double t) { return probe_->at(ray_.at(t)).has_value(); }
+  // A point between two inside that is not: a fold of a grid, or a gap no wider than a step. It is empty.
+  OpticalProperties properties(double t) {
+    const std::optional<double> scalar = probe_->at(ray_.at(t));
+    return scalar ? function_(*scalar) : OpticalProperties{};
+  }
+
+  // Where the field ends between a point inside and one outside, to the last bits.
+  double face(double in, double out) {
     for (int n = 0; n < 60; ++n) {
       const double middle = 0.5 * (in + out);
       (inside(middle) ? in : out) = middle;
@@ -108,7 +123,7 @@ class Marcher {
     transmittance_ *= passed;
   }
 
-  const Scene& scene_;
+  std::unique_ptr<FieldProbe> probe_;
   const OpticalFunction& function_;
   Ray ray_;
   glm::dvec3 colour_{0.0};
@@ -132,21 +147,64 @@ OpticalProperties stepFunction(double f) {
   return {sectionNineColour(f), f > 0.5 ? 16.0 : 0.0};
 }
 
-ReferenceImage referenceMarch(const Scene& scene, const OpticalFunction& function, const Camera& camera,
-                              ImageSize size, double step) {
+ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction& function,
+                              const Camera& camera, ImageSize size, const MarchSteps& steps) {
   ReferenceImage image{size, {}};
   image.pixels.resize(static_cast<size_t>(size.width) * static_cast<size_t>(size.height));
-  const auto [lower, upper] = scene.bounds();
+  const auto [lower, upper] = field.bounds();
+  const glm::dvec3 forward = glm::normalize(camera.focal_point - camera.position);
   tbb::parallel_for(0, size.height, [&, lower = lower, upper = upper](int y) {
     for (int x = 0; x < size.width; ++x) {
       const Ray ray = rayThrough(camera, size, x, y);
       ReferencePixel& pixel = image.pixels[static_cast<size_t>(y) * size.width + x];
-      if (const auto part = partInBox(ray, lower, upper))
-        pixel = Marcher(scene, function, ray).march(part->first, part->second, step);
-      else
-        pixel.colour = glm::dvec3(1.0);
+      pixel.colour = glm::dvec3(1.0);
+      const auto part = partInBox(ray, lower, upper);
+      if (!part) continue;
+      const bool from_eye = camera.projection == Projection::perspective;
+      const double near = from_eye ? steps.near / glm::dot(ray.direction, forward) : 0.0;
+      const double begin = std::max(part->first, near);
+      if (begin < part->second) pixel = Marcher(field, function, ray).march(begin, part->second, steps);
     }
   });
+  return image;
+}
+
+ReferenceImage referenceMarch(const Scene& scene, const OpticalFunction& function, const Camera& camera,
+                              ImageSize size, double step) {
+  MarchSteps steps;
+  steps.step = step;
+  return referenceMarch(SceneField(scene), function, camera, size, steps);
+}
+
+ReferenceImage convergedMarch(const ReferenceField& field, const OpticalFunction& function,
+                              const Camera& camera, ImageSize size, MarchSteps steps, double agreement_db,
+                              double* reached_db) {
+  constexpr int kMostHalvingsOfSteps = 6;
+  ReferenceImage image = referenceMarch(field, function, camera, size, steps);
+  double agreement = 0;
+  for (int n = 0; n < kMostHalvingsOfSteps && agreement < agreement_db; ++n) {
+    steps.step *= 0.5;
+    steps.cells *= 0.5;
+    ReferenceImage finer = referenceMarch(field, function, camera, size, steps);
+    double sum = 0;
+    for (size_t p = 0; p < image.pixels.size(); ++p) {
+      const glm::dvec3 d = finer.pixels[p].colour - image.pixels[p].colour;
+      sum += glm::dot(d, d) / 3;
+    }
+    agreement = sum > 0 ? -10 * std::log10(sum / static_cast<double>(image.pixels.size())) : 200.0;
+    image = std::move(finer);
+  }
+  if (reached_db) *reached_db = agreement;
+  return image;
+}
+
+Image toImage(const ReferenceImage& reference) {
+  Image image(reference.size);
+  for (size_t n = 0; n < reference.pixels.size(); ++n) {
+    for (int c = 0; c < 3; ++c)
+      image.rgba[4 * n + static_cast<size_t>(c)] = static_cast<float>(reference.pixels[n].colour[c]);
+    image.rgba[4 * n + 3] = 1;
+  }
   return image;
 }
 

@@ -1,11 +1,11 @@
-// The specification of the renderer: a ray march in double precision through an analytic scene, along the
-// rays through the pixels' centres. It shares no code with render/ but the words for a camera. Slow, and
-// right.
+// The specification of the renderer: a ray march in double precision through an analytic scene or a real
+// grid, along the rays through the pixels' centres. It shares no code with render/ but the words for a
+// camera. Slow, and right.
 //
 // Front to back, emission and absorption: where colour c and extinction kappa are constant over a length d,
 // the picture gains T (1 - exp(-kappa d)) c and the transmittance T shrinks by exp(-kappa d). A step is
 // halved until kappa hardly changes over it, so that jumps of the transfer function are found too; the
-// scene's faces are found by bisection.
+// field's faces are found by bisection.
 #pragma once
 
 #include <functional>
@@ -14,6 +14,8 @@
 
 #include "preprocess/scenes.h"
 #include "render/camera.h"
+#include "render/image.h"
+#include "tests/support/reference_field.h"
 
 namespace curvisplat {
 
@@ -42,11 +44,28 @@ struct ReferenceImage {
   }
 };
 
-/// Marches every pixel with steps of at most `step` world units, from the plane of the viewer on. A part of a
-/// ray inside or outside of the scene that is shorter than `step` may be missed. Parallel; the result does
-/// not depend on the threads.
+/// How far a march goes at a time, and where it begins.
+struct MarchSteps {
+  double step = 0.004;  // world units
+  double cells = 0.5;   // of a grid's cell, at the point where a step begins
+  double near = 0;      // perspective: as ScreenView::near
+};
+
+/// Marches every pixel, from the plane of the viewer on. A part of a ray inside or outside of the field that
+/// is shorter than a step may be missed. Parallel; the result does not depend on the threads.
+ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction& function,
+                              const Camera& camera, ImageSize size, const MarchSteps& steps);
 ReferenceImage referenceMarch(const Scene& scene, const OpticalFunction& function, const Camera& camera,
                               ImageSize size, double step = 0.004);
+
+/// Halves the steps until two successive pictures agree at `agreement_db` or more, six times at the most, and
+/// gives the finer one. `reached_db` gets their agreement.
+ReferenceImage convergedMarch(const ReferenceField& field, const OpticalFunction& function,
+                              const Camera& camera, ImageSize size, MarchSteps steps = {},
+                              double agreement_db = 75, double* reached_db = nullptr);
+
+/// As a picture over white.
+Image toImage(const ReferenceImage& reference);
 
 /// Section 9's camera: orthographic, on the half-annulus.
 Camera halfAnnulusCamera();

@@ -1,0 +1,264 @@
+// How faithful the pictures are: scenes and real grids through conversion and rendering, against the
+// reference ray march. One table, and JSON on request.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <regex>
+
+#include "preprocess/open_grid.h"
+#include "preprocess/scenes.h"
+#include "render/image.h"
+#include "stream/file.h"
+#include "tests/support/grid_field.h"
+#include "tests/support/known_pictures.h"
+#include "tests/support/rearranged_grid.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr ImageSize kSize{256, 256};
+constexpr SceneGridSize kNodes{128, 64, 64};
+
+struct View {
+  std::string name;
+  Camera camera;
+};
+
+/// A grid and what its picture is held against.
+struct Case {
+  std::string name;
+  std::unique_ptr<GridSource> source;
+  uint32_t scalar = 0;
+  std::shared_ptr<const Scene> scene;  // what `field` looks at, if it is one
+  std::unique_ptr<ReferenceField> field;
+  std::pair<double, double> range{0, 1};
+  double length = 1;  // of world units, that counts as one for the extinction
+  std::vector<View> views;
+};
+
+Case sceneCase(const std::string& name, const std::string& scene, std::optional<double> clustering,
+               std::vector<View> views, std::optional<std::array<uint64_t, 3>> cuts = {}) {
+  Case out;
+  out.name = name;
+  out.scene = makeScene(scene, clustering);
+  out.source = std::make_unique<SceneGridSource>(out.scene, kNodes, 4);
+  if (cuts) {
+    Rearrangement how;
+    how.cuts = *cuts;
+    out.source = std::make_unique<RearrangedGridSource>(*out.source, how);
+  }
+  out.field = std::make_unique<SceneField>(*out.scene);
+  out.views = std::move(views);
+  return out;
+}
+
+/// A scene's grid against its own trilinear interpolation: what is left is the splats' doing alone.
+Case trilinearCase(const std::string& name, const std::string& scene, std::optional<double> clustering,
+                   std::vector<View> views) {
+  Case out = sceneCase(name, scene, clustering, std::move(views));
+  out.field = std::make_unique<GridField>(*out.source, 0);
+  return out;
+}
+
+Case realCase(const std::string& name, const std::filesystem::path& grid,
+              const std::filesystem::path& solution, const std::string& scalar) {
+  Case out;
+  out.name = name;
+  OpenGridOptions options;
+  options.grid = grid;
+  options.solutions = {solution};
+  out.source = openGrid(options);
+  out.scalar = scalarsNamed(out.source->description(), {scalar}).front();
+  auto field = std::make_unique<GridField>(*out.source, out.scalar);
+  const auto [lower, upper] = field->bounds();
+  out.range = field->range();
+  out.length = glm::length(upper - lower) / 3;  // as half-annulus, whose diagonal is 2.6
+  for (const char* view : {"iso", "-x"})
+    out.views.push_back({view, Camera::named(view, lower, upper, kSize, Projection::orthographic)});
+  out.views.push_back({"iso 30", Camera::named("iso", lower, upper, kSize, Projection::perspective)});
+  out.field = std::move(field);
+  return out;
+}
+
+struct NamedCase {
+  std::string name;
+  std::function<Case()> make;
+};
+
+std::vector<NamedCase> allCases() {
+  const View front{"front", halfAnnulusCamera()}, edge{"edge-on", edgeOnCamera()},
+      perspective{"30 degrees", perspectiveCamera(30)}, wide{"90 degrees", perspectiveCamera(90)};
+  Camera from_afar = halfAnnulusCamera();
+  from_afar.focal_point = {0, 0, 0.5};
+  from_afar.position = from_afar.focal_point - 6.0 * glm::normalize(glm::dvec3(0.8, 0.35, -0.45));
+  from_afar.parallel_scale = 1.4;
+  const View whole{"whole", from_afar};
+  from_afar.focal_point = {0, 0, 0};
+  from_afar.parallel_scale = 2.6;
+  const View sheared{"whole", from_afar};
+
+  std::vector<NamedCase> cases;
+  const auto add = [&](const std::string& name, const std::string& scene, std::optional<double> clustering,
+                       std::vector<View> views, std::optional<std::array<uint64_t, 3>> cuts = {}) {
+    cases.push_back({name, [=] { return sceneCase(name, scene, clustering, views, cuts); }});
+  };
+  add("half-annulus 2.5", "half-annulus", 2.5, {front, edge, perspective, wide});
+  add("half-annulus 5", "half-annulus", 5, {front});
+  add("half-annulus 7", "half-annulus", 7, {front});
+  add("half-annulus 9", "half-annulus", 9, {front, edge});
+  add("constant", "half-annulus-constant", {}, {front, edge});
+  add("two blocks", "half-annulus", 2.5, {front}, {{2, 1, 1}});
+  add("o-grid", "o-grid", {}, {whole});
+  add("axis", "axis", {}, {whole});
+  add("shell", "shell", {}, {front});
+  add("sheared waves", "sheared-waves", {}, {sheared});
+  for (const double clustering : {2.5, 9.0}) {
+    const std::string name = fmt::format("trilinear {}", clustering);
+    cases.push_back({name, [=] { return trilinearCase(name, "half-annulus", clustering, {front}); }});
+  }
+  const std::filesystem::path data = CURVISPLAT_SHARED_DATA;
+  const auto real = [&](const std::string& name, const std::string& grid, const std::string& solution,
+                        const std::string& scalar) {
+    if (std::filesystem::exists(data / grid))
+      cases.push_back({name, [=] { return realCase(name, data / grid, data / solution, scalar); }});
+  };
+  real("bluntfin density", "bluntfin/bluntfinxyz.bin", "bluntfin/bluntfinq.bin", "density");
+  real("combustor density", "combustor/combxyz.bin", "combustor/combq.bin", "density");
+  real("nek pressure", "nek/leadingEdge_block.xyz", "nek/leadingEdge_block.fun", "1");
+  return cases;
+}
+
+class Measurement {
+ public:
+  Measurement(std::filesystem::path folder, double low_pass_px2, bool pictures, bool quick)
+      : folder_(std::move(folder)), low_pass_px2_(low_pass_px2), pictures_(pictures), quick_(quick) {
+    std::filesystem::create_directories(folder_);
+  }
+
+  void measure(const Case& grid) {
+    const std::filesystem::path cache = folder_ / (fileName(grid.name) + ".splats");
+    convertGrid(*grid.source, cache, grid.scalar);
+    for (const View& view : grid.views)
+      for (const std::string function : {"smooth", "band", "step"})
+        // A uniform medium right at the step's jump says nothing.
+        if (!(grid.name == "constant" && function == "step")) measure(grid, view, function, cache);
+  }
+
+  nlohmann::json rows() const { return rows_; }
+
+ private:
+  static std::string fileName(std::string name) {
+    for (char& c : name)
+      if (c == ' ') c = '_';
+    return name;
+  }
+
+  /// Marched by the first who asks, and kept in the folder.
+  Image reference(const Case& grid, const View& view, const std::string& function_name,
+                  const KnownFunction& function) {
+    const auto path = folder_ / fmt::format("{}_{}_{}_reference.pfm", fileName(grid.name),
+                                            fileName(view.name), function_name);
+    if (!std::filesystem::exists(path)) {
+      MarchSteps steps;
+      steps.step = 0.016 * grid.length;
+      steps.cells = 2;
+      double reached = 0;
+      const Image image =
+          toImage(convergedMarch(*grid.field, function.exact, view.camera, kSize, steps, 75, &reached));
+      if (reached < 75)
+        fmt::print(stderr, "{}: successive references agree at {:.1f} dB only\n", path.string(), reached);
+      writeImage(image, path);
+    }
+    return readImage(path);
+  }
+
+  void measure(const Case& grid, const View& view, const std::string& function_name,
+               const std::filesystem::path& cache) {
+    const KnownFunction function =
+        KnownFunction::of(function_name, grid.range.first, grid.range.second, grid.length);
+    const Image exact = reference(grid, view, function_name, function);
+    if (rows_.empty()) fmt::print("{:<18} {:<10} {:<7} {:>31}   {:>31}\n", "", "", "", "per pixel", "flat");
+    std::string line = fmt::format("{:<18} {:<10} {:<7}", grid.name, view.name, function_name);
+    for (const auto classification : {Classification::pixel, Classification::flat}) {
+      for (const double lod_pixels : {0.0, 4.0, 8.0}) {
+        if (quick_ && (lod_pixels > 0 || classification == Classification::flat)) continue;
+        FrameOptions options = knownFrame(kSize);
+        options.low_pass_px2 = low_pass_px2_;
+        options.lod_pixels = lod_pixels;
+        options.classification = classification;
+        uint64_t splats = 0;
+        const Image picture = drawCache(cache, function.table, view.camera, options, &splats);
+        const ImageDifference difference = compareImages(picture, exact);
+        const bool flat = classification == Classification::flat;
+        line +=
+            fmt::format(" {:5.1f}{:>7}", difference.psnr_db, flat ? "" : fmt::format("({}k)", splats / 1000));
+        rows_.push_back({{"case", grid.name},
+                         {"view", view.name},
+                         {"function", function_name},
+                         {"classification", flat ? "flat" : "pixel"},
+                         {"lod_pixels", lod_pixels},
+                         {"splats", splats},
+                         {"psnr_db", difference.psnr_db},
+                         {"largest", difference.largest}});
+        if (pictures_ && lod_pixels == 0 && !flat) leave(picture, exact, grid, view, function_name);
+      }
+      line += "  ";
+    }
+    fmt::print("{}\n", line);
+    std::fflush(stdout);
+  }
+
+  void leave(const Image& picture, const Image& exact, const Case& grid, const View& view,
+             const std::string& function_name) {
+    const std::string prefix =
+        fmt::format("{}_{}_{}", fileName(grid.name), fileName(view.name), function_name);
+    Image difference(picture.size);
+    for (size_t n = 0; n < difference.rgba.size(); ++n)
+      difference.rgba[n] = n % 4 == 3 ? 1 : 20 * std::abs(picture.rgba[n] - exact.rgba[n]);
+    writeImage(picture, folder_ / (prefix + "_picture.png"));
+    writeImage(exact, folder_ / (prefix + "_reference.png"));
+    writeImage(difference, folder_ / (prefix + "_difference_x20.png"));
+  }
+
+  std::filesystem::path folder_;
+  double low_pass_px2_;
+  bool pictures_, quick_;
+  nlohmann::json rows_ = nlohmann::json::array();
+};
+
+int run(int argc, char** argv) {
+  CLI::App app(
+      "How faithful pictures are: dB against the reference march, and splats drawn.\n"
+      "Columns: the finest level, 4 pixels, 8 pixels.");
+  std::string folder, only = ".*", json;
+  double low_pass_px2 = FrameOptions().low_pass_px2;
+  bool pictures = false, quick = false;
+  app.add_option("FOLDER", folder, "caches and references; references are kept and used again")->required();
+  app.add_option("--only", only, "a regular expression: cases to measure");
+  app.add_option("--json", json, "the same as a file");
+  app.add_option("--low-pass", low_pass_px2, "pixels squared");
+  app.add_flag("--pictures", pictures, "leave pictures, references and differences in FOLDER");
+  app.add_flag("--quick", quick, "the finest level, per pixel, alone");
+  CLI11_PARSE(app, argc, argv);
+  Measurement measurement(folder, low_pass_px2, pictures, quick);
+  for (const NamedCase& named : allCases())
+    if (std::regex_search(named.name, std::regex(only))) measurement.measure(named.make());
+  if (!json.empty()) writeFileAtomically(json, measurement.rows().dump(1) + "\n");
+  return 0;
+}
+
+}  // namespace
+}  // namespace curvisplat
+
+int main(int argc, char** argv) {
+  try {
+    return curvisplat::run(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "curvisplat_fidelity: {}\n", error.what());
+    return 1;
+  }
+}

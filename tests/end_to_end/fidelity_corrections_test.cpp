@@ -1,0 +1,186 @@
+// What each correction of the method is worth: with it a picture is as faithful as it must be, without it it
+// is not. So every threshold here is known to be one that a broken correction misses.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "preprocess/scenes.h"
+#include "render/image.h"
+#include "tests/support/direct_picture.h"
+#include "tests/support/function_grid.h"
+#include "tests/support/grid_field.h"
+#include "tests/support/known_pictures.h"
+#include "tests/support/rearranged_grid.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr ImageSize kSize{128, 128};
+
+Image marched(const ReferenceField& field, const KnownFunction& function, const Camera& camera,
+              ImageSize size = kSize) {
+  MarchSteps steps;
+  steps.step = 0.016;
+  steps.cells = 1;
+  return toImage(referenceMarch(field, function.exact, camera, size, steps));
+}
+
+/// Expects `least_db` of `with` against the reference, and less than that of `without`.
+void expectWorth(const std::string& what, const GridSource& source, const ReferenceField& field,
+                 const std::string& function_name, const Camera& camera, double least_db,
+                 const DirectOptions& with, const DirectOptions& without) {
+  const KnownFunction function = KnownFunction::of(function_name);
+  const Image reference = marched(field, function, camera);
+  const auto db = [&](const DirectOptions& options) {
+    const Image picture = drawDirectly(source, 0, options, function.table, camera, kSize);
+    return compareImages(picture, reference).psnr_db;
+  };
+  const double with_db = db(with), without_db = db(without);
+  fmt::print("{}: {:.1f} dB, without {:.1f} dB\n", what, with_db, without_db);
+  EXPECT_GE(with_db, least_db) << what;
+  EXPECT_LT(without_db, least_db) << what << " is not needed";
+}
+
+class Corrections : public testing::Test {
+ protected:
+  static std::shared_ptr<const Scene> scene(const std::string& name = "half-annulus") {
+    return makeScene(name);
+  }
+
+  const std::shared_ptr<const Scene> annulus_ = scene();
+  const SceneField field_{*annulus_};
+  const SceneGridSource source_{annulus_, {64, 32, 32}, 4};
+};
+
+TEST_F(Corrections, HalfCells) {
+  DirectOptions without;
+  without.nodes.half_cells = false;
+  expectWorth("half cells", source_, field_, "smooth", halfAnnulusCamera(), 56, {}, without);
+}
+
+TEST_F(Corrections, BendsOfTheScalar) {
+  DirectOptions without;
+  without.nodes.bends = false;
+  expectWorth("bends of the scalar", source_, field_, "band", halfAnnulusCamera(), 58, {}, without);
+}
+
+TEST_F(Corrections, MiddlesOfCells) {
+  // Spectral elements: nodes at Gauss-Legendre-Lobatto points, each element's own.
+  constexpr double kPoints[] = {
+      0, 0.0641299257, 0.2041499093, 0.3953503910, 0.6046496090, 0.7958500907, 0.9358700743};
+  const FunctionGridSource spectral({gridBlock(29, 29, 29)}, 1, [&](const GridNode& n) {
+    const auto at = [&](uint64_t i) { return 0.25 * (static_cast<double>(i / 7) + kPoints[i % 7]); };
+    return NodeValues{{at(n.i), at(n.j), at(n.k)}, {0.5f}, false};
+  });
+  Camera camera;
+  camera.position = {0.5, 0.5, 4};
+  camera.focal_point = {0.5, 0.5, 0.5};
+  camera.parallel_scale = 0.4;  // no borders
+  DirectOptions without;
+  without.nodes.middles = false;
+  expectWorth("middles of cells", spectral, GridField(spectral, 0), "smooth", camera, 34, {}, without);
+}
+
+TEST_F(Corrections, Seams) {
+  // Seen along the seams of a uniform medium.
+  const auto constant = scene("half-annulus-constant");
+  Rearrangement how;
+  how.cuts = {8, 4, 1};
+  DirectOptions without;
+  without.merge_seams = false;
+  Camera camera = edgeOnCamera();
+  camera.focal_point = {-0.55, 0, 0.5};
+  camera.parallel_scale = 0.2;  // no borders
+  expectWorth("seams", RearrangedGridSource(SceneGridSource(constant, {64, 32, 32}, 4), how),
+              SceneField(*constant), "smooth", camera, 40, {}, without);
+}
+
+TEST_F(Corrections, SpreadOfMergedShapes) {
+  // Along the voxels of a uniform medium: where they do not add up to one, a lattice shows.
+  const auto constant = scene("half-annulus-constant");
+  DirectOptions with, without;
+  with.voxel = without.voxel = 0.08;
+  without.spread = 1 / (0.44655 * 0.44655);  // the kernel's own covariance
+  Camera camera = edgeOnCamera();
+  camera.focal_point = {-0.55, 0, 0.5};
+  camera.parallel_scale = 0.2;  // no borders
+  expectWorth("spread of merged shapes", SceneGridSource(constant, {128, 64, 64}, 4), SceneField(*constant),
+              "smooth", camera, 35, with, without);
+}
+
+TEST_F(Corrections, VarianceOfMergedSplats) {
+  // Noise that a voxel cannot resolve: how often each scalar is in it is all that is left of it.
+  std::mt19937_64 random(7);
+  std::vector<float> noise(48 * 48 * 48);
+  for (float& f : noise) f = std::uniform_real_distribution<float>(0, 1)(random);
+  const FunctionGridSource source({gridBlock(48, 48, 48)}, 1, [&](const GridNode& n) {
+    const glm::dvec3 position(static_cast<double>(n.i), static_cast<double>(n.j), static_cast<double>(n.k));
+    return NodeValues{position / 47.0, {noise[(n.k * 48 + n.j) * 48 + n.i]}, false};
+  });
+  Camera camera;
+  camera.position = {1.5, 2, 4};
+  camera.focal_point = {0.5, 0.5, 0.5};
+  camera.parallel_scale = 0.2;  // no borders
+  const KnownFunction function = KnownFunction::of("band");
+  const Image all = drawDirectly(source, 0, {}, function.table, camera, kSize);
+  DirectOptions with, without;
+  with.voxel = without.voxel = 6 / 47.0;
+  without.variance = false;
+  const auto db = [&](const DirectOptions& options) {
+    return compareImages(drawDirectly(source, 0, options, function.table, camera, kSize), all).psnr_db;
+  };
+  const double with_db = db(with), without_db = db(without);
+  fmt::print("variance of merged splats: {:.1f} dB, without {:.1f} dB\n", with_db, without_db);
+  EXPECT_GE(with_db, 34);
+  EXPECT_LT(without_db, 34) << "is not needed";
+}
+
+TEST_F(Corrections, ClassificationPerPixel) {
+  DirectOptions without;
+  without.per_pixel = false;
+  expectWorth("classification per pixel", source_, field_, "band", halfAnnulusCamera(), 50, {}, without);
+}
+
+TEST_F(Corrections, SlopeAlongTheRay) {
+  DirectOptions without;
+  without.hidden_slope = false;
+  expectWorth("slope along the ray", source_, field_, "band", halfAnnulusCamera(), 58.5, {}, without);
+}
+
+TEST_F(Corrections, SlopeOfTheFieldNotOfThePixel) {
+  DirectOptions with, without;
+  with.low_pass_px2 = without.low_pass_px2 = 1.5;
+  without.slope_low_pass_px2 = 1.5;
+  expectWorth("slope of the field", source_, field_, "step", halfAnnulusCamera(), 45, with, without);
+}
+
+TEST_F(Corrections, LowPassNoWiderThanNeeded) {
+  DirectOptions without;
+  without.low_pass_px2 = 1.5;
+  expectWorth("narrow low-pass", source_, field_, "band", halfAnnulusCamera(), 58, {}, without);
+}
+
+TEST_F(Corrections, DistanceIsNotDepth) {
+  DirectOptions without;
+  without.secant = false;
+  expectWorth("distance in perspective", source_, field_, "smooth", perspectiveCamera(90), 45, {}, without);
+}
+
+TEST_F(Corrections, WideSplatsAreCut) {
+  Camera camera;
+  camera.projection = Projection::perspective;
+  camera.position = {-0.55, 0.1, 0.6};
+  camera.focal_point = {-0.3, -0.7, 0.35};
+  camera.view_up = {0, 0, 1};
+  camera.view_angle_deg = 90;
+  DirectOptions without;
+  without.widest = 1e9;
+  expectWorth("cutting of wide splats", source_, field_, "smooth", camera, 42, {}, without);
+}
+
+}  // namespace
+}  // namespace curvisplat

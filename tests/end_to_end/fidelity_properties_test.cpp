@@ -1,0 +1,205 @@
+// What must hold of pictures whatever the grid: convergence, and independence of how a grid is told, of how
+// it is cut into blocks and of how finely it samples; cameras inside of the data and wide ones.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+
+#include "preprocess/scenes.h"
+#include "render/image.h"
+#include "tests/support/direct_picture.h"
+#include "tests/support/known_pictures.h"
+#include "tests/support/rearranged_grid.h"
+#include "tests/support/reference_march.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+class FidelityProperties : public testing::Test {
+ protected:
+  /// Through a cache, as the program does it.
+  Image draw(const GridSource& source, const Camera& camera, const std::string& function, ImageSize size,
+             double low_pass_px2 = kLowPass) {
+    const std::filesystem::path cache = folder_ / "grid.splats";
+    convertGrid(source, cache);
+    FrameOptions options = knownFrame(size);
+    options.low_pass_px2 = low_pass_px2;
+    return drawCache(cache, KnownFunction::of(function).table, camera, options);
+  }
+
+  static SceneGridSource halfAnnulus(SceneGridSize size) {
+    return SceneGridSource(makeScene("half-annulus"), size, 4);
+  }
+
+  TemporaryFolder folder_;
+};
+
+Image marched(const Scene& scene, const std::string& function, const Camera& camera, ImageSize size,
+              double near = 0) {
+  MarchSteps steps;
+  steps.step = 0.016;
+  steps.near = near;
+  return toImage(convergedMarch(SceneField(scene), KnownFunction::of(function).exact, camera, size, steps));
+}
+
+TEST_F(FidelityProperties, PicturesConvergeWithTheGrid) {
+  constexpr ImageSize kSize{256, 256};
+  const Image reference = marched(*makeScene("half-annulus"), "smooth", halfAnnulusCamera(), kSize);
+  constexpr double kLeastGain[] = {7, 5, 2.5};
+  double coarser_db = 0;
+  for (int step = 0; step < 4; ++step) {
+    const uint64_t nodes = uint64_t{16} << step;
+    const Image picture = draw(halfAnnulus({nodes, nodes, nodes}), halfAnnulusCamera(), "smooth", kSize, 0.1);
+    const double db = compareImages(picture, reference).psnr_db;
+    fmt::print("{}³ nodes: {:.2f} dB\n", nodes, db);
+    if (step > 0) {
+      EXPECT_GE(db - coarser_db, kLeastGain[step - 1]) << nodes;
+    }
+    coarser_db = db;
+  }
+}
+
+TEST_F(FidelityProperties, OrderAndDirectionOfTheAxesDoNotMatter) {
+  constexpr ImageSize kSize{128, 128};
+  const SceneGridSource source = halfAnnulus({64, 32, 32});
+  const Image plain = draw(source, halfAnnulusCamera(), "band", kSize);
+  const Rearrangement others[] = {{{1, 0, 2}, {}},
+                                  {{2, 1, 0}, {}},
+                                  {{1, 2, 0}, {}},
+                                  {{0, 1, 2}, {true, false, false}},
+                                  {{0, 1, 2}, {false, true, true}},
+                                  {{2, 0, 1}, {true, true, true}}};
+  for (const Rearrangement& how : others) {
+    const Image other = draw(RearrangedGridSource(source, how), halfAnnulusCamera(), "band", kSize);
+    EXPECT_GE(compareImages(plain, other).psnr_db, 60) << how.axes[0] << how.axes[1] << how.axes[2];
+  }
+}
+
+TEST_F(FidelityProperties, BlocksThatAbutLookLikeOne) {
+  constexpr ImageSize kSize{256, 256};
+  const SceneGridSource source = halfAnnulus({128, 64, 64});
+  const std::string functions[] = {"smooth", "band", "step"};
+  std::vector<Image> uncut;
+  const Image uncut_step =
+      drawDirectly(source, 0, {}, KnownFunction::of("step").table, halfAnnulusCamera(), kSize);
+  for (const auto& cuts : std::vector<std::array<uint64_t, 3>>{{1, 1, 1}, {1, 2, 1}, {2, 2, 2}, {4, 4, 4}}) {
+    Rearrangement how;
+    how.cuts = cuts;
+    const RearrangedGridSource blocks(source, how);
+    convertGrid(blocks, folder_ / "grid.splats");
+    for (size_t n = 0; n < 3; ++n) {
+      const Image image = drawCache(folder_ / "grid.splats", KnownFunction::of(functions[n]).table,
+                                    halfAnnulusCamera(), knownFrame(kSize));
+      if (uncut.size() < 3) {
+        uncut.push_back(image);
+        continue;
+      }
+      const ImageDifference difference = compareImages(uncut[n], image);
+      fmt::print("{} blocks, {}: {:.1f} dB, {:.2f}/255\n", cuts[0] * cuts[1] * cuts[2], functions[n],
+                 difference.psnr_db, 255 * difference.largest);
+      EXPECT_GE(difference.psnr_db, 75) << functions[n];
+      // Where a function jumps, a few pixels show how the codec rounds: rows of other lengths differently.
+      if (functions[n] != "step") {
+        EXPECT_LE(difference.largest, 2.0 / 255) << functions[n];
+      }
+    }
+    const Image directly =
+        drawDirectly(blocks, 0, {}, KnownFunction::of("step").table, halfAnnulusCamera(), kSize);
+    const ImageDifference difference = compareImages(uncut_step, directly);
+    fmt::print("{} blocks, step, without the codec: {:.1f} dB, {:.2f}/255\n", cuts[0] * cuts[1] * cuts[2],
+               difference.psnr_db, 255 * difference.largest);
+    EXPECT_GE(difference.psnr_db, 100);
+    EXPECT_LE(difference.largest, 0.5 / 255);
+  }
+}
+
+TEST_F(FidelityProperties, OpacityDoesNotDependOnSampling) {
+  constexpr ImageSize kSize{128, 128};
+  // f = 0.5 has no blue, so that the blue over white is the transmittance.
+  const auto meanOpacity = [](const Image& image) {
+    double sum = 0;
+    for (size_t n = 0; n < image.rgba.size(); n += 4) sum += 1 - image.rgba[n + 2];
+    return sum / static_cast<double>(image.rgba.size() / 4);
+  };
+  const auto scene = std::shared_ptr<const Scene>(makeScene("half-annulus-constant"));
+  const double exact = meanOpacity(marched(*scene, "smooth", halfAnnulusCamera(), kSize));
+  for (const uint64_t nodes : {32, 64, 128}) {
+    const double opacity = meanOpacity(
+        draw(SceneGridSource(scene, {nodes, nodes, nodes}, 4), halfAnnulusCamera(), "smooth", kSize));
+    fmt::print("{}³ nodes: mean opacity {:.5f}, exactly {:.5f}\n", nodes, opacity, exact);
+    EXPECT_NEAR(opacity / exact, 1, 0.01) << nodes;
+  }
+}
+
+/// Pixels with an edge of the scene in or beside them are left out: how crisp an edge is drawn has nothing to
+/// do with the projection, and a camera's angle decides which edges there are.
+double psnrAwayFromEdges(const Image& picture, const Image& reference) {
+  constexpr float kEdge = 0.04f;
+  double sum = 0;
+  size_t count = 0;
+  for (int y = 2; y < reference.size.height - 2; ++y)
+    for (int x = 2; x < reference.size.width - 2; ++x) {
+      bool is_edge = false;
+      for (int dy = -2; dy <= 2; ++dy)
+        for (int dx = -2; dx <= 2; ++dx)
+          for (int c = 0; c < 3; ++c)
+            is_edge |= std::abs(reference.pixel(x + dx, y + dy)[c] - reference.pixel(x, y)[c]) >
+                       kEdge * static_cast<float>(std::abs(dx) + std::abs(dy));
+      if (is_edge) continue;
+      for (int c = 0; c < 3; ++c) {
+        const double d = picture.pixel(x, y)[c] - reference.pixel(x, y)[c];
+        sum += d * d;
+      }
+      count += 3;
+    }
+  return -10 * std::log10(sum / static_cast<double>(count));
+}
+
+TEST_F(FidelityProperties, PerspectiveIsAsGoodAsOrthographic) {
+  constexpr ImageSize kSize{160, 160};
+  const auto scene = makeScene("half-annulus");
+  const SceneGridSource source = halfAnnulus({128, 64, 64});
+  convertGrid(source, folder_ / "grid.splats");
+  for (const std::string function : {"smooth", "band"}) {
+    const auto db = [&](const Camera& camera) {
+      const Image picture =
+          drawCache(folder_ / "grid.splats", KnownFunction::of(function).table, camera, knownFrame(kSize));
+      return psnrAwayFromEdges(picture, marched(*scene, function, camera, kSize));
+    };
+    const double orthographic = db(halfAnnulusCamera()), perspective = db(perspectiveCamera(30));
+    fmt::print("{}: orthographic {:.1f} dB, 30 degrees {:.1f} dB\n", function, orthographic, perspective);
+    EXPECT_GE(perspective, orthographic - 1) << function;
+  }
+}
+
+TEST_F(FidelityProperties, ACameraInsideSeesWhatIsThere) {
+  constexpr ImageSize kSize{96, 96};
+  const auto scene = makeScene("half-annulus");
+  convertGrid(halfAnnulus({128, 64, 64}), folder_ / "grid.splats");
+  Camera camera;
+  camera.projection = Projection::perspective;
+  camera.position = {-0.55, 0.1, 0.6};
+  camera.focal_point = {-0.3, -0.7, 0.35};
+  camera.view_up = {0, 0, 1};
+  for (const double angle : {40.0, 100.0}) {
+    camera.view_angle_deg = angle;
+    for (const std::string function : {angle > 90 ? "smooth" : "band"}) {
+      const Image picture =
+          drawCache(folder_ / "grid.splats", KnownFunction::of(function).table, camera, knownFrame(kSize));
+      const Image reference = marched(*scene, function, camera, kSize, 2.6e-4);
+      const double db = compareImages(picture, reference).psnr_db;
+      fmt::print("inside, {} degrees, {}: {:.1f} dB\n", angle, function, db);
+      EXPECT_GE(db, 40);
+      if (db < 40) {
+        writeImage(picture, fmt::format("{}/inside_picture.png", testing::TempDir()));
+        writeImage(reference, fmt::format("{}/inside_reference.png", testing::TempDir()));
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,46 @@
+// Damaged NetCDF files: an Error of one line or changed values, never a crash, a hang or an allocation of
+// what the file has no room for.
+#include <gtest/gtest.h>
+
+#include "preprocess/open_grid.h"
+#include "tests/support/damaged_files.h"
+#include "tests/support/earth_files.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+class NetcdfDamage : public testing::TestWithParam<NetcdfFileType> {
+ protected:
+  NetcdfDamage() { roms::write(path_, GetParam(), "ocean_s_coordinate_g2"); }
+
+  static std::unique_ptr<GridSource> open(const std::filesystem::path& file) {
+    OpenGridOptions options;
+    options.grid = file;
+    return openGrid(options);
+  }
+
+  TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_ / "file.nc";
+};
+
+TEST_P(NetcdfDamage, TruncatedFilesAreRefused) {
+  const DamageReport report = openTruncated(path_, 100, open);
+  EXPECT_EQ(harm("truncated", report), "");
+  EXPECT_EQ(report.same + report.changed, 0);
+}
+
+TEST_P(NetcdfDamage, FilesWithAWrongByteAreRefusedOrRead) {
+  const DamageReport report = openCorrupted(path_, 1000, 23, open);
+  EXPECT_EQ(harm("a wrong byte", report), "");
+  EXPECT_GT(report.refused, 50);
+}
+
+INSTANTIATE_TEST_SUITE_P(Types, NetcdfDamage,
+                         testing::Values(NetcdfFileType::classic, NetcdfFileType::netcdf4_compressed),
+                         [](const auto& type) {
+                           return type.param == NetcdfFileType::classic ? "Classic" : "Compressed";
+                         });
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,251 @@
+// Damaged VTK files: truncated, and with one byte changed. The reader refuses them in words, or reads
+// well-formed data in which only what the byte stands for has changed; it asks for no more memory than a
+// small file implies.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <fstream>
+#include <new>
+#include <random>
+
+#include "preprocess/open_grid.h"
+#include "stream/error.h"
+#include "stream/file.h"
+#include "tests/preprocess/plot3d_bytes.h"
+#include "tests/support/all_nodes.h"
+#include "tests/support/vts_writer.h"
+
+namespace curvisplat {
+namespace {
+
+using test::TestFolder;
+
+// The files have some tens of KiB; readers have buffers.
+constexpr rlim_t kMoreMemory = rlim_t{64} << 20;
+constexpr uint64_t kMostRows = 4096;
+
+/// Until its end, this process may not take much more address space than it has.
+class MemoryLimit {
+ public:
+  MemoryLimit() {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    ::getrlimit(RLIMIT_AS, &before_);
+    uint64_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    rlimit limit = before_;
+    limit.rlim_cur = pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + kMoreMemory;
+    ::setrlimit(RLIMIT_AS, &limit);
+#endif
+  }
+  ~MemoryLimit() {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    ::setrlimit(RLIMIT_AS, &before_);
+#endif
+  }
+  MemoryLimit(const MemoryLimit&) = delete;
+  MemoryLimit& operator=(const MemoryLimit&) = delete;
+
+ private:
+  rlimit before_{};
+};
+
+/// All that a grid holds, in one row of numbers; of blocks that claim to be huge, the beginning.
+struct Content {
+  std::vector<std::string> names;
+  std::vector<std::array<uint64_t, 3>> blocks;
+  std::vector<double> numbers;
+};
+
+Content contentOf(const std::filesystem::path& path) {
+  OpenGridOptions options;
+  options.grid = path;
+  options.temporary_folder = path.parent_path();
+  const auto source = openGrid(options);
+  Content content;
+  for (const GridScalar& scalar : source->description().scalars) content.names.push_back(scalar.name);
+  std::vector<uint32_t> scalars(content.names.size());
+  std::iota(scalars.begin(), scalars.end(), 0u);
+  for (uint32_t b = 0; b < source->description().blocks.size(); ++b) {
+    const GridBlock& block = source->description().blocks[b];
+    content.blocks.push_back({block.ni, block.nj, block.nk});
+    if (block.ni > kMostRows) continue;
+    NodeArrays nodes;
+    source->read(b, {0, std::min<uint64_t>(block.nj, 64), 0, std::min<uint64_t>(block.nk, 64)}, scalars,
+                 nodes);
+    for (const auto* axis : {&nodes.x, &nodes.y, &nodes.z})
+      content.numbers.insert(content.numbers.end(), axis->begin(), axis->end());
+    for (const auto& values : nodes.scalars)
+      content.numbers.insert(content.numbers.end(), values.begin(), values.end());
+    content.numbers.insert(content.numbers.end(), nodes.blank.begin(), nodes.blank.end());
+  }
+  return content;
+}
+
+struct Ending {
+  enum class Kind { same, changed, refused } kind = Kind::same;
+  size_t changed = 0;  // numbers, if the names and blocks are as they were
+  std::string error;
+};
+
+/// What a damaged file ends in; fails the test where it must not end so.
+Ending endingOf(const std::filesystem::path& path, const Content& whole, const std::string& what) {
+  Ending ending;
+  try {
+    const MemoryLimit limit;
+    const Content content = contentOf(path);
+    if (content.names == whole.names && content.blocks == whole.blocks) {
+      for (size_t n = 0; n < whole.numbers.size(); ++n) {
+        const double a = content.numbers[n], b = whole.numbers[n];
+        ending.changed += a != b && !(std::isnan(a) && std::isnan(b));
+      }
+      if (ending.changed == 0) return ending;
+    }
+    ending.kind = Ending::Kind::changed;
+  } catch (const Error& error) {
+    ending.kind = Ending::Kind::refused;
+    ending.error = error.what();
+    EXPECT_EQ(ending.error.find('\n'), std::string::npos) << what << ": " << ending.error;
+    EXPECT_NE(ending.error.find(path.parent_path().string()), std::string::npos)
+        << what << ": " << ending.error;
+  } catch (const std::exception& exception) {
+    ADD_FAILURE() << what << ": " << exception.what();
+  }
+  return ending;
+}
+
+struct DamagedFile {
+  std::string name;  // with the extension
+  std::string bytes;
+  size_t data_begins = std::string::npos;  // bytes from here on are stored numbers
+  size_t most_changed = 0;                 // numbers, by one of these bytes; 0: such a byte is refused
+};
+
+void PrintTo(const DamagedFile& file, std::ostream* out) {
+  *out << file.name;
+}
+
+std::string made(const char* name) {
+  return readTextFile(std::filesystem::path(CURVISPLAT_TEST_DATA) / "vtk" / name);
+}
+
+std::vector<DamagedFile> damagedFiles() {
+  std::vector<DamagedFile> files;
+  for (VtsEncoding encoding : allVtsEncodings()) {
+    if (encoding.header_bytes == 8 && !encoding.big_endian) continue;  // enough of them
+    encoding.block_bytes = 200;
+    DamagedFile file;
+    file.name = encoding.inWords() + ".vts";
+    for (char& c : file.name)
+      if (c == ' ' || c == '-') c = '_';
+    file.bytes = vtsFile(annulusVtsGrid(5, 4, 4), encoding, &file.data_begins);
+    // Vectors: a component, and the magnitude; a coordinate; base64: two numbers may share a character. LZ4
+    // has no checksum: a whole block may change, 50 numbers, each vector with its magnitude.
+    if (encoding.format == VtsEncoding::Format::appended_raw) file.most_changed = 2;
+    if (encoding.format == VtsEncoding::Format::appended_base64) file.most_changed = 4;
+    if (encoding.compressor == VtsEncoding::Compressor::lz4 && file.most_changed > 0)
+      file.most_changed = 2 * 50 + 2;
+    if (encoding.compressor == VtsEncoding::Compressor::zlib) file.most_changed = 0;
+    files.push_back(std::move(file));
+  }
+  for (const char* const name :
+       {"structured_ascii.vtk", "structured_binary.vtk", "rectilinear_binary.vtk", "rectilinear_ascii.vtk",
+        "uniform_binary.vtk", "turned.vti", "rectilinear.vtr", "blanked.vts", "ghosts_1.vts"})
+    files.push_back({name, made(name), std::string::npos, 0});
+  return files;
+}
+
+class VtkDamage : public testing::TestWithParam<DamagedFile> {
+ protected:
+  std::filesystem::path write(const std::string& bytes) const {
+    return folder_.write(GetParam().name, bytes);
+  }
+
+  TestFolder folder_{"vtk-damage"};
+  const Content whole_ = contentOf(write(GetParam().bytes));
+};
+
+TEST_P(VtkDamage, TruncatedFilesAreRefused) {
+  const std::string& bytes = GetParam().bytes;
+  int refused = 0;
+  for (size_t n = 0; n < 100; ++n) {
+    const size_t size = bytes.size() * n / 100;
+    const Ending ending = endingOf(write(bytes.substr(0, size)), whole_, fmt::format("cut at {}", size));
+    refused += ending.kind == Ending::Kind::refused;
+    // XML files say where they end. Legacy ones may end behind any of their parts.
+    const bool tells_its_end = !GetParam().name.ends_with(".vtk");
+    EXPECT_FALSE(tells_its_end && ending.kind == Ending::Kind::changed) << size;
+  }
+  EXPECT_GE(refused, 90);
+}
+
+TEST_P(VtkDamage, AWrongByteIsRefusedOrChangesWhatItStandsFor) {
+  const std::string& bytes = GetParam().bytes;
+  std::mt19937_64 random(5);
+  size_t refused = 0, changed = 0, in_data = 0;
+  for (int n = 0; n < 1000; ++n) {
+    std::string damaged = bytes;
+    const size_t at = random() % damaged.size();
+    damaged[at] = static_cast<char>(damaged[at] ^ static_cast<char>(1 + random() % 255));
+    const Ending ending = endingOf(write(damaged), whole_, fmt::format("byte {}", at));
+    refused += ending.kind == Ending::Kind::refused;
+    changed += ending.kind == Ending::Kind::changed;
+    if (at < GetParam().data_begins || ending.kind != Ending::Kind::changed) continue;
+    ++in_data;
+    EXPECT_GT(ending.changed, 0u) << "byte " << at;
+    EXPECT_LE(ending.changed, GetParam().most_changed) << "byte " << at;
+  }
+  EXPECT_GT(refused, 20u);
+  EXPECT_GT(refused + changed, 300u);
+  EXPECT_TRUE(GetParam().most_changed == 0 || in_data > 50) << in_data;
+}
+
+INSTANTIATE_TEST_SUITE_P(Files, VtkDamage, testing::ValuesIn(damagedFiles()), [](const auto& file) {
+  return file.param.name.substr(0, file.param.name.rfind('.')) + "_" +
+         file.param.name.substr(file.param.name.rfind('.') + 1);
+});
+
+// Sets and series: the file that names others.
+TEST(VtkDamageOfSets, AreRefusedOrReadOtherwise) {
+  const TestFolder folder("vtk-damaged-sets");
+  for (const char* const name : {"ghosts_0.vts", "ghosts_1.vts", "ghosts_2.vts", "ghosts_3.vts", "step0.vts",
+                                 "step1.vts", "step2.vts"})
+    folder.write(name, made(name));
+  std::filesystem::create_directory(folder.path() / "blocks");
+  for (const char* const name : {"blocks/blocks_0.vts", "blocks/blocks_1.vtp", "blocks/blocks_2.vts"})
+    folder.write(name, made(name));
+  std::mt19937_64 random(9);
+  for (const char* const name : {"ghosts.pvts", "blocks.vtm", "series.pvd"}) {
+    const std::string bytes = made(name);
+    const Content whole = contentOf(folder.write(name, bytes));
+    for (size_t n = 0; n < 100; ++n) {
+      const size_t size = bytes.size() * n / 100;
+      const Ending ending =
+          endingOf(folder.write(name, bytes.substr(0, size)), whole, fmt::format("cut at {}", size));
+      EXPECT_EQ(ending.kind, Ending::Kind::refused) << name << " " << size;
+    }
+    for (int n = 0; n < 1000; ++n) {
+      std::string damaged = bytes;
+      const size_t at = random() % damaged.size();
+      damaged[at] = static_cast<char>(damaged[at] ^ static_cast<char>(1 + random() % 255));
+      endingOf(folder.write(name, damaged), whole, fmt::format("{} byte {}", name, at));
+    }
+  }
+}
+
+// Heads that promise far more than a file has.
+TEST(VtkDamageOfSizes, HugeCountsAreRefusedBeforeAnythingIsAllocated) {
+  const TestFolder folder("vtk-huge");
+  for (const VtsEncoding& encoding : allVtsEncodings()) {
+    std::string file = vtsFile(annulusVtsGrid(5, 4, 4), encoding);
+    for (size_t at; (at = file.find("0 4 0 3 0 3")) != std::string::npos;)
+      file.replace(at, 11, "0 40000 0 30000 0 30000");
+    const Ending ending = endingOf(folder.write("huge.vts", file), {}, encoding.inWords());
+    EXPECT_EQ(ending.kind, Ending::Kind::refused) << encoding.inWords();
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat

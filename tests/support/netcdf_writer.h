@@ -1,0 +1,50 @@
+// Writes small NetCDF files: dimensions, variables with attributes, and values that a function of the indices
+// says.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace curvisplat {
+
+enum class NetcdfFileType { classic, netcdf4, netcdf4_compressed };
+enum class NetcdfNumbers { int16, int32, single_precision, double_precision };
+
+using NetcdfText = std::string;
+using NetcdfNumberList = std::vector<double>;
+/// Numbers are written in the type of their variable.
+using NetcdfAttributes = std::vector<std::pair<std::string, std::variant<NetcdfText, NetcdfNumberList>>>;
+/// Of the indices along the variable's dimensions, the slowest first.
+using NetcdfFunction = std::function<double(const std::vector<size_t>&)>;
+
+class NetcdfWriter {
+ public:
+  NetcdfWriter(const std::filesystem::path& path, NetcdfFileType type);
+  ~NetcdfWriter();  // closes the file
+  NetcdfWriter(const NetcdfWriter&) = delete;
+  NetcdfWriter& operator=(const NetcdfWriter&) = delete;
+
+  /// `unlimited`: it is written as such, with so many records.
+  void dimension(const std::string& name, size_t length, bool unlimited = false);
+  void variable(const std::string& name, NetcdfNumbers numbers, const std::vector<std::string>& dimensions,
+                const NetcdfAttributes& attributes, const NetcdfFunction& value);
+
+ private:
+  struct Dimension {
+    std::string name;
+    size_t length;
+    int id;
+  };
+  const Dimension& named(const std::string& name) const;
+
+  int file_ = 0;
+  NetcdfFileType type_;
+  std::vector<Dimension> dimensions_;
+};
+
+}  // namespace curvisplat
