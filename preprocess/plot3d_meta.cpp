@@ -8,6 +8,7 @@
 #include <set>
 
 #include "preprocess/plot3d_source.h"
+#include "preprocess/time_steps.h"
 #include "stream/error.h"
 
 namespace curvisplat {
@@ -183,10 +184,9 @@ bool isPlot3dMeta(const InputFile& file) {
 
 std::unique_ptr<GridSource> openPlot3dMeta(const OpenGridOptions& options) {
   const Meta meta(options.grid);
-  const uint32_t number = options.time_step.value_or(0);
-  if (number >= meta.steps().size())
-    throw UsageError("{}: has {} time steps, from 0; there is no step {}", options.grid.string(),
-                     meta.steps().size(), number);
+  std::vector<double> times;
+  for (const Meta::Step& each : meta.steps()) times.push_back(each.time);
+  const uint32_t number = chosenTimeStep(options.grid.string(), times, options.time_step);
   const Meta::Step& step = meta.steps()[number];
   std::vector<std::string> warnings;
   for (const std::string& key : meta.unknownKeys())
@@ -216,7 +216,7 @@ std::unique_ptr<GridSource> openPlot3dMeta(const OpenGridOptions& options) {
   description.files.push_back(options.grid.string());
   if (const auto gamma = meta.number("gamma")) description.gas.gamma = gamma;
   if (const auto constant = meta.number("R")) description.gas.constant = constant;
-  for (const Meta::Step& each : meta.steps()) description.times.push_back(each.time);
+  description.times = std::move(times);
   description.time_step = number;
   description.warnings.insert(description.warnings.begin(), warnings.begin(), warnings.end());
   return std::make_unique<MetaSource>(std::move(files), std::move(description));

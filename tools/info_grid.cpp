@@ -152,7 +152,7 @@ void printBlocks(const GridInfo& info) {
     if (block.has_blanking) odd += fmt::format(", iblank blanks {}", statistics.blank.by_grid);
     if (statistics.degenerate > 0) odd += fmt::format(", {} degenerate cells", statistics.degenerate);
     if (statistics.inverted > 0) odd += fmt::format(", {} inverted cells", statistics.inverted);
-    fmt::print("  {:<10}{}x{}x{}{}\n", block.name, block.ni, block.nj, block.nk, odd);
+    fmt::print("  {:<9} {}x{}x{}{}\n", block.name, block.ni, block.nj, block.nk, odd);
   }
   if (description.blocks.size() > kBlocksListed)
     fmt::print("  and {} more\n", description.blocks.size() - kBlocksListed);
@@ -165,7 +165,7 @@ void printScalars(const GridInfo& info) {
     const bool named = number > 0 && scalar.name != std::to_string(number);
     const ScalarRange& range = info.statistics.scalars[s];
     fmt::print("scalar    {}{}{}{}: {}\n", scalar.name, named ? fmt::format(" ({})", number) : "",
-               scalar.unit.empty() ? "" : " [" + scalar.unit + "]",
+               scalar.unit.empty() ? "" : fmt::format(" [{}]", scalar.unit),
                scalar.centring == Centring::cell ? ", in cells" : "",
                isEmpty(range) ? "no value" : fmt::format("{:.6g} .. {:.6g}", range.min, range.max));
   }

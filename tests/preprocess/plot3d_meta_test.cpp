@@ -64,7 +64,7 @@ TEST_F(Plot3dMeta, SaysWhichFilesAndHow) {
   EXPECT_EQ(description.scalars[6].number, 2u);
   EXPECT_TRUE(description.warnings.empty());
   EXPECT_EQ(open(whole_, 1)->description().blocks[0].ni, 3u);
-  EXPECT_THROW(open(whole_, 2), UsageError);
+  EXPECT_THROW(open(whole_, 2), Error);
 }
 
 TEST_F(Plot3dMeta, RefusesWhatIsWrongByItsKey) {
