@@ -305,6 +305,7 @@ std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_b
 
   // Points that lie in no other block's box need not be looked for.
   std::erase_if(points, [&](const BlockPoint& point) {
+    progress.throwIfStopped();
     for (uint32_t b = 0; b < blocks; ++b)
       if (b != point.block && measures[b].box.holds(point.position)) return false;
     return true;
@@ -331,6 +332,9 @@ std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_b
 }
 
 std::string overlapWarning(const GridDescription& description, const std::vector<BlockOverlap>& overlaps) {
+  if (description.blocks.size() > kMostBlocks)
+    return fmt::format("whether its {} blocks overlap was not looked at: they are more than {}",
+                       description.blocks.size(), kMostBlocks);
   if (overlaps.empty()) return "";
   std::vector<BlockOverlap> largest = overlaps;
   std::stable_sort(largest.begin(), largest.end(),

@@ -29,7 +29,8 @@ struct BlockOverlap {
 std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_bytes,
                                        const Progress& progress);
 
-/// In words, one line for the file: the largest few by name, and the volume of all. Empty if there are none.
+/// In words, one line for the file: the largest few by name, and the volume of all; or that there are too
+/// many blocks to look. Empty if there are none.
 std::string overlapWarning(const GridDescription& description, const std::vector<BlockOverlap>& overlaps);
 
 }  // namespace curvisplat

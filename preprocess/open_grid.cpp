@@ -102,8 +102,10 @@ std::unique_ptr<GridSource> openFormat(const OpenGridOptions& options) {
     for (const GridFormat& format : kFormats)
       if (format.recognises(file)) {
         if (!options.solutions.empty())
-          throw Error("{}: holds scalars itself; leave out {}, which goes with a PLOT3D grid",
-                      options.grid.string(), options.solutions.front().string());
+          throw Error(
+              "{}: holds scalars itself; leave out {}: further files go with PLOT3D grids alone, and several "
+              "VTK files go together in a .vtm, .pvts or .pvd",
+              options.grid.string(), options.solutions.front().string());
         return format.open(complete);
       }
   }

@@ -126,7 +126,8 @@ std::optional<VtkExtent> VtkXmlFile::extent(const pugi::xml_node& node, const ch
   std::string_view text = node.attribute(attribute).value();
   std::array<int64_t, 6> ends{};
   bool good = true;
-  for (int64_t& end : ends) good = good && parseInteger(takeWord(text), end) && std::abs(end) < kFarthest;
+  for (int64_t& end : ends)
+    good = good && parseInteger(takeWord(text), end) && -kFarthest < end && end < kFarthest;
   if (good && takeWord(text).empty() && ends == std::array<int64_t, 6>{0, -1, 0, -1, 0, -1})
     return std::nullopt;
   VtkExtent extent{{ends[0], ends[2], ends[4]}, {ends[1], ends[3], ends[5]}};

@@ -87,24 +87,33 @@ void FramePipeline::makePools(const FrameOptions& options) {
   if (pools_ && pools_->budget == budget && pools_->pager.way == pager.way &&
       pools_->pager.direct == pager.direct)
     return;
-  pools_.reset();  // before the new ones take their memory
-  pools_ =
+  dropPools();  // before the new ones take their memory
+  auto fresh =
       std::make_unique<Pools>(cache_, variable_, budget, pager, backend_->splatMemory(budget.ring_splats));
+  const std::lock_guard lock(mutex_);
+  pools_ = std::move(fresh);
+}
+
+// Memory comes and goes outside of the lock, so that whoever cancels need not wait for it.
+void FramePipeline::dropPools() {
+  std::unique_ptr<Pools> old;  // goes after the lock
+  const std::lock_guard lock(mutex_);
+  old.swap(pools_);
 }
 
 Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
                           Progress* progress) {
   const FrameWork work{cache_,  plan.cut.parts, plan.settings,     planner_.table(),
                        order(), hidden_,        options.keep_going};
+  makePools(options);
   {
     const std::lock_guard lock(mutex_);
     if (phase_ == Phase::cancelled) throw Cancelled();
-    makePools(options);
     pools_->ring.reset();
     hidden_.begin(cache_.bricks(), plan.settings.view);
-    // Back to front, nothing ever is.
+    // Back to front, nothing ever is; and see FrameWorkers::prepare().
     BrickPager::Unneeded unneeded;
-    if (order() == DrawingOrder::front_to_back)
+    if (order() == DrawingOrder::front_to_back && !options.keep_going)
       unneeded = [this](uint32_t brick) { return hidden_.hides(brick); };
     pools_->source.start(plan.cut.parts, std::move(unneeded));
   }
@@ -125,7 +134,10 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
     if (!failure) failure = std::current_exception();
   }
   pools_->source.finish(statistics);
-  if (failure) std::rethrow_exception(failure);
+  if (failure) {
+    dropPools();  // a reading thread that has failed is of no use to the next frame
+    std::rethrow_exception(failure);
+  }
   {
     const std::lock_guard lock(mutex_);
     if (phase_ == Phase::cancelled) throw Cancelled();

@@ -64,6 +64,7 @@ class FramePipeline {
 
   void endPrefetch();
   void makePools(const FrameOptions& options);
+  void dropPools();
   Image paint(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
               Progress* progress);
 

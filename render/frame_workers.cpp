@@ -123,14 +123,17 @@ bool FrameWorkers::passOver(Worker& worker, uint64_t sequence) {
 bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
   FrameStatistics& statistics = worker.statistics;
   const uint32_t brick = work_->parts[sequence].brick;
-  if (work_->hidden.hides(brick)) {
+  // What stands in for a damaged brick may reach out of its box: then nothing is passed over, so that the
+  // same bricks are found damaged, and the same is drawn, whatever the order in which they come.
+  const auto isHidden = [&] { return !work_->keep_going && work_->hidden.hides(brick); };
+  if (isHidden()) {
     source_.pass(sequence);
     return passOver(worker, sequence);
   }
   {
     const std::optional<BrickSource::Splats> fetched = fetch(worker, sequence);
     if (!fetched) return false;
-    if (work_->hidden.hides(brick)) return passOver(worker, sequence);
+    if (isHidden()) return passOver(worker, sequence);
     const StageTimer timer(statistics.project_s);
     worker.projector.project(work_->settings, work_->table,
                              work_->cache.manifest().root.cellMin(fetched->cell), fetched->geometry,

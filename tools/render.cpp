@@ -324,7 +324,10 @@ void addRender(CLI::App& app) {
 
   const std::string where = "Camera";
   CameraWords* camera = &words->camera;
-  command->add_option("--view", camera->view, "iso, +x, -x, +y, -y, +z or -z; iso otherwise")->group(where);
+  command
+      ->add_option("--view", camera->view,
+                   "Where the camera stands: iso, +x, -x, +y, -y, +z or -z; iso otherwise")
+      ->group(where);
   command->add_option("--position", camera->position, "x,y,z of the camera, after --scale")->group(where);
   command->add_option("--focal-point", camera->focal_point, "x,y,z it looks at; the data's centre otherwise")
       ->group(where);

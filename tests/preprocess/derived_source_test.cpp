@@ -340,7 +340,7 @@ TEST(DerivedSource, RefusesAGasThatThereIsNot) {
     EXPECT_THROW(DerivedSource(bentFlow(3, vortexFlow), DerivedOptions{gas, {}}), UsageError);
 }
 
-TEST(DerivedSource, ConvertsWithinTheCap) {
+TEST(DerivedSource, Converts) {
   const TemporaryFolder folder;
   const DerivedSource source(bentFlow(40, vortexFlow), options());
   ConvertOptions convert_options;

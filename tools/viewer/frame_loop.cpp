@@ -143,6 +143,7 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
   FrameRenderer& renderer = *drawing.renderer;
   {
     const std::lock_guard lock(mutex_);
+    if (stopping_) return;  // a cancel() before there was a renderer went to nobody
     drawing_ = &renderer;
     may_give_up_ = !request.moving;
     backend_name_ = renderer.backendName();

@@ -4,6 +4,7 @@
 #include <imgui_stdlib.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <sstream>
 
@@ -107,12 +108,16 @@ void paintColours(const EditedFunction& function) {
 }  // namespace
 
 void FunctionPanel::updateHistogram(const EditedFunction& function, size_t variable) {
-  const std::pair of{variable, function.range()};
-  if (histogram_of_ == of && histogram_log_ == function.logScale()) return;
-  histogram_ = histogramOf(cache_, variable, function.range().first, function.range().second,
-                           function.logScale(), kBins);
+  if (in_the_making_.valid()) {
+    if (in_the_making_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+    histogram_ = in_the_making_.get();
+  }
+  const HistogramOf of{variable, function.range(), function.logScale()};
+  if (histogram_of_ == of) return;
   histogram_of_ = of;
-  histogram_log_ = function.logScale();
+  in_the_making_ = std::async(std::launch::async, [&cache = cache_, of] {
+    return histogramOf(cache, of.variable, of.range.first, of.range.second, of.log_scale, kBins);
+  });
 }
 
 bool FunctionPanel::draw(EditedFunction& function, size_t variable) {

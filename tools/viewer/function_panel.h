@@ -1,6 +1,7 @@
 // The transfer function's editor: a histogram with opacity points over it, the colours under it.
 #pragma once
 
+#include <future>
 #include <optional>
 #include <string>
 #include <utility>
@@ -25,13 +26,21 @@ class FunctionPanel {
   bool drawCurve(EditedFunction& function);
   bool drawRange(EditedFunction& function, const VariableInfo& variable);
   bool drawFile(EditedFunction& function);
+  /// Takes the histogram that is wanted, once it is there, and begins to make it if nobody has. Throws what
+  /// reading throws.
   void updateHistogram(const EditedFunction& function, size_t variable);
 
   const CacheReader& cache_;
   std::optional<size_t> dragged_;
   std::vector<double> histogram_;
-  std::optional<std::pair<size_t, std::pair<double, double>>> histogram_of_;  // variable and range
-  bool histogram_log_ = false;
+  struct HistogramOf {
+    size_t variable;
+    std::pair<double, double> range;
+    bool log_scale;
+    bool operator==(const HistogramOf&) const = default;
+  };
+  std::optional<HistogramOf> histogram_of_;         // what is shown, or on its way
+  std::future<std::vector<double>> in_the_making_;  // of another thread: it reads
   std::string file_ = "function.json";
   std::string said_;  // of the last load or save
 };

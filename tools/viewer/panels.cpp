@@ -102,7 +102,7 @@ void Panels::drawDetail(ViewState& state, PanelWishes& wishes) {
     wishes.changed = true;
   }
   wishes.dragging |= ImGui::IsItemActive();
-  int mebibytes = static_cast<int>(static_cast<double>(state.memory_bytes) / kMiB);
+  int mebibytes = static_cast<int>(std::min<uint64_t>(state.memory_bytes >> 20, 1 << 30));
   if (ImGui::SliderInt("memory, MiB", &mebibytes, 64, 65536, "%d", ImGuiSliderFlags_Logarithmic))
     state.memory_bytes = static_cast<uint64_t>(mebibytes) << 20;
   wishes.changed |= ImGui::IsItemDeactivatedAfterEdit();

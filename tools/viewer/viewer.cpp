@@ -94,13 +94,14 @@ class Viewer {
       savePictureIfFinal();
     }
     window_.endFrame(glm::vec3(state_.background()));
-    return reacted || ImGui::IsAnyItemActive();
+    return std::exchange(pressed_, false) || reacted || ImGui::IsAnyItemActive();
   }
 
   /// Of the picture beside the panels, in pixels.
   ImageSize pictureSize() const {
     ImageSize size = window_.pixels();
-    size.width -= static_cast<int>(std::lround(window_.pixelScale() * panelWidth()));
+    const int panel = static_cast<int>(std::lround(window_.pixelScale() * panelWidth()));
+    if (size.width > 0) size.width = std::max(1, size.width - panel);  // a strip beside them is always left
     return size;
   }
   float panelWidth() const { return panels_shown_ ? Panels::width() : 0; }
@@ -132,6 +133,7 @@ class Viewer {
   }
 
   bool press(const Window::Key& key, ImageSize size) {
+    pressed_ = true;
     switch (key.code) {
       case GLFW_KEY_P:
         save_wanted_ = true;
@@ -252,6 +254,7 @@ class Viewer {
 
   const CacheReader& cache_;
   const ViewerOptions& options_;
+  bool panels_shown_ = true;
   Window window_;
   ViewState state_;
   Panels panels_;
@@ -264,8 +267,8 @@ class Viewer {
   ImageSize asked_{0, 0};
   std::optional<ShownFrame> shown_;
   bool was_moving_ = false, dragging_ = false;
-  bool panels_shown_ = true;
   bool save_wanted_ = false;
+  bool pressed_ = false;  // a key, since the last frame
   bool software_ = true;
   std::string said_;
 };
