@@ -18,16 +18,6 @@ namespace {
 
 constexpr ImageSize kSize{256, 256};
 
-Image toImage(const ReferenceImage& reference) {
-  Image image(reference.size);
-  for (size_t n = 0; n < reference.pixels.size(); ++n) {
-    for (int c = 0; c < 3; ++c)
-      image.rgba[4 * n + static_cast<size_t>(c)] = static_cast<float>(reference.pixels[n].colour[c]);
-    image.rgba[4 * n + 3] = 1;
-  }
-  return image;
-}
-
 class CellFidelity : public testing::Test {
  protected:
   void convertTo(const std::string& name, const GridSource& source, uint32_t scalar) {
