@@ -128,7 +128,7 @@ std::vector<NamedCase> allCases() {
   };
   real("bluntfin density", "bluntfin/bluntfinxyz.bin", "bluntfin/bluntfinq.bin", "density");
   real("combustor density", "combustor/combxyz.bin", "combustor/combq.bin", "density");
-  real("nek pressure", "nek/leadingEdge_block.xyz", "nek/leadingEdge_block.fun", "1");
+  real("nek pressure", "nek/Combined_PressureSide_Block.xyz", "nek/pressure.fun", "4");
   return cases;
 }
 

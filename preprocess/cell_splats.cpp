@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <limits>
 
 #include "preprocess/hexahedron.h"
@@ -113,6 +114,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
   std::array<size_t, 3> before, after;  // elements of NodeArrays
   std::array<double, 3> per_step;
   glm::dmat3 steps;
+  glm::dvec3 bend(0.0);  // the sum of the centres' second differences
   for (int axis = 0; axis < 3; ++axis) {
     const bool has_before = index[axis] > 0 && scratch_.there[cell - cell_strides[axis]];
     const bool has_after = index[axis] + 1 < cells[axis] && scratch_.there[cell + cell_strides[axis]];
@@ -124,15 +126,28 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
                       ? per_step[axis] * (scratch_.centre[has_after ? cell + cell_strides[axis] : cell] -
                                           scratch_.centre[has_before ? cell - cell_strides[axis] : cell])
                       : jacobian[axis];
+    if (has_before && has_after)
+      bend += scratch_.centre[cell + cell_strides[axis]] + scratch_.centre[cell - cell_strides[axis]] -
+              2.0 * scratch_.centre[cell];
   }
   const LatticeGradient gradient_of(steps);
   const auto set_values = [&](double scale, const auto& rotate) {
     SplatScalar* value = out_.values.data() + count_ * in_.nodes->scalars.size();
     for (const std::vector<float>& f : in_.nodes->scalars) {
+      const double here = f[node];
       glm::dvec3 differences;
-      for (int axis = 0; axis < 3; ++axis)
-        differences[axis] = per_step[axis] * (double{f[after[axis]]} - double{f[before[axis]]});
-      *value++ = {f[node], scale * rotate(gradient_of(differences) * jacobian), 0.0};
+      double second = 0, least = here, most = here;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double f_before = f[before[axis]], f_after = f[after[axis]];
+        differences[axis] = per_step[axis] * (f_after - f_before);
+        if (before[axis] != node && after[axis] != node) second += (f_after - here) - (here - f_before);
+        least = std::min({least, f_before, f_after});
+        most = std::max({most, f_before, f_after});
+      }
+      // What tangents miss where the scalar bends: node_splats.h.
+      const glm::dvec3 gradient = gradient_of(differences);
+      const double mean = std::clamp(here + kBend * (second - glm::dot(gradient, bend)), least, most);
+      *value++ = {mean, scale * rotate(gradient * jacobian), 0.0};
     }
   };
   // Axes that have the volume of the hexahedron, where they are near it; a weight of its own elsewhere.

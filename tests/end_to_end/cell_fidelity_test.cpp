@@ -73,7 +73,10 @@ TEST_F(CellFidelity, IsThatOfNodes) {
     OpticalFunction function;
     double least_db, most_lost_db;
   } functions[] = {
-      {"smooth", smoothFunction, 57, 2.5}, {"band", bandFunction, 57, 1}, {"step", stepFunction, 52, 1}};
+      // The border's cells are whole, and their kernels reach beyond it: what nodes' half cells do not.
+      {"smooth", smoothFunction, 59.5, 4},
+      {"band", bandFunction, 64, 1},
+      {"step", stepFunction, 55, 1}};
   for (const auto& [name, function, least_db, most_lost_db] : functions) {
     const Image reference = toImage(referenceMarch(*scene, function, halfAnnulusCamera(), kSize));
     const double nodes_db = compareImages(render("nodes.splats", name), reference).psnr_db;

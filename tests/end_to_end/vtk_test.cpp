@@ -70,10 +70,10 @@ TEST_F(VtkProgram, InfoTellsOfNodesAndCells) {
   EXPECT_EQ(json["blanked"]["not_finite"], 0);
   EXPECT_EQ(json["blocks"][1]["name"], "outlet");
   EXPECT_EQ(json["scalars"][0]["name"], "p");
-  EXPECT_EQ(json["scalars"][0]["of"], "nodes");
+  EXPECT_EQ(json["scalars"][0]["centring"], "node");
   const auto& last = json["scalars"].back();
   EXPECT_EQ(last["name"], "flux:z");
-  EXPECT_EQ(last["of"], "cells");
+  EXPECT_EQ(last["centring"], "cell");
   EXPECT_EQ(last["max"], 46);  // of 24 cells
 }
 

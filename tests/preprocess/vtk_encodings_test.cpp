@@ -277,6 +277,25 @@ TEST(VtkEncodings, TextsMustHaveAsManyNumbersAsTheGrid) {
   EXPECT_NE(errorOf(folder, vtsFile(grid, ascii)).find("ends where a number is expected"), std::string::npos);
 }
 
+TEST(VtkEncodings, CharactersThatAreNoBase64AreRefused) {
+  const TestFolder folder("vts-base64");
+  VtsEncoding encoding;
+  encoding.format = VtsEncoding::Format::appended_base64;
+  size_t begin = 0;
+  const std::string file = vtsFile(annulusVtsGrid(3, 3, 3), encoding, &begin);
+  EXPECT_EQ(errorOf(folder, file), "");
+  for (const char wrong : {'!', '=', ' ', '\n', '\x80'}) {
+    std::string other = file;
+    other[begin + 41] = wrong;
+    const std::string error = errorOf(folder, other);
+    EXPECT_NE(error.find(fmt::format("byte {}: this is no base64", begin + 40)), std::string::npos) << error;
+    other = file;
+    other[begin + 43] = wrong;
+    EXPECT_NE(errorOf(folder, other).find(fmt::format("byte {}: th", begin + 40)), std::string::npos)
+        << errorOf(folder, other);
+  }
+}
+
 TEST(VtkEncodings, NoOtherFilesGoWithThem) {
   const TestFolder folder("vts-solutions");
   OpenGridOptions options;

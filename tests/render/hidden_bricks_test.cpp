@@ -165,6 +165,7 @@ TEST_F(HiddenBricksTest, FramesAreTheSameHoweverMuchIsLeftOut) {
   FrameOptions options;
   options.size = {300, 250};
   options.lod_pixels = 0;
+  options.low_pass_px2 = 1.5;  // few splats a pixel: wide ones, that leave no gap
   const Camera camera =
       Camera::named("iso", manifest.lower, manifest.upper, options.size, Projection::orthographic);
   FrameStatistics statistics;

@@ -1,4 +1,4 @@
-// All that makes a picture in the window: camera, variable, function, detail. Kept from one session to the
+// All that makes a picture in the window: camera, variable, function, detail. Kept from one window to the
 // next, and told as a `curvisplat render` command.
 #pragma once
 
