@@ -7,8 +7,8 @@
 // centres of the neighbouring cells; a missing one (the block ends, or it is not there) makes the difference
 // one-sided.
 //
-// At the grid's faces whole cells end less sharply than the half cells of nodes: 58.7 dB against 61.0 on the
-// half-annulus with a smooth function, all of it within three pixels of the silhouette.
+// At the grid's faces whole cells end less sharply than the half cells of nodes. The half-annulus: 60.3
+// / 66.1 / 55.5 dB for the smooth, band and step functions, as many nodes 64.1 / 67.6 / 57.1.
 #pragma once
 
 #include <cstdint>

@@ -172,8 +172,9 @@ void printScalars(const GridInfo& info) {
   std::string names;
   for (const uint32_t position : info.derived) {
     const GridScalar& scalar = info.scalar(position);
-    names += (names.empty() ? "" : ", ") + scalar.name +
-             (scalar.function > 0 ? fmt::format(" ({})", scalar.function) : "");
+    if (!names.empty()) names += ", ";
+    names += scalar.name;
+    if (scalar.function > 0) names += fmt::format(" ({})", scalar.function);
   }
   fmt::print("derived   {}\n", names);
 }

@@ -1,5 +1,5 @@
-// The half-annulus sampled in cells is as true to the field as sampled at nodes, but for three pixels along
-// the silhouette: nodes have half cells there, whose kernels end more sharply than those of whole cells.
+// The half-annulus sampled in cells against as many nodes. Cells lose most along the silhouette: nodes have
+// half cells there, whose kernels end more sharply than those of whole cells.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -62,7 +62,7 @@ class CellFidelity : public testing::Test {
   const TemporaryFolder folder_;
 };
 
-TEST_F(CellFidelity, IsThatOfNodes) {
+TEST_F(CellFidelity, IsNearThatOfNodes) {
   const std::shared_ptr<const Scene> scene = makeScene("half-annulus");
   const SceneGridSource at_nodes(scene, {128, 64, 64}), corners(scene, {129, 65, 65});
   const CellGridSource in_cells(corners, {[&](const GridCell& cell) { return scene->scalar(cell.centre); }});
