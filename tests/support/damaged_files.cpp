@@ -39,6 +39,12 @@ enum Ending : int {
   kCrash
 };
 
+/// For a signal handler: the heap may be damaged, and its lock held, so that even dprintf() would wait for
+/// ever.
+void say(const char* text) {
+  if (::write(STDERR_FILENO, text, std::strlen(text)) < 0) ::_exit(kCrash);
+}
+
 /// Whose crash it is: of the first frame that is neither the C library's nor the sanitizers'.
 void onCrash(int) {
   void* frames[64];
@@ -48,8 +54,9 @@ void onCrash(int) {
     if (!::dladdr(frames[n], &info) || !info.dli_fname) continue;
     for (const char* library : {"libcgns", "libhdf5", "libnetcdf", "libz.", "libsz."})
       if (std::strstr(info.dli_fname, library)) {
-        ::dprintf(STDERR_FILENO, "%s, %s", library,
-                  info.dli_sname ? info.dli_sname : "a function of its own");
+        say(library);
+        say(", ");
+        say(info.dli_sname ? info.dli_sname : "a function of its own");
         ::_exit(kLibraryCrash);
       }
     for (const char* library : {"libc.so", "libasan", "libubsan", "ld-linux", "libstdc++", "libgcc"})
