@@ -1,0 +1,46 @@
+#!/usr/bin/env python3
+"""Converts files of any format within one memory budget: rate, peak memory against the budget, bytes a node.
+
+    bench/format_memory.py grid.vts flow.cgns --scalar p --memory 144M
+
+Every file is converted on its own into a temporary folder. Exit status 1 if one takes more than its budget.
+"""
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+UNITS = {"K": 1 << 10, "M": 1 << 20, "G": 1 << 30}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("files", nargs="+")
+    parser.add_argument("--scalar", required=True)
+    parser.add_argument("--memory", default="144M", help="a number with K, M or G")
+    parser.add_argument("--program", default="build/release/tools/curvisplat")
+    words = parser.parse_args()
+    budget = int(words.memory[:-1]) * UNITS[words.memory[-1]]
+
+    too_much = False
+    print("| file | nodes | seconds | peak MiB | budget MiB |\n|---|---|---|---|---|")
+    for file in words.files:
+        with tempfile.TemporaryDirectory(dir=pathlib.Path(file).resolve().parent) as folder:
+            statistics = pathlib.Path(folder) / "stats.json"
+            command = [words.program, "convert", file, "-o", f"{folder}/out.splats", "--scalar", words.scalar]
+            command += ["--memory", words.memory, "--stats", str(statistics)]
+            result = subprocess.run(command, capture_output=True, text=True)
+            if result.returncode:
+                sys.exit(f"{file}: {result.stderr.strip()}")
+            told = json.loads(statistics.read_text())
+        peak = told["peak_memory_bytes"]
+        too_much |= peak > budget
+        nodes = told.get("nodes", told.get("cells"))
+        print(f"| {pathlib.Path(file).name} | {nodes} | {told['seconds']:.1f} | {peak / 2**20:.0f} | {budget / 2**20:.0f} |")
+    sys.exit(1 if too_much else 0)
+
+
+if __name__ == "__main__":
+    main()
