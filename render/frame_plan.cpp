@@ -62,8 +62,8 @@ void FramePlanner::setTransferFunction(const TransferFunction& transfer_function
   table_ = tableFor(cache_, variable_, transfer_function);
 }
 
-ScreenView FramePlanner::screenView(const Camera& camera, const FrameOptions& options, ImageSize size) const {
-  const Manifest& manifest = cache_.manifest();
+ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const FrameOptions& options,
+                        ImageSize size) {
   const double diagonal = glm::length(options.scale * (manifest.upper - manifest.lower));
   const double near = kNearInDiagonals * (diagonal > 0 ? diagonal : manifest.root.size);
   return ScreenView::of(camera, size, options.scale, options.low_pass_px2, near);

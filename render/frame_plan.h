@@ -14,6 +14,11 @@
 
 namespace curvisplat {
 
+/// How a frame of such a cache, of `size` pixels, comes to the screen. Throws UsageError as
+/// ScreenView::of() does.
+ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const FrameOptions& options,
+                        ImageSize size);
+
 struct FramePlan {
   ProjectionSettings settings;  // the picture has the size of settings.view
   Cut cut;
@@ -41,7 +46,9 @@ class FramePlanner {
 
   /// For the plans to come, while nobody plans or draws.
   void setTransferFunction(const TransferFunction& transfer_function);
-  ScreenView screenView(const Camera& camera, const FrameOptions& options, ImageSize size) const;
+  ScreenView screenView(const Camera& camera, const FrameOptions& options, ImageSize size) const {
+    return screenViewOf(cache_.manifest(), camera, options, size);
+  }
 
   const ClassificationTable& table() const { return table_; }
   /// What the octree takes, and what plans and the later stages note about its bricks.

@@ -75,6 +75,12 @@ bool EditedFunction::setRange(double low, double high) {
   return true;
 }
 
+void EditedFunction::fitRange(double low, double high) {
+  if (logScale() && !(low > 0)) setLogScale(false);
+  const auto [from, to] = withLength(low, high);
+  setRange(from, to);
+}
+
 bool EditedFunction::setLogScale(bool log_scale) {
   if (log_scale == logScale()) return true;
   if (log_scale && !(range_.first > 0)) return false;

@@ -33,6 +33,9 @@ class EditedFunction {
   std::pair<double, double> range() const { return range_; }
   /// Ends in the wrong order, equal or, for a logarithm, not above zero are not taken: false.
   bool setRange(double low, double high);
+  /// The range of a scalar from `low` to `high`: a constant gets an interval around it, and what is not above
+  /// zero no logarithm.
+  void fitRange(double low, double high);
   bool logScale() const { return definition_.log_scale; }
   /// False where the range is not above zero.
   bool setLogScale(bool log_scale);

@@ -51,13 +51,14 @@ PanelWishes Panels::draw(ViewState& state, size_t variable, const PanelFacts& fa
       const bool chosen = one.name == state.variable;
       if (!ImGui::Selectable(scalarTitle(one.name, one.unit).c_str(), chosen) || chosen) continue;
       chooseVariable(state, cache_.manifest(), one.name);
-      wishes.changed = true;
+      wishes.function_changed = true;
     }
     ImGui::EndCombo();
   }
   // A variable that was chosen just now is drawn from the next frame on.
   if (cache_.manifest().variables[variable].name == state.variable)
-    wishes.changed |= function_.draw(state.function, variable);
+    wishes.function_changed |= function_.draw(state.function, variable);
+  wishes.changed |= wishes.function_changed;
   wishes.dragging |= function_.isDragging();
   if (ImGui::CollapsingHeader("View", ImGuiTreeNodeFlags_DefaultOpen)) drawView(state, wishes, facts);
   if (ImGui::CollapsingHeader("Detail", ImGuiTreeNodeFlags_DefaultOpen)) drawDetail(state, wishes);

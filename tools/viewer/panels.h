@@ -22,8 +22,9 @@ struct PanelFacts {
 
 /// What the user asked for, beyond changing the state.
 struct PanelWishes {
-  bool changed = false;   // of what the picture shows
-  bool dragging = false;  // something is still being changed: a coarse picture will do
+  bool changed = false;           // of what the picture shows
+  bool function_changed = false;  // of the transfer function; `changed` is true as well
+  bool dragging = false;          // something is still being changed: a coarse picture will do
   bool save_picture = false, copy_command = false;
   bool reset_camera = false, other_projection = false, toggle_flight = false;
 };

@@ -149,11 +149,7 @@ void chooseVariable(ViewState& state, const Manifest& manifest, const std::strin
     throw UsageError("the cache has no scalar {}: there are {}", name, names);
   }
   state.variable = name;
-  if (state.function.logScale() && !(variable->min > 0)) state.function.setLogScale(false);
-  if (!state.function.setRange(variable->min, variable->max)) {
-    const double margin = variable->min == 0 ? 1 : 1e-3 * std::abs(variable->min);
-    state.function.setRange(variable->min - margin, variable->max + margin);
-  }
+  state.function.fitRange(variable->min, variable->max);
 }
 
 std::string toJson(const ViewState& state) {

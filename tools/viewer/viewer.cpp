@@ -10,6 +10,7 @@
 #include <memory>
 #include <utility>
 
+#include "render/frame_plan.h"
 #include "render/image.h"
 #include "stream/error.h"
 #include "stream/file.h"
@@ -128,7 +129,7 @@ class Viewer {
     if (wishes.toggle_flight) changed |= press({GLFW_KEY_F}, size);
     if (wishes.save_picture) press({GLFW_KEY_P}, size);
     if (wishes.copy_command) press({GLFW_KEY_C}, size);
-    if (changed) ++function_version_;
+    if (wishes.function_changed) ++function_version_;
     return changed;
   }
 
@@ -189,8 +190,7 @@ class Viewer {
   AnnotatedScene sceneFor(const TransferFunction& function, ImageSize size) const {
     const Manifest& manifest = cache_.manifest();
     const VariableInfo& info = manifest.variables[variable()];
-    const double near = 1e-4 * glm::length(state_.scale * (manifest.upper - manifest.lower));
-    return {ScreenView::of(state_.camera, size, state_.scale, FrameOptions().low_pass_px2, near),
+    return {screenViewOf(manifest, state_.camera, state_.frameOptions(size), size),
             function,
             scalarTitle(info.name, info.unit),
             manifest.lower,
