@@ -9,6 +9,7 @@
 #include "preprocess/scenes.h"
 #include "render/image.h"
 #include "tests/support/cell_grid.h"
+#include "tests/support/half_annulus_words.h"
 #include "tests/support/reference_march.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
@@ -29,32 +30,9 @@ class CellFidelity : public testing::Test {
   }
 
   Image render(const std::string& name, const std::string& function) {
-    const Camera camera = halfAnnulusCamera();
-    const auto words = [](const glm::dvec3& v) { return fmt::format("{},{},{}", v.x, v.y, v.z); };
     const std::string picture = folder_ / "picture.pfm";
     const ProgramResult result =
-        runProgram({"render",
-                    folder_ / name,
-                    "-o",
-                    picture,
-                    "--size",
-                    "256x256",
-                    "--tf",
-                    fmt::format("{}/half_annulus_{}.json", CURVISPLAT_TEST_DATA, function),
-                    "--position",
-                    words(camera.position),
-                    "--focal-point",
-                    words(camera.focal_point),
-                    "--view-up",
-                    words(camera.view_up),
-                    "--parallel-scale",
-                    fmt::format("{}", camera.parallel_scale),
-                    "--background",
-                    "white",
-                    "--lod-pixels",
-                    "0",
-                    "--classify",
-                    "pixel"});
+        runProgram(halfAnnulusWords(folder_ / name, picture, function, {256, 256}, "0"));
     EXPECT_EQ(result.status, 0) << result.err;
     return readImage(picture);
   }

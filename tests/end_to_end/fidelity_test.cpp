@@ -14,6 +14,7 @@
 #include "render/kernel.h"
 #include "render/screen_view.h"
 #include "stream/file.h"
+#include "tests/support/half_annulus_words.h"
 #include "tests/support/reference_march.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
@@ -22,10 +23,6 @@ namespace curvisplat {
 namespace {
 
 constexpr ImageSize kSize{256, 256};
-
-std::string words(const glm::dvec3& v) {
-  return fmt::format("{},{},{}", v.x, v.y, v.z);
-}
 
 Image absoluteDifference(const Image& a, const Image& b) {
   Image difference(a.size);
@@ -69,29 +66,8 @@ class Fidelity : public testing::Test {
 
   static void render(const std::string& scene, const std::string& function, const std::string& output,
                      std::vector<std::string> more = {}, const std::string& lod_pixels = "0") {
-    const Camera camera = halfAnnulusCamera();
-    std::vector<std::string> arguments{"render",
-                                       cacheOf(scene),
-                                       "-o",
-                                       output,
-                                       "--size",
-                                       fmt::format("{}x{}", kSize.width, kSize.height),
-                                       "--tf",
-                                       fmt::format("{}/half_annulus_{}.json", CURVISPLAT_TEST_DATA, function),
-                                       "--position",
-                                       words(camera.position),
-                                       "--focal-point",
-                                       words(camera.focal_point),
-                                       "--view-up",
-                                       words(camera.view_up),
-                                       "--parallel-scale",
-                                       fmt::format("{}", camera.parallel_scale),
-                                       "--background",
-                                       "white",
-                                       "--lod-pixels",
-                                       lod_pixels,
-                                       "--classify",
-                                       "pixel"};
+    std::vector<std::string> arguments =
+        halfAnnulusWords(cacheOf(scene), output, function, kSize, lod_pixels);
     arguments.insert(arguments.end(), more.begin(), more.end());
     run(arguments);
   }

@@ -16,6 +16,7 @@
 #include "render/projection.h"
 #include "stream/brick_codec.h"
 #include "tests/support/reference_march.h"
+#include "tests/support/splat_arrays.h"
 
 namespace curvisplat {
 namespace {
@@ -37,23 +38,7 @@ Splats inArrays(const RootCube& root, const BrickSplats& brick) {
   variable.resize(brick.size());
   for (size_t n = 0; n < brick.size(); ++n) {
     const glm::dvec3 position = root.toWorld(brick.positions[n]) - root.cellMin(brick.cell);
-    const Splat& splat = brick.splats[n];
-    const SplatScalar& scalar = brick.variables[0][n];
-    geometry.x[n] = static_cast<float>(position.x);
-    geometry.y[n] = static_cast<float>(position.y);
-    geometry.z[n] = static_cast<float>(position.z);
-    geometry.axis0[n] = static_cast<float>(splat.axis[0]);
-    geometry.axis1[n] = static_cast<float>(splat.axis[1]);
-    geometry.axis2[n] = static_cast<float>(splat.axis[2]);
-    geometry.shear10[n] = static_cast<float>(splat.shear[0]);
-    geometry.shear20[n] = static_cast<float>(splat.shear[1]);
-    geometry.shear21[n] = static_cast<float>(splat.shear[2]);
-    geometry.weight[n] = static_cast<float>(splat.weight);
-    variable.mean[n] = static_cast<float>(scalar.mean);
-    variable.slope0[n] = static_cast<float>(scalar.slope.x);
-    variable.slope1[n] = static_cast<float>(scalar.slope.y);
-    variable.slope2[n] = static_cast<float>(scalar.slope.z);
-    variable.variance[n] = static_cast<float>(scalar.variance);
+    setSplat(geometry, variable, n, position, brick.splats[n], brick.variables[0][n]);
   }
   return out;
 }

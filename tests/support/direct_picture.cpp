@@ -15,6 +15,7 @@
 #include "render/depth_sort.h"
 #include "render/projection.h"
 #include "tests/support/painted_splats.h"
+#include "tests/support/splat_arrays.h"
 
 namespace curvisplat {
 namespace {
@@ -75,25 +76,8 @@ void toArrays(const std::vector<DirectSplat>& splats, const glm::dvec3& origin, 
               SplatVariable& variable) {
   geometry.resize(splats.size());
   variable.resize(splats.size());
-  for (size_t n = 0; n < splats.size(); ++n) {
-    const auto& [splat, value] = splats[n];
-    const glm::vec3 position(splat.position - origin);
-    geometry.x[n] = position.x;
-    geometry.y[n] = position.y;
-    geometry.z[n] = position.z;
-    geometry.axis0[n] = static_cast<float>(splat.axis[0]);
-    geometry.axis1[n] = static_cast<float>(splat.axis[1]);
-    geometry.axis2[n] = static_cast<float>(splat.axis[2]);
-    geometry.shear10[n] = static_cast<float>(splat.shear[0]);
-    geometry.shear20[n] = static_cast<float>(splat.shear[1]);
-    geometry.shear21[n] = static_cast<float>(splat.shear[2]);
-    geometry.weight[n] = static_cast<float>(splat.weight);
-    variable.mean[n] = static_cast<float>(value.mean);
-    variable.slope0[n] = static_cast<float>(value.slope.x);
-    variable.slope1[n] = static_cast<float>(value.slope.y);
-    variable.slope2[n] = static_cast<float>(value.slope.z);
-    variable.variance[n] = static_cast<float>(value.variance);
-  }
+  for (size_t n = 0; n < splats.size(); ++n)
+    setSplat(geometry, variable, n, splats[n].splat.position - origin, splats[n].splat, splats[n].value);
 }
 
 }  // namespace
