@@ -99,11 +99,9 @@ class GeometryDecoder {
   template <typename StepOf>
   void decodeShear(int which, StepOf step_of) {
     auto& codes = GeometryDecoder::codes();
-    const Predictor predictor = readResiduals(codes);
+    readPredicted(codes);
     double* out = out_.shear[which].data();
-    for (size_t n = 0; n < count_; ++n) out[n] = static_cast<int32_t>(unzigzag(codes[n])) * step_of(out_, n);
-    predictRows(predictor, out_.rows, out,
-                [out](uint32_t n, double predicted) { return out[n] += predicted; });
+    for (size_t n = 0; n < count_; ++n) out[n] = static_cast<int32_t>(codes[n]) * step_of(out_, n);
   }
 
   void decodeWeights() {

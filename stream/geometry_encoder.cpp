@@ -30,7 +30,6 @@ class GeometryEncoder {
     decoded_.resize(count_);
     codes_.resize(count_);
     targets_.resize(count_);
-    steps_.resize(count_);
     residuals_.resize(count_);
   }
 
@@ -125,24 +124,19 @@ class GeometryEncoder {
     return true;
   }
 
-  /// In a closed loop: each shear is predicted from decoded ones.
   template <typename StepOf, typename Target>
   bool encodeShear(int which, StepOf step_of, Target target) {
-    for (size_t n = 0; n < count_; ++n) {
-      targets_[n] = target(n);
-      steps_[n] = step_of(decoded_, n);
-    }
-    const Predictor predictor = bestPredictor(sample_, targets_, steps_);
     auto& out = decoded_.shear[which];
     bool fits = true;
-    predictRows(predictor, decoded_.rows, out.data(), [&](uint32_t n, double predicted) {
-      const double code = std::nearbyint((targets_[n] - predicted) / steps_[n]);
+    for (size_t n = 0; n < count_; ++n) {
+      const double step = step_of(decoded_, n);
+      const double code = std::nearbyint(target(n) / step);
       fits &= std::abs(code) < kLargestShearCode;  // false for NaN
       const int32_t kept = fits ? static_cast<int32_t>(code) : 0;
-      residuals_[n] = zigzag(static_cast<uint32_t>(kept));
-      return out[n] = predicted + kept * steps_[n];
-    });
-    header_.arrays[arrays_++] = {predictor, planes_.add(residuals_)};
+      codes_[n] = static_cast<uint32_t>(kept);
+      out[n] = kept * step;
+    }
+    addPredicted(codes_);
     return fits;
   }
 
@@ -209,7 +203,7 @@ class GeometryEncoder {
   size_t arrays_ = 0;
   std::vector<Row> sample_;
   std::vector<uint32_t> codes_, residuals_;
-  std::vector<double> targets_, steps_;
+  std::vector<double> targets_;
 };
 
 }  // namespace

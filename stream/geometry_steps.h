@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -32,14 +33,25 @@ inline constexpr uint32_t kVolumeWeight = 0, kZeroWeight = 1;
 inline constexpr size_t kMostRunBytes = 50;  // five varints
 
 /// The steps of the shears of splat n, which depend on its decoded axes and, for l10, on its decoded l21: an
-/// error of l10 moves the third axis l21 times as far.
+/// error of l10 moves the third axis l21 times as far. Powers of two, so that neighbours mostly share them
+/// and their codes can be predicted.
 struct ShearSteps {
-  static double l21(const DecodedGeometry& d, size_t n) { return kShearStep * d.axis[2][n] / d.axis[1][n]; }
+  static double l21(const DecodedGeometry& d, size_t n) {
+    return powerOfTwo(kShearStep * d.axis[2][n] / d.axis[1][n]);
+  }
   static double l10(const DecodedGeometry& d, size_t n) {
     const double lever = std::abs(d.shear[2][n]) * d.axis[1][n] / d.axis[2][n];
-    return kShearStep * d.axis[1][n] / (d.axis[0][n] * std::max(1.0, lever));
+    return powerOfTwo(kShearStep * d.axis[1][n] / (d.axis[0][n] * std::max(1.0, lever)));
   }
-  static double l20(const DecodedGeometry& d, size_t n) { return kShearStep * d.axis[2][n] / d.axis[0][n]; }
+  static double l20(const DecodedGeometry& d, size_t n) {
+    return powerOfTwo(kShearStep * d.axis[2][n] / d.axis[0][n]);
+  }
+
+ private:
+  /// The largest that is not above `step` > 0: the exponent without the mantissa.
+  static double powerOfTwo(double step) {
+    return std::bit_cast<double>(std::bit_cast<uint64_t>(step) & 0x7ff0000000000000);
+  }
 };
 
 /// e^(n kWeightStep) at n + kLargestWeightCode.

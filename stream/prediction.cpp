@@ -77,20 +77,6 @@ class RowCutter {
   std::vector<uint32_t> starts_;
 };
 
-template <typename Cost>
-Predictor cheapest(Cost cost) {
-  Predictor best = Predictor::none;
-  double best_cost = std::numeric_limits<double>::infinity();
-  for (int p = 0; p < kPredictors; ++p) {
-    const double c = cost(static_cast<Predictor>(p));
-    if (c < best_cost) {
-      best = static_cast<Predictor>(p);
-      best_cost = c;
-    }
-  }
-  return best;
-}
-
 }  // namespace
 
 std::vector<Row> rowsOf(std::span<const NodeRun> runs, size_t count) {
@@ -131,28 +117,21 @@ std::vector<Row> sampleOf(std::span<const Row> rows) {
 }
 
 Predictor bestPredictor(std::span<const Row> sample, std::span<const uint32_t> values) {
-  return cheapest([&](Predictor predictor) {
+  Predictor best = Predictor::none;
+  uint64_t fewest = std::numeric_limits<uint64_t>::max();
+  for (int p = 0; p < kPredictors; ++p) {
+    const auto predictor = static_cast<Predictor>(p);
     uint64_t bits = 0;
     predictRows(predictor, sample, values.data(), [&](uint32_t n, uint32_t predicted) {
       bits += static_cast<uint64_t>(std::bit_width(zigzag(values[n] - predicted)));
       return values[n];
     });
-    return static_cast<double>(bits);
-  });
-}
-
-Predictor bestPredictor(std::span<const Row> sample, std::span<const double> values,
-                        std::span<const double> steps) {
-  return cheapest([&](Predictor predictor) {
-    uint64_t bits = 0;
-    predictRows(predictor, sample, values.data(), [&](uint32_t n, double predicted) {
-      // A double's bits, exponent before mantissa, are its logarithm drawn with a ruler. Not a number is
-      // most.
-      bits += std::bit_cast<uint64_t>(1 + std::abs(values[n] - predicted) / steps[n]) >> 44;
-      return values[n];
-    });
-    return static_cast<double>(bits);
-  });
+    if (bits < fewest) {
+      best = predictor;
+      fewest = bits;
+    }
+  }
+  return best;
 }
 
 }  // namespace curvisplat

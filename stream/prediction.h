@@ -37,39 +37,39 @@ inline constexpr int kPredictors = 5;
 /// in grid order give rows without neighbours above. No runs: one row.
 std::vector<Row> rowsOf(std::span<const NodeRun> runs, size_t count);
 
-/// Calls `step(n, predicted)` for all n in order; step returns values[n], which it may have just set. T is an
-/// unsigned integer (wrapping) or a double.
-template <typename T, typename Step>
-void predictRows(Predictor predictor, std::span<const Row> rows, const T* values, Step step) {
-  T before = 0;
+/// Calls `step(n, predicted)` for all n in order; step returns values[n], which it may have just set. Numbers
+/// wrap around.
+template <typename Step>
+void predictRows(Predictor predictor, std::span<const Row> rows, const uint32_t* values, Step step) {
+  uint32_t before = 0;
   for (const Row& row : rows) {
     const uint32_t end = row.first + row.count;
     if (predictor == Predictor::none) {
-      for (uint32_t n = row.first; n < end; ++n) step(n, T(0));
+      for (uint32_t n = row.first; n < end; ++n) step(n, 0u);
       continue;
     }
-    const T* above = row.above == kNoRow ? nullptr : values + row.above;
+    const uint32_t* above = row.above == kNoRow ? nullptr : values + row.above;
     before = step(row.first, above ? above[0] : before);
     if (predictor == Predictor::previous) {
       for (uint32_t n = row.first + 1; n < end; ++n) before = step(n, before);
     } else if (predictor == Predictor::linear || !above) {
-      T change = 0;
+      uint32_t change = 0;
       for (uint32_t n = row.first + 1; n < end; ++n) {
-        const T value = step(n, before + change);
+        const uint32_t value = step(n, before + change);
         change = value - before;
         before = value;
       }
     } else if (predictor == Predictor::above) {
-      T difference = before - above[0];
+      uint32_t difference = before - above[0];
       for (uint32_t n = row.first + 1, m = 1; n < end; ++n, ++m) {
-        const T up = above[m];
+        const uint32_t up = above[m];
         before = step(n, up + difference);
         difference = before - up;
       }
     } else {
-      T difference = before - above[0], change = 0;
+      uint32_t difference = before - above[0], change = 0;
       for (uint32_t n = row.first + 1, m = 1; n < end; ++n, ++m) {
-        const T up = above[m];
+        const uint32_t up = above[m];
         before = step(n, up + difference + change);
         change = before - up - difference;
         difference = before - up;
@@ -83,9 +83,6 @@ std::vector<Row> sampleOf(std::span<const Row> rows);
 
 /// The predictor with the fewest bits for `values`, judged on `sample`.
 Predictor bestPredictor(std::span<const Row> sample, std::span<const uint32_t> values);
-/// The same for real values that are coded in multiples of steps[n].
-Predictor bestPredictor(std::span<const Row> sample, std::span<const double> values,
-                        std::span<const double> steps);
 
 /// Small for small differences of either sign: 0, -1, 1, -2, 2 ... give 0, 1, 2, 3, 4 ...
 inline uint32_t zigzag(uint32_t difference) {
