@@ -52,7 +52,7 @@ TEST_F(CellFidelity, IsNearThatOfNodes) {
     double least_db, most_lost_db;
   } functions[] = {// The border's cells are whole, and their kernels reach beyond it; nodes' half cells are
                    // drawn in parts.
-                   {"smooth", smoothFunction, 59.5, 8},
+                   {"smooth", smoothFunction, 59.5, 12},
                    {"band", bandFunction, 64, 2.5},
                    {"step", stepFunction, 55, 1}};
   for (const auto& [name, function, least_db, most_lost_db] : functions) {
