@@ -143,7 +143,8 @@ void addConvert(CLI::App& app) {
   command->add_option("--blank", words->blank_value, "Nodes with this value are not there");
   command->add_option("--memory", words->memory,
                       "Cap on this process's memory, as 512M (default: 2G or a quarter of the machine's)");
-  command->add_option("--threads", words->threads, "Threads that work (default: all)");
+  command->add_option("--threads", words->threads, "Threads that work (default: all)")
+      ->check(CLI::Range(0u, kMostThreads));
   command->add_option("--tmp", words->temporary_folder, "Folder for temporary files (default: the output's)");
   command->add_flag("--resume", words->resume,
                     "Go on from an interrupted conversion, if there is one; keep what is done on errors");
