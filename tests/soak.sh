@@ -6,13 +6,14 @@
 #   tests/soak.sh [--short] [PROGRAM [FOLDER [CACHE]]]
 #
 # In full: 1,000 frames with 128 MiB over a cache of 3.5 GB, and a window for 10 minutes; FOLDER has room for 20 GB,
-# and CACHE, if given, is used in place of the one that is otherwise made there. --short: 30 frames and some seconds.
+# and CACHE, if given, is used in place of the one that is otherwise made there (with python3, which makes it hard to
+# compress). --short: 30 frames and some seconds.
 set -euo pipefail
 
 form=full
 [ "${1:-}" != --short ] || { form=short; shift; }
 program=$(realpath "${1:-build/release/tools/curvisplat}")
-folder=$(mktemp -d "${2:-/tmp}/soak.XXXXXX")
+folder=$(mktemp -d "$(realpath "${2:-/tmp}")/soak.XXXXXX")
 cache=${3:-}
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 started=()
@@ -25,7 +26,7 @@ trap 'exit 1' INT TERM
 export XDG_CONFIG_HOME=$folder/config
 
 if [ $form = full ]; then
-  size=936x468x468 window_size=256x128x128 frames=1000 memory=128M picture=600x600 splats=2000000 session_s=600
+  size=936x468x468 window_size=256x128x128 frames=1000 memory=128M picture=600x600 splats=400000 session_s=600
   interval_s=2 slack=4
 else
   size=96x48x48 window_size=64x32x32 frames=30 memory=52M picture=160x160 splats=200000 session_s=5
@@ -38,17 +39,19 @@ fail() {
 }
 quietly() { "$@" > "$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }; }
 
-# rough NAME SIZE SCALAR...: a cache that does not compress, as large as its grid.
-rough() {
+# made NAME SIZE SCALAR...: a cache; in full form one that does not compress, as large as its grid.
+made() {
   local name=$folder/$1 scalars=()
   quietly "$program" generate half-annulus --size "$2" -o "$name"
-  "$here/roughen.py" "$name.xyz" 12 14
-  "$here/roughen.py" "$name.fun" 16 22
+  if [ $form = full ]; then
+    "$here/roughen.py" "$name.xyz" 12 14
+    "$here/roughen.py" "$name.fun" 16 22
+  fi
   shift 2
   for scalar in "$@"; do scalars+=(--scalar "$scalar"); done
   quietly "$program" convert "$name.xyz" "$name.fun" -o "$name.splats" "${scalars[@]}" --byte-order little \
     --records none --precision single --blocks single
-  rm "$name.xyz" "$name.fun"
+  rm "$name.xyz" "$name.fun" "$name.nam"
 }
 
 # watch PID FILE: a line every so often, as long as it lives: seconds, KiB in memory, open files, threads.
@@ -92,7 +95,7 @@ judge() {
 
 # The orbit. Two turns: every frame of the first comes again, after half of all frames.
 if [ -z "$cache" ]; then
-  rough orbit "$size" f
+  made orbit "$size" f
   cache=$folder/orbit.splats
 fi
 echo "orbit: $frames frames of $picture with --memory $memory over $(du -sh "$cache" | cut -f 1)"
@@ -124,7 +127,7 @@ for needed in Xvfb xdotool; do
     exit $failed
   fi
 done
-rough window $window_size f j
+made window $window_size f j
 cd "$folder"
 mkfifo display
 Xvfb -displayfd 3 -screen 0 1000x700x24 -noreset -nolisten tcp 3> display 2> xvfb.log &

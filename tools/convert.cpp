@@ -59,13 +59,17 @@ void printWarnings(const GridDescription& description, std::optional<uint32_t> t
     note(report.blanked.by_grid, "cells have a blanked corner or no value");
     note(report.blanked.by_value, "cells have the blank value");
     note(report.blanked.not_finite, "cells have an infinite value, and are blanked");
+    note(report.degenerate, "cells are degenerate: drawn with a thickness of their own");
+    note(report.inverted, "cells are inverted: of the other handedness than most of their block");
   } else {
     note(report.blanked.by_grid, "nodes are blanked by the grid");
     note(report.blanked.by_value, "nodes have the blank value");
     note(report.blanked.not_finite, "nodes are not finite numbers, and are blanked");
+    // Not the cells that `info` counts, which lie between nodes.
+    note(report.degenerate, "nodes have no volume around them: drawn with a thickness of their own");
+    note(report.inverted,
+         "nodes have inverted surroundings: of the other handedness than most of their block");
   }
-  note(report.degenerate, "cells are degenerate: drawn with a thickness of their own");
-  note(report.inverted, "cells are inverted: of the other handedness than most of their block");
   note(report.merged_nodes, "face nodes coincide with others, and were merged into them");
 }
 
