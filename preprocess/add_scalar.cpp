@@ -20,7 +20,9 @@
 #include "preprocess/value_buckets.h"
 #include "stream/cache_lock.h"
 #include "stream/cache_reader.h"
+#include "stream/checksum.h"
 #include "stream/error.h"
+#include "stream/file.h"
 #include "stream/variable_writer.h"
 
 namespace curvisplat {
@@ -61,6 +63,22 @@ std::filesystem::path temporaryFolder(const AddScalarOptions& options) {
   return options.temporary_folder.empty() ? folderOf(options.cache) : options.temporary_folder;
 }
 
+/// What an addition's temporary folder is called, up to its process: for this cache alone, wherever it is.
+std::string scratchName(const std::filesystem::path& cache) {
+  const std::string place = std::filesystem::canonical(cache).string();
+  return fmt::format("{}.add-{:016x}", cache.filename().string(),
+                     checksumOf(std::as_bytes(std::span(place))));
+}
+
+/// Makes the folder, and removes those of additions that were killed: the cache is locked, so none of them
+/// lives.
+std::filesystem::path newScratch(const AddScalarOptions& options) {
+  const std::string name = scratchName(options.cache);
+  for (const auto& entry : std::filesystem::directory_iterator(temporaryFolder(options)))
+    if (entry.path().filename().string().starts_with(name + ".")) removeAll(entry.path());
+  return ScratchFolder::newPath(temporaryFolder(options), name);
+}
+
 /// An addition under way: what each pass leaves for the next.
 class Addition {
  public:
@@ -73,8 +91,7 @@ class Addition {
         cache_(options.cache),
         grid_(source),
         reader_(grid_, options.scalars, options.blank_value),
-        scratch_(ScratchFolder::newPath(temporaryFolder(options), options.cache.filename().string() + ".tmp"),
-                 ScratchFolder::Folder::kMake) {
+        scratch_(newScratch(options), ScratchFolder::Folder::kMake) {
     for (const uint32_t scalar : options.scalars)
       report_.scalars.push_back(source.description().scalars[scalar].name);
     report_.nodes = manifest().nodes;

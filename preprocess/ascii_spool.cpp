@@ -102,11 +102,10 @@ class Spooler {
     out_ = std::make_unique<OutputFile>(temporary_);
     try {
       InputFile in(temporary_);
-      std::filesystem::remove(temporary_);
+      removeFile(temporary_);
       return in;
     } catch (...) {
-      std::error_code ignored;
-      std::filesystem::remove(temporary_, ignored);
+      removeAll(temporary_);
       throw;
     }
   }

@@ -223,8 +223,7 @@ BucketFile::~BucketFile() {
   const std::filesystem::path path = state_->path;
   const bool leave = state_->leave;
   state_.reset();
-  std::error_code ignored;
-  if (!leave) std::filesystem::remove(path, ignored);
+  if (!leave) removeAll(path);
 }
 
 void BucketFile::leave() {

@@ -2,6 +2,7 @@
 
 #include "stream/brick_log.h"
 #include "stream/error.h"
+#include "stream/file.h"
 
 namespace curvisplat {
 namespace {
@@ -14,9 +15,7 @@ std::string scratchName(const fs::path& output) {
 
 /// Removes the temporary files of a dead conversion to `output`; whatever else the journal may name stays.
 void removeScratch(const ConversionJournal& journal, const fs::path& output) {
-  std::error_code ignored;
-  if (journal.scratch.filename().string().starts_with(scratchName(output) + "."))
-    fs::remove_all(journal.scratch, ignored);
+  if (journal.scratch.filename().string().starts_with(scratchName(output) + ".")) removeAll(journal.scratch);
 }
 
 bool hasBricks(const fs::path& folder) {
@@ -63,7 +62,7 @@ ConversionWorkspace::ConversionWorkspace(const fs::path& output, bool overwrite,
 
 void ConversionWorkspace::removeDividedBuckets() const {
   for (const auto& entry : fs::directory_iterator(scratch()))
-    if (!journal_.splats || entry.path() != splatsFile()) fs::remove(entry.path());
+    if (!journal_.splats || entry.path() != splatsFile()) removeFile(entry.path());
 }
 
 bool ConversionWorkspace::worthResuming() const {
@@ -88,18 +87,19 @@ uint64_t ConversionWorkspace::bytesInPartial() const {
 }
 
 bool ConversionWorkspace::leaveForResuming() {
-  if (!worthResuming()) return false;
+  if (partial_->isInPlace() || !worthResuming()) return false;
   partial_->leave();
   scratch_->leave();
   return true;
 }
 
 void ConversionWorkspace::clearFinished() {
-  const fs::path target = partial_->target();
-  partial_.reset();
   scratch_.reset();
-  std::error_code ignored;
-  fs::remove(target / kJournalName, ignored);
+  removeAll(partial_->target() / kJournalName);
+}
+
+ConversionWorkspace::~ConversionWorkspace() {
+  if (partial_->isInPlace()) clearFinished();
 }
 
 bool ConversionWorkspace::clearIfFinished(const fs::path& output, const std::vector<ConversionFact>& facts) {
@@ -111,8 +111,7 @@ bool ConversionWorkspace::clearIfFinished(const fs::path& output, const std::vec
   if (readJournal(replaced.path())) return false;
   replaced.clear();
   removeScratch(*journal, output);
-  std::error_code ignored;
-  for (const char* name : {kBrickLogName, "lock", kJournalName}) fs::remove(output / name, ignored);
+  for (const char* name : {kBrickLogName, "lock", kJournalName}) removeAll(output / name);
   return true;
 }
 

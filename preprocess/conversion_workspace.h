@@ -39,8 +39,9 @@ class ConversionWorkspace {
   /// resumed had other `facts`.
   ConversionWorkspace(const std::filesystem::path& output, bool overwrite, Unfinished unfinished,
                       const std::filesystem::path& temporary_folder, std::vector<ConversionFact> facts);
-  /// Removes the folders, unless leaveForResuming() was called.
-  ~ConversionWorkspace() = default;
+  /// Removes the folders, unless leaveForResuming() was called; once the cache is in place, what is left of
+  /// the work.
+  ~ConversionWorkspace();
 
   bool resumed() const { return resumed_; }
   /// The splats that an interrupted conversion has left; none: they are to be made.
@@ -58,9 +59,6 @@ class ConversionWorkspace {
 
   /// Leaves the folders for a later conversion if they are worth it. Returns whether they are.
   bool leaveForResuming();
-  /// Once the cache is in place: removes what is left of the work.
-  void clearFinished();
-
   /// A conversion that was killed between putting its cache into place and clearFinished(): clears for it,
   /// and returns true. Facts as above.
   static bool clearIfFinished(const std::filesystem::path& output, const std::vector<ConversionFact>& facts);
@@ -68,6 +66,7 @@ class ConversionWorkspace {
  private:
   bool worthResuming() const;
   void removeDividedBuckets() const;
+  void clearFinished();
   void writeJournalNow() { writeJournal(partial_->path(), journal_); }
 
   std::unique_ptr<PartialFolder> partial_;

@@ -48,9 +48,7 @@ Unfinished unfinishedOf(const ConvertOptions& options) {
 }
 
 /// What a cache's manifest tells.
-void reportCache(const std::filesystem::path& cache, ConvertReport& report) {
-  const std::filesystem::path path = cache / "manifest.json";
-  const Manifest written = Manifest::fromJson(readTextFile(path), path);
+void reportCache(const Manifest& written, ConvertReport& report) {
   report.centring = written.cells ? Centring::cell : Centring::node;
   report.nodes = written.nodes;
   report.splats = written.splats;
@@ -173,11 +171,9 @@ class Conversion {
   }
 
   void finish() {
-    writer_->finish(manifest());
+    reportCache(writer_->finish(manifest()), report_);
     writer_.reset();
     file_.reset();
-    reportCache(options_.output, report_);
-    workspace_.clearFinished();
     report_.blanked = splats_.survey.blanked;
     report_.degenerate = splats_.counts.degenerate;
     report_.inverted = splats_.counts.inverted;
@@ -282,7 +278,8 @@ ConvertReport convert(const GridSource& source, const ConvertOptions& options, P
   ConvertReport report;
   if (options.resume && ConversionWorkspace::clearIfFinished(options.output, facts)) {
     report.resumed = true;
-    reportCache(options.output, report);
+    const std::filesystem::path manifest = options.output / "manifest.json";
+    reportCache(Manifest::fromJson(readTextFile(manifest), manifest), report);
     report.resumed_bricks = report.bricks;
   } else {
     checkOutput(options.output, options.overwrite, temporaryFolder(options));

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <system_error>
 
 #include "preprocess/bucket_file.h"
 #include "preprocess/conversion_order.h"
@@ -71,8 +70,7 @@ DrawnNodes::DrawnNodes(const CacheReader& cache, const MemoryPlan& plan,
 }
 
 DrawnNodes::~DrawnNodes() {
-  std::error_code ignored;
-  std::filesystem::remove(written_.path(), ignored);
+  removeAll(written_.path());
 }
 
 bool DrawnNodes::holds(uint64_t node) const {

@@ -28,9 +28,7 @@ class PendingFile {
   explicit PendingFile(const std::filesystem::path& path)
       : path_(path), file_(std::filesystem::path(path) += ".part") {}
   ~PendingFile() {
-    if (in_place_) return;
-    std::error_code ignored;
-    std::filesystem::remove(file_.path(), ignored);
+    if (!in_place_) removeAll(file_.path());
   }
   PendingFile(const PendingFile&) = delete;
   PendingFile& operator=(const PendingFile&) = delete;

@@ -12,6 +12,7 @@
 #include "preprocess/splat_record.h"
 #include "preprocess/value_record.h"
 #include "stream/error.h"
+#include "stream/file.h"
 #include "stream/partial_folder.h"
 
 namespace curvisplat {
@@ -72,10 +73,6 @@ ConversionEstimate estimateConversion(uint64_t splats, unsigned threads) {
 
 DiskNeeds diskNeedsOfAdding(uint64_t splats, size_t variables) {
   return {withMargin(splats * leastValueRecordBytes(variables)), splats * variables * kCacheBytesPerScalar};
-}
-
-std::filesystem::path folderOf(const std::filesystem::path& path) {
-  return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
 }
 
 void checkWritable(const std::filesystem::path& folder, const char* hint) {

@@ -38,7 +38,4 @@ void checkWritable(const std::filesystem::path& folder, const char* hint);
 void checkDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
                     const std::filesystem::path& temporary_folder);
 
-/// The folder that holds `path`, "." for a plain name.
-std::filesystem::path folderOf(const std::filesystem::path& path);
-
 }  // namespace curvisplat

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "stream/error.h"
+#include "stream/file.h"
 
 namespace curvisplat {
 
@@ -16,15 +17,15 @@ std::filesystem::path ScratchFolder::newPath(const std::filesystem::path& parent
 
 ScratchFolder::ScratchFolder(std::filesystem::path path, Folder folder) : path_(std::move(path)) {
   if (folder == Folder::kTakeOver) return;
-  std::error_code error;
-  if (!std::filesystem::create_directories(path_, error) || error)
-    throw Error("{}: the folder for temporary files cannot be made: {}; name another place with --tmp",
-                path_.string(), error ? error.message() : "it exists");
+  try {
+    makeFolder(path_);
+  } catch (const Error& error) {
+    throw Error("{}; it is for temporary files: name another place with --tmp", error.what());
+  }
 }
 
 ScratchFolder::~ScratchFolder() {
-  std::error_code ignored;
-  if (!leave_) std::filesystem::remove_all(path_, ignored);
+  if (!leave_) removeAll(path_);
 }
 
 }  // namespace curvisplat

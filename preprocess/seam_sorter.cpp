@@ -7,7 +7,6 @@
 #include <atomic>
 #include <bit>
 #include <queue>
-#include <system_error>
 #include <utility>
 
 #include "stream/error.h"
@@ -127,9 +126,7 @@ void SeamSorter::spill() {
     written_ = std::make_unique<OutputFile>(path);
     read_ = std::make_unique<InputFile>(path);
     // Open, it lives on without a name, and no kill can leave it behind.
-    std::error_code failure;
-    if (!std::filesystem::remove(path, failure))
-      throw Error("{}: the temporary file's name cannot be removed: {}", path.string(), failure.message());
+    removeFile(path);
   }
   std::sort(entries_.begin(), entries_.end());
   const uint64_t begin = written_->size();

@@ -15,10 +15,9 @@ void SpoolFile::create() {
   out_ = std::make_unique<OutputFile>(path);
   try {
     in_ = std::make_unique<InputFile>(path);
-    std::filesystem::remove(path);
+    removeFile(path);
   } catch (...) {
-    std::error_code ignored;
-    std::filesystem::remove(path, ignored);
+    removeAll(path);
     throw;
   }
 }

@@ -101,7 +101,7 @@ void FrameWorkers::loop(Worker& worker) {
 std::optional<BrickSource::Splats> FrameWorkers::fetch(Worker& worker, uint64_t sequence) {
   try {
     return source_.take(sequence, worker.scratch);
-  } catch (const Error& error) {
+  } catch (const DamagedBrick& error) {
     if (!work_->keep_going) throw;
     const BrickPart& part = work_->parts[sequence];
     worker.statistics.bricks_unreadable.push_back({part.brick, error.what()});

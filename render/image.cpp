@@ -50,7 +50,7 @@ Image::Image(ImageSize size_) : size(size_), rgba(4 * static_cast<size_t>(size_.
 void writeImage(const Image& image, const std::filesystem::path& path) {
   CURVISPLAT_CHECK(image.size.width > 0 && image.size.width <= kLargestImageSide);
   CURVISPLAT_CHECK(image.size.height > 0 && image.size.height <= kLargestImageSide);
-  writeFileAtomically(path, formatByName(path).encode(image));
+  writeFileDurably(path, formatByName(path).encode(image));
 }
 
 void checkImageName(const std::filesystem::path& path) {

@@ -184,7 +184,7 @@ BrickSource::Splats BrickSource::standIn(const BrickPart& part, Scratch& scratch
     try {
       cache_.readGeometry(ancestor, scratch.geometry, nullptr, &scratch.times);
       cache_.readVariable(ancestor, variable_, scratch.values, &scratch.times);
-    } catch (const Error&) {
+    } catch (const DamagedBrick&) {
       scratch.geometry.resize(0);
       scratch.values.resize(0);
       continue;  // the next one, then

@@ -63,14 +63,14 @@ class BrickSource {
 
   /// Begins a frame. Nobody may be in take() any more. `unneeded` as the pager has it.
   void start(std::span<const BrickPart> parts, BrickPager::Unneeded unneeded = {});
-  /// The brick of the `sequence`-th part; each once, any thread. Nothing once stopped. Throws Error naming
-  /// the brick where the disk fails, a file has shrunk, or a checksum does not match.
+  /// The brick of the `sequence`-th part; each once, any thread. Nothing once stopped. Throws as CacheReader
+  /// does, DamagedBrick or Error, and Error where reading ahead broke off.
   /// No splats where `unneeded` has said so.
   std::optional<Splats> take(uint64_t sequence, Scratch& scratch);
   /// Instead of take(), for a part of a brick that `unneeded` is true of: lets go of it.
   void pass(uint64_t sequence);
-  /// For a part that take() has failed on: what stands for its space in the nearest ancestor that can be
-  /// read. No splats if none can be read.
+  /// For a part that is damaged: what stands for its space in the nearest ancestor that is not. No splats if
+  /// all are. Throws Error where the disk fails.
   Splats standIn(const BrickPart& part, Scratch& scratch) const;
 
   /// Begins to fill the cache with what it lacks of `bricks`, as far as there is room without them.

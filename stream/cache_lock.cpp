@@ -10,12 +10,13 @@
 #include <string>
 
 #include "stream/error.h"
+#include "stream/file.h"
 
 namespace curvisplat {
 
 CacheLock::CacheLock(const std::filesystem::path& cache) : cache_(cache), manifest_(cache / "manifest.json") {
   // For writing: network file systems grant exclusive locks on nothing less.
-  fd_ = ::open(manifest_.c_str(), O_RDWR | O_CLOEXEC);
+  fd_ = SystemCalls::current().open(manifest_.c_str(), O_RDWR | O_CLOEXEC, 0);
   if (fd_ < 0)
     throw Error("{}: cannot be opened for writing: {}; name a whole splat cache that you may change",
                 manifest_.string(), std::strerror(errno));
@@ -23,14 +24,14 @@ CacheLock::CacheLock(const std::filesystem::path& cache) : cache_(cache), manife
   const bool is_busy = errno == EWOULDBLOCK;
   const std::string reason = std::strerror(errno);
   const bool is_there = isStillThere();
-  ::close(fd_);
+  SystemCalls::current().close(fd_);
   if (is_busy || !is_there)
     throw Error("{}: another program is changing this cache; wait for it", cache_.string());
   throw Error("{}: cannot be locked: {}", manifest_.string(), reason);
 }
 
 CacheLock::~CacheLock() {
-  ::close(fd_);
+  SystemCalls::current().close(fd_);
 }
 
 bool CacheLock::isStillThere() const {

@@ -9,6 +9,7 @@
 #include "stream/checksum.h"
 #include "stream/error.h"
 #include "stream/file.h"
+#include "stream/partial_folder.h"
 #include "stream/stage_timer.h"
 
 namespace curvisplat {
@@ -17,7 +18,12 @@ namespace {
 namespace fs = std::filesystem;
 
 Manifest readManifest(const fs::path& cache) {
-  if (!fs::exists(cache)) throw Error("{}: there is no such cache", cache.string());
+  if (!fs::exists(cache)) {
+    if (hasUnfinished(cache))
+      throw Error("{}: its conversion is not finished; the same command with --resume goes on with it",
+                  cache.string());
+    throw Error("{}: there is no such cache", cache.string());
+  }
   if (!fs::is_directory(cache)) throw Error("{}: is not a folder; a splat cache is one", cache.string());
   const fs::path path = cache / "manifest.json";
   if (!fs::exists(path))
@@ -48,6 +54,8 @@ struct CacheReader::State {
     scratch.resize(extent.length);
     try {
       file.readAt(extent.offset, std::span(scratch));
+    } catch (const TruncatedFile& error) {
+      throw DamagedBrick("brick {} cannot be read: {}", brick, error.what());
     } catch (const Error& error) {
       throw Error("brick {} cannot be read: {}", brick, error.what());
     }
@@ -60,7 +68,7 @@ struct CacheReader::State {
     CURVISPLAT_CHECK_OP(bytes.size(), ==, extent.length);
     const uint64_t found = checksumOf(bytes);
     if (found != extent.checksum)
-      throw Error(
+      throw DamagedBrick(
           "{}: brick {} at offset {} ({} bytes) has the checksum {:016x}, expected {:016x}; the file is "
           "damaged: convert again",
           file.path().string(), brick, extent.offset, extent.length, found, extent.checksum);
@@ -73,7 +81,7 @@ struct CacheReader::State {
     try {
       work();
     } catch (const Error& error) {
-      throw Error("{}: brick {}: {}", file.path().string(), brick, error.what());
+      throw DamagedBrick("{}: brick {}: {}", file.path().string(), brick, error.what());
     }
   }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "stream/brick.h"
+#include "stream/error.h"
 #include "stream/manifest.h"
 #include "stream/splats.h"
 
@@ -19,6 +20,13 @@ namespace curvisplat {
 struct ReadTimes {
   double read_s = 0;  // the disk's
   double verify_s = 0, decode_s = 0;
+};
+
+/// A brick's bytes are not what was written: the file is damaged, or has become shorter. A coarser brick can
+/// stand in. (Where the disk itself fails, the others will fare no better: that is a plain Error.)
+class DamagedBrick : public Error {
+ public:
+  using Error::Error;
 };
 
 class CacheReader {
@@ -41,8 +49,8 @@ class CacheReader {
   /// that lists the names there are.
   size_t variableNamed(std::string_view name) const;
 
-  /// Reads, verifies and decodes. Throws Error naming the brick and the file where the disk fails or a
-  /// checksum does not match.
+  /// Reads, verifies and decodes. Throws DamagedBrick where a checksum does not match or the file ends, Error
+  /// where the disk fails; both name the brick and the file.
   void readGeometry(uint32_t brick, SplatGeometry& out, std::vector<NodeRun>* runs = nullptr,
                     ReadTimes* times = nullptr) const;
   void readVariable(uint32_t brick, size_t variable, SplatVariable& out, ReadTimes* times = nullptr) const;

@@ -148,7 +148,7 @@ CacheWriter::CacheWriter(PartialFolder& folder, RootCube root, std::vector<Varia
   // What an interrupted finish() has left: a manifest, whole though it may be, is older than what follows.
   for (const auto& entry : std::filesystem::directory_iterator(folder.path()))
     if (entry.path().filename() == "manifest.json" || entry.path().extension() == ".part")
-      std::filesystem::remove(entry.path());
+      removeFile(entry.path());
   state_->takeUp(progress);
 }
 
@@ -194,7 +194,7 @@ BrickSplats CacheWriter::readBack(uint64_t id) const {
   return decodeForMerging(s.root, brick, geometry, variables, values);
 }
 
-void CacheWriter::finish(Manifest manifest) {
+Manifest CacheWriter::finish(Manifest manifest) {
   State& s = *state_;
   if (s.bricks.empty())
     throw Error("{}: there is nothing to write: no brick has a splat", s.folder.path().string());
@@ -230,8 +230,9 @@ void CacheWriter::finish(Manifest manifest) {
   manifest.files.push_back(s.writeGrids(ordered));
   writeFileAtomically(s.folder.path() / "manifest.json", manifest.toJson());
   s.folder.putIntoPlace();
-  std::error_code ignored;
-  std::filesystem::remove(s.folder.target() / kBrickLogName, ignored);
+  removeAll(s.folder.target() / kBrickLogName);
+  s.folder.removeReplaced();
+  return manifest;
 }
 
 FileInfo CacheWriter::State::writeIndex(const std::vector<Brick>& ordered) {

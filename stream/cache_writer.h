@@ -50,8 +50,8 @@ class CacheWriter {
 
   /// Sorts the records by level and Morton order, links parents and children, writes bricks.bin, the
   /// variables' tables, bricks.vdb and the manifest (whose root, counts, levels, volume and files it fills
-  /// in), and renames into place.
-  void finish(Manifest manifest);
+  /// in), and renames into place. Returns the manifest as it was written.
+  Manifest finish(Manifest manifest);
 
  private:
   struct State;

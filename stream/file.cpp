@@ -11,8 +11,6 @@
 #include <cstring>
 #include <utility>
 
-#include "stream/error.h"
-
 namespace curvisplat {
 namespace {
 
@@ -61,6 +59,11 @@ void syncRetrying(int fd, const std::filesystem::path& path) {
     throw Error("{}: cannot be flushed to the disk: {}", path.string(), reason());
 }
 
+void renameFile(const std::filesystem::path& from, const std::filesystem::path& to) {
+  if (SystemCalls::current().rename(from.c_str(), to.c_str()) < 0)
+    throw Error("{}: cannot be renamed to {}: {}", from.string(), to.string(), reason());
+}
+
 }  // namespace
 
 int SystemCalls::open(const char* path, int flags, unsigned mode) {
@@ -87,6 +90,12 @@ int SystemCalls::rename(const char* from, const char* to) {
 int SystemCalls::exchange(const char* a, const char* b) {
   return ::renameat2(AT_FDCWD, a, AT_FDCWD, b, RENAME_EXCHANGE);
 }
+int SystemCalls::mkdir(const char* path, unsigned mode) {
+  return ::mkdir(path, mode);
+}
+int SystemCalls::remove(const char* path) {
+  return std::remove(path);
+}
 SystemCalls& SystemCalls::current() {
   return *current_calls.load(std::memory_order_acquire);
 }
@@ -105,7 +114,7 @@ InputFile::InputFile(std::filesystem::path path, Caching caching) : path_(std::m
   if (fd_ < 0) throw Error("{}: cannot be opened for reading: {}", path_.string(), reason());
   struct stat status {};
   if (::fstat(fd_, &status) < 0 || !S_ISREG(status.st_mode)) {
-    ::close(std::exchange(fd_, -1));
+    SystemCalls::current().close(std::exchange(fd_, -1));
     throw Error("{}: is not a regular file", path_.string());
   }
   size_ = static_cast<uint64_t>(status.st_size);
@@ -137,8 +146,9 @@ void InputFile::readAt(uint64_t offset, std::span<std::byte> to) const {
                   reason());
     }
     if (got == 0)
-      throw Error("{}: ends at byte {} where {} bytes from offset {} were expected; the file is truncated",
-                  path_.string(), offset + done, to.size(), offset);
+      throw TruncatedFile(
+          "{}: ends at byte {} where {} bytes from offset {} were expected; the file is truncated",
+          path_.string(), offset + done, to.size(), offset);
     done += static_cast<size_t>(got);
   }
 }
@@ -227,17 +237,30 @@ void writeFileAtomically(const std::filesystem::path& path, std::span<const std:
     OutputFile file(temporary);
     file.append(bytes);
     file.close();
-    if (SystemCalls::current().rename(temporary.c_str(), path.c_str()) < 0)
-      throw Error("{}: cannot be put into place: {}", path.string(), reason());
+    renameFile(temporary, path);
   } catch (...) {
-    std::error_code ignored;
-    std::filesystem::remove(temporary, ignored);
+    removeAll(temporary);
     throw;
   }
 }
 
 void writeFileAtomically(const std::filesystem::path& path, const std::string& text) {
   writeFileAtomically(path, std::as_bytes(std::span(text)));
+}
+
+void writeFileDurably(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  writeFileAtomically(path, bytes);
+  syncDirectory(folderOf(path));
+}
+
+void writeFileDurably(const std::filesystem::path& path, const std::string& text) {
+  writeFileDurably(path, std::as_bytes(std::span(text)));
+}
+
+void putFileIntoPlace(const std::filesystem::path& from, const std::filesystem::path& to) {
+  OutputFile(from, Caching::pages, OutputFile::Existing::kKeep).close();
+  renameFile(from, to);
+  syncDirectory(folderOf(to));
 }
 
 void syncDirectory(const std::filesystem::path& path) {
@@ -250,6 +273,37 @@ void syncDirectory(const std::filesystem::path& path) {
     throw;
   }
   SystemCalls::current().close(fd);
+}
+
+void makeFolder(const std::filesystem::path& path) {
+  if (SystemCalls::current().mkdir(path.c_str(), 0777) < 0)
+    throw Error("{}: the folder cannot be made: {}", path.string(), reason());
+}
+
+void removeFile(const std::filesystem::path& path) {
+  if (SystemCalls::current().remove(path.c_str()) < 0)
+    throw Error("{}: cannot be removed: {}", path.string(), reason());
+}
+
+std::error_code removeAll(const std::filesystem::path& path) noexcept {
+  namespace fs = std::filesystem;
+  std::error_code first;
+  try {
+    std::error_code error;
+    const bool is_folder = fs::is_directory(fs::symlink_status(path, error));
+    if (is_folder)
+      for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error))
+        if (const std::error_code inside = removeAll(entry->path()); !first) first = inside;
+    if (SystemCalls::current().remove(path.c_str()) < 0 && errno != ENOENT && !first)
+      first = {errno, std::generic_category()};
+  } catch (...) {
+    if (!first) first = std::make_error_code(std::errc::not_enough_memory);
+  }
+  return first;
+}
+
+std::filesystem::path folderOf(const std::filesystem::path& path) {
+  return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
 }
 
 }  // namespace curvisplat

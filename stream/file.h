@@ -1,7 +1,8 @@
-// Positional file access: all I/O of our own goes through these two classes, and they go through one table of
-// system calls, so that a test can put a failing disk in its place. Every failure is an Error that names the
-// path, the byte offset and the system's reason. Short transfers and EINTR are retried; they are not
-// failures.
+// Positional file access: all I/O of our own goes through these classes and functions, and they go through
+// one table of system calls, so that a test can put a failing disk in its place. (Reads by io_uring do not:
+// async_reads.h. Libraries that read or write files themselves do not either: CGNS, HDF5, NetCDF.) Every
+// failure is an Error that names the path, the byte offset and the system's reason. Short transfers and EINTR
+// are retried; they are not failures.
 #pragma once
 
 #include <sys/types.h>
@@ -12,6 +13,9 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <system_error>
+
+#include "stream/error.h"
 
 namespace curvisplat {
 
@@ -28,6 +32,9 @@ class SystemCalls {
   virtual int rename(const char* from, const char* to);
   /// Swaps two names in one step (Linux renameat2).
   virtual int exchange(const char* a, const char* b);
+  virtual int mkdir(const char* path, unsigned mode);
+  /// A file, or an empty folder.
+  virtual int remove(const char* path);
 
   static SystemCalls& current();
   /// Whether no double is in their place: reads may then go past this table (io_uring).
@@ -53,6 +60,12 @@ class ScopedSystemCalls {
 enum class Caching { pages, direct };
 inline constexpr size_t kDirectAlignment = 4096;
 
+/// A file ends before the bytes that were asked for: it was cut off, or is being changed.
+class TruncatedFile : public Error {
+ public:
+  using Error::Error;
+};
+
 /// A file that is read by position. Any number of threads may read at once.
 class InputFile {
  public:
@@ -66,7 +79,7 @@ class InputFile {
   /// Bytes, when it was opened.
   uint64_t size() const { return size_; }
 
-  /// Fills `to` from `offset`. Throws Error if the file ends before that, or the disk fails.
+  /// Fills `to` from `offset`. Throws TruncatedFile if the file ends before that, Error if the disk fails.
   void readAt(uint64_t offset, std::span<std::byte> to) const;
 
   template <typename T>
@@ -119,12 +132,30 @@ class OutputFile {
 /// The whole of a small file (at most `limit` bytes, else an Error).
 std::string readTextFile(const std::filesystem::path& path, uint64_t limit = 64 << 20);
 
-/// Writes `text` beside `path`, syncs it and renames it into place: afterwards `path` is the old file or the
-/// whole new one, whatever happens.
+/// Writes `bytes` beside `path`, syncs them and renames them into place: afterwards `path` is the old file or
+/// the whole new one, whatever happens. Which of them, after a power loss, is certain once its folder has
+/// been synced.
 void writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void writeFileAtomically(const std::filesystem::path& path, const std::string& text);
+/// The same, and syncs the folder: what has returned is there for good.
+void writeFileDurably(const std::filesystem::path& path, std::span<const std::byte> bytes);
+void writeFileDurably(const std::filesystem::path& path, const std::string& text);
+
+/// Gives a file that is whole, and written by others, its name: syncs it, renames it, and syncs the folder.
+void putFileIntoPlace(const std::filesystem::path& from, const std::filesystem::path& to);
 
 /// fsync of a directory, so that the names in it survive a power loss.
 void syncDirectory(const std::filesystem::path& path);
+
+/// Makes a folder whose parent is there. Throws Error, also if something has the name.
+void makeFolder(const std::filesystem::path& path);
+/// Removes a file or an empty folder. Throws Error, also if there is none.
+void removeFile(const std::filesystem::path& path);
+/// Removes a file, or a folder and all in it, as far as it goes. Returns what stood in the way first; that
+/// nothing is there does not.
+std::error_code removeAll(const std::filesystem::path& path) noexcept;
+
+/// The folder that holds `path`, "." for a plain name.
+std::filesystem::path folderOf(const std::filesystem::path& path);
 
 }  // namespace curvisplat

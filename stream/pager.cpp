@@ -16,12 +16,16 @@ namespace {
 // So many batches share the buffer, or twice that: some are read while some are decoded.
 constexpr uint64_t kBatchesInBuffer = 8;
 
+// A read that the kernel puts off (EAGAIN, EINTR) so many times in a row has failed.
+constexpr uint8_t kMostPutOff = 100;
+
 BrickExtents extentsOf(const CacheReader& cache, size_t variable, uint32_t brick) {
   return {cache.bricks()[brick].geometry, cache.brickVariables(variable)[brick].values};
 }
 
 std::unique_ptr<AsyncReads> makeReads(const PagerOptions& options) {
   using Way = PagerOptions::Way;
+  if (options.reads) return options.reads(options.queue_depth);
   if (options.way != Way::threads && (SystemCalls::areReal() || options.way == Way::io_uring)) {
     if (auto reads = makeUringReads(options.queue_depth)) return reads;
     if (options.way == Way::io_uring) throw Error("this system refuses io_uring");
@@ -179,6 +183,7 @@ void BrickPager::planAhead() {
     batch.first = planned_;
     batch.begin = *begin;
     batch.done.assign(batch.plan.reads.size(), 0);
+    batch.put_off.assign(batch.plan.reads.size(), 0);
     batch.missing.assign(batch.plan.bricks.size(), kBrickStreams);
     batch.readable.assign(batch.plan.bricks.size(), 1);
     batch.kept = static_cast<uint32_t>(batch.plan.bricks.size());
@@ -250,7 +255,10 @@ void BrickPager::complete(const AsyncReadEnd& end) {
   if (stopped_) return;
   Batch& batch = batches_[read.batch - first_batch_];
   uint32_t& done = batch.done[read.read];
-  if (end.result == -EINTR || end.result == -EAGAIN) {
+  const bool is_put_off = end.result == -EINTR || end.result == -EAGAIN;
+  uint8_t& put_off = batch.put_off[read.read];
+  put_off = is_put_off ? static_cast<uint8_t>(put_off + 1) : uint8_t{0};
+  if (is_put_off && put_off < kMostPutOff) {
     submit(read.batch, read.read, read.direct);
   } else if (end.result == -EINVAL && read.direct) {
     direct_refused_ = true;

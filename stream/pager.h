@@ -9,8 +9,8 @@
 //
 // Reads are direct and by io_uring where the system allows it, else through the page cache, else by pread on
 // threads; by SystemCalls::pread whenever a test has put a double in place of the system's calls. A read that
-// fails or ends early marks its bricks unreadable: whether one of them can be read alone, and what is wrong
-// if not, is for CacheReader to say.
+// fails, ends early or is put off for ever marks its bricks unreadable: whether one of them can be read
+// alone, and what is wrong if not, is for CacheReader to say.
 #pragma once
 
 #include <array>
@@ -43,6 +43,8 @@ struct PagerOptions {
   unsigned queue_depth = 8;
   Way way = Way::automatic;  // io_uring: Error where the kernel refuses it
   bool direct = true;        // false: through the page cache
+  /// For tests: what reads, in the place of all of the ways, at most `depth` at once.
+  std::function<std::unique_ptr<AsyncReads>(unsigned depth)> reads;
 };
 
 /// Of all that was read since the pager was made.
@@ -127,6 +129,7 @@ class BrickPager {
     uint64_t first = 0;             // sequence of its first brick
     uint64_t begin = 0;             // position in the ring, see below
     std::vector<uint32_t> done;     // [read] bytes
+    std::vector<uint8_t> put_off;   // [read] times in a row
     std::vector<uint8_t> missing;   // [brick] reads to come
     std::vector<uint8_t> readable;  // [brick]
     uint32_t next_read = 0;         // to be submitted

@@ -29,10 +29,18 @@ fs::path withSuffix(fs::path path, const char* suffix) {
   return path;
 }
 
+/// "cache/" has an empty file name; what is beside it belongs to "cache".
+fs::path withoutSlash(fs::path path) {
+  return path.has_filename() ? std::move(path) : path.parent_path();
+}
+
+fs::path partialOf(const fs::path& target) {
+  return withSuffix(withoutSlash(target), ".partial");
+}
+
 void removeFolder(const fs::path& path, const char* what) {
-  std::error_code error;
-  fs::remove_all(path, error);
-  if (error) throw Error("{}: the {} cannot be removed: {}", path.string(), what, error.message());
+  if (const std::error_code error = removeAll(path))
+    throw Error("{}: the {} cannot be removed: {}", path.string(), what, error.message());
 }
 
 }  // namespace
@@ -46,28 +54,37 @@ void checkReplaceable(const fs::path& target, bool overwrite) {
   try {
     const fs::path manifest = target / "manifest.json";
     Manifest::fromJson(readTextFile(manifest), manifest);
-  } catch (const Error&) {
+  } catch (const Error& error) {
     throw Error(
-        "{}: is not a whole splat cache and will not be overwritten; remove it, or choose another output",
-        target.string());
+        "{}: is not a whole splat cache and will not be overwritten; remove it, or choose another output ({})",
+        target.string(), error.what());
   }
 }
 
+bool hasUnfinished(const fs::path& target) {
+  std::error_code ignored;
+  return fs::is_directory(partialOf(target), ignored);
+}
+
 PartialFolder::PartialFolder(fs::path target, bool overwrite, Rest rest)
-    // "cache/" has an empty file name; what is beside it belongs to "cache".
-    : target_(target.has_filename() ? std::move(target) : target.parent_path()),
-      path_(withSuffix(target_, ".partial")) {
+    : target_(withoutSlash(std::move(target))), path_(partialOf(target_)) {
   checkReplaceable(target_, overwrite);
-  if (::mkdir(path_.c_str(), 0777) < 0 && errno != EEXIST)
+  const bool is_new = SystemCalls::current().mkdir(path_.c_str(), 0777) == 0;
+  if (!is_new && errno != EEXIST)
     throw Error("{}: the folder cannot be made: {}; choose another output", path_.string(), reason());
-  lock();
+  try {
+    lock();
+  } catch (...) {
+    if (is_new) SystemCalls::current().remove(path_.c_str());  // unless another's lock is in it by now
+    throw;
+  }
   try {
     if (rest == Rest::kRemove)
       clear();
     else
       leave();
   } catch (...) {
-    ::close(lock_);
+    SystemCalls::current().close(lock_);
     throw;
   }
 }
@@ -80,14 +97,13 @@ void PartialFolder::clear() {
 
 PartialFolder::~PartialFolder() {
   if (lock_ < 0) return;
-  std::error_code ignored;
-  if (!leave_) fs::remove_all(path_, ignored);
-  ::close(lock_);
+  if (!leave_) removeAll(path_);
+  SystemCalls::current().close(lock_);
 }
 
 void PartialFolder::lock() {
   const fs::path name = path_ / kLockName;
-  const int fd = ::open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  const int fd = SystemCalls::current().open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (fd < 0) throw Error("{}: cannot be opened: {}", name.string(), reason());
   const bool locked = ::flock(fd, LOCK_EX | LOCK_NB) == 0;
   const std::string why = reason();
@@ -102,7 +118,7 @@ void PartialFolder::lock() {
     lock_ = fd;
     return;
   }
-  ::close(fd);
+  SystemCalls::current().close(fd);
   if (busy || locked)
     throw Error("{}: another conversion to this output is running; wait for it, or choose another output",
                 path_.string());
@@ -113,13 +129,13 @@ void PartialFolder::putIntoPlace() {
   CURVISPLAT_CHECK(lock_ >= 0);
   SystemCalls& calls = SystemCalls::current();
   syncDirectory(path_);
+  const fs::path aside = withSuffix(target_, ".replaced");
   if (!fs::exists(fs::symlink_status(target_))) {
     if (calls.rename(path_.c_str(), target_.c_str()) < 0)
       throw Error("{}: cannot be renamed to {}: {}", path_.string(), target_.string(), reason());
   } else if (calls.exchange(path_.c_str(), target_.c_str()) == 0) {
-    removeFolder(path_, "old cache");
+    replaced_ = path_;
   } else if (errno == EINVAL || errno == ENOSYS || errno == ENOTSUP) {
-    const fs::path aside = withSuffix(target_, ".replaced");
     if (calls.rename(target_.c_str(), aside.c_str()) < 0)
       throw Error("{}: cannot be moved aside to {}: {}", target_.string(), aside.string(), reason());
     if (calls.rename(path_.c_str(), target_.c_str()) < 0) {
@@ -127,17 +143,31 @@ void PartialFolder::putIntoPlace() {
       calls.rename(aside.c_str(), target_.c_str());
       throw Error("{}: cannot be renamed to {}: {}", path_.string(), target_.string(), why);
     }
-    removeFolder(aside, "old cache");
+    replaced_ = aside;
   } else {
     throw Error("{}: cannot be put in the place of {}: {}", path_.string(), target_.string(), reason());
   }
+  try {
+    // Before anything of the old cache goes: a power loss must not take both of them.
+    syncDirectory(folderOf(target_));
+  } catch (...) {
+    const fs::path old = std::exchange(replaced_, {});
+    if (old == path_)
+      calls.exchange(path_.c_str(), target_.c_str());
+    else
+      calls.rename(target_.c_str(), path_.c_str());
+    if (old == aside) calls.rename(aside.c_str(), target_.c_str());
+    throw;
+  }
   // The lock goes after the renaming: gone before, another conversion could take the folder for a dead one's.
   const int lock = std::exchange(lock_, -1);
-  std::error_code ignored;
-  fs::remove(target_ / kLockName, ignored);
-  ::close(lock);
-  const fs::path parent = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
-  syncDirectory(parent);
+  removeAll(target_ / kLockName);
+  calls.close(lock);
+}
+
+void PartialFolder::removeReplaced() {
+  const fs::path old = std::exchange(replaced_, {});
+  if (!old.empty()) removeFolder(old, "old cache, whose place the new one has taken,");
 }
 
 }  // namespace curvisplat

@@ -16,6 +16,9 @@ namespace curvisplat {
 /// Throws Error if something stands at `target`, and `overwrite` is false or it is no cache.
 void checkReplaceable(const std::filesystem::path& target, bool overwrite);
 
+/// Whether a conversion to `target` is under way, or was interrupted.
+bool hasUnfinished(const std::filesystem::path& target);
+
 class PartialFolder {
  public:
   enum class Rest { kRemove, kKeep };
@@ -38,15 +41,20 @@ class PartialFolder {
   /// Whether the destructor leaves the folder, for a conversion that goes on with it.
   void leave(bool leave = true) { leave_ = leave; }
 
-  /// Renames the folder to the target. An old cache there is swapped out in the same step, then removed;
-  /// where the file system cannot swap, it is moved aside first, and is put back if the renaming fails. The
-  /// folder's files must have been synced.
+  /// Renames the folder to the target, for good: the names are synced. An old cache there is swapped out in
+  /// the same step; where the file system cannot swap, it is moved aside first. If that fails, both are where
+  /// they were, and this throws Error. The folder's files must have been synced.
   void putIntoPlace();
+  /// Whether putIntoPlace() has done so.
+  bool isInPlace() const { return lock_ < 0; }
+  /// Removes the old cache that putIntoPlace() has swapped out, if there was one. Throws Error.
+  void removeReplaced();
 
  private:
   void lock();
 
   std::filesystem::path target_, path_;
+  std::filesystem::path replaced_;  // where the old cache is; empty: there is none
   int lock_ = -1;
   bool leave_ = false;
 };

@@ -43,16 +43,17 @@ VariableWriter::VariableWriter(const CacheLock& lock, Manifest manifest, std::ve
 VariableWriter::~VariableWriter() {
   // In a cache that has come in this one's place the same names are another's files.
   if (in_place_ || !lock_->isStillThere()) return;
-  std::error_code ignored;
-  for (const NewFile& file : files_) fs::remove(file.is_renamed ? file.path : file.part, ignored);
+  for (const NewFile& file : files_) removeAll(file.is_renamed ? file.path : file.part);
 }
 
-/// Parts of a program that was killed.
+/// Files of a program that was killed: the manifest does not know them.
 void VariableWriter::removeLeftovers() const {
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(lock_->cache(), ignored)) {
     const std::string name = entry.path().filename().string();
-    if (name.starts_with("var.") && name.ends_with(kPartSuffix)) fs::remove(entry.path(), ignored);
+    const bool is_known = std::any_of(manifest_.files.begin(), manifest_.files.end(),
+                                      [&](const FileInfo& file) { return file.name == name; });
+    if (!is_known && (name.starts_with("var.") || name.ends_with(kPartSuffix))) removeAll(entry.path());
   }
 }
 

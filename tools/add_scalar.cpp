@@ -8,7 +8,6 @@
 #include "preprocess/add_scalar.h"
 #include "preprocess/time_steps.h"
 #include "stream/error.h"
-#include "tools/option_parsers.h"
 #include "tools/run_statistics.h"
 #include "tools/stop_signals.h"
 
@@ -40,15 +39,9 @@ void printSummary(const ConvertWords& words, const AddScalarReport& report, doub
 }
 
 nlohmann::json statistics(const AddScalarReport& report, const Progress& progress) {
-  nlohmann::json json = runStatistics();
-  json["threads"] = report.threads;
-  json["memory_bytes"] = report.memory_bytes;
+  nlohmann::json json = commonStatistics(report, progress);
   json["scalars"] = report.scalars;
   json["nodes"] = report.nodes;
-  json["splats"] = report.splats;
-  json["temporary_bytes"] = report.temporary_bytes;
-  addPhases(progress, json);
-  for (const FileReport& file : report.files) json["files"][file.name] = file.bytes;
   return json;
 }
 
@@ -57,13 +50,9 @@ nlohmann::json statistics(const AddScalarReport& report, const Progress& progres
 void runAddScalar(ConvertWords words) {
   checkWords(words);
   if (!words.to.has_filename()) words.to = words.to.parent_path();  // "NAME.splats/"
-  if (!words.statistics.empty()) checkOutputFolder("--stats", words.statistics);
   AddScalarOptions options;
   options.cache = words.to;
-  options.temporary_folder = words.temporary_folder;
-  options.blank_value = words.blank_value;
-  options.threads = words.threads;
-  if (words.memory) options.memory_bytes = parseByteSize("--memory", *words.memory);
+  takeCommonWords(words, options);
 
   const auto source = openSource(words, words.to);
   options.scalars = chooseScalars(words, words.added_scalars, source->description());

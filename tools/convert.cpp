@@ -74,9 +74,7 @@ void printWarnings(const GridDescription& description, std::optional<uint32_t> t
 }
 
 nlohmann::json statistics(const ConvertReport& report, const Progress& progress) {
-  nlohmann::json json = runStatistics();
-  json["threads"] = report.threads;
-  json["memory_bytes"] = report.memory_bytes;
+  nlohmann::json json = commonStatistics(report, progress);
   json["resumed"] = report.resumed;
   json["resumed_bricks"] = report.resumed_bricks;
   json[report.centring == Centring::cell ? "cells" : "nodes"] = report.nodes;
@@ -86,13 +84,9 @@ nlohmann::json statistics(const ConvertReport& report, const Progress& progress)
   json["degenerate"] = report.degenerate;
   json["inverted"] = report.inverted;
   json["merged_nodes"] = report.merged_nodes;
-  json["splats"] = report.splats;
   json["bricks"] = report.bricks;
   json["levels"] = report.levels;
   json["volume"] = report.volume;
-  json["temporary_bytes"] = report.temporary_bytes;
-  addPhases(progress, json);
-  for (const FileReport& file : report.files) json["files"][file.name] = file.bytes;
   json["cache_bytes"] = totalBytes(report.files);
   return json;
 }
@@ -100,16 +94,12 @@ nlohmann::json statistics(const ConvertReport& report, const Progress& progress)
 void runConvert(ConvertWords words) {
   if (words.output.empty()) throw UsageError("--output is required, or --add-scalar and --to");
   if (!words.output.has_filename()) words.output = words.output.parent_path();  // "NAME.splats/"
-  if (!words.statistics.empty()) checkOutputFolder("--stats", words.statistics);
   checkOutputFolder("-o", words.output);
   ConvertOptions options;
   options.output = words.output;
   options.overwrite = words.overwrite;
   options.resume = words.resume;
-  options.temporary_folder = words.temporary_folder;
-  options.blank_value = words.blank_value;
-  options.threads = words.threads;
-  if (words.memory) options.memory_bytes = parseByteSize("--memory", *words.memory);
+  takeCommonWords(words, options);
 
   const auto source = openSource(words, words.output);
   options.scalars = chooseScalars(words, words.scalars, source->description());

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json_fwd.hpp>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,6 +14,8 @@
 #include "preprocess/convert.h"
 #include "preprocess/open_grid.h"
 #include "stream/progress.h"
+#include "tools/option_parsers.h"
+#include "tools/run_statistics.h"
 
 namespace curvisplat {
 
@@ -39,10 +41,34 @@ std::vector<uint32_t> chooseScalars(const ConvertWords& words, const std::vector
 
 /// Of all phases.
 double secondsOf(const Progress& progress);
-/// Sets "seconds" and "phases".
-void addPhases(const Progress& progress, nlohmann::json& json);
 
 uint64_t totalBytes(std::span<const FileReport> files);
 double mebibytes(uint64_t bytes);
+
+/// What the words say of either way's options. Throws UsageError for a --stats that cannot be written.
+template <typename Options>
+void takeCommonWords(const ConvertWords& words, Options& options) {
+  if (!words.statistics.empty()) checkOutputFolder("--stats", words.statistics);
+  options.temporary_folder = words.temporary_folder;
+  options.blank_value = words.blank_value;
+  options.threads = words.threads;
+  if (words.memory) options.memory_bytes = parseByteSize("--memory", *words.memory);
+}
+
+/// Sets "seconds" and "phases".
+void addPhases(const Progress& progress, nlohmann::json& json);
+
+/// What --stats tells of either way.
+template <typename Report>
+nlohmann::json commonStatistics(const Report& report, const Progress& progress) {
+  nlohmann::json json = runStatistics();
+  json["threads"] = report.threads;
+  json["memory_bytes"] = report.memory_bytes;
+  json["splats"] = report.splats;
+  json["temporary_bytes"] = report.temporary_bytes;
+  addPhases(progress, json);
+  for (const FileReport& file : report.files) json["files"][file.name] = file.bytes;
+  return json;
+}
 
 }  // namespace curvisplat

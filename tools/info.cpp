@@ -13,6 +13,7 @@
 #include "stream/cache_reader.h"
 #include "stream/cache_verify.h"
 #include "stream/error.h"
+#include "stream/partial_folder.h"
 #include "stream/probe.h"
 #include "stream/progress.h"
 #include "tools/commands.h"
@@ -176,6 +177,10 @@ void printCacheInfo(const InfoOptions& options) {
     printAsJson(reader, options, asked);
   else
     printAsText(reader, options, asked);
+  if (hasUnfinished(options.grid.grid))
+    fmt::print(stderr,
+               "curvisplat: note: a conversion that is to replace this cache is under way, or was "
+               "interrupted\n");
   if (!asked.findings.empty())
     throw Error("{}: {} findings; the cache is damaged: convert again", options.grid.grid.string(),
                 asked.findings.size());
@@ -185,7 +190,8 @@ void printInfo(const InfoOptions& options) {
   if (options.system != options.grid.grid.empty())
     throw UsageError("info: expected a cache, a grid file or --system, and one of them");
   if (options.system) return printSystem(options.json);
-  if (fs::is_directory(options.grid.grid)) return printCacheInfo(options);
+  const fs::path& path = options.grid.grid;
+  if (fs::is_directory(path) || (!fs::exists(path) && hasUnfinished(path))) return printCacheInfo(options);
   if (options.verify || !options.point.empty())
     throw UsageError("{}: --verify and --probe are for caches, and this is not a folder",
                      options.grid.grid.string());

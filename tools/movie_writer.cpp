@@ -117,8 +117,7 @@ MovieWriter::~MovieWriter() {
   }
   closeInput();
   close(errors_);
-  std::error_code ignored;
-  std::filesystem::remove(unfinished_, ignored);
+  removeAll(unfinished_);
 }
 
 void MovieWriter::closeInput() {
@@ -159,9 +158,7 @@ void MovieWriter::append(const Image& image) {
 
 void MovieWriter::finish() {
   if (const int status = wait(); status != 0) fail(status);
-  std::error_code error;
-  std::filesystem::rename(unfinished_, path_, error);
-  if (error) throw Error("{}: the movie cannot be put there: {}", path_.string(), error.message());
+  putFileIntoPlace(unfinished_, path_);
 }
 
 }  // namespace curvisplat

@@ -368,7 +368,7 @@ void addRender(CLI::App& app) {
       ->group(how);
   command
       ->add_flag("--keep-going", words->keep_going,
-                 "Draw what cannot be read from a coarser level, and say so, instead of failing")
+                 "Draw damaged bricks from a coarser level, and say so, instead of failing")
       ->group(how);
   command->add_option("--stats", words->statistics, "Write what was done, and how long it took, to FILE.json")
       ->group(how);

@@ -64,7 +64,7 @@ nlohmann::json runStatistics() {
 void writeStatistics(const std::filesystem::path& path, const nlohmann::json& statistics) {
   // Arguments are bytes, which need not be the UTF-8 that JSON is.
   constexpr auto kReplace = nlohmann::json::error_handler_t::replace;
-  writeFileAtomically(path, statistics.dump(2, ' ', false, kReplace) + "\n");
+  writeFileDurably(path, statistics.dump(2, ' ', false, kReplace) + "\n");
 }
 
 void checkOutputFolder(std::string_view option, const std::filesystem::path& path) {

@@ -64,6 +64,9 @@ class StoppingSystemCalls : public SystemCalls {
   std::atomic<int64_t> writes_ = 0;
 };
 
+/// Of the last calls of a conversion, these come when all bricks are written; and these remove an old cache.
+constexpr int64_t kCallsToFinish = 17, kCallsToRemove = 8;
+
 class Resume : public ::testing::Test {
  protected:
   static constexpr uint64_t kBucketSplats = 9000;
@@ -204,7 +207,7 @@ TEST_F(Resume, TakesUpOrDropsTheBricksOfALargeCell) {
   dying_bucket_splats_ = 1'000'000;
   const int64_t calls = callsOfAll({"writes"});
   size_t most = 0;
-  for (int64_t call = calls - 46; call < calls - 12; call += 2) {
+  for (int64_t call = calls - kCallsToFinish - 34; call < calls - kCallsToFinish; call += 2) {
     SCOPED_TRACE(call);
     killedAt(call);
     if (readJournal(partial())->splats) most = std::max(most, readBrickLog(partial(), 1).size());
@@ -224,7 +227,7 @@ TEST_F(Resume, TakesNodesThatAllCoincide) {
   }));
   const int64_t calls = callsOfAll({"writes"});
   size_t most = 0;
-  for (int64_t call = calls - 30; call < calls - 14; ++call) {
+  for (int64_t call = calls - kCallsToFinish - 18; call < calls - kCallsToFinish - 2; ++call) {
     SCOPED_TRACE(call);
     killedAt(call);
     most = std::max(most, readBrickLog(partial(), 1).size());
@@ -239,7 +242,8 @@ TEST_F(Resume, TakesNodesThatAllCoincide) {
 TEST_F(Resume, ReplacesAnOldCacheAtOnce) {
   const Files old{{"manifest.json", ""}, {"geometry.bin", ""}};
   const int64_t calls = callsOfAll({"writes"});
-  for (int64_t call = calls / 8; call <= calls + 1; call += call < calls - 12 ? calls / 8 : 1) {
+  for (int64_t call = calls / 8; call <= calls + kCallsToRemove;
+       call += call < calls - kCallsToFinish ? calls / 8 : 1) {
     SCOPED_TRACE(call);
     Words other{false, true, std::nullopt};
     ConvertOptions options = optionsFor(other);

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
+#include <cerrno>
 #include <filesystem>
 #include <numeric>
 #include <random>
@@ -13,6 +15,7 @@
 #include "stream/checksum.h"
 #include "stream/error.h"
 #include "stream/file.h"
+#include "tests/support/faulty_async_reads.h"
 #include "tests/support/faulty_system_calls.h"
 #include "tests/support/random_cache.h"
 #include "tests/support/temporary_folder.h"
@@ -21,6 +24,7 @@ namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::FaultyAsyncReads;
 using testing::FaultySystemCalls;
 using Way = PagerOptions::Way;
 
@@ -156,6 +160,7 @@ TEST_F(PagerTest, ReadsTheSameBytesAsPlainReads) {
             EXPECT_EQ(takeAll(pager, cache, order, 1 + static_cast<unsigned>(round)), order.size())
                 << path << ' ' << pager.way() << ' ' << buffer;
           }
+          EXPECT_TRUE(pager.way().starts_with(way == Way::io_uring ? "io_uring" : "pread")) << pager.way();
           const PagerStatistics statistics = pager.statistics();
           EXPECT_LE(statistics.peak_bytes, pager.bufferBytes());
           EXPECT_GE(statistics.bytes, 3 * fs::file_size(path / "geometry.bin"));
@@ -165,6 +170,70 @@ TEST_F(PagerTest, ReadsTheSameBytesAsPlainReads) {
         }
   }
   fs::remove_all(in_memory);
+}
+
+TEST_F(PagerTest, ReadsByIoUringWhereTheKernelAllowsIt) {
+  if (!uringWorks()) GTEST_SKIP() << "this kernel, or this container, refuses io_uring";
+  for (const Way way : {Way::automatic, Way::io_uring}) {
+    BrickPager pager(*cache_, 0, optionsOf(way, true, 1 << 20));
+    EXPECT_EQ(takeAll(pager, *cache_, inOrder(), 2), bricks());
+    EXPECT_TRUE(pager.way().starts_with("io_uring")) << pager.way();
+  }
+}
+
+/// Each kind of reads, with its ends changed.
+class PagerFaultTest : public PagerTest, public ::testing::WithParamInterface<bool> {
+ protected:
+  void SetUp() override {
+    if (GetParam() && !uringWorks()) GTEST_SKIP() << "this kernel, or this container, refuses io_uring";
+  }
+  PagerOptions optionsWith(FaultyAsyncReads::Change change) const {
+    PagerOptions options;
+    options.reads = [by_uring = GetParam(), change = std::move(change)](unsigned depth) {
+      return std::make_unique<FaultyAsyncReads>(by_uring ? makeUringReads(depth) : makeThreadReads(depth),
+                                                change);
+    };
+    return options;
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Ways, PagerFaultTest, ::testing::Bool(),
+                         [](const auto& tested) { return tested.param ? "io_uring" : "threads"; });
+
+TEST_P(PagerFaultTest, AnyReadMayFailAndNobodyHangs) {
+  std::atomic<uint64_t> reads = 0;
+  for (uint64_t at = 0; at == 0 || at < reads; ++at) {
+    reads = 0;
+    BrickPager pager(*cache_, 0, optionsWith([&, at](uint64_t number, int64_t result) {
+      ++reads;
+      return number == at ? -EIO : result;
+    }));
+    EXPECT_LT(takeAll(pager, *cache_, inOrder(), 2), bricks()) << at;
+    EXPECT_GT(pager.statistics().bricks_unreadable, 0u) << at;
+    EXPECT_EQ(takeAll(pager, *cache_, inOrder(), 2), bricks()) << at;
+  }
+  EXPECT_GT(reads, 5u);
+}
+
+TEST_P(PagerFaultTest, ShortReadsAreCompleted) {
+  for (const int64_t most : {int64_t{1}, int64_t{4096}, int64_t{5000}}) {
+    BrickPager pager(*cache_, 0, optionsWith([most](uint64_t number, int64_t result) {
+      return number % 3 == 0 ? std::min(result, most) : result;
+    }));
+    EXPECT_EQ(takeAll(pager, *cache_, inOrder(), 2), bricks()) << most;
+  }
+}
+
+TEST_P(PagerFaultTest, ReadsThatArePutOffAreRepeatedButNotForEver) {
+  for (const int64_t error : {EAGAIN, EINTR}) {
+    BrickPager sometimes(*cache_, 0, optionsWith([error](uint64_t number, int64_t result) {
+      return number % 3 == 0 ? -error : result;
+    }));
+    EXPECT_EQ(takeAll(sometimes, *cache_, inOrder(), 2), bricks());
+    BrickPager always(*cache_, 0, optionsWith([error](uint64_t, int64_t) { return -error; }));
+    EXPECT_EQ(takeAll(always, *cache_, inOrder(), 2), 0u);
+    EXPECT_EQ(always.statistics().bricks_unreadable, bricks());
+  }
 }
 
 TEST_F(PagerTest, JoinsReads) {

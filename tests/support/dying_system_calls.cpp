@@ -55,4 +55,14 @@ int DyingSystemCalls::exchange(const char* a, const char* b) {
   return SystemCalls::exchange(a, b);
 }
 
+int DyingSystemCalls::mkdir(const char* path, unsigned mode) {
+  dieIfLast();
+  return SystemCalls::mkdir(path, mode);
+}
+
+int DyingSystemCalls::remove(const char* path) {
+  dieIfLast();
+  return SystemCalls::remove(path);
+}
+
 }  // namespace curvisplat::testing

@@ -10,8 +10,8 @@
 namespace curvisplat::testing {
 
 /// Put in place with ScopedSystemCalls. The call number `die_at` (counted from 0; opening, writing, cutting,
-/// syncing and renaming, and reading if `count_reads`) sends SIGKILL to the process instead of doing its
-/// work; of a write, the first half is done.
+/// syncing, renaming, removing and making folders, and reading if `count_reads`) sends SIGKILL to the process
+/// instead of doing its work; of a write, the first half is done.
 class DyingSystemCalls : public SystemCalls {
  public:
   int64_t die_at = -1;
@@ -25,6 +25,8 @@ class DyingSystemCalls : public SystemCalls {
   int fsync(int fd) override;  // that is all: what a kill leaves needs no syncing
   int rename(const char* from, const char* to) override;
   int exchange(const char* a, const char* b) override;
+  int mkdir(const char* path, unsigned mode) override;
+  int remove(const char* path) override;
 
  private:
   bool isLast() { return calls++ == die_at; }

@@ -215,7 +215,7 @@ bool FunctionPanel::drawFile(EditedFunction& function) {
     }
     ImGui::SameLine();
     if (ImGui::Button("save")) {
-      writeFileAtomically(file_, toParaViewPreset(function.definition()));
+      writeFileDurably(file_, toParaViewPreset(function.definition()));
       said_ = "saved; render --tf " + file_ + " shows the same";
     }
   } catch (const Error& error) {

@@ -49,7 +49,7 @@ void writeState(const fs::path& file, const std::string& text) {
   std::error_code error;
   fs::create_directories(file.parent_path(), error);
   if (error) throw Error("{}: the folder cannot be made: {}", file.parent_path().string(), error.message());
-  writeFileAtomically(file, text);
+  writeFileDurably(file, text);
 }
 
 }  // namespace curvisplat

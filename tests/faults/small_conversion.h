@@ -1,0 +1,123 @@
+// A conversion of a small grid, and the addition of a scalar to its cache, from files to files: what the
+// disk's failures are tried on.
+#pragma once
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "preprocess/add_scalar.h"
+#include "preprocess/convert.h"
+#include "preprocess/memory_plan.h"
+#include "preprocess/open_grid.h"
+#include "preprocess/plot3d_writer.h"
+#include "tests/support/faulty_system_calls.h"
+#include "tests/support/folder_files.h"
+#include "tests/support/function_grid.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+
+/// Two curved blocks of `side`³ nodes that share a face; two scalars.
+inline FunctionGridSource twoBlocks(uint64_t side) {
+  return FunctionGridSource(
+      {gridBlock(side, side, side), gridBlock(side, side, side)}, 2, [side](const GridNode& node) {
+        const double n = static_cast<double>(side - 1);
+        const double u = static_cast<double>(node.i) / n + node.block, v = static_cast<double>(node.j) / n,
+                     w = static_cast<double>(node.k) / n;
+        const double r = 1 + 0.5 * v * (1 + v);
+        const glm::dvec3 at(r * std::cos(u), r * std::sin(u), w + 0.1 * std::sin(3 * u));
+        return NodeValues{at, {static_cast<float>(at.x * at.y), static_cast<float>(std::sin(5 * w))}, false};
+      });
+}
+
+class SmallConversion : public ::testing::Test {
+ protected:
+  SmallConversion() { std::filesystem::create_directory(work_); }
+
+  /// Writes the grid, and makes the two caches that are expected of it.
+  void setUp(const GridSource& grid) {
+    Progress progress;
+    writePlot3d(grid, input_.path() / "in", progress);
+    setUp();
+  }
+  void setUp() {
+    inputs_ = filesOf(input_.path());
+    testing::FaultySystemCalls unsynced;
+    unsynced.is_unsynced = true;
+    const ScopedSystemCalls scope(unsynced);
+    convertNow({0}, {});
+    one_ = filesOf(output_);
+    std::filesystem::remove_all(output_);
+    convertNow({0, 1}, {});
+    both_ = filesOf(output_);
+    startWithOne();
+    addNow();
+    added_ = filesOf(output_);
+    startAnew();
+  }
+
+  /// Inputs as they were, and nothing else.
+  void startAnew() const {
+    writeFiles(input_.path(), inputs_);
+    writeFiles(work_, {});
+  }
+  /// Beside the cache of the first scalar.
+  void startWithOne() const {
+    startAnew();
+    writeFiles(output_, one_);
+  }
+
+  struct Words {
+    bool overwrite = false, resume = false;
+  };
+  void convertNow(std::vector<uint32_t> scalars, Words words) const {
+    const auto source = open();
+    ConvertOptions options;
+    options.output = output_;
+    options.scalars = std::move(scalars);
+    options.overwrite = words.overwrite;
+    options.resume = words.resume;
+    options.title = "small";
+    options.threads = 1;
+    options.bucket_splats = 9000;
+    options.memory_bytes = leastMemory(2);
+    Progress progress;
+    convert(*source, options, progress);
+  }
+
+  void addNow() const {
+    const auto source = open();
+    AddScalarOptions options;
+    options.cache = output_;
+    options.scalars = {1};
+    options.threads = 1;
+    options.bucket_splats = 9000;
+    options.memory_bytes = leastMemory(2);
+    Progress progress;
+    addScalars(*source, options, progress);
+  }
+
+  std::unique_ptr<GridSource> open() const {
+    OpenGridOptions options;
+    options.grid = grid_;
+    options.solutions = {input_ / "in.fun"};
+    options.temporary_folder = work_;
+    return openGrid(options);
+  }
+
+  const TemporaryFolder input_, folder_;
+  std::filesystem::path grid_ = input_ / "in.xyz";
+  const std::filesystem::path work_ = folder_ / "work";
+  const std::filesystem::path output_ = work_ / "a.splats";
+  Files inputs_;
+  Files one_, both_;  // the cache of the first scalar, and of both
+  Files added_;       // of both, one after the other: its manifest lists the files in another order
+};
+
+}  // namespace curvisplat

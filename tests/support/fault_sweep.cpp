@@ -1,0 +1,50 @@
+#include "tests/support/fault_sweep.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "stream/error.h"
+
+namespace curvisplat::testing {
+namespace {
+
+/// Whether the line gives the system's reason. Of a file that is cut off there are many things to say.
+bool tellsWhy(const std::string& line, const Fault& fault) {
+  return fault.error == 0 || line.find(std::strerror(fault.error)) != std::string::npos;
+}
+
+}  // namespace
+
+int64_t FaultSweep::run(const Fault& fault) const {
+  for (int64_t at = 0;; at += step) {
+    const ::testing::ScopedTrace trace(__FILE__, __LINE__, fmt::format("{} at {}", fault.name, at));
+    prepare();
+    const size_t descriptors = openDescriptors();
+    FaultySystemCalls faulty;
+    faulty.*fault.at = at;
+    faulty.error = fault.error;
+    faulty.to_be_cut = to_be_cut;
+    faulty.is_unsynced = true;
+    FaultOutcome outcome;
+    try {
+      const ScopedSystemCalls scope(faulty);
+      job();
+    } catch (const Error& error) {
+      outcome.error = error.what();
+      EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 0) << outcome.error;
+      EXPECT_NE(outcome.error.find(in_message), std::string::npos) << outcome.error;
+      EXPECT_TRUE(tellsWhy(outcome.error, fault)) << outcome.error;
+    }
+    EXPECT_EQ(openDescriptors(), descriptors) << outcome.error;
+    outcome.has_refused_removal = faulty.has_refused_removal;
+    outcome.has_struck = faulty.has_failed;
+    EXPECT_TRUE(outcome.has_struck || outcome.error.empty()) << outcome.error;
+    check(outcome);
+    if (!outcome.has_struck || ::testing::Test::HasFailure()) return at / step;
+  }
+}
+
+}  // namespace curvisplat::testing

@@ -1,0 +1,48 @@
+// Does a job again and again, and each time something else goes wrong with the disk: the first call fails,
+// the second one, ... until the job ends before it comes to that.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "tests/support/faulty_system_calls.h"
+
+namespace curvisplat::testing {
+
+/// What goes wrong at the n-th call of a kind.
+struct Fault {
+  const char* name;
+  int64_t FaultySystemCalls::*at;
+  int error;
+};
+
+inline constexpr Fault kFailsOnce{"EIO once", &FaultySystemCalls::fail_only_call_at, EIO};
+inline constexpr Fault kFailsFromThenOn{"EIO from then on", &FaultySystemCalls::fail_call_at, EIO};
+inline constexpr Fault kIsFull{"ENOSPC", &FaultySystemCalls::fail_write_at, ENOSPC};
+inline constexpr Fault kFailsToSync{"EIO at syncing", &FaultySystemCalls::fail_sync_at, EIO};
+inline constexpr Fault kFailsToRename{"EIO at renaming", &FaultySystemCalls::fail_rename_at, EIO};
+inline constexpr Fault kIsCutOff{"cut to half", &FaultySystemCalls::cut_at, 0};
+inline constexpr Fault kFaults[] = {kFailsOnce,   kFailsFromThenOn, kIsFull,
+                                    kFailsToSync, kFailsToRename,   kIsCutOff};
+
+/// What came of a job.
+struct FaultOutcome {
+  std::string error;                 // what it threw; empty: it says that it has done its work
+  bool has_refused_removal = false;  // so something may be left
+  bool has_struck = false;           // else it ended before
+};
+
+struct FaultSweep {
+  std::string in_message;  // every Error names something whose path begins so
+  std::string to_be_cut;   // only files whose paths begin so become shorter
+  std::function<void()> prepare, job;
+  std::function<void(const FaultOutcome&)> check;
+  int64_t step = 1;
+
+  /// Calls prepare(), job() with the fault at the n-th call, and check(outcome), for n from 0 on in steps,
+  /// until the fault is not reached any more. Expects that a failing job throws an Error of one line that
+  /// names a path and the reason, and that no descriptor is lost. Returns how many faults were tried.
+  int64_t run(const Fault& fault) const;
+};
+
+}  // namespace curvisplat::testing

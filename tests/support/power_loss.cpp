@@ -1,0 +1,240 @@
+#include "tests/support/power_loss.h"
+
+#include <fcntl.h>
+
+#include <algorithm>
+#include <set>
+
+namespace curvisplat::testing {
+namespace {
+
+using Kind = DiskCall::Kind;
+
+/// A file or a folder, as it is and as it was when it was synced last.
+struct Node {
+  bool is_folder = false;
+  std::string bytes, synced_bytes;
+  using Names = std::map<std::string, std::shared_ptr<Node>>;
+  Names names, synced_names;
+};
+using NodeOf = std::shared_ptr<Node>;
+
+enum class Unsynced { lost, kept, zeros, half };
+
+class Disk {
+ public:
+  Disk(const std::filesystem::path& root, const DiskState& before)
+      : root_path_(root.string()), root_(std::make_shared<Node>()) {
+    root_->is_folder = true;
+    for (const auto& [name, files] : before) {
+      NodeOf folder = root_;
+      if (!name.empty()) {
+        folder = root_->names[name] = std::make_shared<Node>();
+        folder->is_folder = true;
+      }
+      for (const auto& [file, bytes] : files) {
+        const auto node = folder->names[file] = std::make_shared<Node>();
+        node->bytes = node->synced_bytes = bytes;
+      }
+      folder->synced_names = folder->names;
+    }
+    root_->synced_names = root_->names;
+  }
+
+  void apply(const DiskCall& call) {
+    switch (call.kind) {
+      case Kind::open:
+        return open(call);
+      case Kind::write:
+        return write(call);
+      case Kind::truncate:
+        if (const NodeOf node = opened_[call.fd]) node->bytes.resize(static_cast<size_t>(call.offset));
+        return;
+      case Kind::sync:
+        return sync(call);
+      case Kind::rename:
+        if (const NodeOf from = parentOf(call.path)) {
+          const NodeOf node = from->names.at(nameOf(call.path));
+          from->names.erase(nameOf(call.path));
+          parentOf(call.other)->names[nameOf(call.other)] = node;
+        }
+        return;
+      case Kind::exchange:
+        if (const NodeOf from = parentOf(call.path))
+          std::swap(from->names.at(nameOf(call.path)), parentOf(call.other)->names.at(nameOf(call.other)));
+        return;
+      case Kind::make_folder:
+        if (const NodeOf parent = parentOf(call.path)) {
+          const auto node = parent->names[nameOf(call.path)] = std::make_shared<Node>();
+          node->is_folder = true;
+        }
+        return;
+      case Kind::remove:
+        if (const NodeOf parent = parentOf(call.path)) parent->names.erase(nameOf(call.path));
+        return;
+    }
+  }
+
+  void forEachState(const std::function<void(const DiskState&)>& use) const {
+    std::vector<const Node*> unsynced;  // folders
+    std::set<const Node*> seen;
+    bool has_unsynced_bytes = false;
+    look(*root_, unsynced, has_unsynced_bytes, seen);
+    for (size_t choice = 0; choice < size_t{1} << unsynced.size(); ++choice) {
+      std::set<const Node*> old_names;
+      for (size_t n = 0; n < unsynced.size(); ++n)
+        if ((choice >> n & 1) != 0) old_names.insert(unsynced[n]);
+      for (const Unsynced bytes : {Unsynced::kept, Unsynced::lost, Unsynced::zeros, Unsynced::half}) {
+        DiskState state;
+        fill(*root_, "", old_names, bytes, state);
+        use(state);
+        if (!has_unsynced_bytes) break;
+      }
+    }
+  }
+
+ private:
+  static std::string nameOf(const std::string& path) { return std::filesystem::path(path).filename(); }
+
+  /// Null for what is not below the root, or was not there before.
+  NodeOf at(const std::string& path) const {
+    if (path == root_path_) return root_;
+    const NodeOf parent = parentOf(path);
+    if (!parent) return nullptr;
+    const auto found = parent->names.find(nameOf(path));
+    return found == parent->names.end() ? nullptr : found->second;
+  }
+  NodeOf parentOf(const std::string& path) const {
+    if (path.size() <= root_path_.size() || !path.starts_with(root_path_)) return nullptr;
+    return at(std::filesystem::path(path).parent_path());
+  }
+
+  void open(const DiskCall& call) {
+    NodeOf node = at(call.path);
+    if (!node && (call.flags & O_CREAT) != 0)
+      if (const NodeOf parent = parentOf(call.path))
+        node = parent->names[nameOf(call.path)] = std::make_shared<Node>();
+    if (node && (call.flags & O_TRUNC) != 0) node->bytes.clear();
+    opened_[call.fd] = node;
+  }
+
+  void write(const DiskCall& call) {
+    const NodeOf node = opened_[call.fd];
+    if (!node) return;
+    const auto begin = static_cast<size_t>(call.offset);
+    if (node->bytes.size() < begin + call.bytes.size()) node->bytes.resize(begin + call.bytes.size());
+    std::copy(call.bytes.begin(), call.bytes.end(), node->bytes.begin() + call.offset);
+  }
+
+  void sync(const DiskCall& call) {
+    const NodeOf node = opened_[call.fd];
+    if (!node) return;
+    node->synced_bytes = node->bytes;
+    node->synced_names = node->names;
+  }
+
+  static void look(const Node& node, std::vector<const Node*>& unsynced, bool& has_unsynced_bytes,
+                   std::set<const Node*>& seen) {
+    if (!seen.insert(&node).second) return;
+    has_unsynced_bytes |= node.bytes != node.synced_bytes;
+    if (node.names != node.synced_names) unsynced.push_back(&node);
+    for (const Node::Names* names : {&node.names, &node.synced_names})
+      for (const auto& [name, below] : *names) look(*below, unsynced, has_unsynced_bytes, seen);
+  }
+
+  static void fill(const Node& folder, const std::string& name, const std::set<const Node*>& old_names,
+                   Unsynced bytes, DiskState& state) {
+    Files& files = state[name];
+    for (const auto& [below, node] : old_names.contains(&folder) ? folder.synced_names : folder.names) {
+      if (node->is_folder)
+        fill(*node, name.empty() ? below : name + "/" + below, old_names, bytes, state);
+      else
+        files[below] = bytesOf(*node, bytes);
+    }
+  }
+
+  static std::string bytesOf(const Node& file, Unsynced unsynced) {
+    if (file.bytes == file.synced_bytes || unsynced == Unsynced::kept) return file.bytes;
+    if (unsynced == Unsynced::lost) return file.synced_bytes;
+    if (unsynced == Unsynced::zeros) return std::string(file.bytes.size(), '\0');
+    return file.bytes.substr(0, file.bytes.size() / 2);
+  }
+
+  const std::string root_path_;
+  NodeOf root_;
+  std::map<int, NodeOf> opened_;  // by descriptor; null: outside of the root
+};
+
+}  // namespace
+
+int RecordingSystemCalls::open(const char* path, int flags, unsigned mode) {
+  const std::lock_guard lock(mutex_);
+  const int fd = SystemCalls::open(path, flags, mode);
+  if (fd >= 0) calls_.push_back({Kind::open, path, "", fd, flags, 0, ""});
+  return fd;
+}
+
+ssize_t RecordingSystemCalls::pwrite(int fd, const void* from, size_t count, int64_t offset) {
+  const std::lock_guard lock(mutex_);
+  const ssize_t put = SystemCalls::pwrite(fd, from, count, offset);
+  if (put >= 0)
+    calls_.push_back({Kind::write, "", "", fd, 0, offset,
+                      std::string(static_cast<const char*>(from), static_cast<size_t>(put))});
+  return put;
+}
+
+int RecordingSystemCalls::truncate(int fd, int64_t size) {
+  const std::lock_guard lock(mutex_);
+  const int result = SystemCalls::truncate(fd, size);
+  if (result == 0) calls_.push_back({Kind::truncate, "", "", fd, 0, size, ""});
+  return result;
+}
+
+int RecordingSystemCalls::fsync(int fd) {
+  const std::lock_guard lock(mutex_);
+  calls_.push_back({Kind::sync, "", "", fd, 0, 0, ""});
+  return 0;
+}
+
+int RecordingSystemCalls::rename(const char* from, const char* to) {
+  const std::lock_guard lock(mutex_);
+  const int result = SystemCalls::rename(from, to);
+  if (result == 0) calls_.push_back({Kind::rename, from, to, -1, 0, 0, ""});
+  return result;
+}
+
+int RecordingSystemCalls::exchange(const char* a, const char* b) {
+  const std::lock_guard lock(mutex_);
+  const int result = SystemCalls::exchange(a, b);
+  if (result == 0) calls_.push_back({Kind::exchange, a, b, -1, 0, 0, ""});
+  return result;
+}
+
+int RecordingSystemCalls::mkdir(const char* path, unsigned mode) {
+  const std::lock_guard lock(mutex_);
+  const int result = SystemCalls::mkdir(path, mode);
+  if (result == 0) calls_.push_back({Kind::make_folder, path, "", -1, 0, 0, ""});
+  return result;
+}
+
+int RecordingSystemCalls::remove(const char* path) {
+  const std::lock_guard lock(mutex_);
+  const int result = SystemCalls::remove(path);
+  if (result == 0) calls_.push_back({Kind::remove, path, "", -1, 0, 0, ""});
+  return result;
+}
+
+void forEachPowerLoss(const std::filesystem::path& root, const DiskState& before,
+                      const std::vector<DiskCall>& calls,
+                      const std::function<void(const DiskState&, size_t call)>& check) {
+  Disk disk(root, before);
+  std::set<DiskState> checked;
+  for (size_t n = 0; n <= calls.size(); ++n) {
+    disk.forEachState([&](const DiskState& state) {
+      if (checked.insert(state).second) check(state, n);
+    });
+    if (n < calls.size()) disk.apply(calls[n]);
+  }
+}
+
+}  // namespace curvisplat::testing
