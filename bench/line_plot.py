@@ -4,7 +4,7 @@ import math
 from xml.sax.saxutils import escape
 
 WIDTH, HEIGHT = 640, 400
-LEFT, RIGHT, TOP, BOTTOM = 70, 170, 36, 50
+LEFT, RIGHT, TOP, BOTTOM = 70, 200, 36, 50
 COLOURS = ["#0b5394", "#cc0000", "#38761d", "#b45f06", "#674ea7"]
 
 
