@@ -123,6 +123,8 @@ def read_fidelity(path):
 
 def run_step(name, paths, form, everything):
     """-> what went wrong; nothing if all is well."""
+    if name in ("bench", "convert") and subprocess.run([paths.program, "bench", "--help"], capture_output=True).returncode:
+        return f"{paths.program}: has no subcommand `bench`; build it anew, or run --without bench,convert"
     commands = STEPS[name](paths, form)
     if not commands:
         return None
