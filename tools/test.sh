@@ -27,6 +27,7 @@ export TSAN_OPTIONS=suppressions=$root/tests/tsan.supp:halt_on_error=1
 
 case $form in
   plain)
+    "$root/tools/setup.sh" python3-vtk9  # the smoke test of bench/ draws with VTK as well
     "$root/tools/build.sh"
     run release "$@"
     ;;
