@@ -19,6 +19,7 @@ int main(int argc, char** argv) {
   addInfo(app);
   addRender(app);
   addView(app);
+  addBench(app);
   addGenerate(app);
   addCompare(app);
 
