@@ -39,7 +39,9 @@ TEST(BrickSample, IsAFewRunsSpreadOverALargeOne) {
   for (size_t n = 0; n < sample.parts.size(); ++n) {
     splats += frame.bricks[sample.parts[n].brick].splats;
     if (n == 0 || sample.parts[n].brick != sample.parts[n - 1].brick + 1) ++runs;
-    if (n > 0) EXPECT_GT(sample.parts[n].brick, sample.parts[n - 1].brick);
+    if (n > 0) {
+      EXPECT_GT(sample.parts[n].brick, sample.parts[n - 1].brick);
+    }
   }
   EXPECT_EQ(sample.splats, splats);
   EXPECT_EQ(runs, 8u);

@@ -130,23 +130,19 @@ void drawTitle(Canvas& canvas, double left, const std::string& title) {
   canvas.font(kFont);
 }
 
-std::vector<AxisTick> valueTicks(double largest) {
-  return axisTicks(0, largest, 5, false);
-}
-
 // --------------------------------------------------------------------------------------------- lines
 
 void drawLines(Canvas& canvas, double panel_left, double panel_top, const LinePanel& panel) {
-  std::set<double> xs;
-  double largest = 0;
+  std::set<double> xs, ys;
   for (const PlotLine& line : panel.lines)
     for (const auto& [x, y] : line.points) {
       xs.insert(x);
-      largest = std::max(largest, y);
+      ys.insert(y);
     }
   if (xs.empty()) return;
-  largest = largest > 0 ? 1.05 * largest : 1;
-  const std::vector<AxisTick> ticks = valueTicks(largest);
+  const double largest = *ys.rbegin() > 0 ? 1.05 * *ys.rbegin() : 1;
+  const double least = panel.log_values ? 0.8 * *ys.begin() : 0;
+  const std::vector<AxisTick> ticks = axisTicks(least, largest, 5, panel.log_values);
   double label_width = 0;
   for (const AxisTick& tick : ticks) label_width = std::max(label_width, canvas.widthOf(tick.label));
 
@@ -158,7 +154,10 @@ void drawLines(Canvas& canvas, double panel_left, double panel_top, const LinePa
     if (!(high > low)) return (left + right) / 2;
     return left + inset + (std::log(x) - low) / (high - low) * (right - left - 2 * inset);
   };
-  const auto yOf = [&](double y) { return bottom - y / largest * (bottom - top); };
+  const auto yOf = [&](double y) {
+    const double part = panel.log_values ? std::log(y / least) / std::log(largest / least) : y / largest;
+    return bottom - part * (bottom - top);
+  };
 
   cairo_set_line_width(canvas.get(), 1);
   for (const AxisTick& tick : ticks) {

@@ -23,6 +23,7 @@ struct LinePanel {
   std::string title, x_name, y_name;
   std::vector<PlotLine> lines;
   std::function<std::string(double)> x_label;  // of a tick
+  bool log_values = false;                     // y at equal ratios too; all above zero
 };
 
 struct Bar {

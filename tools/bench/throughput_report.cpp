@@ -18,7 +18,7 @@ struct DiskWay {
   const char* words;
 };
 constexpr DiskWay kDiskWays[] = {{DiskRun::Way::direct, "direct"},
-                                 {DiskRun::Way::direct_pread, "direct, by pread on threads"},
+                                 {DiskRun::Way::direct_pread, "direct, pread"},
                                  {DiskRun::Way::buffered_cold, "buffered, cold"},
                                  {DiskRun::Way::buffered_warm, "buffered, warm"}};
 constexpr const char* kWorkerStages[] = {"verify", "decode", "project", "sort", "prepare"};
@@ -71,16 +71,25 @@ std::string splatRate(std::optional<double> rate) {
   return rate ? shortCount(*rate) + " splats/s" : "-";
 }
 
-void addDraw(const Measurements& measurements, unsigned threads, TextTable& table) {
-  for (const std::string backend : kBackends) {
-    const std::string name = "stages/draw/" + backend;
-    if (const auto own = measurements.median(name)) table.add({"draw, " + backend, "", splatRate(own)});
-    const auto all = measurements.median(name + fmt::format("/threads:{}", threads));
-    if (!all) continue;
-    const auto one = measurements.median(name + "/threads:1");
-    table.add(
-        {"draw, " + backend, splatRate(one), splatRate(all), one ? fmt::format("{:.2f}", *all / *one) : ""});
-  }
+std::string byteRate(std::optional<double> rate) {
+  return rate ? shortBytes(*rate) + "/s" : "-";
+}
+
+/// A stage's row: on one thread, on all, and how many times as fast those are.
+std::vector<std::string> stageRow(const std::string& words, const Measurements& measurements,
+                                  const std::string& one_name, const std::string& all_name,
+                                  std::string (*cell)(std::optional<double>)) {
+  const auto one = measurements.median(one_name), all = measurements.median(all_name);
+  std::vector<std::string> row{words, cell(one)};
+  if (one_name == all_name) return row;
+  row.push_back(cell(all));
+  if (one && all) row.push_back(fmt::format("{:.2f}", *all / *one));
+  return row;
+}
+
+/// Of what has threads of its own: below "all".
+std::vector<std::string> ownRow(const std::string& words, const std::string& cell, unsigned threads) {
+  return threads > 1 ? std::vector<std::string>{words, "", cell} : std::vector<std::string>{words, cell};
 }
 
 LinePanel diskPanel(const Measurements& measurements, std::span<const DiskRun> runs, bool over_blocks) {
@@ -90,6 +99,7 @@ LinePanel diskPanel(const Measurements& measurements, std::span<const DiskRun> r
                                           blockWords(static_cast<double>(kPagerBlock)));
   panel.x_name = over_blocks ? "size of a read" : "reads at once";
   panel.y_name = "MiB/s";
+  panel.log_values = true;  // the disk, and memory
   panel.x_label = [over_blocks](double x) { return over_blocks ? blockWords(x) : fmt::format("{:g}", x); };
   for (const auto& [way, words] : kDiskWays) {
     PlotLine line{words, {}};
@@ -165,29 +175,27 @@ std::string diskTable(const Measurements& measurements) {
 }
 
 std::string stageTable(const Measurements& measurements, unsigned threads) {
-  std::vector<std::string> heads{"stage", "1 thread", fmt::format("{} threads", threads), "times"};
-  if (threads == 1) heads = {"stage", "1 thread"};
+  std::vector<std::string> heads{"stage", "1 thread"};
+  if (threads > 1) heads.insert(heads.end(), {fmt::format("{} threads", threads), "gain"});
   TextTable table(heads);
-  if (const auto read = measurements.median("stages/read")) table.add({"read", shortBytes(*read) + "/s"});
-  for (const std::string stage : kWorkerStages) {
-    const auto one = measurements.median(stageName(stage, 1));
-    if (!one) continue;
-    std::vector<std::string> row{stage, splatRate(one)};
-    if (threads > 1) {
-      const auto all = measurements.median(stageName(stage, threads));
-      row.push_back(splatRate(all));
-      row.push_back(all ? fmt::format("{:.2f}", *all / *one) : "");
-    }
-    table.add(row);
-    const auto bytes = measurements.median(stageName(stage, 1) + "/bytes");
-    if (!bytes) continue;
-    row = {"", shortBytes(*bytes) + "/s"};
-    const auto all_bytes = measurements.median(stageName(stage, threads) + "/bytes");
-    if (threads > 1 && all_bytes) row.push_back(shortBytes(*all_bytes) + "/s");
-    table.add(row);
+  if (const auto read = measurements.median("stages/read"))
+    table.add(ownRow("read", byteRate(read), threads));
+  const auto add = [&](const std::string& words, const std::string& stage) {
+    const std::string one = stageName(stage, 1), all = stageName(stage, threads);
+    if (!measurements.find(one)) return;
+    table.add(stageRow(words, measurements, one, all, splatRate));
+    if (!measurements.find(one + "/bytes")) return;
+    auto bytes = stageRow("", measurements, one + "/bytes", all + "/bytes", byteRate);
+    bytes.resize(std::min<size_t>(bytes.size(), 3));  // the gain is the same
+    table.add(bytes);
+  };
+  for (const std::string stage : kWorkerStages) add(stage, stage);
+  for (const std::string backend : kBackends) {
+    add("draw, " + backend, "draw/" + backend);
+    if (const auto own = measurements.median("stages/draw/" + backend))
+      table.add(ownRow("draw, " + backend, splatRate(own), threads));
   }
-  addDraw(measurements, threads, table);
-  return table.text();
+  return table.empty() ? "" : table.text();
 }
 
 std::string frameTable(std::span<const FramesOfConfiguration> frames, const Measurements& measurements) {
