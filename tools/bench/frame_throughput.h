@@ -20,7 +20,7 @@
 namespace curvisplat {
 
 struct FrameEffort {
-  double configuration_s = 6;  // about so long are frames of one configuration drawn; two at least
+  double configuration_s = 4;  // about so long are frames of one configuration drawn; two at least
   double total_s = 90;         // what would go on longer is left out
   unsigned most_frames = 24;
 };
