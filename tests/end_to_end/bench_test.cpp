@@ -109,7 +109,7 @@ TEST_F(Bench, MeasuresAConversionAndLeavesNothingBehind) {
 TEST_F(Bench, ConversionThatIsInterruptedLeavesNothingBehind) {
   const std::string tmp = file("tmp");
   fs::create_directory(tmp);
-  RunningProgram program({"bench", "--convert", "--nodes", "30M", "--tmp", tmp});
+  RunningProgram program({"bench", "--convert", "--nodes", "10M", "--tmp", tmp});
   FolderWatch(tmp).waitUntil([&] { return !fs::is_empty(tmp); });
   program.signal(SIGINT);
   const ProgramResult result = program.wait();
