@@ -100,6 +100,8 @@ class Chooser {
         width_(static_cast<float>(settings.view.size.width)),
         height_(static_cast<float>(settings.view.size.height)),
         reach_(1.001f * static_cast<float>(largestReach(settings.view.low_pass_px2))),
+        largest_scalar_(kLargestCells /
+                        std::max(table.logScale() ? 1.0f : std::abs(table.scale()), kLeastScale)),
         per_pixel_(settings.per_pixel),
         splats_(splats),
         depths_(depths) {}
@@ -111,7 +113,12 @@ class Chooser {
                            splat.y - reach_y < height_;
     if (!on_screen) return Fate::off_screen;
     if (!per_pixel_) splat.slope0 = splat.slope1 = splat.half_width = 0;
-    const float spread = kSupport * (std::abs(splat.slope0) + std::abs(splat.slope1)) + splat.half_width;
+    float spread = kSupport * (std::abs(splat.slope0) + std::abs(splat.slope1)) + splat.half_width;
+    if (!(std::abs(splat.mean) + spread <= largest_scalar_)) {
+      splat.slope0 = splat.slope1 = splat.half_width = spread = 0;
+      splat.mean = std::clamp(splat.mean, -largest_scalar_, largest_scalar_);
+    }
+    splat.amplitude = std::min(splat.amplitude, kLargestAmplitude);
     if (!(splat.amplitude > 0) || table_.fullyTransparent(splat.mean - spread, splat.mean + spread))
       return Fate::transparent;
     splats_.push_back(splat);
@@ -127,25 +134,36 @@ class Chooser {
   }
 
  private:
+  // Painters find a scalar's place in the table, and depths, in float: beyond these there are infinities, and
+  // infinity minus infinity is no number. Such a splat is drawn flat, and far outside of the table.
+  static constexpr float kLargestCells = 1e30f, kLeastScale = 1e-7f, kLargestAmplitude = 1e30f;
+
   const ClassificationTable& table_;
   const float width_, height_;
   const float reach_;
+  const float largest_scalar_;
   const bool per_pixel_;
   std::vector<ScreenSplat>& splats_;
   std::vector<float>& depths_;
 };
 
+/// What cutting may still give for a brick: pieces that are drawn, and looks at any.
+struct CutBudget {
+  size_t pieces = BrickProjector::kMostPieces;
+  size_t looks = 64 * BrickProjector::kMostPieces;
+};
+
 /// What cutting needs beside the arithmetic loop's results; orthographic splats are never cut.
 std::optional<Chooser::Fate> chooseCut(const OrthographicMap&, const GeometryArrays<const float>&,
-                                       const VariableArrays<const float>&, size_t, Chooser&, size_t&) {
+                                       const VariableArrays<const float>&, size_t, Chooser&, CutBudget&) {
   return Chooser::Fate::off_screen;
 }
 
-/// Cuts splat `i` up and chooses among its pieces: the best fate of any. Nothing if there are more pieces
-/// than `pieces_left`, which it counts down.
+/// Cuts splat `i` up and chooses among its pieces: the best fate of any. Nothing if that takes more than
+/// what is `left`, which it counts down.
 std::optional<Chooser::Fate> chooseCut(const PerspectiveMap& map, const GeometryArrays<const float>& geometry,
                                        const VariableArrays<const float>& variable, size_t i,
-                                       Chooser& chooser, size_t& pieces_left) {
+                                       Chooser& chooser, CutBudget& left) {
   const SplatPiece whole{{geometry.x[i], geometry.y[i], geometry.z[i]},
                          shapeOf(geometry, i),
                          slopeOf(variable, i),
@@ -155,24 +173,24 @@ std::optional<Chooser::Fate> chooseCut(const PerspectiveMap& map, const Geometry
     return Chooser::Fate::transparent;
   auto best = Chooser::Fate::off_screen;
   const auto take = [&](const SplatPiece& piece, const PerspectiveMap::Centre& centre) {
-    if (pieces_left == 0) return false;
+    if (left.pieces == 0) return false;
     const Ellipse ellipse = ellipseOf(map.rowsAt(centre), piece.shape, piece.slope, variable.variance[i],
                                       piece.weight * map.volumeAt(centre), map.low_pass_px2, map.slope_low_pass_px2);
     const auto fate = chooser.choose(screenSplat(map.pixelX(centre), map.pixelY(centre), ellipse, piece.mean),
                                      centre.distance);
-    if (fate == Chooser::Fate::kept) --pieces_left;
+    if (fate == Chooser::Fate::kept) --left.pieces;
     best = std::max(best, fate);
     return true;
   };
-  if (!cutUp(map, whole, take)) return {};
+  if (!cutUp(map, whole, left.looks, take)) return {};
   return best;
 }
 
-/// False if the brick would give more than `pieces_left`, which it counts down.
+/// False if the brick would take more than what is `left`, which it counts down.
 template <typename Map>
 bool projectRange(const Map& map, const LocalBox& clip, const GeometryArrays<const float>& geometry,
                   const VariableArrays<const float>& variable, const SplatRange& range, Chooser& chooser,
-                  size_t& pieces_left, ProjectionCounts& counts) {
+                  CutBudget& left, ProjectionCounts& counts) {
   Block block;
   for (size_t begin = range.begin; begin < range.end; begin += kBlock) {
     const size_t count = std::min(kBlock, range.end - begin);
@@ -184,7 +202,7 @@ bool projectRange(const Map& map, const LocalBox& clip, const GeometryArrays<con
       }
       Chooser::Fate fate;
       if (block.too_wide[n]) {
-        const auto cut_fate = chooseCut(map, geometry, variable, begin + n, chooser, pieces_left);
+        const auto cut_fate = chooseCut(map, geometry, variable, begin + n, chooser, left);
         if (!cut_fate) return false;
         fate = *cut_fate;
       } else {
@@ -205,9 +223,9 @@ template <typename Map>
 bool projectWith(const Map& map, const LocalBox& clip, const GeometryArrays<const float>& geometry,
                  const VariableArrays<const float>& variable, std::span<const SplatRange> ranges,
                  Chooser& chooser, ProjectionCounts& counts) {
-  size_t pieces_left = BrickProjector::kMostPieces;
+  CutBudget left;
   return std::all_of(ranges.begin(), ranges.end(), [&](const SplatRange& range) {
-    return projectRange(map, clip, geometry, variable, range, chooser, pieces_left, counts);
+    return projectRange(map, clip, geometry, variable, range, chooser, left, counts);
   });
 }
 
@@ -242,8 +260,10 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
   for (const SplatRange& range : ranges) CURVISPLAT_CHECK_OP(range.end, <=, geometry.size());
   const LocalBox clip(settings.clip_box, cell_min);
   Chooser chooser(settings, table, splats_, depths_);
+  // Where the near plane is too near for float, coarser is not less: then what was cut until there is drawn.
+  constexpr float kCoarsest = 1e30f;
   bool complete = false;
-  for (float coarseness = 1; !complete; coarseness *= 2) {
+  for (float coarseness = 1; !complete && coarseness < kCoarsest; coarseness *= 2) {
     splats_.clear();
     depths_.clear();
     counts_ = {};
