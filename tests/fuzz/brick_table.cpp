@@ -106,8 +106,9 @@ void run(std::span<const std::byte> bytes) {
   RootCube root;
   for (int axis = 0; axis < 3; ++axis) root.min[axis] = input.take<double>();
   root.size = input.take<double>();
-  const bool possible = std::isfinite(root.min.x) && std::isfinite(root.min.y) && std::isfinite(root.min.z) &&
-                        root.size > 0 && std::isfinite(root.size);
+  constexpr double kLargest = 1e100;
+  const bool possible = std::abs(root.min.x) <= kLargest && std::abs(root.min.y) <= kLargest &&
+                        std::abs(root.min.z) <= kLargest && root.size > 0 && root.size <= kLargest;
   if (!possible) return;  // the manifest's affair
   const uint64_t geometry_bytes = input.take<uint32_t>() % (1 << 20);
   BricksHeader header;

@@ -44,7 +44,7 @@ for target in "${targets[@]}"; do
     status=0
     {
       time "$program" "$work/$target" "${seeds[@]}" -max_total_time="$left" -rss_limit_mb=2048 \
-        -malloc_limit_mb=512 -timeout=25 -max_len=65536 -print_final_stats=1 \
+        -malloc_limit_mb=512 -timeout=300 -max_len=65536 -print_final_stats=1 \
         -artifact_prefix="$work/findings/$target/" >>"$log" 2>&1 || status=$?
     } 2>"$scratch/times"
     cpu=$(awk -v used="$cpu" 'NF == 2 { used += $1 + $2 } END { print used }' "$scratch/times")
@@ -55,6 +55,6 @@ for target in "${targets[@]}"; do
   found=$(find "$work/findings/$target" -type f | wc -l)
   findings=$((findings + found))
   printf "$row" "$target" "$executions" "$(printf '%.0f' "$cpu")" \
-    "$(awk -v n="$executions" -v s="$cpu" 'BEGIN { printf "%d", s > 0 ? n / s : 0 }')" "$edges" "$found"
+    "$(awk -v n="$executions" -v s="$cpu" 'BEGIN { printf "%d", (s > 0 ? n / s : 0) }')" "$edges" "$found"
 done
 [[ $findings -eq 0 ]]
