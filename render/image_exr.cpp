@@ -78,10 +78,7 @@ class Cursor {
     const auto length = static_cast<size_t>(end - left.begin());
     if (length > 255) throw Error("{}: the EXR header has a name of more than 255 letters", name_);
     const auto letters = takeBytes(length + 1);
-    std::string text(reinterpret_cast<const char*>(letters.data()), length);
-    std::replace_if(
-        text.begin(), text.end(), [](char c) { return c < ' ' || c > '~'; }, '?');  // messages are one line
-    return text;
+    return {reinterpret_cast<const char*>(letters.data()), length};
   }
   size_t at() const { return at_; }
 

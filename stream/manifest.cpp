@@ -28,13 +28,6 @@ Json jsonOf(const glm::dvec3& v) {
 
 // ---- reading: every field is asked for by name, type and range ----
 
-/// Messages are one line, and a terminal obeys control characters.
-std::string printable(std::string text) {
-  for (char& c : text)
-    if (static_cast<unsigned char>(c) < ' ' || c == 0x7f) c = ' ';
-  return text;
-}
-
 /// A JSON object of the file, and how to get at its fields or say what is wrong with them.
 class Fields {
  public:
@@ -46,7 +39,7 @@ class Fields {
   std::string text(const char* name) const {
     const Json& value = at(name);
     if (!value.is_string()) fail(name, "a text", value);
-    return printable(value.get<std::string>());
+    return oneLine(value.get<std::string>());
   }
 
   double number(const char* name) const { return numberOf(at(name), name); }
@@ -94,7 +87,7 @@ class Fields {
     std::vector<std::string> out;
     for (const Json& value : array(name)) {
       if (!value.is_string()) fail(name, "an array of texts", value);
-      out.push_back(printable(value.get<std::string>()));
+      out.push_back(oneLine(value.get<std::string>()));
     }
     return out;
   }
