@@ -31,11 +31,12 @@ namespace fs = std::filesystem;
 constexpr uint32_t kMost32 = std::numeric_limits<uint32_t>::max();
 constexpr uint64_t kMost64 = std::numeric_limits<uint64_t>::max();
 
-/// Runs the program where it gets a GiB of addresses: four times what it takes for a small cache, of which
-/// most are libraries and threads' stacks. Sanitizers need more than there are.
+/// Runs the program where it gets two GiB of addresses: some times what it takes for a small cache, of which
+/// most are libraries and threads' stacks, and less than the caches here ask for. Sanitizers need more than
+/// there are.
 ProgramResult runWithLittleMemory(std::vector<std::string> arguments) {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-  std::vector<std::string> words{"-c", "ulimit -v 1048576; exec \"$0\" \"$@\"", CURVISPLAT_PROGRAM};
+  std::vector<std::string> words{"-c", "ulimit -v 2097152; exec \"$0\" \"$@\"", CURVISPLAT_PROGRAM};
   words.insert(words.end(), arguments.begin(), arguments.end());
   return RunningProgram(words, "/bin/sh").wait();
 #else
