@@ -14,6 +14,7 @@
 #include "stream/brick_log.h"
 #include "stream/cache_format.h"
 #include "stream/geometry_codec.h"
+#include "stream/half_cell.h"
 #include "stream/values_codec.h"
 #include "tests/preprocess/plot3d_bytes.h"
 #include "tests/stream/test_bricks.h"
@@ -70,6 +71,13 @@ std::string unpacked(std::span<const std::byte> stream, size_t header_bytes) {
   return std::string(reinterpret_cast<const char*>(stream.data()), header_bytes) + out;
 }
 
+const glm::dvec3 kInward[] = {{0, 0.6, 0.8}, {1, 0, 0}, {0, 0.8, -0.6}};
+
+void addHalfCells(BrickSplats& brick) {
+  brick.half_cells.assign(brick.size(), kWholeCell);
+  for (size_t n = 0; n < brick.size(); n += 3) brick.half_cells[n] = packHalfCell({kInward, 1 + n / 3 % 3});
+}
+
 void writeStreams(const Seeds& seeds) {
   const RootCube root{{-1, 2, 3}, 4};
   struct Kind {
@@ -85,6 +93,7 @@ void writeStreams(const Seeds& seeds) {
        {Kind{"leaf", leaf, 1}, {"inner", inner, 0}, {"thin", thin, 3}, {"raw", huge, 24}}) {
     const Cell cell{kind.level, {}};
     BrickSplats brick = randomBrick(kind.like, cell, 5);
+    if (kind.like.leaf) addHalfCells(brick);
     const EncodedBrick encoded = encodeBrick(root, brick);
     const auto splats = static_cast<uint16_t>(kind.like.splats - 1);
     const auto whole = [&](uint8_t level, std::span<const std::byte> stream) {
@@ -184,7 +193,9 @@ void writeSplats(const Seeds& seeds) {
       for (int c = 0; c < 3; ++c) seed.add(4 * unit(random));
       for (int c = 0; c < 3; ++c) seed.add(0.3f * unit(random));
       for (int c = 0; c < 3; ++c) seed.add(unit(random) - 0.5f);
-      seed.add(0.1f * unit(random)).add(unit(random));
+      seed.add(0.1f * unit(random));
+      seed.add(n % 3 == 0 ? packHalfCell({&kInward[0], 1 + static_cast<size_t>(n) / 3 % 3}) : kWholeCell);
+      seed.add(unit(random));
       for (int c = 0; c < 3; ++c) seed.add(0.1f * unit(random));
       seed.add(0.01f * unit(random));
     }

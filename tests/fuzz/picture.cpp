@@ -1,7 +1,7 @@
 // Splats such as the decoders let through (finite, axes above zero), on their way to a picture.
 //
-//   flags u8 | corner of the cell, 3 doubles | scale, 3 doubles | size of the cell, double | splats: 15
-//   floats each
+//   flags u8 | corner of the cell, 3 doubles | scale, 3 doubles | size of the cell, double | splats: 10
+//   floats, a half cell, 5 floats each
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,6 +10,7 @@
 #include "render/depth_sort.h"
 #include "render/projection.h"
 #include "stream/error.h"
+#include "stream/half_cell.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {
@@ -35,6 +36,8 @@ struct Splats {
     for (auto* array : {&geometry.shear10, &geometry.shear20, &geometry.shear21})
       array->push_back(finite(input.take<float>(), -kLargest));
     geometry.weight.push_back(finite(input.take<float>(), 0));
+    const auto half_cell = input.take<uint32_t>();
+    geometry.half_cell.push_back(isPossibleHalfCell(half_cell) ? half_cell : kWholeCell);
     for (auto* array : {&values.mean, &values.slope0, &values.slope1, &values.slope2})
       array->push_back(finite(input.take<float>(), -kLargest));
     values.variance.push_back(finite(input.take<float>(), 0));
