@@ -21,7 +21,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr ImageSize kSize{256, 256};
+constexpr int kPixels = 256;  // a side of the picture
 constexpr SceneGridSize kNodes{128, 64, 64};
 
 struct View {
@@ -79,8 +79,10 @@ Case realCase(const std::string& name, const std::filesystem::path& grid,
   out.range = field->range();
   out.length = glm::length(upper - lower) / 3;  // as half-annulus, whose diagonal is 2.6
   for (const char* view : {"iso", "-x"})
-    out.views.push_back({view, Camera::named(view, lower, upper, kSize, Projection::orthographic)});
-  out.views.push_back({"iso 30", Camera::named("iso", lower, upper, kSize, Projection::perspective)});
+    out.views.push_back(
+        {view, Camera::named(view, lower, upper, {kPixels, kPixels}, Projection::orthographic)});
+  out.views.push_back(
+      {"iso 30", Camera::named("iso", lower, upper, {kPixels, kPixels}, Projection::perspective)});
   out.field = std::move(field);
   return out;
 }
@@ -135,8 +137,10 @@ std::vector<NamedCase> allCases() {
 
 class Measurement {
  public:
-  Measurement(std::filesystem::path folder, Backend backend, double low_pass_px2, bool pictures, bool quick)
+  Measurement(std::filesystem::path folder, int pixels, Backend backend, double low_pass_px2, bool pictures,
+              bool quick)
       : folder_(std::move(folder)),
+        size_{pixels, pixels},
         backend_(backend),
         low_pass_px2_(low_pass_px2),
         pictures_(pictures),
@@ -165,15 +169,16 @@ class Measurement {
   /// Marched by the first who asks, and kept in the folder.
   Image reference(const Case& grid, const View& view, const std::string& function_name,
                   const KnownFunction& function) {
-    const auto path = folder_ / fmt::format("{}_{}_{}_reference.pfm", fileName(grid.name),
-                                            fileName(view.name), function_name);
+    const auto path =
+        folder_ / fmt::format("{}_{}_{}{}_reference.pfm", fileName(grid.name), fileName(view.name),
+                              function_name, size_.width == kPixels ? "" : fmt::format("_{}", size_.width));
     if (!std::filesystem::exists(path)) {
       MarchSteps steps;
       steps.step = 0.016 * grid.length;
       steps.cells = 2;
       double reached = 0;
       const Image image =
-          toImage(convergedMarch(*grid.field, function.exact, view.camera, kSize, steps, 75, &reached));
+          toImage(convergedMarch(*grid.field, function.exact, view.camera, size_, steps, 75, &reached));
       if (reached < 75)
         fmt::print(stderr, "{}: successive references agree at {:.1f} dB only\n", path.string(), reached);
       writeImage(image, path);
@@ -191,7 +196,7 @@ class Measurement {
     for (const auto classification : {Classification::pixel, Classification::flat}) {
       for (const double lod_pixels : {0.0, 4.0, 8.0}) {
         if (quick_ && (lod_pixels > 0 || classification == Classification::flat)) continue;
-        FrameOptions options = knownFrame(kSize);
+        FrameOptions options = knownFrame(size_);
         options.low_pass_px2 = low_pass_px2_;
         options.lod_pixels = lod_pixels;
         options.classification = classification;
@@ -230,6 +235,7 @@ class Measurement {
   }
 
   std::filesystem::path folder_;
+  ImageSize size_;
   Backend backend_;
   double low_pass_px2_;
   bool pictures_, quick_;
@@ -244,12 +250,15 @@ int run(int argc, char** argv) {
   double low_pass_px2 = FrameOptions().low_pass_px2;
   bool pictures = false, quick = false;
   Backend backend = Backend::cpu;
+  int pixels = kPixels;
   const std::map<std::string, Backend> backends{{"cpu", Backend::cpu},
                                                 {"osmesa", Backend::osmesa},
                                                 {"egl", Backend::egl},
                                                 {"auto", Backend::automatic}};
   app.add_option("FOLDER", folder, "caches and references; references are kept and used again")->required();
   app.add_option("--only", only, "a regular expression: cases to measure");
+  app.add_option("--pixels", pixels, "a side of the pictures; dB are told for the default, 256")
+      ->check(CLI::Range(8, 4096));
   app.add_option("--json", json, "the same as a file");
   app.add_option("--backend", backend, "what draws: cpu, osmesa, egl or auto")
       ->transform(CLI::CheckedTransformer(backends));
@@ -257,7 +266,7 @@ int run(int argc, char** argv) {
   app.add_flag("--pictures", pictures, "leave pictures, references and differences in FOLDER");
   app.add_flag("--quick", quick, "the finest level, per pixel, alone");
   CLI11_PARSE(app, argc, argv);
-  Measurement measurement(folder, backend, low_pass_px2, pictures, quick);
+  Measurement measurement(folder, pixels, backend, low_pass_px2, pictures, quick);
   for (const NamedCase& named : allCases())
     if (std::regex_search(named.name, std::regex(only))) measurement.measure(named.make());
   if (!json.empty()) writeFileAtomically(json, measurement.rows().dump(1) + "\n");

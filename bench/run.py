@@ -42,7 +42,7 @@ class SmokeForm(Form):
     convert_nodes = "30K"
     scaling = ["--nodes", "4K,30K", "--repeats", "1", "--lod-pixels", "2", "--size", "64x64"]
     peers = ["--sizes", "12x10x8", "--frames", "1", "--picture", "32x32", "--resample", "16"]
-    fidelity = None  # its reference takes as long at any size; peers has one of 32x32 pixels
+    fidelity = ["--only", "^shell$", "--quick", "--pixels", "16"]
     frames = ["--repeats", "1", "--nodes", "16x16x16"]
 
 
@@ -88,8 +88,8 @@ def step_peers(paths, form):
 
 
 def step_fidelity(paths, form):
-    return form.fidelity and [[paths.bench / "curvisplat_fidelity", paths.folder / "fidelity", *form.fidelity, "--json",
-                               paths.json("fidelity")]]
+    return [[paths.bench / "curvisplat_fidelity", paths.folder / "fidelity", *form.fidelity, "--json",
+              paths.json("fidelity")]]
 
 
 def step_frames(paths, form):
@@ -126,8 +126,6 @@ def run_step(name, paths, form, everything):
     if name in ("bench", "convert") and subprocess.run([paths.program, "bench", "--help"], capture_output=True).returncode:
         return f"{paths.program}: has no subcommand `bench`; build it anew, or run --without bench,convert"
     commands = STEPS[name](paths, form)
-    if not commands:
-        return None
     paths.json(name).unlink(missing_ok=True)
     log = paths.folder / f"{name}.log"
     with open(log, "w") as file:
