@@ -10,7 +10,19 @@
 
 namespace curvisplat {
 
+/// Whether a text has a repeat count ("1000000*0") above five digits. Those are bounded by the disk's free
+/// space, which is too long a way for a fuzzer.
+inline bool repeatsVeryOften(std::string_view text) {
+  for (size_t star = text.find('*'); star != text.npos; star = text.find('*', star + 1)) {
+    size_t digits = 0;
+    while (digits < star && text[star - digits - 1] >= '0' && text[star - digits - 1] <= '9') ++digits;
+    if (digits > 5) return true;
+  }
+  return false;
+}
+
 inline void readPlot3d(std::span<const std::byte> bytes, bool ascii) {
+  if (repeatsVeryOften(textOf(bytes))) return;
   FuzzInput input(bytes);
   const auto flags = input.take<uint8_t>();
   OpenGridOptions options;
