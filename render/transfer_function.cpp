@@ -77,16 +77,17 @@ TransferFunction::TransferFunction(TransferFunctionDefinition definition,
   opacities_ = OpacityCurve(definition.opacities);
 }
 
+std::pair<double, double> intervalAround(double low, double high) {
+  if (low != high) return {low, high};
+  const double margin = low == 0 ? 1 : 1e-3 * std::abs(low);
+  return {low - margin, high + margin};
+}
+
 TransferFunction TransferFunction::preset(std::string_view name, double low, double high,
                                           double opacity_unit) {
-  std::pair<double, double> range(low, high);
-  const bool constant = low == high;
-  if (constant) {
-    const double margin = low == 0 ? 1 : 1e-3 * std::abs(low);
-    range = {low - margin, high + margin};
-  }
+  const std::pair<double, double> range = intervalAround(low, high);
   TransferFunctionDefinition definition = presetDefinition(name);
-  if (constant)
+  if (low == high)
     definition.notes.push_back(
         fmt::format("the scalar is {} everywhere: it gets the middle of the preset '{}'", low, name));
   return TransferFunction(std::move(definition), &range, opacity_unit);
