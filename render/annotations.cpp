@@ -7,6 +7,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -162,87 +163,135 @@ void drawAxes(cairo_t* cairo, const ScreenView& view, const glm::dvec3& ink) {
 
 // ---------------------------------------------------------------------------------------- scalar bar
 
+// From the strip's left edge, in units of the font's size.
+constexpr double kBarLeft = 0.6, kBarWidth = 1.3, kLabelGap = 0.7;
+// From its right edge.
+constexpr double kTitleWidth = 1.4, kTitleGap = 0.4;
+
+struct ScalarBar {
+  double top, height;  // of the colours
+  std::vector<AxisTick> ticks;
+  double width;  // of the strip, whole pixels
+};
+
+/// For the font that `cairo` has.
+ScalarBar layOutScalarBar(cairo_t* cairo, ImageSize picture, const TransferFunction& function) {
+  const double font = fontSize(picture);
+  const auto [low, high] = function.range();
+  ScalarBar bar;
+  bar.height = std::floor(0.6 * picture.height);
+  bar.top = std::floor((picture.height - bar.height) / 2);
+  bar.ticks =
+      axisTicks(low, high, std::max(2, static_cast<int>(bar.height / (3 * font))), function.logScale());
+  double labels = 0;
+  for (const AxisTick& tick : bar.ticks) {
+    cairo_text_extents_t extents;
+    cairo_text_extents(cairo, tick.label.c_str(), &extents);
+    labels = std::max(labels, extents.x_advance);
+  }
+  // In whole sizes of the font, so that the data stays where it is while someone drags an end of the range.
+  labels = std::ceil(labels / font) * font;
+  const double wanted = (kBarLeft + kBarWidth + kLabelGap + kTitleGap + kTitleWidth) * font + labels;
+  bar.width = std::floor(std::min(wanted, picture.width / 2.0));
+  return bar;
+}
+
 void drawScalarBar(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& ink) {
   const TransferFunction& function = scene.transfer_function;
   const double low = function.range().first, high = function.range().second;
   const bool log_scale = function.logScale();
-  const auto fractionOf = [&](double scalar) {
+  const auto fractionOf = [&, low = low, high = high](double scalar) {
     if (!(high > low)) return 0.5;
     return log_scale ? std::log(scalar / low) / std::log(high / low) : (scalar - low) / (high - low);
   };
-  const auto scalarAt = [&](double fraction) {
+  const auto scalarAt = [&, low = low, high = high](double fraction) {
     return log_scale ? low * std::pow(high / low, fraction) : low + fraction * (high - low);
   };
 
-  const double font = fontSize(scene.view.size);
-  const double width = 1.3 * font, height = std::floor(0.6 * scene.view.size.height);
-  const std::vector<AxisTick> ticks =
-      axisTicks(low, high, std::max(2, static_cast<int>(height / (3 * font))), log_scale);
-  const auto extentOf = [&](const std::string& text) {
-    cairo_text_extents_t extents;
-    cairo_text_extents(cairo, text.c_str(), &extents);
-    return extents;
-  };
-  double label_width = 0;
-  for (const AxisTick& tick : ticks) label_width = std::max(label_width, extentOf(tick.label).x_advance);
-  const double title_width = extentOf(scene.title).x_advance;
-  const double left =
-      std::floor(scene.view.size.width - std::max(width + 0.9 * font + label_width, title_width) - font);
-  const double top = std::floor((scene.view.size.height - height) / 2);
-
-  for (double y = 0; y < height; ++y) {
-    const glm::dvec3 colour = function.at(scalarAt(1 - (y + 0.5) / height)).colour;
-    setInk(cairo, colour);
-    cairo_rectangle(cairo, left, top + y, width, 1);
+  const double font = fontSize(scene.picture);
+  const ScalarBar bar = layOutScalarBar(cairo, scene.picture, function);
+  const double left = std::floor(scene.picture.width - bar.width + kBarLeft * font);
+  const double width = std::floor(kBarWidth * font);
+  for (double y = 0; y < bar.height; ++y) {
+    setInk(cairo, function.at(scalarAt(1 - (y + 0.5) / bar.height)).colour);
+    cairo_rectangle(cairo, left, bar.top + y, width, 1);
     cairo_fill(cairo);
   }
   setInk(cairo, ink);
   cairo_set_line_width(cairo, 1);
-  cairo_rectangle(cairo, left - 0.5, top - 0.5, width + 1, height + 1);
+  cairo_rectangle(cairo, left - 0.5, bar.top - 0.5, width + 1, bar.height + 1);
   cairo_stroke(cairo);
-  for (const AxisTick& tick : ticks) {
-    const double y = std::floor(top + height * (1 - fractionOf(tick.value))) + 0.5;
+  cairo_text_extents_t extents;
+  for (const AxisTick& tick : bar.ticks) {
+    const double y = std::floor(bar.top + bar.height * (1 - fractionOf(tick.value))) + 0.5;
     cairo_move_to(cairo, left + width, y);
-    cairo_line_to(cairo, left + width + 0.35 * font, y);
+    cairo_line_to(cairo, left + width + kLabelGap * font / 2, y);
     cairo_stroke(cairo);
-    const auto extents = extentOf(tick.label);
-    cairo_move_to(cairo, left + width + 0.7 * font, y - extents.y_bearing - extents.height / 2);
+    cairo_text_extents(cairo, tick.label.c_str(), &extents);
+    cairo_move_to(cairo, left + width + kLabelGap * font, y - extents.y_bearing - extents.height / 2);
     cairo_show_text(cairo, tick.label.c_str());
   }
-  cairo_move_to(cairo, left, top - 0.8 * font);
+  // Along the bar, from below: a long name takes no width.
+  cairo_text_extents(cairo, scene.title.c_str(), &extents);
+  cairo_save(cairo);
+  cairo_translate(cairo, scene.picture.width - (kTitleWidth - 1) * font, bar.top + bar.height / 2);
+  cairo_rotate(cairo, -std::numbers::pi / 2);
+  cairo_move_to(cairo, -extents.x_advance / 2, 0);
   cairo_show_text(cairo, scene.title.c_str());
+  cairo_restore(cairo);
 }
 
 Canvas drawn(const Annotations& annotations, const AnnotatedScene& scene) {
-  Canvas canvas(scene.view.size);
+  Canvas canvas(scene.picture);
   cairo_t* const cairo = canvas.get();
-  cairo_set_font_size(cairo, fontSize(scene.view.size));
+  cairo_set_font_size(cairo, fontSize(scene.picture));
   const glm::dvec3 ink = inkFor(scene.background);
+  cairo_save(cairo);  // what belongs to the data stays out of the scalar bar's strip
+  cairo_rectangle(cairo, 0, 0, scene.view.size.width, scene.view.size.height);
+  cairo_clip(cairo);
   if (annotations.outline) drawOutline(cairo, scene, ink);
   if (annotations.axes) drawAxes(cairo, scene.view, ink);
+  cairo_restore(cairo);
   if (annotations.scalar_bar) drawScalarBar(cairo, scene, ink);
   return canvas;
 }
 
 }  // namespace
 
-void annotate(Image& image, const Annotations& annotations, const AnnotatedScene& scene) {
-  CURVISPLAT_CHECK(image.size.width == scene.view.size.width &&
-                   image.size.height == scene.view.size.height);
-  if (!annotations.any()) return;
-  drawn(annotations, scene).forEachPixel([&](int x, int y, const glm::vec4& over) {
-    float* const pixel = image.pixel(x, y);
-    for (int c = 0; c < 4; ++c) pixel[c] = over[c] + (1 - over.a) * pixel[c];
-  });
+ImageSize dataSize(const Annotations& annotations, ImageSize picture, const TransferFunction& function) {
+  if (!annotations.scalar_bar) return picture;
+  const Canvas ruler({1, 1});
+  cairo_set_font_size(ruler.get(), fontSize(picture));
+  const double strip = layOutScalarBar(ruler.get(), picture, function).width;
+  return {picture.width - static_cast<int>(strip), picture.height};
+}
+
+Image annotated(const Image& data, const Annotations& annotations, const AnnotatedScene& scene) {
+  CURVISPLAT_CHECK_OP(data.size.width, ==, scene.view.size.width);
+  CURVISPLAT_CHECK_OP(data.size.height, ==, scene.picture.height);
+  CURVISPLAT_CHECK_OP(data.size.width, <=, scene.picture.width);
+  Image picture(scene.picture);
+  for (int y = 0; y < picture.size.height; ++y) {
+    std::copy_n(data.pixel(0, y), 4 * static_cast<size_t>(data.size.width), picture.pixel(0, y));
+    for (int x = data.size.width; x < picture.size.width; ++x)
+      for (int c = 0; c < 4; ++c) picture.pixel(x, y)[c] = scene.background[c];
+  }
+  if (!(annotations == Annotations{}))
+    drawn(annotations, scene).forEachPixel([&](int x, int y, const glm::vec4& over) {
+      float* const pixel = picture.pixel(x, y);
+      for (int c = 0; c < 4; ++c) pixel[c] = over[c] + (1 - over.a) * pixel[c];
+    });
+  return picture;
 }
 
 std::vector<uint8_t> annotationLayer(const Annotations& annotations, const AnnotatedScene& scene) {
-  const size_t width = static_cast<size_t>(scene.view.size.width);
-  std::vector<uint8_t> layer(4 * width * static_cast<size_t>(scene.view.size.height), 0);
-  if (!annotations.any()) return layer;
+  const size_t width = static_cast<size_t>(scene.picture.width);
+  std::vector<uint8_t> layer(4 * width * static_cast<size_t>(scene.picture.height), 0);
+  if (annotations == Annotations{}) return layer;
   drawn(annotations, scene).forEachPixel([&](int x, int y, const glm::vec4& over) {
     uint8_t* const pixel = &layer[4 * (static_cast<size_t>(y) * width + static_cast<size_t>(x))];
-    for (int c = 0; c < 3; ++c) pixel[c] = static_cast<uint8_t>(std::min(over[c] / over.a, 1.0f) * 255 + 0.5f);
+    for (int c = 0; c < 3; ++c)
+      pixel[c] = static_cast<uint8_t>(std::min(over[c] / over.a, 1.0f) * 255 + 0.5f);
     pixel[3] = static_cast<uint8_t>(over.a * 255 + 0.5f);
   });
   return layer;

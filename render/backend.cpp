@@ -19,12 +19,12 @@ class GlBackend final : public PaintingBackend {
   ~GlBackend() override {
     gl_.run([this](const GlContext&) { painter_.reset(); });
   }
-  bool isSoftware() const { return gl_.isSoftware(); }
   void run(const Job& job) override {
     gl_.run([&](const GlContext&) { job(*painter_); });
   }
   DrawingOrder order() const override { return painter_->order(); }
   const std::string& name() const override { return gl_.contextName(); }
+  bool isSoftware() const override { return gl_.isSoftware(); }
   std::span<ScreenSplat> splatMemory(size_t count) override {
     std::span<ScreenSplat> mapped;
     gl_.run([&](const GlContext&) { mapped = painter_->mapSplats(count); });
@@ -46,6 +46,7 @@ class CpuBackend final : public PaintingBackend {
   void run(const Job& job) override { job(painter_); }
   DrawingOrder order() const override { return painter_.order(); }
   const std::string& name() const override { return name_; }
+  bool isSoftware() const override { return true; }
   uint64_t bytes(ImageSize size, const PaintResources& resources) const override {
     return CpuPainter::frameBytes(size) + CpuPainter::batchBytes(size, resources);
   }

@@ -30,6 +30,8 @@ class PaintingBackend {
   virtual DrawingOrder order() const = 0;
   /// For people: "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
   virtual const std::string& name() const = 0;
+  /// Whether the processor draws, by itself or below OpenGL.
+  virtual bool isSoftware() const = 0;
   /// Memory for so many splats, to be drawn from without copying them where the painter can. It takes the
   /// place of what was given before.
   virtual std::span<ScreenSplat> splatMemory(size_t count);

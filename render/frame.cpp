@@ -52,7 +52,11 @@ FrameRenderer::FrameRenderer(const CacheReader& cache, size_t variable,
 FrameRenderer::~FrameRenderer() = default;
 
 const std::string& FrameRenderer::backendName() const {
-  return state_->pipeline.backendName();
+  return state_->pipeline.backend().name();
+}
+
+bool FrameRenderer::drawsInSoftware() const {
+  return state_->pipeline.backend().isSoftware();
 }
 
 Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,

@@ -67,6 +67,7 @@ class Cancelled : public std::runtime_error {
 /// Seconds are summed over threads for the workers' stages.
 struct FrameStatistics : FetchStatistics {
   double plan_s = 0, project_s = 0, sort_s = 0, upload_s = 0, draw_s = 0, total_s = 0;
+  double gl_draw_s = 0;         // by OpenGL's own clock
   double workers_waited_s = 0;  // for room in the ring: the painter is slower; for reads: read_waited_s
   double painter_waited_s = 0;  // for the workers
   uint64_t bricks_drawn = 0;    // in whole or in part; one that is drawn in several parts counts for each
@@ -83,6 +84,7 @@ struct FrameStatistics : FetchStatistics {
   double largest_error_px = 0;  // on the screen, of what is drawn; infinite around a perspective eye
   unsigned workers = 0;
   uint64_t ring_peak_bytes = 0;
+  uint64_t memory_used_bytes = 0;  // of memory_bytes: what the stages have, and decoded bricks that are kept
   std::vector<BrickFailure> bricks_unreadable;  // with keep_going; by number
 };
 
@@ -132,6 +134,8 @@ class FrameRenderer {
 
   /// "CPU, AVX3"; "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
   const std::string& backendName() const;
+  /// Whether the processor draws, by itself or below OpenGL.
+  bool drawsInSoftware() const;
 
  private:
   struct State;

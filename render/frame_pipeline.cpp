@@ -153,6 +153,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   statistics.largest_level = static_cast<int>(cut.deepest_level);
   statistics.largest_error_px = cut.largest_error_px;
   statistics.workers = pools_->budget.workers;
+  statistics.memory_used_bytes = options.memory_bytes - pools_->budget.cache_bytes + statistics.cache_bytes;
   return image;
 }
 
@@ -174,6 +175,7 @@ Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, F
     statistics.splats_hidden = painter.hiddenSplats();
     statistics.upload_s = painter.uploadSeconds();
     statistics.draw_s = painter.drawSeconds();
+    statistics.gl_draw_s = painter.glSeconds();
   });
   return image;
 }

@@ -57,7 +57,7 @@ class FramePipeline {
 
   /// In which it wants the cut.
   DrawingOrder order() const { return backend_->order(); }
-  const std::string& backendName() const { return backend_->name(); }
+  const PaintingBackend& backend() const { return *backend_; }
 
  private:
   struct Pools;

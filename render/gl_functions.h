@@ -13,6 +13,7 @@ namespace curvisplat {
 #define CURVISPLAT_GL_FUNCTIONS(X)                             \
   X(ActiveTexture, PFNGLACTIVETEXTUREPROC)                     \
   X(AttachShader, PFNGLATTACHSHADERPROC)                       \
+  X(BeginQuery, PFNGLBEGINQUERYPROC)                           \
   X(BindBuffer, PFNGLBINDBUFFERPROC)                           \
   X(BindFramebuffer, PFNGLBINDFRAMEBUFFERPROC)                 \
   X(BindRenderbuffer, PFNGLBINDRENDERBUFFERPROC)               \
@@ -30,6 +31,7 @@ namespace curvisplat {
   X(DeleteBuffers, PFNGLDELETEBUFFERSPROC)                     \
   X(DeleteFramebuffers, PFNGLDELETEFRAMEBUFFERSPROC)           \
   X(DeleteProgram, PFNGLDELETEPROGRAMPROC)                     \
+  X(DeleteQueries, PFNGLDELETEQUERIESPROC)                     \
   X(DeleteRenderbuffers, PFNGLDELETERENDERBUFFERSPROC)         \
   X(DeleteShader, PFNGLDELETESHADERPROC)                       \
   X(DeleteSync, PFNGLDELETESYNCPROC)                           \
@@ -38,10 +40,12 @@ namespace curvisplat {
   X(DrawArraysInstanced, PFNGLDRAWARRAYSINSTANCEDPROC)         \
   X(Enable, PFNGLENABLEPROC)                                   \
   X(EnableVertexAttribArray, PFNGLENABLEVERTEXATTRIBARRAYPROC) \
+  X(EndQuery, PFNGLENDQUERYPROC)                               \
   X(FenceSync, PFNGLFENCESYNCPROC)                             \
   X(FramebufferRenderbuffer, PFNGLFRAMEBUFFERRENDERBUFFERPROC) \
   X(GenBuffers, PFNGLGENBUFFERSPROC)                           \
   X(GenFramebuffers, PFNGLGENFRAMEBUFFERSPROC)                 \
+  X(GenQueries, PFNGLGENQUERIESPROC)                           \
   X(GenRenderbuffers, PFNGLGENRENDERBUFFERSPROC)               \
   X(GenTextures, PFNGLGENTEXTURESPROC)                         \
   X(GenVertexArrays, PFNGLGENVERTEXARRAYSPROC)                 \
@@ -49,6 +53,7 @@ namespace curvisplat {
   X(GetIntegerv, PFNGLGETINTEGERVPROC)                         \
   X(GetProgramInfoLog, PFNGLGETPROGRAMINFOLOGPROC)             \
   X(GetProgramiv, PFNGLGETPROGRAMIVPROC)                       \
+  X(GetQueryObjectui64v, PFNGLGETQUERYOBJECTUI64VPROC)         \
   X(GetShaderInfoLog, PFNGLGETSHADERINFOLOGPROC)               \
   X(GetShaderiv, PFNGLGETSHADERIVPROC)                         \
   X(GetString, PFNGLGETSTRINGPROC)                             \

@@ -48,6 +48,10 @@ inline GlObject makeRenderbuffer(const GlFunctions& gl) {
   return {gl.GenRenderbuffers, gl.DeleteRenderbuffers};
 }
 
+inline GlObject makeQuery(const GlFunctions& gl) {
+  return {gl.GenQueries, gl.DeleteQueries};
+}
+
 /// A linked program of a vertex and a fragment shader.
 class GlProgram {
  public:

@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "render/gl_objects.h"
@@ -98,11 +99,12 @@ struct GlPainter::State {
   ImageSize size{0, 0};
   struct InFlight {
     GlFence fence;
+    GlObject timer;  // a query, done when the fence is passed
     uint64_t draw;
   };
   std::deque<InFlight> in_flight;
   uint64_t draws = 0;  // calls of draw()
-  double upload_s = 0, draw_s = 0;
+  double upload_s = 0, draw_s = 0, gl_draw_s = 0;
 
   void allocate(ImageSize wanted);
   void drawPart(std::span<const ScreenSplat> splats);
@@ -166,7 +168,7 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
                       bool per_pixel, const PaintResources&) {
   const GlFunctions& gl = state_->gl;
   finishDraws();  // of a frame that was not ended
-  state_->upload_s = state_->draw_s = 0;
+  state_->upload_s = state_->draw_s = state_->gl_draw_s = 0;
   state_->allocate(size);
   state_->classes.fill(gl, kClassesUnit, GL_RGBA32F, table.cumulative());
   state_->use(per_pixel ? (table.logScale() ? state_->per_pixel_log : state_->per_pixel)
@@ -206,11 +208,13 @@ void GlPainter::draw(std::span<const ScreenSplat> splats) {
 
 void GlPainter::State::drawPart(std::span<const ScreenSplat> splats) {
   const auto count = static_cast<GLsizei>(splats.size());
+  GlObject query = makeQuery(gl);
   const std::less_equal<const ScreenSplat*> not_after;
   if (!mapped_splats.empty() && not_after(mapped_splats.data(), splats.data()) &&
       not_after(splats.data() + splats.size(), mapped_splats.data() + mapped_splats.size())) {
     const StageTimer timer(draw_s);
     mapped->bind(gl);
+    gl.BeginQuery(GL_TIME_ELAPSED, query.name());
     gl.DrawArraysInstancedBaseInstance(GL_TRIANGLE_STRIP, 0, 4, count,
                                        static_cast<GLuint>(splats.data() - mapped_splats.data()));
   } else {
@@ -222,16 +226,21 @@ void GlPainter::State::drawPart(std::span<const ScreenSplat> splats) {
                     GL_STREAM_DRAW);
     }
     const StageTimer timer(draw_s);
+    gl.BeginQuery(GL_TIME_ELAPSED, query.name());
     gl.DrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, count);
   }
   const StageTimer timer(draw_s);
+  gl.EndQuery(GL_TIME_ELAPSED);
   gl.check("drawing splats");
-  in_flight.push_back({GlFence(gl), draws});
+  in_flight.push_back({GlFence(gl), std::move(query), draws});
   if (in_flight.size() > kDrawsInFlight) finishOldest();
 }
 
 void GlPainter::State::finishOldest() {
   in_flight.front().fence.wait();
+  GLuint64 nanoseconds = 0;
+  gl.GetQueryObjectui64v(in_flight.front().timer.name(), GL_QUERY_RESULT, &nanoseconds);
+  gl_draw_s += 1e-9 * static_cast<double>(nanoseconds);
   in_flight.pop_front();
 }
 
@@ -247,6 +256,7 @@ void GlPainter::finishDraws() {
 
 Image GlPainter::end() {
   const GlFunctions& gl = state_->gl;
+  finishDraws();
   const StageTimer timer(state_->draw_s);
   Image image(state_->size);
   gl.ReadPixels(0, 0, image.size.width, image.size.height, GL_RGBA, GL_FLOAT, image.rgba.data());
@@ -260,6 +270,10 @@ double GlPainter::uploadSeconds() const {
 
 double GlPainter::drawSeconds() const {
   return state_->draw_s;
+}
+
+double GlPainter::glSeconds() const {
+  return state_->gl_draw_s;
 }
 
 }  // namespace curvisplat

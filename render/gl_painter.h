@@ -28,6 +28,7 @@ class GlPainter final : public Painter {
 
   double uploadSeconds() const override;
   double drawSeconds() const override;
+  double glSeconds() const override;
 
   /// A buffer of OpenGL's for so many splats, mapped for as long as it is there: until the next call. Empty
   /// where OpenGL is older than 4.4.

@@ -57,6 +57,9 @@ class Painter {
   /// it is told to: end() waits for it, and counts as drawing.
   virtual double uploadSeconds() const = 0;
   virtual double drawSeconds() const = 0;
+  /// What OpenGL's own clock says of the drawing, without waits for splats; 0 where OpenGL does not draw.
+  /// Complete after end().
+  virtual double glSeconds() const { return 0; }
   /// Since begin(): of the splats drawn, those that were left out because nothing of them could be seen.
   virtual uint64_t hiddenSplats() const { return 0; }
 };

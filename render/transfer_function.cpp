@@ -14,6 +14,10 @@ constexpr double kLargestOpacity = 0.9999;
 // Between the ends of a range. What classifies pixels divides by it in single precision.
 constexpr double kLeastLength = 1e-30;
 
+bool isConstant(double low, double high) {
+  return low <= high && high - low < kLeastLength;
+}
+
 double toCoordinate(double scalar, bool log_scale) {
   if (!log_scale) return scalar;
   return scalar > 0 ? std::log10(scalar) : -std::numeric_limits<double>::infinity();
@@ -80,16 +84,17 @@ TransferFunction::TransferFunction(TransferFunctionDefinition definition,
   opacities_ = OpacityCurve(definition.opacities);
 }
 
+std::pair<double, double> intervalAround(double low, double high) {
+  if (!isConstant(low, high)) return {low, high};
+  const double margin = low == 0 ? 1 : std::max(1e-3 * std::abs(low), kLeastLength);
+  return {low - margin, high + margin};
+}
+
 TransferFunction TransferFunction::preset(std::string_view name, double low, double high,
                                           double opacity_unit) {
-  std::pair<double, double> range(low, high);
-  const bool constant = low <= high && high - low < kLeastLength;
-  if (constant) {
-    const double margin = low == 0 ? 1 : std::max(1e-3 * std::abs(low), kLeastLength);
-    range = {low - margin, high + margin};
-  }
+  const std::pair<double, double> range = intervalAround(low, high);
   TransferFunctionDefinition definition = presetDefinition(name);
-  if (constant)
+  if (isConstant(low, high))
     definition.notes.push_back(
         fmt::format("the scalar is {} everywhere: it gets the middle of the preset '{}'", low, name));
   return TransferFunction(std::move(definition), &range, opacity_unit);

@@ -88,6 +88,10 @@ class TransferFunction {
 TransferFunctionDefinition presetDefinition(std::string_view name);
 std::string presetNames();
 
+/// The interval that a preset is stretched over for a scalar from `low` to `high`: a constant gets one around
+/// it.
+std::pair<double, double> intervalAround(double low, double high);
+
 /// The ramp of a function that states no opacity, over [low, high].
 std::vector<OpacityPoint> defaultOpacityRamp(double low, double high);
 

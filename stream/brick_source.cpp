@@ -289,7 +289,10 @@ void BrickSource::finish(FetchStatistics& statistics) {
   statistics.bricks_left_out = after.bricks_left_out - before_.bricks_left_out;
   statistics.bytes_left_out = after.bytes_left_out - before_.bytes_left_out;
   statistics.bricks_read = reads_ - statistics.bricks_left_out;
-  statistics.cache_peak_bytes = cached_.statistics().peak_bytes;
+  const BrickCache::Statistics kept = cached_.statistics();
+  statistics.bricks_resident = kept.bricks;
+  statistics.cache_bytes = kept.bytes;
+  statistics.cache_peak_bytes = kept.peak_bytes;
   statistics.pager_peak_bytes = after.peak_bytes;
 }
 

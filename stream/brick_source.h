@@ -35,6 +35,7 @@ struct FetchStatistics {
   uint64_t bytes_read = 0, read_requests = 0;
   uint64_t bricks_cached = 0, bricks_read = 0;          // one in several parts counts once
   uint64_t bricks_left_out = 0, bytes_left_out = 0;     // not read, since nobody needed them any more
+  uint64_t bricks_resident = 0, cache_bytes = 0;        // decoded and kept, of this frame and others
   uint64_t cache_peak_bytes = 0, pager_peak_bytes = 0;  // so far
   std::string read_by;                                  // "io_uring, direct"
 };

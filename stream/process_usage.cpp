@@ -25,6 +25,7 @@ ProcessUsage ProcessUsage::now() {
   usage.cpu_seconds = static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
   usage.bytes_read = numberIn("/proc/self/io", "rchar:");
   usage.bytes_written = numberIn("/proc/self/io", "wchar:");
+  usage.memory_bytes = 1024 * numberIn("/proc/self/status", "VmRSS:");
   usage.peak_memory_bytes = 1024 * numberIn("/proc/self/status", "VmHWM:");
   return usage;
 }

@@ -173,13 +173,13 @@ class FrameRun {
       tell("warning", fmt::format("the picture{} is empty: {}", which, reason));
   }
 
-  Image annotated(Image image, const Camera& camera) const {
+  Image annotated(const Image& data, const Camera& camera) const {
     const FrameOptions& options = report_.options;
-    annotate(image, words_.annotations,
-             {renderer_.screenView(camera, options), report_.transfer_function,
-              scalarTitle(report_.variable.name, report_.variable.unit), manifest_.lower, manifest_.upper,
-              options.background});
-    return image;
+    return curvisplat::annotated(
+        data, words_.annotations,
+        {report_.picture, renderer_.screenView(camera, options), report_.transfer_function,
+         scalarTitle(report_.variable.name, report_.variable.unit), manifest_.lower, manifest_.upper,
+         options.background});
   }
 
   /// A line for a frame with bricks that no frame before it had: the first of them.
@@ -228,17 +228,19 @@ void render(const RenderWords& words) {
   const size_t variable = chooseVariable(cache, words.scalar);
   const VariableInfo& info = manifest.variables[variable];
   const glm::dvec3 lower = manifest.lower * options.scale, upper = manifest.upper * options.scale;
-  const CameraMotion motion = chooseCameraMotion(words.camera, lower, upper, options.size);
   const TransferFunction transfer_function =
       chooseTransferFunction(words.scalar, info, glm::length(upper - lower));
   for (const std::string& note : transfer_function.notes()) tell("note", note);
   const std::string range_warning = rangeMissesScalar(info, transfer_function);
   if (!range_warning.empty()) tell("warning", range_warning);
 
-  const auto output = makeFrameOutput(words.output, words.camera.moves(), options.size, frames_per_s);
+  const ImageSize picture = options.size;
+  options.size = dataSize(words.annotations, picture, transfer_function);
+  const CameraMotion motion = chooseCameraMotion(words.camera, lower, upper, options.size);
+  const auto output = makeFrameOutput(words.output, words.camera.moves(), picture, frames_per_s);
   FrameRenderer renderer(cache, variable, transfer_function, parseBackend(words.backend));
-  RenderReport report{
-      words.cache, words.output, info, transfer_function, options, renderer.backendName(), {}, 0, {}};
+  RenderReport report{words.cache, words.output,           picture, info, transfer_function,
+                      options,     renderer.backendName(), {},      0,    {}};
   FrameRun(words, manifest, renderer, *output, report).draw(motion);
   if (!words.statistics.empty()) writeStatistics(words.statistics, statisticsOf(report));
   tellResult(report);
@@ -282,7 +284,9 @@ void addRender(CLI::App& app) {
       ->capture_default_str()
       ->group(what);
 
-  command->add_flag("--scalar-bar", words->annotations.scalar_bar, "Draw which colour stands for which value")
+  command
+      ->add_flag("--scalar-bar", words->annotations.scalar_bar,
+                 "Beside the data, which colour stands for which value")
       ->group(what);
   command->add_flag("--axes", words->annotations.axes, "Draw where x, y and z point")->group(what);
   command->add_flag("--outline", words->annotations.outline, "Draw the box around the data")->group(what);

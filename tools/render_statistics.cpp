@@ -16,7 +16,7 @@ struct Seconds {
   const char* name;
   double FrameStatistics::*value;
 };
-constexpr std::array<Seconds, 12> kSeconds{{{"plan", &FrameStatistics::plan_s},
+constexpr std::array<Seconds, 13> kSeconds{{{"plan", &FrameStatistics::plan_s},
                                             {"read", &FrameStatistics::read_s},
                                             {"verify", &FrameStatistics::verify_s},
                                             {"decode", &FrameStatistics::decode_s},
@@ -24,6 +24,7 @@ constexpr std::array<Seconds, 12> kSeconds{{{"plan", &FrameStatistics::plan_s},
                                             {"sort", &FrameStatistics::sort_s},
                                             {"upload", &FrameStatistics::upload_s},
                                             {"draw", &FrameStatistics::draw_s},
+                                            {"gl_draw", &FrameStatistics::gl_draw_s},
                                             {"total", &FrameStatistics::total_s},
                                             {"workers_waited", &FrameStatistics::workers_waited_s},
                                             {"workers_waited_for_reads", &FrameStatistics::read_waited_s},
@@ -33,7 +34,7 @@ struct Count {
   const char* name;
   uint64_t FrameStatistics::*value;
 };
-constexpr std::array<Count, 20> kCounts{{{"bricks_drawn", &FrameStatistics::bricks_drawn},
+constexpr std::array<Count, 23> kCounts{{{"bricks_drawn", &FrameStatistics::bricks_drawn},
                                          {"bricks_culled", &FrameStatistics::bricks_culled},
                                          {"bricks_out_of_image", &FrameStatistics::bricks_out_of_image},
                                          {"bricks_transparent", &FrameStatistics::bricks_transparent},
@@ -50,6 +51,9 @@ constexpr std::array<Count, 20> kCounts{{{"bricks_drawn", &FrameStatistics::bric
                                          {"bricks_left_out", &FrameStatistics::bricks_left_out},
                                          {"bytes_left_out", &FrameStatistics::bytes_left_out},
                                          {"bricks_cached", &FrameStatistics::bricks_cached},
+                                         {"bricks_resident", &FrameStatistics::bricks_resident},
+                                         {"cache_bytes", &FrameStatistics::cache_bytes},
+                                         {"memory_used_bytes", &FrameStatistics::memory_used_bytes},
                                          {"ring_peak_bytes", &FrameStatistics::ring_peak_bytes},
                                          {"pager_peak_bytes", &FrameStatistics::pager_peak_bytes},
                                          {"cache_peak_bytes", &FrameStatistics::cache_peak_bytes}}};
@@ -123,7 +127,7 @@ nlohmann::json statisticsOf(const RenderReport& report) {
   json["cache"] = report.cache.string();
   json["scalar"] = {{"name", report.variable.name}, {"range", {report.variable.min, report.variable.max}}};
   json["image"] = {
-      {"file", report.output.string()}, {"width", options.size.width}, {"height", options.size.height}};
+      {"file", report.output.string()}, {"width", report.picture.width}, {"height", report.picture.height}};
   json["backend"] = report.backend;
   json["threads"] = options.threads;
   json["memory_bytes"] = options.memory_bytes;

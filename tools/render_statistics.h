@@ -23,6 +23,7 @@ struct FrameReport {
 /// A run of `render`.
 struct RenderReport {
   std::filesystem::path cache, output;
+  ImageSize picture;  // with the scalar bar; options.size is of the data
   const VariableInfo& variable;
   const TransferFunction& transfer_function;
   const FrameOptions& options;

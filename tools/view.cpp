@@ -7,8 +7,10 @@
 
 #include "stream/cache_reader.h"
 #include "stream/error.h"
+#include "stream/progress.h"
 #include "tools/commands.h"
 #include "tools/option_parsers.h"
+#include "tools/stop_signals.h"
 #include "tools/viewer/viewer.h"
 
 namespace curvisplat {
@@ -30,8 +32,10 @@ void view(const ViewWords& words) {
   if (words.memory) options.memory_bytes = parseByteSize("--memory", *words.memory);
   if (words.frame_time) options.target_s = parsePositive("--frame-time", *words.frame_time) / 1000;
   const CacheReader cache(words.cache);
+  Progress progress;
+  const StopOnSignals stopping(progress);
   try {
-    runViewer(cache, options);
+    runViewer(cache, options, progress);
   } catch (const UsageError& error) {
     throw Error("{}", error.what());  // the cache decides, not the words
   }

@@ -1,125 +1,50 @@
-// The window, as a person uses it: opened on a display, moved with the mouse, looked at.
-#include <fmt/format.h>
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cstdlib>
-#include <filesystem>
+// The window, as a person uses it: moved with the mouse and the keys, its panels edited, left and opened
+// again.
+#include <csignal>
 #include <fstream>
-#include <memory>
-#include <optional>
-#include <sstream>
-#include <string>
-#include <vector>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+#include <iterator>
 
-#include "render/image.h"
-#include "tests/support/run_program.h"
-#include "tests/support/temporary_folder.h"
-#include "tests/support/virtual_display.h"
+#include "tests/end_to_end/window_fixture.h"
 
 namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr ImageSize kScreen{1000, 700};
-constexpr int kPanel = 338;  // the picture begins right of it
+glm::dvec3 pointIn(const std::string& text) {
+  glm::dvec3 point;
+  char comma;
+  std::istringstream(text) >> point.x >> comma >> point.y >> comma >> point.z;
+  return point;
+}
 
-class WindowTest : public testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    folder_ = std::make_unique<TemporaryFolder>();
-    old_folder_ = fs::current_path();
-    fs::current_path(folder_->path());  // where pictures are saved
-    setenv("XDG_CONFIG_HOME", file("config").c_str(), 1);
-    run({"generate", "half-annulus", "--size", "48x24x24", "-o", "a"});
-    // A second scalar: the same file again under another name.
-    fs::copy_file("a.fun", "b.fun");
-    run({"convert", "a.xyz", "a.fun", "b.fun", "-o", "a.splats", "--scalar", "f", "--scalar", "1"});
-  }
-  static void TearDownTestSuite() {
-    fs::current_path(old_folder_);
-    folder_.reset();
-  }
-  void SetUp() override {
-    if (const std::string missing = VirtualDisplay::missing(); !missing.empty())
-      GTEST_SKIP() << missing << " is not installed";
-    display_.emplace(kScreen);
-    fs::remove_all("config");
-    for (int n = 1; n < 20; ++n) fs::remove(picture(n));
-  }
+/// The camera of a `render` command.
+struct SeenFrom {
+  glm::dvec3 position, focal_point;
+  double parallel_scale = 0, view_angle = 0;  // 0: the other projection
 
-  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
-  static void run(const std::vector<std::string>& arguments) {
-    const ProgramResult result = runProgram(arguments);
-    ASSERT_EQ(result.status, 0) << result.err;
-  }
-  static std::string picture(int number) { return fmt::format("a_{:04}.png", number); }
-
-  void open(std::vector<std::string> options = {}) {
-    options.insert(options.begin(), {"view", "a.splats", "--size", "900x600"});
-    window_ = std::make_unique<RunningProgram>(options);
-    act({"mousemove", "600", "300"});
-    // The panels are dark grey, the screen behind the window is black.
-    ASSERT_TRUE(eventually([&] { return display_->screenshot().pixel(10, 590)[0] > 0.01f; }));
-  }
-  void act(const std::vector<std::string>& words) { display_->act(words); }
-  void drag(int button, int dx, int dy, int x = 600, int y = 300) {
-    const std::string number = std::to_string(button);
-    act({"mousemove", std::to_string(x), std::to_string(y), "mousedown", number});
-    for (int step = 1; step <= 4; ++step)
-      act({"mousemove", std::to_string(x + step * dx / 4), std::to_string(y + step * dy / 4)});
-    act({"mouseup", number, "mousemove", "600", "300"});
-  }
-  /// The final picture, as saved by `p`.
-  Image save() {
-    const std::string name = picture(++saved_);
-    EXPECT_TRUE(eventually([&] {
-      if (!fs::exists(name)) act({"key", "p"});  // a key may come before the window hears
-      return eventually([&] { return fs::exists(name); }, 5);
-    }));
-    return readImage(name);
-  }
-  ProgramResult close() {
-    act({"key", "Escape"});
-    return window_->wait();
-  }
-
-  static double difference(const Image& a, const Image& b) {
-    return a.size.width == b.size.width && a.size.height == b.size.height ? compareImages(a, b).psnr_db : 0;
-  }
-  /// The part of the screen where the window shows the picture.
-  Image shown(ImageSize size) const {
-    const Image screen = display_->screenshot();
-    Image part(size);
-    for (int y = 0; y < size.height; ++y)
-      for (int x = 0; x < size.width; ++x) std::copy_n(screen.pixel(kPanel + x, y), 4, part.pixel(x, y));
-    return part;
-  }
-
-  static std::unique_ptr<TemporaryFolder> folder_;
-  static fs::path old_folder_;
-  std::optional<VirtualDisplay> display_;
-  std::unique_ptr<RunningProgram> window_;
-  int saved_ = 0;
+  glm::dvec3 forward() const { return glm::normalize(focal_point - position); }
 };
-std::unique_ptr<TemporaryFolder> WindowTest::folder_;
-fs::path WindowTest::old_folder_;
 
-std::vector<std::string> linesOf(const std::string& text) {
-  std::vector<std::string> lines;
-  std::istringstream stream(text);
-  for (std::string line; std::getline(stream, line);) lines.push_back(line);
-  return lines;
-}
-
-/// The words of a shell command without its first, which is the program's name.
-std::vector<std::string> wordsOf(const std::string& command) {
-  const ProgramResult result =
-      RunningProgram({"sh", "-c", "set -- " + command + "; shift; printf '%s\\n' \"$@\""}, "/usr/bin/env")
-          .wait();
-  return linesOf(result.out);
-}
+class WindowsCamera : public WindowTest {
+ protected:
+  static SeenFrom cameraOf(const std::vector<std::string>& command) {
+    const auto number = [&](const std::string& option) {
+      const std::string value = valueOf(command, option);
+      return value.empty() ? 0 : std::stod(value);
+    };
+    return {pointIn(valueOf(command, "--position")), pointIn(valueOf(command, "--focal-point")),
+            number("--parallel-scale"), number("--view-angle")};
+  }
+  /// One camera for each saveAndCopy().
+  std::vector<SeenFrom> closeAndSee() {
+    std::vector<SeenFrom> cameras;
+    for (const auto& command : close()) cameras.push_back(cameraOf(command));
+    return cameras;
+  }
+};
 
 TEST_F(WindowTest, ShowsWhatIsDoneToIt) {
   open();
@@ -133,59 +58,236 @@ TEST_F(WindowTest, ShowsWhatIsDoneToIt) {
   drag(1, 120, 60);
   const Image rotated = save();
   EXPECT_LT(difference(first, rotated), 30);
-  drag(2, 80, -40);
-  const Image panned = save();
-  EXPECT_LT(difference(rotated, panned), 30);
-  act({"click", "--repeat", "4", "4"});  // the wheel
-  const Image zoomed = save();
-  EXPECT_LT(difference(panned, zoomed), 30);
-  act({"key", "r"});
-  const Image reset = save();
-  EXPECT_LT(difference(zoomed, reset), 30);
-
-  act({"key", "x"});
-  const Image along_x = save();
-  act({"key", "o"});
+  press("o");
   const Image perspective = save();
-  EXPECT_LT(difference(along_x, perspective), 45);
-
-  // A new opacity point, high above the curve.
-  act({"mousemove", "100", "50", "click", "1", "mousemove", "600", "300"});
-  const Image edited = save();
+  EXPECT_LT(difference(rotated, perspective), 45);
+  click(kHighInTheCurve);
+  // The edit is on the screen, without anything else that would make it draw.
+  EXPECT_TRUE(eventually([&] { return difference(shown(first.size), perspective) < 35; }, 5));
+  const Image edited = saveAndCopy();
   EXPECT_LT(difference(perspective, edited), 35);
 
-  act({"key", "c"});
-  const ProgramResult result = close();
-  EXPECT_EQ(result.status, 0) << result.err;
-  const std::vector<std::string> said = linesOf(result.out);
-  ASSERT_EQ(said.size(), 1u) << result.out;
-  EXPECT_NE(said[0].find("--view-angle"), std::string::npos) << said[0];
-  // The command draws what was saved.
-  run(wordsOf(said[0]));
-  EXPECT_GE(difference(readImage("picture.png"), edited), 50);
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_NE(valueOf(commands[0], "--view-angle"), "");
+  expectDraws(commands[0], edited);
+}
+
+TEST_F(WindowsCamera, DragsAndTheWheelMoveIt) {
+  open();
+  const Image first = saveAndCopy();
+  drag(1, 60, 0);
+  const Image rotated = saveAndCopy();
+  drag(2, 80, -40);
+  const Image panned = saveAndCopy();
+  drag(3, 0, -50);
+  const Image zoomed = saveAndCopy();
+  act({"click", "--repeat", "4", "5"});  // the wheel, towards the user
+  const Image further = saveAndCopy();
+  act({"keydown", "shift"});
+  drag(1, -80, 40);
+  act({"keyup", "shift"});
+  const Image panned_back = saveAndCopy();
+  press("r");
+  const Image whole = saveAndCopy();
+
+  const std::vector<SeenFrom> seen = closeAndSee();
+  ASSERT_EQ(seen.size(), 7u);
+  EXPECT_EQ(seen[1].focal_point, seen[0].focal_point);
+  EXPECT_NEAR(glm::length(seen[1].position - seen[1].focal_point),
+              glm::length(seen[0].position - seen[0].focal_point), 1e-9);
+  EXPECT_LT(glm::dot(seen[1].forward(), seen[0].forward()), 0.99);
+  EXPECT_LT(difference(first, rotated), 30);
+
+  const glm::dvec3 shift = seen[2].focal_point - seen[1].focal_point;
+  EXPECT_GT(glm::length(shift), 0.01);
+  EXPECT_NEAR(glm::dot(shift, seen[1].forward()), 0, 1e-9);
+  EXPECT_LE(glm::length(seen[2].position - seen[1].position - shift), 1e-9);
+  EXPECT_LT(difference(rotated, panned), 30);
+
+  EXPECT_NEAR(seen[3].parallel_scale, seen[2].parallel_scale / std::pow(1.01, 50), 1e-6);
+  EXPECT_EQ(seen[3].focal_point, seen[2].focal_point);
+  EXPECT_LT(difference(panned, zoomed), 30);
+  EXPECT_NEAR(seen[4].parallel_scale, seen[3].parallel_scale * std::pow(1.1, 4), 1e-6);
+  EXPECT_LT(difference(zoomed, further), 30);
+
+  const double larger = seen[4].parallel_scale / seen[1].parallel_scale;
+  EXPECT_LE(glm::length(seen[5].focal_point - seen[4].focal_point + larger * shift), 1e-6);
+  EXPECT_LT(difference(further, panned_back), 30);
+  EXPECT_LE(glm::length(seen[6].forward() - seen[5].forward()), 1e-9);
+  EXPECT_NEAR(seen[6].focal_point.x, seen[0].focal_point.x, 1e-9);
+  EXPECT_LT(difference(panned_back, whole), 30);
+}
+
+TEST_F(WindowsCamera, KeysLookAlongTheAxes) {
+  open();
+  save();  // it hears
+  const std::vector<std::pair<std::string, glm::dvec3>> keys{{"x", {-1, 0, 0}},      {"y", {0, -1, 0}},
+                                                             {"z", {0, 0, -1}},      {"shift+x", {1, 0, 0}},
+                                                             {"shift+y", {0, 1, 0}}, {"shift+z", {0, 0, 1}}};
+  for (const auto& [key, forward] : keys) {
+    press(key);
+    saveAndCopy();
+  }
+  press("o");
+  saveAndCopy();
+  press("o");
+  saveAndCopy();
+  const std::vector<SeenFrom> seen = closeAndSee();
+  ASSERT_EQ(seen.size(), keys.size() + 2);
+  for (size_t n = 0; n < keys.size(); ++n)
+    EXPECT_LE(glm::length(seen[n].forward() - keys[n].second), 1e-9) << keys[n].first;
+  EXPECT_GT(seen[6].view_angle, 0);
+  EXPECT_EQ(seen[7].view_angle, 0);
+  EXPECT_NEAR(seen[7].parallel_scale, seen[5].parallel_scale, 1e-9);
+}
+
+TEST_F(WindowsCamera, FliesThroughTheData) {
+  open();
+  press("f");
+  Image before = saveAndCopy();
+  for (const char* key : {"w", "s", "d", "a", "e", "q"}) {
+    act({"keydown", key});
+    EXPECT_TRUE(eventually([&] { return difference(shown(before.size), before) < 40; })) << key;
+    act({"keyup", key});
+    before = saveAndCopy();
+  }
+  drag(1, 60, 20);  // looks around
+  saveAndCopy();
+  act({"click", "4"});
+  saveAndCopy();
+  const std::vector<SeenFrom> seen = closeAndSee();
+  ASSERT_EQ(seen.size(), 9u);
+  EXPECT_GT(seen[0].view_angle, 0);
+  const glm::dvec3 forward = seen[0].forward();
+  // Along forward, right and up; the focal point comes along.
+  const glm::dvec3 right = glm::normalize(glm::cross(forward, glm::dvec3(0, 0, 1)));
+  const std::vector<glm::dvec3> directions{
+      forward, -forward, right, -right, glm::cross(right, forward), -glm::cross(right, forward)};
+  for (size_t n = 0; n < directions.size(); ++n) {
+    const glm::dvec3 way = seen[n + 1].position - seen[n].position;
+    EXPECT_GT(glm::dot(way, directions[n]), 0.001) << n;
+    EXPECT_LE(glm::length(way - glm::dot(way, directions[n]) * directions[n]), 1e-9) << n;
+    EXPECT_LE(glm::length(seen[n + 1].focal_point - seen[n].focal_point - way), 1e-9) << n;
+  }
+  EXPECT_LE(glm::length(seen[7].position - seen[6].position), 1e-9);
+  EXPECT_LT(glm::dot(seen[7].forward(), seen[6].forward()), 0.9999);
+  EXPECT_GT(glm::dot(seen[8].position - seen[7].position, seen[7].forward()), 0.001);
+}
+
+TEST_F(WindowTest, ACommandDrawsScaleRangeAndClipBox) {
+  open();
+  save();
+  click(kScalars);
+  eventually([&] { return display_->screenshot().pixel(150, 40)[2] > 0.5f; }, 1);  // the list is open
+  click(kSecondScalar);  // volumes: above zero, as a logarithm needs
+  const Image linear = save();
+  click(kLogScale);
+  const Image logarithmic = save();
+  EXPECT_LT(difference(linear, logarithmic), 40);
+  moveTo(kRangeBegin);
+  act({"click", "1"});
+  act({"type", "2e-5"});
+  press("Return");
+  const Image ranged = save();
+  EXPECT_LT(difference(logarithmic, ranged), 45);
+  click(kClipHeader);
+  save();
+  click(kClip);
+  save();
+  drag(1, 150, 0, kClipX);
+  save();
+  click(kDark);
+  const Image clipped = saveAndCopy();
+  EXPECT_LT(difference(ranged, clipped), 20);
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_EQ(valueOf(commands[0], "--scalar"), "volume");
+  EXPECT_NE(valueOf(commands[0], "--clip-box"), "");
+  EXPECT_EQ(valueOf(commands[0], "--background"), "black");
+  std::ifstream function(valueOf(commands[0], "--tf"));
+  const std::string text{std::istreambuf_iterator<char>(function), {}};
+  EXPECT_NE(text.find("\"UseLogScale\": 1"), std::string::npos) << text;
+  EXPECT_NE(text.find("2e-05"), std::string::npos) << text;
+  expectDraws(commands[0], clipped);
+}
+
+TEST_F(WindowTest, SavesAndLoadsAFunction) {
+  open();
+  const Image preset = save();
+  click(kHighInTheCurve);
+  const Image edited = save();
+  EXPECT_LT(difference(preset, edited), 35);
+  click(kSave);
+  EXPECT_TRUE(eventually([&] { return fs::exists("function.json"); }));
+  click(kPresetsPoints);
+  EXPECT_GE(difference(save(), preset), 50);
+  click(kLoad);
+  const Image loaded = saveAndCopy();
+  EXPECT_GE(difference(loaded, edited), 50);
+  auto command = close().at(0);
+  for (std::string& word : command)
+    if (word == valueOf(command, "--tf")) word = "function.json";
+  expectDraws(command, edited);
+  fs::remove("function.json");
 }
 
 TEST_F(WindowTest, ComesBackAsItWasLeft) {
   open();
   drag(1, 90, -30);
-  act({"key", "o"});
+  press("o");
   const Image before = save();
-  EXPECT_EQ(close().status, 0);
+  close();
   open();
   EXPECT_GE(difference(save(), before), 50);
-  EXPECT_EQ(close().status, 0);
+  close();
+}
+
+TEST_F(WindowTest, OpensAStateFile) {
+  open();
+  const Image first = save();
+  drag(1, 90, -30);
+  click(kDark);
+  const Image before = save();
+  close();
+  const auto remembered = fs::directory_iterator("config/curvisplat/views")->path();
+  fs::copy_file(remembered, "mine.json", fs::copy_options::overwrite_existing);
+  fs::remove_all("config");
+  open();
+  EXPECT_GE(difference(save(), first), 50);
+  close();
+  open({"--state", "mine.json"});
+  EXPECT_GE(difference(save(), before), 50);
+  close();
+}
+
+TEST_F(WindowTest, ClosesInOrderWhenASignalAsksItTo) {
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) {
+    open();
+    drag(1, 40, 10);
+    const Image before = save();
+    window_->signal(signal);
+    const ProgramResult result = window_->wait();
+    EXPECT_EQ(result.status, 128 + signal) << result.err;
+    EXPECT_NE(result.err.find("interrupted"), std::string::npos) << result.err;
+    open();
+    EXPECT_GE(difference(save(), before), 50) << signal;
+    close();
+  }
 }
 
 TEST_F(WindowTest, ShowsAnotherScalarFromItsList) {
   open();
-  save();
-  act({"mousemove", "100", "17", "click", "1"});
+  const Image f = save();
+  click(kScalars);
   eventually([&] { return display_->screenshot().pixel(150, 40)[2] > 0.5f; }, 1);  // the list is open
-  act({"mousemove", "60", "58", "click", "1", "mousemove", "600", "300"});
-  save();
-  act({"key", "c"});
-  const ProgramResult result = close();
-  EXPECT_NE(result.out.find("--scalar 1"), std::string::npos) << result.out;
+  click(kSecondScalar);
+  const Image volume = saveAndCopy();
+  EXPECT_LT(difference(f, volume), 25);
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_EQ(valueOf(commands[0], "--scalar"), "volume");
+  expectDraws(commands[0], volume);
 }
 
 TEST_F(WindowTest, FollowsTheWindowsSize) {
@@ -193,35 +295,10 @@ TEST_F(WindowTest, FollowsTheWindowsSize) {
   save();
   act({"search", "--onlyvisible", "--name", "curvisplat", "windowsize", "800", "500"});
   eventually([&] { return display_->screenshot().pixel(10, 590)[0] < 0.01f; });
-  const Image resized = save();
+  const Image resized = saveAndCopy();
   EXPECT_EQ(resized.size.width, 800 - kPanel);
   EXPECT_EQ(resized.size.height, 500);
-  EXPECT_EQ(close().status, 0);
-}
-
-TEST_F(WindowTest, EndsWithALineWhereTheCacheIsDamagedUnderIt) {
-  fs::copy("a.splats", "damaged.splats");
-  fs::resize_file("damaged.splats/geometry.bin", 10);
-  const ProgramResult result = runProgram({"view", "damaged.splats"});
-  EXPECT_EQ(result.status, 1) << result.err;
-  EXPECT_NE(result.err.find("geometry.bin"), std::string::npos) << result.err;
-  fs::remove_all("damaged.splats");
-}
-
-TEST_F(WindowTest, SaysWhatIsWrongWithAStateFile) {
-  std::ofstream("state.json") << "{\"curvisplat_view\": 1}";
-  const ProgramResult result = runProgram({"view", "a.splats", "--state", "state.json"});
-  EXPECT_EQ(result.status, 1);
-  EXPECT_NE(result.err.find("state.json: field variable"), std::string::npos) << result.err;
-}
-
-TEST_F(WindowTest, WithoutADisplaySaysSo) {
-  display_.reset();
-  unsetenv("WAYLAND_DISPLAY");
-  const ProgramResult result = runProgram({"view", "a.splats"});
-  EXPECT_EQ(result.status, 1);
-  EXPECT_EQ(lineCount(result.err), 1) << result.err;
-  EXPECT_NE(result.err.find("no window can be opened"), std::string::npos) << result.err;
+  expectDraws(close().at(0), resized);
 }
 
 }  // namespace

@@ -49,6 +49,7 @@ TEST(GlPainter, DrawsFromMappedMemoryWithoutCopying) {
       }
       EXPECT_EQ(painter.end().rgba, copied.rgba);
       EXPECT_EQ(painter.uploadSeconds(), 0);
+      EXPECT_GT(painter.glSeconds(), 0);
       painter.finishDraws();
       EXPECT_EQ(painter.drawsUnderWay(), 0u);
       // What lies elsewhere is copied all the same.

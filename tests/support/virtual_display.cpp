@@ -43,13 +43,14 @@ std::string VirtualDisplay::missing() {
   return {};
 }
 
-VirtualDisplay::VirtualDisplay(ImageSize size) {
+VirtualDisplay::VirtualDisplay(ImageSize size, const std::vector<std::string>& options) {
   int number = 100 + getpid() % 20000;
   while (fs::exists("/tmp/.X11-unix/X" + std::to_string(number))) ++number;
   name_ = ":" + std::to_string(number);
   const std::string screen = std::to_string(size.width) + "x" + std::to_string(size.height) + "x24";
-  server_ = std::make_unique<RunningProgram>(
-      std::vector<std::string>{"Xvfb", name_, "-screen", "0", screen, "-noreset", "-nolisten", "tcp"}, kEnv);
+  std::vector<std::string> words{"Xvfb", name_, "-screen", "0", screen, "-noreset", "-nolisten", "tcp"};
+  words.insert(words.end(), options.begin(), options.end());
+  server_ = std::make_unique<RunningProgram>(words, kEnv);
   setenv("DISPLAY", name_.c_str(), 1);
   const auto answers = [] {
     return RunningProgram({"xdotool", "getmouselocation"}, kEnv).wait().status == 0;

@@ -16,8 +16,9 @@ class VirtualDisplay {
   /// What is not installed of what it needs, or empty.
   static std::string missing();
 
-  /// Starts it, and sets DISPLAY for programs to come; the destructor ends it.
-  explicit VirtualDisplay(ImageSize size);
+  /// Starts it, and sets DISPLAY for programs to come; the destructor ends it. `options` of Xvfb, beside
+  /// ours.
+  explicit VirtualDisplay(ImageSize size, const std::vector<std::string>& options = {});
   ~VirtualDisplay();
 
   /// xdotool's words: {"mousemove", "10", "20"}, {"key", "p"}. Throws where it fails.

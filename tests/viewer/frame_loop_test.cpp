@@ -96,6 +96,27 @@ TEST_F(FrameLoopTest, AMovingPictureIsOneAndCoarse) {
   EXPECT_EQ(frames[0].image.size.width, 160);
 }
 
+TEST_F(FrameLoopTest, AMovingPicturesTimeDecidesItsSplatsAndPixels) {
+  FrameLoop loop(cache_, Backend::cpu, waker());
+  FrameRequest request = requestOf();
+  request.moving = true;
+  const auto lastOf = [&](int pictures, double target_s) {
+    request.target_s = target_s;
+    ShownFrame last;
+    for (int n = 0; n < pictures; ++n) {
+      loop.request(request);
+      last = std::move(all(loop).back());
+    }
+    return last;
+  };
+  const uint64_t first = lastOf(1, 1e-9).statistics.splats_read;
+  const uint64_t hurried = lastOf(12, 1e-9).statistics.splats_read;  // no picture is as quick as that
+  const ShownFrame unhurried = lastOf(20, 1e9);
+  EXPECT_LT(4 * hurried, first);
+  EXPECT_GT(unhurried.statistics.splats_read, 4 * hurried);
+  EXPECT_TRUE(unhurried.is_final);  // there was time for all there is
+}
+
 TEST_F(FrameLoopTest, TheNewestRequestCounts) {
   FrameLoop loop(cache_, Backend::cpu, waker());
   uint64_t newest = 0;
@@ -114,8 +135,11 @@ TEST_F(FrameLoopTest, AnotherFunctionChangesThePicture) {
   request.function = TransferFunction::preset("inferno", 0, 1, 0.05);
   request.function_version = 2;
   loop.request(request);
-  const Image inferno = all(loop).back().image;
-  EXPECT_NE(viridis.rgba, inferno.rgba);
+  const std::vector<ShownFrame> frames = all(loop);
+  const Image& inferno = frames.back().image;
+  // It shows in the first picture already.
+  EXPECT_GT(compareImages(frames.front().image, inferno).psnr_db,
+            compareImages(frames.front().image, viridis).psnr_db + 5);
   FrameRenderer renderer(cache_, 0, request.function, Backend::cpu);
   FrameStatistics statistics;
   EXPECT_EQ(inferno.rgba, renderer.render(request.camera, request.options, statistics).rgba);

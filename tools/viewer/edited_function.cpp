@@ -9,13 +9,6 @@
 namespace curvisplat {
 namespace {
 
-/// A constant scalar gets an interval around it.
-std::pair<double, double> withLength(double low, double high) {
-  if (low < high) return {low, high};
-  const double margin = low == 0 ? 1 : 1e-3 * std::abs(low);
-  return {low - margin, high + margin};
-}
-
 template <typename Point, typename Map>
 void mapPoints(std::vector<Point>& points, const Map& map) {
   for (Point& point : points) point.x = map(point.x);
@@ -25,7 +18,7 @@ void mapPoints(std::vector<Point>& points, const Map& map) {
 
 EditedFunction::EditedFunction(const std::string& preset, double low, double high, double opacity_unit)
     : definition_(presetDefinition(preset)),
-      range_(withLength(low, high)),
+      range_(intervalAround(low, high)),
       opacity_unit_(opacity_unit),
       preset_(preset) {
   CURVISPLAT_CHECK_OP(opacity_unit, >, 0);
@@ -77,7 +70,7 @@ bool EditedFunction::setRange(double low, double high) {
 
 void EditedFunction::fitRange(double low, double high) {
   if (logScale() && !(low > 0)) setLogScale(false);
-  const auto [from, to] = withLength(low, high);
+  const auto [from, to] = intervalAround(low, high);
   setRange(from, to);
 }
 

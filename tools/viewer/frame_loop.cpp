@@ -20,6 +20,14 @@ uint64_t coarsestSplats(const CacheReader& cache) {
   return splats;
 }
 
+std::vector<uint8_t> bytesOf(const Image& image) {
+  std::vector<uint8_t> bytes(image.rgba.size());
+  std::transform(image.rgba.begin(), image.rgba.end(), bytes.begin(), [](float channel) {
+    return static_cast<uint8_t>(std::clamp(channel, 0.0f, 1.0f) * 255 + 0.5f);
+  });
+  return bytes;
+}
+
 }  // namespace
 
 // Slower than wanted: fewer splats, as long as that helps, then fewer pixels. Faster: the other way round.
@@ -82,6 +90,11 @@ bool FrameLoop::busy() const {
 std::string FrameLoop::backendName() const {
   const std::lock_guard lock(mutex_);
   return backend_name_;
+}
+
+bool FrameLoop::drawsInSoftware() const {
+  const std::lock_guard lock(mutex_);
+  return software_;
 }
 
 bool FrameLoop::superseded(uint64_t number) const {
@@ -147,6 +160,7 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
     drawing_ = &renderer;
     may_give_up_ = !request.moving;
     backend_name_ = renderer.backendName();
+    software_ = renderer.drawsInSoftware();
   }
 
   Effort& effort = drawing.effort;
@@ -157,8 +171,12 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
     frame.image = renderer.renderQuickly(request.camera, request.options,
                                          {.max_splats = splats, .detail_px = detail_px}, frame.statistics,
                                          frame.is_final);
-    if (request.moving)
-      effort.learn(frame.statistics.total_s, request.target_s, frame.statistics.splats_read < splats / 2);
+    frame.bytes = bytesOf(frame.image);
+    if (request.moving) {
+      // Fewer splats than it had leave to have say nothing: the next level may take more than it had.
+      const bool complete = frame.is_final || frame.statistics.largest_error_px <= request.options.lod_pixels;
+      effort.learn(frame.statistics.total_s, request.target_s, complete);
+    }
     const bool is_final = frame.is_final;
     publish(std::move(frame));
     if (is_final || request.moving || superseded(number)) return;

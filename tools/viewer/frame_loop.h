@@ -18,6 +18,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "render/frame.h"
 #include "stream/cache_reader.h"
@@ -36,6 +37,7 @@ struct FrameRequest {
 
 struct ShownFrame {
   Image image;
+  std::vector<uint8_t> bytes;  // the image as a screen has it: four a pixel, clamped
   FrameStatistics statistics;
   uint64_t request = 0;   // what request() returned
   bool is_final = false;  // as render() draws it
@@ -82,6 +84,8 @@ class FrameLoop {
   bool busy() const;
   /// What draws; empty until the first picture.
   std::string backendName() const;
+  /// Whether the processor draws; so until the first picture.
+  bool drawsInSoftware() const;
 
  private:
   struct Drawing;
@@ -106,6 +110,7 @@ class FrameLoop {
   bool ended_ = false;  // by a failure
   bool stopping_ = false;
   std::string backend_name_;
+  bool software_ = true;
   std::thread thread_;
 };
 

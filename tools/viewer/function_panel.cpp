@@ -16,6 +16,8 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kBins = 128;
+constexpr ImGuiInputTextFlags kNumber =
+    ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_CharsScientific;
 constexpr float kGrabRadius = 8;  // around a point
 constexpr float kCurveLines = 9;  // height, in lines of text
 
@@ -177,8 +179,7 @@ bool FunctionPanel::drawRange(EditedFunction& function, const VariableInfo& vari
     ImGui::EndCombo();
   }
   double ends[2] = {function.range().first, function.range().second};
-  if (ImGui::InputScalarN("range", ImGuiDataType_Double, ends, 2, nullptr, nullptr, "%.6g",
-                          ImGuiInputTextFlags_EnterReturnsTrue))
+  if (ImGui::InputScalarN("range", ImGuiDataType_Double, ends, 2, nullptr, nullptr, "%.6g", kNumber))
     changed |= function.setRange(ends[0], ends[1]);
   bool log_scale = function.logScale();
   if (ImGui::Checkbox("log scale", &log_scale)) changed |= function.setLogScale(log_scale);
@@ -196,8 +197,7 @@ bool FunctionPanel::drawRange(EditedFunction& function, const VariableInfo& vari
     }
   }
   double unit = function.opacityUnit();
-  if (ImGui::InputScalar("opacity unit", ImGuiDataType_Double, &unit, nullptr, nullptr, "%.4g",
-                         ImGuiInputTextFlags_EnterReturnsTrue)) {
+  if (ImGui::InputScalar("opacity unit", ImGuiDataType_Double, &unit, nullptr, nullptr, "%.4g", kNumber)) {
     function.setOpacityUnit(unit);
     changed = true;
   }

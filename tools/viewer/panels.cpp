@@ -11,8 +11,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kMiB = 1 << 20;
-
 void row(const char* name, const std::string& value) {
   ImGui::TableNextRow();
   ImGui::TableNextColumn();
@@ -27,8 +25,12 @@ std::string milliseconds(double seconds) {
 
 std::string count(uint64_t number) {
   if (number < 10'000) return fmt::format("{}", number);
-  if (number < 10'000'000) return fmt::format("{:.1f} k", static_cast<double>(number) / 1e3);
-  return fmt::format("{:.1f} M", static_cast<double>(number) / 1e6);
+  if (number < 1'000'000) return fmt::format("{:.1f} k", static_cast<double>(number) / 1e3);
+  return fmt::format("{:.2f} M", static_cast<double>(number) / 1e6);
+}
+
+double mebibytes(uint64_t bytes) {
+  return static_cast<double>(bytes) / (1 << 20);
 }
 
 }  // namespace
@@ -154,16 +156,21 @@ void Panels::drawStatistics(const ViewState& state, const PanelFacts& facts) {
         fmt::format("{}, {}", milliseconds(s->read_s), milliseconds(s->verify_s + s->decode_s)));
     row("project, sort", fmt::format("{}, {}", milliseconds(s->project_s), milliseconds(s->sort_s)));
     row("upload, draw", fmt::format("{}, {}", milliseconds(s->upload_s), milliseconds(s->draw_s)));
+    if (s->gl_draw_s > 0) row("OpenGL's time", milliseconds(s->gl_draw_s));
     row("splats", fmt::format("{} drawn of {}", count(s->splats_drawn), count(s->splats_read)));
-    row("bricks", fmt::format("{} drawn, {} in memory", count(s->bricks_drawn), count(s->bricks_cached)));
-    const double mebibytes = static_cast<double>(s->bytes_read) / kMiB;
-    row("read",
-        fmt::format("{:.1f} MiB, {:.0f} MiB/s", mebibytes, s->total_s > 0 ? mebibytes / s->total_s : 0));
     row("error", fmt::format("{:.2f} pixels", s->largest_error_px));
+    row("bricks", fmt::format("{} resident", count(s->bricks_resident)));
+    row("  wanted",
+        fmt::format("{}, {} of them were resident",
+                    count(s->bricks_cached + s->bricks_read + s->bricks_left_out), count(s->bricks_cached)));
+    row("read", fmt::format("{:.1f} MiB, {:.0f} MiB/s", mebibytes(s->bytes_read),
+                            s->read_s > 0 ? mebibytes(s->bytes_read) / s->read_s : 0));
+    row("memory", fmt::format("{:.0f} of {:.0f} MiB for the data", mebibytes(s->memory_used_bytes),
+                              mebibytes(state.memory_bytes)));
   }
-  row("memory",
-      fmt::format("{:.0f} of data, {:.0f} MiB in all", static_cast<double>(state.memory_bytes) / kMiB,
-                  static_cast<double>(ProcessUsage::now().peak_memory_bytes) / kMiB));
+  const ProcessUsage usage = ProcessUsage::now();
+  row("process", fmt::format("{:.0f} MiB, {:.0f} at the most", mebibytes(usage.memory_bytes),
+                             mebibytes(usage.peak_memory_bytes)));
   row("drawn by", facts.backend);
   ImGui::EndTable();
 }

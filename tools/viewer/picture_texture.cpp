@@ -1,8 +1,5 @@
 #include "tools/viewer/picture_texture.h"
 
-#include <algorithm>
-#include <vector>
-
 #include "stream/error.h"
 
 namespace curvisplat {
@@ -18,14 +15,6 @@ PictureTexture::PictureTexture(const GlFunctions& gl) : gl_(gl) {
 
 PictureTexture::~PictureTexture() {
   gl_.DeleteTextures(1, &texture_);
-}
-
-void PictureTexture::set(const Image& opaque) {
-  std::vector<uint8_t> bytes(opaque.rgba.size());
-  std::transform(opaque.rgba.begin(), opaque.rgba.end(), bytes.begin(), [](float channel) {
-    return static_cast<uint8_t>(std::clamp(channel, 0.0f, 1.0f) * 255 + 0.5f);
-  });
-  set(bytes, opaque.size);
 }
 
 void PictureTexture::set(std::span<const uint8_t> rgba, ImageSize size) {

@@ -18,8 +18,6 @@ class PictureTexture {
   PictureTexture(const PictureTexture&) = delete;
   PictureTexture& operator=(const PictureTexture&) = delete;
 
-  /// Channels beyond 0..1 are clamped. The image's alpha must be one everywhere.
-  void set(const Image& opaque);
   /// Four bytes a pixel, red, green, blue, alpha, colours not multiplied; rows from the top.
   void set(std::span<const uint8_t> rgba, ImageSize size);
 

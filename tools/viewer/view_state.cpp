@@ -135,11 +135,17 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
   return options;
 }
 
-ViewState firstViewOf(const Manifest& manifest, ImageSize size) {
+ViewState firstViewOf(const Manifest& manifest, ImageSize picture) {
   if (manifest.variables.empty()) throw Error("{}: the cache holds no scalar to look at", manifest.title);
   const VariableInfo& variable = manifest.variables.front();
-  return {variable.name, Camera::named("iso", manifest.lower, manifest.upper, size, Projection::orthographic),
-          EditedFunction("viridis", variable.min, variable.max, defaultOpacityUnit(manifest, glm::dvec3(1)))};
+  ViewState state{
+      variable.name,
+      {},
+      EditedFunction("viridis", variable.min, variable.max, defaultOpacityUnit(manifest, glm::dvec3(1)))};
+  state.camera = Camera::named("iso", manifest.lower, manifest.upper,
+                               dataSize(state.annotations, picture, state.function.function()),
+                               Projection::orthographic);
+  return state;
 }
 
 void chooseVariable(ViewState& state, const Manifest& manifest, const std::string& name) {

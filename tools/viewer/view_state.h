@@ -32,9 +32,9 @@ struct ViewState {
   FrameOptions frameOptions(ImageSize size) const;
 };
 
-/// What a cache is opened with: its first variable, all of it in the window. Throws Error where the cache has
-/// no variable.
-ViewState firstViewOf(const Manifest& manifest, ImageSize size);
+/// What a cache is opened with: its first variable, all of it in the picture beside the scalar bar. Throws
+/// Error where the cache has no variable.
+ViewState firstViewOf(const Manifest& manifest, ImageSize picture);
 
 /// Another variable, with the function's colours and points over that one's range. Throws UsageError that
 /// lists the variables there are.

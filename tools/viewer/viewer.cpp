@@ -27,9 +27,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// New pictures and input end a wait. Without either a window in software costs what is drawn behind it.
 constexpr double kIdleWait_s = 0.5;
-constexpr double kBusyWait_s = 0.05;
-constexpr int kFramesAfterInput = 3;  // Dear ImGui settles within them
+constexpr double kMovingWait_s = 0.03;  // flying, and until the camera counts as resting
+constexpr int kFramesAfterInput = 2;    // Dear ImGui settles within them
+
+bool same(ImageSize a, ImageSize b) {
+  return a.width == b.width && a.height == b.height;
+}
 
 class Viewer {
  public:
@@ -44,19 +49,32 @@ class Viewer {
         overlay_(window_.gl()) {
     fmt::print(stderr, "curvisplat: window: OpenGL {}\n", window_.contextName());
     updateBounds();
+    fitData(pictureSize());
   }
 
-  void run() {
-    int frames_to_settle = kFramesAfterInput;
-    while (window_.isOpen()) {
-      const bool active = frames_to_settle > 0 || navigation_.isMoving();
-      window_.wait(active ? 0.001 : frames_.busy() ? kBusyWait_s : kIdleWait_s);
-      frames_to_settle = update() ? kFramesAfterInput : std::max(0, frames_to_settle - 1);
+  /// What the window shows is remembered when it is closed, by whomever.
+  void run(const Progress& stopped) {
+    try {
+      loop(stopped);
+    } catch (const Interrupted&) {
+      remember();
+      throw;
     }
     remember();
   }
 
  private:
+  void loop(const Progress& stopped) {
+    int frames_to_settle = kFramesAfterInput;
+    while (window_.isOpen()) {
+      stopped.throwIfStopped();
+      const bool moving = navigation_.isMoving() || ImGui::IsAnyItemActive();
+      window_.wait(frames_to_settle > 0 ? 0 : moving ? kMovingWait_s : kIdleWait_s);
+      frames_to_settle = window_.takeInput() ? kFramesAfterInput : std::max(0, frames_to_settle - 1);
+      update();
+    }
+  }
+
   ViewState openingState() {
     const ImageSize size = pictureSize();
     ViewState state = firstViewOf(cache_.manifest(), size);
@@ -77,25 +95,24 @@ class Viewer {
     return state;
   }
 
-  /// One frame of the window; true if there was anything to react to.
-  bool update() {
+  /// One frame of the window. What the keys and the mouse do is in it.
+  void update() {
     window_.beginFrame();
+    takeFrame();
+    const bool changed = react();
     const ImageSize size = pictureSize();
-    bool reacted = takeFrame();
     if (size.width > 0 && size.height > 0) {
-      const bool changed = react(size);
-      reacted |= changed;
       const bool moving = navigation_.isMoving() || dragging_;
-      if (changed || moving != was_moving_ || size.width != asked_.width || size.height != asked_.height) {
-        ask(size, moving);
-        annotate(size);
-        reacted = true;
+      if (changed || moving != was_moving_ || !same(size, picture_size_) || request_ == 0) {
+        fitData(size);
+        ask(moving);
+        annotate();
       }
       showPicture();
       savePictureIfFinal();
+      if (std::exchange(copy_wanted_, false)) copyCommand();
     }
     window_.endFrame(glm::vec3(state_.background()));
-    return std::exchange(pressed_, false) || reacted || ImGui::IsAnyItemActive();
   }
 
   /// Of the picture beside the panels, in pixels.
@@ -107,8 +124,16 @@ class Viewer {
   }
   float panelWidth() const { return panels_shown_ ? Panels::width() : 0; }
 
-  /// Panels, keys and mouse; true if the picture is to change.
-  bool react(ImageSize size) {
+  /// The part of the picture that shows the data; beside it is the scalar bar.
+  void fitData(ImageSize picture) {
+    picture_size_ = picture;
+    data_size_ = dataSize(state_.annotations, picture, state_.function.function());
+  }
+
+  /// Keys, mouse and panels; true if the picture is to change.
+  bool react() {
+    bool changed = navigation_.update(window_, state_.camera, data_size_);
+    if (!window_.showsClick()) changed |= pressKeys();
     PanelFacts facts;
     facts.statistics = shown_ ? &shown_->statistics : nullptr;
     facts.is_final = shown_ && shown_->is_final && shown_->request == request_;
@@ -120,28 +145,32 @@ class Viewer {
     window_.setPictureLeft(panelWidth());
     if (panels_shown_) wishes = panels_.draw(state_, variable(), facts);
     dragging_ = wishes.dragging;
-    bool changed = wishes.changed;
+    changed |= wishes.changed;
     updateBounds();
-    changed |= navigation_.update(window_, state_.camera, size);
-    for (const Window::Key& key : window_.takeKeys()) changed |= press(key, size);
-    if (wishes.reset_camera) changed |= press({GLFW_KEY_R}, size);
-    if (wishes.other_projection) changed |= press({GLFW_KEY_O}, size);
-    if (wishes.toggle_flight) changed |= press({GLFW_KEY_F}, size);
-    if (wishes.save_picture) press({GLFW_KEY_P}, size);
-    if (wishes.copy_command) press({GLFW_KEY_C}, size);
+    if (wishes.reset_camera) changed |= press({GLFW_KEY_R});
+    if (wishes.other_projection) changed |= press({GLFW_KEY_O});
+    if (wishes.toggle_flight) changed |= press({GLFW_KEY_F});
+    if (wishes.save_picture) press({GLFW_KEY_P});
+    if (wishes.copy_command) press({GLFW_KEY_C});
     if (wishes.function_changed) ++function_version_;
+    if (window_.showsClick()) changed |= pressKeys();
     return changed;
   }
 
-  bool press(const Window::Key& key, ImageSize size) {
-    pressed_ = true;
+  bool pressKeys() {
+    bool changed = false;
+    for (const Window::Key& key : window_.takeKeys()) changed |= press(key);
+    return changed;
+  }
+
+  bool press(const Window::Key& key) {
     switch (key.code) {
       case GLFW_KEY_P:
         save_wanted_ = true;
         said_ = "the picture is saved as soon as it is final";
         return false;
       case GLFW_KEY_C:
-        copyCommand(size);
+        copy_wanted_ = true;
         return false;
       case GLFW_KEY_H:
         panels_shown_ = !panels_shown_;
@@ -150,7 +179,7 @@ class Viewer {
         window_.close();
         return false;
       default:
-        return navigation_.press(key, state_.camera, size);
+        return navigation_.press(key, state_.camera, data_size_);
     }
   }
 
@@ -161,37 +190,32 @@ class Viewer {
     navigation_.setBounds(state_.scale * manifest.lower, state_.scale * manifest.upper);
   }
 
-  void ask(ImageSize size, bool moving) {
+  void ask(bool moving) {
     FrameRequest request{variable(), function_version_, state_.function.function(), state_.camera,
-                         state_.frameOptions(size)};
+                         state_.frameOptions(data_size_)};
     request.moving = moving;
-    request.target_s = options_.target_s.value_or(software_ ? 0.1 : 0.033);
+    request.target_s = options_.target_s.value_or(frames_.drawsInSoftware() ? 0.1 : 0.033);
     request_ = frames_.request(std::move(request));
     was_moving_ = moving;
-    asked_ = size;
   }
 
-  bool takeFrame() {
-    std::optional<ShownFrame> frame;
+  void takeFrame() {
     try {
-      frame = frames_.take();
+      std::optional<ShownFrame> frame = frames_.take();
+      if (!frame) return;
+      picture_.set(frame->bytes, frame->image.size);
+      shown_ = std::move(frame);
     } catch (const UsageError& error) {
       if (said_ != error.what()) fmt::print(stderr, "curvisplat: warning: {}\n", error.what());
       said_ = error.what();
-      return true;
     }
-    if (!frame) return false;
-    software_ = !frames_.backendName().starts_with("EGL") ||
-                frames_.backendName().find("llvmpipe") != std::string::npos;
-    picture_.set(frame->image);
-    shown_ = std::move(frame);
-    return true;
   }
 
-  AnnotatedScene sceneFor(const TransferFunction& function, ImageSize size) const {
+  AnnotatedScene sceneFor(const TransferFunction& function) const {
     const Manifest& manifest = cache_.manifest();
     const VariableInfo& info = manifest.variables[variable()];
-    return {screenViewOf(manifest, state_.camera, state_.frameOptions(size), size),
+    return {picture_size_,
+            screenViewOf(manifest, state_.camera, state_.frameOptions(data_size_), data_size_),
             function,
             scalarTitle(info.name, info.unit),
             manifest.lower,
@@ -199,15 +223,16 @@ class Viewer {
             state_.background()};
   }
 
-  void annotate(ImageSize size) {
+  void annotate() {
     const TransferFunction function = state_.function.function();
-    overlay_.set(annotationLayer(state_.annotations, sceneFor(function, size)), size);
+    overlay_.set(annotationLayer(state_.annotations, sceneFor(function)), picture_size_);
   }
 
   void showPicture() {
     ImDrawList* const list = ImGui::GetBackgroundDrawList();
     const ImVec2 lower(panelWidth(), 0), upper = ImGui::GetIO().DisplaySize;
-    if (!picture_.isEmpty()) list->AddImage(picture_.id(), lower, upper);
+    const float strip = static_cast<float>((picture_size_.width - data_size_.width) / window_.pixelScale());
+    if (!picture_.isEmpty()) list->AddImage(picture_.id(), lower, {upper.x - strip, upper.y});
     if (!overlay_.isEmpty()) list->AddImage(overlay_.id(), lower, upper);
   }
 
@@ -218,22 +243,21 @@ class Viewer {
     for (int number = 1; file.empty() || fs::exists(file); ++number)
       file = fmt::format("{}_{:04}.png", cache_.path().stem().string(), number);
     try {
-      Image image = shown_->image;
       const TransferFunction function = state_.function.function();
-      curvisplat::annotate(image, state_.annotations, sceneFor(function, image.size));
-      writeImage(image, file);
+      writeImage(annotated(shown_->image, state_.annotations, sceneFor(function)), file);
       said_ = "saved " + fs::absolute(file).string();
     } catch (const Error& error) {
       said_ = error.what();
     }
   }
 
-  void copyCommand(ImageSize size) {
+  void copyCommand() {
     try {
       fs::path function_file;
       if (state_.function.preset().empty())
         function_file = keepFunction(toParaViewPreset(state_.function.definition()));
-      const std::string command = renderCommand(state_, fs::absolute(cache_.path()), size, function_file);
+      const std::string command =
+          renderCommand(state_, fs::absolute(cache_.path()), picture_size_, function_file);
       window_.setClipboard(command);
       fmt::print("{}\n", command);
       std::fflush(stdout);
@@ -264,20 +288,18 @@ class Viewer {
   PictureTexture picture_, overlay_;
 
   uint64_t function_version_ = 1;
-  uint64_t request_ = 0;  // the newest
-  ImageSize asked_{0, 0};
+  uint64_t request_ = 0;                            // the newest
+  ImageSize picture_size_{0, 0}, data_size_{0, 0};  // as last asked for
   std::optional<ShownFrame> shown_;
   bool was_moving_ = false, dragging_ = false;
-  bool save_wanted_ = false;
-  bool pressed_ = false;  // a key, since the last frame
-  bool software_ = true;
+  bool save_wanted_ = false, copy_wanted_ = false;
   std::string said_;
 };
 
 }  // namespace
 
-void runViewer(const CacheReader& cache, const ViewerOptions& options) {
-  Viewer(cache, options).run();
+void runViewer(const CacheReader& cache, const ViewerOptions& options, const Progress& stopped) {
+  Viewer(cache, options).run(stopped);
 }
 
 }  // namespace curvisplat

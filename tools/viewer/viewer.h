@@ -9,6 +9,7 @@
 #include "render/backend.h"
 #include "render/camera.h"
 #include "stream/cache_reader.h"
+#include "stream/progress.h"
 
 namespace curvisplat {
 
@@ -22,8 +23,9 @@ struct ViewerOptions {
       target_s;  // for a picture while moving; else 33 ms with a graphics card, 100 ms without
 };
 
-/// Opens the window and returns when it is closed. Throws Error where there is no window to be had, and where
-/// the cache cannot be read any more; UsageError for a scalar that the cache lacks.
-void runViewer(const CacheReader& cache, const ViewerOptions& options);
+/// Opens the window and returns when it is closed; half a second after `stopped` is, it closes the window and
+/// throws Interrupted. Throws Error where there is no window to be had, and where the cache cannot be read
+/// any more; UsageError for a scalar that the cache lacks.
+void runViewer(const CacheReader& cache, const ViewerOptions& options, const Progress& stopped);
 
 }  // namespace curvisplat

@@ -6,6 +6,7 @@
 #include <backends/imgui_impl_opengl3.h>
 #include <imgui.h>
 
+#include <cstdlib>
 #include <utility>
 
 #include "stream/error.h"
@@ -33,29 +34,79 @@ struct Window::Library {
   ~Library() { glfwTerminate(); }
 };
 
-Window::Window(const std::string& title, ImageSize size) : library_(std::make_unique<Library>()) {
+namespace {
+
+/// With OpenGL 3.3 or newer, made current. Throws Error.
+GLFWwindow* openWindow(const char* title, ImageSize size, bool visible) {
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
   glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, GLFW_TRUE);
-  window_ = glfwCreateWindow(size.width, size.height, title.c_str(), nullptr, nullptr);
-  if (!window_)
+  glfwWindowHint(GLFW_VISIBLE, visible ? GLFW_TRUE : GLFW_FALSE);
+  GLFWwindow* const window = glfwCreateWindow(size.width, size.height, title, nullptr, nullptr);
+  if (!window)
     throw Error(
         "no window can be opened: {}; OpenGL 3.3 is needed (from a graphics card's driver, or from Mesa: "
         "libgl1-mesa-dri)",
         last_words);
-  glfwMakeContextCurrent(window_);
+  glfwMakeContextCurrent(window);
+  return window;
+}
+
+GlFunctions glOfCurrentContext() {
+  return GlFunctions([](const char* name) { return reinterpret_cast<void*>(glfwGetProcAddress(name)); });
+}
+
+std::string nameOf(const GlFunctions& gl) {
+  return fmt::format("{}, {}", reinterpret_cast<const char*>(gl.GetString(GL_VERSION)),
+                     reinterpret_cast<const char*>(gl.GetString(GL_RENDERER)));
+}
+
+std::string displayName() {
+  const auto valueOf = [](const char* name) {
+    const char* const value = std::getenv(name);
+    return std::string(value ? value : "");
+  };
+  if (const std::string x11 = valueOf("DISPLAY"); !x11.empty()) return "X11 " + x11;
+  if (const std::string wayland = valueOf("WAYLAND_DISPLAY"); !wayland.empty()) return "Wayland " + wayland;
+  return "none: neither DISPLAY nor WAYLAND_DISPLAY is set";
+}
+
+}  // namespace
+
+WindowReport examineWindow() {
+  WindowReport report;
+  report.display = displayName();
+  report.glfw = glfwGetVersionString();
+  try {
+    const Window::Library library;
+    GLFWwindow* const window = openWindow("curvisplat", {64, 64}, false);
+    report.found = nameOf(glOfCurrentContext());
+    report.opens = true;
+    glfwDestroyWindow(window);
+  } catch (const Error& error) {
+    report.found = error.what();
+  }
+  return report;
+}
+
+Window::Window(const std::string& title, ImageSize size) : library_(std::make_unique<Library>()) {
+  window_ = openWindow(title.c_str(), size, true);
   glfwSwapInterval(1);
-  gl_ = std::make_unique<GlFunctions>(
-      [](const char* name) { return reinterpret_cast<void*>(glfwGetProcAddress(name)); });
-  context_name_ = fmt::format("{}, {}", reinterpret_cast<const char*>(gl_->GetString(GL_VERSION)),
-                              reinterpret_cast<const char*>(gl_->GetString(GL_RENDERER)));
+  gl_ = std::make_unique<GlFunctions>(glOfCurrentContext());
+  context_name_ = nameOf(*gl_);
   glfwSetWindowUserPointer(window_, this);
   // Dear ImGui's callbacks go before these, and call them.
   glfwSetKeyCallback(window_, onKey);
   glfwSetMouseButtonCallback(window_, onButton);
   glfwSetCursorPosCallback(window_, onMove);
   glfwSetScrollCallback(window_, onWheel);
+  glfwSetWindowSizeCallback(window_, onSize);
+  glfwSetFramebufferSizeCallback(window_, onPixels);
+  int height = 0;
+  glfwGetWindowSize(window_, &width_, &height);
+  glfwGetFramebufferSize(window_, &pixels_.width, &pixels_.height);
+  glfwGetCursorPos(window_, &mouse_.x, &mouse_.y);
 
   ImGui::CreateContext();
   ImGui::GetIO().IniFilename = nullptr;
@@ -93,9 +144,26 @@ void Window::wake() {
   glfwPostEmptyEvent();
 }
 
+/// Dear ImGui looks once a frame at what is down, and where the mouse is. A key that has gone down and up
+/// since then is down for this frame; a button is used where the mouse was then, however far it has gone
+/// since.
+void Window::showInput() {
+  ImGuiIO& io = ImGui::GetIO();
+  for (const int key : shown_keys_) io.KeysDown[key] = glfwGetKey(window_, key) == GLFW_PRESS;
+  for (const int key : fresh_keys_) io.KeysDown[key] = true;
+  shown_keys_ = std::exchange(fresh_keys_, {});
+  io.KeyCtrl = io.KeysDown[GLFW_KEY_LEFT_CONTROL] || io.KeysDown[GLFW_KEY_RIGHT_CONTROL];
+  io.KeyShift = io.KeysDown[GLFW_KEY_LEFT_SHIFT] || io.KeysDown[GLFW_KEY_RIGHT_SHIFT];
+  shows_click_ = !mouse_events_.empty();
+  if (!shows_click_) return;
+  io.MousePos = {static_cast<float>(mouse_events_.front().x), static_cast<float>(mouse_events_.front().y)};
+  mouse_events_.pop_front();
+}
+
 void Window::beginFrame() {
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
+  showInput();
   ImGui::NewFrame();
 }
 
@@ -109,28 +177,35 @@ void Window::endFrame(const glm::vec3& background) {
   glfwSwapBuffers(window_);
 }
 
-ImageSize Window::pixels() const {
-  ImageSize size;
-  glfwGetFramebufferSize(window_, &size.width, &size.height);
-  return size;
+double Window::pixelScale() const {
+  return width_ > 0 ? static_cast<double>(pixels_.width) / width_ : 1;
 }
 
-double Window::pixelScale() const {
-  int width = 0, height = 0;
-  glfwGetWindowSize(window_, &width, &height);
-  return width > 0 ? static_cast<double>(pixels().width) / width : 1;
+void Window::onSize(GLFWwindow* window, int width, int) {
+  static_cast<Window*>(glfwGetWindowUserPointer(window))->width_ = width;
+}
+
+void Window::onPixels(GLFWwindow* window, int width, int height) {
+  static_cast<Window*>(glfwGetWindowUserPointer(window))->pixels_ = {width, height};
 }
 
 void Window::onKey(GLFWwindow* window, int key, int, int action, int mods) {
-  if (action != GLFW_PRESS) return;
   auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
+  self->input_ = true;
+  if (action != GLFW_PRESS) return;
+  if (key >= 0) self->fresh_keys_.push_back(key);  // GLFW knows no name of some
   self->keys_.push_back({key, (mods & GLFW_MOD_SHIFT) != 0, (mods & GLFW_MOD_CONTROL) != 0});
 }
 
 std::vector<Window::Key> Window::takeKeys() {
+  if (!mouse_events_.empty()) return {};
   std::vector<Key> keys = std::exchange(keys_, {});
   if (ImGui::GetIO().WantTextInput) keys.clear();
   return keys;
+}
+
+bool Window::takeInput() {
+  return std::exchange(input_, false);
 }
 
 bool Window::overPicture() const {
@@ -139,8 +214,10 @@ bool Window::overPicture() const {
 
 void Window::onButton(GLFWwindow* window, int button, int action, int mods) {
   auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
+  self->input_ = true;
+  self->mouse_events_.push_back(self->mouse_);
   if (action == GLFW_PRESS && !self->isDragging()) {
-    glfwGetCursorPos(window, &self->mouse_.x, &self->mouse_.y);
+    // Where the mouse was then, not where it has gone since.
     if (!self->overPicture()) return;
     self->dragged_button_ = button;
     self->dragged_with_shift_ = (mods & GLFW_MOD_SHIFT) != 0;
@@ -159,6 +236,7 @@ void Window::onMove(GLFWwindow* window, double x, double y) {
 
 void Window::onWheel(GLFWwindow* window, double, double y) {
   auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
+  self->input_ = true;
   if (self->overPicture()) self->wheel_ += y;
 }
 

@@ -3,6 +3,7 @@
 // All members are for the main thread, but for wake().
 #pragma once
 
+#include <deque>
 #include <glm/vec2.hpp>
 #include <memory>
 #include <string>
@@ -14,6 +15,16 @@
 struct GLFWwindow;
 
 namespace curvisplat {
+
+/// What a window would get on this machine.
+struct WindowReport {
+  bool opens = false;
+  std::string display;  // "X11 :0"; "none: ..."
+  std::string glfw;     // its version, and what it was built for
+  std::string found;    // as Window::contextName(); or why there is none
+};
+/// Opens a window that is not shown. The main thread, while there is no Window.
+WindowReport examineWindow();
 
 class Window {
  public:
@@ -35,7 +46,7 @@ class Window {
   void endFrame(const glm::vec3& background);
 
   /// Of what is drawn, in pixels; {0, 0} while it is minimised.
-  ImageSize pixels() const;
+  ImageSize pixels() const { return pixels_; }
   /// Pixels to a unit of Dear ImGui's and of the mouse.
   double pixelScale() const;
 
@@ -43,8 +54,13 @@ class Window {
     int code = 0;  // GLFW_KEY_...
     bool shift = false, control = false;
   };
-  /// Keys pressed since the last call, but for those that a text field takes.
+  /// Keys pressed since the last call, but for those that a text field takes. None while clicks before them
+  /// are still to be shown to Dear ImGui.
   std::vector<Key> takeKeys();
+  /// Whether this frame of Dear ImGui has a click that may have come before keys.
+  bool showsClick() const { return shows_click_; }
+  /// Whether a key, a button or the wheel was used since the last call.
+  bool takeInput();
   bool isDown(int key) const;
 
   /// Movement of the mouse with a button down that went down over the picture. Every event counts with the
@@ -72,14 +88,27 @@ class Window {
   static void onButton(GLFWwindow* window, int button, int action, int mods);
   static void onMove(GLFWwindow* window, double x, double y);
   static void onWheel(GLFWwindow* window, double x, double y);
+  static void onSize(GLFWwindow* window, int width, int height);
+  static void onPixels(GLFWwindow* window, int width, int height);
   bool overPicture() const;
+  void showInput();
 
+  friend WindowReport examineWindow();
   struct Library;  // GLFW, from initialisation to termination
   std::unique_ptr<Library> library_;
   GLFWwindow* window_ = nullptr;
   std::unique_ptr<GlFunctions> gl_;
   std::string context_name_;
+  // As GLFW told last: to ask it is to wait for the display, which may still have a frame to show.
+  ImageSize pixels_{0, 0};
+  int width_ = 0;  // in units of the mouse
+
   std::vector<Key> keys_;
+  std::vector<int> fresh_keys_;          // pressed since the last frame of Dear ImGui
+  std::vector<int> shown_keys_;          // that it was told are down in its last frame
+  std::deque<glm::dvec2> mouse_events_;  // where buttons went down or up, for its frames to come
+  bool shows_click_ = false;
+  bool input_ = true;
 
   double picture_left_ = 0;
   glm::dvec2 mouse_{0.0};

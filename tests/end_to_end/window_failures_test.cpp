@@ -1,0 +1,121 @@
+// What the window says where it cannot open, and where its cache goes bad under it: one line, status 1.
+#include <cstdlib>
+#include <fstream>
+
+#include "tests/end_to_end/window_fixture.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+class NoWindow : public WindowTest {
+ protected:
+  static void expectFailure(const ProgramResult& result, const std::vector<std::string>& parts) {
+    EXPECT_EQ(result.status, 1) << result.err;
+    const std::vector<std::string> lines = linesOf(result.err);
+    ASSERT_FALSE(lines.empty());
+    for (const std::string& part : parts) EXPECT_NE(lines.back().find(part), std::string::npos) << result.err;
+    // Before it there is nothing but the window's OpenGL.
+    for (size_t n = 0; n + 1 < lines.size(); ++n)
+      EXPECT_NE(lines[n].find("curvisplat: window: OpenGL"), std::string::npos) << result.err;
+  }
+  static ProgramResult system() { return runProgram({"info", "--system"}); }
+};
+
+TEST_F(NoWindow, WithoutADisplay) {
+  display_.reset();
+  unsetenv("WAYLAND_DISPLAY");
+  const ProgramResult result = runProgram({"view", "a.splats"});
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  expectFailure(result, {"no window can be opened", "DISPLAY", "curvisplat render"});
+  EXPECT_NE(system().out.find("display    none"), std::string::npos) << system().out;
+  EXPECT_NE(system().out.find("window     not here: no window can be opened"), std::string::npos);
+}
+
+TEST_F(NoWindow, WhereOpenGlIsTooOld) {
+  EXPECT_NE(system().out.find("window     OpenGL"), std::string::npos) << system().out;
+  setenv("MESA_GL_VERSION_OVERRIDE", "2.1", 1);
+  const ProgramResult result = runProgram({"view", "a.splats"});
+  const std::string report = system().out;
+  unsetenv("MESA_GL_VERSION_OVERRIDE");
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  expectFailure(result, {"no window can be opened", "OpenGL 3.3 is needed"});
+  EXPECT_NE(report.find("window     not here: no window can be opened"), std::string::npos) << report;
+}
+
+TEST_F(NoWindow, OnADisplayWithoutOpenGl) {
+  display_.reset();
+  display_.emplace(kScreen, std::vector<std::string>{"-extension", "GLX"});
+  const ProgramResult result = runProgram({"view", "a.splats"});
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  expectFailure(result, {"no window can be opened", "GLX", "OpenGL 3.3 is needed"});
+}
+
+TEST_F(NoWindow, OfAnUnfinishedCache) {
+  fs::copy("a.splats", "part.splats");
+  fs::remove("part.splats/manifest.json");
+  const ProgramResult result = runProgram({"view", "part.splats"});
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  expectFailure(result, {"part.splats"});
+  fs::remove_all("part.splats");
+}
+
+TEST_F(NoWindow, OfACacheThatIsDamaged) {
+  fs::copy("a.splats", "damaged.splats");
+  fs::resize_file("damaged.splats/geometry.bin", 10);
+  expectFailure(runProgram({"view", "damaged.splats"}), {"geometry.bin"});
+  fs::remove_all("damaged.splats");
+}
+
+TEST_F(NoWindow, FromAStateFileThatIsWrong) {
+  std::ofstream("state.json") << "{\"curvisplat_view\": 1}";
+  expectFailure(runProgram({"view", "a.splats", "--state", "state.json"}), {"state.json: field variable"});
+  expectFailure(runProgram({"view", "a.splats", "--state", "none.json"}), {"none.json"});
+}
+
+/// What the window reads for its second scalar was not read before.
+class WindowOnACopy : public NoWindow {
+ protected:
+  void SetUp() override {
+    NoWindow::SetUp();
+    if (IsSkipped()) return;
+    cache_ = "copy";
+    fs::remove_all("copy.splats");
+    fs::copy("a.splats", "copy.splats");
+    open();
+    save();
+  }
+  void TearDown() override { fs::remove_all("copy.splats"); }
+  void chooseSecondScalar() {
+    click(kScalars);
+    eventually([&] { return display_->screenshot().pixel(150, 40)[2] > 0.5f; }, 1);  // the list is open
+    click(kSecondScalar);
+  }
+};
+
+TEST_F(WindowOnACopy, EndsWithALineWhereAFileBecomesShorter) {
+  fs::resize_file("copy.splats/geometry.bin", 5000);
+  chooseSecondScalar();
+  expectFailure(window_->wait(), {"geometry.bin"});
+}
+
+TEST_F(WindowOnACopy, EndsWithALineWhereBytesChange) {
+  {
+    std::fstream file("copy.splats/geometry.bin", std::ios::in | std::ios::out | std::ios::binary);
+    const std::string zeros(4096, '\0');
+    for (uintmax_t at = 0; at + zeros.size() < fs::file_size("copy.splats/geometry.bin"); at += zeros.size())
+      file.write(zeros.data(), static_cast<std::streamsize>(zeros.size()));
+  }
+  chooseSecondScalar();
+  expectFailure(window_->wait(), {"geometry.bin", "brick"});
+}
+
+TEST_F(WindowOnACopy, EndsWithALineWhereItIsDeleted) {
+  fs::remove_all("copy.splats");
+  chooseSecondScalar();
+  expectFailure(window_->wait(), {"copy.splats/", "No such file"});
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,172 @@
+// A window on a small cache of two scalars, f and volume, on a display of its own: what its tests share.
+#pragma once
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "render/image.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/virtual_display.h"
+
+namespace curvisplat {
+
+/// Where things are in a window with its panels shown.
+struct WindowPlaces {
+  using Place = std::pair<int, int>;
+  static constexpr int kPanel = 338;  // the picture begins right of it
+  static constexpr Place kPicture{520, 300};
+  static constexpr Place kScalars{100, 17}, kSecondScalar{60, 58};
+  static constexpr Place kHighInTheCurve{100, 50};
+  static constexpr Place kRangeBegin{50, 201};
+  static constexpr Place kLogScale{18, 225}, kPresetsPoints{245, 225};
+  static constexpr Place kLoad{26, 294}, kSave{70, 294};
+  static constexpr Place kDark{257, 363};
+  static constexpr Place kClipHeader{60, 501}, kClip{18, 524}, kClipX{50, 547};
+};
+
+class WindowTest : public testing::Test, protected WindowPlaces {
+ protected:
+  static constexpr ImageSize kScreen{1000, 700}, kWindow{900, 600};
+
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    old_folder_ = std::filesystem::current_path();
+    std::filesystem::current_path(folder_->path());  // where pictures are saved
+    setenv("XDG_CONFIG_HOME", file("config").c_str(), 1);
+    run({"generate", "half-annulus", "--size", "48x24x24", "-o", "a"});
+    run({"convert", "a.xyz", "a.fun", "-o", "a.splats", "--scalar", "f", "--scalar", "volume"});
+  }
+  static void TearDownTestSuite() {
+    std::filesystem::current_path(old_folder_);
+    folder_.reset();
+  }
+  void SetUp() override {
+    if (const std::string missing = VirtualDisplay::missing(); !missing.empty())
+      GTEST_SKIP() << missing << " is not installed";
+    display_.emplace(kScreen);
+    std::filesystem::remove_all("config");
+    for (const char* stem : {"a", "copy"})
+      for (int n = 1; n < 40; ++n) std::filesystem::remove(picture(n, stem));
+  }
+
+  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
+  static void run(const std::vector<std::string>& arguments) {
+    const ProgramResult result = runProgram(arguments);
+    ASSERT_EQ(result.status, 0) << result.err;
+  }
+  static std::string picture(int number, const std::string& stem = "a") {
+    return fmt::format("{}_{:04}.png", stem, number);
+  }
+
+  void open(std::vector<std::string> options = {}, ImageSize size = kWindow) {
+    options.insert(options.begin(),
+                   {"view", cache_ + ".splats", "--size", fmt::format("{}x{}", size.width, size.height)});
+    saved_ = 0;
+    while (std::filesystem::exists(picture(saved_ + 1, cache_))) ++saved_;
+    window_ = std::make_unique<RunningProgram>(options);
+    moveTo(kPicture);
+    // The panels are dark grey, the screen behind the window is black.
+    ASSERT_TRUE(eventually([&] { return display_->screenshot().pixel(10, size.height - 10)[0] > 0.01f; }));
+  }
+
+  void act(const std::vector<std::string>& words) { display_->act(words); }
+  void press(const std::string& key) { act({"key", key}); }
+  void moveTo(Place place) { act({"mousemove", std::to_string(place.first), std::to_string(place.second)}); }
+  /// The next click, or a drag in the panels, is for another frame of the window's: save() lies between.
+  void click(Place place) {
+    moveTo(place);
+    act({"click", "1"});
+  }
+  void drag(int button, int dx, int dy, Place from = kPicture) {
+    const std::string number = std::to_string(button);
+    moveTo(from);
+    act({"mousedown", number});
+    for (int step = 1; step <= 4; ++step) moveTo({from.first + step * dx / 4, from.second + step * dy / 4});
+    act({"mouseup", number});
+    moveTo(kPicture);
+  }
+  /// The final picture, as saved by `p`: all that was done before is in it.
+  Image save() {
+    const std::string name = picture(++saved_, cache_);
+    EXPECT_TRUE(eventually([&] {
+      if (!std::filesystem::exists(name)) press("p");  // a key may come before the window hears
+      return eventually([&] { return std::filesystem::exists(name); }, 5);
+    }));
+    return readImage(name);
+  }
+  /// The same, and the command that draws it is among those that close() returns.
+  Image saveAndCopy() {
+    press("c");
+    return save();
+  }
+  /// Closes the window: the words of the commands that were copied, without the program's name.
+  std::vector<std::vector<std::string>> close() {
+    press("Escape");
+    const ProgramResult result = window_->wait();
+    EXPECT_EQ(result.status, 0) << result.err;
+    std::vector<std::vector<std::string>> commands;
+    for (const std::string& line : linesOf(result.out)) commands.push_back(wordsOf(line));
+    return commands;
+  }
+
+  static double difference(const Image& a, const Image& b) {
+    return a.size.width == b.size.width && a.size.height == b.size.height ? compareImages(a, b).psnr_db : 0;
+  }
+  /// The part of the screen where the window shows the picture.
+  Image shown(ImageSize size) const {
+    const Image screen = display_->screenshot();
+    Image part(size);
+    for (int y = 0; y < size.height; ++y)
+      for (int x = 0; x < size.width; ++x) std::copy_n(screen.pixel(kPanel + x, y), 4, part.pixel(x, y));
+    return part;
+  }
+  /// The command's picture is `picture`.
+  static void expectDraws(const std::vector<std::string>& command, const Image& picture) {
+    run(command);
+    EXPECT_GE(difference(readImage("picture.png"), picture), 50) << testing::PrintToString(command);
+  }
+  /// What follows `option` in a command: "--option value" or "--option=value"; empty if it is not there.
+  static std::string valueOf(const std::vector<std::string>& command, const std::string& option) {
+    for (size_t n = 0; n < command.size(); ++n) {
+      if (command[n] == option) return n + 1 < command.size() ? command[n + 1] : "";
+      if (command[n].starts_with(option + "=")) return command[n].substr(option.size() + 1);
+    }
+    return {};
+  }
+
+  static std::vector<std::string> linesOf(const std::string& text) {
+    std::vector<std::string> lines;
+    std::istringstream stream(text);
+    for (std::string line; std::getline(stream, line);) lines.push_back(line);
+    return lines;
+  }
+  /// The words of a shell command without its first.
+  static std::vector<std::string> wordsOf(const std::string& command) {
+    const ProgramResult result =
+        RunningProgram({"sh", "-c", "set -- " + command + "; shift; printf '%s\\n' \"$@\""}, "/usr/bin/env")
+            .wait();
+    return linesOf(result.out);
+  }
+
+  std::string cache_ = "a";  // its name without .splats
+  std::optional<VirtualDisplay> display_;
+  std::unique_ptr<RunningProgram> window_;
+
+ private:
+  static inline std::unique_ptr<TemporaryFolder> folder_;
+  static inline std::filesystem::path old_folder_;
+  int saved_ = 0;
+};
+
+}  // namespace curvisplat
