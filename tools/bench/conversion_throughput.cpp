@@ -185,9 +185,11 @@ std::string conversionTable(const ConversionReport& report) {
 std::string conversionSummary(const ConversionReport& report, const Measurements& measurements) {
   const std::string prefix = report.cold ? "conversion/cold/" : "conversion/warm/";
   const Measurement& rate = *measurements.find(prefix + "rate");
-  std::string text =
-      fmt::format("{} nodes/s, median of {} run{}, spread {:.0f} %\n", shortCount(medianOf(rate.samples)),
-                  rate.samples.size(), rate.samples.size() > 1 ? "s" : "", 100 * spreadOf(rate.samples));
+  std::string text = shortCount(medianOf(rate.samples)) + " nodes/s";
+  if (rate.samples.size() > 1)
+    text += fmt::format(", median of {} runs, spread {:.0f} %", rate.samples.size(),
+                        100 * spreadOf(rate.samples));
+  text += "\n";
   if (report.peak_memory_bytes > 0)
     text += fmt::format("{} MiB of memory at the most\n", report.peak_memory_bytes >> 20);
   return text + fmt::format("a node takes {:.2f} B of temporary disk, and {:.2f} B in the cache\n",
