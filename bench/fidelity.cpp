@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <regex>
@@ -134,8 +135,12 @@ std::vector<NamedCase> allCases() {
 
 class Measurement {
  public:
-  Measurement(std::filesystem::path folder, double low_pass_px2, bool pictures, bool quick)
-      : folder_(std::move(folder)), low_pass_px2_(low_pass_px2), pictures_(pictures), quick_(quick) {
+  Measurement(std::filesystem::path folder, Backend backend, double low_pass_px2, bool pictures, bool quick)
+      : folder_(std::move(folder)),
+        backend_(backend),
+        low_pass_px2_(low_pass_px2),
+        pictures_(pictures),
+        quick_(quick) {
     std::filesystem::create_directories(folder_);
   }
 
@@ -191,7 +196,7 @@ class Measurement {
         options.lod_pixels = lod_pixels;
         options.classification = classification;
         uint64_t splats = 0;
-        const Image picture = drawCache(cache, function.table, view.camera, options, &splats);
+        const Image picture = drawCache(cache, function.table, view.camera, options, &splats, backend_);
         const ImageDifference difference = compareImages(picture, exact);
         const bool flat = classification == Classification::flat;
         line +=
@@ -225,6 +230,7 @@ class Measurement {
   }
 
   std::filesystem::path folder_;
+  Backend backend_;
   double low_pass_px2_;
   bool pictures_, quick_;
   nlohmann::json rows_ = nlohmann::json::array();
@@ -237,14 +243,21 @@ int run(int argc, char** argv) {
   std::string folder, only = ".*", json;
   double low_pass_px2 = FrameOptions().low_pass_px2;
   bool pictures = false, quick = false;
+  Backend backend = Backend::cpu;
+  const std::map<std::string, Backend> backends{{"cpu", Backend::cpu},
+                                                {"osmesa", Backend::osmesa},
+                                                {"egl", Backend::egl},
+                                                {"auto", Backend::automatic}};
   app.add_option("FOLDER", folder, "caches and references; references are kept and used again")->required();
   app.add_option("--only", only, "a regular expression: cases to measure");
   app.add_option("--json", json, "the same as a file");
+  app.add_option("--backend", backend, "what draws: cpu, osmesa, egl or auto")
+      ->transform(CLI::CheckedTransformer(backends));
   app.add_option("--low-pass", low_pass_px2, "pixels squared");
   app.add_flag("--pictures", pictures, "leave pictures, references and differences in FOLDER");
   app.add_flag("--quick", quick, "the finest level, per pixel, alone");
   CLI11_PARSE(app, argc, argv);
-  Measurement measurement(folder, low_pass_px2, pictures, quick);
+  Measurement measurement(folder, backend, low_pass_px2, pictures, quick);
   for (const NamedCase& named : allCases())
     if (std::regex_search(named.name, std::regex(only))) measurement.measure(named.make());
   if (!json.empty()) writeFileAtomically(json, measurement.rows().dump(1) + "\n");

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Times whole frames of the scenes in frame_scenes.json, each backend in turn.
 
-    bench/frame_times.py FOLDER [--scene NAME] [--repeats 8] [--backends cpu,osmesa] [--threads N]
+    bench/frame_times.py FOLDER [--scene NAME] [--repeats 8] [--backends cpu,osmesa] [--threads N] [--json OUT.json]
 
 A scene says how its cache is made (once, in FOLDER; those with "grid" need the named files there) and how it
 is drawn. Prints the shortest and the median frame, from the program's own --stats, and the least processor
@@ -12,63 +12,77 @@ import json
 import pathlib
 import resource
 import statistics
-import subprocess
+
+import results
 
 HERE = pathlib.Path(__file__).resolve().parent
-PROGRAM = HERE.parent / "build/release/tools/curvisplat"
 
 
-def run(*arguments):
+def run(*command):
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run([PROGRAM, *map(str, arguments)], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    results.run(command)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def cache_of(scene, folder):
-    cache = folder / f"{scene['name']}.splats"
+def cache_of(program, scene, folder, nodes):
+    cache = folder / (f"{scene['name']}_{nodes}.splats" if nodes else f"{scene['name']}.splats")
     if cache.exists():
         return cache
     if "generate" in scene:
         grid = folder / scene["name"]
-        run("generate", *scene["generate"], "-o", grid)
+        words = list(scene["generate"])
+        if nodes:
+            words[words.index("--size") + 1] = nodes
+        run(program, "generate", *words, "-o", grid)
         files = [grid.with_suffix(".xyz"), grid.with_suffix(".fun")]
     else:
         files = [folder / name for name in scene["grid"]]
-    run("convert", *files, "-o", cache, *scene.get("convert", []))
+    run(program, "convert", *files, "-o", cache, *scene.get("convert", []))
     return cache
 
 
-def measure(scene, cache, backend, folder, repeats, threads):
+def measure(arguments, scene, backend, out):
+    cache, told = cache_of(arguments.program, scene, arguments.folder, arguments.nodes), arguments.folder / "frame.json"
+    threads = ["--threads", arguments.threads] if arguments.threads else []
     seconds, processor = [], []
-    for _ in range(repeats):
-        processor.append(run("render", cache, "-o", folder / "frame.pfm", "--stats", folder / "frame.json",
+    for _ in range(arguments.repeats):
+        processor.append(run(arguments.program, "render", cache, "-o", arguments.folder / "frame.pfm", "--stats", told,
                              "--backend", backend, *scene["render"], *threads))
-        frame = json.loads((folder / "frame.json").read_text())["frames"][0]
+        frame = json.loads(told.read_text())["frames"][0]
         seconds.append(frame["seconds"]["total"])
     print(f"{scene['name']:12} {backend:7} {frame['splats_drawn']:10} splats {1e3 * min(seconds):8.1f} ms "
-          f"(median {1e3 * statistics.median(seconds):.1f}), processor {1e3 * min(processor):.0f} ms")
+          f"(median {1e3 * statistics.median(seconds):.1f}), processor {1e3 * min(processor):.0f} ms", flush=True)
+    out.add(f"frames/{scene['name']}/backend:{backend}", "s", seconds)
+    out.add(f"frames/{scene['name']}/processor/backend:{backend}", "s", processor)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("--program", default=HERE.parent / "build/release/tools/curvisplat")
     parser.add_argument("--scene")
+    parser.add_argument("--nodes", help="NIxNJxNK of generated grids, in place of the scenes' own")
     parser.add_argument("--repeats", type=int, default=8)
     parser.add_argument("--backends", default="cpu,osmesa")
     parser.add_argument("--threads", type=int)
+    parser.add_argument("--json")
     arguments = parser.parse_args()
     arguments.folder.mkdir(parents=True, exist_ok=True)
-    threads = ["--threads", arguments.threads] if arguments.threads else []
+    out = results.Results()
     for scene in json.loads((HERE / "frame_scenes.json").read_text()):
         if arguments.scene and scene["name"] != arguments.scene:
             continue
         if not all((arguments.folder / name).exists() for name in scene.get("grid", [])):
-            print(f"{scene['name']}: {' and '.join(scene['grid'])} are not in {arguments.folder}")
+            reason = f"{' and '.join(scene['grid'])} are not in {arguments.folder}"
+            print(f"{scene['name']}: {reason}")
+            out.leave_out(f"frames/{scene['name']}", reason)
             continue
-        cache = cache_of(scene, arguments.folder)
         for backend in arguments.backends.split(","):
-            measure(scene, cache, backend, arguments.folder, arguments.repeats, threads)
+            measure(arguments, scene, backend, out)
+    if arguments.json:
+        out.write(arguments.json, "frame_times", results.version_of(arguments.program))
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -153,6 +153,7 @@ class Addition {
           "a splat cannot be without; convert again with all scalars",
           cache_.path().string(), missing, manifest().cells ? "cells" : "nodes", joined(report_.scalars),
           survey_.blanked.not_finite, survey_.blanked.by_value);
+    checkRanges(survey_, grid_.description(), options_.scalars);
     if (survey_.lower != manifest().lower || survey_.upper != manifest().upper)
       throw Error(
           "{}: its grid spans ({}, {}, {}) to ({}, {}, {}), and this one ({}, {}, {}) to ({}, {}, {}): it "

@@ -126,6 +126,7 @@ class Conversion {
 
   void scan() {
     splats_.survey = surveyGrid(reader_, plan_.slab_bytes, progress_);
+    checkRanges(splats_.survey, source_.description(), options_.scalars);
     openWriter();
     const std::vector<BlockOverlap> overlaps = findOverlaps(source_, plan_.slab_bytes, progress_);
     if (!overlaps.empty()) report_.warnings.push_back(overlapWarning(source_.description(), overlaps));

@@ -121,7 +121,8 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   // at distances a and b: its middle is (b - a) / 4 away, of a length of (a + b) / 2. With one neighbour
   // only, that is a quarter of the difference, inwards.
   glm::dvec3 middle(0.0);
-  glm::dvec3 bend(0.0);  // the sum of the positions' second differences
+  glm::dvec3 bend(0.0);             // the sum of the positions' second differences
+  std::array<double, 3> inwards{};  // along i, j, k: 1 or -1 where the cell is a half one
   double weight_factor = 1;
   for (int axis = 0; axis < 3; ++axis) {
     const glm::dvec3 to_before = node.node_position - position(at + neighbours.before[axis]);
@@ -130,6 +131,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     const bool whole = neighbours.before[axis] != 0 && neighbours.after[axis] != 0;
     if (whole) bend += to_after - to_before;
     if (a + b > 0 && (corrections_.middles || !whole)) middle[axis] = 0.5 * (b - a) / (a + b);
+    if (!whole && a + b > 0) inwards[axis] = neighbours.before[axis] == 0 ? 1 : -1;
     if (!whole && !corrections_.half_cells) {
       jacobian[axis] *= 2.0;
       middle[axis] = 0;
@@ -162,6 +164,18 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     }
   };
 
+  const auto set_half_cell = [&](const auto& rotate) {
+    std::array<glm::dvec3, 3> axes;
+    size_t count = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (inwards[axis] == 0) continue;
+      glm::dvec3 along(0.0);
+      along[axis] = inwards[axis];
+      axes[count++] = rotate(along);
+    }
+    node.half_cell = corrections_.half_cells ? packHalfCell({axes.data(), count}) : kWholeCell;
+  };
+
   const LqFactors lq({jacobian[0].x, jacobian[1].x, jacobian[2].x},
                      {jacobian[0].y, jacobian[1].y, jacobian[2].y},
                      {jacobian[0].z, jacobian[1].z, jacobian[2].z});
@@ -171,6 +185,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     node.splat.shear = {a.a10 * lq.inverse_a00, a.a20 * lq.inverse_a00, a.a21 * lq.inverse_a11};
     node.splat.weight = a.a00 * a.a11 * a.a22 * weight_factor;
     node.regular = weight_factor == 1;
+    set_half_cell([&](const glm::dvec3& v) { return lq.rotate(v); });
     (lq.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
     set_values([&](const glm::dvec3& gradient) { return lq.rotate(gradient); },
                [&](const glm::dvec3& v) {
@@ -184,6 +199,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     node.splat.shear = shape.shear;
     node.splat.weight = std::abs(shape.determinant) * weight_factor;
     node.regular = !shape.floored;
+    set_half_cell([&](const glm::dvec3& v) { return shape.rotation * v; });
     (shape.floored ? out_.degenerate : shape.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
     // Where an axis was raised there is no telling a bend of the scalar from one of the coordinates.
     set_values([&](const glm::dvec3& gradient) { return shape.rotation * gradient; },

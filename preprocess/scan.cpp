@@ -21,6 +21,8 @@ constexpr size_t kNodesPerTask = 16384;
 
 // Splats are stored in single precision, their weights in units cubed.
 constexpr double kSmallestExtent = 1e-9, kLargestExtent = 1e12;
+// Splats hold variances, squares of differences of values; and they are added up.
+constexpr double kLargestRange = 1e18;
 
 struct Bounds {
   glm::dvec3 lower{std::numeric_limits<double>::infinity()};
@@ -103,6 +105,19 @@ GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, Progress& p
   survey.ranges = std::move(total.ranges);
   checkExtent(survey, reader);
   return survey;
+}
+
+void checkRanges(const GridSurvey& survey, const GridDescription& description,
+                 std::span<const uint32_t> scalars) {
+  for (size_t n = 0; n < scalars.size(); ++n) {
+    const auto [min, max] = survey.ranges.at(n);
+    if (max - min <= kLargestRange) continue;
+    throw Error(
+        "{}: its values go from {:g} to {:g}, more than {:g} apart; if one of them says that there is no "
+        "value, "
+        "name it with --blank, else scale them",
+        description.scalars.at(scalars[n]).name, min, max, kLargestRange);
+  }
 }
 
 void countNodes(const GridSource& source, const RootCube& root, uint64_t slab_bytes, CountingGrid& counts,

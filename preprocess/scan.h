@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "preprocess/counting_grid.h"
@@ -30,6 +31,11 @@ struct GridSurvey {
 /// Reads all nodes once. Memory: two slabs. Throws Error if no node is there, or if the grid is larger or
 /// smaller than single precision can say.
 GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, Progress& progress);
+
+/// Throws Error if the values of one of the survey's scalars lie further apart than single precision can say
+/// the square of.
+void checkRanges(const GridSurvey& survey, const GridDescription& description,
+                 std::span<const uint32_t> scalars);
 
 /// Counts the nodes that are there by cells of `root`, reading coordinates alone: a node that is blanked for
 /// its scalar's sake is counted, which makes the plan no worse than a little uneven.

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "preprocess/merge.h"
+#include "preprocess/open_borders.h"
 #include "preprocess/seam_sorter.h"
 
 namespace curvisplat {
@@ -109,9 +110,10 @@ class Sweep {
     double tolerance;
     NodeSplat lowest;  // the node of the lowest number
     std::vector<SplatScalar> values;
-    std::optional<SplatMerger> merger;  // from the second node on
-    std::optional<BendOfParts> bend;    // the same
-    std::vector<uint64_t> nodes;        // the same
+    std::optional<SplatMerger> merger;   // from the second node on
+    std::optional<BendOfParts> bend;     // the same
+    std::optional<OpenBorders> borders;  // the same
+    std::vector<uint64_t> nodes;         // the same
   };
   using Clusters = std::multimap<double, Cluster>;  // by `across` of the leader
 
@@ -147,6 +149,7 @@ void Sweep::add(const SeamNode& node, std::span<const SplatScalar> values) {
                                                               {values.begin(), values.end()},
                                                               std::nullopt,
                                                               std::nullopt,
+                                                              std::nullopt,
                                                               {}});
   leaving_.push({node.along + tolerance + slackOf(node.splat), sequence_++, cluster});
 }
@@ -173,11 +176,13 @@ void Sweep::join(Cluster& cluster, const NodeSplat& node, std::span<const SplatS
     cluster.merger->add(cluster.lowest.splat.position, cluster.lowest.splat, cluster.values);
     cluster.bend.emplace(variables_);
     cluster.bend->add(cluster.lowest.splat, cluster.lowest.splat.position - cluster.leader, cluster.values);
+    cluster.borders.emplace().add(cluster.lowest.splat, cluster.lowest.half_cell);
     cluster.nodes.push_back(cluster.lowest.node);
   }
   cluster.nodes.push_back(node.node);
   cluster.merger->add(node.splat.position, node.splat, values);
   cluster.bend->add(node.splat, node.splat.position - cluster.leader, values);
+  cluster.borders->add(node.splat, node.half_cell);
   if (node.node < cluster.lowest.node) cluster.lowest = node;
   ++merged_;
 }
@@ -191,6 +196,7 @@ void Sweep::release(double before) {
     if (cluster.merger) {
       cluster.merger->finish(cluster.lowest.splat, cluster.values);
       cluster.bend->correct(cluster.values);
+      cluster.lowest.half_cell = cluster.borders->of(cluster.lowest.splat);
       cluster.lowest.regular = false;
     }
     sink_(cluster.lowest, cluster.values, cluster.nodes);

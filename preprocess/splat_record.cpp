@@ -34,7 +34,8 @@ double product(const std::array<double, 3>& axis) {
 void packRecord(const NodeSplat& in, std::span<const SplatScalar> values, const RootPosition& position,
                 std::vector<std::byte>& out) {
   CURVISPLAT_CHECK_OP(in.node, <, kMaxNodes);
-  const size_t bytes = in.regular ? regularRecordBytes(values.size()) : irregularRecordBytes(values.size());
+  const bool irregular = !in.regular || in.half_cell != kWholeCell;
+  const size_t bytes = irregular ? irregularRecordBytes(values.size()) : regularRecordBytes(values.size());
   const size_t start = out.size();
   out.resize(start + bytes);
   std::byte* at = out.data() + start;
@@ -48,7 +49,7 @@ void packRecord(const NodeSplat& in, std::span<const SplatScalar> values, const 
     std::memcpy(at, &single, sizeof single);
     at += sizeof single;
   };
-  putWord48(in.node | uint64_t{!in.regular} << 47);
+  putWord48(in.node | uint64_t{irregular} << 47);
   for (const uint64_t coordinate : position.at) putWord48(coordinate);
   for (const double axis : in.splat.axis) {
     const uint32_t bits = axisBits(axis);
@@ -60,14 +61,16 @@ void packRecord(const NodeSplat& in, std::span<const SplatScalar> values, const 
     putFloat(value.mean);
     for (int axis = 0; axis < 3; ++axis) putFloat(value.slope[axis]);
   }
-  if (!in.regular) {
+  if (irregular) {
     const double cell = product(in.splat.axis);
     putFloat(cell > 0 ? in.splat.weight / cell : 0);
+    std::memcpy(at, &in.half_cell, sizeof in.half_cell);
+    at += sizeof in.half_cell;
     for (const SplatScalar& value : values) putFloat(value.variance);
   }
 }
 
-void unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScalar> values) {
+uint32_t unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScalar> values) {
   const bool irregular = recordIsIrregular(record);
   const std::byte* at = record + 24;
   const auto takeFloat = [&at] {
@@ -89,10 +92,13 @@ void unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScalar> 
     value.variance = 0;
   }
   splat.weight = product(splat.axis);
-  if (irregular) {
-    splat.weight *= takeFloat();
-    for (SplatScalar& value : values) value.variance = takeFloat();
-  }
+  if (!irregular) return kWholeCell;
+  splat.weight *= takeFloat();
+  uint32_t half_cell;
+  std::memcpy(&half_cell, at, sizeof half_cell);
+  at += sizeof half_cell;
+  for (SplatScalar& value : values) value.variance = takeFloat();
+  return half_cell;
 }
 
 }  // namespace curvisplat

@@ -7,12 +7,13 @@
 //   33   l10 l20 l21                                           3 x float
 //   45   mean w0 w1 w2                                         4 x float a variable
 //        irregular: weight / (a0 a1 a2)                        1 x float
+//                   half cell                                  32 bits
 //                   variance                                   1 x float a variable
 //
-// What is not stored of a regular splat (nearly all are) follows from the rest: its weight is a0 a1 a2 and
-// its variances are 0. Records of one bucket follow one another; their lengths are known from their flag.
-// Axes are good to 8e-6; shears need all of float's digits, since a thin cell multiplies them by its aspect
-// ratio.
+// What is not stored of a regular splat (nearly all are) follows from the rest: its weight is a0 a1 a2,
+// its variances are 0 and its cell is whole. Records of one bucket follow one another; their lengths are
+// known from their flag. Axes are good to 8e-6; shears need all of float's digits, since a thin cell
+// multiplies them by its aspect ratio.
 #pragma once
 
 #include <algorithm>
@@ -36,7 +37,7 @@ inline constexpr size_t regularRecordBytes(size_t variables) {
   return 45 + 16 * variables;
 }
 inline constexpr size_t irregularRecordBytes(size_t variables) {
-  return regularRecordBytes(variables) + 4 + 4 * variables;
+  return regularRecordBytes(variables) + 8 + 4 * variables;
 }
 
 /// A number as records keep it: beyond float's range it becomes the largest.
@@ -67,7 +68,7 @@ inline size_t recordBytes(const std::byte* record, size_t variables) {
   return recordIsIrregular(record) ? irregularRecordBytes(variables) : regularRecordBytes(variables);
 }
 
-/// Reads a record's splat (but for its position) and its values, one a variable.
-void unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScalar> values);
+/// Reads a record's splat (but for its position) and its values, one a variable. Returns the half cell.
+uint32_t unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScalar> values);
 
 }  // namespace curvisplat

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/border_parts.h"
 #include "render/kernel.h"
 #include "render/splat_cutter.h"
 #include "render/splat_ellipse.h"
 #include "render/splat_maps.h"
 #include "stream/error.h"
+#include "stream/half_cell.h"
 
 namespace curvisplat {
 namespace {
@@ -84,8 +86,9 @@ void computeBlock(const PerspectiveMap& map, const LocalBox& clip,
     block.depth[n] = centre.distance;
     block.clipped[n] = clip.excludes(x, y, z);
     block.too_wide[n] = map.tooWide(centre, map.radiusOf(shape));
-    block.set(n, ellipseOf(map.rowsAt(centre), shape, slopeOf(variable, i), variable.variance[i],
-                           geometry.weight[i] * map.volumeAt(centre), map.low_pass_px2, map.slope_low_pass_px2));
+    block.set(n,
+              ellipseOf(map.rowsAt(centre), shape, slopeOf(variable, i), variable.variance[i],
+                        geometry.weight[i] * map.volumeAt(centre), map.low_pass_px2, map.slope_low_pass_px2));
   }
 }
 
@@ -135,17 +138,34 @@ class Chooser {
   std::vector<float>& depths_;
 };
 
-/// What cutting needs beside the arithmetic loop's results; orthographic splats are never cut.
-std::optional<Chooser::Fate> chooseCut(const OrthographicMap&, const GeometryArrays<const float>&,
-                                       const VariableArrays<const float>&, size_t, Chooser&, size_t&) {
-  return Chooser::Fate::off_screen;
+/// Where a piece lies, and the map that is linear there.
+struct PlacedPiece {
+  float x, y, depth, volume;
+  ScreenRows rows;
+};
+
+/// Calls take(piece, its place) for what is to be drawn of `piece`; false as soon as take() gives it.
+template <typename Take>
+bool place(const OrthographicMap& map, const SplatPiece& piece, const Take& take) {
+  const float x = piece.position.x, y = piece.position.y, z = piece.position.z;
+  return take(piece, PlacedPiece{map.x + map.rows.x0 * x + map.rows.y0 * y + map.rows.z0 * z,
+                                 map.y + map.rows.x1 * x + map.rows.y1 * y + map.rows.z1 * z,
+                                 map.depth.x * x + map.depth.y * y + map.depth.z * z, map.volume, map.rows});
+}
+template <typename Take>
+bool place(const PerspectiveMap& map, const SplatPiece& piece, const Take& take) {
+  return cutUp(map, piece, [&](const SplatPiece& part, const PerspectiveMap::Centre& centre) {
+    return take(part, PlacedPiece{map.pixelX(centre), map.pixelY(centre), centre.distance,
+                                  map.volumeAt(centre), map.rowsAt(centre)});
+  });
 }
 
-/// Cuts splat `i` up and chooses among its pieces: the best fate of any. Nothing if there are more pieces
-/// than `pieces_left`, which it counts down.
-std::optional<Chooser::Fate> chooseCut(const PerspectiveMap& map, const GeometryArrays<const float>& geometry,
-                                       const VariableArrays<const float>& variable, size_t i,
-                                       Chooser& chooser, size_t& pieces_left) {
+/// Takes splat `i` to the parts and pieces that it is drawn as, and chooses among them: the best fate of any.
+/// Nothing if there are more pieces than `pieces_left`, which it counts down.
+template <typename Map>
+std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<const float>& geometry,
+                                          const VariableArrays<const float>& variable, size_t i,
+                                          uint32_t half_cell, Chooser& chooser, size_t& pieces_left) {
   const SplatPiece whole{{geometry.x[i], geometry.y[i], geometry.z[i]},
                          shapeOf(geometry, i),
                          slopeOf(variable, i),
@@ -154,25 +174,28 @@ std::optional<Chooser::Fate> chooseCut(const PerspectiveMap& map, const Geometry
   if (chooser.transparentThroughout(whole.mean, whole.slope, variable.variance[i]))
     return Chooser::Fate::transparent;
   auto best = Chooser::Fate::off_screen;
-  const auto take = [&](const SplatPiece& piece, const PerspectiveMap::Centre& centre) {
+  const auto take = [&](const SplatPiece& piece, const PlacedPiece& at) {
     if (pieces_left == 0) return false;
-    const Ellipse ellipse = ellipseOf(map.rowsAt(centre), piece.shape, piece.slope, variable.variance[i],
-                                      piece.weight * map.volumeAt(centre), map.low_pass_px2, map.slope_low_pass_px2);
-    const auto fate = chooser.choose(screenSplat(map.pixelX(centre), map.pixelY(centre), ellipse, piece.mean),
-                                     centre.distance);
+    const Ellipse ellipse = ellipseOf(at.rows, piece.shape, piece.slope, variable.variance[i],
+                                      piece.weight * at.volume, map.low_pass_px2, map.slope_low_pass_px2);
+    const auto fate = chooser.choose(screenSplat(at.x, at.y, ellipse, piece.mean), at.depth);
     if (fate == Chooser::Fate::kept) --pieces_left;
     best = std::max(best, fate);
     return true;
   };
-  if (!cutUp(map, whole, take)) return {};
+  BorderPieces parts;
+  const size_t count = partsAtBorder(whole, half_cell, parts);
+  for (size_t n = 0; n < count; ++n)
+    if (!place(map, parts[n], take)) return {};
   return best;
 }
 
-/// False if the brick would give more than `pieces_left`, which it counts down.
+/// False if the brick would give more than `pieces_left`, which it counts down. With `crisp` borders half
+/// cells are drawn in parts.
 template <typename Map>
-bool projectRange(const Map& map, const LocalBox& clip, const GeometryArrays<const float>& geometry,
-                  const VariableArrays<const float>& variable, const SplatRange& range, Chooser& chooser,
-                  size_t& pieces_left, ProjectionCounts& counts) {
+bool projectRange(const Map& map, bool crisp, const LocalBox& clip,
+                  const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
+                  const SplatRange& range, Chooser& chooser, size_t& pieces_left, ProjectionCounts& counts) {
   Block block;
   for (size_t begin = range.begin; begin < range.end; begin += kBlock) {
     const size_t count = std::min(kBlock, range.end - begin);
@@ -183,10 +206,11 @@ bool projectRange(const Map& map, const LocalBox& clip, const GeometryArrays<con
         continue;
       }
       Chooser::Fate fate;
-      if (block.too_wide[n]) {
-        const auto cut_fate = chooseCut(map, geometry, variable, begin + n, chooser, pieces_left);
-        if (!cut_fate) return false;
-        fate = *cut_fate;
+      const uint32_t half_cell = crisp ? geometry.half_cell[begin + n] : kWholeCell;
+      if (block.too_wide[n] || half_cell != kWholeCell) {
+        const auto best = choosePieces(map, geometry, variable, begin + n, half_cell, chooser, pieces_left);
+        if (!best) return false;
+        fate = *best;
       } else {
         fate = chooser.choose(
             {block.x[n], block.y[n], block.l11[n], block.l21[n], block.l22[n], block.amplitude[n],
@@ -202,12 +226,12 @@ bool projectRange(const Map& map, const LocalBox& clip, const GeometryArrays<con
 }
 
 template <typename Map>
-bool projectWith(const Map& map, const LocalBox& clip, const GeometryArrays<const float>& geometry,
-                 const VariableArrays<const float>& variable, std::span<const SplatRange> ranges,
-                 Chooser& chooser, ProjectionCounts& counts) {
+bool projectWith(const Map& map, bool crisp, const LocalBox& clip,
+                 const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
+                 std::span<const SplatRange> ranges, Chooser& chooser, ProjectionCounts& counts) {
   size_t pieces_left = BrickProjector::kMostPieces;
   return std::all_of(ranges.begin(), ranges.end(), [&](const SplatRange& range) {
-    return projectRange(map, clip, geometry, variable, range, chooser, pieces_left, counts);
+    return projectRange(map, crisp, clip, geometry, variable, range, chooser, pieces_left, counts);
   });
 }
 
@@ -217,9 +241,9 @@ double largestReach(double low_pass_px2) {
   // The slope along L's columns is at most √(x (x + λ)) / (x + ε) times |w|, x the squared extent of the
   // splat on the screen; x below is where that is largest.
   constexpr double kEpsilon = kSlopeLowPass;
-  if (low_pass_px2 <= 2 * kEpsilon) return kKernelSupport;
+  if (low_pass_px2 <= 2 * kEpsilon) return kKernelSupport + kBorderReach;
   const double x = low_pass_px2 * kEpsilon / (low_pass_px2 - 2 * kEpsilon);
-  return kKernelSupport * std::sqrt(x * (x + low_pass_px2)) / (x + kEpsilon);
+  return kBorderReach + kKernelSupport * std::sqrt(x * (x + low_pass_px2)) / (x + kEpsilon);
 }
 
 BrickProjector::BrickProjector() {
@@ -247,10 +271,11 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
     splats_.clear();
     depths_.clear();
     counts_ = {};
+    const bool crisp = coarseness == 1;
     complete = settings.view.projection == Projection::orthographic
-                   ? projectWith(OrthographicMap(settings.view, cell_min), clip, geometry, variable, ranges,
-                                 chooser, counts_)
-                   : projectWith(PerspectiveMap(settings.view, cell_min, coarseness), clip, geometry,
+                   ? projectWith(OrthographicMap(settings.view, cell_min), crisp, clip, geometry, variable,
+                                 ranges, chooser, counts_)
+                   : projectWith(PerspectiveMap(settings.view, cell_min, coarseness), crisp, clip, geometry,
                                  variable, ranges, chooser, counts_);
   }
   for (const SplatRange& range : ranges) counts_.read += range.size();

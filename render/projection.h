@@ -48,7 +48,7 @@ struct ProjectionCounts {
   uint64_t off_screen = 0;   // outside the image, or before the near plane
   uint64_t transparent = 0;  // without extinction in the transfer function, or without weight
   uint64_t drawn = 0;        // of those read
-  uint64_t pieces = 0;       // that the drawn ones were drawn as: more where perspective splats were cut up
+  uint64_t pieces = 0;       // that the drawn ones were drawn as: more at borders, and where perspective cuts
 };
 
 /// What to do with every splat of a frame.
@@ -61,8 +61,9 @@ struct ProjectionSettings {
 /// Projects bricks. One thread each.
 class BrickProjector {
  public:
-  /// A brick gives at most kMaxBrickSplats splats plus this many pieces; where perspective would cut more, it
-  /// cuts coarser and drops more of what is close to the eye.
+  /// A brick gives at most kMaxBrickSplats splats plus this many pieces; where borders and perspective would
+  /// make more, half cells are drawn whole, and perspective cuts coarser and drops more of what is close to
+  /// the eye.
   static constexpr size_t kMostPieces = 65536;
   static constexpr size_t kMostSplats = kMaxBrickSplats + kMostPieces;
 
@@ -70,9 +71,10 @@ class BrickProjector {
   BrickProjector();
 
   /// Projects the splats of a brick that `ranges` hold; `cell_min` is the minimum corner of its cell. Leaves
-  /// out what cannot be seen. Splats that reach behind the near plane or span a wide angle are cut along
-  /// their longest column into two that merge into them exactly, until they are small for their distance;
-  /// what then lies before the near plane is dropped. Overwrites splats() and depths(). Pure.
+  /// out what cannot be seen. Half cells are drawn in parts (border_parts.h). Splats that reach behind the
+  /// near plane or span a wide angle are cut along their longest column into two that merge into them
+  /// exactly, until they are small for their distance; what then lies before the near plane is dropped.
+  /// Overwrites splats() and depths(). Pure.
   void project(const ProjectionSettings& settings, const ClassificationTable& table,
                const glm::dvec3& cell_min, const GeometryArrays<const float>& geometry,
                const VariableArrays<const float>& variable, std::span<const SplatRange> ranges);
@@ -93,7 +95,8 @@ class BrickProjector {
   ProjectionCounts counts_;
 };
 
-/// How far, in multiples of |slope|, a mean can reach over a splat's footprint under `low_pass_px2`.
+/// How far, in multiples of |slope|, a mean can reach over the footprints of a splat and of its parts at a
+/// border, under `low_pass_px2`.
 double largestReach(double low_pass_px2);
 
 }  // namespace curvisplat

@@ -11,6 +11,8 @@ namespace curvisplat {
 namespace {
 
 constexpr double kLargestOpacity = 0.9999;
+// Between the ends of a range. What classifies pixels divides by it in single precision.
+constexpr double kLeastLength = 1e-30;
 
 double toCoordinate(double scalar, bool log_scale) {
   if (!log_scale) return scalar;
@@ -53,8 +55,9 @@ TransferFunction::TransferFunction(TransferFunctionDefinition definition,
   CURVISPLAT_CHECK_OP(opacity_unit, >, 0);
   std::optional<std::pair<double, double>> stretched;
   if (range) {
-    if (!(range->first < range->second))
-      throw UsageError("the range {},{} of a transfer function must ascend", range->first, range->second);
+    if (!(range->second - range->first >= kLeastLength))
+      throw UsageError("the range {},{} of a transfer function must ascend, by {:g} or more", range->first,
+                       range->second, kLeastLength);
     if (log_scale_ && !(range->first > 0))
       throw UsageError("{} is logarithmic: its range {},{} must begin above zero", definition.origin,
                        range->first, range->second);
@@ -80,9 +83,9 @@ TransferFunction::TransferFunction(TransferFunctionDefinition definition,
 TransferFunction TransferFunction::preset(std::string_view name, double low, double high,
                                           double opacity_unit) {
   std::pair<double, double> range(low, high);
-  const bool constant = low == high;
+  const bool constant = low <= high && high - low < kLeastLength;
   if (constant) {
-    const double margin = low == 0 ? 1 : 1e-3 * std::abs(low);
+    const double margin = low == 0 ? 1 : std::max(1e-3 * std::abs(low), kLeastLength);
     range = {low - margin, high + margin};
   }
   TransferFunctionDefinition definition = presetDefinition(name);

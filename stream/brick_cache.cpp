@@ -8,7 +8,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kArrays = 15;
+constexpr uint64_t kArrays = 16;
 // Arrays begin at whole cache lines.
 constexpr uint64_t kLineFloats = Arena::kBlockAlignment / sizeof(float);
 
@@ -71,7 +71,8 @@ std::optional<BrickCache::Room> BrickCache::makeRoom(uint32_t brick, uint32_t sp
   entry.turn = turn_;
   entry.block = block;
   entry.pins = 1;
-  auto* array = reinterpret_cast<float*>(block);
+  entry.geometry.half_cell = reinterpret_cast<uint32_t*>(block);
+  auto* array = reinterpret_cast<float*>(block) + stride;
   for (float** each :
        {&entry.geometry.x, &entry.geometry.y, &entry.geometry.z, &entry.geometry.axis0, &entry.geometry.axis1,
         &entry.geometry.axis2, &entry.geometry.shear10, &entry.geometry.shear20, &entry.geometry.shear21,

@@ -14,8 +14,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kKernelRadius = 1.556228;
-
 float roundedUp(double value) {
   const float rounded = static_cast<float>(value);
   return rounded >= value ? rounded : std::nextafter(rounded, std::numeric_limits<float>::infinity());
@@ -30,6 +28,7 @@ void checkInput(const BrickSplats& brick) {
   CURVISPLAT_CHECK_OP(brick.size(), >=, 1u);
   CURVISPLAT_CHECK_OP(brick.size(), <=, size_t{kMaxBrickSplats});
   CURVISPLAT_CHECK_OP(brick.positions.size(), ==, brick.size());
+  if (!brick.half_cells.empty()) CURVISPLAT_CHECK_OP(brick.half_cells.size(), ==, brick.size());
   uint64_t nodes = 0;
   for (const NodeRun& run : brick.runs) {
     CURVISPLAT_CHECK_OP(run.count, >=, 1u);
@@ -81,7 +80,7 @@ Brick summaryOf(const RootCube& root, const BrickSplats& splats) {
   }
   brick.lower = root.toWorld(lower);
   brick.upper = root.toWorld(upper);
-  brick.largest_radius = roundedUp(kKernelRadius * largestSingularValue(splats.splats));
+  brick.largest_radius = roundedUp(largestReach(splats.splats, splats.half_cells));
   return brick;
 }
 
@@ -195,6 +194,7 @@ void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const st
   toFloats(decoded.shear[1], out.shear20);
   toFloats(decoded.shear[2], out.shear21);
   toFloats(decoded.weight, out.weight);
+  std::copy(decoded.half_cell.begin(), decoded.half_cell.end(), out.half_cell);
 }
 
 void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,
@@ -229,6 +229,7 @@ BrickSplats decodeForMerging(const RootCube& root, const Brick& brick, std::span
   out.positions.resize(brick.splats);
   out.splats.resize(brick.splats);
   fillGeometry(root, decoded, out);
+  out.half_cells = decoded.half_cell;
   SplatVariable variable;
   for (size_t v = 0; v < values.size(); ++v) {
     decodeVariable(brick, variables[v], values[v], variable);

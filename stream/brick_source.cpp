@@ -16,6 +16,7 @@ void compact(std::span<const uint32_t> kept, SplatGeometry& g, SplatVariable& v)
   for (auto* array : {&g.x, &g.y, &g.z, &g.axis0, &g.axis1, &g.axis2, &g.shear10, &g.shear20, &g.shear21,
                       &g.weight, &v.mean, &v.slope0, &v.slope1, &v.slope2, &v.variance})
     for (size_t n = 0; n < kept.size(); ++n) (*array)[n] = (*array)[kept[n]];
+  for (size_t n = 0; n < kept.size(); ++n) g.half_cell[n] = g.half_cell[kept[n]];
   g.resize(kept.size());
   v.resize(kept.size());
 }

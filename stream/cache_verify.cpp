@@ -15,7 +15,6 @@ namespace {
 
 constexpr size_t kMostFindings = 100;
 constexpr double kWeightTolerance = 1e-3;
-constexpr double kKernelRadius = 1.556228;
 // Floats have been rounded, from doubles that the record was made of.
 constexpr double kRounding = 1e-5;
 
@@ -114,7 +113,7 @@ class Verifier {
       splats[s].axis = {geometry_.axis0[s], geometry_.axis1[s], geometry_.axis2[s]};
       splats[s].shear = {geometry_.shear10[s], geometry_.shear20[s], geometry_.shear21[s]};
     }
-    const double radius = kKernelRadius * largestSingularValue(splats);
+    const double radius = largestReach(splats, geometry_.half_cell);
     if (std::abs(radius - brick.largest_radius) > kRounding * radius)
       findIn(n, fmt::format("its largest radius is {}, its record says {}", radius, brick.largest_radius));
   }

@@ -1,7 +1,7 @@
 // The geometry stream of a brick: node runs, positions, shapes, weights.
 //
 //   GeometryHeader | zstd frame: runs (varints) | planes of x, y, z | planes of the shapes | planes of
-//   weights
+//   weights | planes of half cells
 //
 //   positions  the highest `position_bits` bits of the lattice position in the cell, decoded as the middle of
 //              their interval
@@ -10,6 +10,7 @@
 //              splat's own aspect ratio: what must be exact is A⁻¹ A', not A'. l20 makes up for what l10
 //              lost.
 //   weights    ln(V / (a0 a1 a2)) in fixed steps: 0 for a node's splat, 1 for V = 0
+//   half cells the four bytes of half_cell.h's code, lowest first; only where a brick has any (kHalfCells)
 //
 // Shapes or weights whose numbers do not fit are stored as raw 64-bit floats instead (kRawShapes,
 // kRawWeights).
@@ -27,20 +28,20 @@
 
 namespace curvisplat {
 
-inline constexpr uint8_t kRawShapes = 1, kRawWeights = 2;
-inline constexpr size_t kLargestGeometryArrays = 3 + 12 + 2;
+inline constexpr uint8_t kRawShapes = 1, kRawWeights = 2, kHalfCells = 4;
+inline constexpr size_t kLargestGeometryArrays = 3 + 12 + 2 + 4;
 
 struct GeometryHeader {
   uint8_t position_bits;                    //  0: 5..32
-  uint8_t raw;                              //  1: kRawShapes, kRawWeights
+  uint8_t raw;                              //  1: kRawShapes, kRawWeights, kHalfCells
   uint16_t reserved;                        //  2: zero
   uint32_t runs_bytes;                      //  4: of the varints, unpacked
   double log_axis0, log_axis1, log_volume;  //  8: of the smallest, natural
   std::array<ArrayCode, kLargestGeometryArrays>
-      arrays;                // 32: x y z, ln a0, ln a1, ln volume, l21 l10 l20, weight
-  uint8_t more_reserved[6];  // 66: zero
-};                           // 72
-static_assert(sizeof(GeometryHeader) == 72);
+      arrays;                // 32: x y z, ln a0, ln a1, ln volume, l21 l10 l20, weight, half cells
+  uint8_t more_reserved[6];  // 74: zero
+};                           // 80
+static_assert(sizeof(GeometryHeader) == 80);
 
 /// A brick's geometry, decoded in double; scratch that is used again.
 struct DecodedGeometry {
@@ -48,6 +49,7 @@ struct DecodedGeometry {
   std::array<std::vector<uint32_t>, 3> position;  // in units of cell size / 2^position_bits
   std::array<std::vector<double>, 3> axis, shear;
   std::vector<double> weight;
+  std::vector<uint32_t> half_cell;
   std::vector<NodeRun> runs;
   std::vector<Row> rows;
 

@@ -7,6 +7,7 @@
 #include "stream/error.h"
 #include "stream/geometry_codec.h"
 #include "stream/geometry_steps.h"
+#include "stream/half_cell.h"
 #include "stream/planes.h"
 
 namespace curvisplat {
@@ -30,6 +31,7 @@ class GeometryDecoder {
       decodeShapes();
     }
     decodeWeights();
+    decodeHalfCells();
     checkFinite();
   }
 
@@ -122,6 +124,23 @@ class GeometryDecoder {
     }
   }
 
+  void decodeHalfCells() {
+    std::fill(out_.half_cell.begin(), out_.half_cell.end(), kWholeCell);
+    if (!(header_.raw & kHalfCells)) return;
+    auto& codes = GeometryDecoder::codes();
+    uint32_t any = 0;
+    for (int shift = 0; shift < 32; shift += 8) {
+      readPredicted(codes);
+      for (size_t n = 0; n < count_; ++n) {
+        any |= codes[n];
+        out_.half_cell[n] |= codes[n] << shift;
+      }
+    }
+    bool fine = any <= 0xff;
+    for (uint32_t half_cell : out_.half_cell) fine &= isPossibleHalfCell(half_cell);
+    if (!fine) throw Error("a half cell in it is impossible");
+  }
+
   /// Infinite or NaN numbers, and axes or weights that cannot be: one comparison an array element, no
   /// branches.
   void checkFinite() const {
@@ -166,7 +185,8 @@ class GeometryDecoder {
 };
 
 size_t arraysOf(const GeometryHeader& header) {
-  return 3 + (header.raw & kRawShapes ? 12 : 6) + (header.raw & kRawWeights ? 2 : 1);
+  return 3 + (header.raw & kRawShapes ? 12 : 6) + (header.raw & kRawWeights ? 2 : 1) +
+         (header.raw & kHalfCells ? 4 : 0);
 }
 
 }  // namespace
@@ -176,6 +196,7 @@ void DecodedGeometry::resize(size_t count) {
   for (auto* arrays : {&axis, &shear})
     for (auto& array : *arrays) array.resize(count);
   weight.resize(count);
+  half_cell.resize(count);
 }
 
 void decodeGeometryStream(const Cell& cell, uint32_t count, std::span<const std::byte> bytes,
@@ -187,7 +208,7 @@ void decodeGeometryStream(const Cell& cell, uint32_t count, std::span<const std:
   if (header.position_bits < kLeastPositionBits ||
       header.position_bits > std::min(kMostPositionBits, lattice_bits))
     throw Error("it has {} bits a position", header.position_bits);
-  if (header.raw > (kRawShapes | kRawWeights) || header.runs_bytes > kMostRunBytes * count)
+  if (header.raw > (kRawShapes | kRawWeights | kHalfCells) || header.runs_bytes > kMostRunBytes * count)
     throw Error("its header is impossible");
   size_t unpacked = header.runs_bytes;
   for (size_t n = 0; n < arraysOf(header); ++n) {

@@ -5,6 +5,7 @@
 
 #include "stream/geometry_codec.h"
 #include "stream/geometry_steps.h"
+#include "stream/half_cell.h"
 #include "stream/planes.h"
 #include "stream/shape_extent.h"
 
@@ -48,6 +49,7 @@ class GeometryEncoder {
       encodeRawShapes();
     }
     encodeWeights();
+    encodeHalfCells();
     return planes_.compress(std::as_bytes(std::span(&header_, 1)));
   }
 
@@ -171,6 +173,19 @@ class GeometryEncoder {
     } else {
       header_.raw |= kRawWeights;
       addRaw(decoded_.weight, [](const Splat& s) { return s.weight; });
+    }
+  }
+
+  void encodeHalfCells() {
+    const auto& half_cells = brick_.half_cells;
+    std::fill(decoded_.half_cell.begin(), decoded_.half_cell.end(), kWholeCell);
+    if (std::all_of(half_cells.begin(), half_cells.end(), [](uint32_t half) { return half == kWholeCell; }))
+      return;
+    header_.raw |= kHalfCells;
+    decoded_.half_cell = half_cells;
+    for (int shift = 0; shift < 32; shift += 8) {
+      for (size_t n = 0; n < count_; ++n) codes_[n] = half_cells[n] >> shift & 0xff;
+      addPredicted(codes_);
     }
   }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "stream/half_cell.h"
+
 namespace curvisplat {
 namespace {
 
@@ -60,6 +62,13 @@ double smallestSingularValue(std::span<const Splat> splats) {
     largest.add(b0, -b1 * l10, b1, b2 * (l10 * l21 - l20), -b2 * l21, b2);
   }
   return unit / std::sqrt(largest.value());
+}
+
+double largestReach(std::span<const Splat> splats, std::span<const uint32_t> half_cells) {
+  constexpr double kKernelRadius = 1.556228;
+  const bool any_half = std::any_of(half_cells.begin(), half_cells.end(),
+                                    [](uint32_t half_cell) { return half_cell != kWholeCell; });
+  return (kKernelRadius + (any_half ? kBorderReach : 0.0)) * largestSingularValue(splats);
 }
 
 }  // namespace curvisplat

@@ -59,13 +59,17 @@ void printWarnings(const GridDescription& description, std::optional<uint32_t> t
     note(report.blanked.by_grid, "cells have a blanked corner or no value");
     note(report.blanked.by_value, "cells have the blank value");
     note(report.blanked.not_finite, "cells have an infinite value, and are blanked");
+    note(report.degenerate, "cells are degenerate: drawn with a thickness of their own");
+    note(report.inverted, "cells are inverted: of the other handedness than most of their block");
   } else {
     note(report.blanked.by_grid, "nodes are blanked by the grid");
     note(report.blanked.by_value, "nodes have the blank value");
     note(report.blanked.not_finite, "nodes are not finite numbers, and are blanked");
+    // Not the cells that `info` counts, which lie between nodes.
+    note(report.degenerate, "nodes have no volume around them: drawn with a thickness of their own");
+    note(report.inverted,
+         "nodes have inverted surroundings: of the other handedness than most of their block");
   }
-  note(report.degenerate, "cells are degenerate: drawn with a thickness of their own");
-  note(report.inverted, "cells are inverted: of the other handedness than most of their block");
   note(report.merged_nodes, "face nodes coincide with others, and were merged into them");
 }
 
@@ -133,7 +137,8 @@ void addConvert(CLI::App& app) {
   command->add_option("--blank", words->blank_value, "Nodes with this value are not there");
   command->add_option("--memory", words->memory,
                       "Cap on this process's memory, as 512M (default: 2G or a quarter of the machine's)");
-  command->add_option("--threads", words->threads, "Threads that work (default: all)");
+  command->add_option("--threads", words->threads, "Threads that work (default: all)")
+      ->check(CLI::Range(0u, kMostThreads));
   command->add_option("--tmp", words->temporary_folder, "Folder for temporary files (default: the output's)");
   command->add_flag("--resume", words->resume,
                     "Go on from an interrupted conversion, if there is one; keep what is done on errors");

@@ -17,15 +17,52 @@ std::string text(const glm::dvec3& point) {
   return fmt::format("({}, {}, {})", point.x, point.y, point.z);
 }
 
-/// The largest extinction over the scalar's values.
-double largestExtinction(const RenderedScene& scene) {
+/// The largest extinction that the function has from `low` to `high`.
+double largestExtinction(const TransferFunction& function, double low, double high) {
   double largest = 0;
-  for (int n = 0; n <= kSamples; ++n) {
-    const double scalar =
-        std::lerp(scene.variable.min, scene.variable.max, static_cast<double>(n) / kSamples);
-    largest = std::max(largest, scene.transfer_function.at(scalar).extinction);
-  }
+  for (int n = 0; n <= kSamples; ++n)
+    largest =
+        std::max(largest, function.at(std::lerp(low, high, static_cast<double>(n) / kSamples)).extinction);
   return largest;
+}
+
+/// Why none of the scalar's values is opaque, if none is: the function, or where its range lies.
+std::string whyTransparent(const RenderedScene& scene) {
+  const TransferFunction& function = scene.transfer_function;
+  const auto [low, high] = function.range();
+  if (largestExtinction(function, low, high) == 0)
+    return fmt::format("the transfer function '{}' is fully transparent; give another --tf", function.name());
+  return fmt::format(
+      "over the range {}..{}, the transfer function '{}' is fully transparent for {}, whose values are in "
+      "{}..{}; give another --range",
+      low, high, function.name(), scene.variable.name, scene.variable.min, scene.variable.max);
+}
+
+/// Why no splat is seen that could be: the reason found in what was drawn.
+std::string whyNothingIsThere(const RenderedScene& scene) {
+  const Manifest& manifest = scene.manifest;
+  const FrameStatistics& s = scene.statistics;
+  const char* const nodes = manifest.cells ? "cells" : "nodes";
+  if (manifest.volume == 0)
+    return fmt::format(
+        "the data has no volume: each of its {} splats stands for a cell without thickness, since its {} lie "
+        "in one plane or line, or their neighbours are blanked ({} of {} are)",
+        manifest.splats, nodes, manifest.blanked_nodes, manifest.nodes);
+  if (s.splats_transparent + s.bricks_transparent > 0 && s.splats_drawn == 0)
+    return fmt::format(
+        "what the camera sees has only values of {} for which the transfer function '{}' is transparent; "
+        "look "
+        "elsewhere, or give another --range or --tf",
+        scene.variable.name, scene.transfer_function.name());
+  if (manifest.blanked_nodes > 0 && s.splats_drawn == 0)
+    return fmt::format(
+        "what the camera sees of the data's box is blanked, as are {} of its {} {}; look elsewhere (--view "
+        "iso), or convert again without --blank or iblank",
+        manifest.blanked_nodes, manifest.nodes, nodes);
+  return fmt::format(
+      "of {} splats read, {} are outside of --clip-box, {} off the screen, {} transparent and {} drawn, none "
+      "of which reaches a pixel; try --view iso, another --range or another --clip-box",
+      s.splats_read, s.splats_clipped, s.splats_off_screen, s.splats_transparent, s.splats_drawn);
 }
 
 /// The part of the data that the clip box leaves, scaled; false if there is none.
@@ -75,14 +112,8 @@ bool isEmpty(const Image& image, const glm::vec4& background) {
 
 std::vector<std::string> whyEmpty(const RenderedScene& scene) {
   std::vector<std::string> reasons;
-  const auto [low, high] = scene.transfer_function.range();
-  const double largest = largestExtinction(scene);
-  if (largest == 0)
-    reasons.push_back(fmt::format(
-        "the transfer function '{}' over {}..{} is fully transparent for {} in {}..{}; give another "
-        "--tf or --range",
-        scene.transfer_function.name(), low, high, scene.variable.name, scene.variable.min,
-        scene.variable.max));
+  const double largest = largestExtinction(scene.transfer_function, scene.variable.min, scene.variable.max);
+  if (largest == 0) reasons.push_back(whyTransparent(scene));
 
   glm::dvec3 lower, upper;
   if (!visibleBox(scene, lower, upper)) {
@@ -94,19 +125,13 @@ std::vector<std::string> whyEmpty(const RenderedScene& scene) {
                                     text(scene.camera.position), text(scene.camera.focal_point), text(lower),
                                     text(upper)));
     const double thickest = largest * glm::length(upper - lower);
-    if (largest > 0 && thickest < 0.01)
+    if (thickest > 0 && thickest < 0.01)
       reasons.push_back(fmt::format(
           "the data is nearly transparent: its optical depth is at most {:.2g}; an --opacity-unit "
           "smaller than {} makes it more opaque",
           thickest, scene.transfer_function.opacityUnit()));
   }
-  const FrameStatistics& s = scene.statistics;
-  if (reasons.empty())
-    reasons.push_back(fmt::format(
-        "of {} splats read, {} are outside of --clip-box, {} off the screen, {} transparent and {} drawn, "
-        "none of "
-        "which reaches a pixel; try --view iso, another --range or another --clip-box",
-        s.splats_read, s.splats_clipped, s.splats_off_screen, s.splats_transparent, s.splats_drawn));
+  if (reasons.empty()) reasons.push_back(whyNothingIsThere(scene));
   return reasons;
 }
 

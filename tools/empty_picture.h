@@ -1,5 +1,5 @@
-// Why a picture has nothing on it, or less than the user may think: the transfer function, the clip box or
-// the camera. People otherwise see a white image and no reason.
+// Why a picture has nothing on it, or less than the user may think: the transfer function, its range,
+// blanking, the clip box or the camera. People otherwise see a white image and no reason.
 #pragma once
 
 #include <string>

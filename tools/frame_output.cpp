@@ -46,8 +46,8 @@ class Movie : public FrameOutput {
 
 }  // namespace
 
-FrameNames::FrameNames(const std::filesystem::path& path) {
-  const std::string pattern = path.string();
+FrameNames::FrameNames(const std::filesystem::path& path) : folder_(path.parent_path()) {
+  const std::string pattern = path.filename().string();
   int numbers = 0;
   for (size_t at = 0; at < pattern.size(); ++at) {
     std::string& part = numbers == 0 ? before_ : after_;
@@ -74,7 +74,7 @@ FrameNames::FrameNames(const std::filesystem::path& path) {
 std::filesystem::path FrameNames::of(uint64_t frame) const {
   const std::string number =
       zeros_ ? fmt::format("{:0{}}", frame, width_) : fmt::format("{:{}}", frame, width_);
-  return before_ + number + after_;
+  return folder_ / (before_ + number + after_);
 }
 
 bool isMovieName(const std::filesystem::path& path) {

@@ -13,13 +13,15 @@ namespace curvisplat {
 /// File names with the frame's number in them: "frame_%04d.png".
 class FrameNames {
  public:
-  /// Exactly one %d, which may have a width of at most two digits and a leading zero: %4d, %04d. A percent
-  /// sign of the name itself is written %%. Throws UsageError that says what is wrong.
+  /// Exactly one %d in the file's name (folders have the names they have), which may have a width of at most
+  /// two digits and a leading zero: %4d, %04d. A percent sign of the name itself is written %%. Throws
+  /// UsageError that says what is wrong.
   explicit FrameNames(const std::filesystem::path& pattern);
 
   std::filesystem::path of(uint64_t frame) const;
 
  private:
+  std::filesystem::path folder_;
   std::string before_, after_;
   int width_ = 0;
   bool zeros_ = false;

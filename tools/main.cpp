@@ -4,10 +4,26 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
+#include <string>
+#include <vector>
 
 #include "stream/error.h"
 #include "stream/progress.h"
 #include "tools/commands.h"
+
+namespace {
+
+/// "convert, info, render and view"
+std::string namesOf(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+  const std::string last = names.back();
+  names.pop_back();
+  return fmt::format("{} and {}", fmt::join(names, ", "), last);
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   using namespace curvisplat;
@@ -26,6 +42,10 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
     return 0;
   } catch (const CLI::ParseError& error) {
+    if (argc > 1 && argv[1][0] != '-' && app.get_subcommands().empty()) {
+      fmt::print(stderr, "curvisplat: there is no subcommand '{}'; there are {}\n", argv[1], namesOf(app));
+      return 2;
+    }
     const int status = app.exit(error);
     return status == 0 ? 0 : 2;
   } catch (const UsageError& error) {
@@ -36,6 +56,9 @@ int main(int argc, char** argv) {
     return 128 + interrupted.signal();  // as a shell says of a process that the signal has ended
   } catch (const std::bad_alloc&) {
     fmt::print(stderr, "curvisplat: out of memory; give the machine more, or ask for less with --memory\n");
+    return 1;
+  } catch (const std::filesystem::filesystem_error& error) {
+    fmt::print(stderr, "curvisplat: {}: {}\n", error.path1().string(), error.code().message());
     return 1;
   } catch (const std::exception& error) {
     fmt::print(stderr, "curvisplat: {}\n", error.what());

@@ -14,6 +14,8 @@
 
 namespace curvisplat {
 
+inline constexpr unsigned kMostThreads = 1024;  // of --threads
+
 /// One finite number.
 double parseNumber(std::string_view option, std::string_view text);
 /// One finite number above zero.

@@ -359,6 +359,7 @@ void addRender(CLI::App& app) {
       ->capture_default_str()
       ->group(how);
   command->add_option("--threads", words->threads, "Workers; 0: one a core")
+      ->check(CLI::Range(0u, kMostThreads))
       ->capture_default_str()
       ->group(how);
   command

@@ -3,6 +3,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -70,6 +72,9 @@ void checkOutputFolder(std::string_view option, const std::filesystem::path& pat
   std::error_code ignored;
   if (!std::filesystem::is_directory(folder, ignored))
     throw Error("{} {}: there is no folder {}; make it first", option, path.string(), folder.string());
+  if (::access(folder.c_str(), W_OK | X_OK) != 0)
+    throw Error("{} {}: the folder {} cannot be written to: {}; choose another", option, path.string(),
+                folder.string(), std::strerror(errno));
 }
 
 }  // namespace curvisplat

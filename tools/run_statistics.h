@@ -16,8 +16,8 @@ double secondsSinceStart();
 /// Writes one JSON object, whole or not at all. Throws Error.
 void writeStatistics(const std::filesystem::path& path, const nlohmann::json& statistics);
 
-/// Throws Error if the folder that `path`, the value of `option`, is to be written to does not exist: for
-/// use before long work.
+/// Throws Error if the folder that `path`, the value of `option`, is to be written to does not exist or
+/// cannot be written to: for use before long work.
 void checkOutputFolder(std::string_view option, const std::filesystem::path& path);
 
 }  // namespace curvisplat

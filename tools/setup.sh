@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs what building and testing curvisplat needs, by package name, on Debian 12 and its like. Does nothing
-# where everything is there already.
+# Installs what building and testing curvisplat needs, by package name, on Debian 12 and its like, and the packages
+# named. Does nothing where everything is there already.
 set -euo pipefail
 
 packages=(
@@ -25,9 +25,10 @@ packages=(
   # drawing on the processor, in whatever vectors it has
   libhwy-dev
   # tests and benchmarks
-  libgtest-dev libbenchmark-dev
+  libgtest-dev libbenchmark-dev python3
   # the window under test: a display without a screen, its input and its pictures
   xvfb xdotool x11-apps libgl1-mesa-dri
+  "$@"
 )
 
 if ! command -v dpkg-query >/dev/null; then

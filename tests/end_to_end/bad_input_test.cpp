@@ -212,6 +212,10 @@ TEST_F(BadInput, WrongUsage) {
   }
 }
 
+TEST_F(BadInput, MisspeltSubcommandIsToldWhichThereAre) {
+  expectOneLine(runProgram({"rendr", file("whole.splats")}), 2, {"rendr", "render", "convert", "info"});
+}
+
 TEST_F(BadInput, UnknownScene) {
   const ProgramResult result = runProgram({"generate", "pipe", "--size", "4x4x4", "-o", file("pipe")});
   expectOneLine(result, 2, {"pipe", "half-annulus", "wake"});

@@ -62,6 +62,12 @@ TEST_F(Corrections, HalfCells) {
   expectWorth("half cells", source_, field_, "smooth", halfAnnulusCamera(), 56, {}, without);
 }
 
+TEST_F(Corrections, PartsAtBorders) {
+  DirectOptions without;
+  without.border_parts = false;
+  expectWorth("parts at borders", source_, field_, "smooth", halfAnnulusCamera(), 62, {}, without);
+}
+
 TEST_F(Corrections, BendsOfTheScalar) {
   DirectOptions without;
   without.nodes.bends = false;
@@ -96,7 +102,7 @@ TEST_F(Corrections, Seams) {
   camera.focal_point = {-0.55, 0, 0.5};
   camera.parallel_scale = 0.2;  // no borders
   expectWorth("seams", RearrangedGridSource(SceneGridSource(constant, {64, 32, 32}, 4), how),
-              SceneField(*constant), "smooth", camera, 40, {}, without);
+              SceneField(*constant), "smooth", camera, 60, {}, without);
 }
 
 TEST_F(Corrections, SpreadOfMergedShapes) {

@@ -12,6 +12,7 @@
 #include <random>
 
 #include "stream/error.h"
+#include "stream/half_cell.h"
 #include "tests/stream/test_bricks.h"
 
 namespace curvisplat {
@@ -254,6 +255,31 @@ TEST(Codec, KeepsConstantValuesExactly) {
     ASSERT_EQ(value.mean, 0.7f);
     ASSERT_EQ(value.slope, glm::dvec3(0.0));
   }
+}
+
+TEST(Codec, KeepsHalfCells) {
+  const RootCube root{};
+  BrickSplats brick = randomBrick({}, Cell{}, 6);
+  const size_t without = encodeBrick(root, brick).geometry.size();
+  brick.half_cells.assign(brick.size(), kWholeCell);
+  EXPECT_EQ(encodeBrick(root, brick).geometry.size(), without);
+
+  const glm::dvec3 inward[] = {{0, 0.6, 0.8}, {1, 0, 0}};
+  for (size_t n = 0; n < brick.size(); n += 3) brick.half_cells[n] = packHalfCell({inward, 1 + n % 2});
+  const EncodedBrick encoded = encodeBrick(root, brick);
+  EXPECT_EQ(
+      decodeForMerging(root, encoded.brick, encoded.geometry, encoded.variables, encoded.values).half_cells,
+      brick.half_cells);
+  SplatGeometry floats;
+  decodeGeometry(root, encoded.brick, encoded.geometry, floats);
+  EXPECT_EQ(floats.half_cell, brick.half_cells);
+  // Scratch of the brick before is not taken for this one's.
+  brick.half_cells.clear();
+  const EncodedBrick whole = encodeBrick(root, brick);
+  decodeGeometry(root, whole.brick, whole.geometry, floats);
+  EXPECT_EQ(floats.half_cell, std::vector<uint32_t>(brick.size(), kWholeCell));
+  EXPECT_NEAR(encoded.brick.largest_radius / whole.brick.largest_radius, 1 + kBorderReach / kKernelRadius,
+              1e-6);
 }
 
 TEST(Codec, KeepsAllWeightsZero) {

@@ -23,12 +23,13 @@ namespace {
 struct DirectSplat {
   Splat splat;
   SplatScalar value;
+  uint32_t half_cell = kWholeCell;
 };
 
 std::vector<DirectSplat> splatsOf(const GridSource& source, uint32_t scalar, const DirectOptions& options) {
   std::vector<DirectSplat> out;
   const auto take = [&](const NodeSplat& node, std::span<const SplatScalar> values) {
-    out.push_back({node.splat, values[0]});
+    out.push_back({node.splat, values[0], options.border_parts ? node.half_cell : kWholeCell});
   };
   SeamMerger seams(1, uint64_t{64} << 20, std::filesystem::temp_directory_path());
   uint64_t first_node = 0;
@@ -77,7 +78,8 @@ void toArrays(const std::vector<DirectSplat>& splats, const glm::dvec3& origin, 
   geometry.resize(splats.size());
   variable.resize(splats.size());
   for (size_t n = 0; n < splats.size(); ++n)
-    setSplat(geometry, variable, n, splats[n].splat.position - origin, splats[n].splat, splats[n].value);
+    setSplat(geometry, variable, n, splats[n].splat.position - origin, splats[n].splat, splats[n].value,
+             splats[n].half_cell);
 }
 
 }  // namespace
@@ -88,7 +90,7 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
   if (options.voxel > 0) splats = mergedIntoVoxels(splats, options);
   glm::dvec3 origin = splats.front().splat.position;
   double low = splats.front().value.mean, high = low;
-  for (const auto& [splat, value] : splats) {
+  for (const auto& [splat, value, half_cell] : splats) {
     origin = glm::min(origin, splat.position);
     low = std::min(low, value.mean);
     high = std::max(high, value.mean);

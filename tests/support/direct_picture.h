@@ -15,10 +15,11 @@ namespace curvisplat {
 
 struct DirectOptions {
   NodeSplatCorrections nodes;
-  bool merge_seams = true;  // else coincident nodes of block faces stay apart
-  double voxel = 0;         // world units: splats are merged into voxels of this size; 0: they are not
-  double spread = 12;       // as VoxelMerger
-  bool variance = true;     // else merged splats forget the variance that their slope does not explain
+  bool merge_seams = true;   // else coincident nodes of block faces stay apart
+  bool border_parts = true;  // else half cells are drawn as one splat
+  double voxel = 0;          // world units: splats are merged into voxels of this size; 0: they are not
+  double spread = 12;        // as VoxelMerger
+  bool variance = true;      // else merged splats forget the variance that their slope does not explain
 
   bool per_pixel = true;
   bool hidden_slope = true;  // else classification forgets how the scalar changes along the ray

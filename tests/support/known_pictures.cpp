@@ -60,9 +60,9 @@ FrameOptions knownFrame(ImageSize size) {
 }
 
 Image drawCache(const std::filesystem::path& cache, const TransferFunction& function, const Camera& camera,
-                const FrameOptions& options, uint64_t* splats) {
+                const FrameOptions& options, uint64_t* splats, Backend backend) {
   const CacheReader reader(cache);
-  FrameRenderer renderer(reader, 0, function, Backend::cpu);
+  FrameRenderer renderer(reader, 0, function, backend);
   FrameStatistics statistics;
   Image image = renderer.render(camera, options, statistics);
   if (splats) *splats = statistics.splats_drawn;

@@ -176,6 +176,7 @@ class Viewer {
     try {
       frame = frames_.take();
     } catch (const UsageError& error) {
+      if (said_ != error.what()) fmt::print(stderr, "curvisplat: warning: {}\n", error.what());
       said_ = error.what();
       return true;
     }

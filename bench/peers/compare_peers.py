@@ -1,0 +1,309 @@
+#!/usr/bin/env python3
+"""The same grid, camera and transfer function drawn by curvisplat and by VTK, side by side in one run.
+
+    bench/peers/compare_peers.py FOLDER [--sizes 40x32x32,100x100x100] [--fin GRID SOLUTION] [--functions smooth]
+                                 [--json OUT.json] [--plot OUT.svg] [--table OUT.md]
+
+Grids of the half-annulus scene are generated in FOLDER, of each of --sizes; --fin takes a PLOT3D grid with a Q file (the
+blunt fin, 40x32x32, say) for its density. Every picture is held against the reference march of curvisplat_reference: of the
+analytic field for the scene, of the trilinear field in the grid's own cells for --fin. All programs get the extinctions and
+colours of tests/data/half_annulus_*.json over white, an orthographic camera, one pixel a sample, and write PNG.
+
+"build" is what goes before the first picture and is kept: reading and cutting into tetrahedra, or resampling; of curvisplat
+the conversion (which is done once, to a file). "frame" is the median of further frames, the camera moving a little. "peak" is
+the largest memory of the process; of curvisplat that of its picture, the conversion's stands beside it in the JSON.
+"""
+import argparse
+import contextlib
+import json
+import math
+import os
+import pathlib
+import re
+import shutil
+import signal
+import statistics
+import subprocess
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+sys.path.insert(0, str(HERE.parent))
+import results
+from line_plot import write_line_plots
+
+VTK_TECHNIQUES = ["projected-tetrahedra", "ray-cast", "zsweep", "resampled"]
+OWN_TECHNIQUES = {"curvisplat": "0", "curvisplat-1px": "1"}  # and their --lod-pixels
+NAMES = {"projected-tetrahedra": "VTK, projected tetrahedra", "ray-cast": "VTK, ray cast of tetrahedra",
+         "zsweep": "VTK, ZSweep", "resampled": "VTK, resampled and ray cast",
+         "curvisplat": "curvisplat, finest level", "curvisplat-1px": "curvisplat, 1 pixel of error"}
+CLUSTERING = 2.5
+MIB = 2**20
+
+
+def normalized(vector):
+    length = math.sqrt(sum(x * x for x in vector))
+    return [x / length for x in vector]
+
+
+def camera_along(direction, focal_point, distance, parallel_scale):
+    along = normalized(direction)
+    return {"position": [f - distance * d for f, d in zip(focal_point, along)], "focal_point": focal_point,
+            "view_up": [0, 0, 1], "parallel_scale": parallel_scale}
+
+
+class Case:
+    """A grid, and how it is looked at."""
+
+    def __init__(self, name, grid, solution, scalar, kind, array, camera, value_range, length, truth):
+        self.name, self.grid, self.solution, self.scalar = name, grid, solution, scalar
+        self.kind, self.array = kind, array  # VTK's words
+        self.camera, self.range, self.length = camera, value_range, length
+        self.truth = truth  # words for curvisplat_reference
+        self.nodes = 0
+
+    def camera_words(self):
+        def words(vector):
+            return ",".join(f"{x:.17g}" for x in vector)
+        return [f"--position={words(self.camera['position'])}", f"--focal-point={words(self.camera['focal_point'])}",
+                f"--view-up={words(self.camera['view_up'])}", f"--parallel-scale={self.camera['parallel_scale']:.17g}"]
+
+
+def scene_case(arguments, size):
+    prefix = arguments.folder / f"half_annulus_{size}"
+    results.run([arguments.program, "generate", "half-annulus", "--size", size, "--clustering", CLUSTERING, "-o", prefix])
+    camera = camera_along([0.8, 0.35, -0.45], [-0.4, 0, 0.5], 4, 1.25)
+    return Case(f"half-annulus-{size}", prefix.with_suffix(".xyz"), prefix.with_suffix(".fun"), "1", "function",
+                "Function0", camera, (0, 1), 1, ["--scene", "half-annulus", "--clustering", CLUSTERING])
+
+
+def fin_case(arguments, grid, solution):
+    told = json.loads(results.run([arguments.program, "info", grid, solution, "--json"]))
+    lower, upper = told["bounds"]["lower"], told["bounds"]["upper"]
+    density = next(scalar for scalar in told["scalars"] if scalar["name"] == "density")
+    centre = [0.5 * (a + b) for a, b in zip(lower, upper)]
+    diagonal = math.dist(lower, upper)
+    camera = camera_along([-1, -1, -1], centre, diagonal, 0.4 * diagonal)
+    return Case("fin", grid, solution, "density", "q", "Density", camera, (density["min"], density["max"]), diagonal / 3,
+                ["--grid", grid, "--solution", solution, "--scalar", "density"])
+
+
+def function_file(function):
+    return ROOT / f"tests/data/half_annulus_{function}.json"
+
+
+def stretched(points, width, value_range):
+    low, high = value_range
+    return [[low + points[at] * (high - low), *points[at + 1:at + width]] for at in range(0, len(points), 4)]
+
+
+def vtk_job(arguments, case, function, technique, picture):
+    preset = json.loads(function_file(function).read_text())[0]
+    return {"grid": str(case.grid), "solution": str(case.solution), "solution_kind": case.kind, "array": case.array,
+            "technique": technique, "camera": case.camera, "size": [int(n) for n in arguments.picture.split("x")],
+            "colours": stretched(preset["RGBPoints"], 4, case.range),
+            "opacities": stretched(preset["Points"], 2, case.range),
+            "opacity_unit": preset["ScalarOpacityUnitDistance"] * case.length, "frames": arguments.frames,
+            "seconds": arguments.seconds, "resample": arguments.resample, "picture": str(picture)}
+
+
+def drawn_by_vtk(arguments, case, function, technique, picture):
+    job = picture.with_suffix(".job.json")
+    job.write_text(json.dumps(vtk_job(arguments, case, function, technique, picture)))
+    answer = json.loads(results.run([arguments.vtk_python, HERE / "vtk_render.py", job]))
+    job.unlink()
+    return {"build_s": answer["load_s"] + answer["build_s"], **answer}
+
+
+def own_words(arguments, case, function, lod_pixels):
+    preset = json.loads(function_file(function).read_text())[0]
+    return ["--size", arguments.picture, "--tf", function_file(function),
+            f"--range={case.range[0]:.17g},{case.range[1]:.17g}", "--opacity-unit",
+            preset["ScalarOpacityUnitDistance"] * case.length, "--background", "white", "--lod-pixels", lod_pixels,
+            "--classify", "pixel", *case.camera_words()]
+
+
+def converted(arguments, case):
+    cache, told = arguments.folder / f"{case.name}.splats", arguments.folder / "convert.json"
+    results.run([arguments.program, "convert", case.grid, case.solution, "-o", cache, "--scalar", case.scalar,
+                 "--overwrite", "--stats", told])
+    return cache, json.loads(told.read_text())
+
+
+def drawn_by_us(arguments, case, cache, conversion, function, technique, picture):
+    told = arguments.folder / "render.json"
+    words = own_words(arguments, case, function, OWN_TECHNIQUES[technique])
+    results.run([arguments.program, "render", cache, "-o", picture, *words])
+    frames = arguments.folder / "frame_%02d.png"
+    results.run([arguments.program, "render", cache, "-o", frames, "--stats", told, *words,
+                 "--orbit", 0.01 * (arguments.frames + 1), "--frames", arguments.frames + 1])
+    for file in arguments.folder.glob("frame_*.png"):
+        file.unlink()
+    answer = json.loads(told.read_text())
+    seconds = [frame["seconds"]["total"] for frame in answer["frames"]]
+    return {"build_s": conversion["seconds"], "first_frame_s": seconds[0], "frames_s": seconds[1:],
+            "peak_memory_bytes": answer["peak_memory_bytes"], "drawn_by": answer["backend"],
+            "conversion_peak_memory_bytes": conversion["peak_memory_bytes"], "cache_bytes": conversion["cache_bytes"]}
+
+
+def truth_of(arguments, case, function):
+    """The reference's picture; made once."""
+    path = arguments.folder / f"truth_{re.sub('-[0-9x]+$', '', case.name)}_{function}_{arguments.picture}.pfm"
+    if not path.exists():
+        print(f"marching {path}", flush=True)
+        results.run([arguments.reference, *case.truth, "--function", function, f"--range={case.range[0]:.17g},"
+                     f"{case.range[1]:.17g}", "--length", case.length, "--size", arguments.picture,
+                     *case.camera_words(), "-o", path])
+    return path
+
+
+def psnr_of(arguments, picture, truth):
+    said = results.run([arguments.program, "compare", picture, truth])
+    found = re.match(r"PSNR ([0-9.]+) dB", said)
+    if not found:
+        sys.exit(f"{picture}: expected a PSNR against {truth}, found: {said}")
+    return float(found[1])
+
+
+def measure(arguments, case, out):
+    """-> a row for every technique and function."""
+    told = json.loads(results.run([arguments.program, "info", case.grid, case.solution, "--json"]))
+    case.nodes = told["nodes"]
+    cache, conversion = converted(arguments, case)
+    rows = []
+    for function in arguments.functions:
+        truth = truth_of(arguments, case, function)
+        for technique in arguments.techniques:
+            picture = arguments.folder / f"{case.name}_{function}_{technique}.png"
+            if technique in OWN_TECHNIQUES:
+                row = drawn_by_us(arguments, case, cache, conversion, function, technique, picture)
+            else:
+                row = drawn_by_vtk(arguments, case, function, technique, picture)
+            row |= {"case": case.name, "nodes": case.nodes, "function": function, "technique": technique,
+                    "frame_s": statistics.median(row["frames_s"] or [row["first_frame_s"]]),
+                    "psnr_db": psnr_of(arguments, picture, truth)}
+            rows.append(row)
+            print(line_of(row), flush=True)
+            name = f"peers/{technique}/{case.name}/{function}"
+            out.add(f"{name}/build", "s", [row["build_s"]])
+            out.add(f"{name}/first_frame", "s", [row["first_frame_s"]])
+            out.add(f"{name}/frame", "s", row["frames_s"] or [row["first_frame_s"]])
+            out.add(f"{name}/peak_memory", "B", [row["peak_memory_bytes"]])
+            out.add(f"{name}/psnr", "dB", [row["psnr_db"]])
+    return rows
+
+
+HEADING = ("| grid | function | drawn by | build | first frame | frame | peak | PSNR |\n"
+           "|---|---|---|---|---|---|---|---|")
+
+
+def line_of(row):
+    return (f"| {row['case']} | {row['function']} | {NAMES[row['technique']]} | {row['build_s']:.2f} s "
+            f"| {row['first_frame_s']:.3f} s | {row['frame_s']:.3f} s | {row['peak_memory_bytes'] / MIB:.0f} MiB "
+            f"| {row['psnr_db']:.1f} dB |")
+
+
+def plots_of(rows, function):
+    """Over the nodes of the half-annulus: seconds, memory, fidelity."""
+    def lines(value):
+        of = {}
+        for row in rows:
+            if row["function"] == function and row["case"] != "fin" and row["technique"] != "curvisplat-1px":
+                of.setdefault(NAMES[row["technique"]], []).append((row["nodes"], row[value]))
+        return {name: sorted(line) for name, line in of.items()}
+
+    def plot(title, y_name, value, **more):
+        return {"title": f"{title} ({function})", "x_name": "nodes", "y_name": y_name, "lines": lines(value), **more}
+    return [plot("Build, once", "seconds", "build_s"), plot("A frame", "seconds", "frame_s"),
+            plot("Peak memory", "bytes", "peak_memory_bytes"), plot("Against the reference", "dB", "psnr_db", linear_y=True)]
+
+
+@contextlib.contextmanager
+def display(named):
+    """A display without a screen, for VTK; or the one that is named."""
+    if named:
+        os.environ["DISPLAY"] = named
+        yield
+        return
+    if not shutil.which("Xvfb"):
+        sys.exit("Xvfb: is not installed, and VTK draws on a display; apt-get install xvfb, or give --display")
+    read, write = os.pipe()
+    server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", "1280x1280x24", "-nolisten", "tcp"],
+                              pass_fds=[write], stderr=subprocess.DEVNULL)
+    os.close(write)
+    try:
+        with os.fdopen(read) as number:
+            answer = number.readline().strip()
+        if not answer:
+            sys.exit("Xvfb: ended without opening a display")
+        os.environ["DISPLAY"] = f":{answer}"
+        yield
+    finally:
+        server.terminate()
+        server.wait()
+
+
+def python_with_vtk(named):
+    tried = [named] if named else [sys.executable, "/usr/bin/python3", "pvpython"]
+    for python in tried:
+        if shutil.which(python) and subprocess.run([python, "-c", "import vtk"], capture_output=True).returncode == 0:
+            return python
+    sys.exit(f"{', '.join(tried)}: no Python here that has VTK; apt-get install --no-install-recommends python3-vtk9, "
+             "or give --vtk-python")
+
+
+def one_of(choices):
+    def parse(text):
+        chosen = text.split(",")
+        if not set(chosen) <= set(choices):
+            raise argparse.ArgumentTypeError(f"'{text}': there are {', '.join(choices)}")
+        return chosen
+    return parse
+
+
+def parsed():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    every = [*VTK_TECHNIQUES, *OWN_TECHNIQUES]
+    parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("--sizes", default="40x32x32,100x100x100", help="nodes of the half-annulus; '' for none")
+    parser.add_argument("--fin", nargs=2, metavar=("GRID", "SOLUTION"), help="a PLOT3D grid and Q file")
+    parser.add_argument("--functions", default=["smooth"], type=one_of(["smooth", "band", "step"]))
+    parser.add_argument("--techniques", default=[one for one in every if one != "zsweep"], type=one_of(every))
+    parser.add_argument("--picture", default="256x256")
+    parser.add_argument("--frames", type=int, default=5, help="after the first")
+    parser.add_argument("--seconds", type=float, default=30, help="no further frame of VTK after so many")
+    parser.add_argument("--resample", type=int, default=128, help="samples along each axis")
+    parser.add_argument("--program", default=ROOT / "build/release/tools/curvisplat", type=pathlib.Path)
+    parser.add_argument("--reference", default=ROOT / "build/release/bench/curvisplat_reference", type=pathlib.Path)
+    parser.add_argument("--vtk-python", help="a Python that has VTK 9")
+    parser.add_argument("--display", help="draw on this one, with a graphics card say; a virtual one otherwise")
+    parser.add_argument("--json")
+    parser.add_argument("--plot")
+    parser.add_argument("--table")
+    return parser.parse_args()
+
+
+def main():
+    arguments = parsed()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that the display is ended as well
+    arguments.folder.mkdir(parents=True, exist_ok=True)
+    version = results.version_of(arguments.program)
+    if set(arguments.techniques) & set(VTK_TECHNIQUES):
+        arguments.vtk_python = python_with_vtk(arguments.vtk_python)
+    cases = [fin_case(arguments, *map(pathlib.Path, arguments.fin))] if arguments.fin else []
+    cases += [scene_case(arguments, size) for size in arguments.sizes.split(",") if size]
+    out, rows = results.Results(), []
+    print(HEADING)
+    with display(arguments.display):
+        for case in cases:
+            rows += measure(arguments, case, out)
+    if arguments.table:
+        pathlib.Path(arguments.table).write_text("\n".join([HEADING, *map(line_of, rows), ""]))
+    if arguments.json:
+        out.write(arguments.json, "peers", version, picture=arguments.picture, rows=rows)
+    if arguments.plot and any(row["case"] != "fin" for row in rows):
+        write_line_plots(arguments.plot, plots_of(rows, arguments.functions[0]))
+
+
+if __name__ == "__main__":
+    main()

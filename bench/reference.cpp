@@ -1,0 +1,113 @@
+// The true picture of a grid's scalar, or of an analytic scene, as the reference march draws it: what the
+// pictures of any program are held against. Camera and function are given in words, as to `curvisplat
+// render`.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
+
+#include "preprocess/open_grid.h"
+#include "preprocess/scenes.h"
+#include "render/image.h"
+#include "stream/error.h"
+#include "tests/support/grid_field.h"
+#include "tests/support/known_pictures.h"
+
+namespace curvisplat {
+namespace {
+
+struct Words {
+  std::string scene, grid, solution, scalar, function, output;
+  std::optional<double> clustering;
+  std::vector<int> size{256, 256};
+  std::vector<double> range{0, 1};
+  double length = 1;  // of world units, that counts as one for the extinction
+  double agreement_db = 75;
+  std::vector<double> position, focal_point, view_up{0, 0, 1};
+  double parallel_scale = 1;
+};
+
+void addOptions(CLI::App& app, Words& words) {
+  const auto numbers = [&](const std::string& name, std::vector<double>& to, int count, const char* help) {
+    return app.add_option(name, to, help)->delimiter(',')->expected(count);
+  };
+  auto* scene = app.add_option("--scene", words.scene, "an analytic scene, as for `curvisplat generate`");
+  app.add_option("--clustering", words.clustering, "the scene's")->needs(scene);
+  auto* grid = app.add_option("--grid", words.grid, "a grid file, in place of a scene")->excludes(scene);
+  app.add_option("--solution", words.solution, "its solution or function file")->needs(grid);
+  app.add_option("--scalar", words.scalar, "its scalar")->needs(grid);
+  app.add_option("--function", words.function, "smooth, band or step")
+      ->required()
+      ->check(CLI::IsMember({"smooth", "band", "step"}));
+  numbers("--range", words.range, 2, "LO,HI: the function is stretched over these scalars");
+  app.add_option("--length", words.length, "the extinctions are per so many world units")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--size", words.size, "WIDTHxHEIGHT in pixels")->delimiter('x')->expected(2);
+  numbers("--position", words.position, 3, "x,y,z of the camera")->required();
+  numbers("--focal-point", words.focal_point, 3, "x,y,z it looks at")->required();
+  numbers("--view-up", words.view_up, 3, "x,y,z that points up");
+  app.add_option("--parallel-scale", words.parallel_scale, "half the picture's height in world units")
+      ->required();
+  app.add_option("--agreement", words.agreement_db,
+                 "dB between two marches at which the steps are short enough");
+  app.add_option("-o,--output", words.output, "the picture: PFM, EXR or PNG")->required();
+}
+
+Camera cameraOf(const Words& words) {
+  const auto vector = [](const std::vector<double>& v) { return glm::dvec3(v[0], v[1], v[2]); };
+  Camera camera;
+  camera.position = vector(words.position);
+  camera.focal_point = vector(words.focal_point);
+  camera.view_up = vector(words.view_up);
+  camera.parallel_scale = words.parallel_scale;
+  return camera;
+}
+
+void march(const ReferenceField& field, const Words& words) {
+  const KnownFunction function =
+      KnownFunction::of(words.function, words.range[0], words.range[1], words.length);
+  const ImageSize size{words.size[0], words.size[1]};
+  if (size.width < 1 || size.height < 1) throw UsageError("--size: a picture has at least one pixel");
+  MarchSteps steps;
+  steps.step = 0.016 * words.length;
+  steps.cells = 2;
+  double reached = 0;
+  writeImage(toImage(convergedMarch(field, function.exact, cameraOf(words), size, steps, words.agreement_db,
+                                    &reached)),
+             words.output);
+  fmt::print("{{\"agreement_db\": {:.2f}}}\n", reached);
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("The true picture of a grid or a scene, marched along the rays through the pixels' centres.");
+  Words words;
+  addOptions(app, words);
+  CLI11_PARSE(app, argc, argv);
+  if (!words.scene.empty()) {
+    const std::shared_ptr<const Scene> scene = makeScene(words.scene, words.clustering);
+    march(SceneField(*scene), words);
+    return 0;
+  }
+  if (words.grid.empty()) throw UsageError("give --scene, or --grid");
+  OpenGridOptions options;
+  options.grid = words.grid;
+  if (!words.solution.empty()) options.solutions = {words.solution};
+  const std::unique_ptr<GridSource> source = openGrid(options);
+  const uint32_t scalar =
+      words.scalar.empty() ? 0 : scalarsNamed(source->description(), {words.scalar}).front();
+  march(GridField(*source, scalar), words);
+  return 0;
+}
+
+}  // namespace
+}  // namespace curvisplat
+
+int main(int argc, char** argv) {
+  try {
+    return curvisplat::run(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "curvisplat_reference: {}\n", error.what());
+    return 1;
+  }
+}

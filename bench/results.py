@@ -1,0 +1,122 @@
+"""Measurements in the form that all of bench/ and `curvisplat bench` write, and their statistics.
+
+    {"schema": ..., "program": ..., "version": ..., "machine": {...},
+     "measurements": [{"name", "unit", "better": "more" or "less", "median", "samples": [...]}],
+     "left_out": [{"name", "reason"}]}
+
+A name is a path that stays the same from version to version, parameters last: "frames/wake/backend:cpu". Units are
+without prefix: s, B, B/s, nodes/s, dB, 1 (a count).
+"""
+import json
+import os
+import platform
+import statistics
+import subprocess
+import sys
+
+SCHEMA = 1
+SECONDS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0}  # Google Benchmark's units
+
+
+def more_is_better(unit):
+    return unit == "dB" or unit.endswith("/s")
+
+
+def spread(samples):
+    """How far samples lie from their median: the median of the distances, scaled to a normal distribution's standard
+    deviation. Of fewer than five half the range, since of three the two nearest may lie together by chance. None of one."""
+    if len(samples) < 2:
+        return None
+    if len(samples) < 5:
+        return 0.5 * (max(samples) - min(samples))
+    middle = statistics.median(samples)
+    return 1.4826 * statistics.median(abs(sample - middle) for sample in samples)
+
+
+def machine():
+    processor = "unknown"
+    with open("/proc/cpuinfo") as file:
+        for line in file:
+            if line.startswith("model name"):
+                processor = line.split(":", 1)[1].strip()
+                break
+    with open("/proc/meminfo") as file:
+        memory = next(int(line.split()[1]) * 1024 for line in file if line.startswith("MemTotal"))
+    return {"processor": processor, "cores": os.cpu_count(), "memory_bytes": memory,
+            "system": f"{platform.system()} {platform.release()}"}
+
+
+class Results:
+    def __init__(self):
+        self.measurements = []
+        self.left_out = []
+
+    def add(self, name, unit, samples):
+        samples = [float(sample) for sample in samples]
+        if not samples or any(one["name"] == name for one in self.measurements):
+            raise ValueError(f"{name}: measured twice, or without samples")
+        self.measurements.append({"name": name, "unit": unit, "better": "more" if more_is_better(unit) else "less",
+                                  "median": statistics.median(samples), "samples": samples})
+
+    def leave_out(self, name, reason):
+        self.left_out.append({"name": name, "reason": reason})
+
+    def take(self, other, prefix=""):
+        """All of another file's, as read() returns it."""
+        for one in other["measurements"]:
+            self.measurements.append({**one, "name": prefix + one["name"]})
+        for one in other.get("left_out", []):
+            self.left_out.append({**one, "name": prefix + one["name"]})
+
+    def write(self, path, program, version, **more):
+        with open(path, "w") as file:
+            json.dump({"schema": SCHEMA, "program": program, "version": version, "machine": machine(), **more,
+                       "measurements": self.measurements, "left_out": self.left_out}, file, indent=1)
+            file.write("\n")
+
+
+def from_google_benchmark(content):
+    """What --benchmark_format=json gives: seconds of real time, a sample a repetition."""
+    results, samples = Results(), {}
+    for run in content["benchmarks"]:
+        name = run.get("run_name", run["name"])
+        if run.get("error_occurred"):
+            results.leave_out(name, run.get("error_message", "failed"))
+        elif run.get("run_type", "iteration") == "iteration":
+            samples.setdefault(name, []).append(run["real_time"] * SECONDS[run["time_unit"]])
+    for name, values in samples.items():
+        results.add(name, "s", values)
+    context = content.get("context", {})
+    return {"program": "curvisplat_bench", "version": "",
+            "machine": {"processor": "", "cores": context.get("num_cpus")},
+            "measurements": results.measurements, "left_out": results.left_out}
+
+
+def read(path):
+    """A file of this form, or one of Google Benchmark's."""
+    with open(path) as file:
+        content = json.load(file)
+    if isinstance(content, dict) and "benchmarks" in content:
+        return from_google_benchmark(content)
+    if not isinstance(content, dict) or not isinstance(content.get("measurements"), list):
+        raise ValueError(f"{path}: has no \"measurements\"; expected what bench/ or `curvisplat bench` writes")
+    for one in content["measurements"]:
+        if not {"name", "unit", "samples"} <= set(one) or not one["samples"]:
+            raise ValueError(f"{path}: a measurement without name, unit or samples: {one}")
+    return content
+
+
+def run(command, **how):
+    """Runs a program; ends this one with its words if it fails."""
+    command = [str(word) for word in command]
+    try:
+        result = subprocess.run(command, capture_output=True, text=True, **how)
+    except FileNotFoundError:
+        sys.exit(f"{command[0]}: is no program; build it (bench/README.md says how), or name another one")
+    if result.returncode != 0:
+        sys.exit(f"{' '.join(command)}\n{result.stdout}{result.stderr}")
+    return result.stdout
+
+
+def version_of(program):
+    return run([program, "--version"]).split()[-1]

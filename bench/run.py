@@ -1,0 +1,193 @@
+#!/usr/bin/env python3
+"""All of bench/ with one command: a short form (ten minutes on two cores) or a smoke form (does each still work?).
+
+    bench/run.py FOLDER [--smoke] [--only STEP,...] [--without STEP,...] [--fin GRID SOLUTION]
+
+Each step leaves FOLDER/STEP.json, its words in FOLDER/STEP.log, and plots; FOLDER/all.json has every measurement, for
+bench/compare.py. Caches, grids and reference pictures stay in FOLDER and are used again. What a step leaves out is in its
+JSON, with the reason. The smoke form takes tiny sizes: its figures mean nothing, only that they are there.
+
+Exit status 1 if a step failed or left a JSON that is none; the others are run all the same.
+"""
+import argparse
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import time
+
+import results
+
+HERE = pathlib.Path(__file__).resolve().parent
+
+
+class Form:
+    """What the short form measures."""
+    micro = ["--benchmark_min_time=0.05", "--benchmark_repetitions=3"]
+    micro_cache = False  # verify, decode and project take a half annulus of 2 M nodes
+    cache = "200x200x200"
+    convert_nodes = "8M"
+    scaling = ["--nodes", "1M,8M", "--repeats", "3"]
+    peers = ["--sizes", "40x32x32,100x100x100", "--frames", "3", "--seconds", "15"]
+    fidelity = ["--only", "^(half-annulus 2.5|o-grid|shell)$", "--quick"]
+    frames = ["--repeats", "5"]
+
+
+class SmokeForm(Form):
+    micro = ["--benchmark_min_time=0.000001", 
+             "--benchmark_filter=-plainReader|pager|osmesa/radius:[248]/|cpu/radius:[24]/"]
+    micro_cache = True  # they take that of the step "bench"
+    cache = "32x32x32"
+    convert_nodes = "30K"
+    scaling = ["--nodes", "4K,30K", "--repeats", "1", "--lod-pixels", "2", "--size", "64x64"]
+    peers = ["--sizes", "12x10x8", "--frames", "1", "--picture", "32x32", "--resample", "16"]
+    fidelity = None  # its reference takes as long at any size; peers has one of 32x32 pixels
+    frames = ["--repeats", "1", "--nodes", "16x16x16"]
+
+
+def cache_commands(paths, form):
+    """Make the cache of the wake, if it is not there."""
+    if (paths.cache / "manifest.json").exists():
+        return []
+    grid = paths.cache.with_suffix("")
+    return [[paths.program, "generate", "wake", "--size", form.cache, "-o", grid],
+            [paths.program, "convert", f"{grid}.xyz", f"{grid}.fun", "-o", paths.cache],
+            ["rm", f"{grid}.xyz", f"{grid}.fun"]]
+
+
+def step_micro(paths, form):
+    words = [f"CURVISPLAT_BENCH_FOLDER={paths.folder}"]
+    if form.micro_cache:
+        words.append(f"CURVISPLAT_BENCH_CACHE={paths.cache}")
+    return [*(cache_commands(paths, form) if form.micro_cache else []),
+            ["env", *words, paths.bench / "curvisplat_bench", *form.micro, f"--benchmark_out={paths.json('micro')}",
+             "--benchmark_out_format=json"]]
+
+
+def step_bench(paths, form):
+    return [*cache_commands(paths, form), [paths.program, "bench", paths.cache, "--quick", "--json", paths.json("bench"),
+                                           "--plot", paths.folder / "bench_plots"]]
+
+
+def step_convert(paths, form):
+    return [[paths.program, "bench", "--convert", "--nodes", form.convert_nodes, "--tmp", paths.folder,
+             "--json", paths.json("convert")]]
+
+
+def step_scaling(paths, form):
+    return [[sys.executable, HERE / "scaling.py", paths.folder / "scaling", "--program", paths.program, *form.scaling,
+             "--json", paths.json("scaling"), "--plot", paths.folder / "scaling.svg"]]
+
+
+def step_peers(paths, form):
+    fin = ["--fin", *paths.fin] if paths.fin else []
+    return [[sys.executable, HERE / "peers/compare_peers.py", paths.folder / "peers", "--program", paths.program,
+             "--reference", paths.bench / "curvisplat_reference", *form.peers, *fin, "--json", paths.json("peers"),
+             "--plot", paths.folder / "peers.svg", "--table", paths.folder / "peers.md"]]
+
+
+def step_fidelity(paths, form):
+    return form.fidelity and [[paths.bench / "curvisplat_fidelity", paths.folder / "fidelity", *form.fidelity, "--json",
+                               paths.json("fidelity")]]
+
+
+def step_frames(paths, form):
+    return [[sys.executable, HERE / "frame_times.py", paths.folder / "frames", "--program", paths.program, *form.frames,
+             "--json", paths.json("frames")]]
+
+
+STEPS = {"micro": step_micro, "bench": step_bench, "convert": step_convert, "scaling": step_scaling,
+         "frames": step_frames, "fidelity": step_fidelity, "peers": step_peers}
+
+
+class Paths:
+    def __init__(self, arguments):
+        self.folder, self.fin = arguments.folder, arguments.fin
+        self.program = arguments.build / "tools/curvisplat"
+        self.bench = arguments.build / "bench"
+        self.cache = arguments.folder / "wake.splats"
+
+    def json(self, step):
+        return self.folder / f"{step}.json"
+
+
+def read_fidelity(path):
+    """Rows of curvisplat_fidelity as measurements."""
+    out = results.Results()
+    for row in json.loads(path.read_text()):
+        name = "/".join(row[key].replace(" ", "_") for key in ("case", "view", "function", "classification"))
+        out.add(f"fidelity/{name}/error:{row['lod_pixels']:g}px", "dB", [row["psnr_db"]])
+    return {"measurements": out.measurements}
+
+
+def run_step(name, paths, form, everything):
+    """-> what went wrong; nothing if all is well."""
+    if name in ("bench", "convert") and subprocess.run([paths.program, "bench", "--help"], capture_output=True).returncode:
+        return f"{paths.program}: has no subcommand `bench`; build it anew, or run --without bench,convert"
+    commands = STEPS[name](paths, form)
+    if not commands:
+        return None
+    paths.json(name).unlink(missing_ok=True)
+    log = paths.folder / f"{name}.log"
+    with open(log, "w") as file:
+        for command in commands:
+            words = [str(word) for word in command]
+            file.write("+ " + " ".join(words) + "\n")
+            file.flush()
+            try:
+                status = subprocess.run(words, stdout=file, stderr=subprocess.STDOUT).returncode
+            except FileNotFoundError:
+                return f"{words[0]}: is no program; build with -DCURVISPLAT_BENCH=ON"
+            if status != 0:
+                return f"exit status {status} of {' '.join(words[:3])} ...; its words:\n{log.read_text()[-2000:]}"
+    try:
+        found = read_fidelity(paths.json(name)) if name == "fidelity" else results.read(paths.json(name))
+    except (OSError, ValueError, KeyError) as error:
+        return f"expected measurements in {paths.json(name)}; {error}"
+    if not found["measurements"]:
+        return f"{paths.json(name)}: has no measurements"
+    everything.take(found, "micro/" if name == "micro" else "")
+    return None
+
+
+def steps_of(text):
+    steps = [step for step in text.split(",") if step]
+    if not set(steps) <= set(STEPS):
+        raise argparse.ArgumentTypeError(f"'{text}': there are {', '.join(STEPS)}")
+    return steps
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=pathlib.Path, help="on a disk, not in memory: a few GB")
+    parser.add_argument("--smoke", action="store_true", help="tiny sizes: under a minute")
+    parser.add_argument("--build", type=pathlib.Path, default=HERE.parent / "build/release",
+                        help="configured with -DCURVISPLAT_BENCH=ON")
+    parser.add_argument("--only", type=steps_of, default=list(STEPS))
+    parser.add_argument("--without", type=steps_of, default=[])
+    parser.add_argument("--fin", nargs=2, metavar=("GRID", "SOLUTION"), help="for peers: a PLOT3D grid and Q file")
+    arguments = parser.parse_args()
+    os.makedirs(arguments.folder, exist_ok=True)
+
+    paths, form = Paths(arguments), SmokeForm if arguments.smoke else Form
+    everything, failed, begin = results.Results(), [], time.monotonic()
+    version = results.version_of(paths.program)
+    for name in STEPS:
+        if name not in arguments.only or name in arguments.without:
+            continue
+        start = time.monotonic()
+        problem = run_step(name, paths, form, everything)
+        print(f"{name:10} {time.monotonic() - start:6.1f} s  {'FAILED: ' + problem if problem else 'done'}", flush=True)
+        if problem:
+            failed.append(name)
+    everything.write(paths.folder / "all.json", "bench/run.py", version, form="smoke" if arguments.smoke else "short")
+    print(f"{len(everything.measurements)} measurements in {paths.folder / 'all.json'}, "
+          f"{time.monotonic() - begin:.0f} s")
+    for left in everything.left_out:
+        print(f"left out: {left['name']}: {left['reason']}")
+    sys.exit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()

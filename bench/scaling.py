@@ -1,0 +1,218 @@
+#!/usr/bin/env python3
+"""Conversion and rendering at growing sizes: rates, bytes, first picture, frame, memory, and how each of them grows.
+
+    bench/scaling.py FOLDER --nodes 1M,8M,64M [--json OUT.json] [--plot OUT.svg]
+
+Each size of the scene is generated and converted in FOLDER, --conversions times; caches and what was measured of their
+conversion are kept there and used again (--again: not), grids are not. A conversion needs 16 bytes a node of grid and 61
+of temporary files. Then each cache is drawn --repeats times with each error of --lod-pixels.
+
+"cached" is the part of the grid's files that the page cache holds when a conversion starts, asked with mincore: they
+were just written. A cache's files are put out of the page cache before it is drawn ("cold", verified with mincore), the
+program's own are not. "first" is the time from the start of the process to a first, coarse picture in a file, "frame"
+that of the whole picture once the cache is open; "peak" is the largest memory of the process, and "above" what of it is
+more than with a cache of eight splats: program, driver and image take the rest.
+"""
+import argparse
+import json
+import os
+import pathlib
+import re
+import statistics
+
+import page_cache
+import results
+from line_plot import exponent_of, write_line_plots
+
+SUFFIX = {"": 1, "K": 1000, "M": 1000**2, "G": 1000**3}
+MIB = 2**20
+
+
+def count_of(text):
+    match = re.fullmatch(r"(\d+)([KMG]?)", text)
+    if not match:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of nodes such as 64M")
+    return int(match[1]) * SUFFIX[match[2]]
+
+
+def counts_of(text):
+    return [count_of(part) for part in text.split(",")]
+
+
+def converted(arguments, edge, conversions):
+    """-> the cache of a cube of nodes, and the --stats of its conversions."""
+    prefix = arguments.folder / f"{arguments.scene}_{edge}"
+    cache, kept = prefix.with_suffix(".splats"), prefix.with_suffix(".conversions.json")
+    if not arguments.again and kept.exists() and (cache / "manifest.json").exists():
+        return cache, json.loads(kept.read_text())
+    print(f"making {cache}", flush=True)
+    results.run([arguments.program, "generate", arguments.scene, "--size", f"{edge}x{edge}x{edge}", "-o", prefix])
+    grid = [prefix.with_suffix(ending) for ending in (".xyz", ".fun")]
+    runs = []
+    for _ in range(conversions):
+        cached = sum(page_cache.cached_part(file) * file.stat().st_size for file in grid)
+        statistics_file = prefix.with_suffix(".json")
+        results.run([arguments.program, "convert", *grid, "-o", cache, "--overwrite", "--memory",
+                     arguments.convert_memory, "--stats", statistics_file])
+        runs.append(json.loads(statistics_file.read_text()))
+        runs[-1]["cached"] = cached / sum(file.stat().st_size for file in grid)
+        statistics_file.unlink()
+    for ending in (".xyz", ".fun", ".nam"):
+        prefix.with_suffix(ending).unlink(missing_ok=True)
+    kept.write_text(json.dumps(runs, indent=1))
+    return cache, runs
+
+
+def drawn(arguments, cache, lod_pixels):
+    """-> the --stats of one cold picture, and what `compare` says of the first one against it."""
+    output = arguments.folder / "scaling.png"
+    first = output.with_name("scaling_first.png")
+    statistics_file = output.with_suffix(".json")
+    still_there = page_cache.forget(cache)
+    results.run([arguments.program, "render", cache, "-o", output, "--first-image", first, "--stats", statistics_file,
+                 "--size", arguments.size, "--memory", arguments.memory, "--lod-pixels", lod_pixels])
+    told = json.loads(statistics_file.read_text())
+    told["cached"] = still_there
+    told["first_against_whole"] = results.run([arguments.program, "compare", first, output]).split(",")[0].strip()
+    for file in (output, first, statistics_file):
+        file.unlink(missing_ok=True)
+    return told
+
+
+def measure(arguments, edge, out):
+    """One size: all of it into `out`, and into the row that is returned."""
+    cache, conversions = converted(arguments, edge, arguments.conversions)
+    nodes = conversions[0]["nodes"]
+    row = {"nodes": nodes, "size": f"{edge}x{edge}x{edge}", "conversion": conversions[-1], "pictures": {}}
+
+    def add(name, unit, samples):
+        out.add(f"scaling/{name}/nodes:{nodes}", unit, samples)
+
+    add("convert", "nodes/s", [nodes / run["seconds"] for run in conversions])
+    add("convert_peak", "B", [run["peak_memory_bytes"] for run in conversions])
+    add("cache", "B", [conversions[-1]["cache_bytes"]])
+    for lod_pixels in arguments.lod_pixels.split(","):
+        runs = [drawn(arguments, cache, lod_pixels) for _ in range(arguments.repeats)]
+        row["pictures"][lod_pixels] = runs
+        still_there = max(run["cached"] for run in runs)
+        for what, keys in (("first", ["time_to_first_image_s"]), ("frame", ["frames", 0, "seconds", "total"])):
+            if still_there == 0:
+                add(f"{what}/error:{lod_pixels}px", "s", [value_of(run, keys) for run in runs])
+            else:
+                out.leave_out(f"scaling/{what}/error:{lod_pixels}px/nodes:{nodes}",
+                              f"not cold: {100 * still_there:.0f} % of a file stayed in memory; take a folder on a disk")
+        add(f"peak/error:{lod_pixels}px", "B", [run["peak_memory_bytes"] for run in runs])
+    return row
+
+
+def value_of(told, keys):
+    for key in keys:
+        told = told[key]
+    return told
+
+
+def middle(runs, *keys):
+    return statistics.median(value_of(run, keys) for run in runs)
+
+
+def report_conversions(rows):
+    print("\n| nodes | rate | seconds | scan, count | scatter, seams | build, finish | peak | temporary | cache | "
+          "cached |\n|---|---|---|---|---|---|---|---|---|---|")
+    for row in rows:
+        run, nodes = row["conversion"], row["nodes"]
+        of = {phase["name"]: phase["seconds"] for phase in run["phases"]}
+
+        def both(a, b):
+            return f"{of.get(a, 0):.1f} + {of.get(b, 0):.1f} s"
+
+        print(f"| {nodes / 1e6:.3g} M | {nodes / run['seconds'] / 1e6:.2f} M nodes/s | {run['seconds']:.1f} "
+              f"| {both('scan', 'count')} | {both('scatter', 'seams')} | {both('build', 'finish')} "
+              f"| {run['peak_memory_bytes'] / MIB:.0f} MiB | {run['temporary_bytes'] / nodes:.1f} bytes a node "
+              f"| {run['cache_bytes'] / nodes:.2f} bytes a node | {100 * run['cached']:.0f} % |")
+
+
+def report_pictures(rows, base):
+    print("\n| error | nodes | cache | first | it, against the whole | frame | splats | bricks | read | peak | above | "
+          "the painter waited |\n|---|---|---|---|---|---|---|---|---|---|---|---|")
+    for lod_pixels in rows[0]["pictures"]:
+        for row in rows:
+            runs = row["pictures"][lod_pixels]
+            frame = runs[0]["frames"][0]
+            peak, seconds = middle(runs, "peak_memory_bytes"), middle(runs, "frames", 0, "seconds", "total")
+            waited = middle(runs, "frames", 0, "seconds", "painter_waited")
+            print(f"| {lod_pixels} px | {row['nodes'] / 1e6:.3g} M | {row['conversion']['cache_bytes'] / MIB:.1f} MiB "
+                  f"| {middle(runs, 'time_to_first_image_s'):.2f} s | {runs[0]['first_against_whole']} "
+                  f"| {seconds:.2f} s | {frame['splats_drawn'] / 1e6:.2f} M | {frame['bricks_drawn']} "
+                  f"| {frame['bytes_read'] / MIB:.1f} MiB | {peak / MIB:.0f} MiB "
+                  f"| {(peak - middle(base['pictures'][lod_pixels], 'peak_memory_bytes')) / MIB:.0f} MiB "
+                  f"| {100 * waited / seconds:.1f} % |")
+    for lod_pixels, runs in base["pictures"].items():
+        print(f"\neight nodes, {lod_pixels} px: {middle(runs, 'frames', 0, 'seconds', 'total'):.2f} s, "
+              f"{middle(runs, 'peak_memory_bytes') / MIB:.0f} MiB")
+
+
+def plots_of(rows):
+    def line(of):
+        return [(row["nodes"], of(row)) for row in rows]
+
+    def lines(*keys):
+        return {f"{lod_pixels} px": line(lambda row, lod_pixels=lod_pixels: middle(row["pictures"][lod_pixels], *keys))
+                for lod_pixels in rows[0]["pictures"]}
+
+    def plot(title, y_name, of):
+        return {"title": title, "x_name": "nodes", "y_name": y_name, "lines": of, "trend": True}
+
+    return [plot("Conversion", "seconds", {"convert": line(lambda row: row["conversion"]["seconds"])}),
+            plot("What a cache takes", "bytes", {"cache": line(lambda row: row["conversion"]["cache_bytes"])}),
+            plot("First picture, cold", "seconds", lines("time_to_first_image_s")),
+            plot("A frame, cold", "seconds", lines("frames", 0, "seconds", "total")),
+            plot("Peak memory", "bytes", {"convert": line(lambda row: row["conversion"]["peak_memory_bytes"]),
+                                          **lines("peak_memory_bytes")})]
+
+
+def report_trends(plots):
+    print("\n| grows as the nodes to the power of | |\n|---|---|")
+    for plot in plots:
+        for name, line in plot["lines"].items():
+            print(f"| {plot['title']}: {name} | {exponent_of(line):.2f} |")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("--program", default="build/release/tools/curvisplat")
+    parser.add_argument("--scene", default="wake")
+    parser.add_argument("--nodes", default="1M,8M,64M", type=counts_of)
+    parser.add_argument("--lod-pixels", default="1,2,3")
+    parser.add_argument("--size", default="600x600")
+    parser.add_argument("--memory", default="256M", help="for pictures")
+    parser.add_argument("--convert-memory", default="512M")
+    parser.add_argument("--repeats", type=int, default=3, help="pictures of each cache and error")
+    parser.add_argument("--conversions", type=int, default=1, help="of each size")
+    parser.add_argument("--again", action="store_true", help="convert anew what is there")
+    parser.add_argument("--json")
+    parser.add_argument("--plot")
+    arguments = parser.parse_args()
+    os.makedirs(arguments.folder, exist_ok=True)
+    edges = [round(nodes ** (1 / 3)) for nodes in arguments.nodes]
+
+    out = results.Results()
+    version = results.version_of(arguments.program)
+    base = measure(arguments, 2, results.Results())
+    rows = [measure(arguments, edge, out) for edge in edges]
+    plots = plots_of(rows)
+    report_conversions(rows)
+    report_pictures(rows, base)
+    if len(rows) > 1:
+        report_trends(plots)
+    for left in out.left_out:
+        print(f"{left['name']}: {left['reason']}")
+    if arguments.json:
+        out.write(arguments.json, "scaling", version, words=vars(arguments) | {"folder": str(arguments.folder)},
+                  base=base, sizes=rows)
+    if arguments.plot:
+        write_line_plots(arguments.plot, plots)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,164 @@
+// As little memory, as many threads, as large and as small a picture as there may be.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "render/image.h"
+#include "stream/file.h"
+#include "tests/support/cube_files.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+class LimitsTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    writeCube(*folder_ / "cube", 12, [](const GridNode& node, NodeValues& values) {
+      values.scalars[0] = static_cast<float>(node.i);
+    });
+    const ProgramResult result = runProgram(cubeWords(file("cube")));
+    ASSERT_EQ(result.status, 0) << result.err;
+  }
+  static void TearDownTestSuite() { folder_.reset(); }
+
+  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
+
+  /// Draws the cube to `name` (100x100 unless told), and returns what the program said.
+  static ProgramResult render(const std::string& name, std::vector<std::string> more = {}) {
+    more.insert(more.begin(), {"render", file("cube.splats"), "-o", file(name)});
+    if (std::find(more.begin(), more.end(), "--size") == more.end())
+      more.insert(more.end(), {"--size", "100x100"});
+    return runProgram(more);
+  }
+  static std::string rendered(const std::string& name, const std::vector<std::string>& more = {}) {
+    const ProgramResult result = render(name, more);
+    EXPECT_EQ(result.status, 0) << result.err;
+    return result.status == 0 ? readTextFile(file(name)) : std::string();
+  }
+
+  /// N of "at least N MiB" in the one line that a program has said; 0: none.
+  static uint64_t leastMebibytes(const ProgramResult& result) {
+    EXPECT_EQ(lineCount(result.err), 1) << result.err;
+    EXPECT_NE(result.err.find("--memory"), std::string::npos) << result.err;
+    const std::string before = "at least ";
+    const size_t at = result.err.find(before);
+    EXPECT_NE(at, std::string::npos) << result.err;
+    return at == std::string::npos ? 0 : std::stoull(result.err.substr(at + before.size()));
+  }
+
+  static std::unique_ptr<TemporaryFolder> folder_;
+};
+std::unique_ptr<TemporaryFolder> LimitsTest::folder_;
+
+std::string mebibytes(uint64_t count) {
+  return fmt::format("{}M", count);
+}
+
+TEST_F(LimitsTest, ConversionNamesTheLeastMemoryThatItTakes) {
+  const auto convert = [&](uint64_t least) {
+    return runProgram(cubeWords(file("cube"), {"--memory", mebibytes(least)}, file("least.splats")));
+  };
+  const ProgramResult refused = convert(1);
+  EXPECT_EQ(refused.status, 1);
+  const uint64_t least = leastMebibytes(refused);
+  ASSERT_GT(least, 1u);
+  EXPECT_EQ(convert(least - 1).status, 1);
+  EXPECT_FALSE(std::filesystem::exists(file("least.splats")));
+  const ProgramResult taken = convert(least);
+  EXPECT_EQ(taken.status, 0) << taken.err;
+}
+
+TEST_F(LimitsTest, AddingAScalarNamesTheLeastMemoryThatItTakes) {
+  const auto add = [&](uint64_t least) {
+    return runProgram({"convert", file("cube.xyz"), file("cube.fun"), "--add-scalar", "j", "--to",
+                       file("added.splats"), "--memory", mebibytes(least)});
+  };
+  std::filesystem::copy(file("cube.splats"), file("added.splats"));
+  const ProgramResult refused = add(1);
+  EXPECT_EQ(refused.status, 1);
+  const uint64_t least = leastMebibytes(refused);
+  ASSERT_GT(least, 1u);
+  EXPECT_EQ(add(least - 1).status, 1);
+  const ProgramResult taken = add(least);
+  EXPECT_EQ(taken.status, 0) << taken.err;
+}
+
+TEST_F(LimitsTest, RenderingNamesTheLeastMemoryThatItTakes) {
+  const ProgramResult refused = render("least.png", {"--memory", "1"});
+  EXPECT_EQ(refused.status, 2);
+  const uint64_t least = leastMebibytes(refused);
+  ASSERT_GT(least, 1u);
+  EXPECT_EQ(leastMebibytes(render("least.png", {"--memory", mebibytes(least - 1)})), least);
+  EXPECT_FALSE(std::filesystem::exists(file("least.png")));
+  EXPECT_EQ(rendered("least.png", {"--memory", mebibytes(least)}), rendered("much.png"));
+}
+
+TEST_F(LimitsTest, AHugePictureNamesItsMemoryBeforeItTakesAny) {
+  constexpr uint64_t kPictureMebibytes = 16384 / 1024 * (16384 / 1024) * 16;
+  for (const char* backend : {"cpu", "osmesa"}) {
+    SCOPED_TRACE(backend);
+    const ProgramResult refused = render("huge.png", {"--size", "16384x16384", "--backend", backend});
+    EXPECT_EQ(refused.status, 2);
+    EXPECT_GT(leastMebibytes(refused), kPictureMebibytes);
+  }
+  // Of all programs that this process has run, the largest.
+  rusage usage{};
+  ASSERT_EQ(getrusage(RUSAGE_CHILDREN, &usage), 0);
+  EXPECT_LT(static_cast<uint64_t>(usage.ru_maxrss) >> 10, kPictureMebibytes / 4);
+  EXPECT_EQ(render("huge.png", {"--size", "16385x1"}).status, 2);
+}
+
+TEST_F(LimitsTest, FewAndManyThreadsDrawTheSame) {
+  const std::string one = rendered("threads.pfm", {"--threads", "1"});
+  EXPECT_EQ(rendered("threads.pfm", {"--threads", "64"}), one) << "as many of them as the memory is for";
+  EXPECT_EQ(rendered("threads.pfm", {"--threads", "64", "--memory", "8G"}), one);
+  EXPECT_EQ(render("threads.pfm", {"--threads", "1025"}).status, 2);
+  EXPECT_EQ(render("threads.pfm", {"--threads", "-1"}).status, 2);
+}
+
+TEST_F(LimitsTest, FewAndManyThreadsConvertToTheSame) {
+  for (const char* threads : {"1", "64"}) {
+    SCOPED_TRACE(threads);
+    const ProgramResult result = runProgram(cubeWords(
+        file("cube"), {"--overwrite", "--threads", threads, "--memory", "8G"}, file("threads.splats")));
+    EXPECT_EQ(result.status, 0) << result.err;
+    for (const char* name : {"manifest.json", "bricks.bin", "geometry.bin", "var.0.bin", "bricks.vdb"})
+      EXPECT_EQ(readTextFile(file("threads.splats/") + name), readTextFile(file("cube.splats/") + name))
+          << name;
+  }
+  EXPECT_EQ(runProgram(cubeWords(file("cube"), {"--threads", "1025"}, file("no.splats"))).status, 2);
+}
+
+TEST_F(LimitsTest, APictureMayBeOnePixel) {
+  for (const char* backend : {"cpu", "osmesa"})
+    for (const char* name : {"one.png", "one.exr", "one.pfm"}) {
+      SCOPED_TRACE(fmt::format("{} {}", backend, name));
+      rendered(name,
+               {"--size", "1x1", "--backend", backend, "--parallel-scale", "2", "--opacity-unit", "0.1"});
+      const Image image = readImage(file(name));
+      ASSERT_EQ(image.size.width, 1);
+      ASSERT_EQ(image.size.height, 1);
+      EXPECT_LT(image.pixel(0, 0)[0], 0.9f) << "white: nothing is drawn";
+    }
+}
+
+TEST_F(LimitsTest, ALineOfPixelsHasRoomForAnnotations) {
+  for (const char* size : {"1x1", "1x3000", "3000x1", "2x2"}) {
+    SCOPED_TRACE(size);
+    rendered("line.png", {"--size", size, "--scalar-bar", "--axes", "--outline", "--view-angle", "40",
+                          "--first-image", file("first.png")});
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,222 @@
+// Data that is nearly none, or no numbers: what is drawn of it, and what is said about the rest.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "render/image.h"
+#include "stream/file.h"
+#include "tests/support/cube_files.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/vts_writer.h"
+
+namespace curvisplat {
+namespace {
+
+class OddDataTest : public testing::Test {
+ protected:
+  std::string file(const std::string& name) const { return (folder_ / name).string(); }
+
+  ProgramResult convert(uint64_t side, const CubeNode& node,
+                        const std::vector<std::string>& more = {}) const {
+    writeCube(folder_ / "cube", side, node);
+    return runProgram(cubeWords(folder_ / "cube", more));
+  }
+  void expectConverted(uint64_t side, const CubeNode& node) {
+    const ProgramResult result = convert(side, node);
+    ASSERT_EQ(result.status, 0) << result.err;
+    said_ = result.err;
+  }
+  /// Draws the cube, 64x64, and keeps what was said.
+  Image render(std::vector<std::string> options = {}) {
+    options.insert(options.begin(),
+                   {"render", file("cube.splats"), "-o", file("out.pfm"), "--size", "64x64"});
+    const ProgramResult result = runProgram(options);
+    said_ = result.err;
+    EXPECT_EQ(result.status, 0) << result.err;
+    return result.status == 0 ? readImage(file("out.pfm")) : Image({64, 64});
+  }
+  static bool isWhite(const Image& image) {
+    return std::all_of(image.rgba.begin(), image.rgba.end(), [](float value) { return value == 1; });
+  }
+  static bool isFinite(const Image& image) {
+    return std::all_of(image.rgba.begin(), image.rgba.end(),
+                       [](float value) { return std::isfinite(value); });
+  }
+  bool said(const std::string& words) const { return said_.find(words) != std::string::npos; }
+  /// An empty picture, and one warning, which has `words` in it.
+  void expectEmpty(const std::vector<std::string>& options, const std::string& words) {
+    EXPECT_TRUE(isWhite(render(options)));
+    EXPECT_TRUE(said("the picture is empty: ")) << said_;
+    EXPECT_TRUE(said(words)) << said_ << "lacks: " << words;
+    EXPECT_EQ(said_.find("the picture is empty"), said_.rfind("the picture is empty")) << said_;
+  }
+
+  const TemporaryFolder folder_;
+  std::string said_;
+};
+
+void along(const GridNode& node, NodeValues& values) {
+  values.scalars[0] = static_cast<float>(node.i);
+}
+
+TEST_F(OddDataTest, ACacheOfOneSplatIsDrawn) {
+  VtsGrid grid = annulusVtsGrid(2, 2, 2);
+  writeFileAtomically(folder_ / "one.vts", vtsFile(grid, VtsEncoding{}));
+  const ProgramResult result =
+      runProgram({"convert", file("one.vts"), "-o", file("cube.splats"), "--scalar", "T"});
+  ASSERT_EQ(result.status, 0) << result.err;
+  EXPECT_NE(result.out.find("1 splats in 1 bricks, 1 levels"), std::string::npos) << result.out;
+  const Image image = render({"--opacity-unit", "0.01", "--parallel-scale", "5"});
+  EXPECT_LT(image.pixel(32, 32)[0], 0.9f) << said_;
+  EXPECT_EQ(image.pixel(0, 0)[0], 1);
+  EXPECT_TRUE(isFinite(image));
+  EXPECT_EQ(runProgram({"info", file("cube.splats"), "--verify"}).status, 0);
+}
+
+TEST_F(OddDataTest, OneNodeThatIsLeftHasNoVolumeAndThatIsSaid) {
+  expectConverted(2, [](const GridNode& node, NodeValues& values) {
+    values.scalars[0] = 1;
+    values.blank = node.i + node.j + node.k > 0;
+  });
+  EXPECT_TRUE(said("7 nodes are blanked by the grid")) << said_;
+  expectEmpty({}, "the data has no volume");
+  EXPECT_TRUE(said("7 of 8")) << said_;
+}
+
+TEST_F(OddDataTest, NodesInOnePointHaveNoVolumeAndThatIsSaid) {
+  expectConverted(4, [](const GridNode& node, NodeValues& values) {
+    values.position = {1, 2, 3};
+    along(node, values);
+  });
+  expectEmpty({}, "the data has no volume");
+}
+
+TEST_F(OddDataTest, NothingLeftIsNoCache) {
+  const ProgramResult result = convert(2, [](const GridNode&, NodeValues& values) { values.blank = true; });
+  EXPECT_EQ(result.status, 1);
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  EXPECT_NE(result.err.find("8 by the grid"), std::string::npos) << result.err;
+  EXPECT_FALSE(std::filesystem::exists(file("cube.splats")));
+}
+
+TEST_F(OddDataTest, AnEmptyPictureNamesItsCause) {
+  expectConverted(16, [](const GridNode& node, NodeValues& values) {
+    along(node, values);
+    values.blank = node.i >= 4 && node.i <= 11;
+  });
+  EXPECT_FALSE(isWhite(render()));
+  // The range. Below it all is opaque, or so the preset says.
+  expectEmpty({"--range", "20,30"}, "over the range 20..30, the transfer function 'viridis'");
+  EXPECT_TRUE(said("give another --range")) << said_;
+  // The function, over whichever range.
+  writeFileAtomically(folder_ / "clear.json",
+                      std::string(R"([{"Name": "clear", "RGBPoints": [0,1,0,0, 1,1,0,0],
+                                       "Points": [0,0,0.5,0, 1,0,0.5,0]}])"));
+  for (const char* range : {"0,15", "20,30"}) {
+    expectEmpty({"--tf", file("clear.json"), "--range", range}, "'clear' is fully transparent");
+    EXPECT_FALSE(said("--range;")) << said_;
+  }
+  // Blanking.
+  expectEmpty({"--clip-box", "6,9,0,15,0,15"}, "is blanked, as are 2048 of its 4096 nodes");
+  expectEmpty({"--position", "7.5,-50,7.5", "--focal-point", "7.5,7.5,7.5", "--parallel-scale", "1"},
+              "is blanked, as are 2048 of its 4096 nodes");
+  // The camera.
+  expectEmpty({"--position", "100,0,0", "--focal-point", "200,0,0", "--view-angle", "30"},
+              "does not see the data's box");
+  // What is seen is of values that are transparent.
+  writeFileAtomically(folder_ / "high.json",
+                      std::string(R"([{"Name": "high", "RGBPoints": [0,1,0,0, 15,1,0,0],
+                                       "Points": [0,0,0.5,0, 11,0,0.5,0, 15,1,0.5,0]}])"));
+  expectEmpty({"--tf", file("high.json"), "--clip-box", "0,3,0,15,0,15"},
+              "only values of f for which the transfer function 'high' is transparent");
+}
+
+TEST_F(OddDataTest, AConstantIsDrawn) {
+  for (const float constant : {0.0f, 7.5f, -1e30f, 1e-40f}) {
+    SCOPED_TRACE(constant);
+    std::filesystem::remove_all(file("cube.splats"));
+    expectConverted(6, [&](const GridNode&, NodeValues& values) { values.scalars[0] = constant; });
+    const Image image = render({"--scalar-bar"});
+    EXPECT_TRUE(said("everywhere")) << said_;
+    EXPECT_FALSE(isWhite(image));
+    EXPECT_TRUE(isFinite(image));
+  }
+}
+
+TEST_F(OddDataTest, ValuesThatHardlyDifferAreAConstant) {
+  expectConverted(6, [](const GridNode& node, NodeValues& values) {
+    values.scalars[0] = 1e-44f * static_cast<float>(node.i);
+  });
+  EXPECT_FALSE(isWhite(render({"--scalar-bar"})));
+  EXPECT_TRUE(said("everywhere")) << said_;
+}
+
+TEST_F(OddDataTest, WhatIsNotFiniteIsCountedSkippedAndReported) {
+  const float infinity = std::numeric_limits<float>::infinity();
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const CubeNode node = [&](const GridNode& number, NodeValues& values) {
+    along(number, values);
+    if (number.k == 0) values.scalars[0] = nan;       // 64
+    if (number.k == 7) values.scalars[0] = infinity;  // 64
+    if (number.k == 6) values.scalars[0] = -infinity;
+    if (number.k == 4 && number.j == 4) values.position.x = nan;  // 8
+    if (number.k == 4 && number.j == 5) values.position.y = infinity;
+  };
+  writeCube(folder_ / "cube", 8, node);
+  const ProgramResult result = runProgram(cubeWords(folder_ / "cube", {"--stats", file("stats.json")}));
+  ASSERT_EQ(result.status, 0) << result.err;
+  EXPECT_NE(result.err.find("note: 208 nodes are not finite numbers, and are blanked"), std::string::npos)
+      << result.err;
+  const auto stats = nlohmann::json::parse(readTextFile(folder_ / "stats.json"));
+  EXPECT_EQ(stats["blanked"]["not_finite"], 208);
+  EXPECT_EQ(stats["splats"], 512 - 208);
+  const ProgramResult info = runProgram({"info", file("cube.splats"), "--json", "--verify"});
+  EXPECT_EQ(info.status, 0) << info.err;
+  const auto manifest = nlohmann::json::parse(info.out);
+  EXPECT_EQ(manifest["blanked_nodes"], 208);
+  EXPECT_EQ(manifest["variables"][0]["min"], 0);
+  EXPECT_EQ(manifest["variables"][0]["max"], 7);
+  const Image image = render();
+  EXPECT_TRUE(isFinite(image));
+  EXPECT_FALSE(isWhite(image));
+}
+
+TEST_F(OddDataTest, ValuesTooFarApartAreRefusedUnlessTheyAreBlank) {
+  const CubeNode node = [](const GridNode& number, NodeValues& values) {
+    along(number, values);
+    if (number.i == 0) values.scalars[0] = 1e20f;
+  };
+  const ProgramResult refused = convert(8, node);
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_EQ(lineCount(refused.err), 1) << refused.err;
+  EXPECT_NE(refused.err.find("f: its values go from 1 to 1e+20"), std::string::npos) << refused.err;
+  EXPECT_NE(refused.err.find("--blank"), std::string::npos) << refused.err;
+  EXPECT_FALSE(std::filesystem::exists(file("cube.splats")));
+  const ProgramResult taken = convert(8, node, {"--blank", "1e20"});
+  EXPECT_EQ(taken.status, 0) << taken.err;
+  EXPECT_NE(taken.err.find("64 nodes have the blank value"), std::string::npos) << taken.err;
+  EXPECT_FALSE(isWhite(render()));
+}
+
+TEST_F(OddDataTest, ValuesFarApartButNotTooFarAreDrawn) {
+  expectConverted(8, [](const GridNode& number, NodeValues& values) {
+    values.scalars[0] = (number.i + number.j + number.k) % 2 ? 4.9e17f : -4.9e17f;
+  });
+  for (const char* backend : {"cpu", "osmesa"}) {
+    const Image image = render({"--backend", backend});
+    EXPECT_TRUE(isFinite(image)) << backend;
+    EXPECT_FALSE(isWhite(image)) << backend;
+  }
+  EXPECT_EQ(runProgram({"info", file("cube.splats"), "--verify"}).status, 0);
+}
+
+}  // namespace
+}  // namespace curvisplat

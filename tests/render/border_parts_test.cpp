@@ -1,0 +1,128 @@
+#include "render/border_parts.h"
+
+#include <gtest/gtest.h>
+
+#include <glm/glm.hpp>
+#include <random>
+#include <vector>
+
+#include "render/projection.h"
+#include "render/transfer_function.h"
+#include "stream/half_cell.h"
+#include "tests/support/splat_arrays.h"
+
+namespace curvisplat {
+namespace {
+
+glm::dmat3 factorOf(const Shape& s) {
+  return {s.axis0, s.axis0 * s.shear10, s.axis0 * s.shear20, 0, s.axis1, s.axis1 * s.shear21, 0, 0, s.axis2};
+}
+glm::dvec3 vectorOf(const Slope& w) {
+  return {w.w0, w.w1, w.w2};
+}
+
+const SplatPiece kWhole{{1, 2, 3}, {0.5f, 0.02f, 2, 0.3f, -1, 0.7f}, {0.4f, -0.2f, 0.1f}, 5, 0.02f};
+const glm::dvec3 kInward[] = {glm::normalize(glm::dvec3(1, 2, -1)), glm::normalize(glm::dvec3(1, 0, 1)),
+                              glm::normalize(glm::dvec3(-1, 1, 1))};
+
+TEST(BorderParts, OfAWholeCellAreItself) {
+  BorderPieces pieces;
+  ASSERT_EQ(partsAtBorder(kWhole, kWholeCell, pieces), 1u);
+  EXPECT_EQ(pieces[0].position, kWhole.position);
+  EXPECT_EQ(factorOf(pieces[0].shape), factorOf(kWhole.shape));
+  EXPECT_EQ(pieces[0].weight, kWhole.weight);
+  EXPECT_EQ(pieces[0].mean, kWhole.mean);
+}
+
+TEST(BorderParts, AreStretchedAndShiftedAlongTheInwardAxesOnly) {
+  const glm::dmat3 a = factorOf(kWhole.shape);
+  for (size_t axes = 1; axes <= 3; ++axes) {
+    const uint32_t code = packHalfCell({kInward, axes});
+    const InwardAxes inward = inwardAxes(code);
+    BorderPieces pieces;
+    ASSERT_EQ(partsAtBorder(kWhole, code, pieces), size_t{1} << axes);
+    double weight = 0;
+    for (size_t n = 0; n < size_t{1} << axes; ++n) {
+      glm::dmat3 m(1.0);
+      glm::dvec3 offset(0.0);
+      for (size_t axis = 0; axis < axes; ++axis) {
+        const BorderPart& part = kBorderParts[n >> axis & 1];
+        const glm::dvec3 q(inward.axis[axis]);
+        m += (double{part.size} * part.size - 1) * glm::outerProduct(q, q);
+        offset += double{part.offset} * q;
+      }
+      const SplatPiece& piece = pieces[n];
+      const glm::dmat3 factor = factorOf(piece.shape);
+      const glm::dmat3 found = factor * glm::transpose(factor), expected = a * m * glm::transpose(a);
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) EXPECT_NEAR(found[i][j], expected[i][j], 1e-5);
+      EXPECT_LT(glm::distance(glm::dvec3(piece.position), glm::dvec3(kWhole.position) + a * offset), 1e-5);
+      weight += piece.weight;
+    }
+    EXPECT_NEAR(weight, kWhole.weight, 1e-7);
+  }
+}
+
+TEST(BorderParts, CarryTheSameLinearField) {
+  // The gradient is A⁻ᵀ w, whatever A.
+  const glm::dvec3 gradient = glm::inverse(glm::transpose(factorOf(kWhole.shape))) * vectorOf(kWhole.slope);
+  BorderPieces pieces;
+  const size_t count = partsAtBorder(kWhole, packHalfCell({kInward, 3}), pieces);
+  for (size_t n = 0; n < count; ++n) {
+    const SplatPiece& piece = pieces[n];
+    const glm::dvec3 found = glm::inverse(glm::transpose(factorOf(piece.shape))) * vectorOf(piece.slope);
+    EXPECT_LT(glm::distance(found, gradient), 1e-4 * glm::length(gradient));
+    const double mean = kWhole.mean + glm::dot(gradient, glm::dvec3(piece.position - kWhole.position));
+    EXPECT_NEAR(piece.mean, mean, 1e-5);
+  }
+}
+
+/// A brick of `count` equal splats.
+struct Brick {
+  SplatGeometry geometry;
+  SplatVariable variable;
+
+  Brick(size_t count, uint32_t half_cell) {
+    geometry.resize(count);
+    variable.resize(count);
+    Splat splat;
+    splat.axis = {0.1, 0.1, 0.1};
+    splat.weight = 1e-3;
+    for (size_t n = 0; n < count; ++n)
+      setSplat(geometry, variable, n, {0.5, 0.5, 0.5}, splat, {0.5, {0.1, 0, 0}, 0}, half_cell);
+  }
+};
+
+ProjectionCounts project(const Brick& brick, Projection projection) {
+  Camera camera;
+  camera.position = {0.5, 0.5, 4};
+  camera.focal_point = {0.5, 0.5, 0};
+  camera.projection = projection;
+  ProjectionSettings settings;
+  settings.view = ScreenView::of(camera, {64, 64}, glm::dvec3(1), kLowPass, 0.01);
+  const auto table = ClassificationTable::of(TransferFunction::preset("grey", 0, 1, 1), 0, 1);
+  BrickProjector projector;
+  projector.project(settings, table, glm::dvec3(0), brick.geometry, brick.variable);
+  return projector.counts();
+}
+
+TEST(BorderParts, AreWhatHalfCellsAreDrawnAs) {
+  const uint32_t corner = packHalfCell({kInward, 3});
+  for (const Projection projection : {Projection::orthographic, Projection::perspective}) {
+    const ProjectionCounts one = project(Brick(1, packHalfCell({kInward, 1})), projection);
+    EXPECT_EQ(one.drawn, 1u);
+    EXPECT_EQ(one.pieces, 2u);
+    EXPECT_EQ(project(Brick(10, corner), projection).pieces, 80u);
+    EXPECT_EQ(project(Brick(10, kWholeCell), projection).pieces, 10u);
+  }
+}
+
+TEST(BorderParts, AreNotDrawnWhereABrickHasTooMany) {
+  const uint32_t corner = packHalfCell({kInward, 3});
+  const size_t count = BrickProjector::kMostPieces / 8;
+  EXPECT_EQ(project(Brick(count, corner), Projection::orthographic).pieces, 8 * count);
+  EXPECT_EQ(project(Brick(count + 1, corner), Projection::orthographic).pieces, count + 1);
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,83 @@
+#include "stream/half_cell.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
+#include <random>
+#include <vector>
+
+namespace curvisplat {
+namespace {
+
+/// Orthogonal, of either handedness.
+glm::dmat3 randomAxes(std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  const glm::dquat turn =
+      glm::normalize(glm::dquat(normal(random), normal(random), normal(random), normal(random)));
+  glm::dmat3 axes = glm::mat3_cast(turn);
+  if (random() & 1) axes[2] = -axes[2];
+  return axes;
+}
+
+TEST(HalfCell, KeepsItsDirections) {
+  std::mt19937 random(1);
+  for (int n = 0; n < 3000; ++n) {
+    const glm::dmat3 axes = randomAxes(random);
+    const std::vector<glm::dvec3> inward(&axes[0], &axes[0] + 1 + n % 3);
+    const uint32_t code = packHalfCell(inward);
+    ASSERT_TRUE(isPossibleHalfCell(code));
+    const InwardAxes kept = inwardAxes(code);
+    ASSERT_EQ(kept.count, static_cast<int>(inward.size()));
+    for (size_t a = 0; a < inward.size(); ++a) {
+      ASSERT_LT(glm::distance(glm::dvec3(kept.axis[a]), inward[a]), 0.012) << code;
+      for (size_t b = 0; b < inward.size(); ++b)
+        ASSERT_NEAR(glm::dot(kept.axis[a], kept.axis[b]), a == b, 1e-5);
+    }
+  }
+}
+
+TEST(HalfCell, AlongTheFramesOwnAxes) {
+  for (const double sign : {1.0, -1.0})
+    for (int axis = 0; axis < 3; ++axis) {
+      glm::dvec3 along(0.0);
+      along[axis] = sign;
+      const InwardAxes kept = inwardAxes(packHalfCell({&along, 1}));
+      EXPECT_LT(glm::distance(glm::dvec3(kept.axis[0]), along), 0.012) << axis << sign;
+    }
+}
+
+TEST(HalfCell, OfNoDirectionIsAWholeCell) {
+  EXPECT_EQ(packHalfCell({}), kWholeCell);
+  EXPECT_EQ(inwardAxes(kWholeCell).count, 0);
+  EXPECT_TRUE(isPossibleHalfCell(kWholeCell));
+}
+
+TEST(HalfCell, IsRefusedWhereNothingPacksToIt) {
+  EXPECT_FALSE(isPossibleHalfCell(0x00000004));  // reversed, but no axis
+  EXPECT_FALSE(isPossibleHalfCell(0x01000000));
+  EXPECT_FALSE(isPossibleHalfCell(0x00000021));
+}
+
+TEST(HalfCell, OfAnyBytesHasFiniteUnitAxes) {
+  std::mt19937 random(2);
+  for (int n = 0; n < 3000; ++n) {
+    const InwardAxes axes = inwardAxes(static_cast<uint32_t>(random()) | 1);
+    for (int a = 0; a < axes.count; ++a) ASSERT_NEAR(glm::length(axes.axis[a]), 1, 1e-4);
+  }
+}
+
+TEST(HalfCell, ItsPartsHaveItsWeight) {
+  float sum = 0;
+  for (const BorderPart& part : kBorderParts) {
+    sum += part.share;
+    EXPECT_LE(std::sqrt(3.0f) * part.offset, kBorderReach);
+    EXPECT_LE(part.size, 1);
+  }
+  EXPECT_FLOAT_EQ(sum, 1);
+}
+
+}  // namespace
+}  // namespace curvisplat

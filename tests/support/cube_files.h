@@ -1,0 +1,27 @@
+// A small PLOT3D cube whose values are what a test says, and how it becomes a cache.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tests/support/function_grid.h"
+
+namespace curvisplat {
+
+/// Of the node (i, j, k), which stands there unless this says otherwise: one scalar.
+using CubeNode = std::function<void(const GridNode&, NodeValues&)>;
+
+/// Writes `side`³ nodes to PREFIX.xyz and PREFIX.fun. The scalar is `name`.
+void writeCube(const std::filesystem::path& prefix, uint64_t side, const CubeNode& node,
+               const std::string& name = "f");
+
+/// `convert PREFIX.xyz PREFIX.fun -o OUTPUT`, by default to PREFIX.splats; the layout is named, since files
+/// so small fit several.
+std::vector<std::string> cubeWords(const std::filesystem::path& prefix,
+                                   const std::vector<std::string>& more = {},
+                                   const std::filesystem::path& output = {});
+
+}  // namespace curvisplat

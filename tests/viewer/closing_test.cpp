@@ -1,0 +1,94 @@
+// A window that is closed while its pictures load: nothing of the loading stays.
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+
+#include "preprocess/convert.h"
+#include "preprocess/scenes.h"
+#include "stream/progress.h"
+#include "tests/support/reference_march.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/virtual_display.h"
+#include "tools/viewer/frame_loop.h"
+
+namespace curvisplat {
+namespace {
+
+/// Names of this process's threads, but for TBB's, which stay for whoever comes next.
+std::multiset<std::string> threadNames() {
+  std::multiset<std::string> names;
+  for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
+    std::ifstream file(task.path() / "comm");
+    std::string name;
+    std::getline(file, name);
+    for (const char* ours : {"frames", "prepare", "pager", "read", "gl"})
+      if (name == ours) names.insert(name);
+  }
+  return names;
+}
+
+auto openFiles() {
+  return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {});
+}
+
+class ClosingTest : public testing::TestWithParam<PagerOptions::Way> {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    const SceneGridSource scene(makeScene("half-annulus"), {128, 64, 64});
+    ConvertOptions options;
+    options.output = *folder_ / "scene.splats";
+    options.scalars = {0};
+    options.memory_bytes = 512 << 20;
+    Progress progress;
+    convert(scene, options, progress);
+  }
+  static void TearDownTestSuite() { folder_.reset(); }
+
+  static std::unique_ptr<TemporaryFolder> folder_;
+};
+std::unique_ptr<TemporaryFolder> ClosingTest::folder_;
+
+TEST_P(ClosingTest, LeavesNoThreadAndNoFile) {
+  const CacheReader cache(*folder_ / "scene.splats");
+  const auto files = openFiles();
+  FrameRequest request{0, 1, TransferFunction::preset("viridis", 0, 1, 0.05), halfAnnulusCamera(), {}};
+  request.options.size = {160, 120};
+  request.options.lod_pixels = 0;
+  request.options.read_by = GetParam();
+  for (const int pictures : {0, 1, 2}) {
+    SCOPED_TRACE(pictures);
+    std::mutex mutex;
+    std::condition_variable woken;
+    int wakes = 0;
+    {
+      FrameLoop loop(cache, Backend::cpu, [&] {
+        const std::lock_guard lock(mutex);
+        ++wakes;
+        woken.notify_all();
+      });
+      loop.request(request);
+      std::unique_lock lock(mutex);
+      woken.wait(lock, [&] { return wakes >= pictures; });
+      if (pictures > 0) {
+        EXPECT_TRUE(threadNames().contains("frames"));
+      }
+    }
+    // One that was waited for may be seen for a moment more.
+    EXPECT_TRUE(eventually([] { return threadNames().empty(); })) << *threadNames().begin();
+    EXPECT_EQ(openFiles(), files);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Ways, ClosingTest,
+                         testing::Values(PagerOptions::Way::automatic, PagerOptions::Way::threads));
+
+}  // namespace
+}  // namespace curvisplat
