@@ -45,6 +45,7 @@ class Bricks {
   };
   std::vector<Bytes> bytes;
   int64_t splats = 0;
+  int64_t geometry_bytes = 0, values_bytes = 0;  // of the streams
 
   static const CacheReader& cache() {
     static const CacheReader reader(path());
@@ -66,6 +67,8 @@ class Bricks {
       geometry.readAt(brick.geometry.offset, std::span(read.geometry));
       values.readAt(of_values.offset, std::span(read.values));
       splats += brick.splats;
+      geometry_bytes += brick.geometry.length;
+      values_bytes += of_values.length;
     }
   }
 
@@ -111,6 +114,7 @@ void verify(benchmark::State& state) {
     for (const auto& brick : bricks.bytes)
       benchmark::DoNotOptimize(checksumOf(brick.geometry) ^ checksumOf(brick.values));
   state.SetItemsProcessed(state.iterations() * bricks.splats);
+  state.SetBytesProcessed(state.iterations() * (bricks.geometry_bytes + bricks.values_bytes));
 }
 BENCHMARK(verify)->ArgName("leaves")->Arg(1)->Arg(0)->Unit(benchmark::kMillisecond);
 
@@ -122,6 +126,7 @@ void decodeGeometryBench(benchmark::State& state) {
       decodeGeometry(Bricks::cache().manifest().root, Bricks::cache().bricks()[brick.id], brick.geometry,
                      geometry);
   state.SetItemsProcessed(state.iterations() * bricks.splats);
+  state.SetBytesProcessed(state.iterations() * bricks.geometry_bytes);
 }
 BENCHMARK(decodeGeometryBench)
     ->Name("decodeGeometry")
@@ -138,6 +143,7 @@ void decodeValues(benchmark::State& state) {
       decodeVariable(Bricks::cache().bricks()[brick.id], Bricks::cache().brickVariables(0)[brick.id],
                      brick.values, values);
   state.SetItemsProcessed(state.iterations() * bricks.splats);
+  state.SetBytesProcessed(state.iterations() * bricks.values_bytes);
 }
 BENCHMARK(decodeValues)->ArgName("leaves")->Arg(1)->Arg(0)->Unit(benchmark::kMillisecond);
 

@@ -165,7 +165,7 @@ def main():
     parser.add_argument("--build", type=pathlib.Path, default=HERE.parent / "build/release",
                         help="configured with -DCURVISPLAT_BENCH=ON")
     parser.add_argument("--only", type=steps_of, default=list(STEPS))
-    parser.add_argument("--without", type=steps_of, default=[])
+    parser.add_argument("--without", type=steps_of, default=[], action="extend")
     parser.add_argument("--fin", nargs=2, metavar=("GRID", "SOLUTION"), help="for peers: a PLOT3D grid and Q file")
     arguments = parser.parse_args()
     os.makedirs(arguments.folder, exist_ok=True)

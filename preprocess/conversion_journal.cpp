@@ -3,11 +3,14 @@
 #include <fmt/chrono.h>
 #include <sys/stat.h>
 
+#include <charconv>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "stream/checksum.h"
 #include "stream/error.h"
 #include "stream/file.h"
+#include "stream/json_text.h"
 
 namespace curvisplat {
 namespace {
@@ -45,13 +48,31 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
+/// A text with the checksum of a journal's, and not one that this program has written.
+struct NotAJournal {};
+
 std::string unescaped(const std::string& text) {
   std::string out;
   for (size_t n = 0; n < text.size(); ++n) {
-    out += text[n] == '%' ? static_cast<char>(std::stoi(text.substr(n + 1, 2), nullptr, 16)) : text[n];
-    if (text[n] == '%') n += 2;
+    if (text[n] != '%') {
+      out += text[n];
+      continue;
+    }
+    unsigned byte = 0;
+    const char* const begin = text.data() + n + 1;
+    if (n + 2 >= text.size() || std::from_chars(begin, begin + 2, byte, 16).ptr != begin + 2)
+      throw NotAJournal();
+    out += static_cast<char>(byte);
+    n += 2;
   }
   return out;
+}
+
+template <typename Number>
+Number wholeNumber(const json& from) {
+  if (!from.is_number_unsigned() || from.get<uint64_t>() > std::numeric_limits<Number>::max())
+    throw NotAJournal();
+  return from.get<Number>();
 }
 
 json jsonOf(const glm::dvec3& vector) {
@@ -74,12 +95,14 @@ json jsonOf(const GridSurvey& survey) {
 
 GridSurvey surveyOf(const json& from) {
   GridSurvey survey;
-  survey.nodes = from.at("nodes");
+  survey.nodes = wholeNumber<uint64_t>(from.at("nodes"));
   const auto& blanked = from.at("blanked");
-  survey.blanked = {blanked.at(0), blanked.at(1), blanked.at(2)};
+  survey.blanked = {wholeNumber<uint64_t>(blanked.at(0)), wholeNumber<uint64_t>(blanked.at(1)),
+                    wholeNumber<uint64_t>(blanked.at(2))};
   survey.lower = vectorOf(from.at("lower"));
   survey.upper = vectorOf(from.at("upper"));
-  for (const auto& range : from.at("ranges")) survey.ranges.push_back({range.at(0), range.at(1)});
+  for (const auto& range : from.at("ranges"))
+    survey.ranges.push_back({range.at(0).get<double>(), range.at(1).get<double>()});
   return survey;
 }
 
@@ -100,19 +123,41 @@ json jsonOf(const BucketTree& tree) {
   return nodes;
 }
 
-BucketTree treeOf(const json& nodes) {
+/// Children come after their parent, and are no one else's: in the order in which the tree was split.
+void requireTree(const std::vector<BucketTree::Link>& links, size_t buckets) {
+  std::vector<uint32_t> level(links.size(), BucketTree::kNone);
+  if (links.empty()) throw NotAJournal();
+  level[0] = 0;
+  for (size_t node = 0; node < links.size(); ++node) {
+    const BucketTree::Link& link = links[node];
+    const bool leaf = link.first_child == BucketTree::kNone;
+    const bool possible = level[node] != BucketTree::kNone &&
+                          (leaf ? link.bucket < buckets
+                                : link.first_child > node && links.size() - link.first_child >= 8 &&
+                                      link.first_child < links.size() && level[node] < kMaxLevel);
+    if (!possible) throw NotAJournal();
+    for (uint32_t octant = 0; !leaf && octant < 8; ++octant) {
+      uint32_t& child = level[link.first_child + octant];
+      if (child != BucketTree::kNone) throw NotAJournal();
+      child = level[node] + 1;
+    }
+  }
+}
+
+BucketTree treeOf(const json& nodes, size_t buckets) {
   std::vector<BucketTree::Link> links;
   std::vector<CellContents> contents;
   for (const auto& row : nodes) {
-    links.push_back({row.at(0), row.at(1)});
+    links.push_back({wholeNumber<uint32_t>(row.at(0)), wholeNumber<uint32_t>(row.at(1))});
     contents.emplace_back();
     if (row.size() == 2) continue;
-    contents.back().splats = row.at(2);
+    contents.back().splats = wholeNumber<uint64_t>(row.at(2));
     for (size_t axis = 0; axis < 3; ++axis) {
-      contents.back().lower.at[axis] = row.at(3 + axis);
-      contents.back().upper.at[axis] = row.at(6 + axis);
+      contents.back().lower.at[axis] = wholeNumber<uint64_t>(row.at(3 + axis));
+      contents.back().upper.at[axis] = wholeNumber<uint64_t>(row.at(6 + axis));
     }
   }
+  requireTree(links, buckets);
   BucketTree tree = BucketTree::fromLinks(links);
   tree.setContents(tree.leavesBelow(0), contents);
   return tree;
@@ -125,8 +170,10 @@ json jsonOf(const BucketChains& buckets) {
 }
 
 BucketChains bucketsOf(const json& from) {
-  BucketChains buckets{from.at("chunk_bytes"), from.at("size"), {}};
-  for (const auto& chain : from.at("chains")) buckets.chains.push_back({chain.at(0), chain.at(1)});
+  BucketChains buckets{
+      wholeNumber<uint64_t>(from.at("chunk_bytes")), wholeNumber<uint64_t>(from.at("size")), {}};
+  for (const auto& chain : from.at("chains"))
+    buckets.chains.push_back({wholeNumber<uint64_t>(chain.at(0)), wholeNumber<uint64_t>(chain.at(1))});
   return buckets;
 }
 
@@ -139,11 +186,20 @@ json jsonOf(const ScatteredSplats& splats) {
 ScatteredSplats splatsOf(const json& from) {
   ScatteredSplats splats;
   splats.survey = surveyOf(from.at("survey"));
-  splats.counts = {from.at("degenerate"), from.at("inverted")};
-  splats.merged_nodes = from.at("merged_nodes");
-  splats.tree = treeOf(from.at("tree"));
+  splats.counts = {wholeNumber<uint64_t>(from.at("degenerate")), wholeNumber<uint64_t>(from.at("inverted"))};
+  splats.merged_nodes = wholeNumber<uint64_t>(from.at("merged_nodes"));
   splats.buckets = bucketsOf(from.at("buckets"));
+  splats.tree = treeOf(from.at("tree"), splats.buckets.chains.size());
   return splats;
+}
+
+ConversionJournal journalOf(const json& content) {
+  ConversionJournal journal;
+  for (const auto& fact : content.at("facts"))
+    journal.facts.push_back({unescaped(fact.at(0)), unescaped(fact.at(1))});
+  journal.scratch = unescaped(content.at("scratch"));
+  if (content.contains("splats")) journal.splats = splatsOf(content.at("splats"));
+  return journal;
 }
 
 }  // namespace
@@ -161,8 +217,7 @@ std::vector<ConversionFact> factsOf(const GridDescription& description, const st
   uint64_t nodes = 0;
   for (const GridBlock& block : description.blocks) nodes += block.nodes();
   facts.push_back({"the layout", fmt::format("{}, {} nodes", description.format, nodes)});
-  if (description.times.size() > 1)
-    facts.push_back({"--time-step", std::to_string(description.time_step)});
+  if (description.times.size() > 1) facts.push_back({"--time-step", std::to_string(description.time_step)});
   facts.push_back({"--scalar", names.empty() ? "none" : names});
   facts.push_back({"--blank", blank_value ? fmt::format("{}", *blank_value) : "none"});
   return facts;
@@ -193,14 +248,15 @@ std::optional<ConversionJournal> readJournal(const std::filesystem::path& folder
   const size_t end = bytes.find('\n') + 1;  // 0 if there is none
   const std::string text = bytes.substr(0, end);
   if (bytes.substr(end) != checksumLine(text)) return std::nullopt;
-  const json content = json::parse(text);
-  if (content.at("version") != kJournalVersion) return std::nullopt;
-  ConversionJournal journal;
-  for (const auto& fact : content.at("facts"))
-    journal.facts.push_back({unescaped(fact.at(0)), unescaped(fact.at(1))});
-  journal.scratch = unescaped(content.at("scratch"));
-  if (content.contains("splats")) journal.splats = splatsOf(content.at("splats"));
-  return journal;
+  try {
+    requireShallowJson(text, kJournalName);
+    const json content = json::parse(text);
+    if (content.at("version") != kJournalVersion) return std::nullopt;
+    return journalOf(content);
+  } catch (const json::exception&) {
+  } catch (const NotAJournal&) {
+  }
+  return std::nullopt;
 }
 
 }  // namespace curvisplat

@@ -37,7 +37,8 @@ struct ConversionJournal {
 /// Throws Error if the disk fails.
 void writeJournal(const std::filesystem::path& folder, const ConversionJournal& journal);
 
-/// The journal in `folder`; none if there is no whole one. Throws Error if the disk fails.
+/// The journal in `folder`; none if there is no whole one that this program has
+/// written. Throws Error if the disk fails.
 std::optional<ConversionJournal> readJournal(const std::filesystem::path& folder);
 
 }  // namespace curvisplat

@@ -13,9 +13,16 @@ std::string scratchName(const fs::path& output) {
   return output.filename().string() + ".tmp";
 }
 
+/// Whether what the journal names can be the folder of temporary files of a conversion to `output`, in which
+/// files may be removed.
+bool isScratch(const fs::path& folder, const fs::path& output) {
+  return folder.filename().string().starts_with(scratchName(output) + ".") &&
+         fs::is_directory(fs::symlink_status(folder));
+}
+
 /// Removes the temporary files of a dead conversion to `output`; whatever else the journal may name stays.
 void removeScratch(const ConversionJournal& journal, const fs::path& output) {
-  if (journal.scratch.filename().string().starts_with(scratchName(output) + ".")) removeAll(journal.scratch);
+  if (isScratch(journal.scratch, output)) removeAll(journal.scratch);
 }
 
 bool hasBricks(const fs::path& folder) {
@@ -42,7 +49,7 @@ ConversionWorkspace::ConversionWorkspace(const fs::path& output, bool overwrite,
       throw Error("{}: cannot be resumed: {}; begin anew with --overwrite instead of --resume",
                   partial_->path().string(), difference);
     resumed_ = true;
-    if (fs::is_directory(journal_.scratch)) {
+    if (isScratch(journal_.scratch, output)) {
       scratch_ = std::make_unique<ScratchFolder>(journal_.scratch, ScratchFolder::Folder::kTakeOver);
       removeDividedBuckets();
       partial_->leave(false);

@@ -10,6 +10,7 @@
 #include "preprocess/plot3d_source.h"
 #include "preprocess/time_steps.h"
 #include "stream/error.h"
+#include "stream/json_text.h"
 
 namespace curvisplat {
 namespace {
@@ -22,8 +23,10 @@ constexpr uint64_t kLargest = 1 << 20;
 class Meta {
  public:
   explicit Meta(const std::filesystem::path& path) : path_(path) {
+    const std::string text = readTextFile(path, kLargest);
+    requireShallowJson(text, path.string());
     try {
-      json_ = Json::parse(readTextFile(path, kLargest));
+      json_ = Json::parse(text);
     } catch (const Json::exception& error) {
       throw Error("{}: is no JSON, which a .p3d description is: {}", path.string(), firstLine(error.what()));
     }

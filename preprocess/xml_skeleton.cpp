@@ -31,7 +31,7 @@ class Scanner {
       if (tag.starts_with("<!--") || tag.starts_with("<?")) continue;
       if (tag.starts_with("<!"))
         throw Error("{}: byte {}: {} is not expected in a VTK file", file_.name(), at_,
-                    tag.substr(0, tag.find_first_of(" [>")));
+                    tag.substr(0, std::min<size_t>(30, tag.find_first_of(" [>"))));
       if (!nest(tag)) break;
       if (skeleton_.text.size() > kLargestSkeleton)
         throw Error("{}: has more than {} bytes of XML tags; expected fewer pieces or arrays in one file",

@@ -164,7 +164,7 @@ void drawAxes(cairo_t* cairo, const ScreenView& view, const glm::dvec3& ink) {
 
 void drawScalarBar(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3& ink) {
   const TransferFunction& function = scene.transfer_function;
-  const auto [low, high] = function.range();
+  const double low = function.range().first, high = function.range().second;
   const bool log_scale = function.logScale();
   const auto fractionOf = [&](double scalar) {
     if (!(high > low)) return 0.5;

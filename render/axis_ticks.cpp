@@ -25,8 +25,10 @@ std::string labelOf(double value, double step, double largest) {
 }
 
 std::vector<AxisTick> linearTicks(double low, double high, int wanted) {
-  const double step = roundStep(high - low, wanted);
   const double largest = std::max(std::abs(low), std::abs(high));
+  // Closer together than a number's digits can tell: counting steps would not get from one to the other.
+  if (!(high - low > 1e-12 * largest)) return {{low, fmt::format("{:g}", low)}};
+  const double step = roundStep(high - low, wanted);
   std::vector<AxisTick> ticks;
   const double slack = 1e-9 * step;  // a tick that is an end but for rounding
   for (double n = std::ceil((low - slack) / step); n * step <= high + slack; ++n) {

@@ -7,6 +7,7 @@
 #include "render/camera_path.h"
 #include "stream/error.h"
 #include "stream/file.h"
+#include "stream/json_text.h"
 
 namespace curvisplat {
 namespace {
@@ -94,9 +95,11 @@ KeyFrame keyFrame(const KeyFrameObject& object) {
 
 CameraPath CameraPath::fromFile(const std::filesystem::path& path) {
   const std::string name = path.string();
+  const std::string text = readTextFile(path);
+  requireShallowJson(text, name);
   Json file;
   try {
-    file = Json::parse(readTextFile(path));
+    file = Json::parse(text);
   } catch (const Json::exception& error) {
     throw Error("{}: expected a camera path in JSON: {}", name, error.what());
   }

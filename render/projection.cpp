@@ -103,6 +103,8 @@ class Chooser {
         width_(static_cast<float>(settings.view.size.width)),
         height_(static_cast<float>(settings.view.size.height)),
         reach_(1.001f * static_cast<float>(largestReach(settings.view.low_pass_px2))),
+        largest_scalar_(kLargestCells /
+                        std::max(table.logScale() ? 1.0f : std::abs(table.scale()), kLeastScale)),
         per_pixel_(settings.per_pixel),
         splats_(splats),
         depths_(depths) {}
@@ -114,7 +116,12 @@ class Chooser {
                            splat.y - reach_y < height_;
     if (!on_screen) return Fate::off_screen;
     if (!per_pixel_) splat.slope0 = splat.slope1 = splat.half_width = 0;
-    const float spread = kSupport * (std::abs(splat.slope0) + std::abs(splat.slope1)) + splat.half_width;
+    float spread = kSupport * (std::abs(splat.slope0) + std::abs(splat.slope1)) + splat.half_width;
+    if (!(std::abs(splat.mean) + spread <= largest_scalar_)) {
+      splat.slope0 = splat.slope1 = splat.half_width = spread = 0;
+      splat.mean = std::clamp(splat.mean, -largest_scalar_, largest_scalar_);
+    }
+    splat.amplitude = std::min(splat.amplitude, kLargestAmplitude);
     if (!(splat.amplitude > 0) || table_.fullyTransparent(splat.mean - spread, splat.mean + spread))
       return Fate::transparent;
     splats_.push_back(splat);
@@ -130,12 +137,23 @@ class Chooser {
   }
 
  private:
+  // Painters find a scalar's place in the table, and depths, in float: beyond these there are infinities, and
+  // infinity minus infinity is no number. Such a splat is drawn flat, and far outside of the table.
+  static constexpr float kLargestCells = 1e30f, kLeastScale = 1e-7f, kLargestAmplitude = 1e30f;
+
   const ClassificationTable& table_;
   const float width_, height_;
   const float reach_;
+  const float largest_scalar_;
   const bool per_pixel_;
   std::vector<ScreenSplat>& splats_;
   std::vector<float>& depths_;
+};
+
+/// What parts and cutting may still give for a brick: pieces that are drawn, and looks at any.
+struct CutBudget {
+  size_t pieces = BrickProjector::kMostPieces;
+  size_t looks = 64 * BrickProjector::kMostPieces;
 };
 
 /// Where a piece lies, and the map that is linear there.
@@ -144,28 +162,29 @@ struct PlacedPiece {
   ScreenRows rows;
 };
 
-/// Calls take(piece, its place) for what is to be drawn of `piece`; false as soon as take() gives it.
+/// Calls take(piece, its place) for what is to be drawn of `piece`; false as soon as take() gives it, or
+/// after more `looks` at pieces, which it counts down.
 template <typename Take>
-bool place(const OrthographicMap& map, const SplatPiece& piece, const Take& take) {
+bool place(const OrthographicMap& map, const SplatPiece& piece, size_t&, const Take& take) {
   const float x = piece.position.x, y = piece.position.y, z = piece.position.z;
   return take(piece, PlacedPiece{map.x + map.rows.x0 * x + map.rows.y0 * y + map.rows.z0 * z,
                                  map.y + map.rows.x1 * x + map.rows.y1 * y + map.rows.z1 * z,
                                  map.depth.x * x + map.depth.y * y + map.depth.z * z, map.volume, map.rows});
 }
 template <typename Take>
-bool place(const PerspectiveMap& map, const SplatPiece& piece, const Take& take) {
-  return cutUp(map, piece, [&](const SplatPiece& part, const PerspectiveMap::Centre& centre) {
+bool place(const PerspectiveMap& map, const SplatPiece& piece, size_t& looks, const Take& take) {
+  return cutUp(map, piece, looks, [&](const SplatPiece& part, const PerspectiveMap::Centre& centre) {
     return take(part, PlacedPiece{map.pixelX(centre), map.pixelY(centre), centre.distance,
                                   map.volumeAt(centre), map.rowsAt(centre)});
   });
 }
 
 /// Takes splat `i` to the parts and pieces that it is drawn as, and chooses among them: the best fate of any.
-/// Nothing if there are more pieces than `pieces_left`, which it counts down.
+/// Nothing if that takes more than what is `left`, which it counts down.
 template <typename Map>
 std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<const float>& geometry,
                                           const VariableArrays<const float>& variable, size_t i,
-                                          uint32_t half_cell, Chooser& chooser, size_t& pieces_left) {
+                                          uint32_t half_cell, Chooser& chooser, CutBudget& left) {
   const SplatPiece whole{{geometry.x[i], geometry.y[i], geometry.z[i]},
                          shapeOf(geometry, i),
                          slopeOf(variable, i),
@@ -175,27 +194,27 @@ std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<c
     return Chooser::Fate::transparent;
   auto best = Chooser::Fate::off_screen;
   const auto take = [&](const SplatPiece& piece, const PlacedPiece& at) {
-    if (pieces_left == 0) return false;
+    if (left.pieces == 0) return false;
     const Ellipse ellipse = ellipseOf(at.rows, piece.shape, piece.slope, variable.variance[i],
                                       piece.weight * at.volume, map.low_pass_px2, map.slope_low_pass_px2);
     const auto fate = chooser.choose(screenSplat(at.x, at.y, ellipse, piece.mean), at.depth);
-    if (fate == Chooser::Fate::kept) --pieces_left;
+    if (fate == Chooser::Fate::kept) --left.pieces;
     best = std::max(best, fate);
     return true;
   };
   BorderPieces parts;
   const size_t count = partsAtBorder(whole, half_cell, parts);
   for (size_t n = 0; n < count; ++n)
-    if (!place(map, parts[n], take)) return {};
+    if (!place(map, parts[n], left.looks, take)) return {};
   return best;
 }
 
-/// False if the brick would give more than `pieces_left`, which it counts down. With `crisp` borders half
+/// False if the brick would take more than what is `left`, which it counts down. With `crisp` borders half
 /// cells are drawn in parts.
 template <typename Map>
 bool projectRange(const Map& map, bool crisp, const LocalBox& clip,
                   const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
-                  const SplatRange& range, Chooser& chooser, size_t& pieces_left, ProjectionCounts& counts) {
+                  const SplatRange& range, Chooser& chooser, CutBudget& left, ProjectionCounts& counts) {
   Block block;
   for (size_t begin = range.begin; begin < range.end; begin += kBlock) {
     const size_t count = std::min(kBlock, range.end - begin);
@@ -208,7 +227,7 @@ bool projectRange(const Map& map, bool crisp, const LocalBox& clip,
       Chooser::Fate fate;
       const uint32_t half_cell = crisp ? geometry.half_cell[begin + n] : kWholeCell;
       if (block.too_wide[n] || half_cell != kWholeCell) {
-        const auto best = choosePieces(map, geometry, variable, begin + n, half_cell, chooser, pieces_left);
+        const auto best = choosePieces(map, geometry, variable, begin + n, half_cell, chooser, left);
         if (!best) return false;
         fate = *best;
       } else {
@@ -229,9 +248,9 @@ template <typename Map>
 bool projectWith(const Map& map, bool crisp, const LocalBox& clip,
                  const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
                  std::span<const SplatRange> ranges, Chooser& chooser, ProjectionCounts& counts) {
-  size_t pieces_left = BrickProjector::kMostPieces;
+  CutBudget left;
   return std::all_of(ranges.begin(), ranges.end(), [&](const SplatRange& range) {
-    return projectRange(map, crisp, clip, geometry, variable, range, chooser, pieces_left, counts);
+    return projectRange(map, crisp, clip, geometry, variable, range, chooser, left, counts);
   });
 }
 
@@ -266,8 +285,10 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
   for (const SplatRange& range : ranges) CURVISPLAT_CHECK_OP(range.end, <=, geometry.size());
   const LocalBox clip(settings.clip_box, cell_min);
   Chooser chooser(settings, table, splats_, depths_);
+  // Where the near plane is too near for float, coarser is not less: then what was cut until there is drawn.
+  constexpr float kCoarsest = 1e30f;
   bool complete = false;
-  for (float coarseness = 1; !complete; coarseness *= 2) {
+  for (float coarseness = 1; !complete && coarseness < kCoarsest; coarseness *= 2) {
     splats_.clear();
     depths_.clear();
     counts_ = {};

@@ -7,6 +7,8 @@
 #pragma once
 
 #include <array>
+#include <cmath>
+#include <cstddef>
 #include <glm/vec3.hpp>
 
 #include "render/splat_ellipse.h"
@@ -27,12 +29,17 @@ struct SplatPiece {
 std::array<SplatPiece, 2> halve(const SplatPiece& piece, int column);
 
 /// Calls take(piece, centre) for the parts of `piece` that are small for their distance and may be in sight.
-/// Stops, and returns false, as soon as take() does.
+/// Stops, and returns false, as soon as take() does, or when `looks_left`, which it counts down, is used up:
+/// a splat that is very large for where it is has parts without end, of which hardly any is taken. One that
+/// is too large or too far for float's squares is in no cache of ours, and is left out.
 template <typename Take>
-bool cutUp(const PerspectiveMap& map, const SplatPiece& piece, const Take& take) {
+bool cutUp(const PerspectiveMap& map, const SplatPiece& piece, size_t& looks_left, const Take& take) {
+  if (looks_left == 0) return false;
+  --looks_left;
   const auto centre = map.centreOf(piece.position.x, piece.position.y, piece.position.z);
   const glm::vec3 columns2 = map.columns2(piece.shape);
   const float radius = map.radiusOf(piece.shape);
+  if (!std::isfinite(radius) || !std::isfinite(centre.distance)) return true;
   if (map.outOfSight(centre, radius)) return true;
   if (!map.tooWide(centre, radius)) return take(piece, centre);
   if (centre.z < map.near && radius <= map.widest * map.near)
@@ -40,7 +47,7 @@ bool cutUp(const PerspectiveMap& map, const SplatPiece& piece, const Take& take)
   int longest = columns2[1] > columns2[0] ? 1 : 0;
   if (columns2[2] > columns2[longest]) longest = 2;
   for (const SplatPiece& half : halve(piece, longest))
-    if (!cutUp(map, half, take)) return false;
+    if (!cutUp(map, half, looks_left, take)) return false;
   return true;
 }
 

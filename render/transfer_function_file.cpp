@@ -17,6 +17,7 @@
 #include "render/transfer_function.h"
 #include "stream/error.h"
 #include "stream/file.h"
+#include "stream/json_text.h"
 
 namespace curvisplat {
 namespace {
@@ -168,6 +169,7 @@ void refuseCategories(const PresetObject& preset) {
 }
 
 Json parse(const std::string& text, const std::filesystem::path& path) {
+  requireShallowJson(text, path.string());
   try {
     return Json::parse(text);
   } catch (const Json::exception& error) {

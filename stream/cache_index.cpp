@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "stream/cache_file.h"
 #include "stream/cache_format.h"
 #include "stream/checksum.h"
 #include "stream/error.h"
@@ -22,6 +23,15 @@ void checkChecksum(const fs::path& path, const FileInfo& info, uint64_t found) {
   if (found != info.checksum)
     throw Error("{}: has the checksum {:016x}, expected {:016x}; the file is damaged: convert again",
                 path.string(), found, info.checksum);
+}
+
+/// What the streams of so many splats can take at the most, packed: their header, the runs or rows, the
+/// planes, and what zstd adds. Whoever reads one takes memory for it.
+uint64_t mostGeometryBytes(uint64_t splats) {
+  return (16 << 10) + 119 * splats;  // 50 and 17 x 4 bytes a splat
+}
+uint64_t mostValuesBytes(uint64_t splats) {
+  return (16 << 10) + 31 * splats;  // 10 and 5 x 4
 }
 
 /// That no two streams of a file share bytes, and that all lie within `begin` and `end`.
@@ -44,25 +54,28 @@ void checkExtents(const fs::path& path, const std::vector<Extent>& extents, uint
 
 class IndexChecker {
  public:
+  /// `bricks` fills up meanwhile.
   IndexChecker(const fs::path& path, const std::vector<Brick>& bricks, const Manifest& manifest)
       : path_(path), bricks_(bricks), manifest_(manifest) {}
 
-  void check() const {
-    uint64_t splats = 0, children = 0, roots = 0;
-    for (size_t n = 0; n < bricks_.size(); ++n) {
-      checkCell(n);
-      checkNumbers(n);
-      checkLinks(n);
-      if (bricks_[n].isLeaf()) splats += bricks_[n].splats;
-      children += bricks_[n].child_count;
-      roots += bricks_[n].cell.level == 0;
-    }
-    if (roots + children != bricks_.size())
+  /// The last brick so far: what those before it say of it, and it of them.
+  void checkLast() {
+    const size_t n = bricks_.size() - 1;
+    checkCell(n);
+    checkNumbers(n);
+    checkLinks(n);
+    if (bricks_[n].isLeaf()) splats_ += bricks_[n].splats;
+    children_ += bricks_[n].child_count;
+    roots_ += bricks_[n].cell.level == 0;
+  }
+
+  void checkAll() const {
+    if (roots_ + children_ != bricks_.size())
       throw Error("{}: {} roots and {} children are not {} bricks; the file is damaged: convert again",
-                  path_.string(), roots, children, bricks_.size());
-    if (splats != manifest_.splats)
+                  path_.string(), roots_, children_, bricks_.size());
+    if (splats_ != manifest_.splats)
       throw Error("{}: its leaves hold {} splats, the manifest says {}; the cache is damaged: convert again",
-                  path_.string(), splats, manifest_.splats);
+                  path_.string(), splats_, manifest_.splats);
     const uint32_t levels = bricks_.back().cell.level + 1;
     if (levels != manifest_.levels)
       throw Error("{}: has {} levels, the manifest says {}; the cache is damaged: convert again",
@@ -97,6 +110,9 @@ class IndexChecker {
     uint64_t octants = 0;
     for (uint32_t splats : brick.octant_splats) octants += splats;
     if (octants != brick.splats) refuse(path_, n, fmt::format("its octants have {} splats", octants));
+    if (brick.geometry.length > mostGeometryBytes(brick.splats))
+      refuse(path_, n,
+             fmt::format("{} bytes are too many for its {} splats", brick.geometry.length, brick.splats));
     if (!(brick.largest_radius > 0 && std::isfinite(brick.largest_radius)))
       refuse(path_, n, fmt::format("its largest radius is {}", brick.largest_radius));
     if (!(brick.error >= 0 && std::isfinite(brick.error)))
@@ -128,8 +144,8 @@ class IndexChecker {
     }
     if (brick.isLeaf()) {
       if (brick.first_child != kNoBrick) refuse(path_, n, "it is a leaf with a child");
-    } else if (brick.first_child <= n || brick.first_child >= bricks_.size() ||
-               brick.child_count > bricks_.size() - brick.first_child) {
+    } else if (brick.first_child <= n || brick.first_child >= manifest_.bricks ||
+               brick.child_count > manifest_.bricks - brick.first_child) {
       refuse(path_, n, fmt::format("it has {} children from brick {}", brick.child_count, brick.first_child));
     }
   }
@@ -137,12 +153,15 @@ class IndexChecker {
   const fs::path& path_;
   const std::vector<Brick>& bricks_;
   const Manifest& manifest_;
+  uint64_t splats_ = 0, children_ = 0, roots_ = 0;
 };
 
-/// The records behind a header that has been read; they are counted by the real file before they get memory.
-template <typename Record, typename Header>
-std::vector<Record> readRecords(const InputFile& file, const Header& header, uint64_t offset,
-                                const Manifest& manifest, const FileInfo& info) {
+/// Calls `use` for each of the records behind a header that has been read. They are counted by the real file,
+/// and come a piece at a time: a file can say that it is large and have no bytes, so that only what `use` has
+/// found good may take memory for good.
+template <typename Record, typename Header, typename Use>
+void readRecords(const InputFile& file, const Header& header, uint64_t offset, const Manifest& manifest,
+                 const FileInfo& info, const Use& use) {
   if (header.magic != Header{}.magic)
     throw Error("{}: does not begin like such a file", file.path().string());
   if (header.version != kCacheVersion || header.record_bytes != sizeof(Record))
@@ -153,13 +172,17 @@ std::vector<Record> readRecords(const InputFile& file, const Header& header, uin
       (file.size() - offset) % sizeof(Record) != 0)
     throw Error("{}: says it has {} bricks from offset {}; its size is {} and the manifest says {} bricks",
                 file.path().string(), header.bricks, offset, file.size(), manifest.bricks);
-  std::vector<Record> records(header.bricks);
-  file.readAt(offset, std::span(records));
   Checksum checksum;
   checksum.add(std::as_bytes(std::span(&header, 1)));
-  checksum.add(std::as_bytes(std::span(records)));
+  constexpr uint64_t kRecordsAtOnce = (1 << 20) / sizeof(Record);
+  std::vector<Record> records;
+  for (uint64_t first = 0; first < header.bricks; first += records.size()) {
+    records.resize(std::min(kRecordsAtOnce, header.bricks - first));
+    file.readAt(offset + first * sizeof(Record), std::span(records));
+    checksum.add(std::as_bytes(std::span(records)));
+    for (const Record& record : records) use(record);
+  }
   checkChecksum(file.path(), info, checksum.value());
-  return records;
 }
 
 }  // namespace
@@ -168,59 +191,72 @@ std::string variableFileName(const VariableInfo& variable) {
   return fmt::format("var.{}.bin", variable.number);
 }
 
-const FileInfo& checkFile(const InputFile& file, const Manifest& manifest) {
-  const std::string name = file.path().filename().string();
+const FileInfo& checkFile(const fs::path& path, uint64_t bytes, const Manifest& manifest) {
+  const std::string name = path.filename().string();
   for (const FileInfo& info : manifest.files) {
     if (info.name != name) continue;
-    if (info.size != file.size())
+    if (info.size != bytes)
       throw Error("{}: has {} bytes, the manifest says {}; the file is truncated or not this cache's",
-                  file.path().string(), file.size(), info.size);
+                  path.string(), bytes, info.size);
     return info;
   }
-  throw Error("{}: is not among the manifest's files; the cache is damaged", file.path().string());
+  throw Error("{}: is not among the manifest's files; the cache is damaged", path.string());
+}
+
+const FileInfo& checkFile(const InputFile& file, const Manifest& manifest) {
+  return checkFile(file.path(), file.size(), manifest);
 }
 
 std::vector<Brick> readBricks(const fs::path& cache, const Manifest& manifest) {
-  const InputFile file(cache / "bricks.bin");
+  const InputFile file(cacheFile(cache, "bricks.bin"));
   const FileInfo& info = checkFile(file, manifest);
   BricksHeader header;
   file.readAt(0, std::span(&header, 1));
-  const auto records = readRecords<BrickRecord>(file, header, sizeof header, manifest, info);
   std::vector<Brick> bricks;
-  std::vector<Extent> extents;
-  bricks.reserve(records.size());
-  for (const BrickRecord& record : records) {
+  IndexChecker checker(file.path(), bricks, manifest);
+  readRecords<BrickRecord>(file, header, sizeof header, manifest, info, [&](const BrickRecord& record) {
     bricks.push_back(brickOf(record));
-    extents.push_back(bricks.back().geometry);
-  }
-  IndexChecker(file.path(), bricks, manifest).check();
+    checker.checkLast();
+  });
+  checker.checkAll();
+  bricks.shrink_to_fit();
+  std::vector<Extent> extents;
+  extents.reserve(bricks.size());
+  for (const Brick& brick : bricks) extents.push_back(brick.geometry);
 
-  const InputFile geometry(cache / manifest.steps.front().geometry);
+  const InputFile geometry(cacheFile(cache, manifest.steps.front().geometry));
   const FileInfo& geometry_info = checkFile(geometry, manifest);
   checkExtents(file.path(), extents, 0, geometry.size());
   checkChecksum(geometry.path(), geometry_info, geometryChecksum(bricks));
   return bricks;
 }
 
-std::vector<BrickVariable> readVariableTable(const InputFile& file, const Manifest& manifest, size_t bricks) {
+std::vector<BrickVariable> readVariableTable(const InputFile& file, const Manifest& manifest,
+                                             std::span<const Brick> bricks) {
   const FileInfo& info = checkFile(file, manifest);
   VariableHeader header;
   file.readAt(0, std::span(&header, 1));
-  const auto records = readRecords<VariableRecord>(file, header, header.table_offset, manifest, info);
-  CURVISPLAT_CHECK_OP(records.size(), ==, bricks);
   std::vector<BrickVariable> table;
+  table.reserve(bricks.size());
+  readRecords<VariableRecord>(
+      file, header, header.table_offset, manifest, info, [&](const VariableRecord& record) {
+        const size_t n = table.size();
+        table.push_back(brickVariableOf(record));
+        const BrickVariable& variable = table.back();
+        const bool fine = std::isfinite(variable.min) && std::isfinite(variable.max) &&
+                          variable.min <= variable.max && variable.largest_slope >= 0 &&
+                          std::isfinite(variable.largest_slope) && variable.largest_deviation >= 0 &&
+                          std::isfinite(variable.largest_deviation);
+        if (!fine) refuse(file.path(), n, "its range, slope or deviation is impossible");
+        if (variable.values.length > mostValuesBytes(bricks[n].splats))
+          refuse(file.path(), n,
+                 fmt::format("{} bytes are too many for its {} splats", variable.values.length,
+                             bricks[n].splats));
+      });
+  CURVISPLAT_CHECK_OP(table.size(), ==, bricks.size());
   std::vector<Extent> extents;
-  table.reserve(records.size());
-  for (size_t n = 0; n < records.size(); ++n) {
-    table.push_back(brickVariableOf(records[n]));
-    const BrickVariable& variable = table.back();
-    extents.push_back(variable.values);
-    const bool fine = std::isfinite(variable.min) && std::isfinite(variable.max) &&
-                      variable.min <= variable.max && variable.largest_slope >= 0 &&
-                      std::isfinite(variable.largest_slope) && variable.largest_deviation >= 0 &&
-                      std::isfinite(variable.largest_deviation);
-    if (!fine) refuse(file.path(), n, "its range, slope or deviation is impossible");
-  }
+  extents.reserve(table.size());
+  for (const BrickVariable& variable : table) extents.push_back(variable.values);
   checkExtents(file.path(), extents, sizeof header, header.table_offset);
   return table;
 }

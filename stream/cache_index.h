@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,9 +20,11 @@ std::string variableFileName(const VariableInfo& variable);
 std::vector<Brick> readBricks(const std::filesystem::path& cache, const Manifest& manifest);
 
 /// The table of a var.<number>.bin. Throws Error.
-std::vector<BrickVariable> readVariableTable(const InputFile& file, const Manifest& manifest, size_t bricks);
+std::vector<BrickVariable> readVariableTable(const InputFile& file, const Manifest& manifest,
+                                             std::span<const Brick> bricks);
 
-/// Throws Error unless the manifest lists `file` with the size it has.
+/// Throws Error unless the manifest lists the file with the size it has.
 const FileInfo& checkFile(const InputFile& file, const Manifest& manifest);
+const FileInfo& checkFile(const std::filesystem::path& path, uint64_t bytes, const Manifest& manifest);
 
 }  // namespace curvisplat

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "stream/brick_codec.h"
+#include "stream/cache_file.h"
 #include "stream/cache_format.h"
 #include "stream/cache_index.h"
 #include "stream/checksum.h"
@@ -25,10 +26,10 @@ Manifest readManifest(const fs::path& cache) {
     throw Error("{}: there is no such cache", cache.string());
   }
   if (!fs::is_directory(cache)) throw Error("{}: is not a folder; a splat cache is one", cache.string());
-  const fs::path path = cache / "manifest.json";
-  if (!fs::exists(path))
+  if (!fs::exists(cache / "manifest.json"))
     throw Error("{}: has no manifest.json: it is no splat cache, or one whose conversion was not finished",
                 cache.string());
+  const fs::path path = cacheFile(cache, "manifest.json");
   return Manifest::fromJson(readTextFile(path), path);
 }
 
@@ -36,14 +37,25 @@ Manifest readManifest(const fs::path& cache) {
 
 struct CacheReader::State {
   explicit State(const fs::path& cache)
-      : path(cache), manifest(readManifest(cache)), geometry(cache / manifest.steps.front().geometry) {
+      : path(cache),
+        manifest(readManifest(cache)),
+        geometry(cacheFile(cache, manifest.steps.front().geometry)) {
     bricks = readBricks(path, manifest);
     checkFile(geometry, manifest);
     for (const VariableInfo& variable : manifest.variables) {
-      values.emplace_back(path / variableFileName(variable));
-      tables.push_back(readVariableTable(values.back(), manifest, bricks.size()));
+      values.emplace_back(cacheFile(path, variableFileName(variable)));
+      tables.push_back(readVariableTable(values.back(), manifest, bricks));
     }
-    checkFile(InputFile(path / "bricks.vdb"), manifest);
+    checkGrids();
+  }
+
+  /// bricks.vdb is for others' tools, and their parsers trust it: it is not even opened here.
+  void checkGrids() const {
+    const fs::path grids = cacheFile(path, "bricks.vdb");
+    std::error_code error;
+    const uint64_t bytes = fs::file_size(grids, error);
+    if (error) throw Error("{}: {}; the cache is not whole", grids.string(), error.message());
+    checkFile(grids, bytes, manifest);
   }
 
   /// The bytes of a brick's stream, in the thread's scratch.

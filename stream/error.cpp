@@ -1,9 +1,16 @@
 #include "stream/error.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 
 namespace curvisplat {
+
+std::string oneLine(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c == 0x7f; }, ' ');
+  return text;
+}
 
 void checkFailed(const char* file, int line, const char* expression, const std::string& values) {
   fmt::print(stderr, "curvisplat: internal error at {}:{}: {} does not hold{}{}\n", file, line, expression,

@@ -12,15 +12,20 @@
 
 namespace curvisplat {
 
+/// `text` with a space for each control character: texts quote names and words of files, and go to a
+/// terminal.
+std::string oneLine(std::string text);
+
 /// The work failed: exit status 1. The text is one line: what, where, what was expected and found, what to
 /// do.
 class Error : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  explicit Error(const std::string& text) : std::runtime_error(oneLine(text)) {}
+  explicit Error(const char* text) : Error(std::string(text)) {}
 
   template <typename... Args>
   explicit Error(fmt::format_string<Args...> format, Args&&... args)
-      : std::runtime_error(fmt::format(format, std::forward<Args>(args)...)) {}
+      : Error(fmt::format(format, std::forward<Args>(args)...)) {}
 };
 
 /// The command line asks for something that does not exist or does not fit together: exit status 2.

@@ -233,6 +233,9 @@ std::string readTextFile(const std::filesystem::path& path, uint64_t limit) {
 void writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
   std::filesystem::path temporary = path;
   temporary += ".part";
+  // What is there may be a link that leads anywhere: it would be followed.
+  std::error_code none_there;
+  std::filesystem::remove(temporary, none_there);
   try {
     OutputFile file(temporary);
     file.append(bytes);

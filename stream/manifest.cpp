@@ -9,6 +9,7 @@
 
 #include "stream/cache_format.h"
 #include "stream/error.h"
+#include "stream/json_text.h"
 
 namespace curvisplat {
 namespace {
@@ -17,6 +18,11 @@ using Json = nlohmann::ordered_json;
 
 constexpr uint64_t kOldestVersion = 1;
 constexpr const char* kFormat = "curvisplat splat cache";
+// A hundred thousand blocks take half of it; parsed, a text takes some twenty times its size.
+constexpr size_t kLargestText = 16 << 20;
+// Squares and volumes of lengths below it are finite, and so are sums of positions.
+constexpr double kLargestCoordinate = 1e100;
+constexpr uint64_t kLargestVariableNumber = 0x7fffffff;
 
 Json jsonOf(const glm::dvec3& v) {
   return Json::array({v.x, v.y, v.z});
@@ -35,7 +41,7 @@ class Fields {
   std::string text(const char* name) const {
     const Json& value = at(name);
     if (!value.is_string()) fail(name, "a text", value);
-    return value.get<std::string>();
+    return oneLine(value.get<std::string>());
   }
 
   double number(const char* name) const { return numberOf(at(name), name); }
@@ -44,10 +50,14 @@ class Fields {
     return countOf(at(name), name, least, most);
   }
 
-  glm::dvec3 vector(const char* name) const {
+  glm::dvec3 point(const char* name) const {
     const Json& value = at(name);
     if (!value.is_array() || value.size() != 3) fail(name, "three numbers", value);
-    return {numberOf(value[0], name), numberOf(value[1], name), numberOf(value[2], name)};
+    const glm::dvec3 point(numberOf(value[0], name), numberOf(value[1], name), numberOf(value[2], name));
+    for (int axis = 0; axis < 3; ++axis)
+      if (std::abs(point[axis]) > kLargestCoordinate)
+        fail(name, fmt::format("three numbers up to {}", kLargestCoordinate), value);
+    return point;
   }
 
   /// A checksum as 16 hexadecimal digits: JSON's numbers are doubles to many readers.
@@ -63,8 +73,7 @@ class Fields {
   /// A file of the cache: its name must not lead anywhere else.
   std::string fileName(const char* name) const {
     const std::string file = text(name);
-    const bool plain = !file.empty() && file != "." && file != ".." && file.find('/') == std::string::npos &&
-                       file.find('\0') == std::string::npos;
+    const bool plain = !file.empty() && file != "." && file != ".." && file.find('/') == std::string::npos;
     if (!plain) fail(name, "a plain file name", at(name));
     return file;
   }
@@ -80,7 +89,7 @@ class Fields {
     std::vector<std::string> out;
     for (const Json& value : array(name)) {
       if (!value.is_string()) fail(name, "an array of texts", value);
-      out.push_back(value.get<std::string>());
+      out.push_back(oneLine(value.get<std::string>()));
     }
     return out;
   }
@@ -142,11 +151,12 @@ bool allDifferent(std::vector<T> values) {
 
 void readRoot(const Fields& fields, Manifest& manifest, const Json& json) {
   const Fields root = fields.object("root");
-  manifest.root.min = root.vector("min");
+  manifest.root.min = root.point("min");
   manifest.root.size = root.number("size");
-  if (!(manifest.root.size > 0)) root.fail("size", "more than 0", json["root"]["size"]);
-  manifest.lower = fields.vector("lower");
-  manifest.upper = fields.vector("upper");
+  if (!(manifest.root.size > 0 && manifest.root.size <= kLargestCoordinate))
+    root.fail("size", fmt::format("more than 0, up to {}", kLargestCoordinate), json["root"]["size"]);
+  manifest.lower = fields.point("lower");
+  manifest.upper = fields.point("upper");
   for (int axis = 0; axis < 3; ++axis)
     if (manifest.lower[axis] > manifest.upper[axis]) fields.fail("lower", "at most 'upper'", json["lower"]);
 }
@@ -165,11 +175,14 @@ void readVariables(const Fields& fields, Manifest& manifest, const Json& json) {
   std::vector<std::string> names;
   fields.eachObject("variables", [&](const Fields& entry) {
     VariableInfo variable;
-    variable.number = static_cast<uint32_t>(entry.count("number", 0, std::numeric_limits<uint32_t>::max()));
+    variable.number = static_cast<uint32_t>(entry.count("number", 0, kLargestVariableNumber));
     variable.name = entry.text("name");
     variable.unit = entry.text("unit");
     variable.min = entry.number("min");
     variable.max = entry.number("max");
+    constexpr double kLargest = std::numeric_limits<float>::max();  // splats' values are floats
+    if (!(variable.min >= -kLargest && variable.min <= variable.max && variable.max <= kLargest))
+      entry.fail("min", "at most 'max', and both floats", variable.min);
     numbers.push_back(variable.number);
     names.push_back(variable.name);
     manifest.variables.push_back(std::move(variable));
@@ -247,6 +260,11 @@ std::string Manifest::toJson() const {
 }
 
 Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path& path) {
+  if (text.size() > kLargestText)
+    throw Error(
+        "{}: has {} bytes, more than the {} that a manifest can have; the file is damaged or not a cache's",
+        path.string(), text.size(), kLargestText);
+  requireShallowJson(text, path.string());
   Json json;
   try {
     json = Json::parse(text);

@@ -28,10 +28,15 @@ struct Scale {
   float mean(uint32_t code) const {
     return static_cast<float>(lower + static_cast<int32_t>(code) * mean_step);
   }
-  float slope(uint32_t code) const { return static_cast<float>(static_cast<int32_t>(code) * slope_step); }
+  float slope(uint32_t code) const { return bounded(static_cast<int32_t>(code) * slope_step); }
   float variance(uint32_t code) const {
     const double deviation = static_cast<int32_t>(code) * deviation_step;
-    return static_cast<float>(deviation * deviation);
+    return bounded(deviation * deviation);
+  }
+  /// As a float: squares of scalars above 1e19 are larger than any.
+  static float bounded(double value) {
+    constexpr double kLargest = std::numeric_limits<float>::max();
+    return static_cast<float>(std::clamp(value, -kLargest, kLargest));
   }
 
   double lower, mean_step, slope_step, deviation_step;

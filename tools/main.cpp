@@ -35,6 +35,7 @@ int main(int argc, char** argv) {
   addInfo(app);
   addRender(app);
   addView(app);
+  addBench(app);
   addGenerate(app);
   addCompare(app);
 

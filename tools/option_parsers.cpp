@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "stream/error.h"
@@ -97,6 +98,23 @@ uint64_t parseByteSize(std::string_view option, std::string_view text) {
   if (!number || shift < 0 || bytes < 1 || bytes > 0x1p62)
     throw UsageError("{} {}: expected a size such as 512M or 2G (K, M, G, T; powers of 1024)", option, text);
   return static_cast<uint64_t>(bytes);
+}
+
+uint64_t parseCount(std::string_view option, std::string_view text) {
+  const std::string_view digits = text.substr(0, text.find_first_not_of("0123456789"));
+  const std::string_view letter = text.substr(digits.size());
+  const auto number = whole<uint64_t>(digits);
+  const size_t power = letter.empty() ? 0 : std::string_view("KMG").find(letter) + 1;
+  uint64_t count = number.value_or(0);
+  bool fits = count > 0 && letter.size() <= 1 && power <= 3 && (letter.empty() || power > 0);
+  for (size_t n = 0; n < power && fits; ++n) {
+    fits = count <= std::numeric_limits<uint64_t>::max() / 1000;
+    count *= 1000;
+  }
+  if (!fits)
+    throw UsageError("{} {}: expected a number above zero such as 500000 or 8M (K, M, G; powers of 1000)",
+                     option, text);
+  return count;
 }
 
 glm::vec4 parseBackground(std::string_view option, std::string_view text) {

@@ -27,6 +27,7 @@
 #include "tools/option_parsers.h"
 #include "tools/render_statistics.h"
 #include "tools/run_statistics.h"
+#include "tools/scalar_words.h"
 
 namespace curvisplat {
 namespace {
@@ -35,10 +36,11 @@ namespace {
 struct RenderWords {
   std::filesystem::path cache, output, first_image, statistics;
   CameraWords camera;
-  std::string size = "600x600", scalar, transfer_function = "viridis", background = "white";
+  ScalarWords scalar;
+  std::string size = "600x600", background = "white";
   std::string classify = "pixel", scale = "1,1,1", backend = "auto", memory = "512M";
   std::string lod_pixels = "1";
-  std::optional<std::string> range, opacity_unit, clip_box, frame_rate;
+  std::optional<std::string> clip_box, frame_rate;
   std::optional<uint64_t> max_splats;
   unsigned threads = 0;
   bool keep_going = false;
@@ -93,31 +95,6 @@ void checkWords(const RenderWords& words, ImageSize size) {
     checkOutputFolder("--first-image", words.first_image);
   }
   if (!words.statistics.empty()) checkOutputFolder("--stats", words.statistics);
-}
-
-/// A scalar that the cache lacks is bad input, not wrong usage: the cache decides.
-size_t chooseVariable(const CacheReader& cache, const std::string& name) {
-  try {
-    return cache.variableNamed(name);
-  } catch (const UsageError& error) {
-    throw Error("{}", error.what());
-  }
-}
-
-TransferFunction chooseTransferFunction(const RenderWords& words, const VariableInfo& variable,
-                                        double diagonal) {
-  const double default_unit = diagonal > 0 ? diagonal / 100 : 1;
-  const double unit = words.opacity_unit ? parsePositive("--opacity-unit", *words.opacity_unit) : 0;
-  std::optional<std::pair<double, double>> range;
-  if (words.range) {
-    const auto ends = parseNumbers("--range", *words.range, "LO,HI");
-    if (!(ends[0] < ends[1])) throw UsageError("--range {}: expected LO,HI with LO < HI", *words.range);
-    range.emplace(ends[0], ends[1]);
-  }
-  if (words.transfer_function.ends_with(".json"))
-    return TransferFunction::fromFile(words.transfer_function, range ? &*range : nullptr, unit, default_unit);
-  return TransferFunction::preset(words.transfer_function, range ? range->first : variable.min,
-                                  range ? range->second : variable.max, unit > 0 ? unit : default_unit);
 }
 
 void tell(const char* kind, const std::string& text) {
@@ -252,7 +229,8 @@ void render(const RenderWords& words) {
   const VariableInfo& info = manifest.variables[variable];
   const glm::dvec3 lower = manifest.lower * options.scale, upper = manifest.upper * options.scale;
   const CameraMotion motion = chooseCameraMotion(words.camera, lower, upper, options.size);
-  const TransferFunction transfer_function = chooseTransferFunction(words, info, glm::length(upper - lower));
+  const TransferFunction transfer_function =
+      chooseTransferFunction(words.scalar, info, glm::length(upper - lower));
   for (const std::string& note : transfer_function.notes()) tell("note", note);
   const std::string range_warning = rangeMissesScalar(info, transfer_function);
   if (!range_warning.empty()) tell("warning", range_warning);
@@ -277,23 +255,10 @@ void addRender(CLI::App& app) {
                    "The picture: .png, .exr or .pfm; of several frames: frame_%04d.png, or NAME.mp4 (ffmpeg)")
       ->required();
   command->add_option("--size", words->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
-  command->add_option("--scalar", words->scalar, "Name of the scalar; the cache's first otherwise");
+  addScalarOption(*command, words->scalar);
 
   const std::string what = "What to see";
-  command
-      ->add_option("--tf", words->transfer_function,
-                   fmt::format("Transfer function: {}, or a ParaView preset FILE.json", presetNames()))
-      ->capture_default_str()
-      ->group(what);
-  command
-      ->add_option(
-          "--range", words->range,
-          "LO,HI: stretch it over these scalars; the scalar's own range otherwise (a file: as it is)")
-      ->group(what);
-  command
-      ->add_option("--opacity-unit", words->opacity_unit,
-                   "Length, in world units, that opacities are for; 1/100 of the data's diagonal otherwise")
-      ->group(what);
+  addFunctionOptions(*command, words->scalar, what);
   command
       ->add_option("--classify", words->classify,
                    "pixel: the scalar varies within a splat; flat: one colour a splat")

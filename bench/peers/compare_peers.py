@@ -244,7 +244,7 @@ def display(named):
 
 
 def python_with_vtk(named):
-    tried = [named] if named else [sys.executable, "/usr/bin/python3", "pvpython"]
+    tried = [named] if named else [sys.executable, "/usr/bin/python3"]
     for python in tried:
         if shutil.which(python) and subprocess.run([python, "-c", "import vtk"], capture_output=True).returncode == 0:
             return python

@@ -5,7 +5,7 @@
 
 JOB.json has what compare_peers.py writes: files, scalar, technique, camera, size, function, frames and the picture to
 write. The answer, one JSON object, goes to standard output. One process a picture: its peak memory is the technique's.
-Needs Debian's python3-vtk9, or any Python with VTK 9 (pvpython).
+Needs Debian's python3-vtk9, or any Python with VTK 9.
 """
 import json
 import math

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace curvisplat {
 namespace {
 
@@ -36,6 +38,15 @@ TEST(AxisTicks, OfALogarithmStandAtPowersOfTen) {
 
 TEST(AxisTicks, OfARangeWithoutLengthIsOne) {
   EXPECT_EQ(labels(3, 3, 5), Labels{"3"});
+}
+
+TEST(AxisTicks, EndWhereNumbersHardlyDiffer) {
+  for (const double low : {1.0, -1e30, 1e-30})
+    for (const bool log_scale : {false, true}) {
+      if (log_scale && low < 0) continue;
+      const double high = std::nextafter(low, 1e300);
+      EXPECT_EQ(axisTicks(low, high, 5, log_scale).size(), 1u) << low;
+    }
 }
 
 }  // namespace

@@ -278,6 +278,36 @@ TEST(Projection, CountsWhatItLeavesOut) {
   EXPECT_EQ(projector.splats().size(), 1u);
 }
 
+TEST(Projection, DrawsFlatWhatHasNoFiniteReach) {
+  // A painter that gets an infinite reach finds infinity minus infinity.
+  SplatGeometry geometry;
+  SplatVariable variable;
+  TestSplat splat;
+  splat.splat.axis = {1e-1, 1e-1, 1e-1};
+  splat.splat.weight = 1e-3;
+  for (const double slope : {1e25, 3e38}) {
+    splat.scalar = {-0.9 * slope, glm::dvec3(slope), 0};
+    splat.appendTo(geometry, variable, glm::dvec3(-1));
+  }
+  const ClassificationTable table(
+      [](double) {
+        return TransferFunction::Value{glm::dvec3(1), 1.0};
+      },
+      0, 1e25);
+  Camera camera;
+  camera.position = {0, 0, 2};
+  BrickProjector projector;
+  projector.project({ScreenView::of(camera, kSize, glm::dvec3(1), 1.5, 1e-3), true}, table, glm::dvec3(-1),
+                    geometry, variable);
+  ASSERT_EQ(projector.splats().size(), 2u);
+  for (const ScreenSplat& drawn : projector.splats()) {
+    EXPECT_LT(drawn.mean, -1e24f);
+    EXPECT_EQ(drawn.slope0, 0);
+    EXPECT_EQ(drawn.slope1, 0);
+    EXPECT_EQ(drawn.half_width, 0);
+  }
+}
+
 TEST(Projection, LeavesNothingOutThatCanBeSeen) {
   // Splats that a coarse test calls transparent must have no extinction at any offset.
   Random random(8);

@@ -91,7 +91,8 @@ TEST(SplatCutter, PiecesInSightAreSmallForTheirDistanceAndMergeIntoTheWhole) {
     // All of it in sight: far enough, and a wide angle.
     const PerspectiveMap map(viewFrom({0, 0, 9}, 140), glm::dvec3(0), 0.04f);
     std::vector<SplatPiece> pieces;
-    ASSERT_TRUE(cutUp(map, whole, [&](const SplatPiece& piece, const PerspectiveMap::Centre& centre) {
+    size_t looks = 1'000'000;
+    ASSERT_TRUE(cutUp(map, whole, looks, [&](const SplatPiece& piece, const PerspectiveMap::Centre& centre) {
       EXPECT_LE(map.radiusOf(piece.shape), map.widest * centre.z * 1.0001f);
       pieces.push_back(piece);
       return true;
@@ -107,11 +108,32 @@ TEST(SplatCutter, APencilIsCutAcrossOnly) {
   pencil.position = {0, 0, -0.3f};
   pencil.shape = {1e-3f, 1e-3f, 1.0f, 0, 0, 0};
   pencil.weight = 1;
-  size_t pieces = 0;
-  ASSERT_TRUE(cutUp(PerspectiveMap(viewFrom({0.05, 0, 0}, 60), glm::dvec3(0), 1), pencil,
+  size_t pieces = 0, looks = 10'000;
+  ASSERT_TRUE(cutUp(PerspectiveMap(viewFrom({0.05, 0, 0}, 60), glm::dvec3(0), 1), pencil, looks,
                     [&](const SplatPiece&, const PerspectiveMap::Centre&) { return ++pieces < 1000; }));
   EXPECT_GT(pieces, 3u);
   EXPECT_LT(pieces, 100u);
+}
+
+// Such splats are in no cache that conversion makes, and in any that somebody wants to hang a program with.
+TEST(SplatCutter, EndsWhateverTheSize) {
+  const ClassificationTable table([](double) { return TransferFunction::Value{glm::dvec3(1), 1.0}; }, 0, 1);
+  for (const float size : {1e9f, 1e18f, 1e30f, 3e38f})
+    for (const double near : {1e-3, 1e-300}) {
+      SplatGeometry geometry;
+      SplatVariable variable;
+      geometry.resize(1);
+      variable.resize(1);
+      for (auto* array : {&geometry.axis0, &geometry.axis1, &geometry.axis2, &geometry.weight})
+        (*array)[0] = size;
+      geometry.shear10[0] = geometry.shear20[0] = geometry.shear21[0] = 1;
+      variable.mean[0] = 0.5f;
+      ProjectionSettings settings{viewFrom({0.1, 0.2, 0.3}, 60)};
+      settings.view.near = near;
+      BrickProjector projector;
+      projector.project(settings, table, glm::dvec3(0), geometry, variable);
+      EXPECT_LE(projector.splats().size(), BrickProjector::kMostSplats);
+    }
 }
 
 // A brick around the eye: nothing is smeared over the screen, nothing is not finite, and the number of pieces

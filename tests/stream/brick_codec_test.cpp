@@ -282,6 +282,19 @@ TEST(Codec, KeepsHalfCells) {
               1e-6);
 }
 
+TEST(Codec, CutsOffVariancesThatNoFloatHolds) {
+  RandomBrick like;
+  like.value = 1e30;
+  const RootCube root{};
+  BrickSplats brick = randomBrick(like, Cell{}, 2);
+  const EncodedBrick encoded = encodeBrick(root, brick);
+  SplatVariable values;
+  decodeVariable(encoded.brick, encoded.variables[0], encoded.values[0], values);
+  EXPECT_EQ(*std::max_element(values.variance.begin(), values.variance.end()),
+            std::numeric_limits<float>::max());
+  EXPECT_GT(*std::max_element(values.mean.begin(), values.mean.end()), 0.9e30f);
+}
+
 TEST(Codec, KeepsAllWeightsZero) {
   BrickSplats brick = randomBrick({}, Cell{}, 3);
   for (Splat& splat : brick.splats) splat.weight = 0;

@@ -129,6 +129,14 @@ TEST_F(FileTest, GoesOnWithAFileThatIsThere) {
   EXPECT_EQ(emptied.size(), 0u);
 }
 
+TEST_F(FileTest, AnAtomicWriteFollowsNoLink) {
+  writeFileAtomically(folder / "other", std::string("mine"));
+  std::filesystem::create_symlink(folder / "other", folder / "file.part");
+  writeFileAtomically(folder / "file", std::string("new"));
+  EXPECT_EQ(readTextFile(folder / "other"), "mine");
+  EXPECT_EQ(readTextFile(folder / "file"), "new");
+}
+
 TEST_F(FileTest, AnAtomicWriteThatFailsLeavesTheOldFile) {
   writeFileAtomically(folder / "file", std::string("old"));
   for (const char* stage : {"write", "sync", "rename"}) {

@@ -126,6 +126,10 @@ TEST(Manifest, RefusesWhatIsOutOfRange) {
   refused([](Json& j) { j["root"]["size"] = -1; });
   refused([](Json& j) { j["root"]["min"] = {1, 2}; });
   refused([](Json& j) { j["lower"][1] = 1e9; });
+  refused([](Json& j) { j["lower"][1] = -1e150; });
+  refused([](Json& j) { j["root"]["size"] = 1e150; });
+  refused([](Json& j) { j["root"]["min"][2] = 1e308; });
+  refused([](Json& j) { j["variables"][0]["number"] = 0xffffffff; });  // the next one is 0 again
   refused([](Json& j) { j["blocks"][0]["ni"] = 0; });
   refused([](Json& j) { j["blocks"][0]["ni"] = -5; });
   refused([](Json& j) { j["nodes"] = 1.5; });
@@ -146,6 +150,30 @@ TEST(Manifest, RefusesWhatIsOutOfRange) {
     refused([&](Json& j) { j["files"][0]["name"] = name; });
     refused([&](Json& j) { j["steps"][0]["geometry"] = name; });
   }
+}
+
+TEST(Manifest, RefusesBracketsWithoutEnd) {
+  for (const char* bracket : {"[", "{\"a\":"}) {
+    std::string text;
+    for (int n = 0; n < 100'000; ++n) text += bracket;
+    EXPECT_THROW(Manifest::fromJson(text, "m"), Error);
+  }
+  Json json = Json::parse(example().toJson());
+  json["title"] = std::string(1000, '[');  // in a text they are letters
+  EXPECT_EQ(Manifest::fromJson(json.dump(), "m").title.size(), 1000u);
+  json["title"] = "\"" + std::string(1000, '[');
+  EXPECT_EQ(Manifest::fromJson(json.dump(), "m").title.size(), 1001u);
+}
+
+TEST(Manifest, TextsAreOneLineAndNothingToATerminal) {
+  Json json = Json::parse(example().toJson());
+  json["title"] = "a\nb\x1b[2Jc\x7f";
+  json["variables"][0]["name"] = "p\r\ncurvisplat: done";
+  json["sources"] = {"a\tb"};
+  const Manifest manifest = Manifest::fromJson(json.dump(), "m");
+  EXPECT_EQ(manifest.title, "a b [2Jc ");
+  EXPECT_EQ(manifest.variables[0].name, "p  curvisplat: done");
+  EXPECT_EQ(manifest.sources[0], "a b");
 }
 
 TEST(Manifest, RefusesTextThatIsNotJson) {

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "stream/error.h"
+#include "stream/json_text.h"
 
 namespace curvisplat {
 namespace {
@@ -172,6 +173,7 @@ std::string toJson(const ViewState& state) {
 
 ViewState viewStateFromJson(const std::string& text, const std::filesystem::path& path,
                             const Manifest& manifest) {
+  requireShallowJson(text, path.string());
   Json json;
   try {
     json = Json::parse(text);

@@ -1,0 +1,36 @@
+// The kernel and its footprint, one core. Items are values.
+#include <benchmark/benchmark.h>
+
+#include <cstdint>
+
+#include "render/kernel.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr int kValues = 1024;
+
+void kernelValues(benchmark::State& state) {
+  for (auto _ : state)
+    for (int n = 0; n < kValues; ++n) benchmark::DoNotOptimize(kernel(kKernelSupport * n / kValues));
+  state.SetItemsProcessed(kValues * static_cast<int64_t>(state.iterations()));
+}
+BENCHMARK(kernelValues);
+
+/// By quadrature.
+void footprintValues(benchmark::State& state) {
+  for (auto _ : state)
+    for (int n = 0; n < kValues; ++n) benchmark::DoNotOptimize(footprint(kKernelSupport * n / kValues));
+  state.SetItemsProcessed(kValues * static_cast<int64_t>(state.iterations()));
+}
+BENCHMARK(footprintValues)->Unit(benchmark::kMillisecond);
+
+/// As painters make it once.
+void footprintTableOfAPainter(benchmark::State& state) {
+  for (auto _ : state) benchmark::DoNotOptimize(footprintTable(kValues).data());
+  state.SetItemsProcessed((kValues + 1) * static_cast<int64_t>(state.iterations()));
+}
+BENCHMARK(footprintTableOfAPainter)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,20 @@
+// Pictures: PFM is read here; PNG and EXR by libraries, with checks of ours before them.
+#include "render/image.h"
+
+#include "stream/error.h"
+#include "tests/fuzz/fuzz_target.h"
+
+namespace curvisplat {
+namespace {
+
+void run(std::span<const std::byte> bytes) {
+  const Image image = readImage(fuzzFile("picture", bytes));
+  CURVISPLAT_CHECK_OP(
+      image.rgba.size(), ==,
+      size_t{4} * static_cast<size_t>(image.size.width) * static_cast<size_t>(image.size.height));
+}
+
+const RegisteredFuzzTarget registered("image", run);
+
+}  // namespace
+}  // namespace curvisplat

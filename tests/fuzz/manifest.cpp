@@ -1,0 +1,20 @@
+// manifest.json. What is read is written and read again as the same.
+#include "stream/manifest.h"
+
+#include "stream/error.h"
+#include "tests/fuzz/fuzz_target.h"
+
+namespace curvisplat {
+namespace {
+
+void run(std::span<const std::byte> bytes) {
+  const Manifest manifest = Manifest::fromJson(std::string(textOf(bytes)), "manifest.json");
+  const std::string text = manifest.toJson();
+  const std::string again = Manifest::fromJson(text, "again.json").toJson();
+  CURVISPLAT_CHECK(text == again);
+}
+
+const RegisteredFuzzTarget registered("manifest", run);
+
+}  // namespace
+}  // namespace curvisplat

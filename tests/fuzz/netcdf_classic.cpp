@@ -1,0 +1,19 @@
+// The header of classic NetCDF files, by which we tell whether one is whole. The rest is libnetcdf's.
+#include "preprocess/netcdf_classic.h"
+
+#include "preprocess/netcdf_file.h"
+#include "tests/fuzz/fuzz_target.h"
+
+namespace curvisplat {
+namespace {
+
+void run(std::span<const std::byte> bytes) {
+  if (!textOf(bytes).starts_with("CDF")) return;
+  const InputFile file(fuzzFile("a.nc", bytes));
+  if (NetcdfFile::recognises(file)) checkClassicNetcdf(file);
+}
+
+const RegisteredFuzzTarget registered("netcdf_classic", run);
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,31 @@
+// Both streams of a brick as they are in a file: what zstd is given.
+//
+//   splats u16 | level u8 | stream
+#include <vector>
+
+#include "stream/brick_codec.h"
+#include "stream/error.h"
+#include "tests/fuzz/fuzz_target.h"
+
+namespace curvisplat {
+namespace {
+
+void run(std::span<const std::byte> bytes) {
+  FuzzInput input(bytes);
+  Brick brick;
+  brick.splats = input.take<uint16_t>() + 1u;
+  const auto level = input.take<uint8_t>();
+  brick.cell.level = level % (kMaxLevel + 1);
+  if (level & 0x80) {
+    SplatVariable values;
+    decodeVariable(brick, {}, input.rest(), values);
+  } else {
+    SplatGeometry splats;
+    decodeGeometry({}, brick, input.rest(), splats);
+  }
+}
+
+const RegisteredFuzzTarget registered("packed_stream", run);
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,60 @@
+#!/usr/bin/env bash
+# Fuzzes every target, one after another, and prints a table: tests/fuzz/run.sh [SECONDS_A_TARGET [TARGET ...]]
+# Exit 1 if there are findings. SECONDS_A_TARGET is processor time (600 unless told).
+#
+# Needs clang and the preset "fuzz" built (tests/README.md). What it works with is under build/fuzz/corpus/: inputs
+# that reach new code, by target, which the next run begins with; findings/<target>/ has what went wrong. Each
+# finding is mended, and its input put into tests/fuzz/corpus/<target>/, where the ordinary tests replay it.
+set -euo pipefail
+
+seconds=${1:-600}
+shift || true
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+build=$root/build/fuzz
+work=${CURVISPLAT_FUZZ_WORK:-$build/corpus}
+
+if [[ $# -gt 0 ]]; then
+  targets=("$@")
+else
+  targets=()
+  for folder in "$root"/tests/fuzz/corpus/*/; do targets+=("$(basename "$folder")"); done
+fi
+
+# Files that targets read go through memory.
+scratch=$(mktemp -d -p "$([[ -d /dev/shm ]] && echo /dev/shm || echo "${TMPDIR:-/tmp}")" curvisplat_fuzz.XXXXXX)
+trap 'rm -rf "$scratch"' EXIT
+export TMPDIR=$scratch
+export ASAN_OPTIONS=allocator_may_return_null=0:detect_leaks=1:${ASAN_OPTIONS:-}
+
+findings=0
+row='%-18s %12s %9s %9s %8s %8s\n'
+printf "$row" target executions cpu_s exec/s edges findings
+for target in "${targets[@]}"; do
+  program=$build/tests/fuzz/fuzz_$target
+  mkdir -p "$work/$target" "$work/findings/$target"
+  seeds=("$root/tests/fuzz/corpus/$target")
+  if [[ $target == vtk_* ]]; then seeds+=("$root/tests/data/vtk"); fi
+  log=$work/$target.log
+  : >"$log"
+  executions=0 cpu=0 edges=0
+  TIMEFORMAT='%U %S'
+  # By processor time: a run is cut short by whoever else has the machine.
+  while awk -v used="$cpu" -v all="$seconds" 'BEGIN { exit !(used + 1 < all) }'; do
+    left=$(awk -v used="$cpu" -v all="$seconds" 'BEGIN { printf "%d", all - used }')
+    status=0
+    {
+      time "$program" "$work/$target" "${seeds[@]}" -max_total_time="$left" -rss_limit_mb=2048 \
+        -malloc_limit_mb=512 -timeout=300 -max_len=65536 -print_final_stats=1 \
+        -artifact_prefix="$work/findings/$target/" >>"$log" 2>&1 || status=$?
+    } 2>"$scratch/times"
+    cpu=$(awk -v used="$cpu" 'NF == 2 { used += $1 + $2 } END { print used }' "$scratch/times")
+    executions=$(awk '/stat::number_of_executed_units/ { sum += $2 } END { print sum + 0 }' "$log")
+    edges=$(awk '{ for (n = 1; n < NF; ++n) if ($n == "cov:" && $(n + 1) > most) most = $(n + 1) } END { print most + 0 }' "$log")
+    [[ $status -eq 0 ]] || break
+  done
+  found=$(find "$work/findings/$target" -type f | wc -l)
+  findings=$((findings + found))
+  printf "$row" "$target" "$executions" "$(printf '%.0f' "$cpu")" \
+    "$(awk -v n="$executions" -v s="$cpu" 'BEGIN { printf "%d", (s > 0 ? n / s : 0) }')" "$edges" "$found"
+done
+[[ $findings -eq 0 ]]

@@ -1,0 +1,21 @@
+// What the VTK targets share.
+#pragma once
+
+#include "preprocess/vtk_legacy.h"
+#include "preprocess/vtk_xml.h"
+#include "tests/fuzz/fuzz_target.h"
+#include "tests/fuzz/grid_reading.h"
+
+namespace curvisplat {
+
+inline void readVtk(std::string_view name, std::span<const std::byte> bytes) {
+  OpenGridOptions options;
+  options.grid = fuzzFile(name, bytes);
+  options.temporary_folder = fuzzFolder();
+  if (isVtkXml(InputFile(options.grid)))
+    readGrid(*openVtkXml(options));
+  else if (isVtkLegacy(InputFile(options.grid)))
+    readGrid(*openVtkLegacy(options));
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,11 @@
+// .vts, .vtr and .vti files in all encodings.
+#include "tests/fuzz/vtk_input.h"
+
+namespace curvisplat {
+namespace {
+
+const RegisteredFuzzTarget registered("vtk_xml",
+                                      [](std::span<const std::byte> bytes) { readVtk("a.vts", bytes); });
+
+}  // namespace
+}  // namespace curvisplat
