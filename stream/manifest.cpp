@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "stream/cache_format.h"
 #include "stream/error.h"
 #include "stream/json_text.h"
 
@@ -15,6 +16,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr uint64_t kOldestVersion = 1;
 constexpr const char* kFormat = "curvisplat splat cache";
 // A hundred thousand blocks take half of it; parsed, a text takes some twenty times its size.
 constexpr size_t kLargestText = 16 << 20;
@@ -220,7 +222,7 @@ void readFiles(const Fields& fields, Manifest& manifest, const Json& json) {
 std::string Manifest::toJson() const {
   Json json;
   json["format"] = kFormat;
-  json["version"] = kFormatVersion;
+  json["version"] = kCacheVersion;
   json["title"] = title;
   json["program"] = program;
   json["sources"] = sources;
@@ -272,10 +274,15 @@ Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path
   const Fields fields(json, "", path);
   if (fields.text("format") != kFormat) fields.fail("format", fmt::format("'{}'", kFormat), json["format"]);
   const uint64_t version = fields.count("version", 0, kAny);
-  if (version != kFormatVersion)
+  if (version > kCacheVersion)
+    throw Error("{}: the cache has format version {}, and this program reads up to {}; use a newer program",
+                path.string(), version, kCacheVersion);
+  if (version < kOldestVersion)
     throw Error(
-        "{}: the cache has format version {}, this program reads {}; convert again, or use a newer program",
-        path.string(), version, int{kFormatVersion});
+        "{}: the cache has format version {}, from before the format was settled, and this program reads "
+        "from "
+        "{} on; convert again",
+        path.string(), version, kOldestVersion);
   Manifest manifest;
   manifest.title = fields.text("title");
   manifest.program = fields.text("program");

@@ -40,8 +40,6 @@ struct BlockInfo {
 };
 
 struct Manifest {
-  static constexpr int kFormatVersion = 0;
-
   std::string title;
   std::string program;               // what wrote it: "curvisplat 0.1.0"
   std::vector<std::string> sources;  // the input files, as given

@@ -34,19 +34,22 @@ TEST(SplatRecord, RoundTripsToSinglePrecision) {
   for (int n = 0; n < 200; ++n) {
     NodeSplat splat = someSplat(random);
     splat.regular = n % 2 == 0;
-    if (!splat.regular) splat.splat.weight *= 3;
+    if (!splat.regular) {
+      splat.splat.weight *= 3;
+      splat.half_cell = 0x12345601;
+    }
     std::vector<SplatScalar> values{{0.25, {1, 2, 3}, 0}, {-7, {0.5, 0, -1}, 0}};
     if (!splat.regular) values[1].variance = 0.125;
     const RootPosition position{{random() >> 16, random() >> 16, random() >> 16}};
     record.clear();
     packRecord(splat, values, position, record);
-    ASSERT_EQ(record.size(), splat.regular ? 77u : 89u);
+    ASSERT_EQ(record.size(), splat.regular ? 77u : 93u);
     EXPECT_EQ(recordBytes(record.data(), 2), record.size());
     EXPECT_EQ(recordNode(record.data()), splat.node);
     EXPECT_EQ(recordPosition(record.data()), position);
     Splat back;
     std::vector<SplatScalar> values_back(2);
-    unpackRecord(record.data(), back, values_back);
+    EXPECT_EQ(unpackRecord(record.data(), back, values_back), splat.half_cell);
     for (int axis = 0; axis < 3; ++axis) {
       EXPECT_NEAR(back.axis[axis], splat.splat.axis[axis], 8e-6 * splat.splat.axis[axis]);
       EXPECT_FLOAT_EQ(back.shear[axis], splat.splat.shear[axis]);

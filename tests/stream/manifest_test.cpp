@@ -120,7 +120,8 @@ TEST(Manifest, RefusesWhatIsOutOfRange) {
     change(json);
     EXPECT_THROW(Manifest::fromJson(json.dump(), "m"), Error) << json.dump();
   };
-  refused([](Json& j) { j["version"] = 1; });
+  refused([](Json& j) { j["version"] = 0; });
+  refused([](Json& j) { j["version"] = 2; });
   refused([](Json& j) { j["root"]["size"] = 0; });
   refused([](Json& j) { j["root"]["size"] = -1; });
   refused([](Json& j) { j["root"]["min"] = {1, 2}; });

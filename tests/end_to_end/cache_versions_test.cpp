@@ -1,0 +1,78 @@
+// Caches of the versions that have been, as they were written then: each is opened, checked, decoded and
+// drawn, and gives what it gave. tests/programs/make_version_caches.cpp has made them.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "stream/cache_verify.h"
+#include "stream/error.h"
+#include "stream/file.h"
+#include "tests/support/cache_summary.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+class CacheVersion : public ::testing::TestWithParam<const char*> {
+ protected:
+  static fs::path folder() { return fs::path(CURVISPLAT_TEST_DATA) / "caches" / GetParam(); }
+};
+
+INSTANTIATE_TEST_SUITE_P(Versions, CacheVersion, ::testing::Values("version_1"),
+                         [](const auto& tested) { return tested.param; });
+
+TEST_P(CacheVersion, IsStillRead) {
+  for (const char* name : {"blocks", "cells"}) {
+    SCOPED_TRACE(name);
+    const fs::path base = folder() / name;
+    const CacheReader cache(base.string() + ".splats");
+    EXPECT_TRUE(verifyCache(cache).empty());
+
+    const auto expected = nlohmann::json::parse(readTextFile(base.string() + ".json"));
+    const auto found = summaryOf(cache);
+    EXPECT_EQ(found.size(), expected.size());
+    for (const auto& [what, sum] : found) {
+      ASSERT_TRUE(expected.contains(what)) << what;
+      const double wanted = expected[what].get<double>();
+      EXPECT_NEAR(sum, wanted, 1e-6 * std::abs(wanted) + 1e-9) << what;
+    }
+
+    const TemporaryFolder drawn;
+    for (size_t variable = 0; variable < cache.manifest().variables.size(); ++variable) {
+      const fs::path picture = drawn / "a.png";
+      writeImage(smallPictureOf(cache, variable), picture);
+      const Image kept = readImage(fmt::format("{}.{}.png", base.string(), variable));
+      EXPECT_GE(compareImages(readImage(picture), kept).psnr_db, 60) << variable;
+    }
+  }
+  EXPECT_GT(CacheReader(folder() / "blocks.splats").manifest().levels, 1u);
+  EXPECT_TRUE(CacheReader(folder() / "cells.splats").manifest().cells);
+}
+
+TEST(CacheVersions, OthersAreRefusedWithWhatToDo) {
+  const TemporaryFolder folder;
+  const fs::path cache = folder / "a.splats";
+  fs::copy(fs::path(CURVISPLAT_TEST_DATA) / "caches/version_1/cells.splats", cache);
+  const std::pair<int, const char*> versions[] = {{0, "convert again"}, {2, "newer program"}};
+  for (const auto& [version, what_to_do] : versions) {
+    auto manifest = nlohmann::ordered_json::parse(readTextFile(cache / "manifest.json"));
+    manifest["version"] = version;
+    writeFileAtomically(cache / "manifest.json", manifest.dump());
+    const std::string picture = folder / "a.png";
+    for (const std::vector<std::string>& command :
+         {std::vector<std::string>{"info", cache}, {"render", cache, "-o", picture}}) {
+      const ProgramResult result = runProgram(command);
+      EXPECT_EQ(result.status, 1);
+      EXPECT_EQ(lineCount(result.err), 1) << result.err;
+      EXPECT_NE(result.err.find(fmt::format("version {}", version)), std::string::npos) << result.err;
+      EXPECT_NE(result.err.find(what_to_do), std::string::npos) << result.err;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat

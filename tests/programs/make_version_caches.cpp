@@ -1,0 +1,95 @@
+// Makes the small caches that prove that later programs still read this version of the format:
+//
+//    make_version_caches tests/data/caches/version_<n>
+//
+// To be run once for each version, by the program that is the first to write it; never again for an older
+// one.
+//
+//    blocks.splats   three blocks, two of which share a face, and a hole; levels, two scalars
+//    cells.splats    a block with a scalar in its cells
+//    *.json, *.png   what a reader must get out of them (tests/support/cache_summary.h)
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "preprocess/convert.h"
+#include "stream/file.h"
+#include "tests/support/cache_summary.h"
+#include "tests/support/cell_grid.h"
+#include "tests/support/function_grid.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// So many nodes that there are levels; so plain, but for the small third block, that they take little room.
+FunctionGridSource blocks() {
+  std::vector<GridBlock> made{gridBlock(41, 41, 41), gridBlock(4, 41, 41), gridBlock(9, 9, 7)};
+  made[0].has_blanking = true;
+  return FunctionGridSource(made, 2, [](const GridNode& node) {
+    const auto i = static_cast<double>(node.i), j = static_cast<double>(node.j),
+               k = static_cast<double>(node.k);
+    if (node.block == 2) {
+      const double angle = std::numbers::pi * i / 8, radius = 12 * std::exp(0.08 * j);
+      const glm::dvec3 at(20 + radius * std::cos(angle), 20 + radius * std::sin(angle), 45 + 3 * k);
+      return NodeValues{at, {static_cast<float>(i * j / 2), static_cast<float>(std::sin(0.3 * at.x))}, false};
+    }
+    const double along = node.block == 0 ? i : 40 + i;
+    const bool in_hole = std::hypot(i - 12, j - 12) < 6 && node.block == 0;
+    return NodeValues{glm::dvec3(along + 0.25 * j, j + 0.125 * k, k),
+                      {static_cast<float>(along), node.block == 0 ? 0.5f : -0.5f},
+                      in_hole};
+  });
+}
+
+void make(const GridSource& source, std::vector<uint32_t> scalars, const fs::path& cache) {
+  ConvertOptions options;
+  options.output = cache;
+  options.scalars = std::move(scalars);
+  options.title = cache.stem().string();
+  Progress progress;
+  convert(source, options, progress);
+
+  const CacheReader reader(cache);
+  nlohmann::json json = summaryOf(reader);
+  const fs::path beside = fs::path(cache).replace_extension();
+  writeFileDurably(beside.string() + ".json", json.dump(1) + "\n");
+  for (size_t variable = 0; variable < reader.manifest().variables.size(); ++variable)
+    writeImage(smallPictureOf(reader, variable), fmt::format("{}.{}.png", beside.string(), variable));
+}
+
+void makeAll(const fs::path& folder) {
+  fs::create_directories(folder);
+  make(blocks(), {0, 1}, folder / "blocks.splats");
+  const FunctionGridSource nodes({gridBlock(9, 8, 7)}, 0, [](const GridNode& node) {
+    const double angle = 0.3 * static_cast<double>(node.i), radius = 1 + 0.2 * static_cast<double>(node.j);
+    return NodeValues{
+        glm::dvec3(radius * std::cos(angle), radius * std::sin(angle), 0.25 * static_cast<double>(node.k)),
+        {},
+        false};
+  });
+  make(CellGridSource(nodes, {[](const GridCell& cell) { return cell.centre.x * cell.centre.z; }}), {0},
+       folder / "cells.splats");
+}
+
+}  // namespace
+}  // namespace curvisplat
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    fmt::print(stderr, "make_version_caches: name a folder\n");
+    return 2;
+  }
+  try {
+    curvisplat::makeAll(argv[1]);
+    return 0;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "make_version_caches: {}\n", error.what());
+    return 1;
+  }
+}
