@@ -275,13 +275,14 @@ Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path
   if (fields.text("format") != kFormat) fields.fail("format", fmt::format("'{}'", kFormat), json["format"]);
   const uint64_t version = fields.count("version", 0, kAny);
   if (version > kCacheVersion)
-    throw Error("{}: the cache has format version {}, and this program reads up to {}; use a newer program",
-                path.string(), version, kCacheVersion);
+    throw OtherVersion(
+        "{}: the cache has format version {}, and this program reads up to {}; use a newer program",
+        path.string(), version, kCacheVersion);
   if (version < kOldestVersion)
-    throw Error(
+    throw OtherVersion(
         "{}: the cache has format version {}, from before the format was settled, and this program reads "
-        "from "
-        "{} on; convert again",
+        "from {} "
+        "on; convert again, with --overwrite",
         path.string(), version, kOldestVersion);
   Manifest manifest;
   manifest.title = fields.text("title");

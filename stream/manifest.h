@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "stream/error.h"
 #include "stream/octree.h"
 
 namespace curvisplat {
@@ -39,6 +40,12 @@ struct BlockInfo {
   uint64_t ni = 0, nj = 0, nk = 0;
 };
 
+/// A splat cache, but of a format that this program does not read.
+class OtherVersion : public Error {
+ public:
+  using Error::Error;
+};
+
 struct Manifest {
   std::string title;
   std::string program;               // what wrote it: "curvisplat 0.1.0"
@@ -61,7 +68,7 @@ struct Manifest {
 
   std::string toJson() const;
   /// Throws Error naming `path` where a field is missing, of the wrong type or out of range, where a file's
-  /// name is not a plain name, or where the version is not one that this program reads.
+  /// name is not a plain name; OtherVersion where the version is not one that this program reads.
   static Manifest fromJson(const std::string& text, const std::filesystem::path& path);
 };
 

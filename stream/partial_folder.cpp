@@ -54,6 +54,8 @@ void checkReplaceable(const fs::path& target, bool overwrite) {
   try {
     const fs::path manifest = target / "manifest.json";
     Manifest::fromJson(readTextFile(manifest), manifest);
+  } catch (const OtherVersion&) {
+    // A cache all the same.
   } catch (const Error& error) {
     throw Error(
         "{}: is not a whole splat cache and will not be overwritten; remove it, or choose another output ({})",

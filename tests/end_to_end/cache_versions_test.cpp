@@ -71,6 +71,16 @@ TEST(CacheVersions, OthersAreRefusedWithWhatToDo) {
       EXPECT_NE(result.err.find(fmt::format("version {}", version)), std::string::npos) << result.err;
       EXPECT_NE(result.err.find(what_to_do), std::string::npos) << result.err;
     }
+    // And do it.
+    const std::string grid = folder / "grid";
+    ASSERT_EQ(runProgram({"generate", "wake", "--size", "8x8x8", "-o", grid}).status, 0);
+    const std::vector<std::string> convert{"convert", grid + ".xyz", grid + ".fun", "-o", cache};
+    EXPECT_EQ(runProgram(convert).status, 1);
+    std::vector<std::string> overwrite = convert;
+    overwrite.push_back("--overwrite");
+    const ProgramResult result = runProgram(overwrite);
+    EXPECT_EQ(result.status, 0) << result.err;
+    EXPECT_EQ(runProgram({"info", cache}).status, 0);
   }
 }
 

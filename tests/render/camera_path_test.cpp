@@ -229,7 +229,7 @@ TEST_F(CameraPathFile, SaysWhatIsWrong) {
   expectRefused(file(keyFrame() + R"(, {"time": 3, "position": [1, 0, 0], "focal_point": [0, 0, 0],
                                       "view_up": [0, 1, 0], "view_angle": 40})"),
                 "perspective");
-  expectRefused(std::string(100'000, '['), "camera path in JSON");
+  expectRefused(std::string(100'000, '['), "brackets more than 64 deep");
   std::string many = keyFrame();
   for (int n = 0; n < 100'000; ++n) many += ",0";
   expectRefused(file(many), "at most 100000");
