@@ -106,7 +106,8 @@ class Paths:
         self.folder, self.fin = arguments.folder, arguments.fin
         self.program = arguments.build / "tools/curvisplat"
         self.bench = arguments.build / "bench"
-        self.cache = arguments.folder / "wake.splats"
+        size = (SmokeForm if arguments.smoke else Form).cache
+        self.cache = arguments.folder / f"wake_{size}.splats"
 
     def json(self, step):
         return self.folder / f"{step}.json"

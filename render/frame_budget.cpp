@@ -11,10 +11,10 @@ namespace curvisplat {
 namespace {
 
 // A worker's memory: what reading keeps on its thread (a brick's bytes and the decoder's scratch), a brick
-// decoded (15 floats a splat), the projector's splats and depths, the sorter's keys, indices and counters,
+// decoded (16 numbers a splat), the projector's splats and depths, the sorter's keys, indices and counters,
 // the stack.
 constexpr uint64_t kReadingBytes = 12 << 20;
-constexpr uint64_t kWorkerBytes = kReadingBytes + uint64_t{kMaxBrickSplats} * 15 * sizeof(float) +
+constexpr uint64_t kWorkerBytes = kReadingBytes + uint64_t{kMaxBrickSplats} * 16 * sizeof(float) +
                                   BrickProjector::kMostSplats * (sizeof(ScreenSplat) + sizeof(float)) +
                                   BrickProjector::kMostSplats * (2 * 8 + 4) + (uint64_t{2} << 16) * 4 +
                                   (1 << 20);

@@ -1,6 +1,6 @@
 // Decoded bricks of one variable that outlive a frame, in an arena of fixed size.
 //
-// Invariant: every brick is charged the bytes of its 15 arrays; the charges and the holes make up the
+// Invariant: every brick is charged the bytes of its 16 arrays; the charges and the holes make up the
 // capacity; a pinned brick is never thrown out. Of the others the least recently used goes first, but none
 // that was used in the current turn (a frame, or a prefetch): drawing more than the cache holds would
 // otherwise throw out each brick shortly before it is wanted again, and a cache of half the size would hit

@@ -28,7 +28,7 @@ void checkChecksum(const fs::path& path, const FileInfo& info, uint64_t found) {
 /// What the streams of so many splats can take at the most, packed: their header, the runs or rows, the
 /// planes, and what zstd adds. Whoever reads one takes memory for it.
 uint64_t mostGeometryBytes(uint64_t splats) {
-  return (16 << 10) + 119 * splats;  // 50 and 17 x 4 bytes a splat
+  return (16 << 10) + 135 * splats;  // 50 and 21 x 4 bytes a splat
 }
 uint64_t mostValuesBytes(uint64_t splats) {
   return (16 << 10) + 31 * splats;  // 10 and 5 x 4

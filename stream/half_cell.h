@@ -25,7 +25,7 @@ struct InwardAxes {
 uint32_t packHalfCell(std::span<const glm::dvec3> inward);
 InwardAxes inwardAxes(uint32_t half_cell);
 
-/// Whether packHalfCell() can have given it.
+/// False for what packHalfCell() gives to no cell; whatever passes has inward axes.
 bool isPossibleHalfCell(uint32_t half_cell);
 
 // How the renderer draws a half cell: as two parts along each such axis, a narrow one at the border and a

@@ -23,10 +23,14 @@ class UringReads : public AsyncReads {
   UringReads(const io_uring& ring, int event) : ring_(ring), event_(event) { listen(); }
 
   ~UringReads() override {
-    // Until they end, the reads' memory is the kernel's.
-    try {
-      while (under_way_ > 0) wait();
-    } catch (const Error&) {
+    // Until they end, the reads' memory is the kernel's; those that it was never told of have not begun. One more
+    // is under way beside them, which wake() ends.
+    wake();
+    for (unsigned in_kernel = under_way_ + 1 - io_uring_sq_ready(&ring_); in_kernel > 0;) {
+      io_uring_cqe* end = nullptr;
+      if (io_uring_wait_cqe(&ring_, &end) != 0) continue;  // interrupted
+      io_uring_cqe_seen(&ring_, end);
+      --in_kernel;
     }
     io_uring_queue_exit(&ring_);
     ::close(event_);

@@ -108,12 +108,12 @@ Json reportOf(const BenchWords& words, const Machine& machine, const Measurement
 void writeResults(const BenchWords& words, const Json& json, const Plots& plots) {
   // Arguments are bytes, which need not be the UTF-8 that JSON is.
   constexpr auto kReplace = Json::error_handler_t::replace;
-  if (!words.json.empty()) writeFileAtomically(words.json, json.dump(2, ' ', false, kReplace) + "\n");
+  if (!words.json.empty()) writeFileDurably(words.json, json.dump(2, ' ', false, kReplace) + "\n");
   if (words.plots.empty()) return;
   std::error_code error;
   fs::create_directory(words.plots, error);
   if (error) throw Error("--plot {}: the folder cannot be made: {}", words.plots.string(), error.message());
-  for (const auto& [name, bytes] : plots) writeFileAtomically(words.plots / name, bytes);
+  for (const auto& [name, bytes] : plots) writeFileDurably(words.plots / name, bytes);
 }
 
 // -------------------------------------------------------------------------------------------- a cache

@@ -148,7 +148,9 @@ def drawn_by_us(arguments, case, cache, conversion, function, technique, picture
 
 def truth_of(arguments, case, function):
     """The reference's picture; made once."""
-    path = arguments.folder / f"truth_{re.sub('-[0-9x]+$', '', case.name)}_{function}_{arguments.picture}.pfm"
+    # Of an analytic field for all of its grids, else of this one grid.
+    what = re.sub("-[0-9x]+$", "", case.name) if case.name != "fin" else f"fin_{pathlib.Path(case.grid).stem}"
+    path = arguments.folder / f"truth_{what}_{function}_{arguments.picture}.pfm"
     if not path.exists():
         print(f"marching {path}", flush=True)
         results.run([arguments.reference, *case.truth, "--function", function, f"--range={case.range[0]:.17g},"
