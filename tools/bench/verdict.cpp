@@ -101,14 +101,15 @@ class Judge {
                     secondsWords(cores_s_ - draw_s_)));
   }
 
-  /// By the frames of one error and memory that differ in their threads.
+  /// By the frames of one error and memory that differ in their threads. With --threads 1 a worker and the
+  /// painter have one each: of two cores that says nothing.
   void adviseCores() {
     const OtherFrame* one = nullptr;
     const OtherFrame* all = nullptr;
     for (const OtherFrame& other : others_) {
       if (other.threads != 1) continue;
       for (const OtherFrame& same : others_)
-        if (same.threads == frame_.threads && same.threads > 1 && same.lod_pixels == other.lod_pixels &&
+        if (same.threads == frame_.threads && same.threads > 2 && same.lod_pixels == other.lod_pixels &&
             same.memory_bytes == other.memory_bytes) {
           one = &other;
           all = &same;
@@ -116,9 +117,9 @@ class Judge {
     }
     if (!one) return;
     const double gain = one->seconds / all->seconds;
-    const bool good = gain >= kGoodScaling * all->threads;
+    const bool good = gain >= kGoodScaling * all->threads / 2;
     verdict_.lines.push_back(
-        fmt::format("{} threads draw --lod-pixels {:g} {:.1f} times as fast as one: more cores "
+        fmt::format("--threads {} draws --lod-pixels {:g} {:.1f} times as fast as --threads 1: more cores "
                     "would {}",
                     all->threads, all->lod_pixels, gain, good ? "help" : "help little"));
   }
