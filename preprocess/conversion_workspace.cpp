@@ -16,8 +16,9 @@ std::string scratchName(const fs::path& output) {
 /// Whether what the journal names can be the folder of temporary files of a conversion to `output`, in which
 /// files may be removed.
 bool isScratch(const fs::path& folder, const fs::path& output) {
+  std::error_code ignored;
   return folder.filename().string().starts_with(scratchName(output) + ".") &&
-         fs::is_directory(fs::symlink_status(folder));
+         fs::is_directory(fs::symlink_status(folder, ignored));
 }
 
 /// Removes the temporary files of a dead conversion to `output`; whatever else the journal may name stays.

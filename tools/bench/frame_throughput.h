@@ -53,7 +53,7 @@ std::vector<FramesOfConfiguration> measureFrames(const ThroughputScene& scene,
                                                  const FrameEffort& effort, Measurements& to,
                                                  Progress& progress);
 
-/// [{"lod_pixels", "threads", "memory_bytes", "frames", "splats_drawn", ..., "seconds": {stage: median}}]
+/// [{"lod_pixels", "threads", "memory_bytes", "stream_bytes", "frames", "median": {...}, "cold": {...}}]
 nlohmann::ordered_json toJson(std::span<const FramesOfConfiguration> frames);
 
 /// The frame in the middle by its time.
