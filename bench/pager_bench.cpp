@@ -92,8 +92,9 @@ struct BenchCache {
       }
     Brick& brick = encoded.brick;
     brick.cell = cell;
-    brick.splats = 8;
-    brick.octant_splats.fill(1);
+    // As many as its bytes could hold.
+    brick.octant_splats.fill(static_cast<uint32_t>(encoded.geometry.size() / 200 + 1));
+    brick.splats = 8 * brick.octant_splats[0];
     brick.lower = brick.upper = root.cellMin(cell) + 0.5 * root.cellSize(cell.level);
     brick.largest_radius = 0.1f;
     brick.geometry = {0, static_cast<uint32_t>(encoded.geometry.size()), checksumOf(encoded.geometry)};

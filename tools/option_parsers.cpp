@@ -104,7 +104,8 @@ uint64_t parseCount(std::string_view option, std::string_view text) {
   const std::string_view digits = text.substr(0, text.find_first_not_of("0123456789"));
   const std::string_view letter = text.substr(digits.size());
   const auto number = whole<uint64_t>(digits);
-  const size_t power = letter.empty() ? 0 : std::string_view("KMG").find(letter) + 1;
+  const size_t place = std::string_view("KMGkmg").find(letter);
+  const size_t power = letter.empty() || place == std::string_view::npos ? 0 : place % 3 + 1;
   uint64_t count = number.value_or(0);
   bool fits = count > 0 && letter.size() <= 1 && power <= 3 && (letter.empty() || power > 0);
   for (size_t n = 0; n < power && fits; ++n) {
