@@ -39,10 +39,11 @@ run() { "$program" "$@" --stats "$statistics" > "$log" 2>&1; }
 number() { sed -n "s/.*\"$1\": \([0-9]*\).*/\1/p" "$statistics"; }
 
 # end_after SECONDS SIGNAL OPTION ...: sets $status. In a shell of its own, whose word on the killing goes to the log
-# too; with SIGINT as a terminal has it, whatever this script was started with.
+# too; with SIGINT as a terminal has it, whatever this script was started with. In the foreground timeout signals the
+# program once; else its whole group as well, and a second signal is one to end at once.
 end_after() {
   status=0
-  (timeout --preserve-status -s "$2" "$1" env --default-signal=INT "$program" "${@:3}"; exit $?) \
+  (timeout --foreground --preserve-status -s "$2" "$1" env --default-signal=INT "$program" "${@:3}"; exit $?) \
     > "$log" 2>&1 || status=$?
 }
 
