@@ -7,7 +7,6 @@
 #include <memory>
 #include <vector>
 
-#include "preprocess/convert.h"
 #include "preprocess/scenes.h"
 #include "render/classification.h"
 #include "render/depth_sort.h"
@@ -15,6 +14,7 @@
 #include "render/gl_painter.h"
 #include "render/gl_thread.h"
 #include "stream/error.h"
+#include "tests/support/known_pictures.h"
 #include "tests/support/reference_march.h"
 #include "tests/support/temporary_folder.h"
 
@@ -26,14 +26,8 @@ class ProgressiveTest : public testing::Test {
   /// The half-annulus of 128 x 64 x 64 nodes: 524,288 splats, three levels.
   static void SetUpTestSuite() {
     folder_ = std::make_unique<TemporaryFolder>();
-    const SceneGridSource scene(makeScene("half-annulus"), {128, 64, 64});
-    ConvertOptions options;
-    options.output = *folder_ / "scene.splats";
-    options.scalars = {0};
-    options.memory_bytes = 512 << 20;
-    Progress progress;
-    convert(scene, options, progress);
-    cache_ = std::make_unique<CacheReader>(options.output);
+    convertGrid(SceneGridSource(makeScene("half-annulus"), {128, 64, 64}), *folder_ / "scene.splats");
+    cache_ = std::make_unique<CacheReader>(*folder_ / "scene.splats");
   }
   static void TearDownTestSuite() {
     cache_.reset();

@@ -10,9 +10,8 @@
 #include <set>
 #include <string>
 
-#include "preprocess/convert.h"
 #include "preprocess/scenes.h"
-#include "stream/progress.h"
+#include "tests/support/known_pictures.h"
 #include "tests/support/reference_march.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/virtual_display.h"
@@ -42,13 +41,7 @@ class ClosingTest : public testing::TestWithParam<PagerOptions::Way> {
  protected:
   static void SetUpTestSuite() {
     folder_ = std::make_unique<TemporaryFolder>();
-    const SceneGridSource scene(makeScene("half-annulus"), {128, 64, 64});
-    ConvertOptions options;
-    options.output = *folder_ / "scene.splats";
-    options.scalars = {0};
-    options.memory_bytes = 512 << 20;
-    Progress progress;
-    convert(scene, options, progress);
+    convertGrid(SceneGridSource(makeScene("half-annulus"), {128, 64, 64}), *folder_ / "scene.splats");
   }
   static void TearDownTestSuite() { folder_.reset(); }
 

@@ -7,10 +7,9 @@
 #include <memory>
 #include <mutex>
 
-#include "preprocess/convert.h"
 #include "preprocess/scenes.h"
 #include "stream/error.h"
-#include "stream/progress.h"
+#include "tests/support/known_pictures.h"
 #include "tests/support/reference_march.h"
 #include "tests/support/temporary_folder.h"
 
@@ -21,13 +20,7 @@ class FrameLoopTest : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = std::make_unique<TemporaryFolder>();
-    const SceneGridSource scene(makeScene("half-annulus"), {128, 64, 64});
-    ConvertOptions options;
-    options.output = *folder_ / "scene.splats";
-    options.scalars = {0};
-    options.memory_bytes = 512 << 20;
-    Progress progress;
-    convert(scene, options, progress);
+    convertGrid(SceneGridSource(makeScene("half-annulus"), {128, 64, 64}), *folder_ / "scene.splats");
   }
   static void TearDownTestSuite() { folder_.reset(); }
 
