@@ -131,8 +131,10 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     const bool whole = neighbours.before[axis] != 0 && neighbours.after[axis] != 0;
     if (whole) bend += to_after - to_before;
     if (a + b > 0 && (corrections_.middles || !whole)) middle[axis] = 0.5 * (b - a) / (a + b);
-    if (!whole && a + b > 0) inwards[axis] = neighbours.before[axis] == 0 ? 1 : -1;
-    if (!whole && !corrections_.half_cells) {
+    if (whole) continue;
+    if (corrections_.half_cells) {
+      if (a + b > 0) inwards[axis] = neighbours.before[axis] == 0 ? 1 : -1;
+    } else {
       jacobian[axis] *= 2.0;
       middle[axis] = 0;
       weight_factor *= 0.5;
@@ -173,7 +175,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
       along[axis] = inwards[axis];
       axes[count++] = rotate(along);
     }
-    node.half_cell = corrections_.half_cells ? packHalfCell({axes.data(), count}) : kWholeCell;
+    node.half_cell = count > 0 ? packHalfCell({axes.data(), count}) : kWholeCell;
   };
 
   const LqFactors lq({jacobian[0].x, jacobian[1].x, jacobian[2].x},
