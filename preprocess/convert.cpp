@@ -25,6 +25,7 @@
 #include "stream/error.h"
 #include "stream/file.h"
 #include "stream/manifest.h"
+#include "stream/partial_folder.h"
 
 namespace curvisplat {
 namespace {
@@ -276,11 +277,14 @@ ConvertReport convert(const GridSource& source, const ConvertOptions& options, P
 
   std::vector<ConversionFact> facts = factsOf(source.description(), options.scalars, options.blank_value);
   ConvertReport report;
+  const std::filesystem::path manifest = options.output / "manifest.json";
   if (options.resume && ConversionWorkspace::clearIfFinished(options.output, facts)) {
     report.resumed = true;
-    const std::filesystem::path manifest = options.output / "manifest.json";
     reportCache(Manifest::fromJson(readTextFile(manifest), manifest), report);
     report.resumed_bricks = report.bricks;
+  } else if (options.resume && !options.overwrite && std::filesystem::exists(manifest) &&
+             !hasUnfinished(options.output)) {
+    throw Error("{}: is whole already; there is nothing to resume", options.output.string());
   } else {
     checkOutput(options.output, options.overwrite, temporaryFolder(options));
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, plan.threads);

@@ -114,8 +114,7 @@ void checkRanges(const GridSurvey& survey, const GridDescription& description,
     if (max - min <= kLargestRange) continue;
     throw Error(
         "{}: its values go from {:g} to {:g}, more than {:g} apart; if one of them says that there is no "
-        "value, "
-        "name it with --blank, else scale them",
+        "value, name it with --blank, else scale them",
         description.scalars.at(scalars[n]).name, min, max, kLargestRange);
   }
 }

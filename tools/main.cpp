@@ -47,8 +47,11 @@ int main(int argc, char** argv) {
       fmt::print(stderr, "curvisplat: there is no subcommand '{}'; there are {}\n", argv[1], namesOf(app));
       return 2;
     }
-    const int status = app.exit(error);
-    return status == 0 ? 0 : 2;
+    if (error.get_exit_code() == 0) return app.exit(error);  // help and versions come this way too
+    const std::vector<CLI::App*> chosen = app.get_subcommands();
+    const std::string command = "curvisplat" + (chosen.empty() ? "" : " " + chosen.front()->get_name());
+    fmt::print(stderr, "{}: {}; see {} --help\n", command, error.what(), command);
+    return 2;
   } catch (const UsageError& error) {
     fmt::print(stderr, "curvisplat: {}\n", error.what());
     return 2;

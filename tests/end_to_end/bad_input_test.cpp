@@ -201,15 +201,13 @@ TEST_F(BadInput, UnwritablePicture) {
 }
 
 TEST_F(BadInput, WrongUsage) {
-  for (const std::vector<std::string>& arguments : {std::vector<std::string>{},
-                                                    {"frobnicate"},
-                                                    {"convert"},
-                                                    {"render"},
-                                                    {"compare", file("scene.xyz")}}) {
-    const ProgramResult result = runProgram(arguments);
-    EXPECT_EQ(result.status, 2) << result.err;
-    EXPECT_NE(result.err, "");
-  }
+  expectOneLine(runProgram({}), 2, {"subcommand", "see curvisplat --help"});
+  expectOneLine(runProgram({"frobnicate"}), 2, {"frobnicate"});
+  expectOneLine(runProgram({"convert"}), 2, {"see curvisplat convert --help"});
+  expectOneLine(runProgram({"render"}), 2, {"CACHE is required", "see curvisplat render --help"});
+  expectOneLine(runProgram({"compare", file("scene.xyz")}), 2, {"see curvisplat compare --help"});
+  expectOneLine(runProgram({"render", file("whole.splats"), "-o", file("a.png"), "--sise", "4x4"}), 2,
+                {"--sise"});
 }
 
 TEST_F(BadInput, MisspeltSubcommandIsToldWhichThereAre) {

@@ -206,6 +206,22 @@ TEST_F(OddDataTest, ValuesTooFarApartAreRefusedUnlessTheyAreBlank) {
   EXPECT_FALSE(isWhite(render()));
 }
 
+TEST_F(OddDataTest, ValuesTooFarApartAreNotAdded) {
+  expectConverted(8, along);
+  writeCube(
+      folder_ / "far", 8,
+      [](const GridNode& number, NodeValues& values) { values.scalars[0] = number.i == 0 ? 1e20f : 1; },
+      "far");
+  const ProgramResult refused =
+      runProgram(cubeAdditionWords(folder_ / "far", "far", folder_ / "cube.splats"));
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_EQ(lineCount(refused.err), 1) << refused.err;
+  EXPECT_NE(refused.err.find("far: its values go from 1 to 1e+20"), std::string::npos) << refused.err;
+  const ProgramResult info = runProgram({"info", file("cube.splats"), "--verify", "--json"});
+  EXPECT_EQ(info.status, 0) << info.err;
+  EXPECT_EQ(nlohmann::json::parse(info.out)["variables"].size(), 1u);
+}
+
 TEST_F(OddDataTest, ValuesFarApartButNotTooFarAreDrawn) {
   expectConverted(8, [](const GridNode& number, NodeValues& values) {
     values.scalars[0] = (number.i + number.j + number.k) % 2 ? 4.9e17f : -4.9e17f;

@@ -356,11 +356,22 @@ TEST_F(Resume, BeginsAnewIfOverwritingIsAllowed) {
   expectWhole();
 }
 
+TEST_F(Resume, TellsThatTheCacheIsWhole) {
+  convertNow({});
+  try {
+    convertNow({true, false, std::nullopt});
+    ADD_FAILURE() << "no error";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("a.splats: is whole already"), std::string::npos)
+        << error.what();
+  }
+  expectWhole();
+}
+
 TEST_F(Resume, NeedsNothingToResume) {
   const ConvertReport report = convertNow({true, false, std::nullopt});
   EXPECT_FALSE(report.resumed);
   expectWhole();
-  EXPECT_THROW(convertNow({true, false, std::nullopt}), Error);  // it stands there, whole
 }
 
 TEST_F(Resume, AStoppedConversionLeavesWhatIsWorthIt) {

@@ -5,6 +5,15 @@
 #include "stream/progress.h"
 
 namespace curvisplat {
+namespace {
+
+std::vector<std::string> inputWords(const std::filesystem::path& prefix) {
+  const std::string name = prefix.string();
+  return {"convert",   name + ".xyz", name + ".fun", "--iblank", "yes",          "--blocks", "single",
+          "--records", "none",        "--precision", "single",   "--byte-order", "little"};
+}
+
+}  // namespace
 
 void writeCube(const std::filesystem::path& prefix, uint64_t side, const CubeNode& node,
                const std::string& name) {
@@ -23,12 +32,16 @@ void writeCube(const std::filesystem::path& prefix, uint64_t side, const CubeNod
 std::vector<std::string> cubeWords(const std::filesystem::path& prefix, const std::vector<std::string>& more,
                                    const std::filesystem::path& output) {
   const std::string name = prefix.string();
-  std::vector<std::string> words{"convert", name + ".xyz", name + ".fun", "-o"};
-  words.push_back(output.empty() ? name + ".splats" : output.string());
-  for (const char* word : {"--iblank", "yes", "--blocks", "single", "--records", "none", "--precision",
-                           "single", "--byte-order", "little"})
-    words.push_back(word);
+  std::vector<std::string> words = inputWords(prefix);
+  words.insert(words.end(), {"-o", output.empty() ? name + ".splats" : output.string()});
   words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+std::vector<std::string> cubeAdditionWords(const std::filesystem::path& prefix, const std::string& scalar,
+                                           const std::filesystem::path& cache) {
+  std::vector<std::string> words = inputWords(prefix);
+  words.insert(words.end(), {"--add-scalar", scalar, "--to", cache.string()});
   return words;
 }
 

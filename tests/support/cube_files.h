@@ -23,5 +23,8 @@ void writeCube(const std::filesystem::path& prefix, uint64_t side, const CubeNod
 std::vector<std::string> cubeWords(const std::filesystem::path& prefix,
                                    const std::vector<std::string>& more = {},
                                    const std::filesystem::path& output = {});
+/// `convert PREFIX.xyz PREFIX.fun --add-scalar SCALAR --to CACHE`.
+std::vector<std::string> cubeAdditionWords(const std::filesystem::path& prefix, const std::string& scalar,
+                                           const std::filesystem::path& cache);
 
 }  // namespace curvisplat

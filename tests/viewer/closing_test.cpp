@@ -71,7 +71,9 @@ TEST_P(ClosingTest, LeavesNoThreadAndNoFile) {
       std::unique_lock lock(mutex);
       woken.wait(lock, [&] { return wakes >= pictures; });
       if (pictures > 0) {
-        EXPECT_TRUE(threadNames().contains("frames"));
+        const std::multiset<std::string> names = threadNames();
+        for (const char* name : {"frames", "pager", "prepare"}) EXPECT_TRUE(names.contains(name)) << name;
+        EXPECT_EQ(names.contains("read"), GetParam() == PagerOptions::Way::threads);
       }
     }
     // One that was waited for may be seen for a moment more.

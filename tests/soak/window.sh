@@ -1,0 +1,146 @@
+#!/usr/bin/env bash
+# A window that is turned, zoomed, edited and resized without end. Prints what the process had along the way: memory,
+# open files, threads; exit status 1 where they grow, or where the last picture is not the first.
+#
+#   tests/soak/window.sh [--short] [PROGRAM [FOLDER]]
+#
+# In full: 10 minutes over a cache of 100 MB; FOLDER has room for 2 GB. --short: 10 seconds, in which memory is still
+# being filled. Needs Xvfb and xdotool; exit status 77 without them.
+set -euo pipefail
+source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+
+if [ $form = full ]; then
+  grid=256x128x128 session_s=600 interval_s=2 slack=4
+else
+  grid=48x24x24 session_s=10 interval_s=0.25 slack=40
+fi
+for needed in Xvfb xdotool; do
+  command -v $needed > /dev/null || { echo "skipped: $needed is not installed"; exit 77; }
+done
+
+made wake "$grid" f j
+cd "$folder"
+mkfifo display
+Xvfb -displayfd 3 -screen 0 1000x700x24 -noreset -nolisten tcp 3> display 2> xvfb.log &
+started+=($!)
+DISPLAY=:$(head -n 1 display)
+export DISPLAY
+"$program" view wake.splats --size 900x600 --memory 96M > view.log 2> view.err &
+pid=$!
+started+=("$pid")
+
+alive() { kill -0 $pid 2> /dev/null || { echo "FAILED: the window is gone: $(cat view.err)"; exit 1; }; }
+do_() { xdotool "$@" > xdotool.log 2>&1 || { alive; cat xdotool.log; exit 1; }; }
+# until_ TENTHS COMMAND...: waits for it, so many tenths of a second at most.
+until_() {
+  local tries=$1
+  shift
+  for ((try = 0; try < tries; ++try)); do
+    ! "$@" || return 0
+    alive
+    sleep 0.1
+  done
+  return 1
+}
+# Each answer of the window to a key comes after everything that was done before it.
+commands() { wc -l < view.log; }
+more_commands() { [ "$(commands)" -gt "$1" ]; }
+# asked: what the window shows now, as the command that draws it.
+asked() {
+  local before
+  before=$(commands)
+  for ((again = 0; again < 60; ++again)); do
+    do_ mousemove 600 300 key c
+    if until_ 20 more_commands "$before"; then
+      tail -n 1 view.log
+      return
+    fi
+  done
+  echo "FAILED: the window does not answer" >&2
+  exit 1
+}
+# saved NAME: its final picture.
+saved() {
+  local name
+  name=$(printf 'wake_%04d.png' $(($(find . -maxdepth 1 -name 'wake_*.png' | wc -l) + 1)))
+  for ((again = 0; again < 4; ++again)); do
+    do_ mousemove 600 300 key p
+    if until_ 300 test -s "$name"; then
+      asked > "$1.command"  # by then the picture is written
+      cp "$name" "$1.png"
+      return
+    fi
+  done
+  fail "no picture was saved"
+}
+# drag BUTTON X Y: from the middle of the picture to there.
+drag() {
+  do_ mousemove 600 300 mousedown "$1" mousemove 640 320 mousemove 690 350 mousemove "$2" "$3" mouseup "$1" mousemove 600 300
+}
+# show NAME Y: that scalar, from this height of the panel's list. The list and the click on it are for frames of their own:
+# between them, the window is asked.
+show() {
+  for ((again = 0; again < 10; ++again)); do
+    do_ mousemove 100 17 click 1
+    asked > /dev/null
+    do_ mousemove 60 "$2" click 1
+    ! asked | grep -qE -- "--scalar $1( |\$)" || return 0
+  done
+  fail "the scalar $1 cannot be chosen"
+}
+resize() { do_ search --onlyvisible --name curvisplat windowsize "$1" "$2"; }
+# presets_points: the function as it began; a button of the panel's.
+presets_points() {
+  do_ mousemove 245 225 click 1
+  asked > /dev/null
+}
+# home: everything as it was first. An "o" too few or too many is put right.
+home() {
+  show f 38
+  for ((again = 0; again < 4; ++again)); do
+    presets_points
+    do_ key z key r
+    [ "$(asked)" != "$(cat first.command)" ] || return 0
+    [ "$again" -eq 0 ] || do_ key o
+  done
+  fail "the window cannot be brought back: $(asked), not $(cat first.command)"
+}
+
+asked > /dev/null  # it hears
+do_ key z key r
+saved first
+watch "$pid" window.txt $interval_s &
+started+=($!)
+end=$((SECONDS + session_s))
+rounds=0
+while [ $SECONDS -lt $end ]; do
+  drag 1 720 420
+  do_ click --repeat 5 4
+  drag 2 640 340
+  do_ click --repeat 5 5 key o
+  # A point of the function and another scalar; both back.
+  do_ mousemove 100 50 click 1
+  asked > /dev/null
+  do_ mousemove 100 50 click 3
+  show j 58
+  presets_points
+  show f 38
+  resize 800 500
+  do_ key o
+  asked > /dev/null
+  drag 3 600 340
+  resize 900 600
+  do_ key z key r
+  asked > /dev/null
+  rounds=$((rounds + 1))
+done
+home
+saved last
+do_ key Escape
+wait "$pid" || fail "view: $(cat view.err)"
+echo "$rounds rounds in $session_s s; scalars shown: $(grep -o -- '--scalar [a-z]' view.log | sort | uniq -c | tr '\n' ' ')"
+judge window.txt $slack
+cmp first.png last.png || fail "the window's last picture is not its first"
+[ "$(grep -o -- '--scalar [a-z]' view.log | sort -u | wc -l)" -eq 2 ] || fail "the scalar never changed"
+[ ! -s view.err ] || { echo "the window said:"; sort view.err | uniq -c; }
+exit $failed
