@@ -62,11 +62,14 @@ HWY_INLINE hn::Vec<Ints> element(V x) {
   return hn::ConvertTo(Ints(), hn::Clamp(hn::Add(x, hn::Set(d, 1.0f)), hn::Zero(d), hn::Set(d, kLast)));
 }
 
-/// What pixels with these means see, in cells: never less than a cell.
+/// What pixels with these means see, in cells: never less than a cell. An interval beyond an end of the table
+/// sees the same wherever it lies there; it begins where float still tells cells apart.
 HWY_INLINE Range locate(const ShadingTable& table, V mean, V half_width, size_t lane, Intervals& out) {
   static_assert(sizeof(ShadingTable::Cell) == 8 * sizeof(float));
   const Floats d;
   V from = cellsOf(table, hn::Sub(mean, half_width)), to = cellsOf(table, hn::Add(mean, half_width));
+  from = hn::Min(from, hn::Set(d, ClassificationTable::kCells + 1.0f));
+  to = hn::Max(to, hn::Set(d, -1.0f));
   const V half = hn::Set(d, 0.5f), one = hn::Set(d, 1.0f);
   const V widen = hn::Max(hn::Zero(d), hn::Mul(half, hn::Sub(one, hn::Sub(to, from))));
   from = hn::Sub(from, widen);

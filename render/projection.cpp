@@ -153,7 +153,7 @@ class Chooser {
 /// What parts and cutting may still give for a brick: pieces that are drawn, and looks at any.
 struct CutBudget {
   size_t pieces = BrickProjector::kMostPieces;
-  size_t looks = 64 * BrickProjector::kMostPieces;
+  size_t looks = 16 * BrickProjector::kMostPieces;
 };
 
 /// Where a piece lies, and the map that is linear there.
@@ -288,7 +288,8 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
   // Where the near plane is too near for float, coarser is not less: then what was cut until there is drawn.
   constexpr float kCoarsest = 1e30f;
   bool complete = false;
-  for (float coarseness = 1; !complete && coarseness < kCoarsest; coarseness *= 2) {
+  // Beyond a few hundred it is for splats that are in no grid.
+  for (float coarseness = 1; !complete && coarseness < kCoarsest; coarseness *= coarseness < 256 ? 2 : 16) {
     splats_.clear();
     depths_.clear();
     counts_ = {};

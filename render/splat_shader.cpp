@@ -76,7 +76,8 @@ void main() {
 
   float mean = PER_PIXEL ? scalar.x + dot(scalar.yz, u) : scalar.x;
   float width = PER_PIXEL ? scalar.w : 0.0;
-  float from = cellsOf(mean - width), to = cellsOf(mean + width);
+  // Beyond an end of the table all is the same; float tells cells apart only near it.
+  float from = min(cellsOf(mean - width), float(cells) + 1.0), to = max(cellsOf(mean + width), -1.0);
   float widen = max(0.0, 0.5 * (1.0 - (to - from)));
   from -= widen;
   to += widen;

@@ -97,6 +97,32 @@ TEST_P(PainterTest, KeepsVeryThinSplats) {
   EXPECT_NEAR(image.pixel(2, 2)[0], std::exp(-depth), 2e-4);
 }
 
+TEST_P(PainterTest, FarOutsideTheRangeLooksAsJustOutside) {
+  // 1 at both ends, of different colours; in between nothing is seen.
+  const ClassificationTable table(
+      [](double f) {
+        return TransferFunction::Value{{f > 0.5, f < 0.5, 0.25}, f <= 0 || f >= 1 ? 1.0 : 0.0};
+      },
+      0, 1);
+  const ImageSize size{20, 20};
+  for (const float side : {-1.0f, 1.0f}) {
+    const ScreenSplat near{10, 10, 4, 0, 4, 0.7f, 0.5f + side, 0, 0, 0};
+    const Image expected = paint({&near, 1}, table, true, size);
+    EXPECT_LT(expected.pixel(10, 10)[2], 0.9f);
+    for (const float away : {1e2f, 1e4f, 3e5f, 1.9e7f, 1e12f, 1e25f})
+      for (const float width : {0.0f, 0.01f, 0.4f})
+        for (const bool per_pixel : {true, false}) {
+          ScreenSplat far = near;
+          far.mean = side * away;
+          far.slope0 = 0.1f * width;
+          far.half_width = width;
+          const Image image = paint({&far, 1}, table, per_pixel, size);
+          EXPECT_LT(largestDifference(image, expected), 1e-5)
+              << side * away << " ± " << width << ", per pixel: " << per_pixel;
+        }
+  }
+}
+
 TEST_P(PainterTest, DrawsTheSameTwice) {
   const ImageSize size{200, 200};
   const auto splats = randomSplats(2000, 3, size);
