@@ -284,6 +284,11 @@ Image annotated(const Image& data, const Annotations& annotations, const Annotat
   return picture;
 }
 
+uint64_t annotatedBytes(ImageSize picture) {
+  constexpr uint64_t kPixel = 4 * sizeof(float) + sizeof(uint32_t);  // an Image's and a Canvas's
+  return kPixel * static_cast<uint64_t>(picture.width) * static_cast<uint64_t>(picture.height);
+}
+
 std::vector<uint8_t> annotationLayer(const Annotations& annotations, const AnnotatedScene& scene) {
   const size_t width = static_cast<size_t>(scene.picture.width);
   std::vector<uint8_t> layer(4 * width * static_cast<size_t>(scene.picture.height), 0);

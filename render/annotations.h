@@ -40,6 +40,9 @@ struct AnnotatedScene {
 /// Error where the picture is larger than Cairo draws (32,767 pixels a side).
 Image annotated(const Image& data, const Annotations& annotations, const AnnotatedScene& scene);
 
+/// What annotated() takes in memory, its result included.
+uint64_t annotatedBytes(ImageSize picture);
+
 /// The annotations alone, for the whole picture: four bytes a pixel, red, green, blue, alpha, colours not
 /// multiplied. Throws as annotated() does.
 std::vector<uint8_t> annotationLayer(const Annotations& annotations, const AnnotatedScene& scene);

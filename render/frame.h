@@ -47,7 +47,8 @@ struct FrameOptions {
   double low_pass_px2 = kLowPass;      // added to S2's diagonal
   unsigned threads = 0;                // workers; 0: one a core
   uint64_t memory_bytes = 512 << 20;
-  bool keep_going = false;  // draw damaged bricks from an ancestor, and report them
+  uint64_t output_bytes = 0;  // of memory_bytes: left for what is done with the image
+  bool keep_going = false;    // draw damaged bricks from an ancestor, and report them
   PagerOptions::Way read_by = PagerOptions::Way::automatic;
   bool direct_reads = true;  // past the page cache, where the file system can
 };

@@ -19,6 +19,7 @@ struct FrameBudget {
     uint64_t index_bytes = 0;        // the octree, and what a frame notes about its bricks
     uint64_t least_pager_bytes = 0;  // the largest brick's
     uint64_t painter_bytes = 0;      // beside the picture
+    uint64_t output_bytes = 0;       // for what is done with the picture
     ImageSize size;
   };
   /// The shares within `memory_bytes`, for at most `threads` workers (0: one a core): workers first, then the

@@ -78,7 +78,8 @@ FramePipeline::Running::~Running() {
 
 void FramePipeline::makePools(const FrameOptions& options) {
   const FrameBudget::Fixed fixed{planner_.bytes(), BrickPager::leastBufferBytes(cache_, variable_),
-                                 backend_->bytes(options.size, resourcesOf(options)), options.size};
+                                 backend_->bytes(options.size, resourcesOf(options)), options.output_bytes,
+                                 options.size};
   const FrameBudget budget = FrameBudget::of(options.memory_bytes, fixed, options.threads);
   PagerOptions pager;
   pager.buffer_bytes = budget.pager_bytes;

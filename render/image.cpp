@@ -19,14 +19,15 @@ struct Format {
   std::string_view ending;
   std::string_view magic;
   Bytes (*encode)(const Image&);
+  uint64_t pixel_bytes;  // that encoding takes for a pixel, the file included
   Image (*decode)(std::span<const std::byte>, const std::string&);
 };
 
 constexpr std::array<Format, 4> kFormats{{
-    {".png", "\x89PNG", encodePng, decodePng},
-    {".exr", "\x76\x2f\x31\x01", encodeExr, decodeExr},
-    {".pfm", "PF", encodePfm, decodePfm},
-    {"", "Pf", nullptr, decodePfm},  // one grey channel: read, never written
+    {".png", "\x89PNG", encodePng, 8, decodePng},
+    {".exr", "\x76\x2f\x31\x01", encodeExr, 48, decodeExr},
+    {".pfm", "PF", encodePfm, 12, decodePfm},
+    {"", "Pf", nullptr, 0, decodePfm},  // one grey channel: read, never written
 }};
 
 const Format& formatByName(const std::filesystem::path& path) {
@@ -51,6 +52,11 @@ void writeImage(const Image& image, const std::filesystem::path& path) {
   CURVISPLAT_CHECK(image.size.width > 0 && image.size.width <= kLargestImageSide);
   CURVISPLAT_CHECK(image.size.height > 0 && image.size.height <= kLargestImageSide);
   writeFileDurably(path, formatByName(path).encode(image));
+}
+
+uint64_t writingBytes(const std::filesystem::path& path, ImageSize size) {
+  return formatByName(path).pixel_bytes * static_cast<uint64_t>(size.width) *
+         static_cast<uint64_t>(size.height);
 }
 
 void checkImageName(const std::filesystem::path& path) {

@@ -1,6 +1,7 @@
 // Pictures in floating point, and their files.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -26,6 +27,8 @@ struct Image {
 void writeImage(const Image& image, const std::filesystem::path& path);
 /// Throws UsageError for a file name whose ending writeImage() would refuse; for use before long work.
 void checkImageName(const std::filesystem::path& path);
+/// What writeImage() takes in memory for an image of that size, beside the image.
+uint64_t writingBytes(const std::filesystem::path& path, ImageSize size);
 /// Reads what writeImage() writes, and ordinary PNG (8 and 16 bit), scan-line EXR and PFM files. Throws
 /// Error.
 Image readImage(const std::filesystem::path& path);

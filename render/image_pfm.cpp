@@ -57,15 +57,13 @@ float loadFloat(const std::byte* from, bool little_endian) {
 Bytes encodePfm(const Image& image) {
   static_assert(std::endian::native == std::endian::little, "the scale of -1 says so");
   const std::string header = fmt::format("PF\n{} {}\n-1.0\n", image.size.width, image.size.height);
-  std::vector<float> values;
-  values.reserve(3 * static_cast<size_t>(image.size.width) * image.size.height);
+  const size_t row_bytes = 3 * sizeof(float) * static_cast<size_t>(image.size.width);
+  Bytes bytes(header.size() + row_bytes * static_cast<size_t>(image.size.height));
+  std::memcpy(bytes.data(), header.data(), header.size());
+  std::byte* to = bytes.data() + header.size();
   for (int y = image.size.height - 1; y >= 0; --y)
-    for (int x = 0; x < image.size.width; ++x)
-      values.insert(values.end(), image.pixel(x, y), image.pixel(x, y) + 3);
-
-  const auto text = std::as_bytes(std::span(header)), floats = std::as_bytes(std::span(values));
-  Bytes bytes(text.begin(), text.end());
-  bytes.insert(bytes.end(), floats.begin(), floats.end());
+    for (int x = 0; x < image.size.width; ++x, to += 3 * sizeof(float))
+      std::memcpy(to, image.pixel(x, y), 3 * sizeof(float));
   return bytes;
 }
 

@@ -74,15 +74,29 @@ void takeBytes(png_structp png, png_bytep to, size_t count) {
   left = left.subspan(count);
 }
 
-bool writeAll(PngWriter& writer, Bytes& out, ImageSize size, int colour_type, png_bytepp rows) {
+void writeRow(const Image& image, int y, bool opaque, png_bytep row) {
+  for (int x = 0; x < image.size.width; ++x) {
+    const float* const pixel = image.pixel(x, y);
+    const float alpha = pixel[3];
+    for (size_t c = 0; c < 3; ++c) *row++ = toByte(alpha > 0 ? pixel[c] / alpha : 0);
+    if (!opaque) *row++ = toByte(alpha);
+  }
+}
+
+bool writeAll(PngWriter& writer, Bytes& out, const Image& image, bool opaque, png_bytep row) {
   if (setjmp(png_jmpbuf(writer.png))) return false;
   png_set_write_fn(writer.png, &out, appendBytes, nullptr);
   png_set_user_limits(writer.png, kLargestImageSide, kLargestImageSide);
-  png_set_IHDR(writer.png, writer.info, static_cast<png_uint_32>(size.width),
-               static_cast<png_uint_32>(size.height), 8, colour_type, PNG_INTERLACE_NONE,
+  png_set_IHDR(writer.png, writer.info, static_cast<png_uint_32>(image.size.width),
+               static_cast<png_uint_32>(image.size.height), 8,
+               opaque ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_RGB_ALPHA, PNG_INTERLACE_NONE,
                PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-  png_set_rows(writer.png, writer.info, rows);
-  png_write_png(writer.png, writer.info, PNG_TRANSFORM_IDENTITY, nullptr);
+  png_write_info(writer.png, writer.info);
+  for (int y = 0; y < image.size.height; ++y) {
+    writeRow(image, y, opaque, row);
+    png_write_row(writer.png, row);
+  }
+  png_write_end(writer.png, nullptr);
   return true;
 }
 
@@ -117,20 +131,10 @@ std::vector<png_bytep> rowPointers(std::vector<png_byte>& pixels, size_t rows) {
 }  // namespace
 
 Bytes encodePng(const Image& image) {
-  const bool opaque = isOpaque(image);
-  const size_t channels = opaque ? 3 : 4;
-  std::vector<png_byte> pixels;
-  pixels.reserve(image.rgba.size() / 4 * channels);
-  for (size_t n = 0; n < image.rgba.size(); n += 4) {
-    const float alpha = image.rgba[n + 3];
-    for (size_t c = 0; c < 3; ++c) pixels.push_back(toByte(alpha > 0 ? image.rgba[n + c] / alpha : 0));
-    if (!opaque) pixels.push_back(toByte(alpha));
-  }
-  auto rows = rowPointers(pixels, static_cast<size_t>(image.size.height));
+  std::vector<png_byte> row(4 * static_cast<size_t>(image.size.width));
   PngWriter writer;
   Bytes bytes;
-  if (!writeAll(writer, bytes, image.size, opaque ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_RGB_ALPHA,
-                rows.data()))
+  if (!writeAll(writer, bytes, image, isOpaque(image), row.data()))
     throw Error("an image of {} x {} pixels cannot be written as PNG: {}", image.size.width,
                 image.size.height, writer.message.text);
   return bytes;

@@ -101,6 +101,18 @@ void tell(const char* kind, const std::string& text) {
   fmt::print(stderr, "curvisplat: {}: {}\n", kind, text);
 }
 
+/// What a picture takes in memory on the way to its file.
+uint64_t outputBytes(const RenderWords& words, ImageSize picture) {
+  uint64_t bytes = 0;
+  if (isMovieName(words.output))
+    bytes = 3 * static_cast<uint64_t>(picture.width) * static_cast<uint64_t>(picture.height);
+  else
+    bytes = writingBytes(words.output, picture);
+  if (!words.first_image.empty()) bytes = std::max(bytes, writingBytes(words.first_image, picture));
+  if (!(words.annotations == Annotations{})) bytes += annotatedBytes(picture);
+  return bytes;
+}
+
 /// One run: draws frame after frame and keeps what there is to report.
 class FrameRun {
  public:
@@ -140,7 +152,7 @@ class FrameRun {
     }
     const auto show = [&](const Image& image, bool is_final) {
       if (!report_.first_image) {
-        writeImage(annotated(image, camera), words_.first_image);
+        annotate(image, camera, [&](const Image& picture) { writeImage(picture, words_.first_image); });
         report_.time_to_first_image_s = secondsSinceStart();
         report_.first_image = statistics;
       }
@@ -159,7 +171,7 @@ class FrameRun {
   }
 
   void finish(uint64_t number, const Camera& camera, const Image& image, const FrameStatistics& statistics) {
-    output_.write(number, annotated(image, camera));
+    annotate(image, camera, [&](const Image& picture) { output_.write(number, picture); });
     if (number == 0 && !report_.first_image) report_.time_to_first_image_s = secondsSinceStart();
     report_.frames.push_back({camera, statistics});
     const std::string which = words_.camera.moves() ? fmt::format(" of frame {}", number) : "";
@@ -173,13 +185,15 @@ class FrameRun {
       tell("warning", fmt::format("the picture{} is empty: {}", which, reason));
   }
 
-  Image annotated(const Image& data, const Camera& camera) const {
+  /// Calls write(the whole picture).
+  template <typename Write>
+  void annotate(const Image& data, const Camera& camera, const Write& write) const {
+    if (words_.annotations == Annotations{}) return write(data);
     const FrameOptions& options = report_.options;
-    return curvisplat::annotated(
-        data, words_.annotations,
-        {report_.picture, renderer_.screenView(camera, options), report_.transfer_function,
-         scalarTitle(report_.variable.name, report_.variable.unit), manifest_.lower, manifest_.upper,
-         options.background});
+    write(annotated(data, words_.annotations,
+                    {report_.picture, renderer_.screenView(camera, options), report_.transfer_function,
+                     scalarTitle(report_.variable.name, report_.variable.unit), manifest_.lower,
+                     manifest_.upper, options.background}));
   }
 
   /// A line for a frame with bricks that no frame before it had: the first of them.
@@ -236,6 +250,7 @@ void render(const RenderWords& words) {
 
   const ImageSize picture = options.size;
   options.size = dataSize(words.annotations, picture, transfer_function);
+  options.output_bytes = outputBytes(words, picture);
   const CameraMotion motion = chooseCameraMotion(words.camera, lower, upper, options.size);
   const auto output = makeFrameOutput(words.output, words.camera.moves(), picture, frames_per_s);
   FrameRenderer renderer(cache, variable, transfer_function, parseBackend(words.backend));
