@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using Node = pugi::xml_node;
 
-constexpr size_t kMostPieces = 100'000;
+constexpr size_t kMostPieces = 100'000, kMostFiles = 100'000;
 
 /// Follows a file to the files that it names, and gathers their pieces.
 class Gatherer {
@@ -42,6 +42,9 @@ class Gatherer {
   void add(const fs::path& path, const std::string& name) {
     const fs::path normal = fs::weakly_canonical(path);
     if (!inside_.insert(normal).second) throw Error("{}: names itself as a part of itself", path.string());
+    if (grid_.files.size() == kMostFiles)
+      throw Error("{}: leads to more than {} files, counted as often as they are named", grid_.files.front(),
+                  kMostFiles);
     const VtkXmlFile file(files_, path);
     grid_.files.push_back(path.string());
     if (top_type_.empty()) top_type_ = file.type();

@@ -30,6 +30,9 @@ constexpr std::array<Format, 4> kFormats{{
     {"", "Pf", nullptr, 0, decodePfm},  // one grey channel: read, never written
 }};
 
+constexpr size_t kLongestMagic = 4;
+constexpr uint64_t kLargestFile = uint64_t{8} << 30;  // 16384 x 16384 pixels of four floats are 4 GiB
+
 const Format& formatByName(const std::filesystem::path& path) {
   std::string ending = path.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(),
@@ -65,12 +68,19 @@ void checkImageName(const std::filesystem::path& path) {
 
 Image readImage(const std::filesystem::path& path) {
   const InputFile file(path);
-  Bytes bytes(file.size());
+  Bytes bytes(std::min<uint64_t>(file.size(), kLongestMagic));
   file.readAt(0, std::span(bytes));
-  for (const Format& format : kFormats)
-    if (bytes.size() >= format.magic.size() &&
-        std::memcmp(bytes.data(), format.magic.data(), format.magic.size()) == 0)
-      return format.decode(bytes, path.string());
+  for (const Format& format : kFormats) {
+    if (bytes.size() < format.magic.size() ||
+        std::memcmp(bytes.data(), format.magic.data(), format.magic.size()) != 0)
+      continue;
+    if (file.size() > kLargestFile)
+      throw Error("{}: has {} bytes, more than the {} an image can have", path.string(), file.size(),
+                  kLargestFile);
+    bytes.resize(file.size());
+    file.readAt(0, std::span(bytes));
+    return format.decode(bytes, path.string());
+  }
   throw Error("{}: is not a PNG, EXR or PFM image, by its first bytes", path.string());
 }
 

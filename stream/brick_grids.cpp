@@ -1,6 +1,5 @@
 #include "stream/brick_grids.h"
 
-#include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
 
@@ -15,7 +14,8 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kMostFindings = 16;
+// Magic (8), file, library major and minor version (4 each), flag (1).
+constexpr size_t kMagic = 8, kUuidOffset = 21;
 constexpr openvdb::Int32 kBackground = -1;
 constexpr const char* kWorldUnits = "world_units";
 
@@ -38,9 +38,7 @@ bool firstOfItsCell(std::span<const Brick> bricks, size_t brick) {
 
 /// OpenVDB puts a random UUID into each file it writes. A UUID made of the contents keeps the bytes the same.
 void replaceUuid(std::string& file) {
-  constexpr size_t kOffset =
-      21;  // behind magic (8), file, library major and minor version (4 each), flag (1)
-  constexpr size_t kLength = 36;
+  constexpr size_t kOffset = kUuidOffset, kLength = 36;
   CURVISPLAT_CHECK_OP(file.size(), >, kOffset + kLength);
   CURVISPLAT_CHECK(file[kOffset + 8] == '-' && file[kOffset + 23] == '-');
   const auto bytes = std::as_bytes(std::span(file));
@@ -90,50 +88,15 @@ std::vector<std::byte> brickGridsFile(const RootCube& root, std::span<const Bric
   return {bytes.begin(), bytes.end()};
 }
 
-std::vector<std::string> compareBrickGrids(const std::filesystem::path& path, std::span<const Brick> bricks) {
-  initialize();
-  openvdb::GridPtrVecPtr grids;
-  try {
-    openvdb::io::File file(path.string());
-    file.open(/*delayLoad=*/false);
-    grids = file.getGrids();
-    file.close();
-  } catch (const openvdb::Exception& error) {
-    throw Error("{}: OpenVDB cannot read it: {}", path.string(), error.what());
-  }
-  std::vector<std::string> findings;
-  const auto find = [&](std::string finding) {
-    if (findings.size() < kMostFindings) findings.push_back(path.string() + ": " + std::move(finding));
-  };
-  std::vector<openvdb::Int32Grid::Ptr> levels(bricks.back().cell.level + 1);
-  for (const auto& grid : *grids) {
-    const auto ints = openvdb::gridPtrCast<openvdb::Int32Grid>(grid);
-    uint32_t level = 0;
-    while (level < levels.size() && grid->getName() != gridName(level)) ++level;
-    if (!ints || level == levels.size())
-      find(fmt::format("a grid '{}' that is none of the octree's levels", grid->getName()));
-    else
-      levels[level] = ints;
-  }
-  std::vector<uint64_t> cells(levels.size());
-  for (size_t n = 0; n < bricks.size(); ++n) {
-    if (!firstOfItsCell(bricks, n)) continue;
-    const Cell& cell = bricks[n].cell;
-    ++cells[cell.level];
-    if (!levels[cell.level]) continue;
-    const auto value = levels[cell.level]->tree().getValue(coordOf(cell));
-    if (value != static_cast<openvdb::Int32>(n))
-      find(fmt::format("level {}, cell {} {} {} says brick {}, bricks.bin {}", cell.level, cell.at[0],
-                       cell.at[1], cell.at[2], value, n));
-  }
-  for (size_t level = 0; level < levels.size(); ++level) {
-    if (!levels[level])
-      find(fmt::format("no grid '{}'", gridName(static_cast<uint32_t>(level))));
-    else if (levels[level]->activeVoxelCount() != cells[level])
-      find(fmt::format("level {} has {} cells, bricks.bin {}", level, levels[level]->activeVoxelCount(),
-                       cells[level]));
-  }
-  return findings;
+std::string differenceFromBrickGrids(std::span<const std::byte> bytes, const RootCube& root,
+                                     std::span<const Brick> bricks) {
+  const std::vector<std::byte> expected = brickGridsFile(root, bricks);
+  if (bytes.size() < kUuidOffset || !std::equal(bytes.begin(), bytes.begin() + kMagic, expected.begin()))
+    return "is no file of OpenVDB's";
+  if (!std::equal(bytes.begin(), bytes.begin() + kUuidOffset, expected.begin())) return "";
+  return std::equal(bytes.begin(), bytes.end(), expected.begin(), expected.end())
+             ? ""
+             : "has not the octree of bricks.bin";
 }
 
 }  // namespace curvisplat

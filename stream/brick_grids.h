@@ -5,7 +5,6 @@
 #pragma once
 
 #include <cstddef>
-#include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
@@ -17,8 +16,10 @@ namespace curvisplat {
 /// The file's bytes: the same for the same octree.
 std::vector<std::byte> brickGridsFile(const RootCube& root, std::span<const Brick> bricks);
 
-/// Compares the file with the octree; gives what differs, a line each, at most 16. Throws Error if OpenVDB
-/// cannot read it. The file's checksum should have been checked before: OpenVDB trusts what it reads.
-std::vector<std::string> compareBrickGrids(const std::filesystem::path& file, std::span<const Brick> bricks);
+/// What is wrong with `bytes` as the file of that octree, a line; empty if nothing is. OpenVDB's parser
+/// trusts what it reads, so it is not asked: the file is made again and compared. One by another version of
+/// OpenVDB cannot be, and has nothing wrong with it.
+std::string differenceFromBrickGrids(std::span<const std::byte> bytes, const RootCube& root,
+                                     std::span<const Brick> bricks);
 
 }  // namespace curvisplat

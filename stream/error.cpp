@@ -1,8 +1,9 @@
 #include "stream/error.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <cstdlib>
+
+#include "stream/say.h"
 
 namespace curvisplat {
 
@@ -13,8 +14,8 @@ std::string oneLine(std::string text) {
 }
 
 void checkFailed(const char* file, int line, const char* expression, const std::string& values) {
-  fmt::print(stderr, "curvisplat: internal error at {}:{}: {} does not hold{}{}\n", file, line, expression,
-             values.empty() ? "" : ": ", values);
+  say("internal error at {}:{}: {} does not hold{}{}", file, line, expression, values.empty() ? "" : ": ",
+      values);
   std::abort();
 }
 

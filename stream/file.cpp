@@ -64,6 +64,21 @@ void renameFile(const std::filesystem::path& from, const std::filesystem::path& 
     throw Error("{}: cannot be renamed to {}: {}", from.string(), to.string(), reason());
 }
 
+void replaceFile(const std::filesystem::path& path, const std::filesystem::path& temporary,
+                 std::span<const std::byte> bytes) {
+  // What is there may be a link that leads anywhere: it would be followed.
+  SystemCalls::current().remove(temporary.c_str());
+  try {
+    OutputFile file(temporary);
+    file.append(bytes);
+    file.close();
+    renameFile(temporary, path);
+  } catch (...) {
+    removeAll(temporary);
+    throw;
+  }
+}
+
 }  // namespace
 
 int SystemCalls::open(const char* path, int flags, unsigned mode) {
@@ -110,7 +125,8 @@ ScopedSystemCalls::~ScopedSystemCalls() {
 }
 
 InputFile::InputFile(std::filesystem::path path, Caching caching) : path_(std::move(path)) {
-  fd_ = openWith(caching, path_, O_RDONLY, 0);
+  // Without O_NONBLOCK, opening a named pipe waits for whoever writes to it.
+  fd_ = openWith(caching, path_, O_RDONLY | O_NONBLOCK, 0);
   if (fd_ < 0) throw Error("{}: cannot be opened for reading: {}", path_.string(), reason());
   struct stat status {};
   if (::fstat(fd_, &status) < 0 || !S_ISREG(status.st_mode)) {
@@ -231,20 +247,7 @@ std::string readTextFile(const std::filesystem::path& path, uint64_t limit) {
 }
 
 void writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-  std::filesystem::path temporary = path;
-  temporary += ".part";
-  // What is there may be a link that leads anywhere: it would be followed.
-  std::error_code none_there;
-  std::filesystem::remove(temporary, none_there);
-  try {
-    OutputFile file(temporary);
-    file.append(bytes);
-    file.close();
-    renameFile(temporary, path);
-  } catch (...) {
-    removeAll(temporary);
-    throw;
-  }
+  replaceFile(path, path.string() + ".part", bytes);
 }
 
 void writeFileAtomically(const std::filesystem::path& path, const std::string& text) {
@@ -252,8 +255,15 @@ void writeFileAtomically(const std::filesystem::path& path, const std::string& t
 }
 
 void writeFileDurably(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-  writeFileAtomically(path, bytes);
-  syncDirectory(folderOf(path));
+  namespace fs = std::filesystem;
+  std::error_code error;
+  fs::path target = path;
+  if (fs::is_symlink(path, error))  // to what is there, or to nothing yet
+    target = fs::exists(path, error) ? fs::canonical(path) : folderOf(path) / fs::read_symlink(path);
+  if (fs::exists(target, error) && !fs::is_regular_file(target, error))
+    throw Error("{}: is there, and is no regular file; choose another name", path.string());
+  replaceFile(target, fmt::format("{}.{}.part", target.string(), ::getpid()), bytes);
+  syncDirectory(folderOf(target));
 }
 
 void writeFileDurably(const std::filesystem::path& path, const std::string& text) {

@@ -130,14 +130,14 @@ class OutputFile {
 };
 
 /// The whole of a small file (at most `limit` bytes, else an Error).
-std::string readTextFile(const std::filesystem::path& path, uint64_t limit = 64 << 20);
+std::string readTextFile(const std::filesystem::path& path, uint64_t limit = 16 << 20);
 
-/// Writes `bytes` beside `path`, syncs them and renames them into place: afterwards `path` is the old file or
-/// the whole new one, whatever happens. Which of them, after a power loss, is certain once its folder has
-/// been synced.
+/// Writes `bytes` beside `path`, syncs and renames them: then `path` is the old file or the whole new one,
+/// whatever happens; which, after a power loss, is certain once its folder has been synced. For a file that
+/// has one writer at a time.
 void writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void writeFileAtomically(const std::filesystem::path& path, const std::string& text);
-/// The same, and syncs the folder: what has returned is there for good.
+/// For any number of writers, and for good: it syncs the folder. Follows links; refuses what is no file.
 void writeFileDurably(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void writeFileDurably(const std::filesystem::path& path, const std::string& text);
 

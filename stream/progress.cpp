@@ -59,7 +59,7 @@ void Progress::end() {
   usage.bytes_written -= usage_at_start_.bytes_written;
   phases_.push_back({phase_, unit_, secondsSince(start_), done_, usage});
   phase_.clear();
-  if (terminal_) fmt::print(stderr, "\r\033[K");
+  if (terminal_) std::fputs("\r\033[K", stderr);
 }
 
 void Progress::draw() {
@@ -77,7 +77,8 @@ void Progress::draw() {
       line += fmt::format("{:.0f} s left  ", seconds / done * std::max(0.0, total - skipped - done));
   }
   line += fmt::format("{}{}/s", withUnit(done / seconds), unit_);
-  fmt::print(stderr, "\r\033[K{}", line);
+  line.insert(0, "\r\033[K");
+  std::fputs(line.c_str(), stderr);
   std::fflush(stderr);
 }
 

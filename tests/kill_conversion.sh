@@ -57,11 +57,12 @@ add_s=$(calculate "$(seconds) - $start")
 checksums "$cache" > "$folder/both"
 echo "undisturbed: conversion $convert_s s, addition $add_s s"
 
-failed=0
+failed=0 ended=0
 # row WHAT SIGNAL MOMENT STATUS LEFT DONE_AGAIN SECONDS RESULT
 row() {
   printf '%-8s %-5s %9s  %6s   %-22s %-16s %8s   %s\n' "$@"
   [[ "$5$8" =~ [A-Z] ]] && failed=1
+  [ "$4" = 0 ] || ended=$((ended + 1))
   return 0
 }
 printf '%-8s %-5s %9s  %6s   %-22s %-16s %8s   %s\n' job signal 'at [s]' status 'left behind' 'bricks kept' 'in [s]' result
@@ -145,4 +146,6 @@ each end_conversion "$convert_s" KILL 137
 each end_conversion "$convert_s" INT 130
 each end_addition "$add_s" KILL 137
 each end_addition "$add_s" INT 130
+echo "$ended of $((4 * moments)) were ended before they were done"
+[ $ended -gt 0 ] || failed=1
 exit $failed

@@ -8,6 +8,7 @@
 #include "preprocess/add_scalar.h"
 #include "preprocess/time_steps.h"
 #include "stream/error.h"
+#include "stream/say.h"
 #include "tools/run_statistics.h"
 #include "tools/stop_signals.h"
 
@@ -60,10 +61,8 @@ void runAddScalar(ConvertWords words) {
   const StopOnSignals stopping(progress);
   const AddScalarReport report = addScalars(*source, options, progress);
   const nlohmann::json numbers = statistics(report, progress);
-  for (const std::string& warning : source->description().warnings)
-    fmt::print(stderr, "curvisplat: warning: {}\n", warning);
-  if (const auto note = timeStepNote(source->description(), words.grid.time_step))
-    fmt::print(stderr, "curvisplat: note: {}\n", *note);
+  for (const std::string& warning : source->description().warnings) say("warning: {}", warning);
+  if (const auto note = timeStepNote(source->description(), words.grid.time_step)) say("note: {}", *note);
   printSummary(words, report, secondsOf(progress), numbers["peak_memory_bytes"]);
   if (!words.statistics.empty()) writeStatistics(words.statistics, numbers);
 }

@@ -71,7 +71,7 @@ void checkWords(const BenchWords& words) {
     throw UsageError("a CACHE is required, or --convert to measure conversion");
   if (!words.converts && (words.nodes || !words.temporary_folder.empty()))
     throw UsageError("{} is for --convert", words.nodes ? "--nodes" : "--tmp");
-  if (!words.json.empty()) checkOutputFolder("--json", words.json);
+  if (!words.json.empty()) checkOutputFile("--json", words.json, {words.cache});
   if (words.plots.empty()) return;
   std::error_code ignored;
   if (fs::exists(words.plots, ignored) && !fs::is_directory(words.plots, ignored))

@@ -10,6 +10,7 @@
 #include "render/image.h"
 #include "stream/error.h"
 #include "tools/commands.h"
+#include "tools/run_statistics.h"
 
 namespace curvisplat {
 namespace {
@@ -42,7 +43,10 @@ ImageDifference compareNamed(const Image& a, const Image& b, const CompareOption
 }
 
 void compare(const CompareOptions& options) {
-  if (!options.difference.empty()) checkImageName(options.difference);
+  if (!options.difference.empty()) {
+    checkImageName(options.difference);
+    checkOutputFile("--difference", options.difference, {options.a, options.b});
+  }
   const Image a = readImage(options.a), b = readImage(options.b);
   const ImageDifference difference = compareNamed(a, b, options);
   if (difference.largest == 0)

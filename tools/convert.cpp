@@ -14,6 +14,7 @@
 #include "preprocess/time_steps.h"
 #include "stream/error.h"
 #include "stream/progress.h"
+#include "stream/say.h"
 #include "tools/add_scalar.h"
 #include "tools/commands.h"
 #include "tools/convert_words.h"
@@ -44,17 +45,13 @@ void printSummary(const ConvertWords& words, const ConvertReport& report, double
 /// What a person should know of the grid, on stderr: it is odd, not wrong.
 void printWarnings(const GridDescription& description, std::optional<uint32_t> time_step,
                    const ConvertReport& report) {
-  for (const std::string& warning : description.warnings)
-    fmt::print(stderr, "curvisplat: warning: {}\n", warning);
-  for (const std::string& warning : report.warnings) fmt::print(stderr, "curvisplat: warning: {}\n", warning);
-  if (const auto note = timeStepNote(description, time_step))
-    fmt::print(stderr, "curvisplat: note: {}\n", *note);
+  for (const std::string& warning : description.warnings) say("warning: {}", warning);
+  for (const std::string& warning : report.warnings) say("warning: {}", warning);
+  if (const auto note = timeStepNote(description, time_step)) say("note: {}", *note);
   const auto note = [](uint64_t count, const char* what) {
-    if (count > 0) fmt::print(stderr, "curvisplat: note: {} {}\n", count, what);
+    if (count > 0) say("note: {} {}", count, what);
   };
-  if (report.resumed)
-    fmt::print(stderr, "curvisplat: note: resumed with {} of {} bricks done\n", report.resumed_bricks,
-               report.bricks);
+  if (report.resumed) say("note: resumed with {} of {} bricks done", report.resumed_bricks, report.bricks);
   if (report.centring == Centring::cell) {
     note(report.blanked.by_grid, "cells have a blanked corner or no value");
     note(report.blanked.by_value, "cells have the blank value");

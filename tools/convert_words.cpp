@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "stream/error.h"
+#include "stream/say.h"
 #include "tools/grid_options.h"
 
 namespace curvisplat {
@@ -21,12 +22,19 @@ std::unique_ptr<GridSource> openSource(const ConvertWords& words, const std::fil
 std::vector<uint32_t> chooseScalars(const ConvertWords& words, const std::vector<std::string>& names,
                                     const GridDescription& description) {
   try {
-    for (const std::string& note : notesOnNumbers(description, names))
-      fmt::print(stderr, "curvisplat: note: {}\n", note);
+    for (const std::string& note : notesOnNumbers(description, names)) say("note: {}", note);
     return scalarsNamed(description, names);
   } catch (const UsageError& error) {
     throw Error("{}: {}", words.grid.grid.string(), error.what());
   }
+}
+
+void checkStatisticsFile(const ConvertWords& words) {
+  if (words.statistics.empty()) return;
+  std::vector<std::filesystem::path> inputs = words.grid.solutions;
+  inputs.push_back(words.grid.grid);
+  if (!words.to.empty()) inputs.push_back(words.to);
+  checkOutputFile("--stats", words.statistics, inputs);
 }
 
 double secondsOf(const Progress& progress) {

@@ -45,10 +45,13 @@ double secondsOf(const Progress& progress);
 uint64_t totalBytes(std::span<const FileReport> files);
 double mebibytes(uint64_t bytes);
 
-/// What the words say of either way's options. Throws UsageError for a --stats that cannot be written.
+/// Throws Error for a --stats that cannot be written, or would change what is read.
+void checkStatisticsFile(const ConvertWords& words);
+
+/// What the words say of either way's options. Throws as checkStatisticsFile().
 template <typename Options>
 void takeCommonWords(const ConvertWords& words, Options& options) {
-  if (!words.statistics.empty()) checkOutputFolder("--stats", words.statistics);
+  checkStatisticsFile(words);
   options.temporary_folder = words.temporary_folder;
   options.blank_value = words.blank_value;
   options.threads = words.threads;

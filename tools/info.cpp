@@ -16,6 +16,7 @@
 #include "stream/partial_folder.h"
 #include "stream/probe.h"
 #include "stream/progress.h"
+#include "stream/say.h"
 #include "tools/commands.h"
 #include "tools/grid_options.h"
 #include "tools/info_grid.h"
@@ -178,9 +179,7 @@ void printCacheInfo(const InfoOptions& options) {
   else
     printAsText(reader, options, asked);
   if (hasUnfinished(options.grid.grid))
-    fmt::print(stderr,
-               "curvisplat: note: a conversion that is to replace this cache is under way, or was "
-               "interrupted\n");
+    say("note: a conversion that is to replace this cache is under way, or was interrupted");
   if (!asked.findings.empty())
     throw Error("{}: {} findings; the cache is damaged: convert again", options.grid.grid.string(),
                 asked.findings.size());

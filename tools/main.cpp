@@ -10,8 +10,11 @@
 
 #include "stream/error.h"
 #include "stream/progress.h"
+#include "stream/say.h"
 #include "tools/commands.h"
+#include "tools/standard_streams.h"
 
+namespace curvisplat {
 namespace {
 
 /// "convert, info, render and view"
@@ -23,10 +26,8 @@ std::string namesOf(const CLI::App& app) {
   return fmt::format("{} and {}", fmt::join(names, ", "), last);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  using namespace curvisplat;
+/// The exit status.
+int run(int argc, char** argv) {
   CLI::App app("curvisplat shows curvilinear simulation grids that are larger than memory.", "curvisplat");
   app.set_version_flag("--version", "curvisplat " CURVISPLAT_VERSION);
   app.require_subcommand(1);
@@ -44,28 +45,38 @@ int main(int argc, char** argv) {
     return 0;
   } catch (const CLI::ParseError& error) {
     if (argc > 1 && argv[1][0] != '-' && app.get_subcommands().empty()) {
-      fmt::print(stderr, "curvisplat: there is no subcommand '{}'; there are {}\n", argv[1], namesOf(app));
+      say("there is no subcommand '{}'; there are {}", argv[1], namesOf(app));
       return 2;
     }
     if (error.get_exit_code() == 0) return app.exit(error);  // help and versions come this way too
     const std::vector<CLI::App*> chosen = app.get_subcommands();
     const std::string command = "curvisplat" + (chosen.empty() ? "" : " " + chosen.front()->get_name());
-    fmt::print(stderr, "{}: {}; see {} --help\n", command, error.what(), command);
+    say("{}; see {} --help", error.what(), command);
     return 2;
   } catch (const UsageError& error) {
-    fmt::print(stderr, "curvisplat: {}\n", error.what());
+    say("{}", error.what());
     return 2;
   } catch (const Interrupted& interrupted) {
-    fmt::print(stderr, "curvisplat: {}\n", interrupted.what());
+    say("{}", interrupted.what());
     return 128 + interrupted.signal();  // as a shell says of a process that the signal has ended
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "curvisplat: out of memory; give the machine more, or ask for less with --memory\n");
+    say("out of memory; give the machine more, or ask for less (--memory, --size)");
     return 1;
   } catch (const std::filesystem::filesystem_error& error) {
-    fmt::print(stderr, "curvisplat: {}: {}\n", error.path1().string(), error.code().message());
+    say("{}: {}", error.path1().string(), error.code().message());
     return 1;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "curvisplat: {}\n", error.what());
+    if (std::ferror(stdout) == 0) say("{}", error.what());  // else main() says it
     return 1;
   }
+}
+
+}  // namespace
+}  // namespace curvisplat
+
+int main(int argc, char** argv) {
+  curvisplat::openStandardStreams();
+  const int status = curvisplat::run(argc, argv);
+  const bool printed = curvisplat::finishStandardOutput();
+  return status == 0 && !printed ? 1 : status;
 }

@@ -20,6 +20,7 @@
 #include "stream/cache_reader.h"
 #include "stream/error.h"
 #include "stream/progress.h"
+#include "stream/say.h"
 #include "tools/camera_motion.h"
 #include "tools/commands.h"
 #include "tools/empty_picture.h"
@@ -57,6 +58,8 @@ WorldBox parseClipBox(const std::string& text) {
   return box;
 }
 
+constexpr double kLeastScale = 1e-6, kMostScale = 1e6;
+
 FrameOptions frameOptions(const RenderWords& words) {
   FrameOptions options;
   options.size = parseImageSize("--size", words.size);
@@ -68,8 +71,10 @@ FrameOptions frameOptions(const RenderWords& words) {
     throw UsageError("--classify {}: expected pixel or flat", words.classify);
   options.classification = words.classify == "pixel" ? Classification::pixel : Classification::flat;
   options.scale = parsePoint("--scale", words.scale);
-  if (!(std::min({options.scale.x, options.scale.y, options.scale.z}) > 0))
-    throw UsageError("--scale {}: expected three numbers above zero", words.scale);
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(options.scale[axis] >= kLeastScale && options.scale[axis] <= kMostScale))
+      throw UsageError("--scale {}: expected three numbers between {:g} and {:g}", words.scale, kLeastScale,
+                       kMostScale);
   if (words.clip_box) options.clip_box = parseClipBox(*words.clip_box);
   options.background = parseBackground("--background", words.background);
   options.threads = words.threads;
@@ -89,16 +94,20 @@ void checkWords(const RenderWords& words, ImageSize size) {
     throw UsageError("--background transparent: a {} has no transparency; write .png or .exr",
                      words.output.extension().string());
   parseBackend(words.backend);
-  checkOutputFolder("-o", words.output);
+  checkOutputFile("-o", words.output, {words.cache});
   if (!words.first_image.empty()) {
     checkImageName(words.first_image);
-    checkOutputFolder("--first-image", words.first_image);
+    checkOutputFile("--first-image", words.first_image, {words.cache});
   }
-  if (!words.statistics.empty()) checkOutputFolder("--stats", words.statistics);
+  if (!words.statistics.empty()) {
+    checkOutputFile("--stats", words.statistics, {words.cache});
+    if (words.statistics == words.output)
+      throw UsageError("--stats {}: is what -o names", words.statistics.string());
+  }
 }
 
 void tell(const char* kind, const std::string& text) {
-  fmt::print(stderr, "curvisplat: {}: {}\n", kind, text);
+  say("{}: {}", kind, text);
 }
 
 /// What a picture takes in memory on the way to its file.

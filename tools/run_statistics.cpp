@@ -77,4 +77,18 @@ void checkOutputFolder(std::string_view option, const std::filesystem::path& pat
                 folder.string(), std::strerror(errno));
 }
 
+void checkOutputFile(std::string_view option, const std::filesystem::path& path,
+                     const std::vector<std::filesystem::path>& inputs) {
+  namespace fs = std::filesystem;
+  checkOutputFolder(option, path);
+  std::error_code ignored;
+  if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored))
+    throw Error("{} {}: is there, and is no regular file; choose another name", option, path.string());
+  const fs::path target = fs::weakly_canonical(path);
+  for (const fs::path& input : inputs)
+    if (fs::equivalent(target, input, ignored) || fs::equivalent(target.parent_path(), input, ignored))
+      throw Error("{} {}: would change {}, which is read; choose another name", option, path.string(),
+                  input.string());
+}
+
 }  // namespace curvisplat

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <string_view>
+#include <vector>
 
 namespace curvisplat {
 
@@ -19,5 +20,10 @@ void writeStatistics(const std::filesystem::path& path, const nlohmann::json& st
 /// Throws Error if the folder that `path`, the value of `option`, is to be written to does not exist or
 /// cannot be written to: for use before long work.
 void checkOutputFolder(std::string_view option, const std::filesystem::path& path);
+
+/// checkOutputFolder() for a file. Throws Error, too, if `path` is there and is no regular file, or if
+/// writing it would change one of `inputs`: files, or caches.
+void checkOutputFile(std::string_view option, const std::filesystem::path& path,
+                     const std::vector<std::filesystem::path>& inputs);
 
 }  // namespace curvisplat

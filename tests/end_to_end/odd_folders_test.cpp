@@ -39,10 +39,7 @@ TEST(OddNames, AreTakenEverywhere) {
   expectDone(cubeWords(inside / "ο cube", {"--scalar", scalar, "--stats", stats}));
   EXPECT_TRUE(nlohmann::json::parse(readTextFile(stats))["files"].contains("var.0.bin"));
 
-  const std::vector<std::string> layout = cubeWords(inside / "other ö");
-  std::vector<std::string> addition{"convert", layout[1], layout[2], "--add-scalar", added, "--to", cache};
-  addition.insert(addition.end(), layout.begin() + 5, layout.end());
-  expectDone(addition);
+  expectDone(cubeAdditionWords(inside / "other ö", added, cache));
 
   const ProgramResult info = runProgram({"info", cache, "--json", "--verify", "--probe", "3,3,3"});
   ASSERT_EQ(info.status, 0) << info.err;

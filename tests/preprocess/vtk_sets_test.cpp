@@ -209,6 +209,18 @@ TEST(VtkSets, FilesThatNameThemselvesAreRefused) {
   EXPECT_NE(errorOf(series).find("time steps inside of another"), std::string::npos);
 }
 
+TEST(VtkSets, FilesThatNameOthersOverAndOverAreRefused) {
+  const TestFolder folder("vtm-fan");
+  // Ten levels, each of which names the next ten times.
+  for (int level = 0; level < 10; ++level) {
+    std::string members;
+    for (int n = 0; n < 10; ++n) members += fmt::format("<DataSet file='{}.vtm'/>", level + 1);
+    folder.write(fmt::format("{}.vtm", level), setOf("vtkMultiBlockDataSet", members));
+  }
+  folder.write("10.vtm", setOf("vtkMultiBlockDataSet", ""));
+  EXPECT_NE(errorOf(folder.path() / "0.vtm").find("leads to more than 100000 files"), std::string::npos);
+}
+
 // More pieces than files can be open at once.
 TEST(VtkSets, ManyPiecesNeedFewOpenFiles) {
   const TestFolder folder("vtm-many");

@@ -54,7 +54,7 @@ watch() {
 # judge FILE SLACK: a table of it; its last quarter may have no more than its second. Memory at most: 4 % and SLACK MiB
 # are for pages that come and go. Files at least: some are open for a moment.
 judge() {
-  awk -v slack="$2" '
+  awk -v slack="$2" -v form=$form '
     { t[NR] = $1 - $2; memory[NR] = $3 / 1024; files[NR] = $4; threads[NR] = $5 }
     function most(values, from, to,   n, m) { m = 0; for (n = from; n <= to; ++n) if (values[n] > m) m = values[n]; return m }
     function least(values, from, to,   n, m) { m = values[to]; for (n = from; n <= to; ++n) if (values[n] < m) m = values[n]; return m }
@@ -65,7 +65,7 @@ judge() {
         n = rows == 1 ? 1 : 1 + int(row * (NR - 1) / (rows - 1))
         printf "%13.1f %14.1f %12d %9d\n", t[n], memory[n], files[n], threads[n]
       }
-      if (NR < 8) { print "over too soon for a judgement of memory, files and threads"; exit }
+      if (NR < 8) { print "over too soon for a judgement of memory, files and threads"; exit form == "full" }
       half = int(NR / 2); quarter = int(NR / 4); last = NR - quarter
       before = most(memory, quarter, half); after = most(memory, last, NR)
       printf "most memory: %.1f MiB in the second quarter, %.1f in the last\n", before, after

@@ -20,8 +20,11 @@ if [ -z "$cache" ]; then
   made orbit "$grid" f
   cache=$folder/orbit.splats
 fi
+size=$(du -sm "$cache" | cut -f 1)
+[ $form = short ] || [ "$size" -ge $((20 * ${memory%M})) ] ||
+  fail "the cache is $size MiB, less than 20 times the memory"
 # Two turns: every frame of the first comes again, after half of all frames.
-echo "$frames frames of $picture with --memory $memory over $(du -sh "$cache" | cut -f 1)"
+echo "$frames frames of $picture with --memory $memory over $size MiB"
 view=(--parallel-scale 0.3 --lod-pixels 2 --max-splats "$splats" --size "$picture" --memory "$memory")
 "$program" render "$cache" -o "$folder/frame_%04d.png" --position 4,4,3 --orbit 720 --frames "$frames" \
   "${view[@]}" --stats "$folder/stats.json" > "$folder/render.log" 2>&1 &

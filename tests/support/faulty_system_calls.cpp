@@ -43,6 +43,7 @@ void FaultySystemCalls::cut(int fd) {
 }
 
 int FaultySystemCalls::open(const char* path, int flags, unsigned mode) {
+  if (interrupted()) return -1;
   if (callFails()) return fail();
   if (refuse_direct_open && (flags & O_DIRECT)) {
     errno = EINVAL;
@@ -82,10 +83,12 @@ ssize_t FaultySystemCalls::pwrite(int fd, const void* from, size_t count, int64_
 }
 
 int FaultySystemCalls::truncate(int fd, int64_t size) {
+  if (interrupted()) return -1;
   return callFails() ? fail() : SystemCalls::truncate(fd, size);
 }
 
 int FaultySystemCalls::fsync(int fd) {
+  if (interrupted()) return -1;
   const int64_t number = syncs++;
   if (callFails()) return fail();
   if (fail_sync_at >= 0 && number >= fail_sync_at) return fail();

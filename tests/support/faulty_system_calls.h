@@ -15,7 +15,7 @@ namespace curvisplat::testing {
 class FaultySystemCalls : public SystemCalls {
  public:
   size_t largest_transfer = SIZE_MAX;  // a call moves at most so many bytes
-  int interrupt_every = 0;             // every n-th read or write is EINTR first
+  int interrupt_every = 0;             // every n-th call that may be EINTR is so first
   int64_t fail_write_at = -1;          // this write (counted from 0) and all after it fail with `error`
   int64_t fail_read_at = -1;           // this read and all after it
   int64_t fail_only_read_at = -1;      // this read, and none after it

@@ -14,6 +14,7 @@
 #include "render/image.h"
 #include "stream/error.h"
 #include "stream/file.h"
+#include "stream/say.h"
 #include "tools/viewer/frame_loop.h"
 #include "tools/viewer/navigation.h"
 #include "tools/viewer/panels.h"
@@ -47,7 +48,7 @@ class Viewer {
         frames_(cache, options.backend, Window::wake),
         picture_(window_.gl()),
         overlay_(window_.gl()) {
-    fmt::print(stderr, "curvisplat: window: OpenGL {}\n", window_.contextName());
+    say("window: OpenGL {}", window_.contextName());
     updateBounds();
     fitData(pictureSize());
   }
@@ -85,8 +86,7 @@ class Viewer {
       try {
         state = viewStateFromJson(readTextFile(*remembered), *remembered, cache_.manifest());
       } catch (const Error& error) {
-        fmt::print(stderr, "curvisplat: warning: {}; the window opens as if for the first time\n",
-                   error.what());
+        say("warning: {}; the window opens as if for the first time", error.what());
       }
     }
     if (options_.scalar && *options_.scalar != state.variable)
@@ -206,7 +206,7 @@ class Viewer {
       picture_.set(frame->bytes, frame->image.size);
       shown_ = std::move(frame);
     } catch (const UsageError& error) {
-      if (said_ != error.what()) fmt::print(stderr, "curvisplat: warning: {}\n", error.what());
+      if (said_ != error.what()) say("warning: {}", error.what());
       said_ = error.what();
     }
   }
@@ -273,7 +273,7 @@ class Viewer {
     try {
       writeState(*file, toJson(state_));
     } catch (const Error& error) {
-      fmt::print(stderr, "curvisplat: warning: the view is not remembered: {}\n", error.what());
+      say("warning: the view is not remembered: {}", error.what());
     }
   }
 

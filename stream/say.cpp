@@ -1,0 +1,18 @@
+#include "stream/say.h"
+
+#include <cstdio>
+#include <exception>
+#include <string>
+
+namespace curvisplat {
+
+void say(std::string_view text) noexcept {
+  try {
+    const std::string line = "curvisplat: " + std::string(text) + "\n";
+    std::fwrite(line.data(), 1, line.size(), stderr);  // as one, beside other threads' lines
+  } catch (const std::exception&) {
+    std::fputs("curvisplat: out of memory\n", stderr);
+  }
+}
+
+}  // namespace curvisplat

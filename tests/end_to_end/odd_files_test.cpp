@@ -1,0 +1,165 @@
+// Pipes, devices and links where files are expected; standard streams that are full or closed; several
+// programs that write one file.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "render/image.h"
+#include "stream/file.h"
+#include "tests/support/cube_files.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+class OddFiles : public testing::Test {
+ protected:
+  OddFiles() {
+    writeCube(folder_ / "cube", 8, [](const GridNode& node, NodeValues& values) {
+      values.scalars[0] = static_cast<float>(node.i);
+      values.blank = node.i + node.j + node.k == 0;  // a note is printed
+    });
+    const ProgramResult result = runProgram(cubeWords(folder_ / "cube"));
+    EXPECT_EQ(result.status, 0) << result.err;
+    for (const char* name : {"pipe", "pipe.json"}) EXPECT_EQ(::mkfifo(file(name).c_str(), 0600), 0);
+  }
+
+  std::string file(const std::string& name) const { return (folder_ / name).string(); }
+  std::string cache() const { return file("cube.splats"); }
+
+  static void expectRefused(const std::vector<std::string>& arguments, const std::string& saying) {
+    const ProgramResult result = runProgram(arguments);
+    EXPECT_EQ(result.status, 1) << testing::PrintToString(arguments);
+    EXPECT_EQ(lineCount(result.err), 1) << result.err;
+    EXPECT_NE(result.err.find(saying), std::string::npos) << result.err << "lacks: " << saying;
+  }
+  /// Through a shell: `command` ends in redirections.
+  ProgramResult shell(const std::string& command) const {
+    return RunningProgram(
+               {"sh", "-c", "cd '" + folder_.path().string() + "' && " CURVISPLAT_PROGRAM " " + command},
+               "/usr/bin/env")
+        .wait();
+  }
+  void expectWhole(const std::string& name) const {
+    const ProgramResult result = runProgram({"info", file(name), "--verify"});
+    EXPECT_EQ(result.status, 0) << result.err;
+  }
+
+  const TemporaryFolder folder_;
+};
+
+TEST_F(OddFiles, APipeIsNoInput) {
+  const std::string pipe = file("pipe"), no_file = "is not a regular file";
+  expectRefused({"info", pipe}, no_file);
+  expectRefused({"convert", pipe, "-o", file("a.splats")}, no_file);
+  expectRefused({"convert", file("cube.xyz"), pipe, "-o", file("a.splats")}, no_file);
+  expectRefused({"render", cache(), "-o", file("a.png"), "--tf", pipe + ".json"}, no_file);
+  expectRefused({"render", cache(), "-o", file("a%d.png"), "--path", pipe, "--frames", "2"}, no_file);
+  expectRefused({"compare", pipe, pipe}, no_file);
+  expectRefused({"info", "/dev/zero"}, no_file);
+  EXPECT_FALSE(fs::exists(file("a.splats")));
+  // Nor where a cache is to be replaced.
+  fs::create_directory(folder_ / "odd.splats");
+  EXPECT_EQ(::mkfifo(file("odd.splats/manifest.json").c_str(), 0600), 0);
+  expectRefused(cubeWords(folder_ / "cube", {"--overwrite"}, folder_ / "odd.splats"), no_file);
+}
+
+TEST_F(OddFiles, WhatIsNoFileIsNotReplaced) {
+  fs::create_symlink(file("pipe"), file("pipe.png"));
+  fs::create_directory(file("folder.png"));
+  for (const char* name : {"pipe.png", "folder.png"})
+    expectRefused({"render", cache(), "-o", file(name), "--size", "16x16"}, "no regular file");
+  expectRefused({"render", cache(), "-o", file("a.png"), "--stats", file("pipe")}, "no regular file");
+  EXPECT_TRUE(fs::is_fifo(file("pipe")));
+  EXPECT_TRUE(fs::is_symlink(file("pipe.png")));
+  EXPECT_FALSE(fs::exists(file("a.png")));
+}
+
+TEST_F(OddFiles, ALinkIsFollowed) {
+  fs::create_symlink(file("real.png"), file("link.png"));
+  for (int time = 0; time < 2; ++time) {
+    const ProgramResult result = runProgram({"render", cache(), "-o", file("link.png"), "--size", "16x16"});
+    EXPECT_EQ(result.status, 0) << result.err;
+    EXPECT_TRUE(fs::is_symlink(file("link.png")));
+    EXPECT_EQ(readImage(file("real.png")).size.width, 16);
+  }
+}
+
+TEST_F(OddFiles, WhatIsReadIsNotOverwritten) {
+  const std::string grid = readTextFile(file("cube.xyz"));
+  expectRefused(cubeWords(folder_ / "cube", {"--stats", file("cube.xyz")}, folder_ / "b.splats"),
+                "which is read");
+  expectRefused(cubeWords(folder_ / "cube", {"--stats", file("./cube.fun")}, folder_ / "b.splats"),
+                "which is read");
+  expectRefused({"render", cache(), "-o", cache() + "/a.png"}, "which is read");
+  expectRefused({"render", cache(), "-o", file("a.png"), "--stats", cache() + "/manifest.json"},
+                "which is read");
+  expectRefused({"bench", cache(), "--quick", "--json", cache() + "/bricks.bin"}, "which is read");
+  const ProgramResult twice =
+      runProgram({"render", cache(), "-o", file("a.png"), "--stats", file("a.png"), "--size", "16x16"});
+  EXPECT_EQ(twice.status, 2);
+  EXPECT_TRUE(readTextFile(file("cube.xyz")) == grid);
+  expectWhole("cube.splats");
+  ASSERT_EQ(runProgram({"render", cache(), "-o", file("a.png"), "--size", "16x16"}).status, 0);
+  expectRefused({"compare", file("a.png"), file("a.png"), "--difference", file("a.png")}, "which is read");
+}
+
+TEST_F(OddFiles, AFullStandardErrorIsNoReasonToFail) {
+  EXPECT_EQ(shell("render nothing.splats -o a.png 2>/dev/full").status, 1);
+  EXPECT_EQ(shell("render nothing.splats -o a.png 2>&-").status, 1);
+  // A warning, that the picture is empty.
+  EXPECT_EQ(shell("render cube.splats -o a.png --size 16x16 --range 20,30 2>/dev/full").status, 0);
+  EXPECT_EQ(readImage(file("a.png")).size.width, 16);
+  // Notes on what is blanked. A file must not be opened as the closed stream, and take them.
+  std::string words;
+  for (const std::string& word : cubeWords("cube", {}, "b.splats")) words += word + " ";
+  EXPECT_EQ(shell(words + "2>&-").status, 0);
+  expectWhole("b.splats");
+}
+
+TEST_F(OddFiles, AStandardOutputThatCannotBeWrittenIsAnError) {
+  for (const char* command : {"info cube.splats", "info cube.splats --json", "--help", "--version",
+                              "render cube.splats -o a.png --size 16x16"})
+    for (const char* full : {" >/dev/full", " >&-"}) {
+      const ProgramResult result = shell(std::string(command) + full);
+      EXPECT_EQ(result.status, 1) << command << full;
+      EXPECT_EQ(lineCount(result.err), 1) << result.err;
+      EXPECT_NE(result.err.find("standard output cannot be written"), std::string::npos) << result.err;
+    }
+}
+
+TEST_F(OddFiles, ProgramsMayWriteTheSamePicture) {
+  const std::vector<std::string> words{"render", cache(), "-o", file("a.png"), "--size", "200x200"};
+  ASSERT_EQ(runProgram(words).status, 0);
+  const std::string expected = readTextFile(file("a.png"));
+  for (int round = 0; round < 5; ++round) {
+    std::vector<std::unique_ptr<RunningProgram>> programs;
+    for (int n = 0; n < 4; ++n) programs.push_back(std::make_unique<RunningProgram>(words));
+    for (const auto& program : programs) {
+      const ProgramResult result = program->wait();
+      EXPECT_EQ(result.status, 0) << result.err;
+    }
+    EXPECT_TRUE(readTextFile(file("a.png")) == expected);
+  }
+  for (const auto& entry : fs::directory_iterator(folder_.path()))
+    EXPECT_NE(entry.path().extension(), ".part") << entry.path();
+}
+
+TEST_F(OddFiles, AHugeFileIsNoPicture) {
+  for (const std::string magic : {"\x89PNG", "PF", "nothing"}) {
+    std::ofstream(file("huge.png"), std::ios::binary) << magic;
+    fs::resize_file(file("huge.png"), uint64_t{1} << 40);
+    expectRefused({"compare", file("huge.png"), file("huge.png")}, "huge.png");
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat
