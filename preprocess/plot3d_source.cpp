@@ -102,7 +102,8 @@ void Plot3dSource::addFunctionNames(const std::filesystem::path& path, const Plo
   names_path.replace_extension(".nam");
   std::vector<std::string> names = function_names_;
   if (!names.empty()) names_path = path;
-  if (names.empty() && std::filesystem::exists(names_path)) names = variableNames(names_path);
+  std::error_code none_there;
+  if (names.empty() && std::filesystem::exists(names_path, none_there)) names = variableNames(names_path);
   if (!names.empty()) {
     if (names.size() != file.components())
       description_.warnings.push_back(fmt::format("{}: has {} names for the {} variables of {}",

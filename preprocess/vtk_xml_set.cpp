@@ -40,7 +40,9 @@ class Gatherer {
 
  private:
   void add(const fs::path& path, const std::string& name) {
-    const fs::path normal = fs::weakly_canonical(path);
+    std::error_code error;
+    const fs::path normal = fs::weakly_canonical(path, error);
+    if (error) throw Error("{}: cannot be opened: {}", path.string(), error.message());
     if (!inside_.insert(normal).second) throw Error("{}: names itself as a part of itself", path.string());
     if (grid_.files.size() == kMostFiles)
       throw Error("{}: leads to more than {} files, counted as often as they are named", grid_.files.front(),

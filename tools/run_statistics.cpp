@@ -84,7 +84,7 @@ void checkOutputFile(std::string_view option, const std::filesystem::path& path,
   std::error_code ignored;
   if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored))
     throw Error("{} {}: is there, and is no regular file; choose another name", option, path.string());
-  const fs::path target = fs::weakly_canonical(path);
+  const fs::path target = fs::weakly_canonical(path, ignored);
   for (const fs::path& input : inputs)
     if (fs::equivalent(target, input, ignored) || fs::equivalent(target.parent_path(), input, ignored))
       throw Error("{} {}: would change {}, which is read; choose another name", option, path.string(),

@@ -137,9 +137,10 @@ class UntrustedCache : public testing::Test {
     EXPECT_NE(result.err.find(says), std::string::npos) << result.err;
   }
 
-  /// Neither opens it.
+  /// None opens it.
   void expectRefused(const fs::path& cache, const std::string& says) {
     expectLine(runWithLittleMemory({"info", cache.string()}), says);
+    expectLine(runWithLittleMemory({"bench", cache.string(), "--quick"}), says);
     expectLine(render(cache), says);
   }
   void expectRefused(const std::string& says, const Harm& harm) {

@@ -45,7 +45,7 @@ for target in "${targets[@]}"; do
     {
       time "$program" "$work/$target" "${seeds[@]}" -max_total_time="$left" -rss_limit_mb=2048 \
         -malloc_limit_mb=512 -timeout=300 -max_len=65536 -print_final_stats=1 \
-        -artifact_prefix="$work/findings/$target/" >>"$log" 2>&1 || status=$?
+        -report_slow_units=60 -artifact_prefix="$work/findings/$target/" >>"$log" 2>&1 || status=$?
     } 2>"$scratch/times"
     cpu=$(awk -v used="$cpu" 'NF == 2 { used += $1 + $2 } END { print used }' "$scratch/times")
     executions=$(awk '/stat::number_of_executed_units/ { sum += $2 } END { print sum + 0 }' "$log")
