@@ -132,7 +132,8 @@ TEST_F(Annotations, OverTransparencyTheyAreOpaque) {
 TEST_F(Annotations, EglDrawsWhatOsMesaDraws) {
   const ProgramResult system = runProgram({"info", "--system", "--json"});
   ASSERT_EQ(system.status, 0) << system.err;
-  for (const auto& backend : nlohmann::json::parse(system.out).at("backends"))
+  const auto json = nlohmann::json::parse(system.out);
+  for (const auto& backend : json.at("backends"))
     if (!backend.at("works").get<bool>()) GTEST_SKIP() << backend.dump();
   const ImageDifference difference =
       compareImages(render({"--backend", "egl"}), render({"--backend", "osmesa"}, "b.exr"));

@@ -130,9 +130,10 @@ TEST_F(Frames, AnOrbitBeginsAtTheCameraThatWasGiven) {
 TEST_F(Frames, AnOrbitKeepsAllOfTheDataInEveryPicture) {
   expectDrawn({"-o", file("all_%d.exr"), "--orbit", "360", "--frames", "5", "--view", "+x", "--stats",
                file("all.json")});
-  for (const auto& frame : json("all.json")["frames"]) {
+  const auto frames = json("all.json")["frames"];
+  for (const auto& frame : frames) {
     EXPECT_EQ(frame["splats_off_screen"], 0);
-    EXPECT_EQ(frame["camera"]["parallel_scale"], json("all.json")["frames"][0]["camera"]["parallel_scale"]);
+    EXPECT_EQ(frame["camera"]["parallel_scale"], frames[0]["camera"]["parallel_scale"]);
   }
 }
 

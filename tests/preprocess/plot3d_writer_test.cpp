@@ -18,7 +18,7 @@ namespace {
 
 // The whole file as 32-bit words: that is all there is in it.
 std::vector<int32_t> wordsOf(const std::filesystem::path& path) {
-  const std::string bytes = readTextFile(path);
+  const std::string bytes = readTextFile(path, 64 << 20);
   EXPECT_EQ(bytes.size() % 4, 0u);
   std::vector<int32_t> words(bytes.size() / 4);
   std::memcpy(words.data(), bytes.data(), words.size() * 4);

@@ -186,7 +186,7 @@ TEST_P(FrameStreamingTest, PartsOfBricksArePagedAndKept) {
   const uint64_t least = leastMemory(reference, camera("+x"));
   FrameRenderer renderer(*cache_, 0, function(), GetParam());
   bool in_parts = false;  // a brick, which is then read once all the same
-  for (const uint64_t sixteenths : {6, 9, 11, 14}) {
+  for (const uint64_t sixteenths : {6, 8, 10, 13}) {
     FrameOptions wanted = options();
     wanted.max_splats = splats * sixteenths / 16;
     const Image expected =

@@ -45,26 +45,43 @@ void say(const char* text) {
   if (::write(STDERR_FILENO, text, std::strlen(text)) < 0) ::_exit(kCrash);
 }
 
-/// Whose crash it is: of the first frame that is neither the C library's nor the sanitizers'.
+constexpr const char* kParsers[] = {"libcgns", "libhdf5", "libnetcdf", "libz.", "libsz."};
+constexpr const char* kRuntimes[] = {"libc.so", "libasan", "libubsan", "ld-linux", "libstdc++", "libgcc"};
+
+template <size_t kCount>
+const char* libraryOf(const char* file, const char* const (&libraries)[kCount]) {
+  for (const char* library : libraries)
+    if (std::strstr(file, library)) return library;
+  return nullptr;
+}
+
+/// Whose crash it is: of the first frame that is neither the C library's nor the sanitizers'. Before the C
+/// library's, which calls this function, are this function's own.
 void onCrash(int) {
   void* frames[64];
   const int count = ::backtrace(frames, 64);
-  for (int n = 1; n < count; ++n) {
+  bool called = false;
+  for (int n = 0; n < count; ++n) {
     Dl_info info{};
     if (!::dladdr(frames[n], &info) || !info.dli_fname) continue;
-    for (const char* library : {"libcgns", "libhdf5", "libnetcdf", "libz.", "libsz."})
-      if (std::strstr(info.dli_fname, library)) {
-        say(library);
-        say(", ");
-        say(info.dli_sname ? info.dli_sname : "a function of its own");
-        ::_exit(kLibraryCrash);
-      }
-    for (const char* library : {"libc.so", "libasan", "libubsan", "ld-linux", "libstdc++", "libgcc"})
-      if (std::strstr(info.dli_fname, library)) goto next;
-    break;
-  next:;
+    if (const char* library = libraryOf(info.dli_fname, kParsers)) {
+      say(library);
+      say(", ");
+      say(info.dli_sname ? info.dli_sname : "a function of its own");
+      ::_exit(kLibraryCrash);
+    }
+    const bool runtime = libraryOf(info.dli_fname, kRuntimes) != nullptr;
+    if (called && !runtime) break;
+    called |= std::strstr(info.dli_fname, "libc.so") != nullptr;
   }
   ::_exit(kCrash);
+}
+
+/// Whether a sanitizer has ended the process for what a parser did: its report begins with the stack.
+bool isOfParser(const std::string& report) {
+  const size_t stack = report.find(" #1 ");
+  return report.find("AddressSanitizer") != std::string::npos && stack != std::string::npos &&
+         libraryOf(report.substr(stack, report.find(" #2 ", stack) - stack).c_str(), kParsers);
 }
 
 /// All that a grid holds.
@@ -164,7 +181,7 @@ class Trials {
   void count(int status, const std::string& name, std::string words) {
     std::replace(words.begin(), words.end(), '\n', ' ');
     const int ending = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    if (ending == kLibraryCrash) {
+    if (ending == kLibraryCrash || (ending == 1 && isOfParser(words))) {
       report.library_crashes.push_back(name + ": " + words);
       return;
     }
