@@ -40,7 +40,8 @@ constexpr GridFormat kFormats[] = {
 };
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {
-  if (std::filesystem::is_directory(path))
+  std::error_code none_there;
+  if (std::filesystem::is_directory(path, none_there))
     throw Error("{}: is a folder where {} was expected", path.string(), expected);
   if (const auto format = foreignFormat(InputFile(path)))
     throw Error("{}: is {}; expected {}", path.string(), *format, expected);
@@ -97,7 +98,8 @@ std::string namesIn(const GridDescription& description) {
 std::unique_ptr<GridSource> openFormat(const OpenGridOptions& options) {
   OpenGridOptions complete = options;
   if (complete.temporary_folder.empty()) complete.temporary_folder = std::filesystem::temp_directory_path();
-  if (std::filesystem::is_regular_file(options.grid)) {
+  std::error_code none_there;
+  if (std::filesystem::is_regular_file(options.grid, none_there)) {
     const InputFile file(options.grid);
     for (const GridFormat& format : kFormats)
       if (format.recognises(file)) {

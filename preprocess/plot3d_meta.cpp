@@ -201,12 +201,13 @@ std::unique_ptr<GridSource> openPlot3dMeta(const OpenGridOptions& options) {
   of_step.time_step.reset();
   takeLayout(meta, of_step.force);
   if (of_step.function_names.empty()) of_step.function_names = meta.texts("function-names");
-  if (!std::filesystem::is_regular_file(step.grid))
+  std::error_code none_there;  // a name that is too long is no file
+  if (!std::filesystem::is_regular_file(step.grid, none_there))
     throw Error("{}: names the grid {}, which is not there", options.grid.string(), step.grid.string());
   of_step.solutions.clear();
   for (const auto& solution : {step.q, step.function}) {
     if (solution.empty()) continue;
-    if (std::filesystem::is_regular_file(solution))
+    if (std::filesystem::is_regular_file(solution, none_there))
       of_step.solutions.push_back(solution);
     else
       warnings.push_back(fmt::format("{}: names {}, which is not there; left out", options.grid.string(),

@@ -11,12 +11,13 @@
 
 #include "stream/error.h"
 #include "stream/file.h"
+#include "stream/open_retrying.h"
 
 namespace curvisplat {
 
 CacheLock::CacheLock(const std::filesystem::path& cache) : cache_(cache), manifest_(cache / "manifest.json") {
   // For writing: network file systems grant exclusive locks on nothing less.
-  fd_ = SystemCalls::current().open(manifest_.c_str(), O_RDWR | O_CLOEXEC, 0);
+  fd_ = openRetrying(manifest_, O_RDWR);
   if (fd_ < 0)
     throw Error("{}: cannot be opened for writing: {}; name a whole splat cache that you may change",
                 manifest_.string(), std::strerror(errno));

@@ -8,19 +8,9 @@
 
 #include "stream/error.h"
 #include "stream/file.h"
+#include "stream/open_retrying.h"
 
 namespace curvisplat {
-namespace {
-
-int openRetrying(const std::filesystem::path& path, int flags) {
-  int fd;
-  do {
-    fd = SystemCalls::current().open(path.c_str(), flags | O_CLOEXEC, 0);
-  } while (fd < 0 && errno == EINTR);
-  return fd;
-}
-
-}  // namespace
 
 DirectFile::DirectFile(std::filesystem::path path, bool direct) : path_(std::move(path)) {
   buffered_fd_ = openRetrying(path_, O_RDONLY);

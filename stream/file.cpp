@@ -11,6 +11,8 @@
 #include <cstring>
 #include <utility>
 
+#include "stream/open_retrying.h"
+
 namespace curvisplat {
 namespace {
 
@@ -22,14 +24,6 @@ constexpr size_t kLargestTransfer = size_t{1} << 30;
 
 std::string reason() {
   return std::strerror(errno);
-}
-
-int openRetrying(const std::filesystem::path& path, int flags, unsigned mode) {
-  int fd;
-  do {
-    fd = SystemCalls::current().open(path.c_str(), flags | O_CLOEXEC, mode);
-  } while (fd < 0 && errno == EINTR);
-  return fd;
 }
 
 /// As openRetrying. File systems without direct transfers refuse the flag, and do without.
@@ -80,6 +74,14 @@ void replaceFile(const std::filesystem::path& path, const std::filesystem::path&
 }
 
 }  // namespace
+
+int openRetrying(const std::filesystem::path& path, int flags, unsigned mode) {
+  int fd;
+  do {
+    fd = SystemCalls::current().open(path.c_str(), flags | O_CLOEXEC, mode);
+  } while (fd < 0 && errno == EINTR);
+  return fd;
+}
 
 int SystemCalls::open(const char* path, int flags, unsigned mode) {
   return ::open(path, flags, mode);

@@ -12,6 +12,7 @@
 #include "stream/error.h"
 #include "stream/file.h"
 #include "stream/manifest.h"
+#include "stream/open_retrying.h"
 
 namespace curvisplat {
 namespace {
@@ -58,7 +59,8 @@ void checkReplaceable(const fs::path& target, bool overwrite) {
     // A cache all the same.
   } catch (const Error& error) {
     throw Error(
-        "{}: is not a whole splat cache and will not be overwritten; remove it, or choose another output ({})",
+        "{}: is not a whole splat cache and will not be overwritten; remove it, or choose another output "
+        "({})",
         target.string(), error.what());
   }
 }
@@ -105,7 +107,7 @@ PartialFolder::~PartialFolder() {
 
 void PartialFolder::lock() {
   const fs::path name = path_ / kLockName;
-  const int fd = SystemCalls::current().open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  const int fd = openRetrying(name, O_RDWR | O_CREAT, 0666);
   if (fd < 0) throw Error("{}: cannot be opened: {}", name.string(), reason());
   const bool locked = ::flock(fd, LOCK_EX | LOCK_NB) == 0;
   const std::string why = reason();

@@ -25,7 +25,7 @@ class WindowSession : public WindowTest {
   /// Waits for the final picture and keeps what is on the screen then.
   Image look(const std::string& name) {
     const Image picture = save();
-    EXPECT_TRUE(eventually([&] { return difference(shown(picture.size), picture) > 45; }, 10)) << name;
+    EXPECT_TRUE(eventually([&] { return difference(shown(picture.size), picture) > 45; }, 60)) << name;
     Image screen = display_->screenshot();
     writeImage(screen, folder() / (name + ".png"));
     return screen;
