@@ -284,7 +284,11 @@ ConvertReport convert(const GridSource& source, const ConvertOptions& options, P
     report.resumed_bricks = report.bricks;
   } else if (options.resume && !options.overwrite && std::filesystem::exists(manifest) &&
              !hasUnfinished(options.output)) {
-    throw Error("{}: is whole already; there is nothing to resume", options.output.string());
+    throw Error(
+        "{}: is there, and no conversion to it was left unfinished: there is nothing to resume; to replace "
+        "it, "
+        "add --overwrite",
+        options.output.string());
   } else {
     checkOutput(options.output, options.overwrite, temporaryFolder(options));
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, plan.threads);

@@ -44,7 +44,7 @@ class Gatherer {
     const fs::path normal = fs::weakly_canonical(path, error);
     if (error) throw Error("{}: cannot be opened: {}", path.string(), error.message());
     if (!inside_.insert(normal).second) throw Error("{}: names itself as a part of itself", path.string());
-    if (grid_.files.size() == kMostFiles)
+    if (grid_.files.size() > kMostFiles)
       throw Error("{}: leads to more than {} files, counted as often as they are named", grid_.files.front(),
                   kMostFiles);
     const VtkXmlFile file(files_, path);

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <utility>
 
+#include "stream/links.h"
 #include "stream/open_retrying.h"
 
 namespace curvisplat {
@@ -259,12 +260,11 @@ void writeFileAtomically(const std::filesystem::path& path, const std::string& t
 void writeFileDurably(const std::filesystem::path& path, std::span<const std::byte> bytes) {
   namespace fs = std::filesystem;
   std::error_code error;
-  fs::path target = path;
-  if (fs::is_symlink(path, error))  // to what is there, or to nothing yet
-    target = fs::exists(path, error) ? fs::canonical(path) : folderOf(path) / fs::read_symlink(path);
+  const fs::path target = linkTarget(path);
   if (fs::exists(target, error) && !fs::is_regular_file(target, error))
     throw Error("{}: is there, and is no regular file; choose another name", path.string());
-  replaceFile(target, fmt::format("{}.{}.part", target.string(), ::getpid()), bytes);
+  // By a name of this process's own, and a short one.
+  replaceFile(target, folderOf(target) / fmt::format(".curvisplat.{}.part", ::getpid()), bytes);
   syncDirectory(folderOf(target));
 }
 

@@ -137,7 +137,7 @@ std::string readTextFile(const std::filesystem::path& path, uint64_t limit = 16 
 /// has one writer at a time.
 void writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void writeFileAtomically(const std::filesystem::path& path, const std::string& text);
-/// For any number of writers, and for good: it syncs the folder. Follows links; refuses what is no file.
+/// For any number of processes, and for good: it syncs the folder. Follows links; refuses what is no file.
 void writeFileDurably(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void writeFileDurably(const std::filesystem::path& path, const std::string& text);
 

@@ -4,11 +4,13 @@
 #include <exception>
 #include <string>
 
+#include "stream/error.h"
+
 namespace curvisplat {
 
 void say(std::string_view text) noexcept {
   try {
-    const std::string line = "curvisplat: " + std::string(text) + "\n";
+    const std::string line = "curvisplat: " + oneLine(std::string(text)) + "\n";
     std::fwrite(line.data(), 1, line.size(), stderr);  // as one, beside other threads' lines
   } catch (const std::exception&) {
     std::fputs("curvisplat: out of memory\n", stderr);

@@ -33,7 +33,7 @@ void checkStatisticsFile(const ConvertWords& words) {
   if (words.statistics.empty()) return;
   std::vector<std::filesystem::path> inputs = words.grid.solutions;
   inputs.push_back(words.grid.grid);
-  if (!words.to.empty()) inputs.push_back(words.to);
+  inputs.insert(inputs.end(), {words.to, words.output});
   checkOutputFile("--stats", words.statistics, inputs);
 }
 

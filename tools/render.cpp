@@ -94,16 +94,14 @@ void checkWords(const RenderWords& words, ImageSize size) {
     throw UsageError("--background transparent: a {} has no transparency; write .png or .exr",
                      words.output.extension().string());
   parseBackend(words.backend);
-  checkOutputFile("-o", words.output, {words.cache});
+  std::vector<std::filesystem::path> others{words.cache, words.camera.path, words.scalar.transfer_function};
+  checkOutputFile("-o", words.output, others);
   if (!words.first_image.empty()) {
     checkImageName(words.first_image);
-    checkOutputFile("--first-image", words.first_image, {words.cache});
+    checkOutputFile("--first-image", words.first_image, others);
   }
-  if (!words.statistics.empty()) {
-    checkOutputFile("--stats", words.statistics, {words.cache});
-    if (words.statistics == words.output)
-      throw UsageError("--stats {}: is what -o names", words.statistics.string());
-  }
+  others.insert(others.end(), {words.output, words.first_image});
+  if (!words.statistics.empty()) checkOutputFile("--stats", words.statistics, others);
 }
 
 void tell(const char* kind, const std::string& text) {

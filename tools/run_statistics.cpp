@@ -14,6 +14,7 @@
 
 #include "stream/error.h"
 #include "stream/file.h"
+#include "stream/links.h"
 #include "stream/process_usage.h"
 
 namespace curvisplat {
@@ -78,17 +79,21 @@ void checkOutputFolder(std::string_view option, const std::filesystem::path& pat
 }
 
 void checkOutputFile(std::string_view option, const std::filesystem::path& path,
-                     const std::vector<std::filesystem::path>& inputs) {
+                     const std::vector<std::filesystem::path>& others) {
   namespace fs = std::filesystem;
   checkOutputFolder(option, path);
   std::error_code ignored;
-  if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored))
+  const fs::path target = fs::weakly_canonical(linkTarget(path), ignored);
+  if (fs::exists(target, ignored) && !fs::is_regular_file(target, ignored))
     throw Error("{} {}: is there, and is no regular file; choose another name", option, path.string());
-  const fs::path target = fs::weakly_canonical(path, ignored);
-  for (const fs::path& input : inputs)
-    if (fs::equivalent(target, input, ignored) || fs::equivalent(target.parent_path(), input, ignored))
-      throw Error("{} {}: would change {}, which is read; choose another name", option, path.string(),
-                  input.string());
+  if (target != path) checkOutputFolder(option, target);
+  for (const fs::path& other : others) {
+    if (other.empty()) continue;
+    const fs::path there = fs::weakly_canonical(linkTarget(other), ignored);
+    if (there == target || fs::equivalent(target, there, ignored) ||
+        fs::equivalent(target.parent_path(), there, ignored))
+      throw Error("{} {}: would change {}; choose another name", option, path.string(), other.string());
+  }
 }
 
 }  // namespace curvisplat

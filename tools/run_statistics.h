@@ -22,8 +22,8 @@ void writeStatistics(const std::filesystem::path& path, const nlohmann::json& st
 void checkOutputFolder(std::string_view option, const std::filesystem::path& path);
 
 /// checkOutputFolder() for a file. Throws Error, too, if `path` is there and is no regular file, or if
-/// writing it would change one of `inputs`: files, or caches.
+/// writing it would change one of `others`: files or caches that are read, or written as well.
 void checkOutputFile(std::string_view option, const std::filesystem::path& path,
-                     const std::vector<std::filesystem::path>& inputs);
+                     const std::vector<std::filesystem::path>& others);
 
 }  // namespace curvisplat

@@ -84,7 +84,8 @@ TEST_F(OddFiles, WhatIsNoFileIsNotReplaced) {
 }
 
 TEST_F(OddFiles, ALinkIsFollowed) {
-  fs::create_symlink(file("real.png"), file("link.png"));
+  fs::create_symlink(file("real.png"), file("middle.png"));
+  fs::create_symlink("middle.png", file("link.png"));
   for (int time = 0; time < 2; ++time) {
     const ProgramResult result = runProgram({"render", cache(), "-o", file("link.png"), "--size", "16x16"});
     EXPECT_EQ(result.status, 0) << result.err;
@@ -93,23 +94,38 @@ TEST_F(OddFiles, ALinkIsFollowed) {
   }
 }
 
+TEST_F(OddFiles, LinksThatLeadRoundAreRefused) {
+  fs::create_symlink(file("b.png"), file("a.png"));
+  fs::create_symlink(file("a.png"), file("b.png"));
+  expectRefused({"render", cache(), "-o", file("a.png"), "--size", "16x16"}, "a circle");
+  EXPECT_TRUE(fs::is_symlink(file("a.png")));
+}
+
 TEST_F(OddFiles, WhatIsReadIsNotOverwritten) {
   const std::string grid = readTextFile(file("cube.xyz"));
   expectRefused(cubeWords(folder_ / "cube", {"--stats", file("cube.xyz")}, folder_ / "b.splats"),
-                "which is read");
+                "would change");
   expectRefused(cubeWords(folder_ / "cube", {"--stats", file("./cube.fun")}, folder_ / "b.splats"),
-                "which is read");
-  expectRefused({"render", cache(), "-o", cache() + "/a.png"}, "which is read");
+                "would change");
+  expectRefused({"render", cache(), "-o", cache() + "/a.png"}, "would change");
   expectRefused({"render", cache(), "-o", file("a.png"), "--stats", cache() + "/manifest.json"},
-                "which is read");
-  expectRefused({"bench", cache(), "--quick", "--json", cache() + "/bricks.bin"}, "which is read");
-  const ProgramResult twice =
-      runProgram({"render", cache(), "-o", file("a.png"), "--stats", file("a.png"), "--size", "16x16"});
-  EXPECT_EQ(twice.status, 2);
+                "would change");
+  expectRefused({"bench", cache(), "--quick", "--json", cache() + "/bricks.bin"}, "would change");
+  expectRefused({"render", cache(), "-o", file("a.png"), "--stats", file("./a.png")}, "would change");
+  expectRefused(
+      {"render", cache(), "-o", file("a.png"), "--stats", file("b.png"), "--first-image", file("b.png")},
+      "would change");
+  std::ofstream(file("tf.json")) << "{}";
+  expectRefused({"render", cache(), "-o", file("a.png"), "--tf", file("tf.json"), "--stats", file("tf.json")},
+                "would change");
+  expectRefused(cubeWords(folder_ / "cube", {"--overwrite", "--stats", cache() + "/manifest.json"}),
+                "would change");
+  fs::create_symlink(cache() + "/a.png", file("into.png"));
+  expectRefused({"render", cache(), "-o", file("into.png")}, "would change");
   EXPECT_TRUE(readTextFile(file("cube.xyz")) == grid);
   expectWhole("cube.splats");
   ASSERT_EQ(runProgram({"render", cache(), "-o", file("a.png"), "--size", "16x16"}).status, 0);
-  expectRefused({"compare", file("a.png"), file("a.png"), "--difference", file("a.png")}, "which is read");
+  expectRefused({"compare", file("a.png"), file("a.png"), "--difference", file("a.png")}, "would change");
 }
 
 TEST_F(OddFiles, AFullStandardErrorIsNoReasonToFail) {

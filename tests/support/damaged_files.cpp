@@ -79,9 +79,11 @@ void onCrash(int) {
 
 /// Whether a sanitizer has ended the process for what a parser did: its report begins with the stack.
 bool isOfParser(const std::string& report) {
-  const size_t stack = report.find(" #1 ");
-  return report.find("AddressSanitizer") != std::string::npos && stack != std::string::npos &&
-         libraryOf(report.substr(stack, report.find(" #2 ", stack) - stack).c_str(), kParsers);
+  const size_t top = report.find(" #0 "), caller = report.find(" #1 "), end = report.find(" #2 ");
+  if (report.find("AddressSanitizer") == std::string::npos || end == std::string::npos) return false;
+  const std::string first = report.substr(top, caller - top), second = report.substr(caller, end - caller);
+  return libraryOf(first.c_str(), kParsers) ||
+         (first.find("__interceptor_") != std::string::npos && libraryOf(second.c_str(), kParsers));
 }
 
 /// All that a grid holds.
