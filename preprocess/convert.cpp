@@ -286,8 +286,7 @@ ConvertReport convert(const GridSource& source, const ConvertOptions& options, P
              !hasUnfinished(options.output)) {
     throw Error(
         "{}: is there, and no conversion to it was left unfinished: there is nothing to resume; to replace "
-        "it, "
-        "add --overwrite",
+        "it, add --overwrite",
         options.output.string());
   } else {
     checkOutput(options.output, options.overwrite, temporaryFolder(options));
