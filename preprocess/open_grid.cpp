@@ -16,6 +16,7 @@
 #include "preprocess/vtk_legacy.h"
 #include "preprocess/vtk_xml.h"
 #include "stream/error.h"
+#include "stream/paths.h"
 
 namespace curvisplat {
 namespace {
@@ -98,8 +99,7 @@ std::string namesIn(const GridDescription& description) {
 std::unique_ptr<GridSource> openFormat(const OpenGridOptions& options) {
   OpenGridOptions complete = options;
   if (complete.temporary_folder.empty()) complete.temporary_folder = std::filesystem::temp_directory_path();
-  std::error_code none_there;
-  if (std::filesystem::is_regular_file(options.grid, none_there)) {
+  if (isRegularFile(options.grid)) {
     const InputFile file(options.grid);
     for (const GridFormat& format : kFormats)
       if (format.recognises(file)) {

@@ -11,6 +11,7 @@
 #include "preprocess/time_steps.h"
 #include "stream/error.h"
 #include "stream/json_text.h"
+#include "stream/paths.h"
 
 namespace curvisplat {
 namespace {
@@ -201,13 +202,12 @@ std::unique_ptr<GridSource> openPlot3dMeta(const OpenGridOptions& options) {
   of_step.time_step.reset();
   takeLayout(meta, of_step.force);
   if (of_step.function_names.empty()) of_step.function_names = meta.texts("function-names");
-  std::error_code none_there;  // a name that is too long is no file
-  if (!std::filesystem::is_regular_file(step.grid, none_there))
+  if (!isRegularFile(step.grid))
     throw Error("{}: names the grid {}, which is not there", options.grid.string(), step.grid.string());
   of_step.solutions.clear();
   for (const auto& solution : {step.q, step.function}) {
     if (solution.empty()) continue;
-    if (std::filesystem::is_regular_file(solution, none_there))
+    if (isRegularFile(solution))
       of_step.solutions.push_back(solution);
     else
       warnings.push_back(fmt::format("{}: names {}, which is not there; left out", options.grid.string(),

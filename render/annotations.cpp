@@ -286,7 +286,7 @@ Image annotated(const Image& data, const Annotations& annotations, const Annotat
 
 uint64_t annotatedBytes(ImageSize picture) {
   constexpr uint64_t kPixel = 4 * sizeof(float) + sizeof(uint32_t);  // an Image's and a Canvas's
-  return kPixel * static_cast<uint64_t>(picture.width) * static_cast<uint64_t>(picture.height);
+  return kPixel * picture.pixels();
 }
 
 std::vector<uint8_t> annotationLayer(const Annotations& annotations, const AnnotatedScene& scene) {

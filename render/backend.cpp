@@ -31,8 +31,7 @@ class GlBackend final : public PaintingBackend {
     return mapped.empty() ? PaintingBackend::splatMemory(count) : mapped;
   }
   uint64_t bytes(ImageSize size, const PaintResources&) const override {
-    return uint64_t{4} * sizeof(float) * static_cast<uint64_t>(size.width) *
-           static_cast<uint64_t>(size.height);  // the framebuffer
+    return 4 * sizeof(float) * size.pixels();  // the framebuffer
   }
 
  private:

@@ -1,6 +1,7 @@
 // Where the viewer is, in VTK's and PyVista's words.
 #pragma once
 
+#include <cstdint>
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 #include <string_view>
@@ -10,6 +11,8 @@ namespace curvisplat {
 struct ImageSize {
   int width = 600;
   int height = 600;
+
+  uint64_t pixels() const { return static_cast<uint64_t>(width) * static_cast<uint64_t>(height); }
 };
 
 enum class Projection { orthographic, perspective };

@@ -29,8 +29,7 @@ constexpr uint64_t kParts = 16;
 }  // namespace
 
 FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned threads) {
-  const uint64_t image_bytes = uint64_t{4} * sizeof(float) * static_cast<uint64_t>(fixed.size.width) *
-                               static_cast<uint64_t>(fixed.size.height);
+  const uint64_t image_bytes = 4 * sizeof(float) * fixed.size.pixels();
   const uint64_t exact = fixed.index_bytes + fixed.painter_bytes + image_bytes + fixed.output_bytes;
   const uint64_t pools = kLeastRingBytes + fixed.least_pager_bytes;
   const uint64_t least = exact + pools + kWorkerBytes;

@@ -49,7 +49,7 @@ double overWhite(const float* pixel, int channel) {
 
 }  // namespace
 
-Image::Image(ImageSize size_) : size(size_), rgba(4 * static_cast<size_t>(size_.width) * size_.height) {}
+Image::Image(ImageSize size_) : size(size_), rgba(4 * size_.pixels()) {}
 
 void writeImage(const Image& image, const std::filesystem::path& path) {
   CURVISPLAT_CHECK(image.size.width > 0 && image.size.width <= kLargestImageSide);
@@ -58,8 +58,7 @@ void writeImage(const Image& image, const std::filesystem::path& path) {
 }
 
 uint64_t writingBytes(const std::filesystem::path& path, ImageSize size) {
-  return formatByName(path).pixel_bytes * static_cast<uint64_t>(size.width) *
-         static_cast<uint64_t>(size.height);
+  return formatByName(path).pixel_bytes * size.pixels();
 }
 
 void checkImageName(const std::filesystem::path& path) {

@@ -17,6 +17,8 @@ namespace {
 // Magic (8), file, library major and minor version (4 each), flag (1).
 constexpr size_t kMagic = 8, kUuidOffset = 21;
 constexpr openvdb::Int32 kBackground = -1;
+// Which every build of OpenVDB writes alike: values that are not the background, as they are.
+constexpr uint32_t kCompression = openvdb::io::COMPRESS_ACTIVE_MASK;
 constexpr const char* kWorldUnits = "world_units";
 
 void initialize() {
@@ -57,9 +59,8 @@ double worldUnits(double smallest_cell) {
                                          : std::exp2(std::floor(std::log2(smallest_cell / kSmallestVoxel)));
 }
 
-}  // namespace
-
-std::vector<std::byte> brickGridsFile(const RootCube& root, std::span<const Brick> bricks) {
+/// `compression`: OpenVDB's flags.
+std::vector<std::byte> fileOf(const RootCube& root, std::span<const Brick> bricks, uint32_t compression) {
   initialize();
   openvdb::GridPtrVec grids;
   const double world_units = worldUnits(root.cellSize(bricks.back().cell.level));
@@ -80,25 +81,64 @@ std::vector<std::byte> brickGridsFile(const RootCube& root, std::span<const Bric
     }
     if (firstOfItsCell(bricks, n)) grid->tree().setValue(coordOf(cell), static_cast<openvdb::Int32>(n));
   }
-  std::ostringstream stream(std::ios::binary);
-  openvdb::io::Stream(stream).write(grids);
-  std::string file = std::move(stream).str();
+  std::ostringstream text(std::ios::binary);
+  openvdb::io::Stream stream(text);
+  stream.setCompression(compression);
+  stream.write(grids);
+  std::string file = std::move(text).str();
   replaceUuid(file);
   const auto bytes = std::as_bytes(std::span(file));
   return {bytes.begin(), bytes.end()};
 }
 
-std::string differenceFromBrickGrids(std::span<const std::byte> bytes, const RootCube& root,
-                                     std::span<const Brick> bricks) {
+}  // namespace
+
+std::vector<std::byte> brickGridsFile(const RootCube& root, std::span<const Brick> bricks) {
+  return fileOf(root, bricks, kCompression);
+}
+
+uint64_t brickGridsMemory(std::span<const Brick> bricks) {
+  using Tree = openvdb::Int32Tree;
+  using Leaf = Tree::LeafNodeType;
+  using Lower = Tree::RootNodeType::ChildNodeType::ChildNodeType;
+  using Upper = Tree::RootNodeType::ChildNodeType;
+  // A node is made anew where bricks, in Morton order, enter its cube.
+  const auto nodes = [&](uint32_t log2_side) {
+    uint64_t count = 0;
+    for (size_t n = 0; n < bricks.size(); ++n) {
+      const Cell &cell = bricks[n].cell, &before = bricks[n == 0 ? 0 : n - 1].cell;
+      bool enters = n == 0 || cell.level != before.level;
+      for (int axis = 0; axis < 3; ++axis)
+        enters |= cell.at[axis] >> log2_side != before.at[axis] >> log2_side;
+      count += enters;
+    }
+    return count;
+  };
+  return nodes(Leaf::TOTAL) * (sizeof(Leaf) + Leaf::SIZE * sizeof(openvdb::Int32)) +
+         nodes(Lower::TOTAL) * sizeof(Lower) + nodes(Upper::TOTAL) * sizeof(Upper);
+}
+
+BrickGridsComparison compareBrickGrids(std::span<const std::byte> bytes, const RootCube& root,
+                                       std::span<const Brick> bricks, uint64_t most_memory) {
   // A file of another kind is not worth an octree.
   const std::vector<std::byte> small = brickGridsFile(root, bricks.first(1));
   if (bytes.size() < kUuidOffset || !std::equal(bytes.begin(), bytes.begin() + kMagic, small.begin()))
-    return "is no file of OpenVDB's";
-  if (!std::equal(bytes.begin(), bytes.begin() + kUuidOffset, small.begin())) return "";
-  const std::vector<std::byte> expected = brickGridsFile(root, bricks);
-  return std::equal(bytes.begin(), bytes.end(), expected.begin(), expected.end())
-             ? ""
-             : "has not the octree of bricks.bin";
+    return {"is no file of OpenVDB's", ""};
+  if (!std::equal(bytes.begin(), bytes.begin() + kUuidOffset, small.begin()))
+    return {"", "another version of OpenVDB wrote it"};
+  if (const uint64_t memory = brickGridsMemory(bricks); memory > most_memory)
+    return {"", fmt::format("that takes {} MiB of memory", memory >> 20)};
+  std::vector<uint32_t> compressions{kCompression};
+  // Converters left the choice to the library once, and so to how it had been built.
+  if (openvdb::io::Archive::hasBloscCompression())
+    compressions.push_back(kCompression | openvdb::io::COMPRESS_BLOSC);
+  if (openvdb::io::Archive::hasZLibCompression())
+    compressions.push_back(kCompression | openvdb::io::COMPRESS_ZIP);
+  for (const uint32_t compression : compressions) {
+    const std::vector<std::byte> expected = fileOf(root, bricks, compression);
+    if (std::equal(bytes.begin(), bytes.end(), expected.begin(), expected.end())) return {};
+  }
+  return {"has not the octree of bricks.bin", ""};
 }
 
 }  // namespace curvisplat

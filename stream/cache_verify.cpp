@@ -24,7 +24,7 @@ class Verifier {
   explicit Verifier(const CacheReader& reader)
       : reader_(reader), bricks_(reader.bricks()), weights_(bricks_.size()), whole_(bricks_.size()) {}
 
-  std::vector<std::string> verify(Progress* progress) {
+  CacheVerification verify(Progress* progress) {
     if (progress) progress->begin("verify", bricks_.size(), "bricks");
     for (uint32_t n = 0; n < bricks_.size(); ++n) {
       verifyGeometry(n);
@@ -34,14 +34,14 @@ class Verifier {
     verifyWeights();
     verifyGrids();
     if (progress) progress->end();
-    return std::move(findings_);
+    return std::move(result_);
   }
 
  private:
   template <typename... Args>
   void find(fmt::format_string<Args...> format, Args&&... args) {
-    if (findings_.size() < kMostFindings)
-      findings_.push_back(fmt::format(format, std::forward<Args>(args)...));
+    if (result_.findings.size() < kMostFindings)
+      result_.findings.push_back(fmt::format(format, std::forward<Args>(args)...));
   }
 
   void findIn(uint32_t n, const std::string& what) {
@@ -198,8 +198,12 @@ class Verifier {
         if (info.name == "bricks.vdb" && info.checksum != checksumOf(bytes))
           return find("{}: has the checksum {:016x}, expected {:016x}", path.string(), checksumOf(bytes),
                       info.checksum);
-      const std::string difference = differenceFromBrickGrids(bytes, reader_.manifest().root, bricks_);
+      const auto [difference, not_compared] = compareBrickGrids(bytes, reader_.manifest().root, bricks_);
       if (!difference.empty()) find("{}: {}", path.string(), difference);
+      if (!not_compared.empty())
+        result_.notes.push_back(
+            fmt::format("{}: its checksum is right; it was not compared with bricks.bin: {}", path.string(),
+                        not_compared));
     } catch (const Error& error) {
       find("{}", error.what());
     }
@@ -209,14 +213,14 @@ class Verifier {
   const std::span<const Brick> bricks_;
   std::vector<double> weights_;  // [brick]
   std::vector<bool> whole_;      // [brick]: its geometry could be decoded
-  std::vector<std::string> findings_;
+  CacheVerification result_;
   SplatGeometry geometry_;
   SplatVariable values_;
 };
 
 }  // namespace
 
-std::vector<std::string> verifyCache(const CacheReader& reader, Progress* progress) {
+CacheVerification verifyCache(const CacheReader& reader, Progress* progress) {
   return Verifier(reader).verify(progress);
 }
 

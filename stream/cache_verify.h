@@ -10,13 +10,17 @@
 
 namespace curvisplat {
 
-/// Decodes every brick and gives what is wrong, a line each, at most 100; none for a sound cache. Checks
-///   every payload   its checksum, that it decodes, and that it keeps to its record: box, octants (inner
-///   bricks
-///                   in octant order), largest radius, range, slope, deviation
+struct CacheVerification {
+  std::vector<std::string> findings;  // what is wrong, a line each, at most 100; none for a sound cache
+  std::vector<std::string> notes;     // what could not be checked, and why
+};
+
+/// Decodes every brick. Checks
+///   every payload   its checksum, that it decodes, and that it keeps to its record: box, octants (an inner
+///                   brick's splats in their order), largest radius, range, slope, deviation
 ///   leaves          node runs that hold as many nodes as there are splats, within the manifest's blocks
 ///   inner bricks    that their weights sum to their children's, 1e-3 relative
 ///   the cache       that the weights sum to the manifest's volume; bricks.vdb against bricks.bin
-std::vector<std::string> verifyCache(const CacheReader& reader, Progress* progress = nullptr);
+CacheVerification verifyCache(const CacheReader& reader, Progress* progress = nullptr);
 
 }  // namespace curvisplat

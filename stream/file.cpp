@@ -11,8 +11,8 @@
 #include <cstring>
 #include <utility>
 
-#include "stream/links.h"
 #include "stream/open_retrying.h"
+#include "stream/paths.h"
 
 namespace curvisplat {
 namespace {
@@ -258,11 +258,7 @@ void writeFileAtomically(const std::filesystem::path& path, const std::string& t
 }
 
 void writeFileDurably(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-  namespace fs = std::filesystem;
-  std::error_code error;
-  const fs::path target = linkTarget(path);
-  if (fs::exists(target, error) && !fs::is_regular_file(target, error))
-    throw Error("{}: is there, and is no regular file; choose another name", path.string());
+  const std::filesystem::path target = writableTarget(path);
   // By a name of this process's own, and a short one.
   replaceFile(target, folderOf(target) / fmt::format(".curvisplat.{}.part", ::getpid()), bytes);
   syncDirectory(folderOf(target));

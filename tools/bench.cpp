@@ -29,6 +29,7 @@
 #include "tools/camera_motion.h"
 #include "tools/commands.h"
 #include "tools/option_parsers.h"
+#include "tools/output_paths.h"
 #include "tools/run_statistics.h"
 #include "tools/scalar_words.h"
 #include "tools/stop_signals.h"

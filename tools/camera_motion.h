@@ -12,6 +12,8 @@
 
 namespace curvisplat {
 
+inline constexpr unsigned kMostFrames = 100'000;  // of --frames
+
 /// The command line's words, as given.
 struct CameraWords {
   std::optional<std::string> view, position, focal_point, view_up, parallel_scale, view_angle, orbit;

@@ -10,7 +10,7 @@
 #include "render/image.h"
 #include "stream/error.h"
 #include "tools/commands.h"
-#include "tools/run_statistics.h"
+#include "tools/output_paths.h"
 
 namespace curvisplat {
 namespace {

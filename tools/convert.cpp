@@ -20,6 +20,7 @@
 #include "tools/convert_words.h"
 #include "tools/grid_options.h"
 #include "tools/option_parsers.h"
+#include "tools/output_paths.h"
 #include "tools/run_statistics.h"
 #include "tools/stop_signals.h"
 

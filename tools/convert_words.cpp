@@ -7,6 +7,7 @@
 #include "stream/error.h"
 #include "stream/say.h"
 #include "tools/grid_options.h"
+#include "tools/output_paths.h"
 
 namespace curvisplat {
 

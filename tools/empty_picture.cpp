@@ -80,6 +80,16 @@ bool visibleBox(const RenderedScene& scene, glm::dvec3& lower, glm::dvec3& upper
   return true;
 }
 
+/// How many pixels of the picture's height the box's diagonal takes, seen from in front of it.
+double diagonalPixels(const RenderedScene& scene, const glm::dvec3& lower, const glm::dvec3& upper) {
+  const Camera& camera = scene.camera;
+  const double distance = glm::length(0.5 * (lower + upper) - camera.position);
+  const double half_height = camera.projection == Projection::perspective
+                                 ? distance * std::tan(camera.view_angle_deg * std::numbers::pi / 360)
+                                 : camera.parallel_scale;
+  return glm::length(upper - lower) / (2 * half_height) * scene.options.size.height;
+}
+
 /// Whether all corners of the box lie beyond one side of what the camera sees.
 bool outOfView(const RenderedScene& scene, const glm::dvec3& lower, const glm::dvec3& upper) {
   const Camera& camera = scene.camera;
@@ -124,6 +134,11 @@ std::vector<std::string> whyEmpty(const RenderedScene& scene) {
       reasons.push_back(fmt::format("the camera at {} looking at {} does not see the data's box {} to {}",
                                     text(scene.camera.position), text(scene.camera.focal_point), text(lower),
                                     text(upper)));
+    const double pixels = diagonalPixels(scene, lower, upper);
+    if (scene.manifest.volume > 0 && pixels < 1)
+      reasons.push_back(fmt::format(
+          "all of the data is {:.2g} pixels large; bring the camera nearer, or give a smaller {}", pixels,
+          scene.camera.projection == Projection::perspective ? "--view-angle" : "--parallel-scale"));
     const double thickest = largest * glm::length(upper - lower);
     if (thickest > 0 && thickest < 0.01)
       reasons.push_back(fmt::format(

@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
+#include <system_error>
 
 #include "stream/error.h"
+#include "stream/file.h"
 #include "tools/movie_writer.h"
 
 namespace curvisplat {
@@ -75,6 +78,18 @@ std::filesystem::path FrameNames::of(uint64_t frame) const {
   const std::string number =
       zeros_ ? fmt::format("{:0{}}", frame, width_) : fmt::format("{:{}}", frame, width_);
   return folder_ / (before_ + number + after_);
+}
+
+bool FrameNames::include(const std::filesystem::path& path) const {
+  const std::string name = path.filename().string();
+  if (name.size() <= before_.size() + after_.size()) return false;
+  const std::string number = name.substr(before_.size(), name.size() - before_.size() - after_.size());
+  const size_t digits = std::min(number.find_first_not_of(' '), number.size());
+  uint64_t frame = 0;
+  const auto [end, error] = std::from_chars(number.data() + digits, number.data() + number.size(), frame);
+  std::error_code none_there;
+  return error == std::errc{} && of(frame).filename() == name &&
+         std::filesystem::equivalent(folderOf(path), folderOf(of(frame)), none_there);
 }
 
 bool isMovieName(const std::filesystem::path& path) {

@@ -86,7 +86,7 @@ Json jsonOf(const ProbeResult& found, const CacheReader& reader) {
 
 /// What the options ask for beyond the summary.
 struct Asked {
-  std::vector<std::string> findings;
+  CacheVerification verification;
   std::optional<ProbeResult> probe;
 };
 
@@ -94,7 +94,7 @@ Asked answer(const CacheReader& reader, const InfoOptions& options) {
   Asked asked;
   if (options.verify) {
     Progress progress;
-    asked.findings = verifyCache(reader, &progress);
+    asked.verification = verifyCache(reader, &progress);
   }
   if (!options.point.empty()) {
     std::vector<size_t> variables(reader.manifest().variables.size());
@@ -117,7 +117,10 @@ void printAsJson(const CacheReader& reader, const InfoOptions& options, const As
                                        {"geometry_bytes", level.geometry_bytes},
                                        {"values_bytes", level.values_bytes},
                                        {"error", level.largest_error}});
-  if (options.verify) json["findings"] = asked.findings;
+  if (options.verify) {
+    json["findings"] = asked.verification.findings;
+    json["notes"] = asked.verification.notes;
+  }
   if (!options.point.empty()) json["probe"] = asked.probe ? jsonOf(*asked.probe, reader) : Json(nullptr);
   fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
 }
@@ -164,9 +167,10 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const As
     fmt::print("{:<18} {:>12} {:>14.3f}\n", file.name, file.size, perNode(m, file.size));
   fmt::print("{:<18} {:>12} {:>14.3f}\n", "all", totalBytes(m), perNode(m, totalBytes(m)));
   if (!options.point.empty()) printProbe(reader, options, asked);
-  if (options.verify && asked.findings.empty())
+  if (options.verify && asked.verification.findings.empty())
     fmt::print("\nverified: {} bricks are whole and keep to their records\n", m.bricks);
-  for (const std::string& finding : asked.findings) fmt::print("finding: {}\n", finding);
+  for (const std::string& finding : asked.verification.findings) fmt::print("finding: {}\n", finding);
+  for (const std::string& note : asked.verification.notes) fmt::print("note: {}\n", note);
 }
 
 void printCacheInfo(const InfoOptions& options) {
@@ -180,9 +184,9 @@ void printCacheInfo(const InfoOptions& options) {
     printAsText(reader, options, asked);
   if (hasUnfinished(options.grid.grid))
     say("note: a conversion that is to replace this cache is under way, or was interrupted");
-  if (!asked.findings.empty())
+  if (!asked.verification.findings.empty())
     throw Error("{}: {} findings; the cache is damaged: convert again", options.grid.grid.string(),
-                asked.findings.size());
+                asked.verification.findings.size());
 }
 
 void printInfo(const InfoOptions& options) {

@@ -26,6 +26,7 @@
 #include "tools/empty_picture.h"
 #include "tools/frame_output.h"
 #include "tools/option_parsers.h"
+#include "tools/output_paths.h"
 #include "tools/render_statistics.h"
 #include "tools/run_statistics.h"
 #include "tools/scalar_words.h"
@@ -41,8 +42,7 @@ struct RenderWords {
   std::string size = "600x600", background = "white";
   std::string classify = "pixel", scale = "1,1,1", backend = "auto", memory = "512M";
   std::string lod_pixels = "1";
-  std::optional<std::string> clip_box, frame_rate;
-  std::optional<uint64_t> max_splats;
+  std::optional<std::string> clip_box, frame_rate, max_splats;
   unsigned threads = 0;
   bool keep_going = false;
   Annotations annotations;
@@ -66,7 +66,7 @@ FrameOptions frameOptions(const RenderWords& words) {
   options.lod_pixels = parseNumber("--lod-pixels", words.lod_pixels);
   if (options.lod_pixels < 0)
     throw UsageError("--lod-pixels {}: expected 0 (the finest level) or more", words.lod_pixels);
-  options.max_splats = words.max_splats;
+  if (words.max_splats) options.max_splats = parseCount("--max-splats", *words.max_splats);
   if (words.classify != "pixel" && words.classify != "flat")
     throw UsageError("--classify {}: expected pixel or flat", words.classify);
   options.classification = words.classify == "pixel" ? Classification::pixel : Classification::flat;
@@ -96,6 +96,13 @@ void checkWords(const RenderWords& words, ImageSize size) {
   parseBackend(words.backend);
   std::vector<std::filesystem::path> others{words.cache, words.camera.path, words.scalar.transfer_function};
   checkOutputFile("-o", words.output, others);
+  if (words.camera.moves() && !isMovieName(words.output)) {
+    const FrameNames frames(words.output);
+    for (const std::filesystem::path& other : {words.first_image, words.statistics})
+      if (frames.include(other))
+        throw Error("-o {}: a frame would change {}; choose another name", words.output.string(),
+                    other.string());
+  }
   if (!words.first_image.empty()) {
     checkImageName(words.first_image);
     checkOutputFile("--first-image", words.first_image, others);
@@ -112,7 +119,7 @@ void tell(const char* kind, const std::string& text) {
 uint64_t outputBytes(const RenderWords& words, ImageSize picture) {
   uint64_t bytes = 0;
   if (isMovieName(words.output))
-    bytes = 3 * static_cast<uint64_t>(picture.width) * static_cast<uint64_t>(picture.height);
+    bytes = 3 * picture.pixels();
   else
     bytes = writingBytes(words.output, picture);
   if (!words.first_image.empty()) bytes = std::max(bytes, writingBytes(words.first_image, picture));
@@ -293,7 +300,8 @@ void addRender(CLI::App& app) {
       ->group(what);
   command
       ->add_option("--max-splats", words->max_splats,
-                   "Read at most so many, where they show most; as many as --lod-pixels takes otherwise")
+                   "Read at most so many (8M, 500K), where they show most; as many as --lod-pixels takes "
+                   "otherwise")
       ->group(what);
   command->add_option("--scale", words->scale, "sx,sy,sz: stretch the data")
       ->capture_default_str()
@@ -338,7 +346,9 @@ void addRender(CLI::App& app) {
       ->add_option("--path", camera->path,
                    "Key frames to move through, FILE.json; render/README.md describes it")
       ->group(where);
-  command->add_option("--frames", camera->frames, "How many pictures of --orbit or --path")->group(where);
+  command->add_option("--frames", camera->frames, "How many pictures of --orbit or --path")
+      ->check(CLI::Range(1u, kMostFrames))
+      ->group(where);
   command->add_option("--frame-rate", words->frame_rate, "Frames a second of a movie; 25 otherwise")
       ->group(where);
 

@@ -3,18 +3,14 @@
 #include <time.h>
 #include <unistd.h>
 
-#include <cerrno>
-#include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "stream/error.h"
 #include "stream/file.h"
-#include "stream/links.h"
 #include "stream/process_usage.h"
 
 namespace curvisplat {
@@ -66,34 +62,6 @@ void writeStatistics(const std::filesystem::path& path, const nlohmann::json& st
   // Arguments are bytes, which need not be the UTF-8 that JSON is.
   constexpr auto kReplace = nlohmann::json::error_handler_t::replace;
   writeFileDurably(path, statistics.dump(2, ' ', false, kReplace) + "\n");
-}
-
-void checkOutputFolder(std::string_view option, const std::filesystem::path& path) {
-  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
-  std::error_code ignored;
-  if (!std::filesystem::is_directory(folder, ignored))
-    throw Error("{} {}: there is no folder {}; make it first", option, path.string(), folder.string());
-  if (::access(folder.c_str(), W_OK | X_OK) != 0)
-    throw Error("{} {}: the folder {} cannot be written to: {}; choose another", option, path.string(),
-                folder.string(), std::strerror(errno));
-}
-
-void checkOutputFile(std::string_view option, const std::filesystem::path& path,
-                     const std::vector<std::filesystem::path>& others) {
-  namespace fs = std::filesystem;
-  checkOutputFolder(option, path);
-  std::error_code ignored;
-  const fs::path target = fs::weakly_canonical(linkTarget(path), ignored);
-  if (fs::exists(target, ignored) && !fs::is_regular_file(target, ignored))
-    throw Error("{} {}: is there, and is no regular file; choose another name", option, path.string());
-  if (target != path) checkOutputFolder(option, target);
-  for (const fs::path& other : others) {
-    if (other.empty()) continue;
-    const fs::path there = fs::weakly_canonical(linkTarget(other), ignored);
-    if (there == target || fs::equivalent(target, there, ignored) ||
-        fs::equivalent(target.parent_path(), there, ignored))
-      throw Error("{} {}: would change {}; choose another name", option, path.string(), other.string());
-  }
 }
 
 }  // namespace curvisplat

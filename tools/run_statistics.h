@@ -3,8 +3,6 @@
 
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
-#include <string_view>
-#include <vector>
 
 namespace curvisplat {
 
@@ -16,14 +14,5 @@ double secondsSinceStart();
 
 /// Writes one JSON object, whole or not at all. Throws Error.
 void writeStatistics(const std::filesystem::path& path, const nlohmann::json& statistics);
-
-/// Throws Error if the folder that `path`, the value of `option`, is to be written to does not exist or
-/// cannot be written to: for use before long work.
-void checkOutputFolder(std::string_view option, const std::filesystem::path& path);
-
-/// checkOutputFolder() for a file. Throws Error, too, if `path` is there and is no regular file, or if
-/// writing it would change one of `others`: files or caches that are read, or written as well.
-void checkOutputFile(std::string_view option, const std::filesystem::path& path,
-                     const std::vector<std::filesystem::path>& others);
 
 }  // namespace curvisplat

@@ -30,7 +30,7 @@ TEST_P(CacheVersion, IsStillRead) {
     SCOPED_TRACE(name);
     const fs::path base = folder() / name;
     const CacheReader cache(base.string() + ".splats");
-    EXPECT_TRUE(verifyCache(cache).empty());
+    EXPECT_TRUE(verifyCache(cache).findings.empty());
 
     const auto expected = nlohmann::json::parse(readTextFile(base.string() + ".json"));
     const auto found = summaryOf(cache);

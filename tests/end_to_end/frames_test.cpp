@@ -144,6 +144,12 @@ TEST_F(Frames, NamesWithoutOneNumberAreWrongUsage) {
   expectRefused({"-o", file("a%d.jpg"), "--orbit", "90", "--frames", "2"}, 2, ".png");
   expectDrawn({"-o", file("100%%_%2d.png"), "--orbit", "90", "--frames", "1"});
   EXPECT_TRUE(fs::exists(file("100%_ 0.png")));
+  // Nor may a frame be what else is written.
+  expectRefused({"-o", file("a%02d.png"), "--orbit", "90", "--frames", "2", "--stats", file("./a01.png")}, 1,
+                "a frame would change");
+  expectRefused({"-o", file("a%2d.png"), "--orbit", "90", "--frames", "2", "--first-image", file("a 0.png")},
+                1, "a frame would change");
+  expectDrawn({"-o", file("a%02d.png"), "--orbit", "90", "--frames", "1", "--stats", file("a1.png")});
   // One picture is written to the name as it is.
   expectDrawn({"-o", file("a%d.png")});
   EXPECT_TRUE(fs::exists(file("a%d.png")));
@@ -227,7 +233,7 @@ TEST_F(Frames, MaxSplatsHolds) {
   draw("few.exr", {"--max-splats", "123456"});
   EXPECT_LE(json("splats.json")["frames"][0]["splats_read"], 123456);
   EXPECT_EQ(json("splats.json")["max_splats"], 123456);
-  draw("many.exr", {"--max-splats", "9000000"});
+  draw("many.exr", {"--max-splats", "9M"});
   draw("free.exr", {});
   EXPECT_EQ(bytes("many.exr"), bytes("free.exr"));
   EXPECT_NE(bytes("few.exr"), bytes("free.exr"));

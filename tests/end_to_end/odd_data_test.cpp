@@ -131,6 +131,8 @@ TEST_F(OddDataTest, AnEmptyPictureNamesItsCause) {
   // The camera.
   expectEmpty({"--position", "100,0,0", "--focal-point", "200,0,0", "--view-angle", "30"},
               "does not see the data's box");
+  expectEmpty({"--parallel-scale", "1e300"}, "give a smaller --parallel-scale");
+  expectEmpty({"--position", "1e9,0,0", "--view-angle", "30"}, "bring the camera nearer");
   // What is seen is of values that are transparent.
   writeFileAtomically(folder_ / "high.json",
                       std::string(R"([{"Name": "high", "RGBPoints": [0,1,0,0, 15,1,0,0],

@@ -9,9 +9,7 @@ namespace {
 
 void run(std::span<const std::byte> bytes) {
   const Image image = readImage(fuzzFile("picture", bytes));
-  CURVISPLAT_CHECK_OP(
-      image.rgba.size(), ==,
-      size_t{4} * static_cast<size_t>(image.size.width) * static_cast<size_t>(image.size.height));
+  CURVISPLAT_CHECK_OP(image.rgba.size(), ==, 4 * image.size.pixels());
 }
 
 const RegisteredFuzzTarget registered("image", run);

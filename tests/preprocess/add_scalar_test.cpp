@@ -127,7 +127,7 @@ void expectAsAtOnce(const GridSource& source) {
       EXPECT_EQ(found.max, wanted.max);
     }
     EXPECT_EQ(reader.manifest().steps.front().variables, expected.manifest().steps.front().variables);
-    for (const std::string& finding : verifyCache(reader, nullptr)) ADD_FAILURE() << way.name << finding;
+    for (const std::string& finding : verifyCache(reader).findings) ADD_FAILURE() << way.name << finding;
     fs::remove_all(cache);
     EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 2) << way.name;
   }
@@ -372,7 +372,7 @@ TEST_F(ToAnExistingCache, RefusesDamagedGeometry) {
 TEST_F(ToAnExistingCache, ClearsWhatAKilledOneLeft) {
   std::ofstream(cache / "var.1.bin.part") << "rest";
   std::ofstream(cache / "var.2.bin.part") << "rest";
-  EXPECT_TRUE(verifyCache(CacheReader(cache), nullptr).empty());
+  EXPECT_TRUE(verifyCache(CacheReader(cache)).findings.empty());
   addQuietly(source, adding(cache, {1}));
   const Files after = filesOf(cache);
   EXPECT_EQ(after.size(), before.size() + 1);

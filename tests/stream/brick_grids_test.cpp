@@ -27,8 +27,9 @@ class BrickGrids : public testing::Test {
     file.readAt(0, std::span(bytes));
     return bytes;
   }
-  std::string difference(std::span<const std::byte> of) const {
-    return differenceFromBrickGrids(of, cache().manifest().root, cache().bricks());
+  std::string difference(std::span<const std::byte> of) const { return comparison(of).difference; }
+  BrickGridsComparison comparison(std::span<const std::byte> of, uint64_t most_memory = 1 << 30) const {
+    return compareBrickGrids(of, cache().manifest().root, cache().bricks(), most_memory);
   }
   const CacheReader& cache() const {
     if (!cache_) cache_.emplace(folder_ / "a.splats");
@@ -82,11 +83,37 @@ TEST_F(BrickGrids, AreComparedWithoutBeingParsed) {
   EXPECT_NE(difference(other), "");
 }
 
-TEST_F(BrickGrids, OfAnotherVersionOfOpenVdbAreTakenAsTheyAre) {
+TEST_F(BrickGrids, OfAnotherVersionOfOpenVdbAreNotCompared) {
   std::vector<std::byte> other = bytes();
   other[12] ^= std::byte{1};  // the library's major version
   other.resize(other.size() + 1);
-  EXPECT_EQ(difference(other), "");
+  const BrickGridsComparison compared = comparison(other);
+  EXPECT_EQ(compared.difference, "");
+  EXPECT_EQ(compared.not_compared, "another version of OpenVDB wrote it");
+}
+
+TEST_F(BrickGrids, ThatTakeMuchMemoryAreNotCompared) {
+  // Two bricks in opposite corners of 2^12 cells: a tree each, but for its root.
+  std::vector<Brick> bricks(3);
+  bricks[1].cell = {12, {0, 0, 0}};
+  bricks[2].cell = {12, {4095, 4095, 4095}};
+  const uint64_t one = brickGridsMemory(std::span(bricks).first(1));
+  EXPECT_GE(one, 32768 * 8 + 4096 * 8 + 512 * 4);  // the tables of the three kinds of nodes
+  EXPECT_GT(brickGridsMemory(bricks), 2 * one);
+  EXPECT_LT(brickGridsMemory(bricks), 3 * one);  // they share the widest
+  bricks[2].cell = {12, {1, 1, 1}};
+  EXPECT_EQ(brickGridsMemory(bricks), 2 * one);
+  bricks[2].cell = {13, {4095, 4096, 4095}};
+  bricks[1].cell = {13, {4095, 4095, 4095}};
+  EXPECT_EQ(brickGridsMemory(bricks), 3 * one);
+
+  const uint64_t memory = brickGridsMemory(cache().bricks());
+  std::vector<std::byte> bad = bytes();
+  bad.back() ^= std::byte{1};
+  EXPECT_NE(comparison(bad, memory).difference, "");
+  const BrickGridsComparison compared = comparison(bad, memory - 1);
+  EXPECT_EQ(compared.difference, "");
+  EXPECT_NE(compared.not_compared.find("MiB of memory"), std::string::npos);
 }
 
 }  // namespace

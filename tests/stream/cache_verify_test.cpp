@@ -24,7 +24,7 @@ bool anySays(const std::vector<std::string>& findings, const std::string& words)
 class VerifyCache : public testing::Test {
  protected:
   VerifyCache() { SmallCache().write(path); }
-  std::vector<std::string> findings() const { return verifyCache(CacheReader(path)); }
+  std::vector<std::string> findings() const { return verifyCache(CacheReader(path)).findings; }
 
   /// Changes the record of brick `n`, and makes every checksum fit again: a writer's bug, not a disk's.
   template <typename Change>
@@ -93,7 +93,7 @@ TEST_F(VerifyCache, FindsInnerBricksThatLoseWeight) {
     writer.append(encodeBrick(cache.root, inner), 1);
     writer.finish(cache.manifest());
   }
-  const auto found = verifyCache(CacheReader(other));
+  const auto found = verifyCache(CacheReader(other)).findings;
   ASSERT_EQ(found.size(), 1u);
   EXPECT_TRUE(anySays(found, "its children's")) << found[0];
 }
@@ -121,7 +121,7 @@ TEST(Probe, FindsTheNodeAndItsValue) {
     writer.finish(manifest);
   }
   const CacheReader reader(folder / "a.splats");
-  EXPECT_EQ(verifyCache(reader), std::vector<std::string>{});
+  EXPECT_EQ(verifyCache(reader).findings, std::vector<std::string>{});
   const size_t variable = 0;
   const auto second = probe(reader, std::span(&variable, 1), {2.7, 2.4, 2.5});
   ASSERT_TRUE(second);

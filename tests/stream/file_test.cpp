@@ -158,6 +158,11 @@ TEST_F(FileTest, AnAtomicWriteThatFailsLeavesTheOldFile) {
 TEST_F(FileTest, ATextFileIsBounded) {
   writeFileAtomically(folder / "file", std::string(100, 'x'));
   EXPECT_THROW(readTextFile(folder / "file", 99), Error);
+  // Transfer functions, camera paths and view states are.
+  std::filesystem::resize_file(folder / "file", 16 << 20);
+  EXPECT_EQ(readTextFile(folder / "file").size(), 16u << 20);
+  std::filesystem::resize_file(folder / "file", (16 << 20) + 1);
+  EXPECT_THROW(readTextFile(folder / "file"), Error);
 }
 
 }  // namespace

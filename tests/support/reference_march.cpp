@@ -150,7 +150,7 @@ OpticalProperties stepFunction(double f) {
 ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction& function,
                               const Camera& camera, ImageSize size, const MarchSteps& steps) {
   ReferenceImage image{size, {}};
-  image.pixels.resize(static_cast<size_t>(size.width) * static_cast<size_t>(size.height));
+  image.pixels.resize(size.pixels());
   const auto [lower, upper] = field.bounds();
   const glm::dvec3 forward = glm::normalize(camera.focal_point - camera.position);
   tbb::parallel_for(0, size.height, [&, lower = lower, upper = upper](int y) {

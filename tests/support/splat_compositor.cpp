@@ -28,8 +28,7 @@ glm::dvec4 contribution(const ScreenSplat& splat, double dx, double dy, const Cl
 
 Image compositeSplats(std::span<const ScreenSplat> splats, const ClassificationTable& table, bool per_pixel,
                       ImageSize size, const glm::vec4& background) {
-  std::vector<glm::dvec4> pixels(static_cast<size_t>(size.width) * static_cast<size_t>(size.height),
-                                 glm::dvec4(background));
+  std::vector<glm::dvec4> pixels(size.pixels(), glm::dvec4(background));
   for (const ScreenSplat& splat : splats)
     for (int y = 0; y < size.height; ++y)
       for (int x = 0; x < size.width; ++x) {

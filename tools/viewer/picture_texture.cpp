@@ -18,8 +18,7 @@ PictureTexture::~PictureTexture() {
 }
 
 void PictureTexture::set(std::span<const uint8_t> rgba, ImageSize size) {
-  CURVISPLAT_CHECK_OP(rgba.size(), ==,
-                      size_t{4} * static_cast<size_t>(size.width) * static_cast<size_t>(size.height));
+  CURVISPLAT_CHECK_OP(rgba.size(), ==, 4 * size.pixels());
   gl_.BindTexture(GL_TEXTURE_2D, texture_);
   gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, size.width, size.height, 0, GL_RGBA, GL_UNSIGNED_BYTE,
                  rgba.data());

@@ -1,4 +1,4 @@
-#include "stream/links.h"
+#include "stream/paths.h"
 
 #include <system_error>
 
@@ -6,6 +6,11 @@
 #include "stream/file.h"
 
 namespace curvisplat {
+
+bool isRegularFile(const std::filesystem::path& path) noexcept {
+  std::error_code none_there;
+  return std::filesystem::is_regular_file(path, none_there);
+}
 
 std::filesystem::path linkTarget(std::filesystem::path path) {
   constexpr int kMostLinks = 40;  // as the kernel
@@ -16,6 +21,14 @@ std::filesystem::path linkTarget(std::filesystem::path path) {
     path = folderOf(path) / std::filesystem::read_symlink(path);  // which replaces all if it is absolute
   }
   throw Error("{}: is a link that leads round in a circle", first.string());
+}
+
+std::filesystem::path writableTarget(const std::filesystem::path& path) {
+  const std::filesystem::path target = linkTarget(path);
+  std::error_code none_there;
+  if (std::filesystem::exists(target, none_there) && !isRegularFile(target))
+    throw Error("{}: is there, and is no regular file; choose another name", path.string());
+  return target;
 }
 
 }  // namespace curvisplat
