@@ -259,8 +259,7 @@ void writeFileAtomically(const std::filesystem::path& path, const std::string& t
 
 void writeFileDurably(const std::filesystem::path& path, std::span<const std::byte> bytes) {
   const std::filesystem::path target = writableTarget(path);
-  // By a name of this process's own, and a short one.
-  replaceFile(target, folderOf(target) / fmt::format(".curvisplat.{}.part", ::getpid()), bytes);
+  replaceFile(target, temporaryBeside(target), bytes);
   syncDirectory(folderOf(target));
 }
 

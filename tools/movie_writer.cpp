@@ -18,6 +18,7 @@
 #include "render/image_formats.h"
 #include "stream/error.h"
 #include "stream/file.h"
+#include "stream/paths.h"
 
 extern char** environ;
 
@@ -27,9 +28,8 @@ namespace {
 [[noreturn]] void failToStart(const std::filesystem::path& movie, int error) {
   if (error == ENOENT)
     throw Error(
-        "{}: movies are made by ffmpeg, which is not installed (not in PATH); install it, or write pictures: "
-        "-o "
-        "frame_%04d.png",
+        "{}: movies are made by ffmpeg, which is not installed (not in PATH); install it, or write pictures, "
+        "-o frame_%04d.png",
         movie.string());
   throw Error("{}: ffmpeg cannot be started: {}", movie.string(), std::strerror(error));
 }
@@ -61,7 +61,10 @@ std::string textOf(int file) {
 }  // namespace
 
 MovieWriter::MovieWriter(const std::filesystem::path& path, ImageSize size, double frames_per_s)
-    : path_(path), unfinished_(path.string() + ".unfinished"), size_(size) {
+    : path_(writableTarget(path)),
+      unfinished_(temporaryBeside(path_)),
+      size_(size),
+      pixels_(3 * size.pixels()) {
   // A pair of sockets instead of a pipe: sending to a process that has ended is an error, not a signal.
   int ends[2] = {-1, -1};
   errors_ = memfd_create("ffmpeg", MFD_CLOEXEC);
@@ -145,9 +148,8 @@ void MovieWriter::fail(int status) const {
 void MovieWriter::append(const Image& image) {
   CURVISPLAT_CHECK_OP(image.size.width, ==, size_.width);
   CURVISPLAT_CHECK_OP(image.size.height, ==, size_.height);
-  pixels_.clear();
-  for (size_t n = 0; n < image.rgba.size(); ++n)
-    if (n % 4 != 3) pixels_.push_back(toByte(image.rgba[n]));
+  for (size_t n = 0; n < size_.pixels(); ++n)
+    for (size_t c = 0; c < 3; ++c) pixels_[3 * n + c] = toByte(image.rgba[4 * n + c]);
   for (size_t sent = 0; sent < pixels_.size();) {
     const ssize_t count = send(input_, pixels_.data() + sent, pixels_.size() - sent, MSG_NOSIGNAL);
     if (count < 0 && errno == EINTR) continue;

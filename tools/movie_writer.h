@@ -16,7 +16,7 @@ namespace curvisplat {
 class MovieWriter {
  public:
   /// Starts ffmpeg: H.264 of `frames_per_s`. The sides of `size` are even. Throws Error if there is no ffmpeg
-  /// in PATH.
+  /// in PATH, or if something else than a file is at `path`. Links are followed.
   MovieWriter(const std::filesystem::path& path, ImageSize size, double frames_per_s);
   ~MovieWriter();
   MovieWriter(const MovieWriter&) = delete;

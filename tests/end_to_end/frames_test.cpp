@@ -283,6 +283,16 @@ TEST_F(Frames, AMovieIsRawFramesToFfmpeg) {
   }
 }
 
+TEST_F(Frames, AMovieFollowsALink) {
+  const ScopedEnvironment path("PATH", folderWith("ffmpeg",
+                                                  "for word; do last=$word; done\n"
+                                                  "exec cat > \"${last#file:}\"\n"));
+  fs::create_symlink("linked.mp4", file("link.mp4"));
+  expectDrawn({"-o", file("link.mp4"), "--orbit", "90", "--frames", "2"});
+  EXPECT_TRUE(fs::is_symlink(file("link.mp4")));
+  EXPECT_EQ(bytes("linked.mp4").size(), 2u * 64 * 48 * 3);
+}
+
 TEST_F(Frames, AMovieThatFailsLeavesNothing) {
   const std::vector<std::string> movie{"-o", file("failed.mp4"), "--orbit", "90", "--frames", "3"};
   {
@@ -299,7 +309,8 @@ TEST_F(Frames, AMovieThatFailsLeavesNothing) {
     expectRefused(movie, 1, "ffmpeg, which is not installed");
   }
   for (const auto& entry : fs::directory_iterator(folder_->path()))
-    EXPECT_EQ(entry.path().filename().string().find("failed"), std::string::npos) << entry.path();
+    for (const char* part : {"failed", ".curvisplat"})
+      EXPECT_EQ(entry.path().filename().string().find(part), std::string::npos) << entry.path();
   expectRefused({"-o", file("failed.mp4")}, 2, "--orbit or --path");
   expectRefused({"-o", file("failed.mp4"), "--orbit", "9", "--frames", "2", "--size", "65x48"}, 2, "even");
   expectRefused({"-o", file("failed.mp4"), "--orbit", "9", "--frames", "2", "--background", "transparent"}, 2,

@@ -6,9 +6,8 @@ program=$(realpath "${1:-build/release/tools/curvisplat}")
 folder=$(mktemp -d "$(realpath "${2:-${TMPDIR:-/tmp}}")/soak.XXXXXX")
 rest=("${@:3}")
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-started=()
 finish() {
-  for pid in "${started[@]}"; do kill "$pid" 2> /dev/null || true; done
+  for pid in $(jobs -pr); do kill "$pid" 2> /dev/null || true; done
   rm -rf "$folder"
 }
 trap finish EXIT

@@ -22,13 +22,11 @@ made wake "$grid" f j
 cd "$folder"
 mkfifo display
 Xvfb -displayfd 3 -screen 0 1000x700x24 -noreset -nolisten tcp 3> display 2> xvfb.log &
-started+=($!)
 DISPLAY=:$(head -n 1 display)
 export DISPLAY
 : > view.log
 "$program" view wake.splats --size 900x600 --memory 96M > view.log 2> view.err &
 pid=$!
-started+=("$pid")
 
 alive() { kill -0 $pid 2> /dev/null || { echo "FAILED: the window is gone: $(cat view.err)"; exit 1; }; }
 do_() { xdotool "$@" > xdotool.log 2>&1 || { alive; cat xdotool.log; exit 1; }; }
@@ -112,7 +110,6 @@ asked > /dev/null  # it hears
 do_ key z key r
 saved first
 watch "$pid" window.txt $interval_s &
-started+=($!)
 end=$((SECONDS + session_s))
 rounds=0
 while [ $SECONDS -lt $end ]; do
