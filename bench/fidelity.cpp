@@ -14,6 +14,7 @@
 #include "preprocess/scenes.h"
 #include "render/image.h"
 #include "stream/file.h"
+#include "tests/support/cell_grid.h"
 #include "tests/support/grid_field.h"
 #include "tests/support/known_pictures.h"
 #include "tests/support/rearranged_grid.h"
@@ -32,6 +33,7 @@ struct View {
 /// A grid and what its picture is held against.
 struct Case {
   std::string name;
+  std::unique_ptr<GridSource> corners;  // whose cells `source` has, if those are cell-centred
   std::unique_ptr<GridSource> source;
   uint32_t scalar = 0;
   std::shared_ptr<const Scene> scene;  // what `field` looks at, if it is one
@@ -54,6 +56,18 @@ Case sceneCase(const std::string& name, const std::string& scene, std::optional<
   }
   out.field = std::make_unique<SceneField>(*out.scene);
   out.views = std::move(views);
+  return out;
+}
+
+/// A scene in as many cells as other cases have nodes.
+Case cellCase(const std::string& name, const std::string& scene, std::vector<View> views) {
+  Case out = sceneCase(name, scene, {}, std::move(views));
+  out.corners = std::make_unique<SceneGridSource>(
+      out.scene, SceneGridSize{kNodes.ni + 1, kNodes.nj + 1, kNodes.nk + 1}, 4);
+  out.source = std::make_unique<CellGridSource>(
+      *out.corners, std::vector<CellGridSource::Function>{
+                        [&scene = *out.scene](const GridCell& cell) { return scene.scalar(cell.centre); }});
+  out.scalar = 1;
   return out;
 }
 
@@ -114,6 +128,7 @@ std::vector<NamedCase> allCases() {
   add("half-annulus 7", "half-annulus", 7, {front});
   add("half-annulus 9", "half-annulus", 9, {front, edge});
   add("constant", "half-annulus-constant", {}, {front, edge});
+  cases.push_back({"cells", [=] { return cellCase("cells", "half-annulus", {front, edge}); }});
   add("two blocks", "half-annulus", 2.5, {front}, {{2, 1, 1}});
   add("o-grid", "o-grid", {}, {whole});
   add("axis", "axis", {}, {whole});

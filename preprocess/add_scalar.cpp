@@ -133,7 +133,7 @@ class Addition {
     checkSurvey();
   }
 
-  void survey() { survey_ = surveyGrid(reader_, plan_.slab_bytes, progress_); }
+  void survey() { survey_ = surveyGrid(reader_, plan_.slab_bytes, nullptr, progress_); }
 
   void findMergedNodes() { grid_.addMergedFaces(plan_, scratch_.path(), progress_); }
   void findDrawnNodes() { grid_.restrictTo(cache_, plan_, scratch_.path(), progress_); }
@@ -183,7 +183,7 @@ class Addition {
 
     tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
     streamSplats(
-        reader_, plan_.slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, *seams_, progress_);
+        reader_, nullptr, plan_.slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, *seams_, progress_);
     for (ValueSink& sink : sinks) sink.flush();
   }
 

@@ -38,8 +38,8 @@ void CacheGrid::addMergedFaces(const MemoryPlan& plan, const std::filesystem::pa
   SeamMerger seams(0, plan.seam_bytes, temporary_folder);
   NoSink none;
   streamSplats(
-      NodeReader(*this, {}, std::nullopt), plan.slab_bytes, [&]() -> SplatSink& { return none; }, seams,
-      progress);
+      NodeReader(*this, {}, std::nullopt), nullptr, plan.slab_bytes, [&]() -> SplatSink& { return none; },
+      seams, progress);
   // The splat of a set has the number of the lowest node in it that is drawn.
   seams.forEachSet(description().coordinate_bytes, [&](std::span<const uint64_t> nodes) {
     bool merges = false;

@@ -23,8 +23,10 @@ constexpr double kMostVolumeRatio = 8;
 /// What the cells of a box have in common.
 class Cells {
  public:
-  Cells(const BlockWindow& in, const NodeBox& box, CellScratch& scratch, NodeSplats& out)
+  Cells(const BlockWindow& in, const NodeBox& box, const BlockEnds& ends, CellScratch& scratch,
+        NodeSplats& out)
       : in_(in),
+        ends_(ends),
         row_stride_(in.block.ni),
         plane_stride_(in.block.ni * (in.window.j1 - in.window.j0)),
         known_{box.j0 - std::min<uint64_t>(box.j0, 1), std::min(box.j1 + 1, in.block.nj - 1),
@@ -51,6 +53,12 @@ class Cells {
   size_t cellAt(uint64_t i, uint64_t j, uint64_t k) const {
     return ((k - known_.k0) * (known_.j1 - known_.j0) + (j - known_.j0)) * cells_i_ + i;
   }
+  /// For a side on which the block has no cell.
+  bool isBorder(const std::array<uint64_t, 3>& cell, int axis, bool upper) const {
+    if (!ends_.faces) return false;
+    const CellFace face{ends_.block, cell, axis, upper};
+    return !ends_.faces->isAtEnd(face) || !ends_.faces->abuts(face);
+  }
   void lookAtRow(uint64_t j, uint64_t k);
   void addCell(uint64_t i, uint64_t j, uint64_t k);
   std::array<glm::dvec3, 8> corners(size_t node) const {
@@ -59,6 +67,7 @@ class Cells {
   }
 
   const BlockWindow& in_;
+  const BlockEnds& ends_;
   const size_t row_stride_, plane_stride_;
   const NodeBox known_;  // cells whose centres are in the scratch: the box and its neighbours
   const uint64_t cells_i_;
@@ -114,12 +123,16 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
   std::array<size_t, 3> before, after;  // elements of NodeArrays
   std::array<double, 3> per_step;
   glm::dmat3 steps;
-  glm::dvec3 bend(0.0);  // the sum of the centres' second differences
+  glm::dvec3 bend(0.0);             // the sum of the centres' second differences
+  std::array<double, 3> inwards{};  // along i, j, k: 1 or -1 from a border
   for (int axis = 0; axis < 3; ++axis) {
     const bool has_before = index[axis] > 0 && scratch_.there[cell - cell_strides[axis]];
     const bool has_after = index[axis] + 1 < cells[axis] && scratch_.there[cell + cell_strides[axis]];
     before[axis] = has_before ? node - node_strides[axis] : node;
     after[axis] = has_after ? node + node_strides[axis] : node;
+    const bool open_before = !has_before && isBorder(index, axis, false);
+    const bool open_after = !has_after && isBorder(index, axis, true);
+    if (open_before != open_after) inwards[axis] = open_before ? 1 : -1;
     per_step[axis] = has_before && has_after ? 0.5 : 1.0;
     // Without any neighbour there is no difference along this axis, and the cell's own extent is the step.
     steps[axis] = has_before || has_after
@@ -150,6 +163,18 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
       *value++ = {mean, scale * rotate(gradient * jacobian), 0.0};
     }
   };
+  // `rotate` gives Q's image of a vector.
+  const auto set_border = [&](const auto& rotate) {
+    std::array<glm::dvec3, 3> axes;
+    size_t count = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (inwards[axis] == 0) continue;
+      glm::dvec3 along(0.0);
+      along[axis] = inwards[axis];
+      axes[count++] = rotate(along);
+    }
+    splat.half_cell = count > 0 ? packHalfCell({axes.data(), count}) : kWholeCell;
+  };
   // Axes that have the volume of the hexahedron, where they are near it; a weight of its own elsewhere.
   const auto set_volume = [&](double determinant) {
     const double volume = determinant + hexahedron.volume_beyond;
@@ -171,7 +196,9 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     splat.splat.axis = {a.a00, a.a11, a.a22};
     splat.splat.shear = {a.a10 * lq.inverse_a00, a.a20 * lq.inverse_a00, a.a21 * lq.inverse_a11};
     const double scale = set_volume(lq.determinant);
-    set_values(scale, [&](const glm::dvec3& gradient) { return lq.rotate(gradient); });
+    const auto rotate = [&](const glm::dvec3& v) { return lq.rotate(v); };
+    set_values(scale, rotate);
+    set_border(rotate);
   } else {
     const CellShape shape = shapeFromJacobian(jacobian, smallestAxis(hexahedron.centre));
     splat.splat.axis = shape.axis;
@@ -184,14 +211,17 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     } else {
       scale = set_volume(shape.determinant);
     }
-    set_values(scale, [&](const glm::dvec3& gradient) { return shape.rotation * gradient; });
+    const auto rotate = [&](const glm::dvec3& v) { return shape.rotation * v; };
+    set_values(scale, rotate);
+    set_border(rotate);
   }
   ++count_;
 }
 
 }  // namespace
 
-void computeCellSplats(const BlockWindow& in, const NodeBox& box, CellScratch& scratch, NodeSplats& out) {
+void computeCellSplats(const BlockWindow& in, const NodeBox& box, const BlockEnds& ends, CellScratch& scratch,
+                       NodeSplats& out) {
   const GridBlock& block = in.block;
   const NodeBox& window = in.window;
   CURVISPLAT_CHECK(window.j0 <= box.j0 - std::min<uint64_t>(box.j0, 1) &&
@@ -209,7 +239,7 @@ void computeCellSplats(const BlockWindow& in, const NodeBox& box, CellScratch& s
   const size_t variables = in.nodes->scalars.size();
   out.splats.resize(most);
   out.values.resize(most * variables);
-  Cells rows(in, cells, scratch, out);
+  Cells rows(in, cells, ends, scratch, out);
   for (uint64_t k = cells.k0; k < cells.k1; ++k)
     for (uint64_t j = cells.j0; j < cells.j1; ++j) rows.addRow(j, k);
   out.splats.resize(rows.count());

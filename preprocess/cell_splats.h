@@ -7,14 +7,15 @@
 // centres of the neighbouring cells; a missing one (the block ends, or it is not there) makes the difference
 // one-sided.
 //
-// At the grid's faces whole cells end less sharply than the half cells of nodes. The half-annulus: 60.3
-// / 66.1 / 55.5 dB for the smooth, band and step functions, as many nodes 64.1 / 67.6 / 57.1.
+// A cell that has no neighbour ends at a border, and its splat remembers where (stream/half_cell.h); there is
+// a neighbour, too, where blocks abut.
 #pragma once
 
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <vector>
 
+#include "preprocess/abutting_faces.h"
 #include "preprocess/node_splats.h"
 #include "preprocess/slabs.h"
 
@@ -22,6 +23,12 @@ namespace curvisplat {
 
 /// A cell's own nodes, and those of its neighbours.
 inline constexpr Halo kCellHalo{1, 2};
+
+/// What is beyond the ends of a block.
+struct BlockEnds {
+  size_t block = 0;
+  const AbuttingFaces* faces = nullptr;  // null: cells are not told that they end at borders
+};
 
 /// What computeCellSplats() needs for a while; keeps its capacity.
 struct CellScratch {
@@ -33,6 +40,7 @@ struct CellScratch {
 /// are, and their values. A splat's number is that of the cell's lowest node. `in.window` is `box` and
 /// kCellHalo where the block goes on; `in.nodes` as a NodeReader of cell-centred scalars gives them.
 /// Overwrites `out` and keeps its capacity. Pure: any thread. Throws nothing but bad_alloc.
-void computeCellSplats(const BlockWindow& in, const NodeBox& box, CellScratch& scratch, NodeSplats& out);
+void computeCellSplats(const BlockWindow& in, const NodeBox& box, const BlockEnds& ends, CellScratch& scratch,
+                       NodeSplats& out);
 
 }  // namespace curvisplat

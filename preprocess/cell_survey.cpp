@@ -4,7 +4,9 @@
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
+#include <array>
 #include <glm/common.hpp>
+#include <mutex>
 
 #include "preprocess/hexahedron.h"
 #include "preprocess/slabs.h"
@@ -15,20 +17,21 @@ namespace {
 constexpr size_t kNodesPerTask = 16384;
 constexpr Halo kCorners{0, 1};
 
-void addCell(const NodeArrays& nodes, size_t at, size_t row_stride, size_t plane_stride, GridSurvey& survey) {
+/// Whether it is there.
+bool addCell(const NodeArrays& nodes, size_t at, size_t row_stride, size_t plane_stride, GridSurvey& survey) {
   ++survey.nodes;
   const uint8_t own = nodes.blank[at];
   if ((cornerMarks(nodes.blank.data(), at, row_stride, plane_stride) & kNoNode) || (own & kNoValue)) {
     ++survey.blanked.by_grid;
-    return;
+    return false;
   }
   if (own & kBlankValue) {
     ++survey.blanked.by_value;
-    return;
+    return false;
   }
   if (own & kValueNotFinite) {
     ++survey.blanked.not_finite;
-    return;
+    return false;
   }
   for (const glm::dvec3& corner :
        cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at, row_stride, plane_stride)) {
@@ -40,6 +43,7 @@ void addCell(const NodeArrays& nodes, size_t at, size_t row_stride, size_t plane
     survey.ranges[scalar].min = std::min(survey.ranges[scalar].min, value);
     survey.ranges[scalar].max = std::max(survey.ranges[scalar].max, value);
   }
+  return true;
 }
 
 GridSurvey united(GridSurvey a, const GridSurvey& b) {
@@ -56,7 +60,9 @@ GridSurvey united(GridSurvey a, const GridSurvey& b) {
 
 }  // namespace
 
-GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, Progress& progress) {
+GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces,
+                       Progress& progress) {
+  std::mutex adding_faces;  // guards *faces
   GridSurvey nothing;
   nothing.ranges.resize(reader.scalars());
   GridSurvey survey = nothing;
@@ -66,12 +72,24 @@ GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, Progress& 
     const GridBlock& block = reader.source().description().blocks[slab.block];
     const size_t plane_stride = block.ni * (slab.window.j1 - slab.window.j0);
     const uint64_t rows = slab.box.j1 - slab.box.j0;
+    const auto add_faces = [&](const std::array<uint64_t, 3>& cell, size_t at) {
+      for (int axis = 0; axis < 3; ++axis)
+        for (const bool upper : {false, true}) {
+          const CellFace face{slab.block, cell, axis, upper};
+          if (!faces->isAtEnd(face)) continue;
+          const std::lock_guard lock(adding_faces);
+          faces->add(face, cornersAt(loaded->nodes.x.data(), loaded->nodes.y.data(), loaded->nodes.z.data(),
+                                     at, block.ni, plane_stride));
+        }
+    };
     const auto add_row = [&](size_t row, GridSurvey& to) {
       const uint64_t j = slab.box.j0 + row % rows, k = slab.box.k0 + row / rows;
       if (j + 1 == block.nj || k + 1 == block.nk) return;
       const size_t first = (k - slab.window.k0) * plane_stride + (j - slab.window.j0) * block.ni;
-      for (uint64_t i = 0; i + 1 < block.ni; ++i)
-        addCell(loaded->nodes, first + i, block.ni, plane_stride, to);
+      for (uint64_t i = 0; i + 1 < block.ni; ++i) {
+        const bool is_there = addCell(loaded->nodes, first + i, block.ni, plane_stride, to);
+        if (is_there && faces) add_faces({i, j, k}, first + i);
+      }
     };
     // Counts, the smallest and the largest do not depend on how the work is divided.
     survey =

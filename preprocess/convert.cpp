@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 
+#include "preprocess/abutting_faces.h"
 #include "preprocess/block_overlap.h"
 #include "preprocess/bucket_file.h"
 #include "preprocess/bucket_tree.h"
@@ -126,7 +127,11 @@ class Conversion {
   }
 
   void scan() {
-    splats_.survey = surveyGrid(reader_, plan_.slab_bytes, progress_);
+    if (reader_.centring() == Centring::cell)
+      faces_ = std::make_unique<AbuttingFaces>(source_.description().blocks, plan_.seam_bytes,
+                                               workspace_.scratch());
+    splats_.survey = surveyGrid(reader_, plan_.slab_bytes, faces_.get(), progress_);
+    if (faces_) faces_->match(source_.description().coordinate_bytes);
     checkRanges(splats_.survey, source_.description(), options_.scalars);
     openWriter();
     const std::vector<BlockOverlap> overlaps = findOverlaps(source_, plan_.slab_bytes, progress_);
@@ -144,8 +149,9 @@ class Conversion {
 
   void scatter() {
     seams_ = std::make_unique<SeamMerger>(options_.scalars.size(), plan_.seam_bytes, workspace_.scratch());
-    splats_.counts =
-        scatterSplats(reader_, root_, plan_.slab_bytes, splats_.tree, *file_, contents_, *seams_, progress_);
+    splats_.counts = scatterSplats(reader_, faces_.get(), root_, plan_.slab_bytes, splats_.tree, *file_,
+                                   contents_, *seams_, progress_);
+    faces_.reset();
   }
 
   void mergeSeams() {
@@ -248,7 +254,8 @@ class Conversion {
   RootCube root_;
   std::vector<CellContents> contents_;  // [node of the tree], while they are being scattered
   std::unique_ptr<BucketFile> file_;
-  std::unique_ptr<SeamMerger> seams_;
+  std::unique_ptr<AbuttingFaces> faces_;  // of cells
+  std::unique_ptr<SeamMerger> seams_;     // of nodes
   std::unique_ptr<CacheWriter> writer_;
   ConvertReport report_;
 };

@@ -76,9 +76,10 @@ void checkExtent(const GridSurvey& survey, const NodeReader& reader) {
 
 }  // namespace
 
-GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, Progress& progress) {
+GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces,
+                      Progress& progress) {
   if (reader.centring() == Centring::cell) {
-    const GridSurvey survey = surveyCells(reader, slab_bytes, progress);
+    const GridSurvey survey = surveyCells(reader, slab_bytes, faces, progress);
     checkExtent(survey, reader);
     return survey;
   }

@@ -28,9 +28,13 @@ struct GridSurvey {
   std::vector<ScalarRange> ranges;  // [scalar]
 };
 
+class AbuttingFaces;
+
 /// Reads all nodes once. Memory: two slabs. Throws Error if no node is there, or if the grid is larger or
-/// smaller than single precision can say.
-GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, Progress& progress);
+/// smaller than single precision can say. Where scalars stand in cells, those at the blocks' ends are added
+/// to `faces`, unless that is null.
+GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces,
+                      Progress& progress);
 
 /// Throws Error if the values of one of the survey's scalars lie further apart than single precision can say
 /// the square of.

@@ -23,12 +23,13 @@ struct Handedness {
 /// Makes splats of slabs.
 class SplatStream {
  public:
-  SplatStream(const NodeReader& reader, const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams,
-              const Progress& progress)
+  SplatStream(const NodeReader& reader, const AbuttingFaces* faces,
+              const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams, const Progress& progress)
       : progress_(&progress),
         blocks_(&reader.source().description().blocks),
         variables_(reader.scalars()),
         centring_(reader.centring()),
+        faces_(faces),
         sink_of_thread_(&sink_of_thread),
         seams_(&seams),
         workers_([this] {
@@ -44,7 +45,7 @@ class SplatStream {
       progress_->throwIfStopped();
       Worker& worker = workers_.local();
       if (centring_ == Centring::cell)
-        computeCellSplats(window, tasks[task], worker.cells, worker.splats);
+        computeCellSplats(window, tasks[task], {slab.block, faces_}, worker.cells, worker.splats);
       else
         computeNodeSplats(window, tasks[task], worker.splats);
       worker.degenerate += worker.splats.degenerate;
@@ -100,6 +101,7 @@ class SplatStream {
   const std::vector<GridBlock>* blocks_;
   const size_t variables_;
   const Centring centring_;
+  const AbuttingFaces* faces_;
   const std::function<SplatSink&()>* sink_of_thread_;
   std::mutex adding_to_seams_;  // guards *seams_
   SeamMerger* seams_;
@@ -149,10 +151,10 @@ void RecordRouter::flush() {
   gathered_.clear();
 }
 
-ScatterCounts streamSplats(const NodeReader& reader, uint64_t slab_bytes,
+ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces, uint64_t slab_bytes,
                            const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams,
                            Progress& progress) {
-  SplatStream splats(reader, sink_of_thread, seams, progress);
+  SplatStream splats(reader, faces, sink_of_thread, seams, progress);
   SlabStream slabs(reader, slab_bytes, reader.centring() == Centring::cell ? kCellHalo : kNodeHalo);
   while (const LoadedSlab* loaded = slabs.next()) {
     splats.add(*loaded);
@@ -162,12 +164,12 @@ ScatterCounts streamSplats(const NodeReader& reader, uint64_t slab_bytes,
   return splats.counts();
 }
 
-ScatterCounts scatterSplats(const NodeReader& reader, const RootCube& root, uint64_t slab_bytes,
-                            const BucketTree& tree, BucketFile& file, std::vector<CellContents>& contents,
-                            SeamMerger& seams, Progress& progress) {
+ScatterCounts scatterSplats(const NodeReader& reader, const AbuttingFaces* faces, const RootCube& root,
+                            uint64_t slab_bytes, const BucketTree& tree, BucketFile& file,
+                            std::vector<CellContents>& contents, SeamMerger& seams, Progress& progress) {
   tbb::enumerable_thread_specific<RecordSink> sinks([&] { return RecordSink(root, tree, file); });
   const ScatterCounts counts = streamSplats(
-      reader, slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, seams, progress);
+      reader, faces, slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, seams, progress);
   for (RecordSink& sink : sinks) sink.finish(contents);
   return counts;
 }

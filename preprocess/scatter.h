@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "preprocess/abutting_faces.h"
 #include "preprocess/bucket_file.h"
 #include "preprocess/bucket_tree.h"
 #include "preprocess/node_reader.h"
@@ -53,15 +54,15 @@ struct ScatterCounts {
 
 /// Makes all splats, of nodes or of cells as the reader's scalars are, in parallel. Those of block faces go
 /// to `seams`, the others to what `sink_of_thread` gives: a sink of the calling thread's own, always the same
-/// one.
-ScatterCounts streamSplats(const NodeReader& reader, uint64_t slab_bytes,
+/// one. Cells end at borders as computeCellSplats() finds them with `faces`, which may be null.
+ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces, uint64_t slab_bytes,
                            const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams,
                            Progress& progress);
 
 /// Routes all splats but those of block faces, which go to `seams`. Adds to `contents` ([node of the tree]).
-ScatterCounts scatterSplats(const NodeReader& reader, const RootCube& root, uint64_t slab_bytes,
-                            const BucketTree& tree, BucketFile& file, std::vector<CellContents>& contents,
-                            SeamMerger& seams, Progress& progress);
+ScatterCounts scatterSplats(const NodeReader& reader, const AbuttingFaces* faces, const RootCube& root,
+                            uint64_t slab_bytes, const BucketTree& tree, BucketFile& file,
+                            std::vector<CellContents>& contents, SeamMerger& seams, Progress& progress);
 
 /// Routes the splats of block faces, merged. Returns how many nodes were merged into another one.
 uint64_t scatterSeams(SeamMerger& seams, int coordinate_bytes, const RootCube& root, const BucketTree& tree,

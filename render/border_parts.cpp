@@ -3,8 +3,6 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "stream/half_cell.h"
-
 namespace curvisplat {
 namespace {
 
@@ -44,7 +42,8 @@ void reshape(SplatPiece& piece, const Cholesky& l) {
 
 }  // namespace
 
-size_t partsAtBorder(const SplatPiece& whole, uint32_t half_cell, BorderPieces& pieces) {
+size_t partsAtBorder(const SplatPiece& whole, uint32_t half_cell, const BorderParts& parts,
+                     BorderPieces& pieces) {
   const InwardAxes inward = inwardAxes(half_cell);
   const size_t count = size_t{1} << inward.count;
   for (size_t n = 0; n < count; ++n) {
@@ -52,7 +51,7 @@ size_t partsAtBorder(const SplatPiece& whole, uint32_t half_cell, BorderPieces& 
     float share = 1;
     float m00 = 1, m10 = 0, m11 = 1, m20 = 0, m21 = 0, m22 = 1;
     for (int a = 0; a < inward.count; ++a) {
-      const BorderPart& part = kBorderParts[n >> a & 1];
+      const BorderPart& part = parts[n >> a & 1];
       const glm::vec3& q = inward.axis[a];
       offset += part.offset * q;
       share *= part.share;

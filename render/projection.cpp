@@ -184,7 +184,8 @@ bool place(const PerspectiveMap& map, const SplatPiece& piece, size_t& looks, co
 template <typename Map>
 std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<const float>& geometry,
                                           const VariableArrays<const float>& variable, size_t i,
-                                          uint32_t half_cell, Chooser& chooser, CutBudget& left) {
+                                          uint32_t half_cell, const BorderParts* borders, Chooser& chooser,
+                                          CutBudget& left) {
   const SplatPiece whole{{geometry.x[i], geometry.y[i], geometry.z[i]},
                          shapeOf(geometry, i),
                          slopeOf(variable, i),
@@ -202,17 +203,17 @@ std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<c
     best = std::max(best, fate);
     return true;
   };
-  BorderPieces parts;
-  const size_t count = partsAtBorder(whole, half_cell, parts);
+  BorderPieces parts{whole};
+  const size_t count = borders ? partsAtBorder(whole, half_cell, *borders, parts) : 1;
   for (size_t n = 0; n < count; ++n)
     if (!place(map, parts[n], left.looks, take)) return {};
   return best;
 }
 
-/// False if the brick would take more than what is `left`, which it counts down. With `crisp` borders half
-/// cells are drawn in parts.
+/// False if the brick would take more than what is `left`, which it counts down. Cells at borders are drawn
+/// in these parts, unless `borders` is null.
 template <typename Map>
-bool projectRange(const Map& map, bool crisp, const LocalBox& clip,
+bool projectRange(const Map& map, const BorderParts* borders, const LocalBox& clip,
                   const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
                   const SplatRange& range, Chooser& chooser, CutBudget& left, ProjectionCounts& counts) {
   Block block;
@@ -225,9 +226,9 @@ bool projectRange(const Map& map, bool crisp, const LocalBox& clip,
         continue;
       }
       Chooser::Fate fate;
-      const uint32_t half_cell = crisp ? geometry.half_cell[begin + n] : kWholeCell;
+      const uint32_t half_cell = borders ? geometry.half_cell[begin + n] : kWholeCell;
       if (block.too_wide[n] || half_cell != kWholeCell) {
-        const auto best = choosePieces(map, geometry, variable, begin + n, half_cell, chooser, left);
+        const auto best = choosePieces(map, geometry, variable, begin + n, half_cell, borders, chooser, left);
         if (!best) return false;
         fate = *best;
       } else {
@@ -245,12 +246,12 @@ bool projectRange(const Map& map, bool crisp, const LocalBox& clip,
 }
 
 template <typename Map>
-bool projectWith(const Map& map, bool crisp, const LocalBox& clip,
+bool projectWith(const Map& map, const BorderParts* borders, const LocalBox& clip,
                  const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
                  std::span<const SplatRange> ranges, Chooser& chooser, ProjectionCounts& counts) {
   CutBudget left;
   return std::all_of(ranges.begin(), ranges.end(), [&](const SplatRange& range) {
-    return projectRange(map, crisp, clip, geometry, variable, range, chooser, left, counts);
+    return projectRange(map, borders, clip, geometry, variable, range, chooser, left, counts);
   });
 }
 
@@ -293,11 +294,11 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
     splats_.clear();
     depths_.clear();
     counts_ = {};
-    const bool crisp = coarseness == 1;
+    const BorderParts* const borders = coarseness == 1 ? &settings.border_parts : nullptr;
     complete = settings.view.projection == Projection::orthographic
-                   ? projectWith(OrthographicMap(settings.view, cell_min), crisp, clip, geometry, variable,
+                   ? projectWith(OrthographicMap(settings.view, cell_min), borders, clip, geometry, variable,
                                  ranges, chooser, counts_)
-                   : projectWith(PerspectiveMap(settings.view, cell_min, coarseness), crisp, clip, geometry,
+                   : projectWith(PerspectiveMap(settings.view, cell_min, coarseness), borders, clip, geometry,
                                  variable, ranges, chooser, counts_);
   }
   for (const SplatRange& range : ranges) counts_.read += range.size();

@@ -18,6 +18,7 @@
 #include "render/classification.h"
 #include "render/screen_view.h"
 #include "stream/brick.h"
+#include "stream/half_cell.h"
 #include "stream/splats.h"
 
 namespace curvisplat {
@@ -56,14 +57,15 @@ struct ProjectionSettings {
   ScreenView view;
   bool per_pixel = true;  // false: flat splats; slopes and widths are left out
   std::optional<WorldBox> clip_box = std::nullopt;
+  BorderParts border_parts = kHalfCellParts;  // kWholeCellParts where the data is cell-centred
 };
 
 /// Projects bricks. One thread each.
 class BrickProjector {
  public:
   /// A brick gives at most kMaxBrickSplats splats plus this many pieces; where borders and perspective would
-  /// make more, half cells are drawn whole, and perspective cuts coarser and drops more of what is close to
-  /// the eye.
+  /// make more, borders are not drawn in parts, and perspective cuts coarser and drops more of what is close
+  /// to the eye.
   static constexpr size_t kMostPieces = 65536;
   static constexpr size_t kMostSplats = kMaxBrickSplats + kMostPieces;
 
@@ -71,8 +73,8 @@ class BrickProjector {
   BrickProjector();
 
   /// Projects the splats of a brick that `ranges` hold; `cell_min` is the minimum corner of its cell. Leaves
-  /// out what cannot be seen. Half cells are drawn in parts (border_parts.h). Splats that reach behind the
-  /// near plane or span a wide angle are cut along their longest column into two that merge into them
+  /// out what cannot be seen. Cells at borders are drawn in parts (border_parts.h). Splats that reach behind
+  /// the near plane or span a wide angle are cut along their longest column into two that merge into them
   /// exactly, until they are small for their distance; what then lies before the near plane is dropped.
   /// Overwrites splats() and depths(). Pure.
   void project(const ProjectionSettings& settings, const ClassificationTable& table,

@@ -16,7 +16,7 @@
 namespace curvisplat {
 namespace {
 
-enum Flags : uint8_t { kPerspective = 1, kFlat = 2, kClip = 4 };
+enum Flags : uint8_t { kPerspective = 1, kFlat = 2, kClip = 4, kCells = 8 };
 
 constexpr float kLargest = std::numeric_limits<float>::max();
 
@@ -68,6 +68,7 @@ void run(std::span<const std::byte> bytes) {
       Camera::named("iso", scale * corner, scale * (corner + size), pixels,
                     flags & kPerspective ? Projection::perspective : Projection::orthographic);
   ProjectionSettings settings{ScreenView::of(camera, pixels, scale, kLowPass, 1e-4 * size), !(flags & kFlat)};
+  if (flags & kCells) settings.border_parts = kWholeCellParts;
   if (flags & kClip) settings.clip_box = WorldBox{corner, corner + 0.5 * size};
 
   static BrickProjector projector;

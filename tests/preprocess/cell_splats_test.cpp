@@ -6,10 +6,13 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <random>
+#include <vector>
 
 #include "preprocess/hexahedron.h"
 #include "preprocess/node_reader.h"
+#include "stream/half_cell.h"
 #include "tests/support/mapped_block.h"
+#include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
 namespace {
@@ -41,11 +44,11 @@ struct CellBlock : MappedBlock {
       for (const auto& values : nodes.scalars) nodes.blank[n] |= std::isnan(values[n]) ? kNoValue : 0;
   }
 
-  NodeSplats cellSplats() {
+  NodeSplats cellSplats(const BlockEnds& ends = {}) {
     mark();
     NodeSplats out;
     CellScratch scratch;
-    computeCellSplats(window(), {0, block.nj, 0, block.nk}, scratch, out);
+    computeCellSplats(window(), {0, block.nj, 0, block.nk}, ends, scratch, out);
     return out;
   }
 };
@@ -118,6 +121,48 @@ TEST(CellSplats, OfAnAffineGridAreItsCells) {
       for (int column = 0; column < 3; ++column) EXPECT_LT(glm::length(difference[column]), 1e-11);
     }
   }
+}
+
+TEST(CellSplats, EndAtBordersButNotWhereBlocksAbut) {
+  const glm::dmat3 jacobian(2, 0.3, 0, -0.4, 1, 0.2, 0.1, 0, 3);
+  CellBlock grid(4, 4, 4, [&](double i, double j, double k) { return jacobian * glm::dvec3(i, j, k); });
+  grid.addCellScalar([](const glm::dvec3& p) { return p.x; });
+  grid.nodes.scalars[0][grid.at(1, 1, 1)] = NAN;  // the cell in the middle
+  // Beyond the upper end of i there is another block.
+  GridBlock other = grid.block;
+  other.ni = 2;
+  const TemporaryFolder folder;
+  AbuttingFaces faces(std::vector{grid.block, other}, 1 << 20, folder.path());
+  for (uint64_t k = 0; k < 3; ++k)
+    for (uint64_t j = 0; j < 3; ++j)
+      for (const size_t block : {0u, 1u}) {
+        std::array<glm::dvec3, 8> corners;
+        for (size_t c = 0; c < 8; ++c)
+          corners[c] = jacobian * glm::dvec3((block == 0 ? 2 : 3) + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
+        faces.add({block, {block == 0 ? 2u : 0u, j, k}, 0, block == 0}, corners);
+      }
+  faces.match(8);
+
+  const NodeSplats out = grid.cellSplats({0, &faces});
+  ASSERT_EQ(out.splats.size(), 26u);
+  for (const NodeSplat& splat : out.splats) {
+    const uint64_t i = splat.node % 4, j = splat.node / 4 % 4, k = splat.node / 16;
+    std::vector<glm::dvec3> expected;  // inwards
+    const auto beside = [](uint64_t a, uint64_t b, uint64_t c) { return a != 1 && b == 1 && c == 1; };
+    if (i == 0) expected.push_back(jacobian[0]);
+    if (beside(i, j, k) && i == 2) expected.push_back(jacobian[0]);
+    if (beside(i, j, k) && i == 0) expected.pop_back();  // it ends on both sides
+    if (j != 1 && !beside(j, i, k)) expected.push_back(j == 0 ? jacobian[1] : -jacobian[1]);
+    if (k != 1 && !beside(k, i, j)) expected.push_back(k == 0 ? jacobian[2] : -jacobian[2]);
+    const InwardAxes found = inwardAxes(splat.half_cell);
+    ASSERT_EQ(found.count, static_cast<int>(expected.size())) << i << j << k;
+    for (int n = 0; n < found.count; ++n)
+      EXPECT_LT(glm::distance(splat.splat.factor() * glm::dvec3(found.axis[static_cast<size_t>(n)]),
+                              expected[static_cast<size_t>(n)]),
+                0.03 * glm::length(expected[static_cast<size_t>(n)]))
+          << i << j << k;
+  }
+  for (const NodeSplat& splat : grid.cellSplats().splats) EXPECT_EQ(splat.half_cell, kWholeCell);
 }
 
 TEST(CellSplats, OfAnyGridSumToItsHexahedra) {
@@ -207,7 +252,7 @@ TEST(CellSplats, OfWindowsAreThoseOfTheWhole) {
           }
       NodeSplats part;
       CellScratch scratch;
-      computeCellSplats({grid.block, 0, window, &nodes}, box, scratch, part);
+      computeCellSplats({grid.block, 0, window, &nodes}, box, {}, scratch, part);
       for (size_t m = 0; m < part.splats.size(); ++m) {
         size_t same = 0;
         while (same < whole.splats.size() && whole.splats[same].node != part.splats[m].node) ++same;

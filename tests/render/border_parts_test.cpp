@@ -27,7 +27,7 @@ const glm::dvec3 kInward[] = {glm::normalize(glm::dvec3(1, 2, -1)), glm::normali
 
 TEST(BorderParts, OfAWholeCellAreItself) {
   BorderPieces pieces;
-  ASSERT_EQ(partsAtBorder(kWhole, kWholeCell, pieces), 1u);
+  ASSERT_EQ(partsAtBorder(kWhole, kWholeCell, kHalfCellParts, pieces), 1u);
   EXPECT_EQ(pieces[0].position, kWhole.position);
   EXPECT_EQ(factorOf(pieces[0].shape), factorOf(kWhole.shape));
   EXPECT_EQ(pieces[0].weight, kWhole.weight);
@@ -37,16 +37,17 @@ TEST(BorderParts, OfAWholeCellAreItself) {
 TEST(BorderParts, AreStretchedAndShiftedAlongTheInwardAxesOnly) {
   const glm::dmat3 a = factorOf(kWhole.shape);
   for (size_t axes = 1; axes <= 3; ++axes) {
+    const BorderParts& parts = axes == 2 ? kWholeCellParts : kHalfCellParts;
     const uint32_t code = packHalfCell({kInward, axes});
     const InwardAxes inward = inwardAxes(code);
     BorderPieces pieces;
-    ASSERT_EQ(partsAtBorder(kWhole, code, pieces), size_t{1} << axes);
+    ASSERT_EQ(partsAtBorder(kWhole, code, parts, pieces), size_t{1} << axes);
     double weight = 0;
     for (size_t n = 0; n < size_t{1} << axes; ++n) {
       glm::dmat3 m(1.0);
       glm::dvec3 offset(0.0);
       for (size_t axis = 0; axis < axes; ++axis) {
-        const BorderPart& part = kBorderParts[n >> axis & 1];
+        const BorderPart& part = parts[n >> axis & 1];
         const glm::dvec3 q(inward.axis[axis]);
         m += (double{part.size} * part.size - 1) * glm::outerProduct(q, q);
         offset += double{part.offset} * q;
@@ -67,7 +68,7 @@ TEST(BorderParts, CarryTheSameLinearField) {
   // The gradient is A⁻ᵀ w, whatever A.
   const glm::dvec3 gradient = glm::inverse(glm::transpose(factorOf(kWhole.shape))) * vectorOf(kWhole.slope);
   BorderPieces pieces;
-  const size_t count = partsAtBorder(kWhole, packHalfCell({kInward, 3}), pieces);
+  const size_t count = partsAtBorder(kWhole, packHalfCell({kInward, 3}), kHalfCellParts, pieces);
   for (size_t n = 0; n < count; ++n) {
     const SplatPiece& piece = pieces[n];
     const glm::dvec3 found = glm::inverse(glm::transpose(factorOf(piece.shape))) * vectorOf(piece.slope);

@@ -70,13 +70,15 @@ TEST(HalfCell, OfAnyBytesHasFiniteUnitAxes) {
 }
 
 TEST(HalfCell, ItsPartsHaveItsWeight) {
-  float sum = 0;
-  for (const BorderPart& part : kBorderParts) {
-    sum += part.share;
-    EXPECT_LE(std::sqrt(3.0f) * part.offset, kBorderReach);
-    EXPECT_LE(part.size, 1);
+  for (const BorderParts& parts : {kHalfCellParts, kWholeCellParts}) {
+    float sum = 0;
+    for (const BorderPart& part : parts) {
+      sum += part.share;
+      EXPECT_LE(std::sqrt(3.0f) * part.offset, kBorderReach);
+      EXPECT_LE(part.size, 1);
+    }
+    EXPECT_FLOAT_EQ(sum, 1);
   }
-  EXPECT_FLOAT_EQ(sum, 1);
 }
 
 }  // namespace

@@ -1,0 +1,122 @@
+#include "preprocess/abutting_faces.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "tests/support/function_grid.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+/// A block of cells (i, j, k) -> world, with lattice points of real numbers.
+struct Cells {
+  std::array<uint64_t, 3> count;
+  std::function<glm::dvec3(double i, double j, double k)> at;
+  std::function<bool(const std::array<uint64_t, 3>&)> is_there = [](const auto&) { return true; };
+};
+
+constexpr int kFloat = 4;
+
+/// The faces at blocks' ends that abut, as "block i j k axis+-".
+std::vector<std::string> abuttingOf(const std::vector<Cells>& blocks) {
+  std::vector<GridBlock> grid;
+  for (const Cells& block : blocks)
+    grid.push_back(gridBlock(block.count[0] + 1, block.count[1] + 1, block.count[2] + 1));
+  const TemporaryFolder folder;
+  AbuttingFaces faces(grid, 1 << 20, folder.path());
+  const auto for_each = [&](const auto& visit) {
+    for (size_t block = 0; block < blocks.size(); ++block)
+      for (uint64_t k = 0; k < blocks[block].count[2]; ++k)
+        for (uint64_t j = 0; j < blocks[block].count[1]; ++j)
+          for (uint64_t i = 0; i < blocks[block].count[0]; ++i)
+            for (int axis = 0; axis < 3; ++axis)
+              for (const bool upper : {false, true})
+                if (const CellFace face{block, {i, j, k}, axis, upper}; faces.isAtEnd(face)) visit(face);
+  };
+  for_each([&](const CellFace& face) {
+    const Cells& block = blocks[face.block];
+    if (!block.is_there(face.cell)) return;
+    std::array<glm::dvec3, 8> corners;
+    for (size_t n = 0; n < 8; ++n)
+      corners[n] = block.at(static_cast<double>(face.cell[0] + (n & 1)),
+                            static_cast<double>(face.cell[1] + (n >> 1 & 1)),
+                            static_cast<double>(face.cell[2] + (n >> 2)));
+    faces.add(face, corners);
+  });
+  faces.match(kFloat);
+  std::vector<std::string> abutting;
+  for_each([&](const CellFace& face) {
+    if (faces.abuts(face))
+      abutting.push_back(fmt::format("{} {} {} {} {}{}", face.block, face.cell[0], face.cell[1], face.cell[2],
+                                     "ijk"[face.axis], face.upper ? '+' : '-'));
+  });
+  return abutting;
+}
+
+glm::dvec3 box(double i, double j, double k) {
+  return {i, 0.1 * j, 3 * k};
+}
+
+TEST(AbuttingFaces, OfOneBlockAreNone) {
+  EXPECT_EQ(abuttingOf({{{3, 4, 2}, box}}), std::vector<std::string>{});
+  EXPECT_EQ(abuttingOf({{{1, 1, 1}, box}}), std::vector<std::string>{});
+  // A cell a million times thinner than wide is no other cell's neighbour through itself.
+  EXPECT_EQ(
+      abuttingOf({{{3, 1, 2}, [](double i, double j, double k) { return glm::dvec3(i, 1e-6 * j, k); }}}),
+      std::vector<std::string>{});
+}
+
+TEST(AbuttingFaces, AreFoundHoweverTheBlocksAreTurned) {
+  // The second block's j goes down the first one's k, its k along the first one's j, at the first one's i
+  // = 2.
+  const Cells first{{2, 3, 2}, box};
+  const Cells second{{4, 2, 3}, [](double i, double j, double k) { return box(2 + 0.3 * i, k, 2 - j); }};
+  EXPECT_EQ(abuttingOf({first, second}),
+            (std::vector<std::string>{"0 1 0 0 i+", "0 1 1 0 i+", "0 1 2 0 i+", "0 1 0 1 i+", "0 1 1 1 i+",
+                                      "0 1 2 1 i+", "1 0 0 0 i-", "1 0 1 0 i-", "1 0 0 1 i-", "1 0 1 1 i-",
+                                      "1 0 0 2 i-", "1 0 1 2 i-"}));
+}
+
+TEST(AbuttingFaces, AreThoseOfCellsThatAreThere) {
+  const Cells first{{2, 1, 2}, box};
+  const Cells second{{1, 1, 2},
+                     [](double i, double j, double k) { return box(2 + i, j, k); },
+                     [](const std::array<uint64_t, 3>& cell) { return cell[2] == 1; }};
+  EXPECT_EQ(abuttingOf({first, second}), (std::vector<std::string>{"0 1 0 1 i+", "1 0 0 1 i-"}));
+}
+
+TEST(AbuttingFaces, CoincideAsSeamsDo) {
+  const Cells first{{1, 1, 1}, box};
+  for (const double gap : {0.0, 1e-7, 1e-2}) {  // the least width is 0.1
+    const Cells second{{1, 1, 1}, [=](double i, double j, double k) { return box(1 + gap + i, j, k); }};
+    EXPECT_EQ(abuttingOf({first, second}).size(), gap < 1e-3 ? 2u : 0u) << gap;
+  }
+  // Another block's cells are half as large.
+  const Cells finer{{1, 2, 1}, [](double i, double j, double k) { return box(1 + i, 0.5 * j, k); }};
+  EXPECT_EQ(abuttingOf({first, finer}), std::vector<std::string>{});
+}
+
+TEST(AbuttingFaces, OfARingAreItsOwn) {
+  const auto around = [](double i, double j, double k) {
+    const double angle = 2 * std::numbers::pi * i / 8;
+    return glm::dvec3(j * std::cos(angle), j * std::sin(angle), k);
+  };
+  // From the axis: the cells' inner faces are edges there.
+  EXPECT_EQ(abuttingOf({{{8, 1, 1}, around}}),
+            (std::vector<std::string>{"0 0 0 0 i-", "0 0 0 0 j-", "0 1 0 0 j-", "0 2 0 0 j-", "0 3 0 0 j-",
+                                      "0 4 0 0 j-", "0 5 0 0 j-", "0 6 0 0 j-", "0 7 0 0 i+", "0 7 0 0 j-"}));
+  const auto wide = [&](double i, double j, double k) { return around(i, 1 + j, k); };
+  EXPECT_EQ(abuttingOf({{{8, 2, 1}, wide}}),
+            (std::vector<std::string>{"0 0 0 0 i-", "0 7 0 0 i+", "0 0 1 0 i-", "0 7 1 0 i+"}));
+}
+
+}  // namespace
+}  // namespace curvisplat
