@@ -2,40 +2,54 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <limits>
 
+#include "preprocess/seam_sorter.h"
 #include "stream/error.h"
 
 namespace curvisplat {
 namespace {
 
-/// The mean of the corners whose bits under `mask` are `bits`.
+std::array<uint64_t, 3> cellsOf(const GridBlock& block) {
+  const auto along = [](uint64_t nodes) { return std::max<uint64_t>(nodes, 1) - 1; };
+  return {along(block.ni), along(block.nj), along(block.nk)};
+}
+
+uint64_t facesOf(const std::array<uint64_t, 3>& cells) {
+  return 2 * (cells[1] * cells[2] + cells[0] * cells[2] + cells[0] * cells[1]);
+}
+
+/// The mean of the corners whose bits under `mask` are those of `bits`.
 glm::dvec3 middle(const std::array<glm::dvec3, 8>& corners, size_t mask, size_t bits) {
   glm::dvec3 sum(0.0);
   int count = 0;
   for (size_t n = 0; n < 8; ++n)
-    if ((n & mask) == bits) sum += corners[n], ++count;
+    if (((n ^ bits) & mask) == 0) sum += corners[n], ++count;
   return sum / static_cast<double>(count);
 }
 
 }  // namespace
 
-AbuttingFaces::AbuttingFaces(std::span<const GridBlock> blocks, uint64_t memory_bytes,
+AbuttingFaces::Needs AbuttingFaces::needsOf(std::span<const GridBlock> blocks) {
+  uint64_t faces = 0;
+  for (const GridBlock& block : blocks) faces += facesOf(cellsOf(block));
+  return {faces / 8, faces * SeamSorter::recordBytes(0)};
+}
+
+AbuttingFaces::AbuttingFaces(std::span<const GridBlock> blocks, int coordinate_bytes, uint64_t memory_bytes,
                              std::filesystem::path temporary_folder)
-    : centres_(0, memory_bytes, std::move(temporary_folder)) {
+    : coordinate_bytes_(coordinate_bytes), centres_(0, memory_bytes, std::move(temporary_folder)) {
   uint64_t faces = 0;
   for (const GridBlock& block : blocks) {
-    const std::array<uint64_t, 3> cells{std::max<uint64_t>(block.ni, 1) - 1,
-                                        std::max<uint64_t>(block.nj, 1) - 1,
-                                        std::max<uint64_t>(block.nk, 1) - 1};
-    blocks_.push_back({cells, faces});
-    faces += 2 * (cells[1] * cells[2] + cells[0] * cells[2] + cells[0] * cells[1]);
+    blocks_.push_back({cellsOf(block), faces});
+    faces += facesOf(blocks_.back().cells);
   }
   abutting_.resize(faces);
 }
 
 bool AbuttingFaces::isAtEnd(const CellFace& face) const {
-  const size_t axis = static_cast<size_t>(face.axis);
+  const auto axis = static_cast<size_t>(face.axis);
   return face.cell[axis] == (face.upper ? blocks_[face.block].cells[axis] - 1 : 0);
 }
 
@@ -43,7 +57,7 @@ uint64_t AbuttingFaces::numberOf(const CellFace& face) const {
   const auto& [cells, first_face] = blocks_[face.block];
   uint64_t number = first_face;
   for (int axis = 0; axis <= face.axis; ++axis) {
-    const int b = axis == 0 ? 1 : 0, c = axis == 2 ? 1 : 2;
+    const size_t b = axis == 0 ? 1 : 0, c = axis == 2 ? 1 : 2;
     const uint64_t a_side = cells[b] * cells[c];
     if (axis < face.axis)
       number += 2 * a_side;
@@ -53,27 +67,45 @@ uint64_t AbuttingFaces::numberOf(const CellFace& face) const {
   return number;
 }
 
-void AbuttingFaces::add(const CellFace& face, const std::array<glm::dvec3, 8>& corners) {
+AbuttingFaces::Centre AbuttingFaces::centreOf(const CellFace& face,
+                                              const std::array<glm::dvec3, 8>& corners) const {
   CURVISPLAT_CHECK(isAtEnd(face));
   const size_t bit = size_t{1} << face.axis, side = face.upper ? bit : 0;
-  NodeSplat centre;
-  centre.node = numberOf(face);
-  centre.on_block_face = true;
-  centre.node_position = centre.splat.position = middle(corners, bit, side);
-  centre.splat.weight = 1;
-  // How far it is to the centre of another face, at least: across this one, or through the cell.
-  double spacing = std::numeric_limits<double>::infinity();
-  for (size_t other = 1; other < 8; other <<= 1) {
-    const size_t mask = other == bit ? bit : bit | other;
-    const double width = glm::distance(middle(corners, mask, side), middle(corners, mask, side ^ other));
-    if (width > 0) spacing = std::min(spacing, width);
+  Centre centre;
+  centre.face = numberOf(face);
+  centre.at = middle(corners, bit, side);
+  const double rounding = coordinateRounding(centre.at, coordinate_bytes_);
+  // It is as far to the centre of another face as across this one, or through the cell.
+  centre.spacing = std::numeric_limits<double>::infinity();
+  for (const size_t other : {1u, 2u, 4u}) {
+    const double width =
+        glm::distance(middle(corners, bit | other, side), middle(corners, bit | other, side ^ other));
+    if (other != bit && !(width > rounding)) centre.collapsed = true;
+    if (width > 0) centre.spacing = std::min(centre.spacing, width);
   }
-  centre.spacing = std::isfinite(spacing) ? spacing : 0;
-  centres_.add(centre, {});
+  if (!std::isfinite(centre.spacing)) centre.spacing = 0;
+  return centre;
 }
 
-void AbuttingFaces::match(int coordinate_bytes) {
-  centres_.forEachSet(coordinate_bytes, [&](std::span<const uint64_t> faces) {
+void AbuttingFaces::add(std::span<const Centre> centres) {
+  for (const Centre& centre : centres) {
+    if (centre.collapsed) {
+      abutting_[centre.face] = true;
+      continue;
+    }
+    NodeSplat splat;
+    splat.node = centre.face;
+    splat.on_block_face = true;
+    splat.node_position = splat.splat.position = centre.at;
+    splat.splat.weight = 1;
+    splat.spacing = centre.spacing;
+    centres_.add(splat, {});
+  }
+}
+
+void AbuttingFaces::match(const Progress& progress) {
+  centres_.forEachSet(coordinate_bytes_, [&](std::span<const uint64_t> faces) {
+    progress.throwIfStopped();
     for (const uint64_t face : faces) abutting_[face] = true;
   });
 }

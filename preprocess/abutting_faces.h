@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "preprocess/grid_source.h"
-#include "preprocess/hexahedron.h"
 #include "preprocess/seams.h"
+#include "stream/progress.h"
 
 namespace curvisplat {
 
@@ -23,22 +23,41 @@ struct CellFace {
   bool upper = false;
 };
 
-/// Two faces abut if their centres coincide, by SeamMerger's measure of what coincides: that blocks share
-/// their nodes is taken for granted. A face that has collapsed to an edge (an axis) or a point abuts on those
-/// around it. Memory: a bit a face at the blocks' ends, and the sorter's while they are being added.
+/// Two faces at blocks' ends abut if their centres coincide, by SeamMerger's measure of what coincides; on
+/// which sides of them the cells lie is not asked. One that has collapsed to an edge (at an axis) or to a
+/// point is no border either. What abuts otherwise is not found: faces of other sizes, and those beside cells
+/// that are not there though another block has them.
 class AbuttingFaces {
  public:
-  /// As for SeamMerger.
-  AbuttingFaces(std::span<const GridBlock> blocks, uint64_t memory_bytes,
+  /// What a grid's faces at blocks' ends take.
+  struct Needs {
+    uint64_t memory_bytes = 0;  // as long as it lives
+    uint64_t disk_bytes = 0;    // until match() returns, at the most
+  };
+  static Needs needsOf(std::span<const GridBlock> blocks);
+
+  /// Sorts in `memory_bytes`, as SeamMerger does, beside its Needs. `coordinate_bytes`: of the grid's, as
+  /// stored.
+  AbuttingFaces(std::span<const GridBlock> blocks, int coordinate_bytes, uint64_t memory_bytes,
                 std::filesystem::path temporary_folder);
 
-  /// Whether the face is one at the end of its block.
+  /// Whether the face is one at the end of its block. Any thread.
   bool isAtEnd(const CellFace& face) const;
-  /// A face at its block's end, of a cell that is there. One thread at a time. Throws Error if the disk
-  /// fails.
-  void add(const CellFace& face, const std::array<glm::dvec3, 8>& corners);
-  /// After the last add(): finds those that abut. Throws Error if the disk fails.
-  void match(int coordinate_bytes);
+
+  struct Centre {
+    uint64_t face = 0;  // its number
+    glm::dvec3 at{0.0};
+    double spacing = 0;  // to other faces' centres, at least
+    bool collapsed = false;
+  };
+  /// Of a face at its block's end; `corners` of its cell, as Hexahedron takes them. Any thread.
+  Centre centreOf(const CellFace& face, const std::array<glm::dvec3, 8>& corners) const;
+
+  /// Of cells that are there. One thread at a time. Throws Error if the disk fails.
+  void add(std::span<const Centre> centres);
+  /// After the last add(): finds those that abut. Throws Error if the disk fails, Interrupted if a stop is
+  /// asked for.
+  void match(const Progress& progress);
   /// Of a face at its block's end, after match(). Any thread.
   bool abuts(const CellFace& face) const { return abutting_[numberOf(face)]; }
 
@@ -50,6 +69,7 @@ class AbuttingFaces {
     uint64_t first_face;
   };
   std::vector<Block> blocks_;
+  int coordinate_bytes_;
   SeamMerger centres_;
   std::vector<bool> abutting_;  // [face at a block's end]
 };

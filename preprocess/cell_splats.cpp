@@ -53,7 +53,7 @@ class Cells {
   size_t cellAt(uint64_t i, uint64_t j, uint64_t k) const {
     return ((k - known_.k0) * (known_.j1 - known_.j0) + (j - known_.j0)) * cells_i_ + i;
   }
-  /// For a side on which the block has no cell.
+  /// For a side on which the block has no neighbour.
   bool isBorder(const std::array<uint64_t, 3>& cell, int axis, bool upper) const {
     if (!ends_.faces) return false;
     const CellFace face{ends_.block, cell, axis, upper};
@@ -173,7 +173,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
       along[axis] = inwards[axis];
       axes[count++] = rotate(along);
     }
-    splat.half_cell = count > 0 ? packHalfCell({axes.data(), count}) : kWholeCell;
+    splat.half_cell = count > 0 ? packHalfCell({axes.data(), count}) : kNoBorder;
   };
   // Axes that have the volume of the hexahedron, where they are near it; a weight of its own elsewhere.
   const auto set_volume = [&](double determinant) {

@@ -69,26 +69,27 @@ GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFa
   SlabStream slabs(reader, slab_bytes, kCorners);
   while (const LoadedSlab* loaded = slabs.next()) {
     const Slab& slab = loaded->slab;
+    const NodeArrays& nodes = loaded->nodes;
     const GridBlock& block = reader.source().description().blocks[slab.block];
     const size_t plane_stride = block.ni * (slab.window.j1 - slab.window.j0);
     const uint64_t rows = slab.box.j1 - slab.box.j0;
-    const auto add_faces = [&](const std::array<uint64_t, 3>& cell, size_t at) {
+    const auto add_ends = [&](const std::array<uint64_t, 3>& cell, size_t at,
+                              std::vector<AbuttingFaces::Centre>& ends) {
       for (int axis = 0; axis < 3; ++axis)
-        for (const bool upper : {false, true}) {
-          const CellFace face{slab.block, cell, axis, upper};
-          if (!faces->isAtEnd(face)) continue;
-          const std::lock_guard lock(adding_faces);
-          faces->add(face, cornersAt(loaded->nodes.x.data(), loaded->nodes.y.data(), loaded->nodes.z.data(),
-                                     at, block.ni, plane_stride));
-        }
+        for (const bool upper : {false, true})
+          if (const CellFace face{slab.block, cell, axis, upper}; faces->isAtEnd(face))
+            ends.push_back(faces->centreOf(
+                face, cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at, block.ni, plane_stride)));
     };
-    const auto add_row = [&](size_t row, GridSurvey& to) {
+    const auto add_row = [&](size_t row, GridSurvey& to, std::vector<AbuttingFaces::Centre>& ends) {
       const uint64_t j = slab.box.j0 + row % rows, k = slab.box.k0 + row / rows;
       if (j + 1 == block.nj || k + 1 == block.nk) return;
       const size_t first = (k - slab.window.k0) * plane_stride + (j - slab.window.j0) * block.ni;
+      const bool row_at_end = j == 0 || j + 2 == block.nj || k == 0 || k + 2 == block.nk;
       for (uint64_t i = 0; i + 1 < block.ni; ++i) {
-        const bool is_there = addCell(loaded->nodes, first + i, block.ni, plane_stride, to);
-        if (is_there && faces) add_faces({i, j, k}, first + i);
+        const bool is_there = addCell(nodes, first + i, block.ni, plane_stride, to);
+        const bool at_end = row_at_end || i == 0 || i + 2 == block.ni;
+        if (faces && is_there && at_end) add_ends({i, j, k}, first + i, ends);
       }
     };
     // Counts, the smallest and the largest do not depend on how the work is divided.
@@ -97,7 +98,12 @@ GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFa
                tbb::parallel_reduce(
                    tbb::blocked_range<size_t>(0, rowsOf(slab.box), kNodesPerTask / block.ni + 1), nothing,
                    [&](const tbb::blocked_range<size_t>& range, GridSurvey of_range) {
-                     for (size_t row = range.begin(); row < range.end(); ++row) add_row(row, of_range);
+                     std::vector<AbuttingFaces::Centre> ends;
+                     for (size_t row = range.begin(); row < range.end(); ++row) add_row(row, of_range, ends);
+                     if (!ends.empty()) {
+                       const std::lock_guard lock(adding_faces);
+                       faces->add(ends);
+                     }
                      return of_range;
                    },
                    united));

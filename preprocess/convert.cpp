@@ -127,11 +127,9 @@ class Conversion {
   }
 
   void scan() {
-    if (reader_.centring() == Centring::cell)
-      faces_ = std::make_unique<AbuttingFaces>(source_.description().blocks, plan_.seam_bytes,
-                                               workspace_.scratch());
+    if (reader_.centring() == Centring::cell) openFaces();
     splats_.survey = surveyGrid(reader_, plan_.slab_bytes, faces_.get(), progress_);
-    if (faces_) faces_->match(source_.description().coordinate_bytes);
+    if (faces_) faces_->match(progress_);
     checkRanges(splats_.survey, source_.description(), options_.scalars);
     openWriter();
     const std::vector<BlockOverlap> overlaps = findOverlaps(source_, plan_.slab_bytes, progress_);
@@ -191,9 +189,28 @@ class Conversion {
 
   void checkRoom() const {
     DiskNeeds needs = diskNeeds(nodes_, options_.scalars.size());
-    if (workspace_.splats()) needs.temporary_bytes = 0;
+    if (workspace_.splats())
+      needs.temporary_bytes = 0;
+    else if (reader_.centring() == Centring::cell)
+      needs.temporary_bytes = std::max(needs.temporary_bytes, needsOfFaces().disk_bytes);
     needs.cache_bytes -= std::min(needs.cache_bytes, workspace_.bytesInPartial());
     checkDiskSpace(needs, options_.output, temporaryFolder(options_));
+  }
+
+  AbuttingFaces::Needs needsOfFaces() const {
+    const AbuttingFaces::Needs needs = AbuttingFaces::needsOf(source_.description().blocks);
+    if (2 * needs.memory_bytes > plan_.seam_bytes)
+      throw Error("--memory: the ends of so many blocks of cells take {} MiB; give at least {} MiB",
+                  (needs.memory_bytes >> 20) + 1,
+                  (MemoryPlan::capForSeams(2 * needs.memory_bytes) >> 20) + 1);
+    return needs;
+  }
+
+  void openFaces() {
+    const GridDescription& grid = source_.description();
+    faces_ =
+        std::make_unique<AbuttingFaces>(grid.blocks, grid.coordinate_bytes,
+                                        plan_.seam_bytes - needsOfFaces().memory_bytes, workspace_.scratch());
   }
 
   /// Needs the survey.

@@ -19,6 +19,7 @@ constexpr uint64_t kMiB = uint64_t{1} << 20;
 // back.
 constexpr uint64_t kProgramBytes = 64 * kMiB;
 constexpr uint64_t kAllocatorShare = 16;
+constexpr uint64_t kSeamShare = 8;  // of the rest
 // Buckets are built from at least so many splats: some bricks at a time for each thread to work on.
 constexpr uint64_t kLeastBucketSplats = 4 * kMaxBrickSplats;
 constexpr uint64_t kLeastChunkBytes = kMiB / 8, kMostChunkBytes = kMiB;
@@ -60,7 +61,7 @@ MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads
   plan.cap_bytes = cap_bytes;
   plan.slab_bytes = std::min(bytes / 8, 256 * kMiB);
   plan.counting_bytes = bytes / 8;
-  plan.seam_bytes = bytes / 8;
+  plan.seam_bytes = bytes / kSeamShare;
 
   plan.chunk_buffer_bytes = bytes / 4;
   plan.most_buckets =
@@ -81,6 +82,11 @@ MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads
 MemoryPlan MemoryPlan::ofOptions(uint64_t cap_bytes, size_t variables, unsigned threads) {
   return of(cap_bytes > 0 ? cap_bytes : defaultMemory(), variables,
             threads > 0 ? threads : static_cast<unsigned>(tbb::info::default_concurrency()));
+}
+
+uint64_t MemoryPlan::capForSeams(uint64_t seam_bytes) {
+  const uint64_t exact = seam_bytes * kSeamShare + kProgramBytes;
+  return exact + exact / (kAllocatorShare - 1) + kAllocatorShare;
 }
 
 void MemoryPlan::limitBuckets(uint64_t splats, size_t variables) {

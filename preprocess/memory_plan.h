@@ -1,7 +1,8 @@
 // How conversion splits the bytes it is given among what it keeps in memory. The passes follow one another,
 // so each may have nearly all; what lives through several (the program itself) comes off first.
 //
-//    scan, count   2 slabs | counting grid
+//    scan          2 slabs | seams: faces of cells
+//    count         2 slabs | counting grid
 //    scatter       2 slabs | chunk buffers | seams | a task's splats a thread
 //    seams         chunk buffers | seams
 //    build         2 buckets (one is read while the other is built) | a brick's scratch a thread
@@ -28,6 +29,9 @@ struct MemoryPlan {
 
   /// The same, of options as they are given: 0 is defaultMemory(), or as many threads as the machine has.
   static MemoryPlan ofOptions(uint64_t cap_bytes, size_t variables, unsigned threads);
+
+  /// The cap of which seams get so much.
+  static uint64_t capForSeams(uint64_t seam_bytes);
 
   /// Makes buckets smaller than they could be.
   void limitBuckets(uint64_t splats, size_t variables);

@@ -175,7 +175,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
       along[axis] = inwards[axis];
       axes[count++] = rotate(along);
     }
-    node.half_cell = count > 0 ? packHalfCell({axes.data(), count}) : kWholeCell;
+    node.half_cell = count > 0 ? packHalfCell({axes.data(), count}) : kNoBorder;
   };
 
   const LqFactors lq({jacobian[0].x, jacobian[1].x, jacobian[2].x},

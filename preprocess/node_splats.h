@@ -30,12 +30,12 @@ inline constexpr double kBend = 0.5 * 0.44655 * 0.44655;
 
 /// A node's splat on its way into the cache.
 struct NodeSplat {
-  uint64_t node = 0;                // number in the whole grid: block after block, i fastest, then j, k
-  Splat splat;                      // position: world units, moved inwards where the node owns a half cell
-  bool regular = true;              // weight is a0 a1 a2, and every variable's variance is 0
-  uint32_t half_cell = kWholeCell;  // stream/half_cell.h
-  bool on_block_face = false;       // may coincide with a node of another face: to be merged by SeamMerger
-  glm::dvec3 node_position{0.0};    // where the node itself is
+  uint64_t node = 0;               // number in the whole grid: block after block, i fastest, then j, k
+  Splat splat;                     // position: world units, moved inwards where the node owns a half cell
+  bool regular = true;             // weight is a0 a1 a2, and every variable's variance is 0
+  uint32_t half_cell = kNoBorder;  // stream/half_cell.h
+  bool on_block_face = false;      // may coincide with a node of another face: to be merged by SeamMerger
+  glm::dvec3 node_position{0.0};   // where the node itself is
   double spacing = 0;  // on a block face: the smallest distance > 0 to a neighbour along an axis, 0 if there
                        // is none; the seams' tolerance. Elsewhere 0
 };

@@ -14,6 +14,8 @@
 
 namespace curvisplat {
 
+class AbuttingFaces;
+
 struct ScalarRange {
   double min = std::numeric_limits<double>::infinity();
   double max = -std::numeric_limits<double>::infinity();
@@ -27,8 +29,6 @@ struct GridSurvey {
   glm::dvec3 upper{-std::numeric_limits<double>::infinity()};
   std::vector<ScalarRange> ranges;  // [scalar]
 };
-
-class AbuttingFaces;
 
 /// Reads all nodes once. Memory: two slabs. Throws Error if no node is there, or if the grid is larger or
 /// smaller than single precision can say. Where scalars stand in cells, those at the blocks' ends are added

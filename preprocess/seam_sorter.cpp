@@ -71,6 +71,10 @@ SeamSorter::SeamSorter(size_t variables, uint64_t memory_bytes, std::filesystem:
       capacity_(std::max<uint64_t>(1, memory_bytes / (record_size_ * sizeof(double) + sizeof(Entry)))),
       folder_(std::move(temporary_folder)) {}
 
+size_t SeamSorter::recordBytes(size_t variables) {
+  return (kNodeSize + variables * kScalarSize) * sizeof(double);
+}
+
 void SeamSorter::add(const SeamNode& node, std::span<const SplatScalar> values) {
   CURVISPLAT_CHECK_OP(values.size(), ==, variables_);
   if (entries_.size() == capacity_) spill();

@@ -31,6 +31,9 @@ class SeamSorter {
   /// MiB serve 10^11 nodes.
   SeamSorter(size_t variables, uint64_t memory_bytes, std::filesystem::path temporary_folder);
 
+  /// What a node takes, in memory or on disk.
+  static size_t recordBytes(size_t variables);
+
   void add(const SeamNode& node, std::span<const SplatScalar> values);
   /// Visits all that was added, by (along, node), and forgets it.
   void drain(const Visit& visit);

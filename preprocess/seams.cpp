@@ -27,11 +27,7 @@ const glm::dvec3 kAcross =
 /// How far from a node another may lie that is the same point. Half the spacing would let two neighbours meet
 /// at a third node between them.
 double toleranceOf(const NodeSplat& node, int coordinate_bytes) {
-  const glm::dvec3 size = glm::abs(node.node_position);
-  const double largest = std::max({size.x, size.y, size.z});
-  const int digits =
-      coordinate_bytes == 4 ? std::numeric_limits<float>::digits : std::numeric_limits<double>::digits;
-  const double rounding = largest > 0 ? std::ldexp(4.0, std::ilogb(largest) - (digits - 1)) : 0.0;
+  const double rounding = coordinateRounding(node.node_position, coordinate_bytes);
   return std::max(1e-3 * node.spacing, std::min(rounding, 0.4 * node.spacing));
 }
 
@@ -205,6 +201,14 @@ void Sweep::release(double before) {
 }
 
 }  // namespace
+
+double coordinateRounding(const glm::dvec3& position, int coordinate_bytes) {
+  const glm::dvec3 size = glm::abs(position);
+  const double largest = std::max({size.x, size.y, size.z});
+  const int digits =
+      coordinate_bytes == 4 ? std::numeric_limits<float>::digits : std::numeric_limits<double>::digits;
+  return largest > 0 ? std::ldexp(4.0, std::ilogb(largest) - (digits - 1)) : 0.0;
+}
 
 struct SeamMerger::State {
   size_t variables;

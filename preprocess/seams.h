@@ -12,6 +12,10 @@
 
 namespace curvisplat {
 
+/// What rounding may have done to a coordinate, in world units: 4 units in the last place of the largest, as
+/// stored in `coordinate_bytes`.
+double coordinateRounding(const glm::dvec3& position, int coordinate_bytes);
+
 /// Takes the splats of block-face nodes in any order, and gives them back merged, in an order and with sums
 /// that depend on the splats alone. Bounded memory: an external sort by the position along one generic
 /// direction, in sorted runs on disk once `memory_bytes` are full, and a sweep over them.

@@ -34,7 +34,7 @@ double product(const std::array<double, 3>& axis) {
 void packRecord(const NodeSplat& in, std::span<const SplatScalar> values, const RootPosition& position,
                 std::vector<std::byte>& out) {
   CURVISPLAT_CHECK_OP(in.node, <, kMaxNodes);
-  const bool irregular = !in.regular || in.half_cell != kWholeCell;
+  const bool irregular = !in.regular || in.half_cell != kNoBorder;
   const size_t bytes = irregular ? irregularRecordBytes(values.size()) : regularRecordBytes(values.size());
   const size_t start = out.size();
   out.resize(start + bytes);
@@ -92,7 +92,7 @@ uint32_t unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScal
     value.variance = 0;
   }
   splat.weight = product(splat.axis);
-  if (!irregular) return kWholeCell;
+  if (!irregular) return kNoBorder;
   splat.weight *= takeFloat();
   uint32_t half_cell;
   std::memcpy(&half_cell, at, sizeof half_cell);

@@ -72,7 +72,7 @@ ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const Fr
 ProjectionSettings FramePlanner::settingsFor(const Camera& camera, const FrameOptions& options,
                                              ImageSize size) const {
   return {screenView(camera, options, size), options.classification == Classification::pixel,
-          options.clip_box, cache_.manifest().cells ? kWholeCellParts : kHalfCellParts};
+          options.clip_box, cache_.manifest().cells ? kCellBorderParts : kNodeBorderParts};
 }
 
 Cut FramePlanner::chooseCut(const ProjectionSettings& settings, const FrameOptions& options,

@@ -226,8 +226,8 @@ bool projectRange(const Map& map, const BorderParts* borders, const LocalBox& cl
         continue;
       }
       Chooser::Fate fate;
-      const uint32_t half_cell = borders ? geometry.half_cell[begin + n] : kWholeCell;
-      if (block.too_wide[n] || half_cell != kWholeCell) {
+      const uint32_t half_cell = borders ? geometry.half_cell[begin + n] : kNoBorder;
+      if (block.too_wide[n] || half_cell != kNoBorder) {
         const auto best = choosePieces(map, geometry, variable, begin + n, half_cell, borders, chooser, left);
         if (!best) return false;
         fate = *best;

@@ -57,7 +57,7 @@ struct ProjectionSettings {
   ScreenView view;
   bool per_pixel = true;  // false: flat splats; slopes and widths are left out
   std::optional<WorldBox> clip_box = std::nullopt;
-  BorderParts border_parts = kHalfCellParts;  // kWholeCellParts where the data is cell-centred
+  BorderParts border_parts = kNodeBorderParts;  // kCellBorderParts where the data is cell-centred
 };
 
 /// Projects bricks. One thread each.

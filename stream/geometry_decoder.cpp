@@ -125,7 +125,7 @@ class GeometryDecoder {
   }
 
   void decodeHalfCells() {
-    std::fill(out_.half_cell.begin(), out_.half_cell.end(), kWholeCell);
+    std::fill(out_.half_cell.begin(), out_.half_cell.end(), kNoBorder);
     if (!(header_.raw & kHalfCells)) return;
     auto& codes = GeometryDecoder::codes();
     uint32_t any = 0;

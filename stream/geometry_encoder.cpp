@@ -178,8 +178,8 @@ class GeometryEncoder {
 
   void encodeHalfCells() {
     const auto& half_cells = brick_.half_cells;
-    std::fill(decoded_.half_cell.begin(), decoded_.half_cell.end(), kWholeCell);
-    if (std::all_of(half_cells.begin(), half_cells.end(), [](uint32_t half) { return half == kWholeCell; }))
+    std::fill(decoded_.half_cell.begin(), decoded_.half_cell.end(), kNoBorder);
+    if (std::all_of(half_cells.begin(), half_cells.end(), [](uint32_t half) { return half == kNoBorder; }))
       return;
     header_.raw |= kHalfCells;
     decoded_.half_cell = half_cells;

@@ -28,7 +28,7 @@ glm::dquat rotationOf(std::span<const glm::dvec3> inward) {
 }  // namespace
 
 uint32_t packHalfCell(std::span<const glm::dvec3> inward) {
-  if (inward.empty()) return kWholeCell;
+  if (inward.empty()) return kNoBorder;
   const glm::dquat rotation = rotationOf(inward);
   std::array<double, 4> numbers{rotation.w, rotation.x, rotation.y, rotation.z};
   uint32_t largest = 0;
@@ -69,7 +69,7 @@ InwardAxes inwardAxes(uint32_t half_cell) {
 }
 
 bool isPossibleHalfCell(uint32_t half_cell) {
-  const bool whole = half_cell == kWholeCell;
+  const bool whole = half_cell == kNoBorder;
   return whole || ((half_cell & 3) != 0 && (half_cell & 0xe0) == 0);
 }
 

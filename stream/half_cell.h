@@ -14,8 +14,8 @@
 
 namespace curvisplat {
 
-/// Of a cell that no border cuts.
-inline constexpr uint32_t kWholeCell = 0;
+/// Of a cell that ends at none.
+inline constexpr uint32_t kNoBorder = 0;
 
 struct InwardAxes {
   std::array<glm::vec3, 3> axis;  // unit length, orthogonal
@@ -37,12 +37,12 @@ struct BorderPart {
 };
 using BorderParts = std::array<BorderPart, 2>;
 
-// By least squares in one dimension, for the step that a uniform half space is. Half cells: the squared error
-// is 0.40 of that of one splat (0.019 for 0.048), what lies outside of the border 0.42 (0.033 of a cell for
-// 0.079), and where the density dips behind the border it has 0.87 for 0.83. Whole cells: 0.33 (0.027 for
-// 0.083), 0.33 (0.046 for 0.138), and 0.87 for 0.67.
-inline constexpr BorderParts kHalfCellParts{{{-0.286f, 0.336f, 0.264f}, {0.3f, 0.998f, 0.736f}}};
-inline constexpr BorderParts kWholeCellParts{{{-0.342f, 0.25f, 0.197f}, {0.111f, 0.769f, 0.803f}}};
+// By least squares in one dimension, for the step that a uniform half space is. Half cells of nodes: the
+// squared error is 0.40 of that of one splat (0.019 for 0.048), what lies outside of the border 0.42 (0.033
+// of a cell for 0.079), and where the density dips behind the border it has 0.87 for 0.83. Whole cells: 0.33
+// (0.027 for 0.083) and 0.33 (0.045 for 0.138); a dip to 0.87 is new, one splat rises slowly.
+inline constexpr BorderParts kNodeBorderParts{{{-0.286f, 0.336f, 0.264f}, {0.3f, 0.998f, 0.736f}}};
+inline constexpr BorderParts kCellBorderParts{{{-0.342f, 0.25f, 0.197f}, {0.111f, 0.769f, 0.803f}}};
 
 /// How much farther than the splat itself its parts reach, at the most, in units of its largest axis: the
 /// inner parts' offset along three axes.

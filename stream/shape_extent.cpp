@@ -67,7 +67,7 @@ double smallestSingularValue(std::span<const Splat> splats) {
 double largestReach(std::span<const Splat> splats, std::span<const uint32_t> half_cells) {
   constexpr double kKernelRadius = 1.556228;
   const bool any_half = std::any_of(half_cells.begin(), half_cells.end(),
-                                    [](uint32_t half_cell) { return half_cell != kWholeCell; });
+                                    [](uint32_t half_cell) { return half_cell != kNoBorder; });
   return (kKernelRadius + (any_half ? kBorderReach : 0.0)) * largestSingularValue(splats);
 }
 

@@ -66,7 +66,7 @@ struct SplatGeometry {
   std::vector<float> axis0, axis1, axis2;  // world units
   std::vector<float> shear10, shear20, shear21;
   std::vector<float> weight;        // world units cubed
-  std::vector<uint32_t> half_cell;  // stream/half_cell.h: kWholeCell but for nodes at a border
+  std::vector<uint32_t> half_cell;  // stream/half_cell.h: kNoBorder but for nodes at a border
 
   size_t size() const { return x.size(); }
   void resize(size_t count);

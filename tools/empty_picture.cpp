@@ -137,8 +137,9 @@ std::vector<std::string> whyEmpty(const RenderedScene& scene) {
     const double pixels = diagonalPixels(scene, lower, upper);
     if (scene.manifest.volume > 0 && pixels < 1)
       reasons.push_back(fmt::format(
-          "all of the data is {:.2g} pixels large; bring the camera nearer, or give a smaller {}", pixels,
-          scene.camera.projection == Projection::perspective ? "--view-angle" : "--parallel-scale"));
+          "what there is to see of the data is {:.2g} pixels large; bring the camera nearer, or give a "
+          "smaller {}",
+          pixels, scene.camera.projection == Projection::perspective ? "--view-angle" : "--parallel-scale"));
     const double thickest = largest * glm::length(upper - lower);
     if (thickest > 0 && thickest < 0.01)
       reasons.push_back(fmt::format(

@@ -80,7 +80,7 @@ std::filesystem::path FrameNames::of(uint64_t frame) const {
   return folder_ / (before_ + number + after_);
 }
 
-bool FrameNames::include(const std::filesystem::path& path) const {
+bool FrameNames::include(const std::filesystem::path& path, uint64_t frames) const {
   const std::string name = path.filename().string();
   if (name.size() <= before_.size() + after_.size()) return false;
   const std::string number = name.substr(before_.size(), name.size() - before_.size() - after_.size());
@@ -88,7 +88,7 @@ bool FrameNames::include(const std::filesystem::path& path) const {
   uint64_t frame = 0;
   const auto [end, error] = std::from_chars(number.data() + digits, number.data() + number.size(), frame);
   std::error_code none_there;
-  return error == std::errc{} && of(frame).filename() == name &&
+  return error == std::errc{} && frame < frames && of(frame).filename() == name &&
          std::filesystem::equivalent(folderOf(path), folderOf(of(frame)), none_there);
 }
 

@@ -19,8 +19,8 @@ class FrameNames {
   explicit FrameNames(const std::filesystem::path& pattern);
 
   std::filesystem::path of(uint64_t frame) const;
-  /// Whether `path` is the name of some frame.
-  bool include(const std::filesystem::path& path) const;
+  /// Whether `path` is the name of one of the first `frames`.
+  bool include(const std::filesystem::path& path, uint64_t frames) const;
 
  private:
   std::filesystem::path folder_;

@@ -19,6 +19,7 @@
 #include "render/transfer_function.h"
 #include "stream/cache_reader.h"
 #include "stream/error.h"
+#include "stream/paths.h"
 #include "stream/progress.h"
 #include "stream/say.h"
 #include "tools/camera_motion.h"
@@ -97,9 +98,9 @@ void checkWords(const RenderWords& words, ImageSize size) {
   std::vector<std::filesystem::path> others{words.cache, words.camera.path, words.scalar.transfer_function};
   checkOutputFile("-o", words.output, others);
   if (words.camera.moves() && !isMovieName(words.output)) {
-    const FrameNames frames(words.output);
+    const FrameNames names(words.output);
     for (const std::filesystem::path& other : {words.first_image, words.statistics})
-      if (frames.include(other))
+      if (names.include(linkTarget(other), words.camera.frames.value_or(1)))
         throw Error("-o {}: a frame would change {}; choose another name", words.output.string(),
                     other.string());
   }

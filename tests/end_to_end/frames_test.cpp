@@ -149,7 +149,11 @@ TEST_F(Frames, NamesWithoutOneNumberAreWrongUsage) {
                 "a frame would change");
   expectRefused({"-o", file("a%2d.png"), "--orbit", "90", "--frames", "2", "--first-image", file("a 0.png")},
                 1, "a frame would change");
+  fs::create_symlink("a01.png", file("linked.json"));
+  expectRefused({"-o", file("a%02d.png"), "--orbit", "90", "--frames", "2", "--stats", file("linked.json")},
+                1, "a frame would change");
   expectDrawn({"-o", file("a%02d.png"), "--orbit", "90", "--frames", "1", "--stats", file("a1.png")});
+  expectDrawn({"-o", file("a%02d.png"), "--orbit", "90", "--frames", "1", "--stats", file("a01.png")});
   // One picture is written to the name as it is.
   expectDrawn({"-o", file("a%d.png")});
   EXPECT_TRUE(fs::exists(file("a%d.png")));

@@ -74,7 +74,7 @@ std::string unpacked(std::span<const std::byte> stream, size_t header_bytes) {
 const glm::dvec3 kInward[] = {{0, 0.6, 0.8}, {1, 0, 0}, {0, 0.8, -0.6}};
 
 void addHalfCells(BrickSplats& brick) {
-  brick.half_cells.assign(brick.size(), kWholeCell);
+  brick.half_cells.assign(brick.size(), kNoBorder);
   for (size_t n = 0; n < brick.size(); n += 3) brick.half_cells[n] = packHalfCell({kInward, 1 + n / 3 % 3});
 }
 
@@ -194,7 +194,7 @@ void writeSplats(const Seeds& seeds) {
       for (int c = 0; c < 3; ++c) seed.add(0.3f * unit(random));
       for (int c = 0; c < 3; ++c) seed.add(unit(random) - 0.5f);
       seed.add(0.1f * unit(random));
-      seed.add(n % 3 == 0 ? packHalfCell({&kInward[0], 1 + static_cast<size_t>(n) / 3 % 3}) : kWholeCell);
+      seed.add(n % 3 == 0 ? packHalfCell({&kInward[0], 1 + static_cast<size_t>(n) / 3 % 3}) : kNoBorder);
       seed.add(unit(random));
       for (int c = 0; c < 3; ++c) seed.add(0.1f * unit(random));
       seed.add(0.01f * unit(random));

@@ -37,7 +37,7 @@ struct Splats {
       array->push_back(finite(input.take<float>(), -kLargest));
     geometry.weight.push_back(finite(input.take<float>(), 0));
     const auto half_cell = input.take<uint32_t>();
-    geometry.half_cell.push_back(isPossibleHalfCell(half_cell) ? half_cell : kWholeCell);
+    geometry.half_cell.push_back(isPossibleHalfCell(half_cell) ? half_cell : kNoBorder);
     for (auto* array : {&values.mean, &values.slope0, &values.slope1, &values.slope2})
       array->push_back(finite(input.take<float>(), -kLargest));
     values.variance.push_back(finite(input.take<float>(), 0));
@@ -68,7 +68,7 @@ void run(std::span<const std::byte> bytes) {
       Camera::named("iso", scale * corner, scale * (corner + size), pixels,
                     flags & kPerspective ? Projection::perspective : Projection::orthographic);
   ProjectionSettings settings{ScreenView::of(camera, pixels, scale, kLowPass, 1e-4 * size), !(flags & kFlat)};
-  if (flags & kCells) settings.border_parts = kWholeCellParts;
+  if (flags & kCells) settings.border_parts = kCellBorderParts;
   if (flags & kClip) settings.clip_box = WorldBox{corner, corner + 0.5 * size};
 
   static BrickProjector projector;

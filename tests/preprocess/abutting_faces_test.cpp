@@ -26,12 +26,12 @@ struct Cells {
 constexpr int kFloat = 4;
 
 /// The faces at blocks' ends that abut, as "block i j k axis+-".
-std::vector<std::string> abuttingOf(const std::vector<Cells>& blocks) {
+std::vector<std::string> abuttingOf(const std::vector<Cells>& blocks, uint64_t memory_bytes = 1 << 20) {
   std::vector<GridBlock> grid;
   for (const Cells& block : blocks)
     grid.push_back(gridBlock(block.count[0] + 1, block.count[1] + 1, block.count[2] + 1));
   const TemporaryFolder folder;
-  AbuttingFaces faces(grid, 1 << 20, folder.path());
+  AbuttingFaces faces(grid, kFloat, memory_bytes, folder.path());
   const auto for_each = [&](const auto& visit) {
     for (size_t block = 0; block < blocks.size(); ++block)
       for (uint64_t k = 0; k < blocks[block].count[2]; ++k)
@@ -49,9 +49,10 @@ std::vector<std::string> abuttingOf(const std::vector<Cells>& blocks) {
       corners[n] = block.at(static_cast<double>(face.cell[0] + (n & 1)),
                             static_cast<double>(face.cell[1] + (n >> 1 & 1)),
                             static_cast<double>(face.cell[2] + (n >> 2)));
-    faces.add(face, corners);
+    const AbuttingFaces::Centre centre = faces.centreOf(face, corners);
+    faces.add({&centre, 1});
   });
-  faces.match(kFloat);
+  faces.match(Progress());
   std::vector<std::string> abutting;
   for_each([&](const CellFace& face) {
     if (faces.abuts(face))
@@ -85,6 +86,21 @@ TEST(AbuttingFaces, AreFoundHoweverTheBlocksAreTurned) {
                                       "1 0 0 2 i-", "1 0 1 2 i-"}));
 }
 
+TEST(AbuttingFaces, AreFoundInLittleMemory) {
+  const Cells first{{20, 30, 10}, box};
+  const Cells second{{5, 30, 10}, [](double i, double j, double k) { return box(20 + i, j, k); }};
+  const std::vector<std::string> found = abuttingOf({first, second});
+  EXPECT_EQ(found.size(), 2u * 30 * 10);
+  EXPECT_EQ(abuttingOf({first, second}, 1000), found);  // seven faces at a time
+}
+
+TEST(AbuttingFaces, NeedABitAndADiskRecordEach) {
+  const std::vector<GridBlock> blocks{gridBlock(21, 31, 11), gridBlock(6, 31, 11), gridBlock(5, 1, 9)};
+  const uint64_t faces = 2 * (20 * 30 + 20 * 10 + 30 * 10) + 2 * (5 * 30 + 5 * 10 + 30 * 10) + 2 * (4 * 8);
+  EXPECT_EQ(AbuttingFaces::needsOf(blocks).memory_bytes, faces / 8);
+  EXPECT_EQ(AbuttingFaces::needsOf(blocks).disk_bytes, faces * 144);
+}
+
 TEST(AbuttingFaces, AreThoseOfCellsThatAreThere) {
   const Cells first{{2, 1, 2}, box};
   const Cells second{{1, 1, 2},
@@ -113,6 +129,8 @@ TEST(AbuttingFaces, OfARingAreItsOwn) {
   EXPECT_EQ(abuttingOf({{{8, 1, 1}, around}}),
             (std::vector<std::string>{"0 0 0 0 i-", "0 0 0 0 j-", "0 1 0 0 j-", "0 2 0 0 j-", "0 3 0 0 j-",
                                       "0 4 0 0 j-", "0 5 0 0 j-", "0 6 0 0 j-", "0 7 0 0 i+", "0 7 0 0 j-"}));
+  // One wedge alone, as of an axisymmetric grid: an edge is no border, though nothing else is there.
+  EXPECT_EQ(abuttingOf({{{1, 2, 1}, around}}), (std::vector<std::string>{"0 0 0 0 j-"}));
   const auto wide = [&](double i, double j, double k) { return around(i, 1 + j, k); };
   EXPECT_EQ(abuttingOf({{{8, 2, 1}, wide}}),
             (std::vector<std::string>{"0 0 0 0 i-", "0 7 0 0 i+", "0 0 1 0 i-", "0 7 1 0 i+"}));

@@ -213,6 +213,11 @@ TEST(MemoryPlan, StaysWithinTheCap) {
 
 TEST(MemoryPlan, RefusesLessThanTheLeast) {
   EXPECT_THROW(MemoryPlan::of(leastMemory(1) - 1, 1, 1), Error);
+  for (const uint64_t seams : {uint64_t{100} << 20, uint64_t{3} << 30}) {
+    const uint64_t cap = MemoryPlan::capForSeams(seams);
+    EXPECT_GE(MemoryPlan::of(cap, 1, 1).seam_bytes, seams);
+    EXPECT_LT(MemoryPlan::of(cap - 4096, 1, 1).seam_bytes, seams);
+  }
   EXPECT_LE(leastMemory(1), uint64_t{256} << 20);
 }
 

@@ -15,6 +15,7 @@
 #include "stream/error.h"
 #include "tests/support/cell_grid.h"
 #include "tests/support/function_grid.h"
+#include "tests/support/rearranged_grid.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {
@@ -94,7 +95,13 @@ TEST(CellConvert, KeepsEveryCellAndTheVolumeOfTheHexahedra) {
 TEST(CellConvert, HasTheSameBytesForAnyThreadsAndMemory) {
   const TemporaryFolder folder;
   const SceneGridSource nodes(makeScene("half-annulus"), {90, 90, 60});
-  const CellGridSource source(nodes, {field});
+  Rearrangement blocks;
+  blocks.cuts = {2, 1, 3};
+  const RearrangedGridSource cut(nodes, blocks);
+  const CellGridSource source(
+      cut, {[](const GridCell& cell) {
+        return cell.i + cell.j + 5 * cell.k == 50 ? std::numeric_limits<double>::quiet_NaN() : field(cell);
+      }});
   Files expected;
   for (const unsigned threads : {2u, 1u}) {
     ConvertOptions options = optionsFor(folder / "c.splats", {1});
@@ -109,6 +116,20 @@ TEST(CellConvert, HasTheSameBytesForAnyThreadsAndMemory) {
     if (expected.empty()) expected = files;
     EXPECT_TRUE(files == expected) << threads;
   }
+}
+
+TEST(CellConvert, NamesTheMemoryThatManySmallBlocksTake) {
+  // Nothing of it is read: a thousand layers of a million cells.
+  const FunctionGridSource nodes(std::vector(1'000, gridBlock(3000, 300, 2)), 0,
+                                 [](const GridNode&) { return NodeValues{}; });
+  const CellGridSource source(nodes, {field});
+  const TemporaryFolder folder;
+  ConvertOptions options = optionsFor(folder / "c.splats", {0});
+  const std::string error = errorOf([&] { convertQuietly(source, options); });
+  EXPECT_NE(error.find("the ends of so many blocks of cells take 215 MiB; give at least 3731 MiB"),
+            std::string::npos)
+      << error;
+  EXPECT_FALSE(std::filesystem::exists(options.output));
 }
 
 TEST(CellConvert, LeavesOutCellsWithoutACornerOrAValue) {

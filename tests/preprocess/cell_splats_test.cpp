@@ -132,16 +132,17 @@ TEST(CellSplats, EndAtBordersButNotWhereBlocksAbut) {
   GridBlock other = grid.block;
   other.ni = 2;
   const TemporaryFolder folder;
-  AbuttingFaces faces(std::vector{grid.block, other}, 1 << 20, folder.path());
+  AbuttingFaces faces(std::vector{grid.block, other}, 8, 1 << 20, folder.path());
   for (uint64_t k = 0; k < 3; ++k)
     for (uint64_t j = 0; j < 3; ++j)
       for (const size_t block : {0u, 1u}) {
         std::array<glm::dvec3, 8> corners;
         for (size_t c = 0; c < 8; ++c)
           corners[c] = jacobian * glm::dvec3((block == 0 ? 2 : 3) + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
-        faces.add({block, {block == 0 ? 2u : 0u, j, k}, 0, block == 0}, corners);
+        const auto centre = faces.centreOf({block, {block == 0 ? 2u : 0u, j, k}, 0, block == 0}, corners);
+        faces.add({&centre, 1});
       }
-  faces.match(8);
+  faces.match(Progress());
 
   const NodeSplats out = grid.cellSplats({0, &faces});
   ASSERT_EQ(out.splats.size(), 26u);
@@ -162,7 +163,7 @@ TEST(CellSplats, EndAtBordersButNotWhereBlocksAbut) {
                 0.03 * glm::length(expected[static_cast<size_t>(n)]))
           << i << j << k;
   }
-  for (const NodeSplat& splat : grid.cellSplats().splats) EXPECT_EQ(splat.half_cell, kWholeCell);
+  for (const NodeSplat& splat : grid.cellSplats().splats) EXPECT_EQ(splat.half_cell, kNoBorder);
 }
 
 TEST(CellSplats, OfAnyGridSumToItsHexahedra) {
@@ -231,8 +232,12 @@ TEST(CellSplats, OfWindowsAreThoseOfTheWhole) {
   CellBlock grid(6, 8, 9, [](double i, double j, double k) { return halfAnnulus(i / 5, j / 7, k / 8); });
   grid.addCellScalar([](const glm::dvec3& p) { return p.x * p.y + p.z; });
   grid.nodes.blank[grid.at(2, 4, 4)] = kNoNode;
-  const NodeSplats whole = grid.cellSplats();
-  size_t n = 0;
+  const TemporaryFolder folder;
+  AbuttingFaces faces({&grid.block, 1}, 8, 1 << 20, folder.path());
+  faces.match(Progress());
+  const BlockEnds ends{0, &faces};
+  const NodeSplats whole = grid.cellSplats(ends);
+  size_t n = 0, borders = 0;
   for (uint64_t k = 0; k < 9; ++k)
     for (uint64_t j = 0; j < 8; j += 3) {
       const NodeBox box{j, std::min<uint64_t>(j + 3, 8), k, k + 1};
@@ -252,7 +257,7 @@ TEST(CellSplats, OfWindowsAreThoseOfTheWhole) {
           }
       NodeSplats part;
       CellScratch scratch;
-      computeCellSplats({grid.block, 0, window, &nodes}, box, {}, scratch, part);
+      computeCellSplats({grid.block, 0, window, &nodes}, box, ends, scratch, part);
       for (size_t m = 0; m < part.splats.size(); ++m) {
         size_t same = 0;
         while (same < whole.splats.size() && whole.splats[same].node != part.splats[m].node) ++same;
@@ -260,11 +265,14 @@ TEST(CellSplats, OfWindowsAreThoseOfTheWhole) {
         EXPECT_EQ(part.splats[m].splat.position, whole.splats[same].splat.position);
         EXPECT_EQ(part.splats[m].splat.axis, whole.splats[same].splat.axis);
         EXPECT_EQ(part.splats[m].splat.weight, whole.splats[same].splat.weight);
+        EXPECT_EQ(part.splats[m].half_cell, whole.splats[same].half_cell);
         EXPECT_EQ(part.values[m].slope, whole.values[same].slope);
+        borders += part.splats[m].half_cell != kNoBorder;
       }
       n += part.splats.size();
     }
   EXPECT_EQ(n, whole.splats.size());
+  EXPECT_GT(borders, 5u * 7 * 8 - 3 * 5 * 6);
 }
 
 TEST(CellSplats, OfSingularAndFoldedCellsAreFinite) {

@@ -27,7 +27,7 @@ const glm::dvec3 kInward[] = {glm::normalize(glm::dvec3(1, 2, -1)), glm::normali
 
 TEST(BorderParts, OfAWholeCellAreItself) {
   BorderPieces pieces;
-  ASSERT_EQ(partsAtBorder(kWhole, kWholeCell, kHalfCellParts, pieces), 1u);
+  ASSERT_EQ(partsAtBorder(kWhole, kNoBorder, kNodeBorderParts, pieces), 1u);
   EXPECT_EQ(pieces[0].position, kWhole.position);
   EXPECT_EQ(factorOf(pieces[0].shape), factorOf(kWhole.shape));
   EXPECT_EQ(pieces[0].weight, kWhole.weight);
@@ -37,7 +37,7 @@ TEST(BorderParts, OfAWholeCellAreItself) {
 TEST(BorderParts, AreStretchedAndShiftedAlongTheInwardAxesOnly) {
   const glm::dmat3 a = factorOf(kWhole.shape);
   for (size_t axes = 1; axes <= 3; ++axes) {
-    const BorderParts& parts = axes == 2 ? kWholeCellParts : kHalfCellParts;
+    const BorderParts& parts = axes == 2 ? kCellBorderParts : kNodeBorderParts;
     const uint32_t code = packHalfCell({kInward, axes});
     const InwardAxes inward = inwardAxes(code);
     BorderPieces pieces;
@@ -67,14 +67,16 @@ TEST(BorderParts, AreStretchedAndShiftedAlongTheInwardAxesOnly) {
 TEST(BorderParts, CarryTheSameLinearField) {
   // The gradient is A⁻ᵀ w, whatever A.
   const glm::dvec3 gradient = glm::inverse(glm::transpose(factorOf(kWhole.shape))) * vectorOf(kWhole.slope);
-  BorderPieces pieces;
-  const size_t count = partsAtBorder(kWhole, packHalfCell({kInward, 3}), kHalfCellParts, pieces);
-  for (size_t n = 0; n < count; ++n) {
-    const SplatPiece& piece = pieces[n];
-    const glm::dvec3 found = glm::inverse(glm::transpose(factorOf(piece.shape))) * vectorOf(piece.slope);
-    EXPECT_LT(glm::distance(found, gradient), 1e-4 * glm::length(gradient));
-    const double mean = kWhole.mean + glm::dot(gradient, glm::dvec3(piece.position - kWhole.position));
-    EXPECT_NEAR(piece.mean, mean, 1e-5);
+  for (const BorderParts& parts : {kNodeBorderParts, kCellBorderParts}) {
+    BorderPieces pieces;
+    const size_t count = partsAtBorder(kWhole, packHalfCell({kInward, 3}), parts, pieces);
+    for (size_t n = 0; n < count; ++n) {
+      const SplatPiece& piece = pieces[n];
+      const glm::dvec3 found = glm::inverse(glm::transpose(factorOf(piece.shape))) * vectorOf(piece.slope);
+      EXPECT_LT(glm::distance(found, gradient), 1e-4 * glm::length(gradient));
+      const double mean = kWhole.mean + glm::dot(gradient, glm::dvec3(piece.position - kWhole.position));
+      EXPECT_NEAR(piece.mean, mean, 1e-5);
+    }
   }
 }
 
@@ -114,7 +116,7 @@ TEST(BorderParts, AreWhatHalfCellsAreDrawnAs) {
     EXPECT_EQ(one.drawn, 1u);
     EXPECT_EQ(one.pieces, 2u);
     EXPECT_EQ(project(Brick(10, corner), projection).pieces, 80u);
-    EXPECT_EQ(project(Brick(10, kWholeCell), projection).pieces, 10u);
+    EXPECT_EQ(project(Brick(10, kNoBorder), projection).pieces, 10u);
   }
 }
 

@@ -261,7 +261,7 @@ TEST(Codec, KeepsHalfCells) {
   const RootCube root{};
   BrickSplats brick = randomBrick({}, Cell{}, 6);
   const size_t without = encodeBrick(root, brick).geometry.size();
-  brick.half_cells.assign(brick.size(), kWholeCell);
+  brick.half_cells.assign(brick.size(), kNoBorder);
   EXPECT_EQ(encodeBrick(root, brick).geometry.size(), without);
 
   const glm::dvec3 inward[] = {{0, 0.6, 0.8}, {1, 0, 0}};
@@ -277,7 +277,7 @@ TEST(Codec, KeepsHalfCells) {
   brick.half_cells.clear();
   const EncodedBrick whole = encodeBrick(root, brick);
   decodeGeometry(root, whole.brick, whole.geometry, floats);
-  EXPECT_EQ(floats.half_cell, std::vector<uint32_t>(brick.size(), kWholeCell));
+  EXPECT_EQ(floats.half_cell, std::vector<uint32_t>(brick.size(), kNoBorder));
   EXPECT_NEAR(encoded.brick.largest_radius / whole.brick.largest_radius, 1 + kBorderReach / kKernelRadius,
               1e-6);
 }

@@ -28,7 +28,8 @@ class BrickGrids : public testing::Test {
     return bytes;
   }
   std::string difference(std::span<const std::byte> of) const { return comparison(of).difference; }
-  BrickGridsComparison comparison(std::span<const std::byte> of, uint64_t most_memory = 1 << 30) const {
+  BrickGridsComparison comparison(std::span<const std::byte> of,
+                                  uint64_t most_memory = kMostComparisonMemory) const {
     return compareBrickGrids(of, cache().manifest().root, cache().bricks(), most_memory);
   }
   const CacheReader& cache() const {

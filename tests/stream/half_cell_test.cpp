@@ -50,9 +50,9 @@ TEST(HalfCell, AlongTheFramesOwnAxes) {
 }
 
 TEST(HalfCell, OfNoDirectionIsAWholeCell) {
-  EXPECT_EQ(packHalfCell({}), kWholeCell);
-  EXPECT_EQ(inwardAxes(kWholeCell).count, 0);
-  EXPECT_TRUE(isPossibleHalfCell(kWholeCell));
+  EXPECT_EQ(packHalfCell({}), kNoBorder);
+  EXPECT_EQ(inwardAxes(kNoBorder).count, 0);
+  EXPECT_TRUE(isPossibleHalfCell(kNoBorder));
 }
 
 TEST(HalfCell, IsRefusedWhereNothingPacksToIt) {
@@ -70,7 +70,7 @@ TEST(HalfCell, OfAnyBytesHasFiniteUnitAxes) {
 }
 
 TEST(HalfCell, ItsPartsHaveItsWeight) {
-  for (const BorderParts& parts : {kHalfCellParts, kWholeCellParts}) {
+  for (const BorderParts& parts : {kNodeBorderParts, kCellBorderParts}) {
     float sum = 0;
     for (const BorderPart& part : parts) {
       sum += part.share;

@@ -23,13 +23,13 @@ namespace {
 struct DirectSplat {
   Splat splat;
   SplatScalar value;
-  uint32_t half_cell = kWholeCell;
+  uint32_t half_cell = kNoBorder;
 };
 
 std::vector<DirectSplat> splatsOf(const GridSource& source, uint32_t scalar, const DirectOptions& options) {
   std::vector<DirectSplat> out;
   const auto take = [&](const NodeSplat& node, std::span<const SplatScalar> values) {
-    out.push_back({node.splat, values[0], options.border_parts ? node.half_cell : kWholeCell});
+    out.push_back({node.splat, values[0], options.border_parts ? node.half_cell : kNoBorder});
   };
   SeamMerger seams(1, uint64_t{64} << 20, std::filesystem::temp_directory_path());
   uint64_t first_node = 0;

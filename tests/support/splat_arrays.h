@@ -10,7 +10,7 @@ namespace curvisplat {
 
 /// Sets splat `n`; `position` is from the arrays' origin.
 inline void setSplat(SplatGeometry& geometry, SplatVariable& variable, size_t n, const glm::dvec3& position,
-                     const Splat& splat, const SplatScalar& scalar, uint32_t half_cell = kWholeCell) {
+                     const Splat& splat, const SplatScalar& scalar, uint32_t half_cell = kNoBorder) {
   geometry.x[n] = static_cast<float>(position.x);
   geometry.y[n] = static_cast<float>(position.y);
   geometry.z[n] = static_cast<float>(position.z);

@@ -1,0 +1,48 @@
+#include "stream/paths.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+#include "stream/error.h"
+#include "stream/file.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(Paths, LinksLeadToWhatIsThereOrToBe) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(linkTarget(folder / "none"), folder / "none");
+  fs::create_symlink("none", folder / "link");
+  fs::create_symlink(folder / "link", folder / "further");
+  EXPECT_EQ(linkTarget(folder / "further"), folder / "none");
+  EXPECT_EQ(writableTarget(folder / "further"), folder / "none");
+  EXPECT_FALSE(isRegularFile(folder / "further"));
+  writeFileAtomically(folder / "none", std::string("some"));
+  EXPECT_TRUE(isRegularFile(folder / "further"));
+  EXPECT_FALSE(isRegularFile(folder.path() / std::string(5000, 'x')));
+
+  fs::create_symlink("round", folder / "about");
+  fs::create_symlink("about", folder / "round");
+  EXPECT_THROW(linkTarget(folder / "round"), Error);
+  fs::create_directory(folder / "folder");
+  EXPECT_THROW(writableTarget(folder / "folder"), Error);
+}
+
+TEST(Paths, TemporaryNamesAreBesideAndNeverTheSame) {
+  const TemporaryFolder folder;
+  std::set<fs::path> names;
+  for (int n = 0; n < 1000; ++n) {
+    names.insert(temporaryBeside(folder / std::string(255, 'x')));
+    ASSERT_EQ(names.begin()->parent_path(), folder.path());
+    ASSERT_LT(names.begin()->filename().string().size(), 64u);
+  }
+  EXPECT_EQ(names.size(), 1000u);
+}
+
+}  // namespace
+}  // namespace curvisplat
