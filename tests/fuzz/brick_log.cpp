@@ -4,6 +4,8 @@
 //   variables u8 | bytes of the log u16 | log without checksums | bytes of the files of streams
 #include "stream/brick_log.h"
 
+#include <fmt/format.h>
+
 #include "stream/cache_format.h"
 #include "stream/cache_writer.h"
 #include "stream/checksum.h"
@@ -52,8 +54,8 @@ void run(std::span<const std::byte> bytes) {
   fuzzFile("a.splats.partial/geometry.bin", input.rest());
   std::vector<VariableInfo> infos;
   for (uint32_t v = 0; v < variables; ++v) {
-    infos.push_back({v, "f" + std::to_string(v), "", 0, 1});
-    fuzzFile("a.splats.partial/var." + std::to_string(v) + ".bin", input.rest());
+    infos.push_back({v, fmt::format("f{}", v), "", 0, 1});
+    fuzzFile(fmt::format("a.splats.partial/var.{}.bin", v), input.rest());
   }
 
   PartialFolder folder(target, false, PartialFolder::Rest::kKeep);

@@ -1,6 +1,10 @@
 // .p3d files, beside a grid and two solutions that are as they should be: a.xyz, a.q, a.f.
 #include "preprocess/plot3d_meta.h"
 
+#include <bit>
+#include <span>
+#include <vector>
+
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/grid_reading.h"
 
@@ -9,14 +13,10 @@ namespace {
 
 /// Single precision without record markers: `head`, then so many values.
 void writeFile(const char* name, const std::vector<int32_t>& head, size_t values) {
-  std::vector<std::byte> bytes;
-  const auto put = [&](auto value) {
-    const auto added = std::as_bytes(std::span(&value, 1));
-    bytes.insert(bytes.end(), added.begin(), added.end());
-  };
-  for (const int32_t number : head) put(number);
-  for (size_t n = 0; n < values; ++n) put(1 + static_cast<float>(n));
-  fuzzFile(name, bytes);
+  std::vector<float> words(head.size() + values);
+  for (size_t n = 0; n < words.size(); ++n)
+    words[n] = n < head.size() ? std::bit_cast<float>(head[n]) : static_cast<float>(n);
+  fuzzFile(name, std::as_bytes(std::span(words)));
 }
 
 bool writeFiles() {

@@ -1,5 +1,6 @@
 #include "tests/support/virtual_display.h"
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -46,8 +47,8 @@ std::string VirtualDisplay::missing() {
 VirtualDisplay::VirtualDisplay(ImageSize size, const std::vector<std::string>& options) {
   int number = 100 + getpid() % 20000;
   while (fs::exists("/tmp/.X11-unix/X" + std::to_string(number))) ++number;
-  name_ = ":" + std::to_string(number);
-  const std::string screen = std::to_string(size.width) + "x" + std::to_string(size.height) + "x24";
+  name_ = fmt::format(":{}", number);
+  const std::string screen = fmt::format("{}x{}x24", size.width, size.height);
   std::vector<std::string> words{"Xvfb", name_, "-screen", "0", screen, "-noreset", "-nolisten", "tcp"};
   words.insert(words.end(), options.begin(), options.end());
   server_ = std::make_unique<RunningProgram>(words, kEnv);
