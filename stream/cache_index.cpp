@@ -163,7 +163,8 @@ template <typename Record, typename Header, typename Use>
 void readRecords(const InputFile& file, const Header& header, uint64_t offset, const Manifest& manifest,
                  const FileInfo& info, const Use& use) {
   if (header.magic != Header{}.magic)
-    throw Error("{}: does not begin like such a file", file.path().string());
+    throw Error("{}: does not begin as such a file of a cache does; it is damaged or not this cache's",
+                file.path().string());
   if (header.version != kCacheVersion || header.record_bytes != sizeof(Record))
     throw Error("{}: has version {} and records of {} bytes, expected {} and {}", file.path().string(),
                 header.version, header.record_bytes, kCacheVersion, sizeof(Record));
@@ -196,7 +197,7 @@ const FileInfo& checkFile(const fs::path& path, uint64_t bytes, const Manifest& 
   for (const FileInfo& info : manifest.files) {
     if (info.name != name) continue;
     if (info.size != bytes)
-      throw Error("{}: has {} bytes, the manifest says {}; the file is truncated or not this cache's",
+      throw Error("{}: has {} bytes, the manifest says {}; the file is damaged or not this cache's",
                   path.string(), bytes, info.size);
     return info;
   }

@@ -6,8 +6,10 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <span>
 
 #include "stream/cache_format.h"
+#include "stream/checksum.h"
 #include "stream/error.h"
 #include "stream/json_text.h"
 
@@ -23,6 +25,15 @@ constexpr size_t kLargestText = 16 << 20;
 // Squares and volumes of lengths below it are finite, and so are sums of positions.
 constexpr double kLargestCoordinate = 1e100;
 constexpr uint64_t kLargestVariableNumber = 0x7fffffff;
+constexpr const char* kChecksum = "checksum";
+// Names of files and blocks may be in any encoding; JSON is UTF-8.
+constexpr auto kReplace = Json::error_handler_t::replace;
+
+/// Of all but the checksum, however it is laid out.
+std::string checksumText(const Json& json) {
+  const std::string text = json.dump(-1, ' ', false, kReplace);
+  return fmt::format("{:016x}", checksumOf(std::as_bytes(std::span(text))));
+}
 
 Json jsonOf(const glm::dvec3& v) {
   return Json::array({v.x, v.y, v.z});
@@ -255,8 +266,8 @@ std::string Manifest::toJson() const {
   for (const FileInfo& file : files)
     json["files"].push_back(
         {{"name", file.name}, {"size", file.size}, {"checksum", fmt::format("{:016x}", file.checksum)}});
-  // Names of files and blocks may be in any encoding; JSON is UTF-8.
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  json[kChecksum] = checksumText(json);
+  return json.dump(2, ' ', false, kReplace) + "\n";
 }
 
 Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path& path) {
@@ -284,6 +295,15 @@ Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path
         "from {} "
         "on; convert again, with --overwrite",
         path.string(), version, kOldestVersion);
+  if (json.contains(kChecksum)) {  // caches from before have none
+    const std::string said = fields.text(kChecksum);
+    json.erase(kChecksum);
+    const std::string found = checksumText(json);
+    if (found != said)
+      throw Error(
+          "{}: its contents have the checksum {}, it says {}; it is damaged or was changed: convert again",
+          path.string(), found, said);
+  }
   Manifest manifest;
   manifest.title = fields.text("title");
   manifest.program = fields.text("program");

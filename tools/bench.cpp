@@ -147,7 +147,7 @@ void benchCache(const BenchWords& words) {
   options.size = parseImageSize("--size", words.size);
   const std::vector<double> errors = parseErrors(words.lod_pixels);
   options.lod_pixels = errors.front();
-  if (words.memory) options.memory_bytes = parseByteSize("--memory", *words.memory);
+  if (words.memory) options.memory_bytes = parseMemory("--memory", *words.memory);
   options.threads = threadsOf(words);
   const Backend backend = parseBackend(words.backend);
   checkCameraWords(words.camera);
@@ -235,7 +235,7 @@ void benchConversion(const BenchWords& words) {
   if (words.nodes) effort.nodes = parseCount("--nodes", *words.nodes);
   if (effort.nodes < kLeastNodes)
     throw UsageError("--nodes {}: expected {} or more", *words.nodes, kLeastNodes);
-  if (words.memory) effort.memory_bytes = parseByteSize("--memory", *words.memory);
+  if (words.memory) effort.memory_bytes = parseMemory("--memory", *words.memory);
   effort.threads = words.threads;
   effort.temporary_folder =
       words.temporary_folder.empty() ? fs::temp_directory_path() : words.temporary_folder;

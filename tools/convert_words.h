@@ -55,7 +55,7 @@ void takeCommonWords(const ConvertWords& words, Options& options) {
   options.temporary_folder = words.temporary_folder;
   options.blank_value = words.blank_value;
   options.threads = words.threads;
-  if (words.memory) options.memory_bytes = parseByteSize("--memory", *words.memory);
+  if (words.memory) options.memory_bytes = parseMemory("--memory", *words.memory);
 }
 
 /// Sets "seconds" and "phases".

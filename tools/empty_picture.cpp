@@ -115,8 +115,9 @@ bool outOfView(const RenderedScene& scene, const glm::dvec3& lower, const glm::d
 }  // namespace
 
 bool isEmpty(const Image& image, const glm::vec4& background) {
+  constexpr float kLeastSeen = 1.0f / 512;  // half a step of a screen
   for (size_t n = 0; n < image.rgba.size(); ++n)
-    if (image.rgba[n] != background[static_cast<int>(n % 4)]) return false;
+    if (!(std::abs(image.rgba[n] - background[static_cast<int>(n % 4)]) < kLeastSeen)) return false;
   return true;
 }
 
@@ -130,12 +131,13 @@ std::vector<std::string> whyEmpty(const RenderedScene& scene) {
     reasons.push_back(fmt::format("--clip-box has nothing of the data in it, which spans {} to {}",
                                   text(scene.manifest.lower), text(scene.manifest.upper)));
   } else {
-    if (outOfView(scene, lower, upper))
+    const bool out_of_view = outOfView(scene, lower, upper);
+    if (out_of_view)
       reasons.push_back(fmt::format("the camera at {} looking at {} does not see the data's box {} to {}",
                                     text(scene.camera.position), text(scene.camera.focal_point), text(lower),
                                     text(upper)));
     const double pixels = diagonalPixels(scene, lower, upper);
-    if (scene.manifest.volume > 0 && pixels < 1)
+    if (!out_of_view && scene.manifest.volume > 0 && pixels < 1)
       reasons.push_back(fmt::format(
           "what there is to see of the data is {:.2g} pixels large; bring the camera nearer, or give a "
           "smaller {}",

@@ -13,7 +13,7 @@
 
 namespace curvisplat {
 
-/// Whether no pixel differs from the background.
+/// Whether no pixel differs from the background by what a screen would show.
 bool isEmpty(const Image& image, const glm::vec4& background);
 
 /// What was rendered, for a reason to be found in it.

@@ -1,5 +1,7 @@
 #include "tools/option_parsers.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -98,6 +100,12 @@ uint64_t parseByteSize(std::string_view option, std::string_view text) {
   if (!number || shift < 0 || bytes < 1 || bytes > 0x1p62)
     throw UsageError("{} {}: expected a size such as 512M or 2G (K, M, G, T; powers of 1024)", option, text);
   return static_cast<uint64_t>(bytes);
+}
+
+uint64_t parseMemory(std::string_view option, std::string_view text) {
+  const auto pages = static_cast<uint64_t>(::sysconf(_SC_PHYS_PAGES));
+  const auto page_bytes = static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
+  return std::min(parseByteSize(option, text), pages * page_bytes);
 }
 
 uint64_t parseCount(std::string_view option, std::string_view text) {

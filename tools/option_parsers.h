@@ -30,6 +30,8 @@ std::vector<uint64_t> parseExtents(std::string_view option, std::string_view tex
 ImageSize parseImageSize(std::string_view option, std::string_view text);
 /// Bytes: a number with K, M, G or T (powers of 1024; "2G", "1.5GiB", "512MB"), or of bytes.
 uint64_t parseByteSize(std::string_view option, std::string_view text);
+/// The same, of memory: no more than the machine has.
+uint64_t parseMemory(std::string_view option, std::string_view text);
 /// A whole number of things above zero: with K, M or G (powers of 1000; "8M"), or without.
 uint64_t parseCount(std::string_view option, std::string_view text);
 /// "white", "black", "transparent" or "#rrggbb"; premultiplied red, green, blue, alpha.

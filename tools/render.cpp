@@ -79,7 +79,7 @@ FrameOptions frameOptions(const RenderWords& words) {
   if (words.clip_box) options.clip_box = parseClipBox(*words.clip_box);
   options.background = parseBackground("--background", words.background);
   options.threads = words.threads;
-  options.memory_bytes = parseByteSize("--memory", words.memory);
+  options.memory_bytes = parseMemory("--memory", words.memory);
   options.keep_going = words.keep_going;
   return options;
 }
@@ -99,10 +99,12 @@ void checkWords(const RenderWords& words, ImageSize size) {
   checkOutputFile("-o", words.output, others);
   if (words.camera.moves() && !isMovieName(words.output)) {
     const FrameNames names(words.output);
-    for (const std::filesystem::path& other : {words.first_image, words.statistics})
+    const auto check_other = [&](const char* option, const std::filesystem::path& other) {
       if (names.include(linkTarget(other), words.camera.frames.value_or(1)))
-        throw Error("-o {}: a frame would change {}; choose another name", words.output.string(),
-                    other.string());
+        throw Error("{} {}: a frame of -o would change it; choose another name", option, other.string());
+    };
+    check_other("--first-image", words.first_image);
+    check_other("--stats", words.statistics);
   }
   if (!words.first_image.empty()) {
     checkImageName(words.first_image);

@@ -29,7 +29,7 @@ void view(const ViewWords& words) {
   options.backend = parseBackend(words.backend);
   options.state = words.state;
   options.scalar = words.scalar;
-  if (words.memory) options.memory_bytes = parseByteSize("--memory", *words.memory);
+  if (words.memory) options.memory_bytes = parseMemory("--memory", *words.memory);
   if (words.frame_time) options.target_s = parsePositive("--frame-time", *words.frame_time) / 1000;
   const CacheReader cache(words.cache);
   Progress progress;

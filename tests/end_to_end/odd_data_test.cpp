@@ -133,6 +133,8 @@ TEST_F(OddDataTest, AnEmptyPictureNamesItsCause) {
               "does not see the data's box");
   expectEmpty({"--parallel-scale", "1e300"}, "give a smaller --parallel-scale");
   expectEmpty({"--position", "1e9,0,0", "--view-angle", "30"}, "bring the camera nearer");
+  render({"--position", "1e5,0,0", "--view-angle", "30"});  // of which a float picture has a trace
+  EXPECT_TRUE(said("bring the camera nearer")) << said_;
   // What is seen is of values that are transparent.
   writeFileAtomically(folder_ / "high.json",
                       std::string(R"([{"Name": "high", "RGBPoints": [0,1,0,0, 15,1,0,0],

@@ -49,6 +49,7 @@ struct HostileCache {
   explicit HostileCache(fs::path folder) : path(std::move(folder)) {
     writeRandomCache(path, 1, 200);
     manifest = nlohmann::ordered_json::parse(bytesOfFile(path / "manifest.json"));
+    manifest.erase("checksum");
     geometry = bytesOfFile(path / "geometry.bin");
     read(bytesOfFile(path / "bricks.bin"), bricks_header, sizeof(BricksHeader), bricks);
     values = bytesOfFile(path / "var.0.bin");
