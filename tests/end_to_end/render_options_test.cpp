@@ -297,6 +297,13 @@ TEST_F(RenderOptions, BadInputAndOutputAreOneLine) {
   expectRefused({"render", cache(), "-o", file("folder.png")}, 1, "folder.png");
 }
 
+TEST_F(RenderOptions, MoreMemoryThanThereIsIsABoundLikeAnyOther) {
+  render({"--memory", "1000T"});
+  const ProgramResult result = runProgram(
+      {"convert", file("plain.xyz"), file("plain.fun"), "-o", file("bounded.splats"), "--memory", "1000T"});
+  EXPECT_EQ(result.status, 0) << result.err;
+}
+
 TEST_F(RenderOptions, AnUnknownScalarNamesThoseThereAre) {
   const ProgramResult result = runProgram({"render", cache(), "-o", file("a.png"), "--scalar", "entropy"});
   EXPECT_NE(result.err.find("it has f"), std::string::npos) << result.err;
