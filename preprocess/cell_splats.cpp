@@ -163,18 +163,6 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
       *value++ = {mean, scale * rotate(gradient * jacobian), 0.0};
     }
   };
-  // `rotate` gives Q's image of a vector.
-  const auto set_border = [&](const auto& rotate) {
-    std::array<glm::dvec3, 3> axes;
-    size_t count = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      if (inwards[axis] == 0) continue;
-      glm::dvec3 along(0.0);
-      along[axis] = inwards[axis];
-      axes[count++] = rotate(along);
-    }
-    splat.half_cell = count > 0 ? packHalfCell({axes.data(), count}) : kNoBorder;
-  };
   // Axes that have the volume of the hexahedron, where they are near it; a weight of its own elsewhere.
   const auto set_volume = [&](double determinant) {
     const double volume = determinant + hexahedron.volume_beyond;
@@ -198,7 +186,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     const double scale = set_volume(lq.determinant);
     const auto rotate = [&](const glm::dvec3& v) { return lq.rotate(v); };
     set_values(scale, rotate);
-    set_border(rotate);
+    splat.half_cell = borderCode(inwards, rotate);
   } else {
     const CellShape shape = shapeFromJacobian(jacobian, smallestAxis(hexahedron.centre));
     splat.splat.axis = shape.axis;
@@ -213,7 +201,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     }
     const auto rotate = [&](const glm::dvec3& v) { return shape.rotation * v; };
     set_values(scale, rotate);
-    set_border(rotate);
+    splat.half_cell = borderCode(inwards, rotate);
   }
   ++count_;
 }

@@ -166,18 +166,6 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     }
   };
 
-  const auto set_half_cell = [&](const auto& rotate) {
-    std::array<glm::dvec3, 3> axes;
-    size_t count = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      if (inwards[axis] == 0) continue;
-      glm::dvec3 along(0.0);
-      along[axis] = inwards[axis];
-      axes[count++] = rotate(along);
-    }
-    node.half_cell = count > 0 ? packHalfCell({axes.data(), count}) : kNoBorder;
-  };
-
   const LqFactors lq({jacobian[0].x, jacobian[1].x, jacobian[2].x},
                      {jacobian[0].y, jacobian[1].y, jacobian[2].y},
                      {jacobian[0].z, jacobian[1].z, jacobian[2].z});
@@ -187,7 +175,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     node.splat.shear = {a.a10 * lq.inverse_a00, a.a20 * lq.inverse_a00, a.a21 * lq.inverse_a11};
     node.splat.weight = a.a00 * a.a11 * a.a22 * weight_factor;
     node.regular = weight_factor == 1;
-    set_half_cell([&](const glm::dvec3& v) { return lq.rotate(v); });
+    node.half_cell = borderCode(inwards, [&](const glm::dvec3& v) { return lq.rotate(v); });
     (lq.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
     set_values([&](const glm::dvec3& gradient) { return lq.rotate(gradient); },
                [&](const glm::dvec3& v) {
@@ -201,7 +189,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     node.splat.shear = shape.shear;
     node.splat.weight = std::abs(shape.determinant) * weight_factor;
     node.regular = !shape.floored;
-    set_half_cell([&](const glm::dvec3& v) { return shape.rotation * v; });
+    node.half_cell = borderCode(inwards, [&](const glm::dvec3& v) { return shape.rotation * v; });
     (shape.floored ? out_.degenerate : shape.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
     // Where an axis was raised there is no telling a bend of the scalar from one of the coordinates.
     set_values([&](const glm::dvec3& gradient) { return shape.rotation * gradient; },

@@ -15,6 +15,7 @@
 // inwards. Without any neighbour along an axis the column is zero.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -27,6 +28,21 @@ namespace curvisplat {
 
 /// Half the variance of the kernel along an axis: 0.44655², as in render/kernel.h, which is not for here.
 inline constexpr double kBend = 0.5 * 0.44655 * 0.44655;
+
+/// Where a cell ends, as stream/half_cell.h codes it. `inwards`: along i, j, k, 1 or -1 from a border;
+/// `rotate` gives Q's image of a vector.
+template <typename Rotate>
+uint32_t borderCode(const std::array<double, 3>& inwards, const Rotate& rotate) {
+  std::array<glm::dvec3, 3> axes;
+  size_t count = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (inwards[axis] == 0) continue;
+    glm::dvec3 along(0.0);
+    along[axis] = inwards[axis];
+    axes[count++] = rotate(along);
+  }
+  return count > 0 ? packHalfCell({axes.data(), count}) : kNoBorder;
+}
 
 /// A node's splat on its way into the cache.
 struct NodeSplat {
