@@ -16,8 +16,11 @@ std::array<uint64_t, 3> cellsOf(const GridBlock& block) {
   return {along(block.ni), along(block.nj), along(block.nk)};
 }
 
-uint64_t facesOf(const std::array<uint64_t, 3>& cells) {
-  return 2 * (cells[1] * cells[2] + cells[0] * cells[2] + cells[0] * cells[1]);
+/// The axes along a side.
+constexpr std::array<std::array<size_t, 2>, 3> kAlong{{{1, 2}, {0, 2}, {0, 1}}};
+
+uint64_t facesOfSide(const std::array<uint64_t, 3>& cells, size_t axis) {
+  return cells[kAlong[axis][0]] * cells[kAlong[axis][1]];
 }
 
 /// The mean of the corners whose bits under `mask` are those of `bits`.
@@ -33,7 +36,8 @@ glm::dvec3 middle(const std::array<glm::dvec3, 8>& corners, size_t mask, size_t 
 
 AbuttingFaces::Needs AbuttingFaces::needsOf(std::span<const GridBlock> blocks) {
   uint64_t faces = 0;
-  for (const GridBlock& block : blocks) faces += facesOf(cellsOf(block));
+  for (const GridBlock& block : blocks)
+    for (const size_t axis : {0u, 1u, 2u}) faces += 2 * facesOfSide(cellsOf(block), axis);
   return {faces / 8, faces * SeamSorter::recordBytes(0)};
 }
 
@@ -42,8 +46,11 @@ AbuttingFaces::AbuttingFaces(std::span<const GridBlock> blocks, int coordinate_b
     : coordinate_bytes_(coordinate_bytes), centres_(0, memory_bytes, std::move(temporary_folder)) {
   uint64_t faces = 0;
   for (const GridBlock& block : blocks) {
-    blocks_.push_back({cellsOf(block), faces});
-    faces += facesOf(blocks_.back().cells);
+    Block& added = blocks_.emplace_back(Block{cellsOf(block), {}});
+    for (const size_t axis : {0u, 1u, 2u}) {
+      added.first_face[axis] = faces;
+      faces += 2 * facesOfSide(added.cells, axis);
+    }
   }
   abutting_.resize(faces);
 }
@@ -55,16 +62,10 @@ bool AbuttingFaces::isAtEnd(const CellFace& face) const {
 
 uint64_t AbuttingFaces::numberOf(const CellFace& face) const {
   const auto& [cells, first_face] = blocks_[face.block];
-  uint64_t number = first_face;
-  for (int axis = 0; axis <= face.axis; ++axis) {
-    const size_t b = axis == 0 ? 1 : 0, c = axis == 2 ? 1 : 2;
-    const uint64_t a_side = cells[b] * cells[c];
-    if (axis < face.axis)
-      number += 2 * a_side;
-    else
-      number += (face.upper ? a_side : 0) + face.cell[c] * cells[b] + face.cell[b];
-  }
-  return number;
+  const auto axis = static_cast<size_t>(face.axis);
+  const auto [a, b] = kAlong[axis];
+  return first_face[axis] + (face.upper ? facesOfSide(cells, axis) : 0) + face.cell[b] * cells[a] +
+         face.cell[a];
 }
 
 AbuttingFaces::Centre AbuttingFaces::centreOf(const CellFace& face,

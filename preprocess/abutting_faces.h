@@ -66,7 +66,7 @@ class AbuttingFaces {
 
   struct Block {
     std::array<uint64_t, 3> cells;
-    uint64_t first_face;
+    std::array<uint64_t, 3> first_face;  // of an axis' lower side; those of its upper side follow
   };
   std::vector<Block> blocks_;
   int coordinate_bytes_;

@@ -45,10 +45,14 @@ uint64_t leastMemory(size_t variables) {
   return (exact + held_back + 16 * kMiB - 1) / (16 * kMiB) * (16 * kMiB);
 }
 
-uint64_t defaultMemory() {
+uint64_t machineMemory() {
   const auto pages = static_cast<uint64_t>(::sysconf(_SC_PHYS_PAGES));
   const auto page_bytes = static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
-  return std::min<uint64_t>(2048 * kMiB, pages * page_bytes / 4);
+  return pages * page_bytes;
+}
+
+uint64_t defaultMemory() {
+  return std::min<uint64_t>(2048 * kMiB, machineMemory() / 4);
 }
 
 MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads) {

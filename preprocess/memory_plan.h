@@ -44,6 +44,9 @@ struct MemoryPlan {
 /// The smallest cap that conversion of so many variables keeps.
 uint64_t leastMemory(size_t variables);
 
+/// What the machine has.
+uint64_t machineMemory();
+
 /// 2 GiB or a quarter of the machine's memory, the smaller.
 uint64_t defaultMemory();
 

@@ -66,9 +66,9 @@ class RunReader {
 
 SeamSorter::SeamSorter(size_t variables, uint64_t memory_bytes, std::filesystem::path temporary_folder)
     : variables_(variables),
-      record_size_(kNodeSize + variables * kScalarSize),
+      record_size_(recordBytes(variables) / sizeof(double)),
       memory_bytes_(memory_bytes),
-      capacity_(std::max<uint64_t>(1, memory_bytes / (record_size_ * sizeof(double) + sizeof(Entry)))),
+      capacity_(std::max<uint64_t>(1, memory_bytes / (recordBytes(variables) + sizeof(Entry)))),
       folder_(std::move(temporary_folder)) {}
 
 size_t SeamSorter::recordBytes(size_t variables) {

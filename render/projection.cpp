@@ -205,8 +205,12 @@ std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<c
     best = std::max(best, fate);
     return true;
   };
-  BorderPieces parts{whole};
-  const size_t count = borders ? partsAtBorder(whole, half_cell, *borders, parts) : 1;
+  BorderPieces parts;
+  size_t count = 1;
+  if (half_cell == kNoBorder)
+    parts[0] = whole;
+  else
+    count = partsAtBorder(whole, half_cell, *borders, parts);
   for (size_t n = 0; n < count; ++n)
     if (!place(map, parts[n], left.looks, take)) return {};
   return best;

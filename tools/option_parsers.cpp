@@ -1,13 +1,12 @@
 #include "tools/option_parsers.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <limits>
 #include <optional>
 
+#include "preprocess/memory_plan.h"
 #include "stream/error.h"
 
 namespace curvisplat {
@@ -103,9 +102,7 @@ uint64_t parseByteSize(std::string_view option, std::string_view text) {
 }
 
 uint64_t parseMemory(std::string_view option, std::string_view text) {
-  const auto pages = static_cast<uint64_t>(::sysconf(_SC_PHYS_PAGES));
-  const auto page_bytes = static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
-  return std::min(parseByteSize(option, text), pages * page_bytes);
+  return std::min(parseByteSize(option, text), machineMemory());
 }
 
 uint64_t parseCount(std::string_view option, std::string_view text) {

@@ -8,12 +8,13 @@
 #include <system_error>
 
 #include "stream/error.h"
+#include "stream/file.h"
 #include "stream/paths.h"
 
 namespace curvisplat {
 
 void checkOutputFolder(std::string_view option, const std::filesystem::path& path) {
-  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  const std::filesystem::path folder = folderOf(path);
   std::error_code ignored;
   if (!std::filesystem::is_directory(folder, ignored))
     throw Error("{} {}: there is no folder {}; make it first", option, path.string(), folder.string());
