@@ -13,6 +13,7 @@
 #include "preprocess/open_grid.h"
 #include "preprocess/scenes.h"
 #include "render/image.h"
+#include "render/image_file.h"
 #include "stream/file.h"
 #include "tests/support/cell_grid.h"
 #include "tests/support/grid_field.h"

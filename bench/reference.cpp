@@ -10,6 +10,7 @@
 #include "preprocess/open_grid.h"
 #include "preprocess/scenes.h"
 #include "render/image.h"
+#include "render/image_file.h"
 #include "stream/error.h"
 #include "tests/support/grid_field.h"
 #include "tests/support/known_pictures.h"

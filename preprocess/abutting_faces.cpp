@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "preprocess/seam_sorter.h"
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

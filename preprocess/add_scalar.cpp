@@ -18,11 +18,13 @@
 #include "preprocess/scratch_folder.h"
 #include "preprocess/seams.h"
 #include "preprocess/value_buckets.h"
+#include "preprocess/value_record.h"
 #include "stream/cache_lock.h"
 #include "stream/cache_reader.h"
 #include "stream/checksum.h"
 #include "stream/error.h"
 #include "stream/file.h"
+#include "stream/paths.h"
 #include "stream/variable_writer.h"
 
 namespace curvisplat {
@@ -99,8 +101,9 @@ class Addition {
     checkBlocks(source.description(), cache_);
     checkCentring();
     checkNames(report_.scalars, cache_);
-    checkDiskSpace(diskNeedsOfAdding(manifest().splats, options.scalars.size()), options.cache,
-                   temporaryFolder(options));
+    checkDiskSpace(diskNeedsOfAdding(manifest().splats, options.scalars.size(),
+                                     leastValueRecordBytes(options.scalars.size())),
+                   options.cache, temporaryFolder(options));
   }
 
   AddScalarReport run() {
@@ -183,7 +186,8 @@ class Addition {
 
     tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
     streamSplats(
-        reader_, nullptr, plan_.slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, *seams_, progress_);
+        reader_, nullptr, plan_.slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, *seams_,
+        progress_);
     for (ValueSink& sink : sinks) sink.flush();
   }
 

@@ -16,7 +16,7 @@
 #include "preprocess/hexahedron.h"
 #include "preprocess/node_reader.h"
 #include "preprocess/slabs.h"
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

@@ -13,8 +13,8 @@
 #include <optional>
 #include <thread>
 
+#include "stream/check.h"
 #include "stream/checksum.h"
-#include "stream/error.h"
 #include "stream/file.h"
 
 namespace curvisplat {

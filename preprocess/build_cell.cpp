@@ -10,6 +10,7 @@
 
 #include "preprocess/merge_levels.h"
 #include "preprocess/splat_record.h"
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

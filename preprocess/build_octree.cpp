@@ -11,7 +11,7 @@
 #include "preprocess/divide_bucket.h"
 #include "preprocess/merge_levels.h"
 #include "preprocess/splat_record.h"
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

@@ -12,7 +12,7 @@
 #include "preprocess/lq.h"
 #include "preprocess/node_reader.h"
 #include "preprocess/shape.h"
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

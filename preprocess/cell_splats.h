@@ -21,9 +21,6 @@
 
 namespace curvisplat {
 
-/// A cell's own nodes, and those of its neighbours.
-inline constexpr Halo kCellHalo{1, 2};
-
 /// What is beyond the ends of a block.
 struct BlockEnds {
   size_t block = 0;

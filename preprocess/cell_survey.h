@@ -2,7 +2,8 @@
 #pragma once
 
 #include "preprocess/abutting_faces.h"
-#include "preprocess/scan.h"
+#include "preprocess/grid_survey.h"
+#include "stream/progress.h"
 
 namespace curvisplat {
 

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "preprocess/data_library_lock.h"
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

@@ -9,7 +9,7 @@
 #include <set>
 #include <utility>
 
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

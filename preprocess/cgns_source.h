@@ -13,7 +13,7 @@
 #include "preprocess/cgns_file.h"
 #include "preprocess/cgns_tree.h"
 #include "preprocess/grid_source.h"
-#include "preprocess/open_grid.h"
+#include "preprocess/open_grid_options.h"
 
 namespace curvisplat {
 

@@ -8,6 +8,7 @@
 #include <atomic>
 
 #include "preprocess/stored_values.h"
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

@@ -27,6 +27,7 @@
 #include "stream/file.h"
 #include "stream/manifest.h"
 #include "stream/partial_folder.h"
+#include "stream/paths.h"
 
 namespace curvisplat {
 namespace {

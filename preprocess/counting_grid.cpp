@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

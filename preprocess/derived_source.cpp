@@ -8,6 +8,7 @@
 #include "preprocess/flow_window.h"
 #include "preprocess/scalar_names.h"
 #include "preprocess/slabs.h"
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

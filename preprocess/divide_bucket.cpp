@@ -8,7 +8,7 @@
 #include "preprocess/plan_buckets.h"
 #include "preprocess/scatter.h"
 #include "preprocess/splat_record.h"
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

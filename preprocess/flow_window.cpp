@@ -6,8 +6,8 @@
 #include <glm/matrix.hpp>
 #include <limits>
 
-#include "preprocess/cell_splats.h"
 #include "preprocess/lattice_gradient.h"
+#include "preprocess/slabs.h"
 
 namespace curvisplat {
 namespace {

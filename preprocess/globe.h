@@ -2,17 +2,9 @@
 // kilometres, so that the horizontal and the vertical are of one measure.
 #pragma once
 
-#include <optional>
+#include "preprocess/open_grid_options.h"
 
 namespace curvisplat {
-
-/// What the user says of grids of the earth.
-struct GlobeOptions {
-  enum class Shape { automatic, sphere, flat };
-  Shape shape = Shape::automatic;  // automatic: a sphere for degrees, flat for lengths
-  double radius_km = 6371;
-  double vertical_scale = 1;
-};
 
 /// Of one direction of the horizontal: the unit vector of a longitude and a latitude, or a place on the map.
 struct GlobeColumn {

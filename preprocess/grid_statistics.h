@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "preprocess/grid_source.h"
+#include "preprocess/grid_survey.h"
 #include "preprocess/node_reader.h"
-#include "preprocess/scan.h"
 #include "stream/progress.h"
 
 namespace curvisplat {

@@ -10,8 +10,6 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
-#include "preprocess/shape.h"
-
 namespace curvisplat {
 
 struct Lower3 {
@@ -63,20 +61,5 @@ class LqFactors {
   double scale_, first_sign_;
   double cosine_, sine_, last_sign_;
 };
-
-/// True only if every singular value of `a` is above kAxisFloor times the largest: with singular values s0 >=
-/// s1 >= s2, s2 = det / (s0 s1) >= det / ‖adj a‖ and s0 <= ‖a‖ (Frobenius norms). Says no from an aspect
-/// ratio of a third of the limit on, and for lengths whose sixth power leaves the range of double; those are
-/// for the slow and exact way.
-inline bool surelyAboveFloor(const Lower3& a) {
-  const double norm2 =
-      a.a00 * a.a00 + a.a10 * a.a10 + a.a11 * a.a11 + a.a20 * a.a20 + a.a21 * a.a21 + a.a22 * a.a22;
-  const double c0 = a.a11 * a.a22, c1 = a.a10 * a.a22, c2 = a.a10 * a.a21 - a.a11 * a.a20;
-  const double c3 = a.a00 * a.a22, c4 = a.a00 * a.a21, c5 = a.a00 * a.a11;
-  const double adjugate2 = c0 * c0 + c1 * c1 + c2 * c2 + c3 * c3 + c4 * c4 + c5 * c5;
-  const double determinant = c5 * a.a22;
-  constexpr double kMargin = 1.01;  // for the rounding of c2
-  return determinant * determinant > kMargin * kAxisFloor * kAxisFloor * norm2 * adjugate2;
-}
 
 }  // namespace curvisplat

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

@@ -13,6 +13,7 @@
 
 #include "preprocess/data_library_lock.h"
 #include "preprocess/netcdf_classic.h"
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

@@ -9,6 +9,7 @@
 #include "preprocess/cf_roles.h"
 #include "preprocess/scalar_names.h"
 #include "preprocess/time_steps.h"
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

@@ -15,7 +15,7 @@
 #include "preprocess/globe.h"
 #include "preprocess/grid_source.h"
 #include "preprocess/netcdf_file.h"
-#include "preprocess/open_grid.h"
+#include "preprocess/open_grid_options.h"
 
 namespace curvisplat {
 

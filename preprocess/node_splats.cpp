@@ -10,7 +10,7 @@
 
 #include "preprocess/lq.h"
 #include "preprocess/shape.h"
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "preprocess/stored_values.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

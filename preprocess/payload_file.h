@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-#include "preprocess/plot3d_layout.h"
+#include "preprocess/byte_order.h"
 #include "stream/error.h"
 #include "stream/file.h"
 

@@ -7,6 +7,7 @@
 
 #include "preprocess/ascii_spool.h"
 #include "preprocess/plot3d_plausibility.h"
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

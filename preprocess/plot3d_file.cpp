@@ -5,7 +5,7 @@
 #include <type_traits>
 
 #include "preprocess/stored_values.h"
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

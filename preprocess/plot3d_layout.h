@@ -10,25 +10,15 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
+#include "preprocess/byte_order.h"
+#include "preprocess/open_grid_options.h"
+
 namespace curvisplat {
 
-enum class ByteOrder { little, big };
-enum class RecordMarkers { none, bytes4, bytes8 };
 enum class Plot3dKind { grid, q, overflow, function };
-
-/// What the user says of a layout; the rest is detected.
-struct Plot3dForce {
-  std::optional<bool> ascii;
-  std::optional<ByteOrder> byte_order;
-  std::optional<RecordMarkers> records;
-  std::optional<int> precision_bytes;  // 4 or 8
-  std::optional<bool> multi_block;
-  std::optional<bool> blanking;
-};
 
 /// An ASCII file's layout is that of its spool (ascii_spool.h): numbers and integers are doubles in the
 /// machine's byte order, without records.

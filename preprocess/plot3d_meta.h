@@ -10,7 +10,7 @@
 #include <memory>
 
 #include "preprocess/grid_source.h"
-#include "preprocess/open_grid.h"
+#include "preprocess/open_grid_options.h"
 #include "stream/file.h"
 
 namespace curvisplat {

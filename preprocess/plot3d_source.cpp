@@ -6,6 +6,7 @@
 #include <set>
 
 #include "preprocess/plot3d_detect.h"
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "preprocess/grid_source.h"
-#include "preprocess/open_grid.h"
+#include "preprocess/open_grid_options.h"
 #include "preprocess/plot3d_file.h"
 
 namespace curvisplat {

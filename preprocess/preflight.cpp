@@ -10,10 +10,10 @@
 #include <optional>
 
 #include "preprocess/splat_record.h"
-#include "preprocess/value_record.h"
 #include "stream/error.h"
 #include "stream/file.h"
 #include "stream/partial_folder.h"
+#include "stream/paths.h"
 
 namespace curvisplat {
 namespace {
@@ -71,8 +71,8 @@ ConversionEstimate estimateConversion(uint64_t splats, unsigned threads) {
           kUsualStartSeconds + count / (kUsualSplatsPerSecond * std::max(1u, threads))};
 }
 
-DiskNeeds diskNeedsOfAdding(uint64_t splats, size_t variables) {
-  return {withMargin(splats * leastValueRecordBytes(variables)), splats * variables * kCacheBytesPerScalar};
+DiskNeeds diskNeedsOfAdding(uint64_t splats, size_t variables, size_t record_bytes) {
+  return {withMargin(splats * record_bytes), splats * variables * kCacheBytesPerScalar};
 }
 
 void checkWritable(const std::filesystem::path& folder, const char* hint) {

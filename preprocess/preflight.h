@@ -15,8 +15,8 @@ struct DiskNeeds {
   uint64_t cache_bytes = 0;
 };
 DiskNeeds diskNeeds(uint64_t nodes, size_t variables);
-/// The same for adding variables to a cache of so many splats.
-DiskNeeds diskNeedsOfAdding(uint64_t splats, size_t variables);
+/// The same for adding variables to a cache; `record_bytes`: what a splat takes in the temporary file.
+DiskNeeds diskNeedsOfAdding(uint64_t splats, size_t variables, size_t record_bytes);
 
 /// What conversion with one scalar takes, as a rule of thumb from grids that were measured: it differs with
 /// the grid's shape, the scalar and the machine.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "preprocess/counting_grid.h"
+#include "preprocess/grid_survey.h"
 #include "preprocess/node_reader.h"
 #include "stream/octree.h"
 #include "stream/progress.h"
@@ -15,20 +16,6 @@
 namespace curvisplat {
 
 class AbuttingFaces;
-
-struct ScalarRange {
-  double min = std::numeric_limits<double>::infinity();
-  double max = -std::numeric_limits<double>::infinity();
-};
-
-/// Of the nodes that are there; of cell-centred scalars, of the cells that are (corners, for the bounds).
-struct GridSurvey {
-  uint64_t nodes = 0;  // or cells; of the grid, blanked ones included
-  BlankCounts blanked;
-  glm::dvec3 lower{std::numeric_limits<double>::infinity()};
-  glm::dvec3 upper{-std::numeric_limits<double>::infinity()};
-  std::vector<ScalarRange> ranges;  // [scalar]
-};
 
 /// Reads all nodes once. Memory: two slabs. Throws Error if no node is there, or if the grid is larger or
 /// smaller than single precision can say. Where scalars stand in cells, those at the blocks' ends are added

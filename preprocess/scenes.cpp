@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

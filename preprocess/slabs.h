@@ -16,6 +16,9 @@ namespace curvisplat {
 struct Halo {
   uint64_t before = 0, after = 0;
 };
+
+/// A cell's own nodes, and those of its neighbours.
+inline constexpr Halo kCellHalo{1, 2};
 inline constexpr Halo kNoHalo{0, 0};
 inline constexpr Halo kNodeHalo{1, 1};  // a node's neighbours
 

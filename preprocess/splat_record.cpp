@@ -4,7 +4,7 @@
 #include <bit>
 #include <limits>
 
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <atomic>
 
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 

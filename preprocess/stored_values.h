@@ -8,7 +8,7 @@
 #include <cstring>
 #include <type_traits>
 
-#include "preprocess/plot3d_layout.h"
+#include "preprocess/byte_order.h"
 
 namespace curvisplat {
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 

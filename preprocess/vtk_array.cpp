@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "preprocess/stored_values.h"
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "preprocess/byte_order.h"
 #include "preprocess/byte_source.h"
-#include "preprocess/plot3d_layout.h"
 #include "preprocess/spool_file.h"
 #include "preprocess/text_reader.h"
 

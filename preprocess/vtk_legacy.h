@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "preprocess/open_grid.h"
+#include "preprocess/open_grid_options.h"
 #include "stream/file.h"
 
 namespace curvisplat {

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "preprocess/vtk_box.h"
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

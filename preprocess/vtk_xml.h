@@ -5,7 +5,7 @@
 #include <memory>
 #include <string_view>
 
-#include "preprocess/open_grid.h"
+#include "preprocess/open_grid_options.h"
 #include "preprocess/vtk_xml_file.h"
 
 namespace curvisplat {

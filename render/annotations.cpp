@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "render/axis_ticks.h"
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

@@ -6,6 +6,7 @@
 #include "render/egl_context.h"
 #include "render/gl_painter.h"
 #include "render/gl_thread.h"
+#include "render/offscreen_context.h"
 #include "stream/error.h"
 
 namespace curvisplat {

@@ -6,14 +6,9 @@
 #include <glm/vec3.hpp>
 #include <string_view>
 
+#include "render/image_size.h"
+
 namespace curvisplat {
-
-struct ImageSize {
-  int width = 600;
-  int height = 600;
-
-  uint64_t pixels() const { return static_cast<uint64_t>(width) * static_cast<uint64_t>(height); }
-};
 
 enum class Projection { orthographic, perspective };
 

@@ -1,6 +1,6 @@
 #include "render/classification.h"
 
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

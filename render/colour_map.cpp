@@ -7,7 +7,7 @@
 #include <glm/mat3x3.hpp>
 #include <numbers>
 
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

@@ -14,80 +14,23 @@
 
 #include <cstdint>
 #include <functional>
-#include <glm/vec3.hpp>
-#include <glm/vec4.hpp>
 #include <memory>
-#include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "render/backend.h"
 #include "render/camera.h"
+#include "render/cancelled.h"
 #include "render/first_picture.h"
+#include "render/frame_options.h"
+#include "render/frame_statistics.h"
 #include "render/image.h"
-#include "render/projection.h"
+#include "render/screen_view.h"
 #include "render/transfer_function.h"
-#include "stream/brick_source.h"
 #include "stream/cache_reader.h"
 #include "stream/progress.h"
 
 namespace curvisplat {
-
-enum class Classification { pixel, flat };  // flat: one colour and extinction a splat, as in the paper
-
-struct FrameOptions {
-  ImageSize size;
-  Classification classification = Classification::pixel;
-  double lod_pixels = 1;               // screen-space error allowed; 0 is the finest level
-  std::optional<uint64_t> max_splats;  // read at most these, from the levels that make the best of them
-  glm::dvec3 scale{1.0};               // stretches the data: D S Dᵀ, V det D, about the world's origin
-  std::optional<WorldBox> clip_box;    // splats whose centre is outside are not drawn
-  glm::vec4 background{1, 1, 1, 1};    // premultiplied
-  double low_pass_px2 = kLowPass;      // added to S2's diagonal
-  unsigned threads = 0;                // workers; 0: one a core
-  uint64_t memory_bytes = 512 << 20;
-  uint64_t output_bytes = 0;  // of memory_bytes: left for what is done with the image
-  bool keep_going = false;    // draw damaged bricks from an ancestor, and report them
-  PagerOptions::Way read_by = PagerOptions::Way::automatic;
-  bool direct_reads = true;  // past the page cache, where the file system can
-};
-
-/// A brick that was drawn from its nearest readable ancestor, or left out if there is none.
-struct BrickFailure {
-  uint32_t brick = 0;
-  std::string reason;  // one line
-};
-
-/// What render() throws when cancel() was called.
-class Cancelled : public std::runtime_error {
- public:
-  Cancelled() : std::runtime_error("the frame was cancelled") {}
-};
-
-/// Seconds are summed over threads for the workers' stages.
-struct FrameStatistics : FetchStatistics {
-  double plan_s = 0, project_s = 0, sort_s = 0, upload_s = 0, draw_s = 0, total_s = 0;
-  double gl_draw_s = 0;         // by OpenGL's own clock
-  double workers_waited_s = 0;  // for room in the ring: the painter is slower; for reads: read_waited_s
-  double painter_waited_s = 0;  // for the workers
-  uint64_t bricks_drawn = 0;    // in whole or in part; one that is drawn in several parts counts for each
-  uint64_t bricks_culled = 0;   // each stands for all below it; those are
-  uint64_t bricks_out_of_image = 0, bricks_transparent = 0;
-  uint64_t splats_read = 0;
-  uint64_t splats_clipped = 0, splats_off_screen = 0, splats_transparent = 0;  // read, and not drawn, since
-  uint64_t splats_drawn = 0;
-  /// Parts that were left out because what is before them hides them, and splats handed to the painter for
-  /// which it found that. How many depends on how far the stages are ahead of one another; the picture does
-  /// not.
-  uint64_t bricks_hidden = 0, splats_hidden = 0;
-  int largest_level = 0;
-  double largest_error_px = 0;  // on the screen, of what is drawn; infinite around a perspective eye
-  unsigned workers = 0;
-  uint64_t ring_peak_bytes = 0;
-  uint64_t memory_used_bytes = 0;  // of memory_bytes: what the stages have, and decoded bricks that are kept
-  std::vector<BrickFailure> bricks_unreadable;  // with keep_going; by number
-};
 
 /// Draws frames of one variable of one cache. Owns what reads, prepares and draws, and the memory that
 /// they share: decoded bricks stay for the next frame. One caller at a time (but see cancel()); the cache

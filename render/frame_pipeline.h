@@ -16,8 +16,10 @@
 #include <mutex>
 
 #include "render/backend.h"
-#include "render/frame.h"
+#include "render/cancelled.h"
+#include "render/frame_options.h"
 #include "render/frame_plan.h"
+#include "render/frame_statistics.h"
 #include "render/hidden_bricks.h"
 #include "stream/cache_reader.h"
 #include "stream/progress.h"

@@ -5,9 +5,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "render/camera.h"
 #include "render/classification.h"
 #include "render/first_picture.h"
-#include "render/frame.h"
+#include "render/frame_options.h"
 #include "render/projection.h"
 #include "stream/cache_reader.h"
 #include "stream/cut.h"

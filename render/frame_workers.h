@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "render/classification.h"
-#include "render/frame.h"
+#include "render/frame_statistics.h"
 #include "render/hidden_bricks.h"
 #include "render/projection.h"
 #include "render/segment_ring.h"

@@ -2,8 +2,6 @@
 
 #include <sstream>
 
-#include "render/egl_context.h"
-#include "render/osmesa_context.h"
 #include "stream/error.h"
 
 namespace curvisplat {
@@ -36,9 +34,5 @@ GlContext::GlContext(const std::string& library, const GlFunctions::Lookup& look
     : functions_(lookup),
       name_(describe(library, functions_)),
       software_(isSoftwareRenderer(text(functions_, GL_RENDERER))) {}
-
-std::unique_ptr<GlContext> makeOffscreenContext(GlLibrary library) {
-  return library == GlLibrary::egl ? makeEglContext() : makeOsMesaContext();
-}
 
 }  // namespace curvisplat

@@ -1,7 +1,6 @@
-// An OpenGL context to draw in without a window, from whatever library the machine has.
+// An OpenGL context to draw in without a window.
 #pragma once
 
-#include <memory>
 #include <string>
 
 #include "render/gl_functions.h"
@@ -29,12 +28,5 @@ class GlContext {
   std::string name_;
   bool software_ = true;
 };
-
-/// The libraries that give a context without a window.
-enum class GlLibrary { osmesa, egl };
-
-/// A core context of OpenGL 3.3 or newer, made current on the calling thread. Throws Error: what was tried,
-/// and what it said.
-std::unique_ptr<GlContext> makeOffscreenContext(GlLibrary library);
 
 }  // namespace curvisplat

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "render/offscreen_context.h"
 #include "stream/thread_name.h"
 
 namespace curvisplat {

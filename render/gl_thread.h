@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "render/gl_context.h"
+#include "render/offscreen_context.h"
 
 namespace curvisplat {
 

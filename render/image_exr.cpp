@@ -14,6 +14,7 @@
 #include <string_view>
 
 #include "render/image_formats.h"
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

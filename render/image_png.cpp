@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "render/image_formats.h"
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

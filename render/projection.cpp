@@ -8,7 +8,7 @@
 #include "render/splat_cutter.h"
 #include "render/splat_ellipse.h"
 #include "render/splat_maps.h"
-#include "stream/error.h"
+#include "stream/check.h"
 #include "stream/half_cell.h"
 
 namespace curvisplat {

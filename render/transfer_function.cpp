@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

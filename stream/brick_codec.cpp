@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "stream/check.h"
 #include "stream/checksum.h"
 #include "stream/error.h"
 #include "stream/geometry_codec.h"

@@ -8,8 +8,8 @@
 #include <mutex>
 #include <sstream>
 
+#include "stream/check.h"
 #include "stream/checksum.h"
-#include "stream/error.h"
 
 namespace curvisplat {
 namespace {

@@ -5,7 +5,7 @@
 #include <unordered_set>
 #include <utility>
 
-#include "stream/error.h"
+#include "stream/check.h"
 #include "stream/stage_timer.h"
 
 namespace curvisplat {

@@ -6,6 +6,7 @@
 
 #include "stream/cache_file.h"
 #include "stream/cache_format.h"
+#include "stream/check.h"
 #include "stream/checksum.h"
 #include "stream/error.h"
 
@@ -260,6 +261,12 @@ std::vector<BrickVariable> readVariableTable(const InputFile& file, const Manife
   for (const BrickVariable& variable : table) extents.push_back(variable.values);
   checkExtents(file.path(), extents, sizeof header, header.table_offset);
   return table;
+}
+
+uint64_t geometryChecksum(std::span<const Brick> bricks) {
+  Checksum checksum;
+  for (const Brick& brick : bricks) checksum.add(std::as_bytes(std::span(&brick.geometry.checksum, 1)));
+  return checksum.value();
 }
 
 }  // namespace curvisplat

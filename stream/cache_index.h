@@ -27,4 +27,7 @@ std::vector<BrickVariable> readVariableTable(const InputFile& file, const Manife
 const FileInfo& checkFile(const InputFile& file, const Manifest& manifest);
 const FileInfo& checkFile(const std::filesystem::path& path, uint64_t bytes, const Manifest& manifest);
 
+/// The checksum of a geometry file: that of its bricks' checksums, in the order of bricks.bin.
+uint64_t geometryChecksum(std::span<const Brick> bricks);
+
 }  // namespace curvisplat

@@ -7,6 +7,7 @@
 #include "stream/cache_file.h"
 #include "stream/cache_format.h"
 #include "stream/cache_index.h"
+#include "stream/check.h"
 #include "stream/checksum.h"
 #include "stream/error.h"
 #include "stream/file.h"

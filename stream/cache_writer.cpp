@@ -7,6 +7,7 @@
 #include "stream/brick_log.h"
 #include "stream/cache_format.h"
 #include "stream/cache_index.h"
+#include "stream/check.h"
 #include "stream/checksum.h"
 #include "stream/error.h"
 #include "stream/file.h"

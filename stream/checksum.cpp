@@ -27,10 +27,4 @@ uint64_t Checksum::value() const {
   return XXH3_64bits_digest(static_cast<const XXH3_state_t*>(state_));
 }
 
-uint64_t geometryChecksum(std::span<const Brick> bricks) {
-  Checksum checksum;
-  for (const Brick& brick : bricks) checksum.add(std::as_bytes(std::span(&brick.geometry.checksum, 1)));
-  return checksum.value();
-}
-
 }  // namespace curvisplat

@@ -5,8 +5,6 @@
 #include <cstdint>
 #include <span>
 
-#include "stream/brick.h"
-
 namespace curvisplat {
 
 uint64_t checksumOf(std::span<const std::byte> bytes);
@@ -25,8 +23,5 @@ class Checksum {
  private:
   void* state_;  // XXH3_state_t
 };
-
-/// The checksum of a geometry file: that of its bricks' checksums, in the order of bricks.bin.
-uint64_t geometryChecksum(std::span<const Brick> bricks);
 
 }  // namespace curvisplat

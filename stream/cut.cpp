@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 #include <queue>
 
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

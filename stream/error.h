@@ -1,7 +1,6 @@
 // What goes wrong outside the program (a file, a disk, an argument) is thrown as an Error, where it is known,
-// with the place and what to do; the subcommand catches it once and prints it as one line. What goes wrong
-// inside the program (a broken invariant of ours) is a failed CURVISPLAT_CHECK: it prints both values and
-// aborts.
+// with the place and what to do; the subcommand catches it once and prints it as one line. A broken invariant
+// of ours is not an Error but a failed check: check.h.
 #pragma once
 
 #include <fmt/format.h>
@@ -34,22 +33,4 @@ class UsageError : public Error {
   using Error::Error;
 };
 
-[[noreturn]] void checkFailed(const char* file, int line, const char* expression, const std::string& values);
-
 }  // namespace curvisplat
-
-/// Aborts, in release too, when `condition` is false: for our own bugs, never for bad input.
-#define CURVISPLAT_CHECK(condition)                                                  \
-  do {                                                                               \
-    if (!(condition)) ::curvisplat::checkFailed(__FILE__, __LINE__, #condition, ""); \
-  } while (false)
-
-/// As CURVISPLAT_CHECK(a op b), and prints both values.
-#define CURVISPLAT_CHECK_OP(a, op, b)                                        \
-  do {                                                                       \
-    const auto& check_a = (a);                                               \
-    const auto& check_b = (b);                                               \
-    if (!(check_a op check_b))                                               \
-      ::curvisplat::checkFailed(__FILE__, __LINE__, #a " " #op " " #b,       \
-                                fmt::format("{} and {}", check_a, check_b)); \
-  } while (false)

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <utility>
 
+#include "stream/check.h"
 #include "stream/open_retrying.h"
 #include "stream/paths.h"
 
@@ -310,10 +311,6 @@ std::error_code removeAll(const std::filesystem::path& path) noexcept {
     if (!first) first = std::make_error_code(std::errc::not_enough_memory);
   }
   return first;
-}
-
-std::filesystem::path folderOf(const std::filesystem::path& path) {
-  return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
 }
 
 }  // namespace curvisplat

@@ -155,7 +155,4 @@ void removeFile(const std::filesystem::path& path);
 /// nothing is there does not.
 std::error_code removeAll(const std::filesystem::path& path) noexcept;
 
-/// The folder that holds `path`, "." for a plain name.
-std::filesystem::path folderOf(const std::filesystem::path& path);
-
 }  // namespace curvisplat

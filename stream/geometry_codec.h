@@ -22,7 +22,7 @@
 #include <span>
 #include <vector>
 
-#include "stream/brick_codec.h"
+#include "stream/brick_splats.h"
 #include "stream/planes.h"
 #include "stream/prediction.h"
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "stream/cache_format.h"
+#include "stream/check.h"
 #include "stream/error.h"
 #include "stream/file.h"
 #include "stream/thread_name.h"

@@ -9,10 +9,12 @@
 #include <cstring>
 #include <utility>
 
+#include "stream/check.h"
 #include "stream/error.h"
 #include "stream/file.h"
 #include "stream/manifest.h"
 #include "stream/open_retrying.h"
+#include "stream/paths.h"
 
 namespace curvisplat {
 namespace {

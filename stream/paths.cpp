@@ -4,9 +4,12 @@
 #include <system_error>
 
 #include "stream/error.h"
-#include "stream/file.h"
 
 namespace curvisplat {
+
+std::filesystem::path folderOf(const std::filesystem::path& path) {
+  return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+}
 
 bool isRegularFile(const std::filesystem::path& path) noexcept {
   std::error_code none_there;

@@ -5,6 +5,9 @@
 
 namespace curvisplat {
 
+/// The folder that holds `path`, "." for a plain name.
+std::filesystem::path folderOf(const std::filesystem::path& path);
+
 /// Whether there is a regular file, perhaps at the end of links. A name that cannot be one, such as one that
 /// is too long, is none.
 bool isRegularFile(const std::filesystem::path& path) noexcept;

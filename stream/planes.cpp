@@ -7,6 +7,7 @@
 #include <memory>
 #include <new>
 
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

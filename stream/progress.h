@@ -1,13 +1,13 @@
-// Tells a person how long work goes on: a bar on a terminal, nothing in a pipe. And tells the work that a
-// person wants it to stop.
+// How far a job is, in phases, for whoever displays it; and whether the job has been asked to stop.
 #pragma once
 
 #include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <memory>
+#include <functional>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "stream/error.h"
@@ -27,10 +27,22 @@ class Interrupted : public Error {
 };
 
 /// Progress of a job in phases. begin() is for the thread that runs the job; advance() is for any thread and
-/// costs an atomic addition. Draws to stderr at most ten times a second, and only if stderr is a terminal.
+/// costs an atomic addition.
 class Progress {
  public:
-  Progress();
+  /// The phase that is under way.
+  struct State {
+    std::string phase, unit;
+    uint64_t total = 0;  // steps; 0: unknown
+    uint64_t done = 0;   // steps, without those that were skipped
+    uint64_t skipped = 0;
+    double seconds = 0;
+  };
+  /// Shows a state; nullptr ends the phase. Called by any thread, by one at a time.
+  using Display = std::function<void(const State*)>;
+
+  /// Calls `display`, if there is one, at most ten times a second.
+  explicit Progress(Display display = {}) : display_(std::move(display)) {}
   ~Progress();
 
   /// Ends the phase before and begins `phase`, of `total` steps of `unit` ("nodes", "bricks"). 0 is
@@ -40,7 +52,7 @@ class Progress {
   void advance(uint64_t steps);
   /// Counts steps that were done before the job began: for the percentage, not for the rate.
   void skip(uint64_t steps);
-  /// Ends the last phase and clears the line.
+  /// Ends the last phase.
   void end();
 
   /// Asks the job to stop, for the signal's sake, at its next throwIfStopped(). Any thread, and safe in a
@@ -63,18 +75,18 @@ class Progress {
   const std::vector<Phase>& phases() const { return phases_; }
 
  private:
-  void draw();
+  void show();
 
-  const bool terminal_;
+  const Display display_;
   std::string phase_, unit_;
   uint64_t total_ = 0;
   std::atomic<uint64_t> done_ = 0, skipped_ = 0;
   std::atomic<int> stop_signal_ = 0;  // 0: go on
   static_assert(std::atomic<int>::is_always_lock_free);
-  std::atomic<int64_t> next_draw_ms_ = 0;
+  std::atomic<int64_t> next_display_ms_ = 0;
   std::chrono::steady_clock::time_point start_;
   ProcessUsage usage_at_start_;
-  std::mutex drawing_;  // guards the terminal
+  std::mutex displaying_;  // held while display_ is called
   std::vector<Phase> phases_;
 };
 

@@ -4,7 +4,7 @@
 #include <numeric>
 
 #include "stream/cache_format.h"
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

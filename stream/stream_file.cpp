@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "stream/cache_format.h"
+#include "stream/check.h"
 #include "stream/checksum.h"
-#include "stream/error.h"
 
 namespace curvisplat {
 namespace {

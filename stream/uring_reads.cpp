@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "stream/async_reads.h"
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "stream/cache_index.h"
+#include "stream/check.h"
 #include "stream/error.h"
 #include "stream/stream_file.h"
 

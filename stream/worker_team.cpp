@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "stream/error.h"
+#include "stream/check.h"
 #include "stream/thread_name.h"
 
 namespace curvisplat {

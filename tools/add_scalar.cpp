@@ -9,6 +9,7 @@
 #include "preprocess/time_steps.h"
 #include "stream/error.h"
 #include "stream/say.h"
+#include "tools/progress_bar.h"
 #include "tools/run_statistics.h"
 #include "tools/stop_signals.h"
 
@@ -57,7 +58,7 @@ void runAddScalar(ConvertWords words) {
 
   const auto source = openSource(words, words.to);
   options.scalars = chooseScalars(words, words.added_scalars, source->description());
-  Progress progress;
+  Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   const AddScalarReport report = addScalars(*source, options, progress);
   const nlohmann::json numbers = statistics(report, progress);

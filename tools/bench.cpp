@@ -30,6 +30,7 @@
 #include "tools/commands.h"
 #include "tools/option_parsers.h"
 #include "tools/output_paths.h"
+#include "tools/progress_bar.h"
 #include "tools/run_statistics.h"
 #include "tools/scalar_words.h"
 #include "tools/stop_signals.h"
@@ -177,7 +178,7 @@ void benchCache(const BenchWords& words) {
   printMachine(machine);
   std::fflush(stdout);
   Measurements measurements;
-  Progress progress;
+  Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   measureDisk(cache, variable, effort.disk, measurements, progress);
   const StageReport stages = measureStages(scene, options.threads, effort.stages, measurements, progress);
@@ -245,7 +246,7 @@ void benchConversion(const BenchWords& words) {
 
   const Machine machine = Machine::here(effort.temporary_folder);
   Measurements measurements;
-  Progress progress;
+  Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   const ConversionReport report = measureConversion(effort, measurements, progress);
   progress.end();

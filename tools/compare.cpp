@@ -8,6 +8,7 @@
 #include <string>
 
 #include "render/image.h"
+#include "render/image_file.h"
 #include "stream/error.h"
 #include "tools/commands.h"
 #include "tools/output_paths.h"

@@ -21,6 +21,7 @@
 #include "tools/grid_options.h"
 #include "tools/option_parsers.h"
 #include "tools/output_paths.h"
+#include "tools/progress_bar.h"
 #include "tools/run_statistics.h"
 #include "tools/stop_signals.h"
 
@@ -103,7 +104,7 @@ void runConvert(ConvertWords words) {
   options.scalars = chooseScalars(words, words.scalars, source->description());
   options.title = words.grid.grid.stem().string();
 
-  Progress progress;
+  Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   const ConvertReport report = convert(*source, options, progress);
   const nlohmann::json numbers = statistics(report, progress);

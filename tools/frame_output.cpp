@@ -7,8 +7,10 @@
 #include <charconv>
 #include <system_error>
 
+#include "render/image_file.h"
 #include "stream/error.h"
 #include "stream/file.h"
+#include "stream/paths.h"
 #include "tools/movie_writer.h"
 
 namespace curvisplat {

@@ -12,6 +12,7 @@
 #include "preprocess/scenes.h"
 #include "stream/error.h"
 #include "tools/commands.h"
+#include "tools/progress_bar.h"
 
 namespace curvisplat {
 namespace {
@@ -39,7 +40,7 @@ SceneGridSize parseSize(const std::string& text) {
 
 void generate(const GenerateOptions& options) {
   const SceneGridSource source(makeScene(options.scene, options.clustering), parseSize(options.size));
-  Progress progress;
+  Progress progress{progressBar()};
   const auto paths = writePlot3d(source, options.prefix, progress);
   const Progress::Phase& phase = progress.phases().back();
   for (const auto& path : paths) fmt::print("{}\n", path.string());

@@ -21,6 +21,7 @@
 #include "tools/grid_options.h"
 #include "tools/info_grid.h"
 #include "tools/info_system.h"
+#include "tools/progress_bar.h"
 
 namespace curvisplat {
 namespace {
@@ -93,7 +94,7 @@ struct Asked {
 Asked answer(const CacheReader& reader, const InfoOptions& options) {
   Asked asked;
   if (options.verify) {
-    Progress progress;
+    Progress progress{progressBar()};
     asked.verification = verifyCache(reader, &progress);
   }
   if (!options.point.empty()) {

@@ -13,6 +13,7 @@
 #include "preprocess/preflight.h"
 #include "stream/progress.h"
 #include "tools/grid_options.h"
+#include "tools/progress_bar.h"
 
 namespace curvisplat {
 namespace {
@@ -41,7 +42,7 @@ GridInfo inspect(const GridSource& source) {
   for (uint32_t n = 0; n < description.scalars.size(); ++n)
     (description.scalars[n].derived ? info.derived : info.stored).push_back(n);
   for (const GridBlock& block : description.blocks) info.nodes += block.nodes();
-  Progress progress;
+  Progress progress{progressBar()};
   progress.begin("reading", 2 * info.nodes, "nodes");
   info.statistics = measureGrid(source, info.stored, kSlabBytes, progress);
   info.overlaps = findOverlaps(source, kSlabBytes, progress);

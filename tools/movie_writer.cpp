@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "render/image_formats.h"
+#include "stream/check.h"
 #include "stream/error.h"
 #include "stream/file.h"
 #include "stream/paths.h"

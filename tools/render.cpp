@@ -16,6 +16,7 @@
 #include "render/annotations.h"
 #include "render/frame.h"
 #include "render/image.h"
+#include "render/image_file.h"
 #include "render/transfer_function.h"
 #include "stream/cache_reader.h"
 #include "stream/error.h"
@@ -28,6 +29,7 @@
 #include "tools/frame_output.h"
 #include "tools/option_parsers.h"
 #include "tools/output_paths.h"
+#include "tools/progress_bar.h"
 #include "tools/render_statistics.h"
 #include "tools/run_statistics.h"
 #include "tools/scalar_words.h"
@@ -230,7 +232,7 @@ class FrameRun {
   FrameRenderer& renderer_;
   FrameOutput& output_;
   RenderReport& report_;
-  Progress progress_;
+  Progress progress_{progressBar()};
   bool said_empty_ = false;
   std::set<uint32_t> said_unreadable_;  // bricks
 };

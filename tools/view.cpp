@@ -10,6 +10,7 @@
 #include "stream/progress.h"
 #include "tools/commands.h"
 #include "tools/option_parsers.h"
+#include "tools/progress_bar.h"
 #include "tools/stop_signals.h"
 #include "tools/viewer/viewer.h"
 
@@ -32,7 +33,7 @@ void view(const ViewWords& words) {
   if (words.memory) options.memory_bytes = parseMemory("--memory", *words.memory);
   if (words.frame_time) options.target_s = parsePositive("--frame-time", *words.frame_time) / 1000;
   const CacheReader cache(words.cache);
-  Progress progress;
+  Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   try {
     runViewer(cache, options, progress);

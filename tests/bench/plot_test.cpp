@@ -1,5 +1,6 @@
 // Plots, by their pixels: bars are as long as their values, points are where they belong.
 #include "tools/bench/plot.h"
+#include "render/image_file.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "render/image.h"
+#include "render/image_file.h"
 #include "stream/file.h"
 #include "tests/support/folder_watch.h"
 #include "tests/support/lattice_cache.h"

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "render/image_file.h"
 #include "stream/cache_verify.h"
 #include "stream/error.h"
 #include "stream/file.h"

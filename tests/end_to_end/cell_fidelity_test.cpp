@@ -7,6 +7,7 @@
 #include "preprocess/convert.h"
 #include "preprocess/scenes.h"
 #include "render/image.h"
+#include "render/image_file.h"
 #include "tests/support/cell_grid.h"
 #include "tests/support/half_annulus_words.h"
 #include "tests/support/rearranged_grid.h"

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "render/image.h"
+#include "render/image_file.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "render/image.h"
+#include "render/image_file.h"
 #include "stream/cache_reader.h"
 #include "stream/file.h"
 #include "tests/support/random_cache.h"

@@ -16,6 +16,7 @@
 
 #include "preprocess/scenes.h"
 #include "render/image.h"
+#include "render/image_file.h"
 #include "tests/support/direct_picture.h"
 #include "tests/support/known_pictures.h"
 #include "tests/support/rearranged_grid.h"

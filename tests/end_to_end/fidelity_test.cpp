@@ -11,6 +11,7 @@
 
 #include "preprocess/scenes.h"
 #include "render/image.h"
+#include "render/image_file.h"
 #include "render/kernel.h"
 #include "render/screen_view.h"
 #include "stream/file.h"

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "render/image.h"
+#include "render/image_file.h"
 #include "stream/cache_reader.h"
 #include "stream/file.h"
 #include "tests/support/run_program.h"

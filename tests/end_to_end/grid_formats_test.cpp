@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "render/image.h"
+#include "render/image_file.h"
 #include "stream/cache_reader.h"
 #include "stream/file.h"
 #include "tests/support/earth_files.h"

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "render/image.h"
+#include "render/image_file.h"
 #include "stream/file.h"
 #include "tests/support/cube_files.h"
 #include "tests/support/run_program.h"

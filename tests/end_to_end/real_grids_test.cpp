@@ -14,6 +14,7 @@
 
 #include "preprocess/open_grid.h"
 #include "render/image.h"
+#include "render/image_file.h"
 #include "stream/cache_reader.h"
 #include "stream/file.h"
 #include "stream/probe.h"

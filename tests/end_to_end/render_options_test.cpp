@@ -14,6 +14,7 @@
 #include "preprocess/plot3d_writer.h"
 #include "preprocess/scenes.h"
 #include "render/image.h"
+#include "render/image_file.h"
 #include "stream/file.h"
 #include "stream/progress.h"
 #include "tests/support/run_program.h"

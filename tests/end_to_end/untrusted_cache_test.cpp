@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "stream/cache_format.h"
+#include "stream/cache_index.h"
 #include "stream/checksum.h"
 #include "stream/geometry_codec.h"
 #include "stream/stream_file.h"

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "render/image.h"
+#include "render/image_file.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/virtual_display.h"

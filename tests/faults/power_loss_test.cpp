@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "render/image.h"
+#include "render/image_file.h"
 #include "stream/cache_reader.h"
 #include "stream/error.h"
 #include "tests/faults/small_conversion.h"

@@ -4,6 +4,7 @@
 
 #include "render/frame.h"
 #include "render/image.h"
+#include "render/image_file.h"
 #include "stream/cache_reader.h"
 #include "stream/error.h"
 #include "tests/support/fault_sweep.h"

@@ -9,9 +9,9 @@
 #include "render/screen_view.h"
 #include "stream/cache_format.h"
 #include "stream/cache_index.h"
+#include "stream/check.h"
 #include "stream/checksum.h"
 #include "stream/cut.h"
-#include "stream/error.h"
 #include "stream/stream_file.h"
 #include "tests/fuzz/fuzz_target.h"
 

@@ -1,9 +1,9 @@
 // Camera paths, and the cameras on them.
 #include "render/camera_path.h"
+#include "stream/check.h"
 
 #include <cmath>
 
-#include "stream/error.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {

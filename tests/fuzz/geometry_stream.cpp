@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "stream/brick_codec.h"
-#include "stream/error.h"
+#include "stream/check.h"
 #include "stream/geometry_codec.h"
 #include "tests/fuzz/fuzz_target.h"
 

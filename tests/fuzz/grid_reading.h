@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "preprocess/grid_source.h"
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 

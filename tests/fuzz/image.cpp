@@ -1,7 +1,8 @@
 // Pictures: PFM is read here; PNG and EXR by libraries, with checks of ours before them.
 #include "render/image.h"
+#include "render/image_file.h"
+#include "stream/check.h"
 
-#include "stream/error.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {

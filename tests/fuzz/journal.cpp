@@ -1,8 +1,8 @@
 // The journal of an unfinished conversion; its checksum is made right here.
 #include "preprocess/conversion_journal.h"
+#include "stream/check.h"
 
 #include "stream/checksum.h"
-#include "stream/error.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {

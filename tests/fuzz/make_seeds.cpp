@@ -10,6 +10,7 @@
 
 #include "preprocess/conversion_journal.h"
 #include "render/image.h"
+#include "render/image_file.h"
 #include "render/transfer_function.h"
 #include "stream/brick_log.h"
 #include "stream/cache_format.h"

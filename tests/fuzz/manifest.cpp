@@ -1,7 +1,7 @@
 // manifest.json. What is read is written and read again as the same.
 #include "stream/manifest.h"
+#include "stream/check.h"
 
-#include "stream/error.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {

@@ -9,7 +9,7 @@
 #include "render/cpu_painter.h"
 #include "render/depth_sort.h"
 #include "render/projection.h"
-#include "stream/error.h"
+#include "stream/check.h"
 #include "stream/half_cell.h"
 #include "tests/fuzz/fuzz_target.h"
 

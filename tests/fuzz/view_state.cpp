@@ -4,9 +4,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "stream/check.h"
 #include "tools/viewer/view_state.h"
 
-#include "stream/error.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {

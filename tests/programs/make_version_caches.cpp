@@ -17,6 +17,7 @@
 #include <numbers>
 
 #include "preprocess/convert.h"
+#include "render/image_file.h"
 #include "stream/file.h"
 #include "tests/support/cache_summary.h"
 #include "tests/support/cell_grid.h"

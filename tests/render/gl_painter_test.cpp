@@ -1,4 +1,5 @@
 #include "render/gl_painter.h"
+#include "render/offscreen_context.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,5 @@
 #include "render/image.h"
+#include "render/image_file.h"
 
 #include <gtest/gtest.h>
 #include <png.h>

@@ -13,6 +13,7 @@
 #include "render/frame.h"
 #include "render/gl_painter.h"
 #include "render/gl_thread.h"
+#include "render/offscreen_context.h"
 #include "stream/error.h"
 #include "tests/support/known_pictures.h"
 #include "tests/support/reference_march.h"

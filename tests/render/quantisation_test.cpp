@@ -13,6 +13,7 @@
 #include "render/gl_painter.h"
 #include "render/gl_thread.h"
 #include "render/image.h"
+#include "render/offscreen_context.h"
 #include "render/projection.h"
 #include "stream/brick_codec.h"
 #include "tests/support/reference_march.h"
@@ -38,8 +39,7 @@ Splats inArrays(const RootCube& root, const BrickSplats& brick) {
   variable.resize(brick.size());
   for (size_t n = 0; n < brick.size(); ++n) {
     const glm::dvec3 position = root.toWorld(brick.positions[n]) - root.cellMin(brick.cell);
-    setSplat(geometry, variable, n, position, brick.splats[n], brick.variables[0][n],
-             brick.half_cells[n]);
+    setSplat(geometry, variable, n, position, brick.splats[n], brick.variables[0][n], brick.half_cells[n]);
   }
   return out;
 }

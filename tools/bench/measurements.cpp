@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 

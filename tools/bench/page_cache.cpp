@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "stream/check.h"
 #include "stream/direct_file.h"
 #include "stream/error.h"
 #include "stream/file.h"

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "render/axis_ticks.h"
+#include "stream/check.h"
 #include "stream/error.h"
 
 namespace curvisplat {

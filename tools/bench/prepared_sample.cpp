@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "stream/brick_codec.h"
+#include "stream/check.h"
 #include "stream/checksum.h"
-#include "stream/error.h"
 #include "stream/file.h"
 
 namespace curvisplat {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <array>
 
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

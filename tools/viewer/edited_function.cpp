@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "render/colour_map.h"
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 namespace {

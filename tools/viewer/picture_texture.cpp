@@ -1,6 +1,6 @@
 #include "tools/viewer/picture_texture.h"
 
-#include "stream/error.h"
+#include "stream/check.h"
 
 namespace curvisplat {
 

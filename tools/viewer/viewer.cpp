@@ -12,6 +12,7 @@
 
 #include "render/frame_plan.h"
 #include "render/image.h"
+#include "render/image_file.h"
 #include "stream/error.h"
 #include "stream/file.h"
 #include "stream/say.h"

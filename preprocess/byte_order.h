@@ -1,0 +1,8 @@
+// In which order the bytes of a number lie in a file.
+#pragma once
+
+namespace curvisplat {
+
+enum class ByteOrder { little, big };
+
+}  // namespace curvisplat

@@ -1,0 +1,15 @@
+// The size of a picture.
+#pragma once
+
+#include <cstdint>
+
+namespace curvisplat {
+
+struct ImageSize {
+  int width = 600;
+  int height = 600;
+
+  uint64_t pixels() const { return static_cast<uint64_t>(width) * static_cast<uint64_t>(height); }
+};
+
+}  // namespace curvisplat
