@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "stream/brick_codec.h"
+#include "stream/codec/brick_codec.h"
 
 namespace curvisplat {
 namespace {

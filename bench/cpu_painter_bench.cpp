@@ -8,8 +8,8 @@
 #include <random>
 #include <vector>
 
-#include "render/backend.h"
-#include "render/kernel.h"
+#include "render/frame/backend.h"
+#include "render/project/kernel.h"
 
 namespace curvisplat {
 namespace {

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "stream/cut.h"
+#include "stream/paging/cut.h"
 
 namespace curvisplat {
 namespace {
@@ -64,7 +64,7 @@ CutView wholeView(bool perspective) {
   view.towards_viewer = {0.68, 0.46, 0.57};
   view.pixels = 500;
   for (const glm::dvec3& normal : {glm::dvec3(0, 0.78, -0.63), glm::dvec3(0, -0.78, 0.63),
-                                  glm::dvec3(0.73, -0.43, -0.53), glm::dvec3(-0.73, 0.43, 0.53)})
+                                   glm::dvec3(0.73, -0.43, -0.53), glm::dvec3(-0.73, 0.43, 0.53)})
     view.planes.push_back({normal, 10});
   return view;
 }

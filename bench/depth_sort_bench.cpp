@@ -5,8 +5,8 @@
 #include <random>
 #include <vector>
 
-#include "render/depth_sort.h"
-#include "render/projection.h"
+#include "render/project/depth_sort.h"
+#include "render/project/projection.h"
 
 namespace curvisplat {
 namespace {

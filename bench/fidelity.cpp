@@ -10,15 +10,15 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
-#include "preprocess/open_grid.h"
-#include "preprocess/scenes.h"
-#include "render/image.h"
-#include "render/image_file.h"
-#include "stream/file.h"
-#include "tests/support/cell_grid.h"
-#include "tests/support/grid_field.h"
-#include "tests/support/known_pictures.h"
-#include "tests/support/rearranged_grid.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "preprocess/scenes/scenes.h"
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "stream/base/file.h"
+#include "tests/reference/cell_grid.h"
+#include "tests/reference/grid_field.h"
+#include "tests/reference/known_pictures.h"
+#include "tests/reference/rearranged_grid.h"
 
 namespace curvisplat {
 namespace {

@@ -8,8 +8,8 @@
 #include <functional>
 #include <string>
 
-#include "preprocess/node_reader.h"
-#include "preprocess/open_grid.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "preprocess/grid/node_reader.h"
 #include "tests/support/cgns_writer.h"
 #include "tests/support/netcdf_writer.h"
 #include "tests/support/temporary_folder.h"

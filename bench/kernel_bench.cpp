@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "render/kernel.h"
+#include "render/project/kernel.h"
 
 namespace curvisplat {
 namespace {

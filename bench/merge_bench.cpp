@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "preprocess/merge.h"
+#include "preprocess/splats/merge.h"
 
 namespace curvisplat {
 namespace {

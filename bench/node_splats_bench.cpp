@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "preprocess/node_splats.h"
+#include "preprocess/splats/node_splats.h"
 
 namespace curvisplat {
 namespace {

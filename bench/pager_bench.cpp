@@ -16,11 +16,11 @@
 #include <string>
 #include <vector>
 
-#include "stream/cache_format.h"
-#include "stream/cache_writer.h"
-#include "stream/checksum.h"
-#include "stream/cut.h"
-#include "stream/pager.h"
+#include "stream/base/checksum.h"
+#include "stream/cache/cache_format.h"
+#include "stream/cache/cache_writer.h"
+#include "stream/paging/cut.h"
+#include "stream/paging/pager.h"
 
 namespace curvisplat {
 namespace {

@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "preprocess/ascii_spool.h"
-#include "preprocess/node_reader.h"
-#include "preprocess/open_grid.h"
-#include "preprocess/stored_values.h"
-#include "stream/file.h"
+#include "preprocess/formats/common/ascii_spool.h"
+#include "preprocess/formats/common/stored_values.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "preprocess/grid/node_reader.h"
+#include "stream/base/file.h"
 
 namespace curvisplat {
 namespace {

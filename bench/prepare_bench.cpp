@@ -12,17 +12,17 @@
 #include <string>
 #include <vector>
 
-#include "preprocess/convert.h"
-#include "preprocess/scenes.h"
-#include "render/depth_sort.h"
-#include "render/projection.h"
-#include "render/transfer_function.h"
-#include "stream/brick_codec.h"
-#include "stream/cache_index.h"
-#include "stream/cache_reader.h"
-#include "stream/checksum.h"
-#include "stream/file.h"
-#include "stream/progress.h"
+#include "preprocess/convert/convert.h"
+#include "preprocess/scenes/scenes.h"
+#include "render/colour/transfer_function.h"
+#include "render/project/depth_sort.h"
+#include "render/project/projection.h"
+#include "stream/base/checksum.h"
+#include "stream/base/file.h"
+#include "stream/base/progress.h"
+#include "stream/cache/cache_index.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/codec/brick_codec.h"
 
 namespace curvisplat {
 namespace {

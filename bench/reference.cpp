@@ -7,13 +7,13 @@
 #include <filesystem>
 #include <memory>
 
-#include "preprocess/open_grid.h"
-#include "preprocess/scenes.h"
-#include "render/image.h"
-#include "render/image_file.h"
-#include "stream/error.h"
-#include "tests/support/grid_field.h"
-#include "tests/support/known_pictures.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "preprocess/scenes/scenes.h"
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "stream/base/error.h"
+#include "tests/reference/grid_field.h"
+#include "tests/reference/known_pictures.h"
 
 namespace curvisplat {
 namespace {

@@ -5,8 +5,8 @@
 #include <atomic>
 #include <vector>
 
-#include "render/segment_ring.h"
-#include "stream/worker_team.h"
+#include "render/frame/segment_ring.h"
+#include "stream/base/worker_team.h"
 
 namespace curvisplat {
 namespace {

@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "stream/error.h"
-#include "stream/progress.h"
-#include "stream/say.h"
-#include "tools/commands.h"
-#include "tools/standard_streams.h"
+#include "stream/base/error.h"
+#include "stream/base/progress.h"
+#include "stream/base/say.h"
+#include "tools/commands/commands.h"
+#include "tools/output/standard_streams.h"
 
 namespace curvisplat {
 namespace {

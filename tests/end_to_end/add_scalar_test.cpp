@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "stream/file.h"
+#include "stream/base/file.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 

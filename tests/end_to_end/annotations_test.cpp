@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "render/image.h"
-#include "render/image_file.h"
+#include "render/image/image.h"
+#include "render/image/image_file.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 

@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "render/image.h"
-#include "render/image_file.h"
-#include "stream/file.h"
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "stream/base/file.h"
 #include "tests/support/folder_watch.h"
 #include "tests/support/lattice_cache.h"
 #include "tests/support/run_program.h"

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "render/image_file.h"
-#include "stream/cache_verify.h"
-#include "stream/error.h"
-#include "stream/file.h"
+#include "render/image/image_file.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/cache/cache_verify.h"
 #include "tests/support/cache_summary.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"

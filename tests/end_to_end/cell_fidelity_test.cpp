@@ -4,14 +4,14 @@
 
 #include <memory>
 
-#include "preprocess/convert.h"
-#include "preprocess/scenes.h"
-#include "render/image.h"
-#include "render/image_file.h"
-#include "tests/support/cell_grid.h"
-#include "tests/support/half_annulus_words.h"
-#include "tests/support/rearranged_grid.h"
-#include "tests/support/reference_march.h"
+#include "preprocess/convert/convert.h"
+#include "preprocess/scenes/scenes.h"
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "tests/reference/cell_grid.h"
+#include "tests/reference/half_annulus_words.h"
+#include "tests/reference/rearranged_grid.h"
+#include "tests/reference/reference_march.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 

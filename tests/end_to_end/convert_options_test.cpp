@@ -5,10 +5,10 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "preprocess/plot3d_writer.h"
-#include "preprocess/scenes.h"
-#include "stream/file.h"
-#include "stream/progress.h"
+#include "preprocess/formats/plot3d/plot3d_writer.h"
+#include "preprocess/scenes/scenes.h"
+#include "stream/base/file.h"
+#include "stream/base/progress.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 

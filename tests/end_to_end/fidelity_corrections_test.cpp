@@ -8,13 +8,13 @@
 #include <random>
 #include <vector>
 
-#include "preprocess/scenes.h"
-#include "render/image.h"
-#include "tests/support/direct_picture.h"
-#include "tests/support/function_grid.h"
-#include "tests/support/grid_field.h"
-#include "tests/support/known_pictures.h"
-#include "tests/support/rearranged_grid.h"
+#include "preprocess/scenes/scenes.h"
+#include "render/image/image.h"
+#include "tests/reference/direct_picture.h"
+#include "tests/reference/function_grid.h"
+#include "tests/reference/grid_field.h"
+#include "tests/reference/known_pictures.h"
+#include "tests/reference/rearranged_grid.h"
 
 namespace curvisplat {
 namespace {

@@ -14,13 +14,13 @@
 #include <utility>
 #include <vector>
 
-#include "preprocess/scenes.h"
-#include "render/image.h"
-#include "render/image_file.h"
-#include "tests/support/direct_picture.h"
-#include "tests/support/known_pictures.h"
-#include "tests/support/rearranged_grid.h"
-#include "tests/support/reference_march.h"
+#include "preprocess/scenes/scenes.h"
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "tests/reference/direct_picture.h"
+#include "tests/reference/known_pictures.h"
+#include "tests/reference/rearranged_grid.h"
+#include "tests/reference/reference_march.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

@@ -9,14 +9,14 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "preprocess/scenes.h"
-#include "render/image.h"
-#include "render/image_file.h"
-#include "render/kernel.h"
-#include "render/screen_view.h"
-#include "stream/file.h"
-#include "tests/support/half_annulus_words.h"
-#include "tests/support/reference_march.h"
+#include "preprocess/scenes/scenes.h"
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "render/project/kernel.h"
+#include "render/project/screen_view.h"
+#include "stream/base/file.h"
+#include "tests/reference/half_annulus_words.h"
+#include "tests/reference/reference_march.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 

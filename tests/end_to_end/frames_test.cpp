@@ -9,10 +9,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "render/image.h"
-#include "render/image_file.h"
-#include "stream/cache_reader.h"
-#include "stream/file.h"
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "stream/base/file.h"
+#include "stream/cache/cache_reader.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 

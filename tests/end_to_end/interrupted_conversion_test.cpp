@@ -13,11 +13,11 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "preprocess/plot3d_writer.h"
-#include "preprocess/scenes.h"
-#include "stream/checksum.h"
-#include "stream/file.h"
-#include "stream/progress.h"
+#include "preprocess/formats/plot3d/plot3d_writer.h"
+#include "preprocess/scenes/scenes.h"
+#include "stream/base/checksum.h"
+#include "stream/base/file.h"
+#include "stream/base/progress.h"
 #include "tests/support/folder_watch.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"

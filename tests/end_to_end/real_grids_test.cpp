@@ -12,12 +12,12 @@
 #include <ostream>
 #include <string>
 
-#include "preprocess/open_grid.h"
-#include "render/image.h"
-#include "render/image_file.h"
-#include "stream/cache_reader.h"
-#include "stream/file.h"
-#include "stream/probe.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "stream/base/file.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/cache/probe.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 

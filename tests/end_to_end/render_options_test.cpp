@@ -11,12 +11,12 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "preprocess/plot3d_writer.h"
-#include "preprocess/scenes.h"
-#include "render/image.h"
-#include "render/image_file.h"
-#include "stream/file.h"
-#include "stream/progress.h"
+#include "preprocess/formats/plot3d/plot3d_writer.h"
+#include "preprocess/scenes/scenes.h"
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "stream/base/file.h"
+#include "stream/base/progress.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 

@@ -14,11 +14,11 @@
 #include <string>
 #include <vector>
 
-#include "stream/cache_format.h"
-#include "stream/cache_index.h"
-#include "stream/checksum.h"
-#include "stream/geometry_codec.h"
-#include "stream/stream_file.h"
+#include "stream/base/checksum.h"
+#include "stream/cache/cache_format.h"
+#include "stream/cache/cache_index.h"
+#include "stream/cache/stream_file.h"
+#include "stream/codec/geometry_codec.h"
 #include "tests/stream/test_bricks.h"
 #include "tests/support/random_cache.h"
 #include "tests/support/run_program.h"

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "stream/cache_reader.h"
+#include "stream/cache/cache_reader.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 

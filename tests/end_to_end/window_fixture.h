@@ -14,8 +14,8 @@
 #include <utility>
 #include <vector>
 
-#include "render/image.h"
-#include "render/image_file.h"
+#include "render/image/image.h"
+#include "render/image/image_file.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/virtual_display.h"

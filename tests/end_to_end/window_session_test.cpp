@@ -1,5 +1,5 @@
 // A session from the beginning to the end, with a screenshot after every step: for people to look at, too.
-#include "render/image_file.h"
+#include "render/image/image_file.h"
 #include "tests/end_to_end/window_fixture.h"
 
 namespace curvisplat {

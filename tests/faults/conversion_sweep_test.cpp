@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "stream/cache_reader.h"
-#include "stream/error.h"
+#include "stream/base/error.h"
+#include "stream/cache/cache_reader.h"
 #include "tests/faults/small_conversion.h"
 #include "tests/support/fault_sweep.h"
 

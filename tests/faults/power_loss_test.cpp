@@ -2,10 +2,10 @@
 // cache that is whole, or none; the old one or the new one.
 #include <gtest/gtest.h>
 
-#include "render/image.h"
-#include "render/image_file.h"
-#include "stream/cache_reader.h"
-#include "stream/error.h"
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "stream/base/error.h"
+#include "stream/cache/cache_reader.h"
 #include "tests/faults/small_conversion.h"
 #include "tests/support/power_loss.h"
 

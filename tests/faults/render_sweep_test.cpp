@@ -2,11 +2,11 @@
 // right picture; never a part of one under its name.
 #include <gtest/gtest.h>
 
-#include "render/frame.h"
-#include "render/image.h"
-#include "render/image_file.h"
-#include "stream/cache_reader.h"
-#include "stream/error.h"
+#include "render/frame/frame.h"
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "stream/base/error.h"
+#include "stream/cache/cache_reader.h"
 #include "tests/support/fault_sweep.h"
 #include "tests/support/folder_files.h"
 #include "tests/support/lattice_cache.h"

@@ -11,14 +11,14 @@
 #include <utility>
 #include <vector>
 
-#include "preprocess/add_scalar.h"
-#include "preprocess/convert.h"
-#include "preprocess/memory_plan.h"
-#include "preprocess/open_grid.h"
-#include "preprocess/plot3d_writer.h"
+#include "preprocess/addition/add_scalar.h"
+#include "preprocess/convert/convert.h"
+#include "preprocess/convert/memory_plan.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "preprocess/formats/plot3d/plot3d_writer.h"
+#include "tests/reference/function_grid.h"
 #include "tests/support/faulty_system_calls.h"
 #include "tests/support/folder_files.h"
-#include "tests/support/function_grid.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

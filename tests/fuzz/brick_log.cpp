@@ -2,14 +2,14 @@
 // here.
 //
 //   variables u8 | bytes of the log u16 | log without checksums | bytes of the files of streams
-#include "stream/brick_log.h"
+#include "stream/cache/brick_log.h"
 
 #include <fmt/format.h>
 
-#include "stream/cache_format.h"
-#include "stream/cache_writer.h"
-#include "stream/checksum.h"
-#include "stream/stream_file.h"
+#include "stream/base/checksum.h"
+#include "stream/cache/cache_format.h"
+#include "stream/cache/cache_writer.h"
+#include "stream/cache/stream_file.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {

@@ -6,13 +6,13 @@
 #include <cmath>
 #include <fstream>
 
-#include "render/screen_view.h"
-#include "stream/cache_format.h"
-#include "stream/cache_index.h"
-#include "stream/check.h"
-#include "stream/checksum.h"
-#include "stream/cut.h"
-#include "stream/stream_file.h"
+#include "render/project/screen_view.h"
+#include "stream/base/check.h"
+#include "stream/base/checksum.h"
+#include "stream/cache/cache_format.h"
+#include "stream/cache/cache_index.h"
+#include "stream/cache/stream_file.h"
+#include "stream/paging/cut.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {

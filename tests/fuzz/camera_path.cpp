@@ -1,6 +1,6 @@
 // Camera paths, and the cameras on them.
-#include "render/camera_path.h"
-#include "stream/check.h"
+#include "render/camera/camera_path.h"
+#include "stream/base/check.h"
 
 #include <cmath>
 

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <fstream>
 
-#include "stream/error.h"
+#include "stream/base/error.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <vector>
 
-#include "stream/brick_codec.h"
-#include "stream/check.h"
-#include "stream/geometry_codec.h"
+#include "stream/base/check.h"
+#include "stream/codec/brick_codec.h"
+#include "stream/codec/geometry_codec.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <numeric>
 
-#include "preprocess/grid_source.h"
-#include "stream/check.h"
+#include "preprocess/grid/grid_source.h"
+#include "stream/base/check.h"
 
 namespace curvisplat {
 

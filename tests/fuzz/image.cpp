@@ -1,7 +1,7 @@
 // Pictures: PFM is read here; PNG and EXR by libraries, with checks of ours before them.
-#include "render/image.h"
-#include "render/image_file.h"
-#include "stream/check.h"
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "stream/base/check.h"
 
 #include "tests/fuzz/fuzz_target.h"
 

@@ -1,8 +1,8 @@
 // The journal of an unfinished conversion; its checksum is made right here.
-#include "preprocess/conversion_journal.h"
-#include "stream/check.h"
+#include "preprocess/convert/conversion_journal.h"
+#include "stream/base/check.h"
 
-#include "stream/checksum.h"
+#include "stream/base/checksum.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {

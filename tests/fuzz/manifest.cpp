@@ -1,6 +1,6 @@
 // manifest.json. What is read is written and read again as the same.
-#include "stream/manifest.h"
-#include "stream/check.h"
+#include "stream/cache/manifest.h"
+#include "stream/base/check.h"
 
 #include "tests/fuzz/fuzz_target.h"
 

@@ -1,7 +1,7 @@
 // The header of classic NetCDF files, by which we tell whether one is whole. The rest is libnetcdf's.
-#include "preprocess/netcdf_classic.h"
+#include "preprocess/formats/netcdf/netcdf_classic.h"
 
-#include "preprocess/netcdf_file.h"
+#include "preprocess/formats/netcdf/netcdf_file.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {

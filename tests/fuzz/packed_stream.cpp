@@ -3,8 +3,8 @@
 //   splats u16 | level u8 | stream
 #include <vector>
 
-#include "stream/brick_codec.h"
-#include "stream/error.h"
+#include "stream/base/error.h"
+#include "stream/codec/brick_codec.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {

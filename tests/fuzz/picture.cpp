@@ -6,11 +6,11 @@
 #include <cmath>
 #include <limits>
 
-#include "render/cpu_painter.h"
-#include "render/depth_sort.h"
-#include "render/projection.h"
-#include "stream/check.h"
-#include "stream/half_cell.h"
+#include "render/cpu/cpu_painter.h"
+#include "render/project/depth_sort.h"
+#include "render/project/projection.h"
+#include "stream/base/check.h"
+#include "stream/model/half_cell.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {

@@ -4,7 +4,7 @@
 //   empty
 #pragma once
 
-#include "preprocess/plot3d_source.h"
+#include "preprocess/formats/plot3d/plot3d_source.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/grid_reading.h"
 

@@ -1,5 +1,5 @@
 // .p3d files, beside a grid and two solutions that are as they should be: a.xyz, a.q, a.f.
-#include "preprocess/plot3d_meta.h"
+#include "preprocess/formats/plot3d/plot3d_meta.h"
 
 #include <bit>
 #include <span>

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "stream/file.h"
+#include "stream/base/file.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {

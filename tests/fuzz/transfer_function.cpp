@@ -1,11 +1,11 @@
 // ParaView's colour maps. What is read is written and read again as the same, and gives colours and
 // extinctions everywhere.
-#include "render/transfer_function.h"
-#include "stream/check.h"
+#include "render/colour/transfer_function.h"
+#include "stream/base/check.h"
 
 #include <cmath>
 
-#include "render/classification.h"
+#include "render/colour/classification.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {

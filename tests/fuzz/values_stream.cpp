@@ -1,13 +1,13 @@
 // The values stream of a brick, before its compression (see geometry_stream.cpp).
 //
 //   splats u16 | header 40 | rows and planes
-#include "stream/check.h"
-#include "stream/values_codec.h"
+#include "stream/base/check.h"
+#include "stream/codec/values_codec.h"
 
 #include <cmath>
 #include <vector>
 
-#include "stream/brick_codec.h"
+#include "stream/codec/brick_codec.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {

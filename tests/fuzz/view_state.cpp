@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "stream/check.h"
+#include "stream/base/check.h"
 #include "tools/viewer/view_state.h"
 
 #include "tests/fuzz/fuzz_target.h"

@@ -1,8 +1,8 @@
 // What the VTK targets share.
 #pragma once
 
-#include "preprocess/vtk_legacy.h"
-#include "preprocess/vtk_xml.h"
+#include "preprocess/formats/vtk/vtk_legacy.h"
+#include "preprocess/formats/vtk/vtk_xml.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/grid_reading.h"
 

@@ -1,4 +1,4 @@
-#include "preprocess/abutting_faces.h"
+#include "preprocess/splats/abutting_faces.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/function_grid.h"
+#include "tests/reference/function_grid.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

@@ -1,5 +1,5 @@
 // Adding scalars to a cache: it must come out as if it had been made with all of them at once.
-#include "preprocess/add_scalar.h"
+#include "preprocess/addition/add_scalar.h"
 
 #include <gtest/gtest.h>
 
@@ -9,14 +9,14 @@
 #include <map>
 #include <numbers>
 
-#include "preprocess/convert.h"
-#include "preprocess/memory_plan.h"
-#include "stream/cache_lock.h"
-#include "stream/cache_reader.h"
-#include "stream/cache_verify.h"
-#include "stream/error.h"
+#include "preprocess/convert/convert.h"
+#include "preprocess/convert/memory_plan.h"
+#include "stream/base/error.h"
+#include "stream/cache/cache_lock.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/cache/cache_verify.h"
+#include "tests/reference/function_grid.h"
 #include "tests/support/faulty_system_calls.h"
-#include "tests/support/function_grid.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

@@ -1,4 +1,4 @@
-#include "preprocess/ascii_spool.h"
+#include "preprocess/formats/common/ascii_spool.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "stream/error.h"
+#include "stream/base/error.h"
 #include "tests/preprocess/plot3d_bytes.h"
 
 namespace curvisplat {

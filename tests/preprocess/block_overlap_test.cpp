@@ -1,5 +1,5 @@
 // Blocks in one another are found with their volume, and blocks side by side are not.
-#include "preprocess/block_overlap.h"
+#include "preprocess/survey/block_overlap.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
-#include "preprocess/open_grid.h"
-#include "tests/support/function_grid.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "tests/reference/function_grid.h"
 
 namespace curvisplat {
 namespace {

@@ -7,11 +7,11 @@
 #include <random>
 #include <set>
 
-#include "preprocess/bucket_file.h"
-#include "preprocess/bucket_tree.h"
-#include "preprocess/memory_plan.h"
-#include "preprocess/splat_record.h"
-#include "stream/error.h"
+#include "preprocess/convert/bucket_file.h"
+#include "preprocess/convert/bucket_tree.h"
+#include "preprocess/convert/memory_plan.h"
+#include "preprocess/convert/splat_record.h"
+#include "stream/base/error.h"
 #include "tests/support/faulty_system_calls.h"
 #include "tests/support/temporary_folder.h"
 

@@ -6,16 +6,16 @@
 #include <limits>
 #include <map>
 
-#include "preprocess/add_scalar.h"
-#include "preprocess/convert.h"
-#include "preprocess/memory_plan.h"
-#include "preprocess/scenes.h"
-#include "stream/cache_reader.h"
-#include "stream/cache_verify.h"
-#include "stream/error.h"
-#include "tests/support/cell_grid.h"
-#include "tests/support/function_grid.h"
-#include "tests/support/rearranged_grid.h"
+#include "preprocess/addition/add_scalar.h"
+#include "preprocess/convert/convert.h"
+#include "preprocess/convert/memory_plan.h"
+#include "preprocess/scenes/scenes.h"
+#include "stream/base/error.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/cache/cache_verify.h"
+#include "tests/reference/cell_grid.h"
+#include "tests/reference/function_grid.h"
+#include "tests/reference/rearranged_grid.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

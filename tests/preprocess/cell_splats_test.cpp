@@ -1,4 +1,4 @@
-#include "preprocess/cell_splats.h"
+#include "preprocess/splats/cell_splats.h"
 
 #include <gtest/gtest.h>
 
@@ -8,10 +8,10 @@
 #include <random>
 #include <vector>
 
-#include "preprocess/hexahedron.h"
-#include "preprocess/node_reader.h"
-#include "stream/half_cell.h"
-#include "tests/support/mapped_block.h"
+#include "preprocess/grid/hexahedron.h"
+#include "preprocess/grid/node_reader.h"
+#include "stream/model/half_cell.h"
+#include "tests/reference/mapped_block.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

@@ -10,8 +10,8 @@
 #include <cstring>
 #include <limits>
 
-#include "preprocess/open_grid.h"
-#include "stream/error.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

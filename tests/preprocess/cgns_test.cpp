@@ -5,8 +5,8 @@
 #include <cmath>
 #include <thread>
 
-#include "preprocess/open_grid.h"
-#include "stream/error.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "stream/base/error.h"
 #include "tests/support/cgns_writer.h"
 #include "tests/support/temporary_folder.h"
 

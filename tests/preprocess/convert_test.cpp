@@ -1,5 +1,5 @@
 // Conversion as a whole: what must hold of a cache whatever the grid, the threads and the memory.
-#include "preprocess/convert.h"
+#include "preprocess/convert/convert.h"
 
 #include <gtest/gtest.h>
 
@@ -10,12 +10,12 @@
 #include <random>
 #include <set>
 
-#include "preprocess/memory_plan.h"
-#include "preprocess/scenes.h"
-#include "stream/cache_reader.h"
-#include "stream/error.h"
+#include "preprocess/convert/memory_plan.h"
+#include "preprocess/scenes/scenes.h"
+#include "stream/base/error.h"
+#include "stream/cache/cache_reader.h"
+#include "tests/reference/function_grid.h"
 #include "tests/support/faulty_system_calls.h"
-#include "tests/support/function_grid.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

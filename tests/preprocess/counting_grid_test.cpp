@@ -1,4 +1,4 @@
-#include "preprocess/counting_grid.h"
+#include "preprocess/convert/counting_grid.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Derived quantities against flows whose derivatives are known in closed form, on a curved grid.
-#include "preprocess/derived_source.h"
+#include "preprocess/formats/derived/derived_source.h"
 
 #include <gtest/gtest.h>
 
@@ -9,14 +9,14 @@
 #include <limits>
 #include <map>
 
-#include "preprocess/convert.h"
-#include "preprocess/node_reader.h"
-#include "preprocess/open_grid.h"
-#include "preprocess/slabs.h"
-#include "stream/cache_reader.h"
-#include "stream/error.h"
-#include "tests/support/cell_grid.h"
-#include "tests/support/function_grid.h"
+#include "preprocess/convert/convert.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "preprocess/grid/node_reader.h"
+#include "preprocess/grid/slabs.h"
+#include "stream/base/error.h"
+#include "stream/cache/cache_reader.h"
+#include "tests/reference/cell_grid.h"
+#include "tests/reference/function_grid.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

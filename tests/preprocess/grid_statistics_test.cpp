@@ -1,12 +1,12 @@
-#include "preprocess/grid_statistics.h"
+#include "preprocess/survey/grid_statistics.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "preprocess/open_grid.h"
-#include "tests/support/cell_grid.h"
-#include "tests/support/function_grid.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "tests/reference/cell_grid.h"
+#include "tests/reference/function_grid.h"
 
 namespace curvisplat {
 namespace {

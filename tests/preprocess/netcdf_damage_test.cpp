@@ -2,7 +2,7 @@
 // what the file has no room for.
 #include <gtest/gtest.h>
 
-#include "preprocess/open_grid.h"
+#include "preprocess/formats/open/open_grid.h"
 #include "tests/support/damaged_files.h"
 #include "tests/support/earth_files.h"
 #include "tests/support/temporary_folder.h"

@@ -7,8 +7,8 @@
 #include <numbers>
 #include <thread>
 
-#include "preprocess/open_grid.h"
-#include "stream/error.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "stream/base/error.h"
 #include "tests/support/earth_files.h"
 #include "tests/support/temporary_folder.h"
 

@@ -1,4 +1,4 @@
-#include "preprocess/node_reader.h"
+#include "preprocess/grid/node_reader.h"
 
 #include <gtest/gtest.h>
 

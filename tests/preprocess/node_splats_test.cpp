@@ -1,4 +1,4 @@
-#include "preprocess/node_splats.h"
+#include "preprocess/splats/node_splats.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <glm/matrix.hpp>
 #include <random>
 
-#include "preprocess/shape.h"
-#include "tests/support/mapped_block.h"
+#include "preprocess/splats/shape.h"
+#include "tests/reference/mapped_block.h"
 
 namespace curvisplat {
 namespace {

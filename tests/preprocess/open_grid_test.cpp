@@ -1,8 +1,8 @@
-#include "preprocess/open_grid.h"
+#include "preprocess/formats/open/open_grid.h"
 
 #include <gtest/gtest.h>
 
-#include "stream/error.h"
+#include "stream/base/error.h"
 #include "tests/preprocess/plot3d_bytes.h"
 
 namespace curvisplat {

@@ -1,10 +1,10 @@
-#include "preprocess/payload_file.h"
+#include "preprocess/formats/plot3d/payload_file.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "preprocess/open_grid.h"
+#include "preprocess/formats/open/open_grid.h"
 #include "tests/preprocess/plot3d_bytes.h"
 
 namespace curvisplat {

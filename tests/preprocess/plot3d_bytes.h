@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "preprocess/plot3d_layout.h"
-#include "stream/file.h"
+#include "preprocess/formats/plot3d/plot3d_layout.h"
+#include "stream/base/file.h"
 
 namespace curvisplat::test {
 

@@ -5,8 +5,8 @@
 #include <cerrno>
 #include <random>
 
-#include "preprocess/open_grid.h"
-#include "stream/error.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "stream/base/error.h"
 #include "tests/preprocess/plot3d_bytes.h"
 
 namespace curvisplat {

@@ -4,8 +4,8 @@
 #include <random>
 #include <thread>
 
-#include "preprocess/open_grid.h"
-#include "stream/error.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "stream/base/error.h"
 #include "tests/preprocess/plot3d_bytes.h"
 
 namespace curvisplat {

@@ -1,12 +1,12 @@
 // .p3d descriptions and OVERFLOW solutions: what they say, and what becomes of damaged ones.
-#include "preprocess/plot3d_meta.h"
+#include "preprocess/formats/plot3d/plot3d_meta.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "preprocess/open_grid.h"
-#include "stream/error.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "stream/base/error.h"
 #include "tests/preprocess/plot3d_bytes.h"
 
 namespace curvisplat {

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <limits>
 
-#include "preprocess/node_reader.h"
-#include "preprocess/open_grid.h"
-#include "preprocess/plot3d_detect.h"
-#include "preprocess/plot3d_file.h"
-#include "stream/error.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "preprocess/formats/plot3d/plot3d_detect.h"
+#include "preprocess/formats/plot3d/plot3d_file.h"
+#include "preprocess/grid/node_reader.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

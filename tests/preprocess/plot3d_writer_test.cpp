@@ -1,4 +1,4 @@
-#include "preprocess/plot3d_writer.h"
+#include "preprocess/formats/plot3d/plot3d_writer.h"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include <fstream>
 #include <iterator>
 
-#include "preprocess/scenes.h"
-#include "stream/error.h"
-#include "stream/file.h"
+#include "preprocess/scenes/scenes.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

@@ -8,17 +8,17 @@
 #include <map>
 #include <random>
 
-#include "preprocess/conversion_journal.h"
-#include "preprocess/convert.h"
-#include "preprocess/memory_plan.h"
-#include "preprocess/open_grid.h"
-#include "preprocess/plot3d_writer.h"
-#include "preprocess/scenes.h"
-#include "stream/brick_log.h"
-#include "stream/cache_reader.h"
-#include "stream/error.h"
+#include "preprocess/convert/conversion_journal.h"
+#include "preprocess/convert/convert.h"
+#include "preprocess/convert/memory_plan.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "preprocess/formats/plot3d/plot3d_writer.h"
+#include "preprocess/scenes/scenes.h"
+#include "stream/base/error.h"
+#include "stream/cache/brick_log.h"
+#include "stream/cache/cache_reader.h"
+#include "tests/reference/function_grid.h"
 #include "tests/support/faulty_system_calls.h"
-#include "tests/support/function_grid.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 

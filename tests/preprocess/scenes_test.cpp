@@ -1,4 +1,4 @@
-#include "preprocess/scenes.h"
+#include "preprocess/scenes/scenes.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <numbers>
 #include <random>
 
-#include "stream/error.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

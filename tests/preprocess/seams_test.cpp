@@ -1,4 +1,4 @@
-#include "preprocess/seams.h"
+#include "preprocess/splats/seams.h"
 
 #include <gtest/gtest.h>
 
@@ -10,10 +10,10 @@
 #include <random>
 #include <string>
 
-#include "preprocess/shape.h"
-#include "stream/error.h"
-#include "stream/file.h"
-#include "tests/support/mapped_block.h"
+#include "preprocess/splats/shape.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "tests/reference/mapped_block.h"
 
 namespace curvisplat {
 namespace {

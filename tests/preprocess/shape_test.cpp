@@ -1,4 +1,4 @@
-#include "preprocess/shape.h"
+#include "preprocess/splats/shape.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <glm/matrix.hpp>
 #include <random>
 
-#include "tests/support/mapped_block.h"
+#include "tests/reference/mapped_block.h"
 
 namespace curvisplat {
 namespace {

@@ -1,4 +1,4 @@
-#include "preprocess/slabs.h"
+#include "preprocess/grid/slabs.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <map>
 #include <stdexcept>
 
-#include "stream/error.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

@@ -11,9 +11,9 @@
 #include <new>
 #include <random>
 
-#include "preprocess/open_grid.h"
-#include "stream/error.h"
-#include "stream/file.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
 #include "tests/preprocess/plot3d_bytes.h"
 #include "tests/support/all_nodes.h"
 #include "tests/support/vts_writer.h"

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <random>
 
-#include "preprocess/compressed_bytes.h"
-#include "preprocess/convert.h"
-#include "preprocess/open_grid.h"
-#include "stream/cache_reader.h"
-#include "stream/error.h"
+#include "preprocess/convert/convert.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "preprocess/formats/vtk/compressed_bytes.h"
+#include "stream/base/error.h"
+#include "stream/cache/cache_reader.h"
 #include "tests/preprocess/plot3d_bytes.h"
 #include "tests/support/all_nodes.h"
 #include "tests/support/vts_writer.h"

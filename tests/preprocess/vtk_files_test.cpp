@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "preprocess/open_grid.h"
-#include "stream/error.h"
-#include "stream/file.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
 #include "tests/support/all_nodes.h"
 #include "tests/support/crc32.h"
 

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "preprocess/open_grid.h"
-#include "stream/error.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "stream/base/error.h"
 #include "tests/preprocess/plot3d_bytes.h"
 #include "tests/support/all_nodes.h"
 #include "tests/support/vts_writer.h"

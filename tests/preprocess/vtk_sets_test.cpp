@@ -4,11 +4,11 @@
 #include <cmath>
 #include <random>
 
-#include "preprocess/convert.h"
-#include "preprocess/open_grid.h"
-#include "preprocess/time_steps.h"
-#include "preprocess/vtk_extent.h"
-#include "stream/error.h"
+#include "preprocess/convert/convert.h"
+#include "preprocess/formats/open/open_grid.h"
+#include "preprocess/formats/vtk/vtk_extent.h"
+#include "preprocess/grid/time_steps.h"
+#include "stream/base/error.h"
 #include "tests/preprocess/plot3d_bytes.h"
 #include "tests/support/all_nodes.h"
 #include "tests/support/vts_writer.h"

@@ -12,9 +12,9 @@
 #include <span>
 #include <string>
 
-#include "preprocess/convert.h"
-#include "preprocess/memory_plan.h"
-#include "preprocess/open_grid.h"
+#include "preprocess/convert/convert.h"
+#include "preprocess/convert/memory_plan.h"
+#include "preprocess/formats/open/open_grid.h"
 #include "tests/support/dying_system_calls.h"
 
 int main(int argc, char** argv) {

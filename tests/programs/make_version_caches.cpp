@@ -16,12 +16,12 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "preprocess/convert.h"
-#include "render/image_file.h"
-#include "stream/file.h"
+#include "preprocess/convert/convert.h"
+#include "render/image/image_file.h"
+#include "stream/base/file.h"
+#include "tests/reference/cell_grid.h"
+#include "tests/reference/function_grid.h"
 #include "tests/support/cache_summary.h"
-#include "tests/support/cell_grid.h"
-#include "tests/support/function_grid.h"
 
 namespace curvisplat {
 namespace {

@@ -1,4 +1,4 @@
-#include "render/axis_ticks.h"
+#include "render/annotate/axis_ticks.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "render/border_parts.h"
+#include "render/project/border_parts.h"
 
 #include <gtest/gtest.h>
 
@@ -6,10 +6,10 @@
 #include <random>
 #include <vector>
 
-#include "render/projection.h"
-#include "render/transfer_function.h"
-#include "stream/half_cell.h"
-#include "tests/support/splat_arrays.h"
+#include "render/colour/transfer_function.h"
+#include "render/project/projection.h"
+#include "stream/model/half_cell.h"
+#include "tests/reference/splat_arrays.h"
 
 namespace curvisplat {
 namespace {

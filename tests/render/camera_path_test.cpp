@@ -1,4 +1,4 @@
-#include "render/camera_path.h"
+#include "render/camera/camera_path.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "stream/error.h"
+#include "stream/base/error.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

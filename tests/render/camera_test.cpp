@@ -1,4 +1,4 @@
-#include "render/camera.h"
+#include "render/camera/camera.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <glm/matrix.hpp>
 #include <numbers>
 
-#include "stream/error.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

@@ -1,4 +1,4 @@
-#include "render/classification.h"
+#include "render/colour/classification.h"
 
 #include <gtest/gtest.h>
 

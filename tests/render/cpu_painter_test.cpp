@@ -1,4 +1,4 @@
-#include "render/cpu_painter.h"
+#include "render/cpu/cpu_painter.h"
 
 #include <gtest/gtest.h>
 #include <hwy/highway.h>
@@ -7,10 +7,10 @@
 #include <random>
 #include <vector>
 
-#include "render/kernel.h"
-#include "render/tile.h"
-#include "tests/support/painted_splats.h"
-#include "tests/support/splat_compositor.h"
+#include "render/cpu/tile.h"
+#include "render/project/kernel.h"
+#include "tests/reference/painted_splats.h"
+#include "tests/reference/splat_compositor.h"
 
 namespace curvisplat {
 namespace {

@@ -1,4 +1,4 @@
-#include "render/depth_sort.h"
+#include "render/project/depth_sort.h"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
-#include "render/first_picture.h"
+#include "render/frame/first_picture.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "render/screen_view.h"
+#include "render/project/screen_view.h"
 
 namespace curvisplat {
 namespace {

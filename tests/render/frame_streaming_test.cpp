@@ -9,8 +9,8 @@
 #include <random>
 #include <thread>
 
-#include "render/frame.h"
-#include "stream/error.h"
+#include "render/frame/frame.h"
+#include "stream/base/error.h"
 #include "tests/support/faulty_system_calls.h"
 #include "tests/support/random_cache.h"
 #include "tests/support/temporary_folder.h"

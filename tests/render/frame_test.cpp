@@ -1,4 +1,4 @@
-#include "render/frame.h"
+#include "render/frame/frame.h"
 
 #include <gtest/gtest.h>
 
@@ -7,11 +7,11 @@
 #include <fstream>
 #include <numeric>
 
-#include "render/depth_sort.h"
-#include "stream/error.h"
-#include "stream/file.h"
+#include "render/project/depth_sort.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "tests/reference/painted_splats.h"
 #include "tests/support/lattice_cache.h"
-#include "tests/support/painted_splats.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

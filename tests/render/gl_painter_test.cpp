@@ -1,13 +1,13 @@
-#include "render/gl_painter.h"
-#include "render/offscreen_context.h"
+#include "render/gl/gl_painter.h"
+#include "render/gl/offscreen_context.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "render/gl_thread.h"
-#include "stream/error.h"
-#include "tests/support/painted_splats.h"
+#include "render/gl/gl_thread.h"
+#include "stream/base/error.h"
+#include "tests/reference/painted_splats.h"
 
 namespace curvisplat {
 namespace {

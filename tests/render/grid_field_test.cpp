@@ -1,6 +1,6 @@
 // The truth for real grids is held to fields that trilinear interpolation has exactly, on bent, sheared and
 // collapsed cells.
-#include "tests/support/grid_field.h"
+#include "tests/reference/grid_field.h"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include <numbers>
 #include <random>
 
-#include "preprocess/scenes.h"
-#include "tests/support/function_grid.h"
-#include "tests/support/reference_march.h"
+#include "preprocess/scenes/scenes.h"
+#include "tests/reference/function_grid.h"
+#include "tests/reference/reference_march.h"
 
 namespace curvisplat {
 namespace {

@@ -1,15 +1,15 @@
-#include "render/hidden_bricks.h"
+#include "render/frame/hidden_bricks.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "render/cpu_painter.h"
-#include "render/frame.h"
-#include "render/frame_workers.h"
-#include "render/kernel.h"
-#include "stream/file.h"
+#include "render/cpu/cpu_painter.h"
+#include "render/frame/frame.h"
+#include "render/frame/frame_workers.h"
+#include "render/project/kernel.h"
+#include "stream/base/file.h"
 #include "tests/support/lattice_cache.h"
 #include "tests/support/random_cache.h"
 #include "tests/support/temporary_folder.h"

@@ -1,5 +1,5 @@
-#include "render/image.h"
-#include "render/image_file.h"
+#include "render/image/image.h"
+#include "render/image/image_file.h"
 
 #include <gtest/gtest.h>
 #include <png.h>
@@ -12,9 +12,9 @@
 #include <limits>
 #include <random>
 
-#include "render/image_formats.h"
-#include "stream/error.h"
-#include "stream/file.h"
+#include "render/image/image_formats.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

@@ -1,4 +1,4 @@
-#include "render/kernel.h"
+#include "render/project/kernel.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // What every painter must do, with each backend that there is.
-#include "render/painter.h"
+#include "render/project/painter.h"
 
 #include <gtest/gtest.h>
 
@@ -8,10 +8,10 @@
 #include <random>
 #include <vector>
 
-#include "render/backend.h"
-#include "render/kernel.h"
-#include "tests/support/painted_splats.h"
-#include "tests/support/splat_compositor.h"
+#include "render/frame/backend.h"
+#include "render/project/kernel.h"
+#include "tests/reference/painted_splats.h"
+#include "tests/reference/splat_compositor.h"
 
 namespace curvisplat {
 namespace {

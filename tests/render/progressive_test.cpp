@@ -7,16 +7,16 @@
 #include <memory>
 #include <vector>
 
-#include "preprocess/scenes.h"
-#include "render/classification.h"
-#include "render/depth_sort.h"
-#include "render/frame.h"
-#include "render/gl_painter.h"
-#include "render/gl_thread.h"
-#include "render/offscreen_context.h"
-#include "stream/error.h"
-#include "tests/support/known_pictures.h"
-#include "tests/support/reference_march.h"
+#include "preprocess/scenes/scenes.h"
+#include "render/colour/classification.h"
+#include "render/frame/frame.h"
+#include "render/gl/gl_painter.h"
+#include "render/gl/gl_thread.h"
+#include "render/gl/offscreen_context.h"
+#include "render/project/depth_sort.h"
+#include "stream/base/error.h"
+#include "tests/reference/known_pictures.h"
+#include "tests/reference/reference_march.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

@@ -1,4 +1,4 @@
-#include "render/projection.h"
+#include "render/project/projection.h"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <glm/glm.hpp>
 #include <random>
 
-#include "render/kernel.h"
-#include "stream/error.h"
+#include "render/project/kernel.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

@@ -8,16 +8,16 @@
 #include <numeric>
 #include <vector>
 
-#include "preprocess/node_splats.h"
-#include "preprocess/scenes.h"
-#include "render/gl_painter.h"
-#include "render/gl_thread.h"
-#include "render/image.h"
-#include "render/offscreen_context.h"
-#include "render/projection.h"
-#include "stream/brick_codec.h"
-#include "tests/support/reference_march.h"
-#include "tests/support/splat_arrays.h"
+#include "preprocess/scenes/scenes.h"
+#include "preprocess/splats/node_splats.h"
+#include "render/gl/gl_painter.h"
+#include "render/gl/gl_thread.h"
+#include "render/gl/offscreen_context.h"
+#include "render/image/image.h"
+#include "render/project/projection.h"
+#include "stream/codec/brick_codec.h"
+#include "tests/reference/reference_march.h"
+#include "tests/reference/splat_arrays.h"
 
 namespace curvisplat {
 namespace {

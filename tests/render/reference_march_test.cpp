@@ -1,5 +1,5 @@
 // The specification itself is held to closed forms.
-#include "tests/support/reference_march.h"
+#include "tests/reference/reference_march.h"
 
 #include <gtest/gtest.h>
 

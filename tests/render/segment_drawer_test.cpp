@@ -1,4 +1,4 @@
-#include "render/segment_drawer.h"
+#include "render/frame/segment_drawer.h"
 
 #include <gtest/gtest.h>
 

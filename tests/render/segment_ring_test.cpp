@@ -1,4 +1,4 @@
-#include "render/segment_ring.h"
+#include "render/frame/segment_ring.h"
 
 #include <gtest/gtest.h>
 

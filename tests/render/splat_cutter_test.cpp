@@ -1,4 +1,4 @@
-#include "render/splat_cutter.h"
+#include "render/project/splat_cutter.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "render/projection.h"
+#include "render/project/projection.h"
 
 namespace curvisplat {
 namespace {

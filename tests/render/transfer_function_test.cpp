@@ -1,4 +1,4 @@
-#include "render/transfer_function.h"
+#include "render/colour/transfer_function.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -10,7 +10,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "stream/error.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

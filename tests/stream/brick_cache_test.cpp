@@ -1,4 +1,4 @@
-#include "stream/brick_cache.h"
+#include "stream/paging/brick_cache.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "stream/arena.h"
+#include "stream/paging/arena.h"
 
 namespace curvisplat {
 namespace {

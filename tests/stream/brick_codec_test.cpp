@@ -1,6 +1,6 @@
 // The codec's promises, over bricks without any order and over smooth ones; and what it does with hostile
 // bytes.
-#include "stream/brick_codec.h"
+#include "stream/codec/brick_codec.h"
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,8 @@
 #include <ostream>
 #include <random>
 
-#include "stream/error.h"
-#include "stream/half_cell.h"
+#include "stream/base/error.h"
+#include "stream/model/half_cell.h"
 #include "tests/stream/test_bricks.h"
 
 namespace curvisplat {

@@ -1,5 +1,5 @@
 // bricks.vdb, read by OpenVDB itself.
-#include "stream/brick_grids.h"
+#include "stream/cache/brick_grids.h"
 
 #include <gtest/gtest.h>
 #include <openvdb/io/File.h>
@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "stream/cache_reader.h"
-#include "stream/file.h"
+#include "stream/base/file.h"
+#include "stream/cache/cache_reader.h"
 #include "tests/support/random_cache.h"
 #include "tests/support/temporary_folder.h"
 

@@ -1,4 +1,4 @@
-#include "stream/brick_source.h"
+#include "stream/paging/brick_source.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <random>
 #include <thread>
 
-#include "stream/error.h"
+#include "stream/base/error.h"
 #include "tests/support/faulty_system_calls.h"
 #include "tests/support/random_cache.h"
 #include "tests/support/temporary_folder.h"

@@ -3,9 +3,9 @@
 
 #include <filesystem>
 
-#include "stream/cache_format.h"
-#include "stream/cache_reader.h"
-#include "stream/error.h"
+#include "stream/base/error.h"
+#include "stream/cache/cache_format.h"
+#include "stream/cache/cache_reader.h"
 #include "tests/stream/test_bricks.h"
 #include "tests/support/faulty_system_calls.h"
 

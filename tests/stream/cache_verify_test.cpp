@@ -1,14 +1,14 @@
 // What verifyCache finds, and what probing finds.
-#include "stream/cache_verify.h"
+#include "stream/cache/cache_verify.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstring>
 
-#include "stream/cache_format.h"
-#include "stream/checksum.h"
-#include "stream/probe.h"
+#include "stream/base/checksum.h"
+#include "stream/cache/cache_format.h"
+#include "stream/cache/probe.h"
 #include "tests/stream/test_bricks.h"
 
 namespace curvisplat {

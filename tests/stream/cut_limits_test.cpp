@@ -7,7 +7,7 @@
 #include <map>
 #include <set>
 
-#include "stream/cut.h"
+#include "stream/paging/cut.h"
 #include "tests/stream/cut_tree.h"
 
 namespace curvisplat {

@@ -1,4 +1,4 @@
-#include "stream/cut.h"
+#include "stream/paging/cut.h"
 
 #include <gtest/gtest.h>
 

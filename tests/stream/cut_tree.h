@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "stream/cut.h"
+#include "stream/paging/cut.h"
 
 namespace curvisplat {
 

@@ -1,4 +1,4 @@
-#include "stream/file.h"
+#include "stream/base/file.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "stream/error.h"
+#include "stream/base/error.h"
 #include "tests/support/faulty_system_calls.h"
 
 namespace curvisplat {

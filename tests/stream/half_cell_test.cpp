@@ -1,4 +1,4 @@
-#include "stream/half_cell.h"
+#include "stream/model/half_cell.h"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
 // The manifest is strict: a field that is missing, of another type or out of range is an error that names it.
-#include "stream/manifest.h"
+#include "stream/cache/manifest.h"
 
 #include <gtest/gtest.h>
 
 #include <functional>
 #include <nlohmann/json.hpp>
 
-#include "stream/error.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

@@ -1,4 +1,4 @@
-#include "stream/pager.h"
+#include "stream/paging/pager.h"
 
 #include <gtest/gtest.h>
 
@@ -11,10 +11,10 @@
 #include <thread>
 #include <vector>
 
-#include "stream/cache_format.h"
-#include "stream/checksum.h"
-#include "stream/error.h"
-#include "stream/file.h"
+#include "stream/base/checksum.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/cache/cache_format.h"
 #include "tests/support/faulty_async_reads.h"
 #include "tests/support/faulty_system_calls.h"
 #include "tests/support/random_cache.h"

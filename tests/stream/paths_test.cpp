@@ -1,12 +1,12 @@
-#include "stream/paths.h"
+#include "stream/base/paths.h"
 
 #include <gtest/gtest.h>
 
 #include <set>
 #include <string>
 
-#include "stream/error.h"
-#include "stream/file.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

@@ -1,14 +1,14 @@
 // Rows, predictors and planes by themselves: known answers, and bytes that lie.
-#include "stream/prediction.h"
+#include "stream/codec/prediction.h"
 
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <random>
 
-#include "stream/error.h"
-#include "stream/planes.h"
-#include "stream/values_codec.h"
+#include "stream/base/error.h"
+#include "stream/codec/planes.h"
+#include "stream/codec/values_codec.h"
 
 namespace curvisplat {
 namespace {

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "stream/brick_codec.h"
-#include "stream/cache_writer.h"
+#include "stream/cache/cache_writer.h"
+#include "stream/codec/brick_codec.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

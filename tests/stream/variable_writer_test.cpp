@@ -1,10 +1,10 @@
 // Variables that are added to a cache that is whole.
-#include "stream/variable_writer.h"
+#include "stream/cache/variable_writer.h"
 
 #include <gtest/gtest.h>
 
-#include "stream/cache_reader.h"
-#include "stream/error.h"
+#include "stream/base/error.h"
+#include "stream/cache/cache_reader.h"
 #include "tests/stream/test_bricks.h"
 
 namespace curvisplat {

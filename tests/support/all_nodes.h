@@ -4,7 +4,7 @@
 #include <numeric>
 #include <vector>
 
-#include "preprocess/grid_source.h"
+#include "preprocess/grid/grid_source.h"
 
 namespace curvisplat {
 

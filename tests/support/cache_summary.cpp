@@ -4,7 +4,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "render/frame.h"
+#include "render/frame/frame.h"
 
 namespace curvisplat {
 

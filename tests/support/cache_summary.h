@@ -4,8 +4,8 @@
 #include <map>
 #include <string>
 
-#include "render/image.h"
-#include "stream/cache_reader.h"
+#include "render/image/image.h"
+#include "stream/cache/cache_reader.h"
 
 namespace curvisplat {
 

@@ -1,8 +1,8 @@
 #include "tests/support/cube_files.h"
 
-#include "preprocess/plot3d_writer.h"
-#include "stream/file.h"
-#include "stream/progress.h"
+#include "preprocess/formats/plot3d/plot3d_writer.h"
+#include "stream/base/file.h"
+#include "stream/base/progress.h"
 
 namespace curvisplat {
 namespace {

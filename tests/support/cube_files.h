@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/function_grid.h"
+#include "tests/reference/function_grid.h"
 
 namespace curvisplat {
 

@@ -17,8 +17,8 @@
 #include <numeric>
 #include <random>
 
-#include "stream/error.h"
-#include "stream/file.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "preprocess/grid_source.h"
+#include "preprocess/grid/grid_source.h"
 
 namespace curvisplat {
 

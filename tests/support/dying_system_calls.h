@@ -5,7 +5,7 @@
 #include <atomic>
 #include <cstdint>
 
-#include "stream/file.h"
+#include "stream/base/file.h"
 
 namespace curvisplat::testing {
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "stream/error.h"
+#include "stream/base/error.h"
 
 namespace curvisplat::testing {
 namespace {

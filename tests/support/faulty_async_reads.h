@@ -4,7 +4,7 @@
 #include <functional>
 #include <memory>
 
-#include "stream/async_reads.h"
+#include "stream/paging/async_reads.h"
 
 namespace curvisplat::testing {
 

@@ -7,7 +7,7 @@
 #include <set>
 #include <string>
 
-#include "stream/file.h"
+#include "stream/base/file.h"
 
 namespace curvisplat::testing {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "stream/cache_writer.h"
+#include "stream/cache/cache_writer.h"
 
 namespace curvisplat {
 namespace {

@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "stream/file.h"
+#include "stream/base/file.h"
 #include "tests/support/folder_files.h"
 
 namespace curvisplat::testing {

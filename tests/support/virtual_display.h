@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "render/image.h"
+#include "render/image/image.h"
 #include "tests/support/run_program.h"
 
 namespace curvisplat {

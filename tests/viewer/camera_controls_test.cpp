@@ -5,7 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "render/screen_view.h"
+#include "render/project/screen_view.h"
 
 namespace curvisplat {
 namespace {

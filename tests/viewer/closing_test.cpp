@@ -10,9 +10,9 @@
 #include <set>
 #include <string>
 
-#include "preprocess/scenes.h"
-#include "tests/support/known_pictures.h"
-#include "tests/support/reference_march.h"
+#include "preprocess/scenes/scenes.h"
+#include "tests/reference/known_pictures.h"
+#include "tests/reference/reference_march.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/virtual_display.h"
 #include "tools/viewer/frame_loop.h"

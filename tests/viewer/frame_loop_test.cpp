@@ -7,10 +7,10 @@
 #include <memory>
 #include <mutex>
 
-#include "preprocess/scenes.h"
-#include "stream/error.h"
-#include "tests/support/known_pictures.h"
-#include "tests/support/reference_march.h"
+#include "preprocess/scenes/scenes.h"
+#include "stream/base/error.h"
+#include "tests/reference/known_pictures.h"
+#include "tests/reference/reference_march.h"
 #include "tests/support/temporary_folder.h"
 
 namespace curvisplat {

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "stream/error.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

@@ -6,7 +6,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "render/camera.h"
+#include "render/camera/camera.h"
 
 namespace curvisplat {
 

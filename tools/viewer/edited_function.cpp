@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "render/colour_map.h"
-#include "stream/check.h"
+#include "render/colour/colour_map.h"
+#include "stream/base/check.h"
 
 namespace curvisplat {
 namespace {

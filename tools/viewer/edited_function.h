@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "render/transfer_function.h"
+#include "render/colour/transfer_function.h"
 
 namespace curvisplat {
 

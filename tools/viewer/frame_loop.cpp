@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "stream/error.h"
-#include "stream/thread_name.h"
+#include "stream/base/error.h"
+#include "stream/base/thread_name.h"
 
 namespace curvisplat {
 namespace {

@@ -20,8 +20,8 @@
 #include <thread>
 #include <vector>
 
-#include "render/frame.h"
-#include "stream/cache_reader.h"
+#include "render/frame/frame.h"
+#include "stream/cache/cache_reader.h"
 
 namespace curvisplat {
 

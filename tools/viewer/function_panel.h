@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "stream/cache_reader.h"
+#include "stream/cache/cache_reader.h"
 #include "tools/viewer/edited_function.h"
 
 namespace curvisplat {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stream/check.h"
+#include "stream/base/check.h"
 
 namespace curvisplat {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "stream/cache_reader.h"
+#include "stream/cache/cache_reader.h"
 
 namespace curvisplat {
 

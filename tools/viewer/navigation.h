@@ -7,7 +7,7 @@
 
 #include <glm/vec3.hpp>
 
-#include "render/camera.h"
+#include "render/camera/camera.h"
 #include "tools/viewer/window.h"
 
 namespace curvisplat {

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "stream/process_usage.h"
+#include "stream/base/process_usage.h"
 
 namespace curvisplat {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "stream/cache_reader.h"
+#include "stream/cache/cache_reader.h"
 #include "tools/viewer/frame_loop.h"
 #include "tools/viewer/function_panel.h"
 #include "tools/viewer/view_state.h"

@@ -1,6 +1,6 @@
 #include "tools/viewer/picture_texture.h"
 
-#include "stream/check.h"
+#include "stream/base/check.h"
 
 namespace curvisplat {
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <span>
 
-#include "render/gl_functions.h"
-#include "render/image.h"
+#include "render/gl/gl_functions.h"
+#include "render/image/image.h"
 
 namespace curvisplat {
 

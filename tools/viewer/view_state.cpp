@@ -7,8 +7,8 @@
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
-#include "stream/error.h"
-#include "stream/json_text.h"
+#include "stream/base/error.h"
+#include "stream/base/json_text.h"
 
 namespace curvisplat {
 namespace {

@@ -8,10 +8,10 @@
 #include <optional>
 #include <string>
 
-#include "render/annotations.h"
-#include "render/camera.h"
-#include "render/frame.h"
-#include "stream/manifest.h"
+#include "render/annotate/annotations.h"
+#include "render/camera/camera.h"
+#include "render/frame/frame.h"
+#include "stream/cache/manifest.h"
 #include "tools/viewer/edited_function.h"
 
 namespace curvisplat {

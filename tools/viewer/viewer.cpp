@@ -10,12 +10,12 @@
 #include <memory>
 #include <utility>
 
-#include "render/frame_plan.h"
-#include "render/image.h"
-#include "render/image_file.h"
-#include "stream/error.h"
-#include "stream/file.h"
-#include "stream/say.h"
+#include "render/frame/frame_plan.h"
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/base/say.h"
 #include "tools/viewer/frame_loop.h"
 #include "tools/viewer/navigation.h"
 #include "tools/viewer/panels.h"

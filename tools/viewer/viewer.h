@@ -6,10 +6,10 @@
 #include <optional>
 #include <string>
 
-#include "render/backend.h"
-#include "render/camera.h"
-#include "stream/cache_reader.h"
-#include "stream/progress.h"
+#include "render/camera/camera.h"
+#include "render/frame/backend.h"
+#include "stream/base/progress.h"
+#include "stream/cache/cache_reader.h"
 
 namespace curvisplat {
 

@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <utility>
 
-#include "stream/error.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "render/camera.h"
-#include "render/gl_functions.h"
+#include "render/camera/camera.h"
+#include "render/gl/gl_functions.h"
 
 struct GLFWwindow;
 

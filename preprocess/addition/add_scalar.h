@@ -1,0 +1,47 @@
+// Adds scalars to a cache that is there, without touching its geometry: the grid is read again with the new
+// scalars, and their values go to the bricks that have the splats. The new files have the bytes that they
+// would have had if the cache had been made with all of its scalars at once.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "preprocess/convert/convert.h"
+#include "preprocess/grid/grid_source.h"
+#include "stream/base/progress.h"
+
+namespace curvisplat {
+
+struct AddScalarOptions {
+  std::filesystem::path cache;             // that is to have them
+  std::vector<uint32_t> scalars;           // positions in the source's description
+  std::optional<double> blank_value;       // a drawn node must not have it
+  uint64_t memory_bytes = 0;               // 0: defaultMemory()
+  unsigned threads = 0;                    // 0: as many as the machine has
+  std::filesystem::path temporary_folder;  // empty: the folder of the cache
+
+  /// Smaller buckets than memory would allow, and fewer of them in a file: for tests.
+  std::optional<uint64_t> bucket_splats;
+  std::optional<uint32_t> most_buckets;
+};
+
+struct AddScalarReport {
+  std::vector<std::string> scalars;  // as the cache calls them
+  uint64_t nodes = 0, splats = 0;
+  uint64_t temporary_bytes = 0;   // of the scattered values
+  unsigned threads = 0;           // that worked
+  uint64_t memory_bytes = 0;      // the cap that held
+  std::vector<FileReport> files;  // the new ones
+};
+
+/// Adds. `source` is read twice (a third time if older scalars blanked nodes that the grid does not). Nodes
+/// that the cache draws must have the new values; what it does not draw does not matter. Throws Error if the
+/// grid is not the one the cache was made from, if a value is missing, or if something outside fails;
+/// UsageError if the cache has a scalar of the name. Then the cache is as it was. Peak memory, everything
+/// counted: options.memory_bytes.
+AddScalarReport addScalars(const GridSource& source, const AddScalarOptions& options, Progress& progress);
+
+}  // namespace curvisplat

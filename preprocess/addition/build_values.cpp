@@ -1,0 +1,204 @@
+#include "preprocess/addition/build_values.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <utility>
+
+#include "preprocess/addition/value_record.h"
+#include "stream/base/checksum.h"
+#include "stream/base/error.h"
+#include "stream/codec/geometry_codec.h"
+
+namespace curvisplat {
+
+ValueBuilder::ValueBuilder(const CacheReader& cache, const ConversionOrder& order,
+                           const ValueBuckets& buckets, size_t variables, VariableWriter& writer,
+                           Progress& progress)
+    : cache_(&cache),
+      order_(&order),
+      buckets_(&buckets),
+      variables_(variables),
+      numbers_(cache.manifest().blocks),
+      writer_(&writer),
+      progress_(&progress) {}
+
+void ValueBuilder::build(LoadedValues& loaded) {
+  const uint32_t begin = buckets_->begin(loaded.bucket), end = buckets_->end(loaded.bucket);
+  std::vector<Built> built(end - begin);
+  tbb::enumerable_thread_specific<OctantMerger> mergers([this] { return newMerger(); });
+
+  const std::vector<Leaf> leaves = leavesOf(loaded);
+  std::unique_ptr<OctantMerger> continued = std::move(open_);
+  tbb::parallel_for(size_t{0}, leaves.size(), [&](size_t n) {
+    const Leaf& leaf = leaves[n];
+    if (leaf.is_continued) return buildLeaf(leaf, loaded, *continued, built);
+    if (!leaf.goes_on) return buildLeaf(leaf, loaded, mergers.local(), built);
+    // One at most does: the last.
+    open_ = std::make_unique<OctantMerger>(newMerger());
+    buildLeaf(leaf, loaded, *open_, built);
+  });
+  if (!leaves.empty() && leaves.back().is_continued && leaves.back().goes_on) open_ = std::move(continued);
+
+  std::vector<std::vector<uint32_t>> inner(kMaxLevel + 1);  // [level]: positions
+  for (uint32_t position = begin; position < end; ++position) {
+    if (brickAt(position).isLeaf())
+      giveToParent(position, std::move(built[position - begin].octant));
+    else
+      inner[brickAt(position).cell.level].push_back(position);
+  }
+  for (size_t level = inner.size(); level-- > 0;) {
+    const std::vector<uint32_t>& positions = inner[level];
+    tbb::parallel_for(size_t{0}, positions.size(), [&](size_t n) {
+      built[positions[n] - begin] = buildInner(positions[n], loaded, mergers.local());
+    });
+    for (const uint32_t position : positions) {
+      octants_.erase((*order_)[position]);
+      giveToParent(position, std::move(built[position - begin].octant));
+    }
+  }
+
+  for (uint32_t position = begin; position < end; ++position) {
+    writer_->append((*order_)[position], built[position - begin].values);
+    if (brickAt(position).isLeaf()) progress_->advance(brickAt(position).splats);
+  }
+}
+
+std::vector<ValueBuilder::Leaf> ValueBuilder::leavesOf(const LoadedValues& loaded) const {
+  const uint32_t begin = buckets_->begin(loaded.bucket), end = buckets_->end(loaded.bucket);
+  const auto is_next_of_cell = [&](uint32_t position) {
+    return position > 0 && position < order_->size() && brickAt(position).isLeaf() &&
+           brickAt(position - 1).cell == brickAt(position).cell;
+  };
+  std::vector<Leaf> leaves;
+  for (uint32_t position = begin; position < end; ++position) {
+    if (!brickAt(position).isLeaf()) continue;
+    const bool is_next = is_next_of_cell(position);
+    if (!is_next || position == begin) leaves.push_back({position, position, is_next, false});
+    leaves.back().end = position + 1;
+  }
+  if (!leaves.empty() && leaves.back().end == end) leaves.back().goes_on = is_next_of_cell(end);
+  return leaves;
+}
+
+void ValueBuilder::buildLeaf(const Leaf& leaf, LoadedValues& loaded, OctantMerger& merger,
+                             std::vector<Built>& built) const {
+  const Cell& cell = brickAt(leaf.begin).cell;
+  const bool has_parent = cell.level > 0;
+  if (has_parent && !leaf.is_continued) merger.begin(cell);
+  for (uint32_t position = leaf.begin; position < leaf.end; ++position) {
+    BrickSplats brick = decode(position, loaded);
+    takeValues(position, loaded, brick);
+    encode(brick, built[position - loaded.first]);
+    if (has_parent) merger.add(brick);
+  }
+  if (has_parent && !leaf.goes_on)
+    built[leaf.end - 1 - loaded.first].octant = merger.finish().splats.variables;
+}
+
+ValueBuilder::Built ValueBuilder::buildInner(uint32_t position, const LoadedValues& loaded,
+                                             OctantMerger& merger) {
+  BrickSplats brick = decode(position, loaded);
+  std::array<Values, 8>& octants = octants_.at((*order_)[position]);
+  brick.variables.resize(variables_);
+  for (Values& octant : octants) {
+    for (size_t v = 0; v < octant.size(); ++v)
+      brick.variables[v].insert(brick.variables[v].end(), octant[v].begin(), octant[v].end());
+    octant = {};
+  }
+  for (const auto& values : brick.variables)
+    if (values.size() != brick.size())
+      refuse(position,
+             fmt::format("what is below it merges to {} splats, and it has {}; the cache is damaged, or "
+                         "another version's: convert again",
+                         values.size(), brick.size()));
+  Built built;
+  encode(brick, built);
+  if (brick.cell.level > 0) {
+    merger.begin(brick.cell);
+    merger.add(brick);
+    built.octant = merger.finish().splats.variables;
+  }
+  return built;
+}
+
+void ValueBuilder::giveToParent(uint32_t position, Values&& octant) {
+  const Brick& brick = brickAt(position);
+  if (brick.parent == kNoBrick || octant.empty()) return;
+  octants_[brick.parent][static_cast<size_t>(brick.cell.octantInParent())] = std::move(octant);
+}
+
+BrickSplats ValueBuilder::decode(uint32_t position, const LoadedValues& loaded) const {
+  const Brick& brick = brickAt(position);
+  const std::span<const std::byte> geometry = loaded.geometryOf(position);
+  const uint64_t found = checksumOf(geometry);
+  if (found != brick.geometry.checksum)
+    refuse(position,
+           fmt::format("its geometry has the checksum {:016x}, expected {:016x}; the file is damaged: "
+                       "convert again",
+                       found, brick.geometry.checksum));
+  try {
+    return decodeForMerging(cache_->manifest().root, brick, geometry, {}, {});
+  } catch (const Error& error) {
+    refuse(position, error.what());
+  }
+}
+
+/// The values of a leaf's splats, in the order in which it stores them: by node. Each must be where it was.
+void ValueBuilder::takeValues(uint32_t position, LoadedValues& loaded, BrickSplats& brick) const {
+  constexpr const char* kOtherGrid = "this grid is not the one the cache was made from";
+  const RecordSpan records = loaded.records(position);
+  if (records.size() != brick.size())
+    refuse(position, fmt::format("it has {} splats, and the grid gives it {}; {}", brick.size(),
+                                 records.size(), kOtherGrid));
+  sortByNode(records);
+
+  // Positions are stored in so many bits of the cell, the records' places in kPlaceBits. An ulp may carry a
+  // position over a border of either.
+  GeometryHeader header;
+  std::memcpy(&header, loaded.geometryOf(position).data(), sizeof header);
+  const int coarser = std::max(0, kPlaceBits - int{header.position_bits});
+  const auto isAt = [&](const std::array<uint32_t, 3>& stored, const std::array<uint32_t, 3>& found) {
+    bool near = true;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto from = static_cast<int>(stored[axis] >> coarser),
+                 to = static_cast<int>(found[axis] >> coarser);
+      near &= std::abs(from - to) <= 1;
+    }
+    return near;
+  };
+
+  brick.variables.assign(variables_, std::vector<SplatScalar>(brick.size()));
+  std::vector<SplatScalar> values(variables_);
+  size_t n = 0;
+  for (const NodeRun& run : brick.runs) {
+    const uint64_t first = numbers_.firstOf(run);
+    for (uint64_t in_run = 0; in_run < run.count; ++in_run, ++n) {
+      const std::byte* record = records[n];
+      const uint64_t node = recordNode(record);
+      if (node != first + in_run)
+        refuse(position, fmt::format("it has {}, and the grid puts {} there; {}",
+                                     numbers_.nameOf(first + in_run), numbers_.nameOf(node), kOtherGrid));
+      if (!isAt(placeInCell(brick.positions[n], brick.cell), valueRecordPlace(record)))
+        refuse(position, fmt::format("{} is elsewhere in the grid; {}", numbers_.nameOf(node), kOtherGrid));
+      unpackValueRecord(record, values);
+      for (size_t v = 0; v < variables_; ++v) brick.variables[v][n] = values[v];
+    }
+  }
+  if (n != brick.size())
+    refuse(position, fmt::format("it has {} splats, and its runs {}; the cache is damaged: convert again",
+                                 brick.size(), n));
+}
+
+void ValueBuilder::encode(BrickSplats& brick, Built& built) const {
+  for (auto& values : brick.variables) built.values.push_back(encodeValues(brick.runs, values));
+}
+
+void ValueBuilder::refuse(uint32_t position, const std::string& what) const {
+  throw Error("{}: brick {}: {}", cache_->path().string(), (*order_)[position], what);
+}
+
+}  // namespace curvisplat

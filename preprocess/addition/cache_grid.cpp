@@ -1,0 +1,89 @@
+#include "preprocess/addition/cache_grid.h"
+
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "preprocess/convert/scatter.h"
+#include "preprocess/grid/node_reader.h"
+#include "preprocess/splats/seams.h"
+
+namespace curvisplat {
+namespace {
+
+/// For splats that nobody wants.
+class NoSink : public SplatSink {
+ public:
+  void add(const NodeSplat&, std::span<const SplatScalar>) override {}
+};
+
+}  // namespace
+
+CacheGrid::CacheGrid(const GridSource& source) : source_(&source) {
+  uint64_t node = 0;
+  for (const GridBlock& block : source.description().blocks) {
+    first_nodes_.push_back(node);
+    node += block.nodes();
+  }
+}
+
+void CacheGrid::restrictTo(const CacheReader& cache, const MemoryPlan& plan,
+                           const std::filesystem::path& temporary_folder, Progress& progress) {
+  drawn_ = std::make_unique<DrawnNodes>(cache, plan, temporary_folder, progress);
+}
+
+void CacheGrid::addMergedFaces(const MemoryPlan& plan, const std::filesystem::path& temporary_folder,
+                               Progress& progress) {
+  all_faces_ = true;
+  SeamMerger seams(0, plan.seam_bytes, temporary_folder);
+  NoSink none;
+  streamSplats(
+      NodeReader(*this, {}, std::nullopt), nullptr, plan.slab_bytes, [&]() -> SplatSink& { return none; },
+      seams, progress);
+  // The splat of a set has the number of the lowest node in it that is drawn.
+  seams.forEachSet(description().coordinate_bytes, [&](std::span<const uint64_t> nodes) {
+    bool merges = false;
+    for (const uint64_t node : nodes) {
+      const bool is_drawn = drawn_->holds(node);
+      if (merges && !is_drawn) drawn_->add(node);
+      merges |= is_drawn;
+    }
+  });
+  all_faces_ = false;
+}
+
+void CacheGrid::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                     NodeArrays& out) const {
+  source_->read(block, box, scalars, out);
+  for (size_t n = 0; n < out.x.size(); ++n)
+    out.blank[n] |= !(std::isfinite(out.x[n]) && std::isfinite(out.y[n]) && std::isfinite(out.z[n]));
+  if (!drawn_) return;
+  const bool cells = !scalars.empty() && description().scalars[scalars.front()].centring == Centring::cell;
+  if (!cells) {
+    restrict(block, box, out.blank);
+    return;
+  }
+  std::vector<uint8_t> no_cell(out.blank.size(), 0);
+  restrict(block, box, no_cell);
+  for (std::vector<float>& values : out.scalars)
+    for (size_t n = 0; n < values.size(); ++n)
+      if (no_cell[n]) values[n] = std::numeric_limits<float>::quiet_NaN();
+}
+
+void CacheGrid::restrict(uint32_t number, const NodeBox& box, std::vector<uint8_t>& blank) const {
+  const GridBlock& block = description().blocks[number];
+  size_t at = 0;
+  for (uint64_t k = box.k0; k < box.k1; ++k) {
+    for (uint64_t j = box.j0; j < box.j1; ++j, at += block.ni) {
+      const std::span<uint8_t> row(&blank[at], block.ni);
+      const uint64_t first = first_nodes_[number] + (k * block.nj + j) * block.ni;
+      const bool on_face = j == 0 || j + 1 == block.nj || k == 0 || k + 1 == block.nk;
+      if (!all_faces_)
+        drawn_->blankOthers(first, row);
+      else if (!on_face && block.ni > 2)
+        drawn_->blankOthers(first + 1, row.subspan(1, block.ni - 2));
+    }
+  }
+}
+
+}  // namespace curvisplat

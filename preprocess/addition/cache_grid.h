@@ -1,0 +1,46 @@
+// A grid with the nodes that a cache has drawn, whatever scalars are read from it now: blank is what the
+// cache has no splat of, so that every cell comes out as it did when the cache was made. Where splats stand
+// for cells, those that the cache has not have no value (NaN).
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "preprocess/addition/drawn_nodes.h"
+#include "preprocess/convert/memory_plan.h"
+#include "preprocess/grid/grid_source.h"
+#include "stream/base/progress.h"
+#include "stream/cache/cache_reader.h"
+
+namespace curvisplat {
+
+class CacheGrid : public GridSource {
+ public:
+  /// What the grid itself blanks: iblank, and coordinates that are not finite. Enough for a cache whose
+  /// scalars had values everywhere else. `source` must outlive it.
+  explicit CacheGrid(const GridSource& source);
+
+  /// Blanks nodes that `cache` has no splat of, too. Throws Error if a disk fails.
+  void restrictTo(const CacheReader& cache, const MemoryPlan& plan,
+                  const std::filesystem::path& temporary_folder, Progress& progress);
+  /// Takes back those that were merged into others at seams, by merging the grid's faces again. To be called
+  /// after restrictTo(), and while nobody reads.
+  void addMergedFaces(const MemoryPlan& plan, const std::filesystem::path& temporary_folder,
+                      Progress& progress);
+
+  const GridDescription& description() const override { return source_->description(); }
+  void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+            NodeArrays& out) const override;
+
+ private:
+  void restrict(uint32_t block, const NodeBox& box, std::vector<uint8_t>& blank) const;
+
+  const GridSource* source_;
+  std::vector<uint64_t> first_nodes_;  // [block]
+  std::unique_ptr<DrawnNodes> drawn_;
+  bool all_faces_ = false;  // while merged ones are looked for: nodes of block faces are not restricted
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,168 @@
+#include "preprocess/addition/value_buckets.h"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "preprocess/addition/value_record.h"
+#include "preprocess/convert/merge_levels.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kGatheredBytes = 32 << 10;
+
+/// What a brick takes of a bucket while it is built: its records and their places, its geometry, what is
+/// encoded of it, and what is merged of it for its parent.
+uint64_t bytesOf(const Brick& brick, size_t variables) {
+  const uint64_t splats = brick.splats;
+  const uint64_t merged =
+      std::min(splats, uint64_t{1} << (3 * (kLatticeBits - 1))) * sizeof(SplatScalar) * variables;
+  const uint64_t records = brick.isLeaf() ? splats * (mostValueRecordBytes(variables) + sizeof(uint32_t)) : 0;
+  return records + brick.geometry.length + splats * 10 * variables + merged;
+}
+
+}  // namespace
+
+ValueBuckets::ValueBuckets(std::span<const Brick> bricks, const ConversionOrder& order, size_t variables,
+                           uint64_t most_bytes)
+    : begins_{0} {
+  uint64_t bytes = 0;
+  for (uint32_t position = 0; position < order.size(); ++position) {
+    const uint64_t of_brick = bytesOf(bricks[order[position]], variables);
+    if (position > begins_.back() && bytes + of_brick > most_bytes) {
+      begins_.push_back(position);
+      bytes = 0;
+    }
+    bytes += of_brick;
+  }
+  begins_.push_back(static_cast<uint32_t>(order.size()));
+}
+
+uint32_t ValueBuckets::of(uint32_t position) const {
+  const auto after = std::upper_bound(begins_.begin(), begins_.end(), position);
+  return static_cast<uint32_t>(after - begins_.begin() - 1);
+}
+
+ValueSink::ValueSink(const CacheReader& cache, const ConversionOrder& order, const ValueBuckets& buckets,
+                     uint32_t grouped, BucketFile& file)
+    : cache_(&cache), order_(&order), buckets_(&buckets), grouped_(grouped), file_(&file) {}
+
+void ValueSink::add(const NodeSplat& splat, std::span<const SplatScalar> values) {
+  const RootPosition position = cache_->manifest().root.fromWorld(splat.splat.position);
+  if (leaf_ == kNoBrick || leaf_shares_ || !cache_->bricks()[leaf_].cell.contains(position)) {
+    const uint32_t leaf = order_->leafOf(position, splat.node);
+    if (leaf == kNoBrick)
+      throw Error(
+          "{}: has no splat where the grid has that of {}; this grid is not the one the cache was made from",
+          cache_->path().string(), NodeNumbers(cache_->manifest().blocks).nameOf(splat.node));
+    const uint32_t number = buckets_->of(order_->positionOf(leaf)) / grouped_;
+    if (number != number_) flush();
+    number_ = number;
+    leaf_ = leaf;
+    leaf_shares_ = order_->sharesItsCell(leaf);
+  }
+  record_.clear();
+  packValueRecord(splat.node, order_->positionOf(leaf_), placeInCell(position, cache_->bricks()[leaf_].cell),
+                  values, record_);
+  if (gathered_.size() + record_.size() > kGatheredBytes) flush();
+  gathered_.insert(gathered_.end(), record_.begin(), record_.end());
+}
+
+void ValueSink::flush() {
+  if (!gathered_.empty()) file_->append(number_, gathered_);
+  gathered_.clear();
+}
+
+ValueLoader::ValueLoader(const CacheReader& cache, const ConversionOrder& order, const ValueBuckets& buckets,
+                         size_t variables, const MemoryPlan& plan, std::filesystem::path temporary_folder)
+    : cache_(&cache),
+      order_(&order),
+      buckets_(&buckets),
+      variables_(variables),
+      plan_(plan),
+      temporary_folder_(std::move(temporary_folder)),
+      geometry_(cache.path() / cache.manifest().steps.front().geometry) {}
+
+void ValueLoader::forEach(const BucketFile& file, uint32_t begin, uint32_t end, uint32_t grouped,
+                          const std::function<void(LoadedValues&)>& use) {
+  if (grouped > 1) {
+    for (uint32_t first = begin; first < end; first += grouped)
+      divide(file, (first - begin) / grouped, first, std::min(end, first + grouped), use);
+    return;
+  }
+  uint32_t next = begin;
+  ReadAhead<LoadedValues> ahead([&](LoadedValues& loaded) {
+    if (next == end) return false;
+    load(file, next - begin, next, loaded);
+    ++next;
+    return true;
+  });
+  while (LoadedValues* loaded = ahead.next()) use(*loaded);
+}
+
+void ValueLoader::divide(const BucketFile& file, uint32_t number, uint32_t begin, uint32_t end,
+                         const std::function<void(LoadedValues&)>& use) {
+  const uint32_t grouped = grouping(end - begin, plan_);
+  const uint32_t numbers = (end - begin + grouped - 1) / grouped;
+  const auto path = temporary_folder_ / fmt::format("divided{}.bin", files_made_++);
+  BucketFile divided(path, numbers, plan_.chunkBytes(numbers));
+  file.forEachChunk(number, [&](std::span<const std::byte> chunk) {
+    // Records of one number mostly follow one another.
+    size_t first = 0, at = 0;
+    uint32_t to = 0;
+    const auto send = [&] {
+      if (at > first) divided.append(to, chunk.subspan(first, at - first));
+      first = at;
+    };
+    while (at < chunk.size()) {
+      const uint32_t here = (buckets_->of(valueRecordBrick(&chunk[at])) - begin) / grouped;
+      if (here != to || at - first > kGatheredBytes) send();
+      to = here;
+      at += valueRecordBytes(&chunk[at], variables_);
+    }
+    send();
+  });
+  divided.close();
+  forEach(divided, begin, end, grouped, use);
+}
+
+void ValueLoader::load(const BucketFile& file, uint32_t number, uint32_t bucket, LoadedValues& out) const {
+  out.bucket = bucket;
+  out.first = buckets_->begin(bucket);
+  const uint32_t bricks = buckets_->end(bucket) - out.first;
+
+  uint64_t splats = 0;
+  for (uint32_t n = 0; n < bricks; ++n)
+    if (cache_->bricks()[(*order_)[out.first + n]].isLeaf())
+      splats += cache_->bricks()[(*order_)[out.first + n]].splats;
+  if (file.bytes(number) > splats * mostValueRecordBytes(variables_))
+    throw Error(
+        "{}: {} of its bricks hold {} splats, and the grid has more there; this grid is not the one the "
+        "cache was made from",
+        cache_->path().string(), bricks, splats);
+  file.read(number, out.bytes);
+  std::vector<size_t> next(bricks + 1);
+  for (size_t at = 0; at < out.bytes.size(); at += valueRecordBytes(&out.bytes[at], variables_))
+    ++next[valueRecordBrick(&out.bytes[at]) - out.first + 1];
+  for (uint32_t n = 0; n < bricks; ++n) next[n + 1] += next[n];
+  out.begins = next;
+  if (out.places.capacity() < next.back()) out.places = {};
+  out.places.resize(next.back());
+  for (size_t at = 0; at < out.bytes.size(); at += valueRecordBytes(&out.bytes[at], variables_))
+    out.places[next[valueRecordBrick(&out.bytes[at]) - out.first]++] = static_cast<uint32_t>(at);
+
+  out.geometries.assign(1, 0);
+  for (uint32_t n = 0; n < bricks; ++n)
+    out.geometries.push_back(out.geometries.back() +
+                             cache_->bricks()[(*order_)[out.first + n]].geometry.length);
+  if (out.geometry.capacity() < out.geometries.back()) out.geometry = {};
+  out.geometry.resize(out.geometries.back());
+  for (uint32_t n = 0; n < bricks; ++n)
+    geometry_.readAt(
+        cache_->bricks()[(*order_)[out.first + n]].geometry.offset,
+        std::span(out.geometry).subspan(out.geometries[n], out.geometries[n + 1] - out.geometries[n]));
+}
+
+}  // namespace curvisplat

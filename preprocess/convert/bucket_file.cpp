@@ -1,0 +1,289 @@
+#include "preprocess/convert/bucket_file.h"
+
+#include <pthread.h>
+
+#include <algorithm>
+#include <atomic>
+#include <condition_variable>
+#include <cstring>
+#include <deque>
+#include <exception>
+#include <mutex>
+#include <new>
+#include <optional>
+#include <thread>
+
+#include "stream/base/check.h"
+#include "stream/base/checksum.h"
+#include "stream/base/file.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kNoChunk = UINT64_MAX;
+
+struct ChunkHeader {
+  uint64_t checksum;
+  uint64_t previous;
+  uint64_t bytes;
+};
+static_assert(sizeof(ChunkHeader) == 24);
+
+template <typename T>
+struct DirectAllocator {
+  using value_type = T;
+  DirectAllocator() = default;
+  template <typename U>
+  DirectAllocator(const DirectAllocator<U>&) {}
+  T* allocate(size_t count) {
+    return static_cast<T*>(::operator new (count * sizeof(T), std::align_val_t{kDirectAlignment}));
+  }
+  void deallocate(T* at, size_t) { ::operator delete (at, std::align_val_t{kDirectAlignment}); }
+  bool operator==(const DirectAllocator&) const { return true; }
+};
+/// A chunk in memory, at an address for direct transfers.
+using ChunkBuffer = std::vector<std::byte, DirectAllocator<std::byte>>;
+
+/// Writes chunks in a thread of its own, so that no worker waits for the disk unless it is far behind.
+class ChunkWriter {
+ public:
+  struct Chunk {
+    uint64_t offset = 0;
+    ChunkBuffer bytes;
+  };
+
+  explicit ChunkWriter(OutputFile& file) : file_(&file), thread_([this] { writeAll(); }) {}
+  ~ChunkWriter() { stop(); }
+
+  /// Waits while too many chunks wait. Throws what writing threw.
+  void write(Chunk chunk) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return waiting_.size() < BucketFile::kWaitingChunks || error_; });
+    if (error_) std::rethrow_exception(error_);
+    waiting_.push_back(std::move(chunk));
+    changed_.notify_all();
+  }
+
+  /// A used buffer, emptied, or a new one.
+  ChunkBuffer buffer() {
+    const std::lock_guard lock(mutex_);
+    if (free_.empty()) return {};
+    ChunkBuffer buffer = std::move(free_.back());
+    free_.pop_back();
+    return buffer;
+  }
+
+  /// Writes what waits. Throws what writing threw.
+  void finish() {
+    stop();
+    free_ = {};
+    if (error_) std::rethrow_exception(error_);
+  }
+
+ private:
+  void stop() {
+    {
+      const std::lock_guard lock(mutex_);
+      stopped_ = true;
+    }
+    changed_.notify_all();
+    if (thread_.joinable()) thread_.join();
+  }
+
+  void writeAll() {
+    pthread_setname_np(pthread_self(), "bucket-writer");
+    std::unique_lock lock(mutex_);
+    for (;;) {
+      changed_.wait(lock, [this] { return stopped_ || !waiting_.empty(); });
+      if (waiting_.empty() || error_) return;
+      Chunk chunk = std::move(waiting_.front());
+      lock.unlock();
+      std::exception_ptr error;
+      try {
+        ChunkHeader header;
+        std::memcpy(&header, chunk.bytes.data(), sizeof header);
+        header.checksum = checksumOf(
+            std::span(chunk.bytes).first(sizeof header + header.bytes).subspan(sizeof header.checksum));
+        std::memcpy(chunk.bytes.data(), &header, sizeof header);
+        file_->writeAt(chunk.offset, chunk.bytes);
+      } catch (...) {
+        error = std::current_exception();
+      }
+      chunk.bytes.clear();
+      lock.lock();
+      waiting_.pop_front();
+      free_.push_back(std::move(chunk.bytes));
+      if (error) error_ = error;
+      changed_.notify_all();
+    }
+  }
+
+  OutputFile* file_;
+  std::mutex mutex_;  // guards all below
+  std::condition_variable changed_;
+  std::deque<Chunk> waiting_;
+  std::vector<ChunkBuffer> free_;
+  bool stopped_ = false;
+  std::exception_ptr error_;
+  std::thread thread_;  // last: it uses the others
+};
+
+struct Bucket {
+  std::mutex mutex;    // guards the rest, until close()
+  ChunkBuffer buffer;  // a chunk in the making, header first; empty: none
+  uint64_t last_chunk = kNoChunk;
+  uint64_t bytes = 0;
+};
+
+}  // namespace
+
+struct BucketFile::State {
+  State(const std::filesystem::path& file, uint32_t bucket_count, size_t chunk)
+      : path(file),
+        chunk_bytes(chunk),
+        buckets(bucket_count),
+        output(std::in_place, file, Caching::direct),
+        writer(*output) {
+    CURVISPLAT_CHECK_OP(chunk_bytes % kDirectAlignment, ==, 0u);
+  }
+  State(const std::filesystem::path& file, const BucketChains& chains)
+      : path(file), chunk_bytes(chains.chunk_bytes), buckets(chains.chains.size()), end(chains.size) {
+    for (size_t n = 0; n < buckets.size(); ++n) {
+      buckets[n].last_chunk = chains.chains[n].last_chunk;
+      buckets[n].bytes = chains.chains[n].bytes;
+    }
+  }
+
+  const std::filesystem::path path;
+  const size_t chunk_bytes;
+  std::vector<Bucket> buckets;
+  std::atomic<uint64_t> end = 0;
+  std::optional<OutputFile> output;   // of a new file
+  std::optional<ChunkWriter> writer;  // to it
+  std::optional<InputFile> input;     // after close(), or of another's file
+  bool leave = false;
+
+  /// For the holder of the bucket's mutex.
+  void flush(Bucket& bucket) {
+    const ChunkHeader header{0, bucket.last_chunk, bucket.buffer.size() - sizeof(ChunkHeader)};
+    std::memcpy(bucket.buffer.data(), &header, sizeof header);
+    const size_t pages = (bucket.buffer.size() + kDirectAlignment - 1) / kDirectAlignment;
+    bucket.buffer.resize(pages * kDirectAlignment);
+    bucket.last_chunk = end.fetch_add(bucket.buffer.size());
+    bucket.bytes += header.bytes;
+    writer->write({bucket.last_chunk, std::move(bucket.buffer)});
+    bucket.buffer = {};
+  }
+
+  /// Calls use(records) for each chunk.
+  template <typename Use>
+  void forEachChunk(uint32_t number, Use use) const {
+    CURVISPLAT_CHECK(input.has_value());
+    ChunkBuffer chunk(chunk_bytes);
+    uint64_t at = buckets[number].last_chunk;
+    while (at != kNoChunk) {
+      // The next chunk's beginning comes along with a short one.
+      const std::span<std::byte> whole = std::span(chunk).first(std::min<uint64_t>(chunk_bytes, end - at));
+      input->readAt(at, whole);
+      ChunkHeader header;
+      std::memcpy(&header, whole.data(), sizeof header);
+      require(header.bytes <= whole.size() - sizeof header, at);
+      const auto records = std::span<const std::byte>(whole).subspan(sizeof header, header.bytes);
+      if (!output) require(checksumOf(header, records) == header.checksum, at);
+      use(records);
+      at = header.previous;
+    }
+  }
+
+  static uint64_t checksumOf(const ChunkHeader& header, std::span<const std::byte> records) {
+    Checksum checksum;
+    checksum.add(std::as_bytes(std::span(&header, 1)).subspan(sizeof header.checksum));
+    checksum.add(records);
+    return checksum.value();
+  }
+
+  /// What is in the file at `offset` must be as it was written.
+  void require(bool condition, uint64_t offset) const {
+    if (!condition)
+      throw LostBuckets("{}: is damaged at byte {}; convert the grid again", path.string(), offset);
+  }
+};
+
+BucketFile::BucketFile(const std::filesystem::path& path, uint32_t buckets, size_t chunk_bytes)
+    : state_(std::make_unique<State>(path, buckets, chunk_bytes)) {}
+
+BucketFile::BucketFile(const std::filesystem::path& path, BucketChains chains)
+    : state_(std::make_unique<State>(path, chains)) {
+  if (!std::filesystem::exists(path)) throw LostBuckets("{}: is gone; convert the grid again", path.string());
+  state_->input.emplace(path, Caching::direct);
+  state_->require(state_->input->size() >= chains.size, state_->input->size());
+}
+
+BucketFile::~BucketFile() {
+  const std::filesystem::path path = state_->path;
+  const bool leave = state_->leave;
+  state_.reset();
+  if (!leave) removeAll(path);
+}
+
+void BucketFile::leave() {
+  state_->leave = true;
+}
+
+BucketChains BucketFile::chains() const {
+  BucketChains chains{state_->chunk_bytes, state_->end, {}};
+  for (const Bucket& bucket : state_->buckets) chains.chains.push_back({bucket.last_chunk, bucket.bytes});
+  return chains;
+}
+
+uint32_t BucketFile::buckets() const {
+  return static_cast<uint32_t>(state_->buckets.size());
+}
+
+void BucketFile::append(uint32_t number, std::span<const std::byte> records) {
+  const size_t room = state_->chunk_bytes - sizeof(ChunkHeader);
+  CURVISPLAT_CHECK_OP(records.size(), <=, room);
+  Bucket& bucket = state_->buckets[number];
+  const std::lock_guard lock(bucket.mutex);
+  if (bucket.buffer.size() + records.size() > state_->chunk_bytes) state_->flush(bucket);
+  if (bucket.buffer.empty()) {
+    bucket.buffer = state_->writer->buffer();
+    bucket.buffer.reserve(state_->chunk_bytes);
+    bucket.buffer.resize(sizeof(ChunkHeader));
+  }
+  bucket.buffer.insert(bucket.buffer.end(), records.begin(), records.end());
+}
+
+void BucketFile::close() {
+  for (Bucket& bucket : state_->buckets)
+    if (!bucket.buffer.empty()) state_->flush(bucket);
+  state_->writer->finish();
+  state_->input.emplace(state_->path, Caching::direct);
+}
+
+uint64_t BucketFile::bytes(uint32_t bucket) const {
+  return state_->buckets[bucket].bytes;
+}
+
+uint64_t BucketFile::size() const {
+  return state_->end;
+}
+
+void BucketFile::read(uint32_t bucket, std::vector<std::byte>& out) const {
+  if (out.capacity() < bytes(bucket)) out = {};  // or old and new would be in memory together
+  out.resize(bytes(bucket));
+  size_t done = 0;
+  state_->forEachChunk(bucket, [&](std::span<const std::byte> records) {
+    CURVISPLAT_CHECK_OP(done + records.size(), <=, out.size());
+    std::copy(records.begin(), records.end(), out.begin() + static_cast<ptrdiff_t>(done));
+    done += records.size();
+  });
+  CURVISPLAT_CHECK_OP(done, ==, out.size());
+}
+
+void BucketFile::forEachChunk(uint32_t bucket,
+                              const std::function<void(std::span<const std::byte>)>& use) const {
+  state_->forEachChunk(bucket, use);
+}
+
+}  // namespace curvisplat

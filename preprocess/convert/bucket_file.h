@@ -1,0 +1,83 @@
+// The temporary data of conversion: one file, in which each bucket's records form a chain of chunks. A chunk
+// is what one bucket's buffer held when it was full, so writes are large whatever order the splats come in,
+// and the memory of a bucket is its buffer and one offset.
+//
+//    chunk:  checksum of what follows                           uint64
+//            offset of the bucket's chunk before, or kNoChunk   uint64
+//            bytes of records that follow                       uint64
+//            whole records
+//            zeros up to a multiple of kDirectAlignment
+//
+// It is written once and read once, and is larger than memory: it goes past the page cache. It is never
+// synced. The checksums are for an interrupted conversion that goes on with a file of which the disk may have
+// lost a part.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "stream/base/error.h"
+
+namespace curvisplat {
+
+/// A file that an interrupted conversion has left is missing or damaged: it has to be made again.
+class LostBuckets : public Error {
+ public:
+  using Error::Error;
+};
+
+/// What reading a file again takes, beside the file.
+struct BucketChains {
+  struct Chain {
+    uint64_t last_chunk = 0, bytes = 0;
+  };
+  uint64_t chunk_bytes = 0;
+  uint64_t size = 0;          // of the file
+  std::vector<Chain> chains;  // [bucket]
+};
+
+class BucketFile {
+ public:
+  /// Makes `path`. A bucket's buffer has `chunk_bytes`, a multiple of kDirectAlignment; it is there while the
+  /// bucket has something in it. Four more may wait for the disk.
+  BucketFile(const std::filesystem::path& path, uint32_t buckets, size_t chunk_bytes);
+  /// Opens what another process has made. Each chunk that is read is checked: LostBuckets is thrown here or
+  /// by reading if the file is not as it was.
+  BucketFile(const std::filesystem::path& path, BucketChains chains);
+  /// Removes the file, unless it is to be left.
+  ~BucketFile();
+  void leave();
+
+  static constexpr size_t kWaitingChunks = 4;
+
+  uint32_t buckets() const;
+
+  /// Adds whole records, of chunk_bytes at most, to a bucket. Any thread; waits while the disk is behind.
+  /// Throws Error once the disk has failed.
+  void append(uint32_t bucket, std::span<const std::byte> records);
+
+  /// Writes what is left in the buffers and frees them. Reading is possible from here on, by any thread;
+  /// nothing is appended.
+  void close();
+
+  BucketChains chains() const;
+  uint64_t bytes(uint32_t bucket) const;
+  /// All records of a bucket; the order is not to be relied on. Overwrites `out` and keeps its capacity.
+  void read(uint32_t bucket, std::vector<std::byte>& out) const;
+  /// The same, a chunk at a time.
+  void forEachChunk(uint32_t bucket, const std::function<void(std::span<const std::byte>)>& use) const;
+
+  /// Bytes of the whole file.
+  uint64_t size() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,64 @@
+// Loads the buckets of a temporary file, one ahead of the work, and groups each one's records by the cells
+// that are to be built.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "preprocess/convert/bucket_file.h"
+#include "preprocess/convert/bucket_tree.h"
+#include "preprocess/convert/build_cell.h"
+#include "preprocess/grid/read_ahead.h"
+
+namespace curvisplat {
+
+/// The node of the tree that is built as a whole from the records in `leaf`: the leaf itself, or the highest
+/// node above it that fits a brick, or whose splats all coincide. It depends on the splats alone, where the
+/// leaf depends on the plan.
+uint32_t buildUnitOf(const BucketTree& tree, uint32_t leaf);
+
+struct LoadedBucket {
+  struct Part {
+    uint32_t unit = 0;  // node of the tree
+    size_t begin = 0, count = 0;
+  };
+
+  uint32_t bucket = 0;
+  bool too_large = false;  // has more records than allowed: nothing is loaded
+  std::vector<std::byte> bytes;
+  std::vector<uint32_t> places;  // of the records: RecordSpan's
+  std::vector<Part> parts;       // of `places`, in Morton order
+
+  RecordSpan records(const Part& part) {
+    return {bytes.data(), std::span(places).subspan(part.begin, part.count)};
+  }
+};
+
+/// Loads the buckets from `first` on that are not empty, in order. Ends after one that is too large, so that
+/// its division has the memory for itself. Two buckets of `most_bytes`, and 4 bytes a record
+/// of three, are in memory.
+/// Tree and file must not change meanwhile.
+class BucketLoader {
+ public:
+  BucketLoader(const BucketTree& tree, const BucketFile& file, size_t variables, uint32_t first,
+               uint64_t most_bytes);
+
+  /// The next bucket, until the next call; null at the end. Throws Error if the disk fails.
+  LoadedBucket* next() { return ahead_.next(); }
+
+ private:
+  bool fill(LoadedBucket& loaded);
+  void group(LoadedBucket& loaded);
+
+  const BucketTree* tree_;
+  const BucketFile* file_;
+  const size_t variables_;
+  uint32_t position_;
+  const uint64_t most_bytes_;
+  bool ended_ = false;
+  std::vector<uint32_t> tags_;  // [record]: 2 x its part, and 1 if it is irregular
+  ReadAhead<LoadedBucket> ahead_;
+};
+
+}  // namespace curvisplat

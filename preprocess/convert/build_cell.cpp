@@ -1,0 +1,222 @@
+#include "preprocess/convert/build_cell.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <optional>
+
+#include "preprocess/convert/merge_levels.h"
+#include "preprocess/convert/splat_record.h"
+#include "stream/base/check.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+/// A cell that is done, and what its parent needs of it.
+struct Subtree {
+  BuiltCell built;
+  std::optional<MergedOctant> octant;  // none for the topmost
+};
+
+bool coincide(const RecordSpan& records) {
+  const RootPosition first = recordPosition(records[0]);
+  for (size_t n = 1; n < records.size(); ++n)
+    if (recordPosition(records[n]) != first) return false;
+  return true;
+}
+
+/// Reorders the records by octant of `cell`. Returns where each octant begins, and the end.
+std::array<size_t, 9> divide(const Cell& cell, RecordSpan records) {
+  std::vector<uint8_t> octants(records.size());
+  std::array<size_t, 9> begins{};
+  for (size_t n = 0; n < records.size(); ++n) {
+    octants[n] = static_cast<uint8_t>(octantOf(recordPosition(records[n]), cell));
+    ++begins[octants[n] + size_t{1}];
+  }
+  for (size_t octant = 0; octant < 8; ++octant) begins[octant + 1] += begins[octant];
+  std::vector<uint32_t> divided(records.size());
+  std::array<size_t, 9> ends = begins;
+  for (size_t n = 0; n < records.size(); ++n) divided[ends[octants[n]]++] = records.places[n];
+  std::copy(divided.begin(), divided.end(), records.places.begin());
+  return begins;
+}
+
+}  // namespace
+
+void sortByNode(RecordSpan records) {
+  struct Key {
+    uint64_t node;
+    uint32_t place;
+  };
+  // Nodes of a cell lie close together: a radix sort of what they differ in takes two or three passes.
+  constexpr int kDigitBits = 11;
+  std::vector<Key> keys(records.size()), sorted(records.size());
+  uint64_t least = UINT64_MAX, most = 0;
+  for (size_t n = 0; n < records.size(); ++n) {
+    keys[n] = {recordNode(records[n]), records.places[n]};
+    least = std::min(least, keys[n].node);
+    most = std::max(most, keys[n].node);
+  }
+  for (int shift = 0; (most - least) >> shift != 0; shift += kDigitBits) {
+    const auto digitOf = [&](const Key& key) {
+      return (key.node - least) >> shift & ((uint64_t{1} << kDigitBits) - 1);
+    };
+    std::array<uint32_t, (size_t{1} << kDigitBits) + 1> begins{};
+    for (const Key& key : keys) ++begins[digitOf(key) + 1];
+    for (size_t digit = 1; digit < begins.size(); ++digit) begins[digit] += begins[digit - 1];
+    for (const Key& key : keys) sorted[begins[digitOf(key)]++] = key;
+    keys.swap(sorted);
+  }
+  for (size_t n = 0; n < records.size(); ++n) records.places[n] = keys[n].place;
+}
+
+struct CellBuilder::State {
+  /// What a thread needs to make a brick; kept, since it is large. Never held across a wait for other tasks.
+  struct Scratch {
+    BrickSplats brick;
+    OctantMerger merger;
+  };
+
+  State(const RootCube& root_cube, const std::vector<GridBlock>& grid_blocks, size_t variable_count,
+        const Progress& stopping)
+      : root(root_cube),
+        blocks(&grid_blocks),
+        variables(variable_count),
+        progress(&stopping),
+        scratch([this] {
+          return Scratch{{}, OctantMerger(root, variables)};
+        }) {
+    uint64_t node = 0;
+    for (const GridBlock& block : grid_blocks) {
+      first_nodes.push_back(node);
+      node += block.nodes();
+    }
+  }
+
+  Subtree build(const Cell& cell, RecordSpan records, bool is_top);
+  Subtree buildLeaf(const Cell& cell, RecordSpan records, bool is_top);
+  Subtree buildInner(const Cell& cell, RecordSpan records, bool is_top);
+
+  void unpack(const Cell& cell, const RecordSpan& records, BrickSplats& brick) const;
+  void addToRuns(uint64_t node, std::vector<NodeRun>& runs) const;
+
+  const RootCube root;
+  const std::vector<GridBlock>* blocks;
+  const size_t variables;
+  const Progress* progress;
+  std::vector<uint64_t> first_nodes;  // [block]
+  tbb::enumerable_thread_specific<Scratch> scratch;
+};
+
+Subtree CellBuilder::State::build(const Cell& cell, RecordSpan records, bool is_top) {
+  CURVISPLAT_CHECK(records.size() > 0);
+  progress->throwIfStopped();
+  if (records.size() <= kMaxBrickSplats || cell.level == kMaxLevel || coincide(records))
+    return buildLeaf(cell, records, is_top);
+  return buildInner(cell, records, is_top);
+}
+
+Subtree CellBuilder::State::buildLeaf(const Cell& cell, RecordSpan records, bool is_top) {
+  sortByNode(records);
+  Scratch& own = scratch.local();
+  if (!is_top) own.merger.begin(cell);
+  Subtree leaf;
+  for (size_t begin = 0; begin < records.size(); begin += kMaxBrickSplats) {
+    unpack(cell, records.subspan(begin, std::min<size_t>(kMaxBrickSplats, records.size() - begin)),
+           own.brick);
+    leaf.built.bricks.push_back({encodeBrick(root, own.brick), 0, true});
+    if (!is_top) own.merger.add(own.brick);
+  }
+  leaf.built.own_bricks = leaf.built.bricks.size();
+  if (!is_top) leaf.octant = own.merger.finish();
+  return leaf;
+}
+
+Subtree CellBuilder::State::buildInner(const Cell& cell, RecordSpan records, bool is_top) {
+  const std::array<size_t, 9> begins = divide(cell, records);
+  std::array<Subtree, 8> children;
+  tbb::parallel_for(size_t{0}, size_t{8}, [&](size_t octant) {
+    const size_t count = begins[octant + 1] - begins[octant];
+    if (count == 0) return;
+    children[octant] =
+        build(cell.child(static_cast<int>(octant)), records.subspan(begins[octant], count), false);
+  });
+  // Where the loop around this one was cancelled, because another part of it threw, this one ends early and
+  // without a word: its cell is not to be made of what is there. What the other part threw is what is heard
+  // of.
+  for (size_t octant = 0; octant < 8; ++octant)
+    if (begins[octant] != begins[octant + 1] && !children[octant].octant)
+      throw Error("the bricks of a cell were not all built");
+
+  Subtree inner;
+  std::array<MergedOctant, 8> octants;
+  for (size_t octant = 0; octant < 8; ++octant) {
+    Subtree& child = children[octant];
+    if (!child.octant) continue;
+    inner.built.error = std::max({inner.built.error, child.built.error, child.octant->detail});
+    octants[octant] = std::move(*child.octant);
+    std::move(child.built.bricks.begin(), child.built.bricks.end(), std::back_inserter(inner.built.bricks));
+  }
+  BrickSplats brick = joinOctants(cell, variables, std::move(octants));
+  inner.built.bricks.push_back({encodeBrick(root, brick), static_cast<float>(inner.built.error), false});
+  inner.built.own_bricks = 1;
+  if (!is_top) {
+    OctantMerger& merger = scratch.local().merger;
+    merger.begin(cell);
+    merger.add(brick);
+    inner.octant = merger.finish();
+  }
+  return inner;
+}
+
+void CellBuilder::State::unpack(const Cell& cell, const RecordSpan& records, BrickSplats& brick) const {
+  brick.cell = cell;
+  brick.runs.clear();
+  brick.positions.resize(records.size());
+  brick.splats.resize(records.size());
+  brick.half_cells.resize(records.size());
+  brick.variables.resize(variables);
+  for (auto& values : brick.variables) values.resize(records.size());
+  std::vector<SplatScalar> values(variables);
+  for (size_t n = 0; n < records.size(); ++n) {
+    brick.positions[n] = recordPosition(records[n]);
+    brick.half_cells[n] = unpackRecord(records[n], brick.splats[n], values);
+    for (size_t variable = 0; variable < variables; ++variable)
+      brick.variables[variable][n] = values[variable];
+    addToRuns(recordNode(records[n]), brick.runs);
+  }
+}
+
+void CellBuilder::State::addToRuns(uint64_t node, std::vector<NodeRun>& runs) const {
+  if (!runs.empty()) {
+    NodeRun& last = runs.back();
+    const GridBlock& block = (*blocks)[last.block];
+    const uint64_t next_in_block = last.i + last.count + block.ni * (last.j + block.nj * last.k);
+    if (last.i + last.count < block.ni && node == first_nodes[last.block] + next_in_block) {
+      ++last.count;
+      return;
+    }
+  }
+  const auto after = std::upper_bound(first_nodes.begin(), first_nodes.end(), node);
+  const auto number = static_cast<uint32_t>(after - first_nodes.begin() - 1);
+  const GridBlock& block = (*blocks)[number];
+  const uint64_t in_block = node - first_nodes[number];
+  runs.push_back(
+      {number, in_block % block.ni, in_block / block.ni % block.nj, in_block / block.ni / block.nj, 1});
+}
+
+CellBuilder::CellBuilder(const RootCube& root, const std::vector<GridBlock>& blocks, size_t variables,
+                         const Progress& progress)
+    : state_(std::make_unique<State>(root, blocks, variables, progress)) {}
+
+CellBuilder::~CellBuilder() = default;
+
+BuiltCell CellBuilder::build(const Cell& cell, RecordSpan records) {
+  return state_->build(cell, records, true).built;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,229 @@
+#include "preprocess/convert/build_octree.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "preprocess/convert/counting_grid.h"
+#include "preprocess/convert/divide_bucket.h"
+#include "preprocess/convert/merge_levels.h"
+#include "preprocess/convert/splat_record.h"
+#include "stream/base/check.h"
+
+namespace curvisplat {
+
+OctreeBuilder::OctreeBuilder(const RootCube& root, const std::vector<GridBlock>& blocks, size_t variables,
+                             const MemoryPlan& plan, BucketTree& tree, CacheWriter& writer,
+                             std::filesystem::path temporary_folder, Progress& progress)
+    : root_(root),
+      variables_(variables),
+      plan_(plan),
+      tree_(&tree),
+      writer_(&writer),
+      temporary_folder_(std::move(temporary_folder)),
+      progress_(&progress),
+      cells_(root, blocks, variables, progress) {}
+
+void OctreeBuilder::build(const BucketFile& file) {
+  const std::vector<uint32_t> leaves = tree_->leavesBelow(0);
+  takeUpBricks();
+  buildBuckets(file, leaves, finishTakenUp(leaves, file.buckets()));
+  CURVISPLAT_CHECK_OP(carried_.size(), ==, 0u);
+}
+
+/// How many bricks of its own a node that has splats gets, if it is not below the unit that they are built
+/// in.
+uint64_t OctreeBuilder::bricksOf(uint32_t node) const {
+  const CellContents& contents = (*tree_)[node].contents;
+  if ((*tree_)[node].cell.level < kMaxLevel && !contents.coincide()) return 1;
+  return (contents.splats + kMaxBrickSplats - 1) / kMaxBrickSplats;
+}
+
+/// Notes which nodes the writer's bricks are of. Those behind the last that completes a node are of one that
+/// is to be built again.
+void OctreeBuilder::takeUpBricks() {
+  built_.resize(tree_->size());
+  const std::span<const Brick> bricks = writer_->bricks();
+  uint64_t complete = 0;
+  for (uint64_t id = 0; id < bricks.size(); ++id) {
+    const uint32_t node = tree_->nodeOf(bricks[id].cell);
+    if (node == BucketTree::kNone) continue;  // of a cell below a leaf
+    Built& built = built_[node];
+    if (built.bricks++ == 0) built.first_brick = id;
+    built.error = std::max<double>(built.error, bricks[id].error);
+    if (built.bricks == bricksOf(node)) complete = id + 1;
+  }
+  for (Built& built : built_)
+    if (built.first_brick + built.bricks > complete) built = {};
+  writer_->keep(complete);
+}
+
+/// Builds the parents that the bricks taken up lack. Returns the first bucket with more to build.
+uint32_t OctreeBuilder::finishTakenUp(const std::vector<uint32_t>& leaves, uint32_t buckets) {
+  uint32_t last = BucketTree::kNone;
+  for (const uint32_t leaf : leaves) {
+    if ((*tree_)[leaf].contents.splats == 0) continue;
+    const uint32_t unit = buildUnitOf(*tree_, leaf);
+    if (!isBuilt(unit)) {
+      buckets = (*tree_)[leaf].bucket;
+      break;
+    }
+    if (unit != last) progress_->skip((*tree_)[unit].contents.splats);
+    last = unit;
+  }
+  if (last != BucketTree::kNone) completeParents(last);
+  return buckets;
+}
+
+void OctreeBuilder::buildBuckets(const BucketFile& file, const std::vector<uint32_t>& leaves,
+                                 uint32_t first) {
+  // Now, since dividing one of the buckets gives its leaves numbers in another file.
+  std::vector<std::vector<uint32_t>> leaves_of(file.buckets());
+  for (const uint32_t leaf : leaves)
+    if ((*tree_)[leaf].contents.splats > 0) leaves_of[(*tree_)[leaf].bucket].push_back(leaf);
+  uint32_t next = first;
+  while (next < file.buckets()) {
+    bool too_large = false;
+    {
+      BucketLoader loader(*tree_, file, variables_, next, plan_.bucket_bytes);
+      next = file.buckets();
+      while (LoadedBucket* loaded = loader.next()) {
+        too_large = loaded->too_large;
+        if (too_large) next = loaded->bucket;
+        if (!too_large) buildLoaded(*loaded);
+      }
+    }
+    if (!too_large) continue;
+    buildTooLarge(file, next, leaves_of[next]);
+    ++next;
+  }
+}
+
+void OctreeBuilder::buildLoaded(LoadedBucket& loaded) {
+  struct Job {
+    uint32_t unit;
+    RecordSpan records;
+  };
+  std::vector<Job> jobs;
+  std::vector<std::vector<std::byte>> completed;  // that were carried, and are built now
+  std::vector<std::vector<uint32_t>> completed_places;
+  completed.reserve(loaded.parts.size());
+  completed_places.reserve(loaded.parts.size());
+  for (const LoadedBucket::Part& part : loaded.parts) {
+    if (isBuilt(part.unit)) continue;
+    const RecordSpan records = loaded.records(part);
+    const uint64_t expected = (*tree_)[part.unit].contents.splats;
+    if (records.size() == expected) {
+      jobs.push_back({part.unit, records});
+      continue;
+    }
+    std::vector<std::byte>& carried = carried_[part.unit];
+    for (size_t n = 0; n < records.size(); ++n)
+      carried.insert(carried.end(), records[n], records[n] + recordBytes(records[n], variables_));
+    std::vector<uint32_t> places = placesOfRecords(carried, variables_);
+    if (places.size() < expected) continue;
+    completed.push_back(std::move(carried));
+    completed_places.push_back(std::move(places));
+    carried_.erase(part.unit);
+    jobs.push_back({part.unit, {completed.back().data(), completed_places.back()}});
+  }
+
+  std::vector<BuiltCell> cells(jobs.size());
+  tbb::parallel_for(size_t{0}, jobs.size(),
+                    [&](size_t n) { cells[n] = cells_.build((*tree_)[jobs[n].unit].cell, jobs[n].records); });
+  for (size_t n = 0; n < jobs.size(); ++n) {
+    append(jobs[n].unit, std::move(cells[n]));
+    completeParents(jobs[n].unit);
+  }
+}
+
+void OctreeBuilder::buildTooLarge(const BucketFile& file, uint32_t bucket,
+                                  const std::vector<uint32_t>& leaves) {
+  const BucketTree::Node& first = (*tree_)[leaves.front()];
+  const auto leafIsBuilt = [this](uint32_t leaf) { return isBuilt(buildUnitOf(*tree_, leaf)); };
+  if (std::all_of(leaves.begin(), leaves.end(), leafIsBuilt)) return;
+  if (leaves.size() == 1 && (first.cell.level == kMaxLevel || first.contents.coincide())) {
+    buildCoincident(file, bucket, leaves.front());
+    return;
+  }
+  const std::filesystem::path path = temporary_folder_ / fmt::format("divided{}.bin", files_made_++);
+  const DividedBucket divided = divideBucket(file, bucket, leaves, variables_, plan_, path, *tree_);
+  buildBuckets(*divided.file, divided.leaves, 0);
+}
+
+void OctreeBuilder::buildCoincident(const BucketFile& file, uint32_t bucket, uint32_t leaf) {
+  // No division parts these splats, so they become bricks one after the other, in node order.
+  std::vector<std::byte> brick;
+  uint64_t in_brick = 0;
+  const uint32_t unit = buildUnitOf(*tree_, leaf);
+  const auto appendBrick = [&] {
+    std::vector<uint32_t> places = placesOfRecords(brick, variables_);
+    append(unit, cells_.build((*tree_)[unit].cell, {brick.data(), places}));
+    brick.clear();
+    in_brick = 0;
+  };
+  forEachRecordByNode(file, bucket, variables_, plan_, temporary_folder_,
+                      [&](std::span<const std::byte> record) {
+                        brick.insert(brick.end(), record.begin(), record.end());
+                        if (++in_brick == kMaxBrickSplats) appendBrick();
+                      });
+  if (in_brick > 0) appendBrick();
+  completeParents(unit);
+}
+
+void OctreeBuilder::append(uint32_t node, BuiltCell&& cell) {
+  built_.resize(std::max(built_.size(), tree_->size()));
+  Built& built = built_[node];
+  for (size_t n = 0; n < cell.bricks.size(); ++n) {
+    const uint32_t splats = cell.bricks[n].encoded.brick.splats;
+    const uint64_t id = writer_->append(std::move(cell.bricks[n].encoded), cell.bricks[n].error);
+    const bool own = n + cell.own_bricks >= cell.bricks.size();
+    if (own && built.bricks++ == 0) built.first_brick = id;
+    if (cell.bricks[n].is_leaf) progress_->advance(splats);
+  }
+  built.error = std::max(built.error, cell.error);
+}
+
+bool OctreeBuilder::childrenAreBuilt(uint32_t node) const {
+  for (uint32_t octant = 0; octant < 8; ++octant) {
+    const uint32_t child = (*tree_)[node].first_child + octant;
+    if ((*tree_)[child].contents.splats > 0 && !isBuilt(child)) return false;
+  }
+  return true;
+}
+
+void OctreeBuilder::completeParents(uint32_t node) {
+  for (uint32_t parent = (*tree_)[node].parent; parent != BucketTree::kNone;
+       parent = (*tree_)[parent].parent) {
+    if (!childrenAreBuilt(parent)) return;
+    if (!isBuilt(parent)) buildParent(parent);
+  }
+}
+
+void OctreeBuilder::buildParent(uint32_t node) {
+  const uint32_t first_child = (*tree_)[node].first_child;
+  std::array<MergedOctant, 8> octants;
+  tbb::enumerable_thread_specific<OctantMerger> mergers([this] { return OctantMerger(root_, variables_); });
+  tbb::parallel_for(uint32_t{0}, uint32_t{8}, [&](uint32_t octant) {
+    const uint32_t child = first_child + octant;
+    if ((*tree_)[child].contents.splats == 0) return;
+    OctantMerger& merger = mergers.local();
+    merger.begin((*tree_)[child].cell);
+    for (uint64_t n = 0; n < built_[child].bricks; ++n)
+      merger.add(writer_->readBack(built_[child].first_brick + n));
+    octants[octant] = merger.finish();
+  });
+  BuiltCell cell;
+  for (uint32_t octant = 0; octant < 8; ++octant)
+    if (!octants[octant].splats.positions.empty())
+      cell.error = std::max({cell.error, built_[first_child + octant].error, octants[octant].detail});
+  BrickSplats brick = joinOctants((*tree_)[node].cell, variables_, std::move(octants));
+  cell.bricks.push_back({encodeBrick(root_, brick), static_cast<float>(cell.error), false});
+  cell.own_bricks = 1;
+  append(node, std::move(cell));
+}
+
+}  // namespace curvisplat

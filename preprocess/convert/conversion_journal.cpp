@@ -1,0 +1,262 @@
+#include "preprocess/convert/conversion_journal.h"
+
+#include <fmt/chrono.h>
+#include <sys/stat.h>
+
+#include <charconv>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "stream/base/checksum.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/base/json_text.h"
+
+namespace curvisplat {
+namespace {
+
+using nlohmann::json;
+
+// To be raised when the journal, temporary files or the bricks of a grid change.
+constexpr int kJournalVersion = 3;
+constexpr uint64_t kLargestJournal = uint64_t{1} << 30;
+
+std::string checksumLine(const std::string& text) {
+  return fmt::format("{:016x}\n", checksumOf(std::as_bytes(std::span(text))));
+}
+
+std::string factOfFile(const std::string& name) {
+  struct stat status {};
+  if (::stat(name.c_str(), &status) != 0) return name;  // a source need not be made of files
+  std::error_code ignored;
+  std::filesystem::path path = std::filesystem::canonical(name, ignored);
+  if (path.empty()) path = name;
+  return fmt::format("{} ({} bytes, modified {:%Y-%m-%d %H:%M:%S}.{:09} UTC)", path.string(), status.st_size,
+                     fmt::gmtime(status.st_mtim.tv_sec), status.st_mtim.tv_nsec);
+}
+
+/// Names are bytes, which need not be the UTF-8 that JSON is: what is not plain goes as %XX.
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte >= 0x7f || c == '%')
+      out += fmt::format("%{:02x}", byte);
+    else
+      out += c;
+  }
+  return out;
+}
+
+/// A text with the checksum of a journal's, and not one that this program has written.
+struct NotAJournal {};
+
+std::string unescaped(const std::string& text) {
+  std::string out;
+  for (size_t n = 0; n < text.size(); ++n) {
+    if (text[n] != '%') {
+      out += text[n];
+      continue;
+    }
+    unsigned byte = 0;
+    const char* const begin = text.data() + n + 1;
+    if (n + 2 >= text.size() || std::from_chars(begin, begin + 2, byte, 16).ptr != begin + 2)
+      throw NotAJournal();
+    out += static_cast<char>(byte);
+    n += 2;
+  }
+  return out;
+}
+
+template <typename Number>
+Number wholeNumber(const json& from) {
+  if (!from.is_number_unsigned() || from.get<uint64_t>() > std::numeric_limits<Number>::max())
+    throw NotAJournal();
+  return from.get<Number>();
+}
+
+json jsonOf(const glm::dvec3& vector) {
+  return {vector.x, vector.y, vector.z};
+}
+
+glm::dvec3 vectorOf(const json& from) {
+  return {from.at(0).get<double>(), from.at(1).get<double>(), from.at(2).get<double>()};
+}
+
+json jsonOf(const GridSurvey& survey) {
+  json ranges = json::array();
+  for (const ScalarRange& range : survey.ranges) ranges.push_back({range.min, range.max});
+  return {{"nodes", survey.nodes},
+          {"blanked", {survey.blanked.by_grid, survey.blanked.by_value, survey.blanked.not_finite}},
+          {"lower", jsonOf(survey.lower)},
+          {"upper", jsonOf(survey.upper)},
+          {"ranges", ranges}};
+}
+
+GridSurvey surveyOf(const json& from) {
+  GridSurvey survey;
+  survey.nodes = wholeNumber<uint64_t>(from.at("nodes"));
+  const auto& blanked = from.at("blanked");
+  survey.blanked = {wholeNumber<uint64_t>(blanked.at(0)), wholeNumber<uint64_t>(blanked.at(1)),
+                    wholeNumber<uint64_t>(blanked.at(2))};
+  survey.lower = vectorOf(from.at("lower"));
+  survey.upper = vectorOf(from.at("upper"));
+  for (const auto& range : from.at("ranges"))
+    survey.ranges.push_back({range.at(0).get<double>(), range.at(1).get<double>()});
+  return survey;
+}
+
+/// A row a node: first child, bucket and, of a leaf that has splats, its contents.
+json jsonOf(const BucketTree& tree) {
+  json nodes = json::array();
+  const std::vector<BucketTree::Link> links = tree.links();
+  for (uint32_t node = 0; node < links.size(); ++node) {
+    json row = {links[node].first_child, links[node].bucket};
+    const CellContents& contents = tree[node].contents;
+    if (tree[node].isLeaf() && contents.splats > 0) {
+      row.push_back(contents.splats);
+      for (const RootPosition& corner : {contents.lower, contents.upper})
+        for (const uint64_t coordinate : corner.at) row.push_back(coordinate);
+    }
+    nodes.push_back(std::move(row));
+  }
+  return nodes;
+}
+
+/// Children come after their parent, and are no one else's: in the order in which the tree was split.
+void requireTree(const std::vector<BucketTree::Link>& links, size_t buckets) {
+  std::vector<uint32_t> level(links.size(), BucketTree::kNone);
+  if (links.empty()) throw NotAJournal();
+  level[0] = 0;
+  for (size_t node = 0; node < links.size(); ++node) {
+    const BucketTree::Link& link = links[node];
+    const bool leaf = link.first_child == BucketTree::kNone;
+    const bool possible = level[node] != BucketTree::kNone &&
+                          (leaf ? link.bucket < buckets
+                                : link.first_child > node && links.size() - link.first_child >= 8 &&
+                                      link.first_child < links.size() && level[node] < kMaxLevel);
+    if (!possible) throw NotAJournal();
+    for (uint32_t octant = 0; !leaf && octant < 8; ++octant) {
+      uint32_t& child = level[link.first_child + octant];
+      if (child != BucketTree::kNone) throw NotAJournal();
+      child = level[node] + 1;
+    }
+  }
+}
+
+BucketTree treeOf(const json& nodes, size_t buckets) {
+  std::vector<BucketTree::Link> links;
+  std::vector<CellContents> contents;
+  for (const auto& row : nodes) {
+    links.push_back({wholeNumber<uint32_t>(row.at(0)), wholeNumber<uint32_t>(row.at(1))});
+    contents.emplace_back();
+    if (row.size() == 2) continue;
+    contents.back().splats = wholeNumber<uint64_t>(row.at(2));
+    for (size_t axis = 0; axis < 3; ++axis) {
+      contents.back().lower.at[axis] = wholeNumber<uint64_t>(row.at(3 + axis));
+      contents.back().upper.at[axis] = wholeNumber<uint64_t>(row.at(6 + axis));
+    }
+  }
+  requireTree(links, buckets);
+  BucketTree tree = BucketTree::fromLinks(links);
+  tree.setContents(tree.leavesBelow(0), contents);
+  return tree;
+}
+
+json jsonOf(const BucketChains& buckets) {
+  json chains = json::array();
+  for (const BucketChains::Chain& chain : buckets.chains) chains.push_back({chain.last_chunk, chain.bytes});
+  return {{"chunk_bytes", buckets.chunk_bytes}, {"size", buckets.size}, {"chains", chains}};
+}
+
+BucketChains bucketsOf(const json& from) {
+  BucketChains buckets{
+      wholeNumber<uint64_t>(from.at("chunk_bytes")), wholeNumber<uint64_t>(from.at("size")), {}};
+  for (const auto& chain : from.at("chains"))
+    buckets.chains.push_back({wholeNumber<uint64_t>(chain.at(0)), wholeNumber<uint64_t>(chain.at(1))});
+  return buckets;
+}
+
+json jsonOf(const ScatteredSplats& splats) {
+  return {{"survey", jsonOf(splats.survey)},    {"degenerate", splats.counts.degenerate},
+          {"inverted", splats.counts.inverted}, {"merged_nodes", splats.merged_nodes},
+          {"tree", jsonOf(splats.tree)},        {"buckets", jsonOf(splats.buckets)}};
+}
+
+ScatteredSplats splatsOf(const json& from) {
+  ScatteredSplats splats;
+  splats.survey = surveyOf(from.at("survey"));
+  splats.counts = {wholeNumber<uint64_t>(from.at("degenerate")), wholeNumber<uint64_t>(from.at("inverted"))};
+  splats.merged_nodes = wholeNumber<uint64_t>(from.at("merged_nodes"));
+  splats.buckets = bucketsOf(from.at("buckets"));
+  splats.tree = treeOf(from.at("tree"), splats.buckets.chains.size());
+  return splats;
+}
+
+ConversionJournal journalOf(const json& content) {
+  ConversionJournal journal;
+  for (const auto& fact : content.at("facts"))
+    journal.facts.push_back({unescaped(fact.at(0)), unescaped(fact.at(1))});
+  journal.scratch = unescaped(content.at("scratch"));
+  if (content.contains("splats")) journal.splats = splatsOf(content.at("splats"));
+  return journal;
+}
+
+}  // namespace
+
+std::vector<ConversionFact> factsOf(const GridDescription& description, const std::vector<uint32_t>& scalars,
+                                    std::optional<double> blank_value) {
+  std::vector<ConversionFact> facts;
+  facts.push_back(
+      {"the program", fmt::format("curvisplat " CURVISPLAT_VERSION ", journal {}", kJournalVersion)});
+  for (size_t n = 0; n < description.files.size(); ++n)
+    facts.push_back({fmt::format("file {}", n + 1), factOfFile(description.files[n])});
+  std::string names;
+  for (const uint32_t scalar : scalars)
+    names += (names.empty() ? "" : ", ") + description.scalars[scalar].name;
+  uint64_t nodes = 0;
+  for (const GridBlock& block : description.blocks) nodes += block.nodes();
+  facts.push_back({"the layout", fmt::format("{}, {} nodes", description.format, nodes)});
+  if (description.times.size() > 1) facts.push_back({"--time-step", std::to_string(description.time_step)});
+  facts.push_back({"--scalar", names.empty() ? "none" : names});
+  facts.push_back({"--blank", blank_value ? fmt::format("{}", *blank_value) : "none"});
+  return facts;
+}
+
+std::string differenceOf(const std::vector<ConversionFact>& before, const std::vector<ConversionFact>& now) {
+  for (size_t n = 0; n < std::min(before.size(), now.size()); ++n)
+    if (before[n] != now[n])
+      return before[n].what == now[n].what
+                 ? fmt::format("{} was {}, and is now {}", now[n].what, before[n].value, now[n].value)
+                 : fmt::format("it had other files: {} was {}", before[n].what, before[n].value);
+  return before.size() == now.size() ? "" : "it had more or fewer files";
+}
+
+void writeJournal(const std::filesystem::path& folder, const ConversionJournal& journal) {
+  json facts = json::array();
+  for (const ConversionFact& fact : journal.facts) facts.push_back({escaped(fact.what), escaped(fact.value)});
+  json content = {
+      {"version", kJournalVersion}, {"facts", facts}, {"scratch", escaped(journal.scratch.string())}};
+  if (journal.splats) content["splats"] = jsonOf(*journal.splats);
+  const std::string text = content.dump() + "\n";
+  writeFileAtomically(folder / kJournalName, text + checksumLine(text));
+}
+
+std::optional<ConversionJournal> readJournal(const std::filesystem::path& folder) {
+  if (!std::filesystem::exists(folder / kJournalName)) return std::nullopt;
+  const std::string bytes = readTextFile(folder / kJournalName, kLargestJournal);
+  const size_t end = bytes.find('\n') + 1;  // 0 if there is none
+  const std::string text = bytes.substr(0, end);
+  if (bytes.substr(end) != checksumLine(text)) return std::nullopt;
+  try {
+    requireShallowJson(text, kJournalName);
+    const json content = json::parse(text);
+    if (content.at("version") != kJournalVersion) return std::nullopt;
+    return journalOf(content);
+  } catch (const json::exception&) {
+  } catch (const NotAJournal&) {
+  }
+  return std::nullopt;
+}
+
+}  // namespace curvisplat

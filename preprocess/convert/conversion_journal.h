@@ -1,0 +1,44 @@
+// What an unfinished conversion says of itself, to the one that goes on from it: what it converts, where its
+// temporary files are, and what the splats are once they are all on disk. A file of JSON and its checksum in
+// the partial folder, written whole or not at all; of this program's own version only.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "preprocess/convert/scattered_splats.h"
+#include "preprocess/grid/grid_source.h"
+
+namespace curvisplat {
+
+inline constexpr const char* kJournalName = "journal";
+
+/// Something that the cache's bytes depend on, in words.
+struct ConversionFact {
+  std::string what, value;
+  bool operator==(const ConversionFact&) const = default;
+};
+
+/// All such things: program, files as they are now, layout, scalars, blank value. Not memory and threads.
+std::vector<ConversionFact> factsOf(const GridDescription& description, const std::vector<uint32_t>& scalars,
+                                    std::optional<double> blank_value);
+
+/// "" or, in words, the first fact in which two conversions differ.
+std::string differenceOf(const std::vector<ConversionFact>& before, const std::vector<ConversionFact>& now);
+
+struct ConversionJournal {
+  std::vector<ConversionFact> facts;
+  std::filesystem::path scratch;  // the folder of temporary files
+  std::optional<ScatteredSplats> splats;
+};
+
+/// Throws Error if the disk fails.
+void writeJournal(const std::filesystem::path& folder, const ConversionJournal& journal);
+
+/// The journal in `folder`; none if there is no whole one that this program has
+/// written. Throws Error if the disk fails.
+std::optional<ConversionJournal> readJournal(const std::filesystem::path& folder);
+
+}  // namespace curvisplat

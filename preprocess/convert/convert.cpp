@@ -1,0 +1,327 @@
+#include "preprocess/convert/convert.h"
+
+#include <malloc.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <memory>
+#include <span>
+
+#include "preprocess/convert/bucket_file.h"
+#include "preprocess/convert/bucket_tree.h"
+#include "preprocess/convert/build_octree.h"
+#include "preprocess/convert/conversion_workspace.h"
+#include "preprocess/convert/counting_grid.h"
+#include "preprocess/convert/memory_plan.h"
+#include "preprocess/convert/plan_buckets.h"
+#include "preprocess/convert/preflight.h"
+#include "preprocess/convert/scan.h"
+#include "preprocess/convert/scatter.h"
+#include "preprocess/convert/scattered_splats.h"
+#include "preprocess/convert/splat_record.h"
+#include "preprocess/splats/abutting_faces.h"
+#include "preprocess/splats/seams.h"
+#include "preprocess/survey/block_overlap.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/base/paths.h"
+#include "stream/cache/cache_writer.h"
+#include "stream/cache/manifest.h"
+#include "stream/cache/partial_folder.h"
+
+namespace curvisplat {
+namespace {
+
+uint64_t nodesOf(const GridDescription& description) {
+  uint64_t nodes = 0;
+  for (const GridBlock& block : description.blocks) nodes += block.nodes();
+  if (nodes >= kMaxNodes)
+    throw Error("{}: has {} nodes; the most that can be converted are {}", description.format, nodes,
+                kMaxNodes - 1);
+  return nodes;
+}
+
+std::filesystem::path temporaryFolder(const ConvertOptions& options) {
+  return options.temporary_folder.empty() ? folderOf(options.output) : options.temporary_folder;
+}
+
+Unfinished unfinishedOf(const ConvertOptions& options) {
+  if (options.resume) return Unfinished::kResume;
+  return options.overwrite ? Unfinished::kRemove : Unfinished::kRefuse;
+}
+
+/// What a cache's manifest tells.
+void reportCache(const Manifest& written, ConvertReport& report) {
+  report.centring = written.cells ? Centring::cell : Centring::node;
+  report.nodes = written.nodes;
+  report.splats = written.splats;
+  report.bricks = written.bricks;
+  report.levels = written.levels;
+  report.volume = written.volume;
+  for (const FileInfo& file : written.files) report.files.push_back({file.name, file.size});
+}
+
+/// A conversion under way: what each pass leaves for the next.
+class Conversion {
+ public:
+  Conversion(const GridSource& source, const ConvertOptions& options, const MemoryPlan& plan,
+             std::vector<ConversionFact> facts, Progress& progress)
+      : source_(source),
+        options_(options),
+        plan_(plan),
+        progress_(progress),
+        reader_(source, options.scalars, options.blank_value),
+        nodes_(nodesOf(source.description())),
+        workspace_(options.output, options.overwrite, unfinishedOf(options), temporaryFolder(options),
+                   std::move(facts)) {}
+
+  ConvertReport run() {
+    const Pass scatter_grid[] = {
+        {"scan", "nodes", nodes_, &Conversion::scan},
+        {"count", "nodes", nodes_, &Conversion::count},
+        {"scatter", "nodes", nodes_, &Conversion::scatter},
+        {"seams", "nodes", 0, &Conversion::mergeSeams},
+    };
+    const Pass take_up_splats[] = {{"check", "bricks", 0, &Conversion::takeUpSplats}};
+    const Pass build_cache[] = {
+        {"build", "nodes", nodes_, &Conversion::build},
+        {"finish", "bricks", 0, &Conversion::finish},
+    };
+    checkRoom();
+    if (workspace_.splats()) {
+      try {
+        runPasses(take_up_splats);
+        runPasses(build_cache);
+        return std::move(report_);
+      } catch (const LostBuckets&) {
+        // The machine went down before all was on its disk. The bricks that are whole still count.
+        forgetSplats();
+      }
+    }
+    runPasses(scatter_grid);
+    runPasses(build_cache);
+    return std::move(report_);
+  }
+
+  /// After run() has thrown: whether there is something to resume, which then stays.
+  bool leaveForResuming() {
+    if (file_) file_->leave();
+    return workspace_.leaveForResuming();
+  }
+
+ private:
+  struct Pass {
+    const char* name;
+    const char* unit;
+    uint64_t steps;  // 0: not known
+    void (Conversion::*run)();
+  };
+
+  void runPasses(std::span<const Pass> passes) {
+    for (const Pass& pass : passes) {
+      progress_.begin(pass.name, pass.steps, pass.unit);
+      (this->*pass.run)();
+      // What a pass has freed goes back to the system: the next one counts on it.
+      malloc_trim(0);
+    }
+    progress_.end();
+  }
+
+  void scan() {
+    if (reader_.centring() == Centring::cell) openFaces();
+    splats_.survey = surveyGrid(reader_, plan_.slab_bytes, faces_.get(), progress_);
+    if (faces_) faces_->match(progress_);
+    checkRanges(splats_.survey, source_.description(), options_.scalars);
+    openWriter();
+    const std::vector<BlockOverlap> overlaps = findOverlaps(source_, plan_.slab_bytes, progress_);
+    if (!overlaps.empty()) report_.warnings.push_back(overlapWarning(source_.description(), overlaps));
+  }
+
+  void count() {
+    CountingGrid counts(countingLevel(nodes_), plan_.counting_bytes);
+    countNodes(source_, root_, plan_.slab_bytes, counts, progress_);
+    counts.close();
+    const uint32_t buckets = planBuckets(counts, plan_, splats_.tree);
+    file_ = std::make_unique<BucketFile>(workspace_.splatsFile(), buckets, plan_.chunkBytes(buckets));
+    contents_.resize(splats_.tree.size());
+  }
+
+  void scatter() {
+    seams_ = std::make_unique<SeamMerger>(options_.scalars.size(), plan_.seam_bytes, workspace_.scratch());
+    splats_.counts = scatterSplats(reader_, faces_.get(), root_, plan_.slab_bytes, splats_.tree, *file_,
+                                   contents_, *seams_, progress_);
+    faces_.reset();
+  }
+
+  void mergeSeams() {
+    splats_.merged_nodes = scatterSeams(*seams_, source_.description().coordinate_bytes, root_, splats_.tree,
+                                        *file_, contents_, progress_);
+    seams_.reset();
+    file_->close();
+    splats_.buckets = file_->chains();
+    splats_.tree.setContents(splats_.tree.leavesBelow(0), contents_);
+    workspace_.noteSplats(splats_);
+  }
+
+  /// In the place of all before: the splats of a conversion that was interrupted.
+  void takeUpSplats() {
+    splats_ = *workspace_.splats();
+    file_ = std::make_unique<BucketFile>(workspace_.splatsFile(), splats_.buckets);
+    openWriter();
+  }
+
+  void build() {
+    OctreeBuilder builder(root_, source_.description().blocks, options_.scalars.size(), plan_, splats_.tree,
+                          *writer_, workspace_.scratch(), progress_);
+    builder.build(*file_);
+  }
+
+  void finish() {
+    reportCache(writer_->finish(manifest()), report_);
+    writer_.reset();
+    file_.reset();
+    report_.blanked = splats_.survey.blanked;
+    report_.degenerate = splats_.counts.degenerate;
+    report_.inverted = splats_.counts.inverted;
+    report_.merged_nodes = splats_.merged_nodes;
+    report_.temporary_bytes = splats_.buckets.size;
+    report_.resumed = workspace_.resumed();
+  }
+
+  void checkRoom() const {
+    DiskNeeds needs = diskNeeds(nodes_, options_.scalars.size());
+    if (workspace_.splats())
+      needs.temporary_bytes = 0;
+    else if (reader_.centring() == Centring::cell)
+      needs.temporary_bytes = std::max(needs.temporary_bytes, needsOfFaces().disk_bytes);
+    needs.cache_bytes -= std::min(needs.cache_bytes, workspace_.bytesInPartial());
+    checkDiskSpace(needs, options_.output, temporaryFolder(options_));
+  }
+
+  AbuttingFaces::Needs needsOfFaces() const {
+    const AbuttingFaces::Needs needs = AbuttingFaces::needsOf(source_.description().blocks);
+    if (2 * needs.memory_bytes > plan_.seam_bytes)
+      throw Error("--memory: the ends of so many blocks of cells take {} MiB; give at least {} MiB",
+                  (needs.memory_bytes >> 20) + 1,
+                  (MemoryPlan::capForSeams(2 * needs.memory_bytes) >> 20) + 1);
+    return needs;
+  }
+
+  void openFaces() {
+    const GridDescription& grid = source_.description();
+    faces_ =
+        std::make_unique<AbuttingFaces>(grid.blocks, grid.coordinate_bytes,
+                                        plan_.seam_bytes - needsOfFaces().memory_bytes, workspace_.scratch());
+  }
+
+  /// Needs the survey.
+  void openWriter() {
+    root_ = RootCube::around(splats_.survey.lower, splats_.survey.upper);
+    if (writer_) return;
+    writer_ = std::make_unique<CacheWriter>(workspace_.partial(), root_, variables(), progress_);
+    report_.resumed_bricks = writer_->bricks().size();
+  }
+
+  void forgetSplats() {
+    workspace_.forgetSplats();
+    file_.reset();
+    splats_ = {};
+  }
+
+  std::vector<VariableInfo> variables() const {
+    std::vector<VariableInfo> variables;
+    for (size_t n = 0; n < options_.scalars.size(); ++n) {
+      const GridScalar& scalar = source_.description().scalars[options_.scalars[n]];
+      variables.push_back({static_cast<uint32_t>(n), scalar.name, scalar.unit, splats_.survey.ranges[n].min,
+                           splats_.survey.ranges[n].max});
+    }
+    return variables;
+  }
+
+  Manifest manifest() const {
+    const GridDescription& description = source_.description();
+    Manifest manifest;
+    manifest.title = options_.title.empty() ? options_.output.filename().string() : options_.title;
+    manifest.program = "curvisplat " CURVISPLAT_VERSION;
+    manifest.sources = description.files;
+    manifest.reader = description.format;
+    if (options_.blank_value) manifest.reader += fmt::format(", blank value {}", *options_.blank_value);
+    manifest.lower = splats_.survey.lower;
+    manifest.upper = splats_.survey.upper;
+    for (const GridBlock& block : description.blocks)
+      manifest.blocks.push_back({block.name, block.ni, block.nj, block.nk});
+    manifest.cells = reader_.centring() == Centring::cell;
+    manifest.nodes = splats_.survey.nodes;
+    manifest.blanked_nodes = splats_.survey.blanked.total();
+    manifest.variables = variables();
+    StepInfo step;
+    if (!description.times.empty()) step.time = description.times[description.time_step];
+    for (const VariableInfo& variable : manifest.variables) step.variables.push_back(variable.number);
+    manifest.steps = {step};
+    return manifest;
+  }
+
+  const GridSource& source_;
+  const ConvertOptions& options_;
+  const MemoryPlan plan_;
+  Progress& progress_;
+  const NodeReader reader_;
+  const uint64_t nodes_;
+  ConversionWorkspace workspace_;  // before what has files in it
+  ScatteredSplats splats_;
+  RootCube root_;
+  std::vector<CellContents> contents_;  // [node of the tree], while they are being scattered
+  std::unique_ptr<BucketFile> file_;
+  std::unique_ptr<AbuttingFaces> faces_;  // of cells
+  std::unique_ptr<SeamMerger> seams_;     // of nodes
+  std::unique_ptr<CacheWriter> writer_;
+  ConvertReport report_;
+};
+
+/// Runs it. What is to be resumed stays when it is stopped, and on an Error if that is wanted.
+ConvertReport runOrLeave(Conversion& conversion, const ConvertOptions& options) {
+  try {
+    return conversion.run();
+  } catch (const Interrupted& interrupted) {
+    const char* what = conversion.leaveForResuming()
+                           ? "interrupted; the same command with --resume goes on from here"
+                           : "interrupted before there was anything to resume; its temporary files are gone";
+    throw Interrupted(interrupted.signal(), fmt::format("{}: {}", options.output.string(), what));
+  } catch (const Error& error) {
+    if (options.resume && conversion.leaveForResuming())
+      throw Error("{}; what is done is kept, and --resume goes on from it", error.what());
+    throw;
+  }
+}
+
+}  // namespace
+
+ConvertReport convert(const GridSource& source, const ConvertOptions& options, Progress& progress) {
+  MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
+  if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
+
+  std::vector<ConversionFact> facts = factsOf(source.description(), options.scalars, options.blank_value);
+  ConvertReport report;
+  const std::filesystem::path manifest = options.output / "manifest.json";
+  if (options.resume && ConversionWorkspace::clearIfFinished(options.output, facts)) {
+    report.resumed = true;
+    reportCache(Manifest::fromJson(readTextFile(manifest), manifest), report);
+    report.resumed_bricks = report.bricks;
+  } else if (options.resume && !options.overwrite && std::filesystem::exists(manifest) &&
+             !hasUnfinished(options.output)) {
+    throw Error(
+        "{}: is there, and no conversion to it was left unfinished: there is nothing to resume; to replace "
+        "it, add --overwrite",
+        options.output.string());
+  } else {
+    checkOutput(options.output, options.overwrite, temporaryFolder(options));
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, plan.threads);
+    Conversion conversion(source, options, plan, std::move(facts), progress);
+    report = runOrLeave(conversion, options);
+  }
+  report.threads = plan.threads;
+  report.memory_bytes = plan.cap_bytes;
+  return report;
+}
+
+}  // namespace curvisplat

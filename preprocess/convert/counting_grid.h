@@ -1,0 +1,67 @@
+// Counts positions by octree cell, in a sparse OpenVDB grid: voxel = cell of one level, value = count. It
+// begins fine and merges 8 voxels to 1 whenever it outgrows its memory, so that it is as fine as the memory
+// allows where the data are, whatever their clustering.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "stream/model/octree.h"
+
+namespace curvisplat {
+
+/// `count` positions that followed one another in one voxel.
+struct VoxelRun {
+  std::array<uint32_t, 3> voxel;
+  uint32_t count;
+};
+
+/// Not for several threads at once.
+class CountingGrid {
+ public:
+  /// Voxels are cells of `level`, until memory makes them coarser. `memory_bytes` counts OpenVDB's nodes,
+  /// with those of the coarser levels that close() makes.
+  CountingGrid(uint32_t level, uint64_t memory_bytes);
+  ~CountingGrid();
+
+  /// The level that runs passed to add() are of.
+  uint32_t level() const { return level_; }
+  /// Runs of voxels of `level`, which is level() or was.
+  void add(uint32_t level, std::span<const VoxelRun> runs);
+
+  /// Makes count() possible; nothing is added afterwards.
+  void close();
+  /// Positions in `cell`, whose level is at most level(). A voxel counts up to 2^31 - 1.
+  uint64_t count(const Cell& cell) const;
+
+ private:
+  struct Trees;
+  void coarsen();
+
+  uint32_t level_;
+  uint64_t memory_bytes_;
+  std::unique_ptr<Trees> trees_;
+};
+
+/// Gathers positions into runs: the part of counting that threads do each for themselves.
+class VoxelRuns {
+ public:
+  explicit VoxelRuns(uint32_t level) : level_(level) {}
+  void add(const RootPosition& position) {
+    const Cell cell = Cell::of(position, level_);
+    if (runs_.empty() || runs_.back().voxel != cell.at || runs_.back().count == UINT32_MAX)
+      runs_.push_back({cell.at, 0});
+    ++runs_.back().count;
+  }
+  uint32_t level() const { return level_; }
+  std::span<const VoxelRun> runs() const { return runs_; }
+
+ private:
+  uint32_t level_;
+  std::vector<VoxelRun> runs_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,107 @@
+#include "preprocess/convert/memory_plan.h"
+
+#include <tbb/info.h>
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "preprocess/convert/splat_record.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/model/brick.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kMiB = uint64_t{1} << 20;
+
+// The program with its libraries, thread stacks and index records; and of the cap what the allocator holds
+// back.
+constexpr uint64_t kProgramBytes = 64 * kMiB;
+constexpr uint64_t kAllocatorShare = 16;
+constexpr uint64_t kSeamShare = 8;  // of the rest
+// Buckets are built from at least so many splats: some bricks at a time for each thread to work on.
+constexpr uint64_t kLeastBucketSplats = 4 * kMaxBrickSplats;
+constexpr uint64_t kLeastChunkBytes = kMiB / 8, kMostChunkBytes = kMiB;
+constexpr uint32_t kMostBuckets = 4096;
+
+/// Making a brick of kMaxBrickSplats: its splats in double, what the codec lays beside them, and the voxels
+/// that they merge into.
+uint64_t brickScratchBytes(size_t variables) {
+  return kMaxBrickSplats * (200 + 100 * variables);
+}
+
+/// A splat of a bucket: its record, its place in two orders, and what is encoded of it.
+uint64_t bucketBytesPerSplat(size_t variables) {
+  return regularRecordBytes(variables) + 2 * sizeof(uint32_t) + 12 + 10 * variables;
+}
+
+}  // namespace
+
+uint64_t leastMemory(size_t variables) {
+  const uint64_t two_buckets = 2 * kLeastBucketSplats * bucketBytesPerSplat(variables);
+  const uint64_t exact = kProgramBytes + brickScratchBytes(variables) + two_buckets;
+  const uint64_t held_back = exact / (kAllocatorShare - 1) + 1;
+  return (exact + held_back + 16 * kMiB - 1) / (16 * kMiB) * (16 * kMiB);
+}
+
+uint64_t machineMemory() {
+  const auto pages = static_cast<uint64_t>(::sysconf(_SC_PHYS_PAGES));
+  const auto page_bytes = static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
+  return pages * page_bytes;
+}
+
+uint64_t defaultMemory() {
+  return std::min<uint64_t>(2048 * kMiB, machineMemory() / 4);
+}
+
+MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads) {
+  if (cap_bytes < leastMemory(variables))
+    throw Error("--memory: conversion of {} scalars takes at least {} MiB; {} MiB were given", variables,
+                leastMemory(variables) / kMiB, cap_bytes / kMiB);
+  const uint64_t bytes = cap_bytes - cap_bytes / kAllocatorShare - kProgramBytes;
+
+  MemoryPlan plan;
+  plan.cap_bytes = cap_bytes;
+  plan.slab_bytes = std::min(bytes / 8, 256 * kMiB);
+  plan.counting_bytes = bytes / 8;
+  plan.seam_bytes = bytes / kSeamShare;
+
+  plan.chunk_buffer_bytes = bytes / 4;
+  plan.most_buckets =
+      static_cast<uint32_t>(std::min<uint64_t>(plan.chunk_buffer_bytes / kLeastChunkBytes, kMostBuckets));
+
+  const uint64_t scratch = brickScratchBytes(variables);
+  const uint64_t least_buckets = 2 * kLeastBucketSplats * bucketBytesPerSplat(variables);
+  const uint64_t affordable = std::max<uint64_t>(1, (bytes - least_buckets) / (2 * scratch));
+  plan.threads = static_cast<unsigned>(std::min<uint64_t>(std::max(1u, threads), affordable));
+  plan.bucket_splats = (bytes - plan.threads * scratch) / (2 * bucketBytesPerSplat(variables));
+  // More makes nothing faster; and places in a bucket are of 32 bits.
+  plan.bucket_splats = std::min<uint64_t>(
+      {plan.bucket_splats, uint64_t{1} << 24, UINT32_MAX / irregularRecordBytes(variables)});
+  plan.bucket_bytes = plan.bucket_splats * regularRecordBytes(variables);
+  return plan;
+}
+
+MemoryPlan MemoryPlan::ofOptions(uint64_t cap_bytes, size_t variables, unsigned threads) {
+  return of(cap_bytes > 0 ? cap_bytes : defaultMemory(), variables,
+            threads > 0 ? threads : static_cast<unsigned>(tbb::info::default_concurrency()));
+}
+
+uint64_t MemoryPlan::capForSeams(uint64_t seam_bytes) {
+  const uint64_t exact = seam_bytes * kSeamShare + kProgramBytes;
+  return exact + exact / (kAllocatorShare - 1) + kAllocatorShare;
+}
+
+void MemoryPlan::limitBuckets(uint64_t splats, size_t variables) {
+  bucket_splats = std::min(bucket_splats, splats);
+  bucket_bytes = bucket_splats * regularRecordBytes(variables);
+}
+
+size_t MemoryPlan::chunkBytes(uint32_t buckets) const {
+  const uint64_t bytes =
+      std::clamp(chunk_buffer_bytes / std::max(1u, buckets), kLeastChunkBytes, kMostChunkBytes);
+  return bytes / kDirectAlignment * kDirectAlignment;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,39 @@
+// The first two passes of conversion: what is in the grid, and where it is dense.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "preprocess/convert/counting_grid.h"
+#include "preprocess/grid/node_reader.h"
+#include "preprocess/survey/grid_survey.h"
+#include "stream/base/progress.h"
+#include "stream/model/octree.h"
+
+namespace curvisplat {
+
+class AbuttingFaces;
+
+/// Reads all nodes once. Memory: two slabs. Throws Error if no node is there, or if the grid is larger or
+/// smaller than single precision can say. Where scalars stand in cells, those at the blocks' ends are added
+/// to `faces`, unless that is null.
+GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces,
+                      Progress& progress);
+
+/// Throws Error if the values of one of the survey's scalars lie further apart than single precision can say
+/// the square of.
+void checkRanges(const GridSurvey& survey, const GridDescription& description,
+                 std::span<const uint32_t> scalars);
+
+/// Counts the nodes that are there by cells of `root`, reading coordinates alone: a node that is blanked for
+/// its scalar's sake is counted, which makes the plan no worse than a little uneven.
+void countNodes(const GridSource& source, const RootCube& root, uint64_t slab_bytes, CountingGrid& counts,
+                Progress& progress);
+
+/// The level to begin counting at: some levels finer than evenly spread nodes would need.
+uint32_t countingLevel(uint64_t nodes);
+
+}  // namespace curvisplat

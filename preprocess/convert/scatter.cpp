@@ -1,0 +1,189 @@
+#include "preprocess/convert/scatter.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <mutex>
+
+#include "preprocess/convert/splat_record.h"
+#include "preprocess/grid/slabs.h"
+#include "preprocess/splats/cell_splats.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kNodesPerTask = 4096;
+constexpr size_t kGatheredBytes = 32 << 10;
+
+struct Handedness {
+  uint64_t right = 0, left = 0;
+};
+
+/// Makes splats of slabs.
+class SplatStream {
+ public:
+  SplatStream(const NodeReader& reader, const AbuttingFaces* faces,
+              const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams, const Progress& progress)
+      : progress_(&progress),
+        blocks_(&reader.source().description().blocks),
+        variables_(reader.scalars()),
+        centring_(reader.centring()),
+        faces_(faces),
+        sink_of_thread_(&sink_of_thread),
+        seams_(&seams),
+        workers_([this] {
+          return Worker{{}, {}, 0, std::vector<Handedness>(blocks_->size())};
+        }) {}
+
+  void add(const LoadedSlab& loaded) {
+    const Slab& slab = loaded.slab;
+    const GridBlock& block = (*blocks_)[slab.block];
+    const BlockWindow window{block, slab.first_node, slab.window, &loaded.nodes};
+    const std::vector<NodeBox> tasks = cutForTasks(block, slab.box, kNodesPerTask);
+    tbb::parallel_for(size_t{0}, tasks.size(), [&](size_t task) {
+      progress_->throwIfStopped();
+      Worker& worker = workers_.local();
+      if (centring_ == Centring::cell)
+        computeCellSplats(window, tasks[task], {slab.block, faces_}, worker.cells, worker.splats);
+      else
+        computeNodeSplats(window, tasks[task], worker.splats);
+      worker.degenerate += worker.splats.degenerate;
+      worker.handedness[slab.block].right += worker.splats.right_handed;
+      worker.handedness[slab.block].left += worker.splats.left_handed;
+      send(worker.splats);
+    });
+  }
+
+  ScatterCounts counts() const {
+    ScatterCounts counts;
+    std::vector<Handedness> of_blocks(blocks_->size());
+    for (const Worker& worker : workers_) {
+      counts.degenerate += worker.degenerate;
+      for (size_t block = 0; block < of_blocks.size(); ++block) {
+        of_blocks[block].right += worker.handedness[block].right;
+        of_blocks[block].left += worker.handedness[block].left;
+      }
+    }
+    for (const Handedness& of_block : of_blocks) counts.inverted += std::min(of_block.right, of_block.left);
+    return counts;
+  }
+
+ private:
+  /// What a thread has for itself.
+  struct Worker {
+    NodeSplats splats;
+    CellScratch cells;
+    uint64_t degenerate = 0;
+    std::vector<Handedness> handedness;  // [block]
+  };
+
+  std::span<const SplatScalar> valuesOf(const NodeSplats& splats, size_t n) const {
+    return std::span(splats.values).subspan(n * variables_, variables_);
+  }
+
+  void send(const NodeSplats& splats) {
+    SplatSink& sink = (*sink_of_thread_)();
+    bool has_faces = false;
+    for (size_t n = 0; n < splats.splats.size(); ++n) {
+      if (splats.splats[n].on_block_face)
+        has_faces = true;
+      else
+        sink.add(splats.splats[n], valuesOf(splats, n));
+    }
+    if (!has_faces) return;
+    const std::lock_guard lock(adding_to_seams_);
+    for (size_t n = 0; n < splats.splats.size(); ++n)
+      if (splats.splats[n].on_block_face) seams_->add(splats.splats[n], valuesOf(splats, n));
+  }
+
+  const Progress* progress_;
+  const std::vector<GridBlock>* blocks_;
+  const size_t variables_;
+  const Centring centring_;
+  const AbuttingFaces* faces_;
+  const std::function<SplatSink&()>* sink_of_thread_;
+  std::mutex adding_to_seams_;  // guards *seams_
+  SeamMerger* seams_;
+  tbb::enumerable_thread_specific<Worker> workers_;
+};
+
+/// Packs splats and routes their records. One a thread.
+class RecordSink : public SplatSink {
+ public:
+  RecordSink(const RootCube& root, const BucketTree& tree, BucketFile& file)
+      : root_(root), router_(tree, file) {}
+
+  void add(const NodeSplat& splat, std::span<const SplatScalar> values) override {
+    const RootPosition position = root_.fromWorld(splat.splat.position);
+    record_.clear();
+    packRecord(splat, values, position, record_);
+    router_.add(record_, position);
+  }
+
+  /// Sends what is gathered, and adds what was sent to `contents`.
+  void finish(std::vector<CellContents>& contents) {
+    router_.flush();
+    for (size_t node = 0; node < contents.size(); ++node) contents[node].add(router_.contents()[node]);
+  }
+
+ private:
+  const RootCube root_;
+  RecordRouter router_;
+  std::vector<std::byte> record_;
+};
+
+}  // namespace
+
+void RecordRouter::add(std::span<const std::byte> record, const RootPosition& position) {
+  const bool same_leaf = leaf_ != BucketTree::kNone && (*tree_)[leaf_].cell.contains(position);
+  if (!same_leaf || gathered_.size() + record.size() > kGatheredBytes) {
+    flush();
+    if (!same_leaf) leaf_ = tree_->leafOf(position);
+  }
+  contents_[leaf_].add(position);
+  gathered_.insert(gathered_.end(), record.begin(), record.end());
+}
+
+void RecordRouter::flush() {
+  if (gathered_.empty()) return;
+  file_->append((*tree_)[leaf_].bucket, gathered_);
+  gathered_.clear();
+}
+
+ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces, uint64_t slab_bytes,
+                           const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams,
+                           Progress& progress) {
+  SplatStream splats(reader, faces, sink_of_thread, seams, progress);
+  SlabStream slabs(reader, slab_bytes, reader.centring() == Centring::cell ? kCellHalo : kNodeHalo);
+  while (const LoadedSlab* loaded = slabs.next()) {
+    splats.add(*loaded);
+    const GridBlock& block = reader.source().description().blocks[loaded->slab.block];
+    progress.advance(rowsOf(loaded->slab.box) * block.ni);
+  }
+  return splats.counts();
+}
+
+ScatterCounts scatterSplats(const NodeReader& reader, const AbuttingFaces* faces, const RootCube& root,
+                            uint64_t slab_bytes, const BucketTree& tree, BucketFile& file,
+                            std::vector<CellContents>& contents, SeamMerger& seams, Progress& progress) {
+  tbb::enumerable_thread_specific<RecordSink> sinks([&] { return RecordSink(root, tree, file); });
+  const ScatterCounts counts = streamSplats(
+      reader, faces, slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, seams, progress);
+  for (RecordSink& sink : sinks) sink.finish(contents);
+  return counts;
+}
+
+uint64_t scatterSeams(SeamMerger& seams, int coordinate_bytes, const RootCube& root, const BucketTree& tree,
+                      BucketFile& file, std::vector<CellContents>& contents, Progress& progress) {
+  RecordSink sink(root, tree, file);
+  const uint64_t merged =
+      seams.finish(coordinate_bytes, [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
+        sink.add(splat, values);
+        progress.advance(1);
+      });
+  sink.finish(contents);
+  return merged;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,71 @@
+// The pass that makes splats: reads the grid once more, with a halo, and sends each splat to the bucket of
+// the cell that it lies in. Nodes of block faces go through the seam merger first.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "preprocess/convert/bucket_file.h"
+#include "preprocess/convert/bucket_tree.h"
+#include "preprocess/grid/node_reader.h"
+#include "preprocess/splats/abutting_faces.h"
+#include "preprocess/splats/seams.h"
+#include "stream/base/progress.h"
+#include "stream/model/octree.h"
+
+namespace curvisplat {
+
+/// Sends records to their buckets and keeps account of the leaves' contents. One a thread; the tree and the
+/// file are shared.
+class RecordRouter {
+ public:
+  RecordRouter(const BucketTree& tree, BucketFile& file)
+      : tree_(&tree), file_(&file), contents_(tree.size()) {}
+
+  void add(std::span<const std::byte> record, const RootPosition& position);
+  /// Sends what is gathered. To be called at the end.
+  void flush();
+  /// [node of the tree]: what went to each leaf.
+  const std::vector<CellContents>& contents() const { return contents_; }
+
+ private:
+  const BucketTree* tree_;
+  BucketFile* file_;
+  std::vector<CellContents> contents_;
+  uint32_t leaf_ = BucketTree::kNone;
+  std::vector<std::byte> gathered_;  // for the leaf's bucket
+};
+
+/// Where a pass sends its splats.
+class SplatSink {
+ public:
+  virtual ~SplatSink() = default;
+  /// One value a scalar of the reader.
+  virtual void add(const NodeSplat& splat, std::span<const SplatScalar> values) = 0;
+};
+
+struct ScatterCounts {
+  uint64_t degenerate = 0;  // splats with a floored axis
+  uint64_t inverted = 0;    // cells of the handedness that fewer of their block's cells have
+};
+
+/// Makes all splats, of nodes or of cells as the reader's scalars are, in parallel. Those of block faces go
+/// to `seams`, the others to what `sink_of_thread` gives: a sink of the calling thread's own, always the same
+/// one. Cells end at borders as computeCellSplats() finds them with `faces`, which may be null.
+ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces, uint64_t slab_bytes,
+                           const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams,
+                           Progress& progress);
+
+/// Routes all splats but those of block faces, which go to `seams`. Adds to `contents` ([node of the tree]).
+ScatterCounts scatterSplats(const NodeReader& reader, const AbuttingFaces* faces, const RootCube& root,
+                            uint64_t slab_bytes, const BucketTree& tree, BucketFile& file,
+                            std::vector<CellContents>& contents, SeamMerger& seams, Progress& progress);
+
+/// Routes the splats of block faces, merged. Returns how many nodes were merged into another one.
+uint64_t scatterSeams(SeamMerger& seams, int coordinate_bytes, const RootCube& root, const BucketTree& tree,
+                      BucketFile& file, std::vector<CellContents>& contents, Progress& progress);
+
+}  // namespace curvisplat

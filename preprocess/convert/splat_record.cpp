@@ -1,0 +1,104 @@
+#include "preprocess/convert/splat_record.h"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+
+#include "stream/base/check.h"
+
+namespace curvisplat {
+namespace {
+
+static_assert(std::endian::native == std::endian::little,
+              "words of 24 and 48 bits are the low bytes of larger ones");
+
+// The 24 bits of a positive float that a record keeps of an axis.
+constexpr int kDroppedBits = 7;
+
+uint32_t axisBits(double axis) {
+  constexpr float kLargest = 0x1p127f;  // rounds up to no infinity
+  const float single = std::clamp(recordFloat(axis), std::numeric_limits<float>::min(), kLargest);
+  return (std::bit_cast<uint32_t>(single) + (1u << (kDroppedBits - 1))) >> kDroppedBits;
+}
+
+double axisOf(uint32_t bits) {
+  return std::bit_cast<float>(bits << kDroppedBits);
+}
+
+double product(const std::array<double, 3>& axis) {
+  return axis[0] * axis[1] * axis[2];
+}
+
+}  // namespace
+
+void packRecord(const NodeSplat& in, std::span<const SplatScalar> values, const RootPosition& position,
+                std::vector<std::byte>& out) {
+  CURVISPLAT_CHECK_OP(in.node, <, kMaxNodes);
+  const bool irregular = !in.regular || in.half_cell != kNoBorder;
+  const size_t bytes = irregular ? irregularRecordBytes(values.size()) : regularRecordBytes(values.size());
+  const size_t start = out.size();
+  out.resize(start + bytes);
+  std::byte* at = out.data() + start;
+
+  const auto putWord48 = [&at](uint64_t word) {
+    std::memcpy(at, &word, 6);
+    at += 6;
+  };
+  const auto putFloat = [&at](double value) {
+    const float single = recordFloat(value);
+    std::memcpy(at, &single, sizeof single);
+    at += sizeof single;
+  };
+  putWord48(in.node | uint64_t{irregular} << 47);
+  for (const uint64_t coordinate : position.at) putWord48(coordinate);
+  for (const double axis : in.splat.axis) {
+    const uint32_t bits = axisBits(axis);
+    std::memcpy(at, &bits, 3);
+    at += 3;
+  }
+  for (const double shear : in.splat.shear) putFloat(shear);
+  for (const SplatScalar& value : values) {
+    putFloat(value.mean);
+    for (int axis = 0; axis < 3; ++axis) putFloat(value.slope[axis]);
+  }
+  if (irregular) {
+    const double cell = product(in.splat.axis);
+    putFloat(cell > 0 ? in.splat.weight / cell : 0);
+    std::memcpy(at, &in.half_cell, sizeof in.half_cell);
+    at += sizeof in.half_cell;
+    for (const SplatScalar& value : values) putFloat(value.variance);
+  }
+}
+
+uint32_t unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScalar> values) {
+  const bool irregular = recordIsIrregular(record);
+  const std::byte* at = record + 24;
+  const auto takeFloat = [&at] {
+    float single;
+    std::memcpy(&single, at, sizeof single);
+    at += sizeof single;
+    return static_cast<double>(single);
+  };
+  for (double& axis : splat.axis) {
+    uint32_t bits = 0;
+    std::memcpy(&bits, at, 3);
+    at += 3;
+    axis = axisOf(bits);
+  }
+  for (double& shear : splat.shear) shear = takeFloat();
+  for (SplatScalar& value : values) {
+    value.mean = takeFloat();
+    for (int axis = 0; axis < 3; ++axis) value.slope[axis] = takeFloat();
+    value.variance = 0;
+  }
+  splat.weight = product(splat.axis);
+  if (!irregular) return kNoBorder;
+  splat.weight *= takeFloat();
+  uint32_t half_cell;
+  std::memcpy(&half_cell, at, sizeof half_cell);
+  at += sizeof half_cell;
+  for (SplatScalar& value : values) value.variance = takeFloat();
+  return half_cell;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,324 @@
+#include "preprocess/formats/cgns/cgns_file.h"
+
+#include <cgns_io.h>
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+#include <mutex>
+#include <span>
+
+#include "preprocess/formats/common/data_library_lock.h"
+#include "stream/base/check.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr std::string_view kHdf5Mark = "\x89HDF\r\n\x1a\n";
+// Names and labels have at most 32 characters. libcgns copies what a damaged file has.
+constexpr size_t kTextRoom = 4096;
+// What is read at a time from ADF files, where types are converted here.
+constexpr uint64_t kPieceElements = 1 << 16;
+// Times, units, names: nothing small has more elements.
+constexpr uint64_t kMostSmallElements = 1 << 22;
+// Deflate makes a thousandth of zeros.
+constexpr uint64_t kMostCompression = 1100;
+// A node takes at least so much of a file.
+constexpr uint64_t kLeastNodeBytes = 32;
+constexpr int kMostDimensions = 12;
+
+std::string lastMessage() {
+  char message[kTextRoom] = {};
+  cgio_error_message(message);
+  std::string text = message;
+  while (!text.empty() && (text.back() == '\n' || text.back() == ' ' || text.back() == '.')) text.pop_back();
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+uint64_t bytesOf(std::string_view type) {
+  if (type == "C1" || type == "B1" || type == "U1" || type == "I1") return 1;
+  if (type == "I4" || type == "U4" || type == "R4") return 4;
+  if (type == "I8" || type == "U8" || type == "R8") return 8;
+  return 0;
+}
+
+std::string trimmed(const char* begin, size_t size) {
+  size = static_cast<size_t>(std::find(begin, begin + size, '\0') - begin);
+  while (size > 0 && begin[size - 1] == ' ') --size;
+  return std::string(begin, size);
+}
+
+template <typename Stored, typename Value>
+void convert(const std::byte* from, uint64_t count, Value* to) {
+  for (uint64_t n = 0; n < count; ++n) {
+    Stored stored;
+    std::memcpy(&stored, from + n * sizeof(Stored), sizeof(Stored));
+    to[n] = static_cast<Value>(stored);
+  }
+}
+
+template <typename Value>
+void convert(std::string_view type, const std::byte* from, uint64_t count, Value* to) {
+  if (type == "R4") return convert<float>(from, count, to);
+  if (type == "R8") return convert<double>(from, count, to);
+  if (type == "I4") return convert<int32_t>(from, count, to);
+  CURVISPLAT_CHECK(type == "I8");
+  convert<int64_t>(from, count, to);
+}
+
+struct Selection {
+  std::array<cgsize_t, 3> start, end, stride{1, 1, 1};
+};
+
+Selection selectionOf(const std::array<uint64_t, 3>& first, const std::array<uint64_t, 3>& count) {
+  Selection selection;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    selection.start[axis] = static_cast<cgsize_t>(first[axis] + 1);
+    selection.end[axis] = static_cast<cgsize_t>(first[axis] + count[axis]);
+  }
+  return selection;
+}
+
+}  // namespace
+
+uint64_t CgnsShape::count() const {
+  uint64_t product = dims.empty() ? 0 : 1;
+  for (const uint64_t n : dims) {
+    if (n > 0 && product > std::numeric_limits<uint64_t>::max() / n)
+      return std::numeric_limits<uint64_t>::max();
+    product *= n;
+  }
+  return product;
+}
+
+/// libcgns' number of a node, for the time of a call. The lock must be held.
+class CgnsFile::OpenNode {
+ public:
+  OpenNode(const CgnsFile& file, const std::string& path) : file_(file.file_) {
+    if (path.empty()) {
+      id_ = file.root_;
+      return;
+    }
+    if (cgio_get_node_id(file_, file.root_, path.c_str(), &id_) != CGIO_ERR_NONE) file.fail(path);
+    owned_ = true;
+  }
+  ~OpenNode() {
+    if (owned_) cgio_release_id(file_, id_);
+  }
+  OpenNode(const OpenNode&) = delete;
+  OpenNode& operator=(const OpenNode&) = delete;
+
+  double id() const { return id_; }
+
+ private:
+  int file_;
+  double id_ = 0;
+  bool owned_ = false;
+};
+
+CgnsFile::CgnsFile(std::filesystem::path path) : path_(std::move(path)), bytes_(InputFile(path_).size()) {
+  const std::lock_guard lock(dataLibraryMutex());
+  int type = CGIO_FILE_NONE;
+  if (cgio_open_file(path_.c_str(), CGIO_MODE_READ, CGIO_FILE_NONE, &file_) != CGIO_ERR_NONE) fail("");
+  if (cgio_get_root_id(file_, &root_) != CGIO_ERR_NONE || cgio_get_file_type(file_, &type) != CGIO_ERR_NONE) {
+    const std::string message = lastMessage();
+    cgio_close_file(file_);
+    throw Error("{}: cannot be opened as a CGNS file: {}; copy or write it again", path_.string(), message);
+  }
+  hdf5_ = type == CGIO_FILE_HDF5;
+}
+
+CgnsFile::~CgnsFile() {
+  const std::lock_guard lock(dataLibraryMutex());
+  cgio_close_file(file_);
+}
+
+bool CgnsFile::recognises(const InputFile& file) {
+  std::array<char, 32> begin{};
+  if (file.size() < begin.size()) return false;
+  file.readAt(0, std::span<char>(begin));
+  const std::string_view mark(begin.data(), begin.size());
+  // The first four bytes of an ADF file differ between versions.
+  if (mark.substr(4).starts_with("ADF Database Version")) return true;
+  if (!mark.starts_with(kHdf5Mark)) return false;
+  if (file.path().extension() == ".cgns") return true;
+
+  const std::lock_guard lock(dataLibraryMutex());
+  int number = 0;
+  if (cgio_open_file(file.path().c_str(), CGIO_MODE_READ, CGIO_FILE_NONE, &number) != CGIO_ERR_NONE)
+    return false;
+  double root = 0, version = 0;
+  const bool found = cgio_get_root_id(number, &root) == CGIO_ERR_NONE &&
+                     cgio_get_node_id(number, root, "CGNSLibraryVersion", &version) == CGIO_ERR_NONE;
+  if (found) cgio_release_id(number, version);
+  cgio_close_file(number);
+  return found;
+}
+
+void CgnsFile::fail(const std::string& node_path) const {
+  throw Error("{}: {} cannot be read as CGNS: {}; if the file is damaged, copy or write it again",
+              path_.string(), node_path.empty() ? "the file" : node_path, lastMessage());
+}
+
+void CgnsFile::damaged(const std::string& node_path, std::string_view what) const {
+  throw Error("{}: {} {}; the file is damaged: copy or write it again", path_.string(), node_path, what);
+}
+
+std::vector<CgnsNode> CgnsFile::children(const CgnsNode& node) const {
+  const std::lock_guard lock(dataLibraryMutex());
+  const OpenNode open(*this, node.path);
+  int count = 0;
+  if (cgio_number_children(file_, open.id(), &count) != CGIO_ERR_NONE) fail(node.path);
+  if (count <= 0) return {};
+  if (!node.linked && static_cast<uint64_t>(count) > bytes_ / kLeastNodeBytes)
+    damaged(node.path, fmt::format("should have {} nodes below it, more than the file has room for", count));
+
+  std::vector<double> ids(static_cast<size_t>(count), -1);
+  int found = 0;
+  if (cgio_children_ids(file_, open.id(), 1, count, &found, ids.data()) != CGIO_ERR_NONE) fail(node.path);
+  ids.resize(static_cast<size_t>(std::clamp(found, 0, count)));
+  std::vector<CgnsNode> nodes;
+  std::string error;
+  for (const double id : ids) {
+    char name[kTextRoom] = {}, label[kTextRoom] = {};
+    int link_length = 0;
+    // What a link leads to may be missing: that matters to whoever needs it.
+    const bool readable = cgio_get_name(file_, id, name) == CGIO_ERR_NONE &&
+                          cgio_is_link(file_, id, &link_length) == CGIO_ERR_NONE &&
+                          (cgio_get_label(file_, id, label) == CGIO_ERR_NONE || link_length > 0);
+    if (!readable && error.empty()) error = lastMessage();
+    nodes.push_back({node.path + "/" + name, name, label, node.linked || link_length > 0});
+    cgio_release_id(file_, id);
+  }
+  const std::string place = node.path.empty() ? "the root" : node.path;
+  if (found != count) damaged(place, fmt::format("has {} nodes below it, and {} can be found", count, found));
+  if (!error.empty()) damaged(place, "has a node below it that cannot be read: " + error);
+  return nodes;
+}
+
+CgnsShape CgnsFile::shapeOf(const OpenNode& open, const CgnsNode& node) const {
+  char type[kTextRoom] = {};
+  if (cgio_get_data_type(file_, open.id(), type) != CGIO_ERR_NONE) fail(node.path);
+  CgnsShape shape{type, {}};
+  if (shape.type == "MT" || shape.type == "LK") return {"MT", {}};
+  const uint64_t bytes = bytesOf(shape.type);
+  if (bytes == 0) damaged(node.path, fmt::format("has data of an unknown type '{}'", shape.type));
+
+  int dimensions = 0;
+  if (cgio_get_dimensions(file_, open.id(), &dimensions, nullptr) != CGIO_ERR_NONE) fail(node.path);
+  if (dimensions < 0 || dimensions > kMostDimensions)
+    damaged(node.path, fmt::format("has {} dimensions; at most {} can be", dimensions, kMostDimensions));
+  std::array<cgsize_t, kMostDimensions> dims{};
+  if (dimensions > 0 && cgio_get_dimensions(file_, open.id(), &dimensions, dims.data()) != CGIO_ERR_NONE)
+    fail(node.path);
+  for (int n = 0; n < dimensions; ++n) {
+    if (dims[static_cast<size_t>(n)] < 0) damaged(node.path, "has a negative dimension");
+    shape.dims.push_back(static_cast<uint64_t>(dims[static_cast<size_t>(n)]));
+  }
+  const uint64_t most = bytes_ / bytes * (hdf5_ ? kMostCompression : 1);
+  if (!node.linked && shape.count() > most)
+    damaged(node.path, fmt::format("should have {} values, more than {} bytes hold", shape.count(), bytes_));
+  return shape;
+}
+
+CgnsShape CgnsFile::shape(const CgnsNode& node) const {
+  const std::lock_guard lock(dataLibraryMutex());
+  return shapeOf(OpenNode(*this, node.path), node);
+}
+
+void CgnsFile::checkSmall(const CgnsNode& node, const CgnsShape& shape, std::string_view type) const {
+  const bool right = type == "C1" ? shape.type == "C1" : shape.number();
+  if (!right || shape.count() == 0)
+    damaged(node.path, fmt::format("has {} values of type '{}'; expected {}", shape.count(), shape.type,
+                                   type == "C1" ? "a text" : "numbers"));
+  if (shape.count() > kMostSmallElements)
+    damaged(node.path, fmt::format("has {} values; expected at most {}", shape.count(), kMostSmallElements));
+}
+
+std::vector<double> CgnsFile::numbers(const CgnsNode& node) const {
+  const std::lock_guard lock(dataLibraryMutex());
+  const OpenNode open(*this, node.path);
+  const CgnsShape shape = shapeOf(open, node);
+  checkSmall(node, shape, "R8");
+  std::vector<double> values(shape.count());
+  if (hdf5_) {
+    if (cgio_read_all_data_type(file_, open.id(), "R8", values.data()) != CGIO_ERR_NONE) fail(node.path);
+    return values;
+  }
+  std::vector<std::byte> stored(shape.count() * bytesOf(shape.type));
+  if (cgio_read_all_data(file_, open.id(), stored.data()) != CGIO_ERR_NONE) fail(node.path);
+  convert(shape.type, stored.data(), shape.count(), values.data());
+  return values;
+}
+
+std::string CgnsFile::text(const CgnsNode& node) const {
+  const std::vector<std::string> columns = texts(node);
+  std::string all;
+  for (const std::string& column : columns) all += column;
+  return all;
+}
+
+std::vector<std::string> CgnsFile::texts(const CgnsNode& node) const {
+  const std::lock_guard lock(dataLibraryMutex());
+  const OpenNode open(*this, node.path);
+  const CgnsShape shape = shapeOf(open, node);
+  checkSmall(node, shape, "C1");
+  std::vector<char> stored(shape.count());
+  const int result = hdf5_ ? cgio_read_all_data_type(file_, open.id(), "C1", stored.data())
+                           : cgio_read_all_data(file_, open.id(), stored.data());
+  if (result != CGIO_ERR_NONE) fail(node.path);
+  std::vector<std::string> texts;
+  const size_t column = shape.dims[0];
+  for (size_t begin = 0; begin < stored.size(); begin += column)
+    texts.push_back(trimmed(&stored[begin], column));
+  return texts;
+}
+
+template <typename Value>
+void CgnsFile::readHdf5(const CgnsNode& node, const CgnsBox& box, const char* type, Value* to) const {
+  const std::lock_guard lock(dataLibraryMutex());
+  const OpenNode open(*this, node.path);
+  const Selection file = selectionOf(box.first, box.count), memory = selectionOf({}, box.count);
+  const std::array<cgsize_t, 3> memory_dims{static_cast<cgsize_t>(box.memory[0]),
+                                            static_cast<cgsize_t>(box.memory[1]),
+                                            static_cast<cgsize_t>(box.count[2])};
+  if (cgio_read_data_type(file_, open.id(), file.start.data(), file.end.data(), file.stride.data(), type, 3,
+                          memory_dims.data(), memory.start.data(), memory.end.data(), memory.stride.data(),
+                          to) != CGIO_ERR_NONE)
+    fail(node.path);
+}
+
+template <typename Value>
+void CgnsFile::readAdf(const CgnsNode& node, const CgnsShape& shape, const CgnsBox& box, Value* to) const {
+  const uint64_t rows = std::clamp<uint64_t>(kPieceElements / box.count[0], 1, box.count[1]);
+  std::vector<std::byte> stored(rows * box.count[0] * bytesOf(shape.type));
+  for (uint64_t k = 0; k < box.count[2]; ++k)
+    for (uint64_t j = 0; j < box.count[1]; j += rows) {
+      const std::array<uint64_t, 3> count{box.count[0], std::min(rows, box.count[1] - j), 1};
+      const Selection file = selectionOf({box.first[0], box.first[1] + j, box.first[2] + k}, count);
+      const Selection memory = selectionOf({}, count);
+      {
+        const std::lock_guard lock(dataLibraryMutex());
+        const OpenNode open(*this, node.path);
+        if (cgio_read_data(file_, open.id(), file.start.data(), file.end.data(), file.stride.data(), 3,
+                           memory.end.data(), memory.start.data(), memory.end.data(), memory.stride.data(),
+                           stored.data()) != CGIO_ERR_NONE)
+          fail(node.path);
+      }
+      for (uint64_t row = 0; row < count[1]; ++row)
+        convert(shape.type, stored.data() + row * count[0] * bytesOf(shape.type), count[0],
+                to + box.memory[0] * (j + row + box.memory[1] * k));
+    }
+}
+
+void CgnsFile::read(const CgnsNode& node, const CgnsShape& shape, const CgnsBox& box, double* to) const {
+  hdf5_ ? readHdf5(node, box, "R8", to) : readAdf(node, shape, box, to);
+}
+
+void CgnsFile::read(const CgnsNode& node, const CgnsShape& shape, const CgnsBox& box, float* to) const {
+  hdf5_ ? readHdf5(node, box, "R4", to) : readAdf(node, shape, box, to);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,139 @@
+#include "preprocess/formats/cgns/cgns_steps.h"
+
+#include <algorithm>
+#include <set>
+
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr double kMostSteps = 1 << 20;
+
+const CgnsNode* named(const std::vector<CgnsNode>& nodes, const char* name) {
+  const auto found =
+      std::find_if(nodes.begin(), nodes.end(), [&](const CgnsNode& node) { return node.name == name; });
+  return found == nodes.end() ? nullptr : &*found;
+}
+
+const CgnsNode* labelled(const std::vector<CgnsNode>& nodes, const char* label) {
+  const auto found =
+      std::find_if(nodes.begin(), nodes.end(), [&](const CgnsNode& node) { return node.label == label; });
+  return found == nodes.end() ? nullptr : &*found;
+}
+
+void checkCount(const CgnsFile& file, const CgnsNode& node, size_t found, size_t expected) {
+  if (found != expected)
+    throw Error("{}: {} has {} entries; expected {}, one a time step; the file is damaged",
+                file.path().string(), node.path, found, expected);
+}
+
+/// The names of zones, a row a step.
+std::vector<std::vector<std::string>> zonesOfSteps(const CgnsFile& file, const CgnsNode& pointers,
+                                                   size_t steps) {
+  const std::vector<std::string> names = file.texts(pointers);
+  if (names.size() % steps != 0) checkCount(file, pointers, names.size(), steps);
+  const size_t most = names.size() / steps;
+  std::vector<std::vector<std::string>> zones(steps);
+  for (size_t n = 0; n < names.size(); ++n) zones[n / most].push_back(names[n]);
+  return zones;
+}
+
+/// The node that a table of one name a step names; none: "Null".
+const CgnsNode* pointedAt(const CgnsFile& file, const std::vector<CgnsNode>& zone, const CgnsNode& pointers,
+                          size_t steps, uint32_t step) {
+  const std::vector<std::string> names = file.texts(pointers);
+  checkCount(file, pointers, names.size(), steps);
+  if (step >= names.size() || names[step].empty() || names[step] == "Null") return nullptr;
+  const CgnsNode* const node = named(zone, names[step].c_str());
+  if (!node)
+    throw Error("{}: {} names {} for time step {}, and the zone has no such node", file.path().string(),
+                pointers.path, names[step], step);
+  return node;
+}
+
+/// Puts each solution into the first step that has none of its fields yet.
+std::vector<std::vector<CgnsNode>> inOrder(const CgnsFile& file, const std::vector<CgnsNode>& zone) {
+  std::vector<std::vector<CgnsNode>> steps;
+  std::vector<std::set<std::string>> taken;
+  for (const CgnsNode& solution : zone) {
+    if (solution.label != "FlowSolution_t") continue;
+    std::string location = "Vertex";
+    std::vector<std::string> fields;
+    for (const CgnsNode& child : file.children(solution)) {
+      if (child.label == "GridLocation_t") location = file.text(child);
+      if (child.label == "DataArray_t") fields.push_back(child.name);
+    }
+    for (std::string& field : fields) field = location + "/" + field;
+    size_t step = 0;
+    while (step < steps.size() && std::any_of(fields.begin(), fields.end(), [&](const std::string& field) {
+             return taken[step].contains(field);
+           }))
+      ++step;
+    if (step == steps.size()) {
+      steps.emplace_back();
+      taken.emplace_back();
+    }
+    steps[step].push_back(solution);
+    taken[step].insert(fields.begin(), fields.end());
+  }
+  return steps;
+}
+
+}  // namespace
+
+bool CgnsSteps::has(const std::string& zone, uint32_t step) const {
+  if (step >= zones.size()) return true;
+  return std::find(zones[step].begin(), zones[step].end(), zone) != zones[step].end();
+}
+
+CgnsSteps readCgnsSteps(const CgnsFile& file, const std::vector<CgnsNode>& base) {
+  CgnsSteps steps;
+  const CgnsNode* const data = labelled(base, "BaseIterativeData_t");
+  if (!data) return steps;
+  const std::vector<double> count = file.numbers(*data);
+  if (count.size() != 1 || !(count[0] >= 1 && count[0] <= kMostSteps))
+    throw Error("{}: {} should tell the number of time steps, 1 to {}; it tells {:g}", file.path().string(),
+                data->path, kMostSteps, count[0]);
+  steps.count = static_cast<size_t>(count[0]);
+  const std::vector<CgnsNode> children = file.children(*data);
+  const CgnsNode* times = named(children, "TimeValues");
+  if (!times) times = named(children, "IterationValues");
+  if (times) {
+    steps.times = file.numbers(*times);
+    checkCount(file, *times, steps.times.size(), steps.count);
+  } else {
+    for (size_t n = 0; n < steps.count; ++n) steps.times.push_back(static_cast<double>(n));
+  }
+  if (const CgnsNode* const pointers = named(children, "ZonePointers"))
+    steps.zones = zonesOfSteps(file, *pointers, steps.count);
+  return steps;
+}
+
+CgnsZoneStep readCgnsZoneStep(const CgnsFile& file, const std::vector<CgnsNode>& zone, const CgnsSteps& steps,
+                              uint32_t step) {
+  CgnsZoneStep result;
+  const CgnsNode* grid = named(zone, "GridCoordinates");
+  if (!grid) grid = labelled(zone, "GridCoordinates_t");
+  std::vector<CgnsNode> data;
+  if (steps.count > 0)
+    if (const CgnsNode* const node = labelled(zone, "ZoneIterativeData_t")) data = file.children(*node);
+  if (const CgnsNode* const pointers = named(data, "GridCoordinatesPointers"))
+    if (const CgnsNode* const moved = pointedAt(file, zone, *pointers, steps.count, step)) grid = moved;
+  if (grid) result.grid = *grid;
+
+  if (const CgnsNode* const pointers = named(data, "FlowSolutionPointers")) {
+    if (const CgnsNode* const solution = pointedAt(file, zone, *pointers, steps.count, step))
+      result.solutions.push_back(*solution);
+    return result;
+  }
+  std::vector<std::vector<CgnsNode>> order = inOrder(file, zone);
+  result.implied_steps = std::max<size_t>(1, order.size());
+  if (order.size() == 1)
+    result.solutions = std::move(order[0]);
+  else if (step < order.size())
+    result.solutions = std::move(order[step]);
+  return result;
+}
+
+}  // namespace curvisplat

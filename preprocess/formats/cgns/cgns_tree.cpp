@@ -1,0 +1,266 @@
+#include "preprocess/formats/cgns/cgns_tree.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "preprocess/formats/cgns/cgns_steps.h"
+#include "preprocess/formats/cgns/cgns_units.h"
+#include "preprocess/grid/time_steps.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kNamesListed = 3;
+// No zone has more: 2^31 is what libcgns counts to along an axis.
+constexpr double kMostNodes = 2147483647.0;
+
+using Nodes = std::vector<CgnsNode>;
+using Dims = std::array<uint64_t, 3>;
+
+std::string inWords(const Dims& dims) {
+  return fmt::format("{}x{}x{}", dims[0], dims[1], dims[2]);
+}
+
+/// Units hold for all that is below, unless it tells its own.
+struct UnitContext {
+  std::string data_class;
+  std::vector<std::string> units;
+};
+
+class TreeReader {
+ public:
+  TreeReader(const CgnsFile& file, uint32_t step) : file_(file), step_(step) {}
+
+  CgnsTree read();
+
+ private:
+  void readBase(const CgnsNode& base);
+  void readZone(const CgnsNode& base, const CgnsNode& node, const UnitContext& units, const CgnsSteps& steps);
+  std::array<CgnsArray, 3> readCoordinates(const CgnsNode& grid, const Dims& nodes) const;
+  void addSolution(const CgnsNode& solution, UnitContext units, CgnsZone& zone);
+  UnitContext below(const Nodes& children, UnitContext units) const;
+  CgnsArray arrayOf(const CgnsNode& node, const Dims& dims, const std::array<uint64_t, 6>& rind) const;
+  std::array<uint64_t, 6> rindOf(const Nodes& children) const;
+  void warnOfOmissions();
+
+  const CgnsFile& file_;
+  uint32_t step_;
+  CgnsTree tree_;
+  std::optional<std::vector<double>> told_times_;            // by BaseIterativeData
+  size_t implied_steps_ = 1;                                 // by the solutions' order
+  std::map<std::string, std::vector<std::string>> omitted_;  // reason, zones
+};
+
+CgnsTree TreeReader::read() {
+  bool any = false;
+  for (const CgnsNode& node : file_.children(file_.root())) {
+    if (node.label != "CGNSBase_t") continue;
+    readBase(node);
+    any = true;
+  }
+  if (!any)
+    throw Error("{}: has no CGNSBase_t node: it is no CGNS file, or an empty one", file_.path().string());
+  if (told_times_) {
+    tree_.times = *told_times_;
+  } else if (implied_steps_ > 1) {
+    for (size_t n = 0; n < implied_steps_; ++n) tree_.times.push_back(static_cast<double>(n));
+  }
+  chosenTimeStep(file_.path().string(), tree_.times, step_);
+  warnOfOmissions();
+  return std::move(tree_);
+}
+
+void TreeReader::readBase(const CgnsNode& base) {
+  const std::vector<double> dimensions = file_.numbers(base);
+  const Nodes children = file_.children(base);
+  if (dimensions.size() != 2)
+    throw Error(
+        "{}: {} has {} numbers; expected 2, the dimensions of cells and of space; the file is damaged",
+        file_.path().string(), base.path, dimensions.size());
+  if (dimensions[0] != 3 || dimensions[1] != 3) {
+    for (const CgnsNode& node : children)
+      if (node.label == "Zone_t")
+        omitted_[fmt::format("of {:g}-dimensional cells in {:g}-dimensional space (volumes are needed)",
+                             dimensions[0], dimensions[1])]
+            .push_back(node.path.substr(1));
+    return;
+  }
+  const UnitContext units = below(children, {});
+  const CgnsSteps steps = readCgnsSteps(file_, children);
+  if (steps.count > 0 && !told_times_) told_times_ = steps.times;
+  const size_t before = tree_.zones.size();
+  for (const CgnsNode& node : children)
+    if (node.label == "Zone_t" && steps.has(node.name, step_)) readZone(base, node, units, steps);
+  if (tree_.zones.size() > before) ++tree_.bases;
+}
+
+void TreeReader::readZone(const CgnsNode& base, const CgnsNode& node, const UnitContext& base_units,
+                          const CgnsSteps& steps) {
+  const Nodes children = file_.children(node);
+  for (const CgnsNode& child : children)
+    if (child.label == "ZoneType_t" && file_.text(child) != "Structured") {
+      omitted_["unstructured (structured ones are read)"].push_back(node.path.substr(1));
+      return;
+    }
+  const std::vector<double> sizes = file_.numbers(node);
+  if (sizes.size() != 9)
+    throw Error(
+        "{}: {} has {} sizes; expected 9, nodes, cells and boundary nodes along i, j, k; the file is "
+        "damaged",
+        file_.path().string(), node.path, sizes.size());
+  CgnsZone zone{base.name, node.name, {}, {}, {}};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    if (!(sizes[axis] >= 1 && sizes[axis] <= kMostNodes))
+      throw Error("{}: {} should have {:g} nodes along {}; the file is damaged", file_.path().string(),
+                  node.path, sizes[axis], "ijk"[axis]);
+    zone.nodes[axis] = static_cast<uint64_t>(sizes[axis]);
+  }
+  if (*std::min_element(zone.nodes.begin(), zone.nodes.end()) < 2) {
+    omitted_["of a single plane of nodes (volumes are needed)"].push_back(
+        fmt::format("{} ({})", node.path.substr(1), inWords(zone.nodes)));
+    return;
+  }
+
+  const CgnsZoneStep step = readCgnsZoneStep(file_, children, steps, step_);
+  implied_steps_ = std::max(implied_steps_, step.implied_steps);
+  if (!step.grid) {
+    omitted_["without coordinates"].push_back(node.path.substr(1));
+    return;
+  }
+  zone.coordinates = readCoordinates(*step.grid, zone.nodes);
+  const UnitContext units = below(children, base_units);
+  for (const CgnsNode& solution : step.solutions) addSolution(solution, units, zone);
+  tree_.zones.push_back(std::move(zone));
+}
+
+std::array<CgnsArray, 3> TreeReader::readCoordinates(const CgnsNode& grid, const Dims& nodes) const {
+  const Nodes children = file_.children(grid);
+  const std::array<uint64_t, 6> rind = rindOf(children);
+  std::array<CgnsArray, 3> coordinates;
+  std::string found;
+  int known = 0;
+  for (const CgnsNode& child : children) {
+    if (child.label != "DataArray_t") continue;
+    found += (found.empty() ? "" : ", ") + child.name;
+    for (size_t axis = 0; axis < 3; ++axis)
+      if (child.name == std::string("Coordinate") + "XYZ"[axis]) {
+        coordinates[axis] = arrayOf(child, nodes, rind);
+        ++known;
+      }
+  }
+  if (known != 3)
+    throw Error(
+        "{}: {} has coordinates {}; only Cartesian ones, CoordinateX, CoordinateY and CoordinateZ, are "
+        "read: convert them with the program that wrote the file",
+        file_.path().string(), grid.path, found.empty() ? "of no name" : found);
+  return coordinates;
+}
+
+void TreeReader::addSolution(const CgnsNode& solution, UnitContext units, CgnsZone& zone) {
+  const Nodes children = file_.children(solution);
+  Centring centring = Centring::node;
+  for (const CgnsNode& child : children) {
+    if (child.label == "GridLocation_t") {
+      const std::string location = file_.text(child);
+      if (location == "CellCenter") {
+        centring = Centring::cell;
+      } else if (location != "Vertex") {
+        tree_.warnings.push_back(
+            fmt::format("{} is left out: its values stand at {}; those at Vertex and CellCenter are read",
+                        solution.path.substr(1), location));
+        return;
+      }
+    } else if (child.name == "PointList" || child.name == "PointRange") {
+      tree_.warnings.push_back(
+          fmt::format("{} is left out: it has values for a part of its zone only", solution.path.substr(1)));
+      return;
+    }
+  }
+  units = below(children, units);
+  const std::array<uint64_t, 6> rind = rindOf(children);
+  Dims dims = zone.nodes;
+  if (centring == Centring::cell)
+    for (uint64_t& n : dims) --n;
+  for (const CgnsNode& child : children) {
+    if (child.label != "DataArray_t") continue;
+    const Nodes details = file_.children(child);
+    const UnitContext own = below(details, units);
+    std::vector<double> exponents;
+    for (const CgnsNode& detail : details)
+      if (detail.label == "DimensionalExponents_t") exponents = file_.numbers(detail);
+    const bool dimensional = own.data_class.empty() || own.data_class == "Dimensional";
+    zone.fields.push_back({child.name, dimensional ? cgnsUnit(own.units, exponents, child.name) : "",
+                           centring, arrayOf(child, dims, rind)});
+  }
+}
+
+UnitContext TreeReader::below(const Nodes& children, UnitContext units) const {
+  for (const CgnsNode& child : children) {
+    if (child.label == "DataClass_t") units.data_class = file_.text(child);
+    if (child.label == "DimensionalUnits_t") units.units = file_.texts(child);
+  }
+  return units;
+}
+
+CgnsArray TreeReader::arrayOf(const CgnsNode& node, const Dims& dims,
+                              const std::array<uint64_t, 6>& rind) const {
+  CgnsArray array{node, file_.shape(node), {rind[0], rind[2], rind[4]}};
+  const Dims expected{dims[0] + rind[0] + rind[1], dims[1] + rind[2] + rind[3], dims[2] + rind[4] + rind[5]};
+  if (!std::equal(array.shape.dims.begin(), array.shape.dims.end(), expected.begin(), expected.end()))
+    throw Error(
+        "{}: {} has {} values; expected {}, as the zone's size and its rind planes say; the file is "
+        "damaged",
+        file_.path().string(), node.path,
+        array.shape.dims.empty() ? "no" : fmt::format("{}", fmt::join(array.shape.dims, "x")),
+        inWords(expected));
+  if (!array.shape.number())
+    throw Error("{}: {} has values of type '{}'; expected R4, R8, I4 or I8", file_.path().string(), node.path,
+                array.shape.type);
+  return array;
+}
+
+std::array<uint64_t, 6> TreeReader::rindOf(const Nodes& children) const {
+  std::array<uint64_t, 6> rind{};
+  for (const CgnsNode& child : children) {
+    if (child.label != "Rind_t") continue;
+    const std::vector<double> planes = file_.numbers(child);
+    if (planes.size() != 6)
+      throw Error("{}: {} has {} numbers; expected 6, planes before and behind along i, j, k",
+                  file_.path().string(), child.path, planes.size());
+    for (size_t n = 0; n < 6; ++n) {
+      if (!(planes[n] >= 0 && planes[n] <= kMostNodes))
+        throw Error("{}: {} tells of {:g} planes; the file is damaged", file_.path().string(), child.path,
+                    planes[n]);
+      rind[n] = static_cast<uint64_t>(planes[n]);
+    }
+  }
+  return rind;
+}
+
+void TreeReader::warnOfOmissions() {
+  for (const auto& [reason, zones] : omitted_) {
+    std::string names;
+    for (size_t n = 0; n < std::min(kNamesListed, zones.size()); ++n) names += (n ? ", " : "") + zones[n];
+    if (zones.size() > kNamesListed) names += fmt::format(" and {} more", zones.size() - kNamesListed);
+    const std::string words =
+        fmt::format("{} zone{} {}: {}", zones.size(), zones.size() == 1 ? "" : "s", reason, names);
+    if (tree_.zones.empty()) throw Error("{}: nothing to draw in it: {}", file_.path().string(), words);
+    tree_.warnings.push_back("left out: " + words);
+  }
+  if (tree_.zones.empty()) throw Error("{}: has no zones: nothing to draw in it", file_.path().string());
+}
+
+}  // namespace
+
+CgnsTree readCgnsTree(const CgnsFile& file, uint32_t step) {
+  return TreeReader(file, step).read();
+}
+
+}  // namespace curvisplat

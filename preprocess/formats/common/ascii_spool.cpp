@@ -1,0 +1,198 @@
+#include "preprocess/formats/common/ascii_spool.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <string_view>
+#include <vector>
+
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kChunkBytes = size_t{1} << 20;
+constexpr size_t kDigitSamples = 100'000;
+// Repeat counts beyond this are checked against the free space first: a wrong one would fill the disk.
+constexpr uint64_t kUnsuspiciousRepeats = 1'000'000;
+
+bool isSpace(char c) {
+  return c == ' ' || (c >= '\t' && c <= '\r');
+}
+bool isSeparator(char c) {
+  return isSpace(c) || c == ',';
+}
+
+/// Digits of the mantissa: what a writer has kept of a number.
+int significantDigits(std::string_view token) {
+  int digits = 0;
+  for (const char c : token) {
+    if (c >= '0' && c <= '9')
+      digits += digits > 0 || c != '0';
+    else if (c != '.' && c != '-' && c != '+')
+      break;
+  }
+  return digits;
+}
+
+/// A number as Fortran may write it and C++ does not read it: "+1.5", "1.5D+00", "1.5-101", and what
+/// over- or underflows.
+bool parseFortranNumber(std::string_view token, double& value) {
+  std::string spelling(token);
+  std::replace_if(
+      spelling.begin(), spelling.end(), [](char c) { return c == 'D' || c == 'd'; }, 'e');
+  const size_t sign = spelling.find_last_of("+-");
+  if (sign != std::string::npos && sign > 0 &&
+      ((spelling[sign - 1] >= '0' && spelling[sign - 1] <= '9') || spelling[sign - 1] == '.'))
+    spelling.insert(sign, 1, 'e');
+  char* end = nullptr;
+  value = std::strtod(spelling.c_str(), &end);
+  const bool hexadecimal = spelling.find_first_of("xXpP") != std::string::npos;
+  return end == spelling.c_str() + spelling.size() && !hexadecimal;
+}
+
+class Spooler {
+ public:
+  Spooler(const InputFile& text, const std::filesystem::path& folder)
+      : text_(text), folder_(folder), temporary_(unusedName()), in_(std::make_shared<InputFile>(open())) {
+    pending_.reserve(kChunkBytes / sizeof(double));
+  }
+
+  AsciiSpool run() {
+    std::vector<char> chunk(kChunkBytes);
+    size_t kept = 0;  // bytes of a number that the chunk before has cut
+    for (uint64_t offset = 0; offset < text_.size();) {
+      const size_t count =
+          static_cast<size_t>(std::min<uint64_t>(chunk.size() - kept, text_.size() - offset));
+      text_.readAt(offset, std::span(chunk.data() + kept, count));
+      offset += count;
+      const char* const end = chunk.data() + kept + count;
+      const char* stop = end;
+      if (offset < text_.size()) {
+        while (stop != chunk.data() && !isSeparator(stop[-1])) --stop;
+        if (stop == chunk.data())
+          throw Error("{}: line {} has {} bytes without a space; that is no text of numbers", name(),
+                      lines_ + 1, end - stop);
+      }
+      parse(chunk.data(), stop);
+      lines_ += static_cast<uint64_t>(std::count<const char*>(chunk.data(), stop, '\n'));
+      kept = static_cast<size_t>(end - stop);
+      std::copy(stop, end, chunk.data());
+    }
+    flush();
+    out_->close();
+    return {in_, written_, significant_digits_};
+  }
+
+ private:
+  std::string name() const { return text_.path().string(); }
+
+  std::filesystem::path unusedName() const {
+    static std::atomic<unsigned> spools = 0;
+    return folder_ / fmt::format("{}.{}.{}.spool", text_.path().filename().string(), ::getpid(), spools++);
+  }
+
+  /// Creates the file, opens it for reading, and takes its name away at once.
+  InputFile open() {
+    out_ = std::make_unique<OutputFile>(temporary_);
+    try {
+      InputFile in(temporary_);
+      removeFile(temporary_);
+      return in;
+    } catch (...) {
+      removeAll(temporary_);
+      throw;
+    }
+  }
+
+  void parse(const char* const begin, const char* const end) {
+    for (const char* at = begin;;) {
+      for (; at != end && isSeparator(*at); ++at) {
+        if (*at != ',') continue;
+        if (comma_) throw Error("{}: line {} leaves a value out between commas", name(), lineOf(begin, at));
+        comma_ = true;
+      }
+      if (at == end) return;
+      comma_ = false;
+      const char* stop = at;
+      const char* star = nullptr;
+      for (; stop != end && !isSeparator(*stop); ++stop)
+        if (*stop == '*' && !star) star = stop;
+      const char* const number = star ? star + 1 : at;
+      uint64_t repeats = 1;
+      double value = 0;
+      if (star) {
+        const auto [count_end, error] = std::from_chars(at, star, repeats);
+        if (error != std::errc{} || count_end != star || repeats == 0) fail(begin, at, stop);
+      }
+      if (!parseNumber({number, static_cast<size_t>(stop - number)}, value)) fail(begin, at, stop);
+      if (sampled_ < kDigitSamples) {
+        ++sampled_;
+        significant_digits_ =
+            std::max(significant_digits_, significantDigits({number, static_cast<size_t>(stop - number)}));
+      }
+      if (repeats > kUnsuspiciousRepeats) checkSpaceFor(repeats, lineOf(begin, at));
+      for (; repeats > 0; --repeats) put(value);
+      at = stop;
+    }
+  }
+
+  uint64_t lineOf(const char* begin, const char* at) const {
+    return lines_ + 1 + static_cast<uint64_t>(std::count(begin, at, '\n'));
+  }
+
+  [[noreturn]] void fail(const char* begin, const char* at, const char* stop) const {
+    constexpr ptrdiff_t kShown = 30;
+    throw Error("{}: line {} has \"{}\" where a number was expected; is it a PLOT3D file?", name(),
+                lineOf(begin, at), std::string_view(at, static_cast<size_t>(std::min(kShown, stop - at))));
+  }
+
+  void checkSpaceFor(uint64_t values, uint64_t line) const {
+    const uint64_t available = std::filesystem::space(folder_.empty() ? "." : folder_).available;
+    if (values > available / sizeof(double))
+      throw Error("{}: line {} repeats a number {} times, more than the {} bytes free in {} can take", name(),
+                  line, values, available, folder_.string());
+  }
+
+  void put(double value) {
+    pending_.push_back(value);
+    if (pending_.size() == pending_.capacity()) flush();
+  }
+
+  void flush() {
+    out_->append(std::span<const double>(pending_));
+    written_ += pending_.size();
+    pending_.clear();
+  }
+
+  const InputFile& text_;
+  const std::filesystem::path folder_;
+  const std::filesystem::path temporary_;
+  std::unique_ptr<OutputFile> out_;
+  const std::shared_ptr<const InputFile> in_;
+  std::vector<double> pending_;
+  uint64_t written_ = 0;
+  uint64_t lines_ = 0;  // that ended before the current chunk
+  bool comma_ = false;  // since the last number
+  size_t sampled_ = 0;
+  int significant_digits_ = 0;
+};
+
+}  // namespace
+
+bool parseNumber(std::string_view text, double& value) {
+  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error == std::errc{} && stop == text.data() + text.size()) return true;
+  return !text.empty() && parseFortranNumber(text, value);
+}
+
+AsciiSpool spoolAscii(const InputFile& text, const std::filesystem::path& folder) {
+  return Spooler(text, folder).run();
+}
+
+}  // namespace curvisplat

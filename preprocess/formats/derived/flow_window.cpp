@@ -1,0 +1,234 @@
+#include "preprocess/formats/derived/flow_window.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+
+#include "preprocess/grid/lattice_gradient.h"
+#include "preprocess/grid/slabs.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr unsigned kGradients = kNeedsVelocityGradient | kNeedsPressureGradient;
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+Halo haloFor(bool cells, unsigned needs) {
+  if (cells && (needs & kGradients)) return kCellHalo;
+  return needs & (kGradients | kNeedsJacobian) ? kNodeHalo : kNoHalo;
+}
+
+bool isFinite(const glm::dvec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+bool allThere(const std::array<std::optional<uint32_t>, 3>& components) {
+  return components[0] && components[1] && components[2];
+}
+
+}  // namespace
+
+bool FlowInputs::hasVelocity() const {
+  return allThere(velocity) || (density && allThere(momentum));
+}
+
+bool FlowInputs::hasPressure() const {
+  return pressure || (density && energy && hasVelocity());
+}
+
+std::vector<uint32_t> FlowInputs::neededFor(unsigned needs) const {
+  std::vector<uint32_t> inputs;
+  const auto add = [&](const std::optional<uint32_t>& input) {
+    if (input && std::find(inputs.begin(), inputs.end(), *input) == inputs.end()) inputs.push_back(*input);
+  };
+  const bool of_pressure = needs & (kNeedsPressure | kNeedsPressureGradient);
+  const bool from_energy = of_pressure && !pressure;
+  const bool of_velocity = (needs & (kNeedsVelocity | kNeedsVelocityGradient)) || from_energy;
+  const bool from_momentum = of_velocity && !allThere(velocity);
+  if ((needs & kNeedsDensity) || from_energy || from_momentum) add(density);
+  if (of_velocity)
+    for (const auto& component : from_momentum ? momentum : velocity) add(component);
+  if (of_pressure) add(from_energy ? energy : pressure);
+  return inputs;
+}
+
+FlowWindow::FlowWindow(const GridSource& source, const FlowInputs& inputs, const PerfectGas& gas,
+                       std::optional<float> blank_value, unsigned needs)
+    : source_(source),
+      inputs_(inputs),
+      gas_(gas),
+      blank_value_(blank_value),
+      needs_(needs),
+      needed_(inputs.neededFor(needs)),
+      moves_(inputs.centring == Centring::cell && (needs & kGradients)),
+      halo_(haloFor(inputs.centring == Centring::cell, needs)) {}
+
+void FlowWindow::read(uint32_t block, const NodeBox& box, const std::vector<uint32_t>& stored) {
+  block_ = &source_.description().blocks[block];
+  box_ = box;
+  window_ = {box.j0 - std::min(box.j0, halo_.before), std::min(box.j1 + halo_.after, block_->nj),
+             box.k0 - std::min(box.k0, halo_.before), std::min(box.k1 + halo_.after, block_->nk)};
+  row_ = block_->ni;
+  plane_ = row_ * (window_.j1 - window_.j0);
+  std::vector<uint32_t> all = stored;
+  all.insert(all.end(), needed_.begin(), needed_.end());
+  source_.read(block, window_, all, nodes_);
+  stored_ = stored.size();
+}
+
+/// Calls each(element in the window, element in `whole`, j, k).
+template <typename Each>
+void FlowWindow::forEachRow(const NodeBox& whole, const Each& each) const {
+  for (uint64_t k = box_.k0; k < box_.k1; ++k)
+    for (uint64_t j = box_.j0; j < box_.j1; ++j)
+      each(nodeAt(j, k), ((k - whole.k0) * (whole.j1 - whole.j0) + (j - whole.j0)) * row_, j, k);
+}
+
+void FlowWindow::copyStored(const NodeBox& whole, std::span<const size_t> to, NodeArrays& out) const {
+  forEachRow(whole, [&](size_t from, size_t at, uint64_t, uint64_t) {
+    const auto copy = [&](const auto& source, auto& target) {
+      std::copy_n(source.begin() + static_cast<ptrdiff_t>(from), row_,
+                  target.begin() + static_cast<ptrdiff_t>(at));
+    };
+    copy(nodes_.x, out.x);
+    copy(nodes_.y, out.y);
+    copy(nodes_.z, out.z);
+    copy(nodes_.blank, out.blank);
+    for (size_t n = 0; n < stored_; ++n) copy(nodes_.scalars[n], out.scalars[to[n]]);
+  });
+}
+
+void FlowWindow::computeFlow() {
+  there_.resize(nodes_.x.size());
+  for (size_t n = 0; n < there_.size(); ++n) there_[n] = !nodes_.blank[n] && isFinite(position(n));
+  if (moves_) moveToCentres();
+  if (needed_.empty()) return;
+  flow_.resize(there_.size());
+  for (size_t n = 0; n < flow_.size(); ++n) flow_[n] = flowAt(n);
+}
+
+/// In place: a centre depends on its own and on later elements.
+void FlowWindow::moveToCentres() {
+  const uint64_t rows = window_.j1 - window_.j0, planes = window_.k1 - window_.k0;
+  for (size_t n = 0; n < there_.size(); ++n) {
+    const bool last = n % row_ + 1 == row_ || n / row_ % rows + 1 == rows || n / plane_ + 1 == planes;
+    glm::dvec3 sum(0.0);
+    bool there = !last;
+    for (size_t corner = 0; corner < 8 && there; ++corner) {
+      const size_t at = n + (corner & 1) + (corner >> 1 & 1) * row_ + (corner >> 2) * plane_;
+      there = there_[at];
+      sum += position(at);
+    }
+    there_[n] = there;
+    nodes_.x[n] = sum.x / 8;
+    nodes_.y[n] = sum.y / 8;
+    nodes_.z[n] = sum.z / 8;
+  }
+}
+
+double FlowWindow::input(const std::optional<uint32_t>& scalar, size_t n) const {
+  if (!scalar) return kNone;
+  const auto at = std::find(needed_.begin(), needed_.end(), *scalar);
+  if (at == needed_.end()) return kNone;
+  const float value = nodes_.scalars[stored_ + static_cast<size_t>(at - needed_.begin())][n];
+  return blank_value_ && value == *blank_value_ ? kNone : double{value};
+}
+
+FlowState FlowWindow::flowAt(size_t n) const {
+  FlowState flow;
+  flow.density = input(inputs_.density, n);
+  const bool stored_velocity = allThere(inputs_.velocity);
+  for (int axis = 0; axis < 3; ++axis)
+    flow.velocity[axis] =
+        stored_velocity ? input(inputs_.velocity[axis], n) : input(inputs_.momentum[axis], n) / flow.density;
+  flow.pressure = inputs_.pressure
+                      ? input(inputs_.pressure, n)
+                      : pressureOf(flow.density, flow.velocity, input(inputs_.energy, n), gas_.gamma);
+  return flow;
+}
+
+/// The neighbours of a node (or cell) along an axis that `has` is true for; itself where there is none.
+template <typename Has>
+std::pair<size_t, size_t> FlowWindow::neighbours(size_t n, int axis, uint64_t index, const Has& has) const {
+  const size_t stride = axis == 0 ? 1 : axis == 1 ? row_ : plane_;
+  const uint64_t count = axis == 0 ? block_->ni : axis == 1 ? block_->nj : block_->nk;
+  const bool before = index > 0 && has(n - stride);
+  const bool after = index + 1 < count && has(n + stride);
+  return {before ? n - stride : n, after ? n + stride : n};
+}
+
+glm::dmat3 FlowWindow::velocityGradient(size_t n, const std::array<uint64_t, 3>& index) const {
+  glm::dmat3 steps, differences;  // columns: along the axes
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto [before, after] = neighbours(
+        n, axis, index[axis], [&](size_t at) { return there_[at] && isFinite(flow_[at].velocity); });
+    steps[axis] = position(after) - position(before);
+    differences[axis] = flow_[after].velocity - flow_[before].velocity;
+  }
+  const LatticeGradient gradient(steps);
+  glm::dmat3 of_components;
+  for (int c = 0; c < 3; ++c)
+    of_components[c] = gradient({differences[0][c], differences[1][c], differences[2][c]});
+  return of_components;
+}
+
+glm::dvec3 FlowWindow::pressureGradient(size_t n, const std::array<uint64_t, 3>& index) const {
+  glm::dmat3 steps;
+  glm::dvec3 differences;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto [before, after] = neighbours(
+        n, axis, index[axis], [&](size_t at) { return there_[at] && std::isfinite(flow_[at].pressure); });
+    steps[axis] = position(after) - position(before);
+    differences[axis] = flow_[after].pressure - flow_[before].pressure;
+  }
+  return LatticeGradient(steps)(differences);
+}
+
+/// Of the Jacobian of a whole cell around the node, also at a block's end.
+double FlowWindow::determinant(size_t n, const std::array<uint64_t, 3>& index) const {
+  glm::dmat3 jacobian;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto [before, after] = neighbours(n, axis, index[axis], [&](size_t at) { return there_[at] != 0; });
+    const double steps = (before != n) && (after != n) ? 0.5 : 1.0;
+    jacobian[axis] = steps * (position(after) - position(before));
+  }
+  return glm::determinant(jacobian);
+}
+
+void FlowWindow::compute(Quantity quantity, double freestream_mach, const NodeBox& whole,
+                         std::vector<float>& out) const {
+  const unsigned needs = infoOf(quantity).needs;
+  const auto value = [&](size_t n, const std::array<uint64_t, 3>& index) {
+    switch (quantity) {
+      case Quantity::i:
+        return static_cast<double>(index[0]);
+      case Quantity::j:
+        return static_cast<double>(index[1]);
+      case Quantity::k:
+        return static_cast<double>(index[2]);
+      default:
+        break;
+    }
+    if (!there_[n]) return kNone;
+    if (quantity == Quantity::jacobian) return determinant(n, index);
+    if (quantity == Quantity::volume) return std::abs(determinant(n, index));
+    FlowGradients gradients;
+    const FlowState& flow = flow_[n];
+    if (needs & kNeedsVelocityGradient) {
+      if (!isFinite(flow.velocity)) return kNone;
+      gradients.velocity = velocityGradient(n, index);
+    }
+    if (needs & kNeedsPressureGradient) {
+      if (!std::isfinite(flow.pressure)) return kNone;
+      gradients.pressure = pressureGradient(n, index);
+    }
+    return flowQuantity(quantity, flow, gradients, gas_, freestream_mach);
+  };
+  forEachRow(whole, [&](size_t from, size_t at, uint64_t j, uint64_t k) {
+    for (uint64_t i = 0; i < row_; ++i) out[at + i] = static_cast<float>(value(from + i, {i, j, k}));
+  });
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,81 @@
+// The flow at some rows of nodes (or in their cells), read from a source's scalars, and its gradients.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "preprocess/formats/derived/flow_quantities.h"
+#include "preprocess/grid/grid_source.h"
+#include "preprocess/grid/slabs.h"
+
+namespace curvisplat {
+
+/// Positions of the scalars that the flow is computed from, all of one centring.
+struct FlowInputs {
+  Centring centring = Centring::node;
+  std::optional<uint32_t> density, energy, pressure;
+  std::array<std::optional<uint32_t>, 3> momentum, velocity;
+
+  bool hasVelocity() const;
+  bool hasPressure() const;
+  /// Those of them that quantities with these needs take.
+  std::vector<uint32_t> neededFor(unsigned needs) const;
+};
+
+/// Goes over a block piece by piece; one thread. Keeps its capacity.
+class FlowWindow {
+ public:
+  /// `needs`: of all quantities to come (QuantityNeeds). References must outlive it.
+  FlowWindow(const GridSource& source, const FlowInputs& inputs, const PerfectGas& gas,
+             std::optional<float> blank_value, unsigned needs);
+
+  /// Reads `box` and its halo: coordinates, `stored` scalars of the source and inputs. Throws Error.
+  void read(uint32_t block, const NodeBox& box, const std::vector<uint32_t>& stored);
+
+  /// Copies what was read of the box to where it lies in `whole`: stored scalar n to out.scalars[to[n]]. To
+  /// be called before computeFlow().
+  void copyStored(const NodeBox& whole, std::span<const size_t> to, NodeArrays& out) const;
+
+  void computeFlow();
+
+  /// Values of the box, to where it lies in `whole`; NaN where a node is not there or has no flow.
+  void compute(Quantity quantity, double freestream_mach, const NodeBox& whole,
+               std::vector<float>& out) const;
+
+ private:
+  template <typename Each>
+  void forEachRow(const NodeBox& whole, const Each& each) const;
+  size_t nodeAt(uint64_t j, uint64_t k) const { return (k - window_.k0) * plane_ + (j - window_.j0) * row_; }
+  glm::dvec3 position(size_t n) const { return {nodes_.x[n], nodes_.y[n], nodes_.z[n]}; }
+  double input(const std::optional<uint32_t>& scalar, size_t n) const;
+  FlowState flowAt(size_t n) const;
+  void moveToCentres();
+  template <typename Has>
+  std::pair<size_t, size_t> neighbours(size_t n, int axis, uint64_t index, const Has& has) const;
+  glm::dmat3 velocityGradient(size_t n, const std::array<uint64_t, 3>& index) const;
+  glm::dvec3 pressureGradient(size_t n, const std::array<uint64_t, 3>& index) const;
+  double determinant(size_t n, const std::array<uint64_t, 3>& index) const;
+
+  const GridSource& source_;
+  const FlowInputs& inputs_;
+  const PerfectGas& gas_;
+  const std::optional<float> blank_value_;
+  const unsigned needs_;
+  const std::vector<uint32_t> needed_;
+  const bool moves_;  // positions become the cells' centres
+  const Halo halo_;
+
+  const GridBlock* block_ = nullptr;
+  NodeBox box_, window_;
+  size_t row_ = 0, plane_ = 0;
+  size_t stored_ = 0;  // scalars before the inputs
+  NodeArrays nodes_;
+  std::vector<uint8_t> there_;
+  std::vector<FlowState> flow_;
+};
+
+}  // namespace curvisplat

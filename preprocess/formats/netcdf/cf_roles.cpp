@@ -1,0 +1,91 @@
+#include "preprocess/formats/netcdf/cf_roles.h"
+
+#include <algorithm>
+#include <initializer_list>
+#include <string_view>
+
+namespace curvisplat {
+namespace {
+
+std::string lower(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
+bool isOneOf(std::string_view text, std::initializer_list<std::string_view> words) {
+  return std::find(words.begin(), words.end(), text) != words.end();
+}
+
+bool beginsWithOneOf(std::string_view text, std::initializer_list<std::string_view> words) {
+  return std::any_of(words.begin(), words.end(),
+                     [&](std::string_view word) { return text.starts_with(word); });
+}
+
+bool isVerticalName(std::string_view standard_name) {
+  return isOneOf(standard_name, {"depth", "height", "altitude", "geopotential_height", "model_level_number",
+                                 "depth_below_geoid", "air_pressure"}) ||
+         beginsWithOneOf(standard_name, {"height_above_", "ocean_s", "ocean_double_sigma", "atmosphere_"});
+}
+
+/// Names that programs use which write no attributes.
+CfRole roleByName(const std::string& name, bool length) {
+  if (beginsWithOneOf(name, {"lon", "nav_lon", "xlong", "glam"})) return CfRole::longitude;
+  if (beginsWithOneOf(name, {"lat", "nav_lat", "xlat", "gphi"})) return CfRole::latitude;
+  if (isOneOf(name, {"time", "ocean_time", "time_counter"})) return CfRole::time;
+  if (!length) return CfRole::none;
+  if (name == "x" || name.starts_with("x_")) return CfRole::x;
+  if (name == "y" || name.starts_with("y_")) return CfRole::y;
+  if (beginsWithOneOf(name, {"depth", "gdep", "height", "altitude", "z_rho", "z_w", "z_r", "lev"}) ||
+      name == "z")
+    return CfRole::vertical;
+  return CfRole::none;
+}
+
+}  // namespace
+
+CfRole cfRole(const NetcdfFile& file, const NetcdfVariable& variable) {
+  if (!variable.numeric) return CfRole::none;
+  const std::string standard_name = lower(variable.text("standard_name")),
+                    units = lower(variable.text("units"));
+  const std::string axis = lower(variable.text("axis"));
+  if (isOneOf(units, {"degrees_east", "degree_east", "degree_e", "degrees_e", "degreee", "degreese"}) ||
+      standard_name == "longitude")
+    return CfRole::longitude;
+  if (isOneOf(units, {"degrees_north", "degree_north", "degree_n", "degrees_n", "degreen", "degreesn"}) ||
+      standard_name == "latitude")
+    return CfRole::latitude;
+  if (standard_name == "time" || units.find(" since ") != std::string::npos) return CfRole::time;
+
+  const bool length = kilometresOf(units).has_value();
+  // A variable that is called like its dimension is a coordinate, and may say of which axis.
+  const bool coordinate = variable.dims.size() == 1 && file.dimension(variable, 0).name == variable.name;
+  if (isVerticalName(standard_name) || !variable.text("formula_terms").empty() ||
+      (coordinate && (axis == "z" || !variable.text("positive").empty())))
+    return CfRole::vertical;
+  if (standard_name == "projection_x_coordinate" || (axis == "x" && length)) return CfRole::x;
+  if (standard_name == "projection_y_coordinate" || (axis == "y" && length)) return CfRole::y;
+  if (coordinate && axis == "t") return CfRole::time;
+  if (!standard_name.empty()) return CfRole::none;
+  if (length && !variable.text("positive").empty()) return CfRole::vertical;
+  return roleByName(lower(variable.name), length || units.empty());
+}
+
+std::optional<double> kilometresOf(const std::string& unit) {
+  const std::string word = lower(unit);
+  if (isOneOf(word, {"m", "meter", "meters", "metre", "metres"})) return 1e-3;
+  if (isOneOf(word, {"km", "kilometer", "kilometers", "kilometre", "kilometres"})) return 1;
+  if (isOneOf(word, {"cm", "centimeter", "centimeters", "centimetre", "centimetres"})) return 1e-5;
+  if (isOneOf(word, {"ft", "foot", "feet"})) return 0.3048e-3;
+  return std::nullopt;
+}
+
+bool growsDownwards(const NetcdfVariable& variable) {
+  const std::string positive = lower(variable.text("positive"));
+  if (!positive.empty()) return positive == "down";
+  const std::string standard_name = lower(variable.text("standard_name")), name = lower(variable.name);
+  return standard_name.starts_with("depth") ||
+         (standard_name.empty() && beginsWithOneOf(name, {"dep", "gdep"}));
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,123 @@
+#include "preprocess/formats/netcdf/cf_term.h"
+
+#include <algorithm>
+
+namespace curvisplat {
+namespace {
+
+/// A node's value between two of a term.
+struct Between {
+  uint64_t first;  // and the next
+  double weight_first, weight_next;
+};
+
+/// Of the block's node `n`, for a term of `length` points that are by one more or fewer than the nodes.
+Between between(uint64_t n, int longer, uint64_t length) {
+  if (longer > 0) return {n, 0.5, 0.5};
+  if (length < 2) return {0, 1, 0};
+  if (n == 0) return {0, 1.5, -0.5};
+  if (n == length) return {length - 2, -0.5, 1.5};
+  return {n - 1, 0.5, 0.5};
+}
+
+/// Values at the nodes [begin, end) along `axis` of values at a term's points from `point` on.
+CfValues resampled(const CfValues& from, size_t axis, uint64_t begin, uint64_t end, uint64_t point,
+                   int longer, uint64_t length) {
+  CfValues to;
+  to.count = from.count;
+  to.count[axis] = end - begin;
+  const std::array<uint64_t, 3> strides{1, from.count[0], from.count[0] * from.count[1]};
+  for (uint64_t k = 0; k < to.count[2]; ++k)
+    for (uint64_t j = 0; j < to.count[1]; ++j)
+      for (uint64_t i = 0; i < to.count[0]; ++i) {
+        std::array<uint64_t, 3> index{i, j, k};
+        const Between weights = between(begin + index[axis], longer, length);
+        index[axis] = weights.first - point;
+        const uint64_t n = index[0] + strides[1] * index[1] + strides[2] * index[2];
+        const uint64_t next = index[axis] + 1 < from.count[axis] ? n + strides[axis] : n;
+        to.values.push_back(weights.weight_first * from.values[n] + weights.weight_next * from.values[next]);
+      }
+  return to;
+}
+
+}  // namespace
+
+std::optional<CfTerm> CfTerm::of(const NetcdfFile& file, const NetcdfVariable& variable,
+                                 const CfDimensions& block) {
+  CfTerm term;
+  term.variable_ = &variable;
+  term.start_.assign(variable.dims.size(), 0);
+  const auto lengthOf = [&](size_t dim) { return file.dimensions()[dim].length; };
+  std::vector<size_t> unknown;
+  for (size_t d = 0; d < variable.dims.size(); ++d) {
+    const size_t dim = variable.dims[d];
+    const auto axis = std::find(block.axes.begin(), block.axes.end(), dim);
+    if (block.time && dim == *block.time) {
+      term.start_[d] = block.time_step;
+    } else if (axis != block.axes.end()) {
+      std::optional<size_t>& along = term.along_[static_cast<size_t>(axis - block.axes.begin())];
+      if (along) return std::nullopt;
+      along = d;
+    } else if (lengthOf(dim) != 1) {
+      unknown.push_back(d);
+    }
+  }
+  term.exact_ = unknown.empty();
+  // The last is along i, the one before along j: as in the block, unless that axis is taken.
+  for (auto d = unknown.rbegin(); d != unknown.rend(); ++d) {
+    const size_t axis = variable.dims.size() - 1 - *d;
+    if (axis > 2 || term.along_[axis]) return std::nullopt;
+    const uint64_t length = lengthOf(variable.dims[*d]), wanted = lengthOf(block.axes[axis]);
+    if (length + 1 < wanted || length > wanted + 1) return std::nullopt;
+    term.along_[axis] = *d;
+    term.longer_[axis] = static_cast<int>(length > wanted) - static_cast<int>(length < wanted);
+    term.length_[axis] = length;
+  }
+  return term;
+}
+
+bool CfTerm::ofNodes() const {
+  return exact_ && axes() == 3 && *along_[2] < *along_[1] && *along_[1] < *along_[0];
+}
+
+NetcdfBox CfTerm::boxOf(const CfRange& range) const {
+  NetcdfBox box{start_, std::vector<size_t>(start_.size(), 1)};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    if (!along_[axis]) continue;
+    uint64_t begin = range.begin[axis], end = range.end[axis];
+    if (longer_[axis] != 0) {
+      begin = between(begin, longer_[axis], length_[axis]).first;
+      end = std::min(between(end - 1, longer_[axis], length_[axis]).first + 2, length_[axis]);
+    }
+    box.start[*along_[axis]] = begin;
+    box.count[*along_[axis]] = end - begin;
+  }
+  return box;
+}
+
+CfValues CfTerm::read(const NetcdfFile& file, const CfRange& range) const {
+  const NetcdfBox box = boxOf(range);
+  std::vector<double> stored(box.values());
+  file.read(*variable_, box, stored);
+
+  CfValues values;
+  std::array<uint64_t, 3> strides{};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    if (!along_[axis]) continue;
+    values.count[axis] = box.count[*along_[axis]];
+    strides[axis] = 1;
+    for (size_t d = *along_[axis] + 1; d < box.count.size(); ++d) strides[axis] *= box.count[d];
+  }
+  values.values.reserve(stored.size());
+  for (uint64_t k = 0; k < values.count[2]; ++k)
+    for (uint64_t j = 0; j < values.count[1]; ++j)
+      for (uint64_t i = 0; i < values.count[0]; ++i)
+        values.values.push_back(stored[i * strides[0] + j * strides[1] + k * strides[2]]);
+  for (size_t axis = 0; axis < 3; ++axis)
+    if (longer_[axis] != 0)
+      values = resampled(values, axis, range.begin[axis], range.end[axis], box.start[*along_[axis]],
+                         longer_[axis], length_[axis]);
+  return values;
+}
+
+}  // namespace curvisplat

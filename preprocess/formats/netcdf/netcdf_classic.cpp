@@ -1,0 +1,167 @@
+#include "preprocess/formats/netcdf/netcdf_classic.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kBlock = 1 << 16;
+
+/// Reads a header's numbers, big-endian, one after the other.
+class HeaderCursor {
+ public:
+  explicit HeaderCursor(const InputFile& file) : file_(file) {}
+
+  uint64_t number(size_t bytes) {
+    uint64_t value = 0;
+    for (size_t n = 0; n < bytes; ++n) value = value << 8 | next();
+    return value;
+  }
+
+  /// Passes over so many bytes, and those that fill the last four.
+  void skip(uint64_t bytes) {
+    if (bytes > file_.size() - position_) end();
+    position_ += bytes;
+    while (position_ % 4 != 0) next();
+  }
+
+  [[noreturn]] void damaged(const char* what) const {
+    throw Error("{}: its NetCDF header has {} before byte {}; the file is damaged: copy or write it again",
+                file_.path().string(), what, position_);
+  }
+
+ private:
+  uint8_t next() {
+    if (position_ == file_.size()) end();
+    if (position_ / kBlock != block_number_) {
+      block_number_ = position_ / kBlock;
+      block_.resize(std::min(kBlock, file_.size() - block_number_ * kBlock));
+      file_.readAt(block_number_ * kBlock, std::span<uint8_t>(block_));
+    }
+    return block_[position_++ % kBlock];
+  }
+
+  [[noreturn]] void end() const {
+    throw Error("{}: ends within its NetCDF header, at byte {}: it is truncated; copy or write it again",
+                file_.path().string(), file_.size());
+  }
+
+  const InputFile& file_;
+  uint64_t position_ = 0;
+  uint64_t block_number_ = ~uint64_t{0};
+  std::vector<uint8_t> block_;
+};
+
+struct Variable {
+  double record_bytes;  // of a record, or of all
+  double begin;
+  bool in_records;
+};
+
+class Header {
+ public:
+  explicit Header(const InputFile& file) : cursor_(file) {
+    cursor_.number(3);  // "CDF"
+    version_ = cursor_.number(1);
+    count_bytes_ = version_ == 5 ? 8 : 4;
+    offset_bytes_ = version_ == 1 ? 4 : 8;
+    records_ = count();
+    // A file that is still written to has no count.
+    if (records_ == (count_bytes_ == 4 ? 0xffffffffu : ~uint64_t{0})) records_ = 0;
+    for (uint64_t n = listed(0x0a); n > 0; --n) {
+      skipName();
+      dimensions_.push_back(count());
+    }
+    skipAttributes();
+    for (uint64_t n = listed(0x0b); n > 0; --n) readVariable();
+  }
+
+  /// The end of the last value.
+  double bytes() const {
+    const auto in_records = [](const Variable& variable) { return variable.in_records; };
+    const bool one = std::count_if(variables_.begin(), variables_.end(), in_records) == 1;
+    double record = 0, end = 0;
+    for (const Variable& variable : variables_)
+      if (variable.in_records) record += one ? variable.record_bytes : padded(variable.record_bytes);
+    for (const Variable& variable : variables_) {
+      if (variable.in_records && records_ == 0) continue;
+      const double before = variable.in_records ? static_cast<double>(records_ - 1) * record : 0;
+      end = std::max(end, variable.begin + before + variable.record_bytes);
+    }
+    return end;
+  }
+
+ private:
+  static double padded(double bytes) {
+    return static_cast<double>((static_cast<uint64_t>(std::min(bytes, 1e18)) + 3) / 4 * 4);
+  }
+
+  uint64_t count() { return cursor_.number(count_bytes_); }
+  void skipName() { cursor_.skip(count()); }
+
+  /// The count of a list, which may be missing.
+  uint64_t listed(uint64_t tag) {
+    const uint64_t found = cursor_.number(4), entries = count();
+    if (found != tag && !(found == 0 && entries == 0)) cursor_.damaged("a list of an unknown kind");
+    return entries;
+  }
+
+  uint64_t typeBytes() {
+    constexpr std::array<uint64_t, 12> bytes{0, 1, 1, 2, 4, 4, 8, 1, 2, 4, 8, 8};  // byte, char, short, ...
+    const uint64_t type = cursor_.number(4);
+    if (type == 0 || type >= bytes.size()) cursor_.damaged("an unknown type");
+    return bytes[type];
+  }
+
+  void skipAttributes() {
+    for (uint64_t n = listed(0x0c); n > 0; --n) {
+      skipName();
+      const uint64_t bytes = typeBytes(), values = count();
+      if (values > uint64_t{1} << 40) cursor_.damaged("an attribute without end");
+      cursor_.skip(values * bytes);
+    }
+  }
+
+  void readVariable() {
+    Variable variable{1, 0, false};
+    skipName();
+    const uint64_t dimensions = count();
+    for (uint64_t n = 0; n < dimensions; ++n) {
+      const uint64_t id = count();
+      if (id >= dimensions_.size()) cursor_.damaged("an unknown dimension");
+      if (n == 0 && dimensions_[id] == 0)
+        variable.in_records = true;
+      else
+        variable.record_bytes *= static_cast<double>(dimensions_[id]);
+    }
+    skipAttributes();
+    variable.record_bytes *= static_cast<double>(typeBytes());
+    count();  // the size again, which may be wrong for large ones
+    variable.begin = static_cast<double>(cursor_.number(offset_bytes_));
+    variables_.push_back(variable);
+  }
+
+  HeaderCursor cursor_;
+  uint64_t version_ = 0, records_ = 0;
+  size_t count_bytes_ = 4, offset_bytes_ = 4;
+  std::vector<uint64_t> dimensions_;  // 0: of the records
+  std::vector<Variable> variables_;
+};
+
+}  // namespace
+
+void checkClassicNetcdf(const InputFile& file) {
+  const double bytes = Header(file).bytes();
+  if (bytes > static_cast<double>(file.size()))
+    throw Error(
+        "{}: has {} bytes, and its values need {:.0f}: it is truncated or damaged; copy or write it again",
+        file.path().string(), file.size(), bytes);
+}
+
+}  // namespace curvisplat

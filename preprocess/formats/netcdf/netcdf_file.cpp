@@ -1,0 +1,306 @@
+#include "preprocess/formats/netcdf/netcdf_file.h"
+
+#include <netcdf.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <mutex>
+#include <numeric>
+
+#include "preprocess/formats/common/data_library_lock.h"
+#include "preprocess/formats/netcdf/netcdf_classic.h"
+#include "stream/base/check.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+// For each open variable: a slab's rows lie in a few chunks, as a rule.
+constexpr size_t kChunkCacheBytes = size_t{2} << 20;
+constexpr size_t kChunkCacheSlots = 1009;
+constexpr float kChunkCachePreemption = 0.75f;
+// Texts and lists of numbers: descriptions, not data.
+constexpr size_t kMostAttributeValues = size_t{1} << 20;
+// Deflate makes a thousandth of zeros.
+constexpr double kMostCompression = 1100;
+constexpr const char* kNetcdf4 = "NetCDF-4";
+
+bool isClassic(std::string_view mark) {
+  return mark.starts_with("CDF\x01") || mark.starts_with("CDF\x02") || mark.starts_with("CDF\x05");
+}
+
+size_t bytesOf(nc_type type) {
+  switch (type) {
+    case NC_BYTE:
+    case NC_UBYTE:
+      return 1;
+    case NC_SHORT:
+    case NC_USHORT:
+      return 2;
+    case NC_INT:
+    case NC_UINT:
+    case NC_FLOAT:
+      return 4;
+    case NC_INT64:
+    case NC_UINT64:
+    case NC_DOUBLE:
+      return 8;
+    default:
+      return 0;
+  }
+}
+
+/// What NetCDF writes where no one has written, unless a variable says otherwise. Bytes have none by
+/// convention: all of their values are used.
+std::optional<double> defaultFill(nc_type type) {
+  switch (type) {
+    case NC_SHORT:
+      return NC_FILL_SHORT;
+    case NC_USHORT:
+      return NC_FILL_USHORT;
+    case NC_INT:
+      return NC_FILL_INT;
+    case NC_UINT:
+      return NC_FILL_UINT;
+    case NC_FLOAT:
+      return NC_FILL_FLOAT;
+    case NC_DOUBLE:
+      return NC_FILL_DOUBLE;
+    case NC_INT64:
+      return static_cast<double>(NC_FILL_INT64);
+    case NC_UINT64:
+      return static_cast<double>(NC_FILL_UINT64);
+    default:
+      return std::nullopt;
+  }
+}
+
+const std::vector<double>& numbersOf(const NetcdfVariable& variable, const char* attribute) {
+  static const std::vector<double> none;
+  const auto found = variable.attributes.find(attribute);
+  return found == variable.attributes.end() ? none : found->second.numbers;
+}
+
+}  // namespace
+
+std::string NetcdfVariable::text(const char* attribute) const {
+  const auto found = attributes.find(attribute);
+  return found == attributes.end() ? "" : found->second.text;
+}
+
+size_t NetcdfBox::values() const {
+  return std::accumulate(count.begin(), count.end(), size_t{1}, std::multiplies<>());
+}
+
+bool NetcdfFile::recognises(const InputFile& file) {
+  std::array<char, 8> begin{};
+  if (file.size() < begin.size()) return false;
+  file.readAt(0, std::span<char>(begin));
+  const std::string_view mark(begin.data(), begin.size());
+  return isClassic(mark) || mark == "\x89HDF\r\n\x1a\n";
+}
+
+NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
+  const InputFile file(path);
+  const uint64_t bytes = file.size();
+  std::array<char, 4> begin{};
+  if (bytes >= begin.size()) file.readAt(0, std::span<char>(begin));
+  if (isClassic({begin.data(), begin.size()})) checkClassicNetcdf(file);
+  const std::lock_guard lock(dataLibraryMutex());
+  nc_set_chunk_cache(kChunkCacheBytes, kChunkCacheSlots, kChunkCachePreemption);
+  // A relative path might look like an address of the network.
+  const std::filesystem::path absolute = std::filesystem::absolute(path);
+  if (const int status = nc_open(absolute.c_str(), NC_NOWRITE, &file_); status != NC_NOERR)
+    fail("the file", status);
+  try {
+    readHeader();
+    if (kind_ == kNetcdf4) checkSizes(bytes);
+  } catch (...) {
+    nc_close(file_);
+    throw;
+  }
+}
+
+NetcdfFile::~NetcdfFile() {
+  const std::lock_guard lock(dataLibraryMutex());
+  nc_close(file_);
+}
+
+void NetcdfFile::fail(const std::string& place, int status) const {
+  throw Error("{}: {} cannot be read as NetCDF: {}; if the file is damaged, copy or write it again",
+              path_.string(), place, nc_strerror(status));
+}
+
+void NetcdfFile::readHeader() {
+  int dimensions = 0, variables = 0, attributes = 0, unlimited = -1, format = 0;
+  int status = nc_inq(file_, &dimensions, &variables, &attributes, &unlimited);
+  if (status == NC_NOERR) status = nc_inq_format(file_, &format);
+  if (status != NC_NOERR) fail("the header", status);
+  kind_ = format == NC_FORMAT_NETCDF4 || format == NC_FORMAT_NETCDF4_CLASSIC ? kNetcdf4 : "NetCDF classic";
+
+  std::vector<int> ids(static_cast<size_t>(std::max(0, dimensions)));
+  // NetCDF-4 numbers its dimensions as it likes.
+  int found = 0;
+  if ((status = nc_inq_dimids(file_, &found, ids.data(), 0)) != NC_NOERR || found != dimensions)
+    fail("the list of dimensions", status);
+  int most = -1;
+  for (const int id : ids) most = std::max(most, id);
+  if (most >= (1 << 20))
+    throw Error("{}: has a dimension numbered {}; the file is damaged", path_.string(), most);
+  dimensions_.resize(static_cast<size_t>(most + 1));
+  for (const int id : ids) {
+    char name[NC_MAX_NAME + 1] = {};
+    size_t length = 0;
+    if ((status = nc_inq_dim(file_, id, name, &length)) != NC_NOERR) fail("a dimension", status);
+    dimensions_[static_cast<size_t>(id)] = {name, length, id == unlimited};
+  }
+  for (int id = 0; id < variables; ++id) readVariable(id);
+}
+
+void NetcdfFile::readVariable(int id) {
+  char name[NC_MAX_NAME + 1] = {};
+  nc_type type = NC_NAT;
+  int dimensions = 0, attributes = 0;
+  int status = nc_inq_var(file_, id, name, &type, &dimensions, nullptr, &attributes);
+  if (status != NC_NOERR) fail("a variable", status);
+  std::vector<int> ids(static_cast<size_t>(dimensions));
+  if ((status = nc_inq_vardimid(file_, id, ids.data())) != NC_NOERR) fail(name, status);
+
+  NetcdfVariable variable;
+  variable.name = name;
+  variable.id = id;
+  variable.value_bytes = bytesOf(type);
+  variable.numeric = variable.value_bytes > 0;
+  for (const int dimension : ids) {
+    if (dimension < 0 || static_cast<size_t>(dimension) >= dimensions_.size())
+      throw Error("{}: {} has a dimension that the file does not have; the file is damaged", path_.string(),
+                  name);
+    variable.dims.push_back(static_cast<size_t>(dimension));
+  }
+  readAttributes(id, attributes, variable);
+  packings_.push_back(packingOf(variable));
+  if (numbersOf(variable, "_FillValue").empty())
+    if (const auto fill = defaultFill(type)) packings_.back().missing.push_back(*fill);
+  variables_.push_back(std::move(variable));
+}
+
+void NetcdfFile::readAttributes(int id, int count, NetcdfVariable& variable) const {
+  for (int n = 0; n < count; ++n) {
+    char name[NC_MAX_NAME + 1] = {};
+    nc_type type = NC_NAT;
+    size_t length = 0;
+    int status = nc_inq_attname(file_, id, n, name);
+    if (status == NC_NOERR) status = nc_inq_att(file_, id, name, &type, &length);
+    if (status != NC_NOERR) fail("an attribute of " + variable.name, status);
+    if (length > kMostAttributeValues) continue;
+    NetcdfAttribute attribute;
+    if (type == NC_CHAR) {
+      attribute.text.resize(length);
+      status = nc_get_att_text(file_, id, name, attribute.text.data());
+      attribute.text.resize(std::min(attribute.text.find('\0'), attribute.text.size()));
+    } else if (type == NC_STRING && length == 1) {
+      char* text = nullptr;
+      status = nc_get_att_string(file_, id, name, &text);
+      if (status == NC_NOERR && text) attribute.text = text;
+      if (status == NC_NOERR) nc_free_string(1, &text);
+    } else if (bytesOf(type) > 0) {
+      attribute.numbers.resize(length);
+      status = nc_get_att_double(file_, id, name, attribute.numbers.data());
+    }
+    if (status != NC_NOERR) fail(fmt::format("attribute {} of {}", name, variable.name), status);
+    variable.attributes[name] = std::move(attribute);
+  }
+}
+
+void NetcdfFile::checkSizes(uint64_t file_bytes) const {
+  const double most = static_cast<double>(file_bytes) * kMostCompression;
+  for (const NetcdfVariable& variable : variables_) {
+    auto bytes = static_cast<double>(variable.value_bytes);
+    for (const size_t dim : variable.dims) bytes *= static_cast<double>(dimensions_[dim].length);
+    if (bytes > most)
+      throw Error(
+          "{}: {} should have {:.0f} bytes, more than a file of {} can hold; the file is damaged: copy "
+          "or write it again",
+          path_.string(), variable.name, bytes, file_bytes);
+  }
+}
+
+NetcdfFile::Packing NetcdfFile::packingOf(const NetcdfVariable& variable) const {
+  Packing packing;
+  const auto first = [&](const char* attribute, double otherwise) {
+    const std::vector<double>& numbers = numbersOf(variable, attribute);
+    return numbers.empty() ? otherwise : numbers[0];
+  };
+  packing.scale = first("scale_factor", 1);
+  packing.offset = first("add_offset", 0);
+  for (const char* attribute : {"_FillValue", "missing_value"})
+    for (const double value : numbersOf(variable, attribute)) packing.missing.push_back(value);
+  if (const std::vector<double>& range = numbersOf(variable, "valid_range"); range.size() == 2) {
+    packing.least = range[0];
+    packing.most = range[1];
+  }
+  if (const std::vector<double>& least = numbersOf(variable, "valid_min"); least.size() == 1)
+    packing.least = least[0];
+  if (const std::vector<double>& most = numbersOf(variable, "valid_max"); most.size() == 1)
+    packing.most = most[0];
+  return packing;
+}
+
+template <typename Value>
+void NetcdfFile::unpack(const Packing& packing, std::span<Value> values) {
+  constexpr Value kNone = std::numeric_limits<Value>::quiet_NaN();
+  for (const double missing : packing.missing) {
+    const auto wanted = static_cast<Value>(missing);
+    for (Value& value : values)
+      if (value == wanted) value = kNone;
+  }
+  if (packing.least)
+    for (Value& value : values)
+      if (value < static_cast<Value>(*packing.least)) value = kNone;
+  if (packing.most)
+    for (Value& value : values)
+      if (value > static_cast<Value>(*packing.most)) value = kNone;
+  if (packing.scale == 1 && packing.offset == 0) return;
+  for (Value& value : values)
+    value = static_cast<Value>(static_cast<double>(value) * packing.scale + packing.offset);
+}
+
+const NetcdfVariable* NetcdfFile::find(std::string_view name) const {
+  for (const NetcdfVariable& variable : variables_)
+    if (variable.name == name) return &variable;
+  return nullptr;
+}
+
+const NetcdfDimension& NetcdfFile::dimension(const NetcdfVariable& variable, size_t axis) const {
+  return dimensions_.at(variable.dims.at(axis));
+}
+
+template <typename Value, typename Get>
+void NetcdfFile::readWith(const Get& get, const NetcdfVariable& variable, const NetcdfBox& box,
+                          std::span<Value> to) const {
+  CURVISPLAT_CHECK_OP(box.start.size(), ==, variable.dims.size());
+  CURVISPLAT_CHECK_OP(box.values(), <=, to.size());
+  {
+    const std::lock_guard lock(dataLibraryMutex());
+    const int status = get(file_, variable.id, box.start.data(), box.count.data(), to.data());
+    // Of a number that is too large for a float there is an infinity, which is drawn nowhere.
+    if (status != NC_NOERR && status != NC_ERANGE) fail(variable.name, status);
+  }
+  const auto position = static_cast<size_t>(&variable - variables_.data());
+  CURVISPLAT_CHECK_OP(position, <, variables_.size());
+  unpack(packings_[position], to.first(box.values()));
+}
+
+void NetcdfFile::read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const {
+  readWith(nc_get_vara_double, variable, box, to);
+}
+
+void NetcdfFile::read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<float> to) const {
+  readWith(nc_get_vara_float, variable, box, to);
+}
+
+}  // namespace curvisplat

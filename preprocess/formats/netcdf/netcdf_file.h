@@ -1,0 +1,103 @@
+// A NetCDF file, classic or NetCDF-4: its dimensions, variables and attributes, and boxes of values,
+// unpacked, with NaN where there is none. What the variables mean is in cf_grid.h.
+//
+// NetCDF is not thread-safe: every call is made under dataLibraryMutex(), so any number of threads may use a
+// NetcdfFile, one after the other. Beside what is asked for, a read takes the memory of a chunk cache, and
+// where a chunk of a compressed file is larger than that, of the chunk.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "stream/base/file.h"
+
+namespace curvisplat {
+
+struct NetcdfDimension {
+  std::string name;
+  uint64_t length = 0;
+  bool unlimited = false;
+};
+
+/// An attribute is a text, or numbers.
+struct NetcdfAttribute {
+  std::string text;
+  std::vector<double> numbers;
+};
+
+struct NetcdfVariable {
+  std::string name;
+  int id = 0;
+  size_t value_bytes = 0;    // as stored
+  bool numeric = false;      // not texts, not of a type of the file's own
+  std::vector<size_t> dims;  // positions in NetcdfFile::dimensions(), the slowest first
+  std::map<std::string, NetcdfAttribute> attributes;
+
+  /// Empty where there is none.
+  std::string text(const char* attribute) const;
+};
+
+/// A box of a variable: of each dimension, the slowest first.
+struct NetcdfBox {
+  std::vector<size_t> start, count;
+  size_t values() const;
+};
+
+class NetcdfFile {
+ public:
+  /// Throws Error, as every member function, with the file, the variable and what NetCDF says.
+  explicit NetcdfFile(const std::filesystem::path& path);
+  ~NetcdfFile();
+  NetcdfFile(const NetcdfFile&) = delete;
+  NetcdfFile& operator=(const NetcdfFile&) = delete;
+
+  /// By the first bytes: all HDF5 files are taken for NetCDF-4.
+  static bool recognises(const InputFile& file);
+
+  const std::filesystem::path& path() const { return path_; }
+  const std::string& kind() const { return kind_; }  // "NetCDF classic", "NetCDF-4"
+  const std::vector<NetcdfDimension>& dimensions() const { return dimensions_; }
+  const std::vector<NetcdfVariable>& variables() const { return variables_; }
+  const NetcdfVariable* find(std::string_view name) const;
+  const NetcdfDimension& dimension(const NetcdfVariable& variable, size_t axis) const;
+
+  /// Reads box.values() values to the beginning of `to`: times scale_factor, plus add_offset; NaN where the
+  /// value is _FillValue (or NetCDF's own fill value), missing_value, or outside of the valid range.
+  void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const;
+  void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<float> to) const;
+
+ private:
+  /// How stored numbers become values.
+  struct Packing {
+    double scale = 1, offset = 0;
+    std::vector<double> missing;
+    std::optional<double> least, most;
+  };
+
+  [[noreturn]] void fail(const std::string& place, int status) const;
+  void readHeader();
+  void readVariable(int id);
+  void readAttributes(int id, int count, NetcdfVariable& variable) const;
+  void checkSizes(uint64_t file_bytes) const;
+  Packing packingOf(const NetcdfVariable& variable) const;
+  template <typename Value>
+  static void unpack(const Packing& packing, std::span<Value> values);
+  template <typename Value, typename Get>
+  void readWith(const Get& get, const NetcdfVariable& variable, const NetcdfBox& box,
+                std::span<Value> to) const;
+
+  std::filesystem::path path_;
+  int file_ = 0;
+  std::string kind_;
+  std::vector<NetcdfDimension> dimensions_;
+  std::vector<NetcdfVariable> variables_;
+  std::vector<Packing> packings_;  // of each variable
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,166 @@
+#include "preprocess/formats/open/open_grid.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+
+#include "preprocess/formats/cgns/cgns_source.h"
+#include "preprocess/formats/netcdf/netcdf_source.h"
+#include "preprocess/formats/open/foreign_formats.h"
+#include "preprocess/formats/plot3d/plot3d_meta.h"
+#include "preprocess/formats/plot3d/plot3d_source.h"
+#include "preprocess/formats/vtk/vtk_legacy.h"
+#include "preprocess/formats/vtk/vtk_xml.h"
+#include "preprocess/grid/scalar_names.h"
+#include "preprocess/grid/time_steps.h"
+#include "stream/base/error.h"
+#include "stream/base/paths.h"
+
+namespace curvisplat {
+namespace {
+
+/// A file format with a reader of its own. What none recognises is taken for PLOT3D, which has no mark.
+struct GridFormat {
+  bool (*recognises)(const InputFile& file);
+  std::unique_ptr<GridSource> (*open)(const OpenGridOptions& options);
+};
+
+template <typename Source>
+std::unique_ptr<GridSource> openAs(const OpenGridOptions& options) {
+  return std::make_unique<Source>(options);
+}
+
+constexpr GridFormat kFormats[] = {
+    {isVtkXml, openVtkXml},
+    {isVtkLegacy, openVtkLegacy},
+    {isPlot3dMeta, openPlot3dMeta},
+    {CgnsFile::recognises, openAs<CgnsSource>},  // before NetCDF, which takes all HDF5 files
+    {NetcdfFile::recognises, openAs<NetcdfSource>},
+};
+
+void refuseForeign(const std::filesystem::path& path, const char* expected) {
+  std::error_code none_there;
+  if (std::filesystem::is_directory(path, none_there))
+    throw Error("{}: is a folder where {} was expected", path.string(), expected);
+  if (const auto format = foreignFormat(InputFile(path)))
+    throw Error("{}: is {}; expected {}", path.string(), *format, expected);
+}
+
+/// Positions of the scalars that `matches` is true for.
+template <typename Matches>
+std::vector<uint32_t> positionsOf(const GridDescription& description, const Matches& matches) {
+  std::vector<uint32_t> positions;
+  for (uint32_t n = 0; n < description.scalars.size(); ++n)
+    if (matches(description.scalars[n])) positions.push_back(n);
+  return positions;
+}
+
+/// A whole number above 0, if the name is one.
+std::optional<uint32_t> numberIn(const std::string& name) {
+  uint32_t number = 0;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
+  if (error != std::errc{} || end != name.data() + name.size() || number == 0) return std::nullopt;
+  return number;
+}
+
+/// The first of: the exact name, a number (of a function file's variable, else PLOT3D's), the simplified name
+/// or alias of what files hold, or of what is derived from it.
+std::vector<uint32_t> candidatesFor(const GridDescription& description, const std::string& name) {
+  const auto exact = positionsOf(description, [&](const GridScalar& scalar) { return scalar.name == name; });
+  if (!exact.empty()) return exact;
+  if (const auto number = numberIn(name)) {
+    const auto variables = positionsOf(description, [&](const GridScalar& s) { return s.number == *number; });
+    if (!variables.empty()) return variables;
+    return positionsOf(description, [&](const GridScalar& s) { return s.function == *number; });
+  }
+  const std::string simple = simplifiedName(name);
+  const auto named = [&](bool derived) {
+    return positionsOf(description,
+                       [&](const GridScalar& s) { return s.derived == derived && answersTo(s, simple); });
+  };
+  const auto stored = named(false);
+  return stored.empty() ? named(true) : stored;
+}
+
+std::string namesIn(const GridDescription& description) {
+  if (description.scalars.empty()) return "there are none: give a Q or function file";
+  std::string names = "there are ";
+  for (size_t n = 0; n < description.scalars.size(); ++n) {
+    const GridScalar& scalar = description.scalars[n];
+    names += (n ? ", " : "") + scalar.name;
+    const uint32_t number = scalar.number > 0 ? scalar.number : scalar.function;
+    if (number > 0 && scalar.name != std::to_string(number)) names += " (" + std::to_string(number) + ")";
+  }
+  return names;
+}
+
+std::unique_ptr<GridSource> openFormat(const OpenGridOptions& options) {
+  OpenGridOptions complete = options;
+  if (complete.temporary_folder.empty()) complete.temporary_folder = std::filesystem::temp_directory_path();
+  if (isRegularFile(options.grid)) {
+    const InputFile file(options.grid);
+    for (const GridFormat& format : kFormats)
+      if (format.recognises(file)) {
+        if (!options.solutions.empty())
+          throw Error(
+              "{}: holds scalars itself; leave out {}: further files go with PLOT3D grids alone, and several "
+              "VTK files go together in a .vtm, .pvts or .pvd",
+              options.grid.string(), options.solutions.front().string());
+        return format.open(complete);
+      }
+  }
+  refuseForeign(options.grid, "a grid file");
+  for (const std::filesystem::path& path : options.solutions)
+    refuseForeign(path, "a PLOT3D Q or function file");
+  return std::make_unique<Plot3dSource>(complete);
+}
+
+}  // namespace
+
+std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options) {
+  std::unique_ptr<GridSource> source = openFormat(options);
+  chosenTimeStep(options.grid.string(), source->description().times, options.time_step);
+  return source;
+}
+
+std::vector<uint32_t> scalarsNamed(const GridDescription& description,
+                                   const std::vector<std::string>& names) {
+  if (names.empty()) {
+    const bool none_stored = description.scalars.empty() || description.scalars.front().derived;
+    if (none_stored)
+      throw UsageError("the files hold no scalar; ask for one with --scalar: {}", namesIn(description));
+    return {0};
+  }
+  std::vector<uint32_t> positions;
+  for (const std::string& name : names) {
+    const std::vector<uint32_t> candidates = candidatesFor(description, name);
+    if (candidates.size() > 1)
+      throw UsageError("scalar {} is in several files: {}", name, namesIn(description));
+    if (candidates.empty()) throw UsageError("no scalar is called {}: {}", name, namesIn(description));
+    if (std::find(positions.begin(), positions.end(), candidates.front()) != positions.end())
+      throw UsageError("scalar {} is asked for twice", name);
+    positions.push_back(candidates.front());
+  }
+  return positions;
+}
+
+std::vector<std::string> notesOnNumbers(const GridDescription& description,
+                                        const std::vector<std::string>& names) {
+  std::vector<std::string> notes;
+  for (const std::string& name : names) {
+    const auto number = numberIn(name);
+    if (!number) continue;
+    const auto variables = positionsOf(description, [&](const GridScalar& s) { return s.number == *number; });
+    const auto functions =
+        positionsOf(description, [&](const GridScalar& s) { return s.function == *number; });
+    if (!variables.empty() && !functions.empty())
+      notes.push_back(
+          fmt::format("{} is taken as variable {} of the function file; for PLOT3D's function {} ask for {}",
+                      name, name, name, description.scalars[functions.front()].name));
+  }
+  return notes;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,226 @@
+#include "preprocess/formats/plot3d/plot3d_detect.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "preprocess/formats/common/ascii_spool.h"
+#include "preprocess/formats/plot3d/plot3d_plausibility.h"
+#include "stream/base/check.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+bool looksLikeText(const InputFile& file) {
+  std::array<char, 4096> bytes;
+  const auto count = static_cast<size_t>(std::min<uint64_t>(bytes.size(), file.size()));
+  file.readAt(0, std::span(bytes.data(), count));
+  return std::all_of(bytes.begin(), bytes.begin() + static_cast<ptrdiff_t>(count),
+                     [](char c) { return (c >= ' ' && c <= '~') || (c >= '\t' && c <= '\r'); });
+}
+
+/// The options whose values differ between layouts: what the user can say to decide.
+std::string decidingOptions(const std::vector<Plot3dFit>& fits) {
+  const auto differ = [&](const auto& of) {
+    return std::any_of(fits.begin(), fits.end(),
+                       [&](const Plot3dFit& f) { return of(f) != of(fits.front()); });
+  };
+  std::string options;
+  const auto add = [&](bool needed, const char* option) {
+    if (needed) options += (options.empty() ? "" : ", ") + std::string(option);
+  };
+  add(differ([](const Plot3dFit& f) { return f.layout.byte_order; }), "--byte-order");
+  add(differ([](const Plot3dFit& f) { return f.layout.records; }), "--records");
+  add(differ([](const Plot3dFit& f) { return f.layout.precision_bytes; }), "--precision");
+  add(differ([](const Plot3dFit& f) { return f.layout.multi_block; }), "--blocks");
+  add(differ([](const Plot3dFit& f) { return f.layout.blanking; }), "--iblank");
+  return options;
+}
+
+std::string inWords(const std::vector<Plot3dKind>& kinds) {
+  std::string words;
+  for (const Plot3dKind kind : kinds) words += (words.empty() ? "" : " or ") + curvisplat::inWords(kind);
+  return words;
+}
+
+/// A file on its way to one layout.
+class Detection {
+ public:
+  Detection(std::shared_ptr<const InputFile> file, const Plot3dForce& force,
+            const std::filesystem::path& temporary_folder, std::vector<Plot3dKind> kinds)
+      : path_(file->path().string()), force_(force) {
+    if (file->size() == 0) throw Error("{}: is empty; expected a PLOT3D {}", path_, inWords(kinds));
+    CURVISPLAT_CHECK(!force.precision_bytes || *force.precision_bytes == 4 || *force.precision_bytes == 8);
+    file_size_ = file->size();
+    candidates_ = {file, file_size_, force.ascii.value_or(looksLikeText(*file)), std::move(kinds), force};
+    if (!candidates_.ascii) return;
+    const AsciiSpool spool = spoolAscii(*file, temporary_folder);
+    candidates_.file = spool.doubles;
+    candidates_.size = spool.count * sizeof(double);
+    digits_ = spool.significant_digits;
+  }
+
+  /// `grid_path` and `grid_blocks`: null for a grid.
+  DetectedPlot3d run(const std::filesystem::path* grid_path, const std::vector<Plot3dBlock>* grid_blocks) {
+    Plot3dFits found = fitPlot3d(candidates_);
+    if (found.fits.empty()) failUnfit(found.misfits, grid_blocks);
+    if (grid_blocks) keepMatching(found.fits, *grid_blocks);
+    keepExact(found.fits);
+    keepThreeDimensional(found.fits);
+    if (grid_blocks && !matches(found.fits.front(), *grid_blocks))
+      failMismatch(found.fits.front(), *grid_path, *grid_blocks);
+    keepPlausible(found.fits);
+    if (found.fits.size() > 1) failAmbiguous(found.fits);
+    Plot3dFit& fit = found.fits.front();
+    if (fit.trailing_bytes > 0 && !force_.blanking && trailingLooksLikeIblank(fit))
+      throw Error(
+          "{}: {} of {} is followed by {} bytes that look like a truncated iblank; get the whole file, or "
+          "read "
+          "it without iblank (--iblank no)",
+          path_, curvisplat::inWords(fit.layout), curvisplat::inWords(fit.blocks), fit.trailing_bytes);
+    return {std::move(fit), writtenPrecision(fit.layout)};
+  }
+
+ private:
+  int writtenPrecision(const Plot3dLayout& layout) const {
+    constexpr int kDigitsOfFloat = 9;
+    if (!layout.ascii) return layout.precision_bytes;
+    return force_.precision_bytes.value_or(digits_ > kDigitsOfFloat ? 8 : 4);
+  }
+
+  static bool matches(const Plot3dFit& fit, const std::vector<Plot3dBlock>& grid_blocks) {
+    return !fit.layout.two_dimensional && sameDimensions(fit.blocks, grid_blocks);
+  }
+
+  /// If any has the grid's dimensions, only those.
+  static void keepMatching(std::vector<Plot3dFit>& fits, const std::vector<Plot3dBlock>& grid_blocks) {
+    const auto suits = [&](const Plot3dFit& fit) { return matches(fit, grid_blocks); };
+    if (std::any_of(fits.begin(), fits.end(), suits))
+      std::erase_if(fits, [&](const Plot3dFit& fit) { return !suits(fit); });
+  }
+
+  [[noreturn]] void failMismatch(const Plot3dFit& fit, const std::filesystem::path& grid_path,
+                                 const std::vector<Plot3dBlock>& grid_blocks) const {
+    throw Error("{}: this {} has {}, but the grid {} has {}; give a solution of the same grid", path_,
+                curvisplat::inWords(fit.layout.kind), curvisplat::inWords(fit.blocks), grid_path.string(),
+                curvisplat::inWords(grid_blocks));
+  }
+
+  static bool sameDimensions(const std::vector<Plot3dBlock>& a, const std::vector<Plot3dBlock>& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Plot3dBlock& p, const Plot3dBlock& q) {
+      return p.ni == q.ni && p.nj == q.nj && p.nk == q.nk;
+    });
+  }
+
+  static void keepExact(std::vector<Plot3dFit>& fits) {
+    const auto exact = [](const Plot3dFit& fit) { return fit.trailing_bytes == 0; };
+    if (std::any_of(fits.begin(), fits.end(), exact))
+      std::erase_if(fits, [&](const Plot3dFit& fit) { return !exact(fit); });
+  }
+
+  void keepThreeDimensional(std::vector<Plot3dFit>& fits) const {
+    const auto flat = [](const Plot3dFit& fit) { return fit.layout.two_dimensional; };
+    if (std::all_of(fits.begin(), fits.end(), flat))
+      throw Error("{}: is a 2-D {} ({}); only 3-D files are read", path_,
+                  curvisplat::inWords(fits.front().layout.kind), curvisplat::inWords(fits.front().layout));
+    std::erase_if(fits, flat);
+  }
+
+  /// A single solution of the grid's dimensions and the exact size is taken whatever its values: fields may
+  /// well have fill values and be denormal.
+  void keepPlausible(std::vector<Plot3dFit>& fits) const {
+    const bool solution = fits.front().layout.kind != Plot3dKind::grid;
+    if (fits.size() == 1 && solution && fits.front().trailing_bytes == 0) return;
+    if (force_.byte_order && force_.precision_bytes && force_.records) return;
+    std::vector<Plot3dFit> kept;
+    std::string reason;
+    for (const Plot3dFit& fit : fits) {
+      if (const auto implausible = implausibility(fit))
+        reason = fmt::format("{} of {} fits in size, but {}", curvisplat::inWords(fit.layout),
+                             curvisplat::inWords(fit.blocks), *implausible);
+      else
+        kept.push_back(fit);
+    }
+    if (kept.empty())
+      throw Error(
+          "{}: has no plausible values: {}; force the layout with --byte-order, --records and --precision",
+          path_, reason);
+    fits = std::move(kept);
+  }
+
+  [[noreturn]] void failAmbiguous(const std::vector<Plot3dFit>& fits) const {
+    std::string layouts;
+    for (const Plot3dFit& fit : fits)
+      layouts +=
+          fmt::format("{}{} of {} ({})", layouts.empty() ? "" : "; ", curvisplat::inWords(fit.layout.kind),
+                      curvisplat::inWords(fit.blocks), curvisplat::inWords(fit.layout));
+    throw Error("{}: fits {} layouts equally well: {}; say which with {}", path_, fits.size(), layouts,
+                decidingOptions(fits));
+  }
+
+  [[noreturn]] void failUnfit(std::vector<Plot3dMisfit> misfits,
+                              const std::vector<Plot3dBlock>* grid_blocks) const {
+    const std::string expected = inWords(candidates_.kinds);
+    const auto rank = [&](const Plot3dMisfit& misfit) {
+      const bool of_grid = grid_blocks && sameDimensions(misfit.blocks, *grid_blocks);
+      const bool markers_agree = misfit.layout.records != RecordMarkers::none;
+      return 4 * misfit.reached + 2 * of_grid + markers_agree;
+    };
+    const auto furthest = std::max_element(misfits.begin(), misfits.end(),
+                                           [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
+    std::string finding = "no header of plausible dimensions was found";
+    if (furthest != misfits.end() && furthest->reached >= LayoutMisfit::first_record) {
+      finding = fmt::format("read as {} {}: {}", attemptInWords(furthest->layout),
+                            curvisplat::inWords(furthest->layout.kind), furthest->reason);
+    }
+    throw Error("{}: its {} bytes fit no PLOT3D {}; {}{}", path_, file_size_, expected, finding, hint());
+  }
+
+  /// Only what was decided before the sizes were looked at.
+  static std::string attemptInWords(const Plot3dLayout& layout) {
+    std::string words = layout.ascii                          ? "ASCII"
+                        : layout.byte_order == ByteOrder::big ? "big-endian"
+                                                              : "little-endian";
+    if (!layout.ascii) words += layout.records == RecordMarkers::none ? " C" : " Fortran";
+    return words + (layout.multi_block ? " multi-block" : " single-block");
+  }
+
+  /// What the file would be without the options, or as another kind.
+  std::string hint() const {
+    Plot3dCandidates others = candidates_;
+    others.kinds = {Plot3dKind::grid, Plot3dKind::q, Plot3dKind::overflow, Plot3dKind::function};
+    others.force = {};
+    const Plot3dFits found = fitPlot3d(others);
+    for (const Plot3dFit& fit : found.fits)
+      if (fit.trailing_bytes == 0 && !fit.layout.two_dimensional)
+        return fmt::format("; it would fit as a {} of {}, {}", curvisplat::inWords(fit.layout.kind),
+                           curvisplat::inWords(fit.blocks), curvisplat::inWords(fit.layout));
+    return "";
+  }
+
+  std::string path_;
+  uint64_t file_size_ = 0;
+  Plot3dForce force_;
+  Plot3dCandidates candidates_;
+  int digits_ = 0;
+};
+
+}  // namespace
+
+DetectedPlot3d detectPlot3dGrid(std::shared_ptr<const InputFile> file, const Plot3dForce& force,
+                                const std::filesystem::path& temporary_folder) {
+  return Detection(std::move(file), force, temporary_folder, {Plot3dKind::grid}).run(nullptr, nullptr);
+}
+
+DetectedPlot3d detectPlot3dSolution(std::shared_ptr<const InputFile> file, const Plot3dForce& force,
+                                    const std::filesystem::path& temporary_folder,
+                                    const std::filesystem::path& grid_path,
+                                    const std::vector<Plot3dBlock>& grid_blocks) {
+  return Detection(std::move(file), force, temporary_folder,
+                   {Plot3dKind::q, Plot3dKind::overflow, Plot3dKind::function})
+      .run(&grid_path, &grid_blocks);
+}
+
+}  // namespace curvisplat

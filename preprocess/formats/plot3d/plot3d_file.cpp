@@ -1,0 +1,151 @@
+#include "preprocess/formats/plot3d/plot3d_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
+#include "preprocess/formats/common/stored_values.h"
+#include "stream/base/check.h"
+
+namespace curvisplat {
+namespace {
+
+// Half of a second-level cache: bytes are converted before they leave it.
+constexpr size_t kBufferBytes = size_t{256} << 10;
+
+// OVERFLOW's parameters: Mach, alpha, Reynolds, time, gamma, beta, T of the freestream | an integer | three
+// total enthalpies, gas constants, Mach, and two of turbulence.
+constexpr size_t kBeforeInteger = 7, kBehindInteger = 6;
+
+std::span<std::byte> threadBuffer() {
+  thread_local std::vector<std::byte> buffer(kBufferBytes);
+  return buffer;
+}
+
+}  // namespace
+
+/// Calls convert(bytes, count, first) for pieces of the array that begins `array_offset` bytes behind the
+/// block's first value and has `width` bytes a node; `first` counts the nodes of the box.
+template <typename Convert>
+void Plot3dFile::readRanges(uint32_t block, const NodeBox& box, uint64_t array_offset, uint64_t width,
+                            const Convert& convert) const {
+  const Plot3dBlock& dims = fit_.blocks[block];
+  CURVISPLAT_CHECK_OP(box.j0, <=, box.j1);
+  CURVISPLAT_CHECK_OP(box.k0, <=, box.k1);
+  CURVISPLAT_CHECK_OP(box.j1, <=, dims.nj);
+  CURVISPLAT_CHECK_OP(box.k1, <=, dims.nk);
+  const bool whole_planes = box.j0 == 0 && box.j1 == dims.nj;
+  const uint64_t ranges = whole_planes ? std::min<uint64_t>(1, box.k1 - box.k0) : box.k1 - box.k0;
+  const uint64_t range_nodes = dims.ni * (box.j1 - box.j0) * (whole_planes ? box.k1 - box.k0 : 1);
+  const std::span<std::byte> buffer = threadBuffer();
+  uint64_t first = 0;
+  for (uint64_t range = 0; range < ranges; ++range) {
+    const uint64_t node = ((box.k0 + range) * dims.nj + box.j0) * dims.ni;
+    uint64_t offset = dims.values_offset + array_offset + node * width;
+    for (uint64_t left = range_nodes; left > 0;) {
+      const uint64_t count = std::min<uint64_t>(left, buffer.size() / width);
+      const auto bytes = buffer.first(static_cast<size_t>(count * width));
+      fit_.payload.readAt(offset, bytes);
+      convert(bytes.data(), static_cast<size_t>(count), static_cast<size_t>(first));
+      offset += bytes.size();
+      first += count;
+      left -= count;
+    }
+  }
+}
+
+template <typename Value>
+void Plot3dFile::readValues(uint32_t block, uint32_t component, const NodeBox& box,
+                            std::span<Value> out) const {
+  const auto width = static_cast<uint64_t>(fit_.layout.precision_bytes);
+  const bool swap = fit_.layout.byte_order != kMachineByteOrder;
+  const uint64_t array_offset = component * fit_.blocks[block].nodes() * width;
+  readRanges(block, box, array_offset, width, [&](const std::byte* bytes, size_t count, size_t first) {
+    if (width == 8)
+      convertStored<double>(bytes, count, swap, &out[first]);
+    else
+      convertStored<float>(bytes, count, swap, &out[first]);
+  });
+}
+
+template <typename Value>
+void Plot3dFile::readIntegers(uint32_t block, const NodeBox& box, std::span<Value> out) const {
+  CURVISPLAT_CHECK(fit_.layout.blanking);
+  const auto precision = static_cast<uint64_t>(fit_.layout.precision_bytes);
+  const bool swap = fit_.layout.byte_order != kMachineByteOrder;
+  const uint64_t array_offset = fit_.components * fit_.blocks[block].nodes() * precision;
+  const auto convert = [&](auto stored, const std::byte* bytes, size_t count, size_t first) {
+    using Stored = decltype(stored);
+    for (size_t n = 0; n < count; ++n) {
+      const Stored value = loadStored<Stored>(bytes + n * sizeof(Stored), swap);
+      if constexpr (std::is_same_v<Value, uint8_t>)
+        out[first + n] = value == 0;
+      else if constexpr (std::is_same_v<Stored, double>)  // NaN, too, becomes the largest
+        out[first + n] = std::abs(value) < 2147483647.0 ? static_cast<Value>(value) : INT32_MAX;
+      else
+        out[first + n] = value;
+    }
+  };
+  readRanges(block, box, array_offset, fit_.layout.integerBytes(),
+             [&](const std::byte* bytes, size_t count, size_t first) {
+               if (fit_.layout.ascii)
+                 convert(double{}, bytes, count, first);
+               else
+                 convert(int32_t{}, bytes, count, first);
+             });
+}
+
+void Plot3dFile::read(uint32_t block, uint32_t component, const NodeBox& box, std::span<double> out) const {
+  readValues(block, component, box, out);
+}
+
+void Plot3dFile::read(uint32_t block, uint32_t component, const NodeBox& box, std::span<float> out) const {
+  readValues(block, component, box, out);
+}
+
+void Plot3dFile::readBlank(uint32_t block, const NodeBox& box, std::span<uint8_t> out) const {
+  readIntegers(block, box, out);
+}
+
+void Plot3dFile::readIblank(uint32_t block, const NodeBox& box, std::span<int32_t> out) const {
+  readIntegers(block, box, out);
+}
+
+/// The numbers before a block's values, without the integer among OVERFLOW's.
+std::vector<double> Plot3dFile::parameters(uint32_t block) const {
+  const Plot3dLayout& layout = fit_.layout;
+  CURVISPLAT_CHECK(layout.kind == Plot3dKind::q || layout.kind == Plot3dKind::overflow);
+  const bool overflow = layout.kind == Plot3dKind::overflow;
+  const auto width = static_cast<size_t>(layout.precision_bytes);
+  const size_t before = overflow ? kBeforeInteger : 4;
+  const size_t behind = overflow ? kBehindInteger + std::max(2u, fit_.species) : 0;
+  const size_t integer = overflow ? 4 : 0;
+  const uint64_t begin = fit_.blocks[block].values_offset - ((before + behind) * width + integer);
+  std::vector<double> values(before + behind);
+  const auto read = [&](uint64_t offset, std::span<double> to) {
+    std::vector<std::byte> bytes(to.size() * width);
+    fit_.payload.readAt(offset, bytes);
+    const bool swap = layout.byte_order != kMachineByteOrder;
+    if (width == 8)
+      convertStored<double>(bytes.data(), to.size(), swap, to.data());
+    else
+      convertStored<float>(bytes.data(), to.size(), swap, to.data());
+  };
+  read(begin, std::span(values).first(before));
+  read(begin + before * width + integer, std::span(values).subspan(before));
+  return values;
+}
+
+FlowConditions Plot3dFile::conditions(uint32_t block) const {
+  const std::vector<double> values = parameters(block);
+  // OVERFLOW's first Mach number is what the solution is normalised by; the freestream's comes third last.
+  const double freestream = fit_.layout.kind == Plot3dKind::overflow ? values[values.size() - 3] : 0;
+  return {"", block, freestream > 0 ? freestream : values[0], values[1], values[2], values[3]};
+}
+
+double Plot3dFile::freestreamGamma() const {
+  CURVISPLAT_CHECK(fit_.layout.kind == Plot3dKind::overflow);
+  return parameters(0)[4];
+}
+
+}  // namespace curvisplat

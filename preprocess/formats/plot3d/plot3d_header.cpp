@@ -1,0 +1,150 @@
+#include "preprocess/formats/plot3d/plot3d_header.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <optional>
+
+#include "preprocess/formats/common/stored_values.h"
+
+namespace curvisplat {
+namespace {
+
+// Random bytes may promise billions of blocks; real files have some ten thousand at most.
+constexpr int64_t kMaxBlocks = 1'000'000;
+
+/// Reads the numbers of a header, record by record.
+class HeaderReader {
+ public:
+  HeaderReader(PayloadFile& payload, const Plot3dLayout& layout) : payload_(payload), layout_(layout) {}
+
+  /// The bytes of the next record; nothing in a file without records.
+  std::optional<uint64_t> record() {
+    if (layout_.records == RecordMarkers::none) return std::nullopt;
+    return payload_.nextRecord();
+  }
+
+  std::vector<int64_t> integers(uint64_t count) {
+    const uint64_t width = layout_.integerBytes();
+    if (offset_ > payload_.size() || count > (payload_.size() - offset_) / width)
+      throw LayoutMisfit{LayoutMisfit::first_record,
+                         fmt::format("the file ends within a header of {} numbers", count)};
+    std::vector<std::byte> bytes(count * width);
+    payload_.readAt(offset_, bytes);
+    offset_ += bytes.size();
+    const bool swap = layout_.byte_order != kMachineByteOrder;
+    std::vector<int64_t> numbers(count);
+    for (uint64_t n = 0; n < count; ++n)
+      numbers[n] = layout_.ascii ? integerOf(loadStored<double>(&bytes[n * width], swap))
+                                 : loadStored<int32_t>(&bytes[n * width], swap);
+    return numbers;
+  }
+
+  uint64_t offset() const { return offset_; }
+
+ private:
+  static int64_t integerOf(double number) {
+    if (!(std::abs(number) < 1e15) || number != std::trunc(number))
+      throw LayoutMisfit{LayoutMisfit::first_record,
+                         fmt::format("{} stands where a dimension should", number)};
+    return static_cast<int64_t>(number);
+  }
+
+  PayloadFile& payload_;
+  const Plot3dLayout& layout_;
+  uint64_t offset_ = 0;
+};
+
+uint64_t readBlockCount(HeaderReader& reader, const Plot3dLayout& layout, uint64_t file_size) {
+  if (!layout.multi_block) return 1;
+  if (const auto bytes = reader.record(); bytes && *bytes != 4)
+    throw LayoutMisfit{LayoutMisfit::nothing,
+                       fmt::format("the first record has {} bytes, not the 4 of a block count", *bytes)};
+  const int64_t count = reader.integers(1).front();
+  if (count < 1 || count > kMaxBlocks || static_cast<uint64_t>(count) > file_size / layout.integerBytes())
+    throw LayoutMisfit{LayoutMisfit::nothing, fmt::format("a block count of {} is impossible", count)};
+  return static_cast<uint64_t>(count);
+}
+
+/// What a dimension record of `bytes` holds instead, if that is known.
+std::string explainDimensionRecord(const Plot3dLayout& layout, uint64_t blocks, uint64_t bytes) {
+  if (layout.two_dimensional) return "";
+  if (layout.kind == Plot3dKind::function && bytes == 12 * blocks)
+    return "; the number of variables is missing";
+  return "";
+}
+
+/// The nodes of block number `b`, at most `limit`.
+uint64_t checkedNodes(const Plot3dLayout& layout, const int64_t* dimensions, uint64_t b, uint64_t limit) {
+  uint64_t nodes = 1;
+  bool possible = true;
+  std::string words;
+  for (int axis = 0; axis < (layout.two_dimensional ? 2 : 3); ++axis) {
+    words += fmt::format("{}{}", axis ? "x" : "", dimensions[axis]);
+    possible = possible && dimensions[axis] > 0 &&
+               !__builtin_mul_overflow(nodes, static_cast<uint64_t>(dimensions[axis]), &nodes);
+  }
+  if (!possible || nodes > limit)
+    throw LayoutMisfit{
+        LayoutMisfit::first_record,
+        fmt::format("block {} of {} nodes is impossible in a file of this size", b + 1, words)};
+  return nodes;
+}
+
+/// How many quantities and how many species a node of an OVERFLOW file has.
+void readQuantities(const std::vector<int64_t>& numbers, uint64_t nodes_left, uint64_t file_size,
+                    Plot3dHeader& header) {
+  const int64_t quantities = numbers[0], species = numbers[1];
+  const uint64_t nodes = file_size - nodes_left;
+  if (quantities < 5 || static_cast<uint64_t>(quantities) > file_size / nodes || species < 0 ||
+      species > quantities)
+    throw LayoutMisfit{LayoutMisfit::first_record,
+                       fmt::format("{} quantities of {} species are impossible", quantities, species)};
+  header.components = static_cast<uint32_t>(quantities);
+  header.species = static_cast<uint32_t>(species);
+}
+
+}  // namespace
+
+Plot3dHeader readPlot3dHeader(PayloadFile& payload, const Plot3dLayout& layout, uint64_t file_size) {
+  HeaderReader reader(payload, layout);
+  const uint64_t count = readBlockCount(reader, layout, file_size);
+  const uint64_t axes = layout.two_dimensional ? 2 : 3;
+  const uint64_t numbers = axes + (layout.kind == Plot3dKind::function ? 1 : 0);
+  const uint64_t overall = layout.kind == Plot3dKind::overflow ? 2 : 0;  // nq and nqc
+  if (const auto bytes = reader.record(); bytes && *bytes != 4 * (numbers * count + overall)) {
+    const std::string explanation = explainDimensionRecord(layout, count, *bytes);
+    throw LayoutMisfit{explanation.empty() ? LayoutMisfit::first_record : LayoutMisfit::known_structure,
+                       fmt::format("the dimension record has {} bytes where {} block{} of a {} need {}{}",
+                                   *bytes, count, count == 1 ? "" : "s", inWords(layout.kind),
+                                   4 * (numbers * count + overall), explanation)};
+  }
+  const std::vector<int64_t> dimensions = reader.integers(numbers * count);
+  const std::vector<int64_t> quantities = reader.integers(overall);
+
+  Plot3dHeader header;
+  header.components = static_cast<uint32_t>(layout.kind == Plot3dKind::q ? axes + 2 : axes);
+  header.blocks.reserve(count);
+  uint64_t nodes_left = file_size;  // a node takes more than a byte, and so no sum of sizes overflows
+  for (uint64_t b = 0; b < count; ++b) {
+    const int64_t* at = &dimensions[b * numbers];
+    const uint64_t nodes = checkedNodes(layout, at, b, nodes_left);
+    nodes_left -= nodes;
+    header.blocks.push_back({static_cast<uint64_t>(at[0]), static_cast<uint64_t>(at[1]),
+                             layout.two_dimensional ? 1 : static_cast<uint64_t>(at[2])});
+    if (layout.kind != Plot3dKind::function) continue;
+    const int64_t variables = at[axes];
+    if (variables < 1 || static_cast<uint64_t>(variables) > file_size / nodes)
+      throw LayoutMisfit{LayoutMisfit::first_record,
+                         fmt::format("block {} has {} variables", b + 1, variables)};
+    if (b > 0 && variables != header.components)
+      throw LayoutMisfit{LayoutMisfit::dimensions, fmt::format("block {} has {} variables and block 1 has {}",
+                                                               b + 1, variables, header.components)};
+    header.components = static_cast<uint32_t>(variables);
+  }
+  if (layout.kind == Plot3dKind::overflow) readQuantities(quantities, nodes_left, file_size, header);
+  header.bytes = reader.offset();
+  return header;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,45 @@
+// A PLOT3D grid with its Q and function files, as a GridSource.
+#pragma once
+
+#include "preprocess/formats/common/open_grid_options.h"
+#include "preprocess/formats/plot3d/plot3d_file.h"
+#include "preprocess/grid/grid_source.h"
+
+namespace curvisplat {
+
+/// Q files offer density, momentum_x, momentum_y, momentum_z and energy, those of OVERFLOW also gamma,
+/// species_1, ... and turbulence_1, ...; function files the names of their
+/// .nam file (beside them, one a line), else the numbers of their variables. Names that two files share are
+/// written FILE:NAME, FILE being the file's stem.
+class Plot3dSource final : public GridSource {
+ public:
+  /// Detects the layout of every file. Throws Error.
+  explicit Plot3dSource(const OpenGridOptions& options);
+
+  const GridDescription& description() const override { return description_; }
+  void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+            NodeArrays& out) const override;
+
+ private:
+  struct Component {
+    size_t file = 0;  // in solutions_
+    uint32_t component = 0;
+  };
+
+  Plot3dFile openGridFile(const OpenGridOptions& options);
+  void addSolution(const std::filesystem::path& path, const OpenGridOptions& options);
+  void addOverflowScalars(const Plot3dFile& file);
+  void addFunctionNames(const std::filesystem::path& path, const Plot3dFile& file);
+  void describe(const std::filesystem::path& path, const Plot3dFile& file);
+  void makeNamesUnique();
+
+  GridDescription description_;
+  std::filesystem::path grid_path_;
+  std::vector<std::string> function_names_;
+  Plot3dFile grid_;
+  std::vector<Plot3dFile> solutions_;
+  std::vector<std::filesystem::path> solution_paths_;
+  std::vector<Component> components_;  // of each of description_.scalars
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,262 @@
+#include "preprocess/formats/vtk/compressed_bytes.h"
+
+#include <lz4.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+
+#include "preprocess/formats/common/stored_values.h"
+#include "stream/base/check.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kTableStride = 1024;
+constexpr size_t kPieceBytes = size_t{256} << 10;
+
+struct Table {
+  uint64_t blocks = 0, block_bytes = 0, last_bytes = 0;  // the last block has 1 .. block_bytes bytes
+};
+
+/// How many times as large as it is a block can become. Of zlib this is its specification's figure, of LZ4
+/// the 255 bytes that each further byte of a length stands for.
+uint64_t mostUnpacked(BlockCompressor compressor, uint64_t packed) {
+  const uint64_t ratio = compressor == BlockCompressor::zlib ? 1032 : 255;
+  return packed > UINT64_MAX / ratio - 64 ? UINT64_MAX : packed * ratio + 64;
+}
+
+/// What no compressor makes more of, however little it finds to save.
+uint64_t mostPacked(uint64_t unpacked) {
+  return unpacked + unpacked / 8 + 1024;
+}
+
+Table readTable(const CompressedBytes::Parts& parts, uint64_t size) {
+  const HeaderIntegers& integers = parts.integers;
+  Table table{integers.at(*parts.table, 0), integers.at(*parts.table, integers.bytes),
+              integers.at(*parts.table, 2 * integers.bytes)};
+  const uint64_t room = parts.table->size() / integers.bytes;
+  if (table.blocks == 0 || table.blocks > room - 3)
+    throw Error("{}: its head tells of {} compressed blocks, where at most {} fit; the file is damaged",
+                parts.place, table.blocks, room - 3);
+  if (table.last_bytes == 0) table.last_bytes = table.block_bytes;
+  const bool overflows = table.block_bytes == 0 || table.last_bytes > table.block_bytes ||
+                         table.blocks > UINT64_MAX / table.block_bytes;
+  if (overflows || (table.blocks - 1) * table.block_bytes + table.last_bytes != size)
+    throw Error("{}: should have {} bytes, but its head tells of {} blocks of {} bytes, the last of {}",
+                parts.place, size, table.blocks, table.block_bytes, table.last_bytes);
+  return table;
+}
+
+/// Calls visit(block, offset, bytes) for all blocks of the table in order, and checks that they are there.
+template <typename Visit>
+void forEachBlock(const CompressedBytes::Parts& parts, const Table& table, const Visit& visit) {
+  const HeaderIntegers& integers = parts.integers;
+  std::vector<std::byte> piece;
+  uint64_t offset = 0;
+  for (uint64_t first = 0; first < table.blocks; first += kTableStride) {
+    const uint64_t count = std::min(kTableStride, table.blocks - first);
+    piece.resize(static_cast<size_t>(count * integers.bytes));
+    parts.table->readAt((3 + first) * integers.bytes, piece);
+    for (uint64_t n = 0; n < count; ++n) {
+      const uint64_t bytes = integers.at(std::span(piece).subspan(static_cast<size_t>(n * integers.bytes)));
+      const uint64_t unpacked = first + n + 1 == table.blocks ? table.last_bytes : table.block_bytes;
+      if (bytes > parts.blocks->size() - offset || bytes > mostPacked(unpacked) ||
+          mostUnpacked(parts.compressor, bytes) < unpacked)
+        throw Error("{}: block {} should be {} bytes, compressed to {}, of {} that are left in the file",
+                    parts.place, first + n, unpacked, bytes, parts.blocks->size() - offset);
+      visit(first + n, offset, bytes);
+      offset += bytes;
+    }
+  }
+}
+
+[[noreturn]] void failBlock(const std::string& place, uint64_t block, const char* reason) {
+  throw Error("{}: block {} cannot be unpacked: {}; the file is damaged", place, block, reason);
+}
+
+/// A zlib stream that gives its bytes piece by piece.
+class Inflater {
+ public:
+  Inflater(const std::string& place, uint64_t block) : place_(place), block_(block) {
+    if (inflateInit(&stream_) != Z_OK) failBlock(place_, block_, "zlib has no memory");
+  }
+  ~Inflater() { inflateEnd(&stream_); }
+  Inflater(const Inflater&) = delete;
+  Inflater& operator=(const Inflater&) = delete;
+
+  void give(std::span<const std::byte> packed) {
+    stream_.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(packed.data()));
+    stream_.avail_in = static_cast<uInt>(packed.size());
+  }
+
+  /// Fills `to` as far as what was given goes; returns how far.
+  size_t take(std::span<std::byte> to) {
+    if (ended_) return 0;
+    stream_.next_out = reinterpret_cast<Bytef*>(to.data());
+    stream_.avail_out = static_cast<uInt>(to.size());
+    const int result = inflate(&stream_, Z_NO_FLUSH);
+    ended_ = result == Z_STREAM_END;
+    if (!ended_ && result != Z_OK && result != Z_BUF_ERROR)
+      failBlock(place_, block_, stream_.msg ? stream_.msg : "it is no zlib stream");
+    return to.size() - stream_.avail_out;
+  }
+
+  bool ended() const { return ended_; }
+
+ private:
+  const std::string& place_;
+  uint64_t block_;
+  z_stream stream_{};
+  bool ended_ = false;
+};
+
+void unpackZlib(const std::string& place, uint64_t block, std::span<const std::byte> packed,
+                std::span<std::byte> to) {
+  Inflater inflater(place, block);
+  inflater.give(packed);
+  const size_t bytes = inflater.take(to);
+  std::byte more;
+  // The stream ends with a checksum, which is not looked at before one asks for what follows the last byte.
+  if (bytes != to.size() || (!inflater.ended() && inflater.take(std::span(&more, 1)) > 0) ||
+      !inflater.ended())
+    failBlock(place, block, "it has another size than its table says");
+}
+
+void unpackLz4(const std::string& place, uint64_t block, std::span<const std::byte> packed,
+               std::span<std::byte> to) {
+  const int bytes =
+      LZ4_decompress_safe(reinterpret_cast<const char*>(packed.data()), reinterpret_cast<char*>(to.data()),
+                          static_cast<int>(packed.size()), static_cast<int>(to.size()));
+  if (bytes < 0) failBlock(place, block, "it is no LZ4 block");
+  if (static_cast<size_t>(bytes) != to.size())
+    failBlock(place, block, "it has another size than its table says");
+}
+
+/// Unpacks one zlib block of any size in pieces.
+void spoolZlib(const CompressedBytes::Parts& parts, uint64_t block, uint64_t offset, uint64_t packed,
+               uint64_t unpacked, const SpoolFile::Sink& sink) {
+  Inflater inflater(parts.place, block);
+  std::vector<std::byte> in(kPieceBytes), out(kPieceBytes);
+  while (!inflater.ended()) {
+    if (packed == 0) failBlock(parts.place, block, "it ends too early");
+    const auto given = static_cast<size_t>(std::min<uint64_t>(packed, in.size()));
+    parts.blocks->readAt(offset, std::span(in).first(given));
+    inflater.give(std::span(in).first(given));
+    offset += given;
+    packed -= given;
+    for (size_t bytes; (bytes = inflater.take(out)) > 0;) {
+      if (bytes > unpacked) failBlock(parts.place, block, "it is larger than its table says");
+      sink(std::span(out).first(bytes));
+      unpacked -= bytes;
+    }
+  }
+  if (unpacked > 0) failBlock(parts.place, block, "it is smaller than its table says");
+}
+
+uint64_t nextId() {
+  static std::atomic<uint64_t> ids = 0;
+  return ++ids;
+}
+
+/// The block that a thread has unpacked last.
+struct UnpackedBlock {
+  uint64_t id = 0, block = 0;
+  std::vector<std::byte> packed, bytes;
+};
+
+}  // namespace
+
+uint64_t HeaderIntegers::at(const ByteSource& source, uint64_t offset) const {
+  std::array<std::byte, 8> stored;
+  source.readAt(offset, std::span(stored).first(bytes));
+  return at(stored);
+}
+
+uint64_t HeaderIntegers::at(std::span<const std::byte> stored) const {
+  const bool swap = order != kMachineByteOrder;
+  return bytes == 8 ? loadStored<uint64_t>(stored.data(), swap) : loadStored<uint32_t>(stored.data(), swap);
+}
+
+CompressedBytes::CompressedBytes(Parts parts, uint64_t size)
+    : id_(nextId()), parts_(std::move(parts)), size_(size) {
+  const Table table = readTable(parts_, size);
+  if (table.block_bytes > kLargestBlockInMemory)
+    throw Error(
+        "{}: has blocks of {} bytes, and no part of such a block can be read alone; "
+        "write it with blocks of at most {} bytes (VTK's are 32768), or with zlib",
+        parts_.place, table.block_bytes, kLargestBlockInMemory);
+  blocks_ = table.blocks;
+  block_bytes_ = table.block_bytes;
+  forEachBlock(parts_, table, [&](uint64_t block, uint64_t offset, uint64_t) {
+    if (block % kTableStride == 0) offsets_.push_back(offset);
+  });
+}
+
+uint64_t CompressedBytes::bytesOf(uint64_t block) const {
+  return std::min(block_bytes_, size_ - block * block_bytes_);
+}
+
+CompressedBytes::Place CompressedBytes::placeOf(uint64_t block) const {
+  const HeaderIntegers& integers = parts_.integers;
+  const uint64_t first = block / kTableStride * kTableStride;
+  std::array<std::byte, kTableStride * 8> piece;
+  const auto bytes = std::span(piece).first(static_cast<size_t>((block - first + 1) * integers.bytes));
+  parts_.table->readAt((3 + first) * integers.bytes, bytes);
+  const auto packedBytes = [&](uint64_t n) {
+    return integers.at(bytes.subspan(static_cast<size_t>((n - first) * integers.bytes)));
+  };
+  Place place{offsets_[block / kTableStride], 0};
+  for (uint64_t n = first; n < block; ++n) place.offset += packedBytes(n);
+  place.bytes = packedBytes(block);
+  return place;
+}
+
+std::span<const std::byte> CompressedBytes::unpacked(uint64_t block) const {
+  thread_local UnpackedBlock kept;
+  if (kept.id == id_ && kept.block == block) return kept.bytes;
+  kept.id = 0;
+  const Place place = placeOf(block);
+  if (place.bytes > mostPacked(bytesOf(block))) failBlock(parts_.place, block, "the file has changed");
+  kept.packed.resize(static_cast<size_t>(place.bytes));
+  kept.bytes.resize(static_cast<size_t>(bytesOf(block)));
+  parts_.blocks->readAt(place.offset, kept.packed);
+  if (parts_.compressor == BlockCompressor::zlib)
+    unpackZlib(parts_.place, block, kept.packed, kept.bytes);
+  else
+    unpackLz4(parts_.place, block, kept.packed, kept.bytes);
+  kept.id = id_;
+  kept.block = block;
+  return kept.bytes;
+}
+
+void CompressedBytes::readAt(uint64_t offset, std::span<std::byte> to) const {
+  CURVISPLAT_CHECK(offset <= size_ && to.size() <= size_ - offset);
+  while (!to.empty()) {
+    const std::span<const std::byte> bytes = unpacked(offset / block_bytes_);
+    const auto begin = static_cast<size_t>(offset % block_bytes_);
+    const size_t count = std::min(to.size(), bytes.size() - begin);
+    std::copy_n(bytes.begin() + static_cast<ptrdiff_t>(begin), count, to.begin());
+    to = to.subspan(count);
+    offset += count;
+  }
+}
+
+std::shared_ptr<const ByteSource> compressedBytes(CompressedBytes::Parts parts, uint64_t size,
+                                                  const std::shared_ptr<SpoolFile>& spool) {
+  const Table table = readTable(parts, size);
+  if (table.block_bytes <= kLargestBlockInMemory || parts.compressor != BlockCompressor::zlib)
+    return std::make_shared<CompressedBytes>(std::move(parts), size);
+  forEachBlock(parts, table, [](uint64_t, uint64_t, uint64_t) {});
+  return std::make_shared<SpooledBytes>(
+      spool, size, [parts = std::move(parts), table](const SpoolFile::Sink& sink) {
+        forEachBlock(parts, table, [&](uint64_t block, uint64_t offset, uint64_t bytes) {
+          const bool last = block + 1 == table.blocks;
+          spoolZlib(parts, block, offset, bytes, last ? table.last_bytes : table.block_bytes, sink);
+        });
+      });
+}
+
+}  // namespace curvisplat

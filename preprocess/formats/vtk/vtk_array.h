@@ -1,0 +1,60 @@
+// An array of a VTK file: tuples of numbers, whatever their type and encoding.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "preprocess/formats/common/byte_order.h"
+#include "preprocess/formats/common/byte_source.h"
+#include "preprocess/formats/common/spool_file.h"
+#include "preprocess/formats/common/text_reader.h"
+
+namespace curvisplat {
+
+enum class VtkType : uint8_t { int8, uint8, int16, uint16, int32, uint32, int64, uint64, float32, float64 };
+
+size_t bytesOf(VtkType type);
+
+struct VtkArray {
+  std::string name;
+  VtkType type = VtkType::float32;
+  uint32_t components = 1;
+  uint64_t tuples = 0;
+  ByteOrder order = ByteOrder::little;
+  std::shared_ptr<const ByteSource> bytes;
+  std::vector<std::string> component_names;  // empty, or one for each
+
+  uint64_t tupleBytes() const { return components * bytesOf(type); }
+};
+
+/// More components are more than the buffer of a reading thread is good for.
+inline constexpr uint32_t kMostComponents = 4096;
+
+/// What to make of a tuple, and where to put it.
+template <typename Value>
+struct WantedComponent {
+  static constexpr int kMagnitude = -1;
+  int component = 0;  // or kMagnitude: the root of the sum of all components' squares
+  Value* to = nullptr;
+};
+
+/// Reads tuples [first, first + count): of each wanted component puts to[0 .. count). Value: double or float.
+/// Throws Error as the array's bytes do. Costs a buffer of 256 KiB a thread.
+template <typename Value>
+void readTuples(const VtkArray& array, uint64_t first, uint64_t count,
+                std::span<const WantedComponent<Value>> wanted);
+
+extern template void readTuples(const VtkArray&, uint64_t, uint64_t,
+                                std::span<const WantedComponent<double>>);
+extern template void readTuples(const VtkArray&, uint64_t, uint64_t, std::span<const WantedComponent<float>>);
+
+/// Gives `count` numbers of a text to `sink`, as `type` in the machine's byte order. Throws Error if there
+/// are fewer, or if one is no number of that type.
+void packNumbers(TextReader& text, uint64_t count, VtkType type, const SpoolFile::Sink& sink);
+
+}  // namespace curvisplat

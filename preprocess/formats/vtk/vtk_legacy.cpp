@@ -1,0 +1,414 @@
+#include "preprocess/formats/vtk/vtk_legacy.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <sstream>
+
+#include "preprocess/formats/common/stored_values.h"
+#include "preprocess/formats/common/text_reader.h"
+#include "preprocess/formats/vtk/vtk_source.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kMostNodes = 100'000'000'000'000;
+constexpr uint64_t kMostAlongAxis = uint64_t{1} << 30;
+
+constexpr std::pair<const char*, VtkType> kTypes[] = {
+    {"char", VtkType::int8},          {"signed_char", VtkType::int8},      {"unsigned_char", VtkType::uint8},
+    {"short", VtkType::int16},        {"unsigned_short", VtkType::uint16}, {"int", VtkType::int32},
+    {"vtkidtype", VtkType::int32},    {"unsigned_int", VtkType::uint32},   {"long", VtkType::int64},
+    {"vtktypeint64", VtkType::int64}, {"unsigned_long", VtkType::uint64},  {"vtktypeuint64", VtkType::uint64},
+    {"float", VtkType::float32},      {"double", VtkType::float64},
+};
+
+std::string lowered(std::string_view text) {
+  std::string lower(text);
+  for (char& c : lower)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return lower;
+}
+
+/// Names are written with %20 for a space.
+std::string decodedName(std::string_view text) {
+  std::string name;
+  for (size_t n = 0; n < text.size(); ++n) {
+    unsigned code = 0;
+    const bool coded = text[n] == '%' && n + 2 < text.size() &&
+                       std::from_chars(&text[n + 1], &text[n + 1] + 2, code, 16).ptr == &text[n + 1] + 2;
+    name += coded ? static_cast<char>(code) : text[n];
+    if (coded) n += 2;
+  }
+  return name;
+}
+
+/// The parts of the file come one after the other, each with a line of words before its numbers.
+class LegacyReader {
+ public:
+  LegacyReader(const VtkFiles& files, const std::filesystem::path& path)
+      : files_(files),
+        file_(std::make_shared<const PooledFile>(files_.pool, path)),
+        text_(file_, 0, file_->size()) {}
+
+  VtkGrid read() {
+    readHead();
+    for (std::string word = nextWord(); !word.empty(); word = nextWord()) readPart(word);
+    finishNodes();
+    grid_.pieces.push_back(std::move(piece_));
+    grid_.blocks.push_back({"block 1", 0, grid_.pieces.front().extent});
+    grid_.files = {file_->name()};
+    grid_.format = fmt::format("legacy VTK {}, {}, 1 block", dataset_, ascii_ ? "ASCII" : "binary");
+    return std::move(grid_);
+  }
+
+ private:
+  enum class Owner { grid, points, cells };
+
+  template <typename... Args>
+  [[noreturn]] void fail(fmt::format_string<Args...> format, Args&&... args) const {
+    throw Error("{}: byte {}: {}", file_->name(), text_.offset(),
+                printable(fmt::format(format, std::forward<Args>(args)...)));
+  }
+
+  std::string nextWord() { return lowered(text_.word()); }
+  std::string nextName() {
+    const std::string_view word = text_.word();
+    if (word.empty()) fail("ends where a name is expected; the file is truncated");
+    return decodedName(word);
+  }
+  /// The words that are left in the line.
+  std::vector<std::string> restOfLine() {
+    std::istringstream line{std::string(text_.line().value_or(""))};
+    std::vector<std::string> words;
+    for (std::string word; line >> word;) words.push_back(word);
+    return words;
+  }
+  uint64_t count(std::string_view word) const {
+    uint64_t value = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error != std::errc{} || end != word.data() + word.size() || value > kMostNodes)
+      fail("has \"{}\" where a count is expected", word.substr(0, 30));
+    return value;
+  }
+  uint64_t nextCount() { return count(text_.word()); }
+
+  void readHead() {
+    text_.line();  // "# vtk DataFile Version 3.0"
+    text_.line();  // the title
+    const std::string encoding = nextWord();
+    if (encoding != "ascii" && encoding != "binary")
+      fail("has \"{}\" in its third line; expected ASCII or BINARY", encoding.substr(0, 30));
+    ascii_ = encoding == "ascii";
+    std::string word = nextWord();
+    // Field data may come before the grid.
+    for (; word == "field" || word == "metadata"; word = nextWord())
+      word == "field" ? readField() : skipMetadata();
+    dataset_ = nextWord();
+    if (word != "dataset") fail("has \"{}\" where DATASET is expected", word.substr(0, 30));
+    std::transform(dataset_.begin(), dataset_.end(), dataset_.begin(),
+                   [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; });
+    uniform_ = dataset_ == "STRUCTURED_POINTS";
+    if (!uniform_ && dataset_ != "STRUCTURED_GRID" && dataset_ != "RECTILINEAR_GRID")
+      fail("holds a {}; expected STRUCTURED_GRID, RECTILINEAR_GRID or STRUCTURED_POINTS",
+           dataset_.substr(0, 30));
+    if (dataset_ == "RECTILINEAR_GRID") piece_.nodes = VtkAxes{};
+    if (uniform_) piece_.nodes = VtkUniformNodes{};
+  }
+
+  void readPart(const std::string& word) {
+    if (word == "dimensions") return readDimensions();
+    if (word == "extent") return readExtent();
+    if (word == "field") return readField();
+    if (word == "metadata") return skipMetadata();
+    if (word == "point_data" || word == "cell_data") return beginData(word == "cell_data");
+    if (owner_ == Owner::grid) return readNodesPart(word);
+    readAttribute(word);
+  }
+
+  void readDimensions() {
+    std::array<uint64_t, 3> counts{};
+    for (uint64_t& n : counts) n = nextCount();
+    for (size_t axis = 0; axis < 3; ++axis) {
+      if (counts[axis] == 0 || counts[axis] > kMostAlongAxis)
+        fail("has DIMENSIONS {} {} {}; expected three counts of nodes", counts[0], counts[1], counts[2]);
+      piece_.extent.lower[axis] = 0;
+      piece_.extent.upper[axis] = static_cast<int64_t>(counts[axis]) - 1;
+    }
+    checkExtent();
+  }
+
+  void readExtent() {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double ends[] = {text_.number(), text_.number()};
+      const auto most = static_cast<double>(kMostAlongAxis);
+      if (!(std::abs(ends[0]) < most) || !(std::abs(ends[1]) < most) || ends[1] < ends[0])
+        fail("has an EXTENT from {} to {}; expected the first and the last node", ends[0], ends[1]);
+      piece_.extent.lower[axis] = static_cast<int64_t>(ends[0]);
+      piece_.extent.upper[axis] = static_cast<int64_t>(ends[1]);
+    }
+    checkExtent();
+  }
+
+  void checkExtent() {
+    double nodes = 1;
+    for (size_t axis = 0; axis < 3; ++axis) nodes *= static_cast<double>(piece_.extent.nodesAlong(axis));
+    if (nodes > static_cast<double>(kMostNodes)) fail("has {} nodes, more than any file", nodes);
+    if (has_extent_) fail("has a second DIMENSIONS or EXTENT");
+    has_extent_ = true;
+  }
+
+  void needExtent(const std::string& word) const {
+    if (!has_extent_) fail("has {} before DIMENSIONS", word);
+  }
+
+  void readNodesPart(const std::string& word) {
+    auto* const axes = std::get_if<VtkAxes>(&piece_.nodes);
+    auto* const uniform = std::get_if<VtkUniformNodes>(&piece_.nodes);
+    needExtent(word);
+    if (word == "points" && !axes && !uniform) {
+      const uint64_t nodes = nextCount();
+      if (nodes != piece_.extent.nodes())
+        fail("has {} POINTS; expected {}, of {} nodes", nodes, piece_.extent.nodes(),
+             piece_.extent.inWords());
+      piece_.nodes = readNumbers("POINTS", lineOfType(), 3, nodes);
+    } else if (axes && word.size() == 13 && word.ends_with("_coordinates") && word[0] >= 'x' &&
+               word[0] <= 'z') {
+      const auto axis = static_cast<size_t>(word[0] - 'x');
+      const uint64_t nodes = nextCount();
+      if (nodes != piece_.extent.nodesAlong(axis))
+        fail("has {} {}; expected {}", nodes, word, piece_.extent.nodesAlong(axis));
+      (*axes)[axis] = readNumbers(word, lineOfType(), 1, nodes);
+    } else if (uniform && (word == "origin" || word == "spacing" || word == "aspect_ratio")) {
+      for (glm::length_t axis = 0; axis < 3; ++axis) {
+        const double value = text_.number();
+        if (!std::isfinite(value)) fail("has {} {}", word, value);
+        (word == "origin" ? uniform->origin : uniform->spacing)[axis] = value;
+      }
+    } else if (word == "blanking") {
+      const uint64_t nodes = nextCount();
+      if (nodes != piece_.extent.nodes())
+        fail("has BLANKING of {} nodes; expected {}", nodes, piece_.extent.nodes());
+      piece_.visible = readNumbers("BLANKING", lineOfType(), 1, nodes);
+    } else {
+      fail("has \"{}\" where a part of a {} is expected", word.substr(0, 30), dataset_);
+    }
+  }
+
+  void beginData(bool of_cells) {
+    needExtent("POINT_DATA or CELL_DATA");
+    const uint64_t expected = of_cells ? piece_.extent.cells() : piece_.extent.nodes();
+    tuples_ = nextCount();
+    if (tuples_ != expected)
+      fail("has {} for {} {}; expected {}, of {} nodes", of_cells ? "CELL_DATA" : "POINT_DATA", tuples_,
+           of_cells ? "cells" : "nodes", expected, piece_.extent.inWords());
+    owner_ = of_cells ? Owner::cells : Owner::points;
+  }
+
+  void readAttribute(const std::string& word) {
+    if (word == "scalars") return readScalars();
+    if (word == "color_scalars") return readColours();
+    if (word == "lookup_table") return skipLookupTable();
+    if (word == "texture_coordinates") {
+      const std::string name = nextName();
+      const uint64_t components = nextCount();
+      return addArray(name, lineOfType(), components);
+    }
+    struct Attribute {
+      const char* word;
+      uint64_t components;
+    };
+    static constexpr Attribute kAttributes[] = {{"vectors", 3},   {"normals", 3},    {"tensors", 9},
+                                                {"tensors6", 6},  {"global_ids", 1}, {"pedigree_ids", 1},
+                                                {"edge_flags", 1}};
+    for (const Attribute& attribute : kAttributes)
+      if (word == attribute.word) {
+        const std::string name = nextName();
+        return addArray(name, lineOfType(), attribute.components);
+      }
+    fail("has \"{}\" where SCALARS, VECTORS, FIELD or another attribute is expected", word.substr(0, 30));
+  }
+
+  void readScalars() {
+    const std::string name = nextName();
+    const std::vector<std::string> words = restOfLine();
+    if (words.empty() || words.size() > 2) fail("has SCALARS {} without a type", name);
+    if (lookupTableFollows()) text_.line();
+    std::string& active = owner_ == Owner::cells ? piece_.active_cell_data : piece_.active_point_data;
+    if (active.empty()) active = name;
+    addArray(name, words[0], words.size() == 2 ? count(words[1]) : 1);
+  }
+
+  bool lookupTableFollows() {
+    constexpr std::string_view kWord = "lookup_table";
+    if (ascii_) return lowered(text_.peekWord()) == kWord;
+    std::string next(kWord.size(), '\0');
+    if (file_->size() - text_.offset() < next.size()) return false;
+    file_->readAt(text_.offset(), std::as_writable_bytes(std::span(next)));
+    return lowered(next) == kWord;
+  }
+
+  void readColours() {
+    const std::string name = nextName();
+    const std::vector<std::string> words = restOfLine();
+    if (words.size() != 1) fail("has COLOR_SCALARS {} without a number of components", name);
+    addArray(name, ascii_ ? "float" : "unsigned_char", count(words[0]));
+  }
+
+  void skipLookupTable() {
+    nextName();
+    const uint64_t size = nextCount();
+    restOfLine();
+    readNumbers("LOOKUP_TABLE", ascii_ ? "float" : "unsigned_char", 4, size);
+  }
+
+  /// Arrays of any number of tuples: those of the owner's are its data.
+  void readField() {
+    nextName();
+    const uint64_t arrays = nextCount();
+    restOfLine();
+    for (uint64_t n = 0; n < arrays;) {
+      const std::string name = nextName();
+      if (name == "METADATA") {
+        skipMetadata();
+        continue;
+      }
+      ++n;
+      if (name == "NULL_ARRAY") continue;
+      const uint64_t components = nextCount(), tuples = nextCount();
+      const std::string type = lineOfType();
+      if (lowered(type) == "string")
+        skipStrings(components, tuples);
+      else if (owner_ != Owner::grid && tuples == tuples_)
+        addArray(name, type, components);
+      else
+        keepTime(readNumbers(name, type, components, tuples));
+    }
+  }
+
+  void keepTime(const VtkArray& array) {
+    if (owner_ != Owner::grid || array.tuples * array.components != 1) return;
+    if (lowered(array.name) != "time" && array.name != "TimeValue") return;
+    double time = 0;
+    const WantedComponent<double> wanted{0, &time};
+    readTuples<double>(array, 0, 1, std::span(&wanted, 1));
+    grid_.times = {time};
+  }
+
+  void skipStrings(uint64_t components, uint64_t tuples) {
+    const uint64_t strings =
+        tuples > 0 && components > kMostNodes / tuples ? kMostNodes : tuples * components;
+    for (uint64_t n = 0; n < strings; ++n) {
+      if (ascii_) {
+        if (!text_.line()) fail("ends inside of an array of strings; the file is truncated");
+        continue;
+      }
+      // The first two bits of a length tell how many bytes it has: 8, 4, 2 or 1.
+      std::byte first;
+      file_->readAt(text_.offset(), std::span(&first, 1));
+      const auto bytes = size_t{8} >> std::to_integer<unsigned>(first >> 6);
+      std::array<std::byte, 8> length{};
+      file_->readAt(text_.offset(), std::span(length).last(bytes));
+      length[8 - bytes] &= std::byte{0x3f};
+      const auto skipped = loadStored<uint64_t>(length.data(), kMachineByteOrder != ByteOrder::big);
+      if (skipped > file_->size() - text_.offset() - bytes)
+        fail("has a string of {} bytes; the file is truncated or damaged", skipped);
+      text_.seek(text_.offset() + bytes + skipped);
+    }
+  }
+
+  /// Goes behind the next empty line.
+  void skipMetadata() {
+    text_.line();
+    for (;;) {
+      const auto line = text_.line();
+      if (!line || line->find_first_not_of(" \t") == std::string_view::npos) return;
+    }
+  }
+
+  /// The type, which is the last word before the numbers, and the end of its line: binary numbers follow.
+  std::string lineOfType() {
+    const std::vector<std::string> words = restOfLine();
+    if (words.size() != 1) fail("has {} words where a type is expected", words.size());
+    return words[0];
+  }
+
+  void addArray(const std::string& name, const std::string& type, uint64_t components) {
+    addDataArray(piece_, owner_ == Owner::cells, readNumbers(name, type, components, tuples_),
+                 grid_.warnings);
+  }
+
+  VtkArray readNumbers(const std::string& name, const std::string& type, uint64_t components,
+                       uint64_t tuples) {
+    VtkArray array;
+    array.name = name;
+    const std::string type_word = lowered(type);
+    const auto* const known = std::find_if(std::begin(kTypes), std::end(kTypes),
+                                           [&](const auto& entry) { return type_word == entry.first; });
+    if (known == std::end(kTypes))
+      fail("array {} has type {}; expected float, double or an integer", name, type);
+    if (components == 0 || components > kMostComponents)
+      fail("array {} has {} components; expected 1 to {}", name, components, kMostComponents);
+    array.type = known->second;
+    array.components = static_cast<uint32_t>(components);
+    array.tuples = tuples;
+    const uint64_t numbers = tuples * components, bytes = tuples * array.tupleBytes();
+    const uint64_t left = file_->size() - text_.offset();
+    // In text, a number takes a digit and a space.
+    if (ascii_ ? numbers > (left + 1) / 2 : bytes > left)
+      fail("array {} should have {} numbers, but {} bytes are left in the file; it is truncated or damaged",
+           name, numbers, left);
+    if (ascii_) {
+      array.order = kMachineByteOrder;
+      const auto spooled = std::make_shared<SpooledBytes>(
+          files_.spool, bytes,
+          [&](const SpoolFile::Sink& sink) { packNumbers(text_, numbers, array.type, sink); });
+      spooled->fill();
+      array.bytes = spooled;
+    } else {
+      array.order = ByteOrder::big;
+      array.bytes = std::make_shared<FileBytes>(file_, text_.offset(), text_.offset() + bytes);
+      text_.seek(text_.offset() + bytes);
+    }
+    return array;
+  }
+
+  void finishNodes() const {
+    if (!has_extent_) fail("has no DIMENSIONS");
+    const auto* const axes = std::get_if<VtkAxes>(&piece_.nodes);
+    if (axes && !std::all_of(axes->begin(), axes->end(), [](const VtkArray& axis) { return axis.bytes; }))
+      fail("lacks one of X_COORDINATES, Y_COORDINATES and Z_COORDINATES; the file is truncated");
+    if (const auto* const points = std::get_if<VtkPoints>(&piece_.nodes); points && !points->bytes)
+      fail("has no POINTS; the file is truncated");
+  }
+
+  VtkFiles files_;
+  std::shared_ptr<const PooledFile> file_;
+  TextReader text_;
+  bool ascii_ = true;
+  std::string dataset_;
+  bool uniform_ = false, has_extent_ = false;
+  Owner owner_ = Owner::grid;
+  uint64_t tuples_ = 0;  // of the owner's arrays
+  VtkPiece piece_;
+  VtkGrid grid_;
+};
+
+}  // namespace
+
+bool isVtkLegacy(const InputFile& file) {
+  constexpr std::string_view kMagic = "# vtk datafile";
+  std::string begin(static_cast<size_t>(std::min<uint64_t>(file.size(), kMagic.size())), '\0');
+  file.readAt(0, std::span(begin.data(), begin.size()));
+  return lowered(begin) == kMagic;
+}
+
+std::unique_ptr<GridSource> openVtkLegacy(const OpenGridOptions& options) {
+  return std::make_unique<VtkSource>(LegacyReader(VtkFiles(options.temporary_folder), options.grid).read());
+}
+
+}  // namespace curvisplat

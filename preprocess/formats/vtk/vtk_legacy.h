@@ -1,0 +1,18 @@
+// Legacy VTK files (.vtk): structured, rectilinear and uniform grids, ASCII and binary.
+#pragma once
+
+#include <memory>
+
+#include "preprocess/formats/common/open_grid_options.h"
+#include "preprocess/grid/grid_source.h"
+#include "stream/base/file.h"
+
+namespace curvisplat {
+
+/// Whether the file's first bytes are those of a legacy VTK file.
+bool isVtkLegacy(const InputFile& file);
+
+/// Numbers in text go to a temporary file first. Throws Error.
+std::unique_ptr<GridSource> openVtkLegacy(const OpenGridOptions& options);
+
+}  // namespace curvisplat

@@ -1,0 +1,191 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "preprocess/formats/vtk/vtk_source.h"
+#include "preprocess/formats/vtk/vtk_xml.h"
+#include "preprocess/grid/time_steps.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+using Node = pugi::xml_node;
+
+constexpr size_t kMostPieces = 100'000, kMostFiles = 100'000;
+
+/// Follows a file to the files that it names, and gathers their pieces.
+class Gatherer {
+ public:
+  explicit Gatherer(const OpenGridOptions& options)
+      : files_(options.temporary_folder), time_step_(options.time_step) {}
+
+  VtkGrid gather(const fs::path& path) {
+    add(path, "");
+    if (grid_.pieces.empty())
+      throw Error("{}: has no structured grid in it{}", path.string(),
+                  left_out_.empty() ? "" : ": " + left_out_);
+    if (!left_out_.empty())
+      grid_.warnings.push_back(
+          fmt::format("{} files without structured grids are left out: {}", left_out_files_, left_out_));
+    grid_.format = fmt::format("VTK XML {}{}, {}, {} block{}", top_type_,
+                               top_type_ == leaf_type_ ? "" : " of " + leaf_type_, encoding_,
+                               grid_.blocks.size(), grid_.blocks.size() == 1 ? "" : "s");
+    return std::move(grid_);
+  }
+
+ private:
+  void add(const fs::path& path, const std::string& name) {
+    std::error_code error;
+    const fs::path normal = fs::weakly_canonical(path, error);
+    if (error) throw Error("{}: cannot be opened: {}", path.string(), error.message());
+    if (!inside_.insert(normal).second) throw Error("{}: names itself as a part of itself", path.string());
+    if (grid_.files.size() > kMostFiles)
+      throw Error("{}: leads to more than {} files, counted as often as they are named", grid_.files.front(),
+                  kMostFiles);
+    const VtkXmlFile file(files_, path);
+    grid_.files.push_back(path.string());
+    if (top_type_.empty()) top_type_ = file.type();
+    if (hasXmlPieces(file.type()))
+      addPieces(file, name);
+    else if (file.type().starts_with('P') && hasXmlPieces(file.type().substr(1)))
+      addParallel(file, name);
+    else if (file.type() == "vtkMultiBlockDataSet" || file.type() == "vtkPartitionedDataSet" ||
+             file.type() == "vtkPartitionedDataSetCollection")
+      addMembers(file, file.content(), name);
+    else if (file.type() == "Collection")
+      addTimeStep(file);
+    else if (inside_.size() == 1)
+      file.fail(
+          fmt::format("is a VTK file of type {}; expected a structured grid: StructuredGrid, "
+                      "RectilinearGrid or ImageData, or a set of them",
+                      file.type()));
+    else
+      leaveOut(file);
+    inside_.erase(normal);
+  }
+
+  void leaveOut(const VtkXmlFile& file) {
+    if (left_out_files_++ == 0) left_out_ = fmt::format("{} is of type {}", file.name(), file.type());
+  }
+
+  fs::path pathOf(const VtkXmlFile& file, const Node& node, const char* attribute) const {
+    const std::string named = node.attribute(attribute).value();
+    if (named.empty()) file.fail(fmt::format("has a <{}> without {}", node.name(), attribute));
+    return file.path().parent_path() / fs::path(named);
+  }
+
+  /// Puts pieces and blocks of their parts behind those there are.
+  void append(std::vector<VtkPiece> pieces, const std::vector<std::string>& names) {
+    std::vector<VtkExtent> extents;
+    for (const VtkPiece& piece : pieces) extents.push_back(piece.extent);
+    const std::vector<std::vector<VtkExtent>> parts = ownedParts(extents);
+    for (size_t n = 0; n < pieces.size(); ++n) {
+      if (grid_.pieces.size() == kMostPieces)
+        throw Error("{}: has more than {} pieces", grid_.files.front(), kMostPieces);
+      for (size_t part = 0; part < parts[n].size(); ++part)
+        grid_.blocks.push_back({part == 0 ? names[n] : fmt::format("{}.{}", names[n], part + 1),
+                                grid_.pieces.size(), parts[n][part]});
+      grid_.pieces.push_back(std::move(pieces[n]));
+    }
+  }
+
+  VtkXmlPieces piecesOf(const VtkXmlFile& file) {
+    VtkXmlPieces read = readXmlPieces(file, grid_.warnings);
+    if (leaf_type_.empty()) {
+      leaf_type_ = file.type();
+      encoding_ = read.encoding;
+    }
+    if (grid_.times.empty() && read.time) grid_.times = {*read.time};
+    return read;
+  }
+
+  void addPieces(const VtkXmlFile& file, const std::string& name) {
+    VtkXmlPieces read = piecesOf(file);
+    std::vector<std::string> names;
+    for (size_t n = 0; n < read.pieces.size(); ++n)
+      names.push_back(name.empty()              ? fmt::format("block {}", n + 1)
+                      : read.pieces.size() == 1 ? name
+                                                : fmt::format("{}.{}", name, n + 1));
+    append(std::move(read.pieces), names);
+  }
+
+  void addParallel(const VtkXmlFile& file, const std::string& name) {
+    std::vector<VtkPiece> pieces;
+    std::vector<std::string> names;
+    for (const Node& node : file.content().children("Piece")) {
+      const std::optional<VtkExtent> extent = file.extent(node, "Extent");
+      if (!extent) continue;
+      const VtkXmlFile piece_file(files_, pathOf(file, node, "Source"));
+      if ("P" + piece_file.type() != file.type())
+        piece_file.fail(fmt::format("has type {}, but is a piece of a {}", piece_file.type(), file.type()));
+      grid_.files.push_back(piece_file.name());
+      for (VtkPiece& piece : piecesOf(piece_file).pieces) {
+        for (size_t axis = 0; axis < 3; ++axis)
+          if (piece.extent.lower[axis] < extent->lower[axis] ||
+              piece.extent.upper[axis] > extent->upper[axis])
+            piece_file.fail(
+                fmt::format("has a piece of {} nodes that is not in the extent that {} tells of it",
+                            piece.extent.inWords(), file.name()));
+        pieces.push_back(std::move(piece));
+        names.push_back(
+            fmt::format("{}{}{}", name, name.empty() ? "" : "/", piece_file.path().stem().string()));
+      }
+    }
+    append(std::move(pieces), names);
+  }
+
+  /// The files below an element, named by the elements on the way, and else by themselves.
+  void addMembers(const VtkXmlFile& file, const Node& element, const std::string& name) {
+    for (const Node& node : element.children()) {
+      if (node.type() != pugi::node_element) continue;
+      const std::string own = node.attribute("name").value();
+      const std::string separator = name.empty() || own.empty() ? "" : "/";
+      if (std::string_view(node.name()) != "DataSet")
+        addMembers(file, node, name + separator + own);
+      else if (node.attribute("file")) {  // an empty block has none
+        const fs::path path = pathOf(file, node, "file");
+        add(path,
+            own.empty() ? name + (name.empty() ? "" : "/") + path.stem().string() : name + separator + own);
+      }
+    }
+  }
+
+  void addTimeStep(const VtkXmlFile& file) {
+    if (in_time_series_) file.fail("is a series of time steps inside of another one");
+    in_time_series_ = true;
+    std::map<double, std::vector<Node>> steps;
+    for (const Node& node : file.content().children("DataSet"))
+      steps[node.attribute("timestep") ? file.numbers(node, "timestep", 1)[0] : 0].push_back(node);
+    if (steps.empty()) file.fail("names no file");
+    for (const auto& [time, nodes] : steps) grid_.times.push_back(time);
+    grid_.time_step = chosenTimeStep(file.name(), grid_.times, time_step_);
+    const std::vector<Node>& nodes = std::next(steps.begin(), grid_.time_step)->second;
+    for (const Node& node : nodes) {
+      const fs::path path = pathOf(file, node, "file");
+      const std::string own = node.attribute("name").value();
+      add(path, nodes.size() == 1 && own.empty() ? "" : own.empty() ? path.stem().string() : own);
+    }
+  }
+
+  VtkFiles files_;
+  std::optional<uint32_t> time_step_;
+  VtkGrid grid_;
+  std::set<fs::path> inside_;  // the files that are being followed
+  bool in_time_series_ = false;
+  std::string top_type_, leaf_type_, encoding_;
+  std::string left_out_;  // the first file, and why
+  size_t left_out_files_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<GridSource> openVtkXml(const OpenGridOptions& options) {
+  return std::make_unique<VtkSource>(Gatherer(options).gather(options.grid));
+}
+
+}  // namespace curvisplat

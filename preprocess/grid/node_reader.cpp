@@ -1,0 +1,138 @@
+#include "preprocess/grid/node_reader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <span>
+
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+// Nodes are looked at in pieces; only a piece with something to blank is looked at node by node.
+constexpr size_t kPiece = 4096;
+
+/// x * 0 is 0 for a finite x and NaN for any other, so a sum of them tells of all at once. Lanes, since the
+/// compiler may not reorder a sum of floating-point numbers itself.
+template <typename Value>
+bool allFinite(std::span<const Value> values) {
+  constexpr size_t kLanes = 32 / sizeof(Value);
+  std::array<Value, kLanes> sums{};
+  size_t n = 0;
+  for (; n + kLanes <= values.size(); n += kLanes)
+    for (size_t lane = 0; lane < kLanes; ++lane) sums[lane] += values[n + lane] * Value{0};
+  for (; n < values.size(); ++n) sums[0] += values[n] * Value{0};
+  return std::all_of(sums.begin(), sums.end(), [](Value sum) { return sum == 0; });
+}
+
+bool holds(std::span<const float> values, float wanted) {
+  unsigned found = 0;
+  for (const float value : values) found |= value == wanted;
+  return found != 0;
+}
+
+template <typename Value>
+void markNotFinite(std::span<const Value> values, std::span<uint8_t> mark) {
+  for (size_t n = 0; n < values.size(); ++n) mark[n] |= !std::isfinite(values[n]);
+}
+
+/// Blanks the nodes that are marked and not blank yet. Returns how many.
+uint64_t blankMarked(std::span<const uint8_t> mark, std::span<uint8_t> blank) {
+  uint64_t blanked = 0;
+  for (size_t n = 0; n < mark.size(); ++n) {
+    blanked += mark[n] & (blank[n] ^ 1);
+    blank[n] |= mark[n];
+  }
+  return blanked;
+}
+
+Centring centringOf(const GridDescription& description, const std::vector<uint32_t>& scalars) {
+  if (scalars.empty()) return Centring::node;
+  const GridScalar& first = description.scalars.at(scalars.front());
+  for (const uint32_t scalar : scalars) {
+    const GridScalar& other = description.scalars.at(scalar);
+    if (other.centring == first.centring) continue;
+    const bool cells = first.centring == Centring::cell;
+    throw Error(
+        "{} stands at nodes and {} in cells: a cache's splats stand for one or the other; convert them to "
+        "two caches",
+        cells ? other.name : first.name, cells ? first.name : other.name);
+  }
+  return first.centring;
+}
+
+void markCells(std::optional<double> blank_value, NodeArrays& out) {
+  for (size_t n = 0; n < out.x.size(); ++n) {
+    const bool finite = std::isfinite(out.x[n]) && std::isfinite(out.y[n]) && std::isfinite(out.z[n]);
+    out.blank[n] = out.blank[n] != 0 || !finite ? kNoNode : 0;
+  }
+  const float wanted = static_cast<float>(blank_value.value_or(0));
+  for (const std::vector<float>& scalar : out.scalars)
+    for (size_t n = 0; n < scalar.size(); ++n) {
+      if (std::isnan(scalar[n]))
+        out.blank[n] |= kNoValue;
+      else if (blank_value && scalar[n] == wanted)
+        out.blank[n] |= kBlankValue;
+      else if (std::isinf(scalar[n]))
+        out.blank[n] |= kValueNotFinite;
+    }
+}
+
+}  // namespace
+
+BlankCounts& BlankCounts::operator+=(const BlankCounts& other) {
+  by_grid += other.by_grid;
+  by_value += other.by_value;
+  not_finite += other.not_finite;
+  return *this;
+}
+
+NodeReader::NodeReader(const GridSource& source, std::vector<uint32_t> scalars,
+                       std::optional<double> blank_value)
+    : source_(&source),
+      scalars_(std::move(scalars)),
+      blank_value_(blank_value),
+      centring_(centringOf(source.description(), scalars_)) {}
+
+BlankCounts NodeReader::read(uint32_t block, const NodeBox& box, NodeArrays& out) const {
+  source_->read(block, box, scalars_, out);
+  BlankCounts counts;
+  if (centring_ == Centring::cell) {
+    markCells(blank_value_, out);
+    return counts;
+  }
+  std::array<uint8_t, kPiece> mark_buffer;
+  for (size_t first = 0; first < out.x.size(); first += kPiece) {
+    const size_t count = std::min(kPiece, out.x.size() - first);
+    const std::span<uint8_t> blank(&out.blank[first], count);
+    const std::span<uint8_t> mark = std::span(mark_buffer).first(count);
+    counts.by_grid += std::accumulate(blank.begin(), blank.end(), uint64_t{0});
+
+    if (blank_value_) {
+      const auto wanted = static_cast<float>(*blank_value_);
+      for (const std::vector<float>& scalar : out.scalars) {
+        const std::span<const float> values(&scalar[first], count);
+        if (!holds(values, wanted)) continue;
+        for (size_t n = 0; n < count; ++n) mark[n] = values[n] == wanted;
+        counts.by_value += blankMarked(mark, blank);
+      }
+    }
+
+    bool finite = true;
+    for (const auto* axis : {&out.x, &out.y, &out.z})
+      finite &= allFinite(std::span<const double>(&(*axis)[first], count));
+    for (const std::vector<float>& scalar : out.scalars)
+      finite &= allFinite(std::span<const float>(&scalar[first], count));
+    if (finite) continue;
+    std::fill(mark.begin(), mark.end(), uint8_t{0});
+    for (const auto* axis : {&out.x, &out.y, &out.z})
+      markNotFinite(std::span<const double>(&(*axis)[first], count), mark);
+    for (const std::vector<float>& scalar : out.scalars)
+      markNotFinite(std::span<const float>(&scalar[first], count), mark);
+    counts.not_finite += blankMarked(mark, blank);
+  }
+  return counts;
+}
+
+}  // namespace curvisplat

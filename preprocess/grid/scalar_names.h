@@ -1,0 +1,16 @@
+// When two names of scalars are the same: files, programs and people differ in case and underscores.
+#pragma once
+
+#include <string>
+
+#include "preprocess/grid/grid_source.h"
+
+namespace curvisplat {
+
+/// Without case, spaces, underscores and hyphens.
+std::string simplifiedName(const std::string& name);
+
+/// Whether `simple` (a simplified name) is the scalar's name or one of its aliases.
+bool answersTo(const GridScalar& scalar, const std::string& simple);
+
+}  // namespace curvisplat

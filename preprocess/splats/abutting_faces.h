@@ -1,0 +1,77 @@
+// Where the cells of one block's end abut on those of another's, or of the same block's other end: there the
+// data goes on, and the cells have no border. For cell-centred data, whose cells are not merged at seams.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "preprocess/grid/grid_source.h"
+#include "preprocess/splats/seams.h"
+#include "stream/base/progress.h"
+
+namespace curvisplat {
+
+/// A cell of a block, by its lowest node, and one of its six faces.
+struct CellFace {
+  size_t block = 0;
+  std::array<uint64_t, 3> cell{};  // i, j, k
+  int axis = 0;
+  bool upper = false;
+};
+
+/// Two faces at blocks' ends abut if their centres coincide, by SeamMerger's measure of what coincides; on
+/// which sides of them the cells lie is not asked. One that has collapsed to an edge (at an axis) or to a
+/// point is no border either. What abuts otherwise is not found: faces of other sizes, and those beside cells
+/// that are not there though another block has them.
+class AbuttingFaces {
+ public:
+  /// What a grid's faces at blocks' ends take.
+  struct Needs {
+    uint64_t memory_bytes = 0;  // as long as it lives
+    uint64_t disk_bytes = 0;    // until match() returns, at the most
+  };
+  static Needs needsOf(std::span<const GridBlock> blocks);
+
+  /// Sorts in `memory_bytes`, as SeamMerger does, beside its Needs. `coordinate_bytes`: of the grid's, as
+  /// stored.
+  AbuttingFaces(std::span<const GridBlock> blocks, int coordinate_bytes, uint64_t memory_bytes,
+                std::filesystem::path temporary_folder);
+
+  /// Whether the face is one at the end of its block. Any thread.
+  bool isAtEnd(const CellFace& face) const;
+
+  struct Centre {
+    uint64_t face = 0;  // its number
+    glm::dvec3 at{0.0};
+    double spacing = 0;  // to other faces' centres, at least
+    bool collapsed = false;
+  };
+  /// Of a face at its block's end; `corners` of its cell, as Hexahedron takes them. Any thread.
+  Centre centreOf(const CellFace& face, const std::array<glm::dvec3, 8>& corners) const;
+
+  /// Of cells that are there. One thread at a time. Throws Error if the disk fails.
+  void add(std::span<const Centre> centres);
+  /// After the last add(): finds those that abut. Throws Error if the disk fails, Interrupted if a stop is
+  /// asked for.
+  void match(const Progress& progress);
+  /// Of a face at its block's end, after match(). Any thread.
+  bool abuts(const CellFace& face) const { return abutting_[numberOf(face)]; }
+
+ private:
+  uint64_t numberOf(const CellFace& face) const;
+
+  struct Block {
+    std::array<uint64_t, 3> cells;
+    std::array<uint64_t, 3> first_face;  // of an axis' lower side; those of its upper side follow
+  };
+  std::vector<Block> blocks_;
+  int coordinate_bytes_;
+  SeamMerger centres_;
+  std::vector<bool> abutting_;  // [face at a block's end]
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,237 @@
+#include "preprocess/splats/cell_splats.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "preprocess/grid/hexahedron.h"
+#include "preprocess/grid/lattice_gradient.h"
+#include "preprocess/grid/node_reader.h"
+#include "preprocess/splats/lq.h"
+#include "preprocess/splats/shape.h"
+#include "stream/base/check.h"
+
+namespace curvisplat {
+namespace {
+
+// A hexahedron whose volume is so far from its Jacobian's is folded: its axes stay as they are.
+constexpr double kMostVolumeRatio = 8;
+
+/// What the cells of a box have in common.
+class Cells {
+ public:
+  Cells(const BlockWindow& in, const NodeBox& box, const BlockEnds& ends, CellScratch& scratch,
+        NodeSplats& out)
+      : in_(in),
+        ends_(ends),
+        row_stride_(in.block.ni),
+        plane_stride_(in.block.ni * (in.window.j1 - in.window.j0)),
+        known_{box.j0 - std::min<uint64_t>(box.j0, 1), std::min(box.j1 + 1, in.block.nj - 1),
+               box.k0 - std::min<uint64_t>(box.k0, 1), std::min(box.k1 + 1, in.block.nk - 1)},
+        cells_i_(in.block.ni - 1),
+        scratch_(scratch),
+        out_(out) {
+    scratch_.centre.resize(cells_i_ * rowsOf(known_));
+    scratch_.there.resize(scratch_.centre.size());
+    for (uint64_t k = known_.k0; k < known_.k1; ++k)
+      for (uint64_t j = known_.j0; j < known_.j1; ++j) lookAtRow(j, k);
+  }
+
+  void addRow(uint64_t j, uint64_t k) {
+    for (uint64_t i = 0; i < cells_i_; ++i)
+      if (scratch_.there[cellAt(i, j, k)]) addCell(i, j, k);
+  }
+  size_t count() const { return count_; }
+
+ private:
+  size_t nodeAt(uint64_t i, uint64_t j, uint64_t k) const {
+    return (k - in_.window.k0) * plane_stride_ + (j - in_.window.j0) * row_stride_ + i;
+  }
+  size_t cellAt(uint64_t i, uint64_t j, uint64_t k) const {
+    return ((k - known_.k0) * (known_.j1 - known_.j0) + (j - known_.j0)) * cells_i_ + i;
+  }
+  /// For a side on which the block has no neighbour.
+  bool isBorder(const std::array<uint64_t, 3>& cell, int axis, bool upper) const {
+    if (!ends_.faces) return false;
+    const CellFace face{ends_.block, cell, axis, upper};
+    return !ends_.faces->isAtEnd(face) || !ends_.faces->abuts(face);
+  }
+  void lookAtRow(uint64_t j, uint64_t k);
+  void addCell(uint64_t i, uint64_t j, uint64_t k);
+  std::array<glm::dvec3, 8> corners(size_t node) const {
+    return cornersAt(in_.nodes->x.data(), in_.nodes->y.data(), in_.nodes->z.data(), node, row_stride_,
+                     plane_stride_);
+  }
+
+  const BlockWindow& in_;
+  const BlockEnds& ends_;
+  const size_t row_stride_, plane_stride_;
+  const NodeBox known_;  // cells whose centres are in the scratch: the box and its neighbours
+  const uint64_t cells_i_;
+  CellScratch& scratch_;
+  NodeSplats& out_;
+  size_t count_ = 0;
+};
+
+void Cells::lookAtRow(uint64_t j, uint64_t k) {
+  const uint8_t* marks = in_.nodes->blank.data();
+  const size_t node = nodeAt(0, j, k), cell = cellAt(0, j, k);
+  const double* const axes[] = {in_.nodes->x.data() + node, in_.nodes->y.data() + node,
+                                in_.nodes->z.data() + node};
+  for (int axis = 0; axis < 3; ++axis) {
+    const double* a = axes[axis];
+    const auto column = [&](size_t i) {
+      return (a[i] + a[i + row_stride_]) + (a[i + plane_stride_] + a[i + row_stride_ + plane_stride_]);
+    };
+    double before = column(0);
+    for (size_t i = 0; i < cells_i_; ++i) {
+      const double after = column(i + 1);
+      scratch_.centre[cell + i][axis] = 0.125 * (before + after);
+      before = after;
+    }
+  }
+  for (size_t i = 0; i < cells_i_; ++i)
+    scratch_.there[cell + i] =
+        marks[node + i] == 0 && (cornerMarks(marks, node + i, row_stride_, plane_stride_) & kNoNode) == 0;
+}
+
+/// A length for the shape of a cell without any extent: far below the grid's, and above zero.
+double smallestAxis(const glm::dvec3& centre) {
+  const glm::dvec3 here = glm::abs(centre);
+  const double length = std::max({here.x, here.y, here.z});
+  return std::max(kAxisFloor * (length > 0 ? length : 1.0), std::numeric_limits<double>::min());
+}
+
+void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
+  const size_t node = nodeAt(i, j, k), cell = cellAt(i, j, k);
+  const Hexahedron hexahedron(corners(node));
+  const glm::dmat3& jacobian = hexahedron.jacobian;
+
+  NodeSplat& splat = out_.splats[count_];
+  splat.node = in_.first_node + (k * in_.block.nj + j) * in_.block.ni + i;
+  splat.on_block_face = false;
+  splat.spacing = 0;
+  splat.node_position = splat.splat.position = hexahedron.centre;
+
+  const std::array<uint64_t, 3> index{i, j, k};
+  const std::array<uint64_t, 3> cells{cells_i_, in_.block.nj - 1, in_.block.nk - 1};
+  const std::array<size_t, 3> cell_strides{1, cells_i_, cells_i_ * (known_.j1 - known_.j0)};
+  const std::array<size_t, 3> node_strides{1, row_stride_, plane_stride_};
+  std::array<size_t, 3> before, after;  // elements of NodeArrays
+  std::array<double, 3> per_step;
+  glm::dmat3 steps;
+  glm::dvec3 bend(0.0);             // the sum of the centres' second differences
+  std::array<double, 3> inwards{};  // along i, j, k: 1 or -1 from a border
+  for (int axis = 0; axis < 3; ++axis) {
+    const bool has_before = index[axis] > 0 && scratch_.there[cell - cell_strides[axis]];
+    const bool has_after = index[axis] + 1 < cells[axis] && scratch_.there[cell + cell_strides[axis]];
+    before[axis] = has_before ? node - node_strides[axis] : node;
+    after[axis] = has_after ? node + node_strides[axis] : node;
+    const bool open_before = !has_before && isBorder(index, axis, false);
+    const bool open_after = !has_after && isBorder(index, axis, true);
+    if (open_before != open_after) inwards[axis] = open_before ? 1 : -1;
+    per_step[axis] = has_before && has_after ? 0.5 : 1.0;
+    // Without any neighbour there is no difference along this axis, and the cell's own extent is the step.
+    steps[axis] = has_before || has_after
+                      ? per_step[axis] * (scratch_.centre[has_after ? cell + cell_strides[axis] : cell] -
+                                          scratch_.centre[has_before ? cell - cell_strides[axis] : cell])
+                      : jacobian[axis];
+    if (has_before && has_after)
+      bend += scratch_.centre[cell + cell_strides[axis]] + scratch_.centre[cell - cell_strides[axis]] -
+              2.0 * scratch_.centre[cell];
+  }
+  const LatticeGradient gradient_of(steps);
+  const auto set_values = [&](double scale, const auto& rotate) {
+    SplatScalar* value = out_.values.data() + count_ * in_.nodes->scalars.size();
+    for (const std::vector<float>& f : in_.nodes->scalars) {
+      const double here = f[node];
+      glm::dvec3 differences;
+      double second = 0, least = here, most = here;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double f_before = f[before[axis]], f_after = f[after[axis]];
+        differences[axis] = per_step[axis] * (f_after - f_before);
+        if (before[axis] != node && after[axis] != node) second += (f_after - here) - (here - f_before);
+        least = std::min({least, f_before, f_after});
+        most = std::max({most, f_before, f_after});
+      }
+      // What tangents miss where the scalar bends: node_splats.h.
+      const glm::dvec3 gradient = gradient_of(differences);
+      const double mean = std::clamp(here + kBend * (second - glm::dot(gradient, bend)), least, most);
+      *value++ = {mean, scale * rotate(gradient * jacobian), 0.0};
+    }
+  };
+  // Axes that have the volume of the hexahedron, where they are near it; a weight of its own elsewhere.
+  const auto set_volume = [&](double determinant) {
+    const double volume = determinant + hexahedron.volume_beyond;
+    const double ratio = std::abs(volume / determinant);
+    splat.regular = ratio > 1 / kMostVolumeRatio && ratio < kMostVolumeRatio;
+    const double scale = splat.regular ? std::cbrt(ratio) : 1.0;
+    for (double& axis : splat.splat.axis) axis *= scale;
+    splat.splat.weight =
+        splat.regular ? splat.splat.axis[0] * splat.splat.axis[1] * splat.splat.axis[2] : std::abs(volume);
+    (volume < 0 ? out_.left_handed : out_.right_handed) += 1;
+    return scale;
+  };
+
+  const LqFactors lq({jacobian[0].x, jacobian[1].x, jacobian[2].x},
+                     {jacobian[0].y, jacobian[1].y, jacobian[2].y},
+                     {jacobian[0].z, jacobian[1].z, jacobian[2].z});
+  const Lower3& a = lq.lower;
+  if (surelyAboveFloor(a)) {
+    splat.splat.axis = {a.a00, a.a11, a.a22};
+    splat.splat.shear = {a.a10 * lq.inverse_a00, a.a20 * lq.inverse_a00, a.a21 * lq.inverse_a11};
+    const double scale = set_volume(lq.determinant);
+    const auto rotate = [&](const glm::dvec3& v) { return lq.rotate(v); };
+    set_values(scale, rotate);
+    splat.half_cell = borderCode(inwards, rotate);
+  } else {
+    const CellShape shape = shapeFromJacobian(jacobian, smallestAxis(hexahedron.centre));
+    splat.splat.axis = shape.axis;
+    splat.splat.shear = shape.shear;
+    double scale = 1;
+    if (shape.floored) {
+      splat.regular = false;
+      splat.splat.weight = std::abs(shape.determinant + hexahedron.volume_beyond);
+      ++out_.degenerate;
+    } else {
+      scale = set_volume(shape.determinant);
+    }
+    const auto rotate = [&](const glm::dvec3& v) { return shape.rotation * v; };
+    set_values(scale, rotate);
+    splat.half_cell = borderCode(inwards, rotate);
+  }
+  ++count_;
+}
+
+}  // namespace
+
+void computeCellSplats(const BlockWindow& in, const NodeBox& box, const BlockEnds& ends, CellScratch& scratch,
+                       NodeSplats& out) {
+  const GridBlock& block = in.block;
+  const NodeBox& window = in.window;
+  CURVISPLAT_CHECK(window.j0 <= box.j0 - std::min<uint64_t>(box.j0, 1) &&
+                   window.k0 <= box.k0 - std::min<uint64_t>(box.k0, 1));
+  CURVISPLAT_CHECK(std::min(box.j1 + 2, block.nj) <= window.j1 &&
+                   std::min(box.k1 + 2, block.nk) <= window.k1);
+  out.splats.clear();
+  out.values.clear();
+  out.degenerate = out.right_handed = out.left_handed = 0;
+  if (block.ni < 2 || block.nj < 2 || block.nk < 2) return;  // a sheet has no cells
+  const NodeBox cells{box.j0, std::min(box.j1, block.nj - 1), box.k0, std::min(box.k1, block.nk - 1)};
+  if (cells.j0 >= cells.j1 || cells.k0 >= cells.k1) return;
+
+  const size_t most = (block.ni - 1) * rowsOf(cells);
+  const size_t variables = in.nodes->scalars.size();
+  out.splats.resize(most);
+  out.values.resize(most * variables);
+  Cells rows(in, cells, ends, scratch, out);
+  for (uint64_t k = cells.k0; k < cells.k1; ++k)
+    for (uint64_t j = cells.j0; j < cells.j1; ++j) rows.addRow(j, k);
+  out.splats.resize(rows.count());
+  out.values.resize(rows.count() * variables);
+}
+
+}  // namespace curvisplat

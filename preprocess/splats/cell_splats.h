@@ -1,0 +1,43 @@
+// Cells to splats, for values that stand in cells: the cell is the splat, its centre, Jacobian and volume
+// those of the hexahedron between its eight nodes. Nothing is averaged to nodes, there are no half cells, and
+// cells of abutting blocks abut: nothing is merged at seams.
+//
+// A splat's axes are the Jacobian's, scaled alike so that their product is the hexahedron's volume: then a
+// constant field has the same density in every cell. The slope is that of the linear field through the
+// centres of the neighbouring cells; a missing one (the block ends, or it is not there) makes the difference
+// one-sided.
+//
+// A cell that has no neighbour ends at a border, and its splat remembers where (stream/half_cell.h); there is
+// a neighbour, too, where blocks abut.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "preprocess/grid/slabs.h"
+#include "preprocess/splats/abutting_faces.h"
+#include "preprocess/splats/node_splats.h"
+
+namespace curvisplat {
+
+/// What is beyond the ends of a block.
+struct BlockEnds {
+  size_t block = 0;
+  const AbuttingFaces* faces = nullptr;  // null: cells are not told that they end at borders
+};
+
+/// What computeCellSplats() needs for a while; keeps its capacity.
+struct CellScratch {
+  std::vector<glm::dvec3> centre;
+  std::vector<uint8_t> there;
+};
+
+/// Computes the splats of the cells whose lowest nodes are in `box` and that are there: all of their corners
+/// are, and their values. A splat's number is that of the cell's lowest node. `in.window` is `box` and
+/// kCellHalo where the block goes on; `in.nodes` as a NodeReader of cell-centred scalars gives them.
+/// Overwrites `out` and keeps its capacity. Pure: any thread. Throws nothing but bad_alloc.
+void computeCellSplats(const BlockWindow& in, const NodeBox& box, const BlockEnds& ends, CellScratch& scratch,
+                       NodeSplats& out);
+
+}  // namespace curvisplat

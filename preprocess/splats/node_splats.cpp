@@ -1,0 +1,243 @@
+#include "preprocess/splats/node_splats.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "preprocess/splats/lq.h"
+#include "preprocess/splats/shape.h"
+#include "stream/base/check.h"
+
+namespace curvisplat {
+namespace {
+
+/// Where a node's neighbours are, counted in elements of NodeArrays. A missing neighbour is the node itself:
+/// half the difference of the two is then the Jacobian's column in every case.
+struct Neighbours {
+  std::array<ptrdiff_t, 3> before{}, after{};  // along i, j, k; <= 0 and >= 0
+};
+
+/// What the nodes of a window have in common.
+class Window {
+ public:
+  Window(const BlockWindow& in, const NodeSplatCorrections& corrections, NodeSplats& out)
+      : in_(in),
+        corrections_(corrections),
+        x_(in.nodes->x.data()),
+        y_(in.nodes->y.data()),
+        z_(in.nodes->z.data()),
+        blank_(in.nodes->blank.data()),
+        ni_(in.block.ni),
+        row_stride_(static_cast<ptrdiff_t>(ni_)),
+        plane_stride_(static_cast<ptrdiff_t>(ni_ * (in.window.j1 - in.window.j0))),
+        out_(out) {
+    for (const auto& scalar : in.nodes->scalars) scalars_.push_back(scalar.data());
+  }
+
+  void addRow(uint64_t j, uint64_t k);
+  size_t count() const { return count_; }
+
+ private:
+  bool anyBlankAround(const uint8_t* row, const Neighbours& neighbours) const;
+  void addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face);
+  glm::dvec3 position(ptrdiff_t at) const { return {x_[at], y_[at], z_[at]}; }
+  double spacing(ptrdiff_t at, const Neighbours& neighbours) const;
+  /// A length for the shape of a node without any extent: far below the grid's, and above zero.
+  double smallestAxis(ptrdiff_t at, const Neighbours& neighbours) const;
+
+  const BlockWindow& in_;
+  const NodeSplatCorrections corrections_;
+  const double *x_, *y_, *z_;
+  const uint8_t* blank_;
+  std::vector<const float*> scalars_;
+  uint64_t ni_;
+  ptrdiff_t row_stride_, plane_stride_;
+  uint64_t first_node_of_row_ = 0;
+  NodeSplats& out_;
+  size_t count_ = 0;
+};
+
+bool isFace(uint64_t index, uint64_t count) {
+  return index == 0 || index + 1 == count;
+}
+
+void Window::addRow(uint64_t j, uint64_t k) {
+  const GridBlock& block = in_.block;
+  const ptrdiff_t row = static_cast<ptrdiff_t>(k - in_.window.k0) * plane_stride_ +
+                        static_cast<ptrdiff_t>(j - in_.window.j0) * row_stride_;
+  first_node_of_row_ = in_.first_node + (k * block.nj + j) * ni_;
+  const bool on_face = isFace(j, block.nj) || isFace(k, block.nk);
+
+  Neighbours inner;
+  inner.before = {-1, j > 0 ? -row_stride_ : 0, k > 0 ? -plane_stride_ : 0};
+  inner.after = {1, j + 1 < block.nj ? row_stride_ : 0, k + 1 < block.nk ? plane_stride_ : 0};
+  const auto at_i = [&](uint64_t i) {
+    Neighbours neighbours = inner;
+    if (i == 0) neighbours.before[0] = 0;
+    if (i + 1 == ni_) neighbours.after[0] = 0;
+    return neighbours;
+  };
+
+  if (!anyBlankAround(blank_ + row, inner)) {
+    addNode(0, row, at_i(0), true);
+    for (uint64_t i = 1; i + 1 < ni_; ++i) addNode(i, row + static_cast<ptrdiff_t>(i), inner, on_face);
+    if (ni_ > 1) addNode(ni_ - 1, row + static_cast<ptrdiff_t>(ni_ - 1), at_i(ni_ - 1), true);
+    return;
+  }
+  for (uint64_t i = 0; i < ni_; ++i) {
+    const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
+    if (blank_[at]) continue;
+    Neighbours neighbours = at_i(i);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (blank_[at + neighbours.before[axis]]) neighbours.before[axis] = 0;
+      if (blank_[at + neighbours.after[axis]]) neighbours.after[axis] = 0;
+    }
+    addNode(i, at, neighbours, on_face || isFace(i, ni_));
+  }
+}
+
+bool Window::anyBlankAround(const uint8_t* row, const Neighbours& neighbours) const {
+  const auto any_blank = [&](ptrdiff_t offset) { return std::memchr(row + offset, 1, ni_) != nullptr; };
+  return any_blank(0) || any_blank(neighbours.before[1]) || any_blank(neighbours.after[1]) ||
+         any_blank(neighbours.before[2]) || any_blank(neighbours.after[2]);
+}
+
+inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face) {
+  NodeSplat& node = out_.splats[count_];
+  node.node = first_node_of_row_ + i;
+  node.node_position = position(at);
+  node.on_block_face = on_face;
+  node.spacing = on_face ? spacing(at, neighbours) : 0.0;
+
+  glm::dmat3 jacobian;  // columns along i, j, k
+  for (int axis = 0; axis < 3; ++axis)
+    jacobian[axis] = 0.5 * (position(at + neighbours.after[axis]) - position(at + neighbours.before[axis]));
+
+  // Where the middle of the cell is from the node, in cells. The cell reaches half way to either neighbour,
+  // at distances a and b: its middle is (b - a) / 4 away, of a length of (a + b) / 2. With one neighbour
+  // only, that is a quarter of the difference, inwards.
+  glm::dvec3 middle(0.0);
+  glm::dvec3 bend(0.0);             // the sum of the positions' second differences
+  std::array<double, 3> inwards{};  // along i, j, k: 1 or -1 where the cell is a half one
+  double weight_factor = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const glm::dvec3 to_before = node.node_position - position(at + neighbours.before[axis]);
+    const glm::dvec3 to_after = position(at + neighbours.after[axis]) - node.node_position;
+    const double a = glm::length(to_before), b = glm::length(to_after);
+    const bool whole = neighbours.before[axis] != 0 && neighbours.after[axis] != 0;
+    if (whole) bend += to_after - to_before;
+    if (a + b > 0 && (corrections_.middles || !whole)) middle[axis] = 0.5 * (b - a) / (a + b);
+    if (whole) continue;
+    if (corrections_.half_cells) {
+      if (a + b > 0) inwards[axis] = neighbours.before[axis] == 0 ? 1 : -1;
+    } else {
+      jacobian[axis] *= 2.0;
+      middle[axis] = 0;
+      weight_factor *= 0.5;
+    }
+  }
+  node.splat.position = node.node_position + jacobian * middle;
+
+  // `rotate` gives Q's image of a vector; `to_factor` A⁻¹ of one.
+  const auto set_values = [&](const auto& rotate, const auto& to_factor, bool correct_bends) {
+    const glm::dvec3 bend_in_cells = correct_bends ? to_factor(bend) : glm::dvec3(0.0);
+    SplatScalar* value = out_.values.data() + count_ * scalars_.size();
+    for (const float* f : scalars_) {
+      const double here = f[at];
+      glm::dvec3 gradient;
+      double second = 0, least = here, most = here;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double before = f[at + neighbours.before[axis]], after = f[at + neighbours.after[axis]];
+        gradient[axis] = 0.5 * (after - before);
+        if (neighbours.before[axis] != 0 && neighbours.after[axis] != 0)
+          second += (after - here) - (here - before);
+        least = std::min({least, before, after});
+        most = std::max({most, before, after});
+      }
+      const glm::dvec3 slope = rotate(gradient);
+      double mean = here + glm::dot(gradient, middle);
+      if (correct_bends)
+        mean = std::clamp(mean + kBend * (second - glm::dot(slope, bend_in_cells)), least, most);
+      *value++ = {mean, slope, 0.0};
+    }
+  };
+
+  const LqFactors lq({jacobian[0].x, jacobian[1].x, jacobian[2].x},
+                     {jacobian[0].y, jacobian[1].y, jacobian[2].y},
+                     {jacobian[0].z, jacobian[1].z, jacobian[2].z});
+  const Lower3& a = lq.lower;
+  if (surelyAboveFloor(a)) {
+    node.splat.axis = {a.a00, a.a11, a.a22};
+    node.splat.shear = {a.a10 * lq.inverse_a00, a.a20 * lq.inverse_a00, a.a21 * lq.inverse_a11};
+    node.splat.weight = a.a00 * a.a11 * a.a22 * weight_factor;
+    node.regular = weight_factor == 1;
+    node.half_cell = borderCode(inwards, [&](const glm::dvec3& v) { return lq.rotate(v); });
+    (lq.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
+    set_values([&](const glm::dvec3& gradient) { return lq.rotate(gradient); },
+               [&](const glm::dvec3& v) {
+                 const double v0 = v.x * lq.inverse_a00, v1 = (v.y - a.a10 * v0) * lq.inverse_a11;
+                 return glm::dvec3(v0, v1, (v.z - a.a20 * v0 - a.a21 * v1) / a.a22);
+               },
+               corrections_.bends);
+  } else {
+    const CellShape shape = shapeFromJacobian(jacobian, smallestAxis(at, neighbours));
+    node.splat.axis = shape.axis;
+    node.splat.shear = shape.shear;
+    node.splat.weight = std::abs(shape.determinant) * weight_factor;
+    node.regular = !shape.floored;
+    node.half_cell = borderCode(inwards, [&](const glm::dvec3& v) { return shape.rotation * v; });
+    (shape.floored ? out_.degenerate : shape.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
+    // Where an axis was raised there is no telling a bend of the scalar from one of the coordinates.
+    set_values([&](const glm::dvec3& gradient) { return shape.rotation * gradient; },
+               [](const glm::dvec3& v) { return v; }, false);
+  }
+  ++count_;
+}
+
+double Window::spacing(ptrdiff_t at, const Neighbours& neighbours) const {
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const auto& offsets : {neighbours.before, neighbours.after}) {
+    for (const ptrdiff_t offset : offsets) {
+      const double distance = glm::distance(position(at + offset), position(at));
+      if (distance > 0) smallest = std::min(smallest, distance);
+    }
+  }
+  return std::isfinite(smallest) ? smallest : 0.0;
+}
+
+double Window::smallestAxis(ptrdiff_t at, const Neighbours& neighbours) const {
+  const glm::dvec3 here = glm::abs(position(at));
+  for (const double length : {spacing(at, neighbours), std::max({here.x, here.y, here.z})})
+    if (length > 0) return std::max(kAxisFloor * length, std::numeric_limits<double>::min());
+  return kAxisFloor;
+}
+
+}  // namespace
+
+void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeSplats& out,
+                       const NodeSplatCorrections& corrections) {
+  const NodeBox& window = in.window;
+  CURVISPLAT_CHECK(window.j0 <= (box.j0 > 0 ? box.j0 - 1 : 0) && window.k0 <= (box.k0 > 0 ? box.k0 - 1 : 0));
+  CURVISPLAT_CHECK(std::min(box.j1 + 1, in.block.nj) <= window.j1 &&
+                   std::min(box.k1 + 1, in.block.nk) <= window.k1);
+
+  // Sized for the most there can be and cut afterwards: in a run over equal boxes nothing is initialised
+  // twice.
+  const size_t most = in.block.ni * (box.j1 - box.j0) * (box.k1 - box.k0);
+  const size_t variables = in.nodes->scalars.size();
+  out.splats.resize(most);
+  out.values.resize(most * variables);
+  out.degenerate = out.right_handed = out.left_handed = 0;
+
+  Window rows(in, corrections, out);
+  for (uint64_t k = box.k0; k < box.k1; ++k)
+    for (uint64_t j = box.j0; j < box.j1; ++j) rows.addRow(j, k);
+  out.splats.resize(rows.count());
+  out.values.resize(rows.count() * variables);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,90 @@
+// Nodes to splats: design section 3. Each node that is there gives one splat, the piece of space around it.
+//
+// A node's cell reaches half way to its neighbours, and the splat sits in the cell's middle. On an even grid
+// that is the node; where spacing changes quickly (spectral elements: a factor of 1.6 from cell to cell)
+// splats at the nodes themselves would draw stripes of +-30 %, and those in the middles draw a third of that.
+//
+// A splat says what the scalar is at its middle and how it changes from there: a tangent. Tangents of the
+// neighbours do not meet where the scalar bends, and their weighted mean is off by half the second
+// derivative times the kernel's variance. So much is taken off beforehand: a tenth of each second difference,
+// once what bent coordinates make of a straight scalar is left out; the mean stays within the range of the
+// node and its neighbours.
+//
+// A missing neighbour (the block ends, or the node there is blank) makes the cell a half cell along that
+// axis: the Jacobian's column is half of the one difference there is, and the splat sits a quarter cell
+// inwards. Without any neighbour along an axis the column is zero.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "preprocess/grid/grid_source.h"
+#include "stream/model/half_cell.h"
+#include "stream/model/splats.h"
+
+namespace curvisplat {
+
+/// Half the variance of the kernel along an axis: 0.44655², as in render/kernel.h, which is not for here.
+inline constexpr double kBend = 0.5 * 0.44655 * 0.44655;
+
+/// Where a cell ends, as stream/half_cell.h codes it. `inwards`: along i, j, k, 1 or -1 from a border;
+/// `rotate` gives Q's image of a vector.
+template <typename Rotate>
+uint32_t borderCode(const std::array<double, 3>& inwards, const Rotate& rotate) {
+  std::array<glm::dvec3, 3> axes;
+  size_t count = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (inwards[axis] == 0) continue;
+    glm::dvec3 along(0.0);
+    along[axis] = inwards[axis];
+    axes[count++] = rotate(along);
+  }
+  return count > 0 ? packHalfCell({axes.data(), count}) : kNoBorder;
+}
+
+/// A node's splat on its way into the cache.
+struct NodeSplat {
+  uint64_t node = 0;               // number in the whole grid: block after block, i fastest, then j, k
+  Splat splat;                     // position: world units, moved inwards where the node owns a half cell
+  bool regular = true;             // weight is a0 a1 a2, and every variable's variance is 0
+  uint32_t half_cell = kNoBorder;  // stream/half_cell.h
+  bool on_block_face = false;      // may coincide with a node of another face: to be merged by SeamMerger
+  glm::dvec3 node_position{0.0};   // where the node itself is
+  double spacing = 0;  // on a block face: the smallest distance > 0 to a neighbour along an axis, 0 if there
+                       // is none; the seams' tolerance. Elsewhere 0
+};
+
+/// The splats of some rows of one block. Values are [splat * variables + variable].
+struct NodeSplats {
+  std::vector<NodeSplat> splats;  // in node order
+  std::vector<SplatScalar> values;
+  uint64_t degenerate = 0;    // splats with a floored axis
+  uint64_t right_handed = 0;  // of the others: det J > 0
+  uint64_t left_handed = 0;   // det J < 0. The smaller of a whole block's two sums counts its inverted cells
+};
+
+/// A window of one block: `nodes` holds `window`, which is `box` and a halo of one plane in j and k where the
+/// block goes on.
+struct BlockWindow {
+  GridBlock block;
+  uint64_t first_node = 0;  // of the block in the whole grid
+  NodeBox window;
+  const NodeArrays* nodes = nullptr;  // i fastest; scalars in the order of the cache's variables
+};
+
+/// What is done beyond the linear part of the mapping at the node. Conversion does all of it; tests switch
+/// one off and see what it is worth.
+struct NodeSplatCorrections {
+  bool half_cells = true;  // else a border's node has a whole cell of half the weight, around itself
+  bool middles = true;     // else splats sit at nodes, but for half cells
+  bool bends = true;       // of the scalar
+};
+
+/// Computes the splats of the nodes of `box` that are not blank. Overwrites `out` and keeps its capacity.
+/// Pure: any thread. Throws nothing but bad_alloc.
+void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeSplats& out,
+                       const NodeSplatCorrections& corrections = {});
+
+}  // namespace curvisplat

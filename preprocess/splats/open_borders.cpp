@@ -1,0 +1,60 @@
+#include "preprocess/splats/open_borders.h"
+
+#include <algorithm>
+#include <array>
+#include <glm/geometric.hpp>
+
+namespace curvisplat {
+namespace {
+
+constexpr double kSimilar = 0.5;    // cosine: of one direction
+constexpr double kOpposite = -0.5;  // of two that close one another
+constexpr double kLeast = 0.1;      // what must be left of a direction at right angles to the others
+
+/// A⁻¹ v by forward substitution.
+glm::dvec3 inFrame(const Splat& s, const glm::dvec3& v) {
+  const auto& [l10, l20, l21] = s.shear;
+  const double u0 = v.x, u1 = v.y - l10 * u0, u2 = v.z - l20 * u0 - l21 * u1;
+  return {u0 / s.axis[0], u1 / s.axis[1], u2 / s.axis[2]};
+}
+
+}  // namespace
+
+void OpenBorders::add(const Splat& part, uint32_t half_cell) {
+  const InwardAxes inward = inwardAxes(half_cell);
+  for (int a = 0; a < inward.count; ++a)
+    inward_.push_back({part.factor() * glm::dvec3(inward.axis[a]), parts_});
+  ++parts_;
+}
+
+uint32_t OpenBorders::of(const Splat& merged) const {
+  std::vector<glm::dvec3> directions;
+  for (const Inward& inward : inward_) directions.push_back(glm::normalize(inFrame(merged, inward.along)));
+
+  std::vector<glm::dvec3> open;  // sums of similar directions
+  for (size_t n = 0; n < directions.size(); ++n) {
+    const glm::dvec3& direction = directions[n];
+    bool closed = false;
+    for (size_t m = 0; m < directions.size(); ++m)
+      closed |= inward_[m].part != inward_[n].part && glm::dot(directions[m], direction) < kOpposite;
+    if (closed) continue;
+    const auto same = std::find_if(open.begin(), open.end(), [&](const glm::dvec3& other) {
+      return glm::dot(glm::normalize(other), direction) > kSimilar;
+    });
+    if (same == open.end())
+      open.push_back(direction);
+    else
+      *same += direction;
+  }
+
+  std::array<glm::dvec3, 3> axes;
+  size_t count = 0;
+  for (glm::dvec3 axis : open) {
+    axis = glm::normalize(axis);
+    for (size_t n = 0; n < count; ++n) axis -= glm::dot(axis, axes[n]) * axes[n];
+    if (count < 3 && glm::length(axis) > kLeast) axes[count++] = glm::normalize(axis);
+  }
+  return packHalfCell({axes.data(), count});
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,64 @@
+// The linear algebra of a splat's shape: 3x3, double, and total. Singular, badly scaled and left-handed
+// matrices are everyday input here (polar axes, boundary layers of aspect ratio 1e5), so nothing is squared
+// that need not be and nothing divides by what may be zero.
+#pragma once
+
+#include <array>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+
+#include "preprocess/splats/lq.h"
+#include "stream/model/splats.h"
+
+namespace curvisplat {
+
+/// The smallest axis of a splat, relative to its largest: singular values of A below are raised to it.
+/// Thinner cells than this are degenerate; cells of a boundary layer (1e-5) are not, and stay as they are.
+inline constexpr double kAxisFloor = 1e-6;
+
+/// A symmetric matrix: its lower triangle.
+struct Symmetric3 {
+  double xx = 0, xy = 0, yy = 0, xz = 0, yz = 0, zz = 0;
+};
+
+/// The shape of a cell: A and the rotation that belongs to it, from J = A Q.
+struct CellShape {
+  std::array<double, 3> axis;   // as Splat's
+  std::array<double, 3> shear;  // as Splat's
+  glm::dmat3 rotation;          // Q, orthogonal, GLM's columns. The slope is Q ∇_c f
+  double determinant;           // of J as it came, with its sign; 0 if J is singular up to rounding
+  bool floored;                 // a singular value was raised
+};
+
+/// A and Q from a Jacobian of any rank, its singular values raised to kAxisFloor of the largest. The zero
+/// matrix gives `smallest` (> 0) on A's diagonal. Throws nothing.
+CellShape shapeFromJacobian(const glm::dmat3& jacobian, double smallest);
+
+/// A (into `splat`'s axis and shear) from S = A Aᵀ, positive semi-definite up to rounding. The floor as
+/// above.
+void setShape(Splat& splat, const Symmetric3& s, double smallest);
+
+/// S = A Aᵀ of a splat.
+Symmetric3 shapeMatrix(const Splat& splat);
+
+/// The singular values of `m`, largest first: the semi-axes of the ellipsoid that `m` makes of the unit
+/// sphere. Of a splat: singularValues(splat.factor()). Exact to a few units in the last place of each for
+/// matrices whose columns are badly scaled, and of the largest otherwise.
+std::array<double, 3> singularValues(const glm::dmat3& m);
+
+/// True only if every singular value of `a` is above kAxisFloor times the largest: with singular values s0 >=
+/// s1 >= s2, s2 = det / (s0 s1) >= det / ‖adj a‖ and s0 <= ‖a‖ (Frobenius norms). Says no from an aspect
+/// ratio of a third of the limit on, and for lengths whose sixth power leaves the range of double; those are
+/// for the slow and exact way.
+inline bool surelyAboveFloor(const Lower3& a) {
+  const double norm2 =
+      a.a00 * a.a00 + a.a10 * a.a10 + a.a11 * a.a11 + a.a20 * a.a20 + a.a21 * a.a21 + a.a22 * a.a22;
+  const double c0 = a.a11 * a.a22, c1 = a.a10 * a.a22, c2 = a.a10 * a.a21 - a.a11 * a.a20;
+  const double c3 = a.a00 * a.a22, c4 = a.a00 * a.a21, c5 = a.a00 * a.a11;
+  const double adjugate2 = c0 * c0 + c1 * c1 + c2 * c2 + c3 * c3 + c4 * c4 + c5 * c5;
+  const double determinant = c5 * a.a22;
+  constexpr double kMargin = 1.01;  // for the rounding of c2
+  return determinant * determinant > kMargin * kAxisFloor * kAxisFloor * norm2 * adjugate2;
+}
+
+}  // namespace curvisplat

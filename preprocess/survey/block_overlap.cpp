@@ -1,0 +1,356 @@
+#include "preprocess/survey/block_overlap.h"
+
+#include <fmt/format.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <limits>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "preprocess/grid/hexahedron.h"
+#include "preprocess/grid/node_reader.h"
+#include "preprocess/grid/slabs.h"
+#include "stream/base/check.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr Halo kCorners{0, 1};
+constexpr double kPoints = 100'000;  // within all blocks together, about; more at their faces
+constexpr size_t kMostBlocks = 20'000;
+constexpr uint64_t kBinsAlongAxis = 64;
+// Less than this of the smaller block is rounding, or chords of a curved face that two blocks cut
+// differently.
+constexpr double kNegligibleShare = 2e-3;
+constexpr size_t kPairsNamed = 4;
+
+struct Box {
+  glm::dvec3 lower{std::numeric_limits<double>::infinity()};
+  glm::dvec3 upper{-std::numeric_limits<double>::infinity()};
+
+  void add(const glm::dvec3& point) {
+    lower = glm::min(lower, point);
+    upper = glm::max(upper, point);
+  }
+  bool meets(const Box& other) const {
+    for (int axis = 0; axis < 3; ++axis)
+      if (!(lower[axis] < other.upper[axis] && other.lower[axis] < upper[axis])) return false;
+    return true;
+  }
+  bool holds(const glm::dvec3& point) const {
+    for (int axis = 0; axis < 3; ++axis)
+      if (!(lower[axis] <= point[axis] && point[axis] <= upper[axis])) return false;
+    return true;
+  }
+};
+
+/// A point of a block, and the volume that it stands for.
+struct BlockPoint {
+  glm::dvec3 position{0.0};
+  double volume = 0;
+  uint32_t block = 0;
+};
+
+/// Part of a cell along one axis: where in it (0 to 1), and how many cells that stands for.
+struct AxisPoint {
+  double t, cells;
+};
+
+/// The points of `cells` cells along an axis, by cell: several in the first and the last one, close to the
+/// block's ends, where blocks overlap by less than a cell; `wanted` in the middles of others, evenly spread.
+std::map<uint64_t, std::vector<AxisPoint>> pointsAlong(uint64_t cells, uint64_t wanted, bool few) {
+  const std::vector<AxisPoint> end = few ? std::vector<AxisPoint>{{0.1, 0.2}, {0.6, 0.8}}
+                                         : std::vector<AxisPoint>{{0.05, 0.1}, {0.2, 0.2}, {0.65, 0.7}};
+  std::map<uint64_t, std::vector<AxisPoint>> points;
+  if (cells == 1) {
+    for (const AxisPoint& point : end) {
+      points[0].push_back({point.t / 2, point.cells / 2});
+      points[0].push_back({1 - point.t / 2, point.cells / 2});
+    }
+    return points;
+  }
+  points[0] = end;
+  for (const AxisPoint& point : end) points[cells - 1].push_back({1 - point.t, point.cells});
+  const uint64_t inner = cells - 2, count = std::min(inner, std::max<uint64_t>(1, wanted));
+  for (uint64_t n = 0; n < count; ++n)
+    points[1 + (2 * n + 1) * inner / (2 * count)] = {
+        {0.5, static_cast<double>(inner) / static_cast<double>(count)}};
+  return points;
+}
+
+/// Where points are taken in a block.
+struct Sampling {
+  std::map<uint64_t, std::vector<AxisPoint>> i, j, k;
+
+  Sampling(const GridBlock& block, double cells_in_all, size_t blocks) {
+    const auto cells = static_cast<double>((block.ni - 1) * (block.nj - 1) * (block.nk - 1));
+    // As many of 1 in `step` cells along each axis.
+    const double step = std::max(1.0, std::cbrt(cells_in_all / kPoints));
+    const auto wanted = [&](uint64_t nodes) {
+      return static_cast<uint64_t>(static_cast<double>(nodes - 1) / step);
+    };
+    const bool few = blocks > 200;
+    CURVISPLAT_CHECK(cells > 0);
+    i = pointsAlong(block.ni - 1, wanted(block.ni), few);
+    j = pointsAlong(block.nj - 1, wanted(block.nj), few);
+    k = pointsAlong(block.nk - 1, wanted(block.nk), few);
+  }
+};
+
+glm::dvec3 pointIn(const std::array<glm::dvec3, 8>& corner, double u, double v, double w) {
+  const auto along_i = [&](size_t c) { return glm::mix(corner[c], corner[c + 1], u); };
+  return glm::mix(glm::mix(along_i(0), along_i(2), v), glm::mix(along_i(4), along_i(6), v), w);
+}
+
+/// Whether the trilinear hexahedron holds the point: its map is inverted by Newton's method.
+bool holds(const std::array<glm::dvec3, 8>& corner, const glm::dvec3& point) {
+  glm::dvec3 u(0.0);
+  constexpr int kSteps = 12;
+  for (int step = 0; step < kSteps; ++step) {
+    glm::dvec3 at(0.0);
+    glm::dmat3 jacobian(0.0);
+    for (int c = 0; c < 8; ++c) {
+      const glm::dvec3 side(c & 1 ? 1 : -1, c & 2 ? 1 : -1, c & 4 ? 1 : -1);
+      const glm::dvec3 weight = 0.5 * (1.0 + side * u);
+      const glm::dvec3& node = corner[static_cast<size_t>(c)];
+      at += weight.x * weight.y * weight.z * node;
+      jacobian[0] += 0.5 * side.x * weight.y * weight.z * node;
+      jacobian[1] += 0.5 * side.y * weight.x * weight.z * node;
+      jacobian[2] += 0.5 * side.z * weight.x * weight.y * node;
+    }
+    const double determinant = glm::determinant(jacobian);
+    if (determinant == 0) return false;
+    const glm::dvec3 change = glm::inverse(jacobian) * (point - at);
+    u += change;
+    const double size = glm::length(change);
+    if (!(size < 1e3)) return false;
+    if (size < 1e-6) break;
+    if (step + 1 == kSteps) return false;
+  }
+  return std::abs(u.x) < 1 && std::abs(u.y) < 1 && std::abs(u.z) < 1;
+}
+
+/// Points by the cell of an even lattice that they lie in.
+class Bins {
+ public:
+  explicit Bins(std::vector<BlockPoint> points) : points_(std::move(points)) {
+    for (const BlockPoint& point : points_) box_.add(point.position);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double extent = box_.upper[axis] - box_.lower[axis];
+      scale_[axis] = extent > 0 ? static_cast<double>(kBinsAlongAxis) / extent : 0.0;
+    }
+    first_.assign(kBinsAlongAxis * kBinsAlongAxis * kBinsAlongAxis + 1, 0);
+    for (const BlockPoint& point : points_) ++first_[binOf(point.position) + 1];
+    for (size_t bin = 1; bin < first_.size(); ++bin) first_[bin] += first_[bin - 1];
+    std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
+    sorted_.resize(points_.size());
+    for (uint32_t n = 0; n < points_.size(); ++n) sorted_[next[binOf(points_[n].position)]++] = n;
+  }
+
+  const std::vector<BlockPoint>& points() const { return points_; }
+
+  template <typename Each>
+  void forEachIn(const Box& box, const Each& each) const {
+    if (!box_.meets(box)) return;
+    const auto low = place(box.lower), high = place(box.upper);
+    for (uint64_t z = low[2]; z <= high[2]; ++z)
+      for (uint64_t y = low[1]; y <= high[1]; ++y) {
+        const uint64_t row = (z * kBinsAlongAxis + y) * kBinsAlongAxis;
+        for (uint32_t n = first_[row + low[0]]; n < first_[row + high[0] + 1]; ++n) each(sorted_[n]);
+      }
+  }
+
+ private:
+  std::array<uint64_t, 3> place(const glm::dvec3& position) const {
+    std::array<uint64_t, 3> place;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double at = (position[axis] - box_.lower[axis]) * scale_[axis];
+      place[axis] = static_cast<uint64_t>(std::clamp(at, 0.0, static_cast<double>(kBinsAlongAxis - 1)));
+    }
+    return place;
+  }
+  uint64_t binOf(const glm::dvec3& position) const {
+    const auto at = place(position);
+    return (at[2] * kBinsAlongAxis + at[1]) * kBinsAlongAxis + at[0];
+  }
+
+  std::vector<BlockPoint> points_;
+  Box box_;
+  glm::dvec3 scale_{0.0};
+  std::vector<uint32_t> first_, sorted_;
+};
+
+/// Calls each(element of the lowest node, strides, i, j, k) for the cells of a slab that are there, in
+/// parallel by rows; `keep` says of a row whether it is wanted.
+template <typename Keep, typename Each>
+void forEachCell(const GridBlock& block, const LoadedSlab& loaded, const Keep& keep, const Each& each) {
+  const Slab& slab = loaded.slab;
+  const size_t row = block.ni, plane = row * (slab.window.j1 - slab.window.j0);
+  const uint64_t width = slab.box.j1 - slab.box.j0;
+  tbb::parallel_for(uint64_t{0}, rowsOf(slab.box), [&](uint64_t n) {
+    const uint64_t j = slab.box.j0 + n % width, k = slab.box.k0 + n / width;
+    if (j + 1 >= block.nj || k + 1 >= block.nk || !keep(j, k)) return;
+    const size_t first = (k - slab.window.k0) * plane + (j - slab.window.j0) * row;
+    for (uint64_t i = 0; i + 1 < block.ni; ++i)
+      if (!cornerMarks(loaded.nodes.blank.data(), first + i, row, plane))
+        each(first + i, row, plane, i, j, k);
+  });
+}
+
+std::array<glm::dvec3, 8> cornersIn(const LoadedSlab& loaded, size_t at, size_t row, size_t plane) {
+  return cornersAt(loaded.nodes.x.data(), loaded.nodes.y.data(), loaded.nodes.z.data(), at, row, plane);
+}
+
+struct BlockMeasure {
+  Box box;
+  double volume = 0;
+};
+
+/// The first reading: boxes and volumes of the blocks, and points in them.
+std::vector<BlockPoint> pickPoints(const NodeReader& reader, uint64_t slab_bytes, const Progress& progress,
+                                   std::vector<BlockMeasure>& measures) {
+  const std::vector<GridBlock>& blocks = reader.source().description().blocks;
+  double cells = 0;
+  for (const GridBlock& block : blocks)
+    cells += static_cast<double>((block.ni - 1) * (block.nj - 1) * (block.nk - 1));
+  using Numbered = std::pair<std::pair<uint32_t, uint64_t>, std::vector<BlockPoint>>;  // of (block, cell)
+  std::vector<Numbered> of_cells;
+  SlabStream slabs(reader, slab_bytes, kCorners);
+  while (const LoadedSlab* loaded = slabs.next()) {
+    progress.throwIfStopped();
+    const uint32_t number = loaded->slab.block;
+    const GridBlock& block = blocks[number];
+    for (size_t n = 0; n < loaded->nodes.x.size(); ++n)
+      if (!loaded->nodes.blank[n])
+        measures[number].box.add({loaded->nodes.x[n], loaded->nodes.y[n], loaded->nodes.z[n]});
+    if (block.ni < 2 || block.nj < 2 || block.nk < 2) continue;
+    const Sampling sampling(block, cells, blocks.size());
+    tbb::enumerable_thread_specific<std::vector<Numbered>> found;
+    forEachCell(
+        block, *loaded,
+        [&](uint64_t j, uint64_t k) { return sampling.j.contains(j) && sampling.k.contains(k); },
+        [&](size_t at, size_t row, size_t plane, uint64_t i, uint64_t j, uint64_t k) {
+          const auto along_i = sampling.i.find(i);
+          if (along_i == sampling.i.end()) return;
+          const std::array<glm::dvec3, 8> corner = cornersIn(*loaded, at, row, plane);
+          const double volume = std::abs(Hexahedron(corner).volume());
+          std::vector<BlockPoint> points;
+          for (const AxisPoint& w : sampling.k.at(k))
+            for (const AxisPoint& v : sampling.j.at(j))
+              for (const AxisPoint& u : along_i->second)
+                points.push_back(
+                    {pointIn(corner, u.t, v.t, w.t), volume * u.cells * v.cells * w.cells, number});
+          found.local().push_back({{number, (k * block.nj + j) * block.ni + i}, std::move(points)});
+        });
+    for (const auto& of_thread : found) of_cells.insert(of_cells.end(), of_thread.begin(), of_thread.end());
+  }
+  std::sort(of_cells.begin(), of_cells.end(),
+            [](const Numbered& a, const Numbered& b) { return a.first < b.first; });
+  std::vector<BlockPoint> points;
+  for (const auto& [cell, of_cell] : of_cells)
+    for (const BlockPoint& point : of_cell) {
+      points.push_back(point);
+      measures[point.block].volume += point.volume;
+    }
+  return points;
+}
+
+/// The second reading: which points (by number) lie in which other block, sorted.
+std::vector<std::pair<uint32_t, uint32_t>> findInside(const NodeReader& reader, uint64_t slab_bytes,
+                                                      const Progress& progress, const Bins& bins) {
+  const std::vector<GridBlock>& blocks = reader.source().description().blocks;
+  std::vector<std::pair<uint32_t, uint32_t>> inside;
+  SlabStream slabs(reader, slab_bytes, kCorners);
+  while (const LoadedSlab* loaded = slabs.next()) {
+    progress.throwIfStopped();
+    const uint32_t number = loaded->slab.block;
+    tbb::enumerable_thread_specific<std::vector<uint32_t>> found;
+    forEachCell(
+        blocks[number], *loaded, [](uint64_t, uint64_t) { return true; },
+        [&](size_t at, size_t row, size_t plane, uint64_t, uint64_t, uint64_t) {
+          const std::array<glm::dvec3, 8> corner = cornersIn(*loaded, at, row, plane);
+          Box box;
+          for (const glm::dvec3& node : corner) box.add(node);
+          bins.forEachIn(box, [&](uint32_t n) {
+            const BlockPoint& point = bins.points()[n];
+            if (point.block != number && box.holds(point.position) && holds(corner, point.position))
+              found.local().push_back(n);
+          });
+        });
+    for (const auto& of_thread : found)
+      for (const uint32_t point : of_thread) inside.push_back({point, number});
+  }
+  // Two cells may hold a point of their common face.
+  std::sort(inside.begin(), inside.end());
+  inside.erase(std::unique(inside.begin(), inside.end()), inside.end());
+  return inside;
+}
+
+}  // namespace
+
+std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_bytes,
+                                       const Progress& progress) {
+  const size_t blocks = source.description().blocks.size();
+  std::vector<BlockOverlap> overlaps;
+  if (blocks < 2 || blocks > kMostBlocks) return overlaps;
+  const NodeReader reader(source, {}, std::nullopt);
+  std::vector<BlockMeasure> measures(blocks);
+  std::vector<BlockPoint> points = pickPoints(reader, slab_bytes, progress, measures);
+
+  // Points that lie in no other block's box need not be looked for.
+  std::erase_if(points, [&](const BlockPoint& point) {
+    progress.throwIfStopped();
+    for (uint32_t b = 0; b < blocks; ++b)
+      if (b != point.block && measures[b].box.holds(point.position)) return false;
+    return true;
+  });
+  if (points.empty()) return overlaps;
+  const Bins bins(std::move(points));
+
+  std::map<std::pair<uint32_t, uint32_t>, double> shared;  // (of the points, of the cells): volume
+  for (const auto& [point, block] : findInside(reader, slab_bytes, progress, bins))
+    shared[{bins.points()[point].block, block}] += bins.points()[point].volume;
+  // What one block's points say of a pair is as good as what the other's do: the larger is taken.
+  std::map<std::pair<uint32_t, uint32_t>, double> of_pairs;
+  for (const auto& [pair, volume] : shared) {
+    double& largest = of_pairs[std::minmax(pair.first, pair.second)];
+    largest = std::max(largest, volume);
+  }
+  for (const auto& [pair, volume] : of_pairs) {
+    const double smaller = std::min(measures[pair.first].volume, measures[pair.second].volume);
+    if (volume > kNegligibleShare * smaller)
+      overlaps.push_back(
+          {pair.first, pair.second, std::min(volume, smaller), std::min(1.0, volume / smaller)});
+  }
+  return overlaps;
+}
+
+std::string overlapWarning(const GridDescription& description, const std::vector<BlockOverlap>& overlaps) {
+  if (description.blocks.size() > kMostBlocks)
+    return fmt::format("whether its {} blocks overlap was not looked at: they are more than {}",
+                       description.blocks.size(), kMostBlocks);
+  if (overlaps.empty()) return "";
+  std::vector<BlockOverlap> largest = overlaps;
+  std::stable_sort(largest.begin(), largest.end(),
+                   [](const BlockOverlap& a, const BlockOverlap& b) { return a.volume > b.volume; });
+  double total = 0;
+  for (const BlockOverlap& overlap : overlaps) total += overlap.volume;
+  std::string pairs;
+  for (size_t n = 0; n < std::min(kPairsNamed, largest.size()); ++n)
+    pairs +=
+        fmt::format("{}{} and {} ({:.3g}, {:.2g} % of the smaller)", n ? "; " : "",
+                    description.blocks[largest[n].first].name, description.blocks[largest[n].second].name,
+                    largest[n].volume, 100 * largest[n].share);
+  if (largest.size() > kPairsNamed) pairs += fmt::format("; and {} more pairs", largest.size() - kPairsNamed);
+  return fmt::format(
+      "blocks overlap in about {:.3g} cubic units, and are drawn twice there: {}; blank one of them", total,
+      pairs);
+}
+
+}  // namespace curvisplat

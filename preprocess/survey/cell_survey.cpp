@@ -1,0 +1,115 @@
+#include "preprocess/survey/cell_survey.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <array>
+#include <glm/common.hpp>
+#include <mutex>
+
+#include "preprocess/grid/hexahedron.h"
+#include "preprocess/grid/slabs.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kNodesPerTask = 16384;
+constexpr Halo kCorners{0, 1};
+
+/// Whether it is there.
+bool addCell(const NodeArrays& nodes, size_t at, size_t row_stride, size_t plane_stride, GridSurvey& survey) {
+  ++survey.nodes;
+  const uint8_t own = nodes.blank[at];
+  if ((cornerMarks(nodes.blank.data(), at, row_stride, plane_stride) & kNoNode) || (own & kNoValue)) {
+    ++survey.blanked.by_grid;
+    return false;
+  }
+  if (own & kBlankValue) {
+    ++survey.blanked.by_value;
+    return false;
+  }
+  if (own & kValueNotFinite) {
+    ++survey.blanked.not_finite;
+    return false;
+  }
+  for (const glm::dvec3& corner :
+       cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at, row_stride, plane_stride)) {
+    survey.lower = glm::min(survey.lower, corner);
+    survey.upper = glm::max(survey.upper, corner);
+  }
+  for (size_t scalar = 0; scalar < survey.ranges.size(); ++scalar) {
+    const double value = nodes.scalars[scalar][at];
+    survey.ranges[scalar].min = std::min(survey.ranges[scalar].min, value);
+    survey.ranges[scalar].max = std::max(survey.ranges[scalar].max, value);
+  }
+  return true;
+}
+
+GridSurvey united(GridSurvey a, const GridSurvey& b) {
+  a.nodes += b.nodes;
+  a.blanked += b.blanked;
+  a.lower = glm::min(a.lower, b.lower);
+  a.upper = glm::max(a.upper, b.upper);
+  for (size_t scalar = 0; scalar < a.ranges.size(); ++scalar) {
+    a.ranges[scalar].min = std::min(a.ranges[scalar].min, b.ranges[scalar].min);
+    a.ranges[scalar].max = std::max(a.ranges[scalar].max, b.ranges[scalar].max);
+  }
+  return a;
+}
+
+}  // namespace
+
+GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces,
+                       Progress& progress) {
+  std::mutex adding_faces;  // guards *faces
+  GridSurvey nothing;
+  nothing.ranges.resize(reader.scalars());
+  GridSurvey survey = nothing;
+  SlabStream slabs(reader, slab_bytes, kCorners);
+  while (const LoadedSlab* loaded = slabs.next()) {
+    const Slab& slab = loaded->slab;
+    const NodeArrays& nodes = loaded->nodes;
+    const GridBlock& block = reader.source().description().blocks[slab.block];
+    const size_t plane_stride = block.ni * (slab.window.j1 - slab.window.j0);
+    const uint64_t rows = slab.box.j1 - slab.box.j0;
+    const auto add_ends = [&](const std::array<uint64_t, 3>& cell, size_t at,
+                              std::vector<AbuttingFaces::Centre>& ends) {
+      for (int axis = 0; axis < 3; ++axis)
+        for (const bool upper : {false, true})
+          if (const CellFace face{slab.block, cell, axis, upper}; faces->isAtEnd(face))
+            ends.push_back(faces->centreOf(
+                face, cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at, block.ni, plane_stride)));
+    };
+    const auto add_row = [&](size_t row, GridSurvey& to, std::vector<AbuttingFaces::Centre>& ends) {
+      const uint64_t j = slab.box.j0 + row % rows, k = slab.box.k0 + row / rows;
+      if (j + 1 == block.nj || k + 1 == block.nk) return;
+      const size_t first = (k - slab.window.k0) * plane_stride + (j - slab.window.j0) * block.ni;
+      const bool row_at_end = j == 0 || j + 2 == block.nj || k == 0 || k + 2 == block.nk;
+      for (uint64_t i = 0; i + 1 < block.ni; ++i) {
+        const bool is_there = addCell(nodes, first + i, block.ni, plane_stride, to);
+        const bool at_end = row_at_end || i == 0 || i + 2 == block.ni;
+        if (faces && is_there && at_end) add_ends({i, j, k}, first + i, ends);
+      }
+    };
+    // Counts, the smallest and the largest do not depend on how the work is divided.
+    survey =
+        united(std::move(survey),
+               tbb::parallel_reduce(
+                   tbb::blocked_range<size_t>(0, rowsOf(slab.box), kNodesPerTask / block.ni + 1), nothing,
+                   [&](const tbb::blocked_range<size_t>& range, GridSurvey of_range) {
+                     std::vector<AbuttingFaces::Centre> ends;
+                     for (size_t row = range.begin(); row < range.end(); ++row) add_row(row, of_range, ends);
+                     if (!ends.empty()) {
+                       const std::lock_guard lock(adding_faces);
+                       faces->add(ends);
+                     }
+                     return of_range;
+                   },
+                   united));
+    progress.advance(rowsOf(slab.box) * block.ni);
+  }
+  return survey;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,168 @@
+#include "preprocess/survey/grid_statistics.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "preprocess/grid/hexahedron.h"
+#include "preprocess/grid/slabs.h"
+#include "preprocess/survey/cell_survey.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr Halo kCorners{0, 1};
+// The edges at a corner, as unit vectors: less volume than this between them is rounding.
+constexpr double kNoVolume = 1e-12;
+
+template <typename Value>
+void widen(ScalarRange& range, const std::vector<Value>& values, const std::vector<uint8_t>& blank) {
+  for (size_t n = 0; n < values.size(); ++n) {
+    if (blank[n]) continue;
+    range.min = std::min<double>(range.min, values[n]);
+    range.max = std::max<double>(range.max, values[n]);
+  }
+}
+
+/// Cells of some rows; one with corners of both hands counts for both.
+struct CellCounts {
+  uint64_t cells = 0, degenerate = 0, right = 0, left = 0;
+  double volume = 0;
+};
+
+CellCounts sum(CellCounts a, const CellCounts& b) {
+  a.cells += b.cells;
+  a.degenerate += b.degenerate;
+  a.right += b.right;
+  a.left += b.left;
+  a.volume += b.volume;
+  return a;
+}
+
+/// The handedness of the edges at the eight corners.
+struct Corners {
+  bool flat = false, right = false, left = false;  // whether any is
+
+  explicit Corners(const std::array<glm::dvec3, 8>& corner) {
+    for (size_t c = 0; c < 8; ++c) {
+      const glm::dvec3 i = corner[c | 1] - corner[c & 6], j = corner[c | 2] - corner[c & 5],
+                       k = corner[c | 4] - corner[c & 3];
+      const double size = glm::length(i) * glm::length(j) * glm::length(k);
+      const double volume = Hexahedron::triple(i, j, k);
+      if (std::abs(volume) <= kNoVolume * size)
+        flat = true;
+      else
+        (volume < 0 ? left : right) = true;
+    }
+  }
+};
+
+CellCounts countCells(const GridBlock& block, const LoadedSlab& loaded) {
+  const Slab& slab = loaded.slab;
+  const NodeArrays& nodes = loaded.nodes;
+  const size_t row = block.ni, plane = row * (slab.window.j1 - slab.window.j0);
+  const uint64_t width = slab.box.j1 - slab.box.j0;
+  // Deterministic: the volume is a sum of floating-point numbers.
+  return tbb::parallel_deterministic_reduce(
+      tbb::blocked_range<uint64_t>(0, rowsOf(slab.box), 16), CellCounts(),
+      [&](const tbb::blocked_range<uint64_t>& rows, CellCounts counts) {
+        for (uint64_t n = rows.begin(); n < rows.end(); ++n) {
+          const uint64_t j = slab.box.j0 + n % width, k = slab.box.k0 + n / width;
+          if (j + 1 >= block.nj || k + 1 >= block.nk) continue;
+          const size_t first = (k - slab.window.k0) * plane + (j - slab.window.j0) * row;
+          for (size_t at = first; at + 1 < first + block.ni; ++at) {
+            if (cornerMarks(nodes.blank.data(), at, row, plane)) continue;
+            const auto corner = cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at, row, plane);
+            const Corners corners(corner);
+            ++counts.cells;
+            counts.degenerate += corners.flat;
+            counts.right += corners.right;
+            counts.left += corners.left;
+            counts.volume += std::abs(Hexahedron(corner).volume());
+          }
+        }
+        return counts;
+      },
+      sum);
+}
+
+}  // namespace
+
+BlankCounts GridStatistics::blank() const {
+  BlankCounts total;
+  for (const BlockStatistics& block : blocks) total += block.blank;
+  return total;
+}
+
+uint64_t GridStatistics::cells() const {
+  uint64_t total = 0;
+  for (const BlockStatistics& block : blocks) total += block.cells;
+  return total;
+}
+
+uint64_t GridStatistics::degenerate() const {
+  uint64_t total = 0;
+  for (const BlockStatistics& block : blocks) total += block.degenerate;
+  return total;
+}
+
+uint64_t GridStatistics::inverted() const {
+  uint64_t total = 0;
+  for (const BlockStatistics& block : blocks) total += block.inverted;
+  return total;
+}
+
+GridStatistics measureGrid(const GridSource& source, const std::vector<uint32_t>& scalars,
+                           uint64_t slab_bytes, Progress& progress) {
+  const GridDescription& description = source.description();
+  GridStatistics statistics;
+  statistics.blocks.resize(description.blocks.size());
+  statistics.scalars.resize(scalars.size());
+
+  std::vector<uint32_t> at_nodes, in_cells;
+  std::vector<size_t> of_nodes, of_cells;  // where they stand in `scalars`
+  for (size_t n = 0; n < scalars.size(); ++n) {
+    const bool cell = description.scalars[scalars[n]].centring == Centring::cell;
+    (cell ? in_cells : at_nodes).push_back(scalars[n]);
+    (cell ? of_cells : of_nodes).push_back(n);
+  }
+
+  const NodeReader values(source, at_nodes, std::nullopt);
+  SlabStream slabs(values, slab_bytes, kNoHalo);
+  while (const LoadedSlab* loaded = slabs.next()) {
+    const NodeArrays& nodes = loaded->nodes;
+    statistics.blocks[loaded->slab.block].blank += loaded->blanked;
+    const std::vector<double>* const axes[] = {&nodes.x, &nodes.y, &nodes.z};
+    for (size_t axis = 0; axis < 3; ++axis) widen(statistics.bounds[axis], *axes[axis], nodes.blank);
+    for (size_t n = 0; n < at_nodes.size(); ++n)
+      widen(statistics.scalars[of_nodes[n]], nodes.scalars[n], nodes.blank);
+    progress.advance(nodes.x.size());
+  }
+
+  const NodeReader coordinates(source, {}, std::nullopt);
+  std::vector<CellCounts> counts(description.blocks.size());
+  SlabStream cells(coordinates, slab_bytes, kCorners);
+  while (const LoadedSlab* loaded = cells.next()) {
+    const uint32_t block = loaded->slab.block;
+    counts[block] = sum(counts[block], countCells(description.blocks[block], *loaded));
+    progress.advance(loaded->nodes.x.size());
+  }
+  for (size_t b = 0; b < counts.size(); ++b) {
+    BlockStatistics& block = statistics.blocks[b];
+    block.cells = counts[b].cells;
+    block.degenerate = counts[b].degenerate;
+    block.inverted = std::min(counts[b].right, counts[b].left);
+    block.volume = counts[b].volume;
+  }
+
+  if (!in_cells.empty()) {
+    const GridSurvey survey =
+        surveyCells(NodeReader(source, in_cells, std::nullopt), slab_bytes, nullptr, progress);
+    for (size_t n = 0; n < in_cells.size(); ++n) statistics.scalars[of_cells[n]] = survey.ranges[n];
+  }
+  return statistics;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,125 @@
+#include "render/camera/camera_path.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+#include <string>
+#include <utility>
+
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr double kLeastSpan = 1e-6;
+
+/// v turned by `angle` around the unit vector `axis` (Rodrigues).
+glm::dvec3 turned(const glm::dvec3& v, const glm::dvec3& axis, double angle) {
+  const double cosine = std::cos(angle), sine = std::sin(angle);
+  return cosine * v + sine * glm::cross(axis, v) + (1 - cosine) * glm::dot(axis, v) * axis;
+}
+
+/// What is interpolated as numbers.
+struct Track {
+  glm::dvec3 position{0.0}, focal_point{0.0};
+  double zoom = 0;  // logarithm of the parallel scale, or of the half view angle's tangent
+
+  explicit Track(const Camera& camera) : position(camera.position), focal_point(camera.focal_point) {
+    zoom = camera.projection == Projection::orthographic
+               ? std::log(camera.parallel_scale)
+               : std::log(std::tan(0.5 * glm::radians(camera.view_angle_deg)));
+  }
+  Track(const glm::dvec3& position_, const glm::dvec3& focal_point_, double zoom_)
+      : position(position_), focal_point(focal_point_), zoom(zoom_) {}
+
+  friend Track operator+(const Track& a, const Track& b) {
+    return {a.position + b.position, a.focal_point + b.focal_point, a.zoom + b.zoom};
+  }
+  friend Track operator*(double f, const Track& a) { return {f * a.position, f * a.focal_point, f * a.zoom}; }
+  friend Track operator-(const Track& a, const Track& b) { return a + -1.0 * b; }
+};
+
+/// Per unit of time, between two key frames.
+Track secant(const KeyFrame& a, const KeyFrame& b) {
+  return 1 / (b.time - a.time) * (Track(b.camera) - Track(a.camera));
+}
+
+Track slopeAt(const std::vector<KeyFrame>& keys, size_t n) {
+  if (n == 0) return secant(keys[0], keys[1]);
+  if (n + 1 == keys.size()) return secant(keys[n - 1], keys[n]);
+  const double before = keys[n].time - keys[n - 1].time, after = keys[n + 1].time - keys[n].time;
+  return 1 / (before + after) *
+         (after * secant(keys[n - 1], keys[n]) + before * secant(keys[n], keys[n + 1]));
+}
+
+glm::dvec3 upBetween(const Camera& a, const Camera& b, double part) {
+  const glm::dvec3 from = glm::normalize(a.view_up), to = glm::normalize(b.view_up);
+  const glm::dvec3 across = glm::cross(from, to);
+  const double angle = std::atan2(glm::length(across), glm::dot(from, to));
+  if (angle == 0) return a.view_up;
+  glm::dvec3 axis = across;
+  if (glm::length(axis) < 1e-9) {  // opposite: about the line of sight
+    const glm::dvec3 sight = a.focal_point - a.position;
+    axis = sight - glm::dot(sight, from) * from;
+  }
+  return turned(from, glm::normalize(axis), part * angle);
+}
+
+}  // namespace
+
+Camera orbited(const Camera& camera, double degrees) {
+  const double angle = glm::radians(std::remainder(degrees, 360.0));
+  if (angle == 0) return camera;
+  Camera moved = camera;
+  moved.view_up = camera.usableViewUp();
+  const glm::dvec3 arm = camera.position - camera.focal_point;
+  moved.position = camera.focal_point + turned(arm, glm::normalize(moved.view_up), angle);
+  return moved;
+}
+
+CameraPath::CameraPath(std::vector<KeyFrame> key_frames, std::string name)
+    : key_frames_(std::move(key_frames)), name_(std::move(name)) {
+  if (key_frames_.empty()) throw Error("{}: a camera path needs one key frame or more, found none", name_);
+  for (size_t n = 1; n < key_frames_.size(); ++n) {
+    if (!(key_frames_[n].time - key_frames_[n - 1].time >= kLeastSpan))
+      throw Error(
+          "{}: key frame {} is at time {} and the one before it at {}; times must increase by a microsecond "
+          "or "
+          "more",
+          name_, n, key_frames_[n].time, key_frames_[n - 1].time);
+    if (key_frames_[n].camera.projection != key_frames_[0].camera.projection)
+      throw Error(
+          "{}: key frame {} is {} and the first one is not; a path has one kind of camera", name_, n,
+          key_frames_[n].camera.projection == Projection::perspective ? "perspective" : "orthographic");
+  }
+}
+
+Camera CameraPath::at(double time) const {
+  const auto after = std::upper_bound(key_frames_.begin(), key_frames_.end(), time,
+                                      [](double t, const KeyFrame& key) { return t < key.time; });
+  if (after == key_frames_.begin()) return key_frames_.front().camera;
+  const auto n = static_cast<size_t>(after - key_frames_.begin()) - 1;
+  const KeyFrame& a = key_frames_[n];
+  if (after == key_frames_.end() || time == a.time) return a.camera;
+  const KeyFrame& b = *after;
+
+  const double span = b.time - a.time, s = (time - a.time) / span, r = 1 - s;
+  const Track track = r * r * (1 + 2 * s) * Track(a.camera) + s * s * (1 + 2 * r) * Track(b.camera) +
+                      span * s * r * (r * slopeAt(key_frames_, n) - s * slopeAt(key_frames_, n + 1));
+  Camera camera = a.camera;
+  camera.position = track.position;
+  camera.focal_point = track.focal_point;
+  if (camera.position == camera.focal_point)
+    throw Error(
+        "{}: at time {}, after key frame {}, the camera passes through its focal point; add a key frame",
+        name_, time, n);
+  if (camera.projection == Projection::orthographic)
+    camera.parallel_scale = std::exp(track.zoom);
+  else
+    camera.view_angle_deg = 2 * glm::degrees(std::atan(std::exp(track.zoom)));
+  camera.view_up = upBetween(a.camera, b.camera, s);
+  return camera;
+}
+
+}  // namespace curvisplat

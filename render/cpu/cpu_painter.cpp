@@ -1,0 +1,248 @@
+#include "render/cpu/cpu_painter.h"
+
+#include <hwy/aligned_allocator.h>
+#include <hwy/highway.h>
+#include <tbb/info.h>
+#include <tbb/parallel_for.h>
+#include <tbb/partitioner.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <atomic>
+#include <optional>
+#include <thread>
+
+#include "render/cpu/splat_bins.h"
+#include "render/cpu/tile.h"
+#include "stream/base/stage_timer.h"
+
+namespace curvisplat {
+namespace {
+
+// Of most scenes' splats, one in four touches a second tile. Where they touch more, batches are smaller.
+constexpr size_t kEntriesASplat = 4;
+
+size_t tileCount(ImageSize size) {
+  const auto along = [](int pixels) { return static_cast<size_t>((pixels + kTileSide - 1) / kTileSide); };
+  return along(size.width) * along(size.height);
+}
+
+/// Blocks along one side of the image; none where first > last.
+struct BlockRange {
+  int first, last;
+
+  /// Bit n: block n of those along a tile's side.
+  BlockMask inTile(int tile) const {
+    const int from = std::max(first - tile * kTileBlocks, 0);
+    const int to = std::min(last - tile * kTileBlocks, kTileBlocks - 1);
+    return from > to ? 0 : (2u << to) - (1u << from);
+  }
+};
+
+BlockRange blocksAlong(float from, float to, int pixels) {
+  const auto end = static_cast<float>(pixels);
+  if (to < 0 || from >= end) return {0, -1};
+  return {static_cast<int>(std::max(from, 0.0f)) / kBlockSide,
+          static_cast<int>(std::min(to, end - 1)) / kBlockSide};
+}
+
+BlockMask blocksOf(BlockMask columns, BlockMask rows) {
+  BlockMask blocks = 0;
+  for (int row = 0; row < kTileBlocks; ++row)
+    if (rows >> row & 1) blocks |= columns << row * kTileBlocks;
+  return blocks;
+}
+
+unsigned threadsOf(const PaintResources& resources) {
+  return resources.threads ? resources.threads : std::max(1u, std::thread::hardware_concurrency());
+}
+
+}  // namespace
+
+struct CpuPainter::State {
+  ImageSize size{0, 0};
+  glm::vec4 background{0};
+  unsigned threads = 0;
+  size_t batch_splats = 0;
+  hwy::AlignedFreeUniquePtr<float[]> tiles;
+  std::unique_ptr<std::atomic<BlockMask>[]> open;  // [tile]: written by who paints it, read by anyone
+  std::optional<SplatBins> bins;
+  std::optional<ShadingTable> table;
+  std::optional<tbb::task_arena> arena;
+  bool per_pixel = true;
+  double upload_s = 0, draw_s = 0;
+
+  float* tile(size_t number) { return tiles.get() + number * kTileFloats; }
+  template <typename Job>
+  void forTiles(const Job& job) {
+    arena->execute([&] {
+      tbb::parallel_for(
+          tbb::blocked_range<size_t>(0, tileCount(size), 1),
+          [&](const tbb::blocked_range<size_t>& range) {
+            for (size_t number = range.begin(); number < range.end(); ++number) job(number);
+          },
+          tbb::simple_partitioner());
+    });
+  }
+  void clear(size_t number);
+  void allocate(ImageSize wanted, unsigned threads_, size_t batch_splats_);
+  void paintBatch();
+};
+
+CpuPainter::CpuPainter() : state_(std::make_unique<State>()) {}
+
+CpuPainter::~CpuPainter() = default;
+
+void CpuPainter::begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
+                       bool per_pixel, const PaintResources& resources) {
+  State& state = *state_;
+  const unsigned threads = threadsOf(resources);
+  state.upload_s = state.draw_s = 0;
+  state.per_pixel = per_pixel;
+  state.table.emplace(table);
+  if (size.width != state.size.width || size.height != state.size.height || threads != state.threads ||
+      resources.batch_splats != state.batch_splats)
+    state.allocate(size, threads, resources.batch_splats);
+  state.background = background;
+  state.bins->clear();  // of a frame that was not ended
+  state.bins->open();
+  state.forTiles([&](size_t number) { state.clear(number); });
+}
+
+/// Nothing in it; what lies outside of the image is saturated from the beginning.
+void CpuPainter::State::clear(size_t number) {
+  const auto columns = static_cast<size_t>(bins->columns());
+  const int columns_left = size.width - static_cast<int>(number % columns) * kTileSide;
+  const int rows_left = size.height - static_cast<int>(number / columns) * kTileSide;
+  BlockMask in_image = 0;
+  float* at = tile(number);
+  for (int block = 0; block < kTileBlocks * kTileBlocks; ++block) {
+    const int x = block % kTileBlocks * kBlockSide, y = block / kTileBlocks * kBlockSide;
+    if (x < columns_left && y < rows_left) in_image |= BlockMask{1} << block;
+    at = std::fill_n(at, 3 * kBlockPixels, 0.0f);
+    for (int pixel = 0; pixel < kBlockPixels; ++pixel)
+      *at++ = x + pixel % kBlockSide < columns_left && y + pixel / kBlockSide < rows_left;
+  }
+  open[number].store(in_image, std::memory_order_relaxed);
+}
+
+void CpuPainter::State::allocate(ImageSize wanted, unsigned threads_, size_t batch_splats_) {
+  size = {0, 0};
+  bins.reset();
+  tiles.reset();
+  tiles = hwy::AllocateAligned<float>(tileCount(wanted) * kTileFloats);
+  if (!tiles) throw std::bad_alloc();
+  open = std::make_unique<std::atomic<BlockMask>[]>(tileCount(wanted));
+  bins.emplace(wanted, batch_splats_, kEntriesASplat * batch_splats_, threads_);
+  // TBB warns of more than there are cores.
+  arena.emplace(std::min(static_cast<int>(threads_), tbb::info::default_concurrency()));
+  size = wanted;
+  threads = threads_;
+  batch_splats = batch_splats_;
+}
+
+void CpuPainter::State::paintBatch() {
+  const StageTimer timer(draw_s);
+  arena->execute([this] { bins->sort(); });
+  forTiles([this](size_t number) {
+    const std::span<const uint32_t> order = bins->tile(static_cast<int>(number));
+    if (order.empty()) return;
+    const auto columns = static_cast<size_t>(bins->columns());
+    const BlockMask left =
+        paintTile({tile(number), static_cast<int>(number % columns) * kTileSide,
+                   static_cast<int>(number / columns) * kTileSide,
+                   open[number].load(std::memory_order_relaxed), bins->splats(), order, *table, per_pixel});
+    open[number].store(left, std::memory_order_relaxed);
+    if (left == 0) bins->close(static_cast<int>(number));
+  });
+  bins->clear();
+}
+
+void CpuPainter::draw(std::span<const ScreenSplat> splats) {
+  State& state = *state_;
+  while (!splats.empty()) {
+    size_t added;
+    {
+      const StageTimer timer(state.upload_s);
+      added = state.bins->add(splats);
+    }
+    splats = splats.subspan(added);
+    if (!splats.empty()) state.paintBatch();
+  }
+}
+
+bool CpuPainter::hides(const ScreenBox& box) const {
+  if (!(box.x0 <= box.x1 && box.y0 <= box.y1)) return false;
+  const BlockRange columns = blocksAlong(box.x0, box.x1, state_->size.width);
+  const BlockRange rows = blocksAlong(box.y0, box.y1, state_->size.height);
+  const auto tiles_a_row = static_cast<size_t>((state_->size.width + kTileSide - 1) / kTileSide);
+  for (int row = rows.first / kTileBlocks; row <= rows.last / kTileBlocks; ++row)
+    for (int column = columns.first / kTileBlocks; column <= columns.last / kTileBlocks; ++column) {
+      const BlockMask touched = blocksOf(columns.inTile(column), rows.inTile(row));
+      const size_t number = static_cast<size_t>(row) * tiles_a_row + static_cast<size_t>(column);
+      if (state_->open[number].load(std::memory_order_relaxed) & touched) return false;
+    }
+  return true;
+}
+
+Image CpuPainter::end() {
+  State& state = *state_;
+  if (!state.bins->empty()) state.paintBatch();
+  const StageTimer timer(state.draw_s);
+  Image image(state.size);
+  const auto columns = static_cast<size_t>(state.bins->columns());
+  state.forTiles([&](size_t number) {
+    const float* tile = state.tile(number);
+    const int x0 = static_cast<int>(number % columns) * kTileSide;
+    const int y0 = static_cast<int>(number / columns) * kTileSide;
+    for (int y = 0; y < std::min(kTileSide, state.size.height - y0); ++y)
+      for (int x = 0; x < std::min(kTileSide, state.size.width - x0); ++x) {
+        const float* block = tile + (y / kBlockSide * kTileBlocks + x / kBlockSide) * kBlockFloats;
+        const float* from = block + y % kBlockSide * kBlockSide + x % kBlockSide;
+        float* to = image.pixel(x0 + x, y0 + y);
+        const float through = from[3 * kBlockPixels];
+        for (int c = 0; c < 3; ++c) to[c] = from[c * kBlockPixels] + through * state.background[c];
+        to[3] = 1 - through * (1 - state.background[3]);
+      }
+  });
+  return image;
+}
+
+double CpuPainter::uploadSeconds() const {
+  return state_->upload_s;
+}
+
+double CpuPainter::drawSeconds() const {
+  return state_->draw_s;
+}
+
+uint64_t CpuPainter::hiddenSplats() const {
+  return state_->bins ? state_->bins->hidden() : 0;
+}
+
+uint64_t CpuPainter::frameBytes(ImageSize size) {
+  return tileCount(size) * (kTileFloats * sizeof(float) + sizeof(std::atomic<BlockMask>));
+}
+
+uint64_t CpuPainter::batchBytes(ImageSize size, const PaintResources& resources) {
+  return SplatBins::bytes(size, resources.batch_splats, kEntriesASplat * resources.batch_splats,
+                          threadsOf(resources));
+}
+
+std::vector<int64_t> CpuPainter::targets() {
+  std::vector<int64_t> found;
+  for (int64_t rest = hwy::SupportedTargets() & HWY_TARGETS; rest != 0; rest &= rest - 1)
+    found.push_back(rest & -rest);
+  return found;
+}
+
+bool CpuPainter::fuses(int64_t target) {
+  constexpr int64_t kSeparate = HWY_SCALAR | HWY_EMU128 | HWY_SSSE3 | HWY_SSE4;
+  return (target & kSeparate) == 0;
+}
+
+std::string CpuPainter::name() {
+  return std::string("CPU, ") + hwy::TargetName(targets().front());
+}
+
+}  // namespace curvisplat

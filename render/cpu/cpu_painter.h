@@ -1,0 +1,54 @@
+// Draws screen splats on the processor's cores: batches of splats, sorted into the tiles that they touch;
+// every tile painted by one thread, in vectors (tile.h). Design section 7.
+//
+// Nearest first, each under what is there; what can hardly be seen any more is left out, by less than 1/4096
+// of any channel (tile.h). That is the only way it works, since it costs less even where nothing is hidden:
+// two multiplications fewer a pixel.
+//
+// The picture's bits depend neither on threads nor on batches: a pixel's splats are blended one after the
+// other, in their order.
+//
+// Any thread, one at a time; works in a TBB arena of its own.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "render/project/painter.h"
+
+namespace curvisplat {
+
+class CpuPainter final : public Painter {
+ public:
+  CpuPainter();
+  ~CpuPainter() override;
+
+  DrawingOrder order() const override { return DrawingOrder::front_to_back; }
+  void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table, bool per_pixel,
+             const PaintResources& resources = {}) override;
+  void draw(std::span<const ScreenSplat> splats) override;
+  bool hides(const ScreenBox& box) const override;
+  Image end() override;
+
+  double uploadSeconds() const override;
+  double drawSeconds() const override;
+  uint64_t hiddenSplats() const override;
+
+  /// What it takes for a frame beside the picture itself.
+  static uint64_t frameBytes(ImageSize size);
+  static uint64_t batchBytes(ImageSize size, const PaintResources& resources);
+  /// "CPU, AVX3"
+  static std::string name();
+  /// Highway's numbers of the instruction sets that it can paint with here, the best first.
+  static std::vector<int64_t> targets();
+  /// Whether one has fused multiply-adds. All that do draw the same bits.
+  static bool fuses(int64_t target);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace curvisplat

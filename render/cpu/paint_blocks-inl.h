@@ -1,0 +1,215 @@
+// Blends a splat over the blocks of a tile. Included once for every instruction set.
+#if defined(CURVISPLAT_PAINT_BLOCKS_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef CURVISPLAT_PAINT_BLOCKS_INL_H
+#undef CURVISPLAT_PAINT_BLOCKS_INL_H
+#else
+#define CURVISPLAT_PAINT_BLOCKS_INL_H
+#endif
+
+#include <hwy/highway.h>
+
+#include "render/cpu/paint_shade-inl.h"
+#include "render/cpu/tile.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace curvisplat {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+static_assert(kLanes == kBlockPixels);
+
+// The offsets of a block's pixels from its first.
+alignas(64) constexpr float kLaneX[kBlockPixels] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
+alignas(64) constexpr float kLaneY[kBlockPixels] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
+
+/// An ellipse as its pixels need it. With d the offset from the centre, p = a dx and q = b dx + c dy are u
+/// over the support's radius: the footprint ends where p² + q² = 1.
+struct Ellipse {
+  float x, y;  // the centre, from that of the tile's first pixel
+  float a, b, c;
+  float amplitude;
+};
+
+/// 1 - exp(-x), x >= 0, over x: relative error below 1e-6. `kThin`: for x <= ln 2 / 2, with the same bits.
+template <bool kThin>
+HWY_INLINE V absorbedOf(V x) {
+  const Floats d;
+  // exp(-x) = 2^-n exp(r), |r| <= ln 2 / 2
+  V r = hn::Neg(x), scale = hn::Set(d, 1.0f);
+  if constexpr (!kThin) {
+    const V held = hn::Min(x, hn::Set(d, 80.0f));
+    const V n = hn::Round(hn::Mul(held, hn::Set(d, 1.44269504f)));
+    r = hn::MulSub(n, hn::Set(d, 0.693147181f), held);
+    scale = hn::BitCast(d, hn::ShiftLeft<23>(hn::Sub(hn::Set(Ints(), 127), hn::ConvertTo(Ints(), n))));
+  }
+  V series = hn::MulAdd(r, hn::Set(d, 1.0f / 720), hn::Set(d, 1.0f / 120));
+  series = hn::MulAdd(series, r, hn::Set(d, 1.0f / 24));
+  series = hn::MulAdd(series, r, hn::Set(d, 1.0f / 6));
+  series = hn::MulAdd(series, r, hn::Set(d, 1.0f / 2));
+  series = hn::MulAdd(series, r, hn::Set(d, 1.0f));
+  if constexpr (kThin) return series;
+  const V absorbed = hn::NegMulAdd(hn::Mul(scale, series), r, hn::Sub(hn::Set(d, 1.0f), scale));
+  return hn::Div(absorbed, hn::Max(x, hn::Set(d, 1e-30f)));
+}
+
+/// Optical depth per unit of extinction, zero outside of the footprint; and p and q.
+struct Pixels {
+  V depth, p, q;
+};
+
+HWY_INLINE Pixels pixelsAt(const Ellipse& e, const float* HWY_RESTRICT footprint, V dx, V dy) {
+  const Floats d;
+  const V p = hn::Mul(hn::Set(d, e.a), dx);
+  const V q = hn::MulAdd(hn::Set(d, e.b), dx, hn::Mul(hn::Set(d, e.c), dy));
+  const V x = hn::Max(hn::NegMulAdd(q, q, hn::NegMulAdd(p, p, hn::Set(d, 1.0f))), hn::Zero(d));
+  const V x2 = hn::Mul(x, x), x4 = hn::Mul(x2, x2);
+  const auto pair = [&](int n) HWY_ATTR {
+    return hn::MulAdd(hn::Set(d, footprint[n + 1]), x, hn::Set(d, footprint[n]));
+  };
+  const V lo = hn::MulAdd(pair(2), x2, pair(0)), hi = hn::MulAdd(pair(6), x2, pair(4));
+  const V f = hn::MulAdd(hn::MulAdd(hn::Set(d, footprint[8]), x4, hi), x4, lo);
+  return {hn::Mul(hn::Mul(f, hn::Set(d, e.amplitude)), hn::Mul(x, x)), p, q};
+}
+
+/// Blends one vector of a block's pixels under what is there. What then still comes through.
+template <bool kThin>
+HWY_INLINE V blendUnder(float* HWY_RESTRICT at, V depth, const V (&value)[4]) {
+  const Floats d;
+  // A parabola may end below zero, by its error.
+  const V tau = hn::Max(hn::Mul(depth, value[3]), hn::Zero(d));
+  const V part = absorbedOf<kThin>(tau);
+  float* transmittance = at + 3 * kBlockPixels;
+  const V before = hn::Load(d, transmittance);
+  const V weight = hn::Mul(hn::Mul(depth, part), before);
+  const V after = hn::NegMulAdd(hn::Mul(tau, part), before, before);
+  for (int c = 0; c < 3; ++c) {
+    float* place = at + c * kBlockPixels;
+    hn::Store(hn::MulAdd(value[c], weight, hn::Load(d, place)), d, place);
+  }
+  hn::Store(after, d, transmittance);
+  return after;
+}
+
+/// s = s0 + sp p + sq q.
+struct Along {
+  float s0, sp, sq;
+
+  HWY_INLINE V at(const Pixels& pixels) const {
+    const Floats d;
+    return hn::MulAdd(hn::Set(d, sp), pixels.p, hn::MulAdd(hn::Set(d, sq), pixels.q, hn::Set(d, s0)));
+  }
+};
+
+/// One parabola, or one colour: at + s (by + s bend).
+struct Shade {
+  float at[4], by[4], bend[4];
+  Along s;
+};
+
+HWY_INLINE bool isSaturated(V transmittance) {
+  return hn::AllTrue(Floats(), hn::Lt(transmittance, hn::Set(Floats(), kSaturated)));
+}
+
+/// One block. `x`, `y`: of its first pixel, in the tile. Whether it is saturated now.
+template <bool kFitted, bool kThin>
+HWY_INLINE bool paintBlock(const Ellipse& e, const Shade& shade, const float* HWY_RESTRICT footprint,
+                           float* HWY_RESTRICT block, float x, float y) {
+  const Floats d;
+  const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
+  V most = hn::Zero(d);
+  for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
+    const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
+                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
+    V value[4];
+    if constexpr (kFitted) {
+      const V s = shade.s.at(pixels);
+      for (int c = 0; c < 4; ++c)
+        value[c] = hn::MulAdd(hn::MulAdd(hn::Set(d, shade.bend[c]), s, hn::Set(d, shade.by[c])), s,
+                              hn::Set(d, shade.at[c]));
+    } else {
+      for (int c = 0; c < 4; ++c) value[c] = hn::Set(d, shade.at[c]);
+    }
+    most = hn::Max(most, blendUnder<kThin>(block + lane, pixels.depth, value));
+  }
+  return isSaturated(most);
+}
+
+HWY_INLINE V lookUp(const Row& row, hn::Vec<Ints> n) {
+  const Floats d;
+  if constexpr (hn::MaxLanes(d) == kLanes) {
+    return hn::TableLookupLanes(hn::Load(d, row.at), hn::IndicesFromVec(d, n));
+  } else if constexpr (2 * hn::MaxLanes(d) == kLanes) {
+    const auto half = hn::Set(Ints(), kLanes / 2);
+    const auto in_half = hn::IndicesFromVec(d, hn::And(n, hn::Set(Ints(), kLanes / 2 - 1)));
+    return hn::IfThenElse(hn::RebindMask(d, hn::Lt(n, half)),
+                          hn::TableLookupLanes(hn::Load(d, row.at), in_half),
+                          hn::TableLookupLanes(hn::Load(d, row.at + kLanes / 2), in_half));
+  } else {
+    return hn::GatherIndex(d, row.at, n);
+  }
+}
+
+/// One block, by a polyline. Whether it is saturated now.
+HWY_INLINE bool paintBlock(const Ellipse& e, const Polyline& line, const Along& along,
+                           const float* HWY_RESTRICT footprint, float* HWY_RESTRICT block, float x, float y) {
+  const Floats d;
+  const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
+  V most = hn::Zero(d);
+  for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
+    const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
+                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
+    const V s = hn::Clamp(along.at(pixels), hn::Zero(d), hn::Set(d, Polyline::kParts));
+    const auto n = hn::ConvertTo(Ints(), s);
+    const V part = hn::Sub(s, hn::ConvertTo(d, n));
+    V value[4];
+    for (int c = 0; c < 4; ++c)
+      value[c] = hn::MulAdd(lookUp(line.step.of[c], n), part, lookUp(line.at.of[c], n));
+    most = hn::Max(most, blendUnder<false>(block + lane, pixels.depth, value));
+  }
+  return isSaturated(most);
+}
+
+/// The scalar: mean + reach (tp p + tq q), ± half_width.
+struct Scalar {
+  float mean, reach, tp, tq, half_width;
+};
+
+/// A block of which every pixel is looked up.
+struct LookedUp {
+  Row depth, scale;
+  alignas(64) float integrals[4 * kLanes];  // of one pixel after the other
+};
+
+HWY_INLINE void lookUpBlock(const Ellipse& e, const Scalar& scalar, const ShadingTable& table,
+                            const float* HWY_RESTRICT footprint, float x, float y, LookedUp& out) {
+  const Floats d;
+  const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
+  Intervals intervals;
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
+                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
+    const V t = hn::MulAdd(hn::Set(d, scalar.tp), pixels.p, hn::Mul(hn::Set(d, scalar.tq), pixels.q));
+    hn::Store(pixels.depth, d, out.depth.at + lane);
+    locate(table, hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean)),
+           hn::Set(d, scalar.half_width), lane, intervals);
+    hn::Store(hn::Load(d, intervals.scale.at + lane), d, out.scale.at + lane);
+  }
+  integrate(table, intervals, kLanes, out.integrals);
+}
+
+HWY_INLINE bool paintLookedUp(const LookedUp& in, float* HWY_RESTRICT block) {
+  const Floats d;
+  V most = hn::Zero(d);
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    V value[4];
+    meansOf(in.integrals, hn::Load(d, in.scale.at + lane), lane, value);
+    most = hn::Max(most, blendUnder<false>(block + lane, hn::Load(d, in.depth.at + lane), value));
+  }
+  return isSaturated(most);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace curvisplat
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,298 @@
+// What a splat's pixels see of the transfer function, over a piece of the splat: a colour, a parabola along
+// the scalar's slope, or every pixel for itself. Included once for every instruction set.
+#if defined(CURVISPLAT_PAINT_SHADE_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef CURVISPLAT_PAINT_SHADE_INL_H
+#undef CURVISPLAT_PAINT_SHADE_INL_H
+#else
+#define CURVISPLAT_PAINT_SHADE_INL_H
+#endif
+
+#include <hwy/contrib/math/math-inl.h>
+#include <hwy/highway.h>
+
+#include "render/cpu/tile.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace curvisplat {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Sixteen of something at a time: splats, blocks or pixels. In one vector or in several.
+constexpr size_t kLanes = 16;
+using Floats = hn::CappedTag<float, kLanes>;
+using Ints = hn::RebindToSigned<Floats>;
+using Four = hn::CappedTag<float, 4>;
+using V = hn::Vec<Floats>;
+
+struct alignas(64) Row {
+  float at[kLanes];
+};
+struct alignas(64) IntRow {
+  int32_t at[kLanes];
+};
+
+constexpr float kPeak = 0.69995f;  // F(0), and a little
+
+/// Intervals of the table, and the weights of what lies there.
+struct Intervals {
+  IntRow from, to;  // floats from the table's first to the cell
+  Row first, last;  // how much of the cells at the ends lies in the interval
+  Row scale;        // over the interval's width
+};
+
+/// Colour times extinction, and extinction.
+struct Values {
+  Row of[4];
+};
+
+struct Range {
+  V from, to;
+};
+
+HWY_INLINE V cellsOf(const ShadingTable& table, V scalar) {
+  const Floats d;
+  if (table.logScale())
+    scalar = hn::Log(d, hn::Max(scalar, hn::Set(d, ClassificationTable::kLeastLogarithmic)));
+  return hn::MulAdd(scalar, hn::Set(d, table.scale()), hn::Set(d, table.bias()));
+}
+
+HWY_INLINE hn::Vec<Ints> element(V x) {
+  const Floats d;
+  constexpr float kLast = ClassificationTable::kCells + 1;
+  return hn::ConvertTo(Ints(), hn::Clamp(hn::Add(x, hn::Set(d, 1.0f)), hn::Zero(d), hn::Set(d, kLast)));
+}
+
+/// What pixels with these means see, in cells: never less than a cell. An interval beyond an end of the table
+/// sees the same wherever it lies there; it begins where float still tells cells apart.
+HWY_INLINE Range locate(const ShadingTable& table, V mean, V half_width, size_t lane, Intervals& out) {
+  static_assert(sizeof(ShadingTable::Cell) == 8 * sizeof(float));
+  const Floats d;
+  V from = cellsOf(table, hn::Sub(mean, half_width)), to = cellsOf(table, hn::Add(mean, half_width));
+  from = hn::Min(from, hn::Set(d, ClassificationTable::kCells + 1.0f));
+  to = hn::Max(to, hn::Set(d, -1.0f));
+  const V half = hn::Set(d, 0.5f), one = hn::Set(d, 1.0f);
+  const V widen = hn::Max(hn::Zero(d), hn::Mul(half, hn::Sub(one, hn::Sub(to, from))));
+  from = hn::Sub(from, widen);
+  to = hn::Add(to, widen);
+  const auto i = element(from), j = element(to);
+  hn::Store(hn::ShiftLeft<3>(i), Ints(), out.from.at + lane);
+  hn::Store(hn::ShiftLeft<3>(j), Ints(), out.to.at + lane);
+  hn::Store(hn::Sub(hn::ConvertTo(d, i), from), d, out.first.at + lane);
+  hn::Store(hn::Sub(to, hn::Sub(hn::ConvertTo(d, j), one)), d, out.last.at + lane);
+  hn::Store(hn::Div(one, hn::Sub(to, from)), d, out.scale.at + lane);
+  return {from, to};
+}
+
+/// The integrals over the first `count` intervals, one after the other.
+HWY_INLINE void integrate(const ShadingTable& table, const Intervals& in, size_t count,
+                          float* HWY_RESTRICT out) {
+  const Four d;
+  constexpr size_t kDensity = 4, kNext = 8;  // from a cell's start
+  const float* cells = table.cells()->start.of;
+  for (size_t n = 0; n < count; ++n) {
+    const float *from = cells + in.from.at[n], *to = cells + in.to.at[n];
+    for (size_t c = 0; c < 4; c += hn::Lanes(d)) {
+      auto sum = hn::Sub(hn::Load(d, to + c), hn::Load(d, from + kNext + c));
+      sum = hn::MulAdd(hn::Load(d, from + kDensity + c), hn::Set(d, in.first.at[n]), sum);
+      sum = hn::MulAdd(hn::Load(d, to + kDensity + c), hn::Set(d, in.last.at[n]), sum);
+      hn::Store(sum, d, out + 4 * n + c);
+    }
+  }
+}
+
+/// From integrals to means.
+HWY_INLINE void meansOf(const float* HWY_RESTRICT integrals, V scale, size_t lane, V (&out)[4]) {
+  const Floats d;
+  hn::LoadInterleaved4(d, integrals + 4 * lane, out[0], out[1], out[2], out[3]);
+  for (V& value : out) value = hn::Max(hn::Mul(value, scale), hn::Zero(d));
+}
+
+/// Sixteen pieces of splats: where the scalar goes in each.
+struct Pieces {
+  Row mean, reach, half_width;  // scalar = mean ± half_width at t = 0, and reach more by t
+  Row from, to;                 // t
+  Row amplitude;
+};
+
+enum Fit : int32_t { kNothing, kConstant, kParabola, kOther };
+
+/// What does for a piece: at + s (by + s bend), with s = -1 to 1 from end to end.
+struct Fits {
+  Values at, by, bend;
+  Row most;    // extinction
+  Row excess;  // of kOther: the error, in what is allowed
+  IntRow fit;
+};
+
+/// How far the parabola through both ends and the middle is off, at the most (shading_table.h).
+HWY_INLINE V errorOver(const ShadingTable& table, const Range& low, const Range& high, V low_scale) {
+  const Floats d;
+  const V move = hn::Max(hn::Sub(high.to, low.to), hn::Sub(high.from, low.from));
+  const V factor = hn::Mul(move, hn::Min(hn::Mul(move, low_scale), hn::Set(d, 1.0f)));
+  const auto first = hn::ShiftLeft<1>(element(hn::Sub(low.from, hn::Set(d, 1.0f))));
+  const auto last =
+      hn::ShiftLeft<1>(hn::Add(element(hn::Add(high.to, hn::Set(d, 1.0f))), hn::Set(Ints(), 1)));
+  const float* bends = &table.bends()->second;
+  const V second = hn::Sub(hn::GatherIndex(d, bends, last), hn::GatherIndex(d, bends, first));
+  const V third = hn::Sub(hn::GatherIndex(d, bends + 1, last), hn::GatherIndex(d, bends + 1, first));
+  return hn::Mul(factor, hn::Min(hn::Mul(hn::Set(d, 0.097f), second),
+                                 hn::Mul(hn::Mul(hn::Set(d, 0.0189f), move), third)));
+}
+
+/// And of the change between the ends, on a logarithmic scale. The third derivative of g(log m) has g'' and
+/// g' in it, too; r is the move in the logarithm: 0.0189 (3 g'' r + 2 g' r²) at the most, with g'' and g' at
+/// most 4 changes.
+HWY_INLINE V logErrorOver(const ShadingTable& table, const Range& low, const Range& high) {
+  const Floats d;
+  const V move = hn::Max(hn::Sub(high.to, low.to), hn::Sub(high.from, low.from));
+  const V r = hn::Mul(move, hn::Set(d, table.logScale() ? 1 / table.scale() : 0.0f));
+  return hn::Mul(r, hn::MulAdd(r, hn::Set(d, 0.16f), hn::Set(d, 0.23f)));
+}
+
+/// The first `count` pieces.
+HWY_INLINE void fitPieces(const ShadingTable& table, const Pieces& pieces, size_t count, Fits& fits) {
+  const Floats d;
+  Intervals low, middle, high;
+  Row error, log_error;
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    const V mean = hn::Load(d, pieces.mean.at + lane), reach = hn::Load(d, pieces.reach.at + lane);
+    const V half_width = hn::Load(d, pieces.half_width.at + lane);
+    const V t0 = hn::Load(d, pieces.from.at + lane), t1 = hn::Load(d, pieces.to.at + lane);
+    const V tm = hn::Mul(hn::Set(d, 0.5f), hn::Add(t0, t1));
+    const Range first = locate(table, hn::MulAdd(reach, t0, mean), half_width, lane, low);
+    locate(table, hn::MulAdd(reach, tm, mean), half_width, lane, middle);
+    const Range last = locate(table, hn::MulAdd(reach, t1, mean), half_width, lane, high);
+    hn::Store(errorOver(table, first, last, hn::Load(d, low.scale.at + lane)), d, error.at + lane);
+    hn::Store(logErrorOver(table, first, last), d, log_error.at + lane);
+  }
+  alignas(64) float integrals[3][4 * kLanes];
+  integrate(table, low, count, integrals[0]);
+  integrate(table, middle, count, integrals[1]);
+  integrate(table, high, count, integrals[2]);
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    V a[4], m[4], b[4];
+    meansOf(integrals[0], hn::Load(d, low.scale.at + lane), lane, a);
+    meansOf(integrals[1], hn::Load(d, middle.scale.at + lane), lane, m);
+    meansOf(integrals[2], hn::Load(d, high.scale.at + lane), lane, b);
+    const V half = hn::Set(d, 0.5f);
+    V change = hn::Zero(d);
+    for (size_t c = 0; c < 4; ++c) {
+      hn::Store(m[c], d, fits.at.of[c].at + lane);
+      hn::Store(hn::Mul(half, hn::Sub(b[c], a[c])), d, fits.by.of[c].at + lane);
+      hn::Store(hn::Sub(hn::Mul(half, hn::Add(a[c], b[c])), m[c]), d, fits.bend.of[c].at + lane);
+      change = hn::Max(change, hn::Max(hn::AbsDiff(a[c], m[c]), hn::AbsDiff(b[c], m[c])));
+    }
+    const V most = hn::Max(hn::Max(a[3], m[3]), b[3]);
+    const V off = hn::MulAdd(change, hn::Load(d, log_error.at + lane), hn::Load(d, error.at + lane));
+    const V depth = hn::Mul(hn::Set(d, kPeak), hn::Load(d, pieces.amplitude.at + lane));
+    const V allowed =
+        hn::Max(hn::Mul(hn::Set(d, kRelativeError), most), hn::Div(hn::Set(d, kDepthError), depth));
+    const auto code = [&](Fit fit) HWY_ATTR { return hn::Set(d, static_cast<float>(fit)); };
+    V fit = hn::IfThenElse(hn::Le(hn::Add(off, change), allowed), code(kConstant), code(kParabola));
+    fit = hn::IfThenElse(hn::Eq(most, hn::Zero(d)), code(kNothing), fit);
+    fit = hn::IfThenElse(hn::Le(off, allowed), fit, code(kOther));
+    hn::Store(hn::ConvertTo(Ints(), fit), Ints(), fits.fit.at + lane);
+    hn::Store(hn::Div(off, allowed), d, fits.excess.at + lane);
+    // A parabola's most lies between its three points.
+    hn::Store(hn::Mul(hn::Set(d, 1.25f), most), d, fits.most.at + lane);
+  }
+}
+
+/// Where a parabola does not do for a piece: a line of fifteen parts, at[n] + (s - n) step[n], n the whole
+/// part of s, with s = 0 to 15 from end to end.
+struct Polyline {
+  static constexpr float kParts = kLanes - 1;
+
+  Values at, step;
+};
+
+/// A row, and its last element again: to be read from its second.
+struct alignas(64) LongRow {
+  float at[2 * kLanes];
+
+  HWY_INLINE void repeatLast() { at[kLanes] = at[kLanes - 1]; }
+};
+
+/// Of one piece. Whether it is good enough. Over a move by h cells a straight line is off by at most 0.25 h m
+/// sum of |second differences| (shading_table.h); and on a logarithmic scale, where the move itself is bent,
+/// by an eighth of r (of twice that, since r <= 0.3 changes within the move) times the largest slope.
+HWY_INLINE bool fitPolyline(const ShadingTable& table, const Pieces& pieces, size_t n, Polyline& line) {
+  const Floats d;
+  const float from = pieces.from.at[n], per_part = (pieces.to.at[n] - from) / Polyline::kParts;
+  const V mean = hn::Set(d, pieces.mean.at[n]), reach = hn::Set(d, pieces.reach.at[n]);
+  const V half_width = hn::Set(d, pieces.half_width.at[n]);
+  Intervals intervals;
+  LongRow begins, ends, values[4];
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    const V t = hn::MulAdd(hn::Iota(d, static_cast<float>(lane)), hn::Set(d, per_part), hn::Set(d, from));
+    const Range range = locate(table, hn::MulAdd(reach, t, mean), half_width, lane, intervals);
+    hn::Store(range.from, d, begins.at + lane);
+    hn::Store(range.to, d, ends.at + lane);
+  }
+  begins.repeatLast();
+  ends.repeatLast();
+  alignas(64) float integrals[4 * kLanes];
+  integrate(table, intervals, kLanes, integrals);
+  V most = hn::Zero(d);
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    V value[4];
+    meansOf(integrals, hn::Load(d, intervals.scale.at + lane), lane, value);
+    for (size_t c = 0; c < 4; ++c) hn::Store(value[c], d, values[c].at + lane);
+    most = hn::Max(most, value[3]);
+  }
+  for (LongRow& row : values) row.repeatLast();
+
+  V error = hn::Zero(d);
+  const float* bends = &table.bends()->second;
+  const V quarter = hn::Set(d, 0.25f), log_unit = hn::Set(d, table.logScale() ? 1 / table.scale() : 0.0f);
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    V change = hn::Zero(d);
+    for (size_t c = 0; c < 4; ++c) {
+      const V at = hn::Load(d, values[c].at + lane);
+      const V step = hn::Sub(hn::LoadU(d, values[c].at + lane + 1), at);
+      hn::Store(at, d, line.at.of[c].at + lane);
+      hn::Store(step, d, line.step.of[c].at + lane);
+      change = hn::Max(change, hn::Abs(step));
+    }
+    const V begin = hn::Load(d, begins.at + lane), end = hn::LoadU(d, ends.at + lane + 1);
+    const V move = hn::Max(hn::Sub(hn::LoadU(d, begins.at + lane + 1), begin),
+                           hn::Sub(end, hn::Load(d, ends.at + lane)));
+    const auto first = hn::ShiftLeft<1>(element(hn::Sub(begin, hn::Set(d, 1.0f))));
+    const auto last = hn::ShiftLeft<1>(hn::Add(element(hn::Add(end, hn::Set(d, 1.0f))), hn::Set(Ints(), 1)));
+    const V second = hn::Sub(hn::GatherIndex(d, bends, last), hn::GatherIndex(d, bends, first));
+    const V m = hn::Min(hn::Mul(move, hn::Load(d, intervals.scale.at + lane)), hn::Set(d, 1.0f));
+    const V bend = hn::Mul(hn::Mul(move, m), second);
+    const V r = hn::Mul(move, log_unit);
+    V off = hn::Mul(quarter, hn::MulAdd(r, hn::Add(change, bend), bend));
+    off = hn::IfThenElse(hn::Gt(r, hn::Set(d, 0.3f)), hn::Set(d, 1e30f), off);
+    error = hn::Max(error, off);
+  }
+  const float largest = hn::GetLane(hn::MaxOfLanes(d, most));
+  const float allowed = std::max(kRelativeError * largest, kDepthError / (kPeak * pieces.amplitude.at[n]));
+  return hn::GetLane(hn::MaxOfLanes(d, error)) <= allowed;
+}
+
+/// Flat splats: `at`, `most` and `fit`, of their means alone.
+HWY_INLINE void fitMeans(const ShadingTable& table, const Pieces& pieces, size_t count, Fits& fits) {
+  const Floats d;
+  Intervals intervals;
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d))
+    locate(table, hn::Load(d, pieces.mean.at + lane), hn::Zero(d), lane, intervals);
+  alignas(64) float integrals[4 * kLanes];
+  integrate(table, intervals, count, integrals);
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    V value[4];
+    meansOf(integrals, hn::Load(d, intervals.scale.at + lane), lane, value);
+    for (size_t c = 0; c < 4; ++c) hn::Store(value[c], d, fits.at.of[c].at + lane);
+    hn::Store(value[3], d, fits.most.at + lane);
+    const V fit = hn::IfThenElse(hn::Gt(value[3], hn::Zero(d)), hn::Set(d, static_cast<float>(kConstant)),
+                                 hn::Set(d, static_cast<float>(kNothing)));
+    hn::Store(hn::ConvertTo(Ints(), fit), Ints(), fits.fit.at + lane);
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace curvisplat
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,73 @@
+// Which splats of a batch touch which tiles: for every tile a list of indices, in the batch's order.
+//
+// A counting sort: splats are counted tile by tile in a few pieces of the batch at a time, in parallel, and
+// each piece then writes where its counts say. The lists do not depend on how many pieces there were.
+// Tiles can be closed: they take no more, and splats that touch no other tiles are left out.
+// Takes 48 bytes a splat, 4 an entry, 4 a tile and piece, all at its construction.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "render/camera/camera.h"
+#include "render/project/projection.h"
+
+namespace curvisplat {
+
+class SplatBins {
+ public:
+  /// For batches of at most `splats` splats, which touch `entries` tiles in all.
+  SplatBins(ImageSize size, size_t splats, size_t entries, unsigned pieces);
+  static uint64_t bytes(ImageSize size, size_t splats, size_t entries, unsigned pieces);
+
+  int columns() const { return columns_; }
+  int rows() const { return rows_; }
+
+  /// Adds what fits of `splats` behind those there are, and says how much that was, with those that were left
+  /// out. Something always fits while empty().
+  size_t add(std::span<const ScreenSplat> splats);
+  bool empty() const { return splats_.empty(); }
+  std::span<const ScreenSplat> splats() const { return splats_; }
+
+  /// Fills the lists. Uses the calling thread's TBB arena.
+  void sort();
+  /// [splats()] of one tile, after sort().
+  std::span<const uint32_t> tile(int number) const {
+    const size_t begin = begins_[static_cast<size_t>(number)];
+    return {entries_.get() + begin, begins_[static_cast<size_t>(number) + 1] - begin};
+  }
+  void clear();
+
+  /// Opens all tiles. hidden() counts from here.
+  void open();
+  void close(int tile) { closed_[static_cast<size_t>(tile)] = true; }
+  /// Splats that were left out.
+  uint64_t hidden() const { return hidden_; }
+
+ private:
+  /// Tiles, the last included; empty where first > last.
+  struct Tiles {
+    uint16_t x0, y0, x1, y1;
+    size_t count() const { return x0 > x1 || y0 > y1 ? 0 : (x1 - x0 + size_t{1}) * (y1 - y0 + size_t{1}); }
+  };
+  Tiles tilesOf(const ScreenSplat& splat) const;
+  bool allClosed(const Tiles& tiles) const;
+  template <typename Visit>
+  void forPiece(size_t piece, const Visit& visit) const;
+
+  const int columns_, rows_;
+  const size_t most_splats_, most_entries_;
+  const unsigned pieces_;
+  std::vector<ScreenSplat> splats_;
+  std::vector<Tiles> tiles_;  // [splats_]
+  size_t entry_count_ = 0;
+  std::unique_ptr<uint32_t[]> entries_;
+  std::vector<size_t> begins_;        // [tiles + 1]
+  std::vector<uint32_t> piece_ends_;  // [piece][tile]: counts, then where the piece goes on writing
+  std::vector<uint8_t> closed_;       // [tile]
+  uint64_t hidden_ = 0;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,59 @@
+#include "render/frame/frame_budget.h"
+
+#include <algorithm>
+#include <thread>
+
+#include "render/project/projection.h"
+#include "stream/base/error.h"
+#include "stream/model/brick.h"
+
+namespace curvisplat {
+namespace {
+
+// A worker's memory: what reading keeps on its thread (a brick's bytes and the decoder's scratch), a brick
+// decoded (16 numbers a splat), the projector's splats and depths, the sorter's keys, indices and counters,
+// the stack.
+constexpr uint64_t kReadingBytes = 12 << 20;
+constexpr uint64_t kWorkerBytes = kReadingBytes + uint64_t{kMaxBrickSplats} * 16 * sizeof(float) +
+                                  BrickProjector::kMostSplats * (sizeof(ScreenSplat) + sizeof(float)) +
+                                  BrickProjector::kMostSplats * (2 * 8 + 4) + (uint64_t{2} << 16) * 4 +
+                                  (1 << 20);
+constexpr uint64_t kLeastRingBytes = BrickProjector::kMostSplats * sizeof(ScreenSplat);
+// More does not make a frame faster: they only bridge bricks that take unequally long.
+constexpr uint64_t kMostRingBytes = 64 << 20;
+constexpr uint64_t kMostPagerBytes = 32 << 20;
+// Shares of the image, the painter and the index are whole sixteenths of the memory where there is enough:
+// then a picture of another size finds the cache as the one before has left it.
+constexpr uint64_t kParts = 16;
+
+}  // namespace
+
+FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned threads) {
+  const uint64_t image_bytes = 4 * sizeof(float) * fixed.size.pixels();
+  const uint64_t exact = fixed.index_bytes + fixed.painter_bytes + image_bytes + fixed.output_bytes;
+  const uint64_t pools = kLeastRingBytes + fixed.least_pager_bytes;
+  const uint64_t least = exact + pools + kWorkerBytes;
+  if (memory_bytes < least)
+    throw UsageError(
+        "{} MiB of memory are too little for {}x{} pixels of this cache; give at least {} MiB with --memory",
+        memory_bytes >> 20, fixed.size.width, fixed.size.height, (least >> 20) + 1);
+  const uint64_t part = memory_bytes / kParts;
+  const uint64_t rounded = (exact + part - 1) / part * part;
+  const unsigned wanted = threads ? threads : std::max(1u, std::thread::hardware_concurrency());
+  FrameBudget budget;
+  const uint64_t taken = rounded + pools + wanted * kWorkerBytes <= memory_bytes ? rounded : exact;
+  budget.workers =
+      static_cast<unsigned>(std::min<uint64_t>(wanted, (memory_bytes - taken - pools) / kWorkerBytes));
+  uint64_t rest = memory_bytes - taken - pools - budget.workers * kWorkerBytes;
+  const uint64_t share = rest / 4;
+  const uint64_t ring_bytes = std::min(kLeastRingBytes + share, kMostRingBytes);
+  budget.ring_splats = ring_bytes / sizeof(ScreenSplat);
+  budget.pager_bytes =
+      std::max(fixed.least_pager_bytes, std::min(fixed.least_pager_bytes + share, kMostPagerBytes));
+  rest -= ring_bytes - kLeastRingBytes;
+  rest -= budget.pager_bytes - fixed.least_pager_bytes;
+  budget.cache_bytes = rest;
+  return budget;
+}
+
+}  // namespace curvisplat

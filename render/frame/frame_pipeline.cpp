@@ -1,0 +1,206 @@
+#include "render/frame/frame_pipeline.h"
+
+#include <exception>
+#include <span>
+#include <utility>
+
+#include "render/frame/frame_budget.h"
+#include "render/frame/frame_workers.h"
+#include "render/frame/segment_drawer.h"
+#include "render/frame/segment_ring.h"
+#include "stream/base/error.h"
+#include "stream/base/stage_timer.h"
+#include "stream/paging/brick_source.h"
+#include "stream/paging/pager.h"
+
+namespace curvisplat {
+namespace {
+
+PaintResources resourcesOf(const FrameOptions& options) {
+  return {.threads = options.threads};
+}
+
+/// However a frame ends: the ring's memory is the next one's, then.
+class DrawsFinished {
+ public:
+  explicit DrawsFinished(Painter& painter) : painter_(painter) {}
+  ~DrawsFinished() {
+    try {
+      painter_.finishDraws();
+    } catch (const Error&) {
+      // The next begin() meets it again.
+    }
+  }
+  DrawsFinished(const DrawsFinished&) = delete;
+  DrawsFinished& operator=(const DrawsFinished&) = delete;
+
+ private:
+  Painter& painter_;
+};
+
+}  // namespace
+
+/// What frames share, sized from the budget.
+struct FramePipeline::Pools {
+  Pools(const CacheReader& cache, size_t variable, const FrameBudget& budget_, const PagerOptions& pager_,
+        std::span<ScreenSplat> splats)
+      : budget(budget_),
+        pager(pager_),
+        ring(splats),
+        source(cache, variable, pager, budget.cache_bytes),
+        workers(source, ring, budget.workers) {}
+
+  const FrameBudget budget;
+  const PagerOptions pager;
+  SegmentRing ring;
+  BrickSource source;
+  FrameWorkers workers;
+};
+
+FramePipeline::FramePipeline(const CacheReader& cache, size_t variable, const FramePlanner& planner,
+                             Backend backend)
+    : cache_(cache), variable_(variable), planner_(planner), backend_(makeBackend(backend)) {}
+
+FramePipeline::~FramePipeline() {
+  endPrefetch();
+}
+
+FramePipeline::Running::Running(FramePipeline& pipeline) : pipeline_(pipeline) {
+  pipeline.endPrefetch();
+  const std::lock_guard lock(pipeline.mutex_);
+  pipeline.phase_ = Phase::running;
+}
+
+FramePipeline::Running::~Running() {
+  const std::lock_guard lock(pipeline_.mutex_);
+  pipeline_.phase_ = Phase::idle;
+}
+
+void FramePipeline::makePools(const FrameOptions& options) {
+  const FrameBudget::Fixed fixed{planner_.bytes(), BrickPager::leastBufferBytes(cache_, variable_),
+                                 backend_->bytes(options.size, resourcesOf(options)), options.output_bytes,
+                                 options.size};
+  const FrameBudget budget = FrameBudget::of(options.memory_bytes, fixed, options.threads);
+  PagerOptions pager;
+  pager.buffer_bytes = budget.pager_bytes;
+  pager.way = options.read_by;
+  pager.direct = options.direct_reads;
+  if (pools_ && pools_->budget == budget && pools_->pager.way == pager.way &&
+      pools_->pager.direct == pager.direct)
+    return;
+  dropPools();  // before the new ones take their memory
+  auto fresh =
+      std::make_unique<Pools>(cache_, variable_, budget, pager, backend_->splatMemory(budget.ring_splats));
+  const std::lock_guard lock(mutex_);
+  pools_ = std::move(fresh);
+}
+
+// Memory comes and goes outside of the lock, so that whoever cancels need not wait for it.
+void FramePipeline::dropPools() {
+  std::unique_ptr<Pools> old;  // goes after the lock
+  const std::lock_guard lock(mutex_);
+  old.swap(pools_);
+}
+
+Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
+                          Progress* progress) {
+  const FrameWork work{cache_,  plan.cut.parts, plan.settings,     planner_.table(),
+                       order(), hidden_,        options.keep_going};
+  makePools(options);
+  {
+    const std::lock_guard lock(mutex_);
+    if (phase_ == Phase::cancelled) throw Cancelled();
+    pools_->ring.reset();
+    hidden_.begin(cache_.bricks(), plan.settings.view);
+    // Back to front, nothing ever is; and see FrameWorkers::prepare().
+    BrickPager::Unneeded unneeded;
+    if (order() == DrawingOrder::front_to_back && !options.keep_going)
+      unneeded = [this](uint32_t brick) { return hidden_.hides(brick); };
+    pools_->source.start(plan.cut.parts, std::move(unneeded));
+  }
+  if (progress) progress->begin("drawing", plan.cut.parts.size(), "bricks");
+  pools_->workers.start(work);
+  Image image;
+  std::exception_ptr failure;
+  try {
+    image = paint(plan, options, statistics, progress);
+  } catch (...) {
+    failure = std::current_exception();
+    pools_->ring.close();
+    pools_->source.stop();
+  }
+  try {
+    pools_->workers.finish(statistics);
+  } catch (...) {
+    if (!failure) failure = std::current_exception();
+  }
+  pools_->source.finish(statistics);
+  if (failure) {
+    dropPools();  // a reading thread that has failed is of no use to the next frame
+    std::rethrow_exception(failure);
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    if (phase_ == Phase::cancelled) throw Cancelled();
+  }
+  if (progress) progress->end();
+
+  const Cut& cut = plan.cut;
+  statistics.ring_peak_bytes = pools_->ring.peakSplats() * sizeof(ScreenSplat);
+  statistics.bricks_drawn = cut.parts.size() - statistics.bricks_hidden;
+  statistics.bricks_out_of_image = cut.out_of_image;
+  statistics.bricks_transparent = cut.transparent;
+  statistics.bricks_culled = cut.out_of_image + cut.transparent;
+  statistics.largest_level = static_cast<int>(cut.deepest_level);
+  statistics.largest_error_px = cut.largest_error_px;
+  statistics.workers = pools_->budget.workers;
+  statistics.memory_used_bytes = options.memory_bytes - pools_->budget.cache_bytes + statistics.cache_bytes;
+  return image;
+}
+
+/// The stage "draw". No picture where the ring was closed: a worker has failed, or the frame was cancelled.
+Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
+                           Progress* progress) {
+  Image image;
+  backend_->run([&](Painter& painter) {
+    const DrawsFinished finished(painter);
+    painter.begin(plan.settings.view.size, options.background, planner_.table(), plan.settings.per_pixel,
+                  resourcesOf(options));
+    hidden_.ask(&painter);
+    SegmentDrawer drawer(painter, pools_->ring, statistics.painter_waited_s);
+    for (size_t drawn = 0; drawn < plan.cut.parts.size(); ++drawn) {
+      if (!drawer.drawNext()) return;
+      if (progress) progress->advance(1);
+    }
+    image = painter.end();
+    statistics.splats_hidden = painter.hiddenSplats();
+    statistics.upload_s = painter.uploadSeconds();
+    statistics.draw_s = painter.drawSeconds();
+    statistics.gl_draw_s = painter.glSeconds();
+  });
+  return image;
+}
+
+void FramePipeline::cancel() {
+  const std::lock_guard lock(mutex_);
+  if (phase_ == Phase::idle) return;
+  phase_ = Phase::cancelled;
+  if (!pools_) return;
+  pools_->ring.close();
+  pools_->source.stop();
+}
+
+void FramePipeline::prefetch(const FramePlan& plan, const FrameOptions& options) {
+  endPrefetch();
+  makePools(options);
+  pools_->source.startPrefetch(plan.cut.parts);
+  pools_->workers.startPrefetch();
+}
+
+void FramePipeline::endPrefetch() {
+  if (!pools_) return;
+  pools_->source.stop();
+  pools_->workers.finishPrefetch();
+}
+
+}  // namespace curvisplat

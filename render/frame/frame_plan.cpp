@@ -1,0 +1,105 @@
+#include "render/frame/frame_plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <utility>
+
+#include "render/project/kernel.h"
+#include "render/project/screen_view.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+// The perspective near plane's distance, in diagonals of the data. What is nearer would fill the image many
+// times over, cut into very many pieces.
+constexpr double kNearInDiagonals = 1e-4;
+// What the cut and the source note of a brick.
+constexpr uint64_t kFrameBytesABrick = 160;
+
+ClassificationTable tableFor(const CacheReader& cache, size_t variable,
+                             const TransferFunction& transfer_function) {
+  const VariableInfo& info = cache.manifest().variables.at(variable);
+  return ClassificationTable::of(transfer_function, info.min, info.max);
+}
+
+/// Whether no scalar that a pixel of such a brick can have has extinction.
+TransparentBounds transparentIn(const ClassificationTable& table, const ProjectionSettings& settings) {
+  const double reach = settings.per_pixel ? largestReach(settings.view.low_pass_px2) : 1;
+  return [&table, reach](const ValueBounds& values) {
+    const double deviation = std::hypot(kKernelSigma * values.largest_slope, values.largest_deviation);
+    const double spread = 1.001 * (reach * values.largest_slope + std::sqrt(3.0) * deviation);
+    return table.fullyTransparent(static_cast<float>(values.min - spread),
+                                  static_cast<float>(values.max + spread));
+  };
+}
+
+CutOptions limitsOf(const FrameOptions& options, DrawingOrder order) {
+  CutOptions limits;
+  limits.order = order;
+  limits.lod_pixels = options.lod_pixels;
+  limits.max_splats = options.max_splats.value_or(CutOptions::kNoLimit);
+  return limits;
+}
+
+}  // namespace
+
+FramePlanner::FramePlanner(const CacheReader& cache, size_t variable,
+                           const TransferFunction& transfer_function)
+    : cache_(cache),
+      variable_(variable),
+      table_(tableFor(cache, variable, transfer_function)),
+      subtrees_(subtreeBounds(cache.bricks(), cache.brickVariables(variable))) {}
+
+uint64_t FramePlanner::bytes() const {
+  return cache_.bricks().size() *
+         (sizeof(Brick) + cache_.manifest().variables.size() * sizeof(BrickVariable) + sizeof(ValueBounds) +
+          kFrameBytesABrick);
+}
+
+void FramePlanner::setTransferFunction(const TransferFunction& transfer_function) {
+  table_ = tableFor(cache_, variable_, transfer_function);
+}
+
+ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const FrameOptions& options,
+                        ImageSize size) {
+  const double diagonal = glm::length(options.scale * (manifest.upper - manifest.lower));
+  const double near = kNearInDiagonals * (diagonal > 0 ? diagonal : manifest.root.size);
+  return ScreenView::of(camera, size, options.scale, options.low_pass_px2, near);
+}
+
+ProjectionSettings FramePlanner::settingsFor(const Camera& camera, const FrameOptions& options,
+                                             ImageSize size) const {
+  return {screenView(camera, options, size), options.classification == Classification::pixel,
+          options.clip_box, cache_.manifest().cells ? kCellBorderParts : kNodeBorderParts};
+}
+
+Cut FramePlanner::chooseCut(const ProjectionSettings& settings, const FrameOptions& options,
+                            const CutOptions& limits) const {
+  const CutTree tree{cache_.manifest().root, cache_.bricks(), cache_.brickVariables(variable_), subtrees_};
+  Cut cut = curvisplat::chooseCut(tree, settings.view.cutView(), transparentIn(table_, settings), limits);
+  if (options.max_splats && cut.splats > *options.max_splats)
+    throw UsageError(
+        "{} splats are too few: the coarsest picture of this cache takes {}; give --max-splats that",
+        *options.max_splats, cut.splats);
+  return cut;
+}
+
+FramePlan FramePlanner::plan(const Camera& camera, const FrameOptions& options, DrawingOrder order) const {
+  const ProjectionSettings settings = settingsFor(camera, options, options.size);
+  return {settings, chooseCut(settings, options, limitsOf(options, order))};
+}
+
+QuickPlan FramePlanner::planQuick(const Camera& camera, const FrameOptions& options, const QuickLimits& quick,
+                                  DrawingOrder order) const {
+  const ProjectionSettings settings = settingsFor(camera, options, options.size);
+  CutOptions limits = limitsOf(options, order);
+  limits.max_splats = std::min(limits.max_splats, quick.max_splats);
+  limits.max_bytes = std::min(limits.max_bytes, quick.max_bytes);
+  Cut cut = chooseCut(settings, options, limits);
+  const ReducedSize size(options.size, std::max(quick.detail_px, cut.complete ? 0 : cut.largest_error_px));
+  return {{size.isWhole() ? settings : settingsFor(camera, options, size.size()), std::move(cut)}, size};
+}
+
+}  // namespace curvisplat

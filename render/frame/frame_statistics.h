@@ -1,0 +1,42 @@
+// What a frame took, and what became of its bricks and splats.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "stream/paging/brick_source.h"
+
+namespace curvisplat {
+
+/// A brick that was drawn from its nearest readable ancestor, or left out if there is none.
+struct BrickFailure {
+  uint32_t brick = 0;
+  std::string reason;  // one line
+};
+
+/// Seconds are summed over threads for the workers' stages.
+struct FrameStatistics : FetchStatistics {
+  double plan_s = 0, project_s = 0, sort_s = 0, upload_s = 0, draw_s = 0, total_s = 0;
+  double gl_draw_s = 0;         // by OpenGL's own clock
+  double workers_waited_s = 0;  // for room in the ring: the painter is slower; for reads: read_waited_s
+  double painter_waited_s = 0;  // for the workers
+  uint64_t bricks_drawn = 0;    // in whole or in part; one that is drawn in several parts counts for each
+  uint64_t bricks_culled = 0;   // each stands for all below it; those are
+  uint64_t bricks_out_of_image = 0, bricks_transparent = 0;
+  uint64_t splats_read = 0;
+  uint64_t splats_clipped = 0, splats_off_screen = 0, splats_transparent = 0;  // read, and not drawn, since
+  uint64_t splats_drawn = 0;
+  /// Parts that were left out because what is before them hides them, and splats handed to the painter for
+  /// which it found that. How many depends on how far the stages are ahead of one another; the picture does
+  /// not.
+  uint64_t bricks_hidden = 0, splats_hidden = 0;
+  int largest_level = 0;
+  double largest_error_px = 0;  // on the screen, of what is drawn; infinite around a perspective eye
+  unsigned workers = 0;
+  uint64_t ring_peak_bytes = 0;
+  uint64_t memory_used_bytes = 0;  // of memory_bytes: what the stages have, and decoded bricks that are kept
+  std::vector<BrickFailure> bricks_unreadable;  // with keep_going; by number
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,59 @@
+#include "render/frame/hidden_bricks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <limits>
+
+#include "render/project/kernel.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr float kEverywhere = std::numeric_limits<float>::infinity();
+constexpr double kRoundingPixels = 1;
+
+}  // namespace
+
+ScreenBox screenBoxOf(const Brick& brick, const ScreenView& view) {
+  const bool perspective = view.projection == Projection::perspective;
+  const double radius = brick.largest_radius * std::max({view.scale.x, view.scale.y, view.scale.z});
+  glm::dvec2 lower(INFINITY), upper(-INFINITY);
+  double nearest = INFINITY, widest = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 at = view.viewFromData({corner & 1 ? brick.upper.x : brick.lower.x,
+                                             corner & 2 ? brick.upper.y : brick.lower.y,
+                                             corner & 4 ? brick.upper.z : brick.lower.z});
+    if (perspective) {
+      // Splats that come close to the eye are cut into pieces: each is drawn by a linear map of its own, at a
+      // centre that is up to a radius nearer.
+      if (at.z < std::max(view.near, 2 * radius))
+        return {-kEverywhere, -kEverywhere, kEverywhere, kEverywhere};
+      nearest = std::min(nearest, at.z - radius);
+      widest = std::max(widest, (std::max(std::abs(at.x), std::abs(at.y)) + radius) / (at.z - radius));
+    }
+    const glm::dvec2 pixel = view.pixelFromView(at);
+    lower = glm::min(lower, pixel);
+    upper = glm::max(upper, pixel);
+  }
+  // A row of the map at (x, y, z) has the length focal_px / z √(1 + (x / z)²).
+  const double pixels_a_unit =
+      perspective ? view.focal_px / nearest * std::hypot(1.0, widest) : view.focal_px;
+  const double reach =
+      radius * pixels_a_unit + kKernelSupport * std::sqrt(view.low_pass_px2) + kRoundingPixels;
+  return {static_cast<float>(lower.x - reach), static_cast<float>(lower.y - reach),
+          static_cast<float>(upper.x + reach), static_cast<float>(upper.y + reach)};
+}
+
+void HiddenBricks::begin(std::span<const Brick> bricks, const ScreenView& view) {
+  bricks_ = bricks;
+  view_ = view;
+  painter_ = nullptr;
+}
+
+bool HiddenBricks::hides(uint32_t brick) const {
+  const Painter* painter = painter_;
+  return painter && painter->hides(screenBoxOf(bricks_[brick], view_));
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,88 @@
+#include "render/frame/segment_ring.h"
+
+#include <algorithm>
+
+#include "stream/base/check.h"
+
+namespace curvisplat {
+
+std::optional<std::span<ScreenSplat>> SegmentRing::acquire(uint64_t sequence, size_t count) {
+  const size_t capacity = splats_.size();
+  CURVISPLAT_CHECK_OP(count, <=, capacity);
+  std::unique_lock lock(mutex_);
+  uint64_t begin = 0;
+  granted_.wait(lock, [&] {
+    if (closed_) return true;
+    if (sequence != first_sequence_ + segments_.size()) return false;
+    const uint64_t next_lap = (end_ + capacity - 1) / capacity * capacity;
+    begin = segments_.empty() || end_ % capacity + count > capacity ? next_lap : end_;
+    return segments_.empty() || begin + count - segments_.front().begin <= capacity;
+  });
+  if (closed_) return {};
+  segments_.push_back({begin, count, false});
+  end_ = begin + count;
+  peak_ = std::max(peak_, static_cast<size_t>(end_ - segments_.front().begin));
+  granted_.notify_all();
+  return splats_.subspan(begin % capacity, count);
+}
+
+void SegmentRing::commit(uint64_t sequence) {
+  const std::lock_guard lock(mutex_);
+  const size_t n = sequence - first_sequence_;
+  segments_[n].committed = true;
+  if (n == handed_out_) committed_.notify_all();
+}
+
+std::optional<std::span<const ScreenSplat>> SegmentRing::next() {
+  std::unique_lock lock(mutex_);
+  committed_.wait(lock, [&] { return closed_ || isReady(); });
+  if (closed_) return {};
+  return handOut();
+}
+
+std::optional<std::span<const ScreenSplat>> SegmentRing::nextIfReady() {
+  const std::lock_guard lock(mutex_);
+  if (closed_ || !isReady()) return {};
+  return handOut();
+}
+
+bool SegmentRing::isReady() const {
+  return handed_out_ < segments_.size() && segments_[handed_out_].committed;
+}
+
+std::span<const ScreenSplat> SegmentRing::handOut() {
+  const Segment& segment = segments_[handed_out_++];
+  return splats_.subspan(segment.begin % splats_.size(), segment.count);
+}
+
+void SegmentRing::release() {
+  const std::lock_guard lock(mutex_);
+  CURVISPLAT_CHECK_OP(handed_out_, >, 0u);
+  segments_.pop_front();
+  ++first_sequence_;
+  --handed_out_;
+  granted_.notify_all();
+}
+
+void SegmentRing::reset() {
+  const std::lock_guard lock(mutex_);
+  segments_.clear();
+  handed_out_ = 0;
+  end_ = first_sequence_ = 0;
+  closed_ = false;
+  peak_ = 0;
+}
+
+size_t SegmentRing::peakSplats() const {
+  const std::lock_guard lock(mutex_);
+  return peak_;
+}
+
+void SegmentRing::close() {
+  const std::lock_guard lock(mutex_);
+  closed_ = true;
+  granted_.notify_all();
+  committed_.notify_all();
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,279 @@
+#include "render/gl/gl_painter.h"
+
+#include <algorithm>
+#include <array>
+#include <deque>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "render/gl/gl_objects.h"
+#include "render/gl/splat_shader.h"
+#include "render/project/kernel.h"
+#include "stream/base/error.h"
+#include "stream/base/stage_timer.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr int kFootprintSteps = 1024;
+// llvmpipe sets up triangles far ahead of drawing them, at 640 bytes a splat: unbounded, half a million
+// splats took 330 MiB. Two draws under way keep all its threads busy.
+constexpr size_t kSplatsPerDraw = 16384;
+constexpr size_t kDrawsInFlight = 2;
+constexpr GLint kFootprintUnit = 0, kClassesUnit = 1;
+
+/// A table that shaders read by index, exactly: no filtering, no size limit worth a thought.
+struct TableTexture {
+  GlObject buffer, texture;
+
+  explicit TableTexture(const GlFunctions& gl) : buffer(makeBuffer(gl)), texture(makeTexture(gl)) {}
+
+  template <typename T>
+  void fill(const GlFunctions& gl, GLint unit, GLenum format, std::span<const T> values) {
+    gl.BindBuffer(GL_TEXTURE_BUFFER, buffer.name());
+    gl.BufferData(GL_TEXTURE_BUFFER, static_cast<GLsizeiptr>(values.size_bytes()), values.data(),
+                  GL_STATIC_DRAW);
+    gl.ActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
+    gl.BindTexture(GL_TEXTURE_BUFFER, texture.name());
+    gl.TexBuffer(GL_TEXTURE_BUFFER, format, buffer.name());
+  }
+};
+
+/// Splats as the shader's instances: ScreenSplat's ten floats as 4 + 4 + 2. Leaves itself bound.
+struct InstanceBuffer {
+  GlObject buffer, vertex_array;
+
+  explicit InstanceBuffer(const GlFunctions& gl) : buffer(makeBuffer(gl)), vertex_array(makeVertexArray(gl)) {
+    static constexpr GLint kComponents[] = {4, 4, 2};
+    bind(gl);
+    size_t offset = 0;
+    for (GLuint attribute = 0; attribute < 3; ++attribute) {
+      gl.EnableVertexAttribArray(attribute);
+      gl.VertexAttribPointer(attribute, kComponents[attribute], GL_FLOAT, GL_FALSE, sizeof(ScreenSplat),
+                             reinterpret_cast<const void*>(offset));
+      gl.VertexAttribDivisor(attribute, 1);
+      offset += static_cast<size_t>(kComponents[attribute]) * sizeof(float);
+    }
+  }
+
+  void bind(const GlFunctions& gl) const {
+    gl.BindVertexArray(vertex_array.name());
+    gl.BindBuffer(GL_ARRAY_BUFFER, buffer.name());
+  }
+};
+
+/// Value and step to the next value, so that linear interpolation needs one fetch.
+std::vector<std::array<float, 2>> footprintTexels() {
+  const auto table = footprintTable(kFootprintSteps);
+  std::vector<std::array<float, 2>> texels;
+  for (size_t step = 0; step + 1 < table.size(); ++step)
+    texels.push_back({static_cast<float>(table[step]), static_cast<float>(table[step + 1] - table[step])});
+  return texels;
+}
+
+}  // namespace
+
+struct GlPainter::State {
+  explicit State(const GlFunctions& functions)
+      : gl(functions),
+        per_pixel(gl, splatVertexShader(), splatFragmentShader({.per_pixel = true, .log_scale = false})),
+        per_pixel_log(gl, splatVertexShader(), splatFragmentShader({.per_pixel = true, .log_scale = true})),
+        flat(gl, splatVertexShader(), splatFragmentShader({.per_pixel = false, .log_scale = false})),
+        flat_log(gl, splatVertexShader(), splatFragmentShader({.per_pixel = false, .log_scale = true})),
+        footprint(gl),
+        classes(gl),
+        copied(gl),
+        framebuffer(makeFramebuffer(gl)),
+        colour(makeRenderbuffer(gl)) {}
+
+  const GlFunctions& gl;
+  GlProgram per_pixel, per_pixel_log, flat, flat_log;
+  TableTexture footprint, classes;
+  InstanceBuffer copied;                 // what lies elsewhere is copied here to be drawn
+  std::optional<InstanceBuffer> mapped;  // what lies here is not
+  std::span<ScreenSplat> mapped_splats;
+  GlObject framebuffer, colour;
+  ImageSize size{0, 0};
+  struct InFlight {
+    GlFence fence;
+    GlObject timer;  // a query, done when the fence is passed
+    uint64_t draw;
+  };
+  std::deque<InFlight> in_flight;
+  uint64_t draws = 0;  // calls of draw()
+  double upload_s = 0, draw_s = 0, gl_draw_s = 0;
+
+  void allocate(ImageSize wanted);
+  void drawPart(std::span<const ScreenSplat> splats);
+  void finishOldest();
+  void use(const GlProgram& program, const ClassificationTable& table) const;
+};
+
+GlPainter::GlPainter(const GlContext& context) : state_(std::make_unique<State>(context.functions())) {
+  const GlFunctions& gl = state_->gl;
+  const auto texels = footprintTexels();
+  state_->footprint.fill<std::array<float, 2>>(gl, kFootprintUnit, GL_RG32F, texels);
+
+  gl.Enable(GL_BLEND);
+  gl.BlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  gl.check("setting up the painter");
+}
+
+GlPainter::~GlPainter() = default;
+
+void GlPainter::State::allocate(ImageSize wanted) {
+  if (wanted.width == size.width && wanted.height == size.height) return;
+  GLint viewport[2] = {0, 0}, side = 0;
+  gl.GetIntegerv(GL_MAX_VIEWPORT_DIMS, viewport);
+  gl.GetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &side);
+  const GLint widest = std::min(side, viewport[0]), tallest = std::min(side, viewport[1]);
+  if (wanted.width > widest || wanted.height > tallest)
+    throw Error(
+        "an image of {}x{} pixels is larger than this OpenGL draws (at most {}x{}); ask for a smaller --size",
+        wanted.width, wanted.height, widest, tallest);
+  size = {0, 0};
+  gl.BindFramebuffer(GL_FRAMEBUFFER, framebuffer.name());
+  gl.BindRenderbuffer(GL_RENDERBUFFER, colour.name());
+  gl.RenderbufferStorage(GL_RENDERBUFFER, GL_RGBA32F, wanted.width, wanted.height);
+  gl.FramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, colour.name());
+  gl.check("allocating the image");
+  if (const GLenum status = gl.CheckFramebufferStatus(GL_FRAMEBUFFER); status != GL_FRAMEBUFFER_COMPLETE)
+    throw Error(
+        "this OpenGL cannot draw to a 32-bit float image of {}x{} pixels (framebuffer status 0x{:04x})",
+        wanted.width, wanted.height, status);
+  size = wanted;
+}
+
+void GlPainter::State::use(const GlProgram& program, const ClassificationTable& table) const {
+  gl.UseProgram(program.name());
+  gl.Uniform2f(program.uniform("clip_from_pixel"), 2.0f / static_cast<float>(size.width),
+               2.0f / static_cast<float>(size.height));
+  gl.Uniform1i(program.uniform("footprint"), kFootprintUnit);
+  gl.Uniform1i(program.uniform("classes"), kClassesUnit);
+  gl.Uniform1f(program.uniform("support"), static_cast<float>(kKernelSupport));
+  gl.Uniform1f(program.uniform("footprint_steps"),
+               static_cast<float>(kFootprintSteps / (kKernelSupport * kKernelSupport)));
+  gl.Uniform1i(program.uniform("cells"), ClassificationTable::kCells);
+  gl.Uniform2f(program.uniform("cells_from_scalar"), table.scale(), table.bias());
+  gl.Uniform1f(program.uniform("least_logarithmic"), ClassificationTable::kLeastLogarithmic);
+  const glm::vec4 below = table.below(), above = table.above();
+  gl.Uniform4f(program.uniform("below"), below.x, below.y, below.z, below.w);
+  gl.Uniform4f(program.uniform("above"), above.x, above.y, above.z, above.w);
+}
+
+void GlPainter::begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
+                      bool per_pixel, const PaintResources&) {
+  const GlFunctions& gl = state_->gl;
+  finishDraws();  // of a frame that was not ended
+  state_->upload_s = state_->draw_s = state_->gl_draw_s = 0;
+  state_->allocate(size);
+  state_->classes.fill(gl, kClassesUnit, GL_RGBA32F, table.cumulative());
+  state_->use(per_pixel ? (table.logScale() ? state_->per_pixel_log : state_->per_pixel)
+                        : (table.logScale() ? state_->flat_log : state_->flat),
+              table);
+  gl.Viewport(0, 0, size.width, size.height);
+  gl.ClearColor(background.r, background.g, background.b, background.a);
+  gl.Clear(GL_COLOR_BUFFER_BIT);
+  gl.check("beginning a frame");
+}
+
+std::span<ScreenSplat> GlPainter::mapSplats(size_t count) {
+  State& state = *state_;
+  const GlFunctions& gl = state.gl;
+  finishDraws();
+  state.mapped.reset();
+  state.mapped_splats = {};
+  if (!gl.has44()) return {};
+  state.mapped.emplace(gl);
+  const auto bytes = static_cast<GLsizeiptr>(count * sizeof(ScreenSplat));
+  constexpr GLbitfield kHow = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
+  gl.BufferStorage(GL_ARRAY_BUFFER, bytes, nullptr, kHow);
+  void* const memory = gl.MapBufferRange(GL_ARRAY_BUFFER, 0, bytes, kHow);
+  gl.check("mapping memory for splats");
+  state.mapped_splats = {static_cast<ScreenSplat*>(memory), count};
+  return state.mapped_splats;
+}
+
+void GlPainter::draw(std::span<const ScreenSplat> splats) {
+  ++state_->draws;
+  while (!splats.empty()) {
+    const auto part = splats.first(std::min(splats.size(), kSplatsPerDraw));
+    splats = splats.subspan(part.size());
+    state_->drawPart(part);
+  }
+}
+
+void GlPainter::State::drawPart(std::span<const ScreenSplat> splats) {
+  const auto count = static_cast<GLsizei>(splats.size());
+  GlObject query = makeQuery(gl);
+  const std::less_equal<const ScreenSplat*> not_after;
+  if (!mapped_splats.empty() && not_after(mapped_splats.data(), splats.data()) &&
+      not_after(splats.data() + splats.size(), mapped_splats.data() + mapped_splats.size())) {
+    const StageTimer timer(draw_s);
+    mapped->bind(gl);
+    gl.BeginQuery(GL_TIME_ELAPSED, query.name());
+    gl.DrawArraysInstancedBaseInstance(GL_TRIANGLE_STRIP, 0, 4, count,
+                                       static_cast<GLuint>(splats.data() - mapped_splats.data()));
+  } else {
+    copied.bind(gl);
+    {
+      // Fresh storage each time: the driver keeps what it still draws from.
+      const StageTimer timer(upload_s);
+      gl.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(splats.size_bytes()), splats.data(),
+                    GL_STREAM_DRAW);
+    }
+    const StageTimer timer(draw_s);
+    gl.BeginQuery(GL_TIME_ELAPSED, query.name());
+    gl.DrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, count);
+  }
+  const StageTimer timer(draw_s);
+  gl.EndQuery(GL_TIME_ELAPSED);
+  gl.check("drawing splats");
+  in_flight.push_back({GlFence(gl), std::move(query), draws});
+  if (in_flight.size() > kDrawsInFlight) finishOldest();
+}
+
+void GlPainter::State::finishOldest() {
+  in_flight.front().fence.wait();
+  GLuint64 nanoseconds = 0;
+  gl.GetQueryObjectui64v(in_flight.front().timer.name(), GL_QUERY_RESULT, &nanoseconds);
+  gl_draw_s += 1e-9 * static_cast<double>(nanoseconds);
+  in_flight.pop_front();
+}
+
+size_t GlPainter::drawsUnderWay() const {
+  const State& state = *state_;
+  return state.in_flight.empty() ? 0 : state.draws - state.in_flight.front().draw + 1;
+}
+
+void GlPainter::finishDraws() {
+  const StageTimer timer(state_->draw_s);
+  while (!state_->in_flight.empty()) state_->finishOldest();
+}
+
+Image GlPainter::end() {
+  const GlFunctions& gl = state_->gl;
+  finishDraws();
+  const StageTimer timer(state_->draw_s);
+  Image image(state_->size);
+  gl.ReadPixels(0, 0, image.size.width, image.size.height, GL_RGBA, GL_FLOAT, image.rgba.data());
+  gl.check("reading the picture");
+  return image;
+}
+
+double GlPainter::uploadSeconds() const {
+  return state_->upload_s;
+}
+
+double GlPainter::drawSeconds() const {
+  return state_->draw_s;
+}
+
+double GlPainter::glSeconds() const {
+  return state_->gl_draw_s;
+}
+
+}  // namespace curvisplat

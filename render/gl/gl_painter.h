@@ -1,0 +1,42 @@
+// Draws screen splats with OpenGL: an instanced quad a splat, the footprint and the classification as tables
+// in textures, blended over what was drawn before in 32-bit floats.
+//
+// The image's top row is the framebuffer's first, so that nothing is ever flipped.
+// Lives on the context's thread. Not built for: more than one frame at a time.
+#pragma once
+
+#include <memory>
+
+#include "render/gl/gl_context.h"
+#include "render/project/painter.h"
+
+namespace curvisplat {
+
+class GlPainter final : public Painter {
+ public:
+  /// Compiles the programs. `context` outlives the painter. Throws Error.
+  explicit GlPainter(const GlContext& context);
+  ~GlPainter() override;
+
+  DrawingOrder order() const override { return DrawingOrder::back_to_front; }
+  void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table, bool per_pixel,
+             const PaintResources& resources = {}) override;
+  void draw(std::span<const ScreenSplat> splats) override;
+  size_t drawsUnderWay() const override;
+  void finishDraws() override;
+  Image end() override;
+
+  double uploadSeconds() const override;
+  double drawSeconds() const override;
+  double glSeconds() const override;
+
+  /// A buffer of OpenGL's for so many splats, mapped for as long as it is there: until the next call. Empty
+  /// where OpenGL is older than 4.4.
+  std::span<ScreenSplat> mapSplats(size_t count);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,12 @@
+#include "render/gl/offscreen_context.h"
+
+#include "render/gl/egl_context.h"
+#include "render/gl/osmesa_context.h"
+
+namespace curvisplat {
+
+std::unique_ptr<GlContext> makeOffscreenContext(GlLibrary library) {
+  return library == GlLibrary::egl ? makeEglContext() : makeOsMesaContext();
+}
+
+}  // namespace curvisplat

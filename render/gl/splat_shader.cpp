@@ -1,0 +1,102 @@
+#include "render/gl/splat_shader.h"
+
+#include <fmt/format.h>
+
+namespace curvisplat {
+namespace {
+
+constexpr const char* kVertexShader = R"(#version 330 core
+layout(location = 0) in vec4 part0;  // x, y, l11, l21
+layout(location = 1) in vec4 part1;  // l22, amplitude, mean, slope0
+layout(location = 2) in vec2 part2;  // slope1, half_width
+uniform vec2 clip_from_pixel;
+uniform float support;
+flat out vec2 centre;
+flat out vec3 u_from_d;  // of L: 1 / l11, -l21 / (l11 l22), 1 / l22
+flat out float amplitude;
+flat out vec4 scalar;   // mean, slope0, slope1, half_width
+
+void main() {
+  centre = part0.xy;
+  u_from_d = vec3(1.0 / part0.z, -part0.w / (part0.z * part1.x), 1.0 / part1.x);
+  amplitude = part1.y;
+  scalar = vec4(part1.zw, part2);
+  // The square around the support's circle, through L: a parallelogram as large as the ellipse's own rectangle.
+  vec2 u = support * vec2((gl_VertexID & 1) * 2 - 1, (gl_VertexID & 2) - 1);
+  vec2 pixel = centre + vec2(part0.z * u.x, part0.w * u.x + part1.x * u.y);
+  gl_Position = vec4(pixel * clip_from_pixel - 1.0, 0.0, 1.0);
+}
+)";
+
+// Look-ups interpolate by hand: filtering in hardware has 8 bits of fraction.
+constexpr const char* kFragmentShader = R"(
+uniform samplerBuffer footprint;  // F and the step to the next, over rho squared
+uniform samplerBuffer classes;    // cumulative: colour times extinction, extinction
+uniform float support;
+uniform float footprint_steps;    // per unit of rho squared
+uniform int cells;
+uniform vec2 cells_from_scalar;   // factor, offset
+uniform float least_logarithmic;
+uniform vec4 below;
+uniform vec4 above;
+flat in vec2 centre;
+flat in vec3 u_from_d;
+flat in float amplitude;
+flat in vec4 scalar;
+out vec4 blended;
+
+float cellsOf(float value) {
+  float v = LOG_SCALE ? log(max(value, least_logarithmic)) : value;
+  return v * cells_from_scalar.x + cells_from_scalar.y;
+}
+
+vec4 integral(float x) {
+  float inside = clamp(x, 0.0, float(cells));
+  int cell = min(int(inside), cells - 1);
+  vec4 from = texelFetch(classes, cell);
+  return from + (texelFetch(classes, cell + 1) - from) * (inside - float(cell)) + below * min(x, 0.0) +
+         above * max(x - float(cells), 0.0);
+}
+
+// 1 - exp(-x) without cancellation
+float absorbed(float x) {
+  float series = x * (1.0 - x * (1.0 / 2.0 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0)))));
+  return x < 0.25 ? series : 1.0 - exp(-x);
+}
+
+void main() {
+  vec2 d = gl_FragCoord.xy - centre;
+  vec2 u = vec2(u_from_d.x * d.x, u_from_d.y * d.x + u_from_d.z * d.y);
+  float rho2 = dot(u, u);
+  if (rho2 >= support * support) discard;
+
+  float at = rho2 * footprint_steps;
+  vec2 texel = texelFetch(footprint, int(at)).xy;
+  float depth = amplitude * (texel.x + texel.y * fract(at));
+
+  float mean = PER_PIXEL ? scalar.x + dot(scalar.yz, u) : scalar.x;
+  float width = PER_PIXEL ? scalar.w : 0.0;
+  // Beyond an end of the table all is the same; float tells cells apart only near it.
+  float from = min(cellsOf(mean - width), float(cells) + 1.0), to = max(cellsOf(mean + width), -1.0);
+  float widen = max(0.0, 0.5 * (1.0 - (to - from)));
+  from -= widen;
+  to += widen;
+  vec4 seen = max((integral(to) - integral(from)) / (to - from), 0.0);
+
+  float alpha = absorbed(seen.w * depth);
+  blended = vec4(seen.w > 0.0 ? seen.rgb * (alpha / seen.w) : vec3(0.0), alpha);
+}
+)";
+
+}  // namespace
+
+std::string splatVertexShader() {
+  return kVertexShader;
+}
+
+std::string splatFragmentShader(SplatShaderKind kind) {
+  return fmt::format("#version 330 core\n#define PER_PIXEL {}\n#define LOG_SCALE {}\n{}", kind.per_pixel,
+                     kind.log_scale, kFragmentShader);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,78 @@
+#include "render/image/image_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstring>
+#include <string_view>
+
+#include "render/image/image_formats.h"
+#include "stream/base/check.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+
+namespace curvisplat {
+namespace {
+
+struct Format {
+  std::string_view ending;
+  std::string_view magic;
+  Bytes (*encode)(const Image&);
+  uint64_t pixel_bytes;  // that encoding takes for a pixel, the file included
+  Image (*decode)(std::span<const std::byte>, const std::string&);
+};
+
+constexpr std::array<Format, 4> kFormats{{
+    {".png", "\x89PNG", encodePng, 8, decodePng},
+    {".exr", "\x76\x2f\x31\x01", encodeExr, 48, decodeExr},
+    {".pfm", "PF", encodePfm, 12, decodePfm},
+    {"", "Pf", nullptr, 0, decodePfm},  // one grey channel: read, never written
+}};
+
+constexpr size_t kLongestMagic = 4;
+constexpr uint64_t kLargestFile = uint64_t{8} << 30;  // 16384 x 16384 pixels of four floats are 4 GiB
+
+const Format& formatByName(const std::filesystem::path& path) {
+  std::string ending = path.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const Format& format : kFormats)
+    if (format.encode != nullptr && ending == format.ending) return format;
+  throw UsageError("{}: an image's name ends in .png, .exr or .pfm", path.string());
+}
+
+}  // namespace
+
+void writeImage(const Image& image, const std::filesystem::path& path) {
+  CURVISPLAT_CHECK(image.size.width > 0 && image.size.width <= kLargestImageSide);
+  CURVISPLAT_CHECK(image.size.height > 0 && image.size.height <= kLargestImageSide);
+  writeFileDurably(path, formatByName(path).encode(image));
+}
+
+uint64_t writingBytes(const std::filesystem::path& path, ImageSize size) {
+  return formatByName(path).pixel_bytes * size.pixels();
+}
+
+void checkImageName(const std::filesystem::path& path) {
+  formatByName(path);
+}
+
+Image readImage(const std::filesystem::path& path) {
+  const InputFile file(path);
+  Bytes bytes(std::min<uint64_t>(file.size(), kLongestMagic));
+  file.readAt(0, std::span(bytes));
+  for (const Format& format : kFormats) {
+    if (bytes.size() < format.magic.size() ||
+        std::memcmp(bytes.data(), format.magic.data(), format.magic.size()) != 0)
+      continue;
+    if (file.size() > kLargestFile)
+      throw Error("{}: has {} bytes, more than the {} an image can have", path.string(), file.size(),
+                  kLargestFile);
+    bytes.resize(file.size());
+    file.readAt(0, std::span(bytes));
+    return format.decode(bytes, path.string());
+  }
+  throw Error("{}: is not a PNG, EXR or PFM image, by its first bytes", path.string());
+}
+
+}  // namespace curvisplat

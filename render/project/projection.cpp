@@ -1,0 +1,314 @@
+#include "render/project/projection.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/project/border_parts.h"
+#include "render/project/kernel.h"
+#include "render/project/splat_cutter.h"
+#include "render/project/splat_ellipse.h"
+#include "render/project/splat_maps.h"
+#include "stream/base/check.h"
+#include "stream/model/half_cell.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kBlock = 256;  // splats at a time: the arrays between the two loops stay in the L1 cache
+constexpr auto kSupport = static_cast<float>(kKernelSupport);
+
+/// What the arithmetic loop hands to the loop that chooses.
+struct Block {
+  float x[kBlock], y[kBlock], depth[kBlock];
+  float l11[kBlock], l21[kBlock], l22[kBlock];
+  float amplitude[kBlock];
+  float slope0[kBlock], slope1[kBlock], half_width[kBlock];
+  int32_t clipped[kBlock];
+  int32_t too_wide[kBlock];  // perspective: to be cut up, or before the near plane
+
+  [[gnu::always_inline]] void set(size_t n, const Ellipse& ellipse) {
+    l11[n] = ellipse.l11;
+    l21[n] = ellipse.l21;
+    l22[n] = ellipse.l22;
+    amplitude[n] = ellipse.amplitude;
+    slope0[n] = ellipse.slope0;
+    slope1[n] = ellipse.slope1;
+    half_width[n] = ellipse.half_width;
+  }
+};
+
+ScreenSplat screenSplat(float x, float y, const Ellipse& e, float mean) {
+  return {x, y, e.l11, e.l21, e.l22, e.amplitude, mean, e.slope0, e.slope1, e.half_width};
+}
+
+/// The clip box from the brick's origin, in float.
+struct LocalBox {
+  glm::vec3 lower{-INFINITY}, upper{INFINITY};
+
+  LocalBox(const std::optional<WorldBox>& box, const glm::dvec3& origin) {
+    if (!box) return;
+    lower = glm::vec3(box->lower - origin);
+    upper = glm::vec3(box->upper - origin);
+  }
+  [[gnu::always_inline]] bool excludes(float x, float y, float z) const {
+    return (x < lower.x) | (x > upper.x) | (y < lower.y) | (y > upper.y) | (z < lower.z) | (z > upper.z);
+  }
+};
+
+void computeBlock(const OrthographicMap& map, const LocalBox& clip,
+                  const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
+                  size_t begin, size_t count, Block& block) {
+#pragma GCC ivdep
+  for (size_t n = 0; n < count; ++n) {
+    const size_t i = begin + n;
+    const float x = geometry.x[i], y = geometry.y[i], z = geometry.z[i];
+    block.x[n] = map.x + map.rows.x0 * x + map.rows.y0 * y + map.rows.z0 * z;
+    block.y[n] = map.y + map.rows.x1 * x + map.rows.y1 * y + map.rows.z1 * z;
+    block.depth[n] = map.depth.x * x + map.depth.y * y + map.depth.z * z;
+    block.clipped[n] = clip.excludes(x, y, z);
+    block.too_wide[n] = 0;
+    block.set(n, ellipseOf(map.rows, shapeOf(geometry, i), slopeOf(variable, i), variable.variance[i],
+                           geometry.weight[i] * map.volume, map.low_pass_px2, map.slope_low_pass_px2));
+  }
+}
+
+void computeBlock(const PerspectiveMap& map, const LocalBox& clip,
+                  const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
+                  size_t begin, size_t count, Block& block) {
+#pragma GCC ivdep
+  for (size_t n = 0; n < count; ++n) {
+    const size_t i = begin + n;
+    const float x = geometry.x[i], y = geometry.y[i], z = geometry.z[i];
+    const PerspectiveMap::Centre centre = map.centreOf(x, y, z);
+    const Shape shape = shapeOf(geometry, i);
+    block.x[n] = map.pixelX(centre);
+    block.y[n] = map.pixelY(centre);
+    block.depth[n] = centre.distance;
+    block.clipped[n] = clip.excludes(x, y, z);
+    block.too_wide[n] = map.tooWide(centre, map.radiusOf(shape));
+    block.set(n,
+              ellipseOf(map.rowsAt(centre), shape, slopeOf(variable, i), variable.variance[i],
+                        geometry.weight[i] * map.volumeAt(centre), map.low_pass_px2, map.slope_low_pass_px2));
+  }
+}
+
+/// Decides about one projected splat after the other, and keeps what can be seen.
+class Chooser {
+ public:
+  enum class Fate { off_screen, transparent, kept };
+
+  Chooser(const ProjectionSettings& settings, const ClassificationTable& table,
+          std::vector<ScreenSplat>& splats, std::vector<float>& depths)
+      : table_(table),
+        width_(static_cast<float>(settings.view.size.width)),
+        height_(static_cast<float>(settings.view.size.height)),
+        reach_(1.001f * static_cast<float>(largestReach(settings.view.low_pass_px2))),
+        largest_scalar_(kLargestCells /
+                        std::max(table.logScale() ? 1.0f : std::abs(table.scale()), kLeastScale)),
+        per_pixel_(settings.per_pixel),
+        splats_(splats),
+        depths_(depths) {}
+
+  /// Inline: handed over through memory, a splat that has just been put together stalls on its way into the
+  /// vector, which takes as long as all the rest.
+  [[gnu::always_inline]] Fate choose(ScreenSplat splat, float depth) {
+    const float reach_x = kSupport * splat.l11;
+    const float reach_y = kSupport * (std::abs(splat.l21) + splat.l22);
+    const bool on_screen = splat.x + reach_x > 0 && splat.x - reach_x < width_ && splat.y + reach_y > 0 &&
+                           splat.y - reach_y < height_;
+    if (!on_screen) return Fate::off_screen;
+    if (!per_pixel_) splat.slope0 = splat.slope1 = splat.half_width = 0;
+    float spread = kSupport * (std::abs(splat.slope0) + std::abs(splat.slope1)) + splat.half_width;
+    if (!(std::abs(splat.mean) + spread <= largest_scalar_)) {
+      splat.slope0 = splat.slope1 = splat.half_width = spread = 0;
+      splat.mean = std::clamp(splat.mean, -largest_scalar_, largest_scalar_);
+    }
+    splat.amplitude = std::min(splat.amplitude, kLargestAmplitude);
+    if (!(splat.amplitude > 0) || table_.fullyTransparent(splat.mean - spread, splat.mean + spread))
+      return Fate::transparent;
+    splats_.push_back(splat);
+    depths_.push_back(depth);
+    return Fate::kept;
+  }
+
+  /// Whether no piece of a splat could be seen, wherever it is.
+  bool transparentThroughout(float mean, const Slope& w, float variance) const {
+    const float slope = std::sqrt(w.w0 * w.w0 + w.w1 * w.w1 + w.w2 * w.w2);
+    const float spread = reach_ * slope + std::sqrt(3 * (slope * slope + variance));
+    return table_.fullyTransparent(mean - spread, mean + spread);
+  }
+
+ private:
+  // Painters find a scalar's place in the table, and depths, in float: beyond these there are infinities, and
+  // infinity minus infinity is no number. Such a splat is drawn flat, and far outside of the table.
+  static constexpr float kLargestCells = 1e30f, kLeastScale = 1e-7f, kLargestAmplitude = 1e30f;
+
+  const ClassificationTable& table_;
+  const float width_, height_;
+  const float reach_;
+  const float largest_scalar_;
+  const bool per_pixel_;
+  std::vector<ScreenSplat>& splats_;
+  std::vector<float>& depths_;
+};
+
+/// What parts and cutting may still give for a brick: pieces that are drawn, and looks at any.
+struct CutBudget {
+  size_t pieces = BrickProjector::kMostPieces;
+  size_t looks = 16 * BrickProjector::kMostPieces;
+};
+
+/// Where a piece lies, and the map that is linear there.
+struct PlacedPiece {
+  float x, y, depth, volume;
+  ScreenRows rows;
+};
+
+/// Calls take(piece, its place) for what is to be drawn of `piece`; false as soon as take() gives it, or
+/// after more `looks` at pieces, which it counts down.
+template <typename Take>
+bool place(const OrthographicMap& map, const SplatPiece& piece, size_t&, const Take& take) {
+  const float x = piece.position.x, y = piece.position.y, z = piece.position.z;
+  return take(piece, PlacedPiece{map.x + map.rows.x0 * x + map.rows.y0 * y + map.rows.z0 * z,
+                                 map.y + map.rows.x1 * x + map.rows.y1 * y + map.rows.z1 * z,
+                                 map.depth.x * x + map.depth.y * y + map.depth.z * z, map.volume, map.rows});
+}
+template <typename Take>
+bool place(const PerspectiveMap& map, const SplatPiece& piece, size_t& looks, const Take& take) {
+  return cutUp(map, piece, looks, [&](const SplatPiece& part, const PerspectiveMap::Centre& centre) {
+    return take(part, PlacedPiece{map.pixelX(centre), map.pixelY(centre), centre.distance,
+                                  map.volumeAt(centre), map.rowsAt(centre)});
+  });
+}
+
+/// Takes splat `i` to the parts and pieces that it is drawn as, and chooses among them: the best fate of any.
+/// Nothing if that takes more than what is `left`, which it counts down.
+template <typename Map>
+std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<const float>& geometry,
+                                          const VariableArrays<const float>& variable, size_t i,
+                                          uint32_t half_cell, const BorderParts* borders, Chooser& chooser,
+                                          CutBudget& left) {
+  const SplatPiece whole{{geometry.x[i], geometry.y[i], geometry.z[i]},
+                         shapeOf(geometry, i),
+                         slopeOf(variable, i),
+                         variable.mean[i],
+                         geometry.weight[i]};
+  if (chooser.transparentThroughout(whole.mean, whole.slope, variable.variance[i]))
+    return Chooser::Fate::transparent;
+  auto best = Chooser::Fate::off_screen;
+  const auto take = [&](const SplatPiece& piece, const PlacedPiece& at) {
+    if (left.pieces == 0) return false;
+    const Ellipse ellipse = ellipseOf(at.rows, piece.shape, piece.slope, variable.variance[i],
+                                      piece.weight * at.volume, map.low_pass_px2, map.slope_low_pass_px2);
+    const auto fate = chooser.choose(screenSplat(at.x, at.y, ellipse, piece.mean), at.depth);
+    if (fate == Chooser::Fate::kept) --left.pieces;
+    best = std::max(best, fate);
+    return true;
+  };
+  BorderPieces parts;
+  size_t count = 1;
+  if (half_cell == kNoBorder)
+    parts[0] = whole;
+  else
+    count = partsAtBorder(whole, half_cell, *borders, parts);
+  for (size_t n = 0; n < count; ++n)
+    if (!place(map, parts[n], left.looks, take)) return {};
+  return best;
+}
+
+/// False if the brick would take more than what is `left`, which it counts down. Cells at borders are drawn
+/// in these parts, unless `borders` is null.
+template <typename Map>
+bool projectRange(const Map& map, const BorderParts* borders, const LocalBox& clip,
+                  const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
+                  const SplatRange& range, Chooser& chooser, CutBudget& left, ProjectionCounts& counts) {
+  Block block;
+  for (size_t begin = range.begin; begin < range.end; begin += kBlock) {
+    const size_t count = std::min(kBlock, range.end - begin);
+    computeBlock(map, clip, geometry, variable, begin, count, block);
+    for (size_t n = 0; n < count; ++n) {
+      if (block.clipped[n]) {
+        ++counts.clipped;
+        continue;
+      }
+      Chooser::Fate fate;
+      const uint32_t half_cell = borders ? geometry.half_cell[begin + n] : kNoBorder;
+      if (block.too_wide[n] || half_cell != kNoBorder) {
+        const auto best = choosePieces(map, geometry, variable, begin + n, half_cell, borders, chooser, left);
+        if (!best) return false;
+        fate = *best;
+      } else {
+        fate = chooser.choose(
+            {block.x[n], block.y[n], block.l11[n], block.l21[n], block.l22[n], block.amplitude[n],
+             variable.mean[begin + n], block.slope0[n], block.slope1[n], block.half_width[n]},
+            block.depth[n]);
+      }
+      counts.off_screen += fate == Chooser::Fate::off_screen;
+      counts.transparent += fate == Chooser::Fate::transparent;
+      counts.drawn += fate == Chooser::Fate::kept;
+    }
+  }
+  return true;
+}
+
+template <typename Map>
+bool projectWith(const Map& map, const BorderParts* borders, const LocalBox& clip,
+                 const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
+                 std::span<const SplatRange> ranges, Chooser& chooser, ProjectionCounts& counts) {
+  CutBudget left;
+  return std::all_of(ranges.begin(), ranges.end(), [&](const SplatRange& range) {
+    return projectRange(map, borders, clip, geometry, variable, range, chooser, left, counts);
+  });
+}
+
+}  // namespace
+
+double largestReach(double low_pass_px2) {
+  // The slope along L's columns is at most √(x (x + λ)) / (x + ε) times |w|, x the squared extent of the
+  // splat on the screen; x below is where that is largest.
+  constexpr double kEpsilon = kSlopeLowPass;
+  if (low_pass_px2 <= 2 * kEpsilon) return kKernelSupport + kBorderReach;
+  const double x = low_pass_px2 * kEpsilon / (low_pass_px2 - 2 * kEpsilon);
+  return kBorderReach + kKernelSupport * std::sqrt(x * (x + low_pass_px2)) / (x + kEpsilon);
+}
+
+BrickProjector::BrickProjector() {
+  splats_.reserve(kMostSplats);
+  depths_.reserve(kMostSplats);
+}
+
+void BrickProjector::project(const ProjectionSettings& settings, const ClassificationTable& table,
+                             const glm::dvec3& cell_min, const SplatGeometry& geometry,
+                             const SplatVariable& variable) {
+  const SplatRange all{0, static_cast<uint32_t>(geometry.size())};
+  project(settings, table, cell_min, arraysOf(geometry), arraysOf(variable), {&all, 1});
+}
+
+void BrickProjector::project(const ProjectionSettings& settings, const ClassificationTable& table,
+                             const glm::dvec3& cell_min, const GeometryArrays<const float>& geometry,
+                             const VariableArrays<const float>& variable,
+                             std::span<const SplatRange> ranges) {
+  CURVISPLAT_CHECK_OP(geometry.size(), ==, variable.size());
+  for (const SplatRange& range : ranges) CURVISPLAT_CHECK_OP(range.end, <=, geometry.size());
+  const LocalBox clip(settings.clip_box, cell_min);
+  Chooser chooser(settings, table, splats_, depths_);
+  // Where the near plane is too near for float, coarser is not less: then what was cut until there is drawn.
+  constexpr float kCoarsest = 1e30f;
+  bool complete = false;
+  // Beyond a few hundred it is for splats that are in no grid.
+  for (float coarseness = 1; !complete && coarseness < kCoarsest; coarseness *= coarseness < 256 ? 2 : 16) {
+    splats_.clear();
+    depths_.clear();
+    counts_ = {};
+    const BorderParts* const borders = coarseness == 1 ? &settings.border_parts : nullptr;
+    complete = settings.view.projection == Projection::orthographic
+                   ? projectWith(OrthographicMap(settings.view, cell_min), borders, clip, geometry, variable,
+                                 ranges, chooser, counts_)
+                   : projectWith(PerspectiveMap(settings.view, cell_min, coarseness), borders, clip, geometry,
+                                 variable, ranges, chooser, counts_);
+  }
+  for (const SplatRange& range : ranges) counts_.read += range.size();
+  counts_.pieces = splats_.size();
+}
+
+}  // namespace curvisplat

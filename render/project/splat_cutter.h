@@ -1,0 +1,54 @@
+// Cuts splats that are too close to a perspective viewer for their size.
+//
+// A splat is halved along the longest column of A: that column and the slope along it become half, the weight
+// half, and the two centres lie a quarter of the column from the old one, with means a quarter of the slope
+// apart from it. Merging the two (design section 3) gives the splat back exactly, residual variance included;
+// and a pencil of aspect ratio 1000 is cut across only, where eight octants would cut it to dust.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <glm/vec3.hpp>
+
+#include "render/project/splat_ellipse.h"
+#include "render/project/splat_maps.h"
+
+namespace curvisplat {
+
+/// A splat or a part of one. Positions from the brick's origin; the residual variance is that of the whole.
+struct SplatPiece {
+  glm::vec3 position;
+  Shape shape;
+  Slope slope;
+  float mean;
+  float weight;
+};
+
+/// Halves `piece` along `column` (0..2).
+std::array<SplatPiece, 2> halve(const SplatPiece& piece, int column);
+
+/// Calls take(piece, centre) for the parts of `piece` that are small for their distance and may be in sight.
+/// Stops, and returns false, as soon as take() does, or when `looks_left`, which it counts down, is used up:
+/// a splat that is very large for where it is has parts without end, of which hardly any is taken. One that
+/// is too large or too far for float's squares is in no cache of ours, and is left out.
+template <typename Take>
+bool cutUp(const PerspectiveMap& map, const SplatPiece& piece, size_t& looks_left, const Take& take) {
+  if (looks_left == 0) return false;
+  --looks_left;
+  const auto centre = map.centreOf(piece.position.x, piece.position.y, piece.position.z);
+  const glm::vec3 columns2 = map.columns2(piece.shape);
+  const float radius = map.radiusOf(piece.shape);
+  if (!std::isfinite(radius) || !std::isfinite(centre.distance)) return true;
+  if (map.outOfSight(centre, radius)) return true;
+  if (!map.tooWide(centre, radius)) return take(piece, centre);
+  if (centre.z < map.near && radius <= map.widest * map.near)
+    return true;  // small, and before the near plane
+  int longest = columns2[1] > columns2[0] ? 1 : 0;
+  if (columns2[2] > columns2[longest]) longest = 2;
+  for (const SplatPiece& half : halve(piece, longest))
+    if (!cutUp(map, half, looks_left, take)) return false;
+  return true;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,15 @@
+#include "stream/base/check.h"
+
+#include <cstdlib>
+
+#include "stream/base/say.h"
+
+namespace curvisplat {
+
+void checkFailed(const char* file, int line, const char* expression, const std::string& values) {
+  say("internal error at {}:{}: {} does not hold{}{}", file, line, expression, values.empty() ? "" : ": ",
+      values);
+  std::abort();
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,316 @@
+#include "stream/base/file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+#include "stream/base/check.h"
+#include "stream/base/open_retrying.h"
+#include "stream/base/paths.h"
+
+namespace curvisplat {
+namespace {
+
+SystemCalls posix_calls;
+std::atomic<SystemCalls*> current_calls{&posix_calls};
+
+// Linux transfers at most 0x7ffff000 bytes a call; stay on a whole page below it.
+constexpr size_t kLargestTransfer = size_t{1} << 30;
+
+std::string reason() {
+  return std::strerror(errno);
+}
+
+/// As openRetrying. File systems without direct transfers refuse the flag, and do without.
+int openWith(Caching caching, const std::filesystem::path& path, int flags, unsigned mode) {
+  if (caching == Caching::direct) {
+    const int fd = openRetrying(path, flags | O_DIRECT, mode);
+    if (fd >= 0 || errno != EINVAL) return fd;
+  }
+  return openRetrying(path, flags, mode);
+}
+
+/// After a transfer was refused: whether it was for its alignment, which will not be asked for again. A
+/// transfer that was cut short goes on at any byte.
+bool stoppedBeingDirect(int fd) {
+  if (errno != EINVAL) return false;
+  const int flags = ::fcntl(fd, F_GETFL);
+  return flags >= 0 && (flags & O_DIRECT) != 0 && ::fcntl(fd, F_SETFL, flags & ~O_DIRECT) == 0;
+}
+
+void syncRetrying(int fd, const std::filesystem::path& path) {
+  int result;
+  do {
+    result = SystemCalls::current().fsync(fd);
+  } while (result < 0 && errno == EINTR);
+  // Some file systems cannot sync a directory or a pipe and say so; that is not a failed disk.
+  if (result < 0 && errno != EINVAL && errno != ENOTSUP)
+    throw Error("{}: cannot be flushed to the disk: {}", path.string(), reason());
+}
+
+void renameFile(const std::filesystem::path& from, const std::filesystem::path& to) {
+  if (SystemCalls::current().rename(from.c_str(), to.c_str()) < 0)
+    throw Error("{}: cannot be renamed to {}: {}", from.string(), to.string(), reason());
+}
+
+void replaceFile(const std::filesystem::path& path, const std::filesystem::path& temporary,
+                 std::span<const std::byte> bytes) {
+  // What is there may be a link that leads anywhere: it would be followed.
+  SystemCalls::current().remove(temporary.c_str());
+  try {
+    OutputFile file(temporary);
+    file.append(bytes);
+    file.close();
+    renameFile(temporary, path);
+  } catch (...) {
+    removeAll(temporary);
+    throw;
+  }
+}
+
+}  // namespace
+
+int openRetrying(const std::filesystem::path& path, int flags, unsigned mode) {
+  int fd;
+  do {
+    fd = SystemCalls::current().open(path.c_str(), flags | O_CLOEXEC, mode);
+  } while (fd < 0 && errno == EINTR);
+  return fd;
+}
+
+int SystemCalls::open(const char* path, int flags, unsigned mode) {
+  return ::open(path, flags, mode);
+}
+int SystemCalls::close(int fd) {
+  return ::close(fd);
+}
+ssize_t SystemCalls::pread(int fd, void* to, size_t count, int64_t offset) {
+  return ::pread(fd, to, count, offset);
+}
+ssize_t SystemCalls::pwrite(int fd, const void* from, size_t count, int64_t offset) {
+  return ::pwrite(fd, from, count, offset);
+}
+int SystemCalls::truncate(int fd, int64_t size) {
+  return ::ftruncate(fd, size);
+}
+int SystemCalls::fsync(int fd) {
+  return ::fsync(fd);
+}
+int SystemCalls::rename(const char* from, const char* to) {
+  return std::rename(from, to);
+}
+int SystemCalls::exchange(const char* a, const char* b) {
+  return ::renameat2(AT_FDCWD, a, AT_FDCWD, b, RENAME_EXCHANGE);
+}
+int SystemCalls::mkdir(const char* path, unsigned mode) {
+  return ::mkdir(path, mode);
+}
+int SystemCalls::remove(const char* path) {
+  return std::remove(path);
+}
+SystemCalls& SystemCalls::current() {
+  return *current_calls.load(std::memory_order_acquire);
+}
+
+bool SystemCalls::areReal() {
+  return current_calls.load(std::memory_order_acquire) == &posix_calls;
+}
+
+ScopedSystemCalls::ScopedSystemCalls(SystemCalls& calls) : previous_(current_calls.exchange(&calls)) {}
+ScopedSystemCalls::~ScopedSystemCalls() {
+  current_calls.store(previous_);
+}
+
+InputFile::InputFile(std::filesystem::path path, Caching caching) : path_(std::move(path)) {
+  // Without O_NONBLOCK, opening a named pipe waits for whoever writes to it.
+  fd_ = openWith(caching, path_, O_RDONLY | O_NONBLOCK, 0);
+  if (fd_ < 0) throw Error("{}: cannot be opened for reading: {}", path_.string(), reason());
+  struct stat status {};
+  if (::fstat(fd_, &status) < 0 || !S_ISREG(status.st_mode)) {
+    SystemCalls::current().close(std::exchange(fd_, -1));
+    throw Error("{}: is not a regular file", path_.string());
+  }
+  size_ = static_cast<uint64_t>(status.st_size);
+}
+
+InputFile::InputFile(InputFile&& other) noexcept
+    : path_(std::move(other.path_)), fd_(std::exchange(other.fd_, -1)), size_(other.size_) {}
+
+InputFile& InputFile::operator=(InputFile&& other) noexcept {
+  std::swap(path_, other.path_);
+  std::swap(fd_, other.fd_);
+  std::swap(size_, other.size_);
+  return *this;
+}
+
+InputFile::~InputFile() {
+  if (fd_ >= 0) SystemCalls::current().close(fd_);
+}
+
+void InputFile::readAt(uint64_t offset, std::span<std::byte> to) const {
+  size_t done = 0;
+  while (done < to.size()) {
+    const size_t count = std::min(to.size() - done, kLargestTransfer);
+    const ssize_t got =
+        SystemCalls::current().pread(fd_, to.data() + done, count, static_cast<int64_t>(offset + done));
+    if (got < 0) {
+      if (errno == EINTR || stoppedBeingDirect(fd_)) continue;
+      throw Error("{}: reading {} bytes at offset {} failed: {}", path_.string(), count, offset + done,
+                  reason());
+    }
+    if (got == 0)
+      throw TruncatedFile(
+          "{}: ends at byte {} where {} bytes from offset {} were expected; the file is truncated",
+          path_.string(), offset + done, to.size(), offset);
+    done += static_cast<size_t>(got);
+  }
+}
+
+OutputFile::OutputFile(std::filesystem::path path, Caching caching, Existing existing)
+    : path_(std::move(path)) {
+  const int empty = existing == Existing::kEmpty ? O_TRUNC : 0;
+  fd_ = openWith(caching, path_, O_RDWR | O_CREAT | empty, 0666);
+  if (fd_ < 0) throw Error("{}: cannot be opened for writing: {}", path_.string(), reason());
+  struct stat status {};
+  if (::fstat(fd_, &status) < 0) {
+    const std::string why = reason();
+    SystemCalls::current().close(std::exchange(fd_, -1));
+    throw Error("{}: its size cannot be told: {}", path_.string(), why);
+  }
+  size_ = static_cast<uint64_t>(status.st_size);
+}
+
+OutputFile::OutputFile(OutputFile&& other) noexcept
+    : path_(std::move(other.path_)), fd_(std::exchange(other.fd_, -1)), size_(other.size_.load()) {}
+
+OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
+  std::swap(path_, other.path_);
+  std::swap(fd_, other.fd_);
+  size_ = other.size_.exchange(size_.load());
+  return *this;
+}
+
+OutputFile::~OutputFile() {
+  if (fd_ >= 0) SystemCalls::current().close(fd_);
+}
+
+void OutputFile::append(std::span<const std::byte> from) {
+  writeAt(size_, from);
+}
+
+void OutputFile::writeAt(uint64_t offset, std::span<const std::byte> from) {
+  size_t done = 0;
+  while (done < from.size()) {
+    const size_t count = std::min(from.size() - done, kLargestTransfer);
+    const ssize_t put =
+        SystemCalls::current().pwrite(fd_, from.data() + done, count, static_cast<int64_t>(offset + done));
+    if (put < 0) {
+      if (errno == EINTR || stoppedBeingDirect(fd_)) continue;
+      throw Error("{}: writing {} bytes at offset {} failed: {}", path_.string(), count, offset + done,
+                  reason());
+    }
+    done += static_cast<size_t>(put);
+  }
+  const uint64_t end = offset + from.size();
+  uint64_t size = size_.load();
+  while (size < end && !size_.compare_exchange_weak(size, end)) {
+  }
+}
+
+void OutputFile::truncate(uint64_t size) {
+  CURVISPLAT_CHECK_OP(size, <=, size_.load());
+  int result;
+  do {
+    result = SystemCalls::current().truncate(fd_, static_cast<int64_t>(size));
+  } while (result < 0 && errno == EINTR);
+  if (result < 0) throw Error("{}: cannot be cut to {} bytes: {}", path_.string(), size, reason());
+  size_ = size;
+}
+
+void OutputFile::close() {
+  CURVISPLAT_CHECK(fd_ >= 0);
+  syncRetrying(fd_, path_);
+  if (SystemCalls::current().close(std::exchange(fd_, -1)) < 0 && errno != EINTR)
+    throw Error("{}: closing it failed: {}", path_.string(), reason());
+}
+
+std::string readTextFile(const std::filesystem::path& path, uint64_t limit) {
+  const InputFile file(path);
+  if (file.size() > limit)
+    throw Error("{}: has {} bytes, more than the {} such a file can have", path.string(), file.size(), limit);
+  std::string text(file.size(), '\0');
+  file.readAt(0, std::span(text.data(), text.size()));
+  return text;
+}
+
+void writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  replaceFile(path, path.string() + ".part", bytes);
+}
+
+void writeFileAtomically(const std::filesystem::path& path, const std::string& text) {
+  writeFileAtomically(path, std::as_bytes(std::span(text)));
+}
+
+void writeFileDurably(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  const std::filesystem::path target = writableTarget(path);
+  replaceFile(target, temporaryBeside(target), bytes);
+  syncDirectory(folderOf(target));
+}
+
+void writeFileDurably(const std::filesystem::path& path, const std::string& text) {
+  writeFileDurably(path, std::as_bytes(std::span(text)));
+}
+
+void putFileIntoPlace(const std::filesystem::path& from, const std::filesystem::path& to) {
+  OutputFile(from, Caching::pages, OutputFile::Existing::kKeep).close();
+  renameFile(from, to);
+  syncDirectory(folderOf(to));
+}
+
+void syncDirectory(const std::filesystem::path& path) {
+  const int fd = openRetrying(path, O_RDONLY | O_DIRECTORY, 0);
+  if (fd < 0) throw Error("{}: cannot be opened: {}", path.string(), reason());
+  try {
+    syncRetrying(fd, path);
+  } catch (...) {
+    SystemCalls::current().close(fd);
+    throw;
+  }
+  SystemCalls::current().close(fd);
+}
+
+void makeFolder(const std::filesystem::path& path) {
+  if (SystemCalls::current().mkdir(path.c_str(), 0777) < 0)
+    throw Error("{}: the folder cannot be made: {}", path.string(), reason());
+}
+
+void removeFile(const std::filesystem::path& path) {
+  if (SystemCalls::current().remove(path.c_str()) < 0)
+    throw Error("{}: cannot be removed: {}", path.string(), reason());
+}
+
+std::error_code removeAll(const std::filesystem::path& path) noexcept {
+  namespace fs = std::filesystem;
+  std::error_code first;
+  try {
+    std::error_code error;
+    const bool is_folder = fs::is_directory(fs::symlink_status(path, error));
+    if (is_folder)
+      for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error))
+        if (const std::error_code inside = removeAll(entry->path()); !first) first = inside;
+    if (SystemCalls::current().remove(path.c_str()) < 0 && errno != ENOENT && !first)
+      first = {errno, std::generic_category()};
+  } catch (...) {
+    if (!first) first = std::make_error_code(std::errc::not_enough_memory);
+  }
+  return first;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,20 @@
+#include "stream/base/say.h"
+
+#include <cstdio>
+#include <exception>
+#include <string>
+
+#include "stream/base/error.h"
+
+namespace curvisplat {
+
+void say(std::string_view text) noexcept {
+  try {
+    const std::string line = "curvisplat: " + oneLine(std::string(text)) + "\n";
+    std::fwrite(line.data(), 1, line.size(), stderr);  // as one, beside other threads' lines
+  } catch (const std::exception&) {
+    std::fputs("curvisplat: out of memory\n", stderr);
+  }
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,21 @@
+#include "stream/cache/cache_file.h"
+
+#include "stream/base/error.h"
+
+namespace curvisplat {
+
+std::filesystem::path cacheFile(const std::filesystem::path& cache, const std::string& name) {
+  namespace fs = std::filesystem;
+  const fs::path path = cache / name;
+  std::error_code error;
+  const fs::file_status status = fs::symlink_status(path, error);
+  if (fs::is_symlink(status))
+    throw Error(
+        "{}: is a symbolic link, and a cache's files lie in its own folder; copy what it leads to there",
+        path.string());
+  if (fs::exists(status) && !fs::is_regular_file(status))
+    throw Error("{}: is not a regular file", path.string());
+  return path;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,272 @@
+#include "stream/cache/cache_index.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "stream/base/check.h"
+#include "stream/base/checksum.h"
+#include "stream/base/error.h"
+#include "stream/cache/cache_file.h"
+#include "stream/cache/cache_format.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Where something is wrong in a table.
+[[noreturn]] void refuse(const fs::path& path, size_t brick, const std::string& what) {
+  throw Error("{}: brick {}: {}; the file is damaged: convert again", path.string(), brick, what);
+}
+
+void checkChecksum(const fs::path& path, const FileInfo& info, uint64_t found) {
+  if (found != info.checksum)
+    throw Error("{}: has the checksum {:016x}, expected {:016x}; the file is damaged: convert again",
+                path.string(), found, info.checksum);
+}
+
+/// What the streams of so many splats can take at the most, packed: their header, the runs or rows, the
+/// planes, and what zstd adds. Whoever reads one takes memory for it.
+uint64_t mostGeometryBytes(uint64_t splats) {
+  return (16 << 10) + 135 * splats;  // 50 and 21 x 4 bytes a splat
+}
+uint64_t mostValuesBytes(uint64_t splats) {
+  return (16 << 10) + 31 * splats;  // 10 and 5 x 4
+}
+
+/// That no two streams of a file share bytes, and that all lie within `begin` and `end`.
+void checkExtents(const fs::path& path, const std::vector<Extent>& extents, uint64_t begin, uint64_t end) {
+  std::vector<uint32_t> order(extents.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::sort(order.begin(), order.end(),
+            [&](uint32_t a, uint32_t b) { return extents[a].offset < extents[b].offset; });
+  uint64_t free = begin;
+  for (uint32_t n : order) {
+    const Extent& extent = extents[n];
+    if (extent.length == 0 || extent.offset < free || extent.offset > end ||
+        extent.length > end - extent.offset)
+      refuse(path, n,
+             fmt::format("its {} bytes at offset {} overlap another's, or are outside of the file",
+                         extent.length, extent.offset));
+    free = extent.offset + extent.length;
+  }
+}
+
+class IndexChecker {
+ public:
+  /// `bricks` fills up meanwhile.
+  IndexChecker(const fs::path& path, const std::vector<Brick>& bricks, const Manifest& manifest)
+      : path_(path), bricks_(bricks), manifest_(manifest) {}
+
+  /// The last brick so far: what those before it say of it, and it of them.
+  void checkLast() {
+    const size_t n = bricks_.size() - 1;
+    checkCell(n);
+    checkNumbers(n);
+    checkLinks(n);
+    if (bricks_[n].isLeaf()) splats_ += bricks_[n].splats;
+    children_ += bricks_[n].child_count;
+    roots_ += bricks_[n].cell.level == 0;
+  }
+
+  void checkAll() const {
+    if (roots_ + children_ != bricks_.size())
+      throw Error("{}: {} roots and {} children are not {} bricks; the file is damaged: convert again",
+                  path_.string(), roots_, children_, bricks_.size());
+    if (splats_ != manifest_.splats)
+      throw Error("{}: its leaves hold {} splats, the manifest says {}; the cache is damaged: convert again",
+                  path_.string(), splats_, manifest_.splats);
+    const uint32_t levels = bricks_.back().cell.level + 1;
+    if (levels != manifest_.levels)
+      throw Error("{}: has {} levels, the manifest says {}; the cache is damaged: convert again",
+                  path_.string(), levels, manifest_.levels);
+  }
+
+ private:
+  /// Its own cell, and its place in the order of bricks.
+  void checkCell(size_t n) const {
+    const Cell& cell = bricks_[n].cell;
+    if (cell.level > kMaxLevel) refuse(path_, n, fmt::format("it is of level {}", cell.level));
+    for (uint32_t at : cell.at)
+      if (at >> cell.level != 0)
+        refuse(path_, n, fmt::format("its cell {} is outside of level {}", at, cell.level));
+    if (n == 0) {
+      if (cell.level != 0) refuse(path_, n, "it is first and not the root");
+      return;
+    }
+    const Brick& before = bricks_[n - 1];
+    if (cell == before.cell) {
+      if (!bricks_[n].isLeaf() || !before.isLeaf()) refuse(path_, n, "it shares its cell, and is not a leaf");
+    } else if (cell.level < before.cell.level ||
+               (cell.level == before.cell.level && !mortonLess(before.cell, cell))) {
+      refuse(path_, n, "it is out of order");
+    }
+  }
+
+  void checkNumbers(size_t n) const {
+    const Brick& brick = bricks_[n];
+    if (brick.splats == 0 || brick.splats > kMaxBrickSplats)
+      refuse(path_, n, fmt::format("it has {} splats", brick.splats));
+    uint64_t octants = 0;
+    for (uint32_t splats : brick.octant_splats) octants += splats;
+    if (octants != brick.splats) refuse(path_, n, fmt::format("its octants have {} splats", octants));
+    if (brick.geometry.length > mostGeometryBytes(brick.splats))
+      refuse(path_, n,
+             fmt::format("{} bytes are too many for its {} splats", brick.geometry.length, brick.splats));
+    if (!(brick.largest_radius > 0 && std::isfinite(brick.largest_radius)))
+      refuse(path_, n, fmt::format("its largest radius is {}", brick.largest_radius));
+    if (!(brick.error >= 0 && std::isfinite(brick.error)))
+      refuse(path_, n, fmt::format("its error is {}", brick.error));
+    const glm::dvec3 corner = manifest_.root.cellMin(brick.cell);
+    const double size = manifest_.root.cellSize(brick.cell.level);
+    for (int axis = 0; axis < 3; ++axis) {
+      const double slack = 1e-12 * (std::abs(manifest_.root.min[axis]) + manifest_.root.size);
+      const bool inside = corner[axis] - slack <= brick.lower[axis] &&
+                          brick.lower[axis] <= brick.upper[axis] &&
+                          brick.upper[axis] <= corner[axis] + size + slack;  // false for NaN
+      if (!inside)
+        refuse(path_, n,
+               fmt::format("its box [{}, {}] along {} is not inside its cell", brick.lower[axis],
+                           brick.upper[axis], "xyz"[axis]));
+    }
+  }
+
+  void checkLinks(size_t n) const {
+    const Brick& brick = bricks_[n];
+    if (brick.cell.level == 0) {
+      if (brick.parent != kNoBrick) refuse(path_, n, "it is a root with a parent");
+    } else {
+      if (brick.parent >= n) refuse(path_, n, fmt::format("its parent is brick {}", brick.parent));
+      const Brick& parent = bricks_[brick.parent];
+      const bool counted = n >= parent.first_child && n - parent.first_child < parent.child_count;
+      if (!counted || !(parent.cell == brick.cell.parent()))
+        refuse(path_, n, fmt::format("its parent, brick {}, has other children", brick.parent));
+    }
+    if (brick.isLeaf()) {
+      if (brick.first_child != kNoBrick) refuse(path_, n, "it is a leaf with a child");
+    } else if (brick.first_child <= n || brick.first_child >= manifest_.bricks ||
+               brick.child_count > manifest_.bricks - brick.first_child) {
+      refuse(path_, n, fmt::format("it has {} children from brick {}", brick.child_count, brick.first_child));
+    }
+  }
+
+  const fs::path& path_;
+  const std::vector<Brick>& bricks_;
+  const Manifest& manifest_;
+  uint64_t splats_ = 0, children_ = 0, roots_ = 0;
+};
+
+/// Calls `use` for each of the records behind a header that has been read. They are counted by the real file,
+/// and come a piece at a time: a file can say that it is large and have no bytes, so that only what `use` has
+/// found good may take memory for good.
+template <typename Record, typename Header, typename Use>
+void readRecords(const InputFile& file, const Header& header, uint64_t offset, const Manifest& manifest,
+                 const FileInfo& info, const Use& use) {
+  if (header.magic != Header{}.magic)
+    throw Error("{}: does not begin as such a file of a cache does; it is damaged or not this cache's",
+                file.path().string());
+  if (header.version != kCacheVersion || header.record_bytes != sizeof(Record))
+    throw Error("{}: has version {} and records of {} bytes, expected {} and {}", file.path().string(),
+                header.version, header.record_bytes, kCacheVersion, sizeof(Record));
+  if (header.bricks != manifest.bricks || offset > file.size() ||
+      (file.size() - offset) / sizeof(Record) != header.bricks ||
+      (file.size() - offset) % sizeof(Record) != 0)
+    throw Error("{}: says it has {} bricks from offset {}; its size is {} and the manifest says {} bricks",
+                file.path().string(), header.bricks, offset, file.size(), manifest.bricks);
+  Checksum checksum;
+  checksum.add(std::as_bytes(std::span(&header, 1)));
+  constexpr uint64_t kRecordsAtOnce = (1 << 20) / sizeof(Record);
+  std::vector<Record> records;
+  for (uint64_t first = 0; first < header.bricks; first += records.size()) {
+    records.resize(std::min(kRecordsAtOnce, header.bricks - first));
+    file.readAt(offset + first * sizeof(Record), std::span(records));
+    checksum.add(std::as_bytes(std::span(records)));
+    for (const Record& record : records) use(record);
+  }
+  checkChecksum(file.path(), info, checksum.value());
+}
+
+}  // namespace
+
+std::string variableFileName(const VariableInfo& variable) {
+  return fmt::format("var.{}.bin", variable.number);
+}
+
+const FileInfo& checkFile(const fs::path& path, uint64_t bytes, const Manifest& manifest) {
+  const std::string name = path.filename().string();
+  for (const FileInfo& info : manifest.files) {
+    if (info.name != name) continue;
+    if (info.size != bytes)
+      throw Error("{}: has {} bytes, the manifest says {}; the file is damaged or not this cache's",
+                  path.string(), bytes, info.size);
+    return info;
+  }
+  throw Error("{}: is not among the manifest's files; the cache is damaged", path.string());
+}
+
+const FileInfo& checkFile(const InputFile& file, const Manifest& manifest) {
+  return checkFile(file.path(), file.size(), manifest);
+}
+
+std::vector<Brick> readBricks(const fs::path& cache, const Manifest& manifest) {
+  const InputFile file(cacheFile(cache, "bricks.bin"));
+  const FileInfo& info = checkFile(file, manifest);
+  BricksHeader header;
+  file.readAt(0, std::span(&header, 1));
+  std::vector<Brick> bricks;
+  IndexChecker checker(file.path(), bricks, manifest);
+  readRecords<BrickRecord>(file, header, sizeof header, manifest, info, [&](const BrickRecord& record) {
+    bricks.push_back(brickOf(record));
+    checker.checkLast();
+  });
+  checker.checkAll();
+  bricks.shrink_to_fit();
+  std::vector<Extent> extents;
+  extents.reserve(bricks.size());
+  for (const Brick& brick : bricks) extents.push_back(brick.geometry);
+
+  const InputFile geometry(cacheFile(cache, manifest.steps.front().geometry));
+  const FileInfo& geometry_info = checkFile(geometry, manifest);
+  checkExtents(file.path(), extents, 0, geometry.size());
+  checkChecksum(geometry.path(), geometry_info, geometryChecksum(bricks));
+  return bricks;
+}
+
+std::vector<BrickVariable> readVariableTable(const InputFile& file, const Manifest& manifest,
+                                             std::span<const Brick> bricks) {
+  const FileInfo& info = checkFile(file, manifest);
+  VariableHeader header;
+  file.readAt(0, std::span(&header, 1));
+  std::vector<BrickVariable> table;
+  table.reserve(bricks.size());
+  readRecords<VariableRecord>(
+      file, header, header.table_offset, manifest, info, [&](const VariableRecord& record) {
+        const size_t n = table.size();
+        table.push_back(brickVariableOf(record));
+        const BrickVariable& variable = table.back();
+        const bool fine = std::isfinite(variable.min) && std::isfinite(variable.max) &&
+                          variable.min <= variable.max && variable.largest_slope >= 0 &&
+                          std::isfinite(variable.largest_slope) && variable.largest_deviation >= 0 &&
+                          std::isfinite(variable.largest_deviation);
+        if (!fine) refuse(file.path(), n, "its range, slope or deviation is impossible");
+        if (variable.values.length > mostValuesBytes(bricks[n].splats))
+          refuse(file.path(), n,
+                 fmt::format("{} bytes are too many for its {} splats", variable.values.length,
+                             bricks[n].splats));
+      });
+  CURVISPLAT_CHECK_OP(table.size(), ==, bricks.size());
+  std::vector<Extent> extents;
+  extents.reserve(table.size());
+  for (const BrickVariable& variable : table) extents.push_back(variable.values);
+  checkExtents(file.path(), extents, sizeof header, header.table_offset);
+  return table;
+}
+
+uint64_t geometryChecksum(std::span<const Brick> bricks) {
+  Checksum checksum;
+  for (const Brick& brick : bricks) checksum.add(std::as_bytes(std::span(&brick.geometry.checksum, 1)));
+  return checksum.value();
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,45 @@
+#include "stream/cache/cache_lock.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <string>
+
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/base/open_retrying.h"
+
+namespace curvisplat {
+
+CacheLock::CacheLock(const std::filesystem::path& cache) : cache_(cache), manifest_(cache / "manifest.json") {
+  // For writing: network file systems grant exclusive locks on nothing less.
+  fd_ = openRetrying(manifest_, O_RDWR);
+  if (fd_ < 0)
+    throw Error("{}: cannot be opened for writing: {}; name a whole splat cache that you may change",
+                manifest_.string(), std::strerror(errno));
+  if (::flock(fd_, LOCK_EX | LOCK_NB) == 0 && isStillThere()) return;
+  const bool is_busy = errno == EWOULDBLOCK;
+  const std::string reason = std::strerror(errno);
+  const bool is_there = isStillThere();
+  SystemCalls::current().close(fd_);
+  if (is_busy || !is_there)
+    throw Error("{}: another program is changing this cache; wait for it", cache_.string());
+  throw Error("{}: cannot be locked: {}", manifest_.string(), reason);
+}
+
+CacheLock::~CacheLock() {
+  SystemCalls::current().close(fd_);
+}
+
+bool CacheLock::isStillThere() const {
+  struct stat ours {
+  }, theirs{};
+  return ::fstat(fd_, &ours) == 0 && ::stat(manifest_.c_str(), &theirs) == 0 &&
+         ours.st_ino == theirs.st_ino && ours.st_dev == theirs.st_dev;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,227 @@
+#include "stream/cache/cache_verify.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "stream/base/checksum.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/cache/brick_grids.h"
+#include "stream/model/shape_extent.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kMostFindings = 100;
+constexpr uint64_t kMostGridBytes = 64 << 10;  // of bricks.vdb, a brick: one alone takes 10 KiB
+constexpr double kWeightTolerance = 1e-3;
+// Floats have been rounded, from doubles that the record was made of.
+constexpr double kRounding = 1e-5;
+
+class Verifier {
+ public:
+  explicit Verifier(const CacheReader& reader)
+      : reader_(reader), bricks_(reader.bricks()), weights_(bricks_.size()), whole_(bricks_.size()) {}
+
+  CacheVerification verify(Progress* progress) {
+    if (progress) progress->begin("verify", bricks_.size(), "bricks");
+    for (uint32_t n = 0; n < bricks_.size(); ++n) {
+      verifyGeometry(n);
+      for (size_t v = 0; v < reader_.manifest().variables.size(); ++v) verifyValues(n, v);
+      if (progress) progress->advance(1);
+    }
+    verifyWeights();
+    verifyGrids();
+    if (progress) progress->end();
+    return std::move(result_);
+  }
+
+ private:
+  template <typename... Args>
+  void find(fmt::format_string<Args...> format, Args&&... args) {
+    if (result_.findings.size() < kMostFindings)
+      result_.findings.push_back(fmt::format(format, std::forward<Args>(args)...));
+  }
+
+  void findIn(uint32_t n, const std::string& what) {
+    const Cell& cell = bricks_[n].cell;
+    find("{}: brick {} (level {}, cell {} {} {}): {}", reader_.path().string(), n, cell.level, cell.at[0],
+         cell.at[1], cell.at[2], what);
+  }
+
+  void verifyGeometry(uint32_t n) {
+    std::vector<NodeRun> runs;
+    try {
+      reader_.readGeometry(n, geometry_, &runs);
+    } catch (const Error& error) {
+      return find("{}", error.what());
+    }
+    whole_[n] = true;
+    for (float weight : geometry_.weight) weights_[n] += weight;
+    verifyBox(n);
+    verifyOctants(n);
+    verifyRadius(n);
+    verifyRuns(n, runs);
+  }
+
+  void verifyBox(uint32_t n) {
+    const Brick& brick = bricks_[n];
+    const glm::dvec3 corner = reader_.manifest().root.cellMin(brick.cell);
+    const double slack = kRounding * reader_.manifest().root.cellSize(brick.cell.level);
+    const std::vector<float>* const coordinates[] = {&geometry_.x, &geometry_.y, &geometry_.z};
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto [least, most] = std::minmax_element(coordinates[axis]->begin(), coordinates[axis]->end());
+      if (std::abs(corner[axis] + *least - brick.lower[axis]) > slack ||
+          std::abs(corner[axis] + *most - brick.upper[axis]) > slack)
+        findIn(n, fmt::format("its centres span [{}, {}] along {}, its record says [{}, {}]",
+                              corner[axis] + *least, corner[axis] + *most, "xyz"[axis], brick.lower[axis],
+                              brick.upper[axis]));
+    }
+  }
+
+  /// Inner bricks lie octant after octant. Centres within rounding of a middle plane may seem to be on either
+  /// side.
+  void verifyOctants(uint32_t n) {
+    const Brick& brick = bricks_[n];
+    const double half = 0.5 * reader_.manifest().root.cellSize(brick.cell.level);
+    std::array<uint32_t, 8> found{};
+    uint32_t uncertain = 0, misplaced = 0;
+    uint32_t stored = 0, end = brick.octant_splats[0];
+    for (uint32_t s = 0; s < geometry_.size(); ++s) {
+      while (s >= end && stored < 7) end += brick.octant_splats[++stored];
+      const std::array<double, 3> at{geometry_.x[s] - half, geometry_.y[s] - half, geometry_.z[s] - half};
+      const uint32_t octant = (at[0] >= 0) | (at[1] >= 0) << 1 | (at[2] >= 0) << 2;
+      const bool certain = std::min({std::abs(at[0]), std::abs(at[1]), std::abs(at[2])}) > kRounding * half;
+      ++found[octant];
+      uncertain += !certain;
+      misplaced += certain && octant != stored;
+    }
+    for (int octant = 0; octant < 8; ++octant) {
+      const int64_t difference = int64_t{found[octant]} - brick.octant_splats[octant];
+      if (std::abs(difference) > uncertain)
+        findIn(n, fmt::format("octant {} has {} splats, its record says {}", octant, found[octant],
+                              brick.octant_splats[octant]));
+    }
+    if (!brick.isLeaf() && misplaced > 0)
+      findIn(n, fmt::format("{} of its splats are not in octant order", misplaced));
+  }
+
+  void verifyRadius(uint32_t n) {
+    const Brick& brick = bricks_[n];
+    std::vector<Splat> splats(geometry_.size());
+    for (size_t s = 0; s < splats.size(); ++s) {
+      splats[s].axis = {geometry_.axis0[s], geometry_.axis1[s], geometry_.axis2[s]};
+      splats[s].shear = {geometry_.shear10[s], geometry_.shear20[s], geometry_.shear21[s]};
+    }
+    const double radius = largestReach(splats, geometry_.half_cell);
+    if (std::abs(radius - brick.largest_radius) > kRounding * radius)
+      findIn(n, fmt::format("its largest radius is {}, its record says {}", radius, brick.largest_radius));
+  }
+
+  void verifyRuns(uint32_t n, const std::vector<NodeRun>& runs) {
+    if (!bricks_[n].isLeaf()) {
+      if (!runs.empty()) findIn(n, "it has children and nodes of its own");
+      return;
+    }
+    if (runs.empty()) return findIn(n, "it is a leaf without nodes");
+    const auto& blocks = reader_.manifest().blocks;
+    for (const NodeRun& run : runs) {
+      const bool inside = run.block < blocks.size() && run.i + run.count <= blocks[run.block].ni &&
+                          run.j < blocks[run.block].nj && run.k < blocks[run.block].nk;
+      if (!inside)
+        return findIn(n, fmt::format("{} nodes from block {}, {} {} {} are not in the grid", run.count,
+                                     run.block, run.i, run.j, run.k));
+    }
+  }
+
+  void verifyValues(uint32_t n, size_t v) {
+    SplatVariable& values = values_;
+    try {
+      reader_.readVariable(n, v, values);
+    } catch (const Error& error) {
+      return find("{}", error.what());
+    }
+    const BrickVariable& record = reader_.brickVariables(v)[n];
+    const auto [least, most] = std::minmax_element(values.mean.begin(), values.mean.end());
+    double slope = 0, variance = 0;
+    for (size_t s = 0; s < values.size(); ++s) {
+      const glm::dvec3 w(values.slope0[s], values.slope1[s], values.slope2[s]);
+      slope = std::max(slope, glm::length(w));
+      variance = std::max(variance, double{values.variance[s]});
+    }
+    const auto differs = [](double found, double said) {
+      return std::abs(found - said) > kRounding * std::abs(said);
+    };
+    if (*least != record.min || *most != record.max || differs(slope, record.largest_slope) ||
+        differs(std::sqrt(variance), record.largest_deviation))
+      findIn(n, fmt::format(
+                    "'{}' has the range [{}, {}], slope {} and deviation {}, its record says [{}, {}], {} "
+                    "and {}",
+                    reader_.manifest().variables[v].name, *least, *most, slope, std::sqrt(variance),
+                    record.min, record.max, record.largest_slope, record.largest_deviation));
+  }
+
+  void verifyWeights() {
+    double volume = 0;
+    bool all = true;
+    for (uint32_t n = 0; n < bricks_.size(); ++n) {
+      const Brick& brick = bricks_[n];
+      all &= whole_[n];
+      if (brick.isLeaf()) {
+        volume += weights_[n];
+        continue;
+      }
+      double children = 0;
+      bool known = whole_[n];
+      for (uint32_t c = brick.first_child; c < brick.first_child + brick.child_count; ++c) {
+        children += weights_[c];
+        known &= whole_[c];
+      }
+      if (known && std::abs(weights_[n] - children) > kWeightTolerance * children)
+        findIn(n, fmt::format("its weights sum to {}, its children's to {}", weights_[n], children));
+    }
+    const double said = reader_.manifest().volume;
+    if (all && std::abs(volume - said) > kWeightTolerance * said)
+      find("{}: the leaves' weights sum to {}, the manifest says {}", reader_.path().string(), volume, said);
+  }
+
+  void verifyGrids() {
+    const std::filesystem::path path = reader_.path() / "bricks.vdb";
+    try {
+      const InputFile file(path);
+      if (file.size() > kMostGridBytes * (bricks_.size() + 1))
+        return find("{}: has {} bytes for {} bricks", path.string(), file.size(), bricks_.size());
+      std::vector<std::byte> bytes(file.size());
+      file.readAt(0, std::span(bytes));
+      for (const FileInfo& info : reader_.manifest().files)
+        if (info.name == "bricks.vdb" && info.checksum != checksumOf(bytes))
+          return find("{}: has the checksum {:016x}, expected {:016x}", path.string(), checksumOf(bytes),
+                      info.checksum);
+      const auto [difference, not_compared] = compareBrickGrids(bytes, reader_.manifest().root, bricks_);
+      if (!difference.empty()) find("{}: {}", path.string(), difference);
+      if (!not_compared.empty())
+        result_.notes.push_back(
+            fmt::format("{}: its checksum is right; it was not compared with bricks.bin: {}", path.string(),
+                        not_compared));
+    } catch (const Error& error) {
+      find("{}", error.what());
+    }
+  }
+
+  const CacheReader& reader_;
+  const std::span<const Brick> bricks_;
+  std::vector<double> weights_;  // [brick]
+  std::vector<bool> whole_;      // [brick]: its geometry could be decoded
+  CacheVerification result_;
+  SplatGeometry geometry_;
+  SplatVariable values_;
+};
+
+}  // namespace
+
+CacheVerification verifyCache(const CacheReader& reader, Progress* progress) {
+  return Verifier(reader).verify(progress);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,279 @@
+#include "stream/cache/cache_writer.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "stream/base/check.h"
+#include "stream/base/checksum.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/cache/brick_grids.h"
+#include "stream/cache/brick_log.h"
+#include "stream/cache/cache_format.h"
+#include "stream/cache/cache_index.h"
+#include "stream/cache/stream_file.h"
+
+namespace curvisplat {
+namespace {
+
+/// Positions in `bricks`, level by level and in Morton order; equal cells as they were appended.
+std::vector<uint32_t> indexOrder(const std::vector<Brick>& bricks) {
+  std::vector<uint32_t> order(bricks.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+    const Cell &cell = bricks[a].cell, &other = bricks[b].cell;
+    return cell.level != other.level ? cell.level < other.level : mortonLess(cell, other);
+  });
+  return order;
+}
+
+/// Links parents and children of `bricks`, which are in index order. A brick without a parent, and two bricks
+/// of one cell that are not leaves, are bugs of whoever appended them.
+void linkOctree(std::vector<Brick>& bricks) {
+  CURVISPLAT_CHECK_OP(bricks.front().cell.level, ==, 0u);
+  // Parents and children go through their levels in the same order.
+  uint32_t parent = 0;
+  for (uint32_t n = 0; n < bricks.size(); ++n) {
+    const Cell& cell = bricks[n].cell;
+    if (cell.level == 0) continue;
+    while (parent < n && !(bricks[parent].cell == cell.parent())) ++parent;
+    CURVISPLAT_CHECK(parent < n && "every brick's parent has been appended");
+    Brick& above = bricks[parent];
+    if (above.child_count == 0) above.first_child = n;
+    ++above.child_count;
+    bricks[n].parent = parent;
+  }
+  for (uint32_t n = 1; n < bricks.size(); ++n)
+    if (bricks[n].cell == bricks[n - 1].cell)
+      CURVISPLAT_CHECK(bricks[n].isLeaf() && bricks[n - 1].isLeaf() && "only leaves share a cell");
+}
+
+}  // namespace
+
+struct CacheWriter::State {
+  State(PartialFolder& partial, const RootCube& root_cube, std::vector<VariableInfo> variable_infos)
+      : folder(partial),
+        root(root_cube),
+        variables(std::move(variable_infos)),
+        geometry(folder.path() / "geometry.bin", Caching::pages, OutputFile::Existing::kKeep),
+        tables(variables.size()),
+        geometry_input(geometry.path()),
+        log(folder.path(), variables.size()) {
+    for (const VariableInfo& variable : variables) {
+      values.emplace_back(folder.path() / variableFileName(variable), Caching::pages,
+                          OutputFile::Existing::kKeep);
+      values_input.emplace_back(values.back().path());
+    }
+  }
+
+  void add(AppendedBrick&& appended);
+  void takeUp(Progress& progress);
+  bool isWhole(const AppendedBrick& appended) const;
+  void keep(uint64_t count);
+
+  FileInfo writeIndex(const std::vector<Brick>& ordered);
+  FileInfo writeTable(size_t variable, const std::vector<uint32_t>& order);
+  FileInfo writeGrids(const std::vector<Brick>& ordered);
+  FileInfo closeGeometry(const std::vector<Brick>& ordered);
+
+  std::unique_ptr<PartialFolder> own_folder;  // if no one else has it
+  PartialFolder& folder;
+  RootCube root;
+  std::vector<VariableInfo> variables;
+  OutputFile geometry;
+  std::vector<OutputFile> values;                  // [variable]
+  std::vector<Brick> bricks;                       // as appended
+  std::vector<double> weights;                     // [brick]
+  std::vector<std::vector<BrickVariable>> tables;  // [variable][brick]
+  // For readBack; opened at once, since any number of threads may ask.
+  InputFile geometry_input;
+  std::vector<InputFile> values_input;
+  BrickLog log;
+};
+
+void CacheWriter::State::add(AppendedBrick&& appended) {
+  bricks.push_back(appended.brick);
+  weights.push_back(appended.weight);
+  for (size_t v = 0; v < variables.size(); ++v) tables[v].push_back(appended.variables[v]);
+}
+
+/// Whether the files have the brick's streams, as they were written.
+bool CacheWriter::State::isWhole(const AppendedBrick& appended) const {
+  std::vector<std::byte> bytes;
+  const auto has = [&](const InputFile& file, const Extent& extent) {
+    if (extent.offset > file.size() || extent.length > file.size() - extent.offset) return false;
+    bytes.resize(extent.length);
+    file.readAt(extent.offset, std::span(bytes));
+    return checksumOf(bytes) == extent.checksum;
+  };
+  if (!has(geometry_input, appended.brick.geometry)) return false;
+  for (size_t v = 0; v < variables.size(); ++v)
+    if (!has(values_input[v], appended.variables[v].values)) return false;
+  return true;
+}
+
+void CacheWriter::State::takeUp(Progress& progress) {
+  for (AppendedBrick& appended : readBrickLog(folder.path(), variables.size())) {
+    if (!isWhole(appended)) break;
+    add(std::move(appended));
+    progress.advance(1);
+  }
+  keep(bricks.size());
+}
+
+void CacheWriter::State::keep(uint64_t count) {
+  CURVISPLAT_CHECK_OP(count, <=, bricks.size());
+  const auto endOf = [](const Extent& last) { return last.offset + last.length; };
+  bricks.resize(count);
+  weights.resize(count);
+  log.keep(count);
+  geometry.truncate(count > 0 ? endOf(bricks.back().geometry) : 0);
+  for (size_t v = 0; v < variables.size(); ++v) {
+    tables[v].resize(count);
+    values[v].truncate(count > 0 ? endOf(tables[v].back().values) : 0);
+    if (count == 0) beginVariableFile(values[v]);
+  }
+}
+
+CacheWriter::CacheWriter(std::filesystem::path cache, bool overwrite, RootCube root,
+                         std::vector<VariableInfo> variables) {
+  auto folder = std::make_unique<PartialFolder>(std::move(cache), overwrite);
+  state_ = std::make_unique<State>(*folder, root, std::move(variables));
+  state_->own_folder = std::move(folder);
+  state_->keep(0);
+}
+
+CacheWriter::CacheWriter(PartialFolder& folder, RootCube root, std::vector<VariableInfo> variables,
+                         Progress& progress)
+    : state_(std::make_unique<State>(folder, root, std::move(variables))) {
+  // What an interrupted finish() has left: a manifest, whole though it may be, is older than what follows.
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path()))
+    if (entry.path().filename() == "manifest.json" || entry.path().extension() == ".part")
+      removeFile(entry.path());
+  state_->takeUp(progress);
+}
+
+CacheWriter::~CacheWriter() = default;
+
+std::span<const Brick> CacheWriter::bricks() const {
+  return state_->bricks;
+}
+
+void CacheWriter::keep(uint64_t count) {
+  state_->keep(count);
+}
+
+uint64_t CacheWriter::append(EncodedBrick&& encoded, float error) {
+  State& s = *state_;
+  CURVISPLAT_CHECK_OP(encoded.values.size(), ==, s.variables.size());
+  AppendedBrick appended{encoded.brick, encoded.weight, std::move(encoded.variables)};
+  appended.brick.error = error;
+  appended.brick.geometry.offset = appendStream(s.geometry, encoded.geometry);
+  for (size_t v = 0; v < encoded.values.size(); ++v)
+    appended.variables[v].values.offset = appendStream(s.values[v], encoded.values[v]);
+  s.log.append(appended);  // last: what it tells of is there
+  s.add(std::move(appended));
+  return s.bricks.size() - 1;
+}
+
+BrickSplats CacheWriter::readBack(uint64_t id) const {
+  const State& s = *state_;
+  CURVISPLAT_CHECK_OP(id, <, s.bricks.size());
+  const Brick& brick = s.bricks[id];
+  const auto read = [](const InputFile& file, const Extent& extent) {
+    std::vector<std::byte> bytes(extent.length);
+    file.readAt(extent.offset, std::span(bytes));
+    return bytes;
+  };
+  const std::vector<std::byte> geometry = read(s.geometry_input, brick.geometry);
+  std::vector<BrickVariable> variables;
+  std::vector<std::vector<std::byte>> values;
+  for (size_t v = 0; v < s.variables.size(); ++v) {
+    variables.push_back(s.tables[v][id]);
+    values.push_back(read(s.values_input[v], variables.back().values));
+  }
+  return decodeForMerging(s.root, brick, geometry, variables, values);
+}
+
+Manifest CacheWriter::finish(Manifest manifest) {
+  State& s = *state_;
+  if (s.bricks.empty())
+    throw Error("{}: there is nothing to write: no brick has a splat", s.folder.path().string());
+  const std::vector<uint32_t> order = indexOrder(s.bricks);
+  std::vector<Brick> ordered;
+  ordered.reserve(order.size());
+  for (uint32_t id : order) ordered.push_back(s.bricks[id]);
+  linkOctree(ordered);
+
+  manifest.root = s.root;
+  manifest.bricks = ordered.size();
+  manifest.levels = ordered.back().cell.level + 1;
+  manifest.splats = 0;
+  manifest.volume = 0;
+  for (size_t n = 0; n < ordered.size(); ++n) {
+    if (!ordered[n].isLeaf()) continue;
+    manifest.splats += ordered[n].splats;
+    manifest.volume += s.weights[order[n]];
+  }
+  if (manifest.variables.empty()) manifest.variables = s.variables;
+  CURVISPLAT_CHECK_OP(manifest.variables.size(), ==, s.variables.size());
+  if (manifest.steps.empty()) manifest.steps.emplace_back();
+  manifest.steps.front().variables.clear();
+  for (size_t v = 0; v < s.variables.size(); ++v) {
+    CURVISPLAT_CHECK_OP(manifest.variables[v].number, ==, s.variables[v].number);
+    manifest.steps.front().variables.push_back(s.variables[v].number);
+  }
+
+  manifest.files.clear();
+  manifest.files.push_back(s.writeIndex(ordered));
+  manifest.files.push_back(s.closeGeometry(ordered));
+  for (size_t v = 0; v < s.variables.size(); ++v) manifest.files.push_back(s.writeTable(v, order));
+  manifest.files.push_back(s.writeGrids(ordered));
+  writeFileAtomically(s.folder.path() / "manifest.json", manifest.toJson());
+  s.folder.putIntoPlace();
+  removeAll(s.folder.target() / kBrickLogName);
+  s.folder.removeReplaced();
+  return manifest;
+}
+
+FileInfo CacheWriter::State::writeIndex(const std::vector<Brick>& ordered) {
+  std::vector<BrickRecord> records;
+  records.reserve(ordered.size());
+  for (const Brick& brick : ordered) records.push_back(recordOf(brick));
+  BricksHeader header;
+  header.record_bytes = sizeof(BrickRecord);
+  header.bricks = ordered.size();
+  OutputFile file(folder.path() / "bricks.bin");
+  file.append(bytesOf(header));
+  file.append(bytesOf(records));
+  Checksum checksum;
+  checksum.add(bytesOf(header));
+  checksum.add(bytesOf(records));
+  const FileInfo info{"bricks.bin", file.size(), checksum.value()};
+  file.close();
+  return info;
+}
+
+FileInfo CacheWriter::State::closeGeometry(const std::vector<Brick>& ordered) {
+  padToPage(geometry);
+  const FileInfo info{"geometry.bin", geometry.size(), geometryChecksum(ordered)};
+  geometry.close();
+  return info;
+}
+
+FileInfo CacheWriter::State::writeTable(size_t variable, const std::vector<uint32_t>& order) {
+  std::vector<BrickVariable> table;
+  table.reserve(order.size());
+  for (uint32_t id : order) table.push_back(tables[variable][id]);
+  return finishVariableFile(values[variable], variableFileName(variables[variable]), table);
+}
+
+FileInfo CacheWriter::State::writeGrids(const std::vector<Brick>& ordered) {
+  const std::vector<std::byte> bytes = brickGridsFile(root, ordered);
+  OutputFile file(folder.path() / "bricks.vdb");
+  file.append(std::span(bytes));
+  file.close();
+  return {"bricks.vdb", bytes.size(), checksumOf(bytes)};
+}
+
+}  // namespace curvisplat

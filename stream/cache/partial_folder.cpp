@@ -1,0 +1,179 @@
+#include "stream/cache/partial_folder.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "stream/base/check.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/base/open_retrying.h"
+#include "stream/base/paths.h"
+#include "stream/cache/manifest.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kLockName = "lock";
+
+std::string reason() {
+  return std::strerror(errno);
+}
+
+fs::path withSuffix(fs::path path, const char* suffix) {
+  path += suffix;
+  return path;
+}
+
+/// "cache/" has an empty file name; what is beside it belongs to "cache".
+fs::path withoutSlash(fs::path path) {
+  return path.has_filename() ? std::move(path) : path.parent_path();
+}
+
+fs::path partialOf(const fs::path& target) {
+  return withSuffix(withoutSlash(target), ".partial");
+}
+
+void removeFolder(const fs::path& path, const char* what) {
+  if (const std::error_code error = removeAll(path))
+    throw Error("{}: the {} cannot be removed: {}", path.string(), what, error.message());
+}
+
+}  // namespace
+
+void checkReplaceable(const fs::path& target, bool overwrite) {
+  if (target.empty()) throw UsageError("the output has no name");
+  if (!fs::exists(fs::symlink_status(target))) return;
+  if (!overwrite)
+    throw Error("{}: exists already; choose another output, or allow overwriting (--overwrite)",
+                target.string());
+  try {
+    const fs::path manifest = target / "manifest.json";
+    Manifest::fromJson(readTextFile(manifest), manifest);
+  } catch (const OtherVersion&) {
+    // A cache all the same.
+  } catch (const Error& error) {
+    throw Error(
+        "{}: is not a whole splat cache and will not be overwritten; remove it, or choose another output "
+        "({})",
+        target.string(), error.what());
+  }
+}
+
+bool hasUnfinished(const fs::path& target) {
+  std::error_code ignored;
+  return fs::is_directory(partialOf(target), ignored);
+}
+
+PartialFolder::PartialFolder(fs::path target, bool overwrite, Rest rest)
+    : target_(withoutSlash(std::move(target))), path_(partialOf(target_)) {
+  checkReplaceable(target_, overwrite);
+  const bool is_new = SystemCalls::current().mkdir(path_.c_str(), 0777) == 0;
+  if (!is_new && errno != EEXIST)
+    throw Error("{}: the folder cannot be made: {}; choose another output", path_.string(), reason());
+  try {
+    lock();
+  } catch (...) {
+    if (is_new) SystemCalls::current().remove(path_.c_str());  // unless another's lock is in it by now
+    throw;
+  }
+  try {
+    if (rest == Rest::kRemove)
+      clear();
+    else
+      leave();
+  } catch (...) {
+    SystemCalls::current().close(lock_);
+    throw;
+  }
+}
+
+void PartialFolder::clear() {
+  leave_ = false;
+  for (const auto& entry : fs::directory_iterator(path_))
+    if (entry.path().filename() != kLockName) removeFolder(entry.path(), "rest of an unfinished conversion");
+}
+
+PartialFolder::~PartialFolder() {
+  if (lock_ < 0) return;
+  if (!leave_) removeAll(path_);
+  SystemCalls::current().close(lock_);
+}
+
+void PartialFolder::lock() {
+  const fs::path name = path_ / kLockName;
+  const int fd = openRetrying(name, O_RDWR | O_CREAT, 0666);
+  if (fd < 0) throw Error("{}: cannot be opened: {}", name.string(), reason());
+  const bool locked = ::flock(fd, LOCK_EX | LOCK_NB) == 0;
+  const std::string why = reason();
+  const bool busy = !locked && errno == EWOULDBLOCK;
+  // A conversion that ended between open and flock has taken the file away: what is locked is not what is
+  // here.
+  struct stat ours {
+  }, theirs{};
+  const bool same = ::fstat(fd, &ours) == 0 && ::stat(name.c_str(), &theirs) == 0 &&
+                    ours.st_ino == theirs.st_ino && ours.st_dev == theirs.st_dev;
+  if (locked && same) {
+    lock_ = fd;
+    return;
+  }
+  SystemCalls::current().close(fd);
+  if (busy || locked)
+    throw Error("{}: another conversion to this output is running; wait for it, or choose another output",
+                path_.string());
+  throw Error("{}: cannot be locked: {}", name.string(), why);
+}
+
+void PartialFolder::putIntoPlace() {
+  CURVISPLAT_CHECK(lock_ >= 0);
+  SystemCalls& calls = SystemCalls::current();
+  syncDirectory(path_);
+  const fs::path aside = withSuffix(target_, ".replaced");
+  if (!fs::exists(fs::symlink_status(target_))) {
+    if (calls.rename(path_.c_str(), target_.c_str()) < 0)
+      throw Error("{}: cannot be renamed to {}: {}", path_.string(), target_.string(), reason());
+  } else if (calls.exchange(path_.c_str(), target_.c_str()) == 0) {
+    replaced_ = path_;
+  } else if (errno == EINVAL || errno == ENOSYS || errno == ENOTSUP) {
+    if (calls.rename(target_.c_str(), aside.c_str()) < 0)
+      throw Error("{}: cannot be moved aside to {}: {}", target_.string(), aside.string(), reason());
+    if (calls.rename(path_.c_str(), target_.c_str()) < 0) {
+      const std::string why = reason();
+      calls.rename(aside.c_str(), target_.c_str());
+      throw Error("{}: cannot be renamed to {}: {}", path_.string(), target_.string(), why);
+    }
+    replaced_ = aside;
+  } else {
+    throw Error("{}: cannot be put in the place of {}: {}", path_.string(), target_.string(), reason());
+  }
+  try {
+    // Before anything of the old cache goes: a power loss must not take both of them.
+    syncDirectory(folderOf(target_));
+  } catch (...) {
+    const fs::path old = std::exchange(replaced_, {});
+    if (old == path_)
+      calls.exchange(path_.c_str(), target_.c_str());
+    else
+      calls.rename(target_.c_str(), path_.c_str());
+    if (old == aside) calls.rename(aside.c_str(), target_.c_str());
+    throw;
+  }
+  // The lock goes after the renaming: gone before, another conversion could take the folder for a dead one's.
+  const int lock = std::exchange(lock_, -1);
+  removeAll(target_ / kLockName);
+  calls.close(lock);
+}
+
+void PartialFolder::removeReplaced() {
+  const fs::path old = std::exchange(replaced_, {});
+  if (!old.empty()) removeFolder(old, "old cache, whose place the new one has taken,");
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,57 @@
+#include "stream/cache/stream_file.h"
+
+#include <array>
+#include <utility>
+
+#include "stream/base/check.h"
+#include "stream/base/checksum.h"
+#include "stream/cache/cache_format.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr std::array<std::byte, kPageBytes> kZeros{};
+
+/// Appends zeros up to `offset`.
+void padTo(OutputFile& file, uint64_t offset) {
+  CURVISPLAT_CHECK_OP(offset - file.size(), <=, kPageBytes);
+  file.append(std::span(kZeros).first(offset - file.size()));
+}
+
+}  // namespace
+
+void padToPage(OutputFile& file) {
+  padTo(file, (file.size() + kPageBytes - 1) / kPageBytes * kPageBytes);
+}
+
+uint64_t appendStream(OutputFile& file, std::span<const std::byte> stream) {
+  padTo(file, streamOffset(file.size(), stream.size()));
+  const uint64_t offset = file.size();
+  file.append(stream);
+  return offset;
+}
+
+void beginVariableFile(OutputFile& file) {
+  file.append(bytesOf(VariableHeader{}));
+}
+
+FileInfo finishVariableFile(OutputFile& file, const std::string& name, std::span<const BrickVariable> table) {
+  std::vector<VariableRecord> records;
+  records.reserve(table.size());
+  for (const BrickVariable& variable : table) records.push_back(recordOf(variable));
+  padToPage(file);
+  VariableHeader header;
+  header.record_bytes = sizeof(VariableRecord);
+  header.bricks = records.size();
+  header.table_offset = file.size();
+  file.append(bytesOf(records));
+  file.writeAt(0, bytesOf(header));
+  Checksum checksum;
+  checksum.add(bytesOf(header));
+  checksum.add(bytesOf(records));
+  FileInfo info{name, file.size(), checksum.value()};
+  file.close();
+  return info;
+}
+
+}  // namespace curvisplat

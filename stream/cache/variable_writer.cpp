@@ -1,0 +1,100 @@
+#include "stream/cache/variable_writer.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+#include <utility>
+
+#include "stream/base/check.h"
+#include "stream/base/error.h"
+#include "stream/cache/cache_index.h"
+#include "stream/cache/stream_file.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kPartSuffix = ".part";
+
+}  // namespace
+
+VariableWriter::VariableWriter(const CacheLock& lock, Manifest manifest, std::vector<VariableInfo> variables)
+    : lock_(&lock), manifest_(std::move(manifest)) {
+  removeLeftovers();
+  uint32_t number = 0;
+  for (const VariableInfo& variable : manifest_.variables) number = std::max(number, variable.number + 1);
+  try {
+    for (VariableInfo& variable : variables) {
+      variable.number = number++;
+      const fs::path path = lock.cache() / variableFileName(variable);
+      fs::path part = path;
+      part += kPartSuffix;
+      files_.push_back({std::move(variable), path, part, OutputFile(part), {}, false});
+      beginVariableFile(files_.back().file);
+      files_.back().table.resize(manifest_.bricks);
+    }
+  } catch (...) {
+    removeLeftovers();
+    throw;
+  }
+}
+
+VariableWriter::~VariableWriter() {
+  // In a cache that has come in this one's place the same names are another's files.
+  if (in_place_ || !lock_->isStillThere()) return;
+  for (const NewFile& file : files_) removeAll(file.is_renamed ? file.path : file.part);
+}
+
+/// Files of a program that was killed: the manifest does not know them.
+void VariableWriter::removeLeftovers() const {
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(lock_->cache(), ignored)) {
+    const std::string name = entry.path().filename().string();
+    const bool is_known = std::any_of(manifest_.files.begin(), manifest_.files.end(),
+                                      [&](const FileInfo& file) { return file.name == name; });
+    if (!is_known && (name.starts_with("var.") || name.ends_with(kPartSuffix))) removeAll(entry.path());
+  }
+}
+
+void VariableWriter::append(uint32_t brick, std::span<const EncodedValues> values) {
+  CURVISPLAT_CHECK_OP(values.size(), ==, files_.size());
+  for (size_t n = 0; n < values.size(); ++n) {
+    BrickVariable& record = files_[n].table[brick];
+    CURVISPLAT_CHECK_OP(record.values.length, ==, 0u);
+    record = values[n].variable;
+    record.values.offset = appendStream(files_[n].file, values[n].bytes);
+  }
+}
+
+std::vector<FileInfo> VariableWriter::finish(const std::vector<std::string>& sources) {
+  std::vector<FileInfo> infos;
+  for (NewFile& file : files_)
+    infos.push_back(finishVariableFile(file.file, variableFileName(file.variable), file.table));
+  if (!lock_->isStillThere())
+    throw Error("{}: the cache was replaced meanwhile; it is left as it is now", lock_->cache().string());
+  for (NewFile& file : files_) {
+    if (SystemCalls::current().rename(file.part.c_str(), file.path.c_str()) < 0)
+      throw Error("{}: cannot be renamed to {}: {}", file.part.string(), file.path.string(),
+                  std::strerror(errno));
+    file.is_renamed = true;
+  }
+  // Names of payload files must be on the disk before a manifest that names them is.
+  syncDirectory(lock_->cache());
+
+  for (const NewFile& file : files_) {
+    manifest_.variables.push_back(file.variable);
+    manifest_.steps.front().variables.push_back(file.variable.number);
+  }
+  manifest_.files.insert(manifest_.files.end(), infos.begin(), infos.end());
+  for (const std::string& source : sources)
+    if (std::find(manifest_.sources.begin(), manifest_.sources.end(), source) == manifest_.sources.end())
+      manifest_.sources.push_back(source);
+  writeFileAtomically(lock_->cache() / "manifest.json", manifest_.toJson());
+  in_place_ = true;
+  syncDirectory(lock_->cache());
+  return infos;
+}
+
+}  // namespace curvisplat

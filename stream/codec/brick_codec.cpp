@@ -1,0 +1,246 @@
+#include "stream/codec/brick_codec.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "stream/base/check.h"
+#include "stream/base/checksum.h"
+#include "stream/base/error.h"
+#include "stream/codec/geometry_codec.h"
+#include "stream/codec/prediction.h"
+#include "stream/codec/values_codec.h"
+#include "stream/model/shape_extent.h"
+
+namespace curvisplat {
+namespace {
+
+float roundedUp(double value) {
+  const float rounded = static_cast<float>(value);
+  return rounded >= value ? rounded : std::nextafter(rounded, std::numeric_limits<float>::infinity());
+}
+
+DecodedGeometry& scratchGeometry() {
+  thread_local DecodedGeometry scratch;
+  return scratch;
+}
+
+void checkInput(const BrickSplats& brick) {
+  CURVISPLAT_CHECK_OP(brick.size(), >=, 1u);
+  CURVISPLAT_CHECK_OP(brick.size(), <=, size_t{kMaxBrickSplats});
+  CURVISPLAT_CHECK_OP(brick.positions.size(), ==, brick.size());
+  if (!brick.half_cells.empty()) CURVISPLAT_CHECK_OP(brick.half_cells.size(), ==, brick.size());
+  uint64_t nodes = 0;
+  for (const NodeRun& run : brick.runs) {
+    CURVISPLAT_CHECK_OP(run.count, >=, 1u);
+    nodes += run.count;
+  }
+  if (!brick.runs.empty()) CURVISPLAT_CHECK_OP(nodes, ==, brick.size());
+  bool fine = true;
+  for (size_t n = 0; n < brick.size(); ++n) {
+    const Splat& splat = brick.splats[n];
+    for (int c = 0; c < 3; ++c)
+      fine &= splat.axis[c] > 0 && std::isfinite(splat.axis[c]) && std::isfinite(splat.shear[c]);
+    fine &= splat.weight >= 0 && std::isfinite(splat.weight) && brick.cell.contains(brick.positions[n]);
+  }
+  for (const auto& values : brick.variables) {
+    CURVISPLAT_CHECK_OP(values.size(), ==, brick.size());
+    for (const SplatScalar& value : values)
+      fine &= std::isfinite(value.mean) && std::isfinite(value.slope.x) && std::isfinite(value.slope.y) &&
+              std::isfinite(value.slope.z) && value.variance >= 0 && std::isfinite(value.variance);
+  }
+  CURVISPLAT_CHECK(fine && "every number is finite, axes are positive, positions are in the cell");
+}
+
+/// Position, shape and weight of every splat, as decoded.
+void fillGeometry(const RootCube& root, const DecodedGeometry& decoded, BrickSplats& brick) {
+  for (size_t n = 0; n < brick.size(); ++n) {
+    Splat& splat = brick.splats[n];
+    for (int axis = 0; axis < 3; ++axis) {
+      brick.positions[n].at[axis] = latticePosition(decoded.position[axis][n], decoded.position_bits,
+                                                    brick.cell.level, brick.cell.at[axis]);
+      splat.axis[axis] = decoded.axis[axis][n];
+      splat.shear[axis] = decoded.shear[axis][n];
+    }
+    splat.weight = decoded.weight[n];
+    splat.position = root.toWorld(brick.positions[n]);
+  }
+}
+
+Brick summaryOf(const RootCube& root, const BrickSplats& splats) {
+  Brick brick;
+  brick.cell = splats.cell;
+  brick.splats = static_cast<uint32_t>(splats.size());
+  RootPosition lower = splats.positions.front(), upper = lower;
+  for (const RootPosition& position : splats.positions) {
+    ++brick.octant_splats[octantOf(position, splats.cell)];
+    for (int axis = 0; axis < 3; ++axis) {
+      lower.at[axis] = std::min(lower.at[axis], position.at[axis]);
+      upper.at[axis] = std::max(upper.at[axis], position.at[axis]);
+    }
+  }
+  brick.lower = root.toWorld(lower);
+  brick.upper = root.toWorld(upper);
+  brick.largest_radius = roundedUp(largestReach(splats.splats, splats.half_cells));
+  return brick;
+}
+
+BrickVariable summaryOf(std::span<const SplatScalar> values) {
+  BrickVariable summary;
+  double least = std::numeric_limits<double>::infinity(), most = -least, slope = 0, variance = 0;
+  for (const SplatScalar& value : values) {
+    least = std::min(least, value.mean);
+    most = std::max(most, value.mean);
+    slope = std::max(slope, glm::dot(value.slope, value.slope));
+    variance = std::max(variance, value.variance);
+  }
+  summary.min = static_cast<float>(least);  // decoded means are floats
+  summary.max = static_cast<float>(most);
+  summary.largest_slope = roundedUp(std::sqrt(slope));
+  summary.largest_deviation = roundedUp(std::sqrt(variance));
+  return summary;
+}
+
+Extent extentOf(std::span<const std::byte> bytes) {
+  return {0, static_cast<uint32_t>(bytes.size()), checksumOf(bytes)};
+}
+
+EncodedValues encodeInRows(std::span<const Row> rows, std::span<SplatScalar> values) {
+  EncodedValues encoded;
+  encoded.bytes = encodeValuesStream(rows, values);
+  encoded.variable = summaryOf(values);
+  encoded.variable.values = extentOf(encoded.bytes);
+  return encoded;
+}
+
+void checkCount(const Brick& brick) {
+  const auto& at = brick.cell.at;
+  if (brick.splats == 0 || brick.splats > kMaxBrickSplats || brick.cell.level > kMaxLevel)
+    throw Error("the brick of level {}, cell {} {} {} has {} splats, not 1 to {}", brick.cell.level, at[0],
+                at[1], at[2], brick.splats, kMaxBrickSplats);
+}
+
+/// Decodes, and puts the brick's cell before what goes wrong.
+template <typename Decode>
+void decodeNaming(const Brick& brick, const char* stream, Decode decode) {
+  checkCount(brick);
+  const auto& at = brick.cell.at;
+  try {
+    decode();
+  } catch (const Error& error) {
+    throw Error("the {} of the brick of level {}, cell {} {} {}, {} splats, cannot be decoded: {}", stream,
+                brick.cell.level, at[0], at[1], at[2], brick.splats, error.what());
+  }
+}
+
+void toFloats(const std::vector<double>& from, float* to) {
+  const double* f = from.data();
+  for (size_t n = 0; n < from.size(); ++n) to[n] = static_cast<float>(f[n]);
+}
+
+/// An axis too small for a float becomes the smallest one that divisions can bear.
+void toAxisFloats(const std::vector<double>& from, float* to) {
+  const double* f = from.data();
+  for (size_t n = 0; n < from.size(); ++n)
+    to[n] = std::max(static_cast<float>(f[n]), std::numeric_limits<float>::min());
+}
+
+/// The middles of the intervals, from the cell's minimum corner; rounding must not carry them out of the
+/// cell.
+void toCoordinates(const std::vector<uint32_t>& from, double interval, float inside, float* to) {
+  const uint32_t* f = from.data();
+  for (size_t n = 0; n < from.size(); ++n)
+    to[n] = std::min(static_cast<float>((f[n] + 0.5) * interval), inside);
+}
+
+}  // namespace
+
+EncodedBrick encodeBrick(const RootCube& root, BrickSplats& brick) {
+  checkInput(brick);
+  DecodedGeometry& decoded = scratchGeometry();
+  EncodedBrick encoded;
+  encoded.geometry = encodeGeometryStream(root, brick, decoded);
+  fillGeometry(root, decoded, brick);
+  encoded.brick = summaryOf(root, brick);
+  encoded.brick.geometry = extentOf(encoded.geometry);
+  for (const Splat& splat : brick.splats) encoded.weight += splat.weight;
+  for (auto& values : brick.variables) {
+    EncodedValues of_variable = encodeInRows(decoded.rows, values);
+    encoded.values.push_back(std::move(of_variable.bytes));
+    encoded.variables.push_back(of_variable.variable);
+  }
+  return encoded;
+}
+
+EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<SplatScalar> values) {
+  return encodeInRows(rowsOf(runs, values.size()), values);
+}
+
+void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,
+                    const GeometryArrays<float>& out) {
+  CURVISPLAT_CHECK_OP(out.size(), ==, brick.splats);
+  DecodedGeometry& decoded = scratchGeometry();
+  decodeNaming(brick, "geometry", [&] { decodeGeometryStream(brick.cell, brick.splats, bytes, decoded); });
+  const double size = root.cellSize(brick.cell.level);
+  const double interval = std::ldexp(size, -decoded.position_bits);
+  const float rounded = static_cast<float>(size);
+  const float inside = rounded < size ? rounded : std::nextafter(rounded, 0.0f);
+  toCoordinates(decoded.position[0], interval, inside, out.x);
+  toCoordinates(decoded.position[1], interval, inside, out.y);
+  toCoordinates(decoded.position[2], interval, inside, out.z);
+  toAxisFloats(decoded.axis[0], out.axis0);
+  toAxisFloats(decoded.axis[1], out.axis1);
+  toAxisFloats(decoded.axis[2], out.axis2);
+  toFloats(decoded.shear[0], out.shear10);
+  toFloats(decoded.shear[1], out.shear20);
+  toFloats(decoded.shear[2], out.shear21);
+  toFloats(decoded.weight, out.weight);
+  std::copy(decoded.half_cell.begin(), decoded.half_cell.end(), out.half_cell);
+}
+
+void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,
+                    SplatGeometry& out, std::vector<NodeRun>* runs) {
+  checkCount(brick);
+  out.resize(brick.splats);
+  decodeGeometry(root, brick, bytes, arraysOf(out));
+  if (runs) *runs = scratchGeometry().runs;
+}
+
+void decodeVariable(const Brick& brick, std::span<const std::byte> bytes, const VariableArrays<float>& out) {
+  CURVISPLAT_CHECK_OP(out.size(), ==, brick.splats);
+  decodeNaming(brick, "values", [&] { decodeValuesStream(brick.splats, bytes, out); });
+}
+
+void decodeVariable(const Brick& brick, const BrickVariable&, std::span<const std::byte> bytes,
+                    SplatVariable& out) {
+  checkCount(brick);
+  out.resize(brick.splats);
+  decodeVariable(brick, bytes, arraysOf(out));
+}
+
+BrickSplats decodeForMerging(const RootCube& root, const Brick& brick, std::span<const std::byte> geometry,
+                             std::span<const BrickVariable> variables,
+                             std::span<const std::vector<std::byte>> values) {
+  CURVISPLAT_CHECK_OP(variables.size(), ==, values.size());
+  DecodedGeometry& decoded = scratchGeometry();
+  decodeNaming(brick, "geometry", [&] { decodeGeometryStream(brick.cell, brick.splats, geometry, decoded); });
+  BrickSplats out;
+  out.cell = brick.cell;
+  out.runs = decoded.runs;
+  out.positions.resize(brick.splats);
+  out.splats.resize(brick.splats);
+  fillGeometry(root, decoded, out);
+  out.half_cells = decoded.half_cell;
+  SplatVariable variable;
+  for (size_t v = 0; v < values.size(); ++v) {
+    decodeVariable(brick, variables[v], values[v], variable);
+    auto& to = out.variables.emplace_back(brick.splats);
+    for (size_t n = 0; n < to.size(); ++n)
+      to[n] = {variable.mean[n],
+               {variable.slope0[n], variable.slope1[n], variable.slope2[n]},
+               variable.variance[n]};
+  }
+  return out;
+}
+
+}  // namespace curvisplat

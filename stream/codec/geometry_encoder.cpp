@@ -1,0 +1,231 @@
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "stream/codec/geometry_codec.h"
+#include "stream/codec/geometry_steps.h"
+#include "stream/codec/planes.h"
+#include "stream/model/half_cell.h"
+#include "stream/model/shape_extent.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr double kKernelDeviation = 0.44655;
+constexpr double kPositionError = 0.05;  // of the smallest standard deviation
+constexpr double kLargestShearCode = 1e9;
+
+int positionBits(const RootCube& root, const Cell& cell, double smallest_axis) {
+  const double interval = 2 * kPositionError * kKernelDeviation * smallest_axis / std::sqrt(3.0);
+  const double bits = std::ceil(std::log2(root.cellSize(cell.level) / interval));
+  const int lattice_bits = kPositionBits - static_cast<int>(cell.level);
+  return static_cast<int>(
+      std::clamp(bits, 1.0 * kLeastPositionBits, 1.0 * std::min(kMostPositionBits, lattice_bits)));
+}
+
+class GeometryEncoder {
+ public:
+  GeometryEncoder(const RootCube& root, const BrickSplats& brick, DecodedGeometry& decoded)
+      : root_(root), brick_(brick), decoded_(decoded), count_(brick.size()) {
+    decoded_.resize(count_);
+    codes_.resize(count_);
+    targets_.resize(count_);
+    residuals_.resize(count_);
+  }
+
+  std::vector<std::byte> encode() {
+    decoded_.runs = brick_.runs;
+    decoded_.rows = rowsOf(brick_.runs, count_);
+    sample_ = sampleOf(decoded_.rows);
+    encodeRuns();
+    encodePositions();
+    // Shapes are tried first as they should be. What was already added is taken back if they don't fit.
+    const PlaneWriter planes = planes_;
+    const size_t arrays = arrays_;
+    if (!encodeShapes()) {
+      planes_ = planes;
+      arrays_ = arrays;
+      encodeRawShapes();
+    }
+    encodeWeights();
+    encodeHalfCells();
+    return planes_.compress(std::as_bytes(std::span(&header_, 1)));
+  }
+
+ private:
+  void encodeRuns() {
+    std::vector<std::byte> bytes;
+    NodeRun before;
+    // Differences as zigzag varints: rows one after another cost a byte a number.
+    const auto put = [&](uint64_t now, uint64_t then) {
+      const uint64_t difference = now - then;
+      appendVarint(bytes, difference << 1 ^ (0 - (difference >> 63)));
+    };
+    for (const NodeRun& run : brick_.runs) {
+      put(run.block, before.block);
+      put(run.k, before.k);
+      put(run.j, before.j);
+      put(run.i, before.i);
+      put(run.count, before.count);
+      before = run;
+    }
+    header_.runs_bytes = static_cast<uint32_t>(bytes.size());
+    planes_.addBytes(bytes);
+  }
+
+  void encodePositions() {
+    const int bits = positionBits(root_, brick_.cell, smallestSingularValue(brick_.splats));
+    header_.position_bits = static_cast<uint8_t>(bits);
+    decoded_.position_bits = bits;
+    const int lattice_bits = kPositionBits - static_cast<int>(brick_.cell.level);
+    const uint64_t in_cell = (uint64_t{1} << lattice_bits) - 1;
+    for (int axis = 0; axis < 3; ++axis) {
+      auto& position = decoded_.position[axis];
+      for (size_t n = 0; n < count_; ++n)
+        position[n] =
+            static_cast<uint32_t>((brick_.positions[n].at[axis] & in_cell) >> (lattice_bits - bits));
+      addPredicted(position);
+    }
+  }
+
+  bool encodeShapes() {
+    LogTable axis0, axis1, volume;
+    if (!encodeLogs([](const Splat& s) { return std::log(s.axis[0]); }, kAxisStep, header_.log_axis0, axis0,
+                    decoded_.axis[0]) ||
+        !encodeLogs([](const Splat& s) { return std::log(s.axis[1]); }, kAxisStep, header_.log_axis1, axis1,
+                    decoded_.axis[1]) ||
+        !encodeLogs([](const Splat& s) { return std::log(s.axis[0] * s.axis[1] * s.axis[2]); }, kVolumeStep,
+                    header_.log_volume, volume, decoded_.axis[2]))
+      return false;
+    for (size_t n = 0; n < count_; ++n) decoded_.axis[2][n] /= decoded_.axis[0][n] * decoded_.axis[1][n];
+    return encodeShear(2, ShearSteps::l21, [&](size_t n) { return brick_.splats[n].shear[2]; }) &&
+           encodeShear(0, ShearSteps::l10, [&](size_t n) { return brick_.splats[n].shear[0]; }) &&
+           encodeShear(1, ShearSteps::l20, [&](size_t n) {
+             const auto& shear = brick_.splats[n].shear;
+             return shear[1] + shear[2] * (decoded_.shear[0][n] - shear[0]);
+           });
+  }
+
+  template <typename Log>
+  bool encodeLogs(Log log, double step, double& base, LogTable& table, std::vector<double>& out) {
+    double least = std::numeric_limits<double>::infinity(), most = -least;
+    for (size_t n = 0; n < count_; ++n) {
+      targets_[n] = log(brick_.splats[n]);
+      least = std::min(least, targets_[n]);
+      most = std::max(most, targets_[n]);
+    }
+    if (!((most - least) / step < kLargestLogCode)) return false;
+    base = least;
+    table = LogTable(least, step, static_cast<uint32_t>((most - least) / step) + 1);
+    for (size_t n = 0; n < count_; ++n) {
+      codes_[n] = static_cast<uint32_t>((targets_[n] - least) / step + 0.5);
+      out[n] = table[codes_[n]];
+    }
+    addPredicted(codes_);
+    return true;
+  }
+
+  template <typename StepOf, typename Target>
+  bool encodeShear(int which, StepOf step_of, Target target) {
+    auto& out = decoded_.shear[which];
+    bool fits = true;
+    for (size_t n = 0; n < count_; ++n) {
+      const double step = step_of(decoded_, n);
+      const double code = std::nearbyint(target(n) / step);
+      fits &= std::abs(code) < kLargestShearCode;  // false for NaN
+      const int32_t kept = fits ? static_cast<int32_t>(code) : 0;
+      codes_[n] = static_cast<uint32_t>(kept);
+      out[n] = kept * step;
+    }
+    addPredicted(codes_);
+    return fits;
+  }
+
+  void encodeRawShapes() {
+    header_.raw |= kRawShapes;
+    header_.log_axis0 = header_.log_axis1 = header_.log_volume = 0;
+    for (int n = 0; n < 3; ++n) addRaw(decoded_.axis[n], [n](const Splat& s) { return s.axis[n]; });
+    for (int n = 0; n < 3; ++n) addRaw(decoded_.shear[n], [n](const Splat& s) { return s.shear[n]; });
+  }
+
+  void encodeWeights() {
+    bool fits = true;
+    for (size_t n = 0; n < count_ && fits; ++n) {
+      const double volume = decoded_.axis[0][n] * decoded_.axis[1][n] * decoded_.axis[2][n];
+      const double ratio = brick_.splats[n].weight / volume;
+      if (std::abs(ratio - 1) < 0.5 * kWeightStep) {
+        codes_[n] = kVolumeWeight;
+        decoded_.weight[n] = volume;
+      } else if (brick_.splats[n].weight == 0) {
+        codes_[n] = kZeroWeight;
+        decoded_.weight[n] = 0;
+      } else {
+        const double steps = std::nearbyint(std::log(ratio) / kWeightStep);
+        fits = std::abs(steps) <= kLargestWeightCode;
+        const int kept = fits ? static_cast<int>(steps) : 0;
+        codes_[n] = kept == 0 ? kVolumeWeight : zigzag(static_cast<uint32_t>(kept)) + 1;
+        decoded_.weight[n] = kept == 0 ? volume : volume * ratioTable()[kept + kLargestWeightCode];
+      }
+    }
+    if (fits) {
+      header_.arrays[arrays_++] = {Predictor::none, planes_.add(codes_)};
+    } else {
+      header_.raw |= kRawWeights;
+      addRaw(decoded_.weight, [](const Splat& s) { return s.weight; });
+    }
+  }
+
+  void encodeHalfCells() {
+    const auto& half_cells = brick_.half_cells;
+    std::fill(decoded_.half_cell.begin(), decoded_.half_cell.end(), kNoBorder);
+    if (std::all_of(half_cells.begin(), half_cells.end(), [](uint32_t half) { return half == kNoBorder; }))
+      return;
+    header_.raw |= kHalfCells;
+    decoded_.half_cell = half_cells;
+    for (int shift = 0; shift < 32; shift += 8) {
+      for (size_t n = 0; n < count_; ++n) codes_[n] = half_cells[n] >> shift & 0xff;
+      addPredicted(codes_);
+    }
+  }
+
+  void addPredicted(std::span<const uint32_t> values) {
+    const Predictor predictor = bestPredictor(sample_, values);
+    predictRows(predictor, decoded_.rows, values.data(), [&](uint32_t n, uint32_t predicted) {
+      residuals_[n] = zigzag(values[n] - predicted);
+      return values[n];
+    });
+    header_.arrays[arrays_++] = {predictor, planes_.add(residuals_)};
+  }
+
+  template <typename Get>
+  void addRaw(std::vector<double>& out, Get get) {
+    for (int shift : {0, 32}) {
+      for (size_t n = 0; n < count_; ++n) {
+        out[n] = get(brick_.splats[n]);
+        codes_[n] = static_cast<uint32_t>(std::bit_cast<uint64_t>(out[n]) >> shift);
+      }
+      addPredicted(codes_);
+    }
+  }
+
+  const RootCube& root_;
+  const BrickSplats& brick_;
+  DecodedGeometry& decoded_;
+  const size_t count_;
+  GeometryHeader header_{};
+  PlaneWriter planes_;
+  size_t arrays_ = 0;
+  std::vector<Row> sample_;
+  std::vector<uint32_t> codes_, residuals_;
+  std::vector<double> targets_;
+};
+
+}  // namespace
+
+std::vector<std::byte> encodeGeometryStream(const RootCube& root, const BrickSplats& brick,
+                                            DecodedGeometry& decoded) {
+  return GeometryEncoder(root, brick, decoded).encode();
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,137 @@
+#include "stream/codec/prediction.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <tuple>
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kSampleSplats = 4096;
+constexpr uint32_t kSampleRow = 256;  // longest piece of a row in a sample
+
+auto rowKey(const NodeRun& run) {
+  return std::tuple(run.block, run.k, run.j);
+}
+
+bool inGridOrder(std::span<const NodeRun> runs) {
+  for (size_t n = 1; n < runs.size(); ++n) {
+    const NodeRun &a = runs[n - 1], &b = runs[n];
+    if (rowKey(b) < rowKey(a) || (rowKey(a) == rowKey(b) && b.i < a.i + a.count)) return false;
+  }
+  return true;
+}
+
+/// Cuts runs into rows. `starts[r]` is the first splat of run r.
+class RowCutter {
+ public:
+  RowCutter(std::span<const NodeRun> runs, std::vector<Row>& rows) : runs_(runs), rows_(rows) {
+    starts_.reserve(runs.size());
+    uint32_t start = 0;
+    for (const NodeRun& run : runs) {
+      starts_.push_back(start);
+      start += static_cast<uint32_t>(run.count);
+    }
+  }
+
+  void cut(size_t r) {
+    const NodeRun& run = runs_[r];
+    const bool along_j = run.j > 0 && cutBelow(r, {run.block, run.k, run.j - 1});
+    const bool along_k = !along_j && run.k > 0 && cutBelow(r, {run.block, run.k - 1, run.j});
+    if (!along_j && !along_k) rows_.push_back({starts_[r], static_cast<uint32_t>(run.count), kNoRow});
+  }
+
+ private:
+  using Key = std::tuple<uint32_t, uint64_t, uint64_t>;
+
+  /// Cuts run r by the runs of the row `above`. False, and nothing done, if none of them has its i.
+  bool cutBelow(size_t r, const Key& above) {
+    const NodeRun& run = runs_[r];
+    const uint64_t end = run.i + run.count;
+    auto it = std::lower_bound(runs_.begin(), runs_.begin() + static_cast<ptrdiff_t>(r),
+                               std::pair(above, run.i), [](const NodeRun& a, const auto& key_and_i) {
+                                 return std::pair(Key(rowKey(a)), a.i + a.count) <=
+                                        std::pair(key_and_i.first, key_and_i.second);
+                               });
+    uint64_t at = run.i;
+    const auto push = [&](uint64_t until, uint32_t up) {
+      if (until > at)
+        rows_.push_back(
+            {starts_[r] + static_cast<uint32_t>(at - run.i), static_cast<uint32_t>(until - at), up});
+      at = until;
+    };
+    for (; it != runs_.end() && Key(rowKey(*it)) == above && it->i < end; ++it) {
+      if (at < it->i) push(it->i, kNoRow);
+      const size_t up_run = static_cast<size_t>(it - runs_.begin());
+      push(std::min(end, it->i + it->count), starts_[up_run] + static_cast<uint32_t>(at - it->i));
+    }
+    if (at == run.i) return false;
+    push(end, kNoRow);
+    return true;
+  }
+
+  std::span<const NodeRun> runs_;
+  std::vector<Row>& rows_;
+  std::vector<uint32_t> starts_;
+};
+
+}  // namespace
+
+std::vector<Row> rowsOf(std::span<const NodeRun> runs, size_t count) {
+  std::vector<Row> rows;
+  if (runs.empty()) {
+    rows.push_back({0, static_cast<uint32_t>(count), kNoRow});
+    return rows;
+  }
+  RowCutter cutter(runs, rows);
+  if (inGridOrder(runs)) {
+    for (size_t r = 0; r < runs.size(); ++r) cutter.cut(r);
+  } else {
+    uint32_t start = 0;
+    for (const NodeRun& run : runs) {
+      rows.push_back({start, static_cast<uint32_t>(run.count), kNoRow});
+      start += static_cast<uint32_t>(run.count);
+    }
+  }
+  return rows;
+}
+
+std::vector<Row> sampleOf(std::span<const Row> rows) {
+  size_t pieces = 0;
+  for (const Row& row : rows) pieces += (row.count + kSampleRow - 1) / kSampleRow;
+  const size_t total = rows.empty() ? 0 : rows.back().first + rows.back().count;
+  const size_t stride = std::max<size_t>(1, total / kSampleSplats);
+  std::vector<Row> sample;
+  sample.reserve(pieces / stride + 1);
+  size_t piece = 0;
+  for (const Row& row : rows) {
+    for (uint32_t from = 0; from < row.count; from += kSampleRow) {
+      if (piece++ % stride != 0) continue;
+      sample.push_back({row.first + from, std::min(kSampleRow, row.count - from),
+                        row.above == kNoRow ? kNoRow : row.above + from});
+    }
+  }
+  return sample;
+}
+
+Predictor bestPredictor(std::span<const Row> sample, std::span<const uint32_t> values) {
+  Predictor best = Predictor::none;
+  uint64_t fewest = std::numeric_limits<uint64_t>::max();
+  for (int p = 0; p < kPredictors; ++p) {
+    const auto predictor = static_cast<Predictor>(p);
+    uint64_t bits = 0;
+    predictRows(predictor, sample, values.data(), [&](uint32_t n, uint32_t predicted) {
+      bits += static_cast<uint64_t>(std::bit_width(zigzag(values[n] - predicted)));
+      return values[n];
+    });
+    if (bits < fewest) {
+      best = predictor;
+      fewest = bits;
+    }
+  }
+  return best;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,193 @@
+#include "stream/codec/values_codec.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "stream/base/error.h"
+#include "stream/codec/planes.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr double kMeanSteps = 65535;
+constexpr double kSlopeSteps = 8192;
+constexpr double kDeviationSteps = 4096;
+constexpr size_t kMostRowBytes = 10;  // two varints of 32 bits
+
+/// What codes stand for; encoder and decoder share it.
+struct Scale {
+  explicit Scale(const ValuesHeader& header)
+      : lower(header.lower),
+        mean_step((double{header.upper} - double{header.lower}) / kMeanSteps),
+        slope_step(header.slope_step),
+        deviation_step(header.deviation_step) {}
+
+  // Signed conversions are the ones that vectorise.
+  float mean(uint32_t code) const {
+    return static_cast<float>(lower + static_cast<int32_t>(code) * mean_step);
+  }
+  float slope(uint32_t code) const { return bounded(static_cast<int32_t>(code) * slope_step); }
+  float variance(uint32_t code) const {
+    const double deviation = static_cast<int32_t>(code) * deviation_step;
+    return bounded(deviation * deviation);
+  }
+  /// As a float: squares of scalars above 1e19 are larger than any.
+  static float bounded(double value) {
+    constexpr double kLargest = std::numeric_limits<float>::max();
+    return static_cast<float>(std::clamp(value, -kLargest, kLargest));
+  }
+
+  double lower, mean_step, slope_step, deviation_step;
+};
+
+class ValuesEncoder {
+ public:
+  ValuesEncoder(std::span<const Row> rows, std::span<SplatScalar> values)
+      : rows_(rows), values_(values), sample_(sampleOf(rows)), residuals_(values.size()) {
+    for (auto& codes : codes_) codes.resize(values.size());
+  }
+
+  std::vector<std::byte> encode() {
+    findScale();
+    quantise();
+    bool across_rows = false;
+    std::array<Predictor, 5> predictors;
+    for (size_t a = 0; a < codes_.size(); ++a) {
+      predictors[a] = bestPredictor(sample_, codes_[a]);
+      across_rows |= predictors[a] >= Predictor::above;
+    }
+    const Row whole{0, static_cast<uint32_t>(values_.size()), kNoRow};
+    const std::span<const Row> rows = across_rows ? rows_ : std::span(&whole, 1);
+    PlaneWriter planes;
+    if (across_rows) addRows(planes);
+    for (size_t a = 0; a < codes_.size(); ++a) {
+      const std::vector<uint32_t>& codes = codes_[a];
+      predictRows(predictors[a], rows, codes.data(), [&](uint32_t n, uint32_t predicted) {
+        residuals_[n] = zigzag(codes[n] - predicted);
+        return codes[n];
+      });
+      header_.arrays[a] = {predictors[a], planes.add(residuals_)};
+    }
+    return planes.compress(std::as_bytes(std::span(&header_, 1)));
+  }
+
+ private:
+  void findScale() {
+    double lower = std::numeric_limits<double>::infinity(), upper = -lower, span = 0;
+    for (const SplatScalar& value : values_) {
+      lower = std::min(lower, value.mean);
+      upper = std::max(upper, value.mean);
+      span = std::max({span, std::abs(value.slope.x), std::abs(value.slope.y), std::abs(value.slope.z),
+                       std::sqrt(value.variance)});
+    }
+    span = std::max(span, upper - lower);
+    header_.lower = static_cast<float>(lower);
+    header_.upper = static_cast<float>(upper);
+    header_.slope_step = span / kSlopeSteps;
+    header_.deviation_step = span / kDeviationSteps;
+  }
+
+  void quantise() {
+    const Scale scale(header_);
+    const auto over = [](double step) { return step > 0 ? 1 / step : 0.0; };
+    const double means = over(scale.mean_step), slopes = over(scale.slope_step),
+                 deviations = over(scale.deviation_step);
+    for (size_t n = 0; n < values_.size(); ++n) {
+      SplatScalar& value = values_[n];
+      codes_[0][n] =
+          static_cast<uint32_t>(std::clamp((value.mean - scale.lower) * means + 0.5, 0.0, kMeanSteps));
+      value.mean = scale.mean(codes_[0][n]);
+      for (int c = 0; c < 3; ++c) {
+        codes_[1 + c][n] = static_cast<uint32_t>(static_cast<int32_t>(std::lrint(value.slope[c] * slopes)));
+        value.slope[c] = scale.slope(codes_[1 + c][n]);
+      }
+      codes_[4][n] = static_cast<uint32_t>(std::sqrt(value.variance) * deviations + 0.5);
+      value.variance = scale.variance(codes_[4][n]);
+    }
+  }
+
+  void addRows(PlaneWriter& planes) {
+    std::vector<std::byte> bytes;
+    for (const Row& row : rows_) {
+      appendVarint(bytes, row.count);
+      appendVarint(bytes, row.above == kNoRow ? 0 : row.first - row.above);
+    }
+    header_.rows_bytes = static_cast<uint32_t>(bytes.size());
+    planes.addBytes(bytes);
+  }
+
+  std::span<const Row> rows_;
+  std::span<SplatScalar> values_;
+  std::vector<Row> sample_;
+  ValuesHeader header_{};
+  std::array<std::vector<uint32_t>, 5> codes_;
+  std::vector<uint32_t> residuals_;
+};
+
+std::vector<Row> rowsFrom(std::span<const std::byte> bytes, uint32_t count) {
+  if (bytes.empty()) return {{0, count, kNoRow}};
+  std::vector<Row> rows;
+  uint32_t first = 0;
+  while (!bytes.empty()) {
+    const uint64_t length = takeVarint(bytes);
+    const uint64_t distance = takeVarint(bytes);
+    if (length == 0 || length > count - first || distance > first)
+      throw Error("row {} of its values is impossible", rows.size());
+    const uint32_t above = distance == 0 ? kNoRow : first - static_cast<uint32_t>(distance);
+    rows.push_back({first, static_cast<uint32_t>(length), above});
+    first += static_cast<uint32_t>(length);
+  }
+  if (first != count) throw Error("its rows hold {} values, not {}", first, count);
+  return rows;
+}
+
+/// One comparison an element, no branches.
+bool allFinite(std::span<const float> values) {
+  bool fine = true;
+  for (float value : values) fine &= std::abs(value) <= std::numeric_limits<float>::max();
+  return fine;
+}
+
+}  // namespace
+
+std::vector<std::byte> encodeValuesStream(std::span<const Row> rows, std::span<SplatScalar> values) {
+  return ValuesEncoder(rows, values).encode();
+}
+
+void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, const VariableArrays<float>& out) {
+  ValuesHeader header;
+  if (bytes.size() < sizeof header) throw Error("it has {} bytes, fewer than its header", bytes.size());
+  std::memcpy(&header, bytes.data(), sizeof header);
+  if (header.rows_bytes > kMostRowBytes * count) throw Error("its header is impossible");
+  size_t unpacked = header.rows_bytes;
+  for (const ArrayCode& array : header.arrays) {
+    if (!isPossible(array)) throw Error("its header is impossible");
+    unpacked += size_t{array.planes} * count;
+  }
+  PlaneReader planes(bytes.subspan(sizeof header), unpacked);
+  const std::vector<Row> rows = rowsFrom(planes.bytes(header.rows_bytes), count);
+
+  thread_local std::vector<uint32_t> scratch;
+  scratch.resize(count);
+  uint32_t* codes = scratch.data();
+  const Scale scale(header);
+  const auto decode = [&](size_t array, float* values, auto value) {
+    planes.values(header.arrays[array].planes, scratch);
+    for (size_t n = 0; n < count; ++n) codes[n] = unzigzag(codes[n]);
+    if (header.arrays[array].predictor != Predictor::none)
+      predictRows(header.arrays[array].predictor, rows, codes,
+                  [codes](uint32_t n, uint32_t predicted) { return codes[n] += predicted; });
+    for (size_t n = 0; n < count; ++n) values[n] = value(codes[n]);
+    if (!allFinite({values, count})) throw Error("a value in it is not finite");
+  };
+  const auto slope = [&](uint32_t code) { return scale.slope(code); };
+  decode(0, out.mean, [&](uint32_t code) { return scale.mean(code); });
+  decode(1, out.slope0, slope);
+  decode(2, out.slope1, slope);
+  decode(3, out.slope2, slope);
+  decode(4, out.variance, [&](uint32_t code) { return scale.variance(code); });
+}
+
+}  // namespace curvisplat

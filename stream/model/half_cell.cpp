@@ -1,0 +1,76 @@
+#include "stream/model/half_cell.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
+#include <numbers>
+
+namespace curvisplat {
+namespace {
+
+// Bits 0-1: how many axes; bit 2: the third is against the rotation's; bits 3-4: which of the quaternion's
+// numbers, w x y z, is the largest and left out; then 8 bits for each of the others.
+constexpr uint32_t kReversed = 4;
+constexpr double kLargest = std::numbers::sqrt2 / 2;  // that a number which is not the largest can be
+constexpr double kSteps = 255;
+
+glm::dquat rotationOf(std::span<const glm::dvec3> inward) {
+  if (inward.size() == 1) {
+    // The shortest from the first axis: neighbours have similar ones.
+    const glm::dvec3& q = inward[0];
+    return q.x > -0.9999 ? glm::normalize(glm::dquat(1 + q.x, 0, -q.z, q.y)) : glm::dquat(0, 0, 0, 1);
+  }
+  return glm::normalize(glm::quat_cast(glm::dmat3(inward[0], inward[1], glm::cross(inward[0], inward[1]))));
+}
+
+}  // namespace
+
+uint32_t packHalfCell(std::span<const glm::dvec3> inward) {
+  if (inward.empty()) return kNoBorder;
+  const glm::dquat rotation = rotationOf(inward);
+  std::array<double, 4> numbers{rotation.w, rotation.x, rotation.y, rotation.z};
+  uint32_t largest = 0;
+  for (uint32_t n = 1; n < 4; ++n)
+    if (std::abs(numbers[n]) > std::abs(numbers[largest])) largest = n;
+  const double sign = numbers[largest] < 0 ? -1 : 1;
+  auto code = static_cast<uint32_t>(inward.size()) | largest << 3;
+  if (inward.size() == 3 && glm::dot(glm::cross(inward[0], inward[1]), inward[2]) < 0) code |= kReversed;
+  int shift = 8;
+  for (uint32_t n = 0; n < 4; ++n) {
+    if (n == largest) continue;
+    const double unit = std::clamp(0.5 + 0.5 * sign * numbers[n] / kLargest, 0.0, 1.0);
+    code |= static_cast<uint32_t>(unit * kSteps + 0.5) << shift;
+    shift += 8;
+  }
+  return code;
+}
+
+InwardAxes inwardAxes(uint32_t half_cell) {
+  InwardAxes inward;
+  inward.count = static_cast<int>(half_cell & 3);
+  if (inward.count == 0) return inward;
+  const uint32_t largest = half_cell >> 3 & 3;
+  std::array<float, 4> numbers{};
+  float sum = 0;
+  int shift = 8;
+  for (uint32_t n = 0; n < 4; ++n) {
+    if (n == largest) continue;
+    numbers[n] = static_cast<float>(((half_cell >> shift & 0xff) / kSteps * 2 - 1) * kLargest);
+    sum += numbers[n] * numbers[n];
+    shift += 8;
+  }
+  numbers[largest] = std::sqrt(std::max(0.0f, 1 - sum));
+  const glm::mat3 frame =
+      glm::mat3_cast(glm::normalize(glm::quat(numbers[0], numbers[1], numbers[2], numbers[3])));
+  inward.axis = {frame[0], frame[1], half_cell & kReversed ? -frame[2] : frame[2]};
+  return inward;
+}
+
+bool isPossibleHalfCell(uint32_t half_cell) {
+  const bool whole = half_cell == kNoBorder;
+  return whole || ((half_cell & 3) != 0 && (half_cell & 0xe0) == 0);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,74 @@
+#include "stream/model/shape_extent.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "stream/model/half_cell.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr double kRounding = 1e-6;
+
+/// The running maximum of the largest eigenvalues of L Lᵀ, L lower triangular (six entries).
+class LargestEigenvalue {
+ public:
+  void add(double l00, double l10, double l11, double l20, double l21, double l22) {
+    const double xx = l00 * l00, xy = l10 * l00, yy = l10 * l10 + l11 * l11;
+    const double xz = l20 * l00, yz = l20 * l10 + l21 * l11, zz = l20 * l20 + l21 * l21 + l22 * l22;
+    const double q = (xx + yy + zz) / 3;
+    const double a = xx - q, b = yy - q, c = zz - q;
+    const double p = std::sqrt((a * a + b * b + c * c + 2 * (xy * xy + xz * xz + yz * yz)) / 6);
+    // The eigenvalues are q + 2 p cos(angle + 2/3 pi n): q + 2 p bounds them and rules out most.
+    if (q + 2 * p <= best_) return;
+    double largest = q;
+    if (p > 0) {
+      const double s = 1 / p;
+      const double A = a * s, B = b * s, C = c * s, D = xy * s, E = xz * s, F = yz * s;
+      const double half_determinant = 0.5 * (A * (B * C - F * F) - D * (D * C - F * E) + E * (D * F - B * E));
+      largest = q + 2 * p * std::cos(std::acos(std::clamp(half_determinant, -1.0, 1.0)) / 3);
+    }
+    best_ = std::max(best_, largest);
+  }
+  double value() const { return best_ * (1 + kRounding); }
+
+ private:
+  double best_ = 0;
+};
+
+}  // namespace
+
+double largestSingularValue(std::span<const Splat> splats) {
+  double unit = 0;  // scaled by it, so that neither tiny nor huge units under- or overflow
+  for (const Splat& splat : splats) unit = std::max({unit, splat.axis[0], splat.axis[1], splat.axis[2]});
+  const double scale = 1 / unit;
+  LargestEigenvalue largest;
+  for (const Splat& splat : splats) {
+    const double a0 = splat.axis[0] * scale, a1 = splat.axis[1] * scale, a2 = splat.axis[2] * scale;
+    largest.add(a0, a0 * splat.shear[0], a1, a0 * splat.shear[1], a1 * splat.shear[2], a2);
+  }
+  return unit * std::sqrt(largest.value());
+}
+
+double smallestSingularValue(std::span<const Splat> splats) {
+  double unit = std::numeric_limits<double>::infinity();
+  for (const Splat& splat : splats) unit = std::min({unit, splat.axis[0], splat.axis[1], splat.axis[2]});
+  // 1 / the largest singular value of A⁻¹, from the triangular inverse: exact where S⁻¹ would not be.
+  LargestEigenvalue largest;
+  for (const Splat& splat : splats) {
+    const double b0 = unit / splat.axis[0], b1 = unit / splat.axis[1], b2 = unit / splat.axis[2];
+    const double l10 = splat.shear[0], l20 = splat.shear[1], l21 = splat.shear[2];
+    largest.add(b0, -b1 * l10, b1, b2 * (l10 * l21 - l20), -b2 * l21, b2);
+  }
+  return unit / std::sqrt(largest.value());
+}
+
+double largestReach(std::span<const Splat> splats, std::span<const uint32_t> half_cells) {
+  constexpr double kKernelRadius = 1.556228;
+  const bool any_half = std::any_of(half_cells.begin(), half_cells.end(),
+                                    [](uint32_t half_cell) { return half_cell != kNoBorder; });
+  return (kKernelRadius + (any_half ? kBorderReach : 0.0)) * largestSingularValue(splats);
+}
+
+}  // namespace curvisplat

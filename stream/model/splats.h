@@ -1,0 +1,123 @@
+// Splats as the pipeline passes them on: structures of arrays in float, relative to one brick.
+//
+//   shape    S = A Aᵀ, A lower triangular with positive diagonal:
+//
+//                | a0                 |      a = axis0..2    (LDLᵀ: D = diag(a²))
+//            A = | a0 l10  a1         |      l = shear10, shear20, shear21
+//                | a0 l20  a1 l21  a2 |
+//
+//            The kernel's unit sphere maps to {A u : |u| <= 1}. √det S = a0 a1 a2. S is never inverted: A⁻¹
+//            is a forward substitution.
+//   weight   V: the volume of the piece of space that the splat stands for. |det J| = a0 a1 a2 for a node's
+//   cell,
+//            other where an axis was floored (degenerate cells) or splats were merged.
+//   mean     f, the scalar at the centre
+//   slope    w = A⁻¹ h, the change of the scalar along A's columns: f(x) = f + w · A⁻¹(x - μ). Design section
+//   3's
+//            h is A w, so hᵀS⁻¹h = |w|². For a node w is the computational gradient ∇_c f in a rotated frame:
+//            no division by a small cell.
+//   variance r >= 0, the residual in-cell variance: design section 3's t is |w|²/12 + r. Zero for a node's
+//   cell.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+#include <type_traits>
+#include <vector>
+
+#include "stream/model/octree.h"
+
+namespace curvisplat {
+
+/// `count` nodes that follow one another along i in one block: nodes (i..i+count-1, j, k).
+struct NodeRun {
+  uint32_t block = 0;
+  uint64_t i = 0, j = 0, k = 0;
+  uint64_t count = 0;
+  bool operator==(const NodeRun&) const = default;
+};
+
+/// One splat in double precision, as conversion computes and merges it. World units.
+struct Splat {
+  glm::dvec3 position{0.0};
+  std::array<double, 3> axis{1, 1, 1};   // a0, a1, a2: > 0
+  std::array<double, 3> shear{0, 0, 0};  // l10, l20, l21
+  double weight = 0;
+
+  /// A, in GLM's column-major convention: factor()[column][row].
+  glm::dmat3 factor() const {
+    return {axis[0], axis[0] * shear[0], axis[0] * shear[1], 0, axis[1], axis[1] * shear[2], 0, 0, axis[2]};
+  }
+};
+
+/// One scalar of one splat, in double precision.
+struct SplatScalar {
+  double mean = 0;
+  glm::dvec3 slope{0.0};
+  double variance = 0;
+};
+
+/// The geometry of a brick's splats, decoded. All arrays have size() elements.
+struct SplatGeometry {
+  std::vector<float> x, y, z;              // world units from the minimum corner of the brick's cell, >= 0
+  std::vector<float> axis0, axis1, axis2;  // world units
+  std::vector<float> shear10, shear20, shear21;
+  std::vector<float> weight;        // world units cubed
+  std::vector<uint32_t> half_cell;  // stream/half_cell.h: kNoBorder but for nodes at a border
+
+  size_t size() const { return x.size(); }
+  void resize(size_t count);
+};
+
+/// The geometry's arrays, borrowed: where a decoder writes (T = float) or a projector reads (T = const
+/// float).
+template <typename T>
+struct GeometryArrays {
+  T *x, *y, *z;
+  T *axis0, *axis1, *axis2;
+  T *shear10, *shear20, *shear21;
+  T* weight;
+  std::conditional_t<std::is_const_v<T>, const uint32_t, uint32_t>* half_cell;
+  size_t count;
+
+  size_t size() const { return count; }
+  operator GeometryArrays<const float>() const requires(!std::is_const_v<T>) {
+    return {x, y, z, axis0, axis1, axis2, shear10, shear20, shear21, weight, half_cell, count};
+  }
+};
+
+/// One variable of a brick's splats, decoded. The same order as the geometry.
+struct SplatVariable {
+  std::vector<float> mean;
+  std::vector<float> slope0, slope1, slope2;  // the scalar's unit, along the columns of A
+  std::vector<float> variance;                // the scalar's unit squared
+
+  size_t size() const { return mean.size(); }
+  void resize(size_t count);
+};
+
+/// As GeometryArrays.
+template <typename T>
+struct VariableArrays {
+  T* mean;
+  T *slope0, *slope1, *slope2;
+  T* variance;
+  size_t count;
+
+  size_t size() const { return count; }
+  operator VariableArrays<const float>() const requires(!std::is_const_v<T>) {
+    return {mean, slope0, slope1, slope2, variance, count};
+  }
+};
+
+/// To write into; what they borrow lives until the next resize().
+GeometryArrays<float> arraysOf(SplatGeometry& geometry);
+VariableArrays<float> arraysOf(SplatVariable& variable);
+/// To read from.
+GeometryArrays<const float> arraysOf(const SplatGeometry& geometry);
+VariableArrays<const float> arraysOf(const SplatVariable& variable);
+
+}  // namespace curvisplat

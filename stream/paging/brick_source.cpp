@@ -1,0 +1,299 @@
+#include "stream/paging/brick_source.h"
+
+#include <exception>
+#include <glm/common.hpp>
+#include <unordered_set>
+#include <utility>
+
+#include "stream/base/check.h"
+#include "stream/base/stage_timer.h"
+
+namespace curvisplat {
+namespace {
+
+/// Copies the splats of `kept` to the front of the arrays, in their order.
+void compact(std::span<const uint32_t> kept, SplatGeometry& g, SplatVariable& v) {
+  for (auto* array : {&g.x, &g.y, &g.z, &g.axis0, &g.axis1, &g.axis2, &g.shear10, &g.shear20, &g.shear21,
+                      &g.weight, &v.mean, &v.slope0, &v.slope1, &v.slope2, &v.variance})
+    for (size_t n = 0; n < kept.size(); ++n) (*array)[n] = (*array)[kept[n]];
+  for (size_t n = 0; n < kept.size(); ++n) g.half_cell[n] = g.half_cell[kept[n]];
+  g.resize(kept.size());
+  v.resize(kept.size());
+}
+
+std::vector<uint32_t> bricksOf(std::span<const BrickPart> parts) {
+  std::vector<uint32_t> bricks;
+  bricks.reserve(parts.size());
+  for (const BrickPart& part : parts) bricks.push_back(part.brick);
+  return bricks;
+}
+
+}  // namespace
+
+BrickSource::BrickSource(const CacheReader& cache, size_t variable, const PagerOptions& pager,
+                         uint64_t cache_bytes)
+    : cache_(cache), variable_(variable), cached_(cache_bytes), pager_(cache, variable, pager) {}
+
+void BrickSource::start(std::span<const BrickPart> parts, BrickPager::Unneeded unneeded) {
+  parts_.assign(parts.begin(), parts.end());
+  const std::vector<uint32_t> bricks = bricksOf(parts);
+  cached_.beginTurn(bricks);
+  pins_.clear();
+  misses_.clear();
+  shared_.clear();
+  std::unordered_map<uint32_t, uint32_t> place;  // of a brick among those read
+  std::vector<uint32_t> to_read;
+  for (const uint32_t brick : bricks) {
+    const auto [found, first] = place.emplace(brick, static_cast<uint32_t>(to_read.size()));
+    pins_.push_back(cached_.find(brick));
+    misses_.push_back(found->second);
+    if (pins_.back()) continue;
+    if (first)
+      to_read.push_back(brick);
+    else
+      ++shared_[brick].left;
+  }
+  for (auto& [brick, shared] : shared_) ++shared.left;  // the first
+  {
+    const std::lock_guard lock(sharing_);
+    stopped_ = false;
+  }
+  before_ = pager_.statistics();
+  reads_ = to_read.size();
+  hits_ = place.size() - reads_;
+  pager_.start(std::move(to_read), std::move(unneeded));
+}
+
+std::optional<BrickSource::Splats> BrickSource::take(uint64_t sequence, Scratch& scratch) {
+  CURVISPLAT_CHECK_OP(sequence, <, parts_.size());
+  const BrickPart& part = parts_[sequence];
+  if (pins_[sequence]) return splatsOf(*std::exchange(pins_[sequence], {}), part);
+  const auto shared = shared_.find(part.brick);
+  return shared == shared_.end() ? read(part, misses_[sequence], scratch)
+                                 : takeShared(shared->second, part, misses_[sequence], scratch);
+}
+
+void BrickSource::pass(uint64_t sequence) {
+  if (std::exchange(pins_[sequence], {})) return;
+  if (const auto found = shared_.find(parts_[sequence].brick); found != shared_.end()) {
+    Shared& shared = found->second;
+    const std::lock_guard lock(sharing_);
+    if (--shared.left == 0) shared.pin.reset();
+    if (shared.state != Shared::State::untouched) return;
+    shared.state = Shared::State::alone;  // whoever wants it all the same
+  }
+  pager_.take(misses_[sequence]);
+}
+
+std::optional<BrickSource::Splats> BrickSource::takeShared(Shared& shared, const BrickPart& part,
+                                                           uint64_t miss, Scratch& scratch) {
+  using State = Shared::State;
+  std::unique_lock lock(sharing_);
+  const bool last = --shared.left == 0;
+  if (shared.state == State::untouched) {
+    shared.state = State::coming;
+    lock.unlock();
+    std::optional<Splats> splats;
+    std::exception_ptr failure;
+    try {
+      splats = read(part, miss, scratch);
+    } catch (...) {
+      failure = std::current_exception();
+    }
+    lock.lock();
+    if (splats && splats->pin) shared.pin = cached_.find(part.brick);
+    shared.state = shared.pin ? State::kept : State::alone;
+    shared_changed_.notify_all();
+    if (failure) std::rethrow_exception(failure);
+    return splats;
+  }
+  {
+    const StageTimer timer(scratch.waited_s);
+    shared_changed_.wait(lock, [&] { return stopped_ || shared.state != State::coming; });
+  }
+  if (stopped_) return {};
+  if (shared.state == State::alone) {
+    lock.unlock();
+    return readAlone(part, scratch);
+  }
+  return splatsOf(last ? *std::exchange(shared.pin, {}) : *cached_.find(part.brick), part);
+}
+
+std::optional<BrickSource::Splats> BrickSource::read(const BrickPart& part, uint64_t miss, Scratch& scratch) {
+  std::optional<PagedBrick> bytes = await(miss, scratch);
+  if (!bytes) return {};
+  if (bytes->isLeftOut()) {
+    scratch.geometry.resize(0);
+    scratch.values.resize(0);
+    return Splats{arraysOf(std::as_const(scratch.geometry)), arraysOf(std::as_const(scratch.values)),
+                  SplatRanges(Brick(), kAllOctants), cache_.bricks()[part.brick].cell, std::nullopt};
+  }
+  if (!bytes->readable()) {
+    // The read may have failed for a neighbour's sake. If not, this says what is wrong.
+    bytes.reset();
+    return readAlone(part, scratch);
+  }
+  const uint32_t splats = cache_.bricks()[part.brick].splats;
+  if (auto room = cached_.makeRoom(part.brick, splats)) {
+    decode(part.brick, *bytes, room->geometry(), room->values(), scratch);
+    return splatsOf(std::move(*room).keep(), part);
+  }
+  scratch.geometry.resize(splats);
+  scratch.values.resize(splats);
+  decode(part.brick, *bytes, arraysOf(scratch.geometry), arraysOf(scratch.values), scratch);
+  return splatsOf(scratch, part);
+}
+
+/// Without the pager.
+BrickSource::Splats BrickSource::readAlone(const BrickPart& part, Scratch& scratch) const {
+  cache_.readGeometry(part.brick, scratch.geometry, nullptr, &scratch.times);
+  cache_.readVariable(part.brick, variable_, scratch.values, &scratch.times);
+  return splatsOf(scratch, part);
+}
+
+BrickSource::Splats BrickSource::splatsOf(BrickCache::Pin pin, const BrickPart& part) const {
+  const Brick& brick = cache_.bricks()[part.brick];
+  return {pin.geometry(), pin.values(), SplatRanges(brick, part.octants), brick.cell, std::move(pin)};
+}
+
+BrickSource::Splats BrickSource::splatsOf(const Scratch& scratch, const BrickPart& part) const {
+  const Brick& brick = cache_.bricks()[part.brick];
+  return {arraysOf(scratch.geometry), arraysOf(scratch.values), SplatRanges(brick, part.octants), brick.cell,
+          std::nullopt};
+}
+
+std::optional<PagedBrick> BrickSource::await(uint64_t miss, Scratch& scratch) {
+  const StageTimer timer(scratch.waited_s);
+  return pager_.take(miss);
+}
+
+void BrickSource::decode(uint32_t brick, const PagedBrick& bytes, const GeometryArrays<float>& geometry,
+                         const VariableArrays<float>& values, Scratch& scratch) const {
+  cache_.decode(brick, bytes.geometry(), geometry, scratch.times);
+  cache_.decode(brick, variable_, bytes.values(), values, scratch.times);
+}
+
+BrickSource::Splats BrickSource::standIn(const BrickPart& part, Scratch& scratch) const {
+  const auto bricks = cache_.bricks();
+  Brick stored;  // what is in the scratch
+  stored.cell = bricks[part.brick].cell;
+  scratch.geometry.resize(0);
+  scratch.values.resize(0);
+  for (uint32_t ancestor = bricks[part.brick].parent; ancestor != kNoBrick;
+       ancestor = bricks[ancestor].parent) {
+    try {
+      cache_.readGeometry(ancestor, scratch.geometry, nullptr, &scratch.times);
+      cache_.readVariable(ancestor, variable_, scratch.values, &scratch.times);
+    } catch (const DamagedBrick&) {
+      scratch.geometry.resize(0);
+      scratch.values.resize(0);
+      continue;  // the next one, then
+    }
+    keepPart(part, ancestor, scratch);
+    stored.cell = bricks[ancestor].cell;
+    break;
+  }
+  stored.splats = static_cast<uint32_t>(scratch.geometry.size());
+  const SplatGeometry& geometry = scratch.geometry;
+  const SplatVariable& values = scratch.values;
+  return {arraysOf(geometry), arraysOf(values), SplatRanges(stored, kAllOctants), stored.cell, std::nullopt};
+}
+
+/// Of `ancestor` in the scratch, what stands for the space of `part`.
+void BrickSource::keepPart(const BrickPart& part, uint32_t ancestor, Scratch& scratch) const {
+  const auto bricks = cache_.bricks();
+  uint32_t below = part.brick;  // the ancestor's child that holds the brick
+  while (bricks[below].parent != ancestor) below = bricks[below].parent;
+  const auto octant = static_cast<uint8_t>(1 << bricks[below].cell.octantInParent());
+
+  // An ancestor farther up holds other bricks' space in the octant too.
+  const RootCube& root = cache_.manifest().root;
+  const Cell& cell = bricks[part.brick].cell;
+  const glm::vec3 lower(root.cellMin(cell) - root.cellMin(bricks[ancestor].cell));
+  const auto half = static_cast<float>(0.5 * root.cellSize(cell.level));
+  const SplatGeometry& g = scratch.geometry;
+  const auto stands = [&](uint32_t n) {
+    const glm::vec3 at = glm::floor((glm::vec3(g.x[n], g.y[n], g.z[n]) - lower) / half);
+    const auto inside = [](float halves) { return halves == 0 || halves == 1; };
+    if (!inside(at.x) || !inside(at.y) || !inside(at.z)) return false;
+    return (part.octants >> (int(at.x) | int(at.y) << 1 | int(at.z) << 2) & 1) != 0;
+  };
+  const bool all = part.whole() && below == part.brick;
+  std::vector<uint32_t> kept;
+  for (const SplatRange& range : SplatRanges(bricks[ancestor], octant))
+    for (uint32_t n = range.begin; n < range.end; ++n)
+      if (all || stands(n)) kept.push_back(n);
+  compact(kept, scratch.geometry, scratch.values);
+
+  // A cell that could not be split has several bricks; this one is a part of what is stood in for.
+  double of_cell = 0;
+  const Brick& above = bricks[bricks[part.brick].parent];
+  for (uint32_t child = above.first_child; child < above.first_child + above.child_count; ++child)
+    if (bricks[child].cell == cell) of_cell += bricks[child].splats;
+  const auto share = static_cast<float>(bricks[part.brick].splats / of_cell);
+  for (float& weight : scratch.geometry.weight) weight *= share;
+}
+
+void BrickSource::startPrefetch(std::span<const BrickPart> parts) {
+  const std::vector<uint32_t> bricks = bricksOf(parts);
+  cached_.beginTurn(bricks);
+  parts_.clear();
+  pins_.clear();
+  shared_.clear();
+  to_prefetch_.clear();
+  uint64_t bytes = 0;
+  std::unordered_set<uint32_t> seen;
+  for (const uint32_t brick : bricks) {
+    if (!seen.insert(brick).second) continue;
+    bytes += BrickCache::charge(cache_.bricks()[brick].splats);
+    if (bytes > cached_.capacity()) break;
+    if (!cached_.contains(brick)) to_prefetch_.push_back(brick);
+  }
+  next_prefetch_ = 0;
+  pager_.start(to_prefetch_);
+}
+
+bool BrickSource::prefetchNext(Scratch& scratch) {
+  const uint64_t sequence = next_prefetch_++;
+  if (sequence >= to_prefetch_.size()) return false;
+  const std::optional<PagedBrick> bytes = await(sequence, scratch);
+  if (!bytes) return false;
+  const uint32_t brick = to_prefetch_[sequence];
+  if (!bytes->readable()) return true;  // the frame will tell
+  auto room = cached_.makeRoom(brick, cache_.bricks()[brick].splats);
+  if (!room) return false;
+  decode(brick, *bytes, room->geometry(), room->values(), scratch);
+  std::move(*room).keep();
+  return true;
+}
+
+void BrickSource::stop() {
+  pager_.stop();
+  const std::lock_guard lock(sharing_);
+  stopped_ = true;
+  shared_changed_.notify_all();
+}
+
+void BrickSource::finish(FetchStatistics& statistics) {
+  const PagerStatistics after = pager_.statistics();
+  pager_.stop();
+  pins_.clear();
+  shared_.clear();
+  statistics.read_by = pager_.way();
+  statistics.read_s = after.reading_s - before_.reading_s;
+  statistics.mean_queue_depth =
+      statistics.read_s > 0 ? (after.depth_s - before_.depth_s) / statistics.read_s : 0;
+  statistics.bytes_read = after.bytes - before_.bytes;
+  statistics.read_requests = after.requests - before_.requests;
+  statistics.bricks_cached = hits_;
+  statistics.bricks_left_out = after.bricks_left_out - before_.bricks_left_out;
+  statistics.bytes_left_out = after.bytes_left_out - before_.bytes_left_out;
+  statistics.bricks_read = reads_ - statistics.bricks_left_out;
+  const BrickCache::Statistics kept = cached_.statistics();
+  statistics.bricks_resident = kept.bricks;
+  statistics.cache_bytes = kept.bytes;
+  statistics.cache_peak_bytes = kept.peak_bytes;
+  statistics.pager_peak_bytes = after.peak_bytes;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,94 @@
+// Which bricks one view needs, and in which order: a pure function, apart from reading and drawing them.
+// Design section 6, "plan".
+//
+// The cut starts at the root and goes down until a brick's error is small enough on the screen, or it is a
+// leaf; what is outside the image or transparent is left out with all that lies below it. The result's cells
+// are disjoint, and a cell comes after every cell that it can hide (exact: at each octree node the child
+// farther along every axis comes first). A cell that cannot be split has several consecutive bricks: they are
+// taken in the index's order, since their splats lie within 2^-24 of the root of each other.
+//
+// Under a limit of splats or bytes the brick with the largest error on the screen is refined first, octant by
+// octant, until the next octant's children would not fit. That sequence does not depend on the limit: a
+// larger limit gives a refinement of the same cut. At most one brick is drawn in part: the last one.
+//
+// Costs about 35 ns a brick looked at, under a limit 70 to 150 (bench/cut_bench.cpp).
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <glm/vec3.hpp>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "stream/model/brick.h"
+#include "stream/model/octree.h"
+
+namespace curvisplat {
+
+/// What a cut must know of a view. "Stretched" space is scale * data.
+struct CutView {
+  /// Points p with normal·p + offset < 0 are out of the image; |normal| = 1. Stretched.
+  struct Plane {
+    glm::dvec3 normal{0.0};
+    double offset = 0;
+  };
+
+  bool perspective = false;
+  glm::dvec3 scale{1.0};               // > 0
+  glm::dvec3 eye{0.0};                 // perspective; stretched
+  glm::dvec3 towards_viewer{0, 0, 1};  // orthographic; stretched
+  double pixels = 1;                   // to a stretched unit; perspective: at distance 1
+  std::vector<Plane> planes;
+};
+
+/// How far a variable's values spread in a brick, or in a brick and all below it.
+struct ValueBounds {
+  float min = 0, max = 0;       // of the means
+  float largest_slope = 0;      // of |w|
+  float largest_deviation = 0;  // of √r
+};
+
+/// [brick], each with all below it: an inner brick's means are averages, so its own bounds promise nothing
+/// about its children.
+std::vector<ValueBounds> subtreeBounds(std::span<const Brick> bricks,
+                                       std::span<const BrickVariable> variables);
+
+/// An octree with the values of one variable.
+struct CutTree {
+  RootCube root;
+  std::span<const Brick> bricks;
+  std::span<const BrickVariable> variables;
+  std::span<const ValueBounds> subtrees;  // from subtreeBounds()
+};
+
+enum class DrawingOrder { back_to_front, front_to_back };
+
+struct CutOptions {
+  static constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max();
+
+  double lod_pixels = 1;  // error allowed on the screen; at 0 only leaves are taken
+  DrawingOrder order = DrawingOrder::back_to_front;
+  /// What the cut may hold, and what its bricks' streams may take on disk. The root is drawn even where it
+  /// alone is more.
+  uint64_t max_splats = kNoLimit, max_bytes = kNoLimit;
+};
+
+struct Cut {
+  std::vector<BrickPart> parts;  // in drawing order
+  uint64_t splats = 0;
+  uint64_t bytes = 0;  // of the parts' streams; a brick in several parts counts once
+  uint32_t deepest_level = 0;
+  bool complete = true;         // false: a limit keeps some of it coarser than lod_pixels asks for
+  double largest_error_px = 0;  // on the screen, of what is drawn; infinite around a perspective eye
+  uint64_t out_of_image = 0;    // bricks left out, each standing for all below it
+  uint64_t transparent = 0;
+};
+
+/// Says whether nothing of a brick with such values can be seen.
+using TransparentBounds = std::function<bool(const ValueBounds&)>;
+
+Cut chooseCut(const CutTree& tree, const CutView& view, const TransparentBounds& transparent,
+              const CutOptions& options);
+
+}  // namespace curvisplat

@@ -1,0 +1,199 @@
+// Reads the bytes of a frame's bricks ahead of those who decode them, in the frame's order, with several
+// reads under way at once.
+//
+//   start(bricks) ; workers: take(n) -> bytes of the n-th brick -> give them back, by dropping them ; stop()
+//
+// The bytes lie in one buffer of fixed size, which is used as a ring of batches (read_batch.h): space is
+// granted to batches in order and freed in order, so that the brick that is needed next can always be read.
+// Whoever holds a brick's bytes must not wait for a later brick meanwhile. Reads end in any order.
+//
+// Reads are direct and by io_uring where the system allows it, else through the page cache, else by pread on
+// threads; by SystemCalls::pread whenever a test has put a double in place of the system's calls. A read that
+// fails, ends early or is put off for ever marks its bricks unreadable: whether one of them can be read
+// alone, and what is wrong if not, is for CacheReader to say.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <cstdlib>
+#include <deque>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "stream/base/direct_file.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/paging/async_reads.h"
+#include "stream/paging/read_batch.h"
+
+namespace curvisplat {
+
+struct PagerOptions {
+  enum class Way { automatic, io_uring, threads };
+
+  uint64_t buffer_bytes = 16 << 20;  // at least BrickPager::leastBufferBytes()
+  unsigned queue_depth = 8;
+  Way way = Way::automatic;  // io_uring: Error where the kernel refuses it
+  bool direct = true;        // false: through the page cache
+  /// For tests: what reads, in the place of all of the ways, at most `depth` at once.
+  std::function<std::unique_ptr<AsyncReads>(unsigned depth)> reads;
+};
+
+/// Of all that was read since the pager was made.
+struct PagerStatistics {
+  double reading_s = 0;            // with a read under way
+  uint64_t bytes = 0;              // from the files, with what lies between streams
+  uint64_t requests = 0;           // to the kernel
+  double depth_s = 0;              // requests under way, times seconds: over reading_s it is the mean depth
+  uint64_t bricks_unreadable = 0;  // handed over without bytes
+  uint64_t bricks_left_out = 0;    // were not read, since they were not needed any more
+  uint64_t bytes_left_out = 0;     // of their streams
+  uint64_t peak_bytes = 0;         // of the buffer
+};
+
+class BrickPager;
+
+/// The bytes of one brick, lent: dropping it gives them back.
+class PagedBrick {
+ public:
+  PagedBrick(BrickPager& pager, uint64_t sequence, bool readable, std::span<const std::byte> geometry,
+             std::span<const std::byte> values)
+      : pager_(&pager), sequence_(sequence), readable_(readable), geometry_(geometry), values_(values) {}
+  /// One that was not read because it was not needed any more.
+  static PagedBrick leftOut() { return PagedBrick(); }
+  ~PagedBrick();
+  PagedBrick(PagedBrick&& other) noexcept;
+  PagedBrick& operator=(PagedBrick&&) = delete;
+
+  /// False where a read failed or the file ended: there are no bytes.
+  bool readable() const { return readable_; }
+  /// Nobody wants it: there are no bytes.
+  bool isLeftOut() const { return left_out_; }
+  std::span<const std::byte> geometry() const { return geometry_; }
+  std::span<const std::byte> values() const { return values_; }
+
+ private:
+  PagedBrick() : left_out_(true) {}
+
+  BrickPager* pager_ = nullptr;
+  uint64_t sequence_ = 0;
+  bool readable_ = false;
+  bool left_out_ = false;
+  std::span<const std::byte> geometry_, values_;
+};
+
+class BrickPager {
+ public:
+  /// Opens the files of one variable of `cache`, which outlives it, and starts the thread "pager". Throws
+  /// Error.
+  BrickPager(const CacheReader& cache, size_t variable, const PagerOptions& options);
+  /// stop(), and waits for the reads under way.
+  ~BrickPager();
+  BrickPager(const BrickPager&) = delete;
+  BrickPager& operator=(const BrickPager&) = delete;
+
+  /// The buffer that the largest brick needs: it can then be read, one after the other.
+  static uint64_t leastBufferBytes(const CacheReader& cache, size_t variable);
+
+  /// Says of a brick that nobody needs it any more; it stays so.
+  using Unneeded = std::function<bool(uint32_t brick)>;
+
+  /// Begins to read `bricks`. What was begun before is stopped, and all of it must have been given back.
+  /// `unneeded`, if there is one, is asked on the pager's thread, just before a brick would be read, and not
+  /// after stop().
+  void start(std::vector<uint32_t> bricks, Unneeded unneeded = {});
+  /// Waits for the `sequence`-th of the bricks; each once, by any thread. Nothing once stopped. Throws Error
+  /// where reading broke off altogether.
+  std::optional<PagedBrick> take(uint64_t sequence);
+  /// Wakes all who wait: nothing is handed out until the next start(). Any thread, any number of times.
+  void stop();
+
+  PagerStatistics statistics() const;
+  /// How it reads, for people: "io_uring, direct".
+  std::string way() const;
+  uint64_t bufferBytes() const { return capacity_; }
+
+ private:
+  friend class PagedBrick;
+
+  struct Batch {
+    ReadBatch plan;
+    uint64_t first = 0;             // sequence of its first brick
+    uint64_t begin = 0;             // position in the ring, see below
+    std::vector<uint32_t> done;     // [read] bytes
+    std::vector<uint8_t> put_off;   // [read] times in a row
+    std::vector<uint8_t> missing;   // [brick] reads to come
+    std::vector<uint8_t> readable;  // [brick]
+    uint32_t next_read = 0;         // to be submitted
+    uint32_t kept = 0;              // bricks not given back
+  };
+  /// A read that the kernel has, by its tag.
+  struct UnderWay {
+    uint64_t batch = 0;
+    uint32_t read = 0;
+    bool direct = false;
+  };
+
+  void loop();
+  void planAhead();
+  std::span<const BrickExtents> nextNeeded();
+  std::optional<uint64_t> spaceFor(uint64_t bytes) const;
+  void submitReads();
+  void submit(uint64_t batch, uint32_t read, bool direct);
+  void complete(const AsyncReadEnd& end);
+  void finishRead(Batch& batch, uint32_t read, bool good);
+  bool hasArrived(uint64_t sequence);
+  void giveBack(uint64_t sequence);
+  Batch& batchOf(uint64_t sequence);
+  void countReads(int change);
+
+  const CacheReader& cache_;
+  const size_t variable_;
+  const unsigned depth_;
+  const uint64_t capacity_;
+  std::array<std::unique_ptr<DirectFile>, kBrickStreams> files_;
+  struct Free {
+    void operator()(std::byte* bytes) const { std::free(bytes); }
+  };
+  std::unique_ptr<std::byte, Free> buffer_;
+  std::unique_ptr<AsyncReads> reads_;
+
+  mutable std::mutex mutex_;           // guards all below, and not the buffer's bytes
+  std::condition_variable arrived_;    // a brick is complete, or all has stopped
+  std::condition_variable idle_;       // no read is under way
+  std::vector<uint32_t> bricks_;       // [sequence]
+  std::vector<BrickExtents> extents_;  // [sequence]
+  Unneeded unneeded_;
+  std::vector<uint8_t> left_out_;     // [sequence]
+  uint64_t planned_ = 0;              // bricks in batches so far, or left out
+  std::optional<ReadBatch> waiting_;  // the next batch, which has no space yet
+  // Batches that hold space, in order. Positions count on for ever, as in a SegmentRing; modulo the capacity
+  // they are places in the buffer.
+  std::deque<Batch> batches_;
+  uint64_t first_batch_ = 0;  // number of batches_.front()
+  uint64_t next_batch_ = 0;   // number of the first with reads to submit
+  uint64_t end_ = 0;
+  std::vector<UnderWay> under_way_;  // [tag]
+  std::vector<uint64_t> free_tags_;
+  unsigned reads_under_way_ = 0;
+  uint64_t lent_ = 0;            // bricks handed out and not given back
+  bool direct_refused_ = false;  // by a read: the file system is not what it said
+  bool stopped_ = true;          // nothing is submitted or handed out
+  bool wants_space_ = false;
+  bool ending_ = false;
+  std::exception_ptr failure_;
+  PagerStatistics statistics_;
+  std::chrono::steady_clock::time_point counted_;
+
+  std::thread thread_;
+};
+
+}  // namespace curvisplat

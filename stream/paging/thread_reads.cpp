@@ -1,0 +1,105 @@
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "stream/base/file.h"
+#include "stream/base/thread_name.h"
+#include "stream/paging/async_reads.h"
+
+namespace curvisplat {
+namespace {
+
+class ThreadReads : public AsyncReads {
+ public:
+  explicit ThreadReads(unsigned depth) : name_(fmt::format("pread on {} threads", depth)) {
+    try {
+      for (unsigned n = 0; n < depth; ++n) threads_.emplace_back([this] { loop(); });
+    } catch (...) {
+      stop();
+      throw;
+    }
+  }
+
+  ~ThreadReads() override { stop(); }
+
+  const char* name() const override { return name_.c_str(); }
+
+  void submit(const AsyncRead& read) override {
+    {
+      const std::lock_guard lock(mutex_);
+      waiting_.push_back(read);
+    }
+    submitted_.notify_one();
+  }
+
+  std::optional<AsyncReadEnd> wait() override {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return woken_ || !ended_.empty(); });
+    if (ended_.empty()) {
+      woken_ = false;
+      return {};
+    }
+    const AsyncReadEnd end = ended_.front();
+    ended_.pop_front();
+    return end;
+  }
+
+  void wake() override {
+    {
+      const std::lock_guard lock(mutex_);
+      woken_ = true;
+    }
+    changed_.notify_one();
+  }
+
+ private:
+  void loop() {
+    nameThisThread("read");
+    std::unique_lock lock(mutex_);
+    while (true) {
+      submitted_.wait(lock, [this] { return stopping_ || !waiting_.empty(); });
+      if (waiting_.empty()) return;
+      const AsyncRead read = waiting_.front();
+      waiting_.pop_front();
+      lock.unlock();
+      const ssize_t got =
+          SystemCalls::current().pread(read.fd, read.to, read.count, static_cast<int64_t>(read.offset));
+      const int error = errno;
+      lock.lock();
+      ended_.push_back({read.tag, got < 0 ? -error : got});
+      changed_.notify_one();
+    }
+  }
+
+  void stop() {
+    {
+      const std::lock_guard lock(mutex_);
+      stopping_ = true;
+    }
+    submitted_.notify_all();
+    for (std::thread& thread : threads_) thread.join();
+  }
+
+  const std::string name_;
+  std::mutex mutex_;  // guards the four below
+  std::deque<AsyncRead> waiting_;
+  std::deque<AsyncReadEnd> ended_;
+  bool woken_ = false, stopping_ = false;
+  std::condition_variable submitted_;  // a read waits for a thread, or all are to stop
+  std::condition_variable changed_;    // a read has ended, or the owner is to wake
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace
+
+std::unique_ptr<AsyncReads> makeThreadReads(unsigned depth) {
+  return std::make_unique<ThreadReads>(depth);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,127 @@
+#include "tests/reference/direct_picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <glm/common.hpp>
+#include <map>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include "preprocess/splats/merge.h"
+#include "preprocess/splats/seams.h"
+#include "render/cpu/cpu_painter.h"
+#include "render/project/depth_sort.h"
+#include "render/project/projection.h"
+#include "tests/reference/painted_splats.h"
+#include "tests/reference/splat_arrays.h"
+
+namespace curvisplat {
+namespace {
+
+struct DirectSplat {
+  Splat splat;
+  SplatScalar value;
+  uint32_t half_cell = kNoBorder;
+};
+
+std::vector<DirectSplat> splatsOf(const GridSource& source, uint32_t scalar, const DirectOptions& options) {
+  std::vector<DirectSplat> out;
+  const auto take = [&](const NodeSplat& node, std::span<const SplatScalar> values) {
+    out.push_back({node.splat, values[0], options.border_parts ? node.half_cell : kNoBorder});
+  };
+  SeamMerger seams(1, uint64_t{64} << 20, std::filesystem::temp_directory_path());
+  uint64_t first_node = 0;
+  const auto& blocks = source.description().blocks;
+  for (uint32_t b = 0; b < blocks.size(); ++b) {
+    const NodeBox all{0, blocks[b].nj, 0, blocks[b].nk};
+    NodeArrays nodes;
+    source.read(b, all, std::span(&scalar, 1), nodes);
+    NodeSplats splats;
+    computeNodeSplats({blocks[b], first_node, all, &nodes}, all, splats, options.nodes);
+    for (size_t n = 0; n < splats.splats.size(); ++n) {
+      const std::span<const SplatScalar> values(&splats.values[n], 1);
+      if (splats.splats[n].on_block_face && options.merge_seams)
+        seams.add(splats.splats[n], values);
+      else
+        take(splats.splats[n], values);
+    }
+    first_node += blocks[b].nodes();
+  }
+  seams.finish(source.description().coordinate_bytes, take);
+  return out;
+}
+
+std::vector<DirectSplat> mergedIntoVoxels(const std::vector<DirectSplat>& splats,
+                                          const DirectOptions& options) {
+  std::map<std::tuple<int64_t, int64_t, int64_t>, size_t> voxels;
+  const auto voxelOf = [&](const DirectSplat& s) {
+    const glm::dvec3 at = glm::floor(s.splat.position / options.voxel);
+    return std::tuple(static_cast<int64_t>(at.x), static_cast<int64_t>(at.y), static_cast<int64_t>(at.z));
+  };
+  for (const DirectSplat& s : splats) voxels.emplace(voxelOf(s), voxels.size());
+  VoxelMerger merger(1, voxels.size(), options.spread);
+  for (const DirectSplat& s : splats)
+    merger.add(voxels.at(voxelOf(s)), s.splat.position, s.splat, std::span(&s.value, 1));
+  std::vector<DirectSplat> merged(voxels.size());
+  for (size_t n = 0; n < merged.size(); ++n) {
+    merger.finish(n, merged[n].splat, std::span(&merged[n].value, 1));
+    if (!options.variance) merged[n].value.variance = 0;
+  }
+  return merged;
+}
+
+/// In the arrays that are projected, from `origin` on.
+void toArrays(const std::vector<DirectSplat>& splats, const glm::dvec3& origin, SplatGeometry& geometry,
+              SplatVariable& variable) {
+  geometry.resize(splats.size());
+  variable.resize(splats.size());
+  for (size_t n = 0; n < splats.size(); ++n)
+    setSplat(geometry, variable, n, splats[n].splat.position - origin, splats[n].splat, splats[n].value,
+             splats[n].half_cell);
+}
+
+}  // namespace
+
+Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOptions& options,
+                   const TransferFunction& function, const Camera& camera, ImageSize size) {
+  std::vector<DirectSplat> splats = splatsOf(source, scalar, options);
+  if (options.voxel > 0) splats = mergedIntoVoxels(splats, options);
+  glm::dvec3 origin = splats.front().splat.position;
+  double low = splats.front().value.mean, high = low;
+  for (const auto& [splat, value, half_cell] : splats) {
+    origin = glm::min(origin, splat.position);
+    low = std::min(low, value.mean);
+    high = std::max(high, value.mean);
+  }
+  SplatGeometry geometry;
+  SplatVariable variable;
+  toArrays(splats, origin, geometry, variable);
+
+  const ClassificationTable table = ClassificationTable::of(function, low, high);
+  ProjectionSettings settings;
+  settings.view = ScreenView::of(camera, size, glm::dvec3(1), options.low_pass_px2, options.near);
+  settings.view.slope_low_pass_px2 = options.slope_low_pass_px2;
+  settings.view.widest = options.widest;
+  settings.per_pixel = options.per_pixel;
+  BrickProjector projector;
+  projector.project(settings, table, origin, geometry, variable);
+
+  DepthSorter sorter;
+  std::vector<ScreenSplat> sorted;
+  sorted.reserve(projector.splats().size());
+  for (const uint32_t n : sorter.farthestFirst(projector.depths())) {
+    ScreenSplat splat = projector.splats()[n];
+    if (!options.hidden_slope) splat.half_width = 0;
+    if (!options.secant && camera.projection == Projection::perspective)
+      splat.amplitude /=
+          static_cast<float>(std::hypot(1.0, (splat.x - 0.5 * size.width) / settings.view.focal_px,
+                                        (splat.y - 0.5 * size.height) / settings.view.focal_px));
+    sorted.push_back(splat);
+  }
+  CpuPainter painter;
+  return paintFrame(painter, sorted, table, options.per_pixel, size);
+}
+
+}  // namespace curvisplat

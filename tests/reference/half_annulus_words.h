@@ -1,0 +1,17 @@
+// The words of `render` for design section 9's picture of the half-annulus.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "render/camera/camera.h"
+
+namespace curvisplat {
+
+/// Draws the cache with the test data's function half_annulus_<function>.json, every pixel classified, over
+/// white.
+std::vector<std::string> halfAnnulusWords(const std::string& cache, const std::string& output,
+                                          const std::string& function, ImageSize size,
+                                          const std::string& lod_pixels);
+
+}  // namespace curvisplat

@@ -1,0 +1,72 @@
+#include "tests/reference/known_pictures.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "preprocess/convert/convert.h"
+#include "stream/base/progress.h"
+#include "stream/cache/cache_reader.h"
+
+namespace curvisplat {
+
+KnownFunction KnownFunction::of(const std::string& name, double low, double high, double length) {
+  constexpr double kUnit = 0.01;  // of the files' opacities
+  const std::pair<double, double> range(low, high);
+  OpticalFunction plain = name == "smooth" ? smoothFunction : name == "band" ? bandFunction : stepFunction;
+  return {[plain, low, high, length](double scalar) {
+            OpticalProperties properties = plain((scalar - low) / (high - low));
+            properties.extinction /= length;
+            return properties;
+          },
+          TransferFunction::fromFile(fmt::format("{}/half_annulus_{}.json", CURVISPLAT_TEST_DATA, name),
+                                     &range, kUnit * length, kUnit * length)};
+}
+
+Camera edgeOnCamera() {
+  Camera camera = halfAnnulusCamera();
+  camera.position = camera.focal_point - 4.0 * glm::normalize(glm::dvec3(0.001, 0, -1));
+  camera.view_up = {0, 1, 0};
+  return camera;
+}
+
+Camera perspectiveCamera(double view_angle_deg) {
+  Camera camera = halfAnnulusCamera();
+  const double half = 0.5 * view_angle_deg * std::numbers::pi / 180;
+  const glm::dvec3 back = glm::normalize(camera.position - camera.focal_point);
+  camera.position = camera.focal_point + camera.parallel_scale / std::tan(half) * back;
+  camera.projection = Projection::perspective;
+  camera.view_angle_deg = view_angle_deg;
+  return camera;
+}
+
+void convertGrid(const GridSource& source, const std::filesystem::path& cache, uint32_t scalar) {
+  ConvertOptions options;
+  options.output = cache;
+  options.overwrite = true;
+  options.scalars = {scalar};
+  options.memory_bytes = uint64_t{1} << 30;
+  Progress progress;
+  convert(source, options, progress);
+}
+
+FrameOptions knownFrame(ImageSize size) {
+  FrameOptions options;
+  options.size = size;
+  options.lod_pixels = 0;
+  return options;
+}
+
+Image drawCache(const std::filesystem::path& cache, const TransferFunction& function, const Camera& camera,
+                const FrameOptions& options, uint64_t* splats, Backend backend) {
+  const CacheReader reader(cache);
+  FrameRenderer renderer(reader, 0, function, backend);
+  FrameStatistics statistics;
+  Image image = renderer.render(camera, options, statistics);
+  if (splats) *splats = statistics.splats_drawn;
+  return image;
+}
+
+}  // namespace curvisplat

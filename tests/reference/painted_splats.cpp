@@ -1,0 +1,60 @@
+#include "tests/reference/painted_splats.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+namespace curvisplat {
+
+ClassificationTable lively(bool log_scale) {
+  return {
+      [](double f) {
+        return TransferFunction::Value{{f, 0.5 + 0.5 * std::sin(9 * f), 1 - f}, f > 0.6 ? 8.0 : 2 * f * f};
+      },
+      log_scale ? 0.01 : 0.0, 1.0, log_scale};
+}
+
+ClassificationTable smooth(bool log_scale) {
+  return {[](double f) {
+            return TransferFunction::Value{{f, 0.5 + 0.5 * std::sin(4 * f), 1 - f}, 2 * f};
+          },
+          log_scale ? 0.01 : 0.0, 1.0, log_scale};
+}
+
+std::vector<ScreenSplat> randomSplats(int count, uint32_t seed, ImageSize size, float slope, float opacity) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> unit(0, 1), around(-1, 1);
+  const auto width = static_cast<float>(size.width), height = static_cast<float>(size.height);
+  std::vector<ScreenSplat> splats;
+  for (int n = 0; n < count; ++n) {
+    float l11 = 1.3f + 12 * unit(random) * unit(random), l22 = 1.3f + 3 * unit(random);
+    float l21 = 3 * l11 * around(random);
+    if (n % 29 == 0) l11 *= 20, l22 *= 20, l21 *= 20;
+    if (n % 31 == 0) l11 = 0.1f, l21 = 0.3f * around(random), l22 = 0.2f;
+    splats.push_back({width * (1.4f * unit(random) - 0.2f), height * (1.4f * unit(random) - 0.2f), l11, l21,
+                      l22, opacity * unit(random), 1.4f * unit(random) - 0.2f, slope * around(random),
+                      slope * around(random), 0.2f * unit(random)});
+  }
+  return splats;
+}
+
+Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const ClassificationTable& table,
+                 bool per_pixel, ImageSize size, const glm::vec4& background,
+                 const PaintResources& resources) {
+  std::vector<ScreenSplat> ordered(splats.begin(), splats.end());
+  if (painter.order() == DrawingOrder::front_to_back) std::reverse(ordered.begin(), ordered.end());
+  painter.begin(size, background, table, per_pixel, resources);
+  painter.draw(ordered);
+  return painter.end();
+}
+
+double largestDifference(const Image& a, const Image& b) {
+  double largest = 0;
+  for (size_t n = 0; n < a.rgba.size(); ++n) {
+    if (!std::isfinite(a.rgba[n])) return INFINITY;
+    largest = std::max<double>(largest, std::abs(a.rgba[n] - b.rgba[n]));
+  }
+  return largest;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,34 @@
+// What tests of painters draw: transfer functions, and splats of all shapes.
+#pragma once
+
+#include <glm/vec4.hpp>
+#include <span>
+#include <vector>
+
+#include "render/colour/classification.h"
+#include "render/image/image.h"
+#include "render/project/painter.h"
+#include "render/project/projection.h"
+
+namespace curvisplat {
+
+/// Colours and extinction that change with the scalar, and a jump.
+ClassificationTable lively(bool log_scale = false);
+
+/// Without a jump: straight lines fit.
+ClassificationTable smooth(bool log_scale = false);
+
+/// Round, lean and thin ones. Some lie outside of the image, some are larger than it, some much thinner than
+/// a pixel.
+std::vector<ScreenSplat> randomSplats(int count, uint32_t seed, ImageSize size, float slope = 0.3f,
+                                      float opacity = 0.5f);
+
+/// A frame, in the painter's own order. `splats`: farthest first.
+Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const ClassificationTable& table,
+                 bool per_pixel, ImageSize size, const glm::vec4& background = {1, 1, 1, 1},
+                 const PaintResources& resources = {});
+
+/// Of any channel of any pixel; infinite where `a` is not finite.
+double largestDifference(const Image& a, const Image& b);
+
+}  // namespace curvisplat

@@ -1,0 +1,49 @@
+// What the reference renderer marches through: a scalar over a bounded part of space, known at any point.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "preprocess/scenes/scenes.h"
+
+namespace curvisplat {
+
+/// Asks a field along one ray. Remembers where it was: one thread each, and the quicker the nearer together
+/// its points are.
+class FieldProbe {
+ public:
+  virtual ~FieldProbe() = default;
+
+  /// The scalar at a point of the world; nothing outside of the field.
+  virtual std::optional<double> at(const glm::dvec3& world) = 0;
+  /// How far one may go along `direction` (of length 1) from the point last asked about, which had a scalar,
+  /// until about one cell of the grid is passed. Infinite where the field has no cells.
+  virtual double cellLength(const glm::dvec3& /*direction*/) const {
+    return std::numeric_limits<double>::infinity();
+  }
+};
+
+/// Immutable; any thread may take probes.
+class ReferenceField {
+ public:
+  virtual ~ReferenceField() = default;
+  virtual std::unique_ptr<FieldProbe> probe() const = 0;
+  /// The corners of a box that holds the field.
+  virtual std::pair<glm::dvec3, glm::dvec3> bounds() const = 0;
+};
+
+/// An analytic scene. `scene` outlives it.
+class SceneField : public ReferenceField {
+ public:
+  explicit SceneField(const Scene& scene) : scene_(scene) {}
+  std::unique_ptr<FieldProbe> probe() const override;
+  std::pair<glm::dvec3, glm::dvec3> bounds() const override { return scene_.bounds(); }
+
+ private:
+  const Scene& scene_;
+};
+
+}  // namespace curvisplat

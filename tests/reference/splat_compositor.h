@@ -1,0 +1,18 @@
+// The specification of the painters: screen splats drawn one after the other in double precision, with the
+// footprint and the classification evaluated, not looked up. Slow, and right.
+#pragma once
+
+#include <glm/vec4.hpp>
+#include <span>
+
+#include "render/colour/classification.h"
+#include "render/image/image.h"
+#include "render/project/projection.h"
+
+namespace curvisplat {
+
+/// Blends `splats` over `background` (premultiplied) in their order.
+Image compositeSplats(std::span<const ScreenSplat> splats, const ClassificationTable& table, bool per_pixel,
+                      ImageSize size, const glm::vec4& background);
+
+}  // namespace curvisplat

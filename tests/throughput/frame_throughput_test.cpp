@@ -1,0 +1,148 @@
+#include "tools/throughput/frame_throughput.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <nlohmann/json.hpp>
+
+#include "render/camera/camera_path.h"
+#include "tests/support/lattice_cache.h"
+#include "tests/support/temporary_folder.h"
+#include "tools/throughput/stage_throughput.h"
+#include "tools/throughput/throughput_report.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kMiB = 1 << 20, kGiB = 1 << 30;
+
+TEST(FrameConfigurations, VaryOneThingAtATime) {
+  const double errors[] = {1, 2, 4};
+  const auto all = frameConfigurations(errors, 4, 512 * kMiB, 64 * kGiB);
+  std::vector<std::string> names;
+  for (const auto& one : all) names.push_back(one.name());
+  EXPECT_EQ(names, (std::vector<std::string>{
+                       "frames/lod:4/threads:4/memory:512MiB", "frames/lod:2/threads:4/memory:512MiB",
+                       "frames/lod:1/threads:4/memory:512MiB", "frames/lod:2/threads:1/memory:512MiB",
+                       "frames/lod:2/threads:2/memory:512MiB", "frames/lod:2/threads:4/memory:128MiB",
+                       "frames/lod:2/threads:4/memory:2048MiB"}));
+}
+
+TEST(FrameConfigurations, DoNotTakeMostOfTheMemoryNorRepeat) {
+  const double errors[] = {1};
+  EXPECT_EQ(frameConfigurations(errors, 1, 512 * kMiB, 3 * kGiB).size(), 2u);  // and a quarter of the memory
+}
+
+TEST(FrameThroughput, MedianFrameIsOneOfThem) {
+  std::vector<FrameStatistics> frames(4);
+  for (size_t n = 0; n < frames.size(); ++n) frames[n].total_s = std::array{5.0, 1.0, 3.0, 9.0}[n];
+  EXPECT_EQ(medianFrame(frames).total_s, 3);
+}
+
+class ThroughputOfACache : public testing::Test {
+ protected:
+  ThroughputOfACache() {
+    writeLatticeCache(path_, 0.2, {0.01, 0.01, 0.01});
+    cache_ = std::make_unique<CacheReader>(path_);
+    const VariableInfo& info = cache_->manifest().variables[0];
+    function_ = TransferFunction::preset("viridis", info.min, info.max, 1);
+  }
+
+  ThroughputScene scene() const {
+    FrameOptions options;
+    options.size = {60, 60};
+    options.lod_pixels = 0;
+    options.threads = 2;
+    options.memory_bytes = 256 * kMiB;
+    const auto orbit = [this](unsigned frames) {
+      const Manifest& manifest = cache_->manifest();
+      const Camera first =
+          Camera::named("iso", manifest.lower, manifest.upper, {60, 60}, Projection::orthographic);
+      std::vector<Camera> cameras;
+      for (unsigned n = 0; n < frames; ++n) cameras.push_back(orbited(first, 360.0 * n / frames));
+      return cameras;
+    };
+    return {*cache_, 0, *function_, options, Backend::cpu, orbit};
+  }
+
+  const TemporaryFolder folder_;
+  const std::filesystem::path path_ = folder_ / "a.splats";
+  std::unique_ptr<CacheReader> cache_;
+  std::optional<TransferFunction> function_;
+};
+
+TEST_F(ThroughputOfACache, FramesAreDrawnAndCounted) {
+  const FrameConfiguration configurations[] = {{0, 2, 256 * kMiB}, {0, 1, 256 * kMiB}};
+  Measurements measurements;
+  Progress progress;
+  const auto frames =
+      measureFrames(scene(), configurations, {.configuration_s = 1e9, .total_s = 1e9, .most_frames = 3},
+                    measurements, progress);
+  ASSERT_EQ(frames.size(), 2u);
+  for (size_t n = 0; n < 2; ++n) {
+    EXPECT_EQ(frames[n].configuration, configurations[n]);
+    EXPECT_EQ(frames[n].warm.size(), 3u);
+    for (const FrameStatistics& frame : frames[n].warm) {
+      EXPECT_EQ(frame.splats_read, 32u * 32 * 32);
+      EXPECT_EQ(frame.bricks_read, 0u) << "what the first frame has read is in memory";
+    }
+    uint64_t bytes = 0;
+    for (uint32_t brick = 0; brick < cache_->bricks().size(); ++brick)
+      if (cache_->bricks()[brick].isLeaf())
+        bytes += cache_->bricks()[brick].geometry.length + cache_->brickVariables(0)[brick].values.length;
+    EXPECT_EQ(frames[n].bytes, bytes);
+    EXPECT_EQ(measurements.find(configurations[n].name())->samples.size(), 3u);
+  }
+  const auto json = toJson(frames);
+  EXPECT_EQ(json.size(), 2u);
+  EXPECT_EQ(json[0]["median"]["splats_read"], 32 * 32 * 32);
+}
+
+TEST_F(ThroughputOfACache, FramesThatDoNotFitAreLeftOutWithTheReason) {
+  const FrameConfiguration configurations[] = {{0, 2, 1 * kMiB}};
+  Measurements measurements;
+  Progress progress;
+  EXPECT_TRUE(measureFrames(scene(), configurations, {}, measurements, progress).empty());
+  ASSERT_EQ(measurements.leftOut().size(), 1u);
+  EXPECT_NE(measurements.leftOut()[0].reason.find("--memory"), std::string::npos);
+
+  Measurements late;
+  const FrameConfiguration one[] = {{0, 2, 256 * kMiB}};
+  EXPECT_TRUE(measureFrames(scene(), one, {.total_s = 0}, late, progress).empty());
+  EXPECT_EQ(late.leftOut().size(), 1u);
+}
+
+TEST_F(ThroughputOfACache, EveryStageIsMeasuredOrLeftOut) {
+  Measurements measurements;
+  Progress progress;
+  const StageEffort little{.sample_s = 0, .samples = 2, .most_splats = 5000, .most_read_bytes = 1 << 20};
+  const StageReport report = measureStages(scene(), 2, little, measurements, progress);
+  EXPECT_EQ(report.frame_splats, 32u * 32 * 32);
+  EXPECT_GE(report.sampled_splats, 5000u);
+  EXPECT_LT(report.sampled_splats, report.frame_splats);
+  for (const char* stage : {"verify", "decode", "project", "sort", "prepare", "draw/cpu"})
+    for (const unsigned threads : {1u, 2u}) {
+      const Measurement* const found = measurements.find(stageName(stage, threads));
+      ASSERT_NE(found, nullptr) << stage;
+      EXPECT_EQ(found->unit, "splats/s");
+      EXPECT_EQ(found->samples.size(), 2u);
+    }
+  std::string left_out;
+  for (const auto& one : measurements.leftOut()) left_out += one.name + " ";
+  for (const std::string name : {"stages/read", "stages/draw/osmesa", "stages/draw/egl"})
+    EXPECT_TRUE(measurements.find(name) || left_out.find(name) != std::string::npos) << name;
+  EXPECT_EQ(report.backends.size(), 3u);
+}
+
+TEST_F(ThroughputOfACache, NothingToSeeIsSaid) {
+  const VariableInfo& info = cache_->manifest().variables[0];
+  function_ = TransferFunction::preset("viridis", info.max + 100, info.max + 101, 1);
+  Measurements measurements;
+  Progress progress;
+  measureStages(scene(), 1, {.sample_s = 0, .samples = 1}, measurements, progress);
+  EXPECT_TRUE(measurements.all().empty());
+  EXPECT_NE(leftOutTable(measurements).find("transparent"), std::string::npos) << leftOutTable(measurements);
+}
+
+}  // namespace
+}  // namespace curvisplat

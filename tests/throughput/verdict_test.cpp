@@ -1,0 +1,150 @@
+// The verdict's words follow from the numbers, and turn when those do.
+#include "tools/throughput/verdict.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <gtest/gtest.h>
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kMiB = 1 << 20;
+
+/// 1 M splats, half a second: 0.02 + 0.02 s decoded (nothing, in memory), 0.05 projected, 0.02 sorted, 0.4
+/// drawn.
+JudgedFrame frame() {
+  return {.seconds = 0.5,
+          .lod_pixels = 1,
+          .threads = 2,
+          .memory_bytes = 512 * kMiB,
+          .splats_prepared = 1'000'000,
+          .splats_drawn = 1'000'000,
+          .bytes = 8'000'000,
+          .read_part = 0,
+          .draws_apart = false};
+}
+StageSpeeds speeds() {
+  return {.read_bytes_s = 1e9,
+          .verify_splats_s = 50e6,
+          .decode_splats_s = 50e6,
+          .project_splats_s = 20e6,
+          .sort_splats_s = 50e6,
+          .draw_splats_s = 2.5e6};
+}
+
+bool says(const Verdict& verdict, const std::string& words) {
+  for (const std::string& line : verdict.lines)
+    if (line.find(words) != std::string::npos) return true;
+  return false;
+}
+std::string all(const Verdict& verdict) {
+  return fmt::format("{}", fmt::join(verdict.lines, "\n"));
+}
+
+TEST(Verdict, DrawingOnTheCoresBounds) {
+  const Verdict verdict = judge(frame(), speeds(), {});
+  EXPECT_EQ(verdict.stage, "drawing");
+  EXPECT_NEAR(verdict.share, 0.4 / 0.47, 1e-9);
+  EXPECT_TRUE(verdict.lines[0].starts_with("drawing bounds the frame: 85 % of the cores' work in 0.50 s"))
+      << all(verdict);
+  EXPECT_TRUE(
+      says(verdict, "a graphics card would take drawing off the cores: what is left for them takes 70.0 ms"))
+      << all(verdict);
+  // 8 MB a frame at 1 GB/s.
+  EXPECT_TRUE(says(verdict, "the disk could feed 125.0 such frames a second")) << all(verdict);
+}
+
+TEST(Verdict, DecodingBoundsWhereBricksAreReadEachTime) {
+  JudgedFrame judged = frame();
+  judged.read_part = 1;
+  StageSpeeds slow = speeds();
+  slow.decode_splats_s = 2e6;  // 0.5 s
+  slow.draw_splats_s = 20e6;
+  judged.seconds = 0.7;
+  const Verdict verdict = judge(judged, slow, {});
+  EXPECT_EQ(verdict.stage, "decoding");
+  EXPECT_TRUE(says(verdict, "100 % of this one's bricks came from it")) << all(verdict);
+  EXPECT_FALSE(says(verdict, "graphics card")) << all(verdict);
+  // What is in memory is not decoded.
+  judged.read_part = 0;
+  EXPECT_NE(judge(judged, slow, {}).stage, "decoding");
+}
+
+TEST(Verdict, ReadingBoundsWithASlowDisk) {
+  JudgedFrame judged = frame();
+  judged.read_part = 1;
+  judged.seconds = 9;
+  StageSpeeds slow = speeds();
+  slow.read_bytes_s = 1e6;  // 8 s
+  const Verdict verdict = judge(judged, slow, {});
+  EXPECT_EQ(verdict.stage, "reading");
+  EXPECT_TRUE(says(verdict, "reading bounds the frame: alone it takes 8.00 s of 9.00 s")) << all(verdict);
+  EXPECT_TRUE(says(verdict, "a faster disk would help")) << all(verdict);
+  EXPECT_TRUE(says(verdict, "could feed 0.1 such frames")) << all(verdict);
+}
+
+TEST(Verdict, ACardThatDrawsIsNotAdvised) {
+  JudgedFrame judged = frame();
+  judged.draws_apart = true;
+  EXPECT_EQ(judge(judged, speeds(), {}).stage, "drawing");
+  EXPECT_FALSE(says(judge(judged, speeds(), {}), "graphics card"));
+  StageSpeeds fast = speeds();
+  fast.draw_splats_s = 1e9;
+  EXPECT_EQ(judge(judged, fast, {}).stage, "projecting");
+  EXPECT_FALSE(says(judge(judged, fast, {}), "graphics card"));
+}
+
+TEST(Verdict, CoarserErrorsAreAdvisedByWhatTheyGave) {
+  const OtherFrame others[] = {{0.5, 1, 2, 512 * kMiB, 1'000'000},
+                               {0.2, 2, 2, 512 * kMiB, 250'000},
+                               {0.49, 4, 2, 512 * kMiB, 900'000},  // within the noise
+                               {0.1, 8, 1, 512 * kMiB, 100'000}};  // other threads
+  const Verdict verdict = judge(frame(), speeds(), others);
+  EXPECT_TRUE(says(verdict, "--lod-pixels 2 takes 0.20 s, 2.5 times as fast (4.0x fewer splats)"))
+      << all(verdict);
+  EXPECT_FALSE(says(verdict, "--lod-pixels 4")) << all(verdict);
+  EXPECT_FALSE(says(verdict, "--lod-pixels 8")) << all(verdict);
+}
+
+TEST(Verdict, CoresAreAdvisedByWhatTheyGave) {
+  JudgedFrame four = frame();
+  four.threads = 4;
+  OtherFrame others[] = {{0.2, 2, 4, 512 * kMiB, 250'000}, {0.38, 2, 1, 512 * kMiB, 250'000}};
+  EXPECT_TRUE(
+      says(judge(four, speeds(), others),
+           "--threads 4 draws --lod-pixels 2 1.9 times as fast as --threads 1: more cores would help"));
+  others[1].seconds = 0.25;
+  EXPECT_TRUE(
+      says(judge(four, speeds(), others), "1.2 times as fast as --threads 1: more cores would help little"));
+  others[1].memory_bytes = 128 * kMiB;  // no longer the same but for threads
+  EXPECT_FALSE(says(judge(four, speeds(), others), "more cores"));
+  // A worker and the painter have two cores already.
+  const OtherFrame two[] = {{0.2, 2, 2, 512 * kMiB, 250'000}, {0.2, 2, 1, 512 * kMiB, 250'000}};
+  EXPECT_FALSE(says(judge(frame(), speeds(), two), "more cores"));
+}
+
+TEST(Verdict, MemoryIsAdvisedByWhatItGave) {
+  OtherFrame others[] = {{0.2, 2, 2, 512 * kMiB, 250'000}, {0.1, 2, 2, 2048 * kMiB, 250'000}};
+  EXPECT_TRUE(
+      says(judge(frame(), speeds(), others), "--memory 2048M would help: --lod-pixels 2 takes 0.10 s"));
+  others[1].seconds = 0.195;
+  EXPECT_TRUE(says(judge(frame(), speeds(), others), "more than --memory 512M would not help"));
+  others[1].memory_bytes = 128 * kMiB;
+  EXPECT_FALSE(says(judge(frame(), speeds(), others), "--memory"));
+}
+
+TEST(Verdict, TellsOfTimeThatNoStageTakes) {
+  JudgedFrame judged = frame();
+  EXPECT_FALSE(says(judge(judged, speeds(), {}), "not the stages' own time"));
+  judged.seconds = 0.94;  // twice the stages' 0.47
+  EXPECT_TRUE(says(judge(judged, speeds(), {}), "50 % of the frame is not the stages' own time"));
+}
+
+TEST(Verdict, SaysNothingOfADiskThatWasNotMeasured) {
+  StageSpeeds unknown = speeds();
+  unknown.read_bytes_s = std::nullopt;
+  EXPECT_FALSE(says(judge(frame(), unknown, {}), "the disk"));
+}
+
+}  // namespace
+}  // namespace curvisplat

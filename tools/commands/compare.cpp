@@ -1,0 +1,80 @@
+// `curvisplat compare`: how far two pictures are apart.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "stream/base/error.h"
+#include "tools/commands/commands.h"
+#include "tools/output/output_paths.h"
+
+namespace curvisplat {
+namespace {
+
+struct CompareOptions {
+  std::string a, b;
+  std::optional<double> min_psnr_db;
+  std::string difference;
+};
+
+// |a - b| over white, opaque; the largest difference of all is full brightness.
+Image differenceImage(const Image& a, const Image& b, double largest) {
+  Image difference(a.size);
+  const float gain = largest > 0 ? static_cast<float>(1 / largest) : 0;
+  for (size_t n = 0; n < a.rgba.size(); n += 4) {
+    for (size_t c = 0; c < 3; ++c)
+      difference.rgba[n + c] =
+          gain * std::abs(a.rgba[n + c] - a.rgba[n + 3] - (b.rgba[n + c] - b.rgba[n + 3]));
+    difference.rgba[n + 3] = 1;
+  }
+  return difference;
+}
+
+ImageDifference compareNamed(const Image& a, const Image& b, const CompareOptions& options) {
+  try {
+    return compareImages(a, b);
+  } catch (const Error& error) {
+    throw Error("{} and {}: {}", options.a, options.b, error.what());
+  }
+}
+
+void compare(const CompareOptions& options) {
+  if (!options.difference.empty()) {
+    checkImageName(options.difference);
+    checkOutputFile("--difference", options.difference, {options.a, options.b});
+  }
+  const Image a = readImage(options.a), b = readImage(options.b);
+  const ImageDifference difference = compareNamed(a, b, options);
+  if (difference.largest == 0)
+    fmt::print("identical\n");
+  else
+    fmt::print("PSNR {:.2f} dB, largest difference {:.6f} at pixel ({}, {})\n", difference.psnr_db,
+               difference.largest, difference.largest_x, difference.largest_y);
+  if (!options.difference.empty()) writeImage(differenceImage(a, b, difference.largest), options.difference);
+  if (options.min_psnr_db && difference.psnr_db < *options.min_psnr_db)
+    throw Error(
+        "{} and {}: PSNR {:.2f} dB is below the {:.2f} dB asked for; largest difference {:.6f} at pixel "
+        "({}, {})",
+        options.a, options.b, difference.psnr_db, *options.min_psnr_db, difference.largest,
+        difference.largest_x, difference.largest_y);
+}
+
+}  // namespace
+
+void addCompare(CLI::App& app) {
+  auto options = std::make_shared<CompareOptions>();
+  CLI::App* command = app.add_subcommand("compare", "Compare two pictures: PSNR and largest difference");
+  command->add_option("A", options->a, "PNG, EXR or PFM")->required();
+  command->add_option("B", options->b, "PNG, EXR or PFM, of the same size")->required();
+  command->add_option("--min-psnr", options->min_psnr_db, "Fail (exit status 1) below so many dB");
+  command->add_option("--difference", options->difference,
+                      "Picture of the differences to write, the largest at full brightness");
+  command->callback([options] { compare(*options); });
+}
+
+}  // namespace curvisplat

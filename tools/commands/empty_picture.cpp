@@ -1,0 +1,165 @@
+#include "tools/commands/empty_picture.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+namespace curvisplat {
+namespace {
+
+constexpr int kSamples = 4096;
+
+std::string text(const glm::dvec3& point) {
+  return fmt::format("({}, {}, {})", point.x, point.y, point.z);
+}
+
+/// The largest extinction that the function has from `low` to `high`.
+double largestExtinction(const TransferFunction& function, double low, double high) {
+  double largest = 0;
+  for (int n = 0; n <= kSamples; ++n)
+    largest =
+        std::max(largest, function.at(std::lerp(low, high, static_cast<double>(n) / kSamples)).extinction);
+  return largest;
+}
+
+/// Why none of the scalar's values is opaque, if none is: the function, or where its range lies.
+std::string whyTransparent(const RenderedScene& scene) {
+  const TransferFunction& function = scene.transfer_function;
+  const auto [low, high] = function.range();
+  if (largestExtinction(function, low, high) == 0)
+    return fmt::format("the transfer function '{}' is fully transparent; give another --tf", function.name());
+  return fmt::format(
+      "over the range {}..{}, the transfer function '{}' is fully transparent for {}, whose values are in "
+      "{}..{}; give another --range",
+      low, high, function.name(), scene.variable.name, scene.variable.min, scene.variable.max);
+}
+
+/// Why no splat is seen that could be: the reason found in what was drawn.
+std::string whyNothingIsThere(const RenderedScene& scene) {
+  const Manifest& manifest = scene.manifest;
+  const FrameStatistics& s = scene.statistics;
+  const char* const nodes = manifest.cells ? "cells" : "nodes";
+  if (manifest.volume == 0)
+    return fmt::format(
+        "the data has no volume: each of its {} splats stands for a cell without thickness, since its {} lie "
+        "in one plane or line, or their neighbours are blanked ({} of {} are)",
+        manifest.splats, nodes, manifest.blanked_nodes, manifest.nodes);
+  if (s.splats_transparent + s.bricks_transparent > 0 && s.splats_drawn == 0)
+    return fmt::format(
+        "what the camera sees has only values of {} for which the transfer function '{}' is transparent; "
+        "look "
+        "elsewhere, or give another --range or --tf",
+        scene.variable.name, scene.transfer_function.name());
+  if (manifest.blanked_nodes > 0 && s.splats_drawn == 0)
+    return fmt::format(
+        "what the camera sees of the data's box is blanked, as are {} of its {} {}; look elsewhere (--view "
+        "iso), or convert again without --blank or iblank",
+        manifest.blanked_nodes, manifest.nodes, nodes);
+  return fmt::format(
+      "of {} splats read, {} are outside of --clip-box, {} off the screen, {} transparent and {} drawn, none "
+      "of which reaches a pixel; try --view iso, another --range or another --clip-box",
+      s.splats_read, s.splats_clipped, s.splats_off_screen, s.splats_transparent, s.splats_drawn);
+}
+
+/// The part of the data that the clip box leaves, scaled; false if there is none.
+bool visibleBox(const RenderedScene& scene, glm::dvec3& lower, glm::dvec3& upper) {
+  lower = scene.manifest.lower;
+  upper = scene.manifest.upper;
+  if (const auto& clip = scene.options.clip_box) {
+    lower = glm::max(lower, clip->lower);
+    upper = glm::min(upper, clip->upper);
+  }
+  for (int axis = 0; axis < 3; ++axis)
+    if (lower[axis] > upper[axis]) return false;
+  lower *= scene.options.scale;
+  upper *= scene.options.scale;
+  return true;
+}
+
+/// How many pixels of the picture's height the box's diagonal takes, seen from in front of it.
+double diagonalPixels(const RenderedScene& scene, const glm::dvec3& lower, const glm::dvec3& upper) {
+  const Camera& camera = scene.camera;
+  const double distance = glm::length(0.5 * (lower + upper) - camera.position);
+  const double half_height = camera.projection == Projection::perspective
+                                 ? distance * std::tan(camera.view_angle_deg * std::numbers::pi / 360)
+                                 : camera.parallel_scale;
+  return glm::length(upper - lower) / (2 * half_height) * scene.options.size.height;
+}
+
+/// Whether all corners of the box lie beyond one side of what the camera sees.
+bool outOfView(const RenderedScene& scene, const glm::dvec3& lower, const glm::dvec3& upper) {
+  const Camera& camera = scene.camera;
+  const glm::dmat4 view_from_world = camera.viewFromWorld();
+  const double aspect = static_cast<double>(scene.options.size.width) / scene.options.size.height;
+  const double slope = std::tan(camera.view_angle_deg * std::numbers::pi / 360);
+  int beyond[5] = {};  // left, right, below, above, behind
+  for (int n = 0; n < 8; ++n) {
+    const glm::dvec4 world(n & 1 ? upper.x : lower.x, n & 2 ? upper.y : lower.y, n & 4 ? upper.z : lower.z,
+                           1);
+    const glm::dvec4 view = view_from_world * world;
+    const bool perspective = camera.projection == Projection::perspective;
+    const double half_height = perspective ? -view.z * slope : camera.parallel_scale;
+    beyond[0] += view.x < -half_height * aspect;
+    beyond[1] += view.x > half_height * aspect;
+    beyond[2] += view.y < -half_height;
+    beyond[3] += view.y > half_height;
+    beyond[4] += perspective && view.z > 0;
+  }
+  return std::any_of(beyond, beyond + 5, [](int corners) { return corners == 8; });
+}
+
+}  // namespace
+
+bool isEmpty(const Image& image, const glm::vec4& background) {
+  constexpr float kLeastSeen = 1.0f / 512;  // half a step of a screen
+  for (size_t n = 0; n < image.rgba.size(); ++n)
+    if (!(std::abs(image.rgba[n] - background[static_cast<int>(n % 4)]) < kLeastSeen)) return false;
+  return true;
+}
+
+std::vector<std::string> whyEmpty(const RenderedScene& scene) {
+  std::vector<std::string> reasons;
+  const double largest = largestExtinction(scene.transfer_function, scene.variable.min, scene.variable.max);
+  if (largest == 0) reasons.push_back(whyTransparent(scene));
+
+  glm::dvec3 lower, upper;
+  if (!visibleBox(scene, lower, upper)) {
+    reasons.push_back(fmt::format("--clip-box has nothing of the data in it, which spans {} to {}",
+                                  text(scene.manifest.lower), text(scene.manifest.upper)));
+  } else {
+    const bool out_of_view = outOfView(scene, lower, upper);
+    if (out_of_view)
+      reasons.push_back(fmt::format("the camera at {} looking at {} does not see the data's box {} to {}",
+                                    text(scene.camera.position), text(scene.camera.focal_point), text(lower),
+                                    text(upper)));
+    const double pixels = diagonalPixels(scene, lower, upper);
+    if (!out_of_view && scene.manifest.volume > 0 && pixels < 1)
+      reasons.push_back(fmt::format(
+          "what there is to see of the data is {:.2g} pixels large; bring the camera nearer, or give a "
+          "smaller {}",
+          pixels, scene.camera.projection == Projection::perspective ? "--view-angle" : "--parallel-scale"));
+    const double thickest = largest * glm::length(upper - lower);
+    if (thickest > 0 && thickest < 0.01)
+      reasons.push_back(fmt::format(
+          "the data is nearly transparent: its optical depth is at most {:.2g}; an --opacity-unit "
+          "smaller than {} makes it more opaque",
+          thickest, scene.transfer_function.opacityUnit()));
+  }
+  if (reasons.empty()) reasons.push_back(whyNothingIsThere(scene));
+  return reasons;
+}
+
+std::string rangeMissesScalar(const VariableInfo& variable, const TransferFunction& transfer_function) {
+  const auto [low, high] = transfer_function.range();
+  if (low <= variable.max && high >= variable.min) return {};
+  return fmt::format(
+      "the range {}..{} of the transfer function has no value of {} in it, which is in {}..{}: all of it has "
+      "the colour and opacity of one end",
+      low, high, variable.name, variable.min, variable.max);
+}
+
+}  // namespace curvisplat

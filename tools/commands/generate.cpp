@@ -1,0 +1,65 @@
+// `curvisplat generate`: an analytic scene as PLOT3D files, of any size.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "preprocess/formats/plot3d/plot3d_writer.h"
+#include "preprocess/scenes/scenes.h"
+#include "stream/base/error.h"
+#include "tools/commands/commands.h"
+#include "tools/output/progress_bar.h"
+
+namespace curvisplat {
+namespace {
+
+struct GenerateOptions {
+  std::string scene;
+  std::string size;
+  std::string prefix;
+  std::optional<double> clustering;
+};
+
+SceneGridSize parseSize(const std::string& text) {
+  SceneGridSize size;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (uint64_t* nodes : {&size.ni, &size.nj, &size.nk}) {
+    const auto [after, error] = std::from_chars(at, end, *nodes);
+    const bool last = nodes == &size.nk;
+    if (error != std::errc() || *nodes < 2 || (last ? after != end : after == end || *after != 'x'))
+      throw UsageError("--size {}: expected NIxNJxNK, three numbers of nodes from 2 on, as 128x64x64", text);
+    at = last ? after : after + 1;
+  }
+  return size;
+}
+
+void generate(const GenerateOptions& options) {
+  const SceneGridSource source(makeScene(options.scene, options.clustering), parseSize(options.size));
+  Progress progress{progressBar()};
+  const auto paths = writePlot3d(source, options.prefix, progress);
+  const Progress::Phase& phase = progress.phases().back();
+  for (const auto& path : paths) fmt::print("{}\n", path.string());
+  fmt::print("{} nodes of {} in {:.1f} s\n", phase.steps, options.scene, phase.seconds);
+}
+
+}  // namespace
+
+void addGenerate(CLI::App& app) {
+  auto options = std::make_shared<GenerateOptions>();
+  CLI::App* command = app.add_subcommand("generate", "Write an analytic scene as PLOT3D files, of any size");
+  command->add_option("SCENE", options->scene, fmt::format("One of {}", fmt::join(sceneNames(), ", ")))
+      ->required();
+  command->add_option("--size", options->size, "Nodes along i, j and k: NIxNJxNK")->required();
+  command->add_option("-o,--output", options->prefix, "PREFIX of PREFIX.xyz, PREFIX.fun and PREFIX.nam")
+      ->required();
+  command->add_option("--clustering", options->clustering,
+                      "Outermost cells along j are about e^B times as long as the innermost");
+  command->callback([options] { generate(*options); });
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,224 @@
+// `curvisplat info`: what a cache or a grid holds.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stream/base/error.h"
+#include "stream/base/progress.h"
+#include "stream/base/say.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/cache/cache_verify.h"
+#include "stream/cache/partial_folder.h"
+#include "stream/cache/probe.h"
+#include "tools/commands/commands.h"
+#include "tools/commands/info_grid.h"
+#include "tools/commands/info_system.h"
+#include "tools/options/grid_options.h"
+#include "tools/output/progress_bar.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+struct InfoOptions {
+  GasModel gas;
+  OpenGridOptions grid;  // grid.grid is the cache where that is a folder
+  bool json = false;
+  bool verify = false;
+  bool system = false;
+  std::vector<double> point;  // empty, or x, y, z
+};
+
+struct LevelSummary {
+  uint64_t bricks = 0, leaves = 0, splats = 0;
+  uint64_t geometry_bytes = 0, values_bytes = 0;  // values of all variables
+  double largest_error = 0;
+};
+
+std::vector<LevelSummary> levelsOf(const CacheReader& reader) {
+  std::vector<LevelSummary> levels(reader.manifest().levels);
+  const auto bricks = reader.bricks();
+  for (size_t n = 0; n < bricks.size(); ++n) {
+    LevelSummary& level = levels[bricks[n].cell.level];
+    ++level.bricks;
+    level.leaves += bricks[n].isLeaf();
+    level.splats += bricks[n].splats;
+    level.geometry_bytes += bricks[n].geometry.length;
+    level.largest_error = std::max(level.largest_error, double{bricks[n].error});
+    for (size_t v = 0; v < reader.manifest().variables.size(); ++v)
+      level.values_bytes += reader.brickVariables(v)[n].values.length;
+  }
+  return levels;
+}
+
+uint64_t totalBytes(const Manifest& manifest) {
+  uint64_t bytes = 0;
+  for (const FileInfo& file : manifest.files) bytes += file.size;
+  return bytes;
+}
+
+double perNode(const Manifest& manifest, uint64_t bytes) {
+  return static_cast<double>(bytes) / static_cast<double>(manifest.nodes - manifest.blanked_nodes);
+}
+
+Json jsonOf(const ProbeResult& found, const CacheReader& reader) {
+  Json json = {{"block", found.block},
+               {"i", found.i},
+               {"j", found.j},
+               {"k", found.k},
+               {"centre", {found.centre.x, found.centre.y, found.centre.z}},
+               {"distance", found.distance}};
+  json["values"] = Json::array();
+  for (size_t v = 0; v < found.variables.size(); ++v)
+    json["values"].push_back({{"name", reader.manifest().variables[v].name},
+                              {"value", found.variables[v].value},
+                              {"mean", found.variables[v].mean}});
+  return json;
+}
+
+/// What the options ask for beyond the summary.
+struct Asked {
+  CacheVerification verification;
+  std::optional<ProbeResult> probe;
+};
+
+Asked answer(const CacheReader& reader, const InfoOptions& options) {
+  Asked asked;
+  if (options.verify) {
+    Progress progress{progressBar()};
+    asked.verification = verifyCache(reader, &progress);
+  }
+  if (!options.point.empty()) {
+    std::vector<size_t> variables(reader.manifest().variables.size());
+    for (size_t v = 0; v < variables.size(); ++v) variables[v] = v;
+    asked.probe = probe(reader, variables, {options.point[0], options.point[1], options.point[2]});
+  }
+  return asked;
+}
+
+void printAsJson(const CacheReader& reader, const InfoOptions& options, const Asked& asked) {
+  const Manifest& manifest = reader.manifest();
+  Json json = Json::parse(manifest.toJson());
+  json["bytes"] = totalBytes(manifest);
+  json["bytes_per_node"] = perNode(manifest, totalBytes(manifest));
+  json["bricks_by_level"] = Json::array();
+  for (const LevelSummary& level : levelsOf(reader))
+    json["bricks_by_level"].push_back({{"bricks", level.bricks},
+                                       {"leaves", level.leaves},
+                                       {"splats", level.splats},
+                                       {"geometry_bytes", level.geometry_bytes},
+                                       {"values_bytes", level.values_bytes},
+                                       {"error", level.largest_error}});
+  if (options.verify) {
+    json["findings"] = asked.verification.findings;
+    json["notes"] = asked.verification.notes;
+  }
+  if (!options.point.empty()) json["probe"] = asked.probe ? jsonOf(*asked.probe, reader) : Json(nullptr);
+  fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
+}
+
+void printProbe(const CacheReader& reader, const InfoOptions& options, const Asked& asked) {
+  fmt::print("\nat {}, {}, {}: ", options.point[0], options.point[1], options.point[2]);
+  if (!asked.probe) {
+    fmt::print("nothing: the point is outside of every splat\n");
+    return;
+  }
+  const ProbeResult& found = *asked.probe;
+  fmt::print("block {}, i {}, j {}, k {} (counted from 0), {:.3g} footprint radii from its centre\n",
+             found.block, found.i, found.j, found.k, found.distance / 1.556228);
+  for (size_t v = 0; v < found.variables.size(); ++v) {
+    const VariableInfo& variable = reader.manifest().variables[v];
+    fmt::print("  {:<20} {:.6g} {}(node {:.6g})\n", variable.name, found.variables[v].value,
+               variable.unit.empty() ? "" : variable.unit + " ", found.variables[v].mean);
+  }
+}
+
+void printAsText(const CacheReader& reader, const InfoOptions& options, const Asked& asked) {
+  const Manifest& m = reader.manifest();
+  fmt::print("{}\n", m.title);
+  fmt::print("written by {} from", m.program);
+  for (const std::string& source : m.sources) fmt::print(" {}", source);
+  fmt::print("\n{}\n\n", m.reader);
+  fmt::print("bounds     {} .. {}\n           {} .. {}\n           {} .. {}\n", m.lower.x, m.upper.x,
+             m.lower.y, m.upper.y, m.lower.z, m.upper.z);
+  fmt::print("volume     {:.8g}\n", m.volume);
+  fmt::print("{}      {} in {} blocks, {} blanked\n", m.cells ? "cells" : "nodes", m.nodes, m.blocks.size(),
+             m.blanked_nodes);
+  fmt::print("splats     {} at the finest level\n", m.splats);
+  fmt::print("steps      {}\n", m.steps.size());
+  for (const VariableInfo& variable : m.variables)
+    fmt::print("scalar     {} {}: {:.6g} .. {:.6g}\n", variable.name,
+               variable.unit.empty() ? "" : "[" + variable.unit + "]", variable.min, variable.max);
+  fmt::print("\nlevel    bricks    leaves        splats   geometry B     values B      error\n");
+  const std::vector<LevelSummary> levels = levelsOf(reader);
+  for (size_t n = 0; n < levels.size(); ++n)
+    fmt::print("{:>5} {:>9} {:>9} {:>13} {:>12} {:>12} {:>10.3g}\n", n, levels[n].bricks, levels[n].leaves,
+               levels[n].splats, levels[n].geometry_bytes, levels[n].values_bytes, levels[n].largest_error);
+  fmt::print("\nfile                      bytes   a {} drawn\n", m.cells ? "cell" : "node");
+  for (const FileInfo& file : m.files)
+    fmt::print("{:<18} {:>12} {:>14.3f}\n", file.name, file.size, perNode(m, file.size));
+  fmt::print("{:<18} {:>12} {:>14.3f}\n", "all", totalBytes(m), perNode(m, totalBytes(m)));
+  if (!options.point.empty()) printProbe(reader, options, asked);
+  if (options.verify && asked.verification.findings.empty())
+    fmt::print("\nverified: {} bricks are whole and keep to their records\n", m.bricks);
+  for (const std::string& finding : asked.verification.findings) fmt::print("finding: {}\n", finding);
+  for (const std::string& note : asked.verification.notes) fmt::print("note: {}\n", note);
+}
+
+void printCacheInfo(const InfoOptions& options) {
+  if (!options.grid.solutions.empty())
+    throw UsageError("{}: is a cache; no solution files go with it", options.grid.grid.string());
+  const CacheReader reader(options.grid.grid);
+  const Asked asked = answer(reader, options);
+  if (options.json)
+    printAsJson(reader, options, asked);
+  else
+    printAsText(reader, options, asked);
+  if (hasUnfinished(options.grid.grid))
+    say("note: a conversion that is to replace this cache is under way, or was interrupted");
+  if (!asked.verification.findings.empty())
+    throw Error("{}: {} findings; the cache is damaged: convert again", options.grid.grid.string(),
+                asked.verification.findings.size());
+}
+
+void printInfo(const InfoOptions& options) {
+  if (options.system != options.grid.grid.empty())
+    throw UsageError("info: expected a cache, a grid file or --system, and one of them");
+  if (options.system) return printSystem(options.json);
+  const fs::path& path = options.grid.grid;
+  if (fs::is_directory(path) || (!fs::exists(path) && hasUnfinished(path))) return printCacheInfo(options);
+  if (options.verify || !options.point.empty())
+    throw UsageError("{}: --verify and --probe are for caches, and this is not a folder",
+                     options.grid.grid.string());
+  printGridInfo(options.grid, {options.gas, std::nullopt}, options.json);
+}
+
+}  // namespace
+
+void addInfo(CLI::App& app) {
+  CLI::App* info = app.add_subcommand("info", "Prints what a cache or grid files hold");
+  const auto options = std::make_shared<InfoOptions>();
+  info->add_option("path", options->grid.grid, "A splat cache (a folder), or a grid file");
+  info->add_option("solution", options->grid.solutions, "Solution or function files of the grid");
+  info->add_flag("--json", options->json, "One JSON object");
+  info->add_flag("--system", options->system, "What this machine has to draw with, instead");
+  info->add_flag("--verify", options->verify,
+                 "Read the whole cache and look for damage; exit 1 if there is any");
+  info->add_option("--probe", options->point, "The value at x,y,z, and the block, i, j, k it comes from")
+      ->delimiter(',')
+      ->expected(3);
+  addGridOptions(*info, options->grid);
+  addGasOptions(*info, options->gas);
+  info->callback([options] { printInfo(*options); });
+}
+
+}  // namespace curvisplat

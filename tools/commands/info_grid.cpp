@@ -1,0 +1,233 @@
+#include "tools/commands/info_grid.h"
+
+#include <fmt/format.h>
+#include <tbb/info.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
+
+#include "preprocess/convert/preflight.h"
+#include "preprocess/survey/block_overlap.h"
+#include "preprocess/survey/grid_statistics.h"
+#include "stream/base/progress.h"
+#include "tools/options/grid_options.h"
+#include "tools/output/progress_bar.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kSlabBytes = uint64_t{32} << 20;
+constexpr size_t kBlocksListed = 16;
+
+/// What was found out, and of what.
+struct GridInfo {
+  const GridDescription* description = nullptr;
+  std::vector<uint32_t> stored, derived;  // positions of scalars
+  GridStatistics statistics;              // of the stored ones
+  std::vector<BlockOverlap> overlaps;
+  uint64_t nodes = 0, splats = 0;
+  bool splats_are_cells = false;  // if the first scalar is converted
+  unsigned threads = 1;
+  ConversionEstimate estimate;
+
+  const GridScalar& scalar(uint32_t position) const { return description->scalars[position]; }
+};
+
+GridInfo inspect(const GridSource& source) {
+  GridInfo info;
+  const GridDescription& description = source.description();
+  info.description = &description;
+  for (uint32_t n = 0; n < description.scalars.size(); ++n)
+    (description.scalars[n].derived ? info.derived : info.stored).push_back(n);
+  for (const GridBlock& block : description.blocks) info.nodes += block.nodes();
+  Progress progress{progressBar()};
+  progress.begin("reading", 2 * info.nodes, "nodes");
+  info.statistics = measureGrid(source, info.stored, kSlabBytes, progress);
+  info.overlaps = findOverlaps(source, kSlabBytes, progress);
+  info.splats_are_cells = !info.stored.empty() && info.scalar(info.stored.front()).centring == Centring::cell;
+  info.splats =
+      info.splats_are_cells ? info.statistics.cells() : info.nodes - info.statistics.blank().total();
+  info.threads = static_cast<unsigned>(tbb::info::default_concurrency());
+  info.estimate = estimateConversion(info.splats, info.threads);
+  return info;
+}
+
+/// A range, where there is a value at all.
+bool isEmpty(const ScalarRange& range) {
+  return range.min > range.max;
+}
+
+nlohmann::ordered_json jsonOf(const ScalarRange& range, bool lower) {
+  if (isEmpty(range)) return nullptr;
+  return lower ? range.min : range.max;
+}
+
+nlohmann::ordered_json blocksAsJson(const GridInfo& info) {
+  auto blocks = nlohmann::ordered_json::array();
+  for (size_t b = 0; b < info.description->blocks.size(); ++b) {
+    const GridBlock& block = info.description->blocks[b];
+    const BlockStatistics& statistics = info.statistics.blocks[b];
+    blocks.push_back({{"name", block.name},
+                      {"ni", block.ni},
+                      {"nj", block.nj},
+                      {"nk", block.nk},
+                      {"iblank", block.has_blanking},
+                      {"blanked", statistics.blank.total()},
+                      {"cells", statistics.cells},
+                      {"degenerate", statistics.degenerate},
+                      {"inverted", statistics.inverted},
+                      {"volume", statistics.volume}});
+  }
+  return blocks;
+}
+
+nlohmann::ordered_json scalarsAsJson(const GridInfo& info) {
+  auto scalars = nlohmann::ordered_json::array();
+  for (size_t s = 0; s < info.stored.size(); ++s) {
+    const GridScalar& of = info.scalar(info.stored[s]);
+    const ScalarRange& range = info.statistics.scalars[s];
+    nlohmann::ordered_json scalar = {
+        {"name", of.name}, {"min", jsonOf(range, true)}, {"max", jsonOf(range, false)}};
+    if (of.number > 0) scalar["number"] = of.number;
+    if (of.function > 0) scalar["function"] = of.function;
+    if (!of.unit.empty()) scalar["unit"] = of.unit;
+    scalar["centring"] = of.centring == Centring::cell ? "cell" : "node";
+    scalars.push_back(std::move(scalar));
+  }
+  return scalars;
+}
+
+nlohmann::ordered_json asJson(const GridInfo& info) {
+  const GridDescription& description = *info.description;
+  nlohmann::ordered_json json;
+  json["format"] = description.format;
+  json["files"] = description.files;
+  json["nodes"] = info.nodes;
+  json["coordinate_bytes"] = description.coordinate_bytes;
+  const BlankCounts blank = info.statistics.blank();
+  json["blanked"] = {{"iblank", blank.by_grid}, {"not_finite", blank.not_finite}};
+  json["cells"] = {{"count", info.statistics.cells()},
+                   {"degenerate", info.statistics.degenerate()},
+                   {"inverted", info.statistics.inverted()}};
+  for (const ScalarRange& range : info.statistics.bounds) {
+    json["bounds"]["lower"].push_back(jsonOf(range, true));
+    json["bounds"]["upper"].push_back(jsonOf(range, false));
+  }
+  json["blocks"] = blocksAsJson(info);
+  json["scalars"] = scalarsAsJson(info);
+  json["derived"] = nlohmann::ordered_json::array();
+  for (const uint32_t position : info.derived) json["derived"].push_back(info.scalar(position).name);
+  json["flow"] = nlohmann::ordered_json::array();
+  for (const FlowConditions& flow : description.flow)
+    json["flow"].push_back({{"file", flow.file},
+                            {"block", flow.block + 1},
+                            {"mach", flow.mach},
+                            {"alpha", flow.alpha},
+                            {"reynolds", flow.reynolds},
+                            {"time", flow.time}});
+  json["times"] = description.times;
+  json["time_step"] = description.time_step;
+  json["overlaps"] = nlohmann::ordered_json::array();
+  for (const BlockOverlap& overlap : info.overlaps)
+    json["overlaps"].push_back(
+        {{"blocks", {description.blocks[overlap.first].name, description.blocks[overlap.second].name}},
+         {"volume", overlap.volume},
+         {"share_of_smaller", overlap.share}});
+  json["estimate"] = {{"splats", info.splats},
+                      {"cache_bytes", info.estimate.cache_bytes},
+                      {"cache_bytes_per_further_scalar", info.estimate.bytes_per_further_scalar},
+                      {"seconds", info.estimate.seconds},
+                      {"threads", info.threads}};
+  json["warnings"] = description.warnings;
+  return json;
+}
+
+void printBlocks(const GridInfo& info) {
+  const GridDescription& description = *info.description;
+  for (size_t b = 0; b < std::min(kBlocksListed, description.blocks.size()); ++b) {
+    const GridBlock& block = description.blocks[b];
+    const BlockStatistics& statistics = info.statistics.blocks[b];
+    std::string odd;
+    if (block.has_blanking) odd += fmt::format(", iblank blanks {}", statistics.blank.by_grid);
+    if (statistics.degenerate > 0) odd += fmt::format(", {} degenerate cells", statistics.degenerate);
+    if (statistics.inverted > 0) odd += fmt::format(", {} inverted cells", statistics.inverted);
+    fmt::print("  {:<9} {}x{}x{}{}\n", block.name, block.ni, block.nj, block.nk, odd);
+  }
+  if (description.blocks.size() > kBlocksListed)
+    fmt::print("  and {} more\n", description.blocks.size() - kBlocksListed);
+}
+
+void printScalars(const GridInfo& info) {
+  for (size_t s = 0; s < info.stored.size(); ++s) {
+    const GridScalar& scalar = info.scalar(info.stored[s]);
+    const uint32_t number = scalar.number > 0 ? scalar.number : scalar.function;
+    const bool named = number > 0 && scalar.name != std::to_string(number);
+    const ScalarRange& range = info.statistics.scalars[s];
+    fmt::print("scalar    {}{}{}{}: {}\n", scalar.name, named ? fmt::format(" ({})", number) : "",
+               scalar.unit.empty() ? "" : fmt::format(" [{}]", scalar.unit),
+               scalar.centring == Centring::cell ? ", in cells" : "",
+               isEmpty(range) ? "no value" : fmt::format("{:.6g} .. {:.6g}", range.min, range.max));
+  }
+  std::string names;
+  for (const uint32_t position : info.derived) {
+    const GridScalar& scalar = info.scalar(position);
+    if (!names.empty()) names += ", ";
+    names += scalar.name;
+    if (scalar.function > 0) names += fmt::format(" ({})", scalar.function);
+  }
+  fmt::print("derived   {}\n", names);
+}
+
+std::string sizeInWords(uint64_t bytes) {
+  const auto mebibytes = static_cast<double>(bytes) / static_cast<double>(1 << 20);
+  return mebibytes < 1024 ? fmt::format("{:.1f} MiB", mebibytes)
+                          : fmt::format("{:.1f} GiB", mebibytes / 1024);
+}
+
+void printAsText(const GridInfo& info) {
+  const GridDescription& description = *info.description;
+  fmt::print("{}\n", description.format);
+  for (const std::string& warning : description.warnings) fmt::print("warning: {}\n", warning);
+  if (!info.overlaps.empty()) fmt::print("warning: {}\n", overlapWarning(description, info.overlaps));
+  const BlankCounts blank = info.statistics.blank();
+  fmt::print("nodes     {} in {} block{}; {} blanked by iblank, {} not finite\n", info.nodes,
+             description.blocks.size(), description.blocks.size() == 1 ? "" : "s", blank.by_grid,
+             blank.not_finite);
+  printBlocks(info);
+  fmt::print("cells     {}; {} degenerate, {} inverted\n", info.statistics.cells(),
+             info.statistics.degenerate(), info.statistics.inverted());
+  for (size_t axis = 0; axis < 3; ++axis)
+    fmt::print("{}         {:.9g} .. {:.9g}\n", "xyz"[axis], info.statistics.bounds[axis].min,
+               info.statistics.bounds[axis].max);
+  fmt::print("stored    coordinates in {} precision\n",
+             description.coordinate_bytes == 8 ? "double" : "single");
+  printScalars(info);
+  for (size_t n = 0; n < std::min(kBlocksListed, description.flow.size()); ++n) {
+    const FlowConditions& flow = description.flow[n];
+    fmt::print("flow      block {}: Mach {:.6g}, alpha {:.6g}, Reynolds {:.6g}, time {:.6g}\n",
+               flow.block + 1, flow.mach, flow.alpha, flow.reynolds, flow.time);
+  }
+  if (description.times.size() > 1)
+    fmt::print("times     {} steps, {:.6g} .. {:.6g}; this is step {}\n", description.times.size(),
+               description.times.front(), description.times.back(), description.time_step);
+  fmt::print(
+      "estimate  a cache of about {} with one scalar, {} more for each further one; about {:.1f} s on {} "
+      "thread{}\n",
+      sizeInWords(info.estimate.cache_bytes), sizeInWords(info.estimate.bytes_per_further_scalar),
+      info.estimate.seconds, info.threads, info.threads == 1 ? "" : "s");
+}
+
+}  // namespace
+
+void printGridInfo(const OpenGridOptions& options, const DerivedOptions& derived, bool json) {
+  const std::unique_ptr<GridSource> source = openWithDerived(options, derived);
+  const GridInfo info = inspect(*source);
+  if (json)
+    fmt::print("{}\n", asJson(info).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  else
+    printAsText(info);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,70 @@
+#include "tools/options/convert_words.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+
+#include "stream/base/error.h"
+#include "stream/base/say.h"
+#include "tools/options/grid_options.h"
+#include "tools/output/output_paths.h"
+
+namespace curvisplat {
+
+std::unique_ptr<GridSource> openSource(const ConvertWords& words, const std::filesystem::path& cache) {
+  OpenGridOptions grid = words.grid;
+  grid.temporary_folder = words.temporary_folder.empty() ? cache.parent_path() : words.temporary_folder;
+  if (grid.temporary_folder.empty()) grid.temporary_folder = ".";
+  grid.scalars = words.scalars;
+  grid.scalars.insert(grid.scalars.end(), words.added_scalars.begin(), words.added_scalars.end());
+  return openWithDerived(grid, {words.gas, words.blank_value});
+}
+
+std::vector<uint32_t> chooseScalars(const ConvertWords& words, const std::vector<std::string>& names,
+                                    const GridDescription& description) {
+  try {
+    for (const std::string& note : notesOnNumbers(description, names)) say("note: {}", note);
+    return scalarsNamed(description, names);
+  } catch (const UsageError& error) {
+    throw Error("{}: {}", words.grid.grid.string(), error.what());
+  }
+}
+
+void checkStatisticsFile(const ConvertWords& words) {
+  if (words.statistics.empty()) return;
+  std::vector<std::filesystem::path> inputs = words.grid.solutions;
+  inputs.push_back(words.grid.grid);
+  inputs.insert(inputs.end(), {words.to, words.output});
+  checkOutputFile("--stats", words.statistics, inputs);
+}
+
+double secondsOf(const Progress& progress) {
+  double seconds = 0;
+  for (const Progress::Phase& phase : progress.phases()) seconds += phase.seconds;
+  return seconds;
+}
+
+void addPhases(const Progress& progress, nlohmann::json& json) {
+  json["seconds"] = secondsOf(progress);
+  for (const Progress::Phase& phase : progress.phases())
+    json["phases"].push_back({{"name", phase.name},
+                              {"seconds", phase.seconds},
+                              {"cpu_seconds", phase.usage.cpu_seconds},
+                              {"steps", phase.steps},
+                              {"unit", phase.unit},
+                              {"bytes_read", phase.usage.bytes_read},
+                              {"bytes_written", phase.usage.bytes_written},
+                              {"peak_memory_bytes", phase.usage.peak_memory_bytes}});
+}
+
+uint64_t totalBytes(std::span<const FileReport> files) {
+  uint64_t bytes = 0;
+  for (const FileReport& file : files) bytes += file.bytes;
+  return bytes;
+}
+
+double mebibytes(uint64_t bytes) {
+  return static_cast<double>(bytes) / static_cast<double>(1 << 20);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,148 @@
+#include "tools/options/option_parsers.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "preprocess/convert/memory_plan.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kLargestImageSide = 16384;
+
+/// The whole of `text` as a T, or nothing.
+template <typename T>
+std::optional<T> whole(std::string_view text) {
+  T value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+std::vector<std::string_view> split(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  for (size_t begin = 0;;) {
+    const size_t end = text.find(separator, begin);
+    parts.push_back(text.substr(begin, end - begin));
+    if (end == std::string_view::npos) return parts;
+    begin = end + 1;
+  }
+}
+
+}  // namespace
+
+double parseNumber(std::string_view option, std::string_view text) {
+  return parseNumbers(option, text, "a number").front();
+}
+
+double parsePositive(std::string_view option, std::string_view text) {
+  const double value = parseNumber(option, text);
+  if (!(value > 0)) throw UsageError("{} {}: expected a number above zero", option, text);
+  return value;
+}
+
+std::vector<double> parseNumbers(std::string_view option, std::string_view text, std::string_view form) {
+  std::vector<double> numbers;
+  for (const std::string_view part : split(text, ',')) {
+    const auto number = whole<double>(part);
+    if (!number || !std::isfinite(*number))
+      throw UsageError("{} {}: expected {}, but '{}' is not a finite number", option, text, form, part);
+    numbers.push_back(*number);
+  }
+  const size_t expected = split(form, ',').size();
+  if (numbers.size() != expected)
+    throw UsageError("{} {}: expected {}, found {} numbers", option, text, form, numbers.size());
+  return numbers;
+}
+
+glm::dvec3 parsePoint(std::string_view option, std::string_view text) {
+  const auto numbers = parseNumbers(option, text, "x,y,z");
+  return {numbers[0], numbers[1], numbers[2]};
+}
+
+std::vector<uint64_t> parseExtents(std::string_view option, std::string_view text, std::string_view form) {
+  std::vector<uint64_t> extents;
+  for (const std::string_view part : split(text, 'x')) {
+    const auto extent = whole<uint64_t>(part);
+    if (!extent || *extent == 0)
+      throw UsageError("{} {}: expected {}, but '{}' is not a whole number above zero", option, text, form,
+                       part);
+    extents.push_back(*extent);
+  }
+  if (extents.size() != split(form, 'x').size())
+    throw UsageError("{} {}: expected {}, found {} numbers", option, text, form, extents.size());
+  return extents;
+}
+
+ImageSize parseImageSize(std::string_view option, std::string_view text) {
+  const auto sides = parseExtents(option, text, "WIDTHxHEIGHT");
+  if (std::max(sides[0], sides[1]) > kLargestImageSide)
+    throw UsageError("{} {}: an image has at most {} pixels each way", option, text, kLargestImageSide);
+  return {static_cast<int>(sides[0]), static_cast<int>(sides[1])};
+}
+
+uint64_t parseByteSize(std::string_view option, std::string_view text) {
+  const std::string_view digits = text.substr(0, text.find_first_not_of("0123456789."));
+  const std::string_view unit = text.substr(digits.size());
+  int shift = unit.empty() || unit == "B" ? 0 : -1;
+  for (int prefix = 0; prefix < 4 && !unit.empty(); ++prefix) {
+    const std::string_view rest = unit.substr(1);
+    if (std::toupper(unit[0]) == "KMGT"[prefix] && (rest.empty() || rest == "B" || rest == "iB"))
+      shift = 10 * (prefix + 1);
+  }
+  const auto number = whole<double>(digits);
+  const double bytes = number ? std::floor(std::ldexp(*number, std::max(shift, 0))) : 0;
+  if (!number || shift < 0 || bytes < 1 || bytes > 0x1p62)
+    throw UsageError("{} {}: expected a size such as 512M or 2G (K, M, G, T; powers of 1024)", option, text);
+  return static_cast<uint64_t>(bytes);
+}
+
+uint64_t parseMemory(std::string_view option, std::string_view text) {
+  return std::min(parseByteSize(option, text), machineMemory());
+}
+
+uint64_t parseCount(std::string_view option, std::string_view text) {
+  const std::string_view digits = text.substr(0, text.find_first_not_of("0123456789"));
+  const std::string_view letter = text.substr(digits.size());
+  const auto number = whole<uint64_t>(digits);
+  const size_t place = std::string_view("KMGkmg").find(letter);
+  const size_t power = letter.empty() || place == std::string_view::npos ? 0 : place % 3 + 1;
+  uint64_t count = number.value_or(0);
+  bool fits = count > 0 && letter.size() <= 1 && power <= 3 && (letter.empty() || power > 0);
+  for (size_t n = 0; n < power && fits; ++n) {
+    fits = count <= std::numeric_limits<uint64_t>::max() / 1000;
+    count *= 1000;
+  }
+  if (!fits)
+    throw UsageError("{} {}: expected a number above zero such as 500000 or 8M (K, M, G; powers of 1000)",
+                     option, text);
+  return count;
+}
+
+glm::vec4 parseBackground(std::string_view option, std::string_view text) {
+  if (text == "white") return {1, 1, 1, 1};
+  if (text == "black") return {0, 0, 0, 1};
+  if (text == "transparent") return {0, 0, 0, 0};
+  uint32_t rgb = 0;
+  if (text.size() == 7 && text[0] == '#') {
+    const auto [end, error] = std::from_chars(text.data() + 1, text.data() + 7, rgb, 16);
+    if (error == std::errc() && end == text.data() + 7)
+      return {static_cast<float>(rgb >> 16 & 255) / 255, static_cast<float>(rgb >> 8 & 255) / 255,
+              static_cast<float>(rgb & 255) / 255, 1};
+  }
+  throw UsageError("{} {}: expected white, black, transparent or #rrggbb", option, text);
+}
+
+Backend parseBackend(std::string_view text) {
+  if (text == "auto") return Backend::automatic;
+  if (text == "osmesa") return Backend::osmesa;
+  if (text == "egl") return Backend::egl;
+  if (text == "cpu") return Backend::cpu;
+  throw UsageError("--backend {}: expected auto, osmesa, egl or cpu", text);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,47 @@
+#include "tools/output/output_paths.h"
+
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <string>
+#include <system_error>
+
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/base/paths.h"
+
+namespace curvisplat {
+
+void checkOutputFolder(std::string_view option, const std::filesystem::path& path) {
+  const std::filesystem::path folder = folderOf(path);
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(folder, ignored))
+    throw Error("{} {}: there is no folder {}; make it first", option, path.string(), folder.string());
+  if (::access(folder.c_str(), W_OK | X_OK) != 0)
+    throw Error("{} {}: the folder {} cannot be written to: {}; choose another", option, path.string(),
+                folder.string(), std::strerror(errno));
+}
+
+void checkOutputFile(std::string_view option, const std::filesystem::path& path,
+                     const std::vector<std::filesystem::path>& others) {
+  namespace fs = std::filesystem;
+  checkOutputFolder(option, path);
+  std::error_code ignored;
+  fs::path target;
+  try {
+    target = fs::weakly_canonical(writableTarget(path), ignored);
+  } catch (const Error& error) {
+    throw Error("{} {}", option, error.what());
+  }
+  if (target != path) checkOutputFolder(option, target);
+  for (const fs::path& other : others) {
+    if (other.empty()) continue;
+    const fs::path there = fs::weakly_canonical(linkTarget(other), ignored);
+    if (there == target || fs::equivalent(target, there, ignored) ||
+        fs::equivalent(target.parent_path(), there, ignored))
+      throw Error("{} {}: would change {}; choose another name", option, path.string(), other.string());
+  }
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,233 @@
+#include "tools/throughput/conversion_throughput.h"
+
+#include <stdlib.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+#include "preprocess/formats/open/open_grid.h"
+#include "preprocess/formats/plot3d/plot3d_writer.h"
+#include "stream/base/error.h"
+#include "stream/base/process_usage.h"
+#include "tools/throughput/page_cache.h"
+#include "tools/throughput/text_table.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+// bench/README.md: 16 of the grid, 61 of scattered splats, up to 13 of a cache. And what small grids take
+// more.
+constexpr uint64_t kDiskBytesANode = 96, kLeastDiskBytes = 16 << 20;
+
+/// Removed with all in it.
+class WorkFolder {
+ public:
+  explicit WorkFolder(const fs::path& parent) {
+    std::string name = (parent / "curvisplat-bench-XXXXXX").string();
+    if (!::mkdtemp(name.data()))
+      throw Error("--tmp {}: no folder can be made in it: {}", parent.string(), std::strerror(errno));
+    path_ = name;
+  }
+  ~WorkFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  WorkFolder(const WorkFolder&) = delete;
+  WorkFolder& operator=(const WorkFolder&) = delete;
+
+  fs::path operator/(const char* name) const { return path_ / name; }
+
+ private:
+  fs::path path_;
+};
+
+void checkSpace(const fs::path& folder, uint64_t nodes) {
+  std::error_code error;
+  const fs::space_info space = fs::space(folder, error);
+  if (error) throw Error("--tmp {}: its free space cannot be told: {}", folder.string(), error.message());
+  const uint64_t needed = diskBytesFor(nodes);
+  if (space.available < needed)
+    throw Error(
+        "--tmp {}: has {} MiB free, and {} nodes take up to {} MiB meanwhile; give fewer --nodes, or "
+        "another --tmp",
+        folder.string(), space.available >> 20, nodes, needed >> 20);
+}
+
+/// Begins to count the peak of this process' memory anew. False where the system does not let it.
+bool resetPeakMemory() {
+  std::ofstream file("/proc/self/clear_refs");
+  file << "5\n";
+  file.close();
+  return !file.fail();
+}
+
+struct Run {
+  double seconds = 0;
+  std::vector<Progress::Phase> phases;
+  uint64_t peak_memory_bytes = 0;
+};
+
+Run convertOnce(const GridSource& source, const ConvertOptions& options, Progress& progress,
+                ConvertReport& report) {
+  const size_t before = progress.phases().size();
+  report = convert(source, options, progress);
+  Run run;
+  run.phases.assign(progress.phases().begin() + static_cast<ptrdiff_t>(before), progress.phases().end());
+  for (const Progress::Phase& phase : run.phases) {
+    run.seconds += phase.seconds;
+    run.peak_memory_bytes = std::max(run.peak_memory_bytes, phase.usage.peak_memory_bytes);
+  }
+  return run;
+}
+
+void addRuns(const std::vector<Run>& runs, const ConversionReport& report, Measurements& to) {
+  const std::string prefix = report.cold ? "conversion/cold/" : "conversion/warm/";
+  std::vector<double> rates, peaks;
+  std::vector<std::string> phases;
+  std::map<std::string, std::vector<double>> seconds;  // by phase
+  for (const Run& run : runs) {
+    rates.push_back(static_cast<double>(report.nodes()) / run.seconds);
+    peaks.push_back(static_cast<double>(run.peak_memory_bytes));
+    for (const Progress::Phase& phase : run.phases) {
+      if (!seconds.count(phase.name)) phases.push_back(phase.name);
+      seconds[phase.name].push_back(phase.seconds);
+    }
+  }
+  to.add(prefix + "rate", "nodes/s", std::move(rates));
+  for (const std::string& phase : phases) to.add(prefix + "phase/" + phase, "s", seconds[phase]);
+  if (report.peak_memory_bytes > 0)
+    to.add(prefix + "peak_memory", "B", std::move(peaks));
+  else
+    to.leaveOut(prefix + "peak_memory", "/proc/self/clear_refs does not let the peak be counted anew");
+  to.add(prefix + "temporary", "B", {static_cast<double>(report.last.temporary_bytes)});
+  double cache_bytes = 0;
+  for (const FileReport& file : report.last.files) cache_bytes += static_cast<double>(file.bytes);
+  to.add(prefix + "cache", "B", {cache_bytes});
+}
+
+double aNode(const ConversionReport& report, uint64_t bytes) {
+  return static_cast<double>(bytes) / static_cast<double>(report.nodes());
+}
+
+}  // namespace
+
+SceneGridSize sizeOfGrid(uint64_t nodes) {
+  const auto side = std::max<uint64_t>(8, std::llround(std::cbrt(static_cast<double>(nodes))));
+  return {side, side, std::max<uint64_t>(8, (nodes + side * side / 2) / (side * side))};
+}
+
+uint64_t diskBytesFor(uint64_t nodes) {
+  return nodes * kDiskBytesANode + kLeastDiskBytes;
+}
+
+ConversionReport measureConversion(const ConversionEffort& effort, Measurements& to, Progress& progress) {
+  ConversionReport report;
+  report.size = sizeOfGrid(effort.nodes);
+  checkSpace(effort.temporary_folder, report.nodes());
+  const WorkFolder folder(effort.temporary_folder);
+  const auto files = writePlot3d(SceneGridSource(makeScene("wake"), report.size), folder / "grid", progress);
+
+  OpenGridOptions grid;
+  grid.grid = folder / "grid.xyz";
+  grid.solutions = {folder / "grid.fun"};
+  grid.temporary_folder = effort.temporary_folder;
+  ConvertOptions options;
+  options.output = folder / "grid.splats";
+  options.scalars = {0};
+  options.memory_bytes = effort.memory_bytes;
+  options.threads = effort.threads;
+  std::vector<Run> runs;
+  double spent_s = 0;
+  report.cold = true;
+  bool peaks = true;
+  while (runs.empty() || (runs.size() < effort.most_runs && spent_s < effort.repeat_s)) {
+    fs::remove_all(options.output);
+    const auto source = openGrid(grid);
+    if (const auto reason = dropPages(files)) {
+      if (report.cold) to.leaveOut("conversion/cold", *reason);
+      report.cold = false;
+    }
+    peaks = resetPeakMemory() && peaks;
+    runs.push_back(convertOnce(*source, options, progress, report.last));
+    spent_s += runs.back().seconds;
+  }
+  if (peaks)
+    for (const Run& run : runs)
+      report.peak_memory_bytes = std::max(report.peak_memory_bytes, run.peak_memory_bytes);
+  addRuns(runs, report, to);
+  std::sort(runs.begin(), runs.end(), [](const Run& a, const Run& b) { return a.seconds < b.seconds; });
+  report.phases = std::move(runs[(runs.size() - 1) / 2].phases);
+  return report;
+}
+
+std::string conversionTable(const ConversionReport& report) {
+  TextTable table({"phase", "time", "part", "cores", "read a node", "written a node", "peak memory so far"});
+  double all_s = 0;
+  for (const Progress::Phase& phase : report.phases) all_s += phase.seconds;
+  for (const Progress::Phase& phase : report.phases)
+    table.add({phase.name, shortSeconds(phase.seconds), fmt::format("{:.0f} %", 100 * phase.seconds / all_s),
+               fmt::format("{:.2f}", phase.usage.cpu_seconds / std::max(phase.seconds, 1e-9)),
+               fmt::format("{:.1f} B", aNode(report, phase.usage.bytes_read)),
+               fmt::format("{:.1f} B", aNode(report, phase.usage.bytes_written)),
+               fmt::format("{} MiB", phase.usage.peak_memory_bytes >> 20)});
+  return table.text();
+}
+
+std::string conversionSummary(const ConversionReport& report, const Measurements& measurements) {
+  const std::string prefix = report.cold ? "conversion/cold/" : "conversion/warm/";
+  const Measurement& rate = *measurements.find(prefix + "rate");
+  std::string text = shortCount(medianOf(rate.samples)) + " nodes/s";
+  if (rate.samples.size() > 1)
+    text += fmt::format(", median of {} runs, spread {:.0f} %", rate.samples.size(),
+                        100 * spreadOf(rate.samples));
+  text += "\n";
+  if (report.peak_memory_bytes > 0)
+    text += fmt::format("{} MiB of memory at the most\n", report.peak_memory_bytes >> 20);
+  return text + fmt::format("a node takes {:.2f} B of temporary disk, and {:.2f} B in the cache\n",
+                            aNode(report, report.last.temporary_bytes),
+                            *measurements.median(prefix + "cache") / static_cast<double>(report.nodes()));
+}
+
+Plots conversionPlots(const ConversionReport& report) {
+  BarPanel times{"Time", "seconds", {}, {}}, bytes{"Bytes a node", "bytes", {}, {"read", "written"}},
+      memory{"Peak memory so far", "MiB", {}, {}};
+  for (const Progress::Phase& phase : report.phases) {
+    times.bars.push_back({phase.name, phase.seconds, shortSeconds(phase.seconds), 0});
+    const double read = aNode(report, phase.usage.bytes_read);
+    const double written = aNode(report, phase.usage.bytes_written);
+    bytes.bars.push_back({phase.name, read, fmt::format("{:.1f}", read), 0});
+    bytes.bars.push_back({"", written, fmt::format("{:.1f}", written), 1});
+    const auto peak = static_cast<double>(phase.usage.peak_memory_bytes >> 20);
+    memory.bars.push_back({phase.name, peak, fmt::format("{:.0f}", peak), 0});
+  }
+  return {{"conversion.png", drawPlot(std::vector{times, bytes, memory})}};
+}
+
+Json toJson(const ConversionReport& report) {
+  Json json{{"scene", "wake"},
+            {"size", {report.size.ni, report.size.nj, report.size.nk}},
+            {"nodes", report.nodes()},
+            {"grid_files_cold", report.cold},
+            {"threads", report.last.threads},
+            {"memory_bytes", report.last.memory_bytes},
+            {"phases", Json::array()}};
+  for (const Progress::Phase& phase : report.phases)
+    json["phases"].push_back({{"name", phase.name},
+                              {"seconds", phase.seconds},
+                              {"cpu_seconds", phase.usage.cpu_seconds},
+                              {"bytes_read", phase.usage.bytes_read},
+                              {"bytes_written", phase.usage.bytes_written},
+                              {"peak_memory_bytes", phase.usage.peak_memory_bytes}});
+  return json;
+}
+
+}  // namespace curvisplat

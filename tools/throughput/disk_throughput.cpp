@@ -1,0 +1,212 @@
+#include "tools/throughput/disk_throughput.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <random>
+
+#include "stream/base/direct_file.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/cache/cache_format.h"
+#include "stream/paging/async_reads.h"
+#include "tools/throughput/machine.h"
+#include "tools/throughput/page_cache.h"
+
+namespace curvisplat {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Way = DiskRun::Way;
+
+constexpr uint64_t kLargestBlock = kDiskBlocks.back();
+constexpr Way kWays[] = {Way::direct, Way::direct_pread, Way::buffered_cold, Way::buffered_warm};
+
+const char* nameOf(Way way) {
+  switch (way) {
+    case Way::direct:
+      return "direct";
+    case Way::direct_pread:
+      return "direct-pread";
+    case Way::buffered_cold:
+      return "buffered-cold";
+    case Way::buffered_warm:
+      break;
+  }
+  return "buffered-warm";
+}
+
+bool isDirect(Way way) {
+  return way == Way::direct || way == Way::direct_pread;
+}
+
+/// The part of a file that is read from.
+struct Window {
+  const DirectFile* file;
+  uint64_t bytes;  // from the file's beginning
+};
+
+struct Block {
+  const DirectFile* file;
+  uint64_t offset;
+};
+
+/// All blocks of the windows, shuffled, always in the same way.
+std::vector<Block> blocksOf(std::span<const Window> windows, uint64_t block_bytes) {
+  std::vector<Block> blocks;
+  for (const Window& window : windows)
+    for (uint64_t offset = 0; offset < window.bytes; offset += block_bytes)
+      blocks.push_back({window.file, offset});
+  std::mt19937_64 random(1);
+  std::shuffle(blocks.begin(), blocks.end(), random);
+  return blocks;
+}
+
+struct Free {
+  void operator()(std::byte* bytes) const { std::free(bytes); }
+};
+using Buffer = std::unique_ptr<std::byte, Free>;
+
+/// Bytes a second of reading `blocks` until all are read or `most_s` are over.
+double readBlocks(std::span<const Block> blocks, const DiskRun& run, AsyncReads& reads, std::byte* buffer,
+                  double most_s) {
+  const auto start = Clock::now();
+  const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
+  std::vector<size_t> block_of(run.depth);  // [tag]
+  size_t next = 0;
+  unsigned under_way = 0;
+  const auto submit = [&](uint64_t tag) {
+    const Block& block = blocks[block_of[tag]];
+    const int fd = isDirect(run.way) ? block.file->directFd() : block.file->bufferedFd();
+    reads.submit({fd, block.offset, buffer + tag * run.block_bytes, run.block_bytes, tag});
+  };
+  const auto submitNext = [&](uint64_t tag) {
+    block_of[tag] = next++;
+    submit(tag);
+    ++under_way;
+  };
+  uint64_t bytes = 0;
+  int failed = 0;
+  for (uint64_t tag = 0; tag < run.depth && next < blocks.size(); ++tag) submitNext(tag);
+  while (under_way > 0) {
+    const auto end = reads.wait();
+    if (!end) continue;
+    if (end->result == -EINTR || end->result == -EAGAIN) {
+      submit(end->tag);
+      continue;
+    }
+    --under_way;
+    if (end->result < 0) failed = static_cast<int>(-end->result);
+    bytes += static_cast<uint64_t>(std::max<int64_t>(end->result, 0));
+    if (failed == 0 && next < blocks.size() && seconds() < most_s) submitNext(end->tag);
+  }
+  if (failed != 0) throw Error("reading {}: {}", nameOf(run.way), std::strerror(failed));
+  return static_cast<double>(bytes) / seconds();
+}
+
+/// The files of a cache that drawing reads, and what has been found about them.
+class CacheFiles {
+ public:
+  CacheFiles(const CacheReader& cache, size_t variable, uint64_t most_bytes)
+      : paths_{cache.geometryPath(), cache.valuesPath(variable)} {
+    uint64_t all_bytes = 0;
+    for (const auto& path : paths_) all_bytes += std::filesystem::file_size(path);
+    if (const uint64_t available = availableMemory()) most_bytes = std::min(most_bytes, available / 4);
+    const double part = static_cast<double>(most_bytes) / static_cast<double>(all_bytes);
+    for (size_t n = 0; n < paths_.size(); ++n) {
+      files_[n] = std::make_unique<DirectFile>(paths_[n]);
+      const uint64_t bytes = std::filesystem::file_size(paths_[n]);
+      const auto wanted = static_cast<uint64_t>(part * static_cast<double>(bytes)) / kLargestBlock;
+      windows_.push_back({files_[n].get(), std::min(bytes, (wanted + 1) * kLargestBlock)});
+    }
+  }
+
+  std::span<const Window> windows() const { return windows_; }
+  bool areDirect() const {
+    return std::all_of(files_.begin(), files_.end(), [](const auto& file) { return file->isDirect(); });
+  }
+  std::span<const std::filesystem::path> paths() const { return paths_; }
+
+  /// Reads the windows into the page cache. Nothing if all of them are there then, else why not.
+  std::optional<std::string> makeWarm() const {
+    std::vector<std::byte> piece(1 << 20);
+    for (const Window& window : windows_) {
+      const InputFile file(window.file->path());
+      for (uint64_t at = 0; at < window.bytes; at += piece.size())
+        file.readAt(at, std::span(piece).first(std::min<uint64_t>(piece.size(), window.bytes - at)));
+      const PageResidence residence = residenceOf(window.file->path(), 0, window.bytes);
+      if (residence.resident < residence.pages)
+        return fmt::format("only {} of {} pages of {} stay in memory once read", residence.resident,
+                           residence.pages, window.file->path().filename().string());
+    }
+    return std::nullopt;
+  }
+
+ private:
+  const std::array<std::filesystem::path, 2> paths_;
+  std::array<std::unique_ptr<DirectFile>, 2> files_;
+  std::vector<Window> windows_;
+};
+
+/// Nothing if the files are now as `way` wants them, else why not.
+std::optional<std::string> prepareFiles(const CacheFiles& files, Way way) {
+  if (way == Way::buffered_cold) return dropPages(files.paths());
+  if (way == Way::buffered_warm) return files.makeWarm();
+  const std::string file_system = fileSystemOf(files.paths()[0]);
+  if (isInMemory(file_system)) return fmt::format("{} has no disk", file_system);
+  if (!files.areDirect()) return fmt::format("the file system ({}) refuses direct reads", file_system);
+  return std::nullopt;
+}
+
+void measure(const DiskRun& run, const CacheFiles& files, const DiskEffort& effort, Measurements& to) {
+  auto reads = run.way == Way::direct_pread ? nullptr : makeUringReads(run.depth);
+  if (!reads) reads = makeThreadReads(run.depth);
+  const Buffer buffer(static_cast<std::byte*>(std::aligned_alloc(kPageBytes, run.depth * run.block_bytes)));
+  const std::vector<Block> blocks = blocksOf(files.windows(), run.block_bytes);
+  std::vector<double> rates;
+  try {
+    for (unsigned sample = 0; sample < effort.samples; ++sample) {
+      if (const auto reason = prepareFiles(files, run.way)) return to.leaveOut(run.name(), *reason);
+      rates.push_back(readBlocks(blocks, run, *reads, buffer.get(), effort.sample_s));
+    }
+  } catch (const Error& error) {
+    if (!isDirect(run.way)) throw;
+    return to.leaveOut(run.name(), error.what());  // a file system that takes O_DIRECT, and then does not
+  }
+  to.add(run.name(), "B/s", std::move(rates));
+}
+
+}  // namespace
+
+std::string DiskRun::name() const {
+  const bool whole_mib = block_bytes >= 1 << 20;
+  return fmt::format("disk/{}/{}{}/depth:{}", nameOf(way), block_bytes >> (whole_mib ? 20 : 10),
+                     whole_mib ? "MiB" : "KiB", depth);
+}
+
+std::vector<DiskRun> diskRuns() {
+  std::vector<DiskRun> runs;
+  for (const Way way : kWays) {
+    for (const uint64_t block : kDiskBlocks) runs.push_back({way, block, kPagerDepth});
+    for (const unsigned depth : kDiskDepths)
+      if (depth != kPagerDepth) runs.push_back({way, kPagerBlock, depth});
+  }
+  return runs;
+}
+
+void measureDisk(const CacheReader& cache, size_t variable, const DiskEffort& effort, Measurements& to,
+                 Progress& progress) {
+  const CacheFiles files(cache, variable, effort.most_bytes);
+  const std::vector<DiskRun> runs = diskRuns();
+  progress.begin("reading the disk", runs.size(), "ways");
+  for (const DiskRun& run : runs) {
+    measure(run, files, effort, to);
+    progress.advance(1);
+  }
+}
+
+}  // namespace curvisplat

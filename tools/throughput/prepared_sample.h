@@ -1,0 +1,75 @@
+// The bricks of a sample in all the forms that they take on their way to the painter, in memory, so that each
+// stage can be run alone, again and again.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "render/frame/frame_plan.h"
+#include "render/project/depth_sort.h"
+#include "render/project/projection.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/model/splats.h"
+#include "tools/throughput/brick_sample.h"
+
+namespace curvisplat {
+
+class PreparedSample {
+ public:
+  /// Reads, decodes, projects and sorts. All borrowed. Throws Error.
+  PreparedSample(const CacheReader& cache, size_t variable, const FramePlanner& planner,
+                 const FramePlan& plan, const BrickSample& sample);
+
+  /// What a thread works with; reused from brick to brick.
+  struct Scratch {
+    SplatGeometry geometry;
+    SplatVariable values;
+    BrickProjector projector;
+    DepthSorter sorter;
+    std::vector<ScreenSplat> sorted;
+    ReadTimes times;
+  };
+
+  size_t size() const { return bricks_.size(); }
+  uint64_t splats() const { return splats_; }    // of the parts: projected
+  uint64_t decoded() const { return decoded_; }  // of the bricks: decoded
+  uint64_t screenSplats() const { return on_screen_; }
+  uint64_t bytes() const { return bytes_; }  // of the streams
+
+  /// The stages, of the n-th brick. Any thread, with a scratch of its own.
+  void verify(size_t n) const;
+  void decode(size_t n, Scratch& scratch) const;
+  void project(size_t n, Scratch& scratch) const;
+  void sort(size_t n, Scratch& scratch) const;
+  void prepare(size_t n, Scratch& scratch) const;  // all of them
+
+  /// What the painter is given: the splats, sorted, nearest first, and how many each brick has of them.
+  const std::vector<ScreenSplat>& toDraw() const { return to_draw_; }
+  const std::vector<uint32_t>& segments() const { return segments_; }
+
+ private:
+  struct SampledBrick {
+    BrickPart part;
+    std::vector<std::byte> geometry_bytes, values_bytes;
+    SplatGeometry geometry;
+    SplatVariable values;
+    std::vector<float> depths;  // of its splats on the screen, unsorted
+    std::vector<ScreenSplat> projected;
+  };
+
+  void verifyAndDecode(size_t n, Scratch& scratch) const;
+  void project(const SampledBrick& brick, const SplatGeometry& geometry, const SplatVariable& values,
+               BrickProjector& projector) const;
+
+  const CacheReader& cache_;
+  const size_t variable_;
+  const FramePlanner& planner_;
+  const FramePlan& plan_;
+  std::vector<SampledBrick> bricks_;
+  uint64_t splats_ = 0, decoded_ = 0, on_screen_ = 0, bytes_ = 0;
+  std::vector<ScreenSplat> to_draw_;
+  std::vector<uint32_t> segments_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,223 @@
+#include "tools/throughput/stage_throughput.h"
+
+#include <algorithm>
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <set>
+
+#include "render/frame/frame_plan.h"
+#include "stream/base/error.h"
+#include "stream/base/worker_team.h"
+#include "stream/paging/pager.h"
+#include "tools/throughput/page_cache.h"
+#include "tools/throughput/prepared_sample.h"
+#include "tools/throughput/repeated.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kPagerBufferBytes = 32 << 20;  // the most that a frame gives it
+
+std::vector<double> ratesOf(const std::vector<double>& seconds, uint64_t count) {
+  std::vector<double> rates;
+  for (const double each : seconds) rates.push_back(static_cast<double>(count) / each);
+  return rates;
+}
+
+uint64_t streamBytes(const CacheReader& cache, size_t variable, uint32_t brick) {
+  return uint64_t{cache.bricks()[brick].geometry.length} +
+         cache.brickVariables(variable)[brick].values.length;
+}
+
+/// The bricks of `parts`, each once, in their order.
+std::vector<uint32_t> bricksOf(std::span<const BrickPart> parts) {
+  std::set<uint32_t> seen;
+  std::vector<uint32_t> bricks;
+  for (const BrickPart& part : parts)
+    if (seen.insert(part.brick).second) bricks.push_back(part.brick);
+  return bricks;
+}
+
+class Stages {
+ public:
+  Stages(const ThroughputScene& scene, unsigned threads, const StageEffort& effort, Measurements& to,
+         Progress& progress)
+      : scene_(scene),
+        threads_(threads),
+        effort_(effort),
+        to_(to),
+        progress_(progress),
+        planner_(scene.cache, scene.variable, scene.transfer_function),
+        plan_(planner_.plan(scene.orbit(1).front(), scene.options, DrawingOrder::front_to_back)) {
+    report_.frame_splats = plan_.cut.splats;
+  }
+
+  StageReport measure() {
+    const SystemReport system = examineBackends();
+    report_.backends = system.backends;
+    report_.card_draws = system.automatic.starts_with("egl");
+    progress_.begin("measuring the stages", 6 + system.backends.size(), "stages");
+    read();
+    progress_.advance(1);
+    if (plan_.cut.parts.empty()) {
+      to_.leaveOut("stages", "nothing of the data is in the picture, or all of it is transparent");
+      return report_;
+    }
+    const BrickSample chosen = sampleOf(plan_.cut.parts, scene_.cache.bricks(), effort_.most_splats);
+    const PreparedSample sample(scene_.cache, scene_.variable, planner_, plan_, chosen);
+    report_.sampled_splats = sample.splats();
+    using Scratch = PreparedSample::Scratch;
+    onWorkers("verify", sample, sample.decoded(), sample.bytes(),
+              [&](size_t n, Scratch&) { sample.verify(n); });
+    onWorkers("decode", sample, sample.decoded(), sample.bytes(),
+              [&](size_t n, Scratch& scratch) { sample.decode(n, scratch); });
+    onWorkers("project", sample, sample.splats(), 0,
+              [&](size_t n, Scratch& scratch) { sample.project(n, scratch); });
+    onWorkers("sort", sample, sample.screenSplats(), 0,
+              [&](size_t n, Scratch& scratch) { sample.sort(n, scratch); });
+    onWorkers("prepare", sample, sample.splats(), sample.bytes(),
+              [&](size_t n, Scratch& scratch) { sample.prepare(n, scratch); });
+    for (const BackendReport& backend : system.backends) {
+      draw(backend, sample);
+      progress_.advance(1);
+    }
+    return report_;
+  }
+
+ private:
+  /// The pager alone. Direct reads are cold; for others the page cache is emptied.
+  void read() {
+    const std::vector<uint32_t> all = bricksOf(plan_.cut.parts);
+    uint64_t bytes = 0;
+    std::vector<uint32_t> bricks;
+    for (const uint32_t brick : all) {
+      if (bytes > 0 && bytes + streamBytes(scene_.cache, scene_.variable, brick) > effort_.most_read_bytes)
+        break;
+      bytes += streamBytes(scene_.cache, scene_.variable, brick);
+      bricks.push_back(brick);
+    }
+    PagerOptions options;
+    options.buffer_bytes =
+        std::max(kPagerBufferBytes, BrickPager::leastBufferBytes(scene_.cache, scene_.variable));
+    BrickPager pager(scene_.cache, scene_.variable, options);
+    report_.read_by = pager.way();
+    if (bricks.empty()) return to_.leaveOut("stages/read", "the frame has no bricks");
+    const std::filesystem::path files[] = {scene_.cache.geometryPath(),
+                                           scene_.cache.valuesPath(scene_.variable)};
+    std::vector<double> rates;
+    for (unsigned sample = 0; sample < effort_.samples; ++sample) {
+      // Of no use to direct reads, which are cold as they are; but then it cannot be wrong to have done it.
+      const auto reason = dropPages(files);
+      if (reason && report_.read_by.find("direct") == std::string::npos)
+        return to_.leaveOut("stages/read", *reason);
+      const auto start = std::chrono::steady_clock::now();
+      pager.start(bricks);
+      for (size_t n = 0; n < bricks.size(); ++n) {
+        const auto brick = pager.take(n);
+        if (!brick || !brick->readable())
+          throw Error("{}: brick {} cannot be read; `curvisplat info --verify` tells what is damaged",
+                      scene_.cache.path().string(), bricks[n]);
+      }
+      const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      rates.push_back(static_cast<double>(bytes) / seconds);
+    }
+    to_.add("stages/read", "B/s", std::move(rates));
+  }
+
+  using BrickJob = std::function<void(size_t brick, PreparedSample::Scratch&)>;
+
+  /// Runs `job` on every brick of the sample, on one thread and on all.
+  void onWorkers(const std::string& stage, const PreparedSample& sample, uint64_t splats, uint64_t bytes,
+                 const BrickJob& job) {
+    std::set<unsigned> counts{1, threads_};
+    for (const unsigned count : counts) {
+      WorkerTeam team(count, "bench");
+      std::vector<std::unique_ptr<PreparedSample::Scratch>> scratch(count);
+      for (auto& each : scratch) each = std::make_unique<PreparedSample::Scratch>();
+      const auto seconds = secondsOfRuns(effort_.sample_s, effort_.samples, [&] {
+        std::atomic<size_t> next = 0;
+        team.start([&](unsigned worker) {
+          for (size_t n = next++; n < sample.size(); n = next++) job(n, *scratch[worker]);
+        });
+        team.wait();
+        progress_.throwIfStopped();
+      });
+      const std::string name = stageName(stage, count);
+      if (splats > 0) to_.add(name, "splats/s", ratesOf(seconds, splats));
+      if (bytes > 0) to_.add(name + "/bytes", "B/s", ratesOf(seconds, bytes));
+      if (splats == 0) to_.leaveOut(name, "no splat of the sample reaches the screen");
+    }
+    progress_.advance(1);
+  }
+
+  void draw(const BackendReport& found, const PreparedSample& sample) {
+    const std::string stage = "draw/" + found.word;
+    if (!found.works) return to_.leaveOut("stages/" + stage, found.found);
+    if (sample.toDraw().empty())
+      return to_.leaveOut("stages/" + stage, "no splat of the sample reaches the screen");
+    const auto backend = makeBackend(parsedBackend(found.word));
+    // OpenGL's threads are its own; the processor's painter takes as many as it is given.
+    std::set<unsigned> counts{0};
+    if (found.word == "cpu") counts = {1, threads_};
+    for (const unsigned count : counts) {
+      const auto seconds = secondsOfDrawing(*backend, sample, count);
+      to_.add(count ? stageName(stage, count) : "stages/" + stage, "splats/s",
+              ratesOf(seconds, sample.screenSplats()));
+    }
+  }
+
+  std::vector<double> secondsOfDrawing(PaintingBackend& backend, const PreparedSample& sample,
+                                       unsigned threads) const {
+    const std::vector<ScreenSplat>& splats = sample.toDraw();
+    const std::span<ScreenSplat> memory = backend.splatMemory(splats.size());
+    std::vector<uint32_t> segments = sample.segments();
+    if (backend.order() == DrawingOrder::front_to_back) {
+      std::copy(splats.begin(), splats.end(), memory.begin());
+    } else {
+      std::reverse_copy(splats.begin(), splats.end(), memory.begin());
+      std::reverse(segments.begin(), segments.end());
+    }
+    return secondsOfRuns(effort_.sample_s, effort_.samples, [&] {
+      backend.run([&](Painter& painter) {
+        painter.begin(plan_.settings.view.size, scene_.options.background, planner_.table(),
+                      plan_.settings.per_pixel, {.threads = threads});
+        size_t begin = 0;
+        for (const uint32_t count : segments) {
+          painter.draw(memory.subspan(begin, count));
+          begin += count;
+        }
+        painter.end();
+        painter.finishDraws();
+      });
+      progress_.throwIfStopped();
+    });
+  }
+
+  static Backend parsedBackend(const std::string& word) {
+    return word == "cpu" ? Backend::cpu : word == "egl" ? Backend::egl : Backend::osmesa;
+  }
+
+  const ThroughputScene& scene_;
+  const unsigned threads_;
+  const StageEffort effort_;
+  Measurements& to_;
+  Progress& progress_;
+  const FramePlanner planner_;
+  const FramePlan plan_;
+  StageReport report_;
+};
+
+}  // namespace
+
+std::string stageName(const std::string& stage, unsigned threads) {
+  return fmt::format("stages/{}/threads:{}", stage, threads);
+}
+
+StageReport measureStages(const ThroughputScene& scene, unsigned threads, const StageEffort& effort,
+                          Measurements& to, Progress& progress) {
+  return Stages(scene, threads, effort, to, progress).measure();
+}
+
+}  // namespace curvisplat

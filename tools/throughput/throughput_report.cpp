@@ -1,0 +1,278 @@
+#include "tools/throughput/throughput_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+#include <map>
+
+#include "tools/throughput/disk_throughput.h"
+#include "tools/throughput/stage_throughput.h"
+#include "tools/throughput/text_table.h"
+
+namespace curvisplat {
+namespace {
+
+struct DiskWay {
+  DiskRun::Way way;
+  const char* words;
+};
+constexpr DiskWay kDiskWays[] = {{DiskRun::Way::direct, "direct"},
+                                 {DiskRun::Way::direct_pread, "direct, pread"},
+                                 {DiskRun::Way::buffered_cold, "buffered, cold"},
+                                 {DiskRun::Way::buffered_warm, "buffered, warm"}};
+constexpr const char* kWorkerStages[] = {"verify", "decode", "project", "sort", "prepare"};
+constexpr const char* kBackends[] = {"cpu", "osmesa", "egl"};
+
+std::string blockWords(double bytes) {
+  return bytes >= 1 << 20 ? fmt::format("{:.0f} MiB", bytes / (1 << 20))
+                          : fmt::format("{:.0f} KiB", bytes / (1 << 10));
+}
+
+double mebibytesOf(double bytes) {
+  return bytes / (1 << 20);
+}
+
+std::string rateCell(std::optional<double> median) {
+  return median ? fmt::format("{:.0f}", mebibytesOf(*median)) : "-";
+}
+
+std::string diskRows(const Measurements& measurements, const std::string& head, std::span<const DiskRun> runs,
+                     const std::function<std::string(const DiskRun&)>& column) {
+  std::vector<std::string> heads{head};
+  for (const DiskRun& run : runs) heads.push_back(column(run));
+  TextTable table(heads);
+  for (const auto& [way, words] : kDiskWays) {
+    std::vector<std::string> row{words};
+    bool any = false;
+    for (DiskRun run : runs) {
+      run.way = way;
+      const auto median = measurements.median(run.name());
+      any |= median.has_value();
+      row.push_back(rateCell(median));
+    }
+    if (any) table.add(row);
+  }
+  return table.empty() ? "" : table.text();
+}
+
+std::vector<DiskRun> byBlock() {
+  std::vector<DiskRun> runs;
+  for (const uint64_t block : kDiskBlocks) runs.push_back({DiskRun::Way::direct, block, kPagerDepth});
+  return runs;
+}
+std::vector<DiskRun> byDepth() {
+  std::vector<DiskRun> runs;
+  for (const unsigned depth : kDiskDepths) runs.push_back({DiskRun::Way::direct, kPagerBlock, depth});
+  return runs;
+}
+
+std::string splatRate(std::optional<double> rate) {
+  return rate ? shortCount(*rate) + " splats/s" : "-";
+}
+
+std::string byteRate(std::optional<double> rate) {
+  return rate ? shortBytes(*rate) + "/s" : "-";
+}
+
+/// A stage's row: on one thread, on all, and how many times as fast those are.
+std::vector<std::string> stageRow(const std::string& words, const Measurements& measurements,
+                                  const std::string& one_name, const std::string& all_name,
+                                  std::string (*cell)(std::optional<double>)) {
+  const auto one = measurements.median(one_name), all = measurements.median(all_name);
+  std::vector<std::string> row{words, cell(one)};
+  if (one_name == all_name) return row;
+  row.push_back(cell(all));
+  if (one && all) row.push_back(fmt::format("{:.2f}", *all / *one));
+  return row;
+}
+
+/// Of what has threads of its own: below "all".
+std::vector<std::string> ownRow(const std::string& words, const std::string& cell, unsigned threads) {
+  return threads > 1 ? std::vector<std::string>{words, "", cell} : std::vector<std::string>{words, cell};
+}
+
+LinePanel diskPanel(const Measurements& measurements, std::span<const DiskRun> runs, bool over_blocks) {
+  LinePanel panel;
+  panel.title = over_blocks ? fmt::format("Disk by the size of a read, {} at once", kPagerDepth)
+                            : fmt::format("Disk by reads at once, {} each",
+                                          blockWords(static_cast<double>(kPagerBlock)));
+  panel.x_name = over_blocks ? "size of a read" : "reads at once";
+  panel.y_name = "MiB/s";
+  panel.log_values = true;  // the disk, and memory
+  panel.x_label = [over_blocks](double x) { return over_blocks ? blockWords(x) : fmt::format("{:g}", x); };
+  for (const auto& [way, words] : kDiskWays) {
+    PlotLine line{words, {}};
+    for (DiskRun run : runs) {
+      run.way = way;
+      if (const auto median = measurements.median(run.name()))
+        line.points.push_back(
+            {over_blocks ? static_cast<double>(run.block_bytes) : run.depth, mebibytesOf(*median)});
+    }
+    if (!line.points.empty()) panel.lines.push_back(std::move(line));
+  }
+  return panel;
+}
+
+BarPanel stagePanel(const Measurements& measurements, unsigned threads) {
+  BarPanel panel;
+  panel.title = "Each stage by itself";
+  panel.x_name = "million splats a second";
+  panel.kinds = {"1 thread"};
+  if (threads > 1) panel.kinds.push_back(fmt::format("{} threads", threads));
+  panel.kinds.push_back("its own threads");
+  const size_t own = panel.kinds.size() - 1;
+  const auto add = [&](const std::string& name, const std::string& label, size_t colour) {
+    const auto rate = measurements.median(name);
+    if (rate) panel.bars.push_back({label, 1e-6 * *rate, shortCount(*rate), colour});
+  };
+  // Checksums are so much faster than all else that nothing else could be read beside them.
+  for (const std::string stage : kWorkerStages) {
+    if (stage == "verify") continue;
+    add(stageName(stage, 1), stage, 0);
+    if (threads > 1) add(stageName(stage, threads), stage, 1);
+  }
+  for (const std::string backend : kBackends) {
+    add(stageName("draw/" + backend, 1), "draw, " + backend, 0);
+    if (threads > 1) add(stageName("draw/" + backend, threads), "draw, " + backend, 1);
+    add("stages/draw/" + backend, "draw, " + backend, own);
+  }
+  return panel;
+}
+
+std::vector<BarPanel> framePanels(std::span<const FramesOfConfiguration> frames) {
+  BarPanel panel;
+  panel.title = "Frames on an orbit";
+  panel.x_name = "seconds";
+  panel.kinds = {"after the first", "the first, from the disk"};
+  for (const FramesOfConfiguration& one : frames) {
+    const FrameConfiguration& with = one.configuration;
+    const std::string label =
+        fmt::format("{:g} px, {} thread{}, {:.0f} MiB", with.lod_pixels, with.threads,
+                    with.threads > 1 ? "s" : "", mebibytesOf(static_cast<double>(with.memory_bytes)));
+    const double seconds = medianFrame(one.warm).total_s;
+    panel.bars.push_back({label, seconds, shortSeconds(seconds), 0});
+    if (one.cold) panel.bars.push_back({"", one.cold->total_s, shortSeconds(one.cold->total_s), 1});
+  }
+  return {panel};
+}
+
+double readPart(const FrameStatistics& frame) {
+  const uint64_t bricks = frame.bricks_read + frame.bricks_cached;
+  return bricks ? static_cast<double>(frame.bricks_read) / static_cast<double>(bricks) : 0;
+}
+
+}  // namespace
+
+std::string diskTable(const Measurements& measurements) {
+  const std::string blocks =
+      diskRows(measurements, fmt::format("MiB/s, {} reads at once", kPagerDepth), byBlock(),
+               [](const DiskRun& run) { return blockWords(static_cast<double>(run.block_bytes)); });
+  const std::string depths =
+      diskRows(measurements, fmt::format("MiB/s, {} a read", blockWords(static_cast<double>(kPagerBlock))),
+               byDepth(), [](const DiskRun& run) { return fmt::format("{} at once", run.depth); });
+  return blocks.empty() ? depths : depths.empty() ? blocks : blocks + "\n" + depths;
+}
+
+std::string stageTable(const Measurements& measurements, unsigned threads) {
+  std::vector<std::string> heads{"stage", "1 thread"};
+  if (threads > 1) heads.insert(heads.end(), {fmt::format("{} threads", threads), "gain"});
+  TextTable table(heads);
+  if (const auto read = measurements.median("stages/read"))
+    table.add(ownRow("read", byteRate(read), threads));
+  const auto add = [&](const std::string& words, const std::string& stage) {
+    const std::string one = stageName(stage, 1), all = stageName(stage, threads);
+    if (!measurements.find(one)) return;
+    table.add(stageRow(words, measurements, one, all, splatRate));
+    if (!measurements.find(one + "/bytes")) return;
+    auto bytes = stageRow("", measurements, one + "/bytes", all + "/bytes", byteRate);
+    bytes.resize(std::min<size_t>(bytes.size(), 3));  // the gain is the same
+    table.add(bytes);
+  };
+  for (const std::string stage : kWorkerStages) add(stage, stage);
+  for (const std::string backend : kBackends) {
+    add("draw, " + backend, "draw/" + backend);
+    if (const auto own = measurements.median("stages/draw/" + backend))
+      table.add(ownRow("draw, " + backend, splatRate(own), threads));
+  }
+  return table.empty() ? "" : table.text();
+}
+
+std::string frameTable(std::span<const FramesOfConfiguration> frames, const Measurements& measurements) {
+  TextTable table({"error", "threads", "memory", "first", "then", "spread", "frames", "splats", "from disk"});
+  for (const FramesOfConfiguration& one : frames) {
+    const FrameStatistics& middle = medianFrame(one.warm);
+    const Measurement& times = *measurements.find(one.configuration.name());
+    table.add({fmt::format("{:g} px", one.configuration.lod_pixels),
+               fmt::format("{}", one.configuration.threads),
+               fmt::format("{:.0f} MiB", mebibytesOf(static_cast<double>(one.configuration.memory_bytes))),
+               one.cold ? shortSeconds(one.cold->total_s) : "-", shortSeconds(medianOf(times.samples)),
+               fmt::format("{:.0f} %", 100 * spreadOf(times.samples)), fmt::format("{}", one.warm.size()),
+               shortCount(static_cast<double>(middle.splats_drawn)),
+               fmt::format("{:.0f} %", 100 * readPart(middle))});
+  }
+  return table.empty() ? "" : table.text();
+}
+
+std::string leftOutTable(const Measurements& measurements) {
+  std::vector<std::string> reasons;
+  std::map<std::string, std::vector<std::string>> names;  // by reason
+  for (const auto& [name, reason] : measurements.leftOut()) {
+    if (!names.count(reason)) reasons.push_back(reason);
+    names[reason].push_back(name);
+  }
+  std::string text;
+  for (const std::string& reason : reasons) {
+    const auto& with = names[reason];
+    text += with.size() == 1 ? fmt::format("{}: {}\n", with.front(), reason)
+                             : fmt::format("{} and {} more: {}\n", with.front(), with.size() - 1, reason);
+  }
+  return text;
+}
+
+Plots throughputPlots(const Measurements& measurements, std::span<const FramesOfConfiguration> frames,
+                      unsigned threads) {
+  Plots plots;
+  const std::vector<DiskRun> blocks = byBlock(), depths = byDepth();
+  const std::vector<LinePanel> disk{diskPanel(measurements, blocks, true),
+                                    diskPanel(measurements, depths, false)};
+  if (!disk[0].lines.empty()) plots["disk.png"] = drawPlot(disk);
+  const BarPanel stages = stagePanel(measurements, threads);
+  if (!stages.bars.empty()) plots["stages.png"] = drawPlot(std::vector{stages});
+  if (!frames.empty()) plots["frames.png"] = drawPlot(framePanels(frames));
+  return plots;
+}
+
+std::optional<Verdict> verdictOf(const Measurements& measurements,
+                                 std::span<const FramesOfConfiguration> frames, unsigned threads,
+                                 bool draws_apart, const std::string& draw_stage) {
+  const auto rate = [&](const std::string& stage) { return measurements.median(stageName(stage, threads)); };
+  const auto verify = rate("verify"), decode = rate("decode"), project = rate("project"), sort = rate("sort");
+  const auto draw = measurements.median(draw_stage);
+  if (frames.empty() || !verify || !decode || !project || !sort || !draw) return std::nullopt;
+
+  const FramesOfConfiguration* finest = nullptr;
+  std::vector<OtherFrame> others;
+  for (const FramesOfConfiguration& one : frames) {
+    const FrameConfiguration& with = one.configuration;
+    const FrameStatistics& middle = medianFrame(one.warm);
+    others.push_back({middle.total_s, with.lod_pixels, with.threads, with.memory_bytes, middle.splats_read});
+    if (with.threads == threads && (!finest || with.lod_pixels < finest->configuration.lod_pixels))
+      finest = &one;
+  }
+  if (!finest) return std::nullopt;
+  const FrameStatistics& middle = medianFrame(finest->warm);
+  const JudgedFrame judged{.seconds = middle.total_s,
+                           .lod_pixels = finest->configuration.lod_pixels,
+                           .threads = threads,
+                           .memory_bytes = finest->configuration.memory_bytes,
+                           .splats_prepared = middle.splats_read,
+                           .splats_drawn = middle.splats_drawn,
+                           .bytes = finest->bytes,
+                           .read_part = readPart(middle),
+                           .draws_apart = draws_apart};
+  const StageSpeeds speeds{measurements.median("stages/read"), *verify, *decode, *project, *sort, *draw};
+  return judge(judged, speeds, others);
+}
+
+}  // namespace curvisplat

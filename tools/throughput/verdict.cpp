@@ -1,0 +1,183 @@
+#include "tools/throughput/verdict.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+
+#include "stream/base/check.h"
+
+namespace curvisplat {
+namespace {
+
+// A gain below this is within the spread of most machines.
+constexpr double kLeastGain = 1.1;
+// Cores are worth their number where they give at least this part of it.
+constexpr double kGoodScaling = 0.7;
+
+struct Stage {
+  const char* name;
+  double seconds;
+};
+
+std::string secondsWords(double seconds) {
+  return seconds < 0.1 ? fmt::format("{:.1f} ms", 1e3 * seconds) : fmt::format("{:.2f} s", seconds);
+}
+
+std::string memoryWords(uint64_t bytes) {
+  return fmt::format("{}M", bytes >> 20);
+}
+
+class Judge {
+ public:
+  Judge(const JudgedFrame& frame, const StageSpeeds& speeds, std::span<const OtherFrame> others)
+      : frame_(frame), speeds_(speeds), others_(others) {
+    CURVISPLAT_CHECK(frame.seconds > 0);
+    const auto prepared = static_cast<double>(frame.splats_prepared);
+    const auto drawn = static_cast<double>(frame.splats_drawn);
+    const double decoded = frame.read_part * prepared;
+    if (speeds.read_bytes_s)
+      read_s_ = frame.read_part * static_cast<double>(frame.bytes) / *speeds.read_bytes_s;
+    draw_s_ = drawn / speeds.draw_splats_s;
+    on_cores_ = {{"decoding", decoded / speeds.verify_splats_s + decoded / speeds.decode_splats_s},
+                 {"projecting", prepared / speeds.project_splats_s},
+                 {"sorting", drawn / speeds.sort_splats_s}};
+    if (!frame.draws_apart) on_cores_.push_back({"drawing", draw_s_});
+    for (const Stage& stage : on_cores_) cores_s_ += stage.seconds;
+  }
+
+  Verdict verdict() {
+    const double card_s = frame_.draws_apart ? draw_s_ : 0;
+    if (read_s_ > std::max(cores_s_, card_s)) {
+      boundApart("reading", read_s_);
+      verdict_.lines.push_back("a faster disk would help");
+    } else if (card_s > cores_s_) {
+      boundApart("drawing", card_s);
+    } else {
+      boundOnCores();
+      adviseCard();
+      adviseCores();
+    }
+    adviseMemory();
+    adviseError();
+    tellDisk();
+    return std::move(verdict_);
+  }
+
+ private:
+  void boundApart(const char* stage, double seconds) {
+    verdict_.stage = stage;
+    verdict_.share = 1;
+    verdict_.lines.push_back(
+        fmt::format("{} bounds the frame: alone it takes {} of {}; the cores' work takes {}", stage,
+                    secondsWords(seconds), secondsWords(frame_.seconds), secondsWords(cores_s_)));
+  }
+
+  void boundOnCores() {
+    std::vector<Stage> sorted = on_cores_;
+    std::stable_sort(sorted.begin(), sorted.end(),
+                     [](const Stage& a, const Stage& b) { return a.seconds > b.seconds; });
+    verdict_.stage = sorted.front().name;
+    verdict_.share = cores_s_ > 0 ? sorted.front().seconds / cores_s_ : 0;
+    std::vector<std::string> words;
+    for (const Stage& stage : sorted)
+      words.push_back(fmt::format("{} {}", stage.name, secondsWords(stage.seconds)));
+    verdict_.lines.push_back(fmt::format("{} bounds the frame: {:.0f} % of the cores' work in {} (alone: {})",
+                                         verdict_.stage, 100 * verdict_.share, secondsWords(frame_.seconds),
+                                         fmt::join(words, ", ")));
+    const double rest = 1 - cores_s_ / frame_.seconds;
+    if (rest > 0.15)
+      verdict_.lines.push_back(fmt::format(
+          "{:.0f} % of the frame is not the stages' own time: they wait for each other, and share "
+          "caches and memory",
+          100 * rest));
+  }
+
+  void adviseCard() {
+    if (frame_.draws_apart || draw_s_ < cores_s_ / 3) return;
+    verdict_.lines.push_back(
+        fmt::format("a graphics card would take drawing off the cores: what is left for them takes {}",
+                    secondsWords(cores_s_ - draw_s_)));
+  }
+
+  /// By the frames of one error and memory that differ in their threads. With --threads 1 a worker and the
+  /// painter have one each: of two cores that says nothing.
+  void adviseCores() {
+    const OtherFrame* one = nullptr;
+    const OtherFrame* all = nullptr;
+    for (const OtherFrame& other : others_) {
+      if (other.threads != 1) continue;
+      for (const OtherFrame& same : others_)
+        if (same.threads == frame_.threads && same.threads > 2 && same.lod_pixels == other.lod_pixels &&
+            same.memory_bytes == other.memory_bytes) {
+          one = &other;
+          all = &same;
+        }
+    }
+    if (!one) return;
+    const double gain = one->seconds / all->seconds;
+    const bool good = gain >= kGoodScaling * all->threads / 2;
+    verdict_.lines.push_back(
+        fmt::format("--threads {} draws --lod-pixels {:g} {:.1f} times as fast as --threads 1: more cores "
+                    "would {}",
+                    all->threads, all->lod_pixels, gain, good ? "help" : "help little"));
+  }
+
+  void adviseMemory() {
+    for (const OtherFrame& more : others_)
+      for (const OtherFrame& less : others_) {
+        if (more.threads != less.threads || more.lod_pixels != less.lod_pixels ||
+            less.memory_bytes != frame_.memory_bytes || more.memory_bytes <= less.memory_bytes)
+          continue;
+        const double gain = less.seconds / more.seconds;
+        verdict_.lines.push_back(
+            gain >= kLeastGain
+                ? fmt::format("--memory {} would help: --lod-pixels {:g} takes {} in the place of {}",
+                              memoryWords(more.memory_bytes), more.lod_pixels, secondsWords(more.seconds),
+                              secondsWords(less.seconds))
+                : fmt::format("more than --memory {} would not help: {} takes {} in the place of {}",
+                              memoryWords(less.memory_bytes), memoryWords(more.memory_bytes),
+                              secondsWords(more.seconds), secondsWords(less.seconds)));
+        return;
+      }
+  }
+
+  void adviseError() {
+    for (const OtherFrame& other : others_) {
+      if (other.lod_pixels <= frame_.lod_pixels || other.threads != frame_.threads ||
+          other.memory_bytes != frame_.memory_bytes || other.splats_prepared == 0)
+        continue;
+      const double gain = frame_.seconds / other.seconds;
+      if (gain < kLeastGain) continue;
+      verdict_.lines.push_back(fmt::format(
+          "--lod-pixels {:g} takes {}, {:.1f} times as fast ({:.1f}x fewer splats)", other.lod_pixels,
+          secondsWords(other.seconds), gain,
+          static_cast<double>(frame_.splats_prepared) / static_cast<double>(other.splats_prepared)));
+    }
+  }
+
+  void tellDisk() {
+    if (!speeds_.read_bytes_s || frame_.bytes == 0) return;
+    const double frames_s = *speeds_.read_bytes_s / static_cast<double>(frame_.bytes);
+    verdict_.lines.push_back(fmt::format(
+        "the disk could feed {:.1f} such frames a second with nothing in memory; {:.0f} % of this "
+        "one's bricks came from it",
+        frames_s, 100 * frame_.read_part));
+  }
+
+  const JudgedFrame& frame_;
+  const StageSpeeds& speeds_;
+  const std::span<const OtherFrame> others_;
+  double read_s_ = 0, draw_s_ = 0, cores_s_ = 0;
+  std::vector<Stage> on_cores_;
+  Verdict verdict_;
+};
+
+}  // namespace
+
+Verdict judge(const JudgedFrame& frame, const StageSpeeds& speeds, std::span<const OtherFrame> others) {
+  return Judge(frame, speeds, others).verdict();
+}
+
+}  // namespace curvisplat
