@@ -11,7 +11,7 @@ packages=(
   # reads without waiting
   liburing-dev
   # grid files
-  libcgns-dev libnetcdf-dev
+  libcgns-dev libhdf5-dev libnetcdf-dev
   # vectors, texts, command line, manifests
   libglm-dev libfmt-dev libcli11-dev nlohmann-json3-dev
   # VTK's files

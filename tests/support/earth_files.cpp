@@ -53,6 +53,7 @@ double value(int variable, size_t time, size_t k, size_t j, size_t i) {
 
 void write(const std::filesystem::path& path, NetcdfFileType type, const std::string& coordinate) {
   NetcdfWriter file(path, type);
+  file.attribute("type", "ROMS/TOMS history file");
   file.dimension("xi_rho", kXi);
   file.dimension("xi_u", kXi - 1);
   file.dimension("eta_rho", kEta);

@@ -44,6 +44,12 @@ void NetcdfWriter::dimension(const std::string& name, size_t length, bool unlimi
   dimensions_.push_back(dimension);
 }
 
+void NetcdfWriter::attribute(const std::string& name, const std::string& text) {
+  check(nc_redef(file_));
+  check(nc_put_att_text(file_, NC_GLOBAL, name.c_str(), text.size(), text.data()));
+  check(nc_enddef(file_));
+}
+
 const NetcdfWriter::Dimension& NetcdfWriter::named(const std::string& name) const {
   const auto found = std::find_if(dimensions_.begin(), dimensions_.end(),
                                   [&](const Dimension& dimension) { return dimension.name == name; });

@@ -31,6 +31,8 @@ class NetcdfWriter {
 
   /// `unlimited`: it is written as such, with so many records.
   void dimension(const std::string& name, size_t length, bool unlimited = false);
+  /// Of the file.
+  void attribute(const std::string& name, const std::string& text);
   void variable(const std::string& name, NetcdfNumbers numbers, const std::vector<std::string>& dimensions,
                 const NetcdfAttributes& attributes, const NetcdfFunction& value);
 

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <span>
 
+#include "preprocess/formats/cgns/cgns_hdf5.h"
 #include "preprocess/formats/common/data_library_lock.h"
 #include "stream/base/check.h"
 #include "stream/base/error.h"
@@ -22,7 +23,7 @@ constexpr size_t kTextRoom = 4096;
 constexpr uint64_t kPieceElements = 1 << 16;
 // Times, units, names: nothing small has more elements.
 constexpr uint64_t kMostSmallElements = 1 << 22;
-// Deflate makes a thousandth of zeros.
+// Deflate, which HDF5 files are compressed with, makes a thousandth of zeros.
 constexpr uint64_t kMostCompression = 1100;
 // A node takes at least so much of a file.
 constexpr uint64_t kLeastNodeBytes = 32;
@@ -66,6 +67,17 @@ void convert(std::string_view type, const std::byte* from, uint64_t count, Value
   if (type == "I4") return convert<int32_t>(from, count, to);
   CURVISPLAT_CHECK(type == "I8");
   convert<int64_t>(from, count, to);
+}
+
+/// The first 32 bytes; fewer of a shorter file are none.
+std::string beginOf(const InputFile& file) {
+  std::string begin(32, '\0');
+  if (file.size() >= begin.size()) file.readAt(0, std::span(begin.data(), begin.size()));
+  return begin;
+}
+
+bool isHdf5(const InputFile& file) {
+  return beginOf(file).starts_with(kHdf5Mark);
 }
 
 struct Selection {
@@ -118,43 +130,32 @@ class CgnsFile::OpenNode {
   bool owned_ = false;
 };
 
-CgnsFile::CgnsFile(std::filesystem::path path) : path_(std::move(path)), bytes_(InputFile(path_).size()) {
+CgnsFile::CgnsFile(std::filesystem::path path) : path_(std::move(path)) {
+  const InputFile file(path_);
+  bytes_ = file.size();
+  if (isHdf5(file)) {
+    hdf5_ = std::make_unique<CgnsHdf5>(path_);
+    return;
+  }
   const std::lock_guard lock(dataLibraryMutex());
-  int type = CGIO_FILE_NONE;
   if (cgio_open_file(path_.c_str(), CGIO_MODE_READ, CGIO_FILE_NONE, &file_) != CGIO_ERR_NONE) fail("");
-  if (cgio_get_root_id(file_, &root_) != CGIO_ERR_NONE || cgio_get_file_type(file_, &type) != CGIO_ERR_NONE) {
+  if (cgio_get_root_id(file_, &root_) != CGIO_ERR_NONE) {
     const std::string message = lastMessage();
     cgio_close_file(file_);
     throw Error("{}: cannot be opened as a CGNS file: {}; copy or write it again", path_.string(), message);
   }
-  hdf5_ = type == CGIO_FILE_HDF5;
 }
 
 CgnsFile::~CgnsFile() {
+  if (hdf5_) return;
   const std::lock_guard lock(dataLibraryMutex());
   cgio_close_file(file_);
 }
 
 bool CgnsFile::recognises(const InputFile& file) {
-  std::array<char, 32> begin{};
-  if (file.size() < begin.size()) return false;
-  file.readAt(0, std::span<char>(begin));
-  const std::string_view mark(begin.data(), begin.size());
+  if (isHdf5(file)) return file.path().extension() == ".cgns" || CgnsHdf5::recognises(file.path());
   // The first four bytes of an ADF file differ between versions.
-  if (mark.substr(4).starts_with("ADF Database Version")) return true;
-  if (!mark.starts_with(kHdf5Mark)) return false;
-  if (file.path().extension() == ".cgns") return true;
-
-  const std::lock_guard lock(dataLibraryMutex());
-  int number = 0;
-  if (cgio_open_file(file.path().c_str(), CGIO_MODE_READ, CGIO_FILE_NONE, &number) != CGIO_ERR_NONE)
-    return false;
-  double root = 0, version = 0;
-  const bool found = cgio_get_root_id(number, &root) == CGIO_ERR_NONE &&
-                     cgio_get_node_id(number, root, "CGNSLibraryVersion", &version) == CGIO_ERR_NONE;
-  if (found) cgio_release_id(number, version);
-  cgio_close_file(number);
-  return found;
+  return beginOf(file).substr(4).starts_with("ADF Database Version");
 }
 
 void CgnsFile::fail(const std::string& node_path) const {
@@ -167,6 +168,7 @@ void CgnsFile::damaged(const std::string& node_path, std::string_view what) cons
 }
 
 std::vector<CgnsNode> CgnsFile::children(const CgnsNode& node) const {
+  if (hdf5_) return hdf5_->children(node);
   const std::lock_guard lock(dataLibraryMutex());
   const OpenNode open(*this, node.path);
   int count = 0;
@@ -198,13 +200,11 @@ std::vector<CgnsNode> CgnsFile::children(const CgnsNode& node) const {
   return nodes;
 }
 
-CgnsShape CgnsFile::shapeOf(const OpenNode& open, const CgnsNode& node) const {
+CgnsShape CgnsFile::storedShape(const OpenNode& open, const CgnsNode& node) const {
   char type[kTextRoom] = {};
   if (cgio_get_data_type(file_, open.id(), type) != CGIO_ERR_NONE) fail(node.path);
   CgnsShape shape{type, {}};
   if (shape.type == "MT" || shape.type == "LK") return {"MT", {}};
-  const uint64_t bytes = bytesOf(shape.type);
-  if (bytes == 0) damaged(node.path, fmt::format("has data of an unknown type '{}'", shape.type));
 
   int dimensions = 0;
   if (cgio_get_dimensions(file_, open.id(), &dimensions, nullptr) != CGIO_ERR_NONE) fail(node.path);
@@ -217,15 +217,27 @@ CgnsShape CgnsFile::shapeOf(const OpenNode& open, const CgnsNode& node) const {
     if (dims[static_cast<size_t>(n)] < 0) damaged(node.path, "has a negative dimension");
     shape.dims.push_back(static_cast<uint64_t>(dims[static_cast<size_t>(n)]));
   }
-  const uint64_t most = bytes_ / bytes * (hdf5_ ? kMostCompression : 1);
-  if (!node.linked && shape.count() > most)
-    damaged(node.path, fmt::format("should have {} values, more than {} bytes hold", shape.count(), bytes_));
+  checkShape(node, shape);
   return shape;
 }
 
+void CgnsFile::checkShape(const CgnsNode& node, const CgnsShape& shape) const {
+  if (shape.type == "MT") return;
+  const uint64_t bytes = bytesOf(shape.type);
+  if (bytes == 0) damaged(node.path, fmt::format("has data of an unknown type '{}'", shape.type));
+  const uint64_t most = bytes_ / bytes * (hdf5_ ? kMostCompression : 1);
+  if (!node.linked && shape.count() > most)
+    damaged(node.path, fmt::format("should have {} values, more than {} bytes hold", shape.count(), bytes_));
+}
+
 CgnsShape CgnsFile::shape(const CgnsNode& node) const {
+  if (hdf5_) {
+    const CgnsShape shape = hdf5_->shape(node);
+    checkShape(node, shape);
+    return shape;
+  }
   const std::lock_guard lock(dataLibraryMutex());
-  return shapeOf(OpenNode(*this, node.path), node);
+  return storedShape(OpenNode(*this, node.path), node);
 }
 
 void CgnsFile::checkSmall(const CgnsNode& node, const CgnsShape& shape, std::string_view type) const {
@@ -238,18 +250,21 @@ void CgnsFile::checkSmall(const CgnsNode& node, const CgnsShape& shape, std::str
 }
 
 std::vector<double> CgnsFile::numbers(const CgnsNode& node) const {
-  const std::lock_guard lock(dataLibraryMutex());
-  const OpenNode open(*this, node.path);
-  const CgnsShape shape = shapeOf(open, node);
-  checkSmall(node, shape, "R8");
-  std::vector<double> values(shape.count());
   if (hdf5_) {
-    if (cgio_read_all_data_type(file_, open.id(), "R8", values.data()) != CGIO_ERR_NONE) fail(node.path);
+    const CgnsShape found = shape(node);
+    checkSmall(node, found, "R8");
+    std::vector<double> values(found.count());
+    hdf5_->readAll(node, values);
     return values;
   }
-  std::vector<std::byte> stored(shape.count() * bytesOf(shape.type));
+  const std::lock_guard lock(dataLibraryMutex());
+  const OpenNode open(*this, node.path);
+  const CgnsShape found = storedShape(open, node);
+  checkSmall(node, found, "R8");
+  std::vector<double> values(found.count());
+  std::vector<std::byte> stored(found.count() * bytesOf(found.type));
   if (cgio_read_all_data(file_, open.id(), stored.data()) != CGIO_ERR_NONE) fail(node.path);
-  convert(shape.type, stored.data(), shape.count(), values.data());
+  convert(found.type, stored.data(), found.count(), values.data());
   return values;
 }
 
@@ -261,33 +276,27 @@ std::string CgnsFile::text(const CgnsNode& node) const {
 }
 
 std::vector<std::string> CgnsFile::texts(const CgnsNode& node) const {
-  const std::lock_guard lock(dataLibraryMutex());
-  const OpenNode open(*this, node.path);
-  const CgnsShape shape = shapeOf(open, node);
-  checkSmall(node, shape, "C1");
-  std::vector<char> stored(shape.count());
-  const int result = hdf5_ ? cgio_read_all_data_type(file_, open.id(), "C1", stored.data())
-                           : cgio_read_all_data(file_, open.id(), stored.data());
-  if (result != CGIO_ERR_NONE) fail(node.path);
+  std::vector<char> stored;
+  size_t column = 0;
+  if (hdf5_) {
+    const CgnsShape found = shape(node);
+    checkSmall(node, found, "C1");
+    column = found.dims[0];
+    stored.resize(found.count());
+    hdf5_->readAll(node, stored);
+  } else {
+    const std::lock_guard lock(dataLibraryMutex());
+    const OpenNode open(*this, node.path);
+    const CgnsShape found = storedShape(open, node);
+    checkSmall(node, found, "C1");
+    column = found.dims[0];
+    stored.resize(found.count());
+    if (cgio_read_all_data(file_, open.id(), stored.data()) != CGIO_ERR_NONE) fail(node.path);
+  }
   std::vector<std::string> texts;
-  const size_t column = shape.dims[0];
   for (size_t begin = 0; begin < stored.size(); begin += column)
     texts.push_back(trimmed(&stored[begin], column));
   return texts;
-}
-
-template <typename Value>
-void CgnsFile::readHdf5(const CgnsNode& node, const CgnsBox& box, const char* type, Value* to) const {
-  const std::lock_guard lock(dataLibraryMutex());
-  const OpenNode open(*this, node.path);
-  const Selection file = selectionOf(box.first, box.count), memory = selectionOf({}, box.count);
-  const std::array<cgsize_t, 3> memory_dims{static_cast<cgsize_t>(box.memory[0]),
-                                            static_cast<cgsize_t>(box.memory[1]),
-                                            static_cast<cgsize_t>(box.count[2])};
-  if (cgio_read_data_type(file_, open.id(), file.start.data(), file.end.data(), file.stride.data(), type, 3,
-                          memory_dims.data(), memory.start.data(), memory.end.data(), memory.stride.data(),
-                          to) != CGIO_ERR_NONE)
-    fail(node.path);
 }
 
 template <typename Value>
@@ -314,11 +323,11 @@ void CgnsFile::readAdf(const CgnsNode& node, const CgnsShape& shape, const CgnsB
 }
 
 void CgnsFile::read(const CgnsNode& node, const CgnsShape& shape, const CgnsBox& box, double* to) const {
-  hdf5_ ? readHdf5(node, box, "R8", to) : readAdf(node, shape, box, to);
+  hdf5_ ? hdf5_->read(node, box, to) : readAdf(node, shape, box, to);
 }
 
 void CgnsFile::read(const CgnsNode& node, const CgnsShape& shape, const CgnsBox& box, float* to) const {
-  hdf5_ ? readHdf5(node, box, "R4", to) : readAdf(node, shape, box, to);
+  hdf5_ ? hdf5_->read(node, box, to) : readAdf(node, shape, box, to);
 }
 
 }  // namespace curvisplat

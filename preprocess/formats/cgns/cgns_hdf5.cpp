@@ -1,0 +1,336 @@
+#include "preprocess/formats/cgns/cgns_hdf5.h"
+
+#include <algorithm>
+#include <array>
+#include <exception>
+#include <optional>
+
+#include "stream/base/check.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kNameBytes = 33, kLabelBytes = 33, kTypeBytes = 3;
+constexpr const char* kData = " data";
+constexpr const char* kLink = " link";
+// libcgns wrote it when it had not yet turned the order of dimensions around.
+constexpr const char* kOldVersion = " version";
+constexpr const char* kLibraryVersion = "CGNSLibraryVersion";
+constexpr int kMaxLinks = 100;
+// A node takes at least so much of a file: a link, and a group with three attributes.
+constexpr uint64_t kLeastNodeBytes = 32;
+constexpr uint64_t kSmallFileNodes = 4096;
+
+/// What HDF5 says of its last call: the first reason that it gives.
+std::string hdf5Reason() {
+  std::string reason;
+  const auto first = [](unsigned, const H5E_error2_t* error, void* text) -> herr_t {
+    try {
+      *static_cast<std::string*>(text) = error->desc ? error->desc : "";
+      return 1;
+    } catch (const std::exception&) {
+      return -1;
+    }
+  };
+  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, first, &reason);
+  return reason.empty() ? "no reason given" : reason;
+}
+
+struct NodeLink {
+  std::string name;
+  bool external = false;
+};
+
+/// The links of a group to nodes, in the order in which they were made where the file knows it. None if the
+/// group cannot be read.
+std::optional<std::vector<NodeLink>> nodeLinksOf(const Hdf5Group& group) {
+  std::vector<NodeLink> links;
+  const auto add = [](hid_t, const char* name, const H5L_info_t* info, void* to) -> herr_t {
+    try {
+      if (*name != ' ')
+        static_cast<std::vector<NodeLink>*>(to)->push_back({name, info->type == H5L_TYPE_EXTERNAL});
+      return 0;
+    } catch (const std::exception&) {
+      return -1;
+    }
+  };
+  for (const H5_index_t order : {H5_INDEX_CRT_ORDER, H5_INDEX_NAME}) {
+    links.clear();
+    hsize_t position = 0;
+    if (H5Literate(group.id(), order, H5_ITER_INC, &position, add, &links) >= 0) return links;
+  }
+  return std::nullopt;
+}
+
+const char* inWords(H5T_class_t type) {
+  switch (type) {
+    case H5T_INTEGER:
+      return "integers";
+    case H5T_FLOAT:
+      return "floating-point numbers";
+    case H5T_STRING:
+      return "strings";
+    case H5T_COMPOUND:
+      return "compounds";
+    case H5T_REFERENCE:
+      return "references";
+    case H5T_VLEN:
+      return "lists of variable length";
+    case H5T_ARRAY:
+      return "arrays";
+    case H5T_ENUM:
+      return "enumerators";
+    case H5T_OPAQUE:
+      return "opaque bytes";
+    default:
+      return "values of an unknown type";
+  }
+}
+
+std::string placeOf(const std::string& node_path) {
+  return node_path.empty() ? "the root" : node_path;
+}
+
+}  // namespace
+
+CgnsHdf5::CgnsHdf5(std::filesystem::path path) : path_(std::move(path)) {
+  const QuietHdf5 quiet;
+  Hdf5File file(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
+  if (!file) unreadable("", "the file");
+  // Programs other than libcgns may leave out the root's; what there is must be right.
+  const Hdf5Group root(H5Gopen2(file.id(), "/", H5P_DEFAULT));
+  if (!root) unreadable("", "the root");
+  const auto check = [&](const char* attribute, size_t max_bytes) {
+    if (H5Aexists(root.id(), attribute) > 0) text(root, "", attribute, max_bytes);
+  };
+  check("name", kNameBytes);
+  check("label", kLabelBytes);
+  check("type", kTypeBytes);
+  file_ = std::move(file);
+}
+
+CgnsHdf5::~CgnsHdf5() {
+  const QuietHdf5 quiet;
+  file_ = Hdf5File();
+}
+
+bool CgnsHdf5::recognises(const std::filesystem::path& path) {
+  const QuietHdf5 quiet;
+  const Hdf5File file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
+  return file && H5Lexists(file.id(), kLibraryVersion, H5P_DEFAULT) > 0 &&
+         Hdf5Group(H5Gopen2(file.id(), kLibraryVersion, H5P_DEFAULT));
+}
+
+void CgnsHdf5::damaged(const std::string& node_path, std::string_view what) const {
+  throw Error("{}: {} {}; the file is damaged or is not CGNS: copy or write it again", path_.string(),
+              placeOf(node_path), what);
+}
+
+void CgnsHdf5::unreadable(const std::string& node_path, std::string_view what) const {
+  throw Error("{}: {}{}{} cannot be read as CGNS (HDF5: {}); if the file is damaged, copy or write it again",
+              path_.string(), node_path, node_path.empty() ? "" : ": ", what, hdf5Reason());
+}
+
+std::string CgnsHdf5::text(const Hdf5Group& group, const std::string& node_path, const char* attribute,
+                           size_t max_bytes) const {
+  const auto wrong = [&](const std::string& found) {
+    damaged(node_path, fmt::format("has an attribute '{}' of {}; expected a text of at most {} bytes",
+                                   attribute, found, max_bytes));
+  };
+  if (H5Aexists(group.id(), attribute) <= 0)
+    damaged(node_path, fmt::format("has no attribute '{}'", attribute));
+  const Hdf5Attribute open(H5Aopen(group.id(), attribute, H5P_DEFAULT));
+  const Hdf5Type type(open ? H5Aget_type(open.id()) : H5I_INVALID_HID);
+  const Hdf5Space space(open ? H5Aget_space(open.id()) : H5I_INVALID_HID);
+  if (!type || !space) unreadable(node_path, fmt::format("attribute '{}'", attribute));
+
+  const H5T_class_t kind = H5Tget_class(type.id());
+  const size_t bytes = H5Tget_size(type.id());
+  const hssize_t count = H5Sget_simple_extent_npoints(space.id());
+  const int rank = H5Sget_simple_extent_ndims(space.id());
+  if (count < 1) wrong("no value");
+  const auto values = static_cast<uint64_t>(count);
+  // libcgns can be built so that it writes letters one by one.
+  const bool letters = kind == H5T_INTEGER && bytes == 1 && rank == 1;
+  if (!letters) {
+    if (kind != H5T_STRING) wrong(inWords(kind));
+    if (H5Tis_variable_str(type.id()) != 0) wrong("a string of variable length");
+    if (values != 1) wrong(fmt::format("{} strings", values));
+  }
+  if (bytes == 0 || bytes > max_bytes || values > max_bytes) wrong(fmt::format("{} bytes", bytes * values));
+  std::string read(bytes * values, '\0');
+  if (H5Aread(open.id(), type.id(), read.data()) < 0)
+    unreadable(node_path, fmt::format("attribute '{}'", attribute));
+  read.resize(std::min(read.find('\0'), read.size()));
+  while (!read.empty() && read.back() == ' ') read.pop_back();
+  return read;
+}
+
+/// The group itself unless it is a link, else the group that the link, and those after it, lead to. Where
+/// that is missing, none if `may_be_missing`, else an Error.
+Hdf5Group CgnsHdf5::behindLinks(Hdf5Group group, const std::string& node_path, bool may_be_missing) const {
+  for (int links = 0; text(group, node_path, "type", kTypeBytes) == "LK"; ++links) {
+    if (links == kMaxLinks) damaged(node_path, fmt::format("is behind more than {} links", kMaxLinks));
+    Hdf5Group target(H5Gopen2(group.id(), kLink, H5P_DEFAULT));
+    if (!target && may_be_missing) return target;
+    if (!target) unreadable(node_path, "what it links to");
+    group = std::move(target);
+  }
+  return group;
+}
+
+/// The group that has a node's data and the nodes below it.
+Hdf5Group CgnsHdf5::open(const std::string& node_path) const {
+  Hdf5Group group(H5Gopen2(file_.id(), "/", H5P_DEFAULT));
+  if (!group) unreadable("", "the root");
+  for (size_t begin = 1; begin < node_path.size();) {
+    const size_t end = std::min(node_path.find('/', begin), node_path.size());
+    const std::string name = node_path.substr(begin, end - begin);
+    Hdf5Group below(H5Gopen2(group.id(), name.c_str(), H5P_DEFAULT));
+    if (!below) unreadable(node_path, "the node");
+    group = behindLinks(std::move(below), node_path.substr(0, end), false);
+    begin = end + 1;
+  }
+  return group;
+}
+
+/// Bounds what is listed by what the files have room for: links may lead from anywhere to anywhere.
+void CgnsHdf5::count(const Hdf5Group& group, size_t nodes, const std::string& node_path) const {
+  std::string name(static_cast<size_t>(std::max<ssize_t>(0, H5Fget_name(group.id(), nullptr, 0))) + 1, '\0');
+  H5Fget_name(group.id(), name.data(), name.size());
+  if (files_.insert(name).second) {
+    const Hdf5File file(H5Iget_file_id(group.id()));
+    hsize_t bytes = 0;
+    if (!file || H5Fget_filesize(file.id(), &bytes) < 0) unreadable(node_path, "the file");
+    files_bytes_ += bytes;
+  }
+  nodes_listed_ += nodes;
+  const uint64_t most = kSmallFileNodes + files_bytes_ / kLeastNodeBytes;
+  if (nodes_listed_ > most)
+    damaged(node_path,
+            fmt::format("has {} nodes below it; of all nodes, {} were met, more than there is room for",
+                        nodes, nodes_listed_));
+}
+
+std::vector<CgnsNode> CgnsHdf5::children(const CgnsNode& node) const {
+  const QuietHdf5 quiet;
+  const Hdf5Group group = open(node.path);
+  const std::optional<std::vector<NodeLink>> links = nodeLinksOf(group);
+  if (!links) unreadable(node.path, "the list of nodes below it");
+  count(group, links->size(), node.path);
+
+  std::vector<CgnsNode> nodes;
+  for (const NodeLink& link : *links) {
+    CgnsNode child{node.path + "/" + link.name, link.name, "", node.linked || link.external};
+    Hdf5Group own(H5Gopen2(group.id(), link.name.c_str(), H5P_DEFAULT));
+    if (!own) unreadable(child.path, "the node");
+    text(own, child.path, "name", kNameBytes);
+    child.linked |= text(own, child.path, "type", kTypeBytes) == "LK";
+    // What a link leads to may be missing: that matters to whoever needs it.
+    if (const Hdf5Group target = behindLinks(std::move(own), child.path, true))
+      child.label = text(target, child.path, "label", kLabelBytes);
+    nodes.push_back(std::move(child));
+  }
+  return nodes;
+}
+
+CgnsHdf5::Data CgnsHdf5::openData(const Hdf5Group& group, const std::string& node_path) const {
+  Data data{Hdf5DataSet(H5Dopen2(group.id(), kData, H5P_DEFAULT)), Hdf5Space()};
+  if (data.set) data.space = Hdf5Space(H5Dget_space(data.set.id()));
+  if (!data.space) unreadable(node_path, "its data");
+  return data;
+}
+
+CgnsShape CgnsHdf5::shape(const CgnsNode& node) const {
+  const QuietHdf5 quiet;
+  const Hdf5Group group = open(node.path);
+  CgnsShape shape{text(group, node.path, "type", kTypeBytes), {}};
+  if (shape.type == "MT") return shape;
+  const Data data = openData(group, node.path);
+  std::array<hsize_t, H5S_MAX_RANK> dims{};
+  const int rank = H5Sget_simple_extent_ndims(data.space.id());
+  if (rank < 0 || H5Sget_simple_extent_dims(data.space.id(), dims.data(), nullptr) != rank)
+    unreadable(node.path, "the shape of its data");
+  if (rank > 1) {
+    const Hdf5Group root(H5Gopen2(group.id(), "/", H5P_DEFAULT));
+    if (root && H5Lexists(root.id(), kOldVersion, H5P_DEFAULT) > 0)
+      throw Error(
+          "{}: {} has its dimensions in the order of CGNS before 3.0; write the file again with CGNS 3.0 "
+          "or later",
+          path_.string(), node.path);
+  }
+  shape.dims.assign(dims.begin(), dims.begin() + rank);
+  std::reverse(shape.dims.begin(), shape.dims.end());
+  return shape;
+}
+
+void CgnsHdf5::checkNumbers(const Data& data, const std::string& node_path) const {
+  const Hdf5Type type(H5Dget_type(data.set.id()));
+  const H5T_class_t kind = type ? H5Tget_class(type.id()) : H5T_NO_CLASS;
+  if (kind != H5T_INTEGER && kind != H5T_FLOAT)
+    damaged(node_path, fmt::format("has data of {}; expected numbers", inWords(kind)));
+}
+
+void CgnsHdf5::readAll(const CgnsNode& node, std::span<double> to) const {
+  const QuietHdf5 quiet;
+  const Data data = openData(open(node.path), node.path);
+  checkNumbers(data, node.path);
+  const hssize_t count = H5Sget_simple_extent_npoints(data.space.id());
+  if (count < 0 || static_cast<uint64_t>(count) != to.size())
+    damaged(node.path, fmt::format("has {} values; expected {}", count, to.size()));
+  if (H5Dread(data.set.id(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, to.data()) < 0)
+    unreadable(node.path, "its data");
+}
+
+void CgnsHdf5::readAll(const CgnsNode& node, std::span<char> to) const {
+  const QuietHdf5 quiet;
+  const Data data = openData(open(node.path), node.path);
+  const Hdf5Type type(H5Dget_type(data.set.id()));
+  const H5T_class_t kind = type ? H5Tget_class(type.id()) : H5T_NO_CLASS;
+  if (kind != H5T_INTEGER || H5Tget_size(type.id()) != 1)
+    damaged(node.path, fmt::format("has data of {}; expected letters", inWords(kind)));
+  const hssize_t count = H5Sget_simple_extent_npoints(data.space.id());
+  if (count < 0 || static_cast<uint64_t>(count) != to.size())
+    damaged(node.path, fmt::format("has {} letters; expected {}", count, to.size()));
+  if (H5Dread(data.set.id(), H5T_NATIVE_CHAR, H5S_ALL, H5S_ALL, H5P_DEFAULT, to.data()) < 0)
+    unreadable(node.path, "its data");
+}
+
+void CgnsHdf5::readBox(const CgnsNode& node, const CgnsBox& box, hid_t type, void* to) const {
+  const QuietHdf5 quiet;
+  const Data data = openData(open(node.path), node.path);
+  checkNumbers(data, node.path);
+  std::array<hsize_t, H5S_MAX_RANK> dims{};
+  if (H5Sget_simple_extent_ndims(data.space.id()) != 3 ||
+      H5Sget_simple_extent_dims(data.space.id(), dims.data(), nullptr) != 3)
+    damaged(node.path, "has data that are not three-dimensional");
+  std::array<hsize_t, 3> first, count;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    first[2 - axis] = box.first[axis];
+    count[2 - axis] = box.count[axis];
+    if (dims[2 - axis] < box.first[axis] || dims[2 - axis] - box.first[axis] < box.count[axis])
+      damaged(node.path, fmt::format("has {} values along {}; expected {}", dims[2 - axis], "ijk"[axis],
+                                     box.first[axis] + box.count[axis]));
+  }
+  CURVISPLAT_CHECK_OP(box.count[0], <=, box.memory[0]);
+  CURVISPLAT_CHECK_OP(box.count[1], <=, box.memory[1]);
+  const std::array<hsize_t, 3> memory_dims{box.count[2], box.memory[1], box.memory[0]}, none{};
+  const Hdf5Space memory(H5Screate_simple(3, memory_dims.data(), nullptr));
+  if (!memory ||
+      H5Sselect_hyperslab(memory.id(), H5S_SELECT_SET, none.data(), nullptr, count.data(), nullptr) < 0 ||
+      H5Sselect_hyperslab(data.space.id(), H5S_SELECT_SET, first.data(), nullptr, count.data(), nullptr) <
+          0 ||
+      H5Dread(data.set.id(), type, memory.id(), data.space.id(), H5P_DEFAULT, to) < 0)
+    unreadable(node.path, "its data");
+}
+
+void CgnsHdf5::read(const CgnsNode& node, const CgnsBox& box, double* to) const {
+  readBox(node, box, H5T_NATIVE_DOUBLE, to);
+}
+
+void CgnsHdf5::read(const CgnsNode& node, const CgnsBox& box, float* to) const {
+  readBox(node, box, H5T_NATIVE_FLOAT, to);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,34 @@
+// A node of a CGNS file, the shape of its data, and a box of them: what the readers of both kinds of files
+// speak.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace curvisplat {
+
+struct CgnsNode {
+  std::string path;  // "/Base/Zone 1/GridCoordinates"; the root's is empty
+  std::string name, label;
+  bool linked = false;  // it, or one above it, lies in another file
+};
+
+/// What a node's data are: a type as CGNS writes it ("R4", "I8", "C1"; "MT": none), and dimensions, the
+/// fastest first.
+struct CgnsShape {
+  std::string type;
+  std::vector<uint64_t> dims;
+  uint64_t count() const;
+  bool real() const { return type == "R4" || type == "R8"; }
+  bool number() const { return real() || type == "I4" || type == "I8"; }
+};
+
+/// A box of a three-dimensional array, and where it goes in memory.
+struct CgnsBox {
+  std::array<uint64_t, 3> first{}, count{};  // in the array, from 0; count is not zero
+  std::array<uint64_t, 2> memory{};          // elements along i and j of the memory that it is read to
+};
+
+}  // namespace curvisplat

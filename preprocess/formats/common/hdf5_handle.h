@@ -1,0 +1,60 @@
+// Handles of HDF5's that close themselves, and a time without its reports. Every call into HDF5, closing
+// included, is made under dataLibraryMutex().
+#pragma once
+
+#include <hdf5.h>
+
+#include <mutex>
+#include <utility>
+
+#include "preprocess/formats/common/data_library_lock.h"
+
+namespace curvisplat {
+
+/// A number that HDF5 gives out. False where it gave none.
+template <herr_t (*kClose)(hid_t)>
+class Hdf5Handle {
+ public:
+  explicit Hdf5Handle(hid_t id = H5I_INVALID_HID) : id_(id) {}
+  ~Hdf5Handle() {
+    if (id_ >= 0) kClose(id_);
+  }
+  Hdf5Handle(Hdf5Handle&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)) {}
+  Hdf5Handle& operator=(Hdf5Handle&& other) noexcept {
+    std::swap(id_, other.id_);
+    return *this;
+  }
+
+  explicit operator bool() const { return id_ >= 0; }
+  hid_t id() const { return id_; }
+
+ private:
+  hid_t id_;
+};
+
+using Hdf5File = Hdf5Handle<H5Fclose>;
+using Hdf5Group = Hdf5Handle<H5Gclose>;
+using Hdf5DataSet = Hdf5Handle<H5Dclose>;
+using Hdf5Attribute = Hdf5Handle<H5Aclose>;
+using Hdf5Type = Hdf5Handle<H5Tclose>;
+using Hdf5Space = Hdf5Handle<H5Sclose>;
+
+/// Holds the lock, and keeps HDF5 from printing what goes wrong: that becomes an Error. What was set before
+/// is set again at the end.
+class QuietHdf5 {
+ public:
+  QuietHdf5() : lock_(dataLibraryMutex()) {
+    H5Eget_auto2(H5E_DEFAULT, &report_, &data_);
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  }
+  ~QuietHdf5() { H5Eset_auto2(H5E_DEFAULT, report_, data_); }
+  QuietHdf5(const QuietHdf5&) = delete;
+  QuietHdf5& operator=(const QuietHdf5&) = delete;
+
+ private:
+  std::lock_guard<std::mutex> lock_;
+  H5E_auto2_t report_ = nullptr;
+  void* data_ = nullptr;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,55 @@
+// Changes HDF5 files into ones that no CGNS library writes: attributes of other types and sizes, links in
+// circles.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+
+namespace curvisplat {
+
+/// What stands where a short fixed text should.
+enum class HostileAttribute {
+  missing,
+  string_of_34,  // one more than any text of CGNS's has
+  long_string,
+  huge_string,
+  variable_string,
+  strings,  // several
+  null_space,
+  empty_space,
+  integer,
+  integers,
+  long_letters,
+  real,
+  compound,
+  reference,
+  variable_list,
+  array,
+  enumerator,
+  opaque,
+};
+inline constexpr int kHostileAttributes = static_cast<int>(HostileAttribute::opaque) + 1;
+
+/// Throws std::runtime_error where HDF5 refuses. Objects are given by their paths.
+class Hdf5Editor {
+ public:
+  explicit Hdf5Editor(const std::filesystem::path& path);
+  ~Hdf5Editor();  // closes the file
+  Hdf5Editor(const Hdf5Editor&) = delete;
+  Hdf5Editor& operator=(const Hdf5Editor&) = delete;
+
+  void replaceAttribute(const std::string& object, const std::string& attribute, HostileAttribute hostile);
+  /// As a fixed string of so many bytes, without an end where `text` fills them.
+  void writeText(const std::string& object, const std::string& attribute, const std::string& text,
+                 size_t bytes);
+  void group(const std::string& path);
+  void softLink(const std::string& target, const std::string& path);
+  void hardLink(const std::string& target, const std::string& path);
+  void remove(const std::string& path);
+
+ private:
+  long long file_;
+};
+
+}  // namespace curvisplat
