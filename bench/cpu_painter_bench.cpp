@@ -71,8 +71,8 @@ void arguments(benchmark::internal::Benchmark* bench) {
     for (const int radius : {2, 4, 8, 16}) bench->Args({radius, kind});
 }
 
-BENCHMARK_CAPTURE(paint, cpu, Backend::cpu)->Apply(arguments);
-BENCHMARK_CAPTURE(paint, osmesa, Backend::osmesa)->Apply(arguments);
+BENCHMARK_CAPTURE(paint, cpu, Backend::kCpu)->Apply(arguments);
+BENCHMARK_CAPTURE(paint, osmesa, Backend::kOsmesa)->Apply(arguments);
 
 }  // namespace
 }  // namespace curvisplat

@@ -95,9 +95,9 @@ Case realCase(const std::string& name, const std::filesystem::path& grid,
   out.length = glm::length(upper - lower) / 3;  // as half-annulus, whose diagonal is 2.6
   for (const char* view : {"iso", "-x"})
     out.views.push_back(
-        {view, Camera::named(view, lower, upper, {kPixels, kPixels}, Projection::orthographic)});
+        {view, Camera::named(view, lower, upper, {kPixels, kPixels}, Projection::kOrthographic)});
   out.views.push_back(
-      {"iso 30", Camera::named("iso", lower, upper, {kPixels, kPixels}, Projection::perspective)});
+      {"iso 30", Camera::named("iso", lower, upper, {kPixels, kPixels}, Projection::kPerspective)});
   out.field = std::move(field);
   return out;
 }
@@ -209,9 +209,9 @@ class Measurement {
     const Image exact = reference(grid, view, function_name, function);
     if (rows_.empty()) fmt::print("{:<18} {:<10} {:<7} {:>31}   {:>31}\n", "", "", "", "per pixel", "flat");
     std::string line = fmt::format("{:<18} {:<10} {:<7}", grid.name, view.name, function_name);
-    for (const auto classification : {Classification::pixel, Classification::flat}) {
+    for (const auto classification : {Classification::kPixel, Classification::kFlat}) {
       for (const double lod_pixels : {0.0, 4.0, 8.0}) {
-        if (quick_ && (lod_pixels > 0 || classification == Classification::flat)) continue;
+        if (quick_ && (lod_pixels > 0 || classification == Classification::kFlat)) continue;
         FrameOptions options = knownFrame(size_);
         options.low_pass_px2 = low_pass_px2_;
         options.lod_pixels = lod_pixels;
@@ -219,7 +219,7 @@ class Measurement {
         uint64_t splats = 0;
         const Image picture = drawCache(cache, function.table, view.camera, options, &splats, backend_);
         const ImageDifference difference = compareImages(picture, exact);
-        const bool flat = classification == Classification::flat;
+        const bool flat = classification == Classification::kFlat;
         line +=
             fmt::format(" {:5.1f}{:>7}", difference.psnr_db, flat ? "" : fmt::format("({}k)", splats / 1000));
         rows_.push_back({{"case", grid.name},
@@ -265,12 +265,12 @@ int run(int argc, char** argv) {
   std::string folder, only = ".*", json;
   double low_pass_px2 = FrameOptions().low_pass_px2;
   bool pictures = false, quick = false;
-  Backend backend = Backend::cpu;
+  Backend backend = Backend::kCpu;
   int pixels = kPixels;
-  const std::map<std::string, Backend> backends{{"cpu", Backend::cpu},
-                                                {"osmesa", Backend::osmesa},
-                                                {"egl", Backend::egl},
-                                                {"auto", Backend::automatic}};
+  const std::map<std::string, Backend> backends{{"cpu", Backend::kCpu},
+                                                {"osmesa", Backend::kOsmesa},
+                                                {"egl", Backend::kEgl},
+                                                {"auto", Backend::kAutomatic}};
   app.add_option("FOLDER", folder, "caches and references; references are kept and used again")->required();
   app.add_option("--only", only, "a regular expression: cases to measure");
   app.add_option("--pixels", pixels, "a side of the pictures; dB are told for the default, 256")

@@ -56,11 +56,11 @@ void readVts(benchmark::State& state, VtsEncoding::Format format, VtsEncoding::C
 }
 using Format = VtsEncoding::Format;
 using Compressor = VtsEncoding::Compressor;
-BENCHMARK_CAPTURE(readVts, raw, Format::appended_raw, Compressor::none)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(readVts, raw_zlib, Format::appended_raw, Compressor::zlib)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(readVts, raw_lz4, Format::appended_raw, Compressor::lz4)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(readVts, base64, Format::inline_base64, Compressor::none)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(readVts, ascii, Format::ascii, Compressor::none)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(readVts, raw, Format::kAppendedRaw, Compressor::kNone)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(readVts, raw_zlib, Format::kAppendedRaw, Compressor::kZlib)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(readVts, raw_lz4, Format::kAppendedRaw, Compressor::kLz4)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(readVts, base64, Format::kInlineBase64, Compressor::kNone)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(readVts, ascii, Format::kAscii, Compressor::kNone)->Unit(benchmark::kMillisecond);
 
 void readCgns(benchmark::State& state, CgnsFileType type) {
   readFormat(state, "grid.cgns", "Pressure", [&](const std::filesystem::path& path) {
@@ -78,8 +78,8 @@ void readCgns(benchmark::State& state, CgnsFileType type) {
     file.solution("flow", "Vertex", {{"Pressure", along(1, 2, 3)}});
   });
 }
-BENCHMARK_CAPTURE(readCgns, hdf5, CgnsFileType::hdf5)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(readCgns, adf, CgnsFileType::adf)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(readCgns, hdf5, CgnsFileType::kHdf5)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(readCgns, adf, CgnsFileType::kAdf)->Unit(benchmark::kMillisecond);
 
 /// Longitude and latitude of one dimension each, levels of depth: the reader bends them around the globe.
 void readNetcdf(benchmark::State& state, NetcdfFileType type) {
@@ -87,7 +87,7 @@ void readNetcdf(benchmark::State& state, NetcdfFileType type) {
     NetcdfWriter file(path, type);
     const auto axis = [&](const char* name, const NetcdfAttributes& attributes, double step) {
       file.dimension(name, kSide);
-      file.variable(name, NetcdfNumbers::double_precision, {name}, attributes,
+      file.variable(name, NetcdfNumbers::kDoublePrecision, {name}, attributes,
                     [=](const std::vector<size_t>& at) { return 1 + step * static_cast<double>(at[0]); });
     };
     axis("depth", {{"units", NetcdfText("m")}, {"positive", NetcdfText("down")}, {"axis", NetcdfText("Z")}},
@@ -95,13 +95,13 @@ void readNetcdf(benchmark::State& state, NetcdfFileType type) {
     axis("lat", {{"units", NetcdfText("degrees_north")}}, 0.1);
     axis("lon", {{"units", NetcdfText("degrees_east")}}, 0.1);
     file.variable(
-        "temp", NetcdfNumbers::single_precision, {"depth", "lat", "lon"}, {{"units", NetcdfText("degC")}},
+        "temp", NetcdfNumbers::kSinglePrecision, {"depth", "lat", "lon"}, {{"units", NetcdfText("degC")}},
         [](const std::vector<size_t>& at) { return static_cast<double>(at[0] + 2 * at[1] + 3 * at[2]); });
   });
 }
-BENCHMARK_CAPTURE(readNetcdf, classic, NetcdfFileType::classic)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(readNetcdf, netcdf4, NetcdfFileType::netcdf4)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(readNetcdf, netcdf4_compressed, NetcdfFileType::netcdf4_compressed)
+BENCHMARK_CAPTURE(readNetcdf, classic, NetcdfFileType::kClassic)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(readNetcdf, netcdf4, NetcdfFileType::kNetcdf4)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(readNetcdf, netcdf4_compressed, NetcdfFileType::kNetcdf4Compressed)
     ->Unit(benchmark::kMillisecond);
 
 }  // namespace

@@ -171,12 +171,12 @@ void pager(benchmark::State& state, bool large, PagerOptions::Way way) {
 
 #define CURVISPLAT_PAGER(name, large)                                                        \
   BENCHMARK_CAPTURE(plainReader, name, large)->UseRealTime()->Unit(benchmark::kMillisecond); \
-  BENCHMARK_CAPTURE(pager, name##_uring, large, PagerOptions::Way::automatic)                \
+  BENCHMARK_CAPTURE(pager, name##_uring, large, PagerOptions::Way::kAutomatic)               \
       ->ArgNames({"octant", "buffer_MiB"})                                                   \
       ->ArgsProduct({{0, 7, 2}, {8, 32}})                                                    \
       ->UseRealTime()                                                                        \
       ->Unit(benchmark::kMillisecond);                                                       \
-  BENCHMARK_CAPTURE(pager, name##_threads, large, PagerOptions::Way::threads)                \
+  BENCHMARK_CAPTURE(pager, name##_threads, large, PagerOptions::Way::kThreads)               \
       ->ArgNames({"octant", "buffer_MiB"})                                                   \
       ->Args({2, 32})                                                                        \
       ->UseRealTime()                                                                        \

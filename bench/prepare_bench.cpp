@@ -150,7 +150,7 @@ BENCHMARK(decodeValues)->ArgName("leaves")->Arg(1)->Arg(0)->Unit(benchmark::kMil
 /// Projects, or projects and sorts; decoding is not counted where `decode` is false.
 void prepare(benchmark::State& state, bool decode, bool sort) {
   const Bricks& bricks = state.range(0) ? Bricks::leaves() : Bricks::inner();
-  const View view(state.range(1) ? Projection::perspective : Projection::orthographic);
+  const View view(state.range(1) ? Projection::kPerspective : Projection::kOrthographic);
   const CacheReader& cache = Bricks::cache();
   std::vector<SplatGeometry> geometry(bricks.bytes.size());
   std::vector<SplatVariable> values(bricks.bytes.size());
@@ -163,7 +163,7 @@ void prepare(benchmark::State& state, bool decode, bool sort) {
     for (size_t n = 0; n < bricks.bytes.size(); ++n) decodeOne(n, n);
   BrickProjector projector;
   DepthSorter sorter;
-  std::vector<ScreenSplat> out(BrickProjector::kMostSplats);
+  std::vector<ScreenSplat> out(BrickProjector::kMaxSplats);
   uint64_t drawn = 0;
   for (auto _ : state) {
     drawn = 0;

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "stream/base/error.h"
+#include "stream/base/message.h"
 #include "stream/base/progress.h"
-#include "stream/base/say.h"
 #include "tools/commands/commands.h"
 #include "tools/output/standard_streams.h"
 
@@ -45,28 +45,28 @@ int run(int argc, char** argv) {
     return 0;
   } catch (const CLI::ParseError& error) {
     if (argc > 1 && argv[1][0] != '-' && app.get_subcommands().empty()) {
-      say("there is no subcommand '{}'; there are {}", argv[1], namesOf(app));
+      printMessage("there is no subcommand '{}'; there are {}", argv[1], namesOf(app));
       return 2;
     }
     if (error.get_exit_code() == 0) return app.exit(error);  // help and versions come this way too
     const std::vector<CLI::App*> chosen = app.get_subcommands();
     const std::string command = "curvisplat" + (chosen.empty() ? "" : " " + chosen.front()->get_name());
-    say("{}; see {} --help", error.what(), command);
+    printMessage("{}; see {} --help", error.what(), command);
     return 2;
   } catch (const UsageError& error) {
-    say("{}", error.what());
+    printMessage("{}", error.what());
     return 2;
   } catch (const Interrupted& interrupted) {
-    say("{}", interrupted.what());
+    printMessage("{}", interrupted.what());
     return 128 + interrupted.signal();  // as a shell says of a process that the signal has ended
   } catch (const std::bad_alloc&) {
-    say("out of memory; give the machine more, or ask for less (--memory, --size)");
+    printMessage("out of memory; give the machine more, or ask for less (--memory, --size)");
     return 1;
   } catch (const std::filesystem::filesystem_error& error) {
-    say("{}: {}", error.path1().string(), error.code().message());
+    printMessage("{}: {}", error.path1().string(), error.code().message());
     return 1;
   } catch (const std::exception& error) {
-    if (std::ferror(stdout) == 0) say("{}", error.what());  // else main() says it
+    if (std::ferror(stdout) == 0) printMessage("{}", error.what());  // else main() says it
     return 1;
   }
 }

@@ -102,7 +102,7 @@ class Addition {
     checkCentring();
     checkNames(report_.scalars, cache_);
     checkDiskSpace(diskNeedsOfAdding(manifest().splats, options.scalars.size(),
-                                     leastValueRecordBytes(options.scalars.size())),
+                                     minValueRecordBytes(options.scalars.size())),
                    options.cache, temporaryFolder(options));
   }
 
@@ -168,7 +168,7 @@ class Addition {
 
   void checkCentring() const {
     const auto words = [](bool cells) { return cells ? "in cells" : "at nodes"; };
-    const bool cells = reader_.centring() == Centring::cell;
+    const bool cells = reader_.centring() == Centring::kCell;
     if (cells != manifest().cells)
       throw Error("{}: its scalars stand {}, and {} {}; convert it to a cache of its own",
                   cache_.path().string(), words(manifest().cells), joined(report_.scalars), words(cells));

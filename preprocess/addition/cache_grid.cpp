@@ -58,7 +58,7 @@ void CacheGrid::read(uint32_t block, const NodeBox& box, std::span<const uint32_
   for (size_t n = 0; n < out.x.size(); ++n)
     out.blank[n] |= !(std::isfinite(out.x[n]) && std::isfinite(out.y[n]) && std::isfinite(out.z[n]));
   if (!drawn_) return;
-  const bool cells = !scalars.empty() && description().scalars[scalars.front()].centring == Centring::cell;
+  const bool cells = !scalars.empty() && description().scalars[scalars.front()].centring == Centring::kCell;
   if (!cells) {
     restrict(block, box, out.blank);
     return;

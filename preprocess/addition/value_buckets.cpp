@@ -19,7 +19,7 @@ uint64_t bytesOf(const Brick& brick, size_t variables) {
   const uint64_t splats = brick.splats;
   const uint64_t merged =
       std::min(splats, uint64_t{1} << (3 * (kLatticeBits - 1))) * sizeof(SplatScalar) * variables;
-  const uint64_t records = brick.isLeaf() ? splats * (mostValueRecordBytes(variables) + sizeof(uint32_t)) : 0;
+  const uint64_t records = brick.isLeaf() ? splats * (maxValueRecordBytes(variables) + sizeof(uint32_t)) : 0;
   return records + brick.geometry.length + splats * 10 * variables + merged;
 }
 
@@ -137,7 +137,7 @@ void ValueLoader::load(const BucketFile& file, uint32_t number, uint32_t bucket,
   for (uint32_t n = 0; n < bricks; ++n)
     if (cache_->bricks()[(*order_)[out.first + n]].isLeaf())
       splats += cache_->bricks()[(*order_)[out.first + n]].splats;
-  if (file.bytes(number) > splats * mostValueRecordBytes(variables_))
+  if (file.bytes(number) > splats * maxValueRecordBytes(variables_))
     throw Error(
         "{}: {} of its bricks hold {} splats, and the grid has more there; this grid is not the one the "
         "cache was made from",

@@ -24,11 +24,11 @@ namespace curvisplat {
 
 inline constexpr int kPlaceBits = 10;
 
-inline constexpr size_t leastValueRecordBytes(size_t variables) {
+inline constexpr size_t minValueRecordBytes(size_t variables) {
   return 14 + 16 * variables;
 }
-inline constexpr size_t mostValueRecordBytes(size_t variables) {
-  return leastValueRecordBytes(variables) + 4 * variables;
+inline constexpr size_t maxValueRecordBytes(size_t variables) {
+  return minValueRecordBytes(variables) + 4 * variables;
 }
 
 /// Where `position` is in `cell`, which holds it: the highest kPlaceBits bits of each axis. The cell's level
@@ -57,7 +57,7 @@ inline std::array<uint32_t, 3> valueRecordPlace(const std::byte* record) {
   return {bits & kMask, bits >> kPlaceBits & kMask, bits >> (2 * kPlaceBits) & kMask};
 }
 inline size_t valueRecordBytes(const std::byte* record, size_t variables) {
-  return recordIsIrregular(record) ? mostValueRecordBytes(variables) : leastValueRecordBytes(variables);
+  return recordIsIrregular(record) ? maxValueRecordBytes(variables) : minValueRecordBytes(variables);
 }
 
 /// Reads a record's values, one a variable.

@@ -142,7 +142,7 @@ struct BucketFile::State {
       : path(file),
         chunk_bytes(chunk),
         buckets(bucket_count),
-        output(std::in_place, file, Caching::direct),
+        output(std::in_place, file, Caching::kDirect),
         writer(*output) {
     CURVISPLAT_CHECK_OP(chunk_bytes % kDirectAlignment, ==, 0u);
   }
@@ -215,7 +215,7 @@ BucketFile::BucketFile(const std::filesystem::path& path, uint32_t buckets, size
 BucketFile::BucketFile(const std::filesystem::path& path, BucketChains chains)
     : state_(std::make_unique<State>(path, chains)) {
   if (!std::filesystem::exists(path)) throw LostBuckets("{}: is gone; convert the grid again", path.string());
-  state_->input.emplace(path, Caching::direct);
+  state_->input.emplace(path, Caching::kDirect);
   state_->require(state_->input->size() >= chains.size, state_->input->size());
 }
 
@@ -258,7 +258,7 @@ void BucketFile::close() {
   for (Bucket& bucket : state_->buckets)
     if (!bucket.buffer.empty()) state_->flush(bucket);
   state_->writer->finish();
-  state_->input.emplace(state_->path, Caching::direct);
+  state_->input.emplace(state_->path, Caching::kDirect);
 }
 
 uint64_t BucketFile::bytes(uint32_t bucket) const {

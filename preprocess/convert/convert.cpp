@@ -52,7 +52,7 @@ Unfinished unfinishedOf(const ConvertOptions& options) {
 
 /// What a cache's manifest tells.
 void reportCache(const Manifest& written, ConvertReport& report) {
-  report.centring = written.cells ? Centring::cell : Centring::node;
+  report.centring = written.cells ? Centring::kCell : Centring::kNode;
   report.nodes = written.nodes;
   report.splats = written.splats;
   report.bricks = written.bricks;
@@ -128,7 +128,7 @@ class Conversion {
   }
 
   void scan() {
-    if (reader_.centring() == Centring::cell) openFaces();
+    if (reader_.centring() == Centring::kCell) openFaces();
     splats_.survey = surveyGrid(reader_, plan_.slab_bytes, faces_.get(), progress_);
     if (faces_) faces_->match(progress_);
     checkRanges(splats_.survey, source_.description(), options_.scalars);
@@ -192,7 +192,7 @@ class Conversion {
     DiskNeeds needs = diskNeeds(nodes_, options_.scalars.size());
     if (workspace_.splats())
       needs.temporary_bytes = 0;
-    else if (reader_.centring() == Centring::cell)
+    else if (reader_.centring() == Centring::kCell)
       needs.temporary_bytes = std::max(needs.temporary_bytes, needsOfFaces().disk_bytes);
     needs.cache_bytes -= std::min(needs.cache_bytes, workspace_.bytesInPartial());
     checkDiskSpace(needs, options_.output, temporaryFolder(options_));
@@ -250,7 +250,7 @@ class Conversion {
     manifest.upper = splats_.survey.upper;
     for (const GridBlock& block : description.blocks)
       manifest.blocks.push_back({block.name, block.ni, block.nj, block.nk});
-    manifest.cells = reader_.centring() == Centring::cell;
+    manifest.cells = reader_.centring() == Centring::kCell;
     manifest.nodes = splats_.survey.nodes;
     manifest.blanked_nodes = splats_.survey.blanked.total();
     manifest.variables = variables();

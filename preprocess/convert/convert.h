@@ -36,7 +36,7 @@ struct FileReport {
 
 /// What a conversion did, and what was odd about the grid.
 struct ConvertReport {
-  Centring centring = Centring::node;  // of the scalars: what nodes and blanked count, nodes or cells
+  Centring centring = Centring::kNode;  // of the scalars: what nodes and blanked count, nodes or cells
   uint64_t nodes = 0;
   BlankCounts blanked;
   uint64_t degenerate = 0;    // splats with an axis of no length, which got one

@@ -21,9 +21,9 @@ constexpr uint64_t kProgramBytes = 64 * kMiB;
 constexpr uint64_t kAllocatorShare = 16;
 constexpr uint64_t kSeamShare = 8;  // of the rest
 // Buckets are built from at least so many splats: some bricks at a time for each thread to work on.
-constexpr uint64_t kLeastBucketSplats = 4 * kMaxBrickSplats;
-constexpr uint64_t kLeastChunkBytes = kMiB / 8, kMostChunkBytes = kMiB;
-constexpr uint32_t kMostBuckets = 4096;
+constexpr uint64_t kMinBucketSplats = 4 * kMaxBrickSplats;
+constexpr uint64_t kMinChunkBytes = kMiB / 8, kMaxChunkBytes = kMiB;
+constexpr uint32_t kMaxBuckets = 4096;
 
 /// Making a brick of kMaxBrickSplats: its splats in double, what the codec lays beside them, and the voxels
 /// that they merge into.
@@ -39,7 +39,7 @@ uint64_t bucketBytesPerSplat(size_t variables) {
 }  // namespace
 
 uint64_t leastMemory(size_t variables) {
-  const uint64_t two_buckets = 2 * kLeastBucketSplats * bucketBytesPerSplat(variables);
+  const uint64_t two_buckets = 2 * kMinBucketSplats * bucketBytesPerSplat(variables);
   const uint64_t exact = kProgramBytes + brickScratchBytes(variables) + two_buckets;
   const uint64_t held_back = exact / (kAllocatorShare - 1) + 1;
   return (exact + held_back + 16 * kMiB - 1) / (16 * kMiB) * (16 * kMiB);
@@ -69,10 +69,10 @@ MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads
 
   plan.chunk_buffer_bytes = bytes / 4;
   plan.most_buckets =
-      static_cast<uint32_t>(std::min<uint64_t>(plan.chunk_buffer_bytes / kLeastChunkBytes, kMostBuckets));
+      static_cast<uint32_t>(std::min<uint64_t>(plan.chunk_buffer_bytes / kMinChunkBytes, kMaxBuckets));
 
   const uint64_t scratch = brickScratchBytes(variables);
-  const uint64_t least_buckets = 2 * kLeastBucketSplats * bucketBytesPerSplat(variables);
+  const uint64_t least_buckets = 2 * kMinBucketSplats * bucketBytesPerSplat(variables);
   const uint64_t affordable = std::max<uint64_t>(1, (bytes - least_buckets) / (2 * scratch));
   plan.threads = static_cast<unsigned>(std::min<uint64_t>(std::max(1u, threads), affordable));
   plan.bucket_splats = (bytes - plan.threads * scratch) / (2 * bucketBytesPerSplat(variables));
@@ -100,7 +100,7 @@ void MemoryPlan::limitBuckets(uint64_t splats, size_t variables) {
 
 size_t MemoryPlan::chunkBytes(uint32_t buckets) const {
   const uint64_t bytes =
-      std::clamp(chunk_buffer_bytes / std::max(1u, buckets), kLeastChunkBytes, kMostChunkBytes);
+      std::clamp(chunk_buffer_bytes / std::max(1u, buckets), kMinChunkBytes, kMaxChunkBytes);
   return bytes / kDirectAlignment * kDirectAlignment;
 }
 

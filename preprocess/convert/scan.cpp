@@ -65,7 +65,7 @@ void checkExtent(const GridSurvey& survey, const NodeReader& reader) {
     throw Error(
         "{}: every one of the {} {} is blanked ({} by the grid, {} by value, {} not finite): there is "
         "nothing to draw",
-        file, survey.nodes, reader.centring() == Centring::cell ? "cells" : "nodes", survey.blanked.by_grid,
+        file, survey.nodes, reader.centring() == Centring::kCell ? "cells" : "nodes", survey.blanked.by_grid,
         survey.blanked.by_value, survey.blanked.not_finite);
   const glm::dvec3 extent = survey.upper - survey.lower;
   const double largest = std::max({extent.x, extent.y, extent.z});
@@ -78,7 +78,7 @@ void checkExtent(const GridSurvey& survey, const NodeReader& reader) {
 
 GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces,
                       Progress& progress) {
-  if (reader.centring() == Centring::cell) {
+  if (reader.centring() == Centring::kCell) {
     const GridSurvey survey = surveyCells(reader, slab_bytes, faces, progress);
     checkExtent(survey, reader);
     return survey;

@@ -44,7 +44,7 @@ class SplatStream {
     tbb::parallel_for(size_t{0}, tasks.size(), [&](size_t task) {
       progress_->throwIfStopped();
       Worker& worker = workers_.local();
-      if (centring_ == Centring::cell)
+      if (centring_ == Centring::kCell)
         computeCellSplats(window, tasks[task], {slab.block, faces_}, worker.cells, worker.splats);
       else
         computeNodeSplats(window, tasks[task], worker.splats);
@@ -155,7 +155,7 @@ ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces,
                            const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams,
                            Progress& progress) {
   SplatStream splats(reader, faces, sink_of_thread, seams, progress);
-  SlabStream slabs(reader, slab_bytes, reader.centring() == Centring::cell ? kCellHalo : kNodeHalo);
+  SlabStream slabs(reader, slab_bytes, reader.centring() == Centring::kCell ? kCellHalo : kNodeHalo);
   while (const LoadedSlab* loaded = slabs.next()) {
     splats.add(*loaded);
     const GridBlock& block = reader.source().description().blocks[loaded->slab.block];

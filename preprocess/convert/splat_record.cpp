@@ -34,7 +34,7 @@ double product(const std::array<double, 3>& axis) {
 void packRecord(const NodeSplat& in, std::span<const SplatScalar> values, const RootPosition& position,
                 std::vector<std::byte>& out) {
   CURVISPLAT_CHECK_OP(in.node, <, kMaxNodes);
-  const bool irregular = !in.regular || in.half_cell != kNoBorder;
+  const bool irregular = !in.regular || in.border_code != kNoBorder;
   const size_t bytes = irregular ? irregularRecordBytes(values.size()) : regularRecordBytes(values.size());
   const size_t start = out.size();
   out.resize(start + bytes);
@@ -64,8 +64,8 @@ void packRecord(const NodeSplat& in, std::span<const SplatScalar> values, const 
   if (irregular) {
     const double cell = product(in.splat.axis);
     putFloat(cell > 0 ? in.splat.weight / cell : 0);
-    std::memcpy(at, &in.half_cell, sizeof in.half_cell);
-    at += sizeof in.half_cell;
+    std::memcpy(at, &in.border_code, sizeof in.border_code);
+    at += sizeof in.border_code;
     for (const SplatScalar& value : values) putFloat(value.variance);
   }
 }
@@ -94,11 +94,11 @@ uint32_t unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScal
   splat.weight = product(splat.axis);
   if (!irregular) return kNoBorder;
   splat.weight *= takeFloat();
-  uint32_t half_cell;
-  std::memcpy(&half_cell, at, sizeof half_cell);
-  at += sizeof half_cell;
+  uint32_t border_code;
+  std::memcpy(&border_code, at, sizeof border_code);
+  at += sizeof border_code;
   for (SplatScalar& value : values) value.variance = takeFloat();
-  return half_cell;
+  return border_code;
 }
 
 }  // namespace curvisplat

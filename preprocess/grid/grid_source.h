@@ -28,14 +28,14 @@ struct GridBlock {
 };
 
 /// Where a scalar's values stand.
-enum class Centring { node, cell };
+enum class Centring { kNode, kCell };
 
 struct GridScalar {
   std::string name;                  // "density"; of a vector's components "Velocity:mag", "Velocity:x"
   std::string unit;                  // may be empty
   std::vector<std::string> aliases;  // other names it answers to
   uint32_t number = 0;               // of the variable in its function file, from 1; 0: it has none
-  Centring centring = Centring::node;
+  Centring centring = Centring::kNode;
   uint32_t function = 0;  // PLOT3D's number of the quantity; 0: it has none
   bool derived = false;   // not in the files: computed from other scalars and the grid
 };

@@ -48,12 +48,12 @@ uint64_t blankMarked(std::span<const uint8_t> mark, std::span<uint8_t> blank) {
 }
 
 Centring centringOf(const GridDescription& description, const std::vector<uint32_t>& scalars) {
-  if (scalars.empty()) return Centring::node;
+  if (scalars.empty()) return Centring::kNode;
   const GridScalar& first = description.scalars.at(scalars.front());
   for (const uint32_t scalar : scalars) {
     const GridScalar& other = description.scalars.at(scalar);
     if (other.centring == first.centring) continue;
-    const bool cells = first.centring == Centring::cell;
+    const bool cells = first.centring == Centring::kCell;
     throw Error(
         "{} stands at nodes and {} in cells: a cache's splats stand for one or the other; convert them to "
         "two caches",
@@ -98,7 +98,7 @@ NodeReader::NodeReader(const GridSource& source, std::vector<uint32_t> scalars,
 BlankCounts NodeReader::read(uint32_t block, const NodeBox& box, NodeArrays& out) const {
   source_->read(block, box, scalars_, out);
   BlankCounts counts;
-  if (centring_ == Centring::cell) {
+  if (centring_ == Centring::kCell) {
     markCells(blank_value_, out);
     return counts;
   }

@@ -9,7 +9,7 @@ namespace curvisplat {
 namespace {
 
 /// Below so many planes beside the two of the halo, strips read less twice than slabs.
-constexpr uint64_t kLeastPlanes = 4;
+constexpr uint64_t kMinPlanes = 4;
 
 /// Rows along j and planes along k of a box whose window has at most `window_rows` rows.
 struct Extent {
@@ -20,7 +20,7 @@ struct Extent {
 Extent extentWithin(const GridBlock& block, uint64_t window_rows, uint64_t margin) {
   const uint64_t planes = window_rows / block.nj;
   if (planes >= block.nk) return {block.nj, block.nk};
-  if (planes >= kLeastPlanes + margin) return {block.nj, planes - margin};
+  if (planes >= kMinPlanes + margin) return {block.nj, planes - margin};
   const auto side = static_cast<uint64_t>(std::sqrt(static_cast<double>(window_rows)));
   const uint64_t k = std::min(side, block.nk);
   const uint64_t j = std::min(window_rows / k, block.nj);

@@ -18,7 +18,7 @@ namespace curvisplat {
 namespace {
 
 // A hexahedron whose volume is so far from its Jacobian's is folded: its axes stay as they are.
-constexpr double kMostVolumeRatio = 8;
+constexpr double kMaxVolumeRatio = 8;
 
 /// What the cells of a box have in common.
 class Cells {
@@ -167,7 +167,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
   const auto set_volume = [&](double determinant) {
     const double volume = determinant + hexahedron.volume_beyond;
     const double ratio = std::abs(volume / determinant);
-    splat.regular = ratio > 1 / kMostVolumeRatio && ratio < kMostVolumeRatio;
+    splat.regular = ratio > 1 / kMaxVolumeRatio && ratio < kMaxVolumeRatio;
     const double scale = splat.regular ? std::cbrt(ratio) : 1.0;
     for (double& axis : splat.splat.axis) axis *= scale;
     splat.splat.weight =
@@ -186,7 +186,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     const double scale = set_volume(lq.determinant);
     const auto rotate = [&](const glm::dvec3& v) { return lq.rotate(v); };
     set_values(scale, rotate);
-    splat.half_cell = borderCode(inwards, rotate);
+    splat.border_code = borderCode(inwards, rotate);
   } else {
     const CellShape shape = shapeFromJacobian(jacobian, smallestAxis(hexahedron.centre));
     splat.splat.axis = shape.axis;
@@ -201,7 +201,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     }
     const auto rotate = [&](const glm::dvec3& v) { return shape.rotation * v; };
     set_values(scale, rotate);
-    splat.half_cell = borderCode(inwards, rotate);
+    splat.border_code = borderCode(inwards, rotate);
   }
   ++count_;
 }

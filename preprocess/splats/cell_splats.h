@@ -7,7 +7,7 @@
 // centres of the neighbouring cells; a missing one (the block ends, or it is not there) makes the difference
 // one-sided.
 //
-// A cell that has no neighbour ends at a border, and its splat remembers where (stream/half_cell.h); there is
+// A cell that has no neighbour ends at a border, and its splat remembers where (stream/border_code.h); there is
 // a neighbour, too, where blocks abut.
 #pragma once
 

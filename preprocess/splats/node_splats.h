@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "preprocess/grid/grid_source.h"
-#include "stream/model/half_cell.h"
+#include "stream/model/border_code.h"
 #include "stream/model/splats.h"
 
 namespace curvisplat {
@@ -29,7 +29,7 @@ namespace curvisplat {
 /// Half the variance of the kernel along an axis: 0.44655², as in render/kernel.h, which is not for here.
 inline constexpr double kBend = 0.5 * 0.44655 * 0.44655;
 
-/// Where a cell ends, as stream/half_cell.h codes it. `inwards`: along i, j, k, 1 or -1 from a border;
+/// Where a cell ends, as stream/border_code.h codes it. `inwards`: along i, j, k, 1 or -1 from a border;
 /// `rotate` gives Q's image of a vector.
 template <typename Rotate>
 uint32_t borderCode(const std::array<double, 3>& inwards, const Rotate& rotate) {
@@ -41,17 +41,17 @@ uint32_t borderCode(const std::array<double, 3>& inwards, const Rotate& rotate) 
     along[axis] = inwards[axis];
     axes[count++] = rotate(along);
   }
-  return count > 0 ? packHalfCell({axes.data(), count}) : kNoBorder;
+  return count > 0 ? packBorderCode({axes.data(), count}) : kNoBorder;
 }
 
 /// A node's splat on its way into the cache.
 struct NodeSplat {
-  uint64_t node = 0;               // number in the whole grid: block after block, i fastest, then j, k
-  Splat splat;                     // position: world units, moved inwards where the node owns a half cell
-  bool regular = true;             // weight is a0 a1 a2, and every variable's variance is 0
-  uint32_t half_cell = kNoBorder;  // stream/half_cell.h
-  bool on_block_face = false;      // may coincide with a node of another face: to be merged by SeamMerger
-  glm::dvec3 node_position{0.0};   // where the node itself is
+  uint64_t node = 0;                 // number in the whole grid: block after block, i fastest, then j, k
+  Splat splat;                       // position: world units, moved inwards where the node owns a half cell
+  bool regular = true;               // weight is a0 a1 a2, and every variable's variance is 0
+  uint32_t border_code = kNoBorder;  // stream/border_code.h
+  bool on_block_face = false;        // may coincide with a node of another face: to be merged by SeamMerger
+  glm::dvec3 node_position{0.0};     // where the node itself is
   double spacing = 0;  // on a block face: the smallest distance > 0 to a neighbour along an axis, 0 if there
                        // is none; the seams' tolerance. Elsewhere 0
 };
@@ -77,9 +77,9 @@ struct BlockWindow {
 /// What is done beyond the linear part of the mapping at the node. Conversion does all of it; tests switch
 /// one off and see what it is worth.
 struct NodeSplatCorrections {
-  bool half_cells = true;  // else a border's node has a whole cell of half the weight, around itself
-  bool middles = true;     // else splats sit at nodes, but for half cells
-  bool bends = true;       // of the scalar
+  bool border_codes = true;  // else a border's node has a whole cell of half the weight, around itself
+  bool middles = true;       // else splats sit at nodes, but for half cells
+  bool bends = true;         // of the scalar
 };
 
 /// Computes the splats of the nodes of `box` that are not blank. Overwrites `out` and keeps its capacity.

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kSimilar = 0.5;    // cosine: of one direction
 constexpr double kOpposite = -0.5;  // of two that close one another
-constexpr double kLeast = 0.1;      // what must be left of a direction at right angles to the others
+constexpr double kMin = 0.1;        // what must be left of a direction at right angles to the others
 
 /// A⁻¹ v by forward substitution.
 glm::dvec3 inFrame(const Splat& s, const glm::dvec3& v) {
@@ -20,8 +20,8 @@ glm::dvec3 inFrame(const Splat& s, const glm::dvec3& v) {
 
 }  // namespace
 
-void OpenBorders::add(const Splat& part, uint32_t half_cell) {
-  const InwardAxes inward = inwardAxes(half_cell);
+void OpenBorders::add(const Splat& part, uint32_t border_code) {
+  const InwardAxes inward = inwardAxes(border_code);
   for (int a = 0; a < inward.count; ++a)
     inward_.push_back({part.factor() * glm::dvec3(inward.axis[a]), parts_});
   ++parts_;
@@ -52,9 +52,9 @@ uint32_t OpenBorders::of(const Splat& merged) const {
   for (glm::dvec3 axis : open) {
     axis = glm::normalize(axis);
     for (size_t n = 0; n < count; ++n) axis -= glm::dot(axis, axes[n]) * axes[n];
-    if (count < 3 && glm::length(axis) > kLeast) axes[count++] = glm::normalize(axis);
+    if (count < 3 && glm::length(axis) > kMin) axes[count++] = glm::normalize(axis);
   }
-  return packHalfCell({axes.data(), count});
+  return packBorderCode({axes.data(), count});
 }
 
 }  // namespace curvisplat

@@ -6,14 +6,14 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "stream/model/half_cell.h"
+#include "stream/model/border_code.h"
 #include "stream/model/splats.h"
 
 namespace curvisplat {
 
 class OpenBorders {
  public:
-  void add(const Splat& part, uint32_t half_cell);
+  void add(const Splat& part, uint32_t border_code);
   /// The half cell of `merged`, the parts' splat. A direction inwards is closed by another part's opposite
   /// one, and several parts' similar ones are one; angles are measured in the merged cell's own frame, where
   /// thin cells are round.

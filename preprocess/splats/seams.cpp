@@ -172,13 +172,13 @@ void Sweep::join(Cluster& cluster, const NodeSplat& node, std::span<const SplatS
     cluster.merger->add(cluster.lowest.splat.position, cluster.lowest.splat, cluster.values);
     cluster.bend.emplace(variables_);
     cluster.bend->add(cluster.lowest.splat, cluster.lowest.splat.position - cluster.leader, cluster.values);
-    cluster.borders.emplace().add(cluster.lowest.splat, cluster.lowest.half_cell);
+    cluster.borders.emplace().add(cluster.lowest.splat, cluster.lowest.border_code);
     cluster.nodes.push_back(cluster.lowest.node);
   }
   cluster.nodes.push_back(node.node);
   cluster.merger->add(node.splat.position, node.splat, values);
   cluster.bend->add(node.splat, node.splat.position - cluster.leader, values);
-  cluster.borders->add(node.splat, node.half_cell);
+  cluster.borders->add(node.splat, node.border_code);
   if (node.node < cluster.lowest.node) cluster.lowest = node;
   ++merged_;
 }
@@ -192,7 +192,7 @@ void Sweep::release(double before) {
     if (cluster.merger) {
       cluster.merger->finish(cluster.lowest.splat, cluster.values);
       cluster.bend->correct(cluster.values);
-      cluster.lowest.half_cell = cluster.borders->of(cluster.lowest.splat);
+      cluster.lowest.border_code = cluster.borders->of(cluster.lowest.splat);
       cluster.lowest.regular = false;
     }
     sink_(cluster.lowest, cluster.values, cluster.nodes);

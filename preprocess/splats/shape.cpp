@@ -55,8 +55,8 @@ double largestEntry(const glm::dmat3& m) {
 /// of small columns (thin cells), which a diagonalisation of mᵀm would lose.
 Svd decompose(const glm::dmat3& m) {
   glm::dmat3 b = m, v(1.0);
-  constexpr int kMostSweeps = 30;  // it converges quadratically; 3x3 takes four to six
-  for (int sweep = 0; sweep < kMostSweeps; ++sweep) {
+  constexpr int kMaxSweeps = 30;  // it converges quadratically; 3x3 takes four to six
+  for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
     const bool turned_01 = makeOrthogonal(b, v, 0, 1);
     const bool turned_02 = makeOrthogonal(b, v, 0, 2);
     const bool turned_12 = makeOrthogonal(b, v, 1, 2);

@@ -23,7 +23,7 @@ namespace {
 
 constexpr Halo kCorners{0, 1};
 constexpr double kPoints = 100'000;  // within all blocks together, about; more at their faces
-constexpr size_t kMostBlocks = 20'000;
+constexpr size_t kMaxBlocks = 20'000;
 constexpr uint64_t kBinsAlongAxis = 64;
 // Less than this of the smaller block is rounding, or chords of a curved face that two blocks cut
 // differently.
@@ -298,7 +298,7 @@ std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_b
                                        const Progress& progress) {
   const size_t blocks = source.description().blocks.size();
   std::vector<BlockOverlap> overlaps;
-  if (blocks < 2 || blocks > kMostBlocks) return overlaps;
+  if (blocks < 2 || blocks > kMaxBlocks) return overlaps;
   const NodeReader reader(source, {}, std::nullopt);
   std::vector<BlockMeasure> measures(blocks);
   std::vector<BlockPoint> points = pickPoints(reader, slab_bytes, progress, measures);
@@ -332,9 +332,9 @@ std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_b
 }
 
 std::string overlapWarning(const GridDescription& description, const std::vector<BlockOverlap>& overlaps) {
-  if (description.blocks.size() > kMostBlocks)
+  if (description.blocks.size() > kMaxBlocks)
     return fmt::format("whether its {} blocks overlap was not looked at: they are more than {}",
-                       description.blocks.size(), kMostBlocks);
+                       description.blocks.size(), kMaxBlocks);
   if (overlaps.empty()) return "";
   std::vector<BlockOverlap> largest = overlaps;
   std::stable_sort(largest.begin(), largest.end(),

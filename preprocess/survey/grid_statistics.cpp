@@ -124,7 +124,7 @@ GridStatistics measureGrid(const GridSource& source, const std::vector<uint32_t>
   std::vector<uint32_t> at_nodes, in_cells;
   std::vector<size_t> of_nodes, of_cells;  // where they stand in `scalars`
   for (size_t n = 0; n < scalars.size(); ++n) {
-    const bool cell = description.scalars[scalars[n]].centring == Centring::cell;
+    const bool cell = description.scalars[scalars[n]].centring == Centring::kCell;
     (cell ? in_cells : at_nodes).push_back(scalars[n]);
     (cell ? of_cells : of_nodes).push_back(n);
   }

@@ -90,7 +90,7 @@ void drawText(cairo_t* cairo, const glm::dvec2& centre, const std::string& text)
 /// The part of a line that is in front of the near plane, in the image; nothing if none is.
 std::optional<std::pair<glm::dvec2, glm::dvec2>> lineInImage(const ScreenView& view, glm::dvec3 a,
                                                              glm::dvec3 b) {
-  if (view.projection == Projection::perspective) {
+  if (view.projection == Projection::kPerspective) {
     if (a.z < view.near && b.z < view.near) return std::nullopt;
     if (a.z < view.near) a += (view.near - a.z) / (b.z - a.z) * (b - a);
     if (b.z < view.near) b += (view.near - b.z) / (a.z - b.z) * (a - b);

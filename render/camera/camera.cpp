@@ -80,7 +80,7 @@ Camera Camera::named(std::string_view view, const glm::dvec3& lower, const glm::
   camera.projection = projection;
   camera.view_angle_deg = view_angle_deg;
   camera.parallel_scale = camera.parallelScaleFor(lower, upper, size);
-  if (projection == Projection::perspective) {
+  if (projection == Projection::kPerspective) {
     // As near as every corner allows. In view space corners lie at depths around -diagonal.
     const double slope = std::tan(view_angle_deg * std::numbers::pi / 360);
     double distance = 0;

@@ -10,14 +10,14 @@
 
 namespace curvisplat {
 
-enum class Projection { orthographic, perspective };
+enum class Projection { kOrthographic, kPerspective };
 
 /// World units; after --scale has been applied to the data.
 struct Camera {
   glm::dvec3 position{0, 0, 1};
   glm::dvec3 focal_point{0, 0, 0};
   glm::dvec3 view_up{0, 1, 0};
-  Projection projection = Projection::orthographic;
+  Projection projection = Projection::kOrthographic;
   double parallel_scale = 1;   // orthographic: half the image's height, world units
   double view_angle_deg = 30;  // perspective: the angle over the image's height
 

@@ -12,7 +12,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kLeastSpan = 1e-6;
+constexpr double kMinSpan = 1e-6;
 
 /// v turned by `angle` around the unit vector `axis` (Rodrigues).
 glm::dvec3 turned(const glm::dvec3& v, const glm::dvec3& axis, double angle) {
@@ -26,7 +26,7 @@ struct Track {
   double zoom = 0;  // logarithm of the parallel scale, or of the half view angle's tangent
 
   explicit Track(const Camera& camera) : position(camera.position), focal_point(camera.focal_point) {
-    zoom = camera.projection == Projection::orthographic
+    zoom = camera.projection == Projection::kOrthographic
                ? std::log(camera.parallel_scale)
                : std::log(std::tan(0.5 * glm::radians(camera.view_angle_deg)));
   }
@@ -82,7 +82,7 @@ CameraPath::CameraPath(std::vector<KeyFrame> key_frames, std::string name)
     : key_frames_(std::move(key_frames)), name_(std::move(name)) {
   if (key_frames_.empty()) throw Error("{}: a camera path needs one key frame or more, found none", name_);
   for (size_t n = 1; n < key_frames_.size(); ++n) {
-    if (!(key_frames_[n].time - key_frames_[n - 1].time >= kLeastSpan))
+    if (!(key_frames_[n].time - key_frames_[n - 1].time >= kMinSpan))
       throw Error(
           "{}: key frame {} is at time {} and the one before it at {}; times must increase by a microsecond "
           "or "
@@ -91,7 +91,7 @@ CameraPath::CameraPath(std::vector<KeyFrame> key_frames, std::string name)
     if (key_frames_[n].camera.projection != key_frames_[0].camera.projection)
       throw Error(
           "{}: key frame {} is {} and the first one is not; a path has one kind of camera", name_, n,
-          key_frames_[n].camera.projection == Projection::perspective ? "perspective" : "orthographic");
+          key_frames_[n].camera.projection == Projection::kPerspective ? "perspective" : "orthographic");
   }
 }
 
@@ -114,7 +114,7 @@ Camera CameraPath::at(double time) const {
     throw Error(
         "{}: at time {}, after key frame {}, the camera passes through its focal point; add a key frame",
         name_, time, n);
-  if (camera.projection == Projection::orthographic)
+  if (camera.projection == Projection::kOrthographic)
     camera.parallel_scale = std::exp(track.zoom);
   else
     camera.view_angle_deg = 2 * glm::degrees(std::atan(std::exp(track.zoom)));

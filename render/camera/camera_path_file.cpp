@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr size_t kMostKeyFrames = 100'000;
+constexpr size_t kMaxKeyFrames = 100'000;
 // Beyond this squares of lengths overflow somewhere.
 constexpr double kLargestNumber = 1e30;
 
@@ -83,7 +83,7 @@ KeyFrame keyFrame(const KeyFrameObject& object) {
   if (object.has("parallel_scale") == object.has("view_angle"))
     object.fail("parallel_scale", "it or view_angle", object.has("view_angle") ? "both" : "neither");
   if (object.has("view_angle")) {
-    key.camera.projection = Projection::perspective;
+    key.camera.projection = Projection::kPerspective;
     key.camera.view_angle_deg = object.number("view_angle", 0, 180, "degrees between 0 and 180");
   } else {
     key.camera.parallel_scale = object.number("parallel_scale", 0, INFINITY, "a number above zero");
@@ -108,8 +108,8 @@ CameraPath CameraPath::fromFile(const std::filesystem::path& path) {
     throw Error("{}: expected a camera path, an object with a list \"key_frames\"; found {}", name,
                 file.is_object() ? "no such field" : kind(file));
   if (!list->is_array()) throw Error("{}, field key_frames: expected a list, found {}", name, kind(*list));
-  if (list->size() > kMostKeyFrames)
-    throw Error("{}, field key_frames: expected at most {} key frames, found {}", name, kMostKeyFrames,
+  if (list->size() > kMaxKeyFrames)
+    throw Error("{}, field key_frames: expected at most {} key frames, found {}", name, kMaxKeyFrames,
                 list->size());
   std::vector<KeyFrame> key_frames;
   for (size_t n = 0; n < list->size(); ++n) key_frames.push_back(keyFrame({name, n, (*list)[n]}));

@@ -66,7 +66,7 @@ double ClassificationTable::integral(double x, int component) const {
 
 glm::dvec4 ClassificationTable::mean(double centre, double half_width) const {
   const auto in_cells = [this](double scalar) {
-    return scale_ * (log_scale_ ? std::log(std::max(scalar, double{kLeastLogarithmic})) : scalar) + bias_;
+    return scale_ * (log_scale_ ? std::log(std::max(scalar, double{kMinLogarithmic})) : scalar) + bias_;
   };
   double from = in_cells(centre - half_width), to = in_cells(centre + half_width);
   if (to - from < 1) {

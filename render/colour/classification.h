@@ -23,7 +23,7 @@ class ClassificationTable {
  public:
   static constexpr int kCells = 4096;
   /// The least scalar that a logarithm is taken of.
-  static constexpr float kLeastLogarithmic = 1e-37f;
+  static constexpr float kMinLogarithmic = 1e-37f;
 
   /// For scalars in about [data_low, data_high]: the table lies where the transfer function changes and data
   /// can be; a quarter of the data's range is added on either side, since means reach beyond the nodes'.
@@ -59,7 +59,7 @@ class ClassificationTable {
  private:
   double integral(double x, int component) const;
   float cellsOf(float scalar) const {
-    return (log_scale_ ? std::log(std::max(scalar, kLeastLogarithmic)) : scalar) * scale() + bias();
+    return (log_scale_ ? std::log(std::max(scalar, kMinLogarithmic)) : scalar) * scale() + bias();
   }
   /// Of next_opaque_, for x in cells.
   static uint32_t element(float x) { return static_cast<uint32_t>(std::clamp(x, -1.0f, float{kCells}) + 1); }

@@ -113,23 +113,23 @@ ColourMap::ColourMap(std::span<const ColourPoint> points, ColourSpace space) : s
 
 void ColourMap::addSegment(const ColourPoint& from, const ColourPoint& to) {
   switch (space_) {
-    case ColourSpace::rgb:
+    case ColourSpace::kRgb:
       segments_.push_back({from.x, to.x, from.rgb, to.rgb});
       return;
-    case ColourSpace::step:
+    case ColourSpace::kStep:
       segments_.push_back({from.x, to.x, to.rgb, to.rgb});
       return;
-    case ColourSpace::lab:
+    case ColourSpace::kLab:
       segments_.push_back({from.x, to.x, labFromRgb(from.rgb), labFromRgb(to.rgb)});
       return;
-    case ColourSpace::hsv:
-    case ColourSpace::hsv_no_wrap: {
+    case ColourSpace::kHsv:
+    case ColourSpace::kHsvNoWrap: {
       glm::dvec3 a = hsvFromRgb(from.rgb), b = hsvFromRgb(to.rgb);
-      if (space_ == ColourSpace::hsv && std::abs(a.x - b.x) > 0.5) (a.x > b.x ? a : b).x -= 1;
+      if (space_ == ColourSpace::kHsv && std::abs(a.x - b.x) > 0.5) (a.x > b.x ? a : b).x -= 1;
       segments_.push_back({from.x, to.x, a, b});
       return;
     }
-    case ColourSpace::diverging: {
+    case ColourSpace::kDiverging: {
       const auto add = [&](double begin, double end, Msh a, Msh b) {
         if (!a.saturated() && b.saturated()) a.hue = hueTowards(b, a.magnitude);
         if (!b.saturated() && a.saturated()) b.hue = hueTowards(a, b.magnitude);
@@ -157,9 +157,9 @@ glm::dvec3 ColourMap::at(double x) const {
   const double part = (x - segment->begin) / (segment->end - segment->begin);
   const glm::dvec3 colour = glm::mix(segment->from, segment->to, part);
   glm::dvec3 rgb = colour;
-  if (space_ == ColourSpace::hsv || space_ == ColourSpace::hsv_no_wrap) rgb = rgbFromHsv(colour);
-  if (space_ == ColourSpace::lab) rgb = rgbFromLab(colour);
-  if (space_ == ColourSpace::diverging) rgb = rgbFromMsh(colour);
+  if (space_ == ColourSpace::kHsv || space_ == ColourSpace::kHsvNoWrap) rgb = rgbFromHsv(colour);
+  if (space_ == ColourSpace::kLab) rgb = rgbFromLab(colour);
+  if (space_ == ColourSpace::kDiverging) rgb = rgbFromMsh(colour);
   return glm::clamp(rgb, 0.0, 1.0);
 }
 

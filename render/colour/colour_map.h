@@ -14,7 +14,7 @@ namespace curvisplat {
 /// ParaView's names: RGB, HSV (the shorter way round the circle of hues), HSVNoWrap, Lab (CIE L*a*b*, D65),
 /// Diverging (Moreland's Msh: Lab in polar form, white between distinct hues), Step (a segment has the colour
 /// of its upper end).
-enum class ColourSpace { rgb, hsv, hsv_no_wrap, lab, diverging, step };
+enum class ColourSpace { kRgb, kHsv, kHsvNoWrap, kLab, kDiverging, kStep };
 
 struct ColourPoint {
   double x;
@@ -38,7 +38,7 @@ class ColourMap {
   };
   void addSegment(const ColourPoint& from, const ColourPoint& to);
 
-  ColourSpace space_ = ColourSpace::rgb;
+  ColourSpace space_ = ColourSpace::kRgb;
   std::vector<Segment> segments_;
   glm::dvec3 first_{0.0}, last_{0.0};
 };

@@ -13,10 +13,10 @@ namespace {
 
 constexpr double kLargestOpacity = 0.9999;
 // Between the ends of a range. What classifies pixels divides by it in single precision.
-constexpr double kLeastLength = 1e-30;
+constexpr double kMinLength = 1e-30;
 
 bool isConstant(double low, double high) {
-  return low <= high && high - low < kLeastLength;
+  return low <= high && high - low < kMinLength;
 }
 
 double toCoordinate(double scalar, bool log_scale) {
@@ -60,9 +60,9 @@ TransferFunction::TransferFunction(TransferFunctionDefinition definition,
   CURVISPLAT_CHECK_OP(opacity_unit, >, 0);
   std::optional<std::pair<double, double>> stretched;
   if (range) {
-    if (!(range->second - range->first >= kLeastLength))
+    if (!(range->second - range->first >= kMinLength))
       throw UsageError("the range {},{} of a transfer function must ascend, by {:g} or more", range->first,
-                       range->second, kLeastLength);
+                       range->second, kMinLength);
     if (log_scale_ && !(range->first > 0))
       throw UsageError("{} is logarithmic: its range {},{} must begin above zero", definition.origin,
                        range->first, range->second);
@@ -87,7 +87,7 @@ TransferFunction::TransferFunction(TransferFunctionDefinition definition,
 
 std::pair<double, double> intervalAround(double low, double high) {
   if (!isConstant(low, high)) return {low, high};
-  const double margin = low == 0 ? 1 : std::max(1e-3 * std::abs(low), kLeastLength);
+  const double margin = low == 0 ? 1 : std::max(1e-3 * std::abs(low), kMinLength);
   return {low - margin, high + margin};
 }
 

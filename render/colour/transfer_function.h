@@ -23,7 +23,7 @@ namespace curvisplat {
 struct TransferFunctionDefinition {
   std::string name;
   std::string origin;  // where it comes from, for messages: "preset 'grey'", "a.json: preset 'X Ray'"
-  ColourSpace colour_space = ColourSpace::rgb;
+  ColourSpace colour_space = ColourSpace::kRgb;
   std::vector<ColourPoint> colours;
   std::vector<OpacityPoint> opacities;  // empty: the default ramp, from the first to the last colour
   bool log_scale = false;               // interpolated in the logarithm of the scalar

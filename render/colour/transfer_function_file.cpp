@@ -130,17 +130,17 @@ std::vector<OpacityPoint> readOpacities(const PresetObject& preset) {
 
 const char* nameOf(ColourSpace space) {
   switch (space) {
-    case ColourSpace::hsv:
+    case ColourSpace::kHsv:
       return "HSV";
-    case ColourSpace::hsv_no_wrap:
+    case ColourSpace::kHsvNoWrap:
       return "HSVNoWrap";
-    case ColourSpace::lab:
+    case ColourSpace::kLab:
       return "Lab";
-    case ColourSpace::diverging:
+    case ColourSpace::kDiverging:
       return "Diverging";
-    case ColourSpace::step:
+    case ColourSpace::kStep:
       return "Step";
-    case ColourSpace::rgb:
+    case ColourSpace::kRgb:
       break;
   }
   return "RGB";
@@ -148,14 +148,14 @@ const char* nameOf(ColourSpace space) {
 
 ColourSpace readColourSpace(const PresetObject& preset) {
   const Json* field = preset.find("ColorSpace");
-  if (!field) return ColourSpace::rgb;
+  if (!field) return ColourSpace::kRgb;
   const std::pair<const char*, ColourSpace> known[] = {
-      {"RGB", ColourSpace::rgb},
-      {"HSV", preset.flag("HSVWrap", true) ? ColourSpace::hsv : ColourSpace::hsv_no_wrap},
-      {"HSVNoWrap", ColourSpace::hsv_no_wrap},
-      {"Lab", ColourSpace::lab},
-      {"Diverging", ColourSpace::diverging},
-      {"Step", ColourSpace::step}};
+      {"RGB", ColourSpace::kRgb},
+      {"HSV", preset.flag("HSVWrap", true) ? ColourSpace::kHsv : ColourSpace::kHsvNoWrap},
+      {"HSVNoWrap", ColourSpace::kHsvNoWrap},
+      {"Lab", ColourSpace::kLab},
+      {"Diverging", ColourSpace::kDiverging},
+      {"Step", ColourSpace::kStep}};
   for (const auto& [name, space] : known)
     if (*field == name) return space;
   preset.fail("ColorSpace", "RGB, HSV, HSVNoWrap, Lab, Diverging or Step", PresetObject::kind(*field));

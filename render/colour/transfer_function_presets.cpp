@@ -47,12 +47,12 @@ struct Preset {
 
 const std::vector<Preset>& presets() {
   static const std::vector<Preset> all{
-      {"viridis", ColourSpace::rgb, fromTable(kViridis), defaultOpacityRamp(0, 1)},
-      {"inferno", ColourSpace::rgb, fromTable(kInferno), defaultOpacityRamp(0, 1)},
-      {"plasma", ColourSpace::rgb, fromTable(kPlasma), defaultOpacityRamp(0, 1)},
+      {"viridis", ColourSpace::kRgb, fromTable(kViridis), defaultOpacityRamp(0, 1)},
+      {"inferno", ColourSpace::kRgb, fromTable(kInferno), defaultOpacityRamp(0, 1)},
+      {"plasma", ColourSpace::kRgb, fromTable(kPlasma), defaultOpacityRamp(0, 1)},
       // Diverging data is about both ends: the middle is left out of sight.
       {"cool-warm",
-       ColourSpace::diverging,
+       ColourSpace::kDiverging,
        {{0, fromHex(0x3b4cc0)}, {0.5, glm::dvec3(0.865)}, {1, fromHex(0xb40426)}},
        {{0, 0.4},
         {0.125, 0.2},
@@ -63,7 +63,7 @@ const std::vector<Preset>& presets() {
         {0.75, 0.08},
         {0.875, 0.2},
         {1, 0.4}}},
-      {"grey", ColourSpace::rgb, {{0, glm::dvec3(0)}, {1, glm::dvec3(1)}}, defaultOpacityRamp(0, 1)},
+      {"grey", ColourSpace::kRgb, {{0, glm::dvec3(0)}, {1, glm::dvec3(1)}}, defaultOpacityRamp(0, 1)},
   };
   return all;
 }

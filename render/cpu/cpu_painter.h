@@ -25,7 +25,7 @@ class CpuPainter final : public Painter {
   CpuPainter();
   ~CpuPainter() override;
 
-  DrawingOrder order() const override { return DrawingOrder::front_to_back; }
+  DrawingOrder order() const override { return DrawingOrder::kFrontToBack; }
   void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table, bool per_pixel,
              const PaintResources& resources = {}) override;
   void draw(std::span<const ScreenSplat> splats) override;

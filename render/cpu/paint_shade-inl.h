@@ -52,7 +52,7 @@ struct Range {
 HWY_INLINE V cellsOf(const ShadingTable& table, V scalar) {
   const Floats d;
   if (table.logScale())
-    scalar = hn::Log(d, hn::Max(scalar, hn::Set(d, ClassificationTable::kLeastLogarithmic)));
+    scalar = hn::Log(d, hn::Max(scalar, hn::Set(d, ClassificationTable::kMinLogarithmic)));
   return hn::MulAdd(scalar, hn::Set(d, table.scale()), hn::Set(d, table.bias()));
 }
 

@@ -63,7 +63,7 @@ std::unique_ptr<PaintingBackend> makeCardBackend(std::string& why_not) {
       why_not = "EGL knows of no graphics card";
       return nullptr;
     }
-    auto card = std::make_unique<GlBackend>(GlLibrary::egl);
+    auto card = std::make_unique<GlBackend>(GlLibrary::kEgl);
     if (!card->isSoftware()) return card;
     why_not = card->name() + " is software";
   } catch (const Error& error) {
@@ -82,13 +82,13 @@ std::span<ScreenSplat> PaintingBackend::splatMemory(size_t count) {
 
 std::unique_ptr<PaintingBackend> makeBackend(Backend backend) {
   switch (backend) {
-    case Backend::osmesa:
-      return std::make_unique<GlBackend>(GlLibrary::osmesa);
-    case Backend::egl:
-      return std::make_unique<GlBackend>(GlLibrary::egl);
-    case Backend::cpu:
+    case Backend::kOsmesa:
+      return std::make_unique<GlBackend>(GlLibrary::kOsmesa);
+    case Backend::kEgl:
+      return std::make_unique<GlBackend>(GlLibrary::kEgl);
+    case Backend::kCpu:
       return std::make_unique<CpuBackend>();
-    case Backend::automatic:
+    case Backend::kAutomatic:
       break;
   }
   std::string why_not;
@@ -99,7 +99,7 @@ std::unique_ptr<PaintingBackend> makeBackend(Backend backend) {
 SystemReport examineBackends() {
   SystemReport report;
   const std::pair<const char*, Backend> backends[] = {
-      {"egl", Backend::egl}, {"osmesa", Backend::osmesa}, {"cpu", Backend::cpu}};
+      {"egl", Backend::kEgl}, {"osmesa", Backend::kOsmesa}, {"cpu", Backend::kCpu}};
   for (const auto& [word, backend] : backends) {
     BackendReport& found = report.backends.emplace_back();
     found.word = word;

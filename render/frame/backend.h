@@ -12,10 +12,10 @@
 namespace curvisplat {
 
 enum class Backend {
-  automatic,  // OpenGL where a graphics card draws, else the processor
-  osmesa,     // OpenGL in software
-  egl,        // OpenGL of a graphics card, or of Mesa's software where there is none
-  cpu
+  kAutomatic,  // OpenGL where a graphics card draws, else the processor
+  kOsmesa,     // OpenGL in software
+  kEgl,        // OpenGL of a graphics card, or of Mesa's software where there is none
+  kCpu
 };
 
 /// A painter, and where it may be used.

@@ -10,7 +10,7 @@ namespace curvisplat {
 namespace {
 
 constexpr double kPixelsToDetail = 2;
-constexpr double kMostReduction = 8;
+constexpr double kMaxReduction = 8;
 
 /// Where a row or column of the whole image lies between two of the reduced one.
 struct Between {
@@ -32,7 +32,7 @@ std::vector<Between> positions(int whole, int reduced, double scale) {
 }  // namespace
 
 ReducedSize::ReducedSize(ImageSize size, double detail_px) : whole_(size), reduced_(size) {
-  const double reduction = std::clamp(detail_px / kPixelsToDetail, 1.0, kMostReduction);
+  const double reduction = std::clamp(detail_px / kPixelsToDetail, 1.0, kMaxReduction);
   if (reduction < 1.5) return;
   // The camera fits its view to the height; the width is what it then takes to show all of it.
   reduced_.height = std::max(1, static_cast<int>(std::lround(size.height / reduction)));

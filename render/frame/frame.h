@@ -39,7 +39,7 @@ class FrameRenderer {
  public:
   /// Throws Error if there is no such backend to be had: which library was tried, and what it said.
   FrameRenderer(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function,
-                Backend backend = Backend::automatic);
+                Backend backend = Backend::kAutomatic);
   ~FrameRenderer();
 
   /// Throws UsageError for a view that makes no picture and for too little memory or max_splats (how much it

@@ -15,13 +15,13 @@ namespace {
 // the stack.
 constexpr uint64_t kReadingBytes = 12 << 20;
 constexpr uint64_t kWorkerBytes = kReadingBytes + uint64_t{kMaxBrickSplats} * 16 * sizeof(float) +
-                                  BrickProjector::kMostSplats * (sizeof(ScreenSplat) + sizeof(float)) +
-                                  BrickProjector::kMostSplats * (2 * 8 + 4) + (uint64_t{2} << 16) * 4 +
+                                  BrickProjector::kMaxSplats * (sizeof(ScreenSplat) + sizeof(float)) +
+                                  BrickProjector::kMaxSplats * (2 * 8 + 4) + (uint64_t{2} << 16) * 4 +
                                   (1 << 20);
-constexpr uint64_t kLeastRingBytes = BrickProjector::kMostSplats * sizeof(ScreenSplat);
+constexpr uint64_t kMinRingBytes = BrickProjector::kMaxSplats * sizeof(ScreenSplat);
 // More does not make a frame faster: they only bridge bricks that take unequally long.
-constexpr uint64_t kMostRingBytes = 64 << 20;
-constexpr uint64_t kMostPagerBytes = 32 << 20;
+constexpr uint64_t kMaxRingBytes = 64 << 20;
+constexpr uint64_t kMaxPagerBytes = 32 << 20;
 // Shares of the image, the painter and the index are whole sixteenths of the memory where there is enough:
 // then a picture of another size finds the cache as the one before has left it.
 constexpr uint64_t kParts = 16;
@@ -31,7 +31,7 @@ constexpr uint64_t kParts = 16;
 FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned threads) {
   const uint64_t image_bytes = 4 * sizeof(float) * fixed.size.pixels();
   const uint64_t exact = fixed.index_bytes + fixed.painter_bytes + image_bytes + fixed.output_bytes;
-  const uint64_t pools = kLeastRingBytes + fixed.least_pager_bytes;
+  const uint64_t pools = kMinRingBytes + fixed.least_pager_bytes;
   const uint64_t least = exact + pools + kWorkerBytes;
   if (memory_bytes < least)
     throw UsageError(
@@ -46,11 +46,11 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
       static_cast<unsigned>(std::min<uint64_t>(wanted, (memory_bytes - taken - pools) / kWorkerBytes));
   uint64_t rest = memory_bytes - taken - pools - budget.workers * kWorkerBytes;
   const uint64_t share = rest / 4;
-  const uint64_t ring_bytes = std::min(kLeastRingBytes + share, kMostRingBytes);
+  const uint64_t ring_bytes = std::min(kMinRingBytes + share, kMaxRingBytes);
   budget.ring_splats = ring_bytes / sizeof(ScreenSplat);
   budget.pager_bytes =
-      std::max(fixed.least_pager_bytes, std::min(fixed.least_pager_bytes + share, kMostPagerBytes));
-  rest -= ring_bytes - kLeastRingBytes;
+      std::max(fixed.least_pager_bytes, std::min(fixed.least_pager_bytes + share, kMaxPagerBytes));
+  rest -= ring_bytes - kMinRingBytes;
   rest -= budget.pager_bytes - fixed.least_pager_bytes;
   budget.cache_bytes = rest;
   return budget;

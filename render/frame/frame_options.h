@@ -13,11 +13,11 @@
 
 namespace curvisplat {
 
-enum class Classification { pixel, flat };  // flat: one colour and extinction a splat, as in the paper
+enum class Classification { kPixel, kFlat };  // flat: one colour and extinction a splat, as in the paper
 
 struct FrameOptions {
   ImageSize size;
-  Classification classification = Classification::pixel;
+  Classification classification = Classification::kPixel;
   double lod_pixels = 1;               // screen-space error allowed; 0 is the finest level
   std::optional<uint64_t> max_splats;  // read at most these, from the levels that make the best of them
   glm::dvec3 scale{1.0};               // stretches the data: D S Dᵀ, V det D, about the world's origin
@@ -28,7 +28,7 @@ struct FrameOptions {
   uint64_t memory_bytes = 512 << 20;
   uint64_t output_bytes = 0;  // of memory_bytes: left for what is done with the image
   bool keep_going = false;    // draw damaged bricks from an ancestor, and report them
-  PagerOptions::Way read_by = PagerOptions::Way::automatic;
+  PagerOptions::Way read_by = PagerOptions::Way::kAutomatic;
   bool direct_reads = true;  // past the page cache, where the file system can
 };
 

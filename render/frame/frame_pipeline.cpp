@@ -68,12 +68,12 @@ FramePipeline::~FramePipeline() {
 FramePipeline::Running::Running(FramePipeline& pipeline) : pipeline_(pipeline) {
   pipeline.endPrefetch();
   const std::lock_guard lock(pipeline.mutex_);
-  pipeline.phase_ = Phase::running;
+  pipeline.phase_ = Phase::kRunning;
 }
 
 FramePipeline::Running::~Running() {
   const std::lock_guard lock(pipeline_.mutex_);
-  pipeline_.phase_ = Phase::idle;
+  pipeline_.phase_ = Phase::kIdle;
 }
 
 void FramePipeline::makePools(const FrameOptions& options) {
@@ -109,12 +109,12 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   makePools(options);
   {
     const std::lock_guard lock(mutex_);
-    if (phase_ == Phase::cancelled) throw Cancelled();
+    if (phase_ == Phase::kCancelled) throw Cancelled();
     pools_->ring.reset();
     hidden_.begin(cache_.bricks(), plan.settings.view);
     // Back to front, nothing ever is; and see FrameWorkers::prepare().
     BrickPager::Unneeded unneeded;
-    if (order() == DrawingOrder::front_to_back && !options.keep_going)
+    if (order() == DrawingOrder::kFrontToBack && !options.keep_going)
       unneeded = [this](uint32_t brick) { return hidden_.hides(brick); };
     pools_->source.start(plan.cut.parts, std::move(unneeded));
   }
@@ -141,7 +141,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   }
   {
     const std::lock_guard lock(mutex_);
-    if (phase_ == Phase::cancelled) throw Cancelled();
+    if (phase_ == Phase::kCancelled) throw Cancelled();
   }
   if (progress) progress->end();
 
@@ -183,8 +183,8 @@ Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, F
 
 void FramePipeline::cancel() {
   const std::lock_guard lock(mutex_);
-  if (phase_ == Phase::idle) return;
-  phase_ = Phase::cancelled;
+  if (phase_ == Phase::kIdle) return;
+  phase_ = Phase::kCancelled;
   if (!pools_) return;
   pools_->ring.close();
   pools_->source.stop();

@@ -76,9 +76,9 @@ class FramePipeline {
   const std::unique_ptr<PaintingBackend> backend_;
   HiddenBricks hidden_;
 
-  enum class Phase { idle, running, cancelled };
+  enum class Phase { kIdle, kRunning, kCancelled };
   std::mutex mutex_;  // guards the two below; cancel() comes from another thread
-  Phase phase_ = Phase::idle;
+  Phase phase_ = Phase::kIdle;
   std::unique_ptr<Pools> pools_;
 };
 

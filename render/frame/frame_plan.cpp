@@ -71,7 +71,7 @@ ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const Fr
 
 ProjectionSettings FramePlanner::settingsFor(const Camera& camera, const FrameOptions& options,
                                              ImageSize size) const {
-  return {screenView(camera, options, size), options.classification == Classification::pixel,
+  return {screenView(camera, options, size), options.classification == Classification::kPixel,
           options.clip_box, cache_.manifest().cells ? kCellBorderParts : kNodeBorderParts};
 }
 

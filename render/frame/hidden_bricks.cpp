@@ -16,7 +16,7 @@ constexpr double kRoundingPixels = 1;
 }  // namespace
 
 ScreenBox screenBoxOf(const Brick& brick, const ScreenView& view) {
-  const bool perspective = view.projection == Projection::perspective;
+  const bool perspective = view.projection == Projection::kPerspective;
   const double radius = brick.largest_radius * std::max({view.scale.x, view.scale.y, view.scale.z});
   glm::dvec2 lower(INFINITY), upper(-INFINITY);
   double nearest = INFINITY, widest = 0;

@@ -158,7 +158,7 @@ void GlPainter::State::use(const GlProgram& program, const ClassificationTable& 
                static_cast<float>(kFootprintSteps / (kKernelSupport * kKernelSupport)));
   gl.Uniform1i(program.uniform("cells"), ClassificationTable::kCells);
   gl.Uniform2f(program.uniform("cells_from_scalar"), table.scale(), table.bias());
-  gl.Uniform1f(program.uniform("least_logarithmic"), ClassificationTable::kLeastLogarithmic);
+  gl.Uniform1f(program.uniform("least_logarithmic"), ClassificationTable::kMinLogarithmic);
   const glm::vec4 below = table.below(), above = table.above();
   gl.Uniform4f(program.uniform("below"), below.x, below.y, below.z, below.w);
   gl.Uniform4f(program.uniform("above"), above.x, above.y, above.z, above.w);

@@ -18,7 +18,7 @@ class GlPainter final : public Painter {
   explicit GlPainter(const GlContext& context);
   ~GlPainter() override;
 
-  DrawingOrder order() const override { return DrawingOrder::back_to_front; }
+  DrawingOrder order() const override { return DrawingOrder::kBackToFront; }
   void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table, bool per_pixel,
              const PaintResources& resources = {}) override;
   void draw(std::span<const ScreenSplat> splats) override;

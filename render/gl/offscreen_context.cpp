@@ -6,7 +6,7 @@
 namespace curvisplat {
 
 std::unique_ptr<GlContext> makeOffscreenContext(GlLibrary library) {
-  return library == GlLibrary::egl ? makeEglContext() : makeOsMesaContext();
+  return library == GlLibrary::kEgl ? makeEglContext() : makeOsMesaContext();
 }
 
 }  // namespace curvisplat

@@ -8,7 +8,7 @@
 namespace curvisplat {
 
 /// The libraries that give a context without a window.
-enum class GlLibrary { osmesa, egl };
+enum class GlLibrary { kOsmesa, kEgl };
 
 /// A core context of OpenGL 3.3 or newer, made current on the calling thread. Throws Error: what was tried,
 /// and what it said.

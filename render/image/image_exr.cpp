@@ -33,7 +33,7 @@ constexpr std::array<RequiredAttribute, 8> kRequired{{{"channels", 1},
                                                       {"pixelAspectRatio", 4},
                                                       {"screenWindowCenter", 8},
                                                       {"screenWindowWidth", 4}}};
-constexpr size_t kMostAttributes = 128;
+constexpr size_t kMaxAttributes = 128;
 
 constexpr uint32_t kLongNames = 0x400;    // the one flag beside the version 2 that is let through
 constexpr uint64_t kLargestRatio = 1032;  // zlib's; the run lengths' is 64
@@ -141,7 +141,7 @@ ExrLayout takeHeader(Cursor& file, const std::string& name) {
     const std::string type = file.takeString();
     const auto size = file.take<uint32_t>();
     if ((size == 0 && type != "string") || !found.emplace(attribute, size).second ||
-        found.size() > kMostAttributes)
+        found.size() > kMaxAttributes)
       throw Error("{}: the EXR attribute {} is empty, there twice, or one too many", name, attribute);
     takeAttribute(attribute, file.takeBytes(size), layout, name);
   }

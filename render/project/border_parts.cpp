@@ -42,9 +42,9 @@ void reshape(SplatPiece& piece, const Cholesky& l) {
 
 }  // namespace
 
-size_t partsAtBorder(const SplatPiece& whole, uint32_t half_cell, const BorderParts& parts,
+size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const BorderParts& parts,
                      BorderPieces& pieces) {
-  const InwardAxes inward = inwardAxes(half_cell);
+  const InwardAxes inward = inwardAxes(border_code);
   const size_t count = size_t{1} << inward.count;
   for (size_t n = 0; n < count; ++n) {
     glm::vec3 offset(0.0f);

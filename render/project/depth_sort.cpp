@@ -51,7 +51,7 @@ std::span<const uint32_t> DepthSorter::sort(std::span<const float> depths, Drawi
   }
   order_.resize(depths.size());
   for (size_t i = 0; i < items_.size(); ++i) order_[i] = items_[i].index;
-  if (order == DrawingOrder::front_to_back) std::reverse(order_.begin(), order_.end());
+  if (order == DrawingOrder::kFrontToBack) std::reverse(order_.begin(), order_.end());
   return order_;
 }
 

@@ -16,7 +16,7 @@ class DepthSorter {
   /// The indices of `depths` (finite, at most 2^32 - 1), farthest (largest) first; equal depths in index
   /// order. Valid until the next call.
   std::span<const uint32_t> farthestFirst(std::span<const float> depths) {
-    return sort(depths, DrawingOrder::back_to_front);
+    return sort(depths, DrawingOrder::kBackToFront);
   }
   /// Back to front as farthestFirst(); front to back the same from end to beginning.
   std::span<const uint32_t> sort(std::span<const float> depths, DrawingOrder order);

@@ -9,7 +9,7 @@
 #include "render/project/splat_ellipse.h"
 #include "render/project/splat_maps.h"
 #include "stream/base/check.h"
-#include "stream/model/half_cell.h"
+#include "stream/model/border_code.h"
 
 namespace curvisplat {
 namespace {
@@ -95,7 +95,7 @@ void computeBlock(const PerspectiveMap& map, const LocalBox& clip,
 /// Decides about one projected splat after the other, and keeps what can be seen.
 class Chooser {
  public:
-  enum class Fate { off_screen, transparent, kept };
+  enum class Fate { kOffScreen, kTransparent, kKept };
 
   Chooser(const ProjectionSettings& settings, const ClassificationTable& table,
           std::vector<ScreenSplat>& splats, std::vector<float>& depths)
@@ -104,7 +104,7 @@ class Chooser {
         height_(static_cast<float>(settings.view.size.height)),
         reach_(1.001f * static_cast<float>(largestReach(settings.view.low_pass_px2))),
         largest_scalar_(kLargestCells /
-                        std::max(table.logScale() ? 1.0f : std::abs(table.scale()), kLeastScale)),
+                        std::max(table.logScale() ? 1.0f : std::abs(table.scale()), kMinScale)),
         per_pixel_(settings.per_pixel),
         splats_(splats),
         depths_(depths) {}
@@ -116,7 +116,7 @@ class Chooser {
     const float reach_y = kSupport * (std::abs(splat.l21) + splat.l22);
     const bool on_screen = splat.x + reach_x > 0 && splat.x - reach_x < width_ && splat.y + reach_y > 0 &&
                            splat.y - reach_y < height_;
-    if (!on_screen) return Fate::off_screen;
+    if (!on_screen) return Fate::kOffScreen;
     if (!per_pixel_) splat.slope0 = splat.slope1 = splat.half_width = 0;
     float spread = kSupport * (std::abs(splat.slope0) + std::abs(splat.slope1)) + splat.half_width;
     if (!(std::abs(splat.mean) + spread <= largest_scalar_)) {
@@ -125,10 +125,10 @@ class Chooser {
     }
     splat.amplitude = std::min(splat.amplitude, kLargestAmplitude);
     if (!(splat.amplitude > 0) || table_.fullyTransparent(splat.mean - spread, splat.mean + spread))
-      return Fate::transparent;
+      return Fate::kTransparent;
     splats_.push_back(splat);
     depths_.push_back(depth);
-    return Fate::kept;
+    return Fate::kKept;
   }
 
   /// Whether no piece of a splat could be seen, wherever it is.
@@ -141,7 +141,7 @@ class Chooser {
  private:
   // Painters find a scalar's place in the table, and depths, in float: beyond these there are infinities, and
   // infinity minus infinity is no number. Such a splat is drawn flat, and far outside of the table.
-  static constexpr float kLargestCells = 1e30f, kLeastScale = 1e-7f, kLargestAmplitude = 1e30f;
+  static constexpr float kLargestCells = 1e30f, kMinScale = 1e-7f, kLargestAmplitude = 1e30f;
 
   const ClassificationTable& table_;
   const float width_, height_;
@@ -154,8 +154,8 @@ class Chooser {
 
 /// What parts and cutting may still give for a brick: pieces that are drawn, and looks at any.
 struct CutBudget {
-  size_t pieces = BrickProjector::kMostPieces;
-  size_t looks = 16 * BrickProjector::kMostPieces;
+  size_t pieces = BrickProjector::kMaxPieces;
+  size_t looks = 16 * BrickProjector::kMaxPieces;
 };
 
 /// Where a piece lies, and the map that is linear there.
@@ -186,7 +186,7 @@ bool place(const PerspectiveMap& map, const SplatPiece& piece, size_t& looks, co
 template <typename Map>
 std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<const float>& geometry,
                                           const VariableArrays<const float>& variable, size_t i,
-                                          uint32_t half_cell, const BorderParts* borders, Chooser& chooser,
+                                          uint32_t border_code, const BorderParts* borders, Chooser& chooser,
                                           CutBudget& left) {
   const SplatPiece whole{{geometry.x[i], geometry.y[i], geometry.z[i]},
                          shapeOf(geometry, i),
@@ -194,23 +194,23 @@ std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<c
                          variable.mean[i],
                          geometry.weight[i]};
   if (chooser.transparentThroughout(whole.mean, whole.slope, variable.variance[i]))
-    return Chooser::Fate::transparent;
-  auto best = Chooser::Fate::off_screen;
+    return Chooser::Fate::kTransparent;
+  auto best = Chooser::Fate::kOffScreen;
   const auto take = [&](const SplatPiece& piece, const PlacedPiece& at) {
     if (left.pieces == 0) return false;
     const Ellipse ellipse = ellipseOf(at.rows, piece.shape, piece.slope, variable.variance[i],
                                       piece.weight * at.volume, map.low_pass_px2, map.slope_low_pass_px2);
     const auto fate = chooser.choose(screenSplat(at.x, at.y, ellipse, piece.mean), at.depth);
-    if (fate == Chooser::Fate::kept) --left.pieces;
+    if (fate == Chooser::Fate::kKept) --left.pieces;
     best = std::max(best, fate);
     return true;
   };
   BorderPieces parts;
   size_t count = 1;
-  if (half_cell == kNoBorder)
+  if (border_code == kNoBorder)
     parts[0] = whole;
   else
-    count = partsAtBorder(whole, half_cell, *borders, parts);
+    count = partsAtBorder(whole, border_code, *borders, parts);
   for (size_t n = 0; n < count; ++n)
     if (!place(map, parts[n], left.looks, take)) return {};
   return best;
@@ -232,9 +232,10 @@ bool projectRange(const Map& map, const BorderParts* borders, const LocalBox& cl
         continue;
       }
       Chooser::Fate fate;
-      const uint32_t half_cell = borders ? geometry.half_cell[begin + n] : kNoBorder;
-      if (block.too_wide[n] || half_cell != kNoBorder) {
-        const auto best = choosePieces(map, geometry, variable, begin + n, half_cell, borders, chooser, left);
+      const uint32_t border_code = borders ? geometry.border_code[begin + n] : kNoBorder;
+      if (block.too_wide[n] || border_code != kNoBorder) {
+        const auto best =
+            choosePieces(map, geometry, variable, begin + n, border_code, borders, chooser, left);
         if (!best) return false;
         fate = *best;
       } else {
@@ -243,9 +244,9 @@ bool projectRange(const Map& map, const BorderParts* borders, const LocalBox& cl
              variable.mean[begin + n], block.slope0[n], block.slope1[n], block.half_width[n]},
             block.depth[n]);
       }
-      counts.off_screen += fate == Chooser::Fate::off_screen;
-      counts.transparent += fate == Chooser::Fate::transparent;
-      counts.drawn += fate == Chooser::Fate::kept;
+      counts.off_screen += fate == Chooser::Fate::kOffScreen;
+      counts.transparent += fate == Chooser::Fate::kTransparent;
+      counts.drawn += fate == Chooser::Fate::kKept;
     }
   }
   return true;
@@ -273,8 +274,8 @@ double largestReach(double low_pass_px2) {
 }
 
 BrickProjector::BrickProjector() {
-  splats_.reserve(kMostSplats);
-  depths_.reserve(kMostSplats);
+  splats_.reserve(kMaxSplats);
+  depths_.reserve(kMaxSplats);
 }
 
 void BrickProjector::project(const ProjectionSettings& settings, const ClassificationTable& table,
@@ -301,7 +302,7 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
     depths_.clear();
     counts_ = {};
     const BorderParts* const borders = coarseness == 1 ? &settings.border_parts : nullptr;
-    complete = settings.view.projection == Projection::orthographic
+    complete = settings.view.projection == Projection::kOrthographic
                    ? projectWith(OrthographicMap(settings.view, cell_min), borders, clip, geometry, variable,
                                  ranges, chooser, counts_)
                    : projectWith(PerspectiveMap(settings.view, cell_min, coarseness), borders, clip, geometry,

@@ -17,8 +17,8 @@
 
 #include "render/colour/classification.h"
 #include "render/project/screen_view.h"
+#include "stream/model/border_code.h"
 #include "stream/model/brick.h"
-#include "stream/model/half_cell.h"
 #include "stream/model/splats.h"
 
 namespace curvisplat {
@@ -66,8 +66,8 @@ class BrickProjector {
   /// A brick gives at most kMaxBrickSplats splats plus this many pieces; where borders and perspective would
   /// make more, borders are not drawn in parts, and perspective cuts coarser and drops more of what is close
   /// to the eye.
-  static constexpr size_t kMostPieces = 65536;
-  static constexpr size_t kMostSplats = kMaxBrickSplats + kMostPieces;
+  static constexpr size_t kMaxPieces = 65536;
+  static constexpr size_t kMaxSplats = kMaxBrickSplats + kMaxPieces;
 
   /// Takes the memory it will ever need.
   BrickProjector();

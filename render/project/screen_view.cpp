@@ -10,7 +10,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kLeastLowPass = 0.01;
+constexpr double kMinLowPass = 0.01;
 
 }  // namespace
 
@@ -24,9 +24,9 @@ ScreenView ScreenView::of(const Camera& camera, ImageSize size, const glm::dvec3
       throw UsageError("the scale along {} is {}; it must be positive", "xyz"[axis], scale[axis]);
 
   // At 0 a splat seen edge-on would be infinitely opaque.
-  if (!(low_pass_px2 >= kLeastLowPass))
+  if (!(low_pass_px2 >= kMinLowPass))
     throw UsageError("a low-pass of {} px² is too little to draw with; use at least {}", low_pass_px2,
-                     kLeastLowPass);
+                     kMinLowPass);
 
   ScreenView view;
   view.projection = camera.projection;
@@ -43,7 +43,7 @@ ScreenView ScreenView::of(const Camera& camera, ImageSize size, const glm::dvec3
   view.down = -row(1);
   view.forward = -row(2);
 
-  if (camera.projection == Projection::orthographic) {
+  if (camera.projection == Projection::kOrthographic) {
     if (!(camera.parallel_scale > 0 && std::isfinite(camera.parallel_scale)))
       throw UsageError("the camera's parallel scale is {}; it must be positive", camera.parallel_scale);
     view.focal_px = 0.5 * size.height / camera.parallel_scale;
@@ -63,7 +63,7 @@ glm::dvec3 ScreenView::viewFromData(const glm::dvec3& data) const {
 
 CutView ScreenView::cutView() const {
   CutView cut;
-  cut.perspective = projection == Projection::perspective;
+  cut.perspective = projection == Projection::kPerspective;
   cut.scale = scale;
   cut.eye = eye;
   cut.towards_viewer = -forward;
@@ -87,7 +87,7 @@ CutView ScreenView::cutView() const {
 }
 
 glm::dvec2 ScreenView::pixelFromView(const glm::dvec3& view) const {
-  const double pixels = projection == Projection::orthographic ? focal_px : focal_px / view.z;
+  const double pixels = projection == Projection::kOrthographic ? focal_px : focal_px / view.z;
   return {0.5 * size.width + pixels * view.x, 0.5 * size.height + pixels * view.y};
 }
 

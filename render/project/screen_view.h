@@ -27,7 +27,7 @@ inline constexpr double kSlopeLowPass = 0.01;
 inline constexpr double kWidest = 0.4;
 
 struct ScreenView {
-  Projection projection = Projection::orthographic;
+  Projection projection = Projection::kOrthographic;
   ImageSize size;
   glm::dvec3 eye{0.0};  // stretched; orthographic: the camera's position
   glm::dvec3 right{1, 0, 0}, down{0, -1, 0}, forward{0, 0, -1};  // stretched, orthonormal

@@ -2,13 +2,13 @@
 
 #include <cstdlib>
 
-#include "stream/base/say.h"
+#include "stream/base/message.h"
 
 namespace curvisplat {
 
 void checkFailed(const char* file, int line, const char* expression, const std::string& values) {
-  say("internal error at {}:{}: {} does not hold{}{}", file, line, expression, values.empty() ? "" : ": ",
-      values);
+  printMessage("internal error at {}:{}: {} does not hold{}{}", file, line, expression,
+               values.empty() ? "" : ": ", values);
   std::abort();
 }
 

@@ -30,7 +30,7 @@ std::string reason() {
 
 /// As openRetrying. File systems without direct transfers refuse the flag, and do without.
 int openWith(Caching caching, const std::filesystem::path& path, int flags, unsigned mode) {
-  if (caching == Caching::direct) {
+  if (caching == Caching::kDirect) {
     const int fd = openRetrying(path, flags | O_DIRECT, mode);
     if (fd >= 0 || errno != EINVAL) return fd;
   }
@@ -269,7 +269,7 @@ void writeFileDurably(const std::filesystem::path& path, const std::string& text
 }
 
 void putFileIntoPlace(const std::filesystem::path& from, const std::filesystem::path& to) {
-  OutputFile(from, Caching::pages, OutputFile::Existing::kKeep).close();
+  OutputFile(from, Caching::kPages, OutputFile::Existing::kKeep).close();
   renameFile(from, to);
   syncDirectory(folderOf(to));
 }

@@ -57,7 +57,7 @@ class ScopedSystemCalls {
 /// Whether transfers go through the page cache, or straight between disk and memory where the file system can
 /// (else through the page cache after all). Straight ones need offsets, sizes and addresses that are
 /// multiples of kDirectAlignment; they are for large files that are written once and read once.
-enum class Caching { pages, direct };
+enum class Caching { kPages, kDirect };
 inline constexpr size_t kDirectAlignment = 4096;
 
 /// A file ends before the bytes that were asked for: it was cut off, or is being changed.
@@ -70,7 +70,7 @@ class TruncatedFile : public Error {
 class InputFile {
  public:
   /// Throws Error if `path` is missing, not a regular file, or not readable.
-  explicit InputFile(std::filesystem::path path, Caching caching = Caching::pages);
+  explicit InputFile(std::filesystem::path path, Caching caching = Caching::kPages);
   InputFile(InputFile&& other) noexcept;
   InputFile& operator=(InputFile&& other) noexcept;
   ~InputFile();
@@ -101,7 +101,7 @@ class OutputFile {
   enum class Existing { kEmpty, kKeep };
 
   /// Creates `path`; if it exists, empties it or keeps its bytes. Throws Error.
-  explicit OutputFile(std::filesystem::path path, Caching caching = Caching::pages,
+  explicit OutputFile(std::filesystem::path path, Caching caching = Caching::kPages,
                       Existing existing = Existing::kEmpty);
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&& other) noexcept;

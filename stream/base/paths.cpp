@@ -17,9 +17,9 @@ bool isRegularFile(const std::filesystem::path& path) noexcept {
 }
 
 std::filesystem::path linkTarget(std::filesystem::path path) {
-  constexpr int kMostLinks = 40;  // as the kernel
+  constexpr int kMaxLinks = 40;  // as the kernel
   const std::filesystem::path first = path;
-  for (int links = 0; links <= kMostLinks; ++links) {
+  for (int links = 0; links <= kMaxLinks; ++links) {
     std::error_code none_there;
     if (!std::filesystem::is_symlink(path, none_there)) return path;
     path = folderOf(path) / std::filesystem::read_symlink(path);  // which replaces all if it is absolute

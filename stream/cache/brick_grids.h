@@ -27,13 +27,13 @@ struct BrickGridsComparison {
   std::string not_compared;  // why
 };
 
-inline constexpr uint64_t kMostComparisonMemory = uint64_t{1} << 30;
+inline constexpr uint64_t kMaxComparisonMemory = uint64_t{1} << 30;
 
 /// OpenVDB's parser trusts what it reads, so it is not asked: the file is made again and compared. One by
 /// another version of OpenVDB, or compressed in a way that this build of it cannot, is not comparable; one
 /// whose trees take more than `most_memory` is not compared.
 BrickGridsComparison compareBrickGrids(std::span<const std::byte> bytes, const RootCube& root,
                                        std::span<const Brick> bricks,
-                                       uint64_t most_memory = kMostComparisonMemory);
+                                       uint64_t most_memory = kMaxComparisonMemory);
 
 }  // namespace curvisplat

@@ -59,7 +59,7 @@ std::vector<AppendedBrick> readBrickLog(const std::filesystem::path& folder, siz
 }
 
 BrickLog::BrickLog(const std::filesystem::path& folder, size_t variables)
-    : variables_(variables), file_(folder / kBrickLogName, Caching::pages, OutputFile::Existing::kKeep) {}
+    : variables_(variables), file_(folder / kBrickLogName, Caching::kPages, OutputFile::Existing::kKeep) {}
 
 void BrickLog::append(const AppendedBrick& brick) {
   entry_.clear();

@@ -13,8 +13,8 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kMostFindings = 100;
-constexpr uint64_t kMostGridBytes = 64 << 10;  // of bricks.vdb, a brick: one alone takes 10 KiB
+constexpr size_t kMaxFindings = 100;
+constexpr uint64_t kMaxGridBytes = 64 << 10;  // of bricks.vdb, a brick: one alone takes 10 KiB
 constexpr double kWeightTolerance = 1e-3;
 // Floats have been rounded, from doubles that the record was made of.
 constexpr double kRounding = 1e-5;
@@ -40,7 +40,7 @@ class Verifier {
  private:
   template <typename... Args>
   void find(fmt::format_string<Args...> format, Args&&... args) {
-    if (result_.findings.size() < kMostFindings)
+    if (result_.findings.size() < kMaxFindings)
       result_.findings.push_back(fmt::format(format, std::forward<Args>(args)...));
   }
 
@@ -114,7 +114,7 @@ class Verifier {
       splats[s].axis = {geometry_.axis0[s], geometry_.axis1[s], geometry_.axis2[s]};
       splats[s].shear = {geometry_.shear10[s], geometry_.shear20[s], geometry_.shear21[s]};
     }
-    const double radius = largestReach(splats, geometry_.half_cell);
+    const double radius = largestReach(splats, geometry_.border_code);
     if (std::abs(radius - brick.largest_radius) > kRounding * radius)
       findIn(n, fmt::format("its largest radius is {}, its record says {}", radius, brick.largest_radius));
   }
@@ -190,7 +190,7 @@ class Verifier {
     const std::filesystem::path path = reader_.path() / "bricks.vdb";
     try {
       const InputFile file(path);
-      if (file.size() > kMostGridBytes * (bricks_.size() + 1))
+      if (file.size() > kMaxGridBytes * (bricks_.size() + 1))
         return find("{}: has {} bytes for {} bricks", path.string(), file.size(), bricks_.size());
       std::vector<std::byte> bytes(file.size());
       file.readAt(0, std::span(bytes));

@@ -55,12 +55,12 @@ struct CacheWriter::State {
       : folder(partial),
         root(root_cube),
         variables(std::move(variable_infos)),
-        geometry(folder.path() / "geometry.bin", Caching::pages, OutputFile::Existing::kKeep),
+        geometry(folder.path() / "geometry.bin", Caching::kPages, OutputFile::Existing::kKeep),
         tables(variables.size()),
         geometry_input(geometry.path()),
         log(folder.path(), variables.size()) {
     for (const VariableInfo& variable : variables) {
-      values.emplace_back(folder.path() / variableFileName(variable), Caching::pages,
+      values.emplace_back(folder.path() / variableFileName(variable), Caching::kPages,
                           OutputFile::Existing::kKeep);
       values_input.emplace_back(values.back().path());
     }

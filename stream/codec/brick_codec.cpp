@@ -29,7 +29,7 @@ void checkInput(const BrickSplats& brick) {
   CURVISPLAT_CHECK_OP(brick.size(), >=, 1u);
   CURVISPLAT_CHECK_OP(brick.size(), <=, size_t{kMaxBrickSplats});
   CURVISPLAT_CHECK_OP(brick.positions.size(), ==, brick.size());
-  if (!brick.half_cells.empty()) CURVISPLAT_CHECK_OP(brick.half_cells.size(), ==, brick.size());
+  if (!brick.border_codes.empty()) CURVISPLAT_CHECK_OP(brick.border_codes.size(), ==, brick.size());
   uint64_t nodes = 0;
   for (const NodeRun& run : brick.runs) {
     CURVISPLAT_CHECK_OP(run.count, >=, 1u);
@@ -81,7 +81,7 @@ Brick summaryOf(const RootCube& root, const BrickSplats& splats) {
   }
   brick.lower = root.toWorld(lower);
   brick.upper = root.toWorld(upper);
-  brick.largest_radius = roundedUp(largestReach(splats.splats, splats.half_cells));
+  brick.largest_radius = roundedUp(largestReach(splats.splats, splats.border_codes));
   return brick;
 }
 
@@ -195,7 +195,7 @@ void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const st
   toFloats(decoded.shear[1], out.shear20);
   toFloats(decoded.shear[2], out.shear21);
   toFloats(decoded.weight, out.weight);
-  std::copy(decoded.half_cell.begin(), decoded.half_cell.end(), out.half_cell);
+  std::copy(decoded.border_code.begin(), decoded.border_code.end(), out.border_code);
 }
 
 void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,
@@ -230,7 +230,7 @@ BrickSplats decodeForMerging(const RootCube& root, const Brick& brick, std::span
   out.positions.resize(brick.splats);
   out.splats.resize(brick.splats);
   fillGeometry(root, decoded, out);
-  out.half_cells = decoded.half_cell;
+  out.border_codes = decoded.border_code;
   SplatVariable variable;
   for (size_t v = 0; v < values.size(); ++v) {
     decodeVariable(brick, variables[v], values[v], variable);

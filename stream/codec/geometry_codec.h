@@ -10,7 +10,7 @@
 //              splat's own aspect ratio: what must be exact is A⁻¹ A', not A'. l20 makes up for what l10
 //              lost.
 //   weights    ln(V / (a0 a1 a2)) in fixed steps: 0 for a node's splat, 1 for V = 0
-//   half cells the four bytes of half_cell.h's code, lowest first; only where a brick has any (kHalfCells)
+//   half cells the four bytes of border_code.h's code, lowest first; only where a brick has any (kHasBorders)
 //
 // Shapes or weights whose numbers do not fit are stored as raw 64-bit floats instead (kRawShapes,
 // kRawWeights).
@@ -28,12 +28,12 @@
 
 namespace curvisplat {
 
-inline constexpr uint8_t kRawShapes = 1, kRawWeights = 2, kHalfCells = 4;
+inline constexpr uint8_t kRawShapes = 1, kRawWeights = 2, kHasBorders = 4;
 inline constexpr size_t kLargestGeometryArrays = 3 + 12 + 2 + 4;
 
 struct GeometryHeader {
   uint8_t position_bits;                    //  0: 5..32
-  uint8_t raw;                              //  1: kRawShapes, kRawWeights, kHalfCells
+  uint8_t raw;                              //  1: kRawShapes, kRawWeights, kHasBorders
   uint16_t reserved;                        //  2: zero
   uint32_t runs_bytes;                      //  4: of the varints, unpacked
   double log_axis0, log_axis1, log_volume;  //  8: of the smallest, natural
@@ -49,7 +49,7 @@ struct DecodedGeometry {
   std::array<std::vector<uint32_t>, 3> position;  // in units of cell size / 2^position_bits
   std::array<std::vector<double>, 3> axis, shear;
   std::vector<double> weight;
-  std::vector<uint32_t> half_cell;
+  std::vector<uint32_t> border_code;
   std::vector<NodeRun> runs;
   std::vector<Row> rows;
 

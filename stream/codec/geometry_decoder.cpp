@@ -8,7 +8,7 @@
 #include "stream/codec/geometry_codec.h"
 #include "stream/codec/geometry_steps.h"
 #include "stream/codec/planes.h"
-#include "stream/model/half_cell.h"
+#include "stream/model/border_code.h"
 
 namespace curvisplat {
 namespace {
@@ -31,7 +31,7 @@ class GeometryDecoder {
       decodeShapes();
     }
     decodeWeights();
-    decodeHalfCells();
+    decodeBorders();
     checkFinite();
   }
 
@@ -110,7 +110,7 @@ class GeometryDecoder {
     if (header_.raw & kRawWeights) return readRaw(out_.weight);
     auto& codes = GeometryDecoder::codes();
     // Not predicted: what makes a weight differ from the volume has no order.
-    if (readResiduals(codes) != Predictor::none) throw Error("its weights are predicted");
+    if (readResiduals(codes) != Predictor::kNone) throw Error("its weights are predicted");
     const LogTable& ratios = ratioTable();
     const double *a0 = out_.axis[0].data(), *a1 = out_.axis[1].data(), *a2 = out_.axis[2].data();
     double* weight = out_.weight.data();
@@ -124,20 +124,20 @@ class GeometryDecoder {
     }
   }
 
-  void decodeHalfCells() {
-    std::fill(out_.half_cell.begin(), out_.half_cell.end(), kNoBorder);
-    if (!(header_.raw & kHalfCells)) return;
+  void decodeBorders() {
+    std::fill(out_.border_code.begin(), out_.border_code.end(), kNoBorder);
+    if (!(header_.raw & kHasBorders)) return;
     auto& codes = GeometryDecoder::codes();
     uint32_t any = 0;
     for (int shift = 0; shift < 32; shift += 8) {
       readPredicted(codes);
       for (size_t n = 0; n < count_; ++n) {
         any |= codes[n];
-        out_.half_cell[n] |= codes[n] << shift;
+        out_.border_code[n] |= codes[n] << shift;
       }
     }
     bool fine = any <= 0xff;
-    for (uint32_t half_cell : out_.half_cell) fine &= isPossibleHalfCell(half_cell);
+    for (uint32_t border_code : out_.border_code) fine &= isPossibleBorderCode(border_code);
     if (!fine) throw Error("a half cell in it is impossible");
   }
 
@@ -164,7 +164,7 @@ class GeometryDecoder {
     const Predictor predictor = readResiduals(out);
     uint32_t* values = out.data();
     for (size_t n = 0; n < out.size(); ++n) values[n] = unzigzag(values[n]);
-    if (predictor == Predictor::none) return;
+    if (predictor == Predictor::kNone) return;
     predictRows(predictor, out_.rows, values,
                 [values](uint32_t n, uint32_t predicted) { return values[n] += predicted; });
   }
@@ -186,7 +186,7 @@ class GeometryDecoder {
 
 size_t arraysOf(const GeometryHeader& header) {
   return 3 + (header.raw & kRawShapes ? 12 : 6) + (header.raw & kRawWeights ? 2 : 1) +
-         (header.raw & kHalfCells ? 4 : 0);
+         (header.raw & kHasBorders ? 4 : 0);
 }
 
 }  // namespace
@@ -196,7 +196,7 @@ void DecodedGeometry::resize(size_t count) {
   for (auto* arrays : {&axis, &shear})
     for (auto& array : *arrays) array.resize(count);
   weight.resize(count);
-  half_cell.resize(count);
+  border_code.resize(count);
 }
 
 void decodeGeometryStream(const Cell& cell, uint32_t count, std::span<const std::byte> bytes,
@@ -205,10 +205,10 @@ void decodeGeometryStream(const Cell& cell, uint32_t count, std::span<const std:
   if (bytes.size() < sizeof header) throw Error("it has {} bytes, fewer than its header", bytes.size());
   std::memcpy(&header, bytes.data(), sizeof header);
   const int lattice_bits = kPositionBits - static_cast<int>(cell.level);
-  if (header.position_bits < kLeastPositionBits ||
-      header.position_bits > std::min(kMostPositionBits, lattice_bits))
+  if (header.position_bits < kMinPositionBits ||
+      header.position_bits > std::min(kMaxPositionBits, lattice_bits))
     throw Error("it has {} bits a position", header.position_bits);
-  if (header.raw > (kRawShapes | kRawWeights | kHalfCells) || header.runs_bytes > kMostRunBytes * count)
+  if (header.raw > (kRawShapes | kRawWeights | kHasBorders) || header.runs_bytes > kMaxRunBytes * count)
     throw Error("its header is impossible");
   size_t unpacked = header.runs_bytes;
   for (size_t n = 0; n < arraysOf(header); ++n) {

@@ -6,7 +6,7 @@
 #include "stream/codec/geometry_codec.h"
 #include "stream/codec/geometry_steps.h"
 #include "stream/codec/planes.h"
-#include "stream/model/half_cell.h"
+#include "stream/model/border_code.h"
 #include "stream/model/shape_extent.h"
 
 namespace curvisplat {
@@ -21,7 +21,7 @@ int positionBits(const RootCube& root, const Cell& cell, double smallest_axis) {
   const double bits = std::ceil(std::log2(root.cellSize(cell.level) / interval));
   const int lattice_bits = kPositionBits - static_cast<int>(cell.level);
   return static_cast<int>(
-      std::clamp(bits, 1.0 * kLeastPositionBits, 1.0 * std::min(kMostPositionBits, lattice_bits)));
+      std::clamp(bits, 1.0 * kMinPositionBits, 1.0 * std::min(kMaxPositionBits, lattice_bits)));
 }
 
 class GeometryEncoder {
@@ -49,7 +49,7 @@ class GeometryEncoder {
       encodeRawShapes();
     }
     encodeWeights();
-    encodeHalfCells();
+    encodeBorders();
     return planes_.compress(std::as_bytes(std::span(&header_, 1)));
   }
 
@@ -169,22 +169,23 @@ class GeometryEncoder {
       }
     }
     if (fits) {
-      header_.arrays[arrays_++] = {Predictor::none, planes_.add(codes_)};
+      header_.arrays[arrays_++] = {Predictor::kNone, planes_.add(codes_)};
     } else {
       header_.raw |= kRawWeights;
       addRaw(decoded_.weight, [](const Splat& s) { return s.weight; });
     }
   }
 
-  void encodeHalfCells() {
-    const auto& half_cells = brick_.half_cells;
-    std::fill(decoded_.half_cell.begin(), decoded_.half_cell.end(), kNoBorder);
-    if (std::all_of(half_cells.begin(), half_cells.end(), [](uint32_t half) { return half == kNoBorder; }))
+  void encodeBorders() {
+    const auto& border_codes = brick_.border_codes;
+    std::fill(decoded_.border_code.begin(), decoded_.border_code.end(), kNoBorder);
+    if (std::all_of(border_codes.begin(), border_codes.end(),
+                    [](uint32_t half) { return half == kNoBorder; }))
       return;
-    header_.raw |= kHalfCells;
-    decoded_.half_cell = half_cells;
+    header_.raw |= kHasBorders;
+    decoded_.border_code = border_codes;
     for (int shift = 0; shift < 32; shift += 8) {
-      for (size_t n = 0; n < count_; ++n) codes_[n] = half_cells[n] >> shift & 0xff;
+      for (size_t n = 0; n < count_; ++n) codes_[n] = border_codes[n] >> shift & 0xff;
       addPredicted(codes_);
     }
   }

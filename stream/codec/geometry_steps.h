@@ -12,8 +12,8 @@
 
 namespace curvisplat {
 
-inline constexpr int kLeastPositionBits = 5;  // merging's lattice of 32 voxels an axis
-inline constexpr int kMostPositionBits = 32;
+inline constexpr int kMinPositionBits = 5;  // merging's lattice of 32 voxels an axis
+inline constexpr int kMaxPositionBits = 32;
 
 // Half a step is what a number can be off. With E = A⁻¹ A' - I lower triangular, |E00|, |E11| <= 0.0071,
 // |E22| <= 0.0149 (it makes up for both, and for half a volume step) and each shear's entry <= 0.0138, the
@@ -30,7 +30,7 @@ inline constexpr int kLargestWeightCode = 100000;  // a ratio of e^±190
 // Codes of weights: 0 is V = a0 a1 a2, 1 is V = 0, others are zigzag(steps) + 1.
 inline constexpr uint32_t kVolumeWeight = 0, kZeroWeight = 1;
 
-inline constexpr size_t kMostRunBytes = 50;  // five varints
+inline constexpr size_t kMaxRunBytes = 50;  // five varints
 
 /// The steps of the shears of splat n, which depend on its decoded axes and, for l10, on its decoded l21: an
 /// error of l10 moves the third axis l21 times as far. Powers of two, so that neighbours mostly share them

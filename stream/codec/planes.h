@@ -14,7 +14,7 @@ namespace curvisplat {
 
 /// How one array is coded: a byte each in a stream's header.
 struct ArrayCode {
-  Predictor predictor = Predictor::none;
+  Predictor predictor = Predictor::kNone;
   uint8_t planes = 0;
 };
 static_assert(sizeof(ArrayCode) == 2);

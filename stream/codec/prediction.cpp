@@ -117,7 +117,7 @@ std::vector<Row> sampleOf(std::span<const Row> rows) {
 }
 
 Predictor bestPredictor(std::span<const Row> sample, std::span<const uint32_t> values) {
-  Predictor best = Predictor::none;
+  Predictor best = Predictor::kNone;
   uint64_t fewest = std::numeric_limits<uint64_t>::max();
   for (int p = 0; p < kPredictors; ++p) {
     const auto predictor = static_cast<Predictor>(p);

@@ -25,11 +25,11 @@ struct Row {
 };
 
 enum class Predictor : uint8_t {
-  none,          // 0
-  previous,      // the value before
-  linear,        // 2 v[n-1] - v[n-2]
-  above,         // v[n-1] + up[n] - up[n-1]
-  above_linear,  // up[n] + 2 d[n-1] - d[n-2], d = v - up
+  kNone,         // 0
+  kPrevious,     // the value before
+  kLinear,       // 2 v[n-1] - v[n-2]
+  kAbove,        // v[n-1] + up[n] - up[n-1]
+  kAboveLinear,  // up[n] + 2 d[n-1] - d[n-2], d = v - up
 };
 inline constexpr int kPredictors = 5;
 
@@ -44,22 +44,22 @@ void predictRows(Predictor predictor, std::span<const Row> rows, const uint32_t*
   uint32_t before = 0;
   for (const Row& row : rows) {
     const uint32_t end = row.first + row.count;
-    if (predictor == Predictor::none) {
+    if (predictor == Predictor::kNone) {
       for (uint32_t n = row.first; n < end; ++n) step(n, 0u);
       continue;
     }
     const uint32_t* above = row.above == kNoRow ? nullptr : values + row.above;
     before = step(row.first, above ? above[0] : before);
-    if (predictor == Predictor::previous) {
+    if (predictor == Predictor::kPrevious) {
       for (uint32_t n = row.first + 1; n < end; ++n) before = step(n, before);
-    } else if (predictor == Predictor::linear || !above) {
+    } else if (predictor == Predictor::kLinear || !above) {
       uint32_t change = 0;
       for (uint32_t n = row.first + 1; n < end; ++n) {
         const uint32_t value = step(n, before + change);
         change = value - before;
         before = value;
       }
-    } else if (predictor == Predictor::above) {
+    } else if (predictor == Predictor::kAbove) {
       uint32_t difference = before - above[0];
       for (uint32_t n = row.first + 1, m = 1; n < end; ++n, ++m) {
         const uint32_t up = above[m];

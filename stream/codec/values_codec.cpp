@@ -14,7 +14,7 @@ namespace {
 constexpr double kMeanSteps = 65535;
 constexpr double kSlopeSteps = 8192;
 constexpr double kDeviationSteps = 4096;
-constexpr size_t kMostRowBytes = 10;  // two varints of 32 bits
+constexpr size_t kMaxRowBytes = 10;  // two varints of 32 bits
 
 /// What codes stand for; encoder and decoder share it.
 struct Scale {
@@ -56,7 +56,7 @@ class ValuesEncoder {
     std::array<Predictor, 5> predictors;
     for (size_t a = 0; a < codes_.size(); ++a) {
       predictors[a] = bestPredictor(sample_, codes_[a]);
-      across_rows |= predictors[a] >= Predictor::above;
+      across_rows |= predictors[a] >= Predictor::kAbove;
     }
     const Row whole{0, static_cast<uint32_t>(values_.size()), kNoRow};
     const std::span<const Row> rows = across_rows ? rows_ : std::span(&whole, 1);
@@ -160,7 +160,7 @@ void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, const 
   ValuesHeader header;
   if (bytes.size() < sizeof header) throw Error("it has {} bytes, fewer than its header", bytes.size());
   std::memcpy(&header, bytes.data(), sizeof header);
-  if (header.rows_bytes > kMostRowBytes * count) throw Error("its header is impossible");
+  if (header.rows_bytes > kMaxRowBytes * count) throw Error("its header is impossible");
   size_t unpacked = header.rows_bytes;
   for (const ArrayCode& array : header.arrays) {
     if (!isPossible(array)) throw Error("its header is impossible");
@@ -176,7 +176,7 @@ void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, const 
   const auto decode = [&](size_t array, float* values, auto value) {
     planes.values(header.arrays[array].planes, scratch);
     for (size_t n = 0; n < count; ++n) codes[n] = unzigzag(codes[n]);
-    if (header.arrays[array].predictor != Predictor::none)
+    if (header.arrays[array].predictor != Predictor::kNone)
       predictRows(header.arrays[array].predictor, rows, codes,
                   [codes](uint32_t n, uint32_t predicted) { return codes[n] += predicted; });
     for (size_t n = 0; n < count; ++n) values[n] = value(codes[n]);

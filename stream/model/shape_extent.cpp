@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "stream/model/half_cell.h"
+#include "stream/model/border_code.h"
 
 namespace curvisplat {
 namespace {
@@ -64,10 +64,10 @@ double smallestSingularValue(std::span<const Splat> splats) {
   return unit / std::sqrt(largest.value());
 }
 
-double largestReach(std::span<const Splat> splats, std::span<const uint32_t> half_cells) {
+double largestReach(std::span<const Splat> splats, std::span<const uint32_t> border_codes) {
   constexpr double kKernelRadius = 1.556228;
-  const bool any_half = std::any_of(half_cells.begin(), half_cells.end(),
-                                    [](uint32_t half_cell) { return half_cell != kNoBorder; });
+  const bool any_half = std::any_of(border_codes.begin(), border_codes.end(),
+                                    [](uint32_t border_code) { return border_code != kNoBorder; });
   return (kKernelRadius + (any_half ? kBorderReach : 0.0)) * largestSingularValue(splats);
 }
 

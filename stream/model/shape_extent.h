@@ -16,7 +16,7 @@ double largestSingularValue(std::span<const Splat> splats);
 double smallestSingularValue(std::span<const Splat> splats);
 
 /// No splat's support, those of its parts at a border included, reaches further from its centre; 1e-6 too
-/// large at most but for half cells. `half_cells`: as BrickSplats'. World units.
-double largestReach(std::span<const Splat> splats, std::span<const uint32_t> half_cells);
+/// large at most but for half cells. `border_codes`: as BrickSplats'. World units.
+double largestReach(std::span<const Splat> splats, std::span<const uint32_t> border_codes);
 
 }  // namespace curvisplat

@@ -5,7 +5,7 @@ namespace curvisplat {
 void SplatGeometry::resize(size_t count) {
   for (auto* array : {&x, &y, &z, &axis0, &axis1, &axis2, &shear10, &shear20, &shear21, &weight})
     array->resize(count);
-  half_cell.resize(count);
+  border_code.resize(count);
 }
 
 void SplatVariable::resize(size_t count) {
@@ -13,9 +13,9 @@ void SplatVariable::resize(size_t count) {
 }
 
 GeometryArrays<float> arraysOf(SplatGeometry& g) {
-  return {g.x.data(),       g.y.data(),      g.z.data(),         g.axis0.data(),
-          g.axis1.data(),   g.axis2.data(),  g.shear10.data(),   g.shear20.data(),
-          g.shear21.data(), g.weight.data(), g.half_cell.data(), g.size()};
+  return {g.x.data(),       g.y.data(),      g.z.data(),           g.axis0.data(),
+          g.axis1.data(),   g.axis2.data(),  g.shear10.data(),     g.shear20.data(),
+          g.shear21.data(), g.weight.data(), g.border_code.data(), g.size()};
 }
 
 VariableArrays<float> arraysOf(SplatVariable& v) {
@@ -23,9 +23,9 @@ VariableArrays<float> arraysOf(SplatVariable& v) {
 }
 
 GeometryArrays<const float> arraysOf(const SplatGeometry& g) {
-  return {g.x.data(),       g.y.data(),      g.z.data(),         g.axis0.data(),
-          g.axis1.data(),   g.axis2.data(),  g.shear10.data(),   g.shear20.data(),
-          g.shear21.data(), g.weight.data(), g.half_cell.data(), g.size()};
+  return {g.x.data(),       g.y.data(),      g.z.data(),           g.axis0.data(),
+          g.axis1.data(),   g.axis2.data(),  g.shear10.data(),     g.shear20.data(),
+          g.shear21.data(), g.weight.data(), g.border_code.data(), g.size()};
 }
 
 VariableArrays<const float> arraysOf(const SplatVariable& v) {

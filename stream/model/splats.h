@@ -65,8 +65,8 @@ struct SplatGeometry {
   std::vector<float> x, y, z;              // world units from the minimum corner of the brick's cell, >= 0
   std::vector<float> axis0, axis1, axis2;  // world units
   std::vector<float> shear10, shear20, shear21;
-  std::vector<float> weight;        // world units cubed
-  std::vector<uint32_t> half_cell;  // stream/half_cell.h: kNoBorder but for nodes at a border
+  std::vector<float> weight;          // world units cubed
+  std::vector<uint32_t> border_code;  // stream/border_code.h: kNoBorder but for nodes at a border
 
   size_t size() const { return x.size(); }
   void resize(size_t count);
@@ -80,12 +80,12 @@ struct GeometryArrays {
   T *axis0, *axis1, *axis2;
   T *shear10, *shear20, *shear21;
   T* weight;
-  std::conditional_t<std::is_const_v<T>, const uint32_t, uint32_t>* half_cell;
+  std::conditional_t<std::is_const_v<T>, const uint32_t, uint32_t>* border_code;
   size_t count;
 
   size_t size() const { return count; }
   operator GeometryArrays<const float>() const requires(!std::is_const_v<T>) {
-    return {x, y, z, axis0, axis1, axis2, shear10, shear20, shear21, weight, half_cell, count};
+    return {x, y, z, axis0, axis1, axis2, shear10, shear20, shear21, weight, border_code, count};
   }
 };
 

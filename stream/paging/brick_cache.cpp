@@ -71,7 +71,7 @@ std::optional<BrickCache::Room> BrickCache::makeRoom(uint32_t brick, uint32_t sp
   entry.turn = turn_;
   entry.block = block;
   entry.pins = 1;
-  entry.geometry.half_cell = reinterpret_cast<uint32_t*>(block);
+  entry.geometry.border_code = reinterpret_cast<uint32_t*>(block);
   auto* array = reinterpret_cast<float*>(block) + stride;
   for (float** each :
        {&entry.geometry.x, &entry.geometry.y, &entry.geometry.z, &entry.geometry.axis0, &entry.geometry.axis1,

@@ -16,7 +16,7 @@ void compact(std::span<const uint32_t> kept, SplatGeometry& g, SplatVariable& v)
   for (auto* array : {&g.x, &g.y, &g.z, &g.axis0, &g.axis1, &g.axis2, &g.shear10, &g.shear20, &g.shear21,
                       &g.weight, &v.mean, &v.slope0, &v.slope1, &v.slope2, &v.variance})
     for (size_t n = 0; n < kept.size(); ++n) (*array)[n] = (*array)[kept[n]];
-  for (size_t n = 0; n < kept.size(); ++n) g.half_cell[n] = g.half_cell[kept[n]];
+  for (size_t n = 0; n < kept.size(); ++n) g.border_code[n] = g.border_code[kept[n]];
   g.resize(kept.size());
   v.resize(kept.size());
 }
@@ -79,8 +79,8 @@ void BrickSource::pass(uint64_t sequence) {
     Shared& shared = found->second;
     const std::lock_guard lock(sharing_);
     if (--shared.left == 0) shared.pin.reset();
-    if (shared.state != Shared::State::untouched) return;
-    shared.state = Shared::State::alone;  // whoever wants it all the same
+    if (shared.state != Shared::State::kUntouched) return;
+    shared.state = Shared::State::kAlone;  // whoever wants it all the same
   }
   pager_.take(misses_[sequence]);
 }
@@ -90,8 +90,8 @@ std::optional<BrickSource::Splats> BrickSource::takeShared(Shared& shared, const
   using State = Shared::State;
   std::unique_lock lock(sharing_);
   const bool last = --shared.left == 0;
-  if (shared.state == State::untouched) {
-    shared.state = State::coming;
+  if (shared.state == State::kUntouched) {
+    shared.state = State::kComing;
     lock.unlock();
     std::optional<Splats> splats;
     std::exception_ptr failure;
@@ -102,17 +102,17 @@ std::optional<BrickSource::Splats> BrickSource::takeShared(Shared& shared, const
     }
     lock.lock();
     if (splats && splats->pin) shared.pin = cached_.find(part.brick);
-    shared.state = shared.pin ? State::kept : State::alone;
+    shared.state = shared.pin ? State::kKept : State::kAlone;
     shared_changed_.notify_all();
     if (failure) std::rethrow_exception(failure);
     return splats;
   }
   {
     const StageTimer timer(scratch.waited_s);
-    shared_changed_.wait(lock, [&] { return stopped_ || shared.state != State::coming; });
+    shared_changed_.wait(lock, [&] { return stopped_ || shared.state != State::kComing; });
   }
   if (stopped_) return {};
-  if (shared.state == State::alone) {
+  if (shared.state == State::kAlone) {
     lock.unlock();
     return readAlone(part, scratch);
   }

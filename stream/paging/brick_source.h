@@ -92,12 +92,12 @@ class BrickSource {
   /// A brick that several parts want and the cache does not have.
   struct Shared {
     enum class State {
-      untouched,  // -> coming, by the first who takes it
-      coming,     // -> kept or alone
-      kept,       // in the cache, pinned
-      alone,      // not kept, or damaged: each reads it for himself
+      kUntouched,  // -> coming, by the first who takes it
+      kComing,     // -> kept or alone
+      kKept,       // in the cache, pinned
+      kAlone,      // not kept, or damaged: each reads it for himself
     };
-    State state = State::untouched;
+    State state = State::kUntouched;
     uint32_t left = 0;  // parts that have not been taken
     std::optional<BrickCache::Pin> pin;
   };

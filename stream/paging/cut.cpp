@@ -294,7 +294,7 @@ Cut chooseCut(const CutTree& tree, const CutView& view, const TransparentBounds&
               : Refinement(bricks);
   Cut cut = CutWalk(bricks, refinement).walk();
   cut.complete = refinement.complete();
-  if (options.order == DrawingOrder::front_to_back) std::reverse(cut.parts.begin(), cut.parts.end());
+  if (options.order == DrawingOrder::kFrontToBack) std::reverse(cut.parts.begin(), cut.parts.end());
   return cut;
 }
 

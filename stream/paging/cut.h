@@ -62,13 +62,13 @@ struct CutTree {
   std::span<const ValueBounds> subtrees;  // from subtreeBounds()
 };
 
-enum class DrawingOrder { back_to_front, front_to_back };
+enum class DrawingOrder { kBackToFront, kFrontToBack };
 
 struct CutOptions {
   static constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max();
 
   double lod_pixels = 1;  // error allowed on the screen; at 0 only leaves are taken
-  DrawingOrder order = DrawingOrder::back_to_front;
+  DrawingOrder order = DrawingOrder::kBackToFront;
   /// What the cut may hold, and what its bricks' streams may take on disk. The root is drawn even where it
   /// alone is more.
   uint64_t max_splats = kNoLimit, max_bytes = kNoLimit;

@@ -18,7 +18,7 @@ namespace {
 constexpr uint64_t kBatchesInBuffer = 8;
 
 // A read that the kernel puts off (EAGAIN, EINTR) so many times in a row has failed.
-constexpr uint8_t kMostPutOff = 100;
+constexpr uint8_t kMaxPutOff = 100;
 
 BrickExtents extentsOf(const CacheReader& cache, size_t variable, uint32_t brick) {
   return {cache.bricks()[brick].geometry, cache.brickVariables(variable)[brick].values};
@@ -27,9 +27,9 @@ BrickExtents extentsOf(const CacheReader& cache, size_t variable, uint32_t brick
 std::unique_ptr<AsyncReads> makeReads(const PagerOptions& options) {
   using Way = PagerOptions::Way;
   if (options.reads) return options.reads(options.queue_depth);
-  if (options.way != Way::threads && (SystemCalls::areReal() || options.way == Way::io_uring)) {
+  if (options.way != Way::kThreads && (SystemCalls::areReal() || options.way == Way::kIoUring)) {
     if (auto reads = makeUringReads(options.queue_depth)) return reads;
-    if (options.way == Way::io_uring) throw Error("this system refuses io_uring");
+    if (options.way == Way::kIoUring) throw Error("this system refuses io_uring");
   }
   return makeThreadReads(options.queue_depth);
 }
@@ -206,7 +206,7 @@ std::span<const BrickExtents> BrickPager::nextNeeded() {
   }
   if (planned_ > before) arrived_.notify_all();
   size_t count = 0;
-  while (count < kMostBatchBricks && planned_ + count < all.size() && !unneeded_(bricks_[planned_ + count]))
+  while (count < kMaxBatchBricks && planned_ + count < all.size() && !unneeded_(bricks_[planned_ + count]))
     ++count;
   return all.subspan(planned_, count);
 }
@@ -259,7 +259,7 @@ void BrickPager::complete(const AsyncReadEnd& end) {
   const bool is_put_off = end.result == -EINTR || end.result == -EAGAIN;
   uint8_t& put_off = batch.put_off[read.read];
   put_off = is_put_off ? static_cast<uint8_t>(put_off + 1) : uint8_t{0};
-  if (is_put_off && put_off < kMostPutOff) {
+  if (is_put_off && put_off < kMaxPutOff) {
     submit(read.batch, read.read, read.direct);
   } else if (end.result == -EINVAL && read.direct) {
     direct_refused_ = true;

@@ -37,12 +37,12 @@
 namespace curvisplat {
 
 struct PagerOptions {
-  enum class Way { automatic, io_uring, threads };
+  enum class Way { kAutomatic, kIoUring, kThreads };
 
   uint64_t buffer_bytes = 16 << 20;  // at least BrickPager::leastBufferBytes()
   unsigned queue_depth = 8;
-  Way way = Way::automatic;  // io_uring: Error where the kernel refuses it
-  bool direct = true;        // false: through the page cache
+  Way way = Way::kAutomatic;  // io_uring: Error where the kernel refuses it
+  bool direct = true;         // false: through the page cache
   /// For tests: what reads, in the place of all of the ways, at most `depth` at once.
   std::function<std::unique_ptr<AsyncReads>(unsigned depth)> reads;
 };

@@ -20,7 +20,7 @@ uint64_t pagesEnd(const Extent& extent) {
 size_t bricksWithin(std::span<const BrickExtents> bricks, uint64_t limit_bytes) {
   uint64_t bytes = 0;
   size_t count = 0;
-  while (count < std::min(bricks.size(), kMostBatchBricks)) {
+  while (count < std::min(bricks.size(), kMaxBatchBricks)) {
     bytes += pagedBytes(bricks[count]);
     if (count > 0 && bytes > limit_bytes) break;
     ++count;
@@ -55,8 +55,8 @@ ReadBatch planBatch(std::span<const BrickExtents> all, uint64_t limit_bytes) {
       BatchRead* read = batch.reads.size() > first_read ? &batch.reads.back() : nullptr;
       const uint64_t read_end = read ? read->offset + read->length : 0;
       const uint64_t gap = begin > read_end ? begin - read_end : 0;
-      if (read && gap <= std::min(kMostGapBytes, gaps_left) &&
-          std::max(end, read_end) - read->offset <= kMostJoinedBytes) {
+      if (read && gap <= std::min(kMaxGapBytes, gaps_left) &&
+          std::max(end, read_end) - read->offset <= kMaxJoinedBytes) {
         gaps_left -= gap;
       } else {
         read = &batch.reads.emplace_back();

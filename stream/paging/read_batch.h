@@ -23,10 +23,10 @@ inline constexpr size_t kBrickStreams = 2;  // geometry, then the values of one 
 using BrickExtents = std::array<Extent, kBrickStreams>;
 
 /// Reading so many bytes for nothing costs less than one more request.
-inline constexpr uint64_t kMostGapBytes = 32 << 10;
+inline constexpr uint64_t kMaxGapBytes = 32 << 10;
 /// Larger reads are no faster, and come later.
-inline constexpr uint64_t kMostJoinedBytes = 1 << 20;
-inline constexpr size_t kMostBatchBricks = 256;
+inline constexpr uint64_t kMaxJoinedBytes = 1 << 20;
+inline constexpr size_t kMaxBatchBricks = 256;
 
 struct BatchRead {
   uint8_t stream = 0;   // which file

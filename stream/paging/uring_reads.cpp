@@ -15,7 +15,7 @@ namespace {
 constexpr uint64_t kWakeTag = ~uint64_t{0};
 
 // The kernel may put off what it has no memory for; so many times in a row, it has broken off.
-constexpr unsigned kMostPutOff = 1000;
+constexpr unsigned kMaxPutOff = 1000;
 
 /// A read of an event counter is always under way beside the others: adding to the counter is what wakes.
 class UringReads : public AsyncReads {
@@ -49,7 +49,7 @@ class UringReads : public AsyncReads {
     for (unsigned put_off = 0; io_uring_peek_cqe(&ring_, &end) != 0;) {
       const int result = io_uring_submit_and_wait(&ring_, 1);
       const bool is_put_off = result == -EAGAIN || result == -EBUSY;
-      if (result < 0 && result != -EINTR && !(is_put_off && ++put_off < kMostPutOff))
+      if (result < 0 && result != -EINTR && !(is_put_off && ++put_off < kMaxPutOff))
         throw Error("reading by io_uring broke off: {}", std::strerror(-result));
     }
     const AsyncReadEnd ended{io_uring_cqe_get_data64(end), end->res};

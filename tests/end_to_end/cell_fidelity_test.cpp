@@ -9,7 +9,7 @@
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "tests/reference/cell_grid.h"
-#include "tests/reference/half_annulus_words.h"
+#include "tests/reference/half_annulus_arguments.h"
 #include "tests/reference/rearranged_grid.h"
 #include "tests/reference/reference_march.h"
 #include "tests/support/run_program.h"

@@ -58,7 +58,7 @@ class Corrections : public testing::Test {
 
 TEST_F(Corrections, HalfCells) {
   DirectOptions without;
-  without.nodes.half_cells = false;
+  without.nodes.border_codes = false;
   expectWorth("half cells", source_, field_, "smooth", halfAnnulusCamera(), 56, {}, without);
 }
 
@@ -178,7 +178,7 @@ TEST_F(Corrections, DistanceIsNotDepth) {
 
 TEST_F(Corrections, WideSplatsAreCut) {
   Camera camera;
-  camera.projection = Projection::perspective;
+  camera.projection = Projection::kPerspective;
   camera.position = {-0.55, 0.1, 0.6};
   camera.focal_point = {-0.3, -0.7, 0.35};
   camera.view_up = {0, 0, 1};

@@ -56,7 +56,7 @@ Image marched(const Scene& scene, const std::string& function, const Camera& cam
 TEST_F(FidelityProperties, PicturesConvergeWithTheGrid) {
   constexpr ImageSize kSize{256, 256};
   const Image reference = marched(*makeScene("half-annulus"), "smooth", halfAnnulusCamera(), kSize);
-  constexpr double kLeastGain[] = {7, 5, 2.5};
+  constexpr double kMinGain[] = {7, 5, 2.5};
   double coarser_db = 0;
   for (int step = 0; step < 4; ++step) {
     const uint64_t nodes = uint64_t{16} << step;
@@ -64,7 +64,7 @@ TEST_F(FidelityProperties, PicturesConvergeWithTheGrid) {
     const double db = compareImages(picture, reference).psnr_db;
     fmt::print("{}³ nodes: {:.2f} dB\n", nodes, db);
     if (step > 0) {
-      EXPECT_GE(db - coarser_db, kLeastGain[step - 1]) << nodes;
+      EXPECT_GE(db - coarser_db, kMinGain[step - 1]) << nodes;
     }
     coarser_db = db;
   }
@@ -150,7 +150,7 @@ Camera alongTheRay(const Camera& whole, double u, double v, int parts) {
   camera.focal_point = whole.focal_point + half * (u * right + v * glm::cross(right, ahead));
   camera.position = camera.focal_point - 4.0 * glm::normalize(camera.focal_point - whole.position);
   camera.view_up = whole.view_up;
-  camera.projection = Projection::orthographic;
+  camera.projection = Projection::kOrthographic;
   camera.parallel_scale = half / parts;
   return camera;
 }
@@ -210,7 +210,7 @@ TEST_F(FidelityProperties, ACameraInsideSeesWhatIsThere) {
   const auto scene = makeScene("half-annulus");
   convertGrid(halfAnnulus({128, 64, 64}), folder_ / "grid.splats");
   Camera camera;
-  camera.projection = Projection::perspective;
+  camera.projection = Projection::kPerspective;
   camera.position = {-0.55, 0.1, 0.6};
   camera.focal_point = {-0.3, -0.7, 0.35};
   camera.view_up = {0, 0, 1};

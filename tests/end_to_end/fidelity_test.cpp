@@ -15,7 +15,7 @@
 #include "render/project/kernel.h"
 #include "render/project/screen_view.h"
 #include "stream/base/file.h"
-#include "tests/reference/half_annulus_words.h"
+#include "tests/reference/half_annulus_arguments.h"
 #include "tests/reference/reference_march.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"

@@ -44,7 +44,7 @@ class GridFormats : public testing::Test {
 
 TEST_F(GridFormats, AnOceanOnTheSphereAndOnTheMap) {
   const std::string file = folder("roms.nc");
-  roms::write(file, NetcdfFileType::netcdf4_compressed, "ocean_s_coordinate_g2");
+  roms::write(file, NetcdfFileType::kNetcdf4Compressed, "ocean_s_coordinate_g2");
   // The next word after --sphere is the grid, not a radius.
   convert({"--sphere", file, "--vertical-scale", "100"}, folder("sphere.splats"));
   const Manifest sphere = CacheReader(folder("sphere.splats")).manifest();
@@ -68,7 +68,7 @@ TEST_F(GridFormats, AnOceanOnTheSphereAndOnTheMap) {
 
 TEST_F(GridFormats, AScalarIsAddedToAnOcean) {
   const std::string file = folder("roms.nc");
-  roms::write(file, NetcdfFileType::classic, "ocean_s_coordinate_g2");
+  roms::write(file, NetcdfFileType::kClassic, "ocean_s_coordinate_g2");
   convert({file, "--scalar", "temp"}, folder("ocean.splats"));
   const ProgramResult added =
       runProgram({"convert", file, "--add-scalar", "salt", "--to", folder("ocean.splats")});

@@ -27,7 +27,7 @@ class LimitsTest : public testing::Test {
     writeCube(*folder_ / "cube", 12, [](const GridNode& node, NodeValues& values) {
       values.scalars[0] = static_cast<float>(node.i);
     });
-    const ProgramResult result = runProgram(cubeWords(file("cube")));
+    const ProgramResult result = runProgram(cubeArguments(file("cube")));
     ASSERT_EQ(result.status, 0) << result.err;
   }
   static void TearDownTestSuite() { folder_.reset(); }
@@ -67,7 +67,7 @@ std::string mebibytes(uint64_t count) {
 
 TEST_F(LimitsTest, ConversionNamesTheLeastMemoryThatItTakes) {
   const auto convert = [&](uint64_t least) {
-    return runProgram(cubeWords(file("cube"), {"--memory", mebibytes(least)}, file("least.splats")));
+    return runProgram(cubeArguments(file("cube"), {"--memory", mebibytes(least)}, file("least.splats")));
   };
   const ProgramResult refused = convert(1);
   EXPECT_EQ(refused.status, 1);
@@ -130,14 +130,14 @@ TEST_F(LimitsTest, FewAndManyThreadsDrawTheSame) {
 TEST_F(LimitsTest, FewAndManyThreadsConvertToTheSame) {
   for (const char* threads : {"1", "64"}) {
     SCOPED_TRACE(threads);
-    const ProgramResult result = runProgram(cubeWords(
+    const ProgramResult result = runProgram(cubeArguments(
         file("cube"), {"--overwrite", "--threads", threads, "--memory", "8G"}, file("threads.splats")));
     EXPECT_EQ(result.status, 0) << result.err;
     for (const char* name : {"manifest.json", "bricks.bin", "geometry.bin", "var.0.bin", "bricks.vdb"})
       EXPECT_EQ(readTextFile(file("threads.splats/") + name), readTextFile(file("cube.splats/") + name))
           << name;
   }
-  EXPECT_EQ(runProgram(cubeWords(file("cube"), {"--threads", "1025"}, file("no.splats"))).status, 2);
+  EXPECT_EQ(runProgram(cubeArguments(file("cube"), {"--threads", "1025"}, file("no.splats"))).status, 2);
 }
 
 TEST_F(LimitsTest, APictureMayBeOnePixel) {

@@ -28,7 +28,7 @@ class OddDataTest : public testing::Test {
   ProgramResult convert(uint64_t side, const CubeNode& node,
                         const std::vector<std::string>& more = {}) const {
     writeCube(folder_ / "cube", side, node);
-    return runProgram(cubeWords(folder_ / "cube", more));
+    return runProgram(cubeArguments(folder_ / "cube", more));
   }
   void expectConverted(uint64_t side, const CubeNode& node) {
     const ProgramResult result = convert(side, node);
@@ -176,7 +176,7 @@ TEST_F(OddDataTest, WhatIsNotFiniteIsCountedSkippedAndReported) {
     if (number.k == 4 && number.j == 5) values.position.y = infinity;
   };
   writeCube(folder_ / "cube", 8, node);
-  const ProgramResult result = runProgram(cubeWords(folder_ / "cube", {"--stats", file("stats.json")}));
+  const ProgramResult result = runProgram(cubeArguments(folder_ / "cube", {"--stats", file("stats.json")}));
   ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_NE(result.err.find("note: 208 nodes are not finite numbers, and are blanked"), std::string::npos)
       << result.err;

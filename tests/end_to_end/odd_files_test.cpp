@@ -28,7 +28,7 @@ class OddFiles : public testing::Test {
       values.scalars[0] = static_cast<float>(node.i);
       values.blank = node.i + node.j + node.k == 0;  // a note is printed
     });
-    const ProgramResult result = runProgram(cubeWords(folder_ / "cube"));
+    const ProgramResult result = runProgram(cubeArguments(folder_ / "cube"));
     EXPECT_EQ(result.status, 0) << result.err;
     for (const char* name : {"pipe", "pipe.json"}) EXPECT_EQ(::mkfifo(file(name).c_str(), 0600), 0);
   }
@@ -70,7 +70,7 @@ TEST_F(OddFiles, APipeIsNoInput) {
   // Nor where a cache is to be replaced.
   fs::create_directory(folder_ / "odd.splats");
   EXPECT_EQ(::mkfifo(file("odd.splats/manifest.json").c_str(), 0600), 0);
-  expectRefused(cubeWords(folder_ / "cube", {"--overwrite"}, folder_ / "odd.splats"), no_file);
+  expectRefused(cubeArguments(folder_ / "cube", {"--overwrite"}, folder_ / "odd.splats"), no_file);
 }
 
 TEST_F(OddFiles, WhatIsNoFileIsNotReplaced) {
@@ -104,9 +104,9 @@ TEST_F(OddFiles, LinksThatLeadRoundAreRefused) {
 
 TEST_F(OddFiles, WhatIsReadIsNotOverwritten) {
   const std::string grid = readTextFile(file("cube.xyz"));
-  expectRefused(cubeWords(folder_ / "cube", {"--stats", file("cube.xyz")}, folder_ / "b.splats"),
+  expectRefused(cubeArguments(folder_ / "cube", {"--stats", file("cube.xyz")}, folder_ / "b.splats"),
                 "would change");
-  expectRefused(cubeWords(folder_ / "cube", {"--stats", file("./cube.fun")}, folder_ / "b.splats"),
+  expectRefused(cubeArguments(folder_ / "cube", {"--stats", file("./cube.fun")}, folder_ / "b.splats"),
                 "would change");
   expectRefused({"render", cache(), "-o", cache() + "/a.png"}, "would change");
   expectRefused({"render", cache(), "-o", file("a.png"), "--stats", cache() + "/manifest.json"},
@@ -119,7 +119,7 @@ TEST_F(OddFiles, WhatIsReadIsNotOverwritten) {
   std::ofstream(file("tf.json")) << "{}";
   expectRefused({"render", cache(), "-o", file("a.png"), "--tf", file("tf.json"), "--stats", file("tf.json")},
                 "would change");
-  expectRefused(cubeWords(folder_ / "cube", {"--overwrite", "--stats", cache() + "/manifest.json"}),
+  expectRefused(cubeArguments(folder_ / "cube", {"--overwrite", "--stats", cache() + "/manifest.json"}),
                 "would change");
   fs::create_symlink(cache() + "/a.png", file("into.png"));
   expectRefused({"render", cache(), "-o", file("into.png")}, "would change");
@@ -137,7 +137,7 @@ TEST_F(OddFiles, AFullStandardErrorIsNoReasonToFail) {
   EXPECT_EQ(readImage(file("a.png")).size.width, 16);
   // Notes on what is blanked. A file must not be opened as the closed stream, and take them.
   std::string words;
-  for (const std::string& word : cubeWords("cube", {}, "b.splats")) words += word + " ";
+  for (const std::string& word : cubeArguments("cube", {}, "b.splats")) words += word + " ";
   EXPECT_EQ(shell(words + "2>&-").status, 0);
   expectWhole("b.splats");
 }

@@ -37,7 +37,7 @@ TEST(OddNames, AreTakenEverywhere) {
   const std::string scalar = "rho*u/ρ", added = "../../a \"b\"\\ü";
   writeCube(inside / "ο cube", 8, along, scalar);
   writeCube(inside / "other ö", 8, along, added);
-  expectDone(cubeWords(inside / "ο cube", {"--scalar", scalar, "--stats", stats}));
+  expectDone(cubeArguments(inside / "ο cube", {"--scalar", scalar, "--stats", stats}));
   EXPECT_TRUE(nlohmann::json::parse(readTextFile(stats))["files"].contains("var.0.bin"));
 
   expectDone(cubeAdditionWords(inside / "other ö", added, cache));
@@ -72,7 +72,7 @@ TEST(OddNames, OfNoEncodingAreTaken) {
   const fs::path prefix = folder / "lat\xfcn";
   writeCube(prefix, 8, along, "r\xfc");
   const std::string cache = prefix.string() + ".splats", stats = prefix.string() + ".json";
-  expectDone(cubeWords(prefix, {"--stats", stats}));
+  expectDone(cubeArguments(prefix, {"--stats", stats}));
   expectDone(
       {"render", cache, "-o", prefix.string() + ".png", "--size", "9x9", "--scalar-bar", "--stats", stats});
   const ProgramResult info = runProgram({"info", cache, "--json"});
@@ -87,7 +87,7 @@ class ReadOnlyTest : public testing::Test {
     fs::create_directory(readOnly());
     fs::create_directory(folder_ / "rw");
     writeCube(readOnly() / "cube", 8, along);
-    expectDone(cubeWords(readOnly() / "cube"));
+    expectDone(cubeArguments(readOnly() / "cube"));
     setWritable(false);
     const ProgramResult touched = run({"touch", readOnly() / "x"});
     if (touched.status == 0 || touched.err.find("setpriv") != std::string::npos)
@@ -130,7 +130,7 @@ class ReadOnlyTest : public testing::Test {
 };
 
 TEST_F(ReadOnlyTest, ItIsReadAsAnyOther) {
-  const ProgramResult converted = runBound(cubeWords(readOnly() / "cube", {}, folder_ / "rw/b.splats"));
+  const ProgramResult converted = runBound(cubeArguments(readOnly() / "cube", {}, folder_ / "rw/b.splats"));
   EXPECT_EQ(converted.status, 0) << converted.err;
   const ProgramResult drawn = runBound({"render", cache_, "-o", folder_ / "rw/a.png", "--size", "9x9"});
   EXPECT_EQ(drawn.status, 0) << drawn.err;
@@ -140,10 +140,10 @@ TEST_F(ReadOnlyTest, ItIsReadAsAnyOther) {
 
 TEST_F(ReadOnlyTest, ItIsNotWrittenTo) {
   const fs::path ro = readOnly(), rw = folder_ / "rw";
-  expectRefused(cubeWords(ro / "cube", {}, ro / "b.splats"), ro);
-  expectRefused(cubeWords(ro / "cube", {"--overwrite"}), ro);
-  expectRefused(cubeWords(ro / "cube", {"--tmp", ro}, rw / "b.splats"), "--tmp");
-  expectRefused(cubeWords(ro / "cube", {"--stats", ro / "s.json"}, rw / "b.splats"), "--stats");
+  expectRefused(cubeArguments(ro / "cube", {}, ro / "b.splats"), ro);
+  expectRefused(cubeArguments(ro / "cube", {"--overwrite"}), ro);
+  expectRefused(cubeArguments(ro / "cube", {"--tmp", ro}, rw / "b.splats"), "--tmp");
+  expectRefused(cubeArguments(ro / "cube", {"--stats", ro / "s.json"}, rw / "b.splats"), "--stats");
   expectRefused({"convert", ro / "cube.xyz", "--add-scalar", "j", "--to", cache_}, cache_);
   expectRefused({"render", cache_, "-o", ro / "a.png"}, ro);
   expectRefused({"render", cache_, "-o", ro / "a_%d.png", "--orbit", "9", "--frames", "2"}, ro);
@@ -155,7 +155,7 @@ TEST_F(ReadOnlyTest, ItIsNotWrittenTo) {
 TEST_F(ReadOnlyTest, WhatCannotBeReadIsNamed) {
   const fs::path rw = folder_ / "rw";
   fs::permissions(readOnly() / "cube.xyz", fs::perms::none);
-  expectRefused(cubeWords(readOnly() / "cube", {}, rw / "b.splats"), "cube.xyz");
+  expectRefused(cubeArguments(readOnly() / "cube", {}, rw / "b.splats"), "cube.xyz");
   expectRefused({"info", readOnly() / "cube.xyz"}, "cube.xyz");
   fs::permissions(cache_ + "/geometry.bin", fs::perms::none);
   expectRefused({"render", cache_, "-o", rw / "a.png"}, "geometry.bin");

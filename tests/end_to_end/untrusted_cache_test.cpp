@@ -29,8 +29,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint32_t kMost32 = std::numeric_limits<uint32_t>::max();
-constexpr uint64_t kMost64 = std::numeric_limits<uint64_t>::max();
+constexpr uint32_t kMax32 = std::numeric_limits<uint32_t>::max();
+constexpr uint64_t kMax64 = std::numeric_limits<uint64_t>::max();
 
 /// Runs the program where it gets two GiB of addresses: some times what it takes for a small cache, of which
 /// most are libraries and threads' stacks, and less than the caches here ask for. Sanitizers need more than
@@ -199,28 +199,26 @@ TEST_F(UntrustedCache, LinksAndOtherThingsThanFilesAreNotOpened) {
 
 TEST_F(UntrustedCache, SizesAndOffsetsDoNotOverflow) {
   expectRefused("outside of the file", [](HostileCache& cache) {
-    cache.bricks[3].geometry_offset = kMost64 - 100;  // the end is within the file again
+    cache.bricks[3].geometry_offset = kMax64 - 100;  // the end is within the file again
   });
-  expectRefused("outside of the file",
-                [](HostileCache& cache) { cache.variables[3].offset = kMost64 - 100; });
-  expectRefused("its size is",
-                [](HostileCache& cache) { cache.values_header.table_offset = kMost64 - 1000; });
+  expectRefused("outside of the file", [](HostileCache& cache) { cache.variables[3].offset = kMax64 - 100; });
+  expectRefused("its size is", [](HostileCache& cache) { cache.values_header.table_offset = kMax64 - 1000; });
   expectRefused("its size is", [](HostileCache& cache) {
     cache.bricks_header.bricks += uint64_t{1} << 60;  // times the size of a record is the same
   });
   expectRefused("its octants have", [](HostileCache& cache) {
-    std::fill_n(cache.bricks[0].octant_splats, 8, kMost32);
+    std::fill_n(cache.bricks[0].octant_splats, 8, kMax32);
     cache.bricks[0].octant_splats[0] += cache.bricks[0].splats + 8;
   });
-  expectRefused("children from brick", [](HostileCache& cache) { cache.bricks[1].child_count = kMost32; });
+  expectRefused("children from brick", [](HostileCache& cache) { cache.bricks[1].child_count = kMax32; });
   expectRefused("children from brick", [](HostileCache& cache) {
-    cache.bricks[1].first_child = kMost32 - 1;
+    cache.bricks[1].first_child = kMax32 - 1;
     cache.bricks[1].child_count = 3;
   });
 }
 
 TEST_F(UntrustedCache, CountsTakeNoMemoryBeforeTheyAreTrue) {
-  expectRefused("it has 4294967295 splats", [](HostileCache& cache) { cache.bricks[0].splats = kMost32; });
+  expectRefused("it has 4294967295 splats", [](HostileCache& cache) { cache.bricks[0].splats = kMax32; });
   expectRefused("bricks", [](HostileCache& cache) { cache.manifest["bricks"] = 0x7fffffff; });
   // A file of 288 GiB that takes no space.
   expectRefused("brick ", [](HostileCache& cache) {
@@ -234,7 +232,7 @@ TEST_F(UntrustedCache, CountsTakeNoMemoryBeforeTheyAreTrue) {
     cache.geometry_bytes = cache.geometry.size() + 0xf0000000;
   });
   expectRefused("a whole number from 1 to 25",
-                [](HostileCache& cache) { cache.manifest["levels"] = kMost32; });
+                [](HostileCache& cache) { cache.manifest["levels"] = kMax32; });
   expectRefused("cannot be opened", [](HostileCache& cache) {
     auto& variables = cache.manifest["variables"];
     for (int n = 1; n < 50000; ++n)

@@ -34,7 +34,7 @@ class RenderSweep : public ::testing::Test {
   void draw() {
     const CacheReader cache(cache_);
     const Manifest& manifest = cache.manifest();
-    FrameRenderer renderer(cache, 0, TransferFunction::preset("viridis", 0, 56, 8), Backend::cpu);
+    FrameRenderer renderer(cache, 0, TransferFunction::preset("viridis", 0, 56, 8), Backend::kCpu);
     FrameOptions options;
     options.size = {40, 30};
     options.lod_pixels = 0;
@@ -42,7 +42,7 @@ class RenderSweep : public ::testing::Test {
     options.memory_bytes = 64 << 20;
     options.keep_going = keep_going_;
     const Camera camera =
-        Camera::named("iso", manifest.lower, manifest.upper, options.size, Projection::orthographic, 30);
+        Camera::named("iso", manifest.lower, manifest.upper, options.size, Projection::kOrthographic, 30);
     const Image image = renderer.render(camera, options, statistics_);
     writeImage(image, pictures_ / "a.png");
   }

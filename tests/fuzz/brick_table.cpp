@@ -87,7 +87,7 @@ void writeTables(const Tables& tables, const BricksHeader& header, uint64_t geom
 }
 
 void checkCut(const CutTree& tree, const CutView& view, CutOptions options) {
-  for (const DrawingOrder order : {DrawingOrder::back_to_front, DrawingOrder::front_to_back}) {
+  for (const DrawingOrder order : {DrawingOrder::kBackToFront, DrawingOrder::kFrontToBack}) {
     options.order = order;
     const auto opaque = [](const ValueBounds& values) { return values.max < 0; };
     const Cut cut = chooseCut(tree, view, opaque, options);
@@ -134,7 +134,7 @@ void run(std::span<const std::byte> bytes) {
   const CutTree tree{root, bricks, variables, subtrees};
   const Camera camera =
       Camera::named("iso", root.min, root.min + root.size, {40, 30},
-                    flags & kPerspective ? Projection::perspective : Projection::orthographic);
+                    flags & kPerspective ? Projection::kPerspective : Projection::kOrthographic);
   const CutView view = ScreenView::of(camera, {40, 30}, glm::dvec3(1), kLowPass, 1e-4 * root.size).cutView();
   checkCut(tree, view, {});
   if (flags & kLimits) checkCut(tree, view, {.lod_pixels = 0, .max_splats = 200, .max_bytes = 3000});

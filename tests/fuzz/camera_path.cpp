@@ -16,7 +16,7 @@ void run(std::span<const std::byte> bytes) {
     const glm::dmat4 view = camera.viewFromWorld();
     for (int column = 0; column < 4; ++column)
       for (int row = 0; row < 4; ++row) CURVISPLAT_CHECK(std::isfinite(view[column][row]));
-    CURVISPLAT_CHECK(camera.projection == Projection::perspective
+    CURVISPLAT_CHECK(camera.projection == Projection::kPerspective
                          ? camera.view_angle_deg > 0 && camera.view_angle_deg < 180
                          : camera.parallel_scale > 0);
   }

@@ -11,14 +11,14 @@ namespace curvisplat {
 
 /// The first rows of every block with every scalar, as conversion reads them.
 inline void readGrid(const GridSource& source) {
-  constexpr uint64_t kMostNodes = 1 << 16;
+  constexpr uint64_t kMaxNodes = 1 << 16;
   std::vector<uint32_t> scalars(source.description().scalars.size());
   std::iota(scalars.begin(), scalars.end(), 0u);
   NodeArrays nodes;
   for (uint32_t b = 0; b < source.description().blocks.size(); ++b) {
     const GridBlock& block = source.description().blocks[b];
-    if (block.ni > kMostNodes) continue;
-    const uint64_t rows = std::min(block.nj, kMostNodes / block.ni);
+    if (block.ni > kMaxNodes) continue;
+    const uint64_t rows = std::min(block.nj, kMaxNodes / block.ni);
     for (uint64_t k = 0; k < std::min<uint64_t>(block.nk, 4); ++k) {
       source.read(b, {0, rows, k, k + 1}, scalars, nodes);
       CURVISPLAT_CHECK_OP(nodes.x.size(), ==, block.ni * rows);

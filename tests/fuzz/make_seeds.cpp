@@ -16,7 +16,7 @@
 #include "stream/cache/cache_format.h"
 #include "stream/codec/geometry_codec.h"
 #include "stream/codec/values_codec.h"
-#include "stream/model/half_cell.h"
+#include "stream/model/border_code.h"
 #include "tests/preprocess/plot3d_bytes.h"
 #include "tests/stream/test_bricks.h"
 #include "tests/support/netcdf_writer.h"
@@ -75,8 +75,9 @@ std::string unpacked(std::span<const std::byte> stream, size_t header_bytes) {
 const glm::dvec3 kInward[] = {{0, 0.6, 0.8}, {1, 0, 0}, {0, 0.8, -0.6}};
 
 void addHalfCells(BrickSplats& brick) {
-  brick.half_cells.assign(brick.size(), kNoBorder);
-  for (size_t n = 0; n < brick.size(); n += 3) brick.half_cells[n] = packHalfCell({kInward, 1 + n / 3 % 3});
+  brick.border_codes.assign(brick.size(), kNoBorder);
+  for (size_t n = 0; n < brick.size(); n += 3)
+    brick.border_codes[n] = packBorderCode({kInward, 1 + n / 3 % 3});
 }
 
 void writeStreams(const Seeds& seeds) {
@@ -195,7 +196,7 @@ void writeSplats(const Seeds& seeds) {
       for (int c = 0; c < 3; ++c) seed.add(0.3f * unit(random));
       for (int c = 0; c < 3; ++c) seed.add(unit(random) - 0.5f);
       seed.add(0.1f * unit(random));
-      seed.add(n % 3 == 0 ? packHalfCell({&kInward[0], 1 + static_cast<size_t>(n) / 3 % 3}) : kNoBorder);
+      seed.add(n % 3 == 0 ? packBorderCode({&kInward[0], 1 + static_cast<size_t>(n) / 3 % 3}) : kNoBorder);
       seed.add(unit(random));
       for (int c = 0; c < 3; ++c) seed.add(0.1f * unit(random));
       seed.add(0.01f * unit(random));
@@ -245,7 +246,7 @@ void writeTexts(const Seeds& seeds) {
   ViewState state = firstViewOf(manifest, {600, 400});
   seeds.write("view_state", "first", toJson(state));
   state.clip_box = WorldBox{{0, 3, 4}, {1, 4, 5}};
-  state.camera.projection = Projection::perspective;
+  state.camera.projection = Projection::kPerspective;
   state.function.addPoint(0.3, 0.4);
   seeds.write("view_state", "changed", toJson(state));
 }
@@ -269,25 +270,27 @@ void writePlot3d(const Seeds& seeds) {
     seeds.write(target, name, Seed().add(flags).add(bytes).bytes(grid).bytes(solution).whole());
   };
   const std::vector<test::TestBlock> blocks{testBlock(4, 3, 3, 5), testBlock(3, 4, 2, 5, 5)};
-  for (const RecordMarkers records : {RecordMarkers::none, RecordMarkers::bytes4, RecordMarkers::bytes8})
-    for (const ByteOrder order : {ByteOrder::little, ByteOrder::big}) {
-      const bool multi = order == ByteOrder::big;
-      Plot3dLayout grid{Plot3dKind::grid, false, order, records, multi ? 4 : 8, multi, multi, false};
+  for (const RecordMarkers records : {RecordMarkers::kNone, RecordMarkers::kBytes4, RecordMarkers::kBytes8})
+    for (const ByteOrder order : {ByteOrder::kLittle, ByteOrder::kBig}) {
+      const bool multi = order == ByteOrder::kBig;
+      Plot3dLayout grid{Plot3dKind::kGrid, false, order, records, multi ? 4 : 8, multi, multi, false};
       Plot3dLayout solution = grid;
       solution.blanking = false;
-      solution.kind = records == RecordMarkers::bytes4 ? Plot3dKind::function : Plot3dKind::q;
+      solution.kind = records == RecordMarkers::kBytes4 ? Plot3dKind::kFunction : Plot3dKind::kQ;
       const std::span used(blocks.data(), multi ? 2u : 1u);
       const std::vector<test::TestBlock> of_file(used.begin(), used.end());
       write("plot3d", fmt::format("records_{}_{}", static_cast<int>(records), multi ? "big" : "little"), 0,
             plot3dBytes(grid, of_file), plot3dBytes(solution, of_file));
     }
-  Plot3dLayout cut{Plot3dKind::grid, false, ByteOrder::little, RecordMarkers::bytes4, 4, false, false, false};
+  Plot3dLayout cut{
+      Plot3dKind::kGrid, false, ByteOrder::kLittle, RecordMarkers::kBytes4, 4, false, false, false};
   write("plot3d", "subrecords", 0, plot3dBytes(cut, {blocks[0]}, 100), {});
   for (const bool multi : {false, true}) {
-    Plot3dLayout grid{Plot3dKind::grid, true, ByteOrder::little, RecordMarkers::none, 8, multi, multi, false};
+    Plot3dLayout grid{
+        Plot3dKind::kGrid, true, ByteOrder::kLittle, RecordMarkers::kNone, 8, multi, multi, false};
     Plot3dLayout solution = grid;
     solution.blanking = false;
-    solution.kind = multi ? Plot3dKind::function : Plot3dKind::q;
+    solution.kind = multi ? Plot3dKind::kFunction : Plot3dKind::kQ;
     std::vector<test::TestBlock> of_file{testBlock(3, 3, 2, 5)};
     if (multi) of_file.push_back(testBlock(2, 2, 3, 5, 5));
     write("plot3d_ascii", multi ? "blocks" : "one", 0, plot3dText(grid, of_file),
@@ -302,7 +305,7 @@ void writeVtk(const Seeds& seeds) {
     VtsEncoding small = encoding;
     small.block_bytes = 100;
     if (small.header_bytes == 8 && small.big_endian) continue;
-    std::string name = small.inWords();
+    std::string name = small.describe();
     std::replace_if(
         name.begin(), name.end(), [](char c) { return !std::isalnum(static_cast<unsigned char>(c)); }, '_');
     seeds.write("vtk_xml", name, vtsFile(grid, small));
@@ -390,14 +393,14 @@ void writeNetcdf(const Seeds& seeds) {
   const TemporaryFolder folder;
   for (const bool records : {false, true}) {
     {
-      NetcdfWriter file(folder / "a.nc", NetcdfFileType::classic);
+      NetcdfWriter file(folder / "a.nc", NetcdfFileType::kClassic);
       file.dimension("time", 2, records);
       file.dimension("x", 3);
       const auto value = [](const std::vector<size_t>& at) { return static_cast<double>(at.back()); };
-      file.variable("x", NetcdfNumbers::double_precision, {"x"}, {{"units", "m"}}, value);
-      file.variable("f", NetcdfNumbers::int16, {"time", "x"}, {{"scale_factor", NetcdfNumberList{0.5}}},
+      file.variable("x", NetcdfNumbers::kDoublePrecision, {"x"}, {{"units", "m"}}, value);
+      file.variable("f", NetcdfNumbers::kInt16, {"time", "x"}, {{"scale_factor", NetcdfNumberList{0.5}}},
                     value);
-      file.variable("g", NetcdfNumbers::single_precision, {"time", "x"}, {}, value);
+      file.variable("g", NetcdfNumbers::kSinglePrecision, {"time", "x"}, {}, value);
     }
     seeds.write("netcdf_classic", records ? "records" : "fixed", bytesOfFile(folder / "a.nc"));
   }

@@ -10,7 +10,7 @@
 #include "render/project/depth_sort.h"
 #include "render/project/projection.h"
 #include "stream/base/check.h"
-#include "stream/model/half_cell.h"
+#include "stream/model/border_code.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {
@@ -36,8 +36,8 @@ struct Splats {
     for (auto* array : {&geometry.shear10, &geometry.shear20, &geometry.shear21})
       array->push_back(finite(input.take<float>(), -kLargest));
     geometry.weight.push_back(finite(input.take<float>(), 0));
-    const auto half_cell = input.take<uint32_t>();
-    geometry.half_cell.push_back(isPossibleHalfCell(half_cell) ? half_cell : kNoBorder);
+    const auto border_code = input.take<uint32_t>();
+    geometry.border_code.push_back(isPossibleBorderCode(border_code) ? border_code : kNoBorder);
     for (auto* array : {&values.mean, &values.slope0, &values.slope1, &values.slope2})
       array->push_back(finite(input.take<float>(), -kLargest));
     values.variance.push_back(finite(input.take<float>(), 0));
@@ -66,7 +66,7 @@ void run(std::span<const std::byte> bytes) {
   const ImageSize pixels{40, 24};
   const Camera camera =
       Camera::named("iso", scale * corner, scale * (corner + size), pixels,
-                    flags & kPerspective ? Projection::perspective : Projection::orthographic);
+                    flags & kPerspective ? Projection::kPerspective : Projection::kOrthographic);
   ProjectionSettings settings{ScreenView::of(camera, pixels, scale, kLowPass, 1e-4 * size), !(flags & kFlat)};
   if (flags & kCells) settings.border_parts = kCellBorderParts;
   if (flags & kClip) settings.clip_box = WorldBox{corner, corner + 0.5 * size};

@@ -28,8 +28,8 @@ inline void readPlot3d(std::span<const std::byte> bytes, bool ascii) {
   OpenGridOptions options;
   options.temporary_folder = fuzzFolder();
   if (ascii) options.force.ascii = true;
-  if (flags & 1) options.force.byte_order = flags & 2 ? ByteOrder::big : ByteOrder::little;
-  if (flags & 4) options.force.records = flags & 8 ? RecordMarkers::bytes4 : RecordMarkers::none;
+  if (flags & 1) options.force.byte_order = flags & 2 ? ByteOrder::kBig : ByteOrder::kLittle;
+  if (flags & 4) options.force.records = flags & 8 ? RecordMarkers::kBytes4 : RecordMarkers::kNone;
   if (flags & 16) options.force.precision_bytes = flags & 32 ? 8 : 4;
   if (flags & 64) options.force.multi_block = true;
   if (flags & 128) options.force.blanking = true;

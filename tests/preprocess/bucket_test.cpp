@@ -36,7 +36,7 @@ TEST(SplatRecord, RoundTripsToSinglePrecision) {
     splat.regular = n % 2 == 0;
     if (!splat.regular) {
       splat.splat.weight *= 3;
-      splat.half_cell = 0x12345601;
+      splat.border_code = 0x12345601;
     }
     std::vector<SplatScalar> values{{0.25, {1, 2, 3}, 0}, {-7, {0.5, 0, -1}, 0}};
     if (!splat.regular) values[1].variance = 0.125;
@@ -49,7 +49,7 @@ TEST(SplatRecord, RoundTripsToSinglePrecision) {
     EXPECT_EQ(recordPosition(record.data()), position);
     Splat back;
     std::vector<SplatScalar> values_back(2);
-    EXPECT_EQ(unpackRecord(record.data(), back, values_back), splat.half_cell);
+    EXPECT_EQ(unpackRecord(record.data(), back, values_back), splat.border_code);
     for (int axis = 0; axis < 3; ++axis) {
       EXPECT_NEAR(back.axis[axis], splat.splat.axis[axis], 8e-6 * splat.splat.axis[axis]);
       EXPECT_FLOAT_EQ(back.shear[axis], splat.splat.shear[axis]);

@@ -79,7 +79,7 @@ TEST(CellConvert, KeepsEveryCellAndTheVolumeOfTheHexahedra) {
   const TemporaryFolder folder;
   const CellScene scene;
   const ConvertReport report = convertQuietly(scene.source, optionsFor(folder / "c.splats", {1}));
-  EXPECT_EQ(report.centring, Centring::cell);
+  EXPECT_EQ(report.centring, Centring::kCell);
   EXPECT_EQ(report.nodes, 32u * 39 * 36);
   EXPECT_EQ(report.splats, report.nodes);
   EXPECT_EQ(report.merged_nodes, 0u);

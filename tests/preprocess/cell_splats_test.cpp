@@ -10,7 +10,7 @@
 
 #include "preprocess/grid/hexahedron.h"
 #include "preprocess/grid/node_reader.h"
-#include "stream/model/half_cell.h"
+#include "stream/model/border_code.h"
 #include "tests/reference/mapped_block.h"
 #include "tests/support/temporary_folder.h"
 
@@ -155,7 +155,7 @@ TEST(CellSplats, EndAtBordersButNotWhereBlocksAbut) {
     if (beside(i, j, k) && i == 0) expected.pop_back();  // it ends on both sides
     if (j != 1 && !beside(j, i, k)) expected.push_back(j == 0 ? jacobian[1] : -jacobian[1]);
     if (k != 1 && !beside(k, i, j)) expected.push_back(k == 0 ? jacobian[2] : -jacobian[2]);
-    const InwardAxes found = inwardAxes(splat.half_cell);
+    const InwardAxes found = inwardAxes(splat.border_code);
     ASSERT_EQ(found.count, static_cast<int>(expected.size())) << i << j << k;
     for (int n = 0; n < found.count; ++n)
       EXPECT_LT(glm::distance(splat.splat.factor() * glm::dvec3(found.axis[static_cast<size_t>(n)]),
@@ -163,7 +163,7 @@ TEST(CellSplats, EndAtBordersButNotWhereBlocksAbut) {
                 0.03 * glm::length(expected[static_cast<size_t>(n)]))
           << i << j << k;
   }
-  for (const NodeSplat& splat : grid.cellSplats().splats) EXPECT_EQ(splat.half_cell, kNoBorder);
+  for (const NodeSplat& splat : grid.cellSplats().splats) EXPECT_EQ(splat.border_code, kNoBorder);
 }
 
 TEST(CellSplats, OfAnyGridSumToItsHexahedra) {
@@ -265,9 +265,9 @@ TEST(CellSplats, OfWindowsAreThoseOfTheWhole) {
         EXPECT_EQ(part.splats[m].splat.position, whole.splats[same].splat.position);
         EXPECT_EQ(part.splats[m].splat.axis, whole.splats[same].splat.axis);
         EXPECT_EQ(part.splats[m].splat.weight, whole.splats[same].splat.weight);
-        EXPECT_EQ(part.splats[m].half_cell, whole.splats[same].half_cell);
+        EXPECT_EQ(part.splats[m].border_code, whole.splats[same].border_code);
         EXPECT_EQ(part.values[m].slope, whole.values[same].slope);
-        borders += part.splats[m].half_cell != kNoBorder;
+        borders += part.splats[m].border_code != kNoBorder;
       }
       n += part.splats.size();
     }

@@ -29,7 +29,7 @@ class CgnsDamage : public testing::TestWithParam<CgnsFileType> {
     file.zone("Other", {3, 3, 3});
     file.coordinates("GridCoordinates",
                      {{"CoordinateX", value}, {"CoordinateY", value}, {"CoordinateZ", value}});
-    file.solution("S 1", "CellCenter", {{"Pressure", value, CgnsNumbers::single_precision}});
+    file.solution("S 1", "CellCenter", {{"Pressure", value, CgnsNumbers::kSinglePrecision}});
   }
 
   static std::unique_ptr<GridSource> open(const std::filesystem::path& file) {
@@ -55,8 +55,8 @@ TEST_P(CgnsDamage, FilesWithAWrongByteAreRefusedOrRead) {
   EXPECT_GT(report.changed, 10);
 }
 
-INSTANTIATE_TEST_SUITE_P(Types, CgnsDamage, testing::Values(CgnsFileType::adf, CgnsFileType::hdf5),
-                         [](const auto& type) { return type.param == CgnsFileType::adf ? "Adf" : "Hdf5"; });
+INSTANTIATE_TEST_SUITE_P(Types, CgnsDamage, testing::Values(CgnsFileType::kAdf, CgnsFileType::kHdf5),
+                         [](const auto& type) { return type.param == CgnsFileType::kAdf ? "Adf" : "Hdf5"; });
 
 }  // namespace
 }  // namespace curvisplat

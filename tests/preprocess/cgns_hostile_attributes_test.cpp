@@ -23,7 +23,7 @@ const char* const kArray = "/Base/Zone/GridCoordinates/CoordinateX";
 class CgnsHostileAttributes : public testing::Test {
  protected:
   CgnsHostileAttributes() {
-    CgnsWriter file(path_, CgnsFileType::hdf5);
+    CgnsWriter file(path_, CgnsFileType::kHdf5);
     file.base("Base");
     file.zone("Zone", {4, 3, 3});
     file.coordinates("GridCoordinates",
@@ -116,7 +116,7 @@ TEST_F(CgnsHostileAttributes, WhatCgnsDoesNotNeedDoesNotMatter) {
   {
     Hdf5Editor editor(file);
     for (const char* attribute : {"name", "label", "type"})
-      editor.replaceAttribute("/", attribute, HostileAttribute::missing);
+      editor.replaceAttribute("/", attribute, HostileAttribute::kMissing);
   }
   expectDensity(file);
 }
@@ -207,14 +207,14 @@ TEST_F(CgnsHostileAttributes, ManyNamesForTheSameNodesAreBounded) {
 
 TEST_F(CgnsHostileAttributes, AnHdf5FileCalledCgnsSaysWhatItLacks) {
   const std::filesystem::path file = folder_ / "roms.cgns";
-  roms::write(file, NetcdfFileType::netcdf4, "ocean_s_coordinate_g2");
+  roms::write(file, NetcdfFileType::kNetcdf4, "ocean_s_coordinate_g2");
   expectError(file, "the root has an attribute 'type' of 22 bytes; expected a text of at most 3 bytes");
 }
 
 TEST_F(CgnsHostileAttributes, ANetcdfFileWithALongGlobalTypeIsNetcdf) {
   // What is read of it is compared with formulas in netcdf_test.cpp: roms::write gives it the attribute.
   const std::filesystem::path file = folder_ / "roms.nc";
-  roms::write(file, NetcdfFileType::netcdf4, "ocean_s_coordinate_g2");
+  roms::write(file, NetcdfFileType::kNetcdf4, "ocean_s_coordinate_g2");
   for (int hostile = 0; hostile < kHostileAttributes; ++hostile) {
     SCOPED_TRACE(hostile);
     for (const char* attribute : {"name", "label", "type", "order", "flags"})

@@ -85,7 +85,7 @@ class RealCgns : public testing::Test {
       for (uint32_t b = 0; b < description.blocks.size(); ++b) {
         const GridBlock& block = description.blocks[b];
         const bool cells =
-            array < expected.size() && description.scalars[array - 3].centring == Centring::cell;
+            array < expected.size() && description.scalars[array - 3].centring == Centring::kCell;
         const uint64_t less = cells ? 1 : 0;
         // All of an axis comes before the next: a pass an axis.
         NodeArrays nodes;
@@ -116,7 +116,7 @@ TEST_F(RealCgns, DeltaWing) {
   EXPECT_EQ(description.blocks[0].nj, 65u);
   EXPECT_EQ(description.blocks[0].nk, 65u);
   EXPECT_EQ(description.coordinate_bytes, 4);
-  EXPECT_EQ(description.scalars.at(0).centring, Centring::node);
+  EXPECT_EQ(description.scalars.at(0).centring, Centring::kNode);
   EXPECT_EQ(description.scalars.at(0).unit, "");  // normalised by what is not told
   expectArrays(*source, {{"x", 0x89acbc42, -0.800000011920929, 1.7999999523162842},
                          {"y", 0x8c528c6f, -5.6750351962761396e-15, 1.6543920040130615},
@@ -139,7 +139,7 @@ TEST_F(RealCgns, CellCentredZonesInBothFileTypes) {
     for (const GridBlock& block : description.blocks) nodes += block.nodes();
     EXPECT_EQ(nodes, 15'228u);
     EXPECT_EQ(description.coordinate_bytes, 8);
-    for (const GridScalar& scalar : description.scalars) EXPECT_EQ(scalar.centring, Centring::cell);
+    for (const GridScalar& scalar : description.scalars) EXPECT_EQ(scalar.centring, Centring::kCell);
     expectArrays(*source, {{"x", 0x25a6be6b, -1.2, 1.0},
                            {"y", 0x838a74c1, 0.0, 1.0},
                            {"z", 0xb34ff38d, 0.0, 1.0},

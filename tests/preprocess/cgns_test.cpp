@@ -62,7 +62,7 @@ void expectValues(const GridSource& source, uint32_t block, const NodeBox& box, 
   NodeArrays nodes;
   source.read(block, box, std::span(&scalar, 1), nodes);
   ASSERT_EQ(nodes.x.size(), dims.ni * (box.j1 - box.j0) * (box.k1 - box.k0));
-  const bool cells = source.description().scalars.at(scalar).centring == Centring::cell;
+  const bool cells = source.description().scalars.at(scalar).centring == Centring::kCell;
   const std::vector<CgnsWriterField> axes = cartesian(x_offset);
   size_t n = 0;
   for (uint64_t k = box.k0; k < box.k1; ++k)
@@ -111,8 +111,8 @@ TEST_P(Cgns, VertexAndCellSolutionsAreReadByAnyBox) {
   EXPECT_TRUE(description.times.empty());
   EXPECT_TRUE(description.warnings.empty());
   ASSERT_EQ(description.scalars.size(), 3u);
-  EXPECT_EQ(description.scalars[1].centring, Centring::node);
-  EXPECT_EQ(description.scalars[2].centring, Centring::cell);
+  EXPECT_EQ(description.scalars[1].centring, Centring::kNode);
+  EXPECT_EQ(description.scalars[2].centring, Centring::kCell);
   expectAllBoxes(*source, 1, linear(0.5, 9));
   expectAllBoxes(*source, 2, linear(7));
 }
@@ -156,9 +156,9 @@ TEST_P(Cgns, NumbersOfAnyTypeAreConverted) {
     file.zone("Zone", {3, 3, 3});
     file.coordinates("GridCoordinates", cartesian());
     file.solution("Nodes", "Vertex",
-                  {{"Single", linear(0.5), CgnsNumbers::single_precision},
-                   {"Integer", linear(3), CgnsNumbers::integer},
-                   {"Double", linear(0.1), CgnsNumbers::double_precision}});
+                  {{"Single", linear(0.5), CgnsNumbers::kSinglePrecision},
+                   {"Integer", linear(3), CgnsNumbers::kInteger},
+                   {"Double", linear(0.1), CgnsNumbers::kDoublePrecision}});
   }
   const auto source = open();
   expectAllBoxes(*source, 0, linear(0.5));
@@ -422,8 +422,8 @@ TEST_P(Cgns, AnHdf5FileOfAnyNameIsRecognised) {
   EXPECT_EQ(open()->description().blocks.size(), 1u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Types, Cgns, testing::Values(CgnsFileType::adf, CgnsFileType::hdf5),
-                         [](const auto& type) { return type.param == CgnsFileType::adf ? "Adf" : "Hdf5"; });
+INSTANTIATE_TEST_SUITE_P(Types, Cgns, testing::Values(CgnsFileType::kAdf, CgnsFileType::kHdf5),
+                         [](const auto& type) { return type.param == CgnsFileType::kAdf ? "Adf" : "Hdf5"; });
 
 }  // namespace
 }  // namespace curvisplat

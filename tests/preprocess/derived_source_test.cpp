@@ -296,7 +296,7 @@ TEST(DerivedSource, OfCellsStandInCells) {
   const DerivedSource source(std::move(cells), {});
   const auto scalars = scalarsNamed(source.description(), {"211", "210", "mach"});
   for (const uint32_t scalar : scalars)
-    EXPECT_EQ(source.description().scalars[scalar].centring, Centring::cell);
+    EXPECT_EQ(source.description().scalars[scalar].centring, Centring::kCell);
   NodeArrays out;
   source.read(0, {0, 8, 0, 8}, scalars, out);
   int cells_there = 0;

@@ -37,9 +37,9 @@ TEST_P(NetcdfDamage, FilesWithAWrongByteAreRefusedOrRead) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Types, NetcdfDamage,
-                         testing::Values(NetcdfFileType::classic, NetcdfFileType::netcdf4_compressed),
+                         testing::Values(NetcdfFileType::kClassic, NetcdfFileType::kNetcdf4Compressed),
                          [](const auto& type) {
-                           return type.param == NetcdfFileType::classic ? "Classic" : "Compressed";
+                           return type.param == NetcdfFileType::kClassic ? "Classic" : "Compressed";
                          });
 
 }  // namespace

@@ -65,7 +65,7 @@ class Netcdf : public testing::TestWithParam<NetcdfFileType> {
           SCOPED_TRACE(std::to_string(i) + ", " + std::to_string(j) + ", " + std::to_string(k));
           const auto [at, value] = expected(i, j, k);
           const double height = at.height_km * options_.globe.vertical_scale;
-          if (options_.globe.shape == GlobeOptions::Shape::flat) {
+          if (options_.globe.shape == GlobeOptions::Shape::kFlat) {
             ASSERT_NEAR(nodes.x[n], kRadius * radians(at.longitude), near);
             ASSERT_NEAR(nodes.y[n], kRadius * radians(at.latitude), near);
             ASSERT_NEAR(nodes.z[n], height, near);
@@ -240,11 +240,11 @@ TEST_P(Netcdf, FlatMapsAndScalesAreAsAskedFor) {
         nemo::land(k, j, i) ? std::nan("") : nemo::packed(0, k, j, i) * nemo::kScale + nemo::kOffset};
   };
   expectAll(*open(), "votemper", expected);
-  options_.globe.shape = GlobeOptions::Shape::sphere;
+  options_.globe.shape = GlobeOptions::Shape::kSphere;
   options_.globe.radius_km = 1000;
   expectAll(*open(), "votemper", expected);
   options_.globe.radius_km = kRadius;
-  options_.globe.shape = GlobeOptions::Shape::flat;
+  options_.globe.shape = GlobeOptions::Shape::kFlat;
   expectAll(*open(), "votemper", expected);
 }
 
@@ -280,7 +280,7 @@ TEST_P(Netcdf, WrfHeightsAreThoseOfTheGeopotential) {
   });
 
   // The date line is no edge of the map.
-  options_.globe.shape = GlobeOptions::Shape::flat;
+  options_.globe.shape = GlobeOptions::Shape::kFlat;
   tolerance_ = 3e-3;
   expectAll(*open(), "T", [&](size_t i, size_t j, size_t k) {
     const double height =
@@ -298,8 +298,8 @@ TEST_P(Netcdf, WrfHeightsAreThoseOfTheGeopotential) {
 // -- other files
 
 using Index = std::vector<size_t>;
-constexpr auto kSingle = NetcdfNumbers::single_precision;
-constexpr auto kDouble = NetcdfNumbers::double_precision;
+constexpr auto kSingle = NetcdfNumbers::kSinglePrecision;
+constexpr auto kDouble = NetcdfNumbers::kDoublePrecision;
 
 double degreesEast(size_t i) {
   return 10 + 2 * static_cast<double>(i);
@@ -374,7 +374,7 @@ TEST_P(Netcdf, MissingValuesOfEachKindAreBlank) {
                   });
     file.variable("ranged", kSingle, {"alt", "lat", "lon"}, {{"valid_range", NetcdfNumberList{2, 5}}},
                   [](const Index& n) { return static_cast<double>(n[2]); });
-    file.variable("filled", NetcdfNumbers::int32, {"alt", "lat", "lon"}, {},
+    file.variable("filled", NetcdfNumbers::kInt32, {"alt", "lat", "lon"}, {},
                   [](const Index& n) { return n[2] == 3 ? -2147483647.0 : static_cast<double>(n[2]); });
   }
   const auto valuesOf = [&](const char* name) {
@@ -411,7 +411,7 @@ TEST_P(Netcdf, LengthsAreFlat) {
   EXPECT_EQ(nodes.x, (std::vector<double>{0, 1.5, 3, 4.5}));
   EXPECT_EQ(nodes.y, (std::vector<double>{3, 3, 3, 3}));
   EXPECT_EQ(nodes.z, (std::vector<double>{-0.25, -0.25, -0.25, -0.25}));
-  options_.globe.shape = GlobeOptions::Shape::sphere;
+  options_.globe.shape = GlobeOptions::Shape::kSphere;
   EXPECT_NE(errorOf().find("x and y are lengths, not degrees"), std::string::npos) << errorOf();
 }
 
@@ -491,12 +491,12 @@ TEST_P(Netcdf, ThreadsMayReadAtOnce) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Types, Netcdf,
-                         testing::Values(NetcdfFileType::classic, NetcdfFileType::netcdf4,
-                                         NetcdfFileType::netcdf4_compressed),
+                         testing::Values(NetcdfFileType::kClassic, NetcdfFileType::kNetcdf4,
+                                         NetcdfFileType::kNetcdf4Compressed),
                          [](const auto& type) {
-                           return type.param == NetcdfFileType::classic   ? "Classic"
-                                  : type.param == NetcdfFileType::netcdf4 ? "Netcdf4"
-                                                                          : "Compressed";
+                           return type.param == NetcdfFileType::kClassic   ? "Classic"
+                                  : type.param == NetcdfFileType::kNetcdf4 ? "Netcdf4"
+                                                                           : "Compressed";
                          });
 
 }  // namespace

@@ -136,7 +136,7 @@ TEST(NodeSplats, BesideBlankedNodesAreHalfCells) {
   ASSERT_EQ(above.node, grid.at(3, 3, 4));
   EXPECT_EQ(above.splat.position, glm::dvec3(3, 3, 4.25));
   EXPECT_EQ(above.splat.axis, (std::array{1.0, 1.0, 0.5}));
-  const InwardAxes inward = inwardAxes(above.half_cell);
+  const InwardAxes inward = inwardAxes(above.border_code);
   ASSERT_EQ(inward.count, 1);
   EXPECT_LT(glm::distance(inward.axis[0], glm::vec3(0, 0, 1)), 0.01f);
   EXPECT_FALSE(above.on_block_face);

@@ -29,7 +29,7 @@ class OpenGrid : public testing::Test {
     layout.kind = kind;
     folder_.write(name, plot3dBytes(layout, {testBlock(5, 4, 3, components)}));
   }
-  void SetUp() override { write("grid.xyz", Plot3dKind::grid, 0); }
+  void SetUp() override { write("grid.xyz", Plot3dKind::kGrid, 0); }
 
   const TestFolder folder_{"open-grid"};
 };
@@ -46,8 +46,8 @@ std::string usageErrorOf(const GridDescription& description, const std::vector<s
 using Positions = std::vector<uint32_t>;
 
 TEST_F(OpenGrid, FindsScalarsByNameAliasAndNumber) {
-  write("a.q", Plot3dKind::q, 5);
-  write("a.fun", Plot3dKind::function, 3);
+  write("a.q", Plot3dKind::kQ, 5);
+  write("a.fun", Plot3dKind::kFunction, 3);
   folder_.write("a.nam", "velocity_u ; velocity\r\n  T\n\npressure\n");
   EXPECT_EQ(names({"a.q", "a.fun"}),
             (std::vector<std::string>{"density", "momentum_x", "momentum_y", "momentum_z", "energy",
@@ -62,7 +62,7 @@ TEST_F(OpenGrid, FindsScalarsByNameAliasAndNumber) {
 }
 
 TEST_F(OpenGrid, RefusesUnknownScalarsWithTheListOfThem) {
-  write("a.fun", Plot3dKind::function, 2);
+  write("a.fun", Plot3dKind::kFunction, 2);
   folder_.write("a.nam", "p\nT\n");
   const auto source = open({"a.fun"});
   EXPECT_EQ(scalarsNamed(source->description(), {"2"}), Positions{1});
@@ -75,8 +75,8 @@ TEST_F(OpenGrid, RefusesUnknownScalarsWithTheListOfThem) {
 }
 
 TEST_F(OpenGrid, NamesThatClashCarryTheirFile) {
-  write("a.fun", Plot3dKind::function, 2);
-  write("b.fun", Plot3dKind::function, 3);
+  write("a.fun", Plot3dKind::kFunction, 2);
+  write("b.fun", Plot3dKind::kFunction, 3);
   EXPECT_EQ(names({"a.fun", "b.fun"}), (std::vector<std::string>{"a:1", "a:2", "b:1", "b:2", "3"}));
   const auto source = open({"a.fun", "b.fun"});
   EXPECT_EQ(scalarsNamed(source->description(), {"b:2", "3"}), (Positions{3, 4}));
@@ -85,7 +85,7 @@ TEST_F(OpenGrid, NamesThatClashCarryTheirFile) {
 }
 
 TEST_F(OpenGrid, WarnsOfNamesThatDoNotMatch) {
-  write("a.fun", Plot3dKind::function, 3);
+  write("a.fun", Plot3dKind::kFunction, 3);
   folder_.write("a.nam", "p\nT\n");
   const auto source = open({"a.fun"});
   ASSERT_EQ(source->description().warnings.size(), 1u);

@@ -34,10 +34,10 @@ PayloadFile openPayload(const std::filesystem::path& path, const Plot3dLayout& l
 TEST(PayloadFile, IsTheRecordsWithoutTheirMarkers) {
   const TestFolder folder("payload");
   std::mt19937_64 random(1);
-  for (const RecordMarkers records : {RecordMarkers::bytes4, RecordMarkers::bytes8})
-    for (const ByteOrder order : {ByteOrder::little, ByteOrder::big})
+  for (const RecordMarkers records : {RecordMarkers::kBytes4, RecordMarkers::kBytes8})
+    for (const ByteOrder order : {ByteOrder::kLittle, ByteOrder::kBig})
       for (const uint64_t subrecord : {0, 1, 7, 64}) {
-        if (records == RecordMarkers::bytes8 && subrecord > 0) continue;
+        if (records == RecordMarkers::kBytes8 && subrecord > 0) continue;
         const Plot3dLayout layout = withRecords(records, order);
         Bytes file, expected;
         std::vector<uint64_t> sizes;
@@ -70,7 +70,7 @@ TEST(PayloadFile, IsTheRecordsWithoutTheirMarkers) {
 TEST(PayloadFile, EveryMarkerIsChecked) {
   const TestFolder folder("markers");
   std::mt19937_64 random(2);
-  const Plot3dLayout layout = withRecords(RecordMarkers::bytes4, ByteOrder::little);
+  const Plot3dLayout layout = withRecords(RecordMarkers::kBytes4, ByteOrder::kLittle);
   Bytes file;
   appendRecord(file, randomBytes(40, random), layout, 16);  // 3 subrecords: 6 markers
   for (const size_t marker : {0, 20, 24, 44, 48, 60})
@@ -82,7 +82,7 @@ TEST(PayloadFile, EveryMarkerIsChecked) {
     }
   // A second subrecord that says it is a first one, and a record that goes on behind the end.
   Bytes damaged = file, positive;
-  appendNumber(positive, 16, ByteOrder::little);
+  appendNumber(positive, 16, ByteOrder::kLittle);
   std::copy(positive.begin(), positive.end(), damaged.begin() + 44);
   EXPECT_THROW(openPayload(folder.write("records", damaged), layout).nextRecord(), RecordMismatch);
   damaged = file;
@@ -97,7 +97,7 @@ TEST(PayloadFile, RecordsOfSixGigabytesAreRead) {
   constexpr uint64_t kNi = 1024, kNj = 1024, kNk = 512, kNodes = kNi * kNj * kNk;
   constexpr uint64_t kRecord = 12 * kNodes;
   const TestFolder folder("six-gigabytes");
-  const Plot3dLayout layout = withRecords(RecordMarkers::bytes4, ByteOrder::big);
+  const Plot3dLayout layout = withRecords(RecordMarkers::kBytes4, ByteOrder::kBig);
   Bytes header, dimensions;
   for (const uint64_t n : {kNi, kNj, kNk})
     appendNumber(dimensions, static_cast<int32_t>(n), layout.byte_order);

@@ -51,7 +51,7 @@ using Bytes = std::vector<std::byte>;
 template <typename Value>
 void appendNumber(Bytes& to, Value value, ByteOrder order) {
   const auto bytes = std::bit_cast<std::array<std::byte, sizeof(Value)>>(value);
-  const bool reverse = (order == ByteOrder::big) == (std::endian::native == std::endian::little);
+  const bool reverse = (order == ByteOrder::kBig) == (std::endian::native == std::endian::little);
   if (reverse)
     to.insert(to.end(), bytes.rbegin(), bytes.rend());
   else
@@ -63,9 +63,9 @@ void appendNumber(Bytes& to, Value value, ByteOrder order) {
 inline void appendRecord(Bytes& to, const Bytes& payload, const Plot3dLayout& layout,
                          uint64_t subrecord_bytes = 0) {
   const auto marker = [&](int64_t value) {
-    if (layout.records == RecordMarkers::bytes4)
+    if (layout.records == RecordMarkers::kBytes4)
       appendNumber(to, static_cast<int32_t>(value), layout.byte_order);
-    if (layout.records == RecordMarkers::bytes8) appendNumber(to, value, layout.byte_order);
+    if (layout.records == RecordMarkers::kBytes8) appendNumber(to, value, layout.byte_order);
   };
   const uint64_t part = subrecord_bytes > 0 ? subrecord_bytes : std::max<uint64_t>(1, payload.size());
   uint64_t begin = 0;
@@ -94,15 +94,15 @@ inline std::vector<Numbers> recordsOf(const Plot3dLayout& layout, const std::vec
   for (const TestBlock& block : blocks) {
     for (const uint64_t n : {block.ni, block.nj, block.nk})
       dimensions.integers.push_back(static_cast<int32_t>(n));
-    if (layout.kind == Plot3dKind::function)
+    if (layout.kind == Plot3dKind::kFunction)
       dimensions.integers.push_back(static_cast<int32_t>(block.components.size()));
   }
   records.push_back(dimensions);
   for (const TestBlock& block : blocks) {
-    if (layout.kind == Plot3dKind::q)
+    if (layout.kind == Plot3dKind::kQ)
       records.push_back({{}, {block.conditions.begin(), block.conditions.end()}, false});
     Numbers values;
-    if (layout.kind == Plot3dKind::grid)
+    if (layout.kind == Plot3dKind::kGrid)
       for (const auto& axis : block.coordinates)
         values.values.insert(values.values.end(), axis.begin(), axis.end());
     else

@@ -14,8 +14,8 @@ namespace {
 
 using namespace test;
 
-constexpr ByteOrder kLittle = ByteOrder::little, kBig = ByteOrder::big;
-constexpr RecordMarkers kC = RecordMarkers::none, kFortran = RecordMarkers::bytes4;
+constexpr ByteOrder kLittle = ByteOrder::kLittle, kBig = ByteOrder::kBig;
+constexpr RecordMarkers kC = RecordMarkers::kNone, kFortran = RecordMarkers::kBytes4;
 
 std::unique_ptr<GridSource> open(const TestFolder& folder, const Bytes& grid,
                                  const Bytes* solution = nullptr) {
@@ -68,11 +68,11 @@ std::vector<TestBlock> doubleBlocks(uint32_t components) {
 TEST(Plot3dDamage, EveryPrefixOfAGridIsRefusedOrReadRight) {
   const TestFolder folder("prefixes");
   for (const ByteOrder order : {kLittle, kBig})
-    for (const RecordMarkers records : {kC, kFortran, RecordMarkers::bytes8})
+    for (const RecordMarkers records : {kC, kFortran, RecordMarkers::kBytes8})
       for (const int precision : {4, 8})
         for (const bool blanking : {false, true}) {
-          const Plot3dLayout layout{Plot3dKind::grid, false, order, records, precision, true, blanking};
-          SCOPED_TRACE(inWords(layout));
+          const Plot3dLayout layout{Plot3dKind::kGrid, false, order, records, precision, true, blanking};
+          SCOPED_TRACE(describe(layout));
           const Bytes file = plot3dBytes(layout, doubleBlocks(0));
           const auto whole = open(folder, file);
           size_t accepted = 0;
@@ -93,10 +93,10 @@ TEST(Plot3dDamage, EveryPrefixOfAGridIsRefusedOrReadRight) {
 
 TEST(Plot3dDamage, EveryPrefixOfASolutionIsRefused) {
   const TestFolder folder("solution-prefixes");
-  for (const Plot3dKind kind : {Plot3dKind::q, Plot3dKind::function})
+  for (const Plot3dKind kind : {Plot3dKind::kQ, Plot3dKind::kFunction})
     for (const RecordMarkers records : {kC, kFortran})
       for (const int precision : {4, 8}) {
-        Plot3dLayout layout{Plot3dKind::grid, false, kBig, records, precision, true, false};
+        Plot3dLayout layout{Plot3dKind::kGrid, false, kBig, records, precision, true, false};
         const auto blocks = doubleBlocks(5);
         const Bytes grid = plot3dBytes(layout, blocks);
         layout.kind = kind;
@@ -115,7 +115,7 @@ TEST(Plot3dDamage, EveryPrefixOfASolutionIsRefused) {
 
 TEST(Plot3dDamage, EveryPrefixOfATextIsRefused) {
   const TestFolder folder("text-prefixes");
-  const Plot3dLayout layout{Plot3dKind::grid, true, kLittle, kC, 8, false, false};
+  const Plot3dLayout layout{Plot3dKind::kGrid, true, kLittle, kC, 8, false, false};
   const Bytes file = plot3dText(layout, {testBlock(2, 3, 2, 0)});
   EXPECT_EQ(errorOf(folder, file), "");
   // The last number may lose digits unnoticed.
@@ -127,7 +127,7 @@ TEST(Plot3dDamage, FlippedBytesNeverCrash) {
   const TestFolder folder("flips");
   std::mt19937_64 random(11);
   for (const RecordMarkers records : {kC, kFortran}) {
-    const Plot3dLayout layout{Plot3dKind::grid, false, kLittle, records, 4, true, true};
+    const Plot3dLayout layout{Plot3dKind::kGrid, false, kLittle, records, 4, true, true};
     const Bytes file = plot3dBytes(layout, {testBlock(3, 4, 2, 0), testBlock(2, 2, 2, 0)}, 40);
     for (int n = 0; n < 1000; ++n) {
       Bytes damaged = file;
@@ -148,7 +148,7 @@ TEST(Plot3dDamage, FlippedBytesNeverCrash) {
 TEST(Plot3dDamage, TrailingBytesAreAWarning) {
   const TestFolder folder("trailing");
   for (const RecordMarkers records : {kC, kFortran}) {
-    const Plot3dLayout layout{Plot3dKind::grid, false, kBig, records, 4, false, false};
+    const Plot3dLayout layout{Plot3dKind::kGrid, false, kBig, records, 4, false, false};
     Bytes file = plot3dBytes(layout, {testBlock(9, 8, 7, 0)});
     const auto whole = open(folder, file);
     file.insert(file.end(), 484, std::byte{});
@@ -160,7 +160,7 @@ TEST(Plot3dDamage, TrailingBytesAreAWarning) {
 
 TEST(Plot3dDamage, TruncatedIblankIsNoTrailingBytes) {
   const TestFolder folder("truncated-iblank");
-  const Plot3dLayout layout{Plot3dKind::grid, false, kBig, kC, 4, false, true};
+  const Plot3dLayout layout{Plot3dKind::kGrid, false, kBig, kC, 4, false, true};
   Bytes file = plot3dBytes(layout, {testBlock(9, 8, 7, 0)});
   file.resize(12 + 12 * 9 * 8 * 7 + 300);
   const std::string error = errorOf(folder, file);
@@ -170,7 +170,7 @@ TEST(Plot3dDamage, TruncatedIblankIsNoTrailingBytes) {
 
 TEST(Plot3dDamage, TruncatedFilesSayWhatWasExpected) {
   const TestFolder folder("truncated");
-  const Plot3dLayout layout{Plot3dKind::grid, false, kBig, kC, 4, false, false};
+  const Plot3dLayout layout{Plot3dKind::kGrid, false, kBig, kC, 4, false, false};
   Bytes file = plot3dBytes(layout, {testBlock(9, 8, 7, 0)});
   file.resize(4000);
   const std::string error = errorOf(folder, file);
@@ -190,7 +190,7 @@ TEST(Plot3dDamage, TruncatedFilesSayWhatWasExpected) {
 
 TEST(Plot3dDamage, PlanesFormatIsRefusedByName) {
   const TestFolder folder("planes");
-  const Plot3dLayout layout{Plot3dKind::grid, false, kLittle, kFortran, 4, false, false};
+  const Plot3dLayout layout{Plot3dKind::kGrid, false, kLittle, kFortran, 4, false, false};
   Bytes file;
   Bytes dimensions;
   for (const int32_t n : {6, 5, 4}) appendNumber(dimensions, n, kLittle);
@@ -216,9 +216,9 @@ TEST(Plot3dDamage, NoiseInTheRightSizeIsRefused) {
 
 TEST(Plot3dDamage, SolutionOfOtherDimensionsNamesBoth) {
   const TestFolder folder("other-dimensions");
-  Plot3dLayout layout{Plot3dKind::grid, false, kLittle, kFortran, 4, true, false};
+  Plot3dLayout layout{Plot3dKind::kGrid, false, kLittle, kFortran, 4, true, false};
   const Bytes grid = plot3dBytes(layout, {testBlock(6, 5, 4, 0), testBlock(3, 3, 3, 0)});
-  layout.kind = Plot3dKind::q;
+  layout.kind = Plot3dKind::kQ;
   const Bytes q = plot3dBytes(layout, {testBlock(6, 5, 4, 5), testBlock(3, 3, 2, 5)});
   const std::string error = errorOf(folder, grid, &q);
   EXPECT_NE(error.find("solution has 2 blocks (6x5x4, 3x3x2), but the grid"), std::string::npos) << error;
@@ -227,11 +227,11 @@ TEST(Plot3dDamage, SolutionOfOtherDimensionsNamesBoth) {
 
 TEST(Plot3dDamage, WrongKindsAreNamed) {
   const TestFolder folder("kinds");
-  Plot3dLayout layout{Plot3dKind::grid, false, kLittle, kFortran, 4, true, false};
+  Plot3dLayout layout{Plot3dKind::kGrid, false, kLittle, kFortran, 4, true, false};
   const Bytes grid = plot3dBytes(layout, {testBlock(6, 5, 4, 0)});
   const std::string as_solution = errorOf(folder, grid, &grid);
   EXPECT_NE(as_solution.find("it would fit as a grid of 1 block of 6x5x4"), std::string::npos) << as_solution;
-  layout.kind = Plot3dKind::q;
+  layout.kind = Plot3dKind::kQ;
   const std::string as_grid = errorOf(folder, plot3dBytes(layout, {testBlock(6, 5, 4, 5)}));
   EXPECT_NE(as_grid.find("it would fit as a Q solution of 1 block of 6x5x4"), std::string::npos) << as_grid;
 }
@@ -252,7 +252,7 @@ class BadDisk : public SystemCalls {
 
 TEST(Plot3dDamage, AFailingDiskIsNoQuestionOfLayout) {
   const TestFolder folder("bad-disk");
-  const Plot3dLayout layout{Plot3dKind::grid, false, kBig, kFortran, 4, true, false};
+  const Plot3dLayout layout{Plot3dKind::kGrid, false, kBig, kFortran, 4, true, false};
   const Bytes file = plot3dBytes(layout, {testBlock(9, 8, 7, 0), testBlock(3, 3, 3, 0)});
   for (const int64_t good : {2, 20, 70, 6000, 6200}) {
     OpenGridOptions options;

@@ -20,21 +20,22 @@ struct WrittenLayout {
 
 std::vector<WrittenLayout> everyBinaryLayout() {
   std::vector<WrittenLayout> all;
-  for (const ByteOrder order : {ByteOrder::little, ByteOrder::big})
-    for (const auto& [records, subrecord] : {std::pair{RecordMarkers::none, 0u},
-                                             {RecordMarkers::bytes4, 0u},
-                                             {RecordMarkers::bytes8, 0u},
-                                             {RecordMarkers::bytes4, 101u}})
+  for (const ByteOrder order : {ByteOrder::kLittle, ByteOrder::kBig})
+    for (const auto& [records, subrecord] : {std::pair{RecordMarkers::kNone, 0u},
+                                             {RecordMarkers::kBytes4, 0u},
+                                             {RecordMarkers::kBytes8, 0u},
+                                             {RecordMarkers::kBytes4, 101u}})
       for (const int precision : {4, 8})
         for (const bool multi : {false, true})
           for (const bool blanking : {false, true})
-            all.push_back({{Plot3dKind::grid, false, order, records, precision, multi, blanking}, subrecord});
+            all.push_back(
+                {{Plot3dKind::kGrid, false, order, records, precision, multi, blanking}, subrecord});
   return all;
 }
 
 Plot3dLayout as(Plot3dKind kind, Plot3dLayout layout) {
   layout.kind = kind;
-  if (kind != Plot3dKind::grid) layout.blanking = false;
+  if (kind != Plot3dKind::kGrid) layout.blanking = false;
   return layout;
 }
 
@@ -91,9 +92,10 @@ void expectRoundTrip(const TestFolder& folder, const Plot3dLayout& layout,
                      const std::vector<TestBlock>& q_blocks, const std::vector<TestBlock>& function_blocks) {
   const auto source = openGrid(optionsFor(folder, "a.xyz", {"a.q", "a.fun"}));
   const GridDescription& description = source->description();
-  EXPECT_EQ(description.format,
-            fmt::format("PLOT3D grid a.xyz: {}; Q solution a.q: {}; function file a.fun: {}", inWords(layout),
-                        inWords(as(Plot3dKind::q, layout)), inWords(as(Plot3dKind::function, layout))));
+  EXPECT_EQ(
+      description.format,
+      fmt::format("PLOT3D grid a.xyz: {}; Q solution a.q: {}; function file a.fun: {}", describe(layout),
+                  describe(as(Plot3dKind::kQ, layout)), describe(as(Plot3dKind::kFunction, layout))));
   EXPECT_TRUE(description.warnings.empty());
   ASSERT_EQ(description.blocks.size(), q_blocks.size());
   ASSERT_EQ(description.scalars.size(), 7u);
@@ -114,11 +116,11 @@ void expectRoundTrip(const TestFolder& folder, const Plot3dLayout& layout,
 TEST(Plot3dLayouts, EveryBinaryLayoutIsDetectedAndReadBack) {
   const TestFolder folder("layouts");
   for (const auto& [layout, subrecord] : everyBinaryLayout()) {
-    SCOPED_TRACE(fmt::format("{}, subrecords of {}", inWords(layout), subrecord));
+    SCOPED_TRACE(fmt::format("{}, subrecords of {}", describe(layout), subrecord));
     const auto q_blocks = blocksFor(layout, 5), function_blocks = blocksFor(layout, 2);
     folder.write("a.xyz", plot3dBytes(layout, q_blocks, subrecord));
-    folder.write("a.q", plot3dBytes(as(Plot3dKind::q, layout), q_blocks, subrecord));
-    folder.write("a.fun", plot3dBytes(as(Plot3dKind::function, layout), function_blocks, subrecord));
+    folder.write("a.q", plot3dBytes(as(Plot3dKind::kQ, layout), q_blocks, subrecord));
+    folder.write("a.fun", plot3dBytes(as(Plot3dKind::kFunction, layout), function_blocks, subrecord));
     ASSERT_NO_FATAL_FAILURE(expectRoundTrip(folder, layout, q_blocks, function_blocks));
   }
 }
@@ -127,13 +129,13 @@ TEST(Plot3dLayouts, EveryTextLayoutIsDetectedAndReadBack) {
   const TestFolder folder("texts");
   for (const bool multi : {false, true})
     for (const bool blanking : {false, true}) {
-      const Plot3dLayout layout{Plot3dKind::grid, true, ByteOrder::little, RecordMarkers::none, 8, multi,
+      const Plot3dLayout layout{Plot3dKind::kGrid, true, ByteOrder::kLittle, RecordMarkers::kNone, 8, multi,
                                 blanking};
-      SCOPED_TRACE(inWords(layout));
+      SCOPED_TRACE(describe(layout));
       const auto q_blocks = blocksFor(layout, 5), function_blocks = blocksFor(layout, 2);
       folder.write("a.xyz", plot3dText(layout, q_blocks));
-      folder.write("a.q", plot3dText(as(Plot3dKind::q, layout), q_blocks));
-      folder.write("a.fun", plot3dText(as(Plot3dKind::function, layout), function_blocks));
+      folder.write("a.q", plot3dText(as(Plot3dKind::kQ, layout), q_blocks));
+      folder.write("a.fun", plot3dText(as(Plot3dKind::kFunction, layout), function_blocks));
       ASSERT_NO_FATAL_FAILURE(expectRoundTrip(folder, layout, q_blocks, function_blocks));
       // Nothing is left of the spools.
       EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 3);
@@ -156,12 +158,12 @@ TEST(Plot3dLayouts, ForcingEverythingReadsTheSame) {
 
 TEST(Plot3dLayouts, ForcingAnythingElseIsRefusedAndTheLayoutNamed) {
   const TestFolder folder("forced-wrongly");
-  const Plot3dLayout layout{Plot3dKind::grid, false, ByteOrder::big, RecordMarkers::bytes4, 4, true, true};
+  const Plot3dLayout layout{Plot3dKind::kGrid, false, ByteOrder::kBig, RecordMarkers::kBytes4, 4, true, true};
   folder.write("a.xyz", plot3dBytes(layout, blocksFor(layout, 0)));
   Plot3dForce wrong[6];
   wrong[0].ascii = true;
-  wrong[1].byte_order = ByteOrder::little;
-  wrong[2].records = RecordMarkers::bytes8;
+  wrong[1].byte_order = ByteOrder::kLittle;
+  wrong[2].records = RecordMarkers::kBytes8;
   wrong[3].precision_bytes = 8;
   wrong[4].multi_block = false;
   wrong[5].blanking = false;
@@ -171,13 +173,13 @@ TEST(Plot3dLayouts, ForcingAnythingElseIsRefusedAndTheLayoutNamed) {
     const std::string error = errorOf(options);
     EXPECT_NE(error, "");
     if (force.ascii) continue;
-    EXPECT_NE(error.find(inWords(layout)), std::string::npos) << error;
+    EXPECT_NE(error.find(describe(layout)), std::string::npos) << error;
   }
 }
 
 TEST(Plot3dLayouts, ThreadsReadAtOnce) {
   const TestFolder folder("threads");
-  const Plot3dLayout layout{Plot3dKind::grid, false, ByteOrder::big, RecordMarkers::bytes4, 4, true, true};
+  const Plot3dLayout layout{Plot3dKind::kGrid, false, ByteOrder::kBig, RecordMarkers::kBytes4, 4, true, true};
   const auto blocks = blocksFor(layout, 5);
   folder.write("a.xyz", plot3dBytes(layout, blocks, 101));
   const auto source = openGrid(optionsFor(folder, "a.xyz"));
@@ -207,7 +209,7 @@ TEST(Plot3dLayouts, IsNeverTheWrongOne) {
     try {
       const auto source = openGrid(optionsFor(folder, "a.xyz"));
       ++detected;
-      EXPECT_EQ(source->description().format, "PLOT3D grid a.xyz: " + inWords(layout));
+      EXPECT_EQ(source->description().format, "PLOT3D grid a.xyz: " + describe(layout));
     } catch (const Error& error) {
       ++ambiguous;
       EXPECT_NE(std::string(error.what()).find("equally well"), std::string::npos) << error.what();
@@ -221,8 +223,8 @@ TEST(Plot3dLayouts, IsNeverTheWrongOne) {
 TEST(Plot3dLayouts, TwoThatFitEquallyWellAreNamedWithTheOptionsThatDecide) {
   const TestFolder folder("ambiguous");
   Bytes file;
-  for (const int32_t n : {1, 1, 1, 2}) appendNumber(file, n, ByteOrder::little);
-  for (const float value : {1.f, 1.f, 1.f, 1.f, 1.f, 0.f}) appendNumber(file, value, ByteOrder::little);
+  for (const int32_t n : {1, 1, 1, 2}) appendNumber(file, n, ByteOrder::kLittle);
+  for (const float value : {1.f, 1.f, 1.f, 1.f, 1.f, 0.f}) appendNumber(file, value, ByteOrder::kLittle);
   folder.write("a.xyz", file);
   OpenGridOptions options = optionsFor(folder, "a.xyz");
   const std::string error = errorOf(options);

@@ -17,10 +17,10 @@ using namespace test;
 class Plot3dMeta : public testing::Test {
  protected:
   Plot3dMeta() {
-    const Plot3dLayout grid{Plot3dKind::grid, false, ByteOrder::big, RecordMarkers::none, 4, false, false};
+    const Plot3dLayout grid{Plot3dKind::kGrid, false, ByteOrder::kBig, RecordMarkers::kNone, 4, false, false};
     Plot3dLayout q = grid, function = grid;
-    q.kind = Plot3dKind::q;
-    function.kind = Plot3dKind::function;
+    q.kind = Plot3dKind::kQ;
+    function.kind = Plot3dKind::kFunction;
     folder_.write("a.xyz", plot3dBytes(grid, {testBlock(5, 4, 3, 0)}));
     folder_.write("b.xyz", plot3dBytes(grid, {testBlock(3, 4, 3, 0)}));
     folder_.write("a.q", plot3dBytes(q, {testBlock(5, 4, 3, 5)}));
@@ -152,12 +152,12 @@ Bytes overflowBytes(const Plot3dLayout& layout, const std::vector<TestBlock>& bl
 
 TEST(Plot3dOverflow, IsReadInEveryLayout) {
   const TestFolder folder("overflow");
-  for (const ByteOrder order : {ByteOrder::little, ByteOrder::big})
-    for (const RecordMarkers records : {RecordMarkers::bytes4, RecordMarkers::bytes8})
+  for (const ByteOrder order : {ByteOrder::kLittle, ByteOrder::kBig})
+    for (const RecordMarkers records : {RecordMarkers::kBytes4, RecordMarkers::kBytes8})
       for (const int precision : {4, 8})
         for (const bool multi : {false, true})
           for (const int nqc : {0, 3}) {
-            const Plot3dLayout layout{Plot3dKind::grid, false, order, records, precision, multi, false};
+            const Plot3dLayout layout{Plot3dKind::kGrid, false, order, records, precision, multi, false};
             const uint32_t components = nqc ? 11 : 5;
             std::vector<TestBlock> blocks{testBlock(5, 4, 3, components)};
             if (multi) blocks.push_back(testBlock(3, 2, 4, components, 1));
@@ -189,7 +189,7 @@ TEST(Plot3dOverflow, IsReadInEveryLayout) {
 TEST(Plot3dOverflow, OfAnyDamageIsAnErrorOrReads) {
   const TestFolder folder("overflow-damage");
   const Plot3dLayout layout{
-      Plot3dKind::grid, false, ByteOrder::little, RecordMarkers::bytes4, 8, true, false};
+      Plot3dKind::kGrid, false, ByteOrder::kLittle, RecordMarkers::kBytes4, 8, true, false};
   const std::vector<TestBlock> blocks{testBlock(5, 4, 3, 8), testBlock(3, 2, 4, 8, 1)};
   OpenGridOptions options;
   options.grid = folder.write("a.xyz", plot3dBytes(layout, blocks));

@@ -107,7 +107,7 @@ void expectSame(const std::map<std::array<long, 3>, Piece>& found,
     EXPECT_NEAR(piece.value.mean, whole.value.mean, 1e-9);
     EXPECT_LT(glm::distance(piece.value.slope, whole.value.slope), 1e-9);
     EXPECT_NEAR(piece.value.variance, 0, 1e-9);
-    const InwardAxes open = inwardAxes(piece.node.half_cell), border = inwardAxes(whole.node.half_cell);
+    const InwardAxes open = inwardAxes(piece.node.border_code), border = inwardAxes(whole.node.border_code);
     ASSERT_EQ(open.count, border.count);
     for (int n = 0; n < border.count; ++n) {
       double closest = -1;

@@ -25,7 +25,7 @@ using test::TestFolder;
 
 // The files have some tens of KiB; readers have buffers.
 constexpr rlim_t kMoreMemory = rlim_t{64} << 20;
-constexpr uint64_t kMostRows = 4096;
+constexpr uint64_t kMaxRows = 4096;
 
 /// Until its end, this process may not take much more address space than it has.
 class MemoryLimit {
@@ -71,7 +71,7 @@ Content contentOf(const std::filesystem::path& path) {
   for (uint32_t b = 0; b < source->description().blocks.size(); ++b) {
     const GridBlock& block = source->description().blocks[b];
     content.blocks.push_back({block.ni, block.nj, block.nk});
-    if (block.ni > kMostRows) continue;
+    if (block.ni > kMaxRows) continue;
     NodeArrays nodes;
     source->read(b, {0, std::min<uint64_t>(block.nj, 64), 0, std::min<uint64_t>(block.nk, 64)}, scalars,
                  nodes);
@@ -85,7 +85,7 @@ Content contentOf(const std::filesystem::path& path) {
 }
 
 struct Ending {
-  enum class Kind { same, changed, refused } kind = Kind::same;
+  enum class Kind { kSame, kChanged, kRefused } kind = Kind::kSame;
   size_t changed = 0;  // numbers, if the names and blocks are as they were
   std::string error;
 };
@@ -103,9 +103,9 @@ Ending endingOf(const std::filesystem::path& path, const Content& whole, const s
       }
       if (ending.changed == 0) return ending;
     }
-    ending.kind = Ending::Kind::changed;
+    ending.kind = Ending::Kind::kChanged;
   } catch (const Error& error) {
-    ending.kind = Ending::Kind::refused;
+    ending.kind = Ending::Kind::kRefused;
     ending.error = error.what();
     EXPECT_EQ(ending.error.find('\n'), std::string::npos) << what << ": " << ending.error;
     EXPECT_NE(ending.error.find(path.parent_path().string()), std::string::npos)
@@ -137,17 +137,17 @@ std::vector<DamagedFile> damagedFiles() {
     if (encoding.header_bytes == 8 && !encoding.big_endian) continue;  // enough of them
     encoding.block_bytes = 200;
     DamagedFile file;
-    file.name = encoding.inWords() + ".vts";
+    file.name = encoding.describe() + ".vts";
     for (char& c : file.name)
       if (c == ' ' || c == '-') c = '_';
     file.bytes = vtsFile(annulusVtsGrid(5, 4, 4), encoding, &file.data_begins);
     // Vectors: a component, and the magnitude; a coordinate; base64: two numbers may share a character. LZ4
     // has no checksum: a whole block may change, 50 numbers, each vector with its magnitude.
-    if (encoding.format == VtsEncoding::Format::appended_raw) file.most_changed = 2;
-    if (encoding.format == VtsEncoding::Format::appended_base64) file.most_changed = 4;
-    if (encoding.compressor == VtsEncoding::Compressor::lz4 && file.most_changed > 0)
+    if (encoding.format == VtsEncoding::Format::kAppendedRaw) file.most_changed = 2;
+    if (encoding.format == VtsEncoding::Format::kAppendedBase64) file.most_changed = 4;
+    if (encoding.compressor == VtsEncoding::Compressor::kLz4 && file.most_changed > 0)
       file.most_changed = 2 * 50 + 2;
-    if (encoding.compressor == VtsEncoding::Compressor::zlib) file.most_changed = 0;
+    if (encoding.compressor == VtsEncoding::Compressor::kZlib) file.most_changed = 0;
     files.push_back(std::move(file));
   }
   for (const char* const name :
@@ -173,10 +173,10 @@ TEST_P(VtkDamage, TruncatedFilesAreRefused) {
   for (size_t n = 0; n < 100; ++n) {
     const size_t size = bytes.size() * n / 100;
     const Ending ending = endingOf(write(bytes.substr(0, size)), whole_, fmt::format("cut at {}", size));
-    refused += ending.kind == Ending::Kind::refused;
+    refused += ending.kind == Ending::Kind::kRefused;
     // XML files say where they end. Legacy ones may end behind any of their parts.
     const bool tells_its_end = !GetParam().name.ends_with(".vtk");
-    EXPECT_FALSE(tells_its_end && ending.kind == Ending::Kind::changed) << size;
+    EXPECT_FALSE(tells_its_end && ending.kind == Ending::Kind::kChanged) << size;
   }
   EXPECT_GE(refused, 90);
 }
@@ -190,9 +190,9 @@ TEST_P(VtkDamage, AWrongByteIsRefusedOrChangesWhatItStandsFor) {
     const size_t at = random() % damaged.size();
     damaged[at] = static_cast<char>(damaged[at] ^ static_cast<char>(1 + random() % 255));
     const Ending ending = endingOf(write(damaged), whole_, fmt::format("byte {}", at));
-    refused += ending.kind == Ending::Kind::refused;
-    changed += ending.kind == Ending::Kind::changed;
-    if (at < GetParam().data_begins || ending.kind != Ending::Kind::changed) continue;
+    refused += ending.kind == Ending::Kind::kRefused;
+    changed += ending.kind == Ending::Kind::kChanged;
+    if (at < GetParam().data_begins || ending.kind != Ending::Kind::kChanged) continue;
     ++in_data;
     EXPECT_GT(ending.changed, 0u) << "byte " << at;
     EXPECT_LE(ending.changed, GetParam().most_changed) << "byte " << at;
@@ -224,7 +224,7 @@ TEST(VtkDamageOfSets, AreRefusedOrReadOtherwise) {
       const size_t size = bytes.size() * n / 100;
       const Ending ending =
           endingOf(folder.write(name, bytes.substr(0, size)), whole, fmt::format("cut at {}", size));
-      EXPECT_EQ(ending.kind, Ending::Kind::refused) << name << " " << size;
+      EXPECT_EQ(ending.kind, Ending::Kind::kRefused) << name << " " << size;
     }
     for (int n = 0; n < 1000; ++n) {
       std::string damaged = bytes;
@@ -242,8 +242,8 @@ TEST(VtkDamageOfSizes, HugeCountsAreRefusedBeforeAnythingIsAllocated) {
     std::string file = vtsFile(annulusVtsGrid(5, 4, 4), encoding);
     for (size_t at; (at = file.find("0 4 0 3 0 3")) != std::string::npos;)
       file.replace(at, 11, "0 40000 0 30000 0 30000");
-    const Ending ending = endingOf(folder.write("huge.vts", file), {}, encoding.inWords());
-    EXPECT_EQ(ending.kind, Ending::Kind::refused) << encoding.inWords();
+    const Ending ending = endingOf(folder.write("huge.vts", file), {}, encoding.describe());
+    EXPECT_EQ(ending.kind, Ending::Kind::kRefused) << encoding.describe();
   }
 }
 

@@ -46,7 +46,7 @@ TEST(VtkEncodings, AllHoldTheSameValues) {
   const TestFolder folder("vts-encodings");
   const VtsGrid grid = annulusVtsGrid(7, 6, 5, {2, 0, -1});
   for (const VtsEncoding& encoding : allVtsEncodings()) {
-    SCOPED_TRACE(encoding.inWords());
+    SCOPED_TRACE(encoding.describe());
     const auto source = openText(folder, vtsFile(grid, encoding));
     const GridDescription& description = source->description();
     ASSERT_EQ(description.blocks.size(), 1u);
@@ -78,7 +78,7 @@ TEST(VtkEncodings, BoxesAreThoseOfTheWhole) {
   std::mt19937_64 random(3);
   const VtsGrid grid = annulusVtsGrid(11, 9, 8);
   for (const VtsEncoding& encoding : allVtsEncodings()) {
-    SCOPED_TRACE(encoding.inWords());
+    SCOPED_TRACE(encoding.describe());
     const auto source = openText(folder, vtsFile(grid, encoding));
     const NodeArrays all = allNodes(*source, 0);
     const std::vector<uint32_t> scalars = {6, 2, 0};  // T, U:x, p
@@ -120,7 +120,7 @@ TEST(VtkEncodings, AllTypesOfNumbersAreRead) {
   grid.points.type = "Float64";
   for (double& x : grid.points.values) x += 1e-9;
   for (const VtsEncoding& encoding : allVtsEncodings()) {
-    SCOPED_TRACE(encoding.inWords());
+    SCOPED_TRACE(encoding.describe());
     const auto source = openText(folder, vtsFile(grid, encoding));
     EXPECT_EQ(source->description().coordinate_bytes, 8);
     const NodeArrays nodes = allNodes(*source, 0);
@@ -156,7 +156,7 @@ TEST(VtkEncodings, AllGiveTheSameCache) {
   std::map<std::string, uint64_t> first;
   for (const VtsEncoding& encoding : allVtsEncodings()) {
     if (encoding.header_bytes == 8 && !encoding.big_endian) continue;
-    SCOPED_TRACE(encoding.inWords());
+    SCOPED_TRACE(encoding.describe());
     const auto checksums = checksumsOf(*openText(folder, vtsFile(grid, encoding)), {"p", "U:mag"},
                                        folder.path() / "grid.splats");
     if (first.empty()) first = checksums;
@@ -189,12 +189,12 @@ TEST(VtkEncodings, FacesOfAnOceanGiveTheSameCacheInEachEncoding) {
     const auto expected = checksumsOf(*source, {"T"}, folder.path() / "grid.splats");
     EXPECT_GE(expected.size(), 4u);
     for (const VtsEncoding& encoding :
-         {VtsEncoding{Format::ascii}, VtsEncoding{Format::inline_base64, Compressor::zlib},
-          VtsEncoding{Format::appended_raw, Compressor::none, 4, true},
-          VtsEncoding{Format::appended_base64, Compressor::zlib},
-          VtsEncoding{Format::appended_raw, Compressor::zlib},
-          VtsEncoding{Format::appended_raw, Compressor::lz4, 8}}) {
-      SCOPED_TRACE(encoding.inWords());
+         {VtsEncoding{Format::kAscii}, VtsEncoding{Format::kInlineBase64, Compressor::kZlib},
+          VtsEncoding{Format::kAppendedRaw, Compressor::kNone, 4, true},
+          VtsEncoding{Format::kAppendedBase64, Compressor::kZlib},
+          VtsEncoding{Format::kAppendedRaw, Compressor::kZlib},
+          VtsEncoding{Format::kAppendedRaw, Compressor::kLz4, 8}}) {
+      SCOPED_TRACE(encoding.describe());
       const auto again = openText(folder, vtsFile(grid, encoding));
       EXPECT_EQ(checksumsOf(*again, {"T"}, folder.path() / "grid.splats"), expected);
     }
@@ -212,7 +212,7 @@ TEST(VtkEncodings, BlocksLargerThanMemoryAllows) {
   VtsEncoding encoding;
   encoding.block_bytes = size_t{64} << 20;
   ASSERT_GT(5 * 64 * 64 * 64 * sizeof(double), kLargestBlockInMemory);
-  encoding.compressor = VtsEncoding::Compressor::zlib;
+  encoding.compressor = VtsEncoding::Compressor::kZlib;
   std::string file = vtsFile(grid, encoding);
   const auto source = openText(folder, file);
   NodeArrays nodes;
@@ -224,7 +224,7 @@ TEST(VtkEncodings, BlocksLargerThanMemoryAllows) {
       ASSERT_EQ(nodes.scalars[0][128 * k + n],
                 static_cast<float>(noise[5 * (((60 + k) * 64 + 7) * 64 + n) + 3]));
 
-  encoding.compressor = VtsEncoding::Compressor::lz4;
+  encoding.compressor = VtsEncoding::Compressor::kLz4;
   const std::string error = errorOf(folder, vtsFile(grid, encoding));
   EXPECT_NE(error.find("no part of such a block can be read alone"), std::string::npos) << error;
 }
@@ -262,7 +262,7 @@ TEST(VtkEncodings, WhatIsNotReadIsRefusedByName) {
 TEST(VtkEncodings, TextsMustHaveAsManyNumbersAsTheGrid) {
   const TestFolder folder("vts-texts");
   VtsEncoding ascii;
-  ascii.format = VtsEncoding::Format::ascii;
+  ascii.format = VtsEncoding::Format::kAscii;
   VtsGrid grid = annulusVtsGrid(3, 3, 3);
   grid.point_data = {{"a", "Int8", 1, std::vector<double>(27, 5)}};
   EXPECT_EQ(errorOf(folder, vtsFile(grid, ascii)), "");
@@ -280,7 +280,7 @@ TEST(VtkEncodings, TextsMustHaveAsManyNumbersAsTheGrid) {
 TEST(VtkEncodings, CharactersThatAreNoBase64AreRefused) {
   const TestFolder folder("vts-base64");
   VtsEncoding encoding;
-  encoding.format = VtsEncoding::Format::appended_base64;
+  encoding.format = VtsEncoding::Format::kAppendedBase64;
   size_t begin = 0;
   const std::string file = vtsFile(annulusVtsGrid(3, 3, 3), encoding, &begin);
   EXPECT_EQ(errorOf(folder, file), "");

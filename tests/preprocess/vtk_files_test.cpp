@@ -53,7 +53,7 @@ void expectScalar(const GridDescription& description, const GridBlock& block, co
   SCOPED_TRACE(name);
   const uint32_t position = scalarsNamed(description, {name}).front();
   const bool of_cells = expected["centring"] == "cell";
-  EXPECT_EQ(description.scalars[position].centring, of_cells ? Centring::cell : Centring::node);
+  EXPECT_EQ(description.scalars[position].centring, of_cells ? Centring::kCell : Centring::kNode);
   std::vector<float> values = nodes.scalars[position];
   if (of_cells) {
     values = cellValues(block, values);

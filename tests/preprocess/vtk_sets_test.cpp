@@ -86,7 +86,7 @@ TEST(VtkSets, EachCellOfOverlappingPiecesIsOwnedOnce) {
 
 /// A grid of 9x8x7 nodes in eight pieces, each with one more layer of its neighbours' cells.
 std::filesystem::path writePieces(const TestFolder& folder) {
-  const VtsEncoding encoding{VtsEncoding::Format::appended_base64, VtsEncoding::Compressor::zlib, 4, false,
+  const VtsEncoding encoding{VtsEncoding::Format::kAppendedBase64, VtsEncoding::Compressor::kZlib, 4, false,
                              500};
   std::string pieces;
   for (int n = 0; n < 8; ++n) {

@@ -13,7 +13,7 @@ CellGridSource::CellGridSource(const GridSource& nodes, std::vector<Function> fu
   for (size_t n = 0; n < functions_.size(); ++n) {
     GridScalar scalar;
     scalar.name = fmt::format("c{}", n);
-    scalar.centring = Centring::cell;
+    scalar.centring = Centring::kCell;
     description_.scalars.push_back(scalar);
   }
 }

@@ -23,13 +23,13 @@ namespace {
 struct DirectSplat {
   Splat splat;
   SplatScalar value;
-  uint32_t half_cell = kNoBorder;
+  uint32_t border_code = kNoBorder;
 };
 
 std::vector<DirectSplat> splatsOf(const GridSource& source, uint32_t scalar, const DirectOptions& options) {
   std::vector<DirectSplat> out;
   const auto take = [&](const NodeSplat& node, std::span<const SplatScalar> values) {
-    out.push_back({node.splat, values[0], options.border_parts ? node.half_cell : kNoBorder});
+    out.push_back({node.splat, values[0], options.border_parts ? node.border_code : kNoBorder});
   };
   SeamMerger seams(1, uint64_t{64} << 20, std::filesystem::temp_directory_path());
   uint64_t first_node = 0;
@@ -79,7 +79,7 @@ void toArrays(const std::vector<DirectSplat>& splats, const glm::dvec3& origin, 
   variable.resize(splats.size());
   for (size_t n = 0; n < splats.size(); ++n)
     setSplat(geometry, variable, n, splats[n].splat.position - origin, splats[n].splat, splats[n].value,
-             splats[n].half_cell);
+             splats[n].border_code);
 }
 
 }  // namespace
@@ -90,7 +90,7 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
   if (options.voxel > 0) splats = mergedIntoVoxels(splats, options);
   glm::dvec3 origin = splats.front().splat.position;
   double low = splats.front().value.mean, high = low;
-  for (const auto& [splat, value, half_cell] : splats) {
+  for (const auto& [splat, value, border_code] : splats) {
     origin = glm::min(origin, splat.position);
     low = std::min(low, value.mean);
     high = std::max(high, value.mean);
@@ -114,7 +114,7 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
   for (const uint32_t n : sorter.farthestFirst(projector.depths())) {
     ScreenSplat splat = projector.splats()[n];
     if (!options.hidden_slope) splat.half_width = 0;
-    if (!options.secant && camera.projection == Projection::perspective)
+    if (!options.secant && camera.projection == Projection::kPerspective)
       splat.amplitude /=
           static_cast<float>(std::hypot(1.0, (splat.x - 0.5 * size.width) / settings.view.focal_px,
                                         (splat.y - 0.5 * size.height) / settings.view.focal_px));

@@ -56,15 +56,15 @@ class GridProbe : public FieldProbe {
  private:
   /// From cell to neighbouring cell.
   bool follow(const glm::dvec3& world) {
-    constexpr int kMostCells = 4;
+    constexpr int kMaxCells = 4;
     GridField::InCell to = at_;
-    for (int n = 0; n < kMostCells; ++n) {
+    for (int n = 0; n < kMaxCells; ++n) {
       const auto search = field_.findInCell(world, to);
-      if (search == GridField::Search::found) {
+      if (search == GridField::Search::kFound) {
         at_ = to;
         return true;
       }
-      if (search == GridField::Search::failed || !field_.stepTowards(to)) return false;
+      if (search == GridField::Search::kFailed || !field_.stepTowards(to)) return false;
     }
     return false;
   }
@@ -174,10 +174,10 @@ GridField::Search GridField::findInCell(const glm::dvec3& world, InCell& at) con
   const Corners corners = cornersOf(at.cell);
   for (int corner = 0; corner < 8; ++corner) p[corner] = positionOf(nodes, corners.node[corner]) - world;
 
-  constexpr int kMostSteps = 24;
+  constexpr int kMaxSteps = 24;
   constexpr double kConverged = 1e-11;  // of a cell
   glm::dvec3 t = at.uvw;
-  for (int n = 0; n < kMostSteps; ++n) {
+  for (int n = 0; n < kMaxSteps; ++n) {
     const glm::dvec3 s = 1.0 - t;
     // Along u, then v, then w.
     const glm::dvec3 a00 = s.x * p[0] + t.x * p[1], a10 = s.x * p[2] + t.x * p[3],
@@ -204,12 +204,12 @@ GridField::Search GridField::findInCell(const glm::dvec3& world, InCell& at) con
     if (std::max({std::abs(t.x), std::abs(t.y), std::abs(t.z)}) > 8) break;  // nowhere near
     if (length < kConverged) {
       at.uvw = t;
-      return inUnitCube(t) ? Search::found : Search::outside;
+      return inUnitCube(t) ? Search::kFound : Search::kOutside;
     }
   }
   at.uvw = t;
   const bool far = std::max({std::abs(t.x), std::abs(t.y), std::abs(t.z)}) > 2;
-  return far ? Search::outside : Search::failed;
+  return far ? Search::kOutside : Search::kFailed;
 }
 
 bool GridField::findFrom(const glm::dvec3& world, InCell& at) const {
@@ -219,9 +219,9 @@ bool GridField::findFrom(const glm::dvec3& world, InCell& at) const {
   for (const auto& start : kStarts) {
     at.uvw = {start[0], start[1], start[2]};
     const Search search = findInCell(world, at);
-    if (search == Search::found) return true;
+    if (search == Search::kFound) return true;
     // From the middle to a place outside: the point is in another cell, unless this one is badly bent.
-    if (search == Search::outside && !inUnitCube(glm::mix(glm::dvec3(0.5), at.uvw, 0.8))) return false;
+    if (search == Search::kOutside && !inUnitCube(glm::mix(glm::dvec3(0.5), at.uvw, 0.8))) return false;
   }
   return false;
 }

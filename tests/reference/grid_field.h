@@ -45,7 +45,7 @@ class GridField : public ReferenceField {
     glm::dmat3 jacobian{1.0};  // columns: the world per unit of u, v, w
   };
 
-  enum class Search { found, outside, failed };
+  enum class Search { kFound, kOutside, kFailed };
   /// Newton's method from at.uvw on in at.cell. Overwrites uvw and jacobian; `outside`: it converged, but out
   /// of the unit cube.
   Search findInCell(const glm::dvec3& world, InCell& at) const;

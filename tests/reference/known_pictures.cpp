@@ -37,7 +37,7 @@ Camera perspectiveCamera(double view_angle_deg) {
   const double half = 0.5 * view_angle_deg * std::numbers::pi / 180;
   const glm::dvec3 back = glm::normalize(camera.position - camera.focal_point);
   camera.position = camera.focal_point + camera.parallel_scale / std::tan(half) * back;
-  camera.projection = Projection::perspective;
+  camera.projection = Projection::kPerspective;
   camera.view_angle_deg = view_angle_deg;
   return camera;
 }

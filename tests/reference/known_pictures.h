@@ -35,6 +35,6 @@ FrameOptions knownFrame(ImageSize size);
 
 /// Draws the only variable of a cache. `splats` gets how many were drawn.
 Image drawCache(const std::filesystem::path& cache, const TransferFunction& function, const Camera& camera,
-                const FrameOptions& options, uint64_t* splats = nullptr, Backend backend = Backend::cpu);
+                const FrameOptions& options, uint64_t* splats = nullptr, Backend backend = Backend::kCpu);
 
 }  // namespace curvisplat

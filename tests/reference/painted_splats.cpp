@@ -42,7 +42,7 @@ Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const Cl
                  bool per_pixel, ImageSize size, const glm::vec4& background,
                  const PaintResources& resources) {
   std::vector<ScreenSplat> ordered(splats.begin(), splats.end());
-  if (painter.order() == DrawingOrder::front_to_back) std::reverse(ordered.begin(), ordered.end());
+  if (painter.order() == DrawingOrder::kFrontToBack) std::reverse(ordered.begin(), ordered.end());
   painter.begin(size, background, table, per_pixel, resources);
   painter.draw(ordered);
   return painter.end();

@@ -16,7 +16,7 @@ namespace {
 
 // A step is halved until the optical depth that extinction's change over it could be worth is below this.
 constexpr double kDepthTolerance = 2e-5;
-constexpr int kMostHalvings = 16;
+constexpr int kMaxHalvings = 16;
 
 struct Ray {
   glm::dvec3 origin, direction;  // of length 1
@@ -31,7 +31,7 @@ Ray rayThrough(const Camera& camera, ImageSize size, int x, int y) {
   // In units of half the image's height.
   const double across = (2 * (x + 0.5) - size.width) / size.height;
   const double upwards = (size.height - 2 * (y + 0.5)) / size.height;
-  if (camera.projection == Projection::orthographic)
+  if (camera.projection == Projection::kOrthographic)
     return {camera.position + camera.parallel_scale * (across * right + upwards * up), forward};
   const double half_height = std::tan(0.5 * camera.view_angle_deg * std::numbers::pi / 180);
   return {camera.position, glm::normalize(forward + half_height * (across * right + upwards * up))};
@@ -66,7 +66,7 @@ class Marcher {
     while (t < end) {
       double step = steps.step;
       if (is_inside)
-        step = std::clamp(steps.cells * probe_->cellLength(ray_.direction), kLeastStep * step, step);
+        step = std::clamp(steps.cells * probe_->cellLength(ray_.direction), kMinStep * step, step);
       const double next = std::min(end, t + step);
       const bool next_inside = inside(next);
       if (is_inside && next_inside) {
@@ -87,7 +87,7 @@ class Marcher {
   }
 
  private:
-  static constexpr double kLeastStep = 1e-5;  // of the largest
+  static constexpr double kMinStep = 1e-5;  // of the largest
 
   bool inside(double t) { return probe_->at(ray_.at(t)).has_value(); }
   // A point between two inside that is not: a fold of a grid, or a gap no wider than a step. It is empty.
@@ -113,7 +113,7 @@ class Marcher {
     const double middle = 0.5 * (begin + end), length = end - begin;
     const OpticalProperties here = properties(middle);
     const auto [least, most] = std::minmax({at_begin, here.extinction, at_end});
-    if ((most - least) * length > kDepthTolerance && halvings < kMostHalvings) {
+    if ((most - least) * length > kDepthTolerance && halvings < kMaxHalvings) {
       addHalving(begin, middle, at_begin, here.extinction, halvings + 1);
       addHalving(middle, end, here.extinction, at_end, halvings + 1);
       return;
@@ -160,7 +160,7 @@ ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction
       pixel.colour = glm::dvec3(1.0);
       const auto part = partInBox(ray, lower, upper);
       if (!part) continue;
-      const bool from_eye = camera.projection == Projection::perspective;
+      const bool from_eye = camera.projection == Projection::kPerspective;
       const double near = from_eye ? steps.near / glm::dot(ray.direction, forward) : 0.0;
       const double begin = std::max(part->first, near);
       if (begin < part->second) pixel = Marcher(field, function, ray).march(begin, part->second, steps);
@@ -179,10 +179,10 @@ ReferenceImage referenceMarch(const Scene& scene, const OpticalFunction& functio
 ReferenceImage convergedMarch(const ReferenceField& field, const OpticalFunction& function,
                               const Camera& camera, ImageSize size, MarchSteps steps, double agreement_db,
                               double* reached_db) {
-  constexpr int kMostHalvingsOfSteps = 6;
+  constexpr int kMaxHalvingsOfSteps = 6;
   ReferenceImage image = referenceMarch(field, function, camera, size, steps);
   double agreement = 0;
-  for (int n = 0; n < kMostHalvingsOfSteps && agreement < agreement_db; ++n) {
+  for (int n = 0; n < kMaxHalvingsOfSteps && agreement < agreement_db; ++n) {
     steps.step *= 0.5;
     steps.cells *= 0.5;
     ReferenceImage finer = referenceMarch(field, function, camera, size, steps);
@@ -213,7 +213,7 @@ Camera halfAnnulusCamera() {
   camera.focal_point = {-0.4, 0, 0.5};
   camera.position = camera.focal_point - 4.0 * glm::normalize(glm::dvec3(0.8, 0.35, -0.45));
   camera.view_up = {0, 0, 1};
-  camera.projection = Projection::orthographic;
+  camera.projection = Projection::kOrthographic;
   camera.parallel_scale = 1.25;
   return camera;
 }

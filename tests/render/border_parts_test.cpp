@@ -8,7 +8,7 @@
 
 #include "render/colour/transfer_function.h"
 #include "render/project/projection.h"
-#include "stream/model/half_cell.h"
+#include "stream/model/border_code.h"
 #include "tests/reference/splat_arrays.h"
 
 namespace curvisplat {
@@ -38,7 +38,7 @@ TEST(BorderParts, AreStretchedAndShiftedAlongTheInwardAxesOnly) {
   const glm::dmat3 a = factorOf(kWhole.shape);
   for (size_t axes = 1; axes <= 3; ++axes) {
     const BorderParts& parts = axes == 2 ? kCellBorderParts : kNodeBorderParts;
-    const uint32_t code = packHalfCell({kInward, axes});
+    const uint32_t code = packBorderCode({kInward, axes});
     const InwardAxes inward = inwardAxes(code);
     BorderPieces pieces;
     ASSERT_EQ(partsAtBorder(kWhole, code, parts, pieces), size_t{1} << axes);
@@ -69,7 +69,7 @@ TEST(BorderParts, CarryTheSameLinearField) {
   const glm::dvec3 gradient = glm::inverse(glm::transpose(factorOf(kWhole.shape))) * vectorOf(kWhole.slope);
   for (const BorderParts& parts : {kNodeBorderParts, kCellBorderParts}) {
     BorderPieces pieces;
-    const size_t count = partsAtBorder(kWhole, packHalfCell({kInward, 3}), parts, pieces);
+    const size_t count = partsAtBorder(kWhole, packBorderCode({kInward, 3}), parts, pieces);
     for (size_t n = 0; n < count; ++n) {
       const SplatPiece& piece = pieces[n];
       const glm::dvec3 found = glm::inverse(glm::transpose(factorOf(piece.shape))) * vectorOf(piece.slope);
@@ -85,14 +85,14 @@ struct Brick {
   SplatGeometry geometry;
   SplatVariable variable;
 
-  Brick(size_t count, uint32_t half_cell) {
+  Brick(size_t count, uint32_t border_code) {
     geometry.resize(count);
     variable.resize(count);
     Splat splat;
     splat.axis = {0.1, 0.1, 0.1};
     splat.weight = 1e-3;
     for (size_t n = 0; n < count; ++n)
-      setSplat(geometry, variable, n, {0.5, 0.5, 0.5}, splat, {0.5, {0.1, 0, 0}, 0}, half_cell);
+      setSplat(geometry, variable, n, {0.5, 0.5, 0.5}, splat, {0.5, {0.1, 0, 0}, 0}, border_code);
   }
 };
 
@@ -110,9 +110,9 @@ ProjectionCounts project(const Brick& brick, Projection projection) {
 }
 
 TEST(BorderParts, AreWhatHalfCellsAreDrawnAs) {
-  const uint32_t corner = packHalfCell({kInward, 3});
-  for (const Projection projection : {Projection::orthographic, Projection::perspective}) {
-    const ProjectionCounts one = project(Brick(1, packHalfCell({kInward, 1})), projection);
+  const uint32_t corner = packBorderCode({kInward, 3});
+  for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
+    const ProjectionCounts one = project(Brick(1, packBorderCode({kInward, 1})), projection);
     EXPECT_EQ(one.drawn, 1u);
     EXPECT_EQ(one.pieces, 2u);
     EXPECT_EQ(project(Brick(10, corner), projection).pieces, 80u);
@@ -121,10 +121,10 @@ TEST(BorderParts, AreWhatHalfCellsAreDrawnAs) {
 }
 
 TEST(BorderParts, AreNotDrawnWhereABrickHasTooMany) {
-  const uint32_t corner = packHalfCell({kInward, 3});
-  const size_t count = BrickProjector::kMostPieces / 8;
-  EXPECT_EQ(project(Brick(count, corner), Projection::orthographic).pieces, 8 * count);
-  EXPECT_EQ(project(Brick(count + 1, corner), Projection::orthographic).pieces, count + 1);
+  const uint32_t corner = packBorderCode({kInward, 3});
+  const size_t count = BrickProjector::kMaxPieces / 8;
+  EXPECT_EQ(project(Brick(count, corner), Projection::kOrthographic).pieces, 8 * count);
+  EXPECT_EQ(project(Brick(count + 1, corner), Projection::kOrthographic).pieces, count + 1);
 }
 
 }  // namespace

@@ -142,7 +142,7 @@ TEST(CameraPath, ScalesAndAnglesStayWhatTheyMustBe) {
     Camera camera = cameraAt({1, 2, 3});
     camera.parallel_scale = scales[n];
     zoom.push_back({1.0 * n, camera});
-    camera.projection = Projection::perspective;
+    camera.projection = Projection::kPerspective;
     camera.view_angle_deg = angles[n];
     angle.push_back({1.0 * n, camera});
   }
@@ -209,7 +209,7 @@ TEST_F(CameraPathFile, IsReadAsItIsWritten) {
   const CameraPath perspective = read(
       R"({"note": "ours", "key_frames": [{"time": -1, "position": [1, 0, 0], "focal_point": [0, 0, 0],
           "view_up": [0, 1, 0], "view_angle": 40}]})");
-  EXPECT_EQ(perspective.at(0).projection, Projection::perspective);
+  EXPECT_EQ(perspective.at(0).projection, Projection::kPerspective);
   EXPECT_EQ(perspective.at(0).view_angle_deg, 40);
 }
 

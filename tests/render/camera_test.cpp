@@ -23,7 +23,7 @@ glm::dvec3 corner(int n) {
 /// Where a point is in the image: -1..1 from the left and from the bottom.
 glm::dvec2 inImage(const Camera& camera, const glm::dvec3& world, ImageSize size) {
   const glm::dvec3 view(camera.viewFromWorld() * glm::dvec4(world, 1));
-  const double half_height = camera.projection == Projection::orthographic
+  const double half_height = camera.projection == Projection::kOrthographic
                                  ? camera.parallel_scale
                                  : -view.z * std::tan(camera.view_angle_deg * std::numbers::pi / 360);
   return {view.x / half_height * size.height / size.width, view.y / half_height};
@@ -35,7 +35,7 @@ void expectNear(const glm::dvec3& a, const glm::dvec3& b, double tolerance = 1e-
 }
 
 TEST(Camera, NamedViewsHoldTheBoxAndFillTheImage) {
-  for (const auto projection : {Projection::orthographic, Projection::perspective})
+  for (const auto projection : {Projection::kOrthographic, Projection::kPerspective})
     for (const ImageSize size : {ImageSize{600, 600}, ImageSize{800, 200}, ImageSize{200, 800}})
       for (const double angle : {1.0, 30.0, 100.0})
         for (const char* view : kViews) {
@@ -62,7 +62,7 @@ TEST(Camera, NamedViewsLookFromWhereTheySay) {
                   {"+y", {0, 1, 0}, {-1, 0, 0}, {0, 0, 1}}, {"-y", {0, -1, 0}, {1, 0, 0}, {0, 0, 1}},
                   {"+z", {0, 0, 1}, {1, 0, 0}, {0, 1, 0}},  {"-z", {0, 0, -1}, {-1, 0, 0}, {0, 1, 0}}};
   for (const auto& e : expected) {
-    const Camera camera = Camera::named(e.view, kLower, kUpper, {}, Projection::orthographic);
+    const Camera camera = Camera::named(e.view, kLower, kUpper, {}, Projection::kOrthographic);
     expectNear(camera.focal_point, 0.5 * (kLower + kUpper));
     expectNear(glm::normalize(camera.position - camera.focal_point), e.from);
     const glm::dmat4 view = camera.viewFromWorld();
@@ -70,7 +70,7 @@ TEST(Camera, NamedViewsLookFromWhereTheySay) {
     expectNear(glm::dvec3(view * glm::dvec4(e.up, 0)), {0, 1, 0});
     expectNear(glm::dvec3(view * glm::dvec4(e.from, 0)), {0, 0, 1});
   }
-  const Camera iso = Camera::named("iso", kLower, kUpper, {}, Projection::orthographic);
+  const Camera iso = Camera::named("iso", kLower, kUpper, {}, Projection::kOrthographic);
   expectNear(glm::normalize(iso.position - iso.focal_point), glm::dvec3(1 / std::sqrt(3.0)));
   EXPECT_GT((iso.viewFromWorld() * glm::dvec4(0, 0, 1, 0)).y, 0.8);
 }
@@ -108,11 +108,11 @@ TEST(Camera, PositionAtTheFocalPointIsWrongUsage) {
   Camera camera;
   camera.position = camera.focal_point = {1, 2, 3};
   EXPECT_THROW(camera.viewFromWorld(), UsageError);
-  EXPECT_THROW(Camera::named("front", kLower, kUpper, {}, Projection::orthographic), UsageError);
+  EXPECT_THROW(Camera::named("front", kLower, kUpper, {}, Projection::kOrthographic), UsageError);
 }
 
 TEST(Camera, ABoxWithoutExtentIsLookedAtFromSomewhere) {
-  for (const auto projection : {Projection::orthographic, Projection::perspective}) {
+  for (const auto projection : {Projection::kOrthographic, Projection::kPerspective}) {
     const Camera camera = Camera::named("iso", kLower, kLower, {}, projection);
     EXPECT_GT(camera.parallel_scale, 0);
     EXPECT_GT(glm::distance(camera.position, camera.focal_point), 0);

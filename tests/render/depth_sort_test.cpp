@@ -28,7 +28,7 @@ TEST(DepthSorter, PutsTheFarthestFirstAndKeepsTheOrderOfEquals) {
         const auto order = sorter.farthestFirst(depths);
         EXPECT_EQ(std::vector<uint32_t>(order.begin(), order.end()), expected(depths))
             << count << " depths in " << span << ", ties " << ties;
-        const auto reverse = sorter.sort(depths, DrawingOrder::front_to_back);
+        const auto reverse = sorter.sort(depths, DrawingOrder::kFrontToBack);
         EXPECT_EQ(std::vector<uint32_t>(reverse.rbegin(), reverse.rend()), expected(depths));
       }
 }

@@ -41,7 +41,7 @@ class FrameStreamingTest : public ::testing::TestWithParam<Backend> {
   }
   Camera camera(const char* view) const {
     const Manifest& manifest = cache_->manifest();
-    return Camera::named(view, manifest.lower, manifest.upper, options().size, Projection::orthographic, 30);
+    return Camera::named(view, manifest.lower, manifest.upper, options().size, Projection::kOrthographic, 30);
   }
   /// As little memory as renders at all.
   static uint64_t leastMemory(FrameRenderer& renderer, const Camera& camera) {
@@ -67,9 +67,9 @@ class FrameStreamingTest : public ::testing::TestWithParam<Backend> {
   std::unique_ptr<CacheReader> cache_;
 };
 
-INSTANTIATE_TEST_SUITE_P(Backends, FrameStreamingTest, ::testing::Values(Backend::osmesa, Backend::cpu),
+INSTANTIATE_TEST_SUITE_P(Backends, FrameStreamingTest, ::testing::Values(Backend::kOsmesa, Backend::kCpu),
                          [](const ::testing::TestParamInfo<Backend>& tested) {
-                           return tested.param == Backend::osmesa ? "osmesa" : "cpu";
+                           return tested.param == Backend::kOsmesa ? "osmesa" : "cpu";
                          });
 
 TEST_P(FrameStreamingTest, IsTheSameForAnyMemoryThreadsWayAndHistory) {
@@ -86,7 +86,7 @@ TEST_P(FrameStreamingTest, IsTheSameForAnyMemoryThreadsWayAndHistory) {
   FrameRenderer renderer(*cache_, 0, function(), GetParam());
   for (const uint64_t memory : {least, least + (2 << 20), uint64_t{4} << 30})
     for (const unsigned threads : {1u, 2u, 4u})
-      for (const Way way : {Way::automatic, Way::threads}) {
+      for (const Way way : {Way::kAutomatic, Way::kThreads}) {
         FrameOptions wanted = options();
         wanted.memory_bytes = memory;
         wanted.threads = threads;
@@ -158,7 +158,7 @@ TEST_P(FrameStreamingTest, CanBeCancelledAtAnyMoment) {
   });
   int cancelled = 0, whole = 0;
   for (int n = 0; n < kRounds; ++n) {
-    wanted.read_by = n / 50 % 2 ? Way::threads : Way::automatic;
+    wanted.read_by = n / 50 % 2 ? Way::kThreads : Way::kAutomatic;
     round = n;
     round.notify_one();
     try {

@@ -65,9 +65,9 @@ class FrameTest : public testing::TestWithParam<Backend> {
   std::unique_ptr<CacheReader> cache_;
 };
 
-INSTANTIATE_TEST_SUITE_P(Backends, FrameTest, testing::Values(Backend::osmesa, Backend::cpu),
+INSTANTIATE_TEST_SUITE_P(Backends, FrameTest, testing::Values(Backend::kOsmesa, Backend::kCpu),
                          [](const testing::TestParamInfo<Backend>& tested) {
-                           return tested.param == Backend::osmesa ? "osmesa" : "cpu";
+                           return tested.param == Backend::kOsmesa ? "osmesa" : "cpu";
                          });
 
 TEST_P(FrameTest, AConstantFieldIsFlat) {
@@ -99,7 +99,7 @@ TEST_P(FrameTest, PerspectiveRaysOfAConstantFieldHaveTheirLength) {
   const double extinction = 0.03;
   FrameRenderer renderer(lattice(0.5, glm::dvec3(0)), 0, uniform(extinction), GetParam());
   Camera camera = cameraFrom({0, 0, 1});
-  camera.projection = Projection::perspective;
+  camera.projection = Projection::kPerspective;
   camera.view_angle_deg = 80;
   FrameStatistics statistics;
   // From outside, and from inside of the data, looking at the corner of a wide image.
@@ -133,7 +133,7 @@ TEST_P(FrameTest, TheNearSideHidesTheFarSide) {
 TEST_P(FrameTest, IsTheSameForAnyThreadsAndMemory) {
   FrameRenderer renderer(lattice(0, {0.02, 0.01, 0}), 0, redToBlue(), GetParam());
   Camera camera = cameraFrom(glm::dvec3(0.6, 0.64, 0.48));
-  for (const Projection projection : {Projection::orthographic, Projection::perspective}) {
+  for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
     camera.projection = projection;
     camera.view_angle_deg = 35;
     FrameStatistics statistics;
@@ -237,7 +237,7 @@ TEST_P(FrameTest, CullingChangesNothingInThePicture) {
       largest = std::max<double>(largest, std::abs(near.pixel(x, y)[0] - far.pixel(x + 100, y + 100)[0]));
   // Where a splat is cut by the edge of a tile or of the image, the processor's fits to the classification
   // differ.
-  EXPECT_LT(largest, GetParam() == Backend::cpu ? 1e-3 : 1e-4);
+  EXPECT_LT(largest, GetParam() == Backend::kCpu ? 1e-3 : 1e-4);
 }
 
 TEST_P(FrameTest, StretchesTheData) {

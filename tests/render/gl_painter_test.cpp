@@ -14,7 +14,7 @@ namespace {
 
 TEST(GlPainter, RefusesAnImageBeyondTheLimitAndGoesOn) {
   const auto table = lively();
-  GlThread gl(GlLibrary::osmesa);
+  GlThread gl(GlLibrary::kOsmesa);
   gl.run([&](const GlContext& context) {
     GlPainter painter(context);
     try {
@@ -32,7 +32,7 @@ TEST(GlPainter, DrawsFromMappedMemoryWithoutCopying) {
   const ImageSize size{160, 120};
   const auto splats = randomSplats(3000, 8, size);
   const auto table = lively();
-  GlThread gl(GlLibrary::osmesa);
+  GlThread gl(GlLibrary::kOsmesa);
   gl.run([&](const GlContext& context) {
     GlPainter painter(context);
     painter.begin(size, glm::vec4(1), table, true);
@@ -63,7 +63,7 @@ TEST(GlPainter, DrawsFromMappedMemoryWithoutCopying) {
 }
 
 TEST(GlThread, HandsErrorsToTheCaller) {
-  GlThread gl(GlLibrary::osmesa);
+  GlThread gl(GlLibrary::kOsmesa);
   EXPECT_NE(gl.contextName().find("OpenGL"), std::string::npos) << gl.contextName();
   EXPECT_THROW(gl.run([](const GlContext&) { throw Error("no"); }), Error);
   bool ran = false;

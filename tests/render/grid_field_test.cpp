@@ -97,7 +97,7 @@ TEST(GridField, TellsHowFarACellReaches) {
 TEST(GridField, HasTheAnalyticScenesPicture) {
   const auto scene = std::shared_ptr<const Scene>(makeScene("half-annulus"));
   const SceneGridSource source(scene, {192, 96, 96});
-  for (const Projection projection : {Projection::orthographic, Projection::perspective}) {
+  for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
     Camera camera = halfAnnulusCamera();
     camera.projection = projection;
     MarchSteps steps;

@@ -46,7 +46,7 @@ TEST_F(HiddenBricksTest, BoxesHoldAllFootprints) {
   SplatGeometry geometry;
   SplatVariable variable;
   int bounded = 0;
-  for (const Projection projection : {Projection::orthographic, Projection::perspective})
+  for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective})
     for (const double distance : {80.0, 30.0, 12.0}) {
       const Camera camera = cameraFrom(middle + distance * glm::dvec3(0.6, 0.64, 0.48), middle, projection);
       for (const glm::dvec3& scale : {glm::dvec3(1), glm::dvec3(1, 2, 0.5)}) {
@@ -77,7 +77,7 @@ TEST_F(HiddenBricksTest, NothingIsHiddenBeforeAPainterAnswers) {
   const CacheReader cache(folder_ / "lattice.splats");
   const auto table = ClassificationTable::of(grey(), 0, 1);
   const glm::dvec3 middle(0.5 * kLatticeSide);
-  const Camera camera = cameraFrom(middle + glm::dvec3(80, 0, 0), middle, Projection::orthographic);
+  const Camera camera = cameraFrom(middle + glm::dvec3(80, 0, 0), middle, Projection::kOrthographic);
   HiddenBricks hidden;
   const ScreenView view = ScreenView::of(camera, {100, 100}, glm::dvec3(1), 1.5, 1);
   hidden.begin(cache.bricks(), view);
@@ -96,7 +96,7 @@ TEST_F(HiddenBricksTest, NothingIsHiddenBeforeAPainterAnswers) {
 /// Says that the left half of the screen is hidden, and what lies outside of it.
 class HalfHidden final : public Painter {
  public:
-  DrawingOrder order() const override { return DrawingOrder::front_to_back; }
+  DrawingOrder order() const override { return DrawingOrder::kFrontToBack; }
   void begin(ImageSize, const glm::vec4&, const ClassificationTable&, bool, const PaintResources&) override {}
   void draw(std::span<const ScreenSplat>) override {}
   bool hides(const ScreenBox& box) const override { return box.x1 < 30; }
@@ -111,7 +111,7 @@ TEST_F(HiddenBricksTest, WorkersPassOverWhatIsHiddenAndThePagerDoesNotReadIt) {
   const Manifest& manifest = cache.manifest();
   const auto table = ClassificationTable::of(grey(), -1, 1);
   const ImageSize size{60, 50};
-  const Camera camera = Camera::named("-y", manifest.lower, manifest.upper, size, Projection::orthographic);
+  const Camera camera = Camera::named("-y", manifest.lower, manifest.upper, size, Projection::kOrthographic);
   const ProjectionSettings settings{ScreenView::of(camera, size, glm::dvec3(1), 1.5, 1)};
   std::vector<BrickPart> parts;
   uint64_t expected_hidden = 0, expected_bytes = 0;
@@ -130,13 +130,13 @@ TEST_F(HiddenBricksTest, WorkersPassOverWhatIsHiddenAndThePagerDoesNotReadIt) {
   hidden.ask(&painter);
   for (const bool before_reading : {false, true}) {
     BrickSource source(cache, 0, {}, 0);
-    std::vector<ScreenSplat> memory(3 * BrickProjector::kMostSplats);
+    std::vector<ScreenSplat> memory(3 * BrickProjector::kMaxSplats);
     SegmentRing ring(memory);
     FrameWorkers workers(source, ring, 2);
     BrickPager::Unneeded unneeded;
     if (before_reading) unneeded = [&](uint32_t brick) { return hidden.hides(brick); };
     source.start(parts, unneeded);
-    const FrameWork work{cache, parts, settings, table, DrawingOrder::front_to_back, hidden};
+    const FrameWork work{cache, parts, settings, table, DrawingOrder::kFrontToBack, hidden};
     workers.start(work);
     for (const BrickPart& part : parts) {
       const auto segment = ring.next();
@@ -167,9 +167,9 @@ TEST_F(HiddenBricksTest, FramesAreTheSameHoweverMuchIsLeftOut) {
   options.lod_pixels = 0;
   options.low_pass_px2 = 1.5;  // few splats a pixel: wide ones, that leave no gap
   const Camera camera =
-      Camera::named("iso", manifest.lower, manifest.upper, options.size, Projection::orthographic);
+      Camera::named("iso", manifest.lower, manifest.upper, options.size, Projection::kOrthographic);
   FrameStatistics statistics;
-  FrameRenderer renderer(cache, 0, opaque, Backend::cpu);
+  FrameRenderer renderer(cache, 0, opaque, Backend::kCpu);
   const Image whole = renderer.render(camera, options, statistics);
   const uint64_t parts = statistics.bricks_drawn + statistics.bricks_hidden;
   for (const unsigned threads : {1u, 2u})
@@ -180,7 +180,7 @@ TEST_F(HiddenBricksTest, FramesAreTheSameHoweverMuchIsLeftOut) {
       EXPECT_EQ(statistics.bricks_drawn + statistics.bricks_hidden, parts);
       EXPECT_GT(statistics.bricks_hidden + statistics.splats_hidden, 0u);
     }
-  const Image by_gl = FrameRenderer(cache, 0, opaque, Backend::osmesa).render(camera, options, statistics);
+  const Image by_gl = FrameRenderer(cache, 0, opaque, Backend::kOsmesa).render(camera, options, statistics);
   EXPECT_EQ(statistics.bricks_hidden + statistics.splats_hidden + statistics.bricks_left_out, 0u);
   EXPECT_GT(compareImages(whole, by_gl).psnr_db, 55);  // edges are as sharp as a pixel
 }

@@ -31,8 +31,8 @@ class PainterTest : public testing::TestWithParam<Backend> {
   const std::unique_ptr<PaintingBackend> backend_ = makeBackend(GetParam());
 };
 
-INSTANTIATE_TEST_SUITE_P(Painters, PainterTest, testing::Values(Backend::cpu, Backend::osmesa),
-                         [](const auto& with) { return with.param == Backend::cpu ? "Cpu" : "OsMesa"; });
+INSTANTIATE_TEST_SUITE_P(Painters, PainterTest, testing::Values(Backend::kCpu, Backend::kOsmesa),
+                         [](const auto& with) { return with.param == Backend::kCpu ? "Cpu" : "OsMesa"; });
 
 TEST_P(PainterTest, DrawsOneSplatAsSpecified) {
   const ImageSize size{48, 40};

@@ -39,7 +39,7 @@ class ProgressiveTest : public testing::Test {
     Camera camera = halfAnnulusCamera();
     camera.projection = projection;
     camera.view_angle_deg = 40;
-    if (projection == Projection::perspective)
+    if (projection == Projection::kPerspective)
       camera.position = camera.focal_point + 3.0 * (camera.position - camera.focal_point) /
                                                  glm::length(camera.position - camera.focal_point);
     return camera;
@@ -64,7 +64,7 @@ std::unique_ptr<CacheReader> ProgressiveTest::cache_;
 
 TEST_F(ProgressiveTest, TheLastPictureIsTheFrameBitForBit) {
   FrameRenderer renderer(*cache_, 0, function());
-  for (const Projection projection : {Projection::orthographic, Projection::perspective}) {
+  for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
     FrameStatistics statistics;
     const Image direct = renderer.render(camera(projection), options(0.3), statistics);
     const uint64_t splats = statistics.splats_read;
@@ -92,9 +92,9 @@ TEST_F(ProgressiveTest, TheLastPictureIsTheFrameBitForBit) {
 TEST_F(ProgressiveTest, WhatIsCoarseAnywayIsShownOnce) {
   FrameRenderer renderer(*cache_, 0, function());
   FrameStatistics statistics;
-  const Image direct = renderer.render(camera(Projection::orthographic), options(100), statistics);
+  const Image direct = renderer.render(camera(Projection::kOrthographic), options(100), statistics);
   int calls = 0;
-  renderer.renderProgressively(camera(Projection::orthographic), options(100), statistics,
+  renderer.renderProgressively(camera(Projection::kOrthographic), options(100), statistics,
                                [&](const Image& image, bool is_final) {
                                  ++calls;
                                  EXPECT_TRUE(is_final);
@@ -106,14 +106,14 @@ TEST_F(ProgressiveTest, WhatIsCoarseAnywayIsShownOnce) {
 TEST_F(ProgressiveTest, WhatShowThrowsEndsTheFrame) {
   FrameRenderer renderer(*cache_, 0, function());
   FrameStatistics statistics;
-  EXPECT_THROW(renderer.renderProgressively(camera(Projection::orthographic), options(0.3), statistics,
+  EXPECT_THROW(renderer.renderProgressively(camera(Projection::kOrthographic), options(0.3), statistics,
                                             [](const Image&, bool) { throw Error("the disk is full"); }),
                Error);
-  EXPECT_NO_THROW(renderer.render(camera(Projection::orthographic), options(4), statistics));
+  EXPECT_NO_THROW(renderer.render(camera(Projection::kOrthographic), options(4), statistics));
 }
 
 TEST_F(ProgressiveTest, CanBeCancelledBetweenItsPicturesAndBeginsFromTheCacheOfBricks) {
-  const Camera iso = camera(Projection::orthographic);
+  const Camera iso = camera(Projection::kOrthographic);
   FrameRenderer renderer(*cache_, 0, function());
   FrameStatistics statistics;
   int shown = 0;
@@ -136,12 +136,12 @@ TEST_F(ProgressiveTest, CanBeCancelledBetweenItsPicturesAndBeginsFromTheCacheOfB
 TEST_F(ProgressiveTest, MoreSplatsMakeABetterPictureAndNeverMoreThanAsked) {
   FrameRenderer renderer(*cache_, 0, function());
   FrameStatistics statistics;
-  const Image whole = renderer.render(camera(Projection::orthographic), options(0), statistics);
+  const Image whole = renderer.render(camera(Projection::kOrthographic), options(0), statistics);
   double last_db = 0;
   for (const uint64_t limit : {10'000u, 60'000u, 150'000u, 300'000u, 500'000u}) {
     FrameOptions limited = options(0);
     limited.max_splats = limit;
-    const Image image = renderer.render(camera(Projection::orthographic), limited, statistics);
+    const Image image = renderer.render(camera(Projection::kOrthographic), limited, statistics);
     EXPECT_LE(statistics.splats_read, limit);
     EXPECT_GT(statistics.splats_read, limit / 2);
     const double psnr_db = compareImages(image, whole).psnr_db;
@@ -157,7 +157,7 @@ TEST_F(ProgressiveTest, SaysHowManySplatsTheCoarsestPictureTakes) {
   FrameOptions few = options(0);
   few.max_splats = 10;
   try {
-    renderer.render(camera(Projection::orthographic), few, statistics);
+    renderer.render(camera(Projection::kOrthographic), few, statistics);
     ADD_FAILURE() << "ten splats were enough";
   } catch (const UsageError& error) {
     const std::string root = fmt::format("{}", cache_->bricks()[0].splats);
@@ -195,7 +195,7 @@ Image globallySorted(const CacheReader& cache, const TransferFunction& function,
                       {ranges.begin(), ranges.end()});
     drawn += projector.counts().drawn;
     splats.insert(splats.end(), projector.splats().begin(), projector.splats().end());
-    const bool perspective = camera.projection == Projection::perspective;  // else from the cell's corner
+    const bool perspective = camera.projection == Projection::kPerspective;  // else from the cell's corner
     const auto from = static_cast<float>(perspective ? 0 : settings.view.viewFromData(corner).z);
     for (const float depth : projector.depths()) depths.push_back(from + depth);
   }
@@ -203,7 +203,7 @@ Image globallySorted(const CacheReader& cache, const TransferFunction& function,
   DepthSorter sorter;
   for (const uint32_t index : sorter.farthestFirst(depths)) sorted.push_back(splats[index]);
   Image image;
-  GlThread gl(GlLibrary::osmesa);
+  GlThread gl(GlLibrary::kOsmesa);
   gl.run([&](const GlContext& context) {
     GlPainter painter(context);
     painter.begin(options.size, options.background, table, settings.per_pixel);
@@ -216,7 +216,7 @@ Image globallySorted(const CacheReader& cache, const TransferFunction& function,
 TEST_F(ProgressiveTest, BricksInOrderDifferLittleFromOneGlobalSort) {
   const TransferFunction transfer_function = function();
   FrameRenderer renderer(*cache_, 0, transfer_function);
-  for (const Projection projection : {Projection::orthographic, Projection::perspective})
+  for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective})
     // Leaves; several levels; and a brick of which some octants are drawn.
     for (const auto& [lod_pixels, limit] :
          {std::pair{0.0, 1'000'000u}, std::pair{2.0, 1'000'000u}, std::pair{0.0, 123'456u}}) {

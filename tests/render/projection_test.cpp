@@ -116,7 +116,7 @@ Camera randomCamera(Random& random, Projection projection) {
 }
 
 constexpr ImageSize kSize{4000, 3000};  // the least low-pass, 0.01 px², is next to nothing then
-constexpr double kLeastLowPass = 0.01;
+constexpr double kMinLowPass = 0.01;
 
 // Where a ray through a pixel meets the splat, its optical depth must be what the screen splat says.
 void checkOpticalDepths(Projection projection, double size, double tolerance) {
@@ -125,7 +125,7 @@ void checkOpticalDepths(Projection projection, double size, double tolerance) {
     const glm::dvec3 scale = n % 2 ? glm::dvec3(1, 1, 1) : glm::dvec3(0.7, 1.3, 2);
     const TestSplat splat = random.splat(size, 8, glm::dvec3(0));
     const ProjectionSettings settings{
-        ScreenView::of(randomCamera(random, projection), kSize, scale, kLeastLowPass, 1e-3)};
+        ScreenView::of(randomCamera(random, projection), kSize, scale, kMinLowPass, 1e-3)};
     const ScreenView& view = settings.view;
     const ScreenSplat drawn = projectOne(splat, settings, {-0.3, -0.2, -0.4});
     const double peak = drawn.amplitude * footprint(0);
@@ -136,7 +136,7 @@ void checkOpticalDepths(Projection projection, double size, double tolerance) {
       const glm::dvec2 from_middle =
           (glm::dvec2(drawn.x, drawn.y) + d - 0.5 * glm::dvec2(kSize.width, kSize.height)) / view.focal_px;
       const glm::dvec3 across = from_middle.x * view.right + from_middle.y * view.down;
-      const bool perspective = projection == Projection::perspective;
+      const bool perspective = projection == Projection::kPerspective;
       const double depth = integralAlong(splat, scale, perspective ? view.eye : view.eye + across,
                                          perspective ? glm::normalize(view.forward + across) : view.forward);
       EXPECT_NEAR(drawn.amplitude * footprint(rho), depth, tolerance * peak) << n << ", rho " << rho;
@@ -145,12 +145,12 @@ void checkOpticalDepths(Projection projection, double size, double tolerance) {
 }
 
 TEST(Projection, OrthographicOpticalDepthIsTheIntegralAlongTheRay) {
-  checkOpticalDepths(Projection::orthographic, 0.05, 2e-3);
+  checkOpticalDepths(Projection::kOrthographic, 0.05, 2e-3);
 }
 
 TEST(Projection, PerspectiveOpticalDepthIsTheIntegralAlongTheRay) {
-  checkOpticalDepths(Projection::perspective, 0.02, 0.03);
-  checkOpticalDepths(Projection::perspective, 0.005, 0.008);
+  checkOpticalDepths(Projection::kPerspective, 0.02, 0.03);
+  checkOpticalDepths(Projection::kPerspective, 0.005, 0.008);
 }
 
 /// Design section 3 by its formulas: h2ᵀ (S2 + 0.01)⁻¹ and s² = sigma²(|w|² - h2ᵀ(S2 + 0.01)⁻¹h2) + r, at
@@ -187,7 +187,7 @@ TEST(Projection, MeanAndDeviationFollowTheDesign) {
       const glm::dvec3 scale = n % 2 ? glm::dvec3(1, 1, 1) : glm::dvec3(0.7, 1.3, 2);
       const TestSplat splat = random.splat(n % 3 ? 0.05 : 0.002, 20, glm::dvec3(0));
       const ProjectionSettings settings{
-          ScreenView::of(randomCamera(random, Projection::orthographic), kSize, scale, low_pass, 1e-3)};
+          ScreenView::of(randomCamera(random, Projection::kOrthographic), kSize, scale, low_pass, 1e-3)};
       const ScreenView& view = settings.view;
       expectConditioned(projectOne(splat, settings, {-0.3, -0.2, -0.4}),
                         condition(splat, view, view.focal_px * view.right, view.focal_px * view.down), 2e-4);
@@ -201,7 +201,7 @@ TEST(Projection, StaysExactForPencilsAndSheets) {
     for (int n = 0; n < 500; ++n) {
       const TestSplat splat = random.splat(0.3, aspect, glm::dvec3(0));
       const ProjectionSettings settings{
-          ScreenView::of(randomCamera(random, Projection::orthographic), kSize, glm::dvec3(1), 1.5, 1e-3)};
+          ScreenView::of(randomCamera(random, Projection::kOrthographic), kSize, glm::dvec3(1), 1.5, 1e-3)};
       const ScreenView& view = settings.view;
       const ScreenSplat drawn = projectOne(splat, settings, {-0.3, -0.2, -0.4});
       const glm::dvec3 row0 = view.focal_px * view.right, row1 = view.focal_px * view.down;
@@ -228,7 +228,7 @@ TEST(Projection, DepthOrdersAlongTheViewAndFromTheEye) {
   }
   Camera camera;
   camera.position = {0, 0, 2};
-  for (const Projection projection : {Projection::orthographic, Projection::perspective}) {
+  for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
     camera.projection = projection;
     BrickProjector projector;
     projector.project({ScreenView::of(camera, kSize, glm::dvec3(1), 1.5, 1e-3)}, opaque(), {-1, -1, -1},
@@ -236,7 +236,7 @@ TEST(Projection, DepthOrdersAlongTheViewAndFromTheEye) {
     ASSERT_EQ(projector.depths().size(), 3u);
     const auto& depths = projector.depths();
     EXPECT_NEAR(depths[2] - depths[0], 0.1, 1e-6);
-    EXPECT_NEAR(depths[1] - depths[0], projection == Projection::orthographic ? 0 : std::hypot(2, 0.5) - 2,
+    EXPECT_NEAR(depths[1] - depths[0], projection == Projection::kOrthographic ? 0 : std::hypot(2, 0.5) - 2,
                 1e-6);
   }
 }
@@ -265,7 +265,7 @@ TEST(Projection, CountsWhatItLeavesOut) {
       0, 1);
   Camera camera;
   camera.position = {0, 0, 2};
-  camera.projection = Projection::perspective;
+  camera.projection = Projection::kPerspective;
   const WorldBox clip{{-10, -0.3, -10}, {10, 0.3, 10}};
   BrickProjector projector;
   projector.project({ScreenView::of(camera, kSize, glm::dvec3(1), 1.5, 1e-3), true, clip}, table,
@@ -316,7 +316,7 @@ TEST(Projection, LeavesNothingOutThatCanBeSeen) {
         return TransferFunction::Value{glm::dvec3(1), f > 0.7 ? 1.0 : 0.0};
       },
       0, 1);
-  const Camera camera = randomCamera(random, Projection::orthographic);
+  const Camera camera = randomCamera(random, Projection::kOrthographic);
   const ProjectionSettings settings{ScreenView::of(camera, kSize, glm::dvec3(1), 1.5, 1e-3)};
   int left_out = 0;
   for (int n = 0; n < 2000; ++n) {
@@ -357,7 +357,7 @@ TEST(ScreenView, RefusesViewsWithoutAPicture) {
   EXPECT_THROW(of({1, 1}, glm::dvec3(1), 0), UsageError);
   camera.parallel_scale = 0;
   EXPECT_THROW(of({1, 1}, glm::dvec3(1), 1.5), UsageError);
-  camera.projection = Projection::perspective;
+  camera.projection = Projection::kPerspective;
   camera.view_angle_deg = 180;
   EXPECT_THROW(of({1, 1}, glm::dvec3(1), 1.5), UsageError);
 }

@@ -39,7 +39,7 @@ Splats inArrays(const RootCube& root, const BrickSplats& brick) {
   variable.resize(brick.size());
   for (size_t n = 0; n < brick.size(); ++n) {
     const glm::dvec3 position = root.toWorld(brick.positions[n]) - root.cellMin(brick.cell);
-    setSplat(geometry, variable, n, position, brick.splats[n], brick.variables[0][n], brick.half_cells[n]);
+    setSplat(geometry, variable, n, position, brick.splats[n], brick.variables[0][n], brick.border_codes[n]);
   }
   return out;
 }
@@ -71,7 +71,7 @@ std::vector<BrickSplats> halfAnnulusBricks(RootCube& root) {
     for (const NodeSplat& node : splats.splats) {
       brick.positions.push_back(root.fromWorld(node.splat.position));
       brick.splats.push_back(node.splat);
-      brick.half_cells.push_back(node.half_cell);
+      brick.border_codes.push_back(node.border_code);
     }
     for (uint64_t row = 0; row < splats.splats.size() / kNodes.ni; ++row)
       brick.runs.push_back({0, 0, row % kNodes.nj, k + row / kNodes.nj, kNodes.ni});
@@ -142,7 +142,7 @@ class Quantisation : public testing::Test {
     EXPECT_LT(computed_db - decoded_db, 1);
   }
 
-  GlThread gl_{GlLibrary::osmesa};
+  GlThread gl_{GlLibrary::kOsmesa};
 };
 
 TEST_F(Quantisation, OfASmoothFunctionCostsLessThanADecibel) {

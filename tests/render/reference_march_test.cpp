@@ -49,7 +49,7 @@ Camera alongX(Projection projection) {
 }
 
 TEST(ReferenceMarch, MatchesAHomogeneousBox) {
-  Camera camera = alongX(Projection::orthographic);
+  Camera camera = alongX(Projection::kOrthographic);
   camera.parallel_scale = 0.9;
   const ReferenceImage image = referenceMarch(Box(), homogeneous, camera, {10, 10}, 0.03);
   for (int y = 0; y < 10; ++y)
@@ -65,7 +65,7 @@ TEST(ReferenceMarch, MatchesAHomogeneousBox) {
 TEST(ReferenceMarch, MatchesAHomogeneousBoxInPerspective) {
   const int n = 40;
   const ReferenceImage image =
-      referenceMarch(Box(), homogeneous, alongX(Projection::perspective), {2 * n, n}, 0.03);
+      referenceMarch(Box(), homogeneous, alongX(Projection::kPerspective), {2 * n, n}, 0.03);
   const double half_height = std::tan(20 * 3.14159265358979323846 / 180);
   for (int y = 0; y < n; ++y)
     for (int x = 0; x < 2 * n; ++x) {
@@ -79,7 +79,7 @@ TEST(ReferenceMarch, MatchesAHomogeneousBoxInPerspective) {
 }
 
 TEST(ReferenceMarch, HasTheImageTheRightWayUp) {
-  Camera camera = alongX(Projection::orthographic);
+  Camera camera = alongX(Projection::kOrthographic);
   camera.focal_point += glm::dvec3(0, 0.5, 0.5);  // the box moves to the lower right: -y is on the right
   camera.position += glm::dvec3(0, 0.5, 0.5);
   const ReferenceImage image = referenceMarch(Box(), homogeneous, camera, {10, 10}, 0.03);
@@ -89,7 +89,7 @@ TEST(ReferenceMarch, HasTheImageTheRightWayUp) {
 }
 
 TEST(ReferenceMarch, IntegratesTransferFunctions) {
-  const Camera camera = alongX(Projection::orthographic);
+  const Camera camera = alongX(Projection::kOrthographic);
   const auto centre = [&](const OpticalFunction& function) {
     return referenceMarch(Box(), function, camera, {1, 1}, 0.03).at(0, 0).transmittance;
   };
@@ -104,7 +104,7 @@ TEST(ReferenceMarch, MeetsAJumpWhereItIs) {
   const auto edge = [](double f) {
     return OpticalProperties{glm::dvec3(f > 0.37 ? 1 : 0, 0, 0), f > 0.37 ? 0.5 : 0.0};
   };
-  const auto pixel = referenceMarch(Box(), edge, alongX(Projection::orthographic), {1, 1}, 0.03).at(0, 0);
+  const auto pixel = referenceMarch(Box(), edge, alongX(Projection::kOrthographic), {1, 1}, 0.03).at(0, 0);
   EXPECT_NEAR(pixel.transmittance, std::exp(-0.5 * 2 * 0.63), 2e-5);
   EXPECT_NEAR(pixel.colour.r, 1, 1e-12);
 }

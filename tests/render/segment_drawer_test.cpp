@@ -12,7 +12,7 @@ namespace {
 /// Draws two draws later than it is told to, as OpenGL may, and looks at the splats only then.
 class LatePainter final : public Painter {
  public:
-  DrawingOrder order() const override { return DrawingOrder::back_to_front; }
+  DrawingOrder order() const override { return DrawingOrder::kBackToFront; }
   void begin(ImageSize, const glm::vec4&, const ClassificationTable&, bool, const PaintResources&) override {}
   void draw(std::span<const ScreenSplat> splats) override {
     under_way_.push_back(splats);

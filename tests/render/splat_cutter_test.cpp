@@ -78,7 +78,7 @@ ScreenView viewFrom(const glm::dvec3& eye, double angle) {
   Camera camera;
   camera.position = eye;
   camera.focal_point = eye + glm::dvec3(0.2, 0.1, -1);
-  camera.projection = Projection::perspective;
+  camera.projection = Projection::kPerspective;
   camera.view_angle_deg = angle;
   return ScreenView::of(camera, {400, 400}, glm::dvec3(1), 1.5, 0.01);
 }
@@ -132,7 +132,7 @@ TEST(SplatCutter, EndsWhateverTheSize) {
       settings.view.near = near;
       BrickProjector projector;
       projector.project(settings, table, glm::dvec3(0), geometry, variable);
-      EXPECT_LE(projector.splats().size(), BrickProjector::kMostSplats);
+      EXPECT_LE(projector.splats().size(), BrickProjector::kMaxSplats);
     }
 }
 
@@ -158,7 +158,7 @@ TEST(Projection, FromWithinTheData) {
   const ClassificationTable table([](double) { return TransferFunction::Value{glm::dvec3(1), 1}; }, 0, 1);
   BrickProjector projector;
   projector.project({viewFrom({0.5, 0.5, 0.5}, 60)}, table, glm::dvec3(0), geometry, variable);
-  EXPECT_LE(projector.splats().size(), BrickProjector::kMostSplats);
+  EXPECT_LE(projector.splats().size(), BrickProjector::kMaxSplats);
   EXPECT_GT(projector.counts().drawn, 1000u);
   EXPECT_GT(projector.counts().pieces, projector.counts().drawn);
   for (const ScreenSplat& splat : projector.splats()) {

@@ -38,11 +38,11 @@ ColourMap redToBlue(ColourSpace space) {
 }
 
 TEST(ColourMap, RgbIsLinear) {
-  expectColour(redToBlue(ColourSpace::rgb).at(0.25), {0.75, 0, 0.25}, 1e-12);
+  expectColour(redToBlue(ColourSpace::kRgb).at(0.25), {0.75, 0, 0.25}, 1e-12);
 }
 
 TEST(ColourMap, StepHasTheUpperEndsColour) {
-  const ColourMap map = redToBlue(ColourSpace::step);
+  const ColourMap map = redToBlue(ColourSpace::kStep);
   expectBytes(map.at(0), 255, 0, 0);
   expectBytes(map.at(1e-9), 0, 0, 255);
   expectBytes(map.at(0.5), 0, 0, 255);  // as in VTK's own test
@@ -50,14 +50,14 @@ TEST(ColourMap, StepHasTheUpperEndsColour) {
 
 TEST(ColourMap, HsvTakesTheShorterWayRound) {
   // Red is hue 0, blue hue 2/3: the short way leads through magenta, the long one through green.
-  expectBytes(redToBlue(ColourSpace::hsv).at(0.5), 255, 0, 255);
-  expectBytes(redToBlue(ColourSpace::hsv_no_wrap).at(0.5), 0, 255, 0);
+  expectBytes(redToBlue(ColourSpace::kHsv).at(0.5), 255, 0, 255);
+  expectBytes(redToBlue(ColourSpace::kHsvNoWrap).at(0.5), 0, 255, 0);
 }
 
 TEST(ColourMap, HsvKeepsEndsOfEveryHue) {
   for (int hue = 0; hue < 64; ++hue) {
     const glm::dvec3 rgb((hue & 3) / 3.0, (hue >> 2 & 3) / 3.0, (hue >> 4 & 3) / 3.0);
-    for (const auto space : {ColourSpace::hsv, ColourSpace::lab, ColourSpace::diverging}) {
+    for (const auto space : {ColourSpace::kHsv, ColourSpace::kLab, ColourSpace::kDiverging}) {
       const ColourPoint points[] = {{0, {0.2, 0.5, 0.1}}, {1, rgb}, {2, {0.7, 0.1, 0.4}}};
       expectColour(ColourMap(points, space).at(1), rgb, 2e-3);
     }
@@ -67,10 +67,10 @@ TEST(ColourMap, HsvKeepsEndsOfEveryHue) {
 TEST(ColourMap, LabMeetsCie) {
   // Half way in L*a*b* between sRGB black and white is L* = 50: the grey of byte 119.
   const ColourPoint grey[] = {{0, glm::dvec3(0)}, {1, glm::dvec3(1)}};
-  expectBytes(ColourMap(grey, ColourSpace::lab).at(0.5), 119, 119, 119);
+  expectBytes(ColourMap(grey, ColourSpace::kLab).at(0.5), 119, 119, 119);
   // Red is (53.24, 80.09, 67.20), blue (32.30, 79.19, -107.86): half way in sRGB, computed from CIE's
   // formulas.
-  expectBytes(redToBlue(ColourSpace::lab).at(0.5), 202, 0, 136);
+  expectBytes(redToBlue(ColourSpace::kLab).at(0.5), 202, 0, 136);
 }
 
 TEST(ColourMap, DivergingIsParaViewsCoolToWarm) {
@@ -78,14 +78,14 @@ TEST(ColourMap, DivergingIsParaViewsCoolToWarm) {
   const ColourPoint points[] = {{0, glm::dvec3(59, 76, 192) / 255.0}, {1, glm::dvec3(180, 4, 38) / 255.0}};
   const int rows[9][3] = {{59, 76, 192},   {98, 130, 234},  {141, 176, 254}, {184, 208, 249}, {221, 221, 221},
                           {245, 196, 173}, {244, 154, 123}, {222, 96, 77},   {180, 4, 38}};
-  const ColourMap map(points, ColourSpace::diverging);
+  const ColourMap map(points, ColourSpace::kDiverging);
   for (int n = 0; n < 9; ++n)
     expectColour(map.at(n / 8.0), glm::dvec3(rows[n][0], rows[n][1], rows[n][2]) / 255.0, 1.5 / 255);
 }
 
 TEST(ColourMap, DivergingOfLikeHuesStaysBetweenThem) {
   const ColourPoint points[] = {{0, {0.8, 0.1, 0.1}}, {1, {0.9, 0.3, 0.2}}};
-  const glm::dvec3 middle = ColourMap(points, ColourSpace::diverging).at(0.5);
+  const glm::dvec3 middle = ColourMap(points, ColourSpace::kDiverging).at(0.5);
   EXPECT_LT(middle.g, 0.3) << "no white in between";
   EXPECT_GT(middle.r, 0.8);
 }
@@ -93,7 +93,7 @@ TEST(ColourMap, DivergingOfLikeHuesStaysBetweenThem) {
 TEST(ColourMap, EndsGoOnAndJumpsHoldTheirFirst) {
   const ColourPoint points[] = {
       {0, glm::dvec3(0.1)}, {1, glm::dvec3(0.3)}, {1, glm::dvec3(0.9)}, {2, glm::dvec3(0.5)}};
-  const ColourMap map(points, ColourSpace::rgb);
+  const ColourMap map(points, ColourSpace::kRgb);
   EXPECT_DOUBLE_EQ(map.at(-5).r, 0.1);
   EXPECT_DOUBLE_EQ(map.at(7).r, 0.5);
   EXPECT_DOUBLE_EQ(map.at(1).r, 0.3);
@@ -313,19 +313,19 @@ TEST_F(TransferFunctionFile, WithoutPointsGetsTheDefaultRampAndSaysSo) {
 TEST_F(TransferFunctionFile, ColourSpacesAreHonoured) {
   Json preset = plain_;
   preset["RGBPoints"] = {0, 1, 0, 0, 1, 0, 0, 1};
-  const std::pair<const char*, ColourSpace> spaces[] = {{"RGB", ColourSpace::rgb},
-                                                        {"HSV", ColourSpace::hsv},
-                                                        {"HSVNoWrap", ColourSpace::hsv_no_wrap},
-                                                        {"Lab", ColourSpace::lab},
-                                                        {"Diverging", ColourSpace::diverging},
-                                                        {"Step", ColourSpace::step}};
+  const std::pair<const char*, ColourSpace> spaces[] = {{"RGB", ColourSpace::kRgb},
+                                                        {"HSV", ColourSpace::kHsv},
+                                                        {"HSVNoWrap", ColourSpace::kHsvNoWrap},
+                                                        {"Lab", ColourSpace::kLab},
+                                                        {"Diverging", ColourSpace::kDiverging},
+                                                        {"Step", ColourSpace::kStep}};
   for (const auto& [name, space] : spaces) {
     preset["ColorSpace"] = name;
     expectColour(open(preset).at(0.3).colour, redToBlue(space).at(0.3), 1e-12);
   }
   preset["ColorSpace"] = "HSV";
   preset["HSVWrap"] = 0;
-  expectColour(open(preset).at(0.3).colour, redToBlue(ColourSpace::hsv_no_wrap).at(0.3), 1e-12);
+  expectColour(open(preset).at(0.3).colour, redToBlue(ColourSpace::kHsvNoWrap).at(0.3), 1e-12);
 }
 
 TEST_F(TransferFunctionFile, LogScaleInterpolatesInTheLogarithm) {

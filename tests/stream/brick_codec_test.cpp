@@ -12,7 +12,7 @@
 #include <random>
 
 #include "stream/base/error.h"
-#include "stream/model/half_cell.h"
+#include "stream/model/border_code.h"
 #include "tests/stream/test_bricks.h"
 
 namespace curvisplat {
@@ -261,23 +261,23 @@ TEST(Codec, KeepsHalfCells) {
   const RootCube root{};
   BrickSplats brick = randomBrick({}, Cell{}, 6);
   const size_t without = encodeBrick(root, brick).geometry.size();
-  brick.half_cells.assign(brick.size(), kNoBorder);
+  brick.border_codes.assign(brick.size(), kNoBorder);
   EXPECT_EQ(encodeBrick(root, brick).geometry.size(), without);
 
   const glm::dvec3 inward[] = {{0, 0.6, 0.8}, {1, 0, 0}};
-  for (size_t n = 0; n < brick.size(); n += 3) brick.half_cells[n] = packHalfCell({inward, 1 + n % 2});
+  for (size_t n = 0; n < brick.size(); n += 3) brick.border_codes[n] = packBorderCode({inward, 1 + n % 2});
   const EncodedBrick encoded = encodeBrick(root, brick);
   EXPECT_EQ(
-      decodeForMerging(root, encoded.brick, encoded.geometry, encoded.variables, encoded.values).half_cells,
-      brick.half_cells);
+      decodeForMerging(root, encoded.brick, encoded.geometry, encoded.variables, encoded.values).border_codes,
+      brick.border_codes);
   SplatGeometry floats;
   decodeGeometry(root, encoded.brick, encoded.geometry, floats);
-  EXPECT_EQ(floats.half_cell, brick.half_cells);
+  EXPECT_EQ(floats.border_code, brick.border_codes);
   // Scratch of the brick before is not taken for this one's.
-  brick.half_cells.clear();
+  brick.border_codes.clear();
   const EncodedBrick whole = encodeBrick(root, brick);
   decodeGeometry(root, whole.brick, whole.geometry, floats);
-  EXPECT_EQ(floats.half_cell, std::vector<uint32_t>(brick.size(), kNoBorder));
+  EXPECT_EQ(floats.border_code, std::vector<uint32_t>(brick.size(), kNoBorder));
   EXPECT_NEAR(encoded.brick.largest_radius / whole.brick.largest_radius, 1 + kBorderReach / kKernelRadius,
               1e-6);
 }

@@ -29,7 +29,7 @@ class BrickGrids : public testing::Test {
   }
   std::string difference(std::span<const std::byte> of) const { return comparison(of).difference; }
   BrickGridsComparison comparison(std::span<const std::byte> of,
-                                  uint64_t most_memory = kMostComparisonMemory) const {
+                                  uint64_t most_memory = kMaxComparisonMemory) const {
     return compareBrickGrids(of, cache().manifest().root, cache().bricks(), most_memory);
   }
   const CacheReader& cache() const {

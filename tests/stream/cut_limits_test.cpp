@@ -326,7 +326,7 @@ TEST(CutLimits, FrontToBackIsTheReverse) {
     const CutView view = randomView(random, n % 2 == 0);
     CutOptions options = limited(0.2, 5000);
     Cut cut = tree.cut(view, options);
-    options.order = DrawingOrder::front_to_back;
+    options.order = DrawingOrder::kFrontToBack;
     std::reverse(cut.parts.begin(), cut.parts.end());
     EXPECT_EQ(tree.cut(view, options).parts, cut.parts);
   }

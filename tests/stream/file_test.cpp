@@ -74,10 +74,10 @@ TEST_F(FileTest, DirectTransfersThatAreCutShortGoOnThroughThePageCache) {
     FaultySystemCalls faulty;
     faulty.largest_transfer = largest_transfer;
     const ScopedSystemCalls scope(faulty);
-    OutputFile out(folder / "file", Caching::direct);
+    OutputFile out(folder / "file", Caching::kDirect);
     out.append(std::as_bytes(std::span(pages)));
     out.close();
-    const InputFile in(folder / "file", Caching::direct);
+    const InputFile in(folder / "file", Caching::kDirect);
     in.readAt(0, std::as_writable_bytes(std::span(back)));
     for (size_t n = 0; n < kPages; ++n) EXPECT_EQ(back[n].bytes, pages[n].bytes) << n;
   }
@@ -118,7 +118,7 @@ TEST_F(FileTest, MissingFilesAndFoldersAreRefused) {
 
 TEST_F(FileTest, GoesOnWithAFileThatIsThere) {
   writeFileAtomically(folder / "file", std::string("0123456789"));
-  OutputFile out(folder / "file", Caching::pages, OutputFile::Existing::kKeep);
+  OutputFile out(folder / "file", Caching::kPages, OutputFile::Existing::kKeep);
   EXPECT_EQ(out.size(), 10u);
   out.truncate(4);
   EXPECT_EQ(out.size(), 4u);

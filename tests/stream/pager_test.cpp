@@ -148,10 +148,10 @@ TEST_F(PagerTest, ReadsTheSameBytesAsPlainReads) {
     const CacheReader cache(path);
     const uint64_t least = BrickPager::leastBufferBytes(cache, 0);
     std::mt19937 random(2);
-    for (const Way way : {Way::io_uring, Way::threads})
+    for (const Way way : {Way::kIoUring, Way::kThreads})
       for (const bool direct : {true, false})
         for (const uint64_t buffer : {least, least + 5 * kPageBytes, uint64_t{2} << 20}) {
-          if (way == Way::io_uring && !uringWorks()) continue;
+          if (way == Way::kIoUring && !uringWorks()) continue;
           BrickPager pager(cache, 0, optionsOf(way, direct, buffer));
           for (int round = 0; round < 3; ++round) {
             std::vector<uint32_t> order(inOrder());
@@ -160,7 +160,7 @@ TEST_F(PagerTest, ReadsTheSameBytesAsPlainReads) {
             EXPECT_EQ(takeAll(pager, cache, order, 1 + static_cast<unsigned>(round)), order.size())
                 << path << ' ' << pager.way() << ' ' << buffer;
           }
-          EXPECT_TRUE(pager.way().starts_with(way == Way::io_uring ? "io_uring" : "pread")) << pager.way();
+          EXPECT_TRUE(pager.way().starts_with(way == Way::kIoUring ? "io_uring" : "pread")) << pager.way();
           const PagerStatistics statistics = pager.statistics();
           EXPECT_LE(statistics.peak_bytes, pager.bufferBytes());
           EXPECT_GE(statistics.bytes, 3 * fs::file_size(path / "geometry.bin"));
@@ -174,7 +174,7 @@ TEST_F(PagerTest, ReadsTheSameBytesAsPlainReads) {
 
 TEST_F(PagerTest, ReadsByIoUringWhereTheKernelAllowsIt) {
   if (!uringWorks()) GTEST_SKIP() << "this kernel, or this container, refuses io_uring";
-  for (const Way way : {Way::automatic, Way::io_uring}) {
+  for (const Way way : {Way::kAutomatic, Way::kIoUring}) {
     BrickPager pager(*cache_, 0, optionsOf(way, true, 1 << 20));
     EXPECT_EQ(takeAll(pager, *cache_, inOrder(), 2), bricks());
     EXPECT_TRUE(pager.way().starts_with("io_uring")) << pager.way();
@@ -283,7 +283,7 @@ TEST_F(PagerTest, AFailingDiskMarksBricksAndHangsNobody) {
     faulty.fail_read_at = at;
     faulty.error = EIO;
     const ScopedSystemCalls scope(faulty);
-    BrickPager pager(*cache_, 0, optionsOf(Way::automatic, true, BrickPager::leastBufferBytes(*cache_, 0)));
+    BrickPager pager(*cache_, 0, optionsOf(Way::kAutomatic, true, BrickPager::leastBufferBytes(*cache_, 0)));
     EXPECT_LT(takeAll(pager, *cache_, inOrder(), 3), bricks());
     EXPECT_GT(pager.statistics().bricks_unreadable, 0u);
   }
@@ -291,8 +291,8 @@ TEST_F(PagerTest, AFailingDiskMarksBricksAndHangsNobody) {
 
 TEST_F(PagerTest, StoppingWakesAllWhoWaitAndStartingBeginsAnew) {
   std::mt19937 random(7);
-  for (const Way way : {Way::io_uring, Way::threads}) {
-    if (way == Way::io_uring && !uringWorks()) continue;
+  for (const Way way : {Way::kIoUring, Way::kThreads}) {
+    if (way == Way::kIoUring && !uringWorks()) continue;
     BrickPager pager(*cache_, 0, optionsOf(way, true, BrickPager::leastBufferBytes(*cache_, 0)));
     for (int round = 0; round < 100; ++round) {
       std::vector<uint32_t> order = inOrder();
@@ -320,8 +320,8 @@ TEST_F(PagerTest, StoppingWakesAllWhoWaitAndStartingBeginsAnew) {
 
 TEST_F(PagerTest, AFileThatShrinksMarksWhatIsGone) {
   const auto order = inOrder();
-  for (const Way way : {Way::io_uring, Way::threads}) {
-    if (way == Way::io_uring && !uringWorks()) continue;
+  for (const Way way : {Way::kIoUring, Way::kThreads}) {
+    if (way == Way::kIoUring && !uringWorks()) continue;
     BrickPager pager(*cache_, 0, optionsOf(way, true, 1 << 20));
     ASSERT_EQ(takeAll(pager, *cache_, order, 2), bricks());
     const uint64_t size = fs::file_size(cache_->geometryPath());
@@ -350,7 +350,7 @@ TEST_F(PagerTest, AFileThatShrinksMarksWhatIsGone) {
 
 TEST_F(PagerTest, LeavesOutWhatIsNotNeeded) {
   const std::vector<uint32_t> order = inOrder();
-  for (const Way way : {Way::automatic, Way::threads})
+  for (const Way way : {Way::kAutomatic, Way::kThreads})
     for (const uint64_t buffer : {BrickPager::leastBufferBytes(*cache_, 0), uint64_t{64} << 20}) {
       BrickPager pager(*cache_, 0, optionsOf(way, false, buffer));
       const auto unneeded = [](uint32_t brick) { return brick % 3 == 1 || (brick > 20 && brick < 40); };

@@ -47,10 +47,10 @@ TEST(Predictor, OfSmoothDataMissesNothing) {
     });
     return count;
   };
-  EXPECT_EQ(misses(Predictor::none), 48u);
-  EXPECT_EQ(misses(Predictor::linear), 12u);        // each row's first two
-  EXPECT_EQ(misses(Predictor::above), 2 + 5 * 8u);  // the slope along i is another in each row
-  EXPECT_EQ(misses(Predictor::above_linear), 2 + 5 * 2u);
+  EXPECT_EQ(misses(Predictor::kNone), 48u);
+  EXPECT_EQ(misses(Predictor::kLinear), 12u);        // each row's first two
+  EXPECT_EQ(misses(Predictor::kAbove), 2 + 5 * 8u);  // the slope along i is another in each row
+  EXPECT_EQ(misses(Predictor::kAboveLinear), 2 + 5 * 2u);
 }
 
 TEST(Predictor, WrapsAround) {
@@ -122,7 +122,7 @@ std::vector<std::byte> valuesWithRows(uint32_t count, const std::vector<uint64_t
   header.upper = 1;
   header.rows_bytes = static_cast<uint32_t>(bytes.size());
   const std::vector<uint32_t> ones(count, 1);
-  for (ArrayCode& array : header.arrays) array = {Predictor::above_linear, planes.add(ones)};
+  for (ArrayCode& array : header.arrays) array = {Predictor::kAboveLinear, planes.add(ones)};
   return planes.compress(std::as_bytes(std::span(&header, 1)));
 }
 

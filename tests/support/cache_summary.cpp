@@ -51,13 +51,13 @@ Image smallPictureOf(const CacheReader& cache, size_t variable) {
   FrameRenderer renderer(cache, variable,
                          TransferFunction::preset("viridis", info.min, info.max,
                                                   glm::length(manifest.upper - manifest.lower) / 30),
-                         Backend::cpu);
+                         Backend::kCpu);
   FrameOptions options;
   options.size = {96, 72};
   options.lod_pixels = 0;
   FrameStatistics statistics;
   return renderer.render(
-      Camera::named("iso", manifest.lower, manifest.upper, options.size, Projection::orthographic, 30),
+      Camera::named("iso", manifest.lower, manifest.upper, options.size, Projection::kOrthographic, 30),
       options, statistics);
 }
 

@@ -40,7 +40,7 @@ void writeNames(const char* array, const std::vector<std::string>& names) {
 }  // namespace
 
 CgnsWriter::CgnsWriter(const std::filesystem::path& path, CgnsFileType type) {
-  check(cg_set_file_type(type == CgnsFileType::adf ? CG_FILE_ADF : CG_FILE_HDF5));
+  check(cg_set_file_type(type == CgnsFileType::kAdf ? CG_FILE_ADF : CG_FILE_HDF5));
   check(cg_open(path.c_str(), CG_MODE_WRITE, &file_));
 }
 
@@ -78,15 +78,15 @@ void CgnsWriter::writeArray(const std::string& name, const CgnsWriterField& fiel
   const cgsize_t dims[3] = {values[0] + rind[0] + rind[1], values[1] + rind[2] + rind[3],
                             values[2] + rind[4] + rind[5]};
   switch (field.numbers) {
-    case CgnsNumbers::single_precision:
+    case CgnsNumbers::kSinglePrecision:
       check(cg_array_write(name.c_str(), CGNS_ENUMV(RealSingle), 3, dims,
                            valuesOf<float>(field, values, rind).data()));
       break;
-    case CgnsNumbers::double_precision:
+    case CgnsNumbers::kDoublePrecision:
       check(cg_array_write(name.c_str(), CGNS_ENUMV(RealDouble), 3, dims,
                            valuesOf<double>(field, values, rind).data()));
       break;
-    case CgnsNumbers::integer:
+    case CgnsNumbers::kInteger:
       check(cg_array_write(name.c_str(), CGNS_ENUMV(Integer), 3, dims,
                            valuesOf<int>(field, values, rind).data()));
       break;

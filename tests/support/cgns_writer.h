@@ -11,8 +11,8 @@
 
 namespace curvisplat {
 
-enum class CgnsFileType { adf, hdf5 };
-enum class CgnsNumbers { single_precision, double_precision, integer };
+enum class CgnsFileType { kAdf, kHdf5 };
+enum class CgnsNumbers { kSinglePrecision, kDoublePrecision, kInteger };
 
 /// Of indices from 0 in the zone itself; negative, or beyond the zone, on rind planes.
 using CgnsFunction = std::function<double(int64_t i, int64_t j, int64_t k)>;
@@ -21,7 +21,7 @@ using CgnsRind = std::array<int, 6>;  // planes before and behind along i, j, k
 struct CgnsWriterField {
   std::string name;
   CgnsFunction value;
-  CgnsNumbers numbers = CgnsNumbers::double_precision;
+  CgnsNumbers numbers = CgnsNumbers::kDoublePrecision;
 };
 
 /// What follows on from a call is added to what that call began: a zone to the last base, a solution to the

@@ -29,8 +29,9 @@ void writeCube(const std::filesystem::path& prefix, uint64_t side, const CubeNod
   writeFileAtomically(prefix.string() + ".nam", name + "\n");
 }
 
-std::vector<std::string> cubeWords(const std::filesystem::path& prefix, const std::vector<std::string>& more,
-                                   const std::filesystem::path& output) {
+std::vector<std::string> cubeArguments(const std::filesystem::path& prefix,
+                                       const std::vector<std::string>& more,
+                                       const std::filesystem::path& output) {
   const std::string name = prefix.string();
   std::vector<std::string> words = inputWords(prefix);
   words.insert(words.end(), {"-o", output.empty() ? name + ".splats" : output.string()});

@@ -20,9 +20,9 @@ void writeCube(const std::filesystem::path& prefix, uint64_t side, const CubeNod
 
 /// `convert PREFIX.xyz PREFIX.fun -o OUTPUT`, by default to PREFIX.splats; the layout is named, since files
 /// so small fit several.
-std::vector<std::string> cubeWords(const std::filesystem::path& prefix,
-                                   const std::vector<std::string>& more = {},
-                                   const std::filesystem::path& output = {});
+std::vector<std::string> cubeArguments(const std::filesystem::path& prefix,
+                                       const std::vector<std::string>& more = {},
+                                       const std::filesystem::path& output = {});
 /// `convert PREFIX.xyz PREFIX.fun --add-scalar SCALAR --to CACHE`.
 std::vector<std::string> cubeAdditionWords(const std::filesystem::path& prefix, const std::string& scalar,
                                            const std::filesystem::path& cache);

@@ -41,7 +41,7 @@ enum Ending : int {
 
 /// For a signal handler: the heap may be damaged, and its lock held, so that even dprintf() would wait for
 /// ever.
-void say(const char* text) {
+void printMessage(const char* text) {
   if (::write(STDERR_FILENO, text, std::strlen(text)) < 0) ::_exit(kCrash);
 }
 
@@ -65,9 +65,9 @@ void onCrash(int) {
     Dl_info info{};
     if (!::dladdr(frames[n], &info) || !info.dli_fname) continue;
     if (const char* library = libraryOf(info.dli_fname, kParsers)) {
-      say(library);
-      say(", ");
-      say(info.dli_sname ? info.dli_sname : "a function of its own");
+      printMessage(library);
+      printMessage(", ");
+      printMessage(info.dli_sname ? info.dli_sname : "a function of its own");
       ::_exit(kLibraryCrash);
     }
     const bool runtime = libraryOf(info.dli_fname, kRuntimes) != nullptr;

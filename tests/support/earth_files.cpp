@@ -7,8 +7,8 @@ namespace {
 
 using Index = std::vector<size_t>;
 
-constexpr auto kSingle = NetcdfNumbers::single_precision;
-constexpr auto kDouble = NetcdfNumbers::double_precision;
+constexpr auto kSingle = NetcdfNumbers::kSinglePrecision;
+constexpr auto kDouble = NetcdfNumbers::kDoublePrecision;
 
 }  // namespace
 
@@ -171,7 +171,7 @@ void write(const std::filesystem::path& path, NetcdfFileType type, bool partial_
   file.variable("sossheig", kSingle, {"time_counter", "y", "x"}, {{"units", "m"}},
                 [](const Index&) { return 0.5; });
   file.variable(
-      "votemper", NetcdfNumbers::int16, {"time_counter", "deptht", "y", "x"},
+      "votemper", NetcdfNumbers::kInt16, {"time_counter", "deptht", "y", "x"},
       {{"_FillValue", NetcdfNumberList{kNone}},
        {"scale_factor", NetcdfNumberList{kScale}},
        {"add_offset", NetcdfNumberList{kOffset}},

@@ -40,15 +40,15 @@ void writeHostile(hid_t object, const std::string& name, HostileAttribute hostil
   const hid_t one = check(H5Screate(H5S_SCALAR));
   const auto text = [&](size_t bytes) { write(object, name, fixedString(bytes), one, letters(bytes)); };
   switch (hostile) {
-    case HostileAttribute::missing:
+    case HostileAttribute::kMissing:
       break;
-    case HostileAttribute::string_of_34:
+    case HostileAttribute::kStringOf34:
       return text(34);
-    case HostileAttribute::long_string:
+    case HostileAttribute::kLongString:
       return text(400);
-    case HostileAttribute::huge_string:
+    case HostileAttribute::kHugeString:
       return text(60'000);
-    case HostileAttribute::variable_string: {
+    case HostileAttribute::kVariableString: {
       const hid_t type = fixedString(H5T_VARIABLE);
       const char* const value = "R8";
       const hid_t attribute = check(H5Acreate2(object, name.c_str(), type, one, H5P_DEFAULT, H5P_DEFAULT));
@@ -56,41 +56,41 @@ void writeHostile(hid_t object, const std::string& name, HostileAttribute hostil
       H5Aclose(attribute);
       return;
     }
-    case HostileAttribute::strings:
+    case HostileAttribute::kStrings:
       return write(object, name, fixedString(3), line(11), letters(33));
-    case HostileAttribute::null_space:
+    case HostileAttribute::kNullSpace:
       return write(object, name, fixedString(3), check(H5Screate(H5S_NULL)));
-    case HostileAttribute::empty_space:
+    case HostileAttribute::kEmptySpace:
       return write(object, name, fixedString(3), line(0));
-    case HostileAttribute::integer:
+    case HostileAttribute::kInteger:
       return write(object, name, H5T_NATIVE_INT, one);
-    case HostileAttribute::integers:
+    case HostileAttribute::kIntegers:
       return write(object, name, H5T_NATIVE_INT64, line(1000));
-    case HostileAttribute::long_letters:
+    case HostileAttribute::kLongLetters:
       return write(object, name, H5T_NATIVE_CHAR, line(1000), letters(1000));
-    case HostileAttribute::real:
+    case HostileAttribute::kReal:
       return write(object, name, H5T_NATIVE_DOUBLE, one);
-    case HostileAttribute::compound: {
+    case HostileAttribute::kCompound: {
       const hid_t type = check(H5Tcreate(H5T_COMPOUND, 64));
       check(H5Tinsert(type, "text", 0, fixedString(32)));
       check(H5Tinsert(type, "number", 32, H5T_NATIVE_DOUBLE));
       return write(object, name, type, one, letters(64));
     }
-    case HostileAttribute::reference:
+    case HostileAttribute::kReference:
       return write(object, name, H5T_STD_REF_OBJ, one);
-    case HostileAttribute::variable_list:
+    case HostileAttribute::kVariableList:
       return write(object, name, check(H5Tvlen_create(H5T_NATIVE_CHAR)), one);
-    case HostileAttribute::array: {
+    case HostileAttribute::kArray: {
       const hsize_t count = 200;
       return write(object, name, check(H5Tarray_create2(H5T_NATIVE_CHAR, 1, &count)), one, letters(200));
     }
-    case HostileAttribute::enumerator: {
+    case HostileAttribute::kEnumerator: {
       const hid_t type = check(H5Tenum_create(H5T_NATIVE_INT));
       const int zero = 0;
       check(H5Tenum_insert(type, "zero", &zero));
       return write(object, name, type, one);
     }
-    case HostileAttribute::opaque:
+    case HostileAttribute::kOpaque:
       return write(object, name, check(H5Tcreate(H5T_OPAQUE, 100)), one, letters(100));
   }
 }

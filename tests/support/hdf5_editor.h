@@ -10,26 +10,26 @@ namespace curvisplat {
 
 /// What stands where a short fixed text should.
 enum class HostileAttribute {
-  missing,
-  string_of_34,  // one more than any text of CGNS's has
-  long_string,
-  huge_string,
-  variable_string,
-  strings,  // several
-  null_space,
-  empty_space,
-  integer,
-  integers,
-  long_letters,
-  real,
-  compound,
-  reference,
-  variable_list,
-  array,
-  enumerator,
-  opaque,
+  kMissing,
+  kStringOf34,  // one more than any text of CGNS's has
+  kLongString,
+  kHugeString,
+  kVariableString,
+  kStrings,  // several
+  kNullSpace,
+  kEmptySpace,
+  kInteger,
+  kIntegers,
+  kLongLetters,
+  kReal,
+  kCompound,
+  kReference,
+  kVariableList,
+  kArray,
+  kEnumerator,
+  kOpaque,
 };
-inline constexpr int kHostileAttributes = static_cast<int>(HostileAttribute::opaque) + 1;
+inline constexpr int kHostileAttributes = static_cast<int>(HostileAttribute::kOpaque) + 1;
 
 /// Throws std::runtime_error where HDF5 refuses. Objects are given by their paths.
 class Hdf5Editor {

@@ -14,11 +14,11 @@ void check(int status) {
 
 nc_type typeOf(NetcdfNumbers numbers) {
   switch (numbers) {
-    case NetcdfNumbers::int16:
+    case NetcdfNumbers::kInt16:
       return NC_SHORT;
-    case NetcdfNumbers::int32:
+    case NetcdfNumbers::kInt32:
       return NC_INT;
-    case NetcdfNumbers::single_precision:
+    case NetcdfNumbers::kSinglePrecision:
       return NC_FLOAT;
     default:
       return NC_DOUBLE;
@@ -28,7 +28,7 @@ nc_type typeOf(NetcdfNumbers numbers) {
 }  // namespace
 
 NetcdfWriter::NetcdfWriter(const std::filesystem::path& path, NetcdfFileType type) : type_(type) {
-  check(nc_create(path.c_str(), NC_CLOBBER | (type == NetcdfFileType::classic ? 0 : NC_NETCDF4), &file_));
+  check(nc_create(path.c_str(), NC_CLOBBER | (type == NetcdfFileType::kClassic ? 0 : NC_NETCDF4), &file_));
   check(nc_enddef(file_));
 }
 
@@ -69,7 +69,7 @@ void NetcdfWriter::variable(const std::string& name, NetcdfNumbers numbers,
   int id = 0;
   check(nc_redef(file_));
   check(nc_def_var(file_, name.c_str(), typeOf(numbers), static_cast<int>(ids.size()), ids.data(), &id));
-  if (type_ == NetcdfFileType::netcdf4_compressed && !ids.empty())
+  if (type_ == NetcdfFileType::kNetcdf4Compressed && !ids.empty())
     check(nc_def_var_deflate(file_, id, 1, 1, 4));
   for (const auto& [key, attribute] : attributes) {
     if (const auto* const text = std::get_if<NetcdfText>(&attribute)) {

@@ -12,8 +12,8 @@
 
 namespace curvisplat {
 
-enum class NetcdfFileType { classic, netcdf4, netcdf4_compressed };
-enum class NetcdfNumbers { int16, int32, single_precision, double_precision };
+enum class NetcdfFileType { kClassic, kNetcdf4, kNetcdf4Compressed };
+enum class NetcdfNumbers { kInt16, kInt32, kSinglePrecision, kDoublePrecision };
 
 using NetcdfText = std::string;
 using NetcdfNumberList = std::vector<double>;

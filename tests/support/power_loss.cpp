@@ -19,7 +19,7 @@ struct Node {
 };
 using NodeOf = std::shared_ptr<Node>;
 
-enum class Unsynced { lost, kept, zeros, half };
+enum class Unsynced { kLost, kKept, kZeros, kHalf };
 
 class Disk {
  public:
@@ -43,33 +43,33 @@ class Disk {
 
   void apply(const DiskCall& call) {
     switch (call.kind) {
-      case Kind::open:
+      case Kind::kOpen:
         return open(call);
-      case Kind::write:
+      case Kind::kWrite:
         return write(call);
-      case Kind::truncate:
+      case Kind::kTruncate:
         if (const NodeOf node = opened_[call.fd]) node->bytes.resize(static_cast<size_t>(call.offset));
         return;
-      case Kind::sync:
+      case Kind::kSync:
         return sync(call);
-      case Kind::rename:
+      case Kind::kRename:
         if (const NodeOf from = parentOf(call.path)) {
           const NodeOf node = from->names.at(nameOf(call.path));
           from->names.erase(nameOf(call.path));
           parentOf(call.other)->names[nameOf(call.other)] = node;
         }
         return;
-      case Kind::exchange:
+      case Kind::kExchange:
         if (const NodeOf from = parentOf(call.path))
           std::swap(from->names.at(nameOf(call.path)), parentOf(call.other)->names.at(nameOf(call.other)));
         return;
-      case Kind::make_folder:
+      case Kind::kMakeFolder:
         if (const NodeOf parent = parentOf(call.path)) {
           const auto node = parent->names[nameOf(call.path)] = std::make_shared<Node>();
           node->is_folder = true;
         }
         return;
-      case Kind::remove:
+      case Kind::kRemove:
         if (const NodeOf parent = parentOf(call.path)) parent->names.erase(nameOf(call.path));
         return;
     }
@@ -84,7 +84,7 @@ class Disk {
       std::set<const Node*> old_names;
       for (size_t n = 0; n < unsynced.size(); ++n)
         if ((choice >> n & 1) != 0) old_names.insert(unsynced[n]);
-      for (const Unsynced bytes : {Unsynced::kept, Unsynced::lost, Unsynced::zeros, Unsynced::half}) {
+      for (const Unsynced bytes : {Unsynced::kKept, Unsynced::kLost, Unsynced::kZeros, Unsynced::kHalf}) {
         DiskState state;
         fill(*root_, "", old_names, bytes, state);
         use(state);
@@ -154,9 +154,9 @@ class Disk {
   }
 
   static std::string bytesOf(const Node& file, Unsynced unsynced) {
-    if (file.bytes == file.synced_bytes || unsynced == Unsynced::kept) return file.bytes;
-    if (unsynced == Unsynced::lost) return file.synced_bytes;
-    if (unsynced == Unsynced::zeros) return std::string(file.bytes.size(), '\0');
+    if (file.bytes == file.synced_bytes || unsynced == Unsynced::kKept) return file.bytes;
+    if (unsynced == Unsynced::kLost) return file.synced_bytes;
+    if (unsynced == Unsynced::kZeros) return std::string(file.bytes.size(), '\0');
     return file.bytes.substr(0, file.bytes.size() / 2);
   }
 
@@ -170,7 +170,7 @@ class Disk {
 int RecordingSystemCalls::open(const char* path, int flags, unsigned mode) {
   const std::lock_guard lock(mutex_);
   const int fd = SystemCalls::open(path, flags, mode);
-  if (fd >= 0) calls_.push_back({Kind::open, path, "", fd, flags, 0, ""});
+  if (fd >= 0) calls_.push_back({Kind::kOpen, path, "", fd, flags, 0, ""});
   return fd;
 }
 
@@ -178,7 +178,7 @@ ssize_t RecordingSystemCalls::pwrite(int fd, const void* from, size_t count, int
   const std::lock_guard lock(mutex_);
   const ssize_t put = SystemCalls::pwrite(fd, from, count, offset);
   if (put >= 0)
-    calls_.push_back({Kind::write, "", "", fd, 0, offset,
+    calls_.push_back({Kind::kWrite, "", "", fd, 0, offset,
                       std::string(static_cast<const char*>(from), static_cast<size_t>(put))});
   return put;
 }
@@ -186,41 +186,41 @@ ssize_t RecordingSystemCalls::pwrite(int fd, const void* from, size_t count, int
 int RecordingSystemCalls::truncate(int fd, int64_t size) {
   const std::lock_guard lock(mutex_);
   const int result = SystemCalls::truncate(fd, size);
-  if (result == 0) calls_.push_back({Kind::truncate, "", "", fd, 0, size, ""});
+  if (result == 0) calls_.push_back({Kind::kTruncate, "", "", fd, 0, size, ""});
   return result;
 }
 
 int RecordingSystemCalls::fsync(int fd) {
   const std::lock_guard lock(mutex_);
-  calls_.push_back({Kind::sync, "", "", fd, 0, 0, ""});
+  calls_.push_back({Kind::kSync, "", "", fd, 0, 0, ""});
   return 0;
 }
 
 int RecordingSystemCalls::rename(const char* from, const char* to) {
   const std::lock_guard lock(mutex_);
   const int result = SystemCalls::rename(from, to);
-  if (result == 0) calls_.push_back({Kind::rename, from, to, -1, 0, 0, ""});
+  if (result == 0) calls_.push_back({Kind::kRename, from, to, -1, 0, 0, ""});
   return result;
 }
 
 int RecordingSystemCalls::exchange(const char* a, const char* b) {
   const std::lock_guard lock(mutex_);
   const int result = SystemCalls::exchange(a, b);
-  if (result == 0) calls_.push_back({Kind::exchange, a, b, -1, 0, 0, ""});
+  if (result == 0) calls_.push_back({Kind::kExchange, a, b, -1, 0, 0, ""});
   return result;
 }
 
 int RecordingSystemCalls::mkdir(const char* path, unsigned mode) {
   const std::lock_guard lock(mutex_);
   const int result = SystemCalls::mkdir(path, mode);
-  if (result == 0) calls_.push_back({Kind::make_folder, path, "", -1, 0, 0, ""});
+  if (result == 0) calls_.push_back({Kind::kMakeFolder, path, "", -1, 0, 0, ""});
   return result;
 }
 
 int RecordingSystemCalls::remove(const char* path) {
   const std::lock_guard lock(mutex_);
   const int result = SystemCalls::remove(path);
-  if (result == 0) calls_.push_back({Kind::remove, path, "", -1, 0, 0, ""});
+  if (result == 0) calls_.push_back({Kind::kRemove, path, "", -1, 0, 0, ""});
   return result;
 }
 

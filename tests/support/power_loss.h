@@ -24,7 +24,7 @@ namespace curvisplat::testing {
 
 /// One call that changes the disk.
 struct DiskCall {
-  enum class Kind { open, write, truncate, sync, rename, exchange, make_folder, remove } kind;
+  enum class Kind { kOpen, kWrite, kTruncate, kSync, kRename, kExchange, kMakeFolder, kRemove } kind;
   std::string path, other;  // as given
   int fd = -1;
   int flags = 0;

@@ -51,7 +51,7 @@ std::string base64(const std::string& bytes) {
 
 std::string compressed(const std::string& bytes, Compressor compressor) {
   std::string packed;
-  if (compressor == Compressor::zlib) {
+  if (compressor == Compressor::kZlib) {
     uLongf size = compressBound(bytes.size());
     packed.resize(size);
     compress(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(bytes.data()),
@@ -72,10 +72,10 @@ class VtsText {
   std::string array(const VtsArray& array) {
     std::string text = fmt::format("        <DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\"",
                                    array.type, array.name, array.components);
-    if (encoding_.format == Format::ascii)
+    if (encoding_.format == Format::kAscii)
       return text + " format=\"ascii\">\n" + digits(array) + "</DataArray>\n";
     const std::string bytes = encoded(packedNumbers(array.values, array.type, encoding_.big_endian));
-    if (encoding_.format == Format::inline_base64)
+    if (encoding_.format == Format::kInlineBase64)
       return text + " format=\"binary\">\n          " + bytes + "\n        </DataArray>\n";
     text += fmt::format(" format=\"appended\" offset=\"{}\"/>\n", appended_.size());
     appended_ += bytes;
@@ -103,9 +103,9 @@ class VtsText {
   }
 
   std::string encoded(const std::string& bytes) const {
-    const bool text = encoding_.format != Format::appended_raw;
+    const bool text = encoding_.format != Format::kAppendedRaw;
     std::string header, data;
-    if (encoding_.compressor == Compressor::none) {
+    if (encoding_.compressor == Compressor::kNone) {
       appendHeader(header, bytes.size());
       return text ? base64(header + bytes) : header + bytes;
     }
@@ -127,7 +127,7 @@ class VtsText {
 
 }  // namespace
 
-std::string VtsEncoding::inWords() const {
+std::string VtsEncoding::describe() const {
   const char* const formats[] = {"ascii", "inline base64", "appended raw", "appended base64"};
   const char* const compressors[] = {"", " zlib", " lz4"};
   return fmt::format("{}{} {}-bit {}", formats[static_cast<int>(format)],
@@ -159,7 +159,7 @@ std::string vtsFile(const VtsGrid& grid, const VtsEncoding& encoding, size_t* da
   file += "      </Points>\n    </Piece>\n  </StructuredGrid>\n";
   if (!text.appended().empty()) {
     file += fmt::format("  <AppendedData encoding=\"{}\">\n   _",
-                        encoding.format == Format::appended_raw ? "raw" : "base64");
+                        encoding.format == Format::kAppendedRaw ? "raw" : "base64");
     if (data_begins) *data_begins = file.size();
     file += text.appended() + "\n  </AppendedData>\n";
   }
@@ -167,9 +167,9 @@ std::string vtsFile(const VtsGrid& grid, const VtsEncoding& encoding, size_t* da
 }
 
 std::vector<VtsEncoding> allVtsEncodings() {
-  std::vector<VtsEncoding> encodings = {{Format::ascii}};
-  for (const Format format : {Format::inline_base64, Format::appended_raw, Format::appended_base64})
-    for (const Compressor compressor : {Compressor::none, Compressor::zlib, Compressor::lz4})
+  std::vector<VtsEncoding> encodings = {{Format::kAscii}};
+  for (const Format format : {Format::kInlineBase64, Format::kAppendedRaw, Format::kAppendedBase64})
+    for (const Compressor compressor : {Compressor::kNone, Compressor::kZlib, Compressor::kLz4})
       for (const size_t header_bytes : {4, 8})
         for (const bool big_endian : {false, true})
           encodings.push_back({format, compressor, header_bytes, big_endian,

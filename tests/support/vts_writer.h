@@ -10,16 +10,16 @@
 namespace curvisplat {
 
 struct VtsEncoding {
-  enum class Format { ascii, inline_base64, appended_raw, appended_base64 };
-  enum class Compressor { none, zlib, lz4 };
+  enum class Format { kAscii, kInlineBase64, kAppendedRaw, kAppendedBase64 };
+  enum class Compressor { kNone, kZlib, kLz4 };
 
-  Format format = Format::appended_raw;
-  Compressor compressor = Compressor::none;
+  Format format = Format::kAppendedRaw;
+  Compressor compressor = Compressor::kNone;
   size_t header_bytes = 4;  // or 8
   bool big_endian = false;
   size_t block_bytes = 1 << 15;  // of compressed blocks
 
-  std::string inWords() const;
+  std::string describe() const;
 };
 
 struct VtsArray {

@@ -57,12 +57,12 @@ class ThroughputOfACache : public testing::Test {
     const auto orbit = [this](unsigned frames) {
       const Manifest& manifest = cache_->manifest();
       const Camera first =
-          Camera::named("iso", manifest.lower, manifest.upper, {60, 60}, Projection::orthographic);
+          Camera::named("iso", manifest.lower, manifest.upper, {60, 60}, Projection::kOrthographic);
       std::vector<Camera> cameras;
       for (unsigned n = 0; n < frames; ++n) cameras.push_back(orbited(first, 360.0 * n / frames));
       return cameras;
     };
-    return {*cache_, 0, *function_, options, Backend::cpu, orbit};
+    return {*cache_, 0, *function_, options, Backend::kCpu, orbit};
   }
 
   const TemporaryFolder folder_;

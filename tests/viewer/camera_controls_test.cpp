@@ -38,7 +38,7 @@ class CameraControls : public testing::TestWithParam<Projection> {
   const Camera camera_ = cameraOf(GetParam());
 };
 INSTANTIATE_TEST_SUITE_P(, CameraControls,
-                         testing::Values(Projection::orthographic, Projection::perspective));
+                         testing::Values(Projection::kOrthographic, Projection::kPerspective));
 
 TEST_P(CameraControls, APointAtTheFocalDepthFollowsThePan) {
   const Camera after = panned(camera_, {31, -17}, kSize);
@@ -100,7 +100,7 @@ TEST_P(CameraControls, FlyingMovesAlongTheView) {
 }
 
 TEST(CameraLooking, TurnsOnTheSpotByTheViewAngle) {
-  const Camera camera = cameraOf(Projection::perspective);
+  const Camera camera = cameraOf(Projection::kPerspective);
   const Camera after = looking(camera, {0, static_cast<double>(kSize.height)}, kSize);
   expectNear(after.position, camera.position);
   const double cosine = glm::dot(glm::normalize(after.focal_point - after.position),

@@ -62,7 +62,7 @@ TEST_P(ClosingTest, LeavesNoThreadAndNoFile) {
     std::condition_variable woken;
     int wakes = 0;
     {
-      FrameLoop loop(cache, Backend::cpu, [&] {
+      FrameLoop loop(cache, Backend::kCpu, [&] {
         const std::lock_guard lock(mutex);
         ++wakes;
         woken.notify_all();
@@ -73,7 +73,7 @@ TEST_P(ClosingTest, LeavesNoThreadAndNoFile) {
       if (pictures > 0) {
         const std::multiset<std::string> names = threadNames();
         for (const char* name : {"frames", "pager", "prepare"}) EXPECT_TRUE(names.contains(name)) << name;
-        EXPECT_EQ(names.contains("read"), GetParam() == PagerOptions::Way::threads);
+        EXPECT_EQ(names.contains("read"), GetParam() == PagerOptions::Way::kThreads);
       }
     }
     // One that was waited for may be seen for a moment more.
@@ -83,7 +83,7 @@ TEST_P(ClosingTest, LeavesNoThreadAndNoFile) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Ways, ClosingTest,
-                         testing::Values(PagerOptions::Way::automatic, PagerOptions::Way::threads));
+                         testing::Values(PagerOptions::Way::kAutomatic, PagerOptions::Way::kThreads));
 
 }  // namespace
 }  // namespace curvisplat

@@ -65,20 +65,20 @@ class FrameLoopTest : public testing::Test {
 std::unique_ptr<TemporaryFolder> FrameLoopTest::folder_;
 
 TEST_F(FrameLoopTest, RefinesToThePictureThatRenderDraws) {
-  FrameLoop loop(cache_, Backend::cpu, waker());
+  FrameLoop loop(cache_, Backend::kCpu, waker());
   const FrameRequest request = requestOf();
   const uint64_t number = loop.request(request);
   const std::vector<ShownFrame> frames = all(loop);
   ASSERT_FALSE(frames.empty());
   EXPECT_TRUE(frames.back().is_final);
   EXPECT_EQ(frames.back().request, number);
-  FrameRenderer renderer(cache_, 0, request.function, Backend::cpu);
+  FrameRenderer renderer(cache_, 0, request.function, Backend::kCpu);
   FrameStatistics statistics;
   EXPECT_EQ(frames.back().image.rgba, renderer.render(request.camera, request.options, statistics).rgba);
 }
 
 TEST_F(FrameLoopTest, AMovingPictureIsOneAndCoarse) {
-  FrameLoop loop(cache_, Backend::cpu, waker());
+  FrameLoop loop(cache_, Backend::kCpu, waker());
   FrameRequest request = requestOf();
   request.moving = true;
   loop.request(request);
@@ -90,7 +90,7 @@ TEST_F(FrameLoopTest, AMovingPictureIsOneAndCoarse) {
 }
 
 TEST_F(FrameLoopTest, AMovingPicturesTimeDecidesItsSplatsAndPixels) {
-  FrameLoop loop(cache_, Backend::cpu, waker());
+  FrameLoop loop(cache_, Backend::kCpu, waker());
   FrameRequest request = requestOf();
   request.moving = true;
   const auto lastOf = [&](int pictures, double target_s) {
@@ -111,7 +111,7 @@ TEST_F(FrameLoopTest, AMovingPicturesTimeDecidesItsSplatsAndPixels) {
 }
 
 TEST_F(FrameLoopTest, TheNewestRequestCounts) {
-  FrameLoop loop(cache_, Backend::cpu, waker());
+  FrameLoop loop(cache_, Backend::kCpu, waker());
   uint64_t newest = 0;
   for (int n = 0; n < 50; ++n) newest = loop.request(requestOf(1 + 0.01 * n));
   const std::vector<ShownFrame> frames = all(loop);
@@ -121,7 +121,7 @@ TEST_F(FrameLoopTest, TheNewestRequestCounts) {
 }
 
 TEST_F(FrameLoopTest, AnotherFunctionChangesThePicture) {
-  FrameLoop loop(cache_, Backend::cpu, waker());
+  FrameLoop loop(cache_, Backend::kCpu, waker());
   FrameRequest request = requestOf();
   loop.request(request);
   const Image viridis = all(loop).back().image;
@@ -133,13 +133,13 @@ TEST_F(FrameLoopTest, AnotherFunctionChangesThePicture) {
   // It shows in the first picture already.
   EXPECT_GT(compareImages(frames.front().image, inferno).psnr_db,
             compareImages(frames.front().image, viridis).psnr_db + 5);
-  FrameRenderer renderer(cache_, 0, request.function, Backend::cpu);
+  FrameRenderer renderer(cache_, 0, request.function, Backend::kCpu);
   FrameStatistics statistics;
   EXPECT_EQ(inferno.rgba, renderer.render(request.camera, request.options, statistics).rgba);
 }
 
 TEST_F(FrameLoopTest, TooLittleMemoryEndsTheRequestOnly) {
-  FrameLoop loop(cache_, Backend::cpu, waker());
+  FrameLoop loop(cache_, Backend::kCpu, waker());
   FrameRequest request = requestOf();
   request.options.memory_bytes = 1 << 20;
   loop.request(request);
@@ -154,7 +154,7 @@ TEST_F(FrameLoopTest, ADamagedCacheEndsTheLoop) {
   std::filesystem::copy(*folder_ / "scene.splats", copy);
   const CacheReader reader(copy);
   std::filesystem::resize_file(copy / "geometry.bin", 100);
-  FrameLoop loop(reader, Backend::cpu, waker());
+  FrameLoop loop(reader, Backend::kCpu, waker());
   loop.request(requestOf());
   EXPECT_THROW(all(loop), Error);
   EXPECT_FALSE(loop.busy());
@@ -163,7 +163,7 @@ TEST_F(FrameLoopTest, ADamagedCacheEndsTheLoop) {
 
 TEST_F(FrameLoopTest, EndsInTheMiddleOfAPicture) {
   for (int n = 0; n < 20; ++n) {
-    FrameLoop loop(cache_, Backend::cpu, waker());
+    FrameLoop loop(cache_, Backend::kCpu, waker());
     loop.request(requestOf());
     if (n % 2) wait();
   }

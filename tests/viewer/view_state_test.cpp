@@ -27,7 +27,7 @@ ViewState changedState() {
   state.clip_box = WorldBox{{0, -0.5, 0.25}, {1, 1, 1}};
   state.dark = true;
   state.annotations.axes = false;
-  state.classification = Classification::flat;
+  state.classification = Classification::kFlat;
   return state;
 }
 

@@ -8,7 +8,7 @@
 #include "preprocess/addition/add_scalar.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
-#include "stream/base/say.h"
+#include "stream/base/message.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
@@ -16,7 +16,7 @@
 namespace curvisplat {
 namespace {
 
-void checkWords(const ConvertWords& words) {
+void checkWords(const ConvertArguments& words) {
   if (words.to.empty()) throw UsageError("--add-scalar: name the cache with --to");
   if (words.added_scalars.empty()) throw UsageError("--to: name scalars with --add-scalar");
   const auto refuse = [](bool given, const char* option) {
@@ -29,7 +29,7 @@ void checkWords(const ConvertWords& words) {
   refuse(words.resume, "--resume");
 }
 
-void printSummary(const ConvertWords& words, const AddScalarReport& report, double seconds,
+void printSummary(const ConvertArguments& words, const AddScalarReport& report, double seconds,
                   uint64_t peak_memory_bytes) {
   const auto nodes = static_cast<double>(report.nodes);
   std::string names;
@@ -49,7 +49,7 @@ nlohmann::json statistics(const AddScalarReport& report, const Progress& progres
 
 }  // namespace
 
-void runAddScalar(ConvertWords words) {
+void runAddScalar(ConvertArguments words) {
   checkWords(words);
   if (!words.to.has_filename()) words.to = words.to.parent_path();  // "NAME.splats/"
   AddScalarOptions options;
@@ -62,8 +62,9 @@ void runAddScalar(ConvertWords words) {
   const StopOnSignals stopping(progress);
   const AddScalarReport report = addScalars(*source, options, progress);
   const nlohmann::json numbers = statistics(report, progress);
-  for (const std::string& warning : source->description().warnings) say("warning: {}", warning);
-  if (const auto note = timeStepNote(source->description(), words.grid.time_step)) say("note: {}", *note);
+  for (const std::string& warning : source->description().warnings) printMessage("warning: {}", warning);
+  if (const auto note = timeStepNote(source->description(), words.grid.time_step))
+    printMessage("note: {}", *note);
   printSummary(words, report, secondsOf(progress), numbers["peak_memory_bytes"]);
   if (!words.statistics.empty()) writeStatistics(words.statistics, numbers);
 }

@@ -1,11 +1,11 @@
 // `curvisplat convert GRID SOLUTION --add-scalar NAME --to CACHE`.
 #pragma once
 
-#include "tools/options/convert_words.h"
+#include "tools/options/convert_arguments.h"
 
 namespace curvisplat {
 
 /// Throws UsageError where the words do not go together.
-void runAddScalar(ConvertWords words);
+void runAddScalar(ConvertArguments words);
 
 }  // namespace curvisplat

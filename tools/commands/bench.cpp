@@ -21,7 +21,7 @@
 #include "tools/commands/commands.h"
 #include "tools/options/camera_motion.h"
 #include "tools/options/option_parsers.h"
-#include "tools/options/scalar_words.h"
+#include "tools/options/scalar_arguments.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
@@ -42,12 +42,12 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr int kSchema = 1;  // of the JSON; bench/compare.py reads it
-constexpr uint64_t kLeastNodes = 1000;
+constexpr uint64_t kMinNodes = 1000;
 
 /// The command line's words, as given.
 struct BenchWords {
   fs::path cache, json, plots, temporary_folder;
-  ScalarWords scalar;
+  ScalarArguments scalar;
   CameraWords camera;
   std::string size = "600x600", lod_pixels = "1,2,4", backend = "auto";
   std::optional<std::string> nodes, memory;
@@ -137,8 +137,8 @@ std::vector<double> parseErrors(const std::string& text) {
 
 /// The measurement of drawing that frames of this back end depend on, and whether a card draws them.
 std::pair<std::string, bool> drawingOf(Backend backend, bool card_draws, unsigned threads) {
-  if (backend == Backend::osmesa) return {"stages/draw/osmesa", false};
-  if (backend == Backend::egl || (backend == Backend::automatic && card_draws))
+  if (backend == Backend::kOsmesa) return {"stages/draw/osmesa", false};
+  if (backend == Backend::kEgl || (backend == Backend::kAutomatic && card_draws))
     return {"stages/draw/egl", card_draws};
   return {stageName("draw/cpu", threads), false};
 }
@@ -234,8 +234,7 @@ void benchConversion(const BenchWords& words) {
     effort.most_runs = 1;
   }
   if (words.nodes) effort.nodes = parseCount("--nodes", *words.nodes);
-  if (effort.nodes < kLeastNodes)
-    throw UsageError("--nodes {}: expected {} or more", *words.nodes, kLeastNodes);
+  if (effort.nodes < kMinNodes) throw UsageError("--nodes {}: expected {} or more", *words.nodes, kMinNodes);
   if (words.memory) effort.memory_bytes = parseMemory("--memory", *words.memory);
   effort.threads = words.threads;
   effort.temporary_folder =

@@ -13,11 +13,11 @@
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
+#include "stream/base/message.h"
 #include "stream/base/progress.h"
-#include "stream/base/say.h"
 #include "tools/commands/add_scalar.h"
 #include "tools/commands/commands.h"
-#include "tools/options/convert_words.h"
+#include "tools/options/convert_arguments.h"
 #include "tools/options/grid_options.h"
 #include "tools/options/option_parsers.h"
 #include "tools/output/output_paths.h"
@@ -28,11 +28,11 @@
 namespace curvisplat {
 namespace {
 
-void printSummary(const ConvertWords& words, const ConvertReport& report, double seconds,
+void printSummary(const ConvertArguments& words, const ConvertReport& report, double seconds,
                   uint64_t peak_memory_bytes) {
   const auto nodes = static_cast<double>(report.nodes);
   const uint64_t bytes = totalBytes(report.files);
-  const bool cells = report.centring == Centring::cell;
+  const bool cells = report.centring == Centring::kCell;
   fmt::print("{}: {} {}, {} splats in {} bricks, {} levels\n", words.output.string(), report.nodes,
              cells ? "cells" : "nodes", report.splats, report.bricks, report.levels);
   // Of a resumed conversion, another has done a part.
@@ -47,14 +47,15 @@ void printSummary(const ConvertWords& words, const ConvertReport& report, double
 /// What a person should know of the grid, on stderr: it is odd, not wrong.
 void printWarnings(const GridDescription& description, std::optional<uint32_t> time_step,
                    const ConvertReport& report) {
-  for (const std::string& warning : description.warnings) say("warning: {}", warning);
-  for (const std::string& warning : report.warnings) say("warning: {}", warning);
-  if (const auto note = timeStepNote(description, time_step)) say("note: {}", *note);
+  for (const std::string& warning : description.warnings) printMessage("warning: {}", warning);
+  for (const std::string& warning : report.warnings) printMessage("warning: {}", warning);
+  if (const auto note = timeStepNote(description, time_step)) printMessage("note: {}", *note);
   const auto note = [](uint64_t count, const char* what) {
-    if (count > 0) say("note: {} {}", count, what);
+    if (count > 0) printMessage("note: {} {}", count, what);
   };
-  if (report.resumed) say("note: resumed with {} of {} bricks done", report.resumed_bricks, report.bricks);
-  if (report.centring == Centring::cell) {
+  if (report.resumed)
+    printMessage("note: resumed with {} of {} bricks done", report.resumed_bricks, report.bricks);
+  if (report.centring == Centring::kCell) {
     note(report.blanked.by_grid, "cells have a blanked corner or no value");
     note(report.blanked.by_value, "cells have the blank value");
     note(report.blanked.not_finite, "cells have an infinite value, and are blanked");
@@ -76,7 +77,7 @@ nlohmann::json statistics(const ConvertReport& report, const Progress& progress)
   nlohmann::json json = commonStatistics(report, progress);
   json["resumed"] = report.resumed;
   json["resumed_bricks"] = report.resumed_bricks;
-  json[report.centring == Centring::cell ? "cells" : "nodes"] = report.nodes;
+  json[report.centring == Centring::kCell ? "cells" : "nodes"] = report.nodes;
   json["blanked"] = {{"by_grid", report.blanked.by_grid},
                      {"by_value", report.blanked.by_value},
                      {"not_finite", report.blanked.not_finite}};
@@ -90,7 +91,7 @@ nlohmann::json statistics(const ConvertReport& report, const Progress& progress)
   return json;
 }
 
-void runConvert(ConvertWords words) {
+void runConvert(ConvertArguments words) {
   if (words.output.empty()) throw UsageError("--output is required, or --add-scalar and --to");
   if (!words.output.has_filename()) words.output = words.output.parent_path();  // "NAME.splats/"
   checkOutputFolder("-o", words.output);
@@ -116,7 +117,7 @@ void runConvert(ConvertWords words) {
 }  // namespace
 
 void addConvert(CLI::App& app) {
-  auto words = std::make_shared<ConvertWords>();
+  auto words = std::make_shared<ConvertArguments>();
   CLI::App* command = app.add_subcommand("convert", "Make a splat cache of a grid, in bounded memory");
   command->add_option("GRID", words->grid.grid, "Grid file")->required();
   command->add_option("SOLUTION", words->grid.solutions, "Solution (Q) and function files");
@@ -137,7 +138,7 @@ void addConvert(CLI::App& app) {
   command->add_option("--memory", words->memory,
                       "Cap on this process's memory, as 512M (default: 2G or a quarter of the machine's)");
   command->add_option("--threads", words->threads, "Threads that work (default: all)")
-      ->check(CLI::Range(0u, kMostThreads));
+      ->check(CLI::Range(0u, kMaxThreads));
   command->add_option("--tmp", words->temporary_folder, "Folder for temporary files (default: the output's)");
   command->add_flag("--resume", words->resume,
                     "Go on from an interrupted conversion, if there is one; keep what is done on errors");

@@ -84,7 +84,7 @@ bool visibleBox(const RenderedScene& scene, glm::dvec3& lower, glm::dvec3& upper
 double diagonalPixels(const RenderedScene& scene, const glm::dvec3& lower, const glm::dvec3& upper) {
   const Camera& camera = scene.camera;
   const double distance = glm::length(0.5 * (lower + upper) - camera.position);
-  const double half_height = camera.projection == Projection::perspective
+  const double half_height = camera.projection == Projection::kPerspective
                                  ? distance * std::tan(camera.view_angle_deg * std::numbers::pi / 360)
                                  : camera.parallel_scale;
   return glm::length(upper - lower) / (2 * half_height) * scene.options.size.height;
@@ -101,7 +101,7 @@ bool outOfView(const RenderedScene& scene, const glm::dvec3& lower, const glm::d
     const glm::dvec4 world(n & 1 ? upper.x : lower.x, n & 2 ? upper.y : lower.y, n & 4 ? upper.z : lower.z,
                            1);
     const glm::dvec4 view = view_from_world * world;
-    const bool perspective = camera.projection == Projection::perspective;
+    const bool perspective = camera.projection == Projection::kPerspective;
     const double half_height = perspective ? -view.z * slope : camera.parallel_scale;
     beyond[0] += view.x < -half_height * aspect;
     beyond[1] += view.x > half_height * aspect;
@@ -115,9 +115,9 @@ bool outOfView(const RenderedScene& scene, const glm::dvec3& lower, const glm::d
 }  // namespace
 
 bool isEmpty(const Image& image, const glm::vec4& background) {
-  constexpr float kLeastSeen = 1.0f / 512;  // half a step of a screen
+  constexpr float kMinSeen = 1.0f / 512;  // half a step of a screen
   for (size_t n = 0; n < image.rgba.size(); ++n)
-    if (!(std::abs(image.rgba[n] - background[static_cast<int>(n % 4)]) < kLeastSeen)) return false;
+    if (!(std::abs(image.rgba[n] - background[static_cast<int>(n % 4)]) < kMinSeen)) return false;
   return true;
 }
 
@@ -141,7 +141,7 @@ std::vector<std::string> whyEmpty(const RenderedScene& scene) {
       reasons.push_back(fmt::format(
           "what there is to see of the data is {:.2g} pixels large; bring the camera nearer, or give a "
           "smaller {}",
-          pixels, scene.camera.projection == Projection::perspective ? "--view-angle" : "--parallel-scale"));
+          pixels, scene.camera.projection == Projection::kPerspective ? "--view-angle" : "--parallel-scale"));
     const double thickest = largest * glm::length(upper - lower);
     if (thickest > 0 && thickest < 0.01)
       reasons.push_back(fmt::format(

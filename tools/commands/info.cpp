@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "stream/base/error.h"
+#include "stream/base/message.h"
 #include "stream/base/progress.h"
-#include "stream/base/say.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_verify.h"
 #include "stream/cache/partial_folder.h"
@@ -184,7 +184,7 @@ void printCacheInfo(const InfoOptions& options) {
   else
     printAsText(reader, options, asked);
   if (hasUnfinished(options.grid.grid))
-    say("note: a conversion that is to replace this cache is under way, or was interrupted");
+    printMessage("note: a conversion that is to replace this cache is under way, or was interrupted");
   if (!asked.verification.findings.empty())
     throw Error("{}: {} findings; the cache is damaged: convert again", options.grid.grid.string(),
                 asked.verification.findings.size());

@@ -46,7 +46,8 @@ GridInfo inspect(const GridSource& source) {
   progress.begin("reading", 2 * info.nodes, "nodes");
   info.statistics = measureGrid(source, info.stored, kSlabBytes, progress);
   info.overlaps = findOverlaps(source, kSlabBytes, progress);
-  info.splats_are_cells = !info.stored.empty() && info.scalar(info.stored.front()).centring == Centring::cell;
+  info.splats_are_cells =
+      !info.stored.empty() && info.scalar(info.stored.front()).centring == Centring::kCell;
   info.splats =
       info.splats_are_cells ? info.statistics.cells() : info.nodes - info.statistics.blank().total();
   info.threads = static_cast<unsigned>(tbb::info::default_concurrency());
@@ -93,7 +94,7 @@ nlohmann::ordered_json scalarsAsJson(const GridInfo& info) {
     if (of.number > 0) scalar["number"] = of.number;
     if (of.function > 0) scalar["function"] = of.function;
     if (!of.unit.empty()) scalar["unit"] = of.unit;
-    scalar["centring"] = of.centring == Centring::cell ? "cell" : "node";
+    scalar["centring"] = of.centring == Centring::kCell ? "cell" : "node";
     scalars.push_back(std::move(scalar));
   }
   return scalars;
@@ -167,7 +168,7 @@ void printScalars(const GridInfo& info) {
     const ScalarRange& range = info.statistics.scalars[s];
     fmt::print("scalar    {}{}{}{}: {}\n", scalar.name, named ? fmt::format(" ({})", number) : "",
                scalar.unit.empty() ? "" : fmt::format(" [{}]", scalar.unit),
-               scalar.centring == Centring::cell ? ", in cells" : "",
+               scalar.centring == Centring::kCell ? ", in cells" : "",
                isEmpty(range) ? "no value" : fmt::format("{:.6g} .. {:.6g}", range.min, range.max));
   }
   std::string names;

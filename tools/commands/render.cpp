@@ -19,16 +19,16 @@
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/error.h"
+#include "stream/base/message.h"
 #include "stream/base/paths.h"
 #include "stream/base/progress.h"
-#include "stream/base/say.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/empty_picture.h"
 #include "tools/commands/render_statistics.h"
 #include "tools/options/camera_motion.h"
 #include "tools/options/option_parsers.h"
-#include "tools/options/scalar_words.h"
+#include "tools/options/scalar_arguments.h"
 #include "tools/output/frame_output.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
@@ -41,7 +41,7 @@ namespace {
 struct RenderWords {
   std::filesystem::path cache, output, first_image, statistics;
   CameraWords camera;
-  ScalarWords scalar;
+  ScalarArguments scalar;
   std::string size = "600x600", background = "white";
   std::string classify = "pixel", scale = "1,1,1", backend = "auto", memory = "512M";
   std::string lod_pixels = "1";
@@ -61,7 +61,7 @@ WorldBox parseClipBox(const std::string& text) {
   return box;
 }
 
-constexpr double kLeastScale = 1e-6, kMostScale = 1e6;
+constexpr double kMinScale = 1e-6, kMaxScale = 1e6;
 
 FrameOptions frameOptions(const RenderWords& words) {
   FrameOptions options;
@@ -72,12 +72,12 @@ FrameOptions frameOptions(const RenderWords& words) {
   if (words.max_splats) options.max_splats = parseCount("--max-splats", *words.max_splats);
   if (words.classify != "pixel" && words.classify != "flat")
     throw UsageError("--classify {}: expected pixel or flat", words.classify);
-  options.classification = words.classify == "pixel" ? Classification::pixel : Classification::flat;
+  options.classification = words.classify == "pixel" ? Classification::kPixel : Classification::kFlat;
   options.scale = parsePoint("--scale", words.scale);
   for (int axis = 0; axis < 3; ++axis)
-    if (!(options.scale[axis] >= kLeastScale && options.scale[axis] <= kMostScale))
-      throw UsageError("--scale {}: expected three numbers between {:g} and {:g}", words.scale, kLeastScale,
-                       kMostScale);
+    if (!(options.scale[axis] >= kMinScale && options.scale[axis] <= kMaxScale))
+      throw UsageError("--scale {}: expected three numbers between {:g} and {:g}", words.scale, kMinScale,
+                       kMaxScale);
   if (words.clip_box) options.clip_box = parseClipBox(*words.clip_box);
   options.background = parseBackground("--background", words.background);
   options.threads = words.threads;
@@ -117,7 +117,7 @@ void checkWords(const RenderWords& words, ImageSize size) {
 }
 
 void tell(const char* kind, const std::string& text) {
-  say("{}: {}", kind, text);
+  printMessage("{}: {}", kind, text);
 }
 
 /// What a picture takes in memory on the way to its file.
@@ -352,7 +352,7 @@ void addRender(CLI::App& app) {
                    "Key frames to move through, FILE.json; render/README.md describes it")
       ->group(where);
   command->add_option("--frames", camera->frames, "How many pictures of --orbit or --path")
-      ->check(CLI::Range(1u, kMostFrames))
+      ->check(CLI::Range(1u, kMaxFrames))
       ->group(where);
   command->add_option("--frame-rate", words->frame_rate, "Frames a second of a movie; 25 otherwise")
       ->group(where);
@@ -365,7 +365,7 @@ void addRender(CLI::App& app) {
       ->capture_default_str()
       ->group(how);
   command->add_option("--threads", words->threads, "Workers; 0: one a core")
-      ->check(CLI::Range(0u, kMostThreads))
+      ->check(CLI::Range(0u, kMaxThreads))
       ->capture_default_str()
       ->group(how);
   command

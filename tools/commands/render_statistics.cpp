@@ -68,7 +68,7 @@ Json toJson(const Camera& camera) {
   Json json{{"position", toJson(camera.position)},
             {"focal_point", toJson(camera.focal_point)},
             {"view_up", toJson(camera.view_up)}};
-  if (camera.projection == Projection::orthographic) {
+  if (camera.projection == Projection::kOrthographic) {
     json["projection"] = "orthographic";
     json["parallel_scale"] = camera.parallel_scale;
   } else {
@@ -134,7 +134,7 @@ nlohmann::json statisticsOf(const RenderReport& report) {
   json["lod_pixels"] = options.lod_pixels;
   json["max_splats"] = nullptr;
   if (options.max_splats) json["max_splats"] = *options.max_splats;
-  json["classify"] = options.classification == Classification::pixel ? "pixel" : "flat";
+  json["classify"] = options.classification == Classification::kPixel ? "pixel" : "flat";
   json["scale"] = toJson(options.scale);
   json["clip_box"] = nullptr;
   if (options.clip_box)

@@ -13,7 +13,7 @@ namespace {
 
 Camera placedCamera(const CameraWords& words, const glm::dvec3& lower, const glm::dvec3& upper,
                     ImageSize size) {
-  const auto projection = words.view_angle ? Projection::perspective : Projection::orthographic;
+  const auto projection = words.view_angle ? Projection::kPerspective : Projection::kOrthographic;
   const double angle = words.view_angle ? parsePositive("--view-angle", *words.view_angle) : 30;
   if (angle >= 180) throw UsageError("--view-angle {}: expected less than 180 degrees", *words.view_angle);
 
@@ -75,7 +75,7 @@ CameraMotion chooseCameraMotion(const CameraWords& words, const glm::dvec3& lowe
   const auto turn = [=](uint64_t frame) {
     return degrees * static_cast<double>(frame) / static_cast<double>(frames);
   };
-  if (!words.parallel_scale && first.projection == Projection::orthographic)
+  if (!words.parallel_scale && first.projection == Projection::kOrthographic)
     for (uint64_t frame = 0; frame < frames; ++frame)  // all of the data in every frame, and no zooming
       first.parallel_scale =
           std::max(first.parallel_scale, orbited(first, turn(frame)).parallelScaleFor(lower, upper, size));

@@ -12,7 +12,7 @@
 
 namespace curvisplat {
 
-inline constexpr unsigned kMostFrames = 100'000;  // of --frames
+inline constexpr unsigned kMaxFrames = 100'000;  // of --frames
 
 /// The command line's words, as given.
 struct CameraWords {

@@ -30,7 +30,7 @@ void addGlobeOptions(CLI::App& app, GlobeOptions& globe) {
   CLI::Option* const sphere =
       app.add_flag("--sphere{6371}", sphere_help)
           ->each([&globe](const std::string& radius) {
-            globe.shape = GlobeOptions::Shape::sphere;
+            globe.shape = GlobeOptions::Shape::kSphere;
             const char* const end = radius.data() + radius.size();
             const auto [parsed, error] = std::from_chars(radius.data(), end, globe.radius_km);
             if (error != std::errc{} || parsed != end || !(globe.radius_km > 0) ||
@@ -39,7 +39,7 @@ void addGlobeOptions(CLI::App& app, GlobeOptions& globe) {
           })
           ->group(kGlobeGroup);
   app.add_flag_callback(
-         "--flat", [&globe] { globe.shape = GlobeOptions::Shape::flat; },
+         "--flat", [&globe] { globe.shape = GlobeOptions::Shape::kFlat; },
          "They are a flat map's, of equal kilometres a degree")
       ->group(kGlobeGroup)
       ->excludes(sphere);
@@ -56,10 +56,10 @@ void addGridOptions(CLI::App& app, OpenGridOptions& options) {
   addGlobeOptions(app, options.globe);
   Plot3dForce& force = options.force;
   addWords<ByteOrder>(app, "--byte-order", "Byte order",
-                      {{"little", ByteOrder::little}, {"big", ByteOrder::big}}, force.byte_order);
+                      {{"little", ByteOrder::kLittle}, {"big", ByteOrder::kBig}}, force.byte_order);
   addWords<RecordMarkers>(
       app, "--records", "Bytes of Fortran's record markers; none: a C file",
-      {{"none", RecordMarkers::none}, {"4", RecordMarkers::bytes4}, {"8", RecordMarkers::bytes8}},
+      {{"none", RecordMarkers::kNone}, {"4", RecordMarkers::kBytes4}, {"8", RecordMarkers::kBytes8}},
       force.records);
   addWords<int>(app, "--precision", "Precision of the numbers", {{"single", 4}, {"double", 8}},
                 force.precision_bytes);

@@ -138,10 +138,10 @@ glm::vec4 parseBackground(std::string_view option, std::string_view text) {
 }
 
 Backend parseBackend(std::string_view text) {
-  if (text == "auto") return Backend::automatic;
-  if (text == "osmesa") return Backend::osmesa;
-  if (text == "egl") return Backend::egl;
-  if (text == "cpu") return Backend::cpu;
+  if (text == "auto") return Backend::kAutomatic;
+  if (text == "osmesa") return Backend::kOsmesa;
+  if (text == "egl") return Backend::kEgl;
+  if (text == "cpu") return Backend::kCpu;
   throw UsageError("--backend {}: expected auto, osmesa, egl or cpu", text);
 }
 

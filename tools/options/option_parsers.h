@@ -14,7 +14,7 @@
 
 namespace curvisplat {
 
-inline constexpr unsigned kMostThreads = 1024;  // of --threads
+inline constexpr unsigned kMaxThreads = 1024;  // of --threads
 
 /// One finite number.
 double parseNumber(std::string_view option, std::string_view text);

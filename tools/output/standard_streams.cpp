@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <cstring>
 
-#include "stream/base/say.h"
+#include "stream/base/message.h"
 
 namespace curvisplat {
 
@@ -21,7 +21,8 @@ bool finishStandardOutput() {
   // A write that failed before has left its mark, but not its reason.
   const bool failed = std::ferror(stdout) != 0;
   if (std::fflush(stdout) == 0 && !failed) return true;
-  say("standard output cannot be written{}{}", failed ? "" : ": ", failed ? "" : std::strerror(errno));
+  printMessage("standard output cannot be written{}{}", failed ? "" : ": ",
+               failed ? "" : std::strerror(errno));
   return false;
 }
 

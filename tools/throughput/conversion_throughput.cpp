@@ -26,7 +26,7 @@ using Json = nlohmann::ordered_json;
 
 // bench/README.md: 16 of the grid, 61 of scattered splats, up to 13 of a cache. And what small grids take
 // more.
-constexpr uint64_t kDiskBytesANode = 96, kLeastDiskBytes = 16 << 20;
+constexpr uint64_t kDiskBytesANode = 96, kMinDiskBytes = 16 << 20;
 
 /// Removed with all in it.
 class WorkFolder {
@@ -126,7 +126,7 @@ SceneGridSize sizeOfGrid(uint64_t nodes) {
 }
 
 uint64_t diskBytesFor(uint64_t nodes) {
-  return nodes * kDiskBytesANode + kLeastDiskBytes;
+  return nodes * kDiskBytesANode + kMinDiskBytes;
 }
 
 ConversionReport measureConversion(const ConversionEffort& effort, Measurements& to, Progress& progress) {

@@ -24,24 +24,24 @@ using Clock = std::chrono::steady_clock;
 using Way = DiskRun::Way;
 
 constexpr uint64_t kLargestBlock = kDiskBlocks.back();
-constexpr Way kWays[] = {Way::direct, Way::direct_pread, Way::buffered_cold, Way::buffered_warm};
+constexpr Way kWays[] = {Way::kDirect, Way::kDirectPread, Way::kBufferedCold, Way::kBufferedWarm};
 
 const char* nameOf(Way way) {
   switch (way) {
-    case Way::direct:
+    case Way::kDirect:
       return "direct";
-    case Way::direct_pread:
+    case Way::kDirectPread:
       return "direct-pread";
-    case Way::buffered_cold:
+    case Way::kBufferedCold:
       return "buffered-cold";
-    case Way::buffered_warm:
+    case Way::kBufferedWarm:
       break;
   }
   return "buffered-warm";
 }
 
 bool isDirect(Way way) {
-  return way == Way::direct || way == Way::direct_pread;
+  return way == Way::kDirect || way == Way::kDirectPread;
 }
 
 /// The part of a file that is read from.
@@ -154,8 +154,8 @@ class CacheFiles {
 
 /// Nothing if the files are now as `way` wants them, else why not.
 std::optional<std::string> prepareFiles(const CacheFiles& files, Way way) {
-  if (way == Way::buffered_cold) return dropPages(files.paths());
-  if (way == Way::buffered_warm) return files.makeWarm();
+  if (way == Way::kBufferedCold) return dropPages(files.paths());
+  if (way == Way::kBufferedWarm) return files.makeWarm();
   const std::string file_system = fileSystemOf(files.paths()[0]);
   if (isInMemory(file_system)) return fmt::format("{} has no disk", file_system);
   if (!files.areDirect()) return fmt::format("the file system ({}) refuses direct reads", file_system);
@@ -163,7 +163,7 @@ std::optional<std::string> prepareFiles(const CacheFiles& files, Way way) {
 }
 
 void measure(const DiskRun& run, const CacheFiles& files, const DiskEffort& effort, Measurements& to) {
-  auto reads = run.way == Way::direct_pread ? nullptr : makeUringReads(run.depth);
+  auto reads = run.way == Way::kDirectPread ? nullptr : makeUringReads(run.depth);
   if (!reads) reads = makeThreadReads(run.depth);
   const Buffer buffer(static_cast<std::byte*>(std::aligned_alloc(kPageBytes, run.depth * run.block_bytes)));
   const std::vector<Block> blocks = blocksOf(files.windows(), run.block_bytes);

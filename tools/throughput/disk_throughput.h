@@ -27,9 +27,9 @@ struct DiskEffort {
 };
 
 struct DiskRun {
-  enum class Way { direct, direct_pread, buffered_cold, buffered_warm };
+  enum class Way { kDirect, kDirectPread, kBufferedCold, kBufferedWarm };
 
-  Way way = Way::direct;
+  Way way = Way::kDirect;
   uint64_t block_bytes = 256 << 10;
   unsigned depth = 8;
 

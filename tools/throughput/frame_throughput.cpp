@@ -33,7 +33,7 @@ class Frames {
 
   void measure(const FrameConfiguration& configuration) {
     const Cut cut =
-        planner_.plan(scene_.orbit(1).front(), optionsOf(configuration), DrawingOrder::front_to_back).cut;
+        planner_.plan(scene_.orbit(1).front(), optionsOf(configuration), DrawingOrder::kFrontToBack).cut;
     const double left = effort_.total_s - secondsSince(start_);
     const double expected = 2 * expectedSeconds(configuration, cut.splats);
     if (left <= 0 || expected > left)

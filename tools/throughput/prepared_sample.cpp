@@ -12,7 +12,7 @@ namespace {
 
 void sortInto(DepthSorter& sorter, const std::vector<float>& depths, const std::vector<ScreenSplat>& splats,
               std::vector<ScreenSplat>& sorted) {
-  const auto order = sorter.sort(depths, DrawingOrder::front_to_back);
+  const auto order = sorter.sort(depths, DrawingOrder::kFrontToBack);
   sorted.resize(std::max(sorted.size(), splats.size()));
   for (size_t n = 0; n < order.size(); ++n) sorted[n] = splats[order[n]];
 }

@@ -50,7 +50,7 @@ class Stages {
         to_(to),
         progress_(progress),
         planner_(scene.cache, scene.variable, scene.transfer_function),
-        plan_(planner_.plan(scene.orbit(1).front(), scene.options, DrawingOrder::front_to_back)) {
+        plan_(planner_.plan(scene.orbit(1).front(), scene.options, DrawingOrder::kFrontToBack)) {
     report_.frame_splats = plan_.cut.splats;
   }
 
@@ -173,7 +173,7 @@ class Stages {
     const std::vector<ScreenSplat>& splats = sample.toDraw();
     const std::span<ScreenSplat> memory = backend.splatMemory(splats.size());
     std::vector<uint32_t> segments = sample.segments();
-    if (backend.order() == DrawingOrder::front_to_back) {
+    if (backend.order() == DrawingOrder::kFrontToBack) {
       std::copy(splats.begin(), splats.end(), memory.begin());
     } else {
       std::reverse_copy(splats.begin(), splats.end(), memory.begin());
@@ -196,7 +196,7 @@ class Stages {
   }
 
   static Backend parsedBackend(const std::string& word) {
-    return word == "cpu" ? Backend::cpu : word == "egl" ? Backend::egl : Backend::osmesa;
+    return word == "cpu" ? Backend::kCpu : word == "egl" ? Backend::kEgl : Backend::kOsmesa;
   }
 
   const ThroughputScene& scene_;

@@ -17,10 +17,10 @@ struct DiskWay {
   DiskRun::Way way;
   const char* words;
 };
-constexpr DiskWay kDiskWays[] = {{DiskRun::Way::direct, "direct"},
-                                 {DiskRun::Way::direct_pread, "direct, pread"},
-                                 {DiskRun::Way::buffered_cold, "buffered, cold"},
-                                 {DiskRun::Way::buffered_warm, "buffered, warm"}};
+constexpr DiskWay kDiskWays[] = {{DiskRun::Way::kDirect, "direct"},
+                                 {DiskRun::Way::kDirectPread, "direct, pread"},
+                                 {DiskRun::Way::kBufferedCold, "buffered, cold"},
+                                 {DiskRun::Way::kBufferedWarm, "buffered, warm"}};
 constexpr const char* kWorkerStages[] = {"verify", "decode", "project", "sort", "prepare"};
 constexpr const char* kBackends[] = {"cpu", "osmesa", "egl"};
 
@@ -58,12 +58,12 @@ std::string diskRows(const Measurements& measurements, const std::string& head, 
 
 std::vector<DiskRun> byBlock() {
   std::vector<DiskRun> runs;
-  for (const uint64_t block : kDiskBlocks) runs.push_back({DiskRun::Way::direct, block, kPagerDepth});
+  for (const uint64_t block : kDiskBlocks) runs.push_back({DiskRun::Way::kDirect, block, kPagerDepth});
   return runs;
 }
 std::vector<DiskRun> byDepth() {
   std::vector<DiskRun> runs;
-  for (const unsigned depth : kDiskDepths) runs.push_back({DiskRun::Way::direct, kPagerBlock, depth});
+  for (const unsigned depth : kDiskDepths) runs.push_back({DiskRun::Way::kDirect, kPagerBlock, depth});
   return runs;
 }
 

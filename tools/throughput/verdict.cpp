@@ -12,7 +12,7 @@ namespace curvisplat {
 namespace {
 
 // A gain below this is within the spread of most machines.
-constexpr double kLeastGain = 1.1;
+constexpr double kMinGain = 1.1;
 // Cores are worth their number where they give at least this part of it.
 constexpr double kGoodScaling = 0.7;
 
@@ -21,11 +21,11 @@ struct Stage {
   double seconds;
 };
 
-std::string secondsWords(double seconds) {
+std::string secondsText(double seconds) {
   return seconds < 0.1 ? fmt::format("{:.1f} ms", 1e3 * seconds) : fmt::format("{:.2f} s", seconds);
 }
 
-std::string memoryWords(uint64_t bytes) {
+std::string memoryText(uint64_t bytes) {
   return fmt::format("{}M", bytes >> 20);
 }
 
@@ -71,7 +71,7 @@ class Judge {
     verdict_.share = 1;
     verdict_.lines.push_back(
         fmt::format("{} bounds the frame: alone it takes {} of {}; the cores' work takes {}", stage,
-                    secondsWords(seconds), secondsWords(frame_.seconds), secondsWords(cores_s_)));
+                    secondsText(seconds), secondsText(frame_.seconds), secondsText(cores_s_)));
   }
 
   void boundOnCores() {
@@ -82,9 +82,9 @@ class Judge {
     verdict_.share = cores_s_ > 0 ? sorted.front().seconds / cores_s_ : 0;
     std::vector<std::string> words;
     for (const Stage& stage : sorted)
-      words.push_back(fmt::format("{} {}", stage.name, secondsWords(stage.seconds)));
+      words.push_back(fmt::format("{} {}", stage.name, secondsText(stage.seconds)));
     verdict_.lines.push_back(fmt::format("{} bounds the frame: {:.0f} % of the cores' work in {} (alone: {})",
-                                         verdict_.stage, 100 * verdict_.share, secondsWords(frame_.seconds),
+                                         verdict_.stage, 100 * verdict_.share, secondsText(frame_.seconds),
                                          fmt::join(words, ", ")));
     const double rest = 1 - cores_s_ / frame_.seconds;
     if (rest > 0.15)
@@ -98,7 +98,7 @@ class Judge {
     if (frame_.draws_apart || draw_s_ < cores_s_ / 3) return;
     verdict_.lines.push_back(
         fmt::format("a graphics card would take drawing off the cores: what is left for them takes {}",
-                    secondsWords(cores_s_ - draw_s_)));
+                    secondsText(cores_s_ - draw_s_)));
   }
 
   /// By the frames of one error and memory that differ in their threads. With --threads 1 a worker and the
@@ -132,13 +132,13 @@ class Judge {
           continue;
         const double gain = less.seconds / more.seconds;
         verdict_.lines.push_back(
-            gain >= kLeastGain
+            gain >= kMinGain
                 ? fmt::format("--memory {} would help: --lod-pixels {:g} takes {} in the place of {}",
-                              memoryWords(more.memory_bytes), more.lod_pixels, secondsWords(more.seconds),
-                              secondsWords(less.seconds))
+                              memoryText(more.memory_bytes), more.lod_pixels, secondsText(more.seconds),
+                              secondsText(less.seconds))
                 : fmt::format("more than --memory {} would not help: {} takes {} in the place of {}",
-                              memoryWords(less.memory_bytes), memoryWords(more.memory_bytes),
-                              secondsWords(more.seconds), secondsWords(less.seconds)));
+                              memoryText(less.memory_bytes), memoryText(more.memory_bytes),
+                              secondsText(more.seconds), secondsText(less.seconds)));
         return;
       }
   }
@@ -149,10 +149,10 @@ class Judge {
           other.memory_bytes != frame_.memory_bytes || other.splats_prepared == 0)
         continue;
       const double gain = frame_.seconds / other.seconds;
-      if (gain < kLeastGain) continue;
+      if (gain < kMinGain) continue;
       verdict_.lines.push_back(fmt::format(
           "--lod-pixels {:g} takes {}, {:.1f} times as fast ({:.1f}x fewer splats)", other.lod_pixels,
-          secondsWords(other.seconds), gain,
+          secondsText(other.seconds), gain,
           static_cast<double>(frame_.splats_prepared) / static_cast<double>(other.splats_prepared)));
     }
   }

@@ -34,7 +34,7 @@ double halfAngleTangent(const Camera& camera) {
 }  // namespace
 
 double unitsPerPixel(const Camera& camera, ImageSize size) {
-  const double half_height = camera.projection == Projection::orthographic
+  const double half_height = camera.projection == Projection::kOrthographic
                                  ? camera.parallel_scale
                                  : distanceOf(camera) * halfAngleTangent(camera);
   return 2 * half_height / size.height;
@@ -64,7 +64,7 @@ Camera panned(const Camera& camera, const glm::dvec2& movement, ImageSize size) 
 
 Camera zoomed(const Camera& camera, double factor) {
   Camera result = camera;
-  if (camera.projection == Projection::orthographic)
+  if (camera.projection == Projection::kOrthographic)
     result.parallel_scale /= factor;
   else
     result.position = camera.focal_point + (camera.position - camera.focal_point) / factor;
@@ -95,12 +95,12 @@ Camera flown(const Camera& camera, const glm::dvec3& step) {
 Camera withOtherProjection(const Camera& camera) {
   Camera result = camera;
   const double tangent = halfAngleTangent(camera);
-  if (camera.projection == Projection::orthographic) {
+  if (camera.projection == Projection::kOrthographic) {
     const glm::dvec3 towards_viewer = -axesOf(camera).forward;
-    result.projection = Projection::perspective;
+    result.projection = Projection::kPerspective;
     result.position = camera.focal_point + camera.parallel_scale / tangent * towards_viewer;
   } else {
-    result.projection = Projection::orthographic;
+    result.projection = Projection::kOrthographic;
     result.parallel_scale = distanceOf(camera) * tangent;
   }
   return result;

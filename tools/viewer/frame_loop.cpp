@@ -35,12 +35,12 @@ void Effort::learn(double seconds, double target, bool complete) {
   const double factor = std::clamp(target / std::max(seconds, 1e-6), 0.25, 2.0);
   const bool splats_help = !complete && splats_ > least_;
   if (factor < 1 && !splats_help)
-    reduction_ = std::min(kMostReduction, reduction_ / std::sqrt(factor));
+    reduction_ = std::min(kMaxReduction, reduction_ / std::sqrt(factor));
   else if (factor > 1 && reduction_ > 1)
     reduction_ = std::max(1.0, reduction_ / std::sqrt(factor));
   else if (factor < 1 || !complete)
     splats_ = std::clamp(static_cast<uint64_t>(static_cast<double>(splats_) * factor), least_,
-                         std::max(least_, kMost));
+                         std::max(least_, kMax));
 }
 
 /// What the loop's thread keeps from request to request.

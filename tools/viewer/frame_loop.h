@@ -59,8 +59,8 @@ class Effort {
 
  private:
   static constexpr uint64_t kFirst = 100'000;
-  static constexpr uint64_t kMost = 1'000'000'000;
-  static constexpr double kMostReduction = 8;
+  static constexpr uint64_t kMax = 1'000'000'000;
+  static constexpr double kMaxReduction = 8;
   uint64_t least_, splats_;
   double reduction_ = 1;  // of the pixels, each way
 };

@@ -84,11 +84,11 @@ bool Navigation::press(const Window::Key& key, Camera& camera, ImageSize size) {
       return along("+z", "-z");
     case GLFW_KEY_O:
       camera = withOtherProjection(camera);
-      flies_ = flies_ && camera.projection == Projection::perspective;
+      flies_ = flies_ && camera.projection == Projection::kPerspective;
       return true;
     case GLFW_KEY_F:
       flies_ = !flies_;
-      if (flies_ && camera.projection == Projection::orthographic) camera = withOtherProjection(camera);
+      if (flies_ && camera.projection == Projection::kOrthographic) camera = withOtherProjection(camera);
       return true;
     default:
       return false;

@@ -75,7 +75,7 @@ PanelWishes Panels::draw(ViewState& state, size_t variable, const PanelFacts& fa
 void Panels::drawView(ViewState& state, PanelWishes& wishes, const PanelFacts& facts) {
   if (ImGui::Button("all (r)")) wishes.reset_camera = true;
   ImGui::SameLine();
-  const bool perspective = state.camera.projection == Projection::perspective;
+  const bool perspective = state.camera.projection == Projection::kPerspective;
   if (ImGui::Button(perspective ? "orthographic (o)" : "perspective (o)")) wishes.other_projection = true;
   ImGui::SameLine();
   if (ImGui::Button(facts.flies ? "orbit (f)" : "fly (f)")) wishes.toggle_flight = true;
@@ -109,9 +109,9 @@ void Panels::drawDetail(ViewState& state, PanelWishes& wishes) {
   if (ImGui::SliderInt("memory, MiB", &mebibytes, 64, 65536, "%d", ImGuiSliderFlags_Logarithmic))
     state.memory_bytes = static_cast<uint64_t>(mebibytes) << 20;
   wishes.changed |= ImGui::IsItemDeactivatedAfterEdit();
-  bool per_pixel = state.classification == Classification::pixel;
+  bool per_pixel = state.classification == Classification::kPixel;
   if (ImGui::Checkbox("classify every pixel", &per_pixel)) {
-    state.classification = per_pixel ? Classification::pixel : Classification::flat;
+    state.classification = per_pixel ? Classification::kPixel : Classification::kFlat;
     wishes.changed = true;
   }
 }

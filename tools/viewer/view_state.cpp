@@ -77,7 +77,7 @@ Json jsonOf(const Camera& camera) {
   return {{"position", jsonOf(camera.position)},
           {"focal_point", jsonOf(camera.focal_point)},
           {"view_up", jsonOf(camera.view_up)},
-          {"perspective", camera.projection == Projection::perspective},
+          {"perspective", camera.projection == Projection::kPerspective},
           {"parallel_scale", camera.parallel_scale},
           {"view_angle", camera.view_angle_deg}};
 }
@@ -87,7 +87,7 @@ Camera cameraFrom(const Fields& fields) {
   camera.position = fields.point("position");
   camera.focal_point = fields.point("focal_point");
   camera.view_up = fields.point("view_up");
-  camera.projection = fields.flag("perspective") ? Projection::perspective : Projection::orthographic;
+  camera.projection = fields.flag("perspective") ? Projection::kPerspective : Projection::kOrthographic;
   camera.parallel_scale = fields.positive("parallel_scale");
   camera.view_angle_deg = fields.number("view_angle", 1e-3, 179);
   if (camera.position == camera.focal_point) fields.fail("position", "another point than focal_point");
@@ -144,7 +144,7 @@ ViewState firstViewOf(const Manifest& manifest, ImageSize picture) {
       EditedFunction("viridis", variable.min, variable.max, defaultOpacityUnit(manifest, glm::dvec3(1)))};
   state.camera = Camera::named("iso", manifest.lower, manifest.upper,
                                dataSize(state.annotations, picture, state.function.function()),
-                               Projection::orthographic);
+                               Projection::kOrthographic);
   return state;
 }
 
@@ -165,7 +165,7 @@ std::string toJson(const ViewState& state) {
   json["function"] = Json::parse(toParaViewPreset(state.function.definition())).front();
   json["lod_pixels"] = state.lod_pixels;
   json["memory_bytes"] = state.memory_bytes;
-  json["flat"] = state.classification == Classification::flat;
+  json["flat"] = state.classification == Classification::kFlat;
   json["scale"] = jsonOf(state.scale);
   json["clip_box"] = nullptr;
   if (state.clip_box)
@@ -209,7 +209,7 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   ViewState state{variable, camera, function};
   state.lod_pixels = fields.number("lod_pixels", 0, 1e6);
   state.memory_bytes = static_cast<uint64_t>(fields.number("memory_bytes", 1, 1e18));
-  state.classification = fields.flag("flat") ? Classification::flat : Classification::pixel;
+  state.classification = fields.flag("flat") ? Classification::kFlat : Classification::kPixel;
   state.scale = scale;
   if (fields.has("clip_box")) {
     const Fields box = fields.object("clip_box");
@@ -243,12 +243,12 @@ std::string renderCommand(const ViewState& state, const std::filesystem::path& c
   add("--position", numbers(state.camera.position));
   add("--focal-point", numbers(state.camera.focal_point));
   add("--view-up", numbers(state.camera.view_up));
-  if (state.camera.projection == Projection::perspective)
+  if (state.camera.projection == Projection::kPerspective)
     add("--view-angle", fmt::format("{}", state.camera.view_angle_deg));
   else
     add("--parallel-scale", fmt::format("{}", state.camera.parallel_scale));
   add("--lod-pixels", fmt::format("{}", state.lod_pixels));
-  if (state.classification == Classification::flat) add("--classify", "flat");
+  if (state.classification == Classification::kFlat) add("--classify", "flat");
   if (state.scale != glm::dvec3(1.0)) add("--scale", numbers(state.scale));
   if (state.clip_box) {
     const auto& [lower, upper] = *state.clip_box;

@@ -22,7 +22,7 @@ struct ViewState {
   EditedFunction function;
   double lod_pixels = 1;
   uint64_t memory_bytes = 512 << 20;
-  Classification classification = Classification::pixel;
+  Classification classification = Classification::kPixel;
   glm::dvec3 scale{1.0};
   std::optional<WorldBox> clip_box = std::nullopt;
   bool dark = false;  // background

@@ -15,7 +15,7 @@
 #include "render/image/image_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/base/say.h"
+#include "stream/base/message.h"
 #include "tools/viewer/frame_loop.h"
 #include "tools/viewer/navigation.h"
 #include "tools/viewer/panels.h"
@@ -49,7 +49,7 @@ class Viewer {
         frames_(cache, options.backend, Window::wake),
         picture_(window_.gl()),
         overlay_(window_.gl()) {
-    say("window: OpenGL {}", window_.contextName());
+    printMessage("window: OpenGL {}", window_.contextName());
     updateBounds();
     fitData(pictureSize());
   }
@@ -87,7 +87,7 @@ class Viewer {
       try {
         state = viewStateFromJson(readTextFile(*remembered), *remembered, cache_.manifest());
       } catch (const Error& error) {
-        say("warning: {}; the window opens as if for the first time", error.what());
+        printMessage("warning: {}; the window opens as if for the first time", error.what());
       }
     }
     if (options_.scalar && *options_.scalar != state.variable)
@@ -207,7 +207,7 @@ class Viewer {
       picture_.set(frame->bytes, frame->image.size);
       shown_ = std::move(frame);
     } catch (const UsageError& error) {
-      if (said_ != error.what()) say("warning: {}", error.what());
+      if (said_ != error.what()) printMessage("warning: {}", error.what());
       said_ = error.what();
     }
   }
@@ -274,7 +274,7 @@ class Viewer {
     try {
       writeState(*file, toJson(state_));
     } catch (const Error& error) {
-      say("warning: the view is not remembered: {}", error.what());
+      printMessage("warning: the view is not remembered: {}", error.what());
     }
   }
 

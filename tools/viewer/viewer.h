@@ -15,7 +15,7 @@ namespace curvisplat {
 
 struct ViewerOptions {
   ImageSize size{1200, 800};
-  Backend backend = Backend::automatic;
+  Backend backend = Backend::kAutomatic;
   std::optional<std::filesystem::path> state;  // else what is remembered of this cache
   std::optional<std::string> scalar;
   std::optional<uint64_t> memory_bytes;

@@ -22,12 +22,12 @@ constexpr size_t kTextRoom = 4096;
 // What is read at a time from ADF files, where types are converted here.
 constexpr uint64_t kPieceElements = 1 << 16;
 // Times, units, names: nothing small has more elements.
-constexpr uint64_t kMostSmallElements = 1 << 22;
+constexpr uint64_t kMaxSmallElements = 1 << 22;
 // Deflate, which HDF5 files are compressed with, makes a thousandth of zeros.
-constexpr uint64_t kMostCompression = 1100;
+constexpr uint64_t kMaxCompression = 1100;
 // A node takes at least so much of a file.
-constexpr uint64_t kLeastNodeBytes = 32;
-constexpr int kMostDimensions = 12;
+constexpr uint64_t kMinNodeBytes = 32;
+constexpr int kMaxDimensions = 12;
 
 std::string lastMessage() {
   char message[kTextRoom] = {};
@@ -174,7 +174,7 @@ std::vector<CgnsNode> CgnsFile::children(const CgnsNode& node) const {
   int count = 0;
   if (cgio_number_children(file_, open.id(), &count) != CGIO_ERR_NONE) fail(node.path);
   if (count <= 0) return {};
-  if (!node.linked && static_cast<uint64_t>(count) > bytes_ / kLeastNodeBytes)
+  if (!node.linked && static_cast<uint64_t>(count) > bytes_ / kMinNodeBytes)
     damaged(node.path, fmt::format("should have {} nodes below it, more than the file has room for", count));
 
   std::vector<double> ids(static_cast<size_t>(count), -1);
@@ -208,9 +208,9 @@ CgnsShape CgnsFile::storedShape(const OpenNode& open, const CgnsNode& node) cons
 
   int dimensions = 0;
   if (cgio_get_dimensions(file_, open.id(), &dimensions, nullptr) != CGIO_ERR_NONE) fail(node.path);
-  if (dimensions < 0 || dimensions > kMostDimensions)
-    damaged(node.path, fmt::format("has {} dimensions; at most {} can be", dimensions, kMostDimensions));
-  std::array<cgsize_t, kMostDimensions> dims{};
+  if (dimensions < 0 || dimensions > kMaxDimensions)
+    damaged(node.path, fmt::format("has {} dimensions; at most {} can be", dimensions, kMaxDimensions));
+  std::array<cgsize_t, kMaxDimensions> dims{};
   if (dimensions > 0 && cgio_get_dimensions(file_, open.id(), &dimensions, dims.data()) != CGIO_ERR_NONE)
     fail(node.path);
   for (int n = 0; n < dimensions; ++n) {
@@ -225,7 +225,7 @@ void CgnsFile::checkShape(const CgnsNode& node, const CgnsShape& shape) const {
   if (shape.type == "MT") return;
   const uint64_t bytes = bytesOf(shape.type);
   if (bytes == 0) damaged(node.path, fmt::format("has data of an unknown type '{}'", shape.type));
-  const uint64_t most = bytes_ / bytes * (hdf5_ ? kMostCompression : 1);
+  const uint64_t most = bytes_ / bytes * (hdf5_ ? kMaxCompression : 1);
   if (!node.linked && shape.count() > most)
     damaged(node.path, fmt::format("should have {} values, more than {} bytes hold", shape.count(), bytes_));
 }
@@ -245,8 +245,8 @@ void CgnsFile::checkSmall(const CgnsNode& node, const CgnsShape& shape, std::str
   if (!right || shape.count() == 0)
     damaged(node.path, fmt::format("has {} values of type '{}'; expected {}", shape.count(), shape.type,
                                    type == "C1" ? "a text" : "numbers"));
-  if (shape.count() > kMostSmallElements)
-    damaged(node.path, fmt::format("has {} values; expected at most {}", shape.count(), kMostSmallElements));
+  if (shape.count() > kMaxSmallElements)
+    damaged(node.path, fmt::format("has {} values; expected at most {}", shape.count(), kMaxSmallElements));
 }
 
 std::vector<double> CgnsFile::numbers(const CgnsNode& node) const {

@@ -19,7 +19,7 @@ constexpr const char* kOldVersion = " version";
 constexpr const char* kLibraryVersion = "CGNSLibraryVersion";
 constexpr int kMaxLinks = 100;
 // A node takes at least so much of a file: a link, and a group with three attributes.
-constexpr uint64_t kLeastNodeBytes = 32;
+constexpr uint64_t kMinNodeBytes = 32;
 constexpr uint64_t kSmallFileNodes = 4096;
 
 /// What HDF5 says of its last call: the first reason that it gives.
@@ -63,7 +63,7 @@ std::optional<std::vector<NodeLink>> nodeLinksOf(const Hdf5Group& group) {
   return std::nullopt;
 }
 
-const char* inWords(H5T_class_t type) {
+const char* describe(H5T_class_t type) {
   switch (type) {
     case H5T_INTEGER:
       return "integers";
@@ -154,7 +154,7 @@ std::string CgnsHdf5::text(const Hdf5Group& group, const std::string& node_path,
   // libcgns can be built so that it writes letters one by one.
   const bool letters = kind == H5T_INTEGER && bytes == 1 && rank == 1;
   if (!letters) {
-    if (kind != H5T_STRING) wrong(inWords(kind));
+    if (kind != H5T_STRING) wrong(describe(kind));
     if (H5Tis_variable_str(type.id()) != 0) wrong("a string of variable length");
     if (values != 1) wrong(fmt::format("{} strings", values));
   }
@@ -206,7 +206,7 @@ void CgnsHdf5::count(const Hdf5Group& group, size_t nodes, const std::string& no
     files_bytes_ += bytes;
   }
   nodes_listed_ += nodes;
-  const uint64_t most = kSmallFileNodes + files_bytes_ / kLeastNodeBytes;
+  const uint64_t most = kSmallFileNodes + files_bytes_ / kMinNodeBytes;
   if (nodes_listed_ > most)
     damaged(node_path,
             fmt::format("has {} nodes below it; of all nodes, {} were met, more than there is room for",
@@ -269,7 +269,7 @@ void CgnsHdf5::checkNumbers(const Data& data, const std::string& node_path) cons
   const Hdf5Type type(H5Dget_type(data.set.id()));
   const H5T_class_t kind = type ? H5Tget_class(type.id()) : H5T_NO_CLASS;
   if (kind != H5T_INTEGER && kind != H5T_FLOAT)
-    damaged(node_path, fmt::format("has data of {}; expected numbers", inWords(kind)));
+    damaged(node_path, fmt::format("has data of {}; expected numbers", describe(kind)));
 }
 
 void CgnsHdf5::readAll(const CgnsNode& node, std::span<double> to) const {
@@ -289,7 +289,7 @@ void CgnsHdf5::readAll(const CgnsNode& node, std::span<char> to) const {
   const Hdf5Type type(H5Dget_type(data.set.id()));
   const H5T_class_t kind = type ? H5Tget_class(type.id()) : H5T_NO_CLASS;
   if (kind != H5T_INTEGER || H5Tget_size(type.id()) != 1)
-    damaged(node.path, fmt::format("has data of {}; expected letters", inWords(kind)));
+    damaged(node.path, fmt::format("has data of {}; expected letters", describe(kind)));
   const hssize_t count = H5Sget_simple_extent_npoints(data.space.id());
   if (count < 0 || static_cast<uint64_t>(count) != to.size())
     damaged(node.path, fmt::format("has {} letters; expected {}", count, to.size()));

@@ -35,7 +35,7 @@ std::optional<size_t> componentOf(const std::string& name) {
 
 /// The part of the box that has cells, in the array, and the memory that it goes to.
 CgnsBox boxOf(const CgnsZone& zone, const NodeBox& box, const CgnsArray& array, Centring centring) {
-  const uint64_t last = centring == Centring::cell ? 1 : 0;
+  const uint64_t last = centring == Centring::kCell ? 1 : 0;
   const uint64_t j1 = std::min(box.j1, zone.nodes[1] - last), k1 = std::min(box.k1, zone.nodes[2] - last);
   CgnsBox part;
   part.first = {array.rind[0], array.rind[1] + box.j0, array.rind[2] + box.k0};
@@ -92,7 +92,7 @@ void CgnsSource::addScalars() {
   for (const auto& [name, centring] : keys) ++centrings[name];
   for (GridScalar& scalar : description_.scalars)
     if (centrings[scalar.name] > 1) {
-      scalar.name += scalar.centring == Centring::cell ? ":cell" : ":node";
+      scalar.name += scalar.centring == Centring::kCell ? ":cell" : ":node";
       scalar.aliases.clear();
     }
 }
@@ -152,7 +152,7 @@ void CgnsSource::read(uint32_t block, const NodeBox& box, std::span<const uint32
   for (size_t axis = 0; axis < 3; ++axis) {
     axes[axis]->resize(nodes);
     const CgnsArray& array = zone.coordinates[axis];
-    const CgnsBox part = boxOf(zone, box, array, Centring::node);
+    const CgnsBox part = boxOf(zone, box, array, Centring::kNode);
     if (!empty(part)) file_.read(array.node, array.shape, part, axes[axis]->data());
   }
   out.blank.assign(nodes, 0);

@@ -8,7 +8,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kMostSteps = 1 << 20;
+constexpr double kMaxSteps = 1 << 20;
 
 const CgnsNode* named(const std::vector<CgnsNode>& nodes, const char* name) {
   const auto found =
@@ -92,9 +92,9 @@ CgnsSteps readCgnsSteps(const CgnsFile& file, const std::vector<CgnsNode>& base)
   const CgnsNode* const data = labelled(base, "BaseIterativeData_t");
   if (!data) return steps;
   const std::vector<double> count = file.numbers(*data);
-  if (count.size() != 1 || !(count[0] >= 1 && count[0] <= kMostSteps))
+  if (count.size() != 1 || !(count[0] >= 1 && count[0] <= kMaxSteps))
     throw Error("{}: {} should tell the number of time steps, 1 to {}; it tells {:g}", file.path().string(),
-                data->path, kMostSteps, count[0]);
+                data->path, kMaxSteps, count[0]);
   steps.count = static_cast<size_t>(count[0]);
   const std::vector<CgnsNode> children = file.children(*data);
   const CgnsNode* times = named(children, "TimeValues");

@@ -19,12 +19,12 @@ namespace {
 
 constexpr size_t kNamesListed = 3;
 // No zone has more: 2^31 is what libcgns counts to along an axis.
-constexpr double kMostNodes = 2147483647.0;
+constexpr double kMaxNodes = 2147483647.0;
 
 using Nodes = std::vector<CgnsNode>;
 using Dims = std::array<uint64_t, 3>;
 
-std::string inWords(const Dims& dims) {
+std::string describe(const Dims& dims) {
   return fmt::format("{}x{}x{}", dims[0], dims[1], dims[2]);
 }
 
@@ -117,14 +117,14 @@ void TreeReader::readZone(const CgnsNode& base, const CgnsNode& node, const Unit
         file_.path().string(), node.path, sizes.size());
   CgnsZone zone{base.name, node.name, {}, {}, {}};
   for (size_t axis = 0; axis < 3; ++axis) {
-    if (!(sizes[axis] >= 1 && sizes[axis] <= kMostNodes))
+    if (!(sizes[axis] >= 1 && sizes[axis] <= kMaxNodes))
       throw Error("{}: {} should have {:g} nodes along {}; the file is damaged", file_.path().string(),
                   node.path, sizes[axis], "ijk"[axis]);
     zone.nodes[axis] = static_cast<uint64_t>(sizes[axis]);
   }
   if (*std::min_element(zone.nodes.begin(), zone.nodes.end()) < 2) {
     omitted_["of a single plane of nodes (volumes are needed)"].push_back(
-        fmt::format("{} ({})", node.path.substr(1), inWords(zone.nodes)));
+        fmt::format("{} ({})", node.path.substr(1), describe(zone.nodes)));
     return;
   }
 
@@ -165,12 +165,12 @@ std::array<CgnsArray, 3> TreeReader::readCoordinates(const CgnsNode& grid, const
 
 void TreeReader::addSolution(const CgnsNode& solution, UnitContext units, CgnsZone& zone) {
   const Nodes children = file_.children(solution);
-  Centring centring = Centring::node;
+  Centring centring = Centring::kNode;
   for (const CgnsNode& child : children) {
     if (child.label == "GridLocation_t") {
       const std::string location = file_.text(child);
       if (location == "CellCenter") {
-        centring = Centring::cell;
+        centring = Centring::kCell;
       } else if (location != "Vertex") {
         tree_.warnings.push_back(
             fmt::format("{} is left out: its values stand at {}; those at Vertex and CellCenter are read",
@@ -186,7 +186,7 @@ void TreeReader::addSolution(const CgnsNode& solution, UnitContext units, CgnsZo
   units = below(children, units);
   const std::array<uint64_t, 6> rind = rindOf(children);
   Dims dims = zone.nodes;
-  if (centring == Centring::cell)
+  if (centring == Centring::kCell)
     for (uint64_t& n : dims) --n;
   for (const CgnsNode& child : children) {
     if (child.label != "DataArray_t") continue;
@@ -219,7 +219,7 @@ CgnsArray TreeReader::arrayOf(const CgnsNode& node, const Dims& dims,
         "damaged",
         file_.path().string(), node.path,
         array.shape.dims.empty() ? "no" : fmt::format("{}", fmt::join(array.shape.dims, "x")),
-        inWords(expected));
+        describe(expected));
   if (!array.shape.number())
     throw Error("{}: {} has values of type '{}'; expected R4, R8, I4 or I8", file_.path().string(), node.path,
                 array.shape.type);
@@ -235,7 +235,7 @@ std::array<uint64_t, 6> TreeReader::rindOf(const Nodes& children) const {
       throw Error("{}: {} has {} numbers; expected 6, planes before and behind along i, j, k",
                   file_.path().string(), child.path, planes.size());
     for (size_t n = 0; n < 6; ++n) {
-      if (!(planes[n] >= 0 && planes[n] <= kMostNodes))
+      if (!(planes[n] >= 0 && planes[n] <= kMaxNodes))
         throw Error("{}: {} tells of {:g} planes; the file is damaged", file_.path().string(), child.path,
                     planes[n]);
       rind[n] = static_cast<uint64_t>(planes[n]);

@@ -27,7 +27,7 @@ struct CgnsArray {
 
 struct CgnsField {
   std::string name, unit;
-  Centring centring = Centring::node;
+  Centring centring = Centring::kNode;
   CgnsArray array;
 };
 

@@ -3,6 +3,6 @@
 
 namespace curvisplat {
 
-enum class ByteOrder { little, big };
+enum class ByteOrder { kLittle, kBig };
 
 }  // namespace curvisplat

@@ -11,7 +11,7 @@
 
 namespace curvisplat {
 
-enum class RecordMarkers { none, bytes4, bytes8 };
+enum class RecordMarkers { kNone, kBytes4, kBytes8 };
 
 /// What the user says of a PLOT3D file's layout; the rest is detected.
 struct Plot3dForce {
@@ -25,8 +25,8 @@ struct Plot3dForce {
 
 /// What the user says of grids of the earth.
 struct GlobeOptions {
-  enum class Shape { automatic, sphere, flat };
-  Shape shape = Shape::automatic;  // automatic: a sphere for degrees, flat for lengths
+  enum class Shape { kAutomatic, kSphere, kFlat };
+  Shape shape = Shape::kAutomatic;  // automatic: a sphere for degrees, flat for lengths
   double radius_km = 6371;
   double vertical_scale = 1;
 };

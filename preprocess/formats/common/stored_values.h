@@ -13,7 +13,7 @@
 namespace curvisplat {
 
 inline constexpr ByteOrder kMachineByteOrder =
-    std::endian::native == std::endian::big ? ByteOrder::big : ByteOrder::little;
+    std::endian::native == std::endian::big ? ByteOrder::kBig : ByteOrder::kLittle;
 
 inline uint8_t byteSwapped(uint8_t bits) {
   return bits;

@@ -64,7 +64,7 @@ DerivedSource::DerivedSource(std::unique_ptr<GridSource> source, const DerivedOp
 }
 
 void DerivedSource::findInputs() {
-  for (const Centring centring : {Centring::node, Centring::cell}) {
+  for (const Centring centring : {Centring::kNode, Centring::kCell}) {
     const auto find = [&](std::initializer_list<const char*> names) {
       return scalarCalled(description_, centring, names);
     };
@@ -79,7 +79,7 @@ void DerivedSource::findInputs() {
                         find({"velocityz", "velocity:z"})};
     if (inputs_.hasVelocity() || inputs_.hasPressure()) return;
   }
-  inputs_.centring = Centring::node;
+  inputs_.centring = Centring::kNode;
 }
 
 bool DerivedSource::offers(const QuantityInfo& quantity) const {
@@ -114,7 +114,7 @@ void DerivedSource::describe() {
     if (*quantity.alias) scalar.aliases = {quantity.alias};
     scalar.function = quantity.function;
     scalar.derived = true;
-    scalar.centring = (quantity.needs & ~unsigned{kNeedsJacobian}) ? inputs_.centring : Centring::node;
+    scalar.centring = (quantity.needs & ~unsigned{kNeedsJacobian}) ? inputs_.centring : Centring::kNode;
     description_.scalars.push_back(std::move(scalar));
     quantities_.push_back(quantity);
   }

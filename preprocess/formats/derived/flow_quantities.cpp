@@ -11,27 +11,27 @@ namespace {
 constexpr unsigned kThermal = kNeedsDensity | kNeedsPressure;
 
 constexpr QuantityInfo kQuantities[] = {
-    {Quantity::i, "i", "", 0, 0},
-    {Quantity::j, "j", "", 0, 0},
-    {Quantity::k, "k", "", 0, 0},
-    {Quantity::jacobian, "jacobian", "", 0, kNeedsJacobian},
-    {Quantity::volume, "volume", "", 0, kNeedsJacobian},
-    {Quantity::pressure, "pressure", "p", 110, kNeedsPressure},
-    {Quantity::pressure_coefficient, "pressure_coefficient", "cp", 111, kNeedsPressure | kNeedsFreestream},
-    {Quantity::mach_number, "mach_number", "mach", 112, kThermal | kNeedsVelocity},
-    {Quantity::sound_speed, "sound_speed", "speedofsound", 113, kThermal},
-    {Quantity::temperature, "temperature", "", 120, kThermal},
-    {Quantity::enthalpy, "enthalpy", "", 130, kThermal},
-    {Quantity::internal_energy, "internal_energy", "", 140, kThermal},
-    {Quantity::kinetic_energy, "kinetic_energy", "", 144, kNeedsVelocity},
-    {Quantity::velocity_magnitude, "velocity_magnitude", "speed", 153, kNeedsVelocity},
-    {Quantity::stagnation_energy, "stagnation_energy", "", 163, kThermal | kNeedsVelocity},
-    {Quantity::entropy, "entropy", "", 170, kThermal},
-    {Quantity::swirl, "swirl", "", 184, kNeedsDensity | kNeedsVelocity | kNeedsVelocityGradient},
-    {Quantity::pressure_gradient_magnitude, "pressure_gradient_magnitude", "pressuregradient", 210,
+    {Quantity::kI, "i", "", 0, 0},
+    {Quantity::kJ, "j", "", 0, 0},
+    {Quantity::kK, "k", "", 0, 0},
+    {Quantity::kJacobian, "jacobian", "", 0, kNeedsJacobian},
+    {Quantity::kVolume, "volume", "", 0, kNeedsJacobian},
+    {Quantity::kPressure, "pressure", "p", 110, kNeedsPressure},
+    {Quantity::kPressureCoefficient, "pressure_coefficient", "cp", 111, kNeedsPressure | kNeedsFreestream},
+    {Quantity::kMachNumber, "mach_number", "mach", 112, kThermal | kNeedsVelocity},
+    {Quantity::kSoundSpeed, "sound_speed", "speedofsound", 113, kThermal},
+    {Quantity::kTemperature, "temperature", "", 120, kThermal},
+    {Quantity::kEnthalpy, "enthalpy", "", 130, kThermal},
+    {Quantity::kInternalEnergy, "internal_energy", "", 140, kThermal},
+    {Quantity::kKineticEnergy, "kinetic_energy", "", 144, kNeedsVelocity},
+    {Quantity::kVelocityMagnitude, "velocity_magnitude", "speed", 153, kNeedsVelocity},
+    {Quantity::kStagnationEnergy, "stagnation_energy", "", 163, kThermal | kNeedsVelocity},
+    {Quantity::kEntropy, "entropy", "", 170, kThermal},
+    {Quantity::kSwirl, "swirl", "", 184, kNeedsDensity | kNeedsVelocity | kNeedsVelocityGradient},
+    {Quantity::kPressureGradientMagnitude, "pressure_gradient_magnitude", "pressuregradient", 210,
      kNeedsPressureGradient},
-    {Quantity::vorticity_magnitude, "vorticity_magnitude", "vorticity", 211, kNeedsVelocityGradient},
-    {Quantity::q_criterion, "q_criterion", "q", 0, kNeedsVelocityGradient},
+    {Quantity::kVorticityMagnitude, "vorticity_magnitude", "vorticity", 211, kNeedsVelocityGradient},
+    {Quantity::kQCriterion, "q_criterion", "q", 0, kNeedsVelocityGradient},
 };
 
 glm::dvec3 curl(const glm::dmat3& gradient) {
@@ -63,41 +63,41 @@ double flowQuantity(Quantity quantity, const FlowState& flow, const FlowGradient
   const double gamma = gas.gamma, p = flow.pressure, rho = flow.density;
   const double speed2 = glm::dot(flow.velocity, flow.velocity);
   switch (quantity) {
-    case Quantity::pressure:
+    case Quantity::kPressure:
       return p;
-    case Quantity::pressure_coefficient:
+    case Quantity::kPressureCoefficient:
       return (p - 1 / gamma) / (0.5 * freestream_mach * freestream_mach);
-    case Quantity::mach_number:
+    case Quantity::kMachNumber:
       return std::sqrt(speed2 * rho / (gamma * p));
-    case Quantity::sound_speed:
+    case Quantity::kSoundSpeed:
       return std::sqrt(gamma * p / rho);
-    case Quantity::temperature:
+    case Quantity::kTemperature:
       return p / (rho * gas.constant);
-    case Quantity::enthalpy:
+    case Quantity::kEnthalpy:
       return gamma / (gamma - 1) * p / rho;
-    case Quantity::internal_energy:
+    case Quantity::kInternalEnergy:
       return p / ((gamma - 1) * rho);
-    case Quantity::kinetic_energy:
+    case Quantity::kKineticEnergy:
       return 0.5 * speed2;
-    case Quantity::velocity_magnitude:
+    case Quantity::kVelocityMagnitude:
       return std::sqrt(speed2);
-    case Quantity::stagnation_energy:
+    case Quantity::kStagnationEnergy:
       return p / (gamma - 1) + 0.5 * rho * speed2;
-    case Quantity::entropy:
+    case Quantity::kEntropy:
       return gas.constant / (gamma - 1) * std::log(gamma * p / std::pow(rho, gamma));
-    case Quantity::swirl:
+    case Quantity::kSwirl:
       return speed2 > 0 ? rho * glm::dot(curl(gradients.velocity), flow.velocity) / speed2 : 0.0;
-    case Quantity::pressure_gradient_magnitude:
+    case Quantity::kPressureGradientMagnitude:
       return glm::length(gradients.pressure);
-    case Quantity::vorticity_magnitude:
+    case Quantity::kVorticityMagnitude:
       return glm::length(curl(gradients.velocity));
-    case Quantity::q_criterion:
+    case Quantity::kQCriterion:
       return qCriterion(gradients.velocity);
-    case Quantity::i:
-    case Quantity::j:
-    case Quantity::k:
-    case Quantity::jacobian:
-    case Quantity::volume:
+    case Quantity::kI:
+    case Quantity::kJ:
+    case Quantity::kK:
+    case Quantity::kJacobian:
+    case Quantity::kVolume:
       break;
   }
   CURVISPLAT_CHECK(!"a quantity of the grid, not of the flow");

@@ -62,8 +62,8 @@ FlowWindow::FlowWindow(const GridSource& source, const FlowInputs& inputs, const
       blank_value_(blank_value),
       needs_(needs),
       needed_(inputs.neededFor(needs)),
-      moves_(inputs.centring == Centring::cell && (needs & kGradients)),
-      halo_(haloFor(inputs.centring == Centring::cell, needs)) {}
+      moves_(inputs.centring == Centring::kCell && (needs & kGradients)),
+      halo_(haloFor(inputs.centring == Centring::kCell, needs)) {}
 
 void FlowWindow::read(uint32_t block, const NodeBox& box, const std::vector<uint32_t>& stored) {
   block_ = &source_.description().blocks[block];
@@ -202,18 +202,18 @@ void FlowWindow::compute(Quantity quantity, double freestream_mach, const NodeBo
   const unsigned needs = infoOf(quantity).needs;
   const auto value = [&](size_t n, const std::array<uint64_t, 3>& index) {
     switch (quantity) {
-      case Quantity::i:
+      case Quantity::kI:
         return static_cast<double>(index[0]);
-      case Quantity::j:
+      case Quantity::kJ:
         return static_cast<double>(index[1]);
-      case Quantity::k:
+      case Quantity::kK:
         return static_cast<double>(index[2]);
       default:
         break;
     }
     if (!there_[n]) return kNone;
-    if (quantity == Quantity::jacobian) return determinant(n, index);
-    if (quantity == Quantity::volume) return std::abs(determinant(n, index));
+    if (quantity == Quantity::kJacobian) return determinant(n, index);
+    if (quantity == Quantity::kVolume) return std::abs(determinant(n, index));
     FlowGradients gradients;
     const FlowState& flow = flow_[n];
     if (needs & kNeedsVelocityGradient) {

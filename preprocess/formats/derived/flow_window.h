@@ -16,7 +16,7 @@ namespace curvisplat {
 
 /// Positions of the scalars that the flow is computed from, all of one centring.
 struct FlowInputs {
-  Centring centring = Centring::node;
+  Centring centring = Centring::kNode;
   std::optional<uint32_t> density, energy, pressure;
   std::array<std::optional<uint32_t>, 3> momentum, velocity;
 

@@ -16,7 +16,7 @@ namespace {
 bool isTime(const NetcdfFile& file, size_t dim) {
   const NetcdfDimension& dimension = file.dimensions()[dim];
   const NetcdfVariable* const coordinate = file.find(dimension.name);
-  if (coordinate && cfRole(file, *coordinate) == CfRole::time) return true;
+  if (coordinate && cfRole(file, *coordinate) == CfRole::kTime) return true;
   return dimension.unlimited || dimension.name == "time" || dimension.name == "Time";
 }
 
@@ -42,7 +42,7 @@ std::optional<CfDimensions> dimensionsOf(const NetcdfFile& file, const NetcdfVar
   return dims;
 }
 
-std::string inWords(const NetcdfFile& file, const CfDimensions& dims) {
+std::string describe(const NetcdfFile& file, const CfDimensions& dims) {
   const auto name = [&](size_t axis) { return file.dimensions()[dims.axes[axis]].name; };
   return fmt::format("{}, {}, {}", name(2), name(1), name(0));
 }
@@ -80,7 +80,7 @@ class GridFinder {
       for (const bool steady : {false, true})
         for (const NetcdfVariable& variable : file_.variables())
           if (variable.numeric && !auxiliary.contains(variable.name) &&
-              (cfRole(file_, variable) != CfRole::none) == coordinates)
+              (cfRole(file_, variable) != CfRole::kNone) == coordinates)
             add(variable, steady, coordinates);
     return std::move(found_);
   }
@@ -113,16 +113,16 @@ class GridFinder {
     CfGrid grid;
     grid.dims = dims;
     grid.variables.push_back(&variable);
-    auto longitude = coordinateOf(file_, variable, dims, CfRole::longitude);
-    auto latitude = coordinateOf(file_, variable, dims, CfRole::latitude);
+    auto longitude = coordinateOf(file_, variable, dims, CfRole::kLongitude);
+    auto latitude = coordinateOf(file_, variable, dims, CfRole::kLatitude);
     if (!longitude || !latitude) {
-      longitude = coordinateOf(file_, variable, dims, CfRole::x);
-      latitude = coordinateOf(file_, variable, dims, CfRole::y);
+      longitude = coordinateOf(file_, variable, dims, CfRole::kX);
+      latitude = coordinateOf(file_, variable, dims, CfRole::kY);
       grid.degrees = false;
     }
     if (!longitude || !latitude) {
       reason =
-          fmt::format("no longitude and latitude, or x and y, on its dimensions {}", inWords(file_, dims));
+          fmt::format("no longitude and latitude, or x and y, on its dimensions {}", describe(file_, dims));
       return std::nullopt;
     }
     std::vector<size_t> levels;
@@ -130,7 +130,7 @@ class GridFinder {
       if (!longitude->varies(axis) && !latitude->varies(axis)) levels.push_back(axis);
     if (levels.size() != 1) {
       reason = fmt::format("{} and {} do not lie on two of its dimensions {}", longitude->variable().name,
-                           latitude->variable().name, inWords(file_, dims));
+                           latitude->variable().name, describe(file_, dims));
       return std::nullopt;
     }
     auto [vertical, words] = CfVertical::of(file_, variable, dims, levels[0]);

@@ -30,44 +30,44 @@ bool isVerticalName(std::string_view standard_name) {
 
 /// Names that programs use which write no attributes.
 CfRole roleByName(const std::string& name, bool length) {
-  if (beginsWithOneOf(name, {"lon", "nav_lon", "xlong", "glam"})) return CfRole::longitude;
-  if (beginsWithOneOf(name, {"lat", "nav_lat", "xlat", "gphi"})) return CfRole::latitude;
-  if (isOneOf(name, {"time", "ocean_time", "time_counter"})) return CfRole::time;
-  if (!length) return CfRole::none;
-  if (name == "x" || name.starts_with("x_")) return CfRole::x;
-  if (name == "y" || name.starts_with("y_")) return CfRole::y;
+  if (beginsWithOneOf(name, {"lon", "nav_lon", "xlong", "glam"})) return CfRole::kLongitude;
+  if (beginsWithOneOf(name, {"lat", "nav_lat", "xlat", "gphi"})) return CfRole::kLatitude;
+  if (isOneOf(name, {"time", "ocean_time", "time_counter"})) return CfRole::kTime;
+  if (!length) return CfRole::kNone;
+  if (name == "x" || name.starts_with("x_")) return CfRole::kX;
+  if (name == "y" || name.starts_with("y_")) return CfRole::kY;
   if (beginsWithOneOf(name, {"depth", "gdep", "height", "altitude", "z_rho", "z_w", "z_r", "lev"}) ||
       name == "z")
-    return CfRole::vertical;
-  return CfRole::none;
+    return CfRole::kVertical;
+  return CfRole::kNone;
 }
 
 }  // namespace
 
 CfRole cfRole(const NetcdfFile& file, const NetcdfVariable& variable) {
-  if (!variable.numeric) return CfRole::none;
+  if (!variable.numeric) return CfRole::kNone;
   const std::string standard_name = lower(variable.text("standard_name")),
                     units = lower(variable.text("units"));
   const std::string axis = lower(variable.text("axis"));
   if (isOneOf(units, {"degrees_east", "degree_east", "degree_e", "degrees_e", "degreee", "degreese"}) ||
       standard_name == "longitude")
-    return CfRole::longitude;
+    return CfRole::kLongitude;
   if (isOneOf(units, {"degrees_north", "degree_north", "degree_n", "degrees_n", "degreen", "degreesn"}) ||
       standard_name == "latitude")
-    return CfRole::latitude;
-  if (standard_name == "time" || units.find(" since ") != std::string::npos) return CfRole::time;
+    return CfRole::kLatitude;
+  if (standard_name == "time" || units.find(" since ") != std::string::npos) return CfRole::kTime;
 
   const bool length = kilometresOf(units).has_value();
   // A variable that is called like its dimension is a coordinate, and may say of which axis.
   const bool coordinate = variable.dims.size() == 1 && file.dimension(variable, 0).name == variable.name;
   if (isVerticalName(standard_name) || !variable.text("formula_terms").empty() ||
       (coordinate && (axis == "z" || !variable.text("positive").empty())))
-    return CfRole::vertical;
-  if (standard_name == "projection_x_coordinate" || (axis == "x" && length)) return CfRole::x;
-  if (standard_name == "projection_y_coordinate" || (axis == "y" && length)) return CfRole::y;
-  if (coordinate && axis == "t") return CfRole::time;
-  if (!standard_name.empty()) return CfRole::none;
-  if (length && !variable.text("positive").empty()) return CfRole::vertical;
+    return CfRole::kVertical;
+  if (standard_name == "projection_x_coordinate" || (axis == "x" && length)) return CfRole::kX;
+  if (standard_name == "projection_y_coordinate" || (axis == "y" && length)) return CfRole::kY;
+  if (coordinate && axis == "t") return CfRole::kTime;
+  if (!standard_name.empty()) return CfRole::kNone;
+  if (length && !variable.text("positive").empty()) return CfRole::kVertical;
   return roleByName(lower(variable.name), length || units.empty());
 }
 

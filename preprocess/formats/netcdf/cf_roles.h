@@ -9,13 +9,13 @@
 namespace curvisplat {
 
 enum class CfRole {
-  none,
-  longitude,  // degrees
-  latitude,
-  x,  // of a projection, a length
-  y,
-  vertical,  // depth, height or level: see CfVertical
-  time,
+  kNone,
+  kLongitude,  // degrees
+  kLatitude,
+  kX,  // of a projection, a length
+  kY,
+  kVertical,  // depth, height or level: see CfVertical
+  kTime,
 };
 
 /// By standard_name, units, axis and formula_terms; where all of these are missing, by customary names.

@@ -58,7 +58,7 @@ std::pair<std::optional<CfVertical>, std::string> CfVertical::of(const NetcdfFil
 
   for (const bool of_nodes : {true, false}) {
     for (const NetcdfVariable* candidate : candidates) {
-      if (cfRole(file, *candidate) != CfRole::vertical) continue;
+      if (cfRole(file, *candidate) != CfRole::kVertical) continue;
       const auto term = CfTerm::of(file, *candidate, block);
       if (!term || !term->exact() || !term->varies(axis) || (term->axes() > 1) != of_nodes) continue;
       if (auto found = byLevels(file, *candidate, block, axis, reason)) return {std::move(found), ""};
@@ -97,7 +97,7 @@ std::optional<CfVertical> CfVertical::byGeopotential(const NetcdfFile& file, con
     if (!term || term->axes() != 3) return std::nullopt;
     vertical.terms_.push_back(*term);
   }
-  vertical.kind_ = Kind::geopotential;
+  vertical.kind_ = Kind::kGeopotential;
   vertical.scale_ = 1e-3 / kGravity;
   vertical.words_ = "geopotential PH + PHB";
   return vertical;
@@ -105,10 +105,10 @@ std::optional<CfVertical> CfVertical::byGeopotential(const NetcdfFile& file, con
 
 std::optional<CfVertical> CfVertical::byFormula(const NetcdfFile& file, const NetcdfVariable& coordinate,
                                                 const CfDimensions& block, size_t axis, std::string& reason) {
-  static const std::map<std::string, Kind> kinds = {{"ocean_sigma_coordinate", Kind::sigma},
-                                                    {"ocean_s_coordinate", Kind::s},
-                                                    {"ocean_s_coordinate_g1", Kind::s_g1},
-                                                    {"ocean_s_coordinate_g2", Kind::s_g2}};
+  static const std::map<std::string, Kind> kinds = {{"ocean_sigma_coordinate", Kind::kSigma},
+                                                    {"ocean_s_coordinate", Kind::kS},
+                                                    {"ocean_s_coordinate_g1", Kind::kSG1},
+                                                    {"ocean_s_coordinate_g2", Kind::kSG2}};
   const std::string name = coordinate.text("standard_name");
   const auto kind = kinds.find(name);
   if (kind == kinds.end()) {
@@ -120,7 +120,7 @@ std::optional<CfVertical> CfVertical::byFormula(const NetcdfFile& file, const Ne
   CfVertical vertical;
   vertical.kind_ = kind->second;
   vertical.words_ = name + " of " + coordinate.name;
-  vertical.s_ = termNamed(file, terms, kind->second == Kind::sigma ? "sigma" : "s", block);
+  vertical.s_ = termNamed(file, terms, kind->second == Kind::kSigma ? "sigma" : "s", block);
   vertical.eta_ = termNamed(file, terms, "eta", block);
   vertical.depth_ = termNamed(file, terms, "depth", block);
   const auto lacks = [&](const char* key) {
@@ -131,11 +131,11 @@ std::optional<CfVertical> CfVertical::byFormula(const NetcdfFile& file, const Ne
   if (!vertical.depth_ || vertical.depth_->varies(axis)) return lacks("depth");
   vertical.scale_ = kilometresOf(vertical.depth_->variable().text("units")).value_or(1e-3);
   if (!vertical.eta_) vertical.warnings_.push_back("no surface elevation: taken for 0");
-  if (kind->second == Kind::sigma) return vertical;
+  if (kind->second == Kind::kSigma) return vertical;
 
   vertical.depth_c_ = constant(file, termNamed(file, terms, "depth_c", block));
   if (!std::isfinite(vertical.depth_c_)) return lacks("depth_c");
-  if (kind->second == Kind::s) {
+  if (kind->second == Kind::kS) {
     vertical.a_ = constant(file, termNamed(file, terms, "a", block));
     vertical.b_ = constant(file, termNamed(file, terms, "b", block));
     if (!std::isfinite(vertical.a_) || vertical.a_ == 0) return lacks("a");
@@ -150,14 +150,14 @@ std::optional<CfVertical> CfVertical::byFormula(const NetcdfFile& file, const Ne
 /// Source: CF conventions 1.10, appendix D.
 double CfVertical::formula(double s, double c, double eta, double depth, double depth_c) const {
   switch (kind_) {
-    case Kind::sigma:
+    case Kind::kSigma:
       return eta + s * (depth + eta);
-    case Kind::s: {
+    case Kind::kS: {
       const double stretched = (1 - b_) * std::sinh(a_ * s) / std::sinh(a_) +
                                b_ * (std::tanh(a_ * (s + 0.5)) / (2 * std::tanh(0.5 * a_)) - 0.5);
       return eta * (1 + s) + depth_c * s + (depth - depth_c) * stretched;
     }
-    case Kind::s_g1: {
+    case Kind::kSG1: {
       const double level = depth_c * s + (depth - depth_c) * c;
       return level + eta * (1 + level / depth);
     }
@@ -169,7 +169,7 @@ double CfVertical::formula(double s, double c, double eta, double depth, double 
 }
 
 bool CfVertical::readNodes(const NetcdfFile& file, const CfRange& range, std::span<double> to) const {
-  if (kind_ != Kind::levels || !terms_[0].ofNodes()) return false;
+  if (kind_ != Kind::kLevels || !terms_[0].ofNodes()) return false;
   const NetcdfBox box = terms_[0].boxOf(range);
   file.read(terms_[0].variable(), box, to);
   for (double& value : to.first(box.values())) value *= scale_;

@@ -35,7 +35,7 @@ class CfVertical {
   const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
-  enum class Kind { levels, geopotential, sigma, s, s_g1, s_g2 };
+  enum class Kind { kLevels, kGeopotential, kSigma, kS, kSG1, kSG2 };
 
   static std::optional<CfVertical> byFormula(const NetcdfFile& file, const NetcdfVariable& coordinate,
                                              const CfDimensions& block, size_t axis, std::string& reason);
@@ -44,7 +44,7 @@ class CfVertical {
                                             const CfDimensions& block, size_t axis, std::string& reason);
   double formula(double s, double c, double eta, double depth, double depth_c) const;
 
-  Kind kind_ = Kind::levels;
+  Kind kind_ = Kind::kLevels;
   double scale_ = 1;                           // kilometres upwards of what is stored
   std::vector<CfTerm> terms_;                  // levels: itself; geopotential: base and perturbation
   std::optional<CfTerm> s_, c_, eta_, depth_;  // of a formula

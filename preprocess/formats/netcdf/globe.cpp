@@ -11,7 +11,7 @@ constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 }  // namespace
 
 Globe::Globe(const GlobeOptions& options, bool degrees, double middle_longitude)
-    : sphere_(degrees && options.shape != GlobeOptions::Shape::flat),
+    : sphere_(degrees && options.shape != GlobeOptions::Shape::kFlat),
       degrees_(degrees),
       radius_km_(options.radius_km),
       vertical_scale_(options.vertical_scale),

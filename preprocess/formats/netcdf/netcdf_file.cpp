@@ -24,9 +24,9 @@ constexpr size_t kChunkCacheBytes = size_t{2} << 20;
 constexpr size_t kChunkCacheSlots = 1009;
 constexpr float kChunkCachePreemption = 0.75f;
 // Texts and lists of numbers: descriptions, not data.
-constexpr size_t kMostAttributeValues = size_t{1} << 20;
+constexpr size_t kMaxAttributeValues = size_t{1} << 20;
 // Deflate makes a thousandth of zeros.
-constexpr double kMostCompression = 1100;
+constexpr double kMaxCompression = 1100;
 constexpr const char* kNetcdf4 = "NetCDF-4";
 
 bool isClassic(std::string_view mark) {
@@ -196,7 +196,7 @@ void NetcdfFile::readAttributes(int id, int count, NetcdfVariable& variable) con
     int status = nc_inq_attname(file_, id, n, name);
     if (status == NC_NOERR) status = nc_inq_att(file_, id, name, &type, &length);
     if (status != NC_NOERR) fail("an attribute of " + variable.name, status);
-    if (length > kMostAttributeValues) continue;
+    if (length > kMaxAttributeValues) continue;
     NetcdfAttribute attribute;
     if (type == NC_CHAR) {
       attribute.text.resize(length);
@@ -217,7 +217,7 @@ void NetcdfFile::readAttributes(int id, int count, NetcdfVariable& variable) con
 }
 
 void NetcdfFile::checkSizes(uint64_t file_bytes) const {
-  const double most = static_cast<double>(file_bytes) * kMostCompression;
+  const double most = static_cast<double>(file_bytes) * kMaxCompression;
   for (const NetcdfVariable& variable : variables_) {
     auto bytes = static_cast<double>(variable.value_bytes);
     for (const size_t dim : variable.dims) bytes *= static_cast<double>(dimensions_[dim].length);

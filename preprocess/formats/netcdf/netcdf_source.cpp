@@ -108,7 +108,7 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFile& file, const OpenGridOptions& o
 }
 
 Globe NetcdfSource::globeOf(const GlobeOptions& options) const {
-  if (!grid_.degrees && options.shape == GlobeOptions::Shape::sphere)
+  if (!grid_.degrees && options.shape == GlobeOptions::Shape::kSphere)
     throw Error("{}: {} and {} are lengths, not degrees: they lie on no sphere; leave out --sphere",
                 file_.path().string(), grid_.longitude.variable().name, grid_.latitude.variable().name);
   // A map is cut opposite to the grid's middle.
@@ -117,7 +117,7 @@ Globe NetcdfSource::globeOf(const GlobeOptions& options) const {
     middle.begin[axis] = file_.dimensions()[grid_.dims.axes[axis]].length / 2;
     middle.end[axis] = middle.begin[axis] + 1;
   }
-  const bool flat = grid_.degrees && options.shape == GlobeOptions::Shape::flat;
+  const bool flat = grid_.degrees && options.shape == GlobeOptions::Shape::kFlat;
   return Globe(options, grid_.degrees, flat ? grid_.longitude.read(file_, middle).values.at(0) : 0);
 }
 
@@ -132,7 +132,7 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
   const auto length = [&](size_t axis) { return file_.dimensions()[grid_.dims.axes[axis]].length; };
   description_.blocks.push_back({dimensionsInWords(file_, grid_), length(0), length(1), length(2), true});
   for (const NetcdfVariable* variable : grid_.variables) {
-    GridScalar scalar{variable->name, variable->text("units"), {}, 0, Centring::node};
+    GridScalar scalar{variable->name, variable->text("units"), {}, 0, Centring::kNode};
     if (const std::string name = simplifiedName(variable->text("standard_name")); !name.empty())
       scalar.aliases.push_back(name);
     description_.scalars.push_back(std::move(scalar));

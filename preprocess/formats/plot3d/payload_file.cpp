@@ -18,7 +18,7 @@ constexpr size_t kMaxSegments = size_t{1} << 20;
 PayloadFile::PayloadFile(std::shared_ptr<const InputFile> file, uint64_t size, RecordMarkers records,
                          ByteOrder order)
     : file_(std::move(file)), file_size_(size), records_(records), order_(order) {
-  if (records_ == RecordMarkers::none) {
+  if (records_ == RecordMarkers::kNone) {
     segments_.push_back({0, 0});
     size_ = end_in_file_ = file_size_;
   }
@@ -27,7 +27,7 @@ PayloadFile::PayloadFile(std::shared_ptr<const InputFile> file, uint64_t size, R
 int64_t PayloadFile::markerAt(uint64_t offset) const {
   const bool swap = order_ != kMachineByteOrder;
   std::array<std::byte, 8> bytes{};
-  if (records_ == RecordMarkers::bytes8) {
+  if (records_ == RecordMarkers::kBytes8) {
     file_->readAt(offset, std::span(bytes));
     return loadStored<int64_t>(bytes.data(), swap);
   }
@@ -36,8 +36,8 @@ int64_t PayloadFile::markerAt(uint64_t offset) const {
 }
 
 uint64_t PayloadFile::nextRecord() {
-  CURVISPLAT_CHECK(records_ != RecordMarkers::none);
-  const uint64_t marker_bytes = records_ == RecordMarkers::bytes8 ? 8 : 4;
+  CURVISPLAT_CHECK(records_ != RecordMarkers::kNone);
+  const uint64_t marker_bytes = records_ == RecordMarkers::kBytes8 ? 8 : 4;
   uint64_t record_bytes = 0;
   for (bool first = true, more = true; more; first = false) {
     const uint64_t begin = end_in_file_;
@@ -45,7 +45,7 @@ uint64_t PayloadFile::nextRecord() {
       throw RecordMismatch("the file ends at byte {} where a record should begin at {}", file_size_, begin);
     const int64_t leading = markerAt(begin);
     more = leading < 0;
-    if (more && records_ == RecordMarkers::bytes8)
+    if (more && records_ == RecordMarkers::kBytes8)
       throw RecordMismatch("the record marker at byte {} is {}", begin, leading);
     const uint64_t bytes =
         more ? uint64_t{0} - static_cast<uint64_t>(leading) : static_cast<uint64_t>(leading);

@@ -39,9 +39,9 @@ std::string decidingOptions(const std::vector<Plot3dFit>& fits) {
   return options;
 }
 
-std::string inWords(const std::vector<Plot3dKind>& kinds) {
+std::string describe(const std::vector<Plot3dKind>& kinds) {
   std::string words;
-  for (const Plot3dKind kind : kinds) words += (words.empty() ? "" : " or ") + curvisplat::inWords(kind);
+  for (const Plot3dKind kind : kinds) words += (words.empty() ? "" : " or ") + curvisplat::describe(kind);
   return words;
 }
 
@@ -51,7 +51,7 @@ class Detection {
   Detection(std::shared_ptr<const InputFile> file, const Plot3dForce& force,
             const std::filesystem::path& temporary_folder, std::vector<Plot3dKind> kinds)
       : path_(file->path().string()), force_(force) {
-    if (file->size() == 0) throw Error("{}: is empty; expected a PLOT3D {}", path_, inWords(kinds));
+    if (file->size() == 0) throw Error("{}: is empty; expected a PLOT3D {}", path_, describe(kinds));
     CURVISPLAT_CHECK(!force.precision_bytes || *force.precision_bytes == 4 || *force.precision_bytes == 8);
     file_size_ = file->size();
     candidates_ = {file, file_size_, force.ascii.value_or(looksLikeText(*file)), std::move(kinds), force};
@@ -79,7 +79,7 @@ class Detection {
           "{}: {} of {} is followed by {} bytes that look like a truncated iblank; get the whole file, or "
           "read "
           "it without iblank (--iblank no)",
-          path_, curvisplat::inWords(fit.layout), curvisplat::inWords(fit.blocks), fit.trailing_bytes);
+          path_, curvisplat::describe(fit.layout), curvisplat::describe(fit.blocks), fit.trailing_bytes);
     return {std::move(fit), writtenPrecision(fit.layout)};
   }
 
@@ -104,8 +104,8 @@ class Detection {
   [[noreturn]] void failMismatch(const Plot3dFit& fit, const std::filesystem::path& grid_path,
                                  const std::vector<Plot3dBlock>& grid_blocks) const {
     throw Error("{}: this {} has {}, but the grid {} has {}; give a solution of the same grid", path_,
-                curvisplat::inWords(fit.layout.kind), curvisplat::inWords(fit.blocks), grid_path.string(),
-                curvisplat::inWords(grid_blocks));
+                curvisplat::describe(fit.layout.kind), curvisplat::describe(fit.blocks), grid_path.string(),
+                curvisplat::describe(grid_blocks));
   }
 
   static bool sameDimensions(const std::vector<Plot3dBlock>& a, const std::vector<Plot3dBlock>& b) {
@@ -124,22 +124,22 @@ class Detection {
     const auto flat = [](const Plot3dFit& fit) { return fit.layout.two_dimensional; };
     if (std::all_of(fits.begin(), fits.end(), flat))
       throw Error("{}: is a 2-D {} ({}); only 3-D files are read", path_,
-                  curvisplat::inWords(fits.front().layout.kind), curvisplat::inWords(fits.front().layout));
+                  curvisplat::describe(fits.front().layout.kind), curvisplat::describe(fits.front().layout));
     std::erase_if(fits, flat);
   }
 
   /// A single solution of the grid's dimensions and the exact size is taken whatever its values: fields may
   /// well have fill values and be denormal.
   void keepPlausible(std::vector<Plot3dFit>& fits) const {
-    const bool solution = fits.front().layout.kind != Plot3dKind::grid;
+    const bool solution = fits.front().layout.kind != Plot3dKind::kGrid;
     if (fits.size() == 1 && solution && fits.front().trailing_bytes == 0) return;
     if (force_.byte_order && force_.precision_bytes && force_.records) return;
     std::vector<Plot3dFit> kept;
     std::string reason;
     for (const Plot3dFit& fit : fits) {
       if (const auto implausible = implausibility(fit))
-        reason = fmt::format("{} of {} fits in size, but {}", curvisplat::inWords(fit.layout),
-                             curvisplat::inWords(fit.blocks), *implausible);
+        reason = fmt::format("{} of {} fits in size, but {}", curvisplat::describe(fit.layout),
+                             curvisplat::describe(fit.blocks), *implausible);
       else
         kept.push_back(fit);
     }
@@ -154,18 +154,18 @@ class Detection {
     std::string layouts;
     for (const Plot3dFit& fit : fits)
       layouts +=
-          fmt::format("{}{} of {} ({})", layouts.empty() ? "" : "; ", curvisplat::inWords(fit.layout.kind),
-                      curvisplat::inWords(fit.blocks), curvisplat::inWords(fit.layout));
+          fmt::format("{}{} of {} ({})", layouts.empty() ? "" : "; ", curvisplat::describe(fit.layout.kind),
+                      curvisplat::describe(fit.blocks), curvisplat::describe(fit.layout));
     throw Error("{}: fits {} layouts equally well: {}; say which with {}", path_, fits.size(), layouts,
                 decidingOptions(fits));
   }
 
   [[noreturn]] void failUnfit(std::vector<Plot3dMisfit> misfits,
                               const std::vector<Plot3dBlock>* grid_blocks) const {
-    const std::string expected = inWords(candidates_.kinds);
+    const std::string expected = describe(candidates_.kinds);
     const auto rank = [&](const Plot3dMisfit& misfit) {
       const bool of_grid = grid_blocks && sameDimensions(misfit.blocks, *grid_blocks);
-      const bool markers_agree = misfit.layout.records != RecordMarkers::none;
+      const bool markers_agree = misfit.layout.records != RecordMarkers::kNone;
       return 4 * misfit.reached + 2 * of_grid + markers_agree;
     };
     const auto furthest = std::max_element(misfits.begin(), misfits.end(),
@@ -173,30 +173,30 @@ class Detection {
     std::string finding = "no header of plausible dimensions was found";
     if (furthest != misfits.end() && furthest->reached >= LayoutMisfit::first_record) {
       finding = fmt::format("read as {} {}: {}", attemptInWords(furthest->layout),
-                            curvisplat::inWords(furthest->layout.kind), furthest->reason);
+                            curvisplat::describe(furthest->layout.kind), furthest->reason);
     }
     throw Error("{}: its {} bytes fit no PLOT3D {}; {}{}", path_, file_size_, expected, finding, hint());
   }
 
   /// Only what was decided before the sizes were looked at.
   static std::string attemptInWords(const Plot3dLayout& layout) {
-    std::string words = layout.ascii                          ? "ASCII"
-                        : layout.byte_order == ByteOrder::big ? "big-endian"
-                                                              : "little-endian";
-    if (!layout.ascii) words += layout.records == RecordMarkers::none ? " C" : " Fortran";
+    std::string words = layout.ascii                           ? "ASCII"
+                        : layout.byte_order == ByteOrder::kBig ? "big-endian"
+                                                               : "little-endian";
+    if (!layout.ascii) words += layout.records == RecordMarkers::kNone ? " C" : " Fortran";
     return words + (layout.multi_block ? " multi-block" : " single-block");
   }
 
   /// What the file would be without the options, or as another kind.
   std::string hint() const {
     Plot3dCandidates others = candidates_;
-    others.kinds = {Plot3dKind::grid, Plot3dKind::q, Plot3dKind::overflow, Plot3dKind::function};
+    others.kinds = {Plot3dKind::kGrid, Plot3dKind::kQ, Plot3dKind::kOverflow, Plot3dKind::kFunction};
     others.force = {};
     const Plot3dFits found = fitPlot3d(others);
     for (const Plot3dFit& fit : found.fits)
       if (fit.trailing_bytes == 0 && !fit.layout.two_dimensional)
-        return fmt::format("; it would fit as a {} of {}, {}", curvisplat::inWords(fit.layout.kind),
-                           curvisplat::inWords(fit.blocks), curvisplat::inWords(fit.layout));
+        return fmt::format("; it would fit as a {} of {}, {}", curvisplat::describe(fit.layout.kind),
+                           curvisplat::describe(fit.blocks), curvisplat::describe(fit.layout));
     return "";
   }
 
@@ -211,7 +211,7 @@ class Detection {
 
 DetectedPlot3d detectPlot3dGrid(std::shared_ptr<const InputFile> file, const Plot3dForce& force,
                                 const std::filesystem::path& temporary_folder) {
-  return Detection(std::move(file), force, temporary_folder, {Plot3dKind::grid}).run(nullptr, nullptr);
+  return Detection(std::move(file), force, temporary_folder, {Plot3dKind::kGrid}).run(nullptr, nullptr);
 }
 
 DetectedPlot3d detectPlot3dSolution(std::shared_ptr<const InputFile> file, const Plot3dForce& force,
@@ -219,7 +219,7 @@ DetectedPlot3d detectPlot3dSolution(std::shared_ptr<const InputFile> file, const
                                     const std::filesystem::path& grid_path,
                                     const std::vector<Plot3dBlock>& grid_blocks) {
   return Detection(std::move(file), force, temporary_folder,
-                   {Plot3dKind::q, Plot3dKind::overflow, Plot3dKind::function})
+                   {Plot3dKind::kQ, Plot3dKind::kOverflow, Plot3dKind::kFunction})
       .run(&grid_path, &grid_blocks);
 }
 

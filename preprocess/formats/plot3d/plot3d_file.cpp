@@ -114,8 +114,8 @@ void Plot3dFile::readIblank(uint32_t block, const NodeBox& box, std::span<int32_
 /// The numbers before a block's values, without the integer among OVERFLOW's.
 std::vector<double> Plot3dFile::parameters(uint32_t block) const {
   const Plot3dLayout& layout = fit_.layout;
-  CURVISPLAT_CHECK(layout.kind == Plot3dKind::q || layout.kind == Plot3dKind::overflow);
-  const bool overflow = layout.kind == Plot3dKind::overflow;
+  CURVISPLAT_CHECK(layout.kind == Plot3dKind::kQ || layout.kind == Plot3dKind::kOverflow);
+  const bool overflow = layout.kind == Plot3dKind::kOverflow;
   const auto width = static_cast<size_t>(layout.precision_bytes);
   const size_t before = overflow ? kBeforeInteger : 4;
   const size_t behind = overflow ? kBehindInteger + std::max(2u, fit_.species) : 0;
@@ -139,12 +139,12 @@ std::vector<double> Plot3dFile::parameters(uint32_t block) const {
 FlowConditions Plot3dFile::conditions(uint32_t block) const {
   const std::vector<double> values = parameters(block);
   // OVERFLOW's first Mach number is what the solution is normalised by; the freestream's comes third last.
-  const double freestream = fit_.layout.kind == Plot3dKind::overflow ? values[values.size() - 3] : 0;
+  const double freestream = fit_.layout.kind == Plot3dKind::kOverflow ? values[values.size() - 3] : 0;
   return {"", block, freestream > 0 ? freestream : values[0], values[1], values[2], values[3]};
 }
 
 double Plot3dFile::freestreamGamma() const {
-  CURVISPLAT_CHECK(fit_.layout.kind == Plot3dKind::overflow);
+  CURVISPLAT_CHECK(fit_.layout.kind == Plot3dKind::kOverflow);
   return parameters(0)[4];
 }
 

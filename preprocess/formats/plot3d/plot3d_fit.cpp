@@ -16,12 +16,12 @@ namespace {
 /// OVERFLOW file, thirteen numbers, one integer, and a gas constant for each of at least two species.
 uint64_t conditionBytes(const Plot3dLayout& layout, uint32_t species) {
   const auto precision = static_cast<uint64_t>(layout.precision_bytes);
-  if (layout.kind == Plot3dKind::overflow) return (13 + std::max(2u, species)) * precision + 4;
-  return layout.kind == Plot3dKind::q ? 4 * precision : 0;
+  if (layout.kind == Plot3dKind::kOverflow) return (13 + std::max(2u, species)) * precision + 4;
+  return layout.kind == Plot3dKind::kQ ? 4 * precision : 0;
 }
 
 bool hasConditions(const Plot3dLayout& layout) {
-  return layout.kind == Plot3dKind::q || layout.kind == Plot3dKind::overflow;
+  return layout.kind == Plot3dKind::kQ || layout.kind == Plot3dKind::kOverflow;
 }
 
 uint64_t valueBytes(const Plot3dLayout& layout, uint64_t nodes, uint32_t components) {
@@ -35,7 +35,7 @@ std::vector<Plot3dLayout> variants(const Plot3dLayout& base, const Plot3dForce& 
   for (const int precision : {4, 8}) {
     if (base.ascii ? precision != 8 : force.precision_bytes.value_or(precision) != precision) continue;
     for (const bool blanking : {false, true}) {
-      if (base.kind == Plot3dKind::grid ? force.blanking.value_or(blanking) != blanking : blanking) continue;
+      if (base.kind == Plot3dKind::kGrid ? force.blanking.value_or(blanking) != blanking : blanking) continue;
       all.push_back(base);
       all.back().precision_bytes = precision;
       all.back().blanking = blanking;
@@ -44,7 +44,7 @@ std::vector<Plot3dLayout> variants(const Plot3dLayout& base, const Plot3dForce& 
   return all;
 }
 
-std::string inWords(const Plot3dBlock& block) {
+std::string describe(const Plot3dBlock& block) {
   return fmt::format("{}x{}x{}", block.ni, block.nj, block.nk);
 }
 
@@ -56,7 +56,7 @@ std::string expectations(const std::vector<Plot3dLayout>& layouts, const Bytes& 
     words += fmt::format("{}{}", words.empty() ? "" : ", ", bytes(layout));
     if (layout.ascii) continue;
     words += layout.precision_bytes == 8 ? " (double precision" : " (single precision";
-    words += layout.kind == Plot3dKind::grid ? layout.blanking ? ", iblank)" : ", no iblank)" : ")";
+    words += layout.kind == Plot3dKind::kGrid ? layout.blanking ? ", iblank)" : ", no iblank)" : ")";
   }
   return words;
 }
@@ -72,7 +72,7 @@ std::vector<std::vector<uint64_t>> hopRecords(PayloadFile& payload, const Plot3d
         records[b].push_back(payload.nextRecord());
       } catch (const RecordMismatch& mismatch) {
         throw LayoutMisfit{LayoutMisfit::dimensions, fmt::format("block {} of {} nodes: {}", b + 1,
-                                                                 inWords(blocks[b]), mismatch.what())};
+                                                                 describe(blocks[b]), mismatch.what())};
       }
     }
   }
@@ -104,10 +104,10 @@ void fitRecords(const std::vector<Plot3dLayout>& layouts, PayloadFile payload, c
           LayoutMisfit::known_structure,
           fmt::format("block {} of {} nodes has a record for each k-plane; only the whole format, one "
                       "record a block, is read",
-                      b + 1, inWords(block))};
+                      b + 1, describe(block))};
     throw LayoutMisfit{LayoutMisfit::dimensions,
                        fmt::format("block {} of {} nodes has a record of {} bytes, expected: {}", b + 1,
-                                   inWords(block), records[b].back(), expectations(layouts, expected))};
+                                   describe(block), records[b].back(), expectations(layouts, expected))};
   }
   bool fits = false;
   for (const Plot3dLayout& layout : layouts) {
@@ -157,7 +157,7 @@ void fitSize(const std::vector<Plot3dLayout>& layouts, const PayloadFile& payloa
   const uint64_t unit = layouts.front().ascii ? sizeof(double) : 1;
   throw LayoutMisfit{
       near ? LayoutMisfit::dimensions : LayoutMisfit::first_record,
-      fmt::format("{} should have {} {}, it has {}", curvisplat::inWords(header.blocks),
+      fmt::format("{} should have {} {}, it has {}", curvisplat::describe(header.blocks),
                   unit == 1 ? "bytes:" : "numbers:",
                   expectations(layouts, [&](const Plot3dLayout& l) { return expected(l) / unit; }),
                   payload.size() / unit)};
@@ -170,7 +170,7 @@ void fitHeader(const Plot3dCandidates& candidates, const Plot3dLayout& base, Plo
     const Plot3dHeader header = readPlot3dHeader(payload, base, candidates.size);
     blocks = header.blocks;
     const auto layouts = variants(base, candidates.force);
-    if (base.records == RecordMarkers::none)
+    if (base.records == RecordMarkers::kNone)
       fitSize(layouts, payload, header, found);
     else
       fitRecords(layouts, std::move(payload), header, found);
@@ -196,19 +196,19 @@ Plot3dFits fitPlot3d(const Plot3dCandidates& candidates) {
         layout.multi_block = multi_block;
         layout.two_dimensional = two_dimensional;
         if (candidates.ascii) {
-          if (kind == Plot3dKind::overflow) continue;
+          if (kind == Plot3dKind::kOverflow) continue;
           layout.ascii = true;
           layout.byte_order = kMachineByteOrder;
           layout.precision_bytes = 8;
           fitHeader(candidates, layout, found);
           continue;
         }
-        for (const ByteOrder order : {ByteOrder::little, ByteOrder::big}) {
+        for (const ByteOrder order : {ByteOrder::kLittle, ByteOrder::kBig}) {
           if (force.byte_order.value_or(order) != order) continue;
-          for (const auto records : {RecordMarkers::none, RecordMarkers::bytes4, RecordMarkers::bytes8}) {
+          for (const auto records : {RecordMarkers::kNone, RecordMarkers::kBytes4, RecordMarkers::kBytes8}) {
             if (force.records.value_or(records) != records) continue;
             // OVERFLOW is a Fortran program.
-            if (kind == Plot3dKind::overflow && records == RecordMarkers::none) continue;
+            if (kind == Plot3dKind::kOverflow && records == RecordMarkers::kNone) continue;
             layout.byte_order = order;
             layout.records = records;
             fitHeader(candidates, layout, found);

@@ -20,7 +20,7 @@ class HeaderReader {
 
   /// The bytes of the next record; nothing in a file without records.
   std::optional<uint64_t> record() {
-    if (layout_.records == RecordMarkers::none) return std::nullopt;
+    if (layout_.records == RecordMarkers::kNone) return std::nullopt;
     return payload_.nextRecord();
   }
 
@@ -69,7 +69,7 @@ uint64_t readBlockCount(HeaderReader& reader, const Plot3dLayout& layout, uint64
 /// What a dimension record of `bytes` holds instead, if that is known.
 std::string explainDimensionRecord(const Plot3dLayout& layout, uint64_t blocks, uint64_t bytes) {
   if (layout.two_dimensional) return "";
-  if (layout.kind == Plot3dKind::function && bytes == 12 * blocks)
+  if (layout.kind == Plot3dKind::kFunction && bytes == 12 * blocks)
     return "; the number of variables is missing";
   return "";
 }
@@ -110,20 +110,20 @@ Plot3dHeader readPlot3dHeader(PayloadFile& payload, const Plot3dLayout& layout, 
   HeaderReader reader(payload, layout);
   const uint64_t count = readBlockCount(reader, layout, file_size);
   const uint64_t axes = layout.two_dimensional ? 2 : 3;
-  const uint64_t numbers = axes + (layout.kind == Plot3dKind::function ? 1 : 0);
-  const uint64_t overall = layout.kind == Plot3dKind::overflow ? 2 : 0;  // nq and nqc
+  const uint64_t numbers = axes + (layout.kind == Plot3dKind::kFunction ? 1 : 0);
+  const uint64_t overall = layout.kind == Plot3dKind::kOverflow ? 2 : 0;  // nq and nqc
   if (const auto bytes = reader.record(); bytes && *bytes != 4 * (numbers * count + overall)) {
     const std::string explanation = explainDimensionRecord(layout, count, *bytes);
     throw LayoutMisfit{explanation.empty() ? LayoutMisfit::first_record : LayoutMisfit::known_structure,
                        fmt::format("the dimension record has {} bytes where {} block{} of a {} need {}{}",
-                                   *bytes, count, count == 1 ? "" : "s", inWords(layout.kind),
+                                   *bytes, count, count == 1 ? "" : "s", describe(layout.kind),
                                    4 * (numbers * count + overall), explanation)};
   }
   const std::vector<int64_t> dimensions = reader.integers(numbers * count);
   const std::vector<int64_t> quantities = reader.integers(overall);
 
   Plot3dHeader header;
-  header.components = static_cast<uint32_t>(layout.kind == Plot3dKind::q ? axes + 2 : axes);
+  header.components = static_cast<uint32_t>(layout.kind == Plot3dKind::kQ ? axes + 2 : axes);
   header.blocks.reserve(count);
   uint64_t nodes_left = file_size;  // a node takes more than a byte, and so no sum of sizes overflows
   for (uint64_t b = 0; b < count; ++b) {
@@ -132,7 +132,7 @@ Plot3dHeader readPlot3dHeader(PayloadFile& payload, const Plot3dLayout& layout, 
     nodes_left -= nodes;
     header.blocks.push_back({static_cast<uint64_t>(at[0]), static_cast<uint64_t>(at[1]),
                              layout.two_dimensional ? 1 : static_cast<uint64_t>(at[2])});
-    if (layout.kind != Plot3dKind::function) continue;
+    if (layout.kind != Plot3dKind::kFunction) continue;
     const int64_t variables = at[axes];
     if (variables < 1 || static_cast<uint64_t>(variables) > file_size / nodes)
       throw LayoutMisfit{LayoutMisfit::first_record,
@@ -142,7 +142,7 @@ Plot3dHeader readPlot3dHeader(PayloadFile& payload, const Plot3dLayout& layout, 
                                                                b + 1, variables, header.components)};
     header.components = static_cast<uint32_t>(variables);
   }
-  if (layout.kind == Plot3dKind::overflow) readQuantities(quantities, nodes_left, file_size, header);
+  if (layout.kind == Plot3dKind::kOverflow) readQuantities(quantities, nodes_left, file_size, header);
   header.bytes = reader.offset();
   return header;
 }

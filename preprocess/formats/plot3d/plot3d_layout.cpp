@@ -4,34 +4,34 @@
 
 namespace curvisplat {
 
-std::string inWords(Plot3dKind kind) {
+std::string describe(Plot3dKind kind) {
   switch (kind) {
-    case Plot3dKind::grid:
+    case Plot3dKind::kGrid:
       return "grid";
-    case Plot3dKind::q:
+    case Plot3dKind::kQ:
       return "Q solution";
-    case Plot3dKind::overflow:
+    case Plot3dKind::kOverflow:
       return "OVERFLOW Q solution";
-    case Plot3dKind::function:
+    case Plot3dKind::kFunction:
       break;
   }
   return "function file";
 }
 
-std::string inWords(const Plot3dLayout& layout) {
+std::string describe(const Plot3dLayout& layout) {
   std::string words;
   if (layout.ascii) {
     words = "ASCII";
   } else {
-    words = layout.byte_order == ByteOrder::big ? "big-endian" : "little-endian";
+    words = layout.byte_order == ByteOrder::kBig ? "big-endian" : "little-endian";
     switch (layout.records) {
-      case RecordMarkers::none:
+      case RecordMarkers::kNone:
         words += ", C (no record markers)";
         break;
-      case RecordMarkers::bytes4:
+      case RecordMarkers::kBytes4:
         words += ", Fortran (4-byte record markers)";
         break;
-      case RecordMarkers::bytes8:
+      case RecordMarkers::kBytes8:
         words += ", Fortran (8-byte record markers)";
         break;
     }
@@ -39,11 +39,11 @@ std::string inWords(const Plot3dLayout& layout) {
   }
   words += layout.multi_block ? ", multi-block" : ", single-block";
   if (layout.two_dimensional) words += ", 2-D";
-  if (layout.kind == Plot3dKind::grid) words += layout.blanking ? ", iblank" : ", no iblank";
+  if (layout.kind == Plot3dKind::kGrid) words += layout.blanking ? ", iblank" : ", no iblank";
   return words;
 }
 
-std::string inWords(const std::vector<Plot3dBlock>& blocks) {
+std::string describe(const std::vector<Plot3dBlock>& blocks) {
   constexpr size_t kNamed = 4;
   std::string words = blocks.size() == 1 ? "1 block of " : fmt::format("{} blocks (", blocks.size());
   for (size_t n = 0; n < blocks.size() && n < kNamed; ++n)

@@ -18,15 +18,15 @@
 
 namespace curvisplat {
 
-enum class Plot3dKind { grid, q, overflow, function };
+enum class Plot3dKind { kGrid, kQ, kOverflow, kFunction };
 
 /// An ASCII file's layout is that of its spool (ascii_spool.h): numbers and integers are doubles in the
 /// machine's byte order, without records.
 struct Plot3dLayout {
-  Plot3dKind kind = Plot3dKind::grid;
+  Plot3dKind kind = Plot3dKind::kGrid;
   bool ascii = false;
-  ByteOrder byte_order = ByteOrder::little;
-  RecordMarkers records = RecordMarkers::none;
+  ByteOrder byte_order = ByteOrder::kLittle;
+  RecordMarkers records = RecordMarkers::kNone;
   int precision_bytes = 4;
   bool multi_block = false;
   bool blanking = false;         // grids only
@@ -42,11 +42,11 @@ struct Plot3dBlock {
 };
 
 /// "grid", "Q solution", "OVERFLOW Q solution", "function file".
-std::string inWords(Plot3dKind kind);
+std::string describe(Plot3dKind kind);
 /// "big-endian, C (no record markers), single precision, one block, no iblank"; the options that force it use
 /// the same words.
-std::string inWords(const Plot3dLayout& layout);
+std::string describe(const Plot3dLayout& layout);
 /// "1 block of 40x32x32"; "12 blocks (8x12x12, 8x12x12, 4x4x4, ...)".
-std::string inWords(const std::vector<Plot3dBlock>& blocks);
+std::string describe(const std::vector<Plot3dBlock>& blocks);
 
 }  // namespace curvisplat

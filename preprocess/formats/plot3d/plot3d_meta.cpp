@@ -149,10 +149,10 @@ void takeLayout(const Meta& meta, Plot3dForce& force) {
   setIfOpen(force.blanking, meta.flag("blanking"));
   if (force.ascii.value_or(false)) return;
   if (const auto order = meta.word("byte-order", {"little", "big"}))
-    setIfOpen(force.byte_order, {*order == "big" ? ByteOrder::big : ByteOrder::little});
+    setIfOpen(force.byte_order, {*order == "big" ? ByteOrder::kBig : ByteOrder::kLittle});
   // Fortran's markers are of 4 or 8 bytes: detected.
   if (const auto language = meta.word("language", {"fortran", "c"}); language == "c")
-    setIfOpen(force.records, {RecordMarkers::none});
+    setIfOpen(force.records, {RecordMarkers::kNone});
   if (const auto bits = meta.number("precision")) {
     if (*bits != 32 && *bits != 64) meta.fail("precision", "32 or 64", Json(*bits));
     setIfOpen(force.precision_bytes, {*bits == 64 ? 8 : 4});

@@ -101,8 +101,8 @@ std::optional<std::string> implausibility(const Plot3dFit& fit) {
 
 bool trailingLooksLikeIblank(const Plot3dFit& fit) {
   const uint64_t width = fit.layout.integerBytes();
-  if (fit.layout.kind != Plot3dKind::grid || fit.layout.blanking ||
-      fit.layout.records != RecordMarkers::none || fit.trailing_bytes < width)
+  if (fit.layout.kind != Plot3dKind::kGrid || fit.layout.blanking ||
+      fit.layout.records != RecordMarkers::kNone || fit.trailing_bytes < width)
     return false;
   Plot3dFit behind = fit;  // the trailing bytes as the iblank of a block of one row
   const uint64_t count = std::min<uint64_t>(fit.trailing_bytes / width, 1024);

@@ -66,9 +66,9 @@ void Plot3dSource::addSolution(const std::filesystem::path& path, const OpenGrid
   describe(path, file);
   for (uint32_t component = 0; component < file.components(); ++component)
     components_.push_back({solutions_.size(), component});
-  if (file.layout().kind != Plot3dKind::function) {
+  if (file.layout().kind != Plot3dKind::kFunction) {
     description_.scalars.insert(description_.scalars.end(), qScalars().begin(), qScalars().end());
-    if (file.layout().kind == Plot3dKind::overflow) addOverflowScalars(file);
+    if (file.layout().kind == Plot3dKind::kOverflow) addOverflowScalars(file);
     for (uint32_t block = 0; block < file.blocks().size(); ++block) {
       description_.flow.push_back(file.conditions(block));
       description_.flow.back().file = path.string();
@@ -121,9 +121,9 @@ void Plot3dSource::addFunctionNames(const std::filesystem::path& path, const Plo
 
 void Plot3dSource::describe(const std::filesystem::path& path, const Plot3dFile& file) {
   description_.files.push_back(path.string());
-  description_.format +=
-      fmt::format("{} {} {}: {}", description_.files.size() == 1 ? "" : ";", inWords(file.layout().kind),
-                  path.filename().string(), inWords(file.layout()));
+  description_.format += fmt::format("{} {} {}: {}", description_.files.size() == 1 ? "" : ";",
+                                     curvisplat::describe(file.layout().kind), path.filename().string(),
+                                     curvisplat::describe(file.layout()));
   if (file.trailingBytes() == 0) return;
   if (file.layout().ascii)
     description_.warnings.push_back(fmt::format("{}: {} trailing numbers ignored", path.filename().string(),

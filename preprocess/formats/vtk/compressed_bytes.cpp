@@ -24,7 +24,7 @@ struct Table {
 /// How many times as large as it is a block can become. Of zlib this is its specification's figure, of LZ4
 /// the 255 bytes that each further byte of a length stands for.
 uint64_t mostUnpacked(BlockCompressor compressor, uint64_t packed) {
-  const uint64_t ratio = compressor == BlockCompressor::zlib ? 1032 : 255;
+  const uint64_t ratio = compressor == BlockCompressor::kZlib ? 1032 : 255;
   return packed > UINT64_MAX / ratio - 64 ? UINT64_MAX : packed * ratio + 64;
 }
 
@@ -223,7 +223,7 @@ std::span<const std::byte> CompressedBytes::unpacked(uint64_t block) const {
   kept.packed.resize(static_cast<size_t>(place.bytes));
   kept.bytes.resize(static_cast<size_t>(bytesOf(block)));
   parts_.blocks->readAt(place.offset, kept.packed);
-  if (parts_.compressor == BlockCompressor::zlib)
+  if (parts_.compressor == BlockCompressor::kZlib)
     unpackZlib(parts_.place, block, kept.packed, kept.bytes);
   else
     unpackLz4(parts_.place, block, kept.packed, kept.bytes);
@@ -247,7 +247,7 @@ void CompressedBytes::readAt(uint64_t offset, std::span<std::byte> to) const {
 std::shared_ptr<const ByteSource> compressedBytes(CompressedBytes::Parts parts, uint64_t size,
                                                   const std::shared_ptr<SpoolFile>& spool) {
   const Table table = readTable(parts, size);
-  if (table.block_bytes <= kLargestBlockInMemory || parts.compressor != BlockCompressor::zlib)
+  if (table.block_bytes <= kLargestBlockInMemory || parts.compressor != BlockCompressor::kZlib)
     return std::make_shared<CompressedBytes>(std::move(parts), size);
   forEachBlock(parts, table, [](uint64_t, uint64_t, uint64_t) {});
   return std::make_shared<SpooledBytes>(

@@ -15,12 +15,12 @@
 
 namespace curvisplat {
 
-enum class BlockCompressor { zlib, lz4 };
+enum class BlockCompressor { kZlib, kLz4 };
 
 /// Integers as the heads of a file's arrays have them.
 struct HeaderIntegers {
   size_t bytes = 4;  // 4 or 8
-  ByteOrder order = ByteOrder::little;
+  ByteOrder order = ByteOrder::kLittle;
 
   uint64_t at(std::span<const std::byte> stored) const;
   uint64_t at(const ByteSource& source, uint64_t offset) const;
@@ -34,7 +34,7 @@ class CompressedBytes final : public ByteSource {
   struct Parts {
     std::shared_ptr<const ByteSource> table, blocks;
     HeaderIntegers integers;
-    BlockCompressor compressor = BlockCompressor::zlib;
+    BlockCompressor compressor = BlockCompressor::kZlib;
     std::string place;  // for errors: "FILE: array NAME"
   };
 

@@ -13,31 +13,31 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kBufferBytes = size_t{256} << 10;
-static_assert(kBufferBytes >= kMostComponents * sizeof(double));
+static_assert(kBufferBytes >= kMaxComponents * sizeof(double));
 
 /// Calls use(Stored{}) with the C++ type that `type` stands for.
 template <typename Use>
 auto withType(VtkType type, const Use& use) {
   switch (type) {
-    case VtkType::int8:
+    case VtkType::kInt8:
       return use(int8_t{});
-    case VtkType::uint8:
+    case VtkType::kUint8:
       return use(uint8_t{});
-    case VtkType::int16:
+    case VtkType::kInt16:
       return use(int16_t{});
-    case VtkType::uint16:
+    case VtkType::kUint16:
       return use(uint16_t{});
-    case VtkType::int32:
+    case VtkType::kInt32:
       return use(int32_t{});
-    case VtkType::uint32:
+    case VtkType::kUint32:
       return use(uint32_t{});
-    case VtkType::int64:
+    case VtkType::kInt64:
       return use(int64_t{});
-    case VtkType::uint64:
+    case VtkType::kUint64:
       return use(uint64_t{});
-    case VtkType::float32:
+    case VtkType::kFloat32:
       return use(float{});
-    case VtkType::float64:
+    case VtkType::kFloat64:
       break;
   }
   return use(double{});

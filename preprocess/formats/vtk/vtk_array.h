@@ -16,16 +16,27 @@
 
 namespace curvisplat {
 
-enum class VtkType : uint8_t { int8, uint8, int16, uint16, int32, uint32, int64, uint64, float32, float64 };
+enum class VtkType : uint8_t {
+  kInt8,
+  kUint8,
+  kInt16,
+  kUint16,
+  kInt32,
+  kUint32,
+  kInt64,
+  kUint64,
+  kFloat32,
+  kFloat64
+};
 
 size_t bytesOf(VtkType type);
 
 struct VtkArray {
   std::string name;
-  VtkType type = VtkType::float32;
+  VtkType type = VtkType::kFloat32;
   uint32_t components = 1;
   uint64_t tuples = 0;
-  ByteOrder order = ByteOrder::little;
+  ByteOrder order = ByteOrder::kLittle;
   std::shared_ptr<const ByteSource> bytes;
   std::vector<std::string> component_names;  // empty, or one for each
 
@@ -33,7 +44,7 @@ struct VtkArray {
 };
 
 /// More components are more than the buffer of a reading thread is good for.
-inline constexpr uint32_t kMostComponents = 4096;
+inline constexpr uint32_t kMaxComponents = 4096;
 
 /// What to make of a tuple, and where to put it.
 template <typename Value>

@@ -10,7 +10,7 @@ namespace curvisplat {
 namespace {
 
 /// Faces of a box in a partition touch those of six others; more parts than this are no partition.
-constexpr size_t kMostPartsOfAPiece = 64;
+constexpr size_t kMaxPartsOfAPiece = 64;
 
 bool shareCells(const VtkExtent& a, const VtkExtent& b) {
   for (size_t axis = 0; axis < 3; ++axis)
@@ -45,7 +45,7 @@ bool VtkExtent::isFlat() const {
   return nodesAlong(0) < 2 || nodesAlong(1) < 2 || nodesAlong(2) < 2;
 }
 
-std::string VtkExtent::inWords() const {
+std::string VtkExtent::describe() const {
   return fmt::format("{}x{}x{}", nodesAlong(0), nodesAlong(1), nodesAlong(2));
 }
 
@@ -63,7 +63,7 @@ std::vector<std::vector<VtkExtent>> ownedParts(const std::vector<VtkExtent>& pie
           left.push_back(part);
       }
       parts = std::move(left);
-      if (parts.size() > kMostPartsOfAPiece)
+      if (parts.size() > kMaxPartsOfAPiece)
         throw Error(
             "piece {} of the grid overlaps those before it in {} parts; expected pieces that abut, or "
             "overlap by ghost levels",

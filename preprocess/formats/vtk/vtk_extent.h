@@ -17,7 +17,7 @@ struct VtkExtent {
   /// As VTK counts them: a flat extent has a layer of cells.
   uint64_t cells() const;
   bool isFlat() const;
-  std::string inWords() const;  // "33x33x16"
+  std::string describe() const;  // "33x33x16"
   bool operator==(const VtkExtent&) const = default;
 };
 

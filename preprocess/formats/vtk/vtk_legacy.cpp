@@ -16,15 +16,24 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kMostNodes = 100'000'000'000'000;
-constexpr uint64_t kMostAlongAxis = uint64_t{1} << 30;
+constexpr uint64_t kMaxNodes = 100'000'000'000'000;
+constexpr uint64_t kMaxAlongAxis = uint64_t{1} << 30;
 
 constexpr std::pair<const char*, VtkType> kTypes[] = {
-    {"char", VtkType::int8},          {"signed_char", VtkType::int8},      {"unsigned_char", VtkType::uint8},
-    {"short", VtkType::int16},        {"unsigned_short", VtkType::uint16}, {"int", VtkType::int32},
-    {"vtkidtype", VtkType::int32},    {"unsigned_int", VtkType::uint32},   {"long", VtkType::int64},
-    {"vtktypeint64", VtkType::int64}, {"unsigned_long", VtkType::uint64},  {"vtktypeuint64", VtkType::uint64},
-    {"float", VtkType::float32},      {"double", VtkType::float64},
+    {"char", VtkType::kInt8},
+    {"signed_char", VtkType::kInt8},
+    {"unsigned_char", VtkType::kUint8},
+    {"short", VtkType::kInt16},
+    {"unsigned_short", VtkType::kUint16},
+    {"int", VtkType::kInt32},
+    {"vtkidtype", VtkType::kInt32},
+    {"unsigned_int", VtkType::kUint32},
+    {"long", VtkType::kInt64},
+    {"vtktypeint64", VtkType::kInt64},
+    {"unsigned_long", VtkType::kUint64},
+    {"vtktypeuint64", VtkType::kUint64},
+    {"float", VtkType::kFloat32},
+    {"double", VtkType::kFloat64},
 };
 
 std::string lowered(std::string_view text) {
@@ -67,7 +76,7 @@ class LegacyReader {
   }
 
  private:
-  enum class Owner { grid, points, cells };
+  enum class Owner { kGrid, kPoints, kCells };
 
   template <typename... Args>
   [[noreturn]] void fail(fmt::format_string<Args...> format, Args&&... args) const {
@@ -91,7 +100,7 @@ class LegacyReader {
   uint64_t count(std::string_view word) const {
     uint64_t value = 0;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc{} || end != word.data() + word.size() || value > kMostNodes)
+    if (error != std::errc{} || end != word.data() + word.size() || value > kMaxNodes)
       fail("has \"{}\" where a count is expected", word.substr(0, 30));
     return value;
   }
@@ -126,7 +135,7 @@ class LegacyReader {
     if (word == "field") return readField();
     if (word == "metadata") return skipMetadata();
     if (word == "point_data" || word == "cell_data") return beginData(word == "cell_data");
-    if (owner_ == Owner::grid) return readNodesPart(word);
+    if (owner_ == Owner::kGrid) return readNodesPart(word);
     readAttribute(word);
   }
 
@@ -134,7 +143,7 @@ class LegacyReader {
     std::array<uint64_t, 3> counts{};
     for (uint64_t& n : counts) n = nextCount();
     for (size_t axis = 0; axis < 3; ++axis) {
-      if (counts[axis] == 0 || counts[axis] > kMostAlongAxis)
+      if (counts[axis] == 0 || counts[axis] > kMaxAlongAxis)
         fail("has DIMENSIONS {} {} {}; expected three counts of nodes", counts[0], counts[1], counts[2]);
       piece_.extent.lower[axis] = 0;
       piece_.extent.upper[axis] = static_cast<int64_t>(counts[axis]) - 1;
@@ -145,7 +154,7 @@ class LegacyReader {
   void readExtent() {
     for (size_t axis = 0; axis < 3; ++axis) {
       const double ends[] = {text_.number(), text_.number()};
-      const auto most = static_cast<double>(kMostAlongAxis);
+      const auto most = static_cast<double>(kMaxAlongAxis);
       if (!(std::abs(ends[0]) < most) || !(std::abs(ends[1]) < most) || ends[1] < ends[0])
         fail("has an EXTENT from {} to {}; expected the first and the last node", ends[0], ends[1]);
       piece_.extent.lower[axis] = static_cast<int64_t>(ends[0]);
@@ -157,7 +166,7 @@ class LegacyReader {
   void checkExtent() {
     double nodes = 1;
     for (size_t axis = 0; axis < 3; ++axis) nodes *= static_cast<double>(piece_.extent.nodesAlong(axis));
-    if (nodes > static_cast<double>(kMostNodes)) fail("has {} nodes, more than any file", nodes);
+    if (nodes > static_cast<double>(kMaxNodes)) fail("has {} nodes, more than any file", nodes);
     if (has_extent_) fail("has a second DIMENSIONS or EXTENT");
     has_extent_ = true;
   }
@@ -174,7 +183,7 @@ class LegacyReader {
       const uint64_t nodes = nextCount();
       if (nodes != piece_.extent.nodes())
         fail("has {} POINTS; expected {}, of {} nodes", nodes, piece_.extent.nodes(),
-             piece_.extent.inWords());
+             piece_.extent.describe());
       piece_.nodes = readNumbers("POINTS", lineOfType(), 3, nodes);
     } else if (axes && word.size() == 13 && word.ends_with("_coordinates") && word[0] >= 'x' &&
                word[0] <= 'z') {
@@ -205,8 +214,8 @@ class LegacyReader {
     tuples_ = nextCount();
     if (tuples_ != expected)
       fail("has {} for {} {}; expected {}, of {} nodes", of_cells ? "CELL_DATA" : "POINT_DATA", tuples_,
-           of_cells ? "cells" : "nodes", expected, piece_.extent.inWords());
-    owner_ = of_cells ? Owner::cells : Owner::points;
+           of_cells ? "cells" : "nodes", expected, piece_.extent.describe());
+    owner_ = of_cells ? Owner::kCells : Owner::kPoints;
   }
 
   void readAttribute(const std::string& word) {
@@ -238,7 +247,7 @@ class LegacyReader {
     const std::vector<std::string> words = restOfLine();
     if (words.empty() || words.size() > 2) fail("has SCALARS {} without a type", name);
     if (lookupTableFollows()) text_.line();
-    std::string& active = owner_ == Owner::cells ? piece_.active_cell_data : piece_.active_point_data;
+    std::string& active = owner_ == Owner::kCells ? piece_.active_cell_data : piece_.active_point_data;
     if (active.empty()) active = name;
     addArray(name, words[0], words.size() == 2 ? count(words[1]) : 1);
   }
@@ -283,7 +292,7 @@ class LegacyReader {
       const std::string type = lineOfType();
       if (lowered(type) == "string")
         skipStrings(components, tuples);
-      else if (owner_ != Owner::grid && tuples == tuples_)
+      else if (owner_ != Owner::kGrid && tuples == tuples_)
         addArray(name, type, components);
       else
         keepTime(readNumbers(name, type, components, tuples));
@@ -291,7 +300,7 @@ class LegacyReader {
   }
 
   void keepTime(const VtkArray& array) {
-    if (owner_ != Owner::grid || array.tuples * array.components != 1) return;
+    if (owner_ != Owner::kGrid || array.tuples * array.components != 1) return;
     if (lowered(array.name) != "time" && array.name != "TimeValue") return;
     double time = 0;
     const WantedComponent<double> wanted{0, &time};
@@ -300,8 +309,7 @@ class LegacyReader {
   }
 
   void skipStrings(uint64_t components, uint64_t tuples) {
-    const uint64_t strings =
-        tuples > 0 && components > kMostNodes / tuples ? kMostNodes : tuples * components;
+    const uint64_t strings = tuples > 0 && components > kMaxNodes / tuples ? kMaxNodes : tuples * components;
     for (uint64_t n = 0; n < strings; ++n) {
       if (ascii_) {
         if (!text_.line()) fail("ends inside of an array of strings; the file is truncated");
@@ -314,7 +322,7 @@ class LegacyReader {
       std::array<std::byte, 8> length{};
       file_->readAt(text_.offset(), std::span(length).last(bytes));
       length[8 - bytes] &= std::byte{0x3f};
-      const auto skipped = loadStored<uint64_t>(length.data(), kMachineByteOrder != ByteOrder::big);
+      const auto skipped = loadStored<uint64_t>(length.data(), kMachineByteOrder != ByteOrder::kBig);
       if (skipped > file_->size() - text_.offset() - bytes)
         fail("has a string of {} bytes; the file is truncated or damaged", skipped);
       text_.seek(text_.offset() + bytes + skipped);
@@ -338,7 +346,7 @@ class LegacyReader {
   }
 
   void addArray(const std::string& name, const std::string& type, uint64_t components) {
-    addDataArray(piece_, owner_ == Owner::cells, readNumbers(name, type, components, tuples_),
+    addDataArray(piece_, owner_ == Owner::kCells, readNumbers(name, type, components, tuples_),
                  grid_.warnings);
   }
 
@@ -351,8 +359,8 @@ class LegacyReader {
                                            [&](const auto& entry) { return type_word == entry.first; });
     if (known == std::end(kTypes))
       fail("array {} has type {}; expected float, double or an integer", name, type);
-    if (components == 0 || components > kMostComponents)
-      fail("array {} has {} components; expected 1 to {}", name, components, kMostComponents);
+    if (components == 0 || components > kMaxComponents)
+      fail("array {} has {} components; expected 1 to {}", name, components, kMaxComponents);
     array.type = known->second;
     array.components = static_cast<uint32_t>(components);
     array.tuples = tuples;
@@ -370,7 +378,7 @@ class LegacyReader {
       spooled->fill();
       array.bytes = spooled;
     } else {
-      array.order = ByteOrder::big;
+      array.order = ByteOrder::kBig;
       array.bytes = std::make_shared<FileBytes>(file_, text_.offset(), text_.offset() + bytes);
       text_.seek(text_.offset() + bytes);
     }
@@ -392,7 +400,7 @@ class LegacyReader {
   bool ascii_ = true;
   std::string dataset_;
   bool uniform_ = false, has_extent_ = false;
-  Owner owner_ = Owner::grid;
+  Owner owner_ = Owner::kGrid;
   uint64_t tuples_ = 0;  // of the owner's arrays
   VtkPiece piece_;
   VtkGrid grid_;

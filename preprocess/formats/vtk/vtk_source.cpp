@@ -17,7 +17,7 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr int kMagnitude = WantedComponent<float>::kMagnitude;
 
 const std::vector<VtkArray>& dataOf(const VtkPiece& piece, Centring centring) {
-  return centring == Centring::node ? piece.point_data : piece.cell_data;
+  return centring == Centring::kNode ? piece.point_data : piece.cell_data;
 }
 
 /// As scalarsNamed() compares names.
@@ -82,8 +82,8 @@ VtkSource::VtkSource(VtkGrid grid) : grid_(std::move(grid)) {
         description_.warnings.end())
       description_.warnings.push_back(std::move(warning));
   addBlocks();
-  addFields(Centring::node);
-  addFields(Centring::cell);
+  addFields(Centring::kNode);
+  addFields(Centring::kCell);
   for (size_t n = 0; n < fields_.size(); ++n) addScalars(fields_[n], n);
   warnOfPartialFields();
 }
@@ -93,7 +93,7 @@ void VtkSource::addBlocks() {
   std::string flat;
   for (VtkBlock& block : grid_.blocks) {
     if (block.extent.isFlat()) {
-      if (flat.empty()) flat = fmt::format("{} ({} nodes)", block.name, block.extent.inWords());
+      if (flat.empty()) flat = fmt::format("{} ({} nodes)", block.name, block.extent.describe());
       continue;
     }
     const VtkPiece& piece = grid_.pieces[block.piece];
@@ -134,7 +134,7 @@ void VtkSource::addFields(Centring centring) {
     for (size_t n = 0; n < data.size(); ++n)
       fields_[fieldOf(data[n], centring)].array_of_piece[block.piece] = static_cast<int32_t>(n);
     if (active.empty())
-      active = centring == Centring::node ? piece.active_point_data : piece.active_cell_data;
+      active = centring == Centring::kNode ? piece.active_point_data : piece.active_cell_data;
   }
   std::stable_partition(fields_.begin() + static_cast<ptrdiff_t>(before), fields_.end(),
                         [&](const Field& field) { return field.name == active; });
@@ -154,7 +154,7 @@ void VtkSource::addScalars(const Field& field, size_t number) {
     scalar.name = field.name + suffix;
     scalar.centring = field.centring;
     if (names.count(scalar.name)) {
-      if (field.centring == Centring::cell) scalar.name = field.name + ":cell" + suffix;
+      if (field.centring == Centring::kCell) scalar.name = field.name + ":cell" + suffix;
       if (names.count(scalar.name)) scalar.name += fmt::format(":{}", number);
     }
     scalar.aliases = std::move(aliases);
@@ -199,7 +199,7 @@ void VtkSource::readField(const Field& field, const VtkBlock& block, const NodeB
   }
   const VtkArray& array = dataOf(piece, field.centring)[static_cast<size_t>(position)];
   const VtkBox node_box = nodesOf(piece, block, box);
-  if (field.centring == Centring::node) {
+  if (field.centring == Centring::kNode) {
     readBox<float>(array, nodeCounts(piece), node_box, wanted);
     return;
   }

@@ -25,7 +25,7 @@ class VtkSource final : public GridSource {
   /// An array that blocks have in common.
   struct Field {
     std::string name;
-    Centring centring = Centring::node;
+    Centring centring = Centring::kNode;
     uint32_t components = 1;
     std::vector<int32_t> array_of_piece;  // its position in the piece's data; -1: it has none
   };

@@ -17,10 +17,10 @@ namespace curvisplat {
 namespace {
 
 constexpr std::pair<const char*, VtkType> kTypes[] = {
-    {"Int8", VtkType::int8},       {"UInt8", VtkType::uint8},   {"Int16", VtkType::int16},
-    {"UInt16", VtkType::uint16},   {"Int32", VtkType::int32},   {"UInt32", VtkType::uint32},
-    {"Int64", VtkType::int64},     {"UInt64", VtkType::uint64}, {"Float32", VtkType::float32},
-    {"Float64", VtkType::float64},
+    {"Int8", VtkType::kInt8},       {"UInt8", VtkType::kUint8},   {"Int16", VtkType::kInt16},
+    {"UInt16", VtkType::kUint16},   {"Int32", VtkType::kInt32},   {"UInt32", VtkType::kUint32},
+    {"Int64", VtkType::kInt64},     {"UInt64", VtkType::kUint64}, {"Float32", VtkType::kFloat32},
+    {"Float64", VtkType::kFloat64},
 };
 
 std::optional<VtkType> typeNamed(const std::string& name) {
@@ -69,16 +69,16 @@ VtkXmlFile::VtkXmlFile(const VtkFiles& files, const std::filesystem::path& path)
   const std::string order = root_.attribute("byte_order").as_string("LittleEndian");
   if (order != "LittleEndian" && order != "BigEndian")
     fail(fmt::format("has byte_order {}; expected LittleEndian or BigEndian", order));
-  header_.order = order == "BigEndian" ? ByteOrder::big : ByteOrder::little;
+  header_.order = order == "BigEndian" ? ByteOrder::kBig : ByteOrder::kLittle;
   const std::string integers = root_.attribute("header_type").as_string("UInt32");
   if (integers != "UInt32" && integers != "UInt64")
     fail(fmt::format("has header_type {}; expected UInt32 or UInt64", integers));
   header_.bytes = integers == "UInt64" ? 8 : 4;
   const std::string compressor = root_.attribute("compressor").value();
   if (compressor == "vtkZLibDataCompressor")
-    compressor_ = BlockCompressor::zlib;
+    compressor_ = BlockCompressor::kZlib;
   else if (compressor == "vtkLZ4DataCompressor")
-    compressor_ = BlockCompressor::lz4;
+    compressor_ = BlockCompressor::kLz4;
   else if (!compressor.empty())
     fail(fmt::format("is compressed by {}; expected zlib or LZ4: write it with one of them", compressor));
 
@@ -101,9 +101,9 @@ pugi::xml_node VtkXmlFile::content() const {
 std::string VtkXmlFile::encoding(const pugi::xml_node& node) const {
   const std::string format = node.attribute("format").as_string("ascii");
   if (format == "ascii") return "ASCII";
-  std::string words = header_.order == ByteOrder::big ? "big-endian" : "little-endian";
+  std::string words = header_.order == ByteOrder::kBig ? "big-endian" : "little-endian";
   words += format == "binary" ? ", inline base64" : appended_base64_ ? ", appended base64" : ", appended raw";
-  if (compressor_) words += *compressor_ == BlockCompressor::zlib ? ", zlib" : ", LZ4";
+  if (compressor_) words += *compressor_ == BlockCompressor::kZlib ? ", zlib" : ", LZ4";
   return words;
 }
 
@@ -122,7 +122,7 @@ std::vector<double> VtkXmlFile::numbers(const pugi::xml_node& node, const char* 
 std::optional<VtkExtent> VtkXmlFile::extent(const pugi::xml_node& node, const char* attribute) const {
   // Sums and products of a few of them stay below 2^63.
   constexpr int64_t kFarthest = int64_t{1} << 30;
-  constexpr double kMostNodes = 1e14;
+  constexpr double kMaxNodes = 1e14;
   std::string_view text = node.attribute(attribute).value();
   std::array<int64_t, 6> ends{};
   bool good = true;
@@ -136,7 +136,7 @@ std::optional<VtkExtent> VtkXmlFile::extent(const pugi::xml_node& node, const ch
     good = good && extent.lower[axis] <= extent.upper[axis];
     nodes *= static_cast<double>(extent.upper[axis] - extent.lower[axis] + 1);
   }
-  if (!good || nodes > kMostNodes || !takeWord(text).empty())
+  if (!good || nodes > kMaxNodes || !takeWord(text).empty())
     fail(fmt::format("<{}> has {}=\"{}\"; expected the first and last node along i, j and k", node.name(),
                      attribute, node.attribute(attribute).value()));
   return extent;
@@ -166,9 +166,9 @@ VtkArray VtkXmlFile::array(const pugi::xml_node& node, uint64_t tuples) const {
   array.type = *known;
   const std::string components = node.attribute("NumberOfComponents").as_string("1");
   if (!parseInteger(std::string_view(components), array.components) || array.components == 0 ||
-      array.components > kMostComponents)
+      array.components > kMaxComponents)
     fail(fmt::format("array {} has NumberOfComponents {}; expected 1 to {}", array.name, components,
-                     kMostComponents));
+                     kMaxComponents));
   array.tuples = tuples;
   for (uint32_t c = 0; c < array.components; ++c) {
     const auto component = node.attribute(fmt::format("ComponentName{}", c).c_str());

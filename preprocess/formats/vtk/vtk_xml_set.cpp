@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using Node = pugi::xml_node;
 
-constexpr size_t kMostPieces = 100'000, kMostFiles = 100'000;
+constexpr size_t kMaxPieces = 100'000, kMaxFiles = 100'000;
 
 /// Follows a file to the files that it names, and gathers their pieces.
 class Gatherer {
@@ -44,9 +44,9 @@ class Gatherer {
     const fs::path normal = fs::weakly_canonical(path, error);
     if (error) throw Error("{}: cannot be opened: {}", path.string(), error.message());
     if (!inside_.insert(normal).second) throw Error("{}: names itself as a part of itself", path.string());
-    if (grid_.files.size() > kMostFiles)
+    if (grid_.files.size() > kMaxFiles)
       throw Error("{}: leads to more than {} files, counted as often as they are named", grid_.files.front(),
-                  kMostFiles);
+                  kMaxFiles);
     const VtkXmlFile file(files_, path);
     grid_.files.push_back(path.string());
     if (top_type_.empty()) top_type_ = file.type();
@@ -85,8 +85,8 @@ class Gatherer {
     for (const VtkPiece& piece : pieces) extents.push_back(piece.extent);
     const std::vector<std::vector<VtkExtent>> parts = ownedParts(extents);
     for (size_t n = 0; n < pieces.size(); ++n) {
-      if (grid_.pieces.size() == kMostPieces)
-        throw Error("{}: has more than {} pieces", grid_.files.front(), kMostPieces);
+      if (grid_.pieces.size() == kMaxPieces)
+        throw Error("{}: has more than {} pieces", grid_.files.front(), kMaxPieces);
       for (size_t part = 0; part < parts[n].size(); ++part)
         grid_.blocks.push_back({part == 0 ? names[n] : fmt::format("{}.{}", names[n], part + 1),
                                 grid_.pieces.size(), parts[n][part]});
@@ -130,7 +130,7 @@ class Gatherer {
               piece.extent.upper[axis] > extent->upper[axis])
             piece_file.fail(
                 fmt::format("has a piece of {} nodes that is not in the extent that {} tells of it",
-                            piece.extent.inWords(), file.name()));
+                            piece.extent.describe(), file.name()));
         pieces.push_back(std::move(piece));
         names.push_back(
             fmt::format("{}{}{}", name, name.empty() ? "" : "/", piece_file.path().stem().string()));

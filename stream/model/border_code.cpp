@@ -1,4 +1,4 @@
-#include "stream/model/half_cell.h"
+#include "stream/model/border_code.h"
 
 #include <algorithm>
 #include <cmath>
@@ -27,7 +27,7 @@ glm::dquat rotationOf(std::span<const glm::dvec3> inward) {
 
 }  // namespace
 
-uint32_t packHalfCell(std::span<const glm::dvec3> inward) {
+uint32_t packBorderCode(std::span<const glm::dvec3> inward) {
   if (inward.empty()) return kNoBorder;
   const glm::dquat rotation = rotationOf(inward);
   std::array<double, 4> numbers{rotation.w, rotation.x, rotation.y, rotation.z};
@@ -47,30 +47,30 @@ uint32_t packHalfCell(std::span<const glm::dvec3> inward) {
   return code;
 }
 
-InwardAxes inwardAxes(uint32_t half_cell) {
+InwardAxes inwardAxes(uint32_t border_code) {
   InwardAxes inward;
-  inward.count = static_cast<int>(half_cell & 3);
+  inward.count = static_cast<int>(border_code & 3);
   if (inward.count == 0) return inward;
-  const uint32_t largest = half_cell >> 3 & 3;
+  const uint32_t largest = border_code >> 3 & 3;
   std::array<float, 4> numbers{};
   float sum = 0;
   int shift = 8;
   for (uint32_t n = 0; n < 4; ++n) {
     if (n == largest) continue;
-    numbers[n] = static_cast<float>(((half_cell >> shift & 0xff) / kSteps * 2 - 1) * kLargest);
+    numbers[n] = static_cast<float>(((border_code >> shift & 0xff) / kSteps * 2 - 1) * kLargest);
     sum += numbers[n] * numbers[n];
     shift += 8;
   }
   numbers[largest] = std::sqrt(std::max(0.0f, 1 - sum));
   const glm::mat3 frame =
       glm::mat3_cast(glm::normalize(glm::quat(numbers[0], numbers[1], numbers[2], numbers[3])));
-  inward.axis = {frame[0], frame[1], half_cell & kReversed ? -frame[2] : frame[2]};
+  inward.axis = {frame[0], frame[1], border_code & kReversed ? -frame[2] : frame[2]};
   return inward;
 }
 
-bool isPossibleHalfCell(uint32_t half_cell) {
-  const bool whole = half_cell == kNoBorder;
-  return whole || ((half_cell & 3) != 0 && (half_cell & 0xe0) == 0);
+bool isPossibleBorderCode(uint32_t border_code) {
+  const bool whole = border_code == kNoBorder;
+  return whole || ((border_code & 3) != 0 && (border_code & 0xe0) == 0);
 }
 
 }  // namespace curvisplat

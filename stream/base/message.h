@@ -10,11 +10,11 @@ namespace curvisplat {
 
 /// A line behind "curvisplat: ". Where standard error cannot be written (a full disk, a closed pipe), it is
 /// lost: that is no reason to fail. For any thread.
-void say(std::string_view text) noexcept;
+void printMessage(std::string_view text) noexcept;
 
 template <typename First, typename... Rest>
-void say(fmt::format_string<First, Rest...> format, First&& first, Rest&&... rest) {
-  say(fmt::format(format, std::forward<First>(first), std::forward<Rest>(rest)...));
+void printMessage(fmt::format_string<First, Rest...> format, First&& first, Rest&&... rest) {
+  printMessage(fmt::format(format, std::forward<First>(first), std::forward<Rest>(rest)...));
 }
 
 }  // namespace curvisplat

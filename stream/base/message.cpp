@@ -1,4 +1,4 @@
-#include "stream/base/say.h"
+#include "stream/base/message.h"
 
 #include <cstdio>
 #include <exception>
@@ -8,7 +8,7 @@
 
 namespace curvisplat {
 
-void say(std::string_view text) noexcept {
+void printMessage(std::string_view text) noexcept {
   try {
     const std::string line = "curvisplat: " + oneLine(std::string(text)) + "\n";
     std::fwrite(line.data(), 1, line.size(), stderr);  // as one, beside other threads' lines

@@ -23,11 +23,11 @@ struct InwardAxes {
 };
 
 /// `inward`: none to three such vectors.
-uint32_t packHalfCell(std::span<const glm::dvec3> inward);
-InwardAxes inwardAxes(uint32_t half_cell);
+uint32_t packBorderCode(std::span<const glm::dvec3> inward);
+InwardAxes inwardAxes(uint32_t border_code);
 
-/// False for what packHalfCell() gives to no cell; whatever passes has inward axes.
-bool isPossibleHalfCell(uint32_t half_cell);
+/// False for what packBorderCode() gives to no cell; whatever passes has inward axes.
+bool isPossibleBorderCode(uint32_t border_code);
 
 // How the renderer draws a cell at a border: as two parts along each such axis, a narrow one at the border
 // and a wide one behind it. In units of that cell's length, from its middle inwards; the shares of its weight

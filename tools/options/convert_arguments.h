@@ -20,7 +20,7 @@
 namespace curvisplat {
 
 /// The command line's words, as given.
-struct ConvertWords {
+struct ConvertArguments {
   OpenGridOptions grid;
   GasModel gas;
   std::vector<std::string> scalars, added_scalars;
@@ -32,11 +32,11 @@ struct ConvertWords {
 };
 
 /// Opens the grid: temporary files go where the words say, else beside `cache`.
-std::unique_ptr<GridSource> openSource(const ConvertWords& words, const std::filesystem::path& cache);
+std::unique_ptr<GridSource> openSource(const ConvertArguments& words, const std::filesystem::path& cache);
 
 /// Positions of the scalars called `names`. One that the files lack is bad input, not wrong usage, since the
 /// files decide: throws Error. Prints notes on numbers that mean two of them.
-std::vector<uint32_t> chooseScalars(const ConvertWords& words, const std::vector<std::string>& names,
+std::vector<uint32_t> chooseScalars(const ConvertArguments& words, const std::vector<std::string>& names,
                                     const GridDescription& description);
 
 /// Of all phases.
@@ -46,11 +46,11 @@ uint64_t totalBytes(std::span<const FileReport> files);
 double mebibytes(uint64_t bytes);
 
 /// Throws Error for a --stats that cannot be written, or would change what is read.
-void checkStatisticsFile(const ConvertWords& words);
+void checkStatisticsFile(const ConvertArguments& words);
 
 /// What the words say of either way's options. Throws as checkStatisticsFile().
 template <typename Options>
-void takeCommonWords(const ConvertWords& words, Options& options) {
+void takeCommonWords(const ConvertArguments& words, Options& options) {
   checkStatisticsFile(words);
   options.temporary_folder = words.temporary_folder;
   options.blank_value = words.blank_value;

@@ -1,4 +1,4 @@
-#include "tests/reference/half_annulus_words.h"
+#include "tests/reference/half_annulus_arguments.h"
 
 #include <fmt/format.h>
 

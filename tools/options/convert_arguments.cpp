@@ -1,17 +1,17 @@
-#include "tools/options/convert_words.h"
+#include "tools/options/convert_arguments.h"
 
 #include <fmt/format.h>
 
 #include <cstdio>
 
 #include "stream/base/error.h"
-#include "stream/base/say.h"
+#include "stream/base/message.h"
 #include "tools/options/grid_options.h"
 #include "tools/output/output_paths.h"
 
 namespace curvisplat {
 
-std::unique_ptr<GridSource> openSource(const ConvertWords& words, const std::filesystem::path& cache) {
+std::unique_ptr<GridSource> openSource(const ConvertArguments& words, const std::filesystem::path& cache) {
   OpenGridOptions grid = words.grid;
   grid.temporary_folder = words.temporary_folder.empty() ? cache.parent_path() : words.temporary_folder;
   if (grid.temporary_folder.empty()) grid.temporary_folder = ".";
@@ -20,17 +20,17 @@ std::unique_ptr<GridSource> openSource(const ConvertWords& words, const std::fil
   return openWithDerived(grid, {words.gas, words.blank_value});
 }
 
-std::vector<uint32_t> chooseScalars(const ConvertWords& words, const std::vector<std::string>& names,
+std::vector<uint32_t> chooseScalars(const ConvertArguments& words, const std::vector<std::string>& names,
                                     const GridDescription& description) {
   try {
-    for (const std::string& note : notesOnNumbers(description, names)) say("note: {}", note);
+    for (const std::string& note : notesOnNumbers(description, names)) printMessage("note: {}", note);
     return scalarsNamed(description, names);
   } catch (const UsageError& error) {
     throw Error("{}: {}", words.grid.grid.string(), error.what());
   }
 }
 
-void checkStatisticsFile(const ConvertWords& words) {
+void checkStatisticsFile(const ConvertArguments& words) {
   if (words.statistics.empty()) return;
   std::vector<std::filesystem::path> inputs = words.grid.solutions;
   inputs.push_back(words.grid.grid);

@@ -1,4 +1,4 @@
-#include "stream/model/half_cell.h"
+#include "stream/model/border_code.h"
 
 #include <gtest/gtest.h>
 
@@ -27,8 +27,8 @@ TEST(HalfCell, KeepsItsDirections) {
   for (int n = 0; n < 3000; ++n) {
     const glm::dmat3 axes = randomAxes(random);
     const std::vector<glm::dvec3> inward(&axes[0], &axes[0] + 1 + n % 3);
-    const uint32_t code = packHalfCell(inward);
-    ASSERT_TRUE(isPossibleHalfCell(code));
+    const uint32_t code = packBorderCode(inward);
+    ASSERT_TRUE(isPossibleBorderCode(code));
     const InwardAxes kept = inwardAxes(code);
     ASSERT_EQ(kept.count, static_cast<int>(inward.size()));
     for (size_t a = 0; a < inward.size(); ++a) {
@@ -44,21 +44,21 @@ TEST(HalfCell, AlongTheFramesOwnAxes) {
     for (int axis = 0; axis < 3; ++axis) {
       glm::dvec3 along(0.0);
       along[axis] = sign;
-      const InwardAxes kept = inwardAxes(packHalfCell({&along, 1}));
+      const InwardAxes kept = inwardAxes(packBorderCode({&along, 1}));
       EXPECT_LT(glm::distance(glm::dvec3(kept.axis[0]), along), 0.012) << axis << sign;
     }
 }
 
 TEST(HalfCell, OfNoDirectionIsAWholeCell) {
-  EXPECT_EQ(packHalfCell({}), kNoBorder);
+  EXPECT_EQ(packBorderCode({}), kNoBorder);
   EXPECT_EQ(inwardAxes(kNoBorder).count, 0);
-  EXPECT_TRUE(isPossibleHalfCell(kNoBorder));
+  EXPECT_TRUE(isPossibleBorderCode(kNoBorder));
 }
 
 TEST(HalfCell, IsRefusedWhereNothingPacksToIt) {
-  EXPECT_FALSE(isPossibleHalfCell(0x00000004));  // reversed, but no axis
-  EXPECT_FALSE(isPossibleHalfCell(0x01000000));
-  EXPECT_FALSE(isPossibleHalfCell(0x00000021));
+  EXPECT_FALSE(isPossibleBorderCode(0x00000004));  // reversed, but no axis
+  EXPECT_FALSE(isPossibleBorderCode(0x01000000));
+  EXPECT_FALSE(isPossibleBorderCode(0x00000021));
 }
 
 TEST(HalfCell, OfAnyBytesHasFiniteUnitAxes) {

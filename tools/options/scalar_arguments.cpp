@@ -1,4 +1,4 @@
-#include "tools/options/scalar_words.h"
+#include "tools/options/scalar_arguments.h"
 
 #include <fmt/format.h>
 
@@ -9,11 +9,11 @@
 
 namespace curvisplat {
 
-void addScalarOption(CLI::App& command, ScalarWords& words) {
+void addScalarOption(CLI::App& command, ScalarArguments& words) {
   command.add_option("--scalar", words.scalar, "Name of the scalar; the cache's first otherwise");
 }
 
-void addFunctionOptions(CLI::App& command, ScalarWords& words, const std::string& group) {
+void addFunctionOptions(CLI::App& command, ScalarArguments& words, const std::string& group) {
   command
       .add_option("--tf", words.transfer_function,
                   fmt::format("Transfer function: {}, or a ParaView preset FILE.json", presetNames()))
@@ -29,7 +29,7 @@ void addFunctionOptions(CLI::App& command, ScalarWords& words, const std::string
       ->group(group);
 }
 
-size_t chooseVariable(const CacheReader& cache, const ScalarWords& words) {
+size_t chooseVariable(const CacheReader& cache, const ScalarArguments& words) {
   try {
     return cache.variableNamed(words.scalar);
   } catch (const UsageError& error) {
@@ -37,7 +37,7 @@ size_t chooseVariable(const CacheReader& cache, const ScalarWords& words) {
   }
 }
 
-TransferFunction chooseTransferFunction(const ScalarWords& words, const VariableInfo& variable,
+TransferFunction chooseTransferFunction(const ScalarArguments& words, const VariableInfo& variable,
                                         double diagonal) {
   const double default_unit = diagonal > 0 ? diagonal / 100 : 1;
   const double unit = words.opacity_unit ? parsePositive("--opacity-unit", *words.opacity_unit) : 0;
