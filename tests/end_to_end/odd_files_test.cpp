@@ -77,8 +77,8 @@ TEST_F(OddFiles, WhatIsNoFileIsNotReplaced) {
   fs::create_symlink(file("pipe"), file("pipe.png"));
   fs::create_directory(file("folder.png"));
   for (const char* name : {"pipe.png", "folder.png"})
-    expectRefused({"render", cache(), "-o", file(name), "--size", "16x16"}, "no regular file");
-  expectRefused({"render", cache(), "-o", file("a.png"), "--stats", file("pipe")}, "no regular file");
+    expectRefused({"render", cache(), "-o", file(name), "--size", "16x16"}, "not a regular file");
+  expectRefused({"render", cache(), "-o", file("a.png"), "--stats", file("pipe")}, "not a regular file");
   EXPECT_TRUE(fs::is_fifo(file("pipe")));
   EXPECT_TRUE(fs::is_symlink(file("pipe.png")));
   EXPECT_FALSE(fs::exists(file("a.png")));

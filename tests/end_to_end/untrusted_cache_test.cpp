@@ -244,7 +244,7 @@ TEST_F(UntrustedCache, CountsTakeNoMemoryBeforeTheyAreTrue) {
     for (int n = 0; n < 100; ++n) deep = nlohmann::ordered_json::array({deep});
     cache.manifest["title"] = deep;
   });
-  expectRefused("more than the", [](HostileCache& cache) {
+  expectRefused("expected at most", [](HostileCache& cache) {
     cache.manifest["sources"] = std::vector<std::string>(6'000'000, "");
   });
 }
