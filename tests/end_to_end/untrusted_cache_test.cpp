@@ -288,11 +288,11 @@ class Bomb {
 TEST_F(UntrustedCache, StreamsUnpackToWhatTheirRecordAllows) {
   constexpr size_t kBrick = 12;
   constexpr uint64_t kHuge = uint64_t{64} << 20;  // of zeros: 2 KiB packed
-  expectBrickRefused("does not begin a zstd frame of", [](HostileCache& cache) {
+  expectBrickRefused("does not begin with a zstd frame of", [](HostileCache& cache) {
     const Bomb bomb(cache, kBrick);
     cache.replaceGeometry(kBrick, bomb.stream(bomb.header(), kHuge));
   });
-  expectBrickRefused("does not begin a zstd frame of", [](HostileCache& cache) {
+  expectBrickRefused("does not begin with a zstd frame of", [](HostileCache& cache) {
     const Bomb bomb(cache, kBrick);
     cache.replaceGeometry(kBrick, bomb.stream(bomb.header(), kHuge, false));
   });
