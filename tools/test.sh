@@ -27,7 +27,8 @@ export TSAN_OPTIONS=suppressions=$root/tests/tsan.supp:halt_on_error=1
 
 case $form in
   plain)
-    "$root/tools/setup.sh" python3-vtk9  # the smoke test of bench/ draws with VTK as well
+    # The smoke test of bench/ also draws with VTK; tests/stream/read_cache.py needs the others.
+    "$root/tools/setup.sh" python3-vtk9 python3-numpy python3-zstandard python3-xxhash
     "$root/tools/build.sh"
     run release "$@"
     ;;
