@@ -12,16 +12,16 @@ std::filesystem::path folderOf(const std::filesystem::path& path) {
 }
 
 bool isRegularFile(const std::filesystem::path& path) noexcept {
-  std::error_code none_there;
-  return std::filesystem::is_regular_file(path, none_there);
+  std::error_code ignored;
+  return std::filesystem::is_regular_file(path, ignored);
 }
 
 std::filesystem::path linkTarget(std::filesystem::path path) {
   constexpr int kMaxLinks = 40;  // the kernel's limit
   const std::filesystem::path first = path;
   for (int links = 0; links <= kMaxLinks; ++links) {
-    std::error_code none_there;
-    if (!std::filesystem::is_symlink(path, none_there)) return path;
+    std::error_code ignored;
+    if (!std::filesystem::is_symlink(path, ignored)) return path;
     path =
         folderOf(path) / std::filesystem::read_symlink(path);  // an absolute target replaces the whole path
   }
@@ -30,8 +30,8 @@ std::filesystem::path linkTarget(std::filesystem::path path) {
 
 std::filesystem::path writableTarget(const std::filesystem::path& path) {
   const std::filesystem::path target = linkTarget(path);
-  std::error_code none_there;
-  if (std::filesystem::exists(target, none_there) && !isRegularFile(target))
+  std::error_code ignored;
+  if (std::filesystem::exists(target, ignored) && !isRegularFile(target))
     throw Error("{}: exists and is not a regular file; choose another name", path.string());
   return target;
 }

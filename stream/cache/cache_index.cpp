@@ -29,10 +29,10 @@ void checkChecksum(const fs::path& path, const FileInfo& info, uint64_t found) {
 
 /// Upper bounds of the length of a stream of `splats` splats: its header, the runs or rows, the planes, and
 /// zstd's overhead. Readers allocate memory for the stream's length.
-uint64_t mostGeometryBytes(uint64_t splats) {
+uint64_t maxGeometryBytes(uint64_t splats) {
   return (16 << 10) + 135 * splats;  // a run (50) and 21 arrays of 4 planes
 }
-uint64_t mostValuesBytes(uint64_t splats) {
+uint64_t maxValuesBytes(uint64_t splats) {
   return (16 << 10) + 31 * splats;  // a row (10) and 5 arrays of 4 planes
 }
 
@@ -119,7 +119,7 @@ class IndexChecker {
     for (uint32_t splats : brick.octant_splats) octants += splats;
     if (octants != brick.splats)
       refuse(path_, n, fmt::format("its octants have {} splats, expected {}", octants, brick.splats));
-    if (brick.geometry.length > mostGeometryBytes(brick.splats))
+    if (brick.geometry.length > maxGeometryBytes(brick.splats))
       refuse(path_, n,
              fmt::format("its stream of {} bytes is too long for {} splats", brick.geometry.length,
                          brick.splats));
@@ -266,7 +266,7 @@ std::vector<BrickVariable> readVariableTable(const InputFile& file, const Manife
                           std::isfinite(variable.largest_slope) && variable.largest_deviation >= 0 &&
                           std::isfinite(variable.largest_deviation);
         if (!fine) refuse(file.path(), n, "its range, slope or deviation is invalid");
-        if (variable.values.length > mostValuesBytes(bricks[n].splats))
+        if (variable.values.length > maxValuesBytes(bricks[n].splats))
           refuse(file.path(), n,
                  fmt::format("its stream of {} bytes is too long for {} splats", variable.values.length,
                              bricks[n].splats));

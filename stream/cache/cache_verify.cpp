@@ -71,11 +71,12 @@ class Verifier {
     const double slack = kRounding * reader_.manifest().root.cellSize(brick.cell.level);
     const std::vector<float>* const coordinates[] = {&geometry_.x, &geometry_.y, &geometry_.z};
     for (int axis = 0; axis < 3; ++axis) {
-      const auto [least, most] = std::minmax_element(coordinates[axis]->begin(), coordinates[axis]->end());
-      if (std::abs(corner[axis] + *least - brick.lower[axis]) > slack ||
-          std::abs(corner[axis] + *most - brick.upper[axis]) > slack)
+      const auto [lowest, highest] =
+          std::minmax_element(coordinates[axis]->begin(), coordinates[axis]->end());
+      if (std::abs(corner[axis] + *lowest - brick.lower[axis]) > slack ||
+          std::abs(corner[axis] + *highest - brick.upper[axis]) > slack)
         findIn(n, fmt::format("its centres span [{}, {}] along {}, its record has [{}, {}]",
-                              corner[axis] + *least, corner[axis] + *most, "xyz"[axis], brick.lower[axis],
+                              corner[axis] + *lowest, corner[axis] + *highest, "xyz"[axis], brick.lower[axis],
                               brick.upper[axis]));
     }
   }
@@ -143,22 +144,22 @@ class Verifier {
       return find("{}", error.what());
     }
     const BrickVariable& record = reader_.brickVariables(v)[n];
-    const auto [least, most] = std::minmax_element(values.mean.begin(), values.mean.end());
+    const auto [lowest, highest] = std::minmax_element(values.mean.begin(), values.mean.end());
     double slope = 0, variance = 0;
     for (size_t s = 0; s < values.size(); ++s) {
       const glm::dvec3 w(values.slope0[s], values.slope1[s], values.slope2[s]);
       slope = std::max(slope, glm::length(w));
       variance = std::max(variance, double{values.variance[s]});
     }
-    const auto differs = [](double found, double said) {
-      return std::abs(found - said) > kRounding * std::abs(said);
+    const auto differs = [](double found, double recorded) {
+      return std::abs(found - recorded) > kRounding * std::abs(recorded);
     };
-    if (*least != record.min || *most != record.max || differs(slope, record.largest_slope) ||
+    if (*lowest != record.min || *highest != record.max || differs(slope, record.largest_slope) ||
         differs(std::sqrt(variance), record.largest_deviation))
       findIn(n, fmt::format(
                     "'{}' has the range [{}, {}], slope {} and deviation {}, its record has [{}, {}], {} "
                     "and {}",
-                    reader_.manifest().variables[v].name, *least, *most, slope, std::sqrt(variance),
+                    reader_.manifest().variables[v].name, *lowest, *highest, slope, std::sqrt(variance),
                     record.min, record.max, record.largest_slope, record.largest_deviation));
   }
 
@@ -181,9 +182,10 @@ class Verifier {
       if (known && std::abs(weights_[n] - children) > kWeightTolerance * children)
         findIn(n, fmt::format("its weights sum to {}, its children's to {}", weights_[n], children));
     }
-    const double said = reader_.manifest().volume;
-    if (all && std::abs(volume - said) > kWeightTolerance * said)
-      find("{}: the leaves' weights sum to {}, the manifest has {}", reader_.path().string(), volume, said);
+    const double recorded = reader_.manifest().volume;
+    if (all && std::abs(volume - recorded) > kWeightTolerance * recorded)
+      find("{}: the leaves' weights sum to {}, the manifest has {}", reader_.path().string(), volume,
+           recorded);
   }
 
   void verifyGrids() {

@@ -67,7 +67,7 @@ struct CacheWriter::State {
   }
 
   void add(AppendedBrick&& appended);
-  void takeUp(Progress& progress);
+  void resume(Progress& progress);
   bool isWhole(const AppendedBrick& appended) const;
   void keep(uint64_t count);
 
@@ -112,7 +112,7 @@ bool CacheWriter::State::isWhole(const AppendedBrick& appended) const {
   return true;
 }
 
-void CacheWriter::State::takeUp(Progress& progress) {
+void CacheWriter::State::resume(Progress& progress) {
   for (AppendedBrick& appended : readBrickLog(folder.path(), variables.size())) {
     if (!isWhole(appended)) break;
     add(std::move(appended));
@@ -151,7 +151,7 @@ CacheWriter::CacheWriter(PartialFolder& folder, RootCube root, std::vector<Varia
   for (const auto& entry : std::filesystem::directory_iterator(folder.path()))
     if (entry.path().filename() == "manifest.json" || entry.path().extension() == ".part")
       removeFile(entry.path());
-  state_->takeUp(progress);
+  state_->resume(progress);
 }
 
 CacheWriter::~CacheWriter() = default;

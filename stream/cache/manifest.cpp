@@ -57,8 +57,8 @@ class Fields {
 
   double number(const char* name) const { return numberOf(at(name), name); }
 
-  uint64_t count(const char* name, uint64_t least, uint64_t most) const {
-    return countOf(at(name), name, least, most);
+  uint64_t count(const char* name, uint64_t lowest, uint64_t highest) const {
+    return countOf(at(name), name, lowest, highest);
   }
 
   glm::dvec3 point(const char* name) const {
@@ -141,9 +141,9 @@ class Fields {
     return value.get<double>();
   }
 
-  uint64_t countOf(const Json& value, const char* name, uint64_t least, uint64_t most) const {
-    if (!value.is_number_unsigned() || value.get<uint64_t>() < least || value.get<uint64_t>() > most)
-      fail(name, fmt::format("a whole number from {} to {}", least, most), value);
+  uint64_t countOf(const Json& value, const char* name, uint64_t lowest, uint64_t highest) const {
+    if (!value.is_number_unsigned() || value.get<uint64_t>() < lowest || value.get<uint64_t>() > highest)
+      fail(name, fmt::format("a whole number from {} to {}", lowest, highest), value);
     return value.get<uint64_t>();
   }
 
@@ -297,14 +297,14 @@ Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path
         "convert again, with --overwrite",
         path.string(), version, kOldestVersion);
   if (json.contains(kChecksum)) {  // the earliest caches have none
-    const std::string said = fields.text(kChecksum);
+    const std::string stated = fields.text(kChecksum);
     json.erase(kChecksum);
     const std::string found = checksumText(json);
-    if (found != said)
+    if (found != stated)
       throw Error(
           "{}: has a wrong checksum (found {}, expected {}); the file is damaged or was edited: "
           "convert again",
-          path.string(), found, said);
+          path.string(), found, stated);
   }
   Manifest manifest;
   manifest.title = fields.text("title");

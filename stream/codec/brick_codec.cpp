@@ -87,15 +87,15 @@ Brick summaryOf(const RootCube& root, const BrickSplats& splats) {
 
 BrickVariable summaryOf(std::span<const SplatScalar> values) {
   BrickVariable summary;
-  double least = std::numeric_limits<double>::infinity(), most = -least, slope = 0, variance = 0;
+  double lowest = std::numeric_limits<double>::infinity(), highest = -lowest, slope = 0, variance = 0;
   for (const SplatScalar& value : values) {
-    least = std::min(least, value.mean);
-    most = std::max(most, value.mean);
+    lowest = std::min(lowest, value.mean);
+    highest = std::max(highest, value.mean);
     slope = std::max(slope, glm::dot(value.slope, value.slope));
     variance = std::max(variance, value.variance);
   }
-  summary.min = static_cast<float>(least);  // decoded means are floats
-  summary.max = static_cast<float>(most);
+  summary.min = static_cast<float>(lowest);  // decoded means are floats
+  summary.max = static_cast<float>(highest);
   summary.largest_slope = roundedUp(std::sqrt(slope));
   summary.largest_deviation = roundedUp(std::sqrt(variance));
   return summary;

@@ -109,17 +109,17 @@ class GeometryEncoder {
 
   template <typename Log>
   bool encodeLogs(Log log, double step, double& base, LogTable& table, std::vector<double>& out) {
-    double least = std::numeric_limits<double>::infinity(), most = -least;
+    double lowest = std::numeric_limits<double>::infinity(), highest = -lowest;
     for (size_t n = 0; n < count_; ++n) {
       targets_[n] = log(brick_.splats[n]);
-      least = std::min(least, targets_[n]);
-      most = std::max(most, targets_[n]);
+      lowest = std::min(lowest, targets_[n]);
+      highest = std::max(highest, targets_[n]);
     }
-    if (!((most - least) / step < kLargestLogCode)) return false;
-    base = least;
-    table = LogTable(least, step, static_cast<uint32_t>((most - least) / step) + 1);
+    if (!((highest - lowest) / step < kLargestLogCode)) return false;
+    base = lowest;
+    table = LogTable(lowest, step, static_cast<uint32_t>((highest - lowest) / step) + 1);
     for (size_t n = 0; n < count_; ++n) {
-      codes_[n] = static_cast<uint32_t>((targets_[n] - least) / step + 0.5);
+      codes_[n] = static_cast<uint32_t>((targets_[n] - lowest) / step + 0.5);
       out[n] = table[codes_[n]];
     }
     addPredicted(codes_);
