@@ -82,7 +82,7 @@ def drawn(arguments, cache, lod_pixels):
 def measure(arguments, edge, out):
     """Measures one size; adds it to `out` and returns it as a row."""
     cache, conversions = converted(arguments, edge, arguments.conversions)
-    nodes = conversions[0]["nodes"]
+    nodes = conversions[0]["samples"]
     row = {"nodes": nodes, "size": f"{edge}x{edge}x{edge}", "conversion": conversions[-1], "pictures": {}}
 
     def add(name, unit, samples):

@@ -7,7 +7,7 @@
 namespace curvisplat {
 
 void checkFailed(const char* file, int line, const char* expression, const std::string& values) {
-  printMessage("internal error at {}:{}: {} does not hold{}{}", file, line, expression,
+  printMessage("internal error at {}:{}: check failed: {}{}{}", file, line, expression,
                values.empty() ? "" : ": ", values);
   std::abort();
 }

@@ -1,5 +1,5 @@
-// Checks of our own invariants, on in release too: a failed one prints both values and aborts. What goes wrong
-// outside the program is an Error: error.h.
+// Checks of the program's own invariants, in release builds too. A failed check prints both values and
+// aborts. Failures from outside the program (files, disks, arguments) are Errors instead: error.h.
 #pragma once
 
 #include <fmt/format.h>
@@ -12,13 +12,13 @@ namespace curvisplat {
 
 }  // namespace curvisplat
 
-/// Aborts, in release too, when `condition` is false: for our own bugs, never for bad input.
+/// Aborts if `condition` is false, in release builds too. For the program's own bugs, never for bad input.
 #define CURVISPLAT_CHECK(condition)                                                  \
   do {                                                                               \
     if (!(condition)) ::curvisplat::checkFailed(__FILE__, __LINE__, #condition, ""); \
   } while (false)
 
-/// As CURVISPLAT_CHECK(a op b), and prints both values.
+/// CURVISPLAT_CHECK(a op b) that also prints both values.
 #define CURVISPLAT_CHECK_OP(a, op, b)                                        \
   do {                                                                       \
     const auto& check_a = (a);                                               \

@@ -1,4 +1,4 @@
-// The one checksum of the cache: XXH3, 64 bit, of bytes as they are in a file.
+// The cache's only checksum: 64-bit XXH3, with seed 0, of the bytes as they are in the file.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@ namespace curvisplat {
 
 uint64_t checksumOf(std::span<const std::byte> bytes);
 
-/// The same of bytes that come in pieces.
+/// The same checksum, of bytes that arrive in pieces.
 class Checksum {
  public:
   Checksum();

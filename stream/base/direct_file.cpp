@@ -16,7 +16,7 @@ DirectFile::DirectFile(std::filesystem::path path, bool direct) : path_(std::mov
   buffered_fd_ = openRetrying(path_, O_RDONLY);
   if (buffered_fd_ < 0)
     throw Error("{}: cannot be opened for reading: {}", path_.string(), std::strerror(errno));
-  ::posix_fadvise(buffered_fd_, 0, 0, POSIX_FADV_RANDOM);  // advice: a refusal changes nothing
+  ::posix_fadvise(buffered_fd_, 0, 0, POSIX_FADV_RANDOM);  // only a hint: failure does no harm
   if (direct) direct_fd_ = openRetrying(path_, O_RDONLY | O_DIRECT);
 }
 

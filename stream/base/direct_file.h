@@ -1,8 +1,9 @@
-// A file that is read past the page cache where the file system allows it: a cache much larger than memory
-// would only push out what others need, and the kernel's read-ahead guesses wrong in an octree.
+// A file opened for reading with O_DIRECT where the file system allows it. A cache much larger than memory
+// would evict everything else from the page cache, and the kernel's read-ahead guesses wrong in an octree.
 //
-// Direct reads begin, end and land at multiples of kPageBytes. What cannot be read so (a file system that
-// refuses O_DIRECT, the odd end of a short read) goes through the page cache by the second descriptor.
+// Direct reads need offsets, lengths and addresses that are multiples of kPageBytes. Reads that cannot be
+// direct (the file system refuses O_DIRECT, or a short read ended at an unaligned byte) use the second,
+// buffered descriptor.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +13,7 @@ namespace curvisplat {
 /// Immutable: any thread.
 class DirectFile {
  public:
-  /// Throws Error if `path` cannot be opened. `direct`: try it.
+  /// `direct`: try O_DIRECT. Throws Error if `path` cannot be opened.
   explicit DirectFile(std::filesystem::path path, bool direct = true);
   ~DirectFile();
   DirectFile(const DirectFile&) = delete;
@@ -20,7 +21,7 @@ class DirectFile {
 
   const std::filesystem::path& path() const { return path_; }
   bool isDirect() const { return direct_fd_ >= 0; }
-  /// -1 where the file system refused.
+  /// -1 if the file system refused O_DIRECT.
   int directFd() const { return direct_fd_; }
   int bufferedFd() const { return buffered_fd_; }
 

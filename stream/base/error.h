@@ -1,6 +1,7 @@
-// What goes wrong outside the program (a file, a disk, an argument) is thrown as an Error, where it is known,
-// with the place and what to do; the subcommand catches it once and prints it as one line. A broken invariant
-// of ours is not an Error but a failed check: check.h.
+// The errors that the program reports: failures outside the program (a file, a disk, an argument). An Error
+// is thrown where the failure is detected, with the place and what the user can do about it. The subcommand
+// catches it once and prints it as one line. A broken invariant of the program is not an Error but a failed
+// check: check.h.
 #pragma once
 
 #include <fmt/format.h>
@@ -11,12 +12,12 @@
 
 namespace curvisplat {
 
-/// `text` with a space for each control character: texts quote names and words of files, and go to a
-/// terminal.
+/// Replaces each control character of `text` by a space. Messages quote names and words from files and are
+/// printed on a terminal.
 std::string oneLine(std::string text);
 
-/// The work failed: exit status 1. The text is one line: what, where, what was expected and found, what to
-/// do.
+/// The work failed: exit status 1. The text is one line: where, what is wrong, what was found and expected,
+/// and what to do.
 class Error : public std::runtime_error {
  public:
   explicit Error(const std::string& text) : std::runtime_error(oneLine(text)) {}
@@ -27,7 +28,7 @@ class Error : public std::runtime_error {
       : Error(fmt::format(format, std::forward<Args>(args)...)) {}
 };
 
-/// The command line asks for something that does not exist or does not fit together: exit status 2.
+/// The command line names something that does not exist, or its options contradict each other: exit status 2.
 class UsageError : public Error {
  public:
   using Error::Error;

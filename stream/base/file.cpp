@@ -21,14 +21,14 @@ namespace {
 SystemCalls posix_calls;
 std::atomic<SystemCalls*> current_calls{&posix_calls};
 
-// Linux transfers at most 0x7ffff000 bytes a call; stay on a whole page below it.
+// Linux transfers at most 0x7ffff000 bytes a call. This is a whole number of pages below that limit.
 constexpr size_t kLargestTransfer = size_t{1} << 30;
 
 std::string reason() {
   return std::strerror(errno);
 }
 
-/// As openRetrying. File systems without direct transfers refuse the flag, and do without.
+/// openRetrying() with O_DIRECT for Caching::kDirect, and without it where the file system refuses the flag.
 int openWith(Caching caching, const std::filesystem::path& path, int flags, unsigned mode) {
   if (caching == Caching::kDirect) {
     const int fd = openRetrying(path, flags | O_DIRECT, mode);
@@ -37,8 +37,8 @@ int openWith(Caching caching, const std::filesystem::path& path, int flags, unsi
   return openRetrying(path, flags, mode);
 }
 
-/// After a transfer was refused: whether it was for its alignment, which will not be asked for again. A
-/// transfer that was cut short goes on at any byte.
+/// For a transfer that has failed: whether alignment was the reason. If so, switches the descriptor to the
+/// page cache, so that the transfer can be retried. (A short transfer continues at any byte, aligned or not.)
 bool stoppedBeingDirect(int fd) {
   if (errno != EINVAL) return false;
   const int flags = ::fcntl(fd, F_GETFL);
@@ -50,9 +50,9 @@ void syncRetrying(int fd, const std::filesystem::path& path) {
   do {
     result = SystemCalls::current().fsync(fd);
   } while (result < 0 && errno == EINTR);
-  // Some file systems cannot sync a directory or a pipe and say so; that is not a failed disk.
+  // EINVAL and ENOTSUP: the file system cannot sync a directory or a pipe. The disk has not failed.
   if (result < 0 && errno != EINVAL && errno != ENOTSUP)
-    throw Error("{}: cannot be flushed to the disk: {}", path.string(), reason());
+    throw Error("{}: cannot be synced to the disk: {}", path.string(), reason());
 }
 
 void renameFile(const std::filesystem::path& from, const std::filesystem::path& to) {
@@ -62,7 +62,7 @@ void renameFile(const std::filesystem::path& from, const std::filesystem::path& 
 
 void replaceFile(const std::filesystem::path& path, const std::filesystem::path& temporary,
                  std::span<const std::byte> bytes) {
-  // What is there may be a link that leads anywhere: it would be followed.
+  // An existing `temporary` could be a link, which opening it for writing would follow.
   SystemCalls::current().remove(temporary.c_str());
   try {
     OutputFile file(temporary);
@@ -129,7 +129,7 @@ ScopedSystemCalls::~ScopedSystemCalls() {
 }
 
 InputFile::InputFile(std::filesystem::path path, Caching caching) : path_(std::move(path)) {
-  // Without O_NONBLOCK, opening a named pipe waits for whoever writes to it.
+  // Without O_NONBLOCK, opening a named pipe would wait for a writer.
   fd_ = openWith(caching, path_, O_RDONLY | O_NONBLOCK, 0);
   if (fd_ < 0) throw Error("{}: cannot be opened for reading: {}", path_.string(), reason());
   struct stat status {};
@@ -162,13 +162,12 @@ void InputFile::readAt(uint64_t offset, std::span<std::byte> to) const {
         SystemCalls::current().pread(fd_, to.data() + done, count, static_cast<int64_t>(offset + done));
     if (got < 0) {
       if (errno == EINTR || stoppedBeingDirect(fd_)) continue;
-      throw Error("{}: reading {} bytes at offset {} failed: {}", path_.string(), count, offset + done,
+      throw Error("{}: cannot read {} bytes at offset {}: {}", path_.string(), count, offset + done,
                   reason());
     }
     if (got == 0)
-      throw TruncatedFile(
-          "{}: ends at byte {} where {} bytes from offset {} were expected; the file is truncated",
-          path_.string(), offset + done, to.size(), offset);
+      throw TruncatedFile("{}: is truncated: ends at byte {}, expected {} bytes from offset {}",
+                          path_.string(), offset + done, to.size(), offset);
     done += static_cast<size_t>(got);
   }
 }
@@ -182,7 +181,7 @@ OutputFile::OutputFile(std::filesystem::path path, Caching caching, Existing exi
   if (::fstat(fd_, &status) < 0) {
     const std::string why = reason();
     SystemCalls::current().close(std::exchange(fd_, -1));
-    throw Error("{}: its size cannot be told: {}", path_.string(), why);
+    throw Error("{}: cannot determine the file size: {}", path_.string(), why);
   }
   size_ = static_cast<uint64_t>(status.st_size);
 }
@@ -213,7 +212,7 @@ void OutputFile::writeAt(uint64_t offset, std::span<const std::byte> from) {
         SystemCalls::current().pwrite(fd_, from.data() + done, count, static_cast<int64_t>(offset + done));
     if (put < 0) {
       if (errno == EINTR || stoppedBeingDirect(fd_)) continue;
-      throw Error("{}: writing {} bytes at offset {} failed: {}", path_.string(), count, offset + done,
+      throw Error("{}: cannot write {} bytes at offset {}: {}", path_.string(), count, offset + done,
                   reason());
     }
     done += static_cast<size_t>(put);
@@ -230,7 +229,7 @@ void OutputFile::truncate(uint64_t size) {
   do {
     result = SystemCalls::current().truncate(fd_, static_cast<int64_t>(size));
   } while (result < 0 && errno == EINTR);
-  if (result < 0) throw Error("{}: cannot be cut to {} bytes: {}", path_.string(), size, reason());
+  if (result < 0) throw Error("{}: cannot be truncated to {} bytes: {}", path_.string(), size, reason());
   size_ = size;
 }
 
@@ -238,13 +237,14 @@ void OutputFile::close() {
   CURVISPLAT_CHECK(fd_ >= 0);
   syncRetrying(fd_, path_);
   if (SystemCalls::current().close(std::exchange(fd_, -1)) < 0 && errno != EINTR)
-    throw Error("{}: closing it failed: {}", path_.string(), reason());
+    throw Error("{}: cannot be closed: {}", path_.string(), reason());
 }
 
 std::string readTextFile(const std::filesystem::path& path, uint64_t limit) {
   const InputFile file(path);
   if (file.size() > limit)
-    throw Error("{}: has {} bytes, more than the {} such a file can have", path.string(), file.size(), limit);
+    throw Error("{}: is too large for its kind of file (found {} bytes, expected at most {})", path.string(),
+                file.size(), limit);
   std::string text(file.size(), '\0');
   file.readAt(0, std::span(text.data(), text.size()));
   return text;
@@ -288,7 +288,7 @@ void syncDirectory(const std::filesystem::path& path) {
 
 void makeFolder(const std::filesystem::path& path) {
   if (SystemCalls::current().mkdir(path.c_str(), 0777) < 0)
-    throw Error("{}: the folder cannot be made: {}", path.string(), reason());
+    throw Error("{}: the directory cannot be created: {}", path.string(), reason());
 }
 
 void removeFile(const std::filesystem::path& path) {

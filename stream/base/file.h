@@ -1,8 +1,8 @@
-// Positional file access: all I/O of our own goes through these classes and functions, and they go through
-// one table of system calls, so that a test can put a failing disk in its place. (Reads by io_uring do not:
-// async_reads.h. Libraries that read or write files themselves do not either: CGNS, HDF5, NetCDF.) Every
-// failure is an Error that names the path, the byte offset and the system's reason. Short transfers and EINTR
-// are retried; they are not failures.
+// Positional file access. All I/O of the program's own code goes through these classes and functions, and
+// they go through one table of system calls, so that a test can substitute a failing disk. (Reads by io_uring
+// bypass the table: async_reads.h. So do libraries that read or write files themselves: CGNS, HDF5, NetCDF.)
+// Every failure is an Error that names the path, the byte offset and the system's reason. Short transfers and
+// EINTR are retried; they are not failures.
 #pragma once
 
 #include <sys/types.h>
@@ -19,7 +19,8 @@
 
 namespace curvisplat {
 
-/// The system calls that files are made of. The default is POSIX. Set errno and return -1 to fail.
+/// The system calls behind file access. The default calls POSIX. An override fails by setting errno and
+/// returning -1.
 class SystemCalls {
  public:
   virtual ~SystemCalls() = default;
@@ -33,16 +34,17 @@ class SystemCalls {
   /// Swaps two names in one step (Linux renameat2).
   virtual int exchange(const char* a, const char* b);
   virtual int mkdir(const char* path, unsigned mode);
-  /// A file, or an empty folder.
+  /// Removes a file or an empty folder.
   virtual int remove(const char* path);
 
   static SystemCalls& current();
-  /// Whether no double is in their place: reads may then go past this table (io_uring).
+  /// Whether the POSIX calls are in place, not a test's double. Only then may reads bypass this table
+  /// (io_uring).
   static bool areReal();
 };
 
-/// Puts `calls` in the place of the system's until the end of the scope. For tests; not while other threads
-/// do I/O.
+/// Substitutes `calls` for the system's until the end of the scope. For tests only, and not while other
+/// threads do I/O.
 class ScopedSystemCalls {
  public:
   explicit ScopedSystemCalls(SystemCalls& calls);
@@ -54,19 +56,19 @@ class ScopedSystemCalls {
   SystemCalls* previous_;
 };
 
-/// Whether transfers go through the page cache, or straight between disk and memory where the file system can
-/// (else through the page cache after all). Straight ones need offsets, sizes and addresses that are
-/// multiples of kDirectAlignment; they are for large files that are written once and read once.
+/// kPages: transfers go through the page cache. kDirect: transfers bypass it if the file system can
+/// (O_DIRECT), and fall back to the page cache otherwise. Direct transfers need offsets, sizes and addresses
+/// that are multiples of kDirectAlignment. They are for large files that are written once and read once.
 enum class Caching { kPages, kDirect };
 inline constexpr size_t kDirectAlignment = 4096;
 
-/// A file ends before the bytes that were asked for: it was cut off, or is being changed.
+/// A file ends before the requested bytes: it was truncated, or is being changed.
 class TruncatedFile : public Error {
  public:
   using Error::Error;
 };
 
-/// A file that is read by position. Any number of threads may read at once.
+/// A file that is read by position. Any number of threads may read at the same time.
 class InputFile {
  public:
   /// Throws Error if `path` is missing, not a regular file, or not readable.
@@ -76,10 +78,11 @@ class InputFile {
   ~InputFile();
 
   const std::filesystem::path& path() const { return path_; }
-  /// Bytes, when it was opened.
+  /// Size in bytes when the file was opened.
   uint64_t size() const { return size_; }
 
-  /// Fills `to` from `offset`. Throws TruncatedFile if the file ends before that, Error if the disk fails.
+  /// Fills `to` with the bytes at `offset`. Throws TruncatedFile if the file ends first, Error if the disk
+  /// fails.
   void readAt(uint64_t offset, std::span<std::byte> to) const;
 
   template <typename T>
@@ -93,14 +96,14 @@ class InputFile {
   uint64_t size_ = 0;
 };
 
-/// A file that is written by position, or at its end. Threads may write at once to separate ranges;
-/// append() is for one thread at a time. The destructor closes without a word: call close() to learn of a
-/// failure.
+/// A file that is written by position or at its end. Threads may write separate ranges at the same time;
+/// append() is for one thread at a time. The destructor closes the file and ignores errors: call close() to
+/// detect them.
 class OutputFile {
  public:
   enum class Existing { kEmpty, kKeep };
 
-  /// Creates `path`; if it exists, empties it or keeps its bytes. Throws Error.
+  /// Creates `path`. If it exists, empties it or keeps its bytes. Throws Error if that fails.
   explicit OutputFile(std::filesystem::path path, Caching caching = Caching::kPages,
                       Existing existing = Existing::kEmpty);
   OutputFile(OutputFile&& other) noexcept;
@@ -108,14 +111,14 @@ class OutputFile {
   ~OutputFile();
 
   const std::filesystem::path& path() const { return path_; }
-  /// The end of what was written so far.
+  /// The end of the last byte written so far.
   uint64_t size() const { return size_; }
 
   void append(std::span<const std::byte> from);
   void writeAt(uint64_t offset, std::span<const std::byte> from);
-  /// Cuts off what lies behind the first `size` bytes.
+  /// Keeps the first `size` bytes and discards the rest.
   void truncate(uint64_t size);
-  /// fsync and close. Nothing may be written after it.
+  /// Syncs (fsync) and closes. Nothing may be written afterwards. Throws Error if either fails.
   void close();
 
   template <typename T>
@@ -129,30 +132,33 @@ class OutputFile {
   std::atomic<uint64_t> size_ = 0;
 };
 
-/// The whole of a small file (at most `limit` bytes, else an Error).
+/// The contents of a small file. Throws Error if it has more than `limit` bytes.
 std::string readTextFile(const std::filesystem::path& path, uint64_t limit = 16 << 20);
 
-/// Writes `bytes` beside `path`, syncs and renames them: then `path` is the old file or the whole new one,
-/// whatever happens; which, after a power loss, is certain once its folder has been synced. For a file that
-/// has one writer at a time.
+/// Writes `bytes` to a temporary file beside `path`, syncs it and renames it to `path`. At any moment `path`
+/// is either the old file or the complete new one. The rename survives a power loss once the folder has been
+/// synced, which is the caller's task. Only one writer at a time.
 void writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void writeFileAtomically(const std::filesystem::path& path, const std::string& text);
-/// For any number of processes, and for good: it syncs the folder. Follows links; refuses what is no file.
+/// Like writeFileAtomically(), for any number of processes at the same time; also syncs the folder, so that
+/// the new file survives a power loss. Follows links. Throws Error if `path` exists and is not a regular
+/// file.
 void writeFileDurably(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void writeFileDurably(const std::filesystem::path& path, const std::string& text);
 
-/// Gives a file that is whole, and written by others, its name: syncs it, renames it, and syncs the folder.
+/// Gives its final name to a complete file that a library or another program wrote: syncs it, renames it and
+/// syncs the folder.
 void putFileIntoPlace(const std::filesystem::path& from, const std::filesystem::path& to);
 
-/// fsync of a directory, so that the names in it survive a power loss.
+/// Syncs (fsync) a folder, so that the names in it survive a power loss.
 void syncDirectory(const std::filesystem::path& path);
 
-/// Makes a folder whose parent is there. Throws Error, also if something has the name.
+/// Makes a folder in an existing parent. Throws Error, also if the name exists already.
 void makeFolder(const std::filesystem::path& path);
-/// Removes a file or an empty folder. Throws Error, also if there is none.
+/// Removes a file or an empty folder. Throws Error, also if the name does not exist.
 void removeFile(const std::filesystem::path& path);
-/// Removes a file, or a folder and all in it, as far as it goes. Returns what stood in the way first; that
-/// nothing is there does not.
+/// Removes a file, or a folder and everything in it, and continues past failures. Returns the first failure.
+/// A name that does not exist is not a failure.
 std::error_code removeAll(const std::filesystem::path& path) noexcept;
 
 }  // namespace curvisplat

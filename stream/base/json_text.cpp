@@ -19,8 +19,8 @@ void requireShallowJson(std::string_view text, const std::string& file) {
     if (c == '[' || c == '{') ++depth;
     if (c == ']' || c == '}') --depth;
     if (depth > kDeepest)
-      throw Error("{}: has brackets more than {} deep, at byte {}; the file is damaged, or another's", file,
-                  kDeepest, n);
+      throw Error("{}: has brackets more than {} deep at byte {}; the file is damaged or of another kind",
+                  file, kDeepest, n);
   }
 }
 

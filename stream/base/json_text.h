@@ -1,4 +1,4 @@
-// What is asked of any JSON text before a parser gets it.
+// Limits the nesting depth of untrusted JSON before it is parsed.
 #pragma once
 
 #include <string>
@@ -6,8 +6,9 @@
 
 namespace curvisplat {
 
-/// Throws Error naming `file` where brackets nest deeper than in any file of ours: values are walked, copied
-/// and printed recursively, a stack's frame a level.
+/// Throws an Error that names `file` if brackets in `text` nest more than 64 deep. The parser's values are
+/// walked, copied and printed recursively, with one stack frame per level, so deep nesting would overflow the
+/// stack. No JSON file that the program reads or writes needs that depth.
 void requireShallowJson(std::string_view text, const std::string& file);
 
 }  // namespace curvisplat

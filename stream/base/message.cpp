@@ -11,7 +11,7 @@ namespace curvisplat {
 void printMessage(std::string_view text) noexcept {
   try {
     const std::string line = "curvisplat: " + oneLine(std::string(text)) + "\n";
-    std::fwrite(line.data(), 1, line.size(), stderr);  // as one, beside other threads' lines
+    std::fwrite(line.data(), 1, line.size(), stderr);  // in one call, so that threads' lines do not mix
   } catch (const std::exception&) {
     std::fputs("curvisplat: out of memory\n", stderr);
   }

@@ -1,4 +1,4 @@
-// What a person should know, on standard error.
+// Messages to the user, on standard error.
 #pragma once
 
 #include <fmt/format.h>
@@ -8,8 +8,8 @@
 
 namespace curvisplat {
 
-/// A line behind "curvisplat: ". Where standard error cannot be written (a full disk, a closed pipe), it is
-/// lost: that is no reason to fail. For any thread.
+/// Prints `text` as one line that begins with "curvisplat: ". If standard error cannot be written (a full
+/// disk, a closed pipe), the message is lost: that is no reason to fail. Any thread.
 void printMessage(std::string_view text) noexcept;
 
 template <typename First, typename... Rest>

@@ -1,12 +1,11 @@
-// open(2), for whoever keeps a descriptor: files that are only read or written have stream/file.h.
+// open(2), for code that keeps the descriptor. Files that are only read or written use stream/base/file.h.
 #pragma once
 
 #include <filesystem>
 
 namespace curvisplat {
 
-/// SystemCalls::open(), closed on exec, and tried again where a signal came in between. The descriptor, or -1
-/// and errno.
+/// SystemCalls::open() with O_CLOEXEC, retried on EINTR. Returns the descriptor, or -1 with errno set.
 int openRetrying(const std::filesystem::path& path, int flags, unsigned mode = 0);
 
 }  // namespace curvisplat

@@ -17,21 +17,22 @@ bool isRegularFile(const std::filesystem::path& path) noexcept {
 }
 
 std::filesystem::path linkTarget(std::filesystem::path path) {
-  constexpr int kMaxLinks = 40;  // as the kernel
+  constexpr int kMaxLinks = 40;  // the kernel's limit
   const std::filesystem::path first = path;
   for (int links = 0; links <= kMaxLinks; ++links) {
     std::error_code none_there;
     if (!std::filesystem::is_symlink(path, none_there)) return path;
-    path = folderOf(path) / std::filesystem::read_symlink(path);  // which replaces all if it is absolute
+    path =
+        folderOf(path) / std::filesystem::read_symlink(path);  // an absolute target replaces the whole path
   }
-  throw Error("{}: is a link that leads round in a circle", first.string());
+  throw Error("{}: its symbolic links form a cycle", first.string());
 }
 
 std::filesystem::path writableTarget(const std::filesystem::path& path) {
   const std::filesystem::path target = linkTarget(path);
   std::error_code none_there;
   if (std::filesystem::exists(target, none_there) && !isRegularFile(target))
-    throw Error("{}: is there, and is no regular file; choose another name", path.string());
+    throw Error("{}: exists and is not a regular file; choose another name", path.string());
   return target;
 }
 

@@ -1,26 +1,26 @@
-// What is where a name leads that a person has given.
+// Resolves paths that users supply.
 #pragma once
 
 #include <filesystem>
 
 namespace curvisplat {
 
-/// The folder that holds `path`, "." for a plain name.
+/// The folder that contains `path`: "." for a plain name.
 std::filesystem::path folderOf(const std::filesystem::path& path);
 
-/// Whether there is a regular file, perhaps at the end of links. A name that cannot be one, such as one that
-/// is too long, is none.
+/// Whether `path` is a regular file, or links that end at one. False for names that no file can have, such as
+/// names that are too long.
 bool isRegularFile(const std::filesystem::path& path) noexcept;
 
-/// `path`, or what is at the end of the links that it names, whether that is there or not. Throws Error if
-/// they go round.
+/// `path` itself, or the path at the end of its symbolic links, whether that exists or not. Throws Error if
+/// the links form a cycle.
 std::filesystem::path linkTarget(std::filesystem::path path);
 
-/// linkTarget() of a file that is to be written. Throws Error if something else than a regular file is there.
+/// linkTarget() for a file to be written. Throws Error if the target exists and is not a regular file.
 std::filesystem::path writableTarget(const std::filesystem::path& path);
 
-/// A short name beside `target`, for what is to take its place once it is whole: another one each time, of
-/// all programs on all machines that share the folder.
+/// A short name in `target`'s folder for a file that will replace `target` once it is complete. The name is
+/// random, so that programs that share the folder, on any machine, do not collide.
 std::filesystem::path temporaryBeside(const std::filesystem::path& target);
 
 }  // namespace curvisplat

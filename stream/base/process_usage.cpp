@@ -8,7 +8,7 @@
 namespace curvisplat {
 namespace {
 
-/// The number behind `key` in a file of lines "key: number"; 0 if there is none.
+/// The number after `key` in a file of lines "key: number"; 0 if the key is missing.
 uint64_t numberIn(const char* path, const std::string& key) {
   std::ifstream file(path);
   for (std::string line; std::getline(file, line);)

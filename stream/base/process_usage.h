@@ -1,4 +1,4 @@
-// What the system has counted of this process: for --stats.
+// The system's counters of this process, for --stats.
 #pragma once
 
 #include <cstdint>
@@ -6,13 +6,14 @@
 namespace curvisplat {
 
 struct ProcessUsage {
-  double cpu_seconds = 0;   // of all threads, in the program and in the system
-  uint64_t bytes_read = 0;  // through system calls, from the page cache or the disk
+  double cpu_seconds = 0;   // all threads, user and system time
+  uint64_t bytes_read = 0;  // by system calls, from the page cache or the disk
   uint64_t bytes_written = 0;
-  uint64_t memory_bytes = 0;       // VmRSS: the part of it that is in memory
-  uint64_t peak_memory_bytes = 0;  // VmHWM: the largest that this was
+  uint64_t memory_bytes = 0;       // VmRSS: resident memory
+  uint64_t peak_memory_bytes = 0;  // VmHWM: the largest VmRSS so far
 
-  /// Since the process began. Numbers that the system does not tell are 0. Any thread; costs some 20 us.
+  /// Totals since the process started; 0 for numbers that the system does not provide. Any thread; takes
+  /// about 20 us.
   static ProcessUsage now();
 };
 

@@ -1,4 +1,4 @@
-// How far a job is, in phases, for whoever displays it; and whether the job has been asked to stop.
+// Progress of a job, in phases, for display; and requests to stop the job.
 #pragma once
 
 #include <atomic>
@@ -15,48 +15,48 @@
 
 namespace curvisplat {
 
-/// The job was asked to stop, and did: not a failure, but an end.
+/// Thrown when the job was asked to stop. Not a failure.
 class Interrupted : public Error {
  public:
   Interrupted(int signal, const std::string& text) : Error(text), signal_(signal) {}
-  /// What Progress::stop() was given.
+  /// The signal that Progress::stop() was given.
   int signal() const { return signal_; }
 
  private:
   int signal_;
 };
 
-/// Progress of a job in phases. begin() is for the thread that runs the job; advance() is for any thread and
+/// Progress of a job in phases. begin() is for the thread that runs the job. advance() is for any thread and
 /// costs an atomic addition.
 class Progress {
  public:
-  /// The phase that is under way.
+  /// The current phase.
   struct State {
     std::string phase, unit;
     uint64_t total = 0;  // steps; 0: unknown
-    uint64_t done = 0;   // steps, without those that were skipped
+    uint64_t done = 0;   // steps, without the skipped ones
     uint64_t skipped = 0;
     double seconds = 0;
   };
-  /// Shows a state; nullptr ends the phase. Called by any thread, by one at a time.
+  /// Shows a state; nullptr ends the phase. Called from any thread, but only from one at a time.
   using Display = std::function<void(const State*)>;
 
-  /// Calls `display`, if there is one, at most ten times a second.
+  /// Calls `display`, if it is set, at most ten times a second.
   explicit Progress(Display display = {}) : display_(std::move(display)) {}
   ~Progress();
 
-  /// Ends the phase before and begins `phase`, of `total` steps of `unit` ("nodes", "bricks"). 0 is
-  /// "unknown".
+  /// Ends the previous phase and begins `phase`. `total`: its number of steps, 0 if unknown. `unit`: what a
+  /// step is ("nodes", "bricks").
   void begin(std::string phase, uint64_t total, std::string unit);
-  /// Throws Interrupted after stop().
+  /// Counts steps that were done. Throws Interrupted after stop().
   void advance(uint64_t steps);
-  /// Counts steps that were done before the job began: for the percentage, not for the rate.
+  /// Counts steps that were done before the job began: they raise the percentage but not the rate.
   void skip(uint64_t steps);
   /// Ends the last phase.
   void end();
 
-  /// Asks the job to stop, for the signal's sake, at its next throwIfStopped(). Any thread, and safe in a
-  /// signal handler.
+  /// Asks the job to stop at its next throwIfStopped() because of `signal`. Any thread; safe in a signal
+  /// handler.
   void stop(int signal) { stop_signal_ = signal; }
   /// Throws Interrupted after stop(). Any thread; costs a load.
   void throwIfStopped() const {
@@ -68,10 +68,10 @@ class Progress {
     std::string name;
     std::string unit;
     double seconds = 0;
-    uint64_t steps = 0;  // without those that were skipped
-    ProcessUsage usage;  // during the phase; but the peak of memory is that of all until its end
+    uint64_t steps = 0;  // without the skipped ones
+    ProcessUsage usage;  // during the phase; except peak memory, which is since the process started
   };
-  /// The phases that have ended, for --stats.
+  /// The phases that have ended. For --stats.
   const std::vector<Phase>& phases() const { return phases_; }
 
  private:
@@ -81,7 +81,7 @@ class Progress {
   std::string phase_, unit_;
   uint64_t total_ = 0;
   std::atomic<uint64_t> done_ = 0, skipped_ = 0;
-  std::atomic<int> stop_signal_ = 0;  // 0: go on
+  std::atomic<int> stop_signal_ = 0;  // 0: continue
   static_assert(std::atomic<int>::is_always_lock_free);
   std::atomic<int64_t> next_display_ms_ = 0;
   std::chrono::steady_clock::time_point start_;

@@ -1,4 +1,4 @@
-// Adds the time of a scope to a sum of seconds.
+// Measures the time that a scope takes and adds it to a sum of seconds.
 #pragma once
 
 #include <chrono>

@@ -1,9 +1,9 @@
-// Names for threads, as debuggers and top show them.
+// Names threads, for debuggers and top.
 #pragma once
 
 namespace curvisplat {
 
-/// At most 15 characters.
+/// `name`: at most 15 characters.
 void nameThisThread(const char* name);
 
 }  // namespace curvisplat
