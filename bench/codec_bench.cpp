@@ -1,5 +1,5 @@
-// Packing a brick and unpacking it, one core, one scalar: of a curved, stretched block in grid order, which
-// is what the predictors are for. Items are splats, bytes are those of the packed streams.
+// Encodes and decodes a brick of one scalar on one core: a curved, stretched block in grid order, which is
+// what the predictors are made for. Items are splats, bytes are those of the encoded streams.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -12,7 +12,7 @@ namespace {
 constexpr uint64_t kSide = 32;
 const RootCube kRoot{glm::dvec3(-2), 4};
 
-/// kSide³ nodes of a quarter of an annulus, its outermost cells e² times as long as the innermost.
+/// kSide³ nodes of a quarter of an annulus, whose outermost cells are e² times as long as the innermost.
 BrickSplats curvedBrick() {
   BrickSplats brick;
   auto& values = brick.variables.emplace_back();
@@ -67,7 +67,7 @@ void codecDecode(benchmark::State& state) {
 }
 BENCHMARK(codecDecode)->Unit(benchmark::kMillisecond);
 
-/// In double, as conversion merges bricks.
+/// Decodes in double precision, as conversion does to merge bricks.
 void codecDecodeForMerging(benchmark::State& state) {
   BrickSplats brick = curvedBrick();
   const EncodedBrick encoded = encodeBrick(kRoot, brick);

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Compares two files of measurements: medians, spreads, ratios.
+"""Compares two files of measurements by their medians and spreads.
 
     bench/compare.py OLD.json NEW.json [--least 3] [--only REGEX] [--allow-missing] [--all]
 
-Both in the form of bench/results.py, or Google Benchmark's (--benchmark_format=json --benchmark_repetitions=5). A
-median counts as changed if it differs by more than --least percent of the old one and by more than twice the sum of both
-spreads. Seconds and rates of a single sample are shown, not judged; bytes, counts and dB (0.2 of them is the least)
-repeat exactly and are.
+Both files are in the form of bench/results.py, or in Google Benchmark's (--benchmark_format=json
+--benchmark_repetitions=5). A median has changed if it differs by more than --least percent, and by more than twice the sum of
+both spreads. Seconds and rates with a single sample are shown but not judged. Bytes, counts and dB are repeatable, and are
+judged (dB from a difference of 0.2 on).
 
-Exit status: 0 nothing became worse; 1 something did, is missing, or has another unit; 2 a file cannot be read.
+Exit status: 0 nothing became worse; 1 something became worse, is missing, or has another unit; 2 a file cannot be read.
 """
 import argparse
 import re
@@ -21,7 +21,7 @@ LEAST_DB = 0.2
 
 
 def judge(old, new, least):
-    """-> "worse", "better", "same", "one sample" or "other unit"."""
+    """Returns "worse", "better", "same", "one sample" or "other unit"."""
     if old["unit"] != new["unit"]:
         return "other unit"
     unit = old["unit"]
@@ -44,7 +44,7 @@ def text(measurement):
 
 
 def compare(old, new, least=0.03, allow_missing=False, only=""):
-    """-> [(name, judgement, old text, new text, ratio or None)], and whether that is a failure."""
+    """Returns [(name, judgement, old text, new text, ratio or None)], and whether anything failed."""
     rows, failed = [], False
     before = {one["name"]: one for one in old["measurements"]}
     after = {one["name"]: one for one in new["measurements"]}
@@ -70,10 +70,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("old")
     parser.add_argument("new")
-    parser.add_argument("--least", type=float, default=3, help="percent below which nothing counts as changed")
-    parser.add_argument("--only", default="", help="a regular expression: names to compare")
+    parser.add_argument("--least", type=float, default=3, help="smallest change in percent that counts (default 3)")
+    parser.add_argument("--only", default="", help="regular expression of the names to compare")
     parser.add_argument("--allow-missing", action="store_true", help="NEW may lack what OLD has")
-    parser.add_argument("--all", action="store_true", help="list what stayed the same as well")
+    parser.add_argument("--all", action="store_true", help="also list what stayed the same")
     arguments = parser.parse_args()
     try:
         old, new = results.read(arguments.old), results.read(arguments.new)
@@ -81,7 +81,7 @@ def main():
         print(f"compare: {error}", file=sys.stderr)
         sys.exit(2)
     if old.get("machine", {}).get("processor") != new.get("machine", {}).get("processor"):
-        print("compare: measured on different machines, or on unknown ones", file=sys.stderr)
+        print("compare: measured on different or unknown machines", file=sys.stderr)
     rows, failed = compare(old, new, arguments.least / 100, arguments.allow_missing, arguments.only)
     shown = [row for row in rows if arguments.all or row[1] != "same"]
     width = max([len(row[0]) for row in shown], default=0)

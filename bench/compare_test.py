@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What compare.py says of measurements whose answer is known."""
+"""Tests compare.py with measurements whose comparison is known."""
 import json
 import pathlib
 import subprocess

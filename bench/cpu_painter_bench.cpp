@@ -1,7 +1,9 @@
-// The painters, side by side on the same splats: round ones of one radius, anywhere in an image of 600x600.
+// Both painters on the same splats: round ones of one radius, anywhere in an image of 600x600.
 //
-// Arguments: the footprint's radius in pixels, and what is drawn: 0 flat splats, 1 per pixel with a smooth
-// transfer function, 2 per pixel with steps in it. `pixels` counts those inside of footprints.
+//   radius   of the footprint, in pixels
+//   kind     0 flat splats; 1 classified per pixel, smooth transfer function; 2 the same, function with steps
+//
+// `pixels` counts the pixels inside of footprints.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -27,7 +29,8 @@ ClassificationTable tableFor(int64_t kind) {
           0, 1};
 }
 
-/// About 20 million covered pixels. The slopes are those of a grid with 50 nodes along the scalar's range.
+/// Splats that cover about 20 million pixels. Their slopes are those of a grid with 50 nodes over the
+/// scalar's range.
 std::vector<ScreenSplat> roundSplats(float radius) {
   const auto l = radius / static_cast<float>(kKernelSupport);
   std::mt19937 random(1);

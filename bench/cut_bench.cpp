@@ -1,4 +1,4 @@
-// Choosing the cut of an index of 400,000 bricks, one core. "bricks" are those looked at.
+// Chooses the cut of an index of 400,000 bricks on one core. "bricks" counts the bricks that are visited.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 namespace curvisplat {
 namespace {
 
-/// An octree with room for one octant in ten less, level by level: 400,000 bricks in eight levels, as a cache
-/// of some 10 billion nodes has.
+/// An octree in which each level lacks one octant in ten: 400,000 bricks in eight levels, as a cache of about
+/// 10 billion nodes has.
 struct SyntheticIndex {
   RootCube root{glm::dvec3(-1), 2};
   std::vector<Brick> bricks;
@@ -73,7 +73,7 @@ void run(benchmark::State& state, const CutOptions& options, bool perspective) {
   static const SyntheticIndex index;
   const CutTree tree{index.root, index.bricks, index.variables, index.subtrees};
   const CutView view = wholeView(perspective);
-  // As costly as the renderer's: two look-ups in a table that tells where extinction is.
+  // As costly as the renderer's test: two look-ups in a table of where there is extinction.
   std::vector<uint32_t> extinction_before(4097);
   for (size_t n = 0; n < extinction_before.size(); ++n) extinction_before[n] = static_cast<uint32_t>(n);
   const TransparentBounds transparent = [&](const ValueBounds& values) {
@@ -88,7 +88,7 @@ void run(benchmark::State& state, const CutOptions& options, bool perspective) {
     cut = chooseCut(tree, view, transparent, options);
     benchmark::DoNotOptimize(cut.parts.data());
   }
-  // All parts, and the bricks above them: a cut of n parts in an octree has about 8/7 n of both.
+  // All parts and their ancestors: for a cut of n parts in an octree about 8/7 n.
   std::vector<bool> looked_at(index.bricks.size());
   for (const BrickPart& part : cut.parts)
     for (uint32_t id = part.brick; id != kNoBrick && !looked_at[id]; id = index.bricks[id].parent)

@@ -1,4 +1,4 @@
-// Sorting a brick's splats by depth, one core, with and without moving the 40 bytes of each. Items are
+// Sorts a brick's splats by depth on one core, with and without moving the 40 bytes of each. Items are
 // splats.
 #include <benchmark/benchmark.h>
 
@@ -11,7 +11,7 @@
 namespace curvisplat {
 namespace {
 
-/// In a grid's order neighbouring splats have neighbouring depths; else any.
+/// `smooth`: neighbouring splats have similar depths, as in grid order; else depths are random.
 std::vector<float> depthsOf(size_t count, bool smooth) {
   std::mt19937 random(1);
   std::uniform_real_distribution<float> unit(0, 1);

@@ -1,5 +1,5 @@
-// How faithful the pictures are: scenes and real grids through conversion and rendering, against the
-// reference ray march. One table, and JSON on request.
+// Measures how faithful pictures are: converts and draws scenes and real grids, and compares the pictures
+// with the reference ray march. Prints a table, and writes JSON on request.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -23,7 +23,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr int kPixels = 256;  // a side of the picture
+constexpr int kPixels = 256;  // width and height of the picture
 constexpr SceneGridSize kNodes{128, 64, 64};
 
 struct View {
@@ -31,16 +31,16 @@ struct View {
   Camera camera;
 };
 
-/// A grid and what its picture is held against.
+/// A grid, and the field that its picture is compared with.
 struct Case {
   std::string name;
-  std::unique_ptr<GridSource> corners;  // whose cells `source` has, if those are cell-centred
+  std::unique_ptr<GridSource> corners;  // cell-centred cases: the grid whose cells `source` offers
   std::unique_ptr<GridSource> source;
   uint32_t scalar = 0;
-  std::shared_ptr<const Scene> scene;  // what `field` looks at, if it is one
+  std::shared_ptr<const Scene> scene;  // the scene behind `field`, if it is analytic
   std::unique_ptr<ReferenceField> field;
   std::pair<double, double> range{0, 1};
-  double length = 1;  // of world units, that counts as one for the extinction
+  double length = 1;  // extinctions are per this length, in world units
   std::vector<View> views;
 };
 
@@ -60,7 +60,7 @@ Case sceneCase(const std::string& name, const std::string& scene, std::optional<
   return out;
 }
 
-/// A scene in as many cells as other cases have nodes.
+/// A scene with as many cells as the other cases have nodes.
 Case cellCase(const std::string& name, const std::string& scene, std::vector<View> views) {
   Case out = sceneCase(name, scene, {}, std::move(views));
   out.corners = std::make_unique<SceneGridSource>(
@@ -72,7 +72,7 @@ Case cellCase(const std::string& name, const std::string& scene, std::vector<Vie
   return out;
 }
 
-/// A scene's grid against its own trilinear interpolation: what is left is the splats' doing alone.
+/// A scene's grid compared with its own trilinear interpolation: what differs is due to the splats alone.
 Case trilinearCase(const std::string& name, const std::string& scene, std::optional<double> clustering,
                    std::vector<View> views) {
   Case out = sceneCase(name, scene, clustering, std::move(views));
@@ -92,7 +92,7 @@ Case realCase(const std::string& name, const std::filesystem::path& grid,
   auto field = std::make_unique<GridField>(*out.source, out.scalar);
   const auto [lower, upper] = field->bounds();
   out.range = field->range();
-  out.length = glm::length(upper - lower) / 3;  // as half-annulus, whose diagonal is 2.6
+  out.length = glm::length(upper - lower) / 3;  // as for half-annulus, whose diagonal is 2.6
   for (const char* view : {"iso", "-x"})
     out.views.push_back(
         {view, Camera::named(view, lower, upper, {kPixels, kPixels}, Projection::kOrthographic)});
@@ -169,7 +169,7 @@ class Measurement {
     convertGrid(*grid.source, cache, grid.scalar);
     for (const View& view : grid.views)
       for (const std::string function : {"smooth", "band", "step"})
-        // A uniform medium right at the step's jump says nothing.
+        // The constant scene has its value at the step's jump, where the result means nothing.
         if (!(grid.name == "constant" && function == "step")) measure(grid, view, function, cache);
   }
 
@@ -182,7 +182,7 @@ class Measurement {
     return name;
   }
 
-  /// Marched by the first who asks, and kept in the folder.
+  /// The reference picture; marched on the first call and kept in the folder.
   Image reference(const Case& grid, const View& view, const std::string& function_name,
                   const KnownFunction& function) {
     const auto path =
@@ -196,7 +196,7 @@ class Measurement {
       const Image image =
           toImage(convergedMarch(*grid.field, function.exact, view.camera, size_, steps, 75, &reached));
       if (reached < 75)
-        fmt::print(stderr, "{}: successive references agree at {:.1f} dB only\n", path.string(), reached);
+        fmt::print(stderr, "{}: successive references agree to {:.1f} dB only\n", path.string(), reached);
       writeImage(image, path);
     }
     return readImage(path);
@@ -260,7 +260,7 @@ class Measurement {
 
 int run(int argc, char** argv) {
   CLI::App app(
-      "How faithful pictures are: dB against the reference march, and splats drawn.\n"
+      "Compare pictures with the reference march: dB, and splats drawn.\n"
       "Columns: the finest level, 4 pixels, 8 pixels.");
   std::string folder, only = ".*", json;
   double low_pass_px2 = FrameOptions().low_pass_px2;
@@ -271,16 +271,17 @@ int run(int argc, char** argv) {
                                                 {"osmesa", Backend::kOsmesa},
                                                 {"egl", Backend::kEgl},
                                                 {"auto", Backend::kAutomatic}};
-  app.add_option("FOLDER", folder, "caches and references; references are kept and used again")->required();
-  app.add_option("--only", only, "a regular expression: cases to measure");
-  app.add_option("--pixels", pixels, "a side of the pictures; dB are told for the default, 256")
+  app.add_option("FOLDER", folder, "Folder for caches and references; references are reused")->required();
+  app.add_option("--only", only, "Regular expression of the cases to measure");
+  app.add_option("--pixels", pixels,
+                 "Width and height of the pictures (default 256, for which figures are published)")
       ->check(CLI::Range(8, 4096));
-  app.add_option("--json", json, "the same as a file");
-  app.add_option("--backend", backend, "what draws: cpu, osmesa, egl or auto")
+  app.add_option("--json", json, "Write the table as JSON to this file");
+  app.add_option("--backend", backend, "Backend: cpu, osmesa, egl or auto")
       ->transform(CLI::CheckedTransformer(backends));
-  app.add_option("--low-pass", low_pass_px2, "pixels squared");
-  app.add_flag("--pictures", pictures, "leave pictures, references and differences in FOLDER");
-  app.add_flag("--quick", quick, "the finest level, per pixel, alone");
+  app.add_option("--low-pass", low_pass_px2, "Low-pass of the projection, in pixels squared");
+  app.add_flag("--pictures", pictures, "Keep pictures, references and differences in FOLDER");
+  app.add_flag("--quick", quick, "Only the finest level, classified per pixel");
   CLI11_PARSE(app, argc, argv);
   Measurement measurement(folder, pixels, backend, low_pass_px2, pictures, quick);
   for (const NamedCase& named : allCases())

@@ -1,5 +1,5 @@
-// How fast the values of VTK, CGNS and NetCDF files reach a NodeArrays from the page cache: one thread, slabs
-// of four planes, coordinates and one scalar, with the check for blanks. Items are values, bytes those of the
+// Reads VTK, CGNS and NetCDF files from the page cache into NodeArrays, on one thread: slabs of four planes,
+// coordinates and one scalar, including the check for blanked samples. Items are values, bytes those of the
 // file. plot3d_read_bench.cpp does the same with PLOT3D.
 #include <benchmark/benchmark.h>
 
@@ -81,7 +81,7 @@ void readCgns(benchmark::State& state, CgnsFileType type) {
 BENCHMARK_CAPTURE(readCgns, hdf5, CgnsFileType::kHdf5)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(readCgns, adf, CgnsFileType::kAdf)->Unit(benchmark::kMillisecond);
 
-/// Longitude and latitude of one dimension each, levels of depth: the reader bends them around the globe.
+/// One-dimensional longitude, latitude and depth, which the reader maps to the globe.
 void readNetcdf(benchmark::State& state, NetcdfFileType type) {
   readFormat(state, "grid.nc", "temp", [&](const std::filesystem::path& path) {
     NetcdfWriter file(path, type);

@@ -3,9 +3,9 @@
 
     bench/frame_times.py FOLDER [--scene NAME] [--repeats 8] [--backends cpu,osmesa] [--threads N] [--json OUT.json]
 
-A scene says how its cache is made (once, in FOLDER; those with "grid" need the named files there) and how it
-is drawn. Prints the shortest and the median frame, from the program's own --stats, and the least processor
-time of the whole program, its start included.
+A scene states how its cache is made and how it is drawn. Caches are made once, in FOLDER; scenes with "grid" need the
+named files there. Prints the shortest and the median frame, from the program's own --stats, and the smallest processor
+time of the whole program, including its start.
 """
 import argparse
 import json
@@ -62,7 +62,7 @@ def main():
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--program", default=HERE.parent / "build/release/tools/curvisplat")
     parser.add_argument("--scene")
-    parser.add_argument("--nodes", help="NIxNJxNK of generated grids, in place of the scenes' own")
+    parser.add_argument("--nodes", help="NIxNJxNK of generated grids, instead of the scenes' own")
     parser.add_argument("--repeats", type=int, default=8)
     parser.add_argument("--backends", default="cpu,osmesa")
     parser.add_argument("--threads", type=int)

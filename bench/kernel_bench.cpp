@@ -1,4 +1,4 @@
-// The kernel and its footprint, one core. Items are values.
+// Evaluates the kernel and its footprint on one core. Items are values.
 #include <benchmark/benchmark.h>
 
 #include <cstdint>
@@ -17,7 +17,7 @@ void kernelValues(benchmark::State& state) {
 }
 BENCHMARK(kernelValues);
 
-/// By quadrature.
+/// The footprint by quadrature.
 void footprintValues(benchmark::State& state) {
   for (auto _ : state)
     for (int n = 0; n < kValues; ++n) benchmark::DoNotOptimize(footprint(kKernelSupport * n / kValues));
@@ -25,7 +25,7 @@ void footprintValues(benchmark::State& state) {
 }
 BENCHMARK(footprintValues)->Unit(benchmark::kMillisecond);
 
-/// As painters make it once.
+/// The footprint's table, which a painter makes once.
 void footprintTableOfAPainter(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(footprintTable(kValues).data());
   state.SetItemsProcessed((kValues + 1) * static_cast<int64_t>(state.iterations()));

@@ -1,4 +1,4 @@
-"""Plots of a few lines over logarithmic axes, side by side, as SVG, without any library."""
+"""Draws line plots with logarithmic axes, side by side, as SVG. Needs no library."""
 
 import math
 from xml.sax.saxutils import escape
@@ -9,7 +9,7 @@ COLOURS = ["#0b5394", "#cc0000", "#38761d", "#b45f06", "#674ea7"]
 
 
 def exponent_of(line):
-    """The p of the power law y = c x^p that fits best, by least squares of the logarithms."""
+    """The exponent p of the power law y = c x^p that fits best: least squares of the logarithms."""
     xs, ys = [math.log(x) for x, _ in line], [math.log(y) for _, y in line]
     x_mean, y_mean = sum(xs) / len(xs), sum(ys) / len(ys)
     return (sum((x - x_mean) * (y - y_mean) for x, y in zip(xs, ys))
@@ -17,7 +17,7 @@ def exponent_of(line):
 
 
 def axis(values, begin, end):
-    """Whole decades around the values -> (place of a value, ticks)."""
+    """Returns (coordinate of a value, ticks) of an axis over the whole decades around the values."""
     low = math.floor(math.log10(min(values)))
     high = max(math.ceil(math.log10(max(values))), low + 1)
     return (lambda value: begin + (math.log10(value) - low) / (high - low) * (end - begin),
@@ -25,7 +25,7 @@ def axis(values, begin, end):
 
 
 def linear_axis(values, begin, end):
-    """From 0 in tens."""
+    """As axis(), linear from 0 in steps of ten."""
     high = max(10 * math.ceil(max(values) / 10), 10)
     return (lambda value: begin + value / high * (end - begin), [float(tick) for tick in range(0, high + 1, 10)])
 
@@ -42,7 +42,7 @@ def number(value):
 
 
 def apart(places):
-    """Heights of labels, moved down where they would lie on one another."""
+    """Heights of labels, moved down where they would overlap."""
     out, last = {}, -math.inf
     for at in sorted(range(len(places)), key=lambda at: places[at]):
         last = max(places[at], last + 15)
@@ -51,7 +51,7 @@ def apart(places):
 
 
 def panel(plot):
-    """The SVG of one plot, its upper left corner at 0, 0."""
+    """The SVG elements of one plot, with its upper left corner at 0, 0."""
     lines = {name: line for name, line in plot["lines"].items() if line}
     points = [point for line in lines.values() for point in line]
     x_of, x_ticks = axis([x for x, _ in points], LEFT, WIDTH - RIGHT)
@@ -79,8 +79,8 @@ def panel(plot):
 
 
 def write_line_plots(path, plots, columns=2):
-    """`plots`: [{"title", "x_name", "y_name", "lines": {name: [(x, y), ...]}}]; all numbers positive. With "trend" the
-    fitted power of x stands beside a line's name, with "linear_y" y begins at 0 and is not logarithmic."""
+    """`plots`: [{"title", "x_name", "y_name", "lines": {name: [(x, y), ...]}}]; all numbers positive. "trend" adds
+    the fitted power of x to each line's name; "linear_y" makes y linear from 0."""
     plots = [plot for plot in plots if any(plot["lines"].values())]
     rows = math.ceil(len(plots) / columns)
     width, height = WIDTH * min(columns, len(plots)), HEIGHT * rows

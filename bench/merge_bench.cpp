@@ -1,4 +1,4 @@
-// Merging splats into the voxels of an inner brick, one core, one scalar.
+// Merges splats of one scalar into the voxels of an inner brick on one core.
 #include <benchmark/benchmark.h>
 
 #include <random>
@@ -8,8 +8,8 @@
 namespace curvisplat {
 namespace {
 
-/// 8 full bricks into a lattice of 32³ voxels: 16 splats a voxel, in order (as bricks in grid order nearly
-/// are) or anywhere.
+/// 8 full bricks into a lattice of 32³ voxels: 16 splats a voxel, voxel after voxel (nearly as in grid order)
+/// or at random.
 void mergeVoxels(benchmark::State& state) {
   const bool in_order = state.range(0) == 1;
   const bool finish = state.range(1) == 1;

@@ -1,4 +1,4 @@
-// Nodes to splats, one core, one scalar.
+// Turns nodes of one scalar into splats on one core.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -46,7 +46,7 @@ void nodeSplats(benchmark::State& state) {
   state.counters["nodes"] =
       benchmark::Counter(static_cast<double>(n * n * 4 * state.iterations()), benchmark::Counter::kIsRate);
 }
-// The distance of blanked nodes; 0: none.
+// Argument: every how many nodes one is blanked; 0: none.
 BENCHMARK(nodeSplats)->ArgName("blank_every")->Arg(0)->Arg(1001)->Arg(31);
 
 }  // namespace

@@ -1,4 +1,4 @@
-"""Which of a file's pages lie in the page cache, and putting them out of it."""
+"""Tells how much of a file is in the page cache, and evicts it."""
 import ctypes
 import mmap
 import os
@@ -6,7 +6,7 @@ import sys
 
 
 def cached_part(path):
-    """The part of a file's pages that lie in the page cache, as mincore says."""
+    """The fraction of a file's pages that are in the page cache, by mincore."""
     size = os.path.getsize(path)
     if size == 0:
         return 0.0
@@ -23,13 +23,13 @@ def cached_part(path):
 
 
 def forget(folder):
-    """Puts the files of a folder out of the page cache. -> The largest part of one that stays in it: 0, unless another
-    program has it mapped or the file system lives in memory; what is measured then is not cold."""
+    """Evicts the files of a folder from the page cache. Returns the largest fraction of one that stays: 0, unless another
+    program has it mapped or the file system is in memory; a measurement is not cold then."""
     left = 0.0
     for entry in os.scandir(folder):
         descriptor = os.open(entry.path, os.O_RDONLY)
         try:
-            os.fsync(descriptor)  # pages that are not yet written stay
+            os.fsync(descriptor)  # dirty pages would stay
             os.posix_fadvise(descriptor, 0, 0, os.POSIX_FADV_DONTNEED)
         finally:
             os.close(descriptor)

@@ -1,9 +1,9 @@
-// How fast bricks come off the disk, decoding off: the pager, in the order of a cut, against a plain reader
-// of the same files that asks for 256 KiB after 256 KiB, eight at once, direct. Bytes are those of the
-// streams.
+// Reads bricks from the disk without decoding them: the pager, in the order of a cut, compared with a plain
+// reader of the same files that reads 256 KiB after 256 KiB with direct I/O, eight reads at once. Bytes are
+// those of the streams.
 //
-// The cache is made for it, of bytes that mean nothing: CURVISPLAT_BENCH_FOLDER (the temporary folder
-// otherwise) must be on the disk in question and have 700 MB free. "large" are 585 bricks of 0.3 to 1.3 MB,
+// The caches contain random bytes. They are made in CURVISPLAT_BENCH_FOLDER (default: the temporary folder),
+// which must be on the disk to be measured and have 700 MB free. "large" has 585 bricks of 0.3 to 1.3 MB,
 // "small" 4,681 of 2 to 20 kB.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
@@ -57,7 +57,7 @@ struct BenchCache {
     return named ? std::filesystem::path(named) : std::filesystem::temp_directory_path();
   }
 
-  /// The leaves as a viewer in that octant's direction would draw them.
+  /// The leaves in drawing order for a viewer in the direction of an octant.
   std::vector<uint32_t> cut(int octant) const {
     CutView view;
     view.towards_viewer = {octant & 1 ? 1 : -1, octant & 2 ? 1 : -1, octant & 4 ? 1 : -1};
@@ -92,7 +92,7 @@ struct BenchCache {
       }
     Brick& brick = encoded.brick;
     brick.cell = cell;
-    // As many as its bytes could hold.
+    // As many splats as its bytes could hold.
     brick.octant_splats.fill(static_cast<uint32_t>(encoded.geometry.size() / 200 + 1));
     brick.splats = 8 * brick.octant_splats[0];
     brick.lower = brick.upper = root.cellMin(cell) + 0.5 * root.cellSize(cell.level);

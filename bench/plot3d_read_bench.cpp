@@ -1,5 +1,5 @@
-// How fast PLOT3D values reach a NodeArrays from the page cache: one thread, slabs of whole planes,
-// coordinates and one scalar, with the check for blanks. Bytes/s are those of the file, items/s are values.
+// Reads PLOT3D files from the page cache into NodeArrays, on one thread: slabs of whole planes, coordinates
+// and one scalar, including the check for blanked samples. Bytes are those of the file, items are values.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
@@ -25,7 +25,7 @@ Stored stored(Stored value, bool swap) {
   return loadStored<Stored>(reinterpret_cast<const std::byte*>(&value), swap);
 }
 
-/// A C file: dimensions, then `arrays` arrays of a ramp.
+/// Writes a C file: dimensions, then `arrays` arrays that each hold a ramp.
 template <typename Value>
 void writeFile(const std::filesystem::path& path, std::vector<int32_t> header, int arrays, bool swap) {
   OutputFile file(path);
@@ -80,7 +80,7 @@ BENCHMARK(readSingleSwapped)->Unit(benchmark::kMillisecond);
 BENCHMARK(readDoubleNative)->Unit(benchmark::kMillisecond);
 BENCHMARK(readDoubleSwapped)->Unit(benchmark::kMillisecond);
 
-/// Numbers of 18 characters to doubles in a temporary file, its fsync included.
+/// Parses numbers of 18 characters into doubles in a temporary file, including its fsync.
 void spoolText(benchmark::State& state) {
   const auto folder = std::filesystem::temp_directory_path();
   const auto path = folder / ("curvisplat-bench-" + std::to_string(::getpid()) + ".txt");

@@ -1,8 +1,8 @@
-// What a frame's worker does with one brick after the other, on one core, from memory: verify, decode,
-// project and sort, each alone and all together. Items are splats.
+// The work of a frame's worker, from memory on one core: verify, decode, project and sort bricks, each step
+// alone and all together. Items are splats.
 //
-// The bricks are those of a cache: CURVISPLAT_BENCH_CACHE=CACHE names it; otherwise a half annulus of 2 M
-// nodes in single precision is converted first, into the temporary folder.
+// The bricks are those of the cache that CURVISPLAT_BENCH_CACHE names. Without it, a half annulus of 2 M
+// nodes in single precision is converted into the temporary folder first.
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
@@ -27,7 +27,7 @@
 namespace curvisplat {
 namespace {
 
-/// A cache's bricks of one kind, read once.
+/// All leaves, or all inner bricks, of a cache; read once.
 class Bricks {
  public:
   static const Bricks& leaves() {
@@ -89,7 +89,7 @@ class Bricks {
   }
 };
 
-/// A view of all the data, and the colours to see it in.
+/// A view of all data, and a transfer function.
 struct View {
   explicit View(Projection projection)
       : settings{ScreenView::of(camera(projection), {600, 600}, glm::dvec3(1), 1.5, 1e-3)},
@@ -147,7 +147,7 @@ void decodeValues(benchmark::State& state) {
 }
 BENCHMARK(decodeValues)->ArgName("leaves")->Arg(1)->Arg(0)->Unit(benchmark::kMillisecond);
 
-/// Projects, or projects and sorts; decoding is not counted where `decode` is false.
+/// Projects, or projects and sorts; decoding is not timed if `decode` is false.
 void prepare(benchmark::State& state, bool decode, bool sort) {
   const Bricks& bricks = state.range(0) ? Bricks::leaves() : Bricks::inner();
   const View view(state.range(1) ? Projection::kPerspective : Projection::kOrthographic);

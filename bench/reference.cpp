@@ -1,6 +1,5 @@
-// The true picture of a grid's scalar, or of an analytic scene, as the reference march draws it: what the
-// pictures of any program are held against. Camera and function are given in words, as to `curvisplat
-// render`.
+// Draws a grid's scalar, or an analytic scene, with the reference march: the picture that those of any
+// program are compared with. Options for camera and function are those of `curvisplat render`.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -23,7 +22,7 @@ struct Words {
   std::optional<double> clustering;
   std::vector<int> size{256, 256};
   std::vector<double> range{0, 1};
-  double length = 1;  // of world units, that counts as one for the extinction
+  double length = 1;  // extinctions are per this length, in world units
   double agreement_db = 75;
   std::vector<double> position, focal_point, view_up{0, 0, 1};
   double parallel_scale = 1;
@@ -33,26 +32,26 @@ void addOptions(CLI::App& app, Words& words) {
   const auto numbers = [&](const std::string& name, std::vector<double>& to, int count, const char* help) {
     return app.add_option(name, to, help)->delimiter(',')->expected(count);
   };
-  auto* scene = app.add_option("--scene", words.scene, "an analytic scene, as for `curvisplat generate`");
-  app.add_option("--clustering", words.clustering, "the scene's")->needs(scene);
-  auto* grid = app.add_option("--grid", words.grid, "a grid file, in place of a scene")->excludes(scene);
-  app.add_option("--solution", words.solution, "its solution or function file")->needs(grid);
-  app.add_option("--scalar", words.scalar, "its scalar")->needs(grid);
-  app.add_option("--function", words.function, "smooth, band or step")
+  auto* scene = app.add_option("--scene", words.scene, "Analytic scene, as for `curvisplat generate`");
+  app.add_option("--clustering", words.clustering, "Clustering of the scene")->needs(scene);
+  auto* grid = app.add_option("--grid", words.grid, "Grid file, instead of a scene")->excludes(scene);
+  app.add_option("--solution", words.solution, "Solution or function file of the grid")->needs(grid);
+  app.add_option("--scalar", words.scalar, "Scalar of the grid")->needs(grid);
+  app.add_option("--function", words.function, "Transfer function: smooth, band or step")
       ->required()
       ->check(CLI::IsMember({"smooth", "band", "step"}));
-  numbers("--range", words.range, 2, "LO,HI: the function is stretched over these scalars");
-  app.add_option("--length", words.length, "the extinctions are per so many world units")
+  numbers("--range", words.range, 2, "LO,HI: stretch the function over these scalars");
+  app.add_option("--length", words.length, "Length that extinctions are per, in world units")
       ->check(CLI::PositiveNumber);
   app.add_option("--size", words.size, "WIDTHxHEIGHT in pixels")->delimiter('x')->expected(2);
   numbers("--position", words.position, 3, "x,y,z of the camera")->required();
   numbers("--focal-point", words.focal_point, 3, "x,y,z it looks at")->required();
   numbers("--view-up", words.view_up, 3, "x,y,z that points up");
-  app.add_option("--parallel-scale", words.parallel_scale, "half the picture's height in world units")
+  app.add_option("--parallel-scale", words.parallel_scale, "Half the picture's height in world units")
       ->required();
   app.add_option("--agreement", words.agreement_db,
-                 "dB between two marches at which the steps are short enough");
-  app.add_option("-o,--output", words.output, "the picture: PFM, EXR or PNG")->required();
+                 "Halve the steps until two marches agree to this many dB");
+  app.add_option("-o,--output", words.output, "Picture to write: PFM, EXR or PNG")->required();
 }
 
 Camera cameraOf(const Words& words) {
@@ -69,7 +68,7 @@ void march(const ReferenceField& field, const Words& words) {
   const KnownFunction function =
       KnownFunction::of(words.function, words.range[0], words.range[1], words.length);
   const ImageSize size{words.size[0], words.size[1]};
-  if (size.width < 1 || size.height < 1) throw UsageError("--size: a picture has at least one pixel");
+  if (size.width < 1 || size.height < 1) throw UsageError("--size: expected at least one pixel each way");
   MarchSteps steps;
   steps.step = 0.016 * words.length;
   steps.cells = 2;
@@ -81,7 +80,8 @@ void march(const ReferenceField& field, const Words& words) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app("The true picture of a grid or a scene, marched along the rays through the pixels' centres.");
+  CLI::App app(
+      "Draw the reference picture of a grid or a scene by marching rays through the pixels' centres.");
   Words words;
   addOptions(app, words);
   CLI11_PARSE(app, argc, argv);
@@ -90,7 +90,7 @@ int run(int argc, char** argv) {
     march(SceneField(*scene), words);
     return 0;
   }
-  if (words.grid.empty()) throw UsageError("give --scene, or --grid");
+  if (words.grid.empty()) throw UsageError("--scene or --grid is required");
   OpenGridOptions options;
   options.grid = words.grid;
   if (!words.solution.empty()) options.solutions = {words.solution};

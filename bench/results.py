@@ -1,11 +1,11 @@
-"""Measurements in the form that all of bench/ and `curvisplat bench` write, and their statistics.
+"""The form of measurements that all of bench/ and `curvisplat bench` write, and their statistics.
 
     {"schema": ..., "program": ..., "version": ..., "machine": {...},
      "measurements": [{"name", "unit", "better": "more" or "less", "median", "samples": [...]}],
      "left_out": [{"name", "reason"}]}
 
-A name is a path that stays the same from version to version, parameters last: "frames/wake/backend:cpu". Units are
-without prefix: s, B, B/s, nodes/s, dB, 1 (a count).
+A name is a path that does not change from version to version, with parameters last: "frames/wake/backend:cpu". Units have no
+prefix: s, B, B/s, nodes/s, dB, 1 (a count).
 """
 import json
 import os
@@ -23,8 +23,8 @@ def more_is_better(unit):
 
 
 def spread(samples):
-    """How far samples lie from their median: the median of the distances, scaled to a normal distribution's standard
-    deviation. Of fewer than five half the range, since of three the two nearest may lie together by chance. None of one."""
+    """The median distance of the samples from their median, scaled to the standard deviation of a normal distribution.
+    For fewer than five samples half their range, since two of three may lie together by chance; None for one sample."""
     if len(samples) < 2:
         return None
     if len(samples) < 5:
@@ -54,7 +54,7 @@ class Results:
     def add(self, name, unit, samples):
         samples = [float(sample) for sample in samples]
         if not samples or any(one["name"] == name for one in self.measurements):
-            raise ValueError(f"{name}: measured twice, or without samples")
+            raise ValueError(f"{name}: already measured, or without samples")
         self.measurements.append({"name": name, "unit": unit, "better": "more" if more_is_better(unit) else "less",
                                   "median": statistics.median(samples), "samples": samples})
 
@@ -62,7 +62,7 @@ class Results:
         self.left_out.append({"name": name, "reason": reason})
 
     def take(self, other, prefix=""):
-        """All of another file's, as read() returns it."""
+        """Adds all of another file's measurements, as read() returns them."""
         for one in other["measurements"]:
             self.measurements.append({**one, "name": prefix + one["name"]})
         for one in other.get("left_out", []):
@@ -76,7 +76,7 @@ class Results:
 
 
 def from_google_benchmark(content):
-    """What --benchmark_format=json gives: seconds of real time, a sample a repetition."""
+    """The output of --benchmark_format=json, as seconds of real time with one sample a repetition."""
     results, samples = Results(), {}
     for run in content["benchmarks"]:
         name = run.get("run_name", run["name"])
@@ -93,26 +93,26 @@ def from_google_benchmark(content):
 
 
 def read(path):
-    """A file of this form, or one of Google Benchmark's."""
+    """Reads a file of this form, or one of Google Benchmark's."""
     with open(path) as file:
         content = json.load(file)
     if isinstance(content, dict) and "benchmarks" in content:
         return from_google_benchmark(content)
     if not isinstance(content, dict) or not isinstance(content.get("measurements"), list):
-        raise ValueError(f"{path}: has no \"measurements\"; expected what bench/ or `curvisplat bench` writes")
+        raise ValueError(f"{path}: has no \"measurements\"; expected a file that bench/ or `curvisplat bench` wrote")
     for one in content["measurements"]:
         if not {"name", "unit", "samples"} <= set(one) or not one["samples"]:
-            raise ValueError(f"{path}: a measurement without name, unit or samples: {one}")
+            raise ValueError(f"{path}: a measurement lacks name, unit or samples: {one}")
     return content
 
 
 def run(command, **how):
-    """Runs a program; ends this one with its words if it fails."""
+    """Runs a program; exits with its output if it fails."""
     command = [str(word) for word in command]
     try:
         result = subprocess.run(command, capture_output=True, text=True, **how)
     except FileNotFoundError:
-        sys.exit(f"{command[0]}: is no program; build it (bench/README.md says how), or name another one")
+        sys.exit(f"{command[0]}: no such program; build it (see bench/README.md), or give another one")
     if result.returncode != 0:
         sys.exit(f"{' '.join(command)}\n{result.stdout}{result.stderr}")
     return result.stdout

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""All of bench/ with one command: a short form (ten minutes on two cores) or a smoke form (does each still work?).
+"""Runs all of bench/: in short (five to ten minutes on two cores), or as a smoke test.
 
     bench/run.py FOLDER [--smoke] [--only STEP,...] [--without STEP,...] [--fin GRID SOLUTION]
 
-Each step leaves FOLDER/STEP.json, its words in FOLDER/STEP.log, and plots; FOLDER/all.json has every measurement, for
-bench/compare.py. Caches, grids and reference pictures stay in FOLDER and are used again. What a step leaves out is in its
-JSON, with the reason. The smoke form takes tiny sizes: its figures mean nothing, only that they are there.
+Each step writes FOLDER/STEP.json, its output to FOLDER/STEP.log, and plots; FOLDER/all.json has all measurements, for
+bench/compare.py. Caches, grids and reference pictures stay in FOLDER and are reused. A step's JSON lists what could not be
+measured, with the reason. The smoke test uses tiny sizes: it shows that the benchmarks work, its figures mean nothing.
 
-Exit status 1 if a step failed or left a JSON that is none; the others are run all the same.
+Exit status 1 if a step fails or writes no valid measurements; the other steps are still run.
 """
 import argparse
 import json
@@ -23,9 +23,9 @@ HERE = pathlib.Path(__file__).resolve().parent
 
 
 class Form:
-    """What the short form measures."""
+    """Arguments of the short form."""
     micro = ["--benchmark_min_time=0.05", "--benchmark_repetitions=3"]
-    micro_cache = False  # verify, decode and project take a half annulus of 2 M nodes
+    micro_cache = False  # verify, decode and project make a half annulus of 2 M nodes
     cache = "200x200x200"
     convert_nodes = "8M"
     scaling = ["--nodes", "1M,8M", "--repeats", "3"]
@@ -37,7 +37,7 @@ class Form:
 class SmokeForm(Form):
     micro = ["--benchmark_min_time=0.000001", 
              "--benchmark_filter=-plainReader|pager|osmesa/radius:[248]/|cpu/radius:[24]/"]
-    micro_cache = True  # they take that of the step "bench"
+    micro_cache = True  # they use the cache of the step "bench"
     cache = "32x32x32"
     convert_nodes = "30K"
     scaling = ["--nodes", "4K,30K", "--repeats", "1", "--lod-pixels", "2", "--size", "64x64"]
@@ -47,7 +47,7 @@ class SmokeForm(Form):
 
 
 def cache_commands(paths, form):
-    """Make the cache of the wake, if it is not there."""
+    """Commands that make the cache of the wake, unless it exists."""
     if (paths.cache / "manifest.json").exists():
         return []
     grid = paths.cache.with_suffix("")
@@ -114,7 +114,7 @@ class Paths:
 
 
 def read_fidelity(path):
-    """Rows of curvisplat_fidelity as measurements."""
+    """The rows of curvisplat_fidelity as measurements."""
     out = results.Results()
     for row in json.loads(path.read_text()):
         name = "/".join(row[key].replace(" ", "_") for key in ("case", "view", "function", "classification"))
@@ -123,9 +123,9 @@ def read_fidelity(path):
 
 
 def run_step(name, paths, form, everything):
-    """-> what went wrong; nothing if all is well."""
+    """Returns what went wrong, or None."""
     if name in ("bench", "convert") and subprocess.run([paths.program, "bench", "--help"], capture_output=True).returncode:
-        return f"{paths.program}: has no subcommand `bench`; build it anew, or run --without bench,convert"
+        return f"{paths.program}: has no subcommand `bench`; rebuild it, or run --without bench,convert"
     commands = STEPS[name](paths, form)
     paths.json(name).unlink(missing_ok=True)
     log = paths.folder / f"{name}.log"
@@ -137,15 +137,15 @@ def run_step(name, paths, form, everything):
             try:
                 status = subprocess.run(words, stdout=file, stderr=subprocess.STDOUT).returncode
             except FileNotFoundError:
-                return f"{words[0]}: is no program; build with -DCURVISPLAT_BENCH=ON"
+                return f"{words[0]}: no such program; build with -DCURVISPLAT_BENCH=ON"
             if status != 0:
-                return f"exit status {status} of {' '.join(words[:3])} ...; its words:\n{log.read_text()[-2000:]}"
+                return f"exit status {status} of {' '.join(words[:3])} ...; its output:\n{log.read_text()[-2000:]}"
     try:
         found = read_fidelity(paths.json(name)) if name == "fidelity" else results.read(paths.json(name))
     except (OSError, ValueError, KeyError) as error:
         return f"expected measurements in {paths.json(name)}; {error}"
     if not found["measurements"]:
-        return f"{paths.json(name)}: has no measurements"
+        return f"{paths.json(name)}: contains no measurements"
     everything.take(found, "micro/" if name == "micro" else "")
     return None
 
@@ -153,19 +153,19 @@ def run_step(name, paths, form, everything):
 def steps_of(text):
     steps = [step for step in text.split(",") if step]
     if not set(steps) <= set(STEPS):
-        raise argparse.ArgumentTypeError(f"'{text}': there are {', '.join(STEPS)}")
+        raise argparse.ArgumentTypeError(f"unknown step in '{text}'; expected some of {', '.join(STEPS)}")
     return steps
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=pathlib.Path, help="on a disk, not in memory: a few GB")
-    parser.add_argument("--smoke", action="store_true", help="tiny sizes: under a minute")
+    parser.add_argument("folder", type=pathlib.Path, help="for results; needs a few GB on a disk, not in memory")
+    parser.add_argument("--smoke", action="store_true", help="tiny sizes: under a minute, figures mean nothing")
     parser.add_argument("--build", type=pathlib.Path, default=HERE.parent / "build/release",
-                        help="configured with -DCURVISPLAT_BENCH=ON")
+                        help="build folder, configured with -DCURVISPLAT_BENCH=ON")
     parser.add_argument("--only", type=steps_of, default=list(STEPS))
     parser.add_argument("--without", type=steps_of, default=[], action="extend")
-    parser.add_argument("--fin", nargs=2, metavar=("GRID", "SOLUTION"), help="for peers: a PLOT3D grid and Q file")
+    parser.add_argument("--fin", nargs=2, metavar=("GRID", "SOLUTION"), help="PLOT3D grid and Q file for the step peers")
     arguments = parser.parse_args()
     os.makedirs(arguments.folder, exist_ok=True)
 

@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
-"""Conversion and rendering at growing sizes: rates, bytes, first picture, frame, memory, and how each of them grows.
+"""Measures conversion and rendering at growing sizes: rates, bytes, first picture, frame, memory, and how each grows.
 
     bench/scaling.py FOLDER --nodes 1M,8M,64M [--json OUT.json] [--plot OUT.svg]
 
-Each size of the scene is generated and converted in FOLDER, --conversions times; caches and what was measured of their
-conversion are kept there and used again (--again: not), grids are not. A conversion needs 16 bytes a node of grid and 61
-of temporary files. Then each cache is drawn --repeats times with each error of --lod-pixels.
+Each size of the scene is generated in FOLDER and converted --conversions times. Caches and the measurements of their
+conversions are kept there and reused, unless --again is given; grids are deleted. A conversion needs 16 bytes a node for the
+grid and 61 for temporary files. Then each cache is drawn --repeats times with each error of --lod-pixels.
 
-"cached" is the part of the grid's files that the page cache holds when a conversion starts, asked with mincore: they
-were just written. A cache's files are put out of the page cache before it is drawn ("cold", verified with mincore), the
-program's own are not. "first" is the time from the start of the process to a first, coarse picture in a file, "frame"
-that of the whole picture once the cache is open; "peak" is the largest memory of the process, and "above" what of it is
-more than with a cache of eight splats: program, driver and image take the rest.
+"cached" is the part of the grid's files that is in the page cache when a conversion starts, by mincore: they were just
+written. A cache's files are evicted from the page cache before it is drawn ("cold", checked with mincore), the program's own
+files are not. "first" is the time from the start of the process until a first, coarse picture is in its file, "frame" the time
+of the whole picture once the cache is open. "peak" is the peak memory of the process, and "above" the part that a cache of
+eight splats does not need: program, driver and image take the rest.
 """
 import argparse
 import json
@@ -31,7 +31,7 @@ MIB = 2**20
 def count_of(text):
     match = re.fullmatch(r"(\d+)([KMG]?)", text)
     if not match:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number of nodes such as 64M")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of nodes; expected one such as 64M")
     return int(match[1]) * SUFFIX[match[2]]
 
 
@@ -40,7 +40,7 @@ def counts_of(text):
 
 
 def converted(arguments, edge, conversions):
-    """-> the cache of a cube of nodes, and the --stats of its conversions."""
+    """Returns the cache of a cube of nodes, and the --stats of its conversions."""
     prefix = arguments.folder / f"{arguments.scene}_{edge}"
     cache, kept = prefix.with_suffix(".splats"), prefix.with_suffix(".conversions.json")
     if not arguments.again and kept.exists() and (cache / "manifest.json").exists():
@@ -64,7 +64,7 @@ def converted(arguments, edge, conversions):
 
 
 def drawn(arguments, cache, lod_pixels):
-    """-> the --stats of one cold picture, and what `compare` says of the first one against it."""
+    """Returns the --stats of one cold picture, with the PSNR of the first picture against it."""
     output = arguments.folder / "scaling.png"
     first = output.with_name("scaling_first.png")
     statistics_file = output.with_suffix(".json")
@@ -80,7 +80,7 @@ def drawn(arguments, cache, lod_pixels):
 
 
 def measure(arguments, edge, out):
-    """One size: all of it into `out`, and into the row that is returned."""
+    """Measures one size; adds it to `out` and returns it as a row."""
     cache, conversions = converted(arguments, edge, arguments.conversions)
     nodes = conversions[0]["samples"]
     row = {"nodes": nodes, "size": f"{edge}x{edge}x{edge}", "conversion": conversions[-1], "pictures": {}}
@@ -100,7 +100,7 @@ def measure(arguments, edge, out):
                 add(f"{what}/error:{lod_pixels}px", "s", [value_of(run, keys) for run in runs])
             else:
                 out.leave_out(f"scaling/{what}/error:{lod_pixels}px/nodes:{nodes}",
-                              f"not cold: {100 * still_there:.0f} % of a file stayed in memory; take a folder on a disk")
+                              f"not cold: {100 * still_there:.0f} % of a file stayed in memory; use a folder on a disk")
         add(f"peak/error:{lod_pixels}px", "B", [run["peak_memory_bytes"] for run in runs])
     return row
 
@@ -185,11 +185,11 @@ def main():
     parser.add_argument("--nodes", default="1M,8M,64M", type=counts_of)
     parser.add_argument("--lod-pixels", default="1,2,3")
     parser.add_argument("--size", default="600x600")
-    parser.add_argument("--memory", default="256M", help="for pictures")
+    parser.add_argument("--memory", default="256M", help="--memory of pictures")
     parser.add_argument("--convert-memory", default="512M")
-    parser.add_argument("--repeats", type=int, default=3, help="pictures of each cache and error")
-    parser.add_argument("--conversions", type=int, default=1, help="of each size")
-    parser.add_argument("--again", action="store_true", help="convert anew what is there")
+    parser.add_argument("--repeats", type=int, default=3, help="pictures of each cache with each error")
+    parser.add_argument("--conversions", type=int, default=1, help="conversions of each size")
+    parser.add_argument("--again", action="store_true", help="convert again what FOLDER already has")
     parser.add_argument("--json")
     parser.add_argument("--plot")
     arguments = parser.parse_args()

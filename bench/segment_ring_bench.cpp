@@ -1,5 +1,5 @@
-// The queue between workers and painter: what it costs to hand over segments, filled with nothing, by one
-// worker and by several. Items are segments; the splats of a frame come in some hundred of them.
+// The queue between workers and painter: the cost of handing over segments, which are not filled, by one
+// worker and by several. Items are segments; a frame has some hundreds of them.
 #include <benchmark/benchmark.h>
 
 #include <atomic>

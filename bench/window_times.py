@@ -1,14 +1,13 @@
 #!/usr/bin/env python3
-"""How long the window takes, on a display without a screen of its own.
+"""Measures how fast the window responds, on a virtual display.
 
-From the start until the window, and until data of the cache, is on the screen; from a key, and from a movement of the
-mouse with a button down, until the screen answers, at moments all over the refinement; from Escape until the end; and the
-largest memory. The screen is asked about once in a millisecond, through X's own library: a screenshot by another program
-costs more than what is measured.
+Prints the time from the start until the window and until data are on the screen; from a key, and from a drag of the mouse,
+until the screen changes, at moments spread over the refinement; from Escape until the program ends; and its peak memory. The
+screen is polled about every millisecond through Xlib: a screenshot by another program would take longer than what is measured.
 
     bench/window_times.py CACHE [--inputs 40] [--backend cpu] [--program build/release/tools/curvisplat]
 
-Needs Xvfb, libX11 and libXtst (which xdotool brings). Nothing else should run meanwhile.
+Needs Xvfb, libX11 and libXtst (installed with xdotool). Nothing else should run meanwhile.
 """
 import argparse
 import ctypes
@@ -21,7 +20,7 @@ import time
 
 SIZE = (1200, 800)
 PANEL = (20, 40, 200, 100)  # x, y, width, height: the transfer function's curve
-PICTURE = (420, 360, 560, 80)  # a part of it, beside panels and scalar bar
+PICTURE = (420, 360, 560, 80)  # part of the picture, clear of panels and scalar bar
 KEYSYMS = {"h": 0x68, "Escape": 0xFF1B}
 
 
@@ -32,7 +31,7 @@ class XImage(ctypes.Structure):
 
 
 class Display:
-    """The hands and eyes of who sits before it."""
+    """Input and pixels of an X display."""
 
     def __init__(self, name):
         self.x, self.test = ctypes.CDLL("libX11.so.6"), ctypes.CDLL("libXtst.so.6")
@@ -42,12 +41,12 @@ class Display:
         self.x.XKeysymToKeycode.restype = ctypes.c_ubyte
         self.display = ctypes.c_void_p(self.x.XOpenDisplay(name.encode()))
         if not self.display:
-            raise SystemExit(f"{name}: no such display")
+            raise SystemExit(f"{name}: cannot open the display")
         self.root = ctypes.c_ulong(self.x.XDefaultRootWindow(self.display))
         self.images = {}
 
     def pixels(self, box):
-        """Bytes of blue, green, red and nothing."""
+        """The pixels of a box: bytes of blue, green, red and padding."""
         planes, by_pixel = ctypes.c_ulong(0xFFFFFF), 2
         if box not in self.images:
             self.images[box] = self.x.XGetImage(self.display, self.root, *box, planes, by_pixel)
@@ -81,14 +80,14 @@ class Display:
 
 
 def coloured(pixels):
-    """Whether there is data: outline, axes' names and background are grey; some hundred pixels that are not."""
+    """Whether data is shown: more than 100 pixels that are not grey, as outline, axis names and background are."""
     return sum(max(p) - min(p) > 12 for p in zip(pixels[0::16], pixels[1::16], pixels[2::16])) > 100
 
 
 def spread(name, seconds):
     ordered = sorted(seconds)
     of = lambda part: 1000 * ordered[min(len(ordered) - 1, int(part * len(ordered)))]
-    print(f"{name}: {len(ordered)} times, 50 % within {of(0.5):.0f} ms, 95 % within {of(0.95):.0f} ms, "
+    print(f"{name}: {len(ordered)} samples, 50 % within {of(0.5):.0f} ms, 95 % within {of(0.95):.0f} ms, "
           f"all within {1000 * ordered[-1]:.0f} ms")
 
 
@@ -117,7 +116,7 @@ def main():
                  words.backend], cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             while display.pixels(PANEL) == blank:
                 time.sleep(0.001)
-            print(f"the window on the screen after {1000 * (time.monotonic() - start):.0f} ms")
+            print(f"window on the screen after {1000 * (time.monotonic() - start):.0f} ms")
             while not coloured(display.pixels(PICTURE)):
                 time.sleep(0.005)
             print(f"data on the screen after {1000 * (time.monotonic() - start):.0f} ms")
@@ -131,14 +130,14 @@ def main():
                 time.sleep(chance.uniform(0.05, 0.8))
                 display.move(700, 400)
                 display.button(1)
-                display.move(710, 405)  # what follows comes in the midst of a movement
+                display.move(710, 405)  # so that the next movement comes during a drag
                 time.sleep(chance.uniform(0.02, 0.3))
                 drags.append(display.seconds_until_changed(PICTURE, lambda: display.move(730, 415)))
                 display.button(0)
             spread("keys", keys)
             spread("movements", drags)
             peak = [line for line in open(f"/proc/{window.pid}/status") if line.startswith("VmHWM")][0]
-            print(f"memory at the most {int(peak.split()[1]) / 1024:.0f} MiB")
+            print(f"peak memory {int(peak.split()[1]) / 1024:.0f} MiB")
             start = time.monotonic()
             display.key("Escape")
             window.wait()

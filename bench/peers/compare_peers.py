@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
-"""The same grid, camera and transfer function drawn by curvisplat and by VTK, side by side in one run.
+"""Draws the same grid, camera and transfer function with curvisplat and with VTK, in one run.
 
     bench/peers/compare_peers.py FOLDER [--sizes 40x32x32,100x100x100] [--fin GRID SOLUTION] [--functions smooth]
                                  [--json OUT.json] [--plot OUT.svg] [--table OUT.md]
 
-Grids of the half-annulus scene are generated in FOLDER, of each of --sizes; --fin takes a PLOT3D grid with a Q file (the
-blunt fin, 40x32x32, say) for its density. Every picture is held against the reference march of curvisplat_reference: of the
-analytic field for the scene, of the trilinear field in the grid's own cells for --fin. All programs get the extinctions and
-colours of tests/data/half_annulus_*.json over white, an orthographic camera, one pixel a sample, and write PNG.
+The half-annulus scene is generated in FOLDER in each of --sizes; --fin draws the density of a PLOT3D grid with a Q file, such as
+the blunt fin (40x32x32). Every picture is compared with the reference march of curvisplat_reference: of the analytic field for
+the scene, of the trilinear field in the grid's own cells for --fin. All programs get the extinctions and colours of
+tests/data/half_annulus_*.json over white, an orthographic camera and one sample a pixel, and write PNG.
 
-"build" is what goes before the first picture and is kept: reading and cutting into tetrahedra, or resampling; of curvisplat
-the conversion (which is done once, to a file). "frame" is the median of further frames, the camera moving a little. "peak" is
-the largest memory of the process; of curvisplat that of its picture, the conversion's stands beside it in the JSON.
+"build" is what precedes the first picture and is kept: reading and cutting into tetrahedra, or resampling; for curvisplat the
+conversion, which is done once, to a file. "frame" is the median of further frames, between which the camera moves a little. "peak"
+is the peak memory of the process; for curvisplat that of its picture, with that of the conversion beside it in the JSON.
 """
 import argparse
 import contextlib
@@ -53,13 +53,13 @@ def camera_along(direction, focal_point, distance, parallel_scale):
 
 
 class Case:
-    """A grid, and how it is looked at."""
+    """A grid, with its camera, range and reference."""
 
     def __init__(self, name, grid, solution, scalar, kind, array, camera, value_range, length, truth):
         self.name, self.grid, self.solution, self.scalar = name, grid, solution, scalar
-        self.kind, self.array = kind, array  # VTK's words
+        self.kind, self.array = kind, array  # VTK's names
         self.camera, self.range, self.length = camera, value_range, length
-        self.truth = truth  # words for curvisplat_reference
+        self.truth = truth  # arguments of curvisplat_reference
         self.nodes = 0
 
     def camera_words(self):
@@ -147,8 +147,8 @@ def drawn_by_us(arguments, case, cache, conversion, function, technique, picture
 
 
 def truth_of(arguments, case, function):
-    """The reference's picture; made once."""
-    # Of an analytic field for all of its grids, else of this one grid.
+    """The reference picture; made once."""
+    # One picture serves all grids of an analytic field; any other grid has its own.
     what = re.sub("-[0-9x]+$", "", case.name) if case.name != "fin" else f"fin_{pathlib.Path(case.grid).stem}"
     path = arguments.folder / f"truth_{what}_{function}_{arguments.picture}.pfm"
     if not path.exists():
@@ -168,7 +168,7 @@ def psnr_of(arguments, picture, truth):
 
 
 def measure(arguments, case, out):
-    """-> a row for every technique and function."""
+    """Returns a row for every technique and function."""
     told = json.loads(results.run([arguments.program, "info", case.grid, case.solution, "--json"]))
     case.nodes = told["nodes"]
     cache, conversion = converted(arguments, case)
@@ -206,7 +206,7 @@ def line_of(row):
 
 
 def plots_of(rows, function):
-    """Over the nodes of the half-annulus: seconds, memory, fidelity."""
+    """Plots of seconds, memory and fidelity over the nodes of the half-annulus."""
     def lines(value):
         of = {}
         for row in rows:
@@ -222,13 +222,13 @@ def plots_of(rows, function):
 
 @contextlib.contextmanager
 def display(named):
-    """A display without a screen, for VTK; or the one that is named."""
+    """A virtual display for VTK, or the one that is named."""
     if named:
         os.environ["DISPLAY"] = named
         yield
         return
     if not shutil.which("Xvfb"):
-        sys.exit("Xvfb: is not installed, and VTK draws on a display; apt-get install xvfb, or give --display")
+        sys.exit("Xvfb: not installed, and VTK needs a display; apt-get install xvfb, or give --display")
     read, write = os.pipe()
     server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", "1280x1280x24", "-nolisten", "tcp"],
                               pass_fds=[write], stderr=subprocess.DEVNULL)
@@ -250,7 +250,7 @@ def python_with_vtk(named):
     for python in tried:
         if shutil.which(python) and subprocess.run([python, "-c", "import vtk"], capture_output=True).returncode == 0:
             return python
-    sys.exit(f"{', '.join(tried)}: no Python here that has VTK; apt-get install --no-install-recommends python3-vtk9, "
+    sys.exit(f"{', '.join(tried)}: none of them has VTK; apt-get install --no-install-recommends python3-vtk9, "
              "or give --vtk-python")
 
 
@@ -258,7 +258,7 @@ def one_of(choices):
     def parse(text):
         chosen = text.split(",")
         if not set(chosen) <= set(choices):
-            raise argparse.ArgumentTypeError(f"'{text}': there are {', '.join(choices)}")
+            raise argparse.ArgumentTypeError(f"unknown name in '{text}'; expected some of {', '.join(choices)}")
         return chosen
     return parse
 
@@ -272,13 +272,13 @@ def parsed():
     parser.add_argument("--functions", default=["smooth"], type=one_of(["smooth", "band", "step"]))
     parser.add_argument("--techniques", default=[one for one in every if one != "zsweep"], type=one_of(every))
     parser.add_argument("--picture", default="256x256")
-    parser.add_argument("--frames", type=int, default=5, help="after the first")
-    parser.add_argument("--seconds", type=float, default=30, help="no further frame of VTK after so many")
+    parser.add_argument("--frames", type=int, default=5, help="frames after the first")
+    parser.add_argument("--seconds", type=float, default=30, help="VTK begins no further frame after this many seconds")
     parser.add_argument("--resample", type=int, default=128, help="samples along each axis")
     parser.add_argument("--program", default=ROOT / "build/release/tools/curvisplat", type=pathlib.Path)
     parser.add_argument("--reference", default=ROOT / "build/release/bench/curvisplat_reference", type=pathlib.Path)
     parser.add_argument("--vtk-python", help="a Python that has VTK 9")
-    parser.add_argument("--display", help="draw on this one, with a graphics card say; a virtual one otherwise")
+    parser.add_argument("--display", help="display to draw on, for example one with a graphics card (default: a virtual one)")
     parser.add_argument("--json")
     parser.add_argument("--plot")
     parser.add_argument("--table")
@@ -287,7 +287,7 @@ def parsed():
 
 def main():
     arguments = parsed()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that the display is ended as well
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that Xvfb is ended as well
     arguments.folder.mkdir(parents=True, exist_ok=True)
     version = results.version_of(arguments.program)
     if set(arguments.techniques) & set(VTK_TECHNIQUES):

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Draws a structured PLOT3D grid by one of VTK's ways of volume rendering, and says how long each part took.
+"""Draws a structured PLOT3D grid by one of VTK's volume rendering techniques, and reports how long each part took.
 
     xvfb-run vtk_render.py JOB.json
 
-JOB.json has what compare_peers.py writes: files, scalar, technique, camera, size, function, frames and the picture to
-write. The answer, one JSON object, goes to standard output. One process a picture: its peak memory is the technique's.
+JOB.json is written by compare_peers.py: files, scalar, technique, camera, size, function, frames and the picture to write.
+The result, one JSON object, goes to standard output. Each picture has a process of its own, whose peak memory is the technique's.
 Needs Debian's python3-vtk9, or any Python with VTK 9.
 """
 import json
@@ -17,7 +17,7 @@ import vtk
 
 
 def read_grid(job):
-    """The first block, with the scalar as single-precision values at its points."""
+    """The first block, with the scalar in single precision at its points."""
     reader = vtk.vtkMultiBlockPLOT3DReader()
     reader.AutoDetectFormatOn()
     reader.SetXYZFileName(job["grid"])
@@ -25,7 +25,7 @@ def read_grid(job):
     reader.Update()
     grid = reader.GetOutput().GetBlock(0)
     if grid is None or grid.GetPointData().GetArray(job["array"]) is None:
-        sys.exit(f"{job['solution']}: VTK finds no {job['array']} in it")
+        sys.exit(f"{job['solution']}: VTK does not find {job['array']} in it")
     scalar = grid.GetPointData().GetArray(job["array"])
     single = vtk.vtkFloatArray()
     single.DeepCopy(scalar)
@@ -45,7 +45,7 @@ def tetrahedra_of(grid):
 
 
 def resampled(grid, samples):
-    """Boxes of one size all over the grid's bounds. Points outside of the cells are hidden, as in ParaView."""
+    """A uniform grid over the bounds. Points outside of the cells are hidden, as in ParaView."""
     sampler = vtk.vtkResampleToImage()
     sampler.SetInputDataObject(grid)
     sampler.UseInputBoundsOn()
@@ -57,7 +57,7 @@ def resampled(grid, samples):
 
 
 def build(job, grid):
-    """-> the volume's mapper with its data, and what is to be told of it."""
+    """Returns the volume's mapper with its data, and what to report about it."""
     technique = job["technique"]
     if technique == "resampled":
         image, told = resampled(grid, job["resample"])
@@ -75,7 +75,7 @@ def build(job, grid):
     if technique != "projected-tetrahedra":
         mapper.AutoAdjustSampleDistancesOff()
         mapper.SetImageSampleDistance(1)
-        # The default integrates lines and loses precision in thin tetrahedra: 38, 12 and 24 dB in place of 46, 38 and 33.
+        # The default integrates lines and loses precision in thin tetrahedra: 38, 12 and 24 dB instead of 46, 38 and 33.
         mapper.SetRayIntegrator(vtk.vtkUnstructuredGridHomogeneousRayIntegrator())
     mapper.SetInputData(cells)
     return mapper, told
@@ -84,9 +84,9 @@ def build(job, grid):
 def volume_property(job):
     """Colours and extinctions, linear between the job's points.
 
-    The mappers of unstructured grids take what they call opacity for an extinction times the unit distance, that of
-    projected tetrahedra in bytes: so the unit is chosen for which the largest is 1. The ray cast of images takes it for
-    the opacity of a unit distance.
+    The mappers of unstructured grids use what they call opacity as the extinction times the unit distance; projected
+    tetrahedra store it in bytes, so the unit is chosen such that the largest is 1. The ray cast of images uses it as the
+    opacity of a unit distance.
     """
     out = vtk.vtkVolumeProperty()
     unit = job["opacity_unit"]
@@ -169,7 +169,7 @@ def main():
 
     frames = []
     for _ in range(job["frames"]):
-        # A little farther each time: what depends on the view is made anew.
+        # The camera moves a little, so that everything that depends on the view is recomputed.
         camera.Azimuth(0.01)
         renderer.ResetCameraClippingRange()
         start = clock()

@@ -358,7 +358,7 @@ void addRender(CLI::App& app) {
       ->group(where);
   command
       ->add_option("--path", camera->path,
-                   "Camera path: a JSON file of key frames, described in render/README.md")
+                   "Camera path: a JSON file of key frames, described in tools/REFERENCE.md")
       ->group(where);
   command->add_option("--frames", camera->frames, "Number of frames of --orbit or --path")
       ->check(CLI::Range(1u, kMaxFrames))
