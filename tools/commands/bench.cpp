@@ -31,6 +31,7 @@
 #include "tools/throughput/frame_throughput.h"
 #include "tools/throughput/machine.h"
 #include "tools/throughput/measurements.h"
+#include "tools/throughput/plot.h"
 #include "tools/throughput/stage_throughput.h"
 #include "tools/throughput/text_table.h"
 #include "tools/throughput/throughput_report.h"
@@ -75,6 +76,7 @@ void checkWords(const BenchWords& words) {
     throw UsageError("{} is for --convert", words.nodes ? "--nodes" : "--tmp");
   if (!words.json.empty()) checkOutputFile("--json", words.json, {words.cache});
   if (words.plots.empty()) return;
+  requirePlots();
   std::error_code ignored;
   if (fs::exists(words.plots, ignored) && !fs::is_directory(words.plots, ignored))
     throw Error("--plot {}: is not a folder", words.plots.string());
