@@ -12,6 +12,7 @@
 #include "stream/base/message.h"
 #include "stream/base/progress.h"
 #include "tools/commands/commands.h"
+#include "tools/options/shown_options.h"
 #include "tools/output/standard_streams.h"
 
 namespace curvisplat {
@@ -20,7 +21,7 @@ namespace {
 /// "convert, info, render and view"
 std::string namesOf(const CLI::App& app) {
   std::vector<std::string> names;
-  for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+  for (const CLI::App* command : shownCommands(app)) names.push_back(command->get_name());
   const std::string last = names.back();
   names.pop_back();
   return fmt::format("{} and {}", fmt::join(names, ", "), last);
@@ -39,6 +40,7 @@ int run(int argc, char** argv) {
   addBench(app);
   addGenerate(app);
   addCompare(app);
+  addManual(app);
 
   try {
     app.parse(argc, argv);

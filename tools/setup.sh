@@ -25,7 +25,7 @@ packages=(
   # drawing on the processor, in whatever vectors it has
   libhwy-dev
   # tests and benchmarks
-  libgtest-dev libbenchmark-dev python3
+  libgtest-dev libbenchmark-dev python3 man-db
   # the window under test: a display without a screen, its input and its pictures
   xvfb xdotool x11-apps libgl1-mesa-dri
   "$@"
