@@ -13,6 +13,7 @@
 #include "stream/base/message.h"
 #include "stream/base/progress.h"
 #include "tools/commands/commands.h"
+#include "tools/options/shown_options.h"
 #include "tools/output/standard_streams.h"
 
 namespace curvisplat {
@@ -20,7 +21,7 @@ namespace {
 
 std::string namesOf(const CLI::App& app) {
   std::vector<std::string> names;
-  for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+  for (const CLI::App* command : shownCommands(app)) names.push_back(command->get_name());
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
@@ -37,6 +38,7 @@ int run(int argc, char** argv) {
   addBench(app);
   addGenerate(app);
   addCompare(app);
+  addManual(app);
 
   try {
     app.parse(argc, argv);

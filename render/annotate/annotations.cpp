@@ -304,8 +304,4 @@ std::vector<uint8_t> annotationLayer(const Annotations& annotations, const Annot
   return layer;
 }
 
-std::string scalarTitle(const std::string& name, const std::string& unit) {
-  return unit.empty() ? name : fmt::format("{} [{}]", name, unit);
-}
-
 }  // namespace curvisplat

@@ -28,7 +28,7 @@ PROGRAM_ROOMS = {
     "tools/output": set(),
     "tools/options": {"tools/output"},
     "tools/commands": {"tools/output", "tools/options", "tools/throughput", "tools/viewer"},
-    "tools": {"tools/output", "tools/commands"},
+    "tools": {"tools/output", "tools/options", "tools/commands"},
 }
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*(?:"([^"]+)"|<([^>]+)>)')

@@ -31,6 +31,7 @@
 #include "tools/throughput/frame_throughput.h"
 #include "tools/throughput/machine.h"
 #include "tools/throughput/measurements.h"
+#include "tools/throughput/plot.h"
 #include "tools/throughput/stage_throughput.h"
 #include "tools/throughput/text_table.h"
 #include "tools/throughput/throughput_report.h"
@@ -75,6 +76,7 @@ void checkArguments(const BenchArguments& arguments) {
     throw UsageError("{} needs --convert", arguments.nodes ? "--nodes" : "--tmp");
   if (!arguments.json.empty()) checkOutputFile("--json", arguments.json, {arguments.cache});
   if (arguments.plots.empty()) return;
+  requirePlots();
   std::error_code ignored;
   if (fs::exists(arguments.plots, ignored) && !fs::is_directory(arguments.plots, ignored))
     throw Error("--plot {}: exists and is not a directory", arguments.plots.string());

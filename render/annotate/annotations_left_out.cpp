@@ -1,0 +1,36 @@
+// Annotations in a build without Cairo: pictures have none, and asking for one is an error.
+#include "render/annotate/annotations.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+void refuse(const Annotations& annotations) {
+  if (!(annotations == Annotations{}))
+    throw UsageError(
+        "this program was built without scalar bar, axes and outline (CMake's option "
+        "CURVISPLAT_ANNOTATIONS)");
+}
+
+}  // namespace
+
+ImageSize dataSize(const Annotations& annotations, ImageSize picture, const TransferFunction& /*function*/) {
+  refuse(annotations);
+  return picture;
+}
+
+Image annotated(const Image& data, const Annotations& annotations, const AnnotatedScene& /*scene*/) {
+  refuse(annotations);
+  return data;
+}
+
+uint64_t annotatedBytes(ImageSize /*picture*/) {
+  return 0;
+}
+
+std::vector<uint8_t> annotationLayer(const Annotations& annotations, const AnnotatedScene& scene) {
+  refuse(annotations);
+  return std::vector<uint8_t>(4 * scene.picture.pixels());
+}
+
+}  // namespace curvisplat

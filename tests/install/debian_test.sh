@@ -1,0 +1,34 @@
+#!/usr/bin/env bash
+# Makes the Debian packages of a build, unpacks the program's into an empty root and runs it from there.
+#
+#   tests/install/debian_test.sh BUILD_FOLDER
+set -euo pipefail
+
+build=$(realpath "$1")
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+expect() { "${@:2}" || { echo "FAILED: $1"; exit 1; }; }
+
+cpack -G DEB --config "$build/CPackConfig.cmake" -B "$folder" > "$folder/log" 2>&1 ||
+  { cat "$folder/log"; echo "FAILED: cpack"; exit 1; }
+program=$(echo "$folder"/curvisplat_*.deb)
+development=$(echo "$folder"/libcurvisplat-dev_*.deb)
+version=$(dpkg-deb --field "$program" Version)
+
+dpkg --extract "$program" "$folder/root"
+expect "the unpacked program runs" test "$("$folder/root/usr/bin/curvisplat" --version)" = "curvisplat $version"
+# Of every library that the program is linked with, the package is named.
+for library in libc6 libcgns libhdf5 libnetcdf libopenvdb libpng16 libtbb12 liburing2; do
+  expect "the program's package depends on $library" grep -q "$library" <(dpkg-deb --field "$program" Depends)
+done
+expect "the program's package has no libraries" test -z "$(dpkg-deb --contents "$program" | grep -E '\.(a|h|cmake)$')"
+
+dpkg --extract "$development" "$folder/root"
+for file in include/curvisplat/stream/cache/cache_reader.h lib/cmake/curvisplat/curvisplat-config.cmake; do
+  expect "the development package has $file" test -f "$folder/root/usr/$file"
+done
+for depended in $(dpkg-deb --field "$development" Depends | tr -d ','); do
+  expect "$depended is a package" dpkg-query --status "$depended" > /dev/null
+done
+echo "$(basename "$program"): $(($(stat -c %s "$program") / 1024)) KiB;" \
+  "$(basename "$development"): $(($(stat -c %s "$development") / 1024)) KiB"
