@@ -303,7 +303,7 @@ TEST_F(Frames, AMovieThatFailsLeavesNothing) {
   {
     const ScopedEnvironment path("PATH",
                                  folderWith("ffmpeg", "echo 'no such encoder' >&2\necho more >&2\nexit 3\n"));
-    expectRefused(movie, 1, "ffmpeg ended with status 3 before the movie was whole: no such encoder");
+    expectRefused(movie, 1, "ffmpeg ended with status 3 before the movie was complete: no such encoder");
   }
   {
     const ScopedEnvironment path("PATH", folderWith("ffmpeg", "cat > /dev/null\nkill -9 $$\n"));

@@ -132,7 +132,7 @@ TEST_F(OddDataTest, AnEmptyPictureNamesItsCause) {
   // The camera.
   expectEmpty({"--position", "100,0,0", "--focal-point", "200,0,0", "--view-angle", "30"},
               "does not see the data's box");
-  expectEmpty({"--parallel-scale", "1e300"}, "give a smaller --parallel-scale");
+  expectEmpty({"--parallel-scale", "1e300"}, "choose a smaller --parallel-scale");
   expectEmpty({"--position", "1e9,0,0", "--view-angle", "30"}, "move the camera closer");
   render({"--position", "1e5,0,0", "--view-angle", "30"});  // of which a float picture has a trace
   EXPECT_TRUE(said("move the camera closer")) << said_;
@@ -141,7 +141,7 @@ TEST_F(OddDataTest, AnEmptyPictureNamesItsCause) {
                       std::string(R"([{"Name": "high", "RGBPoints": [0,1,0,0, 15,1,0,0],
                                        "Points": [0,0,0.5,0, 11,0,0.5,0, 15,1,0.5,0]}])"));
   expectEmpty({"--tf", file("high.json"), "--clip-box", "0,3,0,15,0,15"},
-              "only values of f for which the transfer function 'high' is transparent");
+              "the transfer function 'high' is transparent for all visible values of f");
 }
 
 TEST_F(OddDataTest, AConstantIsDrawn) {
@@ -178,7 +178,8 @@ TEST_F(OddDataTest, WhatIsNotFiniteIsCountedSkippedAndReported) {
   writeCube(folder_ / "cube", 8, node);
   const ProgramResult result = runProgram(cubeArguments(folder_ / "cube", {"--stats", file("stats.json")}));
   ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_NE(result.err.find("note: 208 samples are not finite and are blanked"), std::string::npos)
+  EXPECT_NE(result.err.find("note: 208 samples are not finite and are blanked"),
+            std::string::npos)
       << result.err;
   const auto stats = nlohmann::json::parse(readTextFile(folder_ / "stats.json"));
   EXPECT_EQ(stats["blanked"]["not_finite"], 208);

@@ -59,7 +59,7 @@ TEST(ThroughputReport, DiskRowsAndWhatIsMissing) {
             "MiB/s, 256 KiB per read  1 in flight  2 in flight  4 in flight  8 in flight  16 in flight  32 in "
             "flight\n"
             "direct                             -            -            -          800             -         "
-            "     -\n");
+            "    -\n");
 }
 
 TEST(ThroughputReport, ReasonsComeOnce) {
