@@ -24,6 +24,7 @@
 #include <vector>
 
 #include "preprocess/formats/open/open_grid.h"
+#include "preprocess/scenes/scenes.h"
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/error.h"
@@ -290,6 +291,17 @@ std::unique_ptr<GridSource> uniformCube(uint64_t n) {
 std::vector<Case> allCases() {
   std::vector<Case> cases;
   cases.push_back({"cube", [] { return uniformCube(101); }, "s0"});
+  const auto scene = [&](const std::string& name, SceneGridSize size) {
+    cases.push_back({name,
+                     [name, size]() -> std::unique_ptr<GridSource> {
+                       return std::make_unique<SceneGridSource>(makeScenes(name), size, 4);
+                     },
+                     "f"});
+  };
+  scene("spectral", {49, 43, 37});
+  scene("dome", {41, 25, 21});
+  scene("globe", {33, 33, 6});
+  scene("duct", {21, 17, 17});
   const std::filesystem::path data = CURVISPLAT_SHARED_DATA;
   const auto add = [&](const std::string& name, const std::string& grid, const std::string& solution,
                        const std::string& scalar) {

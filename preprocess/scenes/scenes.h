@@ -61,33 +61,46 @@ class Scene {
 /// sheared-waves          a parallelepiped of even, strongly sheared cells, with waves
 /// wake                   an O-grid around a cylinder with a vortex street behind it; i closes on itself, and
 ///                        wall cells are e^clustering times thinner than the outermost ones
+/// spectral, dome, globe, duct   rough_scenes.h
 std::vector<std::string> sceneNames();
 
-/// `clustering`: the outermost cells along j are about e^clustering times as long as the innermost; none: the
-/// scene's own (2.5; shell 4, axis 1, wake 9). Throws UsageError for another name (it lists the names there
-/// are) and for a clustering that is not in (0, 20], or that the scene does not have.
-std::unique_ptr<Scene> makeScene(std::string_view name, std::optional<double> clustering = std::nullopt);
+/// The blocks of a scene: one, but for globe (6) and duct (3). `clustering`: the outermost cells along j are about
+/// e^clustering times as long as the innermost; none: the scene's own (2.5; shell 4, axis 1, wake 9, dome 9.7). Throws
+/// UsageError for another name (it lists the names there are) and for a clustering that is not in (0, 20], or that the
+/// scene does not have.
+std::vector<std::shared_ptr<const Scene>> makeScenes(std::string_view name,
+                                                     std::optional<double> clustering = std::nullopt);
+/// A scene of one block.
+std::shared_ptr<const Scene> makeScene(std::string_view name,
+                                       std::optional<double> clustering = std::nullopt);
 
 struct SceneGridSize {
   uint64_t ni = 0, nj = 0, nk = 0;
 };
 
-/// A scene sampled at ni x nj x nk nodes, from u, v, w = 0 to 1 inclusive, evaluated as it is read. One
-/// block, one scalar "f". Memory: three tables of ni, nj and nk entries.
+/// A scene sampled at ni x nj x nk nodes a block, from u, v, w = 0 to 1 inclusive, evaluated as it is read. One
+/// scalar, "f". Memory: three tables of ni, nj and nk entries a block.
 class SceneGridSource : public GridSource {
  public:
   /// `coordinate_bytes`: 4 rounds the coordinates to single precision, as a file would; 8 does not. Throws
   /// UsageError unless each dimension has at least two nodes.
-  SceneGridSource(std::shared_ptr<const Scene> scene, SceneGridSize size, int coordinate_bytes = 8);
+  SceneGridSource(std::vector<std::shared_ptr<const Scene>> blocks, SceneGridSize size,
+                  int coordinate_bytes = 8);
+  SceneGridSource(std::shared_ptr<const Scene> scene, SceneGridSize size, int coordinate_bytes = 8)
+      : SceneGridSource(std::vector{std::move(scene)}, size, coordinate_bytes) {}
 
   const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
 
  private:
-  std::shared_ptr<const Scene> scene_;
+  struct Block {
+    std::shared_ptr<const Scene> scene;
+    std::vector<glm::dvec3> of_i, of_j, of_k;
+  };
+
   GridDescription description_;
-  std::vector<glm::dvec3> of_i_, of_j_, of_k_;
+  std::vector<Block> blocks_;
 };
 
 }  // namespace curvisplat
