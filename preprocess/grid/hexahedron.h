@@ -1,4 +1,4 @@
-// The trilinear hexahedron between eight nodes: its middle, its Jacobian there, and its volume.
+// The trilinear hexahedron between eight nodes: its centre, its Jacobian there, and its volume.
 #pragma once
 
 #include <array>
@@ -10,13 +10,13 @@
 
 namespace curvisplat {
 
-/// From the corners, numbered by their bits: 1 along i, 2 along j, 4 along k. Inline, since conversion does
-/// it for every cell.
+/// Built from the corners, whose index has bit 1 along i, 2 along j, 4 along k. Inline, since conversion does
+/// this for every cell.
 struct Hexahedron {
   glm::dvec3 centre;    // the mean of the corners
   glm::dmat3 jacobian;  // at the centre; columns along i, j, k: each is the mean of four edges
-  /// What the volume has beyond det(jacobian): 0 for a parallelepiped. Exact: the trilinear map's Jacobian
-  /// is integrated in closed form, and it is zero but for the twists e (ij), f (jk) and g (ki).
+  /// Volume minus det(jacobian); 0 for a parallelepiped. Exact: the closed-form integral of the trilinear
+  /// map's Jacobian, in which only the twists e (ij), f (jk) and g (ki) contribute.
   double volume_beyond;
 
   explicit Hexahedron(const std::array<glm::dvec3, 8>& corner) {
@@ -34,7 +34,7 @@ struct Hexahedron {
     volume_beyond = (triple(e, jacobian[1], f) + triple(jacobian[0], e, g) + triple(g, f, jacobian[2])) / 48;
   }
 
-  /// With its sign: below 0 where the corners are left-handed.
+  /// Signed: negative if the corners are left-handed.
   double volume() const { return triple(jacobian[0], jacobian[1], jacobian[2]) + volume_beyond; }
 
   static double triple(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
@@ -42,7 +42,7 @@ struct Hexahedron {
   }
 };
 
-/// The corners of the cell whose lowest node is element `at` of arrays of nodes.
+/// The corners of the cell whose lowest node is element `at` of the arrays.
 inline std::array<glm::dvec3, 8> cornersAt(const double* x, const double* y, const double* z, size_t at,
                                            size_t row_stride, size_t plane_stride) {
   std::array<glm::dvec3, 8> corner;
@@ -53,7 +53,7 @@ inline std::array<glm::dvec3, 8> cornersAt(const double* x, const double* y, con
   return corner;
 }
 
-/// The marks of the eight corners, or-ed.
+/// The bitwise or of the marks of the eight corners.
 inline uint8_t cornerMarks(const uint8_t* marks, size_t at, size_t row_stride, size_t plane_stride) {
   const uint8_t* p = marks + at;
   const auto pair = [](const uint8_t* q) { return static_cast<uint8_t>(q[0] | q[1]); };

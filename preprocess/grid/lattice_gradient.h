@@ -1,4 +1,4 @@
-// The gradient of a field from its differences along the three axes of a grid.
+// The gradient of a field, from its differences along the three axes of a grid.
 #pragma once
 
 #include <array>
@@ -9,11 +9,12 @@
 
 namespace curvisplat {
 
-/// Of the linear field that has these differences over these steps; where the steps lie in a plane or on a
-/// line (polar axes, sheets), the one of them that does not change across it. Inline: done for every node.
+/// The gradient of the linear field with the given differences over the given steps. If the steps lie in a
+/// plane or on a line (polar axes, sheets), the field is taken as constant across it. Inline, since it is
+/// computed for every node.
 class LatticeGradient {
  public:
-  /// Columns: from one neighbour to the other along i, j, k; zero where there is none.
+  /// Columns: from one neighbour to the other along i, j, k; zero where there are no neighbours.
   explicit LatticeGradient(const glm::dmat3& steps) {
     std::array<double, 3> length;
     for (int axis = 0; axis < 3; ++axis) length[axis] = glm::length(steps[axis]);
@@ -46,13 +47,13 @@ class LatticeGradient {
   }
 
  private:
-  // A step that leaves the plane of the longer ones by less than this part of itself has rounding in it.
+  // A step whose relative distance from the span of the longer steps is below this adds only rounding errors.
   static constexpr double kFlat = 1e-7;
 
   std::array<int, 3> order_{0, 1, 2};  // axes, the longest step first
-  std::array<glm::dvec3, 3> basis_;    // orthonormal; 0 where a step adds no direction
-  std::array<double, 3> inverse_;      // 1 / length of what a step adds
-  double along_[3][3];                 // [n][m]: of the step m along basis_[n], n < m
+  std::array<glm::dvec3, 3> basis_;    // orthonormal (Gram-Schmidt); 0 where a step adds no direction
+  std::array<double, 3> inverse_;      // 1 / length of the step's component along its basis vector
+  double along_[3][3];                 // [n][m]: component of step m along basis_[n], n < m
 };
 
 }  // namespace curvisplat

@@ -10,11 +10,11 @@
 namespace curvisplat {
 namespace {
 
-// Nodes are looked at in pieces; only a piece with something to blank is looked at node by node.
+// Nodes are tested in pieces; only a piece with something to blank is processed node by node.
 constexpr size_t kPiece = 4096;
 
-/// x * 0 is 0 for a finite x and NaN for any other, so a sum of them tells of all at once. Lanes, since the
-/// compiler may not reorder a sum of floating-point numbers itself.
+/// x * 0 is 0 if x is finite, else NaN, so one sum tests a whole piece. The sum is split into lanes, since
+/// the compiler must not reorder floating-point additions.
 template <typename Value>
 bool allFinite(std::span<const Value> values) {
   constexpr size_t kLanes = 32 / sizeof(Value);
@@ -37,7 +37,7 @@ void markNotFinite(std::span<const Value> values, std::span<uint8_t> mark) {
   for (size_t n = 0; n < values.size(); ++n) mark[n] |= !std::isfinite(values[n]);
 }
 
-/// Blanks the nodes that are marked and not blank yet. Returns how many.
+/// Blanks the nodes that are marked and not yet blanked. Returns their number.
 uint64_t blankMarked(std::span<const uint8_t> mark, std::span<uint8_t> blank) {
   uint64_t blanked = 0;
   for (size_t n = 0; n < mark.size(); ++n) {
@@ -55,8 +55,7 @@ Centring centringOf(const GridDescription& description, const std::vector<uint32
     if (other.centring == first.centring) continue;
     const bool cells = first.centring == Centring::kCell;
     throw Error(
-        "{} stands at nodes and {} in cells: a cache's splats stand for one or the other; convert them to "
-        "two caches",
+        "{} is node-centred, but {} is cell-centred; a cache holds one kind: convert them to two caches",
         cells ? other.name : first.name, cells ? first.name : other.name);
   }
   return first.centring;

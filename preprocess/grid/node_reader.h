@@ -1,5 +1,5 @@
-// Reads nodes from a source and decides, in one place, which of them are there: the block's own blanking,
-// `--blank VALUE` and non-finite numbers together.
+// Reads nodes from a source and decides, for all of conversion, which of them are blanked: by the grid's own
+// blanking, by `--blank VALUE`, or because a number is not finite.
 #pragma once
 
 #include <cstdint>
@@ -13,35 +13,35 @@ namespace curvisplat {
 struct BlankCounts {
   uint64_t by_grid = 0;     // iblank 0
   uint64_t by_value = 0;    // --blank
-  uint64_t not_finite = 0;  // a coordinate or a scalar that is NaN or infinite; only nodes not counted above
+  uint64_t not_finite = 0;  // NaN or infinite coordinate or scalar, not counted above
   uint64_t total() const { return by_grid + by_value + not_finite; }
   BlankCounts& operator+=(const BlankCounts& other);
 };
 
-/// NodeArrays::blank as a NodeReader of cell-centred scalars fills it: what is wrong with the node, and with
-/// the value of the cell whose lowest node it is.
+/// The bits of NodeArrays::blank as a NodeReader of cell-centred scalars fills it: why the node is blanked,
+/// and why the cell whose lowest node it is has no value.
 enum CellMark : uint8_t {
-  kNoNode = 1,          // blanked by the grid, or its coordinates are not finite
+  kNoNode = 1,          // the grid blanks the node, or its coordinates are not finite
   kNoValue = 2,         // NaN: there is no such cell, or the grid blanks it
-  kBlankValue = 4,      // --blank
-  kValueNotFinite = 8,  // infinite
+  kBlankValue = 4,      // the cell's value is that of --blank
+  kValueNotFinite = 8,  // the cell's value is infinite
 };
 
-/// As a GridSource: any number of threads may read at once.
+/// Any number of threads may read concurrently.
 class NodeReader {
  public:
-  /// `scalars`: positions in source.description().scalars. `source` must outlive the reader. Throws Error if
-  /// some are of nodes and others of cells.
+  /// `scalars`: indices into source.description().scalars. `source` must outlive the reader. Throws Error if
+  /// node-centred and cell-centred scalars are mixed.
   NodeReader(const GridSource& source, std::vector<uint32_t> scalars, std::optional<double> blank_value);
 
   const GridSource& source() const { return *source_; }
   size_t scalars() const { return scalars_.size(); }
-  /// Of all of its scalars; of nodes if there are none.
+  /// The centring of all its scalars; kNode if there are none.
   Centring centring() const { return centring_; }
 
-  /// Reads `box` of `block`, and blanks. Values and coordinates of blanked nodes are as they were read. Of
-  /// cell-centred scalars `blank` holds CellMarks, and nothing is counted: whether a cell is there depends on
-  /// nodes that may lie outside of the box.
+  /// Reads `box` of `block` and marks blanked nodes, whose values and coordinates are left as read. For
+  /// cell-centred scalars `blank` holds CellMarks and nothing is counted, since whether a cell is blanked may
+  /// depend on nodes outside the box.
   BlankCounts read(uint32_t block, const NodeBox& box, NodeArrays& out) const;
 
  private:

@@ -1,6 +1,6 @@
-// Reads one value ahead, in a thread of its own, while the one before is worked on: that is all the
-// concurrency that conversion's disk reads need, and it keeps blocking reads off the workers. Two values
-// exist at any time, and keep their capacity.
+// Reads the next value in a thread of its own while the caller processes the current one. Conversion's disk
+// reads need no more concurrency, and blocking reads stay off the TBB workers. There are two values, which
+// are reused and keep their capacity.
 #pragma once
 
 #include <pthread.h>
@@ -34,8 +34,8 @@ class ReadAhead {
   ReadAhead(const ReadAhead&) = delete;
   ReadAhead& operator=(const ReadAhead&) = delete;
 
-  /// Waits for the next value, which is the caller's until the next call; null at the end. Throws what `fill`
-  /// threw. For one thread.
+  /// Waits for the next value, valid until the next call; null at the end. Throws what `fill` threw. For one
+  /// thread.
   T* next() {
     std::unique_lock lock(mutex_);
     given_back_ = taken_;
@@ -73,12 +73,12 @@ class ReadAhead {
 
   std::function<bool(T&)> fill_;
   std::array<T, 2> values_;
-  std::mutex mutex_;  // guards all below; filled_ is written by the reading thread only
+  std::mutex mutex_;  // guards all members below; only the reading thread writes filled_
   std::condition_variable changed_;
   uint64_t filled_ = 0, taken_ = 0, given_back_ = 0;
   bool ended_ = false, stopped_ = false;
   std::exception_ptr error_;
-  std::thread thread_;  // last: it uses the others
+  std::thread thread_;  // last, since it uses the other members
 };
 
 }  // namespace curvisplat

@@ -1,4 +1,4 @@
-// When two names of scalars are the same: files, programs and people differ in case and underscores.
+// Comparison of scalar names, which differ between files, programs and users in case and underscores.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace curvisplat {
 
-/// Without case, spaces, underscores and hyphens.
+/// The name in lower case without spaces, underscores and hyphens.
 std::string simplifiedName(const std::string& name);
 
 /// Whether `simple` (a simplified name) is the scalar's name or one of its aliases.

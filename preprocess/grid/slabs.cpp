@@ -8,15 +8,15 @@
 namespace curvisplat {
 namespace {
 
-/// Below so many planes beside the two of the halo, strips read less twice than slabs.
+/// With fewer planes than this besides the halo's two, strips re-read fewer rows than slabs of whole planes.
 constexpr uint64_t kMinPlanes = 4;
 
-/// Rows along j and planes along k of a box whose window has at most `window_rows` rows.
+/// The number of rows along j and planes along k of a box whose window has at most `window_rows` rows.
 struct Extent {
   uint64_t j, k;
 };
 
-/// `margin`: rows of the halo, on both sides together.
+/// `margin`: rows of the halo, the sum of both sides.
 Extent extentWithin(const GridBlock& block, uint64_t window_rows, uint64_t margin) {
   const uint64_t planes = window_rows / block.nj;
   if (planes >= block.nk) return {block.nj, block.nk};
@@ -38,8 +38,8 @@ std::vector<Slab> cutIntoSlabs(const std::vector<GridBlock>& blocks, uint64_t wi
     const uint64_t rows = window_nodes / std::max<uint64_t>(block.ni, 1);
     const uint64_t least_rows = (margin + 1) * (margin + 1);
     if (rows < std::min(least_rows, block.nj * block.nk))
-      throw Error("{}: {} rows of {} nodes along i do not fit into memory; give more with --memory",
-                  block.name, least_rows, block.ni);
+      throw Error("{}: {} rows of {} nodes along i do not fit in memory; increase --memory", block.name,
+                  least_rows, block.ni);
     const Extent extent = extentWithin(block, rows, margin);
     for (uint64_t k = 0; k < block.nk; k += extent.k) {
       for (uint64_t j = 0; j < block.nj; j += extent.j) {

@@ -1,5 +1,5 @@
-// Cuts the blocks of a grid into slabs that fit a given number of bytes, and reads them one ahead of the
-// work.
+// Cuts the blocks of a grid into slabs that fit a given number of bytes, and reads one slab ahead of the
+// processing.
 #pragma once
 
 #include <cstddef>
@@ -12,20 +12,20 @@
 
 namespace curvisplat {
 
-/// Rows and planes that are read on either side of a box, where the block goes on.
+/// Additional rows and planes on either side of a box, within the block.
 struct Halo {
   uint64_t before = 0, after = 0;
 };
 
-/// A cell's own nodes, and those of its neighbours.
+/// The nodes of a cell and of its neighbours.
 inline constexpr Halo kCellHalo{1, 2};
 inline constexpr Halo kNoHalo{0, 0};
 inline constexpr Halo kNodeHalo{1, 1};  // a node's neighbours
 
-/// Some rows of one block. `window` is `box` and its halo.
+/// A box of one block. `window` is `box` with its halo.
 struct Slab {
   uint32_t block = 0;
-  uint64_t first_node = 0;  // of the block, in the whole grid
+  uint64_t first_node = 0;  // number of the block's first node in the whole grid
   NodeBox box, window;
 };
 
@@ -33,20 +33,20 @@ inline uint64_t rowsOf(const NodeBox& box) {
   return (box.j1 - box.j0) * (box.k1 - box.k0);
 }
 
-/// Bytes that a node takes in NodeArrays.
+/// Size of a node in NodeArrays.
 inline uint64_t slabBytesPerNode(size_t scalars) {
   return 3 * sizeof(double) + sizeof(uint8_t) + scalars * sizeof(float);
 }
 
 /// Cuts all blocks, in order, into boxes that cover each node once and whose windows have at most
-/// `window_nodes` nodes: whole planes where a few of them fit, else strips of rows that are as long in k as
-/// in j, so that little is read twice. Throws Error if a row and its neighbours do not fit.
+/// `window_nodes` nodes: whole planes if several fit, else strips of about equal length along j and k, so
+/// that few nodes are read twice. Throws Error if a row and its neighbours do not fit.
 std::vector<Slab> cutIntoSlabs(const std::vector<GridBlock>& blocks, uint64_t window_nodes, Halo halo);
 
-/// Cuts `box` into boxes of about `nodes` nodes: the work of one task.
+/// Cuts `box` into boxes of about `nodes` nodes, one for each task.
 std::vector<NodeBox> cutForTasks(const GridBlock& block, const NodeBox& box, uint64_t nodes);
 
-/// A slab and what was read of its window.
+/// A slab and the nodes of its window.
 struct LoadedSlab {
   Slab slab;
   NodeArrays nodes;
@@ -54,12 +54,12 @@ struct LoadedSlab {
 };
 
 /// Reads all slabs of a grid, in order, one ahead. `reader` must outlive it. Two slabs of `slab_bytes` are in
-/// memory.
+/// memory at any time.
 class SlabStream {
  public:
   SlabStream(const NodeReader& reader, uint64_t slab_bytes, Halo halo);
 
-  /// The next slab, until the next call; null at the end. Throws Error if a slab cannot be read.
+  /// The next slab, valid until the next call; null at the end. Throws Error if a slab cannot be read.
   const LoadedSlab* next() { return ahead_.next(); }
 
  private:

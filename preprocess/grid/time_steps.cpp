@@ -12,7 +12,7 @@ uint32_t chosenTimeStep(const std::string& file, std::span<const double> times,
                         std::optional<uint32_t> asked) {
   const size_t steps = std::max<size_t>(1, times.size());
   if (asked && *asked >= steps)
-    throw Error("{}: has {}; --time-step {} is none of them (they count from 0)", file,
+    throw Error("{}: has {}; --time-step {} is out of range (steps count from 0)", file,
                 steps == 1 ? "one time step" : fmt::format("{} time steps", steps), *asked);
   return asked.value_or(0);
 }
@@ -20,7 +20,7 @@ uint32_t chosenTimeStep(const std::string& file, std::span<const double> times,
 std::optional<std::string> timeStepNote(const GridDescription& description, std::optional<uint32_t> asked) {
   const std::vector<double>& times = description.times;
   if (asked || times.size() < 2) return std::nullopt;
-  return fmt::format("{} time steps from {:g} to {:g}; the first is taken: choose with --time-step 0..{}",
+  return fmt::format("{} time steps from {:g} to {:g}; using the first: choose with --time-step 0..{}",
                      times.size(), times.front(), times.back(), times.size() - 1);
 }
 

@@ -1,4 +1,4 @@
-// Which of several time steps is opened.
+// The choice between the time steps of a file.
 #pragma once
 
 #include <cstdint>
@@ -10,13 +10,13 @@
 
 namespace curvisplat {
 
-/// The step that was asked for, or the first. Throws Error if `file` has no such step; one without times has
-/// a single one.
+/// The step that the user chose, or the first. Throws Error if `file` has no such step; a file without times
+/// has a single step.
 uint32_t chosenTimeStep(const std::string& file, std::span<const double> times,
                         std::optional<uint32_t> asked);
 
-/// What a person should know who has not chosen between several steps: "has 3 time steps from 0 to 2.5; the
-/// first is taken: choose with --time-step 0..2". Nothing if there is no choice, or if it was made.
+/// A note for users who have not chosen between several steps: "3 time steps from 0 to 2.5; using the first:
+/// choose with --time-step 0..2". nullopt if there is a single step, or if the user chose one.
 std::optional<std::string> timeStepNote(const GridDescription& description, std::optional<uint32_t> asked);
 
 }  // namespace curvisplat

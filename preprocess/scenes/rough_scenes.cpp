@@ -120,8 +120,8 @@ class GlobeFace : public Scene {
   }
   double scalar(const glm::dvec3& p) const override { return waves(p); }
   std::pair<glm::dvec3, glm::dvec3> bounds() const override {
-    // The face's middle is the farthest along its axis, its corners' inner ends the nearest; its edges' middles reach
-    // the farthest sideways.
+    // The middle of the face reaches the farthest along its axis, the inner corners the least far; the
+    // middles of its edges reach the farthest sideways.
     const double side = kOuter * std::numbers::sqrt2 / 2, near = kInner / std::numbers::sqrt3;
     const glm::dvec3 sideways = side * (glm::abs(right_) + glm::abs(up_));
     const glm::dvec3 a = near * axis_, b = kOuter * axis_;
@@ -139,8 +139,8 @@ class GlobeFace : public Scene {
 
 class DuctPart : public Scene {
  public:
-  /// From x = begin to begin + 1. `clustering`: of the cells along i, above 0 towards the beginning, below 0 towards
-  /// the end.
+  /// From x = begin to begin + 1. `clustering`: cells along i gather at the beginning where it is positive,
+  /// at the end where it is negative.
   DuctPart(double begin, double clustering)
       : Scene("duct"), begin_(begin), clustering_(clustering), growth_(std::expm1(clustering)) {}
 

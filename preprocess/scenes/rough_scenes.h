@@ -1,12 +1,12 @@
 // Scenes with the troubles of real grids, for tests that must not depend on real ones.
 //
-//   spectral   a wavy channel of spectral elements: nodes gather at the elements' ends (Gauss-Lobatto spacing), so that
-//              neighbouring cells differ by up to a factor of three, again and again
-//   dome       a half ball on a flat base, cut out near its centre; cells grow by the factor 1.5 from one to the next
-//              with 25 nodes along j. i closes on itself, and the pole k = 0 is a line
-//   globe      six thin shells, the faces of a cubed sphere; they share their edges' nodes
-//   duct       three blocks of a bent duct, one behind the other. They share the nodes of their faces, and their cells
-//              there are of very different lengths
+//   spectral   a wavy channel of spectral elements. Nodes gather at the ends of each element (Chebyshev-
+//              Gauss-Lobatto points), so that cell sizes rise and fall again and again
+//   dome       a half ball with a flat base, hollow near its centre. With 25 nodes along j, cells grow by the
+//              factor 1.5 from one to the next. Periodic along i; at k = 0 all i coincide on a line
+//   globe      six thin shells, the faces of a cubed sphere. Neighbours share the nodes of their edges
+//   duct       three blocks of a bent duct, one behind the other. They share the nodes of their faces, and
+//              their cells there have very different lengths
 #pragma once
 
 #include <memory>

@@ -24,10 +24,10 @@ bool inUnitInterval(double x) {
   return x >= 0 && x <= 1;
 }
 
-// What of a pipe around the z axis a grid fills.
+// The part of a pipe around the z axis that a grid fills.
 struct PipeShape {
-  double turns;  // 0.5: half of it, on the side of negative x; 1: all around
-  double inner;  // radius; at 0 the nodes of j = 0 lie on the axis, all i of them in one place
+  double turns;  // 0.5: the half with negative x; 1: the full circle
+  double inner;  // inner radius; if 0, all nodes of a row j = 0 coincide on the axis
   double clustering;
 };
 
@@ -39,14 +39,14 @@ double halfAnnulusField(const glm::dvec3& p) {
                     0.0, 1.0);
 }
 
-// A layer on the inner wall, 0.004 thick: with the scene's own clustering, five of 64 cells.
+// A layer on the inner wall, 0.004 thick: five of 64 cells with the scene's default clustering.
 double boundaryLayer(const glm::dvec3& p) {
   const double angle = std::atan2(-p.x, p.y);
   return (0.8 + 0.2 * std::cos(5 * angle + 3 * p.z)) *
          std::exp(-square((std::hypot(p.x, p.y) - 0.3) / 0.004));
 }
 
-// Design section 9's grid, and others of its kind: a pipe around the z axis whose floor waves with the angle.
+// The pipe scenes: an annulus around the z axis, or half of it, whose floor waves with the angle.
 class Pipe : public Scene {
  public:
   using Field = double (*)(const glm::dvec3&);
@@ -55,7 +55,7 @@ class Pipe : public Scene {
       : Scene(std::move(name)), shape_(shape), growth_(std::expm1(shape.clustering)), field_(field) {}
 
   glm::dvec3 alongU(double u) const override {
-    // All around, u = 1 is the very point of u = 0.
+    // On the full circle, u = 1 gives exactly the point of u = 0.
     const double angle = 2 * pi * shape_.turns * (shape_.turns == 1 ? u - std::floor(u) : u);
     return {-std::sin(angle), std::cos(angle), kWave * std::sin(3 * angle)};
   }
@@ -94,8 +94,8 @@ class Pipe : public Scene {
   Field field_;
 };
 
-// A parallelepiped of strongly sheared cells, with waves as in Marschner and Lobb, "An Evaluation of
-// Reconstruction Filters for Volume Rendering", 1994, whose frequency is lower here.
+// A parallelepiped of strongly sheared cells. The scalar is that of Marschner and Lobb, "An Evaluation of
+// Reconstruction Filters for Volume Rendering", 1994, with a lower frequency.
 class ShearedWaves : public Scene {
  public:
   explicit ShearedWaves(std::string name) : Scene(std::move(name)) {}
@@ -128,8 +128,8 @@ class ShearedWaves : public Scene {
 };
 
 // An O-grid around a cylinder along z: circles from the wall outwards, whose centres move downstream (+x).
-// Along v the spacing grows geometrically through the wall layer (half of the nodes) and is even beyond it;
-// along u the nodes gather downstream.
+// Along v the spacing grows geometrically through the wall layer (half of the nodes) and is uniform beyond
+// it; along u the nodes are denser downstream.
 class Wake : public Scene {
  public:
   Wake(std::string name, double clustering)
@@ -139,7 +139,7 @@ class Wake : public Scene {
         stretch_(stretched(1)) {}
 
   glm::dvec3 alongU(double u) const override {
-    const double turn = 2 * pi * (u - std::floor(u));  // u = 1 is the very point of u = 0
+    const double turn = 2 * pi * (u - std::floor(u));  // u = 1 gives exactly the point of u = 0
     const double angle = turn - kGathering * std::sin(turn);
     return {std::cos(angle), std::sin(angle), 0};
   }
@@ -154,7 +154,7 @@ class Wake : public Scene {
   }
 
   std::optional<glm::dvec3> inverse(const glm::dvec3& world) const override {
-    // |(x, y) - (s D, 0)| = wall + s G, a quadratic in s.
+    // Solves |(x, y) - (s D, 0)| = wall + s G, a quadratic equation in s.
     const double growth = kOuter - kWall;
     const double a = square(growth) - square(kDownstream);
     const double b = world.x * kDownstream + kWall * growth;
@@ -167,8 +167,8 @@ class Wake : public Scene {
     return glm::dvec3(turnOf(std::atan2(world.y, world.x - s * kDownstream)) / (2 * pi), v, w);
   }
 
-  // The strength of the vortices: rollers shed in turn from above and below, each a core and an arm wound
-  // around it, waving along the span; braids between them; and the layers that leave the wall.
+  // Vortex strength: rollers shed alternately from above and below, each a core with a spiral arm, wavy along
+  // the span; braids between them; and the shear layers that separate from the wall.
   double scalar(const glm::dvec3& p) const override {
     const double radius = std::hypot(p.x, p.y);
     const double layer = bump((radius - kWall - 0.03) / 0.07) * (0.7 - 0.3 * p.x / radius);
@@ -210,7 +210,7 @@ class Wake : public Scene {
   }
 
   static double bump(double x) { return std::exp(-x * x); }
-  // 1 at multiples of 2 pi, and the narrower in between the larger the concentration.
+  // 1 at multiples of 2 pi; a larger concentration gives narrower peaks.
   static double periodicBump(double phase, double concentration) {
     return std::exp(concentration * (std::cos(phase) - 1));
   }
@@ -219,7 +219,7 @@ class Wake : public Scene {
     return t * t * (3 - 2 * t);
   }
 
-  // A logistic spacing's integral: e^(2 B v) near the wall, a straight line from v = 1/2 on.
+  // The integral of a logistic spacing: grows as e^(2 B v) near the wall, linearly from v = 1/2 on.
   double stretched(double v) const {
     return std::log1p(wall_ * std::expm1(2 * clustering_ * v) / (1 + wall_));
   }
@@ -257,7 +257,7 @@ std::vector<std::string> sceneNames() {
 std::vector<std::shared_ptr<const Scene>> makeScenes(std::string_view name,
                                                      std::optional<double> clustering) {
   if (clustering && !(*clustering > 0 && *clustering <= 20))
-    throw UsageError("clustering {} is not between 0 and 20", *clustering);
+    throw UsageError("clustering {} is out of range; expected above 0, at most 20", *clustering);
   const auto pipe = [&](double turns, double inner, double own_clustering, Pipe::Field field) {
     return std::vector<std::shared_ptr<const Scene>>{std::make_shared<Pipe>(
         std::string(name), PipeShape{turns, inner, clustering.value_or(own_clustering)}, field)};
@@ -272,7 +272,7 @@ std::vector<std::shared_ptr<const Scene>> makeScenes(std::string_view name,
 
   const auto names = sceneNames();
   if (std::find(names.begin(), names.end(), name) == names.end())
-    throw UsageError("there is no scene '{}'; there are {}", name, fmt::join(names, ", "));
+    throw UsageError("there is no scene '{}'; available: {}", name, fmt::join(names, ", "));
   if (clustering) throw UsageError("scene '{}' has its own spacing; omit --clustering", name);
   if (name == "sheared-waves") return {std::make_shared<ShearedWaves>(std::string(name))};
   if (name == "spectral") return {makeSpectral()};
@@ -290,7 +290,7 @@ std::shared_ptr<const Scene> makeScene(std::string_view name, std::optional<doub
 SceneGridSource::SceneGridSource(std::vector<std::shared_ptr<const Scene>> blocks, SceneGridSize size,
                                  int coordinate_bytes) {
   if (std::min({size.ni, size.nj, size.nk}) < 2)
-    throw UsageError("a scene needs at least 2 nodes along each axis, not {} x {} x {}", size.ni, size.nj,
+    throw UsageError("found {} x {} x {} nodes; a scene needs at least 2 along each axis", size.ni, size.nj,
                      size.nk);
   CURVISPLAT_CHECK(coordinate_bytes == 4 || coordinate_bytes == 8);
   description_.format = fmt::format("analytic scene {}", blocks.front()->name());

@@ -22,11 +22,11 @@ namespace curvisplat {
 namespace {
 
 constexpr Halo kCorners{0, 1};
-constexpr double kPoints = 100'000;  // within all blocks together, about; more at their faces
+constexpr double kPoints = 100'000;  // approximate number of points inside all blocks; more at their faces
 constexpr size_t kMaxBlocks = 20'000;
 constexpr uint64_t kBinsAlongAxis = 64;
-// Less than this of the smaller block is rounding, or chords of a curved face that two blocks cut
-// differently.
+// A smaller share of the smaller block is attributed to rounding, or to curved faces that two blocks
+// approximate by different chords.
 constexpr double kNegligibleShare = 2e-3;
 constexpr size_t kPairsNamed = 4;
 
@@ -50,20 +50,21 @@ struct Box {
   }
 };
 
-/// A point of a block, and the volume that it stands for.
+/// A sample point of a block, and the volume that it represents.
 struct BlockPoint {
   glm::dvec3 position{0.0};
   double volume = 0;
   uint32_t block = 0;
 };
 
-/// Part of a cell along one axis: where in it (0 to 1), and how many cells that stands for.
+/// A sample point in a cell along one axis: its position (0 to 1), and the number of cells it represents.
 struct AxisPoint {
   double t, cells;
 };
 
-/// The points of `cells` cells along an axis, by cell: several in the first and the last one, close to the
-/// block's ends, where blocks overlap by less than a cell; `wanted` in the middles of others, evenly spread.
+/// The sample points along an axis of `cells` cells, by cell: several in the first and the last cell, close
+/// to the ends of the block, to find overlaps of less than a cell; `wanted` at the centres of other cells,
+/// evenly spread.
 std::map<uint64_t, std::vector<AxisPoint>> pointsAlong(uint64_t cells, uint64_t wanted, bool few) {
   const std::vector<AxisPoint> end = few ? std::vector<AxisPoint>{{0.1, 0.2}, {0.6, 0.8}}
                                          : std::vector<AxisPoint>{{0.05, 0.1}, {0.2, 0.2}, {0.65, 0.7}};
@@ -84,13 +85,13 @@ std::map<uint64_t, std::vector<AxisPoint>> pointsAlong(uint64_t cells, uint64_t 
   return points;
 }
 
-/// Where points are taken in a block.
+/// The sample points of a block, as a product of those along each axis.
 struct Sampling {
   std::map<uint64_t, std::vector<AxisPoint>> i, j, k;
 
   Sampling(const GridBlock& block, double cells_in_all, size_t blocks) {
     const auto cells = static_cast<double>((block.ni - 1) * (block.nj - 1) * (block.nk - 1));
-    // As many of 1 in `step` cells along each axis.
+    // One of every `step` cells along each axis.
     const double step = std::max(1.0, std::cbrt(cells_in_all / kPoints));
     const auto wanted = [&](uint64_t nodes) {
       return static_cast<uint64_t>(static_cast<double>(nodes - 1) / step);
@@ -108,7 +109,7 @@ glm::dvec3 pointIn(const std::array<glm::dvec3, 8>& corner, double u, double v, 
   return glm::mix(glm::mix(along_i(0), along_i(2), v), glm::mix(along_i(4), along_i(6), v), w);
 }
 
-/// Whether the trilinear hexahedron holds the point: its map is inverted by Newton's method.
+/// Whether the trilinear hexahedron contains the point; inverts its map by Newton's method.
 bool holds(const std::array<glm::dvec3, 8>& corner, const glm::dvec3& point) {
   glm::dvec3 u(0.0);
   constexpr int kSteps = 12;
@@ -136,7 +137,7 @@ bool holds(const std::array<glm::dvec3, 8>& corner, const glm::dvec3& point) {
   return std::abs(u.x) < 1 && std::abs(u.y) < 1 && std::abs(u.z) < 1;
 }
 
-/// Points by the cell of an even lattice that they lie in.
+/// Points sorted into the cells of a uniform lattice.
 class Bins {
  public:
   explicit Bins(std::vector<BlockPoint> points) : points_(std::move(points)) {
@@ -186,8 +187,8 @@ class Bins {
   std::vector<uint32_t> first_, sorted_;
 };
 
-/// Calls each(element of the lowest node, strides, i, j, k) for the cells of a slab that are there, in
-/// parallel by rows; `keep` says of a row whether it is wanted.
+/// Calls each(element of the lowest node, strides, i, j, k) for the cells of a slab that are not blanked, in
+/// parallel by rows; skips rows for which `keep` is false.
 template <typename Keep, typename Each>
 void forEachCell(const GridBlock& block, const LoadedSlab& loaded, const Keep& keep, const Each& each) {
   const Slab& slab = loaded.slab;
@@ -212,7 +213,7 @@ struct BlockMeasure {
   double volume = 0;
 };
 
-/// The first reading: boxes and volumes of the blocks, and points in them.
+/// The first pass: bounding boxes and volumes of the blocks, and their sample points.
 std::vector<BlockPoint> pickPoints(const NodeReader& reader, uint64_t slab_bytes, const Progress& progress,
                                    std::vector<BlockMeasure>& measures) {
   const std::vector<GridBlock>& blocks = reader.source().description().blocks;
@@ -261,7 +262,7 @@ std::vector<BlockPoint> pickPoints(const NodeReader& reader, uint64_t slab_bytes
   return points;
 }
 
-/// The second reading: which points (by number) lie in which other block, sorted.
+/// The second pass: pairs (point, other block that contains it), sorted.
 std::vector<std::pair<uint32_t, uint32_t>> findInside(const NodeReader& reader, uint64_t slab_bytes,
                                                       const Progress& progress, const Bins& bins) {
   const std::vector<GridBlock>& blocks = reader.source().description().blocks;
@@ -286,7 +287,7 @@ std::vector<std::pair<uint32_t, uint32_t>> findInside(const NodeReader& reader, 
     for (const auto& of_thread : found)
       for (const uint32_t point : of_thread) inside.push_back({point, number});
   }
-  // Two cells may hold a point of their common face.
+  // Two cells may both contain a point of their common face.
   std::sort(inside.begin(), inside.end());
   inside.erase(std::unique(inside.begin(), inside.end()), inside.end());
   return inside;
@@ -303,7 +304,7 @@ std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_b
   std::vector<BlockMeasure> measures(blocks);
   std::vector<BlockPoint> points = pickPoints(reader, slab_bytes, progress, measures);
 
-  // Points that lie in no other block's box need not be looked for.
+  // Points outside all other blocks' bounding boxes need no search.
   std::erase_if(points, [&](const BlockPoint& point) {
     progress.throwIfStopped();
     for (uint32_t b = 0; b < blocks; ++b)
@@ -313,10 +314,10 @@ std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_b
   if (points.empty()) return overlaps;
   const Bins bins(std::move(points));
 
-  std::map<std::pair<uint32_t, uint32_t>, double> shared;  // (of the points, of the cells): volume
+  std::map<std::pair<uint32_t, uint32_t>, double> shared;  // (block of points, block of cells) -> volume
   for (const auto& [point, block] : findInside(reader, slab_bytes, progress, bins))
     shared[{bins.points()[point].block, block}] += bins.points()[point].volume;
-  // What one block's points say of a pair is as good as what the other's do: the larger is taken.
+  // The points of either block give an estimate for the pair; the larger one is used.
   std::map<std::pair<uint32_t, uint32_t>, double> of_pairs;
   for (const auto& [pair, volume] : shared) {
     double& largest = of_pairs[std::minmax(pair.first, pair.second)];
@@ -333,8 +334,8 @@ std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_b
 
 std::string overlapWarning(const GridDescription& description, const std::vector<BlockOverlap>& overlaps) {
   if (description.blocks.size() > kMaxBlocks)
-    return fmt::format("whether its {} blocks overlap was not looked at: they are more than {}",
-                       description.blocks.size(), kMaxBlocks);
+    return fmt::format("not checked for overlaps between its {} blocks (limit {})", description.blocks.size(),
+                       kMaxBlocks);
   if (overlaps.empty()) return "";
   std::vector<BlockOverlap> largest = overlaps;
   std::stable_sort(largest.begin(), largest.end(),

@@ -1,12 +1,12 @@
-// Blocks that lie in one another without saying so (overset grids without iblank): there everything is drawn
-// twice. Found before conversion, and told.
+// Finds blocks that overlap without blanking (overset grids without iblank), where everything would be drawn
+// twice, and warns before conversion.
 //
-// Points of every block, most of them close to its faces, are looked for in the cells of all others. Blocks
-// that abut have none there, with the same nodes on their common face or with others; what they lap over one
-// another by cutting a curved face into other chords is negligible (a five-hundredth of a block). The grid's
-// coordinates are read twice, once where the blocks' boxes lie apart. Memory: two slabs, and a hundred bytes
-// a point: some 100 thousand points, and in each block's corners, edges and faces a few more. Grids of more
-// than 20,000 blocks are not looked at.
+// Sample points of every block, most of them close to its faces, are located in the cells of all other
+// blocks. Abutting blocks share no volume, whether or not their nodes match on the common face; overlaps of
+// up to a five-hundredth of a block, where two blocks approximate a curved face by different chords, are
+// ignored. The coordinates are read twice, or once if the blocks' bounding boxes are disjoint. Memory: two
+// slabs, and a hundred bytes for each point: about 100,000 points, and some more at each block's corners,
+// edges and faces. Grids of more than 20,000 blocks are not checked.
 #pragma once
 
 #include <cstdint>
@@ -20,17 +20,17 @@ namespace curvisplat {
 
 struct BlockOverlap {
   uint32_t first = 0, second = 0;  // blocks, first < second
-  double volume = 0;               // in both, estimated
-  double share = 0;                // of the smaller block's volume
+  double volume = 0;               // of the intersection, estimated
+  double share = 0;                // volume / volume of the smaller block
 };
 
-/// All pairs whose overlap is not negligible, by the blocks' numbers. The same for any number of threads and
-/// slabs of any size. Throws Error if the grid cannot be read.
+/// All pairs of blocks with more than a negligible overlap, in order of their numbers. The result depends
+/// neither on the number of threads nor on the size of the slabs. Throws Error if the grid cannot be read.
 std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_bytes,
                                        const Progress& progress);
 
-/// In words, one line for the file: the largest few by name, and the volume of all; or that there are too
-/// many blocks to look. Empty if there are none.
+/// A one-line warning: the largest overlaps by name, and the total volume; or that there are too many blocks
+/// to check. Empty if there are no overlaps.
 std::string overlapWarning(const GridDescription& description, const std::vector<BlockOverlap>& overlaps);
 
 }  // namespace curvisplat

@@ -17,7 +17,7 @@ namespace {
 constexpr size_t kNodesPerTask = 16384;
 constexpr Halo kCorners{0, 1};
 
-/// Whether it is there.
+/// Adds a cell to the survey. Returns whether the cell is drawn.
 bool addCell(const NodeArrays& nodes, size_t at, size_t row_stride, size_t plane_stride, GridSurvey& survey) {
   ++survey.nodes;
   const uint8_t own = nodes.blank[at];
@@ -92,7 +92,7 @@ GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFa
         if (faces && is_there && at_end) add_ends({i, j, k}, first + i, ends);
       }
     };
-    // Counts, the smallest and the largest do not depend on how the work is divided.
+    // Counts, minima and maxima do not depend on how the work is divided.
     survey =
         united(std::move(survey),
                tbb::parallel_reduce(

@@ -1,4 +1,4 @@
-// The first pass of conversion where scalars stand in cells: which cells are there, between which bounds.
+// The first pass of conversion for cell-centred scalars: number, bounds and ranges of the cells.
 #pragma once
 
 #include "preprocess/splats/abutting_faces.h"
@@ -7,9 +7,9 @@
 
 namespace curvisplat {
 
-/// surveyGrid() for a reader of cell-centred scalars: counts, bounds (of the corners) and ranges are of
-/// cells. A cell that has not all of its corners, or no value, is blanked by the grid. Adds the faces of the
-/// others at their blocks' ends to `faces`, unless that is null.
+/// surveyGrid() (preprocess/convert/scan.h) for a reader of cell-centred scalars. Counts, bounds (of the
+/// corners) and ranges refer to cells. A cell with a blanked corner or without a value counts as blanked by
+/// the grid. The faces of all other cells at the ends of their blocks are added to `faces` unless it is null.
 GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces,
                        Progress& progress);
 

@@ -14,7 +14,7 @@ namespace curvisplat {
 namespace {
 
 constexpr Halo kCorners{0, 1};
-// The edges at a corner, as unit vectors: less volume than this between them is rounding.
+// Smaller volumes between the unit vectors of the edges at a corner are rounding errors.
 constexpr double kNoVolume = 1e-12;
 
 template <typename Value>
@@ -26,7 +26,7 @@ void widen(ScalarRange& range, const std::vector<Value>& values, const std::vect
   }
 }
 
-/// Cells of some rows; one with corners of both hands counts for both.
+/// Counts of the cells of some rows. A cell with both right- and left-handed corners counts in both.
 struct CellCounts {
   uint64_t cells = 0, degenerate = 0, right = 0, left = 0;
   double volume = 0;
@@ -43,7 +43,7 @@ CellCounts sum(CellCounts a, const CellCounts& b) {
 
 /// The handedness of the edges at the eight corners.
 struct Corners {
-  bool flat = false, right = false, left = false;  // whether any is
+  bool flat = false, right = false, left = false;  // whether any corner is
 
   explicit Corners(const std::array<glm::dvec3, 8>& corner) {
     for (size_t c = 0; c < 8; ++c) {
@@ -64,7 +64,7 @@ CellCounts countCells(const GridBlock& block, const LoadedSlab& loaded) {
   const NodeArrays& nodes = loaded.nodes;
   const size_t row = block.ni, plane = row * (slab.window.j1 - slab.window.j0);
   const uint64_t width = slab.box.j1 - slab.box.j0;
-  // Deterministic: the volume is a sum of floating-point numbers.
+  // Deterministic, since floating-point addition of the volume is not associative.
   return tbb::parallel_deterministic_reduce(
       tbb::blocked_range<uint64_t>(0, rowsOf(slab.box), 16), CellCounts(),
       [&](const tbb::blocked_range<uint64_t>& rows, CellCounts counts) {
@@ -122,7 +122,7 @@ GridStatistics measureGrid(const GridSource& source, const std::vector<uint32_t>
   statistics.scalars.resize(scalars.size());
 
   std::vector<uint32_t> at_nodes, in_cells;
-  std::vector<size_t> of_nodes, of_cells;  // where they stand in `scalars`
+  std::vector<size_t> of_nodes, of_cells;  // their indices in `scalars`
   for (size_t n = 0; n < scalars.size(); ++n) {
     const bool cell = description.scalars[scalars[n]].centring == Centring::kCell;
     (cell ? in_cells : at_nodes).push_back(scalars[n]);

@@ -1,4 +1,5 @@
-// What is in a grid, before anything is converted: ranges, blanking, and cells that are odd. Read by slabs.
+// Statistics of a grid, for `info` before conversion: ranges, blanking, and degenerate or inverted cells. The
+// grid is read by slabs.
 #pragma once
 
 #include <array>
@@ -15,16 +16,16 @@ namespace curvisplat {
 
 struct BlockStatistics {
   BlankCounts blank;        // of its nodes
-  uint64_t cells = 0;       // all of whose corners are there
-  uint64_t degenerate = 0;  // of those: the edges at one of the corners span no volume
-  uint64_t inverted = 0;    // cells with a corner of the other hand than most of the block's
-  double volume = 0;        // of the hexahedra
+  uint64_t cells = 0;       // cells without blanked corners
+  uint64_t degenerate = 0;  // cells with a corner whose edges span no volume
+  uint64_t inverted = 0;    // cells with a corner whose handedness is the minority in the block
+  double volume = 0;        // sum over the trilinear hexahedra
 };
 
 struct GridStatistics {
   std::vector<BlockStatistics> blocks;
-  std::array<ScalarRange, 3> bounds;  // of the nodes that are there, along x, y, z
-  std::vector<ScalarRange> scalars;   // [as asked for]; of the nodes or cells that are there
+  std::array<ScalarRange, 3> bounds;  // of the nodes that are not blanked, along x, y, z
+  std::vector<ScalarRange> scalars;   // [requested scalar]; of the samples that are not blanked
 
   BlankCounts blank() const;
   uint64_t cells() const;
@@ -32,8 +33,8 @@ struct GridStatistics {
   uint64_t inverted() const;
 };
 
-/// Of these scalars of the source, at nodes and in cells. A node is there if it is for all of the scalars
-/// that stand at nodes. Memory: two slabs. Throws Error if the grid cannot be read.
+/// Measures the given scalars of the source, node-centred and cell-centred. A node is blanked if it is for
+/// any of the node-centred scalars. Memory: two slabs. Throws Error if the grid cannot be read.
 GridStatistics measureGrid(const GridSource& source, const std::vector<uint32_t>& scalars,
                            uint64_t slab_bytes, Progress& progress);
 

@@ -1,4 +1,4 @@
-// What the first pass over a grid finds: how much is there, between which bounds.
+// The result of the first pass over a grid: number, bounds and ranges of its samples.
 #pragma once
 
 #include <cstdint>
@@ -15,13 +15,13 @@ struct ScalarRange {
   double max = -std::numeric_limits<double>::infinity();
 };
 
-/// Of the nodes that are there; of cell-centred scalars, of the cells that are (corners, for the bounds).
+/// Counts and ranges of the nodes, or for cell-centred scalars of the cells (bounds: of their corners).
 struct GridSurvey {
-  uint64_t nodes = 0;  // or cells; of the grid, blanked ones included
+  uint64_t nodes = 0;  // samples (nodes or cells) of the grid, including blanked ones
   BlankCounts blanked;
   glm::dvec3 lower{std::numeric_limits<double>::infinity()};
   glm::dvec3 upper{-std::numeric_limits<double>::infinity()};
-  std::vector<ScalarRange> ranges;  // [scalar]
+  std::vector<ScalarRange> ranges;  // [scalar]; of the samples that are not blanked
 };
 
 }  // namespace curvisplat

@@ -14,10 +14,11 @@
 namespace curvisplat {
 namespace {
 
-// Magic (8), file, library major and minor version (4 each), flag (1).
+// OpenVDB's file header: magic number (8), versions of file, library (major, minor; 4 each), a flag (1), UUID
+// (36).
 constexpr size_t kMagic = 8, kUuidOffset = 21;
 constexpr openvdb::Int32 kBackground = -1;
-// Which every build of OpenVDB writes alike: values that are not the background, as they are.
+// The only compression that every build of OpenVDB has: active values only, not compressed further.
 constexpr uint32_t kCompression = openvdb::io::COMPRESS_ACTIVE_MASK;
 constexpr const char* kWorldUnits = "world_units";
 
@@ -38,7 +39,8 @@ bool firstOfItsCell(std::span<const Brick> bricks, size_t brick) {
   return brick == 0 || !(bricks[brick - 1].cell == bricks[brick].cell);
 }
 
-/// OpenVDB puts a random UUID into each file it writes. A UUID made of the contents keeps the bytes the same.
+/// OpenVDB writes a random UUID into each file. Replaces it by a UUID computed from the contents, so that the
+/// same octree gives the same bytes.
 void replaceUuid(std::string& file) {
   constexpr size_t kOffset = kUuidOffset, kLength = 36;
   CURVISPLAT_CHECK_OP(file.size(), >, kOffset + kLength);
@@ -51,15 +53,15 @@ void replaceUuid(std::string& file) {
   file.replace(kOffset, kLength, uuid);
 }
 
-/// OpenVDB refuses voxels of less than about 1e-5 units: an octree of smaller cells is written in units of a
-/// power of two, so many world units each.
+/// The length of the file's unit in world units. OpenVDB refuses voxels smaller than about 1e-5 units, so an
+/// octree with smaller cells is written in units of a smaller power of two.
 double worldUnits(double smallest_cell) {
   constexpr double kSmallestVoxel = 0x1p-14;
   return smallest_cell >= kSmallestVoxel ? 1
                                          : std::exp2(std::floor(std::log2(smallest_cell / kSmallestVoxel)));
 }
 
-/// `compression`: OpenVDB's flags.
+/// `compression`: OpenVDB's compression flags.
 std::vector<std::byte> fileOf(const RootCube& root, std::span<const Brick> bricks, uint32_t compression) {
   initialize();
   openvdb::GridPtrVec grids;
@@ -73,7 +75,7 @@ std::vector<std::byte> fileOf(const RootCube& root, std::span<const Brick> brick
       grid->insertMeta(kWorldUnits, openvdb::DoubleMetadata(world_units));
       const double size = root.cellSize(cell.level) / world_units;
       const auto transform = openvdb::math::Transform::createLinearTransform(size);
-      // An index is the middle of its voxel.
+      // OpenVDB's index coordinates are the centres of voxels.
       transform->postTranslate(openvdb::Vec3d(root.min.x, root.min.y, root.min.z) / world_units +
                                openvdb::Vec3d(0.5 * size));
       grid->setTransform(transform);
@@ -102,7 +104,8 @@ uint64_t brickGridsMemory(std::span<const Brick> bricks) {
   using Leaf = Tree::LeafNodeType;
   using Lower = Tree::RootNodeType::ChildNodeType::ChildNodeType;
   using Upper = Tree::RootNodeType::ChildNodeType;
-  // A node is made anew where bricks, in Morton order, enter its cube.
+  // In Morton order, the bricks of a tree node's cube follow one another: count how often they enter a new
+  // cube.
   const auto nodes = [&](uint32_t log2_side) {
     uint64_t count = 0;
     for (size_t n = 0; n < bricks.size(); ++n) {
@@ -120,26 +123,26 @@ uint64_t brickGridsMemory(std::span<const Brick> bricks) {
 
 BrickGridsComparison compareBrickGrids(std::span<const std::byte> bytes, const RootCube& root,
                                        std::span<const Brick> bricks, uint64_t most_memory) {
-  // A file of another kind is not worth an octree.
+  // Recognises other kinds of file by their header, without building the whole octree.
   const std::vector<std::byte> small = brickGridsFile(root, bricks.first(1));
   if (bytes.size() < kUuidOffset || !std::equal(bytes.begin(), bytes.begin() + kMagic, small.begin()))
-    return {"is no file of OpenVDB's", ""};
+    return {"is not an OpenVDB file", ""};
   if (!std::equal(bytes.begin(), bytes.begin() + kUuidOffset, small.begin()))
     return {"", "another version of OpenVDB wrote it"};
   if (const uint64_t memory = brickGridsMemory(bricks); memory > most_memory)
-    return {"", fmt::format("that takes {} MiB of memory", memory >> 20)};
+    return {"", fmt::format("the comparison would take {} MiB of memory", memory >> 20)};
   const auto is_file_of = [&](uint32_t compression) {
     const std::vector<std::byte> expected = fileOf(root, bricks, compression);
     return std::equal(bytes.begin(), bytes.end(), expected.begin(), expected.end());
   };
   if (is_file_of(kCompression)) return {};
-  // Converters left the choice to the library once, and so to how it had been built.
+  // Earlier converters left the compression to the library, so it depended on how the library was built.
   const bool blosc = openvdb::io::Archive::hasBloscCompression();
   const bool zlib = openvdb::io::Archive::hasZLibCompression();
   if (blosc && is_file_of(kCompression | openvdb::io::COMPRESS_BLOSC)) return {};
   if (zlib && is_file_of(kCompression | openvdb::io::COMPRESS_ZIP)) return {};
-  if (blosc && zlib) return {"has not the octree of bricks.bin", ""};
-  return {"", "it is compressed as this build of OpenVDB cannot"};
+  if (blosc && zlib) return {"does not agree with the octree in bricks.bin", ""};
+  return {"", "it uses a compression that this build of OpenVDB lacks"};
 }
 
 }  // namespace curvisplat

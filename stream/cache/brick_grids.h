@@ -1,7 +1,8 @@
-// bricks.vdb: the octree as OpenVDB Int32Grids, for any tool that reads VDB files. One grid a level, named
-// "level 0", "level 1", ...: a voxel is a cell, its value the first brick of that cell, the background -1;
-// the transform puts voxels where the cells are in the world, in units of so many world units as the grid's
-// metadata "world_units" says: 1, unless OpenVDB would refuse the smallest cells.
+// bricks.vdb: the octree as OpenVDB Int32Grids, for any tool that reads VDB files. There is one grid per
+// level, named "level 0", "level 1" and so on. A voxel is a cell of the octree, its value is the index of the
+// cell's first brick, and the background value is -1. The grid's transform places voxels where the cells are
+// in the world. Its unit of length is the grid's metadata "world_units" in world units: 1, or a smaller power
+// of two where OpenVDB would refuse voxels as small as the smallest cells.
 #pragma once
 
 #include <cstddef>
@@ -14,24 +15,24 @@
 
 namespace curvisplat {
 
-/// The file's bytes: the same for the same octree and version of OpenVDB.
+/// The bytes of the file. They depend only on the octree and on OpenVDB's version.
 std::vector<std::byte> brickGridsFile(const RootCube& root, std::span<const Brick> bricks);
 
-/// The memory that OpenVDB's trees of these bricks take meanwhile: up to 0.3 MB for a brick that is far from
-/// all others.
+/// The memory that OpenVDB's trees take while the file is made: up to 0.3 MB for a brick that is far from all
+/// others.
 uint64_t brickGridsMemory(std::span<const Brick> bricks);
 
-/// Of a file against the octree it is to be of: a line or nothing, each.
+/// The result of comparing a bricks.vdb with an octree. At most one of the two is set, to one line of text.
 struct BrickGridsComparison {
-  std::string difference;
-  std::string not_compared;  // why
+  std::string difference;    // what is wrong with the file
+  std::string not_compared;  // why the comparison was impossible
 };
 
 inline constexpr uint64_t kMaxComparisonMemory = uint64_t{1} << 30;
 
-/// OpenVDB's parser trusts what it reads, so it is not asked: the file is made again and compared. One by
-/// another version of OpenVDB, or compressed in a way that this build of it cannot, is not comparable; one
-/// whose trees take more than `most_memory` is not compared.
+/// Makes the file again and compares the bytes. The file is not parsed, because OpenVDB's parser trusts its
+/// input. Files from another version of OpenVDB, or in a compression that this build of OpenVDB lacks, cannot
+/// be compared. Octrees whose trees would take more than `most_memory` bytes are not compared.
 BrickGridsComparison compareBrickGrids(std::span<const std::byte> bytes, const RootCube& root,
                                        std::span<const Brick> bricks,
                                        uint64_t most_memory = kMaxComparisonMemory);

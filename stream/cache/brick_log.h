@@ -1,8 +1,8 @@
-// What a CacheWriter has appended, brick by brick: from it a conversion that was interrupted goes on. It lies
-// in the partial folder beside the streams and never comes into a cache. Nothing is synced: an entry whose
-// checksum is wrong is where the log ends.
+// The log of the bricks that a CacheWriter has appended. An interrupted conversion continues from it. The log
+// is in the partial folder beside the streams and never becomes part of a cache. Nothing is synced: the log
+// ends at the first entry whose checksum is wrong.
 //
-//   entry:  BrickRecord 144 | weight 8 | VariableRecord 40 x variables | checksum of these bytes 8
+//   entry:  BrickRecord 144 | weight 8 | VariableRecord 40 x variables | checksum of the bytes before it 8
 #pragma once
 
 #include <cstdint>
@@ -16,25 +16,25 @@ namespace curvisplat {
 
 inline constexpr const char* kBrickLogName = "bricks.log";
 
-/// A brick without parent and children, and where its streams are.
+/// A brick, without links to parent and children, and the extents of its streams.
 struct AppendedBrick {
   Brick brick;
   double weight = 0;  // EncodedBrick::weight
   std::vector<BrickVariable> variables;
 };
 
-/// The entries of the log in `folder`, up to the first that is damaged; none if there is no log. Throws Error
-/// if the disk fails.
+/// The entries of the log in `folder`, up to the first damaged one; empty if there is no log. Throws Error if
+/// the disk fails.
 std::vector<AppendedBrick> readBrickLog(const std::filesystem::path& folder, size_t variables);
 
-/// For one thread.
+/// For one thread at a time.
 class BrickLog {
  public:
-  /// Opens the log in `folder`, or makes it.
+  /// Opens the log in `folder`; creates it if it does not exist. Throws Error.
   BrickLog(const std::filesystem::path& folder, size_t variables);
 
   void append(const AppendedBrick& brick);
-  /// Forgets all entries but the first `count`.
+  /// Truncates the log to its first `count` entries.
   void keep(uint64_t count);
 
  private:

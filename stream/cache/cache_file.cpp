@@ -11,7 +11,7 @@ std::filesystem::path cacheFile(const std::filesystem::path& cache, const std::s
   const fs::file_status status = fs::symlink_status(path, error);
   if (fs::is_symlink(status))
     throw Error(
-        "{}: is a symbolic link, and a cache's files lie in its own folder; copy what it leads to there",
+        "{}: is a symbolic link; expected a file in the cache's own directory: replace the link by a copy",
         path.string());
   if (fs::exists(status) && !fs::is_regular_file(status))
     throw Error("{}: is not a regular file", path.string());

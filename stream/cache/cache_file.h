@@ -1,4 +1,4 @@
-// Files of a cache, which may come from anyone.
+// Opens a cache's files safely. A cache may come from anyone.
 #pragma once
 
 #include <cstdint>
@@ -7,9 +7,9 @@
 
 namespace curvisplat {
 
-/// The path of a file of the folder `cache`, to be opened. `name` is a plain file name. Throws Error where
-/// that is a symbolic link, which may lead out of the folder, or no file, which may wait for ever to be
-/// opened.
+/// The path of the file `name` (a plain file name) in the folder `cache`, checked before it is opened. Throws
+/// Error if it is a symbolic link, which may lead out of the folder, or exists but is not a regular file:
+/// opening a pipe may block forever.
 std::filesystem::path cacheFile(const std::filesystem::path& cache, const std::string& name);
 
 }  // namespace curvisplat

@@ -1,18 +1,18 @@
-// The records of bricks.bin and var.<number>.bin as they are on disk: little-endian, naturally aligned, no
-// padding.
+// The records of bricks.bin and var.<n>.bin, exactly as they are on disk: little-endian, naturally aligned,
+// no padding. stream/FORMAT.md describes the whole format.
 //
-//   bricks.bin        BricksHeader | BrickRecord x bricks, level by level, Morton order, root first
+//   bricks.bin     BricksHeader | BrickRecord x bricks, level by level from the root, Morton order in a level
 //
-//   var.<n>.bin       VariableHeader | values streams, page by page | VariableRecord x bricks, in the order
-//                     ^ offset 0       of bricks.bin                 ^ table_offset, a multiple of kPageBytes
+//   var.<n>.bin    VariableHeader | values streams | zeros | VariableRecord x bricks, in bricks.bin's order
+//                  ^ offset 0                              ^ table_offset, a multiple of kPageBytes
 //
-//   geometry.bin      geometry streams, page by page: nothing else (bricks.bin says where each lies)
+//   geometry.bin   geometry streams | zeros to a multiple of kPageBytes; bricks.bin has the streams' extents
 //
-// A stream starts at the end of the one before it if it then touches no more pages than it has to, else at
-// the next page. So small neighbours share a page, none is split without need, and a direct read fetches the
-// fewest pages. The gaps are zeros.
+// A stream begins where the previous one ends if it then touches no more pages than its length needs, else at
+// the next page. So small streams share a page, no stream crosses a page boundary without need, and a direct
+// read fetches the fewest pages. Gaps are filled with zeros.
 //
-// The streams themselves are laid out in geometry_codec.h and values_codec.h.
+// The layouts of the streams are in stream/codec/geometry_codec.h and stream/codec/values_codec.h.
 #pragma once
 
 #include <array>
@@ -24,10 +24,11 @@
 
 namespace curvisplat {
 
-static_assert(std::endian::native == std::endian::little, "records are written as they lie in memory");
+static_assert(std::endian::native == std::endian::little, "records are written as they are in memory");
 
-/// Of the whole format: manifest, tables and streams. Whoever changes what any of them mean raises it, still
-/// reads the older ones from 1 on (tests/data/caches has some of each), and makes caches of the new one there.
+/// Version of the whole format: manifest, tables and streams. A change to the meaning of any of them raises
+/// it. The program must continue to read every version from 1 on: tests/data/caches has caches of each
+/// version, and a new version adds its own there.
 inline constexpr uint32_t kCacheVersion = 1;
 inline constexpr uint64_t kPageBytes = 4096;
 inline constexpr std::array<char, 8> kBricksMagic{'C', 'V', 'S', 'b', 'r', 'i', 'c', 'k'};
@@ -134,7 +135,7 @@ inline BrickVariable brickVariableOf(const VariableRecord& record) {
           record.largest_deviation};
 }
 
-/// Where a stream of `length` bytes goes in a file that ends at `end`.
+/// The offset of a stream of `length` bytes that is appended to a file of `end` bytes.
 inline uint64_t streamOffset(uint64_t end, uint64_t length) {
   const uint64_t in_page = end % kPageBytes;
   const uint64_t pages = (length + kPageBytes - 1) / kPageBytes;

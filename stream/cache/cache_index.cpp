@@ -15,27 +15,28 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Where something is wrong in a table.
+/// Throws the Error for a brick with an invalid record.
 [[noreturn]] void refuse(const fs::path& path, size_t brick, const std::string& what) {
   throw Error("{}: brick {}: {}; the file is damaged: convert again", path.string(), brick, what);
 }
 
 void checkChecksum(const fs::path& path, const FileInfo& info, uint64_t found) {
   if (found != info.checksum)
-    throw Error("{}: has the checksum {:016x}, expected {:016x}; the file is damaged: convert again",
-                path.string(), found, info.checksum);
+    throw Error(
+        "{}: has a wrong checksum (found {:016x}, expected {:016x}); the file is damaged: convert again",
+        path.string(), found, info.checksum);
 }
 
-/// What the streams of so many splats can take at the most, packed: their header, the runs or rows, the
-/// planes, and what zstd adds. Whoever reads one takes memory for it.
+/// Upper bounds of the length of a stream of `splats` splats: its header, the runs or rows, the planes, and
+/// zstd's overhead. Readers allocate memory for the stream's length.
 uint64_t mostGeometryBytes(uint64_t splats) {
-  return (16 << 10) + 135 * splats;  // 50 and 21 x 4 bytes a splat
+  return (16 << 10) + 135 * splats;  // a run (50) and 21 arrays of 4 planes
 }
 uint64_t mostValuesBytes(uint64_t splats) {
-  return (16 << 10) + 31 * splats;  // 10 and 5 x 4
+  return (16 << 10) + 31 * splats;  // a row (10) and 5 arrays of 4 planes
 }
 
-/// That no two streams of a file share bytes, and that all lie within `begin` and `end`.
+/// Throws Error unless all extents are in [begin, end) and none overlap.
 void checkExtents(const fs::path& path, const std::vector<Extent>& extents, uint64_t begin, uint64_t end) {
   std::vector<uint32_t> order(extents.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -47,7 +48,7 @@ void checkExtents(const fs::path& path, const std::vector<Extent>& extents, uint
     if (extent.length == 0 || extent.offset < free || extent.offset > end ||
         extent.length > end - extent.offset)
       refuse(path, n,
-             fmt::format("its {} bytes at offset {} overlap another's, or are outside of the file",
+             fmt::format("its {} bytes at offset {} overlap another brick's, or are outside of the file",
                          extent.length, extent.offset));
     free = extent.offset + extent.length;
   }
@@ -55,11 +56,11 @@ void checkExtents(const fs::path& path, const std::vector<Extent>& extents, uint
 
 class IndexChecker {
  public:
-  /// `bricks` fills up meanwhile.
+  /// `bricks`: the bricks read so far; it grows between calls of checkLast().
   IndexChecker(const fs::path& path, const std::vector<Brick>& bricks, const Manifest& manifest)
       : path_(path), bricks_(bricks), manifest_(manifest) {}
 
-  /// The last brick so far: what those before it say of it, and it of them.
+  /// Checks the last of the bricks by itself and against those before it.
   void checkLast() {
     const size_t n = bricks_.size() - 1;
     checkCell(n);
@@ -72,32 +73,38 @@ class IndexChecker {
 
   void checkAll() const {
     if (roots_ + children_ != bricks_.size())
-      throw Error("{}: {} roots and {} children are not {} bricks; the file is damaged: convert again",
-                  path_.string(), roots_, children_, bricks_.size());
+      throw Error(
+          "{}: has {} roots and {} children, expected {} bricks in all; the file is damaged: convert again",
+          path_.string(), roots_, children_, bricks_.size());
     if (splats_ != manifest_.splats)
-      throw Error("{}: its leaves hold {} splats, the manifest says {}; the cache is damaged: convert again",
-                  path_.string(), splats_, manifest_.splats);
+      throw Error(
+          "{}: wrong number of splats in leaves (found {}, the manifest has {}); the cache is damaged: "
+          "convert again",
+          path_.string(), splats_, manifest_.splats);
     const uint32_t levels = bricks_.back().cell.level + 1;
     if (levels != manifest_.levels)
-      throw Error("{}: has {} levels, the manifest says {}; the cache is damaged: convert again",
-                  path_.string(), levels, manifest_.levels);
+      throw Error(
+          "{}: wrong number of levels (found {}, the manifest has {}); the cache is damaged: convert again",
+          path_.string(), levels, manifest_.levels);
   }
 
  private:
-  /// Its own cell, and its place in the order of bricks.
+  /// Checks the brick's cell and its place in the order of bricks.
   void checkCell(size_t n) const {
     const Cell& cell = bricks_[n].cell;
-    if (cell.level > kMaxLevel) refuse(path_, n, fmt::format("it is of level {}", cell.level));
+    if (cell.level > kMaxLevel)
+      refuse(path_, n, fmt::format("its level is {}, expected at most {}", cell.level, kMaxLevel));
     for (uint32_t at : cell.at)
       if (at >> cell.level != 0)
-        refuse(path_, n, fmt::format("its cell {} is outside of level {}", at, cell.level));
+        refuse(path_, n, fmt::format("its cell coordinate {} is outside of level {}", at, cell.level));
     if (n == 0) {
-      if (cell.level != 0) refuse(path_, n, "it is first and not the root");
+      if (cell.level != 0) refuse(path_, n, "the first brick is not a root");
       return;
     }
     const Brick& before = bricks_[n - 1];
     if (cell == before.cell) {
-      if (!bricks_[n].isLeaf() || !before.isLeaf()) refuse(path_, n, "it shares its cell, and is not a leaf");
+      if (!bricks_[n].isLeaf() || !before.isLeaf())
+        refuse(path_, n, "it shares its cell with another brick, but not both are leaves");
     } else if (cell.level < before.cell.level ||
                (cell.level == before.cell.level && !mortonLess(before.cell, cell))) {
       refuse(path_, n, "it is out of order");
@@ -107,17 +114,20 @@ class IndexChecker {
   void checkNumbers(size_t n) const {
     const Brick& brick = bricks_[n];
     if (brick.splats == 0 || brick.splats > kMaxBrickSplats)
-      refuse(path_, n, fmt::format("it has {} splats", brick.splats));
+      refuse(path_, n, fmt::format("it has {} splats, expected 1 to {}", brick.splats, kMaxBrickSplats));
     uint64_t octants = 0;
     for (uint32_t splats : brick.octant_splats) octants += splats;
-    if (octants != brick.splats) refuse(path_, n, fmt::format("its octants have {} splats", octants));
+    if (octants != brick.splats)
+      refuse(path_, n, fmt::format("its octants have {} splats, expected {}", octants, brick.splats));
     if (brick.geometry.length > mostGeometryBytes(brick.splats))
       refuse(path_, n,
-             fmt::format("{} bytes are too many for its {} splats", brick.geometry.length, brick.splats));
+             fmt::format("its stream of {} bytes is too long for {} splats", brick.geometry.length,
+                         brick.splats));
     if (!(brick.largest_radius > 0 && std::isfinite(brick.largest_radius)))
-      refuse(path_, n, fmt::format("its largest radius is {}", brick.largest_radius));
+      refuse(path_, n,
+             fmt::format("its largest radius is {}, expected a positive number", brick.largest_radius));
     if (!(brick.error >= 0 && std::isfinite(brick.error)))
-      refuse(path_, n, fmt::format("its error is {}", brick.error));
+      refuse(path_, n, fmt::format("its error is {}, expected 0 or more", brick.error));
     const glm::dvec3 corner = manifest_.root.cellMin(brick.cell);
     const double size = manifest_.root.cellSize(brick.cell.level);
     for (int axis = 0; axis < 3; ++axis) {
@@ -137,17 +147,20 @@ class IndexChecker {
     if (brick.cell.level == 0) {
       if (brick.parent != kNoBrick) refuse(path_, n, "it is a root with a parent");
     } else {
-      if (brick.parent >= n) refuse(path_, n, fmt::format("its parent is brick {}", brick.parent));
+      if (brick.parent >= n)
+        refuse(path_, n, fmt::format("its parent is brick {}, expected an earlier brick", brick.parent));
       const Brick& parent = bricks_[brick.parent];
       const bool counted = n >= parent.first_child && n - parent.first_child < parent.child_count;
       if (!counted || !(parent.cell == brick.cell.parent()))
-        refuse(path_, n, fmt::format("its parent, brick {}, has other children", brick.parent));
+        refuse(path_, n, fmt::format("its parent, brick {}, does not have it as a child", brick.parent));
     }
     if (brick.isLeaf()) {
       if (brick.first_child != kNoBrick) refuse(path_, n, "it is a leaf with a child");
     } else if (brick.first_child <= n || brick.first_child >= manifest_.bricks ||
                brick.child_count > manifest_.bricks - brick.first_child) {
-      refuse(path_, n, fmt::format("it has {} children from brick {}", brick.child_count, brick.first_child));
+      refuse(path_, n,
+             fmt::format("it has {} children from brick {}, expected later bricks of the cache",
+                         brick.child_count, brick.first_child));
     }
   }
 
@@ -157,23 +170,25 @@ class IndexChecker {
   uint64_t splats_ = 0, children_ = 0, roots_ = 0;
 };
 
-/// Calls `use` for each of the records behind a header that has been read. They are counted by the real file,
-/// and come a piece at a time: a file can say that it is large and have no bytes, so that only what `use` has
-/// found good may take memory for good.
+/// Calls `use` for each record of a table whose header has been read. The number of records is checked
+/// against the file's size. A sparse file can be large and hold nothing, so the records are read a piece at a
+/// time, and `use` checks each record before memory is allocated for the next.
 template <typename Record, typename Header, typename Use>
 void readRecords(const InputFile& file, const Header& header, uint64_t offset, const Manifest& manifest,
                  const FileInfo& info, const Use& use) {
   if (header.magic != Header{}.magic)
-    throw Error("{}: does not begin as such a file of a cache does; it is damaged or not this cache's",
+    throw Error("{}: does not begin with the magic bytes of a cache's file; it is damaged or of another kind",
                 file.path().string());
   if (header.version != kCacheVersion || header.record_bytes != sizeof(Record))
-    throw Error("{}: has version {} and records of {} bytes, expected {} and {}", file.path().string(),
-                header.version, header.record_bytes, kCacheVersion, sizeof(Record));
+    throw Error("{}: has version {} and records of {} bytes (expected {} and {}); the file is damaged",
+                file.path().string(), header.version, header.record_bytes, kCacheVersion, sizeof(Record));
   if (header.bricks != manifest.bricks || offset > file.size() ||
       (file.size() - offset) / sizeof(Record) != header.bricks ||
       (file.size() - offset) % sizeof(Record) != 0)
-    throw Error("{}: says it has {} bricks from offset {}; its size is {} and the manifest says {} bricks",
-                file.path().string(), header.bricks, offset, file.size(), manifest.bricks);
+    throw Error(
+        "{}: has a header for {} bricks from offset {}, but its size is {} and the manifest has {} bricks; "
+        "the file is damaged",
+        file.path().string(), header.bricks, offset, file.size(), manifest.bricks);
   Checksum checksum;
   checksum.add(std::as_bytes(std::span(&header, 1)));
   constexpr uint64_t kRecordsAtOnce = (1 << 20) / sizeof(Record);
@@ -198,11 +213,12 @@ const FileInfo& checkFile(const fs::path& path, uint64_t bytes, const Manifest& 
   for (const FileInfo& info : manifest.files) {
     if (info.name != name) continue;
     if (info.size != bytes)
-      throw Error("{}: has {} bytes, the manifest says {}; the file is damaged or not this cache's",
-                  path.string(), bytes, info.size);
+      throw Error(
+          "{}: is truncated or has grown (found {} bytes, expected {}); the file is damaged: convert again",
+          path.string(), bytes, info.size);
     return info;
   }
-  throw Error("{}: is not among the manifest's files; the cache is damaged", path.string());
+  throw Error("{}: is not listed in the manifest; the cache is damaged: convert again", path.string());
 }
 
 const FileInfo& checkFile(const InputFile& file, const Manifest& manifest) {
@@ -249,10 +265,10 @@ std::vector<BrickVariable> readVariableTable(const InputFile& file, const Manife
                           variable.min <= variable.max && variable.largest_slope >= 0 &&
                           std::isfinite(variable.largest_slope) && variable.largest_deviation >= 0 &&
                           std::isfinite(variable.largest_deviation);
-        if (!fine) refuse(file.path(), n, "its range, slope or deviation is impossible");
+        if (!fine) refuse(file.path(), n, "its range, slope or deviation is invalid");
         if (variable.values.length > mostValuesBytes(bricks[n].splats))
           refuse(file.path(), n,
-                 fmt::format("{} bytes are too many for its {} splats", variable.values.length,
+                 fmt::format("its stream of {} bytes is too long for {} splats", variable.values.length,
                              bricks[n].splats));
       });
   CURVISPLAT_CHECK_OP(table.size(), ==, bricks.size());

@@ -1,6 +1,6 @@
-// Reads the tables of a cache and refuses whatever cannot be: afterwards every link of the octree leads where
-// it should, every extent lies in its file and apart from the others, and every number is finite. What a
-// damaged disk or a hostile file could do to the program, it would have to do here.
+// Reads the tables of a cache and refuses invalid ones. After these checks every link of the octree is
+// consistent, every extent lies inside its file and overlaps no other, and every number is finite. Code that
+// uses the tables relies on that. This is where a damaged disk or a hostile cache is stopped.
 #pragma once
 
 #include <filesystem>
@@ -16,18 +16,19 @@ namespace curvisplat {
 
 std::string variableFileName(const VariableInfo& variable);
 
-/// bricks.bin of the folder `cache`, checked in itself and against the manifest. Throws Error.
+/// Reads bricks.bin of the folder `cache`. Throws Error if it is inconsistent, or inconsistent with the
+/// manifest.
 std::vector<Brick> readBricks(const std::filesystem::path& cache, const Manifest& manifest);
 
-/// The table of a var.<number>.bin. Throws Error.
+/// Reads the table of a var.<number>.bin. Throws Error as readBricks().
 std::vector<BrickVariable> readVariableTable(const InputFile& file, const Manifest& manifest,
                                              std::span<const Brick> bricks);
 
-/// Throws Error unless the manifest lists the file with the size it has.
+/// Throws Error unless the manifest lists the file with its actual size. Returns the manifest's entry.
 const FileInfo& checkFile(const InputFile& file, const Manifest& manifest);
 const FileInfo& checkFile(const std::filesystem::path& path, uint64_t bytes, const Manifest& manifest);
 
-/// The checksum of a geometry file: that of its bricks' checksums, in the order of bricks.bin.
+/// The checksum of a geometry file: the checksum of its streams' checksums, in the order of bricks.bin.
 uint64_t geometryChecksum(std::span<const Brick> bricks);
 
 }  // namespace curvisplat

@@ -16,10 +16,10 @@
 namespace curvisplat {
 
 CacheLock::CacheLock(const std::filesystem::path& cache) : cache_(cache), manifest_(cache / "manifest.json") {
-  // For writing: network file systems grant exclusive locks on nothing less.
+  // Opened for writing because network file systems require that for an exclusive lock.
   fd_ = openRetrying(manifest_, O_RDWR);
   if (fd_ < 0)
-    throw Error("{}: cannot be opened for writing: {}; name a whole splat cache that you may change",
+    throw Error("{}: cannot be opened for writing: {}; expected a complete splat cache with write permission",
                 manifest_.string(), std::strerror(errno));
   if (::flock(fd_, LOCK_EX | LOCK_NB) == 0 && isStillThere()) return;
   const bool is_busy = errno == EWOULDBLOCK;
@@ -27,7 +27,7 @@ CacheLock::CacheLock(const std::filesystem::path& cache) : cache_(cache), manife
   const bool is_there = isStillThere();
   SystemCalls::current().close(fd_);
   if (is_busy || !is_there)
-    throw Error("{}: another program is changing this cache; wait for it", cache_.string());
+    throw Error("{}: another program is changing this cache; wait until it has finished", cache_.string());
   throw Error("{}: cannot be locked: {}", manifest_.string(), reason);
 }
 

@@ -1,5 +1,5 @@
-// Keeps two programs from changing one cache at a time. The lock is on the manifest: it needs no file of its
-// own, goes with the process however that ends, and does not disturb readers.
+// Prevents two programs from changing one cache at the same time. The lock (flock) is on the manifest, so it
+// needs no file of its own, ends with the process, and does not affect readers.
 #pragma once
 
 #include <filesystem>
@@ -8,8 +8,8 @@ namespace curvisplat {
 
 class CacheLock {
  public:
-  /// Throws Error if `cache` has no manifest that can be opened for writing, or if another program has it
-  /// locked.
+  /// Throws Error if `cache` has no manifest that can be opened for writing, or if another program holds the
+  /// lock.
   explicit CacheLock(const std::filesystem::path& cache);
   ~CacheLock();
   CacheLock(const CacheLock&) = delete;
@@ -17,7 +17,7 @@ class CacheLock {
 
   const std::filesystem::path& cache() const { return cache_; }
 
-  /// False if what is locked is no longer the manifest of the cache: it was replaced meanwhile.
+  /// Whether the locked file is still the cache's manifest; false if the cache has been replaced since.
   bool isStillThere() const;
 
  private:

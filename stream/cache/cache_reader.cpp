@@ -22,13 +22,19 @@ namespace fs = std::filesystem;
 Manifest readManifest(const fs::path& cache) {
   if (!fs::exists(cache)) {
     if (hasUnfinished(cache))
-      throw Error("{}: its conversion is not finished; the same command with --resume goes on with it",
+      throw Error("{}: its conversion is unfinished; repeat the convert command with --resume to continue it",
                   cache.string());
-    throw Error("{}: there is no such cache", cache.string());
+    throw Error(
+        "{}: does not exist; expected a splat cache (convert the grid first: curvisplat convert GRID -o {})",
+        cache.string(), cache.string());
   }
-  if (!fs::is_directory(cache)) throw Error("{}: is not a folder; a splat cache is one", cache.string());
+  if (!fs::is_directory(cache))
+    throw Error(
+        "{}: is not a directory; expected a splat cache (convert the grid first: curvisplat convert GRID -o "
+        "NAME.splats)",
+        cache.string());
   if (!fs::exists(cache / "manifest.json"))
-    throw Error("{}: has no manifest.json: it is no splat cache, or one whose conversion was not finished",
+    throw Error("{}: contains no manifest.json; it is not a splat cache, or its conversion is unfinished",
                 cache.string());
   const fs::path path = cacheFile(cache, "manifest.json");
   return Manifest::fromJson(readTextFile(path), path);
@@ -50,16 +56,17 @@ struct CacheReader::State {
     checkGrids();
   }
 
-  /// bricks.vdb is for others' tools, and their parsers trust it: it is not even opened here.
+  /// Only checks that bricks.vdb exists and has the right size. The reader does not need it, and OpenVDB's
+  /// parser trusts its input.
   void checkGrids() const {
     const fs::path grids = cacheFile(path, "bricks.vdb");
     std::error_code error;
     const uint64_t bytes = fs::file_size(grids, error);
-    if (error) throw Error("{}: {}; the cache is not whole", grids.string(), error.message());
+    if (error) throw Error("{}: {}; the cache is incomplete: convert again", grids.string(), error.message());
     checkFile(grids, bytes, manifest);
   }
 
-  /// The bytes of a brick's stream, in the thread's scratch.
+  /// Reads a brick's stream into the thread's scratch.
   static std::span<const std::byte> read(const InputFile& file, uint32_t brick, const Extent& extent,
                                          ReadTimes& times) {
     const StageTimer timer(times.read_s);
@@ -82,12 +89,12 @@ struct CacheReader::State {
     const uint64_t found = checksumOf(bytes);
     if (found != extent.checksum)
       throw DamagedBrick(
-          "{}: brick {} at offset {} ({} bytes) has the checksum {:016x}, expected {:016x}; the file is "
-          "damaged: convert again",
+          "{}: brick {} at offset {} ({} bytes) has a wrong checksum (found {:016x}, expected {:016x}); the "
+          "file is damaged: convert again",
           file.path().string(), brick, extent.offset, extent.length, found, extent.checksum);
   }
 
-  /// Runs `work`, which decodes a verified stream, and puts its place before what goes wrong.
+  /// Runs `work`, which decodes a verified stream, and prefixes its errors with file and brick.
   template <typename Work>
   static void decode(const InputFile& file, uint32_t brick, ReadTimes& times, const Work& work) {
     const StageTimer timer(times.decode_s);
@@ -135,7 +142,7 @@ size_t CacheReader::variableNamed(std::string_view name) const {
     if (name.empty() || variables[n].name == name) return n;
     names += (n ? ", " : "") + variables[n].name;
   }
-  if (variables.empty()) throw UsageError("{}: the cache has no scalar", path().string());
+  if (variables.empty()) throw UsageError("{}: the cache has no scalars", path().string());
   throw UsageError("{}: the cache has no scalar '{}'; it has {}", path().string(), name, names);
 }
 

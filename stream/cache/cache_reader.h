@@ -1,6 +1,6 @@
-// Opens a splat cache and reads bricks. Opening reads the manifest and the tables, checks every size against
-// the real files and every link of the octree; it never reads payloads. After that a CacheReader is
-// immutable: any number of threads may read.
+// Opens a splat cache and reads bricks. Opening reads the manifest and the tables, and checks every size
+// against the real files and every link of the octree. It never reads payloads (streams). An open CacheReader
+// is immutable: any number of threads may read.
 #pragma once
 
 #include <filesystem>
@@ -16,14 +16,15 @@
 
 namespace curvisplat {
 
-/// Where reading bricks spends its time; added to.
+/// Time spent reading bricks, by step. Reads add to it.
 struct ReadTimes {
-  double read_s = 0;  // the disk's
+  double read_s = 0;  // reading the file
   double verify_s = 0, decode_s = 0;
 };
 
-/// A brick's bytes are not what was written: the file is damaged, or has become shorter. A coarser brick can
-/// stand in. (Where the disk itself fails, the others will fare no better: that is a plain Error.)
+/// A brick's bytes differ from what was written: the file is damaged or has become shorter. A coarser brick
+/// can be drawn instead. (If the disk itself fails, reading other bricks will probably fail as well: that is
+/// a plain Error.)
 class DamagedBrick : public Error {
  public:
   using Error::Error;
@@ -31,7 +32,7 @@ class DamagedBrick : public Error {
 
 class CacheReader {
  public:
-  /// Throws Error naming the file, what was expected and what was found.
+  /// Throws an Error that names the file, what was found and what was expected.
   explicit CacheReader(const std::filesystem::path& cache);
   ~CacheReader();
   CacheReader(CacheReader&&) noexcept;
@@ -40,26 +41,27 @@ class CacheReader {
   const std::filesystem::path& path() const;
   const Manifest& manifest() const;
 
-  /// The octree, level by level, root (brick 0, or the root's consecutive bricks) first.
+  /// The octree, level by level. The root is brick 0, or the first few bricks if several share the root cell.
   std::span<const Brick> bricks() const;
-  /// [brick], for the variable at `variable` of manifest().variables.
+  /// [brick]: the table of manifest().variables[variable].
   std::span<const BrickVariable> brickVariables(size_t variable) const;
 
-  /// Position in manifest().variables of the variable `name`; the empty name is the first. Throws UsageError
-  /// that lists the names there are.
+  /// The index in manifest().variables of the variable `name`; 0 for the empty name. Throws a UsageError that
+  /// lists the names if there is none.
   size_t variableNamed(std::string_view name) const;
 
-  /// Reads, verifies and decodes. Throws DamagedBrick where a checksum does not match or the file ends, Error
-  /// where the disk fails; both name the brick and the file.
+  /// Reads, verifies and decodes a brick. Throws DamagedBrick if the checksum does not match, the file ends
+  /// early or the stream does not decode, and Error if the disk fails; both name the brick and the file.
   void readGeometry(uint32_t brick, SplatGeometry& out, std::vector<NodeRun>* runs = nullptr,
                     ReadTimes* times = nullptr) const;
   void readVariable(uint32_t brick, size_t variable, SplatVariable& out, ReadTimes* times = nullptr) const;
 
-  /// Where the streams are, for who reads them himself.
+  /// The payload files, for callers that read streams themselves.
   const std::filesystem::path& geometryPath() const;
   const std::filesystem::path& valuesPath(size_t variable) const;
-  /// Verifies and decodes such bytes: those of bricks()[brick].geometry, those of the variable's values.
-  /// Arrays of as many elements as the brick has splats. Throws as reading does.
+  /// Verify and decode a stream that the caller has read: the bytes at bricks()[brick].geometry, or those at
+  /// the variable's `values`. The arrays in `out` have one element per splat of the brick. Throw as the
+  /// reading functions.
   void decode(uint32_t brick, std::span<const std::byte> geometry, const GeometryArrays<float>& out,
               ReadTimes& times) const;
   void decode(uint32_t brick, size_t variable, std::span<const std::byte> values,

@@ -14,9 +14,9 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kMaxFindings = 100;
-constexpr uint64_t kMaxGridBytes = 64 << 10;  // of bricks.vdb, a brick: one alone takes 10 KiB
+constexpr uint64_t kMaxGridBytes = 64 << 10;  // of bricks.vdb per brick; a single brick takes 10 KiB
 constexpr double kWeightTolerance = 1e-3;
-// Floats have been rounded, from doubles that the record was made of.
+// Records were computed from doubles before these were rounded to floats.
 constexpr double kRounding = 1e-5;
 
 class Verifier {
@@ -74,14 +74,14 @@ class Verifier {
       const auto [least, most] = std::minmax_element(coordinates[axis]->begin(), coordinates[axis]->end());
       if (std::abs(corner[axis] + *least - brick.lower[axis]) > slack ||
           std::abs(corner[axis] + *most - brick.upper[axis]) > slack)
-        findIn(n, fmt::format("its centres span [{}, {}] along {}, its record says [{}, {}]",
+        findIn(n, fmt::format("its centres span [{}, {}] along {}, its record has [{}, {}]",
                               corner[axis] + *least, corner[axis] + *most, "xyz"[axis], brick.lower[axis],
                               brick.upper[axis]));
     }
   }
 
-  /// Inner bricks lie octant after octant. Centres within rounding of a middle plane may seem to be on either
-  /// side.
+  /// The splats of inner bricks are stored octant by octant. Centres within rounding of a middle plane count
+  /// for either side.
   void verifyOctants(uint32_t n) {
     const Brick& brick = bricks_[n];
     const double half = 0.5 * reader_.manifest().root.cellSize(brick.cell.level);
@@ -100,11 +100,11 @@ class Verifier {
     for (int octant = 0; octant < 8; ++octant) {
       const int64_t difference = int64_t{found[octant]} - brick.octant_splats[octant];
       if (std::abs(difference) > uncertain)
-        findIn(n, fmt::format("octant {} has {} splats, its record says {}", octant, found[octant],
+        findIn(n, fmt::format("octant {} has {} splats, its record has {}", octant, found[octant],
                               brick.octant_splats[octant]));
     }
     if (!brick.isLeaf() && misplaced > 0)
-      findIn(n, fmt::format("{} of its splats are not in octant order", misplaced));
+      findIn(n, fmt::format("{} of its splats are not in the order of octants", misplaced));
   }
 
   void verifyRadius(uint32_t n) {
@@ -116,22 +116,22 @@ class Verifier {
     }
     const double radius = largestReach(splats, geometry_.border_code);
     if (std::abs(radius - brick.largest_radius) > kRounding * radius)
-      findIn(n, fmt::format("its largest radius is {}, its record says {}", radius, brick.largest_radius));
+      findIn(n, fmt::format("its largest radius is {}, its record has {}", radius, brick.largest_radius));
   }
 
   void verifyRuns(uint32_t n, const std::vector<NodeRun>& runs) {
     if (!bricks_[n].isLeaf()) {
-      if (!runs.empty()) findIn(n, "it has children and nodes of its own");
+      if (!runs.empty()) findIn(n, "it has children but also nodes (node runs belong to leaves only)");
       return;
     }
-    if (runs.empty()) return findIn(n, "it is a leaf without nodes");
+    if (runs.empty()) return findIn(n, "it is a leaf without node runs");
     const auto& blocks = reader_.manifest().blocks;
     for (const NodeRun& run : runs) {
       const bool inside = run.block < blocks.size() && run.i + run.count <= blocks[run.block].ni &&
                           run.j < blocks[run.block].nj && run.k < blocks[run.block].nk;
       if (!inside)
-        return findIn(n, fmt::format("{} nodes from block {}, {} {} {} are not in the grid", run.count,
-                                     run.block, run.i, run.j, run.k));
+        return findIn(n, fmt::format("its run of {} nodes from block {}, {} {} {} is outside of the grid",
+                                     run.count, run.block, run.i, run.j, run.k));
     }
   }
 
@@ -156,7 +156,7 @@ class Verifier {
     if (*least != record.min || *most != record.max || differs(slope, record.largest_slope) ||
         differs(std::sqrt(variance), record.largest_deviation))
       findIn(n, fmt::format(
-                    "'{}' has the range [{}, {}], slope {} and deviation {}, its record says [{}, {}], {} "
+                    "'{}' has the range [{}, {}], slope {} and deviation {}, its record has [{}, {}], {} "
                     "and {}",
                     reader_.manifest().variables[v].name, *least, *most, slope, std::sqrt(variance),
                     record.min, record.max, record.largest_slope, record.largest_deviation));
@@ -183,7 +183,7 @@ class Verifier {
     }
     const double said = reader_.manifest().volume;
     if (all && std::abs(volume - said) > kWeightTolerance * said)
-      find("{}: the leaves' weights sum to {}, the manifest says {}", reader_.path().string(), volume, said);
+      find("{}: the leaves' weights sum to {}, the manifest has {}", reader_.path().string(), volume, said);
   }
 
   void verifyGrids() {
@@ -191,19 +191,20 @@ class Verifier {
     try {
       const InputFile file(path);
       if (file.size() > kMaxGridBytes * (bricks_.size() + 1))
-        return find("{}: has {} bytes for {} bricks", path.string(), file.size(), bricks_.size());
+        return find("{}: is too large for {} bricks (found {} bytes)", path.string(), bricks_.size(),
+                    file.size());
       std::vector<std::byte> bytes(file.size());
       file.readAt(0, std::span(bytes));
       for (const FileInfo& info : reader_.manifest().files)
         if (info.name == "bricks.vdb" && info.checksum != checksumOf(bytes))
-          return find("{}: has the checksum {:016x}, expected {:016x}", path.string(), checksumOf(bytes),
-                      info.checksum);
+          return find("{}: has a wrong checksum (found {:016x}, expected {:016x})", path.string(),
+                      checksumOf(bytes), info.checksum);
       const auto [difference, not_compared] = compareBrickGrids(bytes, reader_.manifest().root, bricks_);
       if (!difference.empty()) find("{}: {}", path.string(), difference);
       if (!not_compared.empty())
         result_.notes.push_back(
-            fmt::format("{}: its checksum is right; it was not compared with bricks.bin: {}", path.string(),
-                        not_compared));
+            fmt::format("{}: the checksum is right, but the contents were not compared with bricks.bin: {}",
+                        path.string(), not_compared));
     } catch (const Error& error) {
       find("{}", error.what());
     }
@@ -212,7 +213,7 @@ class Verifier {
   const CacheReader& reader_;
   const std::span<const Brick> bricks_;
   std::vector<double> weights_;  // [brick]
-  std::vector<bool> whole_;      // [brick]: its geometry could be decoded
+  std::vector<bool> whole_;      // [brick]: whether its geometry could be decoded
   CacheVerification result_;
   SplatGeometry geometry_;
   SplatVariable values_;

@@ -1,5 +1,5 @@
-// Reads a whole cache and looks for what opening it does not: damaged payloads, and an octree that does not
-// keep what it stands for. For `info --verify` and for tests.
+// Reads a whole cache and checks what opening does not: the payloads, and that coarse bricks preserve the
+// weight of the bricks that they stand for. For `info --verify` and for tests.
 #pragma once
 
 #include <string>
@@ -11,16 +11,18 @@
 namespace curvisplat {
 
 struct CacheVerification {
-  std::vector<std::string> findings;  // what is wrong, a line each, at most 100; none for a sound cache
-  std::vector<std::string> notes;     // what could not be checked, and why
+  std::vector<std::string> findings;  // errors, one line each, at most 100; empty for an intact cache
+  std::vector<std::string> notes;     // checks that were impossible, and why
 };
 
-/// Decodes every brick. Checks
-///   every payload   its checksum, that it decodes, and that it keeps to its record: box, octants (an inner
-///                   brick's splats in their order), largest radius, range, slope, deviation
-///   leaves          node runs that hold as many nodes as there are splats, within the manifest's blocks
-///   inner bricks    that their weights sum to their children's, 1e-3 relative
-///   the cache       that the weights sum to the manifest's volume; bricks.vdb against bricks.bin
+/// Decodes every brick and checks
+///
+///   every payload   its checksum; that it decodes; that the splats agree with the brick's record: box,
+///                   octants (in inner bricks, the splats' order), largest radius, range, slope, deviation
+///   leaves          the node runs hold one sample per splat and lie in the manifest's blocks
+///   inner bricks    the sum of the weights equals the children's, within 1e-3
+///   the cache       the sum of the leaves' weights equals the manifest's volume, within 1e-3; bricks.vdb
+///                   agrees with bricks.bin
 CacheVerification verifyCache(const CacheReader& reader, Progress* progress = nullptr);
 
 }  // namespace curvisplat

@@ -16,7 +16,7 @@
 namespace curvisplat {
 namespace {
 
-/// Positions in `bricks`, level by level and in Morton order; equal cells as they were appended.
+/// The indices of `bricks`, by level and then in Morton order; bricks of one cell in the order of appending.
 std::vector<uint32_t> indexOrder(const std::vector<Brick>& bricks) {
   std::vector<uint32_t> order(bricks.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -27,11 +27,11 @@ std::vector<uint32_t> indexOrder(const std::vector<Brick>& bricks) {
   return order;
 }
 
-/// Links parents and children of `bricks`, which are in index order. A brick without a parent, and two bricks
-/// of one cell that are not leaves, are bugs of whoever appended them.
+/// Links parents and children of `bricks`, which are in the order of the index. A brick without a parent, or
+/// two bricks of one cell that are not leaves, are bugs of the caller of append().
 void linkOctree(std::vector<Brick>& bricks) {
   CURVISPLAT_CHECK_OP(bricks.front().cell.level, ==, 0u);
-  // Parents and children go through their levels in the same order.
+  // The parents of a level's bricks, in order, are in order too: `parent` only ever moves forward.
   uint32_t parent = 0;
   for (uint32_t n = 0; n < bricks.size(); ++n) {
     const Cell& cell = bricks[n].cell;
@@ -76,7 +76,7 @@ struct CacheWriter::State {
   FileInfo writeGrids(const std::vector<Brick>& ordered);
   FileInfo closeGeometry(const std::vector<Brick>& ordered);
 
-  std::unique_ptr<PartialFolder> own_folder;  // if no one else has it
+  std::unique_ptr<PartialFolder> own_folder;  // null if the caller owns the folder
   PartialFolder& folder;
   RootCube root;
   std::vector<VariableInfo> variables;
@@ -85,7 +85,7 @@ struct CacheWriter::State {
   std::vector<Brick> bricks;                       // as appended
   std::vector<double> weights;                     // [brick]
   std::vector<std::vector<BrickVariable>> tables;  // [variable][brick]
-  // For readBack; opened at once, since any number of threads may ask.
+  // For readBack(). Opened by the constructor, because any number of threads may call readBack().
   InputFile geometry_input;
   std::vector<InputFile> values_input;
   BrickLog log;
@@ -97,7 +97,7 @@ void CacheWriter::State::add(AppendedBrick&& appended) {
   for (size_t v = 0; v < variables.size(); ++v) tables[v].push_back(appended.variables[v]);
 }
 
-/// Whether the files have the brick's streams, as they were written.
+/// Whether the files contain the brick's streams, undamaged.
 bool CacheWriter::State::isWhole(const AppendedBrick& appended) const {
   std::vector<std::byte> bytes;
   const auto has = [&](const InputFile& file, const Extent& extent) {
@@ -146,7 +146,8 @@ CacheWriter::CacheWriter(std::filesystem::path cache, bool overwrite, RootCube r
 CacheWriter::CacheWriter(PartialFolder& folder, RootCube root, std::vector<VariableInfo> variables,
                          Progress& progress)
     : state_(std::make_unique<State>(folder, root, std::move(variables))) {
-  // What an interrupted finish() has left: a manifest, whole though it may be, is older than what follows.
+  // Left behind by an interrupted finish(). Even a complete manifest describes an older state than the one to
+  // come.
   for (const auto& entry : std::filesystem::directory_iterator(folder.path()))
     if (entry.path().filename() == "manifest.json" || entry.path().extension() == ".part")
       removeFile(entry.path());
@@ -171,7 +172,7 @@ uint64_t CacheWriter::append(EncodedBrick&& encoded, float error) {
   appended.brick.geometry.offset = appendStream(s.geometry, encoded.geometry);
   for (size_t v = 0; v < encoded.values.size(); ++v)
     appended.variables[v].values.offset = appendStream(s.values[v], encoded.values[v]);
-  s.log.append(appended);  // last: what it tells of is there
+  s.log.append(appended);  // last: the streams that an entry describes are in the files
   s.add(std::move(appended));
   return s.bricks.size() - 1;
 }
@@ -198,7 +199,7 @@ BrickSplats CacheWriter::readBack(uint64_t id) const {
 Manifest CacheWriter::finish(Manifest manifest) {
   State& s = *state_;
   if (s.bricks.empty())
-    throw Error("{}: there is nothing to write: no brick has a splat", s.folder.path().string());
+    throw Error("{}: the cache would be empty: no sample can be drawn", s.folder.path().string());
   const std::vector<uint32_t> order = indexOrder(s.bricks);
   std::vector<Brick> ordered;
   ordered.reserve(order.size());

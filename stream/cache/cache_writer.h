@@ -1,9 +1,10 @@
-// Writes a splat cache. Everything goes to files of their final names in a folder NAME.splats.partial beside
-// the output; finish() writes index, bricks.vdb and manifest, syncs, and renames the folder into place. Until
-// then nothing opens as a cache; what stood at the output before stays until the rename.
+// Writes a splat cache. The files get their final names at once, but in a folder NAME.splats.partial beside
+// the output. finish() writes the index, bricks.vdb and the manifest, syncs everything, and renames the
+// folder to its final name. Until then nothing opens as a cache, and an older cache at the output stays in
+// place.
 //
-// A log (brick_log.h) tells what was appended. Nothing is synced before finish(): whoever goes on from an
-// interrupted conversion checks every stream against its checksum, and what the disk has lost is made again.
+// A log (brick_log.h) records the appended bricks. Nothing is synced before finish(): a conversion that
+// continues an interrupted one checks every stream against its checksum, and rewrites what the disk has lost.
 #pragma once
 
 #include <filesystem>
@@ -22,35 +23,35 @@ namespace curvisplat {
 
 class CacheWriter {
  public:
-  /// Throws Error if `cache` exists and `overwrite` is false, if `cache` exists and is not a cache, or if the
-  /// partial folder cannot be made, or belongs to a conversion that is still running (it is locked).
+  /// Throws Error if `cache` exists and `overwrite` is false, if `cache` exists and is not a cache, if the
+  /// partial folder cannot be created, or if a running conversion has it locked.
   CacheWriter(std::filesystem::path cache, bool overwrite, RootCube root,
               std::vector<VariableInfo> variables);
-  /// In a folder that is there already, and must outlive the writer. Bricks that an interrupted conversion
-  /// has appended there count as appended, up to the first that is not whole; each advances `progress` by 1.
-  /// Root and variables must be that conversion's.
+  /// Writes to an existing partial folder, which must outlive the writer. Bricks that an interrupted
+  /// conversion appended there count as appended, up to the first one with a missing or damaged stream; each
+  /// advances `progress` by 1. `root` and `variables` must be those of the interrupted conversion.
   CacheWriter(PartialFolder& folder, RootCube root, std::vector<VariableInfo> variables, Progress& progress);
-  /// Removes the partial folder unless finish() has succeeded, or the folder is another's.
+  /// Removes the partial folder unless finish() has succeeded or the caller owns the folder.
   ~CacheWriter();
 
-  /// The bricks appended so far, by id.
+  /// The bricks appended so far. A brick's id is its index.
   std::span<const Brick> bricks() const;
-  /// Forgets the bricks from id `count` on.
+  /// Discards the bricks with ids >= `count`.
   void keep(uint64_t count);
 
-  /// Appends a brick's streams; small ones share a 4 KiB page, no other crosses into one. Bricks come in
-  /// post-order of the octree (children before their parent, Morton order among siblings), so that the bytes
-  /// do not depend on threads or memory. `error` as Brick::error. One thread at a time. Returns the brick's
-  /// id in order of appending.
+  /// Appends a brick's streams, aligned as cache_format.h describes. Bricks must come in post-order of the
+  /// octree (children before their parent, siblings in Morton order), so that the bytes do not depend on the
+  /// number of threads or on the memory budget. `error`: Brick::error. One thread at a time. Returns the
+  /// brick's id.
   uint64_t append(EncodedBrick&& brick, float error);
 
-  /// Reads back what append() has written under `id`, for merging the levels above. Any number of threads may
-  /// read at once, while nothing is appended.
+  /// Reads back the brick that append() wrote under `id`, for merging into coarser levels. Any number of
+  /// threads may read at the same time, while nothing is appended.
   BrickSplats readBack(uint64_t id) const;
 
-  /// Sorts the records by level and Morton order, links parents and children, writes bricks.bin, the
-  /// variables' tables, bricks.vdb and the manifest (whose root, counts, levels, volume and files it fills
-  /// in), and renames into place. Returns the manifest as it was written.
+  /// Sorts the records by level and Morton order and links parents and children. Writes bricks.bin, the
+  /// variables' tables, bricks.vdb and the manifest, whose root, counts, levels, volume and files it fills
+  /// in. Renames the folder to its final name. Returns the manifest as written.
   Manifest finish(Manifest manifest);
 
  private:

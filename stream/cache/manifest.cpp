@@ -20,16 +20,16 @@ using Json = nlohmann::ordered_json;
 
 constexpr uint64_t kOldestVersion = 1;
 constexpr const char* kFormat = "curvisplat splat cache";
-// A hundred thousand blocks take half of it; parsed, a text takes some twenty times its size.
+// 100,000 blocks take half of this. Parsed JSON takes about twenty times the size of its text.
 constexpr size_t kLargestText = 16 << 20;
-// Squares and volumes of lengths below it are finite, and so are sums of positions.
+// Squares and cubes of lengths up to this are finite, and so are sums of positions.
 constexpr double kLargestCoordinate = 1e100;
 constexpr uint64_t kLargestVariableNumber = 0x7fffffff;
 constexpr const char* kChecksum = "checksum";
-// Names of files and blocks may be in any encoding; JSON is UTF-8.
+// Names of files and blocks may be in any encoding, but JSON is UTF-8: invalid bytes are replaced.
 constexpr auto kReplace = Json::error_handler_t::replace;
 
-/// Of all but the checksum, however it is laid out.
+/// The checksum of a manifest whose `checksum` has been removed. It does not depend on white space.
 std::string checksumText(const Json& json) {
   const std::string text = json.dump(-1, ' ', false, kReplace);
   return fmt::format("{:016x}", checksumOf(std::as_bytes(std::span(text))));
@@ -39,9 +39,9 @@ Json jsonOf(const glm::dvec3& v) {
   return Json::array({v.x, v.y, v.z});
 }
 
-// ---- reading: every field is asked for by name, type and range ----
+// ---- reading: every field is checked for presence, type and range ----
 
-/// A JSON object of the file, and how to get at its fields or say what is wrong with them.
+/// A JSON object of the manifest: access to its fields, and errors that name the field.
 class Fields {
  public:
   Fields(const Json& json, std::string place, const std::filesystem::path& path)
@@ -51,7 +51,7 @@ class Fields {
 
   std::string text(const char* name) const {
     const Json& value = at(name);
-    if (!value.is_string()) fail(name, "a text", value);
+    if (!value.is_string()) fail(name, "a string", value);
     return oneLine(value.get<std::string>());
   }
 
@@ -67,11 +67,11 @@ class Fields {
     const glm::dvec3 point(numberOf(value[0], name), numberOf(value[1], name), numberOf(value[2], name));
     for (int axis = 0; axis < 3; ++axis)
       if (std::abs(point[axis]) > kLargestCoordinate)
-        fail(name, fmt::format("three numbers up to {}", kLargestCoordinate), value);
+        fail(name, fmt::format("three numbers of magnitude up to {}", kLargestCoordinate), value);
     return point;
   }
 
-  /// A checksum as 16 hexadecimal digits: JSON's numbers are doubles to many readers.
+  /// Checksums are strings of 16 hexadecimal digits, because many JSON readers convert numbers to doubles.
   uint64_t checksum(const char* name) const {
     const std::string digits = text(name);
     uint64_t value = 0;
@@ -81,7 +81,7 @@ class Fields {
     return value;
   }
 
-  /// A file of the cache: its name must not lead anywhere else.
+  /// The name of a file of the cache. It must be a plain name, which cannot lead out of the cache's folder.
   std::string fileName(const char* name) const {
     const std::string file = text(name);
     const bool plain = !file.empty() && file != "." && file != ".." && file.find('/') == std::string::npos;
@@ -99,7 +99,7 @@ class Fields {
   std::vector<std::string> texts(const char* name) const {
     std::vector<std::string> out;
     for (const Json& value : array(name)) {
-      if (!value.is_string()) fail(name, "an array of texts", value);
+      if (!value.is_string()) fail(name, "an array of strings", value);
       out.push_back(oneLine(value.get<std::string>()));
     }
     return out;
@@ -117,15 +117,15 @@ class Fields {
   [[noreturn]] void fail(const std::string& name, const std::string& expected, const Json& found) const {
     std::string shown = found.dump(-1, ' ', false, Json::error_handler_t::replace);
     if (shown.size() > 60) shown = shown.substr(0, 60) + "...";
-    throw Error("{}: '{}{}' should be {}, and is {}; the file is damaged or not a cache's", path_.string(),
-                place_, name, expected, shown);
+    throw Error("{}: '{}{}' is invalid (found {}, expected {}); the file is damaged or another program's",
+                path_.string(), place_, name, shown, expected);
   }
 
  private:
   const Json& at(const char* name) const {
     const auto found = json_.find(name);
     if (found == json_.end())
-      throw Error("{}: '{}{}' is missing; the file is damaged or not a cache's", path_.string(), place_,
+      throw Error("{}: '{}{}' is missing; the file is damaged or another program's", path_.string(), place_,
                   name);
     return *found;
   }
@@ -165,14 +165,14 @@ void readRoot(const Fields& fields, Manifest& manifest, const Json& json) {
   manifest.root.min = root.point("min");
   manifest.root.size = root.number("size");
   if (!(manifest.root.size > 0 && manifest.root.size <= kLargestCoordinate))
-    root.fail("size", fmt::format("more than 0, up to {}", kLargestCoordinate), json["root"]["size"]);
+    root.fail("size", fmt::format("a number above 0, up to {}", kLargestCoordinate), json["root"]["size"]);
   manifest.lower = fields.point("lower");
   manifest.upper = fields.point("upper");
   for (int axis = 0; axis < 3; ++axis)
     if (manifest.lower[axis] > manifest.upper[axis]) fields.fail("lower", "at most 'upper'", json["lower"]);
 }
 
-/// Whether splats stand for cells.
+/// Whether the samples are cells.
 bool readCentring(const Fields& fields, const Json& json) {
   if (!json.contains("centring")) return false;
   const std::string centring = fields.text("centring");
@@ -191,15 +191,15 @@ void readVariables(const Fields& fields, Manifest& manifest, const Json& json) {
     variable.unit = entry.text("unit");
     variable.min = entry.number("min");
     variable.max = entry.number("max");
-    constexpr double kLargest = std::numeric_limits<float>::max();  // splats' values are floats
+    constexpr double kLargest = std::numeric_limits<float>::max();  // splats store values as floats
     if (!(variable.min >= -kLargest && variable.min <= variable.max && variable.max <= kLargest))
-      entry.fail("min", "at most 'max', and both floats", variable.min);
+      entry.fail("min", "at most 'max', and both in the range of a float", variable.min);
     numbers.push_back(variable.number);
     names.push_back(variable.name);
     manifest.variables.push_back(std::move(variable));
   });
   if (!allDifferent(numbers) || !allDifferent(names))
-    fields.fail("variables", "different in number and name", json["variables"]);
+    fields.fail("variables", "variables with distinct numbers and names", json["variables"]);
 }
 
 void readSteps(const Fields& fields, Manifest& manifest, const Json& json) {
@@ -211,11 +211,11 @@ void readSteps(const Fields& fields, Manifest& manifest, const Json& json) {
     for (uint32_t number : step.variables) {
       const bool known = std::any_of(manifest.variables.begin(), manifest.variables.end(),
                                      [&](const VariableInfo& v) { return v.number == number; });
-      if (!known) entry.fail("variables", "numbers of variables", json["steps"]);
+      if (!known) entry.fail("variables", "numbers of listed variables", json["steps"]);
     }
     manifest.steps.push_back(std::move(step));
   });
-  if (manifest.steps.empty()) fields.fail("steps", "at least one", json["steps"]);
+  if (manifest.steps.empty()) fields.fail("steps", "at least one step", json["steps"]);
 }
 
 void readFiles(const Fields& fields, Manifest& manifest, const Json& json) {
@@ -225,7 +225,7 @@ void readFiles(const Fields& fields, Manifest& manifest, const Json& json) {
         {entry.fileName("name"), entry.count("size", 0, kAny), entry.checksum("checksum")});
     names.push_back(manifest.files.back().name);
   });
-  if (!allDifferent(names)) fields.fail("files", "of different names", json["files"]);
+  if (!allDifferent(names)) fields.fail("files", "files with distinct names", json["files"]);
 }
 
 }  // namespace
@@ -273,35 +273,37 @@ std::string Manifest::toJson() const {
 Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path& path) {
   if (text.size() > kLargestText)
     throw Error(
-        "{}: has {} bytes, more than the {} that a manifest can have; the file is damaged or not a cache's",
+        "{}: is too large for a manifest (found {} bytes, expected at most {}); the file is damaged: convert "
+        "again",
         path.string(), text.size(), kLargestText);
   requireShallowJson(text, path.string());
   Json json;
   try {
     json = Json::parse(text);
   } catch (const nlohmann::json::exception& error) {
-    throw Error("{}: is not JSON: {}; the file is damaged or not a cache's", path.string(), error.what());
+    throw Error("{}: is not valid JSON: {}; the file is damaged or another program's", path.string(),
+                error.what());
   }
   const Fields fields(json, "", path);
   if (fields.text("format") != kFormat) fields.fail("format", fmt::format("'{}'", kFormat), json["format"]);
   const uint64_t version = fields.count("version", 0, kAny);
   if (version > kCacheVersion)
     throw OtherVersion(
-        "{}: the cache has format version {}, and this program reads up to {}; use a newer program",
+        "{}: the cache has format version {}; this program reads versions up to {}: use a newer program",
         path.string(), version, kCacheVersion);
   if (version < kOldestVersion)
     throw OtherVersion(
-        "{}: the cache has format version {}, from before the format was settled, and this program reads "
-        "from {} "
-        "on; convert again, with --overwrite",
+        "{}: the cache has the experimental format version {}; this program reads versions from {} on: "
+        "convert again, with --overwrite",
         path.string(), version, kOldestVersion);
-  if (json.contains(kChecksum)) {  // caches from before have none
+  if (json.contains(kChecksum)) {  // the earliest caches have none
     const std::string said = fields.text(kChecksum);
     json.erase(kChecksum);
     const std::string found = checksumText(json);
     if (found != said)
       throw Error(
-          "{}: its contents have the checksum {}, it says {}; it is damaged or was changed: convert again",
+          "{}: has a wrong checksum (found {}, expected {}); the file is damaged or was edited: "
+          "convert again",
           path.string(), found, said);
   }
   Manifest manifest;

@@ -1,5 +1,5 @@
-// manifest.json: what a cache holds, in words and numbers for people and for the reader. Written last, by
-// rename: a cache folder without it is unfinished. Design section 4.
+// manifest.json: describes a cache's contents, for people and for the reader; stream/FORMAT.md lists its
+// keys. It is written last, by rename: a cache folder without it is unfinished.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ struct VariableInfo {
   uint32_t number = 0;      // var.<number>.bin
   std::string name;         // unique in the cache
   std::string unit;         // may be empty
-  double min = 0, max = 0;  // of the nodes' values, before any merging
+  double min = 0, max = 0;  // of the samples' values, before merging
 };
 
 /// One time step; a steady cache has exactly one.
@@ -27,8 +27,8 @@ struct StepInfo {
   std::vector<uint32_t> variables;  // numbers
 };
 
-/// Size and checksum (XXH3, 64 bit) of a file of the cache. Of bricks' payload files the checksum is the hash
-/// of the table of their bricks' checksums, so that opening never reads payloads.
+/// Size and checksum (64-bit XXH3) of one of the cache's files. A payload file's checksum covers the table of
+/// its streams' checksums instead of the streams themselves, so that opening a cache reads no payloads.
 struct FileInfo {
   std::string name;
   uint64_t size = 0;
@@ -40,7 +40,7 @@ struct BlockInfo {
   uint64_t ni = 0, nj = 0, nk = 0;
 };
 
-/// A splat cache, but of a format that this program does not read.
+/// Thrown for a splat cache whose format version this program does not read.
 class OtherVersion : public Error {
  public:
   using Error::Error;
@@ -48,27 +48,26 @@ class OtherVersion : public Error {
 
 struct Manifest {
   std::string title;
-  std::string program;               // what wrote it: "curvisplat 0.1.0"
+  std::string program;               // the program that wrote it: "curvisplat 0.1.0"
   std::vector<std::string> sources;  // the input files, as given
-  std::string reader;                // the input's layout and options, in words
+  std::string reader;                // the input's layout and options, as text
   RootCube root;
-  glm::dvec3 lower{0.0}, upper{0.0};  // bounds of the grid's nodes
+  glm::dvec3 lower{0.0}, upper{0.0};  // bounding box of the grid's nodes
   std::vector<BlockInfo> blocks;
-  bool cells = false;          // each splat stands for a cell of the grid, not for a node; runs tell its
-                               // lowest node
-  uint64_t nodes = 0;          // of the grid, or its cells
-  uint64_t blanked_nodes = 0;  // of those, not drawn: iblank, --blank and non-finite together
+  bool cells = false;  // samples are the grid's cells, not its nodes; runs name a cell by its lowest node
+  uint64_t nodes = 0;  // samples of the grid: nodes, or cells
+  uint64_t blanked_nodes = 0;  // samples that are not drawn: iblank, --blank or not finite
   uint64_t splats = 0;         // at the finest level
   uint64_t bricks = 0;
   uint32_t levels = 0;  // deepest level + 1
   double volume = 0;    // sum of the finest level's weights
   std::vector<VariableInfo> variables;
   std::vector<StepInfo> steps;
-  std::vector<FileInfo> files;  // every other file of the cache
+  std::vector<FileInfo> files;  // all files of the cache except the manifest
 
   std::string toJson() const;
-  /// Throws Error naming `path` where a field is missing, of the wrong type or out of range, where a file's
-  /// name is not a plain name; OtherVersion where the version is not one that this program reads.
+  /// Throws an Error that names `path` if a field is missing, of the wrong type or out of range, or if a
+  /// file's name is not a plain name. Throws OtherVersion if the program does not read this version.
   static Manifest fromJson(const std::string& text, const std::filesystem::path& path);
 };
 

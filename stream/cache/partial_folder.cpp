@@ -32,7 +32,7 @@ fs::path withSuffix(fs::path path, const char* suffix) {
   return path;
 }
 
-/// "cache/" has an empty file name; what is beside it belongs to "cache".
+/// "cache/" has an empty file name: without the slash, suffixes are added to "cache".
 fs::path withoutSlash(fs::path path) {
   return path.has_filename() ? std::move(path) : path.parent_path();
 }
@@ -52,16 +52,15 @@ void checkReplaceable(const fs::path& target, bool overwrite) {
   if (target.empty()) throw UsageError("the output has no name");
   if (!fs::exists(fs::symlink_status(target))) return;
   if (!overwrite)
-    throw Error("{}: exists already; choose another output, or allow overwriting (--overwrite)",
-                target.string());
+    throw Error("{}: exists already; choose another output, or replace it with --overwrite", target.string());
   try {
     const fs::path manifest = target / "manifest.json";
     Manifest::fromJson(readTextFile(manifest), manifest);
   } catch (const OtherVersion&) {
-    // A cache all the same.
+    // Still a cache.
   } catch (const Error& error) {
     throw Error(
-        "{}: is not a whole splat cache and will not be overwritten; remove it, or choose another output "
+        "{}: is not a complete splat cache and will not be overwritten; remove it, or choose another output "
         "({})",
         target.string(), error.what());
   }
@@ -77,11 +76,12 @@ PartialFolder::PartialFolder(fs::path target, bool overwrite, Rest rest)
   checkReplaceable(target_, overwrite);
   const bool is_new = SystemCalls::current().mkdir(path_.c_str(), 0777) == 0;
   if (!is_new && errno != EEXIST)
-    throw Error("{}: the folder cannot be made: {}; choose another output", path_.string(), reason());
+    throw Error("{}: the directory cannot be created: {}; choose another output", path_.string(), reason());
   try {
     lock();
   } catch (...) {
-    if (is_new) SystemCalls::current().remove(path_.c_str());  // unless another's lock is in it by now
+    if (is_new)
+      SystemCalls::current().remove(path_.c_str());  // fails if another conversion's lock is in it by now
     throw;
   }
   try {
@@ -98,7 +98,8 @@ PartialFolder::PartialFolder(fs::path target, bool overwrite, Rest rest)
 void PartialFolder::clear() {
   leave_ = false;
   for (const auto& entry : fs::directory_iterator(path_))
-    if (entry.path().filename() != kLockName) removeFolder(entry.path(), "rest of an unfinished conversion");
+    if (entry.path().filename() != kLockName)
+      removeFolder(entry.path(), "remainder of an unfinished conversion");
 }
 
 PartialFolder::~PartialFolder() {
@@ -114,8 +115,8 @@ void PartialFolder::lock() {
   const bool locked = ::flock(fd, LOCK_EX | LOCK_NB) == 0;
   const std::string why = reason();
   const bool busy = !locked && errno == EWOULDBLOCK;
-  // A conversion that ended between open and flock has taken the file away: what is locked is not what is
-  // here.
+  // A conversion that ended between open and flock has removed the file: then the locked file is no longer
+  // the one of this name.
   struct stat ours {
   }, theirs{};
   const bool same = ::fstat(fd, &ours) == 0 && ::stat(name.c_str(), &theirs) == 0 &&
@@ -151,10 +152,10 @@ void PartialFolder::putIntoPlace() {
     }
     replaced_ = aside;
   } else {
-    throw Error("{}: cannot be put in the place of {}: {}", path_.string(), target_.string(), reason());
+    throw Error("{}: cannot replace {}: {}", path_.string(), target_.string(), reason());
   }
   try {
-    // Before anything of the old cache goes: a power loss must not take both of them.
+    // Synced before the old cache is removed: a power loss must not lose both caches.
     syncDirectory(folderOf(target_));
   } catch (...) {
     const fs::path old = std::exchange(replaced_, {});
@@ -165,7 +166,8 @@ void PartialFolder::putIntoPlace() {
     if (old == aside) calls.rename(aside.c_str(), target_.c_str());
     throw;
   }
-  // The lock goes after the renaming: gone before, another conversion could take the folder for a dead one's.
+  // The lock is released after the rename. Otherwise another conversion could take the folder for an
+  // abandoned one.
   const int lock = std::exchange(lock_, -1);
   removeAll(target_ / kLockName);
   calls.close(lock);
@@ -173,7 +175,7 @@ void PartialFolder::putIntoPlace() {
 
 void PartialFolder::removeReplaced() {
   const fs::path old = std::exchange(replaced_, {});
-  if (!old.empty()) removeFolder(old, "old cache, whose place the new one has taken,");
+  if (!old.empty()) removeFolder(old, "old cache, which has been replaced,");
 }
 
 }  // namespace curvisplat

@@ -1,60 +1,60 @@
-// The folder in which a cache grows: NAME.partial beside NAME, locked while its conversion lives, renamed to
-// NAME when it is whole.
+// The folder in which a cache is written: NAME.partial beside NAME. It is locked while its conversion runs,
+// and renamed to NAME when the cache is complete.
 //
 //              PartialFolder()          putIntoPlace()
 //   (nothing) ----------------> locked ----------------> in place
 //    ^                          |    |
-//    +----- ~PartialFolder() ---+    +--- leave() and ~PartialFolder(), or killed: the folder stays,
-//                                         unlocked; the next PartialFolder() empties it, or keeps it
-//                                         to go on from
+//    +----- ~PartialFolder() ---+    +--- leave() and ~PartialFolder(), or the process is killed: the
+//                                         folder remains, unlocked. The next PartialFolder() empties it, or
+//                                         keeps its contents to continue the conversion.
 #pragma once
 
 #include <filesystem>
 
 namespace curvisplat {
 
-/// Throws Error if something stands at `target`, and `overwrite` is false or it is no cache.
+/// Throws Error if `target` exists, unless it is a cache and `overwrite` is true.
 void checkReplaceable(const std::filesystem::path& target, bool overwrite);
 
-/// Whether a conversion to `target` is under way, or was interrupted.
+/// Whether a conversion to `target` is running or was interrupted.
 bool hasUnfinished(const std::filesystem::path& target);
 
 class PartialFolder {
  public:
   enum class Rest { kRemove, kKeep };
 
-  /// Makes and locks the folder. What an unfinished conversion has left there is removed; or kept, and then
-  /// the folder is as after leave(). Throws Error unless checkReplaceable(), or if another conversion to the
-  /// same target is running.
+  /// Creates and locks the folder. `rest`: remove the files of an unfinished conversion, or keep them, which
+  /// implies leave(). Throws Error as checkReplaceable(), and if another conversion to `target` is running.
   PartialFolder(std::filesystem::path target, bool overwrite, Rest rest = Rest::kRemove);
-  /// Removes the folder, unless it has been put into place or is to be left.
+  /// Removes the folder, unless putIntoPlace() or leave() was called.
   ~PartialFolder();
   PartialFolder(const PartialFolder&) = delete;
   PartialFolder& operator=(const PartialFolder&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
-  /// Where the folder goes in the end.
+  /// The final name of the folder.
   const std::filesystem::path& target() const { return target_; }
 
-  /// Removes all that is in the folder, which the destructor will remove.
+  /// Removes the folder's contents, and undoes leave().
   void clear();
-  /// Whether the destructor leaves the folder, for a conversion that goes on with it.
+  /// Sets whether the destructor leaves the folder for a later conversion to continue.
   void leave(bool leave = true) { leave_ = leave; }
 
-  /// Renames the folder to the target, for good: the names are synced. An old cache there is swapped out in
-  /// the same step; where the file system cannot swap, it is moved aside first. If that fails, both are where
-  /// they were, and this throws Error. The folder's files must have been synced.
+  /// Renames the folder to the target and syncs the names, so that the cache survives a power loss. An old
+  /// cache at the target is exchanged with the folder in one step; if the file system cannot exchange names,
+  /// it is moved aside first. Throws Error on failure, after moving both back. The folder's files must have
+  /// been synced before.
   void putIntoPlace();
-  /// Whether putIntoPlace() has done so.
+  /// Whether putIntoPlace() has succeeded.
   bool isInPlace() const { return lock_ < 0; }
-  /// Removes the old cache that putIntoPlace() has swapped out, if there was one. Throws Error.
+  /// Removes the old cache that putIntoPlace() has replaced, if there was one. Throws Error.
   void removeReplaced();
 
  private:
   void lock();
 
   std::filesystem::path target_, path_;
-  std::filesystem::path replaced_;  // where the old cache is; empty: there is none
+  std::filesystem::path replaced_;  // path of the old cache; empty if there is none
   int lock_ = -1;
   bool leave_ = false;
 };

@@ -1,5 +1,4 @@
-// How streams and tables go into a cache's payload files; cache_format.h has the layout. Shared by all that
-// write one.
+// Appends streams and tables to payload files, for all code that writes one. cache_format.h has the layout.
 #pragma once
 
 #include <cstddef>
@@ -24,17 +23,17 @@ std::span<const std::byte> bytesOf(const Record& record) {
   return std::as_bytes(std::span(&record, 1));
 }
 
-/// Appends zeros up to the next page.
+/// Appends zeros up to the next page boundary.
 void padToPage(OutputFile& file);
 
-/// Appends a stream where cache_format.h wants it. Returns its offset.
+/// Appends a stream, aligned as cache_format.h describes. Returns its offset.
 uint64_t appendStream(OutputFile& file, std::span<const std::byte> stream);
 
-/// Makes a new file a var.<number>.bin: with the header's place, which finishVariableFile fills in.
+/// Begins a var.<number>.bin: reserves space for the header, which finishVariableFile() writes.
 void beginVariableFile(OutputFile& file);
 
-/// Appends the table, in the order of bricks.bin, writes the header, and closes the file. `name` is what the
-/// manifest will call it.
+/// Appends the table, writes the header and closes the file. `table` is in the order of bricks.bin. `name`:
+/// the file's name in the manifest. Returns the manifest's entry.
 FileInfo finishVariableFile(OutputFile& file, const std::string& name, std::span<const BrickVariable> table);
 
 }  // namespace curvisplat

@@ -42,12 +42,12 @@ VariableWriter::VariableWriter(const CacheLock& lock, Manifest manifest, std::ve
 }
 
 VariableWriter::~VariableWriter() {
-  // In a cache that has come in this one's place the same names are another's files.
+  // If another cache has replaced this one, files of these names are that cache's.
   if (in_place_ || !lock_->isStillThere()) return;
   for (const NewFile& file : files_) removeAll(file.is_renamed ? file.path : file.part);
 }
 
-/// Files of a program that was killed: the manifest does not know them.
+/// Removes the files that a killed program left behind: those that the manifest does not list.
 void VariableWriter::removeLeftovers() const {
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(lock_->cache(), ignored)) {
@@ -73,14 +73,17 @@ std::vector<FileInfo> VariableWriter::finish(const std::vector<std::string>& sou
   for (NewFile& file : files_)
     infos.push_back(finishVariableFile(file.file, variableFileName(file.variable), file.table));
   if (!lock_->isStillThere())
-    throw Error("{}: the cache was replaced meanwhile; it is left as it is now", lock_->cache().string());
+    throw Error(
+        "{}: another program has replaced the cache; the new cache was not changed: add the scalar to it "
+        "again",
+        lock_->cache().string());
   for (NewFile& file : files_) {
     if (SystemCalls::current().rename(file.part.c_str(), file.path.c_str()) < 0)
       throw Error("{}: cannot be renamed to {}: {}", file.part.string(), file.path.string(),
                   std::strerror(errno));
     file.is_renamed = true;
   }
-  // Names of payload files must be on the disk before a manifest that names them is.
+  // The names of the payload files must be on the disk before a manifest that lists them.
   syncDirectory(lock_->cache());
 
   for (const NewFile& file : files_) {

@@ -1,7 +1,7 @@
-// Adds variables to a cache that is whole: writes var.<number>.bin.part for each beside the cache's files,
-// and at the end renames them and replaces the manifest. No other file is touched. Until the manifest is
-// replaced the cache is what it was, and readers do not see the new files; what a killed program leaves of
-// them is removed by the next one.
+// Adds variables to a complete cache. Writes one var.<number>.bin.part per variable beside the cache's files;
+// at the end renames these files and replaces the manifest. No other file changes. Until the manifest is
+// replaced, readers see the old cache. Files that a killed program left behind are removed by the next
+// VariableWriter.
 #pragma once
 
 #include <cstdint>
@@ -18,19 +18,19 @@ namespace curvisplat {
 /// For one thread at a time.
 class VariableWriter {
  public:
-  /// `lock` must outlive it. `manifest`: the cache's, read while it was locked. `variables` get their numbers
-  /// here. Throws Error if a file cannot be made.
+  /// `lock` must outlive the writer. `manifest`: the cache's, read under the lock. Assigns the numbers of
+  /// `variables`. Throws Error if a file cannot be created.
   VariableWriter(const CacheLock& lock, Manifest manifest, std::vector<VariableInfo> variables);
-  /// Removes the new files unless finish() has put them into place.
+  /// Removes the new files unless finish() has succeeded.
   ~VariableWriter();
   VariableWriter(const VariableWriter&) = delete;
   VariableWriter& operator=(const VariableWriter&) = delete;
 
-  /// Appends the streams of a brick, one a variable. Bricks come in the order of conversion, each once.
+  /// Appends a brick's streams, one per variable. Each brick comes once, in the order of conversion.
   void append(uint32_t brick, std::span<const EncodedValues> values);
 
-  /// Writes the tables, syncs, and puts files and manifest into place. `sources`, those that the manifest
-  /// does not have yet, are added to it. Returns the new files.
+  /// Writes the tables, syncs, renames the files and replaces the manifest. Adds those `sources` to the
+  /// manifest that it does not list yet. Returns the manifest's entries for the new files.
   std::vector<FileInfo> finish(const std::vector<std::string>& sources);
 
  private:

@@ -52,7 +52,7 @@ void checkInput(const BrickSplats& brick) {
   CURVISPLAT_CHECK(fine && "every number is finite, axes are positive, positions are in the cell");
 }
 
-/// Position, shape and weight of every splat, as decoded.
+/// Fills position, shape and weight of every splat from the decoded arrays.
 void fillGeometry(const RootCube& root, const DecodedGeometry& decoded, BrickSplats& brick) {
   for (size_t n = 0; n < brick.size(); ++n) {
     Splat& splat = brick.splats[n];
@@ -116,11 +116,11 @@ EncodedValues encodeInRows(std::span<const Row> rows, std::span<SplatScalar> val
 void checkCount(const Brick& brick) {
   const auto& at = brick.cell.at;
   if (brick.splats == 0 || brick.splats > kMaxBrickSplats || brick.cell.level > kMaxLevel)
-    throw Error("the brick of level {}, cell {} {} {} has {} splats, not 1 to {}", brick.cell.level, at[0],
-                at[1], at[2], brick.splats, kMaxBrickSplats);
+    throw Error("the brick of level {}, cell {} {} {} has {} splats (expected 1 to {})", brick.cell.level,
+                at[0], at[1], at[2], brick.splats, kMaxBrickSplats);
 }
 
-/// Decodes, and puts the brick's cell before what goes wrong.
+/// Calls `decode` and prefixes its errors with the brick's cell.
 template <typename Decode>
 void decodeNaming(const Brick& brick, const char* stream, Decode decode) {
   checkCount(brick);
@@ -138,15 +138,15 @@ void toFloats(const std::vector<double>& from, float* to) {
   for (size_t n = 0; n < from.size(); ++n) to[n] = static_cast<float>(f[n]);
 }
 
-/// An axis too small for a float becomes the smallest one that divisions can bear.
+/// An axis too small for a float becomes the smallest normal float: smaller divisors would overflow.
 void toAxisFloats(const std::vector<double>& from, float* to) {
   const double* f = from.data();
   for (size_t n = 0; n < from.size(); ++n)
     to[n] = std::max(static_cast<float>(f[n]), std::numeric_limits<float>::min());
 }
 
-/// The middles of the intervals, from the cell's minimum corner; rounding must not carry them out of the
-/// cell.
+/// Centres of the position intervals, relative to the cell's minimum corner. `inside`: the largest float
+/// inside the cell, because rounding must not move a splat out of its cell.
 void toCoordinates(const std::vector<uint32_t>& from, double interval, float inside, float* to) {
   const uint32_t* f = from.data();
   for (size_t n = 0; n < from.size(); ++n)

@@ -1,19 +1,24 @@
-// The geometry stream of a brick: node runs, positions, shapes, weights.
+// The geometry stream of a brick: node runs, positions, shapes, weights and border codes.
 //
-//   GeometryHeader | zstd frame: runs (varints) | planes of x, y, z | planes of the shapes | planes of
-//   weights | planes of half cells
+//   GeometryHeader | zstd frame: node runs (varints)
+//                              | planes of x, y, z
+//                              | planes of ln a0, ln a1, ln volume, l21, l10, l20
+//                              | planes of the weights
+//                              | planes of the border codes
 //
-//   positions  the highest `position_bits` bits of the lattice position in the cell, decoded as the middle of
-//              their interval
-//   shapes     ln a0, ln a1 and ln(a0 a1 a2) in fixed steps; a2 follows, so that the volume is kept to 0.1 %
-//              whatever the axes lose. Then the shears l21, l10, l20, each in steps that shrink with the
-//              splat's own aspect ratio: what must be exact is A⁻¹ A', not A'. l20 makes up for what l10
-//              lost.
-//   weights    ln(V / (a0 a1 a2)) in fixed steps: 0 for a node's splat, 1 for V = 0
-//   half cells the four bytes of border_code.h's code, lowest first; only where a brick has any (kHasBorders)
+//   positions      the highest `position_bits` bits of the lattice position in the cell; decoded as the
+//                  middle of their interval
+//   shapes         ln a0, ln a1 and ln(a0 a1 a2) in fixed steps. a2 is derived from them, so that the volume
+//                  is accurate to 0.1 % whatever the errors of the axes. Then the shears l21, l10 and l20, in
+//                  steps that shrink with the splat's aspect ratio, because the error that counts is that of
+//                  A⁻¹ A', not that of A'. l20 compensates the rounding error of l10.
+//   weights        ln(V / (a0 a1 a2)) in fixed steps. Code 0 is V = a0 a1 a2, as for a node's splat; code 1
+//                  is V = 0.
+//   border codes   the four bytes of the code (stream/model/border_code.h), lowest first; absent (no
+//                  kHasBorders) if the brick has none
 //
-// Shapes or weights whose numbers do not fit are stored as raw 64-bit floats instead (kRawShapes,
-// kRawWeights).
+// Shapes or weights that do not fit these codes are stored as raw 64-bit floats (kRawShapes, kRawWeights).
+// stream/FORMAT.md has every formula.
 #pragma once
 
 #include <array>
@@ -35,15 +40,15 @@ struct GeometryHeader {
   uint8_t position_bits;                    //  0: 5..32
   uint8_t raw;                              //  1: kRawShapes, kRawWeights, kHasBorders
   uint16_t reserved;                        //  2: zero
-  uint32_t runs_bytes;                      //  4: of the varints, unpacked
-  double log_axis0, log_axis1, log_volume;  //  8: of the smallest, natural
-  std::array<ArrayCode, kLargestGeometryArrays>
-      arrays;                // 32: x y z, ln a0, ln a1, ln volume, l21 l10 l20, weight, half cells
+  uint32_t runs_bytes;                      //  4: length of the varints, unpacked
+  double log_axis0, log_axis1, log_volume;  //  8: natural logarithms of the brick's smallest a0, a1, volume
+  // 32: in the order of the planes: x, y, z, ln a0, ln a1, ln volume, l21, l10, l20, weight, border codes
+  std::array<ArrayCode, kLargestGeometryArrays> arrays;
   uint8_t more_reserved[6];  // 74: zero
 };                           // 80
 static_assert(sizeof(GeometryHeader) == 80);
 
-/// A brick's geometry, decoded in double; scratch that is used again.
+/// A brick's geometry, decoded in double. Reusable scratch memory.
 struct DecodedGeometry {
   int position_bits = 0;
   std::array<std::vector<uint32_t>, 3> position;  // in units of cell size / 2^position_bits
@@ -56,15 +61,16 @@ struct DecodedGeometry {
   void resize(size_t count);
 };
 
-/// Encodes, and fills `decoded` with what decodeGeometryStream will give. Throws nothing but bad_alloc.
+/// Encodes `brick` and fills `decoded` as decodeGeometryStream() will. Throws nothing but bad_alloc.
 std::vector<std::byte> encodeGeometryStream(const RootCube& root, const BrickSplats& brick,
                                             DecodedGeometry& decoded);
 
-/// Bytes are untrusted: throws Error for anything but `count` finite splats in `cell`.
+/// Decodes untrusted bytes: throws Error unless they hold exactly `count` finite splats in `cell`.
 void decodeGeometryStream(const Cell& cell, uint32_t count, std::span<const std::byte> bytes,
                           DecodedGeometry& out);
 
-/// The lattice position that position_bits bits of it stand for.
+/// The lattice position that `code`, the highest `position_bits` bits in the cell, stands for: the interval's
+/// middle.
 uint64_t latticePosition(uint32_t code, int position_bits, uint32_t level, uint32_t cell_at);
 
 }  // namespace curvisplat

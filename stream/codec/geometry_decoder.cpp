@@ -56,13 +56,13 @@ class GeometryDecoder {
       take(run.k), take(run.j), take(run.i), take(run.count);
       if (block > std::numeric_limits<uint32_t>::max() || run.count == 0 || run.count > count_ - total ||
           run.i > std::numeric_limits<uint64_t>::max() - run.count)
-        throw Error("run {} of its nodes is impossible", out_.runs.size());
+        throw Error("node run {} is invalid", out_.runs.size());
       run.block = static_cast<uint32_t>(block);
       total += run.count;
       out_.runs.push_back(run);
     }
     if (header_.runs_bytes != 0 && total != count_)
-      throw Error("its node runs hold {} nodes, not {}", total, count_);
+      throw Error("its node runs hold {} nodes (expected {})", total, count_);
     out_.rows = rowsOf(out_.runs, count_);
   }
 
@@ -74,7 +74,7 @@ class GeometryDecoder {
       readPredicted(position);
       for (uint32_t value : position) any |= value;
     }
-    if (static_cast<int>(std::bit_width(any)) > bits) throw Error("a position in it is outside the cell");
+    if (static_cast<int>(std::bit_width(any)) > bits) throw Error("a position is outside of the cell");
   }
 
   void decodeShapes() {
@@ -93,7 +93,7 @@ class GeometryDecoder {
     readPredicted(codes);
     uint32_t any = 0;
     for (uint32_t code : codes) any |= code;
-    if (any > kLargestLogCode) throw Error("a size in it is out of range");
+    if (any > kLargestLogCode) throw Error("the code of an axis or a volume is out of range");
     const LogTable table(base, step, any);
     for (size_t n = 0; n < count_; ++n) out[n] = table[codes[n]];
   }
@@ -109,8 +109,9 @@ class GeometryDecoder {
   void decodeWeights() {
     if (header_.raw & kRawWeights) return readRaw(out_.weight);
     auto& codes = GeometryDecoder::codes();
-    // Not predicted: what makes a weight differ from the volume has no order.
-    if (readResiduals(codes) != Predictor::kNone) throw Error("its weights are predicted");
+    // Weights that differ from the volume follow no pattern along the rows, so they are not predicted.
+    if (const Predictor predictor = readResiduals(codes); predictor != Predictor::kNone)
+      throw Error("its weight array has predictor {} (expected 0: none)", static_cast<int>(predictor));
     const LogTable& ratios = ratioTable();
     const double *a0 = out_.axis[0].data(), *a1 = out_.axis[1].data(), *a2 = out_.axis[2].data();
     double* weight = out_.weight.data();
@@ -118,7 +119,7 @@ class GeometryDecoder {
     for (size_t n = 0; n < count_; ++n) {
       if (codes[n] == kVolumeWeight) continue;
       const auto steps = static_cast<int32_t>(unzigzag(codes[n] - 1));
-      if (std::abs(steps) > kLargestWeightCode) throw Error("a weight in it is out of range");
+      if (std::abs(steps) > kLargestWeightCode) throw Error("the code of a weight is out of range");
       weight[n] =
           codes[n] == kZeroWeight ? 0 : weight[n] * ratios[static_cast<uint32_t>(steps + kLargestWeightCode)];
     }
@@ -138,20 +139,20 @@ class GeometryDecoder {
     }
     bool fine = any <= 0xff;
     for (uint32_t border_code : out_.border_code) fine &= isPossibleBorderCode(border_code);
-    if (!fine) throw Error("a half cell in it is impossible");
+    if (!fine) throw Error("a border code is invalid");
   }
 
-  /// Infinite or NaN numbers, and axes or weights that cannot be: one comparison an array element, no
-  /// branches.
+  /// Throws Error for infinite or NaN numbers, and for axes or weights out of range. One comparison per
+  /// element and no branches.
   void checkFinite() const {
-    constexpr double kLargest = std::numeric_limits<float>::max();  // floats is what they become
+    constexpr double kLargest = std::numeric_limits<float>::max();  // they are converted to floats
     bool fine = true;
     for (const auto& array : out_.axis)
       for (double value : array) fine &= value > 0 && value <= kLargest;
     for (const auto& array : out_.shear)
       for (double value : array) fine &= std::abs(value) <= kLargest;
     for (double value : out_.weight) fine &= value >= 0 && value <= kLargest;
-    if (!fine) throw Error("a splat in it has an impossible shape or weight");
+    if (!fine) throw Error("the shape or weight of a splat is not finite or not positive");
   }
 
   Predictor readResiduals(std::span<uint32_t> out) {
@@ -202,17 +203,19 @@ void DecodedGeometry::resize(size_t count) {
 void decodeGeometryStream(const Cell& cell, uint32_t count, std::span<const std::byte> bytes,
                           DecodedGeometry& out) {
   GeometryHeader header;
-  if (bytes.size() < sizeof header) throw Error("it has {} bytes, fewer than its header", bytes.size());
+  if (bytes.size() < sizeof header)
+    throw Error("it ends in its header (found {} bytes, expected at least {})", bytes.size(), sizeof header);
   std::memcpy(&header, bytes.data(), sizeof header);
   const int lattice_bits = kPositionBits - static_cast<int>(cell.level);
   if (header.position_bits < kMinPositionBits ||
       header.position_bits > std::min(kMaxPositionBits, lattice_bits))
-    throw Error("it has {} bits a position", header.position_bits);
+    throw Error("it has {} bits per position (expected {} to {})", header.position_bits, kMinPositionBits,
+                std::min(kMaxPositionBits, lattice_bits));
   if (header.raw > (kRawShapes | kRawWeights | kHasBorders) || header.runs_bytes > kMaxRunBytes * count)
-    throw Error("its header is impossible");
+    throw Error("its header is invalid");
   size_t unpacked = header.runs_bytes;
   for (size_t n = 0; n < arraysOf(header); ++n) {
-    if (!isPossible(header.arrays[n])) throw Error("its header is impossible");
+    if (!isPossible(header.arrays[n])) throw Error("its header is invalid");
     unpacked += size_t{header.arrays[n].planes} * count;
   }
   PlaneReader planes(bytes.subspan(sizeof header), unpacked);

@@ -13,7 +13,7 @@ namespace curvisplat {
 namespace {
 
 constexpr double kKernelDeviation = 0.44655;
-constexpr double kPositionError = 0.05;  // of the smallest standard deviation
+constexpr double kPositionError = 0.05;  // as a fraction of the smallest standard deviation
 constexpr double kLargestShearCode = 1e9;
 
 int positionBits(const RootCube& root, const Cell& cell, double smallest_axis) {
@@ -40,7 +40,7 @@ class GeometryEncoder {
     sample_ = sampleOf(decoded_.rows);
     encodeRuns();
     encodePositions();
-    // Shapes are tried first as they should be. What was already added is taken back if they don't fit.
+    // Try the compact codes first. If a shape does not fit them, discard what was added and store raw floats.
     const PlaneWriter planes = planes_;
     const size_t arrays = arrays_;
     if (!encodeShapes()) {
@@ -57,7 +57,7 @@ class GeometryEncoder {
   void encodeRuns() {
     std::vector<std::byte> bytes;
     NodeRun before;
-    // Differences as zigzag varints: rows one after another cost a byte a number.
+    // Differences as zigzag varints: consecutive rows take a byte per number.
     const auto put = [&](uint64_t now, uint64_t then) {
       const uint64_t difference = now - then;
       appendVarint(bytes, difference << 1 ^ (0 - (difference >> 63)));

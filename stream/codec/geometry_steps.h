@@ -1,4 +1,4 @@
-// What the geometry's encoder and decoder must agree on: ranges, and the steps in which numbers are stored.
+// Constants that the geometry's encoder and decoder share: the ranges of codes, and the quantisation steps.
 #pragma once
 
 #include <algorithm>
@@ -12,29 +12,30 @@
 
 namespace curvisplat {
 
-inline constexpr int kMinPositionBits = 5;  // merging's lattice of 32 voxels an axis
+inline constexpr int kMinPositionBits = 5;  // merging uses a lattice of 32 voxels per axis
 inline constexpr int kMaxPositionBits = 32;
 
-// Half a step is what a number can be off. With E = A⁻¹ A' - I lower triangular, |E00|, |E11| <= 0.0071,
-// |E22| <= 0.0149 (it makes up for both, and for half a volume step) and each shear's entry <= 0.0138, the
-// Frobenius norm of (I + E)(I + E)ᵀ - I, which bounds the spectral norm, is below 0.05.
+// The rounding error of a number is half a step. Let E = A⁻¹ A' - I, which is lower triangular. Then |E00|
+// and |E11| are at most 0.0071, |E22| at most 0.0149 (it compensates both, and adds half a volume step), and
+// the entries of the shears at most 0.0138. So the Frobenius norm of (I + E)(I + E)ᵀ - I, which bounds its
+// spectral norm, is below 0.05.
 inline constexpr double kAxisStep = 0.014;
 inline constexpr double kShearStep = 0.027;
 inline constexpr double kVolumeStep = 0.0016;
-// Weights of nodes agree with the decoded volume within half a volume step and are then coded as 0.
+// Larger than the volume's step, so that a node's weight rounds to the decoded volume, which is code 0.
 inline constexpr double kWeightStep = 0.0019;
 
 inline constexpr uint32_t kLargestLogCode = 0xffff;
 inline constexpr int kLargestWeightCode = 100000;  // a ratio of e^±190
 
-// Codes of weights: 0 is V = a0 a1 a2, 1 is V = 0, others are zigzag(steps) + 1.
+// Codes of weights: 0 for V = a0 a1 a2, 1 for V = 0, and zigzag(steps) + 1 for all others.
 inline constexpr uint32_t kVolumeWeight = 0, kZeroWeight = 1;
 
 inline constexpr size_t kMaxRunBytes = 50;  // five varints
 
-/// The steps of the shears of splat n, which depend on its decoded axes and, for l10, on its decoded l21: an
-/// error of l10 moves the third axis l21 times as far. Powers of two, so that neighbours mostly share them
-/// and their codes can be predicted.
+/// Quantisation steps of the shears of splat n. They depend on the splat's decoded axes. The step of l10 also
+/// depends on the decoded l21, because an error of l10 moves the third axis by l21 times as much. Steps are
+/// powers of two, so that neighbouring splats mostly share them and their codes can be predicted.
 struct ShearSteps {
   static double l21(const DecodedGeometry& d, size_t n) {
     return powerOfTwo(kShearStep * d.axis[2][n] / d.axis[1][n]);
@@ -48,7 +49,7 @@ struct ShearSteps {
   }
 
  private:
-  /// The largest that is not above `step` > 0: the exponent without the mantissa.
+  /// The largest power of two that is not above `step` (> 0): the mantissa is cleared.
   static double powerOfTwo(double step) {
     return std::bit_cast<double>(std::bit_cast<uint64_t>(step) & 0x7ff0000000000000);
   }

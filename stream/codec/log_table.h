@@ -1,5 +1,6 @@
-// e^(base + n step) for whole n, from two small tables: a product instead of an exponential, and the same
-// bits wherever it is computed.
+// e^(base + n step) for whole n, as the product of two entries of small tables. Faster than an exponential,
+// and the rounding is part of the format: encoder and decoder get the same bits (stream/FORMAT.md, "Tables of
+// exponentials").
 #pragma once
 
 #include <cmath>
@@ -11,7 +12,7 @@ namespace curvisplat {
 class LogTable {
  public:
   LogTable() = default;
-  /// For n in 0 .. largest. Costs about 64 + largest / 64 exponentials.
+  /// For n from 0 to `largest`. Costs about 64 + largest / 64 exponentials.
   LogTable(double base, double step, uint32_t largest) : coarse_((largest >> kFineBits) + 1), fine_(kFine) {
     for (uint32_t n = 0; n < kFine; ++n) fine_[n] = std::exp(n * step);
     for (uint32_t n = 0; n < coarse_.size(); ++n) coarse_[n] = std::exp(base + n * (kFine * step));

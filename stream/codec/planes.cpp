@@ -13,9 +13,9 @@
 namespace curvisplat {
 namespace {
 
-// Level 1 packs these planes as well as level 3 does (they are noise, not text) at twice the speed.
+// Level 1 compresses these planes as well as level 3 (they resemble noise, not text), at twice the speed.
 constexpr int kZstdLevel = 1;
-// Shorter planes share a block: its header and tables would cost more than they save.
+// Shorter planes share a block: a block's header and tables would cost more than they save.
 constexpr size_t kSmallestBlock = 2048;
 
 struct FreeCCtx {
@@ -38,7 +38,7 @@ ZSTD_DCtx* decompressor() {
 }
 
 size_t checked(size_t result) {
-  // With valid parameters and enough room only memory can be short.
+  // The parameters are valid and the output is large enough, so the only possible error is lack of memory.
   if (ZSTD_isError(result)) throw std::bad_alloc();
   return result;
 }
@@ -71,7 +71,7 @@ std::vector<std::byte> PlaneWriter::compress(std::span<const std::byte> header) 
   checked(ZSTD_CCtx_setPledgedSrcSize(context, bytes_.size()));
 
   std::vector<std::byte> out(header.begin(), header.end());
-  // A flushed block costs up to three bytes of header and what it had in its buffers.
+  // Each flushed block adds three bytes of header and whatever zstd had buffered.
   out.resize(header.size() + ZSTD_compressBound(bytes_.size()) + 64 * (ends_.size() + 1));
   ZSTD_outBuffer to{out.data(), out.size(), header.size()};
   size_t from = 0;
@@ -93,18 +93,19 @@ std::vector<std::byte> PlaneWriter::compress(std::span<const std::byte> header) 
 
 PlaneReader::PlaneReader(std::span<const std::byte> frame, size_t unpacked_bytes) {
   const unsigned long long stated = ZSTD_getFrameContentSize(frame.data(), frame.size());
-  if (stated != unpacked_bytes) throw Error("it does not begin a zstd frame of {} bytes", unpacked_bytes);
+  if (stated != unpacked_bytes)
+    throw Error("it does not begin with a zstd frame of {} unpacked bytes", unpacked_bytes);
   thread_local std::vector<std::byte> scratch;
   if (scratch.size() < unpacked_bytes) scratch.resize(unpacked_bytes);
   const size_t got =
       ZSTD_decompressDCtx(decompressor(), scratch.data(), unpacked_bytes, frame.data(), frame.size());
   if (ZSTD_isError(got)) throw Error("zstd cannot unpack it: {}", ZSTD_getErrorName(got));
-  if (got != unpacked_bytes) throw Error("it unpacks to {} bytes, not {}", got, unpacked_bytes);
+  if (got != unpacked_bytes) throw Error("it unpacks to {} bytes (expected {})", got, unpacked_bytes);
   rest_ = std::span(scratch).first(unpacked_bytes);
 }
 
 std::span<const std::byte> PlaneReader::bytes(size_t count) {
-  if (count > rest_.size()) throw Error("it ends early");
+  if (count > rest_.size()) throw Error("it is truncated");
   const auto taken = rest_.first(count);
   rest_ = rest_.subspan(count);
   return taken;
@@ -144,14 +145,14 @@ void appendVarint(std::vector<std::byte>& bytes, uint64_t value) {
 uint64_t takeVarint(std::span<const std::byte>& bytes) {
   uint64_t value = 0;
   for (int shift = 0; shift < 70; shift += 7) {
-    if (bytes.empty()) throw Error("a number in it does not end");
+    if (bytes.empty()) throw Error("a varint is truncated");
     const auto byte = static_cast<uint64_t>(bytes.front());
     bytes = bytes.subspan(1);
     if (shift == 63 && byte > 1) break;
     value |= (byte & 0x7f) << shift;
     if (byte < 0x80) return value;
   }
-  throw Error("a number in it does not fit 64 bits");
+  throw Error("a varint exceeds 64 bits");
 }
 
 }  // namespace curvisplat

@@ -1,6 +1,6 @@
-// Arrays of small integers as bytes: each array is cut into planes (all lowest bytes, then all second bytes,
-// ...), as many as its largest value needs, and the planes go through zstd, a block each, so that each has
-// its own statistics.
+// Arrays of small integers as compressed bytes. Each array is cut into byte planes (all lowest bytes, then
+// all second bytes, and so on), as many as its largest value needs. The planes are compressed by zstd, each
+// in its own block unless it is short, so that each has its own statistics.
 #pragma once
 
 #include <cstddef>
@@ -12,27 +12,27 @@
 
 namespace curvisplat {
 
-/// How one array is coded: a byte each in a stream's header.
+/// How one array is coded: two bytes of a stream's header.
 struct ArrayCode {
   Predictor predictor = Predictor::kNone;
   uint8_t planes = 0;
 };
 static_assert(sizeof(ArrayCode) == 2);
 
-/// False if untrusted bytes say something that no encoder would.
+/// Whether untrusted bytes are a valid code.
 inline bool isPossible(const ArrayCode& code) {
   return static_cast<int>(code.predictor) < kPredictors && code.planes <= 4;
 }
 
-/// Collects bytes and planes, and compresses them behind a header. Uses one zstd context a thread.
+/// Collects bytes and planes, and compresses them. Each thread has its own zstd context.
 class PlaneWriter {
  public:
-  /// Bytes as they are.
+  /// Adds bytes unchanged.
   void addBytes(std::span<const std::byte> bytes);
-  /// Adds `values`, and returns the number of planes (0..4) that they took.
+  /// Adds the planes of `values`. Returns their number (0 to 4).
   uint8_t add(std::span<const uint32_t> values);
 
-  /// `header`, then one zstd frame with everything added.
+  /// Returns `header`, followed by one zstd frame of everything added.
   std::vector<std::byte> compress(std::span<const std::byte> header) const;
 
  private:
@@ -40,24 +40,28 @@ class PlaneWriter {
   std::vector<size_t> ends_;  // of the planes in bytes_
 };
 
-/// Takes apart what a PlaneWriter has written. The bytes are untrusted: every call throws Error where they do
-/// not hold what is asked for. One at a time on a thread: the unpacked bytes lie in the thread's scratch.
+/// Unpacks the frame of a PlaneWriter. The bytes are untrusted: every function throws Error if they do not
+/// hold the requested data. A thread may use only one PlaneReader at a time, because the unpacked bytes are
+/// in the thread's scratch.
 class PlaneReader {
  public:
-  /// `frame` must unpack to exactly `unpacked_bytes`.
+  /// Throws Error unless `frame` unpacks to exactly `unpacked_bytes`.
   PlaneReader(std::span<const std::byte> frame, size_t unpacked_bytes);
 
+  /// The next `count` bytes.
   std::span<const std::byte> bytes(size_t count);
-  /// Joins `planes` (0..4) planes to values.size() integers.
+  /// Joins the next `planes` (0 to 4) planes to values.size() integers.
   void values(uint8_t planes, std::span<uint32_t> values);
 
  private:
   std::span<const std::byte> rest_;
 };
 
-/// Little-endian base 128: seven bits a byte, the highest bit says that more follow.
+/// Appends `value` in little-endian base 128: seven bits per byte; the highest bit is set in all bytes but
+/// the last.
 void appendVarint(std::vector<std::byte>& bytes, uint64_t value);
-/// Takes one off the front of `bytes`. Throws Error if it does not end or does not fit 64 bits.
+/// Removes a varint from the front of `bytes` and returns its value. Throws Error if it is truncated or
+/// exceeds 64 bits.
 uint64_t takeVarint(std::span<const std::byte>& bytes);
 
 }  // namespace curvisplat

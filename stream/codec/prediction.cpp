@@ -10,7 +10,7 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kSampleSplats = 4096;
-constexpr uint32_t kSampleRow = 256;  // longest piece of a row in a sample
+constexpr uint32_t kSampleRow = 256;  // splats per piece of a row in a sample
 
 auto rowKey(const NodeRun& run) {
   return std::tuple(run.block, run.k, run.j);
@@ -46,7 +46,8 @@ class RowCutter {
  private:
   using Key = std::tuple<uint32_t, uint64_t, uint64_t>;
 
-  /// Cuts run r by the runs of the row `above`. False, and nothing done, if none of them has its i.
+  /// Cuts run r at the ends of the runs of the row `above`. Returns false and adds nothing if none of them
+  /// overlaps it in i.
   bool cutBelow(size_t r, const Key& above) {
     const NodeRun& run = runs_[r];
     const uint64_t end = run.i + run.count;

@@ -1,9 +1,9 @@
-// Prediction of one array of a brick from its values before, along the rows of the grid. What is coded is
-// what the prediction misses.
+// Predicts the values of an array from earlier values, along and across the rows of the grid. Only the
+// prediction errors (residuals) are coded.
 //
-// A leaf's splats come in grid order: rows along i, then j, then k. A row's splats have neighbours in the row
-// above (j - 1, or k - 1 where that is not in the brick), so smooth data is predicted along i, across rows,
-// or both. An inner brick is one row with none above.
+// A leaf's splats are in grid order: rows along i, then j, then k. The splats of a row have neighbours in the
+// row above (j - 1, or k - 1 where that row is not in the brick), so smooth data can be predicted along i,
+// across rows, or both. An inner brick is a single row, with none above.
 #pragma once
 
 #include <cstddef>
@@ -17,8 +17,8 @@ namespace curvisplat {
 
 inline constexpr uint32_t kNoRow = 0xffffffff;
 
-/// Splats [first, first + count); above: the splat that is the first one's neighbour in the row before
-/// (above < first; the others' follow it), or kNoRow.
+/// Splats [first, first + count). `above`: the neighbour of splat `first` in the row above, or kNoRow. It is
+/// less than `first`; the neighbours of the row's other splats follow it.
 struct Row {
   uint32_t first = 0, count = 0, above = kNoRow;
   bool operator==(const Row&) const = default;
@@ -26,19 +26,20 @@ struct Row {
 
 enum class Predictor : uint8_t {
   kNone,         // 0
-  kPrevious,     // the value before
+  kPrevious,     // v[n-1]
   kLinear,       // 2 v[n-1] - v[n-2]
   kAbove,        // v[n-1] + up[n] - up[n-1]
   kAboveLinear,  // up[n] + 2 d[n-1] - d[n-2], d = v - up
 };
 inline constexpr int kPredictors = 5;
 
-/// The rows of a leaf of `count` splats: its runs, cut where the row above begins or ends. Runs that are not
-/// in grid order give rows without neighbours above. No runs: one row.
+/// The rows of a leaf of `count` splats: its runs, cut where runs of the row above begin or end. If the runs
+/// are not in grid order, no row has one above. Without runs there is one row.
 std::vector<Row> rowsOf(std::span<const NodeRun> runs, size_t count);
 
-/// Calls `step(n, predicted)` for all n in order; step returns values[n], which it may have just set. Numbers
-/// wrap around.
+/// Calls `step(n, predicted)` for all n in order. `step` must return values[n]; a decoder sets it in this
+/// call. Arithmetic is modulo 2^32. In a row without one above, kAbove and kAboveLinear predict as kLinear
+/// does.
 template <typename Step>
 void predictRows(Predictor predictor, std::span<const Row> rows, const uint32_t* values, Step step) {
   uint32_t before = 0;
@@ -78,13 +79,13 @@ void predictRows(Predictor predictor, std::span<const Row> rows, const uint32_t*
   }
 }
 
-/// Rows to try predictors on: enough of `rows` to tell them apart.
+/// A sample of `rows`, large enough to choose a predictor by.
 std::vector<Row> sampleOf(std::span<const Row> rows);
 
-/// The predictor with the fewest bits for `values`, judged on `sample`.
+/// The predictor whose residuals of `values` have the fewest bits, measured on `sample`.
 Predictor bestPredictor(std::span<const Row> sample, std::span<const uint32_t> values);
 
-/// Small for small differences of either sign: 0, -1, 1, -2, 2 ... give 0, 1, 2, 3, 4 ...
+/// Maps differences of small magnitude to small codes: 0, -1, 1, -2, 2, ... become 0, 1, 2, 3, 4, ...
 inline uint32_t zigzag(uint32_t difference) {
   return difference << 1 ^ (0u - (difference >> 31));
 }

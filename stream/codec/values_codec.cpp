@@ -14,9 +14,9 @@ namespace {
 constexpr double kMeanSteps = 65535;
 constexpr double kSlopeSteps = 8192;
 constexpr double kDeviationSteps = 4096;
-constexpr size_t kMaxRowBytes = 10;  // two varints of 32 bits
+constexpr size_t kMaxRowBytes = 10;  // two varints of up to 32 bits
 
-/// What codes stand for; encoder and decoder share it.
+/// The values that codes stand for. Shared by encoder and decoder.
 struct Scale {
   explicit Scale(const ValuesHeader& header)
       : lower(header.lower),
@@ -24,7 +24,7 @@ struct Scale {
         slope_step(header.slope_step),
         deviation_step(header.deviation_step) {}
 
-  // Signed conversions are the ones that vectorise.
+  // Converts from signed integers, which vectorises; conversion from unsigned ones does not.
   float mean(uint32_t code) const {
     return static_cast<float>(lower + static_cast<int32_t>(code) * mean_step);
   }
@@ -33,7 +33,7 @@ struct Scale {
     const double deviation = static_cast<int32_t>(code) * deviation_step;
     return bounded(deviation * deviation);
   }
-  /// As a float: squares of scalars above 1e19 are larger than any.
+  /// Limits a value to the range of floats: variances of scalars above 1e19 exceed it.
   static float bounded(double value) {
     constexpr double kLargest = std::numeric_limits<float>::max();
     return static_cast<float>(std::clamp(value, -kLargest, kLargest));
@@ -134,16 +134,16 @@ std::vector<Row> rowsFrom(std::span<const std::byte> bytes, uint32_t count) {
     const uint64_t length = takeVarint(bytes);
     const uint64_t distance = takeVarint(bytes);
     if (length == 0 || length > count - first || distance > first)
-      throw Error("row {} of its values is impossible", rows.size());
+      throw Error("row {} is invalid", rows.size());
     const uint32_t above = distance == 0 ? kNoRow : first - static_cast<uint32_t>(distance);
     rows.push_back({first, static_cast<uint32_t>(length), above});
     first += static_cast<uint32_t>(length);
   }
-  if (first != count) throw Error("its rows hold {} values, not {}", first, count);
+  if (first != count) throw Error("its rows hold {} values (expected {})", first, count);
   return rows;
 }
 
-/// One comparison an element, no branches.
+/// One comparison per element and no branches.
 bool allFinite(std::span<const float> values) {
   bool fine = true;
   for (float value : values) fine &= std::abs(value) <= std::numeric_limits<float>::max();
@@ -158,12 +158,13 @@ std::vector<std::byte> encodeValuesStream(std::span<const Row> rows, std::span<S
 
 void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, const VariableArrays<float>& out) {
   ValuesHeader header;
-  if (bytes.size() < sizeof header) throw Error("it has {} bytes, fewer than its header", bytes.size());
+  if (bytes.size() < sizeof header)
+    throw Error("it ends in its header (found {} bytes, expected at least {})", bytes.size(), sizeof header);
   std::memcpy(&header, bytes.data(), sizeof header);
-  if (header.rows_bytes > kMaxRowBytes * count) throw Error("its header is impossible");
+  if (header.rows_bytes > kMaxRowBytes * count) throw Error("its header is invalid");
   size_t unpacked = header.rows_bytes;
   for (const ArrayCode& array : header.arrays) {
-    if (!isPossible(array)) throw Error("its header is impossible");
+    if (!isPossible(array)) throw Error("its header is invalid");
     unpacked += size_t{array.planes} * count;
   }
   PlaneReader planes(bytes.subspan(sizeof header), unpacked);
@@ -180,7 +181,7 @@ void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, const 
       predictRows(header.arrays[array].predictor, rows, codes,
                   [codes](uint32_t n, uint32_t predicted) { return codes[n] += predicted; });
     for (size_t n = 0; n < count; ++n) values[n] = value(codes[n]);
-    if (!allFinite({values, count})) throw Error("a value in it is not finite");
+    if (!allFinite({values, count})) throw Error("a value is not finite");
   };
   const auto slope = [&](uint32_t code) { return scale.slope(code); };
   decode(0, out.mean, [&](uint32_t code) { return scale.mean(code); });

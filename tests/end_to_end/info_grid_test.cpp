@@ -68,7 +68,7 @@ TEST_F(InfoGrid, EveryPlot3dFileConvertsOrSaysWhyNot) {
     std::string refusal;  // "": converts
   } cases[] = {
       {{"plot3d_multi/multi.p3d"}, "", ""},
-      {{"plot3d_multi/test.p3d"}, "", "combxyz.bin, which is not there"},
+      {{"plot3d_multi/test.p3d"}, "", "combxyz.bin, which does not exist"},
       {{"plot3d_multi/mbwavelet_ascii.xyz", "plot3d_multi/mbwavelet_ascii.q"}, "112", ""},
       {{"plot3d_multi/multi-ascii.xyz", "plot3d_multi/multi-ascii.q"}, "pressure", ""},
       {{"plot3d_multi/multi-bin-C.xyz", "plot3d_multi/multi-bin-C.q"}, "211", ""},
@@ -78,7 +78,7 @@ TEST_F(InfoGrid, EveryPlot3dFileConvertsOrSaysWhyNot) {
       {{"combustor/combxyz.bin", "combustor/combq.bin"}, "velocity_magnitude", ""},
       {{"lox_post/postxyz.bin", "lox_post/postq.bin"}, "vorticity_magnitude", ""},
       {{"nek/leadingEdge_block.xyz"}, "jacobian", ""},
-      {{"nek/leadingEdge_block.xyz"}, "", "ask for one with --scalar"},
+      {{"nek/leadingEdge_block.xyz"}, "", "choose a derived one with --scalar"},
       {{"nek/leadingEdge_block.xyz", "nek/leadingEdge_block.fun"}, "", "number of variables is missing"},
       {{"fortran/sduct.new.x.bin"}, "j", ""},
       {{"delta_wing/delta_cfl3d.fmt"}, "volume", ""},

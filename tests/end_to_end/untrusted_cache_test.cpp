@@ -226,7 +226,7 @@ TEST_F(UntrustedCache, CountsTakeNoMemoryBeforeTheyAreTrue) {
     cache.manifest["bricks"] = 0x7fffffff;
     cache.bricks_bytes = sizeof(BricksHeader) + uint64_t{0x7fffffff} * sizeof(BrickRecord);
   });
-  expectRefused("bytes are too many", [](HostileCache& cache) {
+  expectRefused("is too long for", [](HostileCache& cache) {
     cache.bricks[5].geometry_offset = cache.geometry.size();
     cache.bricks[5].geometry_length = 0xf0000000;
     cache.geometry_bytes = cache.geometry.size() + 0xf0000000;
@@ -288,15 +288,15 @@ class Bomb {
 TEST_F(UntrustedCache, StreamsUnpackToWhatTheirRecordAllows) {
   constexpr size_t kBrick = 12;
   constexpr uint64_t kHuge = uint64_t{64} << 20;  // of zeros: 2 KiB packed
-  expectBrickRefused("does not begin a zstd frame of", [](HostileCache& cache) {
+  expectBrickRefused("does not begin with a zstd frame of", [](HostileCache& cache) {
     const Bomb bomb(cache, kBrick);
     cache.replaceGeometry(kBrick, bomb.stream(bomb.header(), kHuge));
   });
-  expectBrickRefused("does not begin a zstd frame of", [](HostileCache& cache) {
+  expectBrickRefused("does not begin with a zstd frame of", [](HostileCache& cache) {
     const Bomb bomb(cache, kBrick);
     cache.replaceGeometry(kBrick, bomb.stream(bomb.header(), kHuge, false));
   });
-  expectBrickRefused("header is impossible", [](HostileCache& cache) {
+  expectBrickRefused("header is invalid", [](HostileCache& cache) {
     const Bomb bomb(cache, kBrick);
     GeometryHeader header = bomb.header();
     header.runs_bytes = static_cast<uint32_t>(kHuge);
@@ -323,7 +323,7 @@ TEST_F(UntrustedCache, TheTreeIsATree) {
   expectRefused("its parent is brick", [](HostileCache& cache) { cache.bricks[9].parent = 20; });
   expectRefused("root with a parent", [](HostileCache& cache) { cache.bricks[0].parent = 1; });
   expectRefused("leaf with a child", [](HostileCache& cache) { cache.bricks.back().first_child = 0; });
-  expectRefused("has other children", [](HostileCache& cache) { cache.bricks[9].parent = 2; });
+  expectRefused("does not have it as a child", [](HostileCache& cache) { cache.bricks[9].parent = 2; });
   // One child of two.
   expectRefused("roots and", [](HostileCache& cache) {
     cache.bricks[1].child_count = cache.bricks[2].first_child + 1 - cache.bricks[1].first_child;
@@ -338,17 +338,16 @@ TEST_F(UntrustedCache, NumbersAreNumbers) {
   expectRefused("largest radius", [&](HostileCache& cache) { cache.bricks[2].largest_radius = nan; });
   expectRefused("largest radius", [&](HostileCache& cache) { cache.bricks[2].largest_radius = infinite; });
   expectRefused("its error is", [&](HostileCache& cache) { cache.bricks[2].error = nan; });
-  expectRefused("is impossible", [&](HostileCache& cache) { cache.variables[2].min = nan; });
-  expectRefused("is impossible",
-                [&](HostileCache& cache) { cache.variables[2].largest_deviation = infinite; });
+  expectRefused("is invalid", [&](HostileCache& cache) { cache.variables[2].min = nan; });
+  expectRefused("is invalid", [&](HostileCache& cache) { cache.variables[2].largest_deviation = infinite; });
   // Where the far corner of the cube is infinite, no box is outside of it.
-  expectRefused("three numbers up to", [&](HostileCache& cache) {
+  expectRefused("three numbers of magnitude up to", [&](HostileCache& cache) {
     cache.manifest["root"]["min"] = {1.7e308, 1.7e308, 1.7e308};
     cache.manifest["root"]["size"] = 1.7e308;
     for (BrickRecord& brick : cache.bricks)
       std::fill_n(brick.lower, 3, INFINITY), std::fill_n(brick.upper, 3, INFINITY);
   });
-  expectRefused("three numbers up to", [](HostileCache& cache) {
+  expectRefused("three numbers of magnitude up to", [](HostileCache& cache) {
     cache.manifest["upper"] = {1e200, 1e200, 1e200};
   });
 }

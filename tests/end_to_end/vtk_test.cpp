@@ -28,7 +28,7 @@ TEST_F(VtkProgram, TellsOfTimeStepsUnlessOneIsChosen) {
   ProgramResult result = convert(kMade + "series.pvd");
   ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_NE(
-      result.err.find("note: 3 time steps from 0.5 to 4; the first is taken: choose with --time-step 0..2"),
+      result.err.find("note: 3 time steps from 0.5 to 4; using the first: choose with --time-step 0..2"),
       std::string::npos)
       << result.err;
   EXPECT_EQ(CacheReader(cache_).manifest().steps.at(0).time, 0.5);

@@ -166,7 +166,7 @@ TEST(CellConvert, RefusesNodesAndCellsInOneCache) {
   const std::string error = errorOf([&] {
     convertQuietly(scene.source, optionsFor(folder / "c.splats", {0, 1}));
   });
-  EXPECT_NE(error.find("f stands at nodes and c0 in cells"), std::string::npos) << error;
+  EXPECT_NE(error.find("f is node-centred, but c0 is cell-centred"), std::string::npos) << error;
   EXPECT_FALSE(std::filesystem::exists(folder / "c.splats"));
 }
 

@@ -169,7 +169,7 @@ TEST_F(CgnsHostileAttributes, LinksInCirclesAreRefused) {
     Hdf5Editor editor(file);
     linked(editor, kGrid, std::string(kGrid) + "/ link");  // of HDF5's own kind
   }
-  expect("what it links to cannot be read as CGNS (HDF5: too many links)");
+  expect("the target of its link cannot be read as CGNS (HDF5: too many links)");
   copy();
   Hdf5Editor(file).softLink("/Base/Loop", "/Base/Loop");
   expect("/Base/Loop: the node cannot be read as CGNS");
@@ -202,13 +202,13 @@ TEST_F(CgnsHostileAttributes, ManyNamesForTheSameNodesAreBounded) {
       editor.hardLink(kArray, "/Base/Zone/Solution/Density " + number);
     }
   }
-  expectError(file, "more than there is room for");
+  expectError(file, "more than the files can hold");
 }
 
 TEST_F(CgnsHostileAttributes, AnHdf5FileCalledCgnsSaysWhatItLacks) {
   const std::filesystem::path file = folder_ / "roms.cgns";
   roms::write(file, NetcdfFileType::kNetcdf4, "ocean_s_coordinate_g2");
-  expectError(file, "the root has an attribute 'type' of 22 bytes; expected a text of at most 3 bytes");
+  expectError(file, "the root has an attribute 'type' of 22 bytes; expected text of at most 3 bytes");
 }
 
 TEST_F(CgnsHostileAttributes, ANetcdfFileWithALongGlobalTypeIsNetcdf) {

@@ -229,7 +229,7 @@ TEST_P(Cgns, StepsAreThoseOfTheIterativeData) {
   EXPECT_EQ(second->description().time_step, 1u);
   expectValues(*second, 0, {0, 2, 0, 2}, 0, linear(1), 64);
   EXPECT_TRUE(open(2)->description().scalars.empty());
-  EXPECT_NE(errorOf(3).find("has 3 time steps; --time-step 3 is none of them"), std::string::npos)
+  EXPECT_NE(errorOf(3).find("has 3 time steps; --time-step 3 is out of range"), std::string::npos)
       << errorOf(3);
 }
 
@@ -295,7 +295,7 @@ TEST_P(Cgns, ZonesWithoutTheFieldAreNotDrawnAndNamed) {
   const auto source = open();
   ASSERT_EQ(source->description().warnings.size(), 1u);
   EXPECT_EQ(source->description().warnings[0],
-            "1 of 2 zones (Bare) have no Density: with it, they are not drawn");
+            "1 of 2 zones (Bare) have no Density; they are not drawn with it");
   const NodeArrays full = readAll(*source, 0, {0}), bare = readAll(*source, 1, {0});
   for (const float value : full.scalars[0]) EXPECT_FALSE(std::isnan(value));
   for (const float value : bare.scalars[0]) EXPECT_TRUE(std::isnan(value));
@@ -317,9 +317,9 @@ TEST_P(Cgns, WhatIsNotDrawnIsNamed) {
   ASSERT_EQ(source->description().blocks.size(), 1u);
   EXPECT_TRUE(source->description().scalars.empty());
   const std::vector<std::string> expected = {
-      "Base/Zone/Faces is left out: its values stand at IFaceCenter; those at Vertex and CellCenter are read",
+      "Base/Zone/Faces is left out: its GridLocation is IFaceCenter; expected Vertex or CellCenter",
       "left out: 1 zone of a single plane of nodes (volumes are needed): Base/Plane (4x3x1)",
-      "left out: 1 zone unstructured (structured ones are read): Base/Tetrahedra",
+      "left out: 1 zone unstructured (only structured zones are read): Base/Tetrahedra",
       "left out: 1 zone without coordinates: Base/Empty"};
   EXPECT_EQ(source->description().warnings, expected);
 }
@@ -330,7 +330,7 @@ TEST_P(Cgns, NothingToDrawIsAnError) {
     file.base("Base");
     file.unstructuredZone("Tetrahedra");
   }
-  EXPECT_NE(errorOf().find("1 zone unstructured (structured ones are read): Base/Tetrahedra"),
+  EXPECT_NE(errorOf().find("1 zone unstructured (only structured zones are read): Base/Tetrahedra"),
             std::string::npos)
       << errorOf();
   {
@@ -389,7 +389,7 @@ TEST_P(Cgns, ASolutionFileBesideItIsRefused) {
     openGrid(options);
     FAIL();
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("holds scalars itself"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("contains its own scalars"), std::string::npos) << error.what();
   }
 }
 

@@ -71,7 +71,7 @@ TEST_F(OpenGrid, RefusesUnknownScalarsWithTheListOfThem) {
     EXPECT_NE(error.find("there are p (1), T (2)"), std::string::npos) << error;
   }
   EXPECT_NE(usageErrorOf(source->description(), {"T", "2"}).find("twice"), std::string::npos);
-  EXPECT_NE(usageErrorOf(open({})->description(), {}).find("the files hold no scalar"), std::string::npos);
+  EXPECT_NE(usageErrorOf(open({})->description(), {}).find("the files contain no scalar"), std::string::npos);
 }
 
 TEST_F(OpenGrid, NamesThatClashCarryTheirFile) {

@@ -175,7 +175,8 @@ TEST(Plot3dDamage, TruncatedFilesSayWhatWasExpected) {
   file.resize(4000);
   const std::string error = errorOf(folder, file);
   EXPECT_NE(error.find("4000 bytes fit no PLOT3D grid"), std::string::npos) << error;
-  EXPECT_NE(error.find("9x8x7 should have bytes: 6060 (single precision, no iblank)"), std::string::npos)
+  EXPECT_NE(error.find("9x8x7: found 4000 bytes; expected 6060 (single precision, no iblank)"),
+            std::string::npos)
       << error;
 
   Plot3dLayout fortran = layout;
@@ -183,7 +184,7 @@ TEST(Plot3dDamage, TruncatedFilesSayWhatWasExpected) {
   file = plot3dBytes(fortran, {testBlock(9, 8, 7, 0)});
   file.resize(4000);
   const std::string record_error = errorOf(folder, file);
-  EXPECT_NE(record_error.find("block 1 of 9x8x7 nodes: the record at byte 20 should have 6048 bytes"),
+  EXPECT_NE(record_error.find("block 1 of 9x8x7 nodes: the record at byte 20 declares 6048 bytes"),
             std::string::npos)
       << record_error;
 }
@@ -201,7 +202,7 @@ TEST(Plot3dDamage, PlanesFormatIsRefusedByName) {
     appendRecord(file, plane, layout);
   }
   const std::string error = errorOf(folder, file);
-  EXPECT_NE(error.find("only the whole format"), std::string::npos) << error;
+  EXPECT_NE(error.find("expected the whole format"), std::string::npos) << error;
 }
 
 TEST(Plot3dDamage, NoiseInTheRightSizeIsRefused) {
@@ -211,7 +212,7 @@ TEST(Plot3dDamage, NoiseInTheRightSizeIsRefused) {
   for (const int32_t n : {6, 5, 4}) appendNumber(file, n, kLittle);
   for (int n = 0; n < 3 * 6 * 5 * 4; ++n) appendNumber(file, static_cast<uint32_t>(random()), kLittle);
   const std::string error = errorOf(folder, file);
-  EXPECT_NE(error.find("no plausible values"), std::string::npos) << error;
+  EXPECT_NE(error.find("implausible values"), std::string::npos) << error;
 }
 
 TEST(Plot3dDamage, SolutionOfOtherDimensionsNamesBoth) {
@@ -221,7 +222,7 @@ TEST(Plot3dDamage, SolutionOfOtherDimensionsNamesBoth) {
   layout.kind = Plot3dKind::kQ;
   const Bytes q = plot3dBytes(layout, {testBlock(6, 5, 4, 5), testBlock(3, 3, 2, 5)});
   const std::string error = errorOf(folder, grid, &q);
-  EXPECT_NE(error.find("solution has 2 blocks (6x5x4, 3x3x2), but the grid"), std::string::npos) << error;
+  EXPECT_NE(error.find("solution of 2 blocks (6x5x4, 3x3x2), but the grid"), std::string::npos) << error;
   EXPECT_NE(error.find("2 blocks (6x5x4, 3x3x3)"), std::string::npos) << error;
 }
 

@@ -72,22 +72,23 @@ TEST_F(Plot3dMeta, RefusesWhatIsWrongByItsKey) {
     return "{" + entry + R"(, "filenames": [{"xyz": "a.xyz"}]})";
   };
   EXPECT_EQ(errorOf(with(R"("gamma": 1.4)")), "");
-  for (const auto& [entry, wanted] : std::vector<std::pair<std::string, std::string>>{
-           {R"("2D": true)", "only 3-D"},
-           {R"("byte-order": "middle")", "'byte-order' should be"},
-           {R"("byte-order": 3)", "'byte-order' should be"},
-           {R"("precision": 16)", "32 or 64"},
-           {R"("gamma": "x")", "'gamma' should be a finite number"},
-           {R"("multi-grid": 1)", "true or false"},
-           {R"("function-names": "u")", "an array of texts"},
-           {R"("byte-order": "little")", "a.xyz"}}) {
+  for (const auto& [entry, wanted] :
+       std::vector<std::pair<std::string, std::string>>{{R"("2D": true)", "only 3-D"},
+                                                        {R"("byte-order": "middle")", "'byte-order' is"},
+                                                        {R"("byte-order": 3)", "'byte-order' is"},
+                                                        {R"("precision": 16)", "32 or 64"},
+                                                        {R"("gamma": "x")", "expected a finite number"},
+                                                        {R"("multi-grid": 1)", "true or false"},
+                                                        {R"("function-names": "u")", "an array of strings"},
+                                                        {R"("byte-order": "little")", "a.xyz"}}) {
     const std::string error = errorOf(with(entry));
     EXPECT_NE(error.find(wanted), std::string::npos) << entry << ": " << error;
   }
   for (const char* text : {"{}", R"({"filenames": []})", R"({"filenames": [1]})", R"({"filenames": [{}]})",
                            R"({"filenames": [{"xyz": ""}]})", "{", "{]", R"({"filenames": [{"xyz": 7}]})"})
     EXPECT_NE(errorOf(text), "") << text;
-  EXPECT_NE(errorOf(R"({"filenames": [{"xyz": "none.xyz"}]})").find("which is not there"), std::string::npos);
+  EXPECT_NE(errorOf(R"({"filenames": [{"xyz": "none.xyz"}]})").find("which does not exist"),
+            std::string::npos);
 }
 
 TEST_F(Plot3dMeta, OfAnyDamageIsAnErrorOrReadsTheSameNodes) {

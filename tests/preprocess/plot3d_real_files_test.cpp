@@ -194,8 +194,8 @@ TEST_F(RealFiles, MetaFileNamesItsFiles) {
   EXPECT_EQ(dims(source->description()), "8x12x12 8x12x12");
   EXPECT_EQ(source->description().scalars.size(), 5u);
   ASSERT_EQ(source->description().warnings.size(), 1u);
-  EXPECT_NE(source->description().warnings[0].find("multi-bin.f, which is not there"), std::string::npos);
-  EXPECT_NE(errorOf("plot3d_multi/test.p3d").find("combxyz.bin, which is not there"), std::string::npos);
+  EXPECT_NE(source->description().warnings[0].find("multi-bin.f, which does not exist"), std::string::npos);
+  EXPECT_NE(errorOf("plot3d_multi/test.p3d").find("combxyz.bin, which does not exist"), std::string::npos);
 }
 
 TEST_F(RealFiles, NekFunctionFile) {
@@ -276,7 +276,7 @@ TEST_F(RealFiles, ForeignFilesAreNamed) {
   EXPECT_NE(errorOf("bluntfin/bluntfinxyz.bin", {"cgns/sqnz_s.adf.cgns"}).find("ADF"), std::string::npos);
   EXPECT_NE(errorOf("bluntfin/bluntfinxyz.bin", {"cgns/sqnz_s.hdf.cgns"}).find("HDF5"), std::string::npos);
   EXPECT_NE(errorOf("README.md").find("a number was expected"), std::string::npos);
-  EXPECT_NE(errorOf("bluntfin").find("is a folder"), std::string::npos);
+  EXPECT_NE(errorOf("bluntfin").find("is a directory"), std::string::npos);
   EXPECT_NE(errorOf("bluntfin/missing.xyz").find("cannot be opened"), std::string::npos);
 }
 

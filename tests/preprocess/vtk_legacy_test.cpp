@@ -105,31 +105,30 @@ TEST_F(VtkLegacy, PartsThatLieAreNamed) {
   const std::string rectilinear =
       "DATASET RECTILINEAR_GRID\nDIMENSIONS 2 2 2\nX_COORDINATES 2 float\n0 1\nY_COORDINATES 2 float\n0 1\n";
   const std::tuple<std::string, const char*> cases[] = {
-      {"DATASET UNSTRUCTURED_GRID\nPOINTS 1 float\n0 0 0\n", "holds a UNSTRUCTURED_GRID"},
-      {"DATUM STRUCTURED_GRID\n", "\"datum\" where DATASET is expected"},
+      {"DATASET UNSTRUCTURED_GRID\nPOINTS 1 float\n0 0 0\n", "is a UNSTRUCTURED_GRID"},
+      {"DATUM STRUCTURED_GRID\n", "found \"datum\"; expected DATASET"},
       {grid + "POINTS 8 float\n", "has points before DIMENSIONS"},
-      {grid + "DIMENSIONS 2 2\n", "\"\" where a count is expected"},
+      {grid + "DIMENSIONS 2 2\n", "found \"\"; expected a count"},
       {grid + "DIMENSIONS 2 2 0\n", "DIMENSIONS 2 2 0"},
       {grid + "DIMENSIONS 2 2 99999999999999\n", "three counts of nodes"},
-      {grid + "DIMENSIONS 1000000000 1000000000 2\n", "more than any file"},
+      {grid + "DIMENSIONS 1000000000 1000000000 2\n", "expected at most"},
       {grid + "DIMENSIONS 2 2 2\nDIMENSIONS 2 2 2\n", "a second DIMENSIONS"},
       {grid + "DIMENSIONS 2 2 2\n", "has no POINTS"},
       {grid + "DIMENSIONS 2 2 2\nPOINTS 7 float\n", "has 7 POINTS; expected 8"},
       {grid + "DIMENSIONS 2 2 2\nPOINTS 8 floot\n", "has type floot"},
-      {grid + "DIMENSIONS 2 2 2\nPOINTS 8 float\n1 2 3\n", "should have 24 numbers, but 6 bytes are left"},
+      {grid + "DIMENSIONS 2 2 2\nPOINTS 8 float\n1 2 3\n", "needs 24 numbers, but only 6 bytes are left"},
       {grid + "DIMENSIONS 2 2 2\nPOINTS 8 float\n" + twelve_ + "1 2 3 four 5 6 7 8 9 10 11 12",
-       "\"four\" where a number"},
-      {grid + "DIMENSIONS 1000 1000 1000\nPOINTS 1000000000 float\n1 2 3\n",
-       "should have 3000000000 numbers"},
+       "\"four\"; expected a number"},
+      {grid + "DIMENSIONS 1000 1000 1000\nPOINTS 1000000000 float\n1 2 3\n", "needs 3000000000 numbers"},
       {rectilinear + "Z_COORDINATES 3 float\n0 1 2\n", "has 3 z_coordinates; expected 2"},
-      {rectilinear, "lacks one of X_COORDINATES"},
-      {uniform_ + "POINT_DATA 11\n", "has POINT_DATA for 11 nodes; expected 12"},
-      {uniform_ + "CELL_DATA 3\n", "has CELL_DATA for 3 cells; expected 2"},
+      {rectilinear, "has no X_COORDINATES"},
+      {uniform_ + "POINT_DATA 11\n", "has POINT_DATA 11; expected 12"},
+      {uniform_ + "CELL_DATA 3\n", "has CELL_DATA 3; expected 2"},
       {uniform_ + "POINT_DATA 12\nSCALARS p float 99999\n" + twelve_, "99999 components"},
       {uniform_ + "POINT_DATA 12\nSCALARS p\n" + twelve_, "without a type"},
-      {uniform_ + "POINT_DATA 12\nSCALERS p float\n", "has \"scalers\" where SCALARS"},
+      {uniform_ + "POINT_DATA 12\nSCALERS p float\n", "found \"scalers\"; expected SCALARS"},
       {uniform_ + "POINT_DATA 12\nSCALARS p float\n0 1 2 3 4 5 6 7 8 9 10\n", "is truncated"},
-      {"FIELD f 9999999\n", "ends where a name is expected"},
+      {"FIELD f 9999999\n", "ends where a name was expected"},
       {uniform_ + "SPACING 1 1 nan\n", "has spacing nan"},
   };
   for (const auto& [content, words] : cases) {
@@ -139,9 +138,9 @@ TEST_F(VtkLegacy, PartsThatLieAreNamed) {
     EXPECT_EQ(error.find('\n'), std::string::npos) << error;
   }
   EXPECT_NE(errorOf(uniform_, "OCTAL").find("expected ASCII or BINARY"), std::string::npos);
-  EXPECT_NE(errorOf(uniform_ + "POINT_DATA 12\nVECTORS v double\n12345678", "BINARY")
-                .find("should have 36 numbers"),
-            std::string::npos);
+  EXPECT_NE(
+      errorOf(uniform_ + "POINT_DATA 12\nVECTORS v double\n12345678", "BINARY").find("needs 36 numbers"),
+      std::string::npos);
 }
 
 }  // namespace

@@ -201,7 +201,7 @@ TEST(Cache, OverwritesNothingButCaches) {
   const fs::path path = folder.path() / "mine";
   fs::create_directory(path);
   overwriteFile(path / "thesis.tex", "years");
-  EXPECT_PRED2(says, errorOf([&] { SmallCache().write(path, true); }), "not a whole splat cache");
+  EXPECT_PRED2(says, errorOf([&] { SmallCache().write(path, true); }), "not a complete splat cache");
   EXPECT_TRUE(fs::exists(path / "thesis.tex"));
 }
 

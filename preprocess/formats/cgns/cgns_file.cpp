@@ -17,15 +17,15 @@ namespace curvisplat {
 namespace {
 
 constexpr std::string_view kHdf5Mark = "\x89HDF\r\n\x1a\n";
-// Names and labels have at most 32 characters. libcgns copies what a damaged file has.
+// Names and labels have at most 32 characters, but libcgns copies whatever length a damaged file has.
 constexpr size_t kTextRoom = 4096;
-// What is read at a time from ADF files, where types are converted here.
+// Elements that are read from an ADF file at a time; their types are converted here.
 constexpr uint64_t kPieceElements = 1 << 16;
-// Times, units, names: nothing small has more elements.
+// Limit for arrays that are read whole: times, units, names.
 constexpr uint64_t kMaxSmallElements = 1 << 22;
-// Deflate, which HDF5 files are compressed with, makes a thousandth of zeros.
+// Deflate, the compression of HDF5 files, shrinks zeros to about a thousandth.
 constexpr uint64_t kMaxCompression = 1100;
-// A node takes at least so much of a file.
+// Smallest size of a node in a file.
 constexpr uint64_t kMinNodeBytes = 32;
 constexpr int kMaxDimensions = 12;
 
@@ -69,7 +69,7 @@ void convert(std::string_view type, const std::byte* from, uint64_t count, Value
   convert<int64_t>(from, count, to);
 }
 
-/// The first 32 bytes; fewer of a shorter file are none.
+/// The first 32 bytes; zeros if the file is shorter.
 std::string beginOf(const InputFile& file) {
   std::string begin(32, '\0');
   if (file.size() >= begin.size()) file.readAt(0, std::span(begin.data(), begin.size()));
@@ -105,7 +105,7 @@ uint64_t CgnsShape::count() const {
   return product;
 }
 
-/// libcgns' number of a node, for the time of a call. The lock must be held.
+/// Holds libcgns' id of a node for the duration of a call. The lock must be held.
 class CgnsFile::OpenNode {
  public:
   OpenNode(const CgnsFile& file, const std::string& path) : file_(file.file_) {
@@ -142,7 +142,7 @@ CgnsFile::CgnsFile(std::filesystem::path path) : path_(std::move(path)) {
   if (cgio_get_root_id(file_, &root_) != CGIO_ERR_NONE) {
     const std::string message = lastMessage();
     cgio_close_file(file_);
-    throw Error("{}: cannot be opened as a CGNS file: {}; copy or write it again", path_.string(), message);
+    throw Error("{}: cannot open as a CGNS file: {}; copy or write it again", path_.string(), message);
   }
 }
 
@@ -175,7 +175,7 @@ std::vector<CgnsNode> CgnsFile::children(const CgnsNode& node) const {
   if (cgio_number_children(file_, open.id(), &count) != CGIO_ERR_NONE) fail(node.path);
   if (count <= 0) return {};
   if (!node.linked && static_cast<uint64_t>(count) > bytes_ / kMinNodeBytes)
-    damaged(node.path, fmt::format("should have {} nodes below it, more than the file has room for", count));
+    damaged(node.path, fmt::format("declares {} child nodes, more than the file can hold", count));
 
   std::vector<double> ids(static_cast<size_t>(count), -1);
   int found = 0;
@@ -186,7 +186,7 @@ std::vector<CgnsNode> CgnsFile::children(const CgnsNode& node) const {
   for (const double id : ids) {
     char name[kTextRoom] = {}, label[kTextRoom] = {};
     int link_length = 0;
-    // What a link leads to may be missing: that matters to whoever needs it.
+    // The target of a link may be missing; that is an Error only when its data are read.
     const bool readable = cgio_get_name(file_, id, name) == CGIO_ERR_NONE &&
                           cgio_is_link(file_, id, &link_length) == CGIO_ERR_NONE &&
                           (cgio_get_label(file_, id, label) == CGIO_ERR_NONE || link_length > 0);
@@ -195,8 +195,8 @@ std::vector<CgnsNode> CgnsFile::children(const CgnsNode& node) const {
     cgio_release_id(file_, id);
   }
   const std::string place = node.path.empty() ? "the root" : node.path;
-  if (found != count) damaged(place, fmt::format("has {} nodes below it, and {} can be found", count, found));
-  if (!error.empty()) damaged(place, "has a node below it that cannot be read: " + error);
+  if (found != count) damaged(place, fmt::format("declares {} child nodes, but {} were found", count, found));
+  if (!error.empty()) damaged(place, "has a child node that cannot be read: " + error);
   return nodes;
 }
 
@@ -209,7 +209,7 @@ CgnsShape CgnsFile::storedShape(const OpenNode& open, const CgnsNode& node) cons
   int dimensions = 0;
   if (cgio_get_dimensions(file_, open.id(), &dimensions, nullptr) != CGIO_ERR_NONE) fail(node.path);
   if (dimensions < 0 || dimensions > kMaxDimensions)
-    damaged(node.path, fmt::format("has {} dimensions; at most {} can be", dimensions, kMaxDimensions));
+    damaged(node.path, fmt::format("has {} dimensions; expected at most {}", dimensions, kMaxDimensions));
   std::array<cgsize_t, kMaxDimensions> dims{};
   if (dimensions > 0 && cgio_get_dimensions(file_, open.id(), &dimensions, dims.data()) != CGIO_ERR_NONE)
     fail(node.path);
@@ -224,10 +224,10 @@ CgnsShape CgnsFile::storedShape(const OpenNode& open, const CgnsNode& node) cons
 void CgnsFile::checkShape(const CgnsNode& node, const CgnsShape& shape) const {
   if (shape.type == "MT") return;
   const uint64_t bytes = bytesOf(shape.type);
-  if (bytes == 0) damaged(node.path, fmt::format("has data of an unknown type '{}'", shape.type));
+  if (bytes == 0) damaged(node.path, fmt::format("has data of unknown type '{}'", shape.type));
   const uint64_t most = bytes_ / bytes * (hdf5_ ? kMaxCompression : 1);
   if (!node.linked && shape.count() > most)
-    damaged(node.path, fmt::format("should have {} values, more than {} bytes hold", shape.count(), bytes_));
+    damaged(node.path, fmt::format("declares {} values, more than {} bytes can hold", shape.count(), bytes_));
 }
 
 CgnsShape CgnsFile::shape(const CgnsNode& node) const {
@@ -244,7 +244,7 @@ void CgnsFile::checkSmall(const CgnsNode& node, const CgnsShape& shape, std::str
   const bool right = type == "C1" ? shape.type == "C1" : shape.number();
   if (!right || shape.count() == 0)
     damaged(node.path, fmt::format("has {} values of type '{}'; expected {}", shape.count(), shape.type,
-                                   type == "C1" ? "a text" : "numbers"));
+                                   type == "C1" ? "text" : "numbers"));
   if (shape.count() > kMaxSmallElements)
     damaged(node.path, fmt::format("has {} values; expected at most {}", shape.count(), kMaxSmallElements));
 }

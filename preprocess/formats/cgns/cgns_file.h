@@ -1,14 +1,14 @@
-// A CGNS file as the tree of nodes that it is, HDF5 or ADF: names, labels, small values, and boxes of large
-// arrays. What the nodes mean is in cgns_tree.h.
+// A CGNS file (HDF5 or ADF) as a tree of nodes: names, labels, small values, and boxes of large arrays.
+// cgns_tree.h interprets the nodes.
 //
-// HDF5 files are read with HDF5 itself (cgns_hdf5.h); libcgns never sees one. ADF files are read with
-// libcgns' node layer (cgns_io.h), not with its upper one (cgnslib.h): that one reads all of the tree at
-// opening, refuses whole files for boundary conditions that it does not like, and takes the sizes in a
-// damaged file at their word. Here nothing is read but what is asked for, and every size is checked before
-// memory is taken: dimensions against the file's bytes, types against what is read into.
+// HDF5 files are read with HDF5 itself (cgns_hdf5.h), never with libcgns. ADF files are read with the node
+// layer of libcgns (cgns_io.h), not with its mid-level library (cgnslib.h): cgnslib reads the whole tree when
+// a file is opened, rejects files because of boundary conditions that nobody asked for, and trusts the sizes
+// in a damaged file. This class reads only the nodes that are requested, and checks every size before it
+// allocates: dimensions against the size of the file, types against the destination.
 //
-// Neither library is thread-safe: every call is made under dataLibraryMutex(), so any number of threads may
-// use a CgnsFile, one after the other. Links to other files are followed.
+// Neither library is thread-safe: every call holds dataLibraryMutex(). Any number of threads may use a
+// CgnsFile; their calls run one after the other. Links to other files are followed.
 #pragma once
 
 #include <cstdint>
@@ -27,13 +27,13 @@ class CgnsHdf5;
 
 class CgnsFile {
  public:
-  /// Throws Error, as every member function, with the file, the node and what the library says.
+  /// This and every member function throws Error with the file, the node and the library's message.
   explicit CgnsFile(std::filesystem::path path);
   ~CgnsFile();
   CgnsFile(const CgnsFile&) = delete;
   CgnsFile& operator=(const CgnsFile&) = delete;
 
-  /// Whether `file` is an ADF file, or an HDF5 file that is called .cgns or has a node CGNSLibraryVersion.
+  /// Whether `file` is an ADF file, or an HDF5 file that is named .cgns or has a node CGNSLibraryVersion.
   static bool recognises(const InputFile& file);
 
   const std::filesystem::path& path() const { return path_; }
@@ -43,13 +43,13 @@ class CgnsFile {
   std::vector<CgnsNode> children(const CgnsNode& node) const;
   CgnsShape shape(const CgnsNode& node) const;
 
-  /// Of small nodes: all numbers, or the text, or one text a column, without trailing spaces.
+  /// The data of a small node: all numbers; the text; or one text for each column, without trailing spaces.
   std::vector<double> numbers(const CgnsNode& node) const;
   std::string text(const CgnsNode& node) const;
   std::vector<std::string> texts(const CgnsNode& node) const;
 
-  /// Reads a box of the numbers of `node`, whose shape is `shape`. Elements of `to` outside the box stay as
-  /// they are. No more memory is taken than for some rows.
+  /// Reads a box of the array of `node`, whose shape is `shape`. Elements of `to` outside the box are left
+  /// unchanged. Needs a buffer of a few rows.
   void read(const CgnsNode& node, const CgnsShape& shape, const CgnsBox& box, double* to) const;
   void read(const CgnsNode& node, const CgnsShape& shape, const CgnsBox& box, float* to) const;
 
@@ -66,8 +66,8 @@ class CgnsFile {
   std::filesystem::path path_;
   uint64_t bytes_ = 0;
   std::unique_ptr<CgnsHdf5> hdf5_;  // null: an ADF file
-  int file_ = 0;                    // libcgns' number of an ADF file
-  double root_ = 0;                 // and of its root
+  int file_ = 0;                    // libcgns' id of an ADF file
+  double root_ = 0;                 // libcgns' id of its root node
 };
 
 }  // namespace curvisplat

@@ -14,15 +14,15 @@ namespace {
 constexpr size_t kNameBytes = 33, kLabelBytes = 33, kTypeBytes = 3;
 constexpr const char* kData = " data";
 constexpr const char* kLink = " link";
-// libcgns wrote it when it had not yet turned the order of dimensions around.
+// Written by versions of libcgns before 3.0, which stored dimensions in the opposite order.
 constexpr const char* kOldVersion = " version";
 constexpr const char* kLibraryVersion = "CGNSLibraryVersion";
 constexpr int kMaxLinks = 100;
-// A node takes at least so much of a file: a link, and a group with three attributes.
+// Smallest size of a node in a file: a link, and a group with three attributes.
 constexpr uint64_t kMinNodeBytes = 32;
 constexpr uint64_t kSmallFileNodes = 4096;
 
-/// What HDF5 says of its last call: the first reason that it gives.
+/// The innermost entry of HDF5's error stack after a failed call.
 std::string hdf5Reason() {
   std::string reason;
   const auto first = [](unsigned, const H5E_error2_t* error, void* text) -> herr_t {
@@ -42,8 +42,8 @@ struct NodeLink {
   bool external = false;
 };
 
-/// The links of a group to nodes, in the order in which they were made where the file knows it. None if the
-/// group cannot be read.
+/// The links of a group to nodes, in order of creation if the file tracks it. nullopt if the group cannot be
+/// read.
 std::optional<std::vector<NodeLink>> nodeLinksOf(const Hdf5Group& group) {
   std::vector<NodeLink> links;
   const auto add = [](hid_t, const char* name, const H5L_info_t* info, void* to) -> herr_t {
@@ -98,7 +98,7 @@ CgnsHdf5::CgnsHdf5(std::filesystem::path path) : path_(std::move(path)) {
   const QuietHdf5 quiet;
   Hdf5File file(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
   if (!file) unreadable("", "the file");
-  // Programs other than libcgns may leave out the root's; what there is must be right.
+  // Programs other than libcgns may leave out the root's attributes; attributes that exist must be valid.
   const Hdf5Group root(H5Gopen2(file.id(), "/", H5P_DEFAULT));
   if (!root) unreadable("", "the root");
   const auto check = [&](const char* attribute, size_t max_bytes) {
@@ -135,7 +135,7 @@ void CgnsHdf5::unreadable(const std::string& node_path, std::string_view what) c
 std::string CgnsHdf5::text(const Hdf5Group& group, const std::string& node_path, const char* attribute,
                            size_t max_bytes) const {
   const auto wrong = [&](const std::string& found) {
-    damaged(node_path, fmt::format("has an attribute '{}' of {}; expected a text of at most {} bytes",
+    damaged(node_path, fmt::format("has an attribute '{}' of {}; expected text of at most {} bytes",
                                    attribute, found, max_bytes));
   };
   if (H5Aexists(group.id(), attribute) <= 0)
@@ -151,7 +151,7 @@ std::string CgnsHdf5::text(const Hdf5Group& group, const std::string& node_path,
   const int rank = H5Sget_simple_extent_ndims(space.id());
   if (count < 1) wrong("no value");
   const auto values = static_cast<uint64_t>(count);
-  // libcgns can be built so that it writes letters one by one.
+  // Some builds of libcgns write text as an array of one-byte integers.
   const bool letters = kind == H5T_INTEGER && bytes == 1 && rank == 1;
   if (!letters) {
     if (kind != H5T_STRING) wrong(describe(kind));
@@ -167,20 +167,20 @@ std::string CgnsHdf5::text(const Hdf5Group& group, const std::string& node_path,
   return read;
 }
 
-/// The group itself unless it is a link, else the group that the link, and those after it, lead to. Where
-/// that is missing, none if `may_be_missing`, else an Error.
+/// The group itself unless it is a link; otherwise the group at the end of the chain of links. If the target
+/// is missing: no group if `may_be_missing`, else an Error.
 Hdf5Group CgnsHdf5::behindLinks(Hdf5Group group, const std::string& node_path, bool may_be_missing) const {
   for (int links = 0; text(group, node_path, "type", kTypeBytes) == "LK"; ++links) {
     if (links == kMaxLinks) damaged(node_path, fmt::format("is behind more than {} links", kMaxLinks));
     Hdf5Group target(H5Gopen2(group.id(), kLink, H5P_DEFAULT));
     if (!target && may_be_missing) return target;
-    if (!target) unreadable(node_path, "what it links to");
+    if (!target) unreadable(node_path, "the target of its link");
     group = std::move(target);
   }
   return group;
 }
 
-/// The group that has a node's data and the nodes below it.
+/// The group that holds a node's data and its children.
 Hdf5Group CgnsHdf5::open(const std::string& node_path) const {
   Hdf5Group group(H5Gopen2(file_.id(), "/", H5P_DEFAULT));
   if (!group) unreadable("", "the root");
@@ -195,7 +195,7 @@ Hdf5Group CgnsHdf5::open(const std::string& node_path) const {
   return group;
 }
 
-/// Bounds what is listed by what the files have room for: links may lead from anywhere to anywhere.
+/// Limits the number of nodes listed to what the files can hold, since links may form cycles.
 void CgnsHdf5::count(const Hdf5Group& group, size_t nodes, const std::string& node_path) const {
   std::string name(static_cast<size_t>(std::max<ssize_t>(0, H5Fget_name(group.id(), nullptr, 0))) + 1, '\0');
   H5Fget_name(group.id(), name.data(), name.size());
@@ -208,16 +208,15 @@ void CgnsHdf5::count(const Hdf5Group& group, size_t nodes, const std::string& no
   nodes_listed_ += nodes;
   const uint64_t most = kSmallFileNodes + files_bytes_ / kMinNodeBytes;
   if (nodes_listed_ > most)
-    damaged(node_path,
-            fmt::format("has {} nodes below it; of all nodes, {} were met, more than there is room for",
-                        nodes, nodes_listed_));
+    damaged(node_path, fmt::format("has {} child nodes, which makes {} in all, more than the files can hold",
+                                   nodes, nodes_listed_));
 }
 
 std::vector<CgnsNode> CgnsHdf5::children(const CgnsNode& node) const {
   const QuietHdf5 quiet;
   const Hdf5Group group = open(node.path);
   const std::optional<std::vector<NodeLink>> links = nodeLinksOf(group);
-  if (!links) unreadable(node.path, "the list of nodes below it");
+  if (!links) unreadable(node.path, "the list of its child nodes");
   count(group, links->size(), node.path);
 
   std::vector<CgnsNode> nodes;
@@ -227,7 +226,7 @@ std::vector<CgnsNode> CgnsHdf5::children(const CgnsNode& node) const {
     if (!own) unreadable(child.path, "the node");
     text(own, child.path, "name", kNameBytes);
     child.linked |= text(own, child.path, "type", kTypeBytes) == "LK";
-    // What a link leads to may be missing: that matters to whoever needs it.
+    // The target of a link may be missing; that is an Error only when its data are read.
     if (const Hdf5Group target = behindLinks(std::move(own), child.path, true))
       child.label = text(target, child.path, "label", kLabelBytes);
     nodes.push_back(std::move(child));
@@ -256,7 +255,7 @@ CgnsShape CgnsHdf5::shape(const CgnsNode& node) const {
     const Hdf5Group root(H5Gopen2(group.id(), "/", H5P_DEFAULT));
     if (root && H5Lexists(root.id(), kOldVersion, H5P_DEFAULT) > 0)
       throw Error(
-          "{}: {} has its dimensions in the order of CGNS before 3.0; write the file again with CGNS 3.0 "
+          "{}: {} stores its dimensions in the order of CGNS before 3.0; write the file again with CGNS 3.0 "
           "or later",
           path_.string(), node.path);
   }
@@ -289,10 +288,10 @@ void CgnsHdf5::readAll(const CgnsNode& node, std::span<char> to) const {
   const Hdf5Type type(H5Dget_type(data.set.id()));
   const H5T_class_t kind = type ? H5Tget_class(type.id()) : H5T_NO_CLASS;
   if (kind != H5T_INTEGER || H5Tget_size(type.id()) != 1)
-    damaged(node.path, fmt::format("has data of {}; expected letters", describe(kind)));
+    damaged(node.path, fmt::format("has data of {}; expected text", describe(kind)));
   const hssize_t count = H5Sget_simple_extent_npoints(data.space.id());
   if (count < 0 || static_cast<uint64_t>(count) != to.size())
-    damaged(node.path, fmt::format("has {} letters; expected {}", count, to.size()));
+    damaged(node.path, fmt::format("has {} characters; expected {}", count, to.size()));
   if (H5Dread(data.set.id(), H5T_NATIVE_CHAR, H5S_ALL, H5S_ALL, H5P_DEFAULT, to.data()) < 0)
     unreadable(node.path, "its data");
 }
@@ -304,7 +303,7 @@ void CgnsHdf5::readBox(const CgnsNode& node, const CgnsBox& box, hid_t type, voi
   std::array<hsize_t, H5S_MAX_RANK> dims{};
   if (H5Sget_simple_extent_ndims(data.space.id()) != 3 ||
       H5Sget_simple_extent_dims(data.space.id(), dims.data(), nullptr) != 3)
-    damaged(node.path, "has data that are not three-dimensional");
+    damaged(node.path, "has data that is not three-dimensional");
   std::array<hsize_t, 3> first, count;
   for (size_t axis = 0; axis < 3; ++axis) {
     first[2 - axis] = box.first[axis];

@@ -1,22 +1,22 @@
-// The nodes of a CGNS file that is HDF5, read with HDF5 itself. libcgns never sees such a file: it reads text
-// attributes into buffers of 3 and of 33 bytes, whatever their size in the file, so that any file whose root
-// has an attribute `type` of more than two letters (every ROMS history file) overflows its stack.
+// The nodes of a CGNS file that is HDF5, read with HDF5 itself. libcgns never opens such a file: it copies
+// text attributes into buffers of 3 and 33 bytes without checking their size, so that every file whose root
+// has an attribute `type` longer than two letters (every ROMS history file) overflows the stack.
 //
-// A node is a group, as CGNS's mapping to HDF5 lays down:
+// A node is a group, as in CGNS's mapping to HDF5:
 //
-//   attribute "name"    text of at most 33 bytes; the link's name counts
+//   attribute "name"    text of at most 33 bytes; the name of the link takes precedence
 //   attribute "label"   text of at most 33 bytes: "Zone_t"
-//   attribute "type"    text of at most  3 bytes: "R8"; "MT": no data; "LK": stands for what " link" leads to
+//   attribute "type"    text of at most  3 bytes: "R8"; "MT": no data; "LK": the node is a link
 //   link " data"        data set, slowest dimension first
-//   link " link"        group of this file or of another one
-//   other links         nodes below it; names that begin with a space are CGNS's own
+//   link " link"        of a node that is a link: the target, a group of this or of another file
+//   other links         child nodes; names that begin with a space are reserved by CGNS
 //
-// Type, size and extent of each of these are checked before it is read, and memory is taken as they say.
-// Attributes that CGNS does not need (`flags`, `order`) are not read. However links lead in circles, the
-// nodes that are listed are bounded by what the files have room for.
+// The type, size and extent of each are checked before it is read, and the buffers have that size. Attributes
+// that CGNS does not need (`flags`, `order`) are not read. Links may form cycles: the number of nodes listed
+// is limited to what the files can hold.
 //
-// Every call is made under dataLibraryMutex(), so any number of threads may use a CgnsHdf5, one after the
-// other.
+// Every call holds dataLibraryMutex(): any number of threads may use a CgnsHdf5; their calls run one after
+// the other.
 #pragma once
 
 #include <filesystem>
@@ -33,21 +33,21 @@ namespace curvisplat {
 
 class CgnsHdf5 {
  public:
-  /// Throws Error, as every member function, with the file, the node, what was expected and what was found.
+  /// This and every member function throws Error with the file, the node, and the values found and expected.
   explicit CgnsHdf5(std::filesystem::path path);
   ~CgnsHdf5();
   CgnsHdf5(const CgnsHdf5&) = delete;
   CgnsHdf5& operator=(const CgnsHdf5&) = delete;
 
-  /// Whether an HDF5 file has a group CGNSLibraryVersion, as all that CGNS's own library writes do. Throws
+  /// Whether an HDF5 file has a group CGNSLibraryVersion; every file that libcgns wrote has one. Throws
   /// nothing.
   static bool recognises(const std::filesystem::path& path);
 
   std::vector<CgnsNode> children(const CgnsNode& node) const;
-  /// The type is as it stands in the file; the dimensions are of the data set.
+  /// The type as stored in the file, and the dimensions of the data set.
   CgnsShape shape(const CgnsNode& node) const;
 
-  /// All numbers, or the text, of a node with as many values as `to` has room for.
+  /// Reads all numbers, or the text, of a node that has exactly to.size() values.
   void readAll(const CgnsNode& node, std::span<double> to) const;
   void readAll(const CgnsNode& node, std::span<char> to) const;
   void read(const CgnsNode& node, const CgnsBox& box, double* to) const;
@@ -73,7 +73,7 @@ class CgnsHdf5 {
   std::filesystem::path path_;
   Hdf5File file_;
   // Guarded by dataLibraryMutex().
-  mutable std::set<std::string> files_;  // that nodes were listed of
+  mutable std::set<std::string> files_;  // those whose nodes were listed
   mutable uint64_t files_bytes_ = 0, nodes_listed_ = 0;
 };
 

@@ -1,5 +1,5 @@
-// A node of a CGNS file, the shape of its data, and a box of them: what the readers of both kinds of files
-// speak.
+// A node of a CGNS file, the shape of its data, and a box of an array: the types that the HDF5 and the ADF
+// reader share.
 #pragma once
 
 #include <array>
@@ -12,11 +12,11 @@ namespace curvisplat {
 struct CgnsNode {
   std::string path;  // "/Base/Zone 1/GridCoordinates"; the root's is empty
   std::string name, label;
-  bool linked = false;  // it, or one above it, lies in another file
+  bool linked = false;  // it or an ancestor is reached through a link, possibly in another file
 };
 
-/// What a node's data are: a type as CGNS writes it ("R4", "I8", "C1"; "MT": none), and dimensions, the
-/// fastest first.
+/// The shape of a node's data: the type in CGNS notation ("R4", "I8", "C1"; "MT": no data), and the
+/// dimensions, fastest first.
 struct CgnsShape {
   std::string type;
   std::vector<uint64_t> dims;
@@ -25,10 +25,10 @@ struct CgnsShape {
   bool number() const { return real() || type == "I4" || type == "I8"; }
 };
 
-/// A box of a three-dimensional array, and where it goes in memory.
+/// A box of a three-dimensional array, and the layout of its destination in memory.
 struct CgnsBox {
   std::array<uint64_t, 3> first{}, count{};  // in the array, from 0; count is not zero
-  std::array<uint64_t, 2> memory{};          // elements along i and j of the memory that it is read to
+  std::array<uint64_t, 2> memory{};          // elements along i and j of the destination array
 };
 
 }  // namespace curvisplat

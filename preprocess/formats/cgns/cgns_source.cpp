@@ -15,17 +15,17 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kNamesListed = 3;
-// Nodes of the rows of a vector that are read at a time.
+// A vector is read in groups of rows of about this many nodes.
 constexpr uint64_t kRowsOfNodes = 1 << 16;
 
-/// By which names of PLOT3D's a field is also called.
+/// The PLOT3D names that a field also answers to.
 std::vector<std::string> aliasesOf(const std::string& name) {
   if (name == "Density") return {"rho"};
   if (name == "EnergyStagnationDensity") return {"energy", "stagnationenergy", "rhoe"};
   return {};
 }
 
-/// Whether `name` is a component of a vector, and which.
+/// The axis if `name` is a component of a vector ("VelocityX"); else nullopt.
 std::optional<size_t> componentOf(const std::string& name) {
   if (name.size() < 2) return std::nullopt;
   const size_t axis = std::string_view("XYZ").find(name.back());
@@ -33,7 +33,7 @@ std::optional<size_t> componentOf(const std::string& name) {
   return axis;
 }
 
-/// The part of the box that has cells, in the array, and the memory that it goes to.
+/// The part of `box` that has samples of the given centring, as a box of the array, with its destination.
 CgnsBox boxOf(const CgnsZone& zone, const NodeBox& box, const CgnsArray& array, Centring centring) {
   const uint64_t last = centring == Centring::kCell ? 1 : 0;
   const uint64_t j1 = std::min(box.j1, zone.nodes[1] - last), k1 = std::min(box.k1, zone.nodes[2] - last);
@@ -125,7 +125,7 @@ void CgnsSource::addVectors() {
 }
 
 void CgnsSource::warnOfGaps() {
-  std::map<std::vector<size_t>, std::vector<std::string>> gaps;  // zones, the scalars that they lack
+  std::map<std::vector<size_t>, std::vector<std::string>> gaps;  // zones -> scalars missing in them
   for (size_t n = 0; n < arrays_.size(); ++n) {
     std::vector<size_t> lacking;
     for (size_t z = 0; z < tree_.zones.size(); ++z)
@@ -137,7 +137,7 @@ void CgnsSource::warnOfGaps() {
     for (size_t n = 0; n < std::min(kNamesListed, zones.size()); ++n)
       names += (n ? ", " : "") + description_.blocks[zones[n]].name;
     if (zones.size() > kNamesListed) names += fmt::format(" and {} more", zones.size() - kNamesListed);
-    description_.warnings.push_back(fmt::format("{} of {} zones ({}) have no {}: with it, they are not drawn",
+    description_.warnings.push_back(fmt::format("{} of {} zones ({}) have no {}; they are not drawn with it",
                                                 zones.size(), tree_.zones.size(), names,
                                                 fmt::join(scalars, ", ")));
   }
@@ -171,7 +171,7 @@ void CgnsSource::readScalar(const CgnsZone& zone, const NodeBox& box, const Arra
   const CgnsBox part = boxOf(zone, box, *arrays[0], centring);
   if (empty(part)) return;
   if (arrays.size() == 1) return file_.read(arrays[0]->node, arrays[0]->shape, part, to.data());
-  // Some rows at a time, so that the components take no memory to speak of.
+  // A few rows at a time, so that the buffers of the components stay small.
   const uint64_t ni = part.memory[0];
   const uint64_t rows = std::clamp<uint64_t>(kRowsOfNodes / ni, 1, part.count[1]);
   std::vector<double> squares;

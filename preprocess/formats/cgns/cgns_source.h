@@ -1,8 +1,8 @@
 // A CGNS file, HDF5 or ADF, as a GridSource: the structured zones of all bases as blocks, and the fields of
-// their vertex and cell-centred solutions at one time step as scalars. Nothing holds a zone: what is read is
-// what is asked for, wherever it lies in the file.
+// their vertex and cell-centred solutions at one time step as scalars. Never holds a whole zone: each read
+// fetches the requested box from the file.
 //
-// libcgns is not thread-safe: reads by several threads follow one another.
+// Neither HDF5 nor libcgns is thread-safe: reads by several threads run one after the other.
 #pragma once
 
 #include <array>
@@ -17,9 +17,9 @@
 
 namespace curvisplat {
 
-/// A field that some zones lack is NaN in them, which blanks their nodes; a warning says so. A field that is
-/// of the nodes of some zones and of the cells of others is two scalars, "Density:node" and "Density:cell".
-/// Of VelocityX, VelocityY and VelocityZ there is also their length, "Velocity:mag".
+/// A field that is missing in some zones is NaN there, which blanks their samples; a warning reports it. A
+/// field that is node-centred in some zones and cell-centred in others becomes two scalars, "Density:node"
+/// and "Density:cell". VelocityX, VelocityY and VelocityZ also give their magnitude, "Velocity:mag".
 class CgnsSource final : public GridSource {
  public:
   /// Throws Error.
@@ -30,7 +30,7 @@ class CgnsSource final : public GridSource {
             NodeArrays& out) const override;
 
  private:
-  /// The arrays of a scalar on a zone: one, or the three of a vector whose length it is. None: NaN.
+  /// The arrays of a scalar on a zone: one, or three for the magnitude of a vector. Empty: the scalar is NaN.
   using Arrays = std::vector<const CgnsArray*>;
 
   void addScalars();

@@ -24,11 +24,11 @@ const CgnsNode* labelled(const std::vector<CgnsNode>& nodes, const char* label) 
 
 void checkCount(const CgnsFile& file, const CgnsNode& node, size_t found, size_t expected) {
   if (found != expected)
-    throw Error("{}: {} has {} entries; expected {}, one a time step; the file is damaged",
+    throw Error("{}: {} has {} entries; expected {}, one per time step; the file is damaged",
                 file.path().string(), node.path, found, expected);
 }
 
-/// The names of zones, a row a step.
+/// The names of zones, one row per time step.
 std::vector<std::vector<std::string>> zonesOfSteps(const CgnsFile& file, const CgnsNode& pointers,
                                                    size_t steps) {
   const std::vector<std::string> names = file.texts(pointers);
@@ -39,7 +39,7 @@ std::vector<std::vector<std::string>> zonesOfSteps(const CgnsFile& file, const C
   return zones;
 }
 
-/// The node that a table of one name a step names; none: "Null".
+/// The node that a table of names, one per time step, names for `step`; null where the entry is "Null".
 const CgnsNode* pointedAt(const CgnsFile& file, const std::vector<CgnsNode>& zone, const CgnsNode& pointers,
                           size_t steps, uint32_t step) {
   const std::vector<std::string> names = file.texts(pointers);
@@ -47,12 +47,12 @@ const CgnsNode* pointedAt(const CgnsFile& file, const std::vector<CgnsNode>& zon
   if (step >= names.size() || names[step].empty() || names[step] == "Null") return nullptr;
   const CgnsNode* const node = named(zone, names[step].c_str());
   if (!node)
-    throw Error("{}: {} names {} for time step {}, and the zone has no such node", file.path().string(),
+    throw Error("{}: {} names {} for time step {}, but the zone has no such node", file.path().string(),
                 pointers.path, names[step], step);
   return node;
 }
 
-/// Puts each solution into the first step that has none of its fields yet.
+/// Assigns each solution to the first time step that has none of its fields yet.
 std::vector<std::vector<CgnsNode>> inOrder(const CgnsFile& file, const std::vector<CgnsNode>& zone) {
   std::vector<std::vector<CgnsNode>> steps;
   std::vector<std::set<std::string>> taken;
@@ -93,8 +93,8 @@ CgnsSteps readCgnsSteps(const CgnsFile& file, const std::vector<CgnsNode>& base)
   if (!data) return steps;
   const std::vector<double> count = file.numbers(*data);
   if (count.size() != 1 || !(count[0] >= 1 && count[0] <= kMaxSteps))
-    throw Error("{}: {} should tell the number of time steps, 1 to {}; it tells {:g}", file.path().string(),
-                data->path, kMaxSteps, count[0]);
+    throw Error("{0}: {1} has {3:g} time steps; expected 1 to {2}", file.path().string(), data->path,
+                kMaxSteps, count[0]);
   steps.count = static_cast<size_t>(count[0]);
   const std::vector<CgnsNode> children = file.children(*data);
   const CgnsNode* times = named(children, "TimeValues");

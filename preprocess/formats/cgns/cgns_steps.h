@@ -10,26 +10,26 @@
 
 namespace curvisplat {
 
-/// What a base tells of time (BaseIterativeData).
+/// The time steps of a base (BaseIterativeData).
 struct CgnsSteps {
-  size_t count = 0;           // 0: it tells nothing
-  std::vector<double> times;  // of each step: its time, else its iteration, else its number from 0
-  std::vector<std::vector<std::string>> zones;  // of each step; empty: all zones are in all steps
+  size_t count = 0;                             // 0: the base has no BaseIterativeData
+  std::vector<double> times;                    // [step]: its time, else its iteration, else its index
+  std::vector<std::vector<std::string>> zones;  // [step]; empty: all zones are in all steps
 
   bool has(const std::string& zone, uint32_t step) const;
 };
 
-/// `base`: the nodes below a base. Throws Error.
+/// `base`: the child nodes of a base. Throws Error.
 CgnsSteps readCgnsSteps(const CgnsFile& file, const std::vector<CgnsNode>& base);
 
-/// What a zone has at one step.
+/// The grid and the solutions of a zone at one time step.
 struct CgnsZoneStep {
   std::optional<CgnsNode> grid;     // GridCoordinates_t
   std::vector<CgnsNode> solutions;  // FlowSolution_t
-  size_t implied_steps = 1;         // that the order of its solutions makes, where nothing else tells
+  size_t implied_steps = 1;         // inferred from the order of its solutions without ZoneIterativeData
 };
 
-/// `zone`: the nodes below a zone. A zone of one step is the same at all. Throws Error.
+/// `zone`: the child nodes of a zone. A zone with a single step is the same at every step. Throws Error.
 CgnsZoneStep readCgnsZoneStep(const CgnsFile& file, const std::vector<CgnsNode>& zone, const CgnsSteps& steps,
                               uint32_t step);
 

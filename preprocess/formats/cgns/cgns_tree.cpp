@@ -18,7 +18,7 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kNamesListed = 3;
-// No zone has more: 2^31 is what libcgns counts to along an axis.
+// Largest number of nodes along an axis: 2^31 - 1, the limit of 32-bit sizes.
 constexpr double kMaxNodes = 2147483647.0;
 
 using Nodes = std::vector<CgnsNode>;
@@ -28,7 +28,7 @@ std::string describe(const Dims& dims) {
   return fmt::format("{}x{}x{}", dims[0], dims[1], dims[2]);
 }
 
-/// Units hold for all that is below, unless it tells its own.
+/// Units apply to all descendants that do not set their own.
 struct UnitContext {
   std::string data_class;
   std::vector<std::string> units;
@@ -53,9 +53,9 @@ class TreeReader {
   const CgnsFile& file_;
   uint32_t step_;
   CgnsTree tree_;
-  std::optional<std::vector<double>> told_times_;            // by BaseIterativeData
-  size_t implied_steps_ = 1;                                 // by the solutions' order
-  std::map<std::string, std::vector<std::string>> omitted_;  // reason, zones
+  std::optional<std::vector<double>> told_times_;            // from BaseIterativeData
+  size_t implied_steps_ = 1;                                 // from the order of the solutions
+  std::map<std::string, std::vector<std::string>> omitted_;  // reason -> zones
 };
 
 CgnsTree TreeReader::read() {
@@ -66,7 +66,8 @@ CgnsTree TreeReader::read() {
     any = true;
   }
   if (!any)
-    throw Error("{}: has no CGNSBase_t node: it is no CGNS file, or an empty one", file_.path().string());
+    throw Error("{}: has no CGNSBase_t node; expected a CGNS file with at least one base",
+                file_.path().string());
   if (told_times_) {
     tree_.times = *told_times_;
   } else if (implied_steps_ > 1) {
@@ -81,9 +82,8 @@ void TreeReader::readBase(const CgnsNode& base) {
   const std::vector<double> dimensions = file_.numbers(base);
   const Nodes children = file_.children(base);
   if (dimensions.size() != 2)
-    throw Error(
-        "{}: {} has {} numbers; expected 2, the dimensions of cells and of space; the file is damaged",
-        file_.path().string(), base.path, dimensions.size());
+    throw Error("{}: {} has {} numbers; expected 2 (dimensions of cells and of space); the file is damaged",
+                file_.path().string(), base.path, dimensions.size());
   if (dimensions[0] != 3 || dimensions[1] != 3) {
     for (const CgnsNode& node : children)
       if (node.label == "Zone_t")
@@ -106,19 +106,19 @@ void TreeReader::readZone(const CgnsNode& base, const CgnsNode& node, const Unit
   const Nodes children = file_.children(node);
   for (const CgnsNode& child : children)
     if (child.label == "ZoneType_t" && file_.text(child) != "Structured") {
-      omitted_["unstructured (structured ones are read)"].push_back(node.path.substr(1));
+      omitted_["unstructured (only structured zones are read)"].push_back(node.path.substr(1));
       return;
     }
   const std::vector<double> sizes = file_.numbers(node);
   if (sizes.size() != 9)
     throw Error(
-        "{}: {} has {} sizes; expected 9, nodes, cells and boundary nodes along i, j, k; the file is "
+        "{}: {} has {} sizes; expected 9 (nodes, cells and boundary nodes along i, j, k); the file is "
         "damaged",
         file_.path().string(), node.path, sizes.size());
   CgnsZone zone{base.name, node.name, {}, {}, {}};
   for (size_t axis = 0; axis < 3; ++axis) {
     if (!(sizes[axis] >= 1 && sizes[axis] <= kMaxNodes))
-      throw Error("{}: {} should have {:g} nodes along {}; the file is damaged", file_.path().string(),
+      throw Error("{}: {} declares {:g} nodes along {}; the file is damaged", file_.path().string(),
                   node.path, sizes[axis], "ijk"[axis]);
     zone.nodes[axis] = static_cast<uint64_t>(sizes[axis]);
   }
@@ -157,9 +157,9 @@ std::array<CgnsArray, 3> TreeReader::readCoordinates(const CgnsNode& grid, const
   }
   if (known != 3)
     throw Error(
-        "{}: {} has coordinates {}; only Cartesian ones, CoordinateX, CoordinateY and CoordinateZ, are "
-        "read: convert them with the program that wrote the file",
-        file_.path().string(), grid.path, found.empty() ? "of no name" : found);
+        "{}: {} has the coordinates {}; expected CoordinateX, CoordinateY and CoordinateZ (only Cartesian "
+        "coordinates are read): convert them with the program that wrote the file",
+        file_.path().string(), grid.path, found.empty() ? "(none)" : found);
   return coordinates;
 }
 
@@ -173,13 +173,13 @@ void TreeReader::addSolution(const CgnsNode& solution, UnitContext units, CgnsZo
         centring = Centring::kCell;
       } else if (location != "Vertex") {
         tree_.warnings.push_back(
-            fmt::format("{} is left out: its values stand at {}; those at Vertex and CellCenter are read",
+            fmt::format("{} is left out: its GridLocation is {}; expected Vertex or CellCenter",
                         solution.path.substr(1), location));
         return;
       }
     } else if (child.name == "PointList" || child.name == "PointRange") {
       tree_.warnings.push_back(
-          fmt::format("{} is left out: it has values for a part of its zone only", solution.path.substr(1)));
+          fmt::format("{} is left out: it covers only a part of its zone", solution.path.substr(1)));
       return;
     }
   }
@@ -215,8 +215,7 @@ CgnsArray TreeReader::arrayOf(const CgnsNode& node, const Dims& dims,
   const Dims expected{dims[0] + rind[0] + rind[1], dims[1] + rind[2] + rind[3], dims[2] + rind[4] + rind[5]};
   if (!std::equal(array.shape.dims.begin(), array.shape.dims.end(), expected.begin(), expected.end()))
     throw Error(
-        "{}: {} has {} values; expected {}, as the zone's size and its rind planes say; the file is "
-        "damaged",
+        "{}: {} has {} values; expected {} (the zone's size plus its rind planes); the file is damaged",
         file_.path().string(), node.path,
         array.shape.dims.empty() ? "no" : fmt::format("{}", fmt::join(array.shape.dims, "x")),
         describe(expected));
@@ -232,11 +231,11 @@ std::array<uint64_t, 6> TreeReader::rindOf(const Nodes& children) const {
     if (child.label != "Rind_t") continue;
     const std::vector<double> planes = file_.numbers(child);
     if (planes.size() != 6)
-      throw Error("{}: {} has {} numbers; expected 6, planes before and behind along i, j, k",
+      throw Error("{}: {} has {} numbers; expected 6 (planes at the lower and upper end of i, j, k)",
                   file_.path().string(), child.path, planes.size());
     for (size_t n = 0; n < 6; ++n) {
       if (!(planes[n] >= 0 && planes[n] <= kMaxNodes))
-        throw Error("{}: {} tells of {:g} planes; the file is damaged", file_.path().string(), child.path,
+        throw Error("{}: {} declares {:g} planes; the file is damaged", file_.path().string(), child.path,
                     planes[n]);
       rind[n] = static_cast<uint64_t>(planes[n]);
     }
@@ -251,10 +250,10 @@ void TreeReader::warnOfOmissions() {
     if (zones.size() > kNamesListed) names += fmt::format(" and {} more", zones.size() - kNamesListed);
     const std::string words =
         fmt::format("{} zone{} {}: {}", zones.size(), zones.size() == 1 ? "" : "s", reason, names);
-    if (tree_.zones.empty()) throw Error("{}: nothing to draw in it: {}", file_.path().string(), words);
+    if (tree_.zones.empty()) throw Error("{}: has nothing to draw: {}", file_.path().string(), words);
     tree_.warnings.push_back("left out: " + words);
   }
-  if (tree_.zones.empty()) throw Error("{}: has no zones: nothing to draw in it", file_.path().string());
+  if (tree_.zones.empty()) throw Error("{}: has nothing to draw: it has no zones", file_.path().string());
 }
 
 }  // namespace

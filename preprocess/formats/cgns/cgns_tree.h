@@ -1,10 +1,10 @@
-// What a CGNS file's nodes mean to us: its structured zones, and at one time step their coordinates and the
-// solutions on them. Reads names and sizes only, no values of nodes or cells.
+// The structured zones of a CGNS file, with their coordinates and solutions at one time step. Reads names and
+// sizes only, no samples.
 //
-// Time steps are those of BaseIterativeData, whose zones then tell which solution and which coordinates
-// belong to each (ZoneIterativeData). Where they do not, a zone's solutions follow one another: each goes to
-// the first step that has none of its fields yet, so that two solutions of different fields, or one of the
-// nodes and one of the cells, are of one time.
+// The time steps are those of BaseIterativeData; ZoneIterativeData assigns solutions and coordinates to them.
+// Where it is missing, a zone's solutions are consecutive steps: each is assigned to the first step that has
+// none of its fields yet, so that two solutions with different fields, or a node-centred and a cell-centred
+// one, share a step.
 #pragma once
 
 #include <array>
@@ -17,8 +17,8 @@
 
 namespace curvisplat {
 
-/// An array on a zone. Its element `rind` is the zone's own first: planes before that, and behind the zone's
-/// last, are copies of neighbours' values.
+/// An array on a zone. The zone's first sample is at index `rind`: the planes before it, and those after the
+/// zone's last sample, are copies of the neighbours' values.
 struct CgnsArray {
   CgnsNode node;
   CgnsShape shape;
@@ -40,13 +40,13 @@ struct CgnsZone {
 
 struct CgnsTree {
   std::vector<CgnsZone> zones;  // at least one
-  size_t bases = 0;             // that these are of
-  std::vector<double> times;    // of every step; numbers from 0 where the file tells none; empty: no steps
+  size_t bases = 0;             // number of bases that the zones belong to
+  std::vector<double> times;    // [step]; 0, 1, ... if the file stores no times; empty: no time steps
   std::vector<std::string> warnings;
 };
 
-/// Throws Error where nothing can be drawn (surfaces, unstructured zones), where coordinates are not
-/// Cartesian, where there is no step `step`, and where the file contradicts itself.
+/// Throws Error if the file has nothing to draw (only surfaces or unstructured zones), if its coordinates are
+/// not Cartesian, if it has no step `step`, or if it is inconsistent.
 CgnsTree readCgnsTree(const CgnsFile& file, uint32_t step);
 
 }  // namespace curvisplat

@@ -26,11 +26,11 @@ constexpr UnitSymbol kSymbols[] = {
 };
 
 struct NamedExponents {
-  std::string_view prefix;  // of the array's name
+  std::string_view prefix;  // of the name of the array
   Exponents exponents;
 };
 
-// The longer of two that fit stands first.
+// The first match counts, so a longer prefix precedes a shorter one.
 constexpr NamedExponents kStandard[] = {
     {"Density", {1, -3, 0, 0, 0}},
     {"EnergyStagnationDensity", {1, -1, -2, 0, 0}},

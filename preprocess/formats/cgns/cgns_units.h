@@ -1,5 +1,5 @@
-// Units of CGNS arrays as people write them: "kg m-3" of DimensionalUnits (Kilogram, Meter, ...) and the
-// exponents of the array, or, where it tells none, those that the standard gives to its name.
+// Units of CGNS arrays in common notation: "kg m-3", from DimensionalUnits (Kilogram, Meter, ...) and the
+// exponents of the array, or, if it has none, those that the standard assigns to its name.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace curvisplat {
 
-/// `units`: the names of mass, length, time, temperature and angle. `exponents`: of as many, or empty.
-/// Empty where the units, or what the array is, are not known.
+/// `units`: the names of the units of mass, length, time, temperature and angle. `exponents`: one for each,
+/// or empty. Returns an empty text if the units or the quantity are unknown.
 /// Source: CGNS Standard Interface Data Structures, sections 4.3 and annex A.
 std::string cgnsUnit(const std::vector<std::string>& units, const std::vector<double>& exponents,
                      const std::string& array_name);

@@ -28,7 +28,7 @@ bool isSeparator(char c) {
   return isSpace(c) || c == ',';
 }
 
-/// Digits of the mantissa: what a writer has kept of a number.
+/// Significant digits of the mantissa, which show the precision that the number was written with.
 int significantDigits(std::string_view token) {
   int digits = 0;
   for (const char c : token) {
@@ -40,8 +40,8 @@ int significantDigits(std::string_view token) {
   return digits;
 }
 
-/// A number as Fortran may write it and C++ does not read it: "+1.5", "1.5D+00", "1.5-101", and what
-/// over- or underflows.
+/// Parses notations that Fortran writes and std::from_chars rejects: "+1.5", "1.5D+00", "1.5-101", and
+/// numbers that overflow or underflow.
 bool parseFortranNumber(std::string_view token, double& value) {
   std::string spelling(token);
   std::replace_if(
@@ -65,7 +65,7 @@ class Spooler {
 
   AsciiSpool run() {
     std::vector<char> chunk(kChunkBytes);
-    size_t kept = 0;  // bytes of a number that the chunk before has cut
+    size_t kept = 0;  // bytes of a number that the end of the previous chunk cut
     for (uint64_t offset = 0; offset < text_.size();) {
       const size_t count =
           static_cast<size_t>(std::min<uint64_t>(chunk.size() - kept, text_.size() - offset));
@@ -76,7 +76,7 @@ class Spooler {
       if (offset < text_.size()) {
         while (stop != chunk.data() && !isSeparator(stop[-1])) --stop;
         if (stop == chunk.data())
-          throw Error("{}: line {} has {} bytes without a space; that is no text of numbers", name(),
+          throw Error("{}: line {} has {} bytes without a space; expected numbers in text", name(),
                       lines_ + 1, end - stop);
       }
       parse(chunk.data(), stop);
@@ -97,7 +97,7 @@ class Spooler {
     return folder_ / fmt::format("{}.{}.{}.spool", text_.path().filename().string(), ::getpid(), spools++);
   }
 
-  /// Creates the file, opens it for reading, and takes its name away at once.
+  /// Creates the file, opens it for reading, and unlinks it at once.
   InputFile open() {
     out_ = std::make_unique<OutputFile>(temporary_);
     try {
@@ -114,7 +114,7 @@ class Spooler {
     for (const char* at = begin;;) {
       for (; at != end && isSeparator(*at); ++at) {
         if (*at != ',') continue;
-        if (comma_) throw Error("{}: line {} leaves a value out between commas", name(), lineOf(begin, at));
+        if (comma_) throw Error("{}: line {} has no value between two commas", name(), lineOf(begin, at));
         comma_ = true;
       }
       if (at == end) return;
@@ -148,15 +148,15 @@ class Spooler {
 
   [[noreturn]] void fail(const char* begin, const char* at, const char* stop) const {
     constexpr ptrdiff_t kShown = 30;
-    throw Error("{}: line {} has \"{}\" where a number was expected; is it a PLOT3D file?", name(),
-                lineOf(begin, at), std::string_view(at, static_cast<size_t>(std::min(kShown, stop - at))));
+    throw Error("{}: line {} has \"{}\"; expected a number: is it a PLOT3D file?", name(), lineOf(begin, at),
+                std::string_view(at, static_cast<size_t>(std::min(kShown, stop - at))));
   }
 
   void checkSpaceFor(uint64_t values, uint64_t line) const {
     const uint64_t available = std::filesystem::space(folder_.empty() ? "." : folder_).available;
     if (values > available / sizeof(double))
-      throw Error("{}: line {} repeats a number {} times, more than the {} bytes free in {} can take", name(),
-                  line, values, available, folder_.string());
+      throw Error("{}: line {} repeats a number {} times, too many for the {} bytes free in {}", name(), line,
+                  values, available, folder_.string());
   }
 
   void put(double value) {
@@ -178,7 +178,7 @@ class Spooler {
   std::vector<double> pending_;
   uint64_t written_ = 0;
   uint64_t lines_ = 0;  // that ended before the current chunk
-  bool comma_ = false;  // since the last number
+  bool comma_ = false;  // whether a comma has followed the last number
   size_t sampled_ = 0;
   int significant_digits_ = 0;
 };

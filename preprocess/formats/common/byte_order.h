@@ -1,4 +1,4 @@
-// In which order the bytes of a number lie in a file.
+// The byte order of numbers in a file.
 #pragma once
 
 namespace curvisplat {

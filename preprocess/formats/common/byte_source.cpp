@@ -14,7 +14,7 @@ FileBytes::FileBytes(std::shared_ptr<const PooledFile> file, uint64_t begin, uin
 
 void FileBytes::readAt(uint64_t offset, std::span<std::byte> to) const {
   if (offset > size_ || to.size() > size_ - offset)
-    throw Error("{}: byte {}: {} bytes are expected here, but {} are left; the file is truncated or damaged",
+    throw Error("{}: byte {}: expected {} more bytes, found {}; the file is truncated or damaged",
                 file_->name(), begin_ + std::min(offset, size_), to.size(), size_ - std::min(offset, size_));
   file_->readAt(begin_ + offset, to);
 }

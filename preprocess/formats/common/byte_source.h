@@ -1,5 +1,5 @@
-// Bytes that are read by position, however a file stores them: as they are, in base64, in compressed blocks,
-// or as numbers in text. What reads them need not know.
+// Bytes that are read by position, independent of how a file stores them: raw, in base64, in compressed
+// blocks, or as numbers in text.
 #pragma once
 
 #include <cstddef>
@@ -15,17 +15,17 @@ namespace curvisplat {
 class ByteSource {
  public:
   virtual ~ByteSource() = default;
-  /// How many bytes there can be at most.
+  /// Upper bound of the number of bytes.
   virtual uint64_t size() const = 0;
-  /// Fills `to` from `offset`. Throws Error naming the file if there are not so many bytes, or if they are
-  /// damaged.
+  /// Fills `to` with the bytes at `offset`. Throws Error with the file if the bytes end before that, or if
+  /// they are damaged.
   virtual void readAt(uint64_t offset, std::span<std::byte> to) const = 0;
 };
 
-/// A part of a file, as it is.
+/// A range of a file, raw.
 class FileBytes final : public ByteSource {
  public:
-  /// The bytes from `begin` up to `end`, or to the end of the file if that comes before.
+  /// The bytes [begin, end), cut off at the end of the file.
   FileBytes(std::shared_ptr<const PooledFile> file, uint64_t begin, uint64_t end);
 
   uint64_t size() const override { return size_; }
@@ -36,7 +36,7 @@ class FileBytes final : public ByteSource {
   uint64_t begin_ = 0, size_ = 0;
 };
 
-/// What follows the first `begin` bytes of another source.
+/// Another source without its first `begin` bytes.
 class BytesBehind final : public ByteSource {
  public:
   BytesBehind(std::shared_ptr<const ByteSource> all, uint64_t begin);

@@ -1,12 +1,12 @@
-// libcgns, HDF5 and NetCDF keep lists of open files and error stacks of the whole process, behind no lock of
-// their own. So every call into any of them, by any reader, is made under this one.
+// libcgns, HDF5 and NetCDF keep global lists of open files and global error stacks without any lock. Every
+// call into any of them, by any reader, holds this mutex.
 #pragma once
 
 #include <mutex>
 
 namespace curvisplat {
 
-/// Guards all of libcgns', HDF5's and NetCDF's state.
+/// Guards the global state of libcgns, HDF5 and NetCDF.
 std::mutex& dataLibraryMutex();
 
 }  // namespace curvisplat

@@ -1,5 +1,5 @@
-// Handles of HDF5's that close themselves, and a time without its reports. Every call into HDF5, closing
-// included, is made under dataLibraryMutex().
+// RAII handles for HDF5's identifiers, and a scope in which HDF5 prints no errors. Every call into HDF5,
+// closing included, holds dataLibraryMutex().
 #pragma once
 
 #include <hdf5.h>
@@ -11,7 +11,7 @@
 
 namespace curvisplat {
 
-/// A number that HDF5 gives out. False where it gave none.
+/// An identifier that HDF5 returned; false if the call failed.
 template <herr_t (*kClose)(hid_t)>
 class Hdf5Handle {
  public:
@@ -39,8 +39,8 @@ using Hdf5Attribute = Hdf5Handle<H5Aclose>;
 using Hdf5Type = Hdf5Handle<H5Tclose>;
 using Hdf5Space = Hdf5Handle<H5Sclose>;
 
-/// Holds the lock, and keeps HDF5 from printing what goes wrong: that becomes an Error. What was set before
-/// is set again at the end.
+/// Holds the lock and silences HDF5's printed error stack, since failures are thrown as Error. The destructor
+/// restores the previous error handler.
 class QuietHdf5 {
  public:
   QuietHdf5() : lock_(dataLibraryMutex()) {

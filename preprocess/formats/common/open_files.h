@@ -1,5 +1,5 @@
-// Input files that are opened when they are read, and at most so many at once: a partitioned data set has
-// more pieces than a process may have open files.
+// A bounded pool of open input files: a partitioned data set may have more pieces than a process may have
+// open files.
 #pragma once
 
 #include <cstddef>
@@ -14,12 +14,13 @@
 
 namespace curvisplat {
 
-/// The files that are open, the last used first. Any number of threads may ask at once.
+/// The open files, most recently used first. Thread-safe.
 class OpenFiles {
  public:
   explicit OpenFiles(size_t most = 64) : most_(most) {}
 
-  /// Opens `path` if it is not open. It stays open for whoever holds it. Throws Error as InputFile does.
+  /// Opens `path` unless it is open. It stays open while anybody holds the result. Throws Error as InputFile
+  /// does.
   std::shared_ptr<const InputFile> at(const std::filesystem::path& path);
 
  private:
@@ -28,18 +29,18 @@ class OpenFiles {
   std::list<std::shared_ptr<const InputFile>> files_;
 };
 
-/// A file of a pool. Any number of threads may read at once.
+/// A file of a pool. Any number of threads may read concurrently.
 class PooledFile {
  public:
   /// Throws Error if it cannot be opened.
   PooledFile(std::shared_ptr<OpenFiles> pool, std::filesystem::path path);
 
   const std::filesystem::path& path() const { return path_; }
-  /// For errors.
+  /// For error messages.
   std::string name() const { return path_.string(); }
-  /// Bytes, when it was opened first.
+  /// Its size in bytes when it was first opened.
   uint64_t size() const { return size_; }
-  /// Fills `to` from `offset`. Throws Error if the file ends before that, or the disk fails.
+  /// Fills `to` with the bytes at `offset`. Throws Error if the file ends before that, or if reading fails.
   void readAt(uint64_t offset, std::span<std::byte> to) const { pool_->at(path_)->readAt(offset, to); }
 
  private:

@@ -1,4 +1,5 @@
-// What a user says of a grid's files: which they are, and what cannot be detected or is to be overruled.
+// The user's options for opening a grid: its files, and settings that cannot be detected or that override
+// detection.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +14,7 @@ namespace curvisplat {
 
 enum class RecordMarkers { kNone, kBytes4, kBytes8 };
 
-/// What the user says of a PLOT3D file's layout; the rest is detected.
+/// Parts of a PLOT3D file's layout that the user has fixed; the rest is detected.
 struct Plot3dForce {
   std::optional<bool> ascii;
   std::optional<ByteOrder> byte_order;
@@ -23,23 +24,23 @@ struct Plot3dForce {
   std::optional<bool> blanking;
 };
 
-/// What the user says of grids of the earth.
+/// How longitude and latitude become positions.
 struct GlobeOptions {
   enum class Shape { kAutomatic, kSphere, kFlat };
-  Shape shape = Shape::kAutomatic;  // automatic: a sphere for degrees, flat for lengths
+  Shape shape = Shape::kAutomatic;  // automatic: sphere for degrees, flat for lengths
   double radius_km = 6371;
   double vertical_scale = 1;
 };
 
 struct OpenGridOptions {
   std::filesystem::path grid;
-  std::vector<std::filesystem::path> solutions;  // Q and function files; may be empty
-  std::filesystem::path temporary_folder;        // ASCII is spooled to binary here; empty: the system's
-  Plot3dForce force;                             // what the user says of the layout, over what is detected
-  std::optional<uint32_t> time_step = {};        // from 0; none: the first
-  std::vector<std::string> function_names = {};  // of function files' variables, over their .nam files
-  GlobeOptions globe = {};                       // of grids in degrees
-  std::vector<std::string> scalars = {};         // that are wanted: they choose among several grids of a file
+  std::vector<std::filesystem::path> solutions;  // PLOT3D Q and function files; may be empty
+  std::filesystem::path temporary_folder;        // for spool files; empty: the system's
+  Plot3dForce force;                             // overrides the detected PLOT3D layout
+  std::optional<uint32_t> time_step = {};        // from 0; nullopt: the first
+  std::vector<std::string> function_names = {};  // variables of function files; override their .nam files
+  GlobeOptions globe = {};                       // for grids in degrees
+  std::vector<std::string> scalars = {};         // requested; select one of several grids in a file
 };
 
 }  // namespace curvisplat

@@ -1,4 +1,4 @@
-// One temporary file for all that must be unpacked before it can be read by position: numbers in text, and
+// A temporary file for data that must be unpacked before it can be read by position: numbers in text, and
 // compressed blocks that are too large for memory.
 #pragma once
 
@@ -14,34 +14,35 @@
 
 namespace curvisplat {
 
-/// Made when the first bytes come. It has no name any more from then on: it goes when its last user does,
-/// however the program ends. Any number of threads may use it.
+/// Created, and unlinked at once, when the first bytes are appended: the system frees its space after the
+/// last user closes it, even if the program crashes. Thread-safe.
 class SpoolFile {
  public:
   explicit SpoolFile(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-  /// Where `write` puts bytes, one after the other.
+  /// Takes the next bytes of append().
   using Sink = std::function<void(std::span<const std::byte>)>;
 
-  /// Appends what `write` gives to its sink. One writer at a time; others wait. Returns where it begins.
+  /// Appends the bytes that `write` passes to its sink, and returns the offset of the first. One writer at a
+  /// time; others wait.
   uint64_t append(const std::function<void(const Sink&)>& write);
 
-  /// Bytes that append() has returned from.
+  /// Only for bytes whose append() has returned.
   void readAt(uint64_t offset, std::span<std::byte> to) const { in_->readAt(offset, to); }
 
  private:
   void create();
 
   const std::filesystem::path folder_;
-  std::mutex mutex_;  // guards out_, and the making of in_
+  std::mutex mutex_;  // guards out_, and the creation of in_
   std::unique_ptr<OutputFile> out_;
   std::unique_ptr<InputFile> in_;
 };
 
-/// Bytes that are made when the first of them is read, and lie in a spool file from then on.
+/// Bytes that are produced at the first read and then kept in a spool file.
 class SpooledBytes final : public ByteSource {
  public:
-  /// `make` gives exactly `size` bytes to its sink, or throws.
+  /// `make` passes exactly `size` bytes to its sink, or throws.
   SpooledBytes(std::shared_ptr<SpoolFile> spool, uint64_t size,
                std::function<void(const SpoolFile::Sink&)> make)
       : spool_(std::move(spool)), size_(size), make_(std::move(make)) {}
@@ -49,14 +50,14 @@ class SpooledBytes final : public ByteSource {
   uint64_t size() const override { return size_; }
   void readAt(uint64_t offset, std::span<std::byte> to) const override;
 
-  /// Makes them now, if they are not there. Throws what `make` throws.
+  /// Produces the bytes now unless that has been done. Throws what `make` throws.
   void fill() const;
 
  private:
   std::shared_ptr<SpoolFile> spool_;
   uint64_t size_ = 0;
-  mutable std::mutex mutex_;                                  // guards what follows
-  mutable std::function<void(const SpoolFile::Sink&)> make_;  // let go of once they are there
+  mutable std::mutex mutex_;                                  // guards the members below
+  mutable std::function<void(const SpoolFile::Sink&)> make_;  // reset after its call, to free its captures
   mutable std::optional<uint64_t> begin_;
 };
 

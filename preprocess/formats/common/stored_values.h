@@ -1,4 +1,4 @@
-// Numbers as files store them: either byte order, 1 to 8 bytes, unaligned.
+// Loads numbers as files store them: either byte order, 1 to 8 bytes, unaligned.
 #pragma once
 
 #include <algorithm>
@@ -33,7 +33,7 @@ using UnsignedOfBytes = std::conditional_t<
     kBytes == 8, uint64_t,
     std::conditional_t<kBytes == 4, uint32_t, std::conditional_t<kBytes == 2, uint16_t, uint8_t>>>;
 
-/// The number at `from`. Stored: an arithmetic type of 1, 2, 4 or 8 bytes.
+/// Loads the number at `from`. Stored: an arithmetic type of 1, 2, 4 or 8 bytes.
 template <typename Stored>
 Stored loadStored(const std::byte* from, bool swap) {
   using Bits = UnsignedOfBytes<sizeof(Stored)>;
@@ -43,8 +43,8 @@ Stored loadStored(const std::byte* from, bool swap) {
   return std::bit_cast<Stored>(swap ? byteSwapped(bits) : bits);
 }
 
-/// `count` numbers from `from` to `to`, converted. A double too large for a float becomes infinite, and so
-/// blank.
+/// Converts `count` numbers from `from` to `to`. A double that is too large for a float becomes infinite,
+/// which blanks its sample.
 template <typename Stored, typename Value>
 void convertStored(const std::byte* from, size_t count, bool swap, Value* to) {
   if (swap)

@@ -10,7 +10,7 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kBufferBytes = size_t{256} << 10;
-constexpr size_t kLongestLine = size_t{64} << 10;  // and word
+constexpr size_t kLongestLine = size_t{64} << 10;  // also limits a word
 
 bool isSpace(char c) {
   return c == ' ' || (c >= '\t' && c <= '\r');
@@ -35,7 +35,7 @@ void TextReader::seek(uint64_t offset) {
   at_ = filled_ = 0;
 }
 
-/// Keeps what is not read yet and reads more behind it.
+/// Moves the unread characters to the front of the buffer and fills up the rest.
 void TextReader::refill() {
   std::memmove(buffer_.data(), buffer_.data() + at_, filled_ - at_);
   buffer_offset_ += at_;
@@ -62,7 +62,7 @@ std::string_view TextReader::peekWord() {
   size_t stop = at_;
   while (stop < filled_ && stop - at_ <= kLongestLine && !isSpace(buffer_[stop])) ++stop;
   if (stop - at_ > kLongestLine)
-    throw Error("{}: byte {}: {} characters without a space, where a word or a number is expected",
+    throw Error("{}: byte {}: found {} characters without a space; expected a word or a number",
                 file_->name(), offset(), stop - at_);
   return {&buffer_[at_], stop - at_};
 }
@@ -80,7 +80,7 @@ std::optional<std::string_view> TextReader::line() {
   const size_t most = std::min(filled_ - at_, kLongestLine);
   const auto* const found = static_cast<const char*>(std::memchr(begin, '\n', most));
   if (!found && most == kLongestLine)
-    throw Error("{}: byte {}: more than {} characters without an end of line", file_->name(), offset(), most);
+    throw Error("{}: byte {}: found no end of line within {} characters", file_->name(), offset(), most);
   size_t length = found ? static_cast<size_t>(found - begin) : most;
   at_ += length + (found ? 1 : 0);
   if (length > 0 && begin[length - 1] == '\r') --length;
@@ -92,10 +92,10 @@ double TextReader::number() {
   const std::string_view text = word();
   double value = 0;
   if (text.empty())
-    throw Error("{}: byte {}: ends where a number is expected; the file is truncated", file_->name(),
+    throw Error("{}: byte {}: ends where a number was expected; the file is truncated", file_->name(),
                 offset());
   if (!parseNumber(text, value))
-    throw Error("{}: byte {}: has \"{}\" where a number is expected", file_->name(), offset() - text.size(),
+    throw Error("{}: byte {}: found \"{}\"; expected a number", file_->name(), offset() - text.size(),
                 printable(text.substr(0, kShown)));
   return value;
 }

@@ -11,31 +11,30 @@
 
 namespace curvisplat {
 
-/// With a question mark for each character that would not show on a terminal: what a file has where words are
-/// expected may be anything.
+/// Replaces each character that a terminal would not print by a question mark: for quoting the contents of a
+/// damaged file.
 std::string printable(std::string_view text);
 
-/// For one thread. What it returns is valid until the next call.
+/// For one thread. Each result is valid until the next call.
 class TextReader {
  public:
-  /// From byte `begin` of `file` up to `end`, or its end.
+  /// Reads the bytes [begin, end) of `file`, cut off at its end.
   TextReader(std::shared_ptr<const PooledFile> file, uint64_t begin, uint64_t end);
 
   const PooledFile& file() const { return *file_; }
-  /// Where the next character is read.
+  /// Position of the next character in the file.
   uint64_t offset() const { return buffer_offset_ + at_; }
-  /// Goes to another place.
+  /// Continues at another position.
   void seek(uint64_t offset);
 
-  /// The next characters between white space; empty at the end. Throws Error if they are more than any word
-  /// has.
+  /// The next characters up to white space; empty at the end. Throws Error if they exceed any sane length.
   std::string_view word();
-  /// The rest of the line, without its end; nothing at the end of the text. Throws Error if it is longer than
-  /// any line should be.
+  /// The rest of the line without the line break; nullopt at the end of the text. Throws Error if it exceeds
+  /// any sane length.
   std::optional<std::string_view> line();
-  /// As word(), but is read again by the next call.
+  /// As word(), but without advancing.
   std::string_view peekWord();
-  /// The next number. Throws Error if there is none, or if the next word is none.
+  /// The next number. Throws Error at the end, or if the next word is not a number.
   double number();
 
  private:
@@ -44,7 +43,7 @@ class TextReader {
 
   std::shared_ptr<const PooledFile> file_;
   uint64_t end_ = 0;
-  uint64_t buffer_offset_ = 0;  // of the buffer's first character in the file
+  uint64_t buffer_offset_ = 0;  // position of the buffer's first character in the file
   size_t at_ = 0, filled_ = 0;
   std::vector<char> buffer_;
 };

@@ -27,7 +27,7 @@ std::optional<uint32_t> scalarCalled(const GridDescription& description, Centrin
   return std::nullopt;
 }
 
-/// Cuts `box` into pieces: whole planes where a few fit, else strips as long in k as in j.
+/// Cuts `box` into pieces: whole planes if several fit, else strips of equal length along j and k.
 std::vector<NodeBox> piecesOf(const GridBlock& block, const NodeBox& box) {
   const uint64_t rows = std::max<uint64_t>(1, kPieceNodes / block.ni);
   const uint64_t width = box.j1 - box.j0;
@@ -43,7 +43,7 @@ std::vector<NodeBox> piecesOf(const GridBlock& block, const NodeBox& box) {
 
 }  // namespace
 
-// ---- what there is to derive ----
+// ---- choosing the quantities ----
 
 DerivedSource::DerivedSource(std::unique_ptr<GridSource> source, const DerivedOptions& options)
     : source_(std::move(source)), description_(source_->description()) {
@@ -53,9 +53,9 @@ DerivedSource::DerivedSource(std::unique_ptr<GridSource> source, const DerivedOp
   gas_.gamma = chosen(options.gas.gamma, description_.gas.gamma, gas_.gamma);
   gas_.constant = chosen(options.gas.constant, description_.gas.constant, gas_.constant);
   if (!(gas_.gamma > 1) || !std::isfinite(gas_.gamma))
-    throw UsageError("--gamma: {} is no ratio of specific heats: it is above 1", gas_.gamma);
+    throw UsageError("--gamma: {} is not a ratio of specific heats; expected a number above 1", gas_.gamma);
   if (!(gas_.constant > 0) || !std::isfinite(gas_.constant))
-    throw UsageError("--gas-constant: {} is not above 0", gas_.constant);
+    throw UsageError("--gas-constant: {} is not valid; expected a number above 0", gas_.constant);
   if (gas_.gamma != PerfectGas{}.gamma || gas_.constant != PerfectGas{}.constant)
     description_.format += fmt::format("; gas with gamma {}, R {}", gas_.gamma, gas_.constant);
   if (options.blank_value) blank_value_ = static_cast<float>(*options.blank_value);
@@ -101,7 +101,7 @@ void DerivedSource::describe() {
   if (inputs_.density) description_.scalars[*inputs_.density].function = 100;
   for (const QuantityInfo& quantity : flowQuantities()) {
     if (!offers(quantity)) continue;
-    // What the files hold under that name is not computed; it is what the number means.
+    // If the files hold a scalar of that name, it is not computed, and PLOT3D's number refers to it.
     const auto stored = std::find_if(
         description_.scalars.begin(), description_.scalars.begin() + static_cast<ptrdiff_t>(of_source),
         [&](const GridScalar& scalar) { return answersTo(scalar, simplifiedName(quantity.name)); });
@@ -120,7 +120,7 @@ void DerivedSource::describe() {
   }
 }
 
-// ---- computing it ----
+// ---- computing them ----
 
 void DerivedSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                          NodeArrays& out) const {

@@ -1,10 +1,10 @@
-// Scalars that no file holds: what the flow's density, momentum and energy (or velocity and pressure) give,
-// and what the grid itself gives. Added to any source, behind its own scalars.
+// Scalars that no file holds: computed from density, momentum and energy (or velocity and pressure), or from
+// the grid alone. Decorates any source; derived scalars follow its own.
 //
-//    source ──read box + halo, in pieces──> flow at each node ──gradients by the grid's Jacobian──> quantity
+//    source ──box + halo, in pieces──> flow at each sample ──gradients by the grid's Jacobian──> quantity
 //
-// Derivatives are central, one-sided at a block's ends and beside nodes that are not there. Memory: a piece
-// of some 48 thousand nodes a reading thread, whatever is asked for.
+// Differences are central, and one-sided at the ends of a block and next to blanked samples. Memory: one
+// piece of about 48,000 nodes for each reading thread, whatever the size of the request.
 #pragma once
 
 #include <memory>
@@ -17,13 +17,13 @@
 namespace curvisplat {
 
 struct DerivedOptions {
-  GasModel gas;                       // over what the files tell, and 1.4 and 1 if nobody does
-  std::optional<double> blank_value;  // a scalar with this value has none
+  GasModel gas;                       // overrides the files' values; the defaults are 1.4 and 1
+  std::optional<double> blank_value;  // samples with this value are blanked
 };
 
 class DerivedSource final : public GridSource {
  public:
-  /// Throws UsageError for a gas that there is not.
+  /// Throws UsageError if gamma or the gas constant is out of range.
   DerivedSource(std::unique_ptr<GridSource> source, const DerivedOptions& options);
 
   const GridDescription& description() const override { return description_; }
@@ -40,8 +40,8 @@ class DerivedSource final : public GridSource {
   PerfectGas gas_;
   std::optional<float> blank_value_;
   FlowInputs inputs_;
-  std::vector<double> freestream_mach_;   // [block]; 0: not known
-  std::vector<QuantityInfo> quantities_;  // of the scalars behind the source's own
+  std::vector<double> freestream_mach_;   // [block]; 0: unknown
+  std::vector<QuantityInfo> quantities_;  // of the derived scalars, in order
 };
 
 }  // namespace curvisplat

@@ -38,7 +38,7 @@ glm::dvec3 curl(const glm::dmat3& gradient) {
   return {gradient[2].y - gradient[1].z, gradient[0].z - gradient[2].x, gradient[1].x - gradient[0].y};
 }
 
-/// Half of what the rotation's norm has over the strain's, squared: of ∂a u_b, the sum of -∂a u_b ∂b u_a / 2.
+/// (|rotation tensor|² - |strain tensor|²) / 2 = -1/2 sum over a, b of (∂a u_b) (∂b u_a).
 double qCriterion(const glm::dmat3& gradient) {
   double sum = 0;
   for (int a = 0; a < 3; ++a)

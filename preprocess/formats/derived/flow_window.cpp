@@ -109,7 +109,7 @@ void FlowWindow::computeFlow() {
   for (size_t n = 0; n < flow_.size(); ++n) flow_[n] = flowAt(n);
 }
 
-/// In place: a centre depends on its own and on later elements.
+/// Works in place, since a centre depends on its own and later elements only.
 void FlowWindow::moveToCentres() {
   const uint64_t rows = window_.j1 - window_.j0, planes = window_.k1 - window_.k0;
   for (size_t n = 0; n < there_.size(); ++n) {
@@ -149,7 +149,7 @@ FlowState FlowWindow::flowAt(size_t n) const {
   return flow;
 }
 
-/// The neighbours of a node (or cell) along an axis that `has` is true for; itself where there is none.
+/// The neighbours of a sample along an axis for which `has` is true; the sample itself where there is none.
 template <typename Has>
 std::pair<size_t, size_t> FlowWindow::neighbours(size_t n, int axis, uint64_t index, const Has& has) const {
   const size_t stride = axis == 0 ? 1 : axis == 1 ? row_ : plane_;
@@ -186,7 +186,7 @@ glm::dvec3 FlowWindow::pressureGradient(size_t n, const std::array<uint64_t, 3>&
   return LatticeGradient(steps)(differences);
 }
 
-/// Of the Jacobian of a whole cell around the node, also at a block's end.
+/// The determinant of the Jacobian of a full-size cell around the node, also at the ends of a block.
 double FlowWindow::determinant(size_t n, const std::array<uint64_t, 3>& index) const {
   glm::dmat3 jacobian;
   for (int axis = 0; axis < 3; ++axis) {

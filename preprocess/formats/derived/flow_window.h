@@ -1,4 +1,4 @@
-// The flow at some rows of nodes (or in their cells), read from a source's scalars, and its gradients.
+// The flow and its gradients at the samples of a few rows, computed from a source's scalars.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace curvisplat {
 
-/// Positions of the scalars that the flow is computed from, all of one centring.
+/// Indices of the scalars that the flow is computed from, all of one centring.
 struct FlowInputs {
   Centring centring = Centring::kNode;
   std::optional<uint32_t> density, energy, pressure;
@@ -22,27 +22,29 @@ struct FlowInputs {
 
   bool hasVelocity() const;
   bool hasPressure() const;
-  /// Those of them that quantities with these needs take.
+  /// The inputs that quantities with these needs (QuantityNeeds) use.
   std::vector<uint32_t> neededFor(unsigned needs) const;
 };
 
-/// Goes over a block piece by piece; one thread. Keeps its capacity.
+/// Processes a block piece by piece, in one thread. Its buffers keep their capacity.
 class FlowWindow {
  public:
-  /// `needs`: of all quantities to come (QuantityNeeds). References must outlive it.
+  /// `needs`: union of the needs (QuantityNeeds) of all quantities that will be computed. The references must
+  /// outlive the window.
   FlowWindow(const GridSource& source, const FlowInputs& inputs, const PerfectGas& gas,
              std::optional<float> blank_value, unsigned needs);
 
-  /// Reads `box` and its halo: coordinates, `stored` scalars of the source and inputs. Throws Error.
+  /// Reads `box` and its halo: coordinates, the source's scalars `stored`, and the inputs. Throws Error.
   void read(uint32_t block, const NodeBox& box, const std::vector<uint32_t>& stored);
 
-  /// Copies what was read of the box to where it lies in `whole`: stored scalar n to out.scalars[to[n]]. To
+  /// Copies the box that was read to its place in `whole`; stored scalar n goes to out.scalars[to[n]]. Must
   /// be called before computeFlow().
   void copyStored(const NodeBox& whole, std::span<const size_t> to, NodeArrays& out) const;
 
   void computeFlow();
 
-  /// Values of the box, to where it lies in `whole`; NaN where a node is not there or has no flow.
+  /// Computes the box's values to its place in `whole`; NaN at blanked samples and where the flow is
+  /// undefined.
   void compute(Quantity quantity, double freestream_mach, const NodeBox& whole,
                std::vector<float>& out) const;
 
@@ -66,13 +68,13 @@ class FlowWindow {
   const std::optional<float> blank_value_;
   const unsigned needs_;
   const std::vector<uint32_t> needed_;
-  const bool moves_;  // positions become the cells' centres
+  const bool moves_;  // positions are moved to the centres of the cells
   const Halo halo_;
 
   const GridBlock* block_ = nullptr;
   NodeBox box_, window_;
   size_t row_ = 0, plane_ = 0;
-  size_t stored_ = 0;  // scalars before the inputs
+  size_t stored_ = 0;  // number of scalars before the inputs in nodes_
   NodeArrays nodes_;
   std::vector<uint8_t> there_;
   std::vector<FlowState> flow_;

@@ -20,7 +20,7 @@ bool isTime(const NetcdfFile& file, size_t dim) {
   return dimension.unlimited || dimension.name == "time" || dimension.name == "Time";
 }
 
-/// The dimensions in space, three of them, and that of time.
+/// The three dimensions in space and the time dimension.
 std::optional<CfDimensions> dimensionsOf(const NetcdfFile& file, const NetcdfVariable& variable) {
   CfDimensions dims;
   std::vector<size_t> space;
@@ -30,7 +30,7 @@ std::optional<CfDimensions> dimensionsOf(const NetcdfFile& file, const NetcdfVar
     else
       space.push_back(dim);
   }
-  // Of more than three, those of one value are none.
+  // If there are more than three, dimensions of length 1 are dropped.
   for (size_t n = 0; space.size() > 3 && n < space.size();) {
     if (file.dimensions()[space[n]].length == 1)
       space.erase(space.begin() + static_cast<ptrdiff_t>(n));
@@ -47,7 +47,8 @@ std::string describe(const NetcdfFile& file, const CfDimensions& dims) {
   return fmt::format("{}, {}, {}", name(2), name(1), name(0));
 }
 
-/// The variable's coordinate of a role: what it names itself, what is called like its dimensions, any other.
+/// The variable's coordinate of a role. Candidates in order: variables in its `coordinates` attribute,
+/// variables named like its dimensions, all others.
 std::optional<CfTerm> coordinateOf(const NetcdfFile& file, const NetcdfVariable& variable,
                                    const CfDimensions& dims, CfRole role) {
   std::vector<const NetcdfVariable*> candidates;
@@ -74,8 +75,8 @@ class GridFinder {
     std::set<std::string> auxiliary;
     for (const NetcdfVariable& variable : file_.variables())
       for (const char* attribute : {"bounds", "climatology"}) auxiliary.insert(variable.text(attribute));
-    // What varies in time says of which time dimension a grid is. Coordinates of every node can be drawn too,
-    // but are seldom what is wanted first.
+    // Variables that vary in time come first, since they determine a grid's time dimension. Coordinates of
+    // every node can be drawn too, but come last: they are seldom the scalar of interest.
     for (const bool coordinates : {false, true})
       for (const bool steady : {false, true})
         for (const NetcdfVariable& variable : file_.variables())
@@ -107,7 +108,7 @@ class GridFinder {
                                std::string& reason) {
     for (const size_t dim : dims.axes)
       if (file_.dimensions()[dim].length < 2) {
-        reason = fmt::format("its dimension {} has no two values", file_.dimensions()[dim].name);
+        reason = fmt::format("dimension {} has fewer than 2 values", file_.dimensions()[dim].name);
         return std::nullopt;
       }
     CfGrid grid;
@@ -129,8 +130,8 @@ class GridFinder {
     for (size_t axis = 0; axis < 3; ++axis)
       if (!longitude->varies(axis) && !latitude->varies(axis)) levels.push_back(axis);
     if (levels.size() != 1) {
-      reason = fmt::format("{} and {} do not lie on two of its dimensions {}", longitude->variable().name,
-                           latitude->variable().name, describe(file_, dims));
+      reason = fmt::format("{} and {} do not vary along exactly two of its dimensions {}",
+                           longitude->variable().name, latitude->variable().name, describe(file_, dims));
       return std::nullopt;
     }
     auto [vertical, words] = CfVertical::of(file_, variable, dims, levels[0]);

@@ -1,5 +1,5 @@
-// The curvilinear grids in a NetCDF file, by the CF conventions. Variables of the same three dimensions (and
-// time) are on one grid; on a staggered mesh a file has several, and a variable's own dimensions say which.
+// The curvilinear grids in a NetCDF file, by the CF conventions. Variables with the same three dimensions
+// (and time) share a grid. A file of a staggered mesh has several grids; a variable's dimensions decide.
 #pragma once
 
 #include <string>
@@ -12,14 +12,14 @@
 namespace curvisplat {
 
 struct CfGrid {
-  CfDimensions dims;  // along i the variables' last, and so on
+  CfDimensions dims;  // i is the variables' last dimension
   std::vector<const NetcdfVariable*> variables;
   CfTerm longitude, latitude;  // or x and y
-  bool degrees = true;         // else x and y are lengths
+  bool degrees = true;         // false: x and y, which are lengths
   CfVertical vertical;
 };
 
-/// What is no grid, and why.
+/// A variable that is on no grid, and the reason.
 struct CfLeftOut {
   std::string variable, reason;
 };
@@ -29,12 +29,12 @@ struct CfGrids {
   std::vector<CfLeftOut> left_out;
 };
 
-/// `time_step`: which values are taken of what depends on time. It is not checked. `file` must outlive what
-/// is returned.
+/// `time_step`: the step at which time-dependent variables are read; not checked. `file` must outlive the
+/// result.
 CfGrids findCfGrids(const NetcdfFile& file, size_t time_step);
 
-/// The variables of each grid's time dimension: the time of every step, numbers from 0 if the file tells
-/// none; empty where there is no time.
+/// The time of every step of a grid: values of the time coordinate, or 0, 1, ... if there is none. Empty if
+/// the grid has no time dimension.
 std::vector<double> cfTimes(const NetcdfFile& file, const CfGrid& grid);
 
 }  // namespace curvisplat

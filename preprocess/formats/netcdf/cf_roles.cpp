@@ -28,7 +28,7 @@ bool isVerticalName(std::string_view standard_name) {
          beginsWithOneOf(standard_name, {"height_above_", "ocean_s", "ocean_double_sigma", "atmosphere_"});
 }
 
-/// Names that programs use which write no attributes.
+/// Customary variable names of programs that write no attributes.
 CfRole roleByName(const std::string& name, bool length) {
   if (beginsWithOneOf(name, {"lon", "nav_lon", "xlong", "glam"})) return CfRole::kLongitude;
   if (beginsWithOneOf(name, {"lat", "nav_lat", "xlat", "gphi"})) return CfRole::kLatitude;
@@ -58,7 +58,7 @@ CfRole cfRole(const NetcdfFile& file, const NetcdfVariable& variable) {
   if (standard_name == "time" || units.find(" since ") != std::string::npos) return CfRole::kTime;
 
   const bool length = kilometresOf(units).has_value();
-  // A variable that is called like its dimension is a coordinate, and may say of which axis.
+  // A variable with the name of its dimension is a coordinate variable, and may have an `axis`.
   const bool coordinate = variable.dims.size() == 1 && file.dimension(variable, 0).name == variable.name;
   if (isVerticalName(standard_name) || !variable.text("formula_terms").empty() ||
       (coordinate && (axis == "z" || !variable.text("positive").empty())))

@@ -1,4 +1,4 @@
-// What a NetCDF variable is by the CF conventions: longitude, latitude, depth, time, or none of them.
+// The role of a NetCDF variable by the CF conventions: longitude, latitude, depth, time, or none.
 #pragma once
 
 #include <optional>
@@ -12,20 +12,20 @@ enum class CfRole {
   kNone,
   kLongitude,  // degrees
   kLatitude,
-  kX,  // of a projection, a length
+  kX,  // projection coordinate, a length
   kY,
   kVertical,  // depth, height or level: see CfVertical
   kTime,
 };
 
-/// By standard_name, units, axis and formula_terms; where all of these are missing, by customary names.
+/// Decided by standard_name, units, axis and formula_terms; if all of these are missing, by customary names.
 /// Source: CF conventions 1.10, chapter 4.
 CfRole cfRole(const NetcdfFile& file, const NetcdfVariable& variable);
 
-/// Kilometres of a unit of length; nothing if it is none.
+/// The length of a unit in kilometres; nullopt if it is not a unit of length.
 std::optional<double> kilometresOf(const std::string& unit);
 
-/// Whether its values grow downwards: by `positive`, else by what it is called.
+/// Whether its values increase downwards: by its attribute `positive`, else by its name.
 bool growsDownwards(const NetcdfVariable& variable);
 
 }  // namespace curvisplat

@@ -5,13 +5,13 @@
 namespace curvisplat {
 namespace {
 
-/// A node's value between two of a term.
+/// Linear weights of two neighbouring points of a term at a node.
 struct Between {
-  uint64_t first;  // and the next
+  uint64_t first;  // index of the first of the two points
   double weight_first, weight_next;
 };
 
-/// Of the block's node `n`, for a term of `length` points that are by one more or fewer than the nodes.
+/// Weights at the block's node `n` for a term of `length` points, one more or one fewer than the nodes.
 Between between(uint64_t n, int longer, uint64_t length) {
   if (longer > 0) return {n, 0.5, 0.5};
   if (length < 2) return {0, 1, 0};
@@ -20,7 +20,7 @@ Between between(uint64_t n, int longer, uint64_t length) {
   return {n - 1, 0.5, 0.5};
 }
 
-/// Values at the nodes [begin, end) along `axis` of values at a term's points from `point` on.
+/// Interpolates along `axis` to the nodes [begin, end). `from` has the term's values from point `point` on.
 CfValues resampled(const CfValues& from, size_t axis, uint64_t begin, uint64_t end, uint64_t point,
                    int longer, uint64_t length) {
   CfValues to;
@@ -63,7 +63,7 @@ std::optional<CfTerm> CfTerm::of(const NetcdfFile& file, const NetcdfVariable& v
     }
   }
   term.exact_ = unknown.empty();
-  // The last is along i, the one before along j: as in the block, unless that axis is taken.
+  // Matched from the last dimension (i) to the first, as in the block, skipping axes that are taken.
   for (auto d = unknown.rbegin(); d != unknown.rend(); ++d) {
     const size_t axis = variable.dims.size() - 1 - *d;
     if (axis > 2 || term.along_[axis]) return std::nullopt;

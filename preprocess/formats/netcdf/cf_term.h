@@ -1,6 +1,5 @@
-// A NetCDF variable seen from the nodes of a block: along which of the block's axes it varies, and its values
-// there. One that stands on the points beside the block's nodes, as on a staggered grid, is taken half-way
-// between them.
+// A NetCDF variable as a function on the nodes of a block: the axes of the block along which it varies, and
+// its values at the nodes. A variable on staggered points is interpolated to the nodes half-way between them.
 #pragma once
 
 #include <array>
@@ -12,12 +11,12 @@
 
 namespace curvisplat {
 
-/// Some nodes of a block: half-open ranges along i, j, k.
+/// A box of nodes of a block: half-open ranges along i, j, k.
 struct CfRange {
   std::array<uint64_t, 3> begin{}, end{};
 };
 
-/// What was read of a term: along an axis that it does not vary along it has one value.
+/// Values of a term. Along an axis on which the term does not depend there is a single value.
 struct CfValues {
   std::array<uint64_t, 3> count{1, 1, 1};
   std::vector<double> values;
@@ -28,7 +27,7 @@ struct CfValues {
   }
 };
 
-/// The block's dimensions in the file, along i, j, k, and that of time.
+/// The block's dimensions in the file: along i, j, k, and of time.
 struct CfDimensions {
   std::array<size_t, 3> axes{};
   std::optional<size_t> time;
@@ -37,32 +36,37 @@ struct CfDimensions {
 
 class CfTerm {
  public:
-  /// Nothing if the variable has a dimension that is none of the block's and does not fit in between: it must
-  /// be as long as the block's in the same place, counted from the last, one longer (the block's nodes are
-  /// between its points) or one shorter (its points are between the block's nodes, the outer of which are
-  /// extrapolated to). A dimension of length 1 is passed over.
+  /// Matches the variable's dimensions with the block's. A dimension that is not one of the block's is
+  /// matched by position, counted from the last, and by length:
+  ///
+  ///   equal length   its points are the block's nodes
+  ///   one longer     the block's nodes are half-way between its points
+  ///   one shorter    its points are half-way between the block's nodes; the outermost nodes are extrapolated
+  ///   1              ignored
+  ///
+  /// nullopt if a dimension does not match.
   static std::optional<CfTerm> of(const NetcdfFile& file, const NetcdfVariable& variable,
                                   const CfDimensions& block);
 
   const NetcdfVariable& variable() const { return *variable_; }
   bool varies(size_t axis) const { return along_[axis].has_value(); }
-  /// All of its dimensions are the block's own.
+  /// Whether all of its dimensions are the block's own.
   bool exact() const { return exact_; }
   size_t axes() const { return varies(0) + varies(1) + varies(2); }
 
-  /// It has a value for each node, in the nodes' order, i fastest.
+  /// Whether it stores one value for each node, in the order of the nodes (i fastest).
   bool ofNodes() const;
-  NetcdfBox boxOf(const CfRange& range) const;  // that the values of `range` are made of
+  NetcdfBox boxOf(const CfRange& range) const;  // the stored values needed for `range`
 
   CfValues read(const NetcdfFile& file, const CfRange& range) const;
 
  private:
   const NetcdfVariable* variable_ = nullptr;
-  std::array<std::optional<size_t>, 3> along_;  // its dimension along the block's axis
-  std::array<int, 3> longer_{};                 // by how many it is, there
-  std::array<uint64_t, 3> length_{};            // of it, there
+  std::array<std::optional<size_t>, 3> along_;  // [axis of the block]: its dimension; nullopt: independent
+  std::array<int, 3> longer_{};                 // [axis]: its length minus the block's: -1, 0 or 1
+  std::array<uint64_t, 3> length_{};            // [axis]: its length
   bool exact_ = true;
-  std::vector<size_t> start_;  // the time step, where it has one; 0
+  std::vector<size_t> start_;  // [dimension]: the time step for the time dimension, else 0
 };
 
 }  // namespace curvisplat

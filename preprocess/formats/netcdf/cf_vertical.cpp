@@ -31,7 +31,7 @@ std::optional<CfTerm> termNamed(const NetcdfFile& file, const std::map<std::stri
   return CfTerm::of(file, *variable, block);
 }
 
-/// The number that a term is.
+/// The value of a scalar term.
 double constant(const NetcdfFile& file, const std::optional<CfTerm>& term) {
   if (!term || term->axes() > 0) return std::nan("");
   return term->read(file, {{0, 0, 0}, {1, 1, 1}}).values.at(0);
@@ -48,7 +48,7 @@ std::pair<std::optional<CfVertical>, std::string> CfVertical::of(const NetcdfFil
   if (along && !along->text("formula_terms").empty())
     if (auto found = byFormula(file, *along, block, axis, reason)) return {std::move(found), ""};
 
-  // What the variable itself names comes first.
+  // Variables in its own `coordinates` attribute come first.
   std::vector<const NetcdfVariable*> candidates;
   std::istringstream names(variable.text("coordinates"));
   for (std::string name; names >> name;)
@@ -76,7 +76,7 @@ std::optional<CfVertical> CfVertical::byLevels(const NetcdfFile& file, const Net
   if (!term || !term->varies(axis)) return std::nullopt;
   if (!kilometres && (!coordinate.text("units").empty() || !coordinate.text("formula_terms").empty())) {
     reason =
-        fmt::format("{} has the unit '{}', which is no length", coordinate.name, coordinate.text("units"));
+        fmt::format("{} has the unit '{}'; expected a length", coordinate.name, coordinate.text("units"));
     return std::nullopt;
   }
   CfVertical vertical;
@@ -84,7 +84,7 @@ std::optional<CfVertical> CfVertical::byLevels(const NetcdfFile& file, const Net
   vertical.terms_.push_back(*term);
   vertical.words_ = coordinate.name;
   if (!kilometres)
-    vertical.warnings_.push_back(fmt::format("{} tells no unit: taken for metres", coordinate.name));
+    vertical.warnings_.push_back(fmt::format("{} has no units; metres are assumed", coordinate.name));
   return vertical;
 }
 
@@ -112,7 +112,7 @@ std::optional<CfVertical> CfVertical::byFormula(const NetcdfFile& file, const Ne
   const std::string name = coordinate.text("standard_name");
   const auto kind = kinds.find(name);
   if (kind == kinds.end()) {
-    reason = fmt::format("{} has the formula of {}, which is not read", coordinate.name,
+    reason = fmt::format("{} has the formula of {}, which is not supported", coordinate.name,
                          name.empty() ? "no standard_name" : name);
     return std::nullopt;
   }
@@ -124,13 +124,13 @@ std::optional<CfVertical> CfVertical::byFormula(const NetcdfFile& file, const Ne
   vertical.eta_ = termNamed(file, terms, "eta", block);
   vertical.depth_ = termNamed(file, terms, "depth", block);
   const auto lacks = [&](const char* key) {
-    reason = fmt::format("{} has no term '{}' of its formula on these dimensions", coordinate.name, key);
+    reason = fmt::format("the formula of {} has no term '{}' on these dimensions", coordinate.name, key);
     return std::nullopt;
   };
   if (!vertical.s_ || !vertical.s_->varies(axis)) return lacks("s");
   if (!vertical.depth_ || vertical.depth_->varies(axis)) return lacks("depth");
   vertical.scale_ = kilometresOf(vertical.depth_->variable().text("units")).value_or(1e-3);
-  if (!vertical.eta_) vertical.warnings_.push_back("no surface elevation: taken for 0");
+  if (!vertical.eta_) vertical.warnings_.push_back("no surface elevation (eta); 0 is assumed");
   if (kind->second == Kind::kSigma) return vertical;
 
   vertical.depth_c_ = constant(file, termNamed(file, terms, "depth_c", block));
@@ -194,7 +194,7 @@ CfValues CfVertical::heights(const NetcdfFile& file, const CfRange& range) const
   for (uint64_t k = 0; k < heights.count[2]; ++k)
     for (uint64_t j = 0; j < heights.count[1]; ++j)
       for (uint64_t i = 0; i < heights.count[0]; ++i) {
-        // There is no elevation on land, where the depth may still be known.
+        // On land the elevation is missing, but the depth may be known.
         const double elevation = eta.at(i, j, k);
         heights.values.push_back(scale_ * formula(s.at(i, j, k), c.at(i, j, k),
                                                   std::isfinite(elevation) ? elevation : 0, depth.at(i, j, k),

@@ -1,5 +1,5 @@
-// How high the nodes of a block are: by a depth or height of levels or of nodes, by a geopotential, or by the
-// formula of a terrain-following coordinate. Whatever it is in the file, here it is kilometres, upwards.
+// The heights of a block's nodes: from the depth or height of levels or of nodes, from a geopotential, or
+// from the formula of a terrain-following coordinate. Always converted to kilometres, positive upwards.
 #pragma once
 
 #include <optional>
@@ -15,20 +15,20 @@ namespace curvisplat {
 
 class CfVertical {
  public:
-  /// The vertical coordinate of `variable`, whose block has its levels along `axis`; else a reason, in words.
+  /// The vertical coordinate of `variable`, whose block has its levels along `axis`; or nullopt and a reason.
   ///
-  /// The first there is of: a formula of the coordinate along the axis (ocean_sigma_coordinate,
-  /// ocean_s_coordinate and its generic forms 1 and 2), a height of every node, WRF's geopotential (PH and
-  /// PHB), a height of every level.
+  /// Tried in this order: a formula of the coordinate along the axis (ocean_sigma_coordinate,
+  /// ocean_s_coordinate and its generic forms 1 and 2), the height of every node, WRF's geopotential (PH and
+  /// PHB), the height of every level.
   static std::pair<std::optional<CfVertical>, std::string> of(const NetcdfFile& file,
                                                               const NetcdfVariable& variable,
                                                               const CfDimensions& block, size_t axis);
 
-  /// One value along the axes that it does not vary along.
+  /// A single value along the axes on which the height does not depend.
   CfValues heights(const NetcdfFile& file, const CfRange& range) const;
 
-  /// Where there is a height of every node, in the nodes' order: reads it to the beginning of `to`, in
-  /// kilometres upwards, and returns true. Takes no memory.
+  /// If the file stores a height for every node in the order of the nodes: reads them to the beginning of
+  /// `to` and returns true, without a buffer. Else returns false.
   bool readNodes(const NetcdfFile& file, const CfRange& range, std::span<double> to) const;
 
   const std::string& words() const { return words_; }  // "depth", "ocean_s_coordinate_g2 of s_rho"
@@ -45,9 +45,9 @@ class CfVertical {
   double formula(double s, double c, double eta, double depth, double depth_c) const;
 
   Kind kind_ = Kind::kLevels;
-  double scale_ = 1;                           // kilometres upwards of what is stored
-  std::vector<CfTerm> terms_;                  // levels: itself; geopotential: base and perturbation
-  std::optional<CfTerm> s_, c_, eta_, depth_;  // of a formula
+  double scale_ = 1;                           // converts stored values to kilometres upwards
+  std::vector<CfTerm> terms_;                  // height: one; geopotential: base and perturbation
+  std::optional<CfTerm> s_, c_, eta_, depth_;  // terms of a formula
   double depth_c_ = 0, a_ = 0, b_ = 0;
   std::string words_;
   std::vector<std::string> warnings_;

@@ -23,7 +23,8 @@ GlobeColumn Globe::column(double longitude, double latitude) const {
     const double east = longitude * kRadiansPerDegree, north = latitude * kRadiansPerDegree;
     return {std::cos(north) * std::cos(east), std::cos(north) * std::sin(east), std::sin(north)};
   }
-  // Within half a turn of the middle, so that a grid across the date line is in one piece.
+  // Longitudes relative to the middle of the grid are within ±180 degrees, so that a grid across the date
+  // line stays in one piece.
   const double from_middle = std::remainder(longitude - middle_longitude_, 360.0);
   return {radius_km_ * kRadiansPerDegree * (middle_longitude_ + from_middle),
           radius_km_ * kRadiansPerDegree * latitude, 0};

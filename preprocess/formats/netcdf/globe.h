@@ -1,14 +1,14 @@
-// Longitude, latitude and height as places in the world: on a sphere, or on a flat map. World units are
-// kilometres, so that the horizontal and the vertical are of one measure.
+// Converts longitude, latitude and height to world positions: on a sphere, or on a flat map (equirectangular
+// projection). World units are kilometres, horizontally and vertically.
 #pragma once
 
 #include "preprocess/formats/common/open_grid_options.h"
 
 namespace curvisplat {
 
-/// Of one direction of the horizontal: the unit vector of a longitude and a latitude, or a place on the map.
+/// The horizontal part of a position: the unit vector of a longitude and a latitude, or a point of the map.
 struct GlobeColumn {
-  double x = 0, y = 0, z = 0;  // on the sphere, of length 1; on the map, in kilometres, and 0
+  double x = 0, y = 0, z = 0;  // sphere: of length 1; map: x and y in kilometres, z = 0
 };
 
 struct GlobePlace {
@@ -17,12 +17,12 @@ struct GlobePlace {
 
 class Globe {
  public:
-  /// `middle_longitude`: the map is cut opposite of it, in degrees.
+  /// `middle_longitude`, in degrees: the map is cut on the opposite side.
   Globe(const GlobeOptions& options, bool degrees, double middle_longitude);
 
   bool sphere() const { return sphere_; }
 
-  /// Of degrees east and north; of kilometres, if the grid is one of lengths.
+  /// From degrees east and north, or from kilometres if the grid has lengths.
   GlobeColumn column(double longitude, double latitude) const;
 
   GlobePlace place(const GlobeColumn& column, double height_km) const {

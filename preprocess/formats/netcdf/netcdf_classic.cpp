@@ -13,7 +13,7 @@ namespace {
 
 constexpr uint64_t kBlock = 1 << 16;
 
-/// Reads a header's numbers, big-endian, one after the other.
+/// Reads the big-endian numbers of a header in sequence.
 class HeaderCursor {
  public:
   explicit HeaderCursor(const InputFile& file) : file_(file) {}
@@ -24,7 +24,7 @@ class HeaderCursor {
     return value;
   }
 
-  /// Passes over so many bytes, and those that fill the last four.
+  /// Skips `bytes`, rounded up to a multiple of 4.
   void skip(uint64_t bytes) {
     if (bytes > file_.size() - position_) end();
     position_ += bytes;
@@ -48,7 +48,7 @@ class HeaderCursor {
   }
 
   [[noreturn]] void end() const {
-    throw Error("{}: ends within its NetCDF header, at byte {}: it is truncated; copy or write it again",
+    throw Error("{}: ends at byte {}, inside its NetCDF header; it is truncated: copy or write it again",
                 file_.path().string(), file_.size());
   }
 
@@ -59,7 +59,7 @@ class HeaderCursor {
 };
 
 struct Variable {
-  double record_bytes;  // of a record, or of all
+  double record_bytes;  // of one record, or of the whole variable if it has no records
   double begin;
   bool in_records;
 };
@@ -72,7 +72,7 @@ class Header {
     count_bytes_ = version_ == 5 ? 8 : 4;
     offset_bytes_ = version_ == 1 ? 4 : 8;
     records_ = count();
-    // A file that is still written to has no count.
+    // A file that is still being written has no record count yet.
     if (records_ == (count_bytes_ == 4 ? 0xffffffffu : ~uint64_t{0})) records_ = 0;
     for (uint64_t n = listed(0x0a); n > 0; --n) {
       skipName();
@@ -105,10 +105,10 @@ class Header {
   uint64_t count() { return cursor_.number(count_bytes_); }
   void skipName() { cursor_.skip(count()); }
 
-  /// The count of a list, which may be missing.
+  /// The number of entries of a list; the list may be absent.
   uint64_t listed(uint64_t tag) {
     const uint64_t found = cursor_.number(4), entries = count();
-    if (found != tag && !(found == 0 && entries == 0)) cursor_.damaged("a list of an unknown kind");
+    if (found != tag && !(found == 0 && entries == 0)) cursor_.damaged("an unknown list tag");
     return entries;
   }
 
@@ -123,7 +123,7 @@ class Header {
     for (uint64_t n = listed(0x0c); n > 0; --n) {
       skipName();
       const uint64_t bytes = typeBytes(), values = count();
-      if (values > uint64_t{1} << 40) cursor_.damaged("an attribute without end");
+      if (values > uint64_t{1} << 40) cursor_.damaged("an attribute of impossible length");
       cursor_.skip(values * bytes);
     }
   }
@@ -142,7 +142,7 @@ class Header {
     }
     skipAttributes();
     variable.record_bytes *= static_cast<double>(typeBytes());
-    count();  // the size again, which may be wrong for large ones
+    count();  // vsize: redundant, and wrong for large variables
     variable.begin = static_cast<double>(cursor_.number(offset_bytes_));
     variables_.push_back(variable);
   }
@@ -150,7 +150,7 @@ class Header {
   HeaderCursor cursor_;
   uint64_t version_ = 0, records_ = 0;
   size_t count_bytes_ = 4, offset_bytes_ = 4;
-  std::vector<uint64_t> dimensions_;  // 0: of the records
+  std::vector<uint64_t> dimensions_;  // lengths; 0: the record dimension
   std::vector<Variable> variables_;
 };
 
@@ -159,9 +159,8 @@ class Header {
 void checkClassicNetcdf(const InputFile& file) {
   const double bytes = Header(file).bytes();
   if (bytes > static_cast<double>(file.size()))
-    throw Error(
-        "{}: has {} bytes, and its values need {:.0f}: it is truncated or damaged; copy or write it again",
-        file.path().string(), file.size(), bytes);
+    throw Error("{}: is truncated or damaged (found {} bytes, expected {:.0f}); copy or write it again",
+                file.path().string(), file.size(), bytes);
 }
 
 }  // namespace curvisplat

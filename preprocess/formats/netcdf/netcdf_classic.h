@@ -1,13 +1,13 @@
-// How long a classic NetCDF file must be, by its header. NetCDF itself reads zeros behind the end of a file,
-// so that one whose copying broke off would look whole.
+// Checks a classic NetCDF file's size against its header. The NetCDF library returns zeros beyond the end of
+// a file, so that an incomplete copy would look complete.
 #pragma once
 
 #include "stream/base/file.h"
 
 namespace curvisplat {
 
-/// Throws Error if `file`, which begins as a classic NetCDF file does, ends before its header or its last
-/// value does.
+/// Throws Error if `file`, which has the signature of classic NetCDF, ends before the end of its header or of
+/// its last value.
 /// Source: the NetCDF Classic Format Specification (NetCDF User's Guide, appendix B).
 void checkClassicNetcdf(const InputFile& file);
 

@@ -19,13 +19,13 @@
 namespace curvisplat {
 namespace {
 
-// For each open variable: a slab's rows lie in a few chunks, as a rule.
+// For each open variable: the rows of a slab usually lie in a few chunks.
 constexpr size_t kChunkCacheBytes = size_t{2} << 20;
 constexpr size_t kChunkCacheSlots = 1009;
 constexpr float kChunkCachePreemption = 0.75f;
-// Texts and lists of numbers: descriptions, not data.
+// Limit for attributes: they hold descriptions, not data.
 constexpr size_t kMaxAttributeValues = size_t{1} << 20;
-// Deflate makes a thousandth of zeros.
+// Deflate shrinks zeros to about a thousandth.
 constexpr double kMaxCompression = 1100;
 constexpr const char* kNetcdf4 = "NetCDF-4";
 
@@ -54,8 +54,8 @@ size_t bytesOf(nc_type type) {
   }
 }
 
-/// What NetCDF writes where no one has written, unless a variable says otherwise. Bytes have none by
-/// convention: all of their values are used.
+/// NetCDF's fill value for samples that were never written, unless the variable has its own. By convention
+/// bytes have none, since all of their values are in use.
 std::optional<double> defaultFill(nc_type type) {
   switch (type) {
     case NC_SHORT:
@@ -112,7 +112,7 @@ NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
   if (isClassic({begin.data(), begin.size()})) checkClassicNetcdf(file);
   const std::lock_guard lock(dataLibraryMutex());
   nc_set_chunk_cache(kChunkCacheBytes, kChunkCacheSlots, kChunkCachePreemption);
-  // A relative path might look like an address of the network.
+  // NetCDF takes some relative paths for URLs.
   const std::filesystem::path absolute = std::filesystem::absolute(path);
   if (const int status = nc_open(absolute.c_str(), NC_NOWRITE, &file_); status != NC_NOERR)
     fail("the file", status);
@@ -143,14 +143,14 @@ void NetcdfFile::readHeader() {
   kind_ = format == NC_FORMAT_NETCDF4 || format == NC_FORMAT_NETCDF4_CLASSIC ? kNetcdf4 : "NetCDF classic";
 
   std::vector<int> ids(static_cast<size_t>(std::max(0, dimensions)));
-  // NetCDF-4 numbers its dimensions as it likes.
+  // NetCDF-4's dimension ids need not be consecutive.
   int found = 0;
   if ((status = nc_inq_dimids(file_, &found, ids.data(), 0)) != NC_NOERR || found != dimensions)
     fail("the list of dimensions", status);
   int most = -1;
   for (const int id : ids) most = std::max(most, id);
   if (most >= (1 << 20))
-    throw Error("{}: has a dimension numbered {}; the file is damaged", path_.string(), most);
+    throw Error("{}: has a dimension with the id {}; the file is damaged", path_.string(), most);
   dimensions_.resize(static_cast<size_t>(most + 1));
   for (const int id : ids) {
     char name[NC_MAX_NAME + 1] = {};
@@ -177,7 +177,7 @@ void NetcdfFile::readVariable(int id) {
   variable.numeric = variable.value_bytes > 0;
   for (const int dimension : ids) {
     if (dimension < 0 || static_cast<size_t>(dimension) >= dimensions_.size())
-      throw Error("{}: {} has a dimension that the file does not have; the file is damaged", path_.string(),
+      throw Error("{}: {} refers to a dimension that does not exist; the file is damaged", path_.string(),
                   name);
     variable.dims.push_back(static_cast<size_t>(dimension));
   }
@@ -223,7 +223,7 @@ void NetcdfFile::checkSizes(uint64_t file_bytes) const {
     for (const size_t dim : variable.dims) bytes *= static_cast<double>(dimensions_[dim].length);
     if (bytes > most)
       throw Error(
-          "{}: {} should have {:.0f} bytes, more than a file of {} can hold; the file is damaged: copy "
+          "{}: {} declares {:.0f} bytes, more than a file of {} bytes can hold; the file is damaged: copy "
           "or write it again",
           path_.string(), variable.name, bytes, file_bytes);
   }
@@ -287,7 +287,7 @@ void NetcdfFile::readWith(const Get& get, const NetcdfVariable& variable, const 
   {
     const std::lock_guard lock(dataLibraryMutex());
     const int status = get(file_, variable.id, box.start.data(), box.count.data(), to.data());
-    // Of a number that is too large for a float there is an infinity, which is drawn nowhere.
+    // NC_ERANGE: a number too large for a float becomes infinite, which blanks its sample.
     if (status != NC_NOERR && status != NC_ERANGE) fail(variable.name, status);
   }
   const auto position = static_cast<size_t>(&variable - variables_.data());

@@ -1,9 +1,9 @@
 // A NetCDF file, classic or NetCDF-4: its dimensions, variables and attributes, and boxes of values,
-// unpacked, with NaN where there is none. What the variables mean is in cf_grid.h.
+// unpacked, with NaN for missing values. cf_grid.h interprets the variables.
 //
-// NetCDF is not thread-safe: every call is made under dataLibraryMutex(), so any number of threads may use a
-// NetcdfFile, one after the other. Beside what is asked for, a read takes the memory of a chunk cache, and
-// where a chunk of a compressed file is larger than that, of the chunk.
+// NetCDF is not thread-safe: every call holds dataLibraryMutex(). Any number of threads may use a NetcdfFile;
+// their calls run one after the other. Besides the destination, a read needs a chunk cache for each variable,
+// or memory for one chunk where a compressed chunk is larger than that cache.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ struct NetcdfDimension {
   bool unlimited = false;
 };
 
-/// An attribute is a text, or numbers.
+/// An attribute is text or a list of numbers.
 struct NetcdfAttribute {
   std::string text;
   std::vector<double> numbers;
@@ -34,16 +34,16 @@ struct NetcdfAttribute {
 struct NetcdfVariable {
   std::string name;
   int id = 0;
-  size_t value_bytes = 0;    // as stored
-  bool numeric = false;      // not texts, not of a type of the file's own
-  std::vector<size_t> dims;  // positions in NetcdfFile::dimensions(), the slowest first
+  size_t value_bytes = 0;    // size of a stored value
+  bool numeric = false;      // neither text nor a user-defined type
+  std::vector<size_t> dims;  // indices into NetcdfFile::dimensions(), slowest first
   std::map<std::string, NetcdfAttribute> attributes;
 
-  /// Empty where there is none.
+  /// The text of an attribute; empty if there is none.
   std::string text(const char* attribute) const;
 };
 
-/// A box of a variable: of each dimension, the slowest first.
+/// A box of a variable: start and count along each dimension, slowest first.
 struct NetcdfBox {
   std::vector<size_t> start, count;
   size_t values() const;
@@ -51,13 +51,13 @@ struct NetcdfBox {
 
 class NetcdfFile {
  public:
-  /// Throws Error, as every member function, with the file, the variable and what NetCDF says.
+  /// This and every member function throws Error with the file, the variable and NetCDF's message.
   explicit NetcdfFile(const std::filesystem::path& path);
   ~NetcdfFile();
   NetcdfFile(const NetcdfFile&) = delete;
   NetcdfFile& operator=(const NetcdfFile&) = delete;
 
-  /// By the first bytes: all HDF5 files are taken for NetCDF-4.
+  /// Checks the signature. Every HDF5 file is accepted as NetCDF-4.
   static bool recognises(const InputFile& file);
 
   const std::filesystem::path& path() const { return path_; }
@@ -67,13 +67,14 @@ class NetcdfFile {
   const NetcdfVariable* find(std::string_view name) const;
   const NetcdfDimension& dimension(const NetcdfVariable& variable, size_t axis) const;
 
-  /// Reads box.values() values to the beginning of `to`: times scale_factor, plus add_offset; NaN where the
-  /// value is _FillValue (or NetCDF's own fill value), missing_value, or outside of the valid range.
+  /// Reads box.values() values to the beginning of `to`, multiplied by scale_factor, plus add_offset. NaN
+  /// where the stored value is _FillValue (or NetCDF's default fill value), missing_value, or outside the
+  /// valid range.
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const;
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<float> to) const;
 
  private:
-  /// How stored numbers become values.
+  /// How stored numbers are converted to values.
   struct Packing {
     double scale = 1, offset = 0;
     std::vector<double> missing;
@@ -97,7 +98,7 @@ class NetcdfFile {
   std::string kind_;
   std::vector<NetcdfDimension> dimensions_;
   std::vector<NetcdfVariable> variables_;
-  std::vector<Packing> packings_;  // of each variable
+  std::vector<Packing> packings_;  // [variable]
 };
 
 }  // namespace curvisplat

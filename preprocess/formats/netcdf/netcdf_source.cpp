@@ -16,9 +16,9 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kNamesListed = 3;
-// Nodes whose places are made at a time: what that takes beside the places is small.
+// Positions are computed for this many nodes at a time, which bounds the buffers.
 constexpr uint64_t kNodesAtATime = 1 << 16;
-// Nodes of a variable that only says which nodes are there.
+// The mask variable, if it is not requested itself, is read for this many nodes at a time.
 constexpr uint64_t kMaskNodesAtATime = 1 << 20;
 
 std::string listed(const std::vector<std::string>& names) {
@@ -45,7 +45,7 @@ bool isCalled(const NetcdfVariable& variable, const std::string& name) {
   return simplifiedName(variable.name) == simple || simplifiedName(variable.text("standard_name")) == simple;
 }
 
-/// Positions of a scalar that is called `name`: the grid, and the variable in it.
+/// Indices of the scalar `name`: of its grid, and of the variable in that grid.
 std::optional<std::pair<size_t, size_t>> positionOf(const std::vector<CfGrid>& grids,
                                                     const std::string& name) {
   for (const bool exact : {true, false})
@@ -71,12 +71,12 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFile& file, const OpenGridOptions& o
                                 GridDescription& description, size_t& mask) {
   CfGrids found = findCfGrids(file, options.time_step.value_or(0));
   if (found.grids.empty()) {
-    std::string why = "it has no variable of three dimensions in space";
+    std::string why = "no variable has three dimensions in space";
     if (!found.left_out.empty()) {
       const auto reasons = byReason(found.left_out);
       why = fmt::format("{}: {}", listed(reasons.begin()->second), reasons.begin()->first);
     }
-    throw Error("{}: no grid by the CF conventions: {}", file.path().string(), why);
+    throw Error("{}: has no grid by the CF conventions: {}", file.path().string(), why);
   }
 
   size_t chosen = 0;
@@ -85,9 +85,9 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFile& file, const OpenGridOptions& o
   std::string chooser;
   for (const std::string& name : options.scalars) {
     const auto position = positionOf(found.grids, name);
-    if (!position) continue;  // derived from others, or an error that whoever asks will make
+    if (!position) continue;  // a derived scalar, or a wrong name, which scalarsNamed() reports
     if (!chooser.empty() && position->first != chosen)
-      throw Error("{}: {} and {} stand on other points, {} and {}: convert them to a cache each",
+      throw Error("{}: {} and {} are on different grids ({} and {}); convert each to a cache of its own",
                   file.path().string(), chooser, name, dimensionsInWords(file, found.grids[chosen]),
                   dimensionsInWords(file, found.grids[position->first]));
     if (chooser.empty()) mask = position->second;
@@ -99,7 +99,7 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFile& file, const OpenGridOptions& o
     std::vector<std::string> names;
     for (const NetcdfVariable* variable : found.grids[g].variables) names.push_back(variable->name);
     description.warnings.push_back(
-        fmt::format("left out: {}, on other points ({}): name one with --scalar to have them", listed(names),
+        fmt::format("left out: {}, on another grid ({}); select that grid with --scalar NAME", listed(names),
                     dimensionsInWords(file, found.grids[g])));
   }
   for (const auto& [reason, names] : byReason(found.left_out))
@@ -109,9 +109,9 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFile& file, const OpenGridOptions& o
 
 Globe NetcdfSource::globeOf(const GlobeOptions& options) const {
   if (!grid_.degrees && options.shape == GlobeOptions::Shape::kSphere)
-    throw Error("{}: {} and {} are lengths, not degrees: they lie on no sphere; leave out --sphere",
-                file_.path().string(), grid_.longitude.variable().name, grid_.latitude.variable().name);
-  // A map is cut opposite to the grid's middle.
+    throw Error("{}: {} and {} are lengths; --sphere needs degrees: leave it out", file_.path().string(),
+                grid_.longitude.variable().name, grid_.latitude.variable().name);
+  // The map is cut opposite the middle of the grid.
   CfRange middle;
   for (size_t axis = 0; axis < 3; ++axis) {
     middle.begin[axis] = file_.dimensions()[grid_.dims.axes[axis]].length / 2;
@@ -125,7 +125,7 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
   description_.files.push_back(options.grid.string());
   description_.times = cfTimes(file_, grid_);
   if (grid_.dims.time && description_.times.empty())
-    throw Error("{}: has no values yet: there are none along {}", file_.path().string(),
+    throw Error("{}: has no time step: dimension {} has length 0", file_.path().string(),
                 file_.dimensions()[*grid_.dims.time].name);
   description_.time_step = chosenTimeStep(file_.path().string(), description_.times, options.time_step);
 
@@ -182,7 +182,7 @@ void NetcdfSource::readBlank(const NodeBox& box, std::vector<uint8_t>& blank) co
   size_t n = 0;
   for (uint64_t k = box.k0; k < box.k1; k += planes)
     for (uint64_t j = box.j0; j < box.j1; j += rows) {
-      // Several planes only if their rows are all of the box's: so pieces follow one another.
+      // Several planes only if each is read whole: so the pieces are contiguous in `blank`.
       const NodeBox piece{j, std::min(j + rows, box.j1), k, std::min(k + planes, box.k1)};
       values.resize(ni * (piece.j1 - piece.j0) * (piece.k1 - piece.k0));
       readScalar(piece, mask_, values);
@@ -206,7 +206,7 @@ void NetcdfSource::readPlaces(const NodeBox& box, NodeArrays& out) const {
       const auto column = [&](uint64_t ii, uint64_t jj, uint64_t kk) {
         return globe_.column(scale * east.at(ii, jj, kk), scale * north.at(ii, jj, kk));
       };
-      // One for all levels, as a rule.
+      // Usually one column serves all levels.
       const bool upright = !grid_.longitude.varies(2) && !grid_.latitude.varies(2);
       const uint64_t rows_here = range.end[1] - range.begin[1];
       columns.clear();

@@ -1,11 +1,11 @@
-// A NetCDF file of the ocean, the atmosphere or anything else on a curvilinear grid by the CF conventions, as
-// a GridSource of one block: a grid of the file's variables at one time step.
+// A NetCDF file with a curvilinear grid by the CF conventions (ocean, atmosphere, ...), as a GridSource of
+// one block at one time step.
 //
-// Of a file with several grids (a staggered mesh) it is the grid of the first scalar that the user names,
-// else the one of most variables; warnings name the others. Nodes where that scalar (else the grid's first)
-// has no value are blanked; where another one has none, it is NaN.
+// If a file has several grids (a staggered mesh), the source uses that of the first scalar that the user
+// requests, else the grid with the most variables; warnings list the others. Nodes where that scalar (else
+// the grid's first) is missing are blanked; where another scalar is missing, it is NaN.
 //
-// NetCDF is not thread-safe: reads by several threads follow one another.
+// NetCDF is not thread-safe: reads by several threads run one after the other.
 #pragma once
 
 #include <optional>
@@ -39,9 +39,9 @@ class NetcdfSource final : public GridSource {
 
   NetcdfFile file_;
   GridDescription description_;
-  size_t mask_ = 0;  // the scalar that says which nodes are there
+  size_t mask_ = 0;  // the scalar whose missing values blank nodes
   CfGrid grid_;
-  double length_ = 1;  // kilometres of x and y, if they are no degrees
+  double length_ = 1;  // unit of x and y in kilometres, unless they are degrees
   Globe globe_;
 };
 

@@ -23,20 +23,20 @@ constexpr Magic kMagics[] = {
     {"CDF\x05"sv, "a NetCDF file"},
     {"#!TDV"sv, "a Tecplot binary file, which is not read"},
     {"C Binary"sv, "an EnSight file, which is not read"},
-    {"{"sv, "a JSON file: a .p3d description is given alone, in the grid's place"},
-    {"\x89PNG"sv, "a PNG picture"},
-    {"\xff\xd8\xff"sv, "a JPEG picture"},
+    {"{"sv, "a JSON file (give a .p3d file alone, instead of the grid)"},
+    {"\x89PNG"sv, "a PNG image"},
+    {"\xff\xd8\xff"sv, "a JPEG image"},
     {"%PDF"sv, "a PDF document"},
     {"\x7f"
      "ELF"sv,
-     "a program"},
-    {"\x1f\x8b"sv, "compressed with gzip: unpack it first"},
-    {"BZh"sv, "compressed with bzip2: unpack it first"},
+     "an executable"},
+    {"\x1f\x8b"sv, "compressed with gzip (decompress it first)"},
+    {"BZh"sv, "compressed with bzip2 (decompress it first)"},
     {"\xfd"
      "7zXZ"sv,
-     "compressed with xz: unpack it first"},
-    {"\x28\xb5\x2f\xfd"sv, "compressed with zstd: unpack it first"},
-    {"PK\x03\x04"sv, "a zip archive: unpack it first"},
+     "compressed with xz (decompress it first)"},
+    {"\x28\xb5\x2f\xfd"sv, "compressed with zstd (decompress it first)"},
+    {"PK\x03\x04"sv, "a zip archive (extract it first)"},
 };
 
 }  // namespace
@@ -46,7 +46,7 @@ std::optional<std::string> foreignFormat(const InputFile& file) {
   file.readAt(0, std::span(begin.data(), begin.size()));
   for (const Magic& magic : kMagics)
     if (begin.starts_with(magic.bytes)) return magic.words;
-  // Its first four bytes differ between versions.
+  // The first four bytes of an ADF file differ between versions.
   if (begin.find("ADF Database") == 4) return "a CGNS (ADF) file";
   return std::nullopt;
 }

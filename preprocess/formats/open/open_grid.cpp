@@ -21,7 +21,7 @@
 namespace curvisplat {
 namespace {
 
-/// A file format with a reader of its own. What none recognises is taken for PLOT3D, which has no mark.
+/// A file format with a signature. A file that none of them recognises is read as PLOT3D, which has none.
 struct GridFormat {
   bool (*recognises)(const InputFile& file);
   std::unique_ptr<GridSource> (*open)(const OpenGridOptions& options);
@@ -43,12 +43,12 @@ constexpr GridFormat kFormats[] = {
 void refuseForeign(const std::filesystem::path& path, const char* expected) {
   std::error_code none_there;
   if (std::filesystem::is_directory(path, none_there))
-    throw Error("{}: is a folder where {} was expected", path.string(), expected);
+    throw Error("{}: is a directory; expected {}", path.string(), expected);
   if (const auto format = foreignFormat(InputFile(path)))
     throw Error("{}: is {}; expected {}", path.string(), *format, expected);
 }
 
-/// Positions of the scalars that `matches` is true for.
+/// Indices of the scalars for which `matches` is true.
 template <typename Matches>
 std::vector<uint32_t> positionsOf(const GridDescription& description, const Matches& matches) {
   std::vector<uint32_t> positions;
@@ -57,7 +57,7 @@ std::vector<uint32_t> positionsOf(const GridDescription& description, const Matc
   return positions;
 }
 
-/// A whole number above 0, if the name is one.
+/// The name as a positive integer; nullopt if it is not one.
 std::optional<uint32_t> numberIn(const std::string& name) {
   uint32_t number = 0;
   const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
@@ -65,8 +65,9 @@ std::optional<uint32_t> numberIn(const std::string& name) {
   return number;
 }
 
-/// The first of: the exact name, a number (of a function file's variable, else PLOT3D's), the simplified name
-/// or alias of what files hold, or of what is derived from it.
+/// Indices of the scalars that match, by the first rule that applies: the exact name; the number of a
+/// function file's variable, else PLOT3D's function number; the simplified name or alias of a stored, else of
+/// a derived scalar.
 std::vector<uint32_t> candidatesFor(const GridDescription& description, const std::string& name) {
   const auto exact = positionsOf(description, [&](const GridScalar& scalar) { return scalar.name == name; });
   if (!exact.empty()) return exact;
@@ -85,8 +86,8 @@ std::vector<uint32_t> candidatesFor(const GridDescription& description, const st
 }
 
 std::string namesIn(const GridDescription& description) {
-  if (description.scalars.empty()) return "there are none: give a Q or function file";
-  std::string names = "there are ";
+  if (description.scalars.empty()) return "there are none; give a Q or function file";
+  std::string names = "available: ";
   for (size_t n = 0; n < description.scalars.size(); ++n) {
     const GridScalar& scalar = description.scalars[n];
     names += (n ? ", " : "") + scalar.name;
@@ -105,8 +106,8 @@ std::unique_ptr<GridSource> openFormat(const OpenGridOptions& options) {
       if (format.recognises(file)) {
         if (!options.solutions.empty())
           throw Error(
-              "{}: holds scalars itself; leave out {}: further files go with PLOT3D grids alone, and several "
-              "VTK files go together in a .vtm, .pvts or .pvd",
+              "{}: contains its own scalars; leave out {} (only PLOT3D grids take further files; combine VTK "
+              "files in a .vtm, .pvts or .pvd)",
               options.grid.string(), options.solutions.front().string());
         return format.open(complete);
       }
@@ -130,17 +131,17 @@ std::vector<uint32_t> scalarsNamed(const GridDescription& description,
   if (names.empty()) {
     const bool none_stored = description.scalars.empty() || description.scalars.front().derived;
     if (none_stored)
-      throw UsageError("the files hold no scalar; ask for one with --scalar: {}", namesIn(description));
+      throw UsageError("the files contain no scalar; choose a derived one with --scalar; {}",
+                       namesIn(description));
     return {0};
   }
   std::vector<uint32_t> positions;
   for (const std::string& name : names) {
     const std::vector<uint32_t> candidates = candidatesFor(description, name);
-    if (candidates.size() > 1)
-      throw UsageError("scalar {} is in several files: {}", name, namesIn(description));
-    if (candidates.empty()) throw UsageError("no scalar is called {}: {}", name, namesIn(description));
+    if (candidates.size() > 1) throw UsageError("scalar '{}' is ambiguous; {}", name, namesIn(description));
+    if (candidates.empty()) throw UsageError("there is no scalar '{}'; {}", name, namesIn(description));
     if (std::find(positions.begin(), positions.end(), candidates.front()) != positions.end())
-      throw UsageError("scalar {} is asked for twice", name);
+      throw UsageError("scalar '{}' is requested twice", name);
     positions.push_back(candidates.front());
   }
   return positions;
@@ -157,8 +158,8 @@ std::vector<std::string> notesOnNumbers(const GridDescription& description,
         positionsOf(description, [&](const GridScalar& s) { return s.function == *number; });
     if (!variables.empty() && !functions.empty())
       notes.push_back(
-          fmt::format("{} is taken as variable {} of the function file; for PLOT3D's function {} ask for {}",
-                      name, name, name, description.scalars[functions.front()].name));
+          fmt::format("{} means variable {} of the function file; for PLOT3D's function {} use {}", name,
+                      name, name, description.scalars[functions.front()].name));
   }
   return notes;
 }

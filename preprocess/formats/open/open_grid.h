@@ -1,4 +1,4 @@
-// Opens whatever grid the user names: finds the format, and matches scalars by name.
+// Opens a grid file of any format, and matches scalars by name.
 #pragma once
 
 #include <memory>
@@ -10,15 +10,15 @@
 
 namespace curvisplat {
 
-/// Throws Error naming the file, what was expected and what was found.
+/// Throws Error with the file, and with what was expected and found.
 std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options);
 
-/// Positions in the description's scalars of `names` (a name, or a number: of a function file's variable, or
-/// PLOT3D's of a function); no names: the first scalar, if the files hold any. Throws UsageError that lists
-/// the names there are.
+/// Indices into description.scalars for `names`; each is a name, the number of a function file's variable, or
+/// a PLOT3D function number. Without names: the first scalar, if the files hold any. Throws UsageError that
+/// lists the available names.
 std::vector<uint32_t> scalarsNamed(const GridDescription& description, const std::vector<std::string>& names);
 
-/// What a person may not expect of the numbers among `names`: a line for each that means two scalars.
+/// One line for each number among `names` that could mean two scalars.
 std::vector<std::string> notesOnNumbers(const GridDescription& description,
                                         const std::vector<std::string>& names);
 

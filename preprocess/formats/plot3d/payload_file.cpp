@@ -9,8 +9,8 @@
 namespace curvisplat {
 namespace {
 
-// A file of real subrecords (2 GiB) has a thousand of them for 2 TiB; more than this is no sane file, and
-// the table stays below 16 MiB.
+// Genuine subrecords have 2 GiB each: a file of 2 TiB has about a thousand. The limit rejects nonsense and
+// keeps the table below 16 MiB.
 constexpr size_t kMaxSegments = size_t{1} << 20;
 
 }  // namespace
@@ -42,7 +42,7 @@ uint64_t PayloadFile::nextRecord() {
   for (bool first = true, more = true; more; first = false) {
     const uint64_t begin = end_in_file_;
     if (file_size_ - begin < 2 * marker_bytes)
-      throw RecordMismatch("the file ends at byte {} where a record should begin at {}", file_size_, begin);
+      throw RecordMismatch("the file ends at byte {}, inside the record at byte {}", file_size_, begin);
     const int64_t leading = markerAt(begin);
     more = leading < 0;
     if (more && records_ == RecordMarkers::kBytes8)
@@ -50,16 +50,16 @@ uint64_t PayloadFile::nextRecord() {
     const uint64_t bytes =
         more ? uint64_t{0} - static_cast<uint64_t>(leading) : static_cast<uint64_t>(leading);
     if (bytes > file_size_ - begin - 2 * marker_bytes)
-      throw RecordMismatch("the record at byte {} should have {} bytes, but only {} are left in the file",
-                           begin, bytes, file_size_ - begin - 2 * marker_bytes);
+      throw RecordMismatch("the record at byte {} declares {} bytes, but only {} are left in the file", begin,
+                           bytes, file_size_ - begin - 2 * marker_bytes);
     const uint64_t end = begin + marker_bytes + bytes;
     const int64_t trailing = markerAt(end);
     const int64_t expected = first ? static_cast<int64_t>(bytes) : -static_cast<int64_t>(bytes);
     if (trailing != expected)
-      throw RecordMismatch("the markers of the record at byte {} differ: {} before, {} behind it at byte {}",
+      throw RecordMismatch("the markers of the record at byte {} differ: {} before, {} after it at byte {}",
                            begin, leading, trailing, end);
     if (segments_.size() == kMaxSegments)
-      throw RecordMismatch("there are more than {} records up to byte {}", kMaxSegments, begin);
+      throw RecordMismatch("there are more than {} records before byte {}", kMaxSegments, begin);
     segments_.push_back({size_, begin + marker_bytes});
     size_ += bytes;
     record_bytes += bytes;
@@ -78,7 +78,7 @@ uint64_t PayloadFile::offsetInFile(uint64_t offset) const {
 
 void PayloadFile::readAt(uint64_t offset, std::span<std::byte> to) const {
   if (offset > size_ || to.size() > size_ - offset)
-    throw Error("{}: {} bytes at offset {} of its records were expected, but they have {} bytes",
+    throw Error("{}: expected {} bytes at offset {} of its records, which have {} bytes",
                 file_->path().string(), to.size(), offset, size_);
   if (to.empty()) return;
   auto segment = std::prev(

@@ -1,11 +1,11 @@
-// A file without its Fortran record markers: one run of payload bytes, read by position.
+// A Fortran file without its record markers: one contiguous range of payload bytes, read by position.
 //
-//   file      | m | payload of record 1 | m | m | subrecord | m | m | subrecord | m |     m: 4 or 8 bytes
-//   payload       | record 1 .......... |       | record 2 ............. |
+//   file      | m | record 1 | m | m | record 2, part 1 | m | m | record 2, part 2 | m |     m: 4 or 8 bytes
+//   payload       | record 1 |       | record 2 ................................. |
 //
-// gfortran and ifort cut a record of more than 2^31 - 9 bytes into subrecords: a negative leading marker says
-// "goes on in the next one", a negative trailing marker "is the continuation of the one before". Their sizes
-// are taken from the file. 8-byte markers need no subrecords.
+// gfortran and ifort split a record of more than 2^31 - 9 bytes into subrecords. A negative leading marker
+// means that the record continues in the next subrecord; a negative trailing marker, that this subrecord
+// continues the previous one. The sizes are read from the markers. 8-byte markers need no subrecords.
 #pragma once
 
 #include <cstdint>
@@ -20,31 +20,31 @@
 
 namespace curvisplat {
 
-/// The records do not chain as assumed. No failure yet: another layout may fit.
+/// The records do not match the assumed layout. Not fatal: another layout may fit.
 class RecordMismatch : public Error {
  public:
   using Error::Error;
 };
 
-/// Costs a few bytes a (sub)record. Records are appended by one thread; then any number of threads may read.
+/// Needs a few bytes per (sub)record. One thread appends the records; then any number of threads may read.
 class PayloadFile {
  public:
-  /// Without markers all of `size` bytes are payload; with markers there is none until nextRecord().
+  /// Without markers all `size` bytes are payload; with markers the payload is empty until nextRecord().
   PayloadFile(std::shared_ptr<const InputFile> file, uint64_t size, RecordMarkers records, ByteOrder order);
 
-  /// Hops over the next record, checks both markers of each of its parts, and appends it to the payload.
-  /// Returns its bytes. Throws RecordMismatch where the markers differ or lead out of the file.
+  /// Skips the next record, checks the markers of each of its subrecords, and appends it to the payload.
+  /// Returns its size in bytes. Throws RecordMismatch if markers differ or point beyond the end of the file.
   uint64_t nextRecord();
 
   const InputFile& file() const { return *file_; }
-  /// Bytes of payload.
+  /// Size of the payload in bytes.
   uint64_t size() const { return size_; }
-  /// Bytes of the file behind the payload and its markers.
+  /// Bytes of the file after the payload and its last marker.
   uint64_t bytesBehind() const { return file_size_ - end_in_file_; }
-  /// Where a byte of the payload lies in the file; of size(): where the bytes behind begin.
+  /// Position in the file of a byte of the payload; for size(): of the first byte after the last marker.
   uint64_t offsetInFile(uint64_t offset) const;
 
-  /// Throws Error if the payload ends before `offset` + to.size(), or the disk fails.
+  /// Throws Error if the payload ends before `offset` + to.size(), or if reading fails.
   void readAt(uint64_t offset, std::span<std::byte> to) const;
 
  private:

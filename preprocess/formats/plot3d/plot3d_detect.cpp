@@ -21,7 +21,7 @@ bool looksLikeText(const InputFile& file) {
                      [](char c) { return (c >= ' ' && c <= '~') || (c >= '\t' && c <= '\r'); });
 }
 
-/// The options whose values differ between layouts: what the user can say to decide.
+/// The options that would decide between the layouts.
 std::string decidingOptions(const std::vector<Plot3dFit>& fits) {
   const auto differ = [&](const auto& of) {
     return std::any_of(fits.begin(), fits.end(),
@@ -45,7 +45,7 @@ std::string describe(const std::vector<Plot3dKind>& kinds) {
   return words;
 }
 
-/// A file on its way to one layout.
+/// The detection of the layout of one file.
 class Detection {
  public:
   Detection(std::shared_ptr<const InputFile> file, const Plot3dForce& force,
@@ -76,9 +76,8 @@ class Detection {
     Plot3dFit& fit = found.fits.front();
     if (fit.trailing_bytes > 0 && !force_.blanking && trailingLooksLikeIblank(fit))
       throw Error(
-          "{}: {} of {} is followed by {} bytes that look like a truncated iblank; get the whole file, or "
-          "read "
-          "it without iblank (--iblank no)",
+          "{}: {} of {} is followed by {} bytes that look like a truncated iblank; get the complete file, or "
+          "read it without iblank (--iblank no)",
           path_, curvisplat::describe(fit.layout), curvisplat::describe(fit.blocks), fit.trailing_bytes);
     return {std::move(fit), writtenPrecision(fit.layout)};
   }
@@ -94,7 +93,7 @@ class Detection {
     return !fit.layout.two_dimensional && sameDimensions(fit.blocks, grid_blocks);
   }
 
-  /// If any has the grid's dimensions, only those.
+  /// If any fit has the grid's dimensions, drops the others.
   static void keepMatching(std::vector<Plot3dFit>& fits, const std::vector<Plot3dBlock>& grid_blocks) {
     const auto suits = [&](const Plot3dFit& fit) { return matches(fit, grid_blocks); };
     if (std::any_of(fits.begin(), fits.end(), suits))
@@ -103,7 +102,7 @@ class Detection {
 
   [[noreturn]] void failMismatch(const Plot3dFit& fit, const std::filesystem::path& grid_path,
                                  const std::vector<Plot3dBlock>& grid_blocks) const {
-    throw Error("{}: this {} has {}, but the grid {} has {}; give a solution of the same grid", path_,
+    throw Error("{}: is a {} of {}, but the grid {} has {}; use a solution of the same grid", path_,
                 curvisplat::describe(fit.layout.kind), curvisplat::describe(fit.blocks), grid_path.string(),
                 curvisplat::describe(grid_blocks));
   }
@@ -128,8 +127,8 @@ class Detection {
     std::erase_if(fits, flat);
   }
 
-  /// A single solution of the grid's dimensions and the exact size is taken whatever its values: fields may
-  /// well have fill values and be denormal.
+  /// A single fit of a solution with the grid's dimensions and the exact size is accepted whatever its
+  /// values, since fields may contain fill values and denormal numbers.
   void keepPlausible(std::vector<Plot3dFit>& fits) const {
     const bool solution = fits.front().layout.kind != Plot3dKind::kGrid;
     if (fits.size() == 1 && solution && fits.front().trailing_bytes == 0) return;
@@ -145,7 +144,7 @@ class Detection {
     }
     if (kept.empty())
       throw Error(
-          "{}: has no plausible values: {}; force the layout with --byte-order, --records and --precision",
+          "{}: has implausible values: {}; set the layout with --byte-order, --records and --precision",
           path_, reason);
     fits = std::move(kept);
   }
@@ -156,7 +155,7 @@ class Detection {
       layouts +=
           fmt::format("{}{} of {} ({})", layouts.empty() ? "" : "; ", curvisplat::describe(fit.layout.kind),
                       curvisplat::describe(fit.blocks), curvisplat::describe(fit.layout));
-    throw Error("{}: fits {} layouts equally well: {}; say which with {}", path_, fits.size(), layouts,
+    throw Error("{}: fits {} layouts equally well: {}; choose one with {}", path_, fits.size(), layouts,
                 decidingOptions(fits));
   }
 
@@ -175,10 +174,10 @@ class Detection {
       finding = fmt::format("read as {} {}: {}", attemptInWords(furthest->layout),
                             curvisplat::describe(furthest->layout.kind), furthest->reason);
     }
-    throw Error("{}: its {} bytes fit no PLOT3D {}; {}{}", path_, file_size_, expected, finding, hint());
+    throw Error("{}: its {} bytes fit no PLOT3D {}: {}{}", path_, file_size_, expected, finding, hint());
   }
 
-  /// Only what was decided before the sizes were looked at.
+  /// Describes only the properties that are decided before sizes are compared.
   static std::string attemptInWords(const Plot3dLayout& layout) {
     std::string words = layout.ascii                           ? "ASCII"
                         : layout.byte_order == ByteOrder::kBig ? "big-endian"
@@ -187,7 +186,7 @@ class Detection {
     return words + (layout.multi_block ? " multi-block" : " single-block");
   }
 
-  /// What the file would be without the options, or as another kind.
+  /// A layout that fits if the user's options are ignored, or as another kind of file.
   std::string hint() const {
     Plot3dCandidates others = candidates_;
     others.kinds = {Plot3dKind::kGrid, Plot3dKind::kQ, Plot3dKind::kOverflow, Plot3dKind::kFunction};

@@ -1,6 +1,6 @@
-// Finds out how a PLOT3D file is laid out: every layout is tried, exact sizes come before trailing bytes, and
-// what is left is judged by its values. Never guesses: a file that fits no layout, or two equally well, is an
-// Error that says what was found and how to force a layout.
+// Detects the layout of a PLOT3D file. Tries every layout; prefers exact sizes to trailing bytes; then judges
+// the remaining ones by their values. Never guesses: a file that fits no layout, or two equally well, is an
+// Error that reports what was found and how to set the layout.
 #pragma once
 
 #include <filesystem>
@@ -13,14 +13,14 @@ namespace curvisplat {
 
 struct DetectedPlot3d {
   Plot3dFit fit;
-  int written_precision_bytes = 4;  // 4 or 8: of an ASCII file by its digits
+  int written_precision_bytes = 4;  // 4 or 8; for an ASCII file inferred from its digits
 };
 
-/// `file` is spooled to `temporary_folder` if it is a text.
+/// An ASCII file is spooled to `temporary_folder`.
 DetectedPlot3d detectPlot3dGrid(std::shared_ptr<const InputFile> file, const Plot3dForce& force,
                                 const std::filesystem::path& temporary_folder);
 
-/// A Q or a function file with the blocks of `grid`.
+/// Detects a Q or function file that belongs to the grid with `grid_blocks`.
 DetectedPlot3d detectPlot3dSolution(std::shared_ptr<const InputFile> file, const Plot3dForce& force,
                                     const std::filesystem::path& temporary_folder,
                                     const std::filesystem::path& grid_path,

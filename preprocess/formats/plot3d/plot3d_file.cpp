@@ -10,11 +10,15 @@
 namespace curvisplat {
 namespace {
 
-// Half of a second-level cache: bytes are converted before they leave it.
+// Half of a second-level cache, so that bytes are converted while they are cached.
 constexpr size_t kBufferBytes = size_t{256} << 10;
 
-// OVERFLOW's parameters: Mach, alpha, Reynolds, time, gamma, beta, T of the freestream | an integer | three
-// total enthalpies, gas constants, Mach, and two of turbulence.
+// OVERFLOW's parameters, in order:
+//
+//   7 numbers      Mach, alpha, Reynolds number, time; gamma, beta and temperature of the freestream
+//   1 integer
+//   6 + n numbers  three total enthalpies, gas constants of the n species, freestream Mach number, and two
+//                  numbers of turbulence
 constexpr size_t kBeforeInteger = 7, kBehindInteger = 6;
 
 std::span<std::byte> threadBuffer() {
@@ -24,8 +28,9 @@ std::span<std::byte> threadBuffer() {
 
 }  // namespace
 
-/// Calls convert(bytes, count, first) for pieces of the array that begins `array_offset` bytes behind the
-/// block's first value and has `width` bytes a node; `first` counts the nodes of the box.
+/// Calls convert(bytes, count, first) for consecutive pieces of an array's box. The array begins
+/// `array_offset` bytes after the block's first value and has `width` bytes per node; `first` is the index of
+/// the piece's first node in the box.
 template <typename Convert>
 void Plot3dFile::readRanges(uint32_t block, const NodeBox& box, uint64_t array_offset, uint64_t width,
                             const Convert& convert) const {
@@ -80,7 +85,7 @@ void Plot3dFile::readIntegers(uint32_t block, const NodeBox& box, std::span<Valu
       const Stored value = loadStored<Stored>(bytes + n * sizeof(Stored), swap);
       if constexpr (std::is_same_v<Value, uint8_t>)
         out[first + n] = value == 0;
-      else if constexpr (std::is_same_v<Stored, double>)  // NaN, too, becomes the largest
+      else if constexpr (std::is_same_v<Stored, double>)  // NaN, too, becomes INT32_MAX
         out[first + n] = std::abs(value) < 2147483647.0 ? static_cast<Value>(value) : INT32_MAX;
       else
         out[first + n] = value;
@@ -111,7 +116,7 @@ void Plot3dFile::readIblank(uint32_t block, const NodeBox& box, std::span<int32_
   readIntegers(block, box, out);
 }
 
-/// The numbers before a block's values, without the integer among OVERFLOW's.
+/// The numbers before a block's values; OVERFLOW's integer is left out.
 std::vector<double> Plot3dFile::parameters(uint32_t block) const {
   const Plot3dLayout& layout = fit_.layout;
   CURVISPLAT_CHECK(layout.kind == Plot3dKind::kQ || layout.kind == Plot3dKind::kOverflow);
@@ -138,7 +143,7 @@ std::vector<double> Plot3dFile::parameters(uint32_t block) const {
 
 FlowConditions Plot3dFile::conditions(uint32_t block) const {
   const std::vector<double> values = parameters(block);
-  // OVERFLOW's first Mach number is what the solution is normalised by; the freestream's comes third last.
+  // OVERFLOW's first Mach number is the one that normalises the solution; the freestream's is the third last.
   const double freestream = fit_.layout.kind == Plot3dKind::kOverflow ? values[values.size() - 3] : 0;
   return {"", block, freestream > 0 ? freestream : values[0], values[1], values[2], values[3]};
 }

@@ -10,8 +10,8 @@
 
 namespace curvisplat {
 
-/// Any number of threads may read at once. Reads exactly the bytes asked for: one range a component if all j
-/// of the block are in the box, else one range for each k. Costs a buffer of 256 KiB a thread.
+/// Any number of threads may read concurrently. Reads exactly the requested bytes: one range per component if
+/// the box has all j of the block, else one range for each k. Needs a buffer of 256 KiB per thread.
 class Plot3dFile {
  public:
   explicit Plot3dFile(Plot3dFit fit) : fit_(std::move(fit)) {}
@@ -21,15 +21,16 @@ class Plot3dFile {
   uint32_t components() const { return fit_.components; }
   uint64_t trailingBytes() const { return fit_.trailing_bytes; }
 
-  /// Values of one component in `box`, i fastest: overwrites out[0 .. nodes of the box). Throws Error naming
-  /// the file and the offset.
+  /// Reads one component in `box`, i fastest, to out[0 .. nodes of the box). Throws Error with the file and
+  /// the offset.
   void read(uint32_t block, uint32_t component, const NodeBox& box, std::span<double> out) const;
   void read(uint32_t block, uint32_t component, const NodeBox& box, std::span<float> out) const;
-  /// 1 where iblank is 0; every other value of iblank, negative ones too, is drawn. The layout has blanking.
+  /// Writes 1 where iblank is 0, else 0: nodes with any other iblank, even negative, are drawn. Only for
+  /// layouts with blanking.
   void readBlank(uint32_t block, const NodeBox& box, std::span<uint8_t> out) const;
-  /// The iblank values as they are. For statistics and plausibility.
+  /// The stored iblank values, for statistics and plausibility.
   void readIblank(uint32_t block, const NodeBox& box, std::span<int32_t> out) const;
-  /// Mach, alpha, Reynolds number and time of a Q file (OVERFLOW's too), without the file's name.
+  /// Mach number, alpha, Reynolds number and time of a Q file (OVERFLOW's too), without the name of the file.
   FlowConditions conditions(uint32_t block) const;
   uint32_t species() const { return fit_.species; }
   /// Ratio of specific heats of the freestream in an OVERFLOW file.

@@ -12,8 +12,8 @@
 namespace curvisplat {
 namespace {
 
-/// Mach, alpha, Reynolds number and time come before the values of a Q file's block; before those of an
-/// OVERFLOW file, thirteen numbers, one integer, and a gas constant for each of at least two species.
+/// Size of the numbers before a block's values. Q file: Mach, alpha, Reynolds number and time. OVERFLOW file:
+/// thirteen numbers, one integer, and a gas constant for each of at least two species.
 uint64_t conditionBytes(const Plot3dLayout& layout, uint32_t species) {
   const auto precision = static_cast<uint64_t>(layout.precision_bytes);
   if (layout.kind == Plot3dKind::kOverflow) return (13 + std::max(2u, species)) * precision + 4;
@@ -29,7 +29,7 @@ uint64_t valueBytes(const Plot3dLayout& layout, uint64_t nodes, uint32_t compone
   return nodes * (components * precision + (layout.blanking ? layout.integerBytes() : 0));
 }
 
-/// The layouts that differ in what the header does not tell: precision and iblank.
+/// The layouts that differ only in properties the header does not determine: precision and iblank.
 std::vector<Plot3dLayout> variants(const Plot3dLayout& base, const Plot3dForce& force) {
   std::vector<Plot3dLayout> all;
   for (const int precision : {4, 8}) {
@@ -48,7 +48,7 @@ std::string describe(const Plot3dBlock& block) {
   return fmt::format("{}x{}x{}", block.ni, block.nj, block.nk);
 }
 
-/// "491520 (single precision, no iblank), ...": what would have been right.
+/// "491520 (single precision, no iblank), ...": the sizes that would have fitted.
 template <typename Bytes>
 std::string expectations(const std::vector<Plot3dLayout>& layouts, const Bytes& bytes) {
   std::string words;
@@ -61,7 +61,7 @@ std::string expectations(const std::vector<Plot3dLayout>& layouts, const Bytes& 
   return words;
 }
 
-/// The bytes of each block's records, hopped over.
+/// Skips the records of all blocks, and returns the sizes of each block's.
 std::vector<std::vector<uint64_t>> hopRecords(PayloadFile& payload, const Plot3dLayout& layout,
                                               const std::vector<Plot3dBlock>& blocks) {
   std::vector<std::vector<uint64_t>> records(blocks.size());
@@ -79,7 +79,7 @@ std::vector<std::vector<uint64_t>> hopRecords(PayloadFile& payload, const Plot3d
   return records;
 }
 
-/// A file in the planes format has a record of each k-plane.
+/// Whether the file is in the planes format, which has a record for each k-plane.
 bool isPlanes(const std::vector<Plot3dLayout>& layouts, const Plot3dBlock& block, uint32_t components,
               uint64_t record_bytes) {
   if (block.nk < 2) return false;
@@ -102,11 +102,11 @@ void fitRecords(const std::vector<Plot3dLayout>& layouts, PayloadFile payload, c
     if (isPlanes(layouts, block, header.components, records[b].back()))
       throw LayoutMisfit{
           LayoutMisfit::known_structure,
-          fmt::format("block {} of {} nodes has a record for each k-plane; only the whole format, one "
-                      "record a block, is read",
+          fmt::format("block {} of {} nodes has a record for each k-plane; expected the whole format (one "
+                      "record per block)",
                       b + 1, describe(block))};
     throw LayoutMisfit{LayoutMisfit::dimensions,
-                       fmt::format("block {} of {} nodes has a record of {} bytes, expected: {}", b + 1,
+                       fmt::format("block {} of {} nodes has a record of {} bytes; expected {}", b + 1,
                                    describe(block), records[b].back(), expectations(layouts, expected))};
   }
   bool fits = false;
@@ -125,8 +125,7 @@ void fitRecords(const std::vector<Plot3dLayout>& layouts, PayloadFile payload, c
     fits |= exact;
   }
   if (!fits)
-    throw LayoutMisfit{LayoutMisfit::dimensions,
-                       "the records of its blocks do not agree in precision and iblank"};
+    throw LayoutMisfit{LayoutMisfit::dimensions, "the records of its blocks differ in precision or iblank"};
 }
 
 void fitSize(const std::vector<Plot3dLayout>& layouts, const PayloadFile& payload, const Plot3dHeader& header,
@@ -152,15 +151,14 @@ void fitSize(const std::vector<Plot3dLayout>& layouts, const PayloadFile& payloa
     fits = true;
   }
   if (fits) return;
-  // Random bytes often make dimensions that "go into" the file somehow; a truncated file misses less.
+  // Random bytes often give dimensions that seem to fit the file; a truncated file lacks less than that.
   const bool near = expected(layouts.front()) / 4 <= payload.size();
   const uint64_t unit = layouts.front().ascii ? sizeof(double) : 1;
   throw LayoutMisfit{
       near ? LayoutMisfit::dimensions : LayoutMisfit::first_record,
-      fmt::format("{} should have {} {}, it has {}", curvisplat::describe(header.blocks),
-                  unit == 1 ? "bytes:" : "numbers:",
-                  expectations(layouts, [&](const Plot3dLayout& l) { return expected(l) / unit; }),
-                  payload.size() / unit)};
+      fmt::format("{}: found {} {}; expected {}", curvisplat::describe(header.blocks), payload.size() / unit,
+                  unit == 1 ? "bytes" : "numbers",
+                  expectations(layouts, [&](const Plot3dLayout& l) { return expected(l) / unit; }))};
 }
 
 void fitHeader(const Plot3dCandidates& candidates, const Plot3dLayout& base, Plot3dFits& found) {

@@ -1,5 +1,5 @@
-// Tries one PLOT3D layout after another on a file: which of them do its header, its record markers and its
-// size agree with? The values are looked at by plot3d_detect.h only.
+// Tries each PLOT3D layout on a file and compares it with the header, the record markers and the size. Values
+// are judged later, in plot3d_detect.h.
 #pragma once
 
 #include <cstdint>
@@ -14,25 +14,25 @@
 
 namespace curvisplat {
 
-/// A file under one layout.
+/// A file interpreted by one layout.
 struct Plot3dFit {
   Plot3dLayout layout;
   PayloadFile payload;
   std::vector<Plot3dBlock> blocks;
-  uint32_t components = 3;  // grid 3, Q 5, OVERFLOW and function files their own
+  uint32_t components = 3;  // grid: 3, Q: 5, OVERFLOW and function files: from their header
   uint64_t trailing_bytes = 0;
-  uint32_t species = 0;  // of an OVERFLOW file
+  uint32_t species = 0;  // OVERFLOW files only
 };
 
-/// Why a layout does not fit, and how far it did: of all of them the furthest tells most of the file.
+/// Why a layout does not fit, and how far it fitted. The misfit that got furthest is reported.
 struct Plot3dMisfit {
   LayoutMisfit::Reached reached = LayoutMisfit::nothing;
-  Plot3dLayout layout;  // as far as it was decided
+  Plot3dLayout layout;  // the properties decided so far
   std::string reason;
   std::vector<Plot3dBlock> blocks;  // from `dimensions` on
 };
 
-/// What is tried: either the file itself, or the spool of an ASCII file.
+/// The input of the search: the file itself, or the spool file of an ASCII file.
 struct Plot3dCandidates {
   std::shared_ptr<const InputFile> file;
   uint64_t size = 0;
@@ -46,11 +46,10 @@ struct Plot3dFits {
   std::vector<Plot3dMisfit> misfits;
 };
 
-/// Trailing bytes are accepted up to an eighth of what a C file should have, so that a truncated file of a
-/// larger layout does not pass as a smaller one; behind records any
-/// number is. Throws Error if the disk
-/// fails.
-/// 2-D files fit as such (exact sizes only), so that they can be told and refused.
+/// Files without records may have trailing bytes up to an eighth of the expected size, so that a truncated
+/// file of a larger layout does not pass as one of a smaller layout; after records any number is accepted.
+/// 2-D files fit as such (exact sizes only), so that they can be recognised and refused. Throws Error if
+/// reading fails.
 Plot3dFits fitPlot3d(const Plot3dCandidates& candidates);
 
 }  // namespace curvisplat

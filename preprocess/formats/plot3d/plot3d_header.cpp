@@ -10,15 +10,15 @@
 namespace curvisplat {
 namespace {
 
-// Random bytes may promise billions of blocks; real files have some ten thousand at most.
+// Random bytes may declare billions of blocks; real files have some ten thousand at most.
 constexpr int64_t kMaxBlocks = 1'000'000;
 
-/// Reads the numbers of a header, record by record.
+/// Reads the integers of a header, record by record.
 class HeaderReader {
  public:
   HeaderReader(PayloadFile& payload, const Plot3dLayout& layout) : payload_(payload), layout_(layout) {}
 
-  /// The bytes of the next record; nothing in a file without records.
+  /// The size of the next record; nullopt in a file without records.
   std::optional<uint64_t> record() {
     if (layout_.records == RecordMarkers::kNone) return std::nullopt;
     return payload_.nextRecord();
@@ -45,8 +45,7 @@ class HeaderReader {
  private:
   static int64_t integerOf(double number) {
     if (!(std::abs(number) < 1e15) || number != std::trunc(number))
-      throw LayoutMisfit{LayoutMisfit::first_record,
-                         fmt::format("{} stands where a dimension should", number)};
+      throw LayoutMisfit{LayoutMisfit::first_record, fmt::format("found {} instead of a dimension", number)};
     return static_cast<int64_t>(number);
   }
 
@@ -59,14 +58,14 @@ uint64_t readBlockCount(HeaderReader& reader, const Plot3dLayout& layout, uint64
   if (!layout.multi_block) return 1;
   if (const auto bytes = reader.record(); bytes && *bytes != 4)
     throw LayoutMisfit{LayoutMisfit::nothing,
-                       fmt::format("the first record has {} bytes, not the 4 of a block count", *bytes)};
+                       fmt::format("the first record has {} bytes; expected 4, a block count", *bytes)};
   const int64_t count = reader.integers(1).front();
   if (count < 1 || count > kMaxBlocks || static_cast<uint64_t>(count) > file_size / layout.integerBytes())
     throw LayoutMisfit{LayoutMisfit::nothing, fmt::format("a block count of {} is impossible", count)};
   return static_cast<uint64_t>(count);
 }
 
-/// What a dimension record of `bytes` holds instead, if that is known.
+/// A known explanation for a dimension record of `bytes`; else empty.
 std::string explainDimensionRecord(const Plot3dLayout& layout, uint64_t blocks, uint64_t bytes) {
   if (layout.two_dimensional) return "";
   if (layout.kind == Plot3dKind::kFunction && bytes == 12 * blocks)
@@ -74,7 +73,7 @@ std::string explainDimensionRecord(const Plot3dLayout& layout, uint64_t blocks, 
   return "";
 }
 
-/// The nodes of block number `b`, at most `limit`.
+/// The number of nodes of block `b`; at most `limit`.
 uint64_t checkedNodes(const Plot3dLayout& layout, const int64_t* dimensions, uint64_t b, uint64_t limit) {
   uint64_t nodes = 1;
   bool possible = true;
@@ -91,7 +90,7 @@ uint64_t checkedNodes(const Plot3dLayout& layout, const int64_t* dimensions, uin
   return nodes;
 }
 
-/// How many quantities and how many species a node of an OVERFLOW file has.
+/// Reads the numbers of quantities and of species of an OVERFLOW file.
 void readQuantities(const std::vector<int64_t>& numbers, uint64_t nodes_left, uint64_t file_size,
                     Plot3dHeader& header) {
   const int64_t quantities = numbers[0], species = numbers[1];
@@ -115,7 +114,7 @@ Plot3dHeader readPlot3dHeader(PayloadFile& payload, const Plot3dLayout& layout, 
   if (const auto bytes = reader.record(); bytes && *bytes != 4 * (numbers * count + overall)) {
     const std::string explanation = explainDimensionRecord(layout, count, *bytes);
     throw LayoutMisfit{explanation.empty() ? LayoutMisfit::first_record : LayoutMisfit::known_structure,
-                       fmt::format("the dimension record has {} bytes where {} block{} of a {} need {}{}",
+                       fmt::format("the dimension record has {} bytes, but {} block{} of a {} need {}{}",
                                    *bytes, count, count == 1 ? "" : "s", describe(layout.kind),
                                    4 * (numbers * count + overall), explanation)};
   }
@@ -125,7 +124,7 @@ Plot3dHeader readPlot3dHeader(PayloadFile& payload, const Plot3dLayout& layout, 
   Plot3dHeader header;
   header.components = static_cast<uint32_t>(layout.kind == Plot3dKind::kQ ? axes + 2 : axes);
   header.blocks.reserve(count);
-  uint64_t nodes_left = file_size;  // a node takes more than a byte, and so no sum of sizes overflows
+  uint64_t nodes_left = file_size;  // a node needs more than a byte; so no sum of sizes overflows
   for (uint64_t b = 0; b < count; ++b) {
     const int64_t* at = &dimensions[b * numbers];
     const uint64_t nodes = checkedNodes(layout, at, b, nodes_left);

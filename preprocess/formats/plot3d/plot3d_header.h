@@ -10,13 +10,13 @@
 
 namespace curvisplat {
 
-/// Thrown to end the attempt at one layout, and how far it got. Never leaves plot3d_fit.
+/// Thrown to end the attempt with one layout; records how far it got. Never leaves plot3d_fit.
 struct LayoutMisfit {
   enum Reached {
-    nothing,         // not even the first record, or the block count
-    first_record,    // a header, with impossible dimensions
-    dimensions,      // possible dimensions, but the sizes are others
-    known_structure  // recognised as something else
+    nothing,         // neither the first record nor the block count is valid
+    first_record,    // a header with impossible dimensions
+    dimensions,      // possible dimensions, but the sizes differ
+    known_structure  // recognised as a structure that is not read
   };
   Reached reached;
   std::string reason;
@@ -24,13 +24,14 @@ struct LayoutMisfit {
 
 struct Plot3dHeader {
   std::vector<Plot3dBlock> blocks;  // without offsets
-  uint32_t components = 3;          // grid 3, Q 5, OVERFLOW and function files their own; 2-D: 2 and 4
-  uint32_t species = 0;             // of an OVERFLOW file
-  uint64_t bytes = 0;               // of the payload
+  uint32_t components = 3;          // grid 3 (2-D: 2), Q 5 (2-D: 4), OVERFLOW and function: from the header
+  uint32_t species = 0;             // OVERFLOW files only
+  uint64_t bytes = 0;               // size of the header in the payload
 };
 
-/// Precision and blanking of `layout` don't matter. With records, they are appended to `payload`. All blocks
-/// together have at most `file_size` nodes. Throws LayoutMisfit and RecordMismatch; Error if the disk fails.
+/// Ignores the precision and blanking of `layout`. Records that are read are appended to `payload`. All
+/// blocks together must have at most `file_size` nodes. Throws LayoutMisfit or RecordMismatch; Error if
+/// reading fails.
 Plot3dHeader readPlot3dHeader(PayloadFile& payload, const Plot3dLayout& layout, uint64_t file_size);
 
 }  // namespace curvisplat

@@ -20,7 +20,7 @@ using Json = nlohmann::json;
 
 constexpr uint64_t kLargest = 1 << 20;
 
-/// A .p3d file's contents, its types checked.
+/// The contents of a .p3d file, with types checked.
 class Meta {
  public:
   explicit Meta(const std::filesystem::path& path) : path_(path) {
@@ -29,7 +29,7 @@ class Meta {
     try {
       json_ = Json::parse(text);
     } catch (const Json::exception& error) {
-      throw Error("{}: is no JSON, which a .p3d description is: {}", path.string(), firstLine(error.what()));
+      throw Error("{}: not valid JSON (.p3d files are JSON): {}", path.string(), firstLine(error.what()));
     }
     if (!json_.is_object()) fail("", "an object", json_);
     readSteps();
@@ -48,7 +48,7 @@ class Meta {
     return value->get<bool>();
   }
   std::optional<double> number(const char* key) const { return numberIn(json_, key); }
-  /// One of the words, without regard of case.
+  /// The value of `key`, which must be one of `words`, ignoring case.
   std::optional<std::string> word(const char* key, std::initializer_list<const char*> words) const {
     const Json* value = find(json_, key);
     if (!value) return std::nullopt;
@@ -65,9 +65,9 @@ class Meta {
     std::vector<std::string> out;
     const Json* values = find(json_, key);
     if (!values) return out;
-    if (!values->is_array()) fail(key, "an array of texts", *values);
+    if (!values->is_array()) fail(key, "an array of strings", *values);
     for (const Json& value : *values) {
-      if (!value.is_string()) fail(key, "an array of texts", *values);
+      if (!value.is_string()) fail(key, "an array of strings", *values);
       out.push_back(value.get<std::string>());
     }
     return out;
@@ -87,8 +87,8 @@ class Meta {
   [[noreturn]] void fail(const std::string& key, const std::string& expected, const Json& found) const {
     std::string shown = found.dump(-1, ' ', false, Json::error_handler_t::replace);
     if (shown.size() > 60) shown = shown.substr(0, 60) + "...";
-    throw Error("{}: {} should be {}, and is {}", path_.string(),
-                key.empty() ? "a .p3d description" : "'" + key + "'", expected, shown);
+    throw Error("{0}: {1} is {3}; expected {2}", path_.string(),
+                key.empty() ? "the .p3d description" : "'" + key + "'", expected, shown);
   }
 
  private:
@@ -110,21 +110,21 @@ class Meta {
     const Json* value = find(in, key);
     if (!value) return {};
     const std::string name = value->is_string() ? value->get<std::string>() : std::string();
-    if (name.empty() || name.find('\0') != std::string::npos) fail(key, "a file's name", *value);
+    if (name.empty() || name.find('\0') != std::string::npos) fail(key, "a file name", *value);
     return path_.parent_path() / name;
   }
 
   void readSteps() {
     const Json* filenames = find(json_, "filenames");
     if (!filenames || !filenames->is_array() || filenames->empty())
-      fail("filenames", "an array of files, one a time step", filenames ? *filenames : Json());
+      fail("filenames", "an array of files, one per time step", filenames ? *filenames : Json());
     for (const Json& entry : *filenames) {
       if (!entry.is_object()) fail("filenames", "an array of objects", *filenames);
       Step step{numberIn(entry, "time").value_or(static_cast<double>(steps_.size())), fileIn(entry, "xyz"),
                 fileIn(entry, "q"), fileIn(entry, "function")};
-      // A grid that stands still is named once.
+      // A grid that does not change is named only in the first step.
       if (step.grid.empty() && !steps_.empty()) step.grid = steps_.back().grid;
-      if (step.grid.empty()) fail("xyz", "a grid file's name", entry);
+      if (step.grid.empty()) fail("xyz", "the name of a grid file", entry);
       steps_.push_back(std::move(step));
     }
   }
@@ -139,9 +139,9 @@ void setIfOpen(std::optional<Value>& target, std::optional<Value> value) {
   if (!target) target = value;
 }
 
-/// What the file says of the layout, where the user does not.
+/// Takes the file's settings of the layout where the user has set none.
 void takeLayout(const Meta& meta, Plot3dForce& force) {
-  if (meta.flag("2D").value_or(false)) meta.fail("2D", "false: only 3-D files are read", Json(true));
+  if (meta.flag("2D").value_or(false)) meta.fail("2D", "false (only 3-D files are read)", Json(true));
   if (meta.flag("auto-detect-format").value_or(false)) return;
   if (const auto format = meta.word("format", {"binary", "ascii"}))
     setIfOpen(force.ascii, {*format == "ascii"});
@@ -150,7 +150,7 @@ void takeLayout(const Meta& meta, Plot3dForce& force) {
   if (force.ascii.value_or(false)) return;
   if (const auto order = meta.word("byte-order", {"little", "big"}))
     setIfOpen(force.byte_order, {*order == "big" ? ByteOrder::kBig : ByteOrder::kLittle});
-  // Fortran's markers are of 4 or 8 bytes: detected.
+  // Whether Fortran's markers have 4 or 8 bytes is detected.
   if (const auto language = meta.word("language", {"fortran", "c"}); language == "c")
     setIfOpen(force.records, {RecordMarkers::kNone});
   if (const auto bits = meta.number("precision")) {
@@ -159,7 +159,7 @@ void takeLayout(const Meta& meta, Plot3dForce& force) {
   }
 }
 
-/// The files, with what the description says of them.
+/// A Plot3dSource with the times and the gas of the .p3d file.
 class MetaSource final : public GridSource {
  public:
   MetaSource(std::unique_ptr<GridSource> files, GridDescription description)
@@ -194,8 +194,7 @@ std::unique_ptr<GridSource> openPlot3dMeta(const OpenGridOptions& options) {
   const Meta::Step& step = meta.steps()[number];
   std::vector<std::string> warnings;
   for (const std::string& key : meta.unknownKeys())
-    warnings.push_back(
-        fmt::format("{}: '{}' is not a key that is known; ignored", options.grid.string(), key));
+    warnings.push_back(fmt::format("{}: unknown key '{}' is ignored", options.grid.string(), key));
 
   OpenGridOptions of_step = options;
   of_step.grid = step.grid;
@@ -203,14 +202,14 @@ std::unique_ptr<GridSource> openPlot3dMeta(const OpenGridOptions& options) {
   takeLayout(meta, of_step.force);
   if (of_step.function_names.empty()) of_step.function_names = meta.texts("function-names");
   if (!isRegularFile(step.grid))
-    throw Error("{}: names the grid {}, which is not there", options.grid.string(), step.grid.string());
+    throw Error("{}: names the grid {}, which does not exist", options.grid.string(), step.grid.string());
   of_step.solutions.clear();
   for (const auto& solution : {step.q, step.function}) {
     if (solution.empty()) continue;
     if (isRegularFile(solution))
       of_step.solutions.push_back(solution);
     else
-      warnings.push_back(fmt::format("{}: names {}, which is not there; left out", options.grid.string(),
+      warnings.push_back(fmt::format("{}: names {}, which does not exist; left out", options.grid.string(),
                                      solution.string()));
   }
   of_step.solutions.insert(of_step.solutions.end(), options.solutions.begin(), options.solutions.end());

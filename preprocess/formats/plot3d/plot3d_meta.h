@@ -1,5 +1,5 @@
-// A .p3d file: JSON with ParaView's keys that says which PLOT3D files belong together, at which times, and
-// how they are written. What it does not say is detected as ever.
+// A .p3d file: JSON with ParaView's keys that lists the PLOT3D files of each time step and their layout.
+// Properties that it does not set are detected as usual.
 //
 //   {"filenames": [{"time": 0.5, "xyz": "a.xyz", "q": "a.q", "function": "a.f"}, ...],
 //    "function-names": ["u", ...], "gamma": 1.4, "R": 1, "auto-detect-format": true,
@@ -15,11 +15,11 @@
 
 namespace curvisplat {
 
-/// Whether the file is a text that begins as JSON does.
+/// Whether the file is text that begins with '{'.
 bool isPlot3dMeta(const InputFile& file);
 
-/// Opens the files of the chosen time step. options.force comes before what the file says. A Q or function
-/// file that is not there is left out, with a warning. Throws Error naming the file and the key.
+/// Opens the files of the chosen time step. options.force overrides the file. A Q or function file that does
+/// not exist is left out with a warning. Throws Error with the file and the key.
 std::unique_ptr<GridSource> openPlot3dMeta(const OpenGridOptions& options);
 
 }  // namespace curvisplat

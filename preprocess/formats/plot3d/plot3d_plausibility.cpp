@@ -11,13 +11,13 @@
 namespace curvisplat {
 namespace {
 
-// Read in another byte order or precision, most numbers are extreme, or differ from their neighbour along i
-// by many powers of two: their exponents are bits of something else. Those of a field do so at a few places.
+// Read with the wrong byte order or precision, most numbers are extreme, or differ from their neighbour along
+// i by many powers of two, since their exponents are arbitrary bits. Numbers of a field do so in few places.
 constexpr double kNoiseBelow = 1e-36, kNoiseAbove = 1e30;
 constexpr double kNoiseJump = 65536;
 constexpr double kUsualSize = 1e12;
 constexpr double kNoiseShare = 0.25;
-constexpr int32_t kLargestIblank = 1'000'000;  // a block or grid number, at most
+constexpr int32_t kLargestIblank = 1'000'000;  // iblank values are at most block or grid numbers
 
 /// Up to 8 blocks spread over the file.
 std::vector<uint32_t> sampleBlocks(size_t blocks) {
@@ -27,7 +27,7 @@ std::vector<uint32_t> sampleBlocks(size_t blocks) {
   return sample;
 }
 
-/// Up to `most` rows along i, spread over a block.
+/// At most `most` rows along i, spread over a block.
 std::vector<NodeBox> sampleRows(const Plot3dBlock& block, uint64_t most) {
   const uint64_t rows = block.nj * block.nk;
   const uint64_t step = std::max<uint64_t>(1, rows / most);
@@ -42,7 +42,7 @@ bool isExtreme(double value) {
   return size != 0 && (size < kNoiseBelow || size > kNoiseAbove);
 }
 
-/// Whether `values` (rows of `ni`) are no numbers of a field; if so, `example` is one of them.
+/// Whether `values` (rows of `ni`) look like noise instead of a field; if so, `example` is one of them.
 bool isNoise(const std::vector<double>& values, uint64_t ni, double& example) {
   uint64_t finite = 0, extreme = 0, jumps = 0;
   double largest = 0, before = 0, extreme_value = 0;
@@ -60,7 +60,7 @@ bool isNoise(const std::vector<double>& values, uint64_t ni, double& example) {
     before = size;
   }
   const double limit = kNoiseShare * static_cast<double>(finite);
-  // Next to numbers of a usual size, tiny ones are what is left of a rounded zero.
+  // Among numbers of usual magnitude, tiny ones are rounding errors of zero.
   const bool jumpy = largest > kUsualSize && static_cast<double>(jumps) > limit;
   example = jumpy ? largest : extreme_value;
   return jumpy || static_cast<double>(extreme) > limit;
@@ -93,7 +93,7 @@ std::optional<std::string> implausibility(const Plot3dFit& fit) {
       file.readIblank(b, row, iblank);
       for (const int32_t value : iblank)
         if (value > kLargestIblank || value < -kLargestIblank)
-          return fmt::format("an iblank of block {} is {}", b + 1, value);
+          return fmt::format("block {} has an iblank of {}", b + 1, value);
     }
   }
   return std::nullopt;
@@ -104,7 +104,7 @@ bool trailingLooksLikeIblank(const Plot3dFit& fit) {
   if (fit.layout.kind != Plot3dKind::kGrid || fit.layout.blanking ||
       fit.layout.records != RecordMarkers::kNone || fit.trailing_bytes < width)
     return false;
-  Plot3dFit behind = fit;  // the trailing bytes as the iblank of a block of one row
+  Plot3dFit behind = fit;  // reads the trailing bytes as the iblank of a one-row block
   const uint64_t count = std::min<uint64_t>(fit.trailing_bytes / width, 1024);
   behind.blocks = {{count, 1, 1, fit.payload.size() - fit.trailing_bytes}};
   behind.components = 0;

@@ -1,4 +1,4 @@
-// Looks at samples of the values a layout gives: are they numbers of a grid, or bits of something else?
+// Judges a layout by some of the values it gives: are they coordinates or fields, or noise?
 #pragma once
 
 #include <optional>
@@ -8,12 +8,12 @@
 
 namespace curvisplat {
 
-/// Nothing, or what is wrong with the values, in words. Reads some rows of some blocks. Throws Error if the
-/// disk fails.
+/// nullopt if the values are plausible; else a description of the problem. Reads some rows of some blocks.
+/// Throws Error if reading fails.
 std::optional<std::string> implausibility(const Plot3dFit& fit);
 
-/// Whether the bytes behind coordinates without iblank could be the first part of an iblank array: a
-/// truncated file.
+/// Whether the bytes after coordinates without iblank could be the beginning of an iblank array, which would
+/// mean that the file is truncated.
 bool trailingLooksLikeIblank(const Plot3dFit& fit);
 
 }  // namespace curvisplat

@@ -23,7 +23,7 @@ const std::vector<GridScalar>& qScalars() {
   return scalars;
 }
 
-/// The lines of a .nam file, without what FieldView writes behind a semicolon (the vector it belongs to).
+/// The lines of a .nam file. FieldView's suffix after a semicolon (the name of the vector) is cut off.
 std::vector<std::string> variableNames(const std::filesystem::path& path) {
   std::vector<std::string> names;
   const std::string text = readTextFile(path, 1 << 20);
@@ -80,7 +80,7 @@ void Plot3dSource::addSolution(const std::filesystem::path& path, const OpenGrid
   solution_paths_.push_back(path);
 }
 
-/// What an OVERFLOW file has behind the five of every Q file.
+/// Adds the scalars of an OVERFLOW file that follow the five of every Q file.
 void Plot3dSource::addOverflowScalars(const Plot3dFile& file) {
   const auto add = [&](std::string name) {
     GridScalar scalar;
@@ -94,7 +94,7 @@ void Plot3dSource::addOverflowScalars(const Plot3dFile& file) {
     add(n - 6 < file.species() ? fmt::format("species_{}", n - 5)
                                : fmt::format("turbulence_{}", n - 5 - file.species()));
   description_.warnings.push_back(
-      fmt::format("{}: gamma differs from node to node; derived quantities take one for all, --gamma",
+      fmt::format("{}: gamma varies between nodes; derived quantities use one value (--gamma)",
                   description_.files.back()));
 }
 
@@ -142,7 +142,7 @@ void Plot3dSource::makeNamesUnique() {
     if (names.count(scalars[n].name) > 1)
       scalars[n].name = solution_paths_[components_[n].file].stem().string() + ":" + scalars[n].name;
     if (!unique.insert(scalars[n].name).second)
-      throw Error("{}: two scalars are called {}; rename the file, or a variable in its .nam file",
+      throw Error("{}: two scalars have the name {}; rename the file, or a variable in its .nam file",
                   solution_paths_[components_[n].file].string(), scalars[n].name);
   }
 }

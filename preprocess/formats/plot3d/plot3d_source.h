@@ -7,10 +7,13 @@
 
 namespace curvisplat {
 
-/// Q files offer density, momentum_x, momentum_y, momentum_z and energy, those of OVERFLOW also gamma,
-/// species_1, ... and turbulence_1, ...; function files the names of their
-/// .nam file (beside them, one a line), else the numbers of their variables. Names that two files share are
-/// written FILE:NAME, FILE being the file's stem.
+/// Scalars by kind of file:
+///
+///   Q          density, momentum_x, momentum_y, momentum_z, energy
+///   OVERFLOW   the same, gamma, species_1, ..., turbulence_1, ...
+///   function   the names in its .nam file (in the same directory, one per line), else 1, 2, ...
+///
+/// A name that occurs in two files becomes FILE:NAME, FILE being the stem of the file.
 class Plot3dSource final : public GridSource {
  public:
   /// Detects the layout of every file. Throws Error.
@@ -22,7 +25,7 @@ class Plot3dSource final : public GridSource {
 
  private:
   struct Component {
-    size_t file = 0;  // in solutions_
+    size_t file = 0;  // index into solutions_
     uint32_t component = 0;
   };
 
@@ -39,7 +42,7 @@ class Plot3dSource final : public GridSource {
   Plot3dFile grid_;
   std::vector<Plot3dFile> solutions_;
   std::vector<std::filesystem::path> solution_paths_;
-  std::vector<Component> components_;  // of each of description_.scalars
+  std::vector<Component> components_;  // [description_.scalars]
 };
 
 }  // namespace curvisplat

@@ -17,12 +17,12 @@
 namespace curvisplat {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "PLOT3D files are written as they lie in memory");
+static_assert(std::endian::native == std::endian::little, "PLOT3D is written in the machine's byte order");
 
-constexpr uint64_t kBatchNodes = 2 << 20;  // evaluated while the batch before is written
+constexpr uint64_t kBatchNodes = 2 << 20;  // evaluated while the previous batch is written
 constexpr uint64_t kTaskNodes = 32 << 10;  // what one worker reads from the source at a time
 
-// A file under a temporary name, which takes its own name by putIntoPlace() or goes away.
+// A file under a temporary name. putIntoPlace() renames it; without that, the destructor removes it.
 class PendingFile {
  public:
   explicit PendingFile(const std::filesystem::path& path)
@@ -37,7 +37,7 @@ class PendingFile {
 
   void putIntoPlace() {
     if (SystemCalls::current().rename(file_.path().c_str(), path_.c_str()) < 0)
-      throw Error("{}: cannot be put into place: {}", path_.string(), std::strerror(errno));
+      throw Error("{}: cannot rename the finished file: {}", path_.string(), std::strerror(errno));
     in_place_ = true;
   }
 
@@ -47,7 +47,7 @@ class PendingFile {
   bool in_place_ = false;
 };
 
-// The rows [begin, end) of a block, counted j fastest, as arrays to write: x, y, z, iblank, scalars.
+// The rows [begin, end) of a block (numbered j fastest) as arrays to write: x, y, z, iblank, scalars.
 struct Batch {
   uint64_t begin = 0, end = 0;
   std::array<std::vector<float>, 3> coordinates;
@@ -55,7 +55,7 @@ struct Batch {
   std::vector<std::vector<float>> scalars;
 };
 
-// Where the arrays of a block begin in the two files.
+// The positions of a block's arrays in the two files.
 struct BlockOffsets {
   uint64_t grid = 0, function = 0;
 };
@@ -87,7 +87,7 @@ class Writer {
   uint64_t gridBytesPerNode() const { return has_blanking_ ? 16 : 12; }
   uint64_t functionBytesPerNode() const { return 4 * wanted_.size(); }
 
-  // Notes where each block's arrays will be, and returns the sizes of the two files.
+  // Writes the headers, records the positions of each block's arrays, and returns the sizes of the two files.
   BlockOffsets writeHeaders() {
     std::vector<int32_t> grid, function;
     if (description_.blocks.size() > 1) {
@@ -97,7 +97,7 @@ class Writer {
     for (const GridBlock& block : description_.blocks) {
       for (const uint64_t nodes : {block.ni, block.nj, block.nk}) {
         if (nodes > std::numeric_limits<int32_t>::max())
-          throw Error("{}: {} has {} nodes along an axis, and PLOT3D counts to 2^31 - 1",
+          throw Error("{}: {} has {} nodes along an axis; PLOT3D allows at most 2^31 - 1",
                       grid_.path().string(), block.name, nodes);
         grid.push_back(static_cast<int32_t>(nodes));
         function.push_back(static_cast<int32_t>(nodes));
@@ -121,7 +121,7 @@ class Writer {
     const uint64_t needed = sizes.grid + sizes.function;
     const uint64_t available = std::filesystem::space(folder).available;
     if (available < needed)
-      throw Error("{}: {} bytes are needed there and {} are free; make room or write elsewhere",
+      throw Error("{}: needs {} bytes, but only {} are free; free some space or write elsewhere",
                   folder.string(), needed, available);
   }
 
@@ -163,7 +163,7 @@ class Writer {
         tbb::blocked_range<uint64_t>(begin, end, std::max<uint64_t>(1, kTaskNodes / block.ni)),
         [&](const tbb::blocked_range<uint64_t>& range) {
           for (uint64_t row = range.begin(); row < range.end();) {
-            // A box ends with its plane.
+            // A box does not extend beyond its plane.
             const uint64_t k = row / block.nj, j = row % block.nj;
             const uint64_t count = std::min(range.end() - row, block.nj - j);
             readBox(b, {j, j + count, k, k + 1}, (row - begin) * block.ni, out);

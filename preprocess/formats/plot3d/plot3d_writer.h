@@ -1,11 +1,12 @@
 // Writes a grid of any size as PLOT3D: PREFIX.xyz (coordinates), PREFIX.fun (a function file of the scalars)
-// and PREFIX.nam (their names, one a line).
+// and PREFIX.nam (their names, one per line).
 //
-//   PREFIX.xyz   [blocks]  {ni nj nk} a block          {x of all nodes, y, z, [iblank]} a block
-//   PREFIX.fun   [blocks]  {ni nj nk scalars} a block  {scalar 1 of all nodes, scalar 2, ...} a block
+//   file         header                          per block
+//   PREFIX.xyz   [blocks] {ni nj nk}...          x of all nodes, y, z, [iblank]
+//   PREFIX.fun   [blocks] {ni nj nk scalars}...  scalar 1 of all nodes, scalar 2, ...
 //
-// Little-endian, without record markers ("C binary"), 32-bit integers and single precision; the block count
-// only if there are several blocks, iblank only if a block has blanking. i fastest, then j, then k.
+// Little-endian, without record markers ("C binary"), 32-bit integers and single precision. The block count
+// is present only if there are several blocks, iblank only if a block has blanking. i is fastest, then j.
 #pragma once
 
 #include <filesystem>
@@ -16,11 +17,11 @@
 
 namespace curvisplat {
 
-/// Writes all blocks and all scalars of `source`, and returns the paths of what it wrote. The source is read
-/// by TBB workers, the caller's thread writes; memory is about 100 MB (and some rows), whatever the grid.
+/// Writes all blocks and scalars of `source`, and returns the paths of the files. TBB workers read the
+/// source, the calling thread writes. Needs about 100 MB of memory and a few rows, whatever the grid's size.
 ///
-/// The files take their names when all are whole; a failure leaves what was there before. Throws Error: a
-/// block with a dimension over 2^31 - 1, too little free space, or a disk that fails.
+/// The files are renamed to their final names after all of them are complete; on failure, existing files stay
+/// unchanged. Throws Error if a dimension exceeds 2^31 - 1, if there is too little space, or if I/O fails.
 std::vector<std::filesystem::path> writePlot3d(const GridSource& source, const std::filesystem::path& prefix,
                                                Progress& progress);
 

@@ -23,7 +23,7 @@ constexpr std::array<uint8_t, 256> valuesOfCharacters() {
 }
 constexpr std::array<uint8_t, 256> kValues = valuesOfCharacters();
 
-/// The bytes of one four of characters. Returns how many there are, 0 if it is none.
+/// Decodes a group of four characters. Returns the number of bytes (1 to 3), or 0 if they are not base64.
 size_t decodeFour(const std::byte* from, std::array<std::byte, 3>& to) {
   std::array<uint32_t, 4> values;
   for (size_t n = 0; n < 4; ++n) values[n] = kValues[static_cast<uint8_t>(from[n])];
@@ -58,7 +58,7 @@ void Base64Bytes::readAt(uint64_t offset, std::span<std::byte> to) const {
     const uint64_t left = characters_ / 4 - std::min(four, characters_ / 4);
     const auto fours = static_cast<size_t>(std::min({wanted, left, uint64_t{kPieceCharacters / 4}}));
     if (fours == 0)
-      throw Error("{}: byte {}: {} more bytes of base64 are expected; the file is truncated or damaged",
+      throw Error("{}: byte {}: expected {} more bytes in base64; the file is truncated or damaged",
                   file_->name(), begin_ + 4 * four, to.size());
     file_->readAt(begin_ + 4 * four, std::span(text).first(4 * fours));
     for (size_t n = 0; n < fours && !to.empty(); ++n) {
@@ -67,7 +67,7 @@ void Base64Bytes::readAt(uint64_t offset, std::span<std::byte> to) const {
       const size_t used = std::min(3 - skipped, to.size());
       if (count < skipped + used)
         throw Error("{}: byte {}: {}; the file is damaged", file_->name(), begin_ + 4 * (four + n),
-                    count == 0 ? "this is no base64" : "the base64 ends before its data does");
+                    count == 0 ? "not valid base64" : "the base64 ends before the end of its data");
       std::copy_n(&bytes[skipped], used, to.begin());
       to = to.subspan(used);
       skipped = 0;

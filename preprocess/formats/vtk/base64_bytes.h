@@ -1,24 +1,24 @@
-// Bytes in base64: four characters stand for three bytes, so each byte has its place in the text.
+// Bytes in base64: each group of four characters encodes three bytes, so every byte has a known position.
 #pragma once
 
 #include "preprocess/formats/common/byte_source.h"
 
 namespace curvisplat {
 
-/// A run of base64 without white space in it. It ends where its padding says, or at the end of the part of
-/// the file it is in; what is asked for behind that is an Error.
+/// Contiguous base64 without white space. It ends at its padding, or at the end of its range of the file;
+/// reading beyond that is an Error.
 class Base64Bytes final : public ByteSource {
  public:
-  /// The characters from `begin` up to `end` at most.
+  /// The characters [begin, end) of the file, or fewer.
   Base64Bytes(std::shared_ptr<const PooledFile> file, uint64_t begin, uint64_t end);
 
   uint64_t size() const override { return characters_ / 4 * 3; }
   void readAt(uint64_t offset, std::span<std::byte> to) const override;
 
-  /// True if the run ends with the first `bytes` bytes (1 or more): its fours of characters up to there end
+  /// Whether the data ends after its first `bytes` bytes (at least 1): the group with the last of them ends
   /// with padding.
   bool endsWith(uint64_t bytes) const;
-  /// The run that begins with the four of characters behind those of the first `bytes` bytes.
+  /// The base64 that begins with the group after that of the first `bytes` bytes.
   std::shared_ptr<const Base64Bytes> behind(uint64_t bytes) const;
 
  private:

@@ -21,14 +21,14 @@ struct Table {
   uint64_t blocks = 0, block_bytes = 0, last_bytes = 0;  // the last block has 1 .. block_bytes bytes
 };
 
-/// How many times as large as it is a block can become. Of zlib this is its specification's figure, of LZ4
-/// the 255 bytes that each further byte of a length stands for.
+/// The largest size that `packed` bytes can decompress to. zlib: the ratio in its documentation; LZ4: each
+/// further byte of a length encodes up to 255 bytes.
 uint64_t mostUnpacked(BlockCompressor compressor, uint64_t packed) {
   const uint64_t ratio = compressor == BlockCompressor::kZlib ? 1032 : 255;
   return packed > UINT64_MAX / ratio - 64 ? UINT64_MAX : packed * ratio + 64;
 }
 
-/// What no compressor makes more of, however little it finds to save.
+/// Upper bound of the compressed size of incompressible data.
 uint64_t mostPacked(uint64_t unpacked) {
   return unpacked + unpacked / 8 + 1024;
 }
@@ -39,18 +39,18 @@ Table readTable(const CompressedBytes::Parts& parts, uint64_t size) {
               integers.at(*parts.table, 2 * integers.bytes)};
   const uint64_t room = parts.table->size() / integers.bytes;
   if (table.blocks == 0 || table.blocks > room - 3)
-    throw Error("{}: its head tells of {} compressed blocks, where at most {} fit; the file is damaged",
+    throw Error("{}: its header declares {} compressed blocks, but at most {} fit; the file is damaged",
                 parts.place, table.blocks, room - 3);
   if (table.last_bytes == 0) table.last_bytes = table.block_bytes;
   const bool overflows = table.block_bytes == 0 || table.last_bytes > table.block_bytes ||
                          table.blocks > UINT64_MAX / table.block_bytes;
   if (overflows || (table.blocks - 1) * table.block_bytes + table.last_bytes != size)
-    throw Error("{}: should have {} bytes, but its head tells of {} blocks of {} bytes, the last of {}",
+    throw Error("{}: should have {} bytes, but its header declares {} blocks of {} bytes, the last of {}",
                 parts.place, size, table.blocks, table.block_bytes, table.last_bytes);
   return table;
 }
 
-/// Calls visit(block, offset, bytes) for all blocks of the table in order, and checks that they are there.
+/// Calls visit(block, offset, bytes) for all blocks of the table in order, and checks that they fit the file.
 template <typename Visit>
 void forEachBlock(const CompressedBytes::Parts& parts, const Table& table, const Visit& visit) {
   const HeaderIntegers& integers = parts.integers;
@@ -65,7 +65,7 @@ void forEachBlock(const CompressedBytes::Parts& parts, const Table& table, const
       const uint64_t unpacked = first + n + 1 == table.blocks ? table.last_bytes : table.block_bytes;
       if (bytes > parts.blocks->size() - offset || bytes > mostPacked(unpacked) ||
           mostUnpacked(parts.compressor, bytes) < unpacked)
-        throw Error("{}: block {} should be {} bytes, compressed to {}, of {} that are left in the file",
+        throw Error("{}: block {} of {} bytes, compressed to {}, does not fit the {} bytes left in the file",
                     parts.place, first + n, unpacked, bytes, parts.blocks->size() - offset);
       visit(first + n, offset, bytes);
       offset += bytes;
@@ -74,14 +74,14 @@ void forEachBlock(const CompressedBytes::Parts& parts, const Table& table, const
 }
 
 [[noreturn]] void failBlock(const std::string& place, uint64_t block, const char* reason) {
-  throw Error("{}: block {} cannot be unpacked: {}; the file is damaged", place, block, reason);
+  throw Error("{}: block {} cannot be decompressed: {}; the file is damaged", place, block, reason);
 }
 
-/// A zlib stream that gives its bytes piece by piece.
+/// Decompresses a zlib stream piece by piece.
 class Inflater {
  public:
   Inflater(const std::string& place, uint64_t block) : place_(place), block_(block) {
-    if (inflateInit(&stream_) != Z_OK) failBlock(place_, block_, "zlib has no memory");
+    if (inflateInit(&stream_) != Z_OK) failBlock(place_, block_, "zlib is out of memory");
   }
   ~Inflater() { inflateEnd(&stream_); }
   Inflater(const Inflater&) = delete;
@@ -92,7 +92,7 @@ class Inflater {
     stream_.avail_in = static_cast<uInt>(packed.size());
   }
 
-  /// Fills `to` as far as what was given goes; returns how far.
+  /// Decompresses to `to` as far as the input allows; returns the number of bytes written.
   size_t take(std::span<std::byte> to) {
     if (ended_) return 0;
     stream_.next_out = reinterpret_cast<Bytef*>(to.data());
@@ -100,7 +100,7 @@ class Inflater {
     const int result = inflate(&stream_, Z_NO_FLUSH);
     ended_ = result == Z_STREAM_END;
     if (!ended_ && result != Z_OK && result != Z_BUF_ERROR)
-      failBlock(place_, block_, stream_.msg ? stream_.msg : "it is no zlib stream");
+      failBlock(place_, block_, stream_.msg ? stream_.msg : "not a zlib stream");
     return to.size() - stream_.avail_out;
   }
 
@@ -119,10 +119,10 @@ void unpackZlib(const std::string& place, uint64_t block, std::span<const std::b
   inflater.give(packed);
   const size_t bytes = inflater.take(to);
   std::byte more;
-  // The stream ends with a checksum, which is not looked at before one asks for what follows the last byte.
+  // zlib checks the checksum at the end of the stream only when more than the last byte is requested.
   if (bytes != to.size() || (!inflater.ended() && inflater.take(std::span(&more, 1)) > 0) ||
       !inflater.ended())
-    failBlock(place, block, "it has another size than its table says");
+    failBlock(place, block, "its size differs from the table");
 }
 
 void unpackLz4(const std::string& place, uint64_t block, std::span<const std::byte> packed,
@@ -130,30 +130,29 @@ void unpackLz4(const std::string& place, uint64_t block, std::span<const std::by
   const int bytes =
       LZ4_decompress_safe(reinterpret_cast<const char*>(packed.data()), reinterpret_cast<char*>(to.data()),
                           static_cast<int>(packed.size()), static_cast<int>(to.size()));
-  if (bytes < 0) failBlock(place, block, "it is no LZ4 block");
-  if (static_cast<size_t>(bytes) != to.size())
-    failBlock(place, block, "it has another size than its table says");
+  if (bytes < 0) failBlock(place, block, "not an LZ4 block");
+  if (static_cast<size_t>(bytes) != to.size()) failBlock(place, block, "its size differs from the table");
 }
 
-/// Unpacks one zlib block of any size in pieces.
+/// Decompresses one zlib block of any size in pieces.
 void spoolZlib(const CompressedBytes::Parts& parts, uint64_t block, uint64_t offset, uint64_t packed,
                uint64_t unpacked, const SpoolFile::Sink& sink) {
   Inflater inflater(parts.place, block);
   std::vector<std::byte> in(kPieceBytes), out(kPieceBytes);
   while (!inflater.ended()) {
-    if (packed == 0) failBlock(parts.place, block, "it ends too early");
+    if (packed == 0) failBlock(parts.place, block, "it is truncated");
     const auto given = static_cast<size_t>(std::min<uint64_t>(packed, in.size()));
     parts.blocks->readAt(offset, std::span(in).first(given));
     inflater.give(std::span(in).first(given));
     offset += given;
     packed -= given;
     for (size_t bytes; (bytes = inflater.take(out)) > 0;) {
-      if (bytes > unpacked) failBlock(parts.place, block, "it is larger than its table says");
+      if (bytes > unpacked) failBlock(parts.place, block, "it is larger than the table declares");
       sink(std::span(out).first(bytes));
       unpacked -= bytes;
     }
   }
-  if (unpacked > 0) failBlock(parts.place, block, "it is smaller than its table says");
+  if (unpacked > 0) failBlock(parts.place, block, "it is smaller than the table declares");
 }
 
 uint64_t nextId() {
@@ -161,7 +160,7 @@ uint64_t nextId() {
   return ++ids;
 }
 
-/// The block that a thread has unpacked last.
+/// The block that a thread decompressed last.
 struct UnpackedBlock {
   uint64_t id = 0, block = 0;
   std::vector<std::byte> packed, bytes;
@@ -185,8 +184,8 @@ CompressedBytes::CompressedBytes(Parts parts, uint64_t size)
   const Table table = readTable(parts_, size);
   if (table.block_bytes > kLargestBlockInMemory)
     throw Error(
-        "{}: has blocks of {} bytes, and no part of such a block can be read alone; "
-        "write it with blocks of at most {} bytes (VTK's are 32768), or with zlib",
+        "{}: has compressed blocks of {} bytes, which cannot be read in parts; write it with blocks of at "
+        "most {} bytes (VTK's default is 32768), or with zlib",
         parts_.place, table.block_bytes, kLargestBlockInMemory);
   blocks_ = table.blocks;
   block_bytes_ = table.block_bytes;

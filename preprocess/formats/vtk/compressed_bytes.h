@@ -1,10 +1,10 @@
-// Bytes in compressed blocks, as VTK's XML files have them:
+// Data in compressed blocks, as stored in VTK's XML files: a table followed by the blocks.
 //
-//   table   | blocks | bytes a block | bytes of the last, 0: as the others | compressed bytes of block 0 | 1
-//   | ... blocks  | block 0 | block 1 | ...         each for itself: a zlib stream or an LZ4 block
+//   table    | n | block size | size of the last block | compressed size of block 0 | of 1 | ... | of n - 1 |
+//   blocks   | block 0 | block 1 | ... | block n - 1 |       each a zlib stream or an LZ4 block of its own
 //
-// All of the table are integers of one size and byte order. Of it, one position in a thousand blocks is kept;
-// the rest is read again where it is needed.
+// The table consists of integers of one size and byte order; a last size of 0 means a full block. The offset
+// of every 1024th block is kept in memory; the table is read again for those between.
 #pragma once
 
 #include <vector>
@@ -17,7 +17,7 @@ namespace curvisplat {
 
 enum class BlockCompressor { kZlib, kLz4 };
 
-/// Integers as the heads of a file's arrays have them.
+/// The integers in the headers of a file's arrays.
 struct HeaderIntegers {
   size_t bytes = 4;  // 4 or 8
   ByteOrder order = ByteOrder::kLittle;
@@ -26,7 +26,7 @@ struct HeaderIntegers {
   uint64_t at(const ByteSource& source, uint64_t offset) const;
 };
 
-/// Blocks of more bytes are no longer unpacked in memory.
+/// Larger blocks are not decompressed in memory.
 inline constexpr uint64_t kLargestBlockInMemory = uint64_t{8} << 20;
 
 class CompressedBytes final : public ByteSource {
@@ -35,34 +35,34 @@ class CompressedBytes final : public ByteSource {
     std::shared_ptr<const ByteSource> table, blocks;
     HeaderIntegers integers;
     BlockCompressor compressor = BlockCompressor::kZlib;
-    std::string place;  // for errors: "FILE: array NAME"
+    std::string place;  // for error messages: "FILE: array NAME"
   };
 
-  /// Reads the table. Throws Error unless it tells of exactly `size` bytes, in blocks that are there and that
-  /// can hold as many, of at most kLargestBlockInMemory.
+  /// Reads the table. Throws Error unless it declares exactly `size` bytes, in blocks of at most
+  /// kLargestBlockInMemory whose compressed sizes are possible and fit in the file.
   CompressedBytes(Parts parts, uint64_t size);
 
   uint64_t size() const override { return size_; }
-  /// Unpacks the blocks that `to` lies in, and keeps the last one for this thread's next call.
+  /// Decompresses the blocks that overlap the range, and keeps the last one for this thread's next call.
   void readAt(uint64_t offset, std::span<std::byte> to) const override;
 
  private:
   struct Place {
-    uint64_t offset = 0, bytes = 0;  // in parts_.blocks
+    uint64_t offset = 0, bytes = 0;  // in parts_.blocks, compressed
   };
   Place placeOf(uint64_t block) const;
   uint64_t bytesOf(uint64_t block) const;
   std::span<const std::byte> unpacked(uint64_t block) const;
 
-  const uint64_t id_;  // never used twice: what a thread has kept is known by it
+  const uint64_t id_;  // unique in the process: identifies the block that a thread has kept
   Parts parts_;
   uint64_t size_ = 0, blocks_ = 0, block_bytes_ = 0;
-  std::vector<uint64_t> offsets_;  // of each kTableStride-th block
+  std::vector<uint64_t> offsets_;  // of every kTableStride-th block
 };
 
-/// The bytes of `parts`, which should be `size`: a CompressedBytes, or, if zlib blocks are larger than
-/// kLargestBlockInMemory, all of them unpacked into `spool` when the first are read. Throws Error as
-/// CompressedBytes does; LZ4 blocks of that size are refused.
+/// The `size` decompressed bytes of `parts`: a CompressedBytes; or, for zlib blocks larger than
+/// kLargestBlockInMemory, a spool file that is filled at the first read. Throws Error as CompressedBytes
+/// does, and for LZ4 blocks of that size.
 std::shared_ptr<const ByteSource> compressedBytes(CompressedBytes::Parts parts, uint64_t size,
                                                   const std::shared_ptr<SpoolFile>& spool);
 

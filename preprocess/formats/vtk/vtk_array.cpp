@@ -70,7 +70,7 @@ bool fits(double value) {
   if constexpr (std::is_floating_point_v<Stored>) {
     return true;
   } else {
-    // The largest integers of 64 bits are no doubles: one more is.
+    // The largest 64-bit integers are not representable as doubles, but the next power of two is.
     const double beyond = std::ldexp(1.0, std::numeric_limits<Stored>::digits);
     return value >= static_cast<double>(std::numeric_limits<Stored>::min()) && value < beyond &&
            value == std::trunc(value);
@@ -114,7 +114,7 @@ void packNumbers(TextReader& text, uint64_t count, VtkType type, const SpoolFile
     for (uint64_t n = 0; n < count; ++n) {
       const double value = text.number();
       if (!fits<Stored>(value))
-        throw Error("{}: byte {}: {} is no integer of {} bits", text.file().name(), text.offset(), value,
+        throw Error("{}: byte {}: {} is not an integer of {} bits", text.file().name(), text.offset(), value,
                     8 * sizeof(Stored));
       piece.push_back(static_cast<Stored>(value));
       if (piece.size() < piece.capacity() && n + 1 < count) continue;

@@ -1,4 +1,4 @@
-// An array of a VTK file: tuples of numbers, whatever their type and encoding.
+// An array of a VTK file: tuples of numbers, of any type and encoding.
 #pragma once
 
 #include <cstdint>
@@ -38,24 +38,24 @@ struct VtkArray {
   uint64_t tuples = 0;
   ByteOrder order = ByteOrder::kLittle;
   std::shared_ptr<const ByteSource> bytes;
-  std::vector<std::string> component_names;  // empty, or one for each
+  std::vector<std::string> component_names;  // empty, or one for each component
 
   uint64_t tupleBytes() const { return components * bytesOf(type); }
 };
 
-/// More components are more than the buffer of a reading thread is good for.
+/// Limit that keeps a tuple within the buffer of a reading thread.
 inline constexpr uint32_t kMaxComponents = 4096;
 
-/// What to make of a tuple, and where to put it.
+/// A component, or the magnitude, of an array's tuples, and its destination.
 template <typename Value>
 struct WantedComponent {
   static constexpr int kMagnitude = -1;
-  int component = 0;  // or kMagnitude: the root of the sum of all components' squares
+  int component = 0;  // or kMagnitude: the Euclidean norm of the tuple
   Value* to = nullptr;
 };
 
-/// Reads tuples [first, first + count): of each wanted component puts to[0 .. count). Value: double or float.
-/// Throws Error as the array's bytes do. Costs a buffer of 256 KiB a thread.
+/// Reads tuples [first, first + count), each wanted component to its to[0 .. count). Value: double or float.
+/// Throws Error as the array's bytes do. Needs a buffer of 256 KiB per thread.
 template <typename Value>
 void readTuples(const VtkArray& array, uint64_t first, uint64_t count,
                 std::span<const WantedComponent<Value>> wanted);
@@ -64,8 +64,8 @@ extern template void readTuples(const VtkArray&, uint64_t, uint64_t,
                                 std::span<const WantedComponent<double>>);
 extern template void readTuples(const VtkArray&, uint64_t, uint64_t, std::span<const WantedComponent<float>>);
 
-/// Gives `count` numbers of a text to `sink`, as `type` in the machine's byte order. Throws Error if there
-/// are fewer, or if one is no number of that type.
+/// Parses `count` numbers and passes them to `sink` as `type` in the machine's byte order. Throws Error if
+/// there are fewer, or if one is not a number of that type.
 void packNumbers(TextReader& text, uint64_t count, VtkType type, const SpoolFile::Sink& sink);
 
 }  // namespace curvisplat

@@ -6,10 +6,10 @@
 namespace curvisplat {
 namespace {
 
-// Bits of vtkGhostType (vtkDataSetAttributes). Duplicates, bit 0, are no blanking: of pieces that overlap,
-// the extents tell who draws what; in a grid that stands alone they are as good as any.
+// Bits of vtkGhostType (vtkDataSetAttributes). Duplicates (bit 0) are not blanked: where pieces overlap,
+// their extents decide which piece draws a cell; in a grid of one piece duplicates are ordinary cells.
 constexpr int kHiddenPoint = 2;
-constexpr int kHiddenCell = 32 | 8;  // and refined ones: their place is taken by finer cells elsewhere
+constexpr int kHiddenCell = 32 | 8;  // hidden or refined; finer cells elsewhere replace refined ones
 
 VtkBox inPiece(const VtkPiece& piece, const VtkBlock& block) {
   VtkBox box;
@@ -28,7 +28,7 @@ VtkBox within(VtkBox box, const NodeBox& rows) {
   return box;
 }
 
-/// Values of a small integer array, as read.
+/// The values of a small integer array, unmodified.
 std::vector<float> readFlags(const VtkArray& array, const std::array<uint64_t, 3>& counts,
                              const VtkBox& box) {
   std::vector<float> flags(static_cast<size_t>(box.size()));
@@ -47,7 +47,7 @@ VtkBox plane(VtkBox box, uint64_t k) {
   return box;
 }
 
-/// Adds up how many cells around each node of one plane there are, and how many of them are hidden.
+/// Counts the cells around each node of one plane, and how many of them are hidden.
 struct CellsAround {
   std::vector<uint8_t> all, hidden;
 
@@ -143,7 +143,7 @@ template <typename Value>
 void readBox(const VtkArray& array, const std::array<uint64_t, 3>& counts, const VtkBox& box,
              std::span<const WantedComponent<Value>> wanted) {
   if (box.size() == 0) return;
-  // Rows that follow one another in the file are read at once.
+  // Rows that are contiguous in the file are read together.
   const bool whole_rows = box.along(0) == counts[0];
   const bool whole_planes = whole_rows && box.along(1) == counts[1];
   const uint64_t run = box.along(0) * (whole_rows ? box.along(1) : 1) * (whole_planes ? box.along(2) : 1);

@@ -9,7 +9,7 @@
 namespace curvisplat {
 namespace {
 
-/// Faces of a box in a partition touch those of six others; more parts than this are no partition.
+/// A box in a regular partition has six neighbours; more parts than this are not a sane partition.
 constexpr size_t kMaxPartsOfAPiece = 64;
 
 bool shareCells(const VtkExtent& a, const VtkExtent& b) {
@@ -18,8 +18,8 @@ bool shareCells(const VtkExtent& a, const VtkExtent& b) {
   return true;
 }
 
-/// What of `part` is not in `other`, which shares cells with it: up to six boxes. Cut along k first, since
-/// whole planes are read at once.
+/// Appends to `left` the cells of `part` outside `other`, which overlaps it: up to six boxes. Cuts along k
+/// first, since whole planes are read together.
 void subtract(VtkExtent part, const VtkExtent& other, std::vector<VtkExtent>& left) {
   for (const size_t axis : {2, 1, 0}) {
     if (part.lower[axis] < other.lower[axis]) {
@@ -65,7 +65,7 @@ std::vector<std::vector<VtkExtent>> ownedParts(const std::vector<VtkExtent>& pie
       parts = std::move(left);
       if (parts.size() > kMaxPartsOfAPiece)
         throw Error(
-            "piece {} of the grid overlaps those before it in {} parts; expected pieces that abut, or "
+            "piece {} of the grid overlaps the previous pieces in {} parts; expected pieces that abut or "
             "overlap by ghost levels",
             n + 1, parts.size());
     }

@@ -1,5 +1,5 @@
-// What the readers of VTK's files make of them: pieces, each with its nodes and arrays, and the blocks that
-// they are. VtkSource reads it.
+// The result of all readers of VTK files, and the input of VtkSource: pieces, each with its nodes and arrays,
+// and the blocks into which they are divided.
 #pragma once
 
 #include <array>
@@ -25,21 +25,21 @@ struct VtkUniformNodes {
   glm::dvec3 origin{0}, spacing{1};
   glm::dmat3 direction{1};
 };
-/// Those of a rectilinear one: the coordinates along i, j and k.
+/// The nodes of a rectilinear grid: the coordinates along i, j and k.
 using VtkAxes = std::array<VtkArray, 3>;
-/// Those of a curvilinear one: three components a node.
+/// The nodes of a curvilinear grid: three components per node.
 using VtkPoints = VtkArray;
 
 struct VtkPiece {
   VtkExtent extent;
   std::variant<VtkPoints, VtkAxes, VtkUniformNodes> nodes;
-  std::vector<VtkArray> point_data, cell_data;        // of as many tuples as there are nodes, cells
+  std::vector<VtkArray> point_data, cell_data;        // one tuple per node, per cell
   std::optional<VtkArray> point_ghosts, cell_ghosts;  // vtkGhostType
-  std::optional<VtkArray> visible;                    // of the nodes: 0 hides
+  std::optional<VtkArray> visible;                    // one value per node; 0 hides it
   std::string active_point_data, active_cell_data;    // names of arrays; may be empty
 };
 
-/// A block: all of a piece, or a part.
+/// A block: a whole piece, or a part of one.
 struct VtkBlock {
   std::string name;
   size_t piece = 0;
@@ -56,7 +56,7 @@ struct VtkGrid {
   std::vector<std::string> warnings;
 };
 
-/// What all files of a grid share.
+/// Resources shared by all files of a grid.
 struct VtkFiles {
   explicit VtkFiles(std::filesystem::path temporary_folder)
       : spool(std::make_shared<SpoolFile>(std::move(temporary_folder))) {}
@@ -65,8 +65,8 @@ struct VtkFiles {
   std::shared_ptr<SpoolFile> spool;
 };
 
-/// Puts an array where it belongs: vtkGhostType into the piece's ghosts, old ghost levels nowhere, the others
-/// into its data, unless one of that name is there.
+/// Adds an array to the piece: vtkGhostType becomes its ghosts, obsolete ghost levels are dropped, all others
+/// become data. A second array of the same name is ignored with a warning.
 void addDataArray(VtkPiece& piece, bool of_cells, VtkArray array, std::vector<std::string>& warnings);
 
 }  // namespace curvisplat

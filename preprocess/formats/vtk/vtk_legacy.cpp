@@ -43,7 +43,7 @@ std::string lowered(std::string_view text) {
   return lower;
 }
 
-/// Names are written with %20 for a space.
+/// Decodes %20 and the like; legacy files encode special characters in names.
 std::string decodedName(std::string_view text) {
   std::string name;
   for (size_t n = 0; n < text.size(); ++n) {
@@ -56,7 +56,7 @@ std::string decodedName(std::string_view text) {
   return name;
 }
 
-/// The parts of the file come one after the other, each with a line of words before its numbers.
+/// Reads the file from beginning to end. It is a sequence of parts, each a line of keywords and its numbers.
 class LegacyReader {
  public:
   LegacyReader(const VtkFiles& files, const std::filesystem::path& path)
@@ -87,10 +87,10 @@ class LegacyReader {
   std::string nextWord() { return lowered(text_.word()); }
   std::string nextName() {
     const std::string_view word = text_.word();
-    if (word.empty()) fail("ends where a name is expected; the file is truncated");
+    if (word.empty()) fail("ends where a name was expected; the file is truncated");
     return decodedName(word);
   }
-  /// The words that are left in the line.
+  /// The remaining words of the line.
   std::vector<std::string> restOfLine() {
     std::istringstream line{std::string(text_.line().value_or(""))};
     std::vector<std::string> words;
@@ -101,7 +101,7 @@ class LegacyReader {
     uint64_t value = 0;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (error != std::errc{} || end != word.data() + word.size() || value > kMaxNodes)
-      fail("has \"{}\" where a count is expected", word.substr(0, 30));
+      fail("found \"{}\"; expected a count", word.substr(0, 30));
     return value;
   }
   uint64_t nextCount() { return count(text_.word()); }
@@ -114,16 +114,16 @@ class LegacyReader {
       fail("has \"{}\" in its third line; expected ASCII or BINARY", encoding.substr(0, 30));
     ascii_ = encoding == "ascii";
     std::string word = nextWord();
-    // Field data may come before the grid.
+    // Field data may precede the grid.
     for (; word == "field" || word == "metadata"; word = nextWord())
       word == "field" ? readField() : skipMetadata();
     dataset_ = nextWord();
-    if (word != "dataset") fail("has \"{}\" where DATASET is expected", word.substr(0, 30));
+    if (word != "dataset") fail("found \"{}\"; expected DATASET", word.substr(0, 30));
     std::transform(dataset_.begin(), dataset_.end(), dataset_.begin(),
                    [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; });
     uniform_ = dataset_ == "STRUCTURED_POINTS";
     if (!uniform_ && dataset_ != "STRUCTURED_GRID" && dataset_ != "RECTILINEAR_GRID")
-      fail("holds a {}; expected STRUCTURED_GRID, RECTILINEAR_GRID or STRUCTURED_POINTS",
+      fail("is a {}; expected STRUCTURED_GRID, RECTILINEAR_GRID or STRUCTURED_POINTS",
            dataset_.substr(0, 30));
     if (dataset_ == "RECTILINEAR_GRID") piece_.nodes = VtkAxes{};
     if (uniform_) piece_.nodes = VtkUniformNodes{};
@@ -166,7 +166,8 @@ class LegacyReader {
   void checkExtent() {
     double nodes = 1;
     for (size_t axis = 0; axis < 3; ++axis) nodes *= static_cast<double>(piece_.extent.nodesAlong(axis));
-    if (nodes > static_cast<double>(kMaxNodes)) fail("has {} nodes, more than any file", nodes);
+    if (nodes > static_cast<double>(kMaxNodes))
+      fail("has {} nodes; expected at most {}", nodes, static_cast<double>(kMaxNodes));
     if (has_extent_) fail("has a second DIMENSIONS or EXTENT");
     has_extent_ = true;
   }
@@ -182,7 +183,7 @@ class LegacyReader {
     if (word == "points" && !axes && !uniform) {
       const uint64_t nodes = nextCount();
       if (nodes != piece_.extent.nodes())
-        fail("has {} POINTS; expected {}, of {} nodes", nodes, piece_.extent.nodes(),
+        fail("has {} POINTS; expected {} (a grid of {} nodes)", nodes, piece_.extent.nodes(),
              piece_.extent.describe());
       piece_.nodes = readNumbers("POINTS", lineOfType(), 3, nodes);
     } else if (axes && word.size() == 13 && word.ends_with("_coordinates") && word[0] >= 'x' &&
@@ -204,7 +205,7 @@ class LegacyReader {
         fail("has BLANKING of {} nodes; expected {}", nodes, piece_.extent.nodes());
       piece_.visible = readNumbers("BLANKING", lineOfType(), 1, nodes);
     } else {
-      fail("has \"{}\" where a part of a {} is expected", word.substr(0, 30), dataset_);
+      fail("found \"{}\"; expected a part of a {}", word.substr(0, 30), dataset_);
     }
   }
 
@@ -213,8 +214,8 @@ class LegacyReader {
     const uint64_t expected = of_cells ? piece_.extent.cells() : piece_.extent.nodes();
     tuples_ = nextCount();
     if (tuples_ != expected)
-      fail("has {} for {} {}; expected {}, of {} nodes", of_cells ? "CELL_DATA" : "POINT_DATA", tuples_,
-           of_cells ? "cells" : "nodes", expected, piece_.extent.describe());
+      fail("has {} {}; expected {} (a grid of {} nodes)", of_cells ? "CELL_DATA" : "POINT_DATA", tuples_,
+           expected, piece_.extent.describe());
     owner_ = of_cells ? Owner::kCells : Owner::kPoints;
   }
 
@@ -239,7 +240,7 @@ class LegacyReader {
         const std::string name = nextName();
         return addArray(name, lineOfType(), attribute.components);
       }
-    fail("has \"{}\" where SCALARS, VECTORS, FIELD or another attribute is expected", word.substr(0, 30));
+    fail("found \"{}\"; expected SCALARS, VECTORS, FIELD or another attribute", word.substr(0, 30));
   }
 
   void readScalars() {
@@ -275,7 +276,7 @@ class LegacyReader {
     readNumbers("LOOKUP_TABLE", ascii_ ? "float" : "unsigned_char", 4, size);
   }
 
-  /// Arrays of any number of tuples: those of the owner's are its data.
+  /// Arrays with any number of tuples; those with the owner's number become its data.
   void readField() {
     nextName();
     const uint64_t arrays = nextCount();
@@ -312,10 +313,10 @@ class LegacyReader {
     const uint64_t strings = tuples > 0 && components > kMaxNodes / tuples ? kMaxNodes : tuples * components;
     for (uint64_t n = 0; n < strings; ++n) {
       if (ascii_) {
-        if (!text_.line()) fail("ends inside of an array of strings; the file is truncated");
+        if (!text_.line()) fail("ends inside an array of strings; the file is truncated");
         continue;
       }
-      // The first two bits of a length tell how many bytes it has: 8, 4, 2 or 1.
+      // The first two bits of a length give its size: 8, 4, 2 or 1 bytes.
       std::byte first;
       file_->readAt(text_.offset(), std::span(&first, 1));
       const auto bytes = size_t{8} >> std::to_integer<unsigned>(first >> 6);
@@ -324,12 +325,12 @@ class LegacyReader {
       length[8 - bytes] &= std::byte{0x3f};
       const auto skipped = loadStored<uint64_t>(length.data(), kMachineByteOrder != ByteOrder::kBig);
       if (skipped > file_->size() - text_.offset() - bytes)
-        fail("has a string of {} bytes; the file is truncated or damaged", skipped);
+        fail("declares a string of {} bytes; the file is truncated or damaged", skipped);
       text_.seek(text_.offset() + bytes + skipped);
     }
   }
 
-  /// Goes behind the next empty line.
+  /// Skips everything up to and including the next empty line.
   void skipMetadata() {
     text_.line();
     for (;;) {
@@ -338,10 +339,10 @@ class LegacyReader {
     }
   }
 
-  /// The type, which is the last word before the numbers, and the end of its line: binary numbers follow.
+  /// Reads the type, the last word before the numbers, and the line break; binary numbers follow at once.
   std::string lineOfType() {
     const std::vector<std::string> words = restOfLine();
-    if (words.size() != 1) fail("has {} words where a type is expected", words.size());
+    if (words.size() != 1) fail("found {} words; expected a type", words.size());
     return words[0];
   }
 
@@ -366,10 +367,10 @@ class LegacyReader {
     array.tuples = tuples;
     const uint64_t numbers = tuples * components, bytes = tuples * array.tupleBytes();
     const uint64_t left = file_->size() - text_.offset();
-    // In text, a number takes a digit and a space.
+    // In text, a number needs a digit and a space.
     if (ascii_ ? numbers > (left + 1) / 2 : bytes > left)
-      fail("array {} should have {} numbers, but {} bytes are left in the file; it is truncated or damaged",
-           name, numbers, left);
+      fail("array {} needs {} numbers, but only {} bytes are left; the file is truncated or damaged", name,
+           numbers, left);
     if (ascii_) {
       array.order = kMachineByteOrder;
       const auto spooled = std::make_shared<SpooledBytes>(
@@ -389,7 +390,7 @@ class LegacyReader {
     if (!has_extent_) fail("has no DIMENSIONS");
     const auto* const axes = std::get_if<VtkAxes>(&piece_.nodes);
     if (axes && !std::all_of(axes->begin(), axes->end(), [](const VtkArray& axis) { return axis.bytes; }))
-      fail("lacks one of X_COORDINATES, Y_COORDINATES and Z_COORDINATES; the file is truncated");
+      fail("has no X_COORDINATES, Y_COORDINATES or Z_COORDINATES; the file is truncated");
     if (const auto* const points = std::get_if<VtkPoints>(&piece_.nodes); points && !points->bytes)
       fail("has no POINTS; the file is truncated");
   }
@@ -401,7 +402,7 @@ class LegacyReader {
   std::string dataset_;
   bool uniform_ = false, has_extent_ = false;
   Owner owner_ = Owner::kGrid;
-  uint64_t tuples_ = 0;  // of the owner's arrays
+  uint64_t tuples_ = 0;  // number of tuples of the owner's arrays
   VtkPiece piece_;
   VtkGrid grid_;
 };

@@ -9,10 +9,10 @@
 
 namespace curvisplat {
 
-/// Whether the file's first bytes are those of a legacy VTK file.
+/// Whether the file has the signature of a legacy VTK file.
 bool isVtkLegacy(const InputFile& file);
 
-/// Numbers in text go to a temporary file first. Throws Error.
+/// Numbers in text are spooled to a temporary file first. Throws Error.
 std::unique_ptr<GridSource> openVtkLegacy(const OpenGridOptions& options);
 
 }  // namespace curvisplat

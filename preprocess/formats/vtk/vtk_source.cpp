@@ -20,7 +20,7 @@ const std::vector<VtkArray>& dataOf(const VtkPiece& piece, Centring centring) {
   return centring == Centring::kNode ? piece.point_data : piece.cell_data;
 }
 
-/// As scalarsNamed() compares names.
+/// The name in the form that scalarsNamed() compares.
 std::string asAlias(const std::string& name) {
   std::string alias;
   for (const char c : name)
@@ -37,8 +37,8 @@ int coordinateBytes(const VtkPiece& piece) {
   return 8;
 }
 
-/// Moves the values of cells, which lie at the front of `values`, to their lowest nodes, and puts NaN where
-/// there is no cell.
+/// Moves the values of cells from the front of `values` to their lowest nodes, and writes NaN at nodes that
+/// are not the lowest node of a cell.
 void spreadToNodes(const VtkBox& cells, const VtkBox& nodes, std::span<float> values) {
   const uint64_t row = nodes.along(0);
   for (uint64_t k = nodes.along(2); k-- > 0;)
@@ -77,7 +77,7 @@ VtkSource::VtkSource(VtkGrid grid) : grid_(std::move(grid)) {
   description_.files = grid_.files;
   description_.times = grid_.times;
   description_.time_step = grid_.time_step;
-  for (std::string& warning : grid_.warnings)  // many pieces may have the same to tell
+  for (std::string& warning : grid_.warnings)  // many pieces may give the same warning
     if (std::find(description_.warnings.begin(), description_.warnings.end(), warning) ==
         description_.warnings.end())
       description_.warnings.push_back(std::move(warning));
@@ -107,11 +107,12 @@ void VtkSource::addBlocks() {
   }
   const std::string file = grid_.files.empty() ? "" : grid_.files.front();
   if (blocks.empty())
-    throw Error("{}: has no block with volume{}; expected a structured grid of three dimensions", file,
+    throw Error("{}: has no block with volume{}; expected a three-dimensional structured grid", file,
                 flat.empty() ? "" : ": " + flat + " is flat");
   if (blocks.size() < grid_.blocks.size())
-    description_.warnings.push_back(
-        fmt::format("{} flat blocks are left out, {} among them", grid_.blocks.size() - blocks.size(), flat));
+    description_.warnings.push_back(fmt::format("{} of {} blocks are flat and left out, such as {}",
+                                                grid_.blocks.size() - blocks.size(), grid_.blocks.size(),
+                                                flat));
   grid_.blocks = std::move(blocks);
 }
 
@@ -184,7 +185,7 @@ void VtkSource::warnOfPartialFields() {
     });
     if (without > 0)
       description_.warnings.push_back(
-          fmt::format("{} of {} blocks have no array {}: they are blank where it is drawn", without,
+          fmt::format("{} of {} blocks have no array {}; they are not drawn with it", without,
                       grid_.blocks.size(), field.name));
   }
 }
@@ -225,7 +226,7 @@ void VtkSource::read(uint32_t number, const NodeBox& box, std::span<const uint32
 
   out.scalars.resize(scalars.size());
   for (std::vector<float>& values : out.scalars) values.resize(nodes);
-  // The components of one array are read together.
+  // All requested components of an array are read together.
   std::vector<bool> read(scalars.size());
   for (size_t n = 0; n < scalars.size(); ++n) {
     if (read[n]) continue;

@@ -6,12 +6,17 @@
 
 namespace curvisplat {
 
-/// Scalars are the numeric arrays of points and cells: those of one component under their name; of vectors
-/// NAME:mag, NAME:x, NAME:y (and NAME:z); of more components NAME:0, NAME:1 ... Where points and cells have
-/// arrays of one name, the cells' is NAME:cell. Those that a file calls active come first. Flat pieces are
-/// left out with a warning; arrays that not all blocks have are NaN, so blank, in those that have them not.
+/// Scalars are the numeric arrays of points and cells:
 ///
-/// Blank are nodes that vtkGhostType hides, and those whose cells it hides all.
+///   1 component         NAME
+///   2 or 3 components   NAME:mag, NAME:x, NAME:y (and NAME:z)
+///   more                NAME:0, NAME:1, ...
+///
+/// If points and cells have arrays of the same name, that of the cells is NAME:cell. A file's active arrays
+/// come first. Flat pieces are left out with a warning. An array that is missing in some blocks is NaN there,
+/// which blanks their samples.
+///
+/// A node is blanked if vtkGhostType hides it or all cells around it.
 class VtkSource final : public GridSource {
  public:
   /// Throws Error if no block has volume.
@@ -22,12 +27,12 @@ class VtkSource final : public GridSource {
             NodeArrays& out) const override;
 
  private:
-  /// An array that blocks have in common.
+  /// An array that occurs in one or more pieces.
   struct Field {
     std::string name;
     Centring centring = Centring::kNode;
     uint32_t components = 1;
-    std::vector<int32_t> array_of_piece;  // its position in the piece's data; -1: it has none
+    std::vector<int32_t> array_of_piece;  // [piece]: index in the piece's data; -1: missing
   };
   struct Scalar {
     size_t field = 0;
@@ -46,7 +51,7 @@ class VtkSource final : public GridSource {
   VtkGrid grid_;
   GridDescription description_;
   std::vector<Field> fields_;
-  std::vector<Scalar> scalars_;  // of each of description_.scalars
+  std::vector<Scalar> scalars_;  // [description_.scalars]
 };
 
 }  // namespace curvisplat

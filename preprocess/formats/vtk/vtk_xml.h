@@ -1,5 +1,5 @@
 // VTK's XML formats of structured grids: .vts, .vtr and .vti, their parallel forms .pvts, .pvtr and .pvti,
-// sets of them (.vtm, .vtpd, .vtpc) and time series of any of these (.pvd).
+// collections (.vtm, .vtpd, .vtpc) and time series of any of these (.pvd).
 #pragma once
 
 #include <memory>
@@ -14,16 +14,16 @@ namespace curvisplat {
 /// The pieces of a .vts, .vtr or .vti file.
 struct VtkXmlPieces {
   std::vector<VtkPiece> pieces;
-  std::string encoding;        // of its first array
-  std::optional<double> time;  // as its field data tells
+  std::string encoding;        // of the first array
+  std::optional<double> time;  // from its field data
 };
 
-/// Whether readXmlPieces() reads files of that type.
+/// Whether readXmlPieces() supports files of this type.
 bool hasXmlPieces(std::string_view type);
 /// Throws Error if the file is damaged.
 VtkXmlPieces readXmlPieces(const VtkXmlFile& file, std::vector<std::string>& warnings);
 
-/// Opens any of the formats: their blocks, or those of one time step. Throws Error.
+/// Opens a file of any of these formats, at one time step. Throws Error.
 std::unique_ptr<GridSource> openVtkXml(const OpenGridOptions& options);
 
 }  // namespace curvisplat

@@ -29,7 +29,7 @@ std::optional<VtkType> typeNamed(const std::string& name) {
   return std::nullopt;
 }
 
-/// The next word of `text`, which is taken off it.
+/// Removes the next word from `text` and returns it.
 std::string_view takeWord(std::string_view& text) {
   constexpr const char* kSpace = " \t\r\n";
   text.remove_prefix(std::min(text.find_first_not_of(kSpace), text.size()));
@@ -55,13 +55,13 @@ bool isVtkXml(const InputFile& file) {
 
 VtkXmlFile::VtkXmlFile(const VtkFiles& files, const std::filesystem::path& path)
     : file_(std::make_shared<const PooledFile>(files.pool, path)), spool_(files.spool) {
-  if (!isVtkXml(*files.pool->at(path))) fail("is no VTK XML file");
+  if (!isVtkXml(*files.pool->at(path))) fail("is not a VTK XML file");
   XmlSkeleton skeleton = xmlSkeleton(*file_);
   markup_ = std::move(skeleton.text);
   appended_begin_ = skeleton.appended_begin;
   const pugi::xml_parse_result parsed =
       document_.load_buffer_inplace(markup_.data(), markup_.size(), pugi::parse_default, pugi::encoding_utf8);
-  if (!parsed) fail(fmt::format("is no XML: {}", parsed.description()));
+  if (!parsed) fail(fmt::format("is not valid XML: {}", parsed.description()));
   root_ = document_.child("VTKFile");
   type_ = root_.attribute("type").value();
   if (!root_ || type_.empty()) fail("has no <VTKFile type=...>");
@@ -80,7 +80,7 @@ VtkXmlFile::VtkXmlFile(const VtkFiles& files, const std::filesystem::path& path)
   else if (compressor == "vtkLZ4DataCompressor")
     compressor_ = BlockCompressor::kLz4;
   else if (!compressor.empty())
-    fail(fmt::format("is compressed by {}; expected zlib or LZ4: write it with one of them", compressor));
+    fail(fmt::format("is compressed by {}; expected zlib or LZ4; write it with one of these", compressor));
 
   const std::string encoding = root_.child("AppendedData").attribute("encoding").as_string("base64");
   if (encoding != "base64" && encoding != "raw")
@@ -162,7 +162,7 @@ VtkArray VtkXmlFile::array(const pugi::xml_node& node, uint64_t tuples) const {
   const std::string type = node.attribute("type").value();
   const std::optional<VtkType> known = typeNamed(type);
   if (!known)
-    fail(fmt::format("array {} has type {}; expected Float32 or another of VTK's", array.name, type));
+    fail(fmt::format("array {} has type {}; expected Float32 or another numeric type", array.name, type));
   array.type = *known;
   const std::string components = node.attribute("NumberOfComponents").as_string("1");
   if (!parseInteger(std::string_view(components), array.components) || array.components == 0 ||
@@ -188,8 +188,8 @@ VtkArray VtkXmlFile::array(const pugi::xml_node& node, uint64_t tuples) const {
     Part part{0, file_->size()};
     if (appended_begin_ == 0 || !parseInteger(std::string_view(offset), part.begin) ||
         part.begin > file_->size() - appended_begin_)
-      fail(fmt::format("array {} should be at offset \"{}\" of the appended data, which {}", array.name,
-                       offset, appended_begin_ == 0 ? "is not there" : "is shorter; the file is truncated"));
+      fail(fmt::format("array {} is at offset \"{}\" of the appended data, which {}", array.name, offset,
+                       appended_begin_ == 0 ? "is missing" : "is shorter; the file is truncated"));
     part.begin += appended_begin_;
     array.order = header_.order;
     array.bytes = stored(node, array, part, appended_base64_);
@@ -201,9 +201,9 @@ VtkArray VtkXmlFile::array(const pugi::xml_node& node, uint64_t tuples) const {
 
 std::shared_ptr<const ByteSource> VtkXmlFile::text(const VtkArray& array, Part part) const {
   const uint64_t numbers = array.tuples * array.components;
-  // A number takes a digit and a space.
+  // A number needs a digit and a space.
   if (numbers > (part.end - part.begin + 1) / 2)
-    fail(fmt::format("array {} should have {} numbers, but its text has {} characters", array.name, numbers,
+    fail(fmt::format("array {} needs {} numbers, but its text has only {} characters", array.name, numbers,
                      part.end - part.begin));
   const auto make = [file = file_, part, numbers, type = array.type,
                      name = array.name](const SpoolFile::Sink& sink) {
@@ -226,7 +226,7 @@ std::shared_ptr<const ByteSource> VtkXmlFile::stored(const pugi::xml_node& node,
   if (!all) all = std::make_shared<const FileBytes>(file_, part.begin, part.end);
   const uint64_t first = header_.at(*all, 0);
 
-  std::shared_ptr<const ByteSource> behind;  // the head
+  std::shared_ptr<const ByteSource> behind;  // the bytes after the header
   uint64_t head_bytes = header_.bytes;
   if (compressor_) {
     if (first >= all->size() / header_.bytes) fail(fmt::format("array {} has {} blocks", array.name, first));
@@ -237,12 +237,12 @@ std::shared_ptr<const ByteSource> VtkXmlFile::stored(const pugi::xml_node& node,
   else if (head_bytes <= all->size())
     behind = std::make_shared<const BytesBehind>(all, head_bytes);
   else
-    throw Error("{}: its head of {} bytes is not all there; the file is truncated", place, head_bytes);
+    throw Error("{}: its header of {} bytes is incomplete; the file is truncated", place, head_bytes);
 
   if (compressor_) return compressedBytes({all, behind, header_, *compressor_, place}, bytes, spool_);
   if (first != bytes)
-    throw Error("{}: should have {} bytes, {} tuples of {}, but its head says {}", place, bytes, array.tuples,
-                array.tupleBytes(), first);
+    throw Error("{}: should have {} bytes ({} tuples of {}), but its header declares {}", place, bytes,
+                array.tuples, array.tupleBytes(), first);
   if (behind->size() < bytes)
     throw Error("{}: should have {} bytes, but {} are left in the file; it is truncated", place, bytes,
                 behind->size());

@@ -1,4 +1,4 @@
-// The head of a VTK XML file, and the arrays it tells of.
+// The markup of a VTK XML file, and the arrays that it describes.
 #pragma once
 
 #include <optional>
@@ -10,31 +10,31 @@
 
 namespace curvisplat {
 
-/// Holds the markup of one file; the arrays it gives need it no longer.
+/// Holds the markup of one file. Arrays that it returns are independent of it.
 class VtkXmlFile {
  public:
-  /// Throws Error if it is no VTK XML file, or damaged.
+  /// Throws Error if it is not a VTK XML file, or damaged.
   VtkXmlFile(const VtkFiles& files, const std::filesystem::path& path);
 
   std::string name() const { return file_->name(); }
   const std::filesystem::path& path() const { return file_->path(); }
   /// "StructuredGrid".
   const std::string& type() const { return type_; }
-  /// The element that is called as the type. Throws Error if there is none.
+  /// The element with the name of the type. Throws Error if there is none.
   pugi::xml_node content() const;
-  /// "little-endian, appended raw, zlib": how a <DataArray> is stored.
+  /// How a <DataArray> is stored: "little-endian, appended raw, zlib".
   std::string encoding(const pugi::xml_node& node) const;
 
-  /// The array of a <DataArray> that should have so many tuples. Throws Error if it has not, or if its bytes
-  /// are not all there; of texts, and of compressed blocks, one learns that when they are read.
+  /// The array of a <DataArray> that must have `tuples` tuples. Throws Error if it has not, or if it is
+  /// truncated; text and the contents of compressed blocks are checked when they are read.
   VtkArray array(const pugi::xml_node& node, uint64_t tuples) const;
-  /// The same, but nothing for arrays that are no numbers.
+  /// As array(), but nullopt for arrays that are not numeric.
   std::optional<VtkArray> numericArray(const pugi::xml_node& node, uint64_t tuples) const;
 
-  /// Numbers of an attribute. Throws Error unless there are as many.
+  /// The numbers in an attribute. Throws Error unless there are `count`.
   std::vector<double> numbers(const pugi::xml_node& node, const char* attribute, size_t count) const;
-  /// An extent: six integers; nothing for "0 -1 0 -1 0 -1", which is what an empty piece has. Throws Error if
-  /// it is anything else that is no extent, or too large.
+  /// The six integers of an extent; nullopt for "0 -1 0 -1 0 -1", that of an empty piece. Throws Error if the
+  /// attribute is not a valid extent, or too large.
   std::optional<VtkExtent> extent(const pugi::xml_node& node, const char* attribute) const;
 
   [[noreturn]] void fail(const std::string& what) const;
@@ -50,7 +50,7 @@ class VtkXmlFile {
 
   std::shared_ptr<const PooledFile> file_;
   std::shared_ptr<SpoolFile> spool_;
-  std::string markup_;  // that document_ points into
+  std::string markup_;  // document_ points into it
   pugi::xml_document document_;
   pugi::xml_node root_;
   std::string type_;
@@ -60,7 +60,7 @@ class VtkXmlFile {
   bool appended_base64_ = false;
 };
 
-/// Whether the file's first bytes are those of a VTK XML file.
+/// Whether the file begins as a VTK XML file does.
 bool isVtkXml(const InputFile& file);
 
 }  // namespace curvisplat

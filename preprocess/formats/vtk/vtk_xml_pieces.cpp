@@ -8,7 +8,7 @@ namespace {
 
 using Node = pugi::xml_node;
 
-/// The one component of an array's one tuple.
+/// The value of an array with one tuple of one component.
 double singleValue(const VtkArray& array) {
   double value = 0;
   const WantedComponent<double> wanted{0, &value};

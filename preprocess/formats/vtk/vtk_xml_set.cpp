@@ -18,7 +18,7 @@ using Node = pugi::xml_node;
 
 constexpr size_t kMaxPieces = 100'000, kMaxFiles = 100'000;
 
-/// Follows a file to the files that it names, and gathers their pieces.
+/// Follows the references of a file to other files, and gathers their pieces.
 class Gatherer {
  public:
   explicit Gatherer(const OpenGridOptions& options)
@@ -27,7 +27,7 @@ class Gatherer {
   VtkGrid gather(const fs::path& path) {
     add(path, "");
     if (grid_.pieces.empty())
-      throw Error("{}: has no structured grid in it{}", path.string(),
+      throw Error("{}: contains no structured grid{}", path.string(),
                   left_out_.empty() ? "" : ": " + left_out_);
     if (!left_out_.empty())
       grid_.warnings.push_back(
@@ -43,10 +43,9 @@ class Gatherer {
     std::error_code error;
     const fs::path normal = fs::weakly_canonical(path, error);
     if (error) throw Error("{}: cannot be opened: {}", path.string(), error.message());
-    if (!inside_.insert(normal).second) throw Error("{}: names itself as a part of itself", path.string());
+    if (!inside_.insert(normal).second) throw Error("{}: contains itself", path.string());
     if (grid_.files.size() > kMaxFiles)
-      throw Error("{}: leads to more than {} files, counted as often as they are named", grid_.files.front(),
-                  kMaxFiles);
+      throw Error("{}: refers to more than {} files, counting repetitions", grid_.files.front(), kMaxFiles);
     const VtkXmlFile file(files_, path);
     grid_.files.push_back(path.string());
     if (top_type_.empty()) top_type_ = file.type();
@@ -62,7 +61,7 @@ class Gatherer {
     else if (inside_.size() == 1)
       file.fail(
           fmt::format("is a VTK file of type {}; expected a structured grid: StructuredGrid, "
-                      "RectilinearGrid or ImageData, or a set of them",
+                      "RectilinearGrid or ImageData, or a collection of these",
                       file.type()));
     else
       leaveOut(file);
@@ -79,7 +78,7 @@ class Gatherer {
     return file.path().parent_path() / fs::path(named);
   }
 
-  /// Puts pieces and blocks of their parts behind those there are.
+  /// Appends pieces, and a block for each part of them.
   void append(std::vector<VtkPiece> pieces, const std::vector<std::string>& names) {
     std::vector<VtkExtent> extents;
     for (const VtkPiece& piece : pieces) extents.push_back(piece.extent);
@@ -122,15 +121,14 @@ class Gatherer {
       if (!extent) continue;
       const VtkXmlFile piece_file(files_, pathOf(file, node, "Source"));
       if ("P" + piece_file.type() != file.type())
-        piece_file.fail(fmt::format("has type {}, but is a piece of a {}", piece_file.type(), file.type()));
+        piece_file.fail(fmt::format("is a {}, but belongs to a {}", piece_file.type(), file.type()));
       grid_.files.push_back(piece_file.name());
       for (VtkPiece& piece : piecesOf(piece_file).pieces) {
         for (size_t axis = 0; axis < 3; ++axis)
           if (piece.extent.lower[axis] < extent->lower[axis] ||
               piece.extent.upper[axis] > extent->upper[axis])
-            piece_file.fail(
-                fmt::format("has a piece of {} nodes that is not in the extent that {} tells of it",
-                            piece.extent.describe(), file.name()));
+            piece_file.fail(fmt::format("has a piece of {} nodes that is not within its extent in {}",
+                                        piece.extent.describe(), file.name()));
         pieces.push_back(std::move(piece));
         names.push_back(
             fmt::format("{}{}{}", name, name.empty() ? "" : "/", piece_file.path().stem().string()));
@@ -139,7 +137,7 @@ class Gatherer {
     append(std::move(pieces), names);
   }
 
-  /// The files below an element, named by the elements on the way, and else by themselves.
+  /// Adds the files below an element. Their blocks are named by the path of element names, or by the file.
   void addMembers(const VtkXmlFile& file, const Node& element, const std::string& name) {
     for (const Node& node : element.children()) {
       if (node.type() != pugi::node_element) continue;
@@ -147,7 +145,7 @@ class Gatherer {
       const std::string separator = name.empty() || own.empty() ? "" : "/";
       if (std::string_view(node.name()) != "DataSet")
         addMembers(file, node, name + separator + own);
-      else if (node.attribute("file")) {  // an empty block has none
+      else if (node.attribute("file")) {  // absent for an empty block
         const fs::path path = pathOf(file, node, "file");
         add(path,
             own.empty() ? name + (name.empty() ? "" : "/") + path.stem().string() : name + separator + own);
@@ -156,7 +154,7 @@ class Gatherer {
   }
 
   void addTimeStep(const VtkXmlFile& file) {
-    if (in_time_series_) file.fail("is a series of time steps inside of another one");
+    if (in_time_series_) file.fail("is a time series inside another time series");
     in_time_series_ = true;
     std::map<double, std::vector<Node>> steps;
     for (const Node& node : file.content().children("DataSet"))
@@ -175,10 +173,10 @@ class Gatherer {
   VtkFiles files_;
   std::optional<uint32_t> time_step_;
   VtkGrid grid_;
-  std::set<fs::path> inside_;  // the files that are being followed
+  std::set<fs::path> inside_;  // the chain of files from the first to the current one
   bool in_time_series_ = false;
   std::string top_type_, leaf_type_, encoding_;
-  std::string left_out_;  // the first file, and why
+  std::string left_out_;  // the first file that is left out, and its type
   size_t left_out_files_ = 0;
 };
 

@@ -30,7 +30,7 @@ class Scanner {
       readTag(tag);
       if (tag.starts_with("<!--") || tag.starts_with("<?")) continue;
       if (tag.starts_with("<!"))
-        throw Error("{}: byte {}: {} is not expected in a VTK file", file_.name(), at_,
+        throw Error("{}: byte {}: found {}, which is not allowed in a VTK file", file_.name(), at_,
                     tag.substr(0, std::min<size_t>(30, tag.find_first_of(" [>"))));
       if (!nest(tag)) break;
       if (skeleton_.text.size() > kLargestSkeleton)
@@ -42,7 +42,7 @@ class Scanner {
   }
 
  private:
-  /// Makes the byte at `at_` available. False at the end.
+  /// Ensures that the byte at `at_` is in the buffer. False at the end of the file.
   bool fill() {
     if (at_ < buffer_begin_ + filled_ && at_ >= buffer_begin_) return true;
     if (at_ >= file_.size()) return false;
@@ -57,11 +57,12 @@ class Scanner {
   }
 
   [[noreturn]] void failTruncated() const {
-    throw Error("{}: ends at byte {} inside of {}; the file is truncated", file_.name(), file_.size(),
+    throw Error("{}: ends at byte {}, inside {}; the file is truncated", file_.name(), file_.size(),
                 open_.empty() ? "its first tag" : "<" + open_.back() + ">");
   }
 
-  /// Goes to the next tag and says in the skeleton where the text before it is. False at the end of the file.
+  /// Skips to the next tag and appends the range of the skipped text to the skeleton. False at the end of the
+  /// file.
   bool skipText() {
     uint64_t begin = 0, end = 0;
     while (fill()) {
@@ -83,7 +84,7 @@ class Scanner {
     return false;
   }
 
-  /// Reads from '<' up to its '>'.
+  /// Reads a tag from '<' to the matching '>'.
   void readTag(std::string& tag) {
     char quote = 0;
     while (fill()) {
@@ -91,7 +92,7 @@ class Scanner {
       ++at_;
       tag += c;
       if (tag.size() > kLargestTag)
-        throw Error("{}: byte {}: a tag of more than {} characters", file_.name(), at_, kLargestTag);
+        throw Error("{}: byte {}: found a tag of more than {} characters", file_.name(), at_, kLargestTag);
       const bool comment = tag.starts_with("<!--");
       if (c == '>' && quote == 0 && (!comment || (tag.size() >= 7 && tag.ends_with("-->")))) return;
       if (comment) continue;
@@ -103,14 +104,14 @@ class Scanner {
     failTruncated();
   }
 
-  /// Appends a tag to the skeleton. False if nothing is to be read behind it.
+  /// Appends a tag to the skeleton. False if the skeleton is complete.
   bool nest(const std::string& tag) {
     const bool closes = tag[1] == '/';
     const size_t name_begin = closes ? 2 : 1;
     const std::string name = tag.substr(name_begin, tag.find_first_of(" \t\r\n/>", name_begin) - name_begin);
     if (closes) {
       if (open_.empty() || open_.back() != name)
-        throw Error("{}: byte {}: </{}> closes no <{}>; the file is damaged", file_.name(), at_, name, name);
+        throw Error("{}: byte {}: </{}> without <{}>; the file is damaged", file_.name(), at_, name, name);
       open_.pop_back();
       skeleton_.text += tag;
       return !open_.empty();
@@ -130,13 +131,13 @@ class Scanner {
     while (fill() && isSpace(available().front())) ++at_;
     if (!fill()) failTruncated();
     if (available().front() != '_')
-      throw Error("{}: byte {}: expected the underscore that begins appended data", file_.name(), at_);
+      throw Error("{}: byte {}: expected the underscore before the appended data", file_.name(), at_);
     skeleton_.appended_begin = at_ + 1;
   }
 
   const PooledFile& file_;
   XmlSkeleton skeleton_;
-  std::vector<std::string> open_;  // elements
+  std::vector<std::string> open_;  // names of the open elements
   std::vector<char> buffer_;
   uint64_t buffer_begin_ = 0, at_ = 0;  // in the file
   size_t filled_ = 0;

@@ -1,5 +1,5 @@
-// The markup of an XML file without its texts: what VTK's files hold between their tags is the data, of any
-// size. The skeleton is small enough to be parsed whole, and has, for each text, where it lies.
+// The markup of an XML file without the text between the tags, which in VTK files is data of any size. The
+// skeleton is small enough to be parsed as a whole. It contains the position of each text instead.
 #pragma once
 
 #include <cstdint>
@@ -10,16 +10,16 @@
 namespace curvisplat {
 
 struct XmlSkeleton {
-  /// Each text that is not white space is replaced by its first byte's position in the file and that behind
-  /// its last, as "120 4711"; white space around it does not count. Comments are left out.
+  /// The markup. Each text is replaced by the positions in the file of its first byte and after its last one,
+  /// as "120 4711", not counting white space around it. White space between tags and comments are dropped.
   std::string text;
-  /// Where the data behind <AppendedData> begins, behind its underscore; 0: there is none. Nothing of the
-  /// file is looked at from there on, since it need not be XML.
+  /// Position of the first byte after the underscore of <AppendedData>; 0: there is none. The file is not
+  /// scanned beyond it, since the data need not be XML.
   uint64_t appended_begin = 0;
 };
 
-/// Reads the file up to its end, or to its <AppendedData>, through a buffer. Throws Error if the tags are not
-/// nested, or if there are more of them than a few megabytes.
+/// Scans the file up to its end, or to its <AppendedData>, through a buffer. Throws Error if the tags are not
+/// properly nested, or if they have more than 16 MiB.
 XmlSkeleton xmlSkeleton(const PooledFile& file);
 
 }  // namespace curvisplat

@@ -1,0 +1,228 @@
+#!/usr/bin/env python3
+"""Runs the commands that README.md and tools/REFERENCE.md quote, and checks what the project's documents point at.
+
+    readme_commands_test.py PROGRAM      exit status 1 if anything failed, with a line for each failure
+
+- Every indented line that begins with `curvisplat` is run, in the order of the page, with small grids and pictures in
+  place of large ones. Input files are made here; real ones are taken from ../shared/data where that exists, and commands
+  that need one which is neither there nor can be made are reported as skipped.
+- `curvisplat view` is run without a display: it has to fail for that reason, and not for its options.
+- Other indented commands, and scripts named in `code`, have to exist and be executable.
+- Relative links and pictures of every page have to lead to a file.
+"""
+
+import math
+import os
+import re
+import shlex
+import struct
+import subprocess
+import sys
+import tempfile
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+SHARED_DATA = os.path.join(ROOT, "..", "shared", "data")
+PAGES_WITH_COMMANDS = ["README.md", "tools/REFERENCE.md"]
+NI, NJ, NK = 12, 10, 8  # of the grids made here
+
+failures = []
+
+
+def fail(page, text):
+    failures.append(f"{page}: {text}")
+
+
+def lattice():
+    """Nodes of a bent block around (2, 2, 2), i fastest: (x, y, z)."""
+    for k in range(NK):
+        for j in range(NJ):
+            for i in range(NI):
+                angle, radius = math.pi * i / (NI - 1), 1 + 3 * j / (NJ - 1)
+                yield 4 - radius * math.cos(angle), radius * math.sin(angle), 5 * k / (NK - 1)
+
+
+def write_plot3d(folder):
+    """A grid and a Q file: single precision, big-endian, without record markers, as NASA's blunt fin."""
+    nodes = list(lattice())
+    dimensions = struct.pack(">3i", NI, NJ, NK)
+    with open(os.path.join(folder, "bluntfinxyz.bin"), "wb") as file:
+        file.write(dimensions)
+        for axis in range(3):
+            file.write(struct.pack(f">{len(nodes)}f", *(node[axis] for node in nodes)))
+    density = [1 + 0.5 * math.sin(x + y) for x, y, _ in nodes]
+    momentum = [[2 * d for d in density], [0.1 * d for d in density], [0.0] * len(density)]
+    energy = [2.5 + 3 * d for d in density]
+    with open(os.path.join(folder, "bluntfinq.bin"), "wb") as file:
+        file.write(dimensions + struct.pack(">4f", 2.95, 0, 1e6, 0))
+        for values in [density, *momentum, energy]:
+            file.write(struct.pack(f">{len(values)}f", *values))
+
+
+def write_vts(folder):
+    """An ASCII .vts file with a scalar p and a vector U."""
+    nodes = list(lattice())
+    points = " ".join(f"{x:.6g} {y:.6g} {z:.6g}" for x, y, z in nodes)
+    pressure = " ".join(f"{math.sin(x) + z:.6g}" for x, _, z in nodes)
+    velocity = " ".join(f"{y:.6g} {-x:.6g} 0.1" for x, y, _ in nodes)
+    extent = f"0 {NI - 1} 0 {NJ - 1} 0 {NK - 1}"
+    with open(os.path.join(folder, "flow.vts"), "w") as file:
+        file.write(
+            f'<VTKFile type="StructuredGrid" version="0.1" byte_order="LittleEndian">'
+            f'<StructuredGrid WholeExtent="{extent}"><Piece Extent="{extent}"><PointData>'
+            f'<DataArray type="Float32" Name="p" format="ascii">{pressure}</DataArray>'
+            f'<DataArray type="Float32" Name="U" NumberOfComponents="3" format="ascii">{velocity}</DataArray>'
+            f'</PointData><Points><DataArray type="Float32" Name="Points" NumberOfComponents="3" format="ascii">'
+            f"{points}</DataArray></Points></Piece></StructuredGrid></VTKFile>\n")
+
+
+def write_netcdf(folder):
+    """Longitude, latitude, depth and temp(depth, lat, lon), in NetCDF's classic format."""
+    def text(name):
+        data = name.encode()
+        return struct.pack(">i", len(data)) + data + b"\0" * (-len(data) % 4)
+
+    def attributes(pairs):
+        return struct.pack(">2i", 12, len(pairs)) + b"".join(
+            text(name) + struct.pack(">i", 2) + text(value) for name, value in pairs)
+
+    def floats(values):
+        return struct.pack(f">{len(values)}f", *values)
+
+    dimensions = [("depth", NK), ("lat", NJ), ("lon", NI)]
+    temperatures = [20 - 2 * k + math.sin(0.5 * i) + math.cos(0.4 * j)
+                    for k in range(NK) for j in range(NJ) for i in range(NI)]
+    variables = [
+        ("depth", [0], [("standard_name", "depth"), ("units", "m"), ("positive", "down")],
+         floats([10.0 * (k + 1) ** 2 for k in range(NK)])),
+        ("lat", [1], [("standard_name", "latitude"), ("units", "degrees_north")], floats([40 + 0.5 * j for j in range(NJ)])),
+        ("lon", [2], [("standard_name", "longitude"), ("units", "degrees_east")], floats([0.5 * i - 20 for i in range(NI)])),
+        ("temp", [0, 1, 2], [("units", "degC")], floats(temperatures)),
+    ]
+    head = b"CDF\x01" + struct.pack(">i", 0)
+    head += struct.pack(">2i", 10, len(dimensions))
+    head += b"".join(text(name) + struct.pack(">i", length) for name, length in dimensions)
+    head += attributes([("Conventions", "CF-1.8")])
+    head += struct.pack(">2i", 11, len(variables))
+    entries = [text(name) + struct.pack(f">{1 + len(shape)}i", len(shape), *shape) + attributes(pairs) +
+               struct.pack(">2i", 5, len(data)) for name, shape, pairs, data in variables]
+    begin = len(head) + sum(len(entry) + 4 for entry in entries)
+    with open(os.path.join(folder, "ocean.nc"), "wb") as file:
+        file.write(head)
+        for entry, (_, _, _, data) in zip(entries, variables):
+            file.write(entry + struct.pack(">i", begin))
+            begin += len(data)
+        for _, _, _, data in variables:
+            file.write(data)
+
+
+def make_inputs(folder):
+    write_plot3d(folder)
+    write_vts(folder)
+    write_netcdf(folder)
+    for name in ["delta_wing/delta_vertex.cgns"]:
+        real = os.path.join(SHARED_DATA, name)
+        if os.path.exists(real):
+            os.symlink(os.path.abspath(real), os.path.join(folder, os.path.basename(name)))
+    os.symlink(os.path.join(ROOT, "tools"), os.path.join(folder, "tools"))
+
+
+def shortened(words):
+    """The same command, for a grid or picture of a few pixels."""
+    words = list(words)
+    for n, word in enumerate(words[:-1]):
+        if word == "--size":
+            words[n + 1] = "48x24x16" if words[1] == "generate" else "96x54"
+        elif word == "--frames":
+            words[n + 1] = "2"
+    if words[1] == "render" and "--size" not in words:
+        words += ["--size", "64x64"]
+    if words[1] == "bench":
+        words += ["--size", "64x64"] + ([] if "--quick" in words else ["--quick"])
+    return words
+
+
+def missing_input(words, folder):
+    """A file that the command reads and that is not there, if any."""
+    for word in words[2:]:
+        if re.fullmatch(r"[\w./]+\.(cgns|nc|vts|xyz|bin|fun|q)", word) and not os.path.exists(os.path.join(folder, word)):
+            return word
+    return None
+
+
+def run_command(page, line, program, folder):
+    words = shlex.split(line, comments=True)
+    absent = missing_input(words, folder)
+    if absent:
+        print(f"skipped, {absent} is not here: {line}")
+        return
+    environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    environment["XDG_CONFIG_HOME"] = os.path.join(folder, "config")
+    command = shortened(words)
+    result = subprocess.run([program, *command[1:]], cwd=folder, env=environment, stdin=subprocess.DEVNULL,
+                            capture_output=True, text=True, errors="replace", check=False)
+    said = result.stderr.strip()
+    if words[1] == "view":
+        if result.returncode != 1 or "DISPLAY" not in said:
+            fail(page, f"{line}: status {result.returncode} without a display; expected 1 and the reason: {said}")
+    elif result.returncode != 0:
+        fail(page, f"{line}: status {result.returncode}: {said}")
+
+
+def indented_commands(text):
+    return [line.strip() for line in re.findall(r"^(?: {4}){1,2}(\S.*)$", text, re.MULTILINE)]
+
+
+def check_script(page, path):
+    full = os.path.join(ROOT, path)
+    if not os.path.isfile(full):
+        fail(page, f"{path} does not exist")
+    elif not os.access(full, os.X_OK):
+        fail(page, f"{path} is not executable")
+
+
+def check_links(page, text):
+    for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", text):
+        if "://" in target:
+            continue
+        if not os.path.exists(os.path.join(ROOT, os.path.dirname(page), target)):
+            fail(page, f"link to {target}, which does not exist")
+
+
+def pages():
+    for folder, folders, names in os.walk(ROOT):
+        folders[:] = [name for name in folders if name not in (".git", "build", "out")]
+        for name in names:
+            if name.endswith(".md"):
+                yield os.path.relpath(os.path.join(folder, name), ROOT)
+
+
+def main():
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    program = os.path.abspath(sys.argv[1])
+    with tempfile.TemporaryDirectory() as folder:
+        make_inputs(folder)
+        for page in PAGES_WITH_COMMANDS:
+            with open(os.path.join(ROOT, page), encoding="utf-8") as file:
+                text = file.read()
+            run = 0
+            for line in indented_commands(text):
+                if line.startswith("curvisplat "):
+                    run_command(page, line, program, folder)
+                    run += 1
+                elif re.match(r"(tools|bench)/", line):
+                    check_script(page, line.split()[0])
+            if run == 0:
+                fail(page, "quotes no command; is it laid out differently?")
+            for path in re.findall(r"`((?:tools|bench)/[\w/]+\.(?:sh|py))\b", text):
+                check_script(page, path)
+    for page in pages():
+        with open(os.path.join(ROOT, page), encoding="utf-8") as file:
+            check_links(page, file.read())
+    for failure in failures:
+        print(failure, file=sys.stderr)
+    sys.exit(1 if failures else 0)
+
+
+if __name__ == "__main__":
+    main()
