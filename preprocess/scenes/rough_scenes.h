@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "preprocess/scenes/scenes.h"
+#include "preprocess/scenes/scene.h"
 
 namespace curvisplat {
 
