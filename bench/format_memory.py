@@ -25,7 +25,7 @@ def main():
     budget = int(words.memory[:-1]) * UNITS[words.memory[-1]]
 
     too_much = False
-    print("| file | nodes | seconds | peak MiB | budget MiB |\n|---|---|---|---|---|")
+    print("| file | samples | seconds | peak MiB | budget MiB |\n|---|---|---|---|---|")
     for file in words.files:
         with tempfile.TemporaryDirectory(dir=pathlib.Path(file).resolve().parent) as folder:
             statistics = pathlib.Path(folder) / "stats.json"
@@ -37,8 +37,8 @@ def main():
             told = json.loads(statistics.read_text())
         peak = told["peak_memory_bytes"]
         too_much |= peak > budget
-        nodes = told.get("nodes", told.get("cells"))
-        print(f"| {pathlib.Path(file).name} | {nodes} | {told['seconds']:.1f} | {peak / 2**20:.0f} | {budget / 2**20:.0f} |")
+        samples = told["samples"]
+        print(f"| {pathlib.Path(file).name} | {samples} | {told['seconds']:.1f} | {peak / 2**20:.0f} | {budget / 2**20:.0f} |")
     sys.exit(1 if too_much else 0)
 
 

@@ -82,7 +82,7 @@ def drawn(arguments, cache, lod_pixels):
 def measure(arguments, edge, out):
     """One size: all of it into `out`, and into the row that is returned."""
     cache, conversions = converted(arguments, edge, arguments.conversions)
-    nodes = conversions[0]["nodes"]
+    nodes = conversions[0]["samples"]
     row = {"nodes": nodes, "size": f"{edge}x{edge}x{edge}", "conversion": conversions[-1], "pictures": {}}
 
     def add(name, unit, samples):

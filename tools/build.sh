@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Sets up, configures and builds the release preset in build/release: the targets named, or everything. What is
-# up to date is not built again.
+# Runs setup.sh, then configures and builds the named targets, or everything. The default preset, release, builds in
+# build/release. Builds incrementally.
 #
 #   tools/build.sh [--preset NAME] [TARGET ...]
 set -euo pipefail
@@ -17,13 +17,13 @@ cd "$root"
 mkdir -p build
 if ! cmake --preset "$preset" >"build/configure_$preset.log" 2>&1; then
   cat "build/configure_$preset.log" >&2
-  echo "build: cmake could not configure; see above" >&2
+  echo "build: cmake failed to configure; see the output above" >&2
   exit 1
 fi
 
 targets=()
 [[ $# -eq 0 ]] || targets=(--target "$@")
-# A compiler takes up to 2 GB (OpenVDB's headers): no more of them at once than there is memory for.
+# A compiler process takes up to 2 GB (OpenVDB's headers), so available memory limits the number of jobs.
 memory_kb=$(awk '/^MemAvailable:/ { print $2 }' /proc/meminfo)
 jobs=$(nproc)
 ((jobs * 2000000 <= memory_kb)) || jobs=$((memory_kb / 2000000))

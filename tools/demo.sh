@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Shows what curvisplat does, from nothing: sets up, builds, converts a grid and renders it.
+# Demonstrates curvisplat from a fresh clone: installs packages, builds, converts a grid and renders it.
 #
 #   tools/demo.sh                   a generated wake behind a cylinder
 #   tools/demo.sh GRID SOLUTION     your PLOT3D files: grid, and Q solution or function file
 #
-# Caches and pictures go to out/.
+# Writes the cache and the picture to out/.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -15,7 +15,7 @@ if [[ $# -ne 0 && $# -ne 2 ]] || [[ ${1-} == -* ]]; then
 fi
 for file in "$@"; do
   if [[ ! -r $file || -d $file ]]; then
-    echo "demo: $file: not a readable file" >&2
+    echo "demo: $file: is not a readable file" >&2
     exit 2
   fi
 done
@@ -39,4 +39,4 @@ fi
 
 "$curvisplat" convert "${inputs[@]}" -o "$out/$name.splats" --overwrite
 "$curvisplat" render "$out/$name.splats" -o "$out/$name.png" --size 600x600 "${look[@]}"
-echo "The picture is $out/$name.png"
+echo "Wrote $out/$name.png"

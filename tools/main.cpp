@@ -1,4 +1,5 @@
-// The `curvisplat` program: one subcommand a file, errors caught here and nowhere else.
+// The `curvisplat` program: parses the command line, runs one subcommand, and turns exceptions into messages
+// and exit statuses. No other file of the program catches errors to end it.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -17,21 +18,18 @@
 namespace curvisplat {
 namespace {
 
-/// "convert, info, render and view"
 std::string namesOf(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
-  const std::string last = names.back();
-  names.pop_back();
-  return fmt::format("{} and {}", fmt::join(names, ", "), last);
+  return fmt::format("{}", fmt::join(names, ", "));
 }
 
-/// The exit status.
+/// Returns the exit status: 0 success, 1 failure, 2 wrong usage, 128 + n stopped by signal n.
 int run(int argc, char** argv) {
-  CLI::App app("curvisplat shows curvilinear simulation grids that are larger than memory.", "curvisplat");
+  CLI::App app("Render curvilinear simulation grids that are larger than memory.", "curvisplat");
   app.set_version_flag("--version", "curvisplat " CURVISPLAT_VERSION);
   app.require_subcommand(1);
-  app.set_help_all_flag("--help-all", "Help of every subcommand");
+  app.set_help_all_flag("--help-all", "Print the help of every subcommand and exit");
   addConvert(app);
   addInfo(app);
   addRender(app);
@@ -45,10 +43,10 @@ int run(int argc, char** argv) {
     return 0;
   } catch (const CLI::ParseError& error) {
     if (argc > 1 && argv[1][0] != '-' && app.get_subcommands().empty()) {
-      printMessage("there is no subcommand '{}'; there are {}", argv[1], namesOf(app));
+      printMessage("unknown subcommand '{}'; expected one of {}", argv[1], namesOf(app));
       return 2;
     }
-    if (error.get_exit_code() == 0) return app.exit(error);  // help and versions come this way too
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help and --version
     const std::vector<CLI::App*> chosen = app.get_subcommands();
     const std::string command = "curvisplat" + (chosen.empty() ? "" : " " + chosen.front()->get_name());
     printMessage("{}; see {} --help", error.what(), command);
@@ -58,15 +56,15 @@ int run(int argc, char** argv) {
     return 2;
   } catch (const Interrupted& interrupted) {
     printMessage("{}", interrupted.what());
-    return 128 + interrupted.signal();  // as a shell says of a process that the signal has ended
+    return 128 + interrupted.signal();  // what a shell reports for a process that a signal ended
   } catch (const std::bad_alloc&) {
-    printMessage("out of memory; give the machine more, or ask for less (--memory, --size)");
+    printMessage("out of memory; lower --memory or --size, or use a machine with more memory");
     return 1;
   } catch (const std::filesystem::filesystem_error& error) {
     printMessage("{}: {}", error.path1().string(), error.code().message());
     return 1;
   } catch (const std::exception& error) {
-    if (std::ferror(stdout) == 0) printMessage("{}", error.what());  // else main() says it
+    if (std::ferror(stdout) == 0) printMessage("{}", error.what());  // otherwise main() reports it
     return 1;
   }
 }

@@ -1,38 +1,40 @@
 #!/usr/bin/env bash
-# Installs what building and testing curvisplat needs, by package name, on Debian 12 and its like, and the packages
-# named. Does nothing where everything is there already.
+# Installs the packages that building and testing curvisplat needs, on Debian 12 or a derivative. Does nothing if all
+# are installed.
+#
+#   tools/setup.sh [PACKAGE ...]     also installs the named packages
 set -euo pipefail
 
 packages=(
   # compiler and build
   g++ cmake ninja-build pkg-config
-  # octree and conversion; OpenVDB's CMake module asks for Boost's iostreams
+  # octree and conversion; OpenVDB's CMake module requires Boost.Iostreams
   libopenvdb-dev libboost-iostreams-dev libtbb-dev libzstd-dev libxxhash-dev
-  # reads without waiting
+  # asynchronous reads
   liburing-dev
   # grid files
   libcgns-dev libhdf5-dev libnetcdf-dev
-  # vectors, texts, command line, manifests
+  # vectors, formatting, command line, JSON
   libglm-dev libfmt-dev libcli11-dev nlohmann-json3-dev
-  # VTK's files
+  # VTK files
   libpugixml-dev zlib1g-dev liblz4-dev
-  # pictures, and OpenGL without a display
+  # picture files, and OpenGL without a display
   libpng-dev libtinyexr-dev libosmesa6-dev libgl-dev libegl-dev libegl1
-  # text and lines over pictures
+  # annotations
   libcairo2-dev fonts-dejavu-core
   # the window
   libglfw3-dev libimgui-dev
-  # drawing on the processor, in whatever vectors it has
+  # SIMD for drawing on the processor
   libhwy-dev
   # tests and benchmarks
   libgtest-dev libbenchmark-dev python3
-  # the window under test: a display without a screen, its input and its pictures
+  # window tests: a virtual display, simulated input, screenshots
   xvfb xdotool x11-apps libgl1-mesa-dri
   "$@"
 )
 
 if ! command -v dpkg-query >/dev/null; then
-  echo "setup: this is no Debian system; install the equivalents of: ${packages[*]}" >&2
+  echo "setup: dpkg-query not found: not a Debian system; install the equivalents of: ${packages[*]}" >&2
   exit 1
 fi
 
@@ -46,7 +48,7 @@ done
 as_root=()
 if [[ $(id -u) -ne 0 ]]; then
   if ! command -v sudo >/dev/null; then
-    echo "setup: needs root to install; as root run: apt-get install ${missing[*]}" >&2
+    echo "setup: installing packages needs root; run as root: apt-get install ${missing[*]}" >&2
     exit 1
   fi
   as_root=(sudo)

@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
-# Sets up, builds everything and runs every test. Arguments go to ctest: tools/test.sh -R render
+# Runs setup.sh, builds everything and runs the tests. Passes its arguments to ctest, for example -R render.
 #
-#   tools/test.sh --sanitize [CTEST OPTIONS]         everything under the address and undefined-behaviour sanitizers,
-#                                                    then what has threads under the thread sanitizer: hours
-#   tools/test.sh --sanitize=short [CTEST OPTIONS]   of the first, what reads and writes caches: some minutes
+#   tools/test.sh [CTEST OPTIONS]                    all tests
+#   tools/test.sh --sanitize [CTEST OPTIONS]         all tests with the address and undefined-behaviour sanitizers, then
+#                                                    the multithreaded ones with the thread sanitizer; takes hours
+#   tools/test.sh --sanitize=short [CTEST OPTIONS]   only the tests of stream/ with the first two; takes minutes
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-# run PRESET [CTEST OPTIONS]: the tests of a build, none of which may be missing.
+# run PRESET [CTEST OPTIONS]: runs the tests of a build; fails if there are none.
 run() {
   local preset=$1
   shift
@@ -27,7 +28,8 @@ export TSAN_OPTIONS=suppressions=$root/tests/tsan.supp:halt_on_error=1
 
 case $form in
   plain)
-    "$root/tools/setup.sh" python3-vtk9  # the smoke test of bench/ draws with VTK as well
+    # The smoke test of bench/ also draws with VTK; tests/stream/read_cache.py needs the others.
+    "$root/tools/setup.sh" python3-vtk9 python3-numpy python3-zstandard python3-xxhash
     "$root/tools/build.sh"
     run release "$@"
     ;;
@@ -38,8 +40,8 @@ case $form in
   whole)
     "$root/tools/build.sh" --preset asan
     run asan "$@"
-    # TBB is not built with this sanitizer and its loops get one thread (support/one_tbb_thread.cpp): of conversion,
-    # only what has threads of its own is worth the time.
+    # TBB is not built with this sanitizer, so its loops get one thread (tests/support/one_tbb_thread.cpp). Of the
+    # conversion, run only the tests of code with threads of its own.
     "$root/tools/build.sh" --preset tsan stream_tests preprocess_tests render_tests viewer_tests
     run tsan -R '^(stream|render|viewer)\.|^preprocess\.(Convert|Slabs|AddScalar|Resume)' "$@"
     ;;

@@ -19,7 +19,7 @@
 namespace curvisplat {
 namespace {
 
-/// A transparent picture to draw lines and text on with Cairo, and to lay over an Image.
+/// A transparent Cairo surface for lines and text, to be composited over an Image.
 class Canvas {
  public:
   explicit Canvas(ImageSize size)
@@ -34,7 +34,7 @@ class Canvas {
 
   cairo_t* get() const { return cairo_.get(); }
 
-  /// Calls `use` with the channels of every pixel that was drawn on, colours multiplied by alpha, 0..1.
+  /// Calls `use` with the channels (0..1, premultiplied) of every pixel that is not transparent.
   template <typename Use>
   void forEachPixel(const Use& use) const {
     cairo_surface_flush(surface_.get());
@@ -43,7 +43,7 @@ class Canvas {
     const int width = cairo_image_surface_get_width(surface_.get());
     const int height = cairo_image_surface_get_height(surface_.get());
     for (int y = 0; y < height; ++y) {
-      // 32-bit numbers in the machine's byte order: alpha, red, green, blue from the highest byte.
+      // Cairo's ARGB32: 32-bit words in the machine's byte order, alpha in the highest byte.
       const auto* const row = reinterpret_cast<const uint32_t*>(bytes + static_cast<ptrdiff_t>(y) * stride);
       for (int x = 0; x < width; ++x) {
         const uint32_t argb = row[x];
@@ -76,7 +76,7 @@ double fontSize(ImageSize size) {
   return std::clamp(size.height / 42.0, 9.0, 96.0);
 }
 
-/// The text's middle at `centre`.
+/// Draws text centred on `centre`.
 void drawText(cairo_t* cairo, const glm::dvec2& centre, const std::string& text) {
   cairo_text_extents_t extents;
   cairo_text_extents(cairo, text.c_str(), &extents);
@@ -87,7 +87,7 @@ void drawText(cairo_t* cairo, const glm::dvec2& centre, const std::string& text)
 
 // ------------------------------------------------------------------------------------------- outline
 
-/// The part of a line that is in front of the near plane, in the image; nothing if none is.
+/// The projection of the part of a line that is in front of the near plane; nullopt if none is.
 std::optional<std::pair<glm::dvec2, glm::dvec2>> lineInImage(const ScreenView& view, glm::dvec3 a,
                                                              glm::dvec3 b) {
   if (view.projection == Projection::kPerspective) {
@@ -125,7 +125,7 @@ void drawArrow(cairo_t* cairo, const glm::dvec2& from, const glm::dvec2& to, dou
   cairo_stroke(cairo);
   const glm::dvec2 along = to - from;
   const double length = glm::length(along);
-  if (length < head) return;  // it points at the viewer or away
+  if (length < head) return;  // it points towards the viewer or away
   const glm::dvec2 unit = along / length, across(-unit.y, unit.x);
   const glm::dvec2 back = to - head * unit;
   const glm::dvec2 left = back + 0.4 * head * across, right = back - 0.4 * head * across;
@@ -154,7 +154,7 @@ void drawAxes(cairo_t* cairo, const ScreenView& view, const glm::dvec3& ink) {
     const glm::dvec2 direction(axis.in_view);
     setInk(cairo, axis.colour);
     drawArrow(cairo, origin, origin + length * direction, 0.6 * font);
-    // Of an axis along the view the name goes beside the origin, not on it.
+    // The name of an axis along the view goes beside the origin, not on it.
     const double shown = glm::length(direction);
     const glm::dvec2 away = shown > 0.2 ? direction / shown : glm::dvec2(-0.7071, 0.7071);
     setInk(cairo, ink);
@@ -164,9 +164,9 @@ void drawAxes(cairo_t* cairo, const ScreenView& view, const glm::dvec3& ink) {
 
 // ---------------------------------------------------------------------------------------- scalar bar
 
-// From the strip's left edge, in units of the font's size.
+// Offsets from the strip's left edge, in units of the font's size.
 constexpr double kBarLeft = 0.6, kBarWidth = 1.3, kLabelGap = 0.7;
-// From its right edge.
+// Offset from its right edge.
 constexpr double kTitleWidth = 1.4, kTitleGap = 0.4;
 
 struct ScalarBar {
@@ -175,7 +175,7 @@ struct ScalarBar {
   double width;  // of the strip, whole pixels
 };
 
-/// For the font that `cairo` has.
+/// With the font that is set in `cairo`.
 ScalarBar layOutScalarBar(cairo_t* cairo, ImageSize picture, const TransferFunction& function) {
   const double font = fontSize(picture);
   const auto [low, high] = function.range();
@@ -190,7 +190,8 @@ ScalarBar layOutScalarBar(cairo_t* cairo, ImageSize picture, const TransferFunct
     cairo_text_extents(cairo, tick.label.c_str(), &extents);
     labels = std::max(labels, extents.x_advance);
   }
-  // In whole sizes of the font, so that the data stays where it is while someone drags an end of the range.
+  // In whole multiples of the font's size, so that the data does not move while an end of the range is
+  // dragged.
   labels = std::ceil(labels / font) * font;
   const double wanted = (kBarLeft + kBarWidth + kLabelGap + kTitleGap + kTitleWidth) * font + labels;
   bar.width = std::floor(std::min(wanted, picture.width / 2.0));
@@ -232,7 +233,7 @@ void drawScalarBar(cairo_t* cairo, const AnnotatedScene& scene, const glm::dvec3
     cairo_move_to(cairo, left + width + kLabelGap * font, y - extents.y_bearing - extents.height / 2);
     cairo_show_text(cairo, tick.label.c_str());
   }
-  // Along the bar, from below: a long name takes no width.
+  // The title runs along the bar, from below, so that a long name takes no width.
   cairo_text_extents(cairo, scene.title.c_str(), &extents);
   cairo_save(cairo);
   cairo_translate(cairo, scene.picture.width - (kTitleWidth - 1) * font, bar.top + bar.height / 2);
@@ -247,7 +248,7 @@ Canvas drawn(const Annotations& annotations, const AnnotatedScene& scene) {
   cairo_t* const cairo = canvas.get();
   cairo_set_font_size(cairo, fontSize(scene.picture));
   const glm::dvec3 ink = inkFor(scene.background);
-  cairo_save(cairo);  // what belongs to the data stays out of the scalar bar's strip
+  cairo_save(cairo);  // clips axes and outline to the part that shows the data
   cairo_rectangle(cairo, 0, 0, scene.view.size.width, scene.view.size.height);
   cairo_clip(cairo);
   if (annotations.outline) drawOutline(cairo, scene, ink);
@@ -286,7 +287,7 @@ Image annotated(const Image& data, const Annotations& annotations, const Annotat
 }
 
 uint64_t annotatedBytes(ImageSize picture) {
-  constexpr uint64_t kPixel = 4 * sizeof(float) + sizeof(uint32_t);  // an Image's and a Canvas's
+  constexpr uint64_t kPixel = 4 * sizeof(float) + sizeof(uint32_t);  // of an Image and of a Canvas
   return kPixel * picture.pixels();
 }
 

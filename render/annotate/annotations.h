@@ -1,5 +1,5 @@
-// What is drawn over a picture so that people can read it: the scalar bar, the axes' directions, the box
-// around the data. The same in `render` and in the window.
+// Annotations drawn over a picture: the scalar bar, the directions of the axes, the box around the data. The
+// same in `render` and in the window.
 #pragma once
 
 #include <cstdint>
@@ -21,33 +21,33 @@ struct Annotations {
   bool operator==(const Annotations&) const = default;
 };
 
-/// The part of a picture of `picture` pixels that shows the data, from the left: all of it, or what the
-/// scalar bar leaves. The bar has a strip of its own, so that it never covers data; its width depends on the
-/// labels and the picture's height, and is at most half of the picture's.
+/// The size of the left part of `picture` that shows the data: all of it, or what the scalar bar leaves. The
+/// bar has a strip of its own, so that it never covers data. Its width depends on the labels and the
+/// picture's height, and is at most half of the picture's.
 ImageSize dataSize(const Annotations& annotations, ImageSize picture, const TransferFunction& function);
 
-/// What there is to annotate. The function outlives the call.
+/// What to annotate. The transfer function is borrowed for the call.
 struct AnnotatedScene {
-  ImageSize picture;  // all of it
-  ScreenView view;    // of dataSize()
+  ImageSize picture;  // the whole picture
+  ScreenView view;    // has dataSize()
   const TransferFunction& transfer_function;
   std::string title;                  // of the scalar bar: "density [kg/m3]"
   glm::dvec3 lower{0.0}, upper{0.0};  // the box around the data, before --scale
-  glm::vec4 background{1, 1, 1, 1};   // text and lines are black on a light one, white on a dark one
+  glm::vec4 background{1, 1, 1, 1};   // text and lines are black if it is light, else white
 };
 
-/// The whole picture, from `data` of the size of scene.view. Text is sized by the picture's height. Throws
-/// Error where the picture is larger than Cairo draws (32,767 pixels a side).
+/// The whole picture: `data`, which has the size of scene.view, and the annotations. The text's size follows
+/// the picture's height. Throws Error if the picture is larger than Cairo supports (32,767 pixels a side).
 Image annotated(const Image& data, const Annotations& annotations, const AnnotatedScene& scene);
 
-/// What annotated() takes in memory, its result included.
+/// Memory that annotated() needs, its result included.
 uint64_t annotatedBytes(ImageSize picture);
 
-/// The annotations alone, for the whole picture: four bytes a pixel, red, green, blue, alpha, colours not
-/// multiplied. Throws as annotated() does.
+/// The annotations alone, for the whole picture: four bytes a pixel (red, green, blue, alpha; not
+/// premultiplied). Throws as annotated() does.
 std::vector<uint8_t> annotationLayer(const Annotations& annotations, const AnnotatedScene& scene);
 
-/// "density [kg/m3]"; "density" where the unit is unknown.
+/// "density [kg/m3]", or "density" if the unit is unknown.
 std::string scalarTitle(const std::string& name, const std::string& unit);
 
 }  // namespace curvisplat

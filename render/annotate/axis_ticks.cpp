@@ -8,7 +8,7 @@
 namespace curvisplat {
 namespace {
 
-/// Of 1, 2 and 5 times the powers of ten the one nearest to what would make `wanted` ticks.
+/// The step among 1, 2 and 5 times the powers of ten that comes nearest to `wanted` ticks.
 double roundStep(double length, int wanted) {
   const double rough = length / (wanted - 1);
   const double power = std::pow(10.0, std::floor(std::log10(rough)));
@@ -16,7 +16,7 @@ double roundStep(double length, int wanted) {
   return power * (lead < 1.5 ? 1 : lead < 3.5 ? 2 : lead < 7.5 ? 5 : 10);
 }
 
-/// With as many digits as tell neighbours `step` apart from each other; `largest` is the largest magnitude.
+/// A label with enough digits to distinguish neighbours `step` apart; `largest` is the largest magnitude.
 std::string labelOf(double value, double step, double largest) {
   const int step_power = static_cast<int>(std::floor(std::log10(step) + 1e-9));
   if (largest < 1e6 && step_power >= -4) return fmt::format("{:.{}f}", value, std::max(0, -step_power));
@@ -26,11 +26,11 @@ std::string labelOf(double value, double step, double largest) {
 
 std::vector<AxisTick> linearTicks(double low, double high, int wanted) {
   const double largest = std::max(std::abs(low), std::abs(high));
-  // Closer together than a number's digits can tell: counting steps would not get from one to the other.
+  // The step is below the numbers' precision: adding it would not change them.
   if (!(high - low > 1e-12 * largest)) return {{low, fmt::format("{:g}", low)}};
   const double step = roundStep(high - low, wanted);
   std::vector<AxisTick> ticks;
-  const double slack = 1e-9 * step;  // a tick that is an end but for rounding
+  const double slack = 1e-9 * step;  // accepts a tick at an end in spite of rounding
   for (double n = std::ceil((low - slack) / step); n * step <= high + slack; ++n) {
     const double value = n == 0 ? 0 : n * step;  // no -0
     ticks.push_back({value, labelOf(value, step, largest)});

@@ -11,7 +11,7 @@
 namespace curvisplat {
 namespace {
 
-// Splats reach a little beyond the nodes' box, and a picture that touches its edge looks cut off.
+// Splats reach a little beyond the box of the samples, and data that touches the image's edge looks clipped.
 constexpr double kMargin = 1.05;
 
 struct NamedView {
@@ -37,26 +37,26 @@ std::array<glm::dvec3, 8> cornersInView(const Camera& camera, const glm::dvec3& 
   return corners;
 }
 
-/// Half the height an image needs to show `corner`: its own, or what its width amounts to.
+/// Half the height that the image needs to show `corner`, whether its height or its width decides.
 double halfHeight(const glm::dvec3& corner, ImageSize size) {
   return std::max(std::abs(corner.y), std::abs(corner.x) * size.height / size.width);
 }
 
-/// A direction across `forward` (a unit vector): `up` itself, or what VTK puts in its place.
+/// A direction that is not parallel to the unit vector `forward`: `up`, or VTK's replacement for it.
 glm::dvec3 usableUp(const glm::dvec3& up, const glm::dvec3& forward) {
   const glm::dvec3 candidates[] = {up, {-up.z, up.x, up.y}, {0, 0, 1}, {0, 1, 0}};
   for (const glm::dvec3& candidate : candidates) {
     const double length = glm::length(candidate);
     if (length > 0 && std::abs(glm::dot(candidate, forward)) <= 0.999 * length) return candidate;
   }
-  return {0, 1, 0};  // not reached: z and y are not both along the view
+  return {0, 1, 0};  // not reached: y and z cannot both be parallel to the view
 }
 
 glm::dvec3 directionOf(const Camera& camera) {
   const glm::dvec3 towards = camera.focal_point - camera.position;
   const double distance = glm::length(towards);
   if (!(distance > 0))
-    throw UsageError("the camera's position and its focal point are both ({}, {}, {})", camera.position.x,
+    throw UsageError("the camera's position and focal point coincide at ({}, {}, {})", camera.position.x,
                      camera.position.y, camera.position.z);
   return towards / distance;
 }
@@ -68,7 +68,7 @@ Camera Camera::named(std::string_view view, const glm::dvec3& lower, const glm::
   const auto found = std::find_if(kNamedViews.begin(), kNamedViews.end(),
                                   [&](const NamedView& named) { return named.name == view; });
   if (found == kNamedViews.end())
-    throw UsageError("there is no view '{}'; there are iso, +x, -x, +y, -y, +z, -z", view);
+    throw UsageError("unknown view '{}'; expected iso, +x, -x, +y, -y, +z or -z", view);
 
   double diagonal = glm::length(upper - lower);
   if (!(diagonal > 0)) diagonal = 1;
@@ -81,7 +81,8 @@ Camera Camera::named(std::string_view view, const glm::dvec3& lower, const glm::
   camera.view_angle_deg = view_angle_deg;
   camera.parallel_scale = camera.parallelScaleFor(lower, upper, size);
   if (projection == Projection::kPerspective) {
-    // As near as every corner allows. In view space corners lie at depths around -diagonal.
+    // The smallest distance at which every corner is in the image. In view space corners lie at depths around
+    // -diagonal.
     const double slope = std::tan(view_angle_deg * std::numbers::pi / 360);
     double distance = 0;
     for (const glm::dvec3& corner : cornersInView(camera, lower, upper)) {

@@ -1,4 +1,4 @@
-// Where the viewer is, in VTK's and PyVista's words.
+// A camera, with VTK's and PyVista's names and conventions.
 #pragma once
 
 #include <cstdint>
@@ -12,31 +12,31 @@ namespace curvisplat {
 
 enum class Projection { kOrthographic, kPerspective };
 
-/// World units; after --scale has been applied to the data.
+/// In world units, after --scale has been applied to the data.
 struct Camera {
   glm::dvec3 position{0, 0, 1};
   glm::dvec3 focal_point{0, 0, 0};
   glm::dvec3 view_up{0, 1, 0};
   Projection projection = Projection::kOrthographic;
-  double parallel_scale = 1;   // orthographic: half the image's height, world units
+  double parallel_scale = 1;   // orthographic: half the image's height in world units
   double view_angle_deg = 30;  // perspective: the angle over the image's height
 
-  /// Looks at the box [lower, upper] from a named direction, all of it in the image with a small margin: iso
-  /// (from +x +y +z, z up, as in PyVista), +x, -x, +y, -y (z up), +z, -z (y up); "+x" looks from +x towards
-  /// -x. The position is outside the box. Throws UsageError for another name.
+  /// A camera that shows the whole box [lower, upper] with a small margin, from a named direction: iso (from
+  /// +x +y +z, z up, as in PyVista), +x, -x, +y, -y (z up), +z, -z (y up). "+x" looks from +x towards -x. The
+  /// position is outside the box. Throws UsageError for any other name.
   static Camera named(std::string_view view, const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size,
                       Projection projection, double view_angle_deg = 30);
 
-  /// The parallel_scale at which this camera, orthographic, has the box [lower, upper] in the image, with the
-  /// margin of named().
+  /// The parallel_scale at which this camera, as an orthographic one, shows the whole box [lower, upper] with
+  /// the margin of named().
   double parallelScaleFor(const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size) const;
 
-  /// The direction that viewFromWorld() takes for up: view_up, or what replaces it.
+  /// The up vector that viewFromWorld() uses: view_up, or its replacement.
   glm::dvec3 usableViewUp() const;
 
-  /// Right-handed view space: x right, y up, the viewer looks along -z; for both projections the origin is
-  /// `position`. Throws UsageError if position and focal point coincide; an up vector along the view is
-  /// replaced as VTK does: (x, y, z) by (-z, x, y).
+  /// Right-handed view space: x right, y up, looking along -z; the origin is `position` for both projections.
+  /// A view_up parallel to the view is replaced as VTK does: (x, y, z) by (-z, x, y). Throws UsageError if
+  /// position and focal point coincide.
   glm::dmat4 viewFromWorld() const;
 };
 

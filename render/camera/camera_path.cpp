@@ -14,13 +14,13 @@ namespace {
 
 constexpr double kMinSpan = 1e-6;
 
-/// v turned by `angle` around the unit vector `axis` (Rodrigues).
+/// `v` rotated by `angle` about the unit vector `axis` (Rodrigues' formula).
 glm::dvec3 turned(const glm::dvec3& v, const glm::dvec3& axis, double angle) {
   const double cosine = std::cos(angle), sine = std::sin(angle);
   return cosine * v + sine * glm::cross(axis, v) + (1 - cosine) * glm::dot(axis, v) * axis;
 }
 
-/// What is interpolated as numbers.
+/// The quantities that are interpolated as numbers.
 struct Track {
   glm::dvec3 position{0.0}, focal_point{0.0};
   double zoom = 0;  // logarithm of the parallel scale, or of the half view angle's tangent
@@ -40,7 +40,7 @@ struct Track {
   friend Track operator-(const Track& a, const Track& b) { return a + -1.0 * b; }
 };
 
-/// Per unit of time, between two key frames.
+/// Change per unit of time between two key frames.
 Track secant(const KeyFrame& a, const KeyFrame& b) {
   return 1 / (b.time - a.time) * (Track(b.camera) - Track(a.camera));
 }
@@ -59,7 +59,7 @@ glm::dvec3 upBetween(const Camera& a, const Camera& b, double part) {
   const double angle = std::atan2(glm::length(across), glm::dot(from, to));
   if (angle == 0) return a.view_up;
   glm::dvec3 axis = across;
-  if (glm::length(axis) < 1e-9) {  // opposite: about the line of sight
+  if (glm::length(axis) < 1e-9) {  // opposite directions: roll about the line of sight
     const glm::dvec3 sight = a.focal_point - a.position;
     axis = sight - glm::dot(sight, from) * from;
   }
@@ -80,7 +80,7 @@ Camera orbited(const Camera& camera, double degrees) {
 
 CameraPath::CameraPath(std::vector<KeyFrame> key_frames, std::string name)
     : key_frames_(std::move(key_frames)), name_(std::move(name)) {
-  if (key_frames_.empty()) throw Error("{}: a camera path needs one key frame or more, found none", name_);
+  if (key_frames_.empty()) throw Error("{}: a camera path needs at least one key frame, found none", name_);
   for (size_t n = 1; n < key_frames_.size(); ++n) {
     if (!(key_frames_[n].time - key_frames_[n - 1].time >= kMinSpan))
       throw Error(
@@ -90,8 +90,8 @@ CameraPath::CameraPath(std::vector<KeyFrame> key_frames, std::string name)
           name_, n, key_frames_[n].time, key_frames_[n - 1].time);
     if (key_frames_[n].camera.projection != key_frames_[0].camera.projection)
       throw Error(
-          "{}: key frame {} is {} and the first one is not; a path has one kind of camera", name_, n,
-          key_frames_[n].camera.projection == Projection::kPerspective ? "perspective" : "orthographic");
+          "{}: key frame {} is {} but the first one is not; all key frames need the same projection", name_,
+          n, key_frames_[n].camera.projection == Projection::kPerspective ? "perspective" : "orthographic");
   }
 }
 

@@ -1,4 +1,4 @@
-// Reads camera paths; render/README.md describes the file.
+// Reads camera paths; tools/REFERENCE.md describes the file.
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
@@ -15,16 +15,16 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr size_t kMaxKeyFrames = 100'000;
-// Beyond this squares of lengths overflow somewhere.
+// Squares of larger lengths overflow.
 constexpr double kLargestNumber = 1e30;
 
-/// What `value` is, briefly, on one line.
+/// `value`, or its type, as one short line.
 std::string kind(const Json& value) {
   if (value.is_structured()) return fmt::format("a JSON {}", value.type_name());
   return value.dump(-1, ' ', true, Json::error_handler_t::replace).substr(0, 60);
 }
 
-/// One key frame's object, and where it is, for messages.
+/// The JSON object of one key frame, with its place in the file for messages.
 class KeyFrameObject {
  public:
   KeyFrameObject(const std::string& file, size_t number, const Json& object)

@@ -19,8 +19,8 @@ ClassificationTable ClassificationTable::of(const TransferFunction& transfer_fun
   const auto [from, to] = transfer_function.range();
   double low = std::clamp(from, data_low - margin, data_high + margin);
   double high = std::clamp(to, data_low - margin, data_high + margin);
-  if (transfer_function.logScale()) low = std::max(low, from);  // the margin may reach below zero
-  // A constant field, or a transfer function that does not change where the data is: any cells will do.
+  if (transfer_function.logScale()) low = std::max(low, from);  // the margin may have reached below zero
+  // A constant field, or a transfer function that is constant over the data: any interval will do.
   if (!(high > low)) high = low + std::max(std::abs(low), 1.0) * 1e-3;
   return {[&](double scalar) { return transfer_function.at(scalar); }, low, high,
           transfer_function.logScale()};

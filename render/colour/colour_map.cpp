@@ -35,7 +35,7 @@ glm::dvec3 rgbFromHsv(const glm::dvec3& hsv) {
   return hsv.z * glm::mix(glm::dvec3(1), glm::clamp(hue, 0.0, 1.0), hsv.y);
 }
 
-// sRGB (IEC 61966-2-1), and CIE L*a*b* for its white, D65. The constants are those that VTK rounds to.
+// sRGB (IEC 61966-2-1), and CIE L*a*b* with its white point, D65. The constants are rounded as VTK's are.
 constexpr glm::dvec3 kWhiteXyz{0.9505, 1.0, 1.089};
 
 glm::dvec3 labFromRgb(const glm::dvec3& rgb) {
@@ -60,13 +60,13 @@ glm::dvec3 rgbFromLab(const glm::dvec3& lab) {
   glm::dvec3 rgb = linear_from_xyz * xyz;
   for (int c = 0; c < 3; ++c)
     rgb[c] = rgb[c] > 0.0031308 ? 1.055 * std::pow(rgb[c], 1 / 2.4) - 0.055 : 12.92 * rgb[c];
-  // Out of the display's gamut: dimmed rather than clipped, so that the hue stays.
+  // Colours outside of the display's gamut are dimmed rather than clipped, which keeps their hue.
   const double largest = std::max({rgb.r, rgb.g, rgb.b, 1.0});
   return glm::max(rgb / largest, 0.0);
 }
 
-// Moreland, "Diverging Color Maps for Scientific Visualization", 2009: magnitude, saturation angle, hue
-// angle.
+// Magnitude, saturation angle and hue angle: Moreland, "Diverging Color Maps for Scientific Visualization",
+// 2009.
 struct Msh {
   double magnitude, saturation, hue;
 
@@ -90,8 +90,8 @@ double angleBetween(double a, double b) {
   return difference > pi ? 2 * pi - difference : difference;
 }
 
-// The hue to give an unsaturated colour (whose own hue means nothing) at the end of a segment that begins at
-// `saturated`: spun so that the perceived rate of change stays even. Moreland's AdjustHue.
+// Moreland's AdjustHue: the hue of an unsaturated colour, which has none of its own, at the end of a segment
+// that begins at `saturated`. The hue is rotated so that the perceived rate of change is even.
 double hueTowards(const Msh& saturated, double unsaturated_magnitude) {
   if (saturated.magnitude >= unsaturated_magnitude - 0.1) return saturated.hue;
   const double spin =

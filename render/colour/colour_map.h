@@ -1,8 +1,8 @@
-// Colours between control points, in the colour spaces that ParaView's colour maps are written in.
+// Interpolates colours between control points, in the colour spaces of ParaView's colour maps.
 //
-// Whatever depends on a pair of points alone (the shorter way round the hue circle, the white that a
-// diverging map puts between two saturated colours) is settled when the map is built: afterwards each segment
-// is linear in its space, and a look-up is a search, an interpolation and a conversion to RGB.
+// What depends only on a pair of neighbouring points is resolved when the map is built: the shorter way round
+// the circle of hues, and the white that a diverging map inserts between two saturated colours. After that
+// each segment is linear in its space, and a look-up is a search, an interpolation and a conversion to RGB.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -11,9 +11,9 @@
 
 namespace curvisplat {
 
-/// ParaView's names: RGB, HSV (the shorter way round the circle of hues), HSVNoWrap, Lab (CIE L*a*b*, D65),
-/// Diverging (Moreland's Msh: Lab in polar form, white between distinct hues), Step (a segment has the colour
-/// of its upper end).
+/// As ParaView names them: RGB; HSV, the shorter way round the circle of hues; HSVNoWrap; Lab, CIE L*a*b*
+/// with D65; Diverging, Moreland's Msh (Lab in polar form, with white between distinct hues); Step, where a
+/// segment has the colour of its upper end.
 enum class ColourSpace { kRgb, kHsv, kHsvNoWrap, kLab, kDiverging, kStep };
 
 struct ColourPoint {
@@ -25,10 +25,10 @@ struct ColourPoint {
 class ColourMap {
  public:
   ColourMap() = default;
-  /// `points`: at least one, in the order of x. Points of equal x are a jump; the first holds at x itself.
+  /// `points`: one or more, sorted by x. Points with equal x are a jump; the first of them holds at x itself.
   ColourMap(std::span<const ColourPoint> points, ColourSpace space);
 
-  /// Below and above the points their ends' colours. Each channel in 0..1.
+  /// The colour at x, each channel in 0..1. Outside of the points, the colour of the nearest one.
   glm::dvec3 at(double x) const;
 
  private:

@@ -8,16 +8,16 @@
 namespace curvisplat {
 namespace {
 
-// How far from the lower opacity (0) to the upper one (1) the curve has come at `part` of the way in x.
+// The curve from the lower opacity (0) to the upper one (1), at the fraction `part` of the way in x.
 double progress(double part, double midpoint, double sharpness) {
   midpoint = std::clamp(midpoint, 1e-5, 1 - 1e-5);
   double s = part < midpoint ? 0.5 * part / midpoint : 0.5 + 0.5 * (part - midpoint) / (1 - midpoint);
-  // VTK's thresholds: beyond them the curve is a step, or straight.
+  // VTK's thresholds, beyond which the curve is a step or straight.
   if (sharpness > 0.99) return s < 0.5 ? 0 : 1;
   if (sharpness < 0.01) return s;
   const double power = 1 + 10 * sharpness;
   s = s < 0.5 ? 0.5 * std::pow(2 * s, power) : 1 - 0.5 * std::pow(2 * (1 - s), power);
-  // Hermite: 0 to 1, with the same slope (1 - sharpness) at both ends.
+  // A Hermite curve from 0 to 1 with the slope 1 - sharpness at both ends.
   const double rise = s * s * (3 - 2 * s);
   const double slopes = s * (1 - s) * (1 - 2 * s);
   return std::clamp(rise + slopes * (1 - sharpness), 0.0, 1.0);

@@ -1,8 +1,8 @@
-// Opacity between control points, as VTK's vtkPiecewiseFunction has it.
+// Interpolates opacity between control points as VTK's vtkPiecewiseFunction does.
 //
-// Between two points the curve follows the lower one's midpoint and sharpness: it passes through the mean of
-// the two opacities at the midpoint (a fraction of the way); sharpness 0 is two straight lines, 1 a step at
-// the midpoint, and what lies between is a Hermite curve over a compressed parameter.
+// Midpoint and sharpness of a point shape the curve up to the next point. At the midpoint, a fraction of the
+// way, the curve has the mean of the two opacities. Sharpness 0 gives two straight lines, 1 a step at the
+// midpoint, and values between them a Hermite curve over a compressed parameter.
 #pragma once
 
 #include <span>
@@ -21,10 +21,10 @@ struct OpacityPoint {
 class OpacityCurve {
  public:
   OpacityCurve() = default;
-  /// `points`: at least one, in the order of x. Points of equal x are a jump; the first holds at x itself.
+  /// `points`: one or more, sorted by x. Points with equal x are a jump; the first of them holds at x itself.
   explicit OpacityCurve(std::span<const OpacityPoint> points);
 
-  /// Below and above the points their ends' opacities.
+  /// The opacity at x. Outside of the points, that of the nearest one.
   double at(double x) const;
 
  private:

@@ -12,7 +12,7 @@ namespace curvisplat {
 namespace {
 
 constexpr double kLargestOpacity = 0.9999;
-// Between the ends of a range. What classifies pixels divides by it in single precision.
+// Smallest width of a range, which classification divides by in single precision.
 constexpr double kMinLength = 1e-30;
 
 bool isConstant(double low, double high) {
@@ -24,13 +24,13 @@ double toCoordinate(double scalar, bool log_scale) {
   return scalar > 0 ? std::log10(scalar) : -std::numeric_limits<double>::infinity();
 }
 
-/// Moves the points' x to the coordinates of interpolation, stretched over `range` (coordinates too) if
+/// Converts the points' x to the coordinate of interpolation, stretched over `range` (in that coordinate) if
 /// given.
 template <typename Point>
 void place(std::vector<Point>& points, bool log_scale,
            const std::optional<std::pair<double, double>>& range) {
-  // A stretched map may be written over any interval, 0..1 mostly: its own ends are taken in the logarithm
-  // only where they have one. ParaView does the same.
+  // A map that is to be stretched may be written over any interval, mostly 0..1. The logarithm of its own
+  // ends is taken only if they have one, as in ParaView.
   const bool own_log = log_scale && points.front().x > 0;
   for (Point& point : points) point.x = toCoordinate(point.x, own_log);
   if (!range) return;
@@ -38,7 +38,7 @@ void place(std::vector<Point>& points, bool log_scale,
   for (Point& point : points) point.x = std::lerp(range->first, range->second, (point.x - begin) / length);
 }
 
-/// Of points that are taken as they are, in the logarithm.
+/// Checks points that are not stretched but interpolated in the logarithm.
 template <typename Point>
 void requirePositive(const std::vector<Point>& points, const std::string& origin) {
   if (!points.empty() && !(points.front().x > 0))
@@ -61,10 +61,10 @@ TransferFunction::TransferFunction(TransferFunctionDefinition definition,
   std::optional<std::pair<double, double>> stretched;
   if (range) {
     if (!(range->second - range->first >= kMinLength))
-      throw UsageError("the range {},{} of a transfer function must ascend, by {:g} or more", range->first,
+      throw UsageError("the range {},{} of a transfer function must increase, by {:g} or more", range->first,
                        range->second, kMinLength);
     if (log_scale_ && !(range->first > 0))
-      throw UsageError("{} is logarithmic: its range {},{} must begin above zero", definition.origin,
+      throw UsageError("{} has a logarithmic scale: the range {},{} must be above zero", definition.origin,
                        range->first, range->second);
     stretched.emplace(toCoordinate(range->first, log_scale_), toCoordinate(range->second, log_scale_));
   } else if (log_scale_) {
@@ -97,7 +97,7 @@ TransferFunction TransferFunction::preset(std::string_view name, double low, dou
   TransferFunctionDefinition definition = presetDefinition(name);
   if (isConstant(low, high))
     definition.notes.push_back(
-        fmt::format("the scalar is {} everywhere: it gets the middle of the preset '{}'", low, name));
+        fmt::format("the scalar is {} everywhere; it is drawn in the middle of the preset '{}'", low, name));
   return TransferFunction(std::move(definition), &range, opacity_unit);
 }
 

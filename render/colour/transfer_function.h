@@ -1,8 +1,8 @@
-// Scalar -> (colour, extinction). A preset by name, or a ParaView colour-map file. Design section 9.
+// Transfer functions: scalar -> (colour, extinction). A preset by name, or a ParaView colour-map file.
 //
-//   opacity o is per unit distance u, capped at 0.9999: extinction κ = -ln(1 - o) / u
+//   Opacity o accumulates over the opacity unit u, and is capped at 0.9999: extinction κ = -ln(1 - o) / u.
 //
-// A look-up costs well under a microsecond: a table of 64 k values takes milliseconds in any colour space.
+// A look-up takes well under a microsecond; a table of 65,536 values takes milliseconds in any colour space.
 #pragma once
 
 #include <filesystem>
@@ -17,57 +17,57 @@
 
 namespace curvisplat {
 
-/// What a transfer function is made of, before it is stretched: as a preset or a file states it. Points in
-/// the order of x, which is the scalar; at least two colour points of different x; two opacity points or
-/// none.
+/// A transfer function as a preset or a file states it, before it is stretched over a range. Points are
+/// sorted by x, the scalar. There are two or more colour points with different x, and no opacity points or
+/// two or more.
 struct TransferFunctionDefinition {
   std::string name;
-  std::string origin;  // where it comes from, for messages: "preset 'grey'", "a.json: preset 'X Ray'"
+  std::string origin;  // for messages: "preset 'grey'", "a.json: preset 'X Ray'"
   ColourSpace colour_space = ColourSpace::kRgb;
   std::vector<ColourPoint> colours;
   std::vector<OpacityPoint> opacities;  // empty: the default ramp, from the first to the last colour
-  bool log_scale = false;               // interpolated in the logarithm of the scalar
+  bool log_scale = false;               // interpolate in the logarithm of the scalar
   double opacity_unit = 0;              // world units; 0: not stated
   glm::dvec3 nan_colour{0.5, 0, 0};     // VTK's default
-  std::vector<std::string> notes;       // what a person should be told
+  std::vector<std::string> notes;       // for the user
 };
 
 /// Immutable; any thread may ask.
 class TransferFunction {
  public:
   struct Value {
-    glm::dvec3 colour{0.0};  // 0..1, display values as ParaView's; blended as they are
+    glm::dvec3 colour{0.0};  // 0..1, display values as in ParaView; blended without conversion
     double extinction = 0;   // per world unit
   };
 
-  /// `range` stretches the definition's points, colours and opacities each by their own ends, as ParaView
-  /// rescales them (in the logarithm if the scale is logarithmic); without it they are taken as they are.
-  /// `opacity_unit` > 0. Throws UsageError where the range does not fit: reversed, or not above zero for a
-  /// logarithm; Error where it is not stretched and its own points are not above zero for a logarithm.
+  /// `range` (may be null) stretches the points as ParaView rescales them: colours and opacities each from
+  /// their own ends, in the logarithm if the scale is logarithmic. Null: the points stay as they are.
+  /// `opacity_unit` > 0. Throws UsageError if the range is reversed, or not above zero for a logarithmic
+  /// scale; Error if `range` is null and the points of a logarithmic scale are not above zero.
   TransferFunction(TransferFunctionDefinition definition, const std::pair<double, double>* range,
                    double opacity_unit);
 
-  /// A built-in preset, stretched over [low, high]. If both are equal, that scalar gets the middle of the
-  /// preset. Throws UsageError that lists the names there are.
+  /// A built-in preset, stretched over [low, high]. If both are equal, that scalar gets the preset's middle.
+  /// Throws UsageError that lists the presets.
   static TransferFunction preset(std::string_view name, double low, double high, double opacity_unit);
 
-  /// A ParaView colour-map preset (JSON). `range` stretches it, else it is taken as it is. `opacity_unit` > 0
-  /// goes before the file's ScalarOpacityUnitDistance, which goes before `default_opacity_unit`. Throws Error
-  /// naming the file and the field.
+  /// Reads a ParaView colour-map preset (JSON). `range`: as for the constructor. The opacity unit is
+  /// `opacity_unit` if that is > 0, else the file's ScalarOpacityUnitDistance, else `default_opacity_unit`.
+  /// Throws Error with the file and the field.
   static TransferFunction fromFile(const std::filesystem::path& path, const std::pair<double, double>* range,
                                    double opacity_unit, double default_opacity_unit);
 
-  /// Below and above range() the ends' values go on, as in ParaView. NaN has no extinction.
+  /// Outside of range(), the value at its nearer end, as in ParaView. NaN has no extinction.
   Value at(double scalar) const;
 
-  /// From the lowest to the highest point, colours and opacities together: outside it nothing changes.
+  /// From the lowest to the highest point of colours and opacities.
   std::pair<double, double> range() const { return range_; }
-  /// Whether interpolation between points is in the logarithm of the scalar.
+  /// Whether points are interpolated in the logarithm of the scalar.
   bool logScale() const { return log_scale_; }
   const std::string& name() const { return name_; }
   /// World units.
   double opacityUnit() const { return opacity_unit_; }
-  /// What a person should be told: "no Points in the file: the default opacity ramp is used".
+  /// For the user: "no Points in the file: the default opacity ramp is used".
   const std::vector<std::string>& notes() const { return notes_; }
 
  private:
@@ -83,23 +83,23 @@ class TransferFunction {
   std::vector<std::string> notes_;
 };
 
-/// The built-in presets over [0, 1], and their names, separated by commas. presetDefinition() throws
+/// A built-in preset over [0, 1], and the names of all, separated by commas. presetDefinition() throws
 /// UsageError that lists them.
 TransferFunctionDefinition presetDefinition(std::string_view name);
 std::string presetNames();
 
-/// The interval that a preset is stretched over for a scalar from `low` to `high`: a constant gets one around
-/// it.
+/// The interval over which a preset is stretched for a scalar from `low` to `high`: around the scalar if it
+/// is constant.
 std::pair<double, double> intervalAround(double low, double high);
 
-/// The ramp of a function that states no opacity, over [low, high].
+/// The opacities over [low, high] of a function that states none.
 std::vector<OpacityPoint> defaultOpacityRamp(double low, double high);
 
-/// Reads the first preset of a ParaView colour-map file. Throws Error naming the file and the field.
+/// Reads the first preset of a ParaView colour-map file. Throws Error with the file and the field.
 TransferFunctionDefinition readParaViewPreset(const std::filesystem::path& path);
-/// The same from a text; `path` is where it comes from, for messages.
+/// The same from text; `path` is used in messages.
 TransferFunctionDefinition parseParaViewPreset(const std::string& text, const std::filesystem::path& path);
-/// A colour-map file with this one preset, which readParaViewPreset() and ParaView read.
+/// The text of a colour-map file with this preset, for readParaViewPreset() and ParaView.
 std::string toParaViewPreset(const TransferFunctionDefinition& definition);
 
 }  // namespace curvisplat

@@ -1,4 +1,4 @@
-// Reads ParaView's colour-map presets: a JSON list of objects (or one object) with
+// Reads ParaView's colour-map presets: a list of JSON objects, or one, with these fields:
 //
 //   Name            text
 //   RGBPoints       x r g b, x r g b, ...
@@ -8,7 +8,7 @@
 //   NanColor        r g b                                              optional
 //   ScalarOpacityUnitDistance   world units                            optional
 //
-// Other fields are ParaView's own affair and are passed over, but for those that would change the picture.
+// Other fields are ignored, except that those which would change the picture in ParaView are reported.
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -24,7 +24,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// One preset's object, and where it is, for messages.
+/// The JSON object of one preset, with its place for messages.
 class PresetObject {
  public:
   PresetObject(const std::filesystem::path& path, const Json& object) : path_(path), object_(object) {
@@ -33,7 +33,7 @@ class PresetObject {
                   path.string(), kind(object));
     name_ = path.stem().string();
     if (const Json* name = find("Name")) {
-      if (!name->is_string()) fail("Name", "a text", kind(*name));
+      if (!name->is_string()) fail("Name", "a string", kind(*name));
       name_ = name->get<std::string>();
       for (char& c : name_)
         if (static_cast<unsigned char>(c) < ' ') c = ' ';  // messages are one line
@@ -52,7 +52,7 @@ class PresetObject {
     throw Error("{}, field {}: expected {}, found {}", origin(), field, expected, found);
   }
 
-  /// A list of numbers, `tuple` to a point. At least one point.
+  /// A list of numbers, `tuple` for each point; one point or more.
   std::vector<double> numbers(const char* field, size_t tuple, std::string_view form) const {
     const Json* list = find(field);
     if (!list) fail(field, fmt::format("a list of numbers, {} a point", form), "no such field");
@@ -83,7 +83,7 @@ class PresetObject {
       fail(field, fmt::format("{} between 0 and 1", what), fmt::format("{}", value));
   }
 
-  /// What `value` is, briefly.
+  /// `value`, or its type, in short.
   static std::string kind(const Json& value) {
     if (value.is_structured()) return fmt::format("a JSON {}", value.type_name());
     return value.dump().substr(0, 60);
@@ -95,12 +95,12 @@ class PresetObject {
   std::string name_;
 };
 
-/// Sorts by x, as ParaView does; points of equal x keep the file's order.
+/// Sorts by x, as ParaView does; points with equal x keep the file's order.
 template <typename Point>
 void sortPoints(std::vector<Point>& points, const PresetObject& preset, const char* field) {
   std::stable_sort(points.begin(), points.end(), [](const Point& a, const Point& b) { return a.x < b.x; });
   if (!(points.front().x < points.back().x))
-    preset.fail(field, "points at two different scalars or more",
+    preset.fail(field, "points at two or more different scalars",
                 fmt::format("{} at {}", points.size(), points.front().x));
 }
 
@@ -165,7 +165,7 @@ void refuseCategories(const PresetObject& preset) {
   const bool no_points = !preset.find("RGBPoints");
   if (preset.find("IndexedColors") && (no_points || preset.flag("IndexedLookup", false)))
     preset.fail("IndexedColors", "a continuous colour map (RGBPoints)",
-                "colours of categories, which have no order along a scalar; choose another preset");
+                "a map of categories, which have no order along a scalar; choose another preset");
 }
 
 Json parse(const std::string& text, const std::filesystem::path& path) {
@@ -210,7 +210,7 @@ TransferFunctionDefinition parseParaViewPreset(const std::string& text, const st
     if (rgb.size() != 3) preset.fail("NanColor", "3 numbers", fmt::format("{}", rgb.size()));
     for (const double channel : rgb) preset.checkUnit("NanColor", channel, "colours");
     definition.nan_colour = {rgb[0], rgb[1], rgb[2]};
-    note("NanColor is not seen: nodes without a number are blank in a cache");
+    note("NanColor is not used: a cache does not contain samples that are NaN");
   }
   if (const Json* unit = preset.find("ScalarOpacityUnitDistance")) {
     if (!unit->is_number() || !(unit->get<double>() > 0))
@@ -218,7 +218,7 @@ TransferFunctionDefinition parseParaViewPreset(const std::string& text, const st
     definition.opacity_unit = unit->get<double>();
   }
   if (preset.flag("UseBelowRangeColor", false) || preset.flag("UseAboveRangeColor", false))
-    note("colours for scalars below and above the range are not used: the ends' colours go on");
+    note("colours below and above the range are not used; the colours at its ends continue");
   return definition;
 }
 

@@ -1,5 +1,5 @@
-// The built-in transfer functions. The figures of viridis, inferno and plasma are matplotlib's (CC0), those
-// of cool-warm ParaView's and Moreland's.
+// The built-in transfer functions. The colours of viridis, inferno and plasma are matplotlib's (CC0), those
+// of cool-warm are Moreland's, as in ParaView.
 #include <array>
 #include <cstdint>
 
@@ -9,7 +9,7 @@
 namespace curvisplat {
 namespace {
 
-// Every eighth of matplotlib's 256 colours, and the last: linear between them is within 1/255 of the rest.
+// Every eighth of matplotlib's 256 colours, and the last: linear interpolation is within 1/255 of the others.
 using MatplotlibTable = std::array<uint32_t, 33>;
 constexpr MatplotlibTable kViridis{0x440154, 0x470d60, 0x48186a, 0x482374, 0x472d7b, 0x453781, 0x424086,
                                    0x3e4989, 0x3b528b, 0x375b8d, 0x33638d, 0x2f6b8e, 0x2c728e, 0x297a8e,
@@ -50,7 +50,7 @@ const std::vector<Preset>& presets() {
       {"viridis", ColourSpace::kRgb, fromTable(kViridis), defaultOpacityRamp(0, 1)},
       {"inferno", ColourSpace::kRgb, fromTable(kInferno), defaultOpacityRamp(0, 1)},
       {"plasma", ColourSpace::kRgb, fromTable(kPlasma), defaultOpacityRamp(0, 1)},
-      // Diverging data is about both ends: the middle is left out of sight.
+      // Diverging data is about both ends, so the middle is transparent.
       {"cool-warm",
        ColourSpace::kDiverging,
        {{0, fromHex(0x3b4cc0)}, {0.5, glm::dvec3(0.865)}, {1, fromHex(0xb40426)}},
@@ -70,10 +70,9 @@ const std::vector<Preset>& presets() {
 
 }  // namespace
 
-// Roughly 0.4 t², per hundredth of the data's diagonal if the user says nothing else. Rays cross some 60 such
-// units, so that the lower quarter of the scalar's range is a haze through which the upper half stands out: a
-// linear ramp that shows the top at all hides it behind fog, and a cubic one leaves everything else too
-// faint.
+// Roughly 0.4 t², over the default opacity unit, 1/100 of the data's diagonal. Rays cross some 60 such units,
+// so that the lower quarter of the range is a haze through which the upper half stands out. A linear ramp
+// that shows the top at all hides it in fog, and a cubic one leaves everything else too faint.
 std::vector<OpacityPoint> defaultOpacityRamp(double low, double high) {
   std::vector<OpacityPoint> points{{0, 0}, {0.25, 0.02}, {0.5, 0.08}, {0.75, 0.2}, {1, 0.4}};
   for (OpacityPoint& point : points) point.x = low + point.x * (high - low);
@@ -91,8 +90,9 @@ TransferFunctionDefinition presetDefinition(std::string_view name) {
     definition.opacities = preset.opacities;
     return definition;
   }
-  throw UsageError("there is no transfer function '{}': the presets are {}; a file's name ends in .json",
-                   name, presetNames());
+  throw UsageError(
+      "unknown transfer function '{}'; expected a preset ({}) or a file whose name ends in .json", name,
+      presetNames());
 }
 
 std::string presetNames() {

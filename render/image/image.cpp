@@ -8,7 +8,7 @@
 namespace curvisplat {
 namespace {
 
-// Red, green or blue over white.
+// A premultiplied red, green or blue channel, composited over white.
 double overWhite(const float* pixel, int channel) {
   return static_cast<double>(pixel[channel]) + (1 - static_cast<double>(pixel[3]));
 }

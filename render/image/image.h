@@ -1,4 +1,4 @@
-// Pictures in floating point.
+// An image in 32-bit floats, and how far two images are apart.
 #pragma once
 
 #include <cstddef>
@@ -9,8 +9,8 @@
 
 namespace curvisplat {
 
-/// Rows from the top, pixels from the left, four floats a pixel: red, green, blue (multiplied by alpha),
-/// alpha.
+/// Rows from the top, pixels from the left; four floats a pixel: red, green and blue, premultiplied by alpha,
+/// and alpha.
 struct Image {
   ImageSize size{0, 0};
   std::vector<float> rgba;
@@ -21,11 +21,11 @@ struct Image {
 };
 
 struct ImageDifference {
-  double psnr_db = 0;  // over red, green and blue against a peak of 1; infinite for equal images
-  double largest = 0;  // of one channel
+  double psnr_db = 0;  // over red, green and blue, relative to a peak of 1; infinite if the images are equal
+  double largest = 0;  // absolute difference of one channel
   int largest_x = 0, largest_y = 0;
 };
-/// Both composited over white where they have alpha. Throws Error if the sizes differ or a pixel is not
+/// Compares two images, each composited over white. Throws Error if the sizes differ or a pixel is not
 /// finite.
 ImageDifference compareImages(const Image& a, const Image& b);
 

@@ -1,8 +1,8 @@
-// EXR through TinyEXR: one part, scan lines, half or float channels R, G, B and A, or Y.
+// EXR by TinyEXR: single-part scan-line files with half or float channels R, G, B and A, or Y.
 //
-// TinyEXR believes much of what a file says. What it is given has therefore been walked here first, attribute
-// by attribute and chunk by chunk; the kinds of file that were not checked (tiles, several parts, deep
-// pixels, PIZ, B44, DWA) are refused.
+// TinyEXR trusts sizes and offsets that a file states. So every attribute and every chunk is checked here
+// before TinyEXR sees the file, and what these checks do not cover is refused: tiles, several parts, deep
+// pixels, PIZ, B44 and DWA.
 #include <tinyexr.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@
 namespace curvisplat {
 namespace {
 
-// The attributes that every file has, and their least sizes.
+// The attributes that every file must have, and their minimum sizes in bytes.
 struct RequiredAttribute {
   std::string_view name;
   uint32_t bytes;
@@ -35,8 +35,8 @@ constexpr std::array<RequiredAttribute, 8> kRequired{{{"channels", 1},
                                                       {"screenWindowWidth", 4}}};
 constexpr size_t kMaxAttributes = 128;
 
-constexpr uint32_t kLongNames = 0x400;    // the one flag beside the version 2 that is let through
-constexpr uint64_t kLargestRatio = 1032;  // zlib's; the run lengths' is 64
+constexpr uint32_t kLongNames = 0x400;    // the only flag that is accepted beside version 2
+constexpr uint64_t kLargestRatio = 1032;  // of zlib; run-length encoding reaches 64
 
 struct ExrChannel {
   std::string name;
@@ -57,7 +57,7 @@ struct ExrLayout {
   }
 };
 
-// Reads from the front of a range of bytes, and throws where it ends.
+// Reads a range of bytes from its front, and throws Error at its end.
 class Cursor {
  public:
   Cursor(std::span<const std::byte> bytes, const std::string& name) : bytes_(bytes), name_(name) {}
@@ -69,7 +69,7 @@ class Cursor {
     return value;
   }
   std::span<const std::byte> takeBytes(size_t count) {
-    if (count > bytes_.size() - at_) throw Error("{}: the EXR file ends early; it is truncated", name_);
+    if (count > bytes_.size() - at_) throw Error("{}: the EXR file is truncated", name_);
     at_ += count;
     return bytes_.subspan(at_ - count, count);
   }
@@ -96,8 +96,7 @@ std::vector<ExrChannel> takeChannels(Cursor list, const std::string& name) {
     list.takeBytes(4);  // pLinear and reserved
     const auto x_sampling = list.take<int32_t>(), y_sampling = list.take<int32_t>();
     if (type != TINYEXR_PIXELTYPE_HALF && type != TINYEXR_PIXELTYPE_FLOAT)
-      throw Error("{}: EXR channel {} has pixel type {}, and half or float was expected", name, channel,
-                  type);
+      throw Error("{}: EXR channel {} has pixel type {}, expected half or float", name, channel, type);
     if (x_sampling != 1 || y_sampling != 1)
       throw Error("{}: EXR channel {} is subsampled, which is not supported", name, channel);
     channels.push_back({channel, type == TINYEXR_PIXELTYPE_HALF ? 2u : 4u});
@@ -115,26 +114,27 @@ void takeAttribute(const std::string& attribute, std::span<const std::byte> data
   } else if (attribute == "compression") {
     layout.compression = value.take<uint8_t>();
     if (layout.compression > TINYEXR_COMPRESSIONTYPE_ZIP)
-      throw Error("{}: has EXR compression {}; none, RLE, ZIPS and ZIP (0 to 3) can be read", name,
+      throw Error("{}: EXR compression {} is not supported; expected none, RLE, ZIPS or ZIP (0 to 3)", name,
                   layout.compression);
   } else if (attribute == "dataWindow") {
     for (int32_t* side : {&layout.min_x, &layout.min_y, &layout.max_x, &layout.max_y})
       *side = value.take<int32_t>();
   } else if (attribute == "lineOrder") {
     if (value.take<uint8_t>() != 0)
-      throw Error("{}: EXR lines from the bottom up, or in random order, cannot be read", name);
+      throw Error("{}: EXR lines must be stored from the top down; other orders are not supported", name);
   } else if (attribute == "tiles" || attribute == "chunkCount") {
-    throw Error("{}: has the attribute {}; only EXR files of one part, in scan lines, can be read", name,
+    throw Error("{}: has the attribute {}; only single-part scan-line EXR files are supported", name,
                 attribute);
   }
 }
 
 ExrLayout takeHeader(Cursor& file, const std::string& name) {
-  file.take<uint32_t>();  // the magic number, by which this decoder was chosen
+  file.take<uint32_t>();  // the magic number, which selected this decoder
   const auto version = file.take<uint32_t>();
   if ((version & ~kLongNames) != 2)
-    throw Error("{}: has EXR version and flags {:#x}; only version 2, one part, in scan lines, can be read",
-                name, version);
+    throw Error(
+        "{}: has EXR version and flags {:#x}; only version 2, single-part, in scan lines, is supported", name,
+        version);
   ExrLayout layout;
   std::map<std::string, uint32_t> found;
   for (std::string attribute = file.takeString(); !attribute.empty(); attribute = file.takeString()) {
@@ -142,17 +142,20 @@ ExrLayout takeHeader(Cursor& file, const std::string& name) {
     const auto size = file.take<uint32_t>();
     if ((size == 0 && type != "string") || !found.emplace(attribute, size).second ||
         found.size() > kMaxAttributes)
-      throw Error("{}: the EXR attribute {} is empty, there twice, or one too many", name, attribute);
+      throw Error("{}: the EXR attribute {} is empty or repeated, or there are too many attributes", name,
+                  attribute);
     takeAttribute(attribute, file.takeBytes(size), layout, name);
   }
   for (const RequiredAttribute& required : kRequired)
     if (const auto at = found.find(std::string(required.name));
         at == found.end() || at->second < required.bytes)
-      throw Error("{}: the EXR header has no {} of {} bytes", name, required.name, required.bytes);
+      throw Error("{}: the EXR header lacks the attribute {} ({} bytes or more)", name, required.name,
+                  required.bytes);
   return layout;
 }
 
-// Every chunk lies in the file, is the one that its place in the table says, and has a plausible length.
+// Checks that every chunk lies in the file, begins with the line that its place in the table implies, and has
+// a plausible length.
 void requireChunks(Cursor& file, const ExrLayout& layout, std::span<const std::byte> bytes,
                    const std::string& name) {
   requirePlausibleSize(layout.width(), layout.height(), layout.bytesPerPixel(), bytes.size(), kLargestRatio,
@@ -162,7 +165,7 @@ void requireChunks(Cursor& file, const ExrLayout& layout, std::span<const std::b
   for (int64_t c = 0; c < chunks; ++c) {
     const auto offset = table.take<uint64_t>();
     if (offset < file.at() || offset > bytes.size())
-      throw Error("{}: EXR chunk {} is said to be at byte {}, outside of the file's pixels", name, c, offset);
+      throw Error("{}: EXR chunk {} has offset {}, outside of the file's pixel data", name, c, offset);
     Cursor chunk(bytes.subspan(offset), name);
     const auto line = chunk.take<int32_t>();
     const auto size = chunk.take<uint32_t>();
@@ -174,13 +177,12 @@ void requireChunks(Cursor& file, const ExrLayout& layout, std::span<const std::b
                                ? size == unpacked
                                : size <= unpacked && unpacked / kLargestRatio <= size;
     if (line != layout.min_y + first || size == 0 || !plausible)
-      throw Error(
-          "{}: EXR chunk {} at byte {} says that it has {} bytes from line {} on; the file is corrupt", name,
-          c, offset, size, line);
+      throw Error("{}: EXR chunk {} at byte {} claims {} bytes from line {} on; the file is corrupt", name, c,
+                  offset, size, line);
   }
 }
 
-// TinyEXR allocates by itself; this gives back what it did, however it went.
+// Owns what TinyEXR allocates, also where it fails half way.
 struct TinyExrFile {
   EXRHeader header;
   EXRImage image;
@@ -205,12 +207,12 @@ struct TinyExrFile {
   void loadPixels(std::span<const unsigned char> bytes, const std::string& name) {
     std::fill_n(header.requested_pixel_types, header.num_channels, TINYEXR_PIXELTYPE_FLOAT);
     image.num_channels =
-        header.num_channels;  // a load that fails frees so many channels, and leaves them there
+        header.num_channels;  // a failed load frees that many channels but keeps the pointers
     const int result = LoadEXRImageFromMemory(&image, &header, bytes.data(), bytes.size(), &message_);
     if (result != TINYEXR_SUCCESS) InitEXRImage(&image);
     require(result, name);
   }
-  /// The channel's position, or -1.
+  /// Index of the channel, or -1.
   int channelNamed(std::string_view name) const {
     for (int n = 0; n < header.num_channels; ++n)
       if (header.channels[n].name == name) return n;
@@ -232,7 +234,7 @@ struct TinyExrFile {
 }  // namespace
 
 Bytes encodeExr(const Image& image) {
-  // In the order of the alphabet, as the format wants.
+  // In alphabetical order, as the format requires.
   constexpr std::string_view kNames = "ABGR";
   constexpr std::array<size_t, 4> kFrom{3, 2, 1, 0};
   const size_t first = isOpaque(image) ? 1 : 0, channels = 4 - first;
@@ -247,7 +249,7 @@ Bytes encodeExr(const Image& image) {
     infos[c].name[0] = kNames[first + c];
   }
 
-  // Only lends its arrays to TinyEXR, so it must not free them.
+  // Borrows its arrays to TinyEXR, which must not free them.
   EXRHeader header;
   InitEXRHeader(&header);
   header.num_channels = static_cast<int>(channels);
@@ -289,7 +291,7 @@ Image decodeExr(std::span<const std::byte> bytes, const std::string& name) {
                                   exr.channelNamed(grey ? "Y" : "B")};
   const int alpha = exr.channelNamed("A");
   if (*std::min_element(colour.begin(), colour.end()) < 0)
-    throw Error("{}: the EXR file has neither channels R, G and B nor a channel Y", name);
+    throw Error("{}: the EXR file has neither the channels R, G and B nor Y", name);
   exr.loadPixels(memory, name);
   CURVISPLAT_CHECK_OP(exr.image.width, ==, layout.width());
   CURVISPLAT_CHECK_OP(exr.image.height, ==, layout.height());

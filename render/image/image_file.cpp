@@ -18,7 +18,7 @@ struct Format {
   std::string_view ending;
   std::string_view magic;
   Bytes (*encode)(const Image&);
-  uint64_t pixel_bytes;  // that encoding takes for a pixel, the file included
+  uint64_t pixel_bytes;  // of memory that encoding needs for each pixel, the encoded file included
   Image (*decode)(std::span<const std::byte>, const std::string&);
 };
 
@@ -26,7 +26,7 @@ constexpr std::array<Format, 4> kFormats{{
     {".png", "\x89PNG", encodePng, 8, decodePng},
     {".exr", "\x76\x2f\x31\x01", encodeExr, 48, decodeExr},
     {".pfm", "PF", encodePfm, 12, decodePfm},
-    {"", "Pf", nullptr, 0, decodePfm},  // one grey channel: read, never written
+    {"", "Pf", nullptr, 0, decodePfm},  // greyscale: read, never written
 }};
 
 constexpr size_t kLongestMagic = 4;
@@ -38,7 +38,7 @@ const Format& formatByName(const std::filesystem::path& path) {
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   for (const Format& format : kFormats)
     if (format.encode != nullptr && ending == format.ending) return format;
-  throw UsageError("{}: an image's name ends in .png, .exr or .pfm", path.string());
+  throw UsageError("{}: unknown image format; the name must end in .png, .exr or .pfm", path.string());
 }
 
 }  // namespace
@@ -66,13 +66,13 @@ Image readImage(const std::filesystem::path& path) {
         std::memcmp(bytes.data(), format.magic.data(), format.magic.size()) != 0)
       continue;
     if (file.size() > kLargestFile)
-      throw Error("{}: has {} bytes, more than the {} an image can have", path.string(), file.size(),
+      throw Error("{}: has {} bytes; image files of at most {} bytes are read", path.string(), file.size(),
                   kLargestFile);
     bytes.resize(file.size());
     file.readAt(0, std::span(bytes));
     return format.decode(bytes, path.string());
   }
-  throw Error("{}: is not a PNG, EXR or PFM image, by its first bytes", path.string());
+  throw Error("{}: not a PNG, EXR or PFM image (by its first bytes)", path.string());
 }
 
 }  // namespace curvisplat

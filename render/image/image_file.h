@@ -1,4 +1,4 @@
-// Pictures as files.
+// Reads and writes image files.
 #pragma once
 
 #include <cstdint>
@@ -8,16 +8,16 @@
 
 namespace curvisplat {
 
-/// Writes .png (8 bit), .exr or .pfm (32-bit float) by the name's ending. PNG and EXR keep alpha where the
-/// image is not opaque everywhere (PNG unassociated, EXR associated); PFM has none. Written whole or not at
-/// all. Throws UsageError for another ending, Error where the file cannot be written.
+/// Writes .png (8 bits a channel), .exr or .pfm (32-bit floats), chosen by the name's extension. PNG and EXR
+/// store alpha if the image is not fully opaque (PNG unassociated, EXR associated); PFM has no alpha. The
+/// file appears whole or not at all. Throws UsageError for any other extension, Error if the file cannot be
+/// written.
 void writeImage(const Image& image, const std::filesystem::path& path);
-/// Throws UsageError for a file name whose ending writeImage() would refuse; for use before long work.
+/// Throws UsageError for a name that writeImage() would refuse. For checking before long work.
 void checkImageName(const std::filesystem::path& path);
-/// What writeImage() takes in memory for an image of that size, beside the image.
+/// Memory that writeImage() needs for an image of `size`, beside the image itself.
 uint64_t writingBytes(const std::filesystem::path& path, ImageSize size);
-/// Reads what writeImage() writes, and ordinary PNG (8 and 16 bit), scan-line EXR and PFM files. Throws
-/// Error.
+/// Reads PNG (8 and 16 bits a channel), scan-line EXR and PFM files. Throws Error.
 Image readImage(const std::filesystem::path& path);
 
 }  // namespace curvisplat

@@ -9,13 +9,12 @@ namespace curvisplat {
 void requirePlausibleSize(int64_t width, int64_t height, uint64_t bytes_per_pixel, uint64_t packed_bytes,
                           uint64_t largest_ratio, const std::string& name) {
   if (width < 1 || height < 1 || width > kLargestImageSide || height > kLargestImageSide)
-    throw Error("{}: says that it has {} x {} pixels, and 1 to {} were expected a side", name, width, height,
+    throw Error("{}: claims {} x {} pixels, expected 1 to {} on each side", name, width, height,
                 kLargestImageSide);
   const uint64_t image_bytes = static_cast<uint64_t>(width) * static_cast<uint64_t>(height) * bytes_per_pixel;
   if (image_bytes / largest_ratio > packed_bytes)
-    throw Error(
-        "{}: says that it has {} x {} pixels, which do not fit its {} bytes; it is truncated or corrupt",
-        name, width, height, packed_bytes);
+    throw Error("{}: claims {} x {} pixels, which its {} bytes cannot hold; the file is truncated or corrupt",
+                name, width, height, packed_bytes);
 }
 
 uint8_t toByte(float value) {

@@ -1,6 +1,7 @@
-// The image files behind render/image.h: each format in memory. Decoders trust nothing: every size is bounded
-// by the bytes that are there before memory is asked for, and what is wrong is an Error that begins with
-// `name`, the file's.
+// Encoders and decoders of each image format, in memory; image_file.h reads and writes the files.
+//
+// Decoders take untrusted bytes: every size is bounded by the number of bytes given before anything is
+// allocated. They throw Error with a message that begins with `name`, the name of the file.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +16,7 @@ namespace curvisplat {
 
 using Bytes = std::vector<std::byte>;
 
-/// Neither a decoded image nor an encoded one has a longer side.
+/// Longest side of an image, decoded or encoded, in pixels.
 inline constexpr int kLargestImageSide = 1 << 16;
 
 Bytes encodePng(const Image& image);
@@ -26,12 +27,12 @@ Image decodePng(std::span<const std::byte> bytes, const std::string& name);
 Image decodeExr(std::span<const std::byte> bytes, const std::string& name);
 Image decodePfm(std::span<const std::byte> bytes, const std::string& name);
 
-/// Throws Error unless width and height are in [1, kLargestImageSide] and `packed_bytes` of a file can hold
-/// an image of `bytes_per_pixel` that was compressed by at most `largest_ratio`.
+/// Throws Error unless width and height are in [1, kLargestImageSide] and `packed_bytes` can hold that many
+/// pixels of `bytes_per_pixel`, compressed by at most `largest_ratio`.
 void requirePlausibleSize(int64_t width, int64_t height, uint64_t bytes_per_pixel, uint64_t packed_bytes,
                           uint64_t largest_ratio, const std::string& name);
 
-/// A channel of 8 bits: rounded, values beyond 0 and 1 cut off, 0 for what is no number.
+/// A channel as 8 bits: clamped to 0..1 and rounded; NaN gives 0.
 uint8_t toByte(float value);
 
 /// Whether every alpha is 1.

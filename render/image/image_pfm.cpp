@@ -1,5 +1,7 @@
-// Portable float maps: "PF" (or "Pf" for grey), width, height and a scale as text, each followed by one white
-// space; then rows from the bottom, little-endian if the scale is negative.
+// Portable float maps:
+//
+//   "PF" (colour) or "Pf" (grey), width, height, scale      as text, each followed by one white-space byte
+//   rows from the bottom up, 32-bit floats                  little-endian if the scale is negative
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -14,7 +16,7 @@
 namespace curvisplat {
 namespace {
 
-// The words of the header: white space in front is skipped, one byte of it after the word is taken.
+// Reads the words of the header: skips white space before a word and takes one byte of it after the word.
 class HeaderWords {
  public:
   HeaderWords(std::string_view text, const std::string& name) : text_(text), name_(name) {}
@@ -23,7 +25,7 @@ class HeaderWords {
     while (at_ < text_.size() && isSpace(text_[at_])) ++at_;
     const size_t begin = at_;
     while (at_ < text_.size() && !isSpace(text_[at_])) ++at_;
-    if (at_ == text_.size()) throw Error("{}: the PFM header has no end; the file is truncated", name_);
+    if (at_ == text_.size()) throw Error("{}: the PFM header is truncated", name_);
     return text_.substr(begin, at_++ - begin);
   }
   template <typename Number>
@@ -74,14 +76,14 @@ Image decodePfm(std::span<const std::byte> bytes, const std::string& name) {
   const auto width = words.nextNumber<int>("width"), height = words.nextNumber<int>("height");
   const auto scale = words.nextNumber<double>("scale");
   if (!std::isfinite(scale) || scale == 0)
-    throw Error("{}: the PFM header has {} for its scale", name, scale);
+    throw Error("{}: the PFM header has the scale {}; expected a finite number other than 0", name, scale);
 
   const uint64_t found = bytes.size() - words.at();
   requirePlausibleSize(width, height, 4 * channels, found, 1, name);
   const uint64_t expected = 4ull * channels * width * height;
   if (found != expected)
-    throw Error("{}: {} x {} pixels of {} channels need {} bytes after the header, and there are {}", name,
-                width, height, channels, expected, found);
+    throw Error("{}: {} x {} pixels of {} channels need {} bytes after the header, found {}", name, width,
+                height, channels, expected, found);
 
   Image image({width, height});
   const std::byte* from = bytes.data() + words.at();

@@ -1,5 +1,5 @@
-// PNG through libpng. libpng ends a call that fails by longjmp, which must not cross a C++ destructor: each
-// function here that calls setjmp has none to run, and what they work on is owned by their callers.
+// PNG by libpng. libpng reports failure by longjmp, which must not skip C++ destructors: the functions here
+// that call setjmp have no objects to destroy, and their callers own what they work on.
 #include <png.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 namespace curvisplat {
 namespace {
 
-// zlib packs at most 1032 bytes into one.
+// zlib compresses at most 1032 bytes into one.
 constexpr uint64_t kLargestRatio = 1032;
 
 struct Message {
@@ -27,7 +27,7 @@ struct Message {
   std::longjmp(png_jmpbuf(png), 1);
 }
 
-void onWarning(png_structp, png_const_charp) {}  // about ancillary chunks, which are not looked at
+void onWarning(png_structp, png_const_charp) {}  // warnings are about ancillary chunks, which are not used
 
 struct PngWriter {
   Message message;
@@ -70,7 +70,7 @@ void appendBytes(png_structp png, png_bytep from, size_t count) {
 
 void takeBytes(png_structp png, png_bytep to, size_t count) {
   auto& left = static_cast<PngReader*>(png_get_io_ptr(png))->left;
-  if (count > left.size()) png_error(png, "the file ends early");
+  if (count > left.size()) png_error(png, "the file is truncated");
   std::memcpy(to, left.data(), count);
   left = left.subspan(count);
 }
@@ -101,7 +101,7 @@ bool writeAll(PngWriter& writer, Bytes& out, const Image& image, bool opaque, pn
   return true;
 }
 
-// Reads up to the pixels and asks for red, green, blue and alpha of 8 or 16 bits, whatever the file has.
+// Reads up to the pixels, and has libpng convert them to red, green, blue and alpha of 8 or 16 bits.
 bool readHeader(PngReader& reader) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
   png_set_read_fn(reader.png, &reader, takeBytes);
@@ -143,11 +143,11 @@ Bytes encodePng(const Image& image) {
 
 Image decodePng(std::span<const std::byte> bytes, const std::string& name) {
   PngReader reader(bytes);
-  if (!readHeader(reader)) throw Error("{}: is not a PNG file to be read: {}", name, reader.message.text);
+  if (!readHeader(reader)) throw Error("{}: the PNG header cannot be read: {}", name, reader.message.text);
   const auto width = static_cast<int>(png_get_image_width(reader.png, reader.info));
   const auto height = static_cast<int>(png_get_image_height(reader.png, reader.info));
   const bool wide = png_get_bit_depth(reader.png, reader.info) == 16;
-  // A pixel of the file may have a single bit, and eight of them then fit the byte that zlib packs.
+  // A pixel may take a single bit in the file: eight pixels then fit each byte that zlib compresses.
   requirePlausibleSize(width, height, 1, bytes.size(), 8 * kLargestRatio, name);
 
   const size_t row_bytes = png_get_rowbytes(reader.png, reader.info);

@@ -1,4 +1,4 @@
-// The size of a picture.
+// The size of an image, in pixels.
 #pragma once
 
 #include <cstdint>

@@ -56,7 +56,7 @@ TEST_F(AddScalarCommand, AddsAScalarThatCanBeDrawn) {
   EXPECT_TRUE(bytesOfFile(file("a.splats/geometry.bin")) == geometry);
 
   const auto stats = nlohmann::json::parse(readTextFile(file("stats.json")));
-  EXPECT_EQ(stats["nodes"], 60 * 40 * 20);
+  EXPECT_EQ(stats["samples"], 60 * 40 * 20);
   EXPECT_EQ(stats["phases"].size(), 5u);
   EXPECT_EQ(stats["files"].size(), 1u);
 

@@ -123,8 +123,8 @@ TEST_F(Bench, SaysWhatIsWrong) {
   writeCache();
   const std::string cache = file("a.splats");
   expectOneLine(runProgram({"bench"}), 2, "--convert");
-  expectOneLine(runProgram({"bench", cache, "--convert"}), 2, "give a cache or --convert");
-  expectOneLine(runProgram({"bench", cache, "--nodes", "8M"}), 2, "--nodes is for --convert");
+  expectOneLine(runProgram({"bench", cache, "--convert"}), 2, "give either a cache or --convert");
+  expectOneLine(runProgram({"bench", cache, "--nodes", "8M"}), 2, "--nodes needs --convert");
   for (const char* nodes : {"0", "-5", "many", "8MM", "99999999999999999999", "999"})
     expectOneLine(runProgram({"bench", "--convert", std::string("--nodes=") + nodes}), 2, nodes);
   expectOneLine(runProgram({"bench", "--convert", "--nodes", "999999G"}), 1, "MiB free");
@@ -134,7 +134,7 @@ TEST_F(Bench, SaysWhatIsWrong) {
   expectOneLine(runProgram({"bench", cache, "--lod-pixels", "1,-2"}), 2, "-2");
   expectOneLine(runProgram({"bench", cache, "--lod-pixels", "1,,2"}), 2, "--lod-pixels");
   expectOneLine(runProgram({"bench", cache, "--plot", file("no/where")}), 1, "--plot");
-  expectOneLine(runProgram({"bench", cache, "--plot", cache + "/manifest.json"}), 1, "is not a folder");
+  expectOneLine(runProgram({"bench", cache, "--plot", cache + "/manifest.json"}), 1, "is not a directory");
   expectOneLine(runProgram({"bench", cache, "--json", file("no/b.json")}), 1, "--json");
 }
 

@@ -44,11 +44,11 @@ TEST_F(ConvertOptionsTest, SaysWhatItDid) {
   const ProgramResult result = convert({"--stats", file("stats.json")});
   ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_EQ(lineCount(result.out), 2) << result.out;
-  EXPECT_NE(result.out.find("120000 nodes, 118000 splats"), std::string::npos) << result.out;
-  EXPECT_NE(result.err.find("2000 face nodes coincide"), std::string::npos) << result.err;
+  EXPECT_NE(result.out.find("120000 samples, 118000 splats"), std::string::npos) << result.out;
+  EXPECT_NE(result.err.find("2000 nodes on block faces coincide"), std::string::npos) << result.err;
 
   const auto stats = nlohmann::json::parse(readTextFile(folder_ / "stats.json"));
-  EXPECT_EQ(stats["nodes"], 120000);
+  EXPECT_EQ(stats["samples"], 120000);
   EXPECT_EQ(stats["merged_nodes"], 2000);
   EXPECT_GT(stats["peak_memory_bytes"], 0);
   EXPECT_LE(stats["temporary_bytes"], 64 * 120000);

@@ -147,12 +147,12 @@ TEST_F(Frames, NamesWithoutOneNumberAreWrongUsage) {
   EXPECT_TRUE(fs::exists(file("100%_ 0.png")));
   // Nor may a frame be what else is written.
   expectRefused({"-o", file("a%02d.png"), "--orbit", "90", "--frames", "2", "--stats", file("./a01.png")}, 1,
-                "a frame of -o would change it");
+                "a frame of -o would overwrite it");
   expectRefused({"-o", file("a%2d.png"), "--orbit", "90", "--frames", "2", "--first-image", file("a 0.png")},
-                1, "a frame of -o would change it");
+                1, "a frame of -o would overwrite it");
   fs::create_symlink("a01.png", file("linked.json"));
   expectRefused({"-o", file("a%02d.png"), "--orbit", "90", "--frames", "2", "--stats", file("linked.json")},
-                1, "a frame of -o would change it");
+                1, "a frame of -o would overwrite it");
   expectDrawn({"-o", file("a%02d.png"), "--orbit", "90", "--frames", "1", "--stats", file("a1.png")});
   expectDrawn({"-o", file("a%02d.png"), "--orbit", "90", "--frames", "1", "--stats", file("a01.png")});
   // One picture is written to the name as it is.
@@ -311,7 +311,7 @@ TEST_F(Frames, AMovieThatFailsLeavesNothing) {
   }
   {
     const ScopedEnvironment path("PATH", file("empty"));
-    expectRefused(movie, 1, "ffmpeg, which is not installed");
+    expectRefused(movie, 1, "ffmpeg, which writes movies, was not found in PATH");
   }
   for (const auto& entry : fs::directory_iterator(folder_->path()))
     for (const char* part : {"failed", ".curvisplat"})

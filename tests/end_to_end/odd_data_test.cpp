@@ -87,7 +87,7 @@ TEST_F(OddDataTest, OneNodeThatIsLeftHasNoVolumeAndThatIsSaid) {
     values.scalars[0] = 1;
     values.blank = node.i + node.j + node.k > 0;
   });
-  EXPECT_TRUE(said("7 nodes are blanked by the grid")) << said_;
+  EXPECT_TRUE(said("7 samples are blanked by the grid")) << said_;
   expectEmpty({}, "the data has no volume");
   EXPECT_TRUE(said("7 of 8")) << said_;
 }
@@ -116,7 +116,7 @@ TEST_F(OddDataTest, AnEmptyPictureNamesItsCause) {
   EXPECT_FALSE(isWhite(render()));
   // The range. Below it all is opaque, or so the preset says.
   expectEmpty({"--range", "20,30"}, "over the range 20..30, the transfer function 'viridis'");
-  EXPECT_TRUE(said("give another --range")) << said_;
+  EXPECT_TRUE(said("choose another --range")) << said_;
   // The function, over whichever range.
   writeFileAtomically(folder_ / "clear.json",
                       std::string(R"([{"Name": "clear", "RGBPoints": [0,1,0,0, 1,1,0,0],
@@ -126,16 +126,16 @@ TEST_F(OddDataTest, AnEmptyPictureNamesItsCause) {
     EXPECT_FALSE(said("--range;")) << said_;
   }
   // Blanking.
-  expectEmpty({"--clip-box", "6,9,0,15,0,15"}, "is blanked, as are 2048 of its 4096 nodes");
+  expectEmpty({"--clip-box", "6,9,0,15,0,15"}, "is blanked (2048 of 4096 samples are)");
   expectEmpty({"--position", "7.5,-50,7.5", "--focal-point", "7.5,7.5,7.5", "--parallel-scale", "1"},
-              "is blanked, as are 2048 of its 4096 nodes");
+              "is blanked (2048 of 4096 samples are)");
   // The camera.
   expectEmpty({"--position", "100,0,0", "--focal-point", "200,0,0", "--view-angle", "30"},
               "does not see the data's box");
   expectEmpty({"--parallel-scale", "1e300"}, "give a smaller --parallel-scale");
-  expectEmpty({"--position", "1e9,0,0", "--view-angle", "30"}, "bring the camera nearer");
+  expectEmpty({"--position", "1e9,0,0", "--view-angle", "30"}, "move the camera closer");
   render({"--position", "1e5,0,0", "--view-angle", "30"});  // of which a float picture has a trace
-  EXPECT_TRUE(said("bring the camera nearer")) << said_;
+  EXPECT_TRUE(said("move the camera closer")) << said_;
   // What is seen is of values that are transparent.
   writeFileAtomically(folder_ / "high.json",
                       std::string(R"([{"Name": "high", "RGBPoints": [0,1,0,0, 15,1,0,0],
@@ -178,7 +178,7 @@ TEST_F(OddDataTest, WhatIsNotFiniteIsCountedSkippedAndReported) {
   writeCube(folder_ / "cube", 8, node);
   const ProgramResult result = runProgram(cubeArguments(folder_ / "cube", {"--stats", file("stats.json")}));
   ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_NE(result.err.find("note: 208 nodes are not finite numbers, and are blanked"), std::string::npos)
+  EXPECT_NE(result.err.find("note: 208 samples are not finite and are blanked"), std::string::npos)
       << result.err;
   const auto stats = nlohmann::json::parse(readTextFile(folder_ / "stats.json"));
   EXPECT_EQ(stats["blanked"]["not_finite"], 208);
@@ -207,7 +207,7 @@ TEST_F(OddDataTest, ValuesTooFarApartAreRefusedUnlessTheyAreBlank) {
   EXPECT_FALSE(std::filesystem::exists(file("cube.splats")));
   const ProgramResult taken = convert(8, node, {"--blank", "1e20"});
   EXPECT_EQ(taken.status, 0) << taken.err;
-  EXPECT_NE(taken.err.find("64 nodes have the blank value"), std::string::npos) << taken.err;
+  EXPECT_NE(taken.err.find("64 samples have the blank value"), std::string::npos) << taken.err;
   EXPECT_FALSE(isWhite(render()));
 }
 

@@ -28,9 +28,9 @@ TEST_F(NoWindow, WithoutADisplay) {
   unsetenv("WAYLAND_DISPLAY");
   const ProgramResult result = runProgram({"view", "a.splats"});
   EXPECT_EQ(lineCount(result.err), 1) << result.err;
-  expectFailure(result, {"no window can be opened", "DISPLAY", "curvisplat render"});
+  expectFailure(result, {"cannot open a window", "DISPLAY", "curvisplat render"});
   EXPECT_NE(system().out.find("display    none"), std::string::npos) << system().out;
-  EXPECT_NE(system().out.find("window     not here: no window can be opened"), std::string::npos);
+  EXPECT_NE(system().out.find("window     not available: cannot open a window"), std::string::npos);
 }
 
 TEST_F(NoWindow, WhereOpenGlIsTooOld) {
@@ -40,8 +40,8 @@ TEST_F(NoWindow, WhereOpenGlIsTooOld) {
   const std::string report = system().out;
   unsetenv("MESA_GL_VERSION_OVERRIDE");
   EXPECT_EQ(lineCount(result.err), 1) << result.err;
-  expectFailure(result, {"no window can be opened", "OpenGL 3.3 is needed"});
-  EXPECT_NE(report.find("window     not here: no window can be opened"), std::string::npos) << report;
+  expectFailure(result, {"cannot open a window", "it needs OpenGL 3.3"});
+  EXPECT_NE(report.find("window     not available: cannot open a window"), std::string::npos) << report;
 }
 
 TEST_F(NoWindow, OnADisplayWithoutOpenGl) {
@@ -49,7 +49,7 @@ TEST_F(NoWindow, OnADisplayWithoutOpenGl) {
   display_.emplace(kScreen, std::vector<std::string>{"-extension", "GLX"});
   const ProgramResult result = runProgram({"view", "a.splats"});
   EXPECT_EQ(lineCount(result.err), 1) << result.err;
-  expectFailure(result, {"no window can be opened", "GLX", "OpenGL 3.3 is needed"});
+  expectFailure(result, {"cannot open a window", "GLX", "it needs OpenGL 3.3"});
 }
 
 TEST_F(NoWindow, OfAnUnfinishedCache) {

@@ -84,7 +84,7 @@ TEST_F(WindowLimitsTest, WithNowhereToRememberItOpens) {
   const auto window = open();
   const ProgramResult result = closed(*window);
   EXPECT_EQ(result.status, 0) << result.err;
-  EXPECT_NE(result.err.find("warning: the view is not remembered"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("warning: cannot save the view"), std::string::npos) << result.err;
 }
 
 }  // namespace

@@ -220,7 +220,7 @@ TEST_F(CameraPathFile, SaysWhatIsWrong) {
   expectRefused("[]", "found a JSON array");
   expectRefused("{}", "key_frames");
   expectRefused(R"({"key_frames": 7})", "expected a list");
-  expectRefused(file(""), "one key frame or more");
+  expectRefused(file(""), "at least one key frame");
   expectRefused(file("null"), "key frame 0");
   expectRefused(file(keyFrame() + ", [1]"), "key frame 1");
   expectRefused(file(keyFrame() + "," + keyFrame()), "times must increase");

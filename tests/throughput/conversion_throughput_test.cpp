@@ -26,7 +26,7 @@ TEST(ConversionThroughput, MeasuresEveryPhaseAndLeavesNothing) {
   Measurements measurements;
   Progress progress;
   const ConversionEffort effort{
-      .nodes = 20'000, .threads = 2, .temporary_folder = folder.path(), .repeat_s = 1e9, .most_runs = 2};
+      .nodes = 20'000, .threads = 2, .temporary_folder = folder.path(), .repeat_s = 1e9, .max_runs = 2};
   const ConversionReport report = measureConversion(effort, measurements, progress);
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
   EXPECT_EQ(report.last.nodes, report.nodes());

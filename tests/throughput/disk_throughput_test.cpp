@@ -13,7 +13,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr DiskEffort kLittle{.sample_s = 0.001, .samples = 2, .most_bytes = 64 << 20};
+constexpr DiskEffort kLittle{.sample_s = 0.001, .samples = 2, .max_bytes = 64 << 20};
 
 Measurements measured(const std::filesystem::path& path) {
   writeRandomCache(path);

@@ -76,7 +76,7 @@ TEST_F(ThroughputOfACache, FramesAreDrawnAndCounted) {
   Measurements measurements;
   Progress progress;
   const auto frames =
-      measureFrames(scene(), configurations, {.configuration_s = 1e9, .total_s = 1e9, .most_frames = 3},
+      measureFrames(scene(), configurations, {.configuration_s = 1e9, .total_s = 1e9, .max_frames = 3},
                     measurements, progress);
   ASSERT_EQ(frames.size(), 2u);
   for (size_t n = 0; n < 2; ++n) {
@@ -115,7 +115,7 @@ TEST_F(ThroughputOfACache, FramesThatDoNotFitAreLeftOutWithTheReason) {
 TEST_F(ThroughputOfACache, EveryStageIsMeasuredOrLeftOut) {
   Measurements measurements;
   Progress progress;
-  const StageEffort little{.sample_s = 0, .samples = 2, .most_splats = 5000, .most_read_bytes = 1 << 20};
+  const StageEffort little{.sample_s = 0, .samples = 2, .max_splats = 5000, .max_read_bytes = 1 << 20};
   const StageReport report = measureStages(scene(), 2, little, measurements, progress);
   EXPECT_EQ(report.frame_splats, 32u * 32 * 32);
   EXPECT_GE(report.sampled_splats, 5000u);

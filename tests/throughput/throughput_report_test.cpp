@@ -24,15 +24,15 @@ TEST(ThroughputReport, StagesOnSeveralThreads) {
   Measurements measurements;
   addStages(measurements, 4);
   EXPECT_EQ(stageTable(measurements, 4),
-            "stage                1 thread        4 threads  gain\n"
+            "stage                1 thread        4 threads  speedup\n"
             "read                                 1.80 GB/s\n"
-            "verify        1.00 M splats/s  3.00 M splats/s  3.00\n"
-            "decode        1.00 M splats/s  3.00 M splats/s  3.00\n"
+            "verify        1.00 M splats/s  3.00 M splats/s     3.00\n"
+            "decode        1.00 M splats/s  3.00 M splats/s     3.00\n"
             "                    2.00 MB/s        6.00 MB/s\n"
-            "project       1.00 M splats/s  3.00 M splats/s  3.00\n"
-            "sort          1.00 M splats/s  3.00 M splats/s  3.00\n"
-            "prepare       1.00 M splats/s  3.00 M splats/s  3.00\n"
-            "draw, cpu     1.00 M splats/s  3.00 M splats/s  3.00\n"
+            "project       1.00 M splats/s  3.00 M splats/s     3.00\n"
+            "sort          1.00 M splats/s  3.00 M splats/s     3.00\n"
+            "prepare       1.00 M splats/s  3.00 M splats/s     3.00\n"
+            "draw, cpu     1.00 M splats/s  3.00 M splats/s     3.00\n"
             "draw, osmesa                    500 k splats/s\n");
 }
 
@@ -53,11 +53,13 @@ TEST(ThroughputReport, DiskRowsAndWhatIsMissing) {
   measurements.add("disk/direct/4KiB/depth:8", "B/s", {100 << 20});
   measurements.add("disk/direct/256KiB/depth:8", "B/s", {800 << 20});
   EXPECT_EQ(diskTable(measurements),
-            "MiB/s, 8 reads at once  4 KiB  64 KiB  256 KiB  1 MiB\n"
-            "direct                    100       -      800      -\n"
+            "MiB/s, 8 reads in flight  4 KiB  64 KiB  256 KiB  1 MiB\n"
+            "direct                      100       -      800      -\n"
             "\n"
-            "MiB/s, 256 KiB a read  1 at once  2 at once  4 at once  8 at once  16 at once  32 at once\n"
-            "direct                         -          -          -        800           -           -\n");
+            "MiB/s, 256 KiB per read  1 in flight  2 in flight  4 in flight  8 in flight  16 in flight  32 in "
+            "flight\n"
+            "direct                             -            -            -          800             -         "
+            "     -\n");
 }
 
 TEST(ThroughputReport, ReasonsComeOnce) {
@@ -95,8 +97,8 @@ TEST(ThroughputReport, JudgesTheFinestFrameOnAllThreads) {
   EXPECT_NE(verdict->lines[0].find("0.25 s"), std::string::npos) << verdict->lines[0];
   const std::string last = verdict->lines.back();
   EXPECT_EQ(last,
-            "the disk could feed 100.0 such frames a second with nothing in memory; 25 % of this one's "
-            "bricks came from it");
+            "the disk could sustain 100.0 such frames per second with nothing in memory; 25 % of this frame's "
+            "bricks were read from it");
 }
 
 }  // namespace

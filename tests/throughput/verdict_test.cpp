@@ -20,7 +20,7 @@ JudgedFrame frame() {
           .splats_prepared = 1'000'000,
           .splats_drawn = 1'000'000,
           .bytes = 8'000'000,
-          .read_part = 0,
+          .read_fraction = 0,
           .draws_apart = false};
 }
 StageSpeeds speeds() {
@@ -45,42 +45,42 @@ TEST(Verdict, DrawingOnTheCoresBounds) {
   const Verdict verdict = judge(frame(), speeds(), {});
   EXPECT_EQ(verdict.stage, "drawing");
   EXPECT_NEAR(verdict.share, 0.4 / 0.47, 1e-9);
-  EXPECT_TRUE(verdict.lines[0].starts_with("drawing bounds the frame: 85 % of the cores' work in 0.50 s"))
+  EXPECT_TRUE(verdict.lines[0].starts_with("drawing bounds the frame: 85 % of the work on the cores in 0.50 s"))
       << all(verdict);
   EXPECT_TRUE(
-      says(verdict, "a graphics card would take drawing off the cores: what is left for them takes 70.0 ms"))
+      says(verdict, "a graphics card would draw instead of the cores; their remaining work takes 70.0 ms"))
       << all(verdict);
   // 8 MB a frame at 1 GB/s.
-  EXPECT_TRUE(says(verdict, "the disk could feed 125.0 such frames a second")) << all(verdict);
+  EXPECT_TRUE(says(verdict, "the disk could sustain 125.0 such frames per second")) << all(verdict);
 }
 
 TEST(Verdict, DecodingBoundsWhereBricksAreReadEachTime) {
   JudgedFrame judged = frame();
-  judged.read_part = 1;
+  judged.read_fraction = 1;
   StageSpeeds slow = speeds();
   slow.decode_splats_s = 2e6;  // 0.5 s
   slow.draw_splats_s = 20e6;
   judged.seconds = 0.7;
   const Verdict verdict = judge(judged, slow, {});
   EXPECT_EQ(verdict.stage, "decoding");
-  EXPECT_TRUE(says(verdict, "100 % of this one's bricks came from it")) << all(verdict);
+  EXPECT_TRUE(says(verdict, "100 % of this frame's bricks were read from it")) << all(verdict);
   EXPECT_FALSE(says(verdict, "graphics card")) << all(verdict);
   // What is in memory is not decoded.
-  judged.read_part = 0;
+  judged.read_fraction = 0;
   EXPECT_NE(judge(judged, slow, {}).stage, "decoding");
 }
 
 TEST(Verdict, ReadingBoundsWithASlowDisk) {
   JudgedFrame judged = frame();
-  judged.read_part = 1;
+  judged.read_fraction = 1;
   judged.seconds = 9;
   StageSpeeds slow = speeds();
   slow.read_bytes_s = 1e6;  // 8 s
   const Verdict verdict = judge(judged, slow, {});
   EXPECT_EQ(verdict.stage, "reading");
-  EXPECT_TRUE(says(verdict, "reading bounds the frame: alone it takes 8.00 s of 9.00 s")) << all(verdict);
+  EXPECT_TRUE(says(verdict, "reading bounds the frame: in isolation it takes 8.00 s of 9.00 s")) << all(verdict);
   EXPECT_TRUE(says(verdict, "a faster disk would help")) << all(verdict);
-  EXPECT_TRUE(says(verdict, "could feed 0.1 such frames")) << all(verdict);
+  EXPECT_TRUE(says(verdict, "could sustain 0.1 such frames")) << all(verdict);
 }
 
 TEST(Verdict, ACardThatDrawsIsNotAdvised) {
@@ -135,9 +135,9 @@ TEST(Verdict, MemoryIsAdvisedByWhatItGave) {
 
 TEST(Verdict, TellsOfTimeThatNoStageTakes) {
   JudgedFrame judged = frame();
-  EXPECT_FALSE(says(judge(judged, speeds(), {}), "not the stages' own time"));
+  EXPECT_FALSE(says(judge(judged, speeds(), {}), "overhead"));
   judged.seconds = 0.94;  // twice the stages' 0.47
-  EXPECT_TRUE(says(judge(judged, speeds(), {}), "50 % of the frame is not the stages' own time"));
+  EXPECT_TRUE(says(judge(judged, speeds(), {}), "50 % of the frame is overhead"));
 }
 
 TEST(Verdict, SaysNothingOfADiskThatWasNotMeasured) {

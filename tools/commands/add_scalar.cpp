@@ -16,57 +16,57 @@
 namespace curvisplat {
 namespace {
 
-void checkWords(const ConvertArguments& words) {
-  if (words.to.empty()) throw UsageError("--add-scalar: name the cache with --to");
-  if (words.added_scalars.empty()) throw UsageError("--to: name scalars with --add-scalar");
+void checkArguments(const ConvertArguments& arguments) {
+  if (arguments.to.empty()) throw UsageError("--add-scalar needs --to CACHE, the cache to add to");
+  if (arguments.added_scalars.empty()) throw UsageError("--to needs --add-scalar NAME, the scalar to add");
   const auto refuse = [](bool given, const char* option) {
     if (given)
-      throw UsageError("{} makes a new cache, and --add-scalar changes one: leave one of them out", option);
+      throw UsageError("{} cannot be combined with --add-scalar, which changes an existing cache", option);
   };
-  refuse(!words.output.empty(), "--output");
-  refuse(!words.scalars.empty(), "--scalar");
-  refuse(words.overwrite, "--overwrite");
-  refuse(words.resume, "--resume");
+  refuse(!arguments.output.empty(), "--output");
+  refuse(!arguments.scalars.empty(), "--scalar");
+  refuse(arguments.overwrite, "--overwrite");
+  refuse(arguments.resume, "--resume");
 }
 
-void printSummary(const ConvertArguments& words, const AddScalarReport& report, double seconds,
+void printSummary(const ConvertArguments& arguments, const AddScalarReport& report, double seconds,
                   uint64_t peak_memory_bytes) {
-  const auto nodes = static_cast<double>(report.nodes);
+  const auto samples = static_cast<double>(report.nodes);
   std::string names;
   for (const std::string& name : report.scalars) names += (names.empty() ? "" : ", ") + name;
-  fmt::print("{}: added {} to {} splats\n", words.to.string(), names, report.splats);
-  fmt::print("{:.1f} s, {:.2f} M nodes/s, {:.1f} MiB, {:.2f} bytes a node, peak memory {:.0f} MiB\n", seconds,
-             1e-6 * nodes / seconds, mebibytes(totalBytes(report.files)),
-             static_cast<double>(totalBytes(report.files)) / nodes, mebibytes(peak_memory_bytes));
+  fmt::print("{}: added {} for {} splats\n", arguments.to.string(), names, report.splats);
+  fmt::print("{:.1f} s, {:.2f} M samples/s, {:.1f} MiB, {:.2f} bytes per sample, peak memory {:.0f} MiB\n",
+             seconds, 1e-6 * samples / seconds, mebibytes(totalBytes(report.files)),
+             static_cast<double>(totalBytes(report.files)) / samples, mebibytes(peak_memory_bytes));
 }
 
 nlohmann::json statistics(const AddScalarReport& report, const Progress& progress) {
   nlohmann::json json = commonStatistics(report, progress);
   json["scalars"] = report.scalars;
-  json["nodes"] = report.nodes;
+  json["samples"] = report.nodes;
   return json;
 }
 
 }  // namespace
 
-void runAddScalar(ConvertArguments words) {
-  checkWords(words);
-  if (!words.to.has_filename()) words.to = words.to.parent_path();  // "NAME.splats/"
+void runAddScalar(ConvertArguments arguments) {
+  checkArguments(arguments);
+  if (!arguments.to.has_filename()) arguments.to = arguments.to.parent_path();  // "NAME.splats/"
   AddScalarOptions options;
-  options.cache = words.to;
-  takeCommonWords(words, options);
+  options.cache = arguments.to;
+  applyCommonOptions(arguments, options);
 
-  const auto source = openSource(words, words.to);
-  options.scalars = chooseScalars(words, words.added_scalars, source->description());
+  const auto source = openSource(arguments, arguments.to);
+  options.scalars = chooseScalars(arguments, arguments.added_scalars, source->description());
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   const AddScalarReport report = addScalars(*source, options, progress);
   const nlohmann::json numbers = statistics(report, progress);
   for (const std::string& warning : source->description().warnings) printMessage("warning: {}", warning);
-  if (const auto note = timeStepNote(source->description(), words.grid.time_step))
+  if (const auto note = timeStepNote(source->description(), arguments.grid.time_step))
     printMessage("note: {}", *note);
-  printSummary(words, report, secondsOf(progress), numbers["peak_memory_bytes"]);
-  if (!words.statistics.empty()) writeStatistics(words.statistics, numbers);
+  printSummary(arguments, report, secondsOf(progress), numbers["peak_memory_bytes"]);
+  if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, numbers);
 }
 
 }  // namespace curvisplat

@@ -5,7 +5,7 @@
 
 namespace curvisplat {
 
-/// Throws UsageError where the words do not go together.
-void runAddScalar(ConvertArguments words);
+/// Adds the scalars and prints a summary. Throws UsageError if options contradict each other, and Error.
+void runAddScalar(ConvertArguments arguments);
 
 }  // namespace curvisplat

@@ -1,4 +1,4 @@
-// `curvisplat bench`: how fast this machine reads, prepares and draws a cache, or converts a grid.
+// `curvisplat bench`: measures how fast this machine reads, prepares and draws a cache, or converts a grid.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -44,45 +44,45 @@ using Json = nlohmann::ordered_json;
 constexpr int kSchema = 1;  // of the JSON; bench/compare.py reads it
 constexpr uint64_t kMinNodes = 1000;
 
-/// The command line's words, as given.
-struct BenchWords {
+/// Command-line arguments as given; checked and parsed later.
+struct BenchArguments {
   fs::path cache, json, plots, temporary_folder;
   ScalarArguments scalar;
-  CameraWords camera;
+  CameraArguments camera;
   std::string size = "600x600", lod_pixels = "1,2,4", backend = "auto";
   std::optional<std::string> nodes, memory;
   unsigned threads = 0;
   bool quick = false, converts = false;
 };
 
-/// How much is done, in the whole form and in the quick one.
+/// How long to measure: the defaults, or kQuick.
 struct Effort {
   DiskEffort disk;
   StageEffort stages;
   FrameEffort frames;
 };
-constexpr Effort kQuick{{.sample_s = 0.02, .samples = 2, .most_bytes = 32 << 20},
-                        {.sample_s = 0.02, .samples = 2, .most_splats = 150'000, .most_read_bytes = 16 << 20},
-                        {.configuration_s = 0.3, .total_s = 6, .most_frames = 4}};
+constexpr Effort kQuick{{.sample_s = 0.02, .samples = 2, .max_bytes = 32 << 20},
+                        {.sample_s = 0.02, .samples = 2, .max_splats = 150'000, .max_read_bytes = 16 << 20},
+                        {.configuration_s = 0.3, .total_s = 6, .max_frames = 4}};
 
-void checkWords(const BenchWords& words) {
-  if (words.converts && !words.cache.empty())
-    throw UsageError("{}: --convert measures on a grid of its own; give a cache or --convert",
-                     words.cache.string());
-  if (!words.converts && words.cache.empty())
-    throw UsageError("a CACHE is required, or --convert to measure conversion");
-  if (!words.converts && (words.nodes || !words.temporary_folder.empty()))
-    throw UsageError("{} is for --convert", words.nodes ? "--nodes" : "--tmp");
-  if (!words.json.empty()) checkOutputFile("--json", words.json, {words.cache});
-  if (words.plots.empty()) return;
+void checkArguments(const BenchArguments& arguments) {
+  if (arguments.converts && !arguments.cache.empty())
+    throw UsageError("{}: --convert measures a generated grid; give either a cache or --convert",
+                     arguments.cache.string());
+  if (!arguments.converts && arguments.cache.empty())
+    throw UsageError("a CACHE is required, or --convert to measure a conversion");
+  if (!arguments.converts && (arguments.nodes || !arguments.temporary_folder.empty()))
+    throw UsageError("{} needs --convert", arguments.nodes ? "--nodes" : "--tmp");
+  if (!arguments.json.empty()) checkOutputFile("--json", arguments.json, {arguments.cache});
+  if (arguments.plots.empty()) return;
   std::error_code ignored;
-  if (fs::exists(words.plots, ignored) && !fs::is_directory(words.plots, ignored))
-    throw Error("--plot {}: is not a folder", words.plots.string());
-  checkOutputFolder("--plot", words.plots);
+  if (fs::exists(arguments.plots, ignored) && !fs::is_directory(arguments.plots, ignored))
+    throw Error("--plot {}: exists and is not a directory", arguments.plots.string());
+  checkOutputFolder("--plot", arguments.plots);
 }
 
-unsigned threadsOf(const BenchWords& words) {
-  return words.threads ? words.threads : std::max(1u, std::thread::hardware_concurrency());
+unsigned threadsOf(const BenchArguments& arguments) {
+  return arguments.threads ? arguments.threads : std::max(1u, std::thread::hardware_concurrency());
 }
 
 void printMachine(const Machine& machine) {
@@ -95,30 +95,32 @@ void printSection(const std::string& head, const std::string& text) {
   if (!text.empty()) fmt::print("\n{}\n\n{}", head, text);
 }
 
-/// What every file begins with, and the measurements.
-Json reportOf(const BenchWords& words, const Machine& machine, const Measurements& measurements) {
+/// The common beginning of the JSON report, and the measurements.
+Json reportOf(const BenchArguments& arguments, const Machine& machine, const Measurements& measurements) {
   const nlohmann::json run = runStatistics();
   Json json{{"schema", kSchema}};
   for (const char* key : {"program", "version", "command", "peak_memory_bytes"}) json[key] = run[key];
-  json["quick"] = words.quick;
+  json["quick"] = arguments.quick;
   json["machine"] = machine.toJson();
   json["measurements"] = measurements.toJson();
   json["left_out"] = measurements.leftOutAsJson();
   return json;
 }
 
-void writeResults(const BenchWords& words, const Json& json, const Plots& plots) {
-  // Arguments are bytes, which need not be the UTF-8 that JSON is.
+void writeResults(const BenchArguments& arguments, const Json& json, const Plots& plots) {
+  // The recorded arguments may not be valid UTF-8, which JSON requires.
   constexpr auto kReplace = Json::error_handler_t::replace;
-  if (!words.json.empty()) writeFileDurably(words.json, json.dump(2, ' ', false, kReplace) + "\n");
-  if (words.plots.empty()) return;
+  if (!arguments.json.empty()) writeFileDurably(arguments.json, json.dump(2, ' ', false, kReplace) + "\n");
+  if (arguments.plots.empty()) return;
   std::error_code error;
-  fs::create_directory(words.plots, error);
-  if (error) throw Error("--plot {}: the folder cannot be made: {}", words.plots.string(), error.message());
-  for (const auto& [name, bytes] : plots) writeFileDurably(words.plots / name, bytes);
+  fs::create_directory(arguments.plots, error);
+  if (error)
+    throw Error("--plot {}: cannot create the directory: {}", arguments.plots.string(), error.message());
+  for (const auto& [name, bytes] : plots) writeFileDurably(arguments.plots / name, bytes);
 }
 
-// -------------------------------------------------------------------------------------------- a cache
+// -------------------------------------------------------------------------------------------- drawing a
+// cache
 
 std::vector<double> parseErrors(const std::string& text) {
   std::vector<double> errors;
@@ -135,7 +137,7 @@ std::vector<double> parseErrors(const std::string& text) {
   return errors;
 }
 
-/// The measurement of drawing that frames of this back end depend on, and whether a card draws them.
+/// Name of the drawing measurement that applies to this back end, and whether a graphics card draws.
 std::pair<std::string, bool> drawingOf(Backend backend, bool card_draws, unsigned threads) {
   if (backend == Backend::kOsmesa) return {"stages/draw/osmesa", false};
   if (backend == Backend::kEgl || (backend == Backend::kAutomatic && card_draws))
@@ -143,24 +145,24 @@ std::pair<std::string, bool> drawingOf(Backend backend, bool card_draws, unsigne
   return {stageName("draw/cpu", threads), false};
 }
 
-void benchCache(const BenchWords& words) {
+void benchCache(const BenchArguments& arguments) {
   FrameOptions options;
-  options.size = parseImageSize("--size", words.size);
-  const std::vector<double> errors = parseErrors(words.lod_pixels);
+  options.size = parseImageSize("--size", arguments.size);
+  const std::vector<double> errors = parseErrors(arguments.lod_pixels);
   options.lod_pixels = errors.front();
-  if (words.memory) options.memory_bytes = parseMemory("--memory", *words.memory);
-  options.threads = threadsOf(words);
-  const Backend backend = parseBackend(words.backend);
-  checkCameraWords(words.camera);
+  if (arguments.memory) options.memory_bytes = parseMemory("--memory", *arguments.memory);
+  options.threads = threadsOf(arguments);
+  const Backend backend = parseBackend(arguments.backend);
+  checkCameraArguments(arguments.camera);
 
-  const CacheReader cache(words.cache);
+  const CacheReader cache(arguments.cache);
   const Manifest& manifest = cache.manifest();
-  const size_t variable = chooseVariable(cache, words.scalar);
+  const size_t variable = chooseVariable(cache, arguments.scalar);
   const VariableInfo& info = manifest.variables[variable];
   const TransferFunction function =
-      chooseTransferFunction(words.scalar, info, glm::length(manifest.upper - manifest.lower));
+      chooseTransferFunction(arguments.scalar, info, glm::length(manifest.upper - manifest.lower));
   const auto orbit = [&](unsigned frames) {
-    CameraWords camera = words.camera;
+    CameraArguments camera = arguments.camera;
     camera.orbit = "360";
     camera.frames = frames;
     const CameraMotion motion = chooseCameraMotion(camera, manifest.lower, manifest.upper, options.size);
@@ -171,10 +173,10 @@ void benchCache(const BenchWords& words) {
   const ThroughputScene scene{cache, variable, function, options, backend, orbit};
   const std::string backend_name = FrameRenderer(cache, variable, function, backend).backendName();
   const Machine machine = Machine::here(cache.path());
-  const Effort effort = words.quick ? kQuick : Effort{};
+  const Effort effort = arguments.quick ? kQuick : Effort{};
 
-  fmt::print("{}: {} {} as {} splats in {} bricks; scalar {}\n", words.cache.string(), manifest.nodes,
-             manifest.cells ? "cells" : "nodes", manifest.splats, manifest.bricks, info.name);
+  fmt::print("{}: {} samples as {} splats in {} bricks; scalar {}\n", arguments.cache.string(),
+             manifest.nodes, manifest.splats, manifest.bricks, info.name);
   printMachine(machine);
   std::fflush(stdout);
   Measurements measurements;
@@ -193,7 +195,7 @@ void benchCache(const BenchWords& words) {
                            cache.valuesPath(variable).filename().string()),
                diskTable(measurements));
   printSection(
-      fmt::format("Stages by themselves: {} of the {} splats of a frame at {:g} px, read by {}",
+      fmt::format("Stages in isolation: {} of the {} splats of a frame at {:g} px, read by {}",
                   shortCount(static_cast<double>(stages.sampled_splats)),
                   shortCount(static_cast<double>(stages.frame_splats)), errors.front(), stages.read_by),
       stageTable(measurements, options.threads));
@@ -204,10 +206,10 @@ void benchCache(const BenchWords& words) {
   if (verdict)
     for (const std::string& line : verdict->lines) lines += "- " + line + "\n";
   printSection("What it means", lines);
-  printSection("Left out", leftOutTable(measurements));
+  printSection("Not measured", leftOutTable(measurements));
 
-  Json json = reportOf(words, machine, measurements);
-  json["cache"] = {{"path", words.cache.string()},
+  Json json = reportOf(arguments, machine, measurements);
+  json["cache"] = {{"path", arguments.cache.string()},
                    {"scalar", info.name},
                    {"nodes", manifest.nodes},
                    {"bricks", manifest.bricks},
@@ -222,26 +224,27 @@ void benchCache(const BenchWords& words) {
   json["frames"] = toJson(frames);
   if (verdict)
     json["verdict"] = {{"stage", verdict->stage}, {"share", verdict->share}, {"lines", verdict->lines}};
-  writeResults(words, json, throughputPlots(measurements, frames, options.threads));
+  writeResults(arguments, json, throughputPlots(measurements, frames, options.threads));
 }
 
-// --------------------------------------------------------------------------------------- a conversion
+// --------------------------------------------------------------------------------------- converting a grid
 
-void benchConversion(const BenchWords& words) {
+void benchConversion(const BenchArguments& arguments) {
   ConversionEffort effort;
-  if (words.quick) {
+  if (arguments.quick) {
     effort.nodes = 200'000;
-    effort.most_runs = 1;
+    effort.max_runs = 1;
   }
-  if (words.nodes) effort.nodes = parseCount("--nodes", *words.nodes);
-  if (effort.nodes < kMinNodes) throw UsageError("--nodes {}: expected {} or more", *words.nodes, kMinNodes);
-  if (words.memory) effort.memory_bytes = parseMemory("--memory", *words.memory);
-  effort.threads = words.threads;
+  if (arguments.nodes) effort.nodes = parseCount("--nodes", *arguments.nodes);
+  if (effort.nodes < kMinNodes)
+    throw UsageError("--nodes {}: expected {} or more", *arguments.nodes, kMinNodes);
+  if (arguments.memory) effort.memory_bytes = parseMemory("--memory", *arguments.memory);
+  effort.threads = arguments.threads;
   effort.temporary_folder =
-      words.temporary_folder.empty() ? fs::temp_directory_path() : words.temporary_folder;
+      arguments.temporary_folder.empty() ? fs::temp_directory_path() : arguments.temporary_folder;
   std::error_code ignored;
   if (!fs::is_directory(effort.temporary_folder, ignored))
-    throw Error("--tmp {}: there is no such folder", effort.temporary_folder.string());
+    throw Error("--tmp {}: no such directory", effort.temporary_folder.string());
 
   const Machine machine = Machine::here(effort.temporary_folder);
   Measurements measurements;
@@ -253,62 +256,77 @@ void benchConversion(const BenchWords& words) {
   const SceneGridSize& size = report.size;
   printMachine(machine);
   printSection(
-      fmt::format("Conversion of {}x{}x{} nodes ({}), --threads {}, --memory {}M, the grid's files {}",
-                  size.ni, size.nj, size.nk, report.nodes(), report.last.threads,
-                  report.last.memory_bytes >> 20, report.cold ? "not in memory" : "in memory"),
+      fmt::format("Conversion of {}x{}x{} nodes ({}), --threads {}, --memory {}M, grid files {}", size.ni,
+                  size.nj, size.nk, report.nodes(), report.last.threads, report.last.memory_bytes >> 20,
+                  report.cold ? "not in the page cache" : "in the page cache"),
       conversionTable(report));
-  printSection("In all", conversionSummary(report, measurements));
-  printSection("Left out", leftOutTable(measurements));
-  Json json = reportOf(words, machine, measurements);
+  printSection("Total", conversionSummary(report, measurements));
+  printSection("Not measured", leftOutTable(measurements));
+  Json json = reportOf(arguments, machine, measurements);
   json["conversion"] = toJson(report);
-  writeResults(words, json, conversionPlots(report));
+  writeResults(arguments, json, conversionPlots(report));
 }
 
 }  // namespace
 
 void addBench(CLI::App& app) {
-  auto words = std::make_shared<BenchWords>();
+  auto arguments = std::make_shared<BenchArguments>();
   CLI::App* command =
-      app.add_subcommand("bench", "Measure what this machine does with a cache, or how fast it converts");
-  command->add_option("CACHE", words->cache, "The splat cache, a folder NAME.splats");
-  command->add_option("--json", words->json, "Write all samples to FILE.json");
-  command->add_option("--plot", words->plots, "Write plots (PNG) into this folder");
-  command->add_flag("--quick", words->quick, "Some ten seconds: whether all works, and roughly how fast");
-  command->add_option("--memory", words->memory,
-                      "For frames: memory for the data in flight (512M otherwise); with --convert: the cap");
-  command->add_option("--threads", words->threads, "The most that work; 0: one a core")
+      app.add_subcommand("bench", "Measure how fast this machine draws a cache or converts a grid");
+  command->add_option("CACHE", arguments->cache, "Splat cache, a directory NAME.splats");
+  command->add_option("--json", arguments->json, "Write all measurements to this JSON file");
+  command->add_option("--plot", arguments->plots, "Write plots (PNG) to this directory");
+  command->add_flag("--quick", arguments->quick,
+                    "Measure for about ten seconds only: rough figures, and a check that everything works");
+  command->add_option("--memory", arguments->memory,
+                      "Memory limit for drawing (default 512M) or, with --convert, for the conversion "
+                      "(default: see convert)");
+  command->add_option("--threads", arguments->threads, "Largest number of threads; 0: one per core")
       ->capture_default_str();
 
-  const std::string what = "What is drawn";
-  addScalarOption(*command, words->scalar);
-  addFunctionOptions(*command, words->scalar, what);
-  command->add_option("--size", words->size, "WIDTHxHEIGHT in pixels")->capture_default_str()->group(what);
-  command->add_option("--lod-pixels", words->lod_pixels, "E,E,...: errors, each drawn; 0: the finest level")
+  const std::string what = "Drawing";
+  addScalarOption(*command, arguments->scalar);
+  addFunctionOptions(*command, arguments->scalar, what);
+  command->add_option("--size", arguments->size, "Size of the picture, WIDTHxHEIGHT in pixels")
       ->capture_default_str()
       ->group(what);
-  command->add_option("--view", words->camera.view, "Where the orbit begins: iso, +x, -x, +y, -y, +z or -z")
+  command
+      ->add_option("--lod-pixels", arguments->lod_pixels,
+                   "Screen errors E,E,... in pixels, each drawn; 0 draws the finest level")
+      ->capture_default_str()
       ->group(what);
-  command->add_option("--view-angle", words->camera.view_angle, "Perspective, with this angle, in degrees")
+  command
+      ->add_option("--view", arguments->camera.view,
+                   "Side where the orbit begins: iso, +x, -x, +y, -y, +z or -z (default iso)")
       ->group(what);
-  command->add_option("--backend", words->backend, "auto, osmesa, egl or cpu: what draws whole frames")
+  command
+      ->add_option("--view-angle", arguments->camera.view_angle,
+                   "Perspective with this vertical view angle, in degrees (default: orthographic)")
+      ->group(what);
+  command
+      ->add_option("--backend", arguments->backend,
+                   "Drawing back end of whole frames: auto, osmesa, egl or cpu")
       ->capture_default_str()
       ->group(what);
 
   const std::string how = "Conversion";
   CLI::Option* const convert =
       command
-          ->add_flag("--convert", words->converts, "Convert a generated grid in the place of drawing a cache")
+          ->add_flag("--convert", arguments->converts, "Convert a generated grid instead of drawing a cache")
           ->group(how);
   for (const char* drawing : {"--scalar", "--tf", "--range", "--opacity-unit", "--size", "--lod-pixels",
                               "--view", "--view-angle", "--backend"})
     convert->excludes(command->get_option(drawing));
-  command->add_option("--nodes", words->nodes, "Of the grid, about: 8M, 500K; 96 bytes each on the disk")
+  command
+      ->add_option(
+          "--nodes", arguments->nodes,
+          "Approximate number of nodes of the grid, such as 500K (default 8M); each takes 96 bytes of disk")
       ->group(how);
-  command->add_option("--tmp", words->temporary_folder, "Folder for it all meanwhile; the system's otherwise")
+  command->add_option("--tmp", arguments->temporary_folder, "Temporary directory (default: the system's)")
       ->group(how);
-  command->callback([words] {
-    checkWords(*words);
-    words->converts ? benchConversion(*words) : benchCache(*words);
+  command->callback([arguments] {
+    checkArguments(*arguments);
+    arguments->converts ? benchConversion(*arguments) : benchCache(*arguments);
   });
 }
 

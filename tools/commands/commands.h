@@ -1,5 +1,5 @@
-// The subcommands. Each file adds one to the application: its options, and a callback that does the work and
-// throws what goes wrong.
+// The subcommands. Each function adds one to the application: its options, and a callback that does the work
+// and throws Error on failure.
 #pragma once
 
 #include <CLI/CLI.hpp>

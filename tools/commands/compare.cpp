@@ -1,4 +1,4 @@
-// `curvisplat compare`: how far two pictures are apart.
+// `curvisplat compare`: measures the difference of two pictures.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -22,7 +22,7 @@ struct CompareOptions {
   std::string difference;
 };
 
-// |a - b| over white, opaque; the largest difference of all is full brightness.
+// |a - b| over white, opaque, scaled so that the largest difference has full brightness.
 Image differenceImage(const Image& a, const Image& b, double largest) {
   Image difference(a.size);
   const float gain = largest > 0 ? static_cast<float>(1 / largest) : 0;
@@ -58,7 +58,7 @@ void compare(const CompareOptions& options) {
   if (!options.difference.empty()) writeImage(differenceImage(a, b, difference.largest), options.difference);
   if (options.min_psnr_db && difference.psnr_db < *options.min_psnr_db)
     throw Error(
-        "{} and {}: PSNR {:.2f} dB is below the {:.2f} dB asked for; largest difference {:.6f} at pixel "
+        "{} and {}: PSNR {:.2f} dB is below --min-psnr {:.2f} dB; largest difference {:.6f} at pixel "
         "({}, {})",
         options.a, options.b, difference.psnr_db, *options.min_psnr_db, difference.largest,
         difference.largest_x, difference.largest_y);
@@ -68,12 +68,14 @@ void compare(const CompareOptions& options) {
 
 void addCompare(CLI::App& app) {
   auto options = std::make_shared<CompareOptions>();
-  CLI::App* command = app.add_subcommand("compare", "Compare two pictures: PSNR and largest difference");
-  command->add_option("A", options->a, "PNG, EXR or PFM")->required();
-  command->add_option("B", options->b, "PNG, EXR or PFM, of the same size")->required();
-  command->add_option("--min-psnr", options->min_psnr_db, "Fail (exit status 1) below so many dB");
+  CLI::App* command =
+      app.add_subcommand("compare", "Print the PSNR and the largest difference of two pictures");
+  command->add_option("A", options->a, "Picture: PNG, EXR or PFM")->required();
+  command->add_option("B", options->b, "Picture of the same size: PNG, EXR or PFM")->required();
+  command->add_option("--min-psnr", options->min_psnr_db,
+                      "Exit with status 1 if the PSNR is below this, in dB");
   command->add_option("--difference", options->difference,
-                      "Picture of the differences to write, the largest at full brightness");
+                      "Write a picture of the differences, scaled so that the largest has full brightness");
   command->callback([options] { compare(*options); });
 }
 

@@ -1,4 +1,4 @@
-// `curvisplat convert`: a grid in, a cache out.
+// `curvisplat convert`: converts a grid to a splat cache.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -28,23 +28,20 @@
 namespace curvisplat {
 namespace {
 
-void printSummary(const ConvertArguments& words, const ConvertReport& report, double seconds,
+void printSummary(const ConvertArguments& arguments, const ConvertReport& report, double seconds,
                   uint64_t peak_memory_bytes) {
-  const auto nodes = static_cast<double>(report.nodes);
+  const auto samples = static_cast<double>(report.nodes);
   const uint64_t bytes = totalBytes(report.files);
-  const bool cells = report.centring == Centring::kCell;
-  fmt::print("{}: {} {}, {} splats in {} bricks, {} levels\n", words.output.string(), report.nodes,
-             cells ? "cells" : "nodes", report.splats, report.bricks, report.levels);
-  // Of a resumed conversion, another has done a part.
-  const std::string rate =
-      report.resumed ? " since it was resumed"
-                     : fmt::format(", {:.2f} M {}/s", 1e-6 * nodes / seconds, cells ? "cells" : "nodes");
-  fmt::print("{:.1f} s{}, {:.1f} MiB, {:.2f} bytes a {}, peak memory {:.0f} MiB\n", seconds, rate,
-             mebibytes(bytes), static_cast<double>(bytes) / nodes, cells ? "cell" : "node",
-             mebibytes(peak_memory_bytes));
+  fmt::print("{}: {} samples, {} splats in {} bricks, {} levels\n", arguments.output.string(), report.nodes,
+             report.splats, report.bricks, report.levels);
+  // The interrupted run did part of the work, so this run's time gives no rate.
+  const std::string rate = report.resumed ? " since it was resumed"
+                                          : fmt::format(", {:.2f} M samples/s", 1e-6 * samples / seconds);
+  fmt::print("{:.1f} s{}, {:.1f} MiB, {:.2f} bytes per sample, peak memory {:.0f} MiB\n", seconds, rate,
+             mebibytes(bytes), static_cast<double>(bytes) / samples, mebibytes(peak_memory_bytes));
 }
 
-/// What a person should know of the grid, on stderr: it is odd, not wrong.
+/// Prints warnings and notes on the grid to standard error.
 void printWarnings(const GridDescription& description, std::optional<uint32_t> time_step,
                    const ConvertReport& report) {
   for (const std::string& warning : description.warnings) printMessage("warning: {}", warning);
@@ -54,30 +51,21 @@ void printWarnings(const GridDescription& description, std::optional<uint32_t> t
     if (count > 0) printMessage("note: {} {}", count, what);
   };
   if (report.resumed)
-    printMessage("note: resumed with {} of {} bricks done", report.resumed_bricks, report.bricks);
-  if (report.centring == Centring::kCell) {
-    note(report.blanked.by_grid, "cells have a blanked corner or no value");
-    note(report.blanked.by_value, "cells have the blank value");
-    note(report.blanked.not_finite, "cells have an infinite value, and are blanked");
-    note(report.degenerate, "cells are degenerate: drawn with a thickness of their own");
-    note(report.inverted, "cells are inverted: of the other handedness than most of their block");
-  } else {
-    note(report.blanked.by_grid, "nodes are blanked by the grid");
-    note(report.blanked.by_value, "nodes have the blank value");
-    note(report.blanked.not_finite, "nodes are not finite numbers, and are blanked");
-    // Not the cells that `info` counts, which lie between nodes.
-    note(report.degenerate, "nodes have no volume around them: drawn with a thickness of their own");
-    note(report.inverted,
-         "nodes have inverted surroundings: of the other handedness than most of their block");
-  }
-  note(report.merged_nodes, "face nodes coincide with others, and were merged into them");
+    printMessage("note: resumed; {} of {} bricks were already written", report.resumed_bricks, report.bricks);
+  note(report.blanked.by_grid, "samples are blanked by the grid");
+  note(report.blanked.by_value, "samples have the blank value");
+  note(report.blanked.not_finite, "samples are not finite and are blanked");
+  // For samples at nodes these two differ from what `info` prints: it counts the cells between nodes.
+  note(report.degenerate, "samples have no volume; they are drawn with a minimum thickness");
+  note(report.inverted, "samples are inverted: their handedness differs from most of their block");
+  note(report.merged_nodes, "nodes on block faces coincide with others and were merged");
 }
 
 nlohmann::json statistics(const ConvertReport& report, const Progress& progress) {
   nlohmann::json json = commonStatistics(report, progress);
   json["resumed"] = report.resumed;
   json["resumed_bricks"] = report.resumed_bricks;
-  json[report.centring == Centring::kCell ? "cells" : "nodes"] = report.nodes;
+  json["samples"] = report.nodes;
   json["blanked"] = {{"by_grid", report.blanked.by_grid},
                      {"by_value", report.blanked.by_value},
                      {"not_finite", report.blanked.not_finite}};
@@ -91,65 +79,68 @@ nlohmann::json statistics(const ConvertReport& report, const Progress& progress)
   return json;
 }
 
-void runConvert(ConvertArguments words) {
-  if (words.output.empty()) throw UsageError("--output is required, or --add-scalar and --to");
-  if (!words.output.has_filename()) words.output = words.output.parent_path();  // "NAME.splats/"
-  checkOutputFolder("-o", words.output);
+void runConvert(ConvertArguments arguments) {
+  if (arguments.output.empty()) throw UsageError("--output is required, or --add-scalar with --to");
+  if (!arguments.output.has_filename()) arguments.output = arguments.output.parent_path();  // "NAME.splats/"
+  checkOutputFolder("-o", arguments.output);
   ConvertOptions options;
-  options.output = words.output;
-  options.overwrite = words.overwrite;
-  options.resume = words.resume;
-  takeCommonWords(words, options);
+  options.output = arguments.output;
+  options.overwrite = arguments.overwrite;
+  options.resume = arguments.resume;
+  applyCommonOptions(arguments, options);
 
-  const auto source = openSource(words, words.output);
-  options.scalars = chooseScalars(words, words.scalars, source->description());
-  options.title = words.grid.grid.stem().string();
+  const auto source = openSource(arguments, arguments.output);
+  options.scalars = chooseScalars(arguments, arguments.scalars, source->description());
+  options.title = arguments.grid.grid.stem().string();
 
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   const ConvertReport report = convert(*source, options, progress);
   const nlohmann::json numbers = statistics(report, progress);
-  printWarnings(source->description(), words.grid.time_step, report);
-  printSummary(words, report, secondsOf(progress), numbers["peak_memory_bytes"]);
-  if (!words.statistics.empty()) writeStatistics(words.statistics, numbers);
+  printWarnings(source->description(), arguments.grid.time_step, report);
+  printSummary(arguments, report, secondsOf(progress), numbers["peak_memory_bytes"]);
+  if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, numbers);
 }
 
 }  // namespace
 
 void addConvert(CLI::App& app) {
-  auto words = std::make_shared<ConvertArguments>();
-  CLI::App* command = app.add_subcommand("convert", "Make a splat cache of a grid, in bounded memory");
-  command->add_option("GRID", words->grid.grid, "Grid file")->required();
-  command->add_option("SOLUTION", words->grid.solutions, "Solution (Q) and function files");
-  command->add_option("-o,--output", words->output, "The cache to write, NAME.splats: a folder");
+  auto arguments = std::make_shared<ConvertArguments>();
+  CLI::App* command = app.add_subcommand("convert", "Convert a grid to a splat cache, in bounded memory");
+  command->add_option("GRID", arguments->grid.grid, "Grid file: PLOT3D, VTK, CGNS or NetCDF")->required();
+  command->add_option("SOLUTION", arguments->grid.solutions,
+                      "PLOT3D solution (Q) and function files of the grid");
+  command->add_option("-o,--output", arguments->output, "Splat cache to write: a directory NAME.splats");
   command
-      ->add_option("--scalar", words->scalars,
-                   "Scalars by name, or by number of a function file's variable or of PLOT3D's "
-                   "functions (default: the first)")
+      ->add_option("--scalar", arguments->scalars,
+                   "Scalar to convert; repeatable. A name, the number of a function file's variable, or a "
+                   "PLOT3D function number (default: the first scalar)")
       ->take_all()
       ->allow_extra_args(false);
   command
-      ->add_option("--add-scalar", words->added_scalars,
-                   "Add scalars, by name or number, to the cache --to, whose grid this is")
+      ->add_option("--add-scalar", arguments->added_scalars,
+                   "Scalar to add to the cache --to, which was built from this grid; repeatable")
       ->take_all()
       ->allow_extra_args(false);
-  command->add_option("--to", words->to, "The cache that --add-scalar changes");
-  command->add_option("--blank", words->blank_value, "Nodes with this value are not there");
-  command->add_option("--memory", words->memory,
-                      "Cap on this process's memory, as 512M (default: 2G or a quarter of the machine's)");
-  command->add_option("--threads", words->threads, "Threads that work (default: all)")
+  command->add_option("--to", arguments->to, "Splat cache that --add-scalar changes");
+  command->add_option("--blank", arguments->blank_value, "Treat samples with this value as blanked");
+  command->add_option(
+      "--memory", arguments->memory,
+      "Memory limit of this process, such as 512M (default: 2G, at most 1/4 of the machine's)");
+  command->add_option("--threads", arguments->threads, "Number of threads (default 0: one per core)")
       ->check(CLI::Range(0u, kMaxThreads));
-  command->add_option("--tmp", words->temporary_folder, "Folder for temporary files (default: the output's)");
-  command->add_flag("--resume", words->resume,
-                    "Go on from an interrupted conversion, if there is one; keep what is done on errors");
-  command->add_flag("--overwrite", words->overwrite,
-                    "Replace the output if it is a cache; drop an interrupted conversion, unless --resume");
-  command->add_option("--stats", words->statistics, "Write times, bytes and counts to FILE.json");
-  addGridOptions(*command, words->grid);
-  addGasOptions(*command, words->gas);
-  command->callback([words] {
-    const bool adds = !words->added_scalars.empty() || !words->to.empty();
-    adds ? runAddScalar(*words) : runConvert(*words);
+  command->add_option("--tmp", arguments->temporary_folder,
+                      "Directory for temporary files (default: beside the cache)");
+  command->add_flag("--resume", arguments->resume,
+                    "Resume an interrupted conversion if there is one; keep finished work on an error");
+  command->add_flag("--overwrite", arguments->overwrite,
+                    "Replace an existing cache; discard an interrupted conversion unless --resume is given");
+  command->add_option("--stats", arguments->statistics, "Write times, bytes and counts to this JSON file");
+  addGridOptions(*command, arguments->grid);
+  addGasOptions(*command, arguments->gas);
+  command->callback([arguments] {
+    const bool adds = !arguments->added_scalars.empty() || !arguments->to.empty();
+    adds ? runAddScalar(*arguments) : runConvert(*arguments);
   });
 }
 

@@ -17,7 +17,7 @@ std::string text(const glm::dvec3& point) {
   return fmt::format("({}, {}, {})", point.x, point.y, point.z);
 }
 
-/// The largest extinction that the function has from `low` to `high`.
+/// The function's largest extinction on [low, high].
 double largestExtinction(const TransferFunction& function, double low, double high) {
   double largest = 0;
   for (int n = 0; n <= kSamples; ++n)
@@ -26,46 +26,47 @@ double largestExtinction(const TransferFunction& function, double low, double hi
   return largest;
 }
 
-/// Why none of the scalar's values is opaque, if none is: the function, or where its range lies.
+/// Why all of the scalar's values are transparent: the function itself, or its range.
 std::string whyTransparent(const RenderedScene& scene) {
   const TransferFunction& function = scene.transfer_function;
   const auto [low, high] = function.range();
   if (largestExtinction(function, low, high) == 0)
-    return fmt::format("the transfer function '{}' is fully transparent; give another --tf", function.name());
+    return fmt::format("the transfer function '{}' is fully transparent; choose another --tf",
+                       function.name());
   return fmt::format(
-      "over the range {}..{}, the transfer function '{}' is fully transparent for {}, whose values are in "
-      "{}..{}; give another --range",
+      "over the range {}..{}, the transfer function '{}' is fully transparent for all values of {} (found "
+      "{}..{}); choose another --range",
       low, high, function.name(), scene.variable.name, scene.variable.min, scene.variable.max);
 }
 
-/// Why no splat is seen that could be: the reason found in what was drawn.
-std::string whyNothingIsThere(const RenderedScene& scene) {
+/// Why no splat reaches a pixel although the function and the camera allow it, from the counts of the frame.
+std::string whyNothingIsVisible(const RenderedScene& scene) {
   const Manifest& manifest = scene.manifest;
   const FrameStatistics& s = scene.statistics;
-  const char* const nodes = manifest.cells ? "cells" : "nodes";
   if (manifest.volume == 0)
     return fmt::format(
-        "the data has no volume: each of its {} splats stands for a cell without thickness, since its {} lie "
-        "in one plane or line, or their neighbours are blanked ({} of {} are)",
-        manifest.splats, nodes, manifest.blanked_nodes, manifest.nodes);
+        "the data has no volume: all {} splats are flat, because the samples lie in one plane or line or "
+        "their neighbours are blanked ({} of {} samples are blanked)",
+        manifest.splats, manifest.blanked_nodes, manifest.nodes);
   if (s.splats_transparent + s.bricks_transparent > 0 && s.splats_drawn == 0)
     return fmt::format(
-        "what the camera sees has only values of {} for which the transfer function '{}' is transparent; "
-        "look "
-        "elsewhere, or give another --range or --tf",
+        "the transfer function '{1}' is transparent for all visible values of {0}; move the camera, or "
+        "choose "
+        "another --range or --tf",
         scene.variable.name, scene.transfer_function.name());
   if (manifest.blanked_nodes > 0 && s.splats_drawn == 0)
     return fmt::format(
-        "what the camera sees of the data's box is blanked, as are {} of its {} {}; look elsewhere (--view "
-        "iso), or convert again without --blank or iblank",
-        manifest.blanked_nodes, manifest.nodes, nodes);
+        "the visible part of the data is blanked ({} of {} samples are); move the camera (--view iso), or "
+        "convert again without --blank or iblank",
+        manifest.blanked_nodes, manifest.nodes);
   return fmt::format(
-      "of {} splats read, {} are outside of --clip-box, {} off the screen, {} transparent and {} drawn, none "
-      "of which reaches a pixel; try --view iso, another --range or another --clip-box",
+      "of {} splats read, {} are outside --clip-box, {} off the screen, {} transparent, and {} were drawn "
+      "but "
+      "reach no pixel; try --view iso, another --range or another --clip-box",
       s.splats_read, s.splats_clipped, s.splats_off_screen, s.splats_transparent, s.splats_drawn);
 }
 
-/// The part of the data that the clip box leaves, scaled; false if there is none.
+/// The intersection of the data's box and the clip box, scaled; false if it is empty.
 bool visibleBox(const RenderedScene& scene, glm::dvec3& lower, glm::dvec3& upper) {
   lower = scene.manifest.lower;
   upper = scene.manifest.upper;
@@ -80,7 +81,7 @@ bool visibleBox(const RenderedScene& scene, glm::dvec3& lower, glm::dvec3& upper
   return true;
 }
 
-/// How many pixels of the picture's height the box's diagonal takes, seen from in front of it.
+/// Length of the box's diagonal in pixels, when it is perpendicular to the view direction.
 double diagonalPixels(const RenderedScene& scene, const glm::dvec3& lower, const glm::dvec3& upper) {
   const Camera& camera = scene.camera;
   const double distance = glm::length(0.5 * (lower + upper) - camera.position);
@@ -90,7 +91,7 @@ double diagonalPixels(const RenderedScene& scene, const glm::dvec3& lower, const
   return glm::length(upper - lower) / (2 * half_height) * scene.options.size.height;
 }
 
-/// Whether all corners of the box lie beyond one side of what the camera sees.
+/// Whether all corners of the box lie outside one plane of the view frustum.
 bool outOfView(const RenderedScene& scene, const glm::dvec3& lower, const glm::dvec3& upper) {
   const Camera& camera = scene.camera;
   const glm::dmat4 view_from_world = camera.viewFromWorld();
@@ -115,7 +116,7 @@ bool outOfView(const RenderedScene& scene, const glm::dvec3& lower, const glm::d
 }  // namespace
 
 bool isEmpty(const Image& image, const glm::vec4& background) {
-  constexpr float kMinSeen = 1.0f / 512;  // half a step of a screen
+  constexpr float kMinSeen = 1.0f / 512;  // half a step of an 8-bit display
   for (size_t n = 0; n < image.rgba.size(); ++n)
     if (!(std::abs(image.rgba[n] - background[static_cast<int>(n % 4)]) < kMinSeen)) return false;
   return true;
@@ -128,7 +129,7 @@ std::vector<std::string> whyEmpty(const RenderedScene& scene) {
 
   glm::dvec3 lower, upper;
   if (!visibleBox(scene, lower, upper)) {
-    reasons.push_back(fmt::format("--clip-box has nothing of the data in it, which spans {} to {}",
+    reasons.push_back(fmt::format("--clip-box contains none of the data, which spans {} to {}",
                                   text(scene.manifest.lower), text(scene.manifest.upper)));
   } else {
     const bool out_of_view = outOfView(scene, lower, upper);
@@ -139,17 +140,16 @@ std::vector<std::string> whyEmpty(const RenderedScene& scene) {
     const double pixels = diagonalPixels(scene, lower, upper);
     if (!out_of_view && scene.manifest.volume > 0 && pixels < 1)
       reasons.push_back(fmt::format(
-          "what there is to see of the data is {:.2g} pixels large; bring the camera nearer, or give a "
-          "smaller {}",
+          "the visible data is only {:.2g} pixels large; move the camera closer or choose a smaller {}",
           pixels, scene.camera.projection == Projection::kPerspective ? "--view-angle" : "--parallel-scale"));
     const double thickest = largest * glm::length(upper - lower);
     if (thickest > 0 && thickest < 0.01)
       reasons.push_back(fmt::format(
-          "the data is nearly transparent: its optical depth is at most {:.2g}; an --opacity-unit "
-          "smaller than {} makes it more opaque",
+          "the data is nearly transparent: its optical depth is at most {:.2g}; choose an --opacity-unit "
+          "smaller than {}",
           thickest, scene.transfer_function.opacityUnit()));
   }
-  if (reasons.empty()) reasons.push_back(whyNothingIsThere(scene));
+  if (reasons.empty()) reasons.push_back(whyNothingIsVisible(scene));
   return reasons;
 }
 
@@ -157,8 +157,8 @@ std::string rangeMissesScalar(const VariableInfo& variable, const TransferFuncti
   const auto [low, high] = transfer_function.range();
   if (low <= variable.max && high >= variable.min) return {};
   return fmt::format(
-      "the range {}..{} of the transfer function has no value of {} in it, which is in {}..{}: all of it has "
-      "the colour and opacity of one end",
+      "the range {}..{} of the transfer function contains no value of {} (found {}..{}); all samples get the "
+      "colour and opacity of one end",
       low, high, variable.name, variable.min, variable.max);
 }
 

@@ -1,5 +1,5 @@
-// Why a picture has nothing on it, or less than the user may think: the transfer function, its range,
-// blanking, the clip box or the camera. People otherwise see a white image and no reason.
+// Explains why a picture is empty: the transfer function, its range, blanking, the clip box or the camera.
+// Without an explanation the user sees a white image and no reason.
 #pragma once
 
 #include <string>
@@ -13,10 +13,10 @@
 
 namespace curvisplat {
 
-/// Whether no pixel differs from the background by what a screen would show.
+/// Whether no pixel differs from the background by half a step of an 8-bit display or more.
 bool isEmpty(const Image& image, const glm::vec4& background);
 
-/// What was rendered, for a reason to be found in it.
+/// A rendered picture, in which whyEmpty() looks for reasons.
 struct RenderedScene {
   const Manifest& manifest;
   const VariableInfo& variable;
@@ -26,11 +26,11 @@ struct RenderedScene {
   const FrameStatistics& statistics;
 };
 
-/// The reasons for an empty picture, in the order in which one should look into them; never none.
+/// The reasons for an empty picture, most likely first; at least one.
 std::vector<std::string> whyEmpty(const RenderedScene& scene);
 
-/// A warning if the transfer function's range has no value of the scalar in it, so that everything has the
-/// colour and opacity of one end; empty otherwise.
+/// A warning if the transfer function's range and the scalar's range are disjoint, so that all samples get
+/// the colour and opacity of one end; empty otherwise.
 std::string rangeMissesScalar(const VariableInfo& variable, const TransferFunction& transfer_function);
 
 }  // namespace curvisplat

@@ -1,4 +1,4 @@
-// `curvisplat generate`: an analytic scene as PLOT3D files, of any size.
+// `curvisplat generate`: writes an analytic scene as PLOT3D files of any size.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -32,7 +32,7 @@ SceneGridSize parseSize(const std::string& text) {
     const auto [after, error] = std::from_chars(at, end, *nodes);
     const bool last = nodes == &size.nk;
     if (error != std::errc() || *nodes < 2 || (last ? after != end : after == end || *after != 'x'))
-      throw UsageError("--size {}: expected NIxNJxNK, three numbers of nodes from 2 on, as 128x64x64", text);
+      throw UsageError("--size {}: expected NIxNJxNK with at least 2 nodes each, such as 128x64x64", text);
     at = last ? after : after + 1;
   }
   return size;
@@ -51,14 +51,17 @@ void generate(const GenerateOptions& options) {
 
 void addGenerate(CLI::App& app) {
   auto options = std::make_shared<GenerateOptions>();
-  CLI::App* command = app.add_subcommand("generate", "Write an analytic scene as PLOT3D files, of any size");
-  command->add_option("SCENE", options->scene, fmt::format("One of {}", fmt::join(sceneNames(), ", ")))
+  CLI::App* command = app.add_subcommand("generate", "Write an analytic scene as PLOT3D files of any size");
+  command->add_option("SCENE", options->scene, fmt::format("Scene: one of {}", fmt::join(sceneNames(), ", ")))
       ->required();
-  command->add_option("--size", options->size, "Nodes along i, j and k: NIxNJxNK")->required();
-  command->add_option("-o,--output", options->prefix, "PREFIX of PREFIX.xyz, PREFIX.fun and PREFIX.nam")
+  command->add_option("--size", options->size, "Number of nodes along i, j and k: NIxNJxNK")->required();
+  command
+      ->add_option("-o,--output", options->prefix,
+                   "Prefix of the files to write: PREFIX.xyz, PREFIX.fun and PREFIX.nam")
       ->required();
-  command->add_option("--clustering", options->clustering,
-                      "Outermost cells along j are about e^B times as long as the innermost");
+  command->add_option(
+      "--clustering", options->clustering,
+      "Clustering B: the outermost cells along j are about e^B times as long as the innermost");
   command->callback([options] { generate(*options); });
 }
 

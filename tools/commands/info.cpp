@@ -1,4 +1,4 @@
-// `curvisplat info`: what a cache or a grid holds.
+// `curvisplat info`: prints the contents of a cache or a grid.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -31,7 +31,7 @@ using Json = nlohmann::ordered_json;
 
 struct InfoOptions {
   GasModel gas;
-  OpenGridOptions grid;  // grid.grid is the cache where that is a folder
+  OpenGridOptions grid;  // grid.grid is a cache if it is a directory
   bool json = false;
   bool verify = false;
   bool system = false;
@@ -66,7 +66,7 @@ uint64_t totalBytes(const Manifest& manifest) {
   return bytes;
 }
 
-double perNode(const Manifest& manifest, uint64_t bytes) {
+double bytesPerSample(const Manifest& manifest, uint64_t bytes) {
   return static_cast<double>(bytes) / static_cast<double>(manifest.nodes - manifest.blanked_nodes);
 }
 
@@ -85,31 +85,31 @@ Json jsonOf(const ProbeResult& found, const CacheReader& reader) {
   return json;
 }
 
-/// What the options ask for beyond the summary.
-struct Asked {
+/// Results of --verify and --probe.
+struct Findings {
   CacheVerification verification;
   std::optional<ProbeResult> probe;
 };
 
-Asked answer(const CacheReader& reader, const InfoOptions& options) {
-  Asked asked;
+Findings examine(const CacheReader& reader, const InfoOptions& options) {
+  Findings found;
   if (options.verify) {
     Progress progress{progressBar()};
-    asked.verification = verifyCache(reader, &progress);
+    found.verification = verifyCache(reader, &progress);
   }
   if (!options.point.empty()) {
     std::vector<size_t> variables(reader.manifest().variables.size());
     for (size_t v = 0; v < variables.size(); ++v) variables[v] = v;
-    asked.probe = probe(reader, variables, {options.point[0], options.point[1], options.point[2]});
+    found.probe = probe(reader, variables, {options.point[0], options.point[1], options.point[2]});
   }
-  return asked;
+  return found;
 }
 
-void printAsJson(const CacheReader& reader, const InfoOptions& options, const Asked& asked) {
+void printAsJson(const CacheReader& reader, const InfoOptions& options, const Findings& found) {
   const Manifest& manifest = reader.manifest();
   Json json = Json::parse(manifest.toJson());
   json["bytes"] = totalBytes(manifest);
-  json["bytes_per_node"] = perNode(manifest, totalBytes(manifest));
+  json["bytes_per_node"] = bytesPerSample(manifest, totalBytes(manifest));
   json["bricks_by_level"] = Json::array();
   for (const LevelSummary& level : levelsOf(reader))
     json["bricks_by_level"].push_back({{"bricks", level.bricks},
@@ -119,30 +119,32 @@ void printAsJson(const CacheReader& reader, const InfoOptions& options, const As
                                        {"values_bytes", level.values_bytes},
                                        {"error", level.largest_error}});
   if (options.verify) {
-    json["findings"] = asked.verification.findings;
-    json["notes"] = asked.verification.notes;
+    json["findings"] = found.verification.findings;
+    json["notes"] = found.verification.notes;
   }
-  if (!options.point.empty()) json["probe"] = asked.probe ? jsonOf(*asked.probe, reader) : Json(nullptr);
+  if (!options.point.empty()) json["probe"] = found.probe ? jsonOf(*found.probe, reader) : Json(nullptr);
   fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
 }
 
-void printProbe(const CacheReader& reader, const InfoOptions& options, const Asked& asked) {
+void printProbe(const CacheReader& reader, const InfoOptions& options, const Findings& found) {
   fmt::print("\nat {}, {}, {}: ", options.point[0], options.point[1], options.point[2]);
-  if (!asked.probe) {
-    fmt::print("nothing: the point is outside of every splat\n");
+  if (!found.probe) {
+    fmt::print("no sample: the point is outside the data\n");
     return;
   }
-  const ProbeResult& found = *asked.probe;
-  fmt::print("block {}, i {}, j {}, k {} (counted from 0), {:.3g} footprint radii from its centre\n",
-             found.block, found.i, found.j, found.k, found.distance / 1.556228);
-  for (size_t v = 0; v < found.variables.size(); ++v) {
+  const ProbeResult& probed = *found.probe;
+  fmt::print(
+      "block {}, i {}, j {}, k {} (counted from 0); the point is {:.3g} of the way from its centre to its "
+      "edge\n",
+      probed.block, probed.i, probed.j, probed.k, probed.distance / 1.556228);
+  for (size_t v = 0; v < probed.variables.size(); ++v) {
     const VariableInfo& variable = reader.manifest().variables[v];
-    fmt::print("  {:<20} {:.6g} {}(node {:.6g})\n", variable.name, found.variables[v].value,
-               variable.unit.empty() ? "" : variable.unit + " ", found.variables[v].mean);
+    fmt::print("  {:<20} {:.6g} {}({:.6g} at the centre)\n", variable.name, probed.variables[v].value,
+               variable.unit.empty() ? "" : variable.unit + " ", probed.variables[v].mean);
   }
 }
 
-void printAsText(const CacheReader& reader, const InfoOptions& options, const Asked& asked) {
+void printAsText(const CacheReader& reader, const InfoOptions& options, const Findings& found) {
   const Manifest& m = reader.manifest();
   fmt::print("{}\n", m.title);
   fmt::print("written by {} from", m.program);
@@ -151,8 +153,8 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const As
   fmt::print("bounds     {} .. {}\n           {} .. {}\n           {} .. {}\n", m.lower.x, m.upper.x,
              m.lower.y, m.upper.y, m.lower.z, m.upper.z);
   fmt::print("volume     {:.8g}\n", m.volume);
-  fmt::print("{}      {} in {} blocks, {} blanked\n", m.cells ? "cells" : "nodes", m.nodes, m.blocks.size(),
-             m.blanked_nodes);
+  fmt::print("samples    {} at {} in {} blocks, {} blanked\n", m.nodes, m.cells ? "cell centres" : "nodes",
+             m.blocks.size(), m.blanked_nodes);
   fmt::print("splats     {} at the finest level\n", m.splats);
   fmt::print("steps      {}\n", m.steps.size());
   for (const VariableInfo& variable : m.variables)
@@ -163,41 +165,42 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const As
   for (size_t n = 0; n < levels.size(); ++n)
     fmt::print("{:>5} {:>9} {:>9} {:>13} {:>12} {:>12} {:>10.3g}\n", n, levels[n].bricks, levels[n].leaves,
                levels[n].splats, levels[n].geometry_bytes, levels[n].values_bytes, levels[n].largest_error);
-  fmt::print("\nfile                      bytes   a {} drawn\n", m.cells ? "cell" : "node");
+  fmt::print("\nfile                      bytes   per drawn sample\n");
   for (const FileInfo& file : m.files)
-    fmt::print("{:<18} {:>12} {:>14.3f}\n", file.name, file.size, perNode(m, file.size));
-  fmt::print("{:<18} {:>12} {:>14.3f}\n", "all", totalBytes(m), perNode(m, totalBytes(m)));
-  if (!options.point.empty()) printProbe(reader, options, asked);
-  if (options.verify && asked.verification.findings.empty())
-    fmt::print("\nverified: {} bricks are whole and keep to their records\n", m.bricks);
-  for (const std::string& finding : asked.verification.findings) fmt::print("finding: {}\n", finding);
-  for (const std::string& note : asked.verification.notes) fmt::print("note: {}\n", note);
+    fmt::print("{:<18} {:>12} {:>18.3f}\n", file.name, file.size, bytesPerSample(m, file.size));
+  fmt::print("{:<18} {:>12} {:>18.3f}\n", "all", totalBytes(m), bytesPerSample(m, totalBytes(m)));
+  if (!options.point.empty()) printProbe(reader, options, found);
+  if (options.verify && found.verification.findings.empty())
+    fmt::print("\nverified: all {} bricks are intact\n", m.bricks);
+  for (const std::string& finding : found.verification.findings) fmt::print("finding: {}\n", finding);
+  for (const std::string& note : found.verification.notes) fmt::print("note: {}\n", note);
 }
 
 void printCacheInfo(const InfoOptions& options) {
   if (!options.grid.solutions.empty())
-    throw UsageError("{}: is a cache; no solution files go with it", options.grid.grid.string());
+    throw UsageError("{}: is a splat cache, but solution files were given as well; give only the cache",
+                     options.grid.grid.string());
   const CacheReader reader(options.grid.grid);
-  const Asked asked = answer(reader, options);
+  const Findings found = examine(reader, options);
   if (options.json)
-    printAsJson(reader, options, asked);
+    printAsJson(reader, options, found);
   else
-    printAsText(reader, options, asked);
+    printAsText(reader, options, found);
   if (hasUnfinished(options.grid.grid))
-    printMessage("note: a conversion that is to replace this cache is under way, or was interrupted");
-  if (!asked.verification.findings.empty())
-    throw Error("{}: {} findings; the cache is damaged: convert again", options.grid.grid.string(),
-                asked.verification.findings.size());
+    printMessage("note: a conversion that replaces this cache is in progress or was interrupted");
+  if (!found.verification.findings.empty())
+    throw Error("{}: the cache is damaged ({} findings); convert the grid again", options.grid.grid.string(),
+                found.verification.findings.size());
 }
 
 void printInfo(const InfoOptions& options) {
   if (options.system != options.grid.grid.empty())
-    throw UsageError("info: expected a cache, a grid file or --system, and one of them");
+    throw UsageError("info: expected exactly one of a cache, a grid file and --system");
   if (options.system) return printSystem(options.json);
   const fs::path& path = options.grid.grid;
   if (fs::is_directory(path) || (!fs::exists(path) && hasUnfinished(path))) return printCacheInfo(options);
   if (options.verify || !options.point.empty())
-    throw UsageError("{}: --verify and --probe are for caches, and this is not a folder",
+    throw UsageError("{}: is not a splat cache (a directory); --verify and --probe need one",
                      options.grid.grid.string());
   printGridInfo(options.grid, {options.gas, std::nullopt}, options.json);
 }
@@ -205,15 +208,16 @@ void printInfo(const InfoOptions& options) {
 }  // namespace
 
 void addInfo(CLI::App& app) {
-  CLI::App* info = app.add_subcommand("info", "Prints what a cache or grid files hold");
+  CLI::App* info = app.add_subcommand("info", "Print the contents of a cache or a grid");
   const auto options = std::make_shared<InfoOptions>();
-  info->add_option("path", options->grid.grid, "A splat cache (a folder), or a grid file");
-  info->add_option("solution", options->grid.solutions, "Solution or function files of the grid");
-  info->add_flag("--json", options->json, "One JSON object");
-  info->add_flag("--system", options->system, "What this machine has to draw with, instead");
+  info->add_option("path", options->grid.grid, "Splat cache (a directory) or grid file");
+  info->add_option("solution", options->grid.solutions, "PLOT3D solution (Q) and function files of the grid");
+  info->add_flag("--json", options->json, "Print one JSON object");
+  info->add_flag("--system", options->system, "Print the drawing back ends of this machine instead");
   info->add_flag("--verify", options->verify,
-                 "Read the whole cache and look for damage; exit 1 if there is any");
-  info->add_option("--probe", options->point, "The value at x,y,z, and the block, i, j, k it comes from")
+                 "Read the whole cache and check it; exit with status 1 if it is damaged");
+  info->add_option("--probe", options->point,
+                   "Print the values at x,y,z and the sample (block, i, j, k) they come from")
       ->delimiter(',')
       ->expected(3);
   addGridOptions(*info, options->grid);

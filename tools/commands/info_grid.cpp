@@ -21,14 +21,14 @@ namespace {
 constexpr uint64_t kSlabBytes = uint64_t{32} << 20;
 constexpr size_t kBlocksListed = 16;
 
-/// What was found out, and of what.
+/// The grid's description and what was measured.
 struct GridInfo {
   const GridDescription* description = nullptr;
-  std::vector<uint32_t> stored, derived;  // positions of scalars
-  GridStatistics statistics;              // of the stored ones
+  std::vector<uint32_t> stored, derived;  // positions in description->scalars
+  GridStatistics statistics;              // ranges are those of `stored`
   std::vector<BlockOverlap> overlaps;
   uint64_t nodes = 0, splats = 0;
-  bool splats_are_cells = false;  // if the first scalar is converted
+  bool splats_are_cells = false;  // of a conversion of the first scalar
   unsigned threads = 1;
   ConversionEstimate estimate;
 
@@ -55,7 +55,7 @@ GridInfo inspect(const GridSource& source) {
   return info;
 }
 
-/// A range, where there is a value at all.
+/// Whether the scalar has no value at all.
 bool isEmpty(const ScalarRange& range) {
   return range.min > range.max;
 }
@@ -150,11 +150,11 @@ void printBlocks(const GridInfo& info) {
   for (size_t b = 0; b < std::min(kBlocksListed, description.blocks.size()); ++b) {
     const GridBlock& block = description.blocks[b];
     const BlockStatistics& statistics = info.statistics.blocks[b];
-    std::string odd;
-    if (block.has_blanking) odd += fmt::format(", iblank blanks {}", statistics.blank.by_grid);
-    if (statistics.degenerate > 0) odd += fmt::format(", {} degenerate cells", statistics.degenerate);
-    if (statistics.inverted > 0) odd += fmt::format(", {} inverted cells", statistics.inverted);
-    fmt::print("  {:<9} {}x{}x{}{}\n", block.name, block.ni, block.nj, block.nk, odd);
+    std::string remarks;
+    if (block.has_blanking) remarks += fmt::format(", iblank blanks {}", statistics.blank.by_grid);
+    if (statistics.degenerate > 0) remarks += fmt::format(", {} degenerate cells", statistics.degenerate);
+    if (statistics.inverted > 0) remarks += fmt::format(", {} inverted cells", statistics.inverted);
+    fmt::print("  {:<9} {}x{}x{}{}\n", block.name, block.ni, block.nj, block.nk, remarks);
   }
   if (description.blocks.size() > kBlocksListed)
     fmt::print("  and {} more\n", description.blocks.size() - kBlocksListed);
@@ -168,7 +168,7 @@ void printScalars(const GridInfo& info) {
     const ScalarRange& range = info.statistics.scalars[s];
     fmt::print("scalar    {}{}{}{}: {}\n", scalar.name, named ? fmt::format(" ({})", number) : "",
                scalar.unit.empty() ? "" : fmt::format(" [{}]", scalar.unit),
-               scalar.centring == Centring::kCell ? ", in cells" : "",
+               scalar.centring == Centring::kCell ? ", cell-centred" : "",
                isEmpty(range) ? "no value" : fmt::format("{:.6g} .. {:.6g}", range.min, range.max));
   }
   std::string names;
@@ -181,7 +181,7 @@ void printScalars(const GridInfo& info) {
   fmt::print("derived   {}\n", names);
 }
 
-std::string sizeInWords(uint64_t bytes) {
+std::string sizeText(uint64_t bytes) {
   const auto mebibytes = static_cast<double>(bytes) / static_cast<double>(1 << 20);
   return mebibytes < 1024 ? fmt::format("{:.1f} MiB", mebibytes)
                           : fmt::format("{:.1f} GiB", mebibytes / 1024);
@@ -211,12 +211,12 @@ void printAsText(const GridInfo& info) {
                flow.block + 1, flow.mach, flow.alpha, flow.reynolds, flow.time);
   }
   if (description.times.size() > 1)
-    fmt::print("times     {} steps, {:.6g} .. {:.6g}; this is step {}\n", description.times.size(),
+    fmt::print("times     {} steps, {:.6g} .. {:.6g}; step {} was read\n", description.times.size(),
                description.times.front(), description.times.back(), description.time_step);
   fmt::print(
-      "estimate  a cache of about {} with one scalar, {} more for each further one; about {:.1f} s on {} "
+      "estimate  a cache of about {} with one scalar, {} more per additional scalar; about {:.1f} s on {} "
       "thread{}\n",
-      sizeInWords(info.estimate.cache_bytes), sizeInWords(info.estimate.bytes_per_further_scalar),
+      sizeText(info.estimate.cache_bytes), sizeText(info.estimate.bytes_per_further_scalar),
       info.estimate.seconds, info.threads, info.threads == 1 ? "" : "s");
 }
 

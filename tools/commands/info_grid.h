@@ -1,4 +1,4 @@
-// `info` of grid files: what the reader found, before anything is converted.
+// `info` of grid files: what the reader finds in them, without a conversion.
 #pragma once
 
 #include "preprocess/formats/derived/derived_source.h"
@@ -6,9 +6,9 @@
 
 namespace curvisplat {
 
-/// Prints to stdout: the layout as detected, blocks, blanking, odd cells, bounds, the range of every scalar
-/// that the files hold, what can be derived, overlapping blocks, what conversion would take, warnings. Reads
-/// all values by slabs. Throws Error.
+/// Prints to standard output: the detected layout, blocks, blanking, degenerate and inverted cells, bounds,
+/// the range of every stored scalar, the derivable scalars, overlapping blocks, warnings, and an estimate of
+/// the conversion. Reads all values slab by slab. Throws Error.
 void printGridInfo(const OpenGridOptions& options, const DerivedOptions& derived, bool json);
 
 }  // namespace curvisplat

@@ -26,11 +26,11 @@ void printSystem(bool json) {
   }
   fmt::print("cores      {}\n", cores);
   for (const BackendReport& backend : report.backends)
-    fmt::print("{:<10} {}{}\n", backend.word, backend.works ? "" : "not here: ", backend.found);
+    fmt::print("{:<10} {}{}\n", backend.word, backend.works ? "" : "not available: ", backend.found);
   fmt::print("auto       {}\n", report.automatic);
   fmt::print("display    {}\n", window.display);
   fmt::print("GLFW       {}\n", window.glfw);
-  fmt::print("window     {}{}\n", window.opens ? "OpenGL " : "not here: ", window.found);
+  fmt::print("window     {}{}\n", window.opens ? "OpenGL " : "not available: ", window.found);
 }
 
 }  // namespace curvisplat

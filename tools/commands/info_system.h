@@ -1,4 +1,4 @@
-// What this machine has to draw with, for `curvisplat info --system`.
+// `curvisplat info --system`: prints the drawing back ends and the window system of this machine.
 #pragma once
 
 namespace curvisplat {

@@ -90,7 +90,7 @@ Json toJson(const FrameStatistics& statistics) {
   for (const Seconds& seconds : kSeconds) json["seconds"][seconds.name] = statistics.*seconds.value;
   for (const Count& count : kCounts) json[count.name] = statistics.*count.value;
   json["largest_level"] = statistics.largest_level;
-  json["largest_error_px"] = nullptr;  // around a perspective eye
+  json["largest_error_px"] = nullptr;  // infinite near a perspective camera
   if (std::isfinite(statistics.largest_error_px)) json["largest_error_px"] = statistics.largest_error_px;
   json["workers"] = statistics.workers;
   json["read_by"] = statistics.read_by;
@@ -101,7 +101,7 @@ Json toJson(const FrameStatistics& statistics) {
   return json;
 }
 
-/// Percentiles are values that occur: the smallest that as many frames do not exceed.
+/// Percentiles by the nearest-rank method: always a value of some frame.
 template <typename T>
 Json spread(const std::vector<FrameReport>& frames, T FrameStatistics::*value) {
   std::vector<T> values;

@@ -1,4 +1,4 @@
-// `render --stats`: what was drawn, how long every stage took, frame by frame and over all frames.
+// `render --stats`: counts and times of every stage, for each frame and summarised over all frames.
 #pragma once
 
 #include <filesystem>
@@ -14,22 +14,22 @@
 
 namespace curvisplat {
 
-/// A picture that was drawn.
+/// One drawn frame.
 struct FrameReport {
   Camera camera;
   FrameStatistics statistics;
 };
 
-/// A run of `render`.
+/// One run of `render`.
 struct RenderReport {
   std::filesystem::path cache, output;
-  ImageSize picture;  // with the scalar bar; options.size is of the data
+  ImageSize picture;  // includes the scalar bar; options.size is the data's part
   const VariableInfo& variable;
   const TransferFunction& transfer_function;
   const FrameOptions& options;
   std::string backend;
   std::vector<FrameReport> frames;
-  double time_to_first_image_s = 0;            // since the start of the process
+  double time_to_first_image_s = 0;            // since the process started
   std::optional<FrameStatistics> first_image;  // the coarse one of --first-image
 };
 

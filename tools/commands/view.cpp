@@ -1,4 +1,4 @@
-// `curvisplat view`: a window on a cache.
+// `curvisplat view`: opens a window that shows a cache.
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
@@ -17,47 +17,53 @@
 namespace curvisplat {
 namespace {
 
-struct ViewWords {
+struct ViewArguments {
   std::filesystem::path cache;
   std::string size = "1200x800", backend = "auto";
   std::optional<std::filesystem::path> state;
   std::optional<std::string> scalar, memory, frame_time;
 };
 
-void view(const ViewWords& words) {
+void view(const ViewArguments& arguments) {
   ViewerOptions options;
-  options.size = parseImageSize("--size", words.size);
-  options.backend = parseBackend(words.backend);
-  options.state = words.state;
-  options.scalar = words.scalar;
-  if (words.memory) options.memory_bytes = parseMemory("--memory", *words.memory);
-  if (words.frame_time) options.target_s = parsePositive("--frame-time", *words.frame_time) / 1000;
-  const CacheReader cache(words.cache);
+  options.size = parseImageSize("--size", arguments.size);
+  options.backend = parseBackend(arguments.backend);
+  options.state = arguments.state;
+  options.scalar = arguments.scalar;
+  if (arguments.memory) options.memory_bytes = parseMemory("--memory", *arguments.memory);
+  if (arguments.frame_time) options.target_s = parsePositive("--frame-time", *arguments.frame_time) / 1000;
+  const CacheReader cache(arguments.cache);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   try {
     runViewer(cache, options, progress);
   } catch (const UsageError& error) {
-    throw Error("{}", error.what());  // the cache decides, not the words
+    throw Error("{}", error.what());  // the cache decides, not the usage
   }
 }
 
 }  // namespace
 
 void addView(CLI::App& app) {
-  auto words = std::make_shared<ViewWords>();
-  CLI::App* command = app.add_subcommand("view", "Open a window on a cache");
-  command->add_option("CACHE", words->cache, "The splat cache, a folder NAME.splats")->required();
-  command->add_option("--size", words->size, "WIDTHxHEIGHT of the window")->capture_default_str();
-  command->add_option("--scalar", words->scalar, "Name of the scalar; the one of the last time otherwise");
-  command->add_option("--state", words->state,
-                      "Camera, function and all else from FILE.json; as they were the last time otherwise");
-  command->add_option("--backend", words->backend, "auto, osmesa, egl or cpu: what draws; see info --system")
+  auto arguments = std::make_shared<ViewArguments>();
+  CLI::App* command = app.add_subcommand("view", "Show a cache in a window");
+  command->add_option("CACHE", arguments->cache, "Splat cache, a directory NAME.splats")->required();
+  command->add_option("--size", arguments->size, "Size of the window, WIDTHxHEIGHT in pixels")
       ->capture_default_str();
-  command->add_option("--memory", words->memory, "Memory for the data in flight: 512M, 2G");
-  command->add_option("--frame-time", words->frame_time,
-                      "Milliseconds for a picture while moving; 33 with a graphics card, 100 without");
-  command->callback([words] { view(*words); });
+  command->add_option("--scalar", arguments->scalar, "Name of the scalar to show (default: as last time)");
+  command->add_option(
+      "--state", arguments->state,
+      "Restore camera, transfer function and settings from this JSON file (default: as last time)");
+  command
+      ->add_option("--backend", arguments->backend,
+                   "Drawing back end: auto, osmesa, egl or cpu; see info --system")
+      ->capture_default_str();
+  command->add_option("--memory", arguments->memory,
+                      "Memory limit for drawing, such as 512M or 2G (default: as last time, initially 512M)");
+  command->add_option("--frame-time", arguments->frame_time,
+                      "Time budget of a picture while the camera moves, in ms (default 33 with a graphics "
+                      "card, 100 without)");
+  command->callback([arguments] { view(*arguments); });
 }
 
 }  // namespace curvisplat

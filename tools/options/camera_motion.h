@@ -1,4 +1,4 @@
-// The cameras of `render`: one, or one a frame, from --view or --position, --orbit and --path.
+// Turns the camera options of `render` into the camera of each frame: --view or --position, --orbit, --path.
 #pragma once
 
 #include <cstdint>
@@ -12,10 +12,10 @@
 
 namespace curvisplat {
 
-inline constexpr unsigned kMaxFrames = 100'000;  // of --frames
+inline constexpr unsigned kMaxFrames = 100'000;  // limit of --frames
 
-/// The command line's words, as given.
-struct CameraWords {
+/// Command-line arguments as given; checked and parsed later.
+struct CameraArguments {
   std::optional<std::string> view, position, focal_point, view_up, parallel_scale, view_angle, orbit;
   std::optional<uint64_t> frames;
   std::filesystem::path path;
@@ -23,19 +23,19 @@ struct CameraWords {
   bool moves() const { return orbit || !path.empty(); }
 };
 
-/// Throws UsageError where words contradict each other, whatever the cache holds.
-void checkCameraWords(const CameraWords& words);
+/// Throws UsageError if options contradict each other; needs no cache.
+void checkCameraArguments(const CameraArguments& arguments);
 
-/// The camera of each frame.
+/// One camera per frame.
 struct CameraMotion {
   uint64_t frames = 1;
   std::function<Camera(uint64_t frame)> camera;
 };
 
-/// For words that checkCameraWords() lets pass; [lower, upper] is the data's box after --scale. An orbit of
-/// 360 degrees is a loop: its last frame is one step before the first. A path's last frame is at its last key
-/// frame. Throws UsageError, and Error for a path file that is none.
-CameraMotion chooseCameraMotion(const CameraWords& words, const glm::dvec3& lower, const glm::dvec3& upper,
-                                ImageSize size);
+/// Requires that checkCameraArguments() accepted the arguments. [lower, upper] is the data's bounding box
+/// after --scale. An orbit of 360 degrees is a loop: its last frame is one step before the first. A path's
+/// last frame is at its last key frame. Throws UsageError, or Error if the path file is invalid.
+CameraMotion chooseCameraMotion(const CameraArguments& arguments, const glm::dvec3& lower,
+                                const glm::dvec3& upper, ImageSize size);
 
 }  // namespace curvisplat

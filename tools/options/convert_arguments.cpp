@@ -11,31 +11,33 @@
 
 namespace curvisplat {
 
-std::unique_ptr<GridSource> openSource(const ConvertArguments& words, const std::filesystem::path& cache) {
-  OpenGridOptions grid = words.grid;
-  grid.temporary_folder = words.temporary_folder.empty() ? cache.parent_path() : words.temporary_folder;
+std::unique_ptr<GridSource> openSource(const ConvertArguments& arguments,
+                                       const std::filesystem::path& cache) {
+  OpenGridOptions grid = arguments.grid;
+  grid.temporary_folder =
+      arguments.temporary_folder.empty() ? cache.parent_path() : arguments.temporary_folder;
   if (grid.temporary_folder.empty()) grid.temporary_folder = ".";
-  grid.scalars = words.scalars;
-  grid.scalars.insert(grid.scalars.end(), words.added_scalars.begin(), words.added_scalars.end());
-  return openWithDerived(grid, {words.gas, words.blank_value});
+  grid.scalars = arguments.scalars;
+  grid.scalars.insert(grid.scalars.end(), arguments.added_scalars.begin(), arguments.added_scalars.end());
+  return openWithDerived(grid, {arguments.gas, arguments.blank_value});
 }
 
-std::vector<uint32_t> chooseScalars(const ConvertArguments& words, const std::vector<std::string>& names,
+std::vector<uint32_t> chooseScalars(const ConvertArguments& arguments, const std::vector<std::string>& names,
                                     const GridDescription& description) {
   try {
     for (const std::string& note : notesOnNumbers(description, names)) printMessage("note: {}", note);
     return scalarsNamed(description, names);
   } catch (const UsageError& error) {
-    throw Error("{}: {}", words.grid.grid.string(), error.what());
+    throw Error("{}: {}", arguments.grid.grid.string(), error.what());
   }
 }
 
-void checkStatisticsFile(const ConvertArguments& words) {
-  if (words.statistics.empty()) return;
-  std::vector<std::filesystem::path> inputs = words.grid.solutions;
-  inputs.push_back(words.grid.grid);
-  inputs.insert(inputs.end(), {words.to, words.output});
-  checkOutputFile("--stats", words.statistics, inputs);
+void checkStatisticsFile(const ConvertArguments& arguments) {
+  if (arguments.statistics.empty()) return;
+  std::vector<std::filesystem::path> inputs = arguments.grid.solutions;
+  inputs.push_back(arguments.grid.grid);
+  inputs.insert(inputs.end(), {arguments.to, arguments.output});
+  checkOutputFile("--stats", arguments.statistics, inputs);
 }
 
 double secondsOf(const Progress& progress) {

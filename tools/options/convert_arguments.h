@@ -1,5 +1,5 @@
-// What `curvisplat convert` was asked for, and what its two ways of working (a new cache, or scalars added to
-// one) have in common.
+// The options of `curvisplat convert`, and what its two modes share: writing a new cache, and adding scalars
+// to an existing one.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@
 
 namespace curvisplat {
 
-/// The command line's words, as given.
+/// Command-line arguments as given; checked and parsed later.
 struct ConvertArguments {
   OpenGridOptions grid;
   GasModel gas;
@@ -31,37 +31,37 @@ struct ConvertArguments {
   bool overwrite = false, resume = false;
 };
 
-/// Opens the grid: temporary files go where the words say, else beside `cache`.
-std::unique_ptr<GridSource> openSource(const ConvertArguments& words, const std::filesystem::path& cache);
+/// Opens the grid. Temporary files go to --tmp, or beside `cache` without it.
+std::unique_ptr<GridSource> openSource(const ConvertArguments& arguments, const std::filesystem::path& cache);
 
-/// Positions of the scalars called `names`. One that the files lack is bad input, not wrong usage, since the
-/// files decide: throws Error. Prints notes on numbers that mean two of them.
-std::vector<uint32_t> chooseScalars(const ConvertArguments& words, const std::vector<std::string>& names,
+/// Positions of the scalars `names` in the description. Prints a note for each number that could mean two
+/// scalars. Throws Error, not UsageError, for a scalar that the files lack: the files decide, not the usage.
+std::vector<uint32_t> chooseScalars(const ConvertArguments& arguments, const std::vector<std::string>& names,
                                     const GridDescription& description);
 
-/// Of all phases.
+/// The sum over all phases.
 double secondsOf(const Progress& progress);
 
 uint64_t totalBytes(std::span<const FileReport> files);
 double mebibytes(uint64_t bytes);
 
-/// Throws Error for a --stats that cannot be written, or would change what is read.
-void checkStatisticsFile(const ConvertArguments& words);
+/// Throws Error if the --stats file cannot be written or is one of the inputs or outputs.
+void checkStatisticsFile(const ConvertArguments& arguments);
 
-/// What the words say of either way's options. Throws as checkStatisticsFile().
+/// Sets the options that both modes have, and calls checkStatisticsFile(). Throws UsageError and Error.
 template <typename Options>
-void takeCommonWords(const ConvertArguments& words, Options& options) {
-  checkStatisticsFile(words);
-  options.temporary_folder = words.temporary_folder;
-  options.blank_value = words.blank_value;
-  options.threads = words.threads;
-  if (words.memory) options.memory_bytes = parseMemory("--memory", *words.memory);
+void applyCommonOptions(const ConvertArguments& arguments, Options& options) {
+  checkStatisticsFile(arguments);
+  options.temporary_folder = arguments.temporary_folder;
+  options.blank_value = arguments.blank_value;
+  options.threads = arguments.threads;
+  if (arguments.memory) options.memory_bytes = parseMemory("--memory", *arguments.memory);
 }
 
 /// Sets "seconds" and "phases".
 void addPhases(const Progress& progress, nlohmann::json& json);
 
-/// What --stats tells of either way.
+/// The part of --stats that both modes report.
 template <typename Report>
 nlohmann::json commonStatistics(const Report& report, const Progress& progress) {
   nlohmann::json json = runStatistics();

@@ -8,25 +8,24 @@
 namespace curvisplat {
 namespace {
 
-constexpr const char* kGroup = "How PLOT3D files are written (detected if not given)";
-constexpr const char* kGlobeGroup = "Where grids of the earth lie (NetCDF; kilometres)";
+constexpr const char* kGroup = "PLOT3D layout (default: detected)";
+constexpr const char* kGlobeGroup = "Longitude-latitude grids (NetCDF), in kilometres";
 
-/// An option whose words stand for values of `target`.
+/// Adds an option that accepts the keys of `values` and sets `target` to the value of the given key.
 template <typename Value>
-void addWords(CLI::App& app, const char* name, const char* help, const std::map<std::string, Value>& words,
-              std::optional<Value>& target) {
-  std::vector<std::string> spellings;
-  for (const auto& [word, value] : words) spellings.push_back(word);
+void addChoice(CLI::App& app, const char* name, const char* help, const std::map<std::string, Value>& values,
+               std::optional<Value>& target) {
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : values) keys.push_back(key);
   app.add_option_function<std::string>(
-         name, [words, &target](const std::string& word) { target = words.at(word); }, help)
-      ->check(CLI::IsMember(spellings))
+         name, [values, &target](const std::string& key) { target = values.at(key); }, help)
+      ->check(CLI::IsMember(keys))
       ->group(kGroup);
 }
 
 void addGlobeOptions(CLI::App& app, GlobeOptions& globe) {
-  // A flag that may have a value, not an option: the next word is the grid's name.
-  const std::string sphere_help =
-      "Longitude and latitude lie on a sphere, the default; --sphere=KM: of that radius";
+  // A flag with an optional value: an option would take the next argument, the grid file, as its value.
+  const std::string sphere_help = "Project to a sphere (default); --sphere=KM sets its radius";
   CLI::Option* const sphere =
       app.add_flag("--sphere{6371}", sphere_help)
           ->each([&globe](const std::string& radius) {
@@ -35,15 +34,16 @@ void addGlobeOptions(CLI::App& app, GlobeOptions& globe) {
             const auto [parsed, error] = std::from_chars(radius.data(), end, globe.radius_km);
             if (error != std::errc{} || parsed != end || !(globe.radius_km > 0) ||
                 !std::isfinite(globe.radius_km))
-              throw CLI::ValidationError(radius + " is no radius; expected kilometres, as 6371");
+              throw CLI::ValidationError(radius +
+                                         " is not a radius; expected kilometres above zero, such as 6371");
           })
           ->group(kGlobeGroup);
   app.add_flag_callback(
          "--flat", [&globe] { globe.shape = GlobeOptions::Shape::kFlat; },
-         "They are a flat map's, of equal kilometres a degree")
+         "Project to a flat map (equirectangular)")
       ->group(kGlobeGroup)
       ->excludes(sphere);
-  app.add_option("--vertical-scale", globe.vertical_scale, "Depth and height are so many times as large (1)")
+  app.add_option("--vertical-scale", globe.vertical_scale, "Vertical exaggeration factor (default 1)")
       ->check(CLI::Number)
       ->group(kGlobeGroup);
 }
@@ -51,36 +51,35 @@ void addGlobeOptions(CLI::App& app, GlobeOptions& globe) {
 }  // namespace
 
 void addGridOptions(CLI::App& app, OpenGridOptions& options) {
-  app.add_option("--time-step", options.time_step,
-                 "Of several time steps the one to take, from 0 (default: the first)");
+  app.add_option("--time-step", options.time_step, "Time step to read, counted from 0 (default 0)");
   addGlobeOptions(app, options.globe);
   Plot3dForce& force = options.force;
-  addWords<ByteOrder>(app, "--byte-order", "Byte order",
-                      {{"little", ByteOrder::kLittle}, {"big", ByteOrder::kBig}}, force.byte_order);
-  addWords<RecordMarkers>(
-      app, "--records", "Bytes of Fortran's record markers; none: a C file",
+  addChoice<ByteOrder>(app, "--byte-order", "Byte order of binary files",
+                       {{"little", ByteOrder::kLittle}, {"big", ByteOrder::kBig}}, force.byte_order);
+  addChoice<RecordMarkers>(
+      app, "--records", "Size of Fortran record markers in bytes; none: C binary",
       {{"none", RecordMarkers::kNone}, {"4", RecordMarkers::kBytes4}, {"8", RecordMarkers::kBytes8}},
       force.records);
-  addWords<int>(app, "--precision", "Precision of the numbers", {{"single", 4}, {"double", 8}},
-                force.precision_bytes);
-  addWords<bool>(app, "--blocks", "multi: a block count comes first", {{"single", false}, {"multi", true}},
-                 force.multi_block);
-  addWords<bool>(app, "--iblank", "Whether the grid has an iblank array", {{"no", false}, {"yes", true}},
-                 force.blanking);
+  addChoice<int>(app, "--precision", "Floating-point precision", {{"single", 4}, {"double", 8}},
+                 force.precision_bytes);
+  addChoice<bool>(app, "--blocks", "multi: the file begins with a block count",
+                  {{"single", false}, {"multi", true}}, force.multi_block);
+  addChoice<bool>(app, "--iblank", "Whether the grid file has an iblank array",
+                  {{"no", false}, {"yes", true}}, force.blanking);
   CLI::Option* const ascii = app.add_flag_callback(
-                                    "--ascii", [&force] { force.ascii = true; }, "Texts")
+                                    "--ascii", [&force] { force.ascii = true; }, "Read as ASCII")
                                  ->group(kGroup);
   app.add_flag_callback(
-         "--binary", [&force] { force.ascii = false; }, "No texts")
+         "--binary", [&force] { force.ascii = false; }, "Read as binary")
       ->group(kGroup)
       ->excludes(ascii);
 }
 
 void addGasOptions(CLI::App& app, GasModel& gas) {
-  constexpr const char* kGasGroup = "The gas that derived quantities are of";
-  app.add_option("--gamma", gas.gamma, "Ratio of specific heats (default: the files', else 1.4)")
+  constexpr const char* kGasGroup = "Gas model of derived scalars";
+  app.add_option("--gamma", gas.gamma, "Ratio of specific heats (default: from the files, else 1.4)")
       ->group(kGasGroup);
-  app.add_option("--gas-constant", gas.constant, "Gas constant R (default: the files', else 1)")
+  app.add_option("--gas-constant", gas.constant, "Specific gas constant R (default: from the files, else 1)")
       ->group(kGasGroup);
 }
 

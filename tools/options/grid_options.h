@@ -1,4 +1,4 @@
-// The options that say how grid files are written, shared by the subcommands that read grids.
+// Options that describe grid files, shared by the subcommands that read grids.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -8,15 +8,16 @@
 
 namespace curvisplat {
 
-/// Adds --time-step, --byte-order, --records, --precision, --blocks, --iblank, --ascii and --binary to `app`;
-/// parsing sets options.time_step and options.force. Adds --sphere, --flat and --vertical-scale, which set
-/// options.globe. `options` must live until then.
+/// Adds to `app` the options that set the given fields of `options`, which must outlive parsing:
+///   options.time_step   --time-step
+///   options.force       --byte-order, --records, --precision, --blocks, --iblank, --ascii, --binary
+///   options.globe       --sphere, --flat, --vertical-scale
 void addGridOptions(CLI::App& app, OpenGridOptions& options);
 
 /// Adds --gamma and --gas-constant.
 void addGasOptions(CLI::App& app, GasModel& gas);
 
-/// What openGrid() gives, with the scalars that can be derived from it.
+/// Opens the grid and adds the scalars that can be derived from its own.
 std::unique_ptr<GridSource> openWithDerived(const OpenGridOptions& grid, const DerivedOptions& derived);
 
 }  // namespace curvisplat

@@ -12,11 +12,11 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kLargestImageSide = 16384;
+constexpr uint64_t kMaxImageSide = 16384;
 
-/// The whole of `text` as a T, or nothing.
+/// Parses all of `text` as a T; nullopt if any of it is left over.
 template <typename T>
-std::optional<T> whole(std::string_view text) {
+std::optional<T> parseWhole(std::string_view text) {
   T value{};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
@@ -48,7 +48,7 @@ double parsePositive(std::string_view option, std::string_view text) {
 std::vector<double> parseNumbers(std::string_view option, std::string_view text, std::string_view form) {
   std::vector<double> numbers;
   for (const std::string_view part : split(text, ',')) {
-    const auto number = whole<double>(part);
+    const auto number = parseWhole<double>(part);
     if (!number || !std::isfinite(*number))
       throw UsageError("{} {}: expected {}, but '{}' is not a finite number", option, text, form, part);
     numbers.push_back(*number);
@@ -67,7 +67,7 @@ glm::dvec3 parsePoint(std::string_view option, std::string_view text) {
 std::vector<uint64_t> parseExtents(std::string_view option, std::string_view text, std::string_view form) {
   std::vector<uint64_t> extents;
   for (const std::string_view part : split(text, 'x')) {
-    const auto extent = whole<uint64_t>(part);
+    const auto extent = parseWhole<uint64_t>(part);
     if (!extent || *extent == 0)
       throw UsageError("{} {}: expected {}, but '{}' is not a whole number above zero", option, text, form,
                        part);
@@ -80,8 +80,8 @@ std::vector<uint64_t> parseExtents(std::string_view option, std::string_view tex
 
 ImageSize parseImageSize(std::string_view option, std::string_view text) {
   const auto sides = parseExtents(option, text, "WIDTHxHEIGHT");
-  if (std::max(sides[0], sides[1]) > kLargestImageSide)
-    throw UsageError("{} {}: an image has at most {} pixels each way", option, text, kLargestImageSide);
+  if (std::max(sides[0], sides[1]) > kMaxImageSide)
+    throw UsageError("{} {}: expected at most {} pixels in each direction", option, text, kMaxImageSide);
   return {static_cast<int>(sides[0]), static_cast<int>(sides[1])};
 }
 
@@ -94,7 +94,7 @@ uint64_t parseByteSize(std::string_view option, std::string_view text) {
     if (std::toupper(unit[0]) == "KMGT"[prefix] && (rest.empty() || rest == "B" || rest == "iB"))
       shift = 10 * (prefix + 1);
   }
-  const auto number = whole<double>(digits);
+  const auto number = parseWhole<double>(digits);
   const double bytes = number ? std::floor(std::ldexp(*number, std::max(shift, 0))) : 0;
   if (!number || shift < 0 || bytes < 1 || bytes > 0x1p62)
     throw UsageError("{} {}: expected a size such as 512M or 2G (K, M, G, T; powers of 1024)", option, text);
@@ -108,7 +108,7 @@ uint64_t parseMemory(std::string_view option, std::string_view text) {
 uint64_t parseCount(std::string_view option, std::string_view text) {
   const std::string_view digits = text.substr(0, text.find_first_not_of("0123456789"));
   const std::string_view letter = text.substr(digits.size());
-  const auto number = whole<uint64_t>(digits);
+  const auto number = parseWhole<uint64_t>(digits);
   const size_t place = std::string_view("KMGkmg").find(letter);
   const size_t power = letter.empty() || place == std::string_view::npos ? 0 : place % 3 + 1;
   uint64_t count = number.value_or(0);

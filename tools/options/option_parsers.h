@@ -1,6 +1,6 @@
-// Words of the command line that several subcommands share: sizes, lists of numbers, memory. Each function
-// takes the option's name for its message, reads the whole text, and throws UsageError that shows what was
-// given and what is expected.
+// Parsers of option values that several subcommands share: sizes, lists of numbers, memory. Each function
+// takes the option's name for its message, parses the whole text, and throws UsageError with the text found
+// and the form expected.
 #pragma once
 
 #include <cstdint>
@@ -14,11 +14,11 @@
 
 namespace curvisplat {
 
-inline constexpr unsigned kMaxThreads = 1024;  // of --threads
+inline constexpr unsigned kMaxThreads = 1024;  // limit of --threads
 
-/// One finite number.
+/// A finite number.
 double parseNumber(std::string_view option, std::string_view text);
-/// One finite number above zero.
+/// A finite number above zero.
 double parsePositive(std::string_view option, std::string_view text);
 /// As many finite numbers as `form` ("x,y,z") names, separated by commas.
 std::vector<double> parseNumbers(std::string_view option, std::string_view text, std::string_view form);
@@ -28,16 +28,16 @@ glm::dvec3 parsePoint(std::string_view option, std::string_view text);
 std::vector<uint64_t> parseExtents(std::string_view option, std::string_view text, std::string_view form);
 /// "600x400", at most 16384 each way.
 ImageSize parseImageSize(std::string_view option, std::string_view text);
-/// Bytes: a number with K, M, G or T (powers of 1024; "2G", "1.5GiB", "512MB"), or of bytes.
+/// A number of bytes, optionally with a unit K, M, G or T (powers of 1024): "2G", "1.5GiB", "512MB".
 uint64_t parseByteSize(std::string_view option, std::string_view text);
-/// The same, of memory: no more than the machine has.
+/// As parseByteSize(), but at most the machine's memory.
 uint64_t parseMemory(std::string_view option, std::string_view text);
-/// A whole number of things above zero: with K, M or G (powers of 1000; "8M"), or without.
+/// A whole number above zero, optionally with a suffix K, M or G (powers of 1000): "8M".
 uint64_t parseCount(std::string_view option, std::string_view text);
-/// "white", "black", "transparent" or "#rrggbb"; premultiplied red, green, blue, alpha.
+/// "white", "black", "transparent" or "#rrggbb". Returns premultiplied red, green, blue, alpha.
 glm::vec4 parseBackground(std::string_view option, std::string_view text);
 
-/// "auto", "osmesa", "egl" or "cpu", of --backend.
+/// The value of --backend: "auto", "osmesa", "egl" or "cpu".
 Backend parseBackend(std::string_view text);
 
 }  // namespace curvisplat

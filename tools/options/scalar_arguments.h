@@ -1,4 +1,4 @@
-// Which scalar of a cache, and in which colours: the options that all subcommands with pictures share.
+// Options that choose a scalar and its transfer function, shared by the subcommands that draw.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -11,23 +11,24 @@
 
 namespace curvisplat {
 
-/// The command line's words, as given.
+/// Command-line arguments as given; checked and parsed later.
 struct ScalarArguments {
   std::string scalar, transfer_function = "viridis";
   std::optional<std::string> range, opacity_unit;
 };
 
-/// --scalar.
-void addScalarOption(CLI::App& command, ScalarArguments& words);
-/// --tf, --range and --opacity-unit, under the heading `group`.
-void addFunctionOptions(CLI::App& command, ScalarArguments& words, const std::string& group);
+/// Adds --scalar.
+void addScalarOption(CLI::App& command, ScalarArguments& arguments);
+/// Adds --tf, --range and --opacity-unit under the heading `group`.
+void addFunctionOptions(CLI::App& command, ScalarArguments& arguments, const std::string& group);
 
-/// Position of the scalar. One that the cache lacks is bad input, not wrong usage, since the cache decides:
-/// throws Error.
-size_t chooseVariable(const CacheReader& cache, const ScalarArguments& words);
+/// Position of the chosen scalar in the manifest. Throws Error, not UsageError, for a scalar that the cache
+/// lacks: the cache decides, not the usage.
+size_t chooseVariable(const CacheReader& cache, const ScalarArguments& arguments);
 
-/// `diagonal` of the data, after --scale. Throws UsageError, and Error for a file that is no function.
-TransferFunction chooseTransferFunction(const ScalarArguments& words, const VariableInfo& variable,
+/// `diagonal`: length of the diagonal of the data's bounding box after --scale, in world units. Throws
+/// UsageError, or Error if the file does not hold a transfer function.
+TransferFunction chooseTransferFunction(const ScalarArguments& arguments, const VariableInfo& variable,
                                         double diagonal);
 
 }  // namespace curvisplat

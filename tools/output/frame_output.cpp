@@ -16,18 +16,18 @@
 namespace curvisplat {
 namespace {
 
-class OneFile : public FrameOutput {
+class SingleFile : public FrameOutput {
  public:
-  explicit OneFile(std::filesystem::path path) : path_(std::move(path)) {}
+  explicit SingleFile(std::filesystem::path path) : path_(std::move(path)) {}
   void write(uint64_t, const Image& image) override { writeImage(image, path_); }
 
  private:
   const std::filesystem::path path_;
 };
 
-class FileAFrame : public FrameOutput {
+class NumberedFiles : public FrameOutput {
  public:
-  explicit FileAFrame(const std::filesystem::path& pattern) : names_(pattern) {}
+  explicit NumberedFiles(const std::filesystem::path& pattern) : names_(pattern) {}
   void write(uint64_t frame, const Image& image) override { writeImage(image, names_.of(frame)); }
 
  private:
@@ -46,7 +46,7 @@ class Movie : public FrameOutput {
 };
 
 [[noreturn]] void refusePattern(const std::string& pattern, std::string_view why) {
-  throw UsageError("-o {}: {}; give a name such as frame_%04d.png", pattern, why);
+  throw UsageError("-o {}: {}; use a name such as frame_%04d.png", pattern, why);
 }
 
 }  // namespace
@@ -64,8 +64,8 @@ FrameNames::FrameNames(const std::filesystem::path& path) : folder_(path.parent_
       const size_t end = std::min(pattern.find_first_not_of("0123456789", at + 1), pattern.size());
       const std::string flags = pattern.substr(at + 1, end - at - 1);
       if (end == pattern.size() || pattern[end] != 'd')
-        refusePattern(pattern, fmt::format("'{}' is no frame number", pattern.substr(at, end + 1 - at)));
-      if (++numbers > 1) refusePattern(pattern, "it has room for two frame numbers");
+        refusePattern(pattern, fmt::format("'{}' is not a frame number", pattern.substr(at, end + 1 - at)));
+      if (++numbers > 1) refusePattern(pattern, "found two frame numbers, expected one");
       zeros_ = flags.starts_with('0');
       const std::string width = flags.substr(zeros_ ? 1 : 0);
       if (width.size() > 2) refusePattern(pattern, "the frame number is wider than 99 digits");
@@ -73,7 +73,7 @@ FrameNames::FrameNames(const std::filesystem::path& path) : folder_(path.parent_
       at = end;
     }
   }
-  if (numbers == 0) refusePattern(pattern, "every frame would get the same name, without a %d");
+  if (numbers == 0) refusePattern(pattern, "all frames would have the same name");
 }
 
 std::filesystem::path FrameNames::of(uint64_t frame) const {
@@ -107,16 +107,16 @@ void checkOutputName(const std::filesystem::path& path, bool frames, ImageSize s
     checkImageName(path);
     return;
   }
-  if (!frames) throw UsageError("-o {}: a movie needs frames, from --orbit or --path", path.string());
+  if (!frames) throw UsageError("-o {}: a movie needs --orbit or --path", path.string());
   if (size.width % 2 != 0 || size.height % 2 != 0)
-    throw UsageError("--size {}x{}: a movie's width and height are even", size.width, size.height);
+    throw UsageError("--size {}x{}: the width and height of a movie must be even", size.width, size.height);
 }
 
 std::unique_ptr<FrameOutput> makeFrameOutput(const std::filesystem::path& path, bool frames, ImageSize size,
                                              double frames_per_s) {
   if (isMovieName(path)) return std::make_unique<Movie>(path, size, frames_per_s);
-  if (frames) return std::make_unique<FileAFrame>(path);
-  return std::make_unique<OneFile>(path);
+  if (frames) return std::make_unique<NumberedFiles>(path);
+  return std::make_unique<SingleFile>(path);
 }
 
 }  // namespace curvisplat

@@ -1,4 +1,4 @@
-// Where `render` puts its pictures: one file, a file a frame, or a movie.
+// Writes the pictures of `render`: to one file, to one file per frame, or to a movie.
 #pragma once
 
 #include <cstdint>
@@ -10,16 +10,15 @@
 
 namespace curvisplat {
 
-/// File names with the frame's number in them: "frame_%04d.png".
+/// File names that contain the frame number, from a pattern such as "frame_%04d.png".
 class FrameNames {
  public:
-  /// Exactly one %d in the file's name (folders have the names they have), which may have a width of at most
-  /// two digits and a leading zero: %4d, %04d. A percent sign of the name itself is written %%. Throws
-  /// UsageError that says what is wrong.
+  /// The file name (not its folders) must contain exactly one %d, optionally with a leading zero and a width
+  /// of at most two digits: %4d, %04d. %% stands for a percent sign. Throws UsageError if it does not.
   explicit FrameNames(const std::filesystem::path& pattern);
 
   std::filesystem::path of(uint64_t frame) const;
-  /// Whether `path` is the name of one of the first `frames`.
+  /// Whether `path` is the file of one of the first `frames` frames.
   bool include(const std::filesystem::path& path, uint64_t frames) const;
 
  private:
@@ -29,22 +28,22 @@ class FrameNames {
   bool zeros_ = false;
 };
 
-/// Takes the pictures of frames 0, 1, 2, ... in this order.
+/// Receives the pictures of frames 0, 1, 2, ... in this order.
 class FrameOutput {
  public:
   virtual ~FrameOutput() = default;
   virtual void write(uint64_t frame, const Image& image) = 0;
-  /// Once, after the last frame: what was written is whole now.
+  /// Call once after the last frame: completes the output.
   virtual void finish() {}
 };
 
 bool isMovieName(const std::filesystem::path& path);
 
-/// Throws UsageError where `path` is no name for what is to be written: one picture, or frames.
+/// Throws UsageError if `path` does not suit the output: one picture, or `frames` (a pattern or a movie).
 void checkOutputName(const std::filesystem::path& path, bool frames, ImageSize size);
 
-/// For a name that checkOutputName() lets pass. `frames`: a file a frame, or a movie of `frames_per_s`.
-/// Throws Error where a movie is asked for and there is no ffmpeg.
+/// Requires that checkOutputName() accepted `path`. `frames_per_s` applies to a movie. Throws Error if ffmpeg
+/// is needed and not installed.
 std::unique_ptr<FrameOutput> makeFrameOutput(const std::filesystem::path& path, bool frames, ImageSize size,
                                              double frames_per_s);
 

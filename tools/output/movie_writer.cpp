@@ -29,30 +29,30 @@ namespace {
 [[noreturn]] void failToStart(const std::filesystem::path& movie, int error) {
   if (error == ENOENT)
     throw Error(
-        "{}: movies are made by ffmpeg, which is not installed (not in PATH); install it, or write pictures, "
+        "{}: ffmpeg, which writes movies, was not found in PATH; install it, or write pictures with "
         "-o frame_%04d.png",
         movie.string());
-  throw Error("{}: ffmpeg cannot be started: {}", movie.string(), std::strerror(error));
+  throw Error("{}: cannot start ffmpeg: {}", movie.string(), std::strerror(error));
 }
 
-pid_t start(std::vector<std::string> words, int input, int errors, const std::filesystem::path& movie) {
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
+pid_t start(std::vector<std::string> arguments, int input, int errors, const std::filesystem::path& movie) {
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
   posix_spawn_file_actions_adddup2(&actions, errors, STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, errors, STDERR_FILENO);
   pid_t process = -1;
-  const int error = posix_spawnp(&process, "ffmpeg", &actions, nullptr, arguments.data(), environ);
+  const int error = posix_spawnp(&process, "ffmpeg", &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
   if (error != 0) failToStart(movie, error);
   return process;
 }
 
-/// Its first line.
-std::string textOf(int file) {
+/// The first line of a file.
+std::string firstLineOf(int file) {
   std::array<char, 300> buffer;
   const ssize_t got = pread(file, buffer.data(), buffer.size(), 0);
   const std::string text(buffer.data(), got > 0 ? static_cast<size_t>(got) : 0);
@@ -66,7 +66,7 @@ MovieWriter::MovieWriter(const std::filesystem::path& path, ImageSize size, doub
       unfinished_(temporaryBeside(path_)),
       size_(size),
       pixels_(3 * size.pixels()) {
-  // A pair of sockets instead of a pipe: sending to a process that has ended is an error, not a signal.
+  // Sockets instead of a pipe: writing to a process that has ended is then an error, not SIGPIPE.
   int ends[2] = {-1, -1};
   errors_ = memfd_create("ffmpeg", MFD_CLOEXEC);
   if (errors_ < 0 || socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
@@ -76,7 +76,8 @@ MovieWriter::MovieWriter(const std::filesystem::path& path, ImageSize size, doub
   }
   input_ = ends[0];
   try {
-    // A relative name could begin with a dash, or look like a protocol.
+    // ffmpeg would take a relative name that begins with a dash for an option, and one with a colon for a
+    // protocol.
     const std::string output = std::filesystem::absolute(unfinished_).string();
     process_ = start({"ffmpeg",
                       "-nostdin",
@@ -139,11 +140,11 @@ int MovieWriter::wait() {
 }
 
 void MovieWriter::fail(int status) const {
-  const std::string said = textOf(errors_);
+  const std::string message = firstLineOf(errors_);
   const std::string ended = WIFSIGNALED(status) ? fmt::format("signal {}", WTERMSIG(status))
                                                 : fmt::format("status {}", WEXITSTATUS(status));
-  throw Error("{}: ffmpeg ended with {} before the movie was whole: {}", path_.string(), ended,
-              said.empty() ? "it said nothing" : said);
+  throw Error("{}: ffmpeg ended with {} before the movie was complete: {}", path_.string(), ended,
+              message.empty() ? "it printed no message" : message);
 }
 
 void MovieWriter::append(const Image& image) {

@@ -1,5 +1,4 @@
-// Makes a movie of pictures through the ffmpeg program, which gets them raw on its standard input. No shell
-// is in between.
+// Writes a movie by running ffmpeg, without a shell, and sending raw pictures to its standard input.
 #pragma once
 
 #include <sys/types.h>
@@ -12,25 +11,26 @@
 
 namespace curvisplat {
 
-/// One thread. Unless finish() was called, the destructor ends ffmpeg and leaves nothing at `path`.
+/// For one thread. Unless finish() was called, the destructor ends ffmpeg and removes the unfinished movie.
 class MovieWriter {
  public:
-  /// Starts ffmpeg: H.264 of `frames_per_s`. The sides of `size` are even. Throws Error if there is no ffmpeg
-  /// in PATH, or if something else than a file is at `path`. Links are followed.
+  /// Starts ffmpeg with an H.264 encoder. Width and height must be even. Follows a link at `path`. Throws
+  /// Error if ffmpeg is not in PATH, or if `path` exists and is not a regular file.
   MovieWriter(const std::filesystem::path& path, ImageSize size, double frames_per_s);
   ~MovieWriter();
   MovieWriter(const MovieWriter&) = delete;
   MovieWriter& operator=(const MovieWriter&) = delete;
 
-  /// An opaque picture of the writer's size. Throws Error with what ffmpeg said if it has ended.
+  /// Appends an opaque picture of the writer's size. Throws Error with ffmpeg's message if ffmpeg has ended.
   void append(const Image& image);
-  /// Waits for ffmpeg and puts the movie at its path, whole. Throws Error with what ffmpeg said if it failed.
+  /// Waits for ffmpeg and moves the complete movie to its path. Throws Error with ffmpeg's message if it
+  /// failed.
   void finish();
 
  private:
-  /// Closes its input and returns its wait status.
+  /// Closes ffmpeg's input and returns its wait status.
   int wait();
-  /// For a wait status of ffmpeg that is no success.
+  /// Throws Error for a failed wait status of ffmpeg.
   [[noreturn]] void fail(int status) const;
   void closeInput();
 
@@ -39,7 +39,7 @@ class MovieWriter {
   int input_ = -1;   // our end of ffmpeg's standard input
   int errors_ = -1;  // ffmpeg's standard error, a file in memory
   pid_t process_ = -1;
-  std::vector<unsigned char> pixels_;  // of one picture
+  std::vector<unsigned char> pixels_;  // one picture, RGB
 };
 
 }  // namespace curvisplat

@@ -17,9 +17,10 @@ void checkOutputFolder(std::string_view option, const std::filesystem::path& pat
   const std::filesystem::path folder = folderOf(path);
   std::error_code ignored;
   if (!std::filesystem::is_directory(folder, ignored))
-    throw Error("{} {}: there is no folder {}; make it first", option, path.string(), folder.string());
+    throw Error("{} {}: the directory {} does not exist; create it first", option, path.string(),
+                folder.string());
   if (::access(folder.c_str(), W_OK | X_OK) != 0)
-    throw Error("{} {}: the folder {} cannot be written to: {}; choose another", option, path.string(),
+    throw Error("{} {}: the directory {} is not writable: {}; choose another", option, path.string(),
                 folder.string(), std::strerror(errno));
 }
 
@@ -40,7 +41,7 @@ void checkOutputFile(std::string_view option, const std::filesystem::path& path,
     const fs::path there = fs::weakly_canonical(linkTarget(other), ignored);
     if (there == target || fs::equivalent(target, there, ignored) ||
         fs::equivalent(target.parent_path(), there, ignored))
-      throw Error("{} {}: would change {}; choose another name", option, path.string(), other.string());
+      throw Error("{} {}: would overwrite {}; choose another name", option, path.string(), other.string());
   }
 }
 

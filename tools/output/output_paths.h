@@ -1,4 +1,4 @@
-// Whether there is a place for what a command is to write: asked before the work that it is the result of.
+// Checks, before the work begins, that a command can write its outputs.
 #pragma once
 
 #include <filesystem>
@@ -7,12 +7,11 @@
 
 namespace curvisplat {
 
-/// Throws Error if the folder that `path`, the value of `option`, is to be written to does not exist or
-/// cannot be written to.
+/// `path` is the value of `option`. Throws Error if its folder does not exist or is not writable.
 void checkOutputFolder(std::string_view option, const std::filesystem::path& path);
 
-/// checkOutputFolder() for a file. Throws Error, too, if `path` is there and is no regular file, or if
-/// writing it would change one of `others`: files or caches that are read, or written as well.
+/// Calls checkOutputFolder(). Also throws Error if `path` exists and is not a regular file, or if it is one
+/// of `others` (files or caches that the command reads or writes) or a file of such a cache.
 void checkOutputFile(std::string_view option, const std::filesystem::path& path,
                      const std::vector<std::filesystem::path>& others);
 

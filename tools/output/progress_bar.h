@@ -1,11 +1,11 @@
-// A bar on the terminal that shows how far a job is, and how long it will take.
+// A progress bar on the terminal: percentage, remaining time and rate.
 #pragma once
 
 #include "stream/base/progress.h"
 
 namespace curvisplat {
 
-/// Draws to standard error; no display if that is not a terminal.
+/// A display that draws to standard error; empty if standard error is not a terminal.
 Progress::Display progressBar();
 
 }  // namespace curvisplat

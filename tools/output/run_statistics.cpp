@@ -16,7 +16,7 @@
 namespace curvisplat {
 namespace {
 
-// Files of /proc have no size, which stream/file.h goes by.
+// Not with stream/base/file.h, which reads as many bytes as the file's size: files of /proc have size 0.
 std::vector<std::string> commandLine() {
   std::ifstream file("/proc/self/cmdline", std::ios::binary);
   std::vector<std::string> arguments;
@@ -24,8 +24,8 @@ std::vector<std::string> commandLine() {
   return arguments;
 }
 
-/// Field 22 of /proc/self/stat, in clock ticks since the machine's start. Field 2, the program's name in
-/// brackets, may hold anything.
+/// Start time of this process in clock ticks since boot: field 22 of /proc/self/stat. Counts the fields from
+/// the last bracket on, because field 2, the program's name in brackets, may contain spaces and brackets.
 double startTicks() {
   std::ifstream file("/proc/self/stat");
   std::string line;
@@ -34,8 +34,7 @@ double startTicks() {
   std::string field;
   for (int n = 3; n < 22; ++n) fields >> field;
   double ticks = 0;
-  if (!(fields >> ticks))
-    throw Error("/proc/self/stat: has no field 22, the time at which the process started");
+  if (!(fields >> ticks)) throw Error("/proc/self/stat: cannot read field 22, the start time of the process");
   return ticks;
 }
 
@@ -51,7 +50,7 @@ double secondsSinceStart() {
 nlohmann::json runStatistics() {
   const uint64_t peak_memory_bytes = ProcessUsage::now().peak_memory_bytes;
   if (peak_memory_bytes == 0)
-    throw Error("/proc/self/status: has no VmHWM, the peak of memory that --stats reports");
+    throw Error("/proc/self/status: cannot read VmHWM, the peak memory that --stats reports");
   return {{"program", "curvisplat"},
           {"version", CURVISPLAT_VERSION},
           {"command", commandLine()},
@@ -59,7 +58,7 @@ nlohmann::json runStatistics() {
 }
 
 void writeStatistics(const std::filesystem::path& path, const nlohmann::json& statistics) {
-  // Arguments are bytes, which need not be the UTF-8 that JSON is.
+  // The recorded arguments may not be valid UTF-8, which JSON requires.
   constexpr auto kReplace = nlohmann::json::error_handler_t::replace;
   writeFileDurably(path, statistics.dump(2, ' ', false, kReplace) + "\n");
 }

@@ -1,4 +1,4 @@
-// What every `--stats FILE.json` begins with, and how it is written.
+// The fields that every --stats file has, and writing such a file.
 #pragma once
 
 #include <filesystem>
@@ -6,13 +6,13 @@
 
 namespace curvisplat {
 
-/// {"program", "version", "command": [the arguments], "peak_memory_bytes": VmHWM of this process so far}.
+/// {"program", "version", "command": [the arguments], "peak_memory_bytes": VmHWM of this process so far}
 nlohmann::json runStatistics();
 
-/// Since the start of this process, to a hundredth of a second: what the kernel keeps.
+/// Seconds since this process started, with the kernel's resolution of 1/100 s.
 double secondsSinceStart();
 
-/// Writes one JSON object, whole or not at all. Throws Error.
+/// Writes the JSON object atomically. Throws Error.
 void writeStatistics(const std::filesystem::path& path, const nlohmann::json& statistics);
 
 }  // namespace curvisplat

@@ -11,18 +11,17 @@
 namespace curvisplat {
 
 void openStandardStreams() {
-  // The lowest free number is taken. Standard output is opened for reading: what is printed to it is not lost
-  // in silence.
+  // open() returns the lowest free number. Standard output is opened read-only, so that printing to it fails
+  // and is reported.
   for (int number = 0; number <= 2; ++number)
     if (::fcntl(number, F_GETFD) < 0) ::open("/dev/null", number == 2 ? O_WRONLY : O_RDONLY);
 }
 
 bool finishStandardOutput() {
-  // A write that failed before has left its mark, but not its reason.
+  // An earlier failed write has set the error flag, but its errno is lost.
   const bool failed = std::ferror(stdout) != 0;
   if (std::fflush(stdout) == 0 && !failed) return true;
-  printMessage("standard output cannot be written{}{}", failed ? "" : ": ",
-               failed ? "" : std::strerror(errno));
+  printMessage("cannot write to standard output{}{}", failed ? "" : ": ", failed ? "" : std::strerror(errno));
   return false;
 }
 

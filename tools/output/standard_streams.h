@@ -1,13 +1,13 @@
-// Standard input, output and error, whatever the program was started with.
+// Makes standard input, output and error usable even if the program was started with some of them closed.
 #pragma once
 
 namespace curvisplat {
 
-/// Opens those of the three that are closed, so that no file of ours is taken for one of them: nothing can be
-/// read from or written to them. Before anything else is opened.
+/// Opens closed ones on /dev/null, so that no file the program opens gets number 0, 1 or 2. Reading from or
+/// printing to them fails. Call before opening anything else.
 void openStandardStreams();
 
-/// Whether all that was printed is written. Says so if not.
+/// Flushes standard output. Prints a message and returns false if anything printed could not be written.
 bool finishStandardOutput();
 
 }  // namespace curvisplat

@@ -1,5 +1,4 @@
-// SIGINT, SIGTERM and SIGHUP as a wish to stop: the first asks the job to, the second ends the process as
-// ever.
+// SIGINT, SIGTERM and SIGHUP: the first one asks the running job to stop, a second one ends the process.
 #pragma once
 
 #include <signal.h>
@@ -10,8 +9,8 @@
 
 namespace curvisplat {
 
-/// While it lives, those of the signals that are not ignored call progress.stop(). One at a time; for the
-/// main thread.
+/// During its lifetime these signals, unless they were ignored, call progress.stop(). At most one instance at
+/// a time, on the main thread.
 class StopOnSignals {
  public:
   explicit StopOnSignals(Progress& progress);

@@ -2,7 +2,7 @@
 
 namespace curvisplat {
 
-BrickSample sampleOf(std::span<const BrickPart> parts, std::span<const Brick> bricks, uint64_t most_splats,
+BrickSample sampleOf(std::span<const BrickPart> parts, std::span<const Brick> bricks, uint64_t max_splats,
                      uint32_t runs) {
   const auto splatsOf = [&](const BrickPart& part) {
     return uint64_t{SplatRanges(bricks[part.brick], part.octants).splats()};
@@ -10,12 +10,12 @@ BrickSample sampleOf(std::span<const BrickPart> parts, std::span<const Brick> br
   uint64_t all = 0;
   for (const BrickPart& part : parts) all += splatsOf(part);
   BrickSample sample;
-  if (all <= most_splats) {
+  if (all <= max_splats) {
     sample.parts.assign(parts.begin(), parts.end());
     sample.splats = all;
     return sample;
   }
-  // Run r begins where a fraction r / runs of the splats is behind it, and holds 1 / runs of the sample.
+  // Run r begins after a fraction r / runs of all splats, and holds 1 / runs of the sample.
   uint64_t behind = 0;
   uint32_t run = 0;
   uint64_t wanted = 0;
@@ -23,7 +23,7 @@ BrickSample sampleOf(std::span<const BrickPart> parts, std::span<const Brick> br
     const uint64_t splats = splatsOf(part);
     while (run < runs && static_cast<double>(behind) >= static_cast<double>(all) / runs * run) {
       ++run;
-      wanted = most_splats / runs * run;
+      wanted = max_splats / runs * run;
     }
     if (sample.splats < wanted || sample.parts.empty()) {
       sample.parts.push_back(part);

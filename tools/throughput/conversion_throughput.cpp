@@ -24,17 +24,17 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-// bench/README.md: 16 of the grid, 61 of scattered splats, up to 13 of a cache. And what small grids take
-// more.
-constexpr uint64_t kDiskBytesANode = 96, kMinDiskBytes = 16 << 20;
+// Per node: 16 for the grid, 61 for scattered splats, up to 13 for the cache (bench/README.md), with a
+// margin; a minimum for small grids.
+constexpr uint64_t kDiskBytesPerNode = 96, kMinDiskBytes = 16 << 20;
 
-/// Removed with all in it.
+/// A temporary folder, removed with its contents.
 class WorkFolder {
  public:
   explicit WorkFolder(const fs::path& parent) {
     std::string name = (parent / "curvisplat-bench-XXXXXX").string();
     if (!::mkdtemp(name.data()))
-      throw Error("--tmp {}: no folder can be made in it: {}", parent.string(), std::strerror(errno));
+      throw Error("--tmp {}: cannot create a directory in it: {}", parent.string(), std::strerror(errno));
     path_ = name;
   }
   ~WorkFolder() {
@@ -53,16 +53,17 @@ class WorkFolder {
 void checkSpace(const fs::path& folder, uint64_t nodes) {
   std::error_code error;
   const fs::space_info space = fs::space(folder, error);
-  if (error) throw Error("--tmp {}: its free space cannot be told: {}", folder.string(), error.message());
+  if (error) throw Error("--tmp {}: cannot determine its free space: {}", folder.string(), error.message());
   const uint64_t needed = diskBytesFor(nodes);
   if (space.available < needed)
     throw Error(
-        "--tmp {}: has {} MiB free, and {} nodes take up to {} MiB meanwhile; give fewer --nodes, or "
+        "--tmp {}: too little space for {} nodes (found {} MiB free, expected {} MiB); choose fewer --nodes "
+        "or "
         "another --tmp",
-        folder.string(), space.available >> 20, nodes, needed >> 20);
+        folder.string(), nodes, space.available >> 20, needed >> 20);
 }
 
-/// Begins to count the peak of this process' memory anew. False where the system does not let it.
+/// Resets the peak memory of this process. False where the system does not allow it.
 bool resetPeakMemory() {
   std::ofstream file("/proc/self/clear_refs");
   file << "5\n";
@@ -107,14 +108,14 @@ void addRuns(const std::vector<Run>& runs, const ConversionReport& report, Measu
   if (report.peak_memory_bytes > 0)
     to.add(prefix + "peak_memory", "B", std::move(peaks));
   else
-    to.leaveOut(prefix + "peak_memory", "/proc/self/clear_refs does not let the peak be counted anew");
+    to.leaveOut(prefix + "peak_memory", "the peak memory cannot be reset through /proc/self/clear_refs");
   to.add(prefix + "temporary", "B", {static_cast<double>(report.last.temporary_bytes)});
   double cache_bytes = 0;
   for (const FileReport& file : report.last.files) cache_bytes += static_cast<double>(file.bytes);
   to.add(prefix + "cache", "B", {cache_bytes});
 }
 
-double aNode(const ConversionReport& report, uint64_t bytes) {
+double perNode(const ConversionReport& report, uint64_t bytes) {
   return static_cast<double>(bytes) / static_cast<double>(report.nodes());
 }
 
@@ -126,7 +127,7 @@ SceneGridSize sizeOfGrid(uint64_t nodes) {
 }
 
 uint64_t diskBytesFor(uint64_t nodes) {
-  return nodes * kDiskBytesANode + kMinDiskBytes;
+  return nodes * kDiskBytesPerNode + kMinDiskBytes;
 }
 
 ConversionReport measureConversion(const ConversionEffort& effort, Measurements& to, Progress& progress) {
@@ -149,7 +150,7 @@ ConversionReport measureConversion(const ConversionEffort& effort, Measurements&
   double spent_s = 0;
   report.cold = true;
   bool peaks = true;
-  while (runs.empty() || (runs.size() < effort.most_runs && spent_s < effort.repeat_s)) {
+  while (runs.empty() || (runs.size() < effort.max_runs && spent_s < effort.repeat_s)) {
     fs::remove_all(options.output);
     const auto source = openGrid(grid);
     if (const auto reason = dropPages(files)) {
@@ -170,14 +171,14 @@ ConversionReport measureConversion(const ConversionEffort& effort, Measurements&
 }
 
 std::string conversionTable(const ConversionReport& report) {
-  TextTable table({"phase", "time", "part", "cores", "read a node", "written a node", "peak memory so far"});
+  TextTable table({"phase", "time", "share", "cores", "read/node", "written/node", "peak memory so far"});
   double all_s = 0;
   for (const Progress::Phase& phase : report.phases) all_s += phase.seconds;
   for (const Progress::Phase& phase : report.phases)
     table.add({phase.name, shortSeconds(phase.seconds), fmt::format("{:.0f} %", 100 * phase.seconds / all_s),
                fmt::format("{:.2f}", phase.usage.cpu_seconds / std::max(phase.seconds, 1e-9)),
-               fmt::format("{:.1f} B", aNode(report, phase.usage.bytes_read)),
-               fmt::format("{:.1f} B", aNode(report, phase.usage.bytes_written)),
+               fmt::format("{:.1f} B", perNode(report, phase.usage.bytes_read)),
+               fmt::format("{:.1f} B", perNode(report, phase.usage.bytes_written)),
                fmt::format("{} MiB", phase.usage.peak_memory_bytes >> 20)});
   return table.text();
 }
@@ -191,19 +192,19 @@ std::string conversionSummary(const ConversionReport& report, const Measurements
                         100 * spreadOf(rate.samples));
   text += "\n";
   if (report.peak_memory_bytes > 0)
-    text += fmt::format("{} MiB of memory at the most\n", report.peak_memory_bytes >> 20);
-  return text + fmt::format("a node takes {:.2f} B of temporary disk, and {:.2f} B in the cache\n",
-                            aNode(report, report.last.temporary_bytes),
+    text += fmt::format("peak memory {} MiB\n", report.peak_memory_bytes >> 20);
+  return text + fmt::format("per node {:.2f} B of temporary disk space and {:.2f} B of cache\n",
+                            perNode(report, report.last.temporary_bytes),
                             *measurements.median(prefix + "cache") / static_cast<double>(report.nodes()));
 }
 
 Plots conversionPlots(const ConversionReport& report) {
-  BarPanel times{"Time", "seconds", {}, {}}, bytes{"Bytes a node", "bytes", {}, {"read", "written"}},
+  BarPanel times{"Time", "seconds", {}, {}}, bytes{"Bytes per node", "bytes", {}, {"read", "written"}},
       memory{"Peak memory so far", "MiB", {}, {}};
   for (const Progress::Phase& phase : report.phases) {
     times.bars.push_back({phase.name, phase.seconds, shortSeconds(phase.seconds), 0});
-    const double read = aNode(report, phase.usage.bytes_read);
-    const double written = aNode(report, phase.usage.bytes_written);
+    const double read = perNode(report, phase.usage.bytes_read);
+    const double written = perNode(report, phase.usage.bytes_written);
     bytes.bars.push_back({phase.name, read, fmt::format("{:.1f}", read), 0});
     bytes.bars.push_back({"", written, fmt::format("{:.1f}", written), 1});
     const auto peak = static_cast<double>(phase.usage.peak_memory_bytes >> 20);

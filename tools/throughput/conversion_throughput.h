@@ -1,9 +1,9 @@
-// How fast this machine converts: an analytic grid is written to a temporary folder, converted, and removed.
+// Measures conversion: writes an analytic grid to a temporary folder, converts it, and removes everything.
 //
-//   conversion/cold/rate            nodes/s; the grid's files out of the page cache when it begins, looked at
-//   conversion/warm/rate            where they cannot be got out of it
-//   conversion/cold/phase/scatter   s
-//   conversion/cold/peak_memory     B, of the process while it converts
+//   conversion/cold/rate            nodes/s; grid files evicted from the page cache before each run
+//   conversion/warm/rate            the same where they cannot be evicted
+//   conversion/cold/phase/scatter   s, one measurement per phase
+//   conversion/cold/peak_memory     B, peak of the process during the conversion
 #pragma once
 
 #include <cstdint>
@@ -21,36 +21,36 @@
 namespace curvisplat {
 
 struct ConversionEffort {
-  uint64_t nodes = 8'000'000;  // about
-  uint64_t memory_bytes = 0;   // as ConvertOptions has it
+  uint64_t nodes = 8'000'000;  // approximate
+  uint64_t memory_bytes = 0;   // as in ConvertOptions
   unsigned threads = 0;
-  std::filesystem::path temporary_folder;  // exists
-  double repeat_s = 30;                    // converts again while it has not taken so long,
-  unsigned most_runs = 3;                  // and not more often
+  std::filesystem::path temporary_folder;  // must exist
+  double repeat_s = 30;                    // repeats the conversion until this time has passed
+  unsigned max_runs = 3;                   // or this many runs are done
 };
 
 struct ConversionReport {
   SceneGridSize size;
-  bool cold = false;  // the grid's files were, at the start of each run
+  bool cold = false;  // the grid's files were not in the page cache when a run began
   ConvertReport last;
-  std::vector<Progress::Phase> phases;  // of the run in the middle by its time
-  uint64_t peak_memory_bytes = 0;       // 0 where the system cannot tell it of the conversion alone
+  std::vector<Progress::Phase> phases;  // of the median run by time
+  uint64_t peak_memory_bytes = 0;       // 0 where the system cannot reset the peak
 
   uint64_t nodes() const { return size.ni * size.nj * size.nk; }
 };
 
-/// The grid of about so many nodes: nearly a cube, 8 a side at least.
+/// Size of a nearly cubic grid of about `nodes` nodes, at least 8 per side.
 SceneGridSize sizeOfGrid(uint64_t nodes);
-/// What the grid, the conversion's temporary files and the cache may take on the disk together.
+/// Upper bound of the disk space, in bytes, for the grid, temporary files and cache together.
 uint64_t diskBytesFor(uint64_t nodes);
 
-/// Adds to `to`. Whatever happens, what it wrote is gone when it returns or throws: Error (before any work
-/// where the folder has too little space), Interrupted.
+/// Adds the measurements to `to`. Removes everything it wrote, also when it throws. Throws Interrupted, and
+/// Error (before any work if the disk has too little space).
 ConversionReport measureConversion(const ConversionEffort& effort, Measurements& to, Progress& progress);
 
-/// A row a phase.
+/// One row per phase.
 std::string conversionTable(const ConversionReport& report);
-/// Rate, memory and disk over all phases, with the spread of the rate.
+/// Total rate with its spread, memory and disk space.
 std::string conversionSummary(const ConversionReport& report, const Measurements& measurements);
 /// conversion.png
 Plots conversionPlots(const ConversionReport& report);

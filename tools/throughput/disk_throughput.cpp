@@ -23,7 +23,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Way = DiskRun::Way;
 
-constexpr uint64_t kLargestBlock = kDiskBlocks.back();
+constexpr uint64_t kMaxBlock = kDiskBlocks.back();
 constexpr Way kWays[] = {Way::kDirect, Way::kDirectPread, Way::kBufferedCold, Way::kBufferedWarm};
 
 const char* nameOf(Way way) {
@@ -44,10 +44,10 @@ bool isDirect(Way way) {
   return way == Way::kDirect || way == Way::kDirectPread;
 }
 
-/// The part of a file that is read from.
+/// The part of a file that is measured.
 struct Window {
   const DirectFile* file;
-  uint64_t bytes;  // from the file's beginning
+  uint64_t bytes;  // from offset 0
 };
 
 struct Block {
@@ -55,7 +55,7 @@ struct Block {
   uint64_t offset;
 };
 
-/// All blocks of the windows, shuffled, always in the same way.
+/// All blocks of the windows in a shuffled but fixed order.
 std::vector<Block> blocksOf(std::span<const Window> windows, uint64_t block_bytes) {
   std::vector<Block> blocks;
   for (const Window& window : windows)
@@ -71,9 +71,9 @@ struct Free {
 };
 using Buffer = std::unique_ptr<std::byte, Free>;
 
-/// Bytes a second of reading `blocks` until all are read or `most_s` are over.
+/// Reads `blocks` until all are read or `max_s` seconds have passed. Returns bytes per second.
 double readBlocks(std::span<const Block> blocks, const DiskRun& run, AsyncReads& reads, std::byte* buffer,
-                  double most_s) {
+                  double max_s) {
   const auto start = Clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
   std::vector<size_t> block_of(run.depth);  // [tag]
@@ -102,26 +102,26 @@ double readBlocks(std::span<const Block> blocks, const DiskRun& run, AsyncReads&
     --under_way;
     if (end->result < 0) failed = static_cast<int>(-end->result);
     bytes += static_cast<uint64_t>(std::max<int64_t>(end->result, 0));
-    if (failed == 0 && next < blocks.size() && seconds() < most_s) submitNext(end->tag);
+    if (failed == 0 && next < blocks.size() && seconds() < max_s) submitNext(end->tag);
   }
   if (failed != 0) throw Error("reading {}: {}", nameOf(run.way), std::strerror(failed));
   return static_cast<double>(bytes) / seconds();
 }
 
-/// The files of a cache that drawing reads, and what has been found about them.
+/// The two files of a cache that drawing reads, and the window of each that is measured.
 class CacheFiles {
  public:
-  CacheFiles(const CacheReader& cache, size_t variable, uint64_t most_bytes)
+  CacheFiles(const CacheReader& cache, size_t variable, uint64_t max_bytes)
       : paths_{cache.geometryPath(), cache.valuesPath(variable)} {
     uint64_t all_bytes = 0;
     for (const auto& path : paths_) all_bytes += std::filesystem::file_size(path);
-    if (const uint64_t available = availableMemory()) most_bytes = std::min(most_bytes, available / 4);
-    const double part = static_cast<double>(most_bytes) / static_cast<double>(all_bytes);
+    if (const uint64_t available = availableMemory()) max_bytes = std::min(max_bytes, available / 4);
+    const double part = static_cast<double>(max_bytes) / static_cast<double>(all_bytes);
     for (size_t n = 0; n < paths_.size(); ++n) {
       files_[n] = std::make_unique<DirectFile>(paths_[n]);
       const uint64_t bytes = std::filesystem::file_size(paths_[n]);
-      const auto wanted = static_cast<uint64_t>(part * static_cast<double>(bytes)) / kLargestBlock;
-      windows_.push_back({files_[n].get(), std::min(bytes, (wanted + 1) * kLargestBlock)});
+      const auto wanted = static_cast<uint64_t>(part * static_cast<double>(bytes)) / kMaxBlock;
+      windows_.push_back({files_[n].get(), std::min(bytes, (wanted + 1) * kMaxBlock)});
     }
   }
 
@@ -131,7 +131,8 @@ class CacheFiles {
   }
   std::span<const std::filesystem::path> paths() const { return paths_; }
 
-  /// Reads the windows into the page cache. Nothing if all of them are there then, else why not.
+  /// Reads the windows into the page cache. Returns nullopt if they are all there afterwards, else the
+  /// reason.
   std::optional<std::string> makeWarm() const {
     std::vector<std::byte> piece(1 << 20);
     for (const Window& window : windows_) {
@@ -140,8 +141,8 @@ class CacheFiles {
         file.readAt(at, std::span(piece).first(std::min<uint64_t>(piece.size(), window.bytes - at)));
       const PageResidence residence = residenceOf(window.file->path(), 0, window.bytes);
       if (residence.resident < residence.pages)
-        return fmt::format("only {} of {} pages of {} stay in memory once read", residence.resident,
-                           residence.pages, window.file->path().filename().string());
+        return fmt::format("only {} of {} pages of {} stay in the page cache after being read",
+                           residence.resident, residence.pages, window.file->path().filename().string());
     }
     return std::nullopt;
   }
@@ -152,12 +153,12 @@ class CacheFiles {
   std::vector<Window> windows_;
 };
 
-/// Nothing if the files are now as `way` wants them, else why not.
+/// Brings the files into the state that `way` requires. Returns nullopt, or the reason if that is impossible.
 std::optional<std::string> prepareFiles(const CacheFiles& files, Way way) {
   if (way == Way::kBufferedCold) return dropPages(files.paths());
   if (way == Way::kBufferedWarm) return files.makeWarm();
   const std::string file_system = fileSystemOf(files.paths()[0]);
-  if (isInMemory(file_system)) return fmt::format("{} has no disk", file_system);
+  if (isInMemory(file_system)) return fmt::format("{} is a file system in memory", file_system);
   if (!files.areDirect()) return fmt::format("the file system ({}) refuses direct reads", file_system);
   return std::nullopt;
 }
@@ -175,7 +176,8 @@ void measure(const DiskRun& run, const CacheFiles& files, const DiskEffort& effo
     }
   } catch (const Error& error) {
     if (!isDirect(run.way)) throw;
-    return to.leaveOut(run.name(), error.what());  // a file system that takes O_DIRECT, and then does not
+    return to.leaveOut(run.name(),
+                       error.what());  // the file system accepted O_DIRECT at open but fails reads
   }
   to.add(run.name(), "B/s", std::move(rates));
 }
@@ -200,9 +202,9 @@ std::vector<DiskRun> diskRuns() {
 
 void measureDisk(const CacheReader& cache, size_t variable, const DiskEffort& effort, Measurements& to,
                  Progress& progress) {
-  const CacheFiles files(cache, variable, effort.most_bytes);
+  const CacheFiles files(cache, variable, effort.max_bytes);
   const std::vector<DiskRun> runs = diskRuns();
-  progress.begin("reading the disk", runs.size(), "ways");
+  progress.begin("reading the disk", runs.size(), "runs");
   for (const DiskRun& run : runs) {
     measure(run, files, effort, to);
     progress.advance(1);

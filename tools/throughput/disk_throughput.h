@@ -1,11 +1,11 @@
-// How fast the disk gives a cache's own files, without anything being done with the bytes: direct and
-// buffered, cold and warm, by the size of a read and by how many are under way at once. Reads are those of
-// the pager (direct_file.h, async_reads.h); their places are shuffled, so that no read-ahead flatters.
+// Measures how fast a cache's files can be read, without processing the bytes: direct and buffered, cold and
+// warm, over the size of a read and the number of reads in flight (depth). Uses the pager's own reads
+// (direct_file.h, async_reads.h) at shuffled offsets, so that read-ahead does not distort the result.
 //
-//   disk/direct/256KiB/depth:8            past the page cache: always cold
-//   disk/buffered-cold/256KiB/depth:8     the page cache emptied of the files before each sample, and looked
-//   at disk/buffered-warm/256KiB/depth:8     from the page cache, and all of it found there
-//   disk/direct-pread/256KiB/depth:8      by threads in pread in the place of io_uring
+//   disk/direct/256KiB/depth:8           bypasses the page cache: always cold
+//   disk/buffered-cold/256KiB/depth:8    evicted from the page cache before each sample, checked with mincore
+//   disk/buffered-warm/256KiB/depth:8    from the page cache, checked with mincore
+//   disk/direct-pread/256KiB/depth:8     direct, by threads calling pread instead of io_uring
 #pragma once
 
 #include <array>
@@ -21,9 +21,9 @@
 namespace curvisplat {
 
 struct DiskEffort {
-  double sample_s = 0.25;  // a sample ends after this, or when all has been read once
+  double sample_s = 0.25;  // a sample ends after this time, or when everything was read once
   unsigned samples = 3;
-  uint64_t most_bytes = 256 << 20;  // of the files; never more than a quarter of the memory that is free
+  uint64_t max_bytes = 256 << 20;  // read at most this much of the files, and at most 1/4 of available memory
 };
 
 struct DiskRun {
@@ -39,16 +39,16 @@ struct DiskRun {
 
 inline constexpr std::array<uint64_t, 4> kDiskBlocks{4 << 10, 64 << 10, 256 << 10, 1 << 20};
 inline constexpr std::array<unsigned, 6> kDiskDepths{1, 2, 4, 8, 16, 32};
-/// What the sweeps over one parameter keep of the other: what the pager does.
+/// While one parameter is varied the other has the pager's value.
 inline constexpr uint64_t kPagerBlock = 256 << 10;
 inline constexpr unsigned kPagerDepth = 8;
 
-/// In the order in which they are measured: every way over the blocks at kPagerDepth and over the depths at
+/// All runs in the order of measurement: for every way, all block sizes at kPagerDepth and all depths at
 /// kPagerBlock.
 std::vector<DiskRun> diskRuns();
 
-/// Adds one measurement a run, in B/s, or the reason why there is none. Throws Interrupted, and Error where a
-/// file cannot be read.
+/// Adds for each run one measurement, in B/s, or the reason why it was not measured. Throws Interrupted, and
+/// Error if a file cannot be read.
 void measureDisk(const CacheReader& cache, size_t variable, const DiskEffort& effort, Measurements& to,
                  Progress& progress);
 

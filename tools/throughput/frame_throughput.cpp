@@ -18,7 +18,7 @@ double secondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-std::string sizeWords(uint64_t bytes) {
+std::string sizeText(uint64_t bytes) {
   return bytes % (1 << 20) ? fmt::format("{}B", bytes) : fmt::format("{}MiB", bytes >> 20);
 }
 
@@ -39,12 +39,11 @@ class Frames {
     if (left <= 0 || expected > left)
       return to_.leaveOut(
           configuration.name(),
-          fmt::format("two frames would take longer than what is left of the {:g} s for frames",
-                      effort_.total_s));
+          fmt::format("two frames would exceed the {:g} s allowed for all frames", effort_.total_s));
     try {
       draw(configuration, cut.bytes);
     } catch (const UsageError& error) {
-      to_.leaveOut(configuration.name(), error.what());  // too little memory for it
+      to_.leaveOut(configuration.name(), error.what());  // too little memory
     }
   }
 
@@ -59,7 +58,7 @@ class Frames {
     return options;
   }
 
-  /// By the splats, from what the frames before took a splat and thread.
+  /// Predicts the time from the splats, at the time per splat and thread of the last configuration.
   double expectedSeconds(const FrameConfiguration& configuration, uint64_t splats) const {
     if (done_.empty()) return 0;
     const FramesOfConfiguration& last = done_.back();
@@ -91,9 +90,9 @@ class Frames {
     } else {
       to_.leaveOut(configuration.name() + "/cold", *warm_files);
     }
-    // As many as the time allows, by the first: but that they are spread evenly over the orbit.
+    // As many frames as the time allows, judged by the first one, spread evenly over the orbit.
     const double fit = effort_.configuration_s / std::max(first.total_s, 1e-4);
-    const auto count = static_cast<unsigned>(std::clamp(fit, 1.0, static_cast<double>(effort_.most_frames)));
+    const auto count = static_cast<unsigned>(std::clamp(fit, 1.0, static_cast<double>(effort_.max_frames)));
     std::vector<double> seconds;
     for (const Camera& camera : scene_.orbit(count)) {
       frames.warm.push_back(drawOne(renderer, camera, options));
@@ -136,7 +135,7 @@ Json toJson(const FrameStatistics& frame) {
 }  // namespace
 
 std::string FrameConfiguration::name() const {
-  return fmt::format("frames/lod:{}/threads:{}/memory:{}", lod_pixels, threads, sizeWords(memory_bytes));
+  return fmt::format("frames/lod:{}/threads:{}/memory:{}", lod_pixels, threads, sizeText(memory_bytes));
 }
 
 std::vector<FrameConfiguration> frameConfigurations(std::span<const double> lod_pixels, unsigned threads,

@@ -1,8 +1,9 @@
-// Whole frames, as `render` draws them, on an orbit around the data: the first from the disk, the others with
-// what the memory keeps of the frames before. By error, threads and memory, one varied at a time.
+// Measures whole frames, as `render` draws them, on an orbit around the data. The first frame reads from the
+// disk; later ones also use bricks that earlier frames left in memory. Varies error, threads and memory one
+// at a time.
 //
-//   frames/lod:1/threads:2/memory:512MiB          s a frame, after the first
-//   frames/lod:1/threads:2/memory:512MiB/cold     s of the first one, its files out of the page cache
+//   frames/lod:1/threads:2/memory:512MiB        s per frame, after the first
+//   frames/lod:1/threads:2/memory:512MiB/cold   s of the first frame, files not in the page cache
 #pragma once
 
 #include <cstdint>
@@ -20,9 +21,9 @@
 namespace curvisplat {
 
 struct FrameEffort {
-  double configuration_s = 4;  // about so long are frames of one configuration drawn; two at least
-  double total_s = 90;         // what would go on longer is left out
-  unsigned most_frames = 24;
+  double configuration_s = 4;  // approximate time for the frames of one configuration (at least two)
+  double total_s = 90;         // configurations that would exceed this total are skipped
+  unsigned max_frames = 24;
 };
 
 struct FrameConfiguration {
@@ -37,17 +38,18 @@ struct FrameConfiguration {
 
 struct FramesOfConfiguration {
   FrameConfiguration configuration;
-  uint64_t bytes = 0;  // of the streams of a frame's bricks, from the first camera
+  uint64_t bytes = 0;  // compressed size of the bricks of the first camera's frame
   std::optional<FrameStatistics> cold;
-  std::vector<FrameStatistics> warm;  // one at least
+  std::vector<FrameStatistics> warm;  // at least one
 };
 
-/// What is to be drawn, coarsest first: the errors with all threads and the memory given; then, at the error
-/// in the middle, fewer threads, and a quarter and four times the memory. Each once.
+/// The configurations to draw: every error, coarsest first, with all threads and the given memory; then, at
+/// the median error, fewer threads, and a quarter and four times the memory. Without duplicates.
 std::vector<FrameConfiguration> frameConfigurations(std::span<const double> lod_pixels, unsigned threads,
                                                     uint64_t memory_bytes, uint64_t available_bytes);
 
-/// Adds to `to`, and returns what was drawn. Throws Interrupted, and as FrameRenderer does.
+/// Adds the measurements to `to` and returns the statistics of the drawn frames. Throws Interrupted, and what
+/// FrameRenderer throws.
 std::vector<FramesOfConfiguration> measureFrames(const ThroughputScene& scene,
                                                  std::span<const FrameConfiguration> configurations,
                                                  const FrameEffort& effort, Measurements& to,
@@ -56,7 +58,7 @@ std::vector<FramesOfConfiguration> measureFrames(const ThroughputScene& scene,
 /// [{"lod_pixels", "threads", "memory_bytes", "stream_bytes", "frames", "median": {...}, "cold": {...}}]
 nlohmann::ordered_json toJson(std::span<const FramesOfConfiguration> frames);
 
-/// The frame in the middle by its time.
+/// The median frame by time.
 const FrameStatistics& medianFrame(const std::vector<FrameStatistics>& frames);
 
 }  // namespace curvisplat

@@ -12,7 +12,7 @@
 namespace curvisplat {
 namespace {
 
-/// What stands behind "key :" on the first such line of a file of /proc, which have no size.
+/// The value of the first line "key : value" of a file of /proc; empty if there is none.
 std::string valueIn(const char* path, const std::string& key) {
   std::ifstream file(path);
   for (std::string line; std::getline(file, line);) {

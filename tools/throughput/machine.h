@@ -1,4 +1,4 @@
-// The machine that was measured, in words.
+// Describes the machine that was measured.
 #pragma once
 
 #include <cstdint>
@@ -9,17 +9,17 @@
 namespace curvisplat {
 
 struct Machine {
-  std::string processor;  // "Intel(R) Xeon(R) Processor @ 2.90GHz"; empty if the system does not tell
-  unsigned cores = 1;     // that this process may use
+  std::string processor;  // "Intel(R) Xeon(R) Processor @ 2.90GHz"; empty if unknown
+  unsigned cores = 1;     // usable by this process
   uint64_t memory_bytes = 0;
   std::string system;       // "Linux 6.1.0"
-  std::string file_system;  // of the folder that was measured: "ext4"
+  std::string file_system;  // of the measured folder: "ext4"
 
   static Machine here(const std::filesystem::path& folder);
   nlohmann::ordered_json toJson() const;
 };
 
-/// What the system could still give to programs, the page cache included. 0 if it does not tell.
+/// MemAvailable of /proc/meminfo in bytes; 0 if unknown.
 uint64_t availableMemory();
 
 }  // namespace curvisplat

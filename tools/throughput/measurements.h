@@ -1,7 +1,8 @@
-// What was measured: a name that stays the same from version to version, a unit, and one number a sample.
+// The results of `bench`: measurements with a name that is stable across versions, a unit, and one number per
+// sample.
 //
-// A name is a path, its parameters last and named: "disk/direct/256KiB/depth:8", "stages/project/threads:2".
-// What could not be measured is kept as well, with the reason: a row is never missing without a word.
+// A name is a path that ends with named parameters: "disk/direct/256KiB/depth:8", "stages/project/threads:2".
+// Measurements that could not be made are kept with the reason, so that none is missing without explanation.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -17,19 +18,19 @@ struct Measurement {
   std::string unit;  // "B/s", "splats/s", "nodes/s", "s", "B"
   std::vector<double> samples;
 
-  /// Of a rate more is better, of seconds and bytes less.
+  /// True for rates; false for seconds and bytes.
   bool moreIsBetter() const;
 };
 
-/// The middle sample, or the mean of the two in the middle. At least one.
+/// The median. Requires at least one sample.
 double medianOf(std::vector<double> samples);
 
-/// Half the distance from the smallest to the largest sample, as a part of the median; 0 of one sample.
+/// Half the distance from the smallest to the largest sample, as a fraction of the median; 0 for one sample.
 double spreadOf(const std::vector<double>& samples);
 
 class Measurements {
  public:
-  /// At least one sample, each finite; a name comes once.
+  /// Requires at least one sample, finite samples, and a new name.
   void add(std::string name, std::string unit, std::vector<double> samples);
   void leaveOut(std::string name, std::string reason);
 
@@ -40,7 +41,7 @@ class Measurements {
   const std::vector<LeftOut>& leftOut() const { return left_out_; }
 
   const Measurement* find(std::string_view name) const;
-  /// Nothing where it was not measured.
+  /// nullopt if it was not measured.
   std::optional<double> median(std::string_view name) const;
 
   /// [{"name", "unit", "better": "more" or "less", "median", "samples": [...]}]

@@ -19,20 +19,20 @@
 namespace curvisplat {
 namespace {
 
-// As linux/magic.h and the file systems' own sources have them.
+// Values of statfs.f_type, from linux/magic.h and the sources of the file systems.
 constexpr std::pair<uint64_t, const char*> kFileSystems[] = {
     {0xEF53, "ext4"},       {0x58465342, "xfs"},     {0x9123683E, "btrfs"}, {0x01021994, "tmpfs"},
     {0x858458F6, "ramfs"},  {0x794C7630, "overlay"}, {0x6969, "nfs"},       {0x65735546, "fuse"},
     {0x0BD00BD0, "lustre"}, {0x2FC12FC1, "zfs"},     {0x47504653, "gpfs"},  {0xFF534D42, "cifs"},
     {0xFE534D42, "smb2"},   {0xF2F52010, "f2fs"},    {0x01021997, "9p"},    {0x00C36400, "ceph"}};
 
-/// A part of a file in this process' address space; no page of it is touched.
+/// Maps a part of a file without touching its pages.
 class Mapping {
  public:
   Mapping(const DirectFile& file, uint64_t offset, uint64_t bytes) : bytes_(bytes) {
     at_ = ::mmap(nullptr, bytes, PROT_READ, MAP_SHARED, file.bufferedFd(), static_cast<off_t>(offset));
     if (at_ == MAP_FAILED)
-      throw Error("{}: {} bytes from {} on cannot be mapped: {}", file.path().string(), bytes, offset,
+      throw Error("{}: cannot map {} bytes at offset {}: {}", file.path().string(), bytes, offset,
                   std::strerror(errno));
   }
   ~Mapping() { ::munmap(at_, bytes_); }
@@ -56,8 +56,7 @@ PageResidence residenceOf(const std::filesystem::path& path, uint64_t offset, ui
   const Mapping mapping(file, offset, bytes);
   std::vector<unsigned char> resident((bytes + page - 1) / page);
   if (::mincore(mapping.at(), bytes, resident.data()) != 0)
-    throw Error("{}: mincore does not tell which pages are in memory: {}", path.string(),
-                std::strerror(errno));
+    throw Error("{}: mincore failed: {}", path.string(), std::strerror(errno));
   const auto in_memory =
       std::count_if(resident.begin(), resident.end(), [](unsigned char flags) { return flags & 1; });
   return {resident.size(), static_cast<uint64_t>(in_memory)};
@@ -71,7 +70,7 @@ std::optional<std::string> dropPages(std::span<const std::filesystem::path> file
   for (const std::filesystem::path& path : files) {
     {
       const DirectFile file(path, false);
-      // Pages that are still to be written stay. Whether both worked, mincore says.
+      // Unwritten pages cannot be evicted, hence the sync. mincore shows below whether both calls worked.
       SystemCalls::current().fsync(file.bufferedFd());
       ::posix_fadvise(file.bufferedFd(), 0, 0, POSIX_FADV_DONTNEED);
     }
@@ -80,8 +79,8 @@ std::optional<std::string> dropPages(std::span<const std::filesystem::path> file
     const std::string file_system = fileSystemOf(path);
     return fmt::format("{} of {} pages of {} stay in memory ({}): {}", left.resident, left.pages,
                        path.filename().string(), file_system,
-                       isInMemory(file_system) ? "that file system has no disk"
-                                               : "another program uses them, or the file is not one's own");
+                       isInMemory(file_system) ? "this file system keeps its files in memory"
+                                               : "another program uses them, or another user owns the file");
   }
   return std::nullopt;
 }
@@ -89,7 +88,7 @@ std::optional<std::string> dropPages(std::span<const std::filesystem::path> file
 std::string fileSystemOf(const std::filesystem::path& path) {
   struct statfs status {};
   if (::statfs(path.c_str(), &status) != 0)
-    throw Error("{}: its file system cannot be told: {}", path.string(), std::strerror(errno));
+    throw Error("{}: cannot determine its file system: {}", path.string(), std::strerror(errno));
   const auto magic = static_cast<uint64_t>(status.f_type) & 0xFFFFFFFF;
   for (const auto& [number, name] : kFileSystems)
     if (number == magic) return name;

@@ -1,5 +1,4 @@
-// Which pages of a file lie in memory, and how to get them out: for reads that are to be cold, and known to
-// be.
+// Finds which pages of a file are in the page cache, and evicts them, so that reads are verifiably cold.
 #pragma once
 
 #include <cstdint>
@@ -12,24 +11,25 @@ namespace curvisplat {
 
 struct PageResidence {
   uint64_t pages = 0;
-  uint64_t resident = 0;  // of those, in memory
+  uint64_t resident = 0;  // of these, in the page cache
   bool operator==(const PageResidence&) const = default;
 };
 
-/// Of `bytes` bytes of the file from `offset` (a multiple of the page) on, asked with mincore. The kernel
-/// says "all" of a file that the caller neither owns nor may write. Throws Error.
+/// Residence of `bytes` bytes of the file from `offset`, a multiple of the page size; uses mincore. The
+/// kernel reports all pages of a file as resident if the caller neither owns it nor may write it. Throws
+/// Error.
 PageResidence residenceOf(const std::filesystem::path& file, uint64_t offset, uint64_t bytes);
-/// Of the whole file.
+/// Residence of the whole file.
 PageResidence residenceOf(const std::filesystem::path& file);
 
-/// Writes back and drops the pages of `files`, and looks whether they are gone. Nothing if all are, else the
-/// reason in words: a file system in memory keeps them, and so does another process that maps them. Throws
-/// Error where a file cannot be opened.
+/// Writes back and evicts the pages of `files`, then checks with mincore. Returns nullopt if all are evicted,
+/// else the reason: a file system in memory keeps its pages, and so does another process that maps them.
+/// Throws Error if a file cannot be opened.
 std::optional<std::string> dropPages(std::span<const std::filesystem::path> files);
 
-/// "ext4", "tmpfs", ...: the file system that `path` is on.
+/// The file system that holds `path`: "ext4", "tmpfs", ...
 std::string fileSystemOf(const std::filesystem::path& path);
-/// Whether it has no disk below it.
+/// Whether the file system keeps its files in memory.
 bool isInMemory(const std::string& file_system);
 
 }  // namespace curvisplat

@@ -18,7 +18,7 @@ namespace {
 struct Colour {
   double r, g, b;
 };
-// Okabe and Ito's, which people tell apart who do not see all colours; the yellow is left out.
+// Okabe and Ito's palette for colour-blind readers, without its yellow.
 constexpr std::array<Colour, 7> kColours{{{0.00, 0.45, 0.70},
                                           {0.84, 0.37, 0.00},
                                           {0.00, 0.62, 0.45},
@@ -27,21 +27,20 @@ constexpr std::array<Colour, 7> kColours{{{0.00, 0.45, 0.70},
                                           {0.90, 0.62, 0.00},
                                           {0.40, 0.40, 0.40}}};
 constexpr Colour kInk{0.13, 0.13, 0.13}, kGrid{0.87, 0.87, 0.87}, kFaint{0.4, 0.4, 0.4};
-constexpr double kPixelsAPoint = 2;  // for dense screens
-constexpr double kPanelWidth = 460, kLineHeight = 320, kBarHeight = 19, kKeyHeight = 20;
+constexpr double kPixelsPerPoint = 2;  // for high-resolution displays
+constexpr double kPanelWidth = 460, kLineHeight = 320, kBarHeight = 19, kLegendHeight = 20;
 constexpr double kFont = 12, kTitleFont = 14;
 
 class Canvas {
  public:
   Canvas(double width, double height)
       : surface_(cairo_image_surface_create(CAIRO_FORMAT_RGB24,
-                                            static_cast<int>(std::ceil(kPixelsAPoint * width)),
-                                            static_cast<int>(std::ceil(kPixelsAPoint * height)))),
+                                            static_cast<int>(std::ceil(kPixelsPerPoint * width)),
+                                            static_cast<int>(std::ceil(kPixelsPerPoint * height)))),
         cairo_(cairo_create(surface_.get())) {
     if (const cairo_status_t status = cairo_status(cairo_.get()); status != CAIRO_STATUS_SUCCESS)
-      throw Error("a plot of {} by {} points cannot be drawn: {}", width, height,
-                  cairo_status_to_string(status));
-    cairo_scale(get(), kPixelsAPoint, kPixelsAPoint);
+      throw Error("cannot draw a plot of {} by {} points: {}", width, height, cairo_status_to_string(status));
+    cairo_scale(get(), kPixelsPerPoint, kPixelsPerPoint);
     cairo_set_source_rgb(get(), 1, 1, 1);
     cairo_paint(get());
     cairo_set_line_join(get(), CAIRO_LINE_JOIN_ROUND);
@@ -60,16 +59,16 @@ class Canvas {
     cairo_text_extents(get(), text.c_str(), &extents);
     return extents.x_advance;
   }
-  /// `along`: 0 begins at x, 0.5 is centred on it, 1 ends there. The baseline is at y.
-  void text(double x, double y, const std::string& words, double along = 0) {
-    cairo_move_to(get(), x - along * widthOf(words), y);
-    cairo_show_text(get(), words.c_str());
+  /// `along`: the text begins (0), is centred (0.5) or ends (1) at x. The baseline is at y.
+  void text(double x, double y, const std::string& string, double along = 0) {
+    cairo_move_to(get(), x - along * widthOf(string), y);
+    cairo_show_text(get(), string.c_str());
   }
-  void textUpwards(double x, double y, const std::string& words) {
+  void textUpwards(double x, double y, const std::string& string) {
     cairo_save(get());
     cairo_translate(get(), x, y);
     cairo_rotate(get(), -M_PI / 2);
-    text(0, 0, words, 0.5);
+    text(0, 0, string, 0.5);
     cairo_restore(get());
   }
   void line(double x0, double y0, double x1, double y1) {
@@ -89,7 +88,7 @@ class Canvas {
     cairo_surface_flush(surface_.get());
     const cairo_status_t status = cairo_surface_write_to_png_stream(surface_.get(), append, &bytes);
     if (status != CAIRO_STATUS_SUCCESS)
-      throw Error("a plot cannot be made a PNG: {}", cairo_status_to_string(status));
+      throw Error("cannot write a plot as PNG: {}", cairo_status_to_string(status));
     return bytes;
   }
 
@@ -102,15 +101,15 @@ class Canvas {
   std::unique_ptr<cairo_t, Destroy> cairo_;
 };
 
-/// Names with a patch of their colour, in rows. Returns the height.
-double drawKey(Canvas* canvas, double left, double top, double width, const std::vector<std::string>& names,
-               Canvas& measure) {
+/// Draws a legend of colour patches and names in rows; with a null canvas only measures. Returns the height.
+double drawLegend(Canvas* canvas, double left, double top, double width,
+                  const std::vector<std::string>& names, Canvas& measure) {
   double x = left, y = top;
   for (size_t n = 0; n < names.size(); ++n) {
     const double needed = 18 + measure.widthOf(names[n]) + 14;
     if (x > left && x + needed > left + width) {
       x = left;
-      y += kKeyHeight;
+      y += kLegendHeight;
     }
     if (canvas) {
       canvas->ink(kColours[n % kColours.size()]);
@@ -121,7 +120,7 @@ double drawKey(Canvas* canvas, double left, double top, double width, const std:
     }
     x += needed;
   }
-  return y - top + kKeyHeight;
+  return y - top + kLegendHeight;
 }
 
 void drawTitle(Canvas& canvas, double left, const std::string& title) {
@@ -151,7 +150,7 @@ void drawLines(Canvas& canvas, double panel_left, double panel_top, const LinePa
   const double top = panel_top + 8, bottom = panel_top + kLineHeight - 46;
   const double low = std::log(*xs.begin()), high = std::log(*xs.rbegin());
   const auto xOf = [&](double x) {
-    const double inset = 14;  // so that the first and last point are not on the frame
+    const double inset = 14;  // keeps the first and last point off the frame
     if (!(high > low)) return (left + right) / 2;
     return left + inset + (std::log(x) - low) / (high - low) * (right - left - 2 * inset);
   };
@@ -253,26 +252,26 @@ void drawBody(Canvas& canvas, double left, double top, const BarPanel& panel) {
   drawBars(canvas, left, top, panel);
 }
 
-/// Title, key and body of each panel, from left to right.
+/// Draws title, legend and body of each panel, from left to right.
 template <typename Panel>
 std::vector<std::byte> drawPanels(const std::vector<Panel>& panels) {
   CURVISPLAT_CHECK(!panels.empty());
-  constexpr double kKeyTop = 36;
+  constexpr double kLegendTop = 36;
   Canvas ruler(1, 1);
   ruler.font(kFont);
-  double key_height = 0, body_height = 0;
+  double legend_height = 0, body_height = 0;
   for (const Panel& panel : panels) {
     const std::vector<std::string> names = namesOf(panel);
     if (!names.empty())
-      key_height = std::max(key_height, drawKey(nullptr, 0, 0, kPanelWidth - 36, names, ruler));
+      legend_height = std::max(legend_height, drawLegend(nullptr, 0, 0, kPanelWidth - 36, names, ruler));
     body_height = std::max(body_height, heightOf(panel));
   }
-  const double top = kKeyTop + key_height + 4;
+  const double top = kLegendTop + legend_height + 4;
   Canvas canvas(kPanelWidth * static_cast<double>(panels.size()), top + body_height + 8);
   for (size_t n = 0; n < panels.size(); ++n) {
     const double left = kPanelWidth * static_cast<double>(n);
     drawTitle(canvas, left, panels[n].title);
-    drawKey(&canvas, left + 12, kKeyTop, kPanelWidth - 36, namesOf(panels[n]), canvas);
+    drawLegend(&canvas, left + 12, kLegendTop, kPanelWidth - 36, namesOf(panels[n]), canvas);
     drawBody(canvas, left, top, panels[n]);
   }
   return canvas.png();

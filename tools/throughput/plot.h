@@ -1,5 +1,5 @@
-// Plots for a report: lines over sizes or counts, and bars, drawn with Cairo. Axes of values begin at zero,
-// so that lengths compare.
+// Draws plots with Cairo: lines over sizes or counts, and bars. Linear value axes begin at zero, so that
+// lengths can be compared.
 #pragma once
 
 #include <cstddef>
@@ -15,35 +15,35 @@ struct PlotLine {
   struct Point {
     double x, y;
   };
-  std::vector<Point> points;  // x increasing
+  std::vector<Point> points;  // by increasing x
 };
 
-/// Lines over x at equal ratios (a logarithmic axis), with a tick at every x that a line has.
+/// Lines over a logarithmic x axis, with a tick at the x of every point.
 struct LinePanel {
   std::string title, x_name, y_name;
   std::vector<PlotLine> lines;
-  std::function<std::string(double)> x_label;  // of a tick
-  bool log_values = false;                     // y at equal ratios too; all above zero
+  std::function<std::string(double)> x_label;  // text of a tick
+  bool log_values = false;                     // logarithmic y axis; requires positive values
 };
 
 struct Bar {
   std::string label;
   double value;
-  std::string text;  // behind the bar: the value for people
-  size_t colour;     // bars of one kind have one colour
+  std::string text;  // the value as text, drawn beside the bar
+  size_t colour;     // bars of one kind share a colour
 };
 
-/// Horizontal bars, from the top down.
+/// Horizontal bars, from top to bottom.
 struct BarPanel {
   std::string title, x_name;
   std::vector<Bar> bars;
-  std::vector<std::string> kinds;  // [colour]: for the key; one is not told
+  std::vector<std::string> kinds;  // [colour], names for the legend; no legend for fewer than two
 };
 
-/// Files' names, and their PNGs.
+/// PNG files: bytes by file name.
 using Plots = std::map<std::string, std::vector<std::byte>>;
 
-/// A picture of panels side by side, as the bytes of a PNG file. Throws Error.
+/// Draws the panels side by side. Returns the bytes of a PNG file. Throws Error.
 std::vector<std::byte> drawPlot(const std::vector<LinePanel>& panels);
 std::vector<std::byte> drawPlot(const std::vector<BarPanel>& panels);
 

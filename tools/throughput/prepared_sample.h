@@ -1,5 +1,5 @@
-// The bricks of a sample in all the forms that they take on their way to the painter, in memory, so that each
-// stage can be run alone, again and again.
+// Holds the bricks of a sample in memory in the form each stage of a frame expects (compressed, decoded,
+// projected, sorted), so that each stage can be run alone and repeatedly.
 #pragma once
 
 #include <cstdint>
@@ -17,11 +17,11 @@ namespace curvisplat {
 
 class PreparedSample {
  public:
-  /// Reads, decodes, projects and sorts. All borrowed. Throws Error.
+  /// Reads, decodes, projects and sorts the sample. Keeps references to all arguments. Throws Error.
   PreparedSample(const CacheReader& cache, size_t variable, const FramePlanner& planner,
                  const FramePlan& plan, const BrickSample& sample);
 
-  /// What a thread works with; reused from brick to brick.
+  /// Buffers of one thread, reused for every brick.
   struct Scratch {
     SplatGeometry geometry;
     SplatVariable values;
@@ -32,19 +32,19 @@ class PreparedSample {
   };
 
   size_t size() const { return bricks_.size(); }
-  uint64_t splats() const { return splats_; }    // of the parts: projected
-  uint64_t decoded() const { return decoded_; }  // of the bricks: decoded
+  uint64_t splats() const { return splats_; }    // in the sampled parts; these are projected
+  uint64_t decoded() const { return decoded_; }  // in the whole bricks; these are decoded
   uint64_t screenSplats() const { return on_screen_; }
-  uint64_t bytes() const { return bytes_; }  // of the streams
+  uint64_t bytes() const { return bytes_; }  // compressed
 
-  /// The stages, of the n-th brick. Any thread, with a scratch of its own.
+  /// Runs one stage on brick n. Any thread, each with its own scratch.
   void verify(size_t n) const;
   void decode(size_t n, Scratch& scratch) const;
   void project(size_t n, Scratch& scratch) const;
   void sort(size_t n, Scratch& scratch) const;
-  void prepare(size_t n, Scratch& scratch) const;  // all of them
+  void prepare(size_t n, Scratch& scratch) const;  // all stages in sequence
 
-  /// What the painter is given: the splats, sorted, nearest first, and how many each brick has of them.
+  /// The painter's input: splats sorted nearest first, and the number of splats of each brick.
   const std::vector<ScreenSplat>& toDraw() const { return to_draw_; }
   const std::vector<uint32_t>& segments() const { return segments_; }
 
@@ -54,7 +54,7 @@ class PreparedSample {
     std::vector<std::byte> geometry_bytes, values_bytes;
     SplatGeometry geometry;
     SplatVariable values;
-    std::vector<float> depths;  // of its splats on the screen, unsorted
+    std::vector<float> depths;  // of the splats on the screen, unsorted
     std::vector<ScreenSplat> projected;
   };
 

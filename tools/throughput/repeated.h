@@ -1,4 +1,4 @@
-// Runs a job often enough for its time to be worth measuring.
+// Repeats a job until its run time can be measured reliably.
 #pragma once
 
 #include <chrono>
@@ -7,8 +7,8 @@
 
 namespace curvisplat {
 
-/// Seconds a run of `job`, one number a sample: each sample is as many runs as take `sample_s` seconds, one
-/// at least. A first run, which fills caches and makes memory, is not counted.
+/// Seconds per run of `job`, one number per sample. A sample repeats the job until `sample_s` seconds have
+/// passed, at least once. A first run, which warms caches and allocates memory, is not counted.
 inline std::vector<double> secondsOfRuns(double sample_s, unsigned samples,
                                          const std::function<void()>& job) {
   job();

@@ -18,7 +18,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kPagerBufferBytes = 32 << 20;  // the most that a frame gives it
+constexpr uint64_t kPagerBufferBytes = 32 << 20;  // what a frame gives the pager at most
 
 std::vector<double> ratesOf(const std::vector<double>& seconds, uint64_t count) {
   std::vector<double> rates;
@@ -31,7 +31,7 @@ uint64_t streamBytes(const CacheReader& cache, size_t variable, uint32_t brick) 
          cache.brickVariables(variable)[brick].values.length;
 }
 
-/// The bricks of `parts`, each once, in their order.
+/// The bricks of `parts` in their order, without duplicates.
 std::vector<uint32_t> bricksOf(std::span<const BrickPart> parts) {
   std::set<uint32_t> seen;
   std::vector<uint32_t> bricks;
@@ -62,10 +62,10 @@ class Stages {
     read();
     progress_.advance(1);
     if (plan_.cut.parts.empty()) {
-      to_.leaveOut("stages", "nothing of the data is in the picture, or all of it is transparent");
+      to_.leaveOut("stages", "no data is in view, or all of it is transparent");
       return report_;
     }
-    const BrickSample chosen = sampleOf(plan_.cut.parts, scene_.cache.bricks(), effort_.most_splats);
+    const BrickSample chosen = sampleOf(plan_.cut.parts, scene_.cache.bricks(), effort_.max_splats);
     const PreparedSample sample(scene_.cache, scene_.variable, planner_, plan_, chosen);
     report_.sampled_splats = sample.splats();
     using Scratch = PreparedSample::Scratch;
@@ -87,13 +87,14 @@ class Stages {
   }
 
  private:
-  /// The pager alone. Direct reads are cold; for others the page cache is emptied.
+  /// Measures the pager alone, cold: direct reads bypass the page cache, for others the files are evicted
+  /// from it.
   void read() {
     const std::vector<uint32_t> all = bricksOf(plan_.cut.parts);
     uint64_t bytes = 0;
     std::vector<uint32_t> bricks;
     for (const uint32_t brick : all) {
-      if (bytes > 0 && bytes + streamBytes(scene_.cache, scene_.variable, brick) > effort_.most_read_bytes)
+      if (bytes > 0 && bytes + streamBytes(scene_.cache, scene_.variable, brick) > effort_.max_read_bytes)
         break;
       bytes += streamBytes(scene_.cache, scene_.variable, brick);
       bricks.push_back(brick);
@@ -103,12 +104,12 @@ class Stages {
         std::max(kPagerBufferBytes, BrickPager::leastBufferBytes(scene_.cache, scene_.variable));
     BrickPager pager(scene_.cache, scene_.variable, options);
     report_.read_by = pager.way();
-    if (bricks.empty()) return to_.leaveOut("stages/read", "the frame has no bricks");
+    if (bricks.empty()) return to_.leaveOut("stages/read", "no brick is in view");
     const std::filesystem::path files[] = {scene_.cache.geometryPath(),
                                            scene_.cache.valuesPath(scene_.variable)};
     std::vector<double> rates;
     for (unsigned sample = 0; sample < effort_.samples; ++sample) {
-      // Of no use to direct reads, which are cold as they are; but then it cannot be wrong to have done it.
+      // Direct reads are cold anyway; for them a failure to evict does not matter.
       const auto reason = dropPages(files);
       if (reason && report_.read_by.find("direct") == std::string::npos)
         return to_.leaveOut("stages/read", *reason);
@@ -117,7 +118,7 @@ class Stages {
       for (size_t n = 0; n < bricks.size(); ++n) {
         const auto brick = pager.take(n);
         if (!brick || !brick->readable())
-          throw Error("{}: brick {} cannot be read; `curvisplat info --verify` tells what is damaged",
+          throw Error("{}: cannot read brick {}; `curvisplat info --verify` lists the damage",
                       scene_.cache.path().string(), bricks[n]);
       }
       const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -128,7 +129,7 @@ class Stages {
 
   using BrickJob = std::function<void(size_t brick, PreparedSample::Scratch&)>;
 
-  /// Runs `job` on every brick of the sample, on one thread and on all.
+  /// Measures `job` on every brick of the sample, on one thread and on all.
   void onWorkers(const std::string& stage, const PreparedSample& sample, uint64_t splats, uint64_t bytes,
                  const BrickJob& job) {
     std::set<unsigned> counts{1, threads_};
@@ -158,7 +159,7 @@ class Stages {
     if (sample.toDraw().empty())
       return to_.leaveOut("stages/" + stage, "no splat of the sample reaches the screen");
     const auto backend = makeBackend(parsedBackend(found.word));
-    // OpenGL's threads are its own; the processor's painter takes as many as it is given.
+    // OpenGL uses its own threads; only the processor's painter takes a thread count.
     std::set<unsigned> counts{0};
     if (found.word == "cpu") counts = {1, threads_};
     for (const unsigned count : counts) {

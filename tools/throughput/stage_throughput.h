@@ -1,11 +1,11 @@
-// How fast each stage of a frame is by itself, on one core and on all: read, verify, decode, project, sort,
-// draw, and what a worker does with a brick in one go (prepare). On a sample of the bricks of one frame at
-// the finest error asked for, from memory but for read.
+// Measures each stage of a frame in isolation, on one thread and on all: read, verify, decode, project, sort,
+// draw, and prepare (verify to sort of one brick, as a worker does it). Uses a sample of the bricks of one
+// frame at the finest given error. All stages but read work on data in memory.
 //
-//   stages/read                     B/s of the bricks' streams, by the pager, decoding off
-//   stages/decode/threads:2         splats/s; with /bytes: B/s of the streams; so for verify, prepare
-//   stages/draw/cpu/threads:2       splats/s that reach the screen
-//   stages/draw/osmesa              in OpenGL's own threads
+//   stages/read                     B/s of compressed bricks through the pager, without decoding
+//   stages/decode/threads:2         splats/s; .../bytes: B/s of compressed bricks (also verify, prepare)
+//   stages/draw/cpu/threads:2       splats/s, counting splats that reach the screen
+//   stages/draw/osmesa              the same with OpenGL's own threads
 #pragma once
 
 #include <cstdint>
@@ -19,24 +19,25 @@
 namespace curvisplat {
 
 struct StageEffort {
-  double sample_s = 0.15;  // a sample is repeated until it takes as long
+  double sample_s = 0.15;  // a sample repeats its stage until this time has passed
   unsigned samples = 3;
-  uint64_t most_splats = 1'500'000;      // in memory: 200 bytes each
-  uint64_t most_read_bytes = 128 << 20;  // that the pager reads
+  uint64_t max_splats = 1'500'000;      // size of the sample; 200 bytes of memory each
+  uint64_t max_read_bytes = 128 << 20;  // size of the sample of stages/read
 };
 
-/// What was measured, for people and for the verdict.
+/// What the report and the verdict need besides the measurements.
 struct StageReport {
   uint64_t frame_splats = 0, sampled_splats = 0;
   std::string read_by;  // "io_uring, direct"
   std::vector<BackendReport> backends;
-  bool card_draws = false;  // a graphics card does, through EGL
+  bool card_draws = false;  // whether EGL draws with a graphics card
 };
 
 /// "stages/decode/threads:2"
 std::string stageName(const std::string& stage, unsigned threads);
 
-/// Adds to `to`. `threads`: the most. Throws Interrupted, and Error where bricks cannot be read.
+/// Adds the measurements to `to`. `threads`: the largest number of threads. Throws Interrupted, and Error if
+/// bricks cannot be read.
 StageReport measureStages(const ThroughputScene& scene, unsigned threads, const StageEffort& effort,
                           Measurements& to, Progress& progress);
 

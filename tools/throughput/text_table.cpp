@@ -9,7 +9,7 @@
 namespace curvisplat {
 namespace {
 
-/// On a terminal: bytes of UTF-8 that continue a character take no room.
+/// Width on a terminal, in characters: continuation bytes of UTF-8 do not count.
 size_t widthOf(const std::string& text) {
   return static_cast<size_t>(
       std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
@@ -19,7 +19,7 @@ std::string threeDigits(double value) {
   return fmt::format("{:.{}f}", value, value < 9.995 ? 2 : value < 99.95 ? 1 : 0);
 }
 
-/// With a letter for powers of 1000.
+/// With a unit prefix for powers of 1000.
 std::string scaled(double value) {
   for (const auto& [size, letter] : {std::pair{1e12, "T"}, {1e9, "G"}, {1e6, "M"}, {1e3, "k"}})
     if (value >= size) return threeDigits(value / size) + " " + letter;

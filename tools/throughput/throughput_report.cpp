@@ -15,7 +15,7 @@ namespace {
 
 struct DiskWay {
   DiskRun::Way way;
-  const char* words;
+  const char* label;
 };
 constexpr DiskWay kDiskWays[] = {{DiskRun::Way::kDirect, "direct"},
                                  {DiskRun::Way::kDirectPread, "direct, pread"},
@@ -24,7 +24,7 @@ constexpr DiskWay kDiskWays[] = {{DiskRun::Way::kDirect, "direct"},
 constexpr const char* kWorkerStages[] = {"verify", "decode", "project", "sort", "prepare"};
 constexpr const char* kBackends[] = {"cpu", "osmesa", "egl"};
 
-std::string blockWords(double bytes) {
+std::string sizeText(double bytes) {
   return bytes >= 1 << 20 ? fmt::format("{:.0f} MiB", bytes / (1 << 20))
                           : fmt::format("{:.0f} KiB", bytes / (1 << 10));
 }
@@ -42,8 +42,8 @@ std::string diskRows(const Measurements& measurements, const std::string& head, 
   std::vector<std::string> heads{head};
   for (const DiskRun& run : runs) heads.push_back(column(run));
   TextTable table(heads);
-  for (const auto& [way, words] : kDiskWays) {
-    std::vector<std::string> row{words};
+  for (const auto& [way, label] : kDiskWays) {
+    std::vector<std::string> row{label};
     bool any = false;
     for (DiskRun run : runs) {
       run.way = way;
@@ -75,34 +75,34 @@ std::string byteRate(std::optional<double> rate) {
   return rate ? shortBytes(*rate) + "/s" : "-";
 }
 
-/// A stage's row: on one thread, on all, and how many times as fast those are.
-std::vector<std::string> stageRow(const std::string& words, const Measurements& measurements,
+/// A stage's row: its rate on one thread and on all threads, and the ratio.
+std::vector<std::string> stageRow(const std::string& label, const Measurements& measurements,
                                   const std::string& one_name, const std::string& all_name,
                                   std::string (*cell)(std::optional<double>)) {
   const auto one = measurements.median(one_name), all = measurements.median(all_name);
-  std::vector<std::string> row{words, cell(one)};
+  std::vector<std::string> row{label, cell(one)};
   if (one_name == all_name) return row;
   row.push_back(cell(all));
   if (one && all) row.push_back(fmt::format("{:.2f}", *all / *one));
   return row;
 }
 
-/// Of what has threads of its own: below "all".
-std::vector<std::string> ownRow(const std::string& words, const std::string& cell, unsigned threads) {
-  return threads > 1 ? std::vector<std::string>{words, "", cell} : std::vector<std::string>{words, cell};
+/// The row of a stage with its own threads; its rate goes to the column of all threads.
+std::vector<std::string> ownRow(const std::string& label, const std::string& cell, unsigned threads) {
+  return threads > 1 ? std::vector<std::string>{label, "", cell} : std::vector<std::string>{label, cell};
 }
 
 LinePanel diskPanel(const Measurements& measurements, std::span<const DiskRun> runs, bool over_blocks) {
   LinePanel panel;
-  panel.title = over_blocks ? fmt::format("Disk by the size of a read, {} at once", kPagerDepth)
-                            : fmt::format("Disk by reads at once, {} each",
-                                          blockWords(static_cast<double>(kPagerBlock)));
-  panel.x_name = over_blocks ? "size of a read" : "reads at once";
+  panel.title = over_blocks ? fmt::format("Disk by read size, {} reads in flight", kPagerDepth)
+                            : fmt::format("Disk by reads in flight, {} each",
+                                          sizeText(static_cast<double>(kPagerBlock)));
+  panel.x_name = over_blocks ? "read size" : "reads in flight";
   panel.y_name = "MiB/s";
-  panel.log_values = true;  // the disk, and memory
-  panel.x_label = [over_blocks](double x) { return over_blocks ? blockWords(x) : fmt::format("{:g}", x); };
-  for (const auto& [way, words] : kDiskWays) {
-    PlotLine line{words, {}};
+  panel.log_values = true;  // disk and memory differ by orders of magnitude
+  panel.x_label = [over_blocks](double x) { return over_blocks ? sizeText(x) : fmt::format("{:g}", x); };
+  for (const auto& [way, label] : kDiskWays) {
+    PlotLine line{label, {}};
     for (DiskRun run : runs) {
       run.way = way;
       if (const auto median = measurements.median(run.name()))
@@ -116,17 +116,17 @@ LinePanel diskPanel(const Measurements& measurements, std::span<const DiskRun> r
 
 BarPanel stagePanel(const Measurements& measurements, unsigned threads) {
   BarPanel panel;
-  panel.title = "Each stage by itself";
-  panel.x_name = "million splats a second";
+  panel.title = "Each stage in isolation";
+  panel.x_name = "million splats per second";
   panel.kinds = {"1 thread"};
   if (threads > 1) panel.kinds.push_back(fmt::format("{} threads", threads));
-  panel.kinds.push_back("its own threads");
+  panel.kinds.push_back("own threads");
   const size_t own = panel.kinds.size() - 1;
   const auto add = [&](const std::string& name, const std::string& label, size_t colour) {
     const auto rate = measurements.median(name);
     if (rate) panel.bars.push_back({label, 1e-6 * *rate, shortCount(*rate), colour});
   };
-  // Checksums are so much faster than all else that nothing else could be read beside them.
+  // Checksums are so much faster that their bar would make all others unreadable.
   for (const std::string stage : kWorkerStages) {
     if (stage == "verify") continue;
     add(stageName(stage, 1), stage, 0);
@@ -144,7 +144,7 @@ std::vector<BarPanel> framePanels(std::span<const FramesOfConfiguration> frames)
   BarPanel panel;
   panel.title = "Frames on an orbit";
   panel.x_name = "seconds";
-  panel.kinds = {"after the first", "the first, from the disk"};
+  panel.kinds = {"later frames", "first frame, from disk"};
   for (const FramesOfConfiguration& one : frames) {
     const FrameConfiguration& with = one.configuration;
     const std::string label =
@@ -157,7 +157,7 @@ std::vector<BarPanel> framePanels(std::span<const FramesOfConfiguration> frames)
   return {panel};
 }
 
-double readPart(const FrameStatistics& frame) {
+double readFraction(const FrameStatistics& frame) {
   const uint64_t bricks = frame.bricks_read + frame.bricks_cached;
   return bricks ? static_cast<double>(frame.bricks_read) / static_cast<double>(bricks) : 0;
 }
@@ -166,27 +166,27 @@ double readPart(const FrameStatistics& frame) {
 
 std::string diskTable(const Measurements& measurements) {
   const std::string blocks =
-      diskRows(measurements, fmt::format("MiB/s, {} reads at once", kPagerDepth), byBlock(),
-               [](const DiskRun& run) { return blockWords(static_cast<double>(run.block_bytes)); });
+      diskRows(measurements, fmt::format("MiB/s, {} reads in flight", kPagerDepth), byBlock(),
+               [](const DiskRun& run) { return sizeText(static_cast<double>(run.block_bytes)); });
   const std::string depths =
-      diskRows(measurements, fmt::format("MiB/s, {} a read", blockWords(static_cast<double>(kPagerBlock))),
-               byDepth(), [](const DiskRun& run) { return fmt::format("{} at once", run.depth); });
+      diskRows(measurements, fmt::format("MiB/s, {} per read", sizeText(static_cast<double>(kPagerBlock))),
+               byDepth(), [](const DiskRun& run) { return fmt::format("{} in flight", run.depth); });
   return blocks.empty() ? depths : depths.empty() ? blocks : blocks + "\n" + depths;
 }
 
 std::string stageTable(const Measurements& measurements, unsigned threads) {
   std::vector<std::string> heads{"stage", "1 thread"};
-  if (threads > 1) heads.insert(heads.end(), {fmt::format("{} threads", threads), "gain"});
+  if (threads > 1) heads.insert(heads.end(), {fmt::format("{} threads", threads), "speedup"});
   TextTable table(heads);
   if (const auto read = measurements.median("stages/read"))
     table.add(ownRow("read", byteRate(read), threads));
-  const auto add = [&](const std::string& words, const std::string& stage) {
+  const auto add = [&](const std::string& label, const std::string& stage) {
     const std::string one = stageName(stage, 1), all = stageName(stage, threads);
     if (!measurements.find(one)) return;
-    table.add(stageRow(words, measurements, one, all, splatRate));
+    table.add(stageRow(label, measurements, one, all, splatRate));
     if (!measurements.find(one + "/bytes")) return;
     auto bytes = stageRow("", measurements, one + "/bytes", all + "/bytes", byteRate);
-    bytes.resize(std::min<size_t>(bytes.size(), 3));  // the gain is the same
+    bytes.resize(std::min<size_t>(bytes.size(), 3));  // the speedup is the same
     table.add(bytes);
   };
   for (const std::string stage : kWorkerStages) add(stage, stage);
@@ -199,7 +199,8 @@ std::string stageTable(const Measurements& measurements, unsigned threads) {
 }
 
 std::string frameTable(std::span<const FramesOfConfiguration> frames, const Measurements& measurements) {
-  TextTable table({"error", "threads", "memory", "first", "then", "spread", "frames", "splats", "from disk"});
+  TextTable table(
+      {"error", "threads", "memory", "first", "later", "spread", "frames", "splats", "from disk"});
   for (const FramesOfConfiguration& one : frames) {
     const FrameStatistics& middle = medianFrame(one.warm);
     const Measurement& times = *measurements.find(one.configuration.name());
@@ -209,7 +210,7 @@ std::string frameTable(std::span<const FramesOfConfiguration> frames, const Meas
                one.cold ? shortSeconds(one.cold->total_s) : "-", shortSeconds(medianOf(times.samples)),
                fmt::format("{:.0f} %", 100 * spreadOf(times.samples)), fmt::format("{}", one.warm.size()),
                shortCount(static_cast<double>(middle.splats_drawn)),
-               fmt::format("{:.0f} %", 100 * readPart(middle))});
+               fmt::format("{:.0f} %", 100 * readFraction(middle))});
   }
   return table.empty() ? "" : table.text();
 }
@@ -269,7 +270,7 @@ std::optional<Verdict> verdictOf(const Measurements& measurements,
                            .splats_prepared = middle.splats_read,
                            .splats_drawn = middle.splats_drawn,
                            .bytes = finest->bytes,
-                           .read_part = readPart(middle),
+                           .read_fraction = readFraction(middle),
                            .draws_apart = draws_apart};
   const StageSpeeds speeds{measurements.median("stages/read"), *verify, *decode, *project, *sort, *draw};
   return judge(judged, speeds, others);

@@ -1,5 +1,5 @@
-// What `curvisplat bench` says in the end: tables for a terminal and plots, from the measurements by their
-// names. Pure.
+// The report of `curvisplat bench`: tables for a terminal, plots and a verdict, made from the measurements,
+// which are found by name. Pure.
 #pragma once
 
 #include <optional>
@@ -14,21 +14,22 @@
 
 namespace curvisplat {
 
-/// A table of rates: a row a way of reading, a column a size or a depth.
+/// Rates by way of reading (rows) and by block size or depth (columns).
 std::string diskTable(const Measurements& measurements);
-/// A row a stage: on one thread, on all, and what one of those gives.
+/// One row per stage: its rate on one thread and on all threads, and the ratio.
 std::string stageTable(const Measurements& measurements, unsigned threads);
-/// A row a configuration.
+/// One row per configuration.
 std::string frameTable(std::span<const FramesOfConfiguration> frames, const Measurements& measurements);
-/// What was left out, and why; rows with the same reason together. Empty if nothing was.
+/// Measurements that were not made, grouped by reason. Empty if all were made.
 std::string leftOutTable(const Measurements& measurements);
 
-/// disk.png, stages.png and frames.png; none of what was not measured.
+/// disk.png, stages.png and frames.png, without those that have no measurement.
 Plots throughputPlots(const Measurements& measurements, std::span<const FramesOfConfiguration> frames,
                       unsigned threads);
 
-/// The verdict on the finest frame that was drawn; nothing where stages or frames are missing. `draws_apart`
-/// and `draw_stage`: whether a graphics card draws, and the name of its measurement.
+/// The verdict on the finest frame that was drawn; nullopt if stages or frames were not measured.
+///   draws_apart   a graphics card draws, so that drawing takes no time of the cores
+///   draw_stage    name of the measurement of drawing
 std::optional<Verdict> verdictOf(const Measurements& measurements,
                                  std::span<const FramesOfConfiguration> frames, unsigned threads,
                                  bool draws_apart, const std::string& draw_stage);

@@ -1,4 +1,4 @@
-// What `curvisplat bench` draws: a cache, a scalar, a transfer function, and cameras around it.
+// What `curvisplat bench` draws: a cache, a scalar, a transfer function, and cameras around the data.
 #pragma once
 
 #include <functional>
@@ -12,14 +12,14 @@
 
 namespace curvisplat {
 
-/// Borrowed from the subcommand.
+/// Refers to objects of the subcommand.
 struct ThroughputScene {
   const CacheReader& cache;
   size_t variable;
   const TransferFunction& transfer_function;
-  FrameOptions options;  // those of every frame, but for what is varied
+  FrameOptions options;  // of every frame, before one of them is varied
   Backend backend;
-  /// Cameras spread evenly over one turn around the data.
+  /// `frames` cameras spread evenly over one orbit around the data.
   std::function<std::vector<Camera>(unsigned frames)> orbit;
 };
 

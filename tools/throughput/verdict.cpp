@@ -11,9 +11,9 @@
 namespace curvisplat {
 namespace {
 
-// A gain below this is within the spread of most machines.
+// A smaller gain is within the noise of most machines.
 constexpr double kMinGain = 1.1;
-// Cores are worth their number where they give at least this part of it.
+// More cores are recommended if the speedup is at least this fraction of their number.
 constexpr double kGoodScaling = 0.7;
 
 struct Stage {
@@ -36,9 +36,9 @@ class Judge {
     CURVISPLAT_CHECK(frame.seconds > 0);
     const auto prepared = static_cast<double>(frame.splats_prepared);
     const auto drawn = static_cast<double>(frame.splats_drawn);
-    const double decoded = frame.read_part * prepared;
+    const double decoded = frame.read_fraction * prepared;
     if (speeds.read_bytes_s)
-      read_s_ = frame.read_part * static_cast<double>(frame.bytes) / *speeds.read_bytes_s;
+      read_s_ = frame.read_fraction * static_cast<double>(frame.bytes) / *speeds.read_bytes_s;
     draw_s_ = drawn / speeds.draw_splats_s;
     on_cores_ = {{"decoding", decoded / speeds.verify_splats_s + decoded / speeds.decode_splats_s},
                  {"projecting", prepared / speeds.project_splats_s},
@@ -61,7 +61,7 @@ class Judge {
     }
     adviseMemory();
     adviseError();
-    tellDisk();
+    reportDisk();
     return std::move(verdict_);
   }
 
@@ -70,8 +70,8 @@ class Judge {
     verdict_.stage = stage;
     verdict_.share = 1;
     verdict_.lines.push_back(
-        fmt::format("{} bounds the frame: alone it takes {} of {}; the cores' work takes {}", stage,
-                    secondsText(seconds), secondsText(frame_.seconds), secondsText(cores_s_)));
+        fmt::format("{} bounds the frame: in isolation it takes {} of {}; the work on the cores takes {}",
+                    stage, secondsText(seconds), secondsText(frame_.seconds), secondsText(cores_s_)));
   }
 
   void boundOnCores() {
@@ -80,29 +80,28 @@ class Judge {
                      [](const Stage& a, const Stage& b) { return a.seconds > b.seconds; });
     verdict_.stage = sorted.front().name;
     verdict_.share = cores_s_ > 0 ? sorted.front().seconds / cores_s_ : 0;
-    std::vector<std::string> words;
+    std::vector<std::string> stage_times;
     for (const Stage& stage : sorted)
-      words.push_back(fmt::format("{} {}", stage.name, secondsText(stage.seconds)));
-    verdict_.lines.push_back(fmt::format("{} bounds the frame: {:.0f} % of the cores' work in {} (alone: {})",
-                                         verdict_.stage, 100 * verdict_.share, secondsText(frame_.seconds),
-                                         fmt::join(words, ", ")));
+      stage_times.push_back(fmt::format("{} {}", stage.name, secondsText(stage.seconds)));
+    verdict_.lines.push_back(fmt::format(
+        "{} bounds the frame: {:.0f} % of the work on the cores in {} (in isolation: {})", verdict_.stage,
+        100 * verdict_.share, secondsText(frame_.seconds), fmt::join(stage_times, ", ")));
     const double rest = 1 - cores_s_ / frame_.seconds;
     if (rest > 0.15)
       verdict_.lines.push_back(fmt::format(
-          "{:.0f} % of the frame is not the stages' own time: they wait for each other, and share "
-          "caches and memory",
+          "{:.0f} % of the frame is overhead: stages wait for each other and compete for caches and memory",
           100 * rest));
   }
 
   void adviseCard() {
     if (frame_.draws_apart || draw_s_ < cores_s_ / 3) return;
     verdict_.lines.push_back(
-        fmt::format("a graphics card would take drawing off the cores: what is left for them takes {}",
+        fmt::format("a graphics card would draw instead of the cores; their remaining work takes {}",
                     secondsText(cores_s_ - draw_s_)));
   }
 
-  /// By the frames of one error and memory that differ in their threads. With --threads 1 a worker and the
-  /// painter have one each: of two cores that says nothing.
+  /// Compares frames that differ only in their threads. --threads 1 already uses two cores, one for the
+  /// worker and one for the painter, so frames with 2 threads show nothing.
   void adviseCores() {
     const OtherFrame* one = nullptr;
     const OtherFrame* all = nullptr;
@@ -132,13 +131,12 @@ class Judge {
           continue;
         const double gain = less.seconds / more.seconds;
         verdict_.lines.push_back(
-            gain >= kMinGain
-                ? fmt::format("--memory {} would help: --lod-pixels {:g} takes {} in the place of {}",
-                              memoryText(more.memory_bytes), more.lod_pixels, secondsText(more.seconds),
-                              secondsText(less.seconds))
-                : fmt::format("more than --memory {} would not help: {} takes {} in the place of {}",
-                              memoryText(less.memory_bytes), memoryText(more.memory_bytes),
-                              secondsText(more.seconds), secondsText(less.seconds)));
+            gain >= kMinGain ? fmt::format("--memory {} would help: --lod-pixels {:g} takes {} instead of {}",
+                                           memoryText(more.memory_bytes), more.lod_pixels,
+                                           secondsText(more.seconds), secondsText(less.seconds))
+                             : fmt::format("more than --memory {} would not help: {} takes {} instead of {}",
+                                           memoryText(less.memory_bytes), memoryText(more.memory_bytes),
+                                           secondsText(more.seconds), secondsText(less.seconds)));
         return;
       }
   }
@@ -157,13 +155,14 @@ class Judge {
     }
   }
 
-  void tellDisk() {
+  void reportDisk() {
     if (!speeds_.read_bytes_s || frame_.bytes == 0) return;
     const double frames_s = *speeds_.read_bytes_s / static_cast<double>(frame_.bytes);
-    verdict_.lines.push_back(fmt::format(
-        "the disk could feed {:.1f} such frames a second with nothing in memory; {:.0f} % of this "
-        "one's bricks came from it",
-        frames_s, 100 * frame_.read_part));
+    verdict_.lines.push_back(
+        fmt::format("the disk could sustain {:.1f} such frames per second with nothing in memory; {:.0f} % "
+                    "of this frame's "
+                    "bricks were read from it",
+                    frames_s, 100 * frame_.read_fraction));
   }
 
   const JudgedFrame& frame_;

@@ -1,6 +1,6 @@
-// What the mouse and the keys do to the camera, as in ParaView. Pure: a camera in, a camera out.
+// Camera movements of mouse and keys, as in ParaView. Pure: each function returns the moved camera.
 //
-// Movements are in pixels of a window of `size`, x to the right, y down.
+// `movement` is in pixels of a window of `size`, x to the right, y down.
 #pragma once
 
 #include <glm/vec2.hpp>
@@ -10,25 +10,25 @@
 
 namespace curvisplat {
 
-/// Around the focal point: a window's width turns by 200 degrees about the image's up, its height about the
-/// image's right.
+/// Rotates around the focal point: moving across the window's width turns by 200 degrees about the image's up
+/// direction, across its height by 200 degrees about the image's right.
 Camera rotated(const Camera& camera, const glm::dvec2& movement, ImageSize size);
-/// Across the view: what is at the focal point's depth follows the mouse.
+/// Moves parallel to the image; points at the focal point's depth follow the mouse.
 Camera panned(const Camera& camera, const glm::dvec2& movement, ImageSize size);
-/// What is at the focal point's depth becomes `factor` times as large; a perspective camera moves there.
-/// `factor` > 0.
+/// Magnifies objects at the focal point's depth by `factor` > 0; a perspective camera moves towards the
+/// point.
 Camera zoomed(const Camera& camera, double factor);
-/// Turns on the spot: a window's height turns by the camera's view angle.
+/// Turns the camera in place; moving across the window's height turns by the view angle.
 Camera looking(const Camera& camera, const glm::dvec2& movement, ImageSize size);
-/// Moves by `step` world units: x to the right, y up, z forward. The focal point moves along.
+/// Moves camera and focal point by `step` in world units: x to the right, y up, z forward.
 Camera flown(const Camera& camera, const glm::dvec3& step);
 
-/// The other projection, with what is at the focal point's depth as large as it was.
+/// Switches the projection and keeps the size of objects at the focal point's depth.
 Camera withOtherProjection(const Camera& camera);
-/// From the same direction, all of the box [lower, upper] in the image.
+/// Keeps the view direction and fits the box [lower, upper] into the image.
 Camera refitted(const Camera& camera, const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size);
 
-/// World units to a pixel at the focal point's depth.
+/// World units per pixel at the focal point's depth.
 double unitsPerPixel(const Camera& camera, ImageSize size);
 
 }  // namespace curvisplat

@@ -27,7 +27,8 @@ EditedFunction::EditedFunction(const std::string& preset, double low, double hig
 EditedFunction::EditedFunction(const TransferFunctionDefinition& definition, double default_opacity_unit)
     : definition_(definition),
       opacity_unit_(definition.opacity_unit > 0 ? definition.opacity_unit : default_opacity_unit) {
-  range_ = TransferFunction(definition, nullptr, opacity_unit_).range();  // it checks the logarithm
+  range_ = TransferFunction(definition, nullptr, opacity_unit_)
+               .range();  // checks the range of a logarithmic scale
   if (definition_.opacities.empty())
     definition_.opacities = defaultOpacityRamp(definition_.colours.front().x, definition_.colours.back().x);
   const auto coordinate = [&](double x) { return definition_.log_scale ? std::log10(x) : x; };
@@ -35,7 +36,7 @@ EditedFunction::EditedFunction(const TransferFunctionDefinition& definition, dou
   const auto toUnit = [&](double x) { return std::clamp((coordinate(x) - begin) / length, 0.0, 1.0); };
   mapPoints(definition_.colours, toUnit);
   mapPoints(definition_.opacities, toUnit);
-  // Beyond its ends a curve goes on as it ends.
+  // Beyond its end points a curve is constant.
   auto& points = definition_.opacities;
   if (points.front().x > 0) points.insert(points.begin(), {0, points.front().opacity});
   if (points.back().x < 1) points.push_back({1, points.back().opacity});

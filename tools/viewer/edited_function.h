@@ -1,8 +1,8 @@
-// A transfer function in a person's hands: opacity points that are dragged, colours from a preset or a file,
-// a range, a unit.
+// The transfer function that the user edits: opacity points, colours from a preset or a file, a range and an
+// opacity unit.
 //
-// Points stand on [0, 1], which is stretched over the range, in the logarithm if the scale is logarithmic.
-// There is always an opacity point at 0 and one at 1. Values only; not for several threads at once.
+// Points have coordinates on [0, 1], which is mapped to the range linearly or, on a logarithmic scale,
+// logarithmically. There is always an opacity point at 0 and one at 1. A value type; not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -17,42 +17,43 @@ namespace curvisplat {
 
 class EditedFunction {
  public:
-  /// A built-in preset over [low, high]. Equal ends are moved apart, as TransferFunction::preset() does.
-  /// `opacity_unit` > 0, world units. Throws UsageError that lists the names there are.
+  /// A built-in preset over [low, high]; equal ends are moved apart as in TransferFunction::preset().
+  /// `opacity_unit` > 0, in world units. Throws UsageError that lists the presets if there is none of this
+  /// name.
   EditedFunction(const std::string& preset, double low, double high, double opacity_unit);
-  /// As the definition stands: the range is from its lowest to its highest point. A definition without an
-  /// opacity unit has `default_opacity_unit`. Throws Error where a logarithm does not exist.
+  /// The range goes from the definition's lowest to its highest point. A definition without an opacity unit
+  /// gets `default_opacity_unit`. Throws Error if its scale is logarithmic and its range is not above zero.
   EditedFunction(const TransferFunctionDefinition& definition, double default_opacity_unit);
 
   TransferFunction function() const;
-  /// The same function as a definition whose points stand at scalars: what a ParaView preset holds.
+  /// The same function with points at scalar values, as in a ParaView preset.
   TransferFunctionDefinition definition() const;
-  /// The preset that gives this function over range() and opacityUnit(), or empty if points were changed.
+  /// Name of the preset that gives this function over range() and opacityUnit(); empty if points were
+  /// changed.
   const std::string& preset() const { return preset_; }
 
   std::pair<double, double> range() const { return range_; }
-  /// Ends in the wrong order, equal or, for a logarithm, not above zero are not taken: false.
+  /// Returns false and changes nothing unless low < high and, on a logarithmic scale, low > 0.
   bool setRange(double low, double high);
-  /// The range of a scalar from `low` to `high`: a constant gets an interval around it, and what is not above
-  /// zero no logarithm.
+  /// Sets the range of a scalar. Widens an empty range, and switches to a linear scale unless low > 0.
   void fitRange(double low, double high);
   bool logScale() const { return definition_.log_scale; }
-  /// False where the range is not above zero.
+  /// Returns false and changes nothing if the range is not above zero.
   bool setLogScale(bool log_scale);
   double opacityUnit() const { return opacity_unit_; }
   void setOpacityUnit(double unit);
 
   const std::vector<OpacityPoint>& points() const { return definition_.opacities; }
-  /// Returns the new point's position; on an old point's x it is put beside it.
+  /// Returns the new point's index. A point with the x of an existing one is inserted after it.
   size_t addPoint(double x, double opacity);
-  /// Between its neighbours; the first and the last stay at 0 and 1. Opacity within 0..1.
+  /// Clamps x between the neighbours (0 and 1 for the first and last point) and opacity to 0..1.
   void movePoint(size_t point, double x, double opacity);
-  /// The first and the last are never removed.
+  /// Does nothing for the first and the last point.
   void removePoint(size_t point);
 
-  /// The colours of a built-in preset; opacities stay.
+  /// Sets the colours of a built-in preset; keeps the opacities.
   void setColours(const std::string& preset);
-  /// 0..1 over the range.
+  /// Colour at `x`, 0..1 over the range.
   glm::dvec3 colourAt(double x) const;
 
  private:

@@ -10,9 +10,9 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kRefinement = 4;  // times the splats of the picture before
+constexpr uint64_t kRefinement = 4;  // ratio of the splats of successive pictures
 
-/// What the coarsest bricks have.
+/// Number of splats of the root bricks.
 uint64_t coarsestSplats(const CacheReader& cache) {
   uint64_t splats = 0;
   for (const Brick& brick : cache.bricks())
@@ -30,20 +30,20 @@ std::vector<uint8_t> bytesOf(const Image& image) {
 
 }  // namespace
 
-// Slower than wanted: fewer splats, as long as that helps, then fewer pixels. Faster: the other way round.
+// Too slow: reduce splats as long as that helps, then the resolution. Too fast: raise them in reverse order.
 void Effort::learn(double seconds, double target, bool complete) {
   const double factor = std::clamp(target / std::max(seconds, 1e-6), 0.25, 2.0);
-  const bool splats_help = !complete && splats_ > least_;
+  const bool splats_help = !complete && splats_ > min_;
   if (factor < 1 && !splats_help)
     reduction_ = std::min(kMaxReduction, reduction_ / std::sqrt(factor));
   else if (factor > 1 && reduction_ > 1)
     reduction_ = std::max(1.0, reduction_ / std::sqrt(factor));
   else if (factor < 1 || !complete)
-    splats_ = std::clamp(static_cast<uint64_t>(static_cast<double>(splats_) * factor), least_,
-                         std::max(least_, kMax));
+    splats_ =
+        std::clamp(static_cast<uint64_t>(static_cast<double>(splats_) * factor), min_, std::max(min_, kMax));
 }
 
-/// What the loop's thread keeps from request to request.
+/// What the loop's thread keeps between requests.
 struct FrameLoop::Drawing {
   explicit Drawing(uint64_t coarsest) : effort(coarsest) {}
 
@@ -68,8 +68,8 @@ FrameLoop::~FrameLoop() {
 
 uint64_t FrameLoop::request(FrameRequest request) {
   const std::lock_guard lock(mutex_);
-  waiting_ = std::move(request);
-  if (drawing_ && may_give_up_) drawing_->cancel();
+  pending_ = std::move(request);
+  if (drawing_ && cancellable_) drawing_->cancel();
   changed_.notify_all();
   return ++newest_;
 }
@@ -77,14 +77,14 @@ uint64_t FrameLoop::request(FrameRequest request) {
 std::optional<ShownFrame> FrameLoop::take() {
   const std::lock_guard lock(mutex_);
   if (failure_) std::rethrow_exception(ended_ ? failure_ : std::exchange(failure_, nullptr));
-  // A frame that was just about to begin when its request was superseded has not heard of it.
-  if (waiting_ && drawing_ && may_give_up_) drawing_->cancel();
+  // Repeats the cancel() of request(), which has no effect on a frame that had not begun yet.
+  if (pending_ && drawing_ && cancellable_) drawing_->cancel();
   return std::exchange(shown_, std::nullopt);
 }
 
 bool FrameLoop::busy() const {
   const std::lock_guard lock(mutex_);
-  return !ended_ && (waiting_ || serving_);
+  return !ended_ && (pending_ || serving_);
 }
 
 std::string FrameLoop::backendName() const {
@@ -115,9 +115,9 @@ void FrameLoop::loop() {
   Drawing drawing(coarsestSplats(cache_));
   std::unique_lock lock(mutex_);
   while (true) {
-    changed_.wait(lock, [this] { return waiting_ || stopping_; });
+    changed_.wait(lock, [this] { return pending_ || stopping_; });
     if (stopping_) return;
-    const FrameRequest request = *std::exchange(waiting_, std::nullopt);
+    const FrameRequest request = *std::exchange(pending_, std::nullopt);
     const uint64_t number = newest_;
     serving_ = true;
     lock.unlock();
@@ -146,7 +146,7 @@ void FrameLoop::loop() {
 
 void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t number) {
   if (!drawing.renderer || drawing.variable != request.variable) {
-    drawing.renderer.reset();  // its memory goes before there is another
+    drawing.renderer.reset();  // frees its memory before the next one allocates
     drawing.renderer = std::make_unique<FrameRenderer>(cache_, request.variable, request.function, backend_);
     drawing.variable = request.variable;
   } else if (drawing.function_version != request.function_version) {
@@ -156,9 +156,9 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
   FrameRenderer& renderer = *drawing.renderer;
   {
     const std::lock_guard lock(mutex_);
-    if (stopping_) return;  // a cancel() before there was a renderer went to nobody
+    if (stopping_) return;  // the destructor found no renderer to cancel
     drawing_ = &renderer;
-    may_give_up_ = !request.moving;
+    cancellable_ = !request.moving;
     backend_name_ = renderer.backendName();
     software_ = renderer.drawsInSoftware();
   }
@@ -173,7 +173,8 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
                                          frame.is_final);
     frame.bytes = bytesOf(frame.image);
     if (request.moving) {
-      // Fewer splats than it had leave to have say nothing: the next level may take more than it had.
+      // Drawing fewer splats than the limit does not mean that the view is complete: the next level may
+      // exceed it.
       const bool complete = frame.is_final || frame.statistics.largest_error_px <= request.options.lod_pixels;
       effort.learn(frame.statistics.total_s, request.target_s, complete);
     }

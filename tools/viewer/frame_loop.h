@@ -1,11 +1,11 @@
-// Pictures for a window, made in the background: coarse ones at once, then finer ones until the asked detail
-// is reached. The newest request is the one that counts.
+// Draws the pictures of a window on a thread of its own: first a coarse one, then finer ones until the
+// requested error is reached. A new request replaces the one before.
 //
-//   window --request()--> [ frame loop's thread: FrameRenderer ] --picture, wake()--> window takes it
+//   window --request()--> [ frame loop's thread: FrameRenderer ] --picture, wake()--> window calls take()
 //
-// While the camera moves a picture is as good as its time allows, and is never given up: the next one begins
-// when it is shown. Once the camera rests, pictures take four times as long from one to the next, and are
-// given up at the next request.
+// While the camera moves, each picture is as fine as its time budget allows and is always completed; the next
+// one begins when it is shown. At rest, each picture draws four times the splats of the previous one, and is
+// cancelled by the next request.
 #pragma once
 
 #include <algorithm>
@@ -27,64 +27,65 @@ namespace curvisplat {
 
 struct FrameRequest {
   size_t variable = 0;
-  uint64_t function_version = 0;  // differs where the function does
+  uint64_t function_version = 0;  // changes whenever the function changes
   TransferFunction function;
   Camera camera;
   FrameOptions options;
   bool moving = false;
-  double target_s = 0.1;  // for a picture while moving
+  double target_s = 0.1;  // time budget of a picture while moving
 };
 
 struct ShownFrame {
   Image image;
-  std::vector<uint8_t> bytes;  // the image as a screen has it: four a pixel, clamped
+  std::vector<uint8_t> bytes;  // the image as 8-bit RGBA, clamped
   FrameStatistics statistics;
   uint64_t request = 0;   // what request() returned
-  bool is_final = false;  // as render() draws it
+  bool is_final = false;  // the same picture as FrameRenderer::render() draws
 };
 
-/// How many splats a picture may have, and how coarse its pixels are, so that it takes a given time: learnt
-/// from the pictures before.
+/// Chooses the number of splats and the resolution of a picture so that it takes a given time. Learns from
+/// the times of previous pictures.
 class Effort {
  public:
-  /// `least`: the splats of the coarsest picture there is.
-  explicit Effort(uint64_t least) : least_(least), splats_(std::max(least, kFirst)) {}
+  /// `min_splats`: the splats of the coarsest possible picture.
+  explicit Effort(uint64_t min_splats) : min_(min_splats), splats_(std::max(min_splats, kFirst)) {}
 
   uint64_t splats() const { return splats_; }
-  /// The finest detail that is to be shown, in pixels; 0: all.
+  /// Size in pixels of the finest detail to draw; 0: full resolution.
   double detailPixels() const { return reduction_ > 1 ? 2 * reduction_ : 0; }
-  /// A picture of this effort took `seconds` where `target` were wanted. `complete`: no more splats would
-  /// have been drawn with leave to.
+  /// Adapts to a picture that took `seconds` instead of `target`. `complete`: a higher splat limit would not
+  /// have drawn more splats.
   void learn(double seconds, double target, bool complete);
 
  private:
   static constexpr uint64_t kFirst = 100'000;
   static constexpr uint64_t kMax = 1'000'000'000;
   static constexpr double kMaxReduction = 8;
-  uint64_t least_, splats_;
-  double reduction_ = 1;  // of the pixels, each way
+  uint64_t min_, splats_;
+  double reduction_ = 1;  // of the resolution in each direction
 };
 
-/// Members may be called from one thread, the window's.
+/// All members are for one thread, the window's.
 class FrameLoop {
  public:
-  /// `wake` is called, from the loop's thread, whenever there is something to take. The cache outlives it.
+  /// Calls `wake` on the loop's thread whenever take() has something to return. The cache must outlive the
+  /// loop.
   FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake);
-  /// Gives up what is under way.
+  /// Cancels the picture being drawn.
   ~FrameLoop();
   FrameLoop(const FrameLoop&) = delete;
   FrameLoop& operator=(const FrameLoop&) = delete;
 
   /// Returns the request's number: 1, 2, ...
   uint64_t request(FrameRequest request);
-  /// The newest picture since the last take(). Throws what ended the loop: an Error of reading or drawing; a
-  /// UsageError (too little memory for this size) only ends the request.
+  /// The newest picture since the last take(), or nullopt. Throws the error of reading or drawing that ended
+  /// the loop, or UsageError (too little memory for this size), which ends only the request.
   std::optional<ShownFrame> take();
-  /// Whether pictures of the newest request are still to come.
+  /// Whether more pictures of the newest request will follow.
   bool busy() const;
-  /// What draws; empty until the first picture.
+  /// Name of the drawing back end; empty until the first picture.
   std::string backendName() const;
-  /// Whether the processor draws; so until the first picture.
+  /// Whether the processor draws; true until the first picture.
   bool drawsInSoftware() const;
 
  private:
@@ -98,16 +99,16 @@ class FrameLoop {
   const Backend backend_;
   const std::function<void()> wake_;
 
-  mutable std::mutex mutex_;  // guards all below
+  mutable std::mutex mutex_;  // guards all members below
   std::condition_variable changed_;
-  std::optional<FrameRequest> waiting_;
+  std::optional<FrameRequest> pending_;
   uint64_t newest_ = 0;               // number of the newest request
-  bool serving_ = false;              // a request is under way
-  bool may_give_up_ = false;          // and is no moving one
+  bool serving_ = false;              // a request is being drawn
+  bool cancellable_ = false;          // and its camera is at rest
   FrameRenderer* drawing_ = nullptr;  // for cancel()
   std::optional<ShownFrame> shown_;
   std::exception_ptr failure_;
-  bool ended_ = false;  // by a failure
+  bool ended_ = false;  // by an error
   bool stopping_ = false;
   std::string backend_name_;
   bool software_ = true;

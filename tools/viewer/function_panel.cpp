@@ -18,15 +18,15 @@ namespace {
 constexpr size_t kBins = 128;
 constexpr ImGuiInputTextFlags kNumber =
     ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_CharsScientific;
-constexpr float kGrabRadius = 8;  // around a point
-constexpr float kCurveLines = 9;  // height, in lines of text
+constexpr float kGrabRadius = 8;  // pixels around a point
+constexpr float kCurveLines = 9;  // height in lines of text
 
 ImU32 toImGui(const glm::dvec3& rgb) {
   return ImGui::ColorConvertFloat4ToU32(
       {static_cast<float>(rgb.x), static_cast<float>(rgb.y), static_cast<float>(rgb.z), 1});
 }
 
-// Most opacities are small: the curve's height is the root of opacity.
+// Most opacities are small, so the curve shows the square root of the opacity.
 float heightOf(double opacity) {
   return static_cast<float>(std::sqrt(opacity));
 }
@@ -42,9 +42,9 @@ std::vector<std::string> presets() {
   return names;
 }
 
-/// Where the curve is drawn.
+/// The rectangle of the curve.
 struct Canvas {
-  ImVec2 lower, size;  // its upper left corner
+  ImVec2 lower, size;  // upper left corner
 
   ImVec2 at(double x, float height) const {
     return {lower.x + static_cast<float>(x) * size.x, lower.y + (1 - height) * size.y};
@@ -74,7 +74,7 @@ void paintCurve(const EditedFunction& function, const std::vector<double>& histo
   list->AddRectFilled(canvas.lower, end, IM_COL32(30, 30, 34, 255));
   const double most = histogram.empty() ? 0 : *std::max_element(histogram.begin(), histogram.end());
   for (size_t n = 0; most > 0 && n < histogram.size(); ++n) {
-    // The logarithm over four decades: thin layers show beside the far field.
+    // Logarithmic over four decades, so that thin layers stay visible beside the far field.
     const double part = std::clamp(1 + std::log10(std::max(histogram[n] / most, 1e-9)) / 4, 0.0, 1.0);
     const double x = static_cast<double>(n) / static_cast<double>(histogram.size());
     list->AddRectFilled(canvas.at(x, static_cast<float>(part)),
@@ -110,14 +110,14 @@ void paintColours(const EditedFunction& function) {
 }  // namespace
 
 void FunctionPanel::updateHistogram(const EditedFunction& function, size_t variable) {
-  if (in_the_making_.valid()) {
-    if (in_the_making_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
-    histogram_ = in_the_making_.get();
+  if (pending_histogram_.valid()) {
+    if (pending_histogram_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+    histogram_ = pending_histogram_.get();
   }
   const HistogramOf of{variable, function.range(), function.logScale()};
   if (histogram_of_ == of) return;
   histogram_of_ = of;
-  in_the_making_ = std::async(std::launch::async, [&cache = cache_, of] {
+  pending_histogram_ = std::async(std::launch::async, [&cache = cache_, of] {
     return histogramOf(cache, of.variable, of.range.first, of.range.second, of.log_scale, kBins);
   });
 }
@@ -155,11 +155,11 @@ bool FunctionPanel::drawCurve(EditedFunction& function) {
     changed = true;
   }
   paintCurve(function, histogram_, canvas);
-  if (const auto told = dragged_ ? dragged_ : near) {
+  if (const auto shown = dragged_ ? dragged_ : near) {
     const auto& points = function.points();
     const TransferFunctionDefinition definition = function.definition();
-    ImGui::SetTooltip("%.6g: opacity %.4g\nright click removes", definition.opacities[*told].x,
-                      points[*told].opacity);
+    ImGui::SetTooltip("%.6g: opacity %.4g\nright click to remove", definition.opacities[*shown].x,
+                      points[*shown].opacity);
   }
   return changed;
 }
@@ -170,7 +170,7 @@ bool FunctionPanel::drawRange(EditedFunction& function, const VariableInfo& vari
     for (const std::string& name : presets()) {
       if (!ImGui::Selectable(name.c_str())) continue;
       if (function.preset().empty())
-        function.setColours(name);  // the opacities were made by hand
+        function.setColours(name);  // keep the edited opacities
       else
         function =
             EditedFunction(name, function.range().first, function.range().second, function.opacityUnit());
@@ -186,14 +186,14 @@ bool FunctionPanel::drawRange(EditedFunction& function, const VariableInfo& vari
   ImGui::SameLine();
   if (ImGui::Button("full range")) changed |= function.setRange(variable.min, variable.max);
   ImGui::SameLine();
-  if (ImGui::Button("preset's points")) {
+  if (ImGui::Button("reset points")) {
     const std::string name = function.preset().empty() ? function.definition().name : function.preset();
     try {
       function =
           EditedFunction(name, function.range().first, function.range().second, function.opacityUnit());
       changed = true;
     } catch (const UsageError& error) {
-      said_ = error.what();
+      message_ = error.what();
     }
   }
   double unit = function.opacityUnit();
@@ -210,18 +210,18 @@ bool FunctionPanel::drawFile(EditedFunction& function) {
   try {
     if (ImGui::Button("load")) {
       function = EditedFunction(readParaViewPreset(file_), function.opacityUnit());
-      said_ = "loaded";
+      message_ = "loaded";
       changed = true;
     }
     ImGui::SameLine();
     if (ImGui::Button("save")) {
       writeFileDurably(file_, toParaViewPreset(function.definition()));
-      said_ = "saved; render --tf " + file_ + " shows the same";
+      message_ = "saved; draw with it: render --tf " + file_;
     }
   } catch (const Error& error) {
-    said_ = error.what();
+    message_ = error.what();
   }
-  if (!said_.empty()) ImGui::TextWrapped("%s", said_.c_str());
+  if (!message_.empty()) ImGui::TextWrapped("%s", message_.c_str());
   return changed;
 }
 

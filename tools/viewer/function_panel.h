@@ -1,4 +1,4 @@
-// The transfer function's editor: a histogram with opacity points over it, the colours under it.
+// The editor of the transfer function: a histogram with the opacity points over it, and the colours below.
 #pragma once
 
 #include <future>
@@ -16,8 +16,8 @@ class FunctionPanel {
  public:
   explicit FunctionPanel(const CacheReader& cache) : cache_(cache) {}
 
-  /// Draws it into the present window of Dear ImGui; true if the function changed. `variable` is a position
-  /// in the manifest's.
+  /// Draws into the current Dear ImGui window. Returns true if the function changed. `variable`: position in
+  /// the manifest's variables.
   bool draw(EditedFunction& function, size_t variable);
   /// Whether a point is being dragged.
   bool isDragging() const { return dragged_.has_value(); }
@@ -26,8 +26,8 @@ class FunctionPanel {
   bool drawCurve(EditedFunction& function);
   bool drawRange(EditedFunction& function, const VariableInfo& variable);
   bool drawFile(EditedFunction& function);
-  /// Takes the histogram that is wanted, once it is there, and begins to make it if nobody has. Throws what
-  /// reading throws.
+  /// Takes the finished histogram, and starts computing another one if the function's range has changed.
+  /// Throws what reading throws.
   void updateHistogram(const EditedFunction& function, size_t variable);
 
   const CacheReader& cache_;
@@ -39,10 +39,10 @@ class FunctionPanel {
     bool log_scale;
     bool operator==(const HistogramOf&) const = default;
   };
-  std::optional<HistogramOf> histogram_of_;         // what is shown, or on its way
-  std::future<std::vector<double>> in_the_making_;  // of another thread: it reads
+  std::optional<HistogramOf> histogram_of_;             // shown or being computed
+  std::future<std::vector<double>> pending_histogram_;  // on another thread, because it reads the cache
   std::string file_ = "function.json";
-  std::string said_;  // of the last load or save
+  std::string message_;  // about the last load or save
 };
 
 }  // namespace curvisplat

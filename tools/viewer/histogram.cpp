@@ -8,9 +8,9 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kEnoughSplats = 20'000;
+constexpr uint64_t kMinSplats = 20'000;
 
-/// The coarsest level with enough splats: those of its bricks, and of leaves above it.
+/// The bricks of the coarsest level with at least kMinSplats splats, including leaves above that level.
 std::vector<uint32_t> bricksAtALevel(const CacheReader& cache) {
   const auto bricks = cache.bricks();
   for (uint32_t level = 0;; ++level) {
@@ -25,7 +25,7 @@ std::vector<uint32_t> bricksAtALevel(const CacheReader& cache) {
       }
       deeper |= own > level;
     }
-    if (splats >= kEnoughSplats || !deeper) return chosen;
+    if (splats >= kMinSplats || !deeper) return chosen;
   }
 }
 

@@ -1,4 +1,4 @@
-// How a scalar is spread over a cache, from its coarsest bricks: quick at any size.
+// Computes a scalar's histogram from the coarse bricks of a cache; fast for any cache size.
 #pragma once
 
 #include <cstddef>
@@ -8,9 +8,9 @@
 
 namespace curvisplat {
 
-/// Volume of the data in each of `bins` equal parts of [low, high], as a fraction of all of it; in equal
-/// parts of the logarithm if `log_scale`. Reads the coarsest level that has 20,000 splats or more, or the
-/// finest. Throws Error as reading does. Requires low < high, above zero for a logarithm.
+/// Returns the fraction of the data's volume in each of `bins` bins of [low, high], of equal width on a
+/// linear or logarithmic scale. Reads the coarsest level with at least 20,000 splats, or the finest level.
+/// Requires low < high, and low > 0 on a logarithmic scale. Throws Error as reading does.
 std::vector<double> histogramOf(const CacheReader& cache, size_t variable, double low, double high,
                                 bool log_scale, size_t bins);
 

@@ -13,11 +13,11 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kRestAfter_s = 0.2;        // without movement
-constexpr double kWheelFactor = 1.1;        // a notch
-constexpr double kDragFactor = 1.01;        // a pixel
-constexpr double kWheelFlight = 0.02;       // diagonals of the data a notch
-constexpr double kFlightDiagonals_s = 0.2;  // diagonals of the data a second
+constexpr double kRestAfter_s = 0.2;        // no movement for this time
+constexpr double kWheelFactor = 1.1;        // per notch
+constexpr double kDragFactor = 1.01;        // per pixel
+constexpr double kWheelFlight = 0.02;       // in diagonals of the data per notch
+constexpr double kFlightDiagonals_s = 0.2;  // in diagonals of the data per second
 
 }  // namespace
 

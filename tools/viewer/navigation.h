@@ -1,8 +1,9 @@
-// The mouse and the keys over the picture, as in ParaView:
+// Applies mouse and keys to the camera, as in ParaView:
 //
-//   left drag    rotate            wheel, right drag   zoom          middle drag, shift + left   pan
-//   r  all of the data   x y z (shift: from behind)  along an axis   o  orthographic, perspective
-//   f  fly: w s forwards and back, a d sideways, q e up and down, left drag looks around
+//   left drag                   rotate    r            fit the data into the window
+//   middle or shift+left drag   pan       x y z        look from +x, +y, +z; with shift from -x, -y, -z
+//   wheel or right drag         zoom      o            switch between orthographic and perspective
+//   f   fly: w s forwards and backwards, a d left and right, q e down and up, left drag looks around
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -14,15 +15,16 @@ namespace curvisplat {
 
 class Navigation {
  public:
-  /// The box of the data after --scale, which `r` and the axes fit into the window.
+  /// Sets the data's bounding box, after --scale, which `r`, `x`, `y` and `z` fit into the window.
   void setBounds(const glm::dvec3& lower, const glm::dvec3& upper) { lower_ = lower, upper_ = upper; }
 
-  /// What was done since the last frame of Dear ImGui, which must have begun; true if it moved the camera.
+  /// Applies the input since the last frame of Dear ImGui. Returns true if the camera moved. Call within a
+  /// frame.
   bool update(Window& window, Camera& camera, ImageSize size);
-  /// True if the key is one of navigation's and moved the camera or changed its mode.
+  /// Returns true if the key moved the camera or changed its mode.
   bool press(const Window::Key& key, Camera& camera, ImageSize size);
 
-  /// Whether the camera is being moved, or was a moment ago: a coarse picture will do.
+  /// Whether the camera moves or moved less than 0.2 s ago, so that a coarse picture suffices.
   bool isMoving() const;
   bool flies() const { return flies_; }
 
@@ -32,8 +34,8 @@ class Navigation {
 
   glm::dvec3 lower_{0.0}, upper_{1.0};
   bool flies_ = false;
-  bool holds_ = false;      // a button
-  double moved_at_s_ = -1;  // Dear ImGui's clock
+  bool holds_ = false;      // a mouse button is down
+  double moved_at_s_ = -1;  // by Dear ImGui's clock
 };
 
 }  // namespace curvisplat

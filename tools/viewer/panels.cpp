@@ -36,12 +36,12 @@ double mebibytes(uint64_t bytes) {
 }  // namespace
 
 float Panels::width() {
-  constexpr float kFontSize = 13;  // of Dear ImGui's own font; a frame need not have begun
+  constexpr float kFontSize = 13;  // of Dear ImGui's default font; ImGui::GetFontSize() would need a frame
   return 26 * kFontSize * ImGui::GetIO().FontGlobalScale;
 }
 
-PanelWishes Panels::draw(ViewState& state, size_t variable, const PanelFacts& facts) {
-  PanelWishes wishes;
+PanelActions Panels::draw(ViewState& state, size_t variable, const PanelFacts& facts) {
+  PanelActions actions;
   ImGui::SetNextWindowPos({0, 0});
   ImGui::SetNextWindowSize({width(), ImGui::GetIO().DisplaySize.y});
   constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
@@ -53,70 +53,70 @@ PanelWishes Panels::draw(ViewState& state, size_t variable, const PanelFacts& fa
       const bool chosen = one.name == state.variable;
       if (!ImGui::Selectable(scalarTitle(one.name, one.unit).c_str(), chosen) || chosen) continue;
       chooseVariable(state, cache_.manifest(), one.name);
-      wishes.function_changed = true;
+      actions.function_changed = true;
     }
     ImGui::EndCombo();
   }
-  // A variable that was chosen just now is drawn from the next frame on.
+  // `variable` is outdated if another one was chosen just now; draw the editor from the next frame on.
   if (cache_.manifest().variables[variable].name == state.variable)
-    wishes.function_changed |= function_.draw(state.function, variable);
-  wishes.changed |= wishes.function_changed;
-  wishes.dragging |= function_.isDragging();
-  if (ImGui::CollapsingHeader("View", ImGuiTreeNodeFlags_DefaultOpen)) drawView(state, wishes, facts);
-  if (ImGui::CollapsingHeader("Detail", ImGuiTreeNodeFlags_DefaultOpen)) drawDetail(state, wishes);
-  if (ImGui::CollapsingHeader("Clip box")) drawClipBox(state, wishes);
+    actions.function_changed |= function_.draw(state.function, variable);
+  actions.changed |= actions.function_changed;
+  actions.dragging |= function_.isDragging();
+  if (ImGui::CollapsingHeader("View", ImGuiTreeNodeFlags_DefaultOpen)) drawView(state, actions, facts);
+  if (ImGui::CollapsingHeader("Detail", ImGuiTreeNodeFlags_DefaultOpen)) drawDetail(state, actions);
+  if (ImGui::CollapsingHeader("Clip box")) drawClipBox(state, actions);
   if (ImGui::CollapsingHeader("Statistics", ImGuiTreeNodeFlags_DefaultOpen)) drawStatistics(state, facts);
-  if (!facts.said.empty()) ImGui::TextWrapped("%s", facts.said.c_str());
+  if (!facts.message.empty()) ImGui::TextWrapped("%s", facts.message.c_str());
   ImGui::PopItemWidth();
   ImGui::End();
-  return wishes;
+  return actions;
 }
 
-void Panels::drawView(ViewState& state, PanelWishes& wishes, const PanelFacts& facts) {
-  if (ImGui::Button("all (r)")) wishes.reset_camera = true;
+void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts) {
+  if (ImGui::Button("fit (r)")) actions.reset_camera = true;
   ImGui::SameLine();
   const bool perspective = state.camera.projection == Projection::kPerspective;
-  if (ImGui::Button(perspective ? "orthographic (o)" : "perspective (o)")) wishes.other_projection = true;
+  if (ImGui::Button(perspective ? "orthographic (o)" : "perspective (o)")) actions.other_projection = true;
   ImGui::SameLine();
-  if (ImGui::Button(facts.flies ? "orbit (f)" : "fly (f)")) wishes.toggle_flight = true;
+  if (ImGui::Button(facts.flies ? "orbit (f)" : "fly (f)")) actions.toggle_flight = true;
   if (perspective) {
     float angle = static_cast<float>(state.camera.view_angle_deg);
     if (ImGui::SliderFloat("view angle", &angle, 10, 120, "%.0f deg")) {
       state.camera.view_angle_deg = static_cast<double>(angle);
-      wishes.changed = true;
+      actions.changed = true;
     }
   }
-  wishes.changed |= ImGui::Checkbox("scalar bar", &state.annotations.scalar_bar);
+  actions.changed |= ImGui::Checkbox("scalar bar", &state.annotations.scalar_bar);
   ImGui::SameLine();
-  wishes.changed |= ImGui::Checkbox("axes", &state.annotations.axes);
+  actions.changed |= ImGui::Checkbox("axes", &state.annotations.axes);
   ImGui::SameLine();
-  wishes.changed |= ImGui::Checkbox("outline", &state.annotations.outline);
+  actions.changed |= ImGui::Checkbox("outline", &state.annotations.outline);
   ImGui::SameLine();
-  wishes.changed |= ImGui::Checkbox("dark", &state.dark);
-  if (ImGui::Button("save picture (p)")) wishes.save_picture = true;
+  actions.changed |= ImGui::Checkbox("dark", &state.dark);
+  if (ImGui::Button("save picture (p)")) actions.save_picture = true;
   ImGui::SameLine();
-  if (ImGui::Button("copy command (c)")) wishes.copy_command = true;
+  if (ImGui::Button("copy command (c)")) actions.copy_command = true;
 }
 
-void Panels::drawDetail(ViewState& state, PanelWishes& wishes) {
+void Panels::drawDetail(ViewState& state, PanelActions& actions) {
   float lod = static_cast<float>(state.lod_pixels);
   if (ImGui::SliderFloat("error, pixels", &lod, 0, 16, "%.2f", ImGuiSliderFlags_Logarithmic)) {
     state.lod_pixels = static_cast<double>(lod);
-    wishes.changed = true;
+    actions.changed = true;
   }
-  wishes.dragging |= ImGui::IsItemActive();
+  actions.dragging |= ImGui::IsItemActive();
   int mebibytes = static_cast<int>(std::min<uint64_t>(state.memory_bytes >> 20, 1 << 30));
   if (ImGui::SliderInt("memory, MiB", &mebibytes, 64, 65536, "%d", ImGuiSliderFlags_Logarithmic))
     state.memory_bytes = static_cast<uint64_t>(mebibytes) << 20;
-  wishes.changed |= ImGui::IsItemDeactivatedAfterEdit();
+  actions.changed |= ImGui::IsItemDeactivatedAfterEdit();
   bool per_pixel = state.classification == Classification::kPixel;
   if (ImGui::Checkbox("classify every pixel", &per_pixel)) {
     state.classification = per_pixel ? Classification::kPixel : Classification::kFlat;
-    wishes.changed = true;
+    actions.changed = true;
   }
 }
 
-void Panels::drawClipBox(ViewState& state, PanelWishes& wishes) {
+void Panels::drawClipBox(ViewState& state, PanelActions& actions) {
   const Manifest& manifest = cache_.manifest();
   bool on = state.clip_box.has_value();
   if (ImGui::Checkbox("clip", &on)) {
@@ -124,7 +124,7 @@ void Panels::drawClipBox(ViewState& state, PanelWishes& wishes) {
       state.clip_box = WorldBox{manifest.lower, manifest.upper};
     else
       state.clip_box.reset();
-    wishes.changed = true;
+    actions.changed = true;
   }
   if (!state.clip_box) return;
   for (int axis = 0; axis < 3; ++axis) {
@@ -137,15 +137,15 @@ void Panels::drawClipBox(ViewState& state, PanelWishes& wishes) {
                                lowest, highest, "%.4g", "%.4g", ImGuiSliderFlags_AlwaysClamp)) {
       state.clip_box->lower[axis] = static_cast<double>(lower);
       state.clip_box->upper[axis] = static_cast<double>(std::max(lower, upper));
-      wishes.changed = true;
+      actions.changed = true;
     }
-    wishes.dragging |= ImGui::IsItemActive();
+    actions.dragging |= ImGui::IsItemActive();
   }
 }
 
 void Panels::drawStatistics(const ViewState& state, const PanelFacts& facts) {
   if (!ImGui::BeginTable("statistics", 2, ImGuiTableFlags_SizingFixedFit)) return;
-  row("picture", !facts.statistics ? "none yet"
+  row("picture", !facts.statistics ? "not yet drawn"
                  : facts.is_final  ? "final"
                  : facts.busy      ? "refining"
                                    : "coarse");
@@ -156,20 +156,20 @@ void Panels::drawStatistics(const ViewState& state, const PanelFacts& facts) {
         fmt::format("{}, {}", milliseconds(s->read_s), milliseconds(s->verify_s + s->decode_s)));
     row("project, sort", fmt::format("{}, {}", milliseconds(s->project_s), milliseconds(s->sort_s)));
     row("upload, draw", fmt::format("{}, {}", milliseconds(s->upload_s), milliseconds(s->draw_s)));
-    if (s->gl_draw_s > 0) row("OpenGL's time", milliseconds(s->gl_draw_s));
+    if (s->gl_draw_s > 0) row("OpenGL", milliseconds(s->gl_draw_s));
     row("splats", fmt::format("{} drawn of {}", count(s->splats_drawn), count(s->splats_read)));
     row("error", fmt::format("{:.2f} pixels", s->largest_error_px));
     row("bricks", fmt::format("{} resident", count(s->bricks_resident)));
-    row("  wanted",
-        fmt::format("{}, {} of them were resident",
-                    count(s->bricks_cached + s->bricks_read + s->bricks_left_out), count(s->bricks_cached)));
+    row("  needed",
+        fmt::format("{}, {} of them resident", count(s->bricks_cached + s->bricks_read + s->bricks_left_out),
+                    count(s->bricks_cached)));
     row("read", fmt::format("{:.1f} MiB, {:.0f} MiB/s", mebibytes(s->bytes_read),
                             s->read_s > 0 ? mebibytes(s->bytes_read) / s->read_s : 0));
-    row("memory", fmt::format("{:.0f} of {:.0f} MiB for the data", mebibytes(s->memory_used_bytes),
+    row("memory", fmt::format("{:.0f} of {:.0f} MiB limit", mebibytes(s->memory_used_bytes),
                               mebibytes(state.memory_bytes)));
   }
   const ProcessUsage usage = ProcessUsage::now();
-  row("process", fmt::format("{:.0f} MiB, {:.0f} at the most", mebibytes(usage.memory_bytes),
+  row("process", fmt::format("{:.0f} MiB, peak {:.0f} MiB", mebibytes(usage.memory_bytes),
                              mebibytes(usage.peak_memory_bytes)));
   row("drawn by", facts.backend);
   ImGui::EndTable();

@@ -1,4 +1,4 @@
-// The panel beside the picture: what is shown, how finely, and what that costs.
+// The panels beside the picture: scalar and transfer function, view, detail, clip box, statistics.
 #pragma once
 
 #include <string>
@@ -10,21 +10,21 @@
 
 namespace curvisplat {
 
-/// What the panels tell and do not change.
+/// What the panels display but cannot change.
 struct PanelFacts {
-  const FrameStatistics* statistics = nullptr;  // of the picture shown; null: there is none
+  const FrameStatistics* statistics = nullptr;  // of the shown picture; null if there is none
   bool is_final = false;
   bool busy = false;
   bool flies = false;
   std::string backend;
-  std::string said;  // the last message: what was saved, what went wrong
+  std::string message;  // the last result or error of a user action
 };
 
-/// What the user asked for, beyond changing the state.
-struct PanelWishes {
-  bool changed = false;           // of what the picture shows
-  bool function_changed = false;  // of the transfer function; `changed` is true as well
-  bool dragging = false;          // something is still being changed: a coarse picture will do
+/// What the user did in the panels.
+struct PanelActions {
+  bool changed = false;           // the picture must be drawn again
+  bool function_changed = false;  // implies `changed`
+  bool dragging = false;          // a control is being dragged: a coarse picture suffices
   bool save_picture = false, copy_command = false;
   bool reset_camera = false, other_projection = false, toggle_flight = false;
 };
@@ -33,16 +33,17 @@ class Panels {
  public:
   explicit Panels(const CacheReader& cache) : cache_(cache), function_(cache) {}
 
-  /// The panels stand at the window's left, this wide: units of Dear ImGui.
+  /// Width of the panels, at the left of the window, in Dear ImGui units.
   static float width();
 
-  /// Draws them into the present frame of Dear ImGui. `variable`: position of state.variable.
-  PanelWishes draw(ViewState& state, size_t variable, const PanelFacts& facts);
+  /// Draws the panels into the current Dear ImGui frame and applies edits to `state`. `variable`: position of
+  /// state.variable in the manifest.
+  PanelActions draw(ViewState& state, size_t variable, const PanelFacts& facts);
 
  private:
-  void drawView(ViewState& state, PanelWishes& wishes, const PanelFacts& facts);
-  void drawDetail(ViewState& state, PanelWishes& wishes);
-  void drawClipBox(ViewState& state, PanelWishes& wishes);
+  void drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts);
+  void drawDetail(ViewState& state, PanelActions& actions);
+  void drawClipBox(ViewState& state, PanelActions& actions);
   void drawStatistics(const ViewState& state, const PanelFacts& facts);
 
   const CacheReader& cache_;

@@ -1,4 +1,4 @@
-// A picture on its way to the window: an OpenGL texture of eight bits a channel.
+// An OpenGL texture, 8 bits per channel, that shows a picture in the window.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,7 @@
 
 namespace curvisplat {
 
-/// Lives on the context's thread, no longer than the context. Shown pixel by pixel, or smoothly where it is
-/// stretched.
+/// Use on the context's thread and destroy before the context. Interpolates linearly when stretched.
 class PictureTexture {
  public:
   explicit PictureTexture(const GlFunctions& gl);
@@ -18,12 +17,12 @@ class PictureTexture {
   PictureTexture(const PictureTexture&) = delete;
   PictureTexture& operator=(const PictureTexture&) = delete;
 
-  /// Four bytes a pixel, red, green, blue, alpha, colours not multiplied; rows from the top.
+  /// Uploads a picture: red, green, blue, alpha per pixel, not premultiplied; rows from the top.
   void set(std::span<const uint8_t> rgba, ImageSize size);
 
   bool isEmpty() const { return size_.width == 0; }
   ImageSize size() const { return size_; }
-  /// For Dear ImGui.
+  /// Texture identifier for Dear ImGui.
   void* id() const { return reinterpret_cast<void*>(static_cast<uintptr_t>(texture_)); }
 
  private:

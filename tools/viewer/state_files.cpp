@@ -39,7 +39,7 @@ std::optional<fs::path> rememberedStateOf(const fs::path& cache) {
 
 fs::path keepFunction(const std::string& preset_text) {
   const auto folder = configFolder();
-  if (!folder) throw Error("there is no folder for settings: neither XDG_CONFIG_HOME nor HOME is set");
+  if (!folder) throw Error("cannot find the settings directory: neither XDG_CONFIG_HOME nor HOME is set");
   const fs::path file = *folder / "functions" / (hashOf(preset_text) + ".json");
   writeState(file, preset_text);
   return file;
@@ -48,7 +48,7 @@ fs::path keepFunction(const std::string& preset_text) {
 void writeState(const fs::path& file, const std::string& text) {
   std::error_code error;
   fs::create_directories(file.parent_path(), error);
-  if (error) throw Error("{}: the folder cannot be made: {}", file.parent_path().string(), error.message());
+  if (error) throw Error("{}: cannot create the directory: {}", file.parent_path().string(), error.message());
   writeFileDurably(file, text);
 }
 

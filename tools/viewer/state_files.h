@@ -1,4 +1,4 @@
-// Where the window keeps what it remembers: $XDG_CONFIG_HOME/curvisplat, else ~/.config/curvisplat.
+// The files in which the window keeps its state: in $XDG_CONFIG_HOME/curvisplat, else ~/.config/curvisplat.
 #pragma once
 
 #include <filesystem>
@@ -7,17 +7,17 @@
 
 namespace curvisplat {
 
-/// Nothing where neither XDG_CONFIG_HOME nor HOME is set.
+/// The configuration folder; nullopt if neither XDG_CONFIG_HOME nor HOME is set.
 std::optional<std::filesystem::path> configFolder();
 
-/// The state of this cache's last window: its name, and a hash of where it is.
+/// The state file of this cache, named by the cache's name and a hash of its path; nullopt without a folder.
 std::optional<std::filesystem::path> rememberedStateOf(const std::filesystem::path& cache);
 
-/// Writes a function's text into the configuration folder, by its own hash, so that a command that names it
-/// stays true. Throws Error where it cannot.
+/// Writes a transfer function to the configuration folder under the hash of its text, so that commands that
+/// refer to it stay valid. Returns its path. Throws Error.
 std::filesystem::path keepFunction(const std::string& preset_text);
 
-/// Writes `text`, and makes the folder. Throws Error.
+/// Writes `text` to `file` and creates the folder if necessary. Throws Error.
 void writeState(const std::filesystem::path& file, const std::string& text);
 
 }  // namespace curvisplat

@@ -43,7 +43,7 @@ class Fields {
     return at(field).get<bool>();
   }
   std::string text(const char* field) const {
-    if (!at(field).is_string()) fail(field, "a text");
+    if (!at(field).is_string()) fail(field, "a string");
     return at(field).get<std::string>();
   }
   glm::dvec3 point(const char* field) const {
@@ -105,7 +105,7 @@ double defaultOpacityUnit(const Manifest& manifest, const glm::dvec3& scale) {
   return diagonal > 0 ? diagonal / 100 : 1;
 }
 
-/// One word of a shell command.
+/// `word` quoted for a shell.
 std::string quoted(const std::string& word) {
   const bool plain = !word.empty() && std::all_of(word.begin(), word.end(), [](unsigned char c) {
     return std::isalnum(c) ||
@@ -136,7 +136,8 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
 }
 
 ViewState firstViewOf(const Manifest& manifest, ImageSize picture) {
-  if (manifest.variables.empty()) throw Error("{}: the cache holds no scalar to look at", manifest.title);
+  if (manifest.variables.empty())
+    throw Error("{}: the cache contains no scalar; convert the grid again with a scalar", manifest.title);
   const VariableInfo& variable = manifest.variables.front();
   ViewState state{
       variable.name,
@@ -153,7 +154,7 @@ void chooseVariable(ViewState& state, const Manifest& manifest, const std::strin
   if (!variable) {
     std::string names;
     for (const VariableInfo& one : manifest.variables) names += (names.empty() ? "" : ", ") + one.name;
-    throw UsageError("the cache has no scalar {}: there are {}", name, names);
+    throw UsageError("the cache has no scalar {}; expected one of {}", name, names);
   }
   state.variable = name;
   state.function.fitRange(variable->min, variable->max);
@@ -188,7 +189,7 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   }
   const Fields fields(path, "", json);
   if (fields.number("curvisplat_view", 0, 1e9) != 1)
-    fields.fail("curvisplat_view", "1, the only version that this program reads");
+    fields.fail("curvisplat_view", "1, the only version this program reads");
 
   const std::string variable = fields.text("variable");
   if (!find(manifest, variable)) fields.fail("variable", "a scalar of the cache");
@@ -226,7 +227,7 @@ std::string renderCommand(const ViewState& state, const std::filesystem::path& c
                           const std::filesystem::path& function_file) {
   std::string command = "curvisplat render " + quoted(cache.string()) + " -o picture.png";
   const auto add = [&](const std::string& option, const std::string& value) {
-    // A value that begins with a minus sign would be taken for an option.
+    // The parser would take a separate value with a minus sign for an option.
     command +=
         value.starts_with('-') ? " " + option + "=" + quoted(value) : " " + option + " " + quoted(value);
   };

@@ -1,5 +1,5 @@
-// All that makes a picture in the window: camera, variable, function, detail. Kept from one window to the
-// next, and told as a `curvisplat render` command.
+// Everything that defines the picture in the window: camera, scalar, transfer function, detail. Saved as JSON
+// between windows, and translated to a `curvisplat render` command.
 #pragma once
 
 #include <cstdint>
@@ -32,22 +32,22 @@ struct ViewState {
   FrameOptions frameOptions(ImageSize size) const;
 };
 
-/// What a cache is opened with: its first variable, all of it in the picture beside the scalar bar. Throws
-/// Error where the cache has no variable.
+/// The initial state: the cache's first scalar, with the data fitted into the picture beside the scalar bar.
+/// Throws Error if the cache has no scalar.
 ViewState firstViewOf(const Manifest& manifest, ImageSize picture);
 
-/// Another variable, with the function's colours and points over that one's range. Throws UsageError that
-/// lists the variables there are.
+/// Selects another scalar and fits the transfer function to its range. Throws UsageError that lists the
+/// scalars if there is none of this name.
 void chooseVariable(ViewState& state, const Manifest& manifest, const std::string& name);
 
 std::string toJson(const ViewState& state);
-/// `path` is where the text comes from, for messages. Throws Error naming it and the field that is missing or
-/// out of range, or the variable that the cache lacks.
+/// `path` names the file in messages. Throws Error with the path and the field that is missing or out of
+/// range, or the scalar that the cache lacks.
 ViewState viewStateFromJson(const std::string& text, const std::filesystem::path& path,
                             const Manifest& manifest);
 
-/// The shell command that renders this view. `function_file` holds the function's definition where
-/// state.function is no preset. Numbers are written so that they are read back the same.
+/// The shell command that renders this view; its numbers round-trip exactly. `function_file`: the file that
+/// holds the transfer function; used unless the function is a preset.
 std::string renderCommand(const ViewState& state, const std::filesystem::path& cache, ImageSize size,
                           const std::filesystem::path& function_file);
 

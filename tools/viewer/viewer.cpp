@@ -29,10 +29,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// New pictures and input end a wait. Without either a window in software costs what is drawn behind it.
+// New pictures and input end a wait early. Longer waits leave the processor to the renderer when both share
+// it.
 constexpr double kIdleWait_s = 0.5;
-constexpr double kMovingWait_s = 0.03;  // flying, and until the camera counts as resting
-constexpr int kFramesAfterInput = 2;    // Dear ImGui settles within them
+constexpr double kMovingWait_s = 0.03;  // while flying, and until the camera is at rest
+constexpr int kFramesAfterInput = 2;    // Dear ImGui needs them to settle
 
 bool same(ImageSize a, ImageSize b) {
   return a.width == b.width && a.height == b.height;
@@ -54,7 +55,7 @@ class Viewer {
     fitData(pictureSize());
   }
 
-  /// What the window shows is remembered when it is closed, by whomever.
+  /// Saves the state when the window closes, also when a signal closes it.
   void run(const Progress& stopped) {
     try {
       loop(stopped);
@@ -87,7 +88,7 @@ class Viewer {
       try {
         state = viewStateFromJson(readTextFile(*remembered), *remembered, cache_.manifest());
       } catch (const Error& error) {
-        printMessage("warning: {}; the window opens as if for the first time", error.what());
+        printMessage("warning: {}; using the initial view", error.what());
       }
     }
     if (options_.scalar && *options_.scalar != state.variable)
@@ -96,7 +97,7 @@ class Viewer {
     return state;
   }
 
-  /// One frame of the window. What the keys and the mouse do is in it.
+  /// Draws one frame of the window with the effects of all input so far.
   void update() {
     window_.beginFrame();
     takeFrame();
@@ -111,27 +112,27 @@ class Viewer {
       }
       showPicture();
       savePictureIfFinal();
-      if (std::exchange(copy_wanted_, false)) copyCommand();
+      if (std::exchange(copy_requested_, false)) copyCommand();
     }
     window_.endFrame(glm::vec3(state_.background()));
   }
 
-  /// Of the picture beside the panels, in pixels.
+  /// Size in pixels of the picture beside the panels.
   ImageSize pictureSize() const {
     ImageSize size = window_.pixels();
     const int panel = static_cast<int>(std::lround(window_.pixelScale() * panelWidth()));
-    if (size.width > 0) size.width = std::max(1, size.width - panel);  // a strip beside them is always left
+    if (size.width > 0) size.width = std::max(1, size.width - panel);  // even if the panels fill the window
     return size;
   }
   float panelWidth() const { return panels_shown_ ? Panels::width() : 0; }
 
-  /// The part of the picture that shows the data; beside it is the scalar bar.
+  /// Divides the picture into the data's part and the scalar bar.
   void fitData(ImageSize picture) {
     picture_size_ = picture;
     data_size_ = dataSize(state_.annotations, picture, state_.function.function());
   }
 
-  /// Keys, mouse and panels; true if the picture is to change.
+  /// Applies keys, mouse and panels. Returns true if the picture must be drawn again.
   bool react() {
     bool changed = navigation_.update(window_, state_.camera, data_size_);
     if (!window_.showsClick()) changed |= pressKeys();
@@ -141,19 +142,19 @@ class Viewer {
     facts.busy = frames_.busy();
     facts.flies = navigation_.flies();
     facts.backend = frames_.backendName();
-    facts.said = said_;
-    PanelWishes wishes;
+    facts.message = message_;
+    PanelActions actions;
     window_.setPictureLeft(panelWidth());
-    if (panels_shown_) wishes = panels_.draw(state_, variable(), facts);
-    dragging_ = wishes.dragging;
-    changed |= wishes.changed;
+    if (panels_shown_) actions = panels_.draw(state_, variable(), facts);
+    dragging_ = actions.dragging;
+    changed |= actions.changed;
     updateBounds();
-    if (wishes.reset_camera) changed |= press({GLFW_KEY_R});
-    if (wishes.other_projection) changed |= press({GLFW_KEY_O});
-    if (wishes.toggle_flight) changed |= press({GLFW_KEY_F});
-    if (wishes.save_picture) press({GLFW_KEY_P});
-    if (wishes.copy_command) press({GLFW_KEY_C});
-    if (wishes.function_changed) ++function_version_;
+    if (actions.reset_camera) changed |= press({GLFW_KEY_R});
+    if (actions.other_projection) changed |= press({GLFW_KEY_O});
+    if (actions.toggle_flight) changed |= press({GLFW_KEY_F});
+    if (actions.save_picture) press({GLFW_KEY_P});
+    if (actions.copy_command) press({GLFW_KEY_C});
+    if (actions.function_changed) ++function_version_;
     if (window_.showsClick()) changed |= pressKeys();
     return changed;
   }
@@ -167,11 +168,11 @@ class Viewer {
   bool press(const Window::Key& key) {
     switch (key.code) {
       case GLFW_KEY_P:
-        save_wanted_ = true;
-        said_ = "the picture is saved as soon as it is final";
+        save_requested_ = true;
+        message_ = "the picture will be saved when it is final";
         return false;
       case GLFW_KEY_C:
-        copy_wanted_ = true;
+        copy_requested_ = true;
         return false;
       case GLFW_KEY_H:
         panels_shown_ = !panels_shown_;
@@ -207,8 +208,8 @@ class Viewer {
       picture_.set(frame->bytes, frame->image.size);
       shown_ = std::move(frame);
     } catch (const UsageError& error) {
-      if (said_ != error.what()) printMessage("warning: {}", error.what());
-      said_ = error.what();
+      if (message_ != error.what()) printMessage("warning: {}", error.what());
+      message_ = error.what();
     }
   }
 
@@ -238,17 +239,17 @@ class Viewer {
   }
 
   void savePictureIfFinal() {
-    if (!save_wanted_ || !shown_ || !shown_->is_final || shown_->request != request_) return;
-    save_wanted_ = false;
+    if (!save_requested_ || !shown_ || !shown_->is_final || shown_->request != request_) return;
+    save_requested_ = false;
     fs::path file;
     for (int number = 1; file.empty() || fs::exists(file); ++number)
       file = fmt::format("{}_{:04}.png", cache_.path().stem().string(), number);
     try {
       const TransferFunction function = state_.function.function();
       writeImage(annotated(shown_->image, state_.annotations, sceneFor(function)), file);
-      said_ = "saved " + fs::absolute(file).string();
+      message_ = "saved " + fs::absolute(file).string();
     } catch (const Error& error) {
-      said_ = error.what();
+      message_ = error.what();
     }
   }
 
@@ -262,9 +263,9 @@ class Viewer {
       window_.setClipboard(command);
       fmt::print("{}\n", command);
       std::fflush(stdout);
-      said_ = "copied: " + command;
+      message_ = "copied: " + command;
     } catch (const Error& error) {
-      said_ = error.what();
+      message_ = error.what();
     }
   }
 
@@ -274,7 +275,7 @@ class Viewer {
     try {
       writeState(*file, toJson(state_));
     } catch (const Error& error) {
-      printMessage("warning: the view is not remembered: {}", error.what());
+      printMessage("warning: cannot save the view: {}", error.what());
     }
   }
 
@@ -289,12 +290,12 @@ class Viewer {
   PictureTexture picture_, overlay_;
 
   uint64_t function_version_ = 1;
-  uint64_t request_ = 0;                            // the newest
-  ImageSize picture_size_{0, 0}, data_size_{0, 0};  // as last asked for
+  uint64_t request_ = 0;                            // number of the newest request
+  ImageSize picture_size_{0, 0}, data_size_{0, 0};  // of the newest request
   std::optional<ShownFrame> shown_;
   bool was_moving_ = false, dragging_ = false;
-  bool save_wanted_ = false, copy_wanted_ = false;
-  std::string said_;
+  bool save_requested_ = false, copy_requested_ = false;
+  std::string message_;
 };
 
 }  // namespace

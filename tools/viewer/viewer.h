@@ -1,4 +1,4 @@
-// The window on a cache: the picture, the panels, and the loop that joins them with the frame loop.
+// The window that shows a cache: picture, panels, and the main loop that connects them with the frame loop.
 #pragma once
 
 #include <cstdint>
@@ -16,16 +16,15 @@ namespace curvisplat {
 struct ViewerOptions {
   ImageSize size{1200, 800};
   Backend backend = Backend::kAutomatic;
-  std::optional<std::filesystem::path> state;  // else what is remembered of this cache
+  std::optional<std::filesystem::path> state;  // default: the saved state of this cache
   std::optional<std::string> scalar;
   std::optional<uint64_t> memory_bytes;
-  std::optional<double>
-      target_s;  // for a picture while moving; else 33 ms with a graphics card, 100 ms without
+  std::optional<double> target_s;  // per picture while moving; default 0.033 with a graphics card, else 0.1
 };
 
-/// Opens the window and returns when it is closed; half a second after `stopped` is, it closes the window and
-/// throws Interrupted. Throws Error where there is no window to be had, and where the cache cannot be read
-/// any more; UsageError for a scalar that the cache lacks.
+/// Opens the window and returns when the user closes it. Checks `stopped` twice a second; once it is stopped,
+/// closes the window and throws Interrupted. Throws Error if no window can be opened or the cache cannot be
+/// read, and UsageError for a scalar that the cache lacks.
 void runViewer(const CacheReader& cache, const ViewerOptions& options, const Progress& stopped);
 
 }  // namespace curvisplat

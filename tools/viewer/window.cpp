@@ -14,10 +14,10 @@
 namespace curvisplat {
 namespace {
 
-std::string last_words;  // of GLFW; the main thread's
+std::string last_glfw_error;  // main thread only
 
-void onError(int, const char* words) {
-  last_words = words ? words : "";
+void onError(int, const char* description) {
+  last_glfw_error = description ? description : "";
 }
 
 }  // namespace
@@ -27,16 +27,15 @@ struct Window::Library {
     glfwSetErrorCallback(onError);
     if (!glfwInit())
       throw Error(
-          "no window can be opened: {}; on a machine without a display, draw pictures with curvisplat "
-          "render",
-          last_words);
+          "cannot open a window: {}; on a machine without a display, draw pictures with curvisplat render",
+          last_glfw_error);
   }
   ~Library() { glfwTerminate(); }
 };
 
 namespace {
 
-/// With OpenGL 3.3 or newer, made current. Throws Error.
+/// Opens a window with OpenGL 3.3 or newer and makes its context current. Throws Error.
 GLFWwindow* openWindow(const char* title, ImageSize size, bool visible) {
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
@@ -46,9 +45,8 @@ GLFWwindow* openWindow(const char* title, ImageSize size, bool visible) {
   GLFWwindow* const window = glfwCreateWindow(size.width, size.height, title, nullptr, nullptr);
   if (!window)
     throw Error(
-        "no window can be opened: {}; OpenGL 3.3 is needed (from a graphics card's driver, or from Mesa: "
-        "libgl1-mesa-dri)",
-        last_words);
+        "cannot open a window: {}; it needs OpenGL 3.3 (from a graphics driver or Mesa's libgl1-mesa-dri)",
+        last_glfw_error);
   glfwMakeContextCurrent(window);
   return window;
 }
@@ -69,7 +67,7 @@ std::string displayName() {
   };
   if (const std::string x11 = valueOf("DISPLAY"); !x11.empty()) return "X11 " + x11;
   if (const std::string wayland = valueOf("WAYLAND_DISPLAY"); !wayland.empty()) return "Wayland " + wayland;
-  return "none: neither DISPLAY nor WAYLAND_DISPLAY is set";
+  return "none (neither DISPLAY nor WAYLAND_DISPLAY is set)";
 }
 
 }  // namespace
@@ -96,7 +94,7 @@ Window::Window(const std::string& title, ImageSize size) : library_(std::make_un
   gl_ = std::make_unique<GlFunctions>(glOfCurrentContext());
   context_name_ = nameOf(*gl_);
   glfwSetWindowUserPointer(window_, this);
-  // Dear ImGui's callbacks go before these, and call them.
+  // Dear ImGui installs its callbacks later and calls these from them.
   glfwSetKeyCallback(window_, onKey);
   glfwSetMouseButtonCallback(window_, onButton);
   glfwSetCursorPosCallback(window_, onMove);
@@ -144,9 +142,8 @@ void Window::wake() {
   glfwPostEmptyEvent();
 }
 
-/// Dear ImGui looks once a frame at what is down, and where the mouse is. A key that has gone down and up
-/// since then is down for this frame; a button is used where the mouse was then, however far it has gone
-/// since.
+/// Dear ImGui samples keys and mouse once per frame. Reports a key that was pressed and released between two
+/// frames as down for one frame, and a button event at the position where it happened.
 void Window::showInput() {
   ImGuiIO& io = ImGui::GetIO();
   for (const int key : shown_keys_) io.KeysDown[key] = glfwGetKey(window_, key) == GLFW_PRESS;
@@ -193,7 +190,7 @@ void Window::onKey(GLFWwindow* window, int key, int, int action, int mods) {
   auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
   self->input_ = true;
   if (action != GLFW_PRESS) return;
-  if (key >= 0) self->fresh_keys_.push_back(key);  // GLFW knows no name of some
+  if (key >= 0) self->fresh_keys_.push_back(key);  // some keys have no GLFW code
   self->keys_.push_back({key, (mods & GLFW_MOD_SHIFT) != 0, (mods & GLFW_MOD_CONTROL) != 0});
 }
 
@@ -217,7 +214,7 @@ void Window::onButton(GLFWwindow* window, int button, int action, int mods) {
   self->input_ = true;
   self->mouse_events_.push_back(self->mouse_);
   if (action == GLFW_PRESS && !self->isDragging()) {
-    // Where the mouse was then, not where it has gone since.
+    // mouse_ is still the position of this event.
     if (!self->overPicture()) return;
     self->dragged_button_ = button;
     self->dragged_with_shift_ = (mods & GLFW_MOD_SHIFT) != 0;

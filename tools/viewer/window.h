@@ -1,6 +1,6 @@
-// A window with an OpenGL context and Dear ImGui in it.
+// A window with an OpenGL context and Dear ImGui.
 //
-// All members are for the main thread, but for wake().
+// All members except wake() are for the main thread.
 #pragma once
 
 #include <deque>
@@ -16,19 +16,19 @@ struct GLFWwindow;
 
 namespace curvisplat {
 
-/// What a window would get on this machine.
+/// The window system of this machine, for `info --system`.
 struct WindowReport {
   bool opens = false;
   std::string display;  // "X11 :0"; "none: ..."
-  std::string glfw;     // its version, and what it was built for
-  std::string found;    // as Window::contextName(); or why there is none
+  std::string glfw;     // GLFW's version string
+  std::string found;    // as Window::contextName(), or why no window opens
 };
-/// Opens a window that is not shown. The main thread, while there is no Window.
+/// Opens a hidden window. Call on the main thread while no Window exists.
 WindowReport examineWindow();
 
 class Window {
  public:
-  /// Opens it. Throws Error: no display, no OpenGL 3.3, and what GLFW says of it.
+  /// Throws Error with GLFW's message if there is no display or no OpenGL 3.3.
   Window(const std::string& title, ImageSize size);
   ~Window();
   Window(const Window&) = delete;
@@ -36,46 +36,46 @@ class Window {
 
   bool isOpen() const;
   void close();
-  /// Waits for input, wake() or the time to pass.
+  /// Waits for input, wake() or at most `seconds`.
   void wait(double seconds);
-  /// Ends a wait(). Any thread, while the window lives.
+  /// Ends a wait(). Any thread, during the window's lifetime.
   static void wake();
 
-  /// Begins and ends a frame of Dear ImGui; the end shows it.
+  /// Begins and ends a Dear ImGui frame; endFrame() shows it.
   void beginFrame();
   void endFrame(const glm::vec3& background);
 
-  /// Of what is drawn, in pixels; {0, 0} while it is minimised.
+  /// Size of the contents in pixels; {0, 0} while the window is minimised.
   ImageSize pixels() const { return pixels_; }
-  /// Pixels to a unit of Dear ImGui's and of the mouse.
+  /// Pixels per unit of Dear ImGui and of the mouse position.
   double pixelScale() const;
 
   struct Key {
     int code = 0;  // GLFW_KEY_...
     bool shift = false, control = false;
   };
-  /// Keys pressed since the last call, but for those that a text field takes. None while clicks before them
-  /// are still to be shown to Dear ImGui.
+  /// Keys pressed since the last call, except those typed into a text field. Empty while Dear ImGui has yet
+  /// to see earlier clicks.
   std::vector<Key> takeKeys();
-  /// Whether this frame of Dear ImGui has a click that may have come before keys.
+  /// Whether this Dear ImGui frame contains a click that may precede the keys.
   bool showsClick() const { return shows_click_; }
   /// Whether a key, a button or the wheel was used since the last call.
   bool takeInput();
   bool isDown(int key) const;
 
-  /// Movement of the mouse with a button down that went down over the picture. Every event counts with the
-  /// buttons of its own time, so that nothing is lost where frames are slow.
+  /// Movement of the mouse while a button is down that was pressed over the picture. Recorded per event with
+  /// the buttons at that time, so that slow frames lose nothing.
   struct Drag {
     int button = 0;  // GLFW_MOUSE_BUTTON_...
     bool shift = false;
     glm::dvec2 movement{0.0};  // pixels
   };
   std::vector<Drag> takeDrags();
-  /// Notches of the wheel over the picture, away from the user.
+  /// Wheel notches over the picture since the last call; positive away from the user.
   double takeWheel();
-  /// Whether a drag is under way.
+  /// Whether a drag is in progress.
   bool isDragging() const { return dragged_button_ >= 0; }
-  /// The picture is right of this: units of Dear ImGui.
+  /// Left edge of the picture in Dear ImGui units.
   void setPictureLeft(double left) { picture_left_ = left; }
 
   void setClipboard(const std::string& text);
@@ -94,19 +94,19 @@ class Window {
   void showInput();
 
   friend WindowReport examineWindow();
-  struct Library;  // GLFW, from initialisation to termination
+  struct Library;  // initialises and terminates GLFW
   std::unique_ptr<Library> library_;
   GLFWwindow* window_ = nullptr;
   std::unique_ptr<GlFunctions> gl_;
   std::string context_name_;
-  // As GLFW told last: to ask it is to wait for the display, which may still have a frame to show.
+  // As of GLFW's last callback: querying would wait for the display, which may still be showing a frame.
   ImageSize pixels_{0, 0};
   int width_ = 0;  // in units of the mouse
 
   std::vector<Key> keys_;
-  std::vector<int> fresh_keys_;          // pressed since the last frame of Dear ImGui
-  std::vector<int> shown_keys_;          // that it was told are down in its last frame
-  std::deque<glm::dvec2> mouse_events_;  // where buttons went down or up, for its frames to come
+  std::vector<int> fresh_keys_;          // pressed since the last Dear ImGui frame
+  std::vector<int> shown_keys_;          // reported as down in its last frame
+  std::deque<glm::dvec2> mouse_events_;  // positions of button events that it has yet to see
   bool shows_click_ = false;
   bool input_ = true;
 
