@@ -1,12 +1,13 @@
-// How true the pictures of real grids are. Every grid is drawn as a uniform medium and with a scalar of its own, along
-// the axes, nearly along one, and obliquely, and held against rays marched through the trilinear map of its cells.
-// One table, JSON on request, and a sheet of pictures for each grid.
+// Fidelity of pictures of real grids. Every grid is drawn as a uniform medium and with a scalar of its own,
+// along the axes, nearly along one, and obliquely, and compared with rays marched through the trilinear map of
+// its cells. Prints a table, writes JSON on request, and leaves a sheet of pictures for each grid.
 //
-//   ripple   of a uniform medium: optical depth over the true one, at pixels two and more away from the outline:
-//            its standard deviation over its mean, and its 98th percentile over its 2nd. 0 % and 1 in a perfect picture
-//   outside  of a uniform medium: optical depth more than one pixel beyond the outline, over all of it
-//   inside   PSNR of a uniform medium's transmittance, all pixels
-//   scalar   PSNR of the grid's scalar by the "smooth" function, all pixels
+//   rms %, p98/p2   uniform medium: ratio of the optical depth to the true one, two pixels and more inside the
+//                   outline; its standard deviation over its mean, its 98th percentile over its 2nd. A perfect
+//                   picture has 0 and 1
+//   outside %       uniform medium: optical depth more than one pixel beyond the outline, of the whole
+//   inside          uniform medium: PSNR of the picture, all pixels
+//   scalar          PSNR of the grid's scalar with the "smooth" function, all pixels
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -24,6 +25,7 @@
 #include <vector>
 
 #include "preprocess/formats/open/open_grid.h"
+#include "preprocess/scenes/scenes.h"
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/error.h"
@@ -35,7 +37,7 @@
 namespace curvisplat {
 namespace {
 
-/// A grid to draw. Cell-centred scalars have no trilinear truth; such a grid is drawn as a uniform medium only.
+/// A grid to draw.
 struct Case {
   std::string name;
   std::function<std::unique_ptr<GridSource>()> open;
@@ -67,7 +69,7 @@ std::vector<View> viewsOf(const glm::dvec3& lower, const glm::dvec3& upper, Imag
   return views;
 }
 
-/// Black over white: a pixel is its transmittance.
+/// Black, to be drawn over white: a pixel then shows the transmittance.
 TransferFunction uniformMedium(double extinction, std::pair<double, double> range) {
   TransferFunctionDefinition definition;
   definition.name = definition.origin = "uniform medium";
@@ -215,7 +217,7 @@ class Measurement {
   nlohmann::json rows() const { return rows_; }
 
  private:
-  /// The march's picture: made by the first who asks, and kept in the folder.
+  /// The marched picture. Marched once, and kept in the folder.
   Image truth(const GridField& field, const std::string& name, const OpticalFunction& function,
               const Camera& camera, double length, double agreement_db) const {
     const auto path = folder_ / fmt::format("{}_{}.pfm", name, size_.width);
@@ -290,6 +292,17 @@ std::unique_ptr<GridSource> uniformCube(uint64_t n) {
 std::vector<Case> allCases() {
   std::vector<Case> cases;
   cases.push_back({"cube", [] { return uniformCube(101); }, "s0"});
+  const auto scene = [&](const std::string& name, SceneGridSize size) {
+    cases.push_back({name,
+                     [name, size]() -> std::unique_ptr<GridSource> {
+                       return std::make_unique<SceneGridSource>(makeScenes(name), size, 4);
+                     },
+                     "f"});
+  };
+  scene("spectral", {49, 43, 37});
+  scene("dome", {41, 25, 21});
+  scene("globe", {33, 33, 6});
+  scene("duct", {21, 17, 17});
   const std::filesystem::path data = CURVISPLAT_SHARED_DATA;
   const auto add = [&](const std::string& name, const std::string& grid, const std::string& solution,
                        const std::string& scalar) {

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "preprocess/scenes/rough_scenes.h"
 #include "stream/base/check.h"
 #include "stream/base/error.h"
 
@@ -245,49 +246,75 @@ double nodeCoordinate(uint64_t index, uint64_t nodes) {
 }  // namespace
 
 std::vector<std::string> sceneNames() {
-  return {"half-annulus", "half-annulus-constant", "shell", "o-grid", "axis", "sheared-waves", "wake"};
+  return {"half-annulus", "half-annulus-constant",
+          "shell",        "o-grid",
+          "axis",         "sheared-waves",
+          "wake",         "spectral",
+          "dome",         "globe",
+          "duct"};
 }
 
-std::unique_ptr<Scene> makeScene(std::string_view name, std::optional<double> clustering) {
+std::vector<std::shared_ptr<const Scene>> makeScenes(std::string_view name,
+                                                     std::optional<double> clustering) {
   if (clustering && !(*clustering > 0 && *clustering <= 20))
     throw UsageError("clustering {} is out of range; expected above 0, at most 20", *clustering);
   const auto pipe = [&](double turns, double inner, double own_clustering, Pipe::Field field) {
-    return std::make_unique<Pipe>(std::string(name),
-                                  PipeShape{turns, inner, clustering.value_or(own_clustering)}, field);
+    return std::vector<std::shared_ptr<const Scene>>{std::make_shared<Pipe>(
+        std::string(name), PipeShape{turns, inner, clustering.value_or(own_clustering)}, field)};
   };
   if (name == "half-annulus") return pipe(0.5, 0.3, 2.5, halfAnnulusField);
   if (name == "half-annulus-constant") return pipe(0.5, 0.3, 2.5, [](const glm::dvec3&) { return 0.5; });
   if (name == "shell") return pipe(0.5, 0.3, 4, boundaryLayer);
   if (name == "o-grid") return pipe(1, 0.3, 2.5, halfAnnulusField);
   if (name == "axis") return pipe(1, 0, 1, halfAnnulusField);
-  if (name == "sheared-waves") {
-    if (clustering) throw UsageError("scene '{}' has uniform cells; leave out its clustering", name);
-    return std::make_unique<ShearedWaves>(std::string(name));
-  }
-  if (name == "wake") return std::make_unique<Wake>(std::string(name), clustering.value_or(9));
-  throw UsageError("there is no scene '{}'; available: {}", name, fmt::join(sceneNames(), ", "));
+  if (name == "wake") return {std::make_shared<Wake>(std::string(name), clustering.value_or(9))};
+  if (name == "dome") return {makeDome(clustering)};
+
+  const auto names = sceneNames();
+  if (std::find(names.begin(), names.end(), name) == names.end())
+    throw UsageError("there is no scene '{}'; available: {}", name, fmt::join(names, ", "));
+  if (clustering) throw UsageError("scene '{}' has its own spacing; omit --clustering", name);
+  if (name == "sheared-waves") return {std::make_shared<ShearedWaves>(std::string(name))};
+  if (name == "spectral") return {makeSpectral()};
+  if (name == "globe") return makeGlobe();
+  CURVISPLAT_CHECK(name == "duct");
+  return makeDuct();
 }
 
-SceneGridSource::SceneGridSource(std::shared_ptr<const Scene> scene, SceneGridSize size, int coordinate_bytes)
-    : scene_(std::move(scene)) {
+std::shared_ptr<const Scene> makeScene(std::string_view name, std::optional<double> clustering) {
+  auto blocks = makeScenes(name, clustering);
+  CURVISPLAT_CHECK_OP(blocks.size(), ==, 1u);
+  return std::move(blocks.front());
+}
+
+SceneGridSource::SceneGridSource(std::vector<std::shared_ptr<const Scene>> blocks, SceneGridSize size,
+                                 int coordinate_bytes) {
   if (std::min({size.ni, size.nj, size.nk}) < 2)
     throw UsageError("found {} x {} x {} nodes; a scene needs at least 2 along each axis", size.ni, size.nj,
                      size.nk);
   CURVISPLAT_CHECK(coordinate_bytes == 4 || coordinate_bytes == 8);
-  description_.format = fmt::format("analytic scene {}", scene_->name());
-  description_.blocks = {{"block 1", size.ni, size.nj, size.nk, false}};
+  description_.format = fmt::format("analytic scene {}", blocks.front()->name());
   description_.scalars = {{"f", "", {}}};
   description_.coordinate_bytes = coordinate_bytes;
-  for (uint64_t i = 0; i < size.ni; ++i) of_i_.push_back(scene_->alongU(nodeCoordinate(i, size.ni)));
-  for (uint64_t j = 0; j < size.nj; ++j) of_j_.push_back(scene_->alongV(nodeCoordinate(j, size.nj)));
-  for (uint64_t k = 0; k < size.nk; ++k) of_k_.push_back(scene_->alongW(nodeCoordinate(k, size.nk)));
+  for (auto& scene : blocks) {
+    description_.blocks.push_back(
+        {fmt::format("block {}", description_.blocks.size() + 1), size.ni, size.nj, size.nk, false});
+    Block block;
+    for (uint64_t i = 0; i < size.ni; ++i) block.of_i.push_back(scene->alongU(nodeCoordinate(i, size.ni)));
+    for (uint64_t j = 0; j < size.nj; ++j) block.of_j.push_back(scene->alongV(nodeCoordinate(j, size.nj)));
+    for (uint64_t k = 0; k < size.nk; ++k) block.of_k.push_back(scene->alongW(nodeCoordinate(k, size.nk)));
+    block.scene = std::move(scene);
+    blocks_.push_back(std::move(block));
+  }
 }
 
-void SceneGridSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+void SceneGridSource::read(uint32_t block_number, const NodeBox& box, std::span<const uint32_t> scalars,
                            NodeArrays& out) const {
-  CURVISPLAT_CHECK_OP(block, ==, 0u);
-  CURVISPLAT_CHECK(box.j0 <= box.j1 && box.j1 <= of_j_.size() && box.k0 <= box.k1 && box.k1 <= of_k_.size());
-  const size_t nodes = of_i_.size() * (box.j1 - box.j0) * (box.k1 - box.k0);
+  CURVISPLAT_CHECK_OP(block_number, <, blocks_.size());
+  const Block& block = blocks_[block_number];
+  CURVISPLAT_CHECK(box.j0 <= box.j1 && box.j1 <= block.of_j.size() && box.k0 <= box.k1 &&
+                   box.k1 <= block.of_k.size());
+  const size_t nodes = block.of_i.size() * (box.j1 - box.j0) * (box.k1 - box.k0);
   out.x.resize(nodes);
   out.y.resize(nodes);
   out.z.resize(nodes);
@@ -300,13 +327,13 @@ void SceneGridSource::read(uint32_t block, const NodeBox& box, std::span<const u
   size_t n = 0;
   for (uint64_t k = box.k0; k < box.k1; ++k)
     for (uint64_t j = box.j0; j < box.j1; ++j)
-      for (const glm::dvec3& of_i : of_i_) {
-        const glm::dvec3 position = scene_->join(of_i, of_j_[j], of_k_[k]);
+      for (const glm::dvec3& of_i : block.of_i) {
+        const glm::dvec3 position = block.scene->join(of_i, block.of_j[j], block.of_k[k]);
         out.x[n] = stored(position.x);
         out.y[n] = stored(position.y);
         out.z[n] = stored(position.z);
         if (!scalars.empty()) {
-          const auto f = static_cast<float>(scene_->scalar(position));
+          const auto f = static_cast<float>(block.scene->scalar(position));
           for (auto& values : out.scalars) values[n] = f;
         }
         ++n;

@@ -1,12 +1,8 @@
 // Analytic curvilinear scenes: grids of any size whose positions, scalar, inverse mapping and volume are
 // known in closed form. `curvisplat generate` writes them, and tests use them as ground truth.
-//
-// A scene maps the unit cube (u, v, w), along i, j, k, to the world. The mapping is composed of one function
-// per axis, so that a grid needs three small tables and evaluates no transcendental function per node.
 #pragma once
 
 #include <glm/vec3.hpp>
-#include <glm/vec4.hpp>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,43 +11,9 @@
 #include <vector>
 
 #include "preprocess/grid/grid_source.h"
+#include "preprocess/scenes/scene.h"
 
 namespace curvisplat {
-
-/// Immutable; thread-safe.
-class Scene {
- public:
-  virtual ~Scene() = default;
-
-  const std::string& name() const { return name_; }
-
-  /// The world position of (u, v, w) in [0, 1]³.
-  glm::dvec3 position(const glm::dvec3& uvw) const {
-    return join(alongU(uvw.x), alongV(uvw.y), alongW(uvw.z));
-  }
-  /// The (u, v, w) of a world position; nullopt outside the scene.
-  virtual std::optional<glm::dvec3> inverse(const glm::dvec3& world) const = 0;
-  bool contains(const glm::dvec3& world) const { return inverse(world).has_value(); }
-  /// The scalar "f", in [0, 1]; also defined outside the scene.
-  virtual double scalar(const glm::dvec3& world) const = 0;
-  /// Volume of the image of the unit cube, in world units.
-  virtual double volume() const = 0;
-
-  /// The lower and upper corner of a tight bounding box.
-  virtual std::pair<glm::dvec3, glm::dvec3> bounds() const = 0;
-
-  /// The factors of position(): the position of (u, v, w) is join(alongU(u), alongV(v), alongW(w)).
-  virtual glm::dvec3 alongU(double u) const = 0;
-  virtual glm::dvec3 alongV(double v) const = 0;
-  virtual glm::dvec3 alongW(double w) const = 0;
-  virtual glm::dvec3 join(const glm::dvec3& of_u, const glm::dvec3& of_v, const glm::dvec3& of_w) const = 0;
-
- protected:
-  explicit Scene(std::string name) : name_(std::move(name)) {}
-
- private:
-  std::string name_;
-};
 
 /// half-annulus           half a pipe with a wavy floor; cells clustered towards the inner wall
 /// half-annulus-constant  the same grid, f = 0.5 everywhere
@@ -61,33 +23,49 @@ class Scene {
 /// sheared-waves          a parallelepiped of uniform, strongly sheared cells; f has waves
 /// wake                   an O-grid around a cylinder with a vortex street; periodic along i; cells at the
 ///                        wall are e^clustering times thinner than the outermost ones
+/// spectral               a wavy channel with Gauss-Lobatto spacing (rough_scenes.h, as all below)
+/// dome                   a half ball with a flat base; cells grow by 1.5 from one to the next; periodic along i
+/// globe                  six thin shells, the faces of a cubed sphere: six blocks
+/// duct                   three abutting blocks of a bent duct, with cells of very different lengths
 std::vector<std::string> sceneNames();
 
-/// `clustering`: the outermost cells along j are about e^clustering times as long as the innermost; nullopt:
-/// the scene's default (2.5; shell 4, axis 1, wake 9). Throws UsageError for an unknown name (listing the
-/// names), for a clustering outside (0, 20], and for a clustering of a scene without one.
-std::unique_ptr<Scene> makeScene(std::string_view name, std::optional<double> clustering = std::nullopt);
+/// The blocks of a scene: one, except for globe (6) and duct (3). `clustering`: the outermost cells along j
+/// are about e^clustering times as long as the innermost; nullopt: the scene's default (2.5; shell 4, axis 1,
+/// wake 9, dome 9.7). Throws UsageError for an unknown name (listing the names), for a clustering outside
+/// (0, 20], and for a clustering of a scene without one.
+std::vector<std::shared_ptr<const Scene>> makeScenes(std::string_view name,
+                                                     std::optional<double> clustering = std::nullopt);
+/// As makeScenes(), for a scene of one block.
+std::shared_ptr<const Scene> makeScene(std::string_view name,
+                                       std::optional<double> clustering = std::nullopt);
 
 struct SceneGridSize {
   uint64_t ni = 0, nj = 0, nk = 0;
 };
 
-/// A scene sampled at ni x nj x nk nodes, from u, v, w = 0 to 1 inclusive, evaluated at each read. One block,
-/// one scalar "f". Memory: three tables of ni, nj and nk entries.
+/// A scene sampled at ni x nj x nk nodes per block, from u, v, w = 0 to 1 inclusive, evaluated at each read.
+/// One scalar, "f". Memory: three tables of ni, nj and nk entries per block.
 class SceneGridSource : public GridSource {
  public:
   /// `coordinate_bytes`: 4 rounds the coordinates to single precision, as a file would; 8 does not. Throws
   /// UsageError if a dimension has fewer than two nodes.
-  SceneGridSource(std::shared_ptr<const Scene> scene, SceneGridSize size, int coordinate_bytes = 8);
+  SceneGridSource(std::vector<std::shared_ptr<const Scene>> blocks, SceneGridSize size,
+                  int coordinate_bytes = 8);
+  SceneGridSource(std::shared_ptr<const Scene> scene, SceneGridSize size, int coordinate_bytes = 8)
+      : SceneGridSource(std::vector{std::move(scene)}, size, coordinate_bytes) {}
 
   const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
 
  private:
-  std::shared_ptr<const Scene> scene_;
+  struct Block {
+    std::shared_ptr<const Scene> scene;
+    std::vector<glm::dvec3> of_i, of_j, of_k;
+  };
+
   GridDescription description_;
-  std::vector<glm::dvec3> of_i_, of_j_, of_k_;
+  std::vector<Block> blocks_;
 };
 
 }  // namespace curvisplat

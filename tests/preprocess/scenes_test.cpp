@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <random>
+#include <set>
 
 #include "stream/base/error.h"
 
@@ -14,17 +16,17 @@ namespace curvisplat {
 namespace {
 
 // The volume of the unit cube's image: the integral of |det J| by central differences, midpoint rule.
-double volumeByJacobians(const Scene& scene, int n) {
+double volumeByJacobians(const Scene& scene, int n, int layers) {
   double volume = 0;
-  const double half = 0.5 / n;
-  for (int k = 0; k < 4; ++k)  // the scenes do not stretch along w
+  const double half = 0.5 / n, half_layer = 0.5 / layers;
+  for (int k = 0; k < layers; ++k)
     for (int j = 0; j < n; ++j)
       for (int i = 0; i < n; ++i) {
-        const glm::dvec3 at((i + 0.5) / n, (j + 0.5) / n, (k + 0.5) / 4);
+        const glm::dvec3 at((i + 0.5) / n, (j + 0.5) / n, (k + 0.5) / layers);
         const auto along = [&](const glm::dvec3& step) {
           return scene.position(at + step) - scene.position(at - step);
         };
-        const glm::dvec3 du = along({half, 0, 0}), dv = along({0, half, 0}), dw = along({0, 0, 0.125});
+        const glm::dvec3 du = along({half, 0, 0}), dv = along({0, half, 0}), dw = along({0, 0, half_layer});
         volume += std::abs(glm::dot(glm::cross(du, dv), dw));
       }
   return volume;
@@ -38,50 +40,55 @@ INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene, testing::ValuesIn(sceneNames()), []
 });
 
 TEST_P(EveryScene, IsTheInverseOfItsPositions) {
-  const auto scene = makeScene(GetParam());
-  std::mt19937_64 random(1);
-  std::uniform_real_distribution<double> unit(0.001, 0.999);
-  for (int n = 0; n < 2000; ++n) {
-    const glm::dvec3 uvw(unit(random), unit(random), unit(random));
-    const auto back = scene->inverse(scene->position(uvw));
-    ASSERT_TRUE(back.has_value()) << uvw.x << " " << uvw.y << " " << uvw.z;
-    // A wall cell is e^-9 of the others: a rounding error there is worth that much more of v.
-    for (int axis = 0; axis < 3; ++axis) ASSERT_NEAR((*back)[axis], uvw[axis], 1e-10);
+  for (const auto& scene : makeScenes(GetParam())) {
+    std::mt19937_64 random(1);
+    std::uniform_real_distribution<double> unit(0.001, 0.999);
+    for (int n = 0; n < 2000; ++n) {
+      const glm::dvec3 uvw(unit(random), unit(random), unit(random));
+      const auto back = scene->inverse(scene->position(uvw));
+      ASSERT_TRUE(back.has_value()) << uvw.x << " " << uvw.y << " " << uvw.z;
+      // A wall cell is e^-9 of the others: a rounding error there is worth that much more of v.
+      for (int axis = 0; axis < 3; ++axis) ASSERT_NEAR((*back)[axis], uvw[axis], 1e-10);
+    }
   }
 }
 
 TEST_P(EveryScene, HasTheVolumeItSays) {
-  const auto scene = makeScene(GetParam());
-  EXPECT_NEAR(volumeByJacobians(*scene, 400) / scene->volume(), 1, 1e-3);
+  const bool bent_along_w = GetParam() == "dome" || GetParam() == "globe" || GetParam() == "spectral";
+  for (const auto& scene : makeScenes(GetParam()))
+    EXPECT_NEAR(volumeByJacobians(*scene, bent_along_w ? 120 : 400, bent_along_w ? 120 : 4) / scene->volume(),
+                1, 1e-3);
 }
 
 TEST_P(EveryScene, TouchesAndKeepsItsBounds) {
-  const auto scene = makeScene(GetParam());
-  const auto [lower, upper] = scene->bounds();
-  glm::dvec3 least(1e9), most(-1e9);
-  for (int i = 0; i <= 120; ++i)
-    for (int j = 0; j <= 10; ++j)
-      for (int k = 0; k <= 1; ++k) {
-        const glm::dvec3 p = scene->position({i / 120.0, j / 10.0, k});
-        least = glm::min(least, p);
-        most = glm::max(most, p);
-      }
-  for (int axis = 0; axis < 3; ++axis) {
-    EXPECT_NEAR(least[axis], lower[axis], 5e-3);
-    EXPECT_NEAR(most[axis], upper[axis], 5e-3);
-    EXPECT_GE(least[axis], lower[axis] - 1e-12);
-    EXPECT_LE(most[axis], upper[axis] + 1e-12);
+  for (const auto& scene : makeScenes(GetParam())) {
+    const auto [lower, upper] = scene->bounds();
+    glm::dvec3 least(1e9), most(-1e9);
+    for (int i = 0; i <= 120; ++i)
+      for (int j = 0; j <= 10; ++j)
+        for (int k = 0; k <= 1; ++k) {
+          const glm::dvec3 p = scene->position({i / 120.0, j / 10.0, k});
+          least = glm::min(least, p);
+          most = glm::max(most, p);
+        }
+    for (int axis = 0; axis < 3; ++axis) {
+      EXPECT_NEAR(least[axis], lower[axis], 5e-3);
+      EXPECT_NEAR(most[axis], upper[axis], 5e-3);
+      EXPECT_GE(least[axis], lower[axis] - 1e-12);
+      EXPECT_LE(most[axis], upper[axis] + 1e-12);
+    }
   }
 }
 
 TEST_P(EveryScene, HasAScalarWithinItsRange) {
-  const auto scene = makeScene(GetParam());
-  std::mt19937_64 random(2);
-  std::uniform_real_distribution<double> unit(0, 1);
-  for (int n = 0; n < 2000; ++n) {
-    const double f = scene->scalar(scene->position({unit(random), unit(random), unit(random)}));
-    ASSERT_GE(f, 0);
-    ASSERT_LE(f, 1);
+  for (const auto& scene : makeScenes(GetParam())) {
+    std::mt19937_64 random(2);
+    std::uniform_real_distribution<double> unit(0, 1);
+    for (int n = 0; n < 2000; ++n) {
+      const double f = scene->scalar(scene->position({unit(random), unit(random), unit(random)}));
+      ASSERT_GE(f, 0);
+      ASSERT_LE(f, 1);
+    }
   }
 }
 
@@ -133,6 +140,37 @@ TEST(Wake, HasThinWallCells) {
   const double ratio = length(0, 1e-3) / length(1 - 1e-3, 1);
   EXPECT_GT(ratio, 1e-5);
   EXPECT_LT(ratio, 2e-4);
+}
+
+/// The nodes that are the last of one block along an axis, or the first, and lie where nodes of another block do.
+size_t sharedNodes(const SceneGridSource& grid, SceneGridSize size) {
+  std::vector<std::set<std::array<double, 3>>> places;
+  for (uint32_t block = 0; block < grid.description().blocks.size(); ++block) {
+    NodeArrays nodes;
+    grid.read(block, {0, size.nj, 0, size.nk}, {}, nodes);
+    auto& own = places.emplace_back();
+    for (size_t n = 0; n < nodes.x.size(); ++n) own.insert({nodes.x[n], nodes.y[n], nodes.z[n]});
+  }
+  size_t shared = 0;
+  for (size_t a = 0; a < places.size(); ++a)
+    for (size_t b = a + 1; b < places.size(); ++b)
+      for (const auto& place : places[a]) shared += places[b].count(place);
+  return shared;
+}
+
+TEST(RoughScenes, BlocksShareTheNodesOfTheirFacesExactly) {
+  // Twelve edges of the cube, each a face of 9 x 3 nodes; at each of the eight corners three blocks meet, which
+  // makes three pairs, as the three edges there count them.
+  EXPECT_EQ(sharedNodes(SceneGridSource(makeScenes("globe"), {9, 9, 3}), {9, 9, 3}), 12u * 9 * 3);
+  EXPECT_EQ(sharedNodes(SceneGridSource(makeScenes("duct"), {6, 5, 4}), {6, 5, 4}), 2u * 5 * 4);
+}
+
+TEST(RoughScenes, DomesCellsGrowByAHalf) {
+  const auto dome = makeScene("dome");
+  const auto radius = [&](int j) { return glm::length(dome->position({0.1, j / 24.0, 0.3})); };
+  for (int j = 1; j < 24; ++j)
+    EXPECT_NEAR((radius(j + 1) - radius(j)) / (radius(j) - radius(j - 1)), 1.5, 1e-9);
+  EXPECT_EQ(dome->position({0.3, 0.7, 1}).z, 0);
 }
 
 TEST(SceneGridSource, ReadsTheSameNodesInAnyBox) {

@@ -39,7 +39,7 @@ SceneGridSize parseSize(const std::string& text) {
 }
 
 void generate(const GenerateOptions& options) {
-  const SceneGridSource source(makeScene(options.scene, options.clustering), parseSize(options.size));
+  const SceneGridSource source(makeScenes(options.scene, options.clustering), parseSize(options.size));
   Progress progress{progressBar()};
   const auto paths = writePlot3d(source, options.prefix, progress);
   const Progress::Phase& phase = progress.phases().back();
