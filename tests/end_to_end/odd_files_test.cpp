@@ -98,7 +98,7 @@ TEST_F(OddFiles, ALinkIsFollowed) {
 TEST_F(OddFiles, LinksThatLeadRoundAreRefused) {
   fs::create_symlink(file("b.png"), file("a.png"));
   fs::create_symlink(file("a.png"), file("b.png"));
-  expectRefused({"render", cache(), "-o", file("a.png"), "--size", "16x16"}, "a circle");
+  expectRefused({"render", cache(), "-o", file("a.png"), "--size", "16x16"}, "form a cycle");
   EXPECT_TRUE(fs::is_symlink(file("a.png")));
 }
 

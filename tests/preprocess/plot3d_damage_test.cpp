@@ -264,7 +264,7 @@ TEST(Plot3dDamage, AFailingDiskIsNoQuestionOfLayout) {
       openGrid(options);
       FAIL() << good;
     } catch (const Error& error) {
-      EXPECT_NE(std::string(error.what()).find("reading"), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find("cannot read"), std::string::npos) << error.what();
     }
   }
 }
