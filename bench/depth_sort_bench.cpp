@@ -12,26 +12,28 @@ namespace curvisplat {
 namespace {
 
 /// `smooth`: neighbouring splats have similar depths, as in grid order; else depths are random.
-std::vector<float> depthsOf(size_t count, bool smooth) {
+std::vector<uint32_t> keysOf(size_t count, bool smooth) {
   std::mt19937 random(1);
   std::uniform_real_distribution<float> unit(0, 1);
-  std::vector<float> depths(count);
-  for (size_t n = 0; n < count; ++n)
-    depths[n] = smooth ? static_cast<float>(n % 64) / 64 + 0.01f * unit(random) : unit(random);
-  return depths;
+  std::vector<uint32_t> keys(count);
+  for (size_t n = 0; n < count; ++n) {
+    const float depth = smooth ? static_cast<float>(n % 64) / 64 + 0.01f * unit(random) : unit(random);
+    keys[n] = static_cast<uint32_t>(0x04000000 * depth);  // a brick has a part of all depths
+  }
+  return keys;
 }
 
 void sort(benchmark::State& state, bool moves) {
   const auto count = static_cast<size_t>(state.range(0));
-  const std::vector<float> depths = depthsOf(count, state.range(1) == 1);
+  const std::vector<uint32_t> keys = keysOf(count, state.range(1) == 1);
   const std::vector<ScreenSplat> splats(count);
   std::vector<ScreenSplat> sorted(count);
   DepthSorter sorter;
   for (auto _ : state) {
-    const auto order = sorter.farthestFirst(depths);
+    const auto order = sorter.sort(keys, DrawingOrder::kFrontToBack);
     benchmark::DoNotOptimize(order.data());
     if (!moves) continue;
-    for (size_t n = 0; n < count; ++n) sorted[n] = splats[order[n]];
+    for (size_t n = 0; n < count; ++n) sorted[n] = splats[order[n].splat];
     benchmark::DoNotOptimize(sorted.data());
   }
   const auto items = static_cast<int64_t>(count) * static_cast<int64_t>(state.iterations());

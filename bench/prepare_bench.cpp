@@ -15,6 +15,7 @@
 #include "preprocess/convert/convert.h"
 #include "preprocess/scenes/scenes.h"
 #include "render/colour/transfer_function.h"
+#include "render/project/depth_keys.h"
 #include "render/project/depth_sort.h"
 #include "render/project/projection.h"
 #include "stream/base/checksum.h"
@@ -162,6 +163,8 @@ void prepare(benchmark::State& state, bool decode, bool sort) {
   if (!decode)
     for (size_t n = 0; n < bricks.bytes.size(); ++n) decodeOne(n, n);
   BrickProjector projector;
+  const DepthKeys depth_keys(view.settings.view, cache.manifest().root, DrawingOrder::kFrontToBack);
+  std::vector<uint32_t> keys;
   DepthSorter sorter;
   std::vector<ScreenSplat> out(BrickProjector::kMaxSplats);
   uint64_t drawn = 0;
@@ -179,8 +182,12 @@ void prepare(benchmark::State& state, bool decode, bool sort) {
                         values[from]);
       drawn += projector.counts().drawn;
       if (!sort) continue;
-      const auto order = sorter.farthestFirst(projector.depths());
-      for (size_t i = 0; i < order.size(); ++i) out[i] = projector.splats()[order[i]];
+      const Brick& of_index = cache.bricks()[brick.id];
+      keys.resize(projector.depths().size());
+      depth_keys.keysOf(projector.depths(), cache.manifest().root.cellMin(of_index.cell),
+                        depth_keys.rangeOf(of_index), keys);
+      const auto order = sorter.sort(keys, depth_keys.order());
+      for (size_t i = 0; i < order.size(); ++i) out[i] = projector.splats()[order[i].splat];
       benchmark::DoNotOptimize(out.data());
     }
   }

@@ -278,7 +278,11 @@ BlockMask paintTile(const TileWork& work) {
     const size_t count = std::min(kLanes, work.order.size() - begin);
     // The next sixteen come from anywhere in the batch.
     const size_t end = std::min(begin + 2 * kLanes, work.order.size());
-    for (size_t n = begin + count; n < end; ++n) hwy::Prefetch(&work.splats[work.order[n]]);
+    for (size_t n = begin + count; n < end; ++n) {
+      const ScreenSplat& next = work.splats[work.order[n]];
+      hwy::Prefetch(&next.x);
+      hwy::Prefetch(&next.half_width);  // which may lie in another cache line
+    }
     IntRow numbers;
     for (size_t n = 0; n < kLanes; ++n)
       numbers.at[n] = static_cast<int32_t>(work.order[begin + std::min(n, count - 1)]);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <thread>
 
+#include "render/frame/sweep_buffer.h"
 #include "render/project/projection.h"
 #include "stream/base/error.h"
 #include "stream/model/brick.h"
@@ -11,16 +12,16 @@ namespace curvisplat {
 namespace {
 
 // A worker's memory: what reading keeps on its thread (a brick's bytes and the decoder's scratch), a brick
-// decoded (16 numbers a splat), the projector's splats and depths, the sorter's keys, indices and counters,
-// the stack.
+// decoded (16 numbers a splat), the projector's splats and depths, keys, two sorters, the stack.
 constexpr uint64_t kReadingBytes = 12 << 20;
 constexpr uint64_t kWorkerBytes = kReadingBytes + uint64_t{kMaxBrickSplats} * 16 * sizeof(float) +
                                   BrickProjector::kMaxSplats * (sizeof(ScreenSplat) + sizeof(float)) +
-                                  BrickProjector::kMaxSplats * (2 * 8 + 4) + (uint64_t{2} << 16) * 4 +
-                                  (1 << 20);
-constexpr uint64_t kMinRingBytes = BrickProjector::kMaxSplats * sizeof(ScreenSplat);
+                                  BrickProjector::kMaxSplats * (4 + 2 * sizeof(DepthItem)) +
+                                  SweepBuffer::kMaxBatch * 2 * sizeof(DepthItem) + (1 << 20);
+constexpr uint64_t kMinRingBytes = 32768 * sizeof(ScreenSplat);
+constexpr uint64_t kMinSweepBytes = SweepBuffer::bytes(73728);
 // More does not make a frame faster: they only bridge bricks that take unequally long.
-constexpr uint64_t kMaxRingBytes = 64 << 20;
+constexpr uint64_t kMaxRingBytes = 24 << 20;
 constexpr uint64_t kMaxPagerBytes = 32 << 20;
 // Shares of the image, the painter and the index are whole sixteenths of the memory where there is enough:
 // then a picture of another size finds the cache as the one before has left it.
@@ -31,7 +32,7 @@ constexpr uint64_t kParts = 16;
 FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned threads) {
   const uint64_t image_bytes = 4 * sizeof(float) * fixed.size.pixels();
   const uint64_t exact = fixed.index_bytes + fixed.painter_bytes + image_bytes + fixed.output_bytes;
-  const uint64_t pools = kMinRingBytes + fixed.least_pager_bytes;
+  const uint64_t pools = kMinRingBytes + kMinSweepBytes + fixed.least_pager_bytes;
   const uint64_t least = exact + pools + kWorkerBytes;
   if (memory_bytes < least)
     throw UsageError(
@@ -50,6 +51,10 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
   budget.ring_splats = ring_bytes / sizeof(ScreenSplat);
   budget.pager_bytes =
       std::max(fixed.least_pager_bytes, std::min(fixed.least_pager_bytes + share, kMaxPagerBytes));
+  const uint64_t most_sweep_bytes = std::max(kMinSweepBytes, SweepBuffer::bytes(fixed.splats));
+  const uint64_t sweep_bytes = std::min(kMinSweepBytes + share, most_sweep_bytes);
+  budget.sweep_splats = sweep_bytes / SweepBuffer::bytes(SweepBuffer::kPageSplats) * SweepBuffer::kPageSplats;
+  rest -= sweep_bytes - kMinSweepBytes;
   rest -= ring_bytes - kMinRingBytes;
   rest -= budget.pager_bytes - fixed.least_pager_bytes;
   budget.cache_bytes = rest;

@@ -1,13 +1,14 @@
 #include "render/frame/frame_pipeline.h"
 
-#include <exception>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include "render/frame/frame_budget.h"
 #include "render/frame/frame_workers.h"
 #include "render/frame/segment_drawer.h"
 #include "render/frame/segment_ring.h"
+#include "render/frame/sweep_buffer.h"
 #include "stream/base/error.h"
 #include "stream/base/stage_timer.h"
 #include "stream/paging/brick_source.h"
@@ -47,12 +48,14 @@ struct FramePipeline::Pools {
       : budget(budget_),
         pager(pager_),
         ring(splats),
+        sweep(budget.sweep_splats, budget.ring_splats / 2),
         source(cache, variable, pager, budget.cache_bytes),
-        workers(source, ring, budget.workers) {}
+        workers(source, sweep, ring, budget.workers) {}
 
   const FrameBudget budget;
   const PagerOptions pager;
   SegmentRing ring;
+  SweepBuffer sweep;
   BrickSource source;
   FrameWorkers workers;
 };
@@ -77,8 +80,11 @@ FramePipeline::Running::~Running() {
 }
 
 void FramePipeline::makePools(const FrameOptions& options) {
-  const FrameBudget::Fixed fixed{planner_.bytes(), BrickPager::leastBufferBytes(cache_, variable_),
-                                 backend_->bytes(options.size, resourcesOf(options)), options.output_bytes,
+  const FrameBudget::Fixed fixed{planner_.bytes(),
+                                 BrickPager::leastBufferBytes(cache_, variable_),
+                                 backend_->bytes(options.size, resourcesOf(options)),
+                                 options.output_bytes,
+                                 planner_.mostSplats(),
                                  options.size};
   const FrameBudget budget = FrameBudget::of(options.memory_bytes, fixed, options.threads);
   PagerOptions pager;
@@ -102,42 +108,51 @@ void FramePipeline::dropPools() {
   old.swap(pools_);
 }
 
+/// False if there is none left.
+bool FramePipeline::beginSlab(const FramePlan& plan, const FrameOptions& options) {
+  const std::lock_guard lock(mutex_);
+  if (phase_ == Phase::kCancelled) throw Cancelled();
+  if (!pools_->sweep.beginSlab(plan.parts)) return false;
+  pools_->ring.resume();
+  std::vector<BrickPart> parts;
+  for (const uint32_t number : pools_->sweep.parts()) parts.push_back(plan.parts[number].part);
+  // Back to front, nothing ever is hidden; and see FrameWorkers::prepare().
+  const bool may_hide = order() == DrawingOrder::kFrontToBack && !options.keep_going;
+  pools_->source.start(parts, [this, may_hide, &plan](uint32_t brick) {
+    return (may_hide && hidden_.hides(brick)) ||
+           pools_->sweep.isBehind(sweptPart({brick}, cache_.bricks()[brick], plan.keys));
+  });
+  pools_->workers.start();
+  return true;
+}
+
 Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
                           Progress* progress) {
-  const FrameWork work{cache_,  plan.cut.parts, plan.settings,     planner_.table(),
-                       order(), hidden_,        options.keep_going};
+  const FrameWork work{cache_,    plan.parts, plan.settings,     planner_.table(),
+                       plan.keys, hidden_,    options.keep_going};
   makePools(options);
   {
     const std::lock_guard lock(mutex_);
     if (phase_ == Phase::kCancelled) throw Cancelled();
     pools_->ring.reset();
+    pools_->sweep.beginFrame();
+    pools_->workers.beginFrame(work);
     hidden_.begin(cache_.bricks(), plan.settings.view);
-    // Back to front, nothing ever is; and see FrameWorkers::prepare().
-    BrickPager::Unneeded unneeded;
-    if (order() == DrawingOrder::kFrontToBack && !options.keep_going)
-      unneeded = [this](uint32_t brick) { return hidden_.hides(brick); };
-    pools_->source.start(plan.cut.parts, std::move(unneeded));
   }
-  if (progress) progress->begin("drawing", plan.cut.parts.size(), "bricks");
-  pools_->workers.start(work);
+  if (progress) progress->begin("drawing", plan.parts.size(), "bricks");
   Image image;
-  std::exception_ptr failure;
   try {
+    beginSlab(plan, options);
     image = paint(plan, options, statistics, progress);
   } catch (...) {
-    failure = std::current_exception();
-    pools_->ring.close();
-    pools_->source.stop();
-  }
-  try {
-    pools_->workers.finish(statistics);
-  } catch (...) {
-    if (!failure) failure = std::current_exception();
-  }
-  pools_->source.finish(statistics);
-  if (failure) {
+    pools_->workers.stop();
+    try {
+      pools_->workers.finish(statistics);
+    } catch (...) {
+      // The first failure is the one to report.
+    }
     dropPools();  // a reading thread that has failed is of no use to the next frame
-    std::rethrow_exception(failure);
+    throw;
   }
   {
     const std::lock_guard lock(mutex_);
@@ -147,6 +162,9 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
 
   const Cut& cut = plan.cut;
   statistics.ring_peak_bytes = pools_->ring.peakSplats() * sizeof(ScreenSplat);
+  statistics.sweep_peak_bytes = SweepBuffer::bytes(pools_->sweep.peakSplats());
+  statistics.slabs = pools_->sweep.slabs();
+  statistics.bricks_hidden = pools_->workers.partsHidden();
   statistics.bricks_drawn = cut.parts.size() - statistics.bricks_hidden;
   statistics.bricks_out_of_image = cut.out_of_image;
   statistics.bricks_transparent = cut.transparent;
@@ -168,10 +186,19 @@ Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, F
                   resourcesOf(options));
     hidden_.ask(&painter);
     SegmentDrawer drawer(painter, pools_->ring, statistics.painter_waited_s);
-    for (size_t drawn = 0; drawn < plan.cut.parts.size(); ++drawn) {
-      if (!drawer.drawNext()) return;
-      if (progress) progress->advance(1);
-    }
+    uint64_t seen = 0;
+    const auto advance = [&] {
+      const uint64_t now = pools_->workers.partsSeen();
+      if (progress) progress->advance(now - seen);
+      seen = now;
+    };
+    do {
+      while (drawer.drawNext()) advance();
+      pools_->workers.finish(statistics);
+      pools_->source.finish(statistics);
+      advance();
+      if (pools_->ring.isClosed()) return;
+    } while (beginSlab(plan, options));
     image = painter.end();
     statistics.splats_hidden = painter.hiddenSplats();
     statistics.upload_s = painter.uploadSeconds();
@@ -185,15 +212,15 @@ void FramePipeline::cancel() {
   const std::lock_guard lock(mutex_);
   if (phase_ == Phase::kIdle) return;
   phase_ = Phase::kCancelled;
-  if (!pools_) return;
-  pools_->ring.close();
-  pools_->source.stop();
+  if (pools_) pools_->workers.stop();
 }
 
 void FramePipeline::prefetch(const FramePlan& plan, const FrameOptions& options) {
   endPrefetch();
   makePools(options);
-  pools_->source.startPrefetch(plan.cut.parts);
+  std::vector<BrickPart> parts;
+  for (const SweptPart& part : plan.parts) parts.push_back(part.part);
+  pools_->source.startPrefetch(parts);
   pools_->workers.startPrefetch();
 }
 

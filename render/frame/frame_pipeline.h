@@ -1,12 +1,17 @@
 // The stages of a frame after its plan, and the memory and threads that frames share:
 //
 //   BrickSource --bricks--> FrameWorkers --SegmentRing--> painter
-//   fetch                   prepare                       draw
+//   fetch                   prepare ^ |                   draw
+//                                   | v
+//                                 SweepBuffer
+//
+// A frame is one sweep along the depth, or several slabs of it where the budget cannot hold a layer of the
+// cut: source and workers begin anew with each, the painter draws on.
 //
 // All memory is in pools that are sized from the budget when the first frame needs them, and made anew only
 // for a budget that shares out otherwise. Between frames the workers can fill the cache of bricks.
 //
-//   idle --Running made--> running --cancel()--> cancelled: ring and source are stopped, draw() throws
+//   idle --Running made--> running --cancel()--> cancelled: the stages are stopped, draw() throws
 //    ^                        |                      |
 //    +--Running destroyed-----+----------------------+
 #pragma once
@@ -64,6 +69,7 @@ class FramePipeline {
  private:
   struct Pools;
 
+  bool beginSlab(const FramePlan& plan, const FrameOptions& options);
   void endPrefetch();
   void makePools(const FrameOptions& options);
   void dropPools();

@@ -58,6 +58,13 @@ uint64_t FramePlanner::bytes() const {
           kFrameBytesABrick);
 }
 
+uint64_t FramePlanner::mostSplats() const {
+  uint64_t splats = 0;
+  for (const Brick& brick : cache_.bricks())
+    if (brick.isLeaf()) splats += brick.splats + SweepBuffer::kPageSplats;
+  return splats + splats / 4;
+}
+
 void FramePlanner::setTransferFunction(const TransferFunction& transfer_function) {
   table_ = tableFor(cache_, variable_, transfer_function);
 }
@@ -86,9 +93,24 @@ Cut FramePlanner::chooseCut(const ProjectionSettings& settings, const FrameOptio
   return cut;
 }
 
+SweptPart sweptPart(const BrickPart& part, const Brick& brick, const DepthKeys& keys) {
+  const uint32_t rank = keys.order() == DrawingOrder::kFrontToBack ? part.brick : ~part.brick;
+  return {part, rank, keys.rangeOf(brick)};
+}
+
+FramePlan FramePlanner::planOf(const ProjectionSettings& settings, Cut cut, DrawingOrder order) const {
+  FramePlan plan{settings, std::move(cut), DepthKeys(settings.view, cache_.manifest().root, order), {}};
+  plan.parts.reserve(plan.cut.parts.size());
+  for (const BrickPart& part : plan.cut.parts)
+    plan.parts.push_back(sweptPart(part, cache_.bricks()[part.brick], plan.keys));
+  std::sort(plan.parts.begin(), plan.parts.end(),
+            [](const SweptPart& a, const SweptPart& b) { return a.begin() < b.begin(); });
+  return plan;
+}
+
 FramePlan FramePlanner::plan(const Camera& camera, const FrameOptions& options, DrawingOrder order) const {
   const ProjectionSettings settings = settingsFor(camera, options, options.size);
-  return {settings, chooseCut(settings, options, limitsOf(options, order))};
+  return planOf(settings, chooseCut(settings, options, limitsOf(options, order)), order);
 }
 
 QuickPlan FramePlanner::planQuick(const Camera& camera, const FrameOptions& options, const QuickLimits& quick,
@@ -99,7 +121,9 @@ QuickPlan FramePlanner::planQuick(const Camera& camera, const FrameOptions& opti
   limits.max_bytes = std::min(limits.max_bytes, quick.max_bytes);
   Cut cut = chooseCut(settings, options, limits);
   const ReducedSize size(options.size, std::max(quick.detail_px, cut.complete ? 0 : cut.largest_error_px));
-  return {{size.isWhole() ? settings : settingsFor(camera, options, size.size()), std::move(cut)}, size};
+  return {
+      planOf(size.isWhole() ? settings : settingsFor(camera, options, size.size()), std::move(cut), order),
+      size};
 }
 
 }  // namespace curvisplat

@@ -1,5 +1,5 @@
-// The stage "plan" of a frame: which parts of which bricks the view needs, in which order, and how their
-// splats come to the screen. Pure; it looks at the octree and at no payload.
+// The stage "plan" of a frame: which parts of which bricks the view needs, in which order they are swept, and
+// how their splats come to the screen. Pure; it looks at the octree and at no payload.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,8 @@
 #include "render/colour/classification.h"
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_options.h"
+#include "render/frame/sweep_buffer.h"
+#include "render/project/depth_keys.h"
 #include "render/project/projection.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/paging/cut.h"
@@ -23,7 +25,12 @@ ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const Fr
 struct FramePlan {
   ProjectionSettings settings;  // the picture has the size of settings.view
   Cut cut;
+  DepthKeys keys;
+  std::vector<SweptPart> parts;  // of the cut, in the sweep's order
 };
+
+/// A part of the cut as the sweep has it.
+SweptPart sweptPart(const BrickPart& part, const Brick& brick, const DepthKeys& keys);
 
 /// Of a picture that is to be had quickly.
 struct QuickPlan {
@@ -54,11 +61,14 @@ class FramePlanner {
   const ClassificationTable& table() const { return table_; }
   /// What the octree takes, and what plans and the later stages note about its bricks.
   uint64_t bytes() const;
+  /// Of the cache's finest level, and what its borders are drawn in.
+  uint64_t mostSplats() const;
 
  private:
   ProjectionSettings settingsFor(const Camera& camera, const FrameOptions& options, ImageSize size) const;
   Cut chooseCut(const ProjectionSettings& settings, const FrameOptions& options,
                 const CutOptions& limits) const;
+  FramePlan planOf(const ProjectionSettings& settings, Cut cut, DrawingOrder order) const;
 
   const CacheReader& cache_;
   const size_t variable_;

@@ -21,7 +21,7 @@ struct FrameStatistics : FetchStatistics {
   double gl_draw_s = 0;         // by OpenGL's own clock
   double workers_waited_s = 0;  // for room in the ring: the painter is slower; for reads: read_waited_s
   double painter_waited_s = 0;  // for the workers
-  uint64_t bricks_drawn = 0;    // in whole or in part; one that is drawn in several parts counts for each
+  uint64_t bricks_drawn = 0;    // in whole or in part
   uint64_t bricks_culled = 0;   // each stands for all below it; those are
   uint64_t bricks_out_of_image = 0, bricks_transparent = 0;
   uint64_t splats_read = 0;
@@ -35,6 +35,9 @@ struct FrameStatistics : FetchStatistics {
   double largest_error_px = 0;  // on the screen, of what is drawn; infinite around a perspective eye
   unsigned workers = 0;
   uint64_t ring_peak_bytes = 0;
+  uint64_t sweep_peak_bytes = 0;   // of splats that wait for nearer or farther ones
+  uint64_t slabs = 0;              // of depth, one after the other: more than one where memory is short
+  uint64_t bricks_again = 0;       // decoded or kept bricks that were prepared again, in a further slab
   uint64_t memory_used_bytes = 0;  // of memory_bytes: what the stages have, and decoded bricks that are kept
   std::vector<BrickFailure> bricks_unreadable;  // with keep_going; by number
 };

@@ -12,22 +12,34 @@ namespace curvisplat {
 struct FrameWorkers::Worker {
   BrickSource::Scratch scratch;
   BrickProjector projector;
-  DepthSorter sorter;
+  std::vector<uint32_t> keys;
+  DepthSorter sorter;        // of a brick
+  DepthSorter batch_sorter;  // has its turn while a brick waits for space
   FrameStatistics statistics;
 };
 
-FrameWorkers::FrameWorkers(BrickSource& source, SegmentRing& ring, unsigned count)
-    : source_(source), ring_(ring), team_(count, "prepare") {
+FrameWorkers::FrameWorkers(BrickSource& source, SweepBuffer& sweep, SegmentRing& ring, unsigned count)
+    : source_(source), sweep_(sweep), ring_(ring), team_(count, "prepare") {
   for (unsigned n = 0; n < count; ++n) workers_.push_back(std::make_unique<Worker>());
 }
 
 FrameWorkers::~FrameWorkers() {
+  stop();
+}
+
+void FrameWorkers::stop() {
+  sweep_.close();
   ring_.close();
   source_.stop();
 }
 
-void FrameWorkers::start(const FrameWork& work) {
+void FrameWorkers::beginFrame(const FrameWork& work) {
   work_ = &work;
+  seen_.assign(work.parts.size(), Seen::kNo);
+  parts_seen_ = 0;
+}
+
+void FrameWorkers::start() {
   next_ = 0;
   first_failure_ = nullptr;
   for (auto& worker : workers_) {
@@ -53,12 +65,12 @@ void FrameWorkers::finish(FrameStatistics& sum) {
     sum.splats_off_screen += part.splats_off_screen;
     sum.splats_transparent += part.splats_transparent;
     sum.splats_drawn += part.splats_drawn;
-    sum.bricks_hidden += part.bricks_hidden;
+    sum.bricks_again += part.bricks_again;
     for (const BrickFailure& failure : part.bricks_unreadable) sum.bricks_unreadable.push_back(failure);
   }
   std::sort(sum.bricks_unreadable.begin(), sum.bricks_unreadable.end(),
             [](const BrickFailure& a, const BrickFailure& b) { return a.brick < b.brick; });
-  // One that is drawn in several parts failed for each.
+  // One that is drawn in several slabs failed for each.
   const auto again =
       std::unique(sum.bricks_unreadable.begin(), sum.bricks_unreadable.end(),
                   [](const BrickFailure& a, const BrickFailure& b) { return a.brick == b.brick; });
@@ -85,84 +97,158 @@ void FrameWorkers::finishPrefetch() {
 void FrameWorkers::loop(Worker& worker) {
   try {
     while (true) {
+      if (const auto batch = sweep_.next()) {
+        if (!hand(worker, *batch)) return;
+        continue;
+      }
       const uint64_t sequence = next_++;
-      if (sequence >= work_->parts.size() || !prepare(worker, sequence)) return;
+      if (sequence >= sweep_.parts().size()) break;
+      if (!prepare(worker, sequence)) return;
     }
+    while (true) {
+      std::optional<SweepBuffer::Batch> batch;
+      {
+        const StageTimer timer(worker.statistics.workers_waited_s);
+        batch = sweep_.awaitNext();
+      }
+      if (!batch) break;
+      if (!hand(worker, *batch)) return;
+    }
+    ring_.pauseAfter(sweep_.batches());
   } catch (...) {
     {
       const std::lock_guard lock(failing_);
       if (!first_failure_) first_failure_ = std::current_exception();
     }
-    ring_.close();
-    source_.stop();
+    stop();
   }
 }
 
-std::optional<BrickSource::Splats> FrameWorkers::fetch(Worker& worker, uint64_t sequence) {
+std::optional<BrickSource::Splats> FrameWorkers::fetch(Worker& worker, uint64_t sequence,
+                                                       const BrickPart& part) {
   try {
     return source_.take(sequence, worker.scratch);
   } catch (const DamagedBrick& error) {
     if (!work_->keep_going) throw;
-    const BrickPart& part = work_->parts[sequence];
     worker.statistics.bricks_unreadable.push_back({part.brick, error.what()});
     return source_.standIn(part, worker.scratch);
   }
 }
 
-/// A part that is hidden. False if the ring was stopped.
-bool FrameWorkers::passOver(Worker& worker, uint64_t sequence) {
-  {
-    const StageTimer timer(worker.statistics.workers_waited_s);
-    if (!ring_.acquire(sequence, 0)) return false;
-  }
-  ring_.commit(sequence);
-  ++worker.statistics.bricks_hidden;
-  return true;
-}
-
 bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
-  FrameStatistics& statistics = worker.statistics;
-  const uint32_t brick = work_->parts[sequence].brick;
+  const uint32_t number = sweep_.parts()[sequence];
+  const SweptPart& part = work_->parts[number];
+  if (sweep_.isBehind(part)) {
+    source_.pass(sequence);
+    return passOver(sequence);
+  }
   // What stands in for a damaged brick may reach out of its box: then nothing is passed over, so that the
   // same bricks are found damaged, and the same is drawn, whatever the order in which they come.
-  const auto isHidden = [&] { return !work_->keep_going && work_->hidden.hides(brick); };
+  const auto isHidden = [&] { return !work_->keep_going && work_->hidden.hides(part.part.brick); };
   if (isHidden()) {
+    markSeen(number, Seen::kHidden);
     source_.pass(sequence);
-    return passOver(worker, sequence);
+    return passOver(sequence);
   }
   {
-    const std::optional<BrickSource::Splats> fetched = fetch(worker, sequence);
+    const std::optional<BrickSource::Splats> fetched = fetch(worker, sequence, part.part);
     if (!fetched) return false;
-    if (isHidden()) return passOver(worker, sequence);
-    const StageTimer timer(statistics.project_s);
-    worker.projector.project(work_->settings, work_->table,
-                             work_->cache.manifest().root.cellMin(fetched->cell), fetched->geometry,
-                             fetched->values, fetched->ranges);
+    // By now; then the source may have left it out.
+    if (sweep_.isBehind(part)) return passOver(sequence);
+    if (isHidden()) {
+      markSeen(number, Seen::kHidden);
+      return passOver(sequence);
+    }
+    const StageTimer timer(worker.statistics.project_s);
+    const glm::dvec3 cell_min = work_->cache.manifest().root.cellMin(fetched->cell);
+    worker.projector.project(work_->settings, work_->table, cell_min, fetched->geometry, fetched->values,
+                             fetched->ranges);
+    worker.keys.resize(worker.projector.depths().size());
+    work_->keys.keysOf(worker.projector.depths(), cell_min, part.keys, worker.keys);
   }
-  const std::vector<ScreenSplat>& splats = worker.projector.splats();
-  std::span<const uint32_t> order;
-  {
-    const StageTimer timer(statistics.sort_s);
-    order = worker.sorter.sort(worker.projector.depths(), work_->order);
-  }
-  std::optional<std::span<ScreenSplat>> segment;
-  {
-    const StageTimer timer(statistics.workers_waited_s);
-    segment = ring_.acquire(sequence, splats.size());
-  }
-  if (!segment) return false;
-  {
-    const StageTimer timer(statistics.sort_s);
-    for (size_t n = 0; n < order.size(); ++n) (*segment)[n] = splats[order[n]];
-  }
-  ring_.commit(sequence);
+  count(worker, number);
+  return enter(worker, sequence, part.rank);
+}
 
+void FrameWorkers::markSeen(uint32_t number, Seen seen) {
+  if (seen_[number] == Seen::kNo) ++parts_seen_;
+  seen_[number] = std::max(seen_[number], seen);
+}
+
+uint64_t FrameWorkers::partsHidden() const {
+  return static_cast<uint64_t>(std::count(seen_.begin(), seen_.end(), Seen::kHidden));
+}
+
+/// What was projected; in the first slab that it is in.
+void FrameWorkers::count(Worker& worker, uint32_t number) {
+  FrameStatistics& statistics = worker.statistics;
+  if (seen_[number] == Seen::kProjected) {
+    ++statistics.bricks_again;
+    return;
+  }
+  markSeen(number, Seen::kProjected);
   const ProjectionCounts& counts = worker.projector.counts();
   statistics.splats_read += counts.read;
   statistics.splats_clipped += counts.clipped;
   statistics.splats_off_screen += counts.off_screen;
   statistics.splats_transparent += counts.transparent;
   statistics.splats_drawn += counts.drawn;
+}
+
+/// A part that is hidden, or lies behind the slab.
+bool FrameWorkers::passOver(uint64_t sequence) {
+  if (!sweep_.awaitTurn(sequence)) return false;
+  sweep_.skip();
+  return true;
+}
+
+/// What the worker has projected.
+bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t rank) {
+  FrameStatistics& statistics = worker.statistics;
+  std::span<const DepthItem> sorted;
+  {
+    const StageTimer timer(statistics.sort_s);
+    sorted = worker.sorter.sort(worker.keys, work_->keys.order());
+  }
+  {
+    const StageTimer timer(statistics.workers_waited_s);
+    if (!sweep_.awaitTurn(sequence)) return false;
+  }
+  std::shared_ptr<SweepBuffer::Run> run;
+  while (!(run = sweep_.enter(rank, sorted))) {
+    if (const auto batch = sweep_.nextFinal()) {
+      if (!hand(worker, *batch)) return false;
+      continue;
+    }
+    const StageTimer timer(statistics.workers_waited_s);
+    if (!sweep_.awaitSpace(rank, sorted)) return false;
+  }
+  const StageTimer timer(statistics.sort_s);
+  sweep_.fill(*run, sorted, worker.projector.splats());
+  return true;
+}
+
+/// Sorts a batch into its segment of the ring.
+bool FrameWorkers::hand(Worker& worker, const SweepBuffer::Batch& batch) {
+  std::span<const DepthItem> sorted;
+  std::optional<std::span<ScreenSplat>> segment;
+  {
+    const StageTimer timer(worker.statistics.sort_s);
+    sweep_.itemsOf(batch, worker.batch_sorter.items(batch.count));
+    sorted = worker.batch_sorter.sort();
+  }
+  {
+    const StageTimer timer(worker.statistics.workers_waited_s);
+    if (!sweep_.awaitFilled(batch)) return false;
+    segment = ring_.acquire(batch.sequence, batch.count);
+  }
+  if (!segment) return false;
+  {
+    const StageTimer timer(worker.statistics.sort_s);
+    sweep_.copy(sorted, *segment);
+    sweep_.giveBack(batch);
+  }
+  ring_.commit(batch.sequence);
   return true;
 }
 

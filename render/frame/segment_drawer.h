@@ -17,7 +17,7 @@ class SegmentDrawer {
   SegmentDrawer(Painter& painter, SegmentRing& ring, double& waited_s)
       : painter_(painter), ring_(ring), waited_s_(waited_s) {}
 
-  /// Waits for the next segment and draws it. False if the ring was closed.
+  /// Waits for the next segment and draws it. False if the ring was closed, or pauses.
   bool drawNext();
 
  private:

@@ -33,10 +33,21 @@ void SegmentRing::commit(uint64_t sequence) {
   if (n == handed_out_) committed_.notify_all();
 }
 
+void SegmentRing::pauseAfter(uint64_t segments) {
+  const std::lock_guard lock(mutex_);
+  pause_ = segments;
+  committed_.notify_all();
+}
+
+void SegmentRing::resume() {
+  const std::lock_guard lock(mutex_);
+  pause_ = kNoPause;
+}
+
 std::optional<std::span<const ScreenSplat>> SegmentRing::next() {
   std::unique_lock lock(mutex_);
-  committed_.wait(lock, [&] { return closed_ || isReady(); });
-  if (closed_) return {};
+  committed_.wait(lock, [&] { return closed_ || isReady() || isPaused(); });
+  if (closed_ || isPaused()) return {};
   return handOut();
 }
 
@@ -69,6 +80,7 @@ void SegmentRing::reset() {
   segments_.clear();
   handed_out_ = 0;
   end_ = first_sequence_ = 0;
+  pause_ = kNoPause;
   closed_ = false;
   peak_ = 0;
 }
@@ -76,6 +88,11 @@ void SegmentRing::reset() {
 size_t SegmentRing::peakSplats() const {
   const std::lock_guard lock(mutex_);
   return peak_;
+}
+
+bool SegmentRing::isClosed() const {
+  const std::lock_guard lock(mutex_);
+  return closed_;
 }
 
 void SegmentRing::close() {

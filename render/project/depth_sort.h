@@ -1,7 +1,7 @@
-// Orders the splats of a brick by depth: a radix sort, two passes of 16 bits for large bricks, four of 8 for
-// small ones.
+// Sorts splats by their depth keys: a radix sort, stable, of as few passes as the keys' range needs.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -10,27 +10,29 @@
 
 namespace curvisplat {
 
-/// Keeps its memory between calls. One thread each.
+struct DepthItem {
+  uint32_t key, splat;
+};
+
+/// Keeps its memory between calls: 16 bytes an item. One thread each.
 class DepthSorter {
  public:
-  /// The indices of `depths` (finite, at most 2^32 - 1), farthest (largest) first; equal depths in index
-  /// order. Valid until the next call.
-  std::span<const uint32_t> farthestFirst(std::span<const float> depths) {
-    return sort(depths, DrawingOrder::kBackToFront);
-  }
-  /// Back to front as farthestFirst(); front to back the same from end to beginning.
-  std::span<const uint32_t> sort(std::span<const float> depths, DrawingOrder order);
+  /// Sorts splats by these keys; those of equal keys by their numbers, ascending front to back, descending
+  /// back to front.
+  std::span<const DepthItem> sort(std::span<const uint32_t> keys, DrawingOrder order);
+
+  /// For the items to sort, to be filled in.
+  std::span<DepthItem> items(size_t count);
+  /// The items by ascending key; those of equal keys in the order in which they were. Valid until the next
+  /// call.
+  std::span<const DepthItem> sort();
 
  private:
-  struct Item {
-    uint32_t key, index;
-  };
-  template <int digit_bits>
-  void sortItems();
+  template <int passes>
+  void sortBits(uint32_t least, int bits);
 
-  std::vector<Item> items_, other_;
+  std::vector<DepthItem> items_, other_;
   std::vector<uint32_t> starts_;
-  std::vector<uint32_t> order_;
 };
 
 }  // namespace curvisplat

@@ -280,15 +280,15 @@ void BrickSource::finish(FetchStatistics& statistics) {
   pins_.clear();
   shared_.clear();
   statistics.read_by = pager_.way();
-  statistics.read_s = after.reading_s - before_.reading_s;
-  statistics.mean_queue_depth =
-      statistics.read_s > 0 ? (after.depth_s - before_.depth_s) / statistics.read_s : 0;
-  statistics.bytes_read = after.bytes - before_.bytes;
-  statistics.read_requests = after.requests - before_.requests;
-  statistics.bricks_cached = hits_;
-  statistics.bricks_left_out = after.bricks_left_out - before_.bricks_left_out;
-  statistics.bytes_left_out = after.bytes_left_out - before_.bytes_left_out;
-  statistics.bricks_read = reads_ - statistics.bricks_left_out;
+  const double depth_s = statistics.mean_queue_depth * statistics.read_s + after.depth_s - before_.depth_s;
+  statistics.read_s += after.reading_s - before_.reading_s;
+  statistics.mean_queue_depth = statistics.read_s > 0 ? depth_s / statistics.read_s : 0;
+  statistics.bytes_read += after.bytes - before_.bytes;
+  statistics.read_requests += after.requests - before_.requests;
+  statistics.bricks_cached += hits_;
+  statistics.bricks_left_out += after.bricks_left_out - before_.bricks_left_out;
+  statistics.bytes_left_out += after.bytes_left_out - before_.bytes_left_out;
+  statistics.bricks_read += reads_ - (after.bricks_left_out - before_.bricks_left_out);
   const BrickCache::Statistics kept = cached_.statistics();
   statistics.bricks_resident = kept.bricks;
   statistics.cache_bytes = kept.bytes;

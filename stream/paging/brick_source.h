@@ -82,7 +82,7 @@ class BrickSource {
 
   /// Wakes who waits in take() or prefetchNext(). Any thread.
   void stop();
-  /// After the last take() of a frame: lets go of what was not taken. Tells what was counted since start();
+  /// After the last take() since start(): lets go of what was not taken. Adds what was counted since then;
   /// the workers' sums are left as they are.
   void finish(FetchStatistics& statistics);
 

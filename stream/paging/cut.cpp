@@ -219,30 +219,23 @@ class CutWalk {
 
   /// A child can be hidden only by one that is on the viewer's side along every axis in which they differ.
   /// Counting those axes as bits, that one has the lower number. Octants that are not refined are drawn from
-  /// the brick itself: those that follow one another as one part, sorted as one.
+  /// the brick itself, as one part.
   void visitOctants(uint32_t id, uint8_t refined, bool draw_others) {
     const Brick& brick = view_.brick(id);
     const auto children = childrenByOctant(view_, brick);
     const int viewers_octant = view_.viewersOctant(id);
     uint8_t pending = 0;
-    bool took = false;
-    const auto takePending = [&] {
-      if (pending == 0) return;
-      take({id, pending});
-      pending = 0;
-      took = true;
-    };
     for (int farness = 7; farness >= 0; --farness) {
       const int octant = farness ^ viewers_octant;
       if (refined >> octant & 1) {
-        if (children[octant] < children[octant + 1]) takePending();
         for (uint32_t child = children[octant]; child < children[octant + 1]; ++child) visit(child);
       } else if (draw_others && brick.octant_splats[octant] > 0) {
         pending |= static_cast<uint8_t>(1 << octant);
       }
     }
-    takePending();
-    if (took) tookSome(id);
+    if (pending == 0) return;
+    take({id, pending});
+    tookSome(id);
   }
 
   void take(const BrickPart& part) {

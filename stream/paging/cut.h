@@ -1,11 +1,11 @@
-// Which bricks one view needs, and in which order: a pure function, apart from reading and drawing them.
+// Which bricks one view needs: a pure function, apart from reading and drawing them.
 // Design section 6, "plan".
 //
 // The cut starts at the root and goes down until a brick's error is small enough on the screen, or it is a
 // leaf; what is outside the image or transparent is left out with all that lies below it. The result's cells
-// are disjoint, and a cell comes after every cell that it can hide (exact: at each octree node the child
-// farther along every axis comes first). A cell that cannot be split has several consecutive bricks: they are
-// taken in the index's order, since their splats lie within 2^-24 of the root of each other.
+// are disjoint, and the cell of a whole brick comes after every cell that it can hide (at each octree node the
+// child farther along every axis comes first), so that bricks which are needed about the same time are named
+// so. Splats are drawn in an order of their own (render/frame/sweep_buffer.h).
 //
 // Under a limit of splats or bytes the brick with the largest error on the screen is refined first, octant by
 // octant, until the next octant's children would not fit. That sequence does not depend on the limit: a
@@ -75,7 +75,7 @@ struct CutOptions {
 };
 
 struct Cut {
-  std::vector<BrickPart> parts;  // in drawing order
+  std::vector<BrickPart> parts;  // each brick once
   uint64_t splats = 0;
   uint64_t bytes = 0;  // of the parts' streams; a brick in several parts counts once
   uint32_t deepest_level = 0;

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "render/cpu/cpu_painter.h"
+#include "render/project/depth_keys.h"
 #include "render/project/depth_sort.h"
 #include "render/project/projection.h"
 #include "stream/base/check.h"
@@ -72,12 +73,15 @@ void run(std::span<const std::byte> bytes) {
   if (flags & kClip) settings.clip_box = WorldBox{corner, corner + 0.5 * size};
 
   static BrickProjector projector;
-  static DepthSorter sorter;
   static CpuPainter painter;
   projector.project(settings, table(), corner, splats.geometry, splats.values);
+  static DepthSorter sorter;
+  const DepthKeys keys(settings.view, RootCube{corner, size}, painter.order());
+  std::vector<uint32_t> of_splats(projector.depths().size());
+  keys.keysOf(projector.depths(), corner, {0, ~uint32_t{0}}, of_splats);
   std::vector<ScreenSplat> sorted;
-  for (const uint32_t n : sorter.sort(projector.depths(), painter.order()))
-    sorted.push_back(projector.splats()[n]);
+  for (const DepthItem& item : sorter.sort(of_splats, painter.order()))
+    sorted.push_back(projector.splats()[item.splat]);
   painter.begin(pixels, {1, 1, 1, 1}, table(), settings.per_pixel, {1, 512});
   painter.draw(sorted);
   const Image image = painter.end();

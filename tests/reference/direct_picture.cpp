@@ -12,7 +12,6 @@
 #include "preprocess/splats/merge.h"
 #include "preprocess/splats/seams.h"
 #include "render/cpu/cpu_painter.h"
-#include "render/project/depth_sort.h"
 #include "render/project/projection.h"
 #include "tests/reference/painted_splats.h"
 #include "tests/reference/splat_arrays.h"
@@ -108,10 +107,9 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
   BrickProjector projector;
   projector.project(settings, table, origin, geometry, variable);
 
-  DepthSorter sorter;
   std::vector<ScreenSplat> sorted;
   sorted.reserve(projector.splats().size());
-  for (const uint32_t n : sorter.farthestFirst(projector.depths())) {
+  for (const uint32_t n : farthestFirst(projector.depths())) {
     ScreenSplat splat = projector.splats()[n];
     if (!options.hidden_slope) splat.half_width = 0;
     if (!options.secant && camera.projection == Projection::kPerspective)

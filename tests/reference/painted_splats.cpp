@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <random>
 
 namespace curvisplat {
@@ -36,6 +37,13 @@ std::vector<ScreenSplat> randomSplats(int count, uint32_t seed, ImageSize size, 
                       slope * around(random), 0.2f * unit(random)});
   }
   return splats;
+}
+
+std::vector<uint32_t> farthestFirst(std::span<const float> depths) {
+  std::vector<uint32_t> order(depths.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return depths[a] > depths[b]; });
+  return order;
 }
 
 Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const ClassificationTable& table,

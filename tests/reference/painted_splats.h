@@ -23,6 +23,9 @@ ClassificationTable smooth(bool log_scale = false);
 std::vector<ScreenSplat> randomSplats(int count, uint32_t seed, ImageSize size, float slope = 0.3f,
                                       float opacity = 0.5f);
 
+/// The places of `depths`, the largest first; those of equal depths in their order.
+std::vector<uint32_t> farthestFirst(std::span<const float> depths);
+
 /// A frame, in the painter's own order. `splats`: farthest first.
 Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const ClassificationTable& table,
                  bool per_pixel, ImageSize size, const glm::vec4& background = {1, 1, 1, 1},

@@ -113,10 +113,14 @@ TEST_F(HiddenBricksTest, WorkersPassOverWhatIsHiddenAndThePagerDoesNotReadIt) {
   const ImageSize size{60, 50};
   const Camera camera = Camera::named("-y", manifest.lower, manifest.upper, size, Projection::kOrthographic);
   const ProjectionSettings settings{ScreenView::of(camera, size, glm::dvec3(1), 1.5, 1)};
+  const DepthKeys keys(settings.view, manifest.root, DrawingOrder::kFrontToBack);
   std::vector<BrickPart> parts;
+  std::vector<SweptPart> swept;
   uint64_t expected_hidden = 0, expected_bytes = 0;
   for (uint32_t id = 0; id < cache.bricks().size(); ++id) {
     parts.push_back({id});
+    swept.push_back({{id}, id, keys.rangeOf(cache.bricks()[id])});
+    swept.back().keys.first = 0;  // in any order, then
     if (screenBoxOf(cache.bricks()[id], settings.view).x1 >= 30) continue;
     ++expected_hidden;
     expected_bytes += cache.bricks()[id].geometry.length + cache.brickVariables(0)[id].values.length;
@@ -132,24 +136,26 @@ TEST_F(HiddenBricksTest, WorkersPassOverWhatIsHiddenAndThePagerDoesNotReadIt) {
     BrickSource source(cache, 0, {}, 0);
     std::vector<ScreenSplat> memory(3 * BrickProjector::kMaxSplats);
     SegmentRing ring(memory);
-    FrameWorkers workers(source, ring, 2);
+    SweepBuffer sweep(1'000'000, 50'000);
+    FrameWorkers workers(source, sweep, ring, 2);
     BrickPager::Unneeded unneeded;
     if (before_reading) unneeded = [&](uint32_t brick) { return hidden.hides(brick); };
     source.start(parts, unneeded);
-    const FrameWork work{cache, parts, settings, table, DrawingOrder::kFrontToBack, hidden};
-    workers.start(work);
-    for (const BrickPart& part : parts) {
-      const auto segment = ring.next();
-      ASSERT_TRUE(segment);
-      if (hidden.hides(part.brick)) {
-        EXPECT_EQ(segment->size(), 0u) << part.brick;
-      }
+    const FrameWork work{cache, swept, settings, table, keys, hidden};
+    workers.beginFrame(work);
+    ASSERT_TRUE(sweep.beginSlab(swept));
+    workers.start();
+    uint64_t drawn = 0;
+    while (const auto segment = ring.next()) {
+      drawn += segment->size();
       ring.release();
     }
     FrameStatistics statistics;
     workers.finish(statistics);
     source.finish(statistics);
-    EXPECT_EQ(statistics.bricks_hidden, expected_hidden);
+    EXPECT_EQ(drawn, statistics.splats_drawn);
+    EXPECT_EQ(workers.partsHidden(), expected_hidden);
+    EXPECT_EQ(workers.partsSeen(), parts.size());
     EXPECT_EQ(statistics.bricks_left_out, before_reading ? expected_hidden : 0);
     EXPECT_EQ(statistics.bytes_left_out, before_reading ? expected_bytes : 0);
     EXPECT_GT(statistics.splats_drawn, 0u);

@@ -1,4 +1,4 @@
-// Frames of a converted scene: coarse ones first, limited ones, and all of them against one global sort.
+// Frames of a converted scene: coarse ones first, and limited ones.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -8,12 +8,7 @@
 #include <vector>
 
 #include "preprocess/scenes/scenes.h"
-#include "render/colour/classification.h"
 #include "render/frame/frame.h"
-#include "render/gl/gl_painter.h"
-#include "render/gl/gl_thread.h"
-#include "render/gl/offscreen_context.h"
-#include "render/project/depth_sort.h"
 #include "stream/base/error.h"
 #include "tests/reference/known_pictures.h"
 #include "tests/reference/reference_march.h"
@@ -163,72 +158,6 @@ TEST_F(ProgressiveTest, SaysHowManySplatsTheCoarsestPictureTakes) {
     const std::string root = fmt::format("{}", cache_->bricks()[0].splats);
     EXPECT_NE(std::string(error.what()).find(root), std::string::npos) << error.what();
   }
-}
-
-/// The same splats as a frame's, sorted all together.
-Image globallySorted(const CacheReader& cache, const TransferFunction& function, const Camera& camera,
-                     const FrameOptions& options, FrameStatistics& statistics) {
-  const VariableInfo& info = cache.manifest().variables[0];
-  const auto table = ClassificationTable::of(function, info.min, info.max);
-  const ProjectionSettings settings{
-      ScreenView::of(camera, options.size, options.scale, options.low_pass_px2, 1e-3)};
-  const auto subtrees = subtreeBounds(cache.bricks(), cache.brickVariables(0));
-  CutOptions wanted;
-  wanted.lod_pixels = options.lod_pixels;
-  wanted.max_splats = options.max_splats.value_or(CutOptions::kNoLimit);
-  const Cut cut = chooseCut(
-      {cache.manifest().root, cache.bricks(), cache.brickVariables(0), subtrees}, settings.view.cutView(),
-      [](const ValueBounds&) { return false; }, wanted);
-  std::vector<ScreenSplat> splats, sorted;
-  std::vector<float> depths;
-  uint64_t drawn = 0;  // fewer than pieces: half cells are drawn in parts
-  BrickProjector projector;
-  for (const BrickPart& part : cut.parts) {
-    SplatGeometry geometry;
-    SplatVariable values;
-    cache.readGeometry(part.brick, geometry);
-    cache.readVariable(part.brick, 0, values);
-    const Brick& brick = cache.bricks()[part.brick];
-    const glm::dvec3 corner = cache.manifest().root.cellMin(brick.cell);
-    const SplatRanges ranges(brick, part.octants);
-    projector.project(settings, table, corner, arraysOf(geometry), arraysOf(values),
-                      {ranges.begin(), ranges.end()});
-    drawn += projector.counts().drawn;
-    splats.insert(splats.end(), projector.splats().begin(), projector.splats().end());
-    const bool perspective = camera.projection == Projection::kPerspective;  // else from the cell's corner
-    const auto from = static_cast<float>(perspective ? 0 : settings.view.viewFromData(corner).z);
-    for (const float depth : projector.depths()) depths.push_back(from + depth);
-  }
-  EXPECT_EQ(drawn, statistics.splats_drawn);
-  DepthSorter sorter;
-  for (const uint32_t index : sorter.farthestFirst(depths)) sorted.push_back(splats[index]);
-  Image image;
-  GlThread gl(GlLibrary::kOsmesa);
-  gl.run([&](const GlContext& context) {
-    GlPainter painter(context);
-    painter.begin(options.size, options.background, table, settings.per_pixel);
-    painter.draw(sorted);
-    image = painter.end();
-  });
-  return image;
-}
-
-TEST_F(ProgressiveTest, BricksInOrderDifferLittleFromOneGlobalSort) {
-  const TransferFunction transfer_function = function();
-  FrameRenderer renderer(*cache_, 0, transfer_function);
-  for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective})
-    // Leaves; several levels; and a brick of which some octants are drawn.
-    for (const auto& [lod_pixels, limit] :
-         {std::pair{0.0, 1'000'000u}, std::pair{2.0, 1'000'000u}, std::pair{0.0, 123'456u}}) {
-      FrameOptions wanted = options(lod_pixels);
-      wanted.max_splats = limit;
-      FrameStatistics statistics;
-      const Image image = renderer.render(camera(projection), wanted, statistics);
-      const Image global = globallySorted(*cache_, transfer_function, camera(projection), wanted, statistics);
-      const double psnr_db = compareImages(image, global).psnr_db;
-      fmt::print("{} splats: {:.2f} dB\n", statistics.splats_drawn, psnr_db);
-      EXPECT_GE(psnr_db, 60);
-    }
 }
 
 }  // namespace

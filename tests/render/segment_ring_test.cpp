@@ -80,6 +80,31 @@ TEST(SegmentRing, KeepsWhatIsHandedOutUntilItIsReleased) {
   worker.join();
 }
 
+TEST(SegmentRing, PausesWhereItIsTold) {
+  std::vector<ScreenSplat> memory(10);
+  SegmentRing ring(memory);
+  const auto fill = [&](uint64_t sequence) {
+    ASSERT_TRUE(ring.acquire(sequence, 4));
+    ring.commit(sequence);
+  };
+  fill(0);
+  std::thread painter([&] {
+    EXPECT_TRUE(ring.next());
+    ring.release();
+    EXPECT_TRUE(ring.next());
+    ring.release();
+    EXPECT_FALSE(ring.next());
+    EXPECT_FALSE(ring.isClosed());
+  });
+  fill(1);
+  ring.pauseAfter(2);
+  ring.pauseAfter(2);
+  painter.join();
+  ring.resume();
+  fill(2);
+  EXPECT_TRUE(ring.next());
+}
+
 TEST(SegmentRing, ClosingWakesAllWhoWait) {
   std::vector<ScreenSplat> memory(10);
   SegmentRing ring(memory);

@@ -34,7 +34,7 @@ struct Count {
   const char* name;
   uint64_t FrameStatistics::*value;
 };
-constexpr std::array<Count, 23> kCounts{{{"bricks_drawn", &FrameStatistics::bricks_drawn},
+constexpr std::array<Count, 26> kCounts{{{"bricks_drawn", &FrameStatistics::bricks_drawn},
                                          {"bricks_culled", &FrameStatistics::bricks_culled},
                                          {"bricks_out_of_image", &FrameStatistics::bricks_out_of_image},
                                          {"bricks_transparent", &FrameStatistics::bricks_transparent},
@@ -55,6 +55,9 @@ constexpr std::array<Count, 23> kCounts{{{"bricks_drawn", &FrameStatistics::bric
                                          {"cache_bytes", &FrameStatistics::cache_bytes},
                                          {"memory_used_bytes", &FrameStatistics::memory_used_bytes},
                                          {"ring_peak_bytes", &FrameStatistics::ring_peak_bytes},
+                                         {"sweep_peak_bytes", &FrameStatistics::sweep_peak_bytes},
+                                         {"slabs", &FrameStatistics::slabs},
+                                         {"bricks_again", &FrameStatistics::bricks_again},
                                          {"pager_peak_bytes", &FrameStatistics::pager_peak_bytes},
                                          {"cache_peak_bytes", &FrameStatistics::cache_peak_bytes}}};
 

@@ -10,11 +10,11 @@
 namespace curvisplat {
 namespace {
 
-void sortInto(DepthSorter& sorter, const std::vector<float>& depths, const std::vector<ScreenSplat>& splats,
+void sortInto(DepthSorter& sorter, const std::vector<uint32_t>& keys, const std::vector<ScreenSplat>& splats,
               std::vector<ScreenSplat>& sorted) {
-  const auto order = sorter.sort(depths, DrawingOrder::kFrontToBack);
+  const auto order = sorter.sort(keys, DrawingOrder::kFrontToBack);
   sorted.resize(std::max(sorted.size(), splats.size()));
-  for (size_t n = 0; n < order.size(); ++n) sorted[n] = splats[order[n]];
+  for (size_t n = 0; n < order.size(); ++n) sorted[n] = splats[order[n].splat];
 }
 
 }  // namespace
@@ -41,8 +41,8 @@ PreparedSample::PreparedSample(const CacheReader& cache, size_t variable, const 
     read.values = scratch.values;
     project(read, read.geometry, read.values, scratch.projector);
     read.projected = scratch.projector.splats();
-    read.depths = scratch.projector.depths();
-    sortInto(scratch.sorter, read.depths, read.projected, scratch.sorted);
+    read.keys = keysOf(read, scratch);
+    sortInto(scratch.sorter, read.keys, read.projected, scratch.sorted);
     const auto count = static_cast<ptrdiff_t>(read.projected.size());
     to_draw_.insert(to_draw_.end(), scratch.sorted.begin(), scratch.sorted.begin() + count);
     segments_.push_back(static_cast<uint32_t>(count));
@@ -56,6 +56,14 @@ void PreparedSample::project(const SampledBrick& brick, const SplatGeometry& geo
   const SplatRanges ranges(of_index, brick.part.octants);
   projector.project(plan_.settings, planner_.table(), cache_.manifest().root.cellMin(of_index.cell),
                     arraysOf(geometry), arraysOf(values), std::span(ranges.begin(), ranges.size()));
+}
+
+const std::vector<uint32_t>& PreparedSample::keysOf(const SampledBrick& brick, Scratch& scratch) const {
+  const Brick& of_index = cache_.bricks()[brick.part.brick];
+  scratch.keys.resize(scratch.projector.depths().size());
+  plan_.keys.keysOf(scratch.projector.depths(), cache_.manifest().root.cellMin(of_index.cell),
+                    plan_.keys.rangeOf(of_index), scratch.keys);
+  return scratch.keys;
 }
 
 void PreparedSample::verify(size_t n) const {
@@ -87,13 +95,13 @@ void PreparedSample::project(size_t n, Scratch& scratch) const {
 }
 
 void PreparedSample::sort(size_t n, Scratch& scratch) const {
-  sortInto(scratch.sorter, bricks_[n].depths, bricks_[n].projected, scratch.sorted);
+  sortInto(scratch.sorter, bricks_[n].keys, bricks_[n].projected, scratch.sorted);
 }
 
 void PreparedSample::prepare(size_t n, Scratch& scratch) const {
   verifyAndDecode(n, scratch);
   project(bricks_[n], scratch.geometry, scratch.values, scratch.projector);
-  sortInto(scratch.sorter, scratch.projector.depths(), scratch.projector.splats(), scratch.sorted);
+  sortInto(scratch.sorter, keysOf(bricks_[n], scratch), scratch.projector.splats(), scratch.sorted);
 }
 
 }  // namespace curvisplat

@@ -26,6 +26,7 @@ class PreparedSample {
     SplatGeometry geometry;
     SplatVariable values;
     BrickProjector projector;
+    std::vector<uint32_t> keys;
     DepthSorter sorter;
     std::vector<ScreenSplat> sorted;
     ReadTimes times;
@@ -54,13 +55,14 @@ class PreparedSample {
     std::vector<std::byte> geometry_bytes, values_bytes;
     SplatGeometry geometry;
     SplatVariable values;
-    std::vector<float> depths;  // of the splats on the screen, unsorted
+    std::vector<uint32_t> keys;  // of the splats on the screen, unsorted
     std::vector<ScreenSplat> projected;
   };
 
   void verifyAndDecode(size_t n, Scratch& scratch) const;
   void project(const SampledBrick& brick, const SplatGeometry& geometry, const SplatVariable& values,
                BrickProjector& projector) const;
+  const std::vector<uint32_t>& keysOf(const SampledBrick& brick, Scratch& scratch) const;
 
   const CacheReader& cache_;
   const size_t variable_;

@@ -1,0 +1,339 @@
+#include "render/frame/sweep_buffer.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "stream/base/check.h"
+
+namespace curvisplat {
+namespace {
+
+// Where space is short, this share of the pages is kept when the slab is made to end earlier.
+constexpr size_t kKeptEighths = 7;
+
+/// The splats of a part, sorted, that lie in a slab: places from .. to - 1.
+struct Slice {
+  size_t from, to;
+};
+
+Slice sliceOf(uint32_t rank, std::span<const DepthItem> sorted, const SweepPosition& begin,
+              const SweepPosition& end) {
+  const auto firstNotBefore = [&](const SweepPosition& mark) {
+    size_t low = 0, high = sorted.size();
+    while (low < high) {
+      const size_t middle = (low + high) / 2;
+      if (SweepPosition{sorted[middle].key, rank, static_cast<uint32_t>(middle)} < mark)
+        low = middle + 1;
+      else
+        high = middle;
+    }
+    return low;
+  };
+  return {firstNotBefore(begin), firstNotBefore(end)};
+}
+
+}  // namespace
+
+void copySplats(std::span<const DepthItem> items, const ScreenSplat* from, ScreenSplat* to) {
+  constexpr size_t kAhead = 12;  // they come from anywhere in the brick, or the buffer
+  for (size_t n = 0; n < items.size(); ++n) {
+    if (n + kAhead < items.size()) __builtin_prefetch(from + items[n + kAhead].splat);
+    to[n] = from[items[n].splat];
+  }
+}
+
+SweepBuffer::SweepBuffer(size_t splats, size_t batch_splats)
+    : batch_splats_(std::min(batch_splats, kMaxBatch)),
+      splats_(std::make_unique_for_overwrite<ScreenSplat[]>(splats / kPageSplats * kPageSplats)),
+      keys_(std::make_unique_for_overwrite<uint32_t[]>(splats / kPageSplats * kPageSplats)),
+      left_(splats / kPageSplats) {
+  CURVISPLAT_CHECK_OP(pages(), >=, 4u);
+  CURVISPLAT_CHECK_OP(batch_splats_, >, 0u);
+  beginFrame();
+}
+
+void SweepBuffer::beginFrame() {
+  const std::lock_guard lock(mutex_);
+  std::fill(left_.begin(), left_.end(), uint16_t{0});
+  free_.clear();
+  for (size_t page = pages(); page-- > 0;) free_.push_back(static_cast<uint32_t>(page));
+  swept_ = {};
+  parts_.clear();
+  live_.clear();
+  splits_.clear();
+  turn_ = batches_ = under_way_ = filling_ = slabs_ = 0;
+  peak_pages_ = 0;
+  begin_ = end_ = {};
+  closed_ = false;
+}
+
+bool SweepBuffer::beginSlab(std::span<const SweptPart> swept) {
+  const std::lock_guard lock(mutex_);
+  CURVISPLAT_CHECK(closed_ || (live_.empty() && isQuiet()));
+  if (closed_ || end_ == kSweepEnd) return false;
+  begin_ = end_;
+  end_ = kSweepEnd;
+  swept_ = swept;
+  parts_.clear();
+  for (uint32_t n = 0; n < swept.size(); ++n)
+    if (swept[n].end() >= begin_) parts_.push_back(n);
+  turn_ = 0;
+  mark_ = parts_.empty() ? kSweepEnd : swept_[parts_[0]].begin();
+  entered_ = 0;
+  worth_counting_ = false;
+  ++slabs_;
+  return true;
+}
+
+bool SweepBuffer::isBehind(const SweptPart& part) const {
+  const std::lock_guard lock(mutex_);
+  return part.begin() >= end_;
+}
+
+bool SweepBuffer::awaitTurn(uint64_t sequence) {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return closed_ || turn_ == sequence; });
+  return !closed_;
+}
+
+void SweepBuffer::skip() {
+  const std::lock_guard lock(mutex_);
+  endTurn();
+}
+
+/// The mutex is held, as in all that follow and are private.
+void SweepBuffer::endTurn() {
+  ++turn_;
+  mark_ = turn_ < parts_.size() ? swept_[parts_[turn_]].begin() : kSweepEnd;
+  worth_counting_ |= entered_ >= batch_splats_ / 2 || turn_ == parts_.size();
+  changed_.notify_all();
+}
+
+std::shared_ptr<SweepBuffer::Run> SweepBuffer::enter(uint32_t rank, std::span<const DepthItem> sorted) {
+  const std::lock_guard lock(mutex_);
+  if (closed_) return {};
+  const Slice slice = sliceOf(rank, sorted, begin_, end_);
+  auto run = std::make_shared<Run>();
+  run->rank = rank;
+  run->before = static_cast<uint32_t>(slice.from);
+  run->count = slice.to - slice.from;
+  const size_t needed = (run->count + kPageSplats - 1) / kPageSplats;
+  if (needed > free_.size()) return {};
+  for (size_t page = 0; page < needed; ++page) {
+    run->pages.push_back(free_.back());
+    left_[free_.back()] = static_cast<uint16_t>(std::min(kPageSplats, run->count - page * kPageSplats));
+    free_.pop_back();
+  }
+  for (size_t n = 0; n < run->count; ++n) keys_[run->slot(n)] = sorted[slice.from + n].key;
+  if (run->count > 0) {
+    const auto place =
+        std::upper_bound(live_.begin(), live_.end(), rank,
+                         [](uint32_t of_new, const auto& other) { return of_new < other->rank; });
+    live_.insert(place, run);
+  }
+  ++filling_;
+  entered_ += run->count;
+  peak_pages_ = std::max(peak_pages_, used());
+  endTurn();
+  return run;
+}
+
+bool SweepBuffer::awaitSpace(uint32_t rank, std::span<const DepthItem> sorted) {
+  std::unique_lock lock(mutex_);
+  if (!closed_ && isQuiet()) {
+    endSlabEarlier(rank, sorted);
+  } else {
+    const size_t before = free_.size();
+    changed_.wait(lock, [&] { return closed_ || free_.size() > before || isQuiet(); });
+  }
+  return !closed_;
+}
+
+void SweepBuffer::fill(Run& run, std::span<const DepthItem> sorted, std::span<const ScreenSplat> splats) {
+  const std::span<const DepthItem> entered = sorted.subspan(run.before, run.count);
+  for (size_t page = 0; page < run.pages.size(); ++page) {
+    const size_t first = page * kPageSplats, last = std::min(first + kPageSplats, run.count);
+    copySplats(entered.subspan(first, last - first), splats.data(), &splats_[run.slot(first)]);
+  }
+  const std::lock_guard lock(mutex_);
+  run.filled = true;
+  --filling_;
+  changed_.notify_all();
+}
+
+std::optional<SweepBuffer::Batch> SweepBuffer::next() {
+  const std::lock_guard lock(mutex_);
+  return cut(batch_splats_ / 2);
+}
+
+std::optional<SweepBuffer::Batch> SweepBuffer::awaitNext() {
+  std::unique_lock lock(mutex_);
+  while (!closed_) {
+    const bool all_in = turn_ == parts_.size();
+    if (auto batch = cut(all_in ? 1 : batch_splats_ / 2)) return batch;
+    if (all_in) break;
+    changed_.wait(lock);
+  }
+  return {};
+}
+
+std::optional<SweepBuffer::Batch> SweepBuffer::nextFinal() {
+  const std::lock_guard lock(mutex_);
+  if (!isQuiet()) return {};
+  worth_counting_ = true;
+  return cut(1);
+}
+
+SweepPosition SweepBuffer::position(const Run& run, size_t n) const {
+  return {keys_[run.slot(n)], run.rank, run.before + static_cast<uint32_t>(n)};
+}
+
+/// Looks at few splats where the mark is close to the run's first.
+size_t SweepBuffer::firstNotBefore(const Run& run, const SweepPosition& mark) const {
+  size_t low = run.first, step = 1;  // what lies before `low` lies before the mark
+  while (low + step <= run.count && position(run, low + step - 1) < mark) {
+    low += step;
+    step *= 2;
+  }
+  size_t high = std::min(low + step - 1, run.count);
+  while (low < high) {
+    const size_t middle = (low + high) / 2;
+    if (position(run, middle) < mark)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low;
+}
+
+/// Nothing if fewer splats than that are final.
+std::optional<SweepBuffer::Batch> SweepBuffer::cut(size_t at_least) {
+  if (closed_) return {};
+  if (splits_.empty()) {
+    if (!worth_counting_) return {};
+    size_t finals = 0;
+    for (const auto& run : live_) {
+      run->final_to = firstNotBefore(*run, mark_);
+      finals += run->final_to - run->first;
+    }
+    if (finals < at_least) {
+      worth_counting_ = turn_ == parts_.size();
+      entered_ = 0;
+      return {};
+    }
+    splitFinals(finals);
+  }
+  const SweepPosition end = splits_.front();
+  splits_.pop_front();
+  Batch batch;
+  for (const auto& run : live_) {
+    const size_t to = splits_.empty() ? run->final_to : firstNotBefore(*run, end);
+    if (to == run->first) continue;
+    batch.pieces.push_back({run, run->first, to});
+    batch.count += to - run->first;
+    run->first = to;
+  }
+  std::erase_if(live_, [](const auto& run) { return run->first == run->count; });
+  CURVISPLAT_CHECK_OP(batch.count, <=, batch_splats_);
+  batch.sequence = batches_++;
+  ++under_way_;
+  changed_.notify_all();  // the last one may be out
+  return batch;
+}
+
+/// Ends of batches of at most batch_splats_, the last of which is the mark. Between two neighbours of a sample
+/// of every run's every stride-th splat lie at most `stride` splats of each run.
+void SweepBuffer::splitFinals(size_t finals) {
+  if (finals > batch_splats_) {
+    const size_t stride = std::max<size_t>(1, batch_splats_ / (4 * live_.size()));
+    const size_t samples = stride == 1 ? batch_splats_ : batch_splats_ / stride - live_.size();
+    std::vector<SweepPosition> sample;
+    for (const auto& run : live_)
+      for (size_t n = run->first; n < run->final_to; n += stride) sample.push_back(position(*run, n));
+    std::sort(sample.begin(), sample.end());
+    for (size_t n = samples; n < sample.size(); n += samples) splits_.push_back(sample[n]);
+  }
+  splits_.push_back(mark_);
+}
+
+/// Keeps of the run that is to be entered, and of all others, what lies before a nearer end. Nothing in the
+/// buffer is final: everything is in a run, and no batch is under way.
+void SweepBuffer::endSlabEarlier(uint32_t rank, std::span<const DepthItem> sorted) {
+  std::vector<SweepPosition> starts;  // of pages
+  for (const auto& run : live_)
+    for (size_t n = run->first; n < run->count; n = (n / kPageSplats + 1) * kPageSplats)
+      starts.push_back(position(*run, n));
+  const Slice slice = sliceOf(rank, sorted, begin_, end_);
+  for (size_t n = slice.from; n < slice.to; n += kPageSplats)
+    starts.push_back({sorted[n].key, rank, static_cast<uint32_t>(n)});
+  const size_t kept = std::min(pages() * kKeptEighths / 8, starts.size() - 1);
+  std::nth_element(starts.begin(), starts.begin() + static_cast<ptrdiff_t>(kept), starts.end());
+  end_ = starts[kept];
+  for (const auto& run : live_) {
+    const size_t count = firstNotBefore(*run, end_);
+    release(*run, count, run->count);
+    run->count = count;
+  }
+  std::erase_if(live_, [](const auto& run) { return run->first == run->count; });
+}
+
+/// Of its splats from .. to - 1 nobody wants any more.
+void SweepBuffer::release(const Run& run, size_t from, size_t to) {
+  while (from < to) {
+    const size_t end = std::min((from / kPageSplats + 1) * kPageSplats, to);
+    const uint32_t page = run.pages[from / kPageSplats];
+    left_[page] = static_cast<uint16_t>(left_[page] - (end - from));
+    if (left_[page] == 0) free_.push_back(page);
+    from = end;
+  }
+}
+
+bool SweepBuffer::awaitFilled(const Batch& batch) {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] {
+    return closed_ || std::all_of(batch.pieces.begin(), batch.pieces.end(),
+                                  [](const Piece& piece) { return piece.run->filled; });
+  });
+  return !closed_;
+}
+
+void SweepBuffer::itemsOf(const Batch& batch, std::span<DepthItem> items) const {
+  CURVISPLAT_CHECK_OP(items.size(), ==, batch.count);
+  size_t item = 0;
+  for (const Piece& piece : batch.pieces)
+    for (size_t n = piece.from; n < piece.to;) {
+      const size_t end = std::min((n / kPageSplats + 1) * kPageSplats, piece.to);
+      for (size_t slot = piece.run->slot(n); n < end; ++n, ++slot)
+        items[item++] = {keys_[slot], static_cast<uint32_t>(slot)};
+    }
+}
+
+void SweepBuffer::copy(std::span<const DepthItem> items, std::span<ScreenSplat> to) const {
+  CURVISPLAT_CHECK_OP(items.size(), ==, to.size());
+  copySplats(items, splats_.get(), to.data());
+}
+
+void SweepBuffer::giveBack(const Batch& batch) {
+  const std::lock_guard lock(mutex_);
+  for (const Piece& piece : batch.pieces) release(*piece.run, piece.from, piece.to);
+  --under_way_;
+  changed_.notify_all();
+}
+
+uint64_t SweepBuffer::batches() const {
+  const std::lock_guard lock(mutex_);
+  return batches_;
+}
+
+size_t SweepBuffer::peakSplats() const {
+  const std::lock_guard lock(mutex_);
+  return peak_pages_ * kPageSplats;
+}
+
+void SweepBuffer::close() {
+  const std::lock_guard lock(mutex_);
+  closed_ = true;
+  changed_.notify_all();
+}
+
+}  // namespace curvisplat

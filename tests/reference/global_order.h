@@ -1,0 +1,20 @@
+// The specification of a frame's drawing order: all splats of its cut in memory, in one sort, drawn by one
+// painter.
+#pragma once
+
+#include <vector>
+
+#include "render/colour/transfer_function.h"
+#include "render/frame/backend.h"
+#include "render/frame/frame_options.h"
+#include "render/image/image.h"
+#include "render/project/projection.h"
+#include "stream/cache/cache_reader.h"
+
+namespace curvisplat {
+
+/// The picture that FrameRenderer::render() is to draw of the cache's first variable, bit for bit.
+Image globallySorted(const CacheReader& cache, const TransferFunction& transfer_function, Backend backend,
+                     const Camera& camera, const FrameOptions& options);
+
+}  // namespace curvisplat

@@ -1,0 +1,192 @@
+// All splats of a frame are drawn in one order of depth, whatever the view, the level of detail, the memory
+// and the threads: bit for bit as if they were sorted all together.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "preprocess/scenes/scenes.h"
+#include "render/frame/frame.h"
+#include "stream/base/error.h"
+#include "tests/reference/global_order.h"
+#include "tests/reference/known_pictures.h"
+#include "tests/support/random_cache.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+/// With each backend.
+class FrameOrderTest : public testing::TestWithParam<Backend> {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    convertGrid(SceneGridSource(makeScene("half-annulus"), {96, 48, 48}), *folder_ / "scene.splats");
+    scene_ = std::make_unique<CacheReader>(*folder_ / "scene.splats");
+    writeRandomCache(*folder_ / "random.splats", 5, 30000);
+    random_ = std::make_unique<CacheReader>(*folder_ / "random.splats");
+  }
+  static void TearDownTestSuite() {
+    scene_.reset();
+    random_.reset();
+    folder_.reset();
+  }
+
+  static FrameOptions options(double lod_pixels = 0) {
+    FrameOptions made;
+    made.size = {60, 46};
+    made.lod_pixels = lod_pixels;
+    return made;
+  }
+  /// Strong colours: an order that is wrong shows.
+  static TransferFunction function(const CacheReader& cache) {
+    const VariableInfo& info = cache.manifest().variables[0];
+    const double diagonal = glm::length(cache.manifest().upper - cache.manifest().lower);
+    return TransferFunction::preset("cool-warm", info.min, info.max, 0.02 * diagonal);
+  }
+  static Camera looking(const CacheReader& cache, const glm::dvec3& direction) {
+    const Manifest& manifest = cache.manifest();
+    Camera camera =
+        Camera::named("+x", manifest.lower, manifest.upper, options().size, Projection::kOrthographic, 30);
+    camera.position = camera.focal_point - glm::length(manifest.upper - manifest.lower) * direction;
+    camera.view_up = std::abs(direction.z) > 0.9 ? glm::dvec3(0, 1, 0) : glm::dvec3(0, 0, 1);
+    return camera;
+  }
+  static Camera inside(const CacheReader& cache) {
+    const Manifest& manifest = cache.manifest();
+    Camera camera = looking(cache, {1, 0, 0});
+    camera.projection = Projection::kPerspective;
+    camera.view_angle_deg = 60;
+    camera.position = manifest.lower + glm::dvec3(0.2, 0.5, 0.5) * (manifest.upper - manifest.lower);
+    return camera;
+  }
+  /// As little memory as renders at all.
+  static uint64_t leastMemory(FrameRenderer& renderer, const Camera& camera, FrameOptions wanted) {
+    wanted.memory_bytes = 1 << 20;
+    FrameStatistics statistics;
+    try {
+      renderer.render(camera, wanted, statistics);
+    } catch (const UsageError& error) {
+      const std::string message = error.what();
+      return std::stoull(message.substr(message.find("at least ") + 9)) << 20;
+    }
+    return wanted.memory_bytes;
+  }
+
+  static std::unique_ptr<TemporaryFolder> folder_;
+  static std::unique_ptr<CacheReader> scene_, random_;
+};
+
+std::unique_ptr<TemporaryFolder> FrameOrderTest::folder_;
+std::unique_ptr<CacheReader> FrameOrderTest::scene_, FrameOrderTest::random_;
+
+INSTANTIATE_TEST_SUITE_P(Backends, FrameOrderTest,
+                         testing::Values(Backend::kOsmesa, Backend::kEgl, Backend::kCpu),
+                         [](const testing::TestParamInfo<Backend>& tested) {
+                           return tested.param == Backend::kOsmesa ? "osmesa"
+                                  : tested.param == Backend::kEgl  ? "egl"
+                                                                   : "cpu";
+                         });
+
+TEST_P(FrameOrderTest, IsThatOfOneSortInAnyView) {
+  for (const CacheReader* cache : {scene_.get(), random_.get()}) {
+    const TransferFunction transfer_function = function(*cache);
+    FrameRenderer renderer(*cache, 0, transfer_function, GetParam());
+    std::vector<Camera> cameras{inside(*cache)};
+    for (const glm::dvec3& direction :
+         {glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1), glm::dvec3(1, 0.0017, 0.001),
+          glm::dvec3(0.01, 1, 0.014), glm::dvec3(0.04, 0.03, -1), glm::dvec3(0.6, 0.64, 0.48)})
+      cameras.push_back(looking(*cache, glm::normalize(direction)));
+    if (GetParam() == Backend::kEgl) cameras.resize(2);
+    for (size_t n = 0; n < cameras.size(); ++n) {
+      FrameStatistics statistics;
+      const Image image = renderer.render(cameras[n], options(), statistics);
+      const Image expected = globallySorted(*cache, transfer_function, GetParam(), cameras[n], options());
+      EXPECT_EQ(image.rgba, expected.rgba) << "camera " << n;
+      EXPECT_EQ(statistics.slabs, 1u);
+      EXPECT_NE(*std::max_element(image.rgba.begin(), image.rgba.end()),
+                *std::min_element(image.rgba.begin(), image.rgba.end()));
+    }
+  }
+}
+
+TEST_P(FrameOrderTest, IsThatOfOneSortAtAnyLevelAndWithPartsOfBricks) {
+  const TransferFunction transfer_function = function(*scene_);
+  FrameRenderer renderer(*scene_, 0, transfer_function, GetParam());
+  for (const Camera& camera : {looking(*scene_, {0, 1, 0}), inside(*scene_)})
+    for (const auto& [lod_pixels, limit] :
+         {std::pair{2.0, 1'000'000u}, std::pair{8.0, 1'000'000u}, std::pair{0.0, 123'456u}}) {
+      FrameOptions wanted = options(lod_pixels);
+      wanted.max_splats = limit;
+      FrameStatistics statistics;
+      const Image image = renderer.render(camera, wanted, statistics);
+      EXPECT_EQ(image.rgba, globallySorted(*scene_, transfer_function, GetParam(), camera, wanted).rgba)
+          << lod_pixels << ' ' << limit;
+    }
+}
+
+TEST_P(FrameOrderTest, IsThatOfOneSortInAnyMemoryWithAnyThreads) {
+  if (GetParam() == Backend::kEgl) GTEST_SKIP() << "as OSMesa's";
+  uint64_t most_slabs = 0, again = 0;
+  for (const CacheReader* cache : {scene_.get(), random_.get()}) {
+    const TransferFunction transfer_function = function(*cache);
+    FrameRenderer renderer(*cache, 0, transfer_function, GetParam());
+    for (const Camera& camera : {looking(*cache, {0, 0, 1}), inside(*cache)}) {
+      const Image expected = globallySorted(*cache, transfer_function, GetParam(), camera, options());
+      const uint64_t least = leastMemory(renderer, camera, options());
+      for (const uint64_t memory : {least, least + (3 << 20), least + (40 << 20)})
+        for (const unsigned threads : {1u, 3u}) {
+          FrameOptions wanted = options();
+          wanted.memory_bytes = memory;
+          wanted.threads = threads;
+          FrameStatistics statistics;
+          EXPECT_EQ(renderer.render(camera, wanted, statistics).rgba, expected.rgba)
+              << memory << ' ' << threads;
+          most_slabs = std::max(most_slabs, statistics.slabs);
+          again = std::max(again, statistics.bricks_again);
+          EXPECT_LE(statistics.cache_peak_bytes + statistics.pager_peak_bytes + statistics.ring_peak_bytes +
+                        statistics.sweep_peak_bytes,
+                    memory);
+        }
+    }
+  }
+  EXPECT_GT(most_slabs, 2u);
+  EXPECT_GT(again, 10u);
+}
+
+// What stands in for a damaged brick, too; and each is reported once.
+TEST_P(FrameOrderTest, IsTheSameInSlabsWhereBricksAreDamaged) {
+  if (GetParam() == Backend::kEgl) GTEST_SKIP() << "as OSMesa's";
+  TemporaryFolder folder;
+  writeRandomCache(folder / "damaged.splats", 5, 30000);
+  const CacheReader cache(folder / "damaged.splats");
+  for (const size_t from_end : {1u, 8u, 20u}) {
+    std::fstream file(cache.geometryPath(), std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(cache.bricks()[cache.bricks().size() - from_end].geometry.offset));
+    file.put('\x55').put('\x5a').put('\xa5');
+  }
+  FrameRenderer renderer(cache, 0, function(cache), GetParam());
+  const Camera camera = looking(cache, {0, 0, 1});
+  FrameOptions wanted = options();
+  wanted.keep_going = true;
+  FrameStatistics statistics;
+  const Image image = renderer.render(camera, wanted, statistics);
+  EXPECT_EQ(statistics.slabs, 1u);
+  EXPECT_EQ(statistics.bricks_unreadable.size(), 3u);
+  const uint64_t splats = statistics.splats_drawn;
+  wanted.memory_bytes = leastMemory(renderer, camera, wanted);
+  for (const unsigned threads : {1u, 2u}) {
+    wanted.threads = threads;
+    EXPECT_EQ(renderer.render(camera, wanted, statistics).rgba, image.rgba);
+    EXPECT_GT(statistics.slabs, 1u);
+    EXPECT_EQ(statistics.bricks_unreadable.size(), 3u);
+    EXPECT_EQ(statistics.splats_drawn, splats);
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat
