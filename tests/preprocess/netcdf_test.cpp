@@ -412,7 +412,7 @@ TEST_P(Netcdf, LengthsAreFlat) {
   EXPECT_EQ(nodes.y, (std::vector<double>{3, 3, 3, 3}));
   EXPECT_EQ(nodes.z, (std::vector<double>{-0.25, -0.25, -0.25, -0.25}));
   options_.globe.shape = GlobeOptions::Shape::kSphere;
-  EXPECT_NE(errorOf().find("x and y are lengths, not degrees"), std::string::npos) << errorOf();
+  EXPECT_NE(errorOf().find("x and y are lengths; --sphere needs degrees"), std::string::npos) << errorOf();
 }
 
 TEST_P(Netcdf, WhatIsNoGridIsSaid) {

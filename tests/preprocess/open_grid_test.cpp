@@ -68,7 +68,7 @@ TEST_F(OpenGrid, RefusesUnknownScalarsWithTheListOfThem) {
   EXPECT_EQ(scalarsNamed(source->description(), {"2"}), Positions{1});
   for (const char* name : {"rho", "0", "3", "-1", "1.5", ""}) {
     const std::string error = usageErrorOf(source->description(), {name});
-    EXPECT_NE(error.find("there are p (1), T (2)"), std::string::npos) << error;
+    EXPECT_NE(error.find("available: p (1), T (2)"), std::string::npos) << error;
   }
   EXPECT_NE(usageErrorOf(source->description(), {"T", "2"}).find("twice"), std::string::npos);
   EXPECT_NE(usageErrorOf(open({})->description(), {}).find("the files contain no scalar"), std::string::npos);
@@ -80,7 +80,7 @@ TEST_F(OpenGrid, NamesThatClashCarryTheirFile) {
   EXPECT_EQ(names({"a.fun", "b.fun"}), (std::vector<std::string>{"a:1", "a:2", "b:1", "b:2", "3"}));
   const auto source = open({"a.fun", "b.fun"});
   EXPECT_EQ(scalarsNamed(source->description(), {"b:2", "3"}), (Positions{3, 4}));
-  EXPECT_NE(usageErrorOf(source->description(), {"1"}).find("several"), std::string::npos);
+  EXPECT_NE(usageErrorOf(source->description(), {"1"}).find("ambiguous"), std::string::npos);
   EXPECT_THROW(open({"a.fun", "a.fun"}), Error);
 }
 

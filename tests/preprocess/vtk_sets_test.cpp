@@ -144,7 +144,7 @@ TEST(VtkSets, PiecesElsewhereThanTheyShouldBeAreRefused) {
   EXPECT_NE(written("<Piece Extent='0 3 0 3 0 3'/>").find("without Source"), std::string::npos);
   EXPECT_NE(written("").find("no structured grid"), std::string::npos);
   folder.write("a.vts", setOf("RectilinearGrid", ""));
-  EXPECT_NE(written("<Piece Extent='0 3 0 3 0 3' Source='a.vts'/>").find("is a piece of a PStructuredGrid"),
+  EXPECT_NE(written("<Piece Extent='0 3 0 3 0 3' Source='a.vts'/>").find("belongs to a PStructuredGrid"),
             std::string::npos);
 }
 
