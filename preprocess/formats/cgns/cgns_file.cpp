@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::string_view kHdf5Mark = "\x89HDF\r\n\x1a\n";
 // Names and labels have at most 32 characters, but libcgns copies whatever length a damaged file has.
-constexpr size_t kTextRoom = 4096;
+constexpr size_t kTextBytes = 4096;
 // Elements that are read from an ADF file at a time; their types are converted here.
 constexpr uint64_t kPieceElements = 1 << 16;
 // Limit for arrays that are read whole: times, units, names.
@@ -30,7 +30,7 @@ constexpr uint64_t kMinNodeBytes = 32;
 constexpr int kMaxDimensions = 12;
 
 std::string lastMessage() {
-  char message[kTextRoom] = {};
+  char message[kTextBytes] = {};
   cgio_error_message(message);
   std::string text = message;
   while (!text.empty() && (text.back() == '\n' || text.back() == ' ' || text.back() == '.')) text.pop_back();
@@ -184,7 +184,7 @@ std::vector<CgnsNode> CgnsFile::children(const CgnsNode& node) const {
   std::vector<CgnsNode> nodes;
   std::string error;
   for (const double id : ids) {
-    char name[kTextRoom] = {}, label[kTextRoom] = {};
+    char name[kTextBytes] = {}, label[kTextBytes] = {};
     int link_length = 0;
     // The target of a link may be missing; that is an Error only when its data are read.
     const bool readable = cgio_get_name(file_, id, name) == CGIO_ERR_NONE &&
@@ -201,7 +201,7 @@ std::vector<CgnsNode> CgnsFile::children(const CgnsNode& node) const {
 }
 
 CgnsShape CgnsFile::storedShape(const OpenNode& open, const CgnsNode& node) const {
-  char type[kTextRoom] = {};
+  char type[kTextBytes] = {};
   if (cgio_get_data_type(file_, open.id(), type) != CGIO_ERR_NONE) fail(node.path);
   CgnsShape shape{type, {}};
   if (shape.type == "MT" || shape.type == "LK") return {"MT", {}};

@@ -53,7 +53,7 @@ class TreeReader {
   const CgnsFile& file_;
   uint32_t step_;
   CgnsTree tree_;
-  std::optional<std::vector<double>> told_times_;            // from BaseIterativeData
+  std::optional<std::vector<double>> stored_times_;          // from BaseIterativeData
   size_t implied_steps_ = 1;                                 // from the order of the solutions
   std::map<std::string, std::vector<std::string>> omitted_;  // reason -> zones
 };
@@ -68,8 +68,8 @@ CgnsTree TreeReader::read() {
   if (!any)
     throw Error("{}: has no CGNSBase_t node; expected a CGNS file with at least one base",
                 file_.path().string());
-  if (told_times_) {
-    tree_.times = *told_times_;
+  if (stored_times_) {
+    tree_.times = *stored_times_;
   } else if (implied_steps_ > 1) {
     for (size_t n = 0; n < implied_steps_; ++n) tree_.times.push_back(static_cast<double>(n));
   }
@@ -94,7 +94,7 @@ void TreeReader::readBase(const CgnsNode& base) {
   }
   const UnitContext units = below(children, {});
   const CgnsSteps steps = readCgnsSteps(file_, children);
-  if (steps.count > 0 && !told_times_) told_times_ = steps.times;
+  if (steps.count > 0 && !stored_times_) stored_times_ = steps.times;
   const size_t before = tree_.zones.size();
   for (const CgnsNode& node : children)
     if (node.label == "Zone_t" && steps.has(node.name, step_)) readZone(base, node, units, steps);

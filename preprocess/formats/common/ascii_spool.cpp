@@ -19,7 +19,7 @@ namespace {
 constexpr size_t kChunkBytes = size_t{1} << 20;
 constexpr size_t kDigitSamples = 100'000;
 // Repeat counts beyond this are checked against the free space first: a wrong one would fill the disk.
-constexpr uint64_t kUnsuspiciousRepeats = 1'000'000;
+constexpr uint64_t kMaxUncheckedRepeats = 1'000'000;
 
 bool isSpace(char c) {
   return c == ' ' || (c >= '\t' && c <= '\r');
@@ -136,7 +136,7 @@ class Spooler {
         significant_digits_ =
             std::max(significant_digits_, significantDigits({number, static_cast<size_t>(stop - number)}));
       }
-      if (repeats > kUnsuspiciousRepeats) checkSpaceFor(repeats, lineOf(begin, at));
+      if (repeats > kMaxUncheckedRepeats) checkSpaceFor(repeats, lineOf(begin, at));
       for (; repeats > 0; --repeats) put(value);
       at = stop;
     }

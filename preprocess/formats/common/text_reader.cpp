@@ -10,7 +10,7 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kBufferBytes = size_t{256} << 10;
-constexpr size_t kLongestLine = size_t{64} << 10;  // also limits a word
+constexpr size_t kMaxLineBytes = size_t{64} << 10;  // also limits a word
 
 bool isSpace(char c) {
   return c == ' ' || (c >= '\t' && c <= '\r');
@@ -58,10 +58,10 @@ bool TextReader::skipSpace() {
 
 std::string_view TextReader::peekWord() {
   if (!skipSpace()) return {};
-  if (filled_ - at_ <= kLongestLine && buffer_offset_ + filled_ < end_) refill();
+  if (filled_ - at_ <= kMaxLineBytes && buffer_offset_ + filled_ < end_) refill();
   size_t stop = at_;
-  while (stop < filled_ && stop - at_ <= kLongestLine && !isSpace(buffer_[stop])) ++stop;
-  if (stop - at_ > kLongestLine)
+  while (stop < filled_ && stop - at_ <= kMaxLineBytes && !isSpace(buffer_[stop])) ++stop;
+  if (stop - at_ > kMaxLineBytes)
     throw Error("{}: byte {}: found {} characters without a space; expected a word or a number",
                 file_->name(), offset(), stop - at_);
   return {&buffer_[at_], stop - at_};
@@ -75,11 +75,11 @@ std::string_view TextReader::word() {
 
 std::optional<std::string_view> TextReader::line() {
   if (offset() >= end_) return std::nullopt;
-  if (filled_ - at_ <= kLongestLine && buffer_offset_ + filled_ < end_) refill();
+  if (filled_ - at_ <= kMaxLineBytes && buffer_offset_ + filled_ < end_) refill();
   const auto* const begin = buffer_.data() + at_;
-  const size_t most = std::min(filled_ - at_, kLongestLine);
+  const size_t most = std::min(filled_ - at_, kMaxLineBytes);
   const auto* const found = static_cast<const char*>(std::memchr(begin, '\n', most));
-  if (!found && most == kLongestLine)
+  if (!found && most == kMaxLineBytes)
     throw Error("{}: byte {}: found no end of line within {} characters", file_->name(), offset(), most);
   size_t length = found ? static_cast<size_t>(found - begin) : most;
   at_ += length + (found ? 1 : 0);

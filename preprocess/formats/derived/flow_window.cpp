@@ -101,27 +101,27 @@ void FlowWindow::copyStored(const NodeBox& whole, std::span<const size_t> to, No
 }
 
 void FlowWindow::computeFlow() {
-  there_.resize(nodes_.x.size());
-  for (size_t n = 0; n < there_.size(); ++n) there_[n] = !nodes_.blank[n] && isFinite(position(n));
+  present_.resize(nodes_.x.size());
+  for (size_t n = 0; n < present_.size(); ++n) present_[n] = !nodes_.blank[n] && isFinite(position(n));
   if (moves_) moveToCentres();
   if (needed_.empty()) return;
-  flow_.resize(there_.size());
+  flow_.resize(present_.size());
   for (size_t n = 0; n < flow_.size(); ++n) flow_[n] = flowAt(n);
 }
 
 /// Works in place, since a centre depends on its own and later elements only.
 void FlowWindow::moveToCentres() {
   const uint64_t rows = window_.j1 - window_.j0, planes = window_.k1 - window_.k0;
-  for (size_t n = 0; n < there_.size(); ++n) {
+  for (size_t n = 0; n < present_.size(); ++n) {
     const bool last = n % row_ + 1 == row_ || n / row_ % rows + 1 == rows || n / plane_ + 1 == planes;
     glm::dvec3 sum(0.0);
     bool there = !last;
     for (size_t corner = 0; corner < 8 && there; ++corner) {
       const size_t at = n + (corner & 1) + (corner >> 1 & 1) * row_ + (corner >> 2) * plane_;
-      there = there_[at];
+      there = present_[at];
       sum += position(at);
     }
-    there_[n] = there;
+    present_[n] = there;
     nodes_.x[n] = sum.x / 8;
     nodes_.y[n] = sum.y / 8;
     nodes_.z[n] = sum.z / 8;
@@ -163,7 +163,7 @@ glm::dmat3 FlowWindow::velocityGradient(size_t n, const std::array<uint64_t, 3>&
   glm::dmat3 steps, differences;  // columns: along the axes
   for (int axis = 0; axis < 3; ++axis) {
     const auto [before, after] = neighbours(
-        n, axis, index[axis], [&](size_t at) { return there_[at] && isFinite(flow_[at].velocity); });
+        n, axis, index[axis], [&](size_t at) { return present_[at] && isFinite(flow_[at].velocity); });
     steps[axis] = position(after) - position(before);
     differences[axis] = flow_[after].velocity - flow_[before].velocity;
   }
@@ -179,7 +179,7 @@ glm::dvec3 FlowWindow::pressureGradient(size_t n, const std::array<uint64_t, 3>&
   glm::dvec3 differences;
   for (int axis = 0; axis < 3; ++axis) {
     const auto [before, after] = neighbours(
-        n, axis, index[axis], [&](size_t at) { return there_[at] && std::isfinite(flow_[at].pressure); });
+        n, axis, index[axis], [&](size_t at) { return present_[at] && std::isfinite(flow_[at].pressure); });
     steps[axis] = position(after) - position(before);
     differences[axis] = flow_[after].pressure - flow_[before].pressure;
   }
@@ -190,7 +190,8 @@ glm::dvec3 FlowWindow::pressureGradient(size_t n, const std::array<uint64_t, 3>&
 double FlowWindow::determinant(size_t n, const std::array<uint64_t, 3>& index) const {
   glm::dmat3 jacobian;
   for (int axis = 0; axis < 3; ++axis) {
-    const auto [before, after] = neighbours(n, axis, index[axis], [&](size_t at) { return there_[at] != 0; });
+    const auto [before, after] =
+        neighbours(n, axis, index[axis], [&](size_t at) { return present_[at] != 0; });
     const double steps = (before != n) && (after != n) ? 0.5 : 1.0;
     jacobian[axis] = steps * (position(after) - position(before));
   }
@@ -211,7 +212,7 @@ void FlowWindow::compute(Quantity quantity, double freestream_mach, const NodeBo
       default:
         break;
     }
-    if (!there_[n]) return kNone;
+    if (!present_[n]) return kNone;
     if (quantity == Quantity::kJacobian) return determinant(n, index);
     if (quantity == Quantity::kVolume) return std::abs(determinant(n, index));
     FlowGradients gradients;

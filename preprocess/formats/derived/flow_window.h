@@ -76,7 +76,7 @@ class FlowWindow {
   size_t row_ = 0, plane_ = 0;
   size_t stored_ = 0;  // number of scalars before the inputs in nodes_
   NodeArrays nodes_;
-  std::vector<uint8_t> there_;
+  std::vector<uint8_t> present_;
   std::vector<FlowState> flow_;
 };
 

@@ -82,7 +82,7 @@ std::optional<CfVertical> CfVertical::byLevels(const NetcdfFile& file, const Net
   CfVertical vertical;
   vertical.scale_ = kilometres.value_or(1e-3) * (growsDownwards(coordinate) ? -1 : 1);
   vertical.terms_.push_back(*term);
-  vertical.words_ = coordinate.name;
+  vertical.description_ = coordinate.name;
   if (!kilometres)
     vertical.warnings_.push_back(fmt::format("{} has no units; metres are assumed", coordinate.name));
   return vertical;
@@ -99,7 +99,7 @@ std::optional<CfVertical> CfVertical::byGeopotential(const NetcdfFile& file, con
   }
   vertical.kind_ = Kind::kGeopotential;
   vertical.scale_ = 1e-3 / kGravity;
-  vertical.words_ = "geopotential PH + PHB";
+  vertical.description_ = "geopotential PH + PHB";
   return vertical;
 }
 
@@ -119,7 +119,7 @@ std::optional<CfVertical> CfVertical::byFormula(const NetcdfFile& file, const Ne
   const std::map<std::string, std::string> terms = formulaTerms(coordinate.text("formula_terms"));
   CfVertical vertical;
   vertical.kind_ = kind->second;
-  vertical.words_ = name + " of " + coordinate.name;
+  vertical.description_ = name + " of " + coordinate.name;
   vertical.s_ = termNamed(file, terms, kind->second == Kind::kSigma ? "sigma" : "s", block);
   vertical.eta_ = termNamed(file, terms, "eta", block);
   vertical.depth_ = termNamed(file, terms, "depth", block);

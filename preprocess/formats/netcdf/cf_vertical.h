@@ -31,7 +31,9 @@ class CfVertical {
   /// `to` and returns true, without a buffer. Else returns false.
   bool readNodes(const NetcdfFile& file, const CfRange& range, std::span<double> to) const;
 
-  const std::string& words() const { return words_; }  // "depth", "ocean_s_coordinate_g2 of s_rho"
+  const std::string& description() const {
+    return description_;
+  }  // "depth", "ocean_s_coordinate_g2 of s_rho"
   const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
@@ -49,7 +51,7 @@ class CfVertical {
   std::vector<CfTerm> terms_;                  // height: one; geopotential: base and perturbation
   std::optional<CfTerm> s_, c_, eta_, depth_;  // terms of a formula
   double depth_c_ = 0, a_ = 0, b_ = 0;
-  std::string words_;
+  std::string description_;
   std::vector<std::string> warnings_;
 };
 

@@ -29,7 +29,7 @@ std::string listed(const std::vector<std::string>& names) {
   return text;
 }
 
-std::string dimensionsInWords(const NetcdfFile& file, const CfGrid& grid) {
+std::string describeDimensions(const NetcdfFile& file, const CfGrid& grid) {
   const auto name = [&](size_t axis) { return file.dimensions()[grid.dims.axes[axis]].name; };
   return fmt::format("{} x {} x {}", name(0), name(1), name(2));
 }
@@ -88,8 +88,8 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFile& file, const OpenGridOptions& o
     if (!position) continue;  // a derived scalar, or a wrong name, which scalarsNamed() reports
     if (!chooser.empty() && position->first != chosen)
       throw Error("{}: {} and {} are on different grids ({} and {}); convert each to a cache of its own",
-                  file.path().string(), chooser, name, dimensionsInWords(file, found.grids[chosen]),
-                  dimensionsInWords(file, found.grids[position->first]));
+                  file.path().string(), chooser, name, describeDimensions(file, found.grids[chosen]),
+                  describeDimensions(file, found.grids[position->first]));
     if (chooser.empty()) mask = position->second;
     chosen = position->first;
     chooser = name;
@@ -100,7 +100,7 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFile& file, const OpenGridOptions& o
     for (const NetcdfVariable* variable : found.grids[g].variables) names.push_back(variable->name);
     description.warnings.push_back(
         fmt::format("left out: {}, on another grid ({}); select that grid with --scalar NAME", listed(names),
-                    dimensionsInWords(file, found.grids[g])));
+                    describeDimensions(file, found.grids[g])));
   }
   for (const auto& [reason, names] : byReason(found.left_out))
     description.warnings.push_back(fmt::format("left out: {}: {}", listed(names), reason));
@@ -130,7 +130,7 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
   description_.time_step = chosenTimeStep(file_.path().string(), description_.times, options.time_step);
 
   const auto length = [&](size_t axis) { return file_.dimensions()[grid_.dims.axes[axis]].length; };
-  description_.blocks.push_back({dimensionsInWords(file_, grid_), length(0), length(1), length(2), true});
+  description_.blocks.push_back({describeDimensions(file_, grid_), length(0), length(1), length(2), true});
   for (const NetcdfVariable* variable : grid_.variables) {
     GridScalar scalar{variable->name, variable->text("units"), {}, 0, Centring::kNode};
     if (const std::string name = simplifiedName(variable->text("standard_name")); !name.empty())
@@ -147,7 +147,7 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
                                 : "flat";
   description_.format = fmt::format("{}, {}, {} {}, vertical {} times {:g}, in km", file_.kind(),
                                     grid_.longitude.variable().name, grid_.latitude.variable().name, shape,
-                                    grid_.vertical.words(), options.globe.vertical_scale);
+                                    grid_.vertical.description(), options.globe.vertical_scale);
   if (grid_.dims.time)
     description_.format +=
         fmt::format(", time step {} of {}", description_.time_step, description_.times.size());

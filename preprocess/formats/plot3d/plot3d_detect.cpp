@@ -171,14 +171,14 @@ class Detection {
                                            [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
     std::string finding = "no header of plausible dimensions was found";
     if (furthest != misfits.end() && furthest->reached >= LayoutMisfit::first_record) {
-      finding = fmt::format("read as {} {}: {}", attemptInWords(furthest->layout),
+      finding = fmt::format("read as {} {}: {}", describeAttempt(furthest->layout),
                             curvisplat::describe(furthest->layout.kind), furthest->reason);
     }
     throw Error("{}: its {} bytes fit no PLOT3D {}: {}{}", path_, file_size_, expected, finding, hint());
   }
 
   /// Describes only the properties that are decided before sizes are compared.
-  static std::string attemptInWords(const Plot3dLayout& layout) {
+  static std::string describeAttempt(const Plot3dLayout& layout) {
     std::string words = layout.ascii                           ? "ASCII"
                         : layout.byte_order == ByteOrder::kBig ? "big-endian"
                                                                : "little-endian";

@@ -23,13 +23,13 @@ struct Table {
 
 /// The largest size that `packed` bytes can decompress to. zlib: the ratio in its documentation; LZ4: each
 /// further byte of a length encodes up to 255 bytes.
-uint64_t mostUnpacked(BlockCompressor compressor, uint64_t packed) {
+uint64_t maxUnpackedBytes(BlockCompressor compressor, uint64_t packed) {
   const uint64_t ratio = compressor == BlockCompressor::kZlib ? 1032 : 255;
   return packed > UINT64_MAX / ratio - 64 ? UINT64_MAX : packed * ratio + 64;
 }
 
 /// Upper bound of the compressed size of incompressible data.
-uint64_t mostPacked(uint64_t unpacked) {
+uint64_t maxPackedBytes(uint64_t unpacked) {
   return unpacked + unpacked / 8 + 1024;
 }
 
@@ -37,10 +37,10 @@ Table readTable(const CompressedBytes::Parts& parts, uint64_t size) {
   const HeaderIntegers& integers = parts.integers;
   Table table{integers.at(*parts.table, 0), integers.at(*parts.table, integers.bytes),
               integers.at(*parts.table, 2 * integers.bytes)};
-  const uint64_t room = parts.table->size() / integers.bytes;
-  if (table.blocks == 0 || table.blocks > room - 3)
+  const uint64_t slots = parts.table->size() / integers.bytes;
+  if (table.blocks == 0 || table.blocks > slots - 3)
     throw Error("{}: its header declares {} compressed blocks, but at most {} fit; the file is damaged",
-                parts.place, table.blocks, room - 3);
+                parts.place, table.blocks, slots - 3);
   if (table.last_bytes == 0) table.last_bytes = table.block_bytes;
   const bool overflows = table.block_bytes == 0 || table.last_bytes > table.block_bytes ||
                          table.blocks > UINT64_MAX / table.block_bytes;
@@ -63,8 +63,8 @@ void forEachBlock(const CompressedBytes::Parts& parts, const Table& table, const
     for (uint64_t n = 0; n < count; ++n) {
       const uint64_t bytes = integers.at(std::span(piece).subspan(static_cast<size_t>(n * integers.bytes)));
       const uint64_t unpacked = first + n + 1 == table.blocks ? table.last_bytes : table.block_bytes;
-      if (bytes > parts.blocks->size() - offset || bytes > mostPacked(unpacked) ||
-          mostUnpacked(parts.compressor, bytes) < unpacked)
+      if (bytes > parts.blocks->size() - offset || bytes > maxPackedBytes(unpacked) ||
+          maxUnpackedBytes(parts.compressor, bytes) < unpacked)
         throw Error("{}: block {} of {} bytes, compressed to {}, does not fit the {} bytes left in the file",
                     parts.place, first + n, unpacked, bytes, parts.blocks->size() - offset);
       visit(first + n, offset, bytes);
@@ -218,7 +218,7 @@ std::span<const std::byte> CompressedBytes::unpacked(uint64_t block) const {
   if (kept.id == id_ && kept.block == block) return kept.bytes;
   kept.id = 0;
   const Place place = placeOf(block);
-  if (place.bytes > mostPacked(bytesOf(block))) failBlock(parts_.place, block, "the file has changed");
+  if (place.bytes > maxPackedBytes(bytesOf(block))) failBlock(parts_.place, block, "the file has changed");
   kept.packed.resize(static_cast<size_t>(place.bytes));
   kept.bytes.resize(static_cast<size_t>(bytesOf(block)));
   parts_.blocks->readAt(place.offset, kept.packed);

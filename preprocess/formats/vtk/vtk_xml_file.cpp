@@ -121,13 +121,13 @@ std::vector<double> VtkXmlFile::numbers(const pugi::xml_node& node, const char* 
 
 std::optional<VtkExtent> VtkXmlFile::extent(const pugi::xml_node& node, const char* attribute) const {
   // Sums and products of a few of them stay below 2^63.
-  constexpr int64_t kFarthest = int64_t{1} << 30;
+  constexpr int64_t kMaxIndex = int64_t{1} << 30;
   constexpr double kMaxNodes = 1e14;
   std::string_view text = node.attribute(attribute).value();
   std::array<int64_t, 6> ends{};
   bool good = true;
   for (int64_t& end : ends)
-    good = good && parseInteger(takeWord(text), end) && -kFarthest < end && end < kFarthest;
+    good = good && parseInteger(takeWord(text), end) && -kMaxIndex < end && end < kMaxIndex;
   if (good && takeWord(text).empty() && ends == std::array<int64_t, 6>{0, -1, 0, -1, 0, -1})
     return std::nullopt;
   VtkExtent extent{{ends[0], ends[2], ends[4]}, {ends[1], ends[3], ends[5]}};

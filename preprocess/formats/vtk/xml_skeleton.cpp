@@ -13,9 +13,9 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kBufferBytes = size_t{256} << 10;
-constexpr size_t kLargestSkeleton = size_t{16} << 20;
-constexpr size_t kLargestTag = size_t{64} << 10;
-constexpr size_t kDeepest = 64;
+constexpr size_t kMaxMarkupBytes = size_t{16} << 20;
+constexpr size_t kMaxTagBytes = size_t{64} << 10;
+constexpr size_t kMaxDepth = 64;
 
 bool isSpace(char c) {
   return c == ' ' || (c >= '\t' && c <= '\r');
@@ -33,9 +33,9 @@ class Scanner {
         throw Error("{}: byte {}: found {}, which is not allowed in a VTK file", file_.name(), at_,
                     tag.substr(0, std::min<size_t>(30, tag.find_first_of(" [>"))));
       if (!nest(tag)) break;
-      if (skeleton_.text.size() > kLargestSkeleton)
+      if (skeleton_.text.size() > kMaxMarkupBytes)
         throw Error("{}: has more than {} bytes of XML tags; expected fewer pieces or arrays in one file",
-                    file_.name(), kLargestSkeleton);
+                    file_.name(), kMaxMarkupBytes);
     }
     if (skeleton_.text.empty()) throw Error("{}: has no XML element", file_.name());
     return std::move(skeleton_);
@@ -91,8 +91,8 @@ class Scanner {
       const char c = available().front();
       ++at_;
       tag += c;
-      if (tag.size() > kLargestTag)
-        throw Error("{}: byte {}: found a tag of more than {} characters", file_.name(), at_, kLargestTag);
+      if (tag.size() > kMaxTagBytes)
+        throw Error("{}: byte {}: found a tag of more than {} characters", file_.name(), at_, kMaxTagBytes);
       const bool comment = tag.starts_with("<!--");
       if (c == '>' && quote == 0 && (!comment || (tag.size() >= 7 && tag.ends_with("-->")))) return;
       if (comment) continue;
@@ -119,8 +119,8 @@ class Scanner {
     skeleton_.text += tag;
     if (tag[tag.size() - 2] == '/') return !open_.empty();
     open_.push_back(name);
-    if (open_.size() > kDeepest)
-      throw Error("{}: byte {}: elements are nested more than {} deep", file_.name(), at_, kDeepest);
+    if (open_.size() > kMaxDepth)
+      throw Error("{}: byte {}: elements are nested more than {} deep", file_.name(), at_, kMaxDepth);
     if (name != "AppendedData") return true;
     findAppendedData();
     for (; !open_.empty(); open_.pop_back()) skeleton_.text += "</" + open_.back() + ">";
