@@ -12,6 +12,7 @@
 #include <numeric>
 
 #include "preprocess/formats/common/data_library_lock.h"
+#include "preprocess/formats/netcdf/netcdf4_structure.h"
 #include "preprocess/formats/netcdf/netcdf_classic.h"
 #include "stream/base/check.h"
 #include "stream/base/error.h"
@@ -109,7 +110,10 @@ NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
   const uint64_t bytes = file.size();
   std::array<char, 4> begin{};
   if (bytes >= begin.size()) file.readAt(0, std::span<char>(begin));
-  if (isClassic({begin.data(), begin.size()})) checkClassicNetcdf(file);
+  if (isClassic({begin.data(), begin.size()}))
+    checkClassicNetcdf(file);
+  else
+    checkNetcdf4Structure(path);
   const std::lock_guard lock(dataLibraryMutex());
   nc_set_chunk_cache(kChunkCacheBytes, kChunkCacheSlots, kChunkCachePreemption);
   // NetCDF takes some relative paths for URLs.
