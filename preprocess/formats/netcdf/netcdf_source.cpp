@@ -137,6 +137,9 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
       scalar.aliases.push_back(name);
     description_.scalars.push_back(std::move(scalar));
   }
+  if (const std::string missing = file_.missingValues(*grid_.variables[mask_]); !missing.empty())
+    description_.blanking =
+        fmt::format("{} is missing where it is {}", grid_.variables[mask_]->name, missing);
   description_.coordinate_bytes =
       std::max(grid_.longitude.variable().value_bytes, grid_.latitude.variable().value_bytes) > 4 ? 8 : 4;
   for (const std::string& warning : grid_.vertical.warnings()) description_.warnings.push_back(warning);
