@@ -118,13 +118,17 @@ NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
   if (isClassic({begin.data(), begin.size()}))
     checkClassicNetcdf(file);
   else
-    checkNetcdf4Structure(path);
+    plain_hdf5_ = !checkNetcdf4Structure(path).netcdf4;
   const std::lock_guard lock(dataLibraryMutex());
   nc_set_chunk_cache(kChunkCacheBytes, kChunkCacheSlots, kChunkCachePreemption);
   // NetCDF takes some relative paths for URLs.
   const std::filesystem::path absolute = std::filesystem::absolute(path);
-  if (const int status = nc_open(absolute.c_str(), NC_NOWRITE, &file_); status != NC_NOERR)
+  if (const int status = nc_open(absolute.c_str(), NC_NOWRITE, &file_); status != NC_NOERR) {
+    if (plain_hdf5_)
+      throw Error("{}: is an HDF5 file, but neither NetCDF-4 nor CGNS ({}); expected one of these",
+                  path_.string(), nc_strerror(status));
     fail("the file", status);
+  }
   try {
     readHeader();
     if (kind_ == kNetcdf4) checkSizes(bytes);
@@ -326,6 +330,32 @@ const NetcdfVariable* NetcdfFile::find(std::string_view name) const {
   for (const NetcdfVariable& variable : variables_)
     if (variable.name == name) return &variable;
   return nullptr;
+}
+
+std::string NetcdfFile::text(const char* attribute) const {
+  const std::lock_guard lock(dataLibraryMutex());
+  nc_type type = NC_NAT;
+  size_t length = 0;
+  if (nc_inq_att(file_, NC_GLOBAL, attribute, &type, &length) != NC_NOERR || length > kMaxAttributeValues)
+    return "";
+  std::string text;
+  if (type == NC_CHAR) {
+    text.resize(length);
+    if (nc_get_att_text(file_, NC_GLOBAL, attribute, text.data()) != NC_NOERR) return "";
+    text.resize(std::min(text.find('\0'), text.size()));
+  } else if (type == NC_STRING && length == 1) {
+    char* stored = nullptr;
+    if (nc_get_att_string(file_, NC_GLOBAL, attribute, &stored) != NC_NOERR) return "";
+    if (stored) text = stored;
+    nc_free_string(1, &stored);
+  }
+  return text;
+}
+
+bool NetcdfFile::hasAttribute(const char* attribute) const {
+  const std::lock_guard lock(dataLibraryMutex());
+  int id = 0;
+  return nc_inq_attid(file_, NC_GLOBAL, attribute, &id) == NC_NOERR;
 }
 
 const NetcdfDimension& NetcdfFile::dimension(const NetcdfVariable& variable, size_t axis) const {

@@ -64,9 +64,14 @@ class NetcdfFile {
 
   const std::filesystem::path& path() const { return path_; }
   const std::string& kind() const { return kind_; }  // "NetCDF classic", "NetCDF-4"
+  /// Whether it is an HDF5 file that was not written as NetCDF-4.
+  bool plainHdf5() const { return plain_hdf5_; }
   const std::vector<NetcdfDimension>& dimensions() const { return dimensions_; }
   const std::vector<NetcdfVariable>& variables() const { return variables_; }
   const NetcdfVariable* find(std::string_view name) const;
+  /// The text of an attribute of the file; empty if there is none, or if it is not text.
+  std::string text(const char* attribute) const;
+  bool hasAttribute(const char* attribute) const;
   /// Which stored values of a variable read() replaces by NaN, in words; empty if none.
   std::string missingValues(const NetcdfVariable& variable) const;
   const NetcdfDimension& dimension(const NetcdfVariable& variable, size_t axis) const;
@@ -102,6 +107,7 @@ class NetcdfFile {
   std::filesystem::path path_;
   int file_ = 0;
   std::string kind_;
+  bool plain_hdf5_ = false;
   std::vector<NetcdfDimension> dimensions_;
   std::vector<NetcdfVariable> variables_;
   std::vector<Packing> packings_;  // [variable]

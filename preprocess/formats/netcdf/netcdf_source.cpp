@@ -7,6 +7,7 @@
 #include <map>
 
 #include "preprocess/formats/netcdf/cf_roles.h"
+#include "preprocess/formats/netcdf/foreign_netcdf.h"
 #include "preprocess/grid/scalar_names.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/check.h"
@@ -71,6 +72,8 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFile& file, const OpenGridOptions& o
                                 GridDescription& description, size_t& mask) {
   CfGrids found = findCfGrids(file, options.time_step.value_or(0));
   if (found.grids.empty()) {
+    if (const auto format = foreignNetcdf(file))
+      throw Error("{}: is {}; only structured (curvilinear) grids are read", file.path().string(), *format);
     std::string why = "no variable has three dimensions in space";
     if (!found.left_out.empty()) {
       const auto reasons = byReason(found.left_out);
