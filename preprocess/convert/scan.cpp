@@ -64,9 +64,10 @@ void checkExtent(const GridSurvey& survey, const NodeReader& reader) {
   if (survey.nodes == survey.blanked.total())
     throw Error(
         "{}: every one of the {} {} is blanked ({} by the grid, {} by value, {} not finite): there is "
-        "nothing to draw",
+        "nothing to draw{}",
         file, survey.nodes, reader.centring() == Centring::kCell ? "cells" : "nodes", survey.blanked.by_grid,
-        survey.blanked.by_value, survey.blanked.not_finite);
+        survey.blanked.by_value, survey.blanked.not_finite,
+        survey.blanked.by_grid > 0 && !description.blanking.empty() ? "; " + description.blanking : "");
   const glm::dvec3 extent = survey.upper - survey.lower;
   const double largest = std::max({extent.x, extent.y, extent.z});
   if (largest > 0 && !(largest >= kSmallestExtent && largest <= kLargestExtent))

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <thread>
 
+#include "preprocess/convert/scan.h"
 #include "preprocess/formats/open/open_grid.h"
 #include "stream/base/error.h"
 #include "tests/support/earth_files.h"
@@ -392,6 +393,56 @@ TEST_P(Netcdf, MissingValuesOfEachKindAreBlank) {
   EXPECT_EQ(valuesOf("value"), "0......7");
   EXPECT_EQ(valuesOf("ranged"), "..2345..");
   EXPECT_EQ(valuesOf("filled"), "012.4567");
+}
+
+TEST_P(Netcdf, ARangeInUnpackedUnitsBlanksUnpackedValues) {
+  // Stored n is 273.15 + 0.01 n (or minus): unpacked ranges of the scale's type leave 2 to 5.
+  const auto drawn = [&](double scale, const NetcdfAttributes& range) {
+    {
+      NetcdfWriter file(path_, GetParam());
+      addAxes(file, 8, 2, 2);
+      NetcdfAttributes attributes = range;
+      attributes.push_back({"scale_factor", NetcdfDoubleList{{scale}}});
+      attributes.push_back({"add_offset", NetcdfDoubleList{{273.15}}});
+      file.variable("t", NetcdfNumbers::kInt16, {"alt", "lat", "lon"}, attributes,
+                    [](const Index& n) { return static_cast<double>(n[2]); });
+    }
+    const auto source = open();
+    const uint32_t scalar = 0;
+    NodeArrays nodes;
+    source->read(0, {0, 1, 0, 1}, std::span(&scalar, 1), nodes);
+    std::string there;
+    for (size_t n = 0; n < nodes.blank.size(); ++n)
+      there += nodes.blank[n] ? '.' : static_cast<char>('0' + n);
+    return there;
+  };
+  EXPECT_EQ(drawn(0.01, {{"valid_range", NetcdfDoubleList{{273.17, 273.2}}}}), "..2345..");
+  EXPECT_EQ(drawn(0.01, {{"valid_min", NetcdfDoubleList{{273.17}}}}), "..234567");
+  EXPECT_EQ(drawn(0.01, {{"valid_max", NetcdfDoubleList{{273.2}}}}), "012345..");
+  EXPECT_EQ(drawn(-0.01, {{"valid_range", NetcdfDoubleList{{273.1, 273.13}}}}), "..2345..");
+  // In the type of the variable a range is of stored values.
+  EXPECT_EQ(drawn(0.01, {{"valid_range", NetcdfNumberList{2, 5}}}), "..2345..");
+  EXPECT_EQ(drawn(0.01, {{"valid_range", NetcdfDoubleList{{200, 300}}}}), "01234567");
+}
+
+TEST_P(Netcdf, AGridWithoutAnyValueSaysWhy) {
+  {
+    NetcdfWriter file(path_, GetParam());
+    addAxes(file, 4, 3, 2);
+    file.variable("t", kSingle, {"alt", "lat", "lon"}, {{"valid_min", NetcdfNumberList{200}}},
+                  [](const Index&) { return 7.0; });
+  }
+  const auto source = open();
+  const NodeReader reader(*source, {0}, std::nullopt);
+  Progress progress;
+  try {
+    surveyGrid(reader, 1 << 20, nullptr, progress);
+    FAIL();
+  } catch (const Error& error) {
+    const std::string words = error.what();
+    EXPECT_NE(words.find("every one of the 24 nodes is blanked"), std::string::npos) << words;
+    EXPECT_NE(words.find("t is missing where it is below valid_min 200"), std::string::npos) << words;
+  }
 }
 
 TEST_P(Netcdf, LengthsAreFlat) {

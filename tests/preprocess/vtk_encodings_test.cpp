@@ -259,6 +259,27 @@ TEST(VtkEncodings, WhatIsNotReadIsRefusedByName) {
   }
 }
 
+TEST(VtkEncodings, ArraysThatAreNotDrawnDoNotStopTheOthers) {
+  const TestFolder folder("vts-not-drawn");
+  VtsGrid grid = annulusVtsGrid(3, 3, 3);
+  grid.point_data = {{"a", "Float32", 1, std::vector<double>(27, 5)}};
+  grid.cell_data.clear();
+  std::string file = vtsFile(grid, {});
+  const std::string begin = "<PointData>";
+  ASSERT_NE(file.find(begin), std::string::npos) << file.substr(0, 1000);
+  file.insert(file.find(begin) + begin.size(),
+              "<DataArray type=\"Bit\" Name=\"flags\" format=\"appended\" offset=\"0\"/>"
+              "<DataArray type=\"Float16\" Name=\"halves\" format=\"appended\" offset=\"0\"/>"
+              "<Array type=\"String\" Name=\"words\" format=\"appended\" offset=\"0\"/>");
+  const auto source = openText(folder, file);
+  EXPECT_EQ(source->description().scalars.size(), 1u);
+  EXPECT_EQ(
+      source->description().warnings,
+      (std::vector<std::string>{"left out: array flags of the points has type Bit, which is not drawn",
+                                "left out: array halves of the points has type Float16, which is not drawn",
+                                "left out: array words of the points has type String, which is not drawn"}));
+}
+
 TEST(VtkEncodings, TextsMustHaveAsManyNumbersAsTheGrid) {
   const TestFolder folder("vts-texts");
   VtsEncoding ascii;

@@ -100,6 +100,40 @@ TEST_F(VtkLegacy, BinaryStringsArePassedOver) {
   }
 }
 
+TEST_F(VtkLegacy, ArraysThatAreNotDrawnDoNotStopTheOthers) {
+  const auto expectOthers = [&](const std::string& content, const std::string& head) {
+    const auto source = open(content, head);
+    EXPECT_EQ(names(*source), (std::vector<std::string>{"p", "q"}));
+    EXPECT_EQ(
+        source->description().warnings,
+        (std::vector<std::string>{"left out: array flags of the points has type bit, which is not drawn",
+                                  "left out: array words of the points has type string, which is not drawn",
+                                  "left out: array two of the cells has type bit, which is not drawn"}));
+    EXPECT_EQ(allNodes(*source, 0).scalars[0][11], 11);
+    EXPECT_EQ(allNodes(*source, 0).scalars[1][11], 12);
+  };
+  const std::string bits = "0 1 0 1 0 1 0 1 0 1 1 1\n";
+  std::string words;
+  for (int n = 0; n < 12; ++n) words += "word\n";
+  expectOthers(
+      uniform_ + "POINT_DATA 12\nSCALARS flags bit 1\nLOOKUP_TABLE default\n" + bits +
+          "FIELD more 3\nwords 1 12 string\n" + words + "p 1 12 short\n" + twelve_ +
+          "q 1 12 short\n1 2 3 4 5 6 7 8 9 10 11 12\nCELL_DATA 2\nFIELD f 1\ntwo 3 2 bit\n1 0 1 0 1 0\n",
+      "ASCII");
+  std::vector<double> p, q;
+  for (int n = 0; n < 12; ++n) {
+    p.push_back(n);
+    q.push_back(n + 1);
+  }
+  std::string packed_words;
+  for (int n = 0; n < 12; ++n) packed_words += "\xc4word";
+  expectOthers(uniform_ + "POINT_DATA 12\nSCALARS flags bit 1\nLOOKUP_TABLE default\n" + "\x55\x70" +
+                   "\nFIELD more 3\nwords 1 12 string\n" + packed_words + "\np 1 12 short\n" +
+                   packedNumbers(p, "Int16", true) + "\nq 1 12 short\n" + packedNumbers(q, "Int16", true) +
+                   "\nCELL_DATA 2\nFIELD f 1\ntwo 3 2 bit\n\xa8\n",
+               "BINARY");
+}
+
 TEST_F(VtkLegacy, PartsThatLieAreNamed) {
   const std::string grid = "DATASET STRUCTURED_GRID\n";
   const std::string rectilinear =
@@ -128,6 +162,7 @@ TEST_F(VtkLegacy, PartsThatLieAreNamed) {
       {uniform_ + "POINT_DATA 12\nSCALARS p\n" + twelve_, "without a type"},
       {uniform_ + "POINT_DATA 12\nSCALERS p float\n", "found \"scalers\"; expected SCALARS"},
       {uniform_ + "POINT_DATA 12\nSCALARS p float\n0 1 2 3 4 5 6 7 8 9 10\n", "is truncated"},
+      {uniform_ + "POINT_DATA 12\nSCALARS b bit 4000\n0 1\n", "b needs 12 x 4000 bits"},
       {"FIELD f 9999999\n", "ends where a name was expected"},
       {uniform_ + "SPACING 1 1 nan\n", "has spacing nan"},
   };

@@ -76,6 +76,11 @@ void NetcdfWriter::variable(const std::string& name, NetcdfNumbers numbers,
       check(nc_put_att_text(file_, id, key.c_str(), text->size(), text->data()));
       continue;
     }
+    if (const auto* const doubles = std::get_if<NetcdfDoubleList>(&attribute)) {
+      const auto& values = doubles->values;
+      check(nc_put_att_double(file_, id, key.c_str(), NC_DOUBLE, values.size(), values.data()));
+      continue;
+    }
     const auto& list = std::get<NetcdfNumberList>(attribute);
     // How to unpack is told in what it is unpacked to.
     const bool packing = key == "scale_factor" || key == "add_offset";

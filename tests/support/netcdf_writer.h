@@ -16,9 +16,12 @@ enum class NetcdfFileType { kClassic, kNetcdf4, kNetcdf4Compressed };
 enum class NetcdfNumbers { kInt16, kInt32, kSinglePrecision, kDoublePrecision };
 
 using NetcdfText = std::string;
-using NetcdfNumberList = std::vector<double>;
-/// Numbers are written in the type of their variable.
-using NetcdfAttributes = std::vector<std::pair<std::string, std::variant<NetcdfText, NetcdfNumberList>>>;
+using NetcdfNumberList = std::vector<double>;  // written in the type of the variable
+struct NetcdfDoubleList {                      // written as doubles
+  std::vector<double> values;
+};
+using NetcdfAttributes =
+    std::vector<std::pair<std::string, std::variant<NetcdfText, NetcdfNumberList, NetcdfDoubleList>>>;
 /// Of the indices along the variable's dimensions, the slowest first.
 using NetcdfFunction = std::function<double(const std::vector<size_t>&)>;
 

@@ -5,6 +5,7 @@
 #include <exception>
 #include <optional>
 
+#include "preprocess/formats/common/hdf5_attribute.h"
 #include "stream/base/check.h"
 #include "stream/base/error.h"
 
@@ -21,21 +22,6 @@ constexpr int kMaxLinks = 100;
 // Smallest size of a node in a file: a link, and a group with three attributes.
 constexpr uint64_t kMinNodeBytes = 32;
 constexpr uint64_t kSmallFileNodes = 4096;
-
-/// The innermost entry of HDF5's error stack after a failed call.
-std::string hdf5Reason() {
-  std::string reason;
-  const auto first = [](unsigned, const H5E_error2_t* error, void* text) -> herr_t {
-    try {
-      *static_cast<std::string*>(text) = error->desc ? error->desc : "";
-      return 1;
-    } catch (const std::exception&) {
-      return -1;
-    }
-  };
-  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, first, &reason);
-  return reason.empty() ? "no reason given" : reason;
-}
 
 struct NodeLink {
   std::string name;
@@ -61,31 +47,6 @@ std::optional<std::vector<NodeLink>> nodeLinksOf(const Hdf5Group& group) {
     if (H5Literate(group.id(), order, H5_ITER_INC, &position, add, &links) >= 0) return links;
   }
   return std::nullopt;
-}
-
-const char* describe(H5T_class_t type) {
-  switch (type) {
-    case H5T_INTEGER:
-      return "integers";
-    case H5T_FLOAT:
-      return "floating-point numbers";
-    case H5T_STRING:
-      return "strings";
-    case H5T_COMPOUND:
-      return "compounds";
-    case H5T_REFERENCE:
-      return "references";
-    case H5T_VLEN:
-      return "lists of variable length";
-    case H5T_ARRAY:
-      return "arrays";
-    case H5T_ENUM:
-      return "enumerators";
-    case H5T_OPAQUE:
-      return "opaque bytes";
-    default:
-      return "values of an unknown type";
-  }
 }
 
 std::string placeOf(const std::string& node_path) {
@@ -141,26 +102,21 @@ std::string CgnsHdf5::text(const Hdf5Group& group, const std::string& node_path,
   if (H5Aexists(group.id(), attribute) <= 0)
     damaged(node_path, fmt::format("has no attribute '{}'", attribute));
   const Hdf5Attribute open(H5Aopen(group.id(), attribute, H5P_DEFAULT));
-  const Hdf5Type type(open ? H5Aget_type(open.id()) : H5I_INVALID_HID);
-  const Hdf5Space space(open ? H5Aget_space(open.id()) : H5I_INVALID_HID);
-  if (!type || !space) unreadable(node_path, fmt::format("attribute '{}'", attribute));
-
-  const H5T_class_t kind = H5Tget_class(type.id());
-  const size_t bytes = H5Tget_size(type.id());
-  const hssize_t count = H5Sget_simple_extent_npoints(space.id());
-  const int rank = H5Sget_simple_extent_ndims(space.id());
-  if (count < 1) wrong("no value");
-  const auto values = static_cast<uint64_t>(count);
+  const std::optional<Hdf5AttributeShape> shape = shapeOf(open);
+  if (!shape) unreadable(node_path, fmt::format("attribute '{}'", attribute));
+  if (shape->values < 1) wrong("no value");
   // Some builds of libcgns write text as an array of one-byte integers.
-  const bool letters = kind == H5T_INTEGER && bytes == 1 && rank == 1;
+  const bool letters = shape->kind == H5T_INTEGER && shape->value_bytes == 1 && shape->rank == 1;
   if (!letters) {
-    if (kind != H5T_STRING) wrong(describe(kind));
-    if (H5Tis_variable_str(type.id()) != 0) wrong("a string of variable length");
-    if (values != 1) wrong(fmt::format("{} strings", values));
+    if (shape->kind != H5T_STRING) wrong(describe(shape->kind));
+    if (shape->variable_string) wrong("a string of variable length");
+    if (shape->values != 1) wrong(fmt::format("{} strings", shape->values));
   }
-  if (bytes == 0 || bytes > max_bytes || values > max_bytes) wrong(fmt::format("{} bytes", bytes * values));
-  std::string read(bytes * values, '\0');
-  if (H5Aread(open.id(), type.id(), read.data()) < 0)
+  if (shape->value_bytes > max_bytes || shape->values > max_bytes)
+    wrong(fmt::format("{} bytes", shape->value_bytes * shape->values));
+  const Hdf5Type type(H5Aget_type(open.id()));
+  std::string read(shape->value_bytes * shape->values, '\0');
+  if (!type || H5Aread(open.id(), type.id(), read.data()) < 0)
     unreadable(node_path, fmt::format("attribute '{}'", attribute));
   read.resize(std::min(read.find('\0'), read.size()));
   while (!read.empty() && read.back() == ' ') read.pop_back();

@@ -1,5 +1,6 @@
 #include "preprocess/formats/netcdf/netcdf_file.h"
 
+#include <fmt/format.h>
 #include <netcdf.h>
 
 #include <algorithm>
@@ -12,6 +13,7 @@
 #include <numeric>
 
 #include "preprocess/formats/common/data_library_lock.h"
+#include "preprocess/formats/netcdf/netcdf4_structure.h"
 #include "preprocess/formats/netcdf/netcdf_classic.h"
 #include "stream/base/check.h"
 #include "stream/base/error.h"
@@ -79,6 +81,10 @@ std::optional<double> defaultFill(nc_type type) {
   }
 }
 
+bool isReal(nc_type type) {
+  return type == NC_FLOAT || type == NC_DOUBLE;
+}
+
 const std::vector<double>& numbersOf(const NetcdfVariable& variable, const char* attribute) {
   static const std::vector<double> none;
   const auto found = variable.attributes.find(attribute);
@@ -109,13 +115,20 @@ NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
   const uint64_t bytes = file.size();
   std::array<char, 4> begin{};
   if (bytes >= begin.size()) file.readAt(0, std::span<char>(begin));
-  if (isClassic({begin.data(), begin.size()})) checkClassicNetcdf(file);
+  if (isClassic({begin.data(), begin.size()}))
+    checkClassicNetcdf(file);
+  else
+    plain_hdf5_ = !checkNetcdf4Structure(path).netcdf4;
   const std::lock_guard lock(dataLibraryMutex());
   nc_set_chunk_cache(kChunkCacheBytes, kChunkCacheSlots, kChunkCachePreemption);
   // NetCDF takes some relative paths for URLs.
   const std::filesystem::path absolute = std::filesystem::absolute(path);
-  if (const int status = nc_open(absolute.c_str(), NC_NOWRITE, &file_); status != NC_NOERR)
+  if (const int status = nc_open(absolute.c_str(), NC_NOWRITE, &file_); status != NC_NOERR) {
+    if (plain_hdf5_)
+      throw Error("{}: is an HDF5 file, but neither NetCDF-4 nor CGNS ({}); expected one of these",
+                  path_.string(), nc_strerror(status));
     fail("the file", status);
+  }
   try {
     readHeader();
     if (kind_ == kNetcdf4) checkSizes(bytes);
@@ -173,6 +186,7 @@ void NetcdfFile::readVariable(int id) {
   NetcdfVariable variable;
   variable.name = name;
   variable.id = id;
+  variable.type = type;
   variable.value_bytes = bytesOf(type);
   variable.numeric = variable.value_bytes > 0;
   for (const int dimension : ids) {
@@ -198,6 +212,7 @@ void NetcdfFile::readAttributes(int id, int count, NetcdfVariable& variable) con
     if (status != NC_NOERR) fail("an attribute of " + variable.name, status);
     if (length > kMaxAttributeValues) continue;
     NetcdfAttribute attribute;
+    attribute.type = type;
     if (type == NC_CHAR) {
       attribute.text.resize(length);
       status = nc_get_att_text(file_, id, name, attribute.text.data());
@@ -239,15 +254,57 @@ NetcdfFile::Packing NetcdfFile::packingOf(const NetcdfVariable& variable) const 
   packing.offset = first("add_offset", 0);
   for (const char* attribute : {"_FillValue", "missing_value"})
     for (const double value : numbersOf(variable, attribute)) packing.missing.push_back(value);
-  if (const std::vector<double>& range = numbersOf(variable, "valid_range"); range.size() == 2) {
-    packing.least = range[0];
-    packing.most = range[1];
-  }
-  if (const std::vector<double>& least = numbersOf(variable, "valid_min"); least.size() == 1)
-    packing.least = least[0];
-  if (const std::vector<double>& most = numbersOf(variable, "valid_max"); most.size() == 1)
-    packing.most = most[0];
+  addRange(variable, packing);
   return packing;
+}
+
+/// By NetCDF's conventions a valid range is in stored units, unless it has the type of scale_factor and
+/// add_offset (the wider of the two) and that is wider than the variable's: then it is in unpacked units. Such
+/// a range is converted to stored units here.
+/// Source: NetCDF User's Guide, appendix A, valid_range.
+void NetcdfFile::addRange(const NetcdfVariable& variable, Packing& packing) {
+  nc_type unpacked = NC_NAT;
+  for (const char* attribute : {"scale_factor", "add_offset"}) {
+    const auto found = variable.attributes.find(attribute);
+    if (found == variable.attributes.end() || found->second.numbers.empty()) continue;
+    if (bytesOf(found->second.type) > bytesOf(unpacked)) unpacked = found->second.type;
+  }
+  const bool widens =
+      isReal(unpacked) && (!isReal(variable.type) || bytesOf(unpacked) > bytesOf(variable.type));
+  // A stored integer stands for values half a step to either side, which absorbs the rounding of the factor.
+  const double half_step = isReal(variable.type) ? 0 : 0.5;
+
+  const auto bound = [&](const char* attribute, size_t size, size_t n, bool upper) {
+    const auto found = variable.attributes.find(attribute);
+    if (found == variable.attributes.end() || found->second.numbers.size() != size) return;
+    const double value = found->second.numbers[n];
+    const bool convert = widens && found->second.type == unpacked;
+    if (convert && !(std::isfinite(packing.scale) && packing.scale != 0 && std::isfinite(packing.offset)))
+      return;
+    const bool stored_upper = upper != (convert && packing.scale < 0);
+    const double stored = convert ? (value - packing.offset) / packing.scale : value;
+    if (stored_upper)
+      packing.most = stored + (convert ? half_step : 0);
+    else
+      packing.least = stored - (convert ? half_step : 0);
+    packing.range +=
+        fmt::format("{}{} {} {:g}{}", packing.range.empty() ? "" : " or ", upper ? "above" : "below",
+                    attribute, value, convert ? " after unpacking" : "");
+  };
+  bound("valid_range", 2, 0, false);
+  bound("valid_range", 2, 1, true);
+  bound("valid_min", 1, 0, false);
+  bound("valid_max", 1, 0, true);
+}
+
+std::string NetcdfFile::missingValues(const NetcdfVariable& variable) const {
+  const auto position = static_cast<size_t>(&variable - variables_.data());
+  CURVISPLAT_CHECK_OP(position, <, variables_.size());
+  const Packing& packing = packings_[position];
+  std::string words = packing.range;
+  if (!packing.missing.empty())
+    words += fmt::format("{}equal to {:g}", words.empty() ? "" : " or ", fmt::join(packing.missing, " or "));
+  return words;
 }
 
 template <typename Value>
@@ -273,6 +330,32 @@ const NetcdfVariable* NetcdfFile::find(std::string_view name) const {
   for (const NetcdfVariable& variable : variables_)
     if (variable.name == name) return &variable;
   return nullptr;
+}
+
+std::string NetcdfFile::text(const char* attribute) const {
+  const std::lock_guard lock(dataLibraryMutex());
+  nc_type type = NC_NAT;
+  size_t length = 0;
+  if (nc_inq_att(file_, NC_GLOBAL, attribute, &type, &length) != NC_NOERR || length > kMaxAttributeValues)
+    return "";
+  std::string text;
+  if (type == NC_CHAR) {
+    text.resize(length);
+    if (nc_get_att_text(file_, NC_GLOBAL, attribute, text.data()) != NC_NOERR) return "";
+    text.resize(std::min(text.find('\0'), text.size()));
+  } else if (type == NC_STRING && length == 1) {
+    char* stored = nullptr;
+    if (nc_get_att_string(file_, NC_GLOBAL, attribute, &stored) != NC_NOERR) return "";
+    if (stored) text = stored;
+    nc_free_string(1, &stored);
+  }
+  return text;
+}
+
+bool NetcdfFile::hasAttribute(const char* attribute) const {
+  const std::lock_guard lock(dataLibraryMutex());
+  int id = 0;
+  return nc_inq_attid(file_, NC_GLOBAL, attribute, &id) == NC_NOERR;
 }
 
 const NetcdfDimension& NetcdfFile::dimension(const NetcdfVariable& variable, size_t axis) const {

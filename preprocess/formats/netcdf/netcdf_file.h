@@ -29,11 +29,13 @@ struct NetcdfDimension {
 struct NetcdfAttribute {
   std::string text;
   std::vector<double> numbers;
+  int type = 0;  // as stored, an nc_type
 };
 
 struct NetcdfVariable {
   std::string name;
   int id = 0;
+  int type = 0;              // as stored, an nc_type
   size_t value_bytes = 0;    // size of a stored value
   bool numeric = false;      // neither text nor a user-defined type
   std::vector<size_t> dims;  // indices into NetcdfFile::dimensions(), slowest first
@@ -62,9 +64,16 @@ class NetcdfFile {
 
   const std::filesystem::path& path() const { return path_; }
   const std::string& kind() const { return kind_; }  // "NetCDF classic", "NetCDF-4"
+  /// Whether it is an HDF5 file that was not written as NetCDF-4.
+  bool plainHdf5() const { return plain_hdf5_; }
   const std::vector<NetcdfDimension>& dimensions() const { return dimensions_; }
   const std::vector<NetcdfVariable>& variables() const { return variables_; }
   const NetcdfVariable* find(std::string_view name) const;
+  /// The text of an attribute of the file; empty if there is none, or if it is not text.
+  std::string text(const char* attribute) const;
+  bool hasAttribute(const char* attribute) const;
+  /// Which stored values of a variable read() replaces by NaN, in words; empty if none.
+  std::string missingValues(const NetcdfVariable& variable) const;
   const NetcdfDimension& dimension(const NetcdfVariable& variable, size_t axis) const;
 
   /// Reads box.values() values to the beginning of `to`, multiplied by scale_factor, plus add_offset. NaN
@@ -78,13 +87,15 @@ class NetcdfFile {
   struct Packing {
     double scale = 1, offset = 0;
     std::vector<double> missing;
-    std::optional<double> least, most;
+    std::optional<double> least, most;  // as stored
+    std::string range;                  // the same in words
   };
 
   [[noreturn]] void fail(const std::string& place, int status) const;
   void readHeader();
   void readVariable(int id);
   void readAttributes(int id, int count, NetcdfVariable& variable) const;
+  static void addRange(const NetcdfVariable& variable, Packing& packing);
   void checkSizes(uint64_t file_bytes) const;
   Packing packingOf(const NetcdfVariable& variable) const;
   template <typename Value>
@@ -96,6 +107,7 @@ class NetcdfFile {
   std::filesystem::path path_;
   int file_ = 0;
   std::string kind_;
+  bool plain_hdf5_ = false;
   std::vector<NetcdfDimension> dimensions_;
   std::vector<NetcdfVariable> variables_;
   std::vector<Packing> packings_;  // [variable]

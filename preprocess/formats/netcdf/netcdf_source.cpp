@@ -7,6 +7,7 @@
 #include <map>
 
 #include "preprocess/formats/netcdf/cf_roles.h"
+#include "preprocess/formats/netcdf/foreign_netcdf.h"
 #include "preprocess/grid/scalar_names.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/check.h"
@@ -71,6 +72,8 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFile& file, const OpenGridOptions& o
                                 GridDescription& description, size_t& mask) {
   CfGrids found = findCfGrids(file, options.time_step.value_or(0));
   if (found.grids.empty()) {
+    if (const auto format = foreignNetcdf(file))
+      throw Error("{}: is {}; only structured (curvilinear) grids are read", file.path().string(), *format);
     std::string why = "no variable has three dimensions in space";
     if (!found.left_out.empty()) {
       const auto reasons = byReason(found.left_out);
@@ -137,6 +140,9 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
       scalar.aliases.push_back(name);
     description_.scalars.push_back(std::move(scalar));
   }
+  if (const std::string missing = file_.missingValues(*grid_.variables[mask_]); !missing.empty())
+    description_.blanking =
+        fmt::format("{} is missing where it is {}", grid_.variables[mask_]->name, missing);
   description_.coordinate_bytes =
       std::max(grid_.longitude.variable().value_bytes, grid_.latitude.variable().value_bytes) > 4 ? 8 : 4;
   for (const std::string& warning : grid_.vertical.warnings()) description_.warnings.push_back(warning);

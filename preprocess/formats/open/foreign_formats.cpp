@@ -1,6 +1,7 @@
 #include "preprocess/formats/open/foreign_formats.h"
 
 #include <algorithm>
+#include <sstream>
 #include <string_view>
 
 namespace curvisplat {
@@ -13,16 +14,24 @@ struct Magic {
 
 using namespace std::string_view_literals;
 
+constexpr uint64_t kLooked = 2048;
+
 constexpr Magic kMagics[] = {
     {"# vtk DataFile"sv, "a legacy VTK file"},
     {"<VTKFile"sv, "a VTK XML file"},
-    {"<?xml"sv, "an XML file"},
     {"\x89HDF\r\n\x1a\n"sv, "an HDF5 file"},
     {"CDF\x01"sv, "a NetCDF file"},
     {"CDF\x02"sv, "a NetCDF file"},
     {"CDF\x05"sv, "a NetCDF file"},
     {"#!TDV"sv, "a Tecplot binary file, which is not read"},
-    {"C Binary"sv, "an EnSight file, which is not read"},
+    {"#!SZPLT"sv, "a Tecplot binary file, which is not read"},
+    {"C Binary"sv, "an EnSight geometry file, which is not read"},
+    {"\x50\0\0\0Fortran Binary"sv, "an EnSight geometry file, which is not read"},
+    {"\0\0\0\x50"
+     "Fortran Binary"sv,
+     "an EnSight geometry file, which is not read"},
+    {"GRIB"sv, "a GRIB file, which is not read"},
+    {"\x0e\x03\x13\x01"sv, "an HDF4 file, which is not read"},
     {"{"sv, "a JSON file (give a .p3d file alone, instead of the grid)"},
     {"\x89PNG"sv, "a PNG image"},
     {"\xff\xd8\xff"sv, "a JPEG image"},
@@ -39,16 +48,48 @@ constexpr Magic kMagics[] = {
     {"PK\x03\x04"sv, "a zip archive (extract it first)"},
 };
 
+/// The formats that are text, by the words that they begin with. `begin`: the first bytes of the file.
+std::optional<std::string> foreignText(std::string begin) {
+  if (std::any_of(begin.begin(), begin.end(), [](char c) { return c == '\0'; })) return std::nullopt;
+  std::transform(begin.begin(), begin.end(), begin.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  if (begin.find("<xdmf") != std::string::npos || begin.find("<!doctype xdmf") != std::string::npos)
+    return "an XDMF file, which is not read";
+  if (begin.starts_with("<?xml")) return "an XML file";
+  std::istringstream lines(begin);
+  bool format = false;
+  for (std::string line; std::getline(lines, line);) {
+    const size_t first = line.find_first_not_of(" \t\r");
+    if (first == std::string::npos || line[first] == '#') continue;
+    line.erase(0, first);
+    if (format) {
+      if (line.starts_with("type:") && line.find("ensight") != std::string::npos)
+        return "an EnSight case file, which is not read";
+      return std::nullopt;
+    }
+    format = line.starts_with("format");
+    if (format) continue;
+    for (const std::string_view word : {"title"sv, "variables"sv, "zone"sv, "filetype"sv}) {
+      if (!line.starts_with(word)) continue;
+      const size_t next = line.find_first_not_of(" \t", word.size());
+      if (next == std::string::npos || line[next] == '=' || (word == "zone" && next > word.size()))
+        return "a Tecplot text file, which is not read";
+    }
+    return std::nullopt;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::optional<std::string> foreignFormat(const InputFile& file) {
-  std::string begin(static_cast<size_t>(std::min<uint64_t>(file.size(), 64)), '\0');
+  std::string begin(static_cast<size_t>(std::min<uint64_t>(file.size(), kLooked)), '\0');
   file.readAt(0, std::span(begin.data(), begin.size()));
   for (const Magic& magic : kMagics)
     if (begin.starts_with(magic.bytes)) return magic.words;
   // The first four bytes of an ADF file differ between versions.
   if (begin.find("ADF Database") == 4) return "a CGNS (ADF) file";
-  return std::nullopt;
+  return foreignText(std::move(begin));
 }
 
 }  // namespace curvisplat

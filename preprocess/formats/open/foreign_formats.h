@@ -1,4 +1,5 @@
-// Recognises files of other formats by their first bytes, so that an Error can name them.
+// Recognises files of formats that are not read, by their first bytes, so that an Error can name them. Those
+// that are NetCDF or HDF5 inside are recognised in formats/netcdf/foreign_netcdf.h.
 #pragma once
 
 #include <optional>
@@ -8,8 +9,7 @@
 
 namespace curvisplat {
 
-/// "a gzip archive: unpack it first", "a VTK XML file, which is not read yet"; nothing for what may be
-/// PLOT3D.
+/// "compressed with gzip (decompress it first)", "an XDMF file"; nullopt for a file that may be PLOT3D.
 std::optional<std::string> foreignFormat(const InputFile& file);
 
 }  // namespace curvisplat

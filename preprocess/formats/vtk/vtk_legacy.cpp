@@ -291,9 +291,8 @@ class LegacyReader {
       if (name == "NULL_ARRAY") continue;
       const uint64_t components = nextCount(), tuples = nextCount();
       const std::string type = lineOfType();
-      if (lowered(type) == "string")
-        skipStrings(components, tuples);
-      else if (owner_ != Owner::kGrid && tuples == tuples_)
+      if (skipIfNotDrawn(name, type, components, tuples)) continue;
+      if (owner_ != Owner::kGrid && tuples == tuples_)
         addArray(name, type, components);
       else
         keepTime(readNumbers(name, type, components, tuples));
@@ -307,6 +306,31 @@ class LegacyReader {
     const WantedComponent<double> wanted{0, &time};
     readTuples<double>(array, 0, 1, std::span(&wanted, 1));
     grid_.times = {time};
+  }
+
+  /// Skips an array of a type that is not drawn, with a warning if it belongs to nodes or cells. False for all
+  /// other types.
+  bool skipIfNotDrawn(const std::string& name, const std::string& type, uint64_t components,
+                      uint64_t tuples) {
+    const std::string type_word = lowered(type);
+    const bool bits = type_word == "bit";
+    if (!bits && type_word != "string" && type_word != "utf8_string") return false;
+    bits ? skipBits(name, components, tuples) : skipStrings(components, tuples);
+    if (owner_ != Owner::kGrid)
+      grid_.warnings.push_back(fmt::format("left out: array {} of the {} has type {}, which is not drawn",
+                                           name, owner_ == Owner::kCells ? "cells" : "points", type_word));
+    return true;
+  }
+
+  /// Binary files have eight bits in a byte, and padding at the end of the array.
+  void skipBits(const std::string& name, uint64_t components, uint64_t tuples) {
+    const uint64_t left = file_->size() - text_.offset();
+    if (components > kMaxComponents || (components > 0 && tuples > 8 * left / components))
+      fail("array {} needs {} x {} bits, but only {} bytes are left; the file is truncated or damaged", name,
+           tuples, components, left);
+    const uint64_t bits = tuples * components;
+    if (!ascii_) return text_.seek(text_.offset() + (bits + 7) / 8);
+    for (uint64_t n = 0; n < bits; ++n) text_.number();
   }
 
   void skipStrings(uint64_t components, uint64_t tuples) {
@@ -347,6 +371,7 @@ class LegacyReader {
   }
 
   void addArray(const std::string& name, const std::string& type, uint64_t components) {
+    if (skipIfNotDrawn(name, type, components, tuples_)) return;
     addDataArray(piece_, owner_ == Owner::kCells, readNumbers(name, type, components, tuples_),
                  grid_.warnings);
   }

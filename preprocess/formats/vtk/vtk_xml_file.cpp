@@ -152,7 +152,7 @@ VtkXmlFile::Part VtkXmlFile::textOf(const pugi::xml_node& node) const {
 
 std::optional<VtkArray> VtkXmlFile::numericArray(const pugi::xml_node& node, uint64_t tuples) const {
   const std::string type = node.attribute("type").value();
-  if (type == "String" || type == "Bit") return std::nullopt;
+  if (!typeNamed(type)) return std::nullopt;
   return array(node, tuples);
 }
 

@@ -62,9 +62,17 @@ VtkUniformNodes uniformNodesOf(const VtkXmlFile& file) {
 void addArrays(const VtkXmlFile& file, const Node& data, bool of_cells, VtkPiece& piece,
                std::vector<std::string>& warnings) {
   const uint64_t tuples = of_cells ? piece.extent.cells() : piece.extent.nodes();
+  const auto leaveOut = [&](const Node& node) {
+    warnings.push_back(fmt::format("left out: array {} of the {} has type {}, which is not drawn",
+                                   node.attribute("Name").value(), of_cells ? "cells" : "points",
+                                   node.attribute("type").value()));
+  };
   for (const Node& node : data.children("DataArray"))
     if (auto array = file.numericArray(node, tuples))
       addDataArray(piece, of_cells, std::move(*array), warnings);
+    else
+      leaveOut(node);
+  for (const Node& node : data.children("Array")) leaveOut(node);
   (of_cells ? piece.active_cell_data : piece.active_point_data) = data.attribute("Scalars").value();
 }
 

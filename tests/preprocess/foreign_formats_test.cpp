@@ -1,0 +1,144 @@
+// Files of formats that are not read: each is refused by its own name.
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "preprocess/formats/open/open_grid.h"
+#include "stream/base/error.h"
+#include "tests/support/hdf5_editor.h"
+#include "tests/support/netcdf_writer.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+using namespace std::string_literals;
+
+class ForeignFormats : public testing::Test {
+ protected:
+  std::string errorOf(const char* name) const {
+    OpenGridOptions options;
+    options.grid = folder_ / name;
+    try {
+      openGrid(options);
+    } catch (const Error& error) {
+      EXPECT_TRUE(std::string(error.what()).starts_with(options.grid.string() + ": is ")) << error.what();
+      return error.what();
+    }
+    return "";
+  }
+  void expectNamed(const char* name, const std::string& format) const {
+    const std::string error = errorOf(name);
+    EXPECT_NE(error.find(": is " + format), std::string::npos) << name << ": " << error;
+  }
+  void write(const char* name, const std::string& content) const {
+    std::ofstream(folder_ / name, std::ios::binary) << content;
+  }
+  /// A mesh: values of `cells` cells on two levels, and their centres.
+  static void mesh(NetcdfWriter& file, const char* cells, const char* level,
+                   const NetcdfAttributes& attributes = {}) {
+    file.dimension(cells, 5);
+    file.dimension(level, 2);
+    file.variable("clon", NetcdfNumbers::kDoublePrecision, {cells}, {{"units", "degrees_east"}},
+                  [](const auto& n) { return static_cast<double>(n[0]); });
+    file.variable("clat", NetcdfNumbers::kDoublePrecision, {cells}, {{"units", "degrees_north"}},
+                  [](const auto& n) { return static_cast<double>(n[0]); });
+    file.variable("temp", NetcdfNumbers::kSinglePrecision, {level, cells}, attributes,
+                  [](const auto&) { return 1.0; });
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(ForeignFormats, TextAndBinaryFilesAreNamed) {
+  write("a.plt", "#!TDV112\1\0\0\0"s);
+  expectNamed("a.plt", "a Tecplot binary file");
+  write("a.szplt", "#!SZPLT\1\0\0\0"s);
+  expectNamed("a.szplt", "a Tecplot binary file");
+  for (const char* text : {"TITLE = \"jet\"\nVARIABLES = \"X\", \"Y\"\n", "\n# jet\nvariables=\"X\"\n",
+                           "ZONE I=4, J=3\n1 2 3\n", "TITLE     = \"\"\n"}) {
+    write("a.dat", text);
+    expectNamed("a.dat", "a Tecplot text file");
+  }
+  for (const char* text : {"FORMAT\ntype: ensight gold\n\nGEOMETRY\nmodel: a.geo\n",
+                           "# written by x\r\nFORMAT\r\ntype:   EnSight Gold\r\n"}) {
+    write("a.case", text);
+    expectNamed("a.case", "an EnSight case file");
+  }
+  write("a.geo", "C Binary" + std::string(72, ' '));
+  expectNamed("a.geo", "an EnSight geometry file");
+  write("b.geo", "\x50\0\0\0Fortran Binary"s + std::string(72, ' '));
+  expectNamed("b.geo", "an EnSight geometry file");
+  for (const char* text :
+       {"<?xml version=\"1.0\" ?>\n<!DOCTYPE Xdmf SYSTEM \"Xdmf.dtd\" []>\n<Xdmf Version=\"2.0\">\n",
+        "<Xdmf xmlns:xi=\"http://www.w3.org/2003/XInclude\" Version=\"3.0\">\n"}) {
+    write("a.xmf", text);
+    expectNamed("a.xmf", "an XDMF file");
+  }
+  write("a.xml", "<?xml version=\"1.0\"?>\n<html/>\n");
+  expectNamed("a.xml", "an XML file");
+  write("a.grib", "GRIB\0\0\0\2"s);
+  expectNamed("a.grib", "a GRIB file");
+}
+
+TEST_F(ForeignFormats, TextsOfNumbersAreStillTriedAsPlot3d) {
+  write("a.xyz", "1\n2 2 2\n0 1 0 1 0 1 0 1  0 0 1 1 0 0 1 1  0 0 0 0 1 1 1 1\n");
+  OpenGridOptions options;
+  options.grid = folder_ / "a.xyz";
+  EXPECT_EQ(openGrid(options)->description().blocks.size(), 1u);
+}
+
+TEST_F(ForeignFormats, UnstructuredNetcdfIsNamed) {
+  for (const NetcdfFileType type : {NetcdfFileType::kClassic, NetcdfFileType::kNetcdf4}) {
+    {
+      NetcdfWriter file(folder_ / "ugrid.nc", type);
+      mesh(file, "faces", "lev");
+      file.dimension("one", 1);
+      file.variable("mesh2d", NetcdfNumbers::kInt32, {"one"}, {{"cf_role", "mesh_topology"}},
+                    [](const auto&) { return 0.0; });
+    }
+    expectNamed("ugrid.nc", "an unstructured mesh (UGRID)");
+    {
+      NetcdfWriter file(folder_ / "icon.nc", type);
+      file.attribute("uuidOfHGrid", "0f1e7d66-637e-11e8-913b-51232bb4d8f9");
+      mesh(file, "ncells", "height", {{"CDI_grid_type", "unstructured"}});
+    }
+    expectNamed("icon.nc", "an unstructured grid (ICON)");
+    {
+      NetcdfWriter file(folder_ / "cdo.nc", type);
+      mesh(file, "ncells", "height", {{"CDI_grid_type", "unstructured"}});
+    }
+    expectNamed("cdo.nc", "an unstructured grid;");
+    {
+      NetcdfWriter file(folder_ / "fvcom.nc", type);
+      file.attribute("source", "FVCOM_3.0");
+      mesh(file, "node", "siglay");
+    }
+    expectNamed("fvcom.nc", "an unstructured mesh (FVCOM)");
+    {
+      NetcdfWriter file(folder_ / "mesh.exo", type);
+      file.attribute("api_version", "8.03");
+      file.dimension("num_dim", 3);
+      file.dimension("num_nodes", 8);
+      file.variable("coord", NetcdfNumbers::kDoublePrecision, {"num_dim", "num_nodes"}, {},
+                    [](const auto&) { return 0.0; });
+    }
+    expectNamed("mesh.exo", "a finite-element mesh (Exodus)");
+  }
+}
+
+TEST_F(ForeignFormats, PlainHdf5IsNamed) {
+  const std::filesystem::path file = folder_ / "plain.h5";
+  {
+    NetcdfWriter writer(file, NetcdfFileType::kNetcdf4);  // without dimensions, an HDF5 file like any other
+  }
+  {
+    Hdf5Editor editor(file);
+    editor.replaceAttribute("/", "_NCProperties", HostileAttribute::kMissing);
+    editor.group("/results");
+  }
+  expectNamed("plain.h5", "an HDF5 file, but neither NetCDF-4 nor CGNS");
+}
+
+}  // namespace
+}  // namespace curvisplat

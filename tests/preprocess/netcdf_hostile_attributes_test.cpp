@@ -1,0 +1,139 @@
+// NetCDF-4 files whose attributes for libnetcdf and for dimension scales are not what these write: an Error
+// that names the object, never a crash.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "preprocess/formats/open/open_grid.h"
+#include "stream/base/error.h"
+#include "tests/support/earth_files.h"
+#include "tests/support/hdf5_editor.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+class NetcdfHostileAttributes : public testing::Test {
+ protected:
+  NetcdfHostileAttributes() { roms::write(path_, NetcdfFileType::kNetcdf4, "ocean_s_coordinate_g2"); }
+
+  /// A fresh copy of the valid file. A new inode each time: libnetcdf may leave a file open that it refuses,
+  /// and HDF5 does not open that inode for writing then.
+  std::filesystem::path copy() const {
+    const std::filesystem::path to = folder_ / "copy.nc";
+    std::filesystem::remove(to);
+    std::filesystem::copy_file(path_, to);
+    return to;
+  }
+
+  /// Opens the file and reads a box; returns the Error.
+  static std::string errorOf(const std::filesystem::path& path) {
+    try {
+      OpenGridOptions options;
+      options.grid = path;
+      const auto source = openGrid(options);
+      NodeArrays nodes;
+      source->read(0, {0, 2, 0, 2}, {}, nodes);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_ / "grid.nc";
+};
+
+TEST_F(NetcdfHostileAttributes, AttributesThatLibrariesTrustAreChecked) {
+  struct Case {
+    const char *object, *attribute;
+    std::vector<HostileAttribute> valid;  // kinds that are what they should be
+  };
+  using enum HostileAttribute;
+  const Case cases[] = {
+      {"/temp", "DIMENSION_LIST", {}},
+      {"/lon_rho", "DIMENSION_LIST", {}},
+      {"/temp", "_Netcdf4Coordinates", {}},
+      {"/s_rho", "_Netcdf4Dimid", {kInteger}},
+      {"/xi_rho", "_Netcdf4Dimid", {kInteger}},
+      {"/s_rho", "NAME", {}},
+      {"/xi_rho", "NAME", {}},
+      {"/", "_NCProperties", {kStringOf34, kLongString, kHugeString, kVariableString}},
+  };
+  for (const Case& one : cases)
+    for (int kind = 1; kind < kHostileAttributes; ++kind) {
+      const auto hostile = static_cast<HostileAttribute>(kind);
+      SCOPED_TRACE(fmt::format("{} {} {}", one.object, one.attribute, kind));
+      const std::filesystem::path file = copy();
+      Hdf5Editor(file).replaceAttribute(one.object, one.attribute, hostile);
+      const std::string error = errorOf(file);
+      if (std::find(one.valid.begin(), one.valid.end(), hostile) != one.valid.end()) continue;
+      const std::string words =
+          fmt::format("{}: {} has an attribute '{}' of ", file.string(), one.object, one.attribute);
+      EXPECT_TRUE(error.starts_with(words)) << error;
+      EXPECT_NE(error.find("; expected "), std::string::npos) << error;
+      EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+    }
+}
+
+TEST_F(NetcdfHostileAttributes, NoAttributeOfAnyObjectEndsTheProgram) {
+  int refused = 0, read = 0, unwritten = 0;
+  for (const char* object : {"/", "/xi_rho", "/s_rho", "/temp", "/hc"})
+    for (const char* attribute : {"_NCProperties", "_Netcdf4Dimid", "_Netcdf4Coordinates", "_nc3_strict",
+                                  "CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "DIMENSION_LABELS",
+                                  "_FillValue", "units", "coordinates", "scale_factor"})
+      for (int kind = 0; kind < kHostileAttributes; ++kind) {
+        SCOPED_TRACE(fmt::format("{} {} {}", object, attribute, kind));
+        const std::filesystem::path file = copy();
+        try {
+          Hdf5Editor(file).replaceAttribute(object, attribute, static_cast<HostileAttribute>(kind));
+        } catch (const std::runtime_error&) {
+          ++unwritten;  // HDF5 itself refuses
+          continue;
+        }
+        const std::string error = errorOf(file);
+        EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+        ++(error.empty() ? read : refused);
+      }
+  EXPECT_GT(read, 100);
+  EXPECT_GT(refused, 100);
+  EXPECT_LT(unwritten, 100);
+}
+
+TEST_F(NetcdfHostileAttributes, NamesOfDimensionsMustEnd) {
+  const std::filesystem::path file = copy();
+  Hdf5Editor(file).writeText("/xi_rho", "NAME", "xi_rho", 7);
+  EXPECT_EQ(errorOf(file), "");
+  Hdf5Editor(file).writeText("/xi_rho", "NAME", std::string(64, 'x'), 64);
+  EXPECT_NE(errorOf(file).find("/xi_rho has an attribute 'NAME' of 1 strings of 64 bytes; expected one "
+                               "terminated string"),
+            std::string::npos)
+      << errorOf(file);
+}
+
+TEST_F(NetcdfHostileAttributes, GroupsInCirclesAreRefused) {
+  const std::filesystem::path file = copy();
+  {
+    Hdf5Editor editor(file);
+    editor.group("/group");
+    editor.hardLink("/", "/group/root");
+  }
+  EXPECT_NE(errorOf(file).find("nested more than 100 deep"), std::string::npos) << errorOf(file);
+  copy();
+  {
+    // 2^40 paths to the last group.
+    Hdf5Editor editor(file);
+    std::string path;
+    for (int n = 0; n < 40; ++n) {
+      editor.group(path + "/a");
+      editor.softLink(path + "/a", path + "/b");
+      path += "/a";
+    }
+  }
+  EXPECT_NE(errorOf(file).find("more than the file can hold"), std::string::npos) << errorOf(file);
+}
+
+}  // namespace
+}  // namespace curvisplat
