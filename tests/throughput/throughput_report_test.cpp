@@ -52,14 +52,15 @@ TEST(ThroughputReport, DiskRowsAndWhatIsMissing) {
   Measurements measurements;
   measurements.add("disk/direct/4KiB/depth:8", "B/s", {100 << 20});
   measurements.add("disk/direct/256KiB/depth:8", "B/s", {800 << 20});
-  EXPECT_EQ(diskTable(measurements),
-            "MiB/s, 8 reads in flight  4 KiB  64 KiB  256 KiB  1 MiB\n"
-            "direct                      100       -      800      -\n"
-            "\n"
-            "MiB/s, 256 KiB per read  1 in flight  2 in flight  4 in flight  8 in flight  16 in flight  32 in "
-            "flight\n"
-            "direct                             -            -            -          800             -         "
-            "    -\n");
+  EXPECT_EQ(
+      diskTable(measurements),
+      "MiB/s, 8 reads in flight  4 KiB  64 KiB  256 KiB  1 MiB\n"
+      "direct                      100       -      800      -\n"
+      "\n"
+      "MiB/s, 256 KiB per read  1 in flight  2 in flight  4 in flight  8 in flight  16 in flight  32 in "
+      "flight\n"
+      "direct                             -            -            -          800             -         "
+      "    -\n");
 }
 
 TEST(ThroughputReport, ReasonsComeOnce) {
@@ -96,9 +97,10 @@ TEST(ThroughputReport, JudgesTheFinestFrameOnAllThreads) {
   ASSERT_TRUE(verdict);
   EXPECT_NE(verdict->lines[0].find("0.25 s"), std::string::npos) << verdict->lines[0];
   const std::string last = verdict->lines.back();
-  EXPECT_EQ(last,
-            "the disk could sustain 100.0 such frames per second with nothing in memory; 25 % of this frame's "
-            "bricks were read from it");
+  EXPECT_EQ(
+      last,
+      "the disk could sustain 100.0 such frames per second with nothing in memory; 25 % of this frame's "
+      "bricks were read from it");
 }
 
 }  // namespace

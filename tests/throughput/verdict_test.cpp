@@ -45,7 +45,8 @@ TEST(Verdict, DrawingOnTheCoresBounds) {
   const Verdict verdict = judge(frame(), speeds(), {});
   EXPECT_EQ(verdict.stage, "drawing");
   EXPECT_NEAR(verdict.share, 0.4 / 0.47, 1e-9);
-  EXPECT_TRUE(verdict.lines[0].starts_with("drawing bounds the frame: 85 % of the work on the cores in 0.50 s"))
+  EXPECT_TRUE(
+      verdict.lines[0].starts_with("drawing bounds the frame: 85 % of the work on the cores in 0.50 s"))
       << all(verdict);
   EXPECT_TRUE(
       says(verdict, "a graphics card would draw instead of the cores; their remaining work takes 70.0 ms"))
@@ -78,7 +79,8 @@ TEST(Verdict, ReadingBoundsWithASlowDisk) {
   slow.read_bytes_s = 1e6;  // 8 s
   const Verdict verdict = judge(judged, slow, {});
   EXPECT_EQ(verdict.stage, "reading");
-  EXPECT_TRUE(says(verdict, "reading bounds the frame: in isolation it takes 8.00 s of 9.00 s")) << all(verdict);
+  EXPECT_TRUE(says(verdict, "reading bounds the frame: in isolation it takes 8.00 s of 9.00 s"))
+      << all(verdict);
   EXPECT_TRUE(says(verdict, "a faster disk would help")) << all(verdict);
   EXPECT_TRUE(says(verdict, "could sustain 0.1 such frames")) << all(verdict);
 }
