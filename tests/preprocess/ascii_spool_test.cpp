@@ -62,7 +62,7 @@ TEST(AsciiSpool, NamesTheLineThatIsNoNumber) {
     EXPECT_NE(error.find(std::string("line 3 has \"") + bad + "\""), std::string::npos)
         << bad << ": " << error;
   }
-  EXPECT_NE(errorOf(folder, "1,\n,2").find("line 2 leaves a value out"), std::string::npos);
+  EXPECT_NE(errorOf(folder, "1,\n,2").find("line 2 has no value between two commas"), std::string::npos);
   EXPECT_NE(errorOf(folder, "1 999999999999999*2").find("repeats a number 999999999999999 times"),
             std::string::npos);
   EXPECT_EQ(files(folder), 1u);

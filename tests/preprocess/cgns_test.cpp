@@ -351,7 +351,7 @@ TEST_P(Cgns, CylindricalCoordinatesAreRefused) {
         "GridCoordinates",
         {{"CoordinateR", linear(1)}, {"CoordinateTheta", linear(2)}, {"CoordinateZ", linear(3)}});
   }
-  EXPECT_NE(errorOf().find("coordinates CoordinateR, CoordinateTheta, CoordinateZ; only Cartesian"),
+  EXPECT_NE(errorOf().find("coordinates CoordinateR, CoordinateTheta, CoordinateZ; expected CoordinateX"),
             std::string::npos)
       << errorOf();
 }

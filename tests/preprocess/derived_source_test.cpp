@@ -331,7 +331,7 @@ TEST(DerivedSource, AFileVariablesNumberComesFirst) {
   EXPECT_EQ(scalarsNamed(source.description(), {"110"}), std::vector<uint32_t>{2});
   const auto notes = notesOnNumbers(source.description(), {"110", "113", "109", "pressure"});
   ASSERT_EQ(notes.size(), 1u);
-  EXPECT_NE(notes[0].find("ask for pressure"), std::string::npos) << notes[0];
+  EXPECT_NE(notes[0].find("use pressure"), std::string::npos) << notes[0];
   EXPECT_EQ(source.description().scalars[scalarsNamed(source.description(), {"113"})[0]].name, "sound_speed");
 }
 
