@@ -186,7 +186,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     const double scale = set_volume(lq.determinant);
     const auto rotate = [&](const glm::dvec3& v) { return lq.rotate(v); };
     set_values(scale, rotate);
-    splat.border_code = borderCode(inwards, rotate);
+    splat.border_code = borderCode(inwards, splat.regular, rotate);
   } else {
     const CellShape shape = shapeFromJacobian(jacobian, smallestAxis(hexahedron.centre));
     splat.splat.axis = shape.axis;
@@ -201,7 +201,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     }
     const auto rotate = [&](const glm::dvec3& v) { return shape.rotation * v; };
     set_values(scale, rotate);
-    splat.border_code = borderCode(inwards, rotate);
+    splat.border_code = borderCode(inwards, splat.regular, rotate);
   }
   ++count_;
 }

@@ -175,7 +175,8 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     node.splat.shear = {a.a10 * lq.inverse_a00, a.a20 * lq.inverse_a00, a.a21 * lq.inverse_a11};
     node.splat.weight = a.a00 * a.a11 * a.a22 * weight_factor;
     node.regular = weight_factor == 1;
-    node.border_code = borderCode(inwards, [&](const glm::dvec3& v) { return lq.rotate(v); });
+    node.border_code =
+        borderCode(inwards, corrections_.faces, [&](const glm::dvec3& v) { return lq.rotate(v); });
     (lq.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
     set_values([&](const glm::dvec3& gradient) { return lq.rotate(gradient); },
                [&](const glm::dvec3& v) {
@@ -189,7 +190,8 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     node.splat.shear = shape.shear;
     node.splat.weight = std::abs(shape.determinant) * weight_factor;
     node.regular = !shape.floored;
-    node.border_code = borderCode(inwards, [&](const glm::dvec3& v) { return shape.rotation * v; });
+    node.border_code = borderCode(inwards, corrections_.faces && !shape.floored,
+                                  [&](const glm::dvec3& v) { return shape.rotation * v; });
     (shape.floored ? out_.degenerate : shape.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
     // Where an axis was raised there is no telling a bend of the scalar from one of the coordinates.
     set_values([&](const glm::dvec3& gradient) { return shape.rotation * gradient; },

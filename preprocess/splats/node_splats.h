@@ -12,7 +12,8 @@
 //
 // A missing neighbour (the block ends, or the node there is blank) makes the cell a half cell along that
 // axis: the Jacobian's column is half of the one difference there is, and the splat sits a quarter cell
-// inwards. Without any neighbour along an axis the column is zero.
+// inwards. Without any neighbour along an axis the column is zero. The border is a face that the splat is to be
+// cut at (stream/model/border_code.h), but where the cell has collapsed: at poles, and on singular lines.
 #pragma once
 
 #include <array>
@@ -30,9 +31,9 @@ namespace curvisplat {
 inline constexpr double kBend = 0.5 * 0.44655 * 0.44655;
 
 /// Where a cell ends, as stream/border_code.h codes it. `inwards`: along i, j, k, 1 or -1 from a border;
-/// `rotate` gives Q's image of a vector.
+/// `faces`: whether the borders are faces to be cut at; `rotate` gives Q's image of a vector.
 template <typename Rotate>
-uint32_t borderCode(const std::array<double, 3>& inwards, const Rotate& rotate) {
+uint32_t borderCode(const std::array<double, 3>& inwards, bool faces, const Rotate& rotate) {
   std::array<glm::dvec3, 3> axes;
   size_t count = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -41,7 +42,7 @@ uint32_t borderCode(const std::array<double, 3>& inwards, const Rotate& rotate) 
     along[axis] = inwards[axis];
     axes[count++] = rotate(along);
   }
-  return count > 0 ? packBorderCode({axes.data(), count}) : kNoBorder;
+  return count > 0 ? packBorderCode({axes.data(), count}, faces ? (1u << count) - 1 : 0) : kNoBorder;
 }
 
 /// A node's splat on its way into the cache.
@@ -78,6 +79,7 @@ struct BlockWindow {
 /// one off and see what it is worth.
 struct NodeSplatCorrections {
   bool border_codes = true;  // else a border's node has a whole cell of half the weight, around itself
+  bool faces = true;         // to be cut at; else cells at borders are drawn in parts
   bool middles = true;       // else splats sit at nodes, but for half cells
   bool bends = true;         // of the scalar
 };

@@ -197,6 +197,86 @@ HWY_INLINE void lookUpBlock(const Ellipse& e, const Scalar& scalar, const Shadin
   integrate(table, intervals, kLanes, out.integrals);
 }
 
+/// The faces of a splat, over kReach deviations and the support's radius.
+struct Faces {
+  float at[ScreenCut::kFaces], by_p[ScreenCut::kFaces], by_q[ScreenCut::kFaces];
+  bool far_side[ScreenCut::kFaces];
+  float mean_per_deviation;  // the scalar's, along the ray
+};
+
+/// What the faces leave of the pixels, and how they change the scalar's mean and variance there.
+struct Remainder {
+  V share, mean, variance;
+};
+
+/// Integrals of the biweight's distribution from 0 to x, |x| <= 1: of 1, of -32/5 x, and of x².
+HWY_INLINE V massTo(V x, V x2) {
+  const Floats d;
+  return hn::Mul(
+      x, hn::MulAdd(x2, hn::MulAdd(x2, hn::Set(d, 0.1875f), hn::Set(d, -0.625f)), hn::Set(d, 0.9375f)));
+}
+HWY_INLINE V firstTo(V x2) {
+  const V rest = hn::Sub(hn::Set(Floats(), 1.0f), x2);
+  return hn::Mul(hn::Mul(rest, rest), rest);
+}
+HWY_INLINE V secondTo(V x, V x2) {
+  const Floats d;
+  const V series =
+      hn::MulAdd(x2, hn::MulAdd(x2, hn::Set(d, 0.9375f / 7), hn::Set(d, -0.375f)), hn::Set(d, 0.3125f));
+  return hn::Mul(hn::Mul(x, x2), series);
+}
+
+HWY_INLINE Remainder remainderAt(const Faces& faces, const Pixels& pixels) {
+  const Floats d;
+  V lo = hn::Set(d, -1.0f), hi = hn::Set(d, 1.0f);
+  for (int n = 0; n < ScreenCut::kFaces; ++n) {
+    const V a = hn::MulAdd(hn::Set(d, faces.by_p[n]), pixels.p,
+                           hn::MulAdd(hn::Set(d, faces.by_q[n]), pixels.q, hn::Set(d, faces.at[n])));
+    if (faces.far_side[n])
+      lo = hn::Max(lo, hn::Neg(a));
+    else
+      hi = hn::Min(hi, a);
+  }
+  lo = hn::Min(lo, hn::Set(d, 1.0f));
+  hi = hn::Max(hi, lo);
+  const V lo2 = hn::Mul(lo, lo), hi2 = hn::Mul(hi, hi);
+  const V share = hn::Max(hn::Sub(massTo(hi, hi2), massTo(lo, lo2)), hn::Zero(d));
+  const V inverse = hn::Div(hn::Set(d, 1.0f), hn::Max(share, hn::Set(d, 1e-6f)));
+  // Of slivers there are no digits left: the mean is then held within them.
+  V mean = hn::Mul(hn::Mul(hn::Set(d, -5.0f / 32), hn::Sub(firstTo(hi2), firstTo(lo2))), inverse);
+  mean = hn::Clamp(mean, lo, hi);
+  V variance = hn::Mul(hn::Sub(secondTo(hi, hi2), secondTo(lo, lo2)), inverse);
+  variance = hn::NegMulAdd(mean, mean, variance);
+  // Over kReach deviations, whose square is 7.
+  const V reach2 = hn::Set(d, 7.0f);
+  const V lost =
+      hn::Sub(hn::Set(d, 1.0f), hn::Clamp(hn::Mul(reach2, variance), hn::Zero(d), hn::Set(d, 1.0f)));
+  const V k = hn::Set(d, faces.mean_per_deviation);
+  return {share, hn::Mul(hn::Mul(k, hn::Set(d, ScreenCut::kReach)), mean), hn::Mul(hn::Mul(k, k), lost)};
+}
+
+/// Of a splat that is cut.
+HWY_INLINE void lookUpBlock(const Ellipse& e, const Scalar& scalar, const Faces& faces,
+                            const ShadingTable& table, const float* HWY_RESTRICT footprint, float x, float y,
+                            LookedUp& out) {
+  const Floats d;
+  const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
+  Intervals intervals;
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
+                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
+    const Remainder left = remainderAt(faces, pixels);
+    const V t = hn::MulAdd(hn::Set(d, scalar.tp), pixels.p, hn::Mul(hn::Set(d, scalar.tq), pixels.q));
+    hn::Store(hn::Mul(pixels.depth, left.share), d, out.depth.at + lane);
+    const V mean = hn::Add(hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean)), left.mean);
+    const V width2 =
+        hn::NegMulAdd(hn::Set(d, 3.0f), left.variance, hn::Set(d, scalar.half_width * scalar.half_width));
+    locate(table, mean, hn::Sqrt(hn::Max(width2, hn::Zero(d))), lane, intervals);
+    hn::Store(hn::Load(d, intervals.scale.at + lane), d, out.scale.at + lane);
+  }
+  integrate(table, intervals, kLanes, out.integrals);
+}
+
 HWY_INLINE bool paintLookedUp(const LookedUp& in, float* HWY_RESTRICT block) {
   const Floats d;
   V most = hn::Zero(d);

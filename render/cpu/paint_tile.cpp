@@ -98,7 +98,8 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
 
     store(gather(work, offsets, 6), out.pieces.mean);
     if (!work.per_pixel) {
-      for (Row* row : {&out.pieces.reach, &out.pieces.half_width, &out.pieces.from, &out.pieces.to})
+      for (Row* row :
+           {&out.pieces.reach, &out.pieces.half_width, &out.pieces.from, &out.pieces.to, &out.tp, &out.tq})
         store(zero, *row);
       continue;
     }
@@ -195,10 +196,10 @@ HWY_INLINE BlockMask paintBlocks(const TileWork& work, BlockMask blocks, const E
   return saturated;
 }
 
-/// With a look-up for every pixel. A few blocks are looked up before they are blended: what was
-/// written as many narrow vectors is not ready at once to be read as a wide one.
-HWY_NOINLINE BlockMask paintPixelByPixel(const TileWork& work, BlockMask blocks, const Ellipse& e,
-                                         const Scalar& scalar, const float* footprint) {
+/// With a look-up for every pixel: lookUp(x, y, where to). A few blocks are looked up before they are blended:
+/// what was written as many narrow vectors is not ready at once to be read as a wide one.
+template <typename LookUp>
+HWY_INLINE BlockMask paintLookedUpBlocks(const TileWork& work, BlockMask blocks, const LookUp& look_up) {
   constexpr int kAtOnce = 8;
   LookedUp looked_up[kAtOnce];
   int numbers[kAtOnce];
@@ -207,13 +208,38 @@ HWY_NOINLINE BlockMask paintPixelByPixel(const TileWork& work, BlockMask blocks,
     int count = 0;
     for (; blocks != 0 && count < kAtOnce; ++count) {
       const int block = numbers[count] = takeFirst(blocks);
-      lookUpBlock(e, scalar, work.table, footprint, xOf(block), yOf(block), looked_up[count]);
+      look_up(xOf(block), yOf(block), looked_up[count]);
     }
     for (int n = 0; n < count; ++n)
       if (paintLookedUp(looked_up[n], work.tile + numbers[n] * kBlockFloats))
         saturated |= BlockMask{1} << numbers[n];
   }
   return saturated;
+}
+
+HWY_NOINLINE BlockMask paintPixelByPixel(const TileWork& work, BlockMask blocks, const Ellipse& e,
+                                         const Scalar& scalar, const float* footprint) {
+  return paintLookedUpBlocks(work, blocks, [&](float x, float y, LookedUp& out) HWY_ATTR {
+    lookUpBlock(e, scalar, work.table, footprint, x, y, out);
+  });
+}
+
+/// A splat that is cut. `record`: its ScreenCut.
+HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, Ellipse e, Scalar scalar,
+                                const ScreenSplat& record, const float* footprint) {
+  const ScreenCut cut = ScreenCut::of(record);
+  Faces faces;
+  for (size_t n = 0; n < ScreenCut::kFaces; ++n) {
+    faces.at[n] = cut.faces[n][0] * (1 / ScreenCut::kReach);
+    faces.by_p[n] = cut.faces[n][1] * (kSupport / ScreenCut::kReach);
+    faces.by_q[n] = cut.faces[n][2] * (kSupport / ScreenCut::kReach);
+    faces.far_side[n] = (cut.far_sides >> n & 1) != 0;
+  }
+  faces.mean_per_deviation = cut.correlation * scalar.half_width * 0.57735027f;
+  e.amplitude = -e.amplitude;
+  return paintLookedUpBlocks(work, blocks, [&](float x, float y, LookedUp& out) HWY_ATTR {
+    lookUpBlock(e, scalar, faces, work.table, footprint, x, y, out);
+  });
 }
 
 /// From `begin` to `end` over piece n.
@@ -288,9 +314,13 @@ BlockMask paintTile(const TileWork& work) {
     else
       fitMeans(work.table, visits.pieces, count, fits);
     for (size_t n = 0; n < count; ++n) {
-      if (fits.fit.at[n] == kNothing) continue;
+      const bool cut = visits.pieces.amplitude.at[n] < 0;
+      if (fits.fit.at[n] == kNothing && !cut) continue;
       const BlockMask blocks = blocksOf(visits, n) & open;
-      if (blocks != 0) open &= ~paintVisit(work, blocks, visits, fits, n, footprint);
+      if (blocks == 0) continue;
+      open &= ~(cut ? paintCut(work, blocks, visits.ellipse(n), visits.scalar(n),
+                               work.splats[static_cast<size_t>(numbers.at[n]) - 1], footprint)
+                    : paintVisit(work, blocks, visits, fits, n, footprint));
     }
   }
   return open;

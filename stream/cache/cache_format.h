@@ -26,16 +26,17 @@ namespace curvisplat {
 
 static_assert(std::endian::native == std::endian::little, "records are written as they lie in memory");
 
-/// Of the whole format: manifest, tables and streams. Whoever changes what any of them mean raises it, still
-/// reads the older ones from 1 on (tests/data/caches has some of each), and makes caches of the new one there.
-inline constexpr uint32_t kCacheVersion = 1;
+/// Of the tables: both versions of the format have these. What is new in version 2 is named in the manifest
+/// (manifest.h). Whoever changes what anything means adds a feature there, still reads the caches without it
+/// (tests/data/caches has some of each), and makes caches with it there.
+inline constexpr uint32_t kTableVersion = 1;
 inline constexpr uint64_t kPageBytes = 4096;
 inline constexpr std::array<char, 8> kBricksMagic{'C', 'V', 'S', 'b', 'r', 'i', 'c', 'k'};
 inline constexpr std::array<char, 8> kVariableMagic{'C', 'V', 'S', 'v', 'a', 'l', 'u', 'e'};
 
 struct BricksHeader {
   std::array<char, 8> magic = kBricksMagic;  // 0
-  uint32_t version = kCacheVersion;          // 8
+  uint32_t version = kTableVersion;          // 8
   uint32_t record_bytes = 0;                 // 12
   uint64_t bricks = 0;                       // 16
 };                                           // 24
@@ -63,7 +64,7 @@ static_assert(offsetof(BrickRecord, lower) == 64 && offsetof(BrickRecord, geomet
 
 struct VariableHeader {
   std::array<char, 8> magic = kVariableMagic;  // 0
-  uint32_t version = kCacheVersion;            // 8
+  uint32_t version = kTableVersion;            // 8
   uint32_t record_bytes = 0;                   // 12
   uint64_t bricks = 0;                         // 16
   uint64_t table_offset = 0;                   // 24

@@ -166,9 +166,9 @@ void readRecords(const InputFile& file, const Header& header, uint64_t offset, c
   if (header.magic != Header{}.magic)
     throw Error("{}: does not begin as such a file of a cache does; it is damaged or not this cache's",
                 file.path().string());
-  if (header.version != kCacheVersion || header.record_bytes != sizeof(Record))
+  if (header.version != kTableVersion || header.record_bytes != sizeof(Record))
     throw Error("{}: has version {} and records of {} bytes, expected {} and {}", file.path().string(),
-                header.version, header.record_bytes, kCacheVersion, sizeof(Record));
+                header.version, header.record_bytes, kTableVersion, sizeof(Record));
   if (header.bricks != manifest.bricks || offset > file.size() ||
       (file.size() - offset) / sizeof(Record) != header.bricks ||
       (file.size() - offset) % sizeof(Record) != 0)

@@ -43,7 +43,8 @@ struct EncodedValues {
 
 /// Encodes the values of one variable, as encodeBrick does, and replaces them by what decoding gives. They
 /// are finite. `runs`: the brick's. Pure: any thread. Throws nothing but bad_alloc.
-EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<SplatScalar> values);
+EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<const uint32_t> border_codes,
+                           std::span<SplatScalar> values);
 
 /// Decodes the geometry stream of `brick`. Bytes are untrusted: throws Error (naming the brick) for anything
 /// that does not decode to exactly brick.splats finite splats inside the cell; allocates no more than that

@@ -10,9 +10,8 @@
 namespace curvisplat {
 namespace {
 
-// Bits 0-1: how many axes; bit 2: the third is against the rotation's; bits 3-4: which of the quaternion's
-// numbers, w x y z, is the largest and left out; then 8 bits for each of the others.
 constexpr uint32_t kReversed = 4;
+constexpr int kFacesShift = 5;
 constexpr double kLargest = std::numbers::sqrt2 / 2;  // that a number which is not the largest can be
 constexpr double kSteps = 255;
 
@@ -27,7 +26,7 @@ glm::dquat rotationOf(std::span<const glm::dvec3> inward) {
 
 }  // namespace
 
-uint32_t packBorderCode(std::span<const glm::dvec3> inward) {
+uint32_t packBorderCode(std::span<const glm::dvec3> inward, uint32_t faces) {
   if (inward.empty()) return kNoBorder;
   const glm::dquat rotation = rotationOf(inward);
   std::array<double, 4> numbers{rotation.w, rotation.x, rotation.y, rotation.z};
@@ -35,7 +34,7 @@ uint32_t packBorderCode(std::span<const glm::dvec3> inward) {
   for (uint32_t n = 1; n < 4; ++n)
     if (std::abs(numbers[n]) > std::abs(numbers[largest])) largest = n;
   const double sign = numbers[largest] < 0 ? -1 : 1;
-  auto code = static_cast<uint32_t>(inward.size()) | largest << 3;
+  auto code = static_cast<uint32_t>(inward.size()) | largest << 3 | faces << kFacesShift;
   if (inward.size() == 3 && glm::dot(glm::cross(inward[0], inward[1]), inward[2]) < 0) code |= kReversed;
   int shift = 8;
   for (uint32_t n = 0; n < 4; ++n) {
@@ -51,6 +50,7 @@ InwardAxes inwardAxes(uint32_t border_code) {
   InwardAxes inward;
   inward.count = static_cast<int>(border_code & 3);
   if (inward.count == 0) return inward;
+  inward.faces = border_code >> kFacesShift & 7;
   const uint32_t largest = border_code >> 3 & 3;
   std::array<float, 4> numbers{};
   float sum = 0;
@@ -69,8 +69,26 @@ InwardAxes inwardAxes(uint32_t border_code) {
 }
 
 bool isPossibleBorderCode(uint32_t border_code) {
-  const bool whole = border_code == kNoBorder;
-  return whole || ((border_code & 3) != 0 && (border_code & 0xe0) == 0);
+  if (border_code == kNoBorder) return true;
+  const uint32_t count = border_code & 3, faces = border_code >> kFacesShift & 7;
+  return count != 0 && faces >> count == 0;
+}
+
+double borderReach(uint32_t border_code) {
+  if (border_code == kNoBorder) return 0;
+  return (border_code >> kFacesShift & 7) != 0 ? kCutReach : kPartsReach;
+}
+
+double drawnSlope(const glm::dvec3& slope, uint32_t border_code) {
+  double squared = glm::dot(slope, slope);
+  if (border_code == kNoBorder) return std::sqrt(squared);
+  constexpr double kWidest = std::max(kHalfCellStyle.cut.size, kWholeCellStyle.cut.size);
+  const InwardAxes inward = inwardAxes(border_code);
+  for (int n = 0; n < inward.count; ++n) {
+    const double along = glm::dot(slope, glm::dvec3(inward.axis[static_cast<size_t>(n)]));
+    if (inward.hasFace(n)) squared += (kWidest * kWidest - 1) * along * along;
+  }
+  return std::sqrt(squared);
 }
 
 }  // namespace curvisplat

@@ -68,6 +68,18 @@ TEST_F(Corrections, PartsAtBorders) {
   expectWorth("parts at borders", source_, field_, "smooth", halfAnnulusCamera(), 62, {}, without);
 }
 
+TEST_F(Corrections, FacesOfBorders) {
+  // A uniform medium, whose outline is all that can be wrong.
+  const auto constant = scene("half-annulus-constant");
+  const SceneGridSource source(constant, {64, 32, 32}, 4);
+  DirectOptions without;
+  without.nodes.faces = false;
+  expectWorth("faces of borders, seen edge-on", source, SceneField(*constant), "smooth", edgeOnCamera(), 45,
+              {}, without);
+  expectWorth("faces of borders, seen obliquely", source, SceneField(*constant), "smooth",
+              halfAnnulusCamera(), 57, {}, without);
+}
+
 TEST_F(Corrections, BendsOfTheScalar) {
   DirectOptions without;
   without.nodes.bends = false;

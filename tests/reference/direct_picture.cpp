@@ -113,6 +113,10 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
   sorted.reserve(projector.splats().size());
   for (const uint32_t n : sorter.farthestFirst(projector.depths())) {
     ScreenSplat splat = projector.splats()[n];
+    if (isCut(splat)) {
+      sorted.push_back(splat);
+      continue;
+    }
     if (!options.hidden_slope) splat.half_width = 0;
     if (!options.secant && camera.projection == Projection::kPerspective)
       splat.amplitude /=

@@ -38,6 +38,26 @@ std::vector<ScreenSplat> randomSplats(int count, uint32_t seed, ImageSize size, 
   return splats;
 }
 
+std::vector<ScreenSplat> cutSome(const std::vector<ScreenSplat>& splats, uint32_t seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> around(-1, 1);
+  std::vector<ScreenSplat> out;
+  for (size_t n = 0; n < splats.size(); ++n) {
+    out.push_back(splats[n]);
+    if (n % 3 != 0) continue;
+    out.back().amplitude *= -1;
+    ScreenCut cut;
+    for (size_t face = 0; face < 1 + random() % ScreenCut::kFaces; ++face) {
+      const float steep = face == 0 && n % 2 == 0 ? 20.0f : 2.0f;
+      cut.faces[face] = {2 * around(random), steep * around(random), steep * around(random)};
+    }
+    cut.far_sides = random() % 8;
+    cut.correlation = around(random);
+    out.push_back(cut.record());
+  }
+  return out;
+}
+
 Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const ClassificationTable& table,
                  bool per_pixel, ImageSize size, const glm::vec4& background,
                  const PaintResources& resources) {

@@ -23,6 +23,9 @@ ClassificationTable smooth(bool log_scale = false);
 std::vector<ScreenSplat> randomSplats(int count, uint32_t seed, ImageSize size, float slope = 0.3f,
                                       float opacity = 0.5f);
 
+/// The same, farthest first, every third of them cut at up to three faces.
+std::vector<ScreenSplat> cutSome(const std::vector<ScreenSplat>& splats, uint32_t seed);
+
 /// A frame, in the painter's own order. `splats`: farthest first.
 Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const ClassificationTable& table,
                  bool per_pixel, ImageSize size, const glm::vec4& background = {1, 1, 1, 1},
