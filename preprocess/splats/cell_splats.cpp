@@ -112,7 +112,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
 
   NodeSplat& splat = out_.splats[count_];
   splat.node = in_.first_node + (k * in_.block.nj + j) * in_.block.ni + i;
-  splat.on_block_face = false;
+  splat.on_block_face = splat.behind_face = false;
   splat.spacing = 0;
   splat.node_position = splat.splat.position = hexahedron.centre;
 

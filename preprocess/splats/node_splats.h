@@ -12,8 +12,11 @@
 //
 // A missing neighbour (the block ends, or the node there is blank) makes the cell a half cell along that
 // axis: the Jacobian's column is half of the one difference there is, and the splat sits a quarter cell
-// inwards. Without any neighbour along an axis the column is zero. The border is a face that the splat is to be
-// cut at (stream/model/border_code.h), but where the cell has collapsed: at poles, and on singular lines.
+// inwards. Without any neighbour along an axis the column is zero. The border is a face that the splat is to
+// be cut at (stream/model/border_code.h), but where the cell has collapsed: at poles, and on singular lines.
+// The splats of the next layer of nodes reach beyond a face at the block's end by a hundredth of a cell's
+// weight, and are cut there; not in blocks of three nodes or fewer along that axis, nor on another of the
+// block's faces.
 #pragma once
 
 #include <array>
@@ -52,9 +55,13 @@ struct NodeSplat {
   bool regular = true;               // weight is a0 a1 a2, and every variable's variance is 0
   uint32_t border_code = kNoBorder;  // stream/border_code.h
   bool on_block_face = false;        // may coincide with a node of another face: to be merged by SeamMerger
-  glm::dvec3 node_position{0.0};     // where the node itself is
-  double spacing = 0;  // on a block face: the smallest distance > 0 to a neighbour along an axis, 0 if there
-                       // is none; the seams' tolerance. Elsewhere 0
+  bool behind_face = false;          // its border_code is for a face that SeamMerger may find to be closed
+  glm::dvec3 node_position{0.0};     // where the node itself is; behind a face, where the face's node is
+  // Of that node, where SeamMerger is asked: the smallest distance > 0 to a neighbour along an axis, 0 if there
+  // is none; the seams' tolerance. Elsewhere 0.
+  double spacing = 0;
+
+  bool isForSeams() const { return on_block_face || behind_face; }
 };
 
 /// The splats of some rows of one block. Values are [splat * variables + variable].

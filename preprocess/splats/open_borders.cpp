@@ -20,6 +20,15 @@ glm::dvec3 inFrame(const Splat& s, const glm::dvec3& v) {
 
 }  // namespace
 
+bool isOpen(const Splat& face, uint32_t border_code, const Splat& behind) {
+  const InwardAxes inward = inwardAxes(border_code);
+  const glm::dvec3 direction = glm::normalize(inFrame(face, behind.position - face.position));
+  for (int a = 0; a < inward.count; ++a)
+    if (inward.hasFace(a) && glm::dot(glm::dvec3(inward.axis[static_cast<size_t>(a)]), direction) > kSimilar)
+      return true;
+  return false;
+}
+
 void OpenBorders::add(const Splat& part, uint32_t border_code) {
   const InwardAxes inward = inwardAxes(border_code);
   for (int a = 0; a < inward.count; ++a)

@@ -42,8 +42,8 @@ struct TableTexture {
   }
 };
 
-/// Splats as the shader's instances: ScreenSplat's ten floats as 4 + 4 + 2, and those of the record behind it,
-/// so that there is one more in the buffer than is drawn. Leaves itself bound.
+/// Splats as the shader's instances: ScreenSplat's ten floats as 4 + 4 + 2, and those of the record behind
+/// it, so that there is one more in the buffer than is drawn. Leaves itself bound.
 struct InstanceBuffer {
   GlObject buffer, vertex_array;
 

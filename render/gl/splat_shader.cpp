@@ -9,7 +9,7 @@ constexpr const char* kVertexShader = R"(#version 330 core
 layout(location = 0) in vec4 part0;  // x, y, l11, l21
 layout(location = 1) in vec4 part1;  // l22, amplitude, mean, slope0
 layout(location = 2) in vec2 part2;  // slope1, half_width
-layout(location = 3) in vec4 next0;  // the record behind the splat: its ScreenCut, if its amplitude is negative
+layout(location = 3) in vec4 next0;  // the record behind it: its ScreenCut, if its amplitude is negative
 layout(location = 4) in vec4 next1;
 layout(location = 5) in vec2 next2;
 uniform vec2 clip_from_pixel;
@@ -129,7 +129,8 @@ void main() {
     float deviation = cut.y * width * 0.57735027;
     depth *= left.x;
     mean += deviation * kReach * left.y;
-    width = sqrt(max(0.0, width * width - 3.0 * deviation * deviation * (1.0 - clamp(7.0 * left.z, 0.0, 1.0))));
+    float lost = 1.0 - clamp(7.0 * left.z, 0.0, 1.0);
+    width = sqrt(max(0.0, width * width - 3.0 * deviation * deviation * lost));
   }
   // Beyond an end of the table all is the same; float tells cells apart only near it.
   float from = min(cellsOf(mean - width), float(cells) + 1.0), to = max(cellsOf(mean + width), -1.0);

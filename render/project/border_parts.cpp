@@ -50,6 +50,11 @@ void reshape(SplatPiece& piece, const Cholesky& l) {
 size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const BorderStyle& style,
                      BorderPieces& pieces) {
   const InwardAxes inward = inwardAxes(border_code);
+  if (inward.behind) {
+    pieces[0] = whole;
+    pieces[0].faces.add({inward.axis[0], inward.distance, true});
+    return 1;
+  }
   size_t count = 1;
   for (int a = 0; a < inward.count; ++a)
     if (!inward.hasFace(a)) count *= 2;
@@ -82,11 +87,11 @@ size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const Border
     reshape(piece, l);
     for (int a = 0; a < inward.count; ++a) {
       if (!inward.hasFace(a)) continue;
-      // The face's normal is A⁻ᵀ q, and Lᵀ q in the new frame; the face is half a cell from the cell's middle.
+      // The face's normal is A⁻ᵀ q, and Lᵀ q in the new frame.
       const glm::vec3& q = inward.axis[static_cast<size_t>(a)];
       const glm::vec3 normal = transposed(l, q);
       const float inverse = 1 / glm::length(normal);
-      piece.faces.add({inverse * normal, inverse * (0.5f + glm::dot(q, offset))});
+      piece.faces.add({inverse * normal, inverse * (inward.distance + glm::dot(q, offset))});
     }
   }
   return count;

@@ -1,5 +1,5 @@
-// The splat of a cell at a border as it is drawn: along each axis that ends at a face, one wider splat that is
-// cut there; along others in two parts, which follow a border more closely than one symmetric kernel can
+// The splat of a cell at a border as it is drawn: along each axis that ends at a face, one wider splat that
+// is cut there; along others in two parts, which follow a border more closely than one symmetric kernel can
 // (stream/model/border_code.h).
 #pragma once
 

@@ -24,6 +24,9 @@ Remains cutAtFaces(const ScreenRows& rows, const SplatPiece& piece, const Ellips
   const float nn = glm::dot(along, along);
   const float determinant = nn + low_pass_px2 * (s00 + s11 + low_pass_px2);
 
+  // A face's distance varies along the ray by this part of its variance in the splat: 1 is seen face-on. What
+  // the next layer's splats have behind a face (a hundredth of their weight) shows only beside its edges.
+  constexpr float kLowAngle = 0.5f;
   int count = 0;
   float steepest = 0;  // how much of the face's deviation is along the ray
   for (const CutFace& face : piece.faces) {
@@ -32,8 +35,10 @@ Remains cutAtFaces(const ScreenRows& rows, const SplatPiece& piece, const Ellips
     const glm::vec3 m = glm::cross(along, q), c0 = glm::cross(b0, q), c1 = glm::cross(b1, q);
     const float g0 = (glm::dot(b1, m) + low_pass_px2 * h0) / determinant;
     const float g1 = (low_pass_px2 * h1 - glm::dot(b0, m)) / determinant;
-    const float deviation = std::sqrt(
-        (low_pass_px2 * (low_pass_px2 + glm::dot(c0, c0) + glm::dot(c1, c1)) + nq * nq) / determinant);
+    const float hidden =
+        (low_pass_px2 * (low_pass_px2 + glm::dot(c0, c0) + glm::dot(c1, c1)) + nq * nq) / determinant;
+    if (face.edge_on && hidden > kLowAngle) continue;
+    const float deviation = std::sqrt(hidden);
     const float inverse = 1 / (kSigma * deviation);
     const float a = inverse * face.distance;
     const float by0 = inverse * (ellipse.l11 * g0 + ellipse.l21 * g1), by1 = inverse * ellipse.l22 * g1;

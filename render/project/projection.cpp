@@ -215,18 +215,24 @@ std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<c
                                     variable.variance[i]))
     return Chooser::Fate::kTransparent;
   auto best = Chooser::Fate::kOffScreen;
+  // A splat that is cut at faces has a record of its own, as any splat; what it takes beyond that counts.
+  size_t own = inwardAxes(border_code).faces != 0 ? 1 : 0;
   const auto take = [&](const SplatPiece& piece, const PlacedPiece& at) {
-    if (left.pieces == 0) return false;
+    if (left.pieces + own == 0) return false;
     const Ellipse ellipse = ellipseOf(at.rows, piece.shape, piece.slope, variable.variance[i],
                                       piece.weight * at.volume, map.low_pass_px2, map.slope_low_pass_px2);
     const ScreenSplat splat = screenSplat(at.x, at.y, ellipse, piece.mean);
     ScreenCut cut;
     const Remains remains = cutAtFaces(at.rows, piece, ellipse, map.low_pass_px2, cut);
     if (remains == Remains::kNothing) return true;
-    if (remains == Remains::kSome && left.pieces < 2) return false;
+    const size_t records = remains == Remains::kAll ? 1 : 2;
+    if (left.pieces + own < records) return false;
     const auto fate =
         remains == Remains::kAll ? chooser.choose(splat, at.depth) : chooser.chooseCut(splat, at.depth, cut);
-    if (fate == Chooser::Fate::kKept) left.pieces -= remains == Remains::kAll ? 1 : 2;
+    if (fate == Chooser::Fate::kKept) {
+      left.pieces -= records - own;
+      own = 0;
+    }
     best = std::max(best, fate);
     return true;
   };

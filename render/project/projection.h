@@ -37,16 +37,16 @@ struct ScreenSplat {
 };
 static_assert(sizeof(ScreenSplat) == 40);
 
-/// The faces that a splat is cut at: comes as a record of its own, directly behind the splat from the farthest
-/// to the nearest, and directly before it from the nearest to the farthest. The splat's amplitude is then
-/// negative: minus what it would be.
+/// The faces that a splat is cut at: comes as a record of its own, directly behind the splat from the
+/// farthest to the nearest, and directly before it from the nearest to the farthest. The splat's amplitude is
+/// then negative: minus what it would be.
 ///
 /// Along the ray of a pixel the splat lies about its middle with a distribution of deviation 1: the
-/// biweight's, b(x) = 15 / (16 √7) (1 - x²/7)², |x| <= √7. A face leaves what is nearer than, or farther than,
-/// a = faces[n][0] + (faces[n][1], faces[n][2]) · u deviations before, or behind, the middle; all faces together
-/// an interval [lo, hi]. What is left of the optical depth is the interval's share M of the distribution; and
-/// with its mean m and variance v, the scalar's mean changes by k m and its variance by -k² (1 - v), where
-/// k = correlation half_width / √3.
+/// biweight's, b(x) = 15 / (16 √7) (1 - x²/7)², |x| <= √7. A face leaves what is nearer than, or farther
+/// than, a = faces[n][0] + (faces[n][1], faces[n][2]) · u deviations before, or behind, the middle; all faces
+/// together an interval [lo, hi]. What is left of the optical depth is the interval's share M of the
+/// distribution; and with its mean m and variance v, the scalar's mean changes by k m and its variance by -k²
+/// (1 - v), where k = correlation half_width / √3.
 struct ScreenCut {
   static constexpr int kFaces = 3;
 
@@ -124,9 +124,9 @@ class BrickProjector {
   BrickProjector();
 
   /// Projects the splats of a brick that `ranges` hold; `cell_min` is the minimum corner of its cell. Leaves
-  /// out what cannot be seen. Cells at borders are cut or drawn in parts (border_parts.h). Splats that reach behind
-  /// the near plane or span a wide angle are cut along their longest column into two that merge into them
-  /// exactly, until they are small for their distance; what then lies before the near plane is dropped.
+  /// out what cannot be seen. Cells at borders are cut or drawn in parts (border_parts.h). Splats that reach
+  /// behind the near plane or span a wide angle are cut along their longest column into two that merge into
+  /// them exactly, until they are small for their distance; what then lies before the near plane is dropped.
   /// Overwrites splats() and depths(). Pure.
   void project(const ProjectionSettings& settings, const ClassificationTable& table,
                const glm::dvec3& cell_min, const GeometryArrays<const float>& geometry,
@@ -148,8 +148,8 @@ class BrickProjector {
   ProjectionCounts counts_;
 };
 
-/// How far, in multiples of the largest slope (BrickVariable), a mean can reach over the footprints of a splat
-/// and of its parts at a border, under `low_pass_px2`; where it is cut the mean moves by up to
+/// How far, in multiples of the largest slope (BrickVariable), a mean can reach over the footprints of a
+/// splat and of its parts at a border, under `low_pass_px2`; where it is cut the mean moves by up to
 /// ScreenCut::kReach deviations more.
 double largestReach(double low_pass_px2);
 

@@ -27,10 +27,10 @@ std::array<SplatPiece, 2> halve(const SplatPiece& piece, int column) {
     glm::vec3 inward = face.inward;
     inward[column] *= 0.5f;
     const float inverse = 1 / glm::length(inward), step_inward = 0.25f * face.inward[column];
-    halves[0].faces.face[static_cast<size_t>(n)] = {inverse * inward,
-                                                    inverse * (face.distance - step_inward)};
-    halves[1].faces.face[static_cast<size_t>(n)] = {inverse * inward,
-                                                    inverse * (face.distance + step_inward)};
+    halves[0].faces.face[static_cast<size_t>(n)] = {inverse * inward, inverse * (face.distance - step_inward),
+                                                    face.edge_on};
+    halves[1].faces.face[static_cast<size_t>(n)] = {inverse * inward, inverse * (face.distance + step_inward),
+                                                    face.edge_on};
   }
   return halves;
 }

@@ -21,6 +21,7 @@ namespace curvisplat {
 struct CutFace {
   glm::vec3 inward;  // unit length
   float distance;
+  bool edge_on = false;  // cuts little enough to be left out where it is not seen at a low angle
 };
 struct CutFaces {
   std::array<CutFace, 3> face;

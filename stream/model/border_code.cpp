@@ -24,7 +24,44 @@ glm::dquat rotationOf(std::span<const glm::dvec3> inward) {
   return glm::normalize(glm::quat_cast(glm::dmat3(inward[0], inward[1], glm::cross(inward[0], inward[1]))));
 }
 
+constexpr uint32_t kLayer = 4;
+constexpr int kInwardShift = 8, kDistanceShift = 24;
+constexpr double kDistanceSteps = 128;  // to a cell
+
+/// In 16 bits: the octahedron |x| + |y| + |z| = 1, its lower half folded outwards.
+uint32_t packDirection(const glm::dvec3& q) {
+  const double inverse = 1 / (std::abs(q.x) + std::abs(q.y) + std::abs(q.z));
+  double u = q.x * inverse, v = q.y * inverse;
+  if (q.z < 0) {
+    const double folded = (1 - std::abs(v)) * (u < 0 ? -1 : 1);
+    v = (1 - std::abs(u)) * (v < 0 ? -1 : 1);
+    u = folded;
+  }
+  const auto steps = [](double x) {
+    return static_cast<uint32_t>(std::clamp(0.5 + 0.5 * x, 0.0, 1.0) * kSteps + 0.5);
+  };
+  return steps(u) | steps(v) << 8;
+}
+
+glm::vec3 unpackDirection(uint32_t bits) {
+  const auto number = [](uint32_t steps) { return static_cast<float>(steps / kSteps * 2 - 1); };
+  glm::vec3 q(number(bits & 0xff), number(bits >> 8 & 0xff), 0.0f);
+  q.z = 1 - std::abs(q.x) - std::abs(q.y);
+  if (q.z < 0) {
+    const float folded = (1 - std::abs(q.y)) * (q.x < 0 ? -1.0f : 1.0f);
+    q.y = (1 - std::abs(q.x)) * (q.y < 0 ? -1.0f : 1.0f);
+    q.x = folded;
+  }
+  return glm::normalize(q);
+}
+
 }  // namespace
+
+uint32_t packLayerCode(const glm::dvec3& inward, double distance) {
+  const double steps = std::round(distance * kDistanceSteps);
+  if (!(steps >= 1 && steps <= kSteps)) return kNoBorder;
+  return kLayer | packDirection(inward) << kInwardShift | static_cast<uint32_t>(steps) << kDistanceShift;
+}
 
 uint32_t packBorderCode(std::span<const glm::dvec3> inward, uint32_t faces) {
   if (inward.empty()) return kNoBorder;
@@ -49,7 +86,15 @@ uint32_t packBorderCode(std::span<const glm::dvec3> inward, uint32_t faces) {
 InwardAxes inwardAxes(uint32_t border_code) {
   InwardAxes inward;
   inward.count = static_cast<int>(border_code & 3);
-  if (inward.count == 0) return inward;
+  if (inward.count == 0) {
+    if (border_code == kNoBorder) return inward;
+    inward.count = 1;
+    inward.axis[0] = unpackDirection(border_code >> kInwardShift & 0xffff);
+    inward.faces = 1;
+    inward.distance = static_cast<float>((border_code >> kDistanceShift) / kDistanceSteps);
+    inward.behind = true;
+    return inward;
+  }
   inward.faces = border_code >> kFacesShift & 7;
   const uint32_t largest = border_code >> 3 & 3;
   std::array<float, 4> numbers{};
@@ -71,17 +116,18 @@ InwardAxes inwardAxes(uint32_t border_code) {
 bool isPossibleBorderCode(uint32_t border_code) {
   if (border_code == kNoBorder) return true;
   const uint32_t count = border_code & 3, faces = border_code >> kFacesShift & 7;
-  return count != 0 && faces >> count == 0;
+  if (count == 0) return (border_code & 0xff) == kLayer && border_code >> kDistanceShift != 0;
+  return faces >> count == 0;
 }
 
 double borderReach(uint32_t border_code) {
-  if (border_code == kNoBorder) return 0;
+  if ((border_code & 3) == 0) return 0;
   return (border_code >> kFacesShift & 7) != 0 ? kCutReach : kPartsReach;
 }
 
 double drawnSlope(const glm::dvec3& slope, uint32_t border_code) {
   double squared = glm::dot(slope, slope);
-  if (border_code == kNoBorder) return std::sqrt(squared);
+  if ((border_code & 3) == 0) return std::sqrt(squared);
   constexpr double kWidest = std::max(kHalfCellStyle.cut.size, kWholeCellStyle.cut.size);
   const InwardAxes inward = inwardAxes(border_code);
   for (int n = 0; n < inward.count; ++n) {

@@ -4,8 +4,8 @@
 //
 // The directions are unit vectors in the frame of the splat's A (A q is from the border inwards, as long as
 // the cell is in that direction) and at right angles to one another, since J = A Q with Q orthogonal. They
-// are kept as a rotation, good to 0.01 in the cell's own measure whatever its aspect ratio, and each has a bit
-// that says how the renderer is to draw it: in parts, or cut at the border's face.
+// are kept as a rotation, good to 0.01 in the cell's own measure whatever its aspect ratio, and each has a
+// bit that says how the renderer is to draw it: in parts, or cut at the border's face.
 //
 //   bits 0-1   number of directions
 //        2     the third is opposite to the rotation's
@@ -13,7 +13,16 @@
 //        5-7   direction 0, 1, 2 ends at a face to be cut at
 //        8-31  the quaternion's other numbers, 8 bits each
 //
-// The first version of the format has only zeros in bits 5-7.
+// A node's cell in the layer behind such a face is whole, but its splat reaches beyond the face and is cut
+// there, too. It has a code of another form:
+//
+//   bits 0-1   zero
+//        2     one
+//        3-7   zero
+//        8-23  the direction from the face inwards: the octahedron's map, 8 bits each
+//        24-31 how far the face is from the cell's middle, in 1/128 of the cell's length in that direction
+//
+// The first version of the format has only zeros in bits 5-7 of the one form, and has not the other.
 #pragma once
 
 #include <array>
@@ -30,20 +39,25 @@ struct InwardAxes {
   std::array<glm::vec3, 3> axis;  // unit length, orthogonal
   int count = 0;                  // 0..3
   uint32_t faces = 0;             // bit n: axis[n] starts at a face to be cut at
+  float distance = 0.5f;          // of the faces from the cell's middle, in cells
+  bool behind = false;            // the cell is in the layer behind the one face
 
   bool hasFace(int n) const { return (faces >> n & 1) != 0; }
 };
 
 /// `inward`: none to three such vectors. `faces`: InwardAxes'.
 uint32_t packBorderCode(std::span<const glm::dvec3> inward, uint32_t faces = 0);
+/// Of a cell in the layer behind a face; kNoBorder where the distance, of the face from the cell's middle in
+/// cells, is not in the code's range.
+uint32_t packLayerCode(const glm::dvec3& inward, double distance);
 InwardAxes inwardAxes(uint32_t border_code);
 
 /// False for what packBorderCode() gives to no cell; whatever passes has inward axes.
 bool isPossibleBorderCode(uint32_t border_code);
 
 // How the renderer draws a cell at a border: cut, as one wider splat of which the part behind the face is not
-// drawn (render/project/border_parts.h), or in two parts, a narrow one at the border and a wide one behind it.
-// In units of the cell's length in that direction, from its middle inwards; the shares are of its weight.
+// drawn (render/project/border_parts.h), or in two parts, a narrow one at the border and a wide one behind
+// it. In units of the cell's length in that direction, from its middle inwards; the shares are of its weight.
 struct BorderPart {
   float offset, size, share;
 };
@@ -52,8 +66,8 @@ struct BorderStyle {
   std::array<BorderPart, 2> parts;  // their shares sum to one
 };
 
-// By least squares in one dimension, for the step that a uniform half space is. `kHalf`: half cells, of nodes;
-// `kWhole`: cells of cell-centred data.
+// By least squares in one dimension, for the step that a uniform half space is. `kHalf`: half cells, of
+// nodes; `kWhole`: cells of cell-centred data.
 //
 //                   squared error   outside of the border   density behind it
 //   kHalf   one splat       0.048        0.079                 0.83 and more
@@ -67,8 +81,9 @@ inline constexpr BorderStyle kHalfCellStyle{{-0.646f, 2.13f, 2.31f},
 inline constexpr BorderStyle kWholeCellStyle{{-0.243f, 1.264f, 1.507f},
                                              {{{-0.342f, 0.25f, 0.197f}, {0.111f, 0.769f, 0.803f}}}};
 
-/// How much farther than the splat itself it reaches as it is drawn, at the most, in units of its largest axis:
-/// the inner parts' offset along three axes; and a half cell's wide splat, but for what lies behind the face.
+/// How much farther than the splat itself it reaches as it is drawn, at the most, in units of its largest
+/// axis: the inner parts' offset along three axes; and a half cell's wide splat, but for what lies behind the
+/// face.
 inline constexpr double kPartsReach = 0.52, kCutReach = 1.25;
 double borderReach(uint32_t border_code);
 /// |w|, as stream/model/splats.h has it, of the splat as it is drawn, at the most.

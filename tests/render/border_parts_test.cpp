@@ -116,6 +116,17 @@ TEST(BorderParts, AtFacesAreOneThatIsCutThere) {
   }
 }
 
+TEST(BorderParts, InTheLayerBehindAFaceAreItselfCutThere) {
+  BorderPieces pieces;
+  ASSERT_EQ(partsAtBorder(kWhole, packLayerCode(kInward[0], 0.75), kHalfCellStyle, pieces), 1u);
+  EXPECT_EQ(pieces[0].position, kWhole.position);
+  EXPECT_EQ(factorOf(pieces[0].shape), factorOf(kWhole.shape));
+  EXPECT_EQ(pieces[0].weight, kWhole.weight);
+  ASSERT_EQ(pieces[0].faces.count, 1);
+  EXPECT_EQ(pieces[0].faces.face[0].distance, 0.75f);
+  EXPECT_LT(glm::distance(glm::dvec3(pieces[0].faces.face[0].inward), kInward[0]), 0.02);
+}
+
 TEST(BorderParts, KeepTheirFacesWhereTheyAreHalved) {
   BorderPieces pieces;
   partsAtBorder(kWhole, packBorderCode({kInward, 2}, 3), kHalfCellStyle, pieces);

@@ -113,6 +113,19 @@ TEST(FaceCut, IsAntialiasedEdgeOn) {
   }
 }
 
+TEST(FaceCut, OfTheNextLayerIsLeftOutWhereItIsSeenFaceOn) {
+  const ScreenRows rows{10, 0, 0, 0, 10, 0};
+  for (const bool edge_on : {true, false})
+    for (const glm::vec3& inward : {glm::vec3(0, 0, 1), glm::vec3(1, 0, 0)}) {
+      SplatPiece piece{{0, 0, 0}, {1, 1, 1, 0, 0, 0}, {0, 0, 0}, 0, 1};
+      piece.faces.add({inward, 0.8f, edge_on});
+      ScreenCut cut;
+      const Ellipse ellipse = ellipseOf(rows, piece.shape, piece.slope, 0, 1, kLowPass2, 0.01f);
+      EXPECT_EQ(cutAtFaces(rows, piece, ellipse, kLowPass2, cut),
+                edge_on && inward.z == 1 ? Remains::kAll : Remains::kSome);
+    }
+}
+
 TEST(ScreenCut, IsARecordThatIsNoSplat) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> around(-1, 1);

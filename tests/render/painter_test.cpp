@@ -95,8 +95,8 @@ TEST_P(PainterTest, CutsSplatsWhereverADrawEnds) {
 }
 
 TEST_P(PainterTest, AFaceAcrossTheRayLeavesItsShare) {
-  // Half of a splat that is seen through a face at its middle; with a scalar that falls along the ray, what is
-  // left has the mean of the nearer half.
+  // Half of a splat that is seen through a face at its middle; with a scalar that falls along the ray, what
+  // is left has the mean of the nearer half.
   const ClassificationTable even([](double) { return TransferFunction::Value{glm::dvec3(0.0), 1}; }, 0, 1);
   ScreenCut cut;
   cut.faces[0] = {0, 0, 0};

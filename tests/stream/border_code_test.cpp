@@ -73,6 +73,28 @@ TEST(HalfCell, OfAnyBytesHasFiniteUnitAxes) {
   }
 }
 
+TEST(LayerBehindAFace, KeepsItsDirectionAndDistance) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(0, 1);
+  for (int n = 0; n < 3000; ++n) {
+    const glm::dvec3 inward = randomAxes(random)[0];
+    const double distance = 0.01 + 1.97 * unit(random);
+    const uint32_t code = packLayerCode(inward, distance);
+    ASSERT_TRUE(isPossibleBorderCode(code));
+    const InwardAxes kept = inwardAxes(code);
+    ASSERT_TRUE(kept.behind);
+    ASSERT_EQ(kept.count, 1);
+    EXPECT_TRUE(kept.hasFace(0));
+    ASSERT_LT(glm::distance(glm::dvec3(kept.axis[0]), inward), 0.02) << code;
+    ASSERT_NEAR(kept.distance, distance, 0.5 / 128 + 1e-9);
+    EXPECT_EQ(borderReach(code), 0);
+  }
+  for (const double outside : {-1.0, 0.0, 2.5, 1e300, std::nan("")})
+    EXPECT_EQ(packLayerCode({0, 0, 1}, outside), kNoBorder) << outside;
+  EXPECT_FALSE(isPossibleBorderCode(0x80000014));
+  EXPECT_FALSE(isPossibleBorderCode(0x00000104));
+}
+
 TEST(HalfCell, SlopesAreThoseThatAreDrawn) {
   const glm::dvec3 inward[] = {{0, 0, 1}}, slope(0.3, 0, 0.4);
   EXPECT_DOUBLE_EQ(drawnSlope(slope, kNoBorder), 0.5);
