@@ -63,7 +63,8 @@ void checkExtent(const GridSurvey& survey, const NodeReader& reader) {
   const std::string file = description.files.empty() ? description.format : description.files.front();
   if (survey.nodes == survey.blanked.total())
     throw Error(
-        "{}: every one of the {} {} is blanked ({} by the grid, {} by value, {} not finite): there is "
+        "{}: every one of the {} {} is blanked ({} by the grid, {} by value, {} not finite in single "
+        "precision): there is "
         "nothing to draw",
         file, survey.nodes, reader.centring() == Centring::kCell ? "cells" : "nodes", survey.blanked.by_grid,
         survey.blanked.by_value, survey.blanked.not_finite);

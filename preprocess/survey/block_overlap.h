@@ -5,8 +5,9 @@
 // that abut have none there, with the same nodes on their common face or with others; what they lap over one
 // another by cutting a curved face into other chords is negligible (a five-hundredth of a block). The grid's
 // coordinates are read twice, once where the blocks' boxes lie apart. Memory: two slabs, and a hundred bytes
-// a point: some 100 thousand points, and in each block's corners, edges and faces a few more. Grids of more
-// than 20,000 blocks are not looked at.
+// a point: some 100 thousand points, and in each block's corners, edges and faces a few more. Time: n log n of
+// the blocks, and that of the points in each cell's surroundings; a point is looked for until 16 other blocks
+// hold it. Grids of more than 20,000 blocks are not looked at.
 #pragma once
 
 #include <cstdint>

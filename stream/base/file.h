@@ -134,15 +134,9 @@ std::string readTextFile(const std::filesystem::path& path, uint64_t limit = 16 
 
 /// Writes `bytes` beside `path`, syncs and renames them: then `path` is the old file or the whole new one,
 /// whatever happens; which, after a power loss, is certain once its folder has been synced. For a file that
-/// has one writer at a time.
+/// has one writer at a time; others are in durable_file.h.
 void writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void writeFileAtomically(const std::filesystem::path& path, const std::string& text);
-/// For any number of processes, and for good: it syncs the folder. Follows links; refuses what is no file.
-void writeFileDurably(const std::filesystem::path& path, std::span<const std::byte> bytes);
-void writeFileDurably(const std::filesystem::path& path, const std::string& text);
-
-/// Gives a file that is whole, and written by others, its name: syncs it, renames it, and syncs the folder.
-void putFileIntoPlace(const std::filesystem::path& from, const std::filesystem::path& to);
 
 /// fsync of a directory, so that the names in it survive a power loss.
 void syncDirectory(const std::filesystem::path& path);

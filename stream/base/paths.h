@@ -19,8 +19,4 @@ std::filesystem::path linkTarget(std::filesystem::path path);
 /// linkTarget() of a file that is to be written. Throws Error if something else than a regular file is there.
 std::filesystem::path writableTarget(const std::filesystem::path& path);
 
-/// A short name beside `target`, for what is to take its place once it is whole: another one each time, of
-/// all programs on all machines that share the folder.
-std::filesystem::path temporaryBeside(const std::filesystem::path& target);
-
 }  // namespace curvisplat

@@ -7,11 +7,18 @@
 //    +----- ~PartialFolder() ---+    +--- leave() and ~PartialFolder(), or killed: the folder stays,
 //                                         unlocked; the next PartialFolder() empties it, or keeps it
 //                                         to go on from
+//
+// The lock file contains kPartialMark. Only folders with this mark (or without any files) are taken over and
+// emptied, so that other people's files are never removed.
 #pragma once
 
 #include <filesystem>
+#include <string_view>
 
 namespace curvisplat {
+
+inline constexpr const char* kPartialLock = "lock";
+inline constexpr std::string_view kPartialMark = "curvisplat: unfinished cache\n";
 
 /// Throws Error if something stands at `target`, and `overwrite` is false or it is no cache.
 void checkReplaceable(const std::filesystem::path& target, bool overwrite);
@@ -24,8 +31,8 @@ class PartialFolder {
   enum class Rest { kRemove, kKeep };
 
   /// Makes and locks the folder. What an unfinished conversion has left there is removed; or kept, and then
-  /// the folder is as after leave(). Throws Error unless checkReplaceable(), or if another conversion to the
-  /// same target is running.
+  /// the folder is as after leave(). Throws Error unless checkReplaceable(), if another conversion to the
+  /// same target is running, or if a link or a folder that no conversion has made has the name.
   PartialFolder(std::filesystem::path target, bool overwrite, Rest rest = Rest::kRemove);
   /// Removes the folder, unless it has been put into place or is to be left.
   ~PartialFolder();
@@ -52,6 +59,7 @@ class PartialFolder {
 
  private:
   void lock();
+  void mark();
 
   std::filesystem::path target_, path_;
   std::filesystem::path replaced_;  // where the old cache is; empty: there is none

@@ -30,7 +30,8 @@ class VariableWriter {
   void append(uint32_t brick, std::span<const EncodedValues> values);
 
   /// Writes the tables, syncs, and puts files and manifest into place. `sources`, those that the manifest
-  /// does not have yet, are added to it. Returns the new files.
+  /// does not have yet, are added to it. Returns the new files. Throws Error, and then the cache is what it was;
+  /// NameNotSynced where it is not, although a power loss may undo that.
   std::vector<FileInfo> finish(const std::vector<std::string>& sources);
 
  private:
@@ -43,6 +44,7 @@ class VariableWriter {
   };
 
   void removeLeftovers() const;
+  void replaceManifest();
 
   const CacheLock* lock_;
   Manifest manifest_;
