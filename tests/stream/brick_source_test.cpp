@@ -344,8 +344,8 @@ TEST_F(BrickSourceTest, PassesOverWhatIsNotNeeded) {
   for (const uint64_t cache_bytes : {uint64_t{0}, 2 * decoded_bytes_}) {
     BrickSource source(*cache_, 0, pagerOptions(), cache_bytes);
     BrickSource::Scratch scratch;
-    FetchStatistics statistics;
     for (int frame = 0; frame < 4; ++frame) {
+      FetchStatistics statistics;
       source.start(parts, [](uint32_t brick) { return brick % 4 == 3; });
       for (uint64_t n = 0; n < parts.size(); ++n) {
         const uint32_t brick = parts[n].brick;
