@@ -6,7 +6,9 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <regex>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "stream/base/error.h"
@@ -15,6 +17,7 @@
 #include "tools/commands/commands.h"
 #include "tools/options/shown_options.h"
 #include "tools/output/standard_streams.h"
+#include "tools/output/stop_signals.h"
 
 namespace curvisplat {
 namespace {
@@ -23,6 +26,28 @@ std::string namesOf(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::App* command : shownCommands(app)) names.push_back(command->get_name());
   return fmt::format("{}", fmt::join(names, ", "));
+}
+
+/// What is wrong with the command line: CLI11's texts, without those that leave out the reason.
+std::string describe(const CLI::App* command, const CLI::ParseError& error) {
+  const std::string text = error.what();
+  std::smatch found;
+  if (error.get_name() == "RequiredError" && command) {
+    // An unknown option is the likelier mistake.
+    for (const std::string& argument : command->remaining())
+      if (argument.size() > 1 && argument[0] == '-') return fmt::format("unknown option '{}'", argument);
+  }
+  if (std::regex_match(text, found, std::regex("Could not convert: (\\S+) = (.*)")) && command) {
+    const CLI::Option* const option = command->get_option_no_throw(found[1]);
+    const bool is_whole = option && option->get_type_name().starts_with("UINT");
+    return fmt::format("{} '{}': is not a {}, or is too large", found[1].str(), found[2].str(),
+                       is_whole ? "whole number from 0 on" : "number");
+  }
+  if (std::regex_match(text, found,
+                       std::regex("(\\S+): Value (.*) not in range \\[?(\\S+) (?:to|-) ([^\\]]+)\\]?")))
+    return fmt::format("{} '{}': expected a number from {} to {}", found[1].str(), found[2].str(),
+                       found[3].str(), found[4].str());
+  return text;
 }
 
 /// Returns the exit status: 0 success, 1 failure, 2 wrong usage, 128 + n stopped by signal n.
@@ -51,7 +76,7 @@ int run(int argc, char** argv) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help and --version
     const std::vector<CLI::App*> chosen = app.get_subcommands();
     const std::string command = "curvisplat" + (chosen.empty() ? "" : " " + chosen.front()->get_name());
-    printMessage("{}; see {} --help", error.what(), command);
+    printMessage("{}; see {} --help", describe(chosen.empty() ? nullptr : chosen.front(), error), command);
     return 2;
   } catch (const UsageError& error) {
     printMessage("{}", error.what());
@@ -65,6 +90,13 @@ int run(int argc, char** argv) {
   } catch (const std::filesystem::filesystem_error& error) {
     printMessage("{}: {}", error.path1().string(), error.code().message());
     return 1;
+  } catch (const std::system_error& error) {
+    if (error.code() == std::errc::resource_unavailable_try_again)
+      printMessage("cannot start a thread: {}; lower --threads, or raise the limit of processes and memory",
+                   error.code().message());
+    else
+      printMessage("{}", error.what());
+    return 1;
   } catch (const std::exception& error) {
     if (std::ferror(stdout) == 0) printMessage("{}", error.what());  // otherwise main() reports it
     return 1;
@@ -76,6 +108,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   curvisplat::openStandardStreams();
+  curvisplat::ignoreFileSizeSignal();
   const int status = curvisplat::run(argc, argv);
   const bool printed = curvisplat::finishStandardOutput();
   return status == 0 && !printed ? 1 : status;

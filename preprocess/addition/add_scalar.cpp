@@ -152,8 +152,9 @@ class Addition {
           survey_.blanked.by_grid);
     if (missing > 0)
       throw Error(
-          "{}: {} of the {} that it draws have no value of {} ({} not finite, {} the blank value), and "
-          "a splat cannot be without; convert again with all scalars",
+          "{}: {} of the {} that it draws have no value of {} ({} not finite in single precision, {} with "
+          "the "
+          "blank value), and every splat needs one; convert again with all scalars",
           cache_.path().string(), missing, manifest().cells ? "cells" : "nodes", joined(report_.scalars),
           survey_.blanked.not_finite, survey_.blanked.by_value);
     checkRanges(survey_, grid_.description(), options_.scalars);

@@ -57,8 +57,8 @@ uint64_t defaultMemory() {
 
 MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads) {
   if (cap_bytes < leastMemory(variables))
-    throw Error("--memory: conversion of {} scalars takes at least {} MiB; {} MiB were given", variables,
-                leastMemory(variables) / kMiB, cap_bytes / kMiB);
+    throw Error("--memory: conversion of {} scalars takes at least {} MiB; {:.4g} MiB were given", variables,
+                leastMemory(variables) / kMiB, static_cast<double>(cap_bytes) / static_cast<double>(kMiB));
   const uint64_t bytes = cap_bytes - cap_bytes / kAllocatorShare - kProgramBytes;
 
   MemoryPlan plan;

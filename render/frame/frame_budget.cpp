@@ -36,8 +36,10 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
   const uint64_t least = exact + pools + kWorkerBytes;
   if (memory_bytes < least)
     throw UsageError(
-        "{} MiB of memory are too little for {}x{} pixels of this cache; give at least {} MiB with --memory",
-        memory_bytes >> 20, fixed.size.width, fixed.size.height, (least >> 20) + 1);
+        "{:.4g} MiB of memory are too little for {}x{} pixels of this cache; give at least {} MiB with "
+        "--memory",
+        static_cast<double>(memory_bytes) / (1 << 20), fixed.size.width, fixed.size.height,
+        (least >> 20) + 1);
   const uint64_t part = memory_bytes / kParts;
   const uint64_t rounded = (exact + part - 1) / part * part;
   const unsigned wanted = threads ? threads : std::max(1u, std::thread::hardware_concurrency());

@@ -185,7 +185,8 @@ TEST_F(BadInput, MissingTransferFunction) {
 
 TEST_F(BadInput, BrokenTransferFunction) {
   writeFileAtomically(file("broken.json"), std::string("[{\"RGBPoints\": [0, 1"));
-  expectNotRendered(file("whole.splats"), {"--tf", file("broken.json")}, {"broken.json"});
+  expectNotRendered(file("whole.splats"), {"--tf", file("broken.json")},
+                    {"broken.json", "a syntax error at line 1, column 22"});
 }
 
 TEST_F(BadInput, PictureNameWithAnotherEnding) {
@@ -208,6 +209,26 @@ TEST_F(BadInput, WrongUsage) {
   expectOneLine(runProgram({"compare", file("scene.xyz")}), 2, {"see curvisplat compare --help"});
   expectOneLine(runProgram({"render", file("whole.splats"), "-o", file("a.png"), "--sise", "4x4"}), 2,
                 {"--sise"});
+}
+
+TEST_F(BadInput, OptionValuesThatAreNone) {
+  const auto refused = [](const std::vector<std::string>& arguments, const std::string& text) {
+    expectOneLine(runProgram(arguments), 2, {text});
+  };
+  // The unknown option comes first, whatever else is missing.
+  refused({"render", "--sise"}, "unknown option '--sise'");
+  refused({"convert", file("scene.xyz"), "--time-step", "99999999999"},
+          "--time-step '99999999999': is not a whole number from 0 on, or is too large");
+  refused({"convert", file("scene.xyz"), "--blank", "none"},
+          "--blank 'none': is not a number, or is too large");
+  refused({"convert", file("scene.xyz"), "--threads", "1025"},
+          "--threads '1025': expected a number from 0 to 1024");
+  refused({"convert", file("scene.xyz"), "--threads", ""}, "--threads ''");
+  expectOneLine(runProgram({"convert", file("scene.xyz"), file("scene.fun"), "-o", file("little.splats"),
+                            "--memory", "1K"}),
+                1, {"0.0009766 MiB were given"});
+  expectOneLine(runProgram({"render", file("whole.splats"), "-o", file("a.png"), "--memory", "1K"}), 2,
+                {"0.0009766 MiB of memory are too little"});
 }
 
 TEST_F(BadInput, MisspeltSubcommandIsToldWhichThereAre) {

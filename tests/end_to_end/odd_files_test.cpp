@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -151,6 +153,52 @@ TEST_F(OddFiles, AStandardOutputThatCannotBeWrittenIsAnError) {
       EXPECT_EQ(lineCount(result.err), 1) << result.err;
       EXPECT_NE(result.err.find("cannot write to standard output"), std::string::npos) << result.err;
     }
+}
+
+TEST_F(OddFiles, AFileSizeLimitIsAnErrorLikeAFullDisk) {
+  const auto limited = [&](const std::string& command) {
+    const std::string in_folder =
+        "cd '" + folder_.path().string() + "' && ulimit -f 8 && exec " CURVISPLAT_PROGRAM " ";
+    return RunningProgram({"bash", "-c", in_folder + command}, "/usr/bin/env").wait();
+  };
+  const auto names = [&] {
+    std::set<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder_.path())) names.insert(entry.path().filename());
+    return names;
+  };
+  writeCube(folder_ / "more", 24,
+            [](const GridNode& node, NodeValues& values) { values.scalars[0] = static_cast<float>(node.i); });
+  const std::set<std::string> before = names();
+  for (const char* command :
+       {"convert more.xyz more.fun -o more.splats", "render cube.splats -o a.pfm --size 200x200",
+        "generate wake --size 40x40x40 -o wake"}) {
+    const ProgramResult result = limited(command);
+    EXPECT_EQ(result.status, 1) << command;
+    EXPECT_EQ(lineCount(result.err), 1) << result.err;
+    EXPECT_NE(result.err.find("File too large"), std::string::npos) << result.err;
+    EXPECT_EQ(result.err.find(".curvisplat"), std::string::npos) << result.err;
+    EXPECT_EQ(names(), before) << command;
+  }
+}
+
+TEST_F(OddFiles, WithoutProcItWorksAndStatisticsLackWhatItTells) {
+  const auto without = [&](const std::string& command) {
+    const std::string in_folder =
+        "mount -t tmpfs none /proc && cd '" + folder_.path().string() + "' && exec " CURVISPLAT_PROGRAM " ";
+    return RunningProgram({"unshare", "--mount", "sh", "-c", in_folder + command}, "/usr/bin/env").wait();
+  };
+  if (without("--version").status != 0) GTEST_SKIP() << "no file system can be mounted here";
+  for (const char* command : {"convert cube.xyz cube.fun -o b.splats --stats b.json",
+                              "render cube.splats -o b.png --stats r.json"}) {
+    const ProgramResult result = without(command);
+    EXPECT_EQ(result.status, 0) << result.err;
+    EXPECT_EQ(result.out.find("peak memory"), std::string::npos) << result.out;
+  }
+  EXPECT_TRUE(nlohmann::json::parse(readTextFile(file("b.json")))["peak_memory_bytes"].is_null());
+  const auto drawn = nlohmann::json::parse(readTextFile(file("r.json")));
+  EXPECT_TRUE(drawn["peak_memory_bytes"].is_null());
+  EXPECT_TRUE(drawn["time_to_first_image_s"].is_null());
+  EXPECT_EQ(drawn["frames"].size(), 1u);
 }
 
 TEST_F(OddFiles, ProgramsMayWriteTheSamePicture) {

@@ -62,6 +62,17 @@ TEST(BlockOverlap, OfASmallBlockWithinACellIsItsOwnVolume) {
   EXPECT_NEAR(overlaps[0].share, 1, 0.05);
 }
 
+// A set may name one file thousands of times. All pairs of them would be the square of that.
+TEST(BlockOverlap, OfOneBlockManyTimesIsFoundInFewPairs) {
+  constexpr size_t kBlocks = 2000;
+  const auto source = boxes(std::vector<TestBox>(kBlocks, {{0, 0, 0}, {1, 1, 1}, 3}));
+  const auto overlaps = overlapsIn(source);
+  EXPECT_GE(overlaps.size(), kBlocks);
+  EXPECT_LE(overlaps.size(), 16 * kBlocks);
+  for (const BlockOverlap& overlap : overlaps) ASSERT_NEAR(overlap.share, 1, 1e-9);
+  EXPECT_EQ(overlapsIn(source, 2'000).size(), overlaps.size());  // however it is read
+}
+
 TEST(BlockOverlap, IsNoneOfBlocksThatAbut) {
   EXPECT_TRUE(
       overlapsIn(boxes({{{0, 0, 0}, {1, 1, 1}, 9}, {{1, 0, 0}, {1, 1, 1}, 14}, {{0, 1, 0}, {2, 1, 1}, 6}}))

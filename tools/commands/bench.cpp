@@ -14,8 +14,8 @@
 #include <system_error>
 #include <thread>
 
+#include "stream/base/durable_file.h"
 #include "stream/base/error.h"
-#include "stream/base/file.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"

@@ -28,8 +28,7 @@
 namespace curvisplat {
 namespace {
 
-void printSummary(const ConvertArguments& arguments, const ConvertReport& report, double seconds,
-                  uint64_t peak_memory_bytes) {
+void printSummary(const ConvertArguments& arguments, const ConvertReport& report, double seconds) {
   const auto samples = static_cast<double>(report.nodes);
   const uint64_t bytes = totalBytes(report.files);
   fmt::print("{}: {} samples, {} splats in {} bricks, {} levels\n", arguments.output.string(), report.nodes,
@@ -37,8 +36,8 @@ void printSummary(const ConvertArguments& arguments, const ConvertReport& report
   // The interrupted run did part of the work, so this run's time gives no rate.
   const std::string rate = report.resumed ? " since it was resumed"
                                           : fmt::format(", {:.2f} M samples/s", 1e-6 * samples / seconds);
-  fmt::print("{:.1f} s{}, {:.1f} MiB, {:.2f} bytes per sample, peak memory {:.0f} MiB\n", seconds, rate,
-             mebibytes(bytes), static_cast<double>(bytes) / samples, mebibytes(peak_memory_bytes));
+  fmt::print("{:.1f} s{}, {:.1f} MiB, {:.2f} bytes per sample{}\n", seconds, rate, mebibytes(bytes),
+             static_cast<double>(bytes) / samples, peakMemoryText());
 }
 
 /// Prints warnings and notes on the grid to standard error.
@@ -54,7 +53,7 @@ void printWarnings(const GridDescription& description, std::optional<uint32_t> t
     printMessage("note: resumed; {} of {} bricks were already written", report.resumed_bricks, report.bricks);
   note(report.blanked.by_grid, "samples are blanked by the grid");
   note(report.blanked.by_value, "samples have the blank value");
-  note(report.blanked.not_finite, "samples are not finite and are blanked");
+  note(report.blanked.not_finite, "samples are not finite in single precision and are blanked");
   // For samples at nodes these two differ from what `info` prints: it counts the cells between nodes.
   note(report.degenerate, "samples have no volume; they are drawn with a minimum thickness");
   note(report.inverted, "samples are inverted: their handedness differs from most of their block");
@@ -98,7 +97,7 @@ void runConvert(ConvertArguments arguments) {
   const ConvertReport report = convert(*source, options, progress);
   const nlohmann::json numbers = statistics(report, progress);
   printWarnings(source->description(), arguments.grid.time_step, report);
-  printSummary(arguments, report, secondsOf(progress), numbers["peak_memory_bytes"]);
+  printSummary(arguments, report, secondsOf(progress));
   if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, numbers);
 }
 

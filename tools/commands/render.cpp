@@ -33,6 +33,7 @@
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
+#include "tools/output/stop_signals.h"
 
 namespace curvisplat {
 namespace {
@@ -129,20 +130,29 @@ uint64_t outputBytes(const RenderArguments& arguments, ImageSize picture) {
   return bytes;
 }
 
-/// Draws one frame after another and collects the report.
+/// Draws one frame after another and collects the report. Throws Interrupted after progress.stop().
 class FrameRun {
  public:
   FrameRun(const RenderArguments& arguments, const Manifest& manifest, FrameRenderer& renderer,
-           FrameOutput& output, RenderReport& report)
-      : arguments_(arguments), manifest_(manifest), renderer_(renderer), output_(output), report_(report) {}
+           FrameOutput& output, RenderReport& report, Progress& progress)
+      : arguments_(arguments),
+        manifest_(manifest),
+        renderer_(renderer),
+        output_(output),
+        report_(report),
+        progress_(progress) {}
 
   /// Pictures that were written are kept if a later frame fails.
   void draw(const CameraMotion& motion) {
     const bool moves = arguments_.camera.moves();
     if (moves) progress_.begin("drawing", motion.frames, "frames");
     for (uint64_t number = 0; number < motion.frames; ++number) {
+      Progress of_frame;
+      of_frame.stopWith(progress_);
       try {
-        draw(number, motion, moves ? nullptr : &progress_);
+        draw(number, motion, moves ? of_frame : progress_);
+      } catch (const Interrupted&) {
+        throw;
       } catch (const UsageError& error) {
         if (moves) throw UsageError("frame {}: {}", number, error.what());
         throw;
@@ -157,11 +167,11 @@ class FrameRun {
   }
 
  private:
-  void draw(uint64_t number, const CameraMotion& motion, Progress* progress) {
+  void draw(uint64_t number, const CameraMotion& motion, Progress& progress) {
     const Camera camera = motion.camera(number);
     FrameStatistics statistics;
     if (number > 0 || arguments_.first_image.empty()) {
-      const Image image = renderer_.render(camera, report_.options, statistics, progress);
+      const Image image = renderer_.render(camera, report_.options, statistics, &progress);
       if (number + 1 < motion.frames) prefetch(motion, number + 1);
       finish(number, camera, image, statistics);
       return;
@@ -174,7 +184,7 @@ class FrameRun {
       }
       if (is_final) finish(number, camera, image, statistics);
     };
-    renderer_.renderProgressively(camera, report_.options, statistics, show, progress);
+    renderer_.renderProgressively(camera, report_.options, statistics, show, &progress);
   }
 
   /// Reads the next frame's bricks while this frame's picture is written.
@@ -229,10 +239,18 @@ class FrameRun {
   FrameRenderer& renderer_;
   FrameOutput& output_;
   RenderReport& report_;
-  Progress progress_{progressBar()};
+  Progress& progress_;
   bool reported_empty_ = false;
   std::set<uint32_t> reported_unreadable_;  // bricks
 };
+
+/// What a stopped run has done, and left.
+std::string howFar(const RenderReport& report, uint64_t frames) {
+  const std::string output = report.output.string();
+  if (frames == 1) return fmt::format("interrupted; {} was not written", output);
+  return fmt::format("interrupted after {} of {} frames; {}", report.frames.size(), frames,
+                     isMovieName(output) ? output + " was not written" : "the pictures of these are kept");
+}
 
 void printResult(const RenderReport& report) {
   const FrameStatistics& last = report.frames.back().statistics;
@@ -269,12 +287,23 @@ void render(const RenderArguments& arguments) {
   options.size = dataSize(arguments.annotations, picture, transfer_function);
   options.output_bytes = outputBytes(arguments, picture);
   const CameraMotion motion = chooseCameraMotion(arguments.camera, lower, upper, options.size);
+  Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
   const auto output = makeFrameOutput(arguments.output, arguments.camera.moves(), picture, frames_per_s);
   FrameRenderer renderer(cache, variable, transfer_function, parseBackend(arguments.backend));
   RenderReport report{arguments.cache, arguments.output,       picture, info, transfer_function,
-                      options,         renderer.backendName(), {},      0,    {}};
-  FrameRun(arguments, manifest, renderer, *output, report).draw(motion);
-  if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, statisticsOf(report));
+                      options,         renderer.backendName(), {},      {},   {}};
+  const auto writeReport = [&] {
+    if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, statisticsOf(report));
+  };
+  try {
+    FrameRun(arguments, manifest, renderer, *output, report, progress).draw(motion);
+  } catch (const Interrupted& interrupted) {
+    progress.end();
+    writeReport();
+    throw Interrupted(interrupted.signal(), howFar(report, motion.frames));
+  }
+  writeReport();
   printResult(report);
 }
 

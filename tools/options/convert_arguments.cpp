@@ -6,6 +6,7 @@
 
 #include "stream/base/error.h"
 #include "stream/base/message.h"
+#include "stream/base/process_usage.h"
 #include "tools/options/grid_options.h"
 #include "tools/output/output_paths.h"
 
@@ -67,6 +68,11 @@ uint64_t totalBytes(std::span<const FileReport> files) {
 
 double mebibytes(uint64_t bytes) {
   return static_cast<double>(bytes) / static_cast<double>(1 << 20);
+}
+
+std::string peakMemoryText() {
+  const uint64_t bytes = ProcessUsage::now().peak_memory_bytes;
+  return bytes > 0 ? fmt::format(", peak memory {:.0f} MiB", mebibytes(bytes)) : "";
 }
 
 }  // namespace curvisplat

@@ -44,6 +44,8 @@ double secondsOf(const Progress& progress);
 
 uint64_t totalBytes(std::span<const FileReport> files);
 double mebibytes(uint64_t bytes);
+/// ", peak memory 123 MiB", of this process so far; empty where the system does not tell.
+std::string peakMemoryText();
 
 /// Throws Error if the --stats file cannot be written or is one of the inputs or outputs.
 void checkStatisticsFile(const ConvertArguments& arguments);

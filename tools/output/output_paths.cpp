@@ -7,8 +7,8 @@
 #include <string>
 #include <system_error>
 
+#include "stream/base/durable_file.h"
 #include "stream/base/error.h"
-#include "stream/base/file.h"
 #include "stream/base/paths.h"
 
 namespace curvisplat {
@@ -36,6 +36,7 @@ void checkOutputFile(std::string_view option, const std::filesystem::path& path,
     throw Error("{} {}", option, error.what());
   }
   if (target != path) checkOutputFolder(option, target);
+  removeAbandonedFiles(folderOf(target));
   for (const fs::path& other : others) {
     if (other.empty()) continue;
     const fs::path there = fs::weakly_canonical(linkTarget(other), ignored);

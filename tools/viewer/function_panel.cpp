@@ -8,8 +8,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "stream/base/durable_file.h"
 #include "stream/base/error.h"
-#include "stream/base/file.h"
 #include "tools/viewer/histogram.h"
 
 namespace curvisplat {

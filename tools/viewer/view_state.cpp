@@ -20,7 +20,10 @@ class Fields {
  public:
   Fields(const std::filesystem::path& path, std::string name, const Json& object)
       : path_(path), name_(std::move(name)), object_(object) {
-    if (!object.is_object()) fail("", "an object");
+    if (!object.is_object())
+      throw Error("{}: {}expected an object, found {}", path_.string(),
+                  name_.empty() ? "" : fmt::format("field {}: ", name_.substr(0, name_.size() - 1)),
+                  object.dump().substr(0, 60));
   }
 
   Fields object(const char* field) const { return Fields(path_, name_ + field + ".", at(field)); }
@@ -28,7 +31,7 @@ class Fields {
 
   const Json& at(const char* field) const {
     const auto found = object_.find(field);
-    if (found == object_.end()) fail(field, "one");
+    if (found == object_.end()) fail(field, "a value");
     return *found;
   }
   double number(const char* field, double at_least, double at_most) const {
@@ -185,7 +188,8 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   try {
     json = Json::parse(text);
   } catch (const Json::exception& error) {
-    throw Error("{}: expected the state of a window in JSON: {}", path.string(), error.what());
+    throw Error("{}: expected the state of a window in JSON, found {}", path.string(),
+                jsonFault(text, error));
   }
   const Fields fields(path, "", json);
   if (fields.number("curvisplat_view", 0, 1e9) != 1)
