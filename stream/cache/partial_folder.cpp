@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -54,12 +55,19 @@ void requireRemoved(std::error_code error, const fs::path& path, const char* wha
   if (error) throw Error("{}: the {} cannot be removed: {}", path.string(), what, error.message());
 }
 
-/// Throws Error if the lock cannot be read.
-bool isMarked(const fs::path& folder) {
+/// Text of the lock in `folder`; nullopt if it is missing, no regular file or too long for a mark. Throws Error
+/// if it cannot be read.
+std::optional<std::string> lockText(const fs::path& folder) {
   const fs::path lock = folder / kPartialLock;
   std::error_code error;
-  return fs::is_regular_file(fs::symlink_status(lock, error)) &&
-         fs::file_size(lock, error) == kPartialMark.size() && readTextFile(lock) == kPartialMark;
+  if (!fs::is_regular_file(fs::symlink_status(lock, error)) ||
+      fs::file_size(lock, error) > kPartialMark.size())
+    return std::nullopt;
+  return readTextFile(lock);
+}
+
+bool isMarked(const fs::path& folder) {
+  return lockText(folder) == kPartialMark;
 }
 
 /// Whether a conversion to `target` has made the folder `path` and may empty it; not if it is a link.
@@ -68,11 +76,13 @@ bool isOurs(const fs::path& path, const fs::path& target) {
   if (!fs::is_directory(fs::symlink_status(path, error))) return false;
   // Killed while it put the cache into place, it leaves the mark there, and the old cache here.
   if (isMarked(path) || isMarked(target)) return true;
-  // Killed between making the folder and marking it: empty, or with an empty lock.
+  // Killed between making the folder and marking it: empty, or with a lock that has a part of the mark.
   for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error))
-    if (entry->path().filename() != kPartialLock || entry->is_symlink(error) || entry->file_size(error) > 0)
-      return false;
-  return !error;
+    if (entry->path().filename() != kPartialLock) return false;
+  if (error) return false;
+  if (!fs::exists(fs::symlink_status(path / kPartialLock, error))) return true;
+  const std::optional<std::string> text = lockText(path);
+  return text && kPartialMark.starts_with(*text);
 }
 
 }  // namespace

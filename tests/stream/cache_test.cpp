@@ -222,6 +222,9 @@ TEST(Cache, AConversionKilledBeforeItsMarkLeavesNothingInTheWay) {
   fs::create_directory(partial);
   overwriteFile(partial / "lock", "");
   SmallCache().write(target, true);
+  fs::create_directory(partial);
+  overwriteFile(partial / "lock", std::string(kPartialMark.substr(0, 9)));
+  SmallCache().write(target, true);
   // Killed between swapping the caches and moving the mark.
   fs::copy(target, partial, fs::copy_options::recursive);
   overwriteFile(target / "lock", std::string(kPartialMark));
