@@ -64,6 +64,7 @@ void renameDurably(const fs::path& from, const fs::path& to) {
     if (exchanged ? calls.exchange(from.c_str(), to.c_str()) == 0
                   : !replaces && calls.rename(to.c_str(), from.c_str()) == 0)
       throw;
+    if (exchanged) calls.remove(from.c_str());
     throw NameNotSynced("{}: was written, but a power loss may undo that: {}", to.string(), error.what());
   }
   if (exchanged) calls.remove(from.c_str());
@@ -102,7 +103,7 @@ void TemporaryFile::putIntoPlace() {
     result = SystemCalls::current().fsync(fd_);
   } while (result < 0 && errno == EINTR);
   if (result < 0 && errno != EINVAL && errno != ENOTSUP)
-    throw Error("{}: cannot be flushed to the disk: {}", target_.string(), reason());
+    throw Error("{}: cannot be synced to the disk: {}", target_.string(), reason());
   try {
     renameDurably(path_, target_);
   } catch (const NameNotSynced&) {

@@ -74,8 +74,9 @@ bool isMarked(const fs::path& folder) {
 bool isOurs(const fs::path& path, const fs::path& target) {
   std::error_code error;
   if (!fs::is_directory(fs::symlink_status(path, error))) return false;
+  if (isMarked(path)) return true;
   // Killed while it put the cache into place, it leaves the mark there, and the old cache here.
-  if (isMarked(path) || isMarked(target)) return true;
+  if (isMarked(target) && fs::exists(path / "manifest.json", error)) return true;
   // Killed between making the folder and marking it: empty, or with a lock that has a part of the mark.
   for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error))
     if (entry->path().filename() != kPartialLock) return false;

@@ -214,6 +214,19 @@ TEST(Cache, FoldersThatNoConversionMadeAreRefused) {
   EXPECT_EQ(bytesOfFile(partial), "a file");
 }
 
+// Where the mark could not be removed from the finished cache.
+TEST(Cache, AForeignFolderBesideAMarkedCacheIsRefused) {
+  const TemporaryFolder folder;
+  const fs::path target = folder.path() / "a.splats", partial = folder.path() / "a.splats.partial";
+  SmallCache().write(target);
+  overwriteFile(target / "lock", std::string(kPartialMark));
+  CacheReader reader(target);
+  fs::create_directory(partial);
+  overwriteFile(partial / "precious", "mine");
+  EXPECT_PRED2(says, errorOf([&] { SmallCache().write(target, true); }), "was not made by curvisplat");
+  EXPECT_EQ(bytesOfFile(partial / "precious"), "mine");
+}
+
 TEST(Cache, AConversionKilledBeforeItsMarkLeavesNothingInTheWay) {
   const TemporaryFolder folder;
   const fs::path target = folder.path() / "a.splats", partial = folder.path() / "a.splats.partial";
