@@ -26,7 +26,7 @@ namespace {
 
 constexpr Halo kCorners{0, 1};
 constexpr double kPoints = 100'000;  // approximate number of points inside all blocks; more at their faces
-constexpr size_t kMaxBlocks = 20'000;
+constexpr size_t kMaxBlocks = 100'000;
 constexpr uint64_t kBinsAlongAxis = 64;
 // A smaller share of the smaller block is attributed to rounding, or to curved faces that two blocks
 // approximate by different chords.
