@@ -101,9 +101,10 @@ class Addition {
     checkBlocks(source.description(), cache_);
     checkCentring();
     checkNames(report_.scalars, cache_);
-    checkDiskSpace(diskNeedsOfAdding(manifest().splats, options.scalars.size(),
-                                     minValueRecordBytes(options.scalars.size())),
-                   options.cache, temporaryFolder(options));
+    if (options.check_disk_space)
+      checkDiskSpace(diskNeedsOfAdding(manifest().splats, options.scalars.size(),
+                                       minValueRecordBytes(options.scalars.size())),
+                     options.cache, temporaryFolder(options));
   }
 
   AddScalarReport run() {

@@ -28,7 +28,7 @@ struct ConvertArguments {
   std::optional<double> blank_value;
   std::optional<std::string> memory;
   unsigned threads = 0;
-  bool overwrite = false, resume = false;
+  bool overwrite = false, resume = false, no_preflight = false;
 };
 
 /// Opens the grid. Temporary files go to --tmp, or beside `cache` without it.
@@ -57,6 +57,7 @@ void applyCommonOptions(const ConvertArguments& arguments, Options& options) {
   options.temporary_folder = arguments.temporary_folder;
   options.blank_value = arguments.blank_value;
   options.threads = arguments.threads;
+  options.check_disk_space = !arguments.no_preflight;
   if (arguments.memory) options.memory_bytes = parseMemory("--memory", *arguments.memory);
 }
 
