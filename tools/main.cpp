@@ -18,6 +18,7 @@
 #include "tools/options/shown_options.h"
 #include "tools/output/standard_streams.h"
 #include "tools/output/stop_signals.h"
+#include "tools/output/thread_failures.h"
 
 namespace curvisplat {
 namespace {
@@ -27,6 +28,16 @@ std::string namesOf(const CLI::App& app) {
   for (const CLI::App* command : shownCommands(app)) names.push_back(command->get_name());
   return fmt::format("{}", fmt::join(names, ", "));
 }
+
+/// Whether a thread could not be started, by the C++ library or by TBB.
+bool isForLackOfThreads(const std::exception& error) {
+  const auto* const system = dynamic_cast<const std::system_error*>(&error);
+  return (system && system->code() == std::errc::resource_unavailable_try_again) ||
+         std::string(error.what()).starts_with("pthread_create");
+}
+
+constexpr const char* kThreadAdvice =
+    "the system has none left; raise the limits of processes and memory (ulimit -u, ulimit -v)";
 
 /// What is wrong with the command line: CLI11's texts, without those that leave out the reason.
 std::string describe(const CLI::App* command, const CLI::ParseError& error) {
@@ -90,15 +101,11 @@ int run(int argc, char** argv) {
   } catch (const std::filesystem::filesystem_error& error) {
     printMessage("{}: {}", error.path1().string(), error.code().message());
     return 1;
-  } catch (const std::system_error& error) {
-    if (error.code() == std::errc::resource_unavailable_try_again)
-      printMessage("cannot start a thread: {}; lower --threads, or raise the limit of processes and memory",
-                   error.code().message());
-    else
-      printMessage("{}", error.what());
-    return 1;
   } catch (const std::exception& error) {
-    if (std::ferror(stdout) == 0) printMessage("{}", error.what());  // otherwise main() reports it
+    if (isForLackOfThreads(error))
+      printMessage("cannot start a thread: {}", kThreadAdvice);
+    else if (std::ferror(stdout) == 0)
+      printMessage("{}", error.what());  // otherwise main() reports it
     return 1;
   }
 }
@@ -107,6 +114,7 @@ int run(int argc, char** argv) {
 }  // namespace curvisplat
 
 int main(int argc, char** argv) {
+  curvisplat::endLoadingOfLibraries();
   curvisplat::openStandardStreams();
   curvisplat::ignoreFileSizeSignal();
   const int status = curvisplat::run(argc, argv);

@@ -186,7 +186,7 @@ TEST_F(BadInput, MissingTransferFunction) {
 TEST_F(BadInput, BrokenTransferFunction) {
   writeFileAtomically(file("broken.json"), std::string("[{\"RGBPoints\": [0, 1"));
   expectNotRendered(file("whole.splats"), {"--tf", file("broken.json")},
-                    {"broken.json", "a syntax error at line 1, column 22"});
+                    {"broken.json", "a syntax error at line 1, column 21"});
 }
 
 TEST_F(BadInput, PictureNameWithAnotherEnding) {

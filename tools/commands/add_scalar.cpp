@@ -12,6 +12,7 @@
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
+#include "tools/output/thread_failures.h"
 
 namespace curvisplat {
 namespace {
@@ -57,6 +58,7 @@ void runAddScalar(ConvertArguments arguments) {
 
   const auto source = openSource(arguments, arguments.to);
   options.scalars = chooseScalars(arguments, arguments.added_scalars, source->description());
+  requireThreads(arguments.threads);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   const AddScalarReport report = addScalars(*source, options, progress);

@@ -14,6 +14,7 @@
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
+#include "stream/base/paths.h"
 #include "stream/base/progress.h"
 #include "tools/commands/add_scalar.h"
 #include "tools/commands/commands.h"
@@ -24,6 +25,7 @@
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
+#include "tools/output/thread_failures.h"
 
 namespace curvisplat {
 namespace {
@@ -83,7 +85,9 @@ void runConvert(ConvertArguments arguments) {
   if (!arguments.output.has_filename()) arguments.output = arguments.output.parent_path();  // "NAME.splats/"
   checkOutputFolder("-o", arguments.output);
   ConvertOptions options;
-  options.output = arguments.output;
+  // A link stays, as it does where pictures are written through one.
+  options.output = linkTarget(arguments.output);
+  if (options.output != arguments.output) checkOutputFolder("-o", options.output);
   options.overwrite = arguments.overwrite;
   options.resume = arguments.resume;
   applyCommonOptions(arguments, options);
@@ -92,6 +96,7 @@ void runConvert(ConvertArguments arguments) {
   options.scalars = chooseScalars(arguments, arguments.scalars, source->description());
   options.title = arguments.grid.grid.stem().string();
 
+  requireThreads(arguments.threads);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   const ConvertReport report = convert(*source, options, progress);
@@ -130,6 +135,8 @@ void addConvert(CLI::App& app) {
       ->check(CLI::Range(0u, kMaxThreads));
   command->add_option("--tmp", arguments->temporary_folder,
                       "Directory for temporary files (default: beside the cache)");
+  command->add_flag("--no-preflight", arguments->no_preflight,
+                    "Do not check before the work that the disks have room");
   command->add_flag("--resume", arguments->resume,
                     "Resume an interrupted conversion if there is one; keep finished work on an error");
   command->add_flag("--overwrite", arguments->overwrite,

@@ -34,6 +34,7 @@
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
+#include "tools/output/thread_failures.h"
 
 namespace curvisplat {
 namespace {
@@ -103,6 +104,7 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
   checkOutputFile("-o", arguments.output, others);
   if (arguments.camera.moves() && !isMovieName(arguments.output)) {
     const FrameNames names(arguments.output);
+    checkOutputFolder("-o", names.of(std::max<uint64_t>(arguments.camera.frames.value_or(1), 1) - 1));
     const auto check_other = [&](const char* option, const std::filesystem::path& other) {
       if (names.include(linkTarget(other), arguments.camera.frames.value_or(1)))
         throw Error("{} {}: a frame of -o would overwrite it; choose another name", option, other.string());
@@ -287,6 +289,7 @@ void render(const RenderArguments& arguments) {
   options.size = dataSize(arguments.annotations, picture, transfer_function);
   options.output_bytes = outputBytes(arguments, picture);
   const CameraMotion motion = chooseCameraMotion(arguments.camera, lower, upper, options.size);
+  requireThreads(options.threads);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   const auto output = makeFrameOutput(arguments.output, arguments.camera.moves(), picture, frames_per_s);

@@ -22,6 +22,10 @@ void checkOutputFolder(std::string_view option, const std::filesystem::path& pat
   if (::access(folder.c_str(), W_OK | X_OK) != 0)
     throw Error("{} {}: the directory {} is not writable: {}; choose another", option, path.string(),
                 folder.string(), std::strerror(errno));
+  std::error_code error;
+  std::filesystem::symlink_status(path, error);
+  if (error == std::errc::filename_too_long)
+    throw Error("{} {}: the name is too long; choose a shorter one", option, path.string());
 }
 
 void checkOutputFile(std::string_view option, const std::filesystem::path& path,

@@ -7,7 +7,8 @@
 
 namespace curvisplat {
 
-/// `path` is the value of `option`. Throws Error if its folder does not exist or is not writable.
+/// `path` is the value of `option`. Throws Error if its folder does not exist or is not writable, or if no file
+/// can have the name.
 void checkOutputFolder(std::string_view option, const std::filesystem::path& path);
 
 /// Calls checkOutputFolder(), and removes unfinished files that killed runs have left in the folder. Also
