@@ -38,6 +38,7 @@ int run(int argc, char** argv) {
   addBench(app);
   addGenerate(app);
   addCompare(app);
+  addColormaps(app);
   addManual(app);
 
   try {

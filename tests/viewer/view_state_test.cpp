@@ -78,7 +78,7 @@ TEST(ViewState, ErrorsNameFileAndField) {
   expectError("/clip_box/lower", nlohmann::json::array({5, 0, 0}), "clip_box.lower");
   expectError("/dark", "yes", "dark");
   expectError("/function", 5, "preset");
-  expectError("/preset", "rainbow", "preset");
+  expectError("/preset", "no map", "preset");
   expectError("/memory_bytes", -1, "memory_bytes");
   EXPECT_THROW(viewStateFromJson("{", "a.json", manifest()), Error);
   EXPECT_THROW(viewStateFromJson("[]", "a.json", manifest()), Error);

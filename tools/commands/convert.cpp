@@ -113,8 +113,8 @@ void addConvert(CLI::App& app) {
   command->add_option("-o,--output", arguments->output, "Splat cache to write: a directory NAME.splats");
   command
       ->add_option("--scalar", arguments->scalars,
-                   "Scalar to convert; repeatable. A name, the number of a function file's variable, or a "
-                   "PLOT3D function number (default: the first scalar)")
+                   "Scalars to convert: NAME, NAME,NAME or all; repeatable. A name, the number of a function "
+                   "file's variable, or a PLOT3D function number (default: all that the files store)")
       ->take_all()
       ->allow_extra_args(false);
   command
@@ -139,6 +139,7 @@ void addConvert(CLI::App& app) {
   addGridOptions(*command, arguments->grid);
   addGasOptions(*command, arguments->gas);
   command->callback([arguments] {
+    takeScalarsFromSolutions(*arguments);
     const bool adds = !arguments->added_scalars.empty() || !arguments->to.empty();
     adds ? runAddScalar(*arguments) : runConvert(*arguments);
   });

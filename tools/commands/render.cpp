@@ -28,6 +28,7 @@
 #include "tools/commands/render_statistics.h"
 #include "tools/options/camera_motion.h"
 #include "tools/options/option_parsers.h"
+#include "tools/options/picture_choice.h"
 #include "tools/options/scalar_arguments.h"
 #include "tools/output/frame_output.h"
 #include "tools/output/output_paths.h"
@@ -89,6 +90,7 @@ FrameOptions frameOptions(const RenderArguments& arguments) {
 /// Throws UsageError if options contradict each other, and Error if an output cannot be written.
 void checkArguments(const RenderArguments& arguments, ImageSize size) {
   checkCameraArguments(arguments.camera);
+  checkFunctionArguments(arguments.scalar);
   checkOutputName(arguments.output, arguments.camera.moves(), size);
   if (arguments.frame_rate && !isMovieName(arguments.output))
     throw UsageError("--frame-rate needs a movie: -o NAME.mp4");
@@ -98,7 +100,7 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
                      arguments.output.extension().string());
   parseBackend(arguments.backend);
   std::vector<std::filesystem::path> others{arguments.cache, arguments.camera.path,
-                                            arguments.scalar.transfer_function};
+                                            arguments.scalar.transfer_function.value_or("")};
   checkOutputFile("-o", arguments.output, others);
   if (arguments.camera.moves() && !isMovieName(arguments.output)) {
     const FrameNames names(arguments.output);
@@ -192,13 +194,22 @@ class FrameRun {
     report_.frames.push_back({camera, statistics});
     const std::string which = arguments_.camera.moves() ? fmt::format(" of frame {}", number) : "";
     reportUnreadable(which, statistics);
+    const RenderedScene scene{manifest_, report_.variable, report_.transfer_function,
+                              camera,    report_.options,  statistics};
+    if (number == 0) warnOfPoorPicture(image, scene);
     if (reported_empty_ || !isEmpty(image, report_.options.background)) return;
     reported_empty_ = true;
     progress_.end();
-    const RenderedScene scene{manifest_, report_.variable, report_.transfer_function,
-                              camera,    report_.options,  statistics};
     for (const std::string& reason : whyEmpty(scene))
       printMessage("warning: the picture{} is empty: {}", which, reason);
+  }
+
+  void warnOfPoorPicture(const Image& image, const RenderedScene& scene) {
+    if (isEmpty(image, report_.options.background)) return;  // said with its reasons
+    const std::string warning = poorPictureWarning(image, scene, givenFunctionOptions(arguments_.scalar));
+    if (warning.empty()) return;
+    progress_.end();
+    printMessage("warning: {}", warning);
   }
 
   /// Calls write() with the picture, annotated if annotations were requested.
@@ -259,8 +270,8 @@ void render(const RenderArguments& arguments) {
   const size_t variable = chooseVariable(cache, arguments.scalar);
   const VariableInfo& info = manifest.variables[variable];
   const glm::dvec3 lower = manifest.lower * options.scale, upper = manifest.upper * options.scale;
-  const TransferFunction transfer_function =
-      chooseTransferFunction(arguments.scalar, info, glm::length(upper - lower));
+  PictureChoice choice(cache, variable, options.scale);
+  const TransferFunction transfer_function = choice.function(arguments.scalar);
   for (const std::string& note : transfer_function.notes()) printMessage("note: {}", note);
   const std::string range_warning = rangeMissesScalar(info, transfer_function);
   if (!range_warning.empty()) printMessage("warning: {}", range_warning);
@@ -268,7 +279,8 @@ void render(const RenderArguments& arguments) {
   const ImageSize picture = options.size;
   options.size = dataSize(arguments.annotations, picture, transfer_function);
   options.output_bytes = outputBytes(arguments, picture);
-  const CameraMotion motion = chooseCameraMotion(arguments.camera, lower, upper, options.size);
+  const CameraArguments camera = choice.camera(arguments.camera, transfer_function, options.size);
+  const CameraMotion motion = chooseCameraMotion(camera, lower, upper, options.size);
   const auto output = makeFrameOutput(arguments.output, arguments.camera.moves(), picture, frames_per_s);
   FrameRenderer renderer(cache, variable, transfer_function, parseBackend(arguments.backend));
   RenderReport report{arguments.cache, arguments.output,       picture, info, transfer_function,
@@ -276,6 +288,7 @@ void render(const RenderArguments& arguments) {
   FrameRun(arguments, manifest, renderer, *output, report).draw(motion);
   if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, statisticsOf(report));
   printResult(report);
+  if (!choice.chosenOptions().empty()) fmt::print("chosen from the data: {}\n", choice.chosenOptions());
 }
 
 }  // namespace
@@ -332,8 +345,10 @@ void addRender(CLI::App& app) {
   const std::string where = "Camera";
   CameraArguments* camera = &arguments->camera;
   command
-      ->add_option("--view", camera->view,
-                   "Side the camera looks from: iso, +x, -x, +y, -y, +z or -z (default iso)")
+      ->add_option(
+          "--view", camera->view,
+          "Side the camera looks from: iso, +x, -x, +y, -y, +z or -z (default: chosen from the data; iso for "
+          "a camera that moves)")
       ->group(where);
   command->add_option("--position", camera->position, "Camera position x,y,z, in coordinates after --scale")
       ->group(where);

@@ -34,10 +34,14 @@ struct ConvertArguments {
 /// Opens the grid. Temporary files go to --tmp, or beside `cache` without it.
 std::unique_ptr<GridSource> openSource(const ConvertArguments& arguments, const std::filesystem::path& cache);
 
-/// Positions of the scalars `names` in the description. Prints a note for each number that could mean two
-/// scalars. Throws Error, not UsageError, for a scalar that the files lack: the files decide, not the usage.
+/// Positions of the scalars `names` in the description: names, lists "a,b", or "all". Without names all that
+/// the files store, at most 16 of one centring; a note says what is left out. Prints a note for each number
+/// that could mean two scalars. Throws Error, not UsageError, for a scalar that the files lack: the files decide, not the usage.
 std::vector<uint32_t> chooseScalars(const ConvertArguments& arguments, const std::vector<std::string>& names,
                                     const GridDescription& description);
+
+/// Moves words that are no files from the solutions to the scalars: the second of "--scalar a b".
+void takeScalarsFromSolutions(ConvertArguments& arguments);
 
 /// The sum over all phases.
 double secondsOf(const Progress& progress);

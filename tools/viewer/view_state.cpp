@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
+#include "render/automatic/first_choice.h"
 #include "stream/base/error.h"
 #include "stream/base/json_text.h"
 
@@ -138,7 +139,7 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
 ViewState firstViewOf(const Manifest& manifest, ImageSize picture) {
   if (manifest.variables.empty())
     throw Error("{}: the cache contains no scalar; convert the grid again with a scalar", manifest.title);
-  const VariableInfo& variable = manifest.variables.front();
+  const VariableInfo& variable = manifest.variables[firstVaryingVariable(manifest)];
   ViewState state{
       variable.name,
       {},
@@ -198,12 +199,14 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   if (!(std::min({scale.x, scale.y, scale.z}) > 0)) fields.fail("scale", "three numbers above zero");
   EditedFunction function(parseParaViewPreset(fields.at("function").dump(), path),
                           defaultOpacityUnit(manifest, scale));
-  if (const std::string preset = fields.text("preset"); !preset.empty()) {
+  if (const std::string preset = fields.text("preset"); preset == EditedFunction::kAutomatic) {
+    function.setAutomatic();
+  } else if (!preset.empty()) {
     try {
       function =
           EditedFunction(preset, function.range().first, function.range().second, function.opacityUnit());
     } catch (const UsageError&) {
-      fields.fail("preset", fmt::format("one of {}", presetNames()));
+      fields.fail("preset", "the name of a colour map (curvisplat colormaps lists them)");
     }
   }
 
@@ -234,7 +237,7 @@ std::string renderCommand(const ViewState& state, const std::filesystem::path& c
   add("--size", fmt::format("{}x{}", size.width, size.height));
   add("--scalar", state.variable);
   const EditedFunction& function = state.function;
-  if (function.preset().empty()) {
+  if (!function.isPreset()) {
     add("--tf", function_file.string());
   } else {
     add("--tf", function.preset());
