@@ -12,6 +12,7 @@
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "stream/base/progress.h"
+#include "stream/base/suggestion.h"
 #include "tools/commands/commands.h"
 #include "tools/options/shown_options.h"
 #include "tools/output/standard_streams.h"
@@ -23,6 +24,23 @@ std::string namesOf(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::App* command : shownCommands(app)) names.push_back(command->get_name());
   return fmt::format("{}", fmt::join(names, ", "));
+}
+
+/// The first word that is left over, with the option that it may stand for.
+std::string leftOver(const CLI::App& app, const CLI::App* command) {
+  for (const std::string& word : app.remaining(true)) {
+    if (word == "--") continue;
+    if (!word.starts_with('-')) return fmt::format("unexpected argument '{}'", word);
+    const std::string name = word.substr(0, word.find('='));
+    std::vector<std::string> names;
+    if (command)
+      for (const CLI::Option* option : command->get_options())
+        for (const std::string& known : option->get_lnames()) names.push_back("--" + known);
+    const std::string close = closestTo(name, names);
+    return fmt::format("unknown option {}{}", name,
+                       close.empty() ? "" : fmt::format(" (did you mean {}?)", close));
+  }
+  return "unexpected argument";
 }
 
 /// Returns the exit status: 0 success, 1 failure, 2 wrong usage, 128 + n stopped by signal n.
@@ -46,13 +64,19 @@ int run(int argc, char** argv) {
     return 0;
   } catch (const CLI::ParseError& error) {
     if (argc > 1 && argv[1][0] != '-' && app.get_subcommands().empty()) {
-      printMessage("unknown subcommand '{}'; expected one of {}", argv[1], namesOf(app));
+      std::vector<std::string> names;
+      for (const CLI::App* shown : shownCommands(app)) names.push_back(shown->get_name());
+      const std::string close = closestTo(argv[1], names);
+      printMessage("unknown subcommand '{}'{}; expected one of {}", argv[1],
+                   close.empty() ? "" : fmt::format("; did you mean {}?", close), namesOf(app));
       return 2;
     }
     if (error.get_exit_code() == 0) return app.exit(error);  // --help and --version
     const std::vector<CLI::App*> chosen = app.get_subcommands();
     const std::string command = "curvisplat" + (chosen.empty() ? "" : " " + chosen.front()->get_name());
-    printMessage("{}; see {} --help", error.what(), command);
+    const bool extra = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
+    printMessage("{}; see {} --help",
+                 extra ? leftOver(app, chosen.empty() ? nullptr : chosen.front()) : error.what(), command);
     return 2;
   } catch (const UsageError& error) {
     printMessage("{}", error.what());

@@ -47,7 +47,7 @@ void checkBlocks(const GridDescription& grid, const CacheReader& cache) {
     const BlockInfo& expected = blocks[n];
     if (found.ni != expected.ni || found.nj != expected.nj || found.nk != expected.nk)
       throw Error("{}: block {} of its grid has {}x{}x{} nodes, and of this one {}x{}x{}: it is another",
-                  cache.path().string(), n, expected.ni, expected.nj, expected.nk, found.ni, found.nj,
+                  cache.path().string(), n + 1, expected.ni, expected.nj, expected.nk, found.ni, found.nj,
                   found.nk);
   }
 }

@@ -35,6 +35,8 @@ double weightedPercentile(std::vector<std::pair<double, double>>& weighted, doub
 }  // namespace
 
 bool isNearlyConstant(const VariableInfo& variable) {
+  // A range that is too narrow for a transfer function is one value, too.
+  if (intervalAround(variable.min, variable.max).first < variable.min) return true;
   return !(variable.max - variable.min >
            kConstant * std::max(std::abs(variable.min), std::abs(variable.max)));
 }

@@ -211,7 +211,12 @@ TEST_F(BadInput, WrongUsage) {
 }
 
 TEST_F(BadInput, MisspeltSubcommandIsToldWhichThereAre) {
-  expectOneLine(runProgram({"rendr", file("whole.splats")}), 2, {"rendr", "render", "convert", "info"});
+  expectOneLine(runProgram({"rendr", file("whole.splats")}), 2,
+                {"rendr", "did you mean render?", "convert", "info"});
+  expectOneLine(runProgram({"render", file("whole.splats"), "-o", file("a.png"), "--sise", "9x9"}), 2,
+                {"unknown option --sise (did you mean --size?); see"});
+  expectOneLine(runProgram({"render", file("whole.splats"), "-o", file("a.png"), "--zzzzzz=3"}), 2,
+                {"unknown option --zzzzzz; see curvisplat render --help"});
 }
 
 TEST_F(BadInput, UnknownScene) {

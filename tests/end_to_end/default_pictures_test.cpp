@@ -62,8 +62,8 @@ TEST_P(DefaultPictures, ShowSomethingAndCanBeDrawnAgain) {
 INSTANTIATE_TEST_SUITE_P(Scenes, DefaultPictures,
                          testing::Values("half-annulus", "shell", "o-grid", "axis", "sheared-waves", "wake",
                                          "dome", "globe", "duct"),
-                         [](const auto& info) {
-                           std::string name = info.param;
+                         [](const auto& scene) {
+                           std::string name = scene.param;
                            std::erase(name, '-');
                            return name;
                          });
@@ -97,8 +97,12 @@ TEST_F(DefaultPictures, PoorPicturesAreAnsweredWithAnOption) {
   convert("half-annulus", "24x16x16");
   const ProgramResult pale = render({"--range", "data", "--opacity-unit", "50"});
   EXPECT_NE(pale.err.find("leave out --range and --opacity-unit"), std::string::npos) << pale.err;
-  const ProgramResult flat = render({"--tf", "grey", "--range", "100,200", "--opacity", "0:1,1:1"});
-  EXPECT_NE(flat.err.find("of one colour; leave out --tf, --range and --opacity"), std::string::npos)
+  // Large, so that the edges of the silhouette are a small part of it.
+  const ProgramResult flat =
+      run({"render", file("a.splats"), "-o", file("f.png"), "--size", "800x800", "--tf", "grey", "--range",
+           "100,200", "--opacity", "0:1,1:1", "--opacity-unit", "1e-4"});
+  EXPECT_NE(flat.err.find("of one colour; leave out --tf, --range, --opacity and --opacity-unit"),
+            std::string::npos)
       << flat.err;
 }
 

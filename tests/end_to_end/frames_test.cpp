@@ -72,7 +72,7 @@ class Frames : public testing::Test {
     const ProgramResult result = render(options);
     EXPECT_EQ(result.status, 0) << result.err;
     EXPECT_EQ(result.err, "");
-    EXPECT_EQ(lineCount(result.out), 1) << result.out;
+    EXPECT_EQ(lineCount(result.out), 2) << result.out;  // the second: what was chosen from the data
   }
   static void expectRefused(const std::vector<std::string>& options, int status, const std::string& word) {
     const ProgramResult result = render(options);

@@ -99,6 +99,18 @@ TEST(FirstChoice, SilhouetteIsThatOfTheSamples) {
   EXPECT_NEAR(silhouette.area, 1, 0.03);
 }
 
+TEST(FirstChoice, ConstantScalarsAreRecognised) {
+  Manifest manifest;
+  manifest.variables = {{0, "energy", "", 0, 0},
+                        {1, "density", "", 0.99999, 1.00001},
+                        {2, "tiny", "", 0, 1e-40},
+                        {3, "pressure", "", 1, 1.1},
+                        {4, "other", "", 0, 1}};
+  EXPECT_EQ(firstVaryingVariable(manifest), 3u);
+  manifest.variables.resize(3);
+  EXPECT_EQ(firstVaryingVariable(manifest), 0u);
+}
+
 TEST(FirstChoice, NumbersAreRoundedToDigitsOfTheScale) {
   EXPECT_EQ(roundedTo(0.123456, 0.5, 3), 0.123);
   EXPECT_EQ(roundedTo(101.23456, 0.5, 2), 101.23);

@@ -105,7 +105,7 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
   if (arguments.camera.moves() && !isMovieName(arguments.output)) {
     const FrameNames names(arguments.output);
     const auto check_other = [&](const char* option, const std::filesystem::path& other) {
-      if (names.include(linkTarget(other), arguments.camera.frames.value_or(1)))
+      if (names.include(linkTarget(other), arguments.camera.frameCount()))
         throw Error("{} {}: a frame of -o would overwrite it; choose another name", option, other.string());
     };
     check_other("--first-image", arguments.first_image);
@@ -375,7 +375,7 @@ void addRender(CLI::App& app) {
       ->add_option("--path", camera->path,
                    "Camera path: a JSON file of key frames, described in tools/REFERENCE.md")
       ->group(where);
-  command->add_option("--frames", camera->frames, "Number of frames of --orbit or --path")
+  command->add_option("--frames", camera->frames, "Number of frames of --orbit or --path (default 90)")
       ->check(CLI::Range(1u, kMaxFrames))
       ->group(where);
   command->add_option("--frame-rate", arguments->frame_rate, "Frames per second of a movie (default 25)")

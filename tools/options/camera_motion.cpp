@@ -60,14 +60,12 @@ void checkCameraArguments(const CameraArguments& arguments) {
         "--path {}: its key frames place the camera; remove --view, --position, --parallel-scale and "
         "--view-angle",
         arguments.path.string());
-  if (arguments.moves() && !arguments.frames)
-    throw UsageError("{} needs --frames", arguments.orbit ? "--orbit" : "--path");
   if (arguments.frames && !arguments.moves()) throw UsageError("--frames needs --orbit or --path");
 }
 
 CameraMotion chooseCameraMotion(const CameraArguments& arguments, const glm::dvec3& lower,
                                 const glm::dvec3& upper, ImageSize size) {
-  const uint64_t frames = arguments.frames.value_or(1);
+  const uint64_t frames = arguments.frameCount();
   if (!arguments.path.empty()) {
     const auto path = std::make_shared<CameraPath>(CameraPath::fromFile(arguments.path));
     const double step = frames > 1 ? (path->end() - path->begin()) / static_cast<double>(frames - 1) : 0;
