@@ -14,7 +14,7 @@ TEST(Suggestion, IsTheClosestNameOrNone) {
   EXPECT_EQ(closestTo("--sise", names), "--size");
   EXPECT_EQ(closestTo("--SIZE", names), "--size");
   EXPECT_EQ(closestTo("--isze", names), "--size");  // swapped letters
-  EXPECT_EQ(closestTo("--scaler", names), "--scalar");
+  EXPECT_EQ(closestTo("--sclar", names), "--scalar");
   EXPECT_EQ(closestTo("--opacityunit", names), "--opacity-unit");
   EXPECT_EQ(closestTo("--background", names), "");
   EXPECT_EQ(closestTo("", names), "");
