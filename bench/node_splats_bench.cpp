@@ -36,10 +36,11 @@ void nodeSplats(benchmark::State& state) {
     for (size_t at = 0; at < nodes.blank.size(); at += static_cast<size_t>(state.range(0)))
       nodes.blank[at] = 1;
   const BlockWindow window{{"block 1", n, n, n, true}, 0, {0, n, 0, n}, &nodes};
+  NodeScratch scratch;
   NodeSplats splats;
   uint64_t k = 0;
   for (auto _ : state) {
-    computeNodeSplats(window, {0, n, k, k + 4}, splats);
+    computeNodeSplats(window, {0, n, k, k + 4}, scratch, splats);
     benchmark::DoNotOptimize(splats.splats.data());
     k = (k + 4) % n;
   }

@@ -33,7 +33,7 @@ class SplatStream {
         sink_of_thread_(&sink_of_thread),
         seams_(&seams),
         workers_([this] {
-          return Worker{{}, {}, 0, std::vector<Handedness>(blocks_->size())};
+          return Worker{{}, {}, {}, 0, std::vector<Handedness>(blocks_->size())};
         }) {}
 
   void add(const LoadedSlab& loaded) {
@@ -47,7 +47,7 @@ class SplatStream {
       if (centring_ == Centring::kCell)
         computeCellSplats(window, tasks[task], {slab.block, faces_}, worker.cells, worker.splats);
       else
-        computeNodeSplats(window, tasks[task], worker.splats);
+        computeNodeSplats(window, tasks[task], worker.nodes, worker.splats);
       worker.degenerate += worker.splats.degenerate;
       worker.handedness[slab.block].right += worker.splats.right_handed;
       worker.handedness[slab.block].left += worker.splats.left_handed;
@@ -73,6 +73,7 @@ class SplatStream {
   /// What a thread has for itself.
   struct Worker {
     NodeSplats splats;
+    NodeScratch nodes;
     CellScratch cells;
     uint64_t degenerate = 0;
     std::vector<Handedness> handedness;  // [block]
@@ -155,7 +156,8 @@ ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces,
                            const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams,
                            Progress& progress) {
   SplatStream splats(reader, faces, sink_of_thread, seams, progress);
-  SlabStream slabs(reader, slab_bytes, reader.centring() == Centring::kCell ? kCellHalo : kNodeHalo);
+  SlabStream slabs(reader, slab_bytes,
+                   reader.centring() == Centring::kCell ? kCellSplatHalo : kNodeSplatHalo);
   while (const LoadedSlab* loaded = slabs.next()) {
     splats.add(*loaded);
     const GridBlock& block = reader.source().description().blocks[loaded->slab.block];

@@ -25,6 +25,10 @@ double axisOf(uint32_t bits) {
   return std::bit_cast<float>(bits << kDroppedBits);
 }
 
+// Of weight / (a0 a1 a2), as regular splats keep it. Those below a quarter would lose digits.
+constexpr double kRatioSteps = 0x1p15;
+constexpr double kSmallestRatio = 0.25, kLargestRatio = 0xffff / kRatioSteps;
+
 double product(const std::array<double, 3>& axis) {
   return axis[0] * axis[1] * axis[2];
 }
@@ -34,7 +38,10 @@ double product(const std::array<double, 3>& axis) {
 void packRecord(const NodeSplat& in, std::span<const SplatScalar> values, const RootPosition& position,
                 std::vector<std::byte>& out) {
   CURVISPLAT_CHECK_OP(in.node, <, kMaxNodes);
-  const bool irregular = !in.regular || in.border_code != kNoBorder;
+  const double cell = product(in.splat.axis);
+  const double ratio = cell > 0 ? in.splat.weight / cell : 0;
+  const bool irregular =
+      !in.regular || in.border_code != kNoBorder || !(ratio >= kSmallestRatio) || !(ratio <= kLargestRatio);
   const size_t bytes = irregular ? irregularRecordBytes(values.size()) : regularRecordBytes(values.size());
   const size_t start = out.size();
   out.resize(start + bytes);
@@ -57,13 +64,15 @@ void packRecord(const NodeSplat& in, std::span<const SplatScalar> values, const 
     at += 3;
   }
   for (const double shear : in.splat.shear) putFloat(shear);
+  const auto ratio_code = irregular ? uint16_t{0} : static_cast<uint16_t>(ratio * kRatioSteps + 0.5);
+  std::memcpy(at, &ratio_code, sizeof ratio_code);
+  at += sizeof ratio_code;
   for (const SplatScalar& value : values) {
     putFloat(value.mean);
     for (int axis = 0; axis < 3; ++axis) putFloat(value.slope[axis]);
   }
   if (irregular) {
-    const double cell = product(in.splat.axis);
-    putFloat(cell > 0 ? in.splat.weight / cell : 0);
+    putFloat(ratio);
     std::memcpy(at, &in.border_code, sizeof in.border_code);
     at += sizeof in.border_code;
     for (const SplatScalar& value : values) putFloat(value.variance);
@@ -86,13 +95,19 @@ uint32_t unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScal
     axis = axisOf(bits);
   }
   for (double& shear : splat.shear) shear = takeFloat();
+  uint16_t ratio_code;
+  std::memcpy(&ratio_code, at, sizeof ratio_code);
+  at += sizeof ratio_code;
   for (SplatScalar& value : values) {
     value.mean = takeFloat();
     for (int axis = 0; axis < 3; ++axis) value.slope[axis] = takeFloat();
     value.variance = 0;
   }
   splat.weight = product(splat.axis);
-  if (!irregular) return kNoBorder;
+  if (!irregular) {
+    splat.weight *= ratio_code / kRatioSteps;
+    return kNoBorder;
+  }
   splat.weight *= takeFloat();
   uint32_t border_code;
   std::memcpy(&border_code, at, sizeof border_code);

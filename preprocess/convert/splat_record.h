@@ -1,19 +1,21 @@
-// A splat as conversion keeps it in temporary files and in a bucket's memory: 45 + 16 v bytes for v
+// A splat as conversion keeps it in temporary files and in a bucket's memory: 47 + 16 v bytes for v
 // variables, not aligned, in the machine's own byte order.
 //
 //    0   node number: 47 bits, and bit 47 says "irregular"     48 bits
 //    6   position: x, y, z                                     3 x 48 bits
 //   24   a0 a1 a2: floats > 0 without sign and last 7 bits     3 x 24 bits
 //   33   l10 l20 l21                                           3 x float
-//   45   mean w0 w1 w2                                         4 x float a variable
-//        irregular: weight / (a0 a1 a2)                        1 x float
+//   45   weight / (a0 a1 a2), in steps of 2^-15                16 bits
+//   47   mean w0 w1 w2                                         4 x float a variable
+//        irregular: weight / (a0 a1 a2), in place of the above 1 x float
 //                   half cell                                  32 bits
 //                   variance                                   1 x float a variable
 //
-// What is not stored of a regular splat (nearly all are) follows from the rest: its weight is a0 a1 a2,
-// its variances are 0 and its cell is whole. Records of one bucket follow one another; their lengths are
+// What is not stored of a regular splat (nearly all are) is known: its variances are 0 and its cell is whole.
+// Records of one bucket follow one another; their lengths are
 // known from their flag. Axes are good to 8e-6; shears need all of float's digits, since a thin cell
-// multiplies them by its aspect ratio.
+// multiplies them by its aspect ratio. Weights are good to 1e-4, where the cache
+// keeps 1e-3; one of a0 a1 a2 is kept as that.
 #pragma once
 
 #include <algorithm>
@@ -34,7 +36,7 @@ namespace curvisplat {
 inline constexpr uint64_t kMaxNodes = uint64_t{1} << 47;
 
 inline constexpr size_t regularRecordBytes(size_t variables) {
-  return 45 + 16 * variables;
+  return 47 + 16 * variables;
 }
 inline constexpr size_t irregularRecordBytes(size_t variables) {
   return regularRecordBytes(variables) + 8 + 4 * variables;

@@ -23,19 +23,22 @@ constexpr double kMaxVolumeRatio = 8;
 /// What the cells of a box have in common.
 class Cells {
  public:
-  Cells(const BlockWindow& in, const NodeBox& box, const BlockEnds& ends, CellScratch& scratch,
-        NodeSplats& out)
+  Cells(const BlockWindow& in, const NodeBox& box, const BlockEnds& ends,
+        const NodeSplatCorrections& corrections, CellScratch& scratch, NodeSplats& out)
       : in_(in),
+        box_(box),
         ends_(ends),
         row_stride_(in.block.ni),
         plane_stride_(in.block.ni * (in.window.j1 - in.window.j0)),
-        known_{box.j0 - std::min<uint64_t>(box.j0, 1), std::min(box.j1 + 1, in.block.nj - 1),
-               box.k0 - std::min<uint64_t>(box.k0, 1), std::min(box.k1 + 1, in.block.nk - 1)},
+        known_{box.j0 - std::min<uint64_t>(box.j0, kReach), std::min(box.j1 + kReach, in.block.nj - 1),
+               box.k0 - std::min<uint64_t>(box.k0, kReach), std::min(box.k1 + kReach, in.block.nk - 1)},
         cells_i_(in.block.ni - 1),
+        corrections_(corrections),
         scratch_(scratch),
         out_(out) {
     scratch_.centre.resize(cells_i_ * rowsOf(known_));
     scratch_.there.resize(scratch_.centre.size());
+    for (auto& extent : scratch_.extent) extent.resize(scratch_.centre.size());
     for (uint64_t k = known_.k0; k < known_.k1; ++k)
       for (uint64_t j = known_.j0; j < known_.j1; ++j) lookAtRow(j, k);
   }
@@ -60,17 +63,23 @@ class Cells {
     return !ends_.faces->isAtEnd(face) || !ends_.faces->abuts(face);
   }
   void lookAtRow(uint64_t j, uint64_t k);
+  void measureRow(uint64_t j, uint64_t k, int axis);
+  double stretchAlong(int axis, uint64_t index, uint64_t count, size_t cell, size_t stride) const;
   void addCell(uint64_t i, uint64_t j, uint64_t k);
   std::array<glm::dvec3, 8> corners(size_t node) const {
     return cornersAt(in_.nodes->x.data(), in_.nodes->y.data(), in_.nodes->z.data(), node, row_stride_,
                      plane_stride_);
   }
 
+  static constexpr uint64_t kReach = 2;  // cells whose extents count, on either side of one
+
   const BlockWindow& in_;
+  const NodeBox box_;
   const BlockEnds& ends_;
   const size_t row_stride_, plane_stride_;
-  const NodeBox known_;  // cells whose centres are in the scratch: the box and its neighbours
+  const NodeBox known_;  // cells that are in the scratch: the box and its neighbours
   const uint64_t cells_i_;
+  const NodeSplatCorrections corrections_;
   CellScratch& scratch_;
   NodeSplats& out_;
   size_t count_ = 0;
@@ -96,6 +105,46 @@ void Cells::lookAtRow(uint64_t j, uint64_t k) {
   for (size_t i = 0; i < cells_i_; ++i)
     scratch_.there[cell + i] =
         marks[node + i] == 0 && (cornerMarks(marks, node + i, row_stride_, plane_stride_) & kNoNode) == 0;
+
+  if (!corrections_.stretch) return;
+  const bool in_box_j = j >= box_.j0 && j < box_.j1, in_box_k = k >= box_.k0 && k < box_.k1;
+  if (in_box_j && in_box_k) measureRow(j, k, 0);
+  if (in_box_k) measureRow(j, k, 1);
+  if (in_box_j) measureRow(j, k, 2);
+}
+
+/// The extents of a row's cells along one axis: the mean of four edges.
+void Cells::measureRow(uint64_t j, uint64_t k, int axis) {
+  const std::array<size_t, 3> strides{1, row_stride_, plane_stride_};
+  const size_t along = strides[axis], across = strides[(axis + 1) % 3], other = strides[(axis + 2) % 3];
+  const size_t node = nodeAt(0, j, k);
+  const double *x = in_.nodes->x.data() + node, *y = in_.nodes->y.data() + node,
+               *z = in_.nodes->z.data() + node;
+  double* out = scratch_.extent[axis].data() + cellAt(0, j, k);
+  for (size_t i = 0; i < cells_i_; ++i) {
+    const auto edges = [&](const double* a) {
+      const double* b = a + along;
+      return ((b[i] - a[i]) + (b[i + across] - a[i + across])) +
+             ((b[i + other] - a[i + other]) + (b[i + across + other] - a[i + across + other]));
+    };
+    const double dx = edges(x), dy = edges(y), dz = edges(z);
+    out[i] = dx * dx + dy * dy + dz * dz;
+  }
+}
+
+/// Of a cell, number `index` of `count` along the axis; `stride` is from one to the next in the scratch.
+double Cells::stretchAlong(int axis, uint64_t index, uint64_t count, size_t cell, size_t stride) const {
+  const auto is_there = [&](uint64_t before, uint64_t after) {
+    return index >= before && index + after < count &&
+           scratch_.there[cell + after * stride - before * stride];
+  };
+  if (!corrections_.stretch || !is_there(1, 0) || !is_there(0, 1)) return 1;
+  const double* own = scratch_.extent[axis].data() + cell;
+  const double before = *(own - stride), after = own[stride];
+  // Beyond the last cell is its mirror image, less the steady growth.
+  const double before2 = is_there(2, 0) ? *(own - 2 * stride) : before / steadyGrowth(before, *own, after);
+  const double after2 = is_there(0, 2) ? own[2 * stride] : after / steadyGrowth(after, *own, before);
+  return stretchOf(before2, before, *own, after, after2);
 }
 
 /// A length for the shape of a cell without any extent: far below the grid's, and above zero.
@@ -108,7 +157,7 @@ double smallestAxis(const glm::dvec3& centre) {
 void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
   const size_t node = nodeAt(i, j, k), cell = cellAt(i, j, k);
   const Hexahedron hexahedron(corners(node));
-  const glm::dmat3& jacobian = hexahedron.jacobian;
+  glm::dmat3 jacobian = hexahedron.jacobian;
 
   NodeSplat& splat = out_.splats[count_];
   splat.node = in_.first_node + (k * in_.block.nj + j) * in_.block.ni + i;
@@ -123,6 +172,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
   std::array<size_t, 3> before, after;  // elements of NodeArrays
   std::array<double, 3> per_step;
   glm::dmat3 steps;
+  glm::dvec3 stretch(1.0);
   glm::dvec3 bend(0.0);             // the sum of the centres' second differences
   std::array<double, 3> inwards{};  // along i, j, k: 1 or -1 from a border
   for (int axis = 0; axis < 3; ++axis) {
@@ -139,11 +189,15 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
                       ? per_step[axis] * (scratch_.centre[has_after ? cell + cell_strides[axis] : cell] -
                                           scratch_.centre[has_before ? cell - cell_strides[axis] : cell])
                       : jacobian[axis];
-    if (has_before && has_after)
-      bend += scratch_.centre[cell + cell_strides[axis]] + scratch_.centre[cell - cell_strides[axis]] -
-              2.0 * scratch_.centre[cell];
+    if (!has_before || !has_after) continue;
+    stretch[axis] = stretchAlong(axis, index[axis], cells[axis], cell, cell_strides[axis]);
+    bend += stretch[axis] * stretch[axis] *
+            (scratch_.centre[cell + cell_strides[axis]] + scratch_.centre[cell - cell_strides[axis]] -
+             2.0 * scratch_.centre[cell]);
   }
+  const double shrink = 1 / (stretch[0] * stretch[1] * stretch[2]);  // from the splat's volume to the cell's
   const LatticeGradient gradient_of(steps);
+  for (int axis = 0; axis < 3; ++axis) jacobian[axis] *= stretch[axis];
   const auto set_values = [&](double scale, const auto& rotate) {
     SplatScalar* value = out_.values.data() + count_ * in_.nodes->scalars.size();
     for (const std::vector<float>& f : in_.nodes->scalars) {
@@ -153,7 +207,8 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
       for (int axis = 0; axis < 3; ++axis) {
         const double f_before = f[before[axis]], f_after = f[after[axis]];
         differences[axis] = per_step[axis] * (f_after - f_before);
-        if (before[axis] != node && after[axis] != node) second += (f_after - here) - (here - f_before);
+        if (before[axis] != node && after[axis] != node)
+          second += stretch[axis] * stretch[axis] * ((f_after - here) - (here - f_before));
         least = std::min({least, f_before, f_after});
         most = std::max({most, f_before, f_after});
       }
@@ -164,14 +219,16 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     }
   };
   // Axes that have the volume of the hexahedron, where they are near it; a weight of its own elsewhere.
-  const auto set_volume = [&](double determinant) {
+  const auto set_volume = [&](double stretched) {
+    const double determinant = stretched * shrink;
     const double volume = determinant + hexahedron.volume_beyond;
     const double ratio = std::abs(volume / determinant);
     splat.regular = ratio > 1 / kMaxVolumeRatio && ratio < kMaxVolumeRatio;
     const double scale = splat.regular ? std::cbrt(ratio) : 1.0;
     for (double& axis : splat.splat.axis) axis *= scale;
-    splat.splat.weight =
-        splat.regular ? splat.splat.axis[0] * splat.splat.axis[1] * splat.splat.axis[2] : std::abs(volume);
+    splat.splat.weight = splat.regular
+                             ? splat.splat.axis[0] * splat.splat.axis[1] * splat.splat.axis[2] * shrink
+                             : std::abs(volume);
     (volume < 0 ? out_.left_handed : out_.right_handed) += 1;
     return scale;
   };
@@ -194,7 +251,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     double scale = 1;
     if (shape.floored) {
       splat.regular = false;
-      splat.splat.weight = std::abs(shape.determinant + hexahedron.volume_beyond);
+      splat.splat.weight = std::abs(shape.determinant * shrink + hexahedron.volume_beyond);
       ++out_.degenerate;
     } else {
       scale = set_volume(shape.determinant);
@@ -209,13 +266,13 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
 }  // namespace
 
 void computeCellSplats(const BlockWindow& in, const NodeBox& box, const BlockEnds& ends, CellScratch& scratch,
-                       NodeSplats& out) {
+                       NodeSplats& out, const NodeSplatCorrections& corrections) {
   const GridBlock& block = in.block;
   const NodeBox& window = in.window;
-  CURVISPLAT_CHECK(window.j0 <= box.j0 - std::min<uint64_t>(box.j0, 1) &&
-                   window.k0 <= box.k0 - std::min<uint64_t>(box.k0, 1));
-  CURVISPLAT_CHECK(std::min(box.j1 + 2, block.nj) <= window.j1 &&
-                   std::min(box.k1 + 2, block.nk) <= window.k1);
+  CURVISPLAT_CHECK(window.j0 <= box.j0 - std::min(box.j0, kCellSplatHalo.before) &&
+                   window.k0 <= box.k0 - std::min(box.k0, kCellSplatHalo.before));
+  CURVISPLAT_CHECK(std::min(box.j1 + kCellSplatHalo.after, block.nj) <= window.j1 &&
+                   std::min(box.k1 + kCellSplatHalo.after, block.nk) <= window.k1);
   out.splats.clear();
   out.values.clear();
   out.degenerate = out.right_handed = out.left_handed = 0;
@@ -227,7 +284,7 @@ void computeCellSplats(const BlockWindow& in, const NodeBox& box, const BlockEnd
   const size_t variables = in.nodes->scalars.size();
   out.splats.resize(most);
   out.values.resize(most * variables);
-  Cells rows(in, cells, ends, scratch, out);
+  Cells rows(in, cells, ends, corrections, scratch, out);
   for (uint64_t k = cells.k0; k < cells.k1; ++k)
     for (uint64_t j = cells.j0; j < cells.j1; ++j) rows.addRow(j, k);
   out.splats.resize(rows.count());

@@ -3,14 +3,16 @@
 // cells of abutting blocks abut: nothing is merged at seams.
 //
 // A splat's axes are the Jacobian's, scaled alike so that their product is the hexahedron's volume: then a
-// constant field has the same density in every cell. The slope is that of the linear field through the
-// centres of the neighbouring cells; a missing one (the block ends, or it is not there) makes the difference
-// one-sided.
+// constant field has the same density in every cell. Along each lattice axis they are stretched as those of
+// nodes are (stretch.h), but not where the cell is the last one in its block or beside one that is missing:
+// whether that is a border depends on other blocks. The slope is that of the linear field through the centres
+// of the neighbouring cells; a missing one (the block ends, or it is not there) makes the difference one-sided.
 //
 // A cell that has no neighbour ends at a border, and its splat remembers where (stream/border_code.h); there is
 // a neighbour, too, where blocks abut.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <vector>
@@ -27,17 +29,22 @@ struct BlockEnds {
   const AbuttingFaces* faces = nullptr;  // null: cells are not told that they end at borders
 };
 
+/// What is read around the cells of a box: two cells on either side, and the nodes behind the last.
+inline constexpr Halo kCellSplatHalo{2, 3};
+
 /// What computeCellSplats() needs for a while; keeps its capacity.
 struct CellScratch {
   std::vector<glm::dvec3> centre;
   std::vector<uint8_t> there;
+  std::array<std::vector<double>, 3> extent;  // squared, along i, j, k; times 16
 };
 
 /// Computes the splats of the cells whose lowest nodes are in `box` and that are there: all of their corners
 /// are, and their values. A splat's number is that of the cell's lowest node. `in.window` is `box` and
-/// kCellHalo where the block goes on; `in.nodes` as a NodeReader of cell-centred scalars gives them.
-/// Overwrites `out` and keeps its capacity. Pure: any thread. Throws nothing but bad_alloc.
+/// kCellSplatHalo where the block goes on; `in.nodes` as a NodeReader of cell-centred scalars gives them.
+/// Overwrites `out` and keeps its capacity. Of the corrections only `stretch` is for cells. Pure: any
+/// thread. Throws nothing but bad_alloc.
 void computeCellSplats(const BlockWindow& in, const NodeBox& box, const BlockEnds& ends, CellScratch& scratch,
-                       NodeSplats& out);
+                       NodeSplats& out, const NodeSplatCorrections& corrections = {});
 
 }  // namespace curvisplat

@@ -24,7 +24,8 @@ struct Neighbours {
 /// What the nodes of a window have in common.
 class Window {
  public:
-  Window(const BlockWindow& in, const NodeSplatCorrections& corrections, NodeSplats& out)
+  Window(const BlockWindow& in, const NodeSplatCorrections& corrections, NodeScratch& scratch,
+         NodeSplats& out)
       : in_(in),
         corrections_(corrections),
         x_(in.nodes->x.data()),
@@ -34,15 +35,26 @@ class Window {
         ni_(in.block.ni),
         row_stride_(static_cast<ptrdiff_t>(ni_)),
         plane_stride_(static_cast<ptrdiff_t>(ni_ * (in.window.j1 - in.window.j0))),
+        scratch_(scratch),
         out_(out) {
     for (const auto& scalar : in.nodes->scalars) scalars_.push_back(scalar.data());
+    for (auto& row : scratch.stretch) row.assign(ni_, 1.0f);
+    scratch.has_blank.resize(rowsOf(in.window));
+    for (size_t row = 0; row < scratch.has_blank.size(); ++row)
+      scratch.has_blank[row] = std::memchr(blank_ + row * ni_, 1, ni_) != nullptr;
   }
 
   void addRow(uint64_t j, uint64_t k);
   size_t count() const { return count_; }
 
  private:
-  bool anyBlankAround(const uint8_t* row, const Neighbours& neighbours) const;
+  bool hasBlank(uint64_t j, uint64_t k) const {
+    return scratch_.has_blank[(k - in_.window.k0) * (in_.window.j1 - in_.window.j0) + (j - in_.window.j0)] !=
+           0;
+  }
+  bool anyBlankAround(uint64_t j, uint64_t k) const;
+  void stretchRow(uint64_t j, uint64_t k);
+  float stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const;
   void addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face);
   glm::dvec3 position(ptrdiff_t at) const { return {x_[at], y_[at], z_[at]}; }
   double spacing(ptrdiff_t at, const Neighbours& neighbours) const;
@@ -57,6 +69,7 @@ class Window {
   uint64_t ni_;
   ptrdiff_t row_stride_, plane_stride_;
   uint64_t first_node_of_row_ = 0;
+  NodeScratch& scratch_;
   NodeSplats& out_;
   size_t count_ = 0;
 };
@@ -82,7 +95,8 @@ void Window::addRow(uint64_t j, uint64_t k) {
     return neighbours;
   };
 
-  if (!anyBlankAround(blank_ + row, inner)) {
+  if (corrections_.stretch) stretchRow(j, k);
+  if (!anyBlankAround(j, k)) {
     addNode(0, row, at_i(0), true);
     for (uint64_t i = 1; i + 1 < ni_; ++i) addNode(i, row + static_cast<ptrdiff_t>(i), inner, on_face);
     if (ni_ > 1) addNode(ni_ - 1, row + static_cast<ptrdiff_t>(ni_ - 1), at_i(ni_ - 1), true);
@@ -100,13 +114,62 @@ void Window::addRow(uint64_t j, uint64_t k) {
   }
 }
 
-bool Window::anyBlankAround(const uint8_t* row, const Neighbours& neighbours) const {
-  const auto any_blank = [&](ptrdiff_t offset) { return std::memchr(row + offset, 1, ni_) != nullptr; };
-  return any_blank(0) || any_blank(neighbours.before[1]) || any_blank(neighbours.after[1]) ||
-         any_blank(neighbours.before[2]) || any_blank(neighbours.after[2]);
+bool Window::anyBlankAround(uint64_t j, uint64_t k) const {
+  const GridBlock& block = in_.block;
+  return hasBlank(j, k) || (j > 0 && hasBlank(j - 1, k)) || (j + 1 < block.nj && hasBlank(j + 1, k)) ||
+         (k > 0 && hasBlank(j, k - 1)) || (k + 1 < block.nk && hasBlank(j, k + 1));
+}
+
+/// Fills the scratch with the stretch of a row's nodes.
+void Window::stretchRow(uint64_t j, uint64_t k) {
+  constexpr uint64_t kWhole = kStretchReach - 1;  // neighbours on a side that stretchNodes() needs
+  const GridBlock& block = in_.block;
+  const ptrdiff_t row = static_cast<ptrdiff_t>(k - in_.window.k0) * plane_stride_ +
+                        static_cast<ptrdiff_t>(j - in_.window.j0) * row_stride_;
+  const std::array<uint64_t, 3> index{0, j, k}, count{ni_, block.nj, block.nk};
+  const std::array<ptrdiff_t, 3> strides{1, row_stride_, plane_stride_};
+  for (size_t axis = 0; axis < 3; ++axis) {
+    float* out = scratch_.stretch[axis].data();
+    const auto one_by_one = [&](uint64_t begin, uint64_t end) {
+      for (uint64_t i = begin; i < end; ++i) {
+        const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
+        if (!blank_[at]) out[i] = stretchOfNode(at, strides[axis], axis == 0 ? i : index[axis], count[axis]);
+      }
+    };
+    bool whole = true;
+    if (axis == 0) {
+      whole = ni_ > 2 * kWhole && !hasBlank(j, k);
+    } else {
+      whole = index[axis] >= kWhole && index[axis] + kWhole < count[axis];
+      for (uint64_t n = 0; n <= 2 * kWhole && whole; ++n)
+        whole = !(axis == 1 ? hasBlank(j + n - kWhole, k) : hasBlank(j, k + n - kWhole));
+    }
+    if (!whole) {
+      one_by_one(0, ni_);
+    } else if (axis == 0) {
+      one_by_one(0, kWhole);
+      stretchNodes({x_, y_, z_}, row + static_cast<ptrdiff_t>(kWhole), 1, ni_ - 2 * kWhole, out + kWhole);
+      one_by_one(ni_ - kWhole, ni_);
+    } else {
+      stretchNodes({x_, y_, z_}, row, strides[axis], ni_, out);
+    }
+  }
+}
+
+/// Of a node that is there, number `index` of `count` along the axis of `stride`.
+float Window::stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const {
+  const auto neighbours = [&](uint64_t most, ptrdiff_t step) {
+    int found = 0;
+    while (found < kStretchReach && static_cast<uint64_t>(found) < most && !blank_[at + (found + 1) * step])
+      ++found;
+    return found;
+  };
+  return stretchOnLine({x_, y_, z_}, at, stride, neighbours(index, -stride),
+                       neighbours(count - 1 - index, stride));
 }
 
 inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face) {
+  const glm::dvec3 stretch(scratch_.stretch[0][i], scratch_.stretch[1][i], scratch_.stretch[2][i]);
   NodeSplat& node = out_.splats[count_];
   node.node = first_node_of_row_ + i;
   node.node_position = position(at);
@@ -119,7 +182,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
 
   // Where the middle of the cell is from the node, in cells. The cell reaches half way to either neighbour,
   // at distances a and b: its middle is (b - a) / 4 away, of a length of (a + b) / 2. With one neighbour
-  // only, that is a quarter of the difference, inwards.
+  // only, that is a quarter of the difference, inwards, of the splat's length: its border stays.
   glm::dvec3 middle(0.0);
   glm::dvec3 bend(0.0);             // the sum of the positions' second differences
   std::array<double, 3> inwards{};  // along i, j, k: 1 or -1 where the cell is a half one
@@ -129,11 +192,12 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     const glm::dvec3 to_after = position(at + neighbours.after[axis]) - node.node_position;
     const double a = glm::length(to_before), b = glm::length(to_after);
     const bool whole = neighbours.before[axis] != 0 && neighbours.after[axis] != 0;
-    if (whole) bend += to_after - to_before;
+    if (whole) bend += stretch[axis] * stretch[axis] * (to_after - to_before);
     if (a + b > 0 && (corrections_.middles || !whole)) middle[axis] = 0.5 * (b - a) / (a + b);
     if (whole) continue;
     if (corrections_.border_codes) {
       if (a + b > 0) inwards[axis] = neighbours.before[axis] == 0 ? 1 : -1;
+      middle[axis] *= stretch[axis];
     } else {
       jacobian[axis] *= 2.0;
       middle[axis] = 0;
@@ -141,6 +205,8 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     }
   }
   node.splat.position = node.node_position + jacobian * middle;
+  for (int axis = 0; axis < 3; ++axis) jacobian[axis] *= stretch[axis];
+  const double shrink = 1 / (stretch[0] * stretch[1] * stretch[2]);  // from the splat's volume to the cell's
 
   // `rotate` gives Q's image of a vector; `to_factor` A⁻¹ of one.
   const auto set_values = [&](const auto& rotate, const auto& to_factor, bool correct_bends) {
@@ -154,11 +220,11 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
         const double before = f[at + neighbours.before[axis]], after = f[at + neighbours.after[axis]];
         gradient[axis] = 0.5 * (after - before);
         if (neighbours.before[axis] != 0 && neighbours.after[axis] != 0)
-          second += (after - here) - (here - before);
+          second += stretch[axis] * stretch[axis] * ((after - here) - (here - before));
         least = std::min({least, before, after});
         most = std::max({most, before, after});
       }
-      const glm::dvec3 slope = rotate(gradient);
+      const glm::dvec3 slope = rotate(gradient * stretch);
       double mean = here + glm::dot(gradient, middle);
       if (correct_bends)
         mean = std::clamp(mean + kBend * (second - glm::dot(slope, bend_in_cells)), least, most);
@@ -173,7 +239,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   if (surelyAboveFloor(a)) {
     node.splat.axis = {a.a00, a.a11, a.a22};
     node.splat.shear = {a.a10 * lq.inverse_a00, a.a20 * lq.inverse_a00, a.a21 * lq.inverse_a11};
-    node.splat.weight = a.a00 * a.a11 * a.a22 * weight_factor;
+    node.splat.weight = a.a00 * a.a11 * a.a22 * weight_factor * shrink;
     node.regular = weight_factor == 1;
     node.border_code = borderCode(inwards, [&](const glm::dvec3& v) { return lq.rotate(v); });
     (lq.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
@@ -187,7 +253,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     const CellShape shape = shapeFromJacobian(jacobian, smallestAxis(at, neighbours));
     node.splat.axis = shape.axis;
     node.splat.shear = shape.shear;
-    node.splat.weight = std::abs(shape.determinant) * weight_factor;
+    node.splat.weight = std::abs(shape.determinant) * weight_factor * shrink;
     node.regular = !shape.floored;
     node.border_code = borderCode(inwards, [&](const glm::dvec3& v) { return shape.rotation * v; });
     (shape.floored ? out_.degenerate : shape.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
@@ -218,12 +284,14 @@ double Window::smallestAxis(ptrdiff_t at, const Neighbours& neighbours) const {
 
 }  // namespace
 
-void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeSplats& out,
+void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeScratch& scratch, NodeSplats& out,
                        const NodeSplatCorrections& corrections) {
   const NodeBox& window = in.window;
-  CURVISPLAT_CHECK(window.j0 <= (box.j0 > 0 ? box.j0 - 1 : 0) && window.k0 <= (box.k0 > 0 ? box.k0 - 1 : 0));
-  CURVISPLAT_CHECK(std::min(box.j1 + 1, in.block.nj) <= window.j1 &&
-                   std::min(box.k1 + 1, in.block.nk) <= window.k1);
+  const Halo halo = corrections.stretch ? kNodeSplatHalo : kNodeHalo;
+  CURVISPLAT_CHECK(window.j0 <= box.j0 - std::min(box.j0, halo.before) &&
+                   window.k0 <= box.k0 - std::min(box.k0, halo.before));
+  CURVISPLAT_CHECK(std::min(box.j1 + halo.after, in.block.nj) <= window.j1 &&
+                   std::min(box.k1 + halo.after, in.block.nk) <= window.k1);
 
   // Sized for the most there can be and cut afterwards: in a run over equal boxes nothing is initialised
   // twice.
@@ -233,7 +301,7 @@ void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeSplats& ou
   out.values.resize(most * variables);
   out.degenerate = out.right_handed = out.left_handed = 0;
 
-  Window rows(in, corrections, out);
+  Window rows(in, corrections, scratch, out);
   for (uint64_t k = box.k0; k < box.k1; ++k)
     for (uint64_t j = box.j0; j < box.j1; ++j) rows.addRow(j, k);
   out.splats.resize(rows.count());

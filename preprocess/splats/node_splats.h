@@ -10,6 +10,11 @@
 // once what bent coordinates make of a straight scalar is left out; the mean stays within the range of the
 // node and its neighbours.
 //
+// A splat is longer or shorter than the cell along each axis, by a factor near 1, so that uniform data looks
+// uniform where cells of different sizes meet (stretch.h). Its weight stays the volume of the cell, its slope
+// stays the scalar's gradient, and its middle stays; that of a half cell moves with the stretch, since its
+// border stays.
+//
 // A missing neighbour (the block ends, or the node there is blank) makes the cell a half cell along that
 // axis: the Jacobian's column is half of the one difference there is, and the splat sits a quarter cell
 // inwards. Without any neighbour along an axis the column is zero.
@@ -21,6 +26,8 @@
 #include <vector>
 
 #include "preprocess/grid/grid_source.h"
+#include "preprocess/grid/slabs.h"
+#include "preprocess/splats/stretch.h"
 #include "stream/model/border_code.h"
 #include "stream/model/splats.h"
 
@@ -48,7 +55,7 @@ uint32_t borderCode(const std::array<double, 3>& inwards, const Rotate& rotate) 
 struct NodeSplat {
   uint64_t node = 0;                 // number in the whole grid: block after block, i fastest, then j, k
   Splat splat;                       // position: world units, moved inwards where the node owns a half cell
-  bool regular = true;               // weight is a0 a1 a2, and every variable's variance is 0
+  bool regular = true;               // every variable's variance is 0, and the weight is about a0 a1 a2
   uint32_t border_code = kNoBorder;  // stream/border_code.h
   bool on_block_face = false;        // may coincide with a node of another face: to be merged by SeamMerger
   glm::dvec3 node_position{0.0};     // where the node itself is
@@ -65,8 +72,11 @@ struct NodeSplats {
   uint64_t left_handed = 0;   // det J < 0. The smaller of a whole block's two sums counts its inverted cells
 };
 
-/// A window of one block: `nodes` holds `window`, which is `box` and a halo of one plane in j and k where the
-/// block goes on.
+/// What is read around the nodes of a box.
+inline constexpr Halo kNodeSplatHalo{kStretchReach, kStretchReach};
+
+/// A window of one block: `nodes` holds `window`, which is `box` and its halo (kNodeSplatHalo) in j and k
+/// where the block goes on.
 struct BlockWindow {
   GridBlock block;
   uint64_t first_node = 0;  // of the block in the whole grid
@@ -80,11 +90,18 @@ struct NodeSplatCorrections {
   bool border_codes = true;  // else a border's node has a whole cell of half the weight, around itself
   bool middles = true;       // else splats sit at nodes, but for half cells
   bool bends = true;         // of the scalar
+  bool stretch = true;       // else splats are as long as their cells
+};
+
+/// What computeNodeSplats() needs for a while; keeps its capacity.
+struct NodeScratch {
+  std::array<std::vector<float>, 3> stretch;  // [axis][node of a row]
+  std::vector<uint8_t> has_blank;             // [row of the window]
 };
 
 /// Computes the splats of the nodes of `box` that are not blank. Overwrites `out` and keeps its capacity.
 /// Pure: any thread. Throws nothing but bad_alloc.
-void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeSplats& out,
+void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeScratch& scratch, NodeSplats& out,
                        const NodeSplatCorrections& corrections = {});
 
 }  // namespace curvisplat

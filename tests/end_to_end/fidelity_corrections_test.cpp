@@ -74,21 +74,39 @@ TEST_F(Corrections, BendsOfTheScalar) {
   expectWorth("bends of the scalar", source_, field_, "band", halfAnnulusCamera(), 58, {}, without);
 }
 
-TEST_F(Corrections, MiddlesOfCells) {
-  // Spectral elements: nodes at Gauss-Legendre-Lobatto points, each element's own.
-  constexpr double kPoints[] = {
-      0, 0.0641299257, 0.2041499093, 0.3953503910, 0.6046496090, 0.7958500907, 0.9358700743};
-  const FunctionGridSource spectral({gridBlock(29, 29, 29)}, 1, [&](const GridNode& n) {
+/// A uniform medium in spectral elements: nodes at Gauss-Legendre-Lobatto points, each element's own.
+FunctionGridSource spectralElements() {
+  return FunctionGridSource({gridBlock(29, 29, 29)}, 1, [](const GridNode& n) {
+    constexpr double kPoints[] = {
+        0, 0.0641299257, 0.2041499093, 0.3953503910, 0.6046496090, 0.7958500907, 0.9358700743};
     const auto at = [&](uint64_t i) { return 0.25 * (static_cast<double>(i / 7) + kPoints[i % 7]); };
     return NodeValues{{at(n.i), at(n.j), at(n.k)}, {0.5f}, false};
   });
+}
+
+Camera insideSpectralElements() {
   Camera camera;
   camera.position = {0.5, 0.5, 4};
   camera.focal_point = {0.5, 0.5, 0.5};
   camera.parallel_scale = 0.4;  // no borders
-  DirectOptions without;
+  return camera;
+}
+
+TEST_F(Corrections, MiddlesOfCells) {
+  const FunctionGridSource spectral = spectralElements();
+  DirectOptions with, without;
+  with.nodes.stretch = without.nodes.stretch = false;
   without.nodes.middles = false;
-  expectWorth("middles of cells", spectral, GridField(spectral, 0), "smooth", camera, 34, {}, without);
+  expectWorth("middles of cells", spectral, GridField(spectral, 0), "smooth", insideSpectralElements(), 34,
+              with, without);
+}
+
+TEST_F(Corrections, StretchOfUnevenCells) {
+  const FunctionGridSource spectral = spectralElements();
+  DirectOptions without;
+  without.nodes.stretch = false;
+  expectWorth("stretch of uneven cells", spectral, GridField(spectral, 0), "smooth", insideSpectralElements(),
+              40, {}, without);
 }
 
 TEST_F(Corrections, Seams) {

@@ -34,6 +34,7 @@ TEST(SplatRecord, RoundTripsToSinglePrecision) {
   for (int n = 0; n < 200; ++n) {
     NodeSplat splat = someSplat(random);
     splat.regular = n % 2 == 0;
+    if (n % 4 == 0) splat.splat.weight *= 0.75;
     if (!splat.regular) {
       splat.splat.weight *= 3;
       splat.border_code = 0x12345601;
@@ -43,7 +44,7 @@ TEST(SplatRecord, RoundTripsToSinglePrecision) {
     const RootPosition position{{random() >> 16, random() >> 16, random() >> 16}};
     record.clear();
     packRecord(splat, values, position, record);
-    ASSERT_EQ(record.size(), splat.regular ? 77u : 93u);
+    ASSERT_EQ(record.size(), splat.regular ? 79u : 95u);
     EXPECT_EQ(recordBytes(record.data(), 2), record.size());
     EXPECT_EQ(recordNode(record.data()), splat.node);
     EXPECT_EQ(recordPosition(record.data()), position);
@@ -54,7 +55,7 @@ TEST(SplatRecord, RoundTripsToSinglePrecision) {
       EXPECT_NEAR(back.axis[axis], splat.splat.axis[axis], 8e-6 * splat.splat.axis[axis]);
       EXPECT_FLOAT_EQ(back.shear[axis], splat.splat.shear[axis]);
     }
-    EXPECT_NEAR(back.weight, splat.splat.weight, 2.4e-5 * splat.splat.weight);
+    EXPECT_NEAR(back.weight, splat.splat.weight, 4.5e-5 * splat.splat.weight);
     for (int v = 0; v < 2; ++v) {
       EXPECT_EQ(values_back[v].mean, values[v].mean);
       EXPECT_EQ(values_back[v].slope, values[v].slope);

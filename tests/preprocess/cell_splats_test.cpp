@@ -10,6 +10,7 @@
 
 #include "preprocess/grid/hexahedron.h"
 #include "preprocess/grid/node_reader.h"
+#include "preprocess/splats/shape.h"
 #include "stream/model/border_code.h"
 #include "tests/reference/mapped_block.h"
 #include "tests/support/temporary_folder.h"
@@ -44,11 +45,11 @@ struct CellBlock : MappedBlock {
       for (const auto& values : nodes.scalars) nodes.blank[n] |= std::isnan(values[n]) ? kNoValue : 0;
   }
 
-  NodeSplats cellSplats(const BlockEnds& ends = {}) {
+  NodeSplats cellSplats(const BlockEnds& ends = {}, const NodeSplatCorrections& corrections = {}) {
     mark();
     NodeSplats out;
     CellScratch scratch;
-    computeCellSplats(window(), {0, block.nj, 0, block.nk}, ends, scratch, out);
+    computeCellSplats(window(), {0, block.nj, 0, block.nk}, ends, scratch, out, corrections);
     return out;
   }
 };
@@ -180,9 +181,12 @@ TEST(CellSplats, OfAnyGridSumToItsHexahedra) {
         volume += std::abs(
             integratedVolume(cornersAt(grid.nodes.x.data(), grid.nodes.y.data(), grid.nodes.z.data(),
                                        grid.at(i, j, k), grid.block.ni, grid.block.ni * grid.block.nj)));
-  const NodeSplats out = grid.cellSplats();
+  EXPECT_NEAR(totalWeight(grid.cellSplats()), volume, 1e-12 * volume);
+  // The density of a constant field is the same in every cell, but for what the neighbours' sizes do to it.
+  NodeSplatCorrections corrections;
+  corrections.stretch = false;
+  const NodeSplats out = grid.cellSplats({}, corrections);
   EXPECT_NEAR(totalWeight(out), volume, 1e-12 * volume);
-  // The density of a constant field is the same in every cell.
   for (const NodeSplat& cell : out.splats) {
     const auto& axis = cell.splat.axis;
     EXPECT_TRUE(cell.regular);
@@ -241,8 +245,10 @@ TEST(CellSplats, OfWindowsAreThoseOfTheWhole) {
   for (uint64_t k = 0; k < 9; ++k)
     for (uint64_t j = 0; j < 8; j += 3) {
       const NodeBox box{j, std::min<uint64_t>(j + 3, 8), k, k + 1};
-      const NodeBox window{box.j0 - std::min<uint64_t>(box.j0, 1), std::min<uint64_t>(box.j1 + 2, 8),
-                           k - std::min<uint64_t>(k, 1), std::min<uint64_t>(k + 3, 9)};
+      const NodeBox window{box.j0 - std::min(box.j0, kCellSplatHalo.before),
+                           std::min<uint64_t>(box.j1 + kCellSplatHalo.after, 8),
+                           k - std::min(k, kCellSplatHalo.before),
+                           std::min<uint64_t>(k + 1 + kCellSplatHalo.after, 9)};
       NodeArrays nodes;
       nodes.scalars.resize(1);
       for (uint64_t kk = window.k0; kk < window.k1; ++kk)
@@ -273,6 +279,40 @@ TEST(CellSplats, OfWindowsAreThoseOfTheWhole) {
     }
   EXPECT_EQ(n, whole.splats.size());
   EXPECT_GT(borders, 5u * 7 * 8 - 3 * 5 * 6);
+}
+
+TEST(CellSplats, OfUnevenCellsAreStretchedByTheirNeighbours) {
+  // Two groups of three cells, in turn along each axis.
+  const std::vector<double> x{0, 1, 2.6, 3.6, 4.6, 6.2, 7.2};
+  const glm::dmat3 turn(glm::dvec3(0.6, 0.8, 0), glm::dvec3(-0.8, 0.6, 0), glm::dvec3(0, 0, 1));
+  for (size_t axis = 0; axis < 3; ++axis) {
+    std::array<uint64_t, 3> nodes{4, 4, 4};
+    nodes[axis] = 7;
+    CellBlock grid(nodes[0], nodes[1], nodes[2], [&](double i, double j, double k) {
+      glm::dvec3 p(i, j, k);
+      p[static_cast<int>(axis)] = x[static_cast<size_t>(p[static_cast<int>(axis)])];
+      return turn * p;
+    });
+    grid.addCellScalar([](const glm::dvec3& p) { return p.x; });
+    const NodeSplats out = grid.cellSplats();
+    EXPECT_NEAR(totalWeight(out), 7.2 * 9, 1e-9);
+    for (size_t n = 0; n < 6; ++n) {
+      std::array<uint64_t, 3> cell{1, 1, 1};
+      cell[axis] = n;
+      const NodeSplat* splat = splatOf(out, grid.at(cell[0], cell[1], cell[2]));
+      ASSERT_TRUE(splat);
+      // Extents 1, 1.6, 1, 1, 1.6, 1; those beyond the ends are mirrored.
+      const auto extent = [&](size_t m) { return (m + 6) % 3 == 1 ? 1.6 : 1.0; };
+      double mean = 0;
+      for (size_t m = 0; m < 5; ++m)
+        mean += std::array{1, 4, 6, 4, 1}[m] / 16.0 * std::log(extent(n + m + 4) / extent(n));
+      const double expected = n == 0 || n == 5 ? 1 : std::sqrt(0.418 + 0.582 * std::exp(2 * mean));
+      const Splat& s = splat->splat;
+      EXPECT_NEAR(s.axis[0] * s.axis[1] * s.axis[2] / splat->splat.weight, expected, 1e-6) << axis << n;
+      EXPECT_NEAR(singularValues(s.factor())[0] / (expected * extent(n)), 1, extent(n) == 1 ? 0.2 : 1e-6);
+      EXPECT_TRUE(splat->regular);
+    }
+  }
 }
 
 TEST(CellSplats, OfSingularAndFoldedCellsAreFinite) {

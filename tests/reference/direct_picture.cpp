@@ -37,8 +37,9 @@ std::vector<DirectSplat> splatsOf(const GridSource& source, uint32_t scalar, con
     const NodeBox all{0, blocks[b].nj, 0, blocks[b].nk};
     NodeArrays nodes;
     source.read(b, all, std::span(&scalar, 1), nodes);
+    NodeScratch scratch;
     NodeSplats splats;
-    computeNodeSplats({blocks[b], first_node, all, &nodes}, all, splats, options.nodes);
+    computeNodeSplats({blocks[b], first_node, all, &nodes}, all, scratch, splats, options.nodes);
     for (size_t n = 0; n < splats.splats.size(); ++n) {
       const std::span<const SplatScalar> values(&splats.values[n], 1);
       if (splats.splats[n].on_block_face && options.merge_seams)

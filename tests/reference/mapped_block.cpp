@@ -31,9 +31,10 @@ void MappedBlock::roundToFloat() {
     for (double& value : *values) value = static_cast<float>(value);
 }
 
-NodeSplats MappedBlock::splats() const {
+NodeSplats MappedBlock::splats(const NodeSplatCorrections& corrections) const {
+  NodeScratch scratch;
   NodeSplats out;
-  computeNodeSplats(window(), {0, block.nj, 0, block.nk}, out);
+  computeNodeSplats(window(), {0, block.nj, 0, block.nk}, scratch, out, corrections);
   return out;
 }
 

@@ -25,7 +25,7 @@ struct MappedBlock {
   void addScalar(const std::function<double(const glm::dvec3&)>& f);
   void roundToFloat();
   BlockWindow window() const { return {block, first_node, {0, block.nj, 0, block.nk}, &nodes}; }
-  NodeSplats splats() const;
+  NodeSplats splats(const NodeSplatCorrections& corrections = {}) const;
 };
 
 double totalWeight(const NodeSplats& splats);

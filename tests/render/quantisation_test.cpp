@@ -62,9 +62,10 @@ std::vector<BrickSplats> halfAnnulusBricks(RootCube& root) {
   std::vector<BrickSplats> bricks;
   const BlockWindow window{source.description().blocks[0], 0, all, &nodes};
   const uint64_t planes = kMaxBrickSplats / (kNodes.ni * kNodes.nj);
+  NodeScratch scratch;
   NodeSplats splats;
   for (uint64_t k = 0; k < kNodes.nk; k += planes) {
-    computeNodeSplats(window, {0, kNodes.nj, k, std::min(k + planes, kNodes.nk)}, splats);
+    computeNodeSplats(window, {0, kNodes.nj, k, std::min(k + planes, kNodes.nk)}, scratch, splats);
     BrickSplats& brick = bricks.emplace_back();
     brick.variables.resize(1);
     brick.variables[0] = splats.values;

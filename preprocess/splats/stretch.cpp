@@ -1,0 +1,75 @@
+#include "preprocess/splats/stretch.h"
+
+namespace curvisplat {
+
+void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, size_t count, float* out) {
+  const auto last = at + static_cast<ptrdiff_t>(count);
+  for (ptrdiff_t n = at; n < last; ++n) {
+    // Twice the extents: their ratios count.
+    const auto extent = [&](ptrdiff_t steps) {
+      return nodes.squaredDistance(n + (steps - 1) * stride, n + (steps + 1) * stride);
+    };
+    out[n - at] = stretchOf(extent(-2), extent(-1), extent(0), extent(1), extent(2));
+  }
+}
+
+namespace {
+
+/// The squared extents of nodes near one end of a line, times four as above.
+class LineEnd {
+ public:
+  /// `inwards`: the stride from the end node into the line, which has at least two nodes; `samples` of them
+  /// are known.
+  LineEnd(const NodePositions& nodes, ptrdiff_t end, ptrdiff_t inwards, int samples)
+      : nodes_(nodes), end_(end), inwards_(inwards) {
+    // The end node's extent is of one side only. Of a line that is steady it is (1 + 1/g)/2 as long, with
+    // neighbours g times as far apart from step to step.
+    own_ = 4 * nodes_.squaredDistance(end_, end_ + inwards_);
+    if (samples <= kStretchReach) return;
+    growth_ = steadyGrowth(inner(1), inner(2), inner(3));
+    const double half = 0.5 * (1 + 1 / std::sqrt(growth_));
+    own_ *= half * half;
+  }
+
+  /// Of the end node itself.
+  double own() const { return own_; }
+  /// Of the sample that would be `steps` beyond the end node, from that of its mirror image.
+  double beyond(int steps, double mirrored) const {
+    double shrunk = mirrored;
+    for (int n = 0; n < 2 * steps; ++n) shrunk /= growth_;
+    return shrunk;
+  }
+
+ private:
+  double inner(ptrdiff_t steps) const {
+    return nodes_.squaredDistance(end_ + (steps - 1) * inwards_, end_ + (steps + 1) * inwards_);
+  }
+
+  const NodePositions& nodes_;
+  ptrdiff_t end_, inwards_;
+  double growth_ = 1, own_ = 0;
+};
+
+}  // namespace
+
+float stretchOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, int before, int after) {
+  before = std::min(before, kStretchReach);
+  after = std::min(after, kStretchReach);
+  if (before + after == 0) return 1;
+  const int samples = before + 1 + after;
+  const LineEnd first(nodes, at - before * stride, stride, samples);
+  const LineEnd last(nodes, at + after * stride, -stride, samples);
+  // A line is reflected at either end as often as it takes; where there are `kStretchReach` samples on a
+  // side, its end is out of sight.
+  const auto extent = [&](int steps, const auto& self) -> double {
+    if (steps < -before) return first.beyond(-before - steps, self(-2 * before - steps, self));
+    if (steps > after) return last.beyond(steps - after, self(2 * after - steps, self));
+    if (steps == -before && before < kStretchReach) return first.own();
+    if (steps == after && after < kStretchReach) return last.own();
+    return nodes.squaredDistance(at + (steps - 1) * stride, at + (steps + 1) * stride);
+  };
+  return stretchOf(extent(-2, extent), extent(-1, extent), extent(0, extent), extent(1, extent),
+                   extent(2, extent));
+}
+
+}  // namespace curvisplat
