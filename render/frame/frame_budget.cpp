@@ -21,7 +21,7 @@ constexpr uint64_t kWorkerBytes = kReadingBytes + uint64_t{kMaxBrickSplats} * 16
 constexpr uint64_t kMinRingBytes = 32768 * sizeof(ScreenSplat);
 constexpr uint64_t kMinSweepBytes = SweepBuffer::bytes(73728);
 // More does not make a frame faster: they only bridge bricks that take unequally long.
-constexpr uint64_t kMaxRingBytes = 24 << 20;
+constexpr uint64_t kMaxRingBytes = 16 << 20;
 constexpr uint64_t kMaxPagerBytes = 32 << 20;
 // Shares of the image, the painter and the index are whole sixteenths of the memory where there is enough:
 // then a picture of another size finds the cache as the one before has left it.
@@ -52,7 +52,7 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
   budget.pager_bytes =
       std::max(fixed.least_pager_bytes, std::min(fixed.least_pager_bytes + share, kMaxPagerBytes));
   const uint64_t most_sweep_bytes = std::max(kMinSweepBytes, SweepBuffer::bytes(fixed.splats));
-  const uint64_t sweep_bytes = std::min(kMinSweepBytes + share, most_sweep_bytes);
+  const uint64_t sweep_bytes = std::min(kMinSweepBytes + rest * 3 / 8, most_sweep_bytes);
   budget.sweep_splats = sweep_bytes / SweepBuffer::bytes(SweepBuffer::kPageSplats) * SweepBuffer::kPageSplats;
   rest -= sweep_bytes - kMinSweepBytes;
   rest -= ring_bytes - kMinRingBytes;

@@ -8,28 +8,26 @@
 namespace curvisplat {
 namespace {
 
-// Where space is short, this share of the pages is kept when the slab is made to end earlier.
-constexpr size_t kKeptEighths = 7;
+// Where space is short: of the pages those before the slab's end at first, and when it moves nearer.
+constexpr size_t kFirstEighths = 6, kNextEighths = 7;
+// Space is made for the part that wants it, and so many pages of all more.
+constexpr size_t kSpareShare = 16;
 
-/// The splats of a part, sorted, that lie in a slab: places from .. to - 1.
-struct Slice {
-  size_t from, to;
-};
+size_t pagesFor(size_t splats) {
+  return (splats + SweepBuffer::kPageSplats - 1) / SweepBuffer::kPageSplats;
+}
 
-Slice sliceOf(uint32_t rank, std::span<const DepthItem> sorted, const SweepPosition& begin,
-              const SweepPosition& end) {
-  const auto firstNotBefore = [&](const SweepPosition& mark) {
-    size_t low = 0, high = sorted.size();
-    while (low < high) {
-      const size_t middle = (low + high) / 2;
-      if (SweepPosition{sorted[middle].key, rank, static_cast<uint32_t>(middle)} < mark)
-        low = middle + 1;
-      else
-        high = middle;
-    }
-    return low;
-  };
-  return {firstNotBefore(begin), firstNotBefore(end)};
+/// Of the splats of a part, sorted, how many lie before a position.
+size_t countBefore(const SweepPosition& mark, uint32_t rank, std::span<const DepthItem> sorted) {
+  size_t low = 0, high = sorted.size();
+  while (low < high) {
+    const size_t middle = (low + high) / 2;
+    if (SweepPosition{sorted[middle].key, rank, static_cast<uint32_t>(middle)} < mark)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low;
 }
 
 }  // namespace
@@ -59,6 +57,7 @@ void SweepBuffer::beginFrame() {
   for (size_t page = pages(); page-- > 0;) free_.push_back(static_cast<uint32_t>(page));
   swept_ = {};
   parts_.clear();
+  entered_whole_.clear();
   live_.clear();
   splits_.clear();
   turn_ = batches_ = under_way_ = filling_ = slabs_ = 0;
@@ -69,18 +68,19 @@ void SweepBuffer::beginFrame() {
 
 bool SweepBuffer::beginSlab(std::span<const SweptPart> swept) {
   const std::lock_guard lock(mutex_);
-  CURVISPLAT_CHECK(closed_ || (live_.empty() && isQuiet()));
+  CURVISPLAT_CHECK(closed_ || isQuiet());
   if (closed_ || end_ == kSweepEnd) return false;
   begin_ = end_;
   end_ = kSweepEnd;
   swept_ = swept;
+  entered_whole_.resize(swept.size());
   parts_.clear();
   for (uint32_t n = 0; n < swept.size(); ++n)
-    if (swept[n].end() >= begin_) parts_.push_back(n);
+    if (!entered_whole_[n] && swept[n].end() >= begin_) parts_.push_back(n);
   turn_ = 0;
-  mark_ = parts_.empty() ? kSweepEnd : swept_[parts_[0]].begin();
+  mark_ = parts_.empty() ? kSweepEnd : std::max(begin_, swept_[parts_[0]].begin());
   entered_ = 0;
-  worth_counting_ = false;
+  worth_counting_ = parts_.empty();
   ++slabs_;
   return true;
 }
@@ -104,7 +104,7 @@ void SweepBuffer::skip() {
 /// The mutex is held, as in all that follow and are private.
 void SweepBuffer::endTurn() {
   ++turn_;
-  mark_ = turn_ < parts_.size() ? swept_[parts_[turn_]].begin() : kSweepEnd;
+  mark_ = turn_ < parts_.size() ? std::min(std::max(begin_, swept_[parts_[turn_]].begin()), end_) : end_;
   worth_counting_ |= entered_ >= batch_splats_ / 2 || turn_ == parts_.size();
   changed_.notify_all();
 }
@@ -112,19 +112,24 @@ void SweepBuffer::endTurn() {
 std::shared_ptr<SweepBuffer::Run> SweepBuffer::enter(uint32_t rank, std::span<const DepthItem> sorted) {
   const std::lock_guard lock(mutex_);
   if (closed_) return {};
-  const Slice slice = sliceOf(rank, sorted, begin_, end_);
-  auto run = std::make_shared<Run>();
-  run->rank = rank;
-  run->before = static_cast<uint32_t>(slice.from);
-  run->count = slice.to - slice.from;
-  const size_t needed = (run->count + kPageSplats - 1) / kPageSplats;
+  const size_t before = countBefore(begin_, rank, sorted);
+  const size_t before_end = std::max(before, countBefore(end_, rank, sorted));
+  size_t after = sorted.size();
+  if (pagesFor(after - before) > free_.size()) after = before_end;
+  const size_t needed = pagesFor(after - before);
   if (needed > free_.size()) return {};
+  auto run = std::make_shared<Run>();
+  run->part = parts_[turn_];
+  run->rank = rank;
+  run->before = static_cast<uint32_t>(before);
+  run->count = after - before;
+  entered_whole_[run->part] = after == sorted.size();
   for (size_t page = 0; page < needed; ++page) {
     run->pages.push_back(free_.back());
     left_[free_.back()] = static_cast<uint16_t>(std::min(kPageSplats, run->count - page * kPageSplats));
     free_.pop_back();
   }
-  for (size_t n = 0; n < run->count; ++n) keys_[run->slot(n)] = sorted[slice.from + n].key;
+  for (size_t n = 0; n < run->count; ++n) keys_[run->slot(n)] = sorted[before + n].key;
   if (run->count > 0) {
     const auto place =
         std::upper_bound(live_.begin(), live_.end(), rank,
@@ -141,7 +146,8 @@ std::shared_ptr<SweepBuffer::Run> SweepBuffer::enter(uint32_t rank, std::span<co
 bool SweepBuffer::awaitSpace(uint32_t rank, std::span<const DepthItem> sorted) {
   std::unique_lock lock(mutex_);
   if (!closed_ && isQuiet()) {
-    endSlabEarlier(rank, sorted);
+    // Else a batch can leave by now.
+    if (splits_.empty() && countFinals() == 0) makeSpace(rank, sorted);
   } else {
     const size_t before = free_.size();
     changed_.wait(lock, [&] { return closed_ || free_.size() > before || isQuiet(); });
@@ -206,16 +212,21 @@ size_t SweepBuffer::firstNotBefore(const Run& run, const SweepPosition& mark) co
   return low;
 }
 
+size_t SweepBuffer::countFinals() {
+  size_t finals = 0;
+  for (const auto& run : live_) {
+    run->final_to = firstNotBefore(*run, mark_);
+    finals += run->final_to - run->first;
+  }
+  return finals;
+}
+
 /// Nothing if fewer splats than that are final.
 std::optional<SweepBuffer::Batch> SweepBuffer::cut(size_t at_least) {
   if (closed_) return {};
   if (splits_.empty()) {
     if (!worth_counting_) return {};
-    size_t finals = 0;
-    for (const auto& run : live_) {
-      run->final_to = firstNotBefore(*run, mark_);
-      finals += run->final_to - run->first;
-    }
+    const size_t finals = countFinals();
     if (finals < at_least) {
       worth_counting_ = turn_ == parts_.size();
       entered_ = 0;
@@ -256,25 +267,56 @@ void SweepBuffer::splitFinals(size_t finals) {
   splits_.push_back(mark_);
 }
 
-/// Keeps of the run that is to be entered, and of all others, what lies before a nearer end. Nothing in the
-/// buffer is final: everything is in a run, and no batch is under way.
-void SweepBuffer::endSlabEarlier(uint32_t rank, std::span<const DepthItem> sorted) {
-  std::vector<SweepPosition> starts;  // of pages
+/// For what lies before the slab's end of a part that is to be entered. Nothing in the buffer is final:
+/// everything is in a run, and no batch is under way.
+void SweepBuffer::makeSpace(uint32_t rank, std::span<const DepthItem> sorted) {
+  if (end_ == kSweepEnd) end_ = pageStart(kFirstEighths, rank, sorted);
+  const auto needed = [&] {
+    const size_t before = countBefore(begin_, rank, sorted);
+    return pagesFor(std::max(before, countBefore(end_, rank, sorted)) - before);
+  };
+  std::vector<std::pair<size_t, Run*>> behind;  // splats
+  for (const auto& run : live_)
+    if (const size_t count = run->count - firstNotBefore(*run, end_); count > 0)
+      behind.emplace_back(count, run.get());
+  std::sort(behind.begin(), behind.end(), [](const auto& a, const auto& b) {
+    return a.first != b.first ? a.first > b.first : a.second->rank < b.second->rank;
+  });
+  for (const auto& [count, run] : behind) {
+    if (free_.size() >= needed() + pages() / kSpareShare) break;
+    forgetBehindEnd(*run);
+  }
+  if (free_.size() < needed()) {
+    end_ = pageStart(kNextEighths, rank, sorted);
+    for (const auto& run : live_) forgetBehindEnd(*run);
+  }
+  mark_ = std::min(mark_, end_);
+  std::erase_if(live_, [](const auto& run) { return run->first == run->count; });
+}
+
+/// Where the first page begins that is not among that many of the buffer's, counted by their first positions;
+/// the pages that the part would take are among them.
+SweepPosition SweepBuffer::pageStart(size_t eighths, uint32_t rank, std::span<const DepthItem> sorted) const {
+  std::vector<SweepPosition> starts;
   for (const auto& run : live_)
     for (size_t n = run->first; n < run->count; n = (n / kPageSplats + 1) * kPageSplats)
       starts.push_back(position(*run, n));
-  const Slice slice = sliceOf(rank, sorted, begin_, end_);
-  for (size_t n = slice.from; n < slice.to; n += kPageSplats)
+  const size_t before = countBefore(begin_, rank, sorted);
+  const size_t before_end = std::max(before, countBefore(end_, rank, sorted));
+  for (size_t n = before; n < before_end; n += kPageSplats)
     starts.push_back({sorted[n].key, rank, static_cast<uint32_t>(n)});
-  const size_t kept = std::min(pages() * kKeptEighths / 8, starts.size() - 1);
-  std::nth_element(starts.begin(), starts.begin() + static_cast<ptrdiff_t>(kept), starts.end());
-  end_ = starts[kept];
-  for (const auto& run : live_) {
-    const size_t count = firstNotBefore(*run, end_);
-    release(*run, count, run->count);
-    run->count = count;
-  }
-  std::erase_if(live_, [](const auto& run) { return run->first == run->count; });
+  const auto page =
+      starts.begin() + static_cast<ptrdiff_t>(std::min(pages() * eighths / 8, starts.size() - 1));
+  std::nth_element(starts.begin(), page, starts.end());
+  return *page;
+}
+
+void SweepBuffer::forgetBehindEnd(Run& run) {
+  const size_t count = firstNotBefore(run, end_);
+  if (count == run.count) return;
+  release(run, count, run.count);
+  run.count = count;
+  entered_whole_[run.part] = 0;
 }
 
 /// Of its splats from .. to - 1 nobody wants any more.

@@ -13,9 +13,9 @@
 //
 // A worker enters each part as a run, sorted, when it is that part's turn. What is final leaves in batches,
 // which workers sort and hand on. Where a layer is larger than the buffer, the sweep is made in several slabs:
-// the slab under way is made to end earlier, whatever lies behind its new end is forgotten, and the parts that
-// reach behind it are entered again in the next slab. Slabs do not change the order, and any buffer of a few
-// pages will do.
+// the slab under way gets an end, and of as many runs as need be, those with most splats behind it first,
+// what lies there is forgotten; these parts are entered again in the next slab. Should that not do, the end
+// moves nearer. Slabs do not change the order, and any buffer of a few pages will do.
 //
 //   worker   awaitTurn(n) -> enter() -> fill()          leave its part out: awaitTurn(n) -> skip()
 //                      ^       | no space
@@ -24,7 +24,7 @@
 //            next() -> a batch: awaitFilled(), read, giveBack()
 //
 // No deadlock: whoever fills a run or sorts a batch waits for no turn and no space. Whoever has the turn waits
-// for such workers only; if there are none, the batch that awaits it or a nearer end of the slab makes space.
+// for such workers only; if there are none, it makes space: by a batch of what is final, or by forgetting.
 //
 // Splats lie in pages, which return when all that is in them has been read or forgotten.
 #pragma once
@@ -77,7 +77,7 @@ class SweepBuffer {
   /// For so many splats, in whole pages: a few at least. Batches have up to `batch_splats`.
   SweepBuffer(size_t splats, size_t batch_splats);
 
-  /// The splats of one part that lie in the slab.
+  /// The splats of one part, from the slab's begin on: all of them, or those before the slab's end.
   class Run;
   struct Piece {
     std::shared_ptr<Run> run;
@@ -93,9 +93,9 @@ class SweepBuffer {
   /// Begins a frame: empty and open. Nobody may use the buffer meanwhile; the same goes for beginSlab().
   void beginFrame();
   /// Begins the next slab, the first from the beginning on. False if the last has reached the end. `swept` is
-  /// borrowed for as long as the slab is under way.
+  /// borrowed, and the same throughout the frame.
   bool beginSlab(std::span<const SweptPart> swept);
-  /// The parts that reach into the slab, as places in `swept`: the n-th has its turn as number n.
+  /// The parts that are to be entered, as places in `swept`: the n-th has its turn as number n.
   const std::vector<uint32_t>& parts() const { return parts_; }
 
   /// Whether a part lies behind the slab. It may come to.
@@ -140,10 +140,13 @@ class SweepBuffer {
   size_t used() const { return pages() - free_.size(); }
   SweepPosition position(const Run& run, size_t n) const;
   size_t firstNotBefore(const Run& run, const SweepPosition& mark) const;
+  size_t countFinals();
   std::optional<Batch> cut(size_t at_least);
   void splitFinals(size_t finals);
   void endTurn();
-  void endSlabEarlier(uint32_t rank, std::span<const DepthItem> sorted);
+  void makeSpace(uint32_t rank, std::span<const DepthItem> sorted);
+  SweepPosition pageStart(size_t eighths, uint32_t rank, std::span<const DepthItem> sorted) const;
+  void forgetBehindEnd(Run& run);
   void release(const Run& run, size_t from, size_t to);
   /// Nobody but whoever has the turn can make space now.
   bool isQuiet() const { return under_way_ == 0 && filling_ == 0; }
@@ -158,6 +161,7 @@ class SweepBuffer {
   std::vector<uint32_t> free_;       // pages
   std::span<const SweptPart> swept_;
   std::vector<uint32_t> parts_;
+  std::vector<uint8_t> entered_whole_;  // [swept] nothing of it is to be entered any more
   uint64_t turn_ = 0;
   SweepPosition begin_, end_;               // of the slab
   SweepPosition mark_;                      // all before it is final
@@ -173,13 +177,14 @@ class SweepBuffer {
   bool closed_ = false;
 };
 
-/// A part's splats in the slab, by position: 0 to `count` - 1, of which those before `first` are in batches.
+/// Splats 0 to `count` - 1, by position, of which those before `first` are in batches.
 class SweepBuffer::Run {
  private:
   friend class SweepBuffer;
 
   size_t slot(size_t n) const { return size_t{pages[n / kPageSplats]} * kPageSplats + n % kPageSplats; }
 
+  uint32_t part = 0;  // in the frame
   uint32_t rank = 0;
   uint32_t before = 0;  // splats of the part that lie before the slab
   size_t first = 0, count = 0;
