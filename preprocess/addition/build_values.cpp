@@ -194,7 +194,8 @@ void ValueBuilder::takeValues(uint32_t position, LoadedValues& loaded, BrickSpla
 }
 
 void ValueBuilder::encode(BrickSplats& brick, Built& built) const {
-  for (auto& values : brick.variables) built.values.push_back(encodeValues(brick.runs, values));
+  for (auto& values : brick.variables)
+    built.values.push_back(encodeValues(brick.runs, brick.border_codes, values));
 }
 
 void ValueBuilder::refuse(uint32_t position, const std::string& what) const {

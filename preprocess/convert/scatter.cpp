@@ -87,7 +87,7 @@ class SplatStream {
     SplatSink& sink = (*sink_of_thread_)();
     bool has_faces = false;
     for (size_t n = 0; n < splats.splats.size(); ++n) {
-      if (splats.splats[n].on_block_face)
+      if (splats.splats[n].isForSeams())
         has_faces = true;
       else
         sink.add(splats.splats[n], valuesOf(splats, n));
@@ -95,7 +95,7 @@ class SplatStream {
     if (!has_faces) return;
     const std::lock_guard lock(adding_to_seams_);
     for (size_t n = 0; n < splats.splats.size(); ++n)
-      if (splats.splats[n].on_block_face) seams_->add(splats.splats[n], valuesOf(splats, n));
+      if (splats.splats[n].isForSeams()) seams_->add(splats.splats[n], valuesOf(splats, n));
   }
 
   const Progress* progress_;

@@ -161,7 +161,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
 
   NodeSplat& splat = out_.splats[count_];
   splat.node = in_.first_node + (k * in_.block.nj + j) * in_.block.ni + i;
-  splat.on_block_face = false;
+  splat.on_block_face = splat.behind_face = false;
   splat.spacing = 0;
   splat.node_position = splat.splat.position = hexahedron.centre;
 
@@ -243,7 +243,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     const double scale = set_volume(lq.determinant);
     const auto rotate = [&](const glm::dvec3& v) { return lq.rotate(v); };
     set_values(scale, rotate);
-    splat.border_code = borderCode(inwards, rotate);
+    splat.border_code = borderCode(inwards, splat.regular, rotate);
   } else {
     const CellShape shape = shapeFromJacobian(jacobian, smallestAxis(hexahedron.centre));
     splat.splat.axis = shape.axis;
@@ -258,7 +258,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     }
     const auto rotate = [&](const glm::dvec3& v) { return shape.rotation * v; };
     set_values(scale, rotate);
-    splat.border_code = borderCode(inwards, rotate);
+    splat.border_code = borderCode(inwards, splat.regular, rotate);
   }
   ++count_;
 }

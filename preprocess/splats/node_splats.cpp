@@ -15,6 +15,8 @@
 namespace curvisplat {
 namespace {
 
+constexpr double kMinAcross = 1e-5;  // sine of an inward direction's angle with its face
+
 /// Where a node's neighbours are, counted in elements of NodeArrays. A missing neighbour is the node itself:
 /// half the difference of the two is then the Jacobian's column in every case.
 struct Neighbours {
@@ -55,7 +57,8 @@ class Window {
   bool anyBlankAround(uint64_t j, uint64_t k) const;
   void stretchRow(uint64_t j, uint64_t k);
   float stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const;
-  void addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face);
+  void addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face, int layer);
+  void cutBehindFace(NodeSplat& node, ptrdiff_t at, const Neighbours& neighbours, int layer) const;
   glm::dvec3 position(ptrdiff_t at) const { return {x_[at], y_[at], z_[at]}; }
   double spacing(ptrdiff_t at, const Neighbours& neighbours) const;
   /// A length for the shape of a node without any extent: far below the grid's, and above zero.
@@ -78,12 +81,25 @@ bool isFace(uint64_t index, uint64_t count) {
   return index == 0 || index + 1 == count;
 }
 
+// The face that a node is in the layer behind of: 2 axis, + 1 for the block's upper end.
+constexpr int kNoLayer = -1;
+
+int layerOf(int axis, uint64_t index, uint64_t count) {
+  if (count < 4) return kNoLayer;
+  return index == 1 ? 2 * axis : index + 2 == count ? 2 * axis + 1 : kNoLayer;
+}
+
 void Window::addRow(uint64_t j, uint64_t k) {
   const GridBlock& block = in_.block;
   const ptrdiff_t row = static_cast<ptrdiff_t>(k - in_.window.k0) * plane_stride_ +
                         static_cast<ptrdiff_t>(j - in_.window.j0) * row_stride_;
   first_node_of_row_ = in_.first_node + (k * block.nj + j) * ni_;
   const bool on_face = isFace(j, block.nj) || isFace(k, block.nk);
+  const int layer_j = on_face ? kNoLayer : layerOf(1, j, block.nj);
+  const int layer = layer_j != kNoLayer || on_face ? layer_j : layerOf(2, k, block.nk);
+  const auto layer_at = [&](uint64_t i) {
+    return layer != kNoLayer || on_face || isFace(i, ni_) ? layer : layerOf(0, i, ni_);
+  };
 
   Neighbours inner;
   inner.before = {-1, j > 0 ? -row_stride_ : 0, k > 0 ? -plane_stride_ : 0};
@@ -97,9 +113,10 @@ void Window::addRow(uint64_t j, uint64_t k) {
 
   if (corrections_.stretch) stretchRow(j, k);
   if (!anyBlankAround(j, k)) {
-    addNode(0, row, at_i(0), true);
-    for (uint64_t i = 1; i + 1 < ni_; ++i) addNode(i, row + static_cast<ptrdiff_t>(i), inner, on_face);
-    if (ni_ > 1) addNode(ni_ - 1, row + static_cast<ptrdiff_t>(ni_ - 1), at_i(ni_ - 1), true);
+    addNode(0, row, at_i(0), true, kNoLayer);
+    for (uint64_t i = 1; i + 1 < ni_; ++i)
+      addNode(i, row + static_cast<ptrdiff_t>(i), inner, on_face, layer_at(i));
+    if (ni_ > 1) addNode(ni_ - 1, row + static_cast<ptrdiff_t>(ni_ - 1), at_i(ni_ - 1), true, kNoLayer);
     return;
   }
   for (uint64_t i = 0; i < ni_; ++i) {
@@ -110,7 +127,8 @@ void Window::addRow(uint64_t j, uint64_t k) {
       if (blank_[at + neighbours.before[axis]]) neighbours.before[axis] = 0;
       if (blank_[at + neighbours.after[axis]]) neighbours.after[axis] = 0;
     }
-    addNode(i, at, neighbours, on_face || isFace(i, ni_));
+    const bool at_end = on_face || isFace(i, ni_);
+    addNode(i, at, neighbours, at_end, at_end ? kNoLayer : layer_at(i));
   }
 }
 
@@ -168,12 +186,13 @@ float Window::stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint
                        neighbours(count - 1 - index, stride));
 }
 
-inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face) {
+inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face, int layer) {
   const glm::dvec3 stretch(scratch_.stretch[0][i], scratch_.stretch[1][i], scratch_.stretch[2][i]);
   NodeSplat& node = out_.splats[count_];
   node.node = first_node_of_row_ + i;
   node.node_position = position(at);
   node.on_block_face = on_face;
+  node.behind_face = false;
   node.spacing = on_face ? spacing(at, neighbours) : 0.0;
 
   glm::dmat3 jacobian;  // columns along i, j, k
@@ -241,8 +260,10 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     node.splat.shear = {a.a10 * lq.inverse_a00, a.a20 * lq.inverse_a00, a.a21 * lq.inverse_a11};
     node.splat.weight = a.a00 * a.a11 * a.a22 * weight_factor * shrink;
     node.regular = weight_factor == 1;
-    node.border_code = borderCode(inwards, [&](const glm::dvec3& v) { return lq.rotate(v); });
+    node.border_code =
+        borderCode(inwards, corrections_.faces, [&](const glm::dvec3& v) { return lq.rotate(v); });
     (lq.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
+    if (layer != kNoLayer && node.border_code == kNoBorder) cutBehindFace(node, at, neighbours, layer);
     set_values([&](const glm::dvec3& gradient) { return lq.rotate(gradient); },
                [&](const glm::dvec3& v) {
                  const double v0 = v.x * lq.inverse_a00, v1 = (v.y - a.a10 * v0) * lq.inverse_a11;
@@ -255,13 +276,53 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     node.splat.shear = shape.shear;
     node.splat.weight = std::abs(shape.determinant) * weight_factor * shrink;
     node.regular = !shape.floored;
-    node.border_code = borderCode(inwards, [&](const glm::dvec3& v) { return shape.rotation * v; });
+    node.border_code = borderCode(inwards, corrections_.faces && !shape.floored,
+                                  [&](const glm::dvec3& v) { return shape.rotation * v; });
     (shape.floored ? out_.degenerate : shape.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
     // Where an axis was raised there is no telling a bend of the scalar from one of the coordinates.
     set_values([&](const glm::dvec3& gradient) { return shape.rotation * gradient; },
                [](const glm::dvec3& v) { return v; }, false);
   }
   ++count_;
+}
+
+/// Sets the code of a node whose neighbour along an axis is on the block's face, for the plane through that
+/// neighbour along the face.
+void Window::cutBehindFace(NodeSplat& node, ptrdiff_t at, const Neighbours& neighbours, int layer) const {
+  if (!corrections_.faces) return;
+  const int axis = layer / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
+  const bool upper = layer % 2 != 0;
+  const ptrdiff_t on_face = at + (upper ? neighbours.after[axis] : neighbours.before[axis]);
+  Neighbours beside = neighbours;  // of the node on the face
+  for (int other : {u, v}) {
+    if (blank_[on_face + beside.before[other]]) beside.before[other] = 0;
+    if (blank_[on_face + beside.after[other]]) beside.after[other] = 0;
+  }
+  if (upper) {
+    beside.before[axis] = at - on_face;
+    beside.after[axis] = 0;
+  } else {
+    beside.before[axis] = 0;
+    beside.after[axis] = at - on_face;
+  }
+  const auto along = [&](int other) {
+    return position(on_face + beside.after[other]) - position(on_face + beside.before[other]);
+  };
+  const glm::dvec3 face_position = position(on_face), inward = position(at) - face_position;
+  glm::dvec3 normal = glm::cross(along(u), along(v));
+  const double across = glm::dot(normal, inward);
+  if (!(std::abs(across) > kMinAcross * glm::length(normal) * glm::length(inward))) return;
+  if (across < 0) normal = -normal;
+  // Of a plane n · (x - X0) = 0, A⁻¹ (x - X0) is at right angles to Aᵀ n.
+  const glm::dvec3 in_frame = normal * node.splat.factor();
+  const double length = glm::length(in_frame);
+  const uint32_t code =
+      packLayerCode(in_frame / length, glm::dot(normal, node.splat.position - face_position) / length);
+  if (code == kNoBorder) return;
+  node.border_code = code;
+  node.behind_face = true;
+  node.node_position = face_position;
+  node.spacing = spacing(on_face, beside);
 }
 
 double Window::spacing(ptrdiff_t at, const Neighbours& neighbours) const {

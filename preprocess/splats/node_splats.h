@@ -17,7 +17,11 @@
 //
 // A missing neighbour (the block ends, or the node there is blank) makes the cell a half cell along that
 // axis: the Jacobian's column is half of the one difference there is, and the splat sits a quarter cell
-// inwards. Without any neighbour along an axis the column is zero.
+// inwards. Without any neighbour along an axis the column is zero. The border is a face that the splat is to
+// be cut at (stream/model/border_code.h), but where the cell has collapsed: at poles, and on singular lines.
+// The splats of the next layer of nodes reach beyond a face at the block's end by a hundredth of a cell's
+// weight, and are cut there; not in blocks of three nodes or fewer along that axis, nor on another of the
+// block's faces.
 #pragma once
 
 #include <array>
@@ -37,9 +41,9 @@ namespace curvisplat {
 inline constexpr double kBend = 0.5 * 0.44655 * 0.44655;
 
 /// Where a cell ends, as stream/border_code.h codes it. `inwards`: along i, j, k, 1 or -1 from a border;
-/// `rotate` gives Q's image of a vector.
+/// `faces`: whether the borders are faces to be cut at; `rotate` gives Q's image of a vector.
 template <typename Rotate>
-uint32_t borderCode(const std::array<double, 3>& inwards, const Rotate& rotate) {
+uint32_t borderCode(const std::array<double, 3>& inwards, bool faces, const Rotate& rotate) {
   std::array<glm::dvec3, 3> axes;
   size_t count = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -48,7 +52,7 @@ uint32_t borderCode(const std::array<double, 3>& inwards, const Rotate& rotate) 
     along[axis] = inwards[axis];
     axes[count++] = rotate(along);
   }
-  return count > 0 ? packBorderCode({axes.data(), count}) : kNoBorder;
+  return count > 0 ? packBorderCode({axes.data(), count}, faces ? (1u << count) - 1 : 0) : kNoBorder;
 }
 
 /// A node's splat on its way into the cache.
@@ -58,9 +62,13 @@ struct NodeSplat {
   bool regular = true;               // every variable's variance is 0, and the weight is about a0 a1 a2
   uint32_t border_code = kNoBorder;  // stream/border_code.h
   bool on_block_face = false;        // may coincide with a node of another face: to be merged by SeamMerger
-  glm::dvec3 node_position{0.0};     // where the node itself is
-  double spacing = 0;  // on a block face: the smallest distance > 0 to a neighbour along an axis, 0 if there
-                       // is none; the seams' tolerance. Elsewhere 0
+  bool behind_face = false;          // its border_code is for a face that SeamMerger may find to be closed
+  glm::dvec3 node_position{0.0};     // where the node itself is; behind a face, where the face's node is
+  // Of that node, where SeamMerger is asked: the smallest distance > 0 to a neighbour along an axis, 0 if there
+  // is none; the seams' tolerance. Elsewhere 0.
+  double spacing = 0;
+
+  bool isForSeams() const { return on_block_face || behind_face; }
 };
 
 /// The splats of some rows of one block. Values are [splat * variables + variable].
@@ -88,6 +96,7 @@ struct BlockWindow {
 /// one off and see what it is worth.
 struct NodeSplatCorrections {
   bool border_codes = true;  // else a border's node has a whole cell of half the weight, around itself
+  bool faces = true;         // to be cut at; else cells at borders are drawn in parts
   bool middles = true;       // else splats sit at nodes, but for half cells
   bool bends = true;         // of the scalar
   bool stretch = true;       // else splats are as long as their cells

@@ -20,10 +20,20 @@ glm::dvec3 inFrame(const Splat& s, const glm::dvec3& v) {
 
 }  // namespace
 
+bool isOpen(const Splat& face, uint32_t border_code, const Splat& behind) {
+  const InwardAxes inward = inwardAxes(border_code);
+  const glm::dvec3 direction = glm::normalize(inFrame(face, behind.position - face.position));
+  for (int a = 0; a < inward.count; ++a)
+    if (inward.hasFace(a) && glm::dot(glm::dvec3(inward.axis[static_cast<size_t>(a)]), direction) > kSimilar)
+      return true;
+  return false;
+}
+
 void OpenBorders::add(const Splat& part, uint32_t border_code) {
   const InwardAxes inward = inwardAxes(border_code);
   for (int a = 0; a < inward.count; ++a)
-    inward_.push_back({part.factor() * glm::dvec3(inward.axis[a]), parts_});
+    inward_.push_back(
+        {part.factor() * glm::dvec3(inward.axis[static_cast<size_t>(a)]), parts_, inward.hasFace(a)});
   ++parts_;
 }
 
@@ -31,30 +41,39 @@ uint32_t OpenBorders::of(const Splat& merged) const {
   std::vector<glm::dvec3> directions;
   for (const Inward& inward : inward_) directions.push_back(glm::normalize(inFrame(merged, inward.along)));
 
-  std::vector<glm::dvec3> open;  // sums of similar directions
+  struct Open {
+    glm::dvec3 along;  // sum of similar directions
+    bool face;
+  };
+  std::vector<Open> open;
   for (size_t n = 0; n < directions.size(); ++n) {
     const glm::dvec3& direction = directions[n];
     bool closed = false;
     for (size_t m = 0; m < directions.size(); ++m)
       closed |= inward_[m].part != inward_[n].part && glm::dot(directions[m], direction) < kOpposite;
     if (closed) continue;
-    const auto same = std::find_if(open.begin(), open.end(), [&](const glm::dvec3& other) {
-      return glm::dot(glm::normalize(other), direction) > kSimilar;
+    const auto same = std::find_if(open.begin(), open.end(), [&](const Open& other) {
+      return glm::dot(glm::normalize(other.along), direction) > kSimilar;
     });
-    if (same == open.end())
-      open.push_back(direction);
-    else
-      *same += direction;
+    if (same == open.end()) {
+      open.push_back({direction, inward_[n].face});
+    } else {
+      same->along += direction;
+      same->face &= inward_[n].face;
+    }
   }
 
   std::array<glm::dvec3, 3> axes;
   size_t count = 0;
-  for (glm::dvec3 axis : open) {
-    axis = glm::normalize(axis);
+  uint32_t faces = 0;
+  for (const Open& border : open) {
+    glm::dvec3 axis = glm::normalize(border.along);
     for (size_t n = 0; n < count; ++n) axis -= glm::dot(axis, axes[n]) * axes[n];
-    if (count < 3 && glm::length(axis) > kMin) axes[count++] = glm::normalize(axis);
+    if (count == 3 || glm::length(axis) <= kMin) continue;
+    if (border.face) faces |= 1u << count;
+    axes[count++] = glm::normalize(axis);
   }
-  return packBorderCode({axes.data(), count});
+  return packBorderCode({axes.data(), count}, faces);
 }
 
 }  // namespace curvisplat

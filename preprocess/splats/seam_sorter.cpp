@@ -17,7 +17,7 @@ namespace {
 // A record: along, across, node, flags, the splat's 10 numbers, node position, spacing; 5 numbers a variable.
 constexpr size_t kNodeSize = 18;
 constexpr size_t kScalarSize = 5;
-constexpr uint64_t kRegular = 1, kOnBlockFace = 2;  // of the flags
+constexpr uint64_t kRegular = 1, kOnBlockFace = 2, kBehindFace = 4;  // of the flags
 constexpr int kBorderCodeShift = 32;
 
 constexpr size_t kWriteSize = 32 << 10;  // doubles
@@ -89,7 +89,7 @@ void SeamSorter::add(const SeamNode& node, std::span<const SplatScalar> values) 
   const NodeSplat& n = node.splat;
   const Splat& s = n.splat;
   const uint64_t flags = (n.regular ? kRegular : 0) | (n.on_block_face ? kOnBlockFace : 0) |
-                         uint64_t{n.border_code} << kBorderCodeShift;
+                         (n.behind_face ? kBehindFace : 0) | uint64_t{n.border_code} << kBorderCodeShift;
   put(node.along, node.across, std::bit_cast<double>(n.node), std::bit_cast<double>(flags));
   put(s.position.x, s.position.y, s.position.z, s.axis[0], s.axis[1], s.axis[2]);
   put(s.shear[0], s.shear[1], s.shear[2], s.weight);
@@ -110,6 +110,7 @@ void SeamSorter::unpack(const double* record, SeamNode& node, std::span<SplatSca
   const auto flags = std::bit_cast<uint64_t>(get());
   n.regular = (flags & kRegular) != 0;
   n.on_block_face = (flags & kOnBlockFace) != 0;
+  n.behind_face = (flags & kBehindFace) != 0;
   n.border_code = static_cast<uint32_t>(flags >> kBorderCodeShift);
   n.splat.position = get_vector();
   for (double& axis : n.splat.axis) axis = get();

@@ -110,6 +110,12 @@ class Sweep {
     std::optional<BendOfParts> bend;     // the same
     std::optional<OpenBorders> borders;  // the same
     std::vector<uint64_t> nodes;         // the same
+    struct Behind {
+      NodeSplat node;
+      std::vector<SplatScalar> values;
+    };
+    std::vector<Behind> behind;  // in the layer behind the face
+    bool has_node = true;        // else there are none but those
   };
   using Clusters = std::multimap<double, Cluster>;  // by `across` of the leader
 
@@ -139,6 +145,7 @@ void Sweep::add(const SeamNode& node, std::span<const SplatScalar> values) {
   const double tolerance = toleranceOf(node.splat, coordinate_bytes_);
   const auto found = find(node, tolerance);
   if (found != clusters_.end()) return join(found->second, node.splat, values);
+  const bool behind = node.splat.behind_face;
   const auto cluster = clusters_.emplace(node.across, Cluster{node.splat.node_position,
                                                               tolerance,
                                                               node.splat,
@@ -146,7 +153,10 @@ void Sweep::add(const SeamNode& node, std::span<const SplatScalar> values) {
                                                               std::nullopt,
                                                               std::nullopt,
                                                               std::nullopt,
-                                                              {}});
+                                                              {},
+                                                              {},
+                                                              !behind});
+  if (behind) cluster->second.behind.push_back({node.splat, {values.begin(), values.end()}});
   leaving_.push({node.along + tolerance + slackOf(node.splat), sequence_++, cluster});
 }
 
@@ -167,6 +177,16 @@ Sweep::Clusters::iterator Sweep::find(const SeamNode& node, double tolerance) {
 }
 
 void Sweep::join(Cluster& cluster, const NodeSplat& node, std::span<const SplatScalar> values) {
+  if (node.behind_face) {
+    cluster.behind.push_back({node, {values.begin(), values.end()}});
+    return;
+  }
+  if (!cluster.has_node) {
+    cluster.lowest = node;
+    cluster.values.assign(values.begin(), values.end());
+    cluster.has_node = true;
+    return;
+  }
   if (!cluster.merger) {
     cluster.merger.emplace(variables_);
     cluster.merger->add(cluster.lowest.splat.position, cluster.lowest.splat, cluster.values);
@@ -195,7 +215,12 @@ void Sweep::release(double before) {
       cluster.lowest.border_code = cluster.borders->of(cluster.lowest.splat);
       cluster.lowest.regular = false;
     }
-    sink_(cluster.lowest, cluster.values, cluster.nodes);
+    if (cluster.has_node) sink_(cluster.lowest, cluster.values, cluster.nodes);
+    for (Cluster::Behind& behind : cluster.behind) {
+      if (!cluster.has_node || !isOpen(cluster.lowest.splat, cluster.lowest.border_code, behind.node.splat))
+        behind.node.border_code = kNoBorder;
+      sink_(behind.node, behind.values, {});
+    }
     clusters_.erase(at);
   }
 }

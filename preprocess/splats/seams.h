@@ -16,9 +16,10 @@ namespace curvisplat {
 /// stored in `coordinate_bytes`.
 double coordinateRounding(const glm::dvec3& position, int coordinate_bytes);
 
-/// Takes the splats of block-face nodes in any order, and gives them back merged, in an order and with sums
-/// that depend on the splats alone. Bounded memory: an external sort by the position along one generic
-/// direction, in sorted runs on disk once `memory_bytes` are full, and a sweep over them.
+/// Takes the splats of block-face nodes, and those of the layers behind the faces, in any order, and gives
+/// them back, the former merged, in an order and with sums that depend on the splats alone. The latter lose
+/// their border codes where the face before them is a seam. Bounded memory: an external sort by the position
+/// along one generic direction, in sorted runs on disk once `memory_bytes` are full, and a sweep over them.
 class SeamMerger {
  public:
   /// The temporary file, if one is needed, has no name in `temporary_folder` once it is open: it vanishes
@@ -28,7 +29,7 @@ class SeamMerger {
   SeamMerger(SeamMerger&&) noexcept;
   SeamMerger& operator=(SeamMerger&&) noexcept;
 
-  /// One thread at a time. Every splat is one with on_block_face set. Throws Error if the disk fails.
+  /// One thread at a time. Every splat is one that isForSeams(). Throws Error if the disk fails.
   void add(const NodeSplat& splat, std::span<const SplatScalar> values);
 
   /// Calls `sink` for each merged splat: its node (and node_position) is the lowest of those merged, regular

@@ -180,7 +180,7 @@ struct LookedUp {
   alignas(64) float integrals[4 * kLanes];  // of one pixel after the other
 };
 
-HWY_INLINE void lookUpBlock(const Ellipse& e, const Scalar& scalar, const ShadingTable& table,
+HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const ShadingTable& table,
                             const float* HWY_RESTRICT footprint, float x, float y, LookedUp& out) {
   const Floats d;
   const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
@@ -195,6 +195,129 @@ HWY_INLINE void lookUpBlock(const Ellipse& e, const Scalar& scalar, const Shadin
     hn::Store(hn::Load(d, intervals.scale.at + lane), d, out.scale.at + lane);
   }
   integrate(table, intervals, kLanes, out.integrals);
+  return true;
+}
+
+/// The faces of a splat, over kReach deviations and the support's radius.
+struct Faces {
+  float at[ScreenCut::kFaces], by_p[ScreenCut::kFaces], by_q[ScreenCut::kFaces];
+  bool far_side[ScreenCut::kFaces];
+  float mean_per_deviation;  // the scalar's, along the ray
+};
+
+/// Integrals of the biweight's distribution from 0 to x, |x| <= 1: of 1, of -32/5 x, and of x².
+HWY_INLINE V massTo(V x, V x2) {
+  const Floats d;
+  return hn::Mul(
+      x, hn::MulAdd(x2, hn::MulAdd(x2, hn::Set(d, 0.1875f), hn::Set(d, -0.625f)), hn::Set(d, 0.9375f)));
+}
+HWY_INLINE V firstTo(V x2) {
+  const V rest = hn::Sub(hn::Set(Floats(), 1.0f), x2);
+  return hn::Mul(hn::Mul(rest, rest), rest);
+}
+HWY_INLINE V secondTo(V x, V x2) {
+  const Floats d;
+  const V series =
+      hn::MulAdd(x2, hn::MulAdd(x2, hn::Set(d, 0.9375f / 7), hn::Set(d, -0.375f)), hn::Set(d, 0.3125f));
+  return hn::Mul(hn::Mul(x, x2), series);
+}
+
+/// What the faces leave of the pixels: an interval of depths, over kReach deviations; so are its moments.
+struct Interval {
+  V lo, hi;
+
+  HWY_INLINE V share() const {
+    return hn::Max(hn::Sub(massTo(hi, hn::Mul(hi, hi)), massTo(lo, hn::Mul(lo, lo))), hn::Zero(Floats()));
+  }
+  HWY_INLINE static V inverse(V share) {
+    const Floats d;
+    return hn::Div(hn::Set(d, 1.0f), hn::Max(share, hn::Set(d, 1e-6f)));
+  }
+  /// Of slivers there are no digits left: the mean is then held within them.
+  HWY_INLINE V mean(V share) const {
+    const V first = hn::Sub(firstTo(hn::Mul(hi, hi)), firstTo(hn::Mul(lo, lo)));
+    return hn::Clamp(hn::Mul(hn::Mul(hn::Set(Floats(), -5.0f / 32), first), inverse(share)), lo, hi);
+  }
+  /// 1 less the variance in deviations, whose square is 7.
+  HWY_INLINE V lostVariance(V share, V mean) const {
+    const Floats d;
+    const V second = hn::Sub(secondTo(hi, hn::Mul(hi, hi)), secondTo(lo, hn::Mul(lo, lo)));
+    const V variance = hn::NegMulAdd(mean, mean, hn::Mul(second, inverse(share)));
+    const V one = hn::Set(d, 1.0f);
+    return hn::Sub(one, hn::Clamp(hn::Mul(hn::Set(d, 7.0f), variance), hn::Zero(d), one));
+  }
+};
+
+HWY_INLINE Interval intervalAt(const Faces& faces, const Pixels& pixels) {
+  const Floats d;
+  V lo = hn::Set(d, -1.0f), hi = hn::Set(d, 1.0f);
+  for (int n = 0; n < ScreenCut::kFaces; ++n) {
+    const V a = hn::MulAdd(hn::Set(d, faces.by_p[n]), pixels.p,
+                           hn::MulAdd(hn::Set(d, faces.by_q[n]), pixels.q, hn::Set(d, faces.at[n])));
+    if (faces.far_side[n])
+      lo = hn::Max(lo, hn::Neg(a));
+    else
+      hi = hn::Min(hi, a);
+  }
+  lo = hn::Min(lo, hn::Set(d, 1.0f));
+  return {lo, hn::Max(hi, lo)};
+}
+
+/// One block of a splat that is cut, by one parabola, or one colour; what the faces leave moves s by
+/// `per_deviation` a deviation. Whether it is saturated now.
+template <bool kFitted>
+HWY_INLINE bool paintBlock(const Ellipse& e, const Faces& faces, const Shade& shade, float per_deviation,
+                           const float* HWY_RESTRICT footprint, float* HWY_RESTRICT block, float x, float y) {
+  const Floats d;
+  const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
+  V most = hn::Zero(d);
+  for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
+    const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
+                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
+    const Interval left = intervalAt(faces, pixels);
+    const V share = left.share();
+    V value[4];
+    if constexpr (kFitted) {
+      const V s = hn::MulAdd(left.mean(share), hn::Set(d, per_deviation), shade.s.at(pixels));
+      for (int c = 0; c < 4; ++c)
+        value[c] = hn::MulAdd(hn::MulAdd(hn::Set(d, shade.bend[c]), s, hn::Set(d, shade.by[c])), s,
+                              hn::Set(d, shade.at[c]));
+    } else {
+      for (int c = 0; c < 4; ++c) value[c] = hn::Set(d, shade.at[c]);
+    }
+    most = hn::Max(most, blendUnder<false>(block + lane, hn::Mul(pixels.depth, share), value));
+  }
+  return isSaturated(most);
+}
+
+/// Of a splat that is cut. Whether anything is left of it in the block.
+HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Faces& faces,
+                            const ShadingTable& table, const float* HWY_RESTRICT footprint, float x, float y,
+                            LookedUp& out) {
+  const Floats d;
+  const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
+  Intervals intervals;
+  V most = hn::Zero(d);
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
+                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
+    const Interval left = intervalAt(faces, pixels);
+    const V share = left.share(), moved = left.mean(share);
+    const V depth = hn::Mul(pixels.depth, share);
+    most = hn::Max(most, depth);
+    const V t = hn::MulAdd(hn::Set(d, scalar.tp), pixels.p, hn::Mul(hn::Set(d, scalar.tq), pixels.q));
+    hn::Store(depth, d, out.depth.at + lane);
+    const V mean = hn::MulAdd(hn::Set(d, faces.mean_per_deviation * ScreenCut::kReach), moved,
+                              hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean)));
+    const float lost = 3 * faces.mean_per_deviation * faces.mean_per_deviation;
+    const V width2 = hn::NegMulAdd(hn::Set(d, lost), left.lostVariance(share, moved),
+                                   hn::Set(d, scalar.half_width * scalar.half_width));
+    locate(table, mean, hn::Sqrt(hn::Max(width2, hn::Zero(d))), lane, intervals);
+    hn::Store(hn::Load(d, intervals.scale.at + lane), d, out.scale.at + lane);
+  }
+  if (hn::AllTrue(d, hn::Eq(most, hn::Zero(d)))) return false;
+  integrate(table, intervals, kLanes, out.integrals);
+  return true;
 }
 
 HWY_INLINE bool paintLookedUp(const LookedUp& in, float* HWY_RESTRICT block) {

@@ -111,6 +111,7 @@ HWY_INLINE void meansOf(const float* HWY_RESTRICT integrals, V scale, size_t lan
 struct Pieces {
   Row mean, reach, half_width;  // scalar = mean ± half_width at t = 0, and reach more by t
   Row from, to;                 // t
+  Row width_loss;               // of half_width at the most, where it is not the same everywhere
   Row amplitude;
 };
 
@@ -124,8 +125,11 @@ struct Fits {
   IntRow fit;
 };
 
-/// How far the parabola through both ends and the middle is off, at the most (shading_table.h).
-HWY_INLINE V errorOver(const ShadingTable& table, const Range& low, const Range& high, V low_scale) {
+/// How far the parabola through both ends and the middle is off, at the most (shading_table.h). An interval
+/// that is narrower by 2 x `width_loss` cells sees something else by a quarter of that times the sum of
+/// |second differences|, at the most: so much if they are all in its middle.
+HWY_INLINE V errorOver(const ShadingTable& table, const Range& low, const Range& high, V low_scale,
+                       V width_loss) {
   const Floats d;
   const V move = hn::Max(hn::Sub(high.to, low.to), hn::Sub(high.from, low.from));
   const V factor = hn::Mul(move, hn::Min(hn::Mul(move, low_scale), hn::Set(d, 1.0f)));
@@ -135,8 +139,9 @@ HWY_INLINE V errorOver(const ShadingTable& table, const Range& low, const Range&
   const float* bends = &table.bends()->second;
   const V second = hn::Sub(hn::GatherIndex(d, bends, last), hn::GatherIndex(d, bends, first));
   const V third = hn::Sub(hn::GatherIndex(d, bends + 1, last), hn::GatherIndex(d, bends + 1, first));
-  return hn::Mul(factor, hn::Min(hn::Mul(hn::Set(d, 0.097f), second),
-                                 hn::Mul(hn::Mul(hn::Set(d, 0.0189f), move), third)));
+  const V off = hn::Mul(factor, hn::Min(hn::Mul(hn::Set(d, 0.097f), second),
+                                        hn::Mul(hn::Mul(hn::Set(d, 0.0189f), move), third)));
+  return hn::MulAdd(hn::Mul(hn::Set(d, 0.25f), width_loss), second, off);
 }
 
 /// And of the change between the ends, on a logarithmic scale. The third derivative of g(log m) has g'' and
@@ -162,7 +167,10 @@ HWY_INLINE void fitPieces(const ShadingTable& table, const Pieces& pieces, size_
     const Range first = locate(table, hn::MulAdd(reach, t0, mean), half_width, lane, low);
     locate(table, hn::MulAdd(reach, tm, mean), half_width, lane, middle);
     const Range last = locate(table, hn::MulAdd(reach, t1, mean), half_width, lane, high);
-    hn::Store(errorOver(table, first, last, hn::Load(d, low.scale.at + lane)), d, error.at + lane);
+    const V width_loss =
+        hn::Mul(hn::Load(d, pieces.width_loss.at + lane), hn::Set(d, std::abs(table.scale())));
+    hn::Store(errorOver(table, first, last, hn::Load(d, low.scale.at + lane), width_loss), d,
+              error.at + lane);
     hn::Store(logErrorOver(table, first, last), d, log_error.at + lane);
   }
   alignas(64) float integrals[3][4 * kLanes];

@@ -22,11 +22,14 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr auto kSupport = static_cast<float>(kKernelSupport);
+constexpr float kSqrt3 = 1.7320508f;
+constexpr float kReachOfHalfWidth = ScreenCut::kReach / kSqrt3;
 
 /// Sixteen splats of a tile, ready to be painted.
 struct Visits {
   Row x, y, a, b, c;  // Ellipse
   Row tp, tq;         // Scalar's
+  Row cut;            // 1 where the splat is cut; its pieces' reach is then that of the cut, too
   Pieces pieces;      // all of the splat that is in the tile
   Row l11, l21, l22;
   IntRow x0, y0, x1, y1;  // blocks, the last included; empty where x0 > x1 or y0 > y1
@@ -75,7 +78,10 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
     store(a, out.a);
     store(b, out.b);
     store(c, out.c);
-    store(gather(work, offsets, 5), out.pieces.amplitude);
+    const V amplitude = gather(work, offsets, 5);
+    const auto cut = hn::Lt(amplitude, zero);
+    store(hn::Abs(amplitude), out.pieces.amplitude);
+    store(hn::IfThenElseZero(cut, one), out.cut);
 
     // The pixels of the tile that lie in the ellipse's own rectangle.
     const V reach_x = hn::Mul(support, l11);
@@ -98,7 +104,8 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
 
     store(gather(work, offsets, 6), out.pieces.mean);
     if (!work.per_pixel) {
-      for (Row* row : {&out.pieces.reach, &out.pieces.half_width, &out.pieces.from, &out.pieces.to})
+      for (Row* row : {&out.pieces.reach, &out.pieces.half_width, &out.pieces.from, &out.pieces.to, &out.tp,
+                       &out.tq, &out.pieces.width_loss})
         store(zero, *row);
       continue;
     }
@@ -108,12 +115,29 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
     const V tp = hn::Mul(slope0, inverse), tq = hn::Mul(slope1, inverse);
     store(tp, out.tp);
     store(tq, out.tq);
-    store(hn::Mul(support, slope), out.pieces.reach);
-    store(gather(work, offsets, 9), out.pieces.half_width);
-    const Range t =
-        tOver(hn::MulAdd(tp, a, hn::Mul(tq, b)), hn::Mul(tq, c), hn::Sub(hn::Mul(half, hn::Add(x0, x1)), x),
-              hn::Sub(hn::Mul(half, hn::Add(y0, y1)), y), hn::Mul(half, hn::Sub(x1, x0)),
-              hn::Mul(half, hn::Sub(y1, y0)));
+    const V half_width = gather(work, offsets, 9);
+    store(half_width, out.pieces.half_width);
+    Range t = tOver(hn::MulAdd(tp, a, hn::Mul(tq, b)), hn::Mul(tq, c),
+                    hn::Sub(hn::Mul(half, hn::Add(x0, x1)), x), hn::Sub(hn::Mul(half, hn::Add(y0, y1)), y),
+                    hn::Mul(half, hn::Sub(x1, x0)), hn::Mul(half, hn::Sub(y1, y0)));
+    V reach = hn::Mul(support, slope), width_loss = zero;
+    if (!hn::AllFalse(d, cut)) {
+      // ScreenCut's correlation: how far the mean moves by what is left along the ray, which is all over the
+      // splat, and how much narrower the scalar's distribution becomes.
+      const auto in_cut =
+          hn::IfThenElse(hn::RebindMask(Ints(), cut), hn::Set(Ints(), 2 - 10), hn::Set(Ints(), 2));
+      const V mark = hn::Neg(
+          hn::GatherIndex(d, reinterpret_cast<const float*>(work.splats.data()), hn::Add(offsets, in_cut)));
+      const V far_sides = hn::Floor(hn::Mul(mark, hn::Set(d, 0.25f)));
+      const V correlation = hn::Sub(hn::NegMulAdd(far_sides, hn::Set(d, 4.0f), mark), hn::Set(d, 2.0f));
+      const V moved = hn::Mul(hn::Mul(hn::Abs(correlation), half_width), hn::Set(d, kReachOfHalfWidth));
+      const V kept = hn::Sqrt(hn::Max(hn::NegMulAdd(correlation, correlation, one), zero));
+      reach = hn::IfThenElse(cut, hn::Add(reach, moved), reach);
+      width_loss = hn::IfThenElseZero(cut, hn::Mul(half_width, hn::Sub(one, kept)));
+      t = {hn::IfThenElse(cut, hn::Neg(one), t.from), hn::IfThenElse(cut, one, t.to)};
+    }
+    store(reach, out.pieces.reach);
+    store(width_loss, out.pieces.width_loss);
     store(t.from, out.pieces.from);
     store(t.to, out.pieces.to);
   }
@@ -195,25 +219,33 @@ HWY_INLINE BlockMask paintBlocks(const TileWork& work, BlockMask blocks, const E
   return saturated;
 }
 
-/// With a look-up for every pixel. A few blocks are looked up before they are blended: what was
-/// written as many narrow vectors is not ready at once to be read as a wide one.
-HWY_NOINLINE BlockMask paintPixelByPixel(const TileWork& work, BlockMask blocks, const Ellipse& e,
-                                         const Scalar& scalar, const float* footprint) {
+/// With a look-up for every pixel: look_up(x, y, where to), false for nothing. A few blocks are looked up
+/// before they are blended: what was written as many narrow vectors is not ready at once to be read as a wide
+/// one.
+template <typename LookUp>
+HWY_INLINE BlockMask paintLookedUpBlocks(const TileWork& work, BlockMask blocks, const LookUp& look_up) {
   constexpr int kAtOnce = 8;
   LookedUp looked_up[kAtOnce];
   int numbers[kAtOnce];
   BlockMask saturated = 0;
   while (blocks != 0) {
     int count = 0;
-    for (; blocks != 0 && count < kAtOnce; ++count) {
+    while (blocks != 0 && count < kAtOnce) {
       const int block = numbers[count] = takeFirst(blocks);
-      lookUpBlock(e, scalar, work.table, footprint, xOf(block), yOf(block), looked_up[count]);
+      if (look_up(xOf(block), yOf(block), looked_up[count])) ++count;
     }
     for (int n = 0; n < count; ++n)
       if (paintLookedUp(looked_up[n], work.tile + numbers[n] * kBlockFloats))
         saturated |= BlockMask{1} << numbers[n];
   }
   return saturated;
+}
+
+HWY_NOINLINE BlockMask paintPixelByPixel(const TileWork& work, BlockMask blocks, const Ellipse& e,
+                                         const Scalar& scalar, const float* footprint) {
+  return paintLookedUpBlocks(work, blocks, [&](float x, float y, LookedUp& out) HWY_ATTR {
+    return lookUpBlock(e, scalar, work.table, footprint, x, y, out);
+  });
 }
 
 /// From `begin` to `end` over piece n.
@@ -231,6 +263,52 @@ HWY_INLINE Shade shadeOf(const Fits& fits, size_t n) {
     shade.bend[c] = fits.bend.of[c].at[n];
   }
   return shade;
+}
+
+/// A splat that is cut, and has the number `number`.
+HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const Visits& visits,
+                                const Fits& fits, size_t n, size_t number, const float* footprint) {
+  const ScreenSplat& splat = work.splats[number];
+  const ScreenCut cut = ScreenCut::of(work.splats[number - 1]);
+  Faces faces;
+  for (size_t face = 0; face < ScreenCut::kFaces; ++face) {
+    faces.at[face] = cut.faces[face][0] * (1 / ScreenCut::kReach);
+    faces.by_p[face] = cut.faces[face][1] * (kSupport / ScreenCut::kReach);
+    faces.by_q[face] = cut.faces[face][2] * (kSupport / ScreenCut::kReach);
+    faces.far_side[face] = (cut.far_sides >> face & 1) != 0;
+  }
+  const Ellipse e = visits.ellipse(n);
+  Scalar scalar = visits.scalar(n);
+  faces.mean_per_deviation = cut.correlation * scalar.half_width * (1 / kSqrt3);
+  if (work.per_pixel)
+    scalar.reach = kSupport * std::sqrt(splat.slope0 * splat.slope0 + splat.slope1 * splat.slope1);
+
+  BlockMask saturated = 0;
+  const auto paint = [&](const auto& paint_block) HWY_ATTR {
+    while (blocks != 0) {
+      const int block = takeFirst(blocks);
+      if (paint_block(work.tile + block * kBlockFloats, xOf(block), yOf(block)))
+        saturated |= BlockMask{1} << block;
+    }
+  };
+  const int32_t fit = fits.fit.at[n];
+  // On a logarithmic scale there is no bound of what a narrower distribution sees.
+  if (fit != kOther && !(work.table.logScale() && work.per_pixel)) {
+    Shade shade = shadeOf(fits, n);
+    const float inverse = 1 / std::max(visits.pieces.reach.at[n], 1e-37f);
+    shade.s = {0, inverse * scalar.reach * scalar.tp, inverse * scalar.reach * scalar.tq};
+    const float per_deviation = inverse * faces.mean_per_deviation * ScreenCut::kReach;
+    if (fit == kConstant)
+      paint([&](float* at, float x, float y)
+                HWY_ATTR { return paintBlock<false>(e, faces, shade, per_deviation, footprint, at, x, y); });
+    else
+      paint([&](float* at, float x, float y)
+                HWY_ATTR { return paintBlock<true>(e, faces, shade, per_deviation, footprint, at, x, y); });
+    return saturated;
+  }
+  return paintLookedUpBlocks(work, blocks, [&](float x, float y, LookedUp& out) HWY_ATTR {
+    return lookUpBlock(e, scalar, faces, work.table, footprint, x, y, out);
+  });
 }
 
 HWY_NOINLINE BlockMask paintPolyline(const TileWork& work, BlockMask blocks, const Ellipse& e,
@@ -294,7 +372,10 @@ BlockMask paintTile(const TileWork& work) {
     for (size_t n = 0; n < count; ++n) {
       if (fits.fit.at[n] == kNothing) continue;
       const BlockMask blocks = blocksOf(visits, n) & open;
-      if (blocks != 0) open &= ~paintVisit(work, blocks, visits, fits, n, footprint);
+      if (blocks == 0) continue;
+      open &= ~(visits.cut.at[n] != 0
+                    ? paintCut(work, blocks, visits, fits, n, static_cast<size_t>(numbers.at[n]), footprint)
+                    : paintVisit(work, blocks, visits, fits, n, footprint));
     }
   }
   return open;

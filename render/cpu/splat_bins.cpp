@@ -31,12 +31,12 @@ SplatBins::SplatBins(ImageSize size, size_t splats, size_t entries, unsigned pie
       begins_(tileCount(size) + 1),
       piece_ends_(pieces * tileCount(size)),
       closed_(tileCount(size)) {
-  splats_.reserve(splats);
-  tiles_.reserve(splats);
+  splats_.reserve(splats + 1);
+  tiles_.reserve(splats + 1);
 }
 
 uint64_t SplatBins::bytes(ImageSize size, size_t splats, size_t entries, unsigned pieces) {
-  return splats * (sizeof(ScreenSplat) + sizeof(Tiles)) +
+  return (splats + 1) * (sizeof(ScreenSplat) + sizeof(Tiles)) +
          sizeof(uint32_t) * (std::max(entries, tileCount(size)) + pieces * tileCount(size)) +
          sizeof(size_t) * (tileCount(size) + 1) + tileCount(size);
 }
@@ -70,12 +70,20 @@ bool SplatBins::allClosed(const Tiles& tiles) const {
 size_t SplatBins::add(std::span<const ScreenSplat> splats) {
   size_t added = 0;
   for (; added < splats.size() && splats_.size() < most_splats_; ++added) {
+    if (isCut(splats[added])) {
+      cut_ = splats[added];
+      continue;
+    }
     const Tiles tiles = tilesOf(splats[added]);
     if (allClosed(tiles)) {
       ++hidden_;
       continue;
     }
     if (entry_count_ + tiles.count() > most_entries_) break;
+    if (hasCut(splats[added])) {
+      tiles_.push_back({1, 1, 0, 0});
+      splats_.push_back(cut_);
+    }
     entry_count_ += tiles.count();
     tiles_.push_back(tiles);
     splats_.push_back(splats[added]);

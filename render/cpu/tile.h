@@ -19,7 +19,7 @@
 #include <span>
 
 #include "render/cpu/shading_table.h"
-#include "render/project/projection.h"
+#include "render/project/screen_splat.h"
 
 namespace curvisplat {
 
@@ -45,11 +45,11 @@ static_assert(kTileBlocks * kTileBlocks == 64);
 
 /// Splats to be painted under what a tile holds.
 struct TileWork {
-  float* tile;     // [kTileFloats], on a cache line
-  int x, y;        // of its first pixel
-  BlockMask open;  // the blocks that are not saturated; has one at least
-  std::span<const ScreenSplat> splats;
-  std::span<const uint32_t> order;  // of `splats`, nearest first
+  float* tile;                          // [kTileFloats], on a cache line
+  int x, y;                             // of its first pixel
+  BlockMask open;                       // the blocks that are not saturated; has one at least
+  std::span<const ScreenSplat> splats;  // one that is cut behind its ScreenCut
+  std::span<const uint32_t> order;      // of `splats`, nearest first
   const ShadingTable& table;
   bool per_pixel;
 };

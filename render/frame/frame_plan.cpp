@@ -29,7 +29,7 @@ TransparentBounds transparentIn(const ClassificationTable& table, const Projecti
   const double reach = settings.per_pixel ? largestReach(settings.view.low_pass_px2) : 1;
   return [&table, reach](const ValueBounds& values) {
     const double deviation = std::hypot(kKernelSigma * values.largest_slope, values.largest_deviation);
-    const double spread = 1.001 * (reach * values.largest_slope + std::sqrt(3.0) * deviation);
+    const double spread = 1.001 * (reach * values.largest_slope + ScreenCut::kReach * deviation);
     return table.fullyTransparent(static_cast<float>(values.min - spread),
                                   static_cast<float>(values.max + spread));
   };
@@ -79,7 +79,7 @@ ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const Fr
 ProjectionSettings FramePlanner::settingsFor(const Camera& camera, const FrameOptions& options,
                                              ImageSize size) const {
   return {screenView(camera, options, size), options.classification == Classification::kPixel,
-          options.clip_box, cache_.manifest().cells ? kCellBorderParts : kNodeBorderParts};
+          options.clip_box, cache_.manifest().cells ? kWholeCellStyle : kHalfCellStyle};
 }
 
 Cut FramePlanner::chooseCut(const ProjectionSettings& settings, const FrameOptions& options,

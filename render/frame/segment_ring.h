@@ -19,7 +19,7 @@
 #include <optional>
 #include <span>
 
-#include "render/project/projection.h"
+#include "render/project/screen_splat.h"
 
 namespace curvisplat {
 

@@ -42,7 +42,7 @@
 
 #include "render/project/depth_keys.h"
 #include "render/project/depth_sort.h"
-#include "render/project/projection.h"
+#include "render/project/screen_splat.h"
 
 namespace curvisplat {
 

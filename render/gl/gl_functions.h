@@ -21,6 +21,7 @@ namespace curvisplat {
   X(BindVertexArray, PFNGLBINDVERTEXARRAYPROC)                 \
   X(BlendFunc, PFNGLBLENDFUNCPROC)                             \
   X(BufferData, PFNGLBUFFERDATAPROC)                           \
+  X(BufferSubData, PFNGLBUFFERSUBDATAPROC)                     \
   X(CheckFramebufferStatus, PFNGLCHECKFRAMEBUFFERSTATUSPROC)   \
   X(Clear, PFNGLCLEARPROC)                                     \
   X(ClearColor, PFNGLCLEARCOLORPROC)                           \

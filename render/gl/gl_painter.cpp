@@ -42,7 +42,8 @@ struct TableTexture {
   }
 };
 
-/// Splats as the shader's instances: ScreenSplat's ten floats as 4 + 4 + 2. Leaves itself bound.
+/// Splats as the shader's instances: ScreenSplat's ten floats as 4 + 4 + 2, and those of the record behind
+/// it, so that there is one more in the buffer than is drawn. Leaves itself bound.
 struct InstanceBuffer {
   GlObject buffer, vertex_array;
 
@@ -50,12 +51,13 @@ struct InstanceBuffer {
     static constexpr GLint kComponents[] = {4, 4, 2};
     bind(gl);
     size_t offset = 0;
-    for (GLuint attribute = 0; attribute < 3; ++attribute) {
+    for (GLuint attribute = 0; attribute < 6; ++attribute) {
+      const GLint components = kComponents[attribute % 3];
       gl.EnableVertexAttribArray(attribute);
-      gl.VertexAttribPointer(attribute, kComponents[attribute], GL_FLOAT, GL_FALSE, sizeof(ScreenSplat),
+      gl.VertexAttribPointer(attribute, components, GL_FLOAT, GL_FALSE, sizeof(ScreenSplat),
                              reinterpret_cast<const void*>(offset));
       gl.VertexAttribDivisor(attribute, 1);
-      offset += static_cast<size_t>(kComponents[attribute]) * sizeof(float);
+      offset += static_cast<size_t>(components) * sizeof(float);
     }
   }
 
@@ -95,6 +97,7 @@ struct GlPainter::State {
   InstanceBuffer copied;                 // what lies elsewhere is copied here to be drawn
   std::optional<InstanceBuffer> mapped;  // what lies here is not
   std::span<ScreenSplat> mapped_splats;
+  std::optional<ScreenSplat> held;  // the last splat of a draw, whose ScreenCut is still to come
   GlObject framebuffer, colour;
   ImageSize size{0, 0};
   struct InFlight {
@@ -168,6 +171,7 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
                       bool per_pixel, const PaintResources&) {
   const GlFunctions& gl = state_->gl;
   finishDraws();  // of a frame that was not ended
+  state_->held.reset();
   state_->upload_s = state_->draw_s = state_->gl_draw_s = 0;
   state_->allocate(size);
   state_->classes.fill(gl, kClassesUnit, GL_RGBA32F, table.cumulative());
@@ -188,7 +192,7 @@ std::span<ScreenSplat> GlPainter::mapSplats(size_t count) {
   state.mapped_splats = {};
   if (!gl.has44()) return {};
   state.mapped.emplace(gl);
-  const auto bytes = static_cast<GLsizeiptr>(count * sizeof(ScreenSplat));
+  const auto bytes = static_cast<GLsizeiptr>((count + 1) * sizeof(ScreenSplat));
   constexpr GLbitfield kHow = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
   gl.BufferStorage(GL_ARRAY_BUFFER, bytes, nullptr, kHow);
   void* const memory = gl.MapBufferRange(GL_ARRAY_BUFFER, 0, bytes, kHow);
@@ -198,11 +202,24 @@ std::span<ScreenSplat> GlPainter::mapSplats(size_t count) {
 }
 
 void GlPainter::draw(std::span<const ScreenSplat> splats) {
-  ++state_->draws;
+  State& state = *state_;
+  ++state.draws;
+  if (splats.empty()) return;
+  if (state.held) {
+    const ScreenSplat pair[] = {*state.held, splats.front()};
+    state.held.reset();
+    state.drawPart(pair);
+    splats = splats.subspan(1);
+  }
+  if (!splats.empty() && hasCut(splats.back())) {
+    state.held = splats.back();
+    splats = splats.first(splats.size() - 1);
+  }
   while (!splats.empty()) {
-    const auto part = splats.first(std::min(splats.size(), kSplatsPerDraw));
-    splats = splats.subspan(part.size());
-    state_->drawPart(part);
+    size_t count = std::min(splats.size(), kSplatsPerDraw);
+    if (hasCut(splats[count - 1]) && count < splats.size()) ++count;
+    state.drawPart(splats.first(count));
+    splats = splats.subspan(count);
   }
 }
 
@@ -222,8 +239,10 @@ void GlPainter::State::drawPart(std::span<const ScreenSplat> splats) {
     {
       // Fresh storage each time: the driver keeps what it still draws from.
       const StageTimer timer(upload_s);
-      gl.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(splats.size_bytes()), splats.data(),
+      const auto bytes = static_cast<GLsizeiptr>(splats.size_bytes());
+      gl.BufferData(GL_ARRAY_BUFFER, bytes + static_cast<GLsizeiptr>(sizeof(ScreenSplat)), nullptr,
                     GL_STREAM_DRAW);
+      gl.BufferSubData(GL_ARRAY_BUFFER, 0, bytes, splats.data());
     }
     const StageTimer timer(draw_s);
     gl.BeginQuery(GL_TIME_ELAPSED, query.name());

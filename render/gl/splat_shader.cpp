@@ -9,14 +9,32 @@ constexpr const char* kVertexShader = R"(#version 330 core
 layout(location = 0) in vec4 part0;  // x, y, l11, l21
 layout(location = 1) in vec4 part1;  // l22, amplitude, mean, slope0
 layout(location = 2) in vec2 part2;  // slope1, half_width
+layout(location = 3) in vec4 next0;  // the record behind it: its ScreenCut, if its amplitude is negative
+layout(location = 4) in vec4 next1;
+layout(location = 5) in vec2 next2;
 uniform vec2 clip_from_pixel;
 uniform float support;
 flat out vec2 centre;
 flat out vec3 u_from_d;  // of L: 1 / l11, -l21 / (l11 l22), 1 / l22
 flat out float amplitude;
 flat out vec4 scalar;   // mean, slope0, slope1, half_width
+flat out mat3 faces;    // a face a column; of the splats that are cut
+flat out vec2 cut;      // far_sides, correlation
 
 void main() {
+  if (part0.z < 0.0) {  // a ScreenCut
+    centre = vec2(0.0);
+    u_from_d = vec3(0.0);
+    amplitude = 0.0;
+    scalar = vec4(0.0);
+    faces = mat3(0.0);
+    cut = vec2(0.0);
+    gl_Position = vec4(2.0, 2.0, 0.0, 1.0);
+    return;
+  }
+  faces = mat3(next0.xyw, next1.xyz, vec3(next1.w, next2));
+  cut.x = floor(-0.25 * next0.z);
+  cut.y = -next0.z - 4.0 * cut.x - 2.0;
   centre = part0.xy;
   u_from_d = vec3(1.0 / part0.z, -part0.w / (part0.z * part1.x), 1.0 / part1.x);
   amplitude = part1.y;
@@ -43,6 +61,8 @@ flat in vec2 centre;
 flat in vec3 u_from_d;
 flat in float amplitude;
 flat in vec4 scalar;
+flat in mat3 faces;
+flat in vec2 cut;
 out vec4 blended;
 
 float cellsOf(float value) {
@@ -64,6 +84,34 @@ float absorbed(float x) {
   return x < 0.25 ? series : 1.0 - exp(-x);
 }
 
+const float kReach = 2.6457513;  // of the biweight's distribution of depths, in deviations
+
+// The distribution's integrals over [0, x kReach]: of 1, of -32/5 x, and of x squared.
+vec3 integralsTo(float x) {
+  float x2 = x * x, rest = 1.0 - x2;
+  return vec3(x * (0.9375 + x2 * (-0.625 + 0.1875 * x2)), rest * rest * rest,
+              x * x2 * (0.3125 + x2 * (-0.375 + 0.13392857 * x2)));
+}
+
+// What the faces leave: the share, the mean and the variance of the depths, those over kReach deviations.
+vec3 remainder(vec2 u) {
+  vec3 a = vec3(1.0, u) * faces / kReach;
+  float lo = -1.0, hi = 1.0;
+  int far_sides = int(cut.x);
+  for (int n = 0; n < 3; ++n) {
+    if ((far_sides >> n & 1) != 0)
+      lo = max(lo, -a[n]);
+    else
+      hi = min(hi, a[n]);
+  }
+  lo = min(lo, 1.0);
+  hi = max(hi, lo);
+  vec3 left = integralsTo(hi) - integralsTo(lo);
+  float share = max(left.x, 0.0);
+  float mean = clamp(-5.0 / 32.0 * left.y / max(share, 1e-6), lo, hi);
+  return vec3(share, mean, left.z / max(share, 1e-6) - mean * mean);
+}
+
 void main() {
   vec2 d = gl_FragCoord.xy - centre;
   vec2 u = vec2(u_from_d.x * d.x, u_from_d.y * d.x + u_from_d.z * d.y);
@@ -72,10 +120,18 @@ void main() {
 
   float at = rho2 * footprint_steps;
   vec2 texel = texelFetch(footprint, int(at)).xy;
-  float depth = amplitude * (texel.x + texel.y * fract(at));
+  float depth = abs(amplitude) * (texel.x + texel.y * fract(at));
 
   float mean = PER_PIXEL ? scalar.x + dot(scalar.yz, u) : scalar.x;
   float width = PER_PIXEL ? scalar.w : 0.0;
+  if (amplitude < 0.0) {
+    vec3 left = remainder(u);
+    float deviation = cut.y * width * 0.57735027;
+    depth *= left.x;
+    mean += deviation * kReach * left.y;
+    float lost = 1.0 - clamp(7.0 * left.z, 0.0, 1.0);
+    width = sqrt(max(0.0, width * width - 3.0 * deviation * deviation * lost));
+  }
   // Beyond an end of the table all is the same; float tells cells apart only near it.
   float from = min(cellsOf(mean - width), float(cells) + 1.0), to = max(cellsOf(mean + width), -1.0);
   float widen = max(0.0, 0.5 * (1.0 - (to - from)));

@@ -26,10 +26,15 @@ glm::vec3 inSpace(const Shape& s, const glm::vec3& u) {
           s.axis0 * s.shear20 * u.x + s.axis1 * s.shear21 * u.y + s.axis2 * u.z};
 }
 
+/// Lᵀ u.
+glm::vec3 transposed(const Cholesky& l, const glm::vec3& u) {
+  return {l.l00 * u.x + l.l10 * u.y + l.l20 * u.z, l.l11 * u.y + l.l21 * u.z, l.l22 * u.z};
+}
+
 /// The piece whose S is A M Aᵀ: its A is A L, and the slope along its columns Lᵀ w.
 void reshape(SplatPiece& piece, const Cholesky& l) {
   const Shape s = piece.shape;
-  const Slope w = piece.slope;
+  const glm::vec3 w = transposed(l, {piece.slope.w0, piece.slope.w1, piece.slope.w2});
   const float a0 = s.axis0 * l.l00, a1 = s.axis1 * l.l11;
   piece.shape = {a0,
                  a1,
@@ -37,22 +42,32 @@ void reshape(SplatPiece& piece, const Cholesky& l) {
                  s.shear10 + s.axis1 * l.l10 / a0,
                  s.shear20 + (s.axis1 * s.shear21 * l.l10 + s.axis2 * l.l20) / a0,
                  s.shear21 + s.axis2 * l.l21 / a1};
-  piece.slope = {l.l00 * w.w0 + l.l10 * w.w1 + l.l20 * w.w2, l.l11 * w.w1 + l.l21 * w.w2, l.l22 * w.w2};
+  piece.slope = {w.x, w.y, w.z};
 }
 
 }  // namespace
 
-size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const BorderParts& parts,
+size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const BorderStyle& style,
                      BorderPieces& pieces) {
   const InwardAxes inward = inwardAxes(border_code);
-  const size_t count = size_t{1} << inward.count;
+  if (inward.behind) {
+    pieces[0] = whole;
+    pieces[0].faces.add({inward.axis[0], inward.distance, true});
+    return 1;
+  }
+  size_t count = 1;
+  for (int a = 0; a < inward.count; ++a)
+    if (!inward.hasFace(a)) count *= 2;
   for (size_t n = 0; n < count; ++n) {
     glm::vec3 offset(0.0f);
     float share = 1;
     float m00 = 1, m10 = 0, m11 = 1, m20 = 0, m21 = 0, m22 = 1;
+    size_t choice = n;
     for (int a = 0; a < inward.count; ++a) {
-      const BorderPart& part = parts[n >> a & 1];
-      const glm::vec3& q = inward.axis[a];
+      const bool cut = inward.hasFace(a);
+      const BorderPart& part = cut ? style.cut : style.parts[choice & 1];
+      if (!cut) choice >>= 1;
+      const glm::vec3& q = inward.axis[static_cast<size_t>(a)];
       offset += part.offset * q;
       share *= part.share;
       const float less = 1 - part.size * part.size;
@@ -68,7 +83,16 @@ size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const Border
     piece.position += inSpace(whole.shape, offset);
     piece.mean += whole.slope.w0 * offset.x + whole.slope.w1 * offset.y + whole.slope.w2 * offset.z;
     piece.weight *= share;
-    reshape(piece, Cholesky(m00, m10, m11, m20, m21, m22));
+    const Cholesky l(m00, m10, m11, m20, m21, m22);
+    reshape(piece, l);
+    for (int a = 0; a < inward.count; ++a) {
+      if (!inward.hasFace(a)) continue;
+      // The face's normal is A⁻ᵀ q, and Lᵀ q in the new frame.
+      const glm::vec3& q = inward.axis[static_cast<size_t>(a)];
+      const glm::vec3 normal = transposed(l, q);
+      const float inverse = 1 / glm::length(normal);
+      piece.faces.add({inverse * normal, inverse * (inward.distance + glm::dot(q, offset))});
+    }
   }
   return count;
 }

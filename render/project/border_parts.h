@@ -1,5 +1,6 @@
-// The splat of a cell at a border as it is drawn: in parts that follow the border more closely than one
-// symmetric kernel can (stream/border_code.h).
+// The splat of a cell at a border as it is drawn: along each axis that ends at a face, one wider splat that
+// is cut there; along others in two parts, which follow a border more closely than one symmetric kernel can
+// (stream/model/border_code.h).
 #pragma once
 
 #include <array>
@@ -13,9 +14,8 @@ namespace curvisplat {
 /// At most two parts along each of three axes.
 using BorderPieces = std::array<SplatPiece, 8>;
 
-/// The parts of `whole`, as `parts` says of each axis, in pieces[0 .. n - 1]; returns n: 2, 4 or 8, or 1 for
-/// a cell that ends at no border.
-size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const BorderParts& parts,
+/// The parts of `whole` in pieces[0 .. n - 1]; returns n: 1, 2, 4 or 8.
+size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const BorderStyle& style,
                      BorderPieces& pieces);
 
 }  // namespace curvisplat

@@ -11,7 +11,7 @@
 
 #include "render/colour/classification.h"
 #include "render/image/image.h"
-#include "render/project/projection.h"
+#include "render/project/screen_splat.h"
 #include "stream/paging/cut.h"
 
 namespace curvisplat {

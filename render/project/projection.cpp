@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "render/project/border_parts.h"
+#include "render/project/face_cut.h"
 #include "render/project/kernel.h"
 #include "render/project/splat_cutter.h"
 #include "render/project/splat_ellipse.h"
@@ -131,10 +133,26 @@ class Chooser {
     return Fate::kKept;
   }
 
-  /// Whether no piece of a splat could be seen, wherever it is.
-  bool transparentThroughout(float mean, const Slope& w, float variance) const {
-    const float slope = std::sqrt(w.w0 * w.w0 + w.w1 * w.w1 + w.w2 * w.w2);
-    const float spread = reach_ * slope + std::sqrt(3 * (slope * slope + variance));
+  /// Of a splat that is cut. Twice as many records as splats.
+  Fate chooseCut(ScreenSplat splat, float depth, const ScreenCut& cut) {
+    const size_t before = splats_.size();
+    // A truncated distribution's mean moves by up to kReach deviations; half_width is √3.
+    const float half_width = splat.half_width;
+    splat.half_width *= ScreenCut::kReach / std::numbers::sqrt3_v<float>;
+    const Fate fate = choose(splat, depth);
+    if (splats_.size() == before) return fate;
+    ScreenSplat& kept = splats_.back();
+    if (kept.half_width > 0) kept.half_width = half_width;
+    kept.amplitude = -kept.amplitude;
+    splats_.push_back(kept);
+    splats_[before] = cut.record();
+    depths_.push_back(depth);
+    return fate;
+  }
+
+  /// Whether no piece of a splat could be seen, wherever it is. `slope`: as it is drawn.
+  bool transparentThroughout(float mean, float slope, float variance) const {
+    const float spread = reach_ * slope + ScreenCut::kReach * std::sqrt(slope * slope + variance);
     return table_.fullyTransparent(mean - spread, mean + spread);
   }
 
@@ -186,22 +204,36 @@ bool place(const PerspectiveMap& map, const SplatPiece& piece, size_t& looks, co
 template <typename Map>
 std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<const float>& geometry,
                                           const VariableArrays<const float>& variable, size_t i,
-                                          uint32_t border_code, const BorderParts* borders, Chooser& chooser,
+                                          uint32_t border_code, const BorderStyle* borders, Chooser& chooser,
                                           CutBudget& left) {
   const SplatPiece whole{{geometry.x[i], geometry.y[i], geometry.z[i]},
                          shapeOf(geometry, i),
                          slopeOf(variable, i),
                          variable.mean[i],
                          geometry.weight[i]};
-  if (chooser.transparentThroughout(whole.mean, whole.slope, variable.variance[i]))
+  const glm::dvec3 slope(whole.slope.w0, whole.slope.w1, whole.slope.w2);
+  if (chooser.transparentThroughout(whole.mean, static_cast<float>(drawnSlope(slope, border_code)),
+                                    variable.variance[i]))
     return Chooser::Fate::kTransparent;
   auto best = Chooser::Fate::kOffScreen;
+  // A splat that is cut at faces has a record of its own, as any splat; what it takes beyond that counts.
+  size_t own = inwardAxes(border_code).faces != 0 ? 1 : 0;
   const auto take = [&](const SplatPiece& piece, const PlacedPiece& at) {
-    if (left.pieces == 0) return false;
+    if (left.pieces + own == 0) return false;
     const Ellipse ellipse = ellipseOf(at.rows, piece.shape, piece.slope, variable.variance[i],
                                       piece.weight * at.volume, map.low_pass_px2, map.slope_low_pass_px2);
-    const auto fate = chooser.choose(screenSplat(at.x, at.y, ellipse, piece.mean), at.depth);
-    if (fate == Chooser::Fate::kKept) --left.pieces;
+    const ScreenSplat splat = screenSplat(at.x, at.y, ellipse, piece.mean);
+    ScreenCut cut;
+    const Remains remains = cutAtFaces(at.rows, piece, ellipse, map.low_pass_px2, cut);
+    if (remains == Remains::kNothing) return true;
+    const size_t records = remains == Remains::kAll ? 1 : 2;
+    if (left.pieces + own < records) return false;
+    const auto fate =
+        remains == Remains::kAll ? chooser.choose(splat, at.depth) : chooser.chooseCut(splat, at.depth, cut);
+    if (fate == Chooser::Fate::kKept) {
+      left.pieces -= records - own;
+      own = 0;
+    }
     best = std::max(best, fate);
     return true;
   };
@@ -217,9 +249,9 @@ std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<c
 }
 
 /// False if the brick would take more than what is `left`, which it counts down. Cells at borders are drawn
-/// in these parts, unless `borders` is null.
+/// in this style, and as any cell if it is null.
 template <typename Map>
-bool projectRange(const Map& map, const BorderParts* borders, const LocalBox& clip,
+bool projectRange(const Map& map, const BorderStyle* borders, const LocalBox& clip,
                   const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
                   const SplatRange& range, Chooser& chooser, CutBudget& left, ProjectionCounts& counts) {
   Block block;
@@ -253,7 +285,7 @@ bool projectRange(const Map& map, const BorderParts* borders, const LocalBox& cl
 }
 
 template <typename Map>
-bool projectWith(const Map& map, const BorderParts* borders, const LocalBox& clip,
+bool projectWith(const Map& map, const BorderStyle* borders, const LocalBox& clip,
                  const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
                  std::span<const SplatRange> ranges, Chooser& chooser, ProjectionCounts& counts) {
   CutBudget left;
@@ -268,9 +300,11 @@ double largestReach(double low_pass_px2) {
   // The slope along L's columns is at most √(x (x + λ)) / (x + ε) times |w|, x the squared extent of the
   // splat on the screen; x below is where that is largest.
   constexpr double kEpsilon = kSlopeLowPass;
-  if (low_pass_px2 <= 2 * kEpsilon) return kKernelSupport + kBorderReach;
+  const double farthest =
+      std::max(std::sqrt(3.0) * std::abs(kHalfCellStyle.cut.offset / kHalfCellStyle.cut.size), kPartsReach);
+  if (low_pass_px2 <= 2 * kEpsilon) return kKernelSupport + farthest;
   const double x = low_pass_px2 * kEpsilon / (low_pass_px2 - 2 * kEpsilon);
-  return kBorderReach + kKernelSupport * std::sqrt(x * (x + low_pass_px2)) / (x + kEpsilon);
+  return farthest + kKernelSupport * std::sqrt(x * (x + low_pass_px2)) / (x + kEpsilon);
 }
 
 BrickProjector::BrickProjector() {
@@ -301,7 +335,7 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
     splats_.clear();
     depths_.clear();
     counts_ = {};
-    const BorderParts* const borders = coarseness == 1 ? &settings.border_parts : nullptr;
+    const BorderStyle* const borders = coarseness == 1 ? &settings.borders : nullptr;
     complete = settings.view.projection == Projection::kOrthographic
                    ? projectWith(OrthographicMap(settings.view, cell_min), borders, clip, geometry, variable,
                                  ranges, chooser, counts_)

@@ -16,26 +16,13 @@
 #include <vector>
 
 #include "render/colour/classification.h"
+#include "render/project/screen_splat.h"
 #include "render/project/screen_view.h"
 #include "stream/model/border_code.h"
 #include "stream/model/brick.h"
 #include "stream/model/splats.h"
 
 namespace curvisplat {
-
-/// One splat as the painters take it. With d the offset of a pixel's centre from (x, y) in pixels and u the
-/// solution of L u = d, L = | l11 0; l21 l22 | (S2 and the low-pass = L Lᵀ): rho² = |u|², optical depth per
-/// unit of extinction = amplitude F(rho), scalar = mean + slope·u, spread evenly over ± half_width around
-/// that.
-struct ScreenSplat {
-  float x, y;            // pixels from the left and the top
-  float l11, l21, l22;   // pixels
-  float amplitude;       // stretched units of length
-  float mean;            // the scalar's unit, and so for the rest
-  float slope0, slope1;  // along the columns of L
-  float half_width;      // √3 deviations along the ray at rho = 0
-};
-static_assert(sizeof(ScreenSplat) == 40);
 
 /// In data coordinates, before ScreenView::scale.
 struct WorldBox {
@@ -49,7 +36,8 @@ struct ProjectionCounts {
   uint64_t off_screen = 0;   // outside the image, or before the near plane
   uint64_t transparent = 0;  // without extinction in the transfer function, or without weight
   uint64_t drawn = 0;        // of those read
-  uint64_t pieces = 0;       // that the drawn ones were drawn as: more at borders, and where perspective cuts
+  uint64_t pieces = 0;  // records that the drawn ones were drawn as: more at borders, and where perspective
+                        // cuts
 };
 
 /// What to do with every splat of a frame.
@@ -57,15 +45,15 @@ struct ProjectionSettings {
   ScreenView view;
   bool per_pixel = true;  // false: flat splats; slopes and widths are left out
   std::optional<WorldBox> clip_box = std::nullopt;
-  BorderParts border_parts = kNodeBorderParts;  // kCellBorderParts where the data is cell-centred
+  BorderStyle borders = kHalfCellStyle;  // kWholeCellStyle where the data is cell-centred
 };
 
 /// Projects bricks. One thread each.
 class BrickProjector {
  public:
-  /// A brick gives at most kMaxBrickSplats splats plus this many pieces; where borders and perspective would
-  /// make more, borders are not drawn in parts, and perspective cuts coarser and drops more of what is close
-  /// to the eye.
+  /// A brick gives at most kMaxBrickSplats splats plus this many records of pieces; where borders and
+  /// perspective would make more, borders are drawn as any cell, and perspective cuts coarser and drops more
+  /// of what is close to the eye.
   static constexpr size_t kMaxPieces = 65536;
   static constexpr size_t kMaxSplats = kMaxBrickSplats + kMaxPieces;
 
@@ -73,9 +61,9 @@ class BrickProjector {
   BrickProjector();
 
   /// Projects the splats of a brick that `ranges` hold; `cell_min` is the minimum corner of its cell. Leaves
-  /// out what cannot be seen. Cells at borders are drawn in parts (border_parts.h). Splats that reach behind
-  /// the near plane or span a wide angle are cut along their longest column into two that merge into them
-  /// exactly, until they are small for their distance; what then lies before the near plane is dropped.
+  /// out what cannot be seen. Cells at borders are cut or drawn in parts (border_parts.h). Splats that reach
+  /// behind the near plane or span a wide angle are cut along their longest column into two that merge into
+  /// them exactly, until they are small for their distance; what then lies before the near plane is dropped.
   /// Overwrites splats() and depths(). Pure.
   void project(const ProjectionSettings& settings, const ClassificationTable& table,
                const glm::dvec3& cell_min, const GeometryArrays<const float>& geometry,
@@ -84,7 +72,7 @@ class BrickProjector {
   void project(const ProjectionSettings& settings, const ClassificationTable& table,
                const glm::dvec3& cell_min, const SplatGeometry& geometry, const SplatVariable& variable);
 
-  /// In the order of the ranges.
+  /// In the order of the ranges; a ScreenCut, of the same depth, before its splat.
   const std::vector<ScreenSplat>& splats() const { return splats_; }
   /// [splats()], larger is farther: orthographic, distance along the view from any origin; perspective,
   /// distance from the eye.
@@ -97,8 +85,9 @@ class BrickProjector {
   ProjectionCounts counts_;
 };
 
-/// How far, in multiples of |slope|, a mean can reach over the footprints of a splat and of its parts at a
-/// border, under `low_pass_px2`.
+/// How far, in multiples of the largest slope (BrickVariable), a mean can reach over the footprints of a
+/// splat and of its parts at a border, under `low_pass_px2`; where it is cut the mean moves by up to
+/// ScreenCut::kReach deviations more.
 double largestReach(double low_pass_px2);
 
 }  // namespace curvisplat

@@ -1,5 +1,7 @@
 #include "render/project/splat_cutter.h"
 
+#include <glm/geometric.hpp>
+
 namespace curvisplat {
 
 std::array<SplatPiece, 2> halve(const SplatPiece& piece, int column) {
@@ -20,6 +22,16 @@ std::array<SplatPiece, 2> halve(const SplatPiece& piece, int column) {
   halves[0].mean -= mean_step;
   halves[1].position += step;
   halves[1].mean += mean_step;
+  for (int n = 0; n < piece.faces.count; ++n) {
+    const CutFace& face = piece.faces.face[static_cast<size_t>(n)];
+    glm::vec3 inward = face.inward;
+    inward[column] *= 0.5f;
+    const float inverse = 1 / glm::length(inward), step_inward = 0.25f * face.inward[column];
+    halves[0].faces.face[static_cast<size_t>(n)] = {inverse * inward, inverse * (face.distance - step_inward),
+                                                    face.edge_on};
+    halves[1].faces.face[static_cast<size_t>(n)] = {inverse * inward, inverse * (face.distance + step_inward),
+                                                    face.edge_on};
+  }
   return halves;
 }
 

@@ -16,6 +16,22 @@
 
 namespace curvisplat {
 
+/// A plane that a splat is cut at, in the frame of the splat's A: of a point A u from its centre, what has
+/// inward · u < -distance is not drawn.
+struct CutFace {
+  glm::vec3 inward;  // unit length
+  float distance;
+  bool edge_on = false;  // cuts little enough to be left out where it is not seen at a low angle
+};
+struct CutFaces {
+  std::array<CutFace, 3> face;
+  int count = 0;
+
+  const CutFace* begin() const { return face.data(); }
+  const CutFace* end() const { return face.data() + count; }
+  void add(const CutFace& added) { face[static_cast<size_t>(count++)] = added; }
+};
+
 /// A splat or a part of one. Positions from the brick's origin; the residual variance is that of the whole.
 struct SplatPiece {
   glm::vec3 position;
@@ -23,6 +39,7 @@ struct SplatPiece {
   Slope slope;
   float mean;
   float weight;
+  CutFaces faces = {};
 };
 
 /// Halves `piece` along `column` (0..2).

@@ -26,17 +26,17 @@ namespace curvisplat {
 
 static_assert(std::endian::native == std::endian::little, "records are written as they are in memory");
 
-/// Version of the whole format: manifest, tables and streams. A change to the meaning of any of them raises
-/// it. The program must continue to read every version from 1 on: tests/data/caches has caches of each
-/// version, and a new version adds its own there.
-inline constexpr uint32_t kCacheVersion = 1;
+/// Version of the tables, the same in both versions of the format. What version 2 adds is named in the manifest
+/// (manifest.h). A change to the meaning of anything adds a feature there; the program must continue to read
+/// caches without it: tests/data/caches has caches of each kind, and a new feature adds its own there.
+inline constexpr uint32_t kTableVersion = 1;
 inline constexpr uint64_t kPageBytes = 4096;
 inline constexpr std::array<char, 8> kBricksMagic{'C', 'V', 'S', 'b', 'r', 'i', 'c', 'k'};
 inline constexpr std::array<char, 8> kVariableMagic{'C', 'V', 'S', 'v', 'a', 'l', 'u', 'e'};
 
 struct BricksHeader {
   std::array<char, 8> magic = kBricksMagic;  // 0
-  uint32_t version = kCacheVersion;          // 8
+  uint32_t version = kTableVersion;          // 8
   uint32_t record_bytes = 0;                 // 12
   uint64_t bricks = 0;                       // 16
 };                                           // 24
@@ -64,7 +64,7 @@ static_assert(offsetof(BrickRecord, lower) == 64 && offsetof(BrickRecord, geomet
 
 struct VariableHeader {
   std::array<char, 8> magic = kVariableMagic;  // 0
-  uint32_t version = kCacheVersion;            // 8
+  uint32_t version = kTableVersion;            // 8
   uint32_t record_bytes = 0;                   // 12
   uint64_t bricks = 0;                         // 16
   uint64_t table_offset = 0;                   // 24

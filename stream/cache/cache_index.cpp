@@ -179,9 +179,9 @@ void readRecords(const InputFile& file, const Header& header, uint64_t offset, c
   if (header.magic != Header{}.magic)
     throw Error("{}: does not begin with the magic bytes of a cache's file; it is damaged or of another kind",
                 file.path().string());
-  if (header.version != kCacheVersion || header.record_bytes != sizeof(Record))
+  if (header.version != kTableVersion || header.record_bytes != sizeof(Record))
     throw Error("{}: has version {} and records of {} bytes (expected {} and {}); the file is damaged",
-                file.path().string(), header.version, header.record_bytes, kCacheVersion, sizeof(Record));
+                file.path().string(), header.version, header.record_bytes, kTableVersion, sizeof(Record));
   if (header.bricks != manifest.bricks || offset > file.size() ||
       (file.size() - offset) / sizeof(Record) != header.bricks ||
       (file.size() - offset) % sizeof(Record) != 0)

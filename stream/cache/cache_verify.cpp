@@ -8,6 +8,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/cache/brick_grids.h"
+#include "stream/model/border_code.h"
 #include "stream/model/shape_extent.h"
 
 namespace curvisplat {
@@ -148,13 +149,14 @@ class Verifier {
     double slope = 0, variance = 0;
     for (size_t s = 0; s < values.size(); ++s) {
       const glm::dvec3 w(values.slope0[s], values.slope1[s], values.slope2[s]);
-      slope = std::max(slope, glm::length(w));
+      slope = std::max(slope, drawnSlope(w, whole_[n] ? geometry_.border_code[s] : kNoBorder));
       variance = std::max(variance, double{values.variance[s]});
     }
     const auto differs = [](double found, double recorded) {
       return std::abs(found - recorded) > kRounding * std::abs(recorded);
     };
-    if (*lowest != record.min || *highest != record.max || differs(slope, record.largest_slope) ||
+    if (*lowest != record.min || *highest != record.max ||
+        (whole_[n] && differs(slope, record.largest_slope)) ||
         differs(std::sqrt(variance), record.largest_deviation))
       findIn(n, fmt::format(
                     "'{}' has the range [{}, {}], slope {} and deviation {}, its record has [{}, {}], {} "

@@ -18,7 +18,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr uint64_t kOldestVersion = 1;
+constexpr uint64_t kOldestVersion = 1, kFirstWithRequirements = 2, kNewestVersion = 2;
+constexpr const char* kKnownFeatures[] = {kBorderFaces};
 constexpr const char* kFormat = "curvisplat splat cache";
 // 100,000 blocks take half of this. Parsed JSON takes about twenty times the size of its text.
 constexpr size_t kLargestText = 16 << 20;
@@ -233,7 +234,8 @@ void readFiles(const Fields& fields, Manifest& manifest, const Json& json) {
 std::string Manifest::toJson() const {
   Json json;
   json["format"] = kFormat;
-  json["version"] = kCacheVersion;
+  json["version"] = requirements.empty() ? kOldestVersion : kNewestVersion;
+  if (!requirements.empty()) json["requires"] = requirements;
   json["title"] = title;
   json["program"] = program;
   json["sources"] = sources;
@@ -287,10 +289,10 @@ Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path
   const Fields fields(json, "", path);
   if (fields.text("format") != kFormat) fields.fail("format", fmt::format("'{}'", kFormat), json["format"]);
   const uint64_t version = fields.count("version", 0, kAny);
-  if (version > kCacheVersion)
+  if (version > kNewestVersion)
     throw OtherVersion(
         "{}: the cache has format version {}; this program reads versions up to {}: use a newer program",
-        path.string(), version, kCacheVersion);
+        path.string(), version, kNewestVersion);
   if (version < kOldestVersion)
     throw OtherVersion(
         "{}: the cache has the experimental format version {}; this program reads versions from {} on: "
@@ -307,6 +309,13 @@ Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path
           path.string(), found, stated);
   }
   Manifest manifest;
+  if (version >= kFirstWithRequirements) manifest.requirements = fields.texts("requires");
+  for (const std::string& feature : manifest.requirements)
+    if (std::find(std::begin(kKnownFeatures), std::end(kKnownFeatures), feature) == std::end(kKnownFeatures))
+      throw OtherVersion(
+          "{}: the cache requires the feature '{}', which this program does not know; use a newer "
+          "program",
+          path.string(), feature);
   manifest.title = fields.text("title");
   manifest.program = fields.text("program");
   manifest.sources = fields.texts("sources");

@@ -46,7 +46,12 @@ class OtherVersion : public Error {
   using Error::Error;
 };
 
+/// What a reader must know of to read a cache, by the names in the manifest. Of a version 2 cache only: it is
+/// one of version 1 but for these.
+inline constexpr const char* kBorderFaces = "border-faces";  // borders are cut at faces (border_code.h)
+
 struct Manifest {
+  std::vector<std::string> requirements;  // "requires"; none: version 1
   std::string title;
   std::string program;               // the program that wrote it: "curvisplat 0.1.0"
   std::vector<std::string> sources;  // the input files, as given
@@ -67,7 +72,8 @@ struct Manifest {
 
   std::string toJson() const;
   /// Throws an Error that names `path` if a field is missing, of the wrong type or out of range, or if a
-  /// file's name is not a plain name. Throws OtherVersion if the program does not read this version.
+  /// file's name is not a plain name. Throws OtherVersion if the program does not read this version, or does not
+  /// know a feature that the cache requires.
   static Manifest fromJson(const std::string& text, const std::filesystem::path& path);
 };
 

@@ -10,6 +10,7 @@
 #include "stream/codec/geometry_codec.h"
 #include "stream/codec/prediction.h"
 #include "stream/codec/values_codec.h"
+#include "stream/model/border_code.h"
 #include "stream/model/shape_extent.h"
 
 namespace curvisplat {
@@ -85,7 +86,8 @@ Brick summaryOf(const RootCube& root, const BrickSplats& splats) {
   return brick;
 }
 
-BrickVariable summaryOf(std::span<const SplatScalar> values) {
+/// `border_codes` may be empty.
+BrickVariable summaryOf(std::span<const SplatScalar> values, std::span<const uint32_t> border_codes) {
   BrickVariable summary;
   double lowest = std::numeric_limits<double>::infinity(), highest = -lowest, slope = 0, variance = 0;
   for (const SplatScalar& value : values) {
@@ -94,9 +96,12 @@ BrickVariable summaryOf(std::span<const SplatScalar> values) {
     slope = std::max(slope, glm::dot(value.slope, value.slope));
     variance = std::max(variance, value.variance);
   }
+  slope = std::sqrt(slope);
+  for (size_t n = 0; n < border_codes.size(); ++n)
+    if (border_codes[n] != kNoBorder) slope = std::max(slope, drawnSlope(values[n].slope, border_codes[n]));
   summary.min = static_cast<float>(lowest);  // decoded means are floats
   summary.max = static_cast<float>(highest);
-  summary.largest_slope = roundedUp(std::sqrt(slope));
+  summary.largest_slope = roundedUp(slope);
   summary.largest_deviation = roundedUp(std::sqrt(variance));
   return summary;
 }
@@ -105,10 +110,11 @@ Extent extentOf(std::span<const std::byte> bytes) {
   return {0, static_cast<uint32_t>(bytes.size()), checksumOf(bytes)};
 }
 
-EncodedValues encodeInRows(std::span<const Row> rows, std::span<SplatScalar> values) {
+EncodedValues encodeInRows(std::span<const Row> rows, std::span<const uint32_t> border_codes,
+                           std::span<SplatScalar> values) {
   EncodedValues encoded;
   encoded.bytes = encodeValuesStream(rows, values);
-  encoded.variable = summaryOf(values);
+  encoded.variable = summaryOf(values, border_codes);
   encoded.variable.values = extentOf(encoded.bytes);
   return encoded;
 }
@@ -165,15 +171,16 @@ EncodedBrick encodeBrick(const RootCube& root, BrickSplats& brick) {
   encoded.brick.geometry = extentOf(encoded.geometry);
   for (const Splat& splat : brick.splats) encoded.weight += splat.weight;
   for (auto& values : brick.variables) {
-    EncodedValues of_variable = encodeInRows(decoded.rows, values);
+    EncodedValues of_variable = encodeInRows(decoded.rows, brick.border_codes, values);
     encoded.values.push_back(std::move(of_variable.bytes));
     encoded.variables.push_back(of_variable.variable);
   }
   return encoded;
 }
 
-EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<SplatScalar> values) {
-  return encodeInRows(rowsOf(runs, values.size()), values);
+EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<const uint32_t> border_codes,
+                           std::span<SplatScalar> values) {
+  return encodeInRows(rowsOf(runs, values.size()), border_codes, values);
 }
 
 void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,

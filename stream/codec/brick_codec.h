@@ -44,8 +44,9 @@ struct EncodedValues {
 };
 
 /// Encodes the values of one variable as encodeBrick() does, and replaces them by the decoded ones. The
-/// values must be finite. `runs`: the brick's. Pure: any thread. Throws nothing but bad_alloc.
-EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<SplatScalar> values);
+/// values must be finite. `runs` and `border_codes`: the brick's. Pure: any thread. Throws nothing but bad_alloc.
+EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<const uint32_t> border_codes,
+                           std::span<SplatScalar> values);
 
 /// Decodes the geometry stream of `brick`. The bytes are untrusted: throws an Error that names the brick
 /// unless they decode to exactly brick.splats finite splats inside the cell, and allocates memory for no more

@@ -10,9 +10,8 @@
 namespace curvisplat {
 namespace {
 
-// Bits 0-1: how many axes; bit 2: the third is against the rotation's; bits 3-4: which of the quaternion's
-// numbers, w x y z, is the largest and left out; then 8 bits for each of the others.
 constexpr uint32_t kReversed = 4;
+constexpr int kFacesShift = 5;
 constexpr double kLargest = std::numbers::sqrt2 / 2;  // that a number which is not the largest can be
 constexpr double kSteps = 255;
 
@@ -25,9 +24,46 @@ glm::dquat rotationOf(std::span<const glm::dvec3> inward) {
   return glm::normalize(glm::quat_cast(glm::dmat3(inward[0], inward[1], glm::cross(inward[0], inward[1]))));
 }
 
+constexpr uint32_t kLayer = 4;
+constexpr int kInwardShift = 8, kDistanceShift = 24;
+constexpr double kDistanceSteps = 128;  // to a cell
+
+/// In 16 bits: the octahedron |x| + |y| + |z| = 1, its lower half folded outwards.
+uint32_t packDirection(const glm::dvec3& q) {
+  const double inverse = 1 / (std::abs(q.x) + std::abs(q.y) + std::abs(q.z));
+  double u = q.x * inverse, v = q.y * inverse;
+  if (q.z < 0) {
+    const double folded = (1 - std::abs(v)) * (u < 0 ? -1 : 1);
+    v = (1 - std::abs(u)) * (v < 0 ? -1 : 1);
+    u = folded;
+  }
+  const auto steps = [](double x) {
+    return static_cast<uint32_t>(std::clamp(0.5 + 0.5 * x, 0.0, 1.0) * kSteps + 0.5);
+  };
+  return steps(u) | steps(v) << 8;
+}
+
+glm::vec3 unpackDirection(uint32_t bits) {
+  const auto number = [](uint32_t steps) { return static_cast<float>(steps / kSteps * 2 - 1); };
+  glm::vec3 q(number(bits & 0xff), number(bits >> 8 & 0xff), 0.0f);
+  q.z = 1 - std::abs(q.x) - std::abs(q.y);
+  if (q.z < 0) {
+    const float folded = (1 - std::abs(q.y)) * (q.x < 0 ? -1.0f : 1.0f);
+    q.y = (1 - std::abs(q.x)) * (q.y < 0 ? -1.0f : 1.0f);
+    q.x = folded;
+  }
+  return glm::normalize(q);
+}
+
 }  // namespace
 
-uint32_t packBorderCode(std::span<const glm::dvec3> inward) {
+uint32_t packLayerCode(const glm::dvec3& inward, double distance) {
+  const double steps = std::round(distance * kDistanceSteps);
+  if (!(steps >= 1 && steps <= kSteps)) return kNoBorder;
+  return kLayer | packDirection(inward) << kInwardShift | static_cast<uint32_t>(steps) << kDistanceShift;
+}
+
+uint32_t packBorderCode(std::span<const glm::dvec3> inward, uint32_t faces) {
   if (inward.empty()) return kNoBorder;
   const glm::dquat rotation = rotationOf(inward);
   std::array<double, 4> numbers{rotation.w, rotation.x, rotation.y, rotation.z};
@@ -35,7 +71,7 @@ uint32_t packBorderCode(std::span<const glm::dvec3> inward) {
   for (uint32_t n = 1; n < 4; ++n)
     if (std::abs(numbers[n]) > std::abs(numbers[largest])) largest = n;
   const double sign = numbers[largest] < 0 ? -1 : 1;
-  auto code = static_cast<uint32_t>(inward.size()) | largest << 3;
+  auto code = static_cast<uint32_t>(inward.size()) | largest << 3 | faces << kFacesShift;
   if (inward.size() == 3 && glm::dot(glm::cross(inward[0], inward[1]), inward[2]) < 0) code |= kReversed;
   int shift = 8;
   for (uint32_t n = 0; n < 4; ++n) {
@@ -50,7 +86,16 @@ uint32_t packBorderCode(std::span<const glm::dvec3> inward) {
 InwardAxes inwardAxes(uint32_t border_code) {
   InwardAxes inward;
   inward.count = static_cast<int>(border_code & 3);
-  if (inward.count == 0) return inward;
+  if (inward.count == 0) {
+    if (border_code == kNoBorder) return inward;
+    inward.count = 1;
+    inward.axis[0] = unpackDirection(border_code >> kInwardShift & 0xffff);
+    inward.faces = 1;
+    inward.distance = static_cast<float>((border_code >> kDistanceShift) / kDistanceSteps);
+    inward.behind = true;
+    return inward;
+  }
+  inward.faces = border_code >> kFacesShift & 7;
   const uint32_t largest = border_code >> 3 & 3;
   std::array<float, 4> numbers{};
   float sum = 0;
@@ -69,8 +114,27 @@ InwardAxes inwardAxes(uint32_t border_code) {
 }
 
 bool isPossibleBorderCode(uint32_t border_code) {
-  const bool whole = border_code == kNoBorder;
-  return whole || ((border_code & 3) != 0 && (border_code & 0xe0) == 0);
+  if (border_code == kNoBorder) return true;
+  const uint32_t count = border_code & 3, faces = border_code >> kFacesShift & 7;
+  if (count == 0) return (border_code & 0xff) == kLayer && border_code >> kDistanceShift != 0;
+  return faces >> count == 0;
+}
+
+double borderReach(uint32_t border_code) {
+  if ((border_code & 3) == 0) return 0;
+  return (border_code >> kFacesShift & 7) != 0 ? kCutReach : kPartsReach;
+}
+
+double drawnSlope(const glm::dvec3& slope, uint32_t border_code) {
+  double squared = glm::dot(slope, slope);
+  if ((border_code & 3) == 0) return std::sqrt(squared);
+  constexpr double kWidest = std::max(kHalfCellStyle.cut.size, kWholeCellStyle.cut.size);
+  const InwardAxes inward = inwardAxes(border_code);
+  for (int n = 0; n < inward.count; ++n) {
+    const double along = glm::dot(slope, glm::dvec3(inward.axis[static_cast<size_t>(n)]));
+    if (inward.hasFace(n)) squared += (kWidest * kWidest - 1) * along * along;
+  }
+  return std::sqrt(squared);
 }
 
 }  // namespace curvisplat

@@ -4,7 +4,25 @@
 //
 // The directions are unit vectors in the frame of the splat's A (A q is from the border inwards, as long as
 // the cell is in that direction) and at right angles to one another, since J = A Q with Q orthogonal. They
-// are kept as a rotation in 32 bits, good to 0.01 in the cell's own measure whatever its aspect ratio.
+// are kept as a rotation, good to 0.01 in the cell's own measure whatever its aspect ratio, and each has a
+// bit that says how the renderer is to draw it: in parts, or cut at the border's face.
+//
+//   bits 0-1   number of directions
+//        2     the third is opposite to the rotation's
+//        3-4   which of the quaternion's numbers, w x y z, is the largest and left out
+//        5-7   direction 0, 1, 2 ends at a face to be cut at
+//        8-31  the quaternion's other numbers, 8 bits each
+//
+// A node's cell in the layer behind such a face is whole, but its splat reaches beyond the face and is cut
+// there, too. It has a code of another form:
+//
+//   bits 0-1   zero
+//        2     one
+//        3-7   zero
+//        8-23  the direction from the face inwards: the octahedron's map, 8 bits each
+//        24-31 how far the face is from the cell's middle, in 1/128 of the cell's length in that direction
+//
+// The first version of the format has only zeros in bits 5-7 of the one form, and has not the other.
 #pragma once
 
 #include <array>
@@ -20,32 +38,55 @@ inline constexpr uint32_t kNoBorder = 0;
 struct InwardAxes {
   std::array<glm::vec3, 3> axis;  // unit length, orthogonal
   int count = 0;                  // 0..3
+  uint32_t faces = 0;             // bit n: axis[n] starts at a face to be cut at
+  float distance = 0.5f;          // of the faces from the cell's middle, in cells
+  bool behind = false;            // the cell is in the layer behind the one face
+
+  bool hasFace(int n) const { return (faces >> n & 1) != 0; }
 };
 
-/// `inward`: none to three such vectors.
-uint32_t packBorderCode(std::span<const glm::dvec3> inward);
+/// `inward`: none to three such vectors. `faces`: InwardAxes'.
+uint32_t packBorderCode(std::span<const glm::dvec3> inward, uint32_t faces = 0);
+/// Of a cell in the layer behind a face; kNoBorder where the distance, of the face from the cell's middle in
+/// cells, is not in the code's range.
+uint32_t packLayerCode(const glm::dvec3& inward, double distance);
 InwardAxes inwardAxes(uint32_t border_code);
 
 /// False for what packBorderCode() gives to no cell; whatever passes has inward axes.
 bool isPossibleBorderCode(uint32_t border_code);
 
-// How the renderer draws a cell at a border: as two parts along each such axis, a narrow one at the border
-// and a wide one behind it. In units of that cell's length, from its middle inwards; the shares of its weight
-// sum to one.
+// How the renderer draws a cell at a border: cut, as one wider splat of which the part behind the face is not
+// drawn (render/project/border_parts.h), or in two parts, a narrow one at the border and a wide one behind
+// it. In units of the cell's length in that direction, from its middle inwards; the shares are of its weight.
 struct BorderPart {
   float offset, size, share;
 };
-using BorderParts = std::array<BorderPart, 2>;
+struct BorderStyle {
+  BorderPart cut;
+  std::array<BorderPart, 2> parts;  // their shares sum to one
+};
 
-// By least squares in one dimension, for the step that a uniform half space is. Half cells of nodes: the
-// squared error is 0.40 of that of one splat (0.019 for 0.048), what lies outside of the border 0.42 (0.033
-// of a cell for 0.079), and where the density dips behind the border it has 0.87 for 0.83. Whole cells: 0.33
-// (0.027 for 0.083) and 0.33 (0.045 for 0.138); a dip to 0.87 is new, one splat rises slowly.
-inline constexpr BorderParts kNodeBorderParts{{{-0.286f, 0.336f, 0.264f}, {0.3f, 0.998f, 0.736f}}};
-inline constexpr BorderParts kCellBorderParts{{{-0.342f, 0.25f, 0.197f}, {0.111f, 0.769f, 0.803f}}};
+// By least squares in one dimension, for the step that a uniform half space is. `kHalf`: half cells, of
+// nodes; `kWhole`: cells of cell-centred data.
+//
+//                   squared error   outside of the border   density behind it
+//   kHalf   one splat       0.048        0.079                 0.83 and more
+//           in parts        0.019        0.033                 0.87 to 1.07
+//           cut            0.0004        0.010, of the next layer's splats    0.989 to 1.004
+//   kWhole  one splat       0.083        0.138
+//           in parts        0.027        0.045                 0.87 and more
+//           cut            0.0008        0                     0.932 to 1.030
+inline constexpr BorderStyle kHalfCellStyle{{-0.646f, 2.13f, 2.31f},
+                                            {{{-0.286f, 0.336f, 0.264f}, {0.3f, 0.998f, 0.736f}}}};
+inline constexpr BorderStyle kWholeCellStyle{{-0.243f, 1.264f, 1.507f},
+                                             {{{-0.342f, 0.25f, 0.197f}, {0.111f, 0.769f, 0.803f}}}};
 
-/// How much farther than the splat itself its parts reach, at the most, in units of its largest axis: the
-/// inner parts' offset along three axes.
-inline constexpr double kBorderReach = 0.52;
+/// How much farther than the splat itself it reaches as it is drawn, at the most, in units of its largest
+/// axis: the inner parts' offset along three axes; and a half cell's wide splat, but for what lies behind the
+/// face.
+inline constexpr double kPartsReach = 0.52, kCutReach = 1.25;
+double borderReach(uint32_t border_code);
+/// |w|, as stream/model/splats.h has it, of the splat as it is drawn, at the most.
+double drawnSlope(const glm::dvec3& slope, uint32_t border_code);
 
 }  // namespace curvisplat

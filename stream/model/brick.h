@@ -102,7 +102,8 @@ class SplatRanges {
 struct BrickVariable {
   Extent values;
   float min = 0, max = 0;       // of the means, the scalar's unit
-  float largest_slope = 0;      // of |w|, the scalar's unit: how far a mean reaches over one kernel radius
+  float largest_slope = 0;      // of |w|, the scalar's unit: how far a mean reaches over one kernel radius;
+                                // at faces to be cut at as it is drawn
   float largest_deviation = 0;  // of √r, the scalar's unit: the largest residual standard deviation
 };
 

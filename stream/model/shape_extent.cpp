@@ -66,9 +66,9 @@ double smallestSingularValue(std::span<const Splat> splats) {
 
 double largestReach(std::span<const Splat> splats, std::span<const uint32_t> border_codes) {
   constexpr double kKernelRadius = 1.556228;
-  const bool any_half = std::any_of(border_codes.begin(), border_codes.end(),
-                                    [](uint32_t border_code) { return border_code != kNoBorder; });
-  return (kKernelRadius + (any_half ? kBorderReach : 0.0)) * largestSingularValue(splats);
+  double beyond = 0;
+  for (const uint32_t border_code : border_codes) beyond = std::max(beyond, borderReach(border_code));
+  return (kKernelRadius + beyond) * largestSingularValue(splats);
 }
 
 }  // namespace curvisplat

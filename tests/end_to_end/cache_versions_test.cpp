@@ -23,7 +23,7 @@ class CacheVersion : public ::testing::TestWithParam<const char*> {
   static fs::path folder() { return fs::path(CURVISPLAT_TEST_DATA) / "caches" / GetParam(); }
 };
 
-INSTANTIATE_TEST_SUITE_P(Versions, CacheVersion, ::testing::Values("version_1"),
+INSTANTIATE_TEST_SUITE_P(Versions, CacheVersion, ::testing::Values("version_1", "version_2"),
                          [](const auto& tested) { return tested.param; });
 
 TEST_P(CacheVersion, IsStillRead) {
@@ -58,7 +58,7 @@ TEST(CacheVersions, OthersAreRefusedWithWhatToDo) {
   const TemporaryFolder folder;
   const fs::path cache = folder / "a.splats";
   fs::copy(fs::path(CURVISPLAT_TEST_DATA) / "caches/version_1/cells.splats", cache);
-  const std::pair<int, const char*> versions[] = {{0, "convert again"}, {2, "newer program"}};
+  const std::pair<int, const char*> versions[] = {{0, "convert again"}, {3, "newer program"}};
   for (const auto& [version, what_to_do] : versions) {
     auto manifest = nlohmann::ordered_json::parse(readTextFile(cache / "manifest.json"));
     manifest["version"] = version;
@@ -83,6 +83,22 @@ TEST(CacheVersions, OthersAreRefusedWithWhatToDo) {
     EXPECT_EQ(result.status, 0) << result.err;
     EXPECT_EQ(runProgram({"info", cache}).status, 0);
   }
+}
+
+TEST(CacheVersions, OnesThatRequireWhatIsUnknownAreRefused) {
+  const TemporaryFolder folder;
+  const fs::path cache = folder / "a.splats";
+  fs::copy(fs::path(CURVISPLAT_TEST_DATA) / "caches/version_2/cells.splats", cache);
+  EXPECT_EQ(runProgram({"info", cache}).status, 0);
+  auto manifest = nlohmann::ordered_json::parse(readTextFile(cache / "manifest.json"));
+  manifest.erase("checksum");
+  manifest["requires"].push_back("colours");
+  writeFileAtomically(cache / "manifest.json", manifest.dump());
+  const ProgramResult result = runProgram({"info", cache});
+  EXPECT_EQ(result.status, 1);
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  for (const char* part : {"'colours'", "newer program"})
+    EXPECT_NE(result.err.find(part), std::string::npos) << result.err;
 }
 
 }  // namespace

@@ -29,12 +29,29 @@ Image marched(const ReferenceField& field, const KnownFunction& function, const 
   return toImage(referenceMarch(field, function.exact, camera, size, steps));
 }
 
-/// Expects `least_db` of `with` against the reference, and less than that of `without`.
+/// The mean of `side` x `side` pixels each.
+Image averaged(const Image& image, int side) {
+  Image out({image.size.width / side, image.size.height / side});
+  for (int y = 0; y < out.size.height; ++y)
+    for (int x = 0; x < out.size.width; ++x)
+      for (int c = 0; c < 4; ++c) {
+        double sum = 0;
+        for (int n = 0; n < side * side; ++n)
+          sum += static_cast<double>(image.pixel(x * side + n % side, y * side + n / side)[c]);
+        out.rgba[static_cast<size_t>(4 * (y * out.size.width + x) + c)] =
+            static_cast<float>(sum / (side * side));
+      }
+  return out;
+}
+
+/// Expects `least_db` of `with` against the reference, of `rays` x `rays` rays a pixel, and less than that of
+/// `without`.
 void expectWorth(const std::string& what, const GridSource& source, const ReferenceField& field,
                  const std::string& function_name, const Camera& camera, double least_db,
-                 const DirectOptions& with, const DirectOptions& without) {
+                 const DirectOptions& with, const DirectOptions& without, int rays = 1) {
   const KnownFunction function = KnownFunction::of(function_name);
-  const Image reference = marched(field, function, camera);
+  const Image reference =
+      averaged(marched(field, function, camera, {rays * kSize.width, rays * kSize.height}), rays);
   const auto db = [&](const DirectOptions& options) {
     const Image picture = drawDirectly(source, 0, options, function.table, camera, kSize);
     return compareImages(picture, reference).psnr_db;
@@ -66,6 +83,19 @@ TEST_F(Corrections, PartsAtBorders) {
   DirectOptions without;
   without.border_parts = false;
   expectWorth("parts at borders", source_, field_, "smooth", halfAnnulusCamera(), 62, {}, without);
+}
+
+TEST_F(Corrections, FacesOfBorders) {
+  // A uniform medium, whose outline is all that can be wrong. One ray a pixel does not see how much of it is
+  // outside.
+  const auto constant = scene("half-annulus-constant");
+  const SceneGridSource source(constant, {64, 32, 32}, 4);
+  DirectOptions without;
+  without.nodes.faces = false;
+  expectWorth("faces of borders, seen edge-on", source, SceneField(*constant), "smooth", edgeOnCamera(), 37.5,
+              {}, without, 4);
+  expectWorth("faces of borders, seen obliquely", source, SceneField(*constant), "smooth",
+              halfAnnulusCamera(), 57, {}, without);
 }
 
 TEST_F(Corrections, BendsOfTheScalar) {

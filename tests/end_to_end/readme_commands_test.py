@@ -25,6 +25,7 @@ SHARED_DATA = os.path.join(ROOT, "..", "shared", "data")
 PAGES_WITH_COMMANDS = ["README.md", "tools/REFERENCE.md"]
 NI, NJ, NK = 12, 10, 8  # of the grids made here
 
+not_made = set()  # outputs of commands that were skipped
 failures = []
 
 
@@ -142,8 +143,10 @@ def shortened(words):
 
 
 def missing_input(words, folder):
-    """A file that the command reads and that is not there, if any."""
+    """A file that the command reads and that is not there, if any; or that a skipped command would have made."""
     for word in words[2:]:
+        if word in not_made:
+            return word
         if re.fullmatch(r"[\w./]+\.(cgns|nc|vts|xyz|bin|fun|q)", word) and not os.path.exists(os.path.join(folder, word)):
             return word
     return None
@@ -154,6 +157,7 @@ def run_command(page, line, program, folder):
     absent = missing_input(words, folder)
     if absent:
         print(f"skipped, {absent} is not here: {line}")
+        not_made.update(words[n + 1] for n, word in enumerate(words[:-1]) if word == "-o")
         return
     environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
     environment["XDG_CONFIG_HOME"] = os.path.join(folder, "config")

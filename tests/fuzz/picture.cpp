@@ -69,7 +69,7 @@ void run(std::span<const std::byte> bytes) {
       Camera::named("iso", scale * corner, scale * (corner + size), pixels,
                     flags & kPerspective ? Projection::kPerspective : Projection::kOrthographic);
   ProjectionSettings settings{ScreenView::of(camera, pixels, scale, kLowPass, 1e-4 * size), !(flags & kFlat)};
-  if (flags & kCells) settings.border_parts = kCellBorderParts;
+  if (flags & kCells) settings.borders = kWholeCellStyle;
   if (flags & kClip) settings.clip_box = WorldBox{corner, corner + 0.5 * size};
 
   static BrickProjector projector;

@@ -33,7 +33,7 @@ void run(std::span<const std::byte> bytes) {
   for (size_t n = 0; n < values.size(); ++n)
     doubles.push_back(
         {values.mean[n], {values.slope0[n], values.slope1[n], values.slope2[n]}, values.variance[n]});
-  const EncodedValues again = encodeValues({}, doubles);
+  const EncodedValues again = encodeValues({}, {}, doubles);
   decodeVariable(brick, again.variable, again.bytes, values);
 }
 

@@ -57,7 +57,7 @@ TEST(NodeSplats, OfAnAffineGridAreItsCellsAndSumToItsVolume) {
     EXPECT_EQ(inner.node, grid.at(2, 1, 3));
     EXPECT_TRUE(inner.regular);
     EXPECT_FALSE(inner.on_block_face);
-    EXPECT_LT(glm::distance(inner.splat.position, inner.node_position), 1e-13);
+    EXPECT_LT(glm::distance(inner.splat.position, origin + jacobian * glm::dvec3(2, 1, 3)), 1e-13);
     EXPECT_LT(shapeError(inner.splat, jacobian), 1e-13);
 
     // A node of the edge i = 4, k = 0: half cells along i and k.
@@ -194,6 +194,35 @@ TEST(NodeSplats, BesideBlankedNodesAreHalfCells) {
   EXPECT_EQ(before.splat.position, glm::dvec3(1.75, 3, 3));
   EXPECT_EQ(out.values[grid.at(2, 3, 3)].mean, 1.75);
   EXPECT_EQ(out.values[grid.at(2, 3, 3)].slope, glm::dvec3(0.5, 0, 0));
+}
+
+TEST(NodeSplats, BehindABlocksFaceKnowHowFarItIs) {
+  const glm::dmat3 jacobian(glm::dvec3(2, 0.3, 0), glm::dvec3(-0.5, 0.1, 0.2), glm::dvec3(0.1, 0, 1));
+  MappedBlock grid(6, 5, 3, [&](double i, double j, double k) {
+    return jacobian * glm::dvec3(i, j < 1 ? 0 : 0.5 + 0.5 * j, k);  // at 0, 1, 1.5, 2, 2.5
+  });
+  NodeSplatCorrections corrections;
+  corrections.stretch = false;  // the splats are then as long as the cells
+  const NodeSplats out = grid.splats(corrections);
+  const auto expectBehind = [&](size_t at, size_t face, const glm::dvec3& along, double distance) {
+    const NodeSplat& node = out.splats[at];
+    const InwardAxes inward = inwardAxes(node.border_code);
+    ASSERT_TRUE(inward.behind) << at;
+    EXPECT_TRUE(node.behind_face);
+    EXPECT_FALSE(node.on_block_face);
+    EXPECT_EQ(node.node_position, out.splats[face].node_position);
+    EXPECT_EQ(node.spacing, out.splats[face].spacing);
+    const glm::dvec3 expected = glm::normalize(glm::inverse(node.splat.factor()) * along);
+    EXPECT_LT(glm::distance(glm::dvec3(inward.axis[0]), expected), 0.02) << at;
+    EXPECT_NEAR(inward.distance, distance, 0.01) << at;
+  };
+  expectBehind(grid.at(1, 2, 1), grid.at(0, 2, 1), jacobian[0], 1);
+  expectBehind(grid.at(4, 2, 1), grid.at(5, 2, 1), -jacobian[0], 1);
+  // The cell reaches from 0.5 to 1.25, and its middle lies at 7/8.
+  expectBehind(grid.at(2, 1, 1), grid.at(2, 0, 1), jacobian[1], 0.875 / 0.75);
+  EXPECT_EQ(out.splats[grid.at(2, 2, 1)].border_code, kNoBorder);
+  EXPECT_FALSE(out.splats[grid.at(2, 2, 1)].behind_face);
+  EXPECT_FALSE(inwardAxes(out.splats[grid.at(0, 1, 1)].border_code).behind);
 }
 
 TEST(NodeSplats, AwayFromABlankAreAsWithoutIt) {

@@ -42,7 +42,7 @@ std::vector<DirectSplat> splatsOf(const GridSource& source, uint32_t scalar, con
     computeNodeSplats({blocks[b], first_node, all, &nodes}, all, scratch, splats, options.nodes);
     for (size_t n = 0; n < splats.splats.size(); ++n) {
       const std::span<const SplatScalar> values(&splats.values[n], 1);
-      if (splats.splats[n].on_block_face && options.merge_seams)
+      if (splats.splats[n].isForSeams() && options.merge_seams)
         seams.add(splats.splats[n], values);
       else
         take(splats.splats[n], values);
@@ -112,6 +112,10 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
   sorted.reserve(projector.splats().size());
   for (const uint32_t n : farthestFirst(projector.depths())) {
     ScreenSplat splat = projector.splats()[n];
+    if (isCut(splat)) {
+      sorted.push_back(splat);
+      continue;
+    }
     if (!options.hidden_slope) splat.half_width = 0;
     if (!options.secant && camera.projection == Projection::kPerspective)
       splat.amplitude /=

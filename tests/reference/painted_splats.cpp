@@ -41,9 +41,29 @@ std::vector<ScreenSplat> randomSplats(int count, uint32_t seed, ImageSize size, 
 
 std::vector<uint32_t> farthestFirst(std::span<const float> depths) {
   std::vector<uint32_t> order(depths.size());
-  std::iota(order.begin(), order.end(), 0u);
+  std::iota(order.rbegin(), order.rend(), 0u);
   std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return depths[a] > depths[b]; });
   return order;
+}
+
+std::vector<ScreenSplat> cutSome(const std::vector<ScreenSplat>& splats, uint32_t seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> around(-1, 1);
+  std::vector<ScreenSplat> out;
+  for (size_t n = 0; n < splats.size(); ++n) {
+    out.push_back(splats[n]);
+    if (n % 3 != 0) continue;
+    out.back().amplitude *= -1;
+    ScreenCut cut;
+    for (size_t face = 0; face < 1 + random() % ScreenCut::kFaces; ++face) {
+      const float steep = face == 0 && n % 2 == 0 ? 20.0f : 2.0f;
+      cut.faces[face] = {2 * around(random), steep * around(random), steep * around(random)};
+    }
+    cut.far_sides = random() % 8;
+    cut.correlation = around(random);
+    out.push_back(cut.record());
+  }
+  return out;
 }
 
 Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const ClassificationTable& table,

@@ -8,7 +8,7 @@
 #include "render/colour/classification.h"
 #include "render/image/image.h"
 #include "render/project/painter.h"
-#include "render/project/projection.h"
+#include "render/project/screen_splat.h"
 
 namespace curvisplat {
 
@@ -23,8 +23,10 @@ ClassificationTable smooth(bool log_scale = false);
 std::vector<ScreenSplat> randomSplats(int count, uint32_t seed, ImageSize size, float slope = 0.3f,
                                       float opacity = 0.5f);
 
-/// The places of `depths`, the largest first; those of equal depths in their order.
+/// The places of `depths`, the largest first; of equal depths the last first.
 std::vector<uint32_t> farthestFirst(std::span<const float> depths);
+/// The same splats in their order, every third of them cut at up to three faces.
+std::vector<ScreenSplat> cutSome(const std::vector<ScreenSplat>& splats, uint32_t seed);
 
 /// A frame, in the painter's own order. `splats`: farthest first.
 Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const ClassificationTable& table,

@@ -7,7 +7,7 @@
 
 #include "render/colour/classification.h"
 #include "render/image/image.h"
-#include "render/project/projection.h"
+#include "render/project/screen_splat.h"
 
 namespace curvisplat {
 

@@ -27,7 +27,7 @@ const glm::dvec3 kInward[] = {glm::normalize(glm::dvec3(1, 2, -1)), glm::normali
 
 TEST(BorderParts, OfAWholeCellAreItself) {
   BorderPieces pieces;
-  ASSERT_EQ(partsAtBorder(kWhole, kNoBorder, kNodeBorderParts, pieces), 1u);
+  ASSERT_EQ(partsAtBorder(kWhole, kNoBorder, kHalfCellStyle, pieces), 1u);
   EXPECT_EQ(pieces[0].position, kWhole.position);
   EXPECT_EQ(factorOf(pieces[0].shape), factorOf(kWhole.shape));
   EXPECT_EQ(pieces[0].weight, kWhole.weight);
@@ -37,17 +37,17 @@ TEST(BorderParts, OfAWholeCellAreItself) {
 TEST(BorderParts, AreStretchedAndShiftedAlongTheInwardAxesOnly) {
   const glm::dmat3 a = factorOf(kWhole.shape);
   for (size_t axes = 1; axes <= 3; ++axes) {
-    const BorderParts& parts = axes == 2 ? kCellBorderParts : kNodeBorderParts;
+    const BorderStyle& style = axes == 2 ? kWholeCellStyle : kHalfCellStyle;
     const uint32_t code = packBorderCode({kInward, axes});
     const InwardAxes inward = inwardAxes(code);
     BorderPieces pieces;
-    ASSERT_EQ(partsAtBorder(kWhole, code, parts, pieces), size_t{1} << axes);
+    ASSERT_EQ(partsAtBorder(kWhole, code, style, pieces), size_t{1} << axes);
     double weight = 0;
     for (size_t n = 0; n < size_t{1} << axes; ++n) {
       glm::dmat3 m(1.0);
       glm::dvec3 offset(0.0);
       for (size_t axis = 0; axis < axes; ++axis) {
-        const BorderPart& part = parts[n >> axis & 1];
+        const BorderPart& part = style.parts[n >> axis & 1];
         const glm::dvec3 q(inward.axis[axis]);
         m += (double{part.size} * part.size - 1) * glm::outerProduct(q, q);
         offset += double{part.offset} * q;
@@ -67,9 +67,9 @@ TEST(BorderParts, AreStretchedAndShiftedAlongTheInwardAxesOnly) {
 TEST(BorderParts, CarryTheSameLinearField) {
   // The gradient is A⁻ᵀ w, whatever A.
   const glm::dvec3 gradient = glm::inverse(glm::transpose(factorOf(kWhole.shape))) * vectorOf(kWhole.slope);
-  for (const BorderParts& parts : {kNodeBorderParts, kCellBorderParts}) {
+  for (const BorderStyle& style : {kHalfCellStyle, kWholeCellStyle}) {
     BorderPieces pieces;
-    const size_t count = partsAtBorder(kWhole, packBorderCode({kInward, 3}), parts, pieces);
+    const size_t count = partsAtBorder(kWhole, packBorderCode({kInward, 3}), style, pieces);
     for (size_t n = 0; n < count; ++n) {
       const SplatPiece& piece = pieces[n];
       const glm::dvec3 found = glm::inverse(glm::transpose(factorOf(piece.shape))) * vectorOf(piece.slope);
@@ -78,6 +78,73 @@ TEST(BorderParts, CarryTheSameLinearField) {
       EXPECT_NEAR(piece.mean, mean, 1e-5);
     }
   }
+}
+
+TEST(BorderParts, AtFacesAreOneThatIsCutThere) {
+  const glm::dmat3 a = factorOf(kWhole.shape);
+  for (size_t axes = 1; axes <= 3; ++axes) {
+    const BorderStyle& style = axes == 2 ? kWholeCellStyle : kHalfCellStyle;
+    const uint32_t faces = axes == 3 ? 5 : (1u << axes) - 1;  // the second of three in parts
+    const uint32_t code = packBorderCode({kInward, axes}, faces);
+    const InwardAxes inward = inwardAxes(code);
+    BorderPieces pieces;
+    ASSERT_EQ(partsAtBorder(kWhole, code, style, pieces), axes == 3 ? 2u : 1u);
+    for (size_t n = 0; n < (axes == 3 ? 2 : 1); ++n) {
+      const SplatPiece& piece = pieces[n];
+      ASSERT_EQ(piece.faces.count, axes == 3 ? 2 : static_cast<int>(axes));
+      const glm::dmat3 to_frame = glm::inverse(factorOf(piece.shape));
+      double share = axes == 3 ? style.parts[n].share : 1;
+      int found = 0;
+      for (size_t axis = 0; axis < axes; ++axis) {
+        if (!inward.hasFace(static_cast<int>(axis))) continue;
+        const CutFace& face = piece.faces.face[static_cast<size_t>(found++)];
+        share *= style.cut.share;
+        EXPECT_NEAR(glm::length(face.inward), 1, 1e-5);
+        // The face lies half a cell from the cell's middle, along the other axes; wherever it is looked at.
+        const glm::dvec3 q(inward.axis[axis]), other(inward.axis[(axis + 1) % 3]);
+        for (const double away : {-1.0, 0.0, 2.0}) {
+          const glm::dvec3 on_face =
+              glm::dvec3(kWhole.position) + a * (-0.5 * q + away * glm::cross(q, other));
+          const glm::dvec3 u = to_frame * (on_face - glm::dvec3(piece.position));
+          EXPECT_NEAR(glm::dot(glm::dvec3(face.inward), u), -face.distance, 1e-4);
+        }
+        const glm::dvec3 inside = to_frame * (glm::dvec3(kWhole.position) - glm::dvec3(piece.position));
+        EXPECT_GT(glm::dot(glm::dvec3(face.inward), inside), -face.distance);
+      }
+      EXPECT_NEAR(piece.weight, kWhole.weight * share, 1e-6);
+    }
+  }
+}
+
+TEST(BorderParts, InTheLayerBehindAFaceAreItselfCutThere) {
+  BorderPieces pieces;
+  ASSERT_EQ(partsAtBorder(kWhole, packLayerCode(kInward[0], 0.75), kHalfCellStyle, pieces), 1u);
+  EXPECT_EQ(pieces[0].position, kWhole.position);
+  EXPECT_EQ(factorOf(pieces[0].shape), factorOf(kWhole.shape));
+  EXPECT_EQ(pieces[0].weight, kWhole.weight);
+  ASSERT_EQ(pieces[0].faces.count, 1);
+  EXPECT_EQ(pieces[0].faces.face[0].distance, 0.75f);
+  EXPECT_LT(glm::distance(glm::dvec3(pieces[0].faces.face[0].inward), kInward[0]), 0.02);
+}
+
+TEST(BorderParts, KeepTheirFacesWhereTheyAreHalved) {
+  BorderPieces pieces;
+  partsAtBorder(kWhole, packBorderCode({kInward, 2}, 3), kHalfCellStyle, pieces);
+  const SplatPiece& piece = pieces[0];
+  for (int column = 0; column < 3; ++column)
+    for (const SplatPiece& half : halve(piece, column)) {
+      ASSERT_EQ(half.faces.count, 2);
+      for (size_t n = 0; n < 2; ++n) {
+        const glm::dvec3 inward(piece.faces.face[n].inward);
+        for (const glm::dvec3& along : {glm::dvec3(0), glm::cross(inward, glm::dvec3(1, 0, 0))}) {
+          const glm::dvec3 on_face =
+              glm::dvec3(piece.position) +
+              factorOf(piece.shape) * (-double{piece.faces.face[n].distance} * inward + along);
+          const glm::dvec3 u = glm::inverse(factorOf(half.shape)) * (on_face - glm::dvec3(half.position));
+          EXPECT_NEAR(glm::dot(glm::dvec3(half.faces.face[n].inward), u), -half.faces.face[n].distance, 1e-4);
+        }
+      }
+    }
 }
 
 /// A brick of `count` equal splats.
@@ -117,6 +184,14 @@ TEST(BorderParts, AreWhatHalfCellsAreDrawnAs) {
     EXPECT_EQ(one.pieces, 2u);
     EXPECT_EQ(project(Brick(10, corner), projection).pieces, 80u);
     EXPECT_EQ(project(Brick(10, kNoBorder), projection).pieces, 10u);
+  }
+}
+
+TEST(BorderParts, AtAFaceAreASplatAndItsCut) {
+  for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
+    const ProjectionCounts one = project(Brick(7, packBorderCode({kInward, 2}, 3)), projection);
+    EXPECT_EQ(one.drawn, 7u);
+    EXPECT_EQ(one.pieces, 14u);
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <random>
@@ -29,6 +30,7 @@ class PainterTest : public testing::TestWithParam<Backend> {
   }
 
   const std::unique_ptr<PaintingBackend> backend_ = makeBackend(GetParam());
+  const ClassificationTable lively_ = lively();
 };
 
 INSTANTIATE_TEST_SUITE_P(Painters, PainterTest, testing::Values(Backend::kCpu, Backend::kOsmesa),
@@ -60,6 +62,51 @@ TEST_P(PainterTest, DrawsRandomSplatsAsSpecified) {
           EXPECT_NEAR(drawn.rgba[alpha], specified.rgba[alpha], 1e-3);
         }
       }
+}
+
+TEST_P(PainterTest, CutsSplatsAsSpecified) {
+  const ImageSize size{70, 50};
+  const auto splats = cutSome(randomSplats(300, 9, size), 4);
+  for (const bool per_pixel : {true, false})
+    for (const auto& table : {lively(), smooth(true)}) {
+      const Image drawn = paint(splats, table, per_pixel, size);
+      const Image specified = compositeSplats(splats, table, per_pixel, size, kWhite);
+      EXPECT_GT(compareImages(drawn, specified).psnr_db, 70) << "per pixel: " << per_pixel;
+      EXPECT_LT(largestDifference(drawn, specified), 4e-3) << "per pixel: " << per_pixel;
+    }
+}
+
+TEST_P(PainterTest, CutsSplatsWhereverADrawEnds) {
+  const ImageSize size{90, 60};
+  const auto splats = cutSome(randomSplats(200, 21, size), 5);
+  const Image whole = paint(splats, lively(), true, size);
+  for (const size_t at_once : {1, 2, 7}) {
+    Image image;
+    backend_->run([&](Painter& painter) {
+      std::vector<ScreenSplat> ordered = splats;
+      if (painter.order() == DrawingOrder::kFrontToBack) std::reverse(ordered.begin(), ordered.end());
+      painter.begin(size, kWhite, lively_, true);
+      for (size_t begin = 0; begin < ordered.size(); begin += at_once)
+        painter.draw(std::span(ordered).subspan(begin, std::min(at_once, ordered.size() - begin)));
+      image = painter.end();
+    });
+    EXPECT_EQ(image.rgba, whole.rgba) << at_once;
+  }
+}
+
+TEST_P(PainterTest, AFaceAcrossTheRayLeavesItsShare) {
+  // Half of a splat that is seen through a face at its middle; with a scalar that falls along the ray, what
+  // is left has the mean of the nearer half.
+  const ClassificationTable even([](double) { return TransferFunction::Value{glm::dvec3(0.0), 1}; }, 0, 1);
+  ScreenCut cut;
+  cut.faces[0] = {0, 0, 0};
+  const ScreenSplat splat{8, 8, 4, 0, 4, -1, 0.5f, 0, 0, 0};
+  const std::vector<ScreenSplat> pair{splat, cut.record()};
+  const Image half = paint(pair, even, true, {16, 16});
+  ScreenSplat uncut = splat;
+  uncut.amplitude = 0.5f;
+  const Image expected = paint({&uncut, 1}, even, true, {16, 16});
+  EXPECT_LT(largestDifference(half, expected), 1e-5);
 }
 
 TEST_P(PainterTest, TopOfTheImageIsTheFirstRow) {

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <numeric>
 #include <vector>
 
 #include "preprocess/scenes/scenes.h"
@@ -16,6 +15,7 @@
 #include "render/image/image.h"
 #include "render/project/projection.h"
 #include "stream/codec/brick_codec.h"
+#include "tests/reference/painted_splats.h"
 #include "tests/reference/reference_march.h"
 #include "tests/reference/splat_arrays.h"
 
@@ -100,12 +100,8 @@ class Quantisation : public testing::Test {
       splats.insert(splats.end(), projector.splats().begin(), projector.splats().end());
       depths.insert(depths.end(), projector.depths().begin(), projector.depths().end());
     }
-    std::vector<uint32_t> order(splats.size());
-    std::iota(order.begin(), order.end(), 0u);
-    std::stable_sort(order.begin(), order.end(),
-                     [&](uint32_t a, uint32_t b) { return depths[a] > depths[b]; });
     std::vector<ScreenSplat> sorted;
-    for (const uint32_t n : order) sorted.push_back(splats[n]);
+    for (const uint32_t n : farthestFirst(depths)) sorted.push_back(splats[n]);
 
     Image image;
     gl_.run([&](const GlContext& context) {

@@ -27,9 +27,11 @@ TEST(HalfCell, KeepsItsDirections) {
   for (int n = 0; n < 3000; ++n) {
     const glm::dmat3 axes = randomAxes(random);
     const std::vector<glm::dvec3> inward(&axes[0], &axes[0] + 1 + n % 3);
-    const uint32_t code = packBorderCode(inward);
+    const uint32_t faces = random() % (1u << inward.size());
+    const uint32_t code = packBorderCode(inward, faces);
     ASSERT_TRUE(isPossibleBorderCode(code));
     const InwardAxes kept = inwardAxes(code);
+    EXPECT_EQ(kept.faces, faces);
     ASSERT_EQ(kept.count, static_cast<int>(inward.size()));
     for (size_t a = 0; a < inward.size(); ++a) {
       ASSERT_LT(glm::distance(glm::dvec3(kept.axis[a]), inward[a]), 0.012) << code;
@@ -58,7 +60,9 @@ TEST(HalfCell, OfNoDirectionIsAWholeCell) {
 TEST(HalfCell, IsRefusedWhereNothingPacksToIt) {
   EXPECT_FALSE(isPossibleBorderCode(0x00000004));  // reversed, but no axis
   EXPECT_FALSE(isPossibleBorderCode(0x01000000));
-  EXPECT_FALSE(isPossibleBorderCode(0x00000021));
+  EXPECT_TRUE(isPossibleBorderCode(0x00000021));
+  EXPECT_FALSE(isPossibleBorderCode(0x00000041));  // a face of the second axis, but one axis
+  EXPECT_FALSE(isPossibleBorderCode(0x00000082));
 }
 
 TEST(HalfCell, OfAnyBytesHasFiniteUnitAxes) {
@@ -69,12 +73,42 @@ TEST(HalfCell, OfAnyBytesHasFiniteUnitAxes) {
   }
 }
 
+TEST(LayerBehindAFace, KeepsItsDirectionAndDistance) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(0, 1);
+  for (int n = 0; n < 3000; ++n) {
+    const glm::dvec3 inward = randomAxes(random)[0];
+    const double distance = 0.01 + 1.97 * unit(random);
+    const uint32_t code = packLayerCode(inward, distance);
+    ASSERT_TRUE(isPossibleBorderCode(code));
+    const InwardAxes kept = inwardAxes(code);
+    ASSERT_TRUE(kept.behind);
+    ASSERT_EQ(kept.count, 1);
+    EXPECT_TRUE(kept.hasFace(0));
+    ASSERT_LT(glm::distance(glm::dvec3(kept.axis[0]), inward), 0.02) << code;
+    ASSERT_NEAR(kept.distance, distance, 0.5 / 128 + 1e-9);
+    EXPECT_EQ(borderReach(code), 0);
+  }
+  for (const double outside : {-1.0, 0.0, 2.5, 1e300, std::nan("")})
+    EXPECT_EQ(packLayerCode({0, 0, 1}, outside), kNoBorder) << outside;
+  EXPECT_FALSE(isPossibleBorderCode(0x80000014));
+  EXPECT_FALSE(isPossibleBorderCode(0x00000104));
+}
+
+TEST(HalfCell, SlopesAreThoseThatAreDrawn) {
+  const glm::dvec3 inward[] = {{0, 0, 1}}, slope(0.3, 0, 0.4);
+  EXPECT_DOUBLE_EQ(drawnSlope(slope, kNoBorder), 0.5);
+  EXPECT_DOUBLE_EQ(drawnSlope(slope, packBorderCode(inward)), 0.5);
+  const double wide = kHalfCellStyle.cut.size * 0.4;
+  EXPECT_NEAR(drawnSlope(slope, packBorderCode(inward, 1)), std::hypot(0.3, wide), 0.01);
+}
+
 TEST(HalfCell, ItsPartsHaveItsWeight) {
-  for (const BorderParts& parts : {kNodeBorderParts, kCellBorderParts}) {
+  for (const BorderStyle& style : {kHalfCellStyle, kWholeCellStyle}) {
     float sum = 0;
-    for (const BorderPart& part : parts) {
+    for (const BorderPart& part : style.parts) {
       sum += part.share;
-      EXPECT_LE(std::sqrt(3.0f) * part.offset, kBorderReach);
+      EXPECT_LE(std::sqrt(3.0f) * part.offset, kPartsReach);
       EXPECT_LE(part.size, 1);
     }
     EXPECT_FLOAT_EQ(sum, 1);

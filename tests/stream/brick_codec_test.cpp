@@ -261,11 +261,16 @@ TEST(Codec, KeepsHalfCells) {
   const RootCube root{};
   BrickSplats brick = randomBrick({}, Cell{}, 6);
   const size_t without = encodeBrick(root, brick).geometry.size();
+  BrickSplats whole_brick = brick;
   brick.border_codes.assign(brick.size(), kNoBorder);
   EXPECT_EQ(encodeBrick(root, brick).geometry.size(), without);
 
   const glm::dvec3 inward[] = {{0, 0.6, 0.8}, {1, 0, 0}};
   for (size_t n = 0; n < brick.size(); n += 3) brick.border_codes[n] = packBorderCode({inward, 1 + n % 2});
+  EXPECT_NEAR(
+      encodeBrick(root, brick).brick.largest_radius / encodeBrick(root, whole_brick).brick.largest_radius,
+      1 + kPartsReach / kKernelRadius, 1e-6);
+  for (size_t n = 0; n < brick.size(); n += 6) brick.border_codes[n] = packBorderCode({inward, 1 + n % 2}, 1);
   const EncodedBrick encoded = encodeBrick(root, brick);
   EXPECT_EQ(
       decodeForMerging(root, encoded.brick, encoded.geometry, encoded.variables, encoded.values).border_codes,
@@ -278,8 +283,7 @@ TEST(Codec, KeepsHalfCells) {
   const EncodedBrick whole = encodeBrick(root, brick);
   decodeGeometry(root, whole.brick, whole.geometry, floats);
   EXPECT_EQ(floats.border_code, std::vector<uint32_t>(brick.size(), kNoBorder));
-  EXPECT_NEAR(encoded.brick.largest_radius / whole.brick.largest_radius, 1 + kBorderReach / kKernelRadius,
-              1e-6);
+  EXPECT_NEAR(encoded.brick.largest_radius / whole.brick.largest_radius, 1 + kCutReach / kKernelRadius, 1e-6);
 }
 
 TEST(Codec, CutsOffVariancesThatNoFloatHolds) {

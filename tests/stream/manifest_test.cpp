@@ -86,6 +86,23 @@ TEST(Manifest, TellsOfCells) {
   EXPECT_THROW(Manifest::fromJson(json.dump(), "m"), Error);
 }
 
+TEST(Manifest, IsOfVersionTwoWhereItRequiresSomething) {
+  Manifest m = example();
+  EXPECT_EQ(Json::parse(m.toJson())["version"], 1);
+  EXPECT_FALSE(Json::parse(m.toJson()).contains("requires"));
+  m.requirements = {kBorderFaces};
+  EXPECT_EQ(Json::parse(m.toJson())["version"], 2);
+  EXPECT_EQ(Manifest::fromJson(m.toJson(), "m").requirements, m.requirements);
+  m.requirements.push_back("colours");
+  try {
+    Manifest::fromJson(m.toJson(), "m.json");
+    ADD_FAILURE() << "read what it does not know";
+  } catch (const OtherVersion& error) {
+    for (const char* part : {"m.json", "'colours'", "newer program"})
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+  }
+}
+
 TEST(Manifest, KeepsNamesThatAreNotUtf8Readable) {
   Manifest m = example();
   m.sources = {"gr\xfcn.xyz"};  // Latin-1
@@ -148,7 +165,8 @@ TEST(Manifest, RefusesWhatIsOutOfRange) {
     EXPECT_THROW(Manifest::fromJson(json.dump(), "m"), Error) << json.dump();
   };
   refused([](Json& j) { j["version"] = 0; });
-  refused([](Json& j) { j["version"] = 2; });
+  refused([](Json& j) { j["version"] = 2; });  // without saying what it requires
+  refused([](Json& j) { j["version"] = 3; });
   refused([](Json& j) { j["root"]["size"] = 0; });
   refused([](Json& j) { j["root"]["size"] = -1; });
   refused([](Json& j) { j["root"]["min"] = {1, 2}; });

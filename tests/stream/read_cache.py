@@ -187,7 +187,9 @@ class Cache:
         self.folder, self.data, self.tables = pathlib.Path(folder), {}, {}
         text = (self.folder / "manifest.json").read_text(encoding="utf-8")
         self.manifest = json.loads(text)
-        need((self.manifest["format"], self.manifest["version"]) == ("curvisplat splat cache", 1), "format version")
+        version, requires = self.manifest["version"], self.manifest.get("requires", [])
+        need(self.manifest["format"] == "curvisplat splat cache" and version == (2 if requires else 1), "format version")
+        need(set(requires) <= {"border-faces"}, "required feature")
         self.files = {file["name"]: file for file in self.manifest["files"]}
         if "checksum" in self.manifest:
             packed = re.sub(r'("(?:\\.|[^"\\])*")|\s+', lambda match: match[1] or "", text)

@@ -22,7 +22,7 @@ class AddedVariable : public testing::Test {
       reader.readGeometry(brick, geometry, &runs);
       std::vector<SplatScalar> values(geometry.size());
       for (size_t n = 0; n < values.size(); ++n) values[n].mean = static_cast<double>(n);
-      writer.append(brick, std::vector{encodeValues(runs, values)});
+      writer.append(brick, std::vector{encodeValues(runs, {}, values)});
     }
   }
 
