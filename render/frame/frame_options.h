@@ -5,6 +5,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 #include <optional>
+#include <vector>
 
 #include "render/image/image_size.h"
 #include "render/project/projection.h"
@@ -21,7 +22,8 @@ struct FrameOptions {
   double lod_pixels = 1;               // screen-space error allowed; 0 is the finest level
   std::optional<uint64_t> max_splats;  // read at most these, from the levels that make the best of them
   glm::dvec3 scale{1.0};               // stretches the data: D S Dᵀ, V det D, about the world's origin
-  std::optional<WorldBox> clip_box;    // splats whose centre is outside are not drawn
+  std::optional<WorldBox> clip_box;    // nothing is drawn outside
+  std::vector<ClipPlane> clip_planes;  // nor on their outer sides
   glm::vec4 background{1, 1, 1, 1};    // premultiplied
   double low_pass_px2 = kLowPass;      // added to S2's diagonal
   unsigned threads = 0;                // workers; 0: one a core

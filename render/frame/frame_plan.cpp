@@ -79,13 +79,19 @@ ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const Fr
 ProjectionSettings FramePlanner::settingsFor(const Camera& camera, const FrameOptions& options,
                                              ImageSize size) const {
   return {screenView(camera, options, size), options.classification == Classification::kPixel,
-          options.clip_box, cache_.manifest().cells ? kWholeCellStyle : kHalfCellStyle};
+          clipPlanesOf(options.clip_planes, options.clip_box), cache_.manifest().cells ? kWholeCellStyle : kHalfCellStyle};
 }
 
 Cut FramePlanner::chooseCut(const ProjectionSettings& settings, const FrameOptions& options,
                             const CutOptions& limits) const {
   const CutTree tree{cache_.manifest().root, cache_.bricks(), cache_.brickVariables(variable_), subtrees_};
-  Cut cut = curvisplat::chooseCut(tree, settings.view.cutView(), transparentIn(table_, settings), limits);
+  CutView view = settings.view.cutView();
+  for (const ClipPlane& plane : settings.clip_planes) {
+    // n · (x - p) = n/scale · (scale x - scale p).
+    const glm::dvec3 normal = glm::normalize(plane.normal / settings.view.scale);
+    view.planes.push_back({normal, -glm::dot(normal, settings.view.scale * plane.point)});
+  }
+  Cut cut = curvisplat::chooseCut(tree, view, transparentIn(table_, settings), limits);
   if (options.max_splats && cut.splats > *options.max_splats)
     throw UsageError(
         "{} splats are too few: the coarsest picture of this cache takes {}; give --max-splats that",

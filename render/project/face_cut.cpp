@@ -27,8 +27,15 @@ Remains cutAtFaces(const ScreenRows& rows, const SplatPiece& piece, const Ellips
   // A face's distance varies along the ray by this part of its variance in the splat: 1 is seen face-on. What
   // the next layer's splats have behind a face (a hundredth of their weight) shows only beside its edges.
   constexpr float kLowAngle = 0.5f;
-  int count = 0;
-  float steepest = 0;  // how much of the face's deviation is along the ray
+  // Those that take most, where there are more than a ScreenCut holds.
+  struct Taking {
+    float nearest;  // deviations from the middle, over the footprint
+    std::array<float, 3> at;
+    bool far_side;
+    float along_ray;  // how much of the face's deviation is along the ray
+  };
+  std::array<Taking, ScreenCut::kFaces> taking;
+  size_t count = 0;
   for (const CutFace& face : piece.faces) {
     const glm::vec3& q = face.inward;
     const float h0 = glm::dot(b0, q), h1 = glm::dot(b1, q), nq = glm::dot(along, q);
@@ -45,10 +52,21 @@ Remains cutAtFaces(const ScreenRows& rows, const SplatPiece& piece, const Ellips
     const float spread = kSupport * std::sqrt(by0 * by0 + by1 * by1);
     if (a + spread <= -ScreenCut::kReach) return Remains::kNothing;
     if (a - spread >= ScreenCut::kReach) continue;
-    cut.faces[static_cast<size_t>(count)] = {a, by0, by1};
-    if (nq > 0) cut.far_sides |= 1u << count;
-    steepest = std::max(steepest, std::abs(nq) / (std::sqrt(determinant) * deviation));
-    ++count;
+    const Taking found{a - spread, {a, by0, by1}, nq > 0, std::abs(nq) / (std::sqrt(determinant) * deviation)};
+    if (count < taking.size()) {
+      taking[count++] = found;
+      continue;
+    }
+    Taking& least = *std::max_element(taking.begin(), taking.end(), [](const Taking& one, const Taking& other) {
+      return one.nearest < other.nearest;
+    });
+    if (found.nearest < least.nearest) least = found;
+  }
+  float steepest = 0;
+  for (size_t n = 0; n < count; ++n) {
+    cut.faces[n] = taking[n].at;
+    if (taking[n].far_side) cut.far_sides |= 1u << n;
+    steepest = std::max(steepest, taking[n].along_ray);
   }
   if (count == 0) return Remains::kAll;
 

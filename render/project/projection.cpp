@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "render/project/border_parts.h"
+#include "render/project/clip_planes.h"
 #include "render/project/face_cut.h"
 #include "render/project/kernel.h"
 #include "render/project/splat_cutter.h"
@@ -25,7 +26,6 @@ struct Block {
   float l11[kBlock], l21[kBlock], l22[kBlock];
   float amplitude[kBlock];
   float slope0[kBlock], slope1[kBlock], half_width[kBlock];
-  int32_t clipped[kBlock];
   int32_t too_wide[kBlock];  // perspective: to be cut up, or before the near plane
 
   [[gnu::always_inline]] void set(size_t n, const Ellipse& ellipse) {
@@ -43,23 +43,8 @@ ScreenSplat screenSplat(float x, float y, const Ellipse& e, float mean) {
   return {x, y, e.l11, e.l21, e.l22, e.amplitude, mean, e.slope0, e.slope1, e.half_width};
 }
 
-/// The clip box from the brick's origin, in float.
-struct LocalBox {
-  glm::vec3 lower{-INFINITY}, upper{INFINITY};
-
-  LocalBox(const std::optional<WorldBox>& box, const glm::dvec3& origin) {
-    if (!box) return;
-    lower = glm::vec3(box->lower - origin);
-    upper = glm::vec3(box->upper - origin);
-  }
-  [[gnu::always_inline]] bool excludes(float x, float y, float z) const {
-    return (x < lower.x) | (x > upper.x) | (y < lower.y) | (y > upper.y) | (z < lower.z) | (z > upper.z);
-  }
-};
-
-void computeBlock(const OrthographicMap& map, const LocalBox& clip,
-                  const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
-                  size_t begin, size_t count, Block& block) {
+void computeBlock(const OrthographicMap& map, const GeometryArrays<const float>& geometry,
+                  const VariableArrays<const float>& variable, size_t begin, size_t count, Block& block) {
 #pragma GCC ivdep
   for (size_t n = 0; n < count; ++n) {
     const size_t i = begin + n;
@@ -67,16 +52,14 @@ void computeBlock(const OrthographicMap& map, const LocalBox& clip,
     block.x[n] = map.x + map.rows.x0 * x + map.rows.y0 * y + map.rows.z0 * z;
     block.y[n] = map.y + map.rows.x1 * x + map.rows.y1 * y + map.rows.z1 * z;
     block.depth[n] = map.depth.x * x + map.depth.y * y + map.depth.z * z;
-    block.clipped[n] = clip.excludes(x, y, z);
     block.too_wide[n] = 0;
     block.set(n, ellipseOf(map.rows, shapeOf(geometry, i), slopeOf(variable, i), variable.variance[i],
                            geometry.weight[i] * map.volume, map.low_pass_px2, map.slope_low_pass_px2));
   }
 }
 
-void computeBlock(const PerspectiveMap& map, const LocalBox& clip,
-                  const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
-                  size_t begin, size_t count, Block& block) {
+void computeBlock(const PerspectiveMap& map, const GeometryArrays<const float>& geometry,
+                  const VariableArrays<const float>& variable, size_t begin, size_t count, Block& block) {
 #pragma GCC ivdep
   for (size_t n = 0; n < count; ++n) {
     const size_t i = begin + n;
@@ -86,7 +69,6 @@ void computeBlock(const PerspectiveMap& map, const LocalBox& clip,
     block.x[n] = map.pixelX(centre);
     block.y[n] = map.pixelY(centre);
     block.depth[n] = centre.distance;
-    block.clipped[n] = clip.excludes(x, y, z);
     block.too_wide[n] = map.tooWide(centre, map.radiusOf(shape));
     block.set(n,
               ellipseOf(map.rowsAt(centre), shape, slopeOf(variable, i), variable.variance[i],
@@ -204,8 +186,8 @@ bool place(const PerspectiveMap& map, const SplatPiece& piece, size_t& looks, co
 template <typename Map>
 std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<const float>& geometry,
                                           const VariableArrays<const float>& variable, size_t i,
-                                          uint32_t border_code, const BorderStyle* borders, Chooser& chooser,
-                                          CutBudget& left) {
+                                          uint32_t border_code, const BorderStyle* borders,
+                                          const LocalClipPlanes* clip, Chooser& chooser, CutBudget& left) {
   const SplatPiece whole{{geometry.x[i], geometry.y[i], geometry.z[i]},
                          shapeOf(geometry, i),
                          slopeOf(variable, i),
@@ -217,7 +199,7 @@ std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<c
     return Chooser::Fate::kTransparent;
   auto best = Chooser::Fate::kOffScreen;
   // A splat that is cut at faces has a record of its own, as any splat; what it takes beyond that counts.
-  size_t own = inwardAxes(border_code).faces != 0 ? 1 : 0;
+  size_t own = clip || inwardAxes(border_code).faces != 0 ? 1 : 0;
   const auto take = [&](const SplatPiece& piece, const PlacedPiece& at) {
     if (left.pieces + own == 0) return false;
     const Ellipse ellipse = ellipseOf(at.rows, piece.shape, piece.slope, variable.variance[i],
@@ -243,31 +225,41 @@ std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<c
     parts[0] = whole;
   else
     count = partsAtBorder(whole, border_code, *borders, parts);
-  for (size_t n = 0; n < count; ++n)
+  for (size_t n = 0; n < count; ++n) {
+    if (clip) clip->addFaces(parts[n]);
     if (!place(map, parts[n], left.looks, take)) return {};
+  }
   return best;
 }
 
 /// False if the brick would take more than what is `left`, which it counts down. Cells at borders are drawn
-/// in this style, and as any cell if it is null.
+/// in this style; if it is null, they are drawn as any cell, and clip planes do not cut.
 template <typename Map>
-bool projectRange(const Map& map, const BorderStyle* borders, const LocalBox& clip,
+bool projectRange(const Map& map, const BorderStyle* borders, const LocalClipPlanes& clip,
                   const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
                   const SplatRange& range, Chooser& chooser, CutBudget& left, ProjectionCounts& counts) {
   Block block;
+  std::array<ClipSide, kBlock> sides{};
   for (size_t begin = range.begin; begin < range.end; begin += kBlock) {
     const size_t count = std::min(kBlock, range.end - begin);
-    computeBlock(map, clip, geometry, variable, begin, count, block);
+    computeBlock(map, geometry, variable, begin, count, block);
+    if (!clip.empty()) clip.sidesOf(geometry, begin, count, sides);
     for (size_t n = 0; n < count; ++n) {
-      if (block.clipped[n]) {
+      bool across = sides[n] == ClipSide::kAcross;
+      if (across && !borders) {
+        const size_t i = begin + n;
+        if (!clip.contains({geometry.x[i], geometry.y[i], geometry.z[i]})) sides[n] = ClipSide::kOutside;
+        across = false;
+      }
+      if (sides[n] == ClipSide::kOutside) {
         ++counts.clipped;
         continue;
       }
       Chooser::Fate fate;
       const uint32_t border_code = borders ? geometry.border_code[begin + n] : kNoBorder;
-      if (block.too_wide[n] || border_code != kNoBorder) {
-        const auto best =
-            choosePieces(map, geometry, variable, begin + n, border_code, borders, chooser, left);
+      if (block.too_wide[n] || border_code != kNoBorder || across) {
+        const auto best = choosePieces(map, geometry, variable, begin + n, border_code, borders,
+                                       across ? &clip : nullptr, chooser, left);
         if (!best) return false;
         fate = *best;
       } else {
@@ -285,7 +277,7 @@ bool projectRange(const Map& map, const BorderStyle* borders, const LocalBox& cl
 }
 
 template <typename Map>
-bool projectWith(const Map& map, const BorderStyle* borders, const LocalBox& clip,
+bool projectWith(const Map& map, const BorderStyle* borders, const LocalClipPlanes& clip,
                  const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
                  std::span<const SplatRange> ranges, Chooser& chooser, ProjectionCounts& counts) {
   CutBudget left;
@@ -325,7 +317,7 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
                              std::span<const SplatRange> ranges) {
   CURVISPLAT_CHECK_OP(geometry.size(), ==, variable.size());
   for (const SplatRange& range : ranges) CURVISPLAT_CHECK_OP(range.end, <=, geometry.size());
-  const LocalBox clip(settings.clip_box, cell_min);
+  const LocalClipPlanes clip(settings.clip_planes, cell_min);
   Chooser chooser(settings, table, splats_, depths_);
   // Where the near plane is too near for float, coarser is not less: then what was cut until there is drawn.
   constexpr float kCoarsest = 1e30f;

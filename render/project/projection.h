@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "render/colour/classification.h"
+#include "render/project/clip_planes.h"
 #include "render/project/screen_splat.h"
 #include "render/project/screen_view.h"
 #include "stream/model/border_code.h"
@@ -24,15 +25,10 @@
 
 namespace curvisplat {
 
-/// In data coordinates, before ScreenView::scale.
-struct WorldBox {
-  glm::dvec3 lower{0.0}, upper{0.0};
-};
-
 /// Where splats went; an empty picture is explained by these.
 struct ProjectionCounts {
   uint64_t read = 0;         // in the bricks, or the parts of them that are drawn
-  uint64_t clipped = 0;      // centre outside the clip box
+  uint64_t clipped = 0;      // outside of a clip plane
   uint64_t off_screen = 0;   // outside the image, or before the near plane
   uint64_t transparent = 0;  // without extinction in the transfer function, or without weight
   uint64_t drawn = 0;        // of those read
@@ -44,7 +40,7 @@ struct ProjectionCounts {
 struct ProjectionSettings {
   ScreenView view;
   bool per_pixel = true;  // false: flat splats; slopes and widths are left out
-  std::optional<WorldBox> clip_box = std::nullopt;
+  std::vector<ClipPlane> clip_planes = {};
   BorderStyle borders = kHalfCellStyle;  // kWholeCellStyle where the data is cell-centred
 };
 
@@ -52,8 +48,8 @@ struct ProjectionSettings {
 class BrickProjector {
  public:
   /// A brick gives at most kMaxBrickSplats splats plus this many records of pieces; where borders and
-  /// perspective would make more, borders are drawn as any cell, and perspective cuts coarser and drops more
-  /// of what is close to the eye.
+  /// perspective would make more, borders are drawn as any cell, clip planes leave out or leave whole what
+  /// they go through, and perspective cuts coarser and drops more of what is close to the eye.
   static constexpr size_t kMaxPieces = 65536;
   static constexpr size_t kMaxSplats = kMaxBrickSplats + kMaxPieces;
 

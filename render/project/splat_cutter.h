@@ -6,6 +6,7 @@
 // and a pencil of aspect ratio 1000 is cut across only, where eight octants would cut it to dust.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -23,13 +24,25 @@ struct CutFace {
   float distance;
   bool edge_on = false;  // cuts little enough to be left out where it is not seen at a low angle
 };
+/// The borders of a cell, and clip planes.
 struct CutFaces {
-  std::array<CutFace, 3> face;
+  static constexpr int kMost = 6;
+
+  std::array<CutFace, kMost> face;
   int count = 0;
 
   const CutFace* begin() const { return face.data(); }
   const CutFace* end() const { return face.data() + count; }
-  void add(const CutFace& added) { face[static_cast<size_t>(count++)] = added; }
+  /// In the place of the face that takes the least, where there are kMost.
+  void add(const CutFace& added) {
+    if (count < kMost) {
+      face[static_cast<size_t>(count++)] = added;
+      return;
+    }
+    CutFace* const least = std::max_element(
+        face.begin(), face.end(), [](const CutFace& a, const CutFace& b) { return a.distance < b.distance; });
+    if (added.distance < least->distance) *least = added;
+  }
 };
 
 /// A splat or a part of one. Positions from the brick's origin; the residual variance is that of the whole.

@@ -28,7 +28,7 @@ namespace curvisplat {
 
 /// What a cut must know of a view. "Stretched" space is scale * data.
 struct CutView {
-  /// Points p with normal·p + offset < 0 are out of the image; |normal| = 1. Stretched.
+  /// Points p with normal·p + offset < 0 are out of the image, or clipped; |normal| = 1. Stretched.
   struct Plane {
     glm::dvec3 normal{0.0};
     double offset = 0;

@@ -98,6 +98,31 @@ TEST_F(Corrections, FacesOfBorders) {
               halfAnnulusCamera(), 57, {}, without);
 }
 
+/// Through the middle of the half-annulus: across the view, along it, and both.
+const ClipPlane kAcross{{-0.4, 0, 0.5}, {0.6, 0.5, -0.7}};
+const ClipPlane kAlong{{-0.5, 0.1, 0.4}, {0.1, -0.9, -0.6}};
+
+TEST_F(Corrections, CutsAtClipPlanes) {
+  const struct {
+    const char* name;
+    std::vector<ClipPlane> planes;
+    double finest_db, merged_db;
+  } cuts[] = {{"a plane across the view", {kAcross}, 57, 47},
+              {"a plane along the view", {kAlong}, 57, 47},
+              {"two planes", {kAcross, kAlong}, 57, 47}};
+  for (const auto& cut : cuts) {
+    const ClippedField clipped(field_, cut.planes);
+    DirectOptions with;
+    with.clip_planes = cut.planes;
+    DirectOptions without = with;
+    without.cut_splats = false;
+    expectWorth(cut.name, source_, clipped, "smooth", halfAnnulusCamera(), cut.finest_db, with, without);
+    with.voxel = without.voxel = 4 * 2 * halfAnnulusCamera().parallel_scale / kSize.height;
+    expectWorth(std::string(cut.name) + ", 4 pixels", source_, clipped, "smooth", halfAnnulusCamera(),
+                cut.merged_db, with, without);
+  }
+}
+
 TEST_F(Corrections, BendsOfTheScalar) {
   DirectOptions without;
   without.nodes.bends = false;

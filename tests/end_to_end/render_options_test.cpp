@@ -187,6 +187,26 @@ TEST_F(RenderOptions, APlacedCameraIsTheNamedOne) {
   EXPECT_LT(compareImages(iso, aside).psnr_db, 30);
 }
 
+TEST_F(RenderOptions, AClipPlaneLeavesWhatABoxWithThatFaceLeaves) {
+  const std::vector<std::string> camera{"--view", "+z", "--parallel-scale", "1.2"};
+  std::vector<std::string> by_box = camera, by_plane = camera, by_two = camera;
+  by_box.insert(by_box.end(), {"--clip-box", "-9,9,-9,0.25,-9,9"});
+  by_plane.insert(by_plane.end(), {"--clip-plane", "3,0.25,7,0,-2,0"});
+  by_two.insert(by_two.end(), {"--clip-plane", "0,0.25,0,0,-1,0", "--clip-plane=0,0,0,1,0,0"});
+  const Image box = render(by_box), plane = render(by_plane), two = render(by_two);
+  EXPECT_LT(compareImages(box, plane).largest, 1e-5);
+  EXPECT_GT(pixelsOtherThan(box, {1, 1, 1, 1}), 500u);
+  size_t left = 0, right = 0;
+  for (int y = 0; y < 96; ++y)
+    for (int x = 0; x < 96; ++x) {
+      const bool drawn = two.pixel(x, y)[1] != 1;
+      left += x < 46 && drawn;
+      right += x >= 50 && drawn;
+    }
+  EXPECT_EQ(left, 0u);
+  EXPECT_GT(right, 200u);
+}
+
 TEST_F(RenderOptions, ARangeThatMissesTheScalarIsWarnedOf) {
   render({"--range", "5,6"});
   EXPECT_NE(last_.err.find("warning: the range 5..6"), std::string::npos) << last_.err;
@@ -200,6 +220,9 @@ TEST_F(RenderOptions, ARangeThatMissesTheScalarIsWarnedOf) {
 TEST_F(RenderOptions, AnEmptyPictureSaysWhy) {
   EXPECT_EQ(pixelsOtherThan(render({"--clip-box", "5,6,5,6,5,6"}), {1, 1, 1, 1}), 0u);
   EXPECT_NE(last_.err.find("--clip-box contains none of the data"), std::string::npos) << last_.err;
+  EXPECT_EQ(pixelsOtherThan(render({"--clip-plane", "9,0,0,1,0,0"}), {1, 1, 1, 1}), 0u);
+  EXPECT_NE(last_.err.find("--clip-plane and --clip-box leave none of the data"), std::string::npos)
+      << last_.err;
   EXPECT_EQ(
       pixelsOtherThan(render({"--position", "9,0,0", "--focal-point", "9,9,0", "--parallel-scale", "1"}),
                       {1, 1, 1, 1}),
@@ -262,6 +285,12 @@ TEST_F(RenderOptions, WrongWordsAreUsageErrors) {
                {{"--scale", "1e7,1,1"}, "between 1e-06 and 1e+06"},
                {{"--clip-box", "1,0,0,1,0,1"}, "--clip-box"},
                {{"--clip-box", "0,1,0,1"}, "x0,x1,y0,y1,z0,z1"},
+               {{"--clip-plane", "0,1,0,1"}, "px,py,pz,nx,ny,nz"},
+               {{"--clip-plane", "0,0,0,0,0,0"}, "no direction"},
+               {{"--clip-plane", "0,0,0,1,0,0", "--clip-plane", "0,0,0,1,0,0", "--clip-plane", "0,0,0,1,0,0",
+                 "--clip-plane", "0,0,0,1,0,0", "--clip-plane", "0,0,0,1,0,0", "--clip-plane", "0,0,0,1,0,0",
+                 "--clip-plane", "0,0,0,1,0,0"},
+                "at most 6"},
                {{"--background", "pink"}, "#rrggbb"},
                {{"--background", "#12345g"}, "#rrggbb"},
                {{"--backend", "metal"}, "auto, osmesa, egl or cpu"},
@@ -317,7 +346,7 @@ TEST_F(RenderOptions, StatisticsTellWhatWasDone) {
   const auto json = nlohmann::json::parse(readTextFile(stats));
   for (const char* key : {"program", "version", "command", "peak_memory_bytes", "cache", "scalar", "image",
                           "backend", "threads", "memory_bytes", "lod_pixels", "classify", "scale", "clip_box",
-                          "background", "transfer_function", "time_to_first_image_s", "frames", "summary"})
+                          "clip_planes", "background", "transfer_function", "time_to_first_image_s", "frames", "summary"})
     EXPECT_TRUE(json.contains(key)) << key;
   ASSERT_EQ(json["frames"].size(), 1u);
   const auto& frame = json["frames"][0];

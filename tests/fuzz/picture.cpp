@@ -70,7 +70,7 @@ void run(std::span<const std::byte> bytes) {
                     flags & kPerspective ? Projection::kPerspective : Projection::kOrthographic);
   ProjectionSettings settings{ScreenView::of(camera, pixels, scale, kLowPass, 1e-4 * size), !(flags & kFlat)};
   if (flags & kCells) settings.borders = kWholeCellStyle;
-  if (flags & kClip) settings.clip_box = WorldBox{corner, corner + 0.5 * size};
+  if (flags & kClip) settings.clip_planes = clipPlanesOf({}, WorldBox{corner, corner + 0.5 * size});
 
   static BrickProjector projector;
   static CpuPainter painter;

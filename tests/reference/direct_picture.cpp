@@ -86,8 +86,18 @@ void toArrays(const std::vector<DirectSplat>& splats, const glm::dvec3& origin, 
 
 Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOptions& options,
                    const TransferFunction& function, const Camera& camera, ImageSize size) {
+  ProjectionSettings settings;
   std::vector<DirectSplat> splats = splatsOf(source, scalar, options);
   if (options.voxel > 0) splats = mergedIntoVoxels(splats, options);
+  if (options.cut_splats) {
+    settings.clip_planes = options.clip_planes;
+  } else {
+    std::erase_if(splats, [&](const DirectSplat& s) {
+      return std::any_of(options.clip_planes.begin(), options.clip_planes.end(), [&](const ClipPlane& plane) {
+        return glm::dot(plane.normal, s.splat.position - plane.point) < 0;
+      });
+    });
+  }
   glm::dvec3 origin = splats.front().splat.position;
   double low = splats.front().value.mean, high = low;
   for (const auto& [splat, value, border_code] : splats) {
@@ -100,7 +110,6 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
   toArrays(splats, origin, geometry, variable);
 
   const ClassificationTable table = ClassificationTable::of(function, low, high);
-  ProjectionSettings settings;
   settings.view = ScreenView::of(camera, size, glm::dvec3(1), options.low_pass_px2, options.near);
   settings.view.slope_low_pass_px2 = options.slope_low_pass_px2;
   settings.view.widest = options.widest;

@@ -3,12 +3,14 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/splats/node_splats.h"
 #include "render/camera/camera.h"
 #include "render/colour/transfer_function.h"
 #include "render/image/image.h"
+#include "render/project/clip_planes.h"
 #include "render/project/screen_view.h"
 
 namespace curvisplat {
@@ -20,6 +22,9 @@ struct DirectOptions {
   double voxel = 0;          // world units: splats are merged into voxels of this size; 0: they are not
   double spread = 12;        // as VoxelMerger
   bool variance = true;      // else merged splats forget the variance that their slope does not explain
+
+  std::vector<ClipPlane> clip_planes;
+  bool cut_splats = true;  // else splats whose centre is outside of a clip plane are left out, and no others
 
   bool per_pixel = true;
   bool hidden_slope = true;  // else classification forgets how the scalar changes along the ray

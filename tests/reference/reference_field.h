@@ -6,8 +6,10 @@
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "preprocess/scenes/scenes.h"
+#include "render/project/clip_planes.h"
 
 namespace curvisplat {
 
@@ -44,6 +46,19 @@ class SceneField : public ReferenceField {
 
  private:
   const Scene& scene_;
+};
+
+/// What clip planes leave of a field, which outlives it.
+class ClippedField : public ReferenceField {
+ public:
+  ClippedField(const ReferenceField& whole, std::vector<ClipPlane> planes)
+      : whole_(whole), planes_(std::move(planes)) {}
+  std::unique_ptr<FieldProbe> probe() const override;
+  std::pair<glm::dvec3, glm::dvec3> bounds() const override { return whole_.bounds(); }
+
+ private:
+  const ReferenceField& whole_;
+  const std::vector<ClipPlane> planes_;
 };
 
 }  // namespace curvisplat

@@ -256,7 +256,7 @@ TEST(Projection, CountsWhatItLeavesOut) {
   add({0.1, 0, 0}, 0.2, 1e-9);  // transparent
   add({0.1, 0, 0}, 0.8, 0);     // without weight
   add({5, 0, 0}, 0.8, 1e-9);    // off screen
-  add({0, 0.4, 0}, 0.8, 1e-9);  // clipped
+  add({0, 8, 0}, 0.8, 1e-9);    // clipped
   add({0, 0, 9}, 0.8, 1e-9);    // behind the eye
   const ClassificationTable table(
       [](double f) {
@@ -266,9 +266,9 @@ TEST(Projection, CountsWhatItLeavesOut) {
   Camera camera;
   camera.position = {0, 0, 2};
   camera.projection = Projection::kPerspective;
-  const WorldBox clip{{-10, -0.3, -10}, {10, 0.3, 10}};
+  const WorldBox clip{{-20, -5, -20}, {20, 5, 20}};
   BrickProjector projector;
-  projector.project({ScreenView::of(camera, kSize, glm::dvec3(1), 1.5, 1e-3), true, clip}, table,
+  projector.project({ScreenView::of(camera, kSize, glm::dvec3(1), 1.5, 1e-3), true, clipPlanesOf({}, clip)}, table,
                     glm::dvec3(-1), geometry, variable);
   EXPECT_EQ(projector.counts().read, 6u);
   EXPECT_EQ(projector.counts().drawn, 1u);

@@ -25,6 +25,7 @@ ViewState changedState() {
   state.lod_pixels = 2.5;
   state.scale = {1, 1, 50};
   state.clip_box = WorldBox{{0, -0.5, 0.25}, {1, 1, 1}};
+  state.clip_planes = {{{0, 0.5, 0}, {1, 0, -2}}, {{0.25, 0, 0}, {0, 1, 0}}};
   state.dark = true;
   state.annotations.axes = false;
   state.classification = Classification::kFlat;
@@ -44,6 +45,12 @@ TEST(ViewState, ComesBackFromItsText) {
     else
       EXPECT_EQ(value, after.at(field)) << field;
   }
+}
+
+TEST(ViewState, OfAnEarlierVersionHasNoClipPlanes) {
+  auto json = nlohmann::json::parse(toJson(changedState()));
+  json.erase("clip_planes");
+  EXPECT_TRUE(viewStateFromJson(json.dump(), "a.json", manifest()).clip_planes.empty());
 }
 
 TEST(ViewState, APresetStaysOne) {
@@ -76,6 +83,8 @@ TEST(ViewState, ErrorsNameFileAndField) {
   expectError("/camera", nullptr, "camera");
   expectError("/scale", nlohmann::json::array({1, 1, 0}), "scale");
   expectError("/clip_box/lower", nlohmann::json::array({5, 0, 0}), "clip_box.lower");
+  expectError("/clip_planes", 3, "clip_planes");
+  expectError("/clip_planes/1/normal", nlohmann::json::array({0, 0, 0}), "clip_planes[1].normal");
   expectError("/dark", "yes", "dark");
   expectError("/function", 5, "preset");
   expectError("/preset", "rainbow", "preset");
@@ -102,7 +111,8 @@ TEST(ViewState, TheCommandSaysAll) {
   const std::string command = renderCommand(changedState(), "it's.splats", {30, 20}, "f.json");
   for (const char* part :
        {"'it'\\''s.splats'", "--scalar 'u v'", "--tf f.json", "--scale 1,1,50",
-        "--clip-box 0,1,-0.5,1,0.25,1", "--background black", "--classify flat", "--lod-pixels 2.5",
+        "--clip-box 0,1,-0.5,1,0.25,1", "--clip-plane 0,0.5,0,1,0,-2",
+        "--clip-plane 0.25,0,0,0,1,0", "--background black", "--classify flat", "--lod-pixels 2.5",
         "--scalar-bar --outline", "--position 0.1,-3,0.6666666666666666"})
     EXPECT_NE(command.find(part), std::string::npos) << command << " lacks " << part;
 }

@@ -60,13 +60,14 @@ std::string whyNothingIsVisible(const RenderedScene& scene) {
         "convert again without --blank or iblank",
         manifest.blanked_nodes, manifest.nodes);
   return fmt::format(
-      "of {} splats read, {} are outside --clip-box, {} off the screen, {} transparent, and {} were drawn "
+      "of {} splats read, {} are outside --clip-box or --clip-plane, {} off the screen, {} transparent, and {} were drawn "
       "but "
       "reach no pixel; try --view iso, another --range or another --clip-box",
       s.splats_read, s.splats_clipped, s.splats_off_screen, s.splats_transparent, s.splats_drawn);
 }
 
-/// The intersection of the data's box and the clip box, scaled; false if it is empty.
+/// The intersection of the data's box and the clip box, scaled; false if nothing of it is left by the box or by
+/// a clip plane.
 bool visibleBox(const RenderedScene& scene, glm::dvec3& lower, glm::dvec3& upper) {
   lower = scene.manifest.lower;
   upper = scene.manifest.upper;
@@ -76,6 +77,11 @@ bool visibleBox(const RenderedScene& scene, glm::dvec3& lower, glm::dvec3& upper
   }
   for (int axis = 0; axis < 3; ++axis)
     if (lower[axis] > upper[axis]) return false;
+  for (const ClipPlane& plane : scene.options.clip_planes) {
+    const glm::dvec3 farthest(plane.normal.x > 0 ? upper.x : lower.x, plane.normal.y > 0 ? upper.y : lower.y,
+                              plane.normal.z > 0 ? upper.z : lower.z);
+    if (glm::dot(plane.normal, farthest - plane.point) < 0) return false;
+  }
   lower *= scene.options.scale;
   upper *= scene.options.scale;
   return true;
@@ -129,7 +135,9 @@ std::vector<std::string> whyEmpty(const RenderedScene& scene) {
 
   glm::dvec3 lower, upper;
   if (!visibleBox(scene, lower, upper)) {
-    reasons.push_back(fmt::format("--clip-box contains none of the data, which spans {} to {}",
+    reasons.push_back(fmt::format("{} none of the data, which spans {} to {}",
+                                  scene.options.clip_planes.empty() ? "--clip-box contains"
+                                                                    : "--clip-plane and --clip-box leave",
                                   text(scene.manifest.lower), text(scene.manifest.upper)));
   } else {
     const bool out_of_view = outOfView(scene, lower, upper);

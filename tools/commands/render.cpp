@@ -46,6 +46,7 @@ struct RenderArguments {
   std::string classify = "pixel", scale = "1,1,1", backend = "auto", memory = "512M";
   std::string lod_pixels = "1";
   std::optional<std::string> clip_box, frame_rate, max_splats;
+  std::vector<std::string> clip_planes;
   unsigned threads = 0;
   bool keep_going = false;
   Annotations annotations;
@@ -59,6 +60,21 @@ WorldBox parseClipBox(const std::string& text) {
       throw UsageError("--clip-box {}: the {} range is reversed (found {},{}; expected the smaller first)",
                        text, "xyz"[axis], box.lower[axis], box.upper[axis]);
   return box;
+}
+
+std::vector<ClipPlane> parseClipPlanes(const std::vector<std::string>& texts) {
+  if (texts.size() > kMaxClipPlanes)
+    throw UsageError("--clip-plane: given {} times; at most {} planes cut a picture", texts.size(),
+                     kMaxClipPlanes);
+  std::vector<ClipPlane> planes;
+  for (const std::string& text : texts) {
+    const auto n = parseNumbers("--clip-plane", text, "px,py,pz,nx,ny,nz");
+    const ClipPlane plane{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
+    if (!isUsable(plane))
+      throw UsageError("--clip-plane {}: the normal nx,ny,nz has no direction; give one that is not 0,0,0", text);
+    planes.push_back(plane);
+  }
+  return planes;
 }
 
 constexpr double kMinScale = 1e-6, kMaxScale = 1e6;
@@ -79,6 +95,7 @@ FrameOptions frameOptions(const RenderArguments& arguments) {
       throw UsageError("--scale {}: expected three numbers between {:g} and {:g}", arguments.scale, kMinScale,
                        kMaxScale);
   if (arguments.clip_box) options.clip_box = parseClipBox(*arguments.clip_box);
+  options.clip_planes = parseClipPlanes(arguments.clip_planes);
   options.background = parseBackground("--background", arguments.background);
   options.threads = arguments.threads;
   options.memory_bytes = parseMemory("--memory", arguments.memory);
@@ -316,6 +333,13 @@ void addRender(CLI::App& app) {
   command
       ->add_option("--clip-box", arguments->clip_box,
                    "Box x0,x1,y0,y1,z0,z1 outside which nothing is drawn, in coordinates before --scale")
+      ->group(what);
+  command
+      ->add_option("--clip-plane", arguments->clip_planes,
+                   "Plane px,py,pz,nx,ny,nz through the point p: nothing is drawn behind it, where the normal n "
+                   "does not point. In coordinates before --scale; repeatable, up to 6")
+      ->take_all()
+      ->allow_extra_args(false)
       ->group(what);
   command
       ->add_option("--background", arguments->background,

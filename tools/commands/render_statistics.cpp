@@ -143,6 +143,9 @@ nlohmann::json statisticsOf(const RenderReport& report) {
   if (options.clip_box)
     json["clip_box"] = {{"lower", toJson(options.clip_box->lower)},
                         {"upper", toJson(options.clip_box->upper)}};
+  json["clip_planes"] = Json::array();
+  for (const ClipPlane& plane : options.clip_planes)
+    json["clip_planes"].push_back({{"point", toJson(plane.point)}, {"normal", toJson(plane.normal)}});
   const glm::vec4& background = options.background;
   json["background"] = {background.r, background.g, background.b, background.a};
   json["transfer_function"] = toJson(report.transfer_function);

@@ -24,6 +24,15 @@ class Fields {
   }
 
   Fields object(const char* field) const { return Fields(path_, name_ + field + ".", at(field)); }
+  /// The objects of an array, of at most `most`.
+  std::vector<Fields> objects(const char* field, size_t most) const {
+    const Json& array = at(field);
+    if (!array.is_array() || array.size() > most) fail(field, fmt::format("at most {} objects", most));
+    std::vector<Fields> all;
+    for (size_t n = 0; n < array.size(); ++n)
+      all.emplace_back(path_, fmt::format("{}{}[{}].", name_, field, n), array[n]);
+    return all;
+  }
   bool has(const char* field) const { return object_.contains(field) && !object_.at(field).is_null(); }
 
   const Json& at(const char* field) const {
@@ -130,6 +139,7 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
   options.lod_pixels = lod_pixels;
   options.scale = scale;
   options.clip_box = clip_box;
+  options.clip_planes = clip_planes;
   options.background = background();
   options.memory_bytes = memory_bytes;
   return options;
@@ -171,6 +181,9 @@ std::string toJson(const ViewState& state) {
   json["clip_box"] = nullptr;
   if (state.clip_box)
     json["clip_box"] = {{"lower", jsonOf(state.clip_box->lower)}, {"upper", jsonOf(state.clip_box->upper)}};
+  json["clip_planes"] = Json::array();
+  for (const ClipPlane& plane : state.clip_planes)
+    json["clip_planes"].push_back({{"point", jsonOf(plane.point)}, {"normal", jsonOf(plane.normal)}});
   json["dark"] = state.dark;
   json["scalar_bar"] = state.annotations.scalar_bar;
   json["axes"] = state.annotations.axes;
@@ -218,6 +231,13 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
     for (int axis = 0; axis < 3; ++axis)
       if (state.clip_box->lower[axis] > state.clip_box->upper[axis]) box.fail("lower", "less than upper");
   }
+  if (fields.has("clip_planes")) {  // states of earlier versions have none
+    for (const Fields& field : fields.objects("clip_planes", kMaxClipPlanes)) {
+      const ClipPlane plane{field.point("point"), field.point("normal")};
+      if (!isUsable(plane)) field.fail("normal", "a direction");
+      state.clip_planes.push_back(plane);
+    }
+  }
   state.dark = fields.flag("dark");
   state.annotations = {fields.flag("scalar_bar"), fields.flag("axes"), fields.flag("outline")};
   return state;
@@ -255,6 +275,8 @@ std::string renderCommand(const ViewState& state, const std::filesystem::path& c
     const auto& [lower, upper] = *state.clip_box;
     add("--clip-box", fmt::format("{},{},{},{},{},{}", lower.x, upper.x, lower.y, upper.y, lower.z, upper.z));
   }
+  for (const ClipPlane& plane : state.clip_planes)
+    add("--clip-plane", numbers(plane.point) + "," + numbers(plane.normal));
   add("--background", state.dark ? "black" : "white");
   if (state.annotations.scalar_bar) command += " --scalar-bar";
   if (state.annotations.axes) command += " --axes";

@@ -25,6 +25,7 @@ struct ViewState {
   Classification classification = Classification::kPixel;
   glm::dvec3 scale{1.0};
   std::optional<WorldBox> clip_box = std::nullopt;
+  std::vector<ClipPlane> clip_planes = {};
   bool dark = false;  // background
   Annotations annotations{true, true, true};
 
