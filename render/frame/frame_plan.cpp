@@ -79,7 +79,8 @@ ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const Fr
 ProjectionSettings FramePlanner::settingsFor(const Camera& camera, const FrameOptions& options,
                                              ImageSize size) const {
   return {screenView(camera, options, size), options.classification == Classification::kPixel,
-          clipPlanesOf(options.clip_planes, options.clip_box), cache_.manifest().cells ? kWholeCellStyle : kHalfCellStyle};
+          clipPlanesOf(options.clip_planes, options.clip_box),
+          cache_.manifest().cells ? kWholeCellStyle : kHalfCellStyle};
 }
 
 Cut FramePlanner::chooseCut(const ProjectionSettings& settings, const FrameOptions& options,

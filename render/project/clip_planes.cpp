@@ -57,7 +57,7 @@ void LocalClipPlanes::sidesOf(const GeometryArrays<const float>& geometry, size_
                              n.z * geometry.z[begin + i] + plane.offset;
       const float support = geometry.border_code[begin + i] == kNoBorder ? kSupport : kSupportAtBorder;
       const float reach = support * std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z);
-      const ClipSide side = distance >= reach    ? ClipSide::kInside
+      const ClipSide side = distance >= reach   ? ClipSide::kInside
                             : distance > -reach ? ClipSide::kAcross
                                                 : ClipSide::kOutside;
       sides[i] = std::max(sides[i], side);

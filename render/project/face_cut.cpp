@@ -52,14 +52,15 @@ Remains cutAtFaces(const ScreenRows& rows, const SplatPiece& piece, const Ellips
     const float spread = kSupport * std::sqrt(by0 * by0 + by1 * by1);
     if (a + spread <= -ScreenCut::kReach) return Remains::kNothing;
     if (a - spread >= ScreenCut::kReach) continue;
-    const Taking found{a - spread, {a, by0, by1}, nq > 0, std::abs(nq) / (std::sqrt(determinant) * deviation)};
+    const Taking found{
+        a - spread, {a, by0, by1}, nq > 0, std::abs(nq) / (std::sqrt(determinant) * deviation)};
     if (count < taking.size()) {
       taking[count++] = found;
       continue;
     }
-    Taking& least = *std::max_element(taking.begin(), taking.end(), [](const Taking& one, const Taking& other) {
-      return one.nearest < other.nearest;
-    });
+    Taking& least =
+        *std::max_element(taking.begin(), taking.end(),
+                          [](const Taking& one, const Taking& other) { return one.nearest < other.nearest; });
     if (found.nearest < least.nearest) least = found;
   }
   float steepest = 0;

@@ -344,9 +344,26 @@ TEST_F(RenderOptions, StatisticsTellWhatWasDone) {
   const std::string stats = file("stats.json");
   render({"--stats", stats, "--threads", "2", "--view-angle", "25", "--scale", "1,1,2", "--memory", "64M"});
   const auto json = nlohmann::json::parse(readTextFile(stats));
-  for (const char* key : {"program", "version", "command", "peak_memory_bytes", "cache", "scalar", "image",
-                          "backend", "threads", "memory_bytes", "lod_pixels", "classify", "scale", "clip_box",
-                          "clip_planes", "background", "transfer_function", "time_to_first_image_s", "frames", "summary"})
+  for (const char* key : {"program",
+                          "version",
+                          "command",
+                          "peak_memory_bytes",
+                          "cache",
+                          "scalar",
+                          "image",
+                          "backend",
+                          "threads",
+                          "memory_bytes",
+                          "lod_pixels",
+                          "classify",
+                          "scale",
+                          "clip_box",
+                          "clip_planes",
+                          "background",
+                          "transfer_function",
+                          "time_to_first_image_s",
+                          "frames",
+                          "summary"})
     EXPECT_TRUE(json.contains(key)) << key;
   ASSERT_EQ(json["frames"].size(), 1u);
   const auto& frame = json["frames"][0];

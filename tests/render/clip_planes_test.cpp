@@ -42,8 +42,8 @@ TEST(ClipPlanes, TellSplatsApartByTheirWholeSupport) {
   const ClipPlane plane{{10, 5, 5}, {4, 0, 0}};
   const LocalClipPlanes clip({&plane, 1}, {7, 0, 0});
   const auto reach = static_cast<float>(kKernelSupport);
-  const auto sides =
-      sidesOf(clip, unitSplats({3 - reach - 0.01f, 3 - reach + 0.01f, 3, 3 + reach - 0.01f, 3 + reach + 0.01f}));
+  const auto sides = sidesOf(
+      clip, unitSplats({3 - reach - 0.01f, 3 - reach + 0.01f, 3, 3 + reach - 0.01f, 3 + reach + 0.01f}));
   EXPECT_EQ(sides, (std::vector<ClipSide>{ClipSide::kOutside, ClipSide::kAcross, ClipSide::kAcross,
                                           ClipSide::kAcross, ClipSide::kInside}));
 }
@@ -61,8 +61,8 @@ TEST(ClipPlanes, OfSeveralTheWorstSideCounts) {
   const ClipPlane planes[] = {{{0, 0, 0}, {1, 0, 0}}, {{5, 0, 0}, {-1, 0, 0}}};
   const LocalClipPlanes clip(planes, glm::dvec3(0));
   EXPECT_EQ(sidesOf(clip, unitSplats({-3, 0, 2.5f, 5, 8})),
-            (std::vector<ClipSide>{ClipSide::kOutside, ClipSide::kAcross, ClipSide::kInside, ClipSide::kAcross,
-                                   ClipSide::kOutside}));
+            (std::vector<ClipSide>{ClipSide::kOutside, ClipSide::kAcross, ClipSide::kInside,
+                                   ClipSide::kAcross, ClipSide::kOutside}));
   EXPECT_TRUE(clip.contains({1, 9, 9}));
   EXPECT_FALSE(clip.contains({-1, 0, 0}));
   EXPECT_FALSE(clip.contains({6, 0, 0}));
@@ -97,9 +97,9 @@ TEST(ClipPlanes, BecomeFacesInTheFrameOfThePiece) {
     for (int m = 0; m < 10; ++m) {
       const glm::vec3 u(2 * around(random), 2 * around(random), 2 * around(random));
       const Shape& s = piece.shape;
-      const glm::vec3 x = piece.position +
-                          glm::vec3(s.axis0 * u.x, s.axis0 * s.shear10 * u.x + s.axis1 * u.y,
-                                    s.axis0 * s.shear20 * u.x + s.axis1 * s.shear21 * u.y + s.axis2 * u.z);
+      const glm::vec3 x =
+          piece.position + glm::vec3(s.axis0 * u.x, s.axis0 * s.shear10 * u.x + s.axis1 * u.y,
+                                     s.axis0 * s.shear20 * u.x + s.axis1 * s.shear21 * u.y + s.axis2 * u.z);
       const float by_face = glm::dot(face.inward, u) + face.distance;
       if (std::abs(by_face) > 1e-4f) EXPECT_EQ(by_face > 0, clip.contains(x));
     }

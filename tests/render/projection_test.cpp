@@ -268,8 +268,8 @@ TEST(Projection, CountsWhatItLeavesOut) {
   camera.projection = Projection::kPerspective;
   const WorldBox clip{{-20, -5, -20}, {20, 5, 20}};
   BrickProjector projector;
-  projector.project({ScreenView::of(camera, kSize, glm::dvec3(1), 1.5, 1e-3), true, clipPlanesOf({}, clip)}, table,
-                    glm::dvec3(-1), geometry, variable);
+  projector.project({ScreenView::of(camera, kSize, glm::dvec3(1), 1.5, 1e-3), true, clipPlanesOf({}, clip)},
+                    table, glm::dvec3(-1), geometry, variable);
   EXPECT_EQ(projector.counts().read, 6u);
   EXPECT_EQ(projector.counts().drawn, 1u);
   EXPECT_EQ(projector.counts().transparent, 2u);

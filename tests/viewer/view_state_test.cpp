@@ -111,9 +111,9 @@ TEST(ViewState, TheCommandSaysAll) {
   const std::string command = renderCommand(changedState(), "it's.splats", {30, 20}, "f.json");
   for (const char* part :
        {"'it'\\''s.splats'", "--scalar 'u v'", "--tf f.json", "--scale 1,1,50",
-        "--clip-box 0,1,-0.5,1,0.25,1", "--clip-plane 0,0.5,0,1,0,-2",
-        "--clip-plane 0.25,0,0,0,1,0", "--background black", "--classify flat", "--lod-pixels 2.5",
-        "--scalar-bar --outline", "--position 0.1,-3,0.6666666666666666"})
+        "--clip-box 0,1,-0.5,1,0.25,1", "--clip-plane 0,0.5,0,1,0,-2", "--clip-plane 0.25,0,0,0,1,0",
+        "--background black", "--classify flat", "--lod-pixels 2.5", "--scalar-bar --outline",
+        "--position 0.1,-3,0.6666666666666666"})
     EXPECT_NE(command.find(part), std::string::npos) << command << " lacks " << part;
 }
 

@@ -60,7 +60,8 @@ std::string whyNothingIsVisible(const RenderedScene& scene) {
         "convert again without --blank or iblank",
         manifest.blanked_nodes, manifest.nodes);
   return fmt::format(
-      "of {} splats read, {} are outside --clip-box or --clip-plane, {} off the screen, {} transparent, and {} were drawn "
+      "of {} splats read, {} are outside --clip-box or --clip-plane, {} off the screen, {} transparent, and "
+      "{} were drawn "
       "but "
       "reach no pixel; try --view iso, another --range or another --clip-box",
       s.splats_read, s.splats_clipped, s.splats_off_screen, s.splats_transparent, s.splats_drawn);
@@ -135,10 +136,10 @@ std::vector<std::string> whyEmpty(const RenderedScene& scene) {
 
   glm::dvec3 lower, upper;
   if (!visibleBox(scene, lower, upper)) {
-    reasons.push_back(fmt::format("{} none of the data, which spans {} to {}",
-                                  scene.options.clip_planes.empty() ? "--clip-box contains"
-                                                                    : "--clip-plane and --clip-box leave",
-                                  text(scene.manifest.lower), text(scene.manifest.upper)));
+    reasons.push_back(fmt::format(
+        "{} none of the data, which spans {} to {}",
+        scene.options.clip_planes.empty() ? "--clip-box contains" : "--clip-plane and --clip-box leave",
+        text(scene.manifest.lower), text(scene.manifest.upper)));
   } else {
     const bool out_of_view = outOfView(scene, lower, upper);
     if (out_of_view)

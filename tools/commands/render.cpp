@@ -71,7 +71,8 @@ std::vector<ClipPlane> parseClipPlanes(const std::vector<std::string>& texts) {
     const auto n = parseNumbers("--clip-plane", text, "px,py,pz,nx,ny,nz");
     const ClipPlane plane{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
     if (!isUsable(plane))
-      throw UsageError("--clip-plane {}: the normal nx,ny,nz has no direction; give one that is not 0,0,0", text);
+      throw UsageError("--clip-plane {}: the normal nx,ny,nz has no direction; give one that is not 0,0,0",
+                       text);
     planes.push_back(plane);
   }
   return planes;
@@ -335,9 +336,10 @@ void addRender(CLI::App& app) {
                    "Box x0,x1,y0,y1,z0,z1 outside which nothing is drawn, in coordinates before --scale")
       ->group(what);
   command
-      ->add_option("--clip-plane", arguments->clip_planes,
-                   "Plane px,py,pz,nx,ny,nz through the point p: nothing is drawn behind it, where the normal n "
-                   "does not point. In coordinates before --scale; repeatable, up to 6")
+      ->add_option(
+          "--clip-plane", arguments->clip_planes,
+          "Plane px,py,pz,nx,ny,nz through the point p: nothing is drawn behind it, where the normal n "
+          "does not point. In coordinates before --scale; repeatable, up to 6")
       ->take_all()
       ->allow_extra_args(false)
       ->group(what);

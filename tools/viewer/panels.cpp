@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 
 #include "stream/base/process_usage.h"
 
@@ -65,6 +67,7 @@ PanelActions Panels::draw(ViewState& state, size_t variable, const PanelFacts& f
   if (ImGui::CollapsingHeader("View", ImGuiTreeNodeFlags_DefaultOpen)) drawView(state, actions, facts);
   if (ImGui::CollapsingHeader("Detail", ImGuiTreeNodeFlags_DefaultOpen)) drawDetail(state, actions);
   if (ImGui::CollapsingHeader("Clip box")) drawClipBox(state, actions);
+  if (ImGui::CollapsingHeader("Clip planes")) drawClipPlanes(state, actions);
   if (ImGui::CollapsingHeader("Statistics", ImGuiTreeNodeFlags_DefaultOpen)) drawStatistics(state, facts);
   if (!facts.message.empty()) ImGui::TextWrapped("%s", facts.message.c_str());
   ImGui::PopItemWidth();
@@ -141,6 +144,58 @@ void Panels::drawClipBox(ViewState& state, PanelActions& actions) {
     }
     actions.dragging |= ImGui::IsItemActive();
   }
+}
+
+/// Each plane has a direction and a place along it. A new one faces the viewer, in the middle of the data.
+void Panels::drawClipPlanes(ViewState& state, PanelActions& actions) {
+  const Manifest& manifest = cache_.manifest();
+  const glm::dvec3 middle = 0.5 * (manifest.lower + manifest.upper);
+  const glm::dvec3 half = 0.5 * (manifest.upper - manifest.lower);
+  ImGui::BeginDisabled(state.clip_planes.size() >= kMaxClipPlanes);
+  if (ImGui::Button("add a plane")) {
+    // A plane's normal in data coordinates is its normal after --scale, times the scale.
+    const glm::dvec3 view = (state.camera.focal_point - state.camera.position) * state.scale;
+    state.clip_planes.push_back({middle, glm::normalize(view)});
+    actions.changed = true;
+  }
+  ImGui::EndDisabled();
+  size_t removed = state.clip_planes.size();
+  for (size_t n = 0; n < state.clip_planes.size(); ++n) {
+    ClipPlane& plane = state.clip_planes[n];
+    ImGui::PushID(static_cast<int>(n));
+    ImGui::Separator();
+    const auto turn = [&](const char* label, const glm::dvec3& normal) {
+      if (!ImGui::Button(label)) return;
+      plane.normal = normal;
+      actions.changed = true;
+    };
+    turn("x", {1, 0, 0});
+    ImGui::SameLine();
+    turn("y", {0, 1, 0});
+    ImGui::SameLine();
+    turn("z", {0, 0, 1});
+    ImGui::SameLine();
+    turn("view", glm::normalize((state.camera.focal_point - state.camera.position) * state.scale));
+    ImGui::SameLine();
+    turn("flip", -plane.normal);
+    ImGui::SameLine();
+    if (ImGui::Button("remove")) removed = n;
+    // From the data's one end along the normal to the other.
+    const double reach = glm::dot(half, glm::abs(plane.normal));
+    const double length2 = glm::dot(plane.normal, plane.normal);
+    double place = glm::dot(plane.normal, plane.point - middle);
+    float share = reach > 0 ? static_cast<float>(0.5 + 0.5 * place / reach) : 0.5f;
+    if (ImGui::SliderFloat("place", &share, 0, 1, "%.3f")) {
+      place = reach * (2 * static_cast<double>(share) - 1);
+      plane.point = middle + (place / length2) * plane.normal;
+      actions.changed = true;
+    }
+    actions.dragging |= ImGui::IsItemActive();
+    ImGui::PopID();
+  }
+  if (removed == state.clip_planes.size()) return;
+  state.clip_planes.erase(state.clip_planes.begin() + static_cast<ptrdiff_t>(removed));
+  actions.changed = true;
 }
 
 void Panels::drawStatistics(const ViewState& state, const PanelFacts& facts) {

@@ -1,4 +1,4 @@
-// The panels beside the picture: scalar and transfer function, view, detail, clip box, statistics.
+// The panels beside the picture: scalar and transfer function, view, detail, cuts, statistics.
 #pragma once
 
 #include <string>
@@ -44,6 +44,7 @@ class Panels {
   void drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts);
   void drawDetail(ViewState& state, PanelActions& actions);
   void drawClipBox(ViewState& state, PanelActions& actions);
+  void drawClipPlanes(ViewState& state, PanelActions& actions);
   void drawStatistics(const ViewState& state, const PanelFacts& facts);
 
   const CacheReader& cache_;
