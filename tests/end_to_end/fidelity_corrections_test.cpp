@@ -107,9 +107,9 @@ TEST_F(Corrections, CutsAtClipPlanes) {
     const char* name;
     std::vector<ClipPlane> planes;
     double finest_db, merged_db;
-  } cuts[] = {{"a plane across the view", {kAcross}, 57, 47},
-              {"a plane along the view", {kAlong}, 57, 47},
-              {"two planes", {kAcross, kAlong}, 57, 47}};
+  } cuts[] = {{"a plane across the view", {kAcross}, 62, 45},
+              {"a plane along the view", {kAlong}, 49, 45},
+              {"two planes", {kAcross, kAlong}, 50, 47}};
   for (const auto& cut : cuts) {
     const ClippedField clipped(field_, cut.planes);
     DirectOptions with;
