@@ -96,8 +96,6 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
   actions.changed |= ImGui::Checkbox("outline", &state.annotations.outline);
   ImGui::SameLine();
   actions.changed |= ImGui::Checkbox("dark", &state.dark);
-  ImGui::SameLine();
-  actions.changed |= ImGui::Checkbox("light", &state.lit);
   if (ImGui::Button("save picture (p)")) actions.save_picture = true;
   ImGui::SameLine();
   if (ImGui::Button("copy command (c)")) actions.copy_command = true;
@@ -119,6 +117,8 @@ void Panels::drawDetail(ViewState& state, PanelActions& actions) {
     state.classification = per_pixel ? Classification::kPixel : Classification::kFlat;
     actions.changed = true;
   }
+  ImGui::SameLine();
+  actions.changed |= ImGui::Checkbox("light", &state.lit);
 }
 
 void Panels::drawClipBox(ViewState& state, PanelActions& actions) {
