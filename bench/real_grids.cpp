@@ -1,126 +1,130 @@
 // Fidelity of pictures of real grids. Every grid is drawn as a uniform medium and with a scalar of its own,
-// along the axes, nearly along one, and obliquely, and compared with rays marched through the trilinear map of
-// its cells. Prints a table, writes JSON on request, and leaves a sheet of pictures for each grid.
+// along the axes, nearly along them, and obliquely, and compared with rays marched through the trilinear map
+// of its cells, with one sort of all splats, and with VTK's picture. real_grids.py runs it, and VTK.
 //
 //   rms %, p98/p2   uniform medium: ratio of the optical depth to the true one, two pixels and more inside the
 //                   outline; its standard deviation over its mean, its 98th percentile over its 2nd. A perfect
 //                   picture has 0 and 1
 //   outside %       uniform medium: optical depth more than one pixel beyond the outline, of the whole
-//   inside          uniform medium: PSNR of the picture, all pixels
-//   scalar          PSNR of the grid's scalar with the "smooth" function, all pixels
+//   inside          uniform medium: PSNR two pixels and more from the outline
+//   uniform         uniform medium: PSNR of all pixels
+//   scalar          PSNR of the grid's scalar with the "smooth" function, all pixels; blank for scalars of
+//                   cells, which have no truth between their values
+//   order           the same picture: largest difference to that of one sort of all splats, of 255
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <functional>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <numbers>
+#include <optional>
 #include <regex>
 #include <utility>
 #include <vector>
 
+#include "bench/picture_sheet.h"
+#include "bench/real_grids_cases.h"
+#include "bench/vtk_job.h"
 #include "preprocess/formats/open/open_grid.h"
-#include "preprocess/scenes/scenes.h"
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "tests/reference/function_grid.h"
+#include "tests/reference/global_order.h"
 #include "tests/reference/grid_field.h"
 #include "tests/reference/known_pictures.h"
 
 namespace curvisplat {
 namespace {
 
-/// A grid to draw.
-struct Case {
-  std::string name;
-  std::function<std::unique_ptr<GridSource>()> open;
-  std::string scalar;  // empty: the uniform medium only
-};
+constexpr double kOpacity = 0.5;  // of the uniform medium, in its opacity unit
 
-struct View {
-  std::string name;
-  Camera camera;
-};
-
-/// +x, +y, +z, a little off +z, and obliquely, each with all of the box in the picture.
-std::vector<View> viewsOf(const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size) {
-  std::vector<View> views;
-  for (const char* name : {"+x", "+y", "+z"})
-    views.push_back({name, Camera::named(name, lower, upper, size, Projection::kOrthographic)});
-  const Camera along_z = views.back().camera;
-  for (const double degrees : {0.1, 1.0, 3.0}) {
-    const double angle = degrees * std::numbers::pi / 180;
-    const glm::dvec3 back = along_z.position - along_z.focal_point;
-    Camera tilted = along_z;
-    tilted.position =
-        along_z.focal_point +
-        glm::length(back) * glm::normalize(glm::dvec3(std::sin(angle), 0.6 * std::sin(angle), 1));
-    tilted.parallel_scale = tilted.parallelScaleFor(lower, upper, size);
-    views.push_back({fmt::format("+z {}", degrees), tilted});
-  }
-  views.push_back({"iso", Camera::named("iso", lower, upper, size, Projection::kOrthographic)});
-  return views;
+double opacityUnit(double extinction) {
+  return -std::log1p(-kOpacity) / extinction;
 }
 
 /// Black, to be drawn over white: a pixel then shows the transmittance.
 TransferFunction uniformMedium(double extinction, std::pair<double, double> range) {
   TransferFunctionDefinition definition;
   definition.name = definition.origin = "uniform medium";
-  constexpr double kOpacity = 0.5;
   const auto [low, high] = intervalAround(range.first, range.second);
   definition.colours = {{low, glm::dvec3(0.0)}, {high, glm::dvec3(0.0)}};
   definition.opacities = {{low, kOpacity}, {high, kOpacity}};
-  return TransferFunction(std::move(definition), nullptr, -std::log1p(-kOpacity) / extinction);
+  return TransferFunction(std::move(definition), nullptr, opacityUnit(extinction));
 }
 
 double opticalDepth(double transmittance) {
   return -std::log(std::clamp(transmittance, 1e-12, 1.0));
 }
 
-struct Ripple {
-  double rms_percent = 0, p98_over_p2 = 1, outside_percent = 0, psnr_db = 0;
+/// Where in a picture of a uniform medium the ray is how deep in the grid.
+class Outline {
+ public:
+  explicit Outline(const Image& truth) : size_(truth.size), depth_(size_.pixels()) {
+    for (size_t p = 0; p < depth_.size(); ++p) depth_[p] = opticalDepth(truth.rgba[4 * p]);
+  }
+
+  size_t at(int x, int y) const {
+    return static_cast<size_t>(y) * static_cast<size_t>(size_.width) + static_cast<size_t>(x);
+  }
+  double depth(size_t p) const { return depth_[p]; }
+  double largest() const { return *std::max_element(depth_.begin(), depth_.end()); }
+
+  /// The least and the largest depth around a pixel.
+  std::pair<double, double> around(int x, int y, int margin) const {
+    std::pair<double, double> range(std::numeric_limits<double>::infinity(), 0.0);
+    for (int v = std::max(0, y - margin); v <= std::min(size_.height - 1, y + margin); ++v)
+      for (int u = std::max(0, x - margin); u <= std::min(size_.width - 1, x + margin); ++u)
+        range = {std::min(range.first, depth_[at(u, v)]), std::max(range.second, depth_[at(u, v)])};
+    return range;
+  }
+
+ private:
+  ImageSize size_;
+  std::vector<double> depth_;
 };
+
+struct Ripple {
+  double rms_percent = 0, p98_over_p2 = 1, outside_percent = 0;
+  double psnr_db = 0, inside_psnr_db = 0;
+};
+
+double decibels(double square_sum, size_t pixels) {
+  constexpr double kMost = 99;
+  if (square_sum == 0 || pixels == 0) return kMost;
+  return std::min(kMost, -10 * std::log10(square_sum / static_cast<double>(pixels)));
+}
 
 /// Of two pictures of a uniform medium, black over white.
 Ripple rippleOf(const Image& picture, const Image& truth) {
   constexpr double kThin = 0.05;  // of the largest depth: thinner places have no ripple worth a ratio
   constexpr int kMargin = 2;
-  const ImageSize size = truth.size;
-  std::vector<double> exact(size.pixels()), drawn(size.pixels());
-  for (size_t p = 0; p < exact.size(); ++p) {
-    exact[p] = opticalDepth(truth.rgba[4 * p]);
-    drawn[p] = opticalDepth(picture.rgba[4 * p]);
-  }
-  const double largest = *std::max_element(exact.begin(), exact.end());
-  // The least and the largest of the true depth around a pixel.
-  const auto around = [&](int x, int y, int margin) {
-    std::pair<double, double> range(std::numeric_limits<double>::infinity(), 0.0);
-    for (int v = std::max(0, y - margin); v <= std::min(size.height - 1, y + margin); ++v)
-      for (int u = std::max(0, x - margin); u <= std::min(size.width - 1, x + margin); ++u) {
-        const double depth =
-            exact[static_cast<size_t>(v) * static_cast<size_t>(size.width) + static_cast<size_t>(u)];
-        range = {std::min(range.first, depth), std::max(range.second, depth)};
-      }
-    return range;
-  };
+  const Outline outline(truth);
+  const double largest = outline.largest();
   std::vector<double> ratios;
-  double outside = 0, sum = 0;
-  for (int y = 0; y < size.height; ++y)
-    for (int x = 0; x < size.width; ++x) {
-      const size_t p = static_cast<size_t>(y) * static_cast<size_t>(size.width) + static_cast<size_t>(x);
-      sum += drawn[p];
-      if (around(x, y, 1).second == 0) outside += drawn[p];
-      if (around(x, y, kMargin).first > kThin * largest) ratios.push_back(drawn[p] / exact[p]);
+  double outside = 0, sum = 0, squares = 0;
+  size_t inside = 0;
+  for (int y = 0; y < truth.size.height; ++y)
+    for (int x = 0; x < truth.size.width; ++x) {
+      const size_t p = outline.at(x, y);
+      const double drawn = opticalDepth(picture.rgba[4 * p]);
+      sum += drawn;
+      if (outline.around(x, y, 1).second == 0) outside += drawn;
+      const double least = outline.around(x, y, kMargin).first;
+      if (least > kThin * largest) ratios.push_back(drawn / outline.depth(p));
+      if (least > 0) {
+        const double off = picture.rgba[4 * p] - truth.rgba[4 * p];
+        squares += off * off;
+        ++inside;
+      }
     }
   Ripple ripple;
-  ripple.psnr_db = compareImages(picture, truth).psnr_db;
+  ripple.psnr_db = std::min(99.0, compareImages(picture, truth).psnr_db);
+  ripple.inside_psnr_db = decibels(squares, inside);
   ripple.outside_percent = sum > 0 ? 100 * outside / sum : 0.0;
   if (ratios.empty()) return ripple;
   std::sort(ratios.begin(), ratios.end());
@@ -136,214 +140,251 @@ Ripple rippleOf(const Image& picture, const Image& truth) {
   return ripple;
 }
 
-/// Pictures side by side, row by row, over white.
-class Sheet {
- public:
-  explicit Sheet(ImageSize tile) : tile_(tile) {}
-
-  void addRow(std::vector<Image> row) { rows_.push_back(std::move(row)); }
-
-  Image image() const {
-    size_t columns = 0;
-    for (const auto& row : rows_) columns = std::max(columns, row.size());
-    Image sheet({static_cast<int>(columns) * (tile_.width + kGap),
-                 static_cast<int>(rows_.size()) * (tile_.height + kGap)});
-    std::fill(sheet.rgba.begin(), sheet.rgba.end(), 1.0f);
-    for (size_t r = 0; r < rows_.size(); ++r)
-      for (size_t c = 0; c < rows_[r].size(); ++c)
-        for (int y = 0; y < tile_.height; ++y)
-          std::copy_n(rows_[r][c].pixel(0, y), 4 * tile_.width,
-                      sheet.pixel(static_cast<int>(c) * (tile_.width + kGap),
-                                  static_cast<int>(r) * (tile_.height + kGap) + y));
-    return sheet;
-  }
-
- private:
-  static constexpr int kGap = 4;
-  ImageSize tile_;
-  std::vector<std::vector<Image>> rows_;
+struct Settings {
+  std::filesystem::path folder, data;
+  std::string only = ".*", views = ".*", json;
+  int pixels = 256;
+  double lod_pixels = 0;
+  bool for_vtk = false;
 };
 
-Image differenceOf(const Image& a, const Image& b, float gain) {
-  Image out(a.size);
-  for (size_t n = 0; n < out.rgba.size(); ++n)
-    out.rgba[n] = n % 4 == 3 ? 1 : std::min(1.0f, gain * std::abs(a.rgba[n] - b.rgba[n]));
-  return out;
-}
+/// A grid with all that its pictures need.
+struct OpenGrid {
+  std::string name;
+  std::unique_ptr<GridSource> source;
+  uint32_t scalar;
+  GridField field;
+  double length;  // extinctions are per this length, in world units
+
+  explicit OpenGrid(const RealGrid& grid)
+      : name(grid.name),
+        source(grid.open()),
+        scalar(scalarsNamed(source->description(), {grid.scalar}).front()),
+        field(*source, scalar),
+        // As for the half-annulus, whose diagonal is 2.6.
+        length(glm::length(field.bounds().second - field.bounds().first) / 3) {}
+};
 
 class Measurement {
  public:
-  Measurement(std::filesystem::path folder, int pixels, double lod_pixels)
-      : folder_(std::move(folder)), size_{pixels, pixels}, lod_pixels_(lod_pixels) {
-    std::filesystem::create_directories(folder_);
+  explicit Measurement(const Settings& settings)
+      : settings_(settings), size_{settings.pixels, settings.pixels}, overview_(size_, 2) {
+    std::filesystem::create_directories(settings_.folder);
   }
 
-  void measure(const Case& grid) {
-    const std::unique_ptr<GridSource> source = grid.open();
-    const uint32_t scalar =
-        grid.scalar.empty() ? 0 : scalarsNamed(source->description(), {grid.scalar}).front();
-    const GridField field(*source, scalar);
-    const std::filesystem::path cache = folder_ / (grid.name + ".splats");
-    convertGrid(*source, cache, scalar);
-
-    const auto [lower, upper] = field.bounds();
-    const double length = glm::length(upper - lower) / 3;  // as the half-annulus, whose diagonal is 2.6
-    Sheet sheet(size_);
-    for (const View& view : viewsOf(lower, upper, size_)) {
-      std::vector<Image> row;
-      const Ripple ripple = measureUniform(field, cache, grid, view, length, row);
-      const double psnr_db = grid.scalar.empty() ? 0.0 : measureScalar(field, cache, grid, view, length, row);
-      sheet.addRow(std::move(row));
-      if (rows_.empty())
-        fmt::print("{:<18} {:<7} {:>7} {:>7} {:>9} {:>8} {:>8}\n", "grid", "view", "rms %", "p98/p2",
-                   "outside %", "inside", "scalar");
-      fmt::print("{:<18} {:<7} {:7.2f} {:7.3f} {:9.3f} {:8.1f} {:>8}\n", grid.name, view.name,
-                 ripple.rms_percent, ripple.p98_over_p2, ripple.outside_percent, ripple.psnr_db,
-                 grid.scalar.empty() ? "" : fmt::format("{:.1f}", psnr_db));
-      std::fflush(stdout);
-      nlohmann::json out = {{"grid", grid.name},
-                            {"view", view.name},
-                            {"lod_pixels", lod_pixels_},
-                            {"rms_percent", ripple.rms_percent},
-                            {"p98_over_p2", ripple.p98_over_p2},
-                            {"outside_percent", ripple.outside_percent},
-                            {"uniform_psnr_db", ripple.psnr_db}};
-      if (!grid.scalar.empty()) out["scalar_psnr_db"] = psnr_db;
-      rows_.push_back(std::move(out));
+  /// Writes the grid's cells for VTK, and the job that draws them.
+  void leaveJob(const RealGrid& named) const {
+    const OpenGrid grid(named);
+    const auto [low, high] = grid.field.range();
+    const auto [least, most] = intervalAround(low, high);
+    const auto cells = settings_.folder / fmt::format("{}_{}.vtk", grid.name, named.scalar);
+    nlohmann::json job = {{"grid", cells.string()},
+                          {"size", {size_.width, size_.height}},
+                          {"range", {low, high}},
+                          {"length", grid.length},
+                          {"uniform",
+                           {{"colours", {{least, 0, 0, 0}, {most, 0, 0, 0}}},
+                            {"opacities", {{least, kOpacity}, {most, kOpacity}}},
+                            {"opacity_unit", opacityUnit(1 / grid.length)}}}};
+    for (const NamedView& view : chosenViews(grid)) {
+      nlohmann::json pictures = {{"uniform", pathOf(grid, view, "uniform_vtk", "png").string()}};
+      if (!grid.field.ofCells()) pictures["scalar"] = pathOf(grid, view, "scalar_vtk", "png").string();
+      job["views"].push_back({{"camera", asJson(view.camera)}, {"pictures", pictures}});
     }
-    writeImage(sheet.image(), folder_ / (grid.name + "_sheet.png"));
+    if (!std::filesystem::exists(cells)) writeTetrahedra(grid.field, cells);
+    writeFileAtomically(settings_.folder / (grid.name + "_vtk.json"), job.dump(1) + "\n");
   }
 
-  nlohmann::json rows() const { return rows_; }
+  void measure(const RealGrid& named) {
+    const OpenGrid grid(named);
+    const std::filesystem::path cache = settings_.folder / (grid.name + ".splats");
+    convertGrid(*grid.source, cache, grid.scalar);
+    PictureSheet sheet(size_, 1);
+    for (const NamedView& view : chosenViews(grid)) {
+      std::vector<Image> pictures;
+      nlohmann::json row = {{"grid", grid.name}, {"view", view.name}, {"lod_pixels", settings_.lod_pixels}};
+      measureUniform(grid, cache, view, row, pictures);
+      measureScalar(grid, cache, view, row, pictures);
+      print(row);
+      sheet.addRow(labelOf(row), pictures);
+      overview_.addRow(labelOf(row), pictures);
+      rows_.push_back(std::move(row));
+    }
+    writeImage(sheet.image(), settings_.folder / fmt::format("sheet_{}.png", grid.name));
+  }
+
+  void finish() const {
+    writeImage(overview_.image(), settings_.folder / "sheet.png");
+    if (!settings_.json.empty()) writeFileAtomically(settings_.json, rows_.dump(1) + "\n");
+  }
 
  private:
+  std::vector<NamedView> chosenViews(const OpenGrid& grid) const {
+    const auto [lower, upper] = grid.field.bounds();
+    std::vector<NamedView> views = viewsOf(lower, upper, size_);
+    const std::regex wanted(settings_.views);
+    std::erase_if(views, [&](const NamedView& view) { return !std::regex_search(view.name, wanted); });
+    return views;
+  }
+
+  std::filesystem::path pathOf(const OpenGrid& grid, const NamedView& view, const char* what,
+                               const char* extension) const {
+    std::string name = fmt::format("{}_{}_{}_{}.{}", grid.name, view.name, what, size_.width, extension);
+    std::replace(name.begin(), name.end(), ' ', '_');
+    return settings_.folder / name;
+  }
+
   /// The marched picture. Marched once, and kept in the folder.
-  Image truth(const GridField& field, const std::string& name, const OpticalFunction& function,
-              const Camera& camera, double length, double agreement_db) const {
-    const auto path = folder_ / fmt::format("{}_{}.pfm", name, size_.width);
+  Image truth(const OpenGrid& grid, const NamedView& view, const char* what, const OpticalFunction& function,
+              bool is_uniform) const {
+    const auto path = pathOf(grid, view, what, "pfm");
     if (!std::filesystem::exists(path)) {
       MarchSteps steps;
-      steps.step = 0.016 * length;
-      steps.cells = 1;
-      writeImage(toImage(convergedMarch(field, function, camera, size_, steps, agreement_db)), path);
+      if (is_uniform) {  // one step from end to end is exact
+        steps.step = 1e3 * grid.length;
+        steps.cells = std::numeric_limits<double>::infinity();
+        writeImage(toImage(referenceMarch(grid.field, function, view.camera, size_, steps)), path);
+      } else {
+        constexpr double kAgreementDb = 60;
+        steps.step = 0.016 * grid.length;
+        steps.cells = 1;
+        steps.depth_tolerance = 5e-4;
+        writeImage(toImage(convergedMarch(grid.field, function, view.camera, size_, steps, kAgreementDb)),
+                   path);
+      }
     }
     return readImage(path);
   }
 
-  Image drawn(const std::filesystem::path& cache, const TransferFunction& function,
-              const Camera& camera) const {
+  /// Of the same size, or empty.
+  Image byVtk(const OpenGrid& grid, const NamedView& view, const char* what) const {
+    const auto path = pathOf(grid, view, what, "png");
+    return std::filesystem::exists(path) ? readImage(path) : Image();
+  }
+
+  FrameOptions frame() const {
     FrameOptions options = knownFrame(size_);
-    options.lod_pixels = lod_pixels_;
-    return drawCache(cache, function, camera, options);
+    options.lod_pixels = settings_.lod_pixels;
+    return options;
   }
 
-  static std::string fileName(const Case& grid, const View& view, const char* what) {
-    std::string name = fmt::format("{}_{}_{}", grid.name, view.name, what);
-    std::replace(name.begin(), name.end(), ' ', '_');
-    return name;
+  static void show(const Image& picture, const Image& exact, const Image& vtk, float gain,
+                   std::vector<Image>& pictures) {
+    const bool has_truth = exact.size.pixels() > 0;
+    pictures.push_back(picture);
+    pictures.push_back(exact);
+    pictures.push_back(vtk);
+    pictures.push_back(has_truth ? signedDifference(picture, exact, gain) : Image());
+    pictures.push_back(has_truth && vtk.size.pixels() > 0 ? signedDifference(vtk, exact, gain) : Image());
   }
 
-  Ripple measureUniform(const GridField& field, const std::filesystem::path& cache, const Case& grid,
-                        const View& view, double length, std::vector<Image>& row) const {
-    const double extinction = 1 / length;
+  void measureUniform(const OpenGrid& grid, const std::filesystem::path& cache, const NamedView& view,
+                      nlohmann::json& row, std::vector<Image>& pictures) const {
+    const double extinction = 1 / grid.length;
     const OpticalFunction medium = [extinction](double) {
       return OpticalProperties{glm::dvec3(0.0), extinction};
     };
-    Image exact = truth(field, fileName(grid, view, "uniform"), medium, view.camera, length, 60);
-    Image picture = drawn(cache, uniformMedium(extinction, field.range()), view.camera);
-    const Ripple ripple = rippleOf(picture, exact);
-    Image difference = differenceOf(picture, exact, 5);
-    row.push_back(std::move(picture));
-    row.push_back(std::move(exact));
-    row.push_back(std::move(difference));
-    return ripple;
+    const Image exact = truth(grid, view, "uniform", medium, true);
+    const Image picture =
+        drawCache(cache, uniformMedium(extinction, grid.field.range()), view.camera, frame());
+    const Image vtk = byVtk(grid, view, "uniform_vtk");
+    const Ripple ours = rippleOf(picture, exact);
+    row["rms_percent"] = ours.rms_percent;
+    row["p98_over_p2"] = ours.p98_over_p2;
+    row["outside_percent"] = ours.outside_percent;
+    row["inside_psnr_db"] = ours.inside_psnr_db;
+    row["uniform_psnr_db"] = ours.psnr_db;
+    if (vtk.size.pixels() > 0) {
+      const Ripple theirs = rippleOf(vtk, exact);
+      row["vtk_inside_psnr_db"] = theirs.inside_psnr_db;
+      row["vtk_uniform_psnr_db"] = theirs.psnr_db;
+    }
+    show(picture, exact, vtk, 5, pictures);
   }
 
-  double measureScalar(const GridField& field, const std::filesystem::path& cache, const Case& grid,
-                       const View& view, double length, std::vector<Image>& row) const {
-    const auto [low, high] = field.range();
-    const KnownFunction function = KnownFunction::of("smooth", low, high, length);
-    Image exact = truth(field, fileName(grid, view, "scalar"), function.exact, view.camera, length, 60);
-    Image picture = drawn(cache, function.table, view.camera);
-    const double psnr_db = compareImages(picture, exact).psnr_db;
-    Image difference = differenceOf(picture, exact, 10);
-    row.push_back(std::move(picture));
-    row.push_back(std::move(exact));
-    row.push_back(std::move(difference));
-    return psnr_db;
+  void measureScalar(const OpenGrid& grid, const std::filesystem::path& cache, const NamedView& view,
+                     nlohmann::json& row, std::vector<Image>& pictures) const {
+    const auto [low, high] = grid.field.range();
+    const KnownFunction function = KnownFunction::of("smooth", low, high, grid.length);
+    const Image picture = drawCache(cache, function.table, view.camera, frame());
+    const Image sorted =
+        globallySorted(CacheReader(cache), function.table, Backend::kCpu, view.camera, frame());
+    row["order_255"] = 255 * compareImages(picture, sorted).largest;
+    Image exact, vtk;
+    if (!grid.field.ofCells()) {
+      exact = truth(grid, view, "scalar", function.exact, false);
+      vtk = byVtk(grid, view, "scalar_vtk");
+      row["scalar_psnr_db"] = compareImages(picture, exact).psnr_db;
+      if (vtk.size.pixels() > 0) row["vtk_scalar_psnr_db"] = compareImages(vtk, exact).psnr_db;
+    }
+    show(picture, exact, vtk, 10, pictures);
   }
 
-  std::filesystem::path folder_;
+  static std::string number(const nlohmann::json& row, const char* key) {
+    return row.contains(key) ? fmt::format("{:.1f}", row[key].get<double>()) : std::string();
+  }
+
+  void print(const nlohmann::json& row) const {
+    if (rows_.empty())
+      fmt::print("{:<15} {:<7} {:>6} {:>7} {:>9} {:>6} {:>7} {:>6} {:>5}   {:>6} {:>7} {:>6}\n", "grid",
+                 "view", "rms %", "p98/p2", "outside %", "inside", "uniform", "scalar", "order", "VTK:", "",
+                 "");
+    fmt::print("{:<15} {:<7} {:6.2f} {:7.3f} {:9.3f} {:>6} {:>7} {:>6} {:5.2f}   {:>6} {:>7} {:>6}\n",
+               row["grid"].get<std::string>(), row["view"].get<std::string>(),
+               row["rms_percent"].get<double>(), row["p98_over_p2"].get<double>(),
+               row["outside_percent"].get<double>(), number(row, "inside_psnr_db"),
+               number(row, "uniform_psnr_db"), number(row, "scalar_psnr_db"), row["order_255"].get<double>(),
+               number(row, "vtk_inside_psnr_db"), number(row, "vtk_uniform_psnr_db"),
+               number(row, "vtk_scalar_psnr_db"));
+    std::fflush(stdout);
+  }
+
+  static std::string labelOf(const nlohmann::json& row) {
+    return fmt::format(
+        "{} {}   uniform / truth / vtk / differences x5 / the same of the scalar x10   rms {:.2f} % "
+        "p98/p2 {:.3f} outside {:.3f} %   db inside {} uniform {} scalar {}   vtk {} {} {}",
+        row["grid"].get<std::string>(), row["view"].get<std::string>(), row["rms_percent"].get<double>(),
+        row["p98_over_p2"].get<double>(), row["outside_percent"].get<double>(), number(row, "inside_psnr_db"),
+        number(row, "uniform_psnr_db"), number(row, "scalar_psnr_db"), number(row, "vtk_inside_psnr_db"),
+        number(row, "vtk_uniform_psnr_db"), number(row, "vtk_scalar_psnr_db"));
+  }
+
+  Settings settings_;
   ImageSize size_;
-  double lod_pixels_;
+  PictureSheet overview_;
   nlohmann::json rows_ = nlohmann::json::array();
 };
 
-/// n x n x n nodes of the unit cube.
-std::unique_ptr<GridSource> uniformCube(uint64_t n) {
-  return std::make_unique<FunctionGridSource>(std::vector{gridBlock(n, n, n)}, 1, [n](const GridNode& node) {
-    const double last = static_cast<double>(n - 1);
-    const glm::dvec3 at(static_cast<double>(node.i) / last, static_cast<double>(node.j) / last,
-                        static_cast<double>(node.k) / last);
-    return NodeValues{at, {static_cast<float>(at.z)}};
-  });
-}
-
-std::vector<Case> allCases() {
-  std::vector<Case> cases;
-  cases.push_back({"cube", [] { return uniformCube(101); }, "s0"});
-  const auto scene = [&](const std::string& name, SceneGridSize size) {
-    cases.push_back({name,
-                     [name, size]() -> std::unique_ptr<GridSource> {
-                       return std::make_unique<SceneGridSource>(makeScenes(name), size, 4);
-                     },
-                     "f"});
-  };
-  scene("spectral", {49, 43, 37});
-  scene("dome", {41, 25, 21});
-  scene("globe", {33, 33, 6});
-  scene("duct", {21, 17, 17});
-  const std::filesystem::path data = CURVISPLAT_SHARED_DATA;
-  const auto add = [&](const std::string& name, const std::string& grid, const std::string& solution,
-                       const std::string& scalar) {
-    if (!std::filesystem::exists(data / grid)) return;
-    cases.push_back({name,
-                     [grid = data / grid,
-                      solution = solution.empty() ? std::filesystem::path() : data / solution, scalar] {
-                       OpenGridOptions options;
-                       options.grid = grid;
-                       if (!solution.empty()) options.solutions = {solution};
-                       if (!scalar.empty()) options.scalars = {scalar};
-                       return openGrid(options);
-                     },
-                     scalar});
-  };
-  add("bluntfin", "bluntfin/bluntfinxyz.bin", "bluntfin/bluntfinq.bin", "density");
-  add("combustor", "combustor/combxyz.bin", "combustor/combq.bin", "density");
-  add("lox_post", "lox_post/postxyz.bin", "lox_post/postq.bin", "density");
-  add("nek", "nek/Combined_PressureSide_Block.xyz", "nek/pressure.fun", "4");
-  add("delta_wing", "delta_wing/delta_vertex.cgns", "", "Density");
-  add("nemo_northsea", "nemo_northsea/nemo_northsea_u.xyz", "nemo_northsea/nemo_northsea_u.fun", "1");
-  return cases;
-}
-
 int run(int argc, char** argv) {
-  CLI::App app("How true pictures of real grids are, against rays marched through their cells.");
-  std::string folder, only = ".*", json;
-  int pixels = 256;
-  double lod_pixels = 0;
-  app.add_option("FOLDER", folder, "Caches, marched pictures (kept and used again) and sheets")->required();
-  app.add_option("--only", only, "Grids to measure: a regular expression");
-  app.add_option("--pixels", pixels, "Width and height of the pictures (default 256)")
+  CLI::App app("Measure the fidelity of pictures of real grids against rays marched through their cells.");
+  Settings settings;
+  app.add_option("FOLDER", settings.folder, "Folder for caches, marched pictures (reused) and sheets")
+      ->required();
+  app.add_option("--data", settings.data, "Folder of real grids (default: only the generated ones)")
+      ->check(CLI::ExistingDirectory);
+  app.add_option("--only", settings.only, "Regular expression of the grids to measure");
+  app.add_option("--views", settings.views, "Regular expression of the views to measure");
+  app.add_option("--pixels", settings.pixels, "Width and height of the pictures (default 256)")
       ->check(CLI::Range(16, 2048));
-  app.add_option("--lod-pixels", lod_pixels, "Screen error allowed (default 0: the finest level)");
-  app.add_option("--json", json, "Write the table to this file as well");
+  app.add_option("--lod-pixels", settings.lod_pixels, "Screen error (default 0: the finest level)");
+  app.add_flag("--for-vtk", settings.for_vtk, "Only write what peers/vtk_views.py needs");
+  app.add_option("--json", settings.json, "Write the table as JSON to this file");
   CLI11_PARSE(app, argc, argv);
-  Measurement measurement(folder, pixels, lod_pixels);
-  for (const Case& grid : allCases())
-    if (std::regex_search(grid.name, std::regex(only))) measurement.measure(grid);
-  if (!json.empty()) writeFileAtomically(json, measurement.rows().dump(1) + "\n");
-  return 0;
+  Measurement measurement(settings);
+  bool any = false, all = true;
+  for (const RealGrid& grid : realGrids(settings.data)) {
+    if (!std::regex_search(grid.name, std::regex(settings.only))) continue;
+    any = true;
+    try {
+      settings.for_vtk ? measurement.leaveJob(grid) : measurement.measure(grid);
+    } catch (const Error& error) {
+      fmt::print(stderr, "curvisplat_real_grids: {}: {}\n", grid.name, error.what());
+      all = false;
+    }
+  }
+  if (!any) throw UsageError("--only {}: no such grid", settings.only);
+  if (!settings.for_vtk) measurement.finish();
+  return all ? 0 : 1;
 }
 
 }  // namespace

@@ -6,15 +6,20 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <regex>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "stream/base/progress.h"
+#include "stream/base/suggestion.h"
 #include "tools/commands/commands.h"
 #include "tools/options/shown_options.h"
 #include "tools/output/standard_streams.h"
+#include "tools/output/stop_signals.h"
+#include "tools/output/thread_failures.h"
 
 namespace curvisplat {
 namespace {
@@ -23,6 +28,56 @@ std::string namesOf(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::App* command : shownCommands(app)) names.push_back(command->get_name());
   return fmt::format("{}", fmt::join(names, ", "));
+}
+
+/// Whether a thread could not be started, by the C++ library or by TBB.
+bool isForLackOfThreads(const std::exception& error) {
+  const auto* const system = dynamic_cast<const std::system_error*>(&error);
+  return (system && system->code() == std::errc::resource_unavailable_try_again) ||
+         std::string(error.what()).starts_with("pthread_create");
+}
+
+constexpr const char* kThreadAdvice =
+    "the system has none left; raise the limits of processes and memory (ulimit -u, ulimit -v)";
+
+/// The first word that is left over, with the option that it may stand for.
+std::string leftOver(const CLI::App& app, const CLI::App* command) {
+  for (const std::string& word : app.remaining(true)) {
+    if (word == "--") continue;
+    if (!word.starts_with('-')) return fmt::format("unexpected argument '{}'", word);
+    const std::string name = word.substr(0, word.find('='));
+    std::vector<std::string> names;
+    if (command)
+      for (const CLI::Option* option : command->get_options())
+        for (const std::string& known : option->get_lnames()) names.push_back("--" + known);
+    const std::string close = closestTo(name, names);
+    return fmt::format("unknown option {}{}", name,
+                       close.empty() ? "" : fmt::format(" (did you mean {}?)", close));
+  }
+  return "unexpected argument";
+}
+
+/// What is wrong with the command line: CLI11's texts, without those that leave out the reason.
+std::string describe(const CLI::App& app, const CLI::App* command, const CLI::ParseError& error) {
+  const std::string text = error.what();
+  std::smatch found;
+  if (dynamic_cast<const CLI::ExtrasError*>(&error)) return leftOver(app, command);
+  if (error.get_name() == "RequiredError" && command) {
+    // An unknown option is the likelier mistake.
+    for (const std::string& argument : command->remaining())
+      if (argument.size() > 1 && argument[0] == '-') return leftOver(app, command);
+  }
+  if (std::regex_match(text, found, std::regex("Could not convert: (\\S+) = (.*)")) && command) {
+    const CLI::Option* const option = command->get_option_no_throw(found[1]);
+    const bool is_whole = option && option->get_type_name().starts_with("UINT");
+    return fmt::format("{} '{}': is not a {}, or is too large", found[1].str(), found[2].str(),
+                       is_whole ? "whole number from 0 on" : "number");
+  }
+  if (std::regex_match(text, found,
+                       std::regex("(\\S+): Value (.*) not in range \\[?(\\S+) (?:to|-) ([^\\]]+)\\]?")))
+    return fmt::format("{} '{}': expected a number from {} to {}", found[1].str(), found[2].str(),
+                       found[3].str(), found[4].str());
+  return text;
 }
 
 /// Returns the exit status: 0 success, 1 failure, 2 wrong usage, 128 + n stopped by signal n.
@@ -38,6 +93,7 @@ int run(int argc, char** argv) {
   addBench(app);
   addGenerate(app);
   addCompare(app);
+  addColormaps(app);
   addManual(app);
 
   try {
@@ -45,13 +101,18 @@ int run(int argc, char** argv) {
     return 0;
   } catch (const CLI::ParseError& error) {
     if (argc > 1 && argv[1][0] != '-' && app.get_subcommands().empty()) {
-      printMessage("unknown subcommand '{}'; expected one of {}", argv[1], namesOf(app));
+      std::vector<std::string> names;
+      for (const CLI::App* shown : shownCommands(app)) names.push_back(shown->get_name());
+      const std::string close = closestTo(argv[1], names);
+      printMessage("unknown subcommand '{}'{}; expected one of {}", argv[1],
+                   close.empty() ? "" : fmt::format("; did you mean {}?", close), namesOf(app));
       return 2;
     }
     if (error.get_exit_code() == 0) return app.exit(error);  // --help and --version
     const std::vector<CLI::App*> chosen = app.get_subcommands();
     const std::string command = "curvisplat" + (chosen.empty() ? "" : " " + chosen.front()->get_name());
-    printMessage("{}; see {} --help", error.what(), command);
+    printMessage("{}; see {} --help", describe(app, chosen.empty() ? nullptr : chosen.front(), error),
+                 command);
     return 2;
   } catch (const UsageError& error) {
     printMessage("{}", error.what());
@@ -66,7 +127,10 @@ int run(int argc, char** argv) {
     printMessage("{}: {}", error.path1().string(), error.code().message());
     return 1;
   } catch (const std::exception& error) {
-    if (std::ferror(stdout) == 0) printMessage("{}", error.what());  // otherwise main() reports it
+    if (isForLackOfThreads(error))
+      printMessage("cannot start a thread: {}", kThreadAdvice);
+    else if (std::ferror(stdout) == 0)
+      printMessage("{}", error.what());  // otherwise main() reports it
     return 1;
   }
 }
@@ -75,7 +139,9 @@ int run(int argc, char** argv) {
 }  // namespace curvisplat
 
 int main(int argc, char** argv) {
+  curvisplat::endLoadingOfLibraries();
   curvisplat::openStandardStreams();
+  curvisplat::ignoreFileSizeSignal();
   const int status = curvisplat::run(argc, argv);
   const bool printed = curvisplat::finishStandardOutput();
   return status == 0 && !printed ? 1 : status;

@@ -27,7 +27,7 @@ packages=(
   # SIMD for drawing on the processor
   libhwy-dev
   # tests and benchmarks
-  libgtest-dev libbenchmark-dev python3 python3-numpy python3-xxhash python3-zstandard man-db
+  libgtest-dev libbenchmark-dev python3 man-db
   # window tests: a virtual display, simulated input, screenshots
   xvfb xdotool x11-apps libgl1-mesa-dri
   "$@"

@@ -47,7 +47,7 @@ void checkBlocks(const GridDescription& grid, const CacheReader& cache) {
     const BlockInfo& expected = blocks[n];
     if (found.ni != expected.ni || found.nj != expected.nj || found.nk != expected.nk)
       throw Error("{}: block {} of its grid has {}x{}x{} nodes, and of this one {}x{}x{}: it is another",
-                  cache.path().string(), n, expected.ni, expected.nj, expected.nk, found.ni, found.nj,
+                  cache.path().string(), n + 1, expected.ni, expected.nj, expected.nk, found.ni, found.nj,
                   found.nk);
   }
 }
@@ -101,9 +101,10 @@ class Addition {
     checkBlocks(source.description(), cache_);
     checkCentring();
     checkNames(report_.scalars, cache_);
-    checkDiskSpace(diskNeedsOfAdding(manifest().splats, options.scalars.size(),
-                                     minValueRecordBytes(options.scalars.size())),
-                   options.cache, temporaryFolder(options));
+    if (options.check_disk_space)
+      checkDiskSpace(diskNeedsOfAdding(manifest().splats, options.scalars.size(),
+                                       minValueRecordBytes(options.scalars.size())),
+                     options.cache, temporaryFolder(options));
   }
 
   AddScalarReport run() {
@@ -152,8 +153,9 @@ class Addition {
           survey_.blanked.by_grid);
     if (missing > 0)
       throw Error(
-          "{}: {} of the {} that it draws have no value of {} ({} not finite, {} the blank value), and "
-          "a splat cannot be without; convert again with all scalars",
+          "{}: {} of the {} that it draws have no value of {} ({} not finite in single precision, {} with "
+          "the "
+          "blank value), and every splat needs one; convert again with all scalars",
           cache_.path().string(), missing, manifest().cells ? "cells" : "nodes", joined(report_.scalars),
           survey_.blanked.not_finite, survey_.blanked.by_value);
     checkRanges(survey_, grid_.description(), options_.scalars);

@@ -21,6 +21,7 @@ struct AddScalarOptions {
   std::optional<double> blank_value;       // a drawn node must not have it
   uint64_t memory_bytes = 0;               // 0: defaultMemory()
   unsigned threads = 0;                    // 0: as many as the machine has
+  bool check_disk_space = true;            // before the work
   std::filesystem::path temporary_folder;  // empty: the folder of the cache
 
   /// Smaller buckets than memory would allow, and fewer of them in a file: for tests.

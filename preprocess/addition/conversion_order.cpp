@@ -21,7 +21,7 @@ uint64_t NodeNumbers::firstOf(const NodeRun& run) const {
                       run.k < blocks_[run.block].nk;
   if (!inside)
     throw Error("{} nodes from block {}, {} {} {} are not in the grid; the cache is damaged: convert again",
-                run.count, run.block, run.i, run.j, run.k);
+                run.count, run.block + uint64_t{1}, run.i, run.j, run.k);
   const BlockInfo& block = blocks_[run.block];
   return first_nodes_[run.block] + (run.k * block.nj + run.j) * block.ni + run.i;
 }
@@ -32,7 +32,7 @@ std::string NodeNumbers::nameOf(uint64_t node) const {
   const BlockInfo& block = blocks_[number];
   const uint64_t in_block = node - first_nodes_[number];
   return fmt::format("node {} {} {} of block {}", in_block % block.ni, in_block / block.ni % block.nj,
-                     in_block / block.ni / block.nj, number);
+                     in_block / block.ni / block.nj, number + 1);
 }
 
 ConversionOrder::ConversionOrder(const CacheReader& cache)

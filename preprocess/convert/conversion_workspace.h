@@ -1,14 +1,13 @@
 // The folders that a conversion works in, and what it finds in them of one that was interrupted.
 //
 //    NAME.splats.partial/    beside the output, locked: the cache as it grows, and
-//      journal               what is converted, where the scratch folder is, and the splats once all are
-//      there bricks.log            the bricks that have been appended (CacheWriter)
+//      journal               what is converted, where the scratch folder is, and the splats once all are there
+//      bricks.log            the bricks that have been appended (CacheWriter)
 //    NAME.splats.tmp.<...>/  in the temporary folder: splats.bin, and what buckets are divided into
 //
-//    begun --noteSplats()--> splats on disk --> bricks appended, one by one --CacheWriter::finish()--> in
-//    place
-//      ^                          |  ^                    |
-//      +------- lost by the disk -+  +----- goes on ------+
+//    begun --noteSplats()--> splats on disk --> bricks appended --CacheWriter::finish()--> in place
+//      ^                          |  ^             | one by one
+//      +------- lost by the disk -+  +-- goes on --+
 //
 // A process may die anywhere: what it leaves is checked by whoever goes on from it. Worth going on from is
 // what has all splats, or some bricks. Anything less is removed and made again.

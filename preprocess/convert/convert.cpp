@@ -19,6 +19,8 @@
 #include "preprocess/convert/scatter.h"
 #include "preprocess/convert/scattered_splats.h"
 #include "preprocess/convert/splat_record.h"
+#include "preprocess/grid/node_reader.h"
+#include "preprocess/grid/slabs.h"
 #include "preprocess/splats/abutting_faces.h"
 #include "preprocess/splats/seams.h"
 #include "preprocess/survey/block_overlap.h"
@@ -195,7 +197,7 @@ class Conversion {
     else if (reader_.centring() == Centring::kCell)
       needs.temporary_bytes = std::max(needs.temporary_bytes, needsOfFaces().disk_bytes);
     needs.cache_bytes -= std::min(needs.cache_bytes, workspace_.bytesInPartial());
-    checkDiskSpace(needs, options_.output, temporaryFolder(options_));
+    if (options_.check_disk_space) checkDiskSpace(needs, options_.output, temporaryFolder(options_));
   }
 
   AbuttingFaces::Needs needsOfFaces() const {
@@ -299,6 +301,9 @@ ConvertReport runOrLeave(Conversion& conversion, const ConvertOptions& options) 
 
 ConvertReport convert(const GridSource& source, const ConvertOptions& options, Progress& progress) {
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
+  const bool cells = NodeReader(source, options.scalars, options.blank_value).centring() == Centring::kCell;
+  plan.requireSlabs(
+      leastSlabBytes(source.description().blocks, options.scalars.size(), cells ? kCellHalo : kNodeHalo));
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
 
   std::vector<ConversionFact> facts = factsOf(source.description(), options.scalars, options.blank_value);

@@ -1,4 +1,4 @@
-// Conversion: a grid of any size becomes a splat cache, in bounded memory. Design section 5.
+// Conversion: a grid of any size becomes a splat cache, in bounded memory. DESIGN.md, "Conversion".
 #pragma once
 
 #include <cstdint>
@@ -15,6 +15,7 @@ namespace curvisplat {
 
 struct ConvertOptions {
   std::filesystem::path output;            // NAME.splats, without a slash behind it
+  bool check_disk_space = true;            // before the work
   bool overwrite = false;                  // what stands there goes, once the new cache is whole
   bool resume = false;                     // go on from an interrupted conversion, if there is one
   std::vector<uint32_t> scalars;           // positions in the source's description; the cache's variables

@@ -19,7 +19,7 @@ constexpr uint64_t kMiB = uint64_t{1} << 20;
 // back.
 constexpr uint64_t kProgramBytes = 64 * kMiB;
 constexpr uint64_t kAllocatorShare = 16;
-constexpr uint64_t kSeamShare = 8;  // of the rest
+constexpr uint64_t kSeamShare = 8, kSlabShare = 8;  // of the rest
 // Buckets are built from at least so many splats: some bricks at a time for each thread to work on.
 constexpr uint64_t kMinBucketSplats = 4 * kMaxBrickSplats;
 constexpr uint64_t kMinChunkBytes = kMiB / 8, kMaxChunkBytes = kMiB;
@@ -34,6 +34,12 @@ uint64_t brickScratchBytes(size_t variables) {
 /// A splat of a bucket: its record, its place in two orders, and what is encoded of it.
 uint64_t bucketBytesPerSplat(size_t variables) {
   return regularRecordBytes(variables) + 2 * sizeof(uint32_t) + 12 + 10 * variables;
+}
+
+/// The cap that leaves `bytes` to be shared out.
+uint64_t capFor(uint64_t bytes) {
+  const uint64_t exact = bytes + kProgramBytes;
+  return exact + exact / (kAllocatorShare - 1) + kAllocatorShare;
 }
 
 }  // namespace
@@ -57,13 +63,13 @@ uint64_t defaultMemory() {
 
 MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads) {
   if (cap_bytes < leastMemory(variables))
-    throw Error("--memory: conversion of {} scalars takes at least {} MiB; {} MiB were given", variables,
-                leastMemory(variables) / kMiB, cap_bytes / kMiB);
+    throw Error("--memory: conversion of {} scalars takes at least {} MiB; {:.4g} MiB were given", variables,
+                leastMemory(variables) / kMiB, static_cast<double>(cap_bytes) / static_cast<double>(kMiB));
   const uint64_t bytes = cap_bytes - cap_bytes / kAllocatorShare - kProgramBytes;
 
   MemoryPlan plan;
   plan.cap_bytes = cap_bytes;
-  plan.slab_bytes = std::min(bytes / 8, 256 * kMiB);
+  plan.slab_bytes = std::min(bytes / kSlabShare, 256 * kMiB);
   plan.counting_bytes = bytes / 8;
   plan.seam_bytes = bytes / kSeamShare;
 
@@ -89,8 +95,14 @@ MemoryPlan MemoryPlan::ofOptions(uint64_t cap_bytes, size_t variables, unsigned 
 }
 
 uint64_t MemoryPlan::capForSeams(uint64_t seam_bytes) {
-  const uint64_t exact = seam_bytes * kSeamShare + kProgramBytes;
-  return exact + exact / (kAllocatorShare - 1) + kAllocatorShare;
+  return capFor(seam_bytes * kSeamShare);
+}
+
+void MemoryPlan::requireSlabs(uint64_t bytes) {
+  if (capFor(bytes * kSlabShare) > cap_bytes)
+    throw Error("--memory: the grid's rows along i are long and need at least {} MiB; {} MiB were given",
+                (capFor(bytes * kSlabShare) >> 20) + 1, cap_bytes >> 20);
+  slab_bytes = std::max(slab_bytes, bytes);
 }
 
 void MemoryPlan::limitBuckets(uint64_t splats, size_t variables) {

@@ -33,6 +33,9 @@ struct MemoryPlan {
   /// The cap of which seams get so much.
   static uint64_t capForSeams(uint64_t seam_bytes);
 
+  /// Makes slabs at least so large. Throws Error that names a sufficient cap if the cap is too small for that.
+  void requireSlabs(uint64_t bytes);
+
   /// Makes buckets smaller than they could be.
   void limitBuckets(uint64_t splats, size_t variables);
   /// A bucket's write buffer, where a file has so many buckets.

@@ -41,15 +41,18 @@ std::optional<Disk> diskOf(const std::filesystem::path& folder) {
   return Disk{status.st_dev, uint64_t{disk.f_bavail} * disk.f_frsize};
 }
 
-std::string gigabytes(uint64_t bytes) {
-  return fmt::format("{:.1f} GiB", static_cast<double>(bytes) / static_cast<double>(uint64_t{1} << 30));
+/// In MiB or GiB, so that numbers which differ are printed differently.
+std::string sizeText(uint64_t bytes) {
+  const double mebibytes = static_cast<double>(bytes) / static_cast<double>(1 << 20);
+  return mebibytes < 10'000 ? fmt::format("{:.2f} MiB", mebibytes)
+                            : fmt::format("{:.2f} GiB", mebibytes / 1024);
 }
 
 void checkRoom(const std::filesystem::path& folder, const Disk& disk, uint64_t bytes, const char* what,
                const char* hint) {
   if (disk.free_bytes < bytes)
-    throw Error("{}: {} need about {}, and {} are free; {}", folder.string(), what, gigabytes(bytes),
-                gigabytes(disk.free_bytes), hint);
+    throw Error("{}: {} need about {}, and {} are free; {}, or try regardless with --no-preflight",
+                folder.string(), what, sizeText(bytes), sizeText(disk.free_bytes), hint);
 }
 
 uint64_t withMargin(uint64_t temporary) {
@@ -97,12 +100,12 @@ void checkDiskSpace(const DiskNeeds& needs, const std::filesystem::path& output,
   if (!cache || !temporary) return;  // a file system that does not tell is no reason to refuse
   if (cache->device == temporary->device) {
     checkRoom(folder, *cache, needs.cache_bytes + needs.temporary_bytes, "the cache and temporary files",
-              "make room, or name a folder on another disk with --tmp");
+              "make room, name a folder on another disk with --tmp");
     return;
   }
   checkRoom(folder, *cache, needs.cache_bytes, "the cache's files", "make room");
   checkRoom(temporary_folder, *temporary, needs.temporary_bytes, "temporary files",
-            "make room, or name another folder with --tmp");
+            "make room, name another folder with --tmp");
 }
 
 }  // namespace curvisplat

@@ -63,8 +63,8 @@ void checkExtent(const GridSurvey& survey, const NodeReader& reader) {
   const std::string file = description.files.empty() ? description.format : description.files.front();
   if (survey.nodes == survey.blanked.total())
     throw Error(
-        "{}: every one of the {} {} is blanked ({} by the grid, {} by value, {} not finite): there is "
-        "nothing to draw{}",
+        "{}: every one of the {} {} is blanked ({} by the grid, {} by value, {} not finite in single "
+        "precision): there is nothing to draw{}",
         file, survey.nodes, reader.centring() == Centring::kCell ? "cells" : "nodes", survey.blanked.by_grid,
         survey.blanked.by_value, survey.blanked.not_finite,
         survey.blanked.by_grid > 0 && !description.blanking.empty() ? "; " + description.blanking : "");

@@ -27,7 +27,19 @@ Extent extentWithin(const GridBlock& block, uint64_t window_rows, uint64_t margi
   return {j - std::min(j - 1, margin), k - std::min(k - 1, margin)};
 }
 
+/// The rows of the smallest window that is not cut any further.
+uint64_t leastRows(const GridBlock& block, Halo halo) {
+  const uint64_t side = halo.before + 1 + halo.after;
+  return std::min(side * side, block.nj * block.nk);
+}
+
 }  // namespace
+
+uint64_t leastSlabBytes(const std::vector<GridBlock>& blocks, size_t scalars, Halo halo) {
+  uint64_t nodes = 0;
+  for (const GridBlock& block : blocks) nodes = std::max(nodes, leastRows(block, halo) * block.ni);
+  return nodes * slabBytesPerNode(scalars);
+}
 
 std::vector<Slab> cutIntoSlabs(const std::vector<GridBlock>& blocks, uint64_t window_nodes, Halo halo) {
   const uint64_t margin = halo.before + halo.after;
@@ -36,10 +48,9 @@ std::vector<Slab> cutIntoSlabs(const std::vector<GridBlock>& blocks, uint64_t wi
   for (uint32_t number = 0; number < blocks.size(); ++number) {
     const GridBlock& block = blocks[number];
     const uint64_t rows = window_nodes / std::max<uint64_t>(block.ni, 1);
-    const uint64_t least_rows = (margin + 1) * (margin + 1);
-    if (rows < std::min(least_rows, block.nj * block.nk))
+    if (rows < leastRows(block, halo))
       throw Error("{}: {} rows of {} nodes along i do not fit in memory; increase --memory", block.name,
-                  least_rows, block.ni);
+                  leastRows(block, halo), block.ni);
     const Extent extent = extentWithin(block, rows, margin);
     for (uint64_t k = 0; k < block.nk; k += extent.k) {
       for (uint64_t j = 0; j < block.nj; j += extent.j) {

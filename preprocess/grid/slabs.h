@@ -43,6 +43,9 @@ inline uint64_t slabBytesPerNode(size_t scalars) {
 /// that few nodes are read twice. Throws Error if a row and its neighbours do not fit.
 std::vector<Slab> cutIntoSlabs(const std::vector<GridBlock>& blocks, uint64_t window_nodes, Halo halo);
 
+/// Size of the largest window that cutIntoSlabs() cannot divide: a row and its neighbours.
+uint64_t leastSlabBytes(const std::vector<GridBlock>& blocks, size_t scalars, Halo halo);
+
 /// Cuts `box` into boxes of about `nodes` nodes, one for each task.
 std::vector<NodeBox> cutForTasks(const GridBlock& block, const NodeBox& box, uint64_t nodes);
 

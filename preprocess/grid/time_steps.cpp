@@ -12,8 +12,9 @@ uint32_t chosenTimeStep(const std::string& file, std::span<const double> times,
                         std::optional<uint32_t> asked) {
   const size_t steps = std::max<size_t>(1, times.size());
   if (asked && *asked >= steps)
-    throw Error("{}: has {}; --time-step {} is out of range (steps count from 0)", file,
-                steps == 1 ? "one time step" : fmt::format("{} time steps", steps), *asked);
+    throw Error("{}: has {}; --time-step {} is out of range; {}", file,
+                steps == 1 ? "one time step" : fmt::format("{} time steps", steps), *asked,
+                steps == 1 ? "leave it out" : fmt::format("expected 0 to {}", steps - 1));
   return asked.value_or(0);
 }
 

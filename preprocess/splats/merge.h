@@ -1,4 +1,4 @@
-// Moment matching: several splats become one that stands for all of them. Design section 3, "Merging".
+// Moment matching: several splats become one that stands for all of them. DESIGN.md, "Merging".
 //
 // Sums are kept about the first splat added, so that a cluster far from the origin loses no digits. They
 // depend, in their last bits, on the order of the calls. A cluster of any size takes 216 bytes and 80 a

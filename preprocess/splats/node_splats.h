@@ -1,4 +1,4 @@
-// Nodes to splats: design section 3. Each node that is there gives one splat, the piece of space around it.
+// Nodes to splats: DESIGN.md, "Splats". Each node that is there gives one splat, the piece of space around it.
 //
 // A node's cell reaches half way to its neighbours, and the splat sits in the cell's middle. On an even grid
 // that is the node; where spacing changes quickly (spectral elements: a factor of 1.6 from cell to cell)

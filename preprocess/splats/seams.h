@@ -1,5 +1,5 @@
 // Coincident face nodes of abutting blocks, or of a periodic axis, become one splat: two halves give back the
-// whole cell. Design section 3.
+// whole cell. DESIGN.md, "Splats".
 #pragma once
 
 #include <cstdint>

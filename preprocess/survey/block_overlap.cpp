@@ -8,14 +8,17 @@
 #include <array>
 #include <cmath>
 #include <glm/common.hpp>
+#include <iterator>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <utility>
 
 #include "preprocess/grid/hexahedron.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
+#include "preprocess/survey/box_tree.h"
 #include "stream/base/check.h"
 
 namespace curvisplat {
@@ -23,32 +26,13 @@ namespace {
 
 constexpr Halo kCorners{0, 1};
 constexpr double kPoints = 100'000;  // approximate number of points inside all blocks; more at their faces
-constexpr size_t kMaxBlocks = 20'000;
+constexpr size_t kMaxBlocks = 100'000;
 constexpr uint64_t kBinsAlongAxis = 64;
 // A smaller share of the smaller block is attributed to rounding, or to curved faces that two blocks
 // approximate by different chords.
 constexpr double kNegligibleShare = 2e-3;
 constexpr size_t kPairsNamed = 4;
-
-struct Box {
-  glm::dvec3 lower{std::numeric_limits<double>::infinity()};
-  glm::dvec3 upper{-std::numeric_limits<double>::infinity()};
-
-  void add(const glm::dvec3& point) {
-    lower = glm::min(lower, point);
-    upper = glm::max(upper, point);
-  }
-  bool meets(const Box& other) const {
-    for (int axis = 0; axis < 3; ++axis)
-      if (!(lower[axis] < other.upper[axis] && other.lower[axis] < upper[axis])) return false;
-    return true;
-  }
-  bool holds(const glm::dvec3& point) const {
-    for (int axis = 0; axis < 3; ++axis)
-      if (!(lower[axis] <= point[axis] && point[axis] <= upper[axis])) return false;
-    return true;
-  }
-};
+constexpr uint8_t kMaxHolders = 16;  // of a point: other blocks that are found to hold it
 
 /// A sample point of a block, and the volume that it represents.
 struct BlockPoint {
@@ -137,27 +121,28 @@ bool holds(const std::array<glm::dvec3, 8>& corner, const glm::dvec3& point) {
   return std::abs(u.x) < 1 && std::abs(u.y) < 1 && std::abs(u.z) < 1;
 }
 
-/// Points sorted into the cells of a uniform lattice.
+/// Some of `points`, given by number, sorted into the cells of a uniform lattice. Borrows the points.
 class Bins {
  public:
-  explicit Bins(std::vector<BlockPoint> points) : points_(std::move(points)) {
-    for (const BlockPoint& point : points_) box_.add(point.position);
+  Bins(const std::vector<BlockPoint>& points, const std::vector<uint32_t>& numbers) {
+    for (const uint32_t n : numbers) box_.add(points[n].position);
     for (int axis = 0; axis < 3; ++axis) {
       const double extent = box_.upper[axis] - box_.lower[axis];
       scale_[axis] = extent > 0 ? static_cast<double>(kBinsAlongAxis) / extent : 0.0;
     }
     first_.assign(kBinsAlongAxis * kBinsAlongAxis * kBinsAlongAxis + 1, 0);
-    for (const BlockPoint& point : points_) ++first_[binOf(point.position) + 1];
+    for (const uint32_t n : numbers) ++first_[binOf(points[n].position) + 1];
     for (size_t bin = 1; bin < first_.size(); ++bin) first_[bin] += first_[bin - 1];
     std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
-    sorted_.resize(points_.size());
-    for (uint32_t n = 0; n < points_.size(); ++n) sorted_[next[binOf(points_[n].position)]++] = n;
+    sorted_.resize(numbers.size());
+    for (const uint32_t n : numbers) sorted_[next[binOf(points[n].position)]++] = n;
   }
 
-  const std::vector<BlockPoint>& points() const { return points_; }
+  /// Numbers of the points, by bin.
+  const std::vector<uint32_t>& numbers() const { return sorted_; }
 
   template <typename Each>
-  void forEachIn(const Box& box, const Each& each) const {
+  void forEachIn(const BoundingBox& box, const Each& each) const {
     if (!box_.meets(box)) return;
     const auto low = place(box.lower), high = place(box.upper);
     for (uint64_t z = low[2]; z <= high[2]; ++z)
@@ -181,8 +166,7 @@ class Bins {
     return (at[2] * kBinsAlongAxis + at[1]) * kBinsAlongAxis + at[0];
   }
 
-  std::vector<BlockPoint> points_;
-  Box box_;
+  BoundingBox box_;
   glm::dvec3 scale_{0.0};
   std::vector<uint32_t> first_, sorted_;
 };
@@ -209,7 +193,7 @@ std::array<glm::dvec3, 8> cornersIn(const LoadedSlab& loaded, size_t at, size_t 
 }
 
 struct BlockMeasure {
-  Box box;
+  BoundingBox box;
   double volume = 0;
 };
 
@@ -262,35 +246,95 @@ std::vector<BlockPoint> pickPoints(const NodeReader& reader, uint64_t slab_bytes
   return points;
 }
 
+/// Which points (by number) other blocks contain, as the blocks come one after another. A point that lies in
+/// kMaxHolders blocks is located no further: otherwise a set that names one file a thousand times would take
+/// the square of that.
+class Holders {
+ public:
+  explicit Holders(const std::vector<BlockPoint>& points)
+      : points_(points), counts_(points.size(), 0), bins_(points, allOf(points)) {}
+
+  const Bins& bins() const { return bins_; }
+  bool isWanted(uint32_t point) const { return counts_[point] < kMaxHolders; }
+  bool areAllFound() const { return bins_.numbers().empty(); }
+
+  /// Adds points that a part of `block` contains.
+  void add(uint32_t block, const std::vector<uint32_t>& points) {
+    block_ = block;
+    in_block_.insert(in_block_.end(), points.begin(), points.end());
+  }
+  /// To be called after each block.
+  void finishBlock() {
+    // Two cells may both contain a point of their common face.
+    std::sort(in_block_.begin(), in_block_.end());
+    in_block_.erase(std::unique(in_block_.begin(), in_block_.end()), in_block_.end());
+    for (const uint32_t point : in_block_) {
+      inside_.push_back({point, block_});
+      if (++counts_[point] == kMaxHolders) ++finished_;
+    }
+    in_block_.clear();
+    if (2 * finished_ <= bins_.numbers().size()) return;
+    std::vector<uint32_t> wanted;
+    std::copy_if(bins_.numbers().begin(), bins_.numbers().end(), std::back_inserter(wanted),
+                 [this](uint32_t point) { return isWanted(point); });
+    bins_ = Bins(points_, wanted);
+    finished_ = 0;
+  }
+
+  /// (point, block), sorted.
+  std::vector<std::pair<uint32_t, uint32_t>> take() {
+    finishBlock();
+    std::sort(inside_.begin(), inside_.end());
+    return std::move(inside_);
+  }
+
+ private:
+  static std::vector<uint32_t> allOf(const std::vector<BlockPoint>& points) {
+    std::vector<uint32_t> numbers(points.size());
+    std::iota(numbers.begin(), numbers.end(), 0u);
+    return numbers;
+  }
+
+  const std::vector<BlockPoint>& points_;
+  std::vector<uint8_t> counts_;  // [point]
+  Bins bins_;                    // the points still to be located, and few others
+  uint32_t block_ = 0;
+  std::vector<uint32_t> in_block_;
+  size_t finished_ = 0;  // of the points in bins_
+  std::vector<std::pair<uint32_t, uint32_t>> inside_;
+};
+
 /// The second pass: pairs (point, other block that contains it), sorted.
 std::vector<std::pair<uint32_t, uint32_t>> findInside(const NodeReader& reader, uint64_t slab_bytes,
-                                                      const Progress& progress, const Bins& bins) {
+                                                      const Progress& progress,
+                                                      const std::vector<BlockPoint>& points) {
   const std::vector<GridBlock>& blocks = reader.source().description().blocks;
-  std::vector<std::pair<uint32_t, uint32_t>> inside;
+  Holders holders(points);
+  uint32_t block = 0;
   SlabStream slabs(reader, slab_bytes, kCorners);
   while (const LoadedSlab* loaded = slabs.next()) {
     progress.throwIfStopped();
     const uint32_t number = loaded->slab.block;
+    if (number != std::exchange(block, number)) holders.finishBlock();
+    if (holders.areAllFound()) break;
+    const Bins& bins = holders.bins();
     tbb::enumerable_thread_specific<std::vector<uint32_t>> found;
     forEachCell(
         blocks[number], *loaded, [](uint64_t, uint64_t) { return true; },
         [&](size_t at, size_t row, size_t plane, uint64_t, uint64_t, uint64_t) {
           const std::array<glm::dvec3, 8> corner = cornersIn(*loaded, at, row, plane);
-          Box box;
+          BoundingBox box;
           for (const glm::dvec3& node : corner) box.add(node);
           bins.forEachIn(box, [&](uint32_t n) {
-            const BlockPoint& point = bins.points()[n];
-            if (point.block != number && box.holds(point.position) && holds(corner, point.position))
+            const BlockPoint& point = points[n];
+            if (point.block != number && holders.isWanted(n) && box.holds(point.position) &&
+                holds(corner, point.position))
               found.local().push_back(n);
           });
         });
-    for (const auto& of_thread : found)
-      for (const uint32_t point : of_thread) inside.push_back({point, number});
+    for (const auto& of_thread : found) holders.add(number, of_thread);
   }
-  // Two cells may both contain a point of their common face.
-  std::sort(inside.begin(), inside.end());
-  inside.erase(std::unique(inside.begin(), inside.end()), inside.end());
-  return inside;
+  return holders.take();
 }
 
 }  // namespace
@@ -305,18 +349,18 @@ std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_b
   std::vector<BlockPoint> points = pickPoints(reader, slab_bytes, progress, measures);
 
   // Points outside all other blocks' bounding boxes need no search.
+  std::vector<BoundingBox> boxes;
+  for (const BlockMeasure& measure : measures) boxes.push_back(measure.box);
+  const BoxTree tree(boxes);
   std::erase_if(points, [&](const BlockPoint& point) {
     progress.throwIfStopped();
-    for (uint32_t b = 0; b < blocks; ++b)
-      if (b != point.block && measures[b].box.holds(point.position)) return false;
-    return true;
+    return !tree.anotherHolds(point.position, point.block);
   });
   if (points.empty()) return overlaps;
-  const Bins bins(std::move(points));
 
   std::map<std::pair<uint32_t, uint32_t>, double> shared;  // (block of points, block of cells) -> volume
-  for (const auto& [point, block] : findInside(reader, slab_bytes, progress, bins))
-    shared[{bins.points()[point].block, block}] += bins.points()[point].volume;
+  for (const auto& [point, block] : findInside(reader, slab_bytes, progress, points))
+    shared[{points[point].block, block}] += points[point].volume;
   // The points of either block give an estimate for the pair; the larger one is used.
   std::map<std::pair<uint32_t, uint32_t>, double> of_pairs;
   for (const auto& [pair, volume] : shared) {

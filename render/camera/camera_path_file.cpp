@@ -101,7 +101,7 @@ CameraPath CameraPath::fromFile(const std::filesystem::path& path) {
   try {
     file = Json::parse(text);
   } catch (const Json::exception& error) {
-    throw Error("{}: expected a camera path in JSON: {}", name, error.what());
+    throw Error("{}: expected a camera path in JSON, found {}", name, jsonFault(text, error));
   }
   const auto list = file.is_object() ? file.find("key_frames") : file.end();
   if (!file.is_object() || list == file.end())

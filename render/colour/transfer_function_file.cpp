@@ -173,7 +173,8 @@ Json parse(const std::string& text, const std::filesystem::path& path) {
   try {
     return Json::parse(text);
   } catch (const Json::exception& error) {
-    throw Error("{}: expected a ParaView colour-map preset in JSON: {}", path.string(), error.what());
+    throw Error("{}: expected a ParaView colour-map preset in JSON, found {}", path.string(),
+                jsonFault(text, error));
   }
 }
 

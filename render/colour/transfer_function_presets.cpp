@@ -1,10 +1,20 @@
-// The built-in transfer functions. The colours of viridis, inferno and plasma are matplotlib's (CC0), those
+// The built-in transfer functions; most are in published_maps.cpp. The colours of viridis, inferno and plasma are matplotlib's (CC0), those
 // of cool-warm are Moreland's, as in ParaView.
-#include <array>
-#include <cstdint>
+#include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "render/colour/published_maps.h"
 #include "render/colour/transfer_function.h"
 #include "stream/base/error.h"
+#include "stream/base/suggestion.h"
 
 namespace curvisplat {
 namespace {
@@ -38,6 +48,11 @@ std::vector<ColourPoint> fromTable(const MatplotlibTable& table) {
   return points;
 }
 
+// Diverging data is about both ends, so the middle is transparent.
+const std::vector<OpacityPoint> kDivergingOpacities{{0, 0.4},      {0.125, 0.2}, {0.25, 0.08},
+                                                    {0.375, 0.02}, {0.5, 0},     {0.625, 0.02},
+                                                    {0.75, 0.08},  {0.875, 0.2}, {1, 0.4}};
+
 struct Preset {
   const char* name;
   ColourSpace space;
@@ -50,22 +65,52 @@ const std::vector<Preset>& presets() {
       {"viridis", ColourSpace::kRgb, fromTable(kViridis), defaultOpacityRamp(0, 1)},
       {"inferno", ColourSpace::kRgb, fromTable(kInferno), defaultOpacityRamp(0, 1)},
       {"plasma", ColourSpace::kRgb, fromTable(kPlasma), defaultOpacityRamp(0, 1)},
-      // Diverging data is about both ends, so the middle is transparent.
       {"cool-warm",
        ColourSpace::kDiverging,
        {{0, fromHex(0x3b4cc0)}, {0.5, glm::dvec3(0.865)}, {1, fromHex(0xb40426)}},
-       {{0, 0.4},
-        {0.125, 0.2},
-        {0.25, 0.08},
-        {0.375, 0.02},
-        {0.5, 0},
-        {0.625, 0.02},
-        {0.75, 0.08},
-        {0.875, 0.2},
-        {1, 0.4}}},
+       kDivergingOpacities},
       {"grey", ColourSpace::kRgb, {{0, glm::dvec3(0)}, {1, glm::dvec3(1)}}, defaultOpacityRamp(0, 1)},
   };
   return all;
+}
+
+bool sameLetters(std::string_view a, std::string_view b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) {
+    return std::tolower(static_cast<unsigned char>(x)) == std::tolower(static_cast<unsigned char>(y));
+  });
+}
+
+std::optional<TransferFunctionDefinition> findPreset(std::string_view name) {
+  TransferFunctionDefinition definition;
+  const auto named = [&](std::string_view found) {
+    definition.name = found;
+    definition.origin = fmt::format("preset '{}'", found);
+  };
+  for (const Preset& preset : presets()) {
+    if (!sameLetters(preset.name, name)) continue;
+    named(preset.name);
+    definition.colour_space = preset.space;
+    definition.colours = preset.colours;
+    definition.opacities = preset.opacities;
+    return definition;
+  }
+  for (const PublishedMap& map : publishedMaps()) {
+    if (!sameLetters(map.name, name)) continue;
+    named(map.name);
+    definition.colour_space = map.space;
+    for (const PublishedMap::Point& point : map.points)
+      definition.colours.push_back({point.x, {point.red, point.green, point.blue}});
+    definition.opacities =
+        map.category == MapCategory::kDiverging ? kDivergingOpacities : defaultOpacityRamp(0, 1);
+    return definition;
+  }
+  return std::nullopt;
+}
+
+/// Turns the colours round; the opacities stay.
+void reverse(TransferFunctionDefinition& definition) {
+  std::reverse(definition.colours.begin(), definition.colours.end());
+  for (ColourPoint& point : definition.colours) point.x = 1 - point.x;
 }
 
 }  // namespace
@@ -79,25 +124,39 @@ std::vector<OpacityPoint> defaultOpacityRamp(double low, double high) {
   return points;
 }
 
+std::span<const PublishedMap> builtInMaps() {
+  static const std::vector<PublishedMap> all = [] {
+    std::vector<PublishedMap> maps{{"viridis", "matplotlib", MapCategory::kSequential, true},
+                                   {"inferno", "matplotlib", MapCategory::kSequential, true},
+                                   {"plasma", "matplotlib", MapCategory::kSequential, true},
+                                   {"cool-warm", "ParaView", MapCategory::kDiverging, true},
+                                   {"grey", "-", MapCategory::kSequential, true}};
+    maps.insert(maps.end(), publishedMaps().begin(), publishedMaps().end());
+    return maps;
+  }();
+  return all;
+}
+
 TransferFunctionDefinition presetDefinition(std::string_view name) {
-  for (const Preset& preset : presets()) {
-    if (preset.name != name) continue;
-    TransferFunctionDefinition definition;
-    definition.name = preset.name;
-    definition.origin = fmt::format("preset '{}'", preset.name);
-    definition.colour_space = preset.space;
-    definition.colours = preset.colours;
-    definition.opacities = preset.opacities;
-    return definition;
-  }
+  if (const auto definition = findPreset(name)) return *definition;
+  if (name.ends_with("_r"))
+    if (auto definition = findPreset(name.substr(0, name.size() - 2))) {
+      reverse(*definition);
+      definition->name = name;
+      return *definition;
+    }
+  std::vector<std::string> names;
+  for (const PublishedMap& map : builtInMaps()) names.emplace_back(map.name);
+  const std::string close = closestTo(name, names);
   throw UsageError(
-      "unknown transfer function '{}'; expected a preset ({}) or a file whose name ends in .json", name,
-      presetNames());
+      "unknown transfer function '{}'{}; expected a colour map such as viridis or cool-warm (curvisplat "
+      "colormaps lists them) or a file whose name ends in .json",
+      name, close.empty() ? "" : fmt::format(" (did you mean {}?)", close));
 }
 
 std::string presetNames() {
   std::string names;
-  for (const Preset& preset : presets()) names += (names.empty() ? "" : ", ") + std::string(preset.name);
+  for (const PublishedMap& map : builtInMaps()) names += (names.empty() ? "" : ", ") + std::string(map.name);
   return names;
 }
 

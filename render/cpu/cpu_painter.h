@@ -1,5 +1,5 @@
 // Draws screen splats on the processor's cores: batches of splats, sorted into the tiles that they touch;
-// every tile painted by one thread, in vectors (tile.h). Design section 7.
+// every tile painted by one thread, in vectors (tile.h). DESIGN.md, "Painting".
 //
 // Nearest first, each under what is there; what can hardly be seen any more is left out, by less than 1/4096
 // of any channel (tile.h). That is the only way it works, since it costs less even where nothing is hidden:

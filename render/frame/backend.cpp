@@ -40,7 +40,7 @@ class GlBackend final : public PaintingBackend {
   std::unique_ptr<GlPainter> painter_;  // made, used and destroyed on the GL thread
 };
 
-/// Paints on the caller's thread, and on TBB's.
+/// Paints on the caller's thread and on TBB's threads.
 class CpuBackend final : public PaintingBackend {
  public:
   void run(const Job& job) override { job(painter_); }
@@ -56,7 +56,7 @@ class CpuBackend final : public PaintingBackend {
   const std::string name_ = CpuPainter::name();
 };
 
-/// EGL if a graphics card draws through it; else null, and why.
+/// EGL if it draws on a graphics card. Otherwise returns null and sets `why_not`.
 std::unique_ptr<PaintingBackend> makeCardBackend(std::string& why_not) {
   try {
     if (!eglMayHaveCard()) {

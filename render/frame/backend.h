@@ -1,4 +1,4 @@
-// The ways there are to draw, and the thread that each is to be used on.
+// The backends: each is a painter together with the thread and the context that it needs.
 #pragma once
 
 #include <functional>
@@ -12,47 +12,48 @@
 namespace curvisplat {
 
 enum class Backend {
-  kAutomatic,  // OpenGL where a graphics card draws, else the processor
+  kAutomatic,  // OpenGL if a graphics card draws, otherwise the processor
   kOsmesa,     // OpenGL in software
-  kEgl,        // OpenGL of a graphics card, or of Mesa's software where there is none
+  kEgl,        // OpenGL on a graphics card, or Mesa's software renderer if there is none
   kCpu
 };
 
-/// A painter, and where it may be used.
+/// A painter and the thread on which it may be used.
 class PaintingBackend {
  public:
   virtual ~PaintingBackend() = default;
 
   using Job = std::function<void(Painter&)>;
-  /// Runs `job` on the painter's thread and waits for its end. Throws what it throws. One caller at a time.
+  /// Runs `job` on the painter's thread and waits until it ends. Rethrows what `job` throws. One caller at a
+  /// time.
   virtual void run(const Job& job) = 0;
-  /// The painter's.
+  /// The order in which the painter needs its splats.
   virtual DrawingOrder order() const = 0;
-  /// For people: "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
+  /// The name shown to users: "OSMesa 22.3.6, llvmpipe (LLVM 15.0.6, 256 bits), OpenGL 4.5"
   virtual const std::string& name() const = 0;
-  /// Whether the processor draws, by itself or below OpenGL.
+  /// Whether the processor draws, either directly or through a software OpenGL.
   virtual bool isSoftware() const = 0;
-  /// Memory for so many splats, to be drawn from without copying them where the painter can. It takes the
-  /// place of what was given before.
+  /// Memory for `count` splats. The painter draws from it without a copy if it can. Each call replaces the
+  /// memory that the call before returned.
   virtual std::span<ScreenSplat> splatMemory(size_t count);
-  /// Beside the result, for a frame of this size.
+  /// Memory in bytes that a frame of this size takes in addition to the resulting image.
   virtual uint64_t bytes(ImageSize size, const PaintResources& resources) const = 0;
 
  private:
   std::unique_ptr<ScreenSplat[]> splats_;
 };
 
-/// Throws Error if that cannot be had: which library was tried, and what it said.
+/// Throws Error if the backend is not available; the message names the library that was tried and its error.
 std::unique_ptr<PaintingBackend> makeBackend(Backend backend);
 
-/// One way to draw, as found on this machine.
+/// The result of trying one backend on this machine.
 struct BackendReport {
-  std::string word;  // of --backend
+  std::string word;  // the value of --backend that selects it
   bool works = false;
   std::string found;  // its name, or why it does not work
 };
 
-/// Every backend but automatic, tried, and what automatic takes and why.
+/// The result of trying every backend, and which of them kAutomatic chooses and why.
 struct SystemReport {
   std::vector<BackendReport> backends;
   std::string automatic;  // "cpu: no graphics card draws here"

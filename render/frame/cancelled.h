@@ -1,11 +1,11 @@
-// The end of a frame that was given up.
+// The exception that ends a cancelled frame.
 #pragma once
 
 #include <stdexcept>
 
 namespace curvisplat {
 
-/// What render() throws when cancel() was called.
+/// Thrown by FrameRenderer's drawing functions after a call of cancel().
 class Cancelled : public std::runtime_error {
  public:
   Cancelled() : std::runtime_error("the frame was cancelled") {}

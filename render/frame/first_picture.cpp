@@ -12,13 +12,13 @@ namespace {
 constexpr double kPixelsToDetail = 2;
 constexpr double kMaxReduction = 8;
 
-/// Where a row or column of the whole image lies between two of the reduced one.
+/// The two rows or columns of the reduced image between which one of the whole image lies.
 struct Between {
   int first, second;
   float part;  // of the second
 };
 
-/// Both images have their middle in common; `scale` is reduced pixels to a whole one.
+/// The images' centres coincide; `scale` is the number of reduced pixels per pixel of the whole image.
 std::vector<Between> positions(int whole, int reduced, double scale) {
   std::vector<Between> found;
   for (int n = 0; n < whole; ++n) {
@@ -34,7 +34,7 @@ std::vector<Between> positions(int whole, int reduced, double scale) {
 ReducedSize::ReducedSize(ImageSize size, double detail_px) : whole_(size), reduced_(size) {
   const double reduction = std::clamp(detail_px / kPixelsToDetail, 1.0, kMaxReduction);
   if (reduction < 1.5) return;
-  // The camera fits its view to the height; the width is what it then takes to show all of it.
+  // The camera fits its view to the height. The width follows from it, so that nothing at the sides is lost.
   reduced_.height = std::max(1, static_cast<int>(std::lround(size.height / reduction)));
   const double scale = static_cast<double>(reduced_.height) / size.height;
   reduced_.width = static_cast<int>(std::ceil(size.width * scale));

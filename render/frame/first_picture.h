@@ -1,8 +1,8 @@
-// The first picture of a progressive frame: so little of the cache, at so few pixels, that it is there within
-// a fraction of a second whatever the size of the cache and of the image, drawn in software too.
+// The first picture of a progressive frame. It uses so few splats and pixels that it appears within a
+// fraction of a second, whatever the size of the cache and of the image, also if it is drawn in software.
 //
-// A coarse level of depth n voxels covers each pixel about 10 n times, which takes longer than all else; but
-// it has no detail finer than its voxels. It is drawn with two pixels a voxel and enlarged.
+// A coarse level that is n voxels deep covers each pixel about 10 n times, which takes longer than everything
+// else. But it has no detail finer than its voxels: it is drawn with two pixels per voxel and then enlarged.
 #pragma once
 
 #include "render/camera/camera.h"
@@ -11,25 +11,25 @@
 
 namespace curvisplat {
 
-/// What a picture may cost that is to be had quickly; the coarsest bricks are drawn whatever they cost.
+/// Limits for a picture that must appear quickly. The coarsest bricks are drawn even if they exceed them.
 struct QuickLimits {
   uint64_t max_splats = CutOptions::kNoLimit;
-  uint64_t max_bytes = CutOptions::kNoLimit;  // to be read
-  double detail_px = 0;                       // the finest detail that is needed
+  uint64_t max_bytes = CutOptions::kNoLimit;  // bytes to read
+  double detail_px = 0;                       // size of the finest detail that is needed, in pixels
 };
 
-/// A hundredth of a second of a disk, a twentieth of a second of drawing in software.
+/// About 0.01 s of reading from a disk and 0.05 s of drawing in software.
 inline constexpr QuickLimits kFirstPicture{100'000, 4 << 20, 0};
 
-/// An image with fewer pixels than `size` that shows what a camera shows in one of `size`.
+/// The size of a reduced image that shows everything that a camera shows in an image of the whole size.
 class ReducedSize {
  public:
-  /// By how much may be reduced what has no detail finer than `detail_px`: from 1 to 8 times.
+  /// Reduces `size` as far as a picture without detail finer than `detail_px` allows: 1 to 8 times.
   ReducedSize(ImageSize size, double detail_px);
 
   bool isWhole() const { return reduced_.height == whole_.height; }
   ImageSize size() const { return reduced_; }
-  /// A picture of size() as one of the whole size: linear between its pixels.
+  /// Enlarges a picture of size() to the whole size, with linear interpolation between its pixels.
   Image enlarge(const Image& picture) const;
 
  private:

@@ -91,7 +91,7 @@ void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options) 
   try {
     state_->pipeline.prefetch(state_->planner.plan(camera, options, state_->pipeline.order()), options);
   } catch (const Error&) {
-    // render() will say it.
+    // render() will report it.
   }
 }
 

@@ -11,8 +11,8 @@
 namespace curvisplat {
 namespace {
 
-// A worker's memory: what reading keeps on its thread (a brick's bytes and the decoder's scratch), a brick
-// decoded (16 numbers a splat), the projector's splats and depths, keys, two sorters, the stack.
+// A worker's memory: what reading keeps on its thread (a brick's bytes and the decoder's scratch memory), a
+// decoded brick (16 numbers per splat), the projector's splats and depths, keys, two sorters, the stack.
 constexpr uint64_t kReadingBytes = 12 << 20;
 constexpr uint64_t kWorkerBytes = kReadingBytes + uint64_t{kMaxBrickSplats} * 16 * sizeof(float) +
                                   BrickProjector::kMaxSplats * (sizeof(ScreenSplat) + sizeof(float)) +
@@ -20,11 +20,11 @@ constexpr uint64_t kWorkerBytes = kReadingBytes + uint64_t{kMaxBrickSplats} * 16
                                   SweepBuffer::kMaxBatch * 2 * sizeof(DepthItem) + (1 << 20);
 constexpr uint64_t kMinRingBytes = 32768 * sizeof(ScreenSplat);
 constexpr uint64_t kMinSweepBytes = SweepBuffer::bytes(73728);
-// More does not make a frame faster: they only bridge bricks that take unequally long.
+// Larger buffers do not make a frame faster: they only even out bricks that take different times.
 constexpr uint64_t kMaxRingBytes = 16 << 20;
 constexpr uint64_t kMaxPagerBytes = 32 << 20;
-// Shares of the image, the painter and the index are whole sixteenths of the memory where there is enough:
-// then a picture of another size finds the cache as the one before has left it.
+// The image, the painter and the index together get whole sixteenths of the memory if there is enough: a
+// picture of a slightly different size then needs no new pools, and the cache keeps its bricks.
 constexpr uint64_t kParts = 16;
 
 }  // namespace
@@ -36,8 +36,10 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
   const uint64_t least = exact + pools + kWorkerBytes;
   if (memory_bytes < least)
     throw UsageError(
-        "{} MiB of memory are too little for {}x{} pixels of this cache; give at least {} MiB with --memory",
-        memory_bytes >> 20, fixed.size.width, fixed.size.height, (least >> 20) + 1);
+        "{:.4g} MiB of memory are too little for {}x{} pixels of this cache; give at least {} MiB with "
+        "--memory",
+        static_cast<double>(memory_bytes) / (1 << 20), fixed.size.width, fixed.size.height,
+        (least >> 20) + 1);
   const uint64_t part = memory_bytes / kParts;
   const uint64_t rounded = (exact + part - 1) / part * part;
   const unsigned wanted = threads ? threads : std::max(1u, std::thread::hardware_concurrency());

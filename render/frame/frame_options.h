@@ -1,4 +1,4 @@
-// What a frame is to look like, and what it may take.
+// How a frame looks, and which resources it may use.
 #pragma once
 
 #include <cstdint>
@@ -14,25 +14,25 @@
 
 namespace curvisplat {
 
-enum class Classification { kPixel, kFlat };  // flat: one colour and extinction a splat, as in the paper
+enum class Classification { kPixel, kFlat };  // flat: one colour and extinction per splat, as in the paper
 
 struct FrameOptions {
   ImageSize size;
   Classification classification = Classification::kPixel;
   double lod_pixels = 1;               // screen-space error allowed; 0 is the finest level
-  std::optional<uint64_t> max_splats;  // read at most these, from the levels that make the best of them
-  glm::dvec3 scale{1.0};               // stretches the data: D S Dᵀ, V det D, about the world's origin
-  std::optional<WorldBox> clip_box;    // nothing is drawn outside
-  std::vector<ClipPlane> clip_planes;  // nor on their outer sides
-  std::optional<Light> light;          // none: colours are those of the transfer function
+  std::optional<uint64_t> max_splats;  // splat limit; the largest screen error is refined first
+  glm::dvec3 scale{1.0};               // stretches the data about the world's origin: D S Dᵀ, V det D
+  std::optional<WorldBox> clip_box;    // nothing outside it is drawn
+  std::vector<ClipPlane> clip_planes;  // nothing on their outer sides is drawn
+  std::optional<Light> light;          // none: unlit, the colours of the transfer function
   glm::vec4 background{1, 1, 1, 1};    // premultiplied
-  double low_pass_px2 = kLowPass;      // added to S2's diagonal
-  unsigned threads = 0;                // workers; 0: one a core
+  double low_pass_px2 = kLowPass;      // added to the diagonal of S2, pixels squared
+  unsigned threads = 0;                // workers; 0: one per core
   uint64_t memory_bytes = 512 << 20;
-  uint64_t output_bytes = 0;  // of memory_bytes: left for what is done with the image
+  uint64_t output_bytes = 0;  // part of memory_bytes that is reserved for the use of the finished image
   bool keep_going = false;    // draw damaged bricks from an ancestor, and report them
   PagerOptions::Way read_by = PagerOptions::Way::kAutomatic;
-  bool direct_reads = true;  // past the page cache, where the file system can
+  bool direct_reads = true;  // bypass the page cache if the file system can
 };
 
 }  // namespace curvisplat

@@ -21,7 +21,8 @@ PaintResources resourcesOf(const FrameOptions& options) {
   return {.threads = options.threads};
 }
 
-/// However a frame ends: the ring's memory is the next one's, then.
+/// Waits for the painter's draws when a frame ends, however it ends: the next frame uses the same ring
+/// memory.
 class DrawsFinished {
  public:
   explicit DrawsFinished(Painter& painter) : painter_(painter) {}
@@ -29,7 +30,7 @@ class DrawsFinished {
     try {
       painter_.finishDraws();
     } catch (const Error&) {
-      // The next begin() meets it again.
+      // A painter that has failed reports it again at the next begin().
     }
   }
   DrawsFinished(const DrawsFinished&) = delete;
@@ -41,7 +42,7 @@ class DrawsFinished {
 
 }  // namespace
 
-/// What frames share, sized from the budget.
+/// The memory and threads that frames share, sized from the budget.
 struct FramePipeline::Pools {
   Pools(const CacheReader& cache, size_t variable, const FrameBudget& budget_, const PagerOptions& pager_,
         std::span<ScreenSplat> splats)
@@ -101,14 +102,14 @@ void FramePipeline::makePools(const FrameOptions& options) {
   pools_ = std::move(fresh);
 }
 
-// Memory comes and goes outside of the lock, so that whoever cancels need not wait for it.
+// Memory is allocated and freed without holding the lock, so that cancel() need not wait for it.
 void FramePipeline::dropPools() {
-  std::unique_ptr<Pools> old;  // goes after the lock
+  std::unique_ptr<Pools> old;  // freed after the lock is released
   const std::lock_guard lock(mutex_);
   old.swap(pools_);
 }
 
-/// False if there is none left.
+/// Starts the stages on the next slab. False if no slab is left.
 bool FramePipeline::beginSlab(const FramePlan& plan, const FrameOptions& options) {
   const std::lock_guard lock(mutex_);
   if (phase_ == Phase::kCancelled) throw Cancelled();
@@ -116,7 +117,7 @@ bool FramePipeline::beginSlab(const FramePlan& plan, const FrameOptions& options
   pools_->ring.resume();
   std::vector<BrickPart> parts;
   for (const uint32_t number : pools_->sweep.parts()) parts.push_back(plan.parts[number].part);
-  // Back to front, nothing ever is hidden; and see FrameWorkers::prepare().
+  // Nothing is hidden when drawing back to front. With keep_going, see FrameWorkers::prepare().
   const bool may_hide = order() == DrawingOrder::kFrontToBack && !options.keep_going;
   pools_->source.start(parts, [this, may_hide, &plan](uint32_t brick) {
     return (may_hide && hidden_.hides(brick)) ||
@@ -151,7 +152,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
     } catch (...) {
       // The first failure is the one to report.
     }
-    dropPools();  // a reading thread that has failed is of no use to the next frame
+    dropPools();  // a reading thread that has failed cannot serve the next frame
     throw;
   }
   {

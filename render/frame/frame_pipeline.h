@@ -5,11 +5,11 @@
 //                                   | v
 //                                 SweepBuffer
 //
-// A frame is one sweep along the depth, or several slabs of it where the budget cannot hold a layer of the
-// cut: source and workers begin anew with each, the painter draws on.
+// A frame is one sweep along the depth, or several slabs of it if the budget cannot hold a layer of the cut.
+// The source and the workers start again with each slab; the painter continues.
 //
-// All memory is in pools that are sized from the budget when the first frame needs them, and made anew only
-// for a budget that shares out otherwise. Between frames the workers can fill the cache of bricks.
+// All memory is in pools, which are allocated when the first frame needs them and sized from the budget. They
+// are replaced only if the budget's shares change. Between frames the workers can fill the cache of bricks.
 //
 //   idle --Running made--> running --cancel()--> cancelled: the stages are stopped, draw() throws
 //    ^                        |                      |
@@ -31,15 +31,16 @@
 
 namespace curvisplat {
 
-/// One caller at a time, but for cancel().
+/// The stages and pools of one variable of one cache. One caller at a time, except for cancel().
 class FramePipeline {
  public:
-  /// Draws what `planner` plans for that variable of the cache; both outlive it. Throws Error if there is no
-  /// such backend to be had.
+  /// Draws what `planner` plans for that variable of the cache; both must outlive the pipeline. Throws Error
+  /// if the backend is not available.
   FramePipeline(const CacheReader& cache, size_t variable, const FramePlanner& planner, Backend backend);
   ~FramePipeline();
 
-  /// While there is one, cancel() is heard. Ends a prefetch.
+  /// Marks a frame as running: cancel() has an effect only while a Running exists. Its constructor ends a
+  /// prefetch.
   class Running {
    public:
     explicit Running(FramePipeline& pipeline);
@@ -51,18 +52,19 @@ class FramePipeline {
     FramePipeline& pipeline_;
   };
 
-  /// Fetches, prepares and draws. Memory is shared out for a picture of options.size, which may be larger
-  /// than the plan's. Adds to `statistics`. Throws as FrameRenderer::render() does. Within a Running.
+  /// Fetches, prepares and draws. Memory is divided for a picture of options.size, which may be larger than
+  /// the plan's. Adds to `statistics`. Throws as FrameRenderer::render() does. Call it while a Running
+  /// exists.
   Image draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
              Progress* progress);
-  /// From now on draw() throws Cancelled, until there is another Running; nothing where there is none.
-  /// Any thread.
+  /// Makes draw() throw Cancelled until the next Running is made. Does nothing if no Running exists. Any
+  /// thread.
   void cancel();
 
-  /// Begins to fetch for such a frame, in the background. Throws UsageError for too little memory.
+  /// Begins to fetch the plan's bricks in the background. Throws UsageError if there is too little memory.
   void prefetch(const FramePlan& plan, const FrameOptions& options);
 
-  /// In which it wants the cut.
+  /// The order in which plans must list their parts.
   DrawingOrder order() const { return backend_->order(); }
   const PaintingBackend& backend() const { return *backend_; }
 
@@ -83,7 +85,7 @@ class FramePipeline {
   HiddenBricks hidden_;
 
   enum class Phase { kIdle, kRunning, kCancelled };
-  std::mutex mutex_;  // guards the two below; cancel() comes from another thread
+  std::mutex mutex_;  // guards the two members below, since cancel() comes from another thread
   Phase phase_ = Phase::kIdle;
   std::unique_ptr<Pools> pools_;
 };

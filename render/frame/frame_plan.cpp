@@ -12,10 +12,10 @@
 namespace curvisplat {
 namespace {
 
-// The perspective near plane's distance, in diagonals of the data. What is nearer would fill the image many
-// times over, cut into very many pieces.
+// The distance of the perspective near plane, in diagonals of the data. Nearer splats would fill the image
+// many times over and be cut into very many pieces.
 constexpr double kNearInDiagonals = 1e-4;
-// What the cut and the source note of a brick.
+// Memory that the cut and the source take for their notes about one brick.
 constexpr uint64_t kFrameBytesABrick = 160;
 
 ClassificationTable tableFor(const CacheReader& cache, size_t variable,
@@ -24,7 +24,8 @@ ClassificationTable tableFor(const CacheReader& cache, size_t variable,
   return ClassificationTable::of(transfer_function, info.min, info.max);
 }
 
-/// Whether no scalar that a pixel of such a brick can have has extinction.
+/// Returns a test of a brick's value bounds: whether every scalar that its pixels can have is without
+/// extinction.
 TransparentBounds transparentIn(const ClassificationTable& table, const ProjectionSettings& settings) {
   const double reach = settings.per_pixel ? largestReach(settings.view.low_pass_px2) : 1;
   return [&table, reach](const ValueBounds& values) {

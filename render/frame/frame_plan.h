@@ -1,5 +1,5 @@
-// The stage "plan" of a frame: which parts of which bricks the view needs, in which order they are swept, and
-// how their splats come to the screen. Pure; it looks at the octree and at no payload.
+// The stage "plan" of a frame: which parts of which bricks the view needs, the order in which they are swept,
+// and how their splats are projected. Pure; it reads the octree only, and no bricks.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@
 
 namespace curvisplat {
 
-/// How a frame of such a cache, of `size` pixels, comes to the screen. Throws UsageError as
+/// The projection for a frame of `size` pixels of a cache with this manifest. Throws UsageError as
 /// ScreenView::of() does.
 ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const FrameOptions& options,
                         ImageSize size);
@@ -30,39 +30,39 @@ struct FramePlan {
   std::vector<SweptPart> parts;  // of the cut, in the sweep's order
 };
 
-/// A part of the cut as the sweep has it.
+/// A part of the cut with its rank and its range of depth keys, as the sweep needs it.
 SweptPart sweptPart(const BrickPart& part, const Brick& brick, const DepthKeys& keys);
 
-/// Of a picture that is to be had quickly.
+/// The plan of a picture that must appear quickly.
 struct QuickPlan {
   FramePlan plan;
   ReducedSize size;
 
-  /// Whether there is nothing to refine.
+  /// Whether the picture is the final one: no brick is left to refine, and it has all pixels.
   bool isFinal() const { return plan.cut.complete && size.isWhole(); }
 };
 
-/// Plans frames of one variable of one cache, which outlives it. Any number of threads may plan.
+/// Plans frames of one variable of one cache, which must outlive it. Any number of threads may plan.
 class FramePlanner {
  public:
   FramePlanner(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function);
 
-  /// Throws UsageError for a view that makes no picture, and if options.max_splats are too few.
+  /// Throws UsageError for an invalid view, and if options.max_splats is too small.
   FramePlan plan(const Camera& camera, const FrameOptions& options, DrawingOrder order) const;
-  /// The best picture within `limits`.
+  /// Plans the best picture within `limits`. Throws as plan() does.
   QuickPlan planQuick(const Camera& camera, const FrameOptions& options, const QuickLimits& limits,
                       DrawingOrder order) const;
 
-  /// For the plans to come, while nobody plans or draws.
+  /// Takes effect with the next plan. Nothing may be planned or drawn meanwhile.
   void setTransferFunction(const TransferFunction& transfer_function);
   ScreenView screenView(const Camera& camera, const FrameOptions& options, ImageSize size) const {
     return screenViewOf(cache_.manifest(), camera, options, size);
   }
 
   const ClassificationTable& table() const { return table_; }
-  /// What the octree takes, and what plans and the later stages note about its bricks.
+  /// Memory in bytes of the octree, and of what plans and the later stages note about its bricks.
   uint64_t bytes() const;
-  /// Of the cache's finest level, and what its borders are drawn in.
+  /// The most splats that any picture can have: those of the cache's finest level, with their border parts.
   uint64_t mostSplats() const;
 
  private:

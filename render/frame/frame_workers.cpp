@@ -8,7 +8,7 @@
 
 namespace curvisplat {
 
-/// What a worker keeps from brick to brick, so that preparing one allocates nothing.
+/// The buffers that a worker keeps from brick to brick, so that preparing a brick allocates nothing.
 struct FrameWorkers::Worker {
   BrickSource::Scratch scratch;
   BrickProjector projector;
@@ -70,7 +70,7 @@ void FrameWorkers::finish(FrameStatistics& sum) {
   }
   std::sort(sum.bricks_unreadable.begin(), sum.bricks_unreadable.end(),
             [](const BrickFailure& a, const BrickFailure& b) { return a.brick < b.brick; });
-  // One that is drawn in several slabs failed for each.
+  // A brick that is drawn in several slabs was reported once for each.
   const auto again =
       std::unique(sum.bricks_unreadable.begin(), sum.bricks_unreadable.end(),
                   [](const BrickFailure& a, const BrickFailure& b) { return a.brick == b.brick; });
@@ -84,7 +84,7 @@ void FrameWorkers::startPrefetch() {
       while (source_.prefetchNext(workers_[number]->scratch)) {
       }
     } catch (...) {
-      // A damaged brick is the frame's to report; the others can wait for it too.
+      // The frame will report a damaged brick. The other bricks can wait for the frame too.
       source_.stop();
     }
   });
@@ -142,8 +142,9 @@ bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
     source_.pass(sequence);
     return passOver(sequence);
   }
-  // What stands in for a damaged brick may reach out of its box: then nothing is passed over, so that the
-  // same bricks are found damaged, and the same is drawn, whatever the order in which they come.
+  // The ancestor that replaces a damaged brick may reach out of the brick's box. With keep_going nothing is
+  // passed over, therefore: the same bricks are found damaged, and the same splats drawn, in any order of
+  // work.
   const auto isHidden = [&] { return !work_->keep_going && work_->hidden.hides(part.part.brick); };
   if (isHidden()) {
     markSeen(number, Seen::kHidden);
@@ -153,7 +154,7 @@ bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
   {
     const std::optional<BrickSource::Splats> fetched = fetch(worker, sequence, part.part);
     if (!fetched) return false;
-    // By now; then the source may have left it out.
+    // The slab's end may have moved since. The source may then have left this part out.
     if (sweep_.isBehind(part)) return passOver(sequence);
     if (isHidden()) {
       markSeen(number, Seen::kHidden);
@@ -179,7 +180,7 @@ uint64_t FrameWorkers::partsHidden() const {
   return static_cast<uint64_t>(std::count(seen_.begin(), seen_.end(), Seen::kHidden));
 }
 
-/// What was projected; in the first slab that it is in.
+/// Adds a projected part to the statistics, in the first slab that it is in only.
 void FrameWorkers::count(Worker& worker, uint32_t number) {
   FrameStatistics& statistics = worker.statistics;
   if (seen_[number] == Seen::kProjected) {
@@ -195,14 +196,14 @@ void FrameWorkers::count(Worker& worker, uint32_t number) {
   statistics.splats_drawn += counts.drawn;
 }
 
-/// A part that is hidden, or lies behind the slab.
+/// Ends the turn of a part that is hidden or lies behind the slab.
 bool FrameWorkers::passOver(uint64_t sequence) {
   if (!sweep_.awaitTurn(sequence)) return false;
   sweep_.skip();
   return true;
 }
 
-/// What the worker has projected.
+/// Enters the splats that the worker has projected into the sweep.
 bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t rank) {
   FrameStatistics& statistics = worker.statistics;
   std::span<const DepthItem> sorted;

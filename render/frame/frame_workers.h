@@ -1,6 +1,6 @@
-// The workers of a frame: they take the cut's bricks, or parts of them, decoded and in the sweep's order,
-// project and sort each and enter it into the sweep; what is final there they sort into segments of the ring.
-// Between frames they can fill the cache of decoded bricks.
+// The workers of a frame. They take the decoded bricks of the cut, or parts of them, in the sweep's order;
+// project and sort each, and enter it into the sweep. Splats whose order is final there they sort into
+// segments of the ring. Between frames they can fill the cache of decoded bricks.
 #pragma once
 
 #include <atomic>
@@ -23,7 +23,7 @@
 
 namespace curvisplat {
 
-/// What all workers of a frame look at and none changes; outlives the frame.
+/// The constant inputs that all workers of a frame share. Must outlive the frame.
 struct FrameWork {
   const CacheReader& cache;
   std::span<const SweptPart> parts;  // of the cut, in the sweep's order
@@ -36,7 +36,7 @@ struct FrameWork {
 
 class FrameWorkers {
  public:
-  /// Starts `count` threads, named "prepare". The others outlive them.
+  /// Starts `count` threads, named "prepare". The other arguments must outlive them.
   FrameWorkers(BrickSource& source, SweepBuffer& sweep, SegmentRing& ring, unsigned count);
   ~FrameWorkers();
   FrameWorkers(const FrameWorkers&) = delete;
@@ -44,22 +44,24 @@ class FrameWorkers {
 
   /// Begins a frame.
   void beginFrame(const FrameWork& work);
-  /// Begins the sweep's slab; the source has its parts, and the ring is ready.
+  /// Starts the workers on the sweep's current slab. The source must have the slab's parts, and the ring must
+  /// be open.
   void start();
-  /// Waits for the workers' end: the slab is in the ring, which pauses after it; or sweep, ring or source were
-  /// stopped; or one of them failed, which stops them all. Rethrows the first failure. Adds what they did to
-  /// `statistics`.
+  /// Waits until the workers have ended. Either the whole slab is in the ring, which pauses after it; or the
+  /// sweep, ring or source was stopped; or a worker failed, which stops all of them. Rethrows the first
+  /// failure. Adds the workers' times and counts to `statistics`.
   void finish(FrameStatistics& statistics);
-  /// Parts that were prepared, or passed over, for the first time in this frame. Any thread.
+  /// The number of parts of this frame that were prepared or passed over so far, each counted once. Any
+  /// thread.
   uint64_t partsSeen() const { return parts_seen_; }
-  /// Of those, the ones of which nothing was prepared. After finish().
+  /// The number of those that were passed over because they are hidden. After finish().
   uint64_t partsHidden() const;
   /// Stops sweep, ring and source. Any thread.
   void stop();
 
-  /// Begins a prefetch; the source is ready for it. A brick that cannot be read is left to the frame.
+  /// Begins a prefetch, for which the source must be ready. Errors of bricks are left to the frame to report.
   void startPrefetch();
-  /// Waits for the prefetch's end, if there is one.
+  /// Waits until the prefetch has ended, if one was begun.
   void finishPrefetch();
 
  private:
@@ -67,7 +69,7 @@ class FrameWorkers {
   enum class Seen : uint8_t { kNo, kHidden, kProjected };
 
   void loop(Worker& worker);
-  // False if sweep, ring or source were stopped.
+  // Return false if the sweep, the ring or the source was stopped.
   bool prepare(Worker& worker, uint64_t sequence);
   bool passOver(uint64_t sequence);
   bool enter(Worker& worker, uint64_t sequence, uint32_t rank);
@@ -82,7 +84,7 @@ class FrameWorkers {
   const FrameWork* work_ = nullptr;
   std::vector<Seen> seen_;  // [part of the frame]; each is one worker's at a time
   std::atomic<uint64_t> parts_seen_ = 0;
-  std::atomic<uint64_t> next_ = 0;  // sequence number of a part of the slab that nobody has taken
+  std::atomic<uint64_t> next_ = 0;  // sequence number of the slab's first part that no worker has taken
   std::mutex failing_;              // guards first_failure_
   std::exception_ptr first_failure_;
   std::vector<std::unique_ptr<Worker>> workers_;  // [thread]

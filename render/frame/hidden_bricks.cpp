@@ -25,8 +25,8 @@ ScreenBox screenBoxOf(const Brick& brick, const ScreenView& view) {
                                              corner & 2 ? brick.upper.y : brick.lower.y,
                                              corner & 4 ? brick.upper.z : brick.lower.z});
     if (perspective) {
-      // Splats that come close to the eye are cut into pieces: each is drawn by a linear map of its own, at a
-      // centre that is up to a radius nearer.
+      // Splats close to the eye are cut into pieces. Each piece is drawn with its own linear map, at a centre
+      // that is up to a radius nearer.
       if (at.z < std::max(view.near, 2 * radius))
         return {-kEverywhere, -kEverywhere, kEverywhere, kEverywhere};
       nearest = std::min(nearest, at.z - radius);

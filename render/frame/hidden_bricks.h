@@ -1,8 +1,9 @@
-// Which bricks a frame need not read or prepare, since what is painted already hides them. Exact: a brick is
-// hidden if splats anywhere in its rectangle of the screen would change no bit of the picture
-// (Painter::hides). So the picture does not depend on when it is asked; only how much is read does.
+// Which bricks a frame need not read or prepare, because the splats painted so far hide them. The test is
+// exact: a brick is hidden if splats anywhere in its rectangle of the screen would change no bit of the
+// picture (Painter::hides). The picture does not depend, therefore, on when the test is made; only how much
+// is read does.
 //
-// Any thread may ask. About 0.1 us where the answer is no.
+// Thread-safe. A test takes about 0.1 us if the answer is no.
 #pragma once
 
 #include <atomic>
@@ -17,9 +18,10 @@ namespace curvisplat {
 
 class HiddenBricks {
  public:
-  /// Begins a frame, in which nothing is hidden before ask(). Nobody asks meanwhile. `bricks` are borrowed.
+  /// Begins a frame, in which nothing is hidden before ask(). No thread may call hides() meanwhile. `bricks`
+  /// are borrowed.
   void begin(std::span<const Brick> bricks, const ScreenView& view);
-  /// From now on `painter` answers, which has begun; nobody if null.
+  /// Makes `painter`, which has begun its frame, answer from now on. With null nothing is hidden.
   void ask(const Painter* painter) { painter_ = painter; }
 
   bool hides(uint32_t brick) const;
@@ -30,8 +32,8 @@ class HiddenBricks {
   std::atomic<const Painter*> painter_ = nullptr;
 };
 
-/// Holds the footprints of all splats that a brick can have; all of the screen, and more, where the eye is so
-/// close that this cannot be told.
+/// A rectangle that contains the footprints of all splats that the brick can have. It is larger than any
+/// screen if the eye is too close to the brick to bound them.
 ScreenBox screenBoxOf(const Brick& brick, const ScreenView& view);
 
 }  // namespace curvisplat

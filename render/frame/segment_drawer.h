@@ -1,6 +1,6 @@
-// Draws what comes out of a SegmentRing, in sequence. A segment goes back when the painter no longer reads
-// it, which with OpenGL is a draw or two later; all of them go back before a wait, since the worker that is
-// waited for may need their space.
+// Draws the segments of a SegmentRing, in sequence. A segment is released when the painter no longer reads
+// it, which with OpenGL is one or two draws later. All segments are released before a wait, since the worker
+// that the painter waits for may need their space.
 #pragma once
 
 #include <cstddef>
@@ -10,14 +10,14 @@
 
 namespace curvisplat {
 
-/// On the painter's thread, between its begin() and end().
+/// Used on the painter's thread, between the painter's begin() and end().
 class SegmentDrawer {
  public:
-  /// Adds the time that it waits to `waited_s`. All are borrowed.
+  /// Adds the seconds that it waits to `waited_s`. All arguments are borrowed.
   SegmentDrawer(Painter& painter, SegmentRing& ring, double& waited_s)
       : painter_(painter), ring_(ring), waited_s_(waited_s) {}
 
-  /// Waits for the next segment and draws it. False if the ring was closed, or pauses.
+  /// Waits for the next segment and draws it. False if the ring was closed or is paused.
   bool drawNext();
 
  private:
@@ -26,7 +26,7 @@ class SegmentDrawer {
   Painter& painter_;
   SegmentRing& ring_;
   double& waited_s_;
-  size_t kept_ = 0;  // segments drawn and not given back
+  size_t kept_ = 0;  // segments drawn and not yet released
 };
 
 }  // namespace curvisplat

@@ -1,14 +1,14 @@
-// The way from the workers to the painter: a ring of screen splats of fixed size.
+// A ring buffer of fixed size that carries screen splats from the workers to the painter.
 //
-// Space is granted in sequence order: a worker waits until every earlier segment has its space, so that the
-// one which the painter needs next never starves behind later ones. Segments are contiguous and are drawn and
-// freed in sequence order too.
+// Space is granted in the order of the sequence numbers: a worker waits until every earlier segment has its
+// space, so that later segments never take the space of the one that the painter needs next. Segments are
+// contiguous, and are drawn and freed in the same order.
 //
 //   worker n     acquire(sequence, count) -> fill -> commit(sequence)
 //   painter      next() -> draw -> release(), or several next() before their release(): OpenGL draws later
 //
-// The memory is the painter's (PaintingBackend::splatMemory()): what workers write there is drawn from there.
-// close() wakes everyone: nothing is granted or handed out after it.
+// The memory belongs to the painter (PaintingBackend::splatMemory()), which draws from where the workers
+// write. close() wakes all waiting threads; after it nothing is granted or handed out.
 #pragma once
 
 #include <condition_variable>
@@ -25,31 +25,34 @@ namespace curvisplat {
 
 class SegmentRing {
  public:
-  /// `memory` is at least as large as the largest segment, and outlives the ring.
+  /// `memory` must hold the largest segment, and must outlive the ring.
   explicit SegmentRing(std::span<ScreenSplat> memory) : splats_(memory) {}
 
-  /// Space for `count` splats, which may be 0, of the segment that is `sequence` in the drawing order, from 0
-  /// on. Nothing once the ring is closed. Any thread; each sequence number once, and each in time.
+  /// Waits for space for the `count` splats (0 is allowed) of segment number `sequence` in the drawing order,
+  /// counted from 0. Returns nullopt once the ring is closed. Any thread. Every sequence number must be
+  /// acquired, and only once.
   std::optional<std::span<ScreenSplat>> acquire(uint64_t sequence, size_t count);
-  /// The segment is filled.
+  /// Marks the segment as filled. Any thread.
   void commit(uint64_t sequence);
-  /// For now there are no more than the first `segments`: the painter need not wait for more. Any number of
-  /// times.
+  /// Announces that no more than the first `segments` will come for now: the painter does not wait for more.
+  /// May be called again.
   void pauseAfter(uint64_t segments);
-  /// More segments will come.
+  /// Ends the pause: more segments will come.
   void resume();
 
-  /// The next segment in sequence. Nothing once the ring is closed, or where it pauses. The painter's thread.
-  /// Who has not released all segments before it may wait for ever, since it may need their space.
+  /// Waits for the next segment in sequence. Returns nullopt once the ring is closed, or where it pauses. The
+  /// painter's thread only. Release all earlier segments first: the next one may need their space, and the
+  /// call would then wait for ever.
   std::optional<std::span<const ScreenSplat>> next();
-  /// The same, without waiting: nothing if it is not there yet.
+  /// The same without waiting: nullopt also if the segment is not filled yet.
   std::optional<std::span<const ScreenSplat>> nextIfReady();
-  /// Gives back the first segment handed out that has not been.
+  /// Releases the earliest segment that was handed out and is not released yet.
   void release();
 
+  /// Ends the use of the ring and wakes all waiting threads. Any thread.
   void close();
   bool isClosed() const;
-  /// Begins anew, open and empty, from sequence number 0 on. Nobody may use the ring meanwhile.
+  /// Makes the ring open and empty, with sequence number 0 next. No thread may use the ring meanwhile.
   void reset();
 
   /// The most splats that were held at once, since reset().
@@ -73,13 +76,13 @@ class SegmentRing {
   mutable std::mutex mutex_;           // guards all below, not the splats
   std::condition_variable granted_;    // a segment was granted or released, or the ring closed
   std::condition_variable committed_;  // the first segment may be ready, or the ring closed
-  // Positions count on for ever; modulo the capacity they are places in the ring. What does not fit before
-  // the ring's end begins anew at its start.
+  // Positions only grow; modulo the capacity they are places in the ring. A segment that does not fit before
+  // the ring's end is placed at its start.
   std::deque<Segment> segments_;  // granted and not released, in sequence
   uint64_t end_ = 0;              // of the last segment granted
   uint64_t first_sequence_ = 0;   // of segments_.front()
   uint64_t pause_ = kNoPause;     // the sequence number that will not come for now
-  size_t handed_out_ = 0;         // the first so many of segments_
+  size_t handed_out_ = 0;         // how many of segments_, from the front, are handed out
   bool closed_ = false;
   size_t peak_ = 0;
 };

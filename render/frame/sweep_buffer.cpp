@@ -8,16 +8,17 @@
 namespace curvisplat {
 namespace {
 
-// Where space is short: of the pages those before the slab's end at first, and when it moves nearer.
+// Where the slab's end is put when space is short: behind this many eighths of the buffer's pages, when the
+// slab first gets an end and when the end moves nearer.
 constexpr size_t kFirstEighths = 6, kNextEighths = 7;
-// Space is made for the part that wants it, and so many pages of all more.
+// Space is made for the part that needs it, and for one page in kSpareShare of the buffer in addition.
 constexpr size_t kSpareShare = 16;
 
 size_t pagesFor(size_t splats) {
   return (splats + SweepBuffer::kPageSplats - 1) / SweepBuffer::kPageSplats;
 }
 
-/// Of the splats of a part, sorted, how many lie before a position.
+/// How many of a part's sorted splats lie before a position.
 size_t countBefore(const SweepPosition& mark, uint32_t rank, std::span<const DepthItem> sorted) {
   size_t low = 0, high = sorted.size();
   while (low < high) {
@@ -101,7 +102,7 @@ void SweepBuffer::skip() {
   endTurn();
 }
 
-/// The mutex is held, as in all that follow and are private.
+/// The mutex must be held, as for all private functions below.
 void SweepBuffer::endTurn() {
   ++turn_;
   mark_ = turn_ < parts_.size() ? std::min(std::max(begin_, swept_[parts_[turn_]].begin()), end_) : end_;
@@ -146,7 +147,7 @@ std::shared_ptr<SweepBuffer::Run> SweepBuffer::enter(uint32_t rank, std::span<co
 bool SweepBuffer::awaitSpace(uint32_t rank, std::span<const DepthItem> sorted) {
   std::unique_lock lock(mutex_);
   if (!closed_ && isQuiet()) {
-    // Else a batch can leave by now.
+    // Splats may have become final meanwhile: then a batch can leave, and no space need be made.
     if (splits_.empty() && countFinals() == 0) makeSpace(rank, sorted);
   } else {
     const size_t before = free_.size();
@@ -194,7 +195,7 @@ SweepPosition SweepBuffer::position(const Run& run, size_t n) const {
   return {keys_[run.slot(n)], run.rank, run.before + static_cast<uint32_t>(n)};
 }
 
-/// Looks at few splats where the mark is close to the run's first.
+/// Searches from the run's first splat on with growing steps: fast if the mark is close to it.
 size_t SweepBuffer::firstNotBefore(const Run& run, const SweepPosition& mark) const {
   size_t low = run.first, step = 1;  // what lies before `low` lies before the mark
   while (low + step <= run.count && position(run, low + step - 1) < mark) {
@@ -221,7 +222,7 @@ size_t SweepBuffer::countFinals() {
   return finals;
 }
 
-/// Nothing if fewer splats than that are final.
+/// Takes the next batch out of the live runs. Returns nullopt if fewer than `at_least` splats are final.
 std::optional<SweepBuffer::Batch> SweepBuffer::cut(size_t at_least) {
   if (closed_) return {};
   if (splits_.empty()) {
@@ -252,8 +253,9 @@ std::optional<SweepBuffer::Batch> SweepBuffer::cut(size_t at_least) {
   return batch;
 }
 
-/// Ends of batches of at most batch_splats_, the last of which is the mark. Between two neighbours of a sample
-/// of every run's every stride-th splat lie at most `stride` splats of each run.
+/// Sets the ends of batches of at most batch_splats_ splats; the last end is the mark. They are chosen from a
+/// sorted sample of every stride-th splat of every run: between two neighbours in the sample lie at most
+/// `stride` splats of each run.
 void SweepBuffer::splitFinals(size_t finals) {
   if (finals > batch_splats_) {
     const size_t stride = std::max<size_t>(1, batch_splats_ / (4 * live_.size()));
@@ -267,8 +269,8 @@ void SweepBuffer::splitFinals(size_t finals) {
   splits_.push_back(mark_);
 }
 
-/// For what lies before the slab's end of a part that is to be entered. Nothing in the buffer is final:
-/// everything is in a run, and no batch is under way.
+/// Makes space for those splats of the part to be entered that lie before the slab's end. Requires that
+/// nothing in the buffer is final: all splats are in live runs, and no batch is being sorted.
 void SweepBuffer::makeSpace(uint32_t rank, std::span<const DepthItem> sorted) {
   if (end_ == kSweepEnd) end_ = pageStart(kFirstEighths, rank, sorted);
   const auto needed = [&] {
@@ -294,8 +296,8 @@ void SweepBuffer::makeSpace(uint32_t rank, std::span<const DepthItem> sorted) {
   std::erase_if(live_, [](const auto& run) { return run->first == run->count; });
 }
 
-/// Where the first page begins that is not among that many of the buffer's, counted by their first positions;
-/// the pages that the part would take are among them.
+/// The position at which a slab's end leaves `eighths` eighths of the buffer's pages before it. Pages are
+/// ordered by the positions of their first splats, and include those that the part to be entered would take.
 SweepPosition SweepBuffer::pageStart(size_t eighths, uint32_t rank, std::span<const DepthItem> sorted) const {
   std::vector<SweepPosition> starts;
   for (const auto& run : live_)
@@ -319,7 +321,7 @@ void SweepBuffer::forgetBehindEnd(Run& run) {
   entered_whole_[run.part] = 0;
 }
 
-/// Of its splats from .. to - 1 nobody wants any more.
+/// Frees the run's splats from .. to - 1, which are not needed any more.
 void SweepBuffer::release(const Run& run, size_t from, size_t to) {
   while (from < to) {
     const size_t end = std::min((from / kPageSplats + 1) * kPageSplats, to);

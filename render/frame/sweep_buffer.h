@@ -1,5 +1,5 @@
-// Brings the splats of all bricks of a frame into one order, though no more than a layer of them is ever in
-// memory: a sweep along the depth.
+// Brings the splats of all bricks of a frame into one order while no more than a layer of them is in memory,
+// by a sweep along the depth.
 //
 //   parts, by their nearest key      |---a---|
 //                                      |-----b-----|
@@ -7,15 +7,16 @@
 //                                                |----d----|
 //   a, b, c are in:    what lies before here ----^ is final: it is sorted and drawn
 //
-// "Near" and "before" are meant in drawing order, whatever it is. Splats are ordered by key, then by brick,
-// then by their number in the brick (SweepPosition): no two are equal, and the order depends on the cache and
-// the view alone.
+// "Nearest" and "before" refer to the drawing order, which may also be back to front. Splats are ordered by
+// key, then by brick, then by their number in the brick (SweepPosition): no two are equal, and the order
+// depends only on the cache and the view.
 //
-// A worker enters each part as a run, sorted, when it is that part's turn. What is final leaves in batches,
-// which workers sort and hand on. Where a layer is larger than the buffer, the sweep is made in several slabs:
-// the slab under way gets an end, and of as many runs as need be, those with most splats behind it first,
-// what lies there is forgotten; these parts are entered again in the next slab. Should that not do, the end
-// moves nearer. Slabs do not change the order, and any buffer of a few pages will do.
+// A worker enters each part as a sorted run when it is that part's turn. Splats whose order is final leave in
+// batches, which workers sort and pass on. If a layer is larger than the buffer, the sweep is made in several
+// slabs: the current slab gets an end, and the splats behind the end are discarded from as many runs as
+// necessary, beginning with the runs that have most of them. Those parts are entered again in the next slab.
+// If that does not free enough space, the end moves nearer. Slabs do not change the order, and a buffer of a
+// few pages suffices.
 //
 //   worker   awaitTurn(n) -> enter() -> fill()          leave its part out: awaitTurn(n) -> skip()
 //                      ^       | no space
@@ -23,10 +24,11 @@
 //                      +- nextFinal() -> a batch to be sorted, or awaitSpace()
 //            next() -> a batch: awaitFilled(), read, giveBack()
 //
-// No deadlock: whoever fills a run or sorts a batch waits for no turn and no space. Whoever has the turn waits
-// for such workers only; if there are none, it makes space: by a batch of what is final, or by forgetting.
+// There is no deadlock: a worker that fills a run or sorts a batch waits neither for a turn nor for space.
+// The worker that has the turn waits only for such workers; if there are none, it makes space itself, with a
+// batch of final splats or by discarding.
 //
-// Splats lie in pages, which return when all that is in them has been read or forgotten.
+// Splats are stored in pages. A page is free again when all splats in it have been read or discarded.
 #pragma once
 
 #include <compare>
@@ -46,7 +48,7 @@
 
 namespace curvisplat {
 
-/// Where a splat stands in the drawing order of a frame.
+/// The place of a splat in the drawing order of a frame.
 struct SweepPosition {
   uint32_t key = 0;
   uint32_t rank = 0;   // of its brick among equal keys
@@ -55,7 +57,7 @@ struct SweepPosition {
 };
 inline constexpr SweepPosition kSweepEnd{~uint32_t{0}, ~uint32_t{0}, ~uint32_t{0}};
 
-/// A part in the order in which the sweep takes them: by the first key, then by rank.
+/// A part of the cut with its range of keys. The sweep takes parts by their first key, then by rank.
 struct SweptPart {
   BrickPart part;
   uint32_t rank = 0;
@@ -65,19 +67,21 @@ struct SweptPart {
   SweepPosition end() const { return {keys.last, rank, ~uint32_t{0}}; }
 };
 
+/// Shared by a frame's workers. Thread-safe, except where a function says otherwise.
 class SweepBuffer {
  public:
   static constexpr size_t kPageSplats = 256;
   static constexpr size_t kMaxBatch = 65536;
-  /// What a buffer for so many splats takes.
+  /// Memory in bytes of a buffer for `splats` splats.
   static constexpr uint64_t bytes(uint64_t splats) {
     return splats * (sizeof(ScreenSplat) + sizeof(uint32_t)) + splats / kPageSplats * 32;
   }
 
-  /// For so many splats, in whole pages: a few at least. Batches have up to `batch_splats`.
+  /// A buffer for `splats` splats, in whole pages and a few pages at least. Batches have up to
+  /// `batch_splats`.
   SweepBuffer(size_t splats, size_t batch_splats);
 
-  /// The splats of one part, from the slab's begin on: all of them, or those before the slab's end.
+  /// The splats of one part from the slab's beginning on: all of them, or those before the slab's end.
   class Run;
   struct Piece {
     std::shared_ptr<Run> run;
@@ -90,49 +94,52 @@ class SweepBuffer {
     std::vector<Piece> pieces;
   };
 
-  /// Begins a frame: empty and open. Nobody may use the buffer meanwhile; the same goes for beginSlab().
+  /// Begins a frame with an empty, open buffer. No thread may use the buffer meanwhile, nor during
+  /// beginSlab().
   void beginFrame();
-  /// Begins the next slab, the first from the beginning on. False if the last has reached the end. `swept` is
-  /// borrowed, and the same throughout the frame.
+  /// Begins the next slab; the first begins with the first part. False if the last slab has reached the end.
+  /// `swept` is borrowed and must be the same throughout the frame.
   bool beginSlab(std::span<const SweptPart> swept);
-  /// The parts that are to be entered, as places in `swept`: the n-th has its turn as number n.
+  /// The parts to enter in this slab, as indices into `swept`: the n-th has turn number n.
   const std::vector<uint32_t>& parts() const { return parts_; }
 
-  /// Whether a part lies behind the slab. It may come to.
+  /// Whether a part lies behind the slab's end. The answer can change to true, since the end can move nearer.
   bool isBehind(const SweptPart& part) const;
 
-  /// Waits for the `sequence`-th part's turn. False if closed.
+  /// Waits for the turn of part number `sequence`. False if the buffer is closed.
   bool awaitTurn(uint64_t sequence);
-  /// Ends the turn without a splat.
+  /// Ends the turn without entering splats.
   void skip();
-  /// Enters a part's splats, sorted, and ends its turn; null where they find no space. The run is to be
-  /// filled.
+  /// Enters a part's sorted splats and ends its turn. The caller must then fill() the run. Returns null, and
+  /// does not end the turn, if there is no space or if the buffer is closed.
   std::shared_ptr<Run> enter(uint32_t rank, std::span<const DepthItem> sorted);
-  /// In a turn that found no space and no batch: waits for some, or makes it. False if closed.
+  /// Waits for space or makes it, in a turn that found neither space nor a batch. False if closed.
   bool awaitSpace(uint32_t rank, std::span<const DepthItem> sorted);
-  /// Copies the splats of a run, as sorted, from where their items say.
+  /// Copies the splats of a run into the buffer in sorted order, from the places in `splats` that `sorted`
+  /// has.
   void fill(Run& run, std::span<const DepthItem> sorted, std::span<const ScreenSplat> splats);
 
-  /// A batch of what is final, if there is one that is worth it. The caller sorts it and gives it back.
+  /// A batch of final splats, if there are enough of them. The caller sorts it and calls giveBack().
   std::optional<Batch> next();
-  /// As next(); waits for one for as long as one may still come in this slab.
+  /// As next(), but waits for a batch as long as one can still come in this slab.
   std::optional<Batch> awaitNext();
-  /// Any splats that are final, in a turn that finds no space: nothing while other batches are under way.
+  /// Any final splats, for a turn that finds no space; nullopt while other batches are being sorted.
   std::optional<Batch> nextFinal();
-  /// Until every run in it is filled. False if closed.
+  /// Waits until every run in the batch is filled. False if closed.
   bool awaitFilled(const Batch& batch);
-  /// The keys of a batch's splats, for copy().
+  /// Writes the keys of a batch's splats to `items`, which can then be sorted and passed to copy().
   void itemsOf(const Batch& batch, std::span<DepthItem> items) const;
   void copy(std::span<const DepthItem> items, std::span<ScreenSplat> to) const;
   void giveBack(const Batch& batch);
 
-  /// Of the frame, so far: batches that were handed out. Once awaitNext() has given nothing, all there are.
+  /// The number of batches handed out in this frame so far: all of the slab's once awaitNext() returns
+  /// nullopt.
   uint64_t batches() const;
   /// Slabs that were begun in this frame.
   uint64_t slabs() const { return slabs_; }
   size_t peakSplats() const;
 
-  /// Wakes all who wait; nothing is granted until the next frame.
+  /// Wakes all waiting threads. Nothing is granted until the next frame.
   void close();
 
  private:
@@ -148,7 +155,7 @@ class SweepBuffer {
   SweepPosition pageStart(size_t eighths, uint32_t rank, std::span<const DepthItem> sorted) const;
   void forgetBehindEnd(Run& run);
   void release(const Run& run, size_t from, size_t to);
-  /// Nobody but whoever has the turn can make space now.
+  /// Whether only the worker that has the turn can make space now.
   bool isQuiet() const { return under_way_ == 0 && filling_ == 0; }
 
   const size_t batch_splats_;

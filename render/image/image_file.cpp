@@ -8,6 +8,7 @@
 
 #include "render/image/image_formats.h"
 #include "stream/base/check.h"
+#include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 

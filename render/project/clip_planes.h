@@ -1,5 +1,5 @@
-// Half spaces outside of which nothing is drawn. A splat that a plane goes through is cut there, as at a
-// border's face (face_cut.h): edges are crisp at every level of detail.
+// Half spaces outside of which nothing is drawn. A splat that a plane crosses is cut there, as at a border's
+// face (face_cut.h), so that edges are crisp at every level of detail.
 #pragma once
 
 #include <array>
@@ -20,36 +20,37 @@ struct WorldBox {
   glm::dvec3 lower{0.0}, upper{0.0};
 };
 
-/// What is drawn: where normal · (x - point) >= 0. Data coordinates; the normal has any length but 0.
+/// Points with normal · (x - point) >= 0 are drawn. Data coordinates; the normal may have any length but 0.
 struct ClipPlane {
   glm::dvec3 point{0.0}, normal{0.0};
 };
 
-/// Of a picture, beside the box.
+/// The most clip planes that a picture can have, in addition to the box.
 inline constexpr size_t kMaxClipPlanes = 6;
 
 /// Whether the plane has a direction: a normal of finite length above 0.
 bool isUsable(const ClipPlane& plane);
 
-/// The planes and the six faces of the box, inwards.
+/// The planes, and the six faces of the box if there is one, with normals that point inwards.
 std::vector<ClipPlane> clipPlanesOf(std::span<const ClipPlane> planes, const std::optional<WorldBox>& box);
 
-/// Where splats lie.
+/// On which side of the clip planes a splat lies.
 enum class ClipSide : uint8_t { kInside, kAcross, kOutside };
 
-/// Clip planes in float, from a brick's origin on.
+/// Clip planes in float, relative to a brick's origin.
 class LocalClipPlanes {
  public:
   LocalClipPlanes(std::span<const ClipPlane> planes, const glm::dvec3& origin);
 
   bool empty() const { return planes_.empty(); }
-  /// Of splats begin .. begin + count - 1, with all of their support, in sides[0 .. count - 1].
+  /// Writes the sides of splats begin .. begin + count - 1, with their whole support, to sides[0 .. count -
+  /// 1].
   void sidesOf(const GeometryArrays<const float>& geometry, size_t begin, size_t count,
                std::span<ClipSide> sides) const;
   /// Whether a point is drawn.
   bool contains(const glm::vec3& point) const;
-  /// Adds the planes that go through the piece to its faces; those that take most of it, if there are more
-  /// than CutFaces can hold.
+  /// Adds the planes that cross the piece to its faces. If there are more than CutFaces can hold, it keeps
+  /// those that remove most of the piece.
   void addFaces(SplatPiece& piece) const;
 
  private:

@@ -16,12 +16,12 @@ constexpr double kMostKey = (1 << 28) - 1;
 // A's columns, 1.5 of its singular values, and a border by less than 0.6; a radius has 1.55 of them.
 constexpr double kPieceReach = 1.35;
 
-/// Also of what is not a number.
+/// Defined for NaN as well.
 uint32_t keyOf(double steps) {
   return static_cast<uint32_t>(std::min(std::max(0.0, steps), kMostKey));
 }
 
-/// Of a distance, which is not negative.
+/// The bits of a distance, which must not be negative: they increase with the distance.
 uint32_t bitsOf(float distance) {
   return std::bit_cast<uint32_t>(distance);
 }
@@ -47,7 +47,7 @@ KeyRange DepthKeys::rangeOf(const Brick& brick) const {
   if (view_.projection == Projection::kPerspective) {
     double near = glm::length(glm::clamp(view_.eye, lower, upper) - view_.eye);
     double far = glm::length(glm::max(glm::abs(lower - view_.eye), glm::abs(upper - view_.eye)));
-    // Splats that are wide for their distance are cut into pieces, which have depths of their own.
+    // Splats that are wide for their distance are cut into pieces, each of which has its own depth.
     const double radius = brick.largest_radius * std::max({view_.scale.x, view_.scale.y, view_.scale.z});
     const glm::dvec3 half = 0.5 * (upper - lower);
     const double nearest_plane =

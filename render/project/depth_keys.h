@@ -1,9 +1,9 @@
-// Depths as integers: what a frame's splats are sorted by.
+// Depths as integers, the keys by which a frame's splats are sorted.
 //
-// A key depends on the splat, its brick and the view alone, and never lies outside of the range that the
-// brick's box gives: whoever takes bricks in the order of those ranges knows from the index what can still
-// come. A splat's key is the depth of its centre. Where a piece of a splat (at a border, or cut in
-// perspective) has its centre outside of the box of its brick's centres, it takes the box's nearest or
+// A key depends only on the splat, its brick and the view, and never lies outside of the range that the
+// brick's box gives. If bricks are taken in the order of those ranges, the index therefore tells which keys
+// can still come. A splat's key is the depth of its centre. If a piece of a splat (at a border, or cut in
+// perspective) has its centre outside of the box of its brick's centres, it gets the box's nearest or
 // farthest key.
 //
 // Orthographic keys are the depth in the root's cube in 2^28 steps, perspective ones the bits of the distance
@@ -21,20 +21,20 @@
 
 namespace curvisplat {
 
-/// Both inclusive, in drawing order.
+/// The first and the last key in drawing order, both inclusive.
 struct KeyRange {
   uint32_t first = 0, last = 0;
 };
 
-/// Keys that increase in drawing order: front to back they increase with the depth, back to front they are
-/// those keys' complements. Pure.
+/// Keys that increase in drawing order: front to back they increase with the depth; back to front they are
+/// the complements of those keys. Pure.
 class DepthKeys {
  public:
   DepthKeys(const ScreenView& view, const RootCube& root, DrawingOrder order);
 
   DrawingOrder order() const { return order_; }
   KeyRange rangeOf(const Brick& brick) const;
-  /// The keys of what a BrickProjector has made of a brick.
+  /// Computes the keys of a brick's projected splats.
   ///   depths  [n]  BrickProjector::depths(), from the brick's cell with the minimum corner `cell_min`
   ///   range        of the brick
   ///   keys    [n]  overwritten
@@ -46,8 +46,8 @@ class DepthKeys {
 
   const ScreenView view_;
   const DrawingOrder order_;
-  double nearest_ = 0;  // orthographic: of the root
-  double steps_ = 1;    // orthographic: keys to a stretched unit
+  double nearest_ = 0;  // orthographic: the depth of the root cube's nearest point
+  double steps_ = 1;    // orthographic: keys per stretched unit
 };
 
 }  // namespace curvisplat

@@ -6,8 +6,8 @@
 namespace curvisplat {
 namespace {
 
-// The counters of two or three digits fit the caches; for few items, clearing more of them costs more than a
-// further pass. Measured.
+// The counters of two or three digits fit in the processor's caches. For few items, clearing more counters
+// takes longer than another pass (measured).
 constexpr size_t kFewItems = 12000;
 constexpr int kMaxDigitBits = 13, kMaxDigitBitsOfFew = 11;
 

@@ -1,4 +1,4 @@
-// Sorts splats by their depth keys: a radix sort, stable, of as few passes as the keys' range needs.
+// Sorts splats by their depth keys: a stable radix sort with as few passes as the range of the keys needs.
 #pragma once
 
 #include <cstddef>
@@ -14,17 +14,16 @@ struct DepthItem {
   uint32_t key, splat;
 };
 
-/// Keeps its memory between calls: 16 bytes an item. One thread each.
+/// Keeps its memory between calls: 16 bytes per item. Each sorter belongs to one thread.
 class DepthSorter {
  public:
-  /// Sorts splats by these keys; those of equal keys by their numbers, ascending front to back, descending
-  /// back to front.
+  /// Sorts splats 0 .. keys.size() - 1 by their keys. Splats with equal keys are sorted by their numbers,
+  /// ascending if `order` is front to back and descending if it is back to front. Valid until the next call.
   std::span<const DepthItem> sort(std::span<const uint32_t> keys, DrawingOrder order);
 
-  /// For the items to sort, to be filled in.
+  /// Space for `count` items, which the caller fills before sort().
   std::span<DepthItem> items(size_t count);
-  /// The items by ascending key; those of equal keys in the order in which they were. Valid until the next
-  /// call.
+  /// Sorts the items by ascending key. Items with equal keys keep their order. Valid until the next call.
   std::span<const DepthItem> sort();
 
  private:

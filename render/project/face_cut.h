@@ -1,14 +1,14 @@
-// What a face leaves of a splat on the screen: the parameters of its ScreenCut.
+// Computes what a face leaves of a splat along the rays of its pixels: the parameters of its ScreenCut.
 //
-// With n the face's normal, n · (x - X0) is a linear field like the scalar, so that given a pixel it has a
-// mean and a deviation as the scalar has: in the frame of A, with q the normal, B the rows of the map times
-// A, and S2' = B Bᵀ + λ (the low-pass, which is what antialiases a face that is seen edge-on),
+// With n the face's normal, n · (x - X0) is a linear field like the scalar. At a given pixel it therefore has
+// a mean and a deviation, as the scalar has. In the frame of A, with q the normal, B the rows of the map
+// times A, and S2' = B Bᵀ + λ (λ is the low-pass, which antialiases a face that is seen edge-on):
 //
 //     mean at the offset d  =  distance + (S2'⁻¹ B q) · d
 //     variance              =  σ² (1 - qᵀ Bᵀ S2'⁻¹ B q)
 //                           =  σ² (λ² + λ (|b0 × q|² + |b1 × q|²) + (b0 × b1 · q)²) / det S2'
 //
-// where the second form cannot cancel.
+// The second form is not subject to cancellation.
 #pragma once
 
 #include "render/project/screen_splat.h"
@@ -19,7 +19,7 @@ namespace curvisplat {
 
 enum class Remains { kNothing, kSome, kAll };
 
-/// Sets `cut` where something remains. `ellipse`: of the piece under `rows`.
+/// Sets `cut` if part of the piece remains. `ellipse` is the ellipse of the piece under `rows`.
 Remains cutAtFaces(const ScreenRows& rows, const SplatPiece& piece, const Ellipse& ellipse,
                    float low_pass_px2, ScreenCut& cut);
 

@@ -37,7 +37,7 @@ double kernel(double r) {
 
 double footprint(double rho) {
   if (rho >= kKernelSupport) return 0;
-  // r³ is not smooth in t where rho is small, so the pieces are cut up.
+  // r³ is not smooth in t if rho is small, so the pieces are divided into panels.
   constexpr int kPanels = 16;
   const double end = std::sqrt(kKernelSupport * kKernelSupport - rho * rho);
   const double knot = std::sqrt(std::max(0.0, kKnot * kKnot - rho * rho));

@@ -1,5 +1,5 @@
-// The reconstruction kernel K(r) and its footprint, in units of the grid spacing. Design section 3; Crawfis
-// and Max, "Texture Splats for 3D Scalar and Vector Field Visualization", 1993.
+// The reconstruction kernel K(r) and its footprint, in units of the grid spacing. DESIGN.md, "Splats";
+// Crawfis and Max, "Texture Splats for 3D Scalar and Vector Field Visualization", 1993.
 #pragma once
 
 #include <vector>
@@ -12,12 +12,12 @@ inline constexpr double kKernelSigma = 0.44655;     // standard deviation along 
 /// K(r), r >= 0. Its integral over space is 1.
 double kernel(double r);
 
-/// F(rho) = ∫ K(√(rho² + t²)) dt, rho >= 0: what a splat's kernel leaves on a ray that passes its centre at
-/// the distance rho. By quadrature.
+/// F(rho) = ∫ K(√(rho² + t²)) dt, rho >= 0: the integral of a splat's kernel along a ray that passes its
+/// centre at the distance rho. Computed by quadrature.
 double footprint(double rho);
 
-/// F at equal steps of rho² over [0, kKernelSupport²]: [steps + 1]. F is smooth in rho², and drawing then
-/// needs no square root. Linear interpolation is good to 1e-5 from 1024 steps on.
+/// F at equal steps of rho² over [0, kKernelSupport²]: [steps + 1]. F is smooth in rho², and a table over
+/// rho² needs no square root when drawing. Linear interpolation is accurate to 1e-5 with 1024 steps or more.
 std::vector<double> footprintTable(int steps);
 
 }  // namespace curvisplat

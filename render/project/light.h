@@ -1,13 +1,14 @@
 // Light on the scalar's level surfaces. A splat's normal is the gradient of its scalar, and the light is
-// worked out once a splat:
+// computed once per splat:
 //
 //     g = A⁻ᵀ w     strength = |g|² / (|g|² + g0²)
 //     diffuse  = 1 - strength + strength (ambient + diffuse |n · l|)      times the colour
 //     specular = strength specular |n · h|³²                              white, beside the colour
 //
 // with n = g/|g|, l towards the light and h half way between l and the viewer. A gradient has no side, hence
-// |.|. Where the scalar hardly changes there is no surface to be lit: g0, the range of the transfer function
-// over the data's diagonal, does not depend on the cells' sizes, so that all levels of detail look alike.
+// |.|. Where the scalar hardly changes there is no surface to light, and the strength goes to 0. The
+// threshold g0 is the range of the transfer function divided by the data's diagonal. It does not depend on
+// the cells' sizes, so that all levels of detail look alike.
 #pragma once
 
 #include <cstdint>
@@ -24,19 +25,19 @@ struct Light {
   std::optional<glm::dvec3> towards;  // the light, from everywhere; none: it is where the viewer is
 };
 
-/// How much of a splat's colour is seen, and how much white: 0 to 1.
+/// The factor of a splat's colour, and the amount of white to add; each 0 to 1.
 struct Lit {
   float diffuse = 1, specular = 0;
 };
 
-/// A light and a view, in float, from a brick's origin on.
+/// A light and a view in float, relative to a brick's origin.
 class LocalLight {
  public:
-  /// `g0`: in the scalar's unit per stretched unit of length, above 0.
+  /// `g0` is in the scalar's unit per stretched unit of length, and above 0.
   LocalLight(const Light& light, double g0, const ScreenView& view, const glm::dvec3& origin);
 
-  /// Of a splat at (x, y, z). Pure.
-  Lit of(float x, float y, float z, const Shape& shape, const Slope& slope) const;
+  /// The light on a splat at (x, y, z). Pure.
+  Lit of(float x, float y, float z, const Shape& s, const Slope& w) const;
 
  private:
   const float ambient_, diffuse_, specular_;
@@ -48,8 +49,8 @@ class LocalLight {
   const float g0_squared_;
 };
 
-/// A half width, not negative, in 15 bits and light in 16, as a float that is never denormal: what
-/// ScreenSplat::half_width is in lit pictures.
+/// Packs a half width, which must not be negative, into 15 bits and the light into 16, as a float that is
+/// never denormal: the value of ScreenSplat::half_width in lit pictures.
 float packLit(float half_width, const Lit& lit);
 float unpackHalfWidth(float packed);
 Lit unpackLit(float packed);

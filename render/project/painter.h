@@ -1,8 +1,8 @@
-// What draws screen splats, whatever with: OpenGL or the processor.
+// The interface of painters, which draw screen splats with OpenGL or on the processor.
 //
 //   begin -> draw, draw, ... (in the painter's order) -> end
 //
-// Colours are premultiplied. One frame at a time, on the thread that the painter's backend says.
+// Colours are premultiplied. One frame at a time, on the thread of the painter's backend.
 #pragma once
 
 #include <cstdint>
@@ -16,19 +16,19 @@
 
 namespace curvisplat {
 
-/// What a painter may take for a frame. OpenGL takes what its driver takes.
+/// The resources that a painter may use for a frame. They do not bind OpenGL's driver.
 struct PaintResources {
-  unsigned threads = 0;         // 0: one a core
-  size_t batch_splats = 65536;  // that may be kept back, to be drawn together
+  unsigned threads = 0;         // 0: one per core
+  size_t batch_splats = 65536;  // the most splats that may be collected and drawn together
 };
 
 /// How the pixels of a splat get their colours.
 struct PixelShading {
-  bool per_pixel = true;  // by the splat's slope and width at each; else one colour and extinction a splat
+  bool per_pixel = true;  // from the splat's slope and width; false: one colour and extinction per splat
   bool lit = false;       // splats carry light (light.h)
 };
 
-/// In pixels, as ScreenSplat::x and y.
+/// A rectangle in pixels, with the coordinates of ScreenSplat::x and y.
 struct ScreenBox {
   float x0, y0, x1, y1;
 };
@@ -37,35 +37,35 @@ class Painter {
  public:
   virtual ~Painter() = default;
 
-  /// In which splats are to be drawn.
+  /// The order in which splats must be drawn.
   virtual DrawingOrder order() const = 0;
 
-  /// Begins a frame filled with `background`. `table` outlives the frame. Throws Error where the image is larger
-  /// than the painter's limit, which it names.
+  /// Begins a frame filled with `background`. `table` outlives the frame. Throws Error where the image is
+  /// larger than the painter's limit, which it names.
   virtual void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
                      PixelShading shading, const PaintResources& resources = {}) = 0;
-  /// Blends `splats` into the frame, in their order and behind or before all drawn so far: as order() says.
-  /// The span is free when the call returns, but for those that drawsUnderWay() counts.
+  /// Blends `splats` into the frame in their order: behind all splats drawn so far, or in front of them, as
+  /// order() says. The memory may be used again when the call returns, unless drawsUnderWay() counts the
+  /// draw.
   virtual void draw(std::span<const ScreenSplat> splats) = 0;
-  /// The last so many draws may still read their splats, where those lie in PaintingBackend::splatMemory().
+  /// How many of the last draws may still read their splats, if these lie in PaintingBackend::splatMemory().
   virtual size_t drawsUnderWay() const { return 0; }
-  /// Waits until none is.
+  /// Waits until drawsUnderWay() is 0.
   virtual void finishDraws() {}
-  /// Whether splats whose footprints lie in `box` change nothing, if they are drawn from now on: what would
-  /// be seen of them is hidden. The picture's bits do not depend on whether they are drawn. Any thread,
-  /// between begin() and end().
+  /// Whether all splats drawn from now on whose footprints lie in `box` would be hidden. The picture's bits
+  /// do not depend on whether they are drawn. Any thread, between begin() and end().
   virtual bool hides(const ScreenBox&) const { return false; }
-  /// Waits for the drawing and gives the picture.
+  /// Waits until everything is drawn and returns the picture.
   virtual Image end() = 0;
 
-  /// Of the calling thread, since begin(): taking splats over, and drawing them. OpenGL may draw later than
-  /// it is told to: end() waits for it, and counts as drawing.
+  /// Seconds that the calling thread has spent since begin() on taking splats over and on drawing them.
+  /// OpenGL may draw later than the call; end() waits for it, and this wait counts as drawing.
   virtual double uploadSeconds() const = 0;
   virtual double drawSeconds() const = 0;
-  /// What OpenGL's own clock says of the drawing, without waits for splats; 0 where OpenGL does not draw.
-  /// Complete after end().
+  /// Seconds of drawing by OpenGL's own clock, without waits for splats; 0 if OpenGL does not draw. Complete
+  /// after end().
   virtual double glSeconds() const { return 0; }
-  /// Since begin(): of the splats drawn, those that were left out because nothing of them could be seen.
+  /// How many of the splats given to draw() since begin() were left out because they are hidden completely.
   virtual uint64_t hiddenSplats() const { return 0; }
 };
 

@@ -21,7 +21,7 @@ namespace {
 constexpr size_t kBlock = 256;  // splats at a time: the arrays between the two loops stay in the L1 cache
 constexpr auto kSupport = static_cast<float>(kKernelSupport);
 
-/// What the arithmetic loop hands to the loop that chooses.
+/// The results that the arithmetic loop passes to the loop that chooses.
 struct Block {
   float x[kBlock], y[kBlock], depth[kBlock];
   float l11[kBlock], l21[kBlock], l22[kBlock];
@@ -77,7 +77,7 @@ void computeBlock(const PerspectiveMap& map, const GeometryArrays<const float>& 
   }
 }
 
-/// Decides about one projected splat after the other, and keeps what can be seen.
+/// Decides for each projected splat whether it can be seen, and keeps those that can.
 class Chooser {
  public:
   enum class Fate { kOffScreen, kTransparent, kKept };
@@ -132,7 +132,7 @@ class Chooser {
     return fate;
   }
 
-  /// Whether no piece of a splat could be seen, wherever it is. `slope`: as it is drawn.
+  /// Whether every piece of a splat is transparent, wherever the piece lies. `slope` is the slope as drawn.
   bool transparentThroughout(float mean, float slope, float variance) const {
     const float spread = reach_ * slope + ScreenCut::kReach * std::sqrt(slope * slope + variance);
     return table_.fullyTransparent(mean - spread, mean + spread);

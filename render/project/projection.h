@@ -1,9 +1,10 @@
-// A brick's splats -> ellipses on the screen. Design section 3, "Projection" and "Classification per pixel".
+// Projects a brick's splats to ellipses on the screen. DESIGN.md, "Projection" and "Classification".
 //
-// Nothing is ever inverted: everything comes from rows of B = P A, with P two rows of the view (orthographic)
-// or of its local affine map at the splat's centre (perspective), and A the splat's factor. S2 = B Bᵀ; with
-// b0, b1 the rows of B and n = b0 × b1, Cauchy-Binet gives det S2 = |n|² without cancellation, and (S2 + ε)⁻¹
-// B w = (b1·(n × w) + ε b0·w, -b0·(n × w) + ε b1·w) / det(S2 + ε).
+// No matrix is inverted: everything is computed from the rows of B = P A, with P two rows of the view
+// (orthographic) or of its local affine map at the splat's centre (perspective), and A the splat's factor.
+//
+//     S2 = B Bᵀ, det S2 = |n|² with n = b0 × b1 (Cauchy-Binet: no cancellation; b0, b1 are the rows of B)
+//     (S2 + ε)⁻¹ B w = (b1·(n × w) + ε b0·w, -b0·(n × w) + ε b1·w) / det(S2 + ε)
 //
 // About 15 ns a splat and core (orthographic).
 #pragma once
@@ -26,7 +27,7 @@
 
 namespace curvisplat {
 
-/// Where splats went; an empty picture is explained by these.
+/// What became of the splats; these counts explain an empty picture.
 struct ProjectionCounts {
   uint64_t read = 0;         // in the bricks, or the parts of them that are drawn
   uint64_t clipped = 0;      // outside of a clip plane
@@ -37,7 +38,7 @@ struct ProjectionCounts {
                         // cuts
 };
 
-/// What to do with every splat of a frame.
+/// How to project the splats of a frame; the same for all of them.
 struct ProjectionSettings {
   ScreenView view;
   bool per_pixel = true;  // false: flat splats; slopes and widths are left out
@@ -47,16 +48,17 @@ struct ProjectionSettings {
   BorderStyle borders = kHalfCellStyle;  // kWholeCellStyle where the data is cell-centred
 };
 
-/// Projects bricks. One thread each.
+/// Projects bricks. Each projector belongs to one thread.
 class BrickProjector {
  public:
-  /// A brick gives at most kMaxBrickSplats splats plus this many records of pieces; where borders and
-  /// perspective would make more, borders are drawn as any cell, clip planes leave out or leave whole what
-  /// they go through, and perspective cuts coarser and drops more of what is close to the eye.
+  /// A brick gives at most kMaxBrickSplats splats plus this many records of pieces. If borders and
+  /// perspective would make more, cells at borders are drawn like any cell, clip planes keep or drop whole
+  /// splats instead of cutting them, and perspective cuts more coarsely and drops more of the splats that are
+  /// close to the eye.
   static constexpr size_t kMaxPieces = 65536;
   static constexpr size_t kMaxSplats = kMaxBrickSplats + kMaxPieces;
 
-  /// Takes the memory it will ever need.
+  /// Allocates all memory that project() will need.
   BrickProjector();
 
   /// Projects the splats of a brick that `ranges` hold; `cell_min` is the minimum corner of its cell. Leaves
@@ -71,7 +73,7 @@ class BrickProjector {
   void project(const ProjectionSettings& settings, const ClassificationTable& table,
                const glm::dvec3& cell_min, const SplatGeometry& geometry, const SplatVariable& variable);
 
-  /// In the order of the ranges; a ScreenCut, of the same depth, before its splat.
+  /// In the order of the ranges. A ScreenCut precedes its splat and has the same depth.
   const std::vector<ScreenSplat>& splats() const { return splats_; }
   /// [splats()], larger is farther: orthographic, distance along the view from any origin; perspective,
   /// distance from the eye.

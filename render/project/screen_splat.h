@@ -1,5 +1,5 @@
-// What the projection hands to the painters: splats as ellipses on the screen, and what faces leave of them.
-// Every record takes 40 bytes.
+// The records that the projection passes to the painters: splats as ellipses on the screen, and the faces
+// that cut them. Every record takes 40 bytes.
 #pragma once
 
 #include <array>
@@ -21,8 +21,8 @@ struct ScreenSplat {
 };
 static_assert(sizeof(ScreenSplat) == 40);
 
-/// The faces that a splat is cut at: a record of its own, directly before the splat where splats come from the
-/// nearest to the farthest, and directly behind it where they come from the farthest to the nearest. The
+/// The faces that a splat is cut at: a record of its own, directly before the splat where splats come from
+/// the nearest to the farthest, and directly behind it where they come from the farthest to the nearest. The
 /// splat's amplitude is then negative: minus what it would be.
 ///
 /// Along the ray of a pixel the splat lies about its middle with a distribution of deviation 1: the

@@ -1,5 +1,5 @@
-// A camera and an image, made ready for projecting bricks: everything of one view that does not change from
-// splat to splat. Double precision.
+// A camera and an image, prepared for projecting bricks: all constants of one view that are the same for
+// every splat. Double precision.
 //
 // "Stretched" space is the data's after --scale: what the camera looks at. Pixels count from the left and
 // from the top; pixel (0, 0) covers [0, 1) x [0, 1).
@@ -38,14 +38,14 @@ struct ScreenView {
   double slope_low_pass_px2 = kSlopeLowPass;  // other values than these are for tests
   double widest = kWidest;
 
-  /// Throws UsageError where a number makes no picture: an image without pixels, a scale or extent that is
-  /// not positive, an angle outside (0, 180).
+  /// Throws UsageError for invalid numbers: an image without pixels, a scale or extent that is not positive,
+  /// an angle outside (0, 180) degrees.
   static ScreenView of(const Camera& camera, ImageSize size, const glm::dvec3& scale, double low_pass_px2,
                        double near);
 
   /// A point of the data in view axes (right, down, forward), stretched units, from the eye.
   glm::dvec3 viewFromData(const glm::dvec3& data) const;
-  /// The same view in the words of the cut; the image's edges are moved out by the low-pass' reach.
+  /// The same view as the cut needs it, with the image's edges moved out by the reach of the low-pass.
   CutView cutView() const;
 
   /// Where a point in view axes lies in the image; perspective: in front of the eye.

@@ -2,8 +2,8 @@
 //
 // A splat is halved along the longest column of A: that column and the slope along it become half, the weight
 // half, and the two centres lie a quarter of the column from the old one, with means a quarter of the slope
-// apart from it. Merging the two (design section 3) gives the splat back exactly, residual variance included;
-// and a pencil of aspect ratio 1000 is cut across only, where eight octants would cut it to dust.
+// apart from it. Merging the two (DESIGN.md, "Merging") gives the splat back exactly, residual variance
+// included; and a pencil of aspect ratio 1000 is cut across only, where eight octants would cut it to dust.
 #pragma once
 
 #include <algorithm>

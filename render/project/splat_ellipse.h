@@ -1,5 +1,5 @@
 // One splat under one linear map: the arithmetic at the heart of the projection, without a branch, so that
-// loops over it vectorise. Design section 3; the identities it rests on are in projection.h.
+// loops over it vectorise. DESIGN.md, "Projection"; the identities it rests on are in projection.h.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace curvisplat {
 
-/// A, as in stream/splats.h: column n is axis n times (1, l10, l20), (0, 1, l21), (0, 0, 1).
+/// A, as in stream/model/splats.h: column n is axis n times (1, l10, l20), (0, 1, l21), (0, 0, 1).
 struct Shape {
   float axis0, axis1, axis2;
   float shear10, shear20, shear21;

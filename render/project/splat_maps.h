@@ -1,4 +1,4 @@
-// A view, seen from one brick: the constants of the projection in float, from the brick's origin on.
+// The constants of one view's projection for one brick, in float and relative to the brick's origin.
 #pragma once
 
 #include <cmath>

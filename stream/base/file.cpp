@@ -13,7 +13,6 @@
 
 #include "stream/base/check.h"
 #include "stream/base/open_retrying.h"
-#include "stream/base/paths.h"
 
 namespace curvisplat {
 namespace {
@@ -53,26 +52,6 @@ void syncRetrying(int fd, const std::filesystem::path& path) {
   // EINVAL and ENOTSUP: the file system cannot sync a directory or a pipe. The disk has not failed.
   if (result < 0 && errno != EINVAL && errno != ENOTSUP)
     throw Error("{}: cannot be synced to the disk: {}", path.string(), reason());
-}
-
-void renameFile(const std::filesystem::path& from, const std::filesystem::path& to) {
-  if (SystemCalls::current().rename(from.c_str(), to.c_str()) < 0)
-    throw Error("{}: cannot be renamed to {}: {}", from.string(), to.string(), reason());
-}
-
-void replaceFile(const std::filesystem::path& path, const std::filesystem::path& temporary,
-                 std::span<const std::byte> bytes) {
-  // An existing `temporary` could be a link, which opening it for writing would follow.
-  SystemCalls::current().remove(temporary.c_str());
-  try {
-    OutputFile file(temporary);
-    file.append(bytes);
-    file.close();
-    renameFile(temporary, path);
-  } catch (...) {
-    removeAll(temporary);
-    throw;
-  }
 }
 
 }  // namespace
@@ -251,27 +230,23 @@ std::string readTextFile(const std::filesystem::path& path, uint64_t limit) {
 }
 
 void writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-  replaceFile(path, path.string() + ".part", bytes);
+  const std::filesystem::path temporary = path.string() + ".part";
+  // What is there may be a link that leads anywhere: it would be followed.
+  SystemCalls::current().remove(temporary.c_str());
+  try {
+    OutputFile file(temporary);
+    file.append(bytes);
+    file.close();
+    if (SystemCalls::current().rename(temporary.c_str(), path.c_str()) < 0)
+      throw Error("{}: cannot be renamed to {}: {}", temporary.string(), path.string(), reason());
+  } catch (...) {
+    removeAll(temporary);
+    throw;
+  }
 }
 
 void writeFileAtomically(const std::filesystem::path& path, const std::string& text) {
   writeFileAtomically(path, std::as_bytes(std::span(text)));
-}
-
-void writeFileDurably(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-  const std::filesystem::path target = writableTarget(path);
-  replaceFile(target, temporaryBeside(target), bytes);
-  syncDirectory(folderOf(target));
-}
-
-void writeFileDurably(const std::filesystem::path& path, const std::string& text) {
-  writeFileDurably(path, std::as_bytes(std::span(text)));
-}
-
-void putFileIntoPlace(const std::filesystem::path& from, const std::filesystem::path& to) {
-  OutputFile(from, Caching::kPages, OutputFile::Existing::kKeep).close();
-  renameFile(from, to);
-  syncDirectory(folderOf(to));
 }
 
 void syncDirectory(const std::filesystem::path& path) {

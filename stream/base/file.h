@@ -137,18 +137,9 @@ std::string readTextFile(const std::filesystem::path& path, uint64_t limit = 16 
 
 /// Writes `bytes` to a temporary file beside `path`, syncs it and renames it to `path`. At any moment `path`
 /// is either the old file or the complete new one. The rename survives a power loss once the folder has been
-/// synced, which is the caller's task. Only one writer at a time.
+/// synced, which is the caller's task. Only one writer at a time; durable_file.h has no such limit.
 void writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void writeFileAtomically(const std::filesystem::path& path, const std::string& text);
-/// Like writeFileAtomically(), for any number of processes at the same time; also syncs the folder, so that
-/// the new file survives a power loss. Follows links. Throws Error if `path` exists and is not a regular
-/// file.
-void writeFileDurably(const std::filesystem::path& path, std::span<const std::byte> bytes);
-void writeFileDurably(const std::filesystem::path& path, const std::string& text);
-
-/// Gives its final name to a complete file that a library or another program wrote: syncs it, renames it and
-/// syncs the folder.
-void putFileIntoPlace(const std::filesystem::path& from, const std::filesystem::path& to);
 
 /// Syncs (fsync) a folder, so that the names in it survive a power loss.
 void syncDirectory(const std::filesystem::path& path);

@@ -1,6 +1,5 @@
 #include "stream/base/paths.h"
 
-#include <random>
 #include <system_error>
 
 #include "stream/base/error.h"
@@ -34,11 +33,6 @@ std::filesystem::path writableTarget(const std::filesystem::path& path) {
   if (std::filesystem::exists(target, ignored) && !isRegularFile(target))
     throw Error("{}: exists and is not a regular file; choose another name", path.string());
   return target;
-}
-
-std::filesystem::path temporaryBeside(const std::filesystem::path& target) {
-  std::random_device random;
-  return folderOf(target) / fmt::format(".curvisplat.{:08x}{:08x}.part", random(), random());
 }
 
 }  // namespace curvisplat

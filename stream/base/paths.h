@@ -19,8 +19,4 @@ std::filesystem::path linkTarget(std::filesystem::path path);
 /// linkTarget() for a file to be written. Throws Error if the target exists and is not a regular file.
 std::filesystem::path writableTarget(const std::filesystem::path& path);
 
-/// A short name in `target`'s folder for a file that will replace `target` once it is complete. The name is
-/// random, so that programs that share the folder, on any machine, do not collide.
-std::filesystem::path temporaryBeside(const std::filesystem::path& target);
-
 }  // namespace curvisplat

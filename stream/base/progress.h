@@ -62,7 +62,10 @@ class Progress {
   void throwIfStopped() const {
     if (const int signal = stop_signal_.load(std::memory_order_relaxed))
       throw Interrupted(signal, "interrupted");
+    if (outer_) outer_->throwIfStopped();
   }
+  /// stop() of `outer` stops this job as well, which is a part of that one. `outer` outlives it.
+  void stopWith(const Progress& outer) { outer_ = &outer; }
 
   struct Phase {
     std::string name;
@@ -78,6 +81,7 @@ class Progress {
   void show();
 
   const Display display_;
+  const Progress* outer_ = nullptr;
   std::string phase_, unit_;
   uint64_t total_ = 0;
   std::atomic<uint64_t> done_ = 0, skipped_ = 0;

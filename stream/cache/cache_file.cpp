@@ -6,7 +6,7 @@ namespace curvisplat {
 
 std::filesystem::path cacheFile(const std::filesystem::path& cache, const std::string& name) {
   namespace fs = std::filesystem;
-  const fs::path path = cache / name;
+  fs::path path = cache / name;
   std::error_code error;
   const fs::file_status status = fs::symlink_status(path, error);
   if (fs::is_symlink(status))

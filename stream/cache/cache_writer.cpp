@@ -250,14 +250,14 @@ FileInfo CacheWriter::State::writeIndex(const std::vector<Brick>& ordered) {
   Checksum checksum;
   checksum.add(bytesOf(header));
   checksum.add(bytesOf(records));
-  const FileInfo info{"bricks.bin", file.size(), checksum.value()};
+  FileInfo info{"bricks.bin", file.size(), checksum.value()};
   file.close();
   return info;
 }
 
 FileInfo CacheWriter::State::closeGeometry(const std::vector<Brick>& ordered) {
   padToPage(geometry);
-  const FileInfo info{"geometry.bin", geometry.size(), geometryChecksum(ordered)};
+  FileInfo info{"geometry.bin", geometry.size(), geometryChecksum(ordered)};
   geometry.close();
   return info;
 }

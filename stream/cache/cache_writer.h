@@ -43,7 +43,7 @@ class CacheWriter {
   /// octree (children before their parent, siblings in Morton order), so that the bytes do not depend on the
   /// number of threads or on the memory budget. `error`: Brick::error. One thread at a time. Returns the
   /// brick's id.
-  uint64_t append(EncodedBrick&& brick, float error);
+  uint64_t append(EncodedBrick&& encoded, float error);
 
   /// Reads back the brick that append() wrote under `id`, for merging into coarser levels. Any number of
   /// threads may read at the same time, while nothing is appended.

@@ -283,8 +283,8 @@ Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path
   try {
     json = Json::parse(text);
   } catch (const nlohmann::json::exception& error) {
-    throw Error("{}: is not valid JSON: {}; the file is damaged or another program's", path.string(),
-                error.what());
+    throw Error("{}: is not valid JSON: found {}; the file is damaged or another program's", path.string(),
+                jsonFault(text, error));
   }
   const Fields fields(json, "", path);
   if (fields.text("format") != kFormat) fields.fail("format", fmt::format("'{}'", kFormat), json["format"]);

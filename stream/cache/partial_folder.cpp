@@ -7,6 +7,9 @@
 
 #include <cerrno>
 #include <cstring>
+#include <optional>
+#include <span>
+#include <string>
 #include <utility>
 
 #include "stream/base/check.h"
@@ -20,8 +23,6 @@ namespace curvisplat {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr const char* kLockName = "lock";
 
 std::string reason() {
   return std::strerror(errno);
@@ -41,9 +42,48 @@ fs::path partialOf(const fs::path& target) {
   return withSuffix(withoutSlash(target), ".partial");
 }
 
-void removeFolder(const fs::path& path, const char* what) {
-  if (const std::error_code error = removeAll(path))
-    throw Error("{}: the {} cannot be removed: {}", path.string(), what, error.message());
+/// removeAll() of a folder, its mark last: killed meanwhile, it leaves a folder that the next conversion removes.
+std::error_code removeMarked(const fs::path& path) {
+  std::error_code error, first;
+  for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error))
+    if (entry->path().filename() != kPartialLock)
+      if (const std::error_code inside = removeAll(entry->path()); !first) first = inside;
+  return first ? first : removeAll(path);
+}
+
+void requireRemoved(std::error_code error, const fs::path& path, const char* what) {
+  if (error) throw Error("{}: the {} cannot be removed: {}", path.string(), what, error.message());
+}
+
+/// Text of the lock in `folder`; nullopt if it is missing, no regular file or too long for a mark. Throws Error
+/// if it cannot be read.
+std::optional<std::string> lockText(const fs::path& folder) {
+  const fs::path lock = folder / kPartialLock;
+  std::error_code error;
+  if (!fs::is_regular_file(fs::symlink_status(lock, error)) ||
+      fs::file_size(lock, error) > kPartialMark.size())
+    return std::nullopt;
+  return readTextFile(lock);
+}
+
+bool isMarked(const fs::path& folder) {
+  return lockText(folder) == kPartialMark;
+}
+
+/// Whether a conversion to `target` has made the folder `path` and may empty it; not if it is a link.
+bool isOurs(const fs::path& path, const fs::path& target) {
+  std::error_code error;
+  if (!fs::is_directory(fs::symlink_status(path, error))) return false;
+  if (isMarked(path)) return true;
+  // Killed while it put the cache into place, it leaves the mark there, and the old cache here.
+  if (isMarked(target) && fs::exists(path / "manifest.json", error)) return true;
+  // Killed between making the folder and marking it: empty, or with a lock that has a part of the mark.
+  for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error))
+    if (entry->path().filename() != kPartialLock) return false;
+  if (error) return false;
+  if (!fs::exists(fs::symlink_status(path / kPartialLock, error))) return true;
+  const std::optional<std::string> text = lockText(path);
+  return text && kPartialMark.starts_with(*text);
 }
 
 }  // namespace
@@ -67,8 +107,11 @@ void checkReplaceable(const fs::path& target, bool overwrite) {
 }
 
 bool hasUnfinished(const fs::path& target) {
-  std::error_code ignored;
-  return fs::is_directory(partialOf(target), ignored);
+  try {
+    return isOurs(partialOf(target), withoutSlash(target));
+  } catch (const Error&) {
+    return true;  // a lock that cannot be read
+  }
 }
 
 PartialFolder::PartialFolder(fs::path target, bool overwrite, Rest rest)
@@ -77,9 +120,15 @@ PartialFolder::PartialFolder(fs::path target, bool overwrite, Rest rest)
   const bool is_new = SystemCalls::current().mkdir(path_.c_str(), 0777) == 0;
   if (!is_new && errno != EEXIST)
     throw Error("{}: the directory cannot be created: {}; choose another output", path_.string(), reason());
+  if (!is_new && !isOurs(path_, target_))
+    throw Error("{}: exists and was not made by curvisplat; remove it, or choose another output",
+                path_.string());
   try {
     lock();
+    mark();
   } catch (...) {
+    if (lock_ >= 0 && is_new) SystemCalls::current().remove((path_ / kPartialLock).c_str());
+    if (lock_ >= 0) SystemCalls::current().close(lock_);
     if (is_new)
       SystemCalls::current().remove(path_.c_str());  // fails if another conversion's lock is in it by now
     throw;
@@ -98,19 +147,19 @@ PartialFolder::PartialFolder(fs::path target, bool overwrite, Rest rest)
 void PartialFolder::clear() {
   leave_ = false;
   for (const auto& entry : fs::directory_iterator(path_))
-    if (entry.path().filename() != kLockName)
-      removeFolder(entry.path(), "remainder of an unfinished conversion");
+    if (entry.path().filename() != kPartialLock)
+      requireRemoved(removeAll(entry.path()), entry.path(), "remainder of an unfinished conversion");
 }
 
 PartialFolder::~PartialFolder() {
   if (lock_ < 0) return;
-  if (!leave_) removeAll(path_);
+  if (!leave_) removeMarked(path_);
   SystemCalls::current().close(lock_);
 }
 
 void PartialFolder::lock() {
-  const fs::path name = path_ / kLockName;
-  const int fd = openRetrying(name, O_RDWR | O_CREAT, 0666);
+  const fs::path name = path_ / kPartialLock;
+  const int fd = openRetrying(name, O_RDWR | O_CREAT | O_NOFOLLOW, 0666);
   if (fd < 0) throw Error("{}: cannot be opened: {}", name.string(), reason());
   const bool locked = ::flock(fd, LOCK_EX | LOCK_NB) == 0;
   const std::string why = reason();
@@ -130,6 +179,14 @@ void PartialFolder::lock() {
     throw Error("{}: another conversion to this output is running; wait for it, or choose another output",
                 path_.string());
   throw Error("{}: cannot be locked: {}", name.string(), why);
+}
+
+void PartialFolder::mark() {
+  if (isMarked(path_)) return;
+  OutputFile file(path_ / kPartialLock);
+  file.append(std::as_bytes(std::span(kPartialMark)));
+  file.close();
+  syncDirectory(path_);  // a power loss must not leave the work without its mark
 }
 
 void PartialFolder::putIntoPlace() {
@@ -169,13 +226,16 @@ void PartialFolder::putIntoPlace() {
   // The lock is released after the rename. Otherwise another conversion could take the folder for an
   // abandoned one.
   const int lock = std::exchange(lock_, -1);
-  removeAll(target_ / kLockName);
+  // The old cache, which is to be removed, is marked with it.
+  if (replaced_ != path_ ||
+      calls.rename((target_ / kPartialLock).c_str(), (path_ / kPartialLock).c_str()) < 0)
+    removeAll(target_ / kPartialLock);
   calls.close(lock);
 }
 
 void PartialFolder::removeReplaced() {
   const fs::path old = std::exchange(replaced_, {});
-  if (!old.empty()) removeFolder(old, "old cache, which has been replaced,");
+  if (!old.empty()) requireRemoved(removeMarked(old), old, "old cache, which has been replaced,");
 }
 
 }  // namespace curvisplat

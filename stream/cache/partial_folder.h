@@ -7,11 +7,18 @@
 //    +----- ~PartialFolder() ---+    +--- leave() and ~PartialFolder(), or the process is killed: the
 //                                         folder remains, unlocked. The next PartialFolder() empties it, or
 //                                         keeps its contents to continue the conversion.
+//
+// The lock file contains kPartialMark. Only folders with this mark, or without any files, are taken over and
+// emptied, so that other people's files are never removed.
 #pragma once
 
 #include <filesystem>
+#include <string_view>
 
 namespace curvisplat {
+
+inline constexpr const char* kPartialLock = "lock";
+inline constexpr std::string_view kPartialMark = "curvisplat: unfinished cache\n";
 
 /// Throws Error if `target` exists, unless it is a cache and `overwrite` is true.
 void checkReplaceable(const std::filesystem::path& target, bool overwrite);
@@ -24,7 +31,8 @@ class PartialFolder {
   enum class Rest { kRemove, kKeep };
 
   /// Creates and locks the folder. `rest`: remove the files of an unfinished conversion, or keep them, which
-  /// implies leave(). Throws Error as checkReplaceable(), and if another conversion to `target` is running.
+  /// implies leave(). Throws Error as checkReplaceable(), if another conversion to `target` is running, and if
+  /// the folder's name is a link or a folder that no conversion has made.
   PartialFolder(std::filesystem::path target, bool overwrite, Rest rest = Rest::kRemove);
   /// Removes the folder, unless putIntoPlace() or leave() was called.
   ~PartialFolder();
@@ -52,6 +60,7 @@ class PartialFolder {
 
  private:
   void lock();
+  void mark();
 
   std::filesystem::path target_, path_;
   std::filesystem::path replaced_;  // path of the old cache; empty if there is none

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "stream/base/check.h"
+#include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/cache/cache_index.h"
 #include "stream/cache/stream_file.h"
@@ -94,10 +95,29 @@ std::vector<FileInfo> VariableWriter::finish(const std::vector<std::string>& sou
   for (const std::string& source : sources)
     if (std::find(manifest_.sources.begin(), manifest_.sources.end(), source) == manifest_.sources.end())
       manifest_.sources.push_back(source);
-  writeFileAtomically(lock_->cache() / "manifest.json", manifest_.toJson());
+  replaceManifest();
   in_place_ = true;
-  syncDirectory(lock_->cache());
   return infos;
+}
+
+void VariableWriter::replaceManifest() {
+  const fs::path manifest = lock_->cache() / "manifest.json";
+  fs::path part = manifest;
+  part += kPartSuffix;
+  SystemCalls::current().remove(part.c_str());  // which may be a link
+  try {
+    OutputFile file(part);
+    const std::string text = manifest_.toJson();
+    file.append(std::as_bytes(std::span(text)));
+    file.close();
+    renameDurably(part, manifest);
+  } catch (const NameNotSynced&) {
+    in_place_ = true;
+    throw;
+  } catch (...) {
+    removeAll(part);
+    throw;
+  }
 }
 
 }  // namespace curvisplat

@@ -29,8 +29,9 @@ class VariableWriter {
   /// Appends a brick's streams, one per variable. Each brick comes once, in the order of conversion.
   void append(uint32_t brick, std::span<const EncodedValues> values);
 
-  /// Writes the tables, syncs, renames the files and replaces the manifest. Adds those `sources` to the
-  /// manifest that it does not list yet. Returns the manifest's entries for the new files.
+  /// Writes the tables, syncs, and puts the files and the manifest into place. Adds those `sources` to the
+  /// manifest that it does not list yet. Returns the manifest's entries for the new files. After an Error the
+  /// cache is what it was; after NameNotSynced it has the new files, though a power loss may undo that.
   std::vector<FileInfo> finish(const std::vector<std::string>& sources);
 
  private:
@@ -43,6 +44,7 @@ class VariableWriter {
   };
 
   void removeLeftovers() const;
+  void replaceManifest();
 
   const CacheLock* lock_;
   Manifest manifest_;

@@ -17,7 +17,7 @@ struct BrickSplats {
       runs;  // leaves: the nodes behind the splats, counts sum to size(); inner bricks: empty
   std::vector<RootPosition> positions;              // in `cell`
   std::vector<Splat> splats;                        // .position is ignored in favour of `positions`
-  std::vector<uint32_t> border_codes;               // [splat]; stream/border_code.h. Empty: all are whole
+  std::vector<uint32_t> border_codes;               // [splat]; stream/model/border_code.h. Empty: no borders
   std::vector<std::vector<SplatScalar>> variables;  // [variable][splat]
 
   size_t size() const { return splats.size(); }

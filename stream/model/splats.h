@@ -8,16 +8,13 @@
 //
 //            The kernel's unit sphere maps to {A u : |u| <= 1}. √det S = a0 a1 a2. S is never inverted: A⁻¹
 //            is a forward substitution.
-//   weight   V: the volume of the piece of space that the splat stands for. |det J| = a0 a1 a2 for a node's
-//   cell,
-//            other where an axis was floored (degenerate cells) or splats were merged.
+//   weight   V: the volume of the piece of space that the splat stands for. |det J| for a node's cell, which
+//            is a0 a1 a2 unless the splat was stretched, an axis was floored or splats were merged.
 //   mean     f, the scalar at the centre
-//   slope    w = A⁻¹ h, the change of the scalar along A's columns: f(x) = f + w · A⁻¹(x - μ). Design section
-//   3's
-//            h is A w, so hᵀS⁻¹h = |w|². For a node w is the computational gradient ∇_c f in a rotated frame:
-//            no division by a small cell.
-//   variance r >= 0, the residual in-cell variance: design section 3's t is |w|²/12 + r. Zero for a node's
-//   cell.
+//   slope    w = A⁻¹ h, the change of the scalar along A's columns: f(x) = f + w · A⁻¹(x - μ). So the h of
+//            DESIGN.md, "Splats", is A w, and hᵀS⁻¹h = |w|². For a node w is the computational gradient
+//            ∇_c f in a rotated frame: no division by a small cell.
+//   variance r >= 0, the residual in-cell variance: t of DESIGN.md is |w|²/12 + r. Zero for a node's cell.
 #pragma once
 
 #include <array>
@@ -66,7 +63,7 @@ struct SplatGeometry {
   std::vector<float> axis0, axis1, axis2;  // world units
   std::vector<float> shear10, shear20, shear21;
   std::vector<float> weight;          // world units cubed
-  std::vector<uint32_t> border_code;  // stream/border_code.h: kNoBorder but for nodes at a border
+  std::vector<uint32_t> border_code;  // stream/model/border_code.h: kNoBorder except for cells at a border
 
   size_t size() const { return x.size(); }
   void resize(size_t count);

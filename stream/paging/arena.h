@@ -1,5 +1,5 @@
-// Memory of a fixed size, cut into blocks of any size and put together again. What malloc keeps between
-// blocks of changing sizes is not bounded; this is.
+// An allocator for blocks of any size in memory of a fixed size. Unlike malloc, it bounds the memory that is
+// lost to fragmentation between blocks of changing sizes.
 //
 // First fit, neighbours merge. Blocks begin at multiples of kBlockAlignment. A page that was never used takes
 // no memory. One thread at a time.
@@ -19,12 +19,12 @@ class Arena {
 
   explicit Arena(uint64_t capacity);
 
-  /// Null where no hole is large enough.
+  /// Returns null if no hole is large enough.
   std::byte* allocate(uint64_t bytes);
   /// `bytes` as in allocate().
   void free(std::byte* block, uint64_t bytes);
 
-  /// What a block of `bytes` takes.
+  /// The memory in bytes that a block of `bytes` takes up.
   static uint64_t charge(uint64_t bytes) {
     return (bytes + kBlockAlignment - 1) / kBlockAlignment * kBlockAlignment;
   }

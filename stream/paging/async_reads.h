@@ -1,9 +1,9 @@
-// Reads that go on while the caller does something else: io_uring, or threads in pread where the kernel
+// Reads that go on while the caller does something else: by io_uring, or by threads in pread if the kernel
 // refuses io_uring. One thread owns an AsyncReads, and submits and waits; any thread may wake it.
 //
 //   submit(read) ... submit(read) -> wait() -> a read that has ended, in any order
 //
-// A read may end short, as pread does, or with EINTR; whoever submits goes on from there.
+// A read may end short, as pread does, or with EINTR; the submitter then submits the rest.
 #pragma once
 
 #include <cstddef>
@@ -28,15 +28,15 @@ struct AsyncReadEnd {
 
 class AsyncReads {
  public:
-  /// Waits for what is under way.
+  /// Waits for all reads under way.
   virtual ~AsyncReads() = default;
 
   /// For people: "io_uring" or "pread on 8 threads".
   virtual const char* name() const = 0;
   /// At most as many at once as the depth it was made with.
   virtual void submit(const AsyncRead& read) = 0;
-  /// Waits until a read ends. Nothing if wake() was called since wait() last gave nothing. Throws Error if
-  /// the kernel breaks off.
+  /// Waits until a read ends. Returns nullopt if wake() was called since the last nullopt. Throws Error if
+  /// the wait itself fails.
   virtual std::optional<AsyncReadEnd> wait() = 0;
   /// Any thread.
   virtual void wake() = 0;
@@ -44,7 +44,7 @@ class AsyncReads {
 
 /// Null where the kernel refuses io_uring (old, or forbidden to this process).
 std::unique_ptr<AsyncReads> makeUringReads(unsigned depth);
-/// By SystemCalls::pread.
+/// Reads with SystemCalls::pread on `depth` threads.
 std::unique_ptr<AsyncReads> makeThreadReads(unsigned depth);
 
 }  // namespace curvisplat

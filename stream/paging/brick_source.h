@@ -1,11 +1,11 @@
-// The bricks of a frame, decoded, in the hands of whoever projects them: from the cache of decoded bricks
-// where they are there, else from the disk by the pager.
+// Supplies the decoded bricks of a frame to the workers that project them: from the cache of decoded bricks
+// if they are in it, otherwise from the disk through the pager.
 //
 //   start(parts)         cache: pin what is there      pager: read the others ahead
 //   take(n)  workers     the pin, or: wait for the bytes, verify, decode (into the cache where it has room)
 //
-// A brick that is drawn in several parts is read once: whoever comes first decodes it, the others wait. Which
-// bricks come from where shows in the times alone: decoding gives the same numbers always.
+// A brick that is drawn in several parts is read once: the first worker decodes it, the others wait. Where a
+// brick comes from affects times only: decoding always gives the same numbers.
 #pragma once
 
 #include <atomic>
@@ -80,7 +80,7 @@ class BrickSource {
   /// Throws as take() does.
   bool prefetchNext(Scratch& scratch);
 
-  /// Wakes who waits in take() or prefetchNext(). Any thread.
+  /// Wakes the threads that wait in take() or prefetchNext(). Any thread.
   void stop();
   /// After the last take() since start(): lets go of what was not taken. Adds what was counted since then;
   /// the workers' sums are left as they are.

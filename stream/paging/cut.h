@@ -1,11 +1,11 @@
 // Which bricks one view needs: a pure function, apart from reading and drawing them.
-// Design section 6, "plan".
+// DESIGN.md, "The pipeline".
 //
 // The cut starts at the root and goes down until a brick's error is small enough on the screen, or it is a
 // leaf; what is outside the image or transparent is left out with all that lies below it. The result's cells
-// are disjoint, and the cell of a whole brick comes after every cell that it can hide (at each octree node the
-// child farther along every axis comes first), so that bricks which are needed about the same time are named
-// so. Splats are drawn in an order of their own (render/frame/sweep_buffer.h).
+// are disjoint, and the cell of a whole brick comes after every cell that it can hide (at each octree node
+// the child farther along every axis comes first), so that bricks which are needed about the same time are
+// named so. Splats are drawn in an order of their own (render/frame/sweep_buffer.h).
 //
 // Under a limit of splats or bytes the brick with the largest error on the screen is refined first, octant by
 // octant, until the next octant's children would not fit. That sequence does not depend on the limit: a
@@ -26,7 +26,7 @@
 
 namespace curvisplat {
 
-/// What a cut must know of a view. "Stretched" space is scale * data.
+/// The properties of a view that the cut depends on. "Stretched" space is scale * data.
 struct CutView {
   /// Points p with normal·p + offset < 0 are out of the image, or clipped; |normal| = 1. Stretched.
   struct Plane {
@@ -85,7 +85,7 @@ struct Cut {
   uint64_t transparent = 0;
 };
 
-/// Says whether nothing of a brick with such values can be seen.
+/// Whether a brick with such values is entirely transparent.
 using TransparentBounds = std::function<bool(const ValueBounds&)>;
 
 Cut chooseCut(const CutTree& tree, const CutView& view, const TransparentBounds& transparent,

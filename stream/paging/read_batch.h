@@ -22,7 +22,7 @@ inline constexpr size_t kBrickStreams = 2;  // geometry, then the values of one 
 /// Where one brick's streams lie, each in a file of its own.
 using BrickExtents = std::array<Extent, kBrickStreams>;
 
-/// Reading so many bytes for nothing costs less than one more request.
+/// Reading a gap of this many bytes takes less time than one more request.
 inline constexpr uint64_t kMaxGapBytes = 32 << 10;
 /// Larger reads are no faster, and come later.
 inline constexpr uint64_t kMaxJoinedBytes = 1 << 20;

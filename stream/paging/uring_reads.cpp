@@ -1,7 +1,9 @@
 #include <liburing.h>
-#include <sys/eventfd.h>
+#include <poll.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstring>
 
@@ -17,24 +19,28 @@ constexpr uint64_t kWakeTag = ~uint64_t{0};
 // The kernel may put off what it has no memory for; so many times in a row, it has broken off.
 constexpr unsigned kMaxPutOff = 1000;
 
-/// A read of an event counter is always under way beside the others: adding to the counter is what wakes.
+/// Two connected sockets that do not block.
+using Sockets = std::array<int, 2>;
+
+/// A poll of a socket is always under way beside the reads: writing to the other socket wakes. An event counter
+/// would do as well, but if writing fails, nothing could wake; shutting down the connection can.
 class UringReads : public AsyncReads {
  public:
-  /// `ring` and `event` become its own.
-  UringReads(const io_uring& ring, int event) : ring_(ring), event_(event) { listen(); }
+  /// Takes over `ring` and `sockets`.
+  UringReads(const io_uring& ring, const Sockets& sockets) : ring_(ring), sockets_(sockets) { listen(); }
 
   ~UringReads() override {
-    // Until they end, the reads' memory is the kernel's; those that it was never told of have not begun. One more
-    // is under way beside them, which wake() ends.
-    wake();
-    for (unsigned in_kernel = under_way_ + 1 - io_uring_sq_ready(&ring_); in_kernel > 0;) {
+    // Until the reads end, their memory is the kernel's; those that it was never told of have not begun. The
+    // poll ends with the connection.
+    disconnect();
+    for (unsigned in_kernel = under_way_ + (listening_ ? 1 : 0) - io_uring_sq_ready(&ring_); in_kernel > 0;) {
       io_uring_cqe* end = nullptr;
       if (io_uring_wait_cqe(&ring_, &end) != 0) continue;  // interrupted
       io_uring_cqe_seen(&ring_, end);
       --in_kernel;
     }
     io_uring_queue_exit(&ring_);
-    ::close(event_);
+    for (const int socket : sockets_) ::close(socket);
   }
 
   const char* name() const override { return "io_uring"; }
@@ -55,6 +61,8 @@ class UringReads : public AsyncReads {
     const AsyncReadEnd ended{io_uring_cqe_get_data64(end), end->res};
     io_uring_cqe_seen(&ring_, end);
     if (ended.tag == kWakeTag) {
+      listening_ = false;
+      if (!drain()) throw Error("reading by io_uring broke off: its thread can no longer be woken");
       listen();
       return {};
     }
@@ -63,27 +71,66 @@ class UringReads : public AsyncReads {
   }
 
   void wake() override {
-    const uint64_t one = 1;
-    // Fails only where the counter is full, and then it wakes anyway.
-    [[maybe_unused]] const ssize_t written = ::write(event_, &one, sizeof one);
+    const char any = 0;
+    ssize_t written;
+    do {
+      written = ::send(sockets_[1], &any, 1, MSG_NOSIGNAL);
+    } while (written < 0 && errno == EINTR);
+    // A full socket (EAGAIN) wakes anyway.
+    if (written < 0 && errno != EAGAIN) disconnect();
   }
 
  private:
-  void listen() { put({event_, 0, reinterpret_cast<std::byte*>(&counter_), sizeof counter_, kWakeTag}); }
+  void listen() {
+    io_uring_sqe* entry = nextEntry();
+    io_uring_prep_poll_add(entry, sockets_[0], POLLIN);
+    io_uring_sqe_set_data64(entry, kWakeTag);
+    listening_ = true;
+  }
+
+  /// Reads what has woken. Returns false after disconnect().
+  bool drain() {
+    std::array<char, 256> ignored;
+    ssize_t got;
+    do {
+      got = ::read(sockets_[0], ignored.data(), ignored.size());
+    } while (got > 0 || (got < 0 && errno == EINTR));
+    return got < 0;
+  }
+
+  void disconnect() { ::shutdown(sockets_[1], SHUT_RDWR); }
+
+  io_uring_sqe* nextEntry() {
+    io_uring_sqe* entry = io_uring_get_sqe(&ring_);
+    CURVISPLAT_CHECK(entry && "no more reads at once than the depth");
+    return entry;
+  }
 
   /// Told to the kernel by the next wait().
   void put(const AsyncRead& read) {
-    io_uring_sqe* entry = io_uring_get_sqe(&ring_);
-    CURVISPLAT_CHECK(entry && "no more reads at once than the depth");
+    io_uring_sqe* entry = nextEntry();
     io_uring_prep_read(entry, read.fd, read.to, static_cast<unsigned>(read.count), read.offset);
     io_uring_sqe_set_data64(entry, read.tag);
   }
 
   io_uring ring_;
-  const int event_;
-  uint64_t counter_ = 0;
+  const Sockets sockets_;  // the poll's, wake()'s
+  bool listening_ = false;
   unsigned under_way_ = 0;
 };
+
+/// Whether the kernel takes what is submitted. A container may allow io_uring_setup but not io_uring_enter.
+bool canSubmit(io_uring& ring) {
+  io_uring_prep_nop(io_uring_get_sqe(&ring));
+  int result;
+  do {
+    result = io_uring_submit_and_wait(&ring, 1);
+  } while (result == -EINTR);
+  io_uring_cqe* end = nullptr;
+  if (result < 0 || io_uring_peek_cqe(&ring, &end) != 0) return false;
+  io_uring_cqe_seen(&ring, end);
+  return true;
+}
 
 }  // namespace
 
@@ -94,12 +141,13 @@ std::unique_ptr<AsyncReads> makeUringReads(unsigned depth) {
   io_uring_probe* probe = io_uring_get_probe_ring(&ring);
   const bool reads = probe && io_uring_opcode_supported(probe, IORING_OP_READ);
   if (probe) io_uring_free_probe(probe);
-  const int event = reads ? ::eventfd(0, EFD_CLOEXEC) : -1;
-  if (event < 0) {
+  Sockets sockets{-1, -1};
+  if (!reads || !canSubmit(ring) ||
+      ::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, sockets.data()) < 0) {
     io_uring_queue_exit(&ring);
     return nullptr;
   }
-  return std::make_unique<UringReads>(ring, event);
+  return std::make_unique<UringReads>(ring, sockets);
 }
 
 }  // namespace curvisplat

@@ -185,7 +185,8 @@ TEST_F(BadInput, MissingTransferFunction) {
 
 TEST_F(BadInput, BrokenTransferFunction) {
   writeFileAtomically(file("broken.json"), std::string("[{\"RGBPoints\": [0, 1"));
-  expectNotRendered(file("whole.splats"), {"--tf", file("broken.json")}, {"broken.json"});
+  expectNotRendered(file("whole.splats"), {"--tf", file("broken.json")},
+                    {"broken.json", "a syntax error at line 1, column 21"});
 }
 
 TEST_F(BadInput, PictureNameWithAnotherEnding) {
@@ -210,8 +211,33 @@ TEST_F(BadInput, WrongUsage) {
                 {"--sise"});
 }
 
+TEST_F(BadInput, OptionValuesThatAreNone) {
+  const auto refused = [](const std::vector<std::string>& arguments, const std::string& text) {
+    expectOneLine(runProgram(arguments), 2, {text});
+  };
+  // The unknown option comes first, whatever else is missing.
+  refused({"render", "--sise"}, "unknown option --sise (did you mean --size?)");
+  refused({"convert", file("scene.xyz"), "--time-step", "99999999999"},
+          "--time-step '99999999999': is not a whole number from 0 on, or is too large");
+  refused({"convert", file("scene.xyz"), "--blank", "none"},
+          "--blank 'none': is not a number, or is too large");
+  refused({"convert", file("scene.xyz"), "--threads", "1025"},
+          "--threads '1025': expected a number from 0 to 1024");
+  refused({"convert", file("scene.xyz"), "--threads", ""}, "--threads ''");
+  expectOneLine(runProgram({"convert", file("scene.xyz"), file("scene.fun"), "-o", file("little.splats"),
+                            "--memory", "1K"}),
+                1, {"0.0009766 MiB were given"});
+  expectOneLine(runProgram({"render", file("whole.splats"), "-o", file("a.png"), "--memory", "1K"}), 2,
+                {"0.0009766 MiB of memory are too little"});
+}
+
 TEST_F(BadInput, MisspeltSubcommandIsToldWhichThereAre) {
-  expectOneLine(runProgram({"rendr", file("whole.splats")}), 2, {"rendr", "render", "convert", "info"});
+  expectOneLine(runProgram({"rendr", file("whole.splats")}), 2,
+                {"rendr", "did you mean render?", "convert", "info"});
+  expectOneLine(runProgram({"render", file("whole.splats"), "-o", file("a.png"), "--sise", "9x9"}), 2,
+                {"unknown option --sise (did you mean --size?); see"});
+  expectOneLine(runProgram({"render", file("whole.splats"), "-o", file("a.png"), "--zzzzzz=3"}), 2,
+                {"unknown option --zzzzzz; see curvisplat render --help"});
 }
 
 TEST_F(BadInput, UnknownScene) {

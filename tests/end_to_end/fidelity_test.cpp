@@ -1,5 +1,5 @@
-// The whole program against the specification: generate, convert and render the half-annulus of design
-// section 9, and compare with the reference ray march of the analytic field.
+// The whole program against the specification: generate, convert and render the half-annulus of
+// DESIGN.md, "Fidelity", and compare with the reference ray march of the analytic field.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 

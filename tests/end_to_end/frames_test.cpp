@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -13,6 +14,7 @@
 #include "render/image/image_file.h"
 #include "stream/base/file.h"
 #include "stream/cache/cache_reader.h"
+#include "tests/support/folder_watch.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 
@@ -72,7 +74,7 @@ class Frames : public testing::Test {
     const ProgramResult result = render(options);
     EXPECT_EQ(result.status, 0) << result.err;
     EXPECT_EQ(result.err, "");
-    EXPECT_EQ(lineCount(result.out), 1) << result.out;
+    EXPECT_EQ(lineCount(result.out), 2) << result.out;  // the second: what was chosen from the data
   }
   static void expectRefused(const std::vector<std::string>& options, int status, const std::string& word) {
     const ProgramResult result = render(options);
@@ -286,6 +288,65 @@ TEST_F(Frames, AMovieIsRawFramesToFfmpeg) {
                   std::lround(picture.rgba[4 * pixel + c] * 255))
             << frame << ' ' << pixel;
   }
+}
+
+TEST_F(Frames, ThatASignalStopsAreReportedAndLeaveNothingUnfinished) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    const fs::path out = folder_->path() / fmt::format("stopped{}", signal);
+    fs::create_directory(out);
+    FolderWatch watch(out);
+    RunningProgram program({"render", cache(), "-o", out / "f_%d.png", "--orbit", "360", "--frames", "99999",
+                            "--size", "64x48", "--stats", out / "stats.json"});
+    watch.waitUntil([&] { return fs::exists(out / "f_2.png"); });
+    program.signal(signal);
+    const ProgramResult result = program.wait();
+    EXPECT_EQ(result.status, 128 + signal) << result.err;
+    EXPECT_EQ(lineCount(result.err), 1) << result.err;
+    const size_t frames = json(out / "stats.json")["frames"].size();
+    EXPECT_GE(frames, 3u);
+    EXPECT_NE(result.err.find(fmt::format("interrupted after {} of 99999 frames", frames)), std::string::npos)
+        << result.err;
+    EXPECT_EQ(std::distance(fs::directory_iterator(out), {}), static_cast<ptrdiff_t>(frames + 1));
+  }
+}
+
+TEST_F(Frames, AMovieThatASignalStopsIsNotThere) {
+  const fs::path out = folder_->path() / "stopped_movie";
+  fs::create_directory(out);
+  const ScopedEnvironment path("PATH", folderWith("ffmpeg",
+                                                  "for word; do last=$word; done\n"
+                                                  "cat > \"${last#file:}\"\n"));
+  FolderWatch watch(out);
+  RunningProgram program(
+      {"render", cache(), "-o", out / "m.mp4", "--orbit", "360", "--frames", "99999", "--size", "64x48"});
+  const auto hasBytes = [&] {
+    for (const auto& entry : fs::directory_iterator(out))
+      if (entry.file_size() > 0) return true;
+    return false;
+  };
+  watch.waitUntil(hasBytes);
+  program.signal(SIGTERM);
+  const ProgramResult result = program.wait();
+  EXPECT_EQ(result.status, 128 + SIGTERM) << result.err;
+  EXPECT_NE(result.err.find("m.mp4 was not written"), std::string::npos) << result.err;
+  EXPECT_TRUE(fs::is_empty(out));
+}
+
+TEST_F(Frames, WhatAKilledRunHasLeftIsRemovedByTheNext) {
+  const fs::path out = folder_->path() / "killed";
+  fs::create_directory(out);
+  {
+    const ScopedEnvironment path("PATH", folderWith("ffmpeg", "cat > /dev/null\n"));
+    FolderWatch watch(out);
+    RunningProgram program(
+        {"render", cache(), "-o", out / "m.mp4", "--orbit", "360", "--frames", "99999", "--size", "64x48"});
+    watch.waitUntil([&] { return !fs::is_empty(out); });
+    program.signal(SIGKILL);
+    EXPECT_EQ(program.wait().status, 128 + SIGKILL);
+  }
+  ASSERT_FALSE(fs::is_empty(out));
+  expectDrawn({"-o", out / "a.png"});
+  EXPECT_EQ(std::distance(fs::directory_iterator(out), {}), 1);
 }
 
 TEST_F(Frames, AMovieFollowsALink) {

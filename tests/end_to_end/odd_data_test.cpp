@@ -178,7 +178,8 @@ TEST_F(OddDataTest, WhatIsNotFiniteIsCountedSkippedAndReported) {
   writeCube(folder_ / "cube", 8, node);
   const ProgramResult result = runProgram(cubeArguments(folder_ / "cube", {"--stats", file("stats.json")}));
   ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_NE(result.err.find("note: 208 samples are not finite and are blanked"), std::string::npos)
+  EXPECT_NE(result.err.find("note: 208 samples are not finite in single precision and are blanked"),
+            std::string::npos)
       << result.err;
   const auto stats = nlohmann::json::parse(readTextFile(folder_ / "stats.json"));
   EXPECT_EQ(stats["blanked"]["not_finite"], 208);

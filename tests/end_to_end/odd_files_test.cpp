@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -151,6 +154,129 @@ TEST_F(OddFiles, AStandardOutputThatCannotBeWrittenIsAnError) {
       EXPECT_EQ(lineCount(result.err), 1) << result.err;
       EXPECT_NE(result.err.find("cannot write to standard output"), std::string::npos) << result.err;
     }
+}
+
+TEST_F(OddFiles, AFileSizeLimitIsAnErrorLikeAFullDisk) {
+  const auto limited = [&](const std::string& command) {
+    const std::string in_folder =
+        "cd '" + folder_.path().string() + "' && ulimit -f 8 && exec " CURVISPLAT_PROGRAM " ";
+    return RunningProgram({"bash", "-c", in_folder + command}, "/usr/bin/env").wait();
+  };
+  const auto names = [&] {
+    std::set<std::string> found;
+    for (const auto& entry : fs::directory_iterator(folder_.path())) found.insert(entry.path().filename());
+    return found;
+  };
+  writeCube(folder_ / "more", 24,
+            [](const GridNode& node, NodeValues& values) { values.scalars[0] = static_cast<float>(node.i); });
+  const std::set<std::string> before = names();
+  for (const char* command :
+       {"convert more.xyz more.fun -o more.splats", "render cube.splats -o a.pfm --size 200x200",
+        "generate wake --size 40x40x40 -o wake"}) {
+    const ProgramResult result = limited(command);
+    EXPECT_EQ(result.status, 1) << command;
+    EXPECT_EQ(lineCount(result.err), 1) << result.err;
+    EXPECT_NE(result.err.find("File too large"), std::string::npos) << result.err;
+    EXPECT_EQ(result.err.find(".curvisplat"), std::string::npos) << result.err;
+    EXPECT_EQ(names(), before) << command;
+  }
+}
+
+TEST_F(OddFiles, WithoutProcItWorksAndStatisticsLackWhatItTells) {
+  const auto without = [&](const std::string& command) {
+    const std::string in_folder =
+        "mount -t tmpfs none /proc && cd '" + folder_.path().string() + "' && exec " CURVISPLAT_PROGRAM " ";
+    return RunningProgram({"unshare", "--mount", "sh", "-c", in_folder + command}, "/usr/bin/env").wait();
+  };
+  if (without("--version").status != 0) GTEST_SKIP() << "no file system can be mounted here";
+  for (const char* command : {"convert cube.xyz cube.fun -o b.splats --stats b.json",
+                              "render cube.splats -o b.png --stats r.json"}) {
+    const ProgramResult result = without(command);
+    EXPECT_EQ(result.status, 0) << result.err;
+    EXPECT_EQ(result.out.find("peak memory"), std::string::npos) << result.out;
+  }
+  EXPECT_TRUE(nlohmann::json::parse(readTextFile(file("b.json")))["peak_memory_bytes"].is_null());
+  const auto drawn = nlohmann::json::parse(readTextFile(file("r.json")));
+  EXPECT_TRUE(drawn["peak_memory_bytes"].is_null());
+  EXPECT_TRUE(drawn["time_to_first_image_s"].is_null());
+  EXPECT_EQ(drawn["frames"].size(), 1u);
+}
+
+// Address space for the libraries but not for threads' stacks, whatever of both this system needs.
+TEST_F(OddFiles, WithoutThreadsItEndsWithOneLine) {
+  const auto within = [&](const std::string& command, int mebibytes) {
+    const std::string limited = "cd '" + folder_.path().string() + "' && ulimit -v " +
+                                std::to_string(1024 * mebibytes) + " && exec " CURVISPLAT_PROGRAM " ";
+    return RunningProgram({"bash", "-c", limited + command}, "/usr/bin/env").wait();
+  };
+  constexpr int kNotLoaded = 127;
+  for (const char* command :
+       {"--version", "info cube.splats", "info cube.xyz cube.fun", "convert cube.xyz cube.fun -o b.splats",
+        "render cube.splats -o b.png --size 64x64 --memory 256M"}) {
+    bool succeeded = false;
+    for (int mebibytes = 100; mebibytes < 700 && !succeeded; mebibytes += 20) {
+      const ProgramResult result = within(command, mebibytes);
+      if (result.status == kNotLoaded) continue;
+      succeeded = result.status == 0;
+      EXPECT_TRUE(result.status <= 1)
+          << command << ", " << mebibytes << " MiB: " << result.status << ", " << result.err;
+      if (succeeded) break;
+      EXPECT_EQ(lineCount(result.err), 1) << command << ", " << mebibytes << " MiB: " << result.err;
+      EXPECT_FALSE(fs::exists(file("b.splats"))) << mebibytes;
+      EXPECT_FALSE(fs::exists(file("b.png"))) << mebibytes;
+    }
+    fs::remove_all(file("b.splats"));
+    EXPECT_TRUE(succeeded || std::string(command) != "--version");
+  }
+}
+
+TEST_F(OddFiles, ASmallDiskIsRefusedWithNumbersThatDifferOrTried) {
+  writeCube(folder_ / "more", 24,
+            [](const GridNode& node, NodeValues& values) { values.scalars[0] = static_cast<float>(node.i); });
+  fs::create_directory(folder_ / "disk");
+  const auto converted = [&](const std::string& options) {
+    const std::string command = "cd '" + folder_.path().string() +
+                                "' && mount -t tmpfs -o size=512k none disk && exec " CURVISPLAT_PROGRAM
+                                " convert more.xyz more.fun -o disk/a.splats " +
+                                options;
+    return RunningProgram({"unshare", "--mount", "sh", "-c", command}, "/usr/bin/env").wait();
+  };
+  const ProgramResult refused = converted("");
+  if (refused.err.find("curvisplat: ") != 0) GTEST_SKIP() << "no file system can be mounted here";
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_EQ(lineCount(refused.err), 1) << refused.err;
+  EXPECT_NE(refused.err.find("need about 1."), std::string::npos) << refused.err;
+  EXPECT_NE(refused.err.find("MiB, and 0.4"), std::string::npos) << refused.err;
+  const ProgramResult tried = converted("--no-preflight");
+  EXPECT_EQ(tried.status, 1);
+  EXPECT_NE(tried.err.find("No space left on device"), std::string::npos) << tried.err;
+}
+
+TEST_F(OddFiles, NamesThatAreTooLongAreRefusedBeforeTheWork) {
+  const std::string longest(251, 'x');  // with its ending
+  for (const std::string& name :
+       {longest + "xx.png", longest + ".frames.png", longest.substr(4) + "_%d.png"}) {
+    std::vector<std::string> arguments{"render", cache(), "-o", file(name), "--size", "64x64"};
+    if (name.find('%') != std::string::npos)
+      arguments.insert(arguments.end(), {"--orbit", "10", "--frames", "100000"});
+    expectRefused(arguments, "the name is too long");
+    EXPECT_TRUE(std::none_of(fs::directory_iterator(folder_.path()), fs::directory_iterator(),
+                             [](const auto& entry) { return entry.path().extension() == ".png"; }));
+  }
+  expectRefused({"convert", file("cube.xyz"), file("cube.fun"), "-o", file(longest + "xxxxxxxx")},
+                "the name is too long");
+}
+
+TEST_F(OddFiles, ACacheIsReplacedThroughALink) {
+  fs::create_directory(folder_ / "elsewhere");
+  fs::rename(cache(), folder_ / "elsewhere" / "cube.splats");
+  fs::create_directory_symlink("elsewhere/cube.splats", cache());
+  const ProgramResult result =
+      runProgram({"convert", file("cube.xyz"), file("cube.fun"), "-o", cache(), "--overwrite"});
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_TRUE(fs::is_symlink(cache()));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "elsewhere"), {}), 1);
+  expectWhole("elsewhere/cube.splats");
 }
 
 TEST_F(OddFiles, ProgramsMayWriteTheSamePicture) {

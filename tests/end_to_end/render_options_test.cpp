@@ -105,10 +105,11 @@ size_t pixelsOtherThan(const Image& image, const glm::vec4& background) {
   return count;
 }
 
-TEST_F(RenderOptions, DefaultsGiveAPictureAndOneLine) {
+TEST_F(RenderOptions, DefaultsGiveAPictureAndTheOptionsThatWereChosen) {
   const Image image = render({}, "a.png");
   EXPECT_EQ(last_.err, "");
-  EXPECT_EQ(lineCount(last_.out), 1) << last_.out;
+  EXPECT_EQ(lineCount(last_.out), 2) << last_.out;
+  EXPECT_NE(last_.out.find("chosen from the data: --tf viridis --range"), std::string::npos) << last_.out;
   EXPECT_GT(pixelsOtherThan(image, {1, 1, 1, 1}), 96u * 96 / 10);
 }
 
@@ -172,7 +173,7 @@ TEST_F(RenderOptions, ExrPfmAndPngAgree) {
 }
 
 TEST_F(RenderOptions, NarrowPerspectiveIsNearlyOrthographic) {
-  const Image parallel = render({}), narrow = render({"--view-angle", "0.5"});
+  const Image parallel = render({"--view", "iso"}), narrow = render({"--view-angle", "0.5"});
   EXPECT_GT(compareImages(parallel, narrow).psnr_db, 40);
   const Image wide = render({"--view-angle", "60"});
   EXPECT_LT(compareImages(parallel, wide).psnr_db, 30);
@@ -180,7 +181,8 @@ TEST_F(RenderOptions, NarrowPerspectiveIsNearlyOrthographic) {
 
 TEST_F(RenderOptions, APlacedCameraIsTheNamedOne) {
   // From a corner direction at the data's centre, (-0.5, 0, 0.5), z up, all of it in view: what iso does.
-  const Image iso = render({}, "a.exr"), placed = render({"--position", "9.5,10,10.5"}, "b.exr");
+  const Image iso = render({"--view", "iso"}, "a.exr"),
+              placed = render({"--position", "9.5,10,10.5"}, "b.exr");
   EXPECT_GT(compareImages(iso, placed).psnr_db, 60);
   const Image aside = render({"--position", "9.5,10,10.5", "--focal-point", "-0.4,0,0.5", "--view-up",
                               "0,1,0", "--parallel-scale", "2"});
@@ -322,8 +324,8 @@ TEST_F(RenderOptions, WrongWordsAreUsageErrors) {
                {{"--max-splats", "10"}, "--max-splats"},
                {{"--max-splats", "-1"}, "above zero"},
                {{"--first-image", "a.jpg"}, ".png"},
-               {{"--orbit", "90"}, "--frames"},
-               {{"--path", "a.json"}, "--frames"},
+               {{"--orbit", "90"}, "all frames would have the same name"},
+               {{"--path", "a.json"}, "all frames would have the same name"},
                {{"--frames", "3"}, "--orbit or --path"},
                {{"--orbit", "90", "--path", "a.json", "--frames", "3"}, "cannot be combined"},
                {{"--path", "a.json", "--frames", "3", "--view", "iso"}, "key frames place the camera"},
@@ -331,7 +333,7 @@ TEST_F(RenderOptions, WrongWordsAreUsageErrors) {
                {{"--orbit", "90", "--frames", "-3"}, "1 to 100000"},
                {{"--orbit", "90", "--frames", "3"}, "all frames would have the same name"},
                {{"--frame-rate", "24"}, "NAME.mp4"},
-               {{"--tf", "rainbow"}, "viridis"}};
+               {{"--tf", "virdis"}, "did you mean viridis?"}};
   for (const auto& c : cases) {
     SCOPED_TRACE(c.options[0] + " " + c.options[1]);
     expectUsageError(c.options, c.word);

@@ -9,6 +9,7 @@
 #include "stream/base/checksum.h"
 #include "stream/cache/cache_format.h"
 #include "stream/cache/cache_writer.h"
+#include "stream/cache/partial_folder.h"
 #include "stream/cache/stream_file.h"
 #include "tests/fuzz/fuzz_target.h"
 
@@ -50,6 +51,7 @@ void run(std::span<const std::byte> bytes) {
   const auto entries = input.takeBytes(input.take<uint16_t>());
   const std::filesystem::path target = fuzzFolder() / "a.splats";
   std::filesystem::create_directories(target.string() + ".partial");
+  fuzzFile(fmt::format("a.splats.partial/{}", kPartialLock), std::as_bytes(std::span(kPartialMark)));
   fuzzFile("a.splats.partial/bricks.log", logOf(entries, variables, input.rest()));
   fuzzFile("a.splats.partial/geometry.bin", input.rest());
   std::vector<VariableInfo> infos;

@@ -188,7 +188,7 @@ void writeJournals(const Seeds& seeds) {
 void writeSplats(const Seeds& seeds) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> unit(0, 1);
-  for (const uint8_t flags : {0, 1, 2, 5}) {
+  for (const uint8_t flags : {0, 1, 2, 5, 16, 53}) {
     Seed seed;
     seed.add(flags).add(glm::dvec3(-1, 2, 3)).add(glm::dvec3(1, 1, flags == 5 ? 50 : 1)).add(4.0);
     for (int n = 0; n < 12; ++n) {
@@ -196,7 +196,9 @@ void writeSplats(const Seeds& seeds) {
       for (int c = 0; c < 3; ++c) seed.add(0.3f * unit(random));
       for (int c = 0; c < 3; ++c) seed.add(unit(random) - 0.5f);
       seed.add(0.1f * unit(random));
-      seed.add(n % 3 == 0 ? packBorderCode({&kInward[0], 1 + static_cast<size_t>(n) / 3 % 3}) : kNoBorder);
+      const uint32_t face = flags >= 16 ? 1 : 0;  // the first border is one to cut at
+      seed.add(n % 3 == 0 ? packBorderCode({&kInward[0], 1 + static_cast<size_t>(n) / 3 % 3}, face)
+                          : kNoBorder);
       seed.add(unit(random));
       for (int c = 0; c < 3; ++c) seed.add(0.1f * unit(random));
       seed.add(0.01f * unit(random));

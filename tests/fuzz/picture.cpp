@@ -17,7 +17,7 @@
 namespace curvisplat {
 namespace {
 
-enum Flags : uint8_t { kPerspective = 1, kFlat = 2, kClip = 4, kCells = 8 };
+enum Flags : uint8_t { kPerspective = 1, kFlat = 2, kClip = 4, kCells = 8, kLit = 16, kPlane = 32 };
 
 constexpr float kLargest = std::numeric_limits<float>::max();
 
@@ -71,6 +71,8 @@ void run(std::span<const std::byte> bytes) {
   ProjectionSettings settings{ScreenView::of(camera, pixels, scale, kLowPass, 1e-4 * size), !(flags & kFlat)};
   if (flags & kCells) settings.borders = kWholeCellStyle;
   if (flags & kClip) settings.clip_planes = clipPlanesOf({}, WorldBox{corner, corner + 0.5 * size});
+  if (flags & kPlane) settings.clip_planes.push_back({corner + 0.4 * size, {1, -2, 0.5}});
+  if (flags & kLit) settings.light.emplace();
 
   static BrickProjector projector;
   static CpuPainter painter;
@@ -82,7 +84,7 @@ void run(std::span<const std::byte> bytes) {
   std::vector<ScreenSplat> sorted;
   for (const DepthItem& item : sorter.sort(of_splats, painter.order()))
     sorted.push_back(projector.splats()[item.splat]);
-  painter.begin(pixels, {1, 1, 1, 1}, table(), {settings.per_pixel}, {1, 512});
+  painter.begin(pixels, {1, 1, 1, 1}, table(), {settings.per_pixel, settings.light.has_value()}, {1, 512});
   painter.draw(sorted);
   const Image image = painter.end();
   for (const float channel : image.rgba) CURVISPLAT_CHECK(std::isfinite(channel));

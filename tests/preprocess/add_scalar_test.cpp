@@ -330,7 +330,7 @@ TEST_F(ToAnExistingCache, RefusesOtherNodesInTheSamePlace) {
   convertTo(cache, allButOne(9), {0});
   before = filesOf(cache);
   expectRefused(allButOne(10), adding(cache, {1}),
-                "it has node 10 5 5 of block 0, and the grid puts node 9 5 5");
+                "it has node 10 5 5 of block 1, and the grid puts node 9 5 5");
 }
 
 TEST_F(ToAnExistingCache, RefusesMissingValues) {

@@ -62,6 +62,30 @@ TEST(BlockOverlap, OfASmallBlockWithinACellIsItsOwnVolume) {
   EXPECT_NEAR(overlaps[0].share, 1, 0.05);
 }
 
+// A set may name one file thousands of times. All pairs of them would be the square of that.
+TEST(BlockOverlap, OfOneBlockManyTimesIsFoundInFewPairs) {
+  constexpr size_t kBlocks = 2000;
+  const auto source = boxes(std::vector<TestBox>(kBlocks, {{0, 0, 0}, {1, 1, 1}, 3}));
+  const auto overlaps = overlapsIn(source);
+  EXPECT_GE(overlaps.size(), kBlocks);
+  EXPECT_LE(overlaps.size(), 16 * kBlocks);
+  for (const BlockOverlap& overlap : overlaps) ASSERT_NEAR(overlap.share, 1, 1e-9);
+  EXPECT_EQ(overlapsIn(source, 2'000).size(), overlaps.size());  // however it is read
+}
+
+// In time that grows as n log n, not as the square: every pair would take minutes.
+TEST(BlockOverlap, IsFoundAmongAHundredThousandBlocks) {
+  std::vector<TestBox> many;
+  for (int n = 0; n < 99'999; ++n)
+    many.push_back({{2.0 * (n % 50), 2.0 * (n / 50 % 50), 2.0 * (n / 2500)}, {1, 1, 1}, 3});
+  many.push_back(many[1234]);
+  const auto overlaps = overlapsIn(boxes(many));
+  ASSERT_EQ(overlaps.size(), 1u);
+  EXPECT_EQ(overlaps[0].first, 1234u);
+  EXPECT_EQ(overlaps[0].second, 99'999u);
+  EXPECT_NEAR(overlaps[0].share, 1, 1e-9);
+}
+
 TEST(BlockOverlap, IsNoneOfBlocksThatAbut) {
   EXPECT_TRUE(
       overlapsIn(boxes({{{0, 0, 0}, {1, 1, 1}, 9}, {{1, 0, 0}, {1, 1, 1}, 14}, {{0, 1, 0}, {2, 1, 1}, 6}}))

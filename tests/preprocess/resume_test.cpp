@@ -405,7 +405,7 @@ TEST_F(Resume, AStoppedConversionLeavesWhatIsWorthIt) {
 }
 
 TEST_F(Resume, KeepsWhatIsDoneOnAFullDiskIfAskedTo) {
-  killInBuild(0.5);
+  killInBuild();
   testing::FaultySystemCalls full;
   full.fail_write_at = 10;
   {

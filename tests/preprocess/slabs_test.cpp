@@ -5,11 +5,27 @@
 #include <algorithm>
 #include <map>
 #include <stdexcept>
+#include <string>
 
+#include "preprocess/convert/memory_plan.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
 namespace {
+
+template <typename Run>
+std::string errorOf(const Run& run) {
+  try {
+    run();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+bool says(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 
 GridBlock block(uint64_t ni, uint64_t nj, uint64_t nk) {
   return {"block", ni, nj, nk, false};
@@ -73,6 +89,30 @@ TEST(Slabs, TasksCoverTheBox) {
     EXPECT_EQ(seen.size(), 14u * 24u);
     for (const auto& [row, times] : seen) EXPECT_EQ(times, 1);
   }
+}
+
+TEST(Slabs, OfLongRowsNameTheMemoryThatTheyNeed) {
+  const std::vector<GridBlock> blocks{block(10, 10, 10), block(1'000'000, 2, 2)};
+  const uint64_t bytes = leastSlabBytes(blocks, 1, kNodeHalo);
+  EXPECT_EQ(bytes, 4'000'000 * slabBytesPerNode(1));  // all four rows
+  EXPECT_EQ(leastSlabBytes({block(1000, 50, 50)}, 1, kNodeHalo), 9'000 * slabBytesPerNode(1));
+  EXPECT_EQ(cutIntoSlabs(blocks, 4'000'000, kNodeHalo).size(), 2u);
+  EXPECT_PRED2(says, errorOf([&] { cutIntoSlabs(blocks, 3'999'999, kNodeHalo); }), "4 rows of 1000000 nodes");
+
+  constexpr uint64_t kMiB = 1 << 20;
+  const std::string error = errorOf([&] { MemoryPlan::of(512 * kMiB, 1, 2).requireSlabs(bytes); });
+  const std::string before = "at least ";
+  ASSERT_NE(error.find(before), std::string::npos) << error;
+  const uint64_t least = std::stoull(error.substr(error.find(before) + before.size()));
+  EXPECT_GT(least, 512u);
+  EXPECT_LT(least, 1500u);
+  MemoryPlan enough = MemoryPlan::of(least * kMiB, 1, 2);
+  enough.requireSlabs(bytes);
+  EXPECT_GE(enough.slab_bytes, bytes);
+  EXPECT_THROW(MemoryPlan::of((least - 2) * kMiB, 1, 2).requireSlabs(bytes), Error);
+  MemoryPlan large = MemoryPlan::of(16'384 * kMiB, 1, 2);  // more than it would take of itself
+  large.requireSlabs(1024 * kMiB);
+  EXPECT_EQ(large.slab_bytes, 1024 * kMiB);
 }
 
 TEST(ReadAhead, GivesAllInOrderAndThenNothing) {

@@ -5,6 +5,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
+#include <span>
 #include <utility>
 
 namespace curvisplat {
@@ -77,7 +79,23 @@ class GridProbe : public FieldProbe {
 }  // namespace
 
 GridField::GridField(const GridSource& source, uint32_t scalar) {
+  read(source, scalar);
+  std::vector<OuterFaces::Face> faces;
+  for (uint32_t b = 0; b < blocks_.size(); ++b) {
+    const Block& block = blocks_[b];
+    if (std::min({block.ni, block.nj, block.nk}) < 2) continue;
+    const size_t root = boxes_.size();
+    if (!addBoxes(b, {0, 0, 0}, {block.ni - 1, block.nj - 1, block.nk - 1})) continue;
+    lower_ = root == 0 ? boxes_[root].lower : glm::min(lower_, boxes_[root].lower);
+    upper_ = root == 0 ? boxes_[root].upper : glm::max(upper_, boxes_[root].upper);
+    addOuterFaces(b, faces);
+  }
+  outer_faces_ = OuterFaces(std::move(faces));
+}
+
+void GridField::read(const GridSource& source, uint32_t scalar) {
   const auto& blocks = source.description().blocks;
+  of_cells_ = source.description().scalars[scalar].centring == Centring::kCell;
   range_ = {std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
   for (uint32_t b = 0; b < blocks.size(); ++b) {
     Block& block = blocks_.emplace_back();
@@ -86,34 +104,62 @@ GridField::GridField(const GridSource& source, uint32_t scalar) {
     block.nk = blocks[b].nk;
     source.read(b, {0, block.nj, 0, block.nk}, std::span(&scalar, 1), block.nodes);
     for (size_t n = 0; n < block.nodes.x.size(); ++n) {
-      if (block.nodes.blank[n]) continue;
-      range_.first = std::min<double>(range_.first, block.nodes.scalars[0][n]);
-      range_.second = std::max<double>(range_.second, block.nodes.scalars[0][n]);
+      const double value = block.nodes.scalars[0][n];
+      const glm::dvec3 p = positionOf(block.nodes, n);
+      if (!std::isfinite(p.x + p.y + p.z) || (!of_cells_ && !std::isfinite(value))) block.nodes.blank[n] = 1;
+      if (block.nodes.blank[n] || !std::isfinite(value)) continue;
+      range_.first = std::min(range_.first, value);
+      range_.second = std::max(range_.second, value);
     }
-    if (std::min({block.ni, block.nj, block.nk}) < 2) continue;
-    const size_t root = boxes_.size();
-    if (!addBoxes(b, {0, 0, 0}, {block.ni - 1, block.nj - 1, block.nk - 1})) continue;
-    lower_ = root == 0 ? boxes_[root].lower : glm::min(lower_, boxes_[root].lower);
-    upper_ = root == 0 ? boxes_[root].upper : glm::max(upper_, boxes_[root].upper);
   }
+}
+
+bool GridField::crossings(const glm::dvec3& origin, const glm::dvec3& direction,
+                          std::vector<double>& distances) const {
+  outer_faces_.crossings(origin, direction, distances);
+  return true;
+}
+
+void GridField::addOuterFaces(uint32_t number, std::vector<OuterFaces::Face>& faces) const {
+  const Block& block = blocks_[number];
+  const uint64_t cells[3] = {block.ni - 1, block.nj - 1, block.nk - 1};
+  for (uint64_t k = 0; k < cells[2]; ++k)
+    for (uint64_t j = 0; j < cells[1]; ++j)
+      for (uint64_t i = 0; i < cells[0]; ++i) {
+        const CellAddress cell{number, {i, j, k}};
+        if (!isThere(cell)) continue;
+        const std::array<size_t, 8> corners = cornersOf(cell);
+        for (int axis = 0; axis < 3; ++axis)
+          for (const bool upper : {false, true}) {
+            CellAddress neighbour = cell;
+            neighbour.index[axis] += upper ? 1 : ~uint64_t{0};  // below 0 it wraps
+            if (neighbour.index[axis] < cells[axis] && isThere(neighbour)) continue;
+            const int u = 1 << (axis + 1) % 3, v = 1 << (axis + 2) % 3, first = upper ? 1 << axis : 0;
+            faces.push_back({positionOf(block.nodes, corners[first]),
+                             positionOf(block.nodes, corners[first | u]),
+                             positionOf(block.nodes, corners[first | v]),
+                             positionOf(block.nodes, corners[first | u | v])});
+          }
+      }
 }
 
 std::unique_ptr<FieldProbe> GridField::probe() const {
   return std::make_unique<GridProbe>(*this);
 }
 
-GridField::Corners GridField::cornersOf(const CellAddress& cell) const {
+std::array<size_t, 8> GridField::cornersOf(const CellAddress& cell) const {
   const Block& block = blocks_[cell.block];
   const size_t first = block.at(cell.index[0], cell.index[1], cell.index[2]);
   const size_t row = block.ni, plane = block.ni * block.nj;
-  return {{first, first + 1, first + row, first + row + 1, first + plane, first + plane + 1,
-           first + plane + row, first + plane + row + 1}};
+  return {first,         first + 1,         first + row,         first + row + 1,
+          first + plane, first + plane + 1, first + plane + row, first + plane + row + 1};
 }
 
 bool GridField::isThere(const CellAddress& cell) const {
-  const auto& blank = blocks_[cell.block].nodes.blank;
-  const Corners corners = cornersOf(cell);
-  return std::none_of(corners.node.begin(), corners.node.end(), [&](size_t n) { return blank[n] != 0; });
+  const NodeArrays& nodes = blocks_[cell.block].nodes;
+  const std::array<size_t, 8> corners = cornersOf(cell);
+  if (of_cells_ && !std::isfinite(nodes.scalars[0][corners[0]])) return false;
+  return std::none_of(corners.begin(), corners.end(), [&](size_t n) { return nodes.blank[n] != 0; });
 }
 
 bool GridField::addBoxes(uint32_t block, const std::array<uint64_t, 3>& begin,
@@ -140,7 +186,7 @@ bool GridField::addBoxes(uint32_t block, const std::array<uint64_t, 3>& begin,
         for (uint64_t i = begin[0]; i < end[0]; ++i) {
           const CellAddress cell{block, {i, j, k}};
           if (!isThere(cell)) continue;
-          for (const size_t n : cornersOf(cell).node) {
+          for (const size_t n : cornersOf(cell)) {
             const glm::dvec3 p = positionOf(blocks_[block].nodes, n);
             include(p, p);
           }
@@ -171,11 +217,11 @@ bool GridField::addBoxes(uint32_t block, const std::array<uint64_t, 3>& begin,
 GridField::Search GridField::findInCell(const glm::dvec3& world, InCell& at) const {
   const NodeArrays& nodes = blocks_[at.cell.block].nodes;
   std::array<glm::dvec3, 8> p;
-  const Corners corners = cornersOf(at.cell);
-  for (int corner = 0; corner < 8; ++corner) p[corner] = positionOf(nodes, corners.node[corner]) - world;
+  const std::array<size_t, 8> corners = cornersOf(at.cell);
+  for (int corner = 0; corner < 8; ++corner) p[corner] = positionOf(nodes, corners[corner]) - world;
 
   constexpr int kMaxSteps = 24;
-  constexpr double kConverged = 1e-11;  // of a cell
+  constexpr double kConverged = 1e-6;  // of a cell; the step squares what is left
   glm::dvec3 t = at.uvw;
   for (int n = 0; n < kMaxSteps; ++n) {
     const glm::dvec3 s = 1.0 - t;
@@ -270,10 +316,11 @@ bool GridField::stepTowards(InCell& at) const {
 
 double GridField::scalarAt(const InCell& at) const {
   const auto& values = blocks_[at.cell.block].nodes.scalars[0];
-  const Corners corners = cornersOf(at.cell);
+  const std::array<size_t, 8> corners = cornersOf(at.cell);
+  if (of_cells_) return values[corners[0]];
   const auto weights = weightsAt(at.uvw);
   double sum = 0;
-  for (int corner = 0; corner < 8; ++corner) sum += weights[corner] * values[corners.node[corner]];
+  for (int corner = 0; corner < 8; ++corner) sum += weights[corner] * values[corners[corner]];
   return sum;
 }
 

@@ -3,8 +3,9 @@
 // from no analytic scene.
 //
 // A cell is the image of the unit cube under the trilinear map of its eight nodes; its faces are shared with
-// its neighbours exactly, however bent. Cells with a blank node are not there. Where blocks overlap, the
-// first cell found counts.
+// its neighbours exactly, however bent. Cells with a blank node are not there, nor are those with a sample
+// that is not finite. A scalar of cells is constant in each. Where blocks overlap, the first cell found
+// counts.
 #pragma once
 
 #include <array>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "preprocess/grid/grid_source.h"
+#include "tests/reference/outer_faces.h"
 #include "tests/reference/reference_field.h"
 
 namespace curvisplat {
@@ -24,7 +26,9 @@ class GridField : public ReferenceField {
 
   std::unique_ptr<FieldProbe> probe() const override;
   std::pair<glm::dvec3, glm::dvec3> bounds() const override { return {lower_, upper_}; }
-  /// Smallest and largest of the nodes' values.
+  bool crossings(const glm::dvec3& origin, const glm::dvec3& direction,
+                 std::vector<double>& distances) const override;
+  /// Smallest and largest of the samples.
   std::pair<double, double> range() const { return range_; }
 
   struct Block {
@@ -56,6 +60,12 @@ class GridField : public ReferenceField {
   bool stepTowards(InCell& at) const;
   double scalarAt(const InCell& at) const;
 
+  bool ofCells() const { return of_cells_; }
+  const std::vector<Block>& blocks() const { return blocks_; }
+  /// Nodes of the cell's corners, u fastest.
+  std::array<size_t, 8> cornersOf(const CellAddress& cell) const;
+  bool isThere(const CellAddress& cell) const;
+
  private:
   // The cells of a block, halved along their longest side again and again; children follow one another.
   struct Box {
@@ -66,17 +76,15 @@ class GridField : public ReferenceField {
     bool leaf = false;
   };
 
-  struct Corners {
-    std::array<size_t, 8> node;  // u fastest
-  };
-
-  Corners cornersOf(const CellAddress& cell) const;
-  bool isThere(const CellAddress& cell) const;
+  void read(const GridSource& source, uint32_t scalar);
+  void addOuterFaces(uint32_t block, std::vector<OuterFaces::Face>& faces) const;
   bool addBoxes(uint32_t block, const std::array<uint64_t, 3>& begin, const std::array<uint64_t, 3>& end);
   bool findFrom(const glm::dvec3& world, InCell& at) const;
 
+  bool of_cells_ = false;
   std::vector<Block> blocks_;
   std::vector<Box> boxes_;
+  OuterFaces outer_faces_;
   glm::dvec3 lower_{0.0}, upper_{0.0};
   std::pair<double, double> range_;
 };

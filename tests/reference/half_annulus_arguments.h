@@ -1,4 +1,4 @@
-// The words of `render` for design section 9's picture of the half-annulus.
+// The arguments of `render` for the picture of the half-annulus in DESIGN.md, "Fidelity".
 #pragma once
 
 #include <string>

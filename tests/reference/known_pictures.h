@@ -12,7 +12,7 @@
 
 namespace curvisplat {
 
-/// One of design section 9's transfer functions ("smooth", "band", "step"), over any range of the scalar and
+/// One of the transfer functions of DESIGN.md, "Fidelity" (smooth, band, step), over any range of the scalar and
 /// for data of any size, in the words of the reference and of the renderer.
 struct KnownFunction {
   OpticalFunction exact;

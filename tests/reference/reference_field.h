@@ -35,6 +35,12 @@ class ReferenceField {
   virtual std::unique_ptr<FieldProbe> probe() const = 0;
   /// The corners of a box that holds the field.
   virtual std::pair<glm::dvec3, glm::dvec3> bounds() const = 0;
+  /// Appends the distances along a ray between which it lies inside or outside of the field throughout,
+  /// unordered. False: they are not known. `direction` has length 1.
+  virtual bool crossings(const glm::dvec3& /*origin*/, const glm::dvec3& /*direction*/,
+                         std::vector<double>& /*distances*/) const {
+    return false;
+  }
 };
 
 /// An analytic scene. `scene` outlives it.

@@ -4,18 +4,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <memory>
 #include <numbers>
 #include <optional>
 #include <utility>
+#include <vector>
 
 namespace curvisplat {
 namespace {
 
-// A step is halved until the optical depth that extinction's change over it could be worth is below this.
-constexpr double kDepthTolerance = 2e-5;
 constexpr int kMaxHalvings = 16;
 
 struct Ray {
@@ -58,16 +59,63 @@ std::optional<std::pair<double, double>> partInBox(const Ray& ray, const glm::dv
 class Marcher {
  public:
   Marcher(const ReferenceField& field, const OpticalFunction& function, const Ray& ray,
-          const ReferenceLight* light)
-      : probe_(field.probe()), function_(function), ray_(ray), light_(light) {}
+          const MarchSteps& steps, const ReferenceLight* light)
+      : field_(field), probe_(field.probe()), function_(function), ray_(ray), steps_(steps), light_(light) {}
 
-  ReferencePixel march(double begin, double end, const MarchSteps& steps) {
+  ReferencePixel march(double begin, double end) {
+    std::vector<double> ends;
+    if (field_.crossings(ray_.origin, ray_.direction, ends))
+      marchBetween(std::move(ends), begin, end);
+    else
+      marchSearching(begin, end, steps_.step);
+    return {colour_ + transmittance_, transmittance_};
+  }
+
+ private:
+  static constexpr double kMinStep = 1e-5;    // of the largest
+  static constexpr double kNoLength = 1e-11;  // of the ray's part in the box
+  static constexpr double kSkin = 1e-9;       // of an interval: its ends are sampled so far inside of it
+
+  /// From one of `ends` to the next the field is there throughout, or nowhere.
+  void marchBetween(std::vector<double> ends, double begin, double end) {
+    std::erase_if(ends, [&](double t) { return !(t > begin && t < end); });
+    ends.push_back(begin);
+    ends.push_back(end);
+    std::sort(ends.begin(), ends.end());
+    for (size_t n = 0; n + 1 < ends.size(); ++n) {
+      const double length = ends[n + 1] - ends[n];
+      if (length <= kNoLength * (end - begin)) continue;
+      const bool middle = inside(ends[n] + 0.5 * length);
+      // A face that contains the ray is not met, and faces of blocks need not fit exactly.
+      if (inside(ends[n] + 0.03 * length) != middle || inside(ends[n] + 0.97 * length) != middle)
+        marchSearching(ends[n], ends[n + 1], std::min(steps_.step, 0.02 * length));
+      else if (middle)
+        marchInside(ends[n], ends[n + 1]);
+    }
+  }
+
+  void marchInside(double begin, double end) {
+    first_ = begin + kSkin * (end - begin);
+    last_ = end - kSkin * (end - begin);
+    held_ = {};
+    double t = begin, extinction = properties(t).extinction, step = stepFromHere(steps_.step);
+    while (t < end) {
+      const double next = end - t < 1.001 * step ? end : t + step;
+      const double next_extinction = properties(next).extinction;
+      step = stepFromHere(steps_.step);
+      addHalving(t, next, extinction, next_extinction, 0);
+      t = next;
+      extinction = next_extinction;
+    }
+    first_.reset();
+  }
+
+  /// Without knowing where the field begins and ends.
+  void marchSearching(double begin, double end, double largest_step) {
     double t = begin;
     bool is_inside = inside(t);
     while (t < end) {
-      double step = steps.step;
-      if (is_inside)
-        step = std::clamp(steps.cells * probe_->cellLength(ray_.direction), kMinStep * step, step);
+      const double step = is_inside ? stepFromHere(largest_step) : largest_step;
       const double next = std::min(end, t + step);
       const bool next_inside = inside(next);
       if (is_inside && next_inside) {
@@ -84,20 +132,25 @@ class Marcher {
       }
       is_inside = next_inside;
     }
-    return {colour_ + transmittance_, transmittance_};
   }
 
- private:
-  static constexpr double kMinStep = 1e-5;  // of the largest
+  /// From the point asked about last, which was inside.
+  double stepFromHere(double largest) const {
+    return std::clamp(steps_.cells * probe_->cellLength(ray_.direction), kMinStep * largest, largest);
+  }
 
   bool inside(double t) { return probe_->at(ray_.at(t)).has_value(); }
-  // A point between two inside that is not: a fold of a grid, or a gap no wider than a step. It is empty.
+
   OpticalProperties properties(double t) {
+    if (first_) t = std::clamp(t, *first_, last_);
     const std::optional<double> scalar = probe_->at(ray_.at(t));
-    if (!scalar) return {};
-    OpticalProperties found = function_(*scalar);
-    if (light_ && found.extinction > 0) found.colour = lit(found.colour, gradient(ray_.at(t), *scalar));
-    return found;
+    // A point between two inside that is not: a fold of a grid, or a gap no wider than a step. It is empty,
+    // unless the field said that it is there.
+    if (!scalar && !first_) return {};
+    if (!scalar) return held_;
+    held_ = function_(*scalar);
+    if (light_ && held_.extinction > 0) held_.colour = lit(held_.colour, gradient(ray_.at(t), *scalar));
+    return held_;
   }
 
   glm::dvec3 gradient(const glm::dvec3& at, double scalar) {
@@ -142,7 +195,7 @@ class Marcher {
     const double middle = 0.5 * (begin + end), length = end - begin;
     const OpticalProperties here = properties(middle);
     const auto [least, most] = std::minmax({at_begin, here.extinction, at_end});
-    if ((most - least) * length > kDepthTolerance && halvings < kMaxHalvings) {
+    if ((most - least) * length > steps_.depth_tolerance && halvings < kMaxHalvings) {
       addHalving(begin, middle, at_begin, here.extinction, halvings + 1);
       addHalving(middle, end, here.extinction, at_end, halvings + 1);
       return;
@@ -152,13 +205,57 @@ class Marcher {
     transmittance_ *= passed;
   }
 
+  const ReferenceField& field_;
   std::unique_ptr<FieldProbe> probe_;
   const OpticalFunction& function_;
   Ray ray_;
+  const MarchSteps& steps_;
   const ReferenceLight* light_;
+  std::optional<double> first_;  // between first_ and last_ the field is there
+  double last_ = 0;
+  OpticalProperties held_;  // of the last point found since first_ was set
   glm::dvec3 colour_{0.0};
   double transmittance_ = 1;
 };
+
+/// The pixels of `image` for which `wanted` is not 0.
+void marchPixels(const ReferenceField& field, const OpticalFunction& function, const Camera& camera,
+                 const MarchSteps& steps, const ReferenceLight* light, const std::vector<uint8_t>& wanted,
+                 ReferenceImage& image) {
+  const ImageSize size = image.size;
+  const auto [lower, upper] = field.bounds();
+  const glm::dvec3 forward = glm::normalize(camera.focal_point - camera.position);
+  tbb::parallel_for(0, size.height, [&, lower = lower, upper = upper](int y) {
+    for (int x = 0; x < size.width; ++x) {
+      const size_t p = static_cast<size_t>(y) * static_cast<size_t>(size.width) + static_cast<size_t>(x);
+      if (!wanted[p]) continue;
+      const Ray ray = rayThrough(camera, size, x, y);
+      image.pixels[p] = {glm::dvec3(1.0), 1};
+      const auto part = partInBox(ray, lower, upper);
+      if (!part) continue;
+      const bool from_eye = camera.projection == Projection::kPerspective;
+      const double near = from_eye ? steps.near / glm::dot(ray.direction, forward) : 0.0;
+      const double begin = std::max(part->first, near);
+      if (begin < part->second)
+        image.pixels[p] = Marcher(field, function, ray, steps, light).march(begin, part->second);
+    }
+  });
+}
+
+/// 1 where a pixel or one of its neighbours differs by more than `tolerance`.
+std::vector<uint8_t> unsettled(const ReferenceImage& a, const ReferenceImage& b, double tolerance) {
+  const int width = a.size.width, height = a.size.height;
+  std::vector<uint8_t> out(a.pixels.size(), 0);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const glm::dvec3 d = glm::abs(a.at(x, y).colour - b.at(x, y).colour);
+      if (std::max({d.r, d.g, d.b}) <= tolerance) continue;
+      for (int v = std::max(0, y - 1); v <= std::min(height - 1, y + 1); ++v)
+        for (int u = std::max(0, x - 1); u <= std::min(width - 1, x + 1); ++u)
+          out[static_cast<size_t>(v) * static_cast<size_t>(width) + static_cast<size_t>(u)] = 1;
+    }
+  return out;
+}
 
 glm::dvec3 sectionNineColour(double f) {
   return {std::clamp(2 * f - 0.4, 0.0, 1.0), std::clamp(1 - 2.5 * std::abs(f - 0.5), 0.0, 1.0),
@@ -180,24 +277,8 @@ OpticalProperties stepFunction(double f) {
 ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction& function,
                               const Camera& camera, ImageSize size, const MarchSteps& steps,
                               const ReferenceLight* light) {
-  ReferenceImage image{size, {}};
-  image.pixels.resize(size.pixels());
-  const auto [lower, upper] = field.bounds();
-  const glm::dvec3 forward = glm::normalize(camera.focal_point - camera.position);
-  tbb::parallel_for(0, size.height, [&, lower = lower, upper = upper](int y) {
-    for (int x = 0; x < size.width; ++x) {
-      const Ray ray = rayThrough(camera, size, x, y);
-      ReferencePixel& pixel = image.pixels[static_cast<size_t>(y) * size.width + x];
-      pixel.colour = glm::dvec3(1.0);
-      const auto part = partInBox(ray, lower, upper);
-      if (!part) continue;
-      const bool from_eye = camera.projection == Projection::kPerspective;
-      const double near = from_eye ? steps.near / glm::dot(ray.direction, forward) : 0.0;
-      const double begin = std::max(part->first, near);
-      if (begin < part->second)
-        pixel = Marcher(field, function, ray, light).march(begin, part->second, steps);
-    }
-  });
+  ReferenceImage image{size, std::vector<ReferencePixel>(size.pixels())};
+  marchPixels(field, function, camera, steps, light, std::vector<uint8_t>(size.pixels(), 1), image);
   return image;
 }
 
@@ -212,18 +293,24 @@ ReferenceImage convergedMarch(const ReferenceField& field, const OpticalFunction
                               const Camera& camera, ImageSize size, MarchSteps steps, double agreement_db,
                               double* reached_db) {
   constexpr int kMaxHalvingsOfSteps = 6;
+  std::vector<double> none;
+  const bool exact_ends = field.crossings(camera.position, camera.focal_point - camera.position, none);
+  const double tolerance = 0.25 * std::pow(10, -agreement_db / 20);
   ReferenceImage image = referenceMarch(field, function, camera, size, steps);
+  std::vector<uint8_t> wanted(size.pixels(), 1);
   double agreement = 0;
   for (int n = 0; n < kMaxHalvingsOfSteps && agreement < agreement_db; ++n) {
     steps.step *= 0.5;
     steps.cells *= 0.5;
-    ReferenceImage finer = referenceMarch(field, function, camera, size, steps);
+    ReferenceImage finer = image;
+    marchPixels(field, function, camera, steps, nullptr, wanted, finer);
     double sum = 0;
     for (size_t p = 0; p < image.pixels.size(); ++p) {
       const glm::dvec3 d = finer.pixels[p].colour - image.pixels[p].colour;
       sum += glm::dot(d, d) / 3;
     }
     agreement = sum > 0 ? -10 * std::log10(sum / static_cast<double>(image.pixels.size())) : 200.0;
+    if (exact_ends) wanted = unsettled(image, finer, tolerance);
     image = std::move(finer);
   }
   if (reached_db) *reached_db = agreement;

@@ -4,8 +4,8 @@
 //
 // Front to back, emission and absorption: where colour c and extinction kappa are constant over a length d,
 // the picture gains T (1 - exp(-kappa d)) c and the transmittance T shrinks by exp(-kappa d). A step is
-// halved until kappa hardly changes over it, so that jumps of the transfer function are found too; the
-// field's faces are found by bisection.
+// halved until kappa hardly changes over it, so that jumps of the transfer function are found too. The
+// field's ends are where it says that they are (ReferenceField::crossings), else found by bisection.
 #pragma once
 
 #include <functional>
@@ -26,7 +26,7 @@ struct OpticalProperties {
 };
 using OpticalFunction = std::function<OpticalProperties(double scalar)>;
 
-/// The three functions of design section 9, exact.
+/// The three functions of DESIGN.md, "Fidelity", exact.
 OpticalProperties smoothFunction(double scalar);
 OpticalProperties bandFunction(double scalar);
 OpticalProperties stepFunction(double scalar);
@@ -50,6 +50,8 @@ struct MarchSteps {
   double step = 0.004;  // world units
   double cells = 0.5;   // of a grid's cell, at the point where a step begins
   double near = 0;      // perspective: as ScreenView::near
+  // A step is halved until the optical depth that extinction's change over it could be worth is below this.
+  double depth_tolerance = 2e-5;
 };
 
 /// Light on the field's level surfaces, by the formulas of render/project/light.h, with the field's own
@@ -60,8 +62,9 @@ struct ReferenceLight {
   std::optional<glm::dvec3> towards;  // the light; none: it is where the viewer is
 };
 
-/// Marches every pixel, from the plane of the viewer on. A part of a ray inside or outside of the field that
-/// is shorter than a step may be missed. Parallel; the result does not depend on the threads.
+/// Marches every pixel, from the plane of the viewer on. Where the field does not know its crossings, a part
+/// of a ray inside or outside of it that is shorter than a step may be missed. Parallel; the result does not
+/// depend on the threads.
 ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction& function,
                               const Camera& camera, ImageSize size, const MarchSteps& steps,
                               const ReferenceLight* light = nullptr);
@@ -69,7 +72,8 @@ ReferenceImage referenceMarch(const Scene& scene, const OpticalFunction& functio
                               ImageSize size, double step = 0.004);
 
 /// Halves the steps until two successive pictures agree at `agreement_db` or more, six times at the most, and
-/// gives the finer one. `reached_db` gets their agreement.
+/// gives the finer one. `reached_db` gets their agreement. Where the field knows its crossings, pixels whose
+/// neighbourhood has settled are not marched again.
 ReferenceImage convergedMarch(const ReferenceField& field, const OpticalFunction& function,
                               const Camera& camera, ImageSize size, MarchSteps steps = {},
                               double agreement_db = 75, double* reached_db = nullptr);
@@ -77,7 +81,7 @@ ReferenceImage convergedMarch(const ReferenceField& field, const OpticalFunction
 /// As a picture over white.
 Image toImage(const ReferenceImage& reference);
 
-/// Section 9's camera: orthographic, on the half-annulus.
+/// The camera of DESIGN.md, "Fidelity": orthographic, on the half-annulus.
 Camera halfAnnulusCamera();
 
 }  // namespace curvisplat

@@ -158,6 +158,37 @@ TEST_P(FrameOrderTest, IsThatOfOneSortInAnyMemoryWithAnyThreads) {
   EXPECT_GT(again, 10u);
 }
 
+// A splat and the record of its cut follow one another, wherever a slab ends.
+TEST_P(FrameOrderTest, IsThatOfOneSortWithClipPlanesAndLight) {
+  if (GetParam() == Backend::kEgl) GTEST_SKIP() << "as OSMesa's";
+  uint64_t most_slabs = 0;
+  for (const CacheReader* cache : {scene_.get(), random_.get()}) {
+    const TransferFunction transfer_function = function(*cache);
+    FrameRenderer renderer(*cache, 0, transfer_function, GetParam());
+    const Manifest& manifest = cache->manifest();
+    const glm::dvec3 extent = manifest.upper - manifest.lower;
+    FrameOptions cut = options();
+    cut.clip_planes = {{manifest.lower + 0.15 * extent, {1, 0.5, 0.25}},
+                       {manifest.lower + 0.8 * extent, {-0.25, -1, -0.5}}};
+    cut.light.emplace();
+    cut.light->towards = glm::dvec3(1, -2, 3);
+    for (const Camera& camera : {looking(*cache, {0, 0, 1}), inside(*cache)}) {
+      const Image expected = globallySorted(*cache, transfer_function, GetParam(), camera, cut);
+      EXPECT_NE(expected.rgba, globallySorted(*cache, transfer_function, GetParam(), camera, options()).rgba);
+      const uint64_t least = leastMemory(renderer, camera, cut);
+      for (const uint64_t memory : {least, least + (40 << 20)}) {
+        FrameOptions wanted = cut;
+        wanted.memory_bytes = memory;
+        wanted.threads = 2;
+        FrameStatistics statistics;
+        EXPECT_EQ(renderer.render(camera, wanted, statistics).rgba, expected.rgba) << memory;
+        most_slabs = std::max(most_slabs, statistics.slabs);
+      }
+    }
+  }
+  EXPECT_GT(most_slabs, 1u);
+}
+
 // What stands in for a damaged brick, too; and each is reported once.
 TEST_P(FrameOrderTest, IsTheSameInSlabsWhereBricksAreDamaged) {
   if (GetParam() == Backend::kEgl) GTEST_SKIP() << "as OSMesa's";

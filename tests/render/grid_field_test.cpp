@@ -5,10 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <random>
+#include <utility>
 
 #include "preprocess/scenes/scenes.h"
+#include "tests/reference/cell_grid.h"
 #include "tests/reference/function_grid.h"
 #include "tests/reference/reference_march.h"
 
@@ -91,6 +94,83 @@ TEST(GridField, TellsHowFarACellReaches) {
   EXPECT_NEAR(probe->cellLength({1, 0, 0}), 4, 1e-9);
   EXPECT_NEAR(probe->cellLength({0, 1, 0}), 2, 1e-9);
   EXPECT_NEAR(probe->cellLength(glm::dvec3(0, 0.6, 0.8)), 1 / 0.8, 1e-9);
+}
+
+OpticalProperties uniform(double) {
+  return {{0.25, 0.5, 0.75}, 1.5};
+}
+
+// One step passes all of the field: its ends are known, however thin its parts are.
+TEST(GridField, IsMarchedBetweenItsFaces) {
+  // Two slabs of bent cells, 0.004 and 0.001 thick at any place, and 0.3 apart.
+  const FunctionGridSource source({gridBlock(5, 7, 3), gridBlock(5, 7, 3)}, 1, [](const GridNode& n) {
+    const double u = static_cast<double>(n.i) / 4, v = static_cast<double>(n.j) / 6;
+    const double thickness = n.block == 0 ? 0.004 : 0.001;
+    const double z = 0.1 * u * v + 0.3 * n.block + thickness * static_cast<double>(n.k) / 2;
+    return NodeValues{{u + 0.05 * v * v, v, z}, {1.0f}};
+  });
+  Camera camera;
+  camera.position = {0.5, 0.5, 3};
+  camera.focal_point = {0.5, 0.5, 0};
+  camera.parallel_scale = 0.83;
+  MarchSteps steps;
+  steps.step = 10;
+  steps.cells = 1e9;
+  const ReferenceImage image = referenceMarch(GridField(source, 0), uniform, camera, {24, 24}, steps);
+  int hit = 0;
+  for (int y = 0; y < 24; ++y)
+    for (int x = 0; x < 24; ++x) {
+      // Pixels' centres; the grid's sides are at x = 0.05 v^2 and 1 + 0.05 v^2, between nodes a little off.
+      const double across = 0.5 + 0.83 * (2 * (x + 0.5) / 24 - 1), up = 0.5 + 0.83 * (1 - 2 * (y + 0.5) / 24);
+      const double side = 0.05 * up * up;
+      if (std::min(std::abs(across - side), std::abs(across - 1 - side)) < 0.003) continue;
+      const bool inside = up > 0 && up < 1 && across > side && across < 1 + side;
+      EXPECT_NEAR(image.at(x, y).transmittance, inside ? std::exp(-1.5 * 0.005) : 1, 1e-8) << x << " " << y;
+      hit += inside;
+    }
+  EXPECT_GT(hit, 150);
+}
+
+// Rays along the faces of cells, and through their edges.
+TEST(GridField, IsMarchedAlongTheFacesOfItsCells) {
+  const FunctionGridSource source({gridBlock(9, 9, 9)}, 1, [](const GridNode& n) {
+    return NodeValues{glm::dvec3(n.i, n.j, n.k) / 8.0, {static_cast<float>(n.k) / 8}};
+  });
+  const GridField field(source, 0);
+  Camera camera;
+  camera.position = {0.5, 0.5, 4};
+  camera.focal_point = {0.5, 0.5, 0};
+  camera.parallel_scale = 0.75;  // 12 pixels of 1/8: with an odd number of pixels they are at nodes
+  for (const int pixels : {12, 13}) {
+    camera.parallel_scale = 0.0625 * pixels;
+    const ReferenceImage image = referenceMarch(field, uniform, camera, {pixels, pixels}, MarchSteps());
+    for (int y = 0; y < pixels; ++y)
+      for (int x = 0; x < pixels; ++x) {
+        const double across = 0.5 + 0.125 * (x - 0.5 * (pixels - 1)),
+                     up = 0.5 + 0.125 * (y - 0.5 * (pixels - 1));
+        if (std::abs(std::abs(across - 0.5) - 0.5) < 1e-9 || std::abs(std::abs(up - 0.5) - 0.5) < 1e-9)
+          continue;  // the outline itself
+        const bool inside = across > 0 && across < 1 && up > 0 && up < 1;
+        EXPECT_NEAR(image.at(x, y).transmittance, inside ? std::exp(-1.5) : 1, 1e-7) << x << " " << y;
+      }
+  }
+}
+
+TEST(GridField, HasCellsOfOneValueAndLeavesOutBlankOnes) {
+  const FunctionGridSource nodes({gridBlock(4, 4, 4)}, 1, [](const GridNode& n) {
+    return NodeValues{glm::dvec3(n.i, n.j, n.k), {0.0f}};
+  });
+  const CellGridSource source(nodes, {[](const GridCell& cell) {
+                                return cell.i == 1 && cell.j == 1 && cell.k == 1
+                                           ? std::numeric_limits<double>::quiet_NaN()
+                                           : static_cast<double>(cell.i);
+                              }});
+  const GridField field(source, 1);
+  EXPECT_EQ(field.range(), std::pair(0.0, 2.0));
+  const auto probe = field.probe();
+  EXPECT_EQ(probe->at({2.9, 1.5, 1.5}), 2.0);
+  EXPECT_EQ(probe->at({0.9, 0.1, 0.1}), 0.0);
+  EXPECT_FALSE(probe->at({1.5, 1.5, 1.5}).has_value());
 }
 
 // A scene and its grid are two ways to the same picture.

@@ -153,7 +153,7 @@ TEST(Projection, PerspectiveOpticalDepthIsTheIntegralAlongTheRay) {
   checkOpticalDepths(Projection::kPerspective, 0.005, 0.008);
 }
 
-/// Design section 3 by its formulas: h2ᵀ (S2 + 0.01)⁻¹ and s² = sigma²(|w|² - h2ᵀ(S2 + 0.01)⁻¹h2) + r, at
+/// DESIGN.md, "Projection", by its formulas: h2ᵀ (S2 + 0.01)⁻¹ and s² = sigma²(|w|² - h2ᵀ(S2 + 0.01)⁻¹h2) + r, at
 /// least sigma²(w·n)² + r, in double precision.
 struct Conditioned {
   glm::dvec2 gradient;  // per pixel

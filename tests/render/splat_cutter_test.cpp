@@ -27,7 +27,7 @@ glm::dmat3 factorOf(const Shape& s) {
   return {s.axis0, s.axis0 * s.shear10, s.axis0 * s.shear20, 0, s.axis1, s.axis1 * s.shear21, 0, 0, s.axis2};
 }
 
-/// Design section 3's moments of several splats with one residual variance.
+/// The moments of several splats with one residual variance: DESIGN.md, "Merging".
 struct Moments {
   double weight = 0, mean = 0, square = 0;
   glm::dvec3 position{0.0}, slope{0.0};  // the slope as h = A w

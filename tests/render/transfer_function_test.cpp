@@ -10,6 +10,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "render/colour/published_maps.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -183,13 +184,40 @@ TEST(TransferFunction, PresetsMatchTheirMapsAndShowMoreWhereTheScalarIsHigh) {
   EXPECT_EQ(diverging.at(0).extinction, diverging.at(1).extinction);
 }
 
-TEST(TransferFunction, AnUnknownPresetNamesThoseThereAre) {
+TEST(TransferFunction, AnUnknownPresetIsAnsweredWithTheClosest) {
   try {
-    TransferFunction::preset("rainbow", 0, 1, 1);
+    TransferFunction::preset("virdis", 0, 1, 1);
     FAIL() << "accepted";
   } catch (const UsageError& error) {
-    EXPECT_NE(std::string(error.what()).find("viridis, inferno, plasma, cool-warm, grey"), std::string::npos)
-        << error.what();
+    const std::string what = error.what();
+    EXPECT_NE(what.find("did you mean viridis?"), std::string::npos) << what;
+    EXPECT_NE(what.find("curvisplat colormaps"), std::string::npos) << what;
+  }
+}
+
+TEST(TransferFunction, PublishedMapsHaveTheirPublishedColours) {
+  EXPECT_GE(builtInMaps().size(), 40u);
+  const auto expectColour = [](const char* map, double x, const glm::dvec3& expected) {
+    const glm::dvec3 colour = TransferFunction::preset(map, 0, 1, 1).at(x).colour;
+    for (int channel = 0; channel < 3; ++channel)
+      EXPECT_NEAR(colour[channel], expected[channel], 1.01 / 255) << map << " at " << x;
+  };
+  // From matplotlib 3.6.3 (cmap(x), 256 colours), cmocean's tables and ParaView's presets.
+  expectColour("magma", 128.0 / 255, {0.716387, 0.214982, 0.47529});
+  expectColour("turbo", 64.0 / 255, {0.15844, 0.73551, 0.92305});
+  expectColour("RdBu", 0.5, {0.969, 0.969, 0.969});
+  expectColour("thermal", 0, {4 / 255.0, 35 / 255.0, 51 / 255.0});
+  expectColour("balance", 1, {60 / 255.0, 9 / 255.0, 18 / 255.0});
+  expectColour("Cool-Warm-Extended", 0, {0, 0, 0.34902});
+  expectColour("blue-red-rainbow", 0.5, {0, 1, 0});
+  for (const PublishedMap& map : builtInMaps()) {
+    const std::string name(map.name);
+    const TransferFunction forward = TransferFunction::preset(name, 0, 1, 1);
+    const TransferFunction reversed = TransferFunction::preset(name + "_r", 0, 1, 1);
+    for (const double x : {0.0, 0.3, 1.0})
+      for (int channel = 0; channel < 3; ++channel)
+        EXPECT_NEAR(forward.at(x).colour[channel], reversed.at(1 - x).colour[channel], 1e-3) << name;
+    EXPECT_EQ(forward.at(0.5).extinction == 0, map.category == MapCategory::kDiverging) << name;
   }
 }
 

@@ -107,6 +107,13 @@ home() {
 }
 
 asked > /dev/null  # it hears
+# As home() leaves it: the window begins with a function chosen from the data, until one is edited.
+do_ mousemove 100 50 click 1
+asked > /dev/null
+do_ mousemove 100 50 click 3
+show j 58
+show f 38
+presets_points
 do_ key z key r
 saved first
 watch "$pid" window.txt $interval_s &

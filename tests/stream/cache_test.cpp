@@ -169,11 +169,80 @@ TEST(Cache, TwoConversionsToOneOutputRefuse) {
 TEST(Cache, ADeadConversionsRestIsCleared) {
   const TemporaryFolder folder;
   fs::create_directories(folder.path() / "a.splats.partial/inner");
-  overwriteFile(folder.path() / "a.splats.partial/lock", "");
+  overwriteFile(folder.path() / "a.splats.partial/lock", std::string(kPartialMark));
   overwriteFile(folder.path() / "a.splats.partial/var.7.bin", "rest");
   SmallCache().write(folder.path() / "a.splats");
   EXPECT_FALSE(fs::exists(folder.path() / "a.splats/var.7.bin"));
   CacheReader reader(folder.path() / "a.splats");
+}
+
+TEST(Cache, FoldersThatNoConversionMadeAreRefused) {
+  const TemporaryFolder folder;
+  const fs::path target = folder.path() / "a.splats", partial = folder.path() / "a.splats.partial";
+  const fs::path foreign = folder.path() / "foreign";
+  const auto refused = [&] {
+    const std::string error = errorOf([&] { SmallCache().write(target, true); });
+    EXPECT_PRED2(says, error, "a.splats.partial: exists and was not made by curvisplat");
+    EXPECT_FALSE(fs::exists(target));
+  };
+  fs::create_directory(foreign);
+  overwriteFile(foreign / "precious", "mine");
+  fs::create_directory_symlink(foreign, partial);
+  refused();
+  overwriteFile(foreign / "lock", std::string(kPartialMark));  // a link all the same
+  refused();
+  EXPECT_EQ(bytesOfFile(foreign / "precious"), "mine");
+  fs::remove(partial);
+
+  fs::remove(foreign / "lock");
+  fs::rename(foreign, partial);
+  refused();
+  overwriteFile(partial / "lock", "of another program");
+  refused();
+  overwriteFile(partial / "lock", "");
+  refused();
+  EXPECT_EQ(bytesOfFile(partial / "precious"), "mine");
+
+  fs::remove_all(partial);
+  SmallCache().write(partial);  // a cache that someone calls so
+  refused();
+  EXPECT_NO_THROW(CacheReader{partial});
+
+  fs::remove_all(partial);
+  overwriteFile(partial, "a file");
+  refused();
+  EXPECT_EQ(bytesOfFile(partial), "a file");
+}
+
+// Where the mark could not be removed from the finished cache.
+TEST(Cache, AForeignFolderBesideAMarkedCacheIsRefused) {
+  const TemporaryFolder folder;
+  const fs::path target = folder.path() / "a.splats", partial = folder.path() / "a.splats.partial";
+  SmallCache().write(target);
+  overwriteFile(target / "lock", std::string(kPartialMark));
+  CacheReader reader(target);
+  fs::create_directory(partial);
+  overwriteFile(partial / "precious", "mine");
+  EXPECT_PRED2(says, errorOf([&] { SmallCache().write(target, true); }), "was not made by curvisplat");
+  EXPECT_EQ(bytesOfFile(partial / "precious"), "mine");
+}
+
+TEST(Cache, AConversionKilledBeforeItsMarkLeavesNothingInTheWay) {
+  const TemporaryFolder folder;
+  const fs::path target = folder.path() / "a.splats", partial = folder.path() / "a.splats.partial";
+  fs::create_directory(partial);
+  SmallCache().write(target);
+  fs::create_directory(partial);
+  overwriteFile(partial / "lock", "");
+  SmallCache().write(target, true);
+  fs::create_directory(partial);
+  overwriteFile(partial / "lock", std::string(kPartialMark.substr(0, 9)));
+  SmallCache().write(target, true);
+  // Killed between swapping the caches and moving the mark.
+  fs::copy(target, partial, fs::copy_options::recursive);
+  overwriteFile(target / "lock", std::string(kPartialMark));
+  SmallCache().write(target, true);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
 }
 
 TEST(Cache, OverwritingKeepsTheOldCacheUntilFinish) {

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <set>
 #include <string>
 
 #include "stream/base/error.h"
@@ -31,17 +30,6 @@ TEST(Paths, LinksLeadToWhatIsThereOrToBe) {
   EXPECT_THROW(linkTarget(folder / "round"), Error);
   fs::create_directory(folder / "folder");
   EXPECT_THROW(writableTarget(folder / "folder"), Error);
-}
-
-TEST(Paths, TemporaryNamesAreBesideAndNeverTheSame) {
-  const TemporaryFolder folder;
-  std::set<fs::path> names;
-  for (int n = 0; n < 1000; ++n) {
-    names.insert(temporaryBeside(folder / std::string(255, 'x')));
-    ASSERT_EQ(names.begin()->parent_path(), folder.path());
-    ASSERT_LT(names.begin()->filename().string().size(), 64u);
-  }
-  EXPECT_EQ(names.size(), 1000u);
 }
 
 }  // namespace

@@ -6,11 +6,12 @@
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
 #include "tests/stream/test_bricks.h"
+#include "tests/support/faulty_system_calls.h"
 
 namespace curvisplat {
 namespace {
 
-class AddedVariable : public testing::Test {
+class AddedVariable : public ::testing::Test {
  protected:
   AddedVariable() { SmallCache().write(path); }
 
@@ -74,6 +75,32 @@ TEST_F(AddedVariable, IsSeenByNobodyBeforeItIsWhole) {
   }
   EXPECT_EQ(filesInCache(), files);
   EXPECT_EQ(bytesOfFile(path / "manifest.json"), manifest);
+}
+
+TEST_F(AddedVariable, IsNotThereIfAnySyncFails) {
+  const std::string manifest = bytesOfFile(path / "manifest.json");
+  const size_t files = filesInCache();
+  for (int64_t sync = 0;; ++sync) {
+    curvisplat::testing::FaultySystemCalls faulty;
+    faulty.fail_sync_at = sync;
+    bool failed = false;
+    try {
+      const CacheLock lock(path);
+      const CacheReader reader(path);
+      VariableWriter writer(lock, reader.manifest(), {{0, "pressure", "", 0, 400}});
+      appendAll(reader, writer);
+      const ScopedSystemCalls scope(faulty);
+      writer.finish({});
+    } catch (const Error&) {
+      failed = true;
+    }
+    EXPECT_EQ(failed, sync < 4);
+    if (!failed) break;
+    EXPECT_EQ(bytesOfFile(path / "manifest.json"), manifest) << sync;
+    EXPECT_EQ(filesInCache(), files) << sync;
+  }
+  EXPECT_EQ(CacheReader(path).manifest().variables.size(), 3u);
+  EXPECT_EQ(filesInCache(), files + 1);
 }
 
 TEST_F(AddedVariable, LeavesACacheAloneThatHasComeInItsPlace) {

@@ -135,6 +135,20 @@ TEST(Verdict, MemoryIsAdvisedByWhatItGave) {
   EXPECT_FALSE(says(judge(frame(), speeds(), others), "--memory"));
 }
 
+TEST(Verdict, ADifferenceWithinTheSpreadIsNone) {
+  OtherFrame others[] = {{0.2, 2, 2, 512 * kMiB, 250'000, 0.06}, {0.1, 2, 2, 2048 * kMiB, 250'000, 0.05}};
+  const Verdict same = judge(frame(), speeds(), others);
+  EXPECT_TRUE(says(same, "--memory 2048M instead of 512M: no difference measured")) << all(same);
+  EXPECT_FALSE(says(same, "would help")) << all(same);
+  others[0].spread_s = 0.02;
+  EXPECT_TRUE(says(judge(frame(), speeds(), others), "--memory 2048M would help"));
+
+  JudgedFrame four = frame();
+  four.threads = 4;
+  const OtherFrame cores[] = {{0.2, 2, 4, 512 * kMiB, 250'000, 0.1}, {0.3, 2, 1, 512 * kMiB, 250'000, 0.1}};
+  EXPECT_TRUE(says(judge(four, speeds(), cores), "--threads 4 instead of 1: no difference measured"));
+}
+
 TEST(Verdict, TellsOfTimeThatNoStageTakes) {
   JudgedFrame judged = frame();
   EXPECT_FALSE(says(judge(judged, speeds(), {}), "overhead"));

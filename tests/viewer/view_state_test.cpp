@@ -91,10 +91,25 @@ TEST(ViewState, ErrorsNameFileAndField) {
   expectError("/clip_planes/1/normal", nlohmann::json::array({0, 0, 0}), "clip_planes[1].normal");
   expectError("/dark", "yes", "dark");
   expectError("/function", 5, "preset");
-  expectError("/preset", "rainbow", "preset");
+  expectError("/preset", "no map", "preset");
   expectError("/memory_bytes", -1, "memory_bytes");
-  EXPECT_THROW(viewStateFromJson("{", "a.json", manifest()), Error);
-  EXPECT_THROW(viewStateFromJson("[]", "a.json", manifest()), Error);
+  const auto messageOf = [](const std::string& text) -> std::string {
+    try {
+      viewStateFromJson(text, "a.json", manifest());
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(messageOf("[]"), "a.json: expected an object, found []");
+  EXPECT_EQ(messageOf("{\n  \"a\": 1,\n  oops\n}"),
+            "a.json: expected the state of a window in JSON, found a syntax error at line 3, column 3");
+  EXPECT_EQ(messageOf(" \n"), "a.json: expected the state of a window in JSON, found no text");
+  EXPECT_EQ(messageOf("{\"a\": 1e999}"),
+            "a.json: expected the state of a window in JSON, found a number that is too large");
+  nlohmann::json json = nlohmann::json::parse(toJson(changedState()));
+  json["camera"] = 5;
+  EXPECT_EQ(messageOf(json.dump()), "a.json: field camera: expected an object, found 5");
 }
 
 TEST(ViewState, VariablesKeepTheFunctionOverTheirOwnRange) {

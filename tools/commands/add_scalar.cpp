@@ -12,6 +12,7 @@
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
+#include "tools/output/thread_failures.h"
 
 namespace curvisplat {
 namespace {
@@ -29,15 +30,14 @@ void checkArguments(const ConvertArguments& arguments) {
   refuse(arguments.resume, "--resume");
 }
 
-void printSummary(const ConvertArguments& arguments, const AddScalarReport& report, double seconds,
-                  uint64_t peak_memory_bytes) {
+void printSummary(const ConvertArguments& arguments, const AddScalarReport& report, double seconds) {
   const auto samples = static_cast<double>(report.nodes);
   std::string names;
   for (const std::string& name : report.scalars) names += (names.empty() ? "" : ", ") + name;
   fmt::print("{}: added {} for {} splats\n", arguments.to.string(), names, report.splats);
-  fmt::print("{:.1f} s, {:.2f} M samples/s, {:.1f} MiB, {:.2f} bytes per sample, peak memory {:.0f} MiB\n",
-             seconds, 1e-6 * samples / seconds, mebibytes(totalBytes(report.files)),
-             static_cast<double>(totalBytes(report.files)) / samples, mebibytes(peak_memory_bytes));
+  fmt::print("{:.1f} s, {:.2f} M samples/s, {:.1f} MiB, {:.2f} bytes per sample{}\n", seconds,
+             1e-6 * samples / seconds, mebibytes(totalBytes(report.files)),
+             static_cast<double>(totalBytes(report.files)) / samples, peakMemoryText());
 }
 
 nlohmann::json statistics(const AddScalarReport& report, const Progress& progress) {
@@ -58,6 +58,7 @@ void runAddScalar(ConvertArguments arguments) {
 
   const auto source = openSource(arguments, arguments.to);
   options.scalars = chooseScalars(arguments, arguments.added_scalars, source->description());
+  requireThreads(arguments.threads);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   const AddScalarReport report = addScalars(*source, options, progress);
@@ -65,7 +66,7 @@ void runAddScalar(ConvertArguments arguments) {
   for (const std::string& warning : source->description().warnings) printMessage("warning: {}", warning);
   if (const auto note = timeStepNote(source->description(), arguments.grid.time_step))
     printMessage("note: {}", *note);
-  printSummary(arguments, report, secondsOf(progress), numbers["peak_memory_bytes"]);
+  printSummary(arguments, report, secondsOf(progress));
   if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, numbers);
 }
 

@@ -14,13 +14,14 @@
 #include <system_error>
 #include <thread>
 
+#include "stream/base/durable_file.h"
 #include "stream/base/error.h"
-#include "stream/base/file.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
 #include "tools/options/camera_motion.h"
 #include "tools/options/option_parsers.h"
+#include "tools/options/picture_choice.h"
 #include "tools/options/scalar_arguments.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
@@ -161,8 +162,7 @@ void benchCache(const BenchArguments& arguments) {
   const Manifest& manifest = cache.manifest();
   const size_t variable = chooseVariable(cache, arguments.scalar);
   const VariableInfo& info = manifest.variables[variable];
-  const TransferFunction function =
-      chooseTransferFunction(arguments.scalar, info, glm::length(manifest.upper - manifest.lower));
+  const TransferFunction function = PictureChoice(cache, variable, glm::dvec3(1)).function(arguments.scalar);
   const auto orbit = [&](unsigned frames) {
     CameraArguments camera = arguments.camera;
     camera.orbit = "360";
@@ -316,8 +316,8 @@ void addBench(CLI::App& app) {
       command
           ->add_flag("--convert", arguments->converts, "Convert a generated grid instead of drawing a cache")
           ->group(how);
-  for (const char* drawing : {"--scalar", "--tf", "--range", "--opacity-unit", "--size", "--lod-pixels",
-                              "--view", "--view-angle", "--backend"})
+  for (const char* drawing : {"--scalar", "--tf", "--range", "--opacity", "--asinh", "--opacity-unit",
+                              "--size", "--lod-pixels", "--view", "--view-angle", "--backend"})
     convert->excludes(command->get_option(drawing));
   command
       ->add_option(

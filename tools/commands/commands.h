@@ -13,6 +13,7 @@ void addView(CLI::App& app);
 void addBench(CLI::App& app);
 void addGenerate(CLI::App& app);
 void addCompare(CLI::App& app);
+void addColormaps(CLI::App& app);
 /// The last one: it knows those before it.
 void addManual(CLI::App& app);
 

@@ -14,6 +14,7 @@
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
+#include "stream/base/paths.h"
 #include "stream/base/progress.h"
 #include "tools/commands/add_scalar.h"
 #include "tools/commands/commands.h"
@@ -24,12 +25,12 @@
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
+#include "tools/output/thread_failures.h"
 
 namespace curvisplat {
 namespace {
 
-void printSummary(const ConvertArguments& arguments, const ConvertReport& report, double seconds,
-                  uint64_t peak_memory_bytes) {
+void printSummary(const ConvertArguments& arguments, const ConvertReport& report, double seconds) {
   const auto samples = static_cast<double>(report.nodes);
   const uint64_t bytes = totalBytes(report.files);
   fmt::print("{}: {} samples, {} splats in {} bricks, {} levels\n", arguments.output.string(), report.nodes,
@@ -37,8 +38,8 @@ void printSummary(const ConvertArguments& arguments, const ConvertReport& report
   // The interrupted run did part of the work, so this run's time gives no rate.
   const std::string rate = report.resumed ? " since it was resumed"
                                           : fmt::format(", {:.2f} M samples/s", 1e-6 * samples / seconds);
-  fmt::print("{:.1f} s{}, {:.1f} MiB, {:.2f} bytes per sample, peak memory {:.0f} MiB\n", seconds, rate,
-             mebibytes(bytes), static_cast<double>(bytes) / samples, mebibytes(peak_memory_bytes));
+  fmt::print("{:.1f} s{}, {:.1f} MiB, {:.2f} bytes per sample{}\n", seconds, rate, mebibytes(bytes),
+             static_cast<double>(bytes) / samples, peakMemoryText());
 }
 
 /// Prints warnings and notes on the grid to standard error.
@@ -54,7 +55,7 @@ void printWarnings(const GridDescription& description, std::optional<uint32_t> t
     printMessage("note: resumed; {} of {} bricks were already written", report.resumed_bricks, report.bricks);
   note(report.blanked.by_grid, "samples are blanked by the grid");
   note(report.blanked.by_value, "samples have the blank value");
-  note(report.blanked.not_finite, "samples are not finite and are blanked");
+  note(report.blanked.not_finite, "samples are not finite in single precision and are blanked");
   // For samples at nodes these two differ from what `info` prints: it counts the cells between nodes.
   note(report.degenerate, "samples have no volume; they are drawn with a minimum thickness");
   note(report.inverted, "samples are inverted: their handedness differs from most of their block");
@@ -84,7 +85,9 @@ void runConvert(ConvertArguments arguments) {
   if (!arguments.output.has_filename()) arguments.output = arguments.output.parent_path();  // "NAME.splats/"
   checkOutputFolder("-o", arguments.output);
   ConvertOptions options;
-  options.output = arguments.output;
+  // A link stays, as it does where pictures are written through one.
+  options.output = linkTarget(arguments.output);
+  if (options.output != arguments.output) checkOutputFolder("-o", options.output);
   options.overwrite = arguments.overwrite;
   options.resume = arguments.resume;
   applyCommonOptions(arguments, options);
@@ -93,12 +96,13 @@ void runConvert(ConvertArguments arguments) {
   options.scalars = chooseScalars(arguments, arguments.scalars, source->description());
   options.title = arguments.grid.grid.stem().string();
 
+  requireThreads(arguments.threads);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   const ConvertReport report = convert(*source, options, progress);
   const nlohmann::json numbers = statistics(report, progress);
   printWarnings(source->description(), arguments.grid.time_step, report);
-  printSummary(arguments, report, secondsOf(progress), numbers["peak_memory_bytes"]);
+  printSummary(arguments, report, secondsOf(progress));
   if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, numbers);
 }
 
@@ -113,8 +117,8 @@ void addConvert(CLI::App& app) {
   command->add_option("-o,--output", arguments->output, "Splat cache to write: a directory NAME.splats");
   command
       ->add_option("--scalar", arguments->scalars,
-                   "Scalar to convert; repeatable. A name, the number of a function file's variable, or a "
-                   "PLOT3D function number (default: the first scalar)")
+                   "Scalars to convert: NAME, NAME,NAME or all; repeatable. A name, the number of a function "
+                   "file's variable, or a PLOT3D function number (default: all that the files store)")
       ->take_all()
       ->allow_extra_args(false);
   command
@@ -131,6 +135,8 @@ void addConvert(CLI::App& app) {
       ->check(CLI::Range(0u, kMaxThreads));
   command->add_option("--tmp", arguments->temporary_folder,
                       "Directory for temporary files (default: beside the cache)");
+  command->add_flag("--no-preflight", arguments->no_preflight,
+                    "Do not check before the work that the disks have room");
   command->add_flag("--resume", arguments->resume,
                     "Resume an interrupted conversion if there is one; keep finished work on an error");
   command->add_flag("--overwrite", arguments->overwrite,
@@ -139,6 +145,7 @@ void addConvert(CLI::App& app) {
   addGridOptions(*command, arguments->grid);
   addGasOptions(*command, arguments->gas);
   command->callback([arguments] {
+    takeScalarsFromSolutions(*arguments);
     const bool adds = !arguments->added_scalars.empty() || !arguments->to.empty();
     adds ? runAddScalar(*arguments) : runConvert(*arguments);
   });

@@ -8,6 +8,8 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "render/image/contrast.h"
+
 namespace curvisplat {
 namespace {
 
@@ -160,6 +162,26 @@ std::vector<std::string> whyEmpty(const RenderedScene& scene) {
   }
   if (reasons.empty()) reasons.push_back(whyNothingIsVisible(scene));
   return reasons;
+}
+
+std::string poorPictureWarning(const Image& image, const RenderedScene& scene,
+                               const std::string& function_options) {
+  constexpr double kMinSeen = 0.005, kMinOther = 0.1;  // of the picture; of what is seen
+  const PictureContrast contrast = contrastOf(image, scene.options.background);
+  const bool blank = contrast.seen < kMinSeen;
+  if (!blank && contrast.other >= kMinOther * contrast.seen) return {};
+  const std::string what =
+      blank ? fmt::format("nearly blank: {:.2g} % of its pixels differ visibly from the background",
+                          100 * contrast.seen)
+            : "of one colour";
+  if (!function_options.empty())
+    return fmt::format("the picture is {}; leave out {} to have colours and opacities chosen from the data",
+                       what, function_options);
+  if (blank)
+    return fmt::format("the picture is {}; try --opacity auto --opacity-unit {:.2g} or --view iso", what,
+                       scene.transfer_function.opacityUnit() / 10);
+  return fmt::format(
+      "the picture is {}; try --range 1%,99%, or --clip-box if the outermost layer hides the rest", what);
 }
 
 std::string rangeMissesScalar(const VariableInfo& variable, const TransferFunction& transfer_function) {

@@ -1,5 +1,6 @@
 // Explains why a picture is empty: the transfer function, its range, blanking, the clip box or the camera.
-// Without an explanation the user sees a white image and no reason.
+// Without an explanation the user sees a white image and no reason. Notices pictures that show next to nothing
+// as well.
 #pragma once
 
 #include <string>
@@ -28,6 +29,12 @@ struct RenderedScene {
 
 /// The reasons for an empty picture, most likely first; at least one.
 std::vector<std::string> whyEmpty(const RenderedScene& scene);
+
+/// A warning if the picture is nearly blank or of one colour, with the option that helps; else empty.
+/// `function_options`: those of --tf, --range, --opacity, --asinh and --opacity-unit that were given, for
+/// people to read.
+std::string poorPictureWarning(const Image& image, const RenderedScene& scene,
+                               const std::string& function_options);
 
 /// A warning if the transfer function's range and the scalar's range are disjoint, so that all samples get
 /// the colour and opacity of one end; empty otherwise.

@@ -134,9 +134,10 @@ void printProbe(const CacheReader& reader, const InfoOptions& options, const Fin
   }
   const ProbeResult& probed = *found.probe;
   fmt::print(
-      "block {}, i {}, j {}, k {} (counted from 0); the point is {:.3g} of the way from its centre to its "
+      "block {}, i {}, j {}, k {} (i, j and k counted from 0); the point is {:.3g} of the way from its "
+      "centre to its "
       "edge\n",
-      probed.block, probed.i, probed.j, probed.k, probed.distance / 1.556228);
+      probed.block + 1, probed.i, probed.j, probed.k, probed.distance / 1.556228);
   for (size_t v = 0; v < probed.variables.size(); ++v) {
     const VariableInfo& variable = reader.manifest().variables[v];
     fmt::print("  {:<20} {:.6g} {}({:.6g} at the centre)\n", variable.name, probed.variables[v].value,

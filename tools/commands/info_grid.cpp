@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "preprocess/convert/preflight.h"
+#include "preprocess/grid/slabs.h"
 #include "preprocess/survey/block_overlap.h"
 #include "preprocess/survey/grid_statistics.h"
 #include "stream/base/progress.h"
@@ -44,8 +45,10 @@ GridInfo inspect(const GridSource& source) {
   for (const GridBlock& block : description.blocks) info.nodes += block.nodes();
   Progress progress{progressBar()};
   progress.begin("reading", 2 * info.nodes, "nodes");
-  info.statistics = measureGrid(source, info.stored, kSlabBytes, progress);
-  info.overlaps = findOverlaps(source, kSlabBytes, progress);
+  const uint64_t slab_bytes =
+      std::max(kSlabBytes, leastSlabBytes(description.blocks, info.stored.size(), kCellHalo));
+  info.statistics = measureGrid(source, info.stored, slab_bytes, progress);
+  info.overlaps = findOverlaps(source, slab_bytes, progress);
   info.splats_are_cells =
       !info.stored.empty() && info.scalar(info.stored.front()).centring == Centring::kCell;
   info.splats =

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "stream/base/file.h"
+#include "stream/base/durable_file.h"
 #include "tools/commands/commands.h"
 #include "tools/options/bash_completion.h"
 #include "tools/options/manual_page.h"

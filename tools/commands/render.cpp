@@ -28,11 +28,14 @@
 #include "tools/commands/render_statistics.h"
 #include "tools/options/camera_motion.h"
 #include "tools/options/option_parsers.h"
+#include "tools/options/picture_choice.h"
 #include "tools/options/scalar_arguments.h"
 #include "tools/output/frame_output.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
+#include "tools/output/stop_signals.h"
+#include "tools/output/thread_failures.h"
 
 namespace curvisplat {
 namespace {
@@ -134,6 +137,7 @@ FrameOptions frameOptions(const RenderArguments& arguments) {
 /// Throws UsageError if options contradict each other, and Error if an output cannot be written.
 void checkArguments(const RenderArguments& arguments, ImageSize size) {
   checkCameraArguments(arguments.camera);
+  checkFunctionArguments(arguments.scalar);
   checkOutputName(arguments.output, arguments.camera.moves(), size);
   if (arguments.frame_rate && !isMovieName(arguments.output))
     throw UsageError("--frame-rate needs a movie: -o NAME.mp4");
@@ -143,12 +147,13 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
                      arguments.output.extension().string());
   parseBackend(arguments.backend);
   std::vector<std::filesystem::path> others{arguments.cache, arguments.camera.path,
-                                            arguments.scalar.transfer_function};
+                                            arguments.scalar.transfer_function.value_or("")};
   checkOutputFile("-o", arguments.output, others);
   if (arguments.camera.moves() && !isMovieName(arguments.output)) {
     const FrameNames names(arguments.output);
+    checkOutputFolder("-o", names.of(std::max<uint64_t>(arguments.camera.frames.value_or(1), 1) - 1));
     const auto check_other = [&](const char* option, const std::filesystem::path& other) {
-      if (names.include(linkTarget(other), arguments.camera.frames.value_or(1)))
+      if (names.include(linkTarget(other), arguments.camera.frameCount()))
         throw Error("{} {}: a frame of -o would overwrite it; choose another name", option, other.string());
     };
     check_other("--first-image", arguments.first_image);
@@ -174,20 +179,29 @@ uint64_t outputBytes(const RenderArguments& arguments, ImageSize picture) {
   return bytes;
 }
 
-/// Draws one frame after another and collects the report.
+/// Draws one frame after another and collects the report. Throws Interrupted after progress.stop().
 class FrameRun {
  public:
   FrameRun(const RenderArguments& arguments, const Manifest& manifest, FrameRenderer& renderer,
-           FrameOutput& output, RenderReport& report)
-      : arguments_(arguments), manifest_(manifest), renderer_(renderer), output_(output), report_(report) {}
+           FrameOutput& output, RenderReport& report, Progress& progress)
+      : arguments_(arguments),
+        manifest_(manifest),
+        renderer_(renderer),
+        output_(output),
+        report_(report),
+        progress_(progress) {}
 
   /// Pictures that were written are kept if a later frame fails.
   void draw(const CameraMotion& motion) {
     const bool moves = arguments_.camera.moves();
     if (moves) progress_.begin("drawing", motion.frames, "frames");
     for (uint64_t number = 0; number < motion.frames; ++number) {
+      Progress of_frame;
+      of_frame.stopWith(progress_);
       try {
-        draw(number, motion, moves ? nullptr : &progress_);
+        draw(number, motion, moves ? of_frame : progress_);
+      } catch (const Interrupted&) {
+        throw;
       } catch (const UsageError& error) {
         if (moves) throw UsageError("frame {}: {}", number, error.what());
         throw;
@@ -202,11 +216,11 @@ class FrameRun {
   }
 
  private:
-  void draw(uint64_t number, const CameraMotion& motion, Progress* progress) {
+  void draw(uint64_t number, const CameraMotion& motion, Progress& progress) {
     const Camera camera = motion.camera(number);
     FrameStatistics statistics;
     if (number > 0 || arguments_.first_image.empty()) {
-      const Image image = renderer_.render(camera, report_.options, statistics, progress);
+      const Image image = renderer_.render(camera, report_.options, statistics, &progress);
       if (number + 1 < motion.frames) prefetch(motion, number + 1);
       finish(number, camera, image, statistics);
       return;
@@ -219,7 +233,7 @@ class FrameRun {
       }
       if (is_final) finish(number, camera, image, statistics);
     };
-    renderer_.renderProgressively(camera, report_.options, statistics, show, progress);
+    renderer_.renderProgressively(camera, report_.options, statistics, show, &progress);
   }
 
   /// Reads the next frame's bricks while this frame's picture is written.
@@ -237,13 +251,22 @@ class FrameRun {
     report_.frames.push_back({camera, statistics});
     const std::string which = arguments_.camera.moves() ? fmt::format(" of frame {}", number) : "";
     reportUnreadable(which, statistics);
+    const RenderedScene scene{manifest_, report_.variable, report_.transfer_function,
+                              camera,    report_.options,  statistics};
+    if (number == 0) warnOfPoorPicture(image, scene);
     if (reported_empty_ || !isEmpty(image, report_.options.background)) return;
     reported_empty_ = true;
     progress_.end();
-    const RenderedScene scene{manifest_, report_.variable, report_.transfer_function,
-                              camera,    report_.options,  statistics};
     for (const std::string& reason : whyEmpty(scene))
       printMessage("warning: the picture{} is empty: {}", which, reason);
+  }
+
+  void warnOfPoorPicture(const Image& image, const RenderedScene& scene) {
+    if (isEmpty(image, report_.options.background)) return;  // said with its reasons
+    const std::string warning = poorPictureWarning(image, scene, givenFunctionOptions(arguments_.scalar));
+    if (warning.empty()) return;
+    progress_.end();
+    printMessage("warning: {}", warning);
   }
 
   /// Calls write() with the picture, annotated if annotations were requested.
@@ -274,10 +297,18 @@ class FrameRun {
   FrameRenderer& renderer_;
   FrameOutput& output_;
   RenderReport& report_;
-  Progress progress_{progressBar()};
+  Progress& progress_;
   bool reported_empty_ = false;
   std::set<uint32_t> reported_unreadable_;  // bricks
 };
+
+/// What a stopped run has done, and left.
+std::string howFar(const RenderReport& report, uint64_t frames) {
+  const std::string output = report.output.string();
+  if (frames == 1) return fmt::format("interrupted; {} was not written", output);
+  return fmt::format("interrupted after {} of {} frames; {}", report.frames.size(), frames,
+                     isMovieName(output) ? output + " was not written" : "the pictures of these are kept");
+}
 
 void printResult(const RenderReport& report) {
   const FrameStatistics& last = report.frames.back().statistics;
@@ -304,8 +335,8 @@ void render(const RenderArguments& arguments) {
   const size_t variable = chooseVariable(cache, arguments.scalar);
   const VariableInfo& info = manifest.variables[variable];
   const glm::dvec3 lower = manifest.lower * options.scale, upper = manifest.upper * options.scale;
-  const TransferFunction transfer_function =
-      chooseTransferFunction(arguments.scalar, info, glm::length(upper - lower));
+  PictureChoice choice(cache, variable, options.scale);
+  const TransferFunction transfer_function = choice.function(arguments.scalar);
   for (const std::string& note : transfer_function.notes()) printMessage("note: {}", note);
   const std::string range_warning = rangeMissesScalar(info, transfer_function);
   if (!range_warning.empty()) printMessage("warning: {}", range_warning);
@@ -313,14 +344,28 @@ void render(const RenderArguments& arguments) {
   const ImageSize picture = options.size;
   options.size = dataSize(arguments.annotations, picture, transfer_function);
   options.output_bytes = outputBytes(arguments, picture);
-  const CameraMotion motion = chooseCameraMotion(arguments.camera, lower, upper, options.size);
+  const CameraArguments camera = choice.camera(arguments.camera, transfer_function, options.size);
+  const CameraMotion motion = chooseCameraMotion(camera, lower, upper, options.size);
+  requireThreads(options.threads);
+  Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
   const auto output = makeFrameOutput(arguments.output, arguments.camera.moves(), picture, frames_per_s);
   FrameRenderer renderer(cache, variable, transfer_function, parseBackend(arguments.backend));
   RenderReport report{arguments.cache, arguments.output,       picture, info, transfer_function,
-                      options,         renderer.backendName(), {},      0,    {}};
-  FrameRun(arguments, manifest, renderer, *output, report).draw(motion);
-  if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, statisticsOf(report));
+                      options,         renderer.backendName(), {},      {},   {}};
+  const auto writeReport = [&] {
+    if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, statisticsOf(report));
+  };
+  try {
+    FrameRun(arguments, manifest, renderer, *output, report, progress).draw(motion);
+  } catch (const Interrupted& interrupted) {
+    progress.end();
+    writeReport();
+    throw Interrupted(interrupted.signal(), howFar(report, motion.frames));
+  }
+  writeReport();
   printResult(report);
+  if (!choice.chosenOptions().empty()) fmt::print("chosen from the data: {}\n", choice.chosenOptions());
 }
 
 }  // namespace
@@ -398,8 +443,10 @@ void addRender(CLI::App& app) {
   const std::string where = "Camera";
   CameraArguments* camera = &arguments->camera;
   command
-      ->add_option("--view", camera->view,
-                   "Side the camera looks from: iso, +x, -x, +y, -y, +z or -z (default iso)")
+      ->add_option(
+          "--view", camera->view,
+          "Side the camera looks from: iso, +x, -x, +y, -y, +z or -z (default: chosen from the data; iso for "
+          "a camera that moves)")
       ->group(where);
   command->add_option("--position", camera->position, "Camera position x,y,z, in coordinates after --scale")
       ->group(where);
@@ -426,7 +473,7 @@ void addRender(CLI::App& app) {
       ->add_option("--path", camera->path,
                    "Camera path: a JSON file of key frames, described in tools/REFERENCE.md")
       ->group(where);
-  command->add_option("--frames", camera->frames, "Number of frames of --orbit or --path")
+  command->add_option("--frames", camera->frames, "Number of frames of --orbit or --path (default 90)")
       ->check(CLI::Range(1u, kMaxFrames))
       ->group(where);
   command->add_option("--frame-rate", arguments->frame_rate, "Frames per second of a movie (default 25)")

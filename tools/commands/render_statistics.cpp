@@ -154,7 +154,8 @@ nlohmann::json statisticsOf(const RenderReport& report) {
   const glm::vec4& background = options.background;
   json["background"] = {background.r, background.g, background.b, background.a};
   json["transfer_function"] = toJson(report.transfer_function);
-  json["time_to_first_image_s"] = report.time_to_first_image_s;
+  json["time_to_first_image_s"] = nullptr;
+  if (report.time_to_first_image_s) json["time_to_first_image_s"] = *report.time_to_first_image_s;
   if (report.first_image) json["first_image"] = toJson(*report.first_image);
   json["frames"] = Json::array();
   for (const FrameReport& frame : report.frames) {
@@ -162,7 +163,7 @@ nlohmann::json statisticsOf(const RenderReport& report) {
     one["camera"] = toJson(frame.camera);
     json["frames"].push_back(std::move(one));
   }
-  json["summary"] = overFrames(report.frames);
+  if (!report.frames.empty()) json["summary"] = overFrames(report.frames);
   return json;
 }
 

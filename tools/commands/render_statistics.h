@@ -29,8 +29,8 @@ struct RenderReport {
   const FrameOptions& options;
   std::string backend;
   std::vector<FrameReport> frames;
-  double time_to_first_image_s = 0;            // since the process started
-  std::optional<FrameStatistics> first_image;  // the coarse one of --first-image
+  std::optional<double> time_to_first_image_s;  // since the process started; nullopt: none, or unknown
+  std::optional<FrameStatistics> first_image;   // the coarse one of --first-image
 };
 
 nlohmann::json statisticsOf(const RenderReport& report);

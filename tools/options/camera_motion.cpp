@@ -31,6 +31,11 @@ Camera placedCamera(const CameraArguments& arguments, const glm::dvec3& lower, c
     camera.parallel_scale = camera.parallelScaleFor(lower, upper, size);
   } else {
     camera = Camera::named(arguments.view.value_or("iso"), lower, upper, size, projection, angle);
+    if (arguments.focal_point) {
+      const glm::dvec3 moved = parsePoint("--focal-point", *arguments.focal_point) - camera.focal_point;
+      camera.position += moved;
+      camera.focal_point += moved;
+    }
   }
   if (arguments.parallel_scale)
     camera.parallel_scale = parsePositive("--parallel-scale", *arguments.parallel_scale);
@@ -40,10 +45,11 @@ Camera placedCamera(const CameraArguments& arguments, const glm::dvec3& lower, c
 }  // namespace
 
 void checkCameraArguments(const CameraArguments& arguments) {
-  if (arguments.view && (arguments.position || arguments.focal_point || arguments.view_up))
-    throw UsageError("--view cannot be combined with --position, --focal-point or --view-up");
-  if (!arguments.position && (arguments.focal_point || arguments.view_up))
-    throw UsageError("{} needs --position", arguments.focal_point ? "--focal-point" : "--view-up");
+  if (arguments.view && (arguments.position || arguments.view_up))
+    throw UsageError("--view cannot be combined with --position or --view-up");
+  if (!arguments.position && arguments.view_up) throw UsageError("--view-up needs --position");
+  if (!arguments.position && !arguments.view && arguments.focal_point)
+    throw UsageError("--focal-point needs --position or --view");
   if (arguments.parallel_scale && arguments.view_angle)
     throw UsageError("--parallel-scale (orthographic) cannot be combined with --view-angle (perspective)");
   if (arguments.orbit && !arguments.path.empty())
@@ -54,14 +60,12 @@ void checkCameraArguments(const CameraArguments& arguments) {
         "--path {}: its key frames place the camera; remove --view, --position, --parallel-scale and "
         "--view-angle",
         arguments.path.string());
-  if (arguments.moves() && !arguments.frames)
-    throw UsageError("{} needs --frames", arguments.orbit ? "--orbit" : "--path");
   if (arguments.frames && !arguments.moves()) throw UsageError("--frames needs --orbit or --path");
 }
 
 CameraMotion chooseCameraMotion(const CameraArguments& arguments, const glm::dvec3& lower,
                                 const glm::dvec3& upper, ImageSize size) {
-  const uint64_t frames = arguments.frames.value_or(1);
+  const uint64_t frames = arguments.frameCount();
   if (!arguments.path.empty()) {
     const auto path = std::make_shared<CameraPath>(CameraPath::fromFile(arguments.path));
     const double step = frames > 1 ? (path->end() - path->begin()) / static_cast<double>(frames - 1) : 0;

@@ -13,6 +13,7 @@
 namespace curvisplat {
 
 inline constexpr unsigned kMaxFrames = 100'000;  // limit of --frames
+inline constexpr unsigned kDefaultFrames = 90;   // of an orbit or a path
 
 /// Command-line arguments as given; checked and parsed later.
 struct CameraArguments {
@@ -21,6 +22,7 @@ struct CameraArguments {
   std::filesystem::path path;
 
   bool moves() const { return orbit || !path.empty(); }
+  uint64_t frameCount() const { return frames.value_or(moves() ? kDefaultFrames : 1); }
 };
 
 /// Throws UsageError if options contradict each other; needs no cache.

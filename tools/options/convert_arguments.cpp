@@ -2,14 +2,73 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
+#include <set>
 
 #include "stream/base/error.h"
 #include "stream/base/message.h"
+#include "stream/base/process_usage.h"
 #include "tools/options/grid_options.h"
 #include "tools/output/output_paths.h"
 
 namespace curvisplat {
+namespace {
+
+constexpr size_t kMaxDefaultScalars = 16;
+
+bool isScalar(const GridDescription& description, const std::string& name) {
+  try {
+    scalarsNamed(description, {name});
+    return true;
+  } catch (const UsageError&) {
+    return false;
+  }
+}
+
+std::vector<std::string> splitAtCommas(const std::string& text) {
+  std::vector<std::string> parts;
+  for (size_t begin = 0; begin <= text.size();) {
+    const size_t end = std::min(text.find(',', begin), text.size());
+    if (end > begin) parts.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return parts;
+}
+
+/// The scalars that the files store, which can share a cache with the first: each name once.
+std::vector<uint32_t> storedScalars(const GridDescription& description) {
+  std::vector<uint32_t> positions;
+  std::vector<std::string> left_out;
+  std::set<std::string> names;
+  for (uint32_t n = 0; n < description.scalars.size(); ++n) {
+    const GridScalar& scalar = description.scalars[n];
+    if (scalar.derived) continue;
+    const bool fits = positions.empty() || scalar.centring == description.scalars[positions[0]].centring;
+    if (fits && positions.size() < kMaxDefaultScalars && names.insert(scalar.name).second)
+      positions.push_back(n);
+    else
+      left_out.push_back(scalar.name);
+  }
+  if (!left_out.empty())
+    printMessage("note: left out: {}; choose scalars with --scalar NAME,NAME", fmt::join(left_out, ", "));
+  return positions;
+}
+
+}  // namespace
+
+void takeScalarsFromSolutions(ConvertArguments& arguments) {
+  std::vector<std::string>& scalars =
+      arguments.added_scalars.empty() ? arguments.scalars : arguments.added_scalars;
+  if (scalars.empty()) return;
+  std::erase_if(arguments.grid.solutions, [&](const std::filesystem::path& path) {
+    std::error_code ignored;
+    const bool is_name = path.string().find_first_of("./") == std::string::npos;
+    if (!is_name || std::filesystem::exists(path, ignored)) return false;
+    scalars.push_back(path.string());
+    return true;
+  });
+}
 
 std::unique_ptr<GridSource> openSource(const ConvertArguments& arguments,
                                        const std::filesystem::path& cache) {
@@ -17,16 +76,35 @@ std::unique_ptr<GridSource> openSource(const ConvertArguments& arguments,
   grid.temporary_folder =
       arguments.temporary_folder.empty() ? cache.parent_path() : arguments.temporary_folder;
   if (grid.temporary_folder.empty()) grid.temporary_folder = ".";
-  grid.scalars = arguments.scalars;
-  grid.scalars.insert(grid.scalars.end(), arguments.added_scalars.begin(), arguments.added_scalars.end());
+  // A reader that has several grids takes that of the scalars; it passes over names that it does not know.
+  for (const auto* words : {&arguments.scalars, &arguments.added_scalars})
+    for (const std::string& word : *words) {
+      grid.scalars.push_back(word);
+      const std::vector<std::string> parts = splitAtCommas(word);
+      if (parts.size() > 1) grid.scalars.insert(grid.scalars.end(), parts.begin(), parts.end());
+    }
   return openWithDerived(grid, {arguments.gas, arguments.blank_value});
 }
 
 std::vector<uint32_t> chooseScalars(const ConvertArguments& arguments, const std::vector<std::string>& names,
                                     const GridDescription& description) {
   try {
-    for (const std::string& note : notesOnNumbers(description, names)) printMessage("note: {}", note);
-    return scalarsNamed(description, names);
+    std::vector<uint32_t> stored;
+    std::vector<std::string> words;
+    for (const std::string& name : names) {
+      if (isScalar(description, name))
+        words.push_back(name);
+      else if (name == "all")
+        stored = storedScalars(description);
+      else
+        for (const std::string& part : splitAtCommas(name)) words.push_back(part);
+    }
+    if (names.empty()) stored = storedScalars(description);
+    if (words.empty() && !stored.empty()) return stored;
+    for (const std::string& note : notesOnNumbers(description, words)) printMessage("note: {}", note);
+    for (const uint32_t position : scalarsNamed(description, words))
+      if (std::find(stored.begin(), stored.end(), position) == stored.end()) stored.push_back(position);
+    return stored;
   } catch (const UsageError& error) {
     throw Error("{}: {}", arguments.grid.grid.string(), error.what());
   }
@@ -67,6 +145,11 @@ uint64_t totalBytes(std::span<const FileReport> files) {
 
 double mebibytes(uint64_t bytes) {
   return static_cast<double>(bytes) / static_cast<double>(1 << 20);
+}
+
+std::string peakMemoryText() {
+  const uint64_t bytes = ProcessUsage::now().peak_memory_bytes;
+  return bytes > 0 ? fmt::format(", peak memory {:.0f} MiB", mebibytes(bytes)) : "";
 }
 
 }  // namespace curvisplat

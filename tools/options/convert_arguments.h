@@ -28,22 +28,28 @@ struct ConvertArguments {
   std::optional<double> blank_value;
   std::optional<std::string> memory;
   unsigned threads = 0;
-  bool overwrite = false, resume = false;
+  bool overwrite = false, resume = false, no_preflight = false;
 };
 
 /// Opens the grid. Temporary files go to --tmp, or beside `cache` without it.
 std::unique_ptr<GridSource> openSource(const ConvertArguments& arguments, const std::filesystem::path& cache);
 
-/// Positions of the scalars `names` in the description. Prints a note for each number that could mean two
-/// scalars. Throws Error, not UsageError, for a scalar that the files lack: the files decide, not the usage.
+/// Positions of the scalars `names` in the description: names, lists "a,b", or "all". Without names all that
+/// the files store, at most 16 of one centring; a note says what is left out. Prints a note for each number
+/// that could mean two scalars. Throws Error, not UsageError, for a scalar that the files lack: the files decide, not the usage.
 std::vector<uint32_t> chooseScalars(const ConvertArguments& arguments, const std::vector<std::string>& names,
                                     const GridDescription& description);
+
+/// Moves words that are no files from the solutions to the scalars: the second of "--scalar a b".
+void takeScalarsFromSolutions(ConvertArguments& arguments);
 
 /// The sum over all phases.
 double secondsOf(const Progress& progress);
 
 uint64_t totalBytes(std::span<const FileReport> files);
 double mebibytes(uint64_t bytes);
+/// ", peak memory 123 MiB", of this process so far; empty where the system does not tell.
+std::string peakMemoryText();
 
 /// Throws Error if the --stats file cannot be written or is one of the inputs or outputs.
 void checkStatisticsFile(const ConvertArguments& arguments);
@@ -55,6 +61,7 @@ void applyCommonOptions(const ConvertArguments& arguments, Options& options) {
   options.temporary_folder = arguments.temporary_folder;
   options.blank_value = arguments.blank_value;
   options.threads = arguments.threads;
+  options.check_disk_space = !arguments.no_preflight;
   if (arguments.memory) options.memory_bytes = parseMemory("--memory", *arguments.memory);
 }
 

@@ -1,61 +1,69 @@
 #include "tools/options/scalar_arguments.h"
 
-#include <fmt/format.h>
+#include <string>
+#include <vector>
 
-#include <utility>
-
+#include "render/automatic/first_choice.h"
 #include "stream/base/error.h"
-#include "tools/options/option_parsers.h"
 
 namespace curvisplat {
 
 void addScalarOption(CLI::App& command, ScalarArguments& arguments) {
-  command.add_option("--scalar", arguments.scalar, "Name of the scalar to draw (default: the cache's first)");
+  command.add_option("--scalar", arguments.scalar,
+                     "Name of the scalar to draw (default: the first that is not constant)");
 }
 
 void addFunctionOptions(CLI::App& command, ScalarArguments& arguments, const std::string& group) {
   command
       .add_option(
           "--tf", arguments.transfer_function,
-          fmt::format("Transfer function: {}, or the path of a ParaView preset (.json)", presetNames()))
-      ->capture_default_str()
+          "Colour map, such as viridis, thermal or cool-warm (curvisplat colormaps lists them; NAME_r is "
+          "reversed), or the path of a ParaView preset (.json) (default: chosen from the data)")
       ->group(group);
   command
       .add_option("--range", arguments.range,
-                  "Scalar range LO,HI of the transfer function (default: the scalar's range; with a file, "
-                  "the file's range)")
+                  "Scalar range of the transfer function: LO,HI; percentiles of the volume, such as 1%,99%; "
+                  "or data, all values (default: chosen from the data; with a file, the file's)")
+      ->group(group);
+  command
+      .add_option("--opacity", arguments.opacity,
+                  "Opacities along the range, POSITION:OPACITY,... from 0 to 1, such as "
+                  "0.2:0,0.5:0.8,1:0.1; ramp, which rises from 0 to 0.4; or auto, chosen from the data "
+                  "(default: auto, with --range or --opacity-unit ramp)")
+      ->group(group);
+  command
+      .add_option("--asinh", arguments.asinh,
+                  "Spread values near CENTRE: colours and opacities follow asinh((value - CENTRE)/WIDTH) "
+                  "along the range. CENTRE,WIDTH (default: chosen from the data; with --range linear)")
       ->group(group);
   command
       .add_option("--opacity-unit", arguments.opacity_unit,
                   "Opacity unit: length in world units over which the function's opacity accumulates. "
-                  "Smaller is more "
-                  "opaque (default: 1/100 of the data's diagonal)")
+                  "Smaller is more opaque (default: chosen so that the data absorbs 65 % of the light)")
       ->group(group);
 }
 
+std::string givenFunctionOptions(const ScalarArguments& arguments) {
+  std::vector<std::string> given;
+  if (arguments.transfer_function) given.emplace_back("--tf");
+  if (arguments.range) given.emplace_back("--range");
+  if (arguments.opacity) given.emplace_back("--opacity");
+  if (arguments.asinh) given.emplace_back("--asinh");
+  if (arguments.opacity_unit) given.emplace_back("--opacity-unit");
+  std::string text;
+  for (size_t n = 0; n < given.size(); ++n)
+    text += (n == 0 ? "" : n + 1 == given.size() ? " and " : ", ") + given[n];
+  return text;
+}
+
 size_t chooseVariable(const CacheReader& cache, const ScalarArguments& arguments) {
+  if (arguments.scalar.empty() && !cache.manifest().variables.empty())
+    return firstVaryingVariable(cache.manifest());
   try {
     return cache.variableNamed(arguments.scalar);
   } catch (const UsageError& error) {
     throw Error("{}", error.what());
   }
-}
-
-TransferFunction chooseTransferFunction(const ScalarArguments& arguments, const VariableInfo& variable,
-                                        double diagonal) {
-  const double default_unit = diagonal > 0 ? diagonal / 100 : 1;
-  const double unit = arguments.opacity_unit ? parsePositive("--opacity-unit", *arguments.opacity_unit) : 0;
-  std::optional<std::pair<double, double>> range;
-  if (arguments.range) {
-    const auto ends = parseNumbers("--range", *arguments.range, "LO,HI");
-    if (!(ends[0] < ends[1])) throw UsageError("--range {}: expected LO,HI with LO < HI", *arguments.range);
-    range.emplace(ends[0], ends[1]);
-  }
-  if (arguments.transfer_function.ends_with(".json"))
-    return TransferFunction::fromFile(arguments.transfer_function, range ? &*range : nullptr, unit,
-                                      default_unit);
-  return TransferFunction::preset(arguments.transfer_function, range ? range->first : variable.min,
-                                  range ? range->second : variable.max, unit > 0 ? unit : default_unit);
 }
 
 }  // namespace curvisplat

@@ -13,22 +13,20 @@ namespace curvisplat {
 
 /// Command-line arguments as given; checked and parsed later.
 struct ScalarArguments {
-  std::string scalar, transfer_function = "viridis";
-  std::optional<std::string> range, opacity_unit;
+  std::string scalar;
+  std::optional<std::string> transfer_function, range, opacity, asinh, opacity_unit;
 };
 
 /// Adds --scalar.
 void addScalarOption(CLI::App& command, ScalarArguments& arguments);
-/// Adds --tf, --range and --opacity-unit under the heading `group`.
+/// Adds --tf, --range, --opacity, --asinh and --opacity-unit under the heading `group`.
 void addFunctionOptions(CLI::App& command, ScalarArguments& arguments, const std::string& group);
 
-/// Position of the chosen scalar in the manifest. Throws Error, not UsageError, for a scalar that the cache
-/// lacks: the cache decides, not the usage.
-size_t chooseVariable(const CacheReader& cache, const ScalarArguments& arguments);
+/// The names of the options among those of addFunctionOptions() that were given: "--tf and --range".
+std::string givenFunctionOptions(const ScalarArguments& arguments);
 
-/// `diagonal`: length of the diagonal of the data's bounding box after --scale, in world units. Throws
-/// UsageError, or Error if the file does not hold a transfer function.
-TransferFunction chooseTransferFunction(const ScalarArguments& arguments, const VariableInfo& variable,
-                                        double diagonal);
+/// Position of the chosen scalar in the manifest; without a name, the first that varies. Throws Error, not
+/// UsageError, for a scalar that the cache lacks: the cache decides, not the usage.
+size_t chooseVariable(const CacheReader& cache, const ScalarArguments& arguments);
 
 }  // namespace curvisplat

@@ -18,7 +18,6 @@
 #include "render/image/image_formats.h"
 #include "stream/base/check.h"
 #include "stream/base/error.h"
-#include "stream/base/file.h"
 #include "stream/base/paths.h"
 
 extern char** environ;
@@ -44,8 +43,14 @@ pid_t start(std::vector<std::string> arguments, int input, int errors, const std
   posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
   posix_spawn_file_actions_adddup2(&actions, errors, STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, errors, STDERR_FILENO);
+  // A process group of its own: Ctrl-C is for curvisplat, which stops ffmpeg in order.
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setpgroup(&attributes, 0);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
   pid_t process = -1;
-  const int error = posix_spawnp(&process, "ffmpeg", &actions, nullptr, argv.data(), environ);
+  const int error = posix_spawnp(&process, "ffmpeg", &actions, &attributes, argv.data(), environ);
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   if (error != 0) failToStart(movie, error);
   return process;
@@ -62,10 +67,7 @@ std::string firstLineOf(int file) {
 }  // namespace
 
 MovieWriter::MovieWriter(const std::filesystem::path& path, ImageSize size, double frames_per_s)
-    : path_(writableTarget(path)),
-      unfinished_(temporaryBeside(path_)),
-      size_(size),
-      pixels_(3 * size.pixels()) {
+    : unfinished_(writableTarget(path)), size_(size), pixels_(3 * size.pixels()) {
   // Sockets instead of a pipe: writing to a process that has ended is then an error, not SIGPIPE.
   int ends[2] = {-1, -1};
   errors_ = memfd_create("ffmpeg", MFD_CLOEXEC);
@@ -78,7 +80,7 @@ MovieWriter::MovieWriter(const std::filesystem::path& path, ImageSize size, doub
   try {
     // ffmpeg would take a relative name that begins with a dash for an option, and one with a colon for a
     // protocol.
-    const std::string output = std::filesystem::absolute(unfinished_).string();
+    const std::string output = std::filesystem::absolute(unfinished_.path()).string();
     process_ = start({"ffmpeg",
                       "-nostdin",
                       "-loglevel",
@@ -122,7 +124,6 @@ MovieWriter::~MovieWriter() {
   }
   closeInput();
   close(errors_);
-  removeAll(unfinished_);
 }
 
 void MovieWriter::closeInput() {
@@ -140,11 +141,11 @@ int MovieWriter::wait() {
 }
 
 void MovieWriter::fail(int status) const {
-  const std::string message = firstLineOf(errors_);
+  const std::string message = unfinished_.aboutTarget(firstLineOf(errors_));
   const std::string ended = WIFSIGNALED(status) ? fmt::format("signal {}", WTERMSIG(status))
                                                 : fmt::format("status {}", WEXITSTATUS(status));
-  throw Error("{}: ffmpeg ended with {} before the movie was complete: {}", path_.string(), ended,
-              message.empty() ? "it printed no message" : message);
+  throw Error("{}: ffmpeg ended with {} before the movie was complete: {}", unfinished_.target().string(),
+              ended, message.empty() ? "it printed no message" : message);
 }
 
 void MovieWriter::append(const Image& image) {
@@ -162,7 +163,7 @@ void MovieWriter::append(const Image& image) {
 
 void MovieWriter::finish() {
   if (const int status = wait(); status != 0) fail(status);
-  putFileIntoPlace(unfinished_, path_);
+  unfinished_.putIntoPlace();
 }
 
 }  // namespace curvisplat

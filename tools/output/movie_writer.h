@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "render/image/image.h"
+#include "stream/base/durable_file.h"
 
 namespace curvisplat {
 
@@ -34,7 +35,7 @@ class MovieWriter {
   [[noreturn]] void fail(int status) const;
   void closeInput();
 
-  const std::filesystem::path path_, unfinished_;
+  TemporaryFile unfinished_;
   const ImageSize size_;
   int input_ = -1;   // our end of ffmpeg's standard input
   int errors_ = -1;  // ffmpeg's standard error, a file in memory

@@ -7,8 +7,8 @@
 #include <string>
 #include <system_error>
 
+#include "stream/base/durable_file.h"
 #include "stream/base/error.h"
-#include "stream/base/file.h"
 #include "stream/base/paths.h"
 
 namespace curvisplat {
@@ -22,6 +22,10 @@ void checkOutputFolder(std::string_view option, const std::filesystem::path& pat
   if (::access(folder.c_str(), W_OK | X_OK) != 0)
     throw Error("{} {}: the directory {} is not writable: {}; choose another", option, path.string(),
                 folder.string(), std::strerror(errno));
+  std::error_code error;
+  std::filesystem::symlink_status(path, error);
+  if (error == std::errc::filename_too_long)
+    throw Error("{} {}: the name is too long; choose a shorter one", option, path.string());
 }
 
 void checkOutputFile(std::string_view option, const std::filesystem::path& path,
@@ -36,6 +40,7 @@ void checkOutputFile(std::string_view option, const std::filesystem::path& path,
     throw Error("{} {}", option, error.what());
   }
   if (target != path) checkOutputFolder(option, target);
+  removeAbandonedFiles(folderOf(target));
   for (const fs::path& other : others) {
     if (other.empty()) continue;
     const fs::path there = fs::weakly_canonical(linkTarget(other), ignored);

@@ -7,11 +7,13 @@
 
 namespace curvisplat {
 
-/// `path` is the value of `option`. Throws Error if its folder does not exist or is not writable.
+/// `path` is the value of `option`. Throws Error if its folder does not exist or is not writable, or if no file
+/// can have the name.
 void checkOutputFolder(std::string_view option, const std::filesystem::path& path);
 
-/// Calls checkOutputFolder(). Also throws Error if `path` exists and is not a regular file, or if it is one
-/// of `others` (files or caches that the command reads or writes) or a file of such a cache.
+/// Calls checkOutputFolder(), and removes unfinished files that killed runs have left in the folder. Also
+/// throws Error if `path` exists and is not a regular file, or if it is one of `others` (files or caches that
+/// the command reads or writes) or a file of such a cache.
 void checkOutputFile(std::string_view option, const std::filesystem::path& path,
                      const std::vector<std::filesystem::path>& others);
 

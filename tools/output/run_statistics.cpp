@@ -5,12 +5,12 @@
 
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
 
-#include "stream/base/error.h"
-#include "stream/base/file.h"
+#include "stream/base/durable_file.h"
 #include "stream/base/process_usage.h"
 
 namespace curvisplat {
@@ -26,7 +26,7 @@ std::vector<std::string> commandLine() {
 
 /// Start time of this process in clock ticks since boot: field 22 of /proc/self/stat. Counts the fields from
 /// the last bracket on, because field 2, the program's name in brackets, may contain spaces and brackets.
-double startTicks() {
+std::optional<double> startTicks() {
   std::ifstream file("/proc/self/stat");
   std::string line;
   std::getline(file, line);
@@ -34,27 +34,28 @@ double startTicks() {
   std::string field;
   for (int n = 3; n < 22; ++n) fields >> field;
   double ticks = 0;
-  if (!(fields >> ticks)) throw Error("/proc/self/stat: cannot read field 22, the start time of the process");
+  if (!(fields >> ticks)) return std::nullopt;
   return ticks;
 }
 
 }  // namespace
 
-double secondsSinceStart() {
+std::optional<double> secondsSinceStart() {
+  const std::optional<double> start = startTicks();
+  if (!start) return std::nullopt;
   timespec now;
   clock_gettime(CLOCK_BOOTTIME, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec) -
-         startTicks() / static_cast<double>(sysconf(_SC_CLK_TCK));
+         *start / static_cast<double>(sysconf(_SC_CLK_TCK));
 }
 
 nlohmann::json runStatistics() {
-  const uint64_t peak_memory_bytes = ProcessUsage::now().peak_memory_bytes;
-  if (peak_memory_bytes == 0)
-    throw Error("/proc/self/status: cannot read VmHWM, the peak memory that --stats reports");
-  return {{"program", "curvisplat"},
-          {"version", CURVISPLAT_VERSION},
-          {"command", commandLine()},
-          {"peak_memory_bytes", peak_memory_bytes}};
+  nlohmann::json json{{"program", "curvisplat"},
+                      {"version", CURVISPLAT_VERSION},
+                      {"command", commandLine()},
+                      {"peak_memory_bytes", nullptr}};
+  if (const uint64_t peak = ProcessUsage::now().peak_memory_bytes) json["peak_memory_bytes"] = peak;
+  return json;
 }
 
 void writeStatistics(const std::filesystem::path& path, const nlohmann::json& statistics) {

@@ -31,4 +31,10 @@ StopOnSignals::~StopOnSignals() {
   job = nullptr;
 }
 
+void ignoreFileSizeSignal() {
+  struct sigaction action {};
+  action.sa_handler = SIG_IGN;
+  ::sigaction(SIGXFSZ, &action, nullptr);
+}
+
 }  // namespace curvisplat

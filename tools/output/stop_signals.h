@@ -23,4 +23,8 @@ class StopOnSignals {
   std::array<struct sigaction, kSignals.size()> before_{};
 };
 
+/// Makes a file that grows beyond the limit of `ulimit -f` an error of writing, EFBIG. By default the signal
+/// SIGXFSZ ends the process without a message and without removing its temporary files.
+void ignoreFileSizeSignal();
+
 }  // namespace curvisplat

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "stream/base/check.h"
 
@@ -23,6 +24,15 @@ struct Stage {
 
 std::string secondsText(double seconds) {
   return seconds < 0.1 ? fmt::format("{:.1f} ms", 1e3 * seconds) : fmt::format("{:.2f} s", seconds);
+}
+
+/// Whether the times differ by more than both of them spread.
+bool differ(const OtherFrame& a, const OtherFrame& b) {
+  return std::abs(a.seconds - b.seconds) > a.spread_s + b.spread_s;
+}
+
+std::string timeText(const OtherFrame& frame) {
+  return fmt::format("{} +- {}", secondsText(frame.seconds), secondsText(frame.spread_s));
 }
 
 std::string memoryText(uint64_t bytes) {
@@ -115,6 +125,11 @@ class Judge {
         }
     }
     if (!one) return;
+    if (!differ(*one, *all)) {
+      verdict_.lines.push_back(fmt::format("--threads {} instead of 1: no difference measured ({} and {})",
+                                           all->threads, timeText(*all), timeText(*one)));
+      return;
+    }
     const double gain = one->seconds / all->seconds;
     const bool good = gain >= kGoodScaling * all->threads / 2;
     verdict_.lines.push_back(
@@ -129,6 +144,12 @@ class Judge {
         if (more.threads != less.threads || more.lod_pixels != less.lod_pixels ||
             less.memory_bytes != frame_.memory_bytes || more.memory_bytes <= less.memory_bytes)
           continue;
+        if (!differ(less, more)) {
+          verdict_.lines.push_back(fmt::format(
+              "--memory {} instead of {}: no difference measured ({} and {})", memoryText(more.memory_bytes),
+              memoryText(less.memory_bytes), timeText(more), timeText(less)));
+          return;
+        }
         const double gain = less.seconds / more.seconds;
         verdict_.lines.push_back(
             gain >= kMinGain ? fmt::format("--memory {} would help: --lod-pixels {:g} takes {} instead of {}",

@@ -34,6 +34,7 @@ struct OtherFrame {
   unsigned threads = 1;
   uint64_t memory_bytes = 0;
   uint64_t splats_prepared = 0;
+  double spread_s = 0;  // half the distance between the quartiles of the repeated frames
 };
 
 struct Verdict {

@@ -45,6 +45,12 @@ EditedFunction::EditedFunction(const TransferFunctionDefinition& definition, dou
   if (colours.back().x < 1) colours.push_back({1, colours.back().rgb});
 }
 
+EditedFunction EditedFunction::automatic(const FunctionParts& parts) {
+  EditedFunction function(parts.definition(), parts.opacity_unit);
+  function.setAutomatic();
+  return function;
+}
+
 TransferFunction EditedFunction::function() const {
   return TransferFunction(definition_, &range_, opacity_unit_);
 }

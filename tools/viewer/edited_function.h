@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "render/colour/function_parts.h"
 #include "render/colour/transfer_function.h"
 
 namespace curvisplat {
@@ -25,12 +26,20 @@ class EditedFunction {
   /// gets `default_opacity_unit`. Throws Error if its scale is logarithmic and its range is not above zero.
   EditedFunction(const TransferFunctionDefinition& definition, double default_opacity_unit);
 
+  /// A function that was chosen from the data (render/automatic): the same, with the name kAutomatic.
+  static EditedFunction automatic(const FunctionParts& parts);
+  static constexpr const char* kAutomatic = "automatic";
+
   TransferFunction function() const;
   /// The same function with points at scalar values, as in a ParaView preset.
   TransferFunctionDefinition definition() const;
-  /// Name of the preset that gives this function over range() and opacityUnit(); empty if points were
-  /// changed.
+  /// Name of the preset that gives this function over range() and opacityUnit(), or kAutomatic; empty if
+  /// points were changed.
   const std::string& preset() const { return preset_; }
+  bool isPreset() const { return !preset_.empty() && preset_ != kAutomatic; }
+  bool isAutomatic() const { return preset_ == kAutomatic; }
+  /// Marks a function that was saved as an automatic one.
+  void setAutomatic() { preset_ = kAutomatic; }
 
   std::pair<double, double> range() const { return range_; }
   /// Returns false and changes nothing unless low < high and, on a logarithmic scale, low > 0.

@@ -8,8 +8,9 @@
 #include <cmath>
 #include <sstream>
 
+#include "stream/base/durable_file.h"
 #include "stream/base/error.h"
-#include "stream/base/file.h"
+#include "tools/viewer/first_view.h"
 #include "tools/viewer/histogram.h"
 
 namespace curvisplat {
@@ -167,9 +168,13 @@ bool FunctionPanel::drawCurve(EditedFunction& function) {
 bool FunctionPanel::drawRange(EditedFunction& function, const VariableInfo& variable) {
   bool changed = false;
   if (ImGui::BeginCombo("colours", function.preset().empty() ? "(edited)" : function.preset().c_str())) {
+    if (ImGui::Selectable(EditedFunction::kAutomatic)) {
+      function = automaticFunction(cache_, variable.name);
+      changed = true;
+    }
     for (const std::string& name : presets()) {
       if (!ImGui::Selectable(name.c_str())) continue;
-      if (function.preset().empty())
+      if (!function.isPreset())
         function.setColours(name);  // keep the edited opacities
       else
         function =
@@ -187,7 +192,7 @@ bool FunctionPanel::drawRange(EditedFunction& function, const VariableInfo& vari
   if (ImGui::Button("full range")) changed |= function.setRange(variable.min, variable.max);
   ImGui::SameLine();
   if (ImGui::Button("reset points")) {
-    const std::string name = function.preset().empty() ? function.definition().name : function.preset();
+    const std::string name = function.isPreset() ? function.preset() : function.definition().name;
     try {
       function =
           EditedFunction(name, function.range().first, function.range().second, function.opacityUnit());

@@ -3,31 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/automatic/coarse_samples.h"
 #include "stream/base/check.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr uint64_t kMinSplats = 20'000;
-
-/// The bricks of the coarsest level with at least kMinSplats splats, including leaves above that level.
-std::vector<uint32_t> bricksAtALevel(const CacheReader& cache) {
-  const auto bricks = cache.bricks();
-  for (uint32_t level = 0;; ++level) {
-    std::vector<uint32_t> chosen;
-    uint64_t splats = 0;
-    bool deeper = false;
-    for (uint32_t n = 0; n < bricks.size(); ++n) {
-      const uint32_t own = bricks[n].cell.level;
-      if (own == level || (own < level && bricks[n].isLeaf())) {
-        chosen.push_back(n);
-        splats += bricks[n].splats;
-      }
-      deeper |= own > level;
-    }
-    if (splats >= kMinSplats || !deeper) return chosen;
-  }
-}
 
 }  // namespace
 
@@ -39,7 +21,7 @@ std::vector<double> histogramOf(const CacheReader& cache, size_t variable, doubl
   double total = 0;
   SplatGeometry geometry;
   SplatVariable values;
-  for (const uint32_t brick : bricksAtALevel(cache)) {
+  for (const uint32_t brick : bricksAtALevel(cache, kMinSplats)) {
     cache.readGeometry(brick, geometry);
     cache.readVariable(brick, variable, values);
     for (size_t n = 0; n < values.size(); ++n) {

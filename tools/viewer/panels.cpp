@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 
 #include "stream/base/process_usage.h"
+#include "tools/viewer/first_view.h"
 
 namespace curvisplat {
 namespace {
@@ -54,7 +55,7 @@ PanelActions Panels::draw(ViewState& state, size_t variable, const PanelFacts& f
     for (const VariableInfo& one : cache_.manifest().variables) {
       const bool chosen = one.name == state.variable;
       if (!ImGui::Selectable(scalarTitle(one.name, one.unit).c_str(), chosen) || chosen) continue;
-      chooseVariable(state, cache_.manifest(), one.name);
+      chooseVariable(state, cache_, one.name);
       actions.function_changed = true;
     }
     ImGui::EndCombo();

@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <system_error>
 
+#include "stream/base/durable_file.h"
 #include "stream/base/error.h"
-#include "stream/base/file.h"
 
 namespace curvisplat {
 namespace {

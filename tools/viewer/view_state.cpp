@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
+#include "render/automatic/first_choice.h"
 #include "stream/base/error.h"
 #include "stream/base/json_text.h"
 
@@ -20,7 +21,10 @@ class Fields {
  public:
   Fields(const std::filesystem::path& path, std::string name, const Json& object)
       : path_(path), name_(std::move(name)), object_(object) {
-    if (!object.is_object()) fail("", "an object");
+    if (!object.is_object())
+      throw Error("{}: {}expected an object, found {}", path_.string(),
+                  name_.empty() ? "" : fmt::format("field {}: ", name_.substr(0, name_.size() - 1)),
+                  object.dump().substr(0, 60));
   }
 
   Fields object(const char* field) const { return Fields(path_, name_ + field + ".", at(field)); }
@@ -37,7 +41,7 @@ class Fields {
 
   const Json& at(const char* field) const {
     const auto found = object_.find(field);
-    if (found == object_.end()) fail(field, "one");
+    if (found == object_.end()) fail(field, "a value");
     return *found;
   }
   double number(const char* field, double at_least, double at_most) const {
@@ -149,7 +153,7 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
 ViewState firstViewOf(const Manifest& manifest, ImageSize picture) {
   if (manifest.variables.empty())
     throw Error("{}: the cache contains no scalar; convert the grid again with a scalar", manifest.title);
-  const VariableInfo& variable = manifest.variables.front();
+  const VariableInfo& variable = manifest.variables[firstVaryingVariable(manifest)];
   ViewState state{
       variable.name,
       {},
@@ -200,7 +204,8 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   try {
     json = Json::parse(text);
   } catch (const Json::exception& error) {
-    throw Error("{}: expected the state of a window in JSON: {}", path.string(), error.what());
+    throw Error("{}: expected the state of a window in JSON, found {}", path.string(),
+                jsonFault(text, error));
   }
   const Fields fields(path, "", json);
   if (fields.number("curvisplat_view", 0, 1e9) != 1)
@@ -213,12 +218,14 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   if (!(std::min({scale.x, scale.y, scale.z}) > 0)) fields.fail("scale", "three numbers above zero");
   EditedFunction function(parseParaViewPreset(fields.at("function").dump(), path),
                           defaultOpacityUnit(manifest, scale));
-  if (const std::string preset = fields.text("preset"); !preset.empty()) {
+  if (const std::string preset = fields.text("preset"); preset == EditedFunction::kAutomatic) {
+    function.setAutomatic();
+  } else if (!preset.empty()) {
     try {
       function =
           EditedFunction(preset, function.range().first, function.range().second, function.opacityUnit());
     } catch (const UsageError&) {
-      fields.fail("preset", fmt::format("one of {}", presetNames()));
+      fields.fail("preset", "the name of a colour map (curvisplat colormaps lists them)");
     }
   }
 
@@ -257,7 +264,7 @@ std::string renderCommand(const ViewState& state, const std::filesystem::path& c
   add("--size", fmt::format("{}x{}", size.width, size.height));
   add("--scalar", state.variable);
   const EditedFunction& function = state.function;
-  if (function.preset().empty()) {
+  if (!function.isPreset()) {
     add("--tf", function_file.string());
   } else {
     add("--tf", function.preset());

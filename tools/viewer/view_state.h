@@ -34,8 +34,8 @@ struct ViewState {
   FrameOptions frameOptions(ImageSize size) const;
 };
 
-/// The initial state: the cache's first scalar, with the data fitted into the picture beside the scalar bar.
-/// Throws Error if the cache has no scalar.
+/// The initial state without a look at the data: the first scalar that varies with a preset, and the data
+/// fitted into the picture beside the scalar bar. Throws Error if the cache has no scalar.
 ViewState firstViewOf(const Manifest& manifest, ImageSize picture);
 
 /// Selects another scalar and fits the transfer function to its range. Throws UsageError that lists the

@@ -16,6 +16,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/message.h"
+#include "tools/viewer/first_view.h"
 #include "tools/viewer/frame_loop.h"
 #include "tools/viewer/navigation.h"
 #include "tools/viewer/panels.h"
@@ -80,7 +81,7 @@ class Viewer {
 
   ViewState openingState() {
     const ImageSize size = pictureSize();
-    ViewState state = firstViewOf(cache_.manifest(), size);
+    ViewState state = firstViewOf(cache_, options_.scalar.value_or(""), size);
     if (options_.state) {
       state = viewStateFromJson(readTextFile(*options_.state), *options_.state, cache_.manifest());
     } else if (const auto remembered = rememberedStateOf(cache_.path());
@@ -92,7 +93,7 @@ class Viewer {
       }
     }
     if (options_.scalar && *options_.scalar != state.variable)
-      chooseVariable(state, cache_.manifest(), *options_.scalar);
+      chooseVariable(state, cache_, *options_.scalar);
     if (options_.memory_bytes) state.memory_bytes = *options_.memory_bytes;
     return state;
   }
@@ -256,7 +257,7 @@ class Viewer {
   void copyCommand() {
     try {
       fs::path function_file;
-      if (state_.function.preset().empty())
+      if (!state_.function.isPreset())
         function_file = keepFunction(toParaViewPreset(state_.function.definition()));
       const std::string command =
           renderCommand(state_, fs::absolute(cache_.path()), picture_size_, function_file);

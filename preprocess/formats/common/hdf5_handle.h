@@ -1,5 +1,4 @@
-// RAII handles for HDF5's identifiers, and a scope in which HDF5 prints no errors. Every call into HDF5,
-// closing included, holds dataLibraryMutex().
+// RAII handles for HDF5's identifiers, and the lock that every call into HDF5, closing included, holds.
 #pragma once
 
 #include <hdf5.h>
@@ -39,22 +38,17 @@ using Hdf5Attribute = Hdf5Handle<H5Aclose>;
 using Hdf5Type = Hdf5Handle<H5Tclose>;
 using Hdf5Space = Hdf5Handle<H5Sclose>;
 
-/// Holds the lock and silences HDF5's printed error stack, since failures are thrown as Error. The destructor
-/// restores the previous error handler.
+/// Holds dataLibraryMutex(), and stops HDF5 from printing its error stack: failures are thrown as Error. HDF5
+/// keeps this setting for each thread, so every thread that calls HDF5 or libnetcdf needs it. It stays after
+/// the scope, as libnetcdf leaves it: at the end of the process HDF5 prints what a damaged file left open.
 class QuietHdf5 {
  public:
-  QuietHdf5() : lock_(dataLibraryMutex()) {
-    H5Eget_auto2(H5E_DEFAULT, &report_, &data_);
-    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-  }
-  ~QuietHdf5() { H5Eset_auto2(H5E_DEFAULT, report_, data_); }
+  QuietHdf5() : lock_(dataLibraryMutex()) { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
   QuietHdf5(const QuietHdf5&) = delete;
   QuietHdf5& operator=(const QuietHdf5&) = delete;
 
  private:
   std::lock_guard<std::mutex> lock_;
-  H5E_auto2_t report_ = nullptr;
-  void* data_ = nullptr;
 };
 
 }  // namespace curvisplat

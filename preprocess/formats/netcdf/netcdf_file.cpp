@@ -12,7 +12,7 @@
 #include <mutex>
 #include <numeric>
 
-#include "preprocess/formats/common/data_library_lock.h"
+#include "preprocess/formats/common/hdf5_handle.h"
 #include "preprocess/formats/netcdf/netcdf4_structure.h"
 #include "preprocess/formats/netcdf/netcdf_classic.h"
 #include "stream/base/check.h"
@@ -119,7 +119,7 @@ NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
     checkClassicNetcdf(file);
   else
     plain_hdf5_ = !checkNetcdf4Structure(path).netcdf4;
-  const std::lock_guard lock(dataLibraryMutex());
+  const QuietHdf5 quiet;
   nc_set_chunk_cache(kChunkCacheBytes, kChunkCacheSlots, kChunkCachePreemption);
   // NetCDF takes some relative paths for URLs.
   const std::filesystem::path absolute = std::filesystem::absolute(path);
@@ -139,7 +139,7 @@ NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
 }
 
 NetcdfFile::~NetcdfFile() {
-  const std::lock_guard lock(dataLibraryMutex());
+  const QuietHdf5 quiet;
   nc_close(file_);
 }
 
@@ -333,7 +333,7 @@ const NetcdfVariable* NetcdfFile::find(std::string_view name) const {
 }
 
 std::string NetcdfFile::text(const char* attribute) const {
-  const std::lock_guard lock(dataLibraryMutex());
+  const QuietHdf5 quiet;
   nc_type type = NC_NAT;
   size_t length = 0;
   if (nc_inq_att(file_, NC_GLOBAL, attribute, &type, &length) != NC_NOERR || length > kMaxAttributeValues)
@@ -353,7 +353,7 @@ std::string NetcdfFile::text(const char* attribute) const {
 }
 
 bool NetcdfFile::hasAttribute(const char* attribute) const {
-  const std::lock_guard lock(dataLibraryMutex());
+  const QuietHdf5 quiet;
   int id = 0;
   return nc_inq_attid(file_, NC_GLOBAL, attribute, &id) == NC_NOERR;
 }
@@ -368,7 +368,7 @@ void NetcdfFile::readWith(const Get& get, const NetcdfVariable& variable, const 
   CURVISPLAT_CHECK_OP(box.start.size(), ==, variable.dims.size());
   CURVISPLAT_CHECK_OP(box.values(), <=, to.size());
   {
-    const std::lock_guard lock(dataLibraryMutex());
+    const QuietHdf5 quiet;
     const int status = get(file_, variable.id, box.start.data(), box.count.data(), to.data());
     // NC_ERANGE: a number too large for a float becomes infinite, which blanks its sample.
     if (status != NC_NOERR && status != NC_ERANGE) fail(variable.name, status);

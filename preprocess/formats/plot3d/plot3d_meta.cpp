@@ -29,7 +29,8 @@ class Meta {
     try {
       json_ = Json::parse(text);
     } catch (const Json::exception& error) {
-      throw Error("{}: not valid JSON (.p3d files are JSON): {}", path.string(), firstLine(error.what()));
+      throw Error("{}: not valid JSON (.p3d files are JSON): found {}", path.string(),
+                  jsonFault(text, error));
     }
     if (!json_.is_object()) fail("", "an object", json_);
     readSteps();
@@ -92,8 +93,6 @@ class Meta {
   }
 
  private:
-  static std::string firstLine(const std::string& text) { return text.substr(0, text.find('\n')); }
-
   static const Json* find(const Json& in, const char* key) {
     const auto found = in.find(key);
     return found == in.end() || found->is_null() ? nullptr : &*found;

@@ -1,0 +1,100 @@
+#include "render/automatic/coarse_samples.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kMinSplats = 50'000;
+constexpr size_t kMinPoints = 300'000;
+
+/// A point of the unit cube, of a sequence that fills it evenly (Kronecker's, with powers of the root of
+/// x^5 = x + 1): the same in every run.
+class CubePoints {
+ public:
+  /// x, y, z and a fourth, independent coordinate; each in [-0.5, 0.5).
+  std::array<double, 4> next() {
+    std::array<double, 4> point;
+    for (size_t axis = 0; axis < 4; ++axis) {
+      at_[axis] += kSteps[axis];
+      if (at_[axis] >= 1) at_[axis] -= 1;
+      point[axis] = at_[axis] - 0.5;
+    }
+    return point;
+  }
+
+ private:
+  static constexpr std::array<double, 4> kSteps{0.8566748838545029, 0.7338918566271260, 0.6287067210378087,
+                                                0.5385972572236101};
+  std::array<double, 4> at_{};
+};
+
+}  // namespace
+
+std::vector<uint32_t> bricksAtALevel(const CacheReader& cache, uint64_t min_splats) {
+  const auto bricks = cache.bricks();
+  for (uint32_t level = 0;; ++level) {
+    std::vector<uint32_t> chosen;
+    uint64_t splats = 0;
+    bool deeper = false;
+    for (uint32_t n = 0; n < bricks.size(); ++n) {
+      const uint32_t own = bricks[n].cell.level;
+      if (own == level || (own < level && bricks[n].isLeaf())) {
+        chosen.push_back(n);
+        splats += bricks[n].splats;
+      }
+      deeper |= own > level;
+    }
+    if (splats >= min_splats || !deeper) return chosen;
+  }
+}
+
+CoarseSamples coarseSamples(const CacheReader& cache, size_t variable, const glm::dvec3& scale) {
+  const Manifest& manifest = cache.manifest();
+  const VariableInfo& info = manifest.variables[variable];
+  const std::vector<uint32_t> chosen = bricksAtALevel(cache, kMinSplats);
+  size_t splats = 0;
+  for (const uint32_t brick : chosen) splats += cache.bricks()[brick].splats;
+  const size_t points = splats > 0 ? (kMinPoints + splats - 1) / splats : 1;
+
+  CoarseSamples samples;
+  samples.positions.reserve(splats * points);
+  samples.values.reserve(splats * points);
+  samples.volumes.reserve(splats * points);
+  const double stretch = scale.x * scale.y * scale.z;
+  const auto min = static_cast<float>(info.min), max = static_cast<float>(info.max);
+  CubePoints places;
+  SplatGeometry geometry;
+  SplatVariable values;
+  for (const uint32_t brick : chosen) {
+    try {
+      cache.readGeometry(brick, geometry);
+      cache.readVariable(brick, variable, values);
+    } catch (const DamagedBrick&) {
+      continue;  // drawing it reports it
+    }
+    const glm::dvec3 corner = manifest.root.cellMin(cache.bricks()[brick].cell);
+    for (size_t n = 0; n < values.size(); ++n) {
+      const double a0 = geometry.axis0[n], a1 = geometry.axis1[n], a2 = geometry.axis2[n];
+      const double l10 = geometry.shear10[n], l20 = geometry.shear20[n], l21 = geometry.shear21[n];
+      const double deviation = std::sqrt(12 * std::max(0.0, static_cast<double>(values.variance[n])));
+      const double volume = stretch * geometry.weight[n] / static_cast<double>(points);
+      for (size_t point = 0; point < points; ++point) {
+        const auto [u, v, w, t] = places.next();
+        const glm::dvec3 offset(a0 * u, a0 * l10 * u + a1 * v, a0 * l20 * u + a1 * l21 * v + a2 * w);
+        const double value = values.mean[n] + values.slope0[n] * u + values.slope1[n] * v +
+                             values.slope2[n] * w + deviation * t;
+        samples.positions.push_back(
+            scale * (corner + glm::dvec3(geometry.x[n], geometry.y[n], geometry.z[n]) + offset));
+        samples.values.push_back(std::clamp(static_cast<float>(value), min, max));
+        samples.volumes.push_back(volume);
+        samples.volume += volume;
+      }
+    }
+  }
+  return samples;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,58 @@
+// Chooses a transfer function and a view from the data, so that a picture without options shows something.
+// DESIGN.md, "The first picture", gives the rule and its reasons. Everything that is chosen has few digits
+// and can be given as options: the same options draw the same picture.
+//
+// Opening reads a coarse level of the cache: 0.1 to 0.3 s and 50 MB for any cache. Then immutable; any thread.
+#pragma once
+
+#include <cstddef>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <string>
+
+#include "render/automatic/coarse_samples.h"
+#include "render/automatic/silhouette.h"
+#include "render/automatic/value_distribution.h"
+#include "render/camera/camera.h"
+#include "render/colour/function_parts.h"
+
+namespace curvisplat {
+
+/// Whether the values differ by so little that only their noise could be drawn: 1e-4 of the largest.
+bool isNearlyConstant(const VariableInfo& variable);
+/// The position of the first variable that is not nearly constant; 0 if all are. Requires one or more.
+size_t firstVaryingVariable(const Manifest& manifest);
+
+/// A named view, perhaps of a part of the data.
+struct ViewChoice {
+  std::string view = "iso";
+  std::optional<glm::dvec3> focal_point = std::nullopt;  // nullopt: the whole data is shown
+  double parallel_scale = 0;                             // with a focal point
+};
+
+class FirstChoice {
+ public:
+  /// `scale`: factors that the data's positions are multiplied with. Throws Error as reading does.
+  FirstChoice(const CacheReader& cache, size_t variable, const glm::dvec3& scale);
+
+  /// Range, opacities and opacity unit; `map`: a preset, or empty to have one chosen.
+  FunctionParts function(const std::string& map = "") const;
+  /// The opacity unit at which the function absorbs 65 % on the average over the silhouette. The function's
+  /// own unit does not matter. A function that is transparent for the data gets 1/100 of its diagonal.
+  double opacityUnitOf(const TransferFunction& function) const;
+  /// The value below which `part` (0..1) of the volume lies.
+  double percentile(double part) const;
+  /// The view for a picture of `size`.
+  ViewChoice view(const TransferFunction& function, ImageSize size) const;
+
+ private:
+  FunctionParts constantFunction() const;
+
+  VariableInfo variable_;
+  glm::dvec3 lower_, upper_;  // the data's box, scaled
+  CoarseSamples samples_;
+  std::optional<ValueDistribution> distribution_;  // nullopt: the cache has no splats
+  Silhouette silhouette_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,126 @@
+#include "render/automatic/opacity_rule.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/automatic/rounded.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr double kRareness = 0.6;     // exponent; 0.5 to 0.7 look alike, 0.8 and more show noise
+constexpr double kMinShare = 1e-5;    // of the largest: rarer values are not more opaque
+constexpr double kClearedPart = 0.8;  // of the least extinction
+constexpr int kModeBins = 4;          // on either side
+constexpr int kClearBins = 3;
+constexpr double kModeShare = 0.9;
+constexpr double kLargestDepth = 2.3;
+constexpr double kUnseenPart = 0.005;
+constexpr size_t kMaxPoints = 24;
+constexpr double kRelativeError = 0.15, kMeanError = 0.1;
+constexpr double kEmptyShare = 1e-9;
+
+constexpr auto kBins = VolumeHistogram::kBins;
+
+size_t distanceOf(size_t a, size_t b) {
+  return a > b ? a - b : b - a;
+}
+
+/// The values of the bins as a function of the coordinate, linear between their middles.
+double interpolated(const VolumeHistogram& histogram, const BinExtinctions& values, double coordinate) {
+  const double x =
+      (coordinate - histogram.low) / (histogram.high - histogram.low) * static_cast<double>(kBins) - 0.5;
+  const double inside = std::clamp(x, 0.0, static_cast<double>(kBins - 1));
+  const auto bin = std::min(static_cast<size_t>(inside), kBins - 2);
+  return std::lerp(values[bin], values[bin + 1], inside - static_cast<double>(bin));
+}
+
+}  // namespace
+
+BinExtinctions extinctionsOf(const VolumeHistogram& histogram) {
+  const auto& smoothed = histogram.smoothed;
+  const auto mode =
+      static_cast<size_t>(std::max_element(smoothed.begin(), smoothed.end()) - smoothed.begin());
+  BinExtinctions result{};
+  for (size_t bin = 0; bin < kBins; ++bin)
+    result[bin] = std::pow(smoothed[bin] + kMinShare * smoothed[mode], -kRareness);
+
+  double around_mode = 0, clear = 0, least = result[mode];
+  for (size_t bin = 0; bin < kBins; ++bin) {
+    if (distanceOf(bin, mode) <= kModeBins) around_mode += histogram.shares[bin];
+    if (distanceOf(bin, mode) <= kClearBins) clear = std::max(clear, result[bin]);
+    least = std::min(least, result[bin]);
+  }
+  double largest = 0;
+  for (size_t bin = 0; bin < kBins; ++bin) {
+    if (around_mode > kModeShare)
+      result[bin] = distanceOf(bin, mode) <= kClearBins ? 0 : std::max(0.0, result[bin] - clear);
+    else
+      result[bin] -= kClearedPart * least;
+    largest = std::max(largest, result[bin]);
+  }
+  if (!(largest > 0)) largest = 1;
+  for (double& extinction : result) extinction /= largest;
+  return result;
+}
+
+std::pair<double, double> seenInterval(const VolumeHistogram& histogram, const BinExtinctions& extinctions) {
+  double total = 0;
+  for (size_t bin = 0; bin < kBins; ++bin) total += histogram.shares[bin] * extinctions[bin];
+  if (!(total > 0)) return {histogram.low, histogram.high};
+  const double bin_width = (histogram.high - histogram.low) / static_cast<double>(kBins);
+  const auto at = [&](double part) {
+    double sum = 0;
+    for (size_t bin = 0; bin < kBins; ++bin) {
+      const double here = histogram.shares[bin] * extinctions[bin] / total;
+      if (sum + here >= part && here > 0)
+        return histogram.low + (static_cast<double>(bin) + (part - sum) / here) * bin_width;
+      sum += here;
+    }
+    return histogram.high;
+  };
+  return {at(kUnseenPart), at(1 - kUnseenPart)};
+}
+
+std::vector<OpacityPoint> opacityPoints(const VolumeHistogram& histogram, const BinExtinctions& extinctions,
+                                        double begin, double end) {
+  // The curve at many places, then the fewest of them that keep its shape: always the place that is farthest
+  // off is added.
+  constexpr size_t kPlaces = 257;
+  std::vector<double> opacities(kPlaces), allowed(kPlaces);
+  double mean = 0;
+  for (size_t bin = 0; bin < kBins; ++bin)
+    mean += histogram.shares[bin] * -std::expm1(-kLargestDepth * extinctions[bin]);
+  for (size_t n = 0; n < kPlaces; ++n) {
+    const double coordinate = std::lerp(begin, end, static_cast<double>(n) / (kPlaces - 1));
+    opacities[n] = -std::expm1(-kLargestDepth * interpolated(histogram, extinctions, coordinate));
+    // Values that nothing has may have any opacity.
+    const bool empty = interpolated(histogram, histogram.smoothed, coordinate) < kEmptyShare;
+    allowed[n] = empty ? 1 : kRelativeError * opacities[n] + kMeanError * mean;
+  }
+  std::vector<size_t> kept{0, kPlaces - 1};
+  while (kept.size() < kMaxPoints) {
+    size_t worst = 0;
+    double worst_error = 1;
+    for (size_t piece = 1; piece < kept.size(); ++piece) {
+      const size_t from = kept[piece - 1], to = kept[piece];
+      for (size_t n = from + 1; n < to; ++n) {
+        const double part = static_cast<double>(n - from) / static_cast<double>(to - from);
+        const double error =
+            std::abs(std::lerp(opacities[from], opacities[to], part) - opacities[n]) / allowed[n];
+        if (error <= worst_error) continue;
+        worst_error = error;
+        worst = n;
+      }
+    }
+    if (worst == 0) break;
+    kept.insert(std::upper_bound(kept.begin(), kept.end(), worst), worst);
+  }
+  std::vector<OpacityPoint> points;
+  for (const size_t n : kept)
+    points.push_back({roundedTo(static_cast<double>(n) / (kPlaces - 1), 1, 4),
+                      opacities[n] > 0 ? roundedTo(opacities[n], opacities[n], 2) : 0});
+  return points;
+}
+
+}  // namespace curvisplat

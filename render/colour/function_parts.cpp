@@ -1,0 +1,98 @@
+#include "render/colour/function_parts.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+// Pieces that a curve in asinh is replaced by: straight lines in the scalar.
+constexpr int kAsinhPieces = 256;
+
+std::optional<double> parseUnit(std::string_view text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !(value >= 0 && value <= 1))
+    return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+double AsinhScale::coordinate(double scalar) const {
+  return std::asinh((scalar - centre) / width);
+}
+double AsinhScale::scalar(double coordinate) const {
+  return centre + width * std::sinh(coordinate);
+}
+
+TransferFunctionDefinition FunctionParts::definition() const {
+  TransferFunctionDefinition preset = presetDefinition(map);
+  if (!opacities.empty()) preset.opacities = opacities;
+  const auto [low, high] = range;
+  if (!(low < high)) throw UsageError("the range {},{} of a transfer function must increase", low, high);
+  if (!asinh) {
+    for (ColourPoint& point : preset.colours) point.x = std::lerp(low, high, point.x);
+    for (OpacityPoint& point : preset.opacities) point.x = std::lerp(low, high, point.x);
+    return preset;
+  }
+  const double begin = asinh->coordinate(low), end = asinh->coordinate(high);
+  const ColourMap colours(preset.colours, preset.colour_space);
+  const OpacityCurve curve(preset.opacities);
+  preset.colours.clear();
+  preset.opacities.clear();
+  preset.colour_space = ColourSpace::kRgb;
+  for (int piece = 0; piece <= kAsinhPieces; ++piece) {
+    const double x = static_cast<double>(piece) / kAsinhPieces;
+    const double scalar = piece == 0              ? low
+                          : piece == kAsinhPieces ? high
+                                                  : asinh->scalar(std::lerp(begin, end, x));
+    preset.colours.push_back({scalar, colours.at(x)});
+    preset.opacities.push_back({scalar, curve.at(x)});
+  }
+  return preset;
+}
+
+TransferFunction FunctionParts::function() const {
+  return TransferFunction(definition(), nullptr, opacity_unit);
+}
+
+std::vector<OpacityPoint> parseOpacities(std::string_view option, std::string_view text) {
+  std::vector<OpacityPoint> points;
+  for (size_t begin = 0; begin <= text.size();) {
+    const size_t end = std::min(text.find(',', begin), text.size());
+    const std::string_view pair = text.substr(begin, end - begin);
+    const size_t colon = pair.find(':');
+    const auto x = parseUnit(pair.substr(0, colon));
+    const auto opacity = colon == std::string_view::npos ? std::nullopt : parseUnit(pair.substr(colon + 1));
+    if (!x || !opacity)
+      throw UsageError(
+          "{} {}: '{}' is not POSITION:OPACITY with numbers from 0 to 1; expected a list such as "
+          "0.2:0,0.5:0.8,1:0.1",
+          option, text, pair);
+    if (!points.empty() && *x < points.back().x)
+      throw UsageError("{} {}: position {} follows {}; positions must not decrease", option, text, *x,
+                       points.back().x);
+    points.push_back({*x, *opacity});
+    begin = end + 1;
+  }
+  if (points.size() < 2)
+    throw UsageError("{} {}: expected two or more points, such as 0:0,1:0.5", option, text);
+  if (points.front().x > 0) points.insert(points.begin(), {0, points.front().opacity});
+  if (points.back().x < 1) points.push_back({1, points.back().opacity});
+  return points;
+}
+
+std::string textOf(const std::vector<OpacityPoint>& opacities) {
+  std::string text;
+  for (const OpacityPoint& point : opacities)
+    text += fmt::format("{}{}:{}", text.empty() ? "" : ",", point.x, point.opacity);
+  return text;
+}
+
+}  // namespace curvisplat

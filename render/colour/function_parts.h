@@ -1,0 +1,45 @@
+// A transfer function as command-line options state it: a colour map, the range that it spans, a curve of
+// opacities over that range and the opacity unit. Short enough to print, and what it prints gives the same
+// function.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "render/colour/transfer_function.h"
+
+namespace curvisplat {
+
+/// Divides a range in asinh((f - centre) / width) in place of f: linear within `width` of the centre,
+/// logarithmic further out.
+struct AsinhScale {
+  double centre = 0, width = 1;  // width > 0
+
+  double coordinate(double scalar) const;
+  double scalar(double coordinate) const;
+};
+
+struct FunctionParts {
+  std::string map = "viridis";  // a preset
+  std::pair<double, double> range{0, 1};
+  std::optional<AsinhScale> asinh;
+  std::vector<OpacityPoint> opacities;  // x: 0..1 along the range; empty: those of the preset
+  double opacity_unit = 1;
+
+  /// The points as scalars. Throws UsageError if the preset does not exist, or a range that is reversed or
+  /// empty.
+  TransferFunctionDefinition definition() const;
+  TransferFunction function() const;
+};
+
+/// Parses "0.2:0,0.5:0.8,1:0.1": position along the range and opacity, each 0..1, positions not decreasing,
+/// two or more. Points at 0 and 1 are added where the list lacks them. Throws UsageError that begins with
+/// `option`.
+std::vector<OpacityPoint> parseOpacities(std::string_view option, std::string_view text);
+/// The text that parseOpacities() reads.
+std::string textOf(const std::vector<OpacityPoint>& opacities);
+
+}  // namespace curvisplat

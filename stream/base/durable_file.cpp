@@ -1,0 +1,149 @@
+#include "stream/base/durable_file.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <random>
+#include <string_view>
+#include <utility>
+
+#include "stream/base/checksum.h"
+#include "stream/base/file.h"
+#include "stream/base/open_retrying.h"
+#include "stream/base/paths.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kBegin = ".curvisplat.", kEnd = ".part";
+constexpr size_t kHostDigits = 8, kRandomDigits = 8;
+
+std::string reason() {
+  return std::strerror(errno);
+}
+
+/// Locks of other machines cannot be relied upon on every file system: names tell their files from ours.
+std::string hostDigits() {
+  std::array<char, 256> name{};
+  ::gethostname(name.data(), name.size() - 1);
+  const std::string_view host(name.data());
+  return fmt::format("{:016x}", checksumOf(std::as_bytes(std::span(host)))).substr(0, kHostDigits);
+}
+
+bool isTemporaryOfThisHost(const std::string& name) {
+  return name.size() == kBegin.size() + kHostDigits + kRandomDigits + kEnd.size() &&
+         name.starts_with(std::string(kBegin) + hostDigits()) && name.ends_with(kEnd);
+}
+
+/// Whether the descriptor's file still has a name.
+bool hasName(int fd) {
+  struct stat status {};
+  return ::fstat(fd, &status) == 0 && status.st_nlink > 0;
+}
+
+}  // namespace
+
+void renameDurably(const fs::path& from, const fs::path& to) {
+  SystemCalls& calls = SystemCalls::current();
+  std::error_code none_there;
+  const bool replaces = fs::exists(fs::symlink_status(to, none_there));
+  // Where names can be exchanged, the old file stays under the new one's until the folder is synced.
+  const bool exchanged = replaces && calls.exchange(from.c_str(), to.c_str()) == 0;
+  if (!exchanged && calls.rename(from.c_str(), to.c_str()) < 0)
+    throw Error("{}: cannot be renamed to {}: {}", from.string(), to.string(), reason());
+  try {
+    syncDirectory(folderOf(to));
+  } catch (const Error& error) {
+    if (exchanged ? calls.exchange(from.c_str(), to.c_str()) == 0
+                  : !replaces && calls.rename(to.c_str(), from.c_str()) == 0)
+      throw;
+    if (exchanged) calls.remove(from.c_str());
+    throw NameNotSynced("{}: was written, but a power loss may undo that: {}", to.string(), error.what());
+  }
+  if (exchanged) calls.remove(from.c_str());
+}
+
+TemporaryFile::TemporaryFile(fs::path target) : target_(std::move(target)) {
+  std::random_device random;
+  while (true) {
+    path_ = folderOf(target_) / fmt::format("{}{}{:08x}{}", kBegin, hostDigits(), random(), kEnd);
+    fd_ = openRetrying(path_, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW, 0666);
+    if (fd_ < 0 && errno == EEXIST) continue;
+    if (fd_ < 0) throw Error("{}: no file can be made beside it: {}", target_.string(), reason());
+    // Where files cannot be locked, removeAbandonedFiles() cannot lock them either, and removes nothing.
+    const bool busy = ::flock(fd_, LOCK_EX | LOCK_NB) < 0 && errno == EWOULDBLOCK;
+    if (!busy && hasName(fd_)) return;
+    // Another process took it for abandoned before it was locked.
+    SystemCalls::current().close(fd_);
+  }
+}
+
+TemporaryFile::~TemporaryFile() {
+  if (!in_place_) removeAll(path_);
+  SystemCalls::current().close(fd_);
+}
+
+std::string TemporaryFile::aboutTarget(std::string message) const {
+  const std::string own = path_.string();
+  for (size_t at = 0; (at = message.find(own, at)) != std::string::npos; at += target_.string().size())
+    message.replace(at, own.size(), target_.string());
+  return message;
+}
+
+void TemporaryFile::putIntoPlace() {
+  int result;
+  do {
+    result = SystemCalls::current().fsync(fd_);
+  } while (result < 0 && errno == EINTR);
+  if (result < 0 && errno != EINVAL && errno != ENOTSUP)
+    throw Error("{}: cannot be synced to the disk: {}", target_.string(), reason());
+  try {
+    renameDurably(path_, target_);
+  } catch (const NameNotSynced&) {
+    in_place_ = true;
+    throw;
+  } catch (const Error& error) {
+    throw Error(aboutTarget(error.what()));
+  }
+  in_place_ = true;
+}
+
+void writeFileDurably(const fs::path& path, std::span<const std::byte> bytes) {
+  TemporaryFile temporary(writableTarget(path));
+  try {
+    OutputFile(temporary.path()).append(bytes);
+  } catch (const Error& error) {
+    throw Error(temporary.aboutTarget(error.what()));
+  }
+  temporary.putIntoPlace();
+}
+
+void writeFileDurably(const fs::path& path, const std::string& text) {
+  writeFileDurably(path, std::as_bytes(std::span(text)));
+}
+
+void removeAbandonedFiles(const fs::path& folder) noexcept {
+  try {
+    std::error_code error;
+    for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+      if (!isTemporaryOfThisHost(entry->path().filename().string())) continue;
+      const int fd = openRetrying(entry->path(), O_RDWR | O_NOFOLLOW | O_NONBLOCK, 0);
+      if (fd < 0) continue;
+      struct stat status {};
+      if (::fstat(fd, &status) == 0 && S_ISREG(status.st_mode) && ::flock(fd, LOCK_EX | LOCK_NB) == 0)
+        SystemCalls::current().remove(entry->path().c_str());
+      SystemCalls::current().close(fd);
+    }
+  } catch (...) {
+    // They are in nobody's way.
+  }
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,49 @@
+#include "stream/base/suggestion.h"
+
+#include <algorithm>
+#include <cctype>
+#include <vector>
+
+namespace curvisplat {
+namespace {
+
+char lower(char letter) {
+  return static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
+}
+
+/// Damerau and Levenshtein's distance, in which two letters that are swapped count once.
+size_t distance(std::string_view a, std::string_view b) {
+  std::vector<size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
+  for (size_t j = 0; j <= b.size(); ++j) last[j] = j;
+  for (size_t i = 1; i <= a.size(); ++i) {
+    row[0] = i;
+    for (size_t j = 1; j <= b.size(); ++j) {
+      const bool same = lower(a[i - 1]) == lower(b[j - 1]);
+      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (same ? 0 : 1)});
+      if (i > 1 && j > 1 && lower(a[i - 1]) == lower(b[j - 2]) && lower(a[i - 2]) == lower(b[j - 1]))
+        row[j] = std::min(row[j], before[j - 2] + 1);
+    }
+    before.swap(last);
+    last.swap(row);
+  }
+  return last[b.size()];
+}
+
+}  // namespace
+
+std::string closestTo(std::string_view word, std::span<const std::string> candidates) {
+  constexpr size_t kMaxWord = 64;  // longer ones are no misspelled names
+  if (word.empty() || word.size() > kMaxWord) return {};
+  std::string best;
+  size_t least = std::max<size_t>(1, word.size() / 3) + 1;
+  for (const std::string& candidate : candidates) {
+    if (candidate.size() > 2 * kMaxWord) continue;
+    const size_t letters = distance(word, candidate);
+    if (letters >= least) continue;
+    least = letters;
+    best = candidate;
+  }
+  return best;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,110 @@
+// Pictures without options: each shows something, and the options that the program prints draw it again.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "render/image/contrast.h"
+#include "render/image/image_file.h"
+#include "stream/base/file.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr std::string_view kChosen = "chosen from the data: ";
+
+class DefaultPictures : public testing::TestWithParam<const char*> {
+ protected:
+  std::string file(const std::string& name) const { return (folder_ / name).string(); }
+
+  ProgramResult run(const std::vector<std::string>& arguments) const {
+    const ProgramResult result = runProgram(arguments);
+    EXPECT_EQ(result.status, 0) << result.err;
+    return result;
+  }
+  void convert(const std::string& scene, const std::string& size) const {
+    run({"generate", scene, "--size", size, "-o", file("a")});
+    run({"convert", file("a.xyz"), file("a.fun"), "-o", file("a.splats")});
+  }
+  ProgramResult render(std::vector<std::string> options, const std::string& name = "a.png") const {
+    options.insert(options.begin(), {"render", file("a.splats"), "-o", file(name), "--size", "160x160"});
+    return run(options);
+  }
+  static std::vector<std::string> chosenOptions(const std::string& out) {
+    const size_t at = out.find(kChosen);
+    EXPECT_NE(at, std::string::npos) << out;
+    if (at == std::string::npos) return {};
+    std::istringstream words(out.substr(at + kChosen.size()));
+    std::vector<std::string> options;
+    for (std::string word; words >> word;) options.push_back(word);
+    return options;
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_P(DefaultPictures, ShowSomethingAndCanBeDrawnAgain) {
+  convert(GetParam(), "48x32x24");
+  const ProgramResult result = render({});
+  EXPECT_EQ(result.err, "");
+  const PictureContrast contrast = contrastOf(readImage(file("a.png")), glm::vec4(1));
+  EXPECT_GE(contrast.other, 0.05) << result.out;
+
+  const ProgramResult again = render(chosenOptions(result.out), "b.png");
+  EXPECT_EQ(again.out.find(kChosen), std::string::npos) << "all was given: " << again.out;
+  EXPECT_EQ(readTextFile(file("a.png")), readTextFile(file("b.png"))) << result.out;
+}
+INSTANTIATE_TEST_SUITE_P(Scenes, DefaultPictures,
+                         testing::Values("half-annulus", "shell", "o-grid", "axis", "sheared-waves", "wake",
+                                         "dome", "globe", "duct"),
+                         [](const auto& scene) {
+                           std::string name = scene.param;
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+TEST_F(DefaultPictures, RangesByPercentilesAndOfAllData) {
+  convert("wake", "48x32x24");
+  const auto outputs = [&](const std::string& range) {
+    render({"--range", range, "--opacity-unit", "0.1", "--view", "iso"}, "r.png");
+    return readTextFile(file("r.png"));
+  };
+  const std::string all = outputs("data"), ends = outputs("0%,100%"), middle = outputs("10%,90%");
+  EXPECT_NE(all, middle);
+  EXPECT_NE(ends, middle);
+  for (const char* wrong : {"1%", "90%,10%", "1%,2%,3%", "-1%,50%", "x%,50%", "dat"}) {
+    const ProgramResult result =
+        runProgram({"render", file("a.splats"), "-o", file("w.png"), fmt::format("--range={}", wrong)});
+    EXPECT_EQ(result.status, 2) << wrong << result.err;
+    EXPECT_NE(result.err.find("--range"), std::string::npos) << result.err;
+  }
+}
+
+TEST_F(DefaultPictures, AConstantScalarIsNotChosen) {
+  run({"generate", "half-annulus-constant", "--size", "24x16x16", "-o", file("a")});
+  run({"convert", file("a.xyz"), file("a.fun"), "-o", file("a.splats"), "--scalar", "all", "--scalar",
+       "volume"});
+  const ProgramResult result = render({});
+  EXPECT_NE(result.out.find("--scalar volume"), std::string::npos) << result.out;
+}
+
+TEST_F(DefaultPictures, PoorPicturesAreAnsweredWithAnOption) {
+  convert("half-annulus", "24x16x16");
+  const ProgramResult pale = render({"--range", "data", "--opacity-unit", "50"});
+  EXPECT_NE(pale.err.find("leave out --range and --opacity-unit"), std::string::npos) << pale.err;
+  // Large, so that the edges of the silhouette are a small part of it.
+  const ProgramResult flat =
+      run({"render", file("a.splats"), "-o", file("f.png"), "--size", "800x800", "--tf", "grey", "--range",
+           "100,200", "--opacity", "0:1,1:1", "--opacity-unit", "1e-4"});
+  EXPECT_NE(flat.err.find("of one colour; leave out --tf, --range, --opacity and --opacity-unit"),
+            std::string::npos)
+      << flat.err;
+}
+
+}  // namespace
+}  // namespace curvisplat

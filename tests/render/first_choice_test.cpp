@@ -1,0 +1,164 @@
+// The parts of the rule that chooses a transfer function and a view from the data, on values whose
+// percentiles, histogram and silhouette are known.
+#include "render/automatic/first_choice.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "render/automatic/opacity_rule.h"
+#include "render/automatic/rounded.h"
+#include "render/image/contrast.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+/// `count` values evenly spread over [0, 1], each of volume 1.
+CoarseSamples evenSamples(size_t count) {
+  CoarseSamples samples;
+  for (size_t n = 0; n < count; ++n) {
+    samples.positions.emplace_back(static_cast<double>(n) / static_cast<double>(count), 0, 0);
+    samples.values.push_back(static_cast<float>((static_cast<double>(n) + 0.5) / static_cast<double>(count)));
+    samples.volumes.push_back(1);
+  }
+  samples.volume = static_cast<double>(count);
+  return samples;
+}
+
+void add(CoarseSamples& samples, float value, double volume) {
+  samples.positions.emplace_back(0);
+  samples.values.push_back(value);
+  samples.volumes.push_back(volume);
+  samples.volume += volume;
+}
+
+TEST(FirstChoice, PercentilesAreOfTheVolume) {
+  CoarseSamples samples = evenSamples(10'000);
+  for (int n = 0; n < 5000; ++n) add(samples, 1000, 1e-9);  // degenerate cells
+  const ValueDistribution distribution(samples);
+  EXPECT_NEAR(distribution.percentile(0.01), 0.01, 1e-3);
+  EXPECT_NEAR(distribution.percentile(0.5), 0.5, 1e-3);
+  EXPECT_NEAR(distribution.percentile(0.99), 0.99, 1e-3);
+  EXPECT_EQ(distribution.percentileOfSamples(0.9), 1000);
+}
+
+TEST(FirstChoice, OutliersMakeTheAxisAsinh) {
+  CoarseSamples samples = evenSamples(10'000);
+  EXPECT_FALSE(volumeHistogram(samples, ValueDistribution(samples))->asinh);
+  for (int n = 0; n < 50; ++n) add(samples, 1000, 1e-3);
+  const auto histogram = volumeHistogram(samples, ValueDistribution(samples));
+  ASSERT_TRUE(histogram && histogram->asinh);
+  EXPECT_NEAR(histogram->asinh->centre, 0.5, 0.3);
+  EXPECT_NEAR(histogram->scalar(histogram->high), 1000, 1e-6);
+  double sum = 0, smoothed = 0;
+  for (size_t bin = 0; bin < VolumeHistogram::kBins; ++bin) {
+    sum += histogram->shares[bin];
+    smoothed += histogram->smoothed[bin];
+  }
+  EXPECT_NEAR(sum, 1, 1e-9);
+  EXPECT_NEAR(smoothed, 1, 1e-9);
+}
+
+TEST(FirstChoice, OneValueHasNoHistogram) {
+  CoarseSamples samples;
+  for (int n = 0; n < 100; ++n) add(samples, 7, 1);
+  EXPECT_FALSE(volumeHistogram(samples, ValueDistribution(samples)));
+}
+
+TEST(FirstChoice, RareValuesAreMoreOpaqueAndTheModeIsClear) {
+  CoarseSamples samples = evenSamples(10'000);
+  for (int n = 0; n < 10'000; ++n) add(samples, 0.25f, 30);  // nearly all of the volume
+  const auto histogram = volumeHistogram(samples, ValueDistribution(samples));
+  ASSERT_TRUE(histogram);
+  const BinExtinctions extinctions = extinctionsOf(*histogram);
+  EXPECT_EQ(extinctions[histogram->binOf(0.25)], 0);
+  EXPECT_GT(extinctions[histogram->binOf(0.75)], 0.5);
+  const auto points = opacityPoints(*histogram, extinctions, histogram->low, histogram->high);
+  EXPECT_LE(points.size(), 24u);
+  const OpacityCurve curve(points);
+  EXPECT_LT(curve.at(0.25), 0.01);
+  EXPECT_GT(curve.at(0.75), 0.5);
+}
+
+TEST(FirstChoice, SilhouetteIsThatOfTheSamples) {
+  // A square plate in the plane z = 0, in a box that is as high as wide because of two lone samples.
+  CoarseSamples samples;
+  for (int y = 0; y < 400; ++y)
+    for (int x = 0; x < 400; ++x) {
+      add(samples, 1, 1);
+      samples.positions.back() = {x / 400.0, y / 400.0, 0};
+    }
+  add(samples, 1, 1);
+  samples.positions.back() = {0.5, 0.5, -0.5};
+  add(samples, 1, 1);
+  samples.positions.back() = {0.5, 0.5, 0.5};
+  const Silhouette silhouette = widestSilhouette(samples);
+  EXPECT_EQ(silhouette.view, "+z");
+  EXPECT_NEAR(silhouette.area, 1, 0.03);
+}
+
+TEST(FirstChoice, ConstantScalarsAreRecognised) {
+  Manifest manifest;
+  manifest.variables = {{0, "energy", "", 0, 0},
+                        {1, "density", "", 0.99999, 1.00001},
+                        {2, "tiny", "", 0, 1e-40},
+                        {3, "pressure", "", 1, 1.1},
+                        {4, "other", "", 0, 1}};
+  EXPECT_EQ(firstVaryingVariable(manifest), 3u);
+  manifest.variables.resize(3);
+  EXPECT_EQ(firstVaryingVariable(manifest), 0u);
+}
+
+TEST(FirstChoice, NumbersAreRoundedToDigitsOfTheScale) {
+  EXPECT_EQ(roundedTo(0.123456, 0.5, 3), 0.123);
+  EXPECT_EQ(roundedTo(101.23456, 0.5, 2), 101.23);
+  EXPECT_EQ(roundedTo(123456, 123456, 3), 123000);
+  EXPECT_EQ(roundedTo(-1e-9, 1, 3), 0);
+  EXPECT_EQ(roundedTo(9.9996, 1, 3), 10);
+  EXPECT_EQ(fmt::format("{}", roundedTo(0.1 + 0.2, 0.3, 3)), "0.3");
+}
+
+TEST(FunctionParts, OpacitiesAreReadAndWritten) {
+  const auto points = parseOpacities("--opacity", "0.2:0,0.5:0.8,1:0.1");
+  ASSERT_EQ(points.size(), 4u);  // one is added at 0
+  EXPECT_EQ(points[0].x, 0);
+  EXPECT_EQ(points[0].opacity, 0);
+  EXPECT_EQ(points[2].opacity, 0.8);
+  EXPECT_EQ(textOf(points), "0:0,0.2:0,0.5:0.8,1:0.1");
+  for (const char* wrong : {"", "0.5", "0:0", "0:0,1:2", "0:0,-1:0.5", "0.5:0,0.2:1", "0:0;1:1", "a:b,c:d"})
+    EXPECT_THROW(parseOpacities("--opacity", wrong), UsageError) << wrong;
+}
+
+TEST(FunctionParts, AnAsinhScaleSpreadsValuesNearItsCentre) {
+  FunctionParts parts;
+  parts.map = "grey";
+  parts.range = {-1000, 1000};
+  parts.opacities = parseOpacities("--opacity", "0:0,1:1");
+  const TransferFunction linear = parts.function();
+  parts.asinh = AsinhScale{0, 1};
+  const TransferFunction spread = parts.function();
+  for (const double end : {-1000.0, 1000.0})
+    EXPECT_NEAR(spread.at(end).colour.x, linear.at(end).colour.x, 1e-6);
+  for (const double scalar : {-300.0, -2.0, 0.0, 1.0, 50.0})
+    EXPECT_NEAR(spread.at(scalar).colour.x, 0.5 + 0.5 * std::asinh(scalar) / std::asinh(1000.0), 2e-4)
+        << scalar;
+}
+
+TEST(PictureContrast, CountsWhatDiffersFromBackgroundAndMode) {
+  Image image({10, 10});
+  for (int y = 0; y < 10; ++y)
+    for (int x = 0; x < 10; ++x) {
+      const float value = y < 5 ? 1.0f : y < 8 ? 0.5f : 0.2f;  // background, mode, the rest
+      std::fill_n(image.pixel(x, y), 3, value);
+      image.pixel(x, y)[3] = 1;
+    }
+  const PictureContrast contrast = contrastOf(image, glm::vec4(1));
+  EXPECT_EQ(contrast.seen, 0.5);
+  EXPECT_EQ(contrast.other, 0.2);
+  EXPECT_EQ(contrastOf(Image({4, 4}), glm::vec4(0)).seen, 0);
+}
+
+}  // namespace
+}  // namespace curvisplat

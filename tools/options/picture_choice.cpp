@@ -1,0 +1,171 @@
+#include "tools/options/picture_choice.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "stream/base/error.h"
+#include "tools/options/option_parsers.h"
+
+namespace curvisplat {
+namespace {
+
+bool isFile(const ScalarArguments& arguments) {
+  return arguments.transfer_function && arguments.transfer_function->ends_with(".json");
+}
+
+bool isAutomatic(const ScalarArguments& arguments) {
+  if (isFile(arguments)) return false;
+  if (arguments.opacity) return *arguments.opacity == "auto";
+  return !arguments.range && !arguments.asinh && !arguments.opacity_unit;
+}
+
+/// The opacities that --opacity lists; empty if it lists none.
+std::vector<OpacityPoint> opacitiesOf(const ScalarArguments& arguments) {
+  if (!arguments.opacity || *arguments.opacity == "auto" || *arguments.opacity == "ramp") return {};
+  return parseOpacities("--opacity", *arguments.opacity);
+}
+
+AsinhScale parseAsinh(const std::string& text) {
+  const auto numbers = parseNumbers("--asinh", text, "CENTRE,WIDTH");
+  if (!(numbers[1] > 0)) throw UsageError("--asinh {}: expected a WIDTH above zero", text);
+  return {numbers[0], numbers[1]};
+}
+
+/// The text of a number that reads back as the same number.
+std::string exact(double number) {
+  return fmt::format("{}", number);
+}
+
+}  // namespace
+
+void checkFunctionArguments(const ScalarArguments& arguments) {
+  opacitiesOf(arguments);
+  if (arguments.asinh) parseAsinh(*arguments.asinh);
+  if (arguments.opacity_unit) parsePositive("--opacity-unit", *arguments.opacity_unit);
+  const bool is_auto = arguments.opacity && *arguments.opacity == "auto";
+  if (is_auto && isFile(arguments))
+    throw UsageError("--opacity auto cannot be combined with a file: --tf {} has opacities of its own",
+                     *arguments.transfer_function);
+  if (is_auto && (arguments.range || arguments.asinh))
+    throw UsageError("--opacity auto chooses the range as well; remove {}",
+                     arguments.range ? "--range" : "--asinh");
+  if (arguments.asinh && isFile(arguments))
+    throw UsageError("--asinh cannot be combined with a file (--tf {})", *arguments.transfer_function);
+  if (arguments.transfer_function && !isFile(arguments)) presetDefinition(*arguments.transfer_function);
+}
+
+const FirstChoice& PictureChoice::data() {
+  if (!data_) data_.emplace(cache_, variable_, scale_);
+  return *data_;
+}
+
+void PictureChoice::add(const std::string& option, const std::string& value) {
+  if (!chosen_.empty()) chosen_ += ' ';
+  // The parser would take a separate value with a minus sign for an option.
+  chosen_ += option + (value.starts_with('-') ? '=' : ' ') + value;
+}
+
+std::pair<double, double> PictureChoice::parseRange(const std::string& text) {
+  if (text == "data") return {info().min, info().max};
+  const size_t comma = text.find(',');
+  const auto end = [&](const std::string& word) {
+    if (!word.ends_with('%')) return parseNumber("--range", word);
+    const double percent = parseNumber("--range", word.substr(0, word.size() - 1));
+    if (!(percent >= 0 && percent <= 100))
+      throw UsageError("--range {}: expected a percentage from 0% to 100%", text);
+    return data().percentile(percent / 100);
+  };
+  if (text.find('%') == std::string::npos) {
+    const auto ends = parseNumbers("--range", text, "LO,HI");
+    if (!(ends[0] < ends[1])) throw UsageError("--range {}: expected LO,HI with LO < HI", text);
+    return {ends[0], ends[1]};
+  }
+  if (comma == std::string::npos || text.find(',', comma + 1) != std::string::npos)
+    throw UsageError("--range {}: expected two ends, such as 1%,99%", text);
+  const std::pair range(end(text.substr(0, comma)), end(text.substr(comma + 1)));
+  if (!(range.first < range.second))
+    throw UsageError("--range {}: {} has {} at both percentiles or the ends are reversed; give numbers", text,
+                     info().name, range.first);
+  return range;
+}
+
+TransferFunction PictureChoice::function(const ScalarArguments& arguments) {
+  checkFunctionArguments(arguments);
+  if (arguments.scalar.empty() && cache_.manifest().variables.size() > 1) add("--scalar", info().name);
+  if (isFile(arguments)) return fromFile(arguments);
+  if (isAutomatic(arguments)) return automatic(arguments);
+  FunctionParts parts;
+  if (arguments.transfer_function) parts.map = *arguments.transfer_function;
+  parts.range = arguments.range ? parseRange(*arguments.range) : std::pair(info().min, info().max);
+  if (arguments.asinh) parts.asinh = parseAsinh(*arguments.asinh);
+  parts.opacities = opacitiesOf(arguments);
+  return fromParts(std::move(parts), arguments);
+}
+
+TransferFunction PictureChoice::withUnit(const TransferFunctionDefinition& definition,
+                                         const std::pair<double, double>* range,
+                                         const ScalarArguments& arguments) {
+  if (arguments.opacity_unit)
+    return TransferFunction(definition, range, parsePositive("--opacity-unit", *arguments.opacity_unit));
+  if (definition.opacity_unit > 0) return TransferFunction(definition, range, definition.opacity_unit);
+  const double unit = data().opacityUnitOf(TransferFunction(definition, range, 1));
+  add("--opacity-unit", exact(unit));
+  return TransferFunction(definition, range, unit);
+}
+
+TransferFunction PictureChoice::fromFile(const ScalarArguments& arguments) {
+  TransferFunctionDefinition definition = readParaViewPreset(*arguments.transfer_function);
+  std::optional<std::pair<double, double>> range;
+  if (arguments.range) range = parseRange(*arguments.range);
+  if (const auto opacities = opacitiesOf(arguments); !opacities.empty()) {
+    // Opacities are along the range, which is the file's own if none is given.
+    if (!range) range = TransferFunction(definition, nullptr, 1).range();
+    definition.opacities = opacities;
+  } else if (arguments.opacity) {
+    definition.opacities.clear();  // ramp
+  }
+  return withUnit(definition, range ? &*range : nullptr, arguments);
+}
+
+TransferFunction PictureChoice::fromParts(FunctionParts parts, const ScalarArguments& arguments) {
+  const bool constant = !(parts.range.first < parts.range.second);
+  parts.range = intervalAround(parts.range.first, parts.range.second);
+  TransferFunctionDefinition definition = parts.definition();
+  if (constant)
+    definition.notes.push_back(fmt::format(
+        "the scalar is {} everywhere; it is drawn in the middle of the preset '{}'", info().min, parts.map));
+  return withUnit(definition, nullptr, arguments);
+}
+
+TransferFunction PictureChoice::automatic(const ScalarArguments& arguments) {
+  FunctionParts parts = data().function(arguments.transfer_function.value_or(""));
+  TransferFunctionDefinition definition = parts.definition();
+  if (isNearlyConstant(info()))
+    definition.notes.push_back(
+        fmt::format("{} is {} everywhere, or nearly so; choose another --scalar", info().name, info().min));
+  if (!arguments.transfer_function) add("--tf", parts.map);
+  add("--range", exact(parts.range.first) + "," + exact(parts.range.second));
+  if (parts.asinh) add("--asinh", exact(parts.asinh->centre) + "," + exact(parts.asinh->width));
+  add("--opacity", textOf(parts.opacities));
+  return withUnit(definition, nullptr, arguments);
+}
+
+CameraArguments PictureChoice::camera(CameraArguments arguments, const TransferFunction& function,
+                                      ImageSize size) {
+  if (arguments.view || arguments.position || arguments.focal_point || arguments.view_up ||
+      arguments.parallel_scale || arguments.view_angle || arguments.moves())
+    return arguments;
+  const ViewChoice choice = data().view(function, size);
+  add("--view", choice.view);
+  arguments.view = choice.view;
+  if (!choice.focal_point) return arguments;
+  const glm::dvec3& point = *choice.focal_point;
+  arguments.focal_point = fmt::format("{},{},{}", point.x, point.y, point.z);
+  arguments.parallel_scale = exact(choice.parallel_scale);
+  add("--focal-point", *arguments.focal_point);
+  add("--parallel-scale", *arguments.parallel_scale);
+  return arguments;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,33 @@
+#include "tools/viewer/first_view.h"
+
+#include "render/automatic/first_choice.h"
+
+namespace curvisplat {
+
+ViewState firstViewOf(const CacheReader& cache, const std::string& scalar, ImageSize picture) {
+  const Manifest& manifest = cache.manifest();
+  ViewState state = firstViewOf(manifest, picture);
+  if (!scalar.empty()) state.variable = scalar;
+  const FirstChoice choice(cache, cache.variableNamed(state.variable), glm::dvec3(1));
+  state.function = EditedFunction::automatic(choice.function());
+  const ImageSize size = dataSize(state.annotations, picture, state.function.function());
+  const ViewChoice view = choice.view(state.function.function(), size);
+  state.camera = Camera::named(view.view, manifest.lower, manifest.upper, size, Projection::kOrthographic);
+  if (view.focal_point) {
+    state.camera.position += *view.focal_point - state.camera.focal_point;
+    state.camera.focal_point = *view.focal_point;
+    state.camera.parallel_scale = view.parallel_scale;
+  }
+  return state;
+}
+
+EditedFunction automaticFunction(const CacheReader& cache, const std::string& scalar) {
+  return EditedFunction::automatic(FirstChoice(cache, cache.variableNamed(scalar), glm::dvec3(1)).function());
+}
+
+void chooseVariable(ViewState& state, const CacheReader& cache, const std::string& name) {
+  chooseVariable(state, cache.manifest(), name);
+  if (state.function.isAutomatic()) state.function = automaticFunction(cache, name);
+}
+
+}  // namespace curvisplat
