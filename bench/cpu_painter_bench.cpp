@@ -58,7 +58,7 @@ void paint(benchmark::State& state, Backend which) {
   constexpr size_t kSegment = 16384;
   for (auto _ : state)
     backend->run([&](Painter& painter) {
-      painter.begin(kSize, glm::vec4(1), table, state.range(1) != kFlat);
+      painter.begin(kSize, glm::vec4(1), table, {.per_pixel = state.range(1) != kFlat});
       for (size_t n = 0; n < splats.size(); n += kSegment)
         painter.draw(std::span(splats).subspan(n, std::min(kSegment, splats.size() - n)));
       benchmark::DoNotOptimize(painter.end().rgba.data());

@@ -69,7 +69,7 @@ struct CpuPainter::State {
   std::optional<SplatBins> bins;
   std::optional<ShadingTable> table;
   std::optional<tbb::task_arena> arena;
-  bool per_pixel = true;
+  PixelShading shading;
   double upload_s = 0, draw_s = 0;
 
   float* tile(size_t number) { return tiles.get() + number * kTileFloats; }
@@ -94,11 +94,11 @@ CpuPainter::CpuPainter() : state_(std::make_unique<State>()) {}
 CpuPainter::~CpuPainter() = default;
 
 void CpuPainter::begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
-                       bool per_pixel, const PaintResources& resources) {
+                       PixelShading shading, const PaintResources& resources) {
   State& state = *state_;
   const unsigned threads = threadsOf(resources);
   state.upload_s = state.draw_s = 0;
-  state.per_pixel = per_pixel;
+  state.shading = shading;
   state.table.emplace(table);
   if (size.width != state.size.width || size.height != state.size.height || threads != state.threads ||
       resources.batch_splats != state.batch_splats)
@@ -151,7 +151,7 @@ void CpuPainter::State::paintBatch() {
     const BlockMask left =
         paintTile({tile(number), static_cast<int>(number % columns) * kTileSide,
                    static_cast<int>(number / columns) * kTileSide,
-                   open[number].load(std::memory_order_relaxed), bins->splats(), order, *table, per_pixel});
+                   open[number].load(std::memory_order_relaxed), bins->splats(), order, *table, shading});
     open[number].store(left, std::memory_order_relaxed);
     if (left == 0) bins->close(static_cast<int>(number));
   });

@@ -26,8 +26,8 @@ class CpuPainter final : public Painter {
   ~CpuPainter() override;
 
   DrawingOrder order() const override { return DrawingOrder::kFrontToBack; }
-  void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table, bool per_pixel,
-             const PaintResources& resources = {}) override;
+  void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
+             PixelShading shading, const PaintResources& resources = {}) override;
   void draw(std::span<const ScreenSplat> splats) override;
   bool hides(const ScreenBox& box) const override;
   Image end() override;

@@ -320,12 +320,14 @@ HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Faces&
   return true;
 }
 
-HWY_INLINE bool paintLookedUp(const LookedUp& in, float* HWY_RESTRICT block) {
+HWY_INLINE bool paintLookedUp(const LookedUp& in, const Lit& lit, float* HWY_RESTRICT block) {
   const Floats d;
   V most = hn::Zero(d);
   for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
     V value[4];
     meansOf(in.integrals, hn::Load(d, in.scale.at + lane), lane, value);
+    const V white = hn::Mul(value[3], hn::Set(d, lit.specular));
+    for (int c = 0; c < 3; ++c) value[c] = hn::MulAdd(value[c], hn::Set(d, lit.diffuse), white);
     most = hn::Max(most, blendUnder<false>(block + lane, hn::Load(d, in.depth.at + lane), value));
   }
   return isSaturated(most);

@@ -11,6 +11,7 @@
 #include <hwy/highway.h>
 
 #include "render/cpu/tile.h"
+#include "render/project/light.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace curvisplat {
@@ -123,6 +124,21 @@ struct Fits {
   Row most;    // extinction
   Row excess;  // of kOther: the error, in what is allowed
   IntRow fit;
+
+  /// Colours become what is seen of them in this light.
+  HWY_INLINE void light(const Row& diffuse, const Row& specular) {
+    const Floats d;
+    for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+      const V colour = hn::Load(d, diffuse.at + lane), white = hn::Load(d, specular.at + lane);
+      for (Values* values : {&at, &by, &bend}) {
+        const V of_white = hn::Mul(hn::Load(d, values->of[3].at + lane), white);
+        for (int c = 0; c < 3; ++c) {
+          float* const value = values->of[c].at + lane;
+          hn::Store(hn::MulAdd(hn::Load(d, value), colour, of_white), d, value);
+        }
+      }
+    }
+  }
 };
 
 /// How far the parabola through both ends and the middle is off, at the most (shading_table.h). An interval
@@ -212,6 +228,19 @@ struct Polyline {
   static constexpr float kParts = kLanes - 1;
 
   Values at, step;
+
+  /// As Fits::light().
+  HWY_INLINE void light(const Lit& lit) {
+    const Floats d;
+    for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d))
+      for (Values* values : {&at, &step}) {
+        const V white = hn::Mul(hn::Load(d, values->of[3].at + lane), hn::Set(d, lit.specular));
+        for (int c = 0; c < 3; ++c) {
+          float* const value = values->of[c].at + lane;
+          hn::Store(hn::MulAdd(hn::Load(d, value), hn::Set(d, lit.diffuse), white), d, value);
+        }
+      }
+  }
 };
 
 /// A row, and its last element again: to be read from its second.

@@ -24,18 +24,23 @@ namespace hn = hwy::HWY_NAMESPACE;
 constexpr auto kSupport = static_cast<float>(kKernelSupport);
 constexpr float kSqrt3 = 1.7320508f;
 constexpr float kReachOfHalfWidth = ScreenCut::kReach / kSqrt3;
+constexpr auto kHalfWidthMask = static_cast<int32_t>(0xffff0000u);  // as light.h packs it
 
 /// Sixteen splats of a tile, ready to be painted.
 struct Visits {
-  Row x, y, a, b, c;  // Ellipse
-  Row tp, tq;         // Scalar's
-  Row cut;            // 1 where the splat is cut; its pieces' reach is then that of the cut, too
-  Pieces pieces;      // all of the splat that is in the tile
+  Row x, y, a, b, c;      // Ellipse
+  Row tp, tq;             // Scalar's
+  Row cut;                // 1 where the splat is cut; its pieces' reach is then that of the cut, too
+  Row diffuse, specular;  // Lit, in lit pictures
+  Pieces pieces;          // all of the splat that is in the tile
   Row l11, l21, l22;
   IntRow x0, y0, x1, y1;  // blocks, the last included; empty where x0 > x1 or y0 > y1
 
   HWY_INLINE Ellipse ellipse(size_t n) const {
     return {x.at[n], y.at[n], a.at[n], b.at[n], c.at[n], pieces.amplitude.at[n]};
+  }
+  HWY_INLINE Lit lit(const TileWork& work, size_t n) const {
+    return work.shading.lit ? Lit{diffuse.at[n], specular.at[n]} : Lit{};
   }
   HWY_INLINE Scalar scalar(size_t n) const {
     return {pieces.mean.at[n], pieces.reach.at[n], tp.at[n], tq.at[n], pieces.half_width.at[n]};
@@ -102,8 +107,17 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
     storeBlocks(x1, out.x1);
     storeBlocks(y1, out.y1);
 
+    if (work.shading.lit) {
+      const auto bits = hn::BitCast(Ints(), gather(work, offsets, 9));
+      const auto share = [&](auto shifted, int32_t mask) HWY_ATTR {
+        const V of_mask = hn::ConvertTo(d, hn::And(shifted, hn::Set(Ints(), mask)));
+        return hn::Mul(of_mask, hn::Set(d, 1.0f / static_cast<float>(mask)));
+      };
+      store(share(hn::ShiftRight<7>(bits), 511), out.diffuse);
+      store(share(bits, 127), out.specular);
+    }
     store(gather(work, offsets, 6), out.pieces.mean);
-    if (!work.per_pixel) {
+    if (!work.shading.per_pixel) {
       for (Row* row : {&out.pieces.reach, &out.pieces.half_width, &out.pieces.from, &out.pieces.to, &out.tp,
                        &out.tq, &out.pieces.width_loss})
         store(zero, *row);
@@ -115,7 +129,8 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
     const V tp = hn::Mul(slope0, inverse), tq = hn::Mul(slope1, inverse);
     store(tp, out.tp);
     store(tq, out.tq);
-    const V half_width = gather(work, offsets, 9);
+    V half_width = gather(work, offsets, 9);
+    if (work.shading.lit) half_width = hn::And(half_width, hn::BitCast(d, hn::Set(Ints(), kHalfWidthMask)));
     store(half_width, out.pieces.half_width);
     Range t = tOver(hn::MulAdd(tp, a, hn::Mul(tq, b)), hn::Mul(tq, c),
                     hn::Sub(hn::Mul(half, hn::Add(x0, x1)), x), hn::Sub(hn::Mul(half, hn::Add(y0, y1)), y),
@@ -223,7 +238,8 @@ HWY_INLINE BlockMask paintBlocks(const TileWork& work, BlockMask blocks, const E
 /// before they are blended: what was written as many narrow vectors is not ready at once to be read as a wide
 /// one.
 template <typename LookUp>
-HWY_INLINE BlockMask paintLookedUpBlocks(const TileWork& work, BlockMask blocks, const LookUp& look_up) {
+HWY_INLINE BlockMask paintLookedUpBlocks(const TileWork& work, BlockMask blocks, const Lit& lit,
+                                         const LookUp& look_up) {
   constexpr int kAtOnce = 8;
   LookedUp looked_up[kAtOnce];
   int numbers[kAtOnce];
@@ -235,15 +251,15 @@ HWY_INLINE BlockMask paintLookedUpBlocks(const TileWork& work, BlockMask blocks,
       if (look_up(xOf(block), yOf(block), looked_up[count])) ++count;
     }
     for (int n = 0; n < count; ++n)
-      if (paintLookedUp(looked_up[n], work.tile + numbers[n] * kBlockFloats))
+      if (paintLookedUp(looked_up[n], lit, work.tile + numbers[n] * kBlockFloats))
         saturated |= BlockMask{1} << numbers[n];
   }
   return saturated;
 }
 
 HWY_NOINLINE BlockMask paintPixelByPixel(const TileWork& work, BlockMask blocks, const Ellipse& e,
-                                         const Scalar& scalar, const float* footprint) {
-  return paintLookedUpBlocks(work, blocks, [&](float x, float y, LookedUp& out) HWY_ATTR {
+                                         const Scalar& scalar, const Lit& lit, const float* footprint) {
+  return paintLookedUpBlocks(work, blocks, lit, [&](float x, float y, LookedUp& out) HWY_ATTR {
     return lookUpBlock(e, scalar, work.table, footprint, x, y, out);
   });
 }
@@ -280,7 +296,7 @@ HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const Vi
   const Ellipse e = visits.ellipse(n);
   Scalar scalar = visits.scalar(n);
   faces.mean_per_deviation = cut.correlation * scalar.half_width * (1 / kSqrt3);
-  if (work.per_pixel)
+  if (work.shading.per_pixel)
     scalar.reach = kSupport * std::sqrt(splat.slope0 * splat.slope0 + splat.slope1 * splat.slope1);
 
   BlockMask saturated = 0;
@@ -293,7 +309,7 @@ HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const Vi
   };
   const int32_t fit = fits.fit.at[n];
   // On a logarithmic scale there is no bound of what a narrower distribution sees.
-  if (fit != kOther && !(work.table.logScale() && work.per_pixel)) {
+  if (fit != kOther && !(work.table.logScale() && work.shading.per_pixel)) {
     Shade shade = shadeOf(fits, n);
     const float inverse = 1 / std::max(visits.pieces.reach.at[n], 1e-37f);
     shade.s = {0, inverse * scalar.reach * scalar.tp, inverse * scalar.reach * scalar.tq};
@@ -306,9 +322,10 @@ HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const Vi
                 HWY_ATTR { return paintBlock<true>(e, faces, shade, per_deviation, footprint, at, x, y); });
     return saturated;
   }
-  return paintLookedUpBlocks(work, blocks, [&](float x, float y, LookedUp& out) HWY_ATTR {
-    return lookUpBlock(e, scalar, faces, work.table, footprint, x, y, out);
-  });
+  return paintLookedUpBlocks(work, blocks, visits.lit(work, n),
+                             [&](float x, float y, LookedUp& out) HWY_ATTR {
+                               return lookUpBlock(e, scalar, faces, work.table, footprint, x, y, out);
+                             });
 }
 
 HWY_NOINLINE BlockMask paintPolyline(const TileWork& work, BlockMask blocks, const Ellipse& e,
@@ -341,17 +358,20 @@ HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, const Vi
   // A polyline's error is a 25th of a parabola's or so, where it does not fall much faster; and it is as much
   // work as a block looked up.
   Polyline line;
-  if (fits.excess.at[n] < 25 && std::popcount(blocks) > 1 && fitPolyline(work.table, visits.pieces, n, line))
+  if (fits.excess.at[n] < 25 && std::popcount(blocks) > 1 &&
+      fitPolyline(work.table, visits.pieces, n, line)) {
+    if (work.shading.lit) line.light(visits.lit(work, n));
     return paintPolyline(work, blocks, e, line, along(visits.pieces, n, scalar, 0, Polyline::kParts),
                          footprint);
-  return paintPixelByPixel(work, blocks, e, scalar, footprint);
+  }
+  return paintPixelByPixel(work, blocks, e, scalar, visits.lit(work, n), footprint);
 }
 
 BlockMask paintTile(const TileWork& work) {
   const float* footprint = footprintPolynomial();
   BlockMask open = work.open;
   Visits visits;
-  Fits fits;
+  Fits fits{};
   for (size_t begin = 0; begin < work.order.size() && open != 0; begin += kLanes) {
     const size_t count = std::min(kLanes, work.order.size() - begin);
     // The next sixteen come from anywhere in the batch.
@@ -365,10 +385,11 @@ BlockMask paintTile(const TileWork& work) {
     for (size_t n = 0; n < kLanes; ++n)
       numbers.at[n] = static_cast<int32_t>(work.order[begin + std::min(n, count - 1)]);
     setUp(work, numbers, visits);
-    if (work.per_pixel)
+    if (work.shading.per_pixel)
       fitPieces(work.table, visits.pieces, count, fits);
     else
       fitMeans(work.table, visits.pieces, count, fits);
+    if (work.shading.lit) fits.light(visits.diffuse, visits.specular);
     for (size_t n = 0; n < count; ++n) {
       if (fits.fit.at[n] == kNothing) continue;
       const BlockMask blocks = blocksOf(visits, n) & open;

@@ -19,6 +19,7 @@
 #include <span>
 
 #include "render/cpu/shading_table.h"
+#include "render/project/painter.h"
 #include "render/project/screen_splat.h"
 
 namespace curvisplat {
@@ -51,7 +52,7 @@ struct TileWork {
   std::span<const ScreenSplat> splats;  // one that is cut behind its ScreenCut
   std::span<const uint32_t> order;      // of `splats`, nearest first
   const ShadingTable& table;
-  bool per_pixel;
+  PixelShading shading;
 };
 
 /// Paints in the widest vectors that the processor has; what is open then. Pure but for the tile: any thread.

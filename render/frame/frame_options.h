@@ -24,6 +24,7 @@ struct FrameOptions {
   glm::dvec3 scale{1.0};               // stretches the data: D S Dᵀ, V det D, about the world's origin
   std::optional<WorldBox> clip_box;    // nothing is drawn outside
   std::vector<ClipPlane> clip_planes;  // nor on their outer sides
+  std::optional<Light> light;          // none: colours are those of the transfer function
   glm::vec4 background{1, 1, 1, 1};    // premultiplied
   double low_pass_px2 = kLowPass;      // added to S2's diagonal
   unsigned threads = 0;                // workers; 0: one a core

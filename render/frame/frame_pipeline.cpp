@@ -182,8 +182,8 @@ Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, F
   Image image;
   backend_->run([&](Painter& painter) {
     const DrawsFinished finished(painter);
-    painter.begin(plan.settings.view.size, options.background, planner_.table(), plan.settings.per_pixel,
-                  resourcesOf(options));
+    painter.begin(plan.settings.view.size, options.background, planner_.table(),
+                  {plan.settings.per_pixel, plan.settings.light.has_value()}, resourcesOf(options));
     hidden_.ask(&painter);
     SegmentDrawer drawer(painter, pools_->ring, statistics.painter_waited_s);
     uint64_t seen = 0;

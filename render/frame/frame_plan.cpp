@@ -50,6 +50,7 @@ FramePlanner::FramePlanner(const CacheReader& cache, size_t variable,
     : cache_(cache),
       variable_(variable),
       table_(tableFor(cache, variable, transfer_function)),
+      scalar_range_(transfer_function.range()),
       subtrees_(subtreeBounds(cache.bricks(), cache.brickVariables(variable))) {}
 
 uint64_t FramePlanner::bytes() const {
@@ -67,6 +68,7 @@ uint64_t FramePlanner::mostSplats() const {
 
 void FramePlanner::setTransferFunction(const TransferFunction& transfer_function) {
   table_ = tableFor(cache_, variable_, transfer_function);
+  scalar_range_ = transfer_function.range();
 }
 
 ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const FrameOptions& options,
@@ -78,9 +80,14 @@ ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const Fr
 
 ProjectionSettings FramePlanner::settingsFor(const Camera& camera, const FrameOptions& options,
                                              ImageSize size) const {
-  return {screenView(camera, options, size), options.classification == Classification::kPixel,
-          clipPlanesOf(options.clip_planes, options.clip_box),
-          cache_.manifest().cells ? kWholeCellStyle : kHalfCellStyle};
+  ProjectionSettings settings{screenView(camera, options, size),
+                              options.classification == Classification::kPixel,
+                              clipPlanesOf(options.clip_planes, options.clip_box), options.light};
+  settings.borders = cache_.manifest().cells ? kWholeCellStyle : kHalfCellStyle;
+  const double diagonal = glm::length(options.scale * (cache_.manifest().upper - cache_.manifest().lower));
+  const double range = std::abs(scalar_range_.second - scalar_range_.first);
+  if (diagonal > 0 && range > 0) settings.light_g0 = range / diagonal;
+  return settings;
 }
 
 Cut FramePlanner::chooseCut(const ProjectionSettings& settings, const FrameOptions& options,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "render/camera/camera.h"
@@ -73,6 +74,7 @@ class FramePlanner {
   const CacheReader& cache_;
   const size_t variable_;
   ClassificationTable table_;
+  std::pair<double, double> scalar_range_;  // of the transfer function
   const std::vector<ValueBounds> subtrees_;
 };
 

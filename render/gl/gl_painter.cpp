@@ -112,7 +112,7 @@ struct GlPainter::State {
   void allocate(ImageSize wanted);
   void drawPart(std::span<const ScreenSplat> splats);
   void finishOldest();
-  void use(const GlProgram& program, const ClassificationTable& table) const;
+  void use(const GlProgram& program, const ClassificationTable& table, bool lit) const;
 };
 
 GlPainter::GlPainter(const GlContext& context) : state_(std::make_unique<State>(context.functions())) {
@@ -150,10 +150,11 @@ void GlPainter::State::allocate(ImageSize wanted) {
   size = wanted;
 }
 
-void GlPainter::State::use(const GlProgram& program, const ClassificationTable& table) const {
+void GlPainter::State::use(const GlProgram& program, const ClassificationTable& table, bool lit) const {
   gl.UseProgram(program.name());
   gl.Uniform2f(program.uniform("clip_from_pixel"), 2.0f / static_cast<float>(size.width),
                2.0f / static_cast<float>(size.height));
+  gl.Uniform1i(program.uniform("lit"), lit ? 1 : 0);
   gl.Uniform1i(program.uniform("footprint"), kFootprintUnit);
   gl.Uniform1i(program.uniform("classes"), kClassesUnit);
   gl.Uniform1f(program.uniform("support"), static_cast<float>(kKernelSupport));
@@ -168,16 +169,16 @@ void GlPainter::State::use(const GlProgram& program, const ClassificationTable& 
 }
 
 void GlPainter::begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
-                      bool per_pixel, const PaintResources&) {
+                      PixelShading shading, const PaintResources&) {
   const GlFunctions& gl = state_->gl;
   finishDraws();  // of a frame that was not ended
   state_->held.reset();
   state_->upload_s = state_->draw_s = state_->gl_draw_s = 0;
   state_->allocate(size);
   state_->classes.fill(gl, kClassesUnit, GL_RGBA32F, table.cumulative());
-  state_->use(per_pixel ? (table.logScale() ? state_->per_pixel_log : state_->per_pixel)
-                        : (table.logScale() ? state_->flat_log : state_->flat),
-              table);
+  state_->use(shading.per_pixel ? (table.logScale() ? state_->per_pixel_log : state_->per_pixel)
+                                : (table.logScale() ? state_->flat_log : state_->flat),
+              table, shading.lit);
   gl.Viewport(0, 0, size.width, size.height);
   gl.ClearColor(background.r, background.g, background.b, background.a);
   gl.Clear(GL_COLOR_BUFFER_BIT);

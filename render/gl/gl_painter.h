@@ -19,8 +19,8 @@ class GlPainter final : public Painter {
   ~GlPainter() override;
 
   DrawingOrder order() const override { return DrawingOrder::kBackToFront; }
-  void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table, bool per_pixel,
-             const PaintResources& resources = {}) override;
+  void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
+             PixelShading shading, const PaintResources& resources = {}) override;
   void draw(std::span<const ScreenSplat> splats) override;
   size_t drawsUnderWay() const override;
   void finishDraws() override;

@@ -14,12 +14,14 @@ layout(location = 4) in vec4 next1;
 layout(location = 5) in vec2 next2;
 uniform vec2 clip_from_pixel;
 uniform float support;
+uniform bool lit;
 flat out vec2 centre;
 flat out vec3 u_from_d;  // of L: 1 / l11, -l21 / (l11 l22), 1 / l22
 flat out float amplitude;
 flat out vec4 scalar;   // mean, slope0, slope1, half_width
 flat out mat3 faces;    // a face a column; of the splats that are cut
 flat out vec2 cut;      // far_sides, correlation
+flat out vec2 light;    // diffuse, specular
 
 void main() {
   if (part0.z < 0.0) {  // a ScreenCut
@@ -29,6 +31,7 @@ void main() {
     scalar = vec4(0.0);
     faces = mat3(0.0);
     cut = vec2(0.0);
+    light = vec2(0.0);
     gl_Position = vec4(2.0, 2.0, 0.0, 1.0);
     return;
   }
@@ -39,6 +42,12 @@ void main() {
   u_from_d = vec3(1.0 / part0.z, -part0.w / (part0.z * part1.x), 1.0 / part1.x);
   amplitude = part1.y;
   scalar = vec4(part1.zw, part2);
+  light = vec2(1.0, 0.0);
+  if (lit) {  // light.h
+    uint bits = floatBitsToUint(part2.y);
+    scalar.w = uintBitsToFloat(bits & 0xffff0000u);
+    light = vec2(float(bits >> 7 & 511u) / 511.0, float(bits & 127u) / 127.0);
+  }
   // The square around the support's circle, through L: a parallelogram as large as the ellipse's own rectangle.
   vec2 u = support * vec2((gl_VertexID & 1) * 2 - 1, (gl_VertexID & 2) - 1);
   vec2 pixel = centre + vec2(part0.z * u.x, part0.w * u.x + part1.x * u.y);
@@ -63,6 +72,7 @@ flat in float amplitude;
 flat in vec4 scalar;
 flat in mat3 faces;
 flat in vec2 cut;
+flat in vec2 light;
 out vec4 blended;
 
 float cellsOf(float value) {
@@ -140,7 +150,8 @@ void main() {
   vec4 seen = max((integral(to) - integral(from)) / (to - from), 0.0);
 
   float alpha = absorbed(seen.w * depth);
-  blended = vec4(seen.w > 0.0 ? seen.rgb * (alpha / seen.w) : vec3(0.0), alpha);
+  vec3 colour = seen.rgb * light.x + seen.w * light.y;
+  blended = vec4(seen.w > 0.0 ? colour * (alpha / seen.w) : vec3(0.0), alpha);
 }
 )";
 

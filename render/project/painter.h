@@ -22,6 +22,12 @@ struct PaintResources {
   size_t batch_splats = 65536;  // that may be kept back, to be drawn together
 };
 
+/// How the pixels of a splat get their colours.
+struct PixelShading {
+  bool per_pixel = true;  // by the splat's slope and width at each; else one colour and extinction a splat
+  bool lit = false;       // splats carry light (light.h)
+};
+
 /// In pixels, as ScreenSplat::x and y.
 struct ScreenBox {
   float x0, y0, x1, y1;
@@ -34,11 +40,10 @@ class Painter {
   /// In which splats are to be drawn.
   virtual DrawingOrder order() const = 0;
 
-  /// Begins a frame filled with `background`. `per_pixel`: classify every pixel by the splat's slope and
-  /// width, else one colour and extinction a splat. `table` outlives the frame. Throws Error where the image
-  /// is larger than the painter's limit, which it names.
+  /// Begins a frame filled with `background`. `table` outlives the frame. Throws Error where the image is larger
+  /// than the painter's limit, which it names.
   virtual void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
-                     bool per_pixel, const PaintResources& resources = {}) = 0;
+                     PixelShading shading, const PaintResources& resources = {}) = 0;
   /// Blends `splats` into the frame, in their order and behind or before all drawn so far: as order() says.
   /// The span is free when the call returns, but for those that drawsUnderWay() counts.
   virtual void draw(std::span<const ScreenSplat> splats) = 0;

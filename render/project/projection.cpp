@@ -8,6 +8,7 @@
 #include "render/project/clip_planes.h"
 #include "render/project/face_cut.h"
 #include "render/project/kernel.h"
+#include "render/project/light.h"
 #include "render/project/splat_cutter.h"
 #include "render/project/splat_ellipse.h"
 #include "render/project/splat_maps.h"
@@ -90,19 +91,20 @@ class Chooser {
         largest_scalar_(kLargestCells /
                         std::max(table.logScale() ? 1.0f : std::abs(table.scale()), kMinScale)),
         per_pixel_(settings.per_pixel),
+        lit_(settings.light.has_value()),
         splats_(splats),
         depths_(depths) {}
 
   /// Inline: handed over through memory, a splat that has just been put together stalls on its way into the
-  /// vector, which takes as long as all the rest.
-  [[gnu::always_inline]] Fate choose(ScreenSplat splat, float depth) {
+  /// vector, which takes as long as all the rest. `widening`: how much farther than half_width a mean can be.
+  [[gnu::always_inline]] Fate choose(ScreenSplat splat, float depth, const Lit& lit, float widening = 1) {
     const float reach_x = kSupport * splat.l11;
     const float reach_y = kSupport * (std::abs(splat.l21) + splat.l22);
     const bool on_screen = splat.x + reach_x > 0 && splat.x - reach_x < width_ && splat.y + reach_y > 0 &&
                            splat.y - reach_y < height_;
     if (!on_screen) return Fate::kOffScreen;
     if (!per_pixel_) splat.slope0 = splat.slope1 = splat.half_width = 0;
-    float spread = kSupport * (std::abs(splat.slope0) + std::abs(splat.slope1)) + splat.half_width;
+    float spread = kSupport * (std::abs(splat.slope0) + std::abs(splat.slope1)) + widening * splat.half_width;
     if (!(std::abs(splat.mean) + spread <= largest_scalar_)) {
       splat.slope0 = splat.slope1 = splat.half_width = spread = 0;
       splat.mean = std::clamp(splat.mean, -largest_scalar_, largest_scalar_);
@@ -110,21 +112,19 @@ class Chooser {
     splat.amplitude = std::min(splat.amplitude, kLargestAmplitude);
     if (!(splat.amplitude > 0) || table_.fullyTransparent(splat.mean - spread, splat.mean + spread))
       return Fate::kTransparent;
+    if (lit_) splat.half_width = packLit(splat.half_width, lit);
     splats_.push_back(splat);
     depths_.push_back(depth);
     return Fate::kKept;
   }
 
   /// Of a splat that is cut. Twice as many records as splats.
-  Fate chooseCut(ScreenSplat splat, float depth, const ScreenCut& cut) {
+  Fate chooseCut(const ScreenSplat& splat, float depth, const Lit& lit, const ScreenCut& cut) {
     const size_t before = splats_.size();
     // A truncated distribution's mean moves by up to kReach deviations; half_width is √3.
-    const float half_width = splat.half_width;
-    splat.half_width *= ScreenCut::kReach / std::numbers::sqrt3_v<float>;
-    const Fate fate = choose(splat, depth);
+    const Fate fate = choose(splat, depth, lit, ScreenCut::kReach / std::numbers::sqrt3_v<float>);
     if (splats_.size() == before) return fate;
-    ScreenSplat& kept = splats_.back();
-    if (kept.half_width > 0) kept.half_width = half_width;
+    ScreenSplat kept = splats_.back();
     kept.amplitude = -kept.amplitude;
     splats_.push_back(kept);
     splats_[before] = cut.record();
@@ -147,7 +147,7 @@ class Chooser {
   const float width_, height_;
   const float reach_;
   const float largest_scalar_;
-  const bool per_pixel_;
+  const bool per_pixel_, lit_;
   std::vector<ScreenSplat>& splats_;
   std::vector<float>& depths_;
 };
@@ -187,7 +187,8 @@ template <typename Map>
 std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<const float>& geometry,
                                           const VariableArrays<const float>& variable, size_t i,
                                           uint32_t border_code, const BorderStyle* borders,
-                                          const LocalClipPlanes* clip, Chooser& chooser, CutBudget& left) {
+                                          const LocalClipPlanes* clip, const Lit& lit, Chooser& chooser,
+                                          CutBudget& left) {
   const SplatPiece whole{{geometry.x[i], geometry.y[i], geometry.z[i]},
                          shapeOf(geometry, i),
                          slopeOf(variable, i),
@@ -210,8 +211,8 @@ std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<c
     if (remains == Remains::kNothing) return true;
     const size_t records = remains == Remains::kAll ? 1 : 2;
     if (left.pieces + own < records) return false;
-    const auto fate =
-        remains == Remains::kAll ? chooser.choose(splat, at.depth) : chooser.chooseCut(splat, at.depth, cut);
+    const auto fate = remains == Remains::kAll ? chooser.choose(splat, at.depth, lit)
+                                               : chooser.chooseCut(splat, at.depth, lit, cut);
     if (fate == Chooser::Fate::kKept) {
       left.pieces -= records - own;
       own = 0;
@@ -236,8 +237,9 @@ std::optional<Chooser::Fate> choosePieces(const Map& map, const GeometryArrays<c
 /// in this style; if it is null, they are drawn as any cell, and clip planes do not cut.
 template <typename Map>
 bool projectRange(const Map& map, const BorderStyle* borders, const LocalClipPlanes& clip,
-                  const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
-                  const SplatRange& range, Chooser& chooser, CutBudget& left, ProjectionCounts& counts) {
+                  const std::optional<LocalLight>& light, const GeometryArrays<const float>& geometry,
+                  const VariableArrays<const float>& variable, const SplatRange& range, Chooser& chooser,
+                  CutBudget& left, ProjectionCounts& counts) {
   Block block;
   std::array<ClipSide, kBlock> sides{};
   for (size_t begin = range.begin; begin < range.end; begin += kBlock) {
@@ -245,9 +247,9 @@ bool projectRange(const Map& map, const BorderStyle* borders, const LocalClipPla
     computeBlock(map, geometry, variable, begin, count, block);
     if (!clip.empty()) clip.sidesOf(geometry, begin, count, sides);
     for (size_t n = 0; n < count; ++n) {
+      const size_t i = begin + n;
       bool across = sides[n] == ClipSide::kAcross;
       if (across && !borders) {
-        const size_t i = begin + n;
         if (!clip.contains({geometry.x[i], geometry.y[i], geometry.z[i]})) sides[n] = ClipSide::kOutside;
         across = false;
       }
@@ -255,18 +257,22 @@ bool projectRange(const Map& map, const BorderStyle* borders, const LocalClipPla
         ++counts.clipped;
         continue;
       }
+      Lit lit;
+      if (light)
+        lit = light->of(geometry.x[i], geometry.y[i], geometry.z[i], shapeOf(geometry, i),
+                        slopeOf(variable, i));
       Chooser::Fate fate;
       const uint32_t border_code = borders ? geometry.border_code[begin + n] : kNoBorder;
       if (block.too_wide[n] || border_code != kNoBorder || across) {
         const auto best = choosePieces(map, geometry, variable, begin + n, border_code, borders,
-                                       across ? &clip : nullptr, chooser, left);
+                                       across ? &clip : nullptr, lit, chooser, left);
         if (!best) return false;
         fate = *best;
       } else {
         fate = chooser.choose(
             {block.x[n], block.y[n], block.l11[n], block.l21[n], block.l22[n], block.amplitude[n],
              variable.mean[begin + n], block.slope0[n], block.slope1[n], block.half_width[n]},
-            block.depth[n]);
+            block.depth[n], lit);
       }
       counts.off_screen += fate == Chooser::Fate::kOffScreen;
       counts.transparent += fate == Chooser::Fate::kTransparent;
@@ -278,11 +284,12 @@ bool projectRange(const Map& map, const BorderStyle* borders, const LocalClipPla
 
 template <typename Map>
 bool projectWith(const Map& map, const BorderStyle* borders, const LocalClipPlanes& clip,
-                 const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
-                 std::span<const SplatRange> ranges, Chooser& chooser, ProjectionCounts& counts) {
+                 const std::optional<LocalLight>& light, const GeometryArrays<const float>& geometry,
+                 const VariableArrays<const float>& variable, std::span<const SplatRange> ranges,
+                 Chooser& chooser, ProjectionCounts& counts) {
   CutBudget left;
   return std::all_of(ranges.begin(), ranges.end(), [&](const SplatRange& range) {
-    return projectRange(map, borders, clip, geometry, variable, range, chooser, left, counts);
+    return projectRange(map, borders, clip, light, geometry, variable, range, chooser, left, counts);
   });
 }
 
@@ -318,6 +325,8 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
   CURVISPLAT_CHECK_OP(geometry.size(), ==, variable.size());
   for (const SplatRange& range : ranges) CURVISPLAT_CHECK_OP(range.end, <=, geometry.size());
   const LocalClipPlanes clip(settings.clip_planes, cell_min);
+  std::optional<LocalLight> light;
+  if (settings.light) light.emplace(*settings.light, settings.light_g0, settings.view, cell_min);
   Chooser chooser(settings, table, splats_, depths_);
   // Where the near plane is too near for float, coarser is not less: then what was cut until there is drawn.
   constexpr float kCoarsest = 1e30f;
@@ -329,10 +338,10 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
     counts_ = {};
     const BorderStyle* const borders = coarseness == 1 ? &settings.borders : nullptr;
     complete = settings.view.projection == Projection::kOrthographic
-                   ? projectWith(OrthographicMap(settings.view, cell_min), borders, clip, geometry, variable,
-                                 ranges, chooser, counts_)
-                   : projectWith(PerspectiveMap(settings.view, cell_min, coarseness), borders, clip, geometry,
-                                 variable, ranges, chooser, counts_);
+                   ? projectWith(OrthographicMap(settings.view, cell_min), borders, clip, light, geometry,
+                                 variable, ranges, chooser, counts_)
+                   : projectWith(PerspectiveMap(settings.view, cell_min, coarseness), borders, clip, light,
+                                 geometry, variable, ranges, chooser, counts_);
   }
   for (const SplatRange& range : ranges) counts_.read += range.size();
   counts_.pieces = splats_.size();

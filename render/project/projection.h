@@ -17,6 +17,7 @@
 
 #include "render/colour/classification.h"
 #include "render/project/clip_planes.h"
+#include "render/project/light.h"
 #include "render/project/screen_splat.h"
 #include "render/project/screen_view.h"
 #include "stream/model/border_code.h"
@@ -41,6 +42,8 @@ struct ProjectionSettings {
   ScreenView view;
   bool per_pixel = true;  // false: flat splats; slopes and widths are left out
   std::vector<ClipPlane> clip_planes = {};
+  std::optional<Light> light = std::nullopt;
+  double light_g0 = 1;                   // LocalLight's
   BorderStyle borders = kHalfCellStyle;  // kWholeCellStyle where the data is cell-centred
 };
 

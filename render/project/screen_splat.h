@@ -17,7 +17,7 @@ struct ScreenSplat {
   float amplitude;       // stretched units of length
   float mean;            // the scalar's unit, and so for the rest
   float slope0, slope1;  // along the columns of L
-  float half_width;      // √3 deviations along the ray at rho = 0
+  float half_width;      // √3 deviations along the ray at rho = 0; in lit pictures with the light (light.h)
 };
 static_assert(sizeof(ScreenSplat) == 40);
 

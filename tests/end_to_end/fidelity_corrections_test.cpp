@@ -22,11 +22,11 @@ namespace {
 constexpr ImageSize kSize{128, 128};
 
 Image marched(const ReferenceField& field, const KnownFunction& function, const Camera& camera,
-              ImageSize size = kSize) {
+              ImageSize size = kSize, const ReferenceLight* light = nullptr) {
   MarchSteps steps;
   steps.step = 0.016;
   steps.cells = 1;
-  return toImage(referenceMarch(field, function.exact, camera, size, steps));
+  return toImage(referenceMarch(field, function.exact, camera, size, steps, light));
 }
 
 /// The mean of `side` x `side` pixels each.
@@ -120,6 +120,38 @@ TEST_F(Corrections, CutsAtClipPlanes) {
     with.voxel = without.voxel = 4 * 2 * halfAnnulusCamera().parallel_scale / kSize.height;
     expectWorth(std::string(cut.name) + ", 4 pixels", source_, clipped, "smooth", halfAnnulusCamera(),
                 cut.merged_db, with, without);
+  }
+}
+
+TEST_F(Corrections, LightFromEachSplatsGradient) {
+  const struct {
+    const char* name;
+    std::optional<glm::dvec3> towards;
+    double finest_db, merged_db;
+  } lights[] = {{"a light at the viewer", {}, 50, 40},
+                {"a light from a side", glm::dvec3(0.3, -1, 0.8), 50, 40}};
+  const KnownFunction function = KnownFunction::of("smooth");
+  for (const auto& light : lights) {
+    ReferenceLight truth;
+    truth.towards = light.towards;
+    const Image reference = marched(field_, function, halfAnnulusCamera(), kSize, &truth);
+    for (const bool merged : {false, true}) {
+      DirectOptions options;
+      if (merged) options.voxel = 4 * 2 * halfAnnulusCamera().parallel_scale / kSize.height;
+      const auto db = [&] {
+        return compareImages(drawDirectly(source_, 0, options, function.table, halfAnnulusCamera(), kSize),
+                             reference)
+            .psnr_db;
+      };
+      const double unlit_db = db();
+      options.light = Light{};
+      options.light->towards = light.towards;
+      const double lit_db = db();
+      fmt::print("{}{}: {:.1f} dB, unlit {:.1f} dB\n", light.name, merged ? ", 4 pixels" : "", lit_db,
+                 unlit_db);
+      EXPECT_GE(lit_db, merged ? light.merged_db : light.finest_db) << light.name;
+      EXPECT_LT(unlit_db, 35) << light.name;
+    }
   }
 }
 

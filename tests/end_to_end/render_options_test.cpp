@@ -207,6 +207,26 @@ TEST_F(RenderOptions, AClipPlaneLeavesWhatABoxWithThatFaceLeaves) {
   EXPECT_GT(right, 40u);
 }
 
+TEST_F(RenderOptions, LightChangesColoursAndNotWhatIsCovered) {
+  const std::vector<std::string> lights[] = {{"--shade"},
+                                             {"--light", "0.2,0.5,0"},
+                                             {"--light-direction", "1,0,1"},
+                                             {"--shade", "--classify", "flat"}};
+  const Image unlit = render({"--background", "transparent"}, "a.exr");
+  for (const auto& words : lights) {
+    std::vector<std::string> all{"--background", "transparent"};
+    all.insert(all.end(), words.begin(), words.end());
+    const Image shaded = render(all, "a.exr");
+    double changed = 0, alpha = 0;
+    for (size_t n = 0; n < shaded.rgba.size(); ++n) {
+      double& of = n % 4 == 3 ? alpha : changed;
+      of = std::max(of, static_cast<double>(std::abs(shaded.rgba[n] - unlit.rgba[n])));
+    }
+    EXPECT_GT(changed, 0.02) << words.front();
+    if (words.size() < 3) EXPECT_LT(alpha, 0.002) << words.front();
+  }
+}
+
 TEST_F(RenderOptions, ARangeThatMissesTheScalarIsWarnedOf) {
   render({"--range", "5,6"});
   EXPECT_NE(last_.err.find("warning: the range 5..6"), std::string::npos) << last_.err;
@@ -291,6 +311,10 @@ TEST_F(RenderOptions, WrongWordsAreUsageErrors) {
                  "--clip-plane", "0,0,0,1,0,0", "--clip-plane", "0,0,0,1,0,0", "--clip-plane", "0,0,0,1,0,0",
                  "--clip-plane", "0,0,0,1,0,0"},
                 "at most 6"},
+               {{"--light", "0.5,0.6,0"}, "at most 1"},
+               {{"--light", "-1,0,0"}, "between 0 and 1"},
+               {{"--light", "1,0"}, "ambient,diffuse,specular"},
+               {{"--light-direction", "0,0,0"}, "not 0,0,0"},
                {{"--background", "pink"}, "#rrggbb"},
                {{"--background", "#12345g"}, "#rrggbb"},
                {{"--backend", "metal"}, "auto, osmesa, egl or cpu"},
@@ -359,6 +383,7 @@ TEST_F(RenderOptions, StatisticsTellWhatWasDone) {
                           "scale",
                           "clip_box",
                           "clip_planes",
+                          "light",
                           "background",
                           "transfer_function",
                           "time_to_first_image_s",

@@ -82,7 +82,7 @@ void run(std::span<const std::byte> bytes) {
   std::vector<ScreenSplat> sorted;
   for (const DepthItem& item : sorter.sort(of_splats, painter.order()))
     sorted.push_back(projector.splats()[item.splat]);
-  painter.begin(pixels, {1, 1, 1, 1}, table(), settings.per_pixel, {1, 512});
+  painter.begin(pixels, {1, 1, 1, 1}, table(), {settings.per_pixel}, {1, 512});
   painter.draw(sorted);
   const Image image = painter.end();
   for (const float channel : image.rgba) CURVISPLAT_CHECK(std::isfinite(channel));

@@ -114,6 +114,8 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
   settings.view.slope_low_pass_px2 = options.slope_low_pass_px2;
   settings.view.widest = options.widest;
   settings.per_pixel = options.per_pixel;
+  settings.light = options.light;
+  settings.light_g0 = options.light_g0;
   BrickProjector projector;
   projector.project(settings, table, origin, geometry, variable);
 
@@ -133,7 +135,7 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
     sorted.push_back(splat);
   }
   CpuPainter painter;
-  return paintFrame(painter, sorted, table, options.per_pixel, size);
+  return paintFrame(painter, sorted, table, {options.per_pixel, options.light.has_value()}, size);
 }
 
 }  // namespace curvisplat

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "preprocess/grid/grid_source.h"
@@ -11,6 +12,7 @@
 #include "render/colour/transfer_function.h"
 #include "render/image/image.h"
 #include "render/project/clip_planes.h"
+#include "render/project/light.h"
 #include "render/project/screen_view.h"
 
 namespace curvisplat {
@@ -25,6 +27,9 @@ struct DirectOptions {
 
   std::vector<ClipPlane> clip_planes;
   bool cut_splats = true;  // else splats whose centre is outside of a clip plane are left out, and no others
+
+  std::optional<Light> light;
+  double light_g0 = 1;
 
   bool per_pixel = true;
   bool hidden_slope = true;  // else classification forgets how the scalar changes along the ray

@@ -46,7 +46,8 @@ Image globallySorted(const CacheReader& cache, const TransferFunction& transfer_
   for (const Placed& each : placed) splats.push_back(each.splat);
   Image image;
   painting->run([&](Painter& painter) {
-    painter.begin(options.size, options.background, planner.table(), plan.settings.per_pixel);
+    painter.begin(options.size, options.background, planner.table(),
+                  {plan.settings.per_pixel, plan.settings.light.has_value()});
     painter.draw(splats);
     image = painter.end();
   });

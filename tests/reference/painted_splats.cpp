@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 #include <random>
+#include "render/project/light.h"
 
 namespace curvisplat {
 
@@ -66,12 +67,20 @@ std::vector<ScreenSplat> cutSome(const std::vector<ScreenSplat>& splats, uint32_
   return out;
 }
 
+std::vector<ScreenSplat> lit(std::vector<ScreenSplat> splats, uint32_t seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> unit(0, 1);
+  for (ScreenSplat& splat : splats)
+    if (!isCut(splat)) splat.half_width = packLit(splat.half_width, {unit(random), 0.5f * unit(random)});
+  return splats;
+}
+
 Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const ClassificationTable& table,
-                 bool per_pixel, ImageSize size, const glm::vec4& background,
+                 PixelShading shading, ImageSize size, const glm::vec4& background,
                  const PaintResources& resources) {
   std::vector<ScreenSplat> ordered(splats.begin(), splats.end());
   if (painter.order() == DrawingOrder::kFrontToBack) std::reverse(ordered.begin(), ordered.end());
-  painter.begin(size, background, table, per_pixel, resources);
+  painter.begin(size, background, table, shading, resources);
   painter.draw(ordered);
   return painter.end();
 }

@@ -28,9 +28,12 @@ std::vector<uint32_t> farthestFirst(std::span<const float> depths);
 /// The same splats in their order, every third of them cut at up to three faces.
 std::vector<ScreenSplat> cutSome(const std::vector<ScreenSplat>& splats, uint32_t seed);
 
+/// The same splats in their order, each with light of its own.
+std::vector<ScreenSplat> lit(std::vector<ScreenSplat> splats, uint32_t seed);
+
 /// A frame, in the painter's own order. `splats`: farthest first.
 Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const ClassificationTable& table,
-                 bool per_pixel, ImageSize size, const glm::vec4& background = {1, 1, 1, 1},
+                 PixelShading shading, ImageSize size, const glm::vec4& background = {1, 1, 1, 1},
                  const PaintResources& resources = {});
 
 /// Of any channel of any pixel; infinite where `a` is not finite.

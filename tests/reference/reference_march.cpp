@@ -57,8 +57,9 @@ std::optional<std::pair<double, double>> partInBox(const Ray& ray, const glm::dv
 
 class Marcher {
  public:
-  Marcher(const ReferenceField& field, const OpticalFunction& function, const Ray& ray)
-      : probe_(field.probe()), function_(function), ray_(ray) {}
+  Marcher(const ReferenceField& field, const OpticalFunction& function, const Ray& ray,
+          const ReferenceLight* light)
+      : probe_(field.probe()), function_(function), ray_(ray), light_(light) {}
 
   ReferencePixel march(double begin, double end, const MarchSteps& steps) {
     double t = begin;
@@ -93,7 +94,35 @@ class Marcher {
   // A point between two inside that is not: a fold of a grid, or a gap no wider than a step. It is empty.
   OpticalProperties properties(double t) {
     const std::optional<double> scalar = probe_->at(ray_.at(t));
-    return scalar ? function_(*scalar) : OpticalProperties{};
+    if (!scalar) return {};
+    OpticalProperties found = function_(*scalar);
+    if (light_ && found.extinction > 0) found.colour = lit(found.colour, gradient(ray_.at(t), *scalar));
+    return found;
+  }
+
+  glm::dvec3 gradient(const glm::dvec3& at, double scalar) {
+    constexpr double kStep = 1e-4;
+    glm::dvec3 result;
+    for (int axis = 0; axis < 3; ++axis) {
+      glm::dvec3 step(0.0);
+      step[axis] = kStep;
+      const std::optional<double> before = probe_->at(at - step), after = probe_->at(at + step);
+      const double length = (before ? kStep : 0) + (after ? kStep : 0);
+      result[axis] = length > 0 ? (after.value_or(scalar) - before.value_or(scalar)) / length : 0;
+    }
+    return result;
+  }
+
+  glm::dvec3 lit(const glm::dvec3& colour, const glm::dvec3& g) const {
+    const double steepness = glm::length(g);
+    if (steepness == 0) return colour;
+    const double strength = steepness * steepness / (steepness * steepness + light_->g0 * light_->g0);
+    const glm::dvec3 n = g / steepness, viewer = -ray_.direction;
+    const glm::dvec3 towards = light_->towards ? glm::normalize(*light_->towards) : viewer;
+    const double facing = std::abs(glm::dot(n, towards));
+    const double shine = std::abs(glm::dot(n, glm::normalize(towards + viewer)));
+    return (1 - strength + strength * (light_->ambient + light_->diffuse * facing)) * colour +
+           glm::dvec3(strength * light_->specular * std::pow(shine, 32));
   }
 
   // Where the field ends between a point inside and one outside, to the last bits.
@@ -126,6 +155,7 @@ class Marcher {
   std::unique_ptr<FieldProbe> probe_;
   const OpticalFunction& function_;
   Ray ray_;
+  const ReferenceLight* light_;
   glm::dvec3 colour_{0.0};
   double transmittance_ = 1;
 };
@@ -148,7 +178,8 @@ OpticalProperties stepFunction(double f) {
 }
 
 ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction& function,
-                              const Camera& camera, ImageSize size, const MarchSteps& steps) {
+                              const Camera& camera, ImageSize size, const MarchSteps& steps,
+                              const ReferenceLight* light) {
   ReferenceImage image{size, {}};
   image.pixels.resize(size.pixels());
   const auto [lower, upper] = field.bounds();
@@ -163,7 +194,8 @@ ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction
       const bool from_eye = camera.projection == Projection::kPerspective;
       const double near = from_eye ? steps.near / glm::dot(ray.direction, forward) : 0.0;
       const double begin = std::max(part->first, near);
-      if (begin < part->second) pixel = Marcher(field, function, ray).march(begin, part->second, steps);
+      if (begin < part->second)
+        pixel = Marcher(field, function, ray, light).march(begin, part->second, steps);
     }
   });
   return image;

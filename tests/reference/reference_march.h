@@ -10,6 +10,7 @@
 
 #include <functional>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <vector>
 
 #include "preprocess/scenes/scenes.h"
@@ -51,10 +52,19 @@ struct MarchSteps {
   double near = 0;      // perspective: as ScreenView::near
 };
 
+/// Light on the field's level surfaces, by the formulas of render/project/light.h, with the field's own
+/// gradient.
+struct ReferenceLight {
+  double ambient = 0.3, diffuse = 0.7, specular = 0.25;
+  double g0 = 1;                      // the scalar's unit per world unit
+  std::optional<glm::dvec3> towards;  // the light; none: it is where the viewer is
+};
+
 /// Marches every pixel, from the plane of the viewer on. A part of a ray inside or outside of the field that
 /// is shorter than a step may be missed. Parallel; the result does not depend on the threads.
 ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction& function,
-                              const Camera& camera, ImageSize size, const MarchSteps& steps);
+                              const Camera& camera, ImageSize size, const MarchSteps& steps,
+                              const ReferenceLight* light = nullptr);
 ReferenceImage referenceMarch(const Scene& scene, const OpticalFunction& function, const Camera& camera,
                               ImageSize size, double step = 0.004);
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "render/project/kernel.h"
+#include "render/project/light.h"
 
 namespace curvisplat {
 namespace {
@@ -46,29 +47,31 @@ Remainder remainderOf(const ScreenCut& cut, double u0, double u1) {
 
 /// What one splat adds at an offset from its centre, premultiplied. `cut`: null where it has none.
 glm::dvec4 contribution(const ScreenSplat& splat, const ScreenCut* cut, double dx, double dy,
-                        const ClassificationTable& table, bool per_pixel) {
+                        const ClassificationTable& table, PixelShading shading) {
   const double u0 = dx / splat.l11;
   const double u1 = (dy - splat.l21 * u0) / splat.l22;
   const Remainder left = cut ? remainderOf(*cut, u0, u1) : Remainder{};
   const double depth = std::abs(splat.amplitude) * footprint(std::hypot(u0, u1)) * left.share;
   if (depth == 0) return glm::dvec4(0.0);
+  const double widest = shading.lit ? unpackHalfWidth(splat.half_width) : splat.half_width;
+  const Lit lit = shading.lit ? unpackLit(splat.half_width) : Lit{};
   double f = splat.mean, half_width = 0;
-  if (per_pixel) {
-    const double deviation = cut ? cut->correlation * splat.half_width / std::sqrt(3.0) : 0;
+  if (shading.per_pixel) {
+    const double deviation = cut ? cut->correlation * widest / std::sqrt(3.0) : 0;
     f += double{splat.slope0} * u0 + double{splat.slope1} * u1 + deviation * left.mean;
-    half_width = std::sqrt(std::max(
-        0.0, double{splat.half_width} * splat.half_width - 3 * deviation * deviation * (1 - left.variance)));
+    half_width = std::sqrt(std::max(0.0, widest * widest - 3 * deviation * deviation * (1 - left.variance)));
   }
   const glm::dvec4 mean = table.mean(f, half_width);
   if (mean.w == 0) return glm::dvec4(0.0);
   const double alpha = -std::expm1(-mean.w * depth);
-  return glm::dvec4(glm::dvec3(mean) / mean.w, 1.0) * alpha;
+  const glm::dvec3 colour = double{lit.diffuse} * glm::dvec3(mean) / mean.w + double{lit.specular};
+  return glm::dvec4(colour, 1.0) * alpha;
 }
 
 }  // namespace
 
-Image compositeSplats(std::span<const ScreenSplat> splats, const ClassificationTable& table, bool per_pixel,
-                      ImageSize size, const glm::vec4& background) {
+Image compositeSplats(std::span<const ScreenSplat> splats, const ClassificationTable& table,
+                      PixelShading shading, ImageSize size, const glm::vec4& background) {
   std::vector<glm::dvec4> pixels(size.pixels(), glm::dvec4(background));
   for (size_t n = 0; n < splats.size(); ++n) {
     const ScreenSplat& splat = splats[n];
@@ -77,8 +80,8 @@ Image compositeSplats(std::span<const ScreenSplat> splats, const ClassificationT
     if (hasCut(splat)) cut = ScreenCut::of(splats[n + 1]);
     for (int y = 0; y < size.height; ++y)
       for (int x = 0; x < size.width; ++x) {
-        const glm::dvec4 above = contribution(splat, cut ? &*cut : nullptr, x + 0.5 - splat.x,
-                                              y + 0.5 - splat.y, table, per_pixel);
+        const glm::dvec4 above =
+            contribution(splat, cut ? &*cut : nullptr, x + 0.5 - splat.x, y + 0.5 - splat.y, table, shading);
         glm::dvec4& pixel =
             pixels[static_cast<size_t>(y) * static_cast<size_t>(size.width) + static_cast<size_t>(x)];
         pixel = above + (1 - above.w) * pixel;

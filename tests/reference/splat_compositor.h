@@ -7,12 +7,13 @@
 
 #include "render/colour/classification.h"
 #include "render/image/image.h"
+#include "render/project/painter.h"
 #include "render/project/screen_splat.h"
 
 namespace curvisplat {
 
 /// Blends `splats` over `background` (premultiplied) in their order.
-Image compositeSplats(std::span<const ScreenSplat> splats, const ClassificationTable& table, bool per_pixel,
-                      ImageSize size, const glm::vec4& background);
+Image compositeSplats(std::span<const ScreenSplat> splats, const ClassificationTable& table,
+                      PixelShading shading, ImageSize size, const glm::vec4& background);
 
 }  // namespace curvisplat

@@ -21,7 +21,7 @@ constexpr glm::vec4 kWhite{1, 1, 1, 1};
 Image paint(std::span<const ScreenSplat> splats, const ClassificationTable& table, bool per_pixel,
             ImageSize size, const glm::vec4& background = kWhite, const PaintResources& resources = {}) {
   CpuPainter painter;
-  return paintFrame(painter, splats, table, per_pixel, size, background, resources);
+  return paintFrame(painter, splats, table, {per_pixel}, size, background, resources);
 }
 
 /// Every instruction set that this processor has and this program was built for, one after the other.
@@ -45,7 +45,7 @@ TEST_P(OnEveryTarget, DrawsRandomSplatsAsSpecified) {
         for (const auto& table : {lively(log_scale), smooth(log_scale)}) {
           const auto splats = cutSome(randomSplats(200, 7, size), 3);
           const Image drawn = paint(splats, table, per_pixel, size, background);
-          const Image specified = compositeSplats(splats, table, per_pixel, size, background);
+          const Image specified = compositeSplats(splats, table, {per_pixel}, size, background);
           EXPECT_LT(largestDifference(drawn, specified), 2e-3)
               << size.width << 'x' << size.height << " per pixel: " << per_pixel << " log: " << log_scale;
           EXPECT_GT(compareImages(drawn, specified).psnr_db, 70)
@@ -58,7 +58,7 @@ TEST_P(OnEveryTarget, DrawsOpaqueSplatsAsSpecified) {
   for (const bool per_pixel : {true, false}) {
     const auto splats = randomSplats(60, 11, size, 0.3f, 100);
     EXPECT_LT(largestDifference(paint(splats, smooth(), per_pixel, size),
-                                compositeSplats(splats, smooth(), per_pixel, size, kWhite)),
+                                compositeSplats(splats, smooth(), {per_pixel}, size, kWhite)),
               2e-3);
   }
 }
@@ -74,7 +74,7 @@ TEST_P(OnEveryTarget, IsRightWhereExtinctionEnds) {
   for (const float slope : {0.01f, 0.1f}) {
     const auto splats = randomSplats(400, 17, size, slope, 5);
     EXPECT_LT(
-        largestDifference(paint(splats, ramp, true, size), compositeSplats(splats, ramp, true, size, kWhite)),
+        largestDifference(paint(splats, ramp, true, size), compositeSplats(splats, ramp, {}, size, kWhite)),
         4e-3);
   }
 }
@@ -189,7 +189,7 @@ TEST(CpuPainter, DrawsNothingBehindWhatIsOpaque) {
   auto splats = far;
   splats.push_back(wall);
   CpuPainter painter;
-  const Image image = paintFrame(painter, splats, lively(), true, size, kWhite, {2, 100});
+  const Image image = paintFrame(painter, splats, lively(), {}, size, kWhite, {2, 100});
   EXPECT_EQ(image.rgba, paint({&wall, 1}, lively(), true, size).rgba);
   EXPECT_GE(painter.hiddenSplats(), 1900u);
   EXPECT_LE(painter.hiddenSplats(), 2000u);
@@ -199,7 +199,7 @@ TEST(CpuPainter, HidesWhatIsBehindOpaqueBlocks) {
   const ImageSize size{150, 101};
   const auto table = lively();
   CpuPainter painter;
-  painter.begin(size, kWhite, table, true, {2, 1});  // batches of one splat: drawn when the next one comes
+  painter.begin(size, kWhite, table, {}, {2, 1});  // batches of one splat: drawn when the next one comes
   EXPECT_FALSE(painter.hides({0, 0, 150, 101}));
   EXPECT_TRUE(painter.hides({-20, 5, -1, 9}));  // what is outside of the image
   EXPECT_TRUE(painter.hides({150, 5, 1e30f, 9}));
@@ -212,7 +212,7 @@ TEST(CpuPainter, HidesWhatIsBehindOpaqueBlocks) {
   EXPECT_FALSE(painter.hides({55, 55, 120, 65}));
   EXPECT_FALSE(painter.hides({-INFINITY, -INFINITY, INFINITY, INFINITY}));
   painter.end();
-  painter.begin(size, kWhite, table, true, {2, 1});
+  painter.begin(size, kWhite, table, {}, {2, 1});
   EXPECT_FALSE(painter.hides({55, 55, 65, 65}));
 }
 
@@ -223,8 +223,8 @@ TEST(CpuPainter, WhatItHidesCannotBeSeen) {
   std::mt19937 random(4);
   std::uniform_real_distribution<float> unit(0, 1);
   CpuPainter all, some;
-  all.begin(size, kWhite, table, true, {2, 64});
-  some.begin(size, kWhite, table, true, {1, 32});
+  all.begin(size, kWhite, table, {}, {2, 64});
+  some.begin(size, kWhite, table, {}, {1, 32});
   int hidden = 0;
   for (const ScreenSplat& splat : randomSplats(6000, 21, size, 0.3f, 20)) {
     const auto reach_x = static_cast<float>(kKernelSupport) * splat.l11;

@@ -83,7 +83,7 @@ TEST_F(HiddenBricksTest, NothingIsHiddenBeforeAPainterAnswers) {
   hidden.begin(cache.bricks(), view);
   EXPECT_FALSE(hidden.hides(0));
   CpuPainter painter;
-  painter.begin({100, 100}, glm::vec4(1), table, true, {1, 1});
+  painter.begin({100, 100}, glm::vec4(1), table, {}, {1, 1});
   hidden.ask(&painter);
   EXPECT_FALSE(hidden.hides(0));
   const std::vector<ScreenSplat> walls(2, {50, 50, 1e4f, 0, 1e4f, 1e4f, 0.5f, 0, 0, 0});
@@ -97,7 +97,8 @@ TEST_F(HiddenBricksTest, NothingIsHiddenBeforeAPainterAnswers) {
 class HalfHidden final : public Painter {
  public:
   DrawingOrder order() const override { return DrawingOrder::kFrontToBack; }
-  void begin(ImageSize, const glm::vec4&, const ClassificationTable&, bool, const PaintResources&) override {}
+  void begin(ImageSize, const glm::vec4&, const ClassificationTable&, PixelShading,
+             const PaintResources&) override {}
   void draw(std::span<const ScreenSplat>) override {}
   bool hides(const ScreenBox& box) const override { return box.x1 < 30; }
   Image end() override { return Image(); }

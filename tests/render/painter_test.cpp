@@ -22,10 +22,11 @@ constexpr glm::vec4 kWhite{1, 1, 1, 1};
 class PainterTest : public testing::TestWithParam<Backend> {
  protected:
   Image paint(std::span<const ScreenSplat> splats, const ClassificationTable& table, bool per_pixel,
-              ImageSize size, const glm::vec4& background = kWhite) {
+              ImageSize size, const glm::vec4& background = kWhite, bool lit = false) {
     Image image;
-    backend_->run(
-        [&](Painter& painter) { image = paintFrame(painter, splats, table, per_pixel, size, background); });
+    backend_->run([&](Painter& painter) {
+      image = paintFrame(painter, splats, table, {per_pixel, lit}, size, background);
+    });
     return image;
   }
 
@@ -41,7 +42,7 @@ TEST_P(PainterTest, DrawsOneSplatAsSpecified) {
   const ScreenSplat splat{21.3f, 17.8f, 9.0f, -4.0f, 5.0f, 0.8f, 0.55f, 0.2f, -0.1f, 0.03f};
   for (const bool per_pixel : {true, false}) {
     const auto difference = compareImages(paint({&splat, 1}, lively(), per_pixel, size),
-                                          compositeSplats({&splat, 1}, lively(), per_pixel, size, kWhite));
+                                          compositeSplats({&splat, 1}, lively(), {per_pixel}, size, kWhite));
     EXPECT_GT(difference.psnr_db, 85) << "per pixel: " << per_pixel;
   }
 }
@@ -54,7 +55,7 @@ TEST_P(PainterTest, DrawsRandomSplatsAsSpecified) {
     for (const bool log_scale : {true, false})
       for (const auto& table : {lively(log_scale), smooth(log_scale)}) {
         const Image drawn = paint(splats, table, per_pixel, size, background);
-        const Image specified = compositeSplats(splats, table, per_pixel, size, background);
+        const Image specified = compositeSplats(splats, table, {per_pixel}, size, background);
         EXPECT_GT(compareImages(drawn, specified).psnr_db, 70)
             << "per pixel: " << per_pixel << ", log: " << log_scale;
         for (const int n : {0, 1234, 3499}) {
@@ -70,10 +71,26 @@ TEST_P(PainterTest, CutsSplatsAsSpecified) {
   for (const bool per_pixel : {true, false})
     for (const auto& table : {lively(), smooth(true)}) {
       const Image drawn = paint(splats, table, per_pixel, size);
-      const Image specified = compositeSplats(splats, table, per_pixel, size, kWhite);
+      const Image specified = compositeSplats(splats, table, {per_pixel}, size, kWhite);
       EXPECT_GT(compareImages(drawn, specified).psnr_db, 70) << "per pixel: " << per_pixel;
       EXPECT_LT(largestDifference(drawn, specified), 4e-3) << "per pixel: " << per_pixel;
     }
+}
+
+TEST_P(PainterTest, LightsSplatsAsSpecified) {
+  const ImageSize size{70, 50};
+  // Some cut, and some of which every pixel is looked up.
+  for (const float slope : {0.05f, 0.3f, 3.0f}) {
+    const auto splats = lit(cutSome(randomSplats(300, 9, size, slope), 4), 11);
+    for (const bool per_pixel : {true, false})
+      for (const auto& table : {lively(), smooth(true)}) {
+        const Image drawn = paint(splats, table, per_pixel, size, kWhite, true);
+        const Image specified = compositeSplats(splats, table, {per_pixel, true}, size, kWhite);
+        EXPECT_GT(compareImages(drawn, specified).psnr_db, 70) << "slope " << slope << ", " << per_pixel;
+        const Image unlit = compositeSplats(splats, table, {per_pixel, false}, size, kWhite);
+        EXPECT_LT(compareImages(drawn, unlit).psnr_db, 40) << "slope " << slope << ", " << per_pixel;
+      }
+  }
 }
 
 TEST_P(PainterTest, CutsSplatsWhereverADrawEnds) {
@@ -85,7 +102,7 @@ TEST_P(PainterTest, CutsSplatsWhereverADrawEnds) {
     backend_->run([&](Painter& painter) {
       std::vector<ScreenSplat> ordered = splats;
       if (painter.order() == DrawingOrder::kFrontToBack) std::reverse(ordered.begin(), ordered.end());
-      painter.begin(size, kWhite, lively_, true);
+      painter.begin(size, kWhite, lively_, {});
       for (size_t begin = 0; begin < ordered.size(); begin += at_once)
         painter.draw(std::span(ordered).subspan(begin, std::min(at_once, ordered.size() - begin)));
       image = painter.end();
@@ -190,9 +207,9 @@ TEST_P(PainterTest, ForgetsAFrameThatWasNotEnded) {
   const auto table = lively();
   const Image empty = paint({}, table, true, size);
   backend_->run([&](Painter& painter) {
-    painter.begin(size, kWhite, table, true);
+    painter.begin(size, kWhite, table, {});
     painter.draw(splats);
-    painter.begin(size, kWhite, table, true);
+    painter.begin(size, kWhite, table, {});
     EXPECT_EQ(painter.end().rgba, empty.rgba);
   });
 }

@@ -106,7 +106,7 @@ class Quantisation : public testing::Test {
     Image image;
     gl_.run([&](const GlContext& context) {
       GlPainter painter(context);
-      painter.begin(kSize, {1, 1, 1, 1}, table, true);
+      painter.begin(kSize, {1, 1, 1, 1}, table, {});
       painter.draw(sorted);
       image = painter.end();
     });

@@ -13,7 +13,8 @@ namespace {
 class LatePainter final : public Painter {
  public:
   DrawingOrder order() const override { return DrawingOrder::kBackToFront; }
-  void begin(ImageSize, const glm::vec4&, const ClassificationTable&, bool, const PaintResources&) override {}
+  void begin(ImageSize, const glm::vec4&, const ClassificationTable&, PixelShading,
+             const PaintResources&) override {}
   void draw(std::span<const ScreenSplat> splats) override {
     under_way_.push_back(splats);
     if (under_way_.size() > 2) finishOldest();

@@ -26,6 +26,7 @@ ViewState changedState() {
   state.scale = {1, 1, 50};
   state.clip_box = WorldBox{{0, -0.5, 0.25}, {1, 1, 1}};
   state.clip_planes = {{{0, 0.5, 0}, {1, 0, -2}}, {{0.25, 0, 0}, {0, 1, 0}}};
+  state.lit = true;
   state.dark = true;
   state.annotations.axes = false;
   state.classification = Classification::kFlat;
@@ -47,10 +48,13 @@ TEST(ViewState, ComesBackFromItsText) {
   }
 }
 
-TEST(ViewState, OfAnEarlierVersionHasNoClipPlanes) {
+TEST(ViewState, OfAnEarlierVersionHasNoClipPlanesAndNoLight) {
   auto json = nlohmann::json::parse(toJson(changedState()));
   json.erase("clip_planes");
-  EXPECT_TRUE(viewStateFromJson(json.dump(), "a.json", manifest()).clip_planes.empty());
+  json.erase("lit");
+  const ViewState state = viewStateFromJson(json.dump(), "a.json", manifest());
+  EXPECT_TRUE(state.clip_planes.empty());
+  EXPECT_FALSE(state.lit);
 }
 
 TEST(ViewState, APresetStaysOne) {
@@ -112,7 +116,7 @@ TEST(ViewState, TheCommandSaysAll) {
   for (const char* part :
        {"'it'\\''s.splats'", "--scalar 'u v'", "--tf f.json", "--scale 1,1,50",
         "--clip-box 0,1,-0.5,1,0.25,1", "--clip-plane 0,0.5,0,1,0,-2", "--clip-plane 0.25,0,0,0,1,0",
-        "--background black", "--classify flat", "--lod-pixels 2.5", "--scalar-bar --outline",
+        "--shade --background black", "--classify flat", "--lod-pixels 2.5", "--scalar-bar --outline",
         "--position 0.1,-3,0.6666666666666666"})
     EXPECT_NE(command.find(part), std::string::npos) << command << " lacks " << part;
 }

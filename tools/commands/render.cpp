@@ -47,6 +47,8 @@ struct RenderArguments {
   std::string lod_pixels = "1";
   std::optional<std::string> clip_box, frame_rate, max_splats;
   std::vector<std::string> clip_planes;
+  bool shade = false;
+  std::optional<std::string> light, light_direction;
   unsigned threads = 0;
   bool keep_going = false;
   Annotations annotations;
@@ -78,6 +80,30 @@ std::vector<ClipPlane> parseClipPlanes(const std::vector<std::string>& texts) {
   return planes;
 }
 
+std::optional<Light> parseLight(const RenderArguments& arguments) {
+  if (!arguments.shade && !arguments.light && !arguments.light_direction) return std::nullopt;
+  Light light;
+  if (arguments.light) {
+    const auto n = parseNumbers("--light", *arguments.light, "ambient,diffuse,specular");
+    for (const double strength : n)
+      if (!(strength >= 0 && strength <= 1))
+        throw UsageError("--light {}: expected three numbers between 0 and 1", *arguments.light);
+    if (n[0] + n[1] > 1)
+      throw UsageError("--light {}: ambient and diffuse add up to {}; expected at most 1", *arguments.light,
+                       n[0] + n[1]);
+    light.ambient = static_cast<float>(n[0]);
+    light.diffuse = static_cast<float>(n[1]);
+    light.specular = static_cast<float>(n[2]);
+  }
+  if (arguments.light_direction) {
+    light.towards = parsePoint("--light-direction", *arguments.light_direction);
+    if (!(glm::length(*light.towards) > 0))
+      throw UsageError("--light-direction {}: expected a direction that is not 0,0,0",
+                       *arguments.light_direction);
+  }
+  return light;
+}
+
 constexpr double kMinScale = 1e-6, kMaxScale = 1e6;
 
 FrameOptions frameOptions(const RenderArguments& arguments) {
@@ -97,6 +123,7 @@ FrameOptions frameOptions(const RenderArguments& arguments) {
                        kMaxScale);
   if (arguments.clip_box) options.clip_box = parseClipBox(*arguments.clip_box);
   options.clip_planes = parseClipPlanes(arguments.clip_planes);
+  options.light = parseLight(arguments);
   options.background = parseBackground("--background", arguments.background);
   options.threads = arguments.threads;
   options.memory_bytes = parseMemory("--memory", arguments.memory);
@@ -342,6 +369,19 @@ void addRender(CLI::App& app) {
           "does not point. In coordinates before --scale; repeatable, up to 6")
       ->take_all()
       ->allow_extra_args(false)
+      ->group(what);
+  command
+      ->add_flag("--shade", arguments->shade,
+                 "Light the scalar's level surfaces, from where the viewer is, so that shapes stand out")
+      ->group(what);
+  command
+      ->add_option("--light", arguments->light,
+                   "Strengths ambient,diffuse,specular of the light, each 0 to 1 (default: 0.3,0.7,0.25); "
+                   "implies --shade")
+      ->group(what);
+  command
+      ->add_option("--light-direction", arguments->light_direction,
+                   "Direction x,y,z towards the light, after --scale (default: the viewer); implies --shade")
       ->group(what);
   command
       ->add_option("--background", arguments->background,

@@ -146,6 +146,11 @@ nlohmann::json statisticsOf(const RenderReport& report) {
   json["clip_planes"] = Json::array();
   for (const ClipPlane& plane : options.clip_planes)
     json["clip_planes"].push_back({{"point", toJson(plane.point)}, {"normal", toJson(plane.normal)}});
+  json["light"] = nullptr;
+  if (const auto& light = options.light) {
+    json["light"] = {{"ambient", light->ambient}, {"diffuse", light->diffuse}, {"specular", light->specular}};
+    json["light"]["direction"] = light->towards ? toJson(*light->towards) : Json();
+  }
   const glm::vec4& background = options.background;
   json["background"] = {background.r, background.g, background.b, background.a};
   json["transfer_function"] = toJson(report.transfer_function);

@@ -183,7 +183,7 @@ class Stages {
     return secondsOfRuns(effort_.sample_s, effort_.samples, [&] {
       backend.run([&](Painter& painter) {
         painter.begin(plan_.settings.view.size, scene_.options.background, planner_.table(),
-                      plan_.settings.per_pixel, {.threads = threads});
+                      {plan_.settings.per_pixel}, {.threads = threads});
         size_t begin = 0;
         for (const uint32_t count : segments) {
           painter.draw(memory.subspan(begin, count));

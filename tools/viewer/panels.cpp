@@ -95,6 +95,8 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
   ImGui::SameLine();
   actions.changed |= ImGui::Checkbox("outline", &state.annotations.outline);
   ImGui::SameLine();
+  actions.changed |= ImGui::Checkbox("light", &state.lit);
+  ImGui::SameLine();
   actions.changed |= ImGui::Checkbox("dark", &state.dark);
   if (ImGui::Button("save picture (p)")) actions.save_picture = true;
   ImGui::SameLine();

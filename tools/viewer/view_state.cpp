@@ -140,6 +140,7 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
   options.scale = scale;
   options.clip_box = clip_box;
   options.clip_planes = clip_planes;
+  if (lit) options.light = Light{};
   options.background = background();
   options.memory_bytes = memory_bytes;
   return options;
@@ -184,6 +185,7 @@ std::string toJson(const ViewState& state) {
   json["clip_planes"] = Json::array();
   for (const ClipPlane& plane : state.clip_planes)
     json["clip_planes"].push_back({{"point", jsonOf(plane.point)}, {"normal", jsonOf(plane.normal)}});
+  json["lit"] = state.lit;
   json["dark"] = state.dark;
   json["scalar_bar"] = state.annotations.scalar_bar;
   json["axes"] = state.annotations.axes;
@@ -238,6 +240,7 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
       state.clip_planes.push_back(plane);
     }
   }
+  state.lit = fields.has("lit") && fields.flag("lit");
   state.dark = fields.flag("dark");
   state.annotations = {fields.flag("scalar_bar"), fields.flag("axes"), fields.flag("outline")};
   return state;
@@ -277,6 +280,7 @@ std::string renderCommand(const ViewState& state, const std::filesystem::path& c
   }
   for (const ClipPlane& plane : state.clip_planes)
     add("--clip-plane", numbers(plane.point) + "," + numbers(plane.normal));
+  if (state.lit) command += " --shade";
   add("--background", state.dark ? "black" : "white");
   if (state.annotations.scalar_bar) command += " --scalar-bar";
   if (state.annotations.axes) command += " --axes";

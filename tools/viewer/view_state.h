@@ -26,6 +26,7 @@ struct ViewState {
   glm::dvec3 scale{1.0};
   std::optional<WorldBox> clip_box = std::nullopt;
   std::vector<ClipPlane> clip_planes = {};
+  bool lit = false;
   bool dark = false;  // background
   Annotations annotations{true, true, true};
 

@@ -1,0 +1,57 @@
+// Light on the scalar's level surfaces. A splat's normal is the gradient of its scalar, and the light is
+// worked out once a splat:
+//
+//     g = A⁻ᵀ w     strength = |g|² / (|g|² + g0²)
+//     diffuse  = 1 - strength + strength (ambient + diffuse |n · l|)      times the colour
+//     specular = strength specular |n · h|³²                              white, beside the colour
+//
+// with n = g/|g|, l towards the light and h half way between l and the viewer. A gradient has no side, hence
+// |.|. Where the scalar hardly changes there is no surface to be lit: g0, the range of the transfer function
+// over the data's diagonal, does not depend on the cells' sizes, so that all levels of detail look alike.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <optional>
+
+#include "render/project/screen_view.h"
+#include "render/project/splat_ellipse.h"
+
+namespace curvisplat {
+
+struct Light {
+  float ambient = 0.3f, diffuse = 0.7f, specular = 0.25f;  // each 0 to 1; ambient + diffuse at most 1
+  std::optional<glm::dvec3> towards;  // the light, from everywhere; none: it is where the viewer is
+};
+
+/// How much of a splat's colour is seen, and how much white: 0 to 1.
+struct Lit {
+  float diffuse = 1, specular = 0;
+};
+
+/// A light and a view, in float, from a brick's origin on.
+class LocalLight {
+ public:
+  /// `g0`: in the scalar's unit per stretched unit of length, above 0.
+  LocalLight(const Light& light, double g0, const ScreenView& view, const glm::dvec3& origin);
+
+  /// Of a splat at (x, y, z). Pure.
+  Lit of(float x, float y, float z, const Shape& shape, const Slope& slope) const;
+
+ private:
+  const float ambient_, diffuse_, specular_;
+  const glm::vec3 scale_, per_scale_;
+  const bool perspective_;
+  glm::vec3 eye_;  // stretched, from the origin; orthographic: the direction towards the viewer
+  glm::vec3 towards_{0};
+  const bool at_viewer_;
+  const float g0_squared_;
+};
+
+/// A half width, not negative, in 15 bits and light in 16, as a float that is never denormal: what
+/// ScreenSplat::half_width is in lit pictures.
+float packLit(float half_width, const Lit& lit);
+float unpackHalfWidth(float packed);
+Lit unpackLit(float packed);
+
+}  // namespace curvisplat
