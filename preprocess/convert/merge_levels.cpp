@@ -2,14 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
+#include <glm/vec3.hpp>
 #include <utility>
 
+#include "preprocess/splats/pieces.h"
 #include "stream/base/check.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr int kOctantBits = kLatticeBits - 1;  // voxels along an edge of a child's cell
+constexpr int kOctantEdge = 1 << kOctantBits;
 constexpr size_t kOctantVoxels = size_t{1} << (3 * kOctantBits);
 constexpr uint64_t kOctantMask = (uint64_t{1} << kOctantBits) - 1;
 
@@ -47,6 +51,7 @@ RootPosition OctantMerger::voxelCorner(size_t voxel) const {
 
 void OctantMerger::add(const BrickSplats& brick) {
   const uint64_t in_voxel = (uint64_t{1} << shift_) - 1;
+  const bool is_leaf = !brick.runs.empty();
   for (size_t n = 0; n < brick.size(); ++n) {
     const RootPosition& position = brick.positions[n];
     glm::dvec3 from_corner;
@@ -54,7 +59,30 @@ void OctantMerger::add(const BrickSplats& brick) {
       from_corner[axis] = unit_ * (static_cast<double>(position.at[axis] & in_voxel) + 0.5);
     for (size_t variable = 0; variable < variables_; ++variable)
       values_[variable] = brick.variables[variable][n];
-    voxels_.add(voxelOf(position), from_corner, brick.splats[n], values_);
+    if (is_leaf)
+      addInPieces(position, from_corner, brick.splats[n]);
+    else
+      voxels_.add(voxelOf(position), from_corner, brick.splats[n], values_);
+  }
+}
+
+void OctantMerger::addInPieces(const RootPosition& position, const glm::dvec3& from_corner,
+                               const Splat& splat) {
+  const double voxels_per_unit = 1 / (unit_ * std::ldexp(1.0, shift_));
+  glm::ivec3 own;
+  for (int axis = 0; axis < 3; ++axis)
+    own[axis] = static_cast<int>(position.at[axis] >> shift_ & kOctantMask);
+  const double a0 = voxels_per_unit * splat.axis[0], a1 = voxels_per_unit * splat.axis[1],
+               a2 = voxels_per_unit * splat.axis[2];
+  const PieceVoxels pieces = voxelsOfPieces(glm::dvec3(own) + voxels_per_unit * from_corner,
+                                            {glm::dvec3(a0, a0 * splat.shear[0], a0 * splat.shear[1]),
+                                             glm::dvec3(0, a1, a1 * splat.shear[2]), glm::dvec3(0, 0, a2)},
+                                            kOctantEdge);
+  for (size_t n = 0; n < pieces.count; ++n) {
+    const glm::ivec3& to = pieces.voxel[n];
+    const auto voxel = static_cast<size_t>((to.z << kOctantBits | to.y) << kOctantBits | to.x);
+    voxels_.addPieces(voxel, pieces.pieces[n], from_corner + glm::dvec3(own - to) / voxels_per_unit, splat,
+                      values_);
   }
 }
 

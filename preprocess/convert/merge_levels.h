@@ -1,5 +1,10 @@
 // Levels of detail: what a cell holds, merged into its octant of its parent's lattice. An inner brick is the
 // eight octants of its cell side by side, so that children can be merged one by one, as soon as each is done.
+//
+// The cells of a leaf are cut into eight pieces each (splats/pieces.h), and every voxel gets those that lie in
+// it: whole cells would cover the voxels unevenly, by 7 to 11 % of a uniform medium. A piece that would leave the
+// child is not cut off. Levels above get whole splats: cutting again gains nothing there.
+//
 // Within an octant voxels go in lattice order, x fastest: neighbours predict one another, and geometry.bin as
 // a whole takes up to 17 % less than with Morton order.
 #pragma once
@@ -29,11 +34,13 @@ class OctantMerger {
 
   /// Starts `child` (not the root), whose bricks follow.
   void begin(const Cell& child);
-  /// Adds the decoded splats of one of its bricks. Sums follow the order of the calls and of the splats.
+  /// Adds the decoded splats of one of its bricks; those of a leaf, which are the ones with nodes, in pieces. Sums
+  /// follow the order of the calls and of the splats.
   void add(const BrickSplats& brick);
   MergedOctant finish();
 
  private:
+  void addInPieces(const RootPosition& position, const glm::dvec3& from_corner, const Splat& splat);
   size_t voxelOf(const RootPosition& position) const;
   RootPosition voxelCorner(size_t voxel) const;
 

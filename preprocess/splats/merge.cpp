@@ -42,6 +42,26 @@ glm::dvec3 solveFactor(const Splat& splat, const glm::dvec3& h) {
   return {v0 / splat.axis[0], v1 / splat.axis[1], v2 / splat.axis[2]};
 }
 
+glm::dvec3 times(const Symmetric3& s, const glm::dvec3& v) {
+  return {s.xx * v.x + s.xy * v.y + s.xz * v.z, s.xy * v.x + s.yy * v.y + s.yz * v.z,
+          s.xz * v.x + s.yz * v.y + s.zz * v.z};
+}
+
+/// A C Aᵀ.
+Symmetric3 shapeMatrix(const Splat& splat, const Symmetric3& c) {
+  const glm::dvec3 x = timesFactor(splat, {c.xx, c.xy, c.xz});  // the columns of A C
+  const glm::dvec3 y = timesFactor(splat, {c.xy, c.yy, c.yz});
+  const glm::dvec3 z = timesFactor(splat, {c.xz, c.yz, c.zz});
+  const auto [a00, a11, a22] = splat.axis;
+  const double a10 = a00 * splat.shear[0], a20 = a00 * splat.shear[1], a21 = a11 * splat.shear[2];
+  return {a00 * x.x,
+          a00 * x.y,
+          a10 * x.y + a11 * y.y,
+          a00 * x.z,
+          a10 * x.z + a11 * y.z,
+          a20 * x.z + a21 * y.z + a22 * z.z};
+}
+
 /// By the roots of the characteristic polynomial, in closed form: 1e-8 at worst (two equal largest ones).
 double largestEigenvalue(const Symmetric3& s) {
   const double third = (s.xx + s.yy + s.zz) / 3;
@@ -73,18 +93,42 @@ void VoxelMerger::clear() {
 void VoxelMerger::add(size_t voxel, const glm::dvec3& position, const Splat& splat,
                       std::span<const SplatScalar> values) {
   Cluster& cluster = clusters_[voxel];
-  SplatScalar* first_values = first_values_.data() + voxel * variables_;
   if (cluster.count++ == 0) {
     first_[voxel] = splat;
     first_[voxel].position = position;
-    std::copy_n(values.data(), variables_, first_values);
+    std::copy_n(values.data(), variables_, first_values_.data() + voxel * variables_);
+    cluster.pending = true;
     return;
   }
-  if (cluster.count == 2) {
-    clearSums(voxel);
-    accumulate(voxel, first_[voxel].position, first_[voxel], first_values);
-  }
+  accumulatePending(voxel);
   accumulate(voxel, position, splat, values.data());
+}
+
+void VoxelMerger::addPieces(size_t voxel, PieceSet pieces, const glm::dvec3& position, const Splat& splat,
+                            std::span<const SplatScalar> values) {
+  if (pieces == kAllPieces) return add(voxel, position, splat, values);
+  const PieceGroup& group = pieceGroup(pieces);
+  const Symmetric3 whole_shape = shapeMatrix(splat), shape = shapeMatrix(splat, group.shape);
+  const glm::dvec3 centre = position + timesFactor(splat, group.mean);
+  Cluster& cluster = clusters_[voxel];
+  if (cluster.count++ == 0) {
+    first_[voxel].position = centre;
+    first_[voxel].axis[0] = splat.axis[0];
+    for (size_t v = 0; v < variables_; ++v)
+      first_values_[voxel * variables_ + v].mean = values[v].mean + glm::dot(values[v].slope, group.mean);
+    clearSums(voxel);
+  }
+  accumulatePending(voxel);
+  accumulateMoments(voxel, centre, group.share * splat.weight, group.share, shape,
+                    [&](size_t v) {
+                      const auto& [mean, slope, variance] = values[v];
+                      const glm::dvec3 in_group = times(group.shape, slope);
+                      return SplatScalar{mean + glm::dot(slope, group.mean), timesFactor(splat, in_group),
+                                         glm::dot(slope, in_group) / 12 + variance};
+                    });
+  const double weight = cluster.weighted ? group.share * splat.weight : group.share;
+  addScaled(sums_[voxel].beyond, weight, whole_shape);
+  addScaled(sums_[voxel].beyond, -weight, shape);
 }
 
 void VoxelMerger::clearSums(size_t voxel) {
@@ -92,30 +136,46 @@ void VoxelMerger::clearSums(size_t voxel) {
   std::fill_n(variable_sums_.data() + voxel * variables_, variables_, VariableSums{});
 }
 
+void VoxelMerger::accumulatePending(size_t voxel) {
+  if (!clusters_[voxel].pending) return;
+  clusters_[voxel].pending = false;
+  clearSums(voxel);
+  accumulate(voxel, first_[voxel].position, first_[voxel], first_values_.data() + voxel * variables_);
+}
+
 void VoxelMerger::accumulate(size_t voxel, const glm::dvec3& position, const Splat& splat,
                              const SplatScalar* values) {
+  accumulateMoments(voxel, position, splat.weight, 1, shapeMatrix(splat), [&](size_t v) {
+    const auto& [mean, slope, variance] = values[v];
+    return SplatScalar{mean, timesFactor(splat, slope), glm::dot(slope, slope) / 12 + variance};
+  });
+}
+
+template <typename ValueOf>
+void VoxelMerger::accumulateMoments(size_t voxel, const glm::dvec3& position, double weight, double share,
+                                    const Symmetric3& shape, const ValueOf& value_of) {
   Cluster& cluster = clusters_[voxel];
-  if (!cluster.weighted && splat.weight > 0) {
+  if (!cluster.weighted && weight > 0) {
     clearSums(voxel);
     cluster.weighted = true;
   }
-  const double weight = cluster.weighted ? splat.weight : 1.0;
+  if (!cluster.weighted) weight = share;
   const glm::dvec3 e = position - first_[voxel].position;
 
   GeometrySums& sums = sums_[voxel];
   sums.weight += weight;
   sums.centre += weight * e;
   addSquare(sums.centre2, weight, e);
-  addScaled(sums.shape, weight, shapeMatrix(splat));
+  addScaled(sums.shape, weight, shape);
 
   const SplatScalar* first_values = first_values_.data() + voxel * variables_;
   VariableSums* variable_sums = variable_sums_.data() + voxel * variables_;
   for (size_t v = 0; v < variables_; ++v) {
-    const SplatScalar& value = values[v];
+    const SplatScalar value = value_of(v);
     const double d = value.mean - first_values[v].mean;
     variable_sums[v].mean += weight * d;
-    variable_sums[v].slope += weight * (timesFactor(splat, value.slope) + (12 * d) * e);
-    variable_sums[v].variance += weight * (glm::dot(value.slope, value.slope) / 12 + value.variance + d * d);
+    variable_sums[v].slope += weight * (value.slope + (12 * d) * e);
+    variable_sums[v].variance += weight * (value.variance + d * d);
   }
 }
 
@@ -123,7 +183,7 @@ void VoxelMerger::finish(size_t voxel, Splat& splat, std::span<SplatScalar> valu
   const Splat& first = first_[voxel];
   const SplatScalar* first_values = first_values_.data() + voxel * variables_;
   CURVISPLAT_CHECK_OP(clusters_[voxel].count, >, 0u);
-  if (clusters_[voxel].count == 1) {
+  if (clusters_[voxel].pending) {
     splat = first;
     std::copy_n(first_values, variables_, values.data());
     return;
@@ -155,12 +215,13 @@ void VoxelMerger::finish(size_t voxel, Splat& splat, std::span<SplatScalar> valu
 
 double VoxelMerger::detail(size_t voxel) const {
   CURVISPLAT_CHECK_OP(clusters_[voxel].count, >, 0u);
-  if (clusters_[voxel].count == 1) return 0;
+  if (clusters_[voxel].pending) return 0;
   const GeometrySums& sums = sums_[voxel];
-  Symmetric3 covariance;
-  addScaled(covariance, 1 / sums.weight, sums.centre2);
-  addSquare(covariance, -1, sums.centre / sums.weight);
-  return std::sqrt(12 * std::max(0.0, largestEigenvalue(covariance)));
+  Symmetric3 beyond;  // 12 x the covariance of the centres, less what pieces are smaller than splats
+  addScaled(beyond, 12 / sums.weight, sums.centre2);
+  addSquare(beyond, -12, sums.centre / sums.weight);
+  addScaled(beyond, -1 / sums.weight, sums.beyond);
+  return std::sqrt(std::max(0.0, largestEigenvalue(beyond)));
 }
 
 }  // namespace curvisplat

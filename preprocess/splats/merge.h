@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "preprocess/splats/pieces.h"
 #include "preprocess/splats/shape.h"
 #include "stream/model/splats.h"
 
@@ -28,9 +29,12 @@ class VoxelMerger {
   /// Adds a splat to cluster `voxel`. `position` goes before splat.position: world units from any origin that
   /// is common to the voxel's splats. `values` has one element a variable.
   void add(size_t voxel, const glm::dvec3& position, const Splat& splat, std::span<const SplatScalar> values);
+  /// Adds some of a splat's eight pieces (pieces.h); `position` is the whole splat's.
+  void addPieces(size_t voxel, PieceSet pieces, const glm::dvec3& position, const Splat& splat,
+                 std::span<const SplatScalar> values);
 
   size_t voxels() const { return clusters_.size(); }
-  /// Splats added to `voxel`. finish() and detail() are for voxels that have some.
+  /// Splats and groups of pieces added to `voxel`. finish() and detail() are for voxels that have some.
   uint32_t count(size_t voxel) const { return clusters_[voxel].count; }
 
   /// Overwrites `splat` (position from the same origin) and `values`. A single splat comes back as it went
@@ -38,8 +42,9 @@ class VoxelMerger {
   /// axes are floored as in shape.h.
   void finish(size_t voxel, Splat& splat, std::span<SplatScalar> values) const;
 
-  /// World units: the square root of the largest eigenvalue of 12 x the covariance of the merged centres (n³
-  /// unit cells: √(n² - 1)). 0 for a single splat. What Brick::error is the largest of.
+  /// World units: the square root of the largest eigenvalue of what the merged shape has beyond the mean shape of
+  /// the splats in it, those of which there are but pieces counted whole. n³ unit cells: √(n² - 1). 0 for a
+  /// single splat. What Brick::error is the largest of.
   double detail(size_t voxel) const;
 
  private:
@@ -49,6 +54,7 @@ class VoxelMerger {
     glm::dvec3 centre{0.0};  // e
     Symmetric3 centre2;      // e e^T
     Symmetric3 shape;        // S
+    Symmetric3 beyond;       // S of whole splats less that of their pieces
   };
   struct VariableSums {
     double mean = 0;        // d
@@ -59,17 +65,23 @@ class VoxelMerger {
     uint32_t count = 0;
     bool weighted =
         false;  // a weight > 0 has come; until then each splat counts as 1, from then on by its weight
+    bool pending = false;  // the first splat is not in the sums yet: it may stay the only one
   };
 
+  void accumulatePending(size_t voxel);
   void accumulate(size_t voxel, const glm::dvec3& position, const Splat& splat, const SplatScalar* values);
+  /// `weight` counts if any does, else `share`. `value_of` gives the mean, A w and the variance of a variable.
+  template <typename ValueOf>
+  void accumulateMoments(size_t voxel, const glm::dvec3& position, double weight, double share,
+                         const Symmetric3& shape, const ValueOf& value_of);
   void clearSums(size_t voxel);
 
   size_t variables_;
   double spread_;
   std::vector<Cluster> clusters_;
-  std::vector<Splat> first_;                 // [voxel], of its first splat
+  std::vector<Splat> first_;                 // [voxel], of its first splat; position and size of a group
   std::vector<SplatScalar> first_values_;    // [voxel][variable]
-  std::vector<GeometrySums> sums_;           // [voxel], valid from the second splat on
+  std::vector<GeometrySums> sums_;           // [voxel], valid but while the first splat is pending
   std::vector<VariableSums> variable_sums_;  // [voxel][variable], as sums_
 };
 

@@ -4,12 +4,14 @@
 #include <cmath>
 #include <filesystem>
 #include <glm/common.hpp>
+#include <glm/mat3x3.hpp>
 #include <map>
 #include <span>
 #include <tuple>
 #include <vector>
 
 #include "preprocess/splats/merge.h"
+#include "preprocess/splats/pieces.h"
 #include "preprocess/splats/seams.h"
 #include "render/cpu/cpu_painter.h"
 #include "render/project/projection.h"
@@ -55,15 +57,37 @@ std::vector<DirectSplat> splatsOf(const GridSource& source, uint32_t scalar, con
 
 std::vector<DirectSplat> mergedIntoVoxels(const std::vector<DirectSplat>& splats,
                                           const DirectOptions& options) {
-  std::map<std::tuple<int64_t, int64_t, int64_t>, size_t> voxels;
-  const auto voxelOf = [&](const DirectSplat& s) {
-    const glm::dvec3 at = glm::floor(s.splat.position / options.voxel);
-    return std::tuple(static_cast<int64_t>(at.x), static_cast<int64_t>(at.y), static_cast<int64_t>(at.z));
+  using Voxel = std::tuple<int64_t, int64_t, int64_t>;
+  std::map<Voxel, size_t> voxels;
+  struct Part {
+    size_t voxel, splat;
+    PieceSet pieces;
   };
-  for (const DirectSplat& s : splats) voxels.emplace(voxelOf(s), voxels.size());
+  std::vector<Part> parts;
+  for (size_t n = 0; n < splats.size(); ++n) {
+    const Splat& splat = splats[n].splat;
+    const glm::dvec3 at = splat.position / options.voxel;
+    const double lattice = options.lattice;
+    const glm::dvec3 corner = lattice * glm::floor(at / lattice);
+    const auto numberOf = [&](const glm::ivec3& voxel) {
+      const glm::dvec3 whole = corner + glm::dvec3(voxel);
+      const Voxel key(static_cast<int64_t>(whole.x), static_cast<int64_t>(whole.y),
+                      static_cast<int64_t>(whole.z));
+      return voxels.emplace(key, voxels.size()).first->second;
+    };
+    if (!options.pieces) {
+      parts.push_back({numberOf(glm::ivec3(glm::floor(at - corner))), n, kAllPieces});
+      continue;
+    }
+    const glm::dmat3 a = splat.factor() / options.voxel;
+    const PieceVoxels pieces = voxelsOfPieces(at - corner, {a[0], a[1], a[2]}, options.lattice);
+    for (size_t p = 0; p < pieces.count; ++p)
+      parts.push_back({numberOf(pieces.voxel[p]), n, pieces.pieces[p]});
+  }
   VoxelMerger merger(1, voxels.size(), options.spread);
-  for (const DirectSplat& s : splats)
-    merger.add(voxels.at(voxelOf(s)), s.splat.position, s.splat, std::span(&s.value, 1));
+  for (const auto& [voxel, n, pieces] : parts)
+    merger.addPieces(voxel, pieces, splats[n].splat.position, splats[n].splat,
+                     std::span(&splats[n].value, 1));
   std::vector<DirectSplat> merged(voxels.size());
   for (size_t n = 0; n < merged.size(); ++n) {
     merger.finish(n, merged[n].splat, std::span(&merged[n].value, 1));

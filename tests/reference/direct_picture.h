@@ -23,6 +23,8 @@ struct DirectOptions {
   bool border_parts = true;  // else half cells are drawn as one splat
   double voxel = 0;          // world units: splats are merged into voxels of this size; 0: they are not
   double spread = 12;        // as VoxelMerger
+  bool pieces = true;        // cut cells into pieces before they are merged, else they go whole
+  int lattice = 1 << 20;     // voxels an axis that pieces must not leave, as those of an octant
   bool variance = true;      // else merged splats forget the variance that their slope does not explain
 
   std::vector<ClipPlane> clip_planes;
