@@ -68,6 +68,14 @@ nlohmann::ordered_json jsonOf(const ScalarRange& range, bool lower) {
   return lower ? range.min : range.max;
 }
 
+/// What blanks nodes, in words; empty if nothing does.
+std::string blankingRule(const GridDescription& description) {
+  if (!description.blanking.empty()) return description.blanking;
+  const bool any = std::any_of(description.blocks.begin(), description.blocks.end(),
+                               [](const GridBlock& block) { return block.has_blanking; });
+  return any ? "iblank is 0" : "";
+}
+
 nlohmann::ordered_json blocksAsJson(const GridInfo& info) {
   auto blocks = nlohmann::ordered_json::array();
   for (size_t b = 0; b < info.description->blocks.size(); ++b) {
@@ -111,7 +119,8 @@ nlohmann::ordered_json asJson(const GridInfo& info) {
   json["nodes"] = info.nodes;
   json["coordinate_bytes"] = description.coordinate_bytes;
   const BlankCounts blank = info.statistics.blank();
-  json["blanked"] = {{"iblank", blank.by_grid}, {"not_finite", blank.not_finite}};
+  json["blanked"] = {{"by_grid", blank.by_grid}, {"not_finite", blank.not_finite}};
+  json["blanking"] = blankingRule(description);
   json["cells"] = {{"count", info.statistics.cells()},
                    {"degenerate", info.statistics.degenerate()},
                    {"inverted", info.statistics.inverted()}};
@@ -154,7 +163,7 @@ void printBlocks(const GridInfo& info) {
     const GridBlock& block = description.blocks[b];
     const BlockStatistics& statistics = info.statistics.blocks[b];
     std::string remarks;
-    if (block.has_blanking) remarks += fmt::format(", iblank blanks {}", statistics.blank.by_grid);
+    if (statistics.blank.by_grid > 0) remarks += fmt::format(", {} blanked", statistics.blank.by_grid);
     if (statistics.degenerate > 0) remarks += fmt::format(", {} degenerate cells", statistics.degenerate);
     if (statistics.inverted > 0) remarks += fmt::format(", {} inverted cells", statistics.inverted);
     fmt::print("  {:<9} {}x{}x{}{}\n", block.name, block.ni, block.nj, block.nk, remarks);
@@ -196,9 +205,10 @@ void printAsText(const GridInfo& info) {
   for (const std::string& warning : description.warnings) fmt::print("warning: {}\n", warning);
   if (!info.overlaps.empty()) fmt::print("warning: {}\n", overlapWarning(description, info.overlaps));
   const BlankCounts blank = info.statistics.blank();
-  fmt::print("nodes     {} in {} block{}; {} blanked by iblank, {} not finite\n", info.nodes,
+  fmt::print("nodes     {} in {} block{}; {} blanked by the grid, {} not finite\n", info.nodes,
              description.blocks.size(), description.blocks.size() == 1 ? "" : "s", blank.by_grid,
              blank.not_finite);
+  if (const std::string rule = blankingRule(description); !rule.empty()) fmt::print("blanking  {}\n", rule);
   printBlocks(info);
   fmt::print("cells     {}; {} degenerate, {} inverted\n", info.statistics.cells(),
              info.statistics.degenerate(), info.statistics.inverted());

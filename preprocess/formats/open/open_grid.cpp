@@ -25,6 +25,7 @@ namespace {
 struct GridFormat {
   bool (*recognises)(const InputFile& file);
   std::unique_ptr<GridSource> (*open)(const OpenGridOptions& options);
+  bool takes_more_files = false;  // options.solutions
 };
 
 template <typename Source>
@@ -37,7 +38,7 @@ constexpr GridFormat kFormats[] = {
     {isVtkLegacy, openVtkLegacy},
     {isPlot3dMeta, openPlot3dMeta},
     {CgnsFile::recognises, openAs<CgnsSource>},  // before NetCDF, which takes all HDF5 files
-    {NetcdfFile::recognises, openAs<NetcdfSource>},
+    {NetcdfFile::recognises, openAs<NetcdfSource>, true},
 };
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {
@@ -104,7 +105,7 @@ std::unique_ptr<GridSource> openFormat(const OpenGridOptions& options) {
     const InputFile file(options.grid);
     for (const GridFormat& format : kFormats)
       if (format.recognises(file)) {
-        if (!options.solutions.empty())
+        if (!options.solutions.empty() && !format.takes_more_files)
           throw Error(
               "{}: contains its own scalars; leave out {} (only PLOT3D grids take further files; combine VTK "
               "files in a .vtm, .pvts or .pvd)",
