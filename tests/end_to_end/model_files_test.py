@@ -392,6 +392,73 @@ class ModelFiles(unittest.TestCase):
         self.expect(info, sphere(lon, lat, 1e-3 * np.array([10.0, 1000, 5000])[:, None, None]), t)
         self.assertEqual(info["times"], [])
 
+    # -- around the Earth
+
+    def globe(self, lon, lat, t, **attributes):
+        """Writes two levels of a grid with longitudes and latitudes of every column."""
+        nj, ni = lon.shape
+        with self.file(x=ni, y=nj, z=2) as f:
+            f.add("lon", "y x", lon, units="degrees_east")
+            f.add("lat", "y x", lat, units="degrees_north")
+            f.add("z", "z", [0.0, 100e3], units="m", standard_name="height")
+            f.add("t", "z y x", t, "f4", **attributes)
+        return self.info()
+
+    def test_global_longitude_closes(self):
+        lat, height = np.linspace(-80, 80, 41), np.array([0, 100.0])[:, None, None]
+        for first, last in ((0, 355), (-177.5, 177.5), (2.5, 362.5), (0, 360), (180, -180)):
+            with self.subTest(first):
+                lon = np.linspace(first, last, 73 if (last - first) % 360 == 0 else 72)
+                t = RANDOM.random((2, 41, len(lon))).astype("f4")
+                if len(lon) == 73:
+                    t[..., -1] = t[..., 0]
+                info = self.globe(*np.meshgrid(lon, lat), t)
+                whole = np.linspace(first, first + (360 if last > first else -360), 73)
+                self.expect(info, sphere(whole, lat[:, None], height), np.concatenate([t, t[..., :1]], -1)[..., :73])
+                self.assertEqual("closed around the Earth" in info["format"], len(lon) == 72)
+        # Columns on both sides that repeat others, as NEMO's; and three quarters of the Earth.
+        lon = np.arange(-5, 365, 5.0)
+        t = RANDOM.random((2, 41, 72)).astype("f4")
+        t = np.concatenate([t[..., -1:], t, t[..., :1]], -1)
+        info = self.globe(*np.meshgrid(lon, lat), t)
+        self.expect(info, sphere(lon[:-1], lat[:, None], height), t[..., :-1])
+        info = self.globe(*np.meshgrid(np.arange(0, 270, 5.0), lat), t[..., :54])
+        self.assertEqual(info["blocks"][0]["ni"], 54)
+
+    def test_tripolar_grids_close_at_their_fold(self):
+        # Confocal ellipses: their innermost row is a segment, whose two sides are the two halves of the fold.
+        columns, rows, top = 48, 9, 1.2
+        height = np.array([0, 100.0])[:, None, None]
+        step = top / (rows - 1)
+
+        def places(v, u):
+            x, y = np.cosh(u)[:, None] * np.cos(v), np.sinh(u)[:, None] * np.sin(v)
+            return np.degrees(np.arctan2(y, x)), 90 - 15 * np.hypot(x, y)
+
+        at_points = 2 * np.pi * np.arange(columns) / columns
+        between = at_points + np.pi / columns
+        through_points = step * np.arange(rows - 1, -3, -1)
+        through_edges = step * (np.arange(rows - 1, -2, -1) + 0.5)
+        cases = {
+            "through points": (at_points, through_points[:-2], 0),
+            "through points, repeated": (at_points, through_points[:-1], 1),
+            "through edges": (between, through_edges[:-1], -1),
+            "through edges, repeated": (between, through_edges, 0),
+        }
+        for name, (v, u, dropped) in cases.items():
+            for halo in (False, True):
+                with self.subTest(name, halo=halo):
+                    angle = np.concatenate([v[-1:], v, v[:1]]) if halo else v
+                    t = RANDOM.random((2, len(u), len(angle))).astype("f4")
+                    info = self.globe(*places(angle, u), t)
+                    block = info["blocks"][0]
+                    self.assertEqual((block["nj"], block["ni"]), (len(u) - dropped, columns + 1))
+                    lon, lat = places(np.append(v, v[0]), np.linspace(u[0], 0, 60))
+                    np.testing.assert_allclose(abs(block["volume"]), volume(sphere(lon, lat, height)), rtol=0.01)
+                    hidden = columns + 1 - columns // 2 if "edges" in name else 0
+                    self.assertIn(info["blanked"]["by_grid"], (2 * hidden, 2 * hidden - 2))
+                    self.assertEqual("fold" in info["format"], name != "through points")
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -81,7 +81,7 @@ CfTerm CfTerm::ofIndex(size_t axis, double metres) {
     NetcdfVariable variable;
     variable.name = "index";
     variable.value_bytes = sizeof(float);
-    variable.attributes["units"].text = "m";
+    variable.attributes["units"].text.push_back('m');
     return variable;
   }();
   CfTerm term;

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "preprocess/formats/netcdf/cf_roles.h"
+#include "preprocess/formats/netcdf/closed_grid.h"
 #include "preprocess/formats/netcdf/foreign_netcdf.h"
 #include "preprocess/grid/scalar_names.h"
 #include "preprocess/grid/time_steps.h"
@@ -76,6 +77,13 @@ void forEachPiece(const NodeBox& box, uint64_t ni, uint64_t nodes, const Each& e
 }
 
 }  // namespace
+
+std::unique_ptr<GridSource> openNetcdf(const OpenGridOptions& options) {
+  auto source = std::make_unique<NetcdfSource>(options);
+  if (const auto closure = source->closure())
+    return std::make_unique<ClosedGrid>(std::move(source), *closure);
+  return source;
+}
 
 NetcdfSource::NetcdfSource(const OpenGridOptions& options)
     : file_(filesOf(options)),
@@ -262,6 +270,18 @@ void NetcdfSource::readColumns(const CfRange& range, std::vector<GlobeColumn>& c
   }
   columns.clear();
   for (size_t n = 0; n < x.size(); ++n) columns.push_back(globe_.column(x[n], y[n]));
+}
+
+std::optional<GridClosure> NetcdfSource::closure() const {
+  if (!globe_.sphere() || grid_.levels != 2) return std::nullopt;
+  const GridBlock& block = description_.blocks[0];
+  return closureOf(block.ni, block.nj, [&](uint64_t j) {
+    std::vector<GlobeColumn> columns;
+    readColumns({{0, j, 0}, {block.ni, j + 1, 1}}, columns);
+    std::vector<glm::dvec3> points;
+    for (const GlobeColumn& column : columns) points.push_back({column.x, column.y, column.z});
+    return points;
+  });
 }
 
 void NetcdfSource::readPlaces(const NodeBox& box, NodeArrays& out) const {

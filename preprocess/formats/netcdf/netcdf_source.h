@@ -8,15 +8,21 @@
 // NetCDF is not thread-safe: reads by several threads run one after the other.
 #pragma once
 
+#include <memory>
+#include <optional>
 #include <vector>
 
 #include "preprocess/formats/common/open_grid_options.h"
 #include "preprocess/formats/netcdf/cf_grid.h"
+#include "preprocess/formats/netcdf/closed_grid.h"
 #include "preprocess/formats/netcdf/globe.h"
 #include "preprocess/formats/netcdf/netcdf_files.h"
 #include "preprocess/grid/grid_source.h"
 
 namespace curvisplat {
+
+/// Opens the files, and closes a grid that runs around the Earth (closed_grid.h). Throws Error.
+std::unique_ptr<GridSource> openNetcdf(const OpenGridOptions& options);
 
 class NetcdfSource final : public GridSource {
  public:
@@ -26,6 +32,9 @@ class NetcdfSource final : public GridSource {
   const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
+
+  /// How the grid closes if it runs around the Earth; of grids on a sphere with their levels along k.
+  std::optional<GridClosure> closure() const;
 
  private:
   static CfGrid chooseGrid(const NetcdfFiles& file, const OpenGridOptions& options,

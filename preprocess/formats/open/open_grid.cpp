@@ -38,7 +38,7 @@ constexpr GridFormat kFormats[] = {
     {isVtkLegacy, openVtkLegacy},
     {isPlot3dMeta, openPlot3dMeta},
     {CgnsFile::recognises, openAs<CgnsSource>},  // before NetCDF, which takes all HDF5 files
-    {NetcdfFile::recognises, openAs<NetcdfSource>, true},
+    {NetcdfFile::recognises, openNetcdf, true},
 };
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {
