@@ -392,6 +392,57 @@ class ModelFiles(unittest.TestCase):
         self.expect(info, sphere(lon, lat, 1e-3 * np.array([10.0, 1000, 5000])[:, None, None]), t)
         self.assertEqual(info["times"], [])
 
+    # -- when, and what is missing
+
+    def test_dates_of_every_calendar(self):
+        cases = [
+            ("standard", "days since 1950-01-01", [0, 27000.25]),
+            ("gregorian", "hours since 1900-01-01 00:00:0.0", [876576, 876582]),
+            ("standard", "days since 0001-01-01 00:00:00", [0, 577736, 577737, 730000.5]),
+            ("proleptic_gregorian", "seconds since 1970-01-01T00:00:00Z", [951782400, 951868799]),
+            ("proleptic_gregorian", "minutes since 1583-03-01 12:00", [-1e6, 1e7]),
+            ("julian", "days since 1500-02-28", [0, 1, 2, 40000]),
+            ("noleap", "days since 2000-02-28 06:00:00", [0, 1, 365 * 4 + 1]),
+            ("365_day", "days since 0001-01-01", [0, 58, 59, 364, 365]),
+            ("all_leap", "days since 2001-01-01", [58, 59, 60, 366]),
+            ("360_day", "days since 1850-01-01", [0, 29, 30, 59, 359, 360]),
+            ("standard", "hours since 2001-03-01 00:00:00 -06:00", [0, 5.5]),
+        ]
+        t = RANDOM.random((8, 12)).astype("f4")
+        for calendar, unit, times in cases:
+            with self.file(lon=12, lat=8, height=2, time=None) as f:
+                self.air(f)
+                f.add("height", "height", [0.0, 1000], units="m", positive="up")
+                f.add("time", "time", times, units=unit, calendar=calendar)
+                f.add("T", "time height lat lon", np.broadcast_to(t, (len(times), 2, 8, 12)), "f4")
+            for step, time in enumerate(times):
+                with self.subTest(f"{time} {unit}, {calendar}"):
+                    info = self.info("file.nc", "--time-step", str(step))
+                    expected = netCDF4.num2date(time, unit, calendar).strftime("%Y-%m-%d %H:%M:%S").strip()
+                    self.assertEqual(info["date"], expected.zfill(19))
+                    self.assertEqual((info["time_unit"], info["times"][step]), (unit, time))
+
+    def test_the_times_of_wrf(self):
+        dates = ["2005-08-28_00:00:00", "2005-08-28_03:00:00", "2005-09-01_00:00:30"]
+        with self.file(west_east=12, south_north=8, height=2, Time=None, DateStrLen=19) as f:
+            f.add("XLONG", "south_north west_east", np.broadcast_to(np.linspace(0, 11, 12), (8, 12)), units="degree_east")
+            f.add("XLAT", "south_north west_east", np.broadcast_to(np.linspace(0, 7, 8)[:, None], (8, 12)), units="degree_north")
+            f.add("height", "height", [0.0, 1000], units="m", positive="up")
+            f.add("Times", "Time DateStrLen", np.array([list(date) for date in dates], "S1"), "S1")
+            f.add("T", "Time height south_north west_east", RANDOM.random((3, 2, 8, 12)), "f4")
+        info = self.info("file.nc", "--time-step", "2")
+        self.assertEqual(info["times"], [0, 10800, 4 * 86400 + 30])
+        self.assertEqual(info["date"], "2005-09-01 00:00:30")
+
+    def test_land_that_is_zero_is_noticed(self):
+        wet = RANDOM.random((7, 10)) > 0.3
+        temp = (1 + RANDOM.random((4, 7, 10))).astype("f4")
+        for values, noticed in ((temp * wet, True), (temp, False), (np.where(wet, temp, np.nan), False)):
+            with self.file(lon=10, lat=7, depth=4) as f:
+                self.ocean(f)
+                f.add("temp", "depth lat lon", values, "f4")
+            self.assertEqual("--blank 0" in " ".join(self.info()["warnings"]), noticed)
+
     # -- around the Earth
 
     def globe(self, lon, lat, t, **attributes):

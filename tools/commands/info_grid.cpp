@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "preprocess/convert/preflight.h"
+#include "preprocess/grid/calendar.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/survey/block_overlap.h"
 #include "preprocess/survey/grid_statistics.h"
@@ -74,6 +75,29 @@ std::string blankingRule(const GridDescription& description) {
   const bool any = std::any_of(description.blocks.begin(), description.blocks.end(),
                                [](const GridBlock& block) { return block.has_blanking; });
   return any ? "iblank is 0" : "";
+}
+
+std::optional<std::string> dateOfStep(const GridDescription& description, size_t step) {
+  if (step >= description.times.size()) return std::nullopt;
+  return dateOf(description.times[step], description.time_unit, description.calendar);
+}
+
+/// "36 days since 1950-01-01 (1950-02-06 00:00:00)"
+std::string timeText(const GridDescription& description, size_t step) {
+  std::string text = fmt::format("{:.9g}", description.times[step]);
+  if (!description.time_unit.empty()) text += fmt::format(" {}", description.time_unit);
+  if (const auto date = dateOfStep(description, step)) text += fmt::format(" ({})", *date);
+  return text;
+}
+
+void printTimes(const GridDescription& description) {
+  const size_t steps = description.times.size();
+  if (steps == 1 && !description.time_unit.empty()) fmt::print("time      {}\n", timeText(description, 0));
+  if (steps < 2) return;
+  fmt::print("times     {} steps, {} .. {}\n", steps, timeText(description, 0),
+             timeText(description, steps - 1));
+  fmt::print("time      {}; step {} was read\n", timeText(description, description.time_step),
+             description.time_step);
 }
 
 nlohmann::ordered_json blocksAsJson(const GridInfo& info) {
@@ -142,6 +166,9 @@ nlohmann::ordered_json asJson(const GridInfo& info) {
                             {"time", flow.time}});
   json["times"] = description.times;
   json["time_step"] = description.time_step;
+  if (!description.time_unit.empty()) json["time_unit"] = description.time_unit;
+  if (!description.calendar.empty()) json["calendar"] = description.calendar;
+  if (const auto date = dateOfStep(description, description.time_step)) json["date"] = *date;
   json["overlaps"] = nlohmann::ordered_json::array();
   for (const BlockOverlap& overlap : info.overlaps)
     json["overlaps"].push_back(
@@ -223,9 +250,7 @@ void printAsText(const GridInfo& info) {
     fmt::print("flow      block {}: Mach {:.6g}, alpha {:.6g}, Reynolds {:.6g}, time {:.6g}\n",
                flow.block + 1, flow.mach, flow.alpha, flow.reynolds, flow.time);
   }
-  if (description.times.size() > 1)
-    fmt::print("times     {} steps, {:.6g} .. {:.6g}; step {} was read\n", description.times.size(),
-               description.times.front(), description.times.back(), description.time_step);
+  printTimes(description);
   fmt::print(
       "estimate  a cache of about {} with one scalar, {} more per additional scalar; about {:.1f} s on {} "
       "thread{}\n",

@@ -11,6 +11,7 @@
 
 #include "preprocess/formats/netcdf/cf_roles.h"
 #include "preprocess/formats/netcdf/foreign_netcdf.h"
+#include "preprocess/grid/calendar.h"
 
 namespace curvisplat {
 namespace {
@@ -234,14 +235,35 @@ bool isOcean(const NetcdfFiles& file, const CfGrid& grid) {
   return false;
 }
 
-std::vector<double> cfTimes(const NetcdfFiles& file, const CfGrid& grid) {
-  if (!grid.dims.time) return {};
+CfTimes cfTimes(const NetcdfFiles& file, const CfGrid& grid) {
+  CfTimes times;
+  if (!grid.dims.time) return times;
   const NetcdfDimension& time = file.dimensions()[*grid.dims.time];
-  std::vector<double> times(time.length);
-  for (size_t n = 0; n < times.size(); ++n) times[n] = static_cast<double>(n);
+  times.values.resize(time.length);
+  for (size_t n = 0; n < time.length; ++n) times.values[n] = static_cast<double>(n);
   const NetcdfVariable* const coordinate = file.find(time.name);
-  if (coordinate && coordinate->numeric && coordinate->dims == std::vector<size_t>{*grid.dims.time})
-    file.read(*coordinate, {{0}, {times.size()}}, times);
+  if (coordinate && coordinate->numeric && coordinate->dims == std::vector<size_t>{*grid.dims.time}) {
+    file.read(*coordinate, {{0}, {time.length}}, times.values);
+    times.unit = coordinate->text("units");
+    times.calendar = lowerCase(coordinate->text("calendar"));
+    return times;
+  }
+  const NetcdfVariable* const dates = file.find("Times");
+  if (!dates || dates->dims.size() != 2 || dates->dims[0] != *grid.dims.time || time.length == 0)
+    return times;
+  const std::string text = file.readText(*dates);
+  const size_t length = text.size() / time.length;
+  if (length == 0) return times;
+  std::vector<double> seconds;
+  for (size_t n = 0; n < time.length; ++n)
+    if (const auto since = secondsBetween(text.substr(0, length), text.substr(n * length, length)))
+      seconds.push_back(*since);
+  if (seconds.size() != time.length) return times;
+  times.values = seconds;
+  std::string first = text.substr(0, length);
+  std::replace(first.begin(), first.end(), '_', ' ');
+  times.unit = fmt::format("seconds since {}", first.substr(0, first.find('\0')));
+  times.calendar = "proleptic_gregorian";
   return times;
 }
 

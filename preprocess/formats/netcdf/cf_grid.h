@@ -43,8 +43,13 @@ CfGrids findCfGrids(const NetcdfFiles& file, size_t time_step);
 /// Whether the grid lies below the surface: the middle of the heights of a column is negative.
 bool isOcean(const NetcdfFiles& file, const CfGrid& grid);
 
-/// The time of every step of a grid: values of the time coordinate, or 0, 1, ... if there is none. Empty if
-/// the grid has no time dimension.
-std::vector<double> cfTimes(const NetcdfFiles& file, const CfGrid& grid);
+struct CfTimes {
+  std::vector<double> values;  // empty if the grid has no time dimension
+  std::string unit, calendar;  // "days since 1950-01-01"; may be empty
+};
+
+/// The time of every step of a grid: values of the time coordinate, seconds since the first of WRF's Times, or
+/// 0, 1, ... if there is neither.
+CfTimes cfTimes(const NetcdfFiles& file, const CfGrid& grid);
 
 }  // namespace curvisplat

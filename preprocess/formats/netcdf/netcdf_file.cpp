@@ -27,6 +27,7 @@ constexpr size_t kChunkCacheSlots = 1009;
 constexpr float kChunkCachePreemption = 0.75f;
 // Limit for attributes: they hold descriptions, not data.
 constexpr size_t kMaxAttributeValues = size_t{1} << 20;
+constexpr double kMaxTextBytes = 1 << 24;
 // Deflate shrinks zeros to about a thousandth.
 constexpr double kMaxCompression = 1100;
 constexpr const char* kNetcdf4 = "NetCDF-4";
@@ -384,6 +385,23 @@ void NetcdfFile::readWith(const Get& get, const NetcdfVariable& variable, const 
     if (status != NC_NOERR && status != NC_ERANGE) fail(variable.name, status);
   }
   unpack(packings_.at(variable.position), to.first(box.values()));
+}
+
+std::string NetcdfFile::readText(const NetcdfVariable& variable) const {
+  const std::vector<size_t>& dims = variables_.at(variable.position).dims;  // of this file, not of several
+  const std::vector<size_t> start(dims.size(), 0);
+  std::vector<size_t> count;
+  double bytes = 1;
+  for (const size_t dim : dims) {
+    count.push_back(dimensions_.at(dim).length);
+    bytes *= static_cast<double>(count.back());
+  }
+  if (variable.type != NC_CHAR || bytes > kMaxTextBytes) return "";
+  std::string text(static_cast<size_t>(bytes), ' ');
+  const QuietHdf5 quiet;
+  const int status = nc_get_vara_text(file_, variable.id, start.data(), count.data(), text.data());
+  if (status != NC_NOERR) fail(variable.name, status);
+  return text;
 }
 
 void NetcdfFile::read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const {

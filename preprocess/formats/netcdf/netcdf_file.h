@@ -85,6 +85,8 @@ class NetcdfFile {
   /// valid range.
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const;
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<float> to) const;
+  /// The characters of a variable of text (NC_CHAR); empty if it is not one or has more than 16 MiB.
+  std::string readText(const NetcdfVariable& variable) const;
 
  private:
   /// How stored numbers are converted to values.

@@ -96,4 +96,8 @@ void NetcdfFiles::read(const NetcdfVariable& variable, const NetcdfBox& box, std
   files_.at(variable.file)->read(variable, box, to);
 }
 
+std::string NetcdfFiles::readText(const NetcdfVariable& variable) const {
+  return files_.at(variable.file)->readText(variable);
+}
+
 }  // namespace curvisplat

@@ -44,6 +44,7 @@ class NetcdfFiles {
   std::string missingValues(const NetcdfVariable& variable) const;
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const;
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<float> to) const;
+  std::string readText(const NetcdfVariable& variable) const;
 
  private:
   void add(const NetcdfFile& file);

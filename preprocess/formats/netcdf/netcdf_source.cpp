@@ -163,7 +163,10 @@ bool NetcdfSource::projects() const {
 
 void NetcdfSource::describe(const OpenGridOptions& options) {
   description_.files = file_.paths();
-  description_.times = cfTimes(file_, grid_);
+  const CfTimes times = cfTimes(file_, grid_);
+  description_.times = times.values;
+  description_.time_unit = times.unit;
+  description_.calendar = times.calendar;
   if (grid_.dims.time && description_.times.empty())
     throw Error("{}: has no time step: dimension {} has length 0", file_.path().string(),
                 file_.dimensions()[*grid_.dims.time].name);
@@ -204,6 +207,35 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
   if (grid_.dims.time)
     description_.format +=
         fmt::format(", time step {} of {}", description_.time_step, description_.times.size());
+  if (const double share = shareOfZeros(); share > 0)
+    description_.warnings.push_back(
+        fmt::format("{} is exactly 0 at {:.0f} % of the nodes, at all levels, which may be land; --blank 0 "
+                    "leaves these out",
+                    grid_.variables[mask_]->name, 100 * share));
+}
+
+/// Where a file marks land by zeros alone: the share of columns that are 0 at the first, middle and last level,
+/// in a row in the middle and those a quarter from the ends. 0 if less than a hundredth, if all, in the air, and
+/// where values are missing or a mask tells.
+double NetcdfSource::shareOfZeros() const {
+  const GridBlock& block = description_.blocks[0];
+  if (grid_.levels != 2 || grid_.mask || !isOcean(file_, grid_)) return 0;
+  uint64_t zero = 0, all = 0;
+  for (const uint64_t quarter : {1, 2, 3}) {
+    const uint64_t j = block.nj * quarter / 4;
+    std::vector<uint8_t> zeros(block.ni, 1);
+    std::vector<float> values(block.ni);
+    for (const uint64_t k : {uint64_t{0}, block.nk / 2, block.nk - 1}) {
+      readScalar({j, j + 1, k, k + 1}, mask_, values);
+      for (uint64_t i = 0; i < block.ni; ++i) {
+        if (std::isnan(values[i])) return 0;
+        zeros[i] &= values[i] == 0;
+      }
+    }
+    for (const uint8_t one : zeros) zero += one;
+    all += block.ni;
+  }
+  return zero == all || 100 * zero < all ? 0 : static_cast<double>(zero) / static_cast<double>(all);
 }
 
 void NetcdfSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,

@@ -41,6 +41,7 @@ class NetcdfSource final : public GridSource {
                            GridDescription& description, size_t& mask);
   Globe globeOf(const GlobeOptions& options) const;
   void describe(const OpenGridOptions& options);
+  double shareOfZeros() const;
   bool projects() const;
   void readPlaces(const NodeBox& box, NodeArrays& out) const;
   void readColumns(const CfRange& range, std::vector<GlobeColumn>& columns) const;
