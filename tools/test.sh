@@ -30,7 +30,7 @@ case $form in
   plain)
     # The smoke test of bench/ also draws with VTK; tests/stream/read_cache.py and the tests of
     # files that others write need the others.
-    "$root/tools/setup.sh" python3-vtk9 python3-numpy python3-zstandard python3-xxhash python3-netcdf4 python3-h5py
+    "$root/tools/setup.sh" python3-vtk9 python3-numpy python3-zstandard python3-xxhash python3-netcdf4 python3-h5py zstd
     "$root/tools/build.sh"
     run release "$@"
     ;;
