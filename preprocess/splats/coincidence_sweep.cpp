@@ -43,16 +43,16 @@ double coordinateRounding(const glm::dvec3& position, int coordinate_bytes) {
   return largest > 0 ? std::ldexp(4.0, std::ilogb(largest) - (digits - 1)) : 0.0;
 }
 
-CoincidenceSweep::CoincidenceSweep(size_t variables, int coordinate_bytes, UnlikeHalves unlike, Sink sink)
-    : variables_(variables), coordinate_bytes_(coordinate_bytes), unlike_(unlike), sink_(std::move(sink)) {}
+CoincidenceSweep::CoincidenceSweep(int coordinate_bytes, UnlikeHalves unlike, Sink sink)
+    : coordinate_bytes_(coordinate_bytes), unlike_(unlike), sink_(std::move(sink)) {}
 
 void CoincidenceSweep::add(const SeamNode& node, std::span<const SplatScalar> values) {
   release(node.along);
   const double tolerance = toleranceOf(node.splat, coordinate_bytes_);
   auto cluster = find(node, tolerance);
   if (cluster == clusters_.end()) {
-    cluster = clusters_.emplace(
-        node.across, Cluster{node.splat.node_position, tolerance, JointNodes(variables_, unlike_)});
+    cluster =
+        clusters_.emplace(node.across, Cluster{node.splat.node_position, tolerance, JointNodes(unlike_)});
     leaving_.push({node.along + tolerance + slackOf(node.splat), sequence_++, cluster});
   }
   cluster->second.nodes.add(node.splat, values);

@@ -30,7 +30,7 @@ class CoincidenceSweep {
   /// units in the last place, for coordinates of `coordinate_bytes` bytes) but then at most 0.4 of its spacing,
   /// so that neighbours along a grid line never coincide, however thin the boundary layer, unless they are one
   /// point.
-  CoincidenceSweep(size_t variables, int coordinate_bytes, UnlikeHalves unlike, Sink sink);
+  CoincidenceSweep(int coordinate_bytes, UnlikeHalves unlike, Sink sink);
 
   /// In rising order of `along`.
   void add(const SeamNode& node, std::span<const SplatScalar> values);
@@ -57,7 +57,6 @@ class CoincidenceSweep {
   Clusters::iterator find(const SeamNode& node, double tolerance);
   void release(double before);
 
-  const size_t variables_;
   const int coordinate_bytes_;
   const UnlikeHalves unlike_;
   const Sink sink_;

@@ -7,7 +7,6 @@
 //                half cells                        one splat           two splats, cut at the face
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -56,7 +55,7 @@ class MergedParts {
 /// Not for several threads at once. The sums depend on the order of adding.
 class JointNodes {
  public:
-  JointNodes(size_t variables, UnlikeHalves unlike) : variables_(variables), unlike_(unlike) {}
+  explicit JointNodes(UnlikeHalves unlike) : unlike_(unlike) {}
 
   /// A node at the point, or one of the layer behind a face there, which loses its border code if that face is closed.
   void add(const NodeSplat& splat, std::span<const SplatScalar> values);
@@ -70,7 +69,6 @@ class JointNodes {
   void mergeAll();
   std::vector<MergedParts> groups() const;
 
-  size_t variables_;
   UnlikeHalves unlike_;
   std::vector<SplatWithValues> parts_;
   std::optional<MergedParts> merged_;  // in place of parts_, if there are many

@@ -10,13 +10,11 @@
 namespace curvisplat {
 
 struct SeamMerger::State {
-  size_t variables;
   UnlikeHalves unlike;
   SeamSorter sorter;
 
   void sweep(int coordinate_bytes, const JointNodes::Sink& sink) {
-    CoincidenceSweep sweep(variables, coordinate_bytes, unlike,
-                           [&](JointNodes& joint) { joint.finish(sink); });
+    CoincidenceSweep sweep(coordinate_bytes, unlike, [&](JointNodes& joint) { joint.finish(sink); });
     sorter.drain([&](const SeamNode& node, std::span<const SplatScalar> values) { sweep.add(node, values); });
     sweep.finish();
   }
@@ -24,8 +22,7 @@ struct SeamMerger::State {
 
 SeamMerger::SeamMerger(size_t variables, uint64_t memory_bytes, std::filesystem::path temporary_folder,
                        UnlikeHalves unlike)
-    : state_(new State{variables, unlike, SeamSorter(variables, memory_bytes, std::move(temporary_folder))}) {
-}
+    : state_(new State{unlike, SeamSorter(variables, memory_bytes, std::move(temporary_folder))}) {}
 SeamMerger::~SeamMerger() = default;
 SeamMerger::SeamMerger(SeamMerger&&) noexcept = default;
 SeamMerger& SeamMerger::operator=(SeamMerger&&) noexcept = default;
