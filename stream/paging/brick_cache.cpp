@@ -1,6 +1,7 @@
 #include "stream/paging/brick_cache.h"
 
 #include <algorithm>
+#include <type_traits>
 #include <utility>
 
 #include "stream/base/check.h"
@@ -8,7 +9,6 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kArrays = 16;
 // Arrays begin at whole cache lines.
 constexpr uint64_t kLineFloats = Arena::kBlockAlignment / sizeof(float);
 
@@ -25,7 +25,7 @@ BrickCache::~BrickCache() {
 }
 
 uint64_t BrickCache::charge(uint64_t splats) {
-  return Arena::charge(kArrays * strideOf(splats) * sizeof(float));
+  return Arena::charge(kArraysOfSplats * strideOf(splats) * sizeof(float));
 }
 
 void BrickCache::beginEpoch(const std::vector<uint32_t>& bricks) {
@@ -71,16 +71,13 @@ std::optional<BrickCache::Slot> BrickCache::makeSlot(uint32_t brick, uint32_t sp
   entry.epoch = epoch_;
   entry.block = block;
   entry.pins = 1;
-  entry.geometry.border_code = reinterpret_cast<uint32_t*>(block);
-  auto* array = reinterpret_cast<float*>(block) + stride;
-  for (float** each :
-       {&entry.geometry.x, &entry.geometry.y, &entry.geometry.z, &entry.geometry.axis0, &entry.geometry.axis1,
-        &entry.geometry.axis2, &entry.geometry.shear10, &entry.geometry.shear20, &entry.geometry.shear21,
-        &entry.geometry.weight, &entry.values.mean, &entry.values.slope0, &entry.values.slope1,
-        &entry.values.slope2, &entry.values.variance}) {
-    *each = array;
-    array += stride;
-  }
+  std::byte* array = block;
+  const auto place = [&](auto*& at) {
+    at = reinterpret_cast<std::remove_reference_t<decltype(at)>>(array);
+    array += stride * sizeof(float);
+  };
+  forEachArrayOfGeometry(entry.geometry, place);
+  forEachArrayOfVariable(entry.values, place);
   entry.geometry.count = entry.values.count = splats;
   ++statistics_.bricks;
   statistics_.bytes += bytes;

@@ -12,10 +12,11 @@ namespace {
 
 /// Copies the splats of `kept` to the front of the arrays, in their order.
 void compact(std::span<const uint32_t> kept, SplatGeometry& g, SplatVariable& v) {
-  for (auto* array : {&g.x, &g.y, &g.z, &g.axis0, &g.axis1, &g.axis2, &g.shear10, &g.shear20, &g.shear21,
-                      &g.weight, &v.mean, &v.slope0, &v.slope1, &v.slope2, &v.variance})
-    for (size_t n = 0; n < kept.size(); ++n) (*array)[n] = (*array)[kept[n]];
-  for (size_t n = 0; n < kept.size(); ++n) g.border_code[n] = g.border_code[kept[n]];
+  const auto keep = [&](auto& array) {
+    for (size_t n = 0; n < kept.size(); ++n) array[n] = array[kept[n]];
+  };
+  forEachArrayOfGeometry(g, keep);
+  forEachArrayOfVariable(v, keep);
   g.resize(kept.size());
   v.resize(kept.size());
 }
