@@ -139,7 +139,9 @@ class Addition {
 
   void survey() { survey_ = surveyGrid(reader_, plan_.slab_bytes, nullptr, progress_); }
 
-  void findMergedNodes() { grid_.addMergedFaces(plan_, scratch_.path(), progress_); }
+  void findMergedNodes() {
+    grid_.addMergedFaces(plan_, unlikeHalvesOf(manifest()), scratch_.path(), progress_);
+  }
   void findDrawnNodes() { grid_.restrictTo(cache_, plan_, scratch_.path(), progress_); }
 
   void checkSurvey() const {
@@ -184,7 +186,8 @@ class Addition {
     grouped_ = ValueLoader::grouping(buckets_->size(), plan_);
     const uint32_t numbers = (buckets_->size() + grouped_ - 1) / grouped_;
     file_ = std::make_unique<BucketFile>(scratch_.path() / "values.bin", numbers, plan_.chunkBytes(numbers));
-    seams_ = std::make_unique<SeamMerger>(variables, plan_.seam_bytes, scratch_.path());
+    seams_ = std::make_unique<SeamMerger>(variables, plan_.seam_bytes, scratch_.path(),
+                                          unlikeHalvesOf(manifest()));
 
     tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
     streamSplats(
