@@ -5,10 +5,11 @@
 
 #include <cmath>
 #include <limits>
-#include <mutex>
 #include <numbers>
 #include <sstream>
 #include <vector>
+
+#include "stream/base/mutex.h"
 
 namespace curvisplat {
 namespace {
@@ -111,9 +112,9 @@ const NetcdfVariable* mappingOf(const NetcdfFiles& files, const NetcdfVariable& 
 
 /// PROJ's objects, which one thread at a time may use.
 struct MapProjection::Proj {
-  mutable std::mutex mutex;  // guards both
+  mutable Mutex mutex;
   PJ_CONTEXT* context = nullptr;
-  PJ* projection = nullptr;
+  PJ* projection PT_GUARDED_BY(mutex) = nullptr;
 
   explicit Proj(const std::string& text) {
     context = proj_context_create();
@@ -176,7 +177,7 @@ void MapProjection::toGeographic(std::span<double> x, std::span<double> y) const
     for (size_t n = 0; n < x.size(); ++n) unrotate(x[n], y[n]);
     return;
   }
-  const std::lock_guard lock(proj_->mutex);
+  const MutexLock lock(proj_->mutex);
   for (size_t n = 0; n < x.size(); ++n) {
     const PJ_COORD from = proj_coord(x[n], y[n], 0, 0);
     const PJ_COORD to = std::isfinite(x[n]) && std::isfinite(y[n])
