@@ -180,6 +180,7 @@ nlohmann::ordered_json asJson(const GridInfo& info) {
                       {"cache_bytes_per_further_scalar", info.estimate.bytes_per_further_scalar},
                       {"seconds", info.estimate.seconds},
                       {"threads", info.threads}};
+  json["notes"] = description.notes;
   json["warnings"] = description.warnings;
   return json;
 }
@@ -242,6 +243,7 @@ void printAsText(const GridInfo& info) {
   for (size_t axis = 0; axis < 3; ++axis)
     fmt::print("{}         {:.9g} .. {:.9g}\n", "xyz"[axis], info.statistics.bounds[axis].min,
                info.statistics.bounds[axis].max);
+  for (const std::string& note : description.notes) fmt::print("note      {}\n", note);
   fmt::print("stored    coordinates in {} precision\n",
              description.coordinate_bytes == 8 ? "double" : "single");
   printScalars(info);
