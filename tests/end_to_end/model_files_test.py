@@ -443,6 +443,43 @@ class ModelFiles(unittest.TestCase):
                 f.add("temp", "depth lat lon", values, "f4")
             self.assertEqual("--blank 0" in " ".join(self.info()["warnings"]), noticed)
 
+    # -- damage
+
+    def test_damaged_files_are_refused_or_read(self):
+        """Truncated headers and wrong bytes never crash; in classic files, whose parser is not HDF5's."""
+        t = RANDOM.random((1, 3, 8, 12)).astype("f4")
+        with File(self.folder / "all.nc", {"rlon": 12, "rlat": 8, "lev": 3, "time": None, "n": 19}, format="NETCDF3_CLASSIC") as f:
+            f.add("rlon", "rlon", np.linspace(-10, 12, 12), units="degrees", standard_name="grid_longitude")
+            f.add("rlat", "rlat", np.linspace(-8, 8, 8), units="degrees", standard_name="grid_latitude")
+            f.add("pole", "", 0, "i4", grid_mapping_name="rotated_latitude_longitude", grid_north_pole_latitude=39.25,
+                  grid_north_pole_longitude=-162.0)
+            f.add("lev", "lev", [1.0, 2, 3], standard_name="atmosphere_hybrid_sigma_pressure_coordinate", units="level",
+                  formula_terms="ap: A b: B ps: PS", positive="down")
+            f.add("A", "lev", [1e4, 2e4, 0])
+            f.add("B", "lev", [0, 0.3, 1])
+            f.add("PS", "time rlat rlon", np.full((1, 8, 12), 1e5), units="Pa")
+            f.add("kind", "rlat rlon", np.ones((8, 12)), "i4", flag_values=np.array([0, 1], "i4"), flag_meanings="hole sea")
+            f.add("time", "time", [0.0], units="days since 2001-01-01 00:00:00", calendar="noleap")
+            f.add("T", "time lev rlat rlon", t, "f4", grid_mapping="pole")
+        data = (self.folder / "all.nc").read_bytes()
+        self.assertEqual(self.info("all.nc")["blanked"]["by_grid"], 0)
+        header = data.index(b"flag_meanings") + 1200
+        refused = 0
+        for n in range(250):
+            wrong = bytearray(data)
+            wrong[int(RANDOM.integers(4, min(header, len(data))))] ^= int(RANDOM.integers(1, 256))
+            if n < 40:
+                wrong = wrong[: n * len(data) // 40]
+            (self.folder / "wrong.nc").write_bytes(wrong)
+            done = subprocess.run([PROGRAM, "info", "--json", str(self.folder / "wrong.nc")], capture_output=True, text=True,
+                                  errors="replace", timeout=60)
+            self.assertIn(done.returncode, (0, 1), f"case {n}: {done.stderr}")
+            if done.returncode == 1:
+                refused += 1
+                self.assertRegex(done.stderr, r"^curvisplat: [^\n]*\n$")
+        print(f"{refused} of 250 damaged files refused")
+        self.assertGreater(refused, 50)
+
     # -- around the Earth
 
     def globe(self, lon, lat, t, **attributes):

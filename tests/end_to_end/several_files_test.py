@@ -100,6 +100,12 @@ class SeveralFiles(unittest.TestCase):
         self.assertEqual(again.returncode, 1)
         self.assertIn("no further scalar", again.stderr)
 
+    def test_names_of_any_script(self):
+        p = self.fields(1)[0]
+        write_vts(self.folder / "Änderung 時.vts", 0, **{"Température [°C]": p, "密度": p + 1})
+        names = [s["name"] for s in self.info("Änderung 時.vts")["scalars"]]
+        self.assertEqual(names, ["Température [°C]", "密度"])
+
     def test_blocks_in_several_files(self):
         p, q, r = self.fields(3)
         write_vts(self.folder / "part_0.vts", 0, p=p)
