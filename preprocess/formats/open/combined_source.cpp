@@ -122,7 +122,8 @@ void CombinedSource::describe(const std::vector<std::string>& names) {
 
 void CombinedSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                           NodeArrays& out) const {
-  const auto& [group, number] = blocks_.at(block);
+  const size_t group = blocks_.at(block).first;
+  const uint32_t number = blocks_[block].second;
   const size_t first = groups_[group].sources.front();
   std::map<size_t, std::vector<size_t>> of_source;  // positions in `scalars`
   of_source[first];
