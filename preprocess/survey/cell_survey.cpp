@@ -10,6 +10,7 @@
 
 #include "preprocess/grid/hexahedron.h"
 #include "preprocess/grid/slabs.h"
+#include "preprocess/survey/grid_checksum.h"
 
 namespace curvisplat {
 namespace {
@@ -107,6 +108,7 @@ GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFa
                      return of_range;
                    },
                    united));
+    survey.grid_checksum += checksumOfGrid(*loaded, block);
     progress.advance(rowsOf(slab.box) * block.ni);
   }
   return survey;
