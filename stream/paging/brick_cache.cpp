@@ -71,6 +71,7 @@ std::optional<BrickCache::Room> BrickCache::makeRoom(uint32_t brick, uint32_t sp
   entry.turn = turn_;
   entry.block = block;
   entry.pins = 1;
+  entry.step = step_;
   entry.geometry.border_code = reinterpret_cast<uint32_t*>(block);
   auto* array = reinterpret_cast<float*>(block) + stride;
   for (float** each :
@@ -96,6 +97,20 @@ BrickCache::Statistics BrickCache::statistics() const {
 bool BrickCache::contains(uint32_t brick) const {
   const std::lock_guard lock(mutex_);
   return entries_.contains(brick);
+}
+
+void BrickCache::stepChanged() {
+  const std::lock_guard lock(mutex_);
+  CURVISPLAT_CHECK_OP(entries_.size(), ==, unpinned_.size());
+  ++step_;
+}
+
+bool BrickCache::isStale(uint32_t brick) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = entries_.find(brick);
+  if (found == entries_.end() || !found->second.whole) return false;
+  const std::lock_guard refreshing(found->second.refreshing);
+  return found->second.step != step_;
 }
 
 /// The mutex is held.

@@ -12,6 +12,7 @@
 // Any thread. The arrays of a pinned brick are read without a lock.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <list>
 #include <mutex>
@@ -40,6 +41,15 @@ class BrickCache {
 
     GeometryArrays<const float> geometry() const;
     VariableArrays<const float> values() const;
+    /// Calls `decode` to fill the values anew if they are of an earlier step; others who want that wait. If it
+    /// throws, they stay what they were.
+    template <typename Decode>
+    void refresh(const Decode& decode) const {
+      const std::lock_guard lock(entry_->refreshing);
+      if (entry_->step == cache_->step_) return;
+      decode(entry_->values);
+      entry_->step = cache_->step_;
+    }
 
    private:
     friend class BrickCache;
@@ -79,6 +89,12 @@ class BrickCache {
 
   bool contains(uint32_t brick) const;
 
+  /// From now on the values of bricks that are here are of an earlier step; their geometry stays. Nothing may be
+  /// pinned.
+  void stepChanged();
+  /// Whether the brick is here with values of an earlier step.
+  bool isStale(uint32_t brick) const;
+
   struct Statistics {
     uint64_t hits = 0, misses = 0;  // of find()
     uint64_t evictions = 0;
@@ -99,6 +115,8 @@ class BrickCache {
     VariableArrays<float> values{};
     uint32_t pins = 0;
     bool whole = false;                    // can be found
+    mutable std::mutex refreshing;         // guards step, and the values while they are filled anew
+    uint64_t step = 0;                     // whose values it has, in the cache's count
     std::list<Entry*>::iterator unpinned;  // in unpinned_, where pins is 0
   };
 
@@ -110,6 +128,7 @@ class BrickCache {
   std::unordered_map<uint32_t, Entry> entries_;
   std::list<Entry*> unpinned_;  // least recently used first
   uint64_t turn_ = 0;
+  std::atomic<uint64_t> step_ = 0;  // counts stepChanged()
   Statistics statistics_;
 };
 

@@ -74,6 +74,10 @@ class BrickSource {
   /// all are. Throws Error where the disk fails.
   Splats standIn(const BrickPart& part, Scratch& scratch) const;
 
+  /// The cache is at another step of the same geometry. The geometry of decoded bricks is kept; their values are
+  /// decoded anew when they are taken. Nobody may be in take() or prefetchNext() any more. Throws Error.
+  void stepChanged();
+
   /// Begins to fill the cache with what it lacks of `bricks`, as far as there is room without them.
   void startPrefetch(std::span<const BrickPart> parts);
   /// Takes the next brick of the prefetch. False: none is left, there is no more room, or it was stopped.
@@ -104,6 +108,7 @@ class BrickSource {
 
   std::optional<Splats> takeShared(Shared& shared, const BrickPart& part, uint64_t miss, Scratch& scratch);
   std::optional<Splats> read(const BrickPart& part, uint64_t miss, Scratch& scratch);
+  void refresh(const BrickCache::Pin& pin, uint32_t brick, Scratch& scratch) const;
   Splats readAlone(const BrickPart& part, Scratch& scratch) const;
   Splats splatsOf(BrickCache::Pin pin, const BrickPart& part) const;
   Splats splatsOf(const Scratch& scratch, const BrickPart& part) const;
@@ -120,9 +125,10 @@ class BrickSource {
   std::vector<BrickPart> parts_;                      // [sequence]
   std::vector<std::optional<BrickCache::Pin>> pins_;  // [sequence]
   std::vector<uint32_t> misses_;                      // [sequence]: place among those read
-  std::vector<uint32_t> to_prefetch_;
+  std::vector<uint32_t> to_prefetch_, to_refresh_;
   uint64_t reads_ = 0, hits_ = 0;  // bricks that the pager was asked for, and that it was not
   std::atomic<uint64_t> next_prefetch_ = 0;
+  std::atomic<bool> prefetch_stopped_ = false;
   PagerStatistics before_;
 
   std::mutex sharing_;                           // guards stopped_, and what shared_ holds
