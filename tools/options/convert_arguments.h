@@ -29,6 +29,9 @@ struct ConvertArguments {
   std::optional<std::string> memory;
   unsigned threads = 0;
   bool overwrite = false, resume = false, no_preflight = false;
+  std::optional<std::string> steps;  // of a series
+  std::optional<uint64_t> every;
+  bool keep_going = false, adds_steps = false;
 };
 
 /// Opens the grid. Temporary files go to --tmp, or beside `cache` without it.
