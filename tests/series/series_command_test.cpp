@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -10,6 +11,7 @@
 
 #include "stream/base/file.h"
 #include "stream/cache/cache_reader.h"
+#include "tests/support/folder_watch.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 
@@ -124,6 +126,54 @@ TEST_F(SeriesCommand, SelectsAddsAndLists) {
   ASSERT_EQ(json["steps"].size(), 7u);
   EXPECT_EQ(json["steps"][6]["time"], 6);
   EXPECT_EQ(json["variables"][0]["max"], json["steps"][2]["variables"][0]["max"]);
+}
+
+TEST_F(SeriesCommand, FollowsWhatASimulationWrites) {
+  generate("f", 3);
+  run({"convert", file("f.xyz"), file("f_*.fun"), "-o", file("all.splats")});
+  const auto move = [&](const std::string& step, const std::string& to) {
+    fs::create_directories(file(to));
+    for (const char* ending : {".fun", ".nam"})
+      fs::rename(file("f_" + step + ending), file(to + "/f_" + step + ending));
+  };
+  // Nothing has been written yet. The first step's file is incomplete at first.
+  for (const char* step : {"0000", "0001", "0002"}) move(step, "later");
+  fs::create_directories(file("run"));
+  fs::rename(file("f.xyz"), file("run/f.xyz"));
+  RunningProgram following({"convert", file("run/f.xyz"), file("run/f_*.fun"), "--follow", "--until", "2",
+                            "-o", file("a.splats")});
+  const std::string first = bytesOfFile(file("later/f_0000.fun"));
+  fs::copy_file(file("later/f_0000.nam"), file("run/f_0000.nam"));
+  std::ofstream(file("run/f_0000.fun"), std::ios::binary) << first.substr(0, 1000);
+  std::ofstream(file("run/f_0000.fun"), std::ios::binary) << first;
+  {
+    FolderWatch watch(folder.path());
+    watch.waitUntil([&] { return fs::exists(file("a.splats")); });
+  }
+  for (const char* step : {"0001", "0002"})
+    for (const char* ending : {".nam", ".fun"})
+      fs::copy_file(file(std::string("later/f_") + step + ending),
+                    file(std::string("run/f_") + step + ending));
+  const ProgramResult result = following.wait();
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_NE(result.out.find("2 steps"), std::string::npos) << result.out;
+  EXPECT_EQ(CacheReader(file("a.splats")).series().steps.size(), 2u);
+
+  // Ended by a signal, and continued. The cache is whole in between.
+  RunningProgram interrupted(
+      {"convert", file("run/f.xyz"), file("run/f_*.fun"), "--follow", "--resume", "-o", file("a.splats")});
+  {
+    FolderWatch watch(file("a.splats"));
+    watch.waitUntil([&] { return CacheReader(file("a.splats")).series().steps.size() == 3; });
+  }
+  interrupted.signal(SIGTERM);
+  const ProgramResult ended = interrupted.wait();
+  EXPECT_EQ(ended.status, 128 + SIGTERM);
+  EXPECT_EQ(lineCount(ended.err), 1) << ended.err;
+  for (const char* name : {"steps.bin", "var.0.bin", "var.0.1.bin", "var.0.2.bin", "geometry.bin"})
+    EXPECT_TRUE(bytesOfFile(file(std::string("a.splats/") + name)) ==
+                bytesOfFile(file(std::string("all.splats/") + name)))
+        << name;
 }
 
 TEST_F(SeriesCommand, FileSeriesOfParaView) {
