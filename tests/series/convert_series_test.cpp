@@ -8,11 +8,13 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "preprocess/addition/add_scalar.h"
 #include "preprocess/convert/memory_plan.h"
 #include "stream/base/error.h"
+#include "stream/base/file.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_verify.h"
 #include "tests/reference/function_grid.h"
@@ -321,6 +323,36 @@ TEST(ConvertSeries, DamagedStepsAreRefused) {
   std::ofstream(folder / "a.splats/geometry.1/manifest.json", std::ios::app) << " ";
   EXPECT_THROW(CacheReader(folder / "a.splats", 2), Error);
   EXPECT_EQ(CacheReader(folder / "a.splats", 1).step(), 1u);
+}
+
+/// A cache of this version, kept with the numbers that read_cache.py decoded from it: it must stay readable.
+TEST(Series, OfAnEarlierProgramIsStillRead) {
+  const fs::path kept = fs::path(CURVISPLAT_TEST_DATA) / "caches/version_2/series.splats";
+  const auto expected = nlohmann::json::parse(readTextFile(fs::path(kept).replace_extension(".json")));
+  const CacheReader cache(kept);
+  ASSERT_EQ(cache.series().steps.size(), expected.size());
+  SplatGeometry geometry;
+  SplatVariable values;
+  for (size_t step = 0; step < expected.size(); ++step) {
+    SCOPED_TRACE(step);
+    const CacheReader at_step = cache.atStep(step);
+    EXPECT_TRUE(verifyCache(at_step).findings.empty());
+    EXPECT_EQ(at_step.manifest().steps.front().time, expected[step]["time"].get<double>());
+    EXPECT_EQ(at_step.series().steps[step].geometry, expected[step]["geometry"].get<uint32_t>());
+    double means = 0, slopes = 0, x = 0;
+    for (uint32_t brick = 0; brick < at_step.bricks().size(); ++brick) {
+      at_step.readGeometry(brick, geometry);
+      at_step.readVariable(brick, 0, values);
+      for (size_t n = 0; n < values.size(); ++n) {
+        means += values.mean[n];
+        slopes += std::abs(values.slope0[n]) + std::abs(values.slope1[n]) + std::abs(values.slope2[n]);
+        x += geometry.x[n];
+      }
+    }
+    EXPECT_NEAR(means, expected[step]["means"].get<double>(), 1e-3);
+    EXPECT_NEAR(slopes, expected[step]["slopes"].get<double>(), 1e-3);
+    EXPECT_NEAR(x, expected[step]["x"].get<double>(), 1e-2);
+  }
 }
 
 TEST(Series, NearestStepInTime) {

@@ -124,6 +124,17 @@ void addSeriesOptions(CLI::App& command, ConvertArguments& arguments) {
       .add_flag("--add-steps", arguments.adds_steps,
                 "Add the time steps of these files to the cache --to, after its last")
       ->group(kGroup);
+  CLI::Option* const follow =
+      command
+          .add_flag(
+              "--follow", arguments.follows,
+              "Go on converting the files that match the pattern while a simulation writes them; ends with "
+              "Ctrl-C or --until")
+          ->group(kGroup);
+  command.add_option("--until", arguments.until, "End --follow when the cache has this many time steps")
+      ->check(CLI::Range(uint64_t{1}, uint64_t{1'000'000}))
+      ->needs(follow)
+      ->group(kGroup);
 }
 
 }  // namespace

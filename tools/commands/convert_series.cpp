@@ -2,14 +2,20 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+#include <thread>
 
 #include "preprocess/addition/convert_series.h"
 #include "preprocess/formats/open/series_files.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "stream/base/paths.h"
+#include "stream/cache/cache_reader.h"
 #include "tools/options/option_parsers.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
@@ -105,9 +111,91 @@ class StepLog {
   double before_ = 0;
 };
 
+constexpr auto kPollInterval = std::chrono::milliseconds(250);
+// A file that has not changed for this long has been written.
+constexpr auto kSettled = std::chrono::seconds(2);
+
+/// The files of a running simulation that have been written and are not in the cache.
+class WrittenFiles {
+ public:
+  explicit WrittenFiles(const ConvertArguments& arguments) : arguments_(arguments) {}
+
+  void markDone(const std::vector<std::string>& files) { done_.insert(files.begin(), files.end()); }
+
+  /// The next step whose files are all written; nullopt if there is none yet. Steps come in their order.
+  std::optional<StepFiles> next() {
+    std::vector<StepFiles> steps;
+    try {
+      OpenGridOptions files = arguments_.grid;
+      expandPatterns(files);
+      steps = stepsByName(files);
+    } catch (const Error&) {
+      return std::nullopt;  // none has been written yet, or not every kind of file
+    }
+    for (const StepFiles& step : steps) {
+      if (done_.contains(step.name)) continue;
+      if (!isSettled(step.options)) return std::nullopt;
+      done_.insert(step.name);
+      return step;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  /// Whether no file of the step has changed for a while.
+  static bool isSettled(const OpenGridOptions& options) {
+    std::vector<std::filesystem::path> files = options.solutions;
+    files.push_back(options.grid);
+    for (const std::filesystem::path& path : files) {
+      std::error_code error;
+      const auto written = std::filesystem::last_write_time(path, error);
+      if (error || std::filesystem::file_time_type::clock::now() - written < kSettled) return false;
+    }
+    return true;
+  }
+
+  const ConvertArguments& arguments_;
+  std::set<std::string> done_;  // names of steps
+};
+
+/// Converts what a simulation writes until the cache has enough steps. Throws Interrupted.
+void follow(const ConvertArguments& arguments) {
+  SeriesOptions options = seriesOptions(arguments);
+  Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
+  StepLog log(progress);
+  WrittenFiles files(arguments);
+  uint64_t steps = 0;
+  const std::filesystem::path manifest = options.convert.output / "manifest.json";
+  if (options.add || (options.convert.resume && std::filesystem::exists(manifest))) {
+    const CacheReader cache(options.convert.output);
+    files.markDone(cache.seriesManifest().sources);
+    steps = cache.series().steps.size();
+    options.add = true;
+  }
+  while (!arguments.until || steps < *arguments.until) {
+    const std::optional<StepFiles> step = files.next();
+    if (!step) {
+      progress.throwIfStopped();
+      std::this_thread::sleep_for(kPollInterval);
+      continue;
+    }
+    const std::vector<StepFiles> one{*step};
+    const SeriesReport report = convertSeries(seriesInput(arguments, one), options, progress,
+                                              [&](const SeriesEvent& event) { log.add(event); });
+    if (report.converted > 0) fmt::print("step {}: {}\n", report.steps - 1, step->name);
+    std::fflush(stdout);
+    steps = report.steps;
+    options.add = true;
+    options.convert.overwrite = false;
+  }
+  fmt::print("{}: {} steps\n", options.convert.output.string(), steps);
+}
+
 }  // namespace
 
 bool isSeries(ConvertArguments& arguments) {
+  if (arguments.follows) return true;
   expandPatterns(arguments.grid);
   return arguments.adds_steps || arguments.steps || arguments.every || hasSeveralStepFiles(arguments.grid);
 }
@@ -118,6 +206,12 @@ void runConvertSeries(ConvertArguments arguments) {
   for (auto* path : {&arguments.output, &arguments.to})
     if (!path->empty() && !path->has_filename()) *path = path->parent_path();  // "NAME.splats/"
   if (!arguments.adds_steps) checkOutputFolder("-o", arguments.output);
+  if (arguments.follows) {
+    if (arguments.steps || arguments.every)
+      throw UsageError("--follow takes all steps; leave out --steps and --every");
+    requireThreads(arguments.threads);
+    return follow(arguments);
+  }
   const SeriesOptions options = seriesOptions(arguments);
   const std::vector<StepFiles> steps = chosenSteps(arguments);
   const SeriesInput input = seriesInput(arguments, steps);

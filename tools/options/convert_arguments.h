@@ -31,7 +31,8 @@ struct ConvertArguments {
   bool overwrite = false, resume = false, no_preflight = false;
   std::optional<std::string> steps;  // of a series
   std::optional<uint64_t> every;
-  bool keep_going = false, adds_steps = false;
+  bool keep_going = false, adds_steps = false, follows = false;
+  std::optional<uint64_t> until;  // steps of a cache that follows a simulation
 };
 
 /// Opens the grid. Temporary files go to --tmp, or beside `cache` without it.

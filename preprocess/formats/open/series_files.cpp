@@ -216,10 +216,9 @@ bool hasSeveralStepFiles(const OpenGridOptions& options) {
   return std::adjacent_find(shapes.begin(), shapes.end()) != shapes.end();
 }
 
-std::vector<StepFiles> stepsOf(const OpenGridOptions& options) {
+std::vector<StepFiles> stepsByName(const OpenGridOptions& options) {
   const Groups groups = groupsOf(options);
   std::vector<StepFiles> steps;
-  bool may_hold_several = true;
   for (size_t n = 0; n < groups.steps; ++n) {
     OpenGridOptions files = options;
     files.grid = fileAt(groups.grids, n);
@@ -229,15 +228,26 @@ std::vector<StepFiles> stepsOf(const OpenGridOptions& options) {
     std::string name = files.grid.string();
     for (size_t g = 0; !names_grid && g < groups.solutions.size(); ++g)
       if (groups.solutions[g].size() > 1 || groups.steps == 1) name = files.solutions[g].string();
+    steps.push_back({std::move(files), name});
+  }
+  return steps;
+}
+
+std::vector<StepFiles> stepsOf(const OpenGridOptions& options) {
+  std::vector<StepFiles> steps;
+  bool may_hold_several = true;
+  for (StepFiles& step : stepsByName(options)) {
     size_t times = 1;
     if (may_hold_several) {
-      times = std::max<size_t>(1, openGrid(files)->description().times.size());
+      times = std::max<size_t>(1, openGrid(step.options)->description().times.size());
       // Files of one kind are alike: it is the first that tells whether they hold several steps.
-      may_hold_several = times > 1 || n > 0;
+      may_hold_several = times > 1 || !steps.empty();
     }
     for (size_t time = 0; time < times; ++time) {
-      steps.push_back({files, times > 1 ? fmt::format("{}, time step {}", name, time) : name});
-      if (times > 1) steps.back().options.time_step = static_cast<uint32_t>(time);
+      steps.push_back(step);
+      if (times == 1) continue;
+      steps.back().name += fmt::format(", time step {}", time);
+      steps.back().options.time_step = static_cast<uint32_t>(time);
     }
   }
   return steps;

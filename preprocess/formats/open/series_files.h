@@ -44,6 +44,9 @@ void expandPatterns(OpenGridOptions& options);
 /// Whether the names of the files alone make them several steps.
 bool hasSeveralStepFiles(const OpenGridOptions& options);
 
+/// The steps that the names of the files tell, without opening any: a file with several steps counts as one.
+std::vector<StepFiles> stepsByName(const OpenGridOptions& options);
+
 /// All steps of the files, whose patterns have been expanded. One at least. Opens files that may hold several
 /// steps. Throws Error.
 std::vector<StepFiles> stepsOf(const OpenGridOptions& options);
