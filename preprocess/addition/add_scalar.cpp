@@ -105,7 +105,9 @@ class Addition {
 
   void survey() { survey_ = surveyGrid(reader_, plan_.slab_bytes, nullptr, progress_); }
 
-  void findMergedNodes() { grid_.addMergedFaces(plan_, scratch_.path(), progress_); }
+  void findMergedNodes() {
+    grid_.addMergedFaces(plan_, unlikeHalvesOf(manifest()), scratch_.path(), progress_);
+  }
   void findDrawnNodes() { grid_.restrictTo(cache_, plan_, scratch_.path(), progress_); }
 
   void checkSurvey() const {

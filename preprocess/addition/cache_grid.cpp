@@ -19,6 +19,11 @@ class NoSink : public SplatSink {
 
 }  // namespace
 
+UnlikeHalves unlikeHalvesOf(const Manifest& manifest) {
+  const bool first_version = manifest.requirements.empty();
+  return first_version ? UnlikeHalves::kMerged : UnlikeHalves::kApart;
+}
+
 CacheGrid::CacheGrid(const GridSource& source) : source_(&source) {
   uint64_t node = 0;
   for (const GridBlock& block : source.description().blocks) {
@@ -32,10 +37,10 @@ void CacheGrid::restrictTo(const CacheReader& cache, const MemoryPlan& plan,
   drawn_ = std::make_unique<DrawnNodes>(cache, plan, temporary_folder, progress);
 }
 
-void CacheGrid::addMergedFaces(const MemoryPlan& plan, const std::filesystem::path& temporary_folder,
-                               Progress& progress) {
+void CacheGrid::addMergedFaces(const MemoryPlan& plan, UnlikeHalves unlike,
+                               const std::filesystem::path& temporary_folder, Progress& progress) {
   all_faces_ = true;
-  SeamMerger seams(0, plan.seam_bytes, temporary_folder);
+  SeamMerger seams(0, plan.seam_bytes, temporary_folder, unlike);
   NoSink none;
   streamSplats(
       NodeReader(*this, {}, std::nullopt), nullptr, plan.slab_bytes, [&]() -> SplatSink& { return none; },

@@ -11,10 +11,14 @@
 #include "preprocess/addition/drawn_nodes.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/grid/grid_source.h"
+#include "preprocess/splats/joint_nodes.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 
 namespace curvisplat {
+
+/// What the conversion that made a cache did with coincident halves of unlike thickness.
+UnlikeHalves unlikeHalvesOf(const Manifest& manifest);
 
 class CacheGrid : public GridSource {
  public:
@@ -27,8 +31,8 @@ class CacheGrid : public GridSource {
                   const std::filesystem::path& temporary_folder, Progress& progress);
   /// Takes back those that were merged into others at seams, by merging the grid's faces again. To be called
   /// after restrictTo(), and while nobody reads.
-  void addMergedFaces(const MemoryPlan& plan, const std::filesystem::path& temporary_folder,
-                      Progress& progress);
+  void addMergedFaces(const MemoryPlan& plan, UnlikeHalves unlike,
+                      const std::filesystem::path& temporary_folder, Progress& progress);
 
   const GridDescription& description() const override { return source_->description(); }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,

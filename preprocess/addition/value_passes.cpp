@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "preprocess/addition/build_values.h"
+#include "preprocess/addition/cache_grid.h"
 #include "preprocess/convert/scatter.h"
 
 namespace curvisplat {
@@ -23,7 +24,8 @@ ValuePasses::ValuePasses(const CacheReader& cache, const NodeReader& reader, con
 void ValuePasses::scatter(std::function<void(const LoadedSlab&)> see) {
   const uint32_t numbers = (buckets_.size() + grouped_ - 1) / grouped_;
   file_ = std::make_unique<BucketFile>(scratch_ / "values.bin", numbers, plan_.chunkBytes(numbers));
-  seams_ = std::make_unique<SeamMerger>(reader_->scalars(), plan_.seam_bytes, scratch_);
+  seams_ = std::make_unique<SeamMerger>(reader_->scalars(), plan_.seam_bytes, scratch_,
+                                        unlikeHalvesOf(cache_->manifest()));
 
   tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
   streamSplats(*reader_, nullptr, plan_.slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, *seams_,

@@ -4,11 +4,9 @@
 
 #include <algorithm>
 #include <atomic>
-#include <condition_variable>
 #include <cstring>
 #include <deque>
 #include <exception>
-#include <mutex>
 #include <new>
 #include <optional>
 #include <thread>
@@ -16,6 +14,7 @@
 #include "stream/base/check.h"
 #include "stream/base/checksum.h"
 #include "stream/base/file.h"
+#include "stream/base/mutex.h"
 
 namespace curvisplat {
 namespace {
@@ -57,8 +56,8 @@ class ChunkWriter {
 
   /// Waits while too many chunks wait. Throws what writing threw.
   void write(Chunk chunk) {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return waiting_.size() < BucketFile::kWaitingChunks || error_; });
+    MutexLock lock(mutex_);
+    while (waiting_.size() >= BucketFile::kWaitingChunks && !error_) changed_.wait(lock);
     if (error_) std::rethrow_exception(error_);
     waiting_.push_back(std::move(chunk));
     changed_.notify_all();
@@ -66,7 +65,7 @@ class ChunkWriter {
 
   /// A used buffer, emptied, or a new one.
   ChunkBuffer buffer() {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (free_.empty()) return {};
     ChunkBuffer buffer = std::move(free_.back());
     free_.pop_back();
@@ -76,6 +75,7 @@ class ChunkWriter {
   /// Writes what waits. Throws what writing threw.
   void finish() {
     stop();
+    const MutexLock lock(mutex_);
     free_ = {};
     if (error_) std::rethrow_exception(error_);
   }
@@ -83,7 +83,7 @@ class ChunkWriter {
  private:
   void stop() {
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       stopped_ = true;
     }
     changed_.notify_all();
@@ -92,9 +92,9 @@ class ChunkWriter {
 
   void writeAll() {
     pthread_setname_np(pthread_self(), "bucket-writer");
-    std::unique_lock lock(mutex_);
+    MutexLock lock(mutex_);
     for (;;) {
-      changed_.wait(lock, [this] { return stopped_ || !waiting_.empty(); });
+      while (!stopped_ && waiting_.empty()) changed_.wait(lock);
       if (waiting_.empty() || error_) return;
       Chunk chunk = std::move(waiting_.front());
       lock.unlock();
@@ -119,20 +119,20 @@ class ChunkWriter {
   }
 
   OutputFile* file_;
-  std::mutex mutex_;  // guards all below
-  std::condition_variable changed_;
-  std::deque<Chunk> waiting_;
-  std::vector<ChunkBuffer> free_;
-  bool stopped_ = false;
-  std::exception_ptr error_;
+  Mutex mutex_;
+  ConditionVariable changed_;
+  std::deque<Chunk> waiting_ GUARDED_BY(mutex_);
+  std::vector<ChunkBuffer> free_ GUARDED_BY(mutex_);
+  bool stopped_ GUARDED_BY(mutex_) = false;
+  std::exception_ptr error_ GUARDED_BY(mutex_);
   std::thread thread_;  // last: it uses the others
 };
 
 struct Bucket {
-  std::mutex mutex;    // guards the rest, until close()
-  ChunkBuffer buffer;  // a chunk in the making, header first; empty: none
-  uint64_t last_chunk = kNoChunk;
-  uint64_t bytes = 0;
+  mutable Mutex mutex;
+  ChunkBuffer buffer GUARDED_BY(mutex);  // a chunk in the making, header first; empty: none
+  uint64_t last_chunk GUARDED_BY(mutex) = kNoChunk;
+  uint64_t bytes GUARDED_BY(mutex) = 0;
 };
 
 }  // namespace
@@ -163,8 +163,7 @@ struct BucketFile::State {
   std::optional<InputFile> input;     // after close(), or of another's file
   bool leave = false;
 
-  /// For the holder of the bucket's mutex.
-  void flush(Bucket& bucket) {
+  void flush(Bucket& bucket) REQUIRES(bucket.mutex) {
     const ChunkHeader header{0, bucket.last_chunk, bucket.buffer.size() - sizeof(ChunkHeader)};
     std::memcpy(bucket.buffer.data(), &header, sizeof header);
     const size_t pages = (bucket.buffer.size() + kDirectAlignment - 1) / kDirectAlignment;
@@ -175,12 +174,18 @@ struct BucketFile::State {
     bucket.buffer = {};
   }
 
+  uint64_t lastChunk(uint32_t number) const {
+    const Bucket& bucket = buckets[number];
+    const MutexLock lock(bucket.mutex);
+    return bucket.last_chunk;
+  }
+
   /// Calls use(records) for each chunk.
   template <typename Use>
   void forEachChunk(uint32_t number, Use use) const {
     CURVISPLAT_CHECK(input.has_value());
     ChunkBuffer chunk(chunk_bytes);
-    uint64_t at = buckets[number].last_chunk;
+    uint64_t at = lastChunk(number);
     while (at != kNoChunk) {
       // The next chunk's beginning comes along with a short one.
       const std::span<std::byte> whole = std::span(chunk).first(std::min<uint64_t>(chunk_bytes, end - at));
@@ -232,7 +237,10 @@ void BucketFile::leave() {
 
 BucketChains BucketFile::chains() const {
   BucketChains chains{state_->chunk_bytes, state_->end, {}};
-  for (const Bucket& bucket : state_->buckets) chains.chains.push_back({bucket.last_chunk, bucket.bytes});
+  for (const Bucket& bucket : state_->buckets) {
+    const MutexLock lock(bucket.mutex);
+    chains.chains.push_back({bucket.last_chunk, bucket.bytes});
+  }
   return chains;
 }
 
@@ -244,7 +252,7 @@ void BucketFile::append(uint32_t number, std::span<const std::byte> records) {
   const size_t room = state_->chunk_bytes - sizeof(ChunkHeader);
   CURVISPLAT_CHECK_OP(records.size(), <=, room);
   Bucket& bucket = state_->buckets[number];
-  const std::lock_guard lock(bucket.mutex);
+  const MutexLock lock(bucket.mutex);
   if (bucket.buffer.size() + records.size() > state_->chunk_bytes) state_->flush(bucket);
   if (bucket.buffer.empty()) {
     bucket.buffer = state_->writer->buffer();
@@ -255,14 +263,18 @@ void BucketFile::append(uint32_t number, std::span<const std::byte> records) {
 }
 
 void BucketFile::close() {
-  for (Bucket& bucket : state_->buckets)
+  for (Bucket& bucket : state_->buckets) {
+    const MutexLock lock(bucket.mutex);
     if (!bucket.buffer.empty()) state_->flush(bucket);
+  }
   state_->writer->finish();
   state_->input.emplace(state_->path, Caching::kDirect);
 }
 
 uint64_t BucketFile::bytes(uint32_t bucket) const {
-  return state_->buckets[bucket].bytes;
+  const Bucket& of_number = state_->buckets[bucket];
+  const MutexLock lock(of_number.mutex);
+  return of_number.bytes;
 }
 
 uint64_t BucketFile::size() const {

@@ -4,11 +4,11 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <mutex>
 
 #include "preprocess/convert/splat_record.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/splats/cell_splats.h"
+#include "stream/base/mutex.h"
 
 namespace curvisplat {
 namespace {
@@ -93,7 +93,7 @@ class SplatStream {
         sink.add(splats.splats[n], valuesOf(splats, n));
     }
     if (!has_faces) return;
-    const std::lock_guard lock(adding_to_seams_);
+    const MutexLock lock(adding_to_seams_);
     for (size_t n = 0; n < splats.splats.size(); ++n)
       if (splats.splats[n].isForSeams()) seams_->add(splats.splats[n], valuesOf(splats, n));
   }
@@ -104,8 +104,8 @@ class SplatStream {
   const Centring centring_;
   const AbuttingFaces* faces_;
   const std::function<SplatSink&()>* sink_of_thread_;
-  std::mutex adding_to_seams_;  // guards *seams_
-  SeamMerger* seams_;
+  Mutex adding_to_seams_;
+  SeamMerger* seams_ PT_GUARDED_BY(adding_to_seams_);
   tbb::enumerable_thread_specific<Worker> workers_;
 };
 

@@ -6,13 +6,13 @@
 #include <pthread.h>
 
 #include <array>
-#include <condition_variable>
 #include <cstdint>
 #include <exception>
 #include <functional>
-#include <mutex>
 #include <thread>
 #include <utility>
+
+#include "stream/base/mutex.h"
 
 namespace curvisplat {
 
@@ -24,7 +24,7 @@ class ReadAhead {
 
   ~ReadAhead() {
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       stopped_ = true;
     }
     changed_.notify_all();
@@ -37,10 +37,10 @@ class ReadAhead {
   /// Waits for the next value, valid until the next call; null at the end. Throws what `fill` threw. For one
   /// thread.
   T* next() {
-    std::unique_lock lock(mutex_);
+    MutexLock lock(mutex_);
     given_back_ = taken_;
     changed_.notify_all();
-    changed_.wait(lock, [this] { return filled_ > taken_ || ended_; });
+    while (filled_ <= taken_ && !ended_) changed_.wait(lock);
     if (filled_ > taken_) return &values_[taken_++ % values_.size()];
     if (error_) std::rethrow_exception(error_);
     return nullptr;
@@ -49,20 +49,20 @@ class ReadAhead {
  private:
   void fillAll() {
     pthread_setname_np(pthread_self(), "read-ahead");
-    for (;;) {
+    for (uint64_t filled = 0;; ++filled) {
       {
-        std::unique_lock lock(mutex_);
-        changed_.wait(lock, [this] { return stopped_ || filled_ < given_back_ + values_.size(); });
+        MutexLock lock(mutex_);
+        while (!stopped_ && filled >= given_back_ + values_.size()) changed_.wait(lock);
         if (stopped_) return;
       }
       bool more = false;
       std::exception_ptr error;
       try {
-        more = fill_(values_[filled_ % values_.size()]);
+        more = fill_(values_[filled % values_.size()]);
       } catch (...) {
         error = std::current_exception();
       }
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (more) ++filled_;
       ended_ = !more;
       error_ = error;
@@ -73,11 +73,11 @@ class ReadAhead {
 
   std::function<bool(T&)> fill_;
   std::array<T, 2> values_;
-  std::mutex mutex_;  // guards all members below; only the reading thread writes filled_
-  std::condition_variable changed_;
-  uint64_t filled_ = 0, taken_ = 0, given_back_ = 0;
-  bool ended_ = false, stopped_ = false;
-  std::exception_ptr error_;
+  Mutex mutex_;
+  ConditionVariable changed_;
+  uint64_t filled_ GUARDED_BY(mutex_) = 0, taken_ GUARDED_BY(mutex_) = 0, given_back_ GUARDED_BY(mutex_) = 0;
+  bool ended_ GUARDED_BY(mutex_) = false, stopped_ GUARDED_BY(mutex_) = false;
+  std::exception_ptr error_ GUARDED_BY(mutex_);
   std::thread thread_;  // last, since it uses the other members
 };
 

@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "preprocess/splats/coincidence_sweep.h"
 #include "preprocess/splats/seam_sorter.h"
 #include "stream/base/check.h"
 

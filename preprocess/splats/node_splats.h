@@ -33,12 +33,13 @@
 #include "preprocess/grid/slabs.h"
 #include "preprocess/splats/stretch.h"
 #include "stream/model/border_code.h"
+#include "stream/model/kernel.h"
 #include "stream/model/splats.h"
 
 namespace curvisplat {
 
-/// Half the variance of the kernel along an axis: 0.44655², as in render/kernel.h, which is not for here.
-inline constexpr double kBend = 0.5 * 0.44655 * 0.44655;
+/// Half the variance of the kernel along an axis.
+inline constexpr double kBend = 0.5 * kKernelSigma * kKernelSigma;
 
 /// Where a cell ends, as stream/border_code.h codes it. `inwards`: along i, j, k, 1 or -1 from a border;
 /// `faces`: whether the borders are faces to be cut at; `rotate` gives Q's image of a vector.

@@ -4,6 +4,8 @@
 #include <array>
 #include <glm/geometric.hpp>
 
+#include "preprocess/splats/shape.h"
+
 namespace curvisplat {
 namespace {
 
@@ -11,18 +13,11 @@ constexpr double kSimilar = 0.5;    // cosine: of one direction
 constexpr double kOpposite = -0.5;  // of two that close one another
 constexpr double kMin = 0.1;        // what must be left of a direction at right angles to the others
 
-/// A⁻¹ v by forward substitution.
-glm::dvec3 inFrame(const Splat& s, const glm::dvec3& v) {
-  const auto& [l10, l20, l21] = s.shear;
-  const double u0 = v.x, u1 = v.y - l10 * u0, u2 = v.z - l20 * u0 - l21 * u1;
-  return {u0 / s.axis[0], u1 / s.axis[1], u2 / s.axis[2]};
-}
-
 }  // namespace
 
 bool isOpen(const Splat& face, uint32_t border_code, const Splat& behind) {
   const InwardAxes inward = inwardAxes(border_code);
-  const glm::dvec3 direction = glm::normalize(inFrame(face, behind.position - face.position));
+  const glm::dvec3 direction = glm::normalize(inFrameOf(face, behind.position - face.position));
   for (int a = 0; a < inward.count; ++a)
     if (inward.hasFace(a) && glm::dot(glm::dvec3(inward.axis[static_cast<size_t>(a)]), direction) > kSimilar)
       return true;
@@ -39,7 +34,7 @@ void OpenBorders::add(const Splat& part, uint32_t border_code) {
 
 uint32_t OpenBorders::of(const Splat& merged) const {
   std::vector<glm::dvec3> directions;
-  for (const Inward& inward : inward_) directions.push_back(glm::normalize(inFrame(merged, inward.along)));
+  for (const Inward& inward : inward_) directions.push_back(glm::normalize(inFrameOf(merged, inward.along)));
 
   struct Open {
     glm::dvec3 along;  // sum of similar directions

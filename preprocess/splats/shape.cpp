@@ -159,6 +159,19 @@ void setShape(Splat& splat, const Symmetric3& s, double smallest) {
   splat.shear = shape.shear;
 }
 
+glm::dvec3 inFrameOf(const Splat& splat, const glm::dvec3& v) {
+  const auto& [l10, l20, l21] = splat.shear;
+  const double u0 = v.x, u1 = v.y - l10 * u0, u2 = v.z - l20 * u0 - l21 * u1;
+  return {u0 / splat.axis[0], u1 / splat.axis[1], u2 / splat.axis[2]};
+}
+
+glm::dvec3 gradientOf(const Splat& splat, const glm::dvec3& w) {
+  const auto& [l10, l20, l21] = splat.shear;
+  const double g2 = w.z / splat.axis[2];
+  const double g1 = w.y / splat.axis[1] - l21 * g2;
+  return {w.x / splat.axis[0] - l10 * g1 - l20 * g2, g1, g2};
+}
+
 Symmetric3 shapeMatrix(const Splat& splat) {
   const auto [a00, a11, a22] = splat.axis;
   const double a10 = a00 * splat.shear[0], a20 = a00 * splat.shear[1], a21 = a11 * splat.shear[2];

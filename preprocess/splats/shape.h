@@ -38,6 +38,12 @@ CellShape shapeFromJacobian(const glm::dmat3& jacobian, double smallest);
 /// above.
 void setShape(Splat& splat, const Symmetric3& s, double smallest);
 
+/// A⁻¹ v: a vector in the frame of a splat, where its cell is the unit cube.
+glm::dvec3 inFrameOf(const Splat& splat, const glm::dvec3& v);
+/// A⁻ᵀ w. Of a slope: the gradient, the change per world unit. Of a unit vector of the frame: the normal of the cell's
+/// face at right angles to it, one over the cell's thickness long.
+glm::dvec3 gradientOf(const Splat& splat, const glm::dvec3& w);
+
 /// S = A Aᵀ of a splat.
 Symmetric3 shapeMatrix(const Splat& splat);
 

@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <glm/common.hpp>
-#include <mutex>
 
 #include "preprocess/grid/hexahedron.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/survey/grid_checksum.h"
+#include "stream/base/mutex.h"
 
 namespace curvisplat {
 namespace {
@@ -63,7 +63,7 @@ GridSurvey united(GridSurvey a, const GridSurvey& b) {
 
 GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces,
                        Progress& progress) {
-  std::mutex adding_faces;  // guards *faces
+  Mutex adding_faces;  // guards *faces
   GridSurvey nothing;
   nothing.ranges.resize(reader.scalars());
   GridSurvey survey = nothing;
@@ -102,7 +102,7 @@ GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFa
                      std::vector<AbuttingFaces::Centre> ends;
                      for (size_t row = range.begin(); row < range.end(); ++row) add_row(row, of_range, ends);
                      if (!ends.empty()) {
-                       const std::lock_guard lock(adding_faces);
+                       const MutexLock lock(adding_faces);
                        faces->add(ends);
                      }
                      return of_range;

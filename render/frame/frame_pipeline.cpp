@@ -71,12 +71,12 @@ FramePipeline::~FramePipeline() {
 
 FramePipeline::Running::Running(FramePipeline& pipeline) : pipeline_(pipeline) {
   pipeline.endPrefetch();
-  const std::lock_guard lock(pipeline.mutex_);
+  const MutexLock lock(pipeline.mutex_);
   pipeline.phase_ = Phase::kRunning;
 }
 
 FramePipeline::Running::~Running() {
-  const std::lock_guard lock(pipeline_.mutex_);
+  const MutexLock lock(pipeline_.mutex_);
   pipeline_.phase_ = Phase::kIdle;
 }
 
@@ -97,7 +97,7 @@ void FramePipeline::makePools(const FrameOptions& options) {
   dropPools();  // before the new ones take their memory
   auto fresh =
       std::make_unique<Pools>(cache_, variable_, budget, pager, backend_->splatMemory(budget.ring_splats));
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   pools_ = std::move(fresh);
 }
 
@@ -108,13 +108,13 @@ void FramePipeline::stepChanged() {
 // Memory is allocated and freed without holding the lock, so that cancel() need not wait for it.
 void FramePipeline::dropPools() {
   std::unique_ptr<Pools> old;  // freed after the lock is released
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   old.swap(pools_);
 }
 
 /// Starts the stages on the next slab. False if no slab is left.
 bool FramePipeline::beginSlab(const FramePlan& plan, const FrameOptions& options) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (phase_ == Phase::kCancelled) throw Cancelled();
   if (!pools_->sweep.beginSlab(plan.parts)) return false;
   pools_->ring.resume();
@@ -136,7 +136,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
                        plan.keys, hidden_,    options.keep_going};
   makePools(options);
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (phase_ == Phase::kCancelled) throw Cancelled();
     pools_->ring.reset();
     pools_->sweep.beginFrame();
@@ -159,7 +159,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
     throw;
   }
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (phase_ == Phase::kCancelled) throw Cancelled();
   }
   if (progress) progress->end();
@@ -213,7 +213,7 @@ Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, F
 }
 
 void FramePipeline::cancel() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (phase_ == Phase::kIdle) return;
   phase_ = Phase::kCancelled;
   if (pools_) pools_->workers.stop();

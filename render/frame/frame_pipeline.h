@@ -18,7 +18,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <mutex>
 
 #include "render/frame/backend.h"
 #include "render/frame/cancelled.h"
@@ -26,6 +25,7 @@
 #include "render/frame/frame_plan.h"
 #include "render/frame/frame_statistics.h"
 #include "render/frame/hidden_bricks.h"
+#include "stream/base/mutex.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 
@@ -89,8 +89,9 @@ class FramePipeline {
   uint64_t least_pager_bytes_ = 0;  // that the largest brick of any step so far needs
 
   enum class Phase { kIdle, kRunning, kCancelled };
-  std::mutex mutex_;  // guards the two members below, since cancel() comes from another thread
-  Phase phase_ = Phase::kIdle;
+  Mutex mutex_;  // cancel() comes from another thread
+  Phase phase_ GUARDED_BY(mutex_) = Phase::kIdle;
+  // Replaced with the mutex held; the thread that draws, which replaces them, reads them without it.
   std::unique_ptr<Pools> pools_;
 };
 

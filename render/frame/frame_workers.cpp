@@ -41,7 +41,10 @@ void FrameWorkers::beginFrame(const FrameWork& work) {
 
 void FrameWorkers::start() {
   next_ = 0;
-  first_failure_ = nullptr;
+  {
+    const MutexLock lock(failing_);
+    first_failure_ = nullptr;
+  }
   for (auto& worker : workers_) {
     worker->statistics = {};
     worker->scratch.times = {};
@@ -75,6 +78,7 @@ void FrameWorkers::finish(FrameStatistics& sum) {
       std::unique(sum.bricks_unreadable.begin(), sum.bricks_unreadable.end(),
                   [](const BrickFailure& a, const BrickFailure& b) { return a.brick == b.brick; });
   sum.bricks_unreadable.erase(again, sum.bricks_unreadable.end());
+  const MutexLock lock(failing_);
   if (first_failure_) std::rethrow_exception(first_failure_);
 }
 
@@ -117,7 +121,7 @@ void FrameWorkers::loop(Worker& worker) {
     ring_.pauseAfter(sweep_.batches());
   } catch (...) {
     {
-      const std::lock_guard lock(failing_);
+      const MutexLock lock(failing_);
       if (!first_failure_) first_failure_ = std::current_exception();
     }
     stop();

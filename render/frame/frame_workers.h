@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <exception>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <vector>
 
@@ -18,6 +17,7 @@
 #include "render/frame/sweep_buffer.h"
 #include "render/project/depth_keys.h"
 #include "render/project/projection.h"
+#include "stream/base/mutex.h"
 #include "stream/base/worker_team.h"
 #include "stream/paging/brick_source.h"
 
@@ -85,8 +85,8 @@ class FrameWorkers {
   std::vector<Seen> seen_;  // [part of the frame]; each is one worker's at a time
   std::atomic<uint64_t> parts_seen_ = 0;
   std::atomic<uint64_t> next_ = 0;  // sequence number of the slab's first part that no worker has taken
-  std::mutex failing_;              // guards first_failure_
-  std::exception_ptr first_failure_;
+  Mutex failing_;
+  std::exception_ptr first_failure_ GUARDED_BY(failing_);
   std::vector<std::unique_ptr<Worker>> workers_;  // [thread]
   WorkerTeam team_;
 };

@@ -9,50 +9,55 @@ namespace curvisplat {
 std::optional<std::span<ScreenSplat>> SegmentRing::acquire(uint64_t sequence, size_t count) {
   const size_t capacity = splats_.size();
   CURVISPLAT_CHECK_OP(count, <=, capacity);
-  std::unique_lock lock(mutex_);
-  uint64_t begin = 0;
-  granted_.wait(lock, [&] {
-    if (closed_) return true;
-    if (sequence != first_sequence_ + segments_.size()) return false;
-    const uint64_t next_lap = (end_ + capacity - 1) / capacity * capacity;
-    begin = segments_.empty() || end_ % capacity + count > capacity ? next_lap : end_;
-    return segments_.empty() || begin + count - segments_.front().begin <= capacity;
-  });
+  MutexLock lock(mutex_);
+  std::optional<uint64_t> begin;
+  while (!closed_ && !(begin = placeFor(sequence, count))) granted_.wait(lock);
   if (closed_) return {};
-  segments_.push_back({begin, count, false});
-  end_ = begin + count;
+  segments_.push_back({*begin, count, false});
+  end_ = *begin + count;
   peak_ = std::max(peak_, static_cast<size_t>(end_ - segments_.front().begin));
   granted_.notify_all();
-  return splats_.subspan(begin % capacity, count);
+  return splats_.subspan(*begin % capacity, count);
+}
+
+/// Where the segment would begin; nullopt if it is not its turn or there is no space.
+std::optional<uint64_t> SegmentRing::placeFor(uint64_t sequence, size_t count) const {
+  const size_t capacity = splats_.size();
+  if (sequence != first_sequence_ + segments_.size()) return {};
+  const uint64_t next_lap = (end_ + capacity - 1) / capacity * capacity;
+  if (segments_.empty()) return next_lap;
+  const uint64_t begin = end_ % capacity + count > capacity ? next_lap : end_;
+  if (begin + count - segments_.front().begin > capacity) return {};
+  return begin;
 }
 
 void SegmentRing::commit(uint64_t sequence) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const size_t n = sequence - first_sequence_;
   segments_[n].committed = true;
   if (n == handed_out_) committed_.notify_all();
 }
 
 void SegmentRing::pauseAfter(uint64_t segments) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   pause_ = segments;
   committed_.notify_all();
 }
 
 void SegmentRing::resume() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   pause_ = kNoPause;
 }
 
 std::optional<std::span<const ScreenSplat>> SegmentRing::next() {
-  std::unique_lock lock(mutex_);
-  committed_.wait(lock, [&] { return closed_ || isReady() || isPaused(); });
+  MutexLock lock(mutex_);
+  while (!closed_ && !isReady() && !isPaused()) committed_.wait(lock);
   if (closed_ || isPaused()) return {};
   return handOut();
 }
 
 std::optional<std::span<const ScreenSplat>> SegmentRing::nextIfReady() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (closed_ || !isReady()) return {};
   return handOut();
 }
@@ -67,7 +72,7 @@ std::span<const ScreenSplat> SegmentRing::handOut() {
 }
 
 void SegmentRing::release() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   CURVISPLAT_CHECK_OP(handed_out_, >, 0u);
   segments_.pop_front();
   ++first_sequence_;
@@ -76,7 +81,7 @@ void SegmentRing::release() {
 }
 
 void SegmentRing::reset() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   segments_.clear();
   handed_out_ = 0;
   end_ = first_sequence_ = 0;
@@ -86,17 +91,17 @@ void SegmentRing::reset() {
 }
 
 size_t SegmentRing::peakSplats() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return peak_;
 }
 
 bool SegmentRing::isClosed() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return closed_;
 }
 
 void SegmentRing::close() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   closed_ = true;
   granted_.notify_all();
   committed_.notify_all();

@@ -11,15 +11,14 @@
 // write. close() wakes all waiting threads; after it nothing is granted or handed out.
 #pragma once
 
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <mutex>
 #include <optional>
 #include <span>
 
 #include "render/project/screen_splat.h"
+#include "stream/base/mutex.h"
 
 namespace curvisplat {
 
@@ -67,24 +66,25 @@ class SegmentRing {
     bool committed;
   };
 
-  bool isReady() const;
-  bool isPaused() const { return first_sequence_ + handed_out_ == pause_; }
-  std::span<const ScreenSplat> handOut();
+  bool isReady() const REQUIRES(mutex_);
+  bool isPaused() const REQUIRES(mutex_) { return first_sequence_ + handed_out_ == pause_; }
+  std::span<const ScreenSplat> handOut() REQUIRES(mutex_);
+  std::optional<uint64_t> placeFor(uint64_t sequence, size_t count) const REQUIRES(mutex_);
 
   const std::span<ScreenSplat> splats_;
 
-  mutable std::mutex mutex_;           // guards all below, not the splats
-  std::condition_variable granted_;    // a segment was granted or released, or the ring closed
-  std::condition_variable committed_;  // the first segment may be ready, or the ring closed
+  mutable Mutex mutex_;          // guards no splats
+  ConditionVariable granted_;    // a segment was granted or released, or the ring closed
+  ConditionVariable committed_;  // the first segment may be ready, or the ring closed
   // Positions only grow; modulo the capacity they are places in the ring. A segment that does not fit before
   // the ring's end is placed at its start.
-  std::deque<Segment> segments_;  // granted and not released, in sequence
-  uint64_t end_ = 0;              // of the last segment granted
-  uint64_t first_sequence_ = 0;   // of segments_.front()
-  uint64_t pause_ = kNoPause;     // the sequence number that will not come for now
-  size_t handed_out_ = 0;         // how many of segments_, from the front, are handed out
-  bool closed_ = false;
-  size_t peak_ = 0;
+  std::deque<Segment> segments_ GUARDED_BY(mutex_);  // granted and not released, in sequence
+  uint64_t end_ GUARDED_BY(mutex_) = 0;              // of the last segment granted
+  uint64_t first_sequence_ GUARDED_BY(mutex_) = 0;   // of segments_.front()
+  uint64_t pause_ GUARDED_BY(mutex_) = kNoPause;     // the sequence number that will not come for now
+  size_t handed_out_ GUARDED_BY(mutex_) = 0;         // how many of segments_, from the front, are handed out
+  bool closed_ GUARDED_BY(mutex_) = false;
+  size_t peak_ GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace curvisplat

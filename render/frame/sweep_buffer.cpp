@@ -52,7 +52,7 @@ SweepBuffer::SweepBuffer(size_t splats, size_t batch_splats)
 }
 
 void SweepBuffer::beginFrame() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::fill(left_.begin(), left_.end(), uint16_t{0});
   free_.clear();
   for (size_t page = pages(); page-- > 0;) free_.push_back(static_cast<uint32_t>(page));
@@ -68,7 +68,7 @@ void SweepBuffer::beginFrame() {
 }
 
 bool SweepBuffer::beginSlab(std::span<const SweptPart> swept) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   CURVISPLAT_CHECK(closed_ || isQuiet());
   if (closed_ || end_ == kSweepEnd) return false;
   begin_ = end_;
@@ -87,22 +87,21 @@ bool SweepBuffer::beginSlab(std::span<const SweptPart> swept) {
 }
 
 bool SweepBuffer::isBehind(const SweptPart& part) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return part.begin() >= end_;
 }
 
 bool SweepBuffer::awaitTurn(uint64_t sequence) {
-  std::unique_lock lock(mutex_);
-  changed_.wait(lock, [&] { return closed_ || turn_ == sequence; });
+  MutexLock lock(mutex_);
+  while (!closed_ && turn_ != sequence) changed_.wait(lock);
   return !closed_;
 }
 
 void SweepBuffer::skip() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   endTurn();
 }
 
-/// The mutex must be held, as for all private functions below.
 void SweepBuffer::endTurn() {
   ++turn_;
   mark_ = turn_ < parts_.size() ? std::min(std::max(begin_, swept_[parts_[turn_]].begin()), end_) : end_;
@@ -111,7 +110,7 @@ void SweepBuffer::endTurn() {
 }
 
 std::shared_ptr<SweepBuffer::Run> SweepBuffer::enter(uint32_t rank, std::span<const DepthItem> sorted) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (closed_) return {};
   const size_t before = countBefore(begin_, rank, sorted);
   const size_t before_end = std::max(before, countBefore(end_, rank, sorted));
@@ -145,13 +144,13 @@ std::shared_ptr<SweepBuffer::Run> SweepBuffer::enter(uint32_t rank, std::span<co
 }
 
 bool SweepBuffer::awaitSpace(uint32_t rank, std::span<const DepthItem> sorted) {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   if (!closed_ && isQuiet()) {
     // Splats may have become final meanwhile: then a batch can leave, and no space need be made.
     if (splits_.empty() && countFinals() == 0) makeSpace(rank, sorted);
   } else {
     const size_t before = free_.size();
-    changed_.wait(lock, [&] { return closed_ || free_.size() > before || isQuiet(); });
+    while (!closed_ && free_.size() <= before && !isQuiet()) changed_.wait(lock);
   }
   return !closed_;
 }
@@ -162,19 +161,19 @@ void SweepBuffer::fill(Run& run, std::span<const DepthItem> sorted, std::span<co
     const size_t first = page * kPageSplats, last = std::min(first + kPageSplats, run.count);
     copySplats(entered.subspan(first, last - first), splats.data(), &splats_[run.slot(first)]);
   }
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   run.filled = true;
   --filling_;
   changed_.notify_all();
 }
 
 std::optional<SweepBuffer::Batch> SweepBuffer::next() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return cut(batch_splats_ / 2);
 }
 
 std::optional<SweepBuffer::Batch> SweepBuffer::awaitNext() {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   while (!closed_) {
     const bool all_in = turn_ == parts_.size();
     if (auto batch = cut(all_in ? 1 : batch_splats_ / 2)) return batch;
@@ -185,7 +184,7 @@ std::optional<SweepBuffer::Batch> SweepBuffer::awaitNext() {
 }
 
 std::optional<SweepBuffer::Batch> SweepBuffer::nextFinal() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (!isQuiet()) return {};
   worth_counting_ = true;
   return cut(1);
@@ -273,10 +272,6 @@ void SweepBuffer::splitFinals(size_t finals) {
 /// nothing in the buffer is final: all splats are in live runs, and no batch is being sorted.
 void SweepBuffer::makeSpace(uint32_t rank, std::span<const DepthItem> sorted) {
   if (end_ == kSweepEnd) end_ = pageStart(kFirstEighths, rank, sorted);
-  const auto needed = [&] {
-    const size_t before = countBefore(begin_, rank, sorted);
-    return pagesFor(std::max(before, countBefore(end_, rank, sorted)) - before);
-  };
   std::vector<std::pair<size_t, Run*>> behind;  // splats
   for (const auto& run : live_)
     if (const size_t count = run->count - firstNotBefore(*run, end_); count > 0)
@@ -285,15 +280,21 @@ void SweepBuffer::makeSpace(uint32_t rank, std::span<const DepthItem> sorted) {
     return a.first != b.first ? a.first > b.first : a.second->rank < b.second->rank;
   });
   for (const auto& [count, run] : behind) {
-    if (free_.size() >= needed() + pages() / kSpareShare) break;
+    if (free_.size() >= pagesNeeded(rank, sorted) + pages() / kSpareShare) break;
     forgetBehindEnd(*run);
   }
-  if (free_.size() < needed()) {
+  if (free_.size() < pagesNeeded(rank, sorted)) {
     end_ = pageStart(kNextEighths, rank, sorted);
     for (const auto& run : live_) forgetBehindEnd(*run);
   }
   mark_ = std::min(mark_, end_);
   std::erase_if(live_, [](const auto& run) { return run->first == run->count; });
+}
+
+/// The pages for those splats of a part that lie in the slab.
+size_t SweepBuffer::pagesNeeded(uint32_t rank, std::span<const DepthItem> sorted) const {
+  const size_t before = countBefore(begin_, rank, sorted);
+  return pagesFor(std::max(before, countBefore(end_, rank, sorted)) - before);
 }
 
 /// The position at which a slab's end leaves `eighths` eighths of the buffer's pages before it. Pages are
@@ -333,11 +334,12 @@ void SweepBuffer::release(const Run& run, size_t from, size_t to) {
 }
 
 bool SweepBuffer::awaitFilled(const Batch& batch) {
-  std::unique_lock lock(mutex_);
-  changed_.wait(lock, [&] {
-    return closed_ || std::all_of(batch.pieces.begin(), batch.pieces.end(),
-                                  [](const Piece& piece) { return piece.run->filled; });
-  });
+  MutexLock lock(mutex_);
+  const auto all_filled = [&] {
+    return std::all_of(batch.pieces.begin(), batch.pieces.end(),
+                       [](const Piece& piece) { return piece.run->filled; });
+  };
+  while (!closed_ && !all_filled()) changed_.wait(lock);
   return !closed_;
 }
 
@@ -358,24 +360,29 @@ void SweepBuffer::copy(std::span<const DepthItem> items, std::span<ScreenSplat> 
 }
 
 void SweepBuffer::giveBack(const Batch& batch) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   for (const Piece& piece : batch.pieces) release(*piece.run, piece.from, piece.to);
   --under_way_;
   changed_.notify_all();
 }
 
 uint64_t SweepBuffer::batches() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return batches_;
 }
 
+uint64_t SweepBuffer::slabs() const {
+  const MutexLock lock(mutex_);
+  return slabs_;
+}
+
 size_t SweepBuffer::peakSplats() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return peak_pages_ * kPageSplats;
 }
 
 void SweepBuffer::close() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   closed_ = true;
   changed_.notify_all();
 }

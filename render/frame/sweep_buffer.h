@@ -32,12 +32,10 @@
 #pragma once
 
 #include <compare>
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <vector>
@@ -45,6 +43,7 @@
 #include "render/project/depth_keys.h"
 #include "render/project/depth_sort.h"
 #include "render/project/screen_splat.h"
+#include "stream/base/mutex.h"
 
 namespace curvisplat {
 
@@ -136,52 +135,54 @@ class SweepBuffer {
   /// nullopt.
   uint64_t batches() const;
   /// Slabs that were begun in this frame.
-  uint64_t slabs() const { return slabs_; }
+  uint64_t slabs() const;
   size_t peakSplats() const;
 
   /// Wakes all waiting threads. Nothing is granted until the next frame.
   void close();
 
  private:
-  size_t pages() const { return left_.size(); }
-  size_t used() const { return pages() - free_.size(); }
-  SweepPosition position(const Run& run, size_t n) const;
-  size_t firstNotBefore(const Run& run, const SweepPosition& mark) const;
-  size_t countFinals();
-  std::optional<Batch> cut(size_t at_least);
-  void splitFinals(size_t finals);
-  void endTurn();
-  void makeSpace(uint32_t rank, std::span<const DepthItem> sorted);
-  SweepPosition pageStart(size_t eighths, uint32_t rank, std::span<const DepthItem> sorted) const;
-  void forgetBehindEnd(Run& run);
-  void release(const Run& run, size_t from, size_t to);
+  size_t pages() const REQUIRES(mutex_) { return left_.size(); }
+  size_t used() const REQUIRES(mutex_) { return pages() - free_.size(); }
+  SweepPosition position(const Run& run, size_t n) const REQUIRES(mutex_);
+  size_t firstNotBefore(const Run& run, const SweepPosition& mark) const REQUIRES(mutex_);
+  size_t countFinals() REQUIRES(mutex_);
+  std::optional<Batch> cut(size_t at_least) REQUIRES(mutex_);
+  void splitFinals(size_t finals) REQUIRES(mutex_);
+  void endTurn() REQUIRES(mutex_);
+  void makeSpace(uint32_t rank, std::span<const DepthItem> sorted) REQUIRES(mutex_);
+  size_t pagesNeeded(uint32_t rank, std::span<const DepthItem> sorted) const REQUIRES(mutex_);
+  SweepPosition pageStart(size_t eighths, uint32_t rank, std::span<const DepthItem> sorted) const
+      REQUIRES(mutex_);
+  void forgetBehindEnd(Run& run) REQUIRES(mutex_);
+  void release(const Run& run, size_t from, size_t to) REQUIRES(mutex_);
   /// Whether only the worker that has the turn can make space now.
-  bool isQuiet() const { return under_way_ == 0 && filling_ == 0; }
+  bool isQuiet() const REQUIRES(mutex_) { return under_way_ == 0 && filling_ == 0; }
 
   const size_t batch_splats_;
   std::unique_ptr<ScreenSplat[]> splats_;
   std::unique_ptr<uint32_t[]> keys_;
 
-  mutable std::mutex mutex_;         // guards all below, and keys_; splats are their run's until it is filled
-  std::condition_variable changed_;  // anything that someone waits for
-  std::vector<uint16_t> left_;       // [page] splats that are still to be read
-  std::vector<uint32_t> free_;       // pages
-  std::span<const SweptPart> swept_;
-  std::vector<uint32_t> parts_;
-  std::vector<uint8_t> entered_whole_;  // [swept] nothing of it is to be entered any more
-  uint64_t turn_ = 0;
-  SweepPosition begin_, end_;               // of the slab
-  SweepPosition mark_;                      // all before it is final
-  std::vector<std::shared_ptr<Run>> live_;  // with splats that are in no batch; by rank
-  std::deque<SweepPosition> splits_;        // between batches of what is known to be final
-  size_t entered_ = 0;                      // splats since finals were counted
-  bool worth_counting_ = false;
-  uint64_t batches_ = 0;    // handed out in this frame
-  uint64_t under_way_ = 0;  // and not given back
-  uint64_t filling_ = 0;    // runs
-  uint64_t slabs_ = 0;
-  size_t peak_pages_ = 0;
-  bool closed_ = false;
+  mutable Mutex mutex_;        // for writing keys_, too; splats are their run's until it is filled
+  ConditionVariable changed_;  // anything that someone waits for
+  std::vector<uint16_t> left_ GUARDED_BY(mutex_);  // [page] splats that are still to be read
+  std::vector<uint32_t> free_ GUARDED_BY(mutex_);  // pages
+  std::span<const SweptPart> swept_ GUARDED_BY(mutex_);
+  std::vector<uint32_t> parts_;                            // written only by beginFrame() and beginSlab()
+  std::vector<uint8_t> entered_whole_ GUARDED_BY(mutex_);  // [swept] nothing of it is to be entered any more
+  uint64_t turn_ GUARDED_BY(mutex_) = 0;
+  SweepPosition begin_ GUARDED_BY(mutex_), end_ GUARDED_BY(mutex_);  // of the slab
+  SweepPosition mark_ GUARDED_BY(mutex_);                            // all before it is final
+  std::vector<std::shared_ptr<Run>> live_ GUARDED_BY(mutex_);  // with splats that are in no batch; by rank
+  std::deque<SweepPosition> splits_ GUARDED_BY(mutex_);        // between batches of what is known to be final
+  size_t entered_ GUARDED_BY(mutex_) = 0;                      // splats since finals were counted
+  bool worth_counting_ GUARDED_BY(mutex_) = false;
+  uint64_t batches_ GUARDED_BY(mutex_) = 0;    // handed out in this frame
+  uint64_t under_way_ GUARDED_BY(mutex_) = 0;  // and not given back
+  uint64_t filling_ GUARDED_BY(mutex_) = 0;    // runs
+  uint64_t slabs_ GUARDED_BY(mutex_) = 0;
+  size_t peak_pages_ GUARDED_BY(mutex_) = 0;
+  bool closed_ GUARDED_BY(mutex_) = false;
 };
 
 /// Splats 0 to `count` - 1, by position, of which those before `first` are in batches.

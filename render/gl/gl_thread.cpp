@@ -14,8 +14,8 @@ GlThread::GlThread(GlLibrary library) : library_(library) {
   };
   job_ = &first;  // loop() makes the context before it runs a job
   thread_ = std::thread([this] { loop(); });
-  std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return !job_; });
+  MutexLock lock(mutex_);
+  while (job_) changed_.wait(lock);
   if (!error_) return;
   lock.unlock();
   thread_.join();
@@ -24,7 +24,7 @@ GlThread::GlThread(GlLibrary library) : library_(library) {
 
 GlThread::~GlThread() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
   changed_.notify_all();
@@ -32,19 +32,19 @@ GlThread::~GlThread() {
 }
 
 void GlThread::run(const Job& job) {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   job_ = &job;
   changed_.notify_all();
-  changed_.wait(lock, [this] { return !job_; });
+  while (job_) changed_.wait(lock);
   if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
 }
 
 void GlThread::loop() {
   nameThisThread("gl");
   std::unique_ptr<GlContext> context;
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   while (true) {
-    changed_.wait(lock, [this] { return job_ || stopping_; });
+    while (!job_ && !stopping_) changed_.wait(lock);
     if (!job_) return;
     const Job& job = *job_;
     lock.unlock();

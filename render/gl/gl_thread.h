@@ -2,16 +2,15 @@
 // for.
 #pragma once
 
-#include <condition_variable>
 #include <exception>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <thread>
 
 #include "render/gl/gl_context.h"
 #include "render/gl/offscreen_context.h"
+#include "stream/base/mutex.h"
 
 namespace curvisplat {
 
@@ -34,11 +33,11 @@ class GlThread {
  private:
   void loop();
 
-  std::mutex mutex_;  // guards the four below
-  std::condition_variable changed_;
-  const Job* job_ = nullptr;  // to be run; null when it has
-  std::exception_ptr error_;  // of the last job
-  bool stopping_ = false;
+  Mutex mutex_;
+  ConditionVariable changed_;
+  const Job* job_ GUARDED_BY(mutex_) = nullptr;  // to be run; null when it has
+  std::exception_ptr error_ GUARDED_BY(mutex_);  // of the last job
+  bool stopping_ GUARDED_BY(mutex_) = false;
 
   const GlLibrary library_;
   std::string context_name_;

@@ -4,12 +4,11 @@
 
 #include <vector>
 
+#include "stream/model/kernel.h"
+
 namespace curvisplat {
 
-inline constexpr double kKernelSupport = 1.556228;  // K and F are zero from here on
-inline constexpr double kKernelSigma = 0.44655;     // standard deviation along an axis
-
-/// K(r), r >= 0. Its integral over space is 1.
+/// K(r), r >= 0; zero from kKernelSupport on, as F is. Its integral over space is 1.
 double kernel(double r);
 
 /// F(rho) = ∫ K(√(rho² + t²)) dt, rho >= 0: the integral of a splat's kernel along a ray that passes its

@@ -49,7 +49,7 @@ void Progress::end() {
 }
 
 void Progress::show() {
-  const std::lock_guard lock(displaying_);
+  const MutexLock lock(displaying_);
   const State state{phase_, unit_, total_, done_.load(), skipped_.load(), secondsSince(start_)};
   display_(&state);
 }

@@ -5,12 +5,12 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
-#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "stream/base/error.h"
+#include "stream/base/mutex.h"
 #include "stream/base/process_usage.h"
 
 namespace curvisplat {
@@ -90,7 +90,7 @@ class Progress {
   std::atomic<int64_t> next_display_ms_ = 0;
   std::chrono::steady_clock::time_point start_;
   ProcessUsage usage_at_start_;
-  std::mutex displaying_;  // held while display_ is called
+  Mutex displaying_;  // held while display_ is called
   std::vector<Phase> phases_;
 };
 

@@ -23,7 +23,7 @@ WorkerTeam::~WorkerTeam() {
 
 void WorkerTeam::end() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     ending_ = true;
   }
   started_.notify_all();
@@ -32,7 +32,7 @@ void WorkerTeam::end() {
 
 void WorkerTeam::start(std::function<void(unsigned)> job) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     CURVISPLAT_CHECK_OP(working_, ==, 0u);
     job_ = std::move(job);
     working_ = size();
@@ -42,16 +42,16 @@ void WorkerTeam::start(std::function<void(unsigned)> job) {
 }
 
 void WorkerTeam::wait() {
-  std::unique_lock lock(mutex_);
-  done_.wait(lock, [this] { return working_ == 0; });
+  MutexLock lock(mutex_);
+  while (working_ > 0) done_.wait(lock);
 }
 
 void WorkerTeam::loop(unsigned number, const char* name) {
   nameThisThread(name);
   uint64_t done = 0;
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   while (true) {
-    started_.wait(lock, [&] { return ending_ || jobs_ != done; });
+    while (!ending_ && jobs_ == done) started_.wait(lock);
     if (jobs_ == done) return;
     done = jobs_;
     lock.unlock();

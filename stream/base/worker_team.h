@@ -2,12 +2,12 @@
 // stays warm from one job to the next.
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
-#include <mutex>
 #include <thread>
 #include <vector>
+
+#include "stream/base/mutex.h"
 
 namespace curvisplat {
 
@@ -31,12 +31,12 @@ class WorkerTeam {
   void loop(unsigned number, const char* name);
   void end();
 
-  std::mutex mutex_;  // guards the four below
-  std::function<void(unsigned)> job_;
-  uint64_t jobs_ = 0;     // started so far
-  unsigned working_ = 0;  // threads still running the job
-  bool ending_ = false;
-  std::condition_variable started_, done_;
+  Mutex mutex_;
+  std::function<void(unsigned)> job_;        // set only while no thread is working
+  uint64_t jobs_ GUARDED_BY(mutex_) = 0;     // started so far
+  unsigned working_ GUARDED_BY(mutex_) = 0;  // threads still running the job
+  bool ending_ GUARDED_BY(mutex_) = false;
+  ConditionVariable started_, done_;
   std::vector<std::thread> threads_;
 };
 

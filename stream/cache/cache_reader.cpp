@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <map>
-#include <mutex>
 #include <utility>
 
 #include "stream/base/check.h"
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/mutex.h"
 #include "stream/base/stage_timer.h"
 #include "stream/cache/cache_index.h"
 #include "stream/cache/geometry_folder.h"
@@ -117,7 +117,7 @@ struct CacheReader::State {
 
   /// The values of a variable at an earlier step, kept open from then on. Any thread.
   std::shared_ptr<const ValuesFile> earlierValues(uint64_t at_step, size_t variable) const {
-    const std::lock_guard lock(opening);
+    const MutexLock lock(opening);
     auto& known = earlier[{at_step, variable}];
     if (!known) known = folder->values(*series, at_step, variable);
     return known;
@@ -132,8 +132,9 @@ struct CacheReader::State {
   std::shared_ptr<const GeometryFolder> folder;
   Manifest manifest;                                      // of the step
   std::vector<std::shared_ptr<const ValuesFile>> values;  // [variable]
-  mutable std::mutex opening;                             // guards earlier
-  mutable std::map<std::pair<uint64_t, size_t>, std::shared_ptr<const ValuesFile>> earlier;
+  mutable Mutex opening;
+  mutable std::map<std::pair<uint64_t, size_t>, std::shared_ptr<const ValuesFile>> earlier
+      GUARDED_BY(opening);
 };
 
 /// Decodes a brick's values, with those of earlier steps that they are predicted from, each once.

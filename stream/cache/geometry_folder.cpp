@@ -69,7 +69,7 @@ std::shared_ptr<const GeometryFolder> GeometryFolder::open(const fs::path& cache
 
 std::shared_ptr<const ValuesFile> GeometryFolder::values(const Series& series, uint64_t step,
                                                          size_t variable) const {
-  const std::lock_guard lock(opening_);
+  const MutexLock lock(opening_);
   std::weak_ptr<const ValuesFile>& known = open_[{step, variable}];
   if (auto open = known.lock()) return open;
   const std::string name = stepValuesName(series, step, manifest_.variables[variable].number);

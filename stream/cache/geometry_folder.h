@@ -6,11 +6,11 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <utility>
 #include <vector>
 
 #include "stream/base/file.h"
+#include "stream/base/mutex.h"
 #include "stream/cache/manifest.h"
 #include "stream/cache/steps_file.h"
 #include "stream/model/brick.h"
@@ -47,8 +47,9 @@ class GeometryFolder {
   Manifest manifest_;
   std::vector<Brick> bricks_;
   InputFile geometry_;
-  mutable std::mutex opening_;                                                           // guards open_
-  mutable std::map<std::pair<uint64_t, size_t>, std::weak_ptr<const ValuesFile>> open_;  // [step, variable]
+  mutable Mutex opening_;
+  mutable std::map<std::pair<uint64_t, size_t>, std::weak_ptr<const ValuesFile>> open_
+      GUARDED_BY(opening_);  // [step, variable]
 };
 
 /// The manifest of the cache in the folder `cache`. Throws Error that says what the folder is instead.

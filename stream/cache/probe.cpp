@@ -2,10 +2,10 @@
 
 #include <cmath>
 
+#include "stream/model/kernel.h"
+
 namespace curvisplat {
 namespace {
-
-constexpr double kKernelRadius = 1.556228;
 
 bool reaches(const Brick& brick, const glm::dvec3& point) {
   for (int axis = 0; axis < 3; ++axis)
@@ -22,7 +22,7 @@ glm::dvec3 inFootprint(const SplatGeometry& g, size_t s, const glm::dvec3& d) {
 }
 
 struct Nearest {
-  double distance = kKernelRadius;
+  double distance = kKernelSupport;
   bool found = false;
   uint32_t brick = 0, splat = 0;
   glm::dvec3 centre{0.0}, offset{0.0};

@@ -7,17 +7,17 @@
 #include "stream/codec/geometry_steps.h"
 #include "stream/codec/planes.h"
 #include "stream/model/border_code.h"
+#include "stream/model/kernel.h"
 #include "stream/model/shape_extent.h"
 
 namespace curvisplat {
 namespace {
 
-constexpr double kKernelDeviation = 0.44655;
 constexpr double kPositionError = 0.05;  // as a fraction of the smallest standard deviation
 constexpr double kLargestShearCode = 1e9;
 
 int positionBits(const RootCube& root, const Cell& cell, double smallest_axis) {
-  const double interval = 2 * kPositionError * kKernelDeviation * smallest_axis / std::sqrt(3.0);
+  const double interval = 2 * kPositionError * kKernelSigma * smallest_axis / std::sqrt(3.0);
   const double bits = std::ceil(std::log2(root.cellSize(cell.level) / interval));
   const int lattice_bits = kPositionBits - static_cast<int>(cell.level);
   return static_cast<int>(

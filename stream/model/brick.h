@@ -27,9 +27,8 @@ struct Brick {
   std::array<uint32_t, 8>
       octant_splats{};  // sums to splats. Inner bricks store them by octant, leaves in grid order
   glm::dvec3 lower{0.0}, upper{0.0};  // box of the centres, world units, inside the cell
-  float largest_radius =
-      0;            // world units: no splat's support (kernel radius 1.5562) reaches further from its centre
-  float error = 0;  // world units: 0 for a leaf; the detail an inner brick has merged away
+  float largest_radius = 0;  // world units: no splat's support (kernel.h) reaches further from its centre
+  float error = 0;           // world units: 0 for a leaf; the detail an inner brick has merged away
   uint32_t parent = kNoBrick;
   uint32_t first_child =
       kNoBrick;              // children are consecutive, Morton order; a cell that could not be split has

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "stream/model/border_code.h"
+#include "stream/model/kernel.h"
 
 namespace curvisplat {
 namespace {
@@ -65,10 +66,9 @@ double smallestSingularValue(std::span<const Splat> splats) {
 }
 
 double largestReach(std::span<const Splat> splats, std::span<const uint32_t> border_codes) {
-  constexpr double kKernelRadius = 1.556228;
   double beyond = 0;
   for (const uint32_t border_code : border_codes) beyond = std::max(beyond, borderReach(border_code));
-  return (kKernelRadius + beyond) * largestSingularValue(splats);
+  return (kKernelSupport + beyond) * largestSingularValue(splats);
 }
 
 }  // namespace curvisplat

@@ -69,6 +69,23 @@ struct SplatGeometry {
   void resize(size_t count);
 };
 
+/// Calls visit() with each array of a SplatGeometry or a GeometryArrays; the border codes, which are of another type,
+/// come last.
+template <typename Geometry, typename Visit>
+void forEachArrayOfGeometry(Geometry&& g, Visit&& visit) {
+  for (auto* array :
+       {&g.x, &g.y, &g.z, &g.axis0, &g.axis1, &g.axis2, &g.shear10, &g.shear20, &g.shear21, &g.weight})
+    visit(*array);
+  visit(g.border_code);
+}
+/// The same for a SplatVariable or a VariableArrays.
+template <typename Variable, typename Visit>
+void forEachArrayOfVariable(Variable&& v, Visit&& visit) {
+  for (auto* array : {&v.mean, &v.slope0, &v.slope1, &v.slope2, &v.variance}) visit(*array);
+}
+/// How many arrays these two visit.
+inline constexpr size_t kArraysOfSplats = 16;
+
 /// The geometry's arrays, borrowed: where a decoder writes (T = float) or a projector reads (T = const
 /// float).
 template <typename T>

@@ -1,7 +1,6 @@
 #include "stream/paging/brick_source.h"
 
 #include <algorithm>
-#include <exception>
 #include <glm/common.hpp>
 #include <unordered_set>
 #include <utility>
@@ -14,10 +13,11 @@ namespace {
 
 /// Copies the splats of `kept` to the front of the arrays, in their order.
 void compact(std::span<const uint32_t> kept, SplatGeometry& g, SplatVariable& v) {
-  for (auto* array : {&g.x, &g.y, &g.z, &g.axis0, &g.axis1, &g.axis2, &g.shear10, &g.shear20, &g.shear21,
-                      &g.weight, &v.mean, &v.slope0, &v.slope1, &v.slope2, &v.variance})
-    for (size_t n = 0; n < kept.size(); ++n) (*array)[n] = (*array)[kept[n]];
-  for (size_t n = 0; n < kept.size(); ++n) g.border_code[n] = g.border_code[kept[n]];
+  const auto keep = [&](auto& array) {
+    for (size_t n = 0; n < kept.size(); ++n) array[n] = array[kept[n]];
+  };
+  forEachArrayOfGeometry(g, keep);
+  forEachArrayOfVariable(v, keep);
   g.resize(kept.size());
   v.resize(kept.size());
 }
@@ -38,30 +38,18 @@ BrickSource::BrickSource(const CacheReader& cache, size_t variable, const PagerO
 void BrickSource::start(std::span<const BrickPart> parts, BrickPager::Unneeded unneeded) {
   parts_.assign(parts.begin(), parts.end());
   const std::vector<uint32_t> bricks = bricksOf(parts);
-  cached_.beginTurn(bricks);
+  cached_.beginEpoch(bricks);
   pins_.clear();
   misses_.clear();
-  shared_.clear();
-  std::unordered_map<uint32_t, uint32_t> place;  // of a brick among those read
   std::vector<uint32_t> to_read;
   for (const uint32_t brick : bricks) {
-    const auto [found, first] = place.emplace(brick, static_cast<uint32_t>(to_read.size()));
     pins_.push_back(cached_.find(brick));
-    misses_.push_back(found->second);
-    if (pins_.back()) continue;
-    if (first)
-      to_read.push_back(brick);
-    else
-      ++shared_[brick].left;
-  }
-  for (auto& [brick, shared] : shared_) ++shared.left;  // the first
-  {
-    const std::lock_guard lock(sharing_);
-    stopped_ = false;
+    misses_.push_back(static_cast<uint32_t>(to_read.size()));
+    if (!pins_.back()) to_read.push_back(brick);
   }
   before_ = pager_.statistics();
   reads_ = to_read.size();
-  hits_ = place.size() - reads_;
+  hits_ = parts.size() - reads_;
   pager_.start(std::move(to_read), std::move(unneeded));
 }
 
@@ -72,55 +60,11 @@ std::optional<BrickSource::Splats> BrickSource::take(uint64_t sequence, Scratch&
     refresh(*pins_[sequence], part.brick, scratch);
     return splatsOf(*std::exchange(pins_[sequence], {}), part);
   }
-  const auto shared = shared_.find(part.brick);
-  return shared == shared_.end() ? read(part, misses_[sequence], scratch)
-                                 : takeShared(shared->second, part, misses_[sequence], scratch);
+  return read(part, misses_[sequence], scratch);
 }
 
 void BrickSource::pass(uint64_t sequence) {
-  if (std::exchange(pins_[sequence], {})) return;
-  if (const auto found = shared_.find(parts_[sequence].brick); found != shared_.end()) {
-    Shared& shared = found->second;
-    const std::lock_guard lock(sharing_);
-    if (--shared.left == 0) shared.pin.reset();
-    if (shared.state != Shared::State::kUntouched) return;
-    shared.state = Shared::State::kAlone;  // whoever wants it all the same
-  }
-  pager_.take(misses_[sequence]);
-}
-
-std::optional<BrickSource::Splats> BrickSource::takeShared(Shared& shared, const BrickPart& part,
-                                                           uint64_t miss, Scratch& scratch) {
-  using State = Shared::State;
-  std::unique_lock lock(sharing_);
-  const bool last = --shared.left == 0;
-  if (shared.state == State::kUntouched) {
-    shared.state = State::kComing;
-    lock.unlock();
-    std::optional<Splats> splats;
-    std::exception_ptr failure;
-    try {
-      splats = read(part, miss, scratch);
-    } catch (...) {
-      failure = std::current_exception();
-    }
-    lock.lock();
-    if (splats && splats->pin) shared.pin = cached_.find(part.brick);
-    shared.state = shared.pin ? State::kKept : State::kAlone;
-    shared_changed_.notify_all();
-    if (failure) std::rethrow_exception(failure);
-    return splats;
-  }
-  {
-    const StageTimer timer(scratch.waited_s);
-    shared_changed_.wait(lock, [&] { return stopped_ || shared.state != State::kComing; });
-  }
-  if (stopped_) return {};
-  if (shared.state == State::kAlone) {
-    lock.unlock();
-    return readAlone(part, scratch);
-  }
-  return splatsOf(last ? *std::exchange(shared.pin, {}) : *cached_.find(part.brick), part);
+  if (!std::exchange(pins_[sequence], {})) pager_.take(misses_[sequence]);
 }
 
 std::optional<BrickSource::Splats> BrickSource::read(const BrickPart& part, uint64_t miss, Scratch& scratch) {
@@ -138,9 +82,9 @@ std::optional<BrickSource::Splats> BrickSource::read(const BrickPart& part, uint
     return readAlone(part, scratch);
   }
   const uint32_t splats = cache_.bricks()[part.brick].splats;
-  if (auto room = cached_.makeRoom(part.brick, splats)) {
-    decode(part.brick, *bytes, room->geometry(), room->values(), scratch);
-    return splatsOf(std::move(*room).keep(), part);
+  if (auto slot = cached_.makeSlot(part.brick, splats)) {
+    decode(part.brick, *bytes, slot->geometry(), slot->values(), scratch);
+    return splatsOf(std::move(*slot).keep(), part);
   }
   scratch.geometry.resize(splats);
   scratch.values.resize(splats);
@@ -165,7 +109,6 @@ void BrickSource::refresh(const BrickCache::Pin& pin, uint32_t brick, Scratch& s
 void BrickSource::stepChanged() {
   pager_.stop();
   pins_.clear();
-  shared_.clear();
   pager_.stepChanged();
   cached_.stepChanged();
 }
@@ -262,10 +205,9 @@ void BrickSource::keepPart(const BrickPart& part, uint32_t ancestor, Scratch& sc
 
 void BrickSource::startPrefetch(std::span<const BrickPart> parts) {
   const std::vector<uint32_t> bricks = bricksOf(parts);
-  cached_.beginTurn(bricks);
+  cached_.beginEpoch(bricks);
   parts_.clear();
   pins_.clear();
-  shared_.clear();
   to_prefetch_.clear();
   to_refresh_.clear();
   uint64_t bytes = 0;
@@ -298,26 +240,22 @@ bool BrickSource::prefetchNext(Scratch& scratch) {
   if (!bytes) return false;
   const uint32_t brick = to_prefetch_[sequence];
   if (!bytes->readable()) return true;  // the frame will tell
-  auto room = cached_.makeRoom(brick, cache_.bricks()[brick].splats);
-  if (!room) return false;
-  decode(brick, *bytes, room->geometry(), room->values(), scratch);
-  std::move(*room).keep();
+  auto slot = cached_.makeSlot(brick, cache_.bricks()[brick].splats);
+  if (!slot) return false;
+  decode(brick, *bytes, slot->geometry(), slot->values(), scratch);
+  std::move(*slot).keep();
   return true;
 }
 
 void BrickSource::stop() {
   prefetch_stopped_ = true;
   pager_.stop();
-  const std::lock_guard lock(sharing_);
-  stopped_ = true;
-  shared_changed_.notify_all();
 }
 
 void BrickSource::finish(FetchStatistics& statistics) {
   const PagerStatistics after = pager_.statistics();
   pager_.stop();
   pins_.clear();
-  shared_.clear();
   statistics.read_by = pager_.way();
   const double depth_s = statistics.mean_queue_depth * statistics.read_s + after.depth_s - before_.depth_s;
   statistics.read_s += after.reading_s - before_.reading_s;

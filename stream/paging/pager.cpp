@@ -72,7 +72,7 @@ BrickPager::BrickPager(const CacheReader& cache, size_t variable, const PagerOpt
 BrickPager::~BrickPager() {
   stop();
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     ending_ = true;
   }
   reads_->wake();
@@ -87,9 +87,9 @@ uint64_t BrickPager::leastBufferBytes(const CacheReader& cache, size_t variable)
 }
 
 void BrickPager::start(std::vector<uint32_t> bricks, Unneeded unneeded) {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   stopped_ = true;
-  idle_.wait(lock, [this] { return failure_ || reads_under_way_ == 0; });
+  while (!failure_ && reads_under_way_ > 0) idle_.wait(lock);
   if (failure_) std::rethrow_exception(failure_);
   CURVISPLAT_CHECK_OP(lent_, ==, 0u);
   first_batch_ += batches_.size();
@@ -108,24 +108,24 @@ void BrickPager::start(std::vector<uint32_t> bricks, Unneeded unneeded) {
 }
 
 void BrickPager::stepChanged() {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   stopped_ = true;
-  idle_.wait(lock, [this] { return failure_ || reads_under_way_ == 0; });
+  while (!failure_ && reads_under_way_ > 0) idle_.wait(lock);
   if (failure_) std::rethrow_exception(failure_);
   CURVISPLAT_CHECK_OP(lent_, ==, 0u);
   files_[1] = std::make_unique<DirectFile>(cache_.valuesPath(variable_), direct_);
 }
 
 void BrickPager::stop() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   stopped_ = true;
   arrived_.notify_all();
 }
 
 std::optional<PagedBrick> BrickPager::take(uint64_t sequence) {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   CURVISPLAT_CHECK(stopped_ || sequence < extents_.size());
-  arrived_.wait(lock, [&] { return failure_ || stopped_ || hasArrived(sequence); });
+  while (!failure_ && !stopped_ && !hasArrived(sequence)) arrived_.wait(lock);
   if (failure_) std::rethrow_exception(failure_);
   if (stopped_) return {};
   if (left_out_[sequence]) return PagedBrick::leftOut();
@@ -143,12 +143,12 @@ std::optional<PagedBrick> BrickPager::take(uint64_t sequence) {
 }
 
 PagerStatistics BrickPager::statistics() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return statistics_;
 }
 
 std::string BrickPager::way() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const bool direct = !direct_refused_ && files_[0]->isDirect() && files_[1]->isDirect();
   return std::string(reads_->name()) + (direct ? ", direct" : ", through the page cache");
 }
@@ -156,7 +156,7 @@ std::string BrickPager::way() const {
 void BrickPager::loop() {
   nameThisThread("pager");
   try {
-    std::unique_lock lock(mutex_);
+    MutexLock lock(mutex_);
     while (!ending_) {
       if (!stopped_) {
         planAhead();
@@ -168,7 +168,7 @@ void BrickPager::loop() {
       if (end) complete(*end);
     }
   } catch (...) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     failure_ = std::current_exception();
     arrived_.notify_all();
     idle_.notify_all();
@@ -305,7 +305,7 @@ bool BrickPager::hasArrived(uint64_t sequence) {
 }
 
 void BrickPager::giveBack(uint64_t sequence) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   --lent_;
   --batchOf(sequence).kept;
   while (!batches_.empty() && batches_.front().kept == 0) {

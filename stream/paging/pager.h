@@ -15,14 +15,12 @@
 
 #include <array>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <cstdlib>
 #include <deque>
 #include <exception>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -30,6 +28,7 @@
 #include <vector>
 
 #include "stream/base/direct_file.h"
+#include "stream/base/mutex.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/paging/async_reads.h"
 #include "stream/paging/read_batch.h"
@@ -146,17 +145,17 @@ class BrickPager {
   };
 
   void loop();
-  void planAhead();
-  std::span<const BrickExtents> nextNeeded();
-  std::optional<uint64_t> spaceFor(uint64_t bytes) const;
-  void submitReads();
-  void submit(uint64_t batch, uint32_t read, bool direct);
-  void complete(const AsyncReadEnd& end);
-  void finishRead(Batch& batch, uint32_t read, bool good);
-  bool hasArrived(uint64_t sequence);
+  void planAhead() REQUIRES(mutex_);
+  std::span<const BrickExtents> nextNeeded() REQUIRES(mutex_);
+  std::optional<uint64_t> spaceFor(uint64_t bytes) const REQUIRES(mutex_);
+  void submitReads() REQUIRES(mutex_);
+  void submit(uint64_t batch, uint32_t read, bool direct) REQUIRES(mutex_);
+  void complete(const AsyncReadEnd& end) REQUIRES(mutex_);
+  void finishRead(Batch& batch, uint32_t read, bool good) REQUIRES(mutex_);
+  bool hasArrived(uint64_t sequence) REQUIRES(mutex_);
   void giveBack(uint64_t sequence);
-  Batch& batchOf(uint64_t sequence);
-  void countReads(int change);
+  Batch& batchOf(uint64_t sequence) REQUIRES(mutex_);
+  void countReads(int change) REQUIRES(mutex_);
 
   const CacheReader& cache_;
   const size_t variable_;
@@ -170,32 +169,32 @@ class BrickPager {
   std::unique_ptr<std::byte, Free> buffer_;
   std::unique_ptr<AsyncReads> reads_;
 
-  mutable std::mutex mutex_;           // guards all below, and not the buffer's bytes
-  std::condition_variable arrived_;    // a brick is complete, or all has stopped
-  std::condition_variable idle_;       // no read is under way
-  std::vector<uint32_t> bricks_;       // [sequence]
-  std::vector<BrickExtents> extents_;  // [sequence]
-  Unneeded unneeded_;
-  std::vector<uint8_t> left_out_;     // [sequence]
-  uint64_t planned_ = 0;              // bricks in batches so far, or left out
-  std::optional<ReadBatch> waiting_;  // the next batch, which has no space yet
+  mutable Mutex mutex_;                                   // guards no bytes of the buffer
+  ConditionVariable arrived_;                             // a brick is complete, or all has stopped
+  ConditionVariable idle_;                                // no read is under way
+  std::vector<uint32_t> bricks_ GUARDED_BY(mutex_);       // [sequence]
+  std::vector<BrickExtents> extents_ GUARDED_BY(mutex_);  // [sequence]
+  Unneeded unneeded_ GUARDED_BY(mutex_);
+  std::vector<uint8_t> left_out_ GUARDED_BY(mutex_);     // [sequence]
+  uint64_t planned_ GUARDED_BY(mutex_) = 0;              // bricks in batches so far, or left out
+  std::optional<ReadBatch> waiting_ GUARDED_BY(mutex_);  // the next batch, which has no space yet
   // Batches that hold space, in order. Positions count on for ever, as in a SegmentRing; modulo the capacity
   // they are places in the buffer.
-  std::deque<Batch> batches_;
-  uint64_t first_batch_ = 0;  // number of batches_.front()
-  uint64_t next_batch_ = 0;   // number of the first with reads to submit
-  uint64_t end_ = 0;
-  std::vector<UnderWay> under_way_;  // [tag]
-  std::vector<uint64_t> free_tags_;
-  unsigned reads_under_way_ = 0;
-  uint64_t lent_ = 0;            // bricks handed out and not given back
-  bool direct_refused_ = false;  // by a read: the file system is not what it said
-  bool stopped_ = true;          // nothing is submitted or handed out
-  bool wants_space_ = false;
-  bool ending_ = false;
-  std::exception_ptr failure_;
-  PagerStatistics statistics_;
-  std::chrono::steady_clock::time_point counted_;
+  std::deque<Batch> batches_ GUARDED_BY(mutex_);
+  uint64_t first_batch_ GUARDED_BY(mutex_) = 0;  // number of batches_.front()
+  uint64_t next_batch_ GUARDED_BY(mutex_) = 0;   // number of the first with reads to submit
+  uint64_t end_ GUARDED_BY(mutex_) = 0;
+  std::vector<UnderWay> under_way_ GUARDED_BY(mutex_);  // [tag]
+  std::vector<uint64_t> free_tags_ GUARDED_BY(mutex_);
+  unsigned reads_under_way_ GUARDED_BY(mutex_) = 0;
+  uint64_t lent_ GUARDED_BY(mutex_) = 0;            // bricks handed out and not given back
+  bool direct_refused_ GUARDED_BY(mutex_) = false;  // by a read: the file system is not what it said
+  bool stopped_ GUARDED_BY(mutex_) = true;          // nothing is submitted or handed out
+  bool wants_space_ GUARDED_BY(mutex_) = false;
+  bool ending_ GUARDED_BY(mutex_) = false;
+  std::exception_ptr failure_ GUARDED_BY(mutex_);
+  PagerStatistics statistics_ GUARDED_BY(mutex_);
+  std::chrono::steady_clock::time_point counted_ GUARDED_BY(mutex_);
 
   std::thread thread_;
 };

@@ -1,14 +1,13 @@
 #include <fmt/format.h>
 
 #include <cerrno>
-#include <condition_variable>
 #include <deque>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "stream/base/file.h"
+#include "stream/base/mutex.h"
 #include "stream/base/thread_name.h"
 #include "stream/paging/async_reads.h"
 
@@ -32,15 +31,15 @@ class ThreadReads : public AsyncReads {
 
   void submit(const AsyncRead& read) override {
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       waiting_.push_back(read);
     }
     submitted_.notify_one();
   }
 
   std::optional<AsyncReadEnd> wait() override {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return woken_ || !ended_.empty(); });
+    MutexLock lock(mutex_);
+    while (!woken_ && ended_.empty()) changed_.wait(lock);
     if (ended_.empty()) {
       woken_ = false;
       return {};
@@ -52,7 +51,7 @@ class ThreadReads : public AsyncReads {
 
   void wake() override {
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       woken_ = true;
     }
     changed_.notify_one();
@@ -61,9 +60,9 @@ class ThreadReads : public AsyncReads {
  private:
   void loop() {
     nameThisThread("read");
-    std::unique_lock lock(mutex_);
+    MutexLock lock(mutex_);
     while (true) {
-      submitted_.wait(lock, [this] { return stopping_ || !waiting_.empty(); });
+      while (!stopping_ && waiting_.empty()) submitted_.wait(lock);
       if (waiting_.empty()) return;
       const AsyncRead read = waiting_.front();
       waiting_.pop_front();
@@ -79,7 +78,7 @@ class ThreadReads : public AsyncReads {
 
   void stop() {
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       stopping_ = true;
     }
     submitted_.notify_all();
@@ -87,12 +86,12 @@ class ThreadReads : public AsyncReads {
   }
 
   const std::string name_;
-  std::mutex mutex_;  // guards the four below
-  std::deque<AsyncRead> waiting_;
-  std::deque<AsyncReadEnd> ended_;
-  bool woken_ = false, stopping_ = false;
-  std::condition_variable submitted_;  // a read waits for a thread, or all are to stop
-  std::condition_variable changed_;    // a read has ended, or the owner is to wake
+  Mutex mutex_;
+  std::deque<AsyncRead> waiting_ GUARDED_BY(mutex_);
+  std::deque<AsyncReadEnd> ended_ GUARDED_BY(mutex_);
+  bool woken_ GUARDED_BY(mutex_) = false, stopping_ GUARDED_BY(mutex_) = false;
+  ConditionVariable submitted_;  // a read waits for a thread, or all are to stop
+  ConditionVariable changed_;    // a read has ended, or the owner is to wake
   std::vector<std::thread> threads_;
 };
 

@@ -210,6 +210,22 @@ TEST_F(Corrections, Seams) {
               SceneField(*constant), "smooth", camera, 60, {}, without);
 }
 
+TEST_F(Corrections, SeamsOfUnlikeBlocks) {
+  // Blocks of cells 1 and 3 wide, seen along their joint.
+  const FunctionGridSource source({gridBlock(25, 9, 9), gridBlock(9, 9, 9)}, 1, [](const GridNode& node) {
+    const double x = node.block == 0 ? static_cast<double>(node.i) - 24 : 3 * static_cast<double>(node.i);
+    return NodeValues{{x / 16, static_cast<double>(node.j) / 8, static_cast<double>(node.k) / 8}, {0.5f}};
+  });
+  DirectOptions without;
+  without.unlike = UnlikeHalves::kMerged;
+  Camera camera = edgeOnCamera();
+  camera.focal_point = {0, 0.5, 0.5};
+  camera.position = {0, 0.5, 10};
+  camera.view_up = {0, 1, 0};
+  camera.parallel_scale = 0.3;  // no borders
+  expectWorth("seams of unlike blocks", source, GridField(source, 0), "smooth", camera, 56, {}, without);
+}
+
 TEST_F(Corrections, SpreadOfMergedShapes) {
   // Along the voxels of a uniform medium: where they do not add up to one, a lattice shows.
   const auto constant = scene("half-annulus-constant");

@@ -184,7 +184,8 @@ TEST_F(FidelityProperties, PerspectiveIsAsGoodAsOrthographic) {
   convertGrid(halfAnnulus({128, 64, 64}), folder_ / "grid.splats");
   for (const auto& [function, angle] : std::vector<std::pair<std::string, double>>{
            {"smooth", 30}, {"band", 30}, {"step", 30}, {"band", 90}}) {
-    const auto draw = [&](const Camera& camera, ImageSize size, std::vector<double>& errors) {
+    const auto draw = [&, &function = function](const Camera& camera, ImageSize size,
+                                                std::vector<double>& errors) {
       appendErrors(
           drawCache(folder_ / "grid.splats", KnownFunction::of(function).table, camera, knownFrame(size)),
           marched(*scene, function, camera, size), errors);

@@ -225,7 +225,9 @@ TEST_F(RenderOptions, LightChangesColoursAndNotWhatIsCovered) {
       of = std::max(of, static_cast<double>(std::abs(shaded.rgba[n] - unlit.rgba[n])));
     }
     EXPECT_GT(changed, 0.02) << words.front();
-    if (words.size() < 3) EXPECT_LT(alpha, 0.002) << words.front();
+    if (words.size() < 3) {
+      EXPECT_LT(alpha, 0.002) << words.front();
+    }
   }
 }
 

@@ -30,5 +30,11 @@ done
 for depended in $(dpkg-deb --field "$development" Depends | tr -d ','); do
   expect "$depended is a package" dpkg-query --status "$depended" > /dev/null
 done
+for python in "$folder"/python3-curvisplat_*.deb; do
+  [[ -e $python ]] || continue  # built without it
+  dpkg --extract "$python" "$folder/root"
+  expect "the unpacked Python package is that version" test "$(PYTHONPATH=$folder/root/usr/lib/python3/dist-packages \
+    /usr/bin/python3 -c 'import curvisplat; print(curvisplat.__version__)')" = "$version"
+done
 echo "$(basename "$program"): $(($(stat -c %s "$program") / 1024)) KiB;" \
   "$(basename "$development"): $(($(stat -c %s "$development") / 1024)) KiB"

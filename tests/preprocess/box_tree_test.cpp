@@ -35,7 +35,9 @@ TEST(BoxTree, FindsWhatASearchOfAllBoxesFinds) {
       EXPECT_EQ(tree.anotherHolds(point, except), expected) << count << " boxes";
       held += expected;
     }
-    if (count == 1000) EXPECT_GT(held, 100u);
+    if (count == 1000) {
+      EXPECT_GT(held, 100u);
+    }
   }
 }
 

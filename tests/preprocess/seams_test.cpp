@@ -41,8 +41,8 @@ class TemporaryFolder {
 class Seams : public testing::Test {
  protected:
   std::vector<Piece> merge(const std::vector<Piece>& faces, uint64_t memory_bytes = 64 << 20,
-                           int coordinate_bytes = 8) {
-    SeamMerger seams(1, memory_bytes, folder_.path());
+                           int coordinate_bytes = 8, UnlikeHalves unlike = UnlikeHalves::kApart) {
+    SeamMerger seams(1, memory_bytes, folder_.path(), unlike);
     for (const Piece& face : faces) seams.add(face.node, {&face.value, 1});
     std::vector<Piece> out;
     merged_ = seams.finish(coordinate_bytes, [&](const NodeSplat& node, std::span<const SplatScalar> values) {
@@ -175,6 +175,70 @@ std::vector<Piece> facesOf(const MappedBlock& block) {
   for (size_t n = 0; n < splats.splats.size(); ++n)
     if (splats.splats[n].on_block_face) faces.push_back({splats.splats[n], splats.values[n]});
   return faces;
+}
+
+/// Nodes of a block whose cells are `size` wide along each axis, from `first` on.
+MappedBlock boxBlock(const glm::dvec3& first, const glm::dvec3& size, uint64_t first_node) {
+  MappedBlock block(4, 4, 4,
+                    [&](double i, double j, double k) { return first + size * glm::dvec3(i, j, k); });
+  block.addScalar(field);
+  block.first_node = first_node;
+  return block;
+}
+
+/// The pieces at a point, of blocks merged along their faces.
+std::vector<Piece> piecesAt(const std::vector<Piece>& pieces, const glm::dvec3& point) {
+  std::vector<Piece> there;
+  for (const Piece& piece : pieces)
+    if (glm::distance(piece.node.node_position, point) < 1e-9) there.push_back(piece);
+  return there;
+}
+
+TEST_F(Seams, HalvesOfUnlikeThicknessStayApartAndEndAtTheFace) {
+  for (const double ratio : {1.2, 1.4, 3.0}) {
+    std::vector<Piece> faces = facesOf(boxBlock({0, 0, 0}, {1, 1, 1}, 0));
+    const std::vector<Piece> others = facesOf(boxBlock({3, 0, 0}, {ratio, 1, 1}, 64));
+    faces.insert(faces.end(), others.begin(), others.end());
+    const glm::dvec3 on_joint(3, 1, 1);
+
+    const std::vector<Piece> merged = merge(faces, 64 << 20, 8, UnlikeHalves::kMerged);
+    EXPECT_EQ(piecesAt(merged, on_joint).size(), 1u);
+    const std::vector<Piece> there = piecesAt(merge(faces), on_joint);
+    if (ratio < kMaxJointRatio) {
+      EXPECT_EQ(there.size(), 1u);
+      continue;
+    }
+    EXPECT_EQ(merged_, 0u);
+    ASSERT_EQ(there.size(), 2u);
+    for (const Piece& piece : there) {
+      const InwardAxes open = inwardAxes(piece.node.border_code);
+      ASSERT_EQ(open.count, 1);
+      EXPECT_TRUE(open.hasFace(0));
+      EXPECT_NEAR(open.axis[0].x, piece.node.node < 64 ? -1 : 1, 0.01);
+      EXPECT_NEAR(piece.node.splat.weight, piece.node.node < 64 ? 0.5 : 0.5 * ratio, 1e-12);
+    }
+  }
+}
+
+TEST_F(Seams, OfFourBlocksUnlikeAlongOneAxisMergeAlongTheOther) {
+  std::vector<Piece> faces;
+  for (int n = 0; n < 4; ++n) {
+    const bool right = n % 2 != 0, upper = n / 2 != 0;
+    const glm::dvec3 first(right ? 3 : 0, upper ? 3 : 0, 0), size(right ? 2 : 1, 1, 1);
+    for (const Piece& face : facesOf(boxBlock(first, size, 64 * static_cast<uint64_t>(n))))
+      faces.push_back(face);
+  }
+  std::shuffle(faces.begin(), faces.end(), std::mt19937(3));
+  const std::vector<Piece> there = piecesAt(merge(faces), {3, 3, 1});
+  ASSERT_EQ(there.size(), 2u);
+  for (const Piece& piece : there) {
+    const bool left = piece.node.node < 64;
+    EXPECT_NEAR(piece.node.splat.weight, left ? 0.5 : 1, 1e-12);
+    const InwardAxes open = inwardAxes(piece.node.border_code);
+    ASSERT_EQ(open.count, 1);
+    EXPECT_NEAR(open.axis[0].x, left ? -1 : 1, 0.01);
+    EXPECT_TRUE(open.hasFace(0));
+  }
 }
 
 /// A pipe whose wall layer begins at radius 1 with `spacing`, closed along i after 128 steps. In float

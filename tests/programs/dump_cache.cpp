@@ -43,13 +43,10 @@ void dump(const fs::path& cache, uint64_t step) {
     reader.readGeometry(n, g, &runs);
     write<uint64_t>({g.size(), runs.size()});
     for (const NodeRun& run : runs) write<uint64_t>({run.block, run.k, run.j, run.i, run.count});
-    for (const auto* array :
-         {&g.x, &g.y, &g.z, &g.axis0, &g.axis1, &g.axis2, &g.shear10, &g.shear20, &g.shear21, &g.weight})
-      write(*array);
-    write(g.border_code);
+    forEachArrayOfGeometry(g, [](const auto& array) { write(array); });
     for (size_t variable = 0; variable < reader.manifest().variables.size(); ++variable) {
       reader.readVariable(n, variable, v);
-      for (const auto* array : {&v.mean, &v.slope0, &v.slope1, &v.slope2, &v.variance}) write(*array);
+      forEachArrayOfVariable(v, [](const auto& array) { write(array); });
     }
   }
 }

@@ -30,7 +30,7 @@ std::vector<DirectSplat> splatsOf(const GridSource& source, uint32_t scalar, con
   const auto take = [&](const NodeSplat& node, std::span<const SplatScalar> values) {
     out.push_back({node.splat, values[0], options.border_parts ? node.border_code : kNoBorder});
   };
-  SeamMerger seams(1, uint64_t{64} << 20, std::filesystem::temp_directory_path());
+  SeamMerger seams(1, uint64_t{64} << 20, std::filesystem::temp_directory_path(), options.unlike);
   uint64_t first_node = 0;
   const auto& blocks = source.description().blocks;
   for (uint32_t b = 0; b < blocks.size(); ++b) {

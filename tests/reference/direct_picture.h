@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "preprocess/grid/grid_source.h"
+#include "preprocess/splats/joint_nodes.h"
 #include "preprocess/splats/node_splats.h"
 #include "render/camera/camera.h"
 #include "render/colour/transfer_function.h"
@@ -19,7 +20,8 @@ namespace curvisplat {
 
 struct DirectOptions {
   NodeSplatCorrections nodes;
-  bool merge_seams = true;   // else coincident nodes of block faces stay apart
+  bool merge_seams = true;  // else coincident nodes of block faces stay apart
+  UnlikeHalves unlike = UnlikeHalves::kApart;
   bool border_parts = true;  // else half cells are drawn as one splat
   double voxel = 0;          // world units: splats are merged into voxels of this size; 0: they are not
   double spread = 12;        // as VoxelMerger

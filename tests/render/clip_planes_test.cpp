@@ -101,7 +101,9 @@ TEST(ClipPlanes, BecomeFacesInTheFrameOfThePiece) {
           piece.position + glm::vec3(s.axis0 * u.x, s.axis0 * s.shear10 * u.x + s.axis1 * u.y,
                                      s.axis0 * s.shear20 * u.x + s.axis1 * s.shear21 * u.y + s.axis2 * u.z);
       const float by_face = glm::dot(face.inward, u) + face.distance;
-      if (std::abs(by_face) > 1e-4f) EXPECT_EQ(by_face > 0, clip.contains(x));
+      if (std::abs(by_face) > 1e-4f) {
+        EXPECT_EQ(by_face > 0, clip.contains(x));
+      }
     }
   }
 }

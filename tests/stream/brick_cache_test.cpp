@@ -13,9 +13,9 @@ namespace curvisplat {
 namespace {
 
 /// Fills all arrays of a brick with numbers of its own.
-void fill(const BrickCache::Room& room, uint32_t brick) {
-  const auto& g = room.geometry();
-  const auto& v = room.values();
+void fill(const BrickCache::Slot& slot, uint32_t brick) {
+  const auto& g = slot.geometry();
+  const auto& v = slot.values();
   float number = static_cast<float>(brick) * 100;
   for (float* array : {g.x, g.y, g.z, g.axis0, g.axis1, g.axis2, g.shear10, g.shear20, g.shear21, g.weight,
                        v.mean, v.slope0, v.slope1, v.slope2, v.variance})
@@ -39,30 +39,30 @@ testing::AssertionResult holds(const BrickCache::Pin& pin, uint32_t brick, size_
 
 /// Puts a brick in, and lets go of it.
 bool put(BrickCache& cache, uint32_t brick, uint32_t splats) {
-  auto room = cache.makeRoom(brick, splats);
-  if (!room) return false;
-  fill(*room, brick);
-  std::move(*room).keep();
+  auto slot = cache.makeSlot(brick, splats);
+  if (!slot) return false;
+  fill(*slot, brick);
+  std::move(*slot).keep();
   return true;
 }
 
 TEST(BrickCache, GivesBackWhatWasPutIn) {
   BrickCache cache(1 << 20);
-  cache.beginTurn({});
+  cache.beginEpoch({});
   EXPECT_FALSE(cache.find(7));
   {
-    auto room = cache.makeRoom(7, 100);
-    ASSERT_TRUE(room);
+    auto slot = cache.makeSlot(7, 100);
+    ASSERT_TRUE(slot);
     EXPECT_FALSE(cache.find(7)) << "it is not filled yet";
-    EXPECT_FALSE(cache.makeRoom(7, 100)) << "it is being made";
-    fill(*room, 7);
-    const auto pin = std::move(*room).keep();
+    EXPECT_FALSE(cache.makeSlot(7, 100)) << "it is being made";
+    fill(*slot, 7);
+    const auto pin = std::move(*slot).keep();
     EXPECT_TRUE(holds(pin, 7, 100));
   }
   const auto pin = cache.find(7);
   ASSERT_TRUE(pin);
   EXPECT_TRUE(holds(*pin, 7, 100));
-  EXPECT_FALSE(cache.makeRoom(7, 100)) << "it is there";
+  EXPECT_FALSE(cache.makeSlot(7, 100)) << "it is there";
   EXPECT_EQ(cache.statistics().hits, 1u);
   EXPECT_EQ(cache.statistics().misses, 2u);
 }
@@ -71,7 +71,7 @@ TEST(BrickCache, ChargesEveryArray) {
   EXPECT_EQ(BrickCache::charge(16), 16u * 64);
   EXPECT_EQ(BrickCache::charge(17), 16u * 128);
   BrickCache cache(4 * BrickCache::charge(100));
-  cache.beginTurn({});
+  cache.beginEpoch({});
   for (uint32_t brick = 0; brick < 4; ++brick) EXPECT_TRUE(put(cache, brick, 100));
   EXPECT_EQ(cache.statistics().bytes, 4 * BrickCache::charge(100));
   EXPECT_FALSE(put(cache, 4, 1)) << "all is of this turn";
@@ -81,8 +81,8 @@ TEST(BrickCache, ChargesEveryArray) {
 
 TEST(BrickCache, RoomThatIsNotKeptIsFreeAgain) {
   BrickCache cache(BrickCache::charge(100));
-  cache.beginTurn({});
-  for (int n = 0; n < 3; ++n) EXPECT_TRUE(cache.makeRoom(1, 100));
+  cache.beginEpoch({});
+  for (int n = 0; n < 3; ++n) EXPECT_TRUE(cache.makeSlot(1, 100));
   EXPECT_FALSE(cache.find(1));
   EXPECT_EQ(cache.statistics().bytes, 0u);
   EXPECT_TRUE(put(cache, 2, 100));
@@ -90,11 +90,11 @@ TEST(BrickCache, RoomThatIsNotKeptIsFreeAgain) {
 
 TEST(BrickCache, ThrowsOutTheLeastRecentlyUsed) {
   BrickCache cache(3 * BrickCache::charge(100));
-  cache.beginTurn({});
+  cache.beginEpoch({});
   for (const uint32_t brick : {1u, 2u, 3u}) put(cache, brick, 100);
-  cache.beginTurn({});
+  cache.beginEpoch({});
   cache.find(1);
-  cache.beginTurn({});
+  cache.beginEpoch({});
   EXPECT_TRUE(put(cache, 4, 100));
   EXPECT_FALSE(cache.contains(2));
   EXPECT_TRUE(put(cache, 5, 100));
@@ -105,14 +105,14 @@ TEST(BrickCache, ThrowsOutTheLeastRecentlyUsed) {
 
 TEST(BrickCache, KeepsWhatIsPinned) {
   BrickCache cache(2 * BrickCache::charge(100));
-  cache.beginTurn({});
+  cache.beginEpoch({});
   put(cache, 1, 100);
   put(cache, 2, 100);
   const auto pin = cache.find(1);
   const auto again = cache.find(1);
-  cache.beginTurn({});
+  cache.beginEpoch({});
   EXPECT_TRUE(put(cache, 3, 100)) << "in the place of 2";
-  cache.beginTurn({});
+  cache.beginEpoch({});
   EXPECT_TRUE(put(cache, 4, 100)) << "in the place of 3";
   EXPECT_FALSE(put(cache, 5, 100));
   EXPECT_TRUE(holds(*pin, 1, 100));
@@ -121,12 +121,12 @@ TEST(BrickCache, KeepsWhatIsPinned) {
 
 TEST(BrickCache, KeepsWhatTheTurnWants) {
   BrickCache cache(2 * BrickCache::charge(100));
-  cache.beginTurn({});
+  cache.beginEpoch({});
   put(cache, 1, 100);
   put(cache, 2, 100);
   // A scan over four bricks, again and again: half of them are hits, where plain LRU would have none.
   for (int turn = 0; turn < 5; ++turn) {
-    cache.beginTurn({1, 2, 3, 4});
+    cache.beginEpoch({1, 2, 3, 4});
     int hits = 0;
     for (uint32_t brick = 1; brick <= 4; ++brick) {
       hits += cache.find(brick).has_value();
@@ -138,7 +138,7 @@ TEST(BrickCache, KeepsWhatTheTurnWants) {
 
 TEST(BrickCache, HoldsNothingWithoutCapacity) {
   BrickCache cache(0);
-  cache.beginTurn({});
+  cache.beginEpoch({});
   EXPECT_FALSE(put(cache, 1, 1));
 }
 
@@ -151,7 +151,7 @@ TEST(BrickCache, SurvivesRandomUse) {
   for (int step = 0; step < 20'000; ++step) {
     const uint32_t brick = static_cast<uint32_t>(random() % 60);
     if (random() % 50 == 0) {
-      cache.beginTurn({brick, brick + 1});
+      cache.beginEpoch({brick, brick + 1});
     } else if (random() % 3 == 0 && !pins.empty()) {
       const size_t n = random() % pins.size();
       ASSERT_TRUE(holds(pins[n].second, pins[n].first, splatsOf(pins[n].first)));

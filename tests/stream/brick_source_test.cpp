@@ -138,25 +138,16 @@ TEST_F(BrickSourceTest, GivesWhatTheReaderReadsColdAndWarmWithAnyCache) {
   }
 }
 
-TEST_F(BrickSourceTest, ABrickInSeveralPartsIsReadOnce) {
-  std::vector<uint32_t> often;
-  for (const uint32_t brick : order_) often.insert(often.end(), {brick, brick / 2, brick / 2});
-  for (const uint64_t cache_bytes : {uint64_t{0}, decoded_bytes_ / 3, decoded_bytes_ + (1 << 20)}) {
-    BrickSource source(*cache_, 0, pagerOptions(), cache_bytes);
-    for (const unsigned threads : {4u, 1u}) {
-      FetchStatistics statistics;
-      EXPECT_EQ(takeAll(source, often, threads, statistics), often.size());
-      EXPECT_EQ(statistics.bricks_read + statistics.bricks_cached, order_.size());
-    }
-  }
-
+TEST_F(BrickSourceTest, APartHasTheSplatsOfItsOctants) {
   BrickSource source(*cache_, 0, pagerOptions(), decoded_bytes_);
   const uint32_t inner = 3;
   ASSERT_FALSE(cache_->bricks()[inner].isLeaf());
-  source.start(std::vector<BrickPart>{{inner, 0x0f}, {inner, 0xf0}});
   BrickSource::Scratch scratch;
   uint32_t splats = 0;
-  for (size_t n = 0; n < 2; ++n) splats += source.take(n, scratch)->ranges.splats();
+  for (const uint8_t octants : {0x0f, 0xf0}) {
+    source.start(std::vector<BrickPart>{{inner, octants}});
+    splats += source.take(0, scratch)->ranges.splats();
+  }
   EXPECT_EQ(splats, cache_->bricks()[inner].splats);
 }
 
@@ -334,13 +325,8 @@ TEST_F(BrickSourceTest, CanBeStoppedAtAnyMoment) {
   EXPECT_EQ(takeAll(source, order_, 2, statistics), order_.size());
 }
 
-// Bricks in two parts, of which one, both or none are passed over.
 TEST_F(BrickSourceTest, PassesOverWhatIsNotNeeded) {
-  std::vector<BrickPart> parts;
-  for (const uint32_t brick : order_) {
-    parts.push_back({brick, 0x0f});
-    if (!cache_->bricks()[brick].isLeaf()) parts.push_back({brick, 0xf0});
-  }
+  const std::vector<BrickPart> parts = partsOf(order_);
   for (const uint64_t cache_bytes : {uint64_t{0}, 2 * decoded_bytes_}) {
     BrickSource source(*cache_, 0, pagerOptions(), cache_bytes);
     BrickSource::Scratch scratch;

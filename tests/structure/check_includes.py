@@ -28,6 +28,7 @@ PROGRAM_ROOMS = {
     "tools/output": set(),
     "tools/options": {"tools/output"},
     "tools/commands": {"tools/output", "tools/options", "tools/throughput", "tools/viewer"},
+    "tools/python": {"tools/output", "tools/options"},
     "tools": {"tools/output", "tools/options", "tools/commands"},
 }
 

@@ -17,6 +17,7 @@
 #include "stream/cache/cache_verify.h"
 #include "stream/cache/partial_folder.h"
 #include "stream/cache/probe.h"
+#include "stream/model/kernel.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/info_grid.h"
 #include "tools/commands/info_steps.h"
@@ -144,7 +145,7 @@ void printProbe(const CacheReader& reader, const InfoOptions& options, const Fin
       "block {}, i {}, j {}, k {} (i, j and k counted from 0); the point is {:.3g} of the way from its "
       "centre to its "
       "edge\n",
-      probed.block + 1, probed.i, probed.j, probed.k, probed.distance / 1.556228);
+      probed.block + 1, probed.i, probed.j, probed.k, probed.distance / kKernelSupport);
   for (size_t v = 0; v < probed.variables.size(); ++v) {
     const VariableInfo& variable = reader.manifest().variables[v];
     fmt::print("  {:<20} {:.6g} {}({:.6g} at the centre)\n", variable.name, probed.variables[v].value,

@@ -23,7 +23,7 @@ void checkOutputFolder(std::string_view option, const std::filesystem::path& pat
     throw Error("{} {}: the directory {} is not writable: {}; choose another", option, path.string(),
                 folder.string(), std::strerror(errno));
   std::error_code error;
-  std::filesystem::symlink_status(path, error);
+  static_cast<void>(std::filesystem::symlink_status(path, error));
   if (error == std::errc::filename_too_long)
     throw Error("{} {}: the name is too long; choose a shorter one", option, path.string());
 }

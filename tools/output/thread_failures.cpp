@@ -5,11 +5,9 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <condition_variable>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
-#include <mutex>
 #include <new>
 #include <string_view>
 #include <system_error>
@@ -17,6 +15,7 @@
 #include <vector>
 
 #include "stream/base/error.h"
+#include "stream/base/mutex.h"
 
 namespace curvisplat {
 namespace {
@@ -80,23 +79,23 @@ void endLoadingOfLibraries() {
 void requireThreads(unsigned count) {
   if (count == 0) count = std::max(1u, std::thread::hardware_concurrency());
   count = std::min(count, kMaxTried) + kOwnThreads;
-  std::mutex mutex;  // guards `ending`
+  Mutex mutex;  // guards `ending`
   bool ending = false;
-  std::condition_variable changed;
+  ConditionVariable changed;
   std::vector<std::thread> threads;
   threads.reserve(count);
   int error = 0;
   try {
     while (threads.size() < count)
       threads.emplace_back([&] {
-        std::unique_lock lock(mutex);
-        changed.wait(lock, [&] { return ending; });
+        MutexLock lock(mutex);
+        while (!ending) changed.wait(lock);
       });
   } catch (const std::system_error& failure) {
     error = failure.code().value();
   }
   {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     ending = true;
   }
   changed.notify_all();

@@ -1,5 +1,5 @@
-# `cmake --install`, and the Debian packages of `cpack -G DEB`. Two components: the program, and the libraries with
-# their headers for other projects: find_package(curvisplat).
+# `cmake --install`, and the Debian packages of `cpack -G DEB`. Components: the program; the libraries with their
+# headers for other projects, find_package(curvisplat); and the Python package, if it is built.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -62,6 +62,17 @@ set(development_packages
   nlohmann-json3-dev pkg-config zlib1g-dev)
 if(CURVISPLAT_ANNOTATIONS)
   list(APPEND development_packages libcairo2-dev)
+endif()
+if(CURVISPLAT_PYTHON)
+  list(APPEND CPACK_COMPONENTS_ALL python)
+  set(CPACK_DEBIAN_PYTHON_DESCRIPTION "The Python package curvisplat: grids from files or numpy arrays become caches,
+and caches become pictures, as arrays.")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-curvisplat)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS ON)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3, python3-numpy")
+  install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/python3-curvisplat RENAME copyright
+    COMPONENT python)
 endif()
 list(JOIN development_packages ", " CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS)
 include(CPack)

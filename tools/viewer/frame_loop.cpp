@@ -62,7 +62,7 @@ FrameLoop::FrameLoop(const CacheReader& cache, Backend backend, std::function<vo
 
 FrameLoop::~FrameLoop() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
     if (drawing_) drawing_->cancel();
   }
@@ -71,7 +71,7 @@ FrameLoop::~FrameLoop() {
 }
 
 uint64_t FrameLoop::request(FrameRequest request) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   pending_ = std::move(request);
   if (drawing_ && cancellable_) drawing_->cancel();
   changed_.notify_all();
@@ -79,7 +79,7 @@ uint64_t FrameLoop::request(FrameRequest request) {
 }
 
 std::optional<ShownFrame> FrameLoop::take() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (failure_) std::rethrow_exception(ended_ ? failure_ : std::exchange(failure_, nullptr));
   // Repeats the cancel() of request(), which has no effect on a frame that had not begun yet.
   if (pending_ && drawing_ && cancellable_) drawing_->cancel();
@@ -87,28 +87,28 @@ std::optional<ShownFrame> FrameLoop::take() {
 }
 
 bool FrameLoop::busy() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return !ended_ && (pending_ || serving_);
 }
 
 std::string FrameLoop::backendName() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return backend_name_;
 }
 
 bool FrameLoop::drawsInSoftware() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return software_;
 }
 
 bool FrameLoop::superseded(uint64_t number) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return stopping_ || number != newest_;
 }
 
 void FrameLoop::publish(ShownFrame frame) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     shown_ = std::move(frame);
   }
   wake_();
@@ -117,9 +117,9 @@ void FrameLoop::publish(ShownFrame frame) {
 void FrameLoop::loop() {
   nameThisThread("frames");
   Drawing drawing(coarsestSplats(cache_));
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   while (true) {
-    changed_.wait(lock, [this] { return pending_ || stopping_; });
+    while (!pending_ && !stopping_) changed_.wait(lock);
     if (stopping_) return;
     const FrameRequest request = *std::exchange(pending_, std::nullopt);
     const uint64_t number = newest_;
@@ -161,7 +161,7 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
   drawing.player->goTo(request.step);
   FrameRenderer& renderer = drawing.player->renderer();
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (stopping_) return;  // the destructor found no renderer to cancel
     drawing_ = &renderer;
     cancellable_ = !request.moving;
@@ -195,7 +195,7 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
 /// Goes to the step that is likely to be wanted next, and begins to decode it while this one is looked at.
 void FrameLoop::readAhead(Drawing& drawing, const FrameRequest& request) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     drawing_ = nullptr;  // a step with another geometry has another renderer
   }
   drawing.player->goTo(*request.next_step);

@@ -9,18 +9,17 @@
 #pragma once
 
 #include <algorithm>
-#include <condition_variable>
 #include <cstdint>
 #include <exception>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "render/frame/frame.h"
+#include "stream/base/mutex.h"
 #include "stream/cache/cache_reader.h"
 
 namespace curvisplat {
@@ -103,19 +102,19 @@ class FrameLoop {
   const Backend backend_;
   const std::function<void()> wake_;
 
-  mutable std::mutex mutex_;  // guards all members below
-  std::condition_variable changed_;
-  std::optional<FrameRequest> pending_;
-  uint64_t newest_ = 0;               // number of the newest request
-  bool serving_ = false;              // a request is being drawn
-  bool cancellable_ = false;          // and its camera is at rest
-  FrameRenderer* drawing_ = nullptr;  // for cancel()
-  std::optional<ShownFrame> shown_;
-  std::exception_ptr failure_;
-  bool ended_ = false;  // by an error
-  bool stopping_ = false;
-  std::string backend_name_;
-  bool software_ = true;
+  mutable Mutex mutex_;
+  ConditionVariable changed_;
+  std::optional<FrameRequest> pending_ GUARDED_BY(mutex_);
+  uint64_t newest_ GUARDED_BY(mutex_) = 0;               // number of the newest request
+  bool serving_ GUARDED_BY(mutex_) = false;              // a request is being drawn
+  bool cancellable_ GUARDED_BY(mutex_) = false;          // and its camera is at rest
+  FrameRenderer* drawing_ GUARDED_BY(mutex_) = nullptr;  // for cancel()
+  std::optional<ShownFrame> shown_ GUARDED_BY(mutex_);
+  std::exception_ptr failure_ GUARDED_BY(mutex_);
+  bool ended_ GUARDED_BY(mutex_) = false;  // by an error
+  bool stopping_ GUARDED_BY(mutex_) = false;
+  std::string backend_name_ GUARDED_BY(mutex_);
+  bool software_ GUARDED_BY(mutex_) = true;
   std::thread thread_;
 };
 

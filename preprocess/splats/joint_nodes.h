@@ -1,0 +1,78 @@
+// The nodes of block faces that coincide at one point, and what becomes of them. Two halves of about the same thickness give
+// back the whole cell. Halves of unlike thickness stay apart, each cut at the face between them: one splat for both would
+// reach too far on the thin side and not far enough on the thick one, which shows as a pair of lines.
+//
+//    block A      |  block B                          like                      unlike
+//    o     o     o|o     o     o                  o--[  o  ]--o              o----[o|o]-o-o
+//                half cells                        one splat           two splats, cut at the face
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "preprocess/splats/bend_of_parts.h"
+#include "preprocess/splats/merge.h"
+#include "preprocess/splats/node_splats.h"
+#include "preprocess/splats/open_borders.h"
+
+namespace curvisplat {
+
+/// What is done with coincident halves of unlike thickness. Caches of version 1 have them merged.
+enum class UnlikeHalves { kApart, kMerged };
+
+/// Halves are unlike if one is more than this many times as thick as the other.
+inline constexpr double kMaxJointRatio = 1.3;
+
+/// A splat with its values.
+struct SplatWithValues {
+  NodeSplat splat;
+  std::vector<SplatScalar> values;
+};
+
+/// Some of the nodes at one point as one splat.
+class MergedParts {
+ public:
+  MergedParts(const NodeSplat& first, std::span<const SplatScalar> values);
+  void add(const NodeSplat& part, std::span<const SplatScalar> values);
+  /// Its node (and node_position) is the lowest of the parts; regular is false unless there is only one, which
+  /// comes out as it went in.
+  SplatWithValues finish() const;
+  /// The nodes in it, in the order of adding.
+  const std::vector<uint64_t>& nodes() const { return nodes_; }
+
+ private:
+  glm::dvec3 origin_;
+  SplatWithValues lowest_;
+  SplatMerger merger_;
+  BendOfParts bend_;
+  OpenBorders borders_;
+  std::vector<uint64_t> nodes_;
+};
+
+/// Not for several threads at once. The sums depend on the order of adding.
+class JointNodes {
+ public:
+  explicit JointNodes(UnlikeHalves unlike) : unlike_(unlike) {}
+
+  /// A node at the point, or one of the layer behind a face there, which loses its border code if that face is closed.
+  void add(const NodeSplat& splat, std::span<const SplatScalar> values);
+
+  /// Gets a splat and the nodes that it is merged of; none of the layer behind.
+  using Sink =
+      std::function<void(const NodeSplat&, std::span<const SplatScalar>, std::span<const uint64_t> nodes)>;
+  void finish(const Sink& sink);
+
+ private:
+  void mergeAll();
+  std::vector<MergedParts> groups() const;
+
+  UnlikeHalves unlike_;
+  std::vector<SplatWithValues> parts_;
+  std::optional<MergedParts> merged_;  // in place of parts_, if there are many
+  std::vector<SplatWithValues> behind_;
+};
+
+}  // namespace curvisplat

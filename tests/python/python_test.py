@@ -1,0 +1,311 @@
+#!/usr/bin/env python3
+"""The Python package: its pictures are those of the command, arrays become the caches that files become, and errors,
+interrupts and memory are as its pages say.
+
+    python_test.py PROGRAM    the curvisplat program; the package is found by PYTHONPATH
+"""
+
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+
+import numpy as np
+
+import curvisplat
+
+PROGRAM = None
+
+
+def command(*words):
+    return subprocess.run([PROGRAM, *map(str, words)], check=True, capture_output=True, text=True)
+
+
+def bent_duct(nk=12, nj=10, ni=40):
+    """Positions and a scalar of shape (nk, nj, ni)."""
+    k, j, i = np.meshgrid(np.linspace(0, 1, nk), np.linspace(1, 2, nj), np.linspace(0, 1.5, ni), indexing="ij")
+    return j * np.cos(i), j * np.sin(i), k, (300 + 50 * np.sin(6 * i) * j).astype(np.float32)
+
+
+class PythonTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder_holder = tempfile.TemporaryDirectory()
+        cls.folder = pathlib.Path(cls.folder_holder.name)
+        command("generate", "wake", "--size", "48x40x24", "-o", cls.folder / "wake")
+        cls.cache = cls.folder / "wake.splats"
+        curvisplat.convert(cls.cache, cls.folder / "wake.xyz", [cls.folder / "wake.fun"])
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder_holder.cleanup()
+
+    def drawn(self, *options):
+        """The command's picture, in float."""
+        path = self.folder / "command.pfm"
+        command("render", self.cache, "-o", path, "--size", "160x120", *options)
+        return read_pfm(path)
+
+    def expect_same(self, picture, *options):
+        np.testing.assert_array_equal(np.asarray(picture)[..., :3], self.drawn(*options))
+
+
+def read_pfm(path):
+    data = path.read_bytes()
+    kind, size, scale, pixels = data.split(b"\n", 3)
+    assert kind == b"PF" and float(scale) < 0
+    width, height = map(int, size.split())
+    return np.frombuffer(pixels, "<f4").reshape(height, width, 3)[::-1]
+
+
+class Pictures(PythonTest):
+    def test_are_those_of_the_command(self):
+        with curvisplat.open(self.cache) as cache:
+            size = (160, 120)
+            self.expect_same(cache.render(size=size))
+            self.expect_same(cache.render(size=size, view="+x", colours="inferno", range=(0.0, 0.7)),
+                             "--view", "+x", "--tf", "inferno", "--range", "0.0,0.7")
+            name = cache.scalars[0].name
+            self.expect_same(
+                cache.render(name, size=size, range="1%,99%", opacity=[(0, 0), (0.5, 0.8), (1, 0.1)],
+                             opacity_unit=0.25, position=(20, -9, 8), focal_point=(4, 0, 2), view_angle=35,
+                             background="black", lod_pixels=2, shade=True, light_direction=(1, 0, 1)),
+                "--scalar", name, "--range", "1%,99%", "--opacity", "0:0,0.5:0.8,1:0.1", "--opacity-unit", 0.25,
+                "--position", "20,-9,8", "--focal-point", "4,0,2", "--view-angle", 35, "--background", "black",
+                "--lod-pixels", 2, "--shade", "--light-direction", "1,0,1")
+            self.expect_same(
+                cache.render(size=size, view="iso", clip_planes=[(4, 0, 0, 1, 0, 0), (0, 0, 1, 0, 0, 1)],
+                             clip_box=(0, 9, -9, 9, -9, 9), scale=(1, 1, 2), memory=256 << 20, threads=1),
+                "--view", "iso", "--clip-plane", "4,0,0,1,0,0", "--clip-plane", "0,0,1,0,0,1", "--clip-box",
+                "0,9,-9,9,-9,9", "--scale", "1,1,2")
+
+    def test_know_what_was_chosen(self):
+        with curvisplat.open(self.cache) as cache:
+            picture = cache.render(size=(160, 120))
+            self.assertIn("--opacity", picture.options)
+            self.assertEqual(picture.shape, (120, 160, 4))
+            self.assertEqual(picture.dtype, np.float32)
+            self.assertGreater(picture.statistics["splats_drawn"], 0)
+            again = self.drawn(*picture.options.split())
+            np.testing.assert_array_equal(np.asarray(picture)[..., :3], again)
+
+    def test_are_shown_in_notebooks_and_saved(self):
+        with curvisplat.open(self.cache) as cache:
+            picture = cache.render(size=(160, 120))
+        self.assertTrue(picture._repr_png_().startswith(b"\x89PNG"))
+        self.assertIsNone(picture[0]._repr_png_())
+        picture.save(self.folder / "saved.pfm")
+        np.testing.assert_array_equal(read_pfm(self.folder / "saved.pfm"), np.asarray(picture)[..., :3])
+
+    def test_outlive_their_cache(self):
+        cache = curvisplat.open(self.cache)
+        picture = cache.render(size=(64, 64))
+        before = picture.copy()
+        del cache
+        np.testing.assert_array_equal(picture, before)
+
+    def test_report_progress(self):
+        seen = []
+        with curvisplat.open(self.cache) as cache:
+            cache.render(size=(64, 64), progress=lambda *state: seen.append(state))
+        for phase, done, total, unit in seen:
+            self.assertEqual((phase, unit), ("drawing", "bricks"))
+            self.assertLessEqual(done, total)
+
+
+class CachesAreDescribed(PythonTest):
+    def test_as_the_command_describes_them(self):
+        with curvisplat.open(self.cache) as cache:
+            self.assertEqual(cache.blocks, (("block 1", 48, 40, 24),))
+            self.assertEqual(cache.samples, 48 * 40 * 24)
+            self.assertEqual(cache.splats, cache.samples - 39 * 24)  # the wake closes around its cylinder
+            lower, upper = cache.bounds
+            self.assertTrue((lower < upper).all())
+            inside = cache.probe((lower + upper) / 2)
+            self.assertEqual(set(inside["values"]), {scalar.name for scalar in cache.scalars})
+            self.assertEqual(inside["block"], 1)
+            self.assertIsNone(cache.probe(upper + 100))
+            self.assertIn("wake", repr(cache))
+
+
+class Arrays(PythonTest):
+    def test_become_the_cache_that_the_same_file_becomes(self):
+        x, y, z, t = bent_duct()
+        whole = self.folder / "arrays.splats"
+        report = curvisplat.convert_arrays(whole, curvisplat.Block(x, y, z, {"t": t}, units={"t": "K"}))
+        self.assertEqual(report.samples, t.size)
+        # The same through a PLOT3D grid in double precision and a function file.
+        grid, function = self.folder / "duct.xyz", self.folder / "duct.f"
+        nk, nj, ni = t.shape
+        with open(grid, "wb") as file:
+            np.array([ni, nj, nk], "<i4").tofile(file)
+            for array in (x, y, z):
+                array.astype("<f8").tofile(file)
+        with open(function, "wb") as file:
+            np.array([ni, nj, nk, 1], "<i4").tofile(file)
+            t.astype("<f8").tofile(file)
+        of_files = self.folder / "files.splats"
+        curvisplat.convert(of_files, grid, [function])
+        for name in ("bricks.bin", "geometry.bin", "var.0.bin"):
+            self.assertEqual((whole / name).read_bytes(), (of_files / name).read_bytes(), name)
+        with curvisplat.open(whole) as cache:
+            self.assertEqual(cache.scalars[0][:2], ("t", "K"))
+
+    def test_of_any_strides_and_layouts_are_the_same(self):
+        x, y, z, t = bent_duct()
+        first, second = self.folder / "c.splats", self.folder / "f.splats"
+        curvisplat.convert_arrays(first, curvisplat.Block(x, y, z, {"t": t}))
+        wide = np.zeros((*t.shape, 3))
+        wide[..., 0], wide[..., 1], wide[..., 2] = x, y, z
+        fortran = np.asfortranarray(t)
+        curvisplat.convert_arrays(second, curvisplat.Block(wide[..., 0], wide[..., 1], wide[..., 2], {"t": fortran}))
+        self.assertEqual((first / "var.0.bin").read_bytes(), (second / "var.0.bin").read_bytes())
+
+    def test_that_are_masked_or_blank_are_left_out(self):
+        x, y, z, t = bent_duct()
+        blank = np.zeros(t.shape, bool)
+        blank[:, :, :10] = True
+        report = curvisplat.convert_arrays(self.folder / "blank.splats", curvisplat.Block(x, y, z, {"t": t}, blank))
+        masked = np.ma.masked_array(t, blank)
+        same = curvisplat.convert_arrays(self.folder / "masked.splats", curvisplat.Block(x, y, z, {"t": masked}))
+        self.assertEqual((report.blanked, same.blanked), (blank.sum(), blank.sum()))
+
+    def test_in_cells_and_in_several_blocks(self):
+        x, y, z, t = bent_duct()
+        cells = t[1:, 1:, 1:]
+        report = curvisplat.convert_arrays(self.folder / "cells.splats", curvisplat.Block(x, y, z, {"t": cells}))
+        self.assertEqual(report.samples, cells.size)
+        left, right = np.s_[:, :, :21], np.s_[:, :, 20:]
+        blocks = [curvisplat.Block(x[part], y[part], z[part], {"t": t[part]}, name=name)
+                  for part, name in ((left, "left"), (right, "right"))]
+        report = curvisplat.convert_arrays(self.folder / "two.splats", *blocks)
+        self.assertEqual(report.merged_nodes, t.shape[0] * t.shape[1])
+        with curvisplat.open(self.folder / "two.splats") as cache:
+            self.assertEqual([block[0] for block in cache.blocks], ["left", "right"])
+
+    def test_of_a_callable_are_read_piece_by_piece(self):
+        x, y, z, t = bent_duct()
+        largest = 0
+
+        def read(block, k0, k1, j0, j1, names):
+            nonlocal largest
+            self.assertEqual(block, 0)
+            piece = np.s_[k0:k1, j0:j1]
+            largest = max(largest, t[piece].size)
+            return x[piece], y[piece], z[piece], [t[piece] for _ in names], None
+
+        first, second = self.folder / "whole.splats", self.folder / "pieces.splats"
+        curvisplat.convert_arrays(first, curvisplat.Block(x, y, z, {"t": t}))
+        curvisplat.convert_callable(second, [t.shape], read, {"t": "K"})
+        for name in ("bricks.bin", "geometry.bin", "var.0.bin"):
+            self.assertEqual((first / name).read_bytes(), (second / name).read_bytes(), name)
+        self.assertGreater(largest, 0)
+
+    def test_of_xarray(self):
+        try:
+            import xarray
+        except ImportError:
+            self.skipTest("python3-xarray is not installed")
+        x, y, z, t = bent_duct()
+        dims = ("k", "j", "i")
+        dataset = xarray.Dataset({"t": (dims, t, {"units": "K"})}, coords={
+            "x": (dims[1:], x[0]), "y": (dims[1:], y[0]), "z": ("k", z[:, 0, 0])})
+        first, second = self.folder / "numpy.splats", self.folder / "xarray.splats"
+        curvisplat.convert_arrays(first, curvisplat.Block(x, y, z, {"t": t}))
+        curvisplat.convert_arrays(second, curvisplat.from_xarray(dataset))
+        self.assertEqual((first / "var.0.bin").read_bytes(), (second / "var.0.bin").read_bytes())
+        with curvisplat.open(second) as cache:
+            self.assertEqual(cache.scalars[0].unit, "K")
+
+
+class Errors(PythonTest):
+    def expect_error(self, kind, text, call, *arguments, **options):
+        with self.assertRaises(kind) as caught:
+            call(*arguments, **options)
+        self.assertIn(text, str(caught.exception))
+        self.assertNotIn("\n", str(caught.exception))
+
+    def test_have_the_commands_messages(self):
+        self.expect_error(curvisplat.Error, "none.splats", curvisplat.open, "none.splats")
+        with curvisplat.open(self.cache) as cache:
+            self.expect_error(curvisplat.Error, "nope", cache.render, "nope")
+            self.expect_error(curvisplat.UsageError, "upside-down", cache.render, view="upside-down")
+            self.expect_error(ValueError, "0x10", cache.render, size=(0, 10))
+            self.expect_error(curvisplat.UsageError, "direction", cache.render, clip_planes=[(0, 0, 0, 0, 0, 0)])
+            self.expect_error(curvisplat.UsageError, "memory", cache.render, memory="1K")
+            cache.render(size=(32, 32))  # still works
+
+    def test_of_arrays_say_which(self):
+        x, y, z, t = bent_duct()
+        out = self.folder / "never.splats"
+        make = curvisplat.convert_arrays
+        self.expect_error(curvisplat.UsageError, "y: the array has the shape", make, out,
+                          curvisplat.Block(x, y[1:], z, {"t": t}))
+        self.expect_error(curvisplat.UsageError, "int64", make, out, curvisplat.Block(x, y, z, {"t": t.astype("i8")}))
+        self.expect_error(curvisplat.UsageError, "2 dimensions", make, out,
+                          curvisplat.Block(x[0], y, z, {"t": t}))
+        self.expect_error(curvisplat.UsageError, "no block", make, out)
+        self.expect_error(curvisplat.UsageError, "has no scalar 't'", make, out, curvisplat.Block(x, y, z, {"t": t}),
+                          curvisplat.Block(x, y, z, {"u": t}))
+        self.assertFalse(out.exists())
+
+    def test_of_a_callable_come_through(self):
+        def read(*_):
+            raise KeyError("lost")
+
+        out = self.folder / "lost.splats"
+        with self.assertRaises(KeyError):
+            curvisplat.convert_callable(out, [(4, 4, 4)], read, ["t"])
+        self.assertEqual(list(self.folder.glob("lost*")), [])
+
+
+class Interrupts(PythonTest):
+    def test_end_a_conversion_and_leave_nothing(self):
+        x, y, z, t = bent_duct(8, 8, 8)
+
+        def read(block, k0, k1, j0, j1, names):
+            time.sleep(0.05)
+            shape = (k1 - k0, j1 - j0, 64)
+            return np.zeros(shape), np.zeros(shape), np.zeros(shape), [np.zeros(shape) for _ in names], None
+
+        out = self.folder / "stopped.splats"
+        threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+        with self.assertRaises(KeyboardInterrupt):
+            curvisplat.convert_callable(out, [(4000, 4, 64)] * 50, read, ["t"], memory="160M")
+        self.assertEqual(list(self.folder.glob("stopped*")), [])
+
+    def test_leave_no_thread_and_no_memory(self):
+        def threads():
+            return len(os.listdir("/proc/self/task"))
+
+        def resident():
+            with open("/proc/self/statm") as file:
+                return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+        cache = curvisplat.open(self.cache)
+        for _ in range(3):
+            cache.render(size=(100, 100))
+            cache.render(size=(900, 900), lod_pixels=0)
+        before_threads, before = threads(), resident()
+        for n in range(100):
+            cache.render(size=(100, 100), view="+x" if n % 2 else "iso")
+        for n in range(20):
+            timer = threading.Timer(0.01 * (n % 5), lambda: os.kill(os.getpid(), signal.SIGINT))
+            with self.assertRaises(KeyboardInterrupt):
+                timer.start()
+                while True:
+                    cache.render(size=(900, 900), lod_pixels=0)
+            timer.join()
+        self.assertLessEqual(threads(), before_threads)
+        self.assertLess(resident() - before, 64 << 20)
+        cache.close()
+
+
+if __name__ == "__main__":
+    PROGRAM = sys.argv.pop(1)
+    unittest.main(verbosity=1)

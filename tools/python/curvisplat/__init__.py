@@ -1,0 +1,19 @@
+"""Pictures of curvilinear simulation grids, larger than memory if need be.
+
+    import curvisplat
+    curvisplat.convert("wing.splats", "wing.xyz", ["wing.q"])       # once: a grid becomes a cache
+    cache = curvisplat.open("wing.splats")
+    picture = cache.render(scalar="density", view="+x", size=(800, 600))
+    picture.save("wing.png")
+
+Positions and lengths are in the grid's own unit. Colours are premultiplied by alpha.
+"""
+
+from ._arrays import Block, from_xarray
+from ._cache import Cache, Picture, Scalar, open
+from ._convert import Report, convert, convert_arrays, convert_callable
+from ._core import Error, UsageError, colour_maps
+from ._core import version as __version__
+
+__all__ = ["Block", "Cache", "Error", "Picture", "Report", "Scalar", "UsageError", "colour_maps", "convert",
+           "convert_arrays", "convert_callable", "from_xarray", "open"]

@@ -1,0 +1,59 @@
+"""Grids that are in memory."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Mapping, Optional, Sequence
+
+import numpy as np
+
+
+@dataclasses.dataclass
+class Block:
+    """One block of a curvilinear grid in memory.
+
+    x, y, z: positions of the nodes, arrays of shape (nk, nj, ni), float32 or float64. Any strides do, and nothing is
+    copied: pass `a.T` for arrays of shape (ni, nj, nk). scalars: values by name, at the nodes (the same shape) or in the cells (one
+    less along each dimension). blank: True where a node is not there. units: of the scalars, by name.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    z: np.ndarray
+    scalars: Mapping[str, np.ndarray]
+    blank: Optional[np.ndarray] = None
+    name: str = ""
+    units: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+
+def _values(array: Any) -> np.ndarray:
+    """As numpy has it; masked values become NaN, which blanks them."""
+    if np.ma.isMaskedArray(array) and np.ma.is_masked(array):
+        kind = array.dtype if array.dtype.kind == "f" else np.dtype(np.float32)
+        return array.astype(kind).filled(np.nan)
+    return np.asarray(array)
+
+
+def from_xarray(dataset: Any, coordinates: Sequence[str] = ("x", "y", "z"),
+                scalars: Optional[Sequence[str]] = None) -> Block:
+    """The Block of an xarray.Dataset.
+
+    coordinates: the variables of the positions along x, y and z; each may have fewer dimensions than three, such as an axis,
+    and is spread over the others. scalars: names of data variables (default: all that have all three dimensions).
+    """
+    names = [name for name in dataset.data_vars if name not in coordinates]
+    if scalars is None:
+        scalars = [name for name in names if dataset[name].ndim == 3]
+    if not scalars:
+        raise ValueError("the dataset has no variable of three dimensions; name one of " + ", ".join(map(str, names)))
+    dimensions = dataset[scalars[0]].dims
+    like = dataset[scalars[0]]
+
+    def spread(name: str) -> np.ndarray:
+        array = dataset[name].broadcast_like(like).transpose(*dimensions)
+        return np.asarray(array.values, dtype=np.float64)
+
+    x, y, z = (spread(name) for name in coordinates)
+    values = {str(name): _values(dataset[name].transpose(*dimensions).values) for name in scalars}
+    units = {str(name): str(dataset[name].attrs.get("units", "")) for name in scalars}
+    return Block(x, y, z, values, units=units)

@@ -1,0 +1,201 @@
+"""Open caches, and pictures of them."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import tempfile
+from typing import Any, Callable, NamedTuple, Optional, Sequence, Tuple, Union
+
+import numpy as np
+
+from . import _core
+
+Vector = Sequence[float]
+Progress = Callable[[str, int, int, str], None]
+
+
+class Scalar(NamedTuple):
+    """A scalar of a cache: its name, its unit ("" if unknown) and the range of its values."""
+
+    name: str
+    unit: str
+    min: float
+    max: float
+
+
+class Picture(np.ndarray):
+    """An array of shape (height, width, 4): red, green and blue, premultiplied by alpha, and alpha; float32, rows from the top.
+
+    `options` are those of `curvisplat render` that were chosen from the data, `notes` what there is to know about the
+    transfer function, `statistics` counts and seconds.
+    """
+
+    options: str = ""
+    notes: Sequence[str] = ()
+    statistics: dict = {}
+
+    def __array_finalize__(self, other: Any) -> None:
+        if other is not None:
+            self.options = getattr(other, "options", "")
+            self.notes = getattr(other, "notes", ())
+            self.statistics = getattr(other, "statistics", {})
+
+    def save(self, path: Union[str, os.PathLike]) -> None:
+        """Writes the picture as .png (8 bits), .exr or .pfm (float32)."""
+        _core.write_image(np.ascontiguousarray(self, dtype=np.float32), os.fspath(path))
+
+    def _repr_png_(self) -> Optional[bytes]:
+        """The picture for a notebook; None for an array that is no picture any more, such as one row."""
+        if self.ndim != 3 or self.shape[2] != 4:
+            return None
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "picture.png"
+            self.save(path)
+            return path.read_bytes()
+
+
+def _number(value: float) -> str:
+    return repr(float(value))
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return ",".join(_number(value) for value in values)
+
+
+def _text(value: Any) -> str:
+    """A value as the command line writes it: numbers joined by commas, text as it is."""
+    if isinstance(value, str):
+        return value
+    return _number(value) if np.isscalar(value) else _numbers(value)
+
+
+def _opacities(value: Any) -> str:
+    if isinstance(value, str):
+        return value
+    return ",".join(f"{_number(position)}:{_number(opacity)}" for position, opacity in value)
+
+
+def _given(**options: Any) -> dict:
+    return {name: _text(value) for name, value in options.items() if value is not None}
+
+
+class Cache:
+    """A splat cache, open for drawing. One thread may draw at a time; `close()` or `with` gives its memory back."""
+
+    def __init__(self, path: Union[str, os.PathLike]):
+        self._core = _core.OpenCache(os.fspath(path))
+
+    def __enter__(self) -> "Cache":
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        names = ", ".join(scalar.name for scalar in self.scalars)
+        return f"<curvisplat.Cache {self.title!r}: {self.samples} samples, {names}>"
+
+    def close(self) -> None:
+        """Ends the threads and frees the memory that pictures use. Drawing again starts them again."""
+        self._core.release()
+
+    @property
+    def path(self) -> str:
+        """The directory."""
+        return self._core.path
+
+    @property
+    def title(self) -> str:
+        """What the cache was named when it was converted."""
+        return self._core.title
+
+    @property
+    def scalars(self) -> Tuple[Scalar, ...]:
+        """The scalars, in the order of the cache."""
+        return tuple(Scalar(*scalar) for scalar in self._core.scalars)
+
+    @property
+    def bounds(self) -> Tuple[np.ndarray, np.ndarray]:
+        """The lower and the upper corner of the box that the grid lies in."""
+        return np.array(self._core.lower), np.array(self._core.upper)
+
+    @property
+    def samples(self) -> int:
+        """The nodes of the grid, or its cells if the values are in cells."""
+        return self._core.samples
+
+    @property
+    def splats(self) -> int:
+        """The splats of the finest level."""
+        return self._core.splats
+
+    @property
+    def levels(self) -> int:
+        """The levels of detail."""
+        return self._core.levels
+
+    @property
+    def volume(self) -> float:
+        """The volume of the grid's cells."""
+        return self._core.volume
+
+    @property
+    def blocks(self) -> Tuple[Tuple[str, int, int, int], ...]:
+        """(name, ni, nj, nk) of each block."""
+        return tuple(self._core.blocks)
+
+    def probe(self, point: Vector) -> Optional[dict]:
+        """The sample at a point: {"values": {scalar: value}, "block": from 1, "index": (i, j, k) from 0, "position": of the
+        sample}. None if the point is outside of the grid."""
+        return self._core.probe([float(x) for x in point])
+
+    def render(self, scalar: str = "", *, size: Tuple[int, int] = (600, 600),
+               colours: Optional[str] = None, range: Union[str, Tuple[float, float], None] = None,
+               opacity: Union[str, Sequence[Tuple[float, float]], None] = None,
+               asinh: Optional[Tuple[float, float]] = None, opacity_unit: Optional[float] = None,
+               view: Optional[str] = None, position: Optional[Vector] = None, focal_point: Optional[Vector] = None,
+               view_up: Optional[Vector] = None, parallel_scale: Optional[float] = None,
+               view_angle: Optional[float] = None, scale: Vector = (1, 1, 1), clip_box: Optional[Vector] = None,
+               clip_planes: Sequence[Vector] = (), shade: bool = False, light: Vector = (0.3, 0.7, 0.25),
+               light_direction: Optional[Vector] = None, background: str = "white", lod_pixels: float = 1,
+               max_splats: Optional[int] = None, memory: Union[str, int] = "512M", threads: int = 0,
+               backend: str = "auto", keep_going: bool = False, progress: Optional[Progress] = None) -> Picture:
+        """Draws a picture, bit for bit the one of `curvisplat render` with the same options.
+
+        What is left out is chosen from the data; `Picture.options` says what was.
+
+        scalar: a name (default: the first that is not constant). size: (width, height) in pixels.
+        colours: a colour map (`curvisplat.colour_maps()`; NAME_r is reversed) or the path of a ParaView preset.
+        range: (low, high), "data", or percentiles such as "1%,99%". opacity: points (position 0..1, opacity 0..1), "ramp" or
+        "auto". asinh: (centre, width). opacity_unit: the length over which opacity accumulates.
+        view: iso, +x, -x, +y, -y, +z or -z; or a camera by position, focal_point, view_up and parallel_scale (half the
+        picture's height) or view_angle (perspective, degrees).
+        scale: factors of the data along x, y, z. clip_box: (x0, x1, y0, y1, z0, z1). clip_planes: (px, py, pz, nx, ny, nz)
+        each; nothing is drawn where n does not point. shade: light level surfaces with `light` = (ambient, diffuse,
+        specular), from the viewer or from light_direction.
+        lod_pixels: the largest error of a merged splat on the screen; 0 draws the finest level. memory: the limit, in
+        bytes or as "512M". progress: called with (phase, done, total, unit).
+
+        Raises UsageError for options that make no sense, Error if reading or drawing fails, KeyboardInterrupt after
+        Ctrl-C.
+        """
+        function = _given(tf=colours, range=range, asinh=asinh, opacity_unit=opacity_unit)
+        if opacity is not None:
+            function["opacity"] = _opacities(opacity)
+        camera = _given(view=view, position=position, focal_point=focal_point, view_up=view_up,
+                        parallel_scale=parallel_scale, view_angle=view_angle)
+        lit = shade or light_direction is not None
+        frame = {"size": tuple(size), "lod_pixels": lod_pixels, "max_splats": max_splats, "scale": tuple(scale),
+                 "clip_box": clip_box, "clip_planes": list(clip_planes), "light": tuple(light) if lit else None,
+                 "light_direction": light_direction, "background": background, "threads": threads,
+                 "memory": str(memory), "backend": backend, "keep_going": keep_going}
+        rgba, options, notes, statistics = self._core.render(scalar, function, camera, frame, progress)
+        picture = rgba.view(Picture)
+        picture.options, picture.notes, picture.statistics = options, notes, statistics
+        return picture
+
+
+def open(path: Union[str, os.PathLike]) -> Cache:
+    """Opens a splat cache, a directory NAME.splats. Raises Error if it is none or damaged."""
+    return Cache(path)

@@ -1,0 +1,91 @@
+"""Conversion: grids become caches."""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+
+import numpy as np
+
+from . import _core
+from ._arrays import Block, _values
+
+Path = Union[str, os.PathLike]
+Progress = Callable[[str, int, int, str], None]
+
+
+class Report(NamedTuple):
+    """What a conversion did. `samples`: nodes or cells of the grid, `blanked` of which are not drawn; `volume`: of the cells."""
+
+    samples: int
+    blanked: int
+    splats: int
+    bricks: int
+    levels: int
+    volume: float
+    merged_nodes: int
+    bytes: int
+    warnings: Sequence[str]
+
+
+def _options(overwrite: bool, resume: bool, blank_value: Optional[float], memory: Union[str, int, None], threads: int,
+             title: str) -> dict:
+    return {"overwrite": overwrite, "resume": resume, "blank_value": blank_value, "threads": threads, "title": title,
+            "memory": "" if memory is None else str(memory)}
+
+
+def convert(output: Path, grid: Path, solutions: Sequence[Path] = (), *, scalars: Sequence[str] = (),
+            time_step: Optional[int] = None, blank_value: Optional[float] = None, overwrite: bool = False,
+            resume: bool = False, memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
+            progress: Optional[Progress] = None) -> Report:
+    """Converts grid files (PLOT3D, VTK, CGNS, NetCDF) to the cache `output`, as `curvisplat convert` does.
+
+    scalars: names (default: all that the files store). blank_value: samples with this value are not drawn. resume: go on from an
+    interrupted conversion. memory: the limit of this process, in bytes or as "2G". progress: called with (phase, done,
+    total, unit). Raises Error, UsageError and, after Ctrl-C, KeyboardInterrupt; then no partial cache is left unless
+    `resume` was given.
+    """
+    options = _options(overwrite, resume, blank_value, memory, threads, title)
+    names = [scalars] if isinstance(scalars, str) else list(scalars)
+    return Report(**_core.convert_files(os.fspath(output), os.fspath(grid), [os.fspath(path) for path in solutions], names,
+                                        time_step, options, progress))
+
+
+def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = None, overwrite: bool = False,
+                   memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
+                   progress: Optional[Progress] = None) -> Report:
+    """Converts blocks in memory to the cache `output`. Samples that are NaN are not drawn. The arrays must not change meanwhile. `memory` does not count them.
+
+    Raises as convert() does; UsageError for arrays whose types or shapes do not fit.
+    """
+    if not blocks:
+        raise _core.UsageError("no block to convert; pass one Block or more")
+    names = list(blocks[0].scalars)
+    units = [(name, blocks[0].units.get(name, "")) for name in names]
+    tuples = []
+    for number, block in enumerate(blocks, 1):
+        name = block.name or f"block {number}"
+        missing = [scalar for scalar in names if scalar not in block.scalars]
+        if missing:
+            raise _core.UsageError(f"{name}: has no scalar '{missing[0]}', which the first block has")
+        blank = None if block.blank is None else np.asarray(block.blank)
+        values = [_values(block.scalars[scalar]) for scalar in names]
+        tuples.append((name, np.asarray(block.x), np.asarray(block.y), np.asarray(block.z), values, blank))
+    options = _options(overwrite, False, blank_value, memory, threads, title)
+    return Report(**_core.convert_arrays(os.fspath(output), tuples, units, options, progress))
+
+
+def convert_callable(output: Path, shapes: Sequence[Tuple[int, int, int]], read: Callable[..., Tuple[Any, ...]],
+                     scalars: Union[Sequence[str], Mapping[str, str]], *, blank_value: Optional[float] = None,
+                     overwrite: bool = False, memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
+                     progress: Optional[Progress] = None) -> Report:
+    """Converts a grid larger than memory that `read` hands out piece by piece.
+
+    shapes: (nk, nj, ni) of each block. scalars: names, or units by name. read(block, k0, k1, j0, j1, names) returns (x, y, z, [values of
+    each name], blank): arrays of shape (k1 - k0, j1 - j0, ni); blank is None or of bool. It is called three times for each piece, in any thread, one call at a
+    time. Raises as convert() does, and what `read` raises.
+    """
+    units = list(scalars.items()) if isinstance(scalars, Mapping) else [(name, "") for name in scalars]
+    options = _options(overwrite, False, blank_value, memory, threads, title)
+    return Report(**_core.convert_callable(os.fspath(output), [tuple(shape) for shape in shapes], units, read, options,
+                                           progress))

@@ -1,0 +1,80 @@
+#include "tools/python/open_cache.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "stream/base/error.h"
+#include "tools/options/picture_choice.h"
+#include "tools/python/interruptible.h"
+
+namespace py = pybind11;
+
+namespace curvisplat::python {
+namespace {
+
+/// Marks the cache as busy for a call.
+class Busy {
+ public:
+  explicit Busy(bool& busy) : busy_(busy) {
+    if (busy_) throw UsageError("the cache is drawing in another thread; open it once for each thread");
+    busy_ = true;
+  }
+  ~Busy() { busy_ = false; }
+  Busy(const Busy&) = delete;
+  Busy& operator=(const Busy&) = delete;
+
+ private:
+  bool& busy_;
+};
+
+/// A numpy array that owns the image's pixels.
+py::array_t<float> arrayOf(Image image) {
+  auto pixels = std::make_unique<std::vector<float>>(std::move(image.rgba));
+  const py::capsule owner(pixels.get(), [](void* at) { delete static_cast<std::vector<float>*>(at); });
+  const float* data = pixels.release()->data();
+  return py::array_t<float>({image.size.height, image.size.width, 4}, data, owner);
+}
+
+}  // namespace
+
+FrameRenderer& OpenCache::rendererOf(size_t variable, Backend backend, const TransferFunction& function) {
+  if (renderer_ && variable == variable_ && backend == backend_) {
+    renderer_->setTransferFunction(function);
+    return *renderer_;
+  }
+  renderer_.reset();  // its memory is given back before the next one takes some
+  renderer_ = std::make_unique<FrameRenderer>(reader_, variable, function, backend);
+  variable_ = variable;
+  backend_ = backend;
+  return *renderer_;
+}
+
+DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::object& progress) {
+  const Busy busy(busy_);
+  checkCameraArguments(arguments.camera);
+  DrawnPicture picture;
+  Image image;
+  runInterruptibly(progress, [&](Progress& of_work) {
+    const Manifest& manifest = reader_.manifest();
+    const FrameOptions& frame = arguments.frame;
+    const size_t variable = chooseVariable(reader_, arguments.scalar);
+    PictureChoice choice(reader_, variable, frame.scale);
+    const TransferFunction function = choice.function(arguments.scalar);
+    const CameraArguments camera = choice.camera(arguments.camera, function, frame.size);
+    const CameraMotion motion =
+        chooseCameraMotion(camera, manifest.lower * frame.scale, manifest.upper * frame.scale, frame.size);
+    image = rendererOf(variable, arguments.backend, function)
+                .render(motion.camera(0), frame, picture.statistics, &of_work);
+    picture.chosen = choice.chosenOptions();
+    picture.notes = function.notes();
+  });
+  picture.rgba = arrayOf(std::move(image));
+  return picture;
+}
+
+void OpenCache::release() {
+  const Busy busy(busy_);
+  renderer_.reset();
+}
+
+}  // namespace curvisplat::python

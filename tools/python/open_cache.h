@@ -1,0 +1,59 @@
+// An open cache as Python sees it: what it holds, and pictures of it.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "render/frame/frame.h"
+#include "stream/cache/cache_reader.h"
+#include "tools/options/camera_motion.h"
+#include "tools/options/scalar_arguments.h"
+
+namespace curvisplat::python {
+
+/// Everything a picture is drawn with. What the function and the camera leave out is chosen from the data.
+struct PictureArguments {
+  ScalarArguments scalar;
+  CameraArguments camera;
+  FrameOptions frame;
+  Backend backend = Backend::kAutomatic;
+};
+
+struct DrawnPicture {
+  pybind11::array_t<float> rgba;  // (height, width, 4), premultiplied
+  std::string chosen;             // options of `curvisplat render` that draw the same picture
+  std::vector<std::string> notes;
+  FrameStatistics statistics;
+};
+
+/// One call at a time: a second thread that calls render() gets a UsageError. Threads and decoded bricks are kept from one picture of a
+/// scalar to the next.
+class OpenCache {
+ public:
+  /// Throws Error.
+  explicit OpenCache(const std::filesystem::path& path) : path_(path), reader_(path) {}
+
+  const CacheReader& reader() const { return reader_; }
+  const std::filesystem::path& path() const { return path_; }
+  /// Throws UsageError and Error as `curvisplat render` does, and what stops runInterruptibly().
+  DrawnPicture render(const PictureArguments& arguments, const pybind11::object& progress);
+  /// Ends threads and gives back their memory; the next picture starts them again.
+  void release();
+
+ private:
+  FrameRenderer& rendererOf(size_t variable, Backend backend, const TransferFunction& function);
+
+  const std::filesystem::path path_;
+  const CacheReader reader_;
+  std::unique_ptr<FrameRenderer> renderer_;
+  size_t variable_ = 0;
+  Backend backend_ = Backend::kAutomatic;
+  bool busy_ = false;  // touched with the interpreter's lock held
+};
+
+}  // namespace curvisplat::python
