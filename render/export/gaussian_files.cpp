@@ -41,9 +41,10 @@ void append(std::vector<std::byte>& out, const T& value) {
 }
 
 std::vector<std::byte> plyOf(std::span<const GaussianSplat> splats) {
-  std::string header = fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", splats.size());
-  for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0",
-                           "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"})
+  std::string header =
+      fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", splats.size());
+  for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity",
+                           "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"})
     header += fmt::format("property float {}\n", name);
   header += "end_header\n";
   std::vector<std::byte> out;
@@ -52,8 +53,8 @@ std::vector<std::byte> plyOf(std::span<const GaussianSplat> splats) {
   for (const GaussianSplat& splat : splats) {
     const glm::vec3 colour = coefficientOf(splat.colour), scale = glm::log(positive(splat.deviation));
     append(out, std::array{splat.position.x, splat.position.y, splat.position.z, 0.0f, 0.0f, 0.0f, colour.x,
-                           colour.y, colour.z, logit(splat.opacity), scale.x, scale.y, scale.z, splat.rotation.w,
-                           splat.rotation.x, splat.rotation.y, splat.rotation.z});
+                           colour.y, colour.z, logit(splat.opacity), scale.x, scale.y, scale.z,
+                           splat.rotation.w, splat.rotation.x, splat.rotation.y, splat.rotation.z});
   }
   return out;
 }
@@ -101,7 +102,8 @@ std::vector<std::byte> spzBytes(std::span<const GaussianSplat> splats) {
 std::vector<std::byte> gzip(std::span<const std::byte> bytes) {
   z_stream stream{};
   constexpr int kGzipFormat = 16;
-  if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, MAX_WBITS + kGzipFormat, 8, Z_DEFAULT_STRATEGY) != Z_OK)
+  if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, MAX_WBITS + kGzipFormat, 8,
+                   Z_DEFAULT_STRATEGY) != Z_OK)
     throw Error("cannot compress: zlib has too little memory");
   std::vector<std::byte> out(deflateBound(&stream, static_cast<uLong>(bytes.size())));
   stream.next_out = reinterpret_cast<Bytef*>(out.data());

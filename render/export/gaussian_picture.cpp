@@ -91,7 +91,8 @@ Image drawGaussians(std::span<const GaussianSplat> splats, const Camera& camera,
   const View view = viewOf(camera, size);
   std::vector<std::pair<float, uint32_t>> order(splats.size());
   for (uint32_t n = 0; n < splats.size(); ++n)
-    order[n] = {static_cast<float>(glm::dot(glm::dvec3(splats[n].position) - view.position, view.forward)), n};
+    order[n] = {static_cast<float>(glm::dot(glm::dvec3(splats[n].position) - view.position, view.forward)),
+                n};
   std::sort(order.begin(), order.end());
   Image image(size);
   for (const auto& [depth, n] : order) blend(splats[n], footprintOf(splats[n], view, size), image);

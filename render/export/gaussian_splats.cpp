@@ -53,7 +53,8 @@ struct Eigen {
 /// Surface area of the ellipsoid with the semi-axes `a`, by Thomsen's formula: 1.1 % off at most.
 double surfaceOf(const glm::dvec3& a) {
   constexpr double kPower = 1.6075;
-  const double ab = std::pow(a.x * a.y, kPower), ac = std::pow(a.x * a.z, kPower), bc = std::pow(a.y * a.z, kPower);
+  const double ab = std::pow(a.x * a.y, kPower), ac = std::pow(a.x * a.z, kPower),
+               bc = std::pow(a.y * a.z, kPower);
   return 4 * std::numbers::pi * std::pow((ab + ac + bc) / 3, 1 / kPower);
 }
 
@@ -65,8 +66,9 @@ Cut cutOf(const CacheReader& cache, size_t variable, uint64_t max_splats) {
   CutOptions options;
   options.lod_pixels = 0;
   options.max_splats = max_splats;
-  Cut cut = chooseCut({cache.manifest().root, cache.bricks(), variables, subtrees}, view,
-                      [](const ValueBounds&) { return false; }, options);
+  Cut cut = chooseCut(
+      {cache.manifest().root, cache.bricks(), variables, subtrees}, view,
+      [](const ValueBounds&) { return false; }, options);
   if (cut.splats > max_splats)
     throw UsageError("{}: {} splats are too few: the coarsest level has {}; give --max-splats that",
                      cache.path().string(), max_splats, cut.splats);
@@ -98,7 +100,8 @@ GaussianSplat gaussianOf(const glm::dvec3& position, const glm::dmat3& a, double
                         std::sqrt(std::max(eigen.values.z, 0.0)));
   const double projected = surfaceOf(axes) / (4 * std::numbers::pi);
   const double depth =
-      projected > 0 ? extinction * weight / (2 * std::numbers::pi * kKernelSigma * kKernelSigma * projected) : 0;
+      projected > 0 ? extinction * weight / (2 * std::numbers::pi * kKernelSigma * kKernelSigma * projected)
+                    : 0;
   const GaussianOpacity opaque = gaussianOpacity(depth);
   GaussianSplat splat;
   splat.position = glm::vec3(position);
@@ -134,8 +137,7 @@ std::vector<GaussianSplat> gaussianSplats(const CacheReader& cache, size_t varia
         if (!(mean.w > 0)) continue;
         const double a0 = g.axis0[n], a1 = g.axis1[n], a2 = g.axis2[n];
         const glm::dmat3 a{a0, a0 * g.shear10[n], a0 * g.shear20[n], 0, a1, a1 * g.shear21[n], 0, 0, a2};
-        GaussianSplat splat =
-            gaussianOf(corner + glm::dvec3(g.x[n], g.y[n], g.z[n]), a, g.weight[n], mean.w);
+        GaussianSplat splat = gaussianOf(corner + glm::dvec3(g.x[n], g.y[n], g.z[n]), a, g.weight[n], mean.w);
         if (splat.opacity < kMinOpacity) continue;
         splat.colour = glm::vec3(glm::dvec3(mean) / mean.w);
         out.push_back(splat);

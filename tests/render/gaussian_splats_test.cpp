@@ -37,13 +37,15 @@ TEST(GaussianSplat, HasTheShapeOfOurs) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> number(-1, 1);
   for (int n = 0; n < 200; ++n) {
-    const double a0 = std::exp(3 * number(random)), a1 = std::exp(3 * number(random)), a2 = std::exp(3 * number(random));
+    const double a0 = std::exp(3 * number(random)), a1 = std::exp(3 * number(random)),
+                 a2 = std::exp(3 * number(random));
     const glm::dmat3 a{a0, a0 * number(random), a0 * number(random), 0, a1, a1 * number(random), 0, 0, a2};
     const GaussianSplat splat = gaussianOf({1, 2, 3}, a, 1e-6, 1);
     EXPECT_NEAR(glm::length(splat.rotation), 1, 1e-6);
     const glm::dmat3 axes = glm::mat3_cast(glm::dquat(splat.rotation));
     glm::dmat3 scaled = axes;
-    for (int axis = 0; axis < 3; ++axis) scaled[axis] *= static_cast<double>(splat.deviation[axis]) / kKernelSigma;
+    for (int axis = 0; axis < 3; ++axis)
+      scaled[axis] *= static_cast<double>(splat.deviation[axis]) / kKernelSigma;
     const glm::dmat3 found = scaled * glm::transpose(scaled), expected = a * glm::transpose(a);
     const double size = a0 * a0 + a1 * a1 + a2 * a2;
     for (int row = 0; row < 3; ++row)
@@ -110,8 +112,8 @@ TEST(GaussianFiles, OfPlyHaveTheirNumbersInTheirPlaces) {
   ASSERT_EQ(text.size(), at + 17 * sizeof(float));
   std::array<float, 17> numbers;
   std::memcpy(numbers.data(), text.data() + at, sizeof numbers);
-  const std::array<float, 17> expected{1, 2, 3, 0, 0, 0, 0, 1.7724539f, -1.7724539f, 0, std::log(0.5f), 0,
-                                       std::log(2.0f), 1, 0, 0, 0};
+  const std::array<float, 17> expected{
+      1, 2, 3, 0, 0, 0, 0, 1.7724539f, -1.7724539f, 0, std::log(0.5f), 0, std::log(2.0f), 1, 0, 0, 0};
   for (size_t n = 0; n < 17; ++n) EXPECT_NEAR(numbers[n], expected[n], 1e-6) << n;
 }
 

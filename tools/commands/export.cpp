@@ -98,8 +98,10 @@ void exportCache(const ExportArguments& arguments) {
   const StopOnSignals stopping(progress);
   const std::vector<GaussianSplat> splats = gaussianSplats(cache, variable, function, max_splats, progress);
   if (splats.empty())
-    throw Error("{}: nothing to export: the transfer function makes all of {} transparent; give --opacity or a smaller --opacity-unit",
-                arguments.cache.string(), cache.manifest().variables[variable].name);
+    throw Error(
+        "{}: nothing to export: the transfer function makes all of {} transparent; give --opacity or a "
+        "smaller --opacity-unit",
+        arguments.cache.string(), cache.manifest().variables[variable].name);
   writeGaussians(splats, arguments.output);
   fmt::print("{}: {} splats of {}, {:.1f} MiB\n", arguments.output.string(), splats.size(),
              cache.manifest().variables[variable].name,
@@ -121,8 +123,8 @@ void exportCache(const ExportArguments& arguments) {
 
 void addExport(CLI::App& app) {
   auto arguments = std::make_shared<ExportArguments>();
-  CLI::App* command =
-      app.add_subcommand("export", "Export a cache as 3D Gaussian splats, which web viewers and game engines draw");
+  CLI::App* command = app.add_subcommand(
+      "export", "Export a cache as 3D Gaussian splats, which web viewers and game engines draw");
   command->add_option("CACHE", arguments->cache, "Splat cache, a directory NAME.splats")->required();
   command->add_option("-o,--output", arguments->output, "File to write: .ply or .spz")->required();
   addScalarOption(*command, arguments->scalar);
