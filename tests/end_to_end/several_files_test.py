@@ -108,10 +108,10 @@ class SeveralFiles(unittest.TestCase):
 
     def test_blocks_in_several_files(self):
         p, q, r = self.fields(3)
-        write_vts(self.folder / "part_0.vts", 0, p=p)
-        write_vts(self.folder / "part_1.vts", NI - 1, p=q, r=r)
-        info = self.info("part_0.vts", "part_1.vts")
-        self.assertEqual([block["name"] for block in info["blocks"]], ["part_0", "part_1"])
+        write_vts(self.folder / "left.vts", 0, p=p)
+        write_vts(self.folder / "right.vts", NI - 1, p=q, r=r)
+        info = self.info("left.vts", "right.vts")
+        self.assertEqual([block["name"] for block in info["blocks"]], ["left", "right"])
         self.assertEqual([s["name"] for s in info["scalars"]], ["p"])
         both = np.stack([p, q])
         np.testing.assert_allclose(self.range_of(info, "p"), [both.min(), both.max()], rtol=1e-6)

@@ -10,6 +10,7 @@
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
 #include "tools/options/option_parsers.h"
+#include "tools/options/step_arguments.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/stop_signals.h"
 #include "tools/viewer/viewer.h"
@@ -22,6 +23,7 @@ struct ViewArguments {
   std::string size = "1200x800", backend = "auto";
   std::optional<std::filesystem::path> state;
   std::optional<std::string> scalar, memory, frame_time;
+  StepArguments steps;
 };
 
 void view(const ViewArguments& arguments) {
@@ -32,7 +34,7 @@ void view(const ViewArguments& arguments) {
   options.scalar = arguments.scalar;
   if (arguments.memory) options.memory_bytes = parseMemory("--memory", *arguments.memory);
   if (arguments.frame_time) options.target_s = parsePositive("--frame-time", *arguments.frame_time) / 1000;
-  const CacheReader cache(arguments.cache);
+  const CacheReader cache = openAtStep(arguments.cache, arguments.steps);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   try {
@@ -63,6 +65,7 @@ void addView(CLI::App& app) {
   command->add_option("--frame-time", arguments->frame_time,
                       "Time budget of a picture while the camera moves, in ms (default 33 with a graphics "
                       "card, 100 without)");
+  addStepOptions(*command, arguments->steps, "Time steps");
   command->callback([arguments] { view(*arguments); });
 }
 

@@ -9,6 +9,7 @@
 #include "preprocess/formats/cgns/cgns_source.h"
 #include "preprocess/formats/netcdf/netcdf_source.h"
 #include "preprocess/formats/open/combined_source.h"
+#include "preprocess/formats/open/file_series.h"
 #include "preprocess/formats/open/foreign_formats.h"
 #include "preprocess/formats/open/unpacked_source.h"
 #include "preprocess/formats/plot3d/plot3d_meta.h"
@@ -36,9 +37,14 @@ std::unique_ptr<GridSource> openAs(const OpenGridOptions& options) {
   return std::make_unique<Source>(options);
 }
 
+std::unique_ptr<GridSource> openListedFile(const OpenGridOptions& options) {
+  return openFileSeries(options, openGrid);
+}
+
 constexpr GridFormat kFormats[] = {
     {isVtkXml, openVtkXml, MoreFiles::kCombined},
     {isVtkLegacy, openVtkLegacy, MoreFiles::kCombined},
+    {isFileSeries, openListedFile, MoreFiles::kNone},  // before .p3d, which takes all JSON files
     {isPlot3dMeta, openPlot3dMeta, MoreFiles::kNone},
     {CgnsFile::recognises, openAs<CgnsSource>,
      MoreFiles::kCombined},  // before NetCDF, which takes all HDF5 files
