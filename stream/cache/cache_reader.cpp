@@ -143,15 +143,16 @@ class CacheReader::State::ValuesDecoder {
   ValuesDecoder(const State& state, uint32_t brick, size_t variable, ReadTimes& times)
       : state_(state), brick_(brick), variable_(variable), times_(times) {}
 
-  /// `stream`: of `step`, verified; of the file `path`.
-  void decode(uint64_t step, const InputFile& file, std::span<const std::byte> stream,
+  /// `stream`: that of step `of_step`, verified; it is in `file`.
+  void decode(uint64_t of_step, const InputFile& file, std::span<const std::byte> stream,
               const VariableArrays<float>& out) {
     if (++streams_ > kMaxStreams) refuse(file, fmt::format("it needs more than {} streams", kMaxStreams));
     TimeReferences references;
     State::decode(file, brick_, times_, [&] { references.steps_back = stepsBackOf(stream); });
     // The one further back first: the other may be predicted from it as well.
     for (const size_t n : {size_t{1}, size_t{0}})
-      if (references.steps_back[n] > 0) references.values[n] = earlier(step, references.steps_back[n], file);
+      if (references.steps_back[n] > 0)
+        references.values[n] = earlier(of_step, references.steps_back[n], file);
     State::decode(file, brick_, times_,
                   [&] { decodeVariable(state_.folder->bricks()[brick_], stream, out, references); });
   }
@@ -162,11 +163,11 @@ class CacheReader::State::ValuesDecoder {
     SplatVariable values;
   };
 
-  VariableArrays<const float> earlier(uint64_t step, uint64_t back, const InputFile& from) {
+  VariableArrays<const float> earlier(uint64_t of_step, uint64_t back, const InputFile& from) {
     const auto& steps = state_.series->steps;
-    if (back > step || steps[step - back].geometry != steps[step].geometry)
+    if (back > of_step || steps[of_step - back].geometry != steps[of_step].geometry)
       refuse(from, fmt::format("it is predicted from {} steps back, where its geometry has no step", back));
-    const uint64_t at = step - back;
+    const uint64_t at = of_step - back;
     for (const auto& known : earlier_)
       if (known->step == at) return arraysOf(std::as_const(known->values));
     const auto file = state_.earlierValues(at, variable_);

@@ -31,9 +31,9 @@ struct FrameRequest {
   Camera camera;
   FrameOptions options;
   bool moving = false;
-  double target_s = 0.1;              // time budget of a picture while moving
-  uint64_t step = 0;                  // time step
-  std::optional<uint64_t> next_step;  // is likely to be wanted next, with this camera: read ahead
+  double target_s = 0.1;                   // time budget of a picture while moving
+  uint64_t step = 0;                       // time step
+  std::optional<uint64_t> next_step = {};  // is likely to be wanted next, with this camera: read ahead
 };
 
 struct ShownFrame {
