@@ -67,6 +67,7 @@ struct GridDescription {
   std::string time_unit, calendar;    // of the times, by the CF conventions; may be empty
   std::string blanking;               // the files' rule for blanking in words; empty: iblank or the like
   std::vector<std::string> warnings;  // "bluntfinq.bin: 484 trailing bytes ignored"
+  std::vector<std::string> notes;     // what the files say besides: "boundaries BCWall 3, BCInflow 1"
 };
 
 /// The nodes of a NodeBox, i fastest, then j, then k. The source resizes the arrays, which keep their

@@ -253,6 +253,63 @@ TEST(DerivedSource, OfTheGridAloneAreItsIndicesAndVolumes) {
   }
 }
 
+TEST(DerivedSource, VolumesOfStretchedAndTwistedCellsAreExact) {
+  // Nodes are stretched along i by a factor of 3 a step, and turned from plane to plane. Node (2, 2, 1) is blanked.
+  const auto place = [](double i, double j, double k) {
+    const double x = std::pow(3.0, i), angle = 0.2 * k;
+    return glm::dvec3(x * std::cos(angle) - j * std::sin(angle), x * std::sin(angle) + j * std::cos(angle),
+                      k);
+  };
+  auto grid = std::make_unique<NamedGrid>(std::vector{gridBlock(4, 5, 3)}, std::vector<std::string>{},
+                                          [&](const GridNode& node) {
+                                            const bool blank = node.i == 2 && node.j == 2 && node.k == 1;
+                                            return NodeValues{place(node.i, node.j, node.k), {}, blank};
+                                          });
+  const DerivedSource source(std::move(grid), {});
+  const Values values = valuesOf(source, {"volume"});
+  // The integral of the trilinear map's Jacobian by Gauss' points, which are exact for it.
+  const auto volume = [&](int i, int j, int k) {
+    double sum = 0;
+    for (int g = 0; g < 8; ++g) {
+      const double u[3] = {0.5 + (g & 1 ? 1 : -1) / std::sqrt(12.0), 0.5 + (g & 2 ? 1 : -1) / std::sqrt(12.0),
+                           0.5 + (g & 4 ? 1 : -1) / std::sqrt(12.0)};
+      glm::dmat3 jacobian(0.0);
+      for (int c = 0; c < 8; ++c) {
+        const int at[3] = {c & 1, c >> 1 & 1, c >> 2};
+        for (int axis = 0; axis < 3; ++axis) {
+          double weight = 1;
+          for (int a = 0; a < 3; ++a) {
+            const double side = at[a] ? 1 : -1;
+            weight *= a == axis ? side : at[a] ? u[a] : 1 - u[a];
+          }
+          jacobian[axis] += weight * place(i + at[0], j + at[1], k + at[2]);
+        }
+      }
+      sum += glm::determinant(jacobian) / 8;
+    }
+    return std::abs(sum);
+  };
+  size_t n = 0;
+  for (int k = 0; k < 3; ++k)
+    for (int j = 0; j < 5; ++j)
+      for (int i = 0; i < 4; ++i, ++n) {
+        double sum = 0;
+        int cells = 0;
+        for (int c = 0; c < 8; ++c) {
+          const int at[3] = {i - (c & 1), j - (c >> 1 & 1), k - (c >> 2)};
+          const auto has = [&](int axis, int node) { return at[axis] <= node && node <= at[axis] + 1; };
+          if (at[0] < 0 || at[1] < 0 || at[2] < 0 || at[0] > 2 || at[1] > 3 || at[2] > 1) continue;
+          if (has(0, 2) && has(1, 2) && has(2, 1)) continue;
+          sum += volume(at[0], at[1], at[2]);
+          ++cells;
+        }
+        if (cells == 0 || (i == 2 && j == 2 && k == 1))
+          EXPECT_TRUE(std::isnan(values("volume", n))) << n;
+        else
+          EXPECT_NEAR(values("volume", n), sum / cells, 1e-5 * sum / cells) << n;
+      }
+}
+
 TEST(DerivedSource, TakesCgnsNamesAndStoredPressure) {
   auto grid = std::make_unique<NamedGrid>(
       std::vector{gridBlock(5, 5, 5)},

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <functional>
 #include <numbers>
 #include <thread>
@@ -477,16 +478,19 @@ TEST_P(Netcdf, WhatIsNoGridIsSaid) {
     NetcdfWriter file(path_, GetParam());
     addAxes(file, 4, 3, 2);
     file.dimension("plev", 2);
-    file.variable("plev", kSingle, {"plev"}, {{"units", "Pa"}, {"positive", "down"}},
+    file.variable("plev", kSingle, {"plev"}, {{"units", "kg m-3"}, {"positive", "down"}},
                   [](const Index& n) { return 1e5 - 1e4 * static_cast<double>(n[0]); });
     file.variable("air", kSingle, {"plev", "lat", "lon"}, {}, [](const Index&) { return 1.0; });
   }
-  EXPECT_NE(errorOf().find("air: plev has the unit 'Pa'; expected a length"), std::string::npos) << errorOf();
+  EXPECT_NE(errorOf().find("air: plev has the unit 'kg m-3'; expected a length or a pressure"),
+            std::string::npos)
+      << errorOf();
   {
     NetcdfWriter file(path_, GetParam());
     file.dimension("a", 4);
     file.dimension("b", 4);
     file.dimension("c", 4);
+    file.variable("c", kSingle, {"c"}, {{"units", "1"}}, [](const Index&) { return 1.0; });
     file.variable("bare", kSingle, {"a", "b", "c"}, {}, [](const Index&) { return 1.0; });
   }
   EXPECT_NE(errorOf().find("no longitude and latitude, or x and y, on its dimensions a, b, c"),
@@ -513,8 +517,9 @@ TEST_P(Netcdf, WrongStepsAndMoreFilesAreRefused) {
   nemo::write(path_, GetParam(), false);
   EXPECT_NE(errorOf({}, 3).find("has 3 time steps; --time-step 3 is out of range"), std::string::npos)
       << errorOf({}, 3);
-  options_.solutions = {"more.q"};
-  EXPECT_NE(errorOf().find("contains its own scalars"), std::string::npos) << errorOf();
+  std::ofstream(folder_ / "more.q") << "no NetCDF, but longer than a signature";
+  options_.solutions = {folder_ / "more.q"};
+  EXPECT_NE(errorOf().find("is not a NetCDF file; expected one"), std::string::npos) << errorOf();
 }
 
 TEST_P(Netcdf, ThreadsMayReadAtOnce) {

@@ -160,4 +160,16 @@ void CgnsWriter::zoneSteps(const std::vector<std::string>& solutions, const std:
   if (!grids.empty()) writeNames("GridCoordinatesPointers", grids);
 }
 
+void CgnsWriter::pointers(const std::string& name, const std::vector<std::string>& solutions) {
+  check(cg_goto(file_, base_, "Zone_t", zone_, "ZoneIterativeData_t", 1, "end"));
+  writeNames(name.c_str(), solutions);
+}
+
+void CgnsWriter::boundary(const std::string& name, bool wall) {
+  const std::array<cgsize_t, 6> range{1, 1, 1, nodes_[0], nodes_[1], 1};
+  int condition = 0;
+  check(cg_boco_write(file_, base_, zone_, name.c_str(), wall ? CGNS_ENUMV(BCWall) : CGNS_ENUMV(BCInflow),
+                      CGNS_ENUMV(PointRange), 2, range.data(), &condition));
+}
+
 }  // namespace curvisplat

@@ -55,6 +55,10 @@ class CgnsWriter {
                  bool iterations = false);
   /// For each step the name of a solution and, unless `grids` is empty, of coordinates.
   void zoneSteps(const std::vector<std::string>& solutions, const std::vector<std::string>& grids = {});
+  /// A further table of solutions for each step, such as IOSS' CellCenterSolutionPointers; after zoneSteps().
+  void pointers(const std::string& name, const std::vector<std::string>& solutions);
+  /// A wall or an inflow on the lowest plane of the last zone.
+  void boundary(const std::string& name, bool wall);
 
  private:
   void writeArray(const std::string& name, const CgnsWriterField& field, const std::array<int, 3>& values,

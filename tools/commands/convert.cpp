@@ -143,10 +143,12 @@ void addConvert(CLI::App& app) {
   auto arguments = std::make_shared<ConvertArguments>();
   CLI::App* command = app.add_subcommand("convert", "Convert a grid to a splat cache, in bounded memory");
   command->add_option("GRID", arguments->grid.grid, "Grid file: PLOT3D, VTK, CGNS or NetCDF")->required();
-  command->add_option(
-      "SOLUTION", arguments->grid.solutions,
-      "PLOT3D solution (Q) and function files of the grid. Numbered files are time steps: q.0 q.1 "
-      "..., or a quoted pattern such as 'q.*' or 'run_%04d.vts'");
+  command->add_option("SOLUTION", arguments->grid.solutions,
+                      "Further files of the grid: PLOT3D solution (Q) and function files; NetCDF, VTK or "
+                      "CGNS files with fields, "
+                      "masks, coordinates or blocks. Numbered files are time steps: q.0 q.1 ..., or a quoted "
+                      "pattern such as 'q.*' "
+                      "or 'run_%04d.vts'");
   command->add_option("-o,--output", arguments->output, "Splat cache to write: a directory NAME.splats");
   command
       ->add_option("--scalar", arguments->scalars,

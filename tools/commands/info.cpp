@@ -223,7 +223,7 @@ void addInfo(CLI::App& app) {
   CLI::App* info = app.add_subcommand("info", "Print the contents of a cache or a grid");
   const auto options = std::make_shared<InfoOptions>();
   info->add_option("path", options->grid.grid, "Splat cache (a directory) or grid file");
-  info->add_option("solution", options->grid.solutions, "PLOT3D solution (Q) and function files of the grid");
+  info->add_option("solution", options->grid.solutions, "Further files of the grid, as for convert");
   info->add_flag("--json", options->json, "Print one JSON object");
   info->add_flag("--system", options->system, "Print the drawing back ends of this machine instead");
   info->add_flag("--verify", options->verify,

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "preprocess/convert/preflight.h"
+#include "preprocess/grid/calendar.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/survey/block_overlap.h"
 #include "preprocess/survey/grid_statistics.h"
@@ -68,6 +69,37 @@ nlohmann::ordered_json jsonOf(const ScalarRange& range, bool lower) {
   return lower ? range.min : range.max;
 }
 
+/// What blanks nodes, in words; empty if nothing does.
+std::string blankingRule(const GridDescription& description) {
+  if (!description.blanking.empty()) return description.blanking;
+  const bool any = std::any_of(description.blocks.begin(), description.blocks.end(),
+                               [](const GridBlock& block) { return block.has_blanking; });
+  return any ? "iblank is 0" : "";
+}
+
+std::optional<std::string> dateOfStep(const GridDescription& description, size_t step) {
+  if (step >= description.times.size()) return std::nullopt;
+  return dateOf(description.times[step], description.time_unit, description.calendar);
+}
+
+/// "36 days since 1950-01-01 (1950-02-06 00:00:00)"
+std::string timeText(const GridDescription& description, size_t step) {
+  std::string text = fmt::format("{:.9g}", description.times[step]);
+  if (!description.time_unit.empty()) text += fmt::format(" {}", description.time_unit);
+  if (const auto date = dateOfStep(description, step)) text += fmt::format(" ({})", *date);
+  return text;
+}
+
+void printTimes(const GridDescription& description) {
+  const size_t steps = description.times.size();
+  if (steps == 1 && !description.time_unit.empty()) fmt::print("time      {}\n", timeText(description, 0));
+  if (steps < 2) return;
+  fmt::print("times     {} steps, {} .. {}\n", steps, timeText(description, 0),
+             timeText(description, steps - 1));
+  fmt::print("time      {}; step {} was read\n", timeText(description, description.time_step),
+             description.time_step);
+}
+
 nlohmann::ordered_json blocksAsJson(const GridInfo& info) {
   auto blocks = nlohmann::ordered_json::array();
   for (size_t b = 0; b < info.description->blocks.size(); ++b) {
@@ -111,7 +143,8 @@ nlohmann::ordered_json asJson(const GridInfo& info) {
   json["nodes"] = info.nodes;
   json["coordinate_bytes"] = description.coordinate_bytes;
   const BlankCounts blank = info.statistics.blank();
-  json["blanked"] = {{"iblank", blank.by_grid}, {"not_finite", blank.not_finite}};
+  json["blanked"] = {{"by_grid", blank.by_grid}, {"not_finite", blank.not_finite}};
+  json["blanking"] = blankingRule(description);
   json["cells"] = {{"count", info.statistics.cells()},
                    {"degenerate", info.statistics.degenerate()},
                    {"inverted", info.statistics.inverted()}};
@@ -133,6 +166,9 @@ nlohmann::ordered_json asJson(const GridInfo& info) {
                             {"time", flow.time}});
   json["times"] = description.times;
   json["time_step"] = description.time_step;
+  if (!description.time_unit.empty()) json["time_unit"] = description.time_unit;
+  if (!description.calendar.empty()) json["calendar"] = description.calendar;
+  if (const auto date = dateOfStep(description, description.time_step)) json["date"] = *date;
   json["overlaps"] = nlohmann::ordered_json::array();
   for (const BlockOverlap& overlap : info.overlaps)
     json["overlaps"].push_back(
@@ -144,6 +180,7 @@ nlohmann::ordered_json asJson(const GridInfo& info) {
                       {"cache_bytes_per_further_scalar", info.estimate.bytes_per_further_scalar},
                       {"seconds", info.estimate.seconds},
                       {"threads", info.threads}};
+  json["notes"] = description.notes;
   json["warnings"] = description.warnings;
   return json;
 }
@@ -154,7 +191,7 @@ void printBlocks(const GridInfo& info) {
     const GridBlock& block = description.blocks[b];
     const BlockStatistics& statistics = info.statistics.blocks[b];
     std::string remarks;
-    if (block.has_blanking) remarks += fmt::format(", iblank blanks {}", statistics.blank.by_grid);
+    if (statistics.blank.by_grid > 0) remarks += fmt::format(", {} blanked", statistics.blank.by_grid);
     if (statistics.degenerate > 0) remarks += fmt::format(", {} degenerate cells", statistics.degenerate);
     if (statistics.inverted > 0) remarks += fmt::format(", {} inverted cells", statistics.inverted);
     fmt::print("  {:<9} {}x{}x{}{}\n", block.name, block.ni, block.nj, block.nk, remarks);
@@ -196,15 +233,17 @@ void printAsText(const GridInfo& info) {
   for (const std::string& warning : description.warnings) fmt::print("warning: {}\n", warning);
   if (!info.overlaps.empty()) fmt::print("warning: {}\n", overlapWarning(description, info.overlaps));
   const BlankCounts blank = info.statistics.blank();
-  fmt::print("nodes     {} in {} block{}; {} blanked by iblank, {} not finite\n", info.nodes,
+  fmt::print("nodes     {} in {} block{}; {} blanked by the grid, {} not finite\n", info.nodes,
              description.blocks.size(), description.blocks.size() == 1 ? "" : "s", blank.by_grid,
              blank.not_finite);
+  if (const std::string rule = blankingRule(description); !rule.empty()) fmt::print("blanking  {}\n", rule);
   printBlocks(info);
   fmt::print("cells     {}; {} degenerate, {} inverted\n", info.statistics.cells(),
              info.statistics.degenerate(), info.statistics.inverted());
   for (size_t axis = 0; axis < 3; ++axis)
     fmt::print("{}         {:.9g} .. {:.9g}\n", "xyz"[axis], info.statistics.bounds[axis].min,
                info.statistics.bounds[axis].max);
+  for (const std::string& note : description.notes) fmt::print("note      {}\n", note);
   fmt::print("stored    coordinates in {} precision\n",
              description.coordinate_bytes == 8 ? "double" : "single");
   printScalars(info);
@@ -213,9 +252,7 @@ void printAsText(const GridInfo& info) {
     fmt::print("flow      block {}: Mach {:.6g}, alpha {:.6g}, Reynolds {:.6g}, time {:.6g}\n",
                flow.block + 1, flow.mach, flow.alpha, flow.reynolds, flow.time);
   }
-  if (description.times.size() > 1)
-    fmt::print("times     {} steps, {:.6g} .. {:.6g}; step {} was read\n", description.times.size(),
-               description.times.front(), description.times.back(), description.time_step);
+  printTimes(description);
   fmt::print(
       "estimate  a cache of about {} with one scalar, {} more per additional scalar; about {:.1f} s on {} "
       "thread{}\n",

@@ -57,8 +57,8 @@ convert grids from arrays of their own and draw them.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libcurvisplat-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(development_packages
-  libboost-iostreams-dev libcgns-dev libfmt-dev libgl-dev libglm-dev libhdf5-dev libhwy-dev liblz4-dev libnetcdf-dev
-  libopenvdb-dev libpng-dev libpugixml-dev libtbb-dev libtinyexr-dev liburing-dev libxxhash-dev libzstd-dev
+  libboost-iostreams-dev libcgns-dev libfmt-dev libgl-dev libglm-dev libhdf5-dev libhwy-dev liblz4-dev liblzma-dev libnetcdf-dev
+  libopenvdb-dev libpng-dev libproj-dev libpugixml-dev libtbb-dev libtinyexr-dev liburing-dev libxxhash-dev libzstd-dev
   nlohmann-json3-dev pkg-config zlib1g-dev)
 if(CURVISPLAT_ANNOTATIONS)
   list(APPEND development_packages libcairo2-dev)

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
-#include <mutex>
 #include <span>
 
 #include "preprocess/formats/cgns/cgns_hdf5.h"
@@ -137,7 +136,7 @@ CgnsFile::CgnsFile(std::filesystem::path path) : path_(std::move(path)) {
     hdf5_ = std::make_unique<CgnsHdf5>(path_);
     return;
   }
-  const std::lock_guard lock(dataLibraryMutex());
+  const MutexLock lock(dataLibraryMutex());
   if (cgio_open_file(path_.c_str(), CGIO_MODE_READ, CGIO_FILE_NONE, &file_) != CGIO_ERR_NONE) fail("");
   if (cgio_get_root_id(file_, &root_) != CGIO_ERR_NONE) {
     const std::string message = lastMessage();
@@ -148,7 +147,7 @@ CgnsFile::CgnsFile(std::filesystem::path path) : path_(std::move(path)) {
 
 CgnsFile::~CgnsFile() {
   if (hdf5_) return;
-  const std::lock_guard lock(dataLibraryMutex());
+  const MutexLock lock(dataLibraryMutex());
   cgio_close_file(file_);
 }
 
@@ -169,7 +168,7 @@ void CgnsFile::damaged(const std::string& node_path, std::string_view what) cons
 
 std::vector<CgnsNode> CgnsFile::children(const CgnsNode& node) const {
   if (hdf5_) return hdf5_->children(node);
-  const std::lock_guard lock(dataLibraryMutex());
+  const MutexLock lock(dataLibraryMutex());
   const OpenNode open(*this, node.path);
   int count = 0;
   if (cgio_number_children(file_, open.id(), &count) != CGIO_ERR_NONE) fail(node.path);
@@ -236,7 +235,7 @@ CgnsShape CgnsFile::shape(const CgnsNode& node) const {
     checkShape(node, shape);
     return shape;
   }
-  const std::lock_guard lock(dataLibraryMutex());
+  const MutexLock lock(dataLibraryMutex());
   return storedShape(OpenNode(*this, node.path), node);
 }
 
@@ -257,7 +256,7 @@ std::vector<double> CgnsFile::numbers(const CgnsNode& node) const {
     hdf5_->readAll(node, values);
     return values;
   }
-  const std::lock_guard lock(dataLibraryMutex());
+  const MutexLock lock(dataLibraryMutex());
   const OpenNode open(*this, node.path);
   const CgnsShape found = storedShape(open, node);
   checkSmall(node, found, "R8");
@@ -285,7 +284,7 @@ std::vector<std::string> CgnsFile::texts(const CgnsNode& node) const {
     stored.resize(found.count());
     hdf5_->readAll(node, stored);
   } else {
-    const std::lock_guard lock(dataLibraryMutex());
+    const MutexLock lock(dataLibraryMutex());
     const OpenNode open(*this, node.path);
     const CgnsShape found = storedShape(open, node);
     checkSmall(node, found, "C1");
@@ -309,7 +308,7 @@ void CgnsFile::readAdf(const CgnsNode& node, const CgnsShape& shape, const CgnsB
       const Selection file = selectionOf({box.first[0], box.first[1] + j, box.first[2] + k}, count);
       const Selection memory = selectionOf({}, count);
       {
-        const std::lock_guard lock(dataLibraryMutex());
+        const MutexLock lock(dataLibraryMutex());
         const OpenNode open(*this, node.path);
         if (cgio_read_data(file_, open.id(), file.start.data(), file.end.data(), file.stride.data(), 3,
                            memory.end.data(), memory.start.data(), memory.end.data(), memory.stride.data(),

@@ -56,6 +56,7 @@ CgnsSource::CgnsSource(const OpenGridOptions& options)
   description_.times = tree_.times;
   description_.time_step = options.time_step.value_or(0);
   description_.warnings = tree_.warnings;
+  description_.notes = tree_.notes;
   description_.coordinate_bytes = 4;
   for (const CgnsZone& zone : tree_.zones) {
     const std::string name = tree_.bases > 1 ? zone.base + "/" + zone.name : zone.name;

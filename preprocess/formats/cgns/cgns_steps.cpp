@@ -52,6 +52,36 @@ const CgnsNode* pointedAt(const CgnsFile& file, const std::vector<CgnsNode>& zon
   return node;
 }
 
+struct StepOf {
+  size_t steps;
+  uint32_t step;
+};
+
+/// Adds the solutions of a step that FlowSolutionPointers names. IOSS has a table of its own for each location
+/// besides (VertexSolutionPointers, CellCenterSolutionPointers), and FlowSolutionPointers may then name
+/// nothing that exists. False if there is no such table.
+bool pointedSolutions(const CgnsFile& file, const std::vector<CgnsNode>& zone,
+                      const std::vector<CgnsNode>& data, const StepOf& at, std::vector<CgnsNode>& solutions) {
+  const CgnsNode* const standard = named(data, "FlowSolutionPointers");
+  bool other = false;
+  for (const CgnsNode& pointers : data) {
+    if (!pointers.name.ends_with("SolutionPointers") || &pointers == standard) continue;
+    other = true;
+    if (const CgnsNode* const solution = pointedAt(file, zone, pointers, at.steps, at.step))
+      solutions.push_back(*solution);
+  }
+  if (!standard) return other;
+  if (other) {
+    const std::vector<std::string> names = file.texts(*standard);
+    const bool known = at.step < names.size() && named(zone, names[at.step].c_str());
+    if (!known) return true;
+  }
+  const CgnsNode* const solution = pointedAt(file, zone, *standard, at.steps, at.step);
+  const auto listed = [&](const CgnsNode& one) { return one.path == solution->path; };
+  if (solution && std::none_of(solutions.begin(), solutions.end(), listed)) solutions.push_back(*solution);
+  return true;
+}
+
 /// Assigns each solution to the first time step that has none of its fields yet.
 std::vector<std::vector<CgnsNode>> inOrder(const CgnsFile& file, const std::vector<CgnsNode>& zone) {
   std::vector<std::vector<CgnsNode>> steps;
@@ -122,11 +152,7 @@ CgnsZoneStep readCgnsZoneStep(const CgnsFile& file, const std::vector<CgnsNode>&
     if (const CgnsNode* const moved = pointedAt(file, zone, *pointers, steps.count, step)) grid = moved;
   if (grid) result.grid = *grid;
 
-  if (const CgnsNode* const pointers = named(data, "FlowSolutionPointers")) {
-    if (const CgnsNode* const solution = pointedAt(file, zone, *pointers, steps.count, step))
-      result.solutions.push_back(*solution);
-    return result;
-  }
+  if (pointedSolutions(file, zone, data, {steps.count, step}, result.solutions)) return result;
   std::vector<std::vector<CgnsNode>> order = inOrder(file, zone);
   result.implied_steps = std::max<size_t>(1, order.size());
   if (order.size() == 1)

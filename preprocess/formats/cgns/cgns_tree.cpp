@@ -48,6 +48,8 @@ class TreeReader {
   UnitContext below(const Nodes& children, UnitContext units) const;
   CgnsArray arrayOf(const CgnsNode& node, const Dims& dims, const std::array<uint64_t, 6>& rind) const;
   std::array<uint64_t, 6> rindOf(const Nodes& children) const;
+  void noteConditions(const Nodes& zone);
+  void writeNotes();
   void warnOfOmissions();
 
   const CgnsFile& file_;
@@ -56,6 +58,9 @@ class TreeReader {
   std::optional<std::vector<double>> stored_times_;          // from BaseIterativeData
   size_t implied_steps_ = 1;                                 // from the order of the solutions
   std::map<std::string, std::vector<std::string>> omitted_;  // reason -> zones
+  std::map<std::string, size_t> conditions_;                 // type of boundary condition -> how many
+  std::vector<std::string> families_, units_;
+  size_t holes_ = 0;  // sets of overset holes
 };
 
 CgnsTree TreeReader::read() {
@@ -75,7 +80,36 @@ CgnsTree TreeReader::read() {
   }
   chosenTimeStep(file_.path().string(), tree_.times, step_);
   warnOfOmissions();
+  writeNotes();
   return std::move(tree_);
+}
+
+void TreeReader::noteConditions(const Nodes& zone) {
+  for (const CgnsNode& node : zone) {
+    if (node.label == "ZoneBC_t")
+      for (const CgnsNode& condition : file_.children(node))
+        if (condition.label == "BC_t") ++conditions_[file_.text(condition)];
+    if (node.label == "ZoneGridConnectivity_t")
+      for (const CgnsNode& connectivity : file_.children(node))
+        holes_ += connectivity.label == "OversetHoles_t";
+  }
+}
+
+void TreeReader::writeNotes() {
+  const auto listed = [](const std::vector<std::string>& names) {
+    const size_t count = std::min<size_t>(names.size(), 8);
+    const std::string more = names.size() > count ? fmt::format(" and {} more", names.size() - count) : "";
+    return fmt::format("{}{}", fmt::join(names.begin(), names.begin() + static_cast<ptrdiff_t>(count), ", "),
+                       more);
+  };
+  std::vector<std::string> conditions;
+  for (const auto& [type, count] : conditions_) conditions.push_back(fmt::format("{} {}", type, count));
+  if (!conditions.empty()) tree_.notes.push_back("boundary conditions: " + listed(conditions));
+  if (!families_.empty()) tree_.notes.push_back("families: " + listed(families_));
+  if (!units_.empty()) tree_.notes.push_back("units: " + listed(units_));
+  if (holes_ > 0)
+    tree_.warnings.push_back(
+        fmt::format("{} sets of overset holes are not applied: their cells are drawn", holes_));
 }
 
 void TreeReader::readBase(const CgnsNode& base) {
@@ -93,6 +127,9 @@ void TreeReader::readBase(const CgnsNode& base) {
     return;
   }
   const UnitContext units = below(children, {});
+  for (const CgnsNode& node : children)
+    if (node.label == "Family_t") families_.push_back(node.name);
+  if (units_.empty()) units_ = units.units;
   const CgnsSteps steps = readCgnsSteps(file_, children);
   if (steps.count > 0 && !stored_times_) stored_times_ = steps.times;
   const size_t before = tree_.zones.size();
@@ -137,6 +174,7 @@ void TreeReader::readZone(const CgnsNode& base, const CgnsNode& node, const Unit
   zone.coordinates = readCoordinates(*step.grid, zone.nodes);
   const UnitContext units = below(children, base_units);
   for (const CgnsNode& solution : step.solutions) addSolution(solution, units, zone);
+  noteConditions(children);
   tree_.zones.push_back(std::move(zone));
 }
 

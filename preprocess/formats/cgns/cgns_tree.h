@@ -43,6 +43,7 @@ struct CgnsTree {
   size_t bases = 0;             // number of bases that the zones belong to
   std::vector<double> times;    // [step]; 0, 1, ... if the file stores no times; empty: no time steps
   std::vector<std::string> warnings;
+  std::vector<std::string> notes;  // boundary conditions, families, units
 };
 
 /// Throws Error if the file has nothing to draw (only surfaces or unstructured zones), if its coordinates are

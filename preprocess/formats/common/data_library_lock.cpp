@@ -2,8 +2,8 @@
 
 namespace curvisplat {
 
-std::mutex& dataLibraryMutex() {
-  static std::mutex mutex;
+Mutex& dataLibraryMutex() {
+  static Mutex mutex;
   return mutex;
 }
 

@@ -2,11 +2,11 @@
 // call into any of them, by any reader, holds this mutex.
 #pragma once
 
-#include <mutex>
+#include "stream/base/mutex.h"
 
 namespace curvisplat {
 
 /// Guards the global state of libcgns, HDF5 and NetCDF.
-std::mutex& dataLibraryMutex();
+Mutex& dataLibraryMutex();
 
 }  // namespace curvisplat

@@ -3,7 +3,6 @@
 
 #include <hdf5.h>
 
-#include <mutex>
 #include <utility>
 
 #include "preprocess/formats/common/data_library_lock.h"
@@ -48,7 +47,7 @@ class QuietHdf5 {
   QuietHdf5& operator=(const QuietHdf5&) = delete;
 
  private:
-  std::lock_guard<std::mutex> lock_;
+  MutexLock lock_;
 };
 
 }  // namespace curvisplat

@@ -5,7 +5,7 @@
 namespace curvisplat {
 
 std::shared_ptr<const InputFile> OpenFiles::at(const std::filesystem::path& path) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found =
       std::find_if(files_.begin(), files_.end(), [&](const auto& file) { return file->path() == path; });
   if (found != files_.end()) {

@@ -7,10 +7,10 @@
 #include <filesystem>
 #include <list>
 #include <memory>
-#include <mutex>
 #include <span>
 
 #include "stream/base/file.h"
+#include "stream/base/mutex.h"
 
 namespace curvisplat {
 
@@ -25,8 +25,8 @@ class OpenFiles {
 
  private:
   const size_t most_;
-  std::mutex mutex_;  // guards files_
-  std::list<std::shared_ptr<const InputFile>> files_;
+  Mutex mutex_;
+  std::list<std::shared_ptr<const InputFile>> files_ GUARDED_BY(mutex_);
 };
 
 /// A file of a pool. Any number of threads may read concurrently.

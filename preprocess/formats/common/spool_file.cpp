@@ -23,31 +23,34 @@ void SpoolFile::create() {
 }
 
 uint64_t SpoolFile::append(const std::function<void(const Sink&)>& write) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (!in_) create();
-  const uint64_t begin = out_->size();
-  write([this](std::span<const std::byte> bytes) { out_->append(bytes); });
+  OutputFile& out = *out_;
+  const uint64_t begin = out.size();
+  write([&out](std::span<const std::byte> bytes) { out.append(bytes); });
   return begin;
 }
 
-void SpooledBytes::fill() const {
-  const std::lock_guard lock(mutex_);
-  if (begin_) return;
+uint64_t SpooledBytes::fill() const {
+  const MutexLock lock(mutex_);
+  if (begin_) return *begin_;
   uint64_t written = 0;
+  const auto make = make_;  // a copy: Clang's analysis does not look into lambdas
   begin_ = spool_->append([&](const SpoolFile::Sink& sink) {
-    make_([&](std::span<const std::byte> bytes) {
+    make([&](std::span<const std::byte> bytes) {
       written += bytes.size();
       sink(bytes);
     });
   });
   CURVISPLAT_CHECK_OP(written, ==, size_);
   make_ = nullptr;
+  return *begin_;
 }
 
 void SpooledBytes::readAt(uint64_t offset, std::span<std::byte> to) const {
-  fill();
+  const uint64_t begin = fill();
   CURVISPLAT_CHECK(offset <= size_ && to.size() <= size_ - offset);
-  spool_->readAt(*begin_ + offset, to);
+  spool_->readAt(begin + offset, to);
 }
 
 }  // namespace curvisplat

@@ -5,12 +5,12 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 
 #include "preprocess/formats/common/byte_source.h"
 #include "stream/base/file.h"
+#include "stream/base/mutex.h"
 
 namespace curvisplat {
 
@@ -31,12 +31,12 @@ class SpoolFile {
   void readAt(uint64_t offset, std::span<std::byte> to) const { in_->readAt(offset, to); }
 
  private:
-  void create();
+  void create() REQUIRES(mutex_);
 
   const std::filesystem::path folder_;
-  std::mutex mutex_;  // guards out_, and the creation of in_
-  std::unique_ptr<OutputFile> out_;
-  std::unique_ptr<InputFile> in_;
+  Mutex mutex_;
+  std::unique_ptr<OutputFile> out_ GUARDED_BY(mutex_);
+  std::unique_ptr<InputFile> in_;  // created under the mutex, before the first append() returns
 };
 
 /// Bytes that are produced at the first read and then kept in a spool file.
@@ -50,15 +50,17 @@ class SpooledBytes final : public ByteSource {
   uint64_t size() const override { return size_; }
   void readAt(uint64_t offset, std::span<std::byte> to) const override;
 
-  /// Produces the bytes now unless that has been done. Throws what `make` throws.
-  void fill() const;
+  /// Produces the bytes now unless that has been done, and returns their offset in the spool file. Throws what
+  /// `make` throws.
+  uint64_t fill() const;
 
  private:
   std::shared_ptr<SpoolFile> spool_;
   uint64_t size_ = 0;
-  mutable std::mutex mutex_;                                  // guards the members below
-  mutable std::function<void(const SpoolFile::Sink&)> make_;  // reset after its call, to free its captures
-  mutable std::optional<uint64_t> begin_;
+  mutable Mutex mutex_;
+  // Reset after its call, to free its captures.
+  mutable std::function<void(const SpoolFile::Sink&)> make_ GUARDED_BY(mutex_);
+  mutable std::optional<uint64_t> begin_ GUARDED_BY(mutex_);
 };
 
 }  // namespace curvisplat

@@ -114,7 +114,8 @@ void DerivedSource::describe() {
     if (*quantity.alias) scalar.aliases = {quantity.alias};
     scalar.function = quantity.function;
     scalar.derived = true;
-    scalar.centring = (quantity.needs & ~unsigned{kNeedsJacobian}) ? inputs_.centring : Centring::kNode;
+    scalar.centring =
+        (quantity.needs & ~unsigned{kNeedsJacobian | kNeedsVolume}) ? inputs_.centring : Centring::kNode;
     description_.scalars.push_back(std::move(scalar));
     quantities_.push_back(quantity);
   }

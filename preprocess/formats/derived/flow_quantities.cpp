@@ -15,7 +15,7 @@ constexpr QuantityInfo kQuantities[] = {
     {Quantity::kJ, "j", "", 0, 0},
     {Quantity::kK, "k", "", 0, 0},
     {Quantity::kJacobian, "jacobian", "", 0, kNeedsJacobian},
-    {Quantity::kVolume, "volume", "", 0, kNeedsJacobian},
+    {Quantity::kVolume, "volume", "", 0, kNeedsVolume},
     {Quantity::kPressure, "pressure", "p", 110, kNeedsPressure},
     {Quantity::kPressureCoefficient, "pressure_coefficient", "cp", 111, kNeedsPressure | kNeedsFreestream},
     {Quantity::kMachNumber, "mach_number", "mach", 112, kThermal | kNeedsVelocity},

@@ -42,6 +42,7 @@ enum QuantityNeeds : unsigned {
   kNeedsVelocityGradient = 16,
   kNeedsPressureGradient = 32,
   kNeedsJacobian = 64,
+  kNeedsVolume = 128,  // of the cells around the node
 };
 
 struct QuantityInfo {

@@ -6,6 +6,7 @@
 #include <glm/matrix.hpp>
 #include <limits>
 
+#include "preprocess/grid/hexahedron.h"
 #include "preprocess/grid/lattice_gradient.h"
 #include "preprocess/grid/slabs.h"
 
@@ -17,7 +18,7 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 Halo haloFor(bool cells, unsigned needs) {
   if (cells && (needs & kGradients)) return kCellHalo;
-  return needs & (kGradients | kNeedsJacobian) ? kNodeHalo : kNoHalo;
+  return needs & (kGradients | kNeedsJacobian | kNeedsVolume) ? kNodeHalo : kNoHalo;
 }
 
 bool isFinite(const glm::dvec3& v) {
@@ -103,10 +104,40 @@ void FlowWindow::copyStored(const NodeBox& whole, std::span<const size_t> to, No
 void FlowWindow::computeFlow() {
   present_.resize(nodes_.x.size());
   for (size_t n = 0; n < present_.size(); ++n) present_[n] = !nodes_.blank[n] && isFinite(position(n));
+  if (needs_ & kNeedsVolume) measureCells();
   if (moves_) moveToCentres();
   if (needed_.empty()) return;
   flow_.resize(present_.size());
   for (size_t n = 0; n < flow_.size(); ++n) flow_[n] = flowAt(n);
+}
+
+void FlowWindow::measureCells() {
+  const uint64_t rows = window_.j1 - window_.j0, planes = window_.k1 - window_.k0;
+  volumes_.assign(present_.size(), kNone);
+  for (size_t n = 0; n < present_.size(); ++n) {
+    if (n % row_ + 1 == row_ || n / row_ % rows + 1 == rows || n / plane_ + 1 == planes) continue;
+    bool there = true;
+    for (size_t corner = 0; corner < 8; ++corner)
+      there &= present_[n + (corner & 1) + (corner >> 1 & 1) * row_ + (corner >> 2) * plane_] != 0;
+    if (there)
+      volumes_[n] = std::abs(
+          Hexahedron(cornersAt(nodes_.x.data(), nodes_.y.data(), nodes_.z.data(), n, row_, plane_)).volume());
+  }
+}
+
+/// The mean volume of the cells around a node, exact for each; NaN where all of them lack a corner.
+double FlowWindow::meanVolume(size_t n, const std::array<uint64_t, 3>& index) const {
+  double sum = 0;
+  int cells = 0;
+  for (size_t corner = 0; corner < 8; ++corner) {
+    const bool i = corner & 1, j = corner & 2, k = corner & 4;
+    if ((i && index[0] == 0) || (j && index[1] == 0) || (k && index[2] == 0)) continue;
+    const double volume = volumes_[n - i - (j ? row_ : 0) - (k ? plane_ : 0)];
+    if (std::isnan(volume)) continue;
+    sum += volume;
+    ++cells;
+  }
+  return cells > 0 ? sum / cells : kNone;
 }
 
 /// Works in place, since a centre depends on its own and later elements only.
@@ -214,7 +245,7 @@ void FlowWindow::compute(Quantity quantity, double freestream_mach, const NodeBo
     }
     if (!present_[n]) return kNone;
     if (quantity == Quantity::kJacobian) return determinant(n, index);
-    if (quantity == Quantity::kVolume) return std::abs(determinant(n, index));
+    if (quantity == Quantity::kVolume) return meanVolume(n, index);
     FlowGradients gradients;
     const FlowState& flow = flow_[n];
     if (needs & kNeedsVelocityGradient) {

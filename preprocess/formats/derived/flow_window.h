@@ -55,6 +55,8 @@ class FlowWindow {
   glm::dvec3 position(size_t n) const { return {nodes_.x[n], nodes_.y[n], nodes_.z[n]}; }
   double input(const std::optional<uint32_t>& scalar, size_t n) const;
   FlowState flowAt(size_t n) const;
+  void measureCells();
+  double meanVolume(size_t n, const std::array<uint64_t, 3>& index) const;
   void moveToCentres();
   template <typename Has>
   std::pair<size_t, size_t> neighbours(size_t n, int axis, uint64_t index, const Has& has) const;
@@ -78,6 +80,7 @@ class FlowWindow {
   NodeArrays nodes_;
   std::vector<uint8_t> present_;
   std::vector<FlowState> flow_;
+  std::vector<double> volumes_;  // [lowest node of a cell]: NaN if there is no cell
 };
 
 }  // namespace curvisplat

@@ -3,29 +3,36 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <set>
 #include <sstream>
 #include <utility>
 
 #include "preprocess/formats/netcdf/cf_roles.h"
+#include "preprocess/formats/netcdf/foreign_netcdf.h"
+#include "preprocess/grid/calendar.h"
 
 namespace curvisplat {
 namespace {
 
-bool isTime(const NetcdfFile& file, size_t dim) {
+/// An unlimited dimension without a coordinate is one of time only if the variable has three others.
+bool isTime(const NetcdfFiles& file, size_t dim, size_t rank) {
   const NetcdfDimension& dimension = file.dimensions()[dim];
   const NetcdfVariable* const coordinate = file.find(dimension.name);
-  if (coordinate && cfRole(file, *coordinate) == CfRole::kTime) return true;
-  return dimension.unlimited || dimension.name == "time" || dimension.name == "Time";
+  const CfRole role = coordinate ? cfRole(file, *coordinate) : CfRole::kNone;
+  if (role != CfRole::kNone) return role == CfRole::kTime;
+  const std::string name = lowerCase(dimension.name);
+  if (name.starts_with("time") || name.ends_with("_time") || name == "t") return true;
+  return dimension.unlimited && rank > 3;
 }
 
 /// The three dimensions in space and the time dimension.
-std::optional<CfDimensions> dimensionsOf(const NetcdfFile& file, const NetcdfVariable& variable) {
+std::optional<CfDimensions> dimensionsOf(const NetcdfFiles& file, const NetcdfVariable& variable) {
   CfDimensions dims;
   std::vector<size_t> space;
   for (const size_t dim : variable.dims) {
-    if (!dims.time && isTime(file, dim))
+    if (!dims.time && isTime(file, dim, variable.dims.size()))
       dims.time = dim;
     else
       space.push_back(dim);
@@ -42,14 +49,15 @@ std::optional<CfDimensions> dimensionsOf(const NetcdfFile& file, const NetcdfVar
   return dims;
 }
 
-std::string describe(const NetcdfFile& file, const CfDimensions& dims) {
+std::string describe(const NetcdfFiles& file, const CfDimensions& dims) {
   const auto name = [&](size_t axis) { return file.dimensions()[dims.axes[axis]].name; };
   return fmt::format("{}, {}, {}", name(2), name(1), name(0));
 }
 
 /// The variable's coordinate of a role. Candidates in order: variables in its `coordinates` attribute,
-/// variables named like its dimensions, all others.
-std::optional<CfTerm> coordinateOf(const NetcdfFile& file, const NetcdfVariable& variable,
+/// variables named like its dimensions, all others; last those of other files whose dimensions have other
+/// names and the same lengths.
+std::optional<CfTerm> coordinateOf(const NetcdfFiles& file, const NetcdfVariable& variable,
                                    const CfDimensions& dims, CfRole role) {
   std::vector<const NetcdfVariable*> candidates;
   std::istringstream names(variable.text("coordinates"));
@@ -59,34 +67,54 @@ std::optional<CfTerm> coordinateOf(const NetcdfFile& file, const NetcdfVariable&
     if (const NetcdfVariable* const named = file.find(file.dimensions()[dim].name))
       candidates.push_back(named);
   for (const NetcdfVariable& other : file.variables()) candidates.push_back(&other);
-  for (const NetcdfVariable* candidate : candidates) {
-    if (cfRole(file, *candidate) != role) continue;
-    const auto term = CfTerm::of(file, *candidate, dims);
-    if (term && term->exact() && (term->axes() == 1 || term->axes() == 2)) return term;
-  }
+  for (const bool exact : {true, false})
+    for (const NetcdfVariable* candidate : candidates) {
+      if (cfRole(file, *candidate) != role || (!exact && candidate->file == variable.file)) continue;
+      const auto term = CfTerm::of(file, *candidate, dims);
+      if (!term || !(exact ? term->exact() : term->onNodes())) continue;
+      if (term->axes() == 1 || term->axes() == 2) return term;
+    }
   return std::nullopt;
+}
+
+/// Distance of nodes along `axis` (0 or 1) in metres where the files have no coordinates: WRF's DX and DY.
+double indexSpacing(const NetcdfFiles& file, size_t axis) {
+  const double spacing = file.number(axis == 0 ? "DX" : "DY").value_or(1000);
+  return std::isfinite(spacing) && spacing > 0 ? spacing : 1000;
 }
 
 class GridFinder {
  public:
-  GridFinder(const NetcdfFile& file, size_t time_step) : file_(file), time_step_(time_step) {}
+  GridFinder(const NetcdfFiles& file, size_t time_step) : file_(file), time_step_(time_step) {}
 
   CfGrids find() {
     std::set<std::string> auxiliary;
     for (const NetcdfVariable& variable : file_.variables())
       for (const char* attribute : {"bounds", "climatology"}) auxiliary.insert(variable.text(attribute));
-    // Variables that vary in time come first, since they determine a grid's time dimension. Coordinates of
-    // every node can be drawn too, but come last: they are seldom the scalar of interest.
-    for (const bool coordinates : {false, true})
-      for (const bool steady : {false, true})
-        for (const NetcdfVariable& variable : file_.variables())
-          if (variable.numeric && !auxiliary.contains(variable.name) &&
-              (cfRole(file_, variable) != CfRole::kNone) == coordinates)
-            add(variable, steady, coordinates);
+    addAll(auxiliary);
+    // Without coordinates, indices take their place: but not in files of unstructured meshes, and only if
+    // there is nothing better.
+    if (found_.grids.empty() && !foreignNetcdf(file_)) {
+      const std::vector<CfLeftOut> left_out = std::exchange(found_.left_out, {});
+      by_index_ = true;
+      addAll(auxiliary);
+      if (found_.grids.empty()) found_.left_out = left_out;
+    }
     return std::move(found_);
   }
 
  private:
+  void addAll(const std::set<std::string>& auxiliary) {
+    // Variables that vary in time come first, since they determine a grid's time dimension. Coordinates of
+    // every node and masks can be drawn too, but come last: they are seldom the scalar of interest.
+    for (const bool coordinates : {false, true})
+      for (const bool steady : {false, true})
+        for (const NetcdfVariable& variable : file_.variables())
+          if (variable.numeric && !auxiliary.contains(variable.name) &&
+              (cfRole(file_, variable) != CfRole::kNone || CfMask::isMask(variable)) == coordinates)
+            add(variable, steady, coordinates);
+  }
+
   void add(const NetcdfVariable& variable, bool steady, bool coordinate) {
     auto dims = dimensionsOf(file_, variable);
     if (!dims || dims->time.has_value() == steady) return;
@@ -114,56 +142,128 @@ class GridFinder {
     CfGrid grid;
     grid.dims = dims;
     grid.variables.push_back(&variable);
-    auto longitude = coordinateOf(file_, variable, dims, CfRole::kLongitude);
-    auto latitude = coordinateOf(file_, variable, dims, CfRole::kLatitude);
-    if (!longitude || !latitude) {
-      longitude = coordinateOf(file_, variable, dims, CfRole::kX);
-      latitude = coordinateOf(file_, variable, dims, CfRole::kY);
-      grid.degrees = false;
-    }
-    if (!longitude || !latitude) {
-      reason =
-          fmt::format("no longitude and latitude, or x and y, on its dimensions {}", describe(file_, dims));
-      return std::nullopt;
-    }
+    if (!setHorizontal(grid, variable, reason)) return std::nullopt;
     std::vector<size_t> levels;
     for (size_t axis = 0; axis < 3; ++axis)
-      if (!longitude->varies(axis) && !latitude->varies(axis)) levels.push_back(axis);
+      if (!grid.longitude.varies(axis) && !grid.latitude.varies(axis)) levels.push_back(axis);
     if (levels.size() != 1) {
-      reason = fmt::format("{} and {} do not vary along exactly two of its dimensions {}",
-                           longitude->variable().name, latitude->variable().name, describe(file_, dims));
+      reason =
+          fmt::format("{} and {} do not vary along exactly two of its dimensions {}",
+                      grid.longitude.variable().name, grid.latitude.variable().name, describe(file_, dims));
       return std::nullopt;
     }
-    auto [vertical, words] = CfVertical::of(file_, variable, dims, levels[0]);
+    grid.levels = levels[0];
+    auto [vertical, words] = CfVertical::of(file_, variable, dims, grid.levels);
+    if (!vertical && grid.indices && !file_.find(file_.dimensions()[dims.axes[grid.levels]].name))
+      vertical = CfVertical::ofIndex(grid.levels);
     if (!vertical) {
       reason = words;
       return std::nullopt;
     }
-    grid.longitude = *longitude;
-    grid.latitude = *latitude;
     grid.vertical = *vertical;
+    grid.mask = CfMask::of(file_, variable, dims, grid.levels, isOcean(file_, grid));
     return grid;
   }
 
-  const NetcdfFile& file_;
+  /// Longitude and latitude; or x and y, with their projection if they have one; or indices.
+  bool setHorizontal(CfGrid& grid, const NetcdfVariable& variable, std::string& reason) const {
+    const auto set = [&](CfRole east, CfRole north) {
+      const auto longitude = coordinateOf(file_, variable, grid.dims, east),
+                 latitude = coordinateOf(file_, variable, grid.dims, north);
+      if (!longitude || !latitude) return false;
+      grid.longitude = *longitude;
+      grid.latitude = *latitude;
+      return true;
+    };
+    if (set(CfRole::kLongitude, CfRole::kLatitude)) return true;
+    auto [projection, words] = MapProjection::of(file_, variable);
+    if (set(CfRole::kGridLongitude, CfRole::kGridLatitude)) {
+      if (projection && projection->degrees()) {
+        grid.projection = std::move(projection);
+        return true;
+      }
+      reason =
+          fmt::format("{} and {} are degrees from a rotated pole, but {}", grid.longitude.variable().name,
+                      grid.latitude.variable().name, projection ? "the grid mapping is a map's" : words);
+      return false;
+    }
+    if (set(CfRole::kX, CfRole::kY)) {
+      grid.degrees = false;
+      if (projection && !projection->degrees()) grid.projection = std::move(projection);
+      return true;
+    }
+    reason = fmt::format("no longitude and latitude, or x and y, on its dimensions {}",
+                         describe(file_, grid.dims));
+    if (!by_index_) return false;
+    for (size_t axis = 0; axis < 2; ++axis)
+      if (file_.find(file_.dimensions()[grid.dims.axes[axis]].name)) return false;
+    grid.degrees = false;
+    grid.indices = true;
+    grid.longitude = CfTerm::ofIndex(0, indexSpacing(file_, 0));
+    grid.latitude = CfTerm::ofIndex(1, indexSpacing(file_, 1));
+    return true;
+  }
+
+  const NetcdfFiles& file_;
   size_t time_step_;
+  bool by_index_ = false;
   CfGrids found_;
 };
 
 }  // namespace
 
-CfGrids findCfGrids(const NetcdfFile& file, size_t time_step) {
+CfGrids findCfGrids(const NetcdfFiles& file, size_t time_step) {
   return GridFinder(file, time_step).find();
 }
 
-std::vector<double> cfTimes(const NetcdfFile& file, const CfGrid& grid) {
-  if (!grid.dims.time) return {};
+bool isOcean(const NetcdfFiles& file, const CfGrid& grid) {
+  // A quarter, half and three quarters along: some columns may be land, without a depth.
+  for (const uint64_t part : {2, 1, 3}) {
+    CfRange column;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const uint64_t length = file.dimensions()[grid.dims.axes[axis]].length;
+      column.begin[axis] = axis == grid.levels ? 0 : length * part / 4;
+      column.end[axis] = axis == grid.levels ? length : column.begin[axis] + 1;
+    }
+    double lowest = 0, highest = 0;
+    for (const double height : grid.vertical.heights(file, column).values) {
+      lowest = std::fmin(lowest, height);
+      highest = std::fmax(highest, height);
+    }
+    if (lowest != highest) return lowest + highest < 0;
+  }
+  return false;
+}
+
+CfTimes cfTimes(const NetcdfFiles& file, const CfGrid& grid) {
+  CfTimes times;
+  if (!grid.dims.time) return times;
   const NetcdfDimension& time = file.dimensions()[*grid.dims.time];
-  std::vector<double> times(time.length);
-  for (size_t n = 0; n < times.size(); ++n) times[n] = static_cast<double>(n);
+  times.values.resize(time.length);
+  for (size_t n = 0; n < time.length; ++n) times.values[n] = static_cast<double>(n);
   const NetcdfVariable* const coordinate = file.find(time.name);
-  if (coordinate && coordinate->numeric && coordinate->dims == std::vector<size_t>{*grid.dims.time})
-    file.read(*coordinate, {{0}, {times.size()}}, times);
+  if (coordinate && coordinate->numeric && coordinate->dims == std::vector<size_t>{*grid.dims.time}) {
+    file.read(*coordinate, {{0}, {time.length}}, times.values);
+    times.unit = coordinate->text("units");
+    times.calendar = lowerCase(coordinate->text("calendar"));
+    return times;
+  }
+  const NetcdfVariable* const dates = file.find("Times");
+  if (!dates || dates->dims.size() != 2 || dates->dims[0] != *grid.dims.time || time.length == 0)
+    return times;
+  const std::string text = file.readText(*dates);
+  const size_t length = text.size() / time.length;
+  if (length == 0) return times;
+  std::vector<double> seconds;
+  for (size_t n = 0; n < time.length; ++n)
+    if (const auto since = secondsBetween(text.substr(0, length), text.substr(n * length, length)))
+      seconds.push_back(*since);
+  if (seconds.size() != time.length) return times;
+  times.values = seconds;
+  std::string first = text.substr(0, length);
+  std::replace(first.begin(), first.end(), '_', ' ');
+  times.unit = fmt::format("seconds since {}", first.substr(0, first.find('\0')));
+  times.calendar = "proleptic_gregorian";
   return times;
 }
 

@@ -1,22 +1,29 @@
-// The curvilinear grids in a NetCDF file, by the CF conventions. Variables with the same three dimensions
+// The curvilinear grids in NetCDF files, by the CF conventions. Variables with the same three dimensions
 // (and time) share a grid. A file of a staggered mesh has several grids; a variable's dimensions decide.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "preprocess/formats/netcdf/cf_mask.h"
 #include "preprocess/formats/netcdf/cf_term.h"
 #include "preprocess/formats/netcdf/cf_vertical.h"
-#include "preprocess/formats/netcdf/netcdf_file.h"
+#include "preprocess/formats/netcdf/map_projection.h"
+#include "preprocess/formats/netcdf/netcdf_files.h"
 
 namespace curvisplat {
 
 struct CfGrid {
   CfDimensions dims;  // i is the variables' last dimension
   std::vector<const NetcdfVariable*> variables;
-  CfTerm longitude, latitude;  // or x and y
-  bool degrees = true;         // false: x and y, which are lengths
+  CfTerm longitude, latitude;               // or x and y
+  bool degrees = true;                      // false: x and y, which are lengths
+  std::optional<MapProjection> projection;  // of longitude and latitude, if these are the map's
+  bool indices = false;                     // x, y and perhaps z have no coordinates but the nodes' indices
   CfVertical vertical;
+  size_t levels = 2;  // the axis along which longitude and latitude do not vary
+  std::optional<CfMask> mask;
 };
 
 /// A variable that is on no grid, and the reason.
@@ -31,10 +38,18 @@ struct CfGrids {
 
 /// `time_step`: the step at which time-dependent variables are read; not checked. `file` must outlive the
 /// result.
-CfGrids findCfGrids(const NetcdfFile& file, size_t time_step);
+CfGrids findCfGrids(const NetcdfFiles& file, size_t time_step);
 
-/// The time of every step of a grid: values of the time coordinate, or 0, 1, ... if there is none. Empty if
-/// the grid has no time dimension.
-std::vector<double> cfTimes(const NetcdfFile& file, const CfGrid& grid);
+/// Whether the grid lies below the surface: the middle of the heights of a column is negative.
+bool isOcean(const NetcdfFiles& file, const CfGrid& grid);
+
+struct CfTimes {
+  std::vector<double> values;  // empty if the grid has no time dimension
+  std::string unit, calendar;  // "days since 1950-01-01"; may be empty
+};
+
+/// The time of every step of a grid: values of the time coordinate, seconds since the first of WRF's Times, or
+/// 0, 1, ... if there is neither.
+CfTimes cfTimes(const NetcdfFiles& file, const CfGrid& grid);
 
 }  // namespace curvisplat

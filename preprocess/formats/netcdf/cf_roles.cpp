@@ -7,12 +7,6 @@
 namespace curvisplat {
 namespace {
 
-std::string lower(std::string text) {
-  for (char& c : text)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return text;
-}
-
 bool isOneOf(std::string_view text, std::initializer_list<std::string_view> words) {
   return std::find(words.begin(), words.end(), text) != words.end();
 }
@@ -24,7 +18,7 @@ bool beginsWithOneOf(std::string_view text, std::initializer_list<std::string_vi
 
 bool isVerticalName(std::string_view standard_name) {
   return isOneOf(standard_name, {"depth", "height", "altitude", "geopotential_height", "model_level_number",
-                                 "depth_below_geoid", "air_pressure"}) ||
+                                 "depth_below_geoid", "air_pressure", "hybrid_sigma_pressure"}) ||
          beginsWithOneOf(standard_name, {"height_above_", "ocean_s", "ocean_double_sigma", "atmosphere_"});
 }
 
@@ -44,11 +38,19 @@ CfRole roleByName(const std::string& name, bool length) {
 
 }  // namespace
 
-CfRole cfRole(const NetcdfFile& file, const NetcdfVariable& variable) {
+std::string lowerCase(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
+CfRole cfRole(const NetcdfFiles& file, const NetcdfVariable& variable) {
   if (!variable.numeric) return CfRole::kNone;
-  const std::string standard_name = lower(variable.text("standard_name")),
-                    units = lower(variable.text("units"));
-  const std::string axis = lower(variable.text("axis"));
+  const std::string standard_name = lowerCase(variable.text("standard_name")),
+                    units = lowerCase(variable.text("units"));
+  const std::string axis = lowerCase(variable.text("axis"));
+  if (standard_name == "grid_longitude") return CfRole::kGridLongitude;
+  if (standard_name == "grid_latitude") return CfRole::kGridLatitude;
   if (isOneOf(units, {"degrees_east", "degree_east", "degree_e", "degrees_e", "degreee", "degreese"}) ||
       standard_name == "longitude")
     return CfRole::kLongitude;
@@ -57,33 +59,46 @@ CfRole cfRole(const NetcdfFile& file, const NetcdfVariable& variable) {
     return CfRole::kLatitude;
   if (standard_name == "time" || units.find(" since ") != std::string::npos) return CfRole::kTime;
 
-  const bool length = kilometresOf(units).has_value();
+  const bool length = kilometresOf(units).has_value(), pressure = pascalsOf(units).has_value();
   // A variable with the name of its dimension is a coordinate variable, and may have an `axis`.
   const bool coordinate = variable.dims.size() == 1 && file.dimension(variable, 0).name == variable.name;
   if (isVerticalName(standard_name) || !variable.text("formula_terms").empty() ||
-      (coordinate && (axis == "z" || !variable.text("positive").empty())))
+      (coordinate && (axis == "z" || pressure || !variable.text("positive").empty())))
     return CfRole::kVertical;
-  if (standard_name == "projection_x_coordinate" || (axis == "x" && length)) return CfRole::kX;
-  if (standard_name == "projection_y_coordinate" || (axis == "y" && length)) return CfRole::kY;
+  if (isOneOf(standard_name, {"projection_x_coordinate", "plane_x_coordinate"}) || (axis == "x" && length))
+    return CfRole::kX;
+  if (isOneOf(standard_name, {"projection_y_coordinate", "plane_y_coordinate"}) || (axis == "y" && length))
+    return CfRole::kY;
   if (coordinate && axis == "t") return CfRole::kTime;
   if (!standard_name.empty()) return CfRole::kNone;
   if (length && !variable.text("positive").empty()) return CfRole::kVertical;
-  return roleByName(lower(variable.name), length || units.empty());
+  return roleByName(lowerCase(variable.name), length || units.empty());
 }
 
 std::optional<double> kilometresOf(const std::string& unit) {
-  const std::string word = lower(unit);
-  if (isOneOf(word, {"m", "meter", "meters", "metre", "metres"})) return 1e-3;
+  const std::string word = lowerCase(unit);
+  if (isOneOf(word, {"m", "meter", "meters", "metre", "metres", "gpm"})) return 1e-3;
   if (isOneOf(word, {"km", "kilometer", "kilometers", "kilometre", "kilometres"})) return 1;
   if (isOneOf(word, {"cm", "centimeter", "centimeters", "centimetre", "centimetres"})) return 1e-5;
   if (isOneOf(word, {"ft", "foot", "feet"})) return 0.3048e-3;
   return std::nullopt;
 }
 
+std::optional<double> pascalsOf(const std::string& unit) {
+  const std::string word = lowerCase(unit);
+  if (isOneOf(word, {"pa", "pascal", "pascals"})) return 1;
+  if (isOneOf(word, {"hpa", "mb", "mbar", "millibar", "millibars", "hectopascal", "hectopascals"}))
+    return 100;
+  if (isOneOf(word, {"kpa", "cb", "centibar"})) return 1000;
+  if (isOneOf(word, {"bar", "bars"})) return 1e5;
+  return std::nullopt;
+}
+
 bool growsDownwards(const NetcdfVariable& variable) {
-  const std::string positive = lower(variable.text("positive"));
+  const std::string positive = lowerCase(variable.text("positive"));
   if (!positive.empty()) return positive == "down";
-  const std::string standard_name = lower(variable.text("standard_name")), name = lower(variable.name);
+  const std::string standard_name = lowerCase(variable.text("standard_name")),
+                    name = lowerCase(variable.name);
   return standard_name.starts_with("depth") ||
          (standard_name.empty() && beginsWithOneOf(name, {"dep", "gdep"}));
 }

@@ -42,7 +42,7 @@ CfValues resampled(const CfValues& from, size_t axis, uint64_t begin, uint64_t e
 
 }  // namespace
 
-std::optional<CfTerm> CfTerm::of(const NetcdfFile& file, const NetcdfVariable& variable,
+std::optional<CfTerm> CfTerm::of(const NetcdfFiles& file, const NetcdfVariable& variable,
                                  const CfDimensions& block) {
   CfTerm term;
   term.variable_ = &variable;
@@ -76,8 +76,23 @@ std::optional<CfTerm> CfTerm::of(const NetcdfFile& file, const NetcdfVariable& v
   return term;
 }
 
+CfTerm CfTerm::ofIndex(size_t axis, double metres) {
+  static const NetcdfVariable index = [] {
+    NetcdfVariable variable;
+    variable.name = "index";
+    variable.value_bytes = sizeof(float);
+    variable.attributes["units"].text.push_back('m');
+    return variable;
+  }();
+  CfTerm term;
+  term.variable_ = &index;
+  term.along_[axis] = 0;
+  term.index_metres_ = metres;
+  return term;
+}
+
 bool CfTerm::ofNodes() const {
-  return exact_ && axes() == 3 && *along_[2] < *along_[1] && *along_[1] < *along_[0];
+  return index_metres_ == 0 && exact_ && axes() == 3 && *along_[2] < *along_[1] && *along_[1] < *along_[0];
 }
 
 NetcdfBox CfTerm::boxOf(const CfRange& range) const {
@@ -95,7 +110,17 @@ NetcdfBox CfTerm::boxOf(const CfRange& range) const {
   return box;
 }
 
-CfValues CfTerm::read(const NetcdfFile& file, const CfRange& range) const {
+CfValues CfTerm::read(const NetcdfFiles& file, const CfRange& range) const {
+  if (index_metres_ > 0) {
+    CfValues indices;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      if (!along_[axis]) continue;
+      indices.count[axis] = range.end[axis] - range.begin[axis];
+      for (uint64_t n = range.begin[axis]; n < range.end[axis]; ++n)
+        indices.values.push_back(index_metres_ * static_cast<double>(n));
+    }
+    return indices;
+  }
   const NetcdfBox box = boxOf(range);
   std::vector<double> stored(box.values());
   file.read(*variable_, box, stored);

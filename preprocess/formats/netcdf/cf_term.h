@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "preprocess/formats/netcdf/netcdf_file.h"
+#include "preprocess/formats/netcdf/netcdf_files.h"
 
 namespace curvisplat {
 
@@ -45,20 +45,28 @@ class CfTerm {
   ///   1              ignored
   ///
   /// nullopt if a dimension does not match.
-  static std::optional<CfTerm> of(const NetcdfFile& file, const NetcdfVariable& variable,
+  static std::optional<CfTerm> of(const NetcdfFiles& file, const NetcdfVariable& variable,
                                   const CfDimensions& block);
+
+  /// The index along an axis times `metres`: for dimensions without a coordinate. Its variable is called
+  /// "index".
+  static CfTerm ofIndex(size_t axis, double metres);
 
   const NetcdfVariable& variable() const { return *variable_; }
   bool varies(size_t axis) const { return along_[axis].has_value(); }
+  /// The position among the variable's dimensions of that along `axis`; for axes along which it varies.
+  size_t dimensionOf(size_t axis) const { return *along_[axis]; }
   /// Whether all of its dimensions are the block's own.
   bool exact() const { return exact_; }
+  /// Whether its points are the block's nodes: nothing is interpolated.
+  bool onNodes() const { return longer_ == std::array<int, 3>{}; }
   size_t axes() const { return varies(0) + varies(1) + varies(2); }
 
   /// Whether it stores one value for each node, in the order of the nodes (i fastest).
   bool ofNodes() const;
   NetcdfBox boxOf(const CfRange& range) const;  // the stored values needed for `range`
 
-  CfValues read(const NetcdfFile& file, const CfRange& range) const;
+  CfValues read(const NetcdfFiles& file, const CfRange& range) const;
 
  private:
   const NetcdfVariable* variable_ = nullptr;
@@ -66,6 +74,7 @@ class CfTerm {
   std::array<int, 3> longer_{};                 // [axis]: its length minus the block's: -1, 0 or 1
   std::array<uint64_t, 3> length_{};            // [axis]: its length
   bool exact_ = true;
+  double index_metres_ = 0;    // above 0: there is no variable, see ofIndex()
   std::vector<size_t> start_;  // [dimension]: the time step for the time dimension, else 0
 };
 

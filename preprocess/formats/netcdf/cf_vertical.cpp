@@ -2,16 +2,20 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <sstream>
 
 #include "preprocess/formats/netcdf/cf_roles.h"
+#include "preprocess/formats/netcdf/standard_atmosphere.h"
 
 namespace curvisplat {
 namespace {
 
-constexpr double kGravity = 9.81;  // WRF's
+constexpr double kWrfGravity = 9.81;
+constexpr double kStandardGravity = 9.80665;
+constexpr double kSeaLevelPressure = 101325;
 
 /// "s: s_rho C: Cs_r" as {s: s_rho, C: Cs_r}.
 std::map<std::string, std::string> formulaTerms(const std::string& text) {
@@ -23,7 +27,7 @@ std::map<std::string, std::string> formulaTerms(const std::string& text) {
   return terms;
 }
 
-std::optional<CfTerm> termNamed(const NetcdfFile& file, const std::map<std::string, std::string>& terms,
+std::optional<CfTerm> termNamed(const NetcdfFiles& file, const std::map<std::string, std::string>& terms,
                                 const char* key, const CfDimensions& block) {
   const auto name = terms.find(key);
   const NetcdfVariable* const variable = name == terms.end() ? nullptr : file.find(name->second);
@@ -32,63 +36,175 @@ std::optional<CfTerm> termNamed(const NetcdfFile& file, const std::map<std::stri
 }
 
 /// The value of a scalar term.
-double constant(const NetcdfFile& file, const std::optional<CfTerm>& term) {
+double constant(const NetcdfFiles& file, const std::optional<CfTerm>& term) {
   if (!term || term->axes() > 0) return std::nan("");
   return term->read(file, {{0, 0, 0}, {1, 1, 1}}).values.at(0);
 }
 
+std::string notALength(const NetcdfVariable& variable) {
+  const std::string units = variable.text("units");
+  return fmt::format("{} {}; expected a length or a pressure", variable.name,
+                     units.empty() ? "has no unit" : fmt::format("has the unit '{}'", units));
+}
+
 }  // namespace
 
-std::pair<std::optional<CfVertical>, std::string> CfVertical::of(const NetcdfFile& file,
+std::pair<std::optional<CfVertical>, std::string> CfVertical::of(const NetcdfFiles& file,
                                                                  const NetcdfVariable& variable,
                                                                  const CfDimensions& block, size_t axis) {
   const std::string& levels = file.dimensions()[block.axes[axis]].name;
-  std::string reason = fmt::format("no depth or height along {}", levels);
+  std::string reason = fmt::format("no depth, height or pressure along {}", levels);
+  if (auto found = byNodeGeopotential(file, block)) return {std::move(found), ""};
   const NetcdfVariable* const along = file.find(levels);
+  if (along && !along->text("units").empty()) reason = notALength(*along);
   if (along && !along->text("formula_terms").empty())
     if (auto found = byFormula(file, *along, block, axis, reason)) return {std::move(found), ""};
 
   // Variables in its own `coordinates` attribute come first.
-  std::vector<const NetcdfVariable*> candidates;
+  Candidates candidates;
   std::istringstream names(variable.text("coordinates"));
   for (std::string name; names >> name;)
     if (const NetcdfVariable* const named = file.find(name)) candidates.push_back(named);
   if (along) candidates.push_back(along);
   for (const NetcdfVariable& other : file.variables()) candidates.push_back(&other);
 
-  for (const bool of_nodes : {true, false}) {
-    for (const NetcdfVariable* candidate : candidates) {
-      if (cfRole(file, *candidate) != CfRole::kVertical) continue;
-      const auto term = CfTerm::of(file, *candidate, block);
-      if (!term || !term->exact() || !term->varies(axis) || (term->axes() > 1) != of_nodes) continue;
-      if (auto found = byLevels(file, *candidate, block, axis, reason)) return {std::move(found), ""};
-    }
-    if (of_nodes)
+  // Lengths before pressures, whose heights are the standard atmosphere's.
+  for (const bool pressure : {false, true}) {
+    if (auto found = byCandidates(file, candidates, variable, block, {axis, true, pressure}, reason))
+      return {std::move(found), ""};
+    if (!pressure) {
       if (auto found = byGeopotential(file, block)) return {std::move(found), ""};
+      if (auto found = byInterfaces(file, block, axis)) return {std::move(found), ""};
+    }
+    if (auto found = byCandidates(file, candidates, variable, block, {axis, false, pressure}, reason))
+      return {std::move(found), ""};
   }
+  if (auto found = byThickness(file, block, axis)) return {std::move(found), ""};
   return {std::nullopt, reason};
 }
 
-std::optional<CfVertical> CfVertical::byLevels(const NetcdfFile& file, const NetcdfVariable& coordinate,
-                                               const CfDimensions& block, size_t axis, std::string& reason) {
-  const auto kilometres = kilometresOf(coordinate.text("units"));
-  const auto term = CfTerm::of(file, coordinate, block);
-  if (!term || !term->varies(axis)) return std::nullopt;
-  if (!kilometres && (!coordinate.text("units").empty() || !coordinate.text("formula_terms").empty())) {
-    reason =
-        fmt::format("{} has the unit '{}'; expected a length", coordinate.name, coordinate.text("units"));
+std::optional<CfVertical> CfVertical::byCandidates(const NetcdfFiles& file, const Candidates& candidates,
+                                                   const NetcdfVariable& variable, const CfDimensions& block,
+                                                   const Wanted& wanted, std::string& reason) {
+  for (const bool exact : {true, false})
+    for (const NetcdfVariable* candidate : candidates) {
+      if (cfRole(file, *candidate) != CfRole::kVertical) continue;
+      if (pascalsOf(candidate->text("units")).has_value() != wanted.pressure) continue;
+      const auto term = CfTerm::of(file, *candidate, block);
+      // Dimensions of other names count in other files only: a file of masks names its levels as it likes.
+      if (!term || !term->onNodes() || term->exact() != exact) continue;
+      if ((!exact && candidate->file == variable.file) || !term->varies(wanted.axis)) continue;
+      if ((term->axes() > 1) != wanted.of_nodes) continue;
+      if (auto found = byLevels(file, *candidate, *term, wanted.axis, reason)) return found;
+    }
+  return std::nullopt;
+}
+
+CfVertical CfVertical::ofIndex(size_t axis) {
+  CfVertical vertical;
+  vertical.terms_.push_back(CfTerm::ofIndex(axis, 1000));
+  vertical.scale_ = 1e-3;
+  vertical.description_ = "index";
+  return vertical;
+}
+
+std::optional<CfVertical> CfVertical::byLevels(const NetcdfFiles& file, const NetcdfVariable& coordinate,
+                                               const CfTerm& term, size_t axis, std::string& reason) {
+  const std::string units = coordinate.text("units");
+  const auto kilometres = kilometresOf(units), pascals = pascalsOf(units);
+  CfVertical vertical;
+  vertical.terms_.push_back(term);
+  vertical.description_ = coordinate.name;
+  // The levels of a formula have pressures as nominal values; ROMS' and sigma levels have no unit.
+  const bool formula = !coordinate.text("formula_terms").empty();
+  if (pascals) {
+    vertical.kind_ = Kind::kPressure;
+    vertical.scale_ = *pascals;
+    vertical.description_ += " (pressure, at heights of the standard atmosphere)";
+    if (formula) vertical.warnings_.push_back(fmt::format("{}; its nominal pressures are taken", reason));
+    return vertical;
+  }
+  const bool vague = lowerCase(coordinate.name).starts_with("lev") ||
+                     coordinate.text("standard_name") == "model_level_number";
+  if (!kilometres && (!units.empty() || formula || vague)) {
+    reason = notALength(coordinate);
     return std::nullopt;
   }
-  CfVertical vertical;
   vertical.scale_ = kilometres.value_or(1e-3) * (growsDownwards(coordinate) ? -1 : 1);
-  vertical.terms_.push_back(*term);
-  vertical.description_ = coordinate.name;
+  if (vertical.scale_ < 0 && coordinate.text("positive").empty() && term.axes() == 1) {
+    // Depths that fall from 0 are heights, whatever their name.
+    CfRange all;
+    for (size_t along = 0; along < 3; ++along) all.end[along] = 1;
+    all.end[axis] = file.dimension(coordinate, term.dimensionOf(axis)).length;
+    const std::vector<double> values = term.read(file, all).values;
+    if (std::all_of(values.begin(), values.end(), [](double value) { return value <= 0; }))
+      vertical.scale_ = -vertical.scale_;
+  }
   if (!kilometres)
     vertical.warnings_.push_back(fmt::format("{} has no units; metres are assumed", coordinate.name));
   return vertical;
 }
 
-std::optional<CfVertical> CfVertical::byGeopotential(const NetcdfFile& file, const CfDimensions& block) {
+std::optional<CfVertical> CfVertical::byNodeGeopotential(const NetcdfFiles& file, const CfDimensions& block) {
+  for (const NetcdfVariable& variable : file.variables()) {
+    if (variable.text("standard_name") != "geopotential" || !variable.numeric) continue;
+    const auto term = CfTerm::of(file, variable, block);
+    if (!term || !term->exact() || term->axes() != 3) continue;
+    CfVertical vertical;
+    vertical.terms_.push_back(*term);
+    vertical.scale_ = 1e-3 / kStandardGravity;
+    vertical.description_ = "geopotential " + variable.name;
+    return vertical;
+  }
+  return std::nullopt;
+}
+
+/// MOM6's `e`, at the layers' interfaces: there is one more than layers.
+std::optional<CfVertical> CfVertical::byInterfaces(const NetcdfFiles& file, const CfDimensions& block,
+                                                   size_t axis) {
+  for (const NetcdfVariable& variable : file.variables()) {
+    const auto kilometres = kilometresOf(variable.text("units"));
+    const std::string words = lowerCase(variable.text("long_name"));
+    if (!variable.numeric || !kilometres) continue;
+    if (variable.name != "e" && words.find("interface height") == std::string::npos) continue;
+    const auto term = CfTerm::of(file, variable, block);
+    if (!term || term->axes() != 3 || !term->varies(axis)) continue;
+    CfVertical vertical;
+    vertical.terms_.push_back(*term);
+    vertical.scale_ = *kilometres;
+    vertical.description_ = "interface height " + variable.name;
+    return vertical;
+  }
+  return std::nullopt;
+}
+
+/// Layers of isopycnal models: their thicknesses add up from the surface, which is taken at 0.
+std::optional<CfVertical> CfVertical::byThickness(const NetcdfFiles& file, const CfDimensions& block,
+                                                  size_t axis) {
+  for (const NetcdfVariable& variable : file.variables()) {
+    const auto kilometres = kilometresOf(variable.text("units"));
+    const std::string words = lowerCase(variable.text("long_name"));
+    if (!variable.numeric || !kilometres) continue;
+    if (variable.text("standard_name") != "cell_thickness" &&
+        words.find("layer thickness") == std::string::npos)
+      continue;
+    const auto term = CfTerm::of(file, variable, block);
+    if (!term || !term->exact() || term->axes() != 3) continue;
+    CfVertical vertical;
+    vertical.kind_ = Kind::kThickness;
+    vertical.terms_.push_back(*term);
+    vertical.scale_ = *kilometres;
+    vertical.axis_ = axis;
+    vertical.layers_ = file.dimensions()[block.axes[axis]].length;
+    const NetcdfVariable* const along = file.find(file.dimensions()[block.axes[axis]].name);
+    vertical.from_bottom_ = along && lowerCase(along->text("positive")) == "up";
+    vertical.description_ = "layer thickness " + variable.name;
+    return vertical;
+  }
+  return std::nullopt;
+}
+
+std::optional<CfVertical> CfVertical::byGeopotential(const NetcdfFiles& file, const CfDimensions& block) {
   CfVertical vertical;
   for (const char* name : {"PHB", "PH"}) {
     const NetcdfVariable* const variable = file.find(name);
@@ -98,17 +214,23 @@ std::optional<CfVertical> CfVertical::byGeopotential(const NetcdfFile& file, con
     vertical.terms_.push_back(*term);
   }
   vertical.kind_ = Kind::kGeopotential;
-  vertical.scale_ = 1e-3 / kGravity;
+  vertical.scale_ = 1e-3 / kWrfGravity;
   vertical.description_ = "geopotential PH + PHB";
   return vertical;
 }
 
-std::optional<CfVertical> CfVertical::byFormula(const NetcdfFile& file, const NetcdfVariable& coordinate,
+std::optional<CfVertical> CfVertical::byFormula(const NetcdfFiles& file, const NetcdfVariable& coordinate,
                                                 const CfDimensions& block, size_t axis, std::string& reason) {
-  static const std::map<std::string, Kind> kinds = {{"ocean_sigma_coordinate", Kind::kSigma},
-                                                    {"ocean_s_coordinate", Kind::kS},
-                                                    {"ocean_s_coordinate_g1", Kind::kSG1},
-                                                    {"ocean_s_coordinate_g2", Kind::kSG2}};
+  static const std::map<std::string, Kind> kinds = {
+      {"ocean_sigma_coordinate", Kind::kSigma},
+      {"ocean_s_coordinate", Kind::kS},
+      {"ocean_s_coordinate_g1", Kind::kSG1},
+      {"ocean_s_coordinate_g2", Kind::kSG2},
+      {"atmosphere_hybrid_height_coordinate", Kind::kHybridHeight},
+      {"atmosphere_ln_pressure_coordinate", Kind::kLogPressure},
+      {"atmosphere_sigma_coordinate", Kind::kSigmaPressure},
+      {"atmosphere_hybrid_sigma_pressure_coordinate", Kind::kHybridPressure},
+      {"hybrid_sigma_pressure", Kind::kHybridPressure}};
   const std::string name = coordinate.text("standard_name");
   const auto kind = kinds.find(name);
   if (kind == kinds.end()) {
@@ -116,91 +238,96 @@ std::optional<CfVertical> CfVertical::byFormula(const NetcdfFile& file, const Ne
                          name.empty() ? "no standard_name" : name);
     return std::nullopt;
   }
-  const std::map<std::string, std::string> terms = formulaTerms(coordinate.text("formula_terms"));
+  const Terms terms = formulaTerms(coordinate.text("formula_terms"));
   CfVertical vertical;
   vertical.kind_ = kind->second;
-  vertical.description_ = name + " of " + coordinate.name;
-  vertical.s_ = termNamed(file, terms, kind->second == Kind::kSigma ? "sigma" : "s", block);
-  vertical.eta_ = termNamed(file, terms, "eta", block);
-  vertical.depth_ = termNamed(file, terms, "depth", block);
-  const auto lacks = [&](const char* key) {
-    reason = fmt::format("the formula of {} has no term '{}' on these dimensions", coordinate.name, key);
-    return std::nullopt;
-  };
-  if (!vertical.s_ || !vertical.s_->varies(axis)) return lacks("s");
-  if (!vertical.depth_ || vertical.depth_->varies(axis)) return lacks("depth");
-  vertical.scale_ = kilometresOf(vertical.depth_->variable().text("units")).value_or(1e-3);
-  if (!vertical.eta_) vertical.warnings_.push_back("no surface elevation (eta); 0 is assumed");
-  if (kind->second == Kind::kSigma) return vertical;
-
-  vertical.depth_c_ = constant(file, termNamed(file, terms, "depth_c", block));
-  if (!std::isfinite(vertical.depth_c_)) return lacks("depth_c");
-  if (kind->second == Kind::kS) {
-    vertical.a_ = constant(file, termNamed(file, terms, "a", block));
-    vertical.b_ = constant(file, termNamed(file, terms, "b", block));
-    if (!std::isfinite(vertical.a_) || vertical.a_ == 0) return lacks("a");
-    if (!std::isfinite(vertical.b_)) return lacks("b");
-    return vertical;
+  // ROMS and CROCO call theirs ocean_s_coordinate too; the stretching C tells them apart.
+  if (vertical.kind_ == Kind::kS && terms.contains("C") && !terms.contains("a")) {
+    const NetcdfVariable* const transform = file.find("Vtransform");
+    const bool second =
+        transform && transform->numeric && constant(file, CfTerm::of(file, *transform, block)) == 2;
+    vertical.kind_ = second ? Kind::kSG2 : Kind::kSG1;
   }
-  vertical.c_ = termNamed(file, terms, "C", block);
-  if (!vertical.c_ || !vertical.c_->varies(axis)) return lacks("C");
+  const bool air = vertical.kind_ == Kind::kHybridHeight || vertical.ofPressure();
+  vertical.description_ = name + " of " + coordinate.name;
+  if (vertical.ofPressure()) vertical.description_ += " (pressure, at heights of the standard atmosphere)";
+  const char* lacking = "";
+  if (air ? !vertical.setAirTerms(file, terms, block, axis, lacking)
+          : !vertical.setOceanTerms(file, terms, block, axis, lacking)) {
+    reason = fmt::format("the formula of {} has no term '{}' on these dimensions", coordinate.name, lacking);
+    return std::nullopt;
+  }
   return vertical;
 }
 
-/// Source: CF conventions 1.10, appendix D.
-double CfVertical::formula(double s, double c, double eta, double depth, double depth_c) const {
-  switch (kind_) {
-    case Kind::kSigma:
-      return eta + s * (depth + eta);
-    case Kind::kS: {
-      const double stretched = (1 - b_) * std::sinh(a_ * s) / std::sinh(a_) +
-                               b_ * (std::tanh(a_ * (s + 0.5)) / (2 * std::tanh(0.5 * a_)) - 0.5);
-      return eta * (1 + s) + depth_c * s + (depth - depth_c) * stretched;
-    }
-    case Kind::kSG1: {
-      const double level = depth_c * s + (depth - depth_c) * c;
-      return level + eta * (1 + level / depth);
-    }
-    default: {
-      const double level = (depth_c * s + depth * c) / (depth_c + depth);
-      return eta + (eta + depth) * level;
-    }
+bool CfVertical::setOceanTerms(const NetcdfFiles& file, const Terms& terms, const CfDimensions& block,
+                               size_t axis, const char*& lacking) {
+  const auto lacks = [&](const char* key) {
+    lacking = key;
+    return false;
+  };
+  s_ = termNamed(file, terms, kind_ == Kind::kSigma ? "sigma" : "s", block);
+  eta_ = termNamed(file, terms, "eta", block);
+  depth_ = termNamed(file, terms, "depth", block);
+  if (!s_ || !s_->varies(axis)) return lacks("s");
+  if (!depth_ || depth_->varies(axis)) return lacks("depth");
+  scale_ = kilometresOf(depth_->variable().text("units")).value_or(1e-3);
+  if (!eta_) warnings_.push_back("no surface elevation (eta); 0 is assumed");
+  if (kind_ == Kind::kSigma) return true;
+
+  depth_c_ = constant(file, termNamed(file, terms, "depth_c", block));
+  if (!std::isfinite(depth_c_)) return lacks("depth_c");
+  if (kind_ == Kind::kS) {
+    a_ = constant(file, termNamed(file, terms, "a", block));
+    b_ = constant(file, termNamed(file, terms, "b", block));
+    if (!std::isfinite(a_) || a_ == 0) return lacks("a");
+    return std::isfinite(b_) || lacks("b");
   }
+  c_ = termNamed(file, terms, "C", block);
+  return (c_ && c_->varies(axis)) || lacks("C");
 }
 
-bool CfVertical::readNodes(const NetcdfFile& file, const CfRange& range, std::span<double> to) const {
-  if (kind_ != Kind::kLevels || !terms_[0].ofNodes()) return false;
-  const NetcdfBox box = terms_[0].boxOf(range);
-  file.read(terms_[0].variable(), box, to);
-  for (double& value : to.first(box.values())) value *= scale_;
+/// s_: a, ap, sigma or lev; c_: b; depth_: the surface's pressure or height; a_: p0 or ptop, in pascals.
+bool CfVertical::setAirTerms(const NetcdfFiles& file, const Terms& terms, const CfDimensions& block,
+                             size_t axis, const char*& lacking) {
+  const auto lacks = [&](const char* key) {
+    lacking = key;
+    return false;
+  };
+  const auto pressure = [&](const std::optional<CfTerm>& term, double otherwise) {
+    const double value = constant(file, term);
+    return std::isfinite(value) ? value * pascalsOf(term->variable().text("units")).value_or(1) : otherwise;
+  };
+  const bool hybrid = kind_ == Kind::kHybridPressure, height = kind_ == Kind::kHybridHeight;
+  const bool scaled = hybrid && !terms.contains("ap");
+  const char* const first = kind_ == Kind::kSigmaPressure ? "sigma"
+                            : kind_ == Kind::kLogPressure ? "lev"
+                            : hybrid && !scaled           ? "ap"
+                                                          : "a";
+  s_ = termNamed(file, terms, first, block);
+  if (!s_ || !s_->varies(axis)) return lacks(first);
+  if (kind_ == Kind::kLogPressure) {
+    a_ = pressure(termNamed(file, terms, "p0", block), kSeaLevelPressure);
+    return true;
+  }
+  if (hybrid || height) {
+    c_ = termNamed(file, terms, "b", block);
+    if (!c_ || !c_->varies(axis)) return lacks("b");
+  }
+  depth_ = termNamed(file, terms, height ? "orog" : "ps", block);
+  if (depth_ && depth_->varies(axis)) return lacks(height ? "orog" : "ps");
+  if (height) {
+    if (!depth_) warnings_.push_back("no height of the ground (orog); 0 is assumed");
+    scale_ = kilometresOf(s_->variable().text("units")).value_or(1e-3);
+    return true;
+  }
+  if (!depth_) warnings_.push_back("no surface pressure (ps); 1013.25 hPa is assumed");
+  depth_c_ = depth_ ? pascalsOf(depth_->variable().text("units")).value_or(1) : 1;
+  a_ = pressure(termNamed(file, terms, kind_ == Kind::kSigmaPressure ? "ptop" : "p0", block),
+                kind_ == Kind::kSigmaPressure ? 0 : 1e5);
+  // ap is a pressure already; a is a part of p0.
+  if (hybrid && !scaled) a_ = pascalsOf(s_->variable().text("units")).value_or(1);
   return true;
-}
-
-CfValues CfVertical::heights(const NetcdfFile& file, const CfRange& range) const {
-  CfValues heights;
-  if (!terms_.empty()) {
-    heights = terms_[0].read(file, range);
-    for (size_t n = 1; n < terms_.size(); ++n) {
-      const CfValues more = terms_[n].read(file, range);
-      for (size_t v = 0; v < heights.values.size(); ++v) heights.values[v] += more.values[v];
-    }
-    for (double& value : heights.values) value *= scale_;
-    return heights;
-  }
-  const CfValues none{{1, 1, 1}, {0.0}};
-  const CfValues s = s_->read(file, range), depth = depth_->read(file, range);
-  const CfValues c = c_ ? c_->read(file, range) : none, eta = eta_ ? eta_->read(file, range) : none;
-  for (size_t axis = 0; axis < 3; ++axis) heights.count[axis] = range.end[axis] - range.begin[axis];
-  for (uint64_t k = 0; k < heights.count[2]; ++k)
-    for (uint64_t j = 0; j < heights.count[1]; ++j)
-      for (uint64_t i = 0; i < heights.count[0]; ++i) {
-        // On land the elevation is missing, but the depth may be known.
-        const double elevation = eta.at(i, j, k);
-        heights.values.push_back(scale_ * formula(s.at(i, j, k), c.at(i, j, k),
-                                                  std::isfinite(elevation) ? elevation : 0, depth.at(i, j, k),
-                                                  depth_c_));
-      }
-  return heights;
 }
 
 }  // namespace curvisplat

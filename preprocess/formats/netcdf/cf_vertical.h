@@ -1,7 +1,15 @@
-// The heights of a block's nodes: from the depth or height of levels or of nodes, from a geopotential, or
-// from the formula of a terrain-following coordinate. Always converted to kilometres, positive upwards.
+// The heights of a block's nodes: from the depth or height of levels or of nodes, from a geopotential, from
+// pressures, from the thickness of layers, or from the formula of a terrain-following coordinate. Always
+// converted to kilometres, positive upwards.
+//
+//   pressure                  the height of that pressure in the standard atmosphere (standard_atmosphere.h)
+//   formulas of a pressure    atmosphere_sigma_, atmosphere_ln_pressure_, atmosphere_hybrid_sigma_pressure_
+//                             coordinate: that pressure's height
+//   formulas of a height      atmosphere_hybrid_height_coordinate, ocean_sigma_coordinate, ocean_s_coordinate
+//                             and its generic forms 1 and 2
 #pragma once
 
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -9,7 +17,7 @@
 #include <vector>
 
 #include "preprocess/formats/netcdf/cf_term.h"
-#include "preprocess/formats/netcdf/netcdf_file.h"
+#include "preprocess/formats/netcdf/netcdf_files.h"
 
 namespace curvisplat {
 
@@ -17,19 +25,22 @@ class CfVertical {
  public:
   /// The vertical coordinate of `variable`, whose block has its levels along `axis`; or nullopt and a reason.
   ///
-  /// Tried in this order: a formula of the coordinate along the axis (ocean_sigma_coordinate,
-  /// ocean_s_coordinate and its generic forms 1 and 2), the height of every node, WRF's geopotential (PH and
-  /// PHB), the height of every level.
-  static std::pair<std::optional<CfVertical>, std::string> of(const NetcdfFile& file,
+  /// Tried in this order: the geopotential of every node; a formula of the coordinate along the axis; the
+  /// height or pressure of every node; WRF's geopotential (PH and PHB); the height of the layers' interfaces;
+  /// the height or pressure of every level; the thickness of the layers.
+  static std::pair<std::optional<CfVertical>, std::string> of(const NetcdfFiles& file,
                                                               const NetcdfVariable& variable,
                                                               const CfDimensions& block, size_t axis);
 
+  /// The index along `axis` in kilometres.
+  static CfVertical ofIndex(size_t axis);
+
   /// A single value along the axes on which the height does not depend.
-  CfValues heights(const NetcdfFile& file, const CfRange& range) const;
+  CfValues heights(const NetcdfFiles& file, const CfRange& range) const;
 
   /// If the file stores a height for every node in the order of the nodes: reads them to the beginning of
   /// `to` and returns true, without a buffer. Else returns false.
-  bool readNodes(const NetcdfFile& file, const CfRange& range, std::span<double> to) const;
+  bool readNodes(const NetcdfFiles& file, const CfRange& range, std::span<double> to) const;
 
   const std::string& description() const {
     return description_;
@@ -37,20 +48,58 @@ class CfVertical {
   const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
-  enum class Kind { kLevels, kGeopotential, kSigma, kS, kSG1, kSG2 };
+  enum class Kind {
+    kLevels,
+    kGeopotential,
+    kSigma,
+    kS,
+    kSG1,
+    kSG2,
+    kHybridHeight,
+    kPressure,
+    kLogPressure,
+    kSigmaPressure,
+    kHybridPressure,
+    kThickness,
+  };
+  using Candidates = std::vector<const NetcdfVariable*>;
+  using Terms = std::map<std::string, std::string>;
 
-  static std::optional<CfVertical> byFormula(const NetcdfFile& file, const NetcdfVariable& coordinate,
+  struct Wanted {
+    size_t axis;
+    bool of_nodes, pressure;
+  };
+
+  static std::optional<CfVertical> byCandidates(const NetcdfFiles& file, const Candidates& candidates,
+                                                const NetcdfVariable& variable, const CfDimensions& block,
+                                                const Wanted& wanted, std::string& reason);
+  static std::optional<CfVertical> byFormula(const NetcdfFiles& file, const NetcdfVariable& coordinate,
                                              const CfDimensions& block, size_t axis, std::string& reason);
-  static std::optional<CfVertical> byGeopotential(const NetcdfFile& file, const CfDimensions& block);
-  static std::optional<CfVertical> byLevels(const NetcdfFile& file, const NetcdfVariable& coordinate,
-                                            const CfDimensions& block, size_t axis, std::string& reason);
+  static std::optional<CfVertical> byNodeGeopotential(const NetcdfFiles& file, const CfDimensions& block);
+  static std::optional<CfVertical> byGeopotential(const NetcdfFiles& file, const CfDimensions& block);
+  static std::optional<CfVertical> byInterfaces(const NetcdfFiles& file, const CfDimensions& block,
+                                                size_t axis);
+  static std::optional<CfVertical> byThickness(const NetcdfFiles& file, const CfDimensions& block,
+                                               size_t axis);
+  static std::optional<CfVertical> byLevels(const NetcdfFiles& file, const NetcdfVariable& coordinate,
+                                            const CfTerm& term, size_t axis, std::string& reason);
+  bool setOceanTerms(const NetcdfFiles& file, const Terms& terms, const CfDimensions& block, size_t axis,
+                     const char*& lacking);
+  bool setAirTerms(const NetcdfFiles& file, const Terms& terms, const CfDimensions& block, size_t axis,
+                   const char*& lacking);
+  bool ofPressure() const { return kind_ >= Kind::kPressure && kind_ <= Kind::kHybridPressure; }
+  CfValues thicknessHeights(const NetcdfFiles& file, const CfRange& range) const;
+  CfValues formulaHeights(const NetcdfFiles& file, const CfRange& range) const;
   double formula(double s, double c, double eta, double depth, double depth_c) const;
 
   Kind kind_ = Kind::kLevels;
   double scale_ = 1;                           // converts stored values to kilometres upwards
   std::vector<CfTerm> terms_;                  // height: one; geopotential: base and perturbation
-  std::optional<CfTerm> s_, c_, eta_, depth_;  // terms of a formula
-  double depth_c_ = 0, a_ = 0, b_ = 0;
+  std::optional<CfTerm> s_, c_, eta_, depth_;  // terms of a formula; of the air: a, b, -, surface
+  double depth_c_ = 0, a_ = 0, b_ = 0;         // of the air: a_ the reference or top pressure
+  size_t axis_ = 2;                            // kThickness: of the layers
+  uint64_t layers_ = 0;                        // kThickness: their number
+  bool from_bottom_ = false;                   // kThickness: the first layer is the lowest
   std::string description_;
   std::vector<std::string> warnings_;
 };

@@ -6,19 +6,19 @@
 namespace curvisplat {
 namespace {
 
-bool hasDimensions(const NetcdfFile& file, std::initializer_list<const char*> names) {
+bool hasDimensions(const NetcdfFiles& file, std::initializer_list<const char*> names) {
   return std::all_of(names.begin(), names.end(), [&](const char* name) {
     return std::any_of(file.dimensions().begin(), file.dimensions().end(),
                        [&](const NetcdfDimension& dimension) { return dimension.name == name; });
   });
 }
 
-bool anyVariable(const NetcdfFile& file, const char* attribute, const char* value) {
+bool anyVariable(const NetcdfFiles& file, const char* attribute, const char* value) {
   return std::any_of(file.variables().begin(), file.variables().end(),
                      [&](const NetcdfVariable& variable) { return variable.text(attribute) == value; });
 }
 
-bool mentions(const NetcdfFile& file, std::initializer_list<const char*> attributes, const char* word) {
+bool mentions(const NetcdfFiles& file, std::initializer_list<const char*> attributes, const char* word) {
   return std::any_of(attributes.begin(), attributes.end(), [&](const char* attribute) {
     return file.text(attribute).find(word) != std::string::npos;
   });
@@ -26,7 +26,7 @@ bool mentions(const NetcdfFile& file, std::initializer_list<const char*> attribu
 
 }  // namespace
 
-std::optional<std::string> foreignNetcdf(const NetcdfFile& file) {
+std::optional<std::string> foreignNetcdf(const NetcdfFiles& file) {
   if (hasDimensions(file, {"num_dim", "num_nodes"}) &&
       (file.hasAttribute("api_version") || file.hasAttribute("floating_point_word_size")))
     return "a finite-element mesh (Exodus)";

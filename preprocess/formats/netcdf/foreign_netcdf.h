@@ -4,11 +4,11 @@
 #include <optional>
 #include <string>
 
-#include "preprocess/formats/netcdf/netcdf_file.h"
+#include "preprocess/formats/netcdf/netcdf_files.h"
 
 namespace curvisplat {
 
 /// "an unstructured mesh (UGRID)", "an HDF5 file, but not NetCDF-4 or CGNS"; nullopt for any other file.
-std::optional<std::string> foreignNetcdf(const NetcdfFile& file);
+std::optional<std::string> foreignNetcdf(const NetcdfFiles& file);
 
 }  // namespace curvisplat

@@ -21,6 +21,7 @@ class Globe {
   Globe(const GlobeOptions& options, bool degrees, double middle_longitude);
 
   bool sphere() const { return sphere_; }
+  bool degrees() const { return degrees_; }
 
   /// From degrees east and north, or from kilometres if the grid has lengths.
   GlobeColumn column(double longitude, double latitude) const;

@@ -27,6 +27,7 @@ constexpr size_t kChunkCacheSlots = 1009;
 constexpr float kChunkCachePreemption = 0.75f;
 // Limit for attributes: they hold descriptions, not data.
 constexpr size_t kMaxAttributeValues = size_t{1} << 20;
+constexpr double kMaxTextBytes = 1 << 24;
 // Deflate shrinks zeros to about a thousandth.
 constexpr double kMaxCompression = 1100;
 constexpr const char* kNetcdf4 = "NetCDF-4";
@@ -186,6 +187,7 @@ void NetcdfFile::readVariable(int id) {
   NetcdfVariable variable;
   variable.name = name;
   variable.id = id;
+  variable.position = variables_.size();
   variable.type = type;
   variable.value_bytes = bytesOf(type);
   variable.numeric = variable.value_bytes > 0;
@@ -298,9 +300,7 @@ void NetcdfFile::addRange(const NetcdfVariable& variable, Packing& packing) {
 }
 
 std::string NetcdfFile::missingValues(const NetcdfVariable& variable) const {
-  const auto position = static_cast<size_t>(&variable - variables_.data());
-  CURVISPLAT_CHECK_OP(position, <, variables_.size());
-  const Packing& packing = packings_[position];
+  const Packing& packing = packings_.at(variable.position);
   std::string words = packing.range;
   if (!packing.missing.empty())
     words += fmt::format("{}equal to {:g}", words.empty() ? "" : " or ", fmt::join(packing.missing, " or "));
@@ -358,6 +358,17 @@ bool NetcdfFile::hasAttribute(const char* attribute) const {
   return nc_inq_attid(file_, NC_GLOBAL, attribute, &id) == NC_NOERR;
 }
 
+std::optional<double> NetcdfFile::number(const char* attribute) const {
+  const QuietHdf5 quiet;
+  nc_type type = NC_NAT;
+  size_t length = 0;
+  double value = 0;
+  if (nc_inq_att(file_, NC_GLOBAL, attribute, &type, &length) != NC_NOERR || length != 1 ||
+      bytesOf(type) == 0 || nc_get_att_double(file_, NC_GLOBAL, attribute, &value) != NC_NOERR)
+    return std::nullopt;
+  return value;
+}
+
 const NetcdfDimension& NetcdfFile::dimension(const NetcdfVariable& variable, size_t axis) const {
   return dimensions_.at(variable.dims.at(axis));
 }
@@ -373,9 +384,24 @@ void NetcdfFile::readWith(const Get& get, const NetcdfVariable& variable, const 
     // NC_ERANGE: a number too large for a float becomes infinite, which blanks its sample.
     if (status != NC_NOERR && status != NC_ERANGE) fail(variable.name, status);
   }
-  const auto position = static_cast<size_t>(&variable - variables_.data());
-  CURVISPLAT_CHECK_OP(position, <, variables_.size());
-  unpack(packings_[position], to.first(box.values()));
+  unpack(packings_.at(variable.position), to.first(box.values()));
+}
+
+std::string NetcdfFile::readText(const NetcdfVariable& variable) const {
+  const std::vector<size_t>& dims = variables_.at(variable.position).dims;  // of this file, not of several
+  const std::vector<size_t> start(dims.size(), 0);
+  std::vector<size_t> count;
+  double bytes = 1;
+  for (const size_t dim : dims) {
+    count.push_back(dimensions_.at(dim).length);
+    bytes *= static_cast<double>(count.back());
+  }
+  if (variable.type != NC_CHAR || bytes > kMaxTextBytes) return "";
+  std::string text(static_cast<size_t>(bytes), ' ');
+  const QuietHdf5 quiet;
+  const int status = nc_get_vara_text(file_, variable.id, start.data(), count.data(), text.data());
+  if (status != NC_NOERR) fail(variable.name, status);
+  return text;
 }
 
 void NetcdfFile::read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const {

@@ -35,6 +35,8 @@ struct NetcdfAttribute {
 struct NetcdfVariable {
   std::string name;
   int id = 0;
+  size_t file = 0;           // index into the files of a NetcdfFiles
+  size_t position = 0;       // index into its NetcdfFile::variables()
   int type = 0;              // as stored, an nc_type
   size_t value_bytes = 0;    // size of a stored value
   bool numeric = false;      // neither text nor a user-defined type
@@ -72,6 +74,8 @@ class NetcdfFile {
   /// The text of an attribute of the file; empty if there is none, or if it is not text.
   std::string text(const char* attribute) const;
   bool hasAttribute(const char* attribute) const;
+  /// A numeric attribute of the file with one value.
+  std::optional<double> number(const char* attribute) const;
   /// Which stored values of a variable read() replaces by NaN, in words; empty if none.
   std::string missingValues(const NetcdfVariable& variable) const;
   const NetcdfDimension& dimension(const NetcdfVariable& variable, size_t axis) const;
@@ -81,6 +85,8 @@ class NetcdfFile {
   /// valid range.
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const;
   void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<float> to) const;
+  /// The characters of a variable of text (NC_CHAR); empty if it is not one or has more than 16 MiB.
+  std::string readText(const NetcdfVariable& variable) const;
 
  private:
   /// How stored numbers are converted to values.

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "preprocess/formats/netcdf/cf_roles.h"
+#include "preprocess/formats/netcdf/closed_grid.h"
 #include "preprocess/formats/netcdf/foreign_netcdf.h"
 #include "preprocess/grid/scalar_names.h"
 #include "preprocess/grid/time_steps.h"
@@ -30,7 +31,7 @@ std::string listed(const std::vector<std::string>& names) {
   return text;
 }
 
-std::string describeDimensions(const NetcdfFile& file, const CfGrid& grid) {
+std::string describeDimensions(const NetcdfFiles& file, const CfGrid& grid) {
   const auto name = [&](size_t axis) { return file.dimensions()[grid.dims.axes[axis]].name; };
   return fmt::format("{} x {} x {}", name(0), name(1), name(2));
 }
@@ -58,17 +59,41 @@ std::optional<std::pair<size_t, size_t>> positionOf(const std::vector<CfGrid>& g
   return std::nullopt;
 }
 
+std::vector<std::filesystem::path> filesOf(const OpenGridOptions& options) {
+  std::vector<std::filesystem::path> files{options.grid};
+  files.insert(files.end(), options.solutions.begin(), options.solutions.end());
+  return files;
+}
+
+/// Calls `each` for pieces of a box that are contiguous in it, of about `nodes` nodes or a row.
+template <typename Each>
+void forEachPiece(const NodeBox& box, uint64_t ni, uint64_t nodes, const Each& each) {
+  const uint64_t nj = box.j1 - box.j0;
+  const uint64_t rows = std::clamp<uint64_t>(nodes / ni, 1, nj);
+  const uint64_t planes = rows < nj ? 1 : std::clamp<uint64_t>(nodes / (ni * rows), 1, box.k1 - box.k0);
+  for (uint64_t k = box.k0; k < box.k1; k += planes)
+    for (uint64_t j = box.j0; j < box.j1; j += rows)
+      each(NodeBox{j, std::min(j + rows, box.j1), k, std::min(k + planes, box.k1)});
+}
+
 }  // namespace
 
+std::unique_ptr<GridSource> openNetcdf(const OpenGridOptions& options) {
+  auto source = std::make_unique<NetcdfSource>(options);
+  if (const auto closure = source->closure())
+    return std::make_unique<ClosedGrid>(std::move(source), *closure);
+  return source;
+}
+
 NetcdfSource::NetcdfSource(const OpenGridOptions& options)
-    : file_(options.grid),
+    : file_(filesOf(options)),
       grid_(chooseGrid(file_, options, description_, mask_)),
       length_(kilometresOf(grid_.longitude.variable().text("units")).value_or(1e-3)),
       globe_(globeOf(options.globe)) {
   describe(options);
 }
 
-CfGrid NetcdfSource::chooseGrid(const NetcdfFile& file, const OpenGridOptions& options,
+CfGrid NetcdfSource::chooseGrid(const NetcdfFiles& file, const OpenGridOptions& options,
                                 GridDescription& description, size_t& mask) {
   CfGrids found = findCfGrids(file, options.time_step.value_or(0));
   if (found.grids.empty()) {
@@ -111,28 +136,37 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFile& file, const OpenGridOptions& o
 }
 
 Globe NetcdfSource::globeOf(const GlobeOptions& options) const {
-  if (!grid_.degrees && options.shape == GlobeOptions::Shape::kSphere)
-    throw Error("{}: {} and {} are lengths; --sphere needs degrees: leave it out", file_.path().string(),
-                grid_.longitude.variable().name, grid_.latitude.variable().name);
+  if (!grid_.degrees && !grid_.projection && options.shape == GlobeOptions::Shape::kSphere)
+    throw Error("{}: {} and {} are lengths; --sphere needs degrees, or a map projection: leave it out",
+                file_.path().string(), grid_.longitude.variable().name, grid_.latitude.variable().name);
   // The map is cut opposite the middle of the grid.
   CfRange middle;
   for (size_t axis = 0; axis < 3; ++axis) {
     middle.begin[axis] = file_.dimensions()[grid_.dims.axes[axis]].length / 2;
     middle.end[axis] = middle.begin[axis] + 1;
   }
-  const bool flat = grid_.degrees && options.shape == GlobeOptions::Shape::kFlat;
-  return Globe(options, grid_.degrees, flat ? grid_.longitude.read(file_, middle).values.at(0) : 0);
+  const bool flat = options.shape == GlobeOptions::Shape::kFlat;
+  // A projected map stays the flat map that it is.
+  const bool degrees = grid_.degrees || (grid_.projection && !flat);
+  double longitude = 0;
+  if (degrees && flat) {
+    longitude = grid_.longitude.read(file_, middle).values.at(0);
+    double latitude = grid_.latitude.read(file_, middle).values.at(0);
+    if (grid_.projection) grid_.projection->toGeographic({&longitude, 1}, {&latitude, 1});
+  }
+  return Globe(options, degrees, longitude);
+}
+
+bool NetcdfSource::projects() const {
+  return grid_.projection && globe_.degrees();
 }
 
 void NetcdfSource::describe(const OpenGridOptions& options) {
-  description_.files.push_back(options.grid.string());
-  description_.times = cfTimes(file_, grid_);
-  const NetcdfVariable* const time =
-      grid_.dims.time ? file_.find(file_.dimensions()[*grid_.dims.time].name) : nullptr;
-  if (time) {
-    description_.time_unit = time->text("units");
-    description_.calendar = time->text("calendar");
-  }
+  description_.files = file_.paths();
+  const CfTimes times = cfTimes(file_, grid_);
+  description_.times = times.values;
+  description_.time_unit = times.unit;
+  description_.calendar = times.calendar;
   if (grid_.dims.time && description_.times.empty())
     throw Error("{}: has no time step: dimension {} has length 0", file_.path().string(),
                 file_.dimensions()[*grid_.dims.time].name);
@@ -151,18 +185,57 @@ void NetcdfSource::describe(const OpenGridOptions& options) {
         fmt::format("{} is missing where it is {}", grid_.variables[mask_]->name, missing);
   description_.coordinate_bytes =
       std::max(grid_.longitude.variable().value_bytes, grid_.latitude.variable().value_bytes) > 4 ? 8 : 4;
-  for (const std::string& warning : grid_.vertical.warnings()) description_.warnings.push_back(warning);
+  if (grid_.mask)
+    description_.blanking +=
+        fmt::format("{}{}", description_.blanking.empty() ? "" : ", or where ", grid_.mask->description());
+  for (const auto* warnings : {&grid_.vertical.warnings(), &file_.duplicates()})
+    description_.warnings.insert(description_.warnings.end(), warnings->begin(), warnings->end());
+  if (grid_.indices)
+    description_.warnings.push_back(
+        fmt::format("the dimensions {} have no coordinates; the indices of the nodes take their place",
+                    describeDimensions(file_, grid_)));
 
   const std::string shape = globe_.sphere() ? fmt::format("on a sphere of {:g} km", options.globe.radius_km)
-                            : grid_.degrees
+                            : globe_.degrees()
                                 ? fmt::format("on a flat map of a sphere of {:g} km", options.globe.radius_km)
                                 : "flat";
-  description_.format = fmt::format("{}, {}, {} {}, vertical {} times {:g}, in km", file_.kind(),
-                                    grid_.longitude.variable().name, grid_.latitude.variable().name, shape,
-                                    grid_.vertical.description(), options.globe.vertical_scale);
+  const std::string projection = grid_.projection ? fmt::format(" ({})", grid_.projection->name()) : "";
+  description_.format =
+      fmt::format("{}, {}, {}{} {}, vertical {} times {:g}, in km", file_.kind(),
+                  grid_.longitude.variable().name, grid_.latitude.variable().name, projection, shape,
+                  grid_.vertical.description(), options.globe.vertical_scale);
   if (grid_.dims.time)
     description_.format +=
         fmt::format(", time step {} of {}", description_.time_step, description_.times.size());
+  if (const double share = shareOfZeros(); share > 0)
+    description_.warnings.push_back(
+        fmt::format("{} is exactly 0 at {:.0f} % of the nodes, at all levels, which may be land; --blank 0 "
+                    "leaves these out",
+                    grid_.variables[mask_]->name, 100 * share));
+}
+
+/// Where a file marks land by zeros alone: the share of columns that are 0 at the first, middle and last level,
+/// in a row in the middle and those a quarter from the ends. 0 if less than a hundredth, if all, in the air, and
+/// where values are missing or a mask tells.
+double NetcdfSource::shareOfZeros() const {
+  const GridBlock& block = description_.blocks[0];
+  if (grid_.levels != 2 || grid_.mask || !isOcean(file_, grid_)) return 0;
+  uint64_t zero = 0, all = 0;
+  for (const uint64_t quarter : {1, 2, 3}) {
+    const uint64_t j = block.nj * quarter / 4;
+    std::vector<uint8_t> zeros(block.ni, 1);
+    std::vector<float> values(block.ni);
+    for (const uint64_t k : {uint64_t{0}, block.nk / 2, block.nk - 1}) {
+      readScalar({j, j + 1, k, k + 1}, mask_, values);
+      for (uint64_t i = 0; i < block.ni; ++i) {
+        if (std::isnan(values[i])) return 0;
+        zeros[i] &= values[i] == 0;
+      }
+    }
+    for (const uint8_t one : zeros) zero += one;
+    all += block.ni;
+  }
+  return zero == all || 100 * zero < all ? 0 : static_cast<double>(zero) / static_cast<double>(all);
 }
 
 void NetcdfSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
@@ -184,57 +257,86 @@ void NetcdfSource::read(uint32_t block, const NodeBox& box, std::span<const uint
     for (size_t n = 0; n < nodes; ++n) out.blank[n] = std::isnan((*mask)[n]);
   else
     readBlank(box, out.blank);
+  if (grid_.mask) applyMask(box, out.blank);
+}
+
+void NetcdfSource::applyMask(const NodeBox& box, std::vector<uint8_t>& blank) const {
+  const uint64_t ni = description_.blocks[0].ni;
+  size_t n = 0;
+  forEachPiece(box, ni, kNodesAtATime, [&](const NodeBox& piece) {
+    const size_t nodes = ni * (piece.j1 - piece.j0) * (piece.k1 - piece.k0);
+    grid_.mask->apply(file_, {{0, piece.j0, piece.k0}, {ni, piece.j1, piece.k1}}, {&blank[n], nodes});
+    n += nodes;
+  });
 }
 
 void NetcdfSource::readBlank(const NodeBox& box, std::vector<uint8_t>& blank) const {
-  const uint64_t ni = description_.blocks[0].ni, nj = box.j1 - box.j0;
-  const uint64_t rows = std::clamp<uint64_t>(kMaskNodesAtATime / ni, 1, nj);
-  const uint64_t planes = std::clamp<uint64_t>(kMaskNodesAtATime / (ni * rows), 1, box.k1 - box.k0);
+  const uint64_t ni = description_.blocks[0].ni;
   std::vector<float> values;
   size_t n = 0;
-  for (uint64_t k = box.k0; k < box.k1; k += planes)
-    for (uint64_t j = box.j0; j < box.j1; j += rows) {
-      // Several planes only if each is read whole: so the pieces are contiguous in `blank`.
-      const NodeBox piece{j, std::min(j + rows, box.j1), k, std::min(k + planes, box.k1)};
-      values.resize(ni * (piece.j1 - piece.j0) * (piece.k1 - piece.k0));
-      readScalar(piece, mask_, values);
-      for (const float value : values) blank[n++] = std::isnan(value);
-    }
+  forEachPiece(box, ni, kMaskNodesAtATime, [&](const NodeBox& piece) {
+    values.resize(ni * (piece.j1 - piece.j0) * (piece.k1 - piece.k0));
+    readScalar(piece, mask_, values);
+    for (const float value : values) blank[n++] = std::isnan(value);
+  });
+}
+
+/// The columns of the box's nodes; those of its first plane only where one column serves all levels.
+void NetcdfSource::readColumns(const CfRange& range, std::vector<GlobeColumn>& columns) const {
+  const CfValues east = grid_.longitude.read(file_, range), north = grid_.latitude.read(file_, range);
+  const double scale = !grid_.degrees && !projects() ? length_ : 1;
+  const bool upright = !grid_.longitude.varies(2) && !grid_.latitude.varies(2);
+  const uint64_t planes = upright ? 1 : range.end[2] - range.begin[2];
+  std::vector<double> x, y;
+  for (uint64_t k = 0; k < planes; ++k)
+    for (uint64_t j = 0; j < range.end[1] - range.begin[1]; ++j)
+      for (uint64_t i = 0; i < range.end[0] - range.begin[0]; ++i) {
+        x.push_back(scale * east.at(i, j, k));
+        y.push_back(scale * north.at(i, j, k));
+      }
+  if (projects()) {
+    if (!grid_.degrees)  // PROJ's lengths are metres
+      for (std::vector<double>* axis : {&x, &y})
+        for (double& value : *axis) value *= 1e3 * length_;
+    grid_.projection->toGeographic(x, y);
+  }
+  columns.clear();
+  for (size_t n = 0; n < x.size(); ++n) columns.push_back(globe_.column(x[n], y[n]));
+}
+
+std::optional<GridClosure> NetcdfSource::closure() const {
+  if (!globe_.sphere() || grid_.levels != 2) return std::nullopt;
+  const GridBlock& block = description_.blocks[0];
+  return closureOf(block.ni, block.nj, [&](uint64_t j) {
+    std::vector<GlobeColumn> columns;
+    readColumns({{0, j, 0}, {block.ni, j + 1, 1}}, columns);
+    std::vector<glm::dvec3> points;
+    for (const GlobeColumn& column : columns) points.push_back({column.x, column.y, column.z});
+    return points;
+  });
 }
 
 void NetcdfSource::readPlaces(const NodeBox& box, NodeArrays& out) const {
-  const uint64_t ni = description_.blocks[0].ni, nj = box.j1 - box.j0;
-  const uint64_t rows = std::clamp<uint64_t>(kNodesAtATime / ni, 1, nj);
-  const uint64_t planes = std::clamp<uint64_t>(kNodesAtATime / (ni * rows), 1, box.k1 - box.k0);
+  const uint64_t ni = description_.blocks[0].ni;
   std::vector<GlobeColumn> columns;
   const bool read = grid_.vertical.readNodes(file_, {{0, box.j0, box.k0}, {ni, box.j1, box.k1}}, out.z);
   CfValues height;
-  for (uint64_t k = box.k0; k < box.k1; k += planes)
-    for (uint64_t j = box.j0; j < box.j1; j += rows) {
-      const CfRange range{{0, j, k}, {ni, std::min(j + rows, box.j1), std::min(k + planes, box.k1)}};
-      const CfValues east = grid_.longitude.read(file_, range), north = grid_.latitude.read(file_, range);
-      if (!read) height = grid_.vertical.heights(file_, range);
-      const double scale = grid_.degrees ? 1 : length_;
-      const auto column = [&](uint64_t ii, uint64_t jj, uint64_t kk) {
-        return globe_.column(scale * east.at(ii, jj, kk), scale * north.at(ii, jj, kk));
-      };
-      // Usually one column serves all levels.
-      const bool upright = !grid_.longitude.varies(2) && !grid_.latitude.varies(2);
-      const uint64_t rows_here = range.end[1] - range.begin[1];
-      columns.clear();
-      for (uint64_t jj = 0; upright && jj < rows_here; ++jj)
-        for (uint64_t ii = 0; ii < ni; ++ii) columns.push_back(column(ii, jj, 0));
-      for (uint64_t kk = 0; kk < range.end[2] - range.begin[2]; ++kk)
-        for (uint64_t jj = 0; jj < rows_here; ++jj)
-          for (uint64_t ii = 0; ii < ni; ++ii) {
-            const uint64_t n = ii + ni * ((j - box.j0 + jj) + nj * (k - box.k0 + kk));
-            const GlobePlace place = globe_.place(upright ? columns[ii + ni * jj] : column(ii, jj, kk),
-                                                  read ? out.z[n] : height.at(ii, jj, kk));
-            out.x[n] = place.x;
-            out.y[n] = place.y;
-            out.z[n] = place.z;
-          }
-    }
+  size_t n = 0;
+  forEachPiece(box, ni, kNodesAtATime, [&](const NodeBox& piece) {
+    const CfRange range{{0, piece.j0, piece.k0}, {ni, piece.j1, piece.k1}};
+    readColumns(range, columns);
+    if (!read) height = grid_.vertical.heights(file_, range);
+    size_t column = 0;
+    for (uint64_t k = 0; k < piece.k1 - piece.k0; ++k)
+      for (uint64_t j = 0; j < piece.j1 - piece.j0; ++j)
+        for (uint64_t i = 0; i < ni; ++i, ++n, ++column) {
+          if (column == columns.size()) column = 0;
+          const GlobePlace place = globe_.place(columns[column], read ? out.z[n] : height.at(i, j, k));
+          out.x[n] = place.x;
+          out.y[n] = place.y;
+          out.z[n] = place.z;
+        }
+  });
 }
 
 void NetcdfSource::readScalar(const NodeBox& box, size_t scalar, std::vector<float>& to) const {

@@ -8,8 +8,10 @@
 
 #include "preprocess/formats/cgns/cgns_source.h"
 #include "preprocess/formats/netcdf/netcdf_source.h"
+#include "preprocess/formats/open/combined_source.h"
 #include "preprocess/formats/open/file_series.h"
 #include "preprocess/formats/open/foreign_formats.h"
+#include "preprocess/formats/open/unpacked_source.h"
 #include "preprocess/formats/plot3d/plot3d_meta.h"
 #include "preprocess/formats/plot3d/plot3d_source.h"
 #include "preprocess/formats/vtk/vtk_legacy.h"
@@ -26,7 +28,9 @@ namespace {
 struct GridFormat {
   bool (*recognises)(const InputFile& file);
   std::unique_ptr<GridSource> (*open)(const OpenGridOptions& options);
+  enum class MoreFiles { kNone, kByItself, kCombined } more_files;  // who reads options.solutions
 };
+using MoreFiles = GridFormat::MoreFiles;
 
 template <typename Source>
 std::unique_ptr<GridSource> openAs(const OpenGridOptions& options) {
@@ -38,12 +42,13 @@ std::unique_ptr<GridSource> openListedFile(const OpenGridOptions& options) {
 }
 
 constexpr GridFormat kFormats[] = {
-    {isVtkXml, openVtkXml},
-    {isVtkLegacy, openVtkLegacy},
-    {isFileSeries, openListedFile},  // before .p3d, which takes all JSON files
-    {isPlot3dMeta, openPlot3dMeta},
-    {CgnsFile::recognises, openAs<CgnsSource>},  // before NetCDF, which takes all HDF5 files
-    {NetcdfFile::recognises, openAs<NetcdfSource>},
+    {isVtkXml, openVtkXml, MoreFiles::kCombined},
+    {isVtkLegacy, openVtkLegacy, MoreFiles::kCombined},
+    {isFileSeries, openListedFile, MoreFiles::kNone},  // before .p3d, which takes all JSON files
+    {isPlot3dMeta, openPlot3dMeta, MoreFiles::kNone},
+    {CgnsFile::recognises, openAs<CgnsSource>,
+     MoreFiles::kCombined},  // before NetCDF, which takes all HDF5 files
+    {NetcdfFile::recognises, openNetcdf, MoreFiles::kByItself},
 };
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {
@@ -104,30 +109,29 @@ std::string namesIn(const GridDescription& description) {
 }
 
 std::unique_ptr<GridSource> openFormat(const OpenGridOptions& options) {
-  OpenGridOptions complete = options;
-  if (complete.temporary_folder.empty()) complete.temporary_folder = std::filesystem::temp_directory_path();
   if (isRegularFile(options.grid)) {
     const InputFile file(options.grid);
     for (const GridFormat& format : kFormats)
       if (format.recognises(file)) {
-        if (!options.solutions.empty())
-          throw Error(
-              "{}: contains its own scalars; leave out {} (only PLOT3D grids take further files; combine VTK "
-              "files in a .vtm, .pvts or .pvd)",
-              options.grid.string(), options.solutions.front().string());
-        return format.open(complete);
+        if (options.solutions.empty() || format.more_files == MoreFiles::kByItself)
+          return format.open(options);
+        if (format.more_files == MoreFiles::kCombined) return openCombined(options, openFormat);
+        throw Error("{}: describes its own files; leave out {}", options.grid.string(),
+                    options.solutions.front().string());
       }
   }
   refuseForeign(options.grid, "a grid file");
   for (const std::filesystem::path& path : options.solutions)
     refuseForeign(path, "a PLOT3D Q or function file");
-  return std::make_unique<Plot3dSource>(complete);
+  return std::make_unique<Plot3dSource>(options);
 }
 
 }  // namespace
 
 std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options) {
-  std::unique_ptr<GridSource> source = openFormat(options);
+  OpenGridOptions complete = options;
+  if (complete.temporary_folder.empty()) complete.temporary_folder = std::filesystem::temp_directory_path();
+  std::unique_ptr<GridSource> source = openUnpacked(complete, openFormat);
   chosenTimeStep(options.grid.string(), source->description().times, options.time_step);
   return source;
 }

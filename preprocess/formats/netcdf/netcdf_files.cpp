@@ -1,0 +1,103 @@
+#include "preprocess/formats/netcdf/netcdf_files.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kNamesListed = 3;
+
+}  // namespace
+
+NetcdfFiles::NetcdfFiles(const std::vector<std::filesystem::path>& paths) {
+  for (const std::filesystem::path& path : paths) {
+    if (!files_.empty() && !NetcdfFile::recognises(InputFile(path)))
+      throw Error("{}: is not a NetCDF file; expected one, like {}, for further variables of its grid",
+                  path.string(), paths.front().string());
+    files_.push_back(std::make_unique<NetcdfFile>(path));
+    add(*files_.back());
+  }
+}
+
+void NetcdfFiles::add(const NetcdfFile& file) {
+  std::vector<size_t> merged;  // [the file's dimension]
+  for (const NetcdfDimension& dimension : file.dimensions()) {
+    const auto same = std::find_if(dimensions_.begin(), dimensions_.end(), [&](const NetcdfDimension& other) {
+      return !dimension.name.empty() && other.name == dimension.name && other.length == dimension.length;
+    });
+    merged.push_back(static_cast<size_t>(same - dimensions_.begin()));
+    if (same == dimensions_.end()) dimensions_.push_back(dimension);
+  }
+  std::vector<std::string> twice;
+  for (const NetcdfVariable& variable : file.variables()) {
+    if (find(variable.name)) {
+      if (variable.dims.size() >= 3) twice.push_back(variable.name);
+      continue;
+    }
+    NetcdfVariable& added = variables_.emplace_back(variable);
+    added.file = files_.size() - 1;
+    for (size_t& dim : added.dims) dim = merged.at(dim);
+  }
+  if (twice.empty()) return;
+  const size_t listed = std::min(kNamesListed, twice.size());
+  std::string names =
+      fmt::format("{}", fmt::join(twice.begin(), twice.begin() + static_cast<ptrdiff_t>(listed), ", "));
+  if (twice.size() > listed) names += fmt::format(" and {} more", twice.size() - listed);
+  duplicates_.push_back(
+      fmt::format("left out: {} of {}: an earlier file has the same variables", names, file.path().string()));
+}
+
+std::vector<std::string> NetcdfFiles::paths() const {
+  std::vector<std::string> paths;
+  for (const auto& file : files_) paths.push_back(file->path().string());
+  return paths;
+}
+
+const NetcdfVariable* NetcdfFiles::find(std::string_view name) const {
+  const auto found = std::find_if(variables_.begin(), variables_.end(),
+                                  [&](const NetcdfVariable& variable) { return variable.name == name; });
+  return found == variables_.end() ? nullptr : &*found;
+}
+
+const NetcdfDimension& NetcdfFiles::dimension(const NetcdfVariable& variable, size_t axis) const {
+  return dimensions_.at(variable.dims.at(axis));
+}
+
+std::string NetcdfFiles::text(const char* attribute) const {
+  for (const auto& file : files_)
+    if (std::string text = file->text(attribute); !text.empty()) return text;
+  return "";
+}
+
+bool NetcdfFiles::hasAttribute(const char* attribute) const {
+  return std::any_of(files_.begin(), files_.end(),
+                     [&](const auto& file) { return file->hasAttribute(attribute); });
+}
+
+std::optional<double> NetcdfFiles::number(const char* attribute) const {
+  for (const auto& file : files_)
+    if (const auto number = file->number(attribute)) return number;
+  return std::nullopt;
+}
+
+std::string NetcdfFiles::missingValues(const NetcdfVariable& variable) const {
+  return files_.at(variable.file)->missingValues(variable);
+}
+
+void NetcdfFiles::read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const {
+  files_.at(variable.file)->read(variable, box, to);
+}
+
+void NetcdfFiles::read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<float> to) const {
+  files_.at(variable.file)->read(variable, box, to);
+}
+
+std::string NetcdfFiles::readText(const NetcdfVariable& variable) const {
+  return files_.at(variable.file)->readText(variable);
+}
+
+}  // namespace curvisplat

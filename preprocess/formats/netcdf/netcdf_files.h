@@ -1,0 +1,58 @@
+// One or more NetCDF files that describe one grid: coordinates and masks in one, fields in others. Their
+// variables and dimensions are offered as those of one file. Any number of threads may use a NetcdfFiles.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "preprocess/formats/netcdf/netcdf_file.h"
+
+namespace curvisplat {
+
+class NetcdfFiles {
+ public:
+  /// Dimensions of the same name and length are one dimension. Of variables with the same name the first
+  /// file's is taken; duplicates() lists the others. Throws Error as NetcdfFile does, and for a file that is
+  /// not NetCDF.
+  explicit NetcdfFiles(const std::vector<std::filesystem::path>& paths);
+
+  /// Of the first file.
+  const std::filesystem::path& path() const { return files_.front()->path(); }
+  const std::string& kind() const { return files_.front()->kind(); }
+  std::vector<std::string> paths() const;
+
+  const std::vector<NetcdfDimension>& dimensions() const { return dimensions_; }
+  const std::vector<NetcdfVariable>& variables() const { return variables_; }
+  const NetcdfVariable* find(std::string_view name) const;
+  const NetcdfDimension& dimension(const NetcdfVariable& variable, size_t axis) const;
+  /// One sentence for each further file with variables that an earlier file has too.
+  const std::vector<std::string>& duplicates() const { return duplicates_; }
+
+  /// Of the first file that has the attribute; as NetcdfFile's.
+  std::string text(const char* attribute) const;
+  bool hasAttribute(const char* attribute) const;
+  std::optional<double> number(const char* attribute) const;
+  bool plainHdf5() const { return files_.front()->plainHdf5(); }
+
+  /// As NetcdfFile's.
+  std::string missingValues(const NetcdfVariable& variable) const;
+  void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<double> to) const;
+  void read(const NetcdfVariable& variable, const NetcdfBox& box, std::span<float> to) const;
+  std::string readText(const NetcdfVariable& variable) const;
+
+ private:
+  void add(const NetcdfFile& file);
+
+  std::vector<std::unique_ptr<NetcdfFile>> files_;
+  std::vector<NetcdfDimension> dimensions_;
+  std::vector<NetcdfVariable> variables_;
+  std::vector<std::string> duplicates_;
+};
+
+}  // namespace curvisplat

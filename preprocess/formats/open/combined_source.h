@@ -1,0 +1,58 @@
+// Several VTK or CGNS files of one instant as one grid: fields of the same nodes in several files, or blocks in
+// several files.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "preprocess/formats/common/open_grid_options.h"
+#include "preprocess/grid/grid_source.h"
+
+namespace curvisplat {
+
+/// A file belongs to the first one whose blocks have its dimensions and its nodes (the first row of each block
+/// is compared); then its scalars, or those that the other lacks, are that one's too. Else its blocks follow
+/// those before it. The grid has the scalars that all of its blocks have; warnings name the others.
+class CombinedSource final : public GridSource {
+ public:
+  /// `names`: of the files, for blocks and messages. Throws Error if a file has the nodes of an earlier one and
+  /// nothing new: steps in time, perhaps.
+  CombinedSource(std::vector<std::unique_ptr<GridSource>> sources, const std::vector<std::string>& names);
+
+  const GridDescription& description() const override { return description_; }
+  void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+            NodeArrays& out) const override;
+
+ private:
+  /// A scalar of a group: the file that has it, and its index there.
+  struct Place {
+    size_t source = 0;
+    uint32_t scalar = 0;
+  };
+  /// Files of the same nodes. The first one's coordinates and blanking count.
+  struct Group {
+    std::vector<size_t> sources;
+    std::vector<GridScalar> scalars;
+    std::vector<Place> places;  // [scalars]
+  };
+
+  bool sameNodes(const GridSource& a, const GridSource& b) const;
+  size_t addScalars(Group& group, size_t source) const;
+  void describe(const std::vector<std::string>& names);
+  void readFrom(size_t source, uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+                std::span<std::vector<float>* const> to) const;
+
+  std::vector<std::unique_ptr<GridSource>> sources_;
+  std::vector<Group> groups_;
+  std::vector<std::pair<size_t, uint32_t>> blocks_;  // [block]: its group, and its number there
+  std::vector<std::vector<Place>> places_;           // [group][scalar of the description]
+  GridDescription description_;
+};
+
+/// Opens the grid file and the further files of `options` each by itself with `open`, and combines them.
+std::unique_ptr<GridSource> openCombined(
+    const OpenGridOptions& options,
+    const std::function<std::unique_ptr<GridSource>(const OpenGridOptions&)>& open);
+
+}  // namespace curvisplat

@@ -1,0 +1,552 @@
+#!/usr/bin/python3
+"""model_files_test.py CURVISPLAT
+
+Writes NetCDF files as models and their tools write them, with netCDF4, and compares what `curvisplat info` measures
+(dimensions, ranges, blanked nodes, bounds and volume) with what numpy makes of the same arrays by the conventions'
+formulas, written down here once more. Exit status 77 (skipped) without python3-netcdf4.
+"""
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+try:
+    import netCDF4
+    import numpy as np
+except ModuleNotFoundError as error:
+    print(f"skipped: {error}; install python3-netcdf4 and python3-numpy")
+    sys.exit(77)
+
+PROGRAM = sys.argv.pop(1)
+RADIUS = 6371.0  # kilometres
+RANDOM = np.random.default_rng(1)
+
+
+def sphere(longitude, latitude, height_km):
+    """World positions of broadcastable arrays, indexed (k, j, i)."""
+    longitude, latitude, height_km = np.broadcast_arrays(longitude, latitude, height_km)
+    east, north, r = np.radians(longitude), np.radians(latitude), RADIUS + height_km
+    return np.stack([r * np.cos(north) * np.cos(east), r * np.cos(north) * np.sin(east), r * np.sin(north)], -1)
+
+
+def volume(places):
+    """The sum of the cells' volumes, each from six tetrahedra: exact to the cells' curvature."""
+    c = [places[k : k - 1 or None, j : j - 1 or None, i : i - 1 or None] for k in (0, 1) for j in (0, 1) for i in (0, 1)]
+    total = 0
+    for a, b in ((1, 3), (3, 2), (2, 6), (6, 4), (4, 5), (5, 1)):
+        total = total + np.einsum("...i,...i", c[a] - c[0], np.cross(c[b] - c[0], c[7] - c[0])) / 6
+    return abs(total.sum())
+
+
+def standard_altitude(pascals):
+    """Kilometres: the barometric formula, integrated downwards from 0 to 90 km in steps of a metre."""
+    h = np.arange(-2000.0, 90000.0)  # geopotential metres
+    feet = [0, 11000, 20000, 32000, 47000, 51000, 71000]
+    lapses = [-0.0065, 0, 0.001, 0.0028, 0, -0.0028, -0.002]
+    lapse = np.select([h < foot for foot in feet[1:]], lapses[:-1], lapses[-1])
+    temperature = np.concatenate([[288.15 + 0.0065 * 2000], 288.15 + 13 + np.cumsum(lapse[:-1])])
+    middle = (temperature[1:] + temperature[:-1]) / 2
+    log_pressure = np.concatenate([[0], np.cumsum(-9.80665 / (287.05287 * middle))])
+    log_pressure += np.log(101325) - np.interp(0, h, log_pressure)
+    geopotential = np.interp(-np.log(pascals), -log_pressure, h)
+    return 1e-3 * 6356766 * geopotential / (6356766 - geopotential)
+
+
+class File(netCDF4.Dataset):
+    """A file with dimensions of the given lengths; a length of None is unlimited."""
+
+    def __init__(self, path, dimensions, **options):
+        super().__init__(path, "w", **options)
+        for name, length in dimensions.items():
+            self.createDimension(name, length)
+
+    def add(self, name, dimensions, values, kind="f8", fill=None, **attributes):
+        variable = self.createVariable(name, kind, tuple(dimensions.split()), fill_value=fill)
+        variable.setncatts(attributes)
+        variable.set_auto_maskandscale(False)
+        variable[...] = values
+        return variable
+
+
+class ModelFiles(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def file(self, name="file.nc", **dimensions):
+        return File(self.folder / name, dimensions)
+
+    def info(self, *words, fails=False):
+        words = [str(self.folder / word) if "." in str(word) else word for word in words or ("file.nc",)]
+        done = subprocess.run([PROGRAM, "info", "--json", *words], capture_output=True, text=True)
+        self.assertEqual(done.returncode != 0, fails, done.stderr)
+        return done.stderr if fails else json.loads(done.stdout)
+
+    def expect(self, info, places, values, near=1e-4, scalar=0):
+        """`values`: NaN where a node is blanked."""
+        there = ~np.isnan(values)
+        block = info["blocks"][0]
+        self.assertEqual((block["nk"], block["nj"], block["ni"]), values.shape)
+        self.assertEqual(info["blanked"]["by_grid"], (~there).sum())
+        self.assertEqual(info["blanked"]["not_finite"], 0)
+        np.testing.assert_allclose(info["bounds"]["lower"], places[there].min(axis=0), atol=near)
+        np.testing.assert_allclose(info["bounds"]["upper"], places[there].max(axis=0), atol=near)
+        measured = info["scalars"][scalar]
+        np.testing.assert_allclose([measured["min"], measured["max"]], [values[there].min(), values[there].max()], rtol=1e-6)
+        if there.all():
+            np.testing.assert_allclose(abs(block["volume"]), volume(places), rtol=0.01)
+
+    # -- masks, from one file or two
+
+    def roms(self, name, lon, lat, temp, attributes=None, **masks):
+        nk, nj, ni = temp.shape
+        s = (np.arange(nk) + 0.5) / nk - 1
+        with self.file(name, xi_rho=ni, eta_rho=nj, s_rho=nk, ocean_time=None) as f:
+            f.add("s_rho", "s_rho", s, standard_name="ocean_s_coordinate_g2", positive="up",
+                  formula_terms="s: s_rho C: Cs_r eta: zeta depth: h depth_c: hc")
+            f.add("Cs_r", "s_rho", -s * s)
+            f.add("hc", "", 20.0)
+            f.add("zeta", "ocean_time eta_rho xi_rho", np.zeros((1, nj, ni)), units="meter")
+            f.add("ocean_time", "ocean_time", [0.0], units="seconds since 2001-01-01")
+            f.add("temp", "ocean_time s_rho eta_rho xi_rho", temp[None], "f4")
+            for mask, values in masks.items():
+                f.add(mask, "eta_rho xi_rho", values, **(attributes or {}))
+        s = s[:, None, None]
+        return sphere(lon, lat, 1e-3 * 100 * (20 * s - 100 * s * s) / 120)
+
+    def test_a_mask_and_the_grid_in_a_second_file(self):
+        lon, lat = np.meshgrid(np.linspace(-10, 0, 20), np.linspace(40, 50, 15))
+        mask = ((lon + lat) % 7 > 2).astype("f8")
+        temp = (1 + RANDOM.random((6, 15, 20))).astype("f4")
+        places = self.roms("his.nc", lon, lat, temp * mask.astype("f4"))
+        with self.file("grid.nc", xi_rho=20, eta_rho=15) as f:
+            f.add("lon_rho", "eta_rho xi_rho", lon, units="degree_east")
+            f.add("lat_rho", "eta_rho xi_rho", lat, units="degree_north")
+            f.add("h", "eta_rho xi_rho", 100 + 0 * lon, units="meter")
+            f.add("mask_rho", "eta_rho xi_rho", mask)
+        info = self.info("his.nc", "grid.nc")
+        self.expect(info, places, np.where(mask == 0, np.nan, temp))
+        self.assertEqual(len(info["files"]), 2)
+        self.assertIn("mask_rho is 0", info["blanking"])
+        self.assertIn("no longitude", self.info("his.nc", fails=True))
+
+    def test_nemo_takes_the_mask_of_its_points(self):
+        lon, lat = np.meshgrid(np.linspace(0, 9, 10), np.linspace(30, 36, 7))
+        depth = np.array([5.0, 20, 60, 100])
+        land = {p: RANDOM.random((4, 7, 10)) < 0.3 for p in "tu"}
+        temp = RANDOM.random((4, 7, 10)).astype("f4")
+        for point, places in (("t", "deptht"), ("u", "depthu")):
+            with self.file(f"{point}.nc", x=10, y=7, time_counter=None, **{places: 4}) as f:
+                f.add("nav_lon", "y x", lon, units="degrees_east")
+                f.add("nav_lat", "y x", lat, units="degrees_north")
+                f.add(places, places, depth, units="m", positive="down")
+                f.add("field", f"time_counter {places} y x", temp[None], "f4")
+        with self.file("mesh_mask.nc", x=10, y=7, z=4, t=None) as f:
+            for point, hidden in land.items():
+                f.add(f"{point}mask", "t z y x", ~hidden[None], "i1")
+        for point, hidden in land.items():
+            info = self.info(f"{point}.nc", "mesh_mask.nc")
+            self.expect(info, sphere(lon, lat, -1e-3 * depth[:, None, None]), np.where(hidden, np.nan, temp))
+
+    def ocean(self, f, nk=4, nj=7, ni=10):
+        """Axes of an ocean, and its places."""
+        lon, lat, depth = np.linspace(0, 9, ni), np.linspace(30, 36, nj), np.linspace(5, 100, nk)
+        f.add("lon", "lon", lon, units="degrees_east")
+        f.add("lat", "lat", lat, units="degrees_north")
+        f.add("depth", "depth", depth, units="m", positive="down")
+        return sphere(lon, lat[:, None], -1e-3 * depth[:, None, None])
+
+    def test_masks_by_other_names_and_attributes(self):
+        temp = RANDOM.random((4, 7, 10)).astype("f4")
+        deep = RANDOM.integers(0, 5, (7, 10))
+        part = RANDOM.random((4, 7, 10)) * (RANDOM.random((4, 7, 10)) > 0.4)
+        wet = part > 0
+        levels = np.arange(4)[:, None, None] < deep
+        flags = {"flag_values": np.array([0, 1, 2], "i4"), "flag_meanings": "sea lake land"}
+        cases = [
+            ("hFacC", "depth lat lon", part, {}, wet),
+            ("wet", "lat lon", wet[0], {}, wet[:1]),
+            ("KMT", "lat lon", deep, {}, levels),
+            ("ocean", "depth lat lon", wet, {"standard_name": "sea_binary_mask"}, wet),
+            ("ground", "lat lon", ~wet[0], {"standard_name": "land_binary_mask"}, wet[:1]),
+            ("kind", "lat lon", np.where(wet[0], 1, 2), flags, wet[:1]),
+        ]
+        for name, dims, values, attributes, seen in cases:
+            with self.subTest(name):
+                with self.file(lon=10, lat=7, depth=4) as f:
+                    places = self.ocean(f)
+                    f.add(name, dims, values, "f4" if name == "hFacC" else "i4", **attributes)
+                    f.add("temp", "depth lat lon", temp, "f4")
+                self.expect(self.info(), places, np.where(seen, temp, np.nan))
+
+    def test_land_does_not_hide_the_air_above(self):
+        temp = RANDOM.random((4, 7, 10)).astype("f4")
+        with self.file(lon=10, lat=7, height=4) as f:
+            f.add("lon", "lon", np.linspace(0, 9, 10), units="degrees_east")
+            f.add("lat", "lat", np.linspace(30, 36, 7), units="degrees_north")
+            f.add("height", "height", [10.0, 100, 1000, 5000], units="m", positive="up")
+            f.add("LANDMASK", "lat lon", RANDOM.integers(0, 2, (7, 10)), standard_name="land_binary_mask")
+            f.add("t", "height lat lon", temp, "f4")
+        self.assertEqual(self.info()["blanked"]["by_grid"], 0)
+
+    # -- heights
+
+    def air(self, f, ni=12, nj=8):
+        lon, lat = np.linspace(0, 33, ni), np.linspace(10, 31, nj)
+        f.add("lon", "lon", lon, units="degrees_east")
+        f.add("lat", "lat", lat, units="degrees_north")
+        return lon, lat[:, None]
+
+    def test_pressure_levels_in_every_unit(self):
+        levels = np.array([1, 10, 100, 300, 500, 850, 1000, 1030.0])
+        t = RANDOM.random((8, 8, 12)).astype("f4")
+        for unit, pascals in (("millibars", 100), ("hPa", 100), ("Pa", 1), ("mb", 100)):
+            with self.subTest(unit):
+                with self.file(lon=12, lat=8, level=8, time=None) as f:
+                    lon, lat = self.air(f)
+                    f.add("level", "level", levels * 100 / pascals, units=unit)
+                    f.add("time", "time", [900000.0], units="hours since 1900-01-01")
+                    f.add("t", "time level lat lon", t[None], "f4")
+                info = self.info()
+                self.expect(info, sphere(lon, lat, standard_altitude(100 * levels)[:, None, None]), t, near=1e-3)
+                self.assertIn("standard atmosphere", info["format"])
+
+    def test_a_geopotential_goes_before_the_standard_atmosphere(self):
+        t = RANDOM.random((5, 8, 12)).astype("f4")
+        geopotential = 9.80665 * (np.array([16000, 9000, 5000, 1500, 100.0])[:, None, None] + 100 * RANDOM.random((5, 8, 12)))
+        with self.file(lon=12, lat=8, plev=5) as f:
+            lon, lat = self.air(f)
+            f.add("plev", "plev", [1e4, 3e4, 5e4, 8.5e4, 1e5], units="Pa", positive="down")
+            f.add("t", "plev lat lon", t, "f4")
+            f.add("z", "plev lat lon", geopotential, standard_name="geopotential", units="m**2 s**-2")
+        self.expect(self.info("file.nc"), sphere(lon, lat, 1e-3 * geopotential / 9.80665), t)
+
+    def test_formulas_of_pressures_and_heights(self):
+        a, b = np.array([0.05, 0.1, 0.2, 0.1, 0]), np.array([0, 0.05, 0.3, 0.7, 1])
+        ground = 95000 + 6000 * RANDOM.random((8, 12))
+        orography = 500 * RANDOM.random((8, 12))
+        column = lambda values: values[:, None, None]
+        t = RANDOM.random((5, 8, 12)).astype("f4")
+        prefix = "atmosphere_"
+        cases = [
+            (prefix + "hybrid_sigma_pressure_coordinate", "a: A b: B p0: P0 ps: PS", column(a) * 1e5 + column(b) * ground),
+            (prefix + "hybrid_sigma_pressure_coordinate", "ap: AP b: B ps: PS", column(a) * 9e4 + column(b) * ground),
+            (prefix + "sigma_coordinate", "sigma: SIGMA ps: PS ptop: PTOP", 5000 + column(b + 0.01) * (ground - 5000)),
+            (prefix + "ln_pressure_coordinate", "p0: P0 lev: LEV", column(1e5 * np.exp(-np.linspace(2, 0, 5))) + 0 * ground),
+            (prefix + "hybrid_height_coordinate", "a: Z b: B orog: OROG", None),
+        ]
+        for name, terms, pascals in cases:
+            with self.subTest(terms):
+                with self.file(lon=12, lat=8, lev=5, time=None) as f:
+                    lon, lat = self.air(f)
+                    f.add("lev", "lev", 1000 * (a + b), units="level", positive="down", standard_name=name, formula_terms=terms)
+                    f.add("A", "lev", a)
+                    f.add("AP", "lev", 900 * a, units="hPa")
+                    f.add("B", "lev", b)
+                    f.add("SIGMA", "lev", b + 0.01)
+                    f.add("LEV", "lev", np.linspace(2, 0, 5))
+                    f.add("Z", "lev", 1e4 * (1.1 - b), units="m")
+                    f.add("P0", "", 1000.0, units="hPa")
+                    f.add("PTOP", "", 5000.0, units="Pa")
+                    f.add("PS", "time lat lon", ground[None], units="Pa")
+                    f.add("OROG", "lat lon", orography, units="m")
+                    f.add("T", "time lev lat lon", t[None], "f4")
+                if pascals is None:
+                    height = 1e-3 * (column(1e4 * (1.1 - b)) + column(b) * orography)
+                else:
+                    height = standard_altitude(pascals)
+                self.expect(self.info(), sphere(lon, lat, height), t, near=1e-3)
+
+    def test_layers_of_density(self):
+        thickness = 10 + 50 * RANDOM.random((5, 8, 12))
+        thickness[1:3, 2, 3] = 0  # layers vanish
+        salt = RANDOM.random((5, 8, 12)).astype("f4")
+        above = np.cumsum(thickness, axis=0) - thickness / 2
+        for positive in ("down", "up"):
+            with self.subTest(positive):
+                up = positive == "up"
+                with self.file(lon=12, lat=8, zl=5) as f:
+                    lon, lat = self.air(f)
+                    f.add("zl", "zl", np.linspace(1025, 1028, 5), units="kg m-3", positive=positive)
+                    f.add("salt", "zl lat lon", salt, "f4")
+                    f.add("h", "zl lat lon", thickness[::-1] if up else thickness, units="m", long_name="Layer Thickness")
+                self.expect(self.info(), sphere(lon, lat, -1e-3 * (above[::-1] if up else above)), salt)
+        edges = -np.concatenate([np.zeros((1, 8, 12)), np.cumsum(thickness, axis=0)])
+        with self.file(lon=12, lat=8, zl=5, zi=6) as f:
+            lon, lat = self.air(f)
+            f.add("zl", "zl", np.linspace(1025, 1028, 5), units="kg m-3", positive="down")
+            f.add("salt", "zl lat lon", salt, "f4")
+            f.add("e", "zi lat lon", edges, units="m", long_name="Interface Height Relative to Mean Sea Level")
+        self.expect(self.info(), sphere(lon, lat, 1e-3 * (edges[1:] + edges[:-1]) / 2), salt)
+
+    def test_depths_that_fall_are_heights(self):
+        t = RANDOM.random((4, 7, 10)).astype("f4")
+        with self.file(lon=10, lat=7, depth=4) as f:
+            f.add("lon", "lon", np.linspace(0, 9, 10), units="degrees_east")
+            f.add("lat", "lat", np.linspace(30, 36, 7), units="degrees_north")
+            f.add("depth", "depth", [-5.0, -20, -60, -100], units="m")
+            f.add("t", "depth lat lon", t, "f4")
+        height = -1e-3 * np.array([5.0, 20, 60, 100])[:, None, None]
+        self.expect(self.info(), sphere(np.linspace(0, 9, 10), np.linspace(30, 36, 7)[:, None], height), t)
+
+    def test_levels_without_a_length_are_refused(self):
+        for attributes, words in (({}, "lev has no unit"), ({"units": "1"}, "lev has the unit '1'")):
+            with self.file(lon=12, lat=8, lev=5) as f:
+                self.air(f)
+                f.add("lev", "lev", np.linspace(1, 0, 5), **attributes)
+                f.add("T", "lev lat lon", RANDOM.random((5, 8, 12)))
+            self.assertIn(words, self.info("file.nc", fails=True))
+
+    # -- maps
+
+    def test_a_rotated_pole(self):
+        rlon, rlat, t = np.linspace(-10, 12, 12), np.linspace(-8, 8, 8), RANDOM.random((3, 8, 12)).astype("f4")
+        for turn in (0.0, 20.0):
+            with self.file(rlon=12, rlat=8, height=3) as f:
+                f.add("rlon", "rlon", rlon, units="degrees", standard_name="grid_longitude")
+                f.add("rlat", "rlat", rlat, units="degrees", standard_name="grid_latitude")
+                f.add("height", "height", [10.0, 1000, 5000], units="m", positive="up")
+                f.add("rotated_pole", "", 0, "i4", grid_mapping_name="rotated_latitude_longitude",
+                      grid_north_pole_latitude=39.25, grid_north_pole_longitude=-162.0, north_pole_grid_longitude=turn)
+                f.add("T", "height rlat rlon", t, "f4", grid_mapping="rotated_pole")
+            # The grid's sphere is turned about its axis, tilted until its pole stands at the pole's latitude, and turned
+            # to the pole's longitude.
+            at = sphere(rlon - turn, rlat[:, None], 1e-3 * np.array([10.0, 1000, 5000])[:, None, None])
+            tilt, around = np.radians(90 - 39.25), np.radians(-162.0)
+            y = np.array([[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]])
+            z = np.array([[np.cos(around), -np.sin(around), 0], [np.sin(around), np.cos(around), 0], [0, 0, 1]])
+            half = np.diag([-1.0, -1.0, 1.0])  # grid longitude 0 is the meridian that points away from the pole
+            self.expect(self.info(), at @ half.T @ y.T @ z.T, t)
+
+    def test_lambert_and_stereographic_maps(self):
+        x, y, t = np.arange(12) * 1e5 - 5e5, np.arange(8) * 1e5 - 4e5, RANDOM.random((3, 8, 12)).astype("f4")
+        metres = RADIUS * 1e3
+        north, n = y[:, None], np.sin(np.radians(45))
+        # A cone that touches the sphere at 45 degrees north; the plane that touches it at the pole.
+        rho0 = metres / np.tan(np.radians(45))
+        rho = np.hypot(x, rho0 - north)
+        cone = (10 + np.degrees(np.arctan2(x, rho0 - north)) / n,
+                np.degrees(2 * np.arctan((rho0 / rho) ** (1 / n) * np.tan(np.radians(67.5))) - np.pi / 2))
+        pole = (-45 + np.degrees(np.arctan2(x, -north)), 90 - 2 * np.degrees(np.arctan(np.hypot(x, north) / (2 * metres))))
+        cases = [
+            ({"grid_mapping_name": "lambert_conformal_conic", "standard_parallel": 45.0,
+              "longitude_of_central_meridian": 10.0, "latitude_of_projection_origin": 45.0}, cone),
+            ({"grid_mapping_name": "polar_stereographic", "straight_vertical_longitude_from_pole": -45.0,
+              "latitude_of_projection_origin": 90.0, "scale_factor_at_projection_origin": 1.0}, pole),
+        ]
+        for mapping, (lon, lat) in cases:
+            for unit, scale in (("m", 1), ("km", 1e-3)):
+                with self.subTest(mapping["grid_mapping_name"], unit=unit):
+                    with self.file(x=12, y=8, z=3) as f:
+                        f.add("x", "x", x * scale, units=unit, standard_name="projection_x_coordinate")
+                        f.add("y", "y", y * scale, units=unit, standard_name="projection_y_coordinate")
+                        f.add("z", "z", [10.0, 1000, 5000], units="m", standard_name="height")
+                        f.add("crs", "", 0, "i4", earth_radius=metres, **mapping)
+                        f.add("T", "z y x", t, "f4", grid_mapping="crs")
+                    height = 1e-3 * np.array([10.0, 1000, 5000])[:, None, None]
+                    self.expect(self.info(), sphere(lon, lat, height), t)
+                    flat = np.stack(np.broadcast_arrays(1e-3 * x, 1e-3 * north, height), -1)
+                    self.expect(self.info("file.nc", "--flat"), flat, t)
+
+    def test_a_projection_that_is_not_known(self):
+        with self.file(rlon=12, rlat=8, height=3) as f:
+            f.add("rlon", "rlon", np.arange(12.0), units="degrees", standard_name="grid_longitude")
+            f.add("rlat", "rlat", np.arange(8.0), units="degrees", standard_name="grid_latitude")
+            f.add("height", "height", [10.0, 1000, 5000], units="m", positive="up")
+            f.add("T", "height rlat rlon", RANDOM.random((3, 8, 12)), "f4")
+        self.assertIn("degrees from a rotated pole, but no grid_mapping", self.info("file.nc", fails=True))
+
+    # -- dimensions
+
+    def test_planes_and_indices(self):
+        t = RANDOM.random((3, 8, 12)).astype("f4")
+        i, j, k = np.arange(12.0), np.arange(8.0)[:, None], np.arange(3.0)[:, None, None]
+        with self.file(x=12, y=8, z=3) as f:
+            f.add("x", "x", i, units="km", standard_name="plane_x_coordinate")
+            f.add("y", "y", j[:, 0], units="km", standard_name="plane_y_coordinate")
+            f.add("z", "z", k[:, 0, 0], units="km", standard_name="height")
+            f.add("T", "z y x", t, "f4")
+        places = np.stack(np.broadcast_arrays(i, j, k), -1)
+        self.expect(self.info(), places, t)
+        with self.file(a=12, b=8, c=3) as f:
+            f.add("T", "c b a", t, "f4")
+        info = self.info()
+        self.expect(info, places, t)
+        self.assertIn("have no coordinates", " ".join(info["warnings"]))
+        with self.file(a=12, b=8, c=3) as f:
+            f.DX, f.DY = 2000.0, 4000.0
+            f.add("z", "c", 500 * k[:, 0, 0], units="m", standard_name="height")
+            f.add("T", "c b a", t, "f4")
+        self.expect(self.info(), np.stack(np.broadcast_arrays(2 * i, 4 * j, 0.5 * k), -1), t)
+
+    def test_an_unlimited_dimension_that_is_not_time(self):
+        t = RANDOM.random((3, 8, 12)).astype("f4")
+        with self.file(lon=12, lat=8, height=None) as f:
+            lon, lat = self.air(f)
+            f.add("height", "height", [10.0, 1000, 5000], units="m", positive="up")
+            f.add("T", "height lat lon", t, "f4")
+        info = self.info()
+        self.expect(info, sphere(lon, lat, 1e-3 * np.array([10.0, 1000, 5000])[:, None, None]), t)
+        self.assertEqual(info["times"], [])
+
+    # -- when, and what is missing
+
+    def test_dates_of_every_calendar(self):
+        cases = [
+            ("standard", "days since 1950-01-01", [0, 27000.25]),
+            ("gregorian", "hours since 1900-01-01 00:00:0.0", [876576, 876582]),
+            ("standard", "days since 0001-01-01 00:00:00", [0, 577736, 577737, 730000.5]),
+            ("proleptic_gregorian", "seconds since 1970-01-01T00:00:00Z", [951782400, 951868799]),
+            ("proleptic_gregorian", "minutes since 1583-03-01 12:00", [-1e6, 1e7]),
+            ("julian", "days since 1500-02-28", [0, 1, 2, 40000]),
+            ("noleap", "days since 2000-02-28 06:00:00", [0, 1, 365 * 4 + 1]),
+            ("365_day", "days since 0001-01-01", [0, 58, 59, 364, 365]),
+            ("all_leap", "days since 2001-01-01", [58, 59, 60, 366]),
+            ("360_day", "days since 1850-01-01", [0, 29, 30, 59, 359, 360]),
+            ("standard", "hours since 2001-03-01 00:00:00 -06:00", [0, 5.5]),
+        ]
+        t = RANDOM.random((8, 12)).astype("f4")
+        for calendar, unit, times in cases:
+            with self.file(lon=12, lat=8, height=2, time=None) as f:
+                self.air(f)
+                f.add("height", "height", [0.0, 1000], units="m", positive="up")
+                f.add("time", "time", times, units=unit, calendar=calendar)
+                f.add("T", "time height lat lon", np.broadcast_to(t, (len(times), 2, 8, 12)), "f4")
+            for step, time in enumerate(times):
+                with self.subTest(f"{time} {unit}, {calendar}"):
+                    info = self.info("file.nc", "--time-step", str(step))
+                    expected = netCDF4.num2date(time, unit, calendar).strftime("%Y-%m-%d %H:%M:%S").strip()
+                    self.assertEqual(info["date"], expected.zfill(19))
+                    self.assertEqual((info["time_unit"], info["times"][step]), (unit, time))
+
+    def test_the_times_of_wrf(self):
+        dates = ["2005-08-28_00:00:00", "2005-08-28_03:00:00", "2005-09-01_00:00:30"]
+        with self.file(west_east=12, south_north=8, height=2, Time=None, DateStrLen=19) as f:
+            f.add("XLONG", "south_north west_east", np.broadcast_to(np.linspace(0, 11, 12), (8, 12)), units="degree_east")
+            f.add("XLAT", "south_north west_east", np.broadcast_to(np.linspace(0, 7, 8)[:, None], (8, 12)), units="degree_north")
+            f.add("height", "height", [0.0, 1000], units="m", positive="up")
+            f.add("Times", "Time DateStrLen", np.array([list(date) for date in dates], "S1"), "S1")
+            f.add("T", "Time height south_north west_east", RANDOM.random((3, 2, 8, 12)), "f4")
+        info = self.info("file.nc", "--time-step", "2")
+        self.assertEqual(info["times"], [0, 10800, 4 * 86400 + 30])
+        self.assertEqual(info["date"], "2005-09-01 00:00:30")
+
+    def test_land_that_is_zero_is_noticed(self):
+        wet = RANDOM.random((7, 10)) > 0.3
+        temp = (1 + RANDOM.random((4, 7, 10))).astype("f4")
+        for values, noticed in ((temp * wet, True), (temp, False), (np.where(wet, temp, np.nan), False)):
+            with self.file(lon=10, lat=7, depth=4) as f:
+                self.ocean(f)
+                f.add("temp", "depth lat lon", values, "f4")
+            self.assertEqual("--blank 0" in " ".join(self.info()["warnings"]), noticed)
+
+    # -- damage
+
+    def test_damaged_files_are_refused_or_read(self):
+        """Truncated headers and wrong bytes never crash; in classic files, whose parser is not HDF5's."""
+        t = RANDOM.random((1, 3, 8, 12)).astype("f4")
+        with File(self.folder / "all.nc", {"rlon": 12, "rlat": 8, "lev": 3, "time": None, "n": 19}, format="NETCDF3_CLASSIC") as f:
+            f.add("rlon", "rlon", np.linspace(-10, 12, 12), units="degrees", standard_name="grid_longitude")
+            f.add("rlat", "rlat", np.linspace(-8, 8, 8), units="degrees", standard_name="grid_latitude")
+            f.add("pole", "", 0, "i4", grid_mapping_name="rotated_latitude_longitude", grid_north_pole_latitude=39.25,
+                  grid_north_pole_longitude=-162.0)
+            f.add("lev", "lev", [1.0, 2, 3], standard_name="atmosphere_hybrid_sigma_pressure_coordinate", units="level",
+                  formula_terms="ap: A b: B ps: PS", positive="down")
+            f.add("A", "lev", [1e4, 2e4, 0])
+            f.add("B", "lev", [0, 0.3, 1])
+            f.add("PS", "time rlat rlon", np.full((1, 8, 12), 1e5), units="Pa")
+            f.add("kind", "rlat rlon", np.ones((8, 12)), "i4", flag_values=np.array([0, 1], "i4"), flag_meanings="hole sea")
+            f.add("time", "time", [0.0], units="days since 2001-01-01 00:00:00", calendar="noleap")
+            f.add("T", "time lev rlat rlon", t, "f4", grid_mapping="pole")
+        data = (self.folder / "all.nc").read_bytes()
+        self.assertEqual(self.info("all.nc")["blanked"]["by_grid"], 0)
+        header = data.index(b"flag_meanings") + 1200
+        refused = 0
+        for n in range(250):
+            wrong = bytearray(data)
+            wrong[int(RANDOM.integers(4, min(header, len(data))))] ^= int(RANDOM.integers(1, 256))
+            if n < 40:
+                wrong = wrong[: n * len(data) // 40]
+            (self.folder / "wrong.nc").write_bytes(wrong)
+            done = subprocess.run([PROGRAM, "info", "--json", str(self.folder / "wrong.nc")], capture_output=True, text=True,
+                                  errors="replace", timeout=60)
+            self.assertIn(done.returncode, (0, 1), f"case {n}: {done.stderr}")
+            if done.returncode == 1:
+                refused += 1
+                self.assertRegex(done.stderr, r"^curvisplat: [^\n]*\n$")
+        print(f"{refused} of 250 damaged files refused")
+        self.assertGreater(refused, 50)
+
+    # -- around the Earth
+
+    def globe(self, lon, lat, t, **attributes):
+        """Writes two levels of a grid with longitudes and latitudes of every column."""
+        nj, ni = lon.shape
+        with self.file(x=ni, y=nj, z=2) as f:
+            f.add("lon", "y x", lon, units="degrees_east")
+            f.add("lat", "y x", lat, units="degrees_north")
+            f.add("z", "z", [0.0, 100e3], units="m", standard_name="height")
+            f.add("t", "z y x", t, "f4", **attributes)
+        return self.info()
+
+    def test_global_longitude_closes(self):
+        lat, height = np.linspace(-80, 80, 41), np.array([0, 100.0])[:, None, None]
+        for first, last in ((0, 355), (-177.5, 177.5), (2.5, 362.5), (0, 360), (180, -180)):
+            with self.subTest(first):
+                lon = np.linspace(first, last, 73 if (last - first) % 360 == 0 else 72)
+                t = RANDOM.random((2, 41, len(lon))).astype("f4")
+                if len(lon) == 73:
+                    t[..., -1] = t[..., 0]
+                info = self.globe(*np.meshgrid(lon, lat), t)
+                whole = np.linspace(first, first + (360 if last > first else -360), 73)
+                self.expect(info, sphere(whole, lat[:, None], height), np.concatenate([t, t[..., :1]], -1)[..., :73])
+                self.assertEqual("closed around the Earth" in info["format"], len(lon) == 72)
+        # Columns on both sides that repeat others, as NEMO's; and three quarters of the Earth.
+        lon = np.arange(-5, 365, 5.0)
+        t = RANDOM.random((2, 41, 72)).astype("f4")
+        t = np.concatenate([t[..., -1:], t, t[..., :1]], -1)
+        info = self.globe(*np.meshgrid(lon, lat), t)
+        self.expect(info, sphere(lon[:-1], lat[:, None], height), t[..., :-1])
+        info = self.globe(*np.meshgrid(np.arange(0, 270, 5.0), lat), t[..., :54])
+        self.assertEqual(info["blocks"][0]["ni"], 54)
+
+    def test_tripolar_grids_close_at_their_fold(self):
+        # Confocal ellipses: their innermost row is a segment, whose two sides are the two halves of the fold.
+        columns, rows, top = 48, 9, 1.2
+        height = np.array([0, 100.0])[:, None, None]
+        step = top / (rows - 1)
+
+        def places(v, u):
+            x, y = np.cosh(u)[:, None] * np.cos(v), np.sinh(u)[:, None] * np.sin(v)
+            return np.degrees(np.arctan2(y, x)), 90 - 15 * np.hypot(x, y)
+
+        at_points = 2 * np.pi * np.arange(columns) / columns
+        between = at_points + np.pi / columns
+        through_points = step * np.arange(rows - 1, -3, -1)
+        through_edges = step * (np.arange(rows - 1, -2, -1) + 0.5)
+        cases = {
+            "through points": (at_points, through_points[:-2], 0),
+            "through points, repeated": (at_points, through_points[:-1], 1),
+            "through edges": (between, through_edges[:-1], -1),
+            "through edges, repeated": (between, through_edges, 0),
+        }
+        for name, (v, u, dropped) in cases.items():
+            for halo in (False, True):
+                with self.subTest(name, halo=halo):
+                    angle = np.concatenate([v[-1:], v, v[:1]]) if halo else v
+                    t = RANDOM.random((2, len(u), len(angle))).astype("f4")
+                    info = self.globe(*places(angle, u), t)
+                    block = info["blocks"][0]
+                    self.assertEqual((block["nj"], block["ni"]), (len(u) - dropped, columns + 1))
+                    lon, lat = places(np.append(v, v[0]), np.linspace(u[0], 0, 60))
+                    np.testing.assert_allclose(abs(block["volume"]), volume(sphere(lon, lat, height)), rtol=0.01)
+                    hidden = columns + 1 - columns // 2 if "edges" in name else 0
+                    self.assertIn(info["blanked"]["by_grid"], (2 * hidden, 2 * hidden - 2))
+                    self.assertEqual("fold" in info["format"], name != "through points")
+
+
+if __name__ == "__main__":
+    unittest.main()

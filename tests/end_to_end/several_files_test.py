@@ -1,0 +1,193 @@
+#!/usr/bin/python3
+"""several_files_test.py CURVISPLAT
+
+Grids in several VTK or NetCDF files, and in files compressed as a whole. VTK and netCDF4 write them; what `curvisplat info`
+measures of several files is compared with the arrays, and what it measures of compressed files with what it measures of the
+files themselves. Exit status 77 (skipped) without python3-vtk9, python3-netcdf4 or the programs that compress.
+"""
+import gzip
+import json
+import lzma
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+try:
+    import netCDF4
+    import numpy as np
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkStructuredGrid
+    from vtkmodules.vtkIOXML import vtkXMLStructuredGridWriter
+except ModuleNotFoundError as error:
+    print(f"skipped: {error}; install python3-vtk9, python3-netcdf4 and python3-numpy")
+    sys.exit(77)
+
+PROGRAM = str(pathlib.Path(sys.argv.pop(1)).resolve())
+RANDOM = np.random.default_rng(1)
+NI, NJ, NK = 9, 7, 5
+
+
+def write_vts(path, shift, **arrays):
+    k, j, i = np.meshgrid(np.arange(NK), np.arange(NJ), np.arange(NI), indexing="ij")
+    grid, points = vtkStructuredGrid(), vtkPoints()
+    points.SetData(numpy_to_vtk(np.stack([i + shift + 0.1 * j, j, k], -1).reshape(-1, 3).astype("f4"), deep=True))
+    grid.SetDimensions(NI, NJ, NK)
+    grid.SetPoints(points)
+    for name, values in arrays.items():
+        array = numpy_to_vtk(values.ravel(), deep=True)
+        array.SetName(name)
+        grid.GetPointData().AddArray(array)
+    writer = vtkXMLStructuredGridWriter()
+    writer.SetFileName(str(path))
+    writer.SetInputData(grid)
+    writer.Write()
+
+
+def write_netcdf(path, form, nodes=20):
+    with netCDF4.Dataset(path, "w", format=form) as f:
+        for name in ("lon", "lat", "depth"):
+            f.createDimension(name, nodes)
+            f.createVariable(name, "f8", (name,))[:] = np.arange(nodes)
+        f["lon"].units, f["lat"].units, f["depth"].units = "degrees_east", "degrees_north", "m"
+        f.createVariable("t", "f4", ("depth", "lat", "lon"))[:] = RANDOM.random((nodes, nodes, nodes))
+
+
+def zstd(data):
+    return subprocess.run(["zstd", "-q", "-c"], input=data, capture_output=True, check=True).stdout
+
+
+COMPRESSIONS = {"gz": gzip.compress, "xz": lzma.compress, "zst": zstd}
+if not shutil.which("zstd"):
+    del COMPRESSIONS["zst"]
+
+
+class SeveralFiles(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def run_program(self, command, *words):
+        return subprocess.run([PROGRAM, command, *map(str, words)], capture_output=True, text=True, cwd=self.folder)
+
+    def info(self, *files):
+        done = self.run_program("info", "--json", *files)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return json.loads(done.stdout)
+
+    def fields(self, count):
+        return [RANDOM.random((NK, NJ, NI)).astype("f4") for _ in range(count)]
+
+    def range_of(self, info, name):
+        return next([s["min"], s["max"]] for s in info["scalars"] if s["name"] == name)
+
+    def test_fields_of_the_same_nodes(self):
+        p, q, r = self.fields(3)
+        write_vts(self.folder / "grid.vts", 0)
+        write_vts(self.folder / "p.vts", 0, p=p)
+        write_vts(self.folder / "q.vts", 0, q=q, r=r)
+        info = self.info("grid.vts", "p.vts", "q.vts")
+        self.assertEqual((len(info["blocks"]), len(info["files"])), (1, 3))
+        for name, values in (("p", p), ("q", q), ("r", r)):
+            np.testing.assert_allclose(self.range_of(info, name), [values.min(), values.max()], rtol=1e-6)
+        done = self.run_program("convert", "grid.vts", "p.vts", "q.vts", "-o", "all.splats")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        again = self.run_program("info", "p.vts", "p.vts")
+        self.assertEqual(again.returncode, 1)
+        self.assertIn("no further scalar", again.stderr)
+
+    def test_names_of_any_script(self):
+        p = self.fields(1)[0]
+        write_vts(self.folder / "Änderung 時.vts", 0, **{"Température [°C]": p, "密度": p + 1})
+        names = [s["name"] for s in self.info("Änderung 時.vts")["scalars"]]
+        self.assertEqual(names, ["Température [°C]", "密度"])
+
+    def test_blocks_in_several_files(self):
+        p, q, r = self.fields(3)
+        write_vts(self.folder / "left.vts", 0, p=p)
+        write_vts(self.folder / "right.vts", NI - 1, p=q, r=r)
+        info = self.info("left.vts", "right.vts")
+        self.assertEqual([block["name"] for block in info["blocks"]], ["left", "right"])
+        self.assertEqual([s["name"] for s in info["scalars"]], ["p"])
+        both = np.stack([p, q])
+        np.testing.assert_allclose(self.range_of(info, "p"), [both.min(), both.max()], rtol=1e-6)
+        self.assertEqual(info["bounds"]["upper"][0], np.float32(2 * (NI - 1) + 0.1 * (NJ - 1)))
+        self.assertIn("left out: r", " ".join(info["warnings"]))
+
+    def files(self):
+        write_netcdf(self.folder / "three.nc", "NETCDF3_CLASSIC")
+        write_netcdf(self.folder / "four.nc", "NETCDF4")
+        write_vts(self.folder / "grid.vts", 0, p=self.fields(1)[0])
+        x = np.stack(np.meshgrid(np.arange(5.0), np.arange(4.0), np.arange(3.0))).astype("f4")
+        (self.folder / "grid.xyz").write_bytes(np.array(x.shape[:0:-1], "i4").tobytes() + x.tobytes())
+        return ["three.nc", "four.nc", "grid.vts", "grid.xyz"]
+
+    def test_compressed_files_are_those_files(self):
+        for name in self.files():
+            plain = self.info(name)
+            for suffix, compress in COMPRESSIONS.items():
+                with self.subTest(name, suffix=suffix):
+                    (self.folder / f"{name}.{suffix}").write_bytes(compress((self.folder / name).read_bytes()))
+                    info = self.info(f"{name}.{suffix}")
+                    self.assertEqual(info.pop("files"), [f"{name}.{suffix}"])
+                    self.assertEqual(info.pop("format"), plain["format"] + ", decompressed")
+                    self.assertEqual({k: v for k, v in info.items() if k != "estimate"},
+                                     {k: v for k, v in plain.items() if k not in ("files", "format", "estimate")})
+        # Members and frames that follow one another are one file.
+        data = (self.folder / "three.nc").read_bytes()
+        for suffix, compress in COMPRESSIONS.items():
+            (self.folder / f"parts.{suffix}").write_bytes(compress(data[:999]) + compress(data[999:]))
+            self.assertEqual(self.info(f"parts.{suffix}")["scalars"], self.info("three.nc")["scalars"])
+        self.assertEqual([path.name for path in self.folder.iterdir() if "unpacked" in path.name], [])
+
+    def test_damaged_compressed_files_are_refused(self):
+        data = (self.folder / self.files()[0]).read_bytes()[:3000]
+        before = list(pathlib.Path(tempfile.gettempdir()).glob("curvisplat.*.unpacked"))
+        for suffix, compress in COMPRESSIONS.items():
+            packed = compress(data)
+            self.assertEqual(compress(b""), compress(b""))
+            for size in [*range(7, 40, 3), *range(40, len(packed), len(packed) // 25)]:
+                (self.folder / "cut").write_bytes(packed[:size])
+                done = self.run_program("info", "cut")
+                self.assertEqual(done.returncode, 1, f"{suffix} cut at {size}")
+                self.assertRegex(done.stderr, r"^curvisplat: cut: .*\n$")
+            for place in range(10, len(packed), len(packed) // 40):
+                wrong = bytearray(packed)
+                wrong[place] ^= 0x55
+                (self.folder / "wrong").write_bytes(wrong)
+                done = self.run_program("info", "wrong")
+                self.assertEqual(done.returncode, 1, f"{suffix} wrong at {place}")
+                self.assertRegex(done.stderr, r"^curvisplat: wrong: .*\n$")
+        self.assertEqual(list(pathlib.Path(tempfile.gettempdir()).glob("curvisplat.*.unpacked")), before)
+
+    def peak_mebibytes(self, name):
+        script = "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL, " \
+            "stderr=subprocess.DEVNULL); print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
+        words = [PROGRAM, "convert", name, "-o", name + ".splats", "--memory", "256M"]
+        done = subprocess.run([sys.executable, "-c", script, *words], capture_output=True, text=True, cwd=self.folder)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return int(done.stdout) / 1024
+
+    def test_memory_is_bounded(self):
+        write_netcdf(self.folder / "large.nc", "NETCDF3_CLASSIC", nodes=110)  # 5 MB
+        plain = self.peak_mebibytes("large.nc")
+        for suffix, compress in COMPRESSIONS.items():
+            (self.folder / f"large.nc.{suffix}").write_bytes(compress((self.folder / "large.nc").read_bytes()))
+            peak = self.peak_mebibytes(f"large.nc.{suffix}")
+            print(f"peak memory {peak:.0f} MiB compressed by {suffix}, {plain:.0f} MiB not compressed, of 256 MiB")
+            self.assertLess(peak, plain + 16)
+        # A file that asks for more memory than is given is refused: a dictionary of 512 MiB.
+        filters = [{"id": lzma.FILTER_LZMA2, "preset": 0, "dict_size": 512 << 20}]
+        header = lzma.compress(bytes(100), format=lzma.FORMAT_XZ, filters=filters)
+        (self.folder / "greedy.xz").write_bytes(header)
+        done = self.run_program("info", "greedy.xz")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("needs more than 128 MiB", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
