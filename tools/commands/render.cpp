@@ -30,6 +30,7 @@
 #include "tools/options/option_parsers.h"
 #include "tools/options/picture_choice.h"
 #include "tools/options/scalar_arguments.h"
+#include "tools/options/surface_arguments.h"
 #include "tools/output/frame_output.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
@@ -45,6 +46,7 @@ struct RenderArguments {
   std::filesystem::path cache, output, first_image, statistics;
   CameraArguments camera;
   ScalarArguments scalar;
+  SurfaceArguments surfaces;
   std::string size = "600x600", background = "white";
   std::string classify = "pixel", scale = "1,1,1", backend = "auto", memory = "512M";
   std::string lod_pixels = "1";
@@ -138,6 +140,7 @@ FrameOptions frameOptions(const RenderArguments& arguments) {
 void checkArguments(const RenderArguments& arguments, ImageSize size) {
   checkCameraArguments(arguments.camera);
   checkFunctionArguments(arguments.scalar);
+  checkSurfaceArguments(arguments.surfaces);
   checkOutputName(arguments.output, arguments.camera.moves(), size);
   if (arguments.frame_rate && !isMovieName(arguments.output))
     throw UsageError("--frame-rate needs a movie: -o NAME.mp4");
@@ -341,6 +344,10 @@ void render(const RenderArguments& arguments) {
   const std::string range_warning = rangeMissesScalar(info, transfer_function);
   if (!range_warning.empty()) printMessage("warning: {}", range_warning);
 
+  options.scene = sceneOf(arguments.surfaces);
+  for (const std::string& miss : slicesThatMiss(arguments.surfaces, manifest.lower, manifest.upper))
+    printMessage("warning: {}", miss);
+
   const ImageSize picture = options.size;
   options.size = dataSize(arguments.annotations, picture, transfer_function);
   options.output_bytes = outputBytes(arguments, picture);
@@ -439,6 +446,8 @@ void addRender(CLI::App& app) {
   command->add_flag("--axes", arguments->annotations.axes, "Draw the directions of x, y and z")->group(what);
   command->add_flag("--outline", arguments->annotations.outline, "Draw the bounding box of the data")
       ->group(what);
+
+  addSurfaceOptions(*command, arguments->surfaces, "Surfaces and slices");
 
   const std::string where = "Camera";
   CameraArguments* camera = &arguments->camera;

@@ -10,6 +10,7 @@
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
 #include "tools/options/option_parsers.h"
+#include "tools/options/surface_arguments.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/stop_signals.h"
 #include "tools/viewer/viewer.h"
@@ -22,6 +23,7 @@ struct ViewArguments {
   std::string size = "1200x800", backend = "auto";
   std::optional<std::filesystem::path> state;
   std::optional<std::string> scalar, memory, frame_time;
+  SurfaceArguments surfaces;
 };
 
 void view(const ViewArguments& arguments) {
@@ -32,6 +34,9 @@ void view(const ViewArguments& arguments) {
   options.scalar = arguments.scalar;
   if (arguments.memory) options.memory_bytes = parseMemory("--memory", *arguments.memory);
   if (arguments.frame_time) options.target_s = parsePositive("--frame-time", *arguments.frame_time) / 1000;
+  checkSurfaceArguments(arguments.surfaces);
+  options.scene = sceneOf(arguments.surfaces);
+  options.surface_files.assign(arguments.surfaces.surfaces.begin(), arguments.surfaces.surfaces.end());
   const CacheReader cache(arguments.cache);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
@@ -63,6 +68,7 @@ void addView(CLI::App& app) {
   command->add_option("--frame-time", arguments->frame_time,
                       "Time budget of a picture while the camera moves, in ms (default 33 with a graphics "
                       "card, 100 without)");
+  addSurfaceOptions(*command, arguments->surfaces, "Surfaces and slices");
   command->callback([arguments] { view(*arguments); });
 }
 
