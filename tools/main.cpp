@@ -94,6 +94,7 @@ int run(int argc, char** argv) {
   addGenerate(app);
   addCompare(app);
   addColormaps(app);
+  addExport(app);
   addManual(app);
 
   try {

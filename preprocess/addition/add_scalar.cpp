@@ -1,27 +1,20 @@
 #include "preprocess/addition/add_scalar.h"
 
 #include <malloc.h>
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
 #include <memory>
 
-#include "preprocess/addition/build_values.h"
+#include "preprocess/addition/addition_checks.h"
 #include "preprocess/addition/cache_grid.h"
-#include "preprocess/addition/conversion_order.h"
-#include "preprocess/addition/value_buckets.h"
+#include "preprocess/addition/value_passes.h"
 #include "preprocess/addition/value_record.h"
-#include "preprocess/convert/bucket_file.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/preflight.h"
 #include "preprocess/convert/scan.h"
-#include "preprocess/convert/scatter.h"
 #include "preprocess/convert/scratch_folder.h"
-#include "preprocess/splats/seams.h"
-#include "stream/base/checksum.h"
 #include "stream/base/error.h"
-#include "stream/base/file.h"
 #include "stream/base/paths.h"
 #include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
@@ -34,22 +27,6 @@ std::string joined(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
   return text;
-}
-
-/// Blocks say at once whether a grid can be the cache's.
-void checkBlocks(const GridDescription& grid, const CacheReader& cache) {
-  const std::vector<BlockInfo>& blocks = cache.manifest().blocks;
-  if (grid.blocks.size() != blocks.size())
-    throw Error("{}: was made from a grid of {} blocks, and this one has {}: it is another",
-                cache.path().string(), blocks.size(), grid.blocks.size());
-  for (size_t n = 0; n < blocks.size(); ++n) {
-    const GridBlock& found = grid.blocks[n];
-    const BlockInfo& expected = blocks[n];
-    if (found.ni != expected.ni || found.nj != expected.nj || found.nk != expected.nk)
-      throw Error("{}: block {} of its grid has {}x{}x{} nodes, and of this one {}x{}x{}: it is another",
-                  cache.path().string(), n + 1, expected.ni, expected.nj, expected.nk, found.ni, found.nj,
-                  found.nk);
-  }
 }
 
 void checkNames(const std::vector<std::string>& names, const CacheReader& cache) {
@@ -65,22 +42,6 @@ std::filesystem::path temporaryFolder(const AddScalarOptions& options) {
   return options.temporary_folder.empty() ? folderOf(options.cache) : options.temporary_folder;
 }
 
-/// What an addition's temporary folder is called, up to its process: for this cache alone, wherever it is.
-std::string scratchName(const std::filesystem::path& cache) {
-  const std::string place = std::filesystem::canonical(cache).string();
-  return fmt::format("{}.add-{:016x}", cache.filename().string(),
-                     checksumOf(std::as_bytes(std::span(place))));
-}
-
-/// Makes the folder, and removes those of additions that were killed: the cache is locked, so none of them
-/// lives.
-std::filesystem::path newScratch(const AddScalarOptions& options) {
-  const std::string name = scratchName(options.cache);
-  for (const auto& entry : std::filesystem::directory_iterator(temporaryFolder(options)))
-    if (entry.path().filename().string().starts_with(name + ".")) removeAll(entry.path());
-  return ScratchFolder::newPath(temporaryFolder(options), name);
-}
-
 /// An addition under way: what each pass leaves for the next.
 class Addition {
  public:
@@ -93,11 +54,16 @@ class Addition {
         cache_(options.cache),
         grid_(source),
         reader_(grid_, options.scalars, options.blank_value),
-        scratch_(newScratch(options), ScratchFolder::Folder::kMake) {
+        scratch_(newScratch(options.cache, temporaryFolder(options)), ScratchFolder::Folder::kMake) {
     for (const uint32_t scalar : options.scalars)
       report_.scalars.push_back(source.description().scalars[scalar].name);
     report_.nodes = manifest().nodes;
     report_.splats = manifest().splats;
+    if (cache_.series().steps.size() > 1)
+      throw Error(
+          "{}: is a series of {} steps, to which no scalar can be added; convert the series again with all "
+          "scalars",
+          cache_.path().string(), cache_.series().steps.size());
     checkBlocks(source.description(), cache_);
     checkCentring();
     checkNames(report_.scalars, cache_);
@@ -179,51 +145,25 @@ class Addition {
   }
 
   void scatter() {
-    const size_t variables = options_.scalars.size();
     writer_ = std::make_unique<VariableWriter>(lock_, manifest(), this->variables());
-    order_ = std::make_unique<ConversionOrder>(cache_);
-    buckets_ = std::make_unique<ValueBuckets>(cache_.bricks(), *order_, variables, plan_.bucket_bytes);
-    grouped_ = ValueLoader::grouping(buckets_->size(), plan_);
-    const uint32_t numbers = (buckets_->size() + grouped_ - 1) / grouped_;
-    file_ = std::make_unique<BucketFile>(scratch_.path() / "values.bin", numbers, plan_.chunkBytes(numbers));
-    seams_ = std::make_unique<SeamMerger>(variables, plan_.seam_bytes, scratch_.path(),
-                                          unlikeHalvesOf(manifest()));
-
-    tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
-    streamSplats(
-        reader_, nullptr, plan_.slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, *seams_,
-        progress_);
-    for (ValueSink& sink : sinks) sink.flush();
+    passes_ = std::make_unique<ValuePasses>(cache_, reader_, plan_, scratch_.path(), progress_);
+    passes_->scatter();
   }
 
   void mergeSeams() {
-    ValueSink sink = newSink();
-    seams_->finish(grid_.description().coordinate_bytes,
-                   [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
-                     sink.add(splat, values);
-                     progress_.advance(1);
-                   });
-    sink.flush();
-    seams_.reset();
-    file_->close();
-    report_.temporary_bytes = file_->size();
+    passes_->mergeSeams();
+    report_.temporary_bytes = passes_->temporaryBytes();
   }
 
   void build() {
-    const size_t variables = options_.scalars.size();
-    ValueBuilder builder(cache_, *order_, *buckets_, variables, *writer_, progress_);
-    ValueLoader loader(cache_, *order_, *buckets_, variables, plan_, scratch_.path());
-    loader.forEach(*file_, 0, buckets_->size(), grouped_,
-                   [&](LoadedValues& loaded) { builder.build(loaded); });
-    file_.reset();
+    passes_->build(*writer_);
+    passes_.reset();
   }
 
   void finish() {
     for (const FileInfo& file : writer_->finish(grid_.description().files))
       report_.files.push_back({file.name, file.size});
   }
-
-  ValueSink newSink() const { return {cache_, *order_, *buckets_, grouped_, *file_}; }
 
   std::vector<VariableInfo> variables() const {
     std::vector<VariableInfo> variables;
@@ -245,12 +185,8 @@ class Addition {
   const NodeReader reader_;
   const ScratchFolder scratch_;  // before what has files in it
   GridSurvey survey_;
-  uint32_t grouped_ = 1;
   std::unique_ptr<VariableWriter> writer_;
-  std::unique_ptr<ConversionOrder> order_;
-  std::unique_ptr<ValueBuckets> buckets_;
-  std::unique_ptr<BucketFile> file_;
-  std::unique_ptr<SeamMerger> seams_;
+  std::unique_ptr<ValuePasses> passes_;
   AddScalarReport report_;
 };
 

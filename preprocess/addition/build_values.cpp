@@ -16,7 +16,7 @@
 namespace curvisplat {
 
 ValueBuilder::ValueBuilder(const CacheReader& cache, const ConversionOrder& order,
-                           const ValueBuckets& buckets, size_t variables, VariableWriter& writer,
+                           const ValueBuckets& buckets, size_t variables, ValuesWriter& writer,
                            Progress& progress)
     : cache_(&cache),
       order_(&order),
@@ -92,7 +92,7 @@ void ValueBuilder::buildLeaf(const Leaf& leaf, LoadedValues& loaded, OctantMerge
   for (uint32_t position = leaf.begin; position < leaf.end; ++position) {
     BrickSplats brick = decode(position, loaded);
     takeValues(position, loaded, brick);
-    encode(brick, built[position - loaded.first]);
+    encode(position, brick, built[position - loaded.first]);
     if (has_parent) merger.add(brick);
   }
   if (has_parent && !leaf.goes_on)
@@ -116,7 +116,7 @@ ValueBuilder::Built ValueBuilder::buildInner(uint32_t position, const LoadedValu
                          "another version's: convert again",
                          values.size(), brick.size()));
   Built built;
-  encode(brick, built);
+  encode(position, brick, built);
   if (brick.cell.level > 0) {
     merger.begin(brick.cell);
     merger.add(brick);
@@ -193,9 +193,13 @@ void ValueBuilder::takeValues(uint32_t position, LoadedValues& loaded, BrickSpla
                                  brick.size(), n));
 }
 
-void ValueBuilder::encode(BrickSplats& brick, Built& built) const {
-  for (auto& values : brick.variables)
-    built.values.push_back(encodeValues(brick.runs, brick.border_codes, values));
+void ValueBuilder::encode(uint32_t position, BrickSplats& brick, Built& built) const {
+  thread_local StepReferences::Scratch scratch;
+  for (size_t v = 0; v < brick.variables.size(); ++v) {
+    TimeReferences references;
+    if (references_) references = references_->of((*order_)[position], v, scratch);
+    built.values.push_back(encodeValues(brick.runs, brick.border_codes, brick.variables[v], references));
+  }
 }
 
 void ValueBuilder::refuse(uint32_t position, const std::string& what) const {

@@ -11,11 +11,12 @@
 #include <vector>
 
 #include "preprocess/addition/conversion_order.h"
+#include "preprocess/addition/step_references.h"
 #include "preprocess/addition/value_buckets.h"
 #include "preprocess/convert/merge_levels.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
-#include "stream/cache/variable_writer.h"
+#include "stream/cache/values_writer.h"
 
 namespace curvisplat {
 
@@ -23,7 +24,9 @@ class ValueBuilder {
  public:
   /// All references must outlive it.
   ValueBuilder(const CacheReader& cache, const ConversionOrder& order, const ValueBuckets& buckets,
-               size_t variables, VariableWriter& writer, Progress& progress);
+               size_t variables, ValuesWriter& writer, Progress& progress);
+  /// Predicts from these from now on. They must outlive it.
+  void predictFrom(const StepReferences& references) { references_ = &references; }
 
   /// Builds and appends a bucket; they come in order. Throws Error if the splats are not those of the cache.
   void build(LoadedValues& loaded);
@@ -48,7 +51,7 @@ class ValueBuilder {
 
   BrickSplats decode(uint32_t position, const LoadedValues& loaded) const;
   void takeValues(uint32_t position, LoadedValues& loaded, BrickSplats& brick) const;
-  void encode(BrickSplats& brick, Built& built) const;
+  void encode(uint32_t position, BrickSplats& brick, Built& built) const;
   [[noreturn]] void refuse(uint32_t position, const std::string& what) const;
 
   const Brick& brickAt(uint32_t position) const { return cache_->bricks()[(*order_)[position]]; }
@@ -59,7 +62,8 @@ class ValueBuilder {
   const ValueBuckets* buckets_;
   const size_t variables_;
   const NodeNumbers numbers_;
-  VariableWriter* writer_;
+  ValuesWriter* writer_;
+  const StepReferences* references_ = nullptr;
   Progress* progress_;
   // Of inner bricks some of whose children are built: what these gave, [octant].
   std::map<uint32_t, std::array<Values, 8>> octants_;

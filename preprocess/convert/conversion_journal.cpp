@@ -87,6 +87,7 @@ json jsonOf(const GridSurvey& survey) {
   json ranges = json::array();
   for (const ScalarRange& range : survey.ranges) ranges.push_back({range.min, range.max});
   return {{"nodes", survey.nodes},
+          {"grid_checksum", survey.grid_checksum},
           {"blanked", {survey.blanked.by_grid, survey.blanked.by_value, survey.blanked.not_finite}},
           {"lower", jsonOf(survey.lower)},
           {"upper", jsonOf(survey.upper)},
@@ -96,6 +97,7 @@ json jsonOf(const GridSurvey& survey) {
 GridSurvey surveyOf(const json& from) {
   GridSurvey survey;
   survey.nodes = wholeNumber<uint64_t>(from.at("nodes"));
+  survey.grid_checksum = from.at("grid_checksum").get<uint64_t>();
   const auto& blanked = from.at("blanked");
   survey.blanked = {wholeNumber<uint64_t>(blanked.at(0)), wholeNumber<uint64_t>(blanked.at(1)),
                     wholeNumber<uint64_t>(blanked.at(2))};

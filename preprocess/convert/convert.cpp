@@ -256,9 +256,13 @@ class Conversion {
     manifest.cells = reader_.centring() == Centring::kCell;
     manifest.nodes = splats_.survey.nodes;
     manifest.blanked_nodes = splats_.survey.blanked.total();
+    manifest.grid_checksum = splats_.survey.grid_checksum;
     manifest.variables = variables();
     StepInfo step;
     if (!description.times.empty()) step.time = description.times[description.time_step];
+    if (options_.time) step.time = *options_.time;
+    manifest.time_unit = description.time_unit;
+    manifest.calendar = description.calendar;
     for (const VariableInfo& variable : manifest.variables) step.variables.push_back(variable.number);
     manifest.steps = {step};
     return manifest;

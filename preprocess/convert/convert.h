@@ -24,6 +24,7 @@ struct ConvertOptions {
   unsigned threads = 0;                    // 0: as many as the machine has
   std::filesystem::path temporary_folder;  // empty: the folder of the output
   std::string title;                       // empty: the output's name
+  std::optional<double> time;              // of the step; otherwise the source's, or 0
 
   /// Smaller buckets than memory would allow: tests make many of them from small grids.
   std::optional<uint64_t> bucket_splats;

@@ -12,6 +12,7 @@
 
 #include "preprocess/grid/slabs.h"
 #include "preprocess/survey/cell_survey.h"
+#include "preprocess/survey/grid_checksum.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -92,6 +93,7 @@ GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFac
     const size_t count = loaded->nodes.x.size();
     survey.nodes += count;
     survey.blanked += loaded->blanked;
+    survey.grid_checksum += checksumOfGrid(*loaded, reader.source().description().blocks[loaded->slab.block]);
     // The smallest and the largest do not depend on how the work is divided.
     total = tbb::parallel_reduce(
         tbb::blocked_range<size_t>(0, count, kNodesPerTask), total,

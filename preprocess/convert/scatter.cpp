@@ -154,14 +154,15 @@ void RecordRouter::flush() {
 
 ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces, uint64_t slab_bytes,
                            const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams,
-                           Progress& progress) {
-  SplatStream splats(reader, faces, sink_of_thread, seams, progress);
+                           const SlabPass& pass) {
+  SplatStream splats(reader, faces, sink_of_thread, seams, pass.progress);
   SlabStream slabs(reader, slab_bytes,
                    reader.centring() == Centring::kCell ? kCellSplatHalo : kNodeSplatHalo);
   while (const LoadedSlab* loaded = slabs.next()) {
+    if (pass.see) pass.see(*loaded);
     splats.add(*loaded);
     const GridBlock& block = reader.source().description().blocks[loaded->slab.block];
-    progress.advance(rowsOf(loaded->slab.box) * block.ni);
+    pass.progress.advance(rowsOf(loaded->slab.box) * block.ni);
   }
   return splats.counts();
 }

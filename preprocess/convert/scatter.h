@@ -6,11 +6,13 @@
 #include <cstdint>
 #include <functional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "preprocess/convert/bucket_file.h"
 #include "preprocess/convert/bucket_tree.h"
 #include "preprocess/grid/node_reader.h"
+#include "preprocess/grid/slabs.h"
 #include "preprocess/splats/abutting_faces.h"
 #include "preprocess/splats/seams.h"
 #include "stream/base/progress.h"
@@ -52,12 +54,23 @@ struct ScatterCounts {
   uint64_t inverted = 0;    // cells of the handedness that fewer of their block's cells have
 };
 
+/// What a pass over a grid's slabs reports to.
+struct SlabPass {
+  SlabPass(Progress& of_pass) : progress(of_pass) {}  // implicit: most passes report nothing else
+  SlabPass(Progress& of_pass, std::function<void(const LoadedSlab&)> of_slab)
+      : progress(of_pass), see(std::move(of_slab)) {}
+
+  Progress& progress;
+  std::function<void(const LoadedSlab&)>
+      see;  // each slab, in order, before its splats are made; may be empty
+};
+
 /// Makes all splats, of nodes or of cells as the reader's scalars are, in parallel. Those of block faces go
 /// to `seams`, the others to what `sink_of_thread` gives: a sink of the calling thread's own, always the same
 /// one. Cells end at borders as computeCellSplats() finds them with `faces`, which may be null.
 ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces, uint64_t slab_bytes,
                            const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams,
-                           Progress& progress);
+                           const SlabPass& pass);
 
 /// Routes all splats but those of block faces, which go to `seams`. Adds to `contents` ([node of the tree]).
 ScatterCounts scatterSplats(const NodeReader& reader, const AbuttingFaces* faces, const RootCube& root,

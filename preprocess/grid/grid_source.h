@@ -64,6 +64,7 @@ struct GridDescription {
   int coordinate_bytes = 4;           // 4 or 8: the stored precision of the coordinates
   std::vector<double> times;          // of every time step; empty: the files have none
   uint32_t time_step = 0;             // index of the open one
+  std::string time_unit, calendar;    // of the times, by the CF conventions; may be empty
   std::string blanking;               // the files' rule for blanking in words; empty: iblank or the like
   std::vector<std::string> warnings;  // "bluntfinq.bin: 484 trailing bytes ignored"
 };

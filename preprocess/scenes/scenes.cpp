@@ -132,9 +132,10 @@ class ShearedWaves : public Scene {
 // it; along u the nodes are denser downstream.
 class Wake : public Scene {
  public:
-  Wake(std::string name, double clustering)
+  Wake(std::string name, double clustering, const SceneTime& time = {})
       : Scene(std::move(name)),
         clustering_(clustering),
+        time_(time),
         wall_(std::exp(-clustering)),
         stretch_(stretched(1)) {}
 
@@ -150,10 +151,12 @@ class Wake : public Scene {
   }
   glm::dvec3 alongW(double w) const override { return {0, 0, kSpan * w}; }
   glm::dvec3 join(const glm::dvec3& of_u, const glm::dvec3& of_v, const glm::dvec3& of_w) const override {
-    return {of_v.z + of_v.x * of_u.x, of_v.y * of_u.y, of_w.z};
+    const double x = of_v.z + of_v.x * of_u.x;
+    return {x, of_v.y * of_u.y + sway(x), of_w.z};
   }
 
-  std::optional<glm::dvec3> inverse(const glm::dvec3& world) const override {
+  std::optional<glm::dvec3> inverse(const glm::dvec3& swayed) const override {
+    const glm::dvec3 world(swayed.x, swayed.y - sway(swayed.x), swayed.z);
     // Solves |(x, y) - (s D, 0)| = wall + s G, a quadratic equation in s.
     const double growth = kOuter - kWall;
     const double a = square(growth) - square(kDownstream);
@@ -169,7 +172,8 @@ class Wake : public Scene {
 
   // Vortex strength: rollers shed alternately from above and below, each a core with a spiral arm, wavy along
   // the span; braids between them; and the shear layers that separate from the wall.
-  double scalar(const glm::dvec3& p) const override {
+  double scalar(const glm::dvec3& swayed) const override {
+    const glm::dvec3 p(swayed.x, swayed.y - sway(swayed.x), swayed.z);
     const double radius = std::hypot(p.x, p.y);
     const double layer = bump((radius - kWall - 0.03) / 0.07) * (0.7 - 0.3 * p.x / radius);
     const double separated = 0.7 * bump((std::abs(p.y) - 0.5 - 0.05 * p.x) / 0.12) *
@@ -178,20 +182,24 @@ class Wake : public Scene {
   }
 
   std::pair<glm::dvec3, glm::dvec3> bounds() const override {
-    return {{kDownstream - kOuter, -kOuter, 0}, {kDownstream + kOuter, kOuter, kSpan}};
+    const double most = time_.moving ? kSway * (kDownstream + kOuter) : 0;
+    return {{kDownstream - kOuter, -kOuter - most, 0}, {kDownstream + kOuter, kOuter + most, kSpan}};
   }
 
+  // Swaying shears the grid along y.
   double volume() const override { return pi * (square(kOuter) - square(kWall)) * kSpan; }
 
  private:
   static constexpr double kWall = 0.5, kOuter = 4.0, kDownstream = 3.0, kSpan = 4, kGathering = 0.6,
-                          kWaveLength = 2.5;
+                          kWaveLength = 2.5, kSway = 0.1;
+
+  double sway(double x) const { return time_.moving ? kSway * x * std::sin(2 * pi * time_.time) : 0; }
 
   double street(const glm::dvec3& p) const {
     const double behind = smoothStep((p.x - 0.6) / 1.4);
     if (behind == 0) return 0;
     const double height = 0.42 + 0.03 * p.x;
-    const double along = p.x - 0.22 * std::sin(pi * p.z + 0.4 * p.x);
+    const double along = p.x - 0.22 * std::sin(pi * p.z + 0.4 * p.x) - kWaveLength * time_.time;
     const double upper = roller(along, p.y - height, 1),
                  lower = roller(along + 0.5 * kWaveLength, height + p.y, -1);
     const double phase = 2 * pi * along / kWaveLength;
@@ -236,7 +244,9 @@ class Wake : public Scene {
     return std::clamp(turn, 0.0, 2 * pi);
   }
 
-  double clustering_, wall_, stretch_;
+  double clustering_;
+  SceneTime time_;
+  double wall_, stretch_;
 };
 
 double nodeCoordinate(uint64_t index, uint64_t nodes) {
@@ -279,6 +289,14 @@ std::vector<std::shared_ptr<const Scene>> makeScenes(std::string_view name,
   if (name == "globe") return makeGlobe();
   CURVISPLAT_CHECK(name == "duct");
   return makeDuct();
+}
+
+std::vector<std::shared_ptr<const Scene>> makeScenesAt(std::string_view name,
+                                                       std::optional<double> clustering,
+                                                       const SceneTime& time) {
+  if (name != "wake") throw UsageError("scene '{}' does not change with time; wake does", name);
+  makeScenes(name, clustering);  // checks the clustering
+  return {std::make_shared<Wake>(std::string(name), clustering.value_or(9), time)};
 }
 
 std::shared_ptr<const Scene> makeScene(std::string_view name, std::optional<double> clustering) {

@@ -35,6 +35,16 @@ std::vector<std::string> sceneNames();
 /// (0, 20], and for a clustering of a scene without one.
 std::vector<std::shared_ptr<const Scene>> makeScenes(std::string_view name,
                                                      std::optional<double> clustering = std::nullopt);
+/// When a scene is, for those that change: wake. Its vortices move down the street by a wave length per unit of
+/// time. `moving`: the grid sways along y as well, fixed at the cylinder's upstream side.
+struct SceneTime {
+  double time = 0;
+  bool moving = false;
+};
+/// The wake at a time. Throws UsageError for another scene, and as makeScenes().
+std::vector<std::shared_ptr<const Scene>> makeScenesAt(std::string_view name,
+                                                       std::optional<double> clustering,
+                                                       const SceneTime& time);
 /// As makeScenes(), for a scene of one block.
 std::shared_ptr<const Scene> makeScene(std::string_view name,
                                        std::optional<double> clustering = std::nullopt);

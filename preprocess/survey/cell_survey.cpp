@@ -9,6 +9,7 @@
 
 #include "preprocess/grid/hexahedron.h"
 #include "preprocess/grid/slabs.h"
+#include "preprocess/survey/grid_checksum.h"
 #include "stream/base/mutex.h"
 
 namespace curvisplat {
@@ -107,6 +108,7 @@ GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFa
                      return of_range;
                    },
                    united));
+    survey.grid_checksum += checksumOfGrid(*loaded, block);
     progress.advance(rowsOf(slab.box) * block.ni);
   }
   return survey;

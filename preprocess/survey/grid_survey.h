@@ -22,6 +22,7 @@ struct GridSurvey {
   glm::dvec3 lower{std::numeric_limits<double>::infinity()};
   glm::dvec3 upper{-std::numeric_limits<double>::infinity()};
   std::vector<ScalarRange> ranges;  // [scalar]; of the samples that are not blanked
+  uint64_t grid_checksum = 0;       // grid_checksum.h
 };
 
 }  // namespace curvisplat

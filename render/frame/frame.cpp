@@ -97,6 +97,22 @@ void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options) 
   }
 }
 
+void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options, const QuickLimits& limits) {
+  try {
+    state_->pipeline.prefetch(
+        state_->planner.planQuick(camera, options, limits, state_->pipeline.order()).plan, options);
+  } catch (const Error&) {
+    // renderQuickly() will report it.
+  }
+}
+
+void FrameRenderer::changeStep(const std::function<void()>& change) {
+  const FramePipeline::Running running(state_->pipeline);
+  change();
+  state_->planner.stepChanged();
+  state_->pipeline.stepChanged();
+}
+
 void FrameRenderer::setTransferFunction(const TransferFunction& transfer_function) {
   const FramePipeline::Running running(state_->pipeline);
   state_->planner.setTransferFunction(transfer_function);

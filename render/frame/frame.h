@@ -73,6 +73,13 @@ class FrameRenderer {
   /// need, as far as they fit in the cache of bricks. The next frame or prefetch() ends it. Its errors are
   /// not reported; render() reports those that matter to it.
   void prefetch(const Camera& camera, const FrameOptions& options);
+  /// The same for renderQuickly().
+  void prefetch(const Camera& camera, const FrameOptions& options, const QuickLimits& limits);
+
+  /// Goes to another time step of the same geometry: calls `change`, which has to replace the cache's reader by one
+  /// at that step, while nothing reads. Decoded geometry is kept. Ends a prefetch; a prefetch from now on is of the
+  /// new step. Throws what `change` throws.
+  void changeStep(const std::function<void()>& change);
 
   /// Takes effect with the next frame. Decoded bricks are kept. Ends a prefetch.
   void setTransferFunction(const TransferFunction& transfer_function);

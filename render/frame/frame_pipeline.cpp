@@ -101,8 +101,10 @@ FramePipeline::Running::~Running() {
 }
 
 void FramePipeline::makePools(const FrameOptions& options) {
+  // Steps differ in this; the pools stay.
+  least_pager_bytes_ = std::max(least_pager_bytes_, BrickPager::leastBufferBytes(cache_, variable_));
   const FrameBudget::Fixed fixed{planner_.bytes(),
-                                 BrickPager::leastBufferBytes(cache_, variable_),
+                                 least_pager_bytes_,
                                  backend_->bytes(options.size, resourcesOf(options)) + sceneBytes(options),
                                  options.output_bytes,
                                  planner_.mostSplats(),
@@ -120,6 +122,10 @@ void FramePipeline::makePools(const FrameOptions& options) {
       std::make_unique<Pools>(cache_, variable_, budget, pager, backend_->splatMemory(budget.ring_splats));
   const MutexLock lock(mutex_);
   pools_ = std::move(fresh);
+}
+
+void FramePipeline::stepChanged() {
+  if (pools_) pools_->source.stepChanged();
 }
 
 // Memory is allocated and freed without holding the lock, so that cancel() need not wait for it.

@@ -68,6 +68,9 @@ class FramePipeline {
   /// Begins to fetch the plan's bricks in the background. Throws UsageError if there is too little memory.
   void prefetch(const FramePlan& plan, const FrameOptions& options);
 
+  /// The cache is at another step of the same geometry. Nothing may be drawn or fetched meanwhile.
+  void stepChanged();
+
   /// The order in which plans must list their parts.
   DrawingOrder order() const { return backend_->order(); }
   const PaintingBackend& backend() const { return *backend_; }
@@ -89,6 +92,7 @@ class FramePipeline {
   const FramePlanner& planner_;
   const std::unique_ptr<PaintingBackend> backend_;
   HiddenBricks hidden_;
+  uint64_t least_pager_bytes_ = 0;  // that the largest brick of any step so far needs
 
   enum class Phase { kIdle, kRunning, kCancelled };
   Mutex mutex_;  // cancel() comes from another thread

@@ -57,6 +57,7 @@ FramePlanner::FramePlanner(const CacheReader& cache, size_t variable,
                            const TransferFunction& transfer_function)
     : cache_(cache),
       variable_(variable),
+      transfer_function_(transfer_function),
       table_(tableFor(cache, variable, transfer_function)),
       colours_(transfer_function),
       scalar_range_(transfer_function.range()),
@@ -75,7 +76,13 @@ uint64_t FramePlanner::mostSplats() const {
   return splats + splats / 4;
 }
 
+void FramePlanner::stepChanged() {
+  table_ = tableFor(cache_, variable_, transfer_function_);
+  subtrees_ = subtreeBounds(cache_.bricks(), cache_.brickVariables(variable_));
+}
+
 void FramePlanner::setTransferFunction(const TransferFunction& transfer_function) {
+  transfer_function_ = transfer_function;
   table_ = tableFor(cache_, variable_, transfer_function);
   colours_ = ColourTable(transfer_function);
   scalar_range_ = transfer_function.range();

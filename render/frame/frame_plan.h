@@ -69,6 +69,8 @@ class FramePlanner {
   QuickPlan planQuick(const Camera& camera, const FrameOptions& options, const QuickLimits& limits,
                       DrawingOrder order) const;
 
+  /// The cache is at another step of the same geometry. Nothing may be planned or drawn meanwhile.
+  void stepChanged();
   /// Takes effect with the next plan. Nothing may be planned or drawn meanwhile.
   void setTransferFunction(const TransferFunction& transfer_function);
   ScreenView screenView(const Camera& camera, const FrameOptions& options, ImageSize size) const {
@@ -98,10 +100,11 @@ class FramePlanner {
 
   const CacheReader& cache_;
   const size_t variable_;
+  TransferFunction transfer_function_;
   ClassificationTable table_;
   ColourTable colours_;
   std::pair<double, double> scalar_range_;  // of the transfer function
-  const std::vector<ValueBounds> subtrees_;
+  std::vector<ValueBounds> subtrees_;
 };
 
 }  // namespace curvisplat

@@ -16,7 +16,7 @@ inline constexpr size_t kMaxSlices = 8;
 /// Opaque and lit, from both sides. In data coordinates.
 struct Surface {
   std::shared_ptr<const TriangleMesh> mesh;
-  glm::vec3 colour{0.8f, 0.8f, 0.8f};
+  glm::vec3 colour{0.7f, 0.7f, 0.7f};
   bool by_scalar =
       false;  // the transfer function's colours for the mesh's scalars; `colour` where it has none
 };

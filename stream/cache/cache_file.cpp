@@ -18,4 +18,14 @@ std::filesystem::path cacheFile(const std::filesystem::path& cache, const std::s
   return path;
 }
 
+std::filesystem::path cacheFolder(const std::filesystem::path& cache, const std::string& name) {
+  namespace fs = std::filesystem;
+  fs::path path = cache / name;
+  std::error_code error;
+  if (!fs::is_directory(fs::symlink_status(path, error)))
+    throw Error("{}: is not a directory of the cache's own; the cache is damaged: convert again",
+                path.string());
+  return path;
+}
+
 }  // namespace curvisplat

@@ -12,4 +12,7 @@ namespace curvisplat {
 /// opening a pipe may block forever.
 std::filesystem::path cacheFile(const std::filesystem::path& cache, const std::string& name);
 
+/// The same of a folder in the folder `cache`. Throws Error if it is a link, or no folder.
+std::filesystem::path cacheFolder(const std::filesystem::path& cache, const std::string& name);
+
 }  // namespace curvisplat

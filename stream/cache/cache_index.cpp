@@ -174,7 +174,7 @@ class IndexChecker {
 /// against the file's size. A sparse file can be large and hold nothing, so the records are read a piece at a
 /// time, and `use` checks each record before memory is allocated for the next.
 template <typename Record, typename Header, typename Use>
-void readRecords(const InputFile& file, const Header& header, uint64_t offset, const Manifest& manifest,
+void readRecords(const InputFile& file, const Header& header, uint64_t offset, uint64_t bricks,
                  const FileInfo& info, const Use& use) {
   if (header.magic != Header{}.magic)
     throw Error("{}: does not begin with the magic bytes of a cache's file; it is damaged or of another kind",
@@ -182,13 +182,13 @@ void readRecords(const InputFile& file, const Header& header, uint64_t offset, c
   if (header.version != kTableVersion || header.record_bytes != sizeof(Record))
     throw Error("{}: has version {} and records of {} bytes (expected {} and {}); the file is damaged",
                 file.path().string(), header.version, header.record_bytes, kTableVersion, sizeof(Record));
-  if (header.bricks != manifest.bricks || offset > file.size() ||
+  if (header.bricks != bricks || offset > file.size() ||
       (file.size() - offset) / sizeof(Record) != header.bricks ||
       (file.size() - offset) % sizeof(Record) != 0)
     throw Error(
         "{}: has a header for {} bricks from offset {}, but its size is {} and the manifest has {} bricks; "
         "the file is damaged",
-        file.path().string(), header.bricks, offset, file.size(), manifest.bricks);
+        file.path().string(), header.bricks, offset, file.size(), bricks);
   Checksum checksum;
   checksum.add(std::as_bytes(std::span(&header, 1)));
   constexpr uint64_t kRecordsAtOnce = (1 << 20) / sizeof(Record);
@@ -208,14 +208,18 @@ std::string variableFileName(const VariableInfo& variable) {
   return fmt::format("var.{}.bin", variable.number);
 }
 
+void checkSize(const fs::path& path, uint64_t bytes, const FileInfo& info) {
+  if (info.size != bytes)
+    throw Error(
+        "{}: is truncated or has grown (found {} bytes, expected {}); the file is damaged: convert again",
+        path.string(), bytes, info.size);
+}
+
 const FileInfo& checkFile(const fs::path& path, uint64_t bytes, const Manifest& manifest) {
   const std::string name = path.filename().string();
   for (const FileInfo& info : manifest.files) {
     if (info.name != name) continue;
-    if (info.size != bytes)
-      throw Error(
-          "{}: is truncated or has grown (found {} bytes, expected {}); the file is damaged: convert again",
-          path.string(), bytes, info.size);
+    checkSize(path, bytes, info);
     return info;
   }
   throw Error("{}: is not listed in the manifest; the cache is damaged: convert again", path.string());
@@ -232,10 +236,11 @@ std::vector<Brick> readBricks(const fs::path& cache, const Manifest& manifest) {
   file.readAt(0, std::span(&header, 1));
   std::vector<Brick> bricks;
   IndexChecker checker(file.path(), bricks, manifest);
-  readRecords<BrickRecord>(file, header, sizeof header, manifest, info, [&](const BrickRecord& record) {
-    bricks.push_back(brickOf(record));
-    checker.checkLast();
-  });
+  readRecords<BrickRecord>(file, header, sizeof header, manifest.bricks, info,
+                           [&](const BrickRecord& record) {
+                             bricks.push_back(brickOf(record));
+                             checker.checkLast();
+                           });
   checker.checkAll();
   bricks.shrink_to_fit();
   std::vector<Extent> extents;
@@ -249,15 +254,15 @@ std::vector<Brick> readBricks(const fs::path& cache, const Manifest& manifest) {
   return bricks;
 }
 
-std::vector<BrickVariable> readVariableTable(const InputFile& file, const Manifest& manifest,
+std::vector<BrickVariable> readVariableTable(const InputFile& file, const FileInfo& info,
                                              std::span<const Brick> bricks) {
-  const FileInfo& info = checkFile(file, manifest);
+  checkSize(file.path(), file.size(), info);
   VariableHeader header;
   file.readAt(0, std::span(&header, 1));
   std::vector<BrickVariable> table;
   table.reserve(bricks.size());
   readRecords<VariableRecord>(
-      file, header, header.table_offset, manifest, info, [&](const VariableRecord& record) {
+      file, header, header.table_offset, bricks.size(), info, [&](const VariableRecord& record) {
         const size_t n = table.size();
         table.push_back(brickVariableOf(record));
         const BrickVariable& variable = table.back();

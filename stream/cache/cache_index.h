@@ -20,13 +20,16 @@ std::string variableFileName(const VariableInfo& variable);
 /// manifest.
 std::vector<Brick> readBricks(const std::filesystem::path& cache, const Manifest& manifest);
 
-/// Reads the table of a var.<number>.bin. Throws Error as readBricks().
-std::vector<BrickVariable> readVariableTable(const InputFile& file, const Manifest& manifest,
+/// Reads the table of a file of values; `info`: its entry in a manifest or in steps.bin. Throws Error as
+/// readBricks().
+std::vector<BrickVariable> readVariableTable(const InputFile& file, const FileInfo& info,
                                              std::span<const Brick> bricks);
 
 /// Throws Error unless the manifest lists the file with its actual size. Returns the manifest's entry.
 const FileInfo& checkFile(const InputFile& file, const Manifest& manifest);
 const FileInfo& checkFile(const std::filesystem::path& path, uint64_t bytes, const Manifest& manifest);
+/// Throws Error unless the file has the size that `info` states.
+void checkSize(const std::filesystem::path& path, uint64_t bytes, const FileInfo& info);
 
 /// The checksum of a geometry file: the checksum of its streams' checksums, in the order of bricks.bin.
 uint64_t geometryChecksum(std::span<const Brick> bricks);

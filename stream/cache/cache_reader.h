@@ -1,4 +1,5 @@
-// Opens a splat cache and reads bricks. Opening reads the manifest and the tables, and checks every size
+// Opens a splat cache at a time step and reads bricks. An open reader looks like one of a cache of that step
+// alone. Opening reads the manifest and the tables, and checks every size
 // against the real files and every link of the octree. It never reads payloads (streams). An open CacheReader
 // is immutable: any number of threads may read.
 #pragma once
@@ -11,6 +12,7 @@
 
 #include "stream/base/error.h"
 #include "stream/cache/manifest.h"
+#include "stream/cache/steps_file.h"
 #include "stream/model/brick.h"
 #include "stream/model/splats.h"
 
@@ -32,14 +34,28 @@ class DamagedBrick : public Error {
 
 class CacheReader {
  public:
-  /// Throws an Error that names the file, what was found and what was expected.
-  explicit CacheReader(const std::filesystem::path& cache);
+  /// Opens the cache at a step, the first unless told otherwise. Throws an Error that names the file, what was
+  /// found and what was expected.
+  explicit CacheReader(const std::filesystem::path& cache, uint64_t step = 0);
   ~CacheReader();
   CacheReader(CacheReader&&) noexcept;
   CacheReader& operator=(CacheReader&&) noexcept;
 
+  /// The folder of the step's geometry: the cache's own, unless the series has several.
   const std::filesystem::path& path() const;
+  /// As of a cache of the step alone.
   const Manifest& manifest() const;
+
+  /// The folder of the cache, and its manifest as it is there: of the whole series.
+  const std::filesystem::path& cachePath() const;
+  const Manifest& seriesManifest() const;
+  const Series& series() const;
+  uint64_t step() const;
+  /// The same cache at another step. Shares the tables of the geometry if that is the same. Throws Error as the
+  /// constructor.
+  CacheReader atStep(uint64_t step) const;
+  /// Whether the bricks and geometry streams of both are the same ones.
+  bool sharesGeometryWith(const CacheReader& other) const;
 
   /// The octree, level by level. The root is brick 0, or the first few bricks if several share the root cell.
   std::span<const Brick> bricks() const;
@@ -60,8 +76,8 @@ class CacheReader {
   const std::filesystem::path& geometryPath() const;
   const std::filesystem::path& valuesPath(size_t variable) const;
   /// Verify and decode a stream that the caller has read: the bytes at bricks()[brick].geometry, or those at
-  /// the variable's `values`. The arrays in `out` have one element per splat of the brick. Throw as the
-  /// reading functions.
+  /// the variable's `values`. The arrays in `out` have one element per splat of the brick. Values that are
+  /// predicted from earlier steps are read there, by this thread. Throw as the reading functions.
   void decode(uint32_t brick, std::span<const std::byte> geometry, const GeometryArrays<float>& out,
               ReadTimes& times) const;
   void decode(uint32_t brick, size_t variable, std::span<const std::byte> values,
@@ -69,6 +85,7 @@ class CacheReader {
 
  private:
   struct State;
+  explicit CacheReader(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };
 

@@ -19,7 +19,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr uint64_t kOldestVersion = 1, kFirstWithRequirements = 2, kNewestVersion = 2;
-constexpr const char* kKnownFeatures[] = {kBorderFaces};
+constexpr const char* kKnownFeatures[] = {kBorderFaces, kSteps};
 constexpr const char* kFormat = "curvisplat splat cache";
 // 100,000 blocks take half of this. Parsed JSON takes about twenty times the size of its text.
 constexpr size_t kLargestText = 16 << 20;
@@ -231,6 +231,10 @@ void readFiles(const Fields& fields, Manifest& manifest, const Json& json) {
 
 }  // namespace
 
+bool Manifest::hasFeature(const char* feature) const {
+  return std::find(requirements.begin(), requirements.end(), feature) != requirements.end();
+}
+
 std::string Manifest::toJson() const {
   Json json;
   json["format"] = kFormat;
@@ -253,6 +257,9 @@ std::string Manifest::toJson() const {
   json["bricks"] = bricks;
   json["levels"] = levels;
   json["volume"] = volume;
+  if (grid_checksum) json["grid_checksum"] = fmt::format("{:016x}", *grid_checksum);
+  if (!time_unit.empty()) json["time_unit"] = time_unit;
+  if (!calendar.empty()) json["calendar"] = calendar;
   json["variables"] = Json::array();
   for (const VariableInfo& variable : variables)
     json["variables"].push_back({{"number", variable.number},
@@ -333,6 +340,9 @@ Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path
   manifest.levels = static_cast<uint32_t>(fields.count("levels", 1, kMaxLevel + 1));
   manifest.volume = fields.number("volume");
   if (manifest.volume < 0) fields.fail("volume", "0 or more", json["volume"]);
+  if (json.contains("grid_checksum")) manifest.grid_checksum = fields.checksum("grid_checksum");
+  if (json.contains("time_unit")) manifest.time_unit = fields.text("time_unit");
+  if (json.contains("calendar")) manifest.calendar = fields.text("calendar");
   readVariables(fields, manifest, json);
   readSteps(fields, manifest, json);
   readFiles(fields, manifest, json);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,7 @@ struct VariableInfo {
   double min = 0, max = 0;  // of the samples' values, before merging
 };
 
-/// One time step; a steady cache has exactly one.
+/// One time step. A manifest lists the first; a series has the others in steps.bin (steps_file.h).
 struct StepInfo {
   double time = 0;
   std::string geometry = "geometry.bin";
@@ -49,6 +50,7 @@ class OtherVersion : public Error {
 /// What a reader must know of to read a cache, by the names in the manifest. Of a version 2 cache only: it is
 /// one of version 1 but for these.
 inline constexpr const char* kBorderFaces = "border-faces";  // borders are cut at faces (border_code.h)
+inline constexpr const char* kSteps = "steps";               // a series of time steps (steps_file.h)
 
 struct Manifest {
   std::vector<std::string> requirements;  // "requires"; none: version 1
@@ -64,11 +66,17 @@ struct Manifest {
   uint64_t blanked_nodes = 0;  // samples that are not drawn: iblank, --blank or not finite
   uint64_t splats = 0;         // at the finest level
   uint64_t bricks = 0;
-  uint32_t levels = 0;  // deepest level + 1
-  double volume = 0;    // sum of the finest level's weights
+  uint32_t levels = 0;                    // deepest level + 1
+  double volume = 0;                      // sum of the finest level's weights
+  std::optional<uint64_t> grid_checksum;  // of coordinates and blanking: steps in which it is the same share
+                                          // their geometry (preprocess/survey/grid_checksum.h)
+  std::string time_unit;  // of the steps' times, such as "days since 1900-01-01"; may be empty
+  std::string calendar;   // of the time unit, by the CF conventions; may be empty
   std::vector<VariableInfo> variables;
   std::vector<StepInfo> steps;
   std::vector<FileInfo> files;  // all files of the cache except the manifest
+
+  bool hasFeature(const char* feature) const;
 
   std::string toJson() const;
   /// Throws an Error that names `path` if a field is missing, of the wrong type or out of range, or if a

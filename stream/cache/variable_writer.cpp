@@ -10,6 +10,7 @@
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/cache/cache_index.h"
+#include "stream/cache/replace_manifest.h"
 #include "stream/cache/stream_file.h"
 
 namespace curvisplat {
@@ -92,32 +93,15 @@ std::vector<FileInfo> VariableWriter::finish(const std::vector<std::string>& sou
     manifest_.steps.front().variables.push_back(file.variable.number);
   }
   manifest_.files.insert(manifest_.files.end(), infos.begin(), infos.end());
-  for (const std::string& source : sources)
-    if (std::find(manifest_.sources.begin(), manifest_.sources.end(), source) == manifest_.sources.end())
-      manifest_.sources.push_back(source);
-  replaceManifest();
-  in_place_ = true;
-  return infos;
-}
-
-void VariableWriter::replaceManifest() {
-  const fs::path manifest = lock_->cache() / "manifest.json";
-  fs::path part = manifest;
-  part += kPartSuffix;
-  SystemCalls::current().remove(part.c_str());  // which may be a link
+  addSources(sources, manifest_);
   try {
-    OutputFile file(part);
-    const std::string text = manifest_.toJson();
-    file.append(std::as_bytes(std::span(text)));
-    file.close();
-    renameDurably(part, manifest);
+    replaceManifest(lock_->cache(), manifest_);
   } catch (const NameNotSynced&) {
     in_place_ = true;
     throw;
-  } catch (...) {
-    removeAll(part);
-    throw;
   }
+  in_place_ = true;
+  return infos;
 }
 
 }  // namespace curvisplat

@@ -11,23 +11,22 @@
 #include "stream/base/file.h"
 #include "stream/cache/cache_lock.h"
 #include "stream/cache/manifest.h"
-#include "stream/codec/brick_codec.h"
+#include "stream/cache/values_writer.h"
 
 namespace curvisplat {
 
 /// For one thread at a time.
-class VariableWriter {
+class VariableWriter : public ValuesWriter {
  public:
   /// `lock` must outlive the writer. `manifest`: the cache's, read under the lock. Assigns the numbers of
   /// `variables`. Throws Error if a file cannot be created.
   VariableWriter(const CacheLock& lock, Manifest manifest, std::vector<VariableInfo> variables);
   /// Removes the new files unless finish() has succeeded.
-  ~VariableWriter();
+  ~VariableWriter() override;
   VariableWriter(const VariableWriter&) = delete;
   VariableWriter& operator=(const VariableWriter&) = delete;
 
-  /// Appends a brick's streams, one per variable. Each brick comes once, in the order of conversion.
-  void append(uint32_t brick, std::span<const EncodedValues> values);
+  void append(uint32_t brick, std::span<const EncodedValues> values) override;
 
   /// Writes the tables, syncs, and puts the files and the manifest into place. Adds those `sources` to the
   /// manifest that it does not list yet. Returns the manifest's entries for the new files. After an Error the
@@ -44,7 +43,6 @@ class VariableWriter {
   };
 
   void removeLeftovers() const;
-  void replaceManifest();
 
   const CacheLock* lock_;
   Manifest manifest_;

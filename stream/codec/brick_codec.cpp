@@ -111,9 +111,9 @@ Extent extentOf(std::span<const std::byte> bytes) {
 }
 
 EncodedValues encodeInRows(std::span<const Row> rows, std::span<const uint32_t> border_codes,
-                           std::span<SplatScalar> values) {
+                           std::span<SplatScalar> values, const TimeReferences& references) {
   EncodedValues encoded;
-  encoded.bytes = encodeValuesStream(rows, values);
+  encoded.bytes = encodeValuesStream(rows, values, references);
   encoded.variable = summaryOf(values, border_codes);
   encoded.variable.values = extentOf(encoded.bytes);
   return encoded;
@@ -171,7 +171,7 @@ EncodedBrick encodeBrick(const RootCube& root, BrickSplats& brick) {
   encoded.brick.geometry = extentOf(encoded.geometry);
   for (const Splat& splat : brick.splats) encoded.weight += splat.weight;
   for (auto& values : brick.variables) {
-    EncodedValues of_variable = encodeInRows(decoded.rows, brick.border_codes, values);
+    EncodedValues of_variable = encodeInRows(decoded.rows, brick.border_codes, values, {});
     encoded.values.push_back(std::move(of_variable.bytes));
     encoded.variables.push_back(of_variable.variable);
   }
@@ -179,8 +179,8 @@ EncodedBrick encodeBrick(const RootCube& root, BrickSplats& brick) {
 }
 
 EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<const uint32_t> border_codes,
-                           std::span<SplatScalar> values) {
-  return encodeInRows(rowsOf(runs, values.size()), border_codes, values);
+                           std::span<SplatScalar> values, const TimeReferences& references) {
+  return encodeInRows(rowsOf(runs, values.size()), border_codes, values, references);
 }
 
 void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,
@@ -213,9 +213,10 @@ void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const st
   if (runs) *runs = scratchGeometry().runs;
 }
 
-void decodeVariable(const Brick& brick, std::span<const std::byte> bytes, const VariableArrays<float>& out) {
+void decodeVariable(const Brick& brick, std::span<const std::byte> bytes, const VariableArrays<float>& out,
+                    const TimeReferences& references) {
   CURVISPLAT_CHECK_OP(out.size(), ==, brick.splats);
-  decodeNaming(brick, "values", [&] { decodeValuesStream(brick.splats, bytes, out); });
+  decodeNaming(brick, "values", [&] { decodeValuesStream(brick.splats, bytes, out, references); });
 }
 
 void decodeVariable(const Brick& brick, const BrickVariable&, std::span<const std::byte> bytes,

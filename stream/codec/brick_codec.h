@@ -18,6 +18,7 @@
 #include <span>
 #include <vector>
 
+#include "stream/codec/values_codec.h"
 #include "stream/model/brick.h"
 #include "stream/model/brick_splats.h"
 #include "stream/model/octree.h"
@@ -44,9 +45,10 @@ struct EncodedValues {
 };
 
 /// Encodes the values of one variable as encodeBrick() does, and replaces them by the decoded ones. The
-/// values must be finite. `runs` and `border_codes`: the brick's. Pure: any thread. Throws nothing but bad_alloc.
+/// values must be finite. `runs` and `border_codes`: the brick's. `references`: its values at earlier steps, which
+/// the stream may be predicted from. Pure: any thread. Throws nothing but bad_alloc.
 EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<const uint32_t> border_codes,
-                           std::span<SplatScalar> values);
+                           std::span<SplatScalar> values, const TimeReferences& references = {});
 
 /// Decodes the geometry stream of `brick`. The bytes are untrusted: throws an Error that names the brick
 /// unless they decode to exactly brick.splats finite splats inside the cell, and allocates memory for no more
@@ -61,7 +63,8 @@ void decodeVariable(const Brick& brick, const BrickVariable& variable, std::span
 /// The same two functions for arrays of brick.splats elements.
 void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,
                     const GeometryArrays<float>& out);
-void decodeVariable(const Brick& brick, std::span<const std::byte> bytes, const VariableArrays<float>& out);
+void decodeVariable(const Brick& brick, std::span<const std::byte> bytes, const VariableArrays<float>& out,
+                    const TimeReferences& references = {});
 
 /// Decodes geometry and values to doubles with exact positions, for merging into coarser bricks.
 BrickSplats decodeForMerging(const RootCube& root, const Brick& brick, std::span<const std::byte> geometry,

@@ -191,7 +191,7 @@ class GeometryEncoder {
   }
 
   void addPredicted(std::span<const uint32_t> values) {
-    const Predictor predictor = bestPredictor(sample_, values);
+    const Predictor predictor = bestPredictor(sample_, values).predictor;
     predictRows(predictor, decoded_.rows, values.data(), [&](uint32_t n, uint32_t predicted) {
       residuals_[n] = zigzag(values[n] - predicted);
       return values[n];

@@ -117,9 +117,8 @@ std::vector<Row> sampleOf(std::span<const Row> rows) {
   return sample;
 }
 
-Predictor bestPredictor(std::span<const Row> sample, std::span<const uint32_t> values) {
-  Predictor best = Predictor::kNone;
-  uint64_t fewest = std::numeric_limits<uint64_t>::max();
+PredictorChoice bestPredictor(std::span<const Row> sample, std::span<const uint32_t> values) {
+  PredictorChoice best{Predictor::kNone, std::numeric_limits<uint64_t>::max()};
   for (int p = 0; p < kPredictors; ++p) {
     const auto predictor = static_cast<Predictor>(p);
     uint64_t bits = 0;
@@ -127,10 +126,7 @@ Predictor bestPredictor(std::span<const Row> sample, std::span<const uint32_t> v
       bits += static_cast<uint64_t>(std::bit_width(zigzag(values[n] - predicted)));
       return values[n];
     });
-    if (bits < fewest) {
-      best = predictor;
-      fewest = bits;
-    }
+    if (bits < best.bits) best = {predictor, bits};
   }
   return best;
 }

@@ -82,8 +82,13 @@ void predictRows(Predictor predictor, std::span<const Row> rows, const uint32_t*
 /// A sample of `rows`, large enough to choose a predictor by.
 std::vector<Row> sampleOf(std::span<const Row> rows);
 
+struct PredictorChoice {
+  Predictor predictor = Predictor::kNone;
+  uint64_t bits = 0;  // of its residuals in the sample
+};
+
 /// The predictor whose residuals of `values` have the fewest bits, measured on `sample`.
-Predictor bestPredictor(std::span<const Row> sample, std::span<const uint32_t> values);
+PredictorChoice bestPredictor(std::span<const Row> sample, std::span<const uint32_t> values);
 
 /// Maps differences of small magnitude to small codes: 0, -1, 1, -2, 2, ... become 0, 1, 2, 3, 4, ...
 inline uint32_t zigzag(uint32_t difference) {

@@ -16,6 +16,19 @@ constexpr double kSlopeSteps = 8192;
 constexpr double kDeviationSteps = 4096;
 constexpr size_t kMaxRowBytes = 10;  // two varints of up to 32 bits
 
+// An array code whose predictor applies to the differences in time.
+constexpr uint8_t kInTime = 8;
+
+Predictor coded(Predictor predictor, bool in_time) {
+  return static_cast<Predictor>(static_cast<uint8_t>(predictor) | (in_time ? kInTime : 0));
+}
+bool isInTime(const ArrayCode& code) {
+  return (static_cast<uint8_t>(code.predictor) & kInTime) != 0;
+}
+ArrayCode spatialPart(const ArrayCode& code) {
+  return {static_cast<Predictor>(static_cast<uint8_t>(code.predictor) & ~kInTime), code.planes};
+}
+
 /// The values that codes stand for. Shared by encoder and decoder.
 struct Scale {
   explicit Scale(const ValuesHeader& header)
@@ -42,10 +55,61 @@ struct Scale {
   double lower, mean_step, slope_step, deviation_step;
 };
 
+/// The codes that the references have for an array, in the steps of the stream that they predict.
+class TimePrediction {
+ public:
+  TimePrediction(const ValuesHeader& header, const TimeReferences& references)
+      : scale_(header), references_(references) {
+    const auto& back = references.steps_back;
+    if (back[1] > back[0]) ratio_ = static_cast<double>(back[0]) / (back[1] - back[0]);
+  }
+
+  /// codes: [splat]
+  void predict(size_t array, std::span<uint32_t> codes) const {
+    const double step = array == 0   ? scale_.mean_step
+                        : array == 4 ? scale_.deviation_step
+                                     : scale_.slope_step;
+    const double least = array == 0 || array == 4 ? 0.0 : -kLargestCode;
+    const double most = array == 0 ? kMeanSteps : kLargestCode;
+    const double origin = array == 0 ? scale_.lower : 0.0;
+    const float* const first = arrayOf(0, array);
+    const float* const second = ratio_ > 0 ? arrayOf(1, array) : nullptr;
+    const auto value = [array](float stored) {
+      return array == 4 ? std::sqrt(double{stored}) : double{stored};
+    };
+    for (size_t n = 0; n < codes.size(); ++n) {
+      double expected = value(first[n]);
+      if (second) expected += (expected - value(second[n])) * ratio_;
+      const double code = step > 0 ? std::clamp((expected - origin) / step, least, most) : 0.0;
+      codes[n] = static_cast<uint32_t>(static_cast<int32_t>(std::lrint(code)));
+    }
+  }
+
+ private:
+  static constexpr double kLargestCode = 1 << 30;
+
+  const float* arrayOf(size_t reference, size_t array) const {
+    const VariableArrays<const float>& from = references_.values[reference];
+    const float* const arrays[] = {from.mean, from.slope0, from.slope1, from.slope2, from.variance};
+    return arrays[array];
+  }
+
+  const Scale scale_;
+  const TimeReferences& references_;
+  double ratio_ = 0;  // how far the change between the references goes on; 0: one reference
+};
+
+/// An array is predicted in time only where that takes clearly fewer bits: the estimate is no exact one.
+constexpr double kWorthwhile = 0.97;
+
 class ValuesEncoder {
  public:
-  ValuesEncoder(std::span<const Row> rows, std::span<SplatScalar> values)
-      : rows_(rows), values_(values), sample_(sampleOf(rows)), residuals_(values.size()) {
+  ValuesEncoder(std::span<const Row> rows, std::span<SplatScalar> values, const TimeReferences& references)
+      : rows_(rows),
+        values_(values),
+        references_(references),
+        sample_(sampleOf(rows)),
+        residuals_(values.size()) {
     for (auto& codes : codes_) codes.resize(values.size());
   }
 
@@ -54,10 +118,13 @@ class ValuesEncoder {
     quantise();
     bool across_rows = false;
     std::array<Predictor, 5> predictors;
+    std::array<bool, 5> in_time{};
     for (size_t a = 0; a < codes_.size(); ++a) {
-      predictors[a] = bestPredictor(sample_, codes_[a]);
+      predictors[a] = choosePredictor(a, in_time[a]);
       across_rows |= predictors[a] >= Predictor::kAbove;
     }
+    if (std::any_of(in_time.begin(), in_time.end(), [](bool used) { return used; }))
+      header_.steps_back = references_.steps_back;
     const Row whole{0, static_cast<uint32_t>(values_.size()), kNoRow};
     const std::span<const Row> rows = across_rows ? rows_ : std::span(&whole, 1);
     PlaneWriter planes;
@@ -68,7 +135,7 @@ class ValuesEncoder {
         residuals_[n] = zigzag(codes[n] - predicted);
         return codes[n];
       });
-      header_.arrays[a] = {predictors[a], planes.add(residuals_)};
+      header_.arrays[a] = {coded(predictors[a], in_time[a]), planes.add(residuals_)};
     }
     return planes.compress(std::as_bytes(std::span(&header_, 1)));
   }
@@ -108,6 +175,20 @@ class ValuesEncoder {
     }
   }
 
+  /// The predictor of an array. If it is one of the differences in time, these replace the codes.
+  Predictor choosePredictor(size_t array, bool& in_time) {
+    const PredictorChoice alone = bestPredictor(sample_, codes_[array]);
+    if (references_.steps_back[0] == 0) return alone.predictor;
+    std::vector<uint32_t>& differences = differences_;
+    differences.resize(values_.size());
+    TimePrediction(header_, references_).predict(array, differences);
+    for (size_t n = 0; n < differences.size(); ++n) differences[n] = codes_[array][n] - differences[n];
+    const PredictorChoice timed = bestPredictor(sample_, differences);
+    in_time = static_cast<double>(timed.bits) < kWorthwhile * static_cast<double>(alone.bits);
+    if (in_time) codes_[array].swap(differences);
+    return in_time ? timed.predictor : alone.predictor;
+  }
+
   void addRows(PlaneWriter& planes) {
     std::vector<std::byte> bytes;
     for (const Row& row : rows_) {
@@ -120,11 +201,20 @@ class ValuesEncoder {
 
   std::span<const Row> rows_;
   std::span<SplatScalar> values_;
+  const TimeReferences& references_;
   std::vector<Row> sample_;
   ValuesHeader header_{};
   std::array<std::vector<uint32_t>, 5> codes_;
-  std::vector<uint32_t> residuals_;
+  std::vector<uint32_t> residuals_, differences_;
 };
+
+ValuesHeader headerOf(std::span<const std::byte> bytes) {
+  ValuesHeader header;
+  if (bytes.size() < sizeof header)
+    throw Error("it ends in its header (found {} bytes, expected at least {})", bytes.size(), sizeof header);
+  std::memcpy(&header, bytes.data(), sizeof header);
+  return header;
+}
 
 std::vector<Row> rowsFrom(std::span<const std::byte> bytes, uint32_t count) {
   if (bytes.empty()) return {{0, count, kNoRow}};
@@ -152,34 +242,48 @@ bool allFinite(std::span<const float> values) {
 
 }  // namespace
 
-std::vector<std::byte> encodeValuesStream(std::span<const Row> rows, std::span<SplatScalar> values) {
-  return ValuesEncoder(rows, values).encode();
+std::array<uint8_t, 2> stepsBackOf(std::span<const std::byte> stream) {
+  const std::array<uint8_t, 2> back = headerOf(stream).steps_back;
+  if (back[1] != 0 && (back[0] == 0 || back[1] <= back[0])) throw Error("its header is invalid");
+  return back;
 }
 
-void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, const VariableArrays<float>& out) {
-  ValuesHeader header;
-  if (bytes.size() < sizeof header)
-    throw Error("it ends in its header (found {} bytes, expected at least {})", bytes.size(), sizeof header);
-  std::memcpy(&header, bytes.data(), sizeof header);
+std::vector<std::byte> encodeValuesStream(std::span<const Row> rows, std::span<SplatScalar> values,
+                                          const TimeReferences& references) {
+  return ValuesEncoder(rows, values, references).encode();
+}
+
+void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, const VariableArrays<float>& out,
+                        const TimeReferences& references) {
+  const ValuesHeader header = headerOf(bytes);
+  const TimePrediction in_time(header, references);
   if (header.rows_bytes > kMaxRowBytes * count) throw Error("its header is invalid");
   size_t unpacked = header.rows_bytes;
   for (const ArrayCode& array : header.arrays) {
-    if (!isPossible(array)) throw Error("its header is invalid");
+    const bool has_reference = header.steps_back[0] > 0 && references.steps_back == header.steps_back;
+    if (!isPossible(spatialPart(array)) || (isInTime(array) && !has_reference))
+      throw Error("its header is invalid");
     unpacked += size_t{array.planes} * count;
   }
   PlaneReader planes(bytes.subspan(sizeof header), unpacked);
   const std::vector<Row> rows = rowsFrom(planes.bytes(header.rows_bytes), count);
 
-  thread_local std::vector<uint32_t> scratch;
+  thread_local std::vector<uint32_t> scratch, expected;
   scratch.resize(count);
   uint32_t* codes = scratch.data();
   const Scale scale(header);
   const auto decode = [&](size_t array, float* values, auto value) {
     planes.values(header.arrays[array].planes, scratch);
     for (size_t n = 0; n < count; ++n) codes[n] = unzigzag(codes[n]);
-    if (header.arrays[array].predictor != Predictor::kNone)
-      predictRows(header.arrays[array].predictor, rows, codes,
+    const Predictor predictor = spatialPart(header.arrays[array]).predictor;
+    if (predictor != Predictor::kNone)
+      predictRows(predictor, rows, codes,
                   [codes](uint32_t n, uint32_t predicted) { return codes[n] += predicted; });
+    if (isInTime(header.arrays[array])) {
+      expected.resize(count);
+      in_time.predict(array, expected);
+      for (size_t n = 0; n < count; ++n) codes[n] += expected[n];
+    }
     for (size_t n = 0; n < count; ++n) values[n] = value(codes[n]);
     if (!allFinite({values, count})) throw Error("a value is not finite");
   };

@@ -9,7 +9,10 @@
 //   deviation   √variance in steps of 2^-12 of the span; 0 stays 0
 //
 // The stream contains the rows if a predictor uses them, so that it decodes without the geometry stream.
-// stream/FORMAT.md has every formula.
+//
+// In a series a stream may be predicted in time: the header says how many steps back its references are, and an
+// array's code whether its predictor applies to the codes or to their differences from what the references have
+// there, in this stream's steps. What decodes is the same either way. stream/FORMAT.md has every formula.
 #pragma once
 
 #include <array>
@@ -29,16 +32,28 @@ struct ValuesHeader {
   double slope_step, deviation_step;  //  8: in the scalar's unit
   uint32_t rows_bytes;                // 24: length of the varints, unpacked
   std::array<ArrayCode, 5> arrays;    // 28: mean, three slopes, deviation
-  uint8_t reserved[2];                // 38: zero
+  std::array<uint8_t, 2> steps_back;  // 38: of the first and the second reference in time; 0: none
 };                                    // 40
 static_assert(sizeof(ValuesHeader) == 40);
 
+/// The same brick's values at one or two earlier steps, to predict from: borrowed.
+struct TimeReferences {
+  std::array<uint8_t, 2> steps_back{};                  // 0: none; the second is further back
+  std::array<VariableArrays<const float>, 2> values{};  // of as many splats as the stream
+};
+
+/// How many steps back the references of a stream are: zeros where it has none. Untrusted bytes: throws Error if
+/// they hold no header, or a second reference that is not further back than the first.
+std::array<uint8_t, 2> stepsBackOf(std::span<const std::byte> stream);
+
 /// Encodes `values` and replaces them by the decoded values. `rows`: the rows of the brick's geometry
-/// (rowsOf()).
-std::vector<std::byte> encodeValuesStream(std::span<const Row> rows, std::span<SplatScalar> values);
+/// (rowsOf()). Predicts from `references` those arrays for which that takes fewer bits.
+std::vector<std::byte> encodeValuesStream(std::span<const Row> rows, std::span<SplatScalar> values,
+                                          const TimeReferences& references = {});
 
 /// Decodes untrusted bytes: throws Error unless they hold exactly `count` finite values. `out`: arrays of
-/// `count`.
-void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, const VariableArrays<float>& out);
+/// `count`. `references`: those that stepsBackOf() names.
+void decodeValuesStream(uint32_t count, std::span<const std::byte> bytes, const VariableArrays<float>& out,
+                        const TimeReferences& references = {});
 
 }  // namespace curvisplat

@@ -71,6 +71,7 @@ std::optional<BrickCache::Slot> BrickCache::makeSlot(uint32_t brick, uint32_t sp
   entry.epoch = epoch_;
   entry.block = block;
   entry.pins = 1;
+  entry.step = step_;
   std::byte* array = block;
   const auto place = [&](auto*& at) {
     at = reinterpret_cast<std::remove_reference_t<decltype(at)>>(array);
@@ -93,6 +94,18 @@ BrickCache::Statistics BrickCache::statistics() const {
 bool BrickCache::contains(uint32_t brick) const {
   const MutexLock lock(mutex_);
   return entries_.contains(brick);
+}
+
+void BrickCache::stepChanged() {
+  const MutexLock lock(mutex_);
+  CURVISPLAT_CHECK_OP(entries_.size(), ==, unpinned_.size());
+  ++step_;
+}
+
+bool BrickCache::isStale(uint32_t brick) const {
+  const MutexLock lock(mutex_);
+  const auto found = entries_.find(brick);
+  return found != entries_.end() && found->second.whole && found->second.step != step_;
 }
 
 void BrickCache::unpin(Entry& entry) {

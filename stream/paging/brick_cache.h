@@ -40,6 +40,14 @@ class BrickCache {
 
     GeometryArrays<const float> geometry() const;
     VariableArrays<const float> values() const;
+    /// Calls `decode` to fill the values anew if they are of an earlier step. One thread for each brick. If it
+    /// throws, they stay what they were.
+    template <typename Decode>
+    void refresh(const Decode& decode) const {
+      if (entry_->step == cache_->step_) return;
+      decode(entry_->values);
+      entry_->step = cache_->step_;
+    }
 
    private:
     friend class BrickCache;
@@ -79,6 +87,12 @@ class BrickCache {
 
   bool contains(uint32_t brick) const;
 
+  /// From now on the values of bricks that are here are of an earlier step; their geometry stays. Nothing may be
+  /// pinned.
+  void stepChanged();
+  /// Whether the brick is here with values of an earlier step.
+  bool isStale(uint32_t brick) const;
+
   struct Statistics {
     uint64_t hits = 0, misses = 0;  // of find()
     uint64_t evictions = 0;
@@ -99,6 +113,7 @@ class BrickCache {
     VariableArrays<float> values{};
     uint32_t pins = 0;
     bool whole = false;                    // filled: find() finds it
+    uint64_t step = 0;                     // whose values it has, in the cache's count
     std::list<Entry*>::iterator unpinned;  // in unpinned_, where pins is 0
   };
 
@@ -111,6 +126,7 @@ class BrickCache {
   std::unordered_map<uint32_t, Entry> entries_ GUARDED_BY(mutex_);
   std::list<Entry*> unpinned_ GUARDED_BY(mutex_);  // least recently used first
   uint64_t epoch_ GUARDED_BY(mutex_) = 0;
+  uint64_t step_ = 0;  // counts stepChanged(), which nothing runs beside
   Statistics statistics_ GUARDED_BY(mutex_);
 };
 

@@ -1,5 +1,6 @@
 #include "stream/paging/brick_source.h"
 
+#include <algorithm>
 #include <glm/common.hpp>
 #include <unordered_set>
 #include <utility>
@@ -55,7 +56,10 @@ void BrickSource::start(std::span<const BrickPart> parts, BrickPager::Unneeded u
 std::optional<BrickSource::Splats> BrickSource::take(uint64_t sequence, Scratch& scratch) {
   CURVISPLAT_CHECK_OP(sequence, <, parts_.size());
   const BrickPart& part = parts_[sequence];
-  if (pins_[sequence]) return splatsOf(*std::exchange(pins_[sequence], {}), part);
+  if (pins_[sequence]) {
+    refresh(*pins_[sequence], part.brick, scratch);
+    return splatsOf(*std::exchange(pins_[sequence], {}), part);
+  }
   return read(part, misses_[sequence], scratch);
 }
 
@@ -86,6 +90,27 @@ std::optional<BrickSource::Splats> BrickSource::read(const BrickPart& part, uint
   scratch.values.resize(splats);
   decode(part.brick, *bytes, arraysOf(scratch.geometry), arraysOf(scratch.values), scratch);
   return splatsOf(scratch, part);
+}
+
+/// The values of a brick whose geometry is there, of this step. They are read by the worker: a few pages, which the
+/// prefetch of the step has usually brought into memory.
+void BrickSource::refresh(const BrickCache::Pin& pin, uint32_t brick, Scratch& scratch) const {
+  pin.refresh([&](const VariableArrays<float>& values) {
+    cache_.readVariable(brick, variable_, scratch.values, &scratch.times);
+    const SplatVariable& read = scratch.values;
+    std::copy(read.mean.begin(), read.mean.end(), values.mean);
+    std::copy(read.slope0.begin(), read.slope0.end(), values.slope0);
+    std::copy(read.slope1.begin(), read.slope1.end(), values.slope1);
+    std::copy(read.slope2.begin(), read.slope2.end(), values.slope2);
+    std::copy(read.variance.begin(), read.variance.end(), values.variance);
+  });
+}
+
+void BrickSource::stepChanged() {
+  pager_.stop();
+  pins_.clear();
+  pager_.stepChanged();
+  cached_.stepChanged();
 }
 
 /// Without the pager.
@@ -184,20 +209,32 @@ void BrickSource::startPrefetch(std::span<const BrickPart> parts) {
   parts_.clear();
   pins_.clear();
   to_prefetch_.clear();
+  to_refresh_.clear();
   uint64_t bytes = 0;
   std::unordered_set<uint32_t> seen;
   for (const uint32_t brick : bricks) {
     if (!seen.insert(brick).second) continue;
     bytes += BrickCache::charge(cache_.bricks()[brick].splats);
     if (bytes > cached_.capacity()) break;
-    if (!cached_.contains(brick)) to_prefetch_.push_back(brick);
+    if (!cached_.contains(brick))
+      to_prefetch_.push_back(brick);
+    else if (cached_.isStale(brick))
+      to_refresh_.push_back(brick);
   }
   next_prefetch_ = 0;
+  prefetch_stopped_ = false;
   pager_.start(to_prefetch_);
 }
 
 bool BrickSource::prefetchNext(Scratch& scratch) {
-  const uint64_t sequence = next_prefetch_++;
+  uint64_t sequence = next_prefetch_++;
+  if (sequence < to_refresh_.size()) {
+    if (prefetch_stopped_) return false;
+    const uint32_t brick = to_refresh_[sequence];
+    if (const auto pin = cached_.find(brick)) refresh(*pin, brick, scratch);
+    return true;
+  }
+  sequence -= to_refresh_.size();
   if (sequence >= to_prefetch_.size()) return false;
   const std::optional<PagedBrick> bytes = await(sequence, scratch);
   if (!bytes) return false;
@@ -211,6 +248,7 @@ bool BrickSource::prefetchNext(Scratch& scratch) {
 }
 
 void BrickSource::stop() {
+  prefetch_stopped_ = true;
   pager_.stop();
 }
 

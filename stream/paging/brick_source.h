@@ -73,6 +73,10 @@ class BrickSource {
   /// all ancestors are damaged. Throws Error if the disk fails.
   Splats standIn(const BrickPart& part, Scratch& scratch) const;
 
+  /// The cache is at another step of the same geometry. The geometry of decoded bricks is kept; their values are
+  /// decoded anew when they are taken. Nobody may be in take() or prefetchNext() any more. Throws Error.
+  void stepChanged();
+
   /// Begins to fill the cache with the bricks of `parts`, in their order, as far as they fit.
   void startPrefetch(std::span<const BrickPart> parts);
   /// Takes the next brick of the prefetch. False if none is left, if the cache is full, or after stop().
@@ -89,6 +93,7 @@ class BrickSource {
 
  private:
   std::optional<Splats> read(const BrickPart& part, uint64_t miss, Scratch& scratch);
+  void refresh(const BrickCache::Pin& pin, uint32_t brick, Scratch& scratch) const;
   Splats readAlone(const BrickPart& part, Scratch& scratch) const;
   Splats splatsOf(BrickCache::Pin pin, const BrickPart& part) const;
   Splats splatsOf(const Scratch& scratch, const BrickPart& part) const;
@@ -105,9 +110,10 @@ class BrickSource {
   std::vector<BrickPart> parts_;                      // [sequence]
   std::vector<std::optional<BrickCache::Pin>> pins_;  // [sequence]
   std::vector<uint32_t> misses_;                      // [sequence]: place among those read
-  std::vector<uint32_t> to_prefetch_;
+  std::vector<uint32_t> to_prefetch_, to_refresh_;
   uint64_t reads_ = 0, hits_ = 0;  // bricks that the pager was asked for, and that it was not
   std::atomic<uint64_t> next_prefetch_ = 0;
+  std::atomic<bool> prefetch_stopped_ = false;
   PagerStatistics before_;
 };
 

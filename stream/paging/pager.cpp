@@ -56,6 +56,7 @@ BrickPager::BrickPager(const CacheReader& cache, size_t variable, const PagerOpt
     : cache_(cache),
       variable_(variable),
       depth_(options.queue_depth),
+      direct_(options.direct),
       capacity_(roundedToPages(options.buffer_bytes)),
       files_{std::make_unique<DirectFile>(cache.geometryPath(), options.direct),
              std::make_unique<DirectFile>(cache.valuesPath(variable), options.direct)},
@@ -104,6 +105,15 @@ void BrickPager::start(std::vector<uint32_t> bricks, Unneeded unneeded) {
   for (const uint32_t brick : bricks_) extents_.push_back(extentsOf(cache_, variable_, brick));
   stopped_ = false;
   reads_->wake();
+}
+
+void BrickPager::stepChanged() {
+  MutexLock lock(mutex_);
+  stopped_ = true;
+  while (!failure_ && reads_under_way_ > 0) idle_.wait(lock);
+  if (failure_) std::rethrow_exception(failure_);
+  CURVISPLAT_CHECK_OP(lent_, ==, 0u);
+  files_[1] = std::make_unique<DirectFile>(cache_.valuesPath(variable_), direct_);
 }
 
 void BrickPager::stop() {

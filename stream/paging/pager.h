@@ -109,6 +109,9 @@ class BrickPager {
   /// `unneeded`, if there is one, is asked on the pager's thread, just before a brick would be read, and not
   /// after stop().
   void start(std::vector<uint32_t> bricks, Unneeded unneeded = {});
+  /// The cache is at another step of the same geometry: reads its values from the next start() on. What was begun
+  /// before is stopped, and all of it must have been given back. Throws Error.
+  void stepChanged();
   /// Waits for the `sequence`-th of the bricks; each once, by any thread. Nothing once stopped. Throws Error
   /// where reading broke off altogether.
   std::optional<PagedBrick> take(uint64_t sequence);
@@ -157,6 +160,7 @@ class BrickPager {
   const CacheReader& cache_;
   const size_t variable_;
   const unsigned depth_;
+  const bool direct_;
   const uint64_t capacity_;
   std::array<std::unique_ptr<DirectFile>, kBrickStreams> files_;
   struct Free {

@@ -128,8 +128,8 @@ void run(std::span<const std::byte> bytes) {
   writeTables(tables, header, geometry_bytes, manifest);
 
   const std::vector<Brick> bricks = readBricks(fuzzFolder(), manifest);
-  const std::vector<BrickVariable> variables =
-      readVariableTable(InputFile(fuzzFolder() / "var.0.bin"), manifest, bricks);
+  const InputFile values(fuzzFolder() / "var.0.bin");
+  const std::vector<BrickVariable> variables = readVariableTable(values, checkFile(values, manifest), bricks);
   const std::vector<ValueBounds> subtrees = subtreeBounds(bricks, variables);
   const CutTree tree{root, bricks, variables, subtrees};
   const Camera camera =

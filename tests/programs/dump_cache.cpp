@@ -34,8 +34,8 @@ void write(const std::vector<T>& values) {
   std::fwrite(values.data(), sizeof(T), values.size(), stdout);
 }
 
-void dump(const fs::path& cache) {
-  const CacheReader reader(cache);
+void dump(const fs::path& cache, uint64_t step) {
+  const CacheReader reader(cache, step);
   SplatGeometry g;
   SplatVariable v;
   std::vector<NodeRun> runs;
@@ -140,15 +140,15 @@ void make(const fs::path& folder) {
 
 int main(int argc, char** argv) {
   const bool is_making = argc == 3 && std::string_view(argv[1]) == "--make";
-  if (!is_making && argc != 2) {
-    fmt::print(stderr, "usage: dump_cache CACHE | dump_cache --make FOLDER\n");
+  if (!is_making && argc != 2 && argc != 3) {
+    fmt::print(stderr, "usage: dump_cache CACHE [STEP] | dump_cache --make FOLDER\n");
     return 2;
   }
   try {
     if (is_making)
       curvisplat::make(argv[2]);
     else
-      curvisplat::dump(argv[1]);
+      curvisplat::dump(argv[1], argc == 3 ? std::stoull(argv[2]) : 0);
     return std::fflush(stdout) == 0 ? 0 : 1;
   } catch (const std::exception& error) {
     fmt::print(stderr, "dump_cache: {}\n", error.what());

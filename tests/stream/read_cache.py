@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""read_cache.py CACHE: prints a splat cache's octree and the first splats of every brick.
+"""read_cache.py CACHE [STEP]: prints a splat cache's octree and the first splats of every brick.
 
 Written from stream/FORMAT.md alone, which shows that the page is complete. It shares no code with the program;
 read_cache_test.py compares the two. Needs Debian's python3-numpy, python3-zstandard and python3-xxhash.
@@ -45,6 +45,20 @@ def varints(data):
     need(shift == 0, "end of a varint")
 
 
+def expected(array, header, references):
+    """The codes q that the references of a values stream have, in its own steps."""
+    lower, upper, slope_step, deviation_step = header
+    b, values = references
+    if array == 4:
+        values = [np.sqrt(value) for value in values]
+    e = values[0] if len(values) == 1 else values[0] + (values[0] - values[1]) * (b[0] / (b[1] - b[0]))
+    origin, step = (lower, (upper - lower) / 65535) if array == 0 else (0.0, deviation_step if array == 4 else slope_step)
+    if not step > 0:
+        return np.zeros(len(e), np.uint64)
+    low, high = 0 if array in (0, 4) else -2.0**30, 65535 if array == 0 else 2.0**30
+    return np.rint(np.clip((e - origin) / step, low, high)).astype(np.int64).astype(np.uint64)
+
+
 def predicted(predictor, rows, residuals):
     """The values v of an array. Rows are (first splat, splats, first splat of the row above or None)."""
     v = []
@@ -68,9 +82,9 @@ def predicted(predictor, rows, residuals):
 
 class Contents:
     """The unpacked frame of a stream: its varints, and its arrays one after another."""
-    def __init__(self, frame, varint_bytes, codes, count):
+    def __init__(self, frame, varint_bytes, codes, count, timed=False):
         self.codes, self.at, self.count, self.rows = list(codes), varint_bytes, count, None
-        need(all(predictor <= 4 and planes <= 4 for predictor, planes in self.codes), "array code")
+        need(all((predictor & ~8 if timed else predictor) <= 4 and planes <= 4 for predictor, planes in self.codes), "array code")
         size = varint_bytes + sum(planes for _, planes in self.codes) * count
         need(zstandard.frame_content_size(frame) == size, "size of a frame")
         self.data = zstandard.ZstdDecompressor().decompress(frame)
@@ -83,12 +97,13 @@ class Contents:
         self.at += planes * self.count
         return predictor, u.view("<u4")[:, 0].astype(np.uint64)
 
-    def values(self):
+    def values(self, in_time=None):
         predictor, u = self.elements()
-        return predicted(predictor, self.rows, [unzigzag(code) for code in u.tolist()])
+        values = predicted(predictor & 7, self.rows, [unzigzag(code) for code in u.tolist()])
+        return (values + in_time()) & np.uint64(0xFFFFFFFF) if predictor & 8 else values
 
-    def signed(self):
-        return self.values().astype(np.uint32).view(np.int32).astype(np.float64)
+    def signed(self, in_time=None):
+        return self.values(in_time).astype(np.uint32).view(np.int32).astype(np.float64)
 
     def raw(self):
         return (self.values() | self.values() << np.uint64(32)).view(np.float64)
@@ -165,10 +180,15 @@ def decode_geometry(data, brick, root):
     return out
 
 
-def decode_values(data, count):
+def decode_values(data, count, reference):
+    """`reference(steps back)`: the values of the brick there."""
     lower, upper, slope_step, deviation_step, varint_bytes = struct.unpack_from("<ffddI", data)
     need(varint_bytes <= 10 * count, "values header")
-    contents = Contents(data[40:], varint_bytes, zip(data[28:38:2], data[29:38:2]), count)
+    back = [b for b in data[38:40] if b]
+    need(back == sorted(set(back)) and (data[38] or not data[39]), "reference")
+    contents = Contents(data[40:], varint_bytes, zip(data[28:38:2], data[29:38:2]), count, bool(back))
+    earlier = [reference(b) for b in back]
+    header = lower, upper, slope_step, deviation_step
     rows, first = [], 0
     for length, distance in zip(contents.varints[::2], contents.varints[1::2]):
         need(length > 0 and distance <= first, "row")
@@ -176,21 +196,68 @@ def decode_values(data, count):
         first += length
     need(first == (count if varint_bytes else 0), "number of values")
     contents.rows = rows or [(0, count, None)]
-    m, s0, s1, s2, d = (contents.signed() for _ in range(5))
+    m, s0, s1, s2, d = (contents.signed(lambda a=a: expected(a, header, (back, [e[VALUES[a]].astype(np.float32).astype(np.float64)
+                                                                                for e in earlier])))
+                        for a in range(5))
     steps = lower + m * ((upper - lower) / 65535), s0 * slope_step, s1 * slope_step, s2 * slope_step
     return dict(zip(VALUES, (*steps, (d * deviation_step) ** 2)))
 
 
 class Cache:
     """Opens a cache and verifies all of it but the streams, which are verified when they are read."""
-    def __init__(self, folder):
+    def __init__(self, folder, step=0):
         self.folder, self.data, self.tables = pathlib.Path(folder), {}, {}
+        self.step, self.steps = step, None
         text = (self.folder / "manifest.json").read_text(encoding="utf-8")
         self.manifest = json.loads(text)
         version, requires = self.manifest["version"], self.manifest.get("requires", [])
         need(self.manifest["format"] == "curvisplat splat cache" and version == (2 if requires else 1), "format version")
-        need(set(requires) <= {"border-faces"}, "required feature")
+        need(set(requires) <= {"border-faces", "steps"}, "required feature")
         self.files = {file["name"]: file for file in self.manifest["files"]}
+        if "steps" in requires:
+            self.open_step(text)
+            return
+        self.open(text)
+
+    def open_step(self, text):
+        """The geometry of the step, and its values instead of those of the geometry's first step."""
+        size, v = self.files["steps.bin"]["size"], len(self.manifest["variables"])
+        data = (self.folder / "steps.bin").read_bytes()[:size]
+        self.verify("steps.bin", data)
+        need(struct.unpack_from("<8sII", data) == (b"CVSsteps", 1, v), "header of steps.bin")
+        need(len(data) > 16 and (len(data) - 16) % (32 + 32 * v) == 0, "size of steps.bin")
+        self.steps = [struct.unpack_from("<dIIQQ" + "ddQQ" * v, data, at) for at in range(16, len(data), 32 + 32 * v)]
+        geometry = self.steps[self.step][1]
+        self.first = next(s for s, record in enumerate(self.steps) if record[1] == geometry)
+        if geometry:
+            self.folder /= f"geometry.{geometry}"
+            raw = (self.folder / "manifest.json").read_bytes()
+            need(checksum(raw) == self.steps[self.step][3], "checksum of a geometry")
+            text = raw.decode()
+            self.manifest = json.loads(text)
+            self.files = {file["name"]: file for file in self.manifest["files"]}
+        self.open(text)
+        for v, variable in enumerate(self.manifest["variables"]):
+            variable["min"], variable["max"] = self.steps[self.step][5 + 4 * v:7 + 4 * v]
+
+    def values_name(self, number, step):
+        return f"var.{number}.bin" if self.steps is None or step == self.first else f"var.{number}.{step}.bin"
+
+    def table(self, number, step):
+        """The table of a variable at a step, which is loaded."""
+        name, count = self.values_name(number, step), self.manifest["bricks"]
+        if self.steps is not None:
+            v = [variable["number"] for variable in self.manifest["variables"]].index(number)
+            size, digest = self.steps[step][7 + 4 * v:9 + 4 * v]
+            self.files[name] = {"name": name, "size": size, "checksum": f"{digest:016x}"}
+        data = self.load(name)
+        *header, table = struct.unpack_from("<8sIIQQ", data)
+        need(header == [b"CVSvalue", 1, 40, count] and len(data) == table + 40 * count, f"header of {name}")
+        self.verify(name, data[:32] + data[table:])
+        return [dict(extent=(f[0], f[2], f[1]), min=f[3], max=f[4], slope=f[5], deviation=f[6])
+                for f in struct.iter_unpack("<QQIffffI", data[table:])]
+
+    def open(self, text):
         if "checksum" in self.manifest:
             packed = re.sub(r'("(?:\\.|[^"\\])*")|\s+', lambda match: match[1] or "", text)
             packed = re.sub(r',"checksum":"[0-9a-f]{16}"}$', "}", packed)
@@ -206,13 +273,7 @@ class Cache:
         self.load(self.geometry_name)
         self.verify(self.geometry_name, b"".join(struct.pack("<Q", brick["extent"][2]) for brick in self.bricks))
         for number in self.manifest["steps"][0]["variables"]:
-            name = f"var.{number}.bin"
-            data = self.load(name)
-            *header, table = struct.unpack_from("<8sIIQQ", data)
-            need(header == [b"CVSvalue", 1, 40, count] and len(data) == table + 40 * count, f"header of {name}")
-            self.verify(name, data[:32] + data[table:])
-            self.tables[number] = [dict(extent=(f[0], f[2], f[1]), min=f[3], max=f[4], slope=f[5], deviation=f[6])
-                                   for f in struct.iter_unpack("<QQIffffI", data[table:])]
+            self.tables[number] = self.table(number, self.step)
 
     def load(self, name):
         self.data[name] = (self.folder / name).read_bytes()
@@ -231,13 +292,19 @@ class Cache:
         data = self.stream(self.geometry_name, self.bricks[n]["extent"])
         return decode_geometry(data, self.bricks[n], self.manifest["root"])
 
-    def values(self, number, n):
-        data = self.stream(f"var.{number}.bin", self.tables[number][n]["extent"])
-        return decode_values(data, self.bricks[n]["splats"])
+    def values(self, number, n, step=None):
+        step = self.step if step is None else step
+        table = self.tables[number] if step == self.step else self.table(number, step)
+        data = self.stream(self.values_name(number, step), table[n]["extent"])
+
+        def reference(back):
+            need(back <= step and self.steps[step - back][1] == self.steps[step][1], "reference")
+            return self.values(number, n, step - back)
+        return decode_values(data, self.bricks[n]["splats"], reference)
 
 
-def main(folder):
-    cache = Cache(folder)
+def main(folder, step=0):
+    cache = Cache(folder, int(step))
     for n, brick in enumerate(cache.bricks):
         print(f"brick {n}: level {brick['level']}, cell {brick['at']}, {brick['splats']} splats")
         geometry, values = cache.geometry(n), [cache.values(number, n) for number in cache.tables]

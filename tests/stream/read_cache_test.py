@@ -69,7 +69,7 @@ def compare(cache, dump, seen):
         seen |= {f"geometry predictor {predictor}" for predictor in header[32:74:2]}
         seen |= {f"flag {flag}" for flag in (1, 2, 4) if header[1] & flag}
         for number, table in cache.tables.items():
-            header = cache.stream(f"var.{number}.bin", table[n]["extent"])[:40]
+            header = cache.stream(cache.values_name(number, cache.step), table[n]["extent"])[:40]
             seen |= {f"values predictor {predictor}" for predictor in header[28:38:2]}
             seen |= {"values with rows" if any(header[24:28]) else "values without rows"}
     if dump.read(1):

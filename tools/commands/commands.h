@@ -14,6 +14,7 @@ void addBench(CLI::App& app);
 void addGenerate(CLI::App& app);
 void addCompare(CLI::App& app);
 void addColormaps(CLI::App& app);
+void addExport(CLI::App& app);
 /// The last one: it knows those before it.
 void addManual(CLI::App& app);
 

@@ -18,6 +18,7 @@
 #include "stream/base/progress.h"
 #include "tools/commands/add_scalar.h"
 #include "tools/commands/commands.h"
+#include "tools/commands/convert_series.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/grid_options.h"
 #include "tools/options/option_parsers.h"
@@ -106,14 +107,46 @@ void runConvert(ConvertArguments arguments) {
   if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, numbers);
 }
 
+void addSeriesOptions(CLI::App& command, ConvertArguments& arguments) {
+  constexpr const char* kGroup = "Time steps";
+  command
+      .add_option("--steps", arguments.steps,
+                  "Convert these time steps: all, FIRST:LAST or FIRST:LAST:STRIDE, counted from 0")
+      ->group(kGroup);
+  command.add_option("--every", arguments.every, "Convert every N-th time step")
+      ->check(CLI::Range(uint64_t{1}, uint64_t{1'000'000}))
+      ->group(kGroup);
+  command
+      .add_flag("--keep-going", arguments.keep_going,
+                "Leave out time steps that do not fit: other blocks, a missing scalar, a time that goes back")
+      ->group(kGroup);
+  command
+      .add_flag("--add-steps", arguments.adds_steps,
+                "Add the time steps of these files to the cache --to, after its last")
+      ->group(kGroup);
+  CLI::Option* const follow =
+      command
+          .add_flag(
+              "--follow", arguments.follows,
+              "Go on converting the files that match the pattern while a simulation writes them; ends with "
+              "Ctrl-C or --until")
+          ->group(kGroup);
+  command.add_option("--until", arguments.until, "End --follow when the cache has this many time steps")
+      ->check(CLI::Range(uint64_t{1}, uint64_t{1'000'000}))
+      ->needs(follow)
+      ->group(kGroup);
+}
+
 }  // namespace
 
 void addConvert(CLI::App& app) {
   auto arguments = std::make_shared<ConvertArguments>();
   CLI::App* command = app.add_subcommand("convert", "Convert a grid to a splat cache, in bounded memory");
   command->add_option("GRID", arguments->grid.grid, "Grid file: PLOT3D, VTK, CGNS or NetCDF")->required();
-  command->add_option("SOLUTION", arguments->grid.solutions,
-                      "PLOT3D solution (Q) and function files of the grid");
+  command->add_option(
+      "SOLUTION", arguments->grid.solutions,
+      "PLOT3D solution (Q) and function files of the grid. Numbered files are time steps: q.0 q.1 "
+      "..., or a quoted pattern such as 'q.*' or 'run_%04d.vts'");
   command->add_option("-o,--output", arguments->output, "Splat cache to write: a directory NAME.splats");
   command
       ->add_option("--scalar", arguments->scalars,
@@ -126,7 +159,8 @@ void addConvert(CLI::App& app) {
                    "Scalar to add to the cache --to, which was built from this grid; repeatable")
       ->take_all()
       ->allow_extra_args(false);
-  command->add_option("--to", arguments->to, "Splat cache that --add-scalar changes");
+  command->add_option("--to", arguments->to, "Splat cache that --add-scalar or --add-steps changes");
+  addSeriesOptions(*command, *arguments);
   command->add_option("--blank", arguments->blank_value, "Treat samples with this value as blanked");
   command->add_option(
       "--memory", arguments->memory,
@@ -146,6 +180,7 @@ void addConvert(CLI::App& app) {
   addGasOptions(*command, arguments->gas);
   command->callback([arguments] {
     takeScalarsFromSolutions(*arguments);
+    if (isSeries(*arguments)) return runConvertSeries(*arguments);
     const bool adds = !arguments->added_scalars.empty() || !arguments->to.empty();
     adds ? runAddScalar(*arguments) : runConvert(*arguments);
   });

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -22,7 +23,11 @@ struct GenerateOptions {
   std::string size;
   std::string prefix;
   std::optional<double> clustering;
+  std::optional<uint64_t> steps;
+  bool moving = false;
 };
+
+constexpr double kStepsPerUnitOfTime = 50;  // in which the wake's vortices move by a wave length
 
 SceneGridSize parseSize(const std::string& text) {
   SceneGridSize size;
@@ -38,7 +43,32 @@ SceneGridSize parseSize(const std::string& text) {
   return size;
 }
 
+/// The files of each time step: PREFIX_0000.fun, ... and, unless the grid moves, one PREFIX.xyz.
+void generateSteps(const GenerateOptions& options) {
+  const SceneGridSize size = parseSize(options.size);
+  Progress progress{progressBar()};
+  uint64_t nodes = 0;
+  double seconds = 0;
+  for (uint64_t step = 0; step < *options.steps; ++step) {
+    const SceneTime time{static_cast<double>(step) / kStepsPerUnitOfTime, options.moving};
+    const SceneGridSource source(makeScenesAt(options.scene, options.clustering, time), size);
+    const auto paths = writePlot3d(source, fmt::format("{}_{:04}", options.prefix, step), progress);
+    if (!options.moving) {
+      if (step == 0)
+        std::filesystem::rename(paths[0], options.prefix + ".xyz");
+      else
+        std::filesystem::remove(paths[0]);
+    }
+    nodes += progress.phases().back().steps;
+    seconds += progress.phases().back().seconds;
+  }
+  fmt::print("{}{}\n{}_%04d.fun\n", options.prefix, options.moving ? "_%04d.xyz" : ".xyz", options.prefix);
+  fmt::print("{} nodes of {} in {} steps, in {:.1f} s\n", nodes, options.scene, *options.steps, seconds);
+}
+
 void generate(const GenerateOptions& options) {
+  if (options.steps) return generateSteps(options);
+  if (options.moving) throw UsageError("--moving needs --steps");
   const SceneGridSource source(makeScenes(options.scene, options.clustering), parseSize(options.size));
   Progress progress{progressBar()};
   const auto paths = writePlot3d(source, options.prefix, progress);
@@ -62,6 +92,12 @@ void addGenerate(CLI::App& app) {
   command->add_option(
       "--clustering", options->clustering,
       "Clustering B: the outermost cells along j are about e^B times as long as the innermost");
+  command
+      ->add_option(
+          "--steps", options->steps,
+          "Time steps of the wake, whose vortices move: PREFIX.xyz, PREFIX_0000.fun, PREFIX_0001.fun, ...")
+      ->check(CLI::Range(uint64_t{1}, uint64_t{9999}));
+  command->add_flag("--moving", options->moving, "The grid moves with time: PREFIX_0000.xyz, ...");
   command->callback([options] { generate(*options); });
 }
 

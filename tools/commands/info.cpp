@@ -20,8 +20,10 @@
 #include "stream/model/kernel.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/info_grid.h"
+#include "tools/commands/info_steps.h"
 #include "tools/commands/info_system.h"
 #include "tools/options/grid_options.h"
+#include "tools/options/step_arguments.h"
 #include "tools/output/progress_bar.h"
 
 namespace curvisplat {
@@ -37,6 +39,7 @@ struct InfoOptions {
   bool verify = false;
   bool system = false;
   std::vector<double> point;  // empty, or x, y, z
+  StepArguments steps;
 };
 
 struct LevelSummary {
@@ -96,7 +99,7 @@ Findings examine(const CacheReader& reader, const InfoOptions& options) {
   Findings found;
   if (options.verify) {
     Progress progress{progressBar()};
-    found.verification = verifyCache(reader, &progress);
+    found.verification = verifySteps(reader, progress);
   }
   if (!options.point.empty()) {
     std::vector<size_t> variables(reader.manifest().variables.size());
@@ -109,6 +112,10 @@ Findings examine(const CacheReader& reader, const InfoOptions& options) {
 void printAsJson(const CacheReader& reader, const InfoOptions& options, const Findings& found) {
   const Manifest& manifest = reader.manifest();
   Json json = Json::parse(manifest.toJson());
+  if (reader.series().steps.size() > 1) {
+    json["steps"] = stepsAsJson(reader);
+    json["series_bytes"] = seriesBytes(reader);
+  }
   json["bytes"] = totalBytes(manifest);
   json["bytes_per_node"] = bytesPerSample(manifest, totalBytes(manifest));
   json["bricks_by_level"] = Json::array();
@@ -158,7 +165,7 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
   fmt::print("samples    {} at {} in {} blocks, {} blanked\n", m.nodes, m.cells ? "cell centres" : "nodes",
              m.blocks.size(), m.blanked_nodes);
   fmt::print("splats     {} at the finest level\n", m.splats);
-  fmt::print("steps      {}\n", m.steps.size());
+  printSteps(reader);
   for (const VariableInfo& variable : m.variables)
     fmt::print("scalar     {} {}: {:.6g} .. {:.6g}\n", variable.name,
                variable.unit.empty() ? "" : "[" + variable.unit + "]", variable.min, variable.max);
@@ -173,7 +180,10 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
   fmt::print("{:<18} {:>12} {:>18.3f}\n", "all", totalBytes(m), bytesPerSample(m, totalBytes(m)));
   if (!options.point.empty()) printProbe(reader, options, found);
   if (options.verify && found.verification.findings.empty())
-    fmt::print("\nverified: all {} bricks are intact\n", m.bricks);
+    fmt::print("\nverified: all {} bricks are intact{}\n", m.bricks,
+               reader.series().steps.size() > 1
+                   ? fmt::format(", at all {} time steps", reader.series().steps.size())
+                   : "");
   for (const std::string& finding : found.verification.findings) fmt::print("finding: {}\n", finding);
   for (const std::string& note : found.verification.notes) fmt::print("note: {}\n", note);
 }
@@ -182,7 +192,7 @@ void printCacheInfo(const InfoOptions& options) {
   if (!options.grid.solutions.empty())
     throw UsageError("{}: is a splat cache, but solution files were given as well; give only the cache",
                      options.grid.grid.string());
-  const CacheReader reader(options.grid.grid);
+  const CacheReader reader = openAtStep(options.grid.grid, options.steps);
   const Findings found = examine(reader, options);
   if (options.json)
     printAsJson(reader, options, found);
@@ -222,6 +232,7 @@ void addInfo(CLI::App& app) {
                    "Print the values at x,y,z and the sample (block, i, j, k) they come from")
       ->delimiter(',')
       ->expected(3);
+  addStepOptions(*info, options->steps, "Time steps");
   addGridOptions(*info, options->grid);
   addGasOptions(*info, options->gas);
   info->callback([options] { printInfo(*options); });

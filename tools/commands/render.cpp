@@ -16,6 +16,7 @@
 #include "render/annotate/annotations.h"
 #include "render/colour/transfer_function.h"
 #include "render/frame/frame.h"
+#include "render/frame/step_player.h"
 #include "render/image/image.h"
 #include "render/image/image_file.h"
 #include "stream/base/error.h"
@@ -30,6 +31,7 @@
 #include "tools/options/option_parsers.h"
 #include "tools/options/picture_choice.h"
 #include "tools/options/scalar_arguments.h"
+#include "tools/options/step_arguments.h"
 #include "tools/options/surface_arguments.h"
 #include "tools/output/frame_output.h"
 #include "tools/output/output_paths.h"
@@ -47,6 +49,7 @@ struct RenderArguments {
   CameraArguments camera;
   ScalarArguments scalar;
   SurfaceArguments surfaces;
+  StepArguments steps;
   std::string size = "600x600", background = "white";
   std::string classify = "pixel", scale = "1,1,1", backend = "auto", memory = "512M";
   std::string lod_pixels = "1";
@@ -58,6 +61,10 @@ struct RenderArguments {
   bool keep_going = false;
   Annotations annotations;
 };
+
+bool severalFrames(const RenderArguments& arguments) {
+  return arguments.camera.moves() || arguments.steps.severalSteps();
+}
 
 WorldBox parseClipBox(const std::string& text) {
   const auto n = parseNumbers("--clip-box", text, "x0,x1,y0,y1,z0,z1");
@@ -141,7 +148,7 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
   checkCameraArguments(arguments.camera);
   checkFunctionArguments(arguments.scalar);
   checkSurfaceArguments(arguments.surfaces);
-  checkOutputName(arguments.output, arguments.camera.moves(), size);
+  checkOutputName(arguments.output, severalFrames(arguments), size);
   if (arguments.frame_rate && !isMovieName(arguments.output))
     throw UsageError("--frame-rate needs a movie: -o NAME.mp4");
   if (arguments.background == "transparent" && arguments.output.extension() != ".png" &&
@@ -152,11 +159,12 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
   std::vector<std::filesystem::path> others{arguments.cache, arguments.camera.path,
                                             arguments.scalar.transfer_function.value_or("")};
   checkOutputFile("-o", arguments.output, others);
-  if (arguments.camera.moves() && !isMovieName(arguments.output)) {
+  if (severalFrames(arguments) && !isMovieName(arguments.output)) {
     const FrameNames names(arguments.output);
     checkOutputFolder("-o", names.of(std::max<uint64_t>(arguments.camera.frames.value_or(1), 1) - 1));
+    const uint64_t most = arguments.steps.severalSteps() ? kMaxFrames : arguments.camera.frameCount();
     const auto check_other = [&](const char* option, const std::filesystem::path& other) {
-      if (names.include(linkTarget(other), arguments.camera.frameCount()))
+      if (names.include(linkTarget(other), most))
         throw Error("{} {}: a frame of -o would overwrite it; choose another name", option, other.string());
     };
     check_other("--first-image", arguments.first_image);
@@ -185,18 +193,18 @@ uint64_t outputBytes(const RenderArguments& arguments, ImageSize picture) {
 /// Draws one frame after another and collects the report. Throws Interrupted after progress.stop().
 class FrameRun {
  public:
-  FrameRun(const RenderArguments& arguments, const Manifest& manifest, FrameRenderer& renderer,
+  FrameRun(const RenderArguments& arguments, const Manifest& manifest, StepPlayer& player,
            FrameOutput& output, RenderReport& report, Progress& progress)
       : arguments_(arguments),
         manifest_(manifest),
-        renderer_(renderer),
+        player_(player),
         output_(output),
         report_(report),
         progress_(progress) {}
 
   /// Pictures that were written are kept if a later frame fails.
   void draw(const CameraMotion& motion) {
-    const bool moves = arguments_.camera.moves();
+    const bool moves = severalFrames(arguments_);
     if (moves) progress_.begin("drawing", motion.frames, "frames");
     for (uint64_t number = 0; number < motion.frames; ++number) {
       Progress of_frame;
@@ -220,10 +228,11 @@ class FrameRun {
 
  private:
   void draw(uint64_t number, const CameraMotion& motion, Progress& progress) {
+    player_.goTo(motion.step(number));
     const Camera camera = motion.camera(number);
     FrameStatistics statistics;
     if (number > 0 || arguments_.first_image.empty()) {
-      const Image image = renderer_.render(camera, report_.options, statistics, &progress);
+      const Image image = player_.renderer().render(camera, report_.options, statistics, &progress);
       if (number + 1 < motion.frames) prefetch(motion, number + 1);
       finish(number, camera, image, statistics);
       return;
@@ -236,13 +245,14 @@ class FrameRun {
       }
       if (is_final) finish(number, camera, image, statistics);
     };
-    renderer_.renderProgressively(camera, report_.options, statistics, show, &progress);
+    player_.renderer().renderProgressively(camera, report_.options, statistics, show, &progress);
   }
 
-  /// Reads the next frame's bricks while this frame's picture is written.
+  /// Reads the next frame's bricks, and goes to its time step, while this frame's picture is written.
   void prefetch(const CameraMotion& motion, uint64_t number) {
+    player_.goTo(motion.step(number));
     try {
-      renderer_.prefetch(motion.camera(number), report_.options);
+      player_.renderer().prefetch(motion.camera(number), report_.options);
     } catch (const Error&) {
       // That frame will report its own invalid camera.
     }
@@ -252,7 +262,7 @@ class FrameRun {
     annotate(image, camera, [&](const Image& picture) { output_.write(number, picture); });
     if (number == 0 && !report_.first_image) report_.time_to_first_image_s = secondsSinceStart();
     report_.frames.push_back({camera, statistics});
-    const std::string which = arguments_.camera.moves() ? fmt::format(" of frame {}", number) : "";
+    const std::string which = severalFrames(arguments_) ? fmt::format(" of frame {}", number) : "";
     reportUnreadable(which, statistics);
     const RenderedScene scene{manifest_, report_.variable, report_.transfer_function,
                               camera,    report_.options,  statistics};
@@ -278,9 +288,9 @@ class FrameRun {
     if (arguments_.annotations == Annotations{}) return write(data);
     const FrameOptions& options = report_.options;
     write(annotated(data, arguments_.annotations,
-                    {report_.picture, renderer_.screenView(camera, options), report_.transfer_function,
-                     scalarTitle(report_.variable.name, report_.variable.unit), manifest_.lower,
-                     manifest_.upper, options.background}));
+                    {report_.picture, player_.renderer().screenView(camera, options),
+                     report_.transfer_function, scalarTitle(report_.variable.name, report_.variable.unit),
+                     manifest_.lower, manifest_.upper, options.background}));
   }
 
   /// Prints one warning for a frame with unreadable bricks that no earlier frame reported; it names the
@@ -297,7 +307,7 @@ class FrameRun {
 
   const RenderArguments& arguments_;
   const Manifest& manifest_;
-  FrameRenderer& renderer_;
+  StepPlayer& player_;
   FrameOutput& output_;
   RenderReport& report_;
   Progress& progress_;
@@ -333,8 +343,9 @@ void render(const RenderArguments& arguments) {
   const double frames_per_s =
       arguments.frame_rate ? parsePositive("--frame-rate", *arguments.frame_rate) : 25;
 
-  const CacheReader cache(arguments.cache);
-  const Manifest& manifest = cache.manifest();
+  CacheReader cache = openAtStep(arguments.cache, arguments.steps);
+  const std::vector<uint64_t> steps = chosenSteps(arguments.steps, cache);
+  const Manifest manifest = cache.manifest();  // of the first step
   const size_t variable = chooseVariable(cache, arguments.scalar);
   const VariableInfo& info = manifest.variables[variable];
   const glm::dvec3 lower = manifest.lower * options.scale, upper = manifest.upper * options.scale;
@@ -352,19 +363,28 @@ void render(const RenderArguments& arguments) {
   options.size = dataSize(arguments.annotations, picture, transfer_function);
   options.output_bytes = outputBytes(arguments, picture);
   const CameraArguments camera = choice.camera(arguments.camera, transfer_function, options.size);
-  const CameraMotion motion = chooseCameraMotion(camera, lower, upper, options.size);
+  const CameraMotion motion =
+      withSteps(chooseCameraMotion(framesOf(camera, steps), lower, upper, options.size), steps);
   requireThreads(options.threads);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
-  const auto output = makeFrameOutput(arguments.output, arguments.camera.moves(), picture, frames_per_s);
-  FrameRenderer renderer(cache, variable, transfer_function, parseBackend(arguments.backend));
-  RenderReport report{arguments.cache, arguments.output,       picture, info, transfer_function,
-                      options,         renderer.backendName(), {},      {},   {}};
+  const auto output = makeFrameOutput(arguments.output, severalFrames(arguments), picture, frames_per_s);
+  StepPlayer player(cache, variable, transfer_function, parseBackend(arguments.backend));
+  RenderReport report{arguments.cache,
+                      arguments.output,
+                      picture,
+                      info,
+                      transfer_function,
+                      options,
+                      player.renderer().backendName(),
+                      {},
+                      {},
+                      {}};
   const auto writeReport = [&] {
     if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, statisticsOf(report));
   };
   try {
-    FrameRun(arguments, manifest, renderer, *output, report, progress).draw(motion);
+    FrameRun(arguments, manifest, player, *output, report, progress).draw(motion);
   } catch (const Interrupted& interrupted) {
     progress.end();
     writeReport();
@@ -448,6 +468,9 @@ void addRender(CLI::App& app) {
       ->group(what);
 
   addSurfaceOptions(*command, arguments->surfaces, "Surfaces and slices");
+  const std::string when = "Time steps";
+  addStepOptions(*command, arguments->steps, when);
+  addStepsOption(*command, arguments->steps, when);
 
   const std::string where = "Camera";
   CameraArguments* camera = &arguments->camera;

@@ -10,6 +10,7 @@
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
 #include "tools/options/option_parsers.h"
+#include "tools/options/step_arguments.h"
 #include "tools/options/surface_arguments.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/stop_signals.h"
@@ -24,6 +25,7 @@ struct ViewArguments {
   std::optional<std::filesystem::path> state;
   std::optional<std::string> scalar, memory, frame_time;
   SurfaceArguments surfaces;
+  StepArguments steps;
 };
 
 void view(const ViewArguments& arguments) {
@@ -37,7 +39,7 @@ void view(const ViewArguments& arguments) {
   checkSurfaceArguments(arguments.surfaces);
   options.scene = sceneOf(arguments.surfaces);
   options.surface_files.assign(arguments.surfaces.surfaces.begin(), arguments.surfaces.surfaces.end());
-  const CacheReader cache(arguments.cache);
+  const CacheReader cache = openAtStep(arguments.cache, arguments.steps);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   try {
@@ -69,6 +71,7 @@ void addView(CLI::App& app) {
                       "Time budget of a picture while the camera moves, in ms (default 33 with a graphics "
                       "card, 100 without)");
   addSurfaceOptions(*command, arguments->surfaces, "Surfaces and slices");
+  addStepOptions(*command, arguments->steps, "Time steps");
   command->callback([arguments] { view(*arguments); });
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <memory>
+#include <utility>
 
 #include "render/camera/camera_path.h"
 #include "stream/base/error.h"
@@ -61,6 +62,23 @@ void checkCameraArguments(const CameraArguments& arguments) {
         "--view-angle",
         arguments.path.string());
   if (arguments.frames && !arguments.moves()) throw UsageError("--frames needs --orbit or --path");
+}
+
+CameraArguments framesOf(const CameraArguments& arguments, const std::vector<uint64_t>& steps) {
+  CameraArguments with_frames = arguments;
+  if (arguments.moves() && !arguments.frames && steps.size() > 1) with_frames.frames = steps.size();
+  return with_frames;
+}
+
+CameraMotion withSteps(CameraMotion motion, std::vector<uint64_t> steps) {
+  if (motion.frames == 1 && steps.size() > 1) {
+    motion.frames = steps.size();
+    motion.camera = [camera = motion.camera(0)](uint64_t) { return camera; };
+  }
+  motion.step = [steps = std::move(steps), frames = motion.frames](uint64_t frame) {
+    return steps[frame * steps.size() / frames];
+  };
+  return motion;
 }
 
 CameraMotion chooseCameraMotion(const CameraArguments& arguments, const glm::dvec3& lower,

@@ -29,6 +29,10 @@ struct ConvertArguments {
   std::optional<std::string> memory;
   unsigned threads = 0;
   bool overwrite = false, resume = false, no_preflight = false;
+  std::optional<std::string> steps;  // of a series
+  std::optional<uint64_t> every;
+  bool keep_going = false, adds_steps = false, follows = false;
+  std::optional<uint64_t> until;  // steps of a cache that follows a simulation
 };
 
 /// Opens the grid. Temporary files go to --tmp, or beside `cache` without it.

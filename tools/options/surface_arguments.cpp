@@ -54,7 +54,7 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
       ->group(group);
   command
       .add_option("--surface-colour", arguments.colours,
-                  "Colour #rrggbb of the surfaces, or one for each in their order (default #cccccc)")
+                  "Colour #rrggbb of the surfaces, or one for each in their order (default #b3b3b3)")
       ->take_all()
       ->allow_extra_args(false)
       ->group(group);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "render/frame/step_player.h"
 #include "stream/base/error.h"
 #include "stream/base/thread_name.h"
 
@@ -47,14 +48,17 @@ void Effort::learn(double seconds, double target, bool complete) {
 struct FrameLoop::Drawing {
   explicit Drawing(uint64_t coarsest) : effort(coarsest) {}
 
-  std::unique_ptr<FrameRenderer> renderer;  // of one variable
+  std::unique_ptr<StepPlayer> player;  // of one variable
   size_t variable = 0;
   uint64_t function_version = 0;
   Effort effort;
 };
 
 FrameLoop::FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake)
-    : cache_(cache), backend_(backend), wake_(std::move(wake)), thread_([this] { loop(); }) {}
+    : cache_(cache.atStep(cache.step())),
+      backend_(backend),
+      wake_(std::move(wake)),
+      thread_([this] { loop(); }) {}
 
 FrameLoop::~FrameLoop() {
   {
@@ -145,15 +149,17 @@ void FrameLoop::loop() {
 }
 
 void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t number) {
-  if (!drawing.renderer || drawing.variable != request.variable) {
-    drawing.renderer.reset();  // frees its memory before the next one allocates
-    drawing.renderer = std::make_unique<FrameRenderer>(cache_, request.variable, request.function, backend_);
+  if (!drawing.player || drawing.variable != request.variable) {
+    drawing.player.reset();  // frees its memory before the next one allocates
+    if (request.step != cache_.step()) cache_ = cache_.atStep(request.step);
+    drawing.player = std::make_unique<StepPlayer>(cache_, request.variable, request.function, backend_);
     drawing.variable = request.variable;
   } else if (drawing.function_version != request.function_version) {
-    drawing.renderer->setTransferFunction(request.function);
+    drawing.player->setTransferFunction(request.function);
   }
   drawing.function_version = request.function_version;
-  FrameRenderer& renderer = *drawing.renderer;
+  drawing.player->goTo(request.step);
+  FrameRenderer& renderer = drawing.player->renderer();
   {
     const MutexLock lock(mutex_);
     if (stopping_) return;  // the destructor found no renderer to cancel
@@ -168,6 +174,7 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
   for (uint64_t splats = effort.splats();; splats *= kRefinement) {
     ShownFrame frame;
     frame.request = number;
+    frame.step = request.step;
     frame.image = renderer.renderQuickly(request.camera, request.options,
                                          {.max_splats = splats, .detail_px = detail_px}, frame.statistics,
                                          frame.is_final);
@@ -180,8 +187,21 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
     }
     const bool is_final = frame.is_final;
     publish(std::move(frame));
+    if (request.next_step) readAhead(drawing, request);
     if (is_final || request.moving || superseded(number)) return;
   }
+}
+
+/// Goes to the step that is likely to be wanted next, and begins to decode it while this one is looked at.
+void FrameLoop::readAhead(Drawing& drawing, const FrameRequest& request) {
+  {
+    const MutexLock lock(mutex_);
+    drawing_ = nullptr;  // a step with another geometry has another renderer
+  }
+  drawing.player->goTo(*request.next_step);
+  const double detail_px = request.moving ? drawing.effort.detailPixels() : 0;
+  drawing.player->renderer().prefetch(request.camera, request.options,
+                                      {.max_splats = drawing.effort.splats(), .detail_px = detail_px});
 }
 
 }  // namespace curvisplat

@@ -31,14 +31,17 @@ struct FrameRequest {
   Camera camera;
   FrameOptions options;
   bool moving = false;
-  double target_s = 0.1;  // time budget of a picture while moving
+  double target_s = 0.1;                   // time budget of a picture while moving
+  uint64_t step = 0;                       // time step
+  std::optional<uint64_t> next_step = {};  // is likely to be wanted next, with this camera: read ahead
 };
 
 struct ShownFrame {
   Image image;
   std::vector<uint8_t> bytes;  // the image as 8-bit RGBA, clamped
   FrameStatistics statistics;
-  uint64_t request = 0;   // what request() returned
+  uint64_t request = 0;  // what request() returned
+  uint64_t step = 0;
   bool is_final = false;  // the same picture as FrameRenderer::render() draws
 };
 
@@ -67,8 +70,8 @@ class Effort {
 /// All members are for one thread, the window's.
 class FrameLoop {
  public:
-  /// Calls `wake` on the loop's thread whenever take() has something to return. The cache must outlive the
-  /// loop.
+  /// Calls `wake` on the loop's thread whenever take() has something to return. Opens the cache for itself, since it
+  /// goes from step to step.
   FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake);
   /// Cancels the picture being drawn.
   ~FrameLoop();
@@ -91,10 +94,11 @@ class FrameLoop {
   struct Drawing;
   void loop();
   void serve(Drawing& drawing, const FrameRequest& request, uint64_t number);
+  void readAhead(Drawing& drawing, const FrameRequest& request);
   bool superseded(uint64_t number) const;
   void publish(ShownFrame frame);
 
-  const CacheReader& cache_;
+  CacheReader cache_;  // at the step that is drawn; of the loop's thread
   const Backend backend_;
   const std::function<void()> wake_;
 

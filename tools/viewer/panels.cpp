@@ -51,6 +51,7 @@ PanelActions Panels::draw(ViewState& state, size_t variable, const PanelFacts& f
                                       ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoSavedSettings;
   ImGui::Begin("curvisplat", nullptr, kFixed);
   ImGui::PushItemWidth(0.62f * ImGui::GetContentRegionAvail().x);
+  if (facts.playback && facts.playback->steps() > 1) drawTime(actions, *facts.playback);
   if (ImGui::BeginCombo("scalar", state.variable.c_str())) {
     for (const VariableInfo& one : cache_.manifest().variables) {
       const bool chosen = one.name == state.variable;
@@ -75,6 +76,22 @@ PanelActions Panels::draw(ViewState& state, size_t variable, const PanelFacts& f
   ImGui::PopItemWidth();
   ImGui::End();
   return actions;
+}
+
+void Panels::drawTime(PanelActions& actions, Playback& playback) {
+  const double time = cache_.series().steps[playback.step()].time;
+  int step = static_cast<int>(playback.step());
+  if (ImGui::SliderInt("step", &step, 0, static_cast<int>(playback.steps() - 1)))
+    actions.step = static_cast<uint64_t>(std::max(0, step));
+  actions.dragging |= ImGui::IsItemActive();
+  if (ImGui::Button(playback.isPlaying() ? "stop (space)" : "play (space)")) actions.toggle_play = true;
+  ImGui::SameLine();
+  bool loops = playback.loops();
+  if (ImGui::Checkbox("loop", &loops)) playback.setLoop(loops);
+  ImGui::SameLine();
+  ImGui::Text("time %g %s", time, cache_.seriesManifest().time_unit.c_str());
+  float speed = static_cast<float>(playback.stepsPerSecond());
+  if (ImGui::SliderFloat("steps per second", &speed, 1, 60, "%.0f")) playback.setStepsPerSecond(speed);
 }
 
 void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts) {

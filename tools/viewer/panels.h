@@ -1,11 +1,14 @@
 // The panels beside the picture: scalar and transfer function, view, detail, cuts, statistics.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 
 #include "stream/cache/cache_reader.h"
 #include "tools/viewer/frame_loop.h"
 #include "tools/viewer/function_panel.h"
+#include "tools/viewer/playback.h"
 #include "tools/viewer/view_state.h"
 
 namespace curvisplat {
@@ -17,7 +20,8 @@ struct PanelFacts {
   bool busy = false;
   bool flies = false;
   std::string backend;
-  std::string message;  // the last result or error of a user action
+  Playback* playback = nullptr;  // of a series; the panels set its speed and loop
+  std::string message;           // the last result or error of a user action
 };
 
 /// What the user did in the panels.
@@ -26,6 +30,8 @@ struct PanelActions {
   bool function_changed = false;  // implies `changed`
   bool dragging = false;          // a control is being dragged: a coarse picture suffices
   bool save_picture = false, copy_command = false;
+  std::optional<uint64_t> step;  // to go to
+  bool toggle_play = false;
   bool reset_camera = false, other_projection = false, toggle_flight = false;
 };
 
@@ -41,6 +47,7 @@ class Panels {
   PanelActions draw(ViewState& state, size_t variable, const PanelFacts& facts);
 
  private:
+  void drawTime(PanelActions& actions, Playback& playback);
   void drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts);
   void drawDetail(ViewState& state, PanelActions& actions);
   void drawClipBox(ViewState& state, PanelActions& actions);

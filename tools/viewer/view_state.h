@@ -21,7 +21,7 @@ namespace curvisplat {
 /// A surface of a file, which loadSurfaces() reads.
 struct SurfaceFile {
   std::filesystem::path path;
-  glm::vec3 colour{0.8f, 0.8f, 0.8f};
+  glm::vec3 colour{0.7f, 0.7f, 0.7f};
   std::shared_ptr<const TriangleMesh> mesh = nullptr;
 };
 

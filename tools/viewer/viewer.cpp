@@ -21,6 +21,7 @@
 #include "tools/viewer/navigation.h"
 #include "tools/viewer/panels.h"
 #include "tools/viewer/picture_texture.h"
+#include "tools/viewer/playback.h"
 #include "tools/viewer/state_files.h"
 #include "tools/viewer/view_state.h"
 #include "tools/viewer/window.h"
@@ -36,6 +37,10 @@ constexpr double kIdleWait_s = 0.5;
 constexpr double kMovingWait_s = 0.03;  // while flying, and until the camera is at rest
 constexpr int kFramesAfterInput = 2;    // Dear ImGui needs them to settle
 
+double clockSeconds() {
+  return glfwGetTime();
+}
+
 bool same(ImageSize a, ImageSize b) {
   return a.width == b.width && a.height == b.height;
 }
@@ -45,13 +50,15 @@ class Viewer {
   Viewer(const CacheReader& cache, const ViewerOptions& options)
       : cache_(cache),
         options_(options),
-        window_(fmt::format("{} - curvisplat", cache.path().filename().string()), options.size),
+        window_(fmt::format("{} - curvisplat", cache.cachePath().filename().string()), options.size),
         state_(openingState()),
         panels_(cache),
+        playback_(cache.series().steps.size()),
         frames_(cache, options.backend, Window::wake),
         picture_(window_.gl()),
         overlay_(window_.gl()) {
     printMessage("window: OpenGL {}", window_.contextName());
+    playback_.goTo(cache.step());
     updateBounds();
     fitData(pictureSize());
   }
@@ -73,7 +80,9 @@ class Viewer {
     while (window_.isOpen()) {
       stopped.throwIfStopped();
       const bool moving = navigation_.isMoving() || ImGui::IsAnyItemActive();
-      window_.wait(frames_to_settle > 0 ? 0 : moving ? kMovingWait_s : kIdleWait_s);
+      const bool step_is_due = playback_.isPlaying() && isShown() && playback_.wait(clockSeconds()) <= 0;
+      const bool short_wait = moving || playback_.isPlaying();
+      window_.wait(frames_to_settle > 0 || step_is_due ? 0 : short_wait ? kMovingWait_s : kIdleWait_s);
       frames_to_settle = window_.takeInput() ? kFramesAfterInput : std::max(0, frames_to_settle - 1);
       update();
     }
@@ -84,7 +93,7 @@ class Viewer {
     ViewState state = firstViewOf(cache_, options_.scalar.value_or(""), size);
     if (options_.state) {
       state = viewStateFromJson(readTextFile(*options_.state), *options_.state, cache_.manifest());
-    } else if (const auto remembered = rememberedStateOf(cache_.path());
+    } else if (const auto remembered = rememberedStateOf(cache_.cachePath());
                remembered && fs::exists(*remembered)) {
       try {
         ViewState found = viewStateFromJson(readTextFile(*remembered), *remembered, cache_.manifest());
@@ -120,7 +129,7 @@ class Viewer {
     const bool changed = react();
     const ImageSize size = pictureSize();
     if (size.width > 0 && size.height > 0) {
-      const bool moving = navigation_.isMoving() || dragging_;
+      const bool moving = navigation_.isMoving() || dragging_ || playback_.isPlaying();
       if (changed || moving != was_moving_ || !same(size, picture_size_) || request_ == 0) {
         fitData(size);
         ask(moving);
@@ -160,8 +169,12 @@ class Viewer {
     facts.backend = frames_.backendName();
     facts.message = message_;
     PanelActions actions;
+    facts.playback = &playback_;
     window_.setPictureLeft(panelWidth());
     if (panels_shown_) actions = panels_.draw(state_, variable(), facts);
+    if (actions.step) changed |= playback_.goTo(*actions.step);
+    if (actions.toggle_play) changed |= press({GLFW_KEY_SPACE});
+    if (isShown()) changed |= playback_.tick(clockSeconds());
     dragging_ = actions.dragging;
     changed |= actions.changed;
     updateBounds();
@@ -174,6 +187,9 @@ class Viewer {
     if (window_.showsClick()) changed |= pressKeys();
     return changed;
   }
+
+  /// Whether a picture of the newest request is in the window.
+  bool isShown() const { return shown_ && shown_->request == request_; }
 
   bool pressKeys() {
     bool changed = false;
@@ -190,6 +206,13 @@ class Viewer {
       case GLFW_KEY_C:
         copy_requested_ = true;
         return false;
+      case GLFW_KEY_SPACE:
+        playback_.toggle();
+        return true;
+      case GLFW_KEY_PERIOD:
+        return playback_.advance(true);
+      case GLFW_KEY_COMMA:
+        return playback_.advance(false);
       case GLFW_KEY_H:
         panels_shown_ = !panels_shown_;
         return false;
@@ -212,6 +235,8 @@ class Viewer {
     FrameRequest request{variable(), function_version_, state_.function.function(), state_.camera,
                          state_.frameOptions(data_size_)};
     request.moving = moving;
+    request.step = playback_.step();
+    request.next_step = playback_.next();
     request.target_s = options_.target_s.value_or(frames_.drawsInSoftware() ? 0.1 : 0.033);
     request_ = frames_.request(std::move(request));
     was_moving_ = moving;
@@ -259,7 +284,7 @@ class Viewer {
     save_requested_ = false;
     fs::path file;
     for (int number = 1; file.empty() || fs::exists(file); ++number)
-      file = fmt::format("{}_{:04}.png", cache_.path().stem().string(), number);
+      file = fmt::format("{}_{:04}.png", cache_.cachePath().stem().string(), number);
     try {
       const TransferFunction function = state_.function.function();
       writeImage(annotated(shown_->image, state_.annotations, sceneFor(function)), file);
@@ -275,7 +300,8 @@ class Viewer {
       if (!state_.function.isPreset())
         function_file = keepFunction(toParaViewPreset(state_.function.definition()));
       const std::string command =
-          renderCommand(state_, fs::absolute(cache_.path()), picture_size_, function_file);
+          renderCommand(state_, fs::absolute(cache_.cachePath()), picture_size_, function_file) +
+          (playback_.steps() > 1 ? fmt::format(" --step {}", playback_.step()) : "");
       window_.setClipboard(command);
       fmt::print("{}\n", command);
       std::fflush(stdout);
@@ -286,7 +312,7 @@ class Viewer {
   }
 
   void remember() const {
-    const auto file = rememberedStateOf(cache_.path());
+    const auto file = rememberedStateOf(cache_.cachePath());
     if (!file) return;
     try {
       writeState(*file, toJson(state_));
@@ -301,6 +327,7 @@ class Viewer {
   Window window_;
   ViewState state_;
   Panels panels_;
+  Playback playback_;
   Navigation navigation_;
   FrameLoop frames_;
   PictureTexture picture_, overlay_;

@@ -127,6 +127,12 @@ Globe NetcdfSource::globeOf(const GlobeOptions& options) const {
 void NetcdfSource::describe(const OpenGridOptions& options) {
   description_.files.push_back(options.grid.string());
   description_.times = cfTimes(file_, grid_);
+  const NetcdfVariable* const time =
+      grid_.dims.time ? file_.find(file_.dimensions()[*grid_.dims.time].name) : nullptr;
+  if (time) {
+    description_.time_unit = time->text("units");
+    description_.calendar = time->text("calendar");
+  }
   if (grid_.dims.time && description_.times.empty())
     throw Error("{}: has no time step: dimension {} has length 0", file_.path().string(),
                 file_.dimensions()[*grid_.dims.time].name);

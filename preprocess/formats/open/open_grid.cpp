@@ -8,6 +8,7 @@
 
 #include "preprocess/formats/cgns/cgns_source.h"
 #include "preprocess/formats/netcdf/netcdf_source.h"
+#include "preprocess/formats/open/file_series.h"
 #include "preprocess/formats/open/foreign_formats.h"
 #include "preprocess/formats/plot3d/plot3d_meta.h"
 #include "preprocess/formats/plot3d/plot3d_source.h"
@@ -32,9 +33,14 @@ std::unique_ptr<GridSource> openAs(const OpenGridOptions& options) {
   return std::make_unique<Source>(options);
 }
 
+std::unique_ptr<GridSource> openListedFile(const OpenGridOptions& options) {
+  return openFileSeries(options, openGrid);
+}
+
 constexpr GridFormat kFormats[] = {
     {isVtkXml, openVtkXml},
     {isVtkLegacy, openVtkLegacy},
+    {isFileSeries, openListedFile},  // before .p3d, which takes all JSON files
     {isPlot3dMeta, openPlot3dMeta},
     {CgnsFile::recognises, openAs<CgnsSource>},  // before NetCDF, which takes all HDF5 files
     {NetcdfFile::recognises, openAs<NetcdfSource>},

@@ -1,0 +1,71 @@
+#!/usr/bin/env python3
+"""Measures series of time steps: conversion of further steps, bytes, and frames while the steps change.
+
+    bench/steps.py FOLDER [--nodes 192x128x48] [--steps 12] [--memory 512M] [--json OUT.json]
+
+The wake on a fixed grid, and on one that moves. Frames are drawn by `render --steps`, forwards, at the finest level (256x256) and
+at 4 pixels (600x600); the first frame, which opens the cache, is a measurement of its own.
+"""
+import argparse
+import json
+import pathlib
+import shutil
+import statistics
+
+import results
+
+HERE = pathlib.Path(__file__).resolve().parent
+VIEWS = {"finest": ["--lod-pixels", "0", "--size", "256x256"], "4px": ["--lod-pixels", "4", "--size", "600x600"]}
+
+
+def convert(arguments, name, moving, out):
+    program, folder = arguments.program, arguments.folder
+    grid, cache, told = folder / name, folder / f"{name}.splats", folder / "convert.json"
+    results.run([program, "generate", "wake", "--size", arguments.nodes, "--steps", arguments.steps, "-o", grid,
+                 *(["--moving"] if moving else [])])
+    shutil.rmtree(cache, ignore_errors=True)
+    results.run([program, "convert", f"{grid}_%04d.xyz" if moving else f"{grid}.xyz", f"{grid}_%04d.fun", "-o", cache, "--memory",
+                 arguments.memory, "--stats", told])
+    report = json.loads(told.read_text())
+    steps, nodes = report["each_step"], report["samples"]
+    rates = [nodes / step["seconds"] for step in steps]
+    size = [step["bytes"] / nodes for step in steps]
+    out.add(f"steps/{name}/convert/first", "nodes/s", rates[:1])
+    out.add(f"steps/{name}/convert/further", "nodes/s", rates[1:])
+    out.add(f"steps/{name}/bytes_per_node/further", "1", size[1:])
+    print(f"{name}: first step {rates[0] / 1e6:.2f} M nodes/s, further {statistics.median(rates[1:]) / 1e6:.2f} "
+          f"({statistics.median(rates[1:]) / rates[0]:.2f} times), {statistics.mean(size[1:]):.2f} bytes a node and step", flush=True)
+    return cache
+
+
+def draw(arguments, name, cache, view, out):
+    told = arguments.folder / "frames.json"
+    results.run([arguments.program, "render", cache, "-o", arguments.folder / "step_%04d.pfm", "--steps", "all", "--range", "0,1",
+                 "--view", "iso", "--memory", arguments.memory, "--stats", told, *VIEWS[view]])
+    seconds = [frame["seconds"]["total"] for frame in json.loads(told.read_text())["frames"]]
+    out.add(f"steps/{name}/first_frame/{view}", "s", seconds[:1])
+    out.add(f"steps/{name}/frame/{view}", "s", seconds[1:])
+    print(f"{name}, {view}: first frame {seconds[0]:.3f} s, then {statistics.median(seconds[1:]):.3f} s a step", flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("--program", default=HERE.parent / "build/release/tools/curvisplat")
+    parser.add_argument("--nodes", default="192x128x48", help="NIxNJxNK of the grid")
+    parser.add_argument("--steps", type=int, default=12)
+    parser.add_argument("--memory", default="512M")
+    parser.add_argument("--json")
+    arguments = parser.parse_args()
+    arguments.folder.mkdir(parents=True, exist_ok=True)
+    out = results.Results()
+    for name, moving in (("fixed", False), ("moving", True)):
+        cache = convert(arguments, name, moving, out)
+        for view in VIEWS:
+            draw(arguments, name, cache, view, out)
+    if arguments.json:
+        out.write(arguments.json, "steps", results.version_of(arguments.program))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,251 @@
+#include "preprocess/addition/add_step.h"
+
+#include <malloc.h>
+#include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "preprocess/addition/addition_checks.h"
+#include "preprocess/addition/step_references.h"
+#include "preprocess/addition/value_passes.h"
+#include "preprocess/addition/value_record.h"
+#include "preprocess/convert/memory_plan.h"
+#include "preprocess/convert/preflight.h"
+#include "preprocess/convert/scan.h"
+#include "preprocess/convert/scratch_folder.h"
+#include "preprocess/survey/grid_checksum.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/base/paths.h"
+#include "stream/cache/cache_lock.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/cache/step_writer.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kNodesPerTask = 16384;
+
+CacheReader openAtLastStep(const std::filesystem::path& path) {
+  CacheReader first(path);
+  const uint64_t last = first.series().steps.size() - 1;
+  return last == 0 ? std::move(first) : first.atStep(last);
+}
+
+/// Positions of the cache's scalars in the source's description.
+std::vector<uint32_t> scalarsOf(const GridDescription& description, const Manifest& manifest) {
+  std::vector<uint32_t> positions;
+  for (const VariableInfo& variable : manifest.variables) {
+    const auto found = std::find_if(description.scalars.begin(), description.scalars.end(),
+                                    [&](const GridScalar& scalar) { return scalar.name == variable.name; });
+    if (found == description.scalars.end())
+      throw Error("has no scalar '{}', which the steps before it have", variable.name);
+    positions.push_back(static_cast<uint32_t>(found - description.scalars.begin()));
+  }
+  return positions;
+}
+
+/// What the scatter pass learns about a grid of node-centred scalars on its way.
+struct SlabSurvey {
+  uint64_t grid_checksum = 0;
+  std::vector<ScalarRange> ranges;
+
+  void add(const LoadedSlab& loaded, const GridBlock& block) {
+    grid_checksum += checksumOfGrid(loaded, block);
+    // The halo's nodes are nodes of the grid as well: counting them twice changes no range.
+    const NodeArrays& nodes = loaded.nodes;
+    for (size_t scalar = 0; scalar < ranges.size(); ++scalar) {
+      const std::vector<float>& values = nodes.scalars[scalar];
+      ranges[scalar] = tbb::parallel_reduce(
+          tbb::blocked_range<size_t>(0, values.size(), kNodesPerTask), ranges[scalar],
+          [&](const tbb::blocked_range<size_t>& part, ScalarRange range) {
+            for (size_t n = part.begin(); n < part.end(); ++n) {
+              if (nodes.blank[n]) continue;
+              range.min = std::min<double>(range.min, values[n]);
+              range.max = std::max<double>(range.max, values[n]);
+            }
+            return range;
+          },
+          [](const ScalarRange& a, const ScalarRange& b) {
+            return ScalarRange{std::min(a.min, b.min), std::max(a.max, b.max)};
+          });
+    }
+  }
+};
+
+/// A step on its way into the cache: what each pass leaves for the next.
+class StepAddition {
+ public:
+  StepAddition(const GridSource& source, const AddStepOptions& options, Progress& progress)
+      : source_(source),
+        options_(options),
+        progress_(progress),
+        lock_(options.cache),
+        cache_(openAtLastStep(options.cache)),
+        scalars_(scalarsOf(source.description(), cache_.seriesManifest())),
+        plan_(MemoryPlan::ofOptions(options.memory_bytes, scalars_.size(), options.threads)),
+        reader_(source, scalars_, options.blank_value) {
+    if (options.bucket_splats) plan_.limitBuckets(*options.bucket_splats, scalars_.size());
+    report_.step = cache_.series().steps.size();
+    report_.nodes = cache_.manifest().nodes;
+    checkBlocks(source.description(), cache_);
+    if ((reader_.centring() == Centring::kCell) != cache_.manifest().cells)
+      throw Error("its scalars are {}-centred; those of the steps before it are {}-centred",
+                  cache_.manifest().cells ? "node" : "cell", cache_.manifest().cells ? "cell" : "node");
+    chooseTime();
+  }
+
+  AddStepReport run() {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, plan_.threads);
+    const bool known = cache_.series().steps[cache_.step()].grid_checksum != 0;
+    const bool try_first = known && !options_.expect_new_geometry && reader_.centring() == Centring::kNode;
+    if (!try_first || !addToLastGeometry()) addAfterScan();
+    progress_.end();
+    return std::move(report_);
+  }
+
+ private:
+  void chooseTime() {
+    const double last = cache_.series().steps.back().time;
+    const std::optional<double> stated = options_.time ? options_.time : timeOf(source_.description());
+    report_.time = stated.value_or(last + 1);
+    if (!(report_.time > last) || !std::isfinite(report_.time))
+      throw Error("its time {:g} is not after {:g}, the time of the step before it", report_.time, last);
+  }
+
+  template <typename Work>
+  void pass(const char* name, uint64_t steps, const char* unit, const Work& work) {
+    progress_.begin(name, steps, unit);
+    work();
+    // What a pass has freed goes back to the system: the next one counts on it.
+    malloc_trim(0);
+  }
+
+  /// Most steps have the geometry of the step before: its checksum is computed while the values are scattered.
+  /// Returns false if it is another.
+  bool addToLastGeometry() {
+    const uint64_t expected = cache_.series().steps[cache_.step()].grid_checksum;
+    makeScratch();
+    ValuePasses passes(cache_, reader_, plan_, scratch_->path(), progress_);
+    SlabSurvey survey;
+    survey.ranges.resize(scalars_.size());
+    try {
+      pass("scatter", report_.nodes, "nodes", [&] {
+        passes.scatter([&](const LoadedSlab& loaded) {
+          survey.add(loaded, source_.description().blocks[loaded.slab.block]);
+        });
+      });
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const Error&) {
+      return false;  // its splats lie elsewhere; or it cannot be read, which the scan reports
+    }
+    if (survey.grid_checksum != expected) return false;
+    ranges_ = survey.ranges;
+    finishValues(passes, cache_);
+    return true;
+  }
+
+  void addAfterScan() {
+    scratch_.reset();
+    GridSurvey survey;
+    pass("scan", report_.nodes, "nodes",
+         [&] { survey = surveyGrid(reader_, plan_.slab_bytes, nullptr, progress_); });
+    checkRanges(survey, source_.description(), scalars_);
+    ranges_ = survey.ranges;
+    const auto geometry = cache_.series().geometryOf(survey.grid_checksum);
+    if (!geometry) return addGeometry();
+    const CacheReader cache = cache_.atStep(cache_.series().first_steps[*geometry]);
+    makeScratch();
+    ValuePasses passes(cache, reader_, plan_, scratch_->path(), progress_);
+    pass("scatter", report_.nodes, "nodes", [&] { passes.scatter(); });
+    finishValues(passes, cache);
+  }
+
+  void makeScratch() {
+    if (options_.check_disk_space)
+      checkDiskSpace(
+          diskNeedsOfAdding(cache_.manifest().splats, scalars_.size(), minValueRecordBytes(scalars_.size())),
+          options_.cache, temporaryFolder());
+    scratch_ = std::make_unique<ScratchFolder>(newScratch(options_.cache, temporaryFolder()),
+                                               ScratchFolder::Folder::kMake);
+  }
+
+  void finishValues(ValuePasses& passes, const CacheReader& cache) {
+    GridSurvey survey;
+    survey.ranges = ranges_;
+    checkRanges(survey, source_.description(), scalars_);
+    StepWriter writer(lock_, cache);
+    pass("seams", 0, "nodes", [&] { passes.mergeSeams(); });
+    pass("build", cache.manifest().splats, "splats", [&] {
+      const StepReferences references(cache);
+      passes.build(writer, &references);
+    });
+    pass("finish", 0, "bricks", [&] {
+      for (const FileInfo& file : writer.finish(newStep())) report_.files.push_back({file.name, file.size});
+    });
+  }
+
+  void addGeometry() {
+    ConvertOptions options;
+    options.output = options_.cache / geometryFolderName(cache_.series().geometries());
+    // A kill between the two steps below leaves a geometry that the series does not have.
+    if (std::filesystem::exists(options.output)) removeAll(options.output);
+    options.check_disk_space = options_.check_disk_space;
+    options.resume = options_.resume;
+    options.overwrite = !options_.resume;
+    options.scalars = scalars_;
+    options.blank_value = options_.blank_value;
+    options.memory_bytes = options_.memory_bytes;
+    options.threads = options_.threads;
+    options.temporary_folder = temporaryFolder();
+    options.title = cache_.seriesManifest().title;
+    options.time = report_.time;
+    options.bucket_splats = options_.bucket_splats;
+    ConvertReport converted = convert(source_, options, progress_);
+    report_.new_geometry = true;
+    report_.files = std::move(converted.files);
+    addGeometryStep(lock_, cache_, newStep());
+  }
+
+  NewStep newStep() const {
+    NewStep step{report_.time, {}, source_.description().files};
+    for (const ScalarRange& range : ranges_) step.ranges.push_back({range.min, range.max});
+    return step;
+  }
+
+  std::filesystem::path temporaryFolder() const {
+    return options_.temporary_folder.empty() ? folderOf(options_.cache) : options_.temporary_folder;
+  }
+
+  const GridSource& source_;
+  const AddStepOptions& options_;
+  Progress& progress_;
+  const CacheLock lock_;  // before the cache is read
+  const CacheReader cache_;
+  const std::vector<uint32_t> scalars_;
+  MemoryPlan plan_;
+  const NodeReader reader_;
+  std::unique_ptr<ScratchFolder> scratch_;  // before what has files in it
+  std::vector<ScalarRange> ranges_;
+  AddStepReport report_;
+};
+
+}  // namespace
+
+std::optional<double> timeOf(const GridDescription& description) {
+  if (!description.times.empty()) return description.times[description.time_step];
+  if (!description.flow.empty() && description.flow.front().time != 0) return description.flow.front().time;
+  return std::nullopt;
+}
+
+AddStepReport addStep(const GridSource& source, const AddStepOptions& options, Progress& progress) {
+  checkWritable(options.cache, "; name a splat cache that you may change");
+  return StepAddition(source, options, progress).run();
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,49 @@
+// Adds a time step to a cache. If the step's coordinates and blanking are those of an earlier step, only its values
+// are added, which takes half a conversion's time; otherwise it is converted to a geometry of its own.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "preprocess/convert/convert.h"
+#include "preprocess/grid/grid_source.h"
+#include "stream/base/progress.h"
+
+namespace curvisplat {
+
+struct AddStepOptions {
+  std::filesystem::path cache;
+  std::optional<double> time;         // otherwise the source's, or one more than the last step's
+  std::optional<double> blank_value;  // as the other steps were converted with
+  uint64_t memory_bytes = 0;          // 0: defaultMemory()
+  unsigned threads = 0;               // 0: as many as the machine has
+  bool check_disk_space = true;       // before the work
+  bool resume = false;                // go on from an interrupted conversion of this step, if there is one
+  bool expect_new_geometry = false;   // for speed alone: the step before had a geometry of its own
+  std::filesystem::path temporary_folder;  // empty: the folder of the cache
+
+  /// Smaller buckets than memory would allow: for tests.
+  std::optional<uint64_t> bucket_splats;
+};
+
+struct AddStepReport {
+  uint64_t step = 0;  // its number
+  double time = 0;
+  bool new_geometry = false;
+  uint64_t nodes = 0;
+  std::vector<FileReport> files;  // the new ones
+};
+
+/// The time that the files state for the open step: that of the step, or that in the Q file's header unless it is
+/// 0, which many programs write for all steps.
+std::optional<double> timeOf(const GridDescription& description);
+
+/// Adds. The cache's scalars are found in the source by name. Throws Error if the step does not fit: other blocks, a
+/// missing scalar, a time that is not after the last; or if something outside fails. Then the cache is as it was.
+/// Killed at any moment it leaves the cache with the steps before. Peak memory, everything counted:
+/// options.memory_bytes.
+AddStepReport addStep(const GridSource& source, const AddStepOptions& options, Progress& progress);
+
+}  // namespace curvisplat

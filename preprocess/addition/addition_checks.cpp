@@ -1,0 +1,45 @@
+#include "preprocess/addition/addition_checks.h"
+
+#include <span>
+
+#include "preprocess/convert/scratch_folder.h"
+#include "stream/base/checksum.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+
+namespace curvisplat {
+namespace {
+
+/// What an addition's temporary folder is called, up to its process: for this cache alone, wherever it is.
+std::string scratchName(const std::filesystem::path& cache) {
+  const std::string place = std::filesystem::canonical(cache).string();
+  return fmt::format("{}.add-{:016x}", cache.filename().string(),
+                     checksumOf(std::as_bytes(std::span(place))));
+}
+
+}  // namespace
+
+void checkBlocks(const GridDescription& grid, const CacheReader& cache) {
+  const std::vector<BlockInfo>& blocks = cache.manifest().blocks;
+  if (grid.blocks.size() != blocks.size())
+    throw Error("{}: was made from a grid of {} blocks, and this one has {}: it is another",
+                cache.path().string(), blocks.size(), grid.blocks.size());
+  for (size_t n = 0; n < blocks.size(); ++n) {
+    const GridBlock& found = grid.blocks[n];
+    const BlockInfo& expected = blocks[n];
+    if (found.ni != expected.ni || found.nj != expected.nj || found.nk != expected.nk)
+      throw Error("{}: block {} of its grid has {}x{}x{} nodes, and of this one {}x{}x{}: it is another",
+                  cache.path().string(), n + 1, expected.ni, expected.nj, expected.nk, found.ni, found.nj,
+                  found.nk);
+  }
+}
+
+std::filesystem::path newScratch(const std::filesystem::path& cache, const std::filesystem::path& folder) {
+  const std::string name = scratchName(cache);
+  // The cache is locked, so none of the additions that these belong to lives.
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    if (entry.path().filename().string().starts_with(name + ".")) removeAll(entry.path());
+  return ScratchFolder::newPath(folder, name);
+}
+
+}  // namespace curvisplat

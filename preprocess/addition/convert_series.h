@@ -1,0 +1,60 @@
+// Converts a series of time steps to one cache: the first step as always, then each further one is added
+// (add_step.h). So from the first step on there is a whole cache of the steps so far, at every moment.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "preprocess/addition/add_step.h"
+#include "preprocess/convert/convert.h"
+#include "preprocess/grid/grid_source.h"
+#include "stream/base/progress.h"
+
+namespace curvisplat {
+
+/// The steps of a series, in order.
+struct SeriesInput {
+  uint64_t count = 0;
+  /// Names a step for messages: "q.0100" or "run.nc, time step 3".
+  std::function<std::string(uint64_t)> name;
+  /// Throws Error.
+  std::function<std::unique_ptr<GridSource>(uint64_t)> open;
+  /// Positions of the scalars to convert, for the first step. Throws Error.
+  std::function<std::vector<uint32_t>(const GridDescription&)> scalars;
+};
+
+struct SeriesOptions {
+  ConvertOptions convert;   // of the first step; `scalars` is not used
+  bool keep_going = false;  // leave out steps that do not fit
+  bool add = false;         // to the cache that is there, which has other steps
+};
+
+/// One step that was converted, or left out for `reason`.
+struct SeriesEvent {
+  std::string name;
+  const AddStepReport* added = nullptr;      // of a further step
+  const ConvertReport* converted = nullptr;  // of the first
+  const GridDescription* source = nullptr;   // of the first
+  std::string reason;
+};
+
+struct SeriesReport {
+  uint64_t steps = 0;      // of the cache now
+  uint64_t converted = 0;  // by this run
+  uint64_t left_out = 0;
+  uint64_t new_geometries = 0;  // of these steps, beside the first
+  uint64_t nodes = 0;           // of a step
+};
+
+/// Converts or, with options.convert.resume, goes on from where an interrupted conversion of the same series
+/// stopped: steps that the cache has at the same time are passed over. `report` is called after each step. Throws
+/// Error that names the step that does not fit, unless options.keep_going, and Interrupted; the cache keeps the
+/// steps so far.
+SeriesReport convertSeries(const SeriesInput& input, const SeriesOptions& options, Progress& progress,
+                           const std::function<void(const SeriesEvent&)>& report);
+
+}  // namespace curvisplat

@@ -1,0 +1,58 @@
+#include "preprocess/addition/value_passes.h"
+
+#include <tbb/enumerable_thread_specific.h>
+
+#include <utility>
+
+#include "preprocess/addition/build_values.h"
+#include "preprocess/addition/cache_grid.h"
+#include "preprocess/convert/scatter.h"
+
+namespace curvisplat {
+
+ValuePasses::ValuePasses(const CacheReader& cache, const NodeReader& reader, const MemoryPlan& plan,
+                         std::filesystem::path scratch, Progress& progress)
+    : cache_(&cache),
+      reader_(&reader),
+      plan_(plan),
+      scratch_(std::move(scratch)),
+      progress_(&progress),
+      order_(cache),
+      buckets_(cache.bricks(), order_, reader.scalars(), plan.bucket_bytes),
+      grouped_(ValueLoader::grouping(buckets_.size(), plan)) {}
+
+void ValuePasses::scatter(std::function<void(const LoadedSlab&)> see) {
+  const uint32_t numbers = (buckets_.size() + grouped_ - 1) / grouped_;
+  file_ = std::make_unique<BucketFile>(scratch_ / "values.bin", numbers, plan_.chunkBytes(numbers));
+  seams_ = std::make_unique<SeamMerger>(reader_->scalars(), plan_.seam_bytes, scratch_,
+                                        unlikeHalvesOf(cache_->manifest()));
+
+  tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
+  streamSplats(*reader_, nullptr, plan_.slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, *seams_,
+               {*progress_, std::move(see)});
+  for (ValueSink& sink : sinks) sink.flush();
+}
+
+void ValuePasses::mergeSeams() {
+  ValueSink sink = newSink();
+  seams_->finish(reader_->source().description().coordinate_bytes,
+                 [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
+                   sink.add(splat, values);
+                   progress_->advance(1);
+                 });
+  sink.flush();
+  seams_.reset();
+  file_->close();
+  temporary_bytes_ = file_->size();
+}
+
+void ValuePasses::build(ValuesWriter& writer, const StepReferences* references) {
+  const size_t variables = reader_->scalars();
+  ValueBuilder builder(*cache_, order_, buckets_, variables, writer, *progress_);
+  if (references) builder.predictFrom(*references);
+  ValueLoader loader(*cache_, order_, buckets_, variables, plan_, scratch_);
+  loader.forEach(*file_, 0, buckets_.size(), grouped_, [&](LoadedValues& loaded) { builder.build(loaded); });
+  file_.reset();
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,61 @@
+// The passes that bring the values of scalars to the bricks of a cache whose geometry is that of the grid: what
+// adding a scalar and adding a time step have in common.
+//
+//   scatter   the grid's splats go to buckets of bricks; those of block faces to the seam merger
+//   seams     the merged splats of block faces follow
+//   build     bucket after bucket, the streams
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+
+#include "preprocess/addition/conversion_order.h"
+#include "preprocess/addition/step_references.h"
+#include "preprocess/addition/value_buckets.h"
+#include "preprocess/convert/bucket_file.h"
+#include "preprocess/convert/memory_plan.h"
+#include "preprocess/grid/node_reader.h"
+#include "preprocess/grid/slabs.h"
+#include "preprocess/splats/seams.h"
+#include "stream/base/progress.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/cache/values_writer.h"
+
+namespace curvisplat {
+
+/// For one thread, which calls the passes in order.
+class ValuePasses {
+ public:
+  /// All references must outlive it. `scratch`: a folder for temporary files.
+  ValuePasses(const CacheReader& cache, const NodeReader& reader, const MemoryPlan& plan,
+              std::filesystem::path scratch, Progress& progress);
+
+  /// `see`: as SlabPass has it. Throws Error if the cache has no cell for a splat.
+  void scatter(std::function<void(const LoadedSlab&)> see = {});
+  void mergeSeams();
+  /// `references`: what the values are predicted from; may be null. Throws Error if the splats are not those of the
+  /// cache.
+  void build(ValuesWriter& writer, const StepReferences* references = nullptr);
+
+  /// Of the scattered values, after mergeSeams().
+  uint64_t temporaryBytes() const { return temporary_bytes_; }
+
+ private:
+  ValueSink newSink() const { return {*cache_, order_, buckets_, grouped_, *file_}; }
+
+  const CacheReader* cache_;
+  const NodeReader* reader_;
+  const MemoryPlan plan_;
+  const std::filesystem::path scratch_;
+  Progress* progress_;
+  const ConversionOrder order_;
+  const ValueBuckets buckets_;
+  const uint32_t grouped_;
+  std::unique_ptr<BucketFile> file_;
+  std::unique_ptr<SeamMerger> seams_;
+  uint64_t temporary_bytes_ = 0;
+};
+
+}  // namespace curvisplat

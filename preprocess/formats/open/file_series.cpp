@@ -1,0 +1,107 @@
+#include "preprocess/formats/open/file_series.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "preprocess/grid/time_steps.h"
+#include "stream/base/error.h"
+#include "stream/base/json_text.h"
+#include "stream/base/paths.h"
+
+namespace curvisplat {
+namespace {
+
+using Json = nlohmann::json;
+
+struct ListedFile {
+  double time = 0;
+  std::string name;
+};
+
+std::vector<ListedFile> filesIn(const std::filesystem::path& path) {
+  const std::string text = readTextFile(path);
+  requireShallowJson(text, path.string());
+  Json json;
+  try {
+    json = Json::parse(text);
+  } catch (const Json::exception& error) {
+    throw Error("{}: is not valid JSON (.series files are JSON): found {}", path.string(),
+                jsonFault(text, error));
+  }
+  const auto fail = [&](const char* what) {
+    throw Error("{}: {}; expected {{\"files\": [{{\"name\": ..., \"time\": ...}}, ...]}}", path.string(),
+                what);
+  };
+  if (!json.is_object() || !json.contains("files") || !json["files"].is_array()) fail("has no list 'files'");
+  std::vector<ListedFile> files;
+  for (const Json& entry : json["files"]) {
+    if (!entry.is_object() || !entry.contains("name") || !entry["name"].is_string())
+      fail("has a file without a name");
+    ListedFile file{static_cast<double>(files.size()), entry["name"].get<std::string>()};
+    if (entry.contains("time")) {
+      if (!entry["time"].is_number() || !std::isfinite(entry["time"].get<double>()))
+        fail("has a time that is not a number");
+      file.time = entry["time"].get<double>();
+    }
+    files.push_back(std::move(file));
+  }
+  if (files.empty()) fail("lists no files");
+  std::stable_sort(files.begin(), files.end(),
+                   [](const ListedFile& a, const ListedFile& b) { return a.time < b.time; });
+  return files;
+}
+
+/// A file of the series, with the times of all.
+class SeriesSource final : public GridSource {
+ public:
+  SeriesSource(std::unique_ptr<GridSource> source, GridDescription description)
+      : source_(std::move(source)), description_(std::move(description)) {}
+
+  const GridDescription& description() const override { return description_; }
+  void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+            NodeArrays& out) const override {
+    source_->read(block, box, scalars, out);
+  }
+
+ private:
+  std::unique_ptr<GridSource> source_;
+  GridDescription description_;
+};
+
+}  // namespace
+
+bool isFileSeries(const InputFile& file) {
+  return file.path().extension() == ".series";
+}
+
+std::unique_ptr<GridSource> openFileSeries(
+    const OpenGridOptions& options,
+    const std::function<std::unique_ptr<GridSource>(const OpenGridOptions&)>& open) {
+  const std::vector<ListedFile> files = filesIn(options.grid);
+  std::vector<double> times;
+  for (const ListedFile& file : files) times.push_back(file.time);
+  const uint32_t step = chosenTimeStep(options.grid.string(), times, options.time_step);
+
+  OpenGridOptions of_step = options;
+  of_step.grid = folderOf(options.grid) / files[step].name;
+  of_step.time_step.reset();
+  if (of_step.grid.extension() == ".series")
+    throw Error("{}: lists {}, a file series itself; expected grid files", options.grid.string(),
+                files[step].name);
+  if (!isRegularFile(of_step.grid))
+    throw Error("{}: lists {}, which does not exist", options.grid.string(), of_step.grid.string());
+  std::unique_ptr<GridSource> source = open(of_step);
+  GridDescription description = source->description();
+  description.files.push_back(options.grid.string());
+  description.times = std::move(times);
+  description.time_step = step;
+  return std::make_unique<SeriesSource>(std::move(source), std::move(description));
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,256 @@
+#include "preprocess/formats/open/series_files.h"
+
+#include <fmt/format.h>
+#include <fnmatch.h>
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <map>
+
+#include "preprocess/formats/open/open_grid.h"
+#include "stream/base/error.h"
+#include "stream/base/paths.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool isDigit(char c) {
+  return std::isdigit(static_cast<unsigned char>(c)) != 0;
+}
+
+/// Natural order: runs of digits by the numbers that they are.
+bool comesBefore(const std::string& a, const std::string& b) {
+  size_t i = 0, j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (isDigit(a[i]) && isDigit(b[j])) {
+      const auto number = [](const std::string& text, size_t& at) {
+        size_t end = at;
+        while (end < text.size() && isDigit(text[end])) ++end;
+        const size_t first = std::min(text.find_first_not_of('0', at), end);
+        at = end;
+        return text.substr(first, end - first);
+      };
+      const std::string of_a = number(a, i), of_b = number(b, j);
+      if (of_a.size() != of_b.size()) return of_a.size() < of_b.size();
+      if (of_a != of_b) return of_a < of_b;
+    } else {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i;
+      ++j;
+    }
+  }
+  if (a.size() - i != b.size() - j) return a.size() - i < b.size() - j;
+  return a < b;
+}
+
+void sortNaturally(std::vector<fs::path>& paths) {
+  std::sort(paths.begin(), paths.end(),
+            [](const fs::path& a, const fs::path& b) { return comesBefore(a.string(), b.string()); });
+  paths.erase(std::unique(paths.begin(), paths.end()), paths.end());
+}
+
+/// The path with '#' for each number in its file name: equal for the files of a series.
+std::string shapeOf(const fs::path& path) {
+  const std::string name = path.filename().string();
+  std::string shape = path.parent_path().string() + "/";
+  for (size_t n = 0; n < name.size(); ++n)
+    if (!isDigit(name[n]))
+      shape += name[n];
+    else if (n == 0 || !isDigit(name[n - 1]))
+      shape += '#';
+  return shape;
+}
+
+/// A pattern for fnmatch(): "%04d" stands for a number. Empty if the path is no pattern.
+std::string patternOf(const fs::path& path) {
+  std::error_code ignored;
+  if (fs::exists(path, ignored)) return "";
+  const std::string name = path.filename().string();
+  std::string pattern;
+  bool is_pattern = name.find_first_of("*?[") != std::string::npos;
+  for (size_t n = 0; n < name.size(); ++n) {
+    size_t end = n + 1;
+    while (name[n] == '%' && end < name.size() && isDigit(name[end])) ++end;
+    if (name[n] == '%' && end < name.size() && name[end] == 'd') {
+      pattern += "[0-9]*";
+      is_pattern = true;
+      n = end;
+    } else {
+      pattern += name[n];
+    }
+  }
+  return is_pattern ? pattern : "";
+}
+
+std::vector<fs::path> filesLike(const fs::path& path, const std::string& pattern) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  const fs::path folder = folderOf(path);
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    if (fnmatch(pattern.c_str(), name.c_str(), FNM_PERIOD) == 0)
+      files.push_back(path.has_parent_path() ? folder / name : fs::path(name));
+  }
+  if (files.empty()) throw Error("{}: no file has a name like that", path.string());
+  sortNaturally(files);
+  return files;
+}
+
+/// The files of a series as its steps use them.
+struct Groups {
+  std::vector<fs::path> grids;                   // one, or one a step
+  std::vector<std::vector<fs::path>> solutions;  // each one, or one a step
+  size_t steps = 1;
+};
+
+Groups groupsOf(const OpenGridOptions& options) {
+  Groups groups;
+  groups.grids = {options.grid};
+  std::map<std::string, size_t> group_of_shape;
+  const std::string grid_shape = shapeOf(options.grid);
+  for (const fs::path& path : options.solutions) {
+    const std::string shape = shapeOf(path);
+    if (shape == grid_shape) {
+      groups.grids.push_back(path);
+      continue;
+    }
+    const auto [found, is_new] = group_of_shape.emplace(shape, groups.solutions.size());
+    if (is_new) groups.solutions.emplace_back();
+    groups.solutions[found->second].push_back(path);
+  }
+  sortNaturally(groups.grids);
+  for (auto& group : groups.solutions) sortNaturally(group);
+  const auto count = [&](const std::vector<fs::path>& files) {
+    if (files.size() == 1) return;
+    if (groups.steps > 1 && groups.steps != files.size())
+      throw Error(
+          "{}: has {} files of this kind, and there are {} of another; a series needs as many of each as it "
+          "has "
+          "steps",
+          files.front().string(), files.size(), groups.steps);
+    groups.steps = files.size();
+  };
+  count(groups.grids);
+  for (const auto& group : groups.solutions) count(group);
+  return groups;
+}
+
+const fs::path& fileAt(const std::vector<fs::path>& files, size_t step) {
+  return files.size() == 1 ? files.front() : files[step];
+}
+
+/// A number, or `otherwise` for an empty text.
+std::optional<uint64_t> numberOf(std::string_view text) {
+  uint64_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return number;
+}
+
+}  // namespace
+
+StepSelection parseSteps(const std::string& option, const std::string& text) {
+  StepSelection selection;
+  if (text == "all") return selection;
+  std::vector<std::string_view> parts;
+  for (size_t begin = 0; begin <= text.size();) {
+    const size_t end = std::min(text.find(':', begin), text.size());
+    parts.push_back(std::string_view(text).substr(begin, end - begin));
+    begin = end + 1;
+  }
+  const auto fail = [&] {
+    throw UsageError("{} {}: expected all, FIRST, FIRST:LAST or FIRST:LAST:STRIDE, such as 0:100:5", option,
+                     text);
+  };
+  if (parts.size() > 3 || (parts.size() == 1 && parts[0].empty())) fail();
+  for (size_t n = 0; n < parts.size(); ++n) {
+    if (parts[n].empty()) continue;
+    const auto number = numberOf(parts[n]);
+    if (!number || (n == 2 && *number == 0)) fail();
+    if (n == 0) selection.first = *number;
+    if (n == 1 || parts.size() == 1) selection.last = *number;
+    if (n == 2) selection.stride = *number;
+  }
+  if (selection.last && *selection.last < selection.first) fail();
+  return selection;
+}
+
+std::vector<uint64_t> selectedSteps(const std::string& option, const StepSelection& selection,
+                                    uint64_t count) {
+  std::vector<uint64_t> numbers;
+  const uint64_t end = selection.last ? std::min(count, *selection.last + 1) : count;
+  for (uint64_t step = selection.first; step < end; step += std::min(selection.stride, count))
+    numbers.push_back(step);
+  if (numbers.empty())
+    throw UsageError("{}: step {} is out of range; there are {} steps, from 0 to {}", option, selection.first,
+                     count, count - 1);
+  return numbers;
+}
+
+void expandPatterns(OpenGridOptions& options) {
+  std::vector<fs::path> solutions;
+  if (const std::string pattern = patternOf(options.grid); !pattern.empty()) {
+    const std::vector<fs::path> grids = filesLike(options.grid, pattern);
+    options.grid = grids.front();
+    solutions.assign(grids.begin() + 1, grids.end());
+  }
+  for (const fs::path& path : options.solutions) {
+    const std::string pattern = patternOf(path);
+    if (pattern.empty()) {
+      solutions.push_back(path);
+      continue;
+    }
+    const std::vector<fs::path> files = filesLike(path, pattern);
+    solutions.insert(solutions.end(), files.begin(), files.end());
+  }
+  options.solutions = std::move(solutions);
+}
+
+bool hasSeveralStepFiles(const OpenGridOptions& options) {
+  std::vector<std::string> shapes{shapeOf(options.grid)};
+  for (const fs::path& path : options.solutions) shapes.push_back(shapeOf(path));
+  std::sort(shapes.begin(), shapes.end());
+  return std::adjacent_find(shapes.begin(), shapes.end()) != shapes.end();
+}
+
+std::vector<StepFiles> stepsByName(const OpenGridOptions& options) {
+  const Groups groups = groupsOf(options);
+  std::vector<StepFiles> steps;
+  for (size_t n = 0; n < groups.steps; ++n) {
+    OpenGridOptions files = options;
+    files.grid = fileAt(groups.grids, n);
+    files.solutions.clear();
+    for (const auto& group : groups.solutions) files.solutions.push_back(fileAt(group, n));
+    const bool names_grid = groups.grids.size() > 1 || files.solutions.empty();
+    std::string name = files.grid.string();
+    for (size_t g = 0; !names_grid && g < groups.solutions.size(); ++g)
+      if (groups.solutions[g].size() > 1 || groups.steps == 1) name = files.solutions[g].string();
+    steps.push_back({std::move(files), name});
+  }
+  return steps;
+}
+
+std::vector<StepFiles> stepsOf(const OpenGridOptions& options) {
+  std::vector<StepFiles> steps;
+  bool may_hold_several = true;
+  for (StepFiles& step : stepsByName(options)) {
+    size_t times = 1;
+    if (may_hold_several) {
+      times = std::max<size_t>(1, openGrid(step.options)->description().times.size());
+      // Files of one kind are alike: it is the first that tells whether they hold several steps.
+      may_hold_several = times > 1 || !steps.empty();
+    }
+    for (size_t time = 0; time < times; ++time) {
+      steps.push_back(step);
+      if (times == 1) continue;
+      steps.back().name += fmt::format(", time step {}", time);
+      steps.back().options.time_step = static_cast<uint32_t>(time);
+    }
+  }
+  return steps;
+}
+
+}  // namespace curvisplat

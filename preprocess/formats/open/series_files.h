@@ -1,0 +1,54 @@
+// Which files and time steps make a series. These are several steps:
+//
+//   q.0000 q.0100 ...     files whose names differ in numbers only, in natural order (q.9 before q.10): PLOT3D
+//                         solutions of one grid, or grids with their own scalars; several kinds go side by side
+//   'q.*' 'q.%04d'        patterns of such names, quoted from the shell: all files that match
+//   one file              .pvd, .vtk.series and the like, .p3d, CGNS, NetCDF: its time steps
+//   several such files    the steps of one after those of the other
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "preprocess/formats/common/open_grid_options.h"
+
+namespace curvisplat {
+
+/// A step: what openGrid() takes to open it.
+struct StepFiles {
+  OpenGridOptions options;
+  std::string name;  // "q.0100" or "run.nc, time step 3"
+};
+
+/// Steps [first, last] of a series, every `stride`-th.
+struct StepSelection {
+  uint64_t first = 0;
+  std::optional<uint64_t> last;
+  uint64_t stride = 1;
+};
+
+/// "all", "FIRST", "FIRST:LAST" or "FIRST:LAST:STRIDE"; both ends count, and may be left out. Throws UsageError
+/// that names `option`.
+StepSelection parseSteps(const std::string& option, const std::string& text);
+/// The selected numbers below `count`. Throws UsageError that names `option` if there are none.
+std::vector<uint64_t> selectedSteps(const std::string& option, const StepSelection& selection,
+                                    uint64_t count);
+
+/// Replaces patterns among the grid and the solutions by the files that match, in natural order. Throws Error if a
+/// pattern matches none. Where the grid is a pattern, the first file stays the grid and the others follow first
+/// among the solutions.
+void expandPatterns(OpenGridOptions& options);
+
+/// Whether the names of the files alone make them several steps.
+bool hasSeveralStepFiles(const OpenGridOptions& options);
+
+/// The steps that the names of the files tell, without opening any: a file with several steps counts as one.
+std::vector<StepFiles> stepsByName(const OpenGridOptions& options);
+
+/// All steps of the files, whose patterns have been expanded. One at least. Opens files that may hold several
+/// steps. Throws Error.
+std::vector<StepFiles> stepsOf(const OpenGridOptions& options);
+
+}  // namespace curvisplat

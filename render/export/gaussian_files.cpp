@@ -1,0 +1,153 @@
+#include "render/export/gaussian_files.h"
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <glm/common.hpp>
+#include <string>
+#include <vector>
+
+#include "stream/base/durable_file.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr float kColourBasis = 0.28209479177387814f;  // the constant spherical harmonic
+constexpr double kSpzWidth = 1000;                    // of the data's box, in the file's units
+
+/// The zeroth coefficient of a colour.
+glm::vec3 coefficientOf(const glm::vec3& colour) {
+  return (colour - 0.5f) / kColourBasis;
+}
+
+float logit(float opacity) {
+  return std::log(opacity / (1 - opacity));
+}
+
+/// A length that has a logarithm.
+glm::vec3 positive(const glm::vec3& deviation) {
+  return glm::max(deviation, glm::vec3(1e-30f));
+}
+
+template <typename T>
+void append(std::vector<std::byte>& out, const T& value) {
+  const auto* bytes = reinterpret_cast<const std::byte*>(&value);
+  out.insert(out.end(), bytes, bytes + sizeof value);
+}
+
+std::vector<std::byte> plyOf(std::span<const GaussianSplat> splats) {
+  std::string header =
+      fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", splats.size());
+  for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity",
+                           "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"})
+    header += fmt::format("property float {}\n", name);
+  header += "end_header\n";
+  std::vector<std::byte> out;
+  out.reserve(header.size() + splats.size() * 17 * sizeof(float));
+  for (const char c : header) out.push_back(static_cast<std::byte>(c));
+  for (const GaussianSplat& splat : splats) {
+    const glm::vec3 colour = coefficientOf(splat.colour), scale = glm::log(positive(splat.deviation));
+    append(out, std::array{splat.position.x, splat.position.y, splat.position.z, 0.0f, 0.0f, 0.0f, colour.x,
+                           colour.y, colour.z, logit(splat.opacity), scale.x, scale.y, scale.z,
+                           splat.rotation.w, splat.rotation.x, splat.rotation.y, splat.rotation.z});
+  }
+  return out;
+}
+
+uint8_t byteOf(float value) {
+  return static_cast<uint8_t>(std::clamp(std::round(value), 0.0f, 255.0f));
+}
+
+/// The file before compression: a header, then each quantity of all splats.
+std::vector<std::byte> spzBytes(std::span<const GaussianSplat> splats) {
+  struct Header {
+    uint32_t magic = 0x5053474e, version = 2, points = 0;
+    uint8_t sh_degree = 0, fractional_bits = 12, flags = 0, reserved = 0;
+  };
+  static_assert(sizeof(Header) == 16);
+  const SpzFrame frame = spzFrameOf(splats);
+  std::vector<std::byte> out;
+  out.reserve(sizeof(Header) + 19 * splats.size());
+  Header header;
+  header.points = static_cast<uint32_t>(splats.size());
+  append(out, header);
+  for (const GaussianSplat& splat : splats) {
+    const glm::dvec3 at = (glm::dvec3(splat.position) - frame.centre) * frame.scale;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto fixed = static_cast<int32_t>(std::lround(at[axis] * 4096));
+      for (int byte = 0; byte < 3; ++byte) out.push_back(static_cast<std::byte>(fixed >> (8 * byte) & 0xff));
+    }
+  }
+  for (const GaussianSplat& splat : splats) append(out, byteOf(255 * splat.opacity));
+  for (const GaussianSplat& splat : splats) {
+    const glm::vec3 coefficient = coefficientOf(splat.colour);
+    for (int c = 0; c < 3; ++c) append(out, byteOf((coefficient[c] * 0.15f + 0.5f) * 255));
+  }
+  for (const GaussianSplat& splat : splats) {
+    const glm::vec3 scale = glm::log(positive(splat.deviation * static_cast<float>(frame.scale)));
+    for (int axis = 0; axis < 3; ++axis) append(out, byteOf((scale[axis] + 10) * 16));
+  }
+  for (const GaussianSplat& splat : splats) {
+    const glm::quat q = splat.rotation.w < 0 ? -splat.rotation : splat.rotation;
+    for (const float part : {q.x, q.y, q.z}) append(out, byteOf(part * 127.5f + 127.5f));
+  }
+  return out;
+}
+
+std::vector<std::byte> gzip(std::span<const std::byte> bytes) {
+  z_stream stream{};
+  constexpr int kGzipFormat = 16;
+  if (deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, MAX_WBITS + kGzipFormat, 8,
+                   Z_DEFAULT_STRATEGY) != Z_OK)
+    throw Error("cannot compress: zlib has too little memory");
+  std::vector<std::byte> out(deflateBound(&stream, static_cast<uLong>(bytes.size())));
+  stream.next_out = reinterpret_cast<Bytef*>(out.data());
+  size_t taken = 0, given = 0;
+  // zlib counts in 32 bits.
+  while (true) {
+    constexpr size_t kMost = size_t{1} << 30;
+    const size_t in = std::min(bytes.size() - taken, kMost), room = std::min(out.size() - given, kMost);
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(bytes.data() + taken));
+    stream.avail_in = static_cast<uInt>(in);
+    stream.avail_out = static_cast<uInt>(room);
+    const int status = deflate(&stream, taken + in == bytes.size() ? Z_FINISH : Z_NO_FLUSH);
+    taken += in - stream.avail_in;
+    given += room - stream.avail_out;
+    if (status == Z_STREAM_END || (status != Z_OK && status != Z_BUF_ERROR)) break;
+  }
+  deflateEnd(&stream);
+  out.resize(given);
+  return out;
+}
+
+}  // namespace
+
+void checkGaussianName(const std::filesystem::path& path) {
+  if (path.extension() != ".ply" && path.extension() != ".spz")
+    throw UsageError("{}: expected a name that ends in .ply or .spz", path.string());
+}
+
+SpzFrame spzFrameOf(std::span<const GaussianSplat> splats) {
+  if (splats.empty()) return {};
+  glm::dvec3 lower(splats.front().position), upper = lower;
+  for (const GaussianSplat& splat : splats) {
+    lower = glm::min(lower, glm::dvec3(splat.position));
+    upper = glm::max(upper, glm::dvec3(splat.position));
+  }
+  const glm::dvec3 size = upper - lower;
+  const double widest = std::max({size.x, size.y, size.z});
+  return {0.5 * (lower + upper), widest > 0 ? kSpzWidth / widest : 1};
+}
+
+void writeGaussians(std::span<const GaussianSplat> splats, const std::filesystem::path& path) {
+  checkGaussianName(path);
+  const std::vector<std::byte> bytes = path.extension() == ".ply" ? plyOf(splats) : gzip(spzBytes(splats));
+  writeFileDurably(path, bytes);
+}
+
+}  // namespace curvisplat

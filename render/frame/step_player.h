@@ -1,0 +1,32 @@
+// Draws the time steps of a cache: one renderer as long as the geometry stays, so that decoded geometry is kept while
+// values change. One caller at a time, as FrameRenderer.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "render/frame/frame.h"
+#include "stream/cache/cache_reader.h"
+
+namespace curvisplat {
+
+class StepPlayer {
+ public:
+  /// `cache` must outlive it, and is at the step that is drawn. Throws Error as FrameRenderer.
+  StepPlayer(CacheReader& cache, size_t variable, const TransferFunction& transfer_function, Backend backend);
+
+  FrameRenderer& renderer() { return *renderer_; }
+  /// Of this step and those to come.
+  void setTransferFunction(const TransferFunction& transfer_function);
+  /// Makes `step` the one that is drawn. Throws Error as CacheReader.
+  void goTo(uint64_t step);
+
+ private:
+  CacheReader& cache_;
+  const size_t variable_;
+  TransferFunction transfer_function_;
+  const Backend backend_;
+  std::unique_ptr<FrameRenderer> renderer_;
+};
+
+}  // namespace curvisplat

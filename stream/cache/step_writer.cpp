@@ -1,0 +1,133 @@
+#include "stream/cache/step_writer.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "stream/base/check.h"
+#include "stream/base/checksum.h"
+#include "stream/base/durable_file.h"
+#include "stream/base/error.h"
+#include "stream/cache/cache_file.h"
+#include "stream/cache/replace_manifest.h"
+#include "stream/cache/stream_file.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+void requireStillThere(const CacheLock& lock) {
+  if (lock.isStillThere()) return;
+  throw Error(
+      "{}: another program has replaced the cache; the new cache was not changed: add the step to it again",
+      lock.cache().string());
+}
+
+/// Appends the step to the series and replaces the manifest.
+void putStep(const CacheLock& lock, Manifest manifest, Series series, SeriesStep step, const NewStep& added) {
+  for (size_t v = 0; v < manifest.variables.size(); ++v) {
+    step.values[v].min = added.ranges[v].min;
+    step.values[v].max = added.ranges[v].max;
+    VariableInfo& variable = manifest.variables[v];
+    variable.min = std::min(variable.min, added.ranges[v].min);
+    variable.max = std::max(variable.max, added.ranges[v].max);
+  }
+  series.add(std::move(step));
+  const FileInfo info = appendStep(lock.cache(), manifest, series);
+  std::erase_if(manifest.files, [](const FileInfo& file) { return file.name == kStepsFileName; });
+  manifest.files.push_back(info);
+  if (!manifest.hasFeature(kSteps)) {
+    // The name must be on the disk before a manifest that lists it.
+    syncDirectory(lock.cache());
+    manifest.requirements.push_back(kSteps);
+  }
+  addSources(added.sources, manifest);
+  replaceManifest(lock.cache(), manifest);
+}
+
+}  // namespace
+
+StepWriter::StepWriter(const CacheLock& lock, const CacheReader& cache)
+    : lock_(&lock),
+      folder_(cache.path()),
+      manifest_(cache.seriesManifest()),
+      series_(cache.series()),
+      geometry_(cache.series().steps[cache.step()].geometry) {
+  for (const VariableInfo& variable : manifest_.variables) {
+    const fs::path path = folder_ / fmt::format("var.{}.{}.bin", variable.number, series_.steps.size());
+    fs::path part = path;
+    part += ".part";
+    SystemCalls::current().remove(part.c_str());  // a killed program's; which may be a link
+    files_.push_back({path, part, OutputFile(part), {}, false});
+    beginVariableFile(files_.back().file);
+    files_.back().table.resize(cache.bricks().size());
+  }
+}
+
+StepWriter::~StepWriter() {
+  // If another cache has replaced this one, files of these names are that cache's.
+  if (in_place_ || !lock_->isStillThere()) return;
+  for (const NewFile& file : files_) removeAll(file.is_renamed ? file.path : file.part);
+}
+
+void StepWriter::append(uint32_t brick, std::span<const EncodedValues> values) {
+  CURVISPLAT_CHECK_OP(values.size(), ==, files_.size());
+  for (size_t n = 0; n < values.size(); ++n) {
+    BrickVariable& record = files_[n].table[brick];
+    CURVISPLAT_CHECK_OP(record.values.length, ==, 0u);
+    record = values[n].variable;
+    record.values.offset = appendStream(files_[n].file, values[n].bytes);
+  }
+}
+
+std::vector<FileInfo> StepWriter::finish(const NewStep& added) {
+  const SeriesStep& first = series_.steps[series_.first_steps[geometry_]];
+  SeriesStep step{added.time, geometry_, first.geometry_checksum, first.grid_checksum, {}};
+  std::vector<FileInfo> infos;
+  for (NewFile& file : files_) {
+    infos.push_back(finishVariableFile(file.file, file.path.filename().string(), file.table));
+    step.values.push_back({0, 0, infos.back().size, infos.back().checksum});
+  }
+  requireStillThere(*lock_);
+  for (NewFile& file : files_) {
+    if (SystemCalls::current().rename(file.part.c_str(), file.path.c_str()) < 0)
+      throw Error("{}: cannot be renamed to {}: {}", file.part.string(), file.path.string(),
+                  std::strerror(errno));
+    file.is_renamed = true;
+  }
+  syncDirectory(folder_);
+  try {
+    putStep(*lock_, manifest_, series_, std::move(step), added);
+  } catch (const NameNotSynced&) {
+    in_place_ = true;
+    throw;
+  }
+  in_place_ = true;
+  return infos;
+}
+
+void addGeometryStep(const CacheLock& lock, const CacheReader& cache, const NewStep& added) {
+  const Series& series = cache.series();
+  const fs::path folder = cacheFolder(lock.cache(), geometryFolderName(series.geometries()));
+  const fs::path path = cacheFile(folder, "manifest.json");
+  const std::string text = readTextFile(path);
+  const Manifest manifest = Manifest::fromJson(text, path);
+  SeriesStep step{added.time,
+                  series.geometries(),
+                  checksumOf(std::as_bytes(std::span(text))),
+                  manifest.grid_checksum.value_or(0),
+                  {}};
+  for (const VariableInfo& variable : manifest.variables) {
+    const std::string name = fmt::format("var.{}.bin", variable.number);
+    for (const FileInfo& file : manifest.files)
+      if (file.name == name) step.values.push_back({0, 0, file.size, file.checksum});
+  }
+  CURVISPLAT_CHECK_OP(step.values.size(), ==, cache.seriesManifest().variables.size());
+  requireStillThere(lock);
+  syncDirectory(lock.cache());
+  putStep(lock, cache.seriesManifest(), series, std::move(step), added);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,213 @@
+#include "stream/cache/steps_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "stream/base/check.h"
+#include "stream/base/checksum.h"
+#include "stream/base/error.h"
+#include "stream/cache/cache_file.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::array<char, 8> kMagic{'C', 'V', 'S', 's', 't', 'e', 'p', 's'};
+constexpr uint64_t kMaxSteps = 1'000'000;
+
+struct StepsHeader {
+  std::array<char, 8> magic = kMagic;  //  0
+  uint32_t version = 1;                //  8
+  uint32_t variables = 0;              // 12
+};                                     // 16
+static_assert(sizeof(StepsHeader) == 16);
+
+struct StepRecord {
+  double time;                 //  0
+  uint32_t geometry;           //  8
+  uint32_t reserved;           // 12: zero
+  uint64_t geometry_checksum;  // 16
+  uint64_t grid_checksum;      // 24
+};                             // 32
+static_assert(sizeof(StepRecord) == 32);
+
+struct StepValuesRecord {
+  double min, max;          //  0
+  uint64_t size, checksum;  // 16
+};                          // 32
+static_assert(sizeof(StepValuesRecord) == 32 && sizeof(StepValues) == 32);
+
+uint64_t recordBytes(size_t variables) {
+  return sizeof(StepRecord) + variables * sizeof(StepValuesRecord);
+}
+
+template <typename Record>
+void put(const Record& record, std::vector<std::byte>& out) {
+  const auto bytes = std::as_bytes(std::span(&record, 1));
+  out.insert(out.end(), bytes.begin(), bytes.end());
+}
+
+void putStep(const SeriesStep& step, std::vector<std::byte>& out) {
+  put(StepRecord{step.time, step.geometry, 0, step.geometry_checksum, step.grid_checksum}, out);
+  for (const StepValues& values : step.values)
+    put(StepValuesRecord{values.min, values.max, values.size, values.checksum}, out);
+}
+
+std::vector<std::byte> bytesOf(const Series& series, size_t variables) {
+  std::vector<std::byte> bytes;
+  StepsHeader header;
+  header.variables = static_cast<uint32_t>(variables);
+  put(header, bytes);
+  for (const SeriesStep& step : series.steps) putStep(step, bytes);
+  return bytes;
+}
+
+class StepsReader {
+ public:
+  StepsReader(fs::path path, const Manifest& manifest) : path_(std::move(path)), manifest_(manifest) {}
+
+  Series read() {
+    const FileInfo& info = listed();
+    const InputFile file(path_);
+    const uint64_t record = recordBytes(manifest_.variables.size());
+    // What follows belongs to an addition that is under way or was interrupted.
+    if (info.size > file.size()) refuse("is truncated", file.size(), info.size);
+    const uint64_t steps = info.size < sizeof(StepsHeader) ? 0 : (info.size - sizeof(StepsHeader)) / record;
+    if (steps == 0 || steps > kMaxSteps || sizeof(StepsHeader) + steps * record != info.size)
+      throw Error(
+          "{}: has {} bytes, which hold no whole number of steps; the cache is damaged: convert again",
+          path_.string(), info.size);
+    bytes_.resize(info.size);
+    file.readAt(0, std::span(bytes_));
+    if (const uint64_t found = checksumOf(bytes_); found != info.checksum)
+      throw Error(
+          "{}: has a wrong checksum (found {:016x}, expected {:016x}); the file is damaged: convert again",
+          path_.string(), found, info.checksum);
+    checkHeader();
+    Series series;
+    series.steps.reserve(steps);
+    for (uint64_t step = 0; step < steps; ++step) series.add(stepAt(step, series));
+    return series;
+  }
+
+ private:
+  const FileInfo& listed() const {
+    for (const FileInfo& info : manifest_.files)
+      if (info.name == kStepsFileName) return info;
+    throw Error("{}: is not listed in the manifest; the cache is damaged: convert again", path_.string());
+  }
+
+  void checkHeader() const {
+    StepsHeader header;
+    std::memcpy(&header, bytes_.data(), sizeof header);
+    if (header.magic != kMagic || header.version != 1)
+      throw Error("{}: does not begin as a steps.bin of version 1; the cache is damaged: convert again",
+                  path_.string());
+    if (header.variables != manifest_.variables.size())
+      refuse("has another number of variables", header.variables, manifest_.variables.size());
+  }
+
+  SeriesStep stepAt(uint64_t number, const Series& before) const {
+    const std::byte* at =
+        bytes_.data() + sizeof(StepsHeader) + number * recordBytes(manifest_.variables.size());
+    StepRecord record;
+    std::memcpy(&record, at, sizeof record);
+    SeriesStep step{record.time, record.geometry, record.geometry_checksum, record.grid_checksum, {}};
+    bool fine = std::isfinite(step.time) && step.geometry <= before.geometries() &&
+                (before.steps.empty() || step.time > before.steps.back().time);
+    if (before.steps.empty()) fine &= step.geometry == 0;
+    step.values.resize(manifest_.variables.size());
+    std::memcpy(step.values.data(), at + sizeof record, step.values.size() * sizeof(StepValuesRecord));
+    constexpr double kLargest = std::numeric_limits<float>::max();
+    for (const StepValues& values : step.values)
+      fine &= values.min >= -kLargest && values.min <= values.max && values.max <= kLargest;
+    if (!fine)
+      throw Error("{}: step {} is invalid; the file is damaged or another program's", path_.string(), number);
+    return step;
+  }
+
+  [[noreturn]] void refuse(const char* what, uint64_t found, uint64_t expected) const {
+    throw Error("{}: {} (found {}, expected {}); the cache is damaged: convert again", path_.string(), what,
+                found, expected);
+  }
+
+  const fs::path path_;
+  const Manifest& manifest_;
+  std::vector<std::byte> bytes_;
+};
+
+/// The one step of a cache that is no series.
+Series singleStep(const Manifest& manifest) {
+  SeriesStep step{manifest.steps.front().time, 0, 0, manifest.grid_checksum.value_or(0), {}};
+  for (const VariableInfo& variable : manifest.variables) {
+    StepValues values{variable.min, variable.max, 0, 0};
+    const std::string name = fmt::format("var.{}.bin", variable.number);
+    for (const FileInfo& file : manifest.files)
+      if (file.name == name) {
+        values.size = file.size;
+        values.checksum = file.checksum;
+      }
+    step.values.push_back(values);
+  }
+  Series series;
+  series.add(std::move(step));
+  return series;
+}
+
+}  // namespace
+
+uint64_t Series::nearest(double time) const {
+  const auto after = std::lower_bound(steps.begin(), steps.end(), time,
+                                      [](const SeriesStep& step, double value) { return step.time < value; });
+  if (after == steps.begin()) return 0;
+  const auto before = after - 1;
+  const bool is_after = after != steps.end() && after->time - time < time - before->time;
+  return static_cast<uint64_t>((is_after ? after : before) - steps.begin());
+}
+
+std::optional<uint32_t> Series::geometryOf(uint64_t grid_checksum) const {
+  if (grid_checksum == 0) return std::nullopt;
+  for (uint32_t geometry = geometries(); geometry-- > 0;)
+    if (steps[first_steps[geometry]].grid_checksum == grid_checksum) return geometry;
+  return std::nullopt;
+}
+
+void Series::add(SeriesStep step) {
+  CURVISPLAT_CHECK_OP(step.geometry, <=, geometries());
+  if (step.geometry == geometries()) first_steps.push_back(steps.size());
+  steps.push_back(std::move(step));
+}
+
+std::string geometryFolderName(uint32_t geometry) {
+  return geometry == 0 ? "" : fmt::format("geometry.{}", geometry);
+}
+
+std::string stepValuesName(const Series& series, uint64_t step, uint32_t number) {
+  return series.isFirstOfGeometry(step) ? fmt::format("var.{}.bin", number)
+                                        : fmt::format("var.{}.{}.bin", number, step);
+}
+
+Series readSeries(const fs::path& cache, const Manifest& manifest) {
+  if (!manifest.hasFeature(kSteps)) return singleStep(manifest);
+  return StepsReader(cacheFile(cache, kStepsFileName), manifest).read();
+}
+
+FileInfo appendStep(const fs::path& cache, const Manifest& manifest, const Series& series) {
+  const size_t variables = manifest.variables.size();
+  const std::vector<std::byte> bytes = bytesOf(series, variables);
+  // A cache that was no series may have the file of an addition that was interrupted.
+  const bool anew = !manifest.hasFeature(kSteps);
+  OutputFile file(cacheFile(cache, kStepsFileName), Caching::kPages,
+                  anew ? OutputFile::Existing::kEmpty : OutputFile::Existing::kKeep);
+  const uint64_t before = anew ? 0 : bytes.size() - recordBytes(variables);
+  file.writeAt(before, std::span(bytes).subspan(before));
+  file.truncate(bytes.size());
+  file.close();
+  return {kStepsFileName, bytes.size(), checksumOf(bytes)};
+}
+
+}  // namespace curvisplat

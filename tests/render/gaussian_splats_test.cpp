@@ -1,0 +1,121 @@
+#include "render/export/gaussian_splats.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "render/export/gaussian_files.h"
+#include "render/export/gaussian_picture.h"
+#include "stream/base/error.h"
+#include "stream/model/kernel.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+TEST(GaussianOpacity, AbsorbsAsMuchAsTheFootprintItStandsFor) {
+  for (const double t : {1e-9, 0.01, 0.1, 1.0, 2.0, 3.0, 10.0, 19.9, 20.1, 100.0}) {
+    const GaussianOpacity found = gaussianOpacity(t);
+    EXPECT_NEAR(found.opacity, 1 - std::exp(-t), 1e-12);
+    // ∫ (1 - exp(-t e^(-r²/2))) r dr against area ∫ o e^(-r²/2) r dr = area o.
+    double absorbed = 0;
+    constexpr double kStep = 1e-4;
+    for (double r = 0.5 * kStep; r < 12; r += kStep)
+      absorbed += -std::expm1(-t * std::exp(-0.5 * r * r)) * r * kStep;
+    EXPECT_NEAR(found.area * found.opacity / absorbed, 1, 1e-6) << t;
+  }
+}
+
+TEST(GaussianSplat, HasTheShapeOfOurs) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> number(-1, 1);
+  for (int n = 0; n < 200; ++n) {
+    const double a0 = std::exp(3 * number(random)), a1 = std::exp(3 * number(random)),
+                 a2 = std::exp(3 * number(random));
+    const glm::dmat3 a{a0, a0 * number(random), a0 * number(random), 0, a1, a1 * number(random), 0, 0, a2};
+    const GaussianSplat splat = gaussianOf({1, 2, 3}, a, 1e-6, 1);
+    EXPECT_NEAR(glm::length(splat.rotation), 1, 1e-6);
+    const glm::dmat3 axes = glm::mat3_cast(glm::dquat(splat.rotation));
+    glm::dmat3 scaled = axes;
+    for (int axis = 0; axis < 3; ++axis)
+      scaled[axis] *= static_cast<double>(splat.deviation[axis]) / kKernelSigma;
+    const glm::dmat3 found = scaled * glm::transpose(scaled), expected = a * glm::transpose(a);
+    const double size = a0 * a0 + a1 * a1 + a2 * a2;
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 3; ++column)
+        EXPECT_NEAR(found[column][row], expected[column][row], 4e-6 * size * 4);
+  }
+}
+
+TEST(GaussianSplat, OfABallHasItsOpticalDepth) {
+  // V = 1, S = I: all directions see the same.
+  const GaussianSplat splat = gaussianOf({0, 0, 0}, glm::dmat3(1.0), 1, 0.7);
+  const double depth = 0.7 / (2 * std::numbers::pi * kKernelSigma * kKernelSigma);
+  EXPECT_NEAR(splat.opacity, 1 - std::exp(-depth), 1e-6);
+}
+
+TEST(GaussianPicture, OfOneSplatIsItsClosedForm) {
+  GaussianSplat splat;
+  splat.deviation = {0.2f, 0.2f, 0.2f};
+  splat.colour = {1, 0, 0};
+  splat.opacity = 0.8f;
+  Camera camera;
+  camera.position = {0, 0, 5};
+  camera.parallel_scale = 1;
+  const Image image = drawGaussians(std::span(&splat, 1), camera, {65, 65});
+  const double variance = std::pow(0.2 * 32.5, 2) + 0.3;
+  for (const int x : {32, 40, 45, 60}) {
+    const double alpha = 0.8 * std::exp(-0.5 * (x - 32) * (x - 32) / variance);
+    EXPECT_NEAR(image.pixel(x, 32)[1], alpha < 1.0 / 255 ? 1 : 1 - alpha, 1e-4) << x;
+    EXPECT_NEAR(image.pixel(x, 32)[0], 1, 1e-6);
+  }
+}
+
+TEST(GaussianPicture, DrawsTheNearerOneBeforeTheOther) {
+  std::vector<GaussianSplat> splats(2);
+  for (GaussianSplat& splat : splats) splat.deviation = {0.5f, 0.5f, 0.5f};
+  splats[0].colour = {1, 0, 0};
+  splats[0].opacity = splats[1].opacity = 0.9f;
+  splats[0].position = {0, 0, -1};
+  splats[1].colour = {0, 0, 1};
+  splats[1].position = {0, 0, 1};
+  Camera camera;
+  camera.position = {0, 0, 5};
+  const Image image = drawGaussians(splats, camera, {33, 33});
+  EXPECT_GT(image.pixel(16, 16)[2], 0.9f);
+  camera.position = {0, 0, -5};
+  EXPECT_GT(drawGaussians(splats, camera, {33, 33}).pixel(16, 16)[0], 0.9f);
+}
+
+TEST(GaussianFiles, RefuseOtherEndings) {
+  EXPECT_THROW(writeGaussians({}, "out.obj"), UsageError);
+}
+
+TEST(GaussianFiles, OfPlyHaveTheirNumbersInTheirPlaces) {
+  const TemporaryFolder folder;
+  GaussianSplat splat;
+  splat.position = {1, 2, 3};
+  splat.deviation = {0.5f, 1, 2};
+  splat.colour = {0.5f, 1, 0};
+  splat.opacity = 0.5f;
+  writeGaussians(std::span(&splat, 1), folder / "one.ply");
+  std::ifstream file(folder / "one.ply", std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const size_t at = text.find("end_header\n") + 11;
+  ASSERT_EQ(text.size(), at + 17 * sizeof(float));
+  std::array<float, 17> numbers;
+  std::memcpy(numbers.data(), text.data() + at, sizeof numbers);
+  const std::array<float, 17> expected{
+      1, 2, 3, 0, 0, 0, 0, 1.7724539f, -1.7724539f, 0, std::log(0.5f), 0, std::log(2.0f), 1, 0, 0, 0};
+  for (size_t n = 0; n < 17; ++n) EXPECT_NEAR(numbers[n], expected[n], 1e-6) << n;
+}
+
+}  // namespace
+}  // namespace curvisplat

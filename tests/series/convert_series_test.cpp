@@ -1,0 +1,370 @@
+// Series of time steps: a step must look as a cache of that step alone does, whatever came before it.
+#include "preprocess/addition/convert_series.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "preprocess/addition/add_scalar.h"
+#include "preprocess/convert/memory_plan.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/cache/cache_verify.h"
+#include "tests/reference/function_grid.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Every file below `folder`, by its path.
+std::map<std::string, std::string> allFilesOf(const fs::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (!entry.is_regular_file()) continue;
+    std::ifstream file(entry.path(), std::ios::binary);
+    files[fs::relative(entry.path(), folder).string()] =
+        std::string(std::istreambuf_iterator<char>(file), {});
+  }
+  return files;
+}
+
+/// What a step of the test series is made of.
+struct StepKind {
+  double time = 0;
+  double shift = 0;  // of the grid
+  bool other_blocks = false;
+  bool lacks_scalar = false;
+  bool blanks_more = false;
+};
+
+/// Two blocks that share a face, with blanked nodes, and two scalars that move with time.
+class StepSource : public GridSource {
+ public:
+  explicit StepSource(const StepKind& kind)
+      : grid_({gridBlock(kind.other_blocks ? 20 : 24, 18, 16), gridBlock(14, 18, 16)}, 2,
+              [kind](const GridNode& node) {
+                NodeValues values;
+                const double i = static_cast<double>(node.i) + (node.block == 1 ? 23.0 : 0.0);
+                const auto j = static_cast<double>(node.j), k = static_cast<double>(node.k);
+                values.position = {i + 0.2 * std::sin(j) + kind.shift, j + 0.1 * std::cos(k),
+                                   k + 0.002 * i * i};
+                const double t = 0.1 * kind.time;
+                values.scalars = {static_cast<float>(std::sin(0.3 * i - t) * std::cos(0.2 * j)),
+                                  static_cast<float>(10 + 0.1 * k + std::cos(0.5 * i + t))};
+                values.blank = node.block == 0 && node.i < 3 && node.j < (kind.blanks_more ? 6u : 4u);
+                return values;
+              }),
+        description_(grid_.description()) {
+    description_.times = {kind.time};
+    description_.files = {"step " + std::to_string(kind.time)};
+    if (kind.lacks_scalar) description_.scalars[1].name = "other";
+  }
+
+  const GridDescription& description() const override { return description_; }
+  void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+            NodeArrays& out) const override {
+    grid_.read(block, box, scalars, out);
+  }
+
+ private:
+  const FunctionGridSource grid_;
+  GridDescription description_;
+};
+
+std::vector<StepKind> steadyGrid(size_t steps) {
+  std::vector<StepKind> kinds;
+  for (size_t n = 0; n < steps; ++n) kinds.push_back({static_cast<double>(n)});
+  return kinds;
+}
+
+SeriesInput inputOf(const std::vector<StepKind>& kinds) {
+  SeriesInput input;
+  input.count = kinds.size();
+  input.name = [](uint64_t step) { return "file " + std::to_string(step); };
+  input.open = [kinds](uint64_t step) { return std::make_unique<StepSource>(kinds[step]); };
+  input.scalars = [](const GridDescription&) { return std::vector<uint32_t>{0, 1}; };
+  return input;
+}
+
+SeriesOptions optionsFor(const fs::path& output) {
+  SeriesOptions options;
+  options.convert.output = output;
+  options.convert.memory_bytes = uint64_t{1} << 30;
+  options.convert.threads = 2;
+  options.convert.title = "series";
+  options.convert.bucket_splats = 4000;
+  return options;
+}
+
+struct Conversion {
+  SeriesReport report;
+  std::vector<std::string> left_out;
+};
+
+Conversion convertQuietly(const SeriesInput& input, const SeriesOptions& options) {
+  Progress progress;
+  Conversion run;
+  run.report = convertSeries(input, options, progress, [&](const SeriesEvent& event) {
+    if (!event.reason.empty()) run.left_out.push_back(event.name + ": " + event.reason);
+  });
+  return run;
+}
+
+/// That two readers decode to the same bits, and state the same ranges.
+void expectSame(const CacheReader& found, const CacheReader& wanted) {
+  ASSERT_EQ(found.bricks().size(), wanted.bricks().size());
+  ASSERT_EQ(found.manifest().variables.size(), wanted.manifest().variables.size());
+  EXPECT_EQ(found.manifest().requirements, wanted.manifest().requirements);
+  EXPECT_EQ(found.manifest().steps.front().time, wanted.manifest().steps.front().time);
+  for (size_t v = 0; v < wanted.manifest().variables.size(); ++v) {
+    EXPECT_EQ(found.manifest().variables[v].min, wanted.manifest().variables[v].min);
+    EXPECT_EQ(found.manifest().variables[v].max, wanted.manifest().variables[v].max);
+  }
+  SplatGeometry geometry, wanted_geometry;
+  SplatVariable values, wanted_values;
+  for (uint32_t brick = 0; brick < wanted.bricks().size(); ++brick) {
+    found.readGeometry(brick, geometry);
+    wanted.readGeometry(brick, wanted_geometry);
+    ASSERT_EQ(geometry.x, wanted_geometry.x);
+    ASSERT_EQ(geometry.shear21, wanted_geometry.shear21);
+    ASSERT_EQ(geometry.weight, wanted_geometry.weight);
+    for (size_t v = 0; v < wanted.manifest().variables.size(); ++v) {
+      found.readVariable(brick, v, values);
+      wanted.readVariable(brick, v, wanted_values);
+      ASSERT_EQ(values.mean, wanted_values.mean) << brick;
+      ASSERT_EQ(values.slope0, wanted_values.slope0) << brick;
+      ASSERT_EQ(values.slope1, wanted_values.slope1) << brick;
+      ASSERT_EQ(values.slope2, wanted_values.slope2) << brick;
+      ASSERT_EQ(values.variance, wanted_values.variance) << brick;
+      EXPECT_EQ(found.brickVariables(v)[brick].min, wanted.brickVariables(v)[brick].min);
+      EXPECT_EQ(found.brickVariables(v)[brick].largest_slope, wanted.brickVariables(v)[brick].largest_slope);
+    }
+  }
+}
+
+/// Converts the series, and each step alone, and compares.
+void expectEachAsAlone(const std::vector<StepKind>& kinds, const std::vector<uint32_t>& geometries) {
+  const TemporaryFolder folder;
+  convertQuietly(inputOf(kinds), optionsFor(folder / "series.splats"));
+  const CacheReader series(folder / "series.splats");
+  ASSERT_EQ(series.series().steps.size(), kinds.size());
+  for (size_t step = 0; step < kinds.size(); ++step) {
+    SCOPED_TRACE(step);
+    EXPECT_EQ(series.series().steps[step].geometry, geometries[step]);
+    const fs::path alone = folder / ("alone" + std::to_string(step) + ".splats");
+    convertQuietly(inputOf({kinds[step]}), optionsFor(alone));
+    const CacheReader wanted(alone), found = series.atStep(step);
+    expectSame(found, wanted);
+    expectSame(CacheReader(folder / "series.splats", step), wanted);
+    for (const std::string& finding : verifyCache(found).findings) ADD_FAILURE() << finding;
+  }
+}
+
+TEST(ConvertSeries, StepsOfOneGridShareItsGeometry) {
+  expectEachAsAlone(steadyGrid(9), {0, 0, 0, 0, 0, 0, 0, 0, 0});
+}
+
+TEST(ConvertSeries, AMovedGridHasItsOwnGeometryAndOneThatComesBackHasNot) {
+  expectEachAsAlone({{0}, {1, 0.5}, {2, 0.5}, {3, 0}, {4, 1}, {5, 0.5}, {6, 1}}, {0, 1, 1, 0, 2, 1, 2});
+}
+
+TEST(ConvertSeries, OtherBlankingIsAnotherGeometry) {
+  expectEachAsAlone({{0}, {1, 0, false, false, true}, {2}}, {0, 1, 0});
+}
+
+TEST(ConvertSeries, BytesDependNeitherOnThreadsNorMemoryNorTheOrderOfAdding) {
+  const std::vector<StepKind> kinds{{0}, {1}, {2, 0.5}, {3, 0.5}, {4}, {5}};
+  const TemporaryFolder folder;
+  convertQuietly(inputOf(kinds), optionsFor(folder / "a.splats"));
+  const auto wanted = allFilesOf(folder / "a.splats");
+
+  SeriesOptions other = optionsFor(folder / "b.splats");
+  other.convert.threads = 1;
+  other.convert.memory_bytes = leastMemory(2);
+  other.convert.bucket_splats.reset();
+  convertQuietly(inputOf(kinds), other);
+  EXPECT_TRUE(allFilesOf(folder / "b.splats") == wanted);
+
+  convertQuietly(inputOf({kinds[0]}), optionsFor(folder / "c.splats"));
+  for (size_t step = 1; step < kinds.size(); ++step) {
+    SeriesOptions adding = optionsFor(folder / "c.splats");
+    adding.add = true;
+    convertQuietly(inputOf({kinds[step]}), adding);
+  }
+  EXPECT_TRUE(allFilesOf(folder / "c.splats") == wanted);
+}
+
+/// What converting throws, as text.
+std::string refusal(const std::vector<StepKind>& kinds, const SeriesOptions& options) {
+  try {
+    convertQuietly(inputOf(kinds), options);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(ConvertSeries, StepsThatDoNotFitAreNamedOrLeftOut) {
+  struct Case {
+    StepKind kind;
+    const char* words;
+  };
+  const Case cases[] = {{{1, 0, true}, "block 1"}, {{1, 0, false, true}, "'s1'"}, {{-1}, "not after"}};
+  for (const Case& each : cases) {
+    const std::vector<StepKind> kinds{{0}, each.kind, {2}};
+    const TemporaryFolder folder;
+    const std::string message = refusal(kinds, optionsFor(folder / "a.splats"));
+    EXPECT_NE(message.find("step 1 (file 1)"), std::string::npos) << message;
+    EXPECT_NE(message.find(each.words), std::string::npos) << message;
+    EXPECT_EQ(CacheReader(folder / "a.splats").series().steps.size(), 1u);
+
+    SeriesOptions options = optionsFor(folder / "b.splats");
+    options.keep_going = true;
+    const Conversion run = convertQuietly(inputOf(kinds), options);
+    EXPECT_EQ(run.report.left_out, 1u);
+    ASSERT_EQ(run.left_out.size(), 1u);
+    convertQuietly(inputOf({{0}, {2}}), optionsFor(folder / "c.splats"));
+    EXPECT_TRUE(allFilesOf(folder / "b.splats") == allFilesOf(folder / "c.splats"));
+  }
+}
+
+TEST(ConvertSeries, ResumesAfterTheStepsThatAreDone) {
+  const std::vector<StepKind> kinds{{0}, {1}, {2, 0.5}, {3, 0.5}, {4}};
+  const TemporaryFolder folder;
+  convertQuietly(inputOf(kinds), optionsFor(folder / "whole.splats"));
+  const auto wanted = allFilesOf(folder / "whole.splats");
+  for (uint64_t stop = 0; stop < kinds.size(); ++stop) {
+    const fs::path output = folder / ("stopped" + std::to_string(stop) + ".splats");
+    SeriesInput interrupted = inputOf(kinds);
+    interrupted.open = [&](uint64_t step) -> std::unique_ptr<GridSource> {
+      if (step == stop) throw Interrupted(SIGINT, "stopped");
+      return std::make_unique<StepSource>(kinds[step]);
+    };
+    EXPECT_THROW(convertQuietly(interrupted, optionsFor(output)), Interrupted);
+    if (stop > 0) {
+      EXPECT_EQ(CacheReader(output).series().steps.size(), stop);
+    }
+    SeriesOptions options = optionsFor(output);
+    options.convert.resume = true;
+    const Conversion run = convertQuietly(inputOf(kinds), options);
+    EXPECT_EQ(run.report.converted, kinds.size() - stop);
+    EXPECT_TRUE(allFilesOf(output) == wanted) << stop;
+  }
+}
+
+TEST(ConvertSeries, ResumingDoesNotMixSeries) {
+  const TemporaryFolder folder;
+  convertQuietly(inputOf({{0}, {1}}), optionsFor(folder / "a.splats"));
+  SeriesOptions options = optionsFor(folder / "a.splats");
+  options.convert.resume = true;
+  EXPECT_NE(refusal({{0}, {1.5}, {2}}, options).find("was not made from"), std::string::npos);
+}
+
+TEST(ConvertSeries, LeftoversOfAKilledAdditionDoNotMatter) {
+  const std::vector<StepKind> kinds{{0}, {1}, {2, 0.5}};
+  const TemporaryFolder folder;
+  convertQuietly(inputOf(kinds), optionsFor(folder / "a.splats"));
+  const auto wanted = allFilesOf(folder / "a.splats");
+  convertQuietly(inputOf({kinds[0], kinds[1]}), optionsFor(folder / "b.splats"));
+  // A record that no manifest counts, values that no record counts, a geometry that no step has.
+  std::ofstream(folder / "b.splats/steps.bin", std::ios::binary | std::ios::app) << std::string(500, 'x');
+  std::ofstream(folder / "b.splats/var.0.2.bin") << "half";
+  std::ofstream(folder / "b.splats/var.0.2.bin.part") << "half";
+  fs::create_directory(folder / "b.splats/geometry.1");
+  std::ofstream(folder / "b.splats/geometry.1/manifest.json") << "half";
+  EXPECT_EQ(CacheReader(folder / "b.splats").series().steps.size(), 2u);
+  SeriesOptions adding = optionsFor(folder / "b.splats");
+  adding.add = true;
+  convertQuietly(inputOf({kinds[2]}), adding);
+  auto found = allFilesOf(folder / "b.splats");
+  found.erase("var.0.2.bin");
+  found.erase("var.0.2.bin.part");
+  EXPECT_TRUE(found == wanted);
+}
+
+TEST(ConvertSeries, ASeriesRefusesFurtherScalars) {
+  const TemporaryFolder folder;
+  convertQuietly(inputOf(steadyGrid(2)), optionsFor(folder / "a.splats"));
+  AddScalarOptions options;
+  options.cache = folder / "a.splats";
+  options.scalars = {0};
+  Progress progress;
+  try {
+    addScalars(StepSource({0}), options, progress);
+    ADD_FAILURE() << "added";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("series of 2 steps"), std::string::npos) << error.what();
+  }
+}
+
+TEST(ConvertSeries, DamagedStepsAreRefused) {
+  const TemporaryFolder folder;
+  convertQuietly(inputOf({{0}, {1}, {2, 0.5}}), optionsFor(folder / "a.splats"));
+  const std::string steps = allFilesOf(folder / "a.splats").at("steps.bin");
+  for (size_t at = 0; at < steps.size(); at += 7) {
+    std::string damaged = steps;
+    damaged[at] = static_cast<char>(damaged[at] ^ 0x10);
+    std::ofstream(folder / "a.splats/steps.bin", std::ios::binary) << damaged;
+    EXPECT_THROW(CacheReader(folder / "a.splats"), Error) << at;
+  }
+  std::ofstream(folder / "a.splats/steps.bin", std::ios::binary) << steps.substr(0, steps.size() - 1);
+  EXPECT_THROW(CacheReader(folder / "a.splats"), Error);
+  std::ofstream(folder / "a.splats/steps.bin", std::ios::binary) << steps;
+  EXPECT_THROW(CacheReader(folder / "a.splats", 3), Error);
+  std::ofstream(folder / "a.splats/geometry.1/manifest.json", std::ios::app) << " ";
+  EXPECT_THROW(CacheReader(folder / "a.splats", 2), Error);
+  EXPECT_EQ(CacheReader(folder / "a.splats", 1).step(), 1u);
+}
+
+/// A cache of this version, kept with the numbers that read_cache.py decoded from it: it must stay readable.
+TEST(Series, OfAnEarlierProgramIsStillRead) {
+  const fs::path kept = fs::path(CURVISPLAT_TEST_DATA) / "caches/version_2/series.splats";
+  const auto expected = nlohmann::json::parse(readTextFile(fs::path(kept).replace_extension(".json")));
+  const CacheReader cache(kept);
+  ASSERT_EQ(cache.series().steps.size(), expected.size());
+  SplatGeometry geometry;
+  SplatVariable values;
+  for (size_t step = 0; step < expected.size(); ++step) {
+    SCOPED_TRACE(step);
+    const CacheReader at_step = cache.atStep(step);
+    EXPECT_TRUE(verifyCache(at_step).findings.empty());
+    EXPECT_EQ(at_step.manifest().steps.front().time, expected[step]["time"].get<double>());
+    EXPECT_EQ(at_step.series().steps[step].geometry, expected[step]["geometry"].get<uint32_t>());
+    double means = 0, slopes = 0, x = 0;
+    for (uint32_t brick = 0; brick < at_step.bricks().size(); ++brick) {
+      at_step.readGeometry(brick, geometry);
+      at_step.readVariable(brick, 0, values);
+      for (size_t n = 0; n < values.size(); ++n) {
+        means += values.mean[n];
+        slopes += std::abs(values.slope0[n]) + std::abs(values.slope1[n]) + std::abs(values.slope2[n]);
+        x += geometry.x[n];
+      }
+    }
+    EXPECT_NEAR(means, expected[step]["means"].get<double>(), 1e-3);
+    EXPECT_NEAR(slopes, expected[step]["slopes"].get<double>(), 1e-3);
+    EXPECT_NEAR(x, expected[step]["x"].get<double>(), 1e-2);
+  }
+}
+
+TEST(Series, NearestStepInTime) {
+  Series series;
+  for (const double time : {0.0, 1.0, 4.0}) series.add({time, 0, 0, 0, {}});
+  EXPECT_EQ(series.nearest(-5), 0u);
+  EXPECT_EQ(series.nearest(0.4), 0u);
+  EXPECT_EQ(series.nearest(0.5), 0u);
+  EXPECT_EQ(series.nearest(0.6), 1u);
+  EXPECT_EQ(series.nearest(3.9), 2u);
+  EXPECT_EQ(series.nearest(100), 2u);
+}
+
+}  // namespace
+}  // namespace curvisplat

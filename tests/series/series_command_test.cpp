@@ -1,0 +1,244 @@
+// Series of time steps, as a person converts, lists and draws them.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "stream/base/file.h"
+#include "stream/cache/cache_reader.h"
+#include "tests/support/folder_watch.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string bytesOfFile(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+class SeriesCommand : public testing::Test {
+ protected:
+  ProgramResult run(const std::vector<std::string>& arguments) {
+    const ProgramResult result = runProgram(arguments);
+    EXPECT_EQ(result.status, 0) << result.err;
+    return result;
+  }
+  std::string file(const std::string& name) const { return (folder / name).string(); }
+
+  void generate(const std::string& prefix, int steps, std::vector<std::string> more = {}) {
+    more.insert(more.begin(), {"generate", "wake", "--size", "40x30x16", "--steps", std::to_string(steps),
+                               "-o", file(prefix)});
+    run(more);
+  }
+  /// A picture in the view and the function that all tests use.
+  std::string draw(const std::string& cache, const std::string& picture, std::vector<std::string> more = {}) {
+    more.insert(more.begin(), {"render", file(cache), "-o", file(picture), "--size", "80x60", "--view", "+z",
+                               "--range", "0,1", "--opacity-unit", "0.5"});
+    run(more);
+    return bytesOfFile(file(picture));
+  }
+
+  const TemporaryFolder folder;
+};
+
+TEST_F(SeriesCommand, EachStepDrawsAsACacheOfThatStepAlone) {
+  for (const bool moving : {false, true}) {
+    SCOPED_TRACE(moving);
+    const std::string name = moving ? "m" : "f";
+    std::vector<std::string> more;
+    if (moving) more = {"--moving"};
+    generate(name, 5, more);
+    const std::string grid = moving ? file(name + "_%04d.xyz") : file(name + ".xyz");
+    const ProgramResult converted =
+        run({"convert", grid, file(name + "_%04d.fun"), "-o", file(name + ".splats")});
+    EXPECT_EQ(lineCount(converted.out), 2) << converted.out;
+    EXPECT_EQ(CacheReader(file(name + ".splats")).series().geometries(), moving ? 5u : 1u);
+    run({"info", file(name + ".splats"), "--verify"});
+
+    draw(name + ".splats", "frame_%d.png", {"--steps", "all"});
+    for (int step = 0; step < 5; ++step) {
+      SCOPED_TRACE(step);
+      const std::string number = fmt::format("{:04}", step);
+      const std::string own_grid = moving ? file(name + "_" + number + ".xyz") : file(name + ".xyz");
+      fs::remove_all(file("alone.splats"));
+      run({"convert", own_grid, file(name + "_" + number + ".fun"), "-o", file("alone.splats")});
+      const std::string alone = draw("alone.splats", "alone.png");
+      EXPECT_TRUE(draw(name + ".splats", "step.png", {"--step", std::to_string(step)}) == alone);
+      EXPECT_TRUE(draw(name + ".splats", "time.png", {"--time", fmt::format("{}.2", step)}) == alone);
+      // The view of a moving camera stays; a still one fits the step.
+      if (!moving) {
+        EXPECT_TRUE(bytesOfFile(file(fmt::format("frame_{}.png", step))) == alone);
+      }
+    }
+  }
+}
+
+TEST_F(SeriesCommand, DrawsStepsBackwardsInMemoryAndOutOfIt) {
+  generate("f", 4);
+  run({"convert", file("f.xyz"), file("f_%04d.fun"), "-o", file("f.splats")});
+  for (const char* memory : {"512M", "96M"}) {
+    draw("f.splats", "a_%d.png", {"--steps", "1:3:2", "--memory", memory, "--backend", "cpu"});
+    for (const int frame : {0, 1}) {
+      const std::string step = std::to_string(1 + 2 * frame);
+      EXPECT_TRUE(bytesOfFile(file(fmt::format("a_{}.png", frame))) ==
+                  draw("f.splats", "b.png", {"--step", step, "--backend", "cpu"}))
+          << memory << " " << step;
+    }
+  }
+  // Two turns of the camera through the four steps.
+  draw("f.splats", "o_%d.png", {"--steps", "all", "--orbit", "360", "--frames", "8"});
+  EXPECT_TRUE(fs::exists(file("o_7.png")));
+  EXPECT_FALSE(fs::exists(file("o_8.png")));
+}
+
+TEST_F(SeriesCommand, SelectsAddsAndLists) {
+  generate("f", 7);
+  run({"convert", file("f.xyz"), file("f_*.fun"), "-o", file("all.splats")});
+  run({"convert", file("f.xyz"), file("f_*.fun"), "--steps", "1:5:2", "-o", file("some.splats")});
+  run({"convert", file("f.xyz"), file("f_*.fun"), "--every", "3", "-o", file("third.splats")});
+  EXPECT_EQ(CacheReader(file("all.splats")).series().steps.size(), 7u);
+  EXPECT_EQ(CacheReader(file("some.splats")).series().steps.size(), 3u);
+  EXPECT_EQ(CacheReader(file("third.splats")).series().steps.size(), 3u);
+
+  run({"convert", file("f.xyz"), file("f_0000.fun"), "-o", file("added.splats")});
+  run({"convert", "--add-steps", file("f.xyz"), file("f_0001.fun"), "--to", file("added.splats")});
+  const ProgramResult added =
+      run({"convert", "--add-steps", file("f.xyz"), file("f_0002.fun"), file("f_0003.fun"),
+           file("f_0004.fun"), file("f_0005.fun"), file("f_0006.fun"), "--to", file("added.splats")});
+  EXPECT_NE(added.out.find("7 steps, 5 of them converted now"), std::string::npos) << added.out;
+  for (const char* name : {"steps.bin", "var.0.bin", "var.0.6.bin", "geometry.bin"})
+    EXPECT_TRUE(bytesOfFile(file(std::string("added.splats/") + name)) ==
+                bytesOfFile(file(std::string("all.splats/") + name)))
+        << name;
+
+  const ProgramResult info = run({"info", file("all.splats")});
+  EXPECT_NE(info.out.find("steps      7, times 0 to 6, 1 geometry"), std::string::npos) << info.out;
+  const auto json = nlohmann::json::parse(run({"info", file("all.splats"), "--json", "--step", "2"}).out);
+  ASSERT_EQ(json["steps"].size(), 7u);
+  EXPECT_EQ(json["steps"][6]["time"], 6);
+  EXPECT_EQ(json["variables"][0]["max"], json["steps"][2]["variables"][0]["max"]);
+}
+
+TEST_F(SeriesCommand, FollowsWhatASimulationWrites) {
+  generate("f", 3);
+  run({"convert", file("f.xyz"), file("f_*.fun"), "-o", file("all.splats")});
+  const auto move = [&](const std::string& step, const std::string& to) {
+    fs::create_directories(file(to));
+    for (const char* ending : {".fun", ".nam"})
+      fs::rename(file("f_" + step + ending), file(to + "/f_" + step + ending));
+  };
+  // Nothing has been written yet. The first step's file is incomplete at first.
+  for (const char* step : {"0000", "0001", "0002"}) move(step, "later");
+  fs::create_directories(file("run"));
+  fs::rename(file("f.xyz"), file("run/f.xyz"));
+  RunningProgram following({"convert", file("run/f.xyz"), file("run/f_*.fun"), "--follow", "--until", "2",
+                            "-o", file("a.splats")});
+  const std::string first = bytesOfFile(file("later/f_0000.fun"));
+  fs::copy_file(file("later/f_0000.nam"), file("run/f_0000.nam"));
+  std::ofstream(file("run/f_0000.fun"), std::ios::binary) << first.substr(0, 1000);
+  std::ofstream(file("run/f_0000.fun"), std::ios::binary) << first;
+  {
+    FolderWatch watch(folder.path());
+    watch.waitUntil([&] { return fs::exists(file("a.splats")); });
+  }
+  for (const char* step : {"0001", "0002"})
+    for (const char* ending : {".nam", ".fun"})
+      fs::copy_file(file(std::string("later/f_") + step + ending),
+                    file(std::string("run/f_") + step + ending));
+  const ProgramResult result = following.wait();
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_NE(result.out.find("2 steps"), std::string::npos) << result.out;
+  EXPECT_EQ(CacheReader(file("a.splats")).series().steps.size(), 2u);
+
+  // Ended by a signal, and continued. The cache is whole in between.
+  RunningProgram interrupted(
+      {"convert", file("run/f.xyz"), file("run/f_*.fun"), "--follow", "--resume", "-o", file("a.splats")});
+  {
+    FolderWatch watch(file("a.splats"));
+    watch.waitUntil([&] { return CacheReader(file("a.splats")).series().steps.size() == 3; });
+  }
+  interrupted.signal(SIGTERM);
+  const ProgramResult ended = interrupted.wait();
+  EXPECT_EQ(ended.status, 128 + SIGTERM);
+  EXPECT_EQ(lineCount(ended.err), 1) << ended.err;
+  for (const char* name : {"steps.bin", "var.0.bin", "var.0.1.bin", "var.0.2.bin", "geometry.bin"})
+    EXPECT_TRUE(bytesOfFile(file(std::string("a.splats/") + name)) ==
+                bytesOfFile(file(std::string("all.splats/") + name)))
+        << name;
+}
+
+TEST_F(SeriesCommand, FileSeriesOfParaView) {
+  generate("f", 3);
+  // A .series takes files of any format; times are its own.
+  std::ofstream(file("s.p3d.series")) << R"({"file-series-version": "1.0", "files": [
+      {"name": "two.p3d", "time": 5}, {"name": "one.p3d", "time": 2.5}]})";
+  std::ofstream(file("one.p3d"))
+      << R"({"filenames": [{"time": 0, "xyz": "f.xyz", "function": "f_0000.fun"}]})";
+  std::ofstream(file("two.p3d"))
+      << R"({"filenames": [{"time": 0, "xyz": "f.xyz", "function": "f_0001.fun"}]})";
+  run({"convert", file("s.p3d.series"), "--steps", "all", "-o", file("a.splats")});
+  const CacheReader cache(file("a.splats"));
+  ASSERT_EQ(cache.series().steps.size(), 2u);
+  EXPECT_EQ(cache.series().steps[0].time, 2.5);
+  EXPECT_EQ(cache.series().steps[1].time, 5);
+  EXPECT_EQ(cache.series().geometries(), 1u);
+  // Without --steps it is one step, and a note says so.
+  const ProgramResult one = run({"convert", file("s.p3d.series"), "-o", file("b.splats")});
+  EXPECT_NE(one.err.find("2 time steps"), std::string::npos) << one.err;
+  // So is a .p3d of several steps.
+  std::ofstream(file("both.p3d")) << R"({"filenames": [{"time": 1, "xyz": "f.xyz", "function": "f_0000.fun"},
+      {"time": 2, "xyz": "f.xyz", "function": "f_0002.fun"}]})";
+  run({"convert", file("both.p3d"), "--steps", "all", "-o", file("c.splats")});
+  EXPECT_EQ(CacheReader(file("c.splats")).series().steps.size(), 2u);
+}
+
+TEST_F(SeriesCommand, RefusesInOneLine) {
+  generate("f", 3);
+  const auto refused = [&](const std::vector<std::string>& arguments, int status, const std::string& words) {
+    const ProgramResult result = runProgram(arguments);
+    EXPECT_EQ(result.status, status) << result.err;
+    EXPECT_EQ(lineCount(result.err), 1) << result.err;
+    EXPECT_NE(result.err.find(words), std::string::npos) << result.err;
+  };
+  refused({"convert", file("f.xyz"), file("g_*.fun"), "-o", file("a.splats")}, 1, "g_*.fun");
+  refused({"convert", file("f.xyz"), file("f_*.fun"), "--steps", "5:9", "-o", file("a.splats")}, 2,
+          "3 steps");
+  refused({"convert", file("f.xyz"), file("f_*.fun"), "--steps", "1:x", "-o", file("a.splats")}, 2,
+          "FIRST:LAST");
+  refused({"convert", file("f.xyz"), file("f_*.fun"), "--time-step", "1", "-o", file("a.splats")}, 2,
+          "--steps 1");
+  refused({"convert", "--add-steps", file("f.xyz"), file("f_0000.fun")}, 2, "--to");
+  run({"convert", file("f.xyz"), file("f_*.fun"), "-o", file("a.splats")});
+  refused({"render", file("a.splats"), "-o", file("a.png"), "--step", "3"}, 2, "steps 0 to 2");
+  refused({"render", file("a.splats"), "-o", file("a.png"), "--steps", "all"}, 2, "frame");
+  refused({"convert", file("f.xyz"), file("f_0000.fun"), "--add-scalar", "f", "--to", file("a.splats")}, 1,
+          "series of 3 steps");
+
+  // A step of another size is named, and left out with --keep-going.
+  run({"generate", "wake", "--size", "20x30x16", "-o", file("other")});
+  fs::copy_file(file("other.fun"), file("f_0003.fun"));
+  fs::copy_file(file("f_0002.fun"), file("f_0004.fun"));
+  for (const char* name : {"f_0003.nam", "f_0004.nam"}) fs::copy_file(file("f_0000.nam"), file(name));
+  const ProgramResult broken =
+      runProgram({"convert", file("f.xyz"), file("f_*.fun"), "-o", file("b.splats")});
+  EXPECT_EQ(broken.status, 1);
+  EXPECT_NE(broken.err.find("step 3"), std::string::npos) << broken.err;
+  EXPECT_NE(broken.err.find("f_0003.fun"), std::string::npos) << broken.err;
+  EXPECT_EQ(CacheReader(file("b.splats")).series().steps.size(), 3u);
+  const ProgramResult kept =
+      run({"convert", file("f.xyz"), file("f_*.fun"), "-o", file("c.splats"), "--keep-going"});
+  EXPECT_NE(kept.err.find("left out step 3"), std::string::npos) << kept.err;
+  EXPECT_EQ(CacheReader(file("c.splats")).series().steps.size(), 4u);
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,151 @@
+// Series of every format that has time steps: each step must be what converting that step alone gives.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "stream/cache/cache_reader.h"
+#include "stream/cache/cache_verify.h"
+#include "tests/support/cgns_writer.h"
+#include "tests/support/earth_files.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/vts_writer.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+class SeriesFormats : public testing::Test {
+ protected:
+  void run(const std::vector<std::string>& arguments) {
+    const ProgramResult result = runProgram(arguments);
+    ASSERT_EQ(result.status, 0) << result.err;
+  }
+  std::string file(const std::string& name) const { return (folder / name).string(); }
+
+  /// Converts `series` to a.splats with --steps all and compares step n with what `alone(n)` names.
+  template <typename Alone>
+  void expectEachAsAlone(const std::string& series, const std::vector<uint32_t>& geometries,
+                         const Alone& alone, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> words{"convert", series,           "--steps",    "all",
+                                   "-o",      file("a.splats"), "--overwrite"};
+    words.insert(words.end(), more.begin(), more.end());
+    run(words);
+    const CacheReader cache(file("a.splats"));
+    ASSERT_EQ(cache.series().steps.size(), geometries.size());
+    for (size_t step = 0; step < geometries.size(); ++step) {
+      SCOPED_TRACE(step);
+      EXPECT_EQ(cache.series().steps[step].geometry, geometries[step]);
+      words = alone(step);
+      words.insert(words.begin(), "convert");
+      words.insert(words.end(), {"-o", file("b.splats"), "--overwrite"});
+      words.insert(words.end(), more.begin(), more.end());
+      run(words);
+      const CacheReader found = cache.atStep(step), wanted(file("b.splats"));
+      for (const std::string& finding : verifyCache(found).findings) ADD_FAILURE() << finding;
+      expectSame(found, wanted);
+    }
+  }
+
+  static void expectSame(const CacheReader& found, const CacheReader& wanted) {
+    ASSERT_EQ(found.bricks().size(), wanted.bricks().size());
+    EXPECT_EQ(found.manifest().blanked_nodes, wanted.manifest().blanked_nodes);
+    SplatGeometry geometry, wanted_geometry;
+    SplatVariable values, wanted_values;
+    for (uint32_t brick = 0; brick < wanted.bricks().size(); ++brick) {
+      found.readGeometry(brick, geometry);
+      wanted.readGeometry(brick, wanted_geometry);
+      EXPECT_EQ(geometry.x, wanted_geometry.x);
+      EXPECT_EQ(geometry.border_code, wanted_geometry.border_code);
+      for (size_t v = 0; v < wanted.manifest().variables.size(); ++v) {
+        EXPECT_EQ(found.manifest().variables[v].min, wanted.manifest().variables[v].min);
+        found.readVariable(brick, v, values);
+        wanted.readVariable(brick, v, wanted_values);
+        EXPECT_EQ(values.mean, wanted_values.mean);
+        EXPECT_EQ(values.slope2, wanted_values.slope2);
+        EXPECT_EQ(values.variance, wanted_values.variance);
+      }
+    }
+  }
+
+  const TemporaryFolder folder;
+};
+
+TEST_F(SeriesFormats, TimeDimensionOfNetcdf) {
+  nemo::write(file("nemo.nc"), NetcdfFileType::kNetcdf4, false);
+  expectEachAsAlone(file("nemo.nc"), {0, 0, 0}, [&](size_t step) {
+    return std::vector<std::string>{file("nemo.nc"), "--time-step", std::to_string(step)};
+  });
+  // Levels that follow the surface move with it.
+  roms::write(file("roms.nc"), NetcdfFileType::kClassic, "ocean_s_coordinate_g2");
+  expectEachAsAlone(file("roms.nc"), {0, 1},
+                    [&](size_t step) {
+                      return std::vector<std::string>{file("roms.nc"), "--time-step", std::to_string(step)};
+                    },
+                    {"--scalar", "temp"});
+}
+
+TEST_F(SeriesFormats, BaseIterativeDataOfCgns) {
+  {
+    CgnsWriter writer(file("a.cgns"), CgnsFileType::kHdf5);
+    const auto field = [](const char* name, double of_i, double of_j, double of_k, double add) {
+      return CgnsWriterField{name, [=](int64_t i, int64_t j, int64_t k) {
+                               return of_i * static_cast<double>(i) + of_j * static_cast<double>(j * j) +
+                                      of_k * static_cast<double>(k) + add;
+                             }};
+    };
+    writer.base("base");
+    writer.zone("zone", {6, 5, 4});
+    for (const double shift : {0.0, 0.25})
+      writer.coordinates(shift == 0 ? "GridCoordinates" : "Moved",
+                         {field("CoordinateX", 1, 0.01, 0, shift), field("CoordinateY", 0, 0.5, 0.1, 0),
+                          field("CoordinateZ", 0, 0, 1, 0)});
+    for (const int step : {0, 1, 2})
+      writer.solution("step" + std::to_string(step), "Vertex",
+                      {field("Density", 0.1 * step, 0.2, 0.3, step)});
+    writer.baseSteps({0.5, 1, 1.5});
+    writer.zoneSteps({"step0", "step1", "step2"}, {"GridCoordinates", "GridCoordinates", "Moved"});
+  }
+  expectEachAsAlone(file("a.cgns"), {0, 0, 1}, [&](size_t step) {
+    return std::vector<std::string>{file("a.cgns"), "--time-step", std::to_string(step)};
+  });
+  EXPECT_EQ(CacheReader(file("a.splats")).series().steps[2].time, 1.5);
+}
+
+TEST_F(SeriesFormats, CellCentredFilesAndTheirCollections) {
+  std::string pvd = "<VTKFile type=\"Collection\" version=\"0.1\"><Collection>";
+  std::string series = R"({"file-series-version": "1.0", "files": [)";
+  for (int step = 0; step < 3; ++step) {
+    VtsGrid grid = annulusVtsGrid(9, 8, 7);
+    for (VtsArray& array : grid.cell_data)
+      for (double& value : array.values) value = static_cast<float>(value * (1 + 0.1 * step) + step);
+    const std::string name = "c_" + std::to_string(step) + ".vts";
+    std::ofstream(file(name), std::ios::binary) << vtsFile(grid, {});
+    pvd += "<DataSet timestep=\"" + std::to_string(0.5 * step) + "\" file=\"" + name + "\"/>";
+    series += (step ? ", " : "") + std::string(R"({"name": ")") + name + R"(", "time": )" +
+              std::to_string(2 * step) + "}";
+  }
+  std::ofstream(file("c.pvd")) << pvd << "</Collection></VTKFile>";
+  std::ofstream(file("c.vts.series")) << series << "]}";
+  const std::vector<std::string> cells{"--scalar", "T"};
+  const auto alone = [&](size_t step) {
+    return std::vector<std::string>{file("c_" + std::to_string(step) + ".vts")};
+  };
+  expectEachAsAlone(file("c_*.vts"), {0, 0, 0}, alone, cells);
+  EXPECT_TRUE(CacheReader(file("a.splats")).manifest().cells);
+  expectEachAsAlone(file("c.pvd"), {0, 0, 0}, alone, cells);
+  EXPECT_EQ(CacheReader(file("a.splats")).series().steps[2].time, 1);
+  expectEachAsAlone(file("c.vts.series"), {0, 0, 0}, alone, cells);
+  EXPECT_EQ(CacheReader(file("a.splats")).series().steps[2].time, 4);
+  // Without quotes the shell expands the pattern.
+  run({"convert", file("c_0.vts"), file("c_2.vts"), file("c_1.vts"), "--scalar", "T", "-o",
+       file("d.splats")});
+  EXPECT_EQ(CacheReader(file("d.splats")).series().steps.size(), 3u);
+}
+
+}  // namespace
+}  // namespace curvisplat

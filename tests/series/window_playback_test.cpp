@@ -1,0 +1,104 @@
+// The window on a series of time steps: slider, play and step keys.
+#include <gtest/gtest.h>
+
+#include "tests/end_to_end/window_fixture.h"
+#include "tools/viewer/playback.h"
+
+namespace curvisplat {
+namespace {
+
+TEST(Playback, StepsAndLoops) {
+  Playback playback(3);
+  EXPECT_FALSE(playback.isPlaying());
+  EXPECT_FALSE(playback.next());
+  EXPECT_TRUE(playback.advance(true));
+  EXPECT_TRUE(playback.advance(true));
+  EXPECT_EQ(playback.step(), 2u);
+  EXPECT_TRUE(playback.advance(true));
+  EXPECT_EQ(playback.step(), 0u);
+  EXPECT_TRUE(playback.advance(false));
+  EXPECT_EQ(playback.step(), 2u);
+  playback.setLoop(false);
+  EXPECT_FALSE(playback.advance(true));
+  EXPECT_TRUE(playback.goTo(1));
+  EXPECT_FALSE(playback.goTo(1));
+  EXPECT_TRUE(playback.goTo(7));
+  EXPECT_EQ(playback.step(), 2u);
+}
+
+TEST(Playback, GoesOnWhenTheStepHasBeenShown) {
+  Playback playback(3);
+  playback.setLoop(false);
+  playback.setStepsPerSecond(10);
+  EXPECT_FALSE(playback.tick(0));
+  playback.toggle();
+  EXPECT_EQ(playback.next(), 1u);
+  EXPECT_FALSE(playback.tick(5));  // shown since now
+  EXPECT_NEAR(playback.wait(5.06), 0.04, 1e-9);
+  EXPECT_FALSE(playback.tick(5.06));
+  EXPECT_TRUE(playback.tick(5.11));
+  EXPECT_EQ(playback.step(), 1u);
+  EXPECT_FALSE(playback.tick(6));  // however long its picture took
+  EXPECT_TRUE(playback.tick(6.2));
+  EXPECT_FALSE(playback.next());
+  EXPECT_FALSE(playback.tick(7));
+  EXPECT_TRUE(playback.tick(7.2));  // the end: drawn again, at rest
+  EXPECT_FALSE(playback.isPlaying());
+  EXPECT_EQ(playback.step(), 2u);
+  playback.toggle();
+  EXPECT_EQ(playback.step(), 0u);
+  Playback steady(1);
+  steady.toggle();
+  EXPECT_FALSE(steady.isPlaying());
+}
+
+class WindowPlayback : public WindowTest {
+ protected:
+  void SetUp() override {
+    WindowTest::SetUp();
+    if (IsSkipped()) return;
+    run({"generate", "wake", "--size", "32x24x12", "--steps", "4", "-o", "w"});
+    run({"convert", "w.xyz", "w_%04d.fun", "-o", "a.splats", "--overwrite"});
+  }
+};
+
+TEST_F(WindowPlayback, KeysChooseTheStepAndPlay) {
+  open();
+  const Image first = saveAndCopy();
+  press("period");
+  const Image second = saveAndCopy();
+  press("comma");
+  press("comma");  // round to the last
+  const Image last = saveAndCopy();
+  EXPECT_LT(difference(first, second), 60);
+  EXPECT_LT(difference(second, last), 60);
+
+  // Plays: pictures of other steps come by themselves. Stopped, the picture is of one step, and final.
+  const Image before = shown(last.size);
+  press("space");
+  EXPECT_TRUE(eventually([&] { return difference(shown(last.size), before) < 60; }));
+  press("space");
+  const Image stopped = saveAndCopy();
+
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 4u);
+  EXPECT_EQ(valueOf(commands[0], "--step"), "0");
+  EXPECT_EQ(valueOf(commands[1], "--step"), "1");
+  EXPECT_EQ(valueOf(commands[2], "--step"), "3");
+  expectDraws(commands[0], first);
+  expectDraws(commands[1], second);
+  expectDraws(commands[2], last);
+  expectDraws(commands[3], stopped);
+}
+
+TEST_F(WindowPlayback, OpensAtAStep) {
+  open({"--step", "2"});
+  const Image picture = saveAndCopy();
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_EQ(valueOf(commands[0], "--step"), "2");
+  expectDraws(commands[0], picture);
+}
+
+}  // namespace
+}  // namespace curvisplat

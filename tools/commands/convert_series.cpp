@@ -1,0 +1,248 @@
+#include "tools/commands/convert_series.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+#include <thread>
+
+#include "preprocess/addition/convert_series.h"
+#include "preprocess/formats/open/series_files.h"
+#include "stream/base/error.h"
+#include "stream/base/message.h"
+#include "stream/base/paths.h"
+#include "stream/cache/cache_reader.h"
+#include "tools/options/option_parsers.h"
+#include "tools/output/output_paths.h"
+#include "tools/output/progress_bar.h"
+#include "tools/output/run_statistics.h"
+#include "tools/output/stop_signals.h"
+#include "tools/output/thread_failures.h"
+
+namespace curvisplat {
+namespace {
+
+void checkArguments(const ConvertArguments& arguments) {
+  if (arguments.grid.time_step)
+    throw UsageError("--time-step {}: chooses one step, and there are several here; use --steps {}",
+                     *arguments.grid.time_step, *arguments.grid.time_step);
+  if (!arguments.adds_steps) return;
+  const auto refuse = [](bool given, const char* option) {
+    if (given)
+      throw UsageError("{} cannot be combined with --add-steps, which changes an existing cache", option);
+  };
+  if (arguments.to.empty()) throw UsageError("--add-steps needs --to CACHE, the cache to add to");
+  refuse(!arguments.output.empty(), "--output");
+  refuse(!arguments.scalars.empty(), "--scalar");
+  refuse(!arguments.added_scalars.empty(), "--add-scalar");
+  refuse(arguments.overwrite, "--overwrite");
+}
+
+/// The steps that --steps and --every leave of those that the files have.
+std::vector<StepFiles> chosenSteps(const ConvertArguments& arguments) {
+  std::vector<StepFiles> all = stepsOf(arguments.grid);
+  StepSelection selection = parseSteps("--steps", arguments.steps.value_or("all"));
+  if (arguments.every) selection.stride *= *arguments.every;
+  std::vector<StepFiles> chosen;
+  for (const uint64_t step : selectedSteps("--steps", selection, all.size())) chosen.push_back(all[step]);
+  return chosen;
+}
+
+SeriesOptions seriesOptions(const ConvertArguments& arguments) {
+  SeriesOptions options;
+  options.convert.output = linkTarget(arguments.adds_steps ? arguments.to : arguments.output);
+  options.convert.overwrite = arguments.overwrite;
+  options.convert.resume = arguments.resume;
+  options.convert.title = arguments.grid.grid.stem().string();
+  applyCommonOptions(arguments, options.convert);
+  options.keep_going = arguments.keep_going;
+  options.add = arguments.adds_steps;
+  return options;
+}
+
+SeriesInput seriesInput(const ConvertArguments& arguments, const std::vector<StepFiles>& steps) {
+  SeriesInput input;
+  input.count = steps.size();
+  input.name = [&](uint64_t step) { return steps[step].name; };
+  input.open = [&](uint64_t step) {
+    ConvertArguments of_step = arguments;
+    of_step.grid = steps[step].options;
+    return openSource(of_step, arguments.adds_steps ? arguments.to : arguments.output);
+  };
+  input.scalars = [&](const GridDescription& description) {
+    return chooseScalars(arguments, arguments.scalars, description);
+  };
+  return input;
+}
+
+/// Prints each step as it comes, and keeps what --stats reports.
+class StepLog {
+ public:
+  explicit StepLog(Progress& progress) : progress_(progress) {}
+
+  void add(const SeriesEvent& event) {
+    const double now = secondsOf(progress_), seconds = now - before_;
+    before_ = now;
+    if (!event.reason.empty()) {
+      progress_.end();
+      printMessage("warning: left out {}: {}", event.name, event.reason);
+      return;
+    }
+    if (event.source)
+      for (const std::string& warning : event.source->warnings) printMessage("warning: {}", warning);
+    const std::vector<FileReport>& files = event.added ? event.added->files : event.converted->files;
+    const bool is_new = !event.added || event.added->new_geometry;
+    steps_.push_back(
+        {{"name", event.name}, {"seconds", seconds}, {"bytes", totalBytes(files)}, {"new_geometry", is_new}});
+    bytes_ += totalBytes(files);
+  }
+
+  uint64_t bytes() const { return bytes_; }
+  const nlohmann::json& steps() const { return steps_; }
+
+ private:
+  Progress& progress_;
+  nlohmann::json steps_ = nlohmann::json::array();
+  uint64_t bytes_ = 0;
+  double before_ = 0;
+};
+
+constexpr auto kPollInterval = std::chrono::milliseconds(250);
+// A file that has not changed for this long has been written.
+constexpr auto kSettled = std::chrono::seconds(2);
+
+/// The files of a running simulation that have been written and are not in the cache.
+class WrittenFiles {
+ public:
+  explicit WrittenFiles(const ConvertArguments& arguments) : arguments_(arguments) {}
+
+  void markDone(const std::vector<std::string>& files) { done_.insert(files.begin(), files.end()); }
+
+  /// The next step whose files are all written; nullopt if there is none yet. Steps come in their order.
+  std::optional<StepFiles> next() {
+    std::vector<StepFiles> steps;
+    try {
+      OpenGridOptions files = arguments_.grid;
+      expandPatterns(files);
+      steps = stepsByName(files);
+    } catch (const Error&) {
+      return std::nullopt;  // none has been written yet, or not every kind of file
+    }
+    for (const StepFiles& step : steps) {
+      if (done_.contains(step.name)) continue;
+      if (!isSettled(step.options)) return std::nullopt;
+      done_.insert(step.name);
+      return step;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  /// Whether no file of the step has changed for a while.
+  static bool isSettled(const OpenGridOptions& options) {
+    std::vector<std::filesystem::path> files = options.solutions;
+    files.push_back(options.grid);
+    for (const std::filesystem::path& path : files) {
+      std::error_code error;
+      const auto written = std::filesystem::last_write_time(path, error);
+      if (error || std::filesystem::file_time_type::clock::now() - written < kSettled) return false;
+    }
+    return true;
+  }
+
+  const ConvertArguments& arguments_;
+  std::set<std::string> done_;  // names of steps
+};
+
+/// Converts what a simulation writes until the cache has enough steps. Throws Interrupted.
+void follow(const ConvertArguments& arguments) {
+  SeriesOptions options = seriesOptions(arguments);
+  Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
+  StepLog log(progress);
+  WrittenFiles files(arguments);
+  uint64_t steps = 0;
+  const std::filesystem::path manifest = options.convert.output / "manifest.json";
+  if (options.add || (options.convert.resume && std::filesystem::exists(manifest))) {
+    const CacheReader cache(options.convert.output);
+    files.markDone(cache.seriesManifest().sources);
+    steps = cache.series().steps.size();
+    options.add = true;
+  }
+  while (!arguments.until || steps < *arguments.until) {
+    const std::optional<StepFiles> step = files.next();
+    if (!step) {
+      progress.throwIfStopped();
+      std::this_thread::sleep_for(kPollInterval);
+      continue;
+    }
+    const std::vector<StepFiles> one{*step};
+    const SeriesReport report = convertSeries(seriesInput(arguments, one), options, progress,
+                                              [&](const SeriesEvent& event) { log.add(event); });
+    if (report.converted > 0) fmt::print("step {}: {}\n", report.steps - 1, step->name);
+    std::fflush(stdout);
+    steps = report.steps;
+    options.add = true;
+    options.convert.overwrite = false;
+  }
+  fmt::print("{}: {} steps\n", options.convert.output.string(), steps);
+}
+
+}  // namespace
+
+bool isSeries(ConvertArguments& arguments) {
+  if (arguments.follows) return true;
+  expandPatterns(arguments.grid);
+  return arguments.adds_steps || arguments.steps || arguments.every || hasSeveralStepFiles(arguments.grid);
+}
+
+void runConvertSeries(ConvertArguments arguments) {
+  checkArguments(arguments);
+  if (!arguments.adds_steps && arguments.output.empty()) throw UsageError("--output is required");
+  for (auto* path : {&arguments.output, &arguments.to})
+    if (!path->empty() && !path->has_filename()) *path = path->parent_path();  // "NAME.splats/"
+  if (!arguments.adds_steps) checkOutputFolder("-o", arguments.output);
+  if (arguments.follows) {
+    if (arguments.steps || arguments.every)
+      throw UsageError("--follow takes all steps; leave out --steps and --every");
+    requireThreads(arguments.threads);
+    return follow(arguments);
+  }
+  const SeriesOptions options = seriesOptions(arguments);
+  const std::vector<StepFiles> steps = chosenSteps(arguments);
+  const SeriesInput input = seriesInput(arguments, steps);
+
+  requireThreads(arguments.threads);
+  Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
+  StepLog log(progress);
+  const SeriesReport report =
+      convertSeries(input, options, progress, [&](const SeriesEvent& event) { log.add(event); });
+
+  const double seconds = secondsOf(progress);
+  const auto samples = static_cast<double>(report.nodes * report.converted);
+  fmt::print("{}: {} steps{}, {} of them converted now, {} with a geometry of their own\n",
+             options.convert.output.string(), report.steps,
+             report.left_out > 0 ? fmt::format(" ({} left out)", report.left_out) : "", report.converted,
+             report.new_geometries);
+  if (report.converted > 0)
+    fmt::print("{:.1f} s, {:.2f} M samples/s, {:.1f} MiB, {:.2f} bytes per sample and step{}\n", seconds,
+               1e-6 * samples / seconds, mebibytes(log.bytes()), static_cast<double>(log.bytes()) / samples,
+               peakMemoryText());
+  if (arguments.statistics.empty()) return;
+  nlohmann::json json = runStatistics();
+  json["steps"] = report.steps;
+  json["converted"] = report.converted;
+  json["left_out"] = report.left_out;
+  json["new_geometries"] = report.new_geometries;
+  json["samples"] = report.nodes;
+  json["each_step"] = log.steps();
+  addPhases(progress, json);
+  writeStatistics(arguments.statistics, json);
+}
+
+}  // namespace curvisplat

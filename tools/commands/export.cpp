@@ -1,0 +1,143 @@
+// `curvisplat export`: a classified cut of a cache as 3D Gaussian splats.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <glm/geometric.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "render/export/gaussian_files.h"
+#include "render/export/gaussian_picture.h"
+#include "render/frame/frame.h"
+#include "stream/base/message.h"
+#include "stream/base/progress.h"
+#include "stream/cache/cache_reader.h"
+#include "tools/commands/commands.h"
+#include "tools/options/option_parsers.h"
+#include "tools/options/picture_choice.h"
+#include "tools/options/scalar_arguments.h"
+#include "tools/output/output_paths.h"
+#include "tools/output/progress_bar.h"
+#include "tools/output/stop_signals.h"
+
+namespace curvisplat {
+namespace {
+
+struct ExportArguments {
+  std::filesystem::path cache, output;
+  ScalarArguments scalar;
+  std::string max_splats = "1M", memory = "512M";
+  bool no_comparison = false;
+};
+
+constexpr ImageSize kComparedSize{512, 512};
+
+/// The corners of an icosahedron: twelve directions, evenly spread.
+std::vector<glm::dvec3> twelveDirections() {
+  const double golden = 0.5 * (1 + std::sqrt(5.0));
+  std::vector<glm::dvec3> directions;
+  for (const double one : {-1.0, 1.0})
+    for (const double wide : {-golden, golden})
+      for (const glm::dvec3& corner : {glm::dvec3(0, one, wide), {one, wide, 0}, {wide, 0, one}})
+        directions.push_back(glm::normalize(corner));
+  return directions;
+}
+
+struct Comparison {
+  double mean_db = 0, least_db = 0;
+};
+
+/// The exported splats, drawn as their viewers do, against our own pictures.
+Comparison compare(const CacheReader& cache, size_t variable, const TransferFunction& function,
+                   const std::vector<GaussianSplat>& splats, uint64_t memory, Progress& progress) {
+  const Manifest& manifest = cache.manifest();
+  FrameRenderer renderer(cache, variable, function);
+  FrameOptions options;
+  options.size = kComparedSize;
+  options.memory_bytes = memory;
+  const std::vector<glm::dvec3> directions = twelveDirections();
+  progress.begin("comparing", directions.size(), "pictures");
+  double squares = 0, largest = 0;
+  for (const glm::dvec3& direction : directions) {
+    Camera camera;
+    camera.focal_point = 0.5 * (manifest.lower + manifest.upper);
+    camera.position = camera.focal_point + glm::length(manifest.upper - manifest.lower) * direction;
+    camera.view_up = {0, 0, 1};
+    camera.parallel_scale = camera.parallelScaleFor(manifest.lower, manifest.upper, kComparedSize);
+    FrameStatistics statistics;
+    const Image ours = renderer.render(camera, options, statistics);
+    const double db = compareImages(drawGaussians(splats, camera, kComparedSize), ours).psnr_db;
+    const double square = std::pow(10, -0.1 * db);
+    squares += square / static_cast<double>(directions.size());
+    largest = std::max(largest, square);
+    progress.advance(1);
+  }
+  progress.end();
+  return {-10 * std::log10(squares), -10 * std::log10(largest)};
+}
+
+void exportCache(const ExportArguments& arguments) {
+  checkGaussianName(arguments.output);
+  checkFunctionArguments(arguments.scalar);
+  checkOutputFile("-o", arguments.output, {arguments.cache, arguments.scalar.transfer_function.value_or("")});
+  const uint64_t max_splats = parseCount("--max-splats", arguments.max_splats);
+  const uint64_t memory = parseMemory("--memory", arguments.memory);
+
+  const CacheReader cache(arguments.cache);
+  const size_t variable = chooseVariable(cache, arguments.scalar);
+  PictureChoice choice(cache, variable, glm::dvec3(1));
+  const TransferFunction function = choice.function(arguments.scalar);
+  for (const std::string& note : function.notes()) printMessage("note: {}", note);
+
+  Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
+  const std::vector<GaussianSplat> splats = gaussianSplats(cache, variable, function, max_splats, progress);
+  if (splats.empty())
+    throw Error(
+        "{}: nothing to export: the transfer function makes all of {} transparent; give --opacity or a "
+        "smaller --opacity-unit",
+        arguments.cache.string(), cache.manifest().variables[variable].name);
+  writeGaussians(splats, arguments.output);
+  fmt::print("{}: {} splats of {}, {:.1f} MiB\n", arguments.output.string(), splats.size(),
+             cache.manifest().variables[variable].name,
+             static_cast<double>(std::filesystem::file_size(arguments.output)) / (1 << 20));
+  if (!arguments.no_comparison) {
+    const Comparison found = compare(cache, variable, function, splats, memory, progress);
+    fmt::print("against curvisplat's own pictures from 12 directions: {:.1f} dB, {:.1f} dB at worst\n",
+               found.mean_db, found.least_db);
+  }
+  if (arguments.output.extension() == ".spz") {
+    const SpzFrame frame = spzFrameOf(splats);
+    fmt::print("a position p is stored as (p - ({:g}, {:g}, {:g})) * {:g}\n", frame.centre.x, frame.centre.y,
+               frame.centre.z, frame.scale);
+  }
+  if (!choice.chosenOptions().empty()) fmt::print("chosen from the data: {}\n", choice.chosenOptions());
+}
+
+}  // namespace
+
+void addExport(CLI::App& app) {
+  auto arguments = std::make_shared<ExportArguments>();
+  CLI::App* command = app.add_subcommand(
+      "export", "Export a cache as 3D Gaussian splats, which web viewers and game engines draw");
+  command->add_option("CACHE", arguments->cache, "Splat cache, a directory NAME.splats")->required();
+  command->add_option("-o,--output", arguments->output, "File to write: .ply or .spz")->required();
+  addScalarOption(*command, arguments->scalar);
+  addFunctionOptions(*command, arguments->scalar, "Data and colours");
+  command
+      ->add_option("--max-splats", arguments->max_splats,
+                   "Splat limit, such as 8M or 500K; the largest detail is kept first")
+      ->capture_default_str();
+  command->add_option("--memory", arguments->memory, "Memory limit for the pictures of the comparison")
+      ->capture_default_str();
+  command->add_flag("--no-comparison", arguments->no_comparison,
+                    "Do not draw and compare the splats from 12 directions");
+  command->callback([arguments] { exportCache(*arguments); });
+}
+
+}  // namespace curvisplat

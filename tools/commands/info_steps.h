@@ -1,0 +1,25 @@
+// The time steps of a cache, for `info`.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "stream/base/progress.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/cache/cache_verify.h"
+
+namespace curvisplat {
+
+/// Prints the number of steps, and of a series a line for each: its time, its geometry, and the ranges of its
+/// scalars. Of more than 24 steps the middle ones are left out.
+void printSteps(const CacheReader& reader);
+
+/// [step]: time, geometry, and for each scalar its range and bytes.
+nlohmann::ordered_json stepsAsJson(const CacheReader& reader);
+
+/// Bytes of all files of the series, steps.bin and those of further geometries included.
+uint64_t seriesBytes(const CacheReader& reader);
+
+/// verifyCache() at all steps. Findings of a series name the step.
+CacheVerification verifySteps(const CacheReader& reader, Progress& progress);
+
+}  // namespace curvisplat
