@@ -14,6 +14,7 @@
 
 #include "render/cpu/splat_bins.h"
 #include "render/cpu/tile.h"
+#include "render/cpu/tile_windows.h"
 #include "stream/base/stage_timer.h"
 
 namespace curvisplat {
@@ -66,6 +67,7 @@ struct CpuPainter::State {
   size_t batch_splats = 0;
   hwy::AlignedFreeUniquePtr<float[]> tiles;
   std::unique_ptr<std::atomic<BlockMask>[]> open;  // [tile]: written by who paints it, read by anyone
+  WindowTiles windows;
   std::optional<SplatBins> bins;
   std::optional<ShadingTable> table;
   std::optional<tbb::task_arena> arena;
@@ -106,6 +108,7 @@ void CpuPainter::begin(ImageSize size, const glm::vec4& background, const Classi
   state.background = background;
   state.bins->clear();  // of a frame that was not ended
   state.bins->open();
+  state.arena->execute([&] { state.windows.begin(shading.layers); });
   state.forTiles([&](size_t number) { state.clear(number); });
 }
 
@@ -148,10 +151,10 @@ void CpuPainter::State::paintBatch() {
     const std::span<const uint32_t> order = bins->tile(static_cast<int>(number));
     if (order.empty()) return;
     const auto columns = static_cast<size_t>(bins->columns());
-    const BlockMask left =
-        paintTile({tile(number), static_cast<int>(number % columns) * kTileSide,
-                   static_cast<int>(number / columns) * kTileSide,
-                   open[number].load(std::memory_order_relaxed), bins->splats(), order, *table, shading});
+    const BlockMask left = paintTile({tile(number), static_cast<int>(number % columns) * kTileSide,
+                                      static_cast<int>(number / columns) * kTileSide,
+                                      open[number].load(std::memory_order_relaxed), bins->splats(), order,
+                                      *table, shading, windows.tile(number)});
     open[number].store(left, std::memory_order_relaxed);
     if (left == 0) bins->close(static_cast<int>(number));
   });
@@ -193,16 +196,28 @@ Image CpuPainter::end() {
   const auto columns = static_cast<size_t>(state.bins->columns());
   state.forTiles([&](size_t number) {
     const float* tile = state.tile(number);
+    const TileWindows* const windows = state.windows.tile(number);
     const int x0 = static_cast<int>(number % columns) * kTileSide;
     const int y0 = static_cast<int>(number / columns) * kTileSide;
     for (int y = 0; y < std::min(kTileSide, state.size.height - y0); ++y)
       for (int x = 0; x < std::min(kTileSide, state.size.width - x0); ++x) {
         const float* block = tile + (y / kBlockSide * kTileBlocks + x / kBlockSide) * kBlockFloats;
         const float* from = block + y % kBlockSide * kBlockSide + x % kBlockSide;
+        PixelResult result;
+        result.add({from[0], from[kBlockPixels], from[2 * kBlockPixels]}, from[3 * kBlockPixels]);
+        if (windows) {
+          const auto layers = state.shading.layers->at(x0 + x, y0 + y);
+          const float* behind = windows->behind + (from - tile);
+          for (size_t n = 0; n < layers.size(); ++n) {
+            result.add(glm::vec3(layers[n].colour), 1 - layers[n].colour.w);
+            if (layers[n].colour.w >= 1) break;
+            result.add({behind[0], behind[kBlockPixels], behind[2 * kBlockPixels]}, behind[3 * kBlockPixels]);
+            behind += kTileFloats;
+          }
+        }
         float* to = image.pixel(x0 + x, y0 + y);
-        const float through = from[3 * kBlockPixels];
-        for (int c = 0; c < 3; ++c) to[c] = from[c * kBlockPixels] + through * state.background[c];
-        to[3] = 1 - through * (1 - state.background[3]);
+        for (int c = 0; c < 3; ++c) to[c] = result.colour[c] + result.through * state.background[c];
+        to[3] = 1 - result.through * (1 - state.background[3]);
       }
   });
   return image;
@@ -227,6 +242,10 @@ uint64_t CpuPainter::frameBytes(ImageSize size) {
 uint64_t CpuPainter::batchBytes(ImageSize size, const PaintResources& resources) {
   return SplatBins::bytes(size, resources.batch_splats, kEntriesASplat * resources.batch_splats,
                           threadsOf(resources));
+}
+
+uint64_t CpuPainter::layerBytes(const PixelLayers& layers) {
+  return WindowTiles::bytes(layers);
 }
 
 std::vector<int64_t> CpuPainter::targets() {

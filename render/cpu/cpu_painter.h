@@ -39,6 +39,7 @@ class CpuPainter final : public Painter {
   /// What it takes for a frame beside the picture itself.
   static uint64_t frameBytes(ImageSize size);
   static uint64_t batchBytes(ImageSize size, const PaintResources& resources);
+  static uint64_t layerBytes(const PixelLayers& layers);
   /// "CPU, AVX3"
   static std::string name();
   /// Highway's numbers of the instruction sets that it can paint with here, the best first.

@@ -31,12 +31,12 @@ SplatBins::SplatBins(ImageSize size, size_t splats, size_t entries, unsigned pie
       begins_(tileCount(size) + 1),
       piece_ends_(pieces * tileCount(size)),
       closed_(tileCount(size)) {
-  splats_.reserve(splats + 1);
-  tiles_.reserve(splats + 1);
+  splats_.reserve(splats + 2);
+  tiles_.reserve(splats + 2);
 }
 
 uint64_t SplatBins::bytes(ImageSize size, size_t splats, size_t entries, unsigned pieces) {
-  return (splats + 1) * (sizeof(ScreenSplat) + sizeof(Tiles)) +
+  return (splats + 2) * (sizeof(ScreenSplat) + sizeof(Tiles)) +
          sizeof(uint32_t) * (std::max(entries, tileCount(size)) + pieces * tileCount(size)) +
          sizeof(size_t) * (tileCount(size) + 1) + tileCount(size);
 }
@@ -71,19 +71,21 @@ size_t SplatBins::add(std::span<const ScreenSplat> splats) {
   size_t added = 0;
   for (; added < splats.size() && splats_.size() < most_splats_; ++added) {
     if (isCut(splats[added])) {
-      cut_ = splats[added];
+      records_[record_count_++ % records_.size()] = splats[added];
       continue;
     }
     const Tiles tiles = tilesOf(splats[added]);
     if (allClosed(tiles)) {
       ++hidden_;
+      record_count_ = 0;
       continue;
     }
     if (entry_count_ + tiles.count() > most_entries_) break;
-    if (hasCut(splats[added])) {
+    for (size_t n = 0; n < record_count_; ++n) {
       tiles_.push_back({1, 1, 0, 0});
-      splats_.push_back(cut_);
+      splats_.push_back(records_[n]);
     }
+    record_count_ = 0;
     entry_count_ += tiles.count();
     tiles_.push_back(tiles);
     splats_.push_back(splats[added]);
@@ -130,6 +132,7 @@ void SplatBins::sort() {
 void SplatBins::open() {
   std::fill(closed_.begin(), closed_.end(), 0);
   hidden_ = 0;
+  record_count_ = 0;
 }
 
 void SplatBins::clear() {

@@ -6,6 +6,7 @@
 // Takes 48 bytes a splat, 4 an entry, 4 a tile and piece, all at its construction.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -18,8 +19,8 @@ namespace curvisplat {
 
 class SplatBins {
  public:
-  /// For batches of at most `splats` splats and cuts, or one more where the last is a splat with its cut,
-  /// which touch `entries` tiles in all.
+  /// For batches of at most `splats` splats and their records, or up to two more where the last is a splat with
+  /// its records, which touch `entries` tiles in all.
   SplatBins(ImageSize size, size_t splats, size_t entries, unsigned pieces);
   static uint64_t bytes(ImageSize size, size_t splats, size_t entries, unsigned pieces);
 
@@ -27,8 +28,8 @@ class SplatBins {
   int rows() const { return rows_; }
 
   /// Adds what fits of `splats` behind those there are, and says how much that was, with those that were left
-  /// out. Something always fits while empty(). Nearest first: a splat's ScreenCut comes before it, and is
-  /// kept until it does; in splats() it is the element before.
+  /// out. Something always fits while empty(). Nearest first: a splat's records come before it, and are kept
+  /// until it does; in splats() they are the elements before.
   size_t add(std::span<const ScreenSplat> splats);
   bool empty() const { return splats_.empty(); }
   std::span<const ScreenSplat> splats() const { return splats_; }
@@ -63,7 +64,8 @@ class SplatBins {
   const size_t most_splats_, most_entries_;
   const unsigned pieces_;
   std::vector<ScreenSplat> splats_;
-  ScreenSplat cut_{};         // of the next splat that has one
+  std::array<ScreenSplat, 2> records_{};  // of the next splat that has some
+  size_t record_count_ = 0;
   std::vector<Tiles> tiles_;  // [splats_]
   size_t entry_count_ = 0;
   std::unique_ptr<uint32_t[]> entries_;

@@ -15,6 +15,7 @@
 // unaligned, and a small splat touches few.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -44,15 +45,24 @@ inline constexpr float kSaturated = 1.0f / 4096;
 using BlockMask = uint64_t;
 static_assert(kTileBlocks * kTileBlocks == 64);
 
+/// The layers of a tile's pixels, and the windows behind the first (tile_windows.h).
+struct TileWindows {
+  int layers;     // the most of any pixel
+  float* depths;  // [layers][pixels of the tile, block by block]; infinite where a pixel has fewer
+  float* behind;  // [windows - 1][kTileFloats]
+  std::array<uint8_t, 64> open;  // of each block: how many windows, from the first, take more
+};
+
 /// Splats to be painted under what a tile holds.
 struct TileWork {
   float* tile;                          // [kTileFloats], on a cache line
   int x, y;                             // of its first pixel
   BlockMask open;                       // the blocks that are not saturated; has one at least
-  std::span<const ScreenSplat> splats;  // one that is cut behind its ScreenCut
+  std::span<const ScreenSplat> splats;  // one that is cut behind its records
   std::span<const uint32_t> order;      // of `splats`, nearest first
   const ShadingTable& table;
   PixelShading shading;
+  TileWindows* windows = nullptr;  // null: no layers, and no splats with a ScreenDepth
 };
 
 /// Paints in the widest vectors that the processor has; what is open then. Pure but for the tile: any thread.

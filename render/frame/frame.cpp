@@ -25,8 +25,9 @@ struct FrameRenderer::State {
                Progress* progress) {
     statistics = {};
     const StageTimer total(statistics.total_s);
-    const FramePlan plan =
+    FramePlan plan =
         timed(statistics.plan_s, [&] { return planner.plan(camera, options, pipeline.order()); });
+    pipeline.drawLayers(plan, options, statistics);
     return pipeline.draw(plan, options, statistics, progress);
   }
 
@@ -34,9 +35,10 @@ struct FrameRenderer::State {
                       FrameStatistics& statistics, bool& is_final, Progress* progress) {
     statistics = {};
     const StageTimer total(statistics.total_s);
-    const QuickPlan quick = timed(
-        statistics.plan_s, [&] { return planner.planQuick(camera, options, limits, pipeline.order()); });
+    QuickPlan quick = timed(statistics.plan_s,
+                            [&] { return planner.planQuick(camera, options, limits, pipeline.order()); });
     is_final = quick.isFinal();
+    pipeline.drawLayers(quick.plan, options, statistics);
     Image picture = pipeline.draw(quick.plan, options, statistics, progress);
     return quick.size.isWhole() ? picture : quick.size.enlarge(picture);
   }

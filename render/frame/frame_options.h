@@ -4,12 +4,14 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "render/image/image_size.h"
 #include "render/project/projection.h"
 #include "render/project/screen_view.h"
+#include "render/surface/surface_scene.h"
 #include "stream/paging/pager.h"
 
 namespace curvisplat {
@@ -25,9 +27,10 @@ struct FrameOptions {
   std::optional<WorldBox> clip_box;    // nothing outside it is drawn
   std::vector<ClipPlane> clip_planes;  // nothing on their outer sides is drawn
   std::optional<Light> light;          // none: unlit, the colours of the transfer function
-  glm::vec4 background{1, 1, 1, 1};    // premultiplied
-  double low_pass_px2 = kLowPass;      // added to the diagonal of S2, pixels squared
-  unsigned threads = 0;                // workers; 0: one per core
+  std::shared_ptr<const SurfaceScene> scene;  // surfaces and slices; null: none
+  glm::vec4 background{1, 1, 1, 1};           // premultiplied
+  double low_pass_px2 = kLowPass;             // added to the diagonal of S2, pixels squared
+  unsigned threads = 0;                       // workers; 0: one per core
   uint64_t memory_bytes = 512 << 20;
   uint64_t output_bytes = 0;  // part of memory_bytes that is reserved for the use of the finished image
   bool keep_going = false;    // draw damaged bricks from an ancestor, and report them

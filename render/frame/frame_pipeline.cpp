@@ -1,6 +1,11 @@
 #include "render/frame/frame_pipeline.h"
 
+#include <tbb/info.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
 #include <span>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -9,6 +14,7 @@
 #include "render/frame/segment_drawer.h"
 #include "render/frame/segment_ring.h"
 #include "render/frame/sweep_buffer.h"
+#include "render/surface/scene_layers.h"
 #include "stream/base/error.h"
 #include "stream/base/stage_timer.h"
 #include "stream/paging/brick_source.h"
@@ -17,8 +23,22 @@
 namespace curvisplat {
 namespace {
 
+constexpr uint64_t kBandBytes = 32 << 20;  // of surfaces' samples
+
 PaintResources resourcesOf(const FrameOptions& options) {
   return {.threads = options.threads};
+}
+
+/// About what a scene takes: its meshes and their vertices on the screen, samples of slices, bands of samples of
+/// surfaces, and a layer and a half a pixel with a window behind it. The same for all pictures of one size.
+uint64_t sceneBytes(const FrameOptions& options) {
+  if (!options.scene || options.scene->empty()) return 0;
+  constexpr uint64_t kLayerBytes = 56, kSliceBytes = 24, kVertexBytes = 12;
+  uint64_t bytes =
+      kBandBytes + options.size.pixels() * (kLayerBytes + kSliceBytes * options.scene->slices.size());
+  for (const Surface& surface : options.scene->surfaces)
+    bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size();
+  return bytes;
 }
 
 /// Waits for the painter's draws when a frame ends, however it ends: the next frame uses the same ring
@@ -83,9 +103,12 @@ FramePipeline::Running::~Running() {
 void FramePipeline::makePools(const FrameOptions& options) {
   // Steps differ in this; the pools stay.
   least_pager_bytes_ = std::max(least_pager_bytes_, BrickPager::leastBufferBytes(cache_, variable_));
-  const FrameBudget::Fixed fixed{
-      planner_.bytes(),     least_pager_bytes_,    backend_->bytes(options.size, resourcesOf(options)),
-      options.output_bytes, planner_.mostSplats(), options.size};
+  const FrameBudget::Fixed fixed{planner_.bytes(),
+                                 least_pager_bytes_,
+                                 backend_->bytes(options.size, resourcesOf(options)) + sceneBytes(options),
+                                 options.output_bytes,
+                                 planner_.mostSplats(),
+                                 options.size};
   const FrameBudget budget = FrameBudget::of(options.memory_bytes, fixed, options.threads);
   PagerOptions pager;
   pager.buffer_bytes = budget.pager_bytes;
@@ -130,6 +153,51 @@ bool FramePipeline::beginSlab(const FramePlan& plan, const FrameOptions& options
   return true;
 }
 
+void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics) {
+  if (!options.scene) return;
+  const VariableInfo& info = cache_.manifest().variables[variable_];
+  const ScreenView& view = plan.settings.view;
+  std::vector<std::unique_ptr<SliceSampler>> samplers;
+  for (const SlicePlan& slice : plan.slices) {
+    samplers.push_back(
+        std::make_unique<SliceSampler>(view, slice.plane, info.min, info.max, plan.settings.borders));
+    if (samplers.back()->isSeen()) sampleSlice(slice, *samplers.back(), options, statistics);
+  }
+  const StageTimer timer(statistics.surfaces_s);
+  const glm::dvec3 middle = 0.5 * (cache_.manifest().lower + cache_.manifest().upper);
+  const SceneLook look{planner_.colours(), options.light, plan.settings.clip_planes,
+                       view.projection == Projection::kPerspective ? 0 : view.viewFromData(middle).z};
+  std::shared_ptr<const PixelLayers> layers;
+  const unsigned wanted =
+      options.threads ? options.threads : std::max(1u, std::thread::hardware_concurrency());
+  tbb::task_arena arena(std::min(static_cast<int>(wanted), tbb::info::default_concurrency()));
+  arena.execute([&] {
+    layers = std::make_shared<PixelLayers>(layersOf(*options.scene, view, samplers, look, kBandBytes));
+  });
+  planner_.addLayers(plan, std::move(layers), options);
+}
+
+void FramePipeline::sampleSlice(const SlicePlan& slice, SliceSampler& sampler, const FrameOptions& options,
+                                FrameStatistics& statistics) {
+  makePools(options);
+  const SliceWork work{cache_, slice.parts, sampler, options.keep_going};
+  try {
+    {
+      const MutexLock lock(mutex_);
+      if (phase_ == Phase::kCancelled) throw Cancelled();
+      pools_->source.start(slice.parts);
+      pools_->workers.startSampling(work);
+    }
+    pools_->workers.finish(statistics);
+    pools_->source.finish(statistics);
+  } catch (...) {
+    dropPools();
+    throw;
+  }
+  const MutexLock lock(mutex_);
+  if (phase_ == Phase::kCancelled) throw Cancelled();
+}
+
 Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
                           Progress* progress) {
   const FrameWork work{cache_,    plan.parts, plan.settings,     planner_.table(),
@@ -168,7 +236,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   statistics.ring_peak_bytes = pools_->ring.peakSplats() * sizeof(ScreenSplat);
   statistics.sweep_peak_bytes = SweepBuffer::bytes(pools_->sweep.peakSplats());
   statistics.slabs = pools_->sweep.slabs();
-  statistics.bricks_hidden = pools_->workers.partsHidden();
+  statistics.bricks_hidden = pools_->workers.partsHidden() + plan.parts_hidden;
   statistics.bricks_drawn = cut.parts.size() - statistics.bricks_hidden;
   statistics.bricks_out_of_image = cut.out_of_image;
   statistics.bricks_transparent = cut.transparent;
@@ -187,7 +255,8 @@ Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, F
   backend_->run([&](Painter& painter) {
     const DrawsFinished finished(painter);
     painter.begin(plan.settings.view.size, options.background, planner_.table(),
-                  {plan.settings.per_pixel, plan.settings.light.has_value()}, resourcesOf(options));
+                  {plan.settings.per_pixel, plan.settings.light.has_value(), plan.settings.layers},
+                  resourcesOf(options));
     hidden_.ask(&painter);
     SegmentDrawer drawer(painter, pools_->ring, statistics.painter_waited_s);
     uint64_t seen = 0;

@@ -25,6 +25,7 @@
 #include "render/frame/frame_plan.h"
 #include "render/frame/frame_statistics.h"
 #include "render/frame/hidden_bricks.h"
+#include "render/surface/slice_sampler.h"
 #include "stream/base/mutex.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
@@ -57,7 +58,10 @@ class FramePipeline {
   /// exists.
   Image draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
              Progress* progress);
-  /// Makes draw() throw Cancelled until the next Running is made. Does nothing if no Running exists. Any
+  /// Draws the surfaces and slices of options.scene, if there is one, and puts them into the plan as its layers.
+  /// Before draw(), and as draw().
+  void drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics);
+  /// Makes draw() and drawLayers() throw Cancelled until the next Running is made. Does nothing if no Running exists. Any
   /// thread.
   void cancel();
 
@@ -74,6 +78,8 @@ class FramePipeline {
  private:
   struct Pools;
 
+  void sampleSlice(const SlicePlan& slice, SliceSampler& sampler, const FrameOptions& options,
+                   FrameStatistics& statistics);
   bool beginSlab(const FramePlan& plan, const FrameOptions& options);
   void endPrefetch();
   void makePools(const FrameOptions& options);

@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "render/frame/hidden_bricks.h"
 #include "render/project/kernel.h"
 #include "render/project/screen_view.h"
 #include "stream/base/error.h"
@@ -36,6 +37,12 @@ TransparentBounds transparentIn(const ClassificationTable& table, const Projecti
   };
 }
 
+/// n · (x - p) = n/scale · (scale x - scale p).
+CutView::Plane cutPlane(const ClipPlane& plane, const ScreenView& view) {
+  const glm::dvec3 normal = glm::normalize(plane.normal / view.scale);
+  return {normal, -glm::dot(normal, view.scale * plane.point)};
+}
+
 CutOptions limitsOf(const FrameOptions& options, DrawingOrder order) {
   CutOptions limits;
   limits.order = order;
@@ -52,6 +59,7 @@ FramePlanner::FramePlanner(const CacheReader& cache, size_t variable,
       variable_(variable),
       transfer_function_(transfer_function),
       table_(tableFor(cache, variable, transfer_function)),
+      colours_(transfer_function),
       scalar_range_(transfer_function.range()),
       subtrees_(subtreeBounds(cache.bricks(), cache.brickVariables(variable))) {}
 
@@ -76,6 +84,7 @@ void FramePlanner::stepChanged() {
 void FramePlanner::setTransferFunction(const TransferFunction& transfer_function) {
   transfer_function_ = transfer_function;
   table_ = tableFor(cache_, variable_, transfer_function);
+  colours_ = ColourTable(transfer_function);
   scalar_range_ = transfer_function.range();
 }
 
@@ -98,16 +107,33 @@ ProjectionSettings FramePlanner::settingsFor(const Camera& camera, const FrameOp
   return settings;
 }
 
+CutView FramePlanner::cutViewOf(const ProjectionSettings& settings) const {
+  CutView view = settings.view.cutView();
+  for (const ClipPlane& plane : settings.clip_planes) view.planes.push_back(cutPlane(plane, settings.view));
+  return view;
+}
+
+/// One cut for each slice, of the bricks on both of its sides. What is transparent in the volume is not there.
+std::vector<SlicePlan> FramePlanner::planSlices(const ProjectionSettings& settings,
+                                                const FrameOptions& options, const CutOptions& limits) const {
+  std::vector<SlicePlan> slices;
+  if (!options.scene) return slices;
+  const CutTree tree{cache_.manifest().root, cache_.bricks(), cache_.brickVariables(variable_), subtrees_};
+  for (const ClipPlane& plane : options.scene->slices) {
+    CutView view = cutViewOf(settings);
+    view.planes.push_back(cutPlane(plane, settings.view));
+    view.planes.push_back(cutPlane({plane.point, -plane.normal}, settings.view));
+    Cut cut = curvisplat::chooseCut(
+        tree, view, [](const ValueBounds&) { return false; }, limits);
+    slices.push_back({plane, std::move(cut.parts), cut.complete});
+  }
+  return slices;
+}
+
 Cut FramePlanner::chooseCut(const ProjectionSettings& settings, const FrameOptions& options,
                             const CutOptions& limits) const {
   const CutTree tree{cache_.manifest().root, cache_.bricks(), cache_.brickVariables(variable_), subtrees_};
-  CutView view = settings.view.cutView();
-  for (const ClipPlane& plane : settings.clip_planes) {
-    // n · (x - p) = n/scale · (scale x - scale p).
-    const glm::dvec3 normal = glm::normalize(plane.normal / settings.view.scale);
-    view.planes.push_back({normal, -glm::dot(normal, settings.view.scale * plane.point)});
-  }
-  Cut cut = curvisplat::chooseCut(tree, view, transparentIn(table_, settings), limits);
+  Cut cut = curvisplat::chooseCut(tree, cutViewOf(settings), transparentIn(table_, settings), limits);
   if (options.max_splats && cut.splats > *options.max_splats)
     throw UsageError(
         "{} splats are too few: the coarsest picture of this cache takes {}; give --max-splats that",
@@ -132,7 +158,25 @@ FramePlan FramePlanner::planOf(const ProjectionSettings& settings, Cut cut, Draw
 
 FramePlan FramePlanner::plan(const Camera& camera, const FrameOptions& options, DrawingOrder order) const {
   const ProjectionSettings settings = settingsFor(camera, options, options.size);
-  return planOf(settings, chooseCut(settings, options, limitsOf(options, order)), order);
+  const CutOptions limits = limitsOf(options, order);
+  FramePlan plan = planOf(settings, chooseCut(settings, options, limits), order);
+  plan.slices = planSlices(settings, options, limits);
+  return plan;
+}
+
+void FramePlanner::addLayers(FramePlan& plan, std::shared_ptr<const PixelLayers> layers,
+                             const FrameOptions& options) const {
+  plan.layers = std::move(layers);
+  plan.settings.layers = plan.layers.get();
+  const bool volume = options.scene->volume;
+  if (volume && options.keep_going)
+    return;  // an ancestor that replaces a damaged brick reaches out of its box
+  plan.parts_hidden = std::erase_if(plan.parts, [&](const SweptPart& part) {
+    if (!volume) return true;
+    const Brick& brick = cache_.bricks()[part.part.brick];
+    const PixelLayers::Bounds bounds = plan.layers->boundsOver(screenBoxOf(brick, plan.settings.view));
+    return nearestDepthOf(brick, plan.settings.view) - plan.layers->depthOrigin() >= double{bounds.hidden};
+  });
 }
 
 QuickPlan FramePlanner::planQuick(const Camera& camera, const FrameOptions& options, const QuickLimits& quick,
@@ -143,9 +187,10 @@ QuickPlan FramePlanner::planQuick(const Camera& camera, const FrameOptions& opti
   limits.max_bytes = std::min(limits.max_bytes, quick.max_bytes);
   Cut cut = chooseCut(settings, options, limits);
   const ReducedSize size(options.size, std::max(quick.detail_px, cut.complete ? 0 : cut.largest_error_px));
-  return {
-      planOf(size.isWhole() ? settings : settingsFor(camera, options, size.size()), std::move(cut), order),
-      size};
+  FramePlan plan =
+      planOf(size.isWhole() ? settings : settingsFor(camera, options, size.size()), std::move(cut), order);
+  plan.slices = planSlices(plan.settings, options, limits);
+  return {std::move(plan), size};
 }
 
 }  // namespace curvisplat

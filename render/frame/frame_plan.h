@@ -2,7 +2,9 @@
 // and how their splats are projected. Pure; it reads the octree only, and no bricks.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -13,6 +15,7 @@
 #include "render/frame/sweep_buffer.h"
 #include "render/project/depth_keys.h"
 #include "render/project/projection.h"
+#include "render/surface/colour_table.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/paging/cut.h"
 
@@ -23,11 +26,21 @@ namespace curvisplat {
 ScreenView screenViewOf(const Manifest& manifest, const Camera& camera, const FrameOptions& options,
                         ImageSize size);
 
+/// The bricks that a slice of the scene crosses.
+struct SlicePlan {
+  ClipPlane plane;
+  std::vector<BrickPart> parts;
+  bool complete = true;  // as Cut's
+};
+
 struct FramePlan {
   ProjectionSettings settings;  // the picture has the size of settings.view
   Cut cut;
   DepthKeys keys;
   std::vector<SweptPart> parts;  // of the cut, in the sweep's order
+  std::vector<SlicePlan> slices = {};
+  std::shared_ptr<const PixelLayers> layers = nullptr;  // those of settings, where there are some
+  uint64_t parts_hidden = 0;                            // of the cut, behind opaque layers: not in `parts`
 };
 
 /// A part of the cut with its rank and its range of depth keys, as the sweep needs it.
@@ -39,7 +52,10 @@ struct QuickPlan {
   ReducedSize size;
 
   /// Whether the picture is the final one: no brick is left to refine, and it has all pixels.
-  bool isFinal() const { return plan.cut.complete && size.isWhole(); }
+  bool isFinal() const {
+    return plan.cut.complete && size.isWhole() &&
+           std::all_of(plan.slices.begin(), plan.slices.end(), [](const SlicePlan& s) { return s.complete; });
+  }
 };
 
 /// Plans frames of one variable of one cache, which must outlive it. Any number of threads may plan.
@@ -61,7 +77,13 @@ class FramePlanner {
     return screenViewOf(cache_.manifest(), camera, options, size);
   }
 
+  /// Puts the layers of its scene into a plan. What is behind opaque ones everywhere is left out, unless
+  /// `keep_going`; all is without a volume.
+  void addLayers(FramePlan& plan, std::shared_ptr<const PixelLayers> layers,
+                 const FrameOptions& options) const;
+
   const ClassificationTable& table() const { return table_; }
+  const ColourTable& colours() const { return colours_; }
   /// Memory in bytes of the octree, and of what plans and the later stages note about its bricks.
   uint64_t bytes() const;
   /// The most splats that any picture can have: those of the cache's finest level, with their border parts.
@@ -69,14 +91,18 @@ class FramePlanner {
 
  private:
   ProjectionSettings settingsFor(const Camera& camera, const FrameOptions& options, ImageSize size) const;
+  CutView cutViewOf(const ProjectionSettings& settings) const;
   Cut chooseCut(const ProjectionSettings& settings, const FrameOptions& options,
                 const CutOptions& limits) const;
+  std::vector<SlicePlan> planSlices(const ProjectionSettings& settings, const FrameOptions& options,
+                                    const CutOptions& limits) const;
   FramePlan planOf(const ProjectionSettings& settings, Cut cut, DrawingOrder order) const;
 
   const CacheReader& cache_;
   const size_t variable_;
   TransferFunction transfer_function_;
   ClassificationTable table_;
+  ColourTable colours_;
   std::pair<double, double> scalar_range_;  // of the transfer function
   std::vector<ValueBounds> subtrees_;
 };

@@ -27,6 +27,8 @@ struct FrameStatistics : FetchStatistics {
   uint64_t splats_read = 0;
   uint64_t splats_clipped = 0, splats_off_screen = 0,
            splats_transparent = 0;  // read but not drawn: the reason
+  uint64_t splats_behind = 0;       // read but not drawn: behind opaque surfaces or slices
+  double surfaces_s = 0;            // surfaces and slices, without reading and sampling bricks for slices
   uint64_t splats_drawn = 0;
   /// Parts that were left out because splats in front hide them, and splats that the painter left out for the
   /// same reason. The counts depend on how far the stages are ahead of one another; the picture does not.

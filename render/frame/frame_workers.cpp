@@ -40,6 +40,16 @@ void FrameWorkers::beginFrame(const FrameWork& work) {
 }
 
 void FrameWorkers::start() {
+  begin();
+  team_.start([this](unsigned number) { loop(*workers_[number]); });
+}
+
+void FrameWorkers::startSampling(const SliceWork& work) {
+  begin();
+  team_.start([this, work](unsigned number) { sample(*workers_[number], work); });
+}
+
+void FrameWorkers::begin() {
   next_ = 0;
   {
     const MutexLock lock(failing_);
@@ -50,7 +60,6 @@ void FrameWorkers::start() {
     worker->scratch.times = {};
     worker->scratch.waited_s = 0;
   }
-  team_.start([this](unsigned number) { loop(*workers_[number]); });
 }
 
 void FrameWorkers::finish(FrameStatistics& sum) {
@@ -65,6 +74,7 @@ void FrameWorkers::finish(FrameStatistics& sum) {
     sum.workers_waited_s += part.workers_waited_s;
     sum.splats_read += part.splats_read;
     sum.splats_clipped += part.splats_clipped;
+    sum.splats_behind += part.splats_behind;
     sum.splats_off_screen += part.splats_off_screen;
     sum.splats_transparent += part.splats_transparent;
     sum.splats_drawn += part.splats_drawn;
@@ -120,20 +130,39 @@ void FrameWorkers::loop(Worker& worker) {
     }
     ring_.pauseAfter(sweep_.batches());
   } catch (...) {
-    {
-      const MutexLock lock(failing_);
-      if (!first_failure_) first_failure_ = std::current_exception();
+    fail();
+  }
+}
+
+/// In a handler: keeps the exception, if it is the first, and stops all workers.
+void FrameWorkers::fail() {
+  {
+    const MutexLock lock(failing_);
+    if (!first_failure_) first_failure_ = std::current_exception();
+  }
+  stop();
+}
+
+void FrameWorkers::sample(Worker& worker, const SliceWork& work) {
+  try {
+    for (uint64_t sequence = next_++; sequence < work.parts.size(); sequence = next_++) {
+      const auto fetched = fetch(worker, sequence, work.parts[sequence], work.keep_going);
+      if (!fetched) return;
+      const StageTimer timer(worker.statistics.project_s);
+      work.sampler.add(work.cache.manifest().root.cellMin(fetched->cell), fetched->geometry, fetched->values,
+                       fetched->ranges);
     }
-    stop();
+  } catch (...) {
+    fail();
   }
 }
 
 std::optional<BrickSource::Splats> FrameWorkers::fetch(Worker& worker, uint64_t sequence,
-                                                       const BrickPart& part) {
+                                                       const BrickPart& part, bool keep_going) {
   try {
     return source_.take(sequence, worker.scratch);
   } catch (const DamagedBrick& error) {
-    if (!work_->keep_going) throw;
+    if (!keep_going) throw;
     worker.statistics.bricks_unreadable.push_back({part.brick, error.what()});
     return source_.standIn(part, worker.scratch);
   }
@@ -156,7 +185,7 @@ bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
     return passOver(sequence);
   }
   {
-    const std::optional<BrickSource::Splats> fetched = fetch(worker, sequence, part.part);
+    const std::optional<BrickSource::Splats> fetched = fetch(worker, sequence, part.part, work_->keep_going);
     if (!fetched) return false;
     // The slab's end may have moved since. The source may then have left this part out.
     if (sweep_.isBehind(part)) return passOver(sequence);
@@ -195,6 +224,7 @@ void FrameWorkers::count(Worker& worker, uint32_t number) {
   const ProjectionCounts& counts = worker.projector.counts();
   statistics.splats_read += counts.read;
   statistics.splats_clipped += counts.clipped;
+  statistics.splats_behind += counts.hidden;
   statistics.splats_off_screen += counts.off_screen;
   statistics.splats_transparent += counts.transparent;
   statistics.splats_drawn += counts.drawn;

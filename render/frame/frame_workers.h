@@ -17,6 +17,7 @@
 #include "render/frame/sweep_buffer.h"
 #include "render/project/depth_keys.h"
 #include "render/project/projection.h"
+#include "render/surface/slice_sampler.h"
 #include "stream/base/mutex.h"
 #include "stream/base/worker_team.h"
 #include "stream/paging/brick_source.h"
@@ -31,6 +32,14 @@ struct FrameWork {
   const ClassificationTable& table;
   const DepthKeys& keys;
   const HiddenBricks& hidden;
+  bool keep_going = false;
+};
+
+/// The same for a slice.
+struct SliceWork {
+  const CacheReader& cache;
+  std::span<const BrickPart> parts;
+  SliceSampler& sampler;
   bool keep_going = false;
 };
 
@@ -59,6 +68,9 @@ class FrameWorkers {
   /// Stops sweep, ring and source. Any thread.
   void stop();
 
+  /// Starts the workers on the parts that a slice crosses, which the source must have. finish() waits for them.
+  void startSampling(const SliceWork& work);
+
   /// Begins a prefetch, for which the source must be ready. Errors of bricks are left to the frame to report.
   void startPrefetch();
   /// Waits until the prefetch has ended, if one was begun.
@@ -69,12 +81,16 @@ class FrameWorkers {
   enum class Seen : uint8_t { kNo, kHidden, kProjected };
 
   void loop(Worker& worker);
+  void sample(Worker& worker, const SliceWork& work);
+  void begin();
+  void fail();
   // Return false if the sweep, the ring or the source was stopped.
   bool prepare(Worker& worker, uint64_t sequence);
   bool passOver(uint64_t sequence);
   bool enter(Worker& worker, uint64_t sequence, uint32_t rank);
   bool hand(Worker& worker, const SweepBuffer::Batch& batch);
-  std::optional<BrickSource::Splats> fetch(Worker& worker, uint64_t sequence, const BrickPart& part);
+  std::optional<BrickSource::Splats> fetch(Worker& worker, uint64_t sequence, const BrickPart& part,
+                                           bool keep_going);
   void count(Worker& worker, uint32_t number);
   void markSeen(uint32_t number, Seen seen);
 

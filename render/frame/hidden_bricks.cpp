@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <limits>
 
+#include "render/project/face_cut.h"
 #include "render/project/kernel.h"
 
 namespace curvisplat {
@@ -43,6 +45,17 @@ ScreenBox screenBoxOf(const Brick& brick, const ScreenView& view) {
       radius * pixels_a_unit + kKernelSupport * std::sqrt(view.low_pass_px2) + kRoundingPixels;
   return {static_cast<float>(lower.x - reach), static_cast<float>(lower.y - reach),
           static_cast<float>(upper.x + reach), static_cast<float>(upper.y + reach)};
+}
+
+double nearestDepthOf(const Brick& brick, const ScreenView& view) {
+  const glm::dvec3 lower = view.scale * brick.lower, upper = view.scale * brick.upper;
+  const double nearest = view.projection == Projection::kPerspective
+                             ? glm::length(glm::clamp(view.eye, lower, upper) - view.eye)
+                             : glm::dot(view.forward, 0.5 * (lower + upper) - view.eye) -
+                                   glm::dot(glm::abs(view.forward), 0.5 * (upper - lower));
+  // Along the ray a splat's distribution reaches a little beyond its support (face_cut.h).
+  constexpr double kBeyond = double{kDepthReach} / kKernelSupport;
+  return nearest - kBeyond * brick.largest_radius * std::max({view.scale.x, view.scale.y, view.scale.z});
 }
 
 void HiddenBricks::begin(std::span<const Brick> bricks, const ScreenView& view) {

@@ -36,4 +36,7 @@ class HiddenBricks {
 /// screen if the eye is too close to the brick to bound them.
 ScreenBox screenBoxOf(const Brick& brick, const ScreenView& view);
 
+/// No part of the brick's splats is nearer along the view; perspective: to the eye.
+double nearestDepthOf(const Brick& brick, const ScreenView& view);
+
 }  // namespace curvisplat

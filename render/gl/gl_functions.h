@@ -39,6 +39,7 @@ namespace curvisplat {
   X(DeleteTextures, PFNGLDELETETEXTURESPROC)                   \
   X(DeleteVertexArrays, PFNGLDELETEVERTEXARRAYSPROC)           \
   X(DrawArraysInstanced, PFNGLDRAWARRAYSINSTANCEDPROC)         \
+  X(DrawBuffers, PFNGLDRAWBUFFERSPROC)                         \
   X(Enable, PFNGLENABLEPROC)                                   \
   X(EnableVertexAttribArray, PFNGLENABLEVERTEXATTRIBARRAYPROC) \
   X(EndQuery, PFNGLENDQUERYPROC)                               \
@@ -60,6 +61,7 @@ namespace curvisplat {
   X(GetString, PFNGLGETSTRINGPROC)                             \
   X(GetUniformLocation, PFNGLGETUNIFORMLOCATIONPROC)           \
   X(LinkProgram, PFNGLLINKPROGRAMPROC)                         \
+  X(ReadBuffer, PFNGLREADBUFFERPROC)                           \
   X(ReadPixels, PFNGLREADPIXELSPROC)                           \
   X(RenderbufferStorage, PFNGLRENDERBUFFERSTORAGEPROC)         \
   X(ShaderSource, PFNGLSHADERSOURCEPROC)                       \

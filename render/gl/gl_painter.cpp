@@ -4,6 +4,7 @@
 #include <array>
 #include <deque>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -23,7 +24,7 @@ constexpr int kFootprintSteps = 1024;
 // splats took 330 MiB. Two draws under way keep all its threads busy.
 constexpr size_t kSplatsPerDraw = 16384;
 constexpr size_t kDrawsInFlight = 2;
-constexpr GLint kFootprintUnit = 0, kClassesUnit = 1;
+constexpr GLint kFootprintUnit = 0, kClassesUnit = 1, kLayersUnit = 2;
 
 /// A table that shaders read by index, exactly: no filtering, no size limit worth a thought.
 struct TableTexture {
@@ -42,8 +43,11 @@ struct TableTexture {
   }
 };
 
-/// Splats as the shader's instances: ScreenSplat's ten floats as 4 + 4 + 2, and those of the record behind
-/// it, so that there is one more in the buffer than is drawn. Leaves itself bound.
+/// How many records of a splat may come behind it.
+constexpr size_t kMostRecords = 2;
+
+/// Splats as the shader's instances: ScreenSplat's ten floats as 4 + 4 + 2, and those of the records behind
+/// it, so that there are more in the buffer than are drawn. Leaves itself bound.
 struct InstanceBuffer {
   GlObject buffer, vertex_array;
 
@@ -51,7 +55,7 @@ struct InstanceBuffer {
     static constexpr GLint kComponents[] = {4, 4, 2};
     bind(gl);
     size_t offset = 0;
-    for (GLuint attribute = 0; attribute < 6; ++attribute) {
+    for (GLuint attribute = 0; attribute < 3 * (1 + kMostRecords); ++attribute) {
       const GLint components = kComponents[attribute % 3];
       gl.EnableVertexAttribArray(attribute);
       gl.VertexAttribPointer(attribute, components, GL_FLOAT, GL_FALSE, sizeof(ScreenSplat),
@@ -76,30 +80,35 @@ std::vector<std::array<float, 2>> footprintTexels() {
   return texels;
 }
 
+/// How many of the last of `splats` belong to a splat of which records are still to come. Farthest first.
+size_t lacksRecords(std::span<const ScreenSplat> splats) {
+  if (hasCut(splats.back())) return 1;
+  return isDepth(splats.back()) && ScreenDepth::of(splats.back()).has_cut ? 2 : 0;
+}
+
 }  // namespace
 
 struct GlPainter::State {
   explicit State(const GlFunctions& functions)
       : gl(functions),
-        per_pixel(gl, splatVertexShader(), splatFragmentShader({.per_pixel = true, .log_scale = false})),
-        per_pixel_log(gl, splatVertexShader(), splatFragmentShader({.per_pixel = true, .log_scale = true})),
-        flat(gl, splatVertexShader(), splatFragmentShader({.per_pixel = false, .log_scale = false})),
-        flat_log(gl, splatVertexShader(), splatFragmentShader({.per_pixel = false, .log_scale = true})),
         footprint(gl),
         classes(gl),
         copied(gl),
         framebuffer(makeFramebuffer(gl)),
-        colour(makeRenderbuffer(gl)) {}
+        layers_texture(makeTexture(gl)) {}
 
   const GlFunctions& gl;
-  GlProgram per_pixel, per_pixel_log, flat, flat_log;
+  std::map<int, GlProgram> programs;  // by their kinds, each compiled when it is first needed
   TableTexture footprint, classes;
   InstanceBuffer copied;                 // what lies elsewhere is copied here to be drawn
   std::optional<InstanceBuffer> mapped;  // what lies here is not
   std::span<ScreenSplat> mapped_splats;
-  std::optional<ScreenSplat> held;  // the last splat of a draw, whose ScreenCut is still to come
-  GlObject framebuffer, colour;
+  std::vector<ScreenSplat> held;  // the last splat of a draw, with the records of it that have come
+  GlObject framebuffer, layers_texture;
+  std::vector<GlObject> colours;  // an attachment for each window of depth
   ImageSize size{0, 0};
+  glm::vec4 background{0};
+  const PixelLayers* layers = nullptr;
   struct InFlight {
     GlFence fence;
     GlObject timer;  // a query, done when the fence is passed
@@ -109,7 +118,10 @@ struct GlPainter::State {
   uint64_t draws = 0;  // calls of draw()
   double upload_s = 0, draw_s = 0, gl_draw_s = 0;
 
-  void allocate(ImageSize wanted);
+  void allocate(ImageSize wanted, int windows);
+  void loadLayers();
+  const GlProgram& program(const SplatShaderKind& kind);
+  int windows() const { return layers ? layers->windows() : 1; }
   void drawPart(std::span<const ScreenSplat> splats);
   void finishOldest();
   void use(const GlProgram& program, const ClassificationTable& table, bool lit) const;
@@ -127,8 +139,18 @@ GlPainter::GlPainter(const GlContext& context) : state_(std::make_unique<State>(
 
 GlPainter::~GlPainter() = default;
 
-void GlPainter::State::allocate(ImageSize wanted) {
-  if (wanted.width == size.width && wanted.height == size.height) return;
+const GlProgram& GlPainter::State::program(const SplatShaderKind& kind) {
+  const int key = 8 * kind.windows + 4 * kind.layered + 2 * kind.log_scale + kind.per_pixel;
+  auto found = programs.find(key);
+  if (found == programs.end())
+    found = programs.emplace(key, GlProgram(gl, splatVertexShader(), splatFragmentShader(kind))).first;
+  return found->second;
+}
+
+void GlPainter::State::allocate(ImageSize wanted, int windows) {
+  const auto count = static_cast<size_t>(windows);
+  const bool same_size = wanted.width == size.width && wanted.height == size.height;
+  if (same_size && colours.size() == count) return;
   GLint viewport[2] = {0, 0}, side = 0;
   gl.GetIntegerv(GL_MAX_VIEWPORT_DIMS, viewport);
   gl.GetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &side);
@@ -138,16 +160,47 @@ void GlPainter::State::allocate(ImageSize wanted) {
         "an image of {}x{} pixels is larger than this OpenGL draws (at most {}x{}); ask for a smaller --size",
         wanted.width, wanted.height, widest, tallest);
   size = {0, 0};
+  if (!same_size) colours.clear();
   gl.BindFramebuffer(GL_FRAMEBUFFER, framebuffer.name());
-  gl.BindRenderbuffer(GL_RENDERBUFFER, colour.name());
-  gl.RenderbufferStorage(GL_RENDERBUFFER, GL_RGBA32F, wanted.width, wanted.height);
-  gl.FramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, colour.name());
+  for (size_t n = count; n < colours.size(); ++n)
+    gl.FramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0 + static_cast<GLenum>(n), GL_RENDERBUFFER,
+                               0);
+  colours.erase(colours.begin() + static_cast<std::ptrdiff_t>(std::min(count, colours.size())),
+                colours.end());
+  std::vector<GLenum> attachments;
+  for (size_t n = 0; n < count; ++n) {
+    attachments.push_back(GL_COLOR_ATTACHMENT0 + static_cast<GLenum>(n));
+    if (n < colours.size()) continue;
+    colours.push_back(makeRenderbuffer(gl));
+    gl.BindRenderbuffer(GL_RENDERBUFFER, colours[n].name());
+    gl.RenderbufferStorage(GL_RENDERBUFFER, GL_RGBA32F, wanted.width, wanted.height);
+    gl.FramebufferRenderbuffer(GL_FRAMEBUFFER, attachments[n], GL_RENDERBUFFER, colours[n].name());
+  }
+  gl.DrawBuffers(static_cast<GLsizei>(count), attachments.data());
   gl.check("allocating the image");
   if (const GLenum status = gl.CheckFramebufferStatus(GL_FRAMEBUFFER); status != GL_FRAMEBUFFER_COMPLETE)
     throw Error(
         "this OpenGL cannot draw to a 32-bit float image of {}x{} pixels (framebuffer status 0x{:04x})",
         wanted.width, wanted.height, status);
   size = wanted;
+}
+
+/// The depths of the pixels' layers, as the shader reads them.
+void GlPainter::State::loadLayers() {
+  static_assert(PixelLayers::kMostLayers == 4);
+  std::vector<float> depths(4 * size.pixels(), PixelLayers::kNowhere);
+  for (int y = 0; y < size.height; ++y)
+    for (int x = 0; x < size.width; ++x) {
+      float* at =
+          &depths[4 * (static_cast<size_t>(y) * static_cast<size_t>(size.width) + static_cast<size_t>(x))];
+      for (const PixelLayer& layer : layers->at(x, y)) *at++ = layer.depth;
+    }
+  gl.ActiveTexture(GL_TEXTURE0 + kLayersUnit);
+  gl.BindTexture(GL_TEXTURE_2D, layers_texture.name());
+  gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  gl.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA32F, size.width, size.height, 0, GL_RGBA, GL_FLOAT, depths.data());
+  gl.check("loading the depths of surfaces");
 }
 
 void GlPainter::State::use(const GlProgram& program, const ClassificationTable& table, bool lit) const {
@@ -157,6 +210,7 @@ void GlPainter::State::use(const GlProgram& program, const ClassificationTable& 
   gl.Uniform1i(program.uniform("lit"), lit ? 1 : 0);
   gl.Uniform1i(program.uniform("footprint"), kFootprintUnit);
   gl.Uniform1i(program.uniform("classes"), kClassesUnit);
+  gl.Uniform1i(program.uniform("layers"), kLayersUnit);
   gl.Uniform1f(program.uniform("support"), static_cast<float>(kKernelSupport));
   gl.Uniform1f(program.uniform("footprint_steps"),
                static_cast<float>(kFootprintSteps / (kKernelSupport * kKernelSupport)));
@@ -172,15 +226,23 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
                       PixelShading shading, const PaintResources&) {
   const GlFunctions& gl = state_->gl;
   finishDraws();  // of a frame that was not ended
-  state_->held.reset();
+  state_->held.clear();
   state_->upload_s = state_->draw_s = state_->gl_draw_s = 0;
-  state_->allocate(size);
+  state_->layers = shading.layers && !shading.layers->empty() ? shading.layers : nullptr;
+  const int windows = state_->windows();
+  state_->allocate(size, windows);
+  if (state_->layers) state_->loadLayers();
   state_->classes.fill(gl, kClassesUnit, GL_RGBA32F, table.cumulative());
-  state_->use(shading.per_pixel ? (table.logScale() ? state_->per_pixel_log : state_->per_pixel)
-                                : (table.logScale() ? state_->flat_log : state_->flat),
+  state_->use(state_->program({.per_pixel = shading.per_pixel,
+                               .log_scale = table.logScale(),
+                               .layered = state_->layers != nullptr,
+                               .windows = windows}),
               table, shading.lit);
   gl.Viewport(0, 0, size.width, size.height);
-  gl.ClearColor(background.r, background.g, background.b, background.a);
+  state_->background = background;
+  // With layers the picture is put together in end().
+  const glm::vec4 behind = state_->layers ? glm::vec4(0) : background;
+  gl.ClearColor(behind.r, behind.g, behind.b, behind.a);
   gl.Clear(GL_COLOR_BUFFER_BIT);
   gl.check("beginning a frame");
 }
@@ -193,7 +255,7 @@ std::span<ScreenSplat> GlPainter::mapSplats(size_t count) {
   state.mapped_splats = {};
   if (!gl.has44()) return {};
   state.mapped.emplace(gl);
-  const auto bytes = static_cast<GLsizeiptr>((count + 1) * sizeof(ScreenSplat));
+  const auto bytes = static_cast<GLsizeiptr>((count + kMostRecords) * sizeof(ScreenSplat));
   constexpr GLbitfield kHow = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
   gl.BufferStorage(GL_ARRAY_BUFFER, bytes, nullptr, kHow);
   void* const memory = gl.MapBufferRange(GL_ARRAY_BUFFER, 0, bytes, kHow);
@@ -205,21 +267,18 @@ std::span<ScreenSplat> GlPainter::mapSplats(size_t count) {
 void GlPainter::draw(std::span<const ScreenSplat> splats) {
   State& state = *state_;
   ++state.draws;
-  if (splats.empty()) return;
-  if (state.held) {
-    const ScreenSplat pair[] = {*state.held, splats.front()};
-    state.held.reset();
-    state.drawPart(pair);
-    splats = splats.subspan(1);
-  }
-  if (!splats.empty() && hasCut(splats.back())) {
-    state.held = splats.back();
-    splats = splats.first(splats.size() - 1);
+  for (; !state.held.empty() && !splats.empty(); splats = splats.subspan(1)) {
+    state.held.push_back(splats.front());
+    if (lacksRecords(state.held) > 0) continue;
+    state.drawPart(state.held);
+    state.held.clear();
   }
   while (!splats.empty()) {
     size_t count = std::min(splats.size(), kSplatsPerDraw);
-    if (hasCut(splats[count - 1]) && count < splats.size()) ++count;
-    state.drawPart(splats.first(count));
+    while (count < splats.size() && lacksRecords(splats.first(count)) > 0) ++count;
+    const size_t last = lacksRecords(splats.first(count));
+    if (last > 0) state.held.assign(splats.begin() + static_cast<std::ptrdiff_t>(count - last), splats.end());
+    if (count > last) state.drawPart(splats.first(count - last));
     splats = splats.subspan(count);
   }
 }
@@ -241,8 +300,8 @@ void GlPainter::State::drawPart(std::span<const ScreenSplat> splats) {
       // Fresh storage each time: the driver keeps what it still draws from.
       const StageTimer timer(upload_s);
       const auto bytes = static_cast<GLsizeiptr>(splats.size_bytes());
-      gl.BufferData(GL_ARRAY_BUFFER, bytes + static_cast<GLsizeiptr>(sizeof(ScreenSplat)), nullptr,
-                    GL_STREAM_DRAW);
+      gl.BufferData(GL_ARRAY_BUFFER, bytes + static_cast<GLsizeiptr>(kMostRecords * sizeof(ScreenSplat)),
+                    nullptr, GL_STREAM_DRAW);
       gl.BufferSubData(GL_ARRAY_BUFFER, 0, bytes, splats.data());
     }
     const StageTimer timer(draw_s);
@@ -278,9 +337,31 @@ Image GlPainter::end() {
   const GlFunctions& gl = state_->gl;
   finishDraws();
   const StageTimer timer(state_->draw_s);
-  Image image(state_->size);
-  gl.ReadPixels(0, 0, image.size.width, image.size.height, GL_RGBA, GL_FLOAT, image.rgba.data());
+  const State& state = *state_;
+  std::vector<Image> windows;
+  for (int n = 0; n < state.windows(); ++n) {
+    windows.emplace_back(state.size);
+    gl.ReadBuffer(GL_COLOR_ATTACHMENT0 + static_cast<GLenum>(n));
+    gl.ReadPixels(0, 0, state.size.width, state.size.height, GL_RGBA, GL_FLOAT, windows.back().rgba.data());
+  }
   gl.check("reading the picture");
+  if (!state.layers) return std::move(windows.front());
+  Image image(state.size);
+  for (int y = 0; y < image.size.height; ++y)
+    for (int x = 0; x < image.size.width; ++x) {
+      PixelResult result;
+      const auto add = [&](const float* c) { result.add({c[0], c[1], c[2]}, 1 - c[3]); };
+      add(windows[0].pixel(x, y));
+      size_t window = 1;
+      for (const PixelLayer& layer : state.layers->at(x, y)) {
+        result.add(glm::vec3(layer.colour), 1 - layer.colour.w);
+        if (layer.colour.w >= 1) break;
+        add(windows[window++].pixel(x, y));
+      }
+      float* to = image.pixel(x, y);
+      for (int c = 0; c < 3; ++c) to[c] = result.colour[c] + result.through * state.background[c];
+      to[3] = 1 - result.through * (1 - state.background[3]);
+    }
   return image;
 }
 

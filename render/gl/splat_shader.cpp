@@ -9,12 +9,16 @@ constexpr const char* kVertexShader = R"(#version 330 core
 layout(location = 0) in vec4 part0;  // x, y, l11, l21
 layout(location = 1) in vec4 part1;  // l22, amplitude, mean, slope0
 layout(location = 2) in vec2 part2;  // slope1, half_width
-layout(location = 3) in vec4 next0;  // the record behind it: its ScreenCut, if its amplitude is negative
+layout(location = 3) in vec4 next0;  // the record behind it: its ScreenCut or ScreenDepth, if its amplitude is negative
 layout(location = 4) in vec4 next1;
 layout(location = 5) in vec2 next2;
+layout(location = 6) in vec4 beyond0;  // the record behind that, which is the ScreenCut of one with a ScreenDepth
+layout(location = 7) in vec4 beyond1;
+layout(location = 8) in vec2 beyond2;
 uniform vec2 clip_from_pixel;
 uniform float support;
 uniform bool lit;
+const float kNoFace = 4.0;
 flat out vec2 centre;
 flat out vec3 u_from_d;  // of L: 1 / l11, -l21 / (l11 l22), 1 / l22
 flat out float amplitude;
@@ -22,6 +26,7 @@ flat out vec4 scalar;   // mean, slope0, slope1, half_width
 flat out mat3 faces;    // a face a column; of the splats that are cut
 flat out vec2 cut;      // far_sides, correlation
 flat out vec2 light;    // diffuse, specular
+flat out vec4 depth_line;  // of the splats that meet layers: the middle, by u, deviations per depth; else no more than 0
 
 void main() {
   if (part0.z < 0.0) {  // a ScreenCut
@@ -32,12 +37,21 @@ void main() {
     faces = mat3(0.0);
     cut = vec2(0.0);
     light = vec2(0.0);
+    depth_line = vec4(0.0);
     gl_Position = vec4(2.0, 2.0, 0.0, 1.0);
     return;
   }
   faces = mat3(next0.xyw, next1.xyz, vec3(next1.w, next2));
   cut.x = floor(-0.25 * next0.z);
   cut.y = -next0.z - 4.0 * cut.x - 2.0;
+  depth_line = vec4(0.0);
+  if (part1.y < 0.0 && next0.z < -32.0) {
+    depth_line = vec4(next0.xyw, next1.x);
+    bool has_cut = next0.z < -96.0;
+    faces = has_cut ? mat3(beyond0.xyw, beyond1.xyz, vec3(beyond1.w, beyond2)) : mat3(kNoFace, 0.0, 0.0, kNoFace, 0.0, 0.0, kNoFace, 0.0, 0.0);
+    cut.x = has_cut ? floor(-0.25 * beyond0.z) : 0.0;
+    cut.y = -next0.z - (has_cut ? 98.0 : 34.0);
+  }
   centre = part0.xy;
   u_from_d = vec3(1.0 / part0.z, -part0.w / (part0.z * part1.x), 1.0 / part1.x);
   amplitude = part1.y;
@@ -73,7 +87,21 @@ flat in vec4 scalar;
 flat in mat3 faces;
 flat in vec2 cut;
 flat in vec2 light;
-out vec4 blended;
+flat in vec4 depth_line;
+uniform sampler2D layers;  // the depths of the pixel's, from the nearest; infinite where there is none
+layout(location = 0) out vec4 blended0;
+#if WINDOWS > 1
+layout(location = 1) out vec4 blended1;
+#endif
+#if WINDOWS > 2
+layout(location = 2) out vec4 blended2;
+#endif
+#if WINDOWS > 3
+layout(location = 3) out vec4 blended3;
+#endif
+#if WINDOWS > 4
+layout(location = 4) out vec4 blended4;
+#endif
 
 float cellsOf(float value) {
   float v = LOG_SCALE ? log(max(value, least_logarithmic)) : value;
@@ -103,10 +131,10 @@ vec3 integralsTo(float x) {
               x * x2 * (0.3125 + x2 * (-0.375 + 0.13392857 * x2)));
 }
 
-// What the faces leave: the share, the mean and the variance of the depths, those over kReach deviations.
-vec3 remainder(vec2 u) {
+// What the faces leave between two depths: the share, the mean and the variance of the depths, those over kReach
+// deviations.
+vec3 remainder(vec2 u, float lo, float hi) {
   vec3 a = vec3(1.0, u) * faces / kReach;
-  float lo = -1.0, hi = 1.0;
   int far_sides = int(cut.x);
   for (int n = 0; n < 3; ++n) {
     if ((far_sides >> n & 1) != 0)
@@ -122,20 +150,12 @@ vec3 remainder(vec2 u) {
   return vec3(share, mean, left.z / max(share, 1e-6) - mean * mean);
 }
 
-void main() {
-  vec2 d = gl_FragCoord.xy - centre;
-  vec2 u = vec2(u_from_d.x * d.x, u_from_d.y * d.x + u_from_d.z * d.y);
-  float rho2 = dot(u, u);
-  if (rho2 >= support * support) discard;
-
-  float at = rho2 * footprint_steps;
-  vec2 texel = texelFetch(footprint, int(at)).xy;
-  float depth = abs(amplitude) * (texel.x + texel.y * fract(at));
-
+// What is seen of a splat with this optical depth per extinction, between two depths.
+vec4 seenBetween(vec2 u, float depth, float lo, float hi) {
   float mean = PER_PIXEL ? scalar.x + dot(scalar.yz, u) : scalar.x;
   float width = PER_PIXEL ? scalar.w : 0.0;
   if (amplitude < 0.0) {
-    vec3 left = remainder(u);
+    vec3 left = remainder(u, lo, hi);
     float deviation = cut.y * width * 0.57735027;
     depth *= left.x;
     mean += deviation * kReach * left.y;
@@ -151,7 +171,49 @@ void main() {
 
   float alpha = absorbed(seen.w * depth);
   vec3 colour = seen.rgb * light.x + seen.w * light.y;
-  blended = vec4(seen.w > 0.0 ? colour * (alpha / seen.w) : vec3(0.0), alpha);
+  return vec4(seen.w > 0.0 ? colour * (alpha / seen.w) : vec3(0.0), alpha);
+}
+
+#if WINDOWS > 1 || LAYERED
+// Of the window between layers n - 1 and n.
+vec4 seenIn(int n, vec2 u, float depth, vec4 ends) {
+  float lo = n > 0 ? clamp(ends[max(n - 1, 0)], -1.0, 1.0) : -1.0, hi = n < 4 ? clamp(ends[min(n, 3)], -1.0, 1.0) : 1.0;
+  if (lo >= hi) return vec4(0.0);
+  return seenBetween(u, depth, lo, hi);
+}
+#endif
+
+void main() {
+  vec2 d = gl_FragCoord.xy - centre;
+  vec2 u = vec2(u_from_d.x * d.x, u_from_d.y * d.x + u_from_d.z * d.y);
+  float rho2 = dot(u, u);
+  if (rho2 >= support * support) discard;
+
+  float at = rho2 * footprint_steps;
+  vec2 texel = texelFetch(footprint, int(at)).xy;
+  float depth = abs(amplitude) * (texel.x + texel.y * fract(at));
+#if WINDOWS > 1 || LAYERED
+  vec4 ends = vec4(1.0);
+  if (depth_line.w > 0.0) {
+    float middle = depth_line.x + dot(depth_line.yz, u);
+    ends = (texelFetch(layers, ivec2(gl_FragCoord.xy), 0) - middle) * (depth_line.w / kReach);
+  }
+  blended0 = seenIn(0, u, depth, ends);
+#else
+  blended0 = seenBetween(u, depth, -1.0, 1.0);
+#endif
+#if WINDOWS > 1
+  blended1 = seenIn(1, u, depth, ends);
+#endif
+#if WINDOWS > 2
+  blended2 = seenIn(2, u, depth, ends);
+#endif
+#if WINDOWS > 3
+  blended3 = seenIn(3, u, depth, ends);
+#endif
+#if WINDOWS > 4
+  blended4 = seenIn(4, u, depth, ends);
+#endif
 }
 )";
 
@@ -162,8 +224,10 @@ std::string splatVertexShader() {
 }
 
 std::string splatFragmentShader(SplatShaderKind kind) {
-  return fmt::format("#version 330 core\n#define PER_PIXEL {}\n#define LOG_SCALE {}\n{}", kind.per_pixel,
-                     kind.log_scale, kFragmentShader);
+  return fmt::format(
+      "#version 330 core\n#define PER_PIXEL {}\n#define LOG_SCALE {}\n#define LAYERED {:d}\n#define WINDOWS "
+      "{}\n{}",
+      kind.per_pixel, kind.log_scale, kind.layered, kind.windows, kFragmentShader);
 }
 
 }  // namespace curvisplat

@@ -8,21 +8,58 @@
 #include "render/project/kernel.h"
 
 namespace curvisplat {
+namespace {
+
+constexpr auto kSigma = static_cast<float>(kKernelSigma);
+constexpr auto kSupport = static_cast<float>(kKernelSupport);
+
+/// B's rows, and what every linear field along the ray needs of them.
+struct RayFrame {
+  glm::vec3 b0, b1;
+  glm::vec3 along;  // the ray, away from the viewer
+  float s00, s11, nn, low_pass, determinant;
+
+  RayFrame(const ScreenRows& rows, const Shape& s, float low_pass_px2)
+      : b0(s.axis0 * (rows.x0 + rows.y0 * s.shear10 + rows.z0 * s.shear20),
+           s.axis1 * (rows.y0 + rows.z0 * s.shear21), s.axis2 * rows.z0),
+        b1(s.axis0 * (rows.x1 + rows.y1 * s.shear10 + rows.z1 * s.shear20),
+           s.axis1 * (rows.y1 + rows.z1 * s.shear21), s.axis2 * rows.z1),
+        along(glm::cross(b0, b1)),
+        s00(glm::dot(b0, b0)),
+        s11(glm::dot(b1, b1)),
+        nn(glm::dot(along, along)),
+        low_pass(low_pass_px2),
+        determinant(nn + low_pass_px2 * (s00 + s11 + low_pass_px2)) {}
+
+  /// A field that changes by q: its change a pixel, the part of its variance that is along the ray, and q's
+  /// part in the ray's direction.
+  struct Field {
+    float g0, g1, hidden, along;
+  };
+  Field fieldOf(const glm::vec3& q) const {
+    const float h0 = glm::dot(b0, q), h1 = glm::dot(b1, q), nq = glm::dot(along, q);
+    const glm::vec3 m = glm::cross(along, q), c0 = glm::cross(b0, q), c1 = glm::cross(b1, q);
+    return {(glm::dot(b1, m) + low_pass * h0) / determinant, (low_pass * h1 - glm::dot(b0, m)) / determinant,
+            (low_pass * (low_pass * glm::dot(q, q) + glm::dot(c0, c0) + glm::dot(c1, c1)) + nq * nq) /
+                determinant,
+            nq};
+  }
+
+  /// Of the scalar with a field that has `steepness` of its deviation along the ray. Where the ellipse is a
+  /// line to float's precision, the ray's direction is noise (splat_ellipse.h).
+  float correlation(const Slope& w, const Ellipse& ellipse, float steepness) const {
+    if (!(nn > 1e-8f * s00 * s11 && ellipse.half_width > 0)) return 0;
+    const float deviation = kSigma * glm::dot({w.w0, w.w1, w.w2}, along) / std::sqrt(nn);
+    return std::clamp(steepness * deviation * std::numbers::sqrt3_v<float> / ellipse.half_width, -1.0f, 1.0f);
+  }
+};
+
+}  // namespace
 
 Remains cutAtFaces(const ScreenRows& rows, const SplatPiece& piece, const Ellipse& ellipse,
                    float low_pass_px2, ScreenCut& cut) {
   if (piece.faces.count == 0) return Remains::kAll;
-  constexpr auto kSigma = static_cast<float>(kKernelSigma);
-  constexpr auto kSupport = static_cast<float>(kKernelSupport);
-  const Shape& s = piece.shape;
-  const glm::vec3 b0(s.axis0 * (rows.x0 + rows.y0 * s.shear10 + rows.z0 * s.shear20),
-                     s.axis1 * (rows.y0 + rows.z0 * s.shear21), s.axis2 * rows.z0);
-  const glm::vec3 b1(s.axis0 * (rows.x1 + rows.y1 * s.shear10 + rows.z1 * s.shear20),
-                     s.axis1 * (rows.y1 + rows.z1 * s.shear21), s.axis2 * rows.z1);
-  const float s00 = glm::dot(b0, b0), s11 = glm::dot(b1, b1);
-  const glm::vec3 along = glm::cross(b0, b1);  // the ray, away from the viewer
-  const float nn = glm::dot(along, along);
-  const float determinant = nn + low_pass_px2 * (s00 + s11 + low_pass_px2);
+  const RayFrame ray(rows, piece.shape, low_pass_px2);
 
   // A face's distance varies along the ray by this part of its variance in the splat: 1 is seen face-on. What
   // the next layer's splats have behind a face (a hundredth of their weight) shows only beside its edges.
@@ -37,23 +74,20 @@ Remains cutAtFaces(const ScreenRows& rows, const SplatPiece& piece, const Ellips
   std::array<Taking, ScreenCut::kFaces> taking;
   size_t count = 0;
   for (const CutFace& face : piece.faces) {
-    const glm::vec3& q = face.inward;
-    const float h0 = glm::dot(b0, q), h1 = glm::dot(b1, q), nq = glm::dot(along, q);
-    const glm::vec3 m = glm::cross(along, q), c0 = glm::cross(b0, q), c1 = glm::cross(b1, q);
-    const float g0 = (glm::dot(b1, m) + low_pass_px2 * h0) / determinant;
-    const float g1 = (low_pass_px2 * h1 - glm::dot(b0, m)) / determinant;
-    const float hidden =
-        (low_pass_px2 * (low_pass_px2 + glm::dot(c0, c0) + glm::dot(c1, c1)) + nq * nq) / determinant;
-    if (face.edge_on && hidden > kLowAngle) continue;
-    const float deviation = std::sqrt(hidden);
+    const RayFrame::Field field = ray.fieldOf(face.inward);
+    if (face.edge_on && field.hidden > kLowAngle) continue;
+    const float deviation = std::sqrt(field.hidden);
     const float inverse = 1 / (kSigma * deviation);
     const float a = inverse * face.distance;
-    const float by0 = inverse * (ellipse.l11 * g0 + ellipse.l21 * g1), by1 = inverse * ellipse.l22 * g1;
+    const float by0 = inverse * (ellipse.l11 * field.g0 + ellipse.l21 * field.g1);
+    const float by1 = inverse * ellipse.l22 * field.g1;
     const float spread = kSupport * std::sqrt(by0 * by0 + by1 * by1);
     if (a + spread <= -ScreenCut::kReach) return Remains::kNothing;
     if (a - spread >= ScreenCut::kReach) continue;
-    const Taking found{
-        a - spread, {a, by0, by1}, nq > 0, std::abs(nq) / (std::sqrt(determinant) * deviation)};
+    const Taking found{a - spread,
+                       {a, by0, by1},
+                       field.along > 0,
+                       std::abs(field.along) / (std::sqrt(ray.determinant) * deviation)};
     if (count < taking.size()) {
       taking[count++] = found;
       continue;
@@ -71,14 +105,25 @@ Remains cutAtFaces(const ScreenRows& rows, const SplatPiece& piece, const Ellips
   }
   if (count == 0) return Remains::kAll;
 
-  // Where the ellipse is a line to float's precision, the ray's direction is noise (splat_ellipse.h).
-  if (nn > 1e-8f * s00 * s11 && ellipse.half_width > 0) {
-    const Slope& w = piece.slope;
-    const float deviation = kSigma * glm::dot({w.w0, w.w1, w.w2}, along) / std::sqrt(nn);
-    cut.correlation =
-        std::clamp(steepest * deviation * std::numbers::sqrt3_v<float> / ellipse.half_width, -1.0f, 1.0f);
-  }
+  cut.correlation = ray.correlation(piece.slope, ellipse, steepest);
   return Remains::kSome;
+}
+
+ScreenDepth depthAlongRay(const ScreenRows& rows, const glm::vec3& depth_row, float depth,
+                          const SplatPiece& piece, const Ellipse& ellipse, float low_pass_px2) {
+  const RayFrame ray(rows, piece.shape, low_pass_px2);
+  const Shape& s = piece.shape;
+  const RayFrame::Field field =
+      ray.fieldOf({s.axis0 * (depth_row.x + depth_row.y * s.shear10 + depth_row.z * s.shear20),
+                   s.axis1 * (depth_row.y + depth_row.z * s.shear21), s.axis2 * depth_row.z});
+  constexpr float kMostPerDepth = 1e30f;
+  ScreenDepth out;
+  out.middle = depth;
+  out.by = {ellipse.l11 * field.g0 + ellipse.l21 * field.g1, ellipse.l22 * field.g1};
+  out.per_depth = std::min(1 / (kSigma * std::sqrt(field.hidden)), kMostPerDepth);
+  const float deviation = std::sqrt(ray.determinant * field.hidden);
+  out.correlation = ray.correlation(piece.slope, ellipse, deviation > 0 ? field.along / deviation : 0);
+  return out;
 }
 
 }  // namespace curvisplat

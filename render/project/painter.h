@@ -11,6 +11,8 @@
 
 #include "render/colour/classification.h"
 #include "render/image/image.h"
+#include "render/project/pixel_layers.h"
+#include "render/project/screen_box.h"
 #include "render/project/screen_splat.h"
 #include "stream/paging/cut.h"
 
@@ -26,11 +28,7 @@ struct PaintResources {
 struct PixelShading {
   bool per_pixel = true;  // from the splat's slope and width; false: one colour and extinction per splat
   bool lit = false;       // splats carry light (light.h)
-};
-
-/// A rectangle in pixels, with the coordinates of ScreenSplat::x and y.
-struct ScreenBox {
-  float x0, y0, x1, y1;
+  const PixelLayers* layers = nullptr;  // of the picture's size, in it; outlive the frame
 };
 
 class Painter {

@@ -19,6 +19,7 @@
 #include "render/colour/classification.h"
 #include "render/project/clip_planes.h"
 #include "render/project/light.h"
+#include "render/project/pixel_layers.h"
 #include "render/project/screen_splat.h"
 #include "render/project/screen_view.h"
 #include "stream/model/border_code.h"
@@ -31,6 +32,7 @@ namespace curvisplat {
 struct ProjectionCounts {
   uint64_t read = 0;         // in the bricks, or the parts of them that are drawn
   uint64_t clipped = 0;      // outside of a clip plane
+  uint64_t hidden = 0;       // behind opaque layers
   uint64_t off_screen = 0;   // outside the image, or before the near plane
   uint64_t transparent = 0;  // without extinction in the transfer function, or without weight
   uint64_t drawn = 0;        // of those read
@@ -46,6 +48,7 @@ struct ProjectionSettings {
   std::optional<Light> light = std::nullopt;
   double light_g0 = 1;                   // LocalLight's
   BorderStyle borders = kHalfCellStyle;  // kWholeCellStyle where the data is cell-centred
+  const PixelLayers* layers = nullptr;   // surfaces and slices in the picture, which splats are cut at
 };
 
 /// Projects bricks. Each projector belongs to one thread.
@@ -73,7 +76,7 @@ class BrickProjector {
   void project(const ProjectionSettings& settings, const ClassificationTable& table,
                const glm::dvec3& cell_min, const SplatGeometry& geometry, const SplatVariable& variable);
 
-  /// In the order of the ranges. A ScreenCut precedes its splat and has the same depth.
+  /// In the order of the ranges. A splat's ScreenCut and ScreenDepth precede it and have the same depth.
   const std::vector<ScreenSplat>& splats() const { return splats_; }
   /// [splats()], larger is farther: orthographic, distance along the view from any origin; perspective,
   /// distance from the eye.

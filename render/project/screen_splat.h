@@ -1,5 +1,5 @@
-// The records that the projection passes to the painters: splats as ellipses on the screen, and the faces
-// that cut them. Every record takes 40 bytes.
+// The records that the projection passes to the painters: splats as ellipses on the screen, and what cuts them:
+// faces, and the layers of the pixels. Every record takes 40 bytes.
 #pragma once
 
 #include <array>
@@ -23,7 +23,8 @@ static_assert(sizeof(ScreenSplat) == 40);
 
 /// The faces that a splat is cut at: a record of its own, directly before the splat where splats come from
 /// the nearest to the farthest, and directly behind it where they come from the farthest to the nearest. The
-/// splat's amplitude is then negative: minus what it would be.
+/// splat's amplitude is then negative: minus what it would be. A splat that has a ScreenDepth as well has that
+/// beside it, and the ScreenCut beyond.
 ///
 /// Along the ray of a pixel the splat lies about its middle with a distribution of deviation 1: the
 /// biweight's, b(x) = 15 / (16 √7) (1 - x²/7)², |x| <= √7. A face leaves what is nearer than, or farther
@@ -46,11 +47,29 @@ struct ScreenCut {
   static ScreenCut of(const ScreenSplat& record);
 };
 
-/// Whether a record is a ScreenCut.
+/// Where a splat lies along the ray, for those that may meet the layers of their pixels (pixel_layers.h). The
+/// middle's depth at u is middle + by[0] u0 + by[1] u1; a layer at the depth z is (z - that) per_depth
+/// deviations behind it. A window between two layers is one more interval that the splat is cut to, together
+/// with those of its faces. In front of all layers is what has no such record.
+struct ScreenDepth {
+  float middle = 0;
+  std::array<float, 2> by{};
+  float per_depth = 1;
+  float correlation = 0;  // as ScreenCut's, which it replaces
+  bool has_cut = false;   // a ScreenCut lies beyond
+
+  ScreenSplat record() const;
+  static ScreenDepth of(const ScreenSplat& record);
+};
+
+/// Whether a record is a ScreenCut or a ScreenDepth, which isDepth() tells apart.
 inline bool isCut(const ScreenSplat& record) {
   return record.l11 < 0;
 }
-/// Whether a splat has a ScreenCut.
+inline bool isDepth(const ScreenSplat& record) {
+  return record.l11 < -32;
+}
+/// Whether a splat has one of them, or both.
 inline bool hasCut(const ScreenSplat& splat) {
   return splat.amplitude < 0 && !isCut(splat);
 }
@@ -70,5 +89,32 @@ inline ScreenCut ScreenCut::of(const ScreenSplat& r) {
   cut.correlation = -r.l11 - 4 * static_cast<float>(cut.far_sides) - 2;
   return cut;
 }
+
+// The correlation is found as that of a ScreenCut, with far_sides 8 or 24.
+inline ScreenSplat ScreenDepth::record() const {
+  return {middle, by[0], -(has_cut ? 98.0f : 34.0f) - correlation, by[1], per_depth, 0, 0, 0, 0, 0};
+}
+inline ScreenDepth ScreenDepth::of(const ScreenSplat& r) {
+  ScreenDepth depth;
+  depth.middle = r.x;
+  depth.by = {r.y, r.l21};
+  depth.per_depth = r.l22;
+  depth.has_cut = r.l11 < -96;
+  depth.correlation = -r.l11 - (depth.has_cut ? 98.0f : 34.0f);
+  return depth;
+}
+
+/// What lies beside a splat that is cut: its records, found from the one next to it on. `step` is -1 where
+/// splats come from the nearest to the farthest, else 1.
+struct SplatCuts {
+  const ScreenSplat* cut = nullptr;
+  const ScreenSplat* depth = nullptr;
+
+  static SplatCuts beside(const ScreenSplat* splat, int step) {
+    const ScreenSplat* const next = splat + step;
+    if (!isDepth(*next)) return {next, nullptr};
+    return {ScreenDepth::of(*next).has_cut ? next + step : nullptr, next};
+  }
+};
 
 }  // namespace curvisplat

@@ -1,6 +1,7 @@
 // The constants of one view's projection for one brick, in float and relative to the brick's origin.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <glm/vec3.hpp>
 
@@ -18,6 +19,9 @@ struct OrthographicMap {
   float low_pass_px2, slope_low_pass_px2;
 
   OrthographicMap(const ScreenView& view, const glm::dvec3& origin);
+
+  /// Depth per unit of the data.
+  glm::vec3 depthRow(float, float, float) const { return depth; }
 };
 
 /// The local affine map of each splat (Zwicker et al., "EWA Volume Splatting", 2001), with the distance from
@@ -57,6 +61,12 @@ struct PerspectiveMap {
             pixels * (right.z - x * forward.z), pixels * (down.x - y * forward.x),
             pixels * (down.y - y * forward.y),  pixels * (down.z - y * forward.z)};
   }
+
+  /// Depth, the distance from the eye, per unit of the data.
+  glm::vec3 depthRowAt(const Centre& c) const {
+    return (c.x * right + c.y * down + c.z * forward) / std::max(c.distance, 1e-30f);
+  }
+  glm::vec3 depthRow(float x, float y, float z) const { return depthRowAt(centreOf(x, y, z)); }
 
   float volumeAt(const Centre& c) const {
     return volume * focal_px * focal_px * c.distance / (c.z * c.z * c.z);

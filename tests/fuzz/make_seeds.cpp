@@ -408,6 +408,33 @@ void writeNetcdf(const Seeds& seeds) {
   }
 }
 
+void writeMeshes(const Seeds& seeds) {
+  Seed stl;
+  stl.add(uint8_t{0}).text(std::string(80, ' ')).add(uint32_t{1});
+  for (const float x : {0.0f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f, 0.0f}) stl.add(x);
+  seeds.write("mesh", "binary_stl", stl.add(uint16_t{0}).whole());
+  seeds.write("mesh", "ascii_stl",
+              Seed()
+                  .add(uint8_t{0})
+                  .text("solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+                        "endloop\nendfacet\nendsolid a\n")
+                  .whole());
+  const std::string elements =
+      "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+      "property list uchar int vertex_indices\nend_header\n";
+  seeds.write("mesh", "ascii_ply",
+              Seed()
+                  .add(uint8_t{1})
+                  .text("ply\nformat ascii 1.0\n" + elements + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+                  .whole());
+  Seed ply;
+  ply.add(uint8_t{1}).text("ply\nformat binary_little_endian 1.0\n" + elements);
+  for (const float x : {0.0f, 0.0f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f, 0.0f}) ply.add(x);
+  seeds.write("mesh", "binary_ply", ply.add(uint8_t{3}).add(0).add(1).add(2).whole());
+  seeds.write("mesh", "obj",
+              Seed().add(uint8_t{2}).text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1/1 2//2 -2 4\n").whole());
+}
+
 }  // namespace
 }  // namespace curvisplat
 
@@ -424,6 +451,7 @@ int main(int argc, char** argv) {
   writeJournals(seeds);
   writeSplats(seeds);
   writeTexts(seeds);
+  writeMeshes(seeds);
   writeImages(seeds);
   writePlot3d(seeds);
   writeVtk(seeds);

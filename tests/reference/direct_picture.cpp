@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <glm/common.hpp>
 #include <map>
+#include <memory>
+#include <optional>
 #include <span>
 #include <tuple>
 #include <vector>
@@ -13,6 +15,7 @@
 #include "preprocess/splats/seams.h"
 #include "render/cpu/cpu_painter.h"
 #include "render/project/projection.h"
+#include "render/surface/scene_layers.h"
 #include "tests/reference/painted_splats.h"
 #include "tests/reference/splat_arrays.h"
 
@@ -82,6 +85,31 @@ void toArrays(const std::vector<DirectSplat>& splats, const glm::dvec3& origin, 
              splats[n].border_code);
 }
 
+/// The layers of the scene, its slices through these splats.
+PixelLayers sceneLayers(const SurfaceScene& scene, const ProjectionSettings& settings,
+                        const TransferFunction& function, const glm::dvec3& origin,
+                        const SplatGeometry& geometry, const SplatVariable& variable) {
+  const auto [low, high] = std::minmax_element(variable.mean.begin(), variable.mean.end());
+  std::vector<std::unique_ptr<SliceSampler>> slices;
+  const SplatRange all{0, static_cast<uint32_t>(geometry.size())};
+  for (const ClipPlane& plane : scene.slices) {
+    slices.push_back(std::make_unique<SliceSampler>(settings.view, plane, *low, *high, settings.borders));
+    slices.back()->add(origin, arraysOf(geometry), arraysOf(variable), {&all, 1});
+  }
+  const double depth_origin =
+      settings.view.projection == Projection::kPerspective ? 0 : settings.view.viewFromData(origin).z;
+  return layersOf(scene, settings.view, slices,
+                  {ColourTable(function), settings.light, settings.clip_planes, depth_origin});
+}
+
+/// Whether the layers of its pixel hide a splat's centre; depths from the layers' origin.
+bool isBehind(const PixelLayers& layers, const ScreenSplat& splat, float depth) {
+  const ImageSize size = layers.size();
+  const auto at = layers.at(std::clamp(static_cast<int>(splat.x), 0, size.width - 1),
+                            std::clamp(static_cast<int>(splat.y), 0, size.height - 1));
+  return !at.empty() && at.back().colour.w >= 1 && depth > at.back().depth;
+}
+
 }  // namespace
 
 Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOptions& options,
@@ -116,12 +144,22 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
   settings.per_pixel = options.per_pixel;
   settings.light = options.light;
   settings.light_g0 = options.light_g0;
+  std::optional<PixelLayers> layers;
+  if (options.scene)
+    layers.emplace(sceneLayers(*options.scene, settings, function, origin, geometry, variable));
+  if (layers && options.cut_splats) settings.layers = &*layers;
   BrickProjector projector;
   projector.project(settings, table, origin, geometry, variable);
 
   std::vector<ScreenSplat> sorted;
   sorted.reserve(projector.splats().size());
+  bool is_behind = false;
   for (const uint32_t n : farthestFirst(projector.depths())) {
+    if (options.scene && !options.scene->volume) break;
+    // A splat's records come behind it.
+    if (layers && !options.cut_splats && !isCut(projector.splats()[n]))
+      is_behind = isBehind(*layers, projector.splats()[n], projector.depths()[n]);
+    if (is_behind) continue;
     ScreenSplat splat = projector.splats()[n];
     if (isCut(splat)) {
       sorted.push_back(splat);
@@ -135,7 +173,8 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
     sorted.push_back(splat);
   }
   CpuPainter painter;
-  return paintFrame(painter, sorted, table, {options.per_pixel, options.light.has_value()}, size);
+  return paintFrame(painter, sorted, table,
+                    {options.per_pixel, options.light.has_value(), layers ? &*layers : nullptr}, size);
 }
 
 }  // namespace curvisplat

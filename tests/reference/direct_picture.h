@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "render/project/clip_planes.h"
 #include "render/project/light.h"
 #include "render/project/screen_view.h"
+#include "render/surface/surface_scene.h"
 
 namespace curvisplat {
 
@@ -28,7 +30,10 @@ struct DirectOptions {
   bool variance = true;      // else merged splats forget the variance that their slope does not explain
 
   std::vector<ClipPlane> clip_planes;
-  bool cut_splats = true;  // else splats whose centre is outside of a clip plane are left out, and no others
+  bool cut_splats =
+      true;  // else splats whose centre is outside of a clip plane, or behind a surface, are left
+             // out, and no others
+  std::shared_ptr<const SurfaceScene> scene;
 
   std::optional<Light> light;
   double light_g0 = 1;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 #include <random>
+#include <utility>
+
 #include "render/project/light.h"
 
 namespace curvisplat {
@@ -65,6 +67,47 @@ std::vector<ScreenSplat> cutSome(const std::vector<ScreenSplat>& splats, uint32_
     out.push_back(cut.record());
   }
   return out;
+}
+
+std::vector<ScreenSplat> placeSome(const std::vector<ScreenSplat>& splats, uint32_t seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> unit(0, 1), around(-1, 1);
+  std::vector<ScreenSplat> out;
+  for (size_t n = 0; n < splats.size(); ++n) {
+    if (isCut(splats[n])) continue;
+    out.push_back(splats[n]);
+    const bool is_cut = hasCut(splats[n]);
+    if (n % 3 != 2) {
+      out.back().amplitude = -std::abs(out.back().amplitude);
+      const float size = n % 4 == 0 ? 1e-4f : 0.3f;
+      out.push_back(ScreenDepth{unit(random),
+                                {size * around(random), size * around(random)},
+                                1 / (size * (0.1f + unit(random))),
+                                around(random),
+                                is_cut}
+                        .record());
+    }
+    if (is_cut) out.push_back(splats[n + 1]);
+  }
+  return out;
+}
+
+PixelLayers randomLayers(ImageSize size, uint32_t seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> unit(0, 1);
+  std::vector<PixelLayers::Row> rows(static_cast<size_t>(size.height));
+  for (int y = 0; y < size.height; ++y)
+    for (int x = 0; x < size.width; ++x) {
+      PixelLayers::Row& row = rows[static_cast<size_t>(y)];
+      const size_t first = row.layers.size();
+      const bool none = x / 32 == 1 && y / 32 == 0;
+      for (size_t n = none ? 0 : random() % 6; n > 0; --n) {
+        const float alpha = random() % 4 == 0 ? 1.0f : unit(random);
+        row.layers.push_back({unit(random), glm::vec4(unit(random), unit(random), unit(random), 1) * alpha});
+      }
+      row.endPixel(first);
+    }
+  return {size, std::move(rows), 0};
 }
 
 std::vector<ScreenSplat> lit(std::vector<ScreenSplat> splats, uint32_t seed) {

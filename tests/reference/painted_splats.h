@@ -28,6 +28,12 @@ std::vector<uint32_t> farthestFirst(std::span<const float> depths);
 /// The same splats in their order, every third of them cut at up to three faces.
 std::vector<ScreenSplat> cutSome(const std::vector<ScreenSplat>& splats, uint32_t seed);
 
+/// The same splats in their order, two in three of them somewhere along the ray, near depths 0 to 1; some of
+/// those are cut as well.
+std::vector<ScreenSplat> placeSome(const std::vector<ScreenSplat>& splats, uint32_t seed);
+/// Up to five layers a pixel, at depths from 0 to 1, some of them opaque; none in some tiles.
+PixelLayers randomLayers(ImageSize size, uint32_t seed);
+
 /// The same splats in their order, each with light of its own.
 std::vector<ScreenSplat> lit(std::vector<ScreenSplat> splats, uint32_t seed);
 

@@ -62,12 +62,15 @@ class Marcher {
           const MarchSteps& steps, const ReferenceLight* light)
       : field_(field), probe_(field.probe()), function_(function), ray_(ray), steps_(steps), light_(light) {}
 
-  ReferencePixel march(double begin, double end) {
-    std::vector<double> ends;
-    if (field_.crossings(ray_.origin, ray_.direction, ends))
-      marchBetween(std::move(ends), begin, end);
-    else
-      marchSearching(begin, end, steps_.step);
+  /// `layers`: from the nearest.
+  ReferencePixel march(double begin, double end, const std::vector<ReferenceLayer>& layers) {
+    for (const ReferenceLayer& layer : layers) {
+      if (layer.distance > begin) marchVolume(begin, std::min(layer.distance, end));
+      begin = std::max(begin, layer.distance);
+      colour_ += transmittance_ * layer.opacity * layer.colour;
+      transmittance_ *= 1 - layer.opacity;
+    }
+    if (transmittance_ > 0) marchVolume(begin, end);
     return {colour_ + transmittance_, transmittance_};
   }
 
@@ -75,6 +78,15 @@ class Marcher {
   static constexpr double kMinStep = 1e-5;    // of the largest
   static constexpr double kNoLength = 1e-11;  // of the ray's part in the box
   static constexpr double kSkin = 1e-9;       // of an interval: its ends are sampled so far inside of it
+
+  void marchVolume(double begin, double end) {
+    if (!(begin < end)) return;
+    std::vector<double> ends;
+    if (field_.crossings(ray_.origin, ray_.direction, ends))
+      marchBetween(std::move(ends), begin, end);
+    else
+      marchSearching(begin, end, steps_.step);
+  }
 
   /// From one of `ends` to the next the field is there throughout, or nowhere.
   void marchBetween(std::vector<double> ends, double begin, double end) {
@@ -218,9 +230,24 @@ class Marcher {
   double transmittance_ = 1;
 };
 
+/// What lights the field, and what lies in it.
+struct Surroundings {
+  const ReferenceLight* light = nullptr;
+  const ReferenceLayers& layers;
+};
+
+std::vector<ReferenceLayer> layersAlong(const ReferenceLayers& layers, const Ray& ray, double near) {
+  std::vector<ReferenceLayer> found;
+  if (layers) found = layers(ray.origin, ray.direction);
+  std::erase_if(found, [&](const ReferenceLayer& layer) { return layer.distance < near; });
+  std::sort(found.begin(), found.end(),
+            [](const ReferenceLayer& a, const ReferenceLayer& b) { return a.distance < b.distance; });
+  return found;
+}
+
 /// The pixels of `image` for which `wanted` is not 0.
 void marchPixels(const ReferenceField& field, const OpticalFunction& function, const Camera& camera,
-                 const MarchSteps& steps, const ReferenceLight* light, const std::vector<uint8_t>& wanted,
+                 const MarchSteps& steps, const Surroundings& around, const std::vector<uint8_t>& wanted,
                  ReferenceImage& image) {
   const ImageSize size = image.size;
   const auto [lower, upper] = field.bounds();
@@ -230,14 +257,12 @@ void marchPixels(const ReferenceField& field, const OpticalFunction& function, c
       const size_t p = static_cast<size_t>(y) * static_cast<size_t>(size.width) + static_cast<size_t>(x);
       if (!wanted[p]) continue;
       const Ray ray = rayThrough(camera, size, x, y);
-      image.pixels[p] = {glm::dvec3(1.0), 1};
       const auto part = partInBox(ray, lower, upper);
-      if (!part) continue;
       const bool from_eye = camera.projection == Projection::kPerspective;
       const double near = from_eye ? steps.near / glm::dot(ray.direction, forward) : 0.0;
-      const double begin = std::max(part->first, near);
-      if (begin < part->second)
-        image.pixels[p] = Marcher(field, function, ray, steps, light).march(begin, part->second);
+      const auto [begin, end] = part.value_or(std::pair(near, near));
+      image.pixels[p] = Marcher(field, function, ray, steps, around.light)
+                            .march(std::max(begin, near), end, layersAlong(around.layers, ray, near));
     }
   });
 }
@@ -264,6 +289,50 @@ glm::dvec3 sectionNineColour(double f) {
 
 }  // namespace
 
+namespace {
+
+glm::dvec3 litAtViewer(const glm::dvec3& colour, const glm::dvec3& normal, const glm::dvec3& direction) {
+  const ReferenceLight light;
+  const double facing = std::abs(glm::dot(normal, direction));
+  return glm::min(
+      (light.ambient + light.diffuse * facing) * colour + glm::dvec3(light.specular * std::pow(facing, 32)),
+      glm::dvec3(1.0));
+}
+
+}  // namespace
+
+ReferenceLayers planeLayer(const glm::dvec3& point, const glm::dvec3& normal, const glm::dvec3& colour) {
+  const glm::dvec3 n = glm::normalize(normal);
+  return [=](const glm::dvec3& origin, const glm::dvec3& direction) -> std::vector<ReferenceLayer> {
+    const double along = glm::dot(n, direction);
+    if (along == 0) return {};
+    return {{glm::dot(n, point - origin) / along, litAtViewer(colour, n, direction), 1}};
+  };
+}
+
+ReferenceLayers sphereLayer(const glm::dvec3& centre, double radius, const glm::dvec3& colour) {
+  return [=](const glm::dvec3& origin, const glm::dvec3& direction) -> std::vector<ReferenceLayer> {
+    const double middle = glm::dot(centre - origin, direction);
+    const glm::dvec3 aside = origin + middle * direction - centre;
+    const double half2 = radius * radius - glm::dot(aside, aside);
+    if (half2 <= 0) return {};
+    const double distance = middle - std::sqrt(half2);
+    const glm::dvec3 n = (origin + distance * direction - centre) / radius;
+    return {{distance, litAtViewer(colour, n, direction), 1}};
+  };
+}
+
+ReferenceLayers sliceLayer(const ReferenceField& field, const OpticalFunction& function,
+                           const glm::dvec3& point, const glm::dvec3& normal, double opacity) {
+  return [&field, function, point, n = glm::normalize(normal), opacity](
+             const glm::dvec3& origin, const glm::dvec3& direction) -> std::vector<ReferenceLayer> {
+    const double distance = glm::dot(n, point - origin) / glm::dot(n, direction);
+    const auto scalar = field.probe()->at(origin + distance * direction);
+    if (!scalar) return {};
+    return {{distance, function(*scalar).colour, opacity}};
+  };
+}
+
 OpticalProperties smoothFunction(double f) {
   return {sectionNineColour(f), 8 * f * f};
 }
@@ -276,9 +345,9 @@ OpticalProperties stepFunction(double f) {
 
 ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction& function,
                               const Camera& camera, ImageSize size, const MarchSteps& steps,
-                              const ReferenceLight* light) {
+                              const ReferenceLight* light, const ReferenceLayers& layers) {
   ReferenceImage image{size, std::vector<ReferencePixel>(size.pixels())};
-  marchPixels(field, function, camera, steps, light, std::vector<uint8_t>(size.pixels(), 1), image);
+  marchPixels(field, function, camera, steps, {light, layers}, std::vector<uint8_t>(size.pixels(), 1), image);
   return image;
 }
 
@@ -303,7 +372,7 @@ ReferenceImage convergedMarch(const ReferenceField& field, const OpticalFunction
     steps.step *= 0.5;
     steps.cells *= 0.5;
     ReferenceImage finer = image;
-    marchPixels(field, function, camera, steps, nullptr, wanted, finer);
+    marchPixels(field, function, camera, steps, {nullptr, {}}, wanted, finer);
     double sum = 0;
     for (size_t p = 0; p < image.pixels.size(); ++p) {
       const glm::dvec3 d = finer.pixels[p].colour - image.pixels[p].colour;

@@ -62,12 +62,29 @@ struct ReferenceLight {
   std::optional<glm::dvec3> towards;  // the light; none: it is where the viewer is
 };
 
+/// Something in the field that a ray meets: a surface, or a slice.
+struct ReferenceLayer {
+  double distance = 0;     // along the ray, whose direction has length 1
+  glm::dvec3 colour{0.0};  // not premultiplied
+  double opacity = 1;
+};
+/// What a ray meets, in any order.
+using ReferenceLayers =
+    std::function<std::vector<ReferenceLayer>(const glm::dvec3& origin, const glm::dvec3& direction)>;
+
+/// A plane of one colour, or a sphere, opaque and lit from where the viewer is (ReferenceLight without g0).
+ReferenceLayers planeLayer(const glm::dvec3& point, const glm::dvec3& normal, const glm::dvec3& colour);
+ReferenceLayers sphereLayer(const glm::dvec3& centre, double radius, const glm::dvec3& colour);
+/// A slice through the field, in the colours of the function.
+ReferenceLayers sliceLayer(const ReferenceField& field, const OpticalFunction& function,
+                           const glm::dvec3& point, const glm::dvec3& normal, double opacity = 1);
+
 /// Marches every pixel, from the plane of the viewer on. Where the field does not know its crossings, a part
 /// of a ray inside or outside of it that is shorter than a step may be missed. Parallel; the result does not
 /// depend on the threads.
 ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction& function,
                               const Camera& camera, ImageSize size, const MarchSteps& steps,
-                              const ReferenceLight* light = nullptr);
+                              const ReferenceLight* light = nullptr, const ReferenceLayers& layers = {});
 ReferenceImage referenceMarch(const Scene& scene, const OpticalFunction& function, const Camera& camera,
                               ImageSize size, double step = 0.004);
 

@@ -28,8 +28,28 @@ double biweight(int power, double x) {
 struct Remainder {
   double share = 1, mean = 0, variance = 1;
 };
-Remainder remainderOf(const ScreenCut& cut, double u0, double u1) {
+
+/// A window of depth, in the depths of layers.
+struct Window {
+  double nearer = -INFINITY, farther = INFINITY;
+};
+
+struct Cuts {
+  std::optional<ScreenCut> cut;
+  std::optional<ScreenDepth> depth;
+  Window window = {};
+
+  double correlation() const { return depth ? depth->correlation : cut ? cut->correlation : 0; }
+};
+
+Remainder remainderOf(const Cuts& cuts, double u0, double u1) {
   double lo = -std::sqrt(7.0), hi = std::sqrt(7.0);
+  if (cuts.depth) {
+    const double middle = cuts.depth->middle + cuts.depth->by[0] * u0 + cuts.depth->by[1] * u1;
+    lo = std::clamp((cuts.window.nearer - middle) * cuts.depth->per_depth, lo, hi);
+    hi = std::clamp((cuts.window.farther - middle) * cuts.depth->per_depth, lo, hi);
+  }
+  const ScreenCut cut = cuts.cut.value_or(ScreenCut{});
   for (size_t n = 0; n < ScreenCut::kFaces; ++n) {
     const double a = cut.faces[n][0] + cut.faces[n][1] * u0 + cut.faces[n][2] * u1;
     if (cut.far_sides >> n & 1)
@@ -45,19 +65,19 @@ Remainder remainderOf(const ScreenCut& cut, double u0, double u1) {
   return left;
 }
 
-/// What one splat adds at an offset from its centre, premultiplied. `cut`: null where it has none.
-glm::dvec4 contribution(const ScreenSplat& splat, const ScreenCut* cut, double dx, double dy,
+/// What one splat adds at an offset from its centre, premultiplied.
+glm::dvec4 contribution(const ScreenSplat& splat, const Cuts& cuts, double dx, double dy,
                         const ClassificationTable& table, PixelShading shading) {
   const double u0 = dx / splat.l11;
   const double u1 = (dy - splat.l21 * u0) / splat.l22;
-  const Remainder left = cut ? remainderOf(*cut, u0, u1) : Remainder{};
+  const Remainder left = cuts.cut || cuts.depth ? remainderOf(cuts, u0, u1) : Remainder{};
   const double depth = std::abs(splat.amplitude) * footprint(std::hypot(u0, u1)) * left.share;
   if (depth == 0) return glm::dvec4(0.0);
   const double widest = shading.lit ? unpackHalfWidth(splat.half_width) : splat.half_width;
   const Lit lit = shading.lit ? unpackLit(splat.half_width) : Lit{};
   double f = splat.mean, half_width = 0;
   if (shading.per_pixel) {
-    const double deviation = cut ? cut->correlation * widest / std::sqrt(3.0) : 0;
+    const double deviation = cuts.correlation() * widest / std::sqrt(3.0);
     f += double{splat.slope0} * u0 + double{splat.slope1} * u1 + deviation * left.mean;
     half_width = std::sqrt(std::max(0.0, widest * widest - 3 * deviation * deviation * (1 - left.variance)));
   }
@@ -72,25 +92,35 @@ glm::dvec4 contribution(const ScreenSplat& splat, const ScreenCut* cut, double d
 
 Image compositeSplats(std::span<const ScreenSplat> splats, const ClassificationTable& table,
                       PixelShading shading, ImageSize size, const glm::vec4& background) {
-  std::vector<glm::dvec4> pixels(size.pixels(), glm::dvec4(background));
-  for (size_t n = 0; n < splats.size(); ++n) {
-    const ScreenSplat& splat = splats[n];
-    if (isCut(splat)) continue;
-    std::optional<ScreenCut> cut;
-    if (hasCut(splat)) cut = ScreenCut::of(splats[n + 1]);
-    for (int y = 0; y < size.height; ++y)
-      for (int x = 0; x < size.width; ++x) {
-        const glm::dvec4 above =
-            contribution(splat, cut ? &*cut : nullptr, x + 0.5 - splat.x, y + 0.5 - splat.y, table, shading);
-        glm::dvec4& pixel =
-            pixels[static_cast<size_t>(y) * static_cast<size_t>(size.width) + static_cast<size_t>(x)];
-        pixel = above + (1 - above.w) * pixel;
-      }
-  }
   Image image(size);
-  for (size_t n = 0; n < pixels.size(); ++n)
-    for (int channel = 0; channel < 4; ++channel)
-      image.rgba[4 * n + static_cast<size_t>(channel)] = static_cast<float>(pixels[n][channel]);
+  for (int y = 0; y < size.height; ++y)
+    for (int x = 0; x < size.width; ++x) {
+      std::vector<PixelLayer> layers;
+      if (shading.layers) layers.assign(shading.layers->at(x, y).begin(), shading.layers->at(x, y).end());
+      glm::dvec4 pixel(background);
+      for (size_t window = layers.size() + 1; window-- > 0;) {
+        if (window < layers.size())
+          pixel = glm::dvec4(layers[window].colour) + (1 - double{layers[window].colour.w}) * pixel;
+        const Window depths{window > 0 ? double{layers[window - 1].depth} : -INFINITY,
+                            window < layers.size() ? double{layers[window].depth} : INFINITY};
+        for (size_t n = 0; n < splats.size(); ++n) {
+          const ScreenSplat& splat = splats[n];
+          if (isCut(splat)) continue;
+          Cuts cuts{{}, {}, depths};
+          if (hasCut(splat)) {
+            const SplatCuts records = SplatCuts::beside(&splat, 1);
+            if (records.cut) cuts.cut = ScreenCut::of(*records.cut);
+            if (records.depth) cuts.depth = ScreenDepth::of(*records.depth);
+          }
+          if (!cuts.depth && window > 0) continue;
+          const glm::dvec4 above =
+              contribution(splat, cuts, x + 0.5 - splat.x, y + 0.5 - splat.y, table, shading);
+          pixel = above + (1 - above.w) * pixel;
+        }
+      }
+      for (int channel = 0; channel < 4; ++channel)
+        image.pixel(x, y)[channel] = static_cast<float>(pixel[channel]);
+    }
   return image;
 }
 

@@ -23,10 +23,13 @@ class PainterTest : public testing::TestWithParam<Backend> {
  protected:
   Image paint(std::span<const ScreenSplat> splats, const ClassificationTable& table, bool per_pixel,
               ImageSize size, const glm::vec4& background = kWhite, bool lit = false) {
+    return paint(splats, table, PixelShading{per_pixel, lit}, size, background);
+  }
+  Image paint(std::span<const ScreenSplat> splats, const ClassificationTable& table,
+              const PixelShading& shading, ImageSize size, const glm::vec4& background) {
     Image image;
-    backend_->run([&](Painter& painter) {
-      image = paintFrame(painter, splats, table, {per_pixel, lit}, size, background);
-    });
+    backend_->run(
+        [&](Painter& painter) { image = paintFrame(painter, splats, table, shading, size, background); });
     return image;
   }
 
@@ -77,6 +80,35 @@ TEST_P(PainterTest, CutsSplatsAsSpecified) {
     }
 }
 
+TEST_P(PainterTest, CutsSplatsAtLayersAsSpecified) {
+  const ImageSize size{70, 50};
+  const PixelLayers layers = randomLayers(size, 3);
+  ASSERT_EQ(layers.windows(), 5);
+  const auto splats = placeSome(cutSome(randomSplats(300, 9, size), 4), 5);
+  for (const bool per_pixel : {true, false})
+    for (const auto& table : {lively(), smooth(true)})
+      for (const bool light : {true, false}) {
+        const PixelShading shading{per_pixel, light, &layers};
+        const auto drawn_splats = light ? lit(splats, 11) : splats;
+        const Image drawn = paint(drawn_splats, table, shading, size, {0.1f, 0.2f, 0.05f, 0.3f});
+        const Image specified =
+            compositeSplats(drawn_splats, table, shading, size, {0.1f, 0.2f, 0.05f, 0.3f});
+        EXPECT_GT(compareImages(drawn, specified).psnr_db, 70) << "per pixel: " << per_pixel;
+        EXPECT_LT(largestDifference(drawn, specified), 4e-3) << "per pixel: " << per_pixel;
+      }
+}
+
+TEST_P(PainterTest, DrawsLayersWithoutSplats) {
+  const ImageSize size{70, 50};
+  const PixelLayers layers = randomLayers(size, 8);
+  const PixelShading shading{true, false, &layers};
+  EXPECT_LT(largestDifference(paint({}, lively(), shading, size, kWhite),
+                              compositeSplats({}, lively(), shading, size, kWhite)),
+            1e-6);
+  // And none in the next picture.
+  EXPECT_EQ(paint({}, lively(), {}, size, kWhite).rgba, paint({}, smooth(), {}, size, kWhite).rgba);
+}
+
 TEST_P(PainterTest, LightsSplatsAsSpecified) {
   const ImageSize size{70, 50};
   // Some cut, and some of which every pixel is looked up.
@@ -95,14 +127,16 @@ TEST_P(PainterTest, LightsSplatsAsSpecified) {
 
 TEST_P(PainterTest, CutsSplatsWhereverADrawEnds) {
   const ImageSize size{90, 60};
-  const auto splats = cutSome(randomSplats(200, 21, size), 5);
-  const Image whole = paint(splats, lively(), true, size);
+  const PixelLayers layers = randomLayers(size, 3);
+  const PixelShading shading{true, false, &layers};
+  const auto splats = placeSome(cutSome(randomSplats(200, 21, size), 5), 6);
+  const Image whole = paint(splats, lively(), shading, size, kWhite);
   for (const size_t at_once : {1, 2, 7}) {
     Image image;
     backend_->run([&](Painter& painter) {
       std::vector<ScreenSplat> ordered = splats;
       if (painter.order() == DrawingOrder::kFrontToBack) std::reverse(ordered.begin(), ordered.end());
-      painter.begin(size, kWhite, lively_, {});
+      painter.begin(size, kWhite, lively_, shading);
       for (size_t begin = 0; begin < ordered.size(); begin += at_once)
         painter.draw(std::span(ordered).subspan(begin, std::min(at_once, ordered.size() - begin)));
       image = painter.end();

@@ -26,6 +26,10 @@ ViewState changedState() {
   state.scale = {1, 1, 50};
   state.clip_box = WorldBox{{0, -0.5, 0.25}, {1, 1, 1}};
   state.clip_planes = {{{0, 0.5, 0}, {1, 0, -2}}, {{0.25, 0, 0}, {0, 1, 0}}};
+  state.surfaces = {{"/a/wing.stl", {1, 0.5f, 0}}};
+  state.slices = {{{0, 0.25, 0}, {0, -1, 2}}};
+  state.slice_opacity = 0.5;
+  state.volume = false;
   state.lit = true;
   state.dark = true;
   state.annotations.axes = false;
@@ -50,10 +54,14 @@ TEST(ViewState, ComesBackFromItsText) {
 
 TEST(ViewState, OfAnEarlierVersionHasNoClipPlanesAndNoLight) {
   auto json = nlohmann::json::parse(toJson(changedState()));
-  json.erase("clip_planes");
+  for (const char* field : {"clip_planes", "surfaces", "slices", "slice_opacity", "volume"})
+    json.erase(field);
   json.erase("lit");
   const ViewState state = viewStateFromJson(json.dump(), "a.json", manifest());
   EXPECT_TRUE(state.clip_planes.empty());
+  EXPECT_TRUE(state.surfaces.empty());
+  EXPECT_TRUE(state.slices.empty());
+  EXPECT_TRUE(state.volume);
   EXPECT_FALSE(state.lit);
 }
 
@@ -88,6 +96,9 @@ TEST(ViewState, ErrorsNameFileAndField) {
   expectError("/scale", nlohmann::json::array({1, 1, 0}), "scale");
   expectError("/clip_box/lower", nlohmann::json::array({5, 0, 0}), "clip_box.lower");
   expectError("/clip_planes", 3, "clip_planes");
+  expectError("/slices/0/normal", nlohmann::json::array({0, 0, 0}), "slices[0].normal");
+  expectError("/surfaces/0/colour", nlohmann::json::array({0, 0, 2}), "surfaces[0].colour");
+  expectError("/slice_opacity", 2, "slice_opacity");
   expectError("/clip_planes/1/normal", nlohmann::json::array({0, 0, 0}), "clip_planes[1].normal");
   expectError("/dark", "yes", "dark");
   expectError("/function", 5, "preset");
@@ -132,7 +143,8 @@ TEST(ViewState, TheCommandSaysAll) {
        {"'it'\\''s.splats'", "--scalar 'u v'", "--tf f.json", "--scale 1,1,50",
         "--clip-box 0,1,-0.5,1,0.25,1", "--clip-plane 0,0.5,0,1,0,-2", "--clip-plane 0.25,0,0,0,1,0",
         "--shade --background black", "--classify flat", "--lod-pixels 2.5", "--scalar-bar --outline",
-        "--position 0.1,-3,0.6666666666666666"})
+        "--position 0.1,-3,0.6666666666666666", "--surface /a/wing.stl", "--surface-colour '#ff8000'",
+        "--slice 0,0.25,0,0,-1,2", "--slice-opacity 0.5", "--volume off"})
     EXPECT_NE(command.find(part), std::string::npos) << command << " lacks " << part;
 }
 

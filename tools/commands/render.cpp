@@ -32,6 +32,7 @@
 #include "tools/options/picture_choice.h"
 #include "tools/options/scalar_arguments.h"
 #include "tools/options/step_arguments.h"
+#include "tools/options/surface_arguments.h"
 #include "tools/output/frame_output.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
@@ -47,6 +48,7 @@ struct RenderArguments {
   std::filesystem::path cache, output, first_image, statistics;
   CameraArguments camera;
   ScalarArguments scalar;
+  SurfaceArguments surfaces;
   StepArguments steps;
   std::string size = "600x600", background = "white";
   std::string classify = "pixel", scale = "1,1,1", backend = "auto", memory = "512M";
@@ -145,6 +147,7 @@ FrameOptions frameOptions(const RenderArguments& arguments) {
 void checkArguments(const RenderArguments& arguments, ImageSize size) {
   checkCameraArguments(arguments.camera);
   checkFunctionArguments(arguments.scalar);
+  checkSurfaceArguments(arguments.surfaces);
   checkOutputName(arguments.output, severalFrames(arguments), size);
   if (arguments.frame_rate && !isMovieName(arguments.output))
     throw UsageError("--frame-rate needs a movie: -o NAME.mp4");
@@ -352,6 +355,10 @@ void render(const RenderArguments& arguments) {
   const std::string range_warning = rangeMissesScalar(info, transfer_function);
   if (!range_warning.empty()) printMessage("warning: {}", range_warning);
 
+  options.scene = sceneOf(arguments.surfaces);
+  for (const std::string& miss : slicesThatMiss(arguments.surfaces, manifest.lower, manifest.upper))
+    printMessage("warning: {}", miss);
+
   const ImageSize picture = options.size;
   options.size = dataSize(arguments.annotations, picture, transfer_function);
   options.output_bytes = outputBytes(arguments, picture);
@@ -460,6 +467,7 @@ void addRender(CLI::App& app) {
   command->add_flag("--outline", arguments->annotations.outline, "Draw the bounding box of the data")
       ->group(what);
 
+  addSurfaceOptions(*command, arguments->surfaces, "Surfaces and slices");
   const std::string when = "Time steps";
   addStepOptions(*command, arguments->steps, when);
   addStepsOption(*command, arguments->steps, when);

@@ -34,13 +34,14 @@ struct Count {
   const char* name;
   uint64_t FrameStatistics::*value;
 };
-constexpr std::array<Count, 26> kCounts{{{"bricks_drawn", &FrameStatistics::bricks_drawn},
+constexpr std::array<Count, 27> kCounts{{{"bricks_drawn", &FrameStatistics::bricks_drawn},
                                          {"bricks_culled", &FrameStatistics::bricks_culled},
                                          {"bricks_out_of_image", &FrameStatistics::bricks_out_of_image},
                                          {"bricks_transparent", &FrameStatistics::bricks_transparent},
                                          {"bricks_hidden", &FrameStatistics::bricks_hidden},
                                          {"splats_read", &FrameStatistics::splats_read},
                                          {"splats_clipped", &FrameStatistics::splats_clipped},
+                                         {"splats_behind", &FrameStatistics::splats_behind},
                                          {"splats_off_screen", &FrameStatistics::splats_off_screen},
                                          {"splats_transparent", &FrameStatistics::splats_transparent},
                                          {"splats_drawn", &FrameStatistics::splats_drawn},

@@ -11,6 +11,7 @@
 #include "tools/commands/commands.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/step_arguments.h"
+#include "tools/options/surface_arguments.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/stop_signals.h"
 #include "tools/viewer/viewer.h"
@@ -23,6 +24,7 @@ struct ViewArguments {
   std::string size = "1200x800", backend = "auto";
   std::optional<std::filesystem::path> state;
   std::optional<std::string> scalar, memory, frame_time;
+  SurfaceArguments surfaces;
   StepArguments steps;
 };
 
@@ -34,6 +36,9 @@ void view(const ViewArguments& arguments) {
   options.scalar = arguments.scalar;
   if (arguments.memory) options.memory_bytes = parseMemory("--memory", *arguments.memory);
   if (arguments.frame_time) options.target_s = parsePositive("--frame-time", *arguments.frame_time) / 1000;
+  checkSurfaceArguments(arguments.surfaces);
+  options.scene = sceneOf(arguments.surfaces);
+  options.surface_files.assign(arguments.surfaces.surfaces.begin(), arguments.surfaces.surfaces.end());
   const CacheReader cache = openAtStep(arguments.cache, arguments.steps);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
@@ -65,6 +70,7 @@ void addView(CLI::App& app) {
   command->add_option("--frame-time", arguments->frame_time,
                       "Time budget of a picture while the camera moves, in ms (default 33 with a graphics "
                       "card, 100 without)");
+  addSurfaceOptions(*command, arguments->surfaces, "Surfaces and slices");
   addStepOptions(*command, arguments->steps, "Time steps");
   command->callback([arguments] { view(*arguments); });
 }

@@ -69,7 +69,8 @@ PanelActions Panels::draw(ViewState& state, size_t variable, const PanelFacts& f
   if (ImGui::CollapsingHeader("View", ImGuiTreeNodeFlags_DefaultOpen)) drawView(state, actions, facts);
   if (ImGui::CollapsingHeader("Detail", ImGuiTreeNodeFlags_DefaultOpen)) drawDetail(state, actions);
   if (ImGui::CollapsingHeader("Clip box")) drawClipBox(state, actions);
-  if (ImGui::CollapsingHeader("Clip planes")) drawClipPlanes(state, actions);
+  if (ImGui::CollapsingHeader("Clip planes")) drawPlanes(state.clip_planes, kMaxClipPlanes, state, actions);
+  if (ImGui::CollapsingHeader("Slices")) drawSlices(state, actions);
   if (ImGui::CollapsingHeader("Statistics", ImGuiTreeNodeFlags_DefaultOpen)) drawStatistics(state, facts);
   if (!facts.message.empty()) ImGui::TextWrapped("%s", facts.message.c_str());
   ImGui::PopItemWidth();
@@ -167,21 +168,23 @@ void Panels::drawClipBox(ViewState& state, PanelActions& actions) {
 }
 
 /// Each plane has a direction and a place along it. A new one faces the viewer, in the middle of the data.
-void Panels::drawClipPlanes(ViewState& state, PanelActions& actions) {
+void Panels::drawPlanes(std::vector<ClipPlane>& planes, size_t most, const ViewState& state,
+                        PanelActions& actions) {
   const Manifest& manifest = cache_.manifest();
   const glm::dvec3 middle = 0.5 * (manifest.lower + manifest.upper);
   const glm::dvec3 half = 0.5 * (manifest.upper - manifest.lower);
-  ImGui::BeginDisabled(state.clip_planes.size() >= kMaxClipPlanes);
+  ImGui::PushID(&planes);
+  ImGui::BeginDisabled(planes.size() >= most);
   if (ImGui::Button("add a plane")) {
     // A plane's normal in data coordinates is its normal after --scale, times the scale.
     const glm::dvec3 view = (state.camera.focal_point - state.camera.position) * state.scale;
-    state.clip_planes.push_back({middle, glm::normalize(view)});
+    planes.push_back({middle, glm::normalize(view)});
     actions.changed = true;
   }
   ImGui::EndDisabled();
-  size_t removed = state.clip_planes.size();
-  for (size_t n = 0; n < state.clip_planes.size(); ++n) {
-    ClipPlane& plane = state.clip_planes[n];
+  size_t removed = planes.size();
+  for (size_t n = 0; n < planes.size(); ++n) {
+    ClipPlane& plane = planes[n];
     ImGui::PushID(static_cast<int>(n));
     ImGui::Separator();
     const auto turn = [&](const char* label, const glm::dvec3& normal) {
@@ -213,9 +216,25 @@ void Panels::drawClipPlanes(ViewState& state, PanelActions& actions) {
     actions.dragging |= ImGui::IsItemActive();
     ImGui::PopID();
   }
-  if (removed == state.clip_planes.size()) return;
-  state.clip_planes.erase(state.clip_planes.begin() + static_cast<ptrdiff_t>(removed));
+  ImGui::PopID();
+  if (removed == planes.size()) return;
+  planes.erase(planes.begin() + static_cast<ptrdiff_t>(removed));
   actions.changed = true;
+}
+
+/// Without a slice or a surface there is nothing to show but the volume.
+void Panels::drawSlices(ViewState& state, PanelActions& actions) {
+  auto opacity = static_cast<float>(state.slice_opacity);
+  if (ImGui::SliderFloat("opacity", &opacity, 0.05f, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp)) {
+    state.slice_opacity = static_cast<double>(opacity);
+    actions.changed = true;
+  }
+  actions.dragging |= ImGui::IsItemActive();
+  const bool alone = state.slices.empty() && state.surfaces.empty();
+  ImGui::BeginDisabled(alone);
+  actions.changed |= ImGui::Checkbox("volume", &state.volume);
+  ImGui::EndDisabled();
+  drawPlanes(state.slices, kMaxSlices, state, actions);
 }
 
 void Panels::drawStatistics(const ViewState& state, const PanelFacts& facts) {

@@ -51,7 +51,8 @@ class Panels {
   void drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts);
   void drawDetail(ViewState& state, PanelActions& actions);
   void drawClipBox(ViewState& state, PanelActions& actions);
-  void drawClipPlanes(ViewState& state, PanelActions& actions);
+  void drawSlices(ViewState& state, PanelActions& actions);
+  void drawPlanes(std::vector<ClipPlane>& planes, size_t most, const ViewState& state, PanelActions& actions);
   void drawStatistics(const ViewState& state, const PanelFacts& facts);
 
   const CacheReader& cache_;

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 #include <nlohmann/json.hpp>
 
 #include "render/automatic/first_choice.h"
+#include "render/mesh/mesh_file.h"
 #include "stream/base/error.h"
 #include "stream/base/json_text.h"
 
@@ -15,6 +17,8 @@ namespace curvisplat {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr size_t kMaxSurfaces = 64;
 
 /// Fields of one object of a state file.
 class Fields {
@@ -86,6 +90,24 @@ Json jsonOf(const glm::dvec3& point) {
   return {point.x, point.y, point.z};
 }
 
+Json jsonOf(const std::vector<ClipPlane>& planes) {
+  Json json = Json::array();
+  for (const ClipPlane& plane : planes)
+    json.push_back({{"point", jsonOf(plane.point)}, {"normal", jsonOf(plane.normal)}});
+  return json;
+}
+
+/// At most `most`; states of earlier versions have none.
+std::vector<ClipPlane> planesFrom(const Fields& fields, const char* name, size_t most) {
+  std::vector<ClipPlane> planes;
+  if (!fields.has(name)) return planes;
+  for (const Fields& field : fields.objects(name, most)) {
+    planes.push_back({field.point("point"), field.point("normal")});
+    if (!isUsable(planes.back())) field.fail("normal", "a direction");
+  }
+  return planes;
+}
+
 Json jsonOf(const Camera& camera) {
   return {{"position", jsonOf(camera.position)},
           {"focal_point", jsonOf(camera.focal_point)},
@@ -145,6 +167,15 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
   options.clip_box = clip_box;
   options.clip_planes = clip_planes;
   if (lit) options.light = Light{};
+  if (!surfaces.empty() || !slices.empty()) {
+    auto scene = std::make_shared<SurfaceScene>();
+    for (const SurfaceFile& surface : surfaces)
+      if (surface.mesh) scene->surfaces.push_back({surface.mesh, surface.colour});
+    scene->slices = slices;
+    scene->slice_opacity = slice_opacity;
+    scene->volume = volume;
+    options.scene = std::move(scene);
+  }
   options.background = background();
   options.memory_bytes = memory_bytes;
   return options;
@@ -162,6 +193,11 @@ ViewState firstViewOf(const Manifest& manifest, ImageSize picture) {
                                dataSize(state.annotations, picture, state.function.function()),
                                Projection::kOrthographic);
   return state;
+}
+
+void loadSurfaces(ViewState& state) {
+  for (SurfaceFile& surface : state.surfaces)
+    if (!surface.mesh) surface.mesh = std::make_shared<TriangleMesh>(readMeshFile(surface.path));
 }
 
 void chooseVariable(ViewState& state, const Manifest& manifest, const std::string& name) {
@@ -186,9 +222,14 @@ std::string toJson(const ViewState& state) {
   json["clip_box"] = nullptr;
   if (state.clip_box)
     json["clip_box"] = {{"lower", jsonOf(state.clip_box->lower)}, {"upper", jsonOf(state.clip_box->upper)}};
-  json["clip_planes"] = Json::array();
-  for (const ClipPlane& plane : state.clip_planes)
-    json["clip_planes"].push_back({{"point", jsonOf(plane.point)}, {"normal", jsonOf(plane.normal)}});
+  json["clip_planes"] = jsonOf(state.clip_planes);
+  json["surfaces"] = Json::array();
+  for (const SurfaceFile& surface : state.surfaces)
+    json["surfaces"].push_back(
+        {{"file", surface.path.string()}, {"colour", jsonOf(glm::dvec3(surface.colour))}});
+  json["slices"] = jsonOf(state.slices);
+  json["slice_opacity"] = state.slice_opacity;
+  json["volume"] = state.volume;
   json["lit"] = state.lit;
   json["dark"] = state.dark;
   json["scalar_bar"] = state.annotations.scalar_bar;
@@ -240,13 +281,17 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
     for (int axis = 0; axis < 3; ++axis)
       if (state.clip_box->lower[axis] > state.clip_box->upper[axis]) box.fail("lower", "less than upper");
   }
-  if (fields.has("clip_planes")) {  // states of earlier versions have none
-    for (const Fields& field : fields.objects("clip_planes", kMaxClipPlanes)) {
-      const ClipPlane plane{field.point("point"), field.point("normal")};
-      if (!isUsable(plane)) field.fail("normal", "a direction");
-      state.clip_planes.push_back(plane);
+  state.clip_planes = planesFrom(fields, "clip_planes", kMaxClipPlanes);
+  state.slices = planesFrom(fields, "slices", kMaxSlices);
+  if (fields.has("surfaces"))
+    for (const Fields& field : fields.objects("surfaces", kMaxSurfaces)) {
+      const glm::dvec3 colour = field.point("colour");
+      for (int c = 0; c < 3; ++c)
+        if (!(colour[c] >= 0 && colour[c] <= 1)) field.fail("colour", "three numbers from 0 to 1");
+      state.surfaces.push_back({field.text("file"), glm::vec3(colour)});
     }
-  }
+  if (fields.has("slice_opacity")) state.slice_opacity = fields.number("slice_opacity", 1e-3, 1);
+  if (fields.has("volume")) state.volume = fields.flag("volume");
   state.lit = fields.has("lit") && fields.flag("lit");
   state.dark = fields.flag("dark");
   state.annotations = {fields.flag("scalar_bar"), fields.flag("axes"), fields.flag("outline")};
@@ -288,6 +333,16 @@ std::string renderCommand(const ViewState& state, const std::filesystem::path& c
   for (const ClipPlane& plane : state.clip_planes)
     add("--clip-plane", numbers(plane.point) + "," + numbers(plane.normal));
   if (state.lit) command += " --shade";
+  for (const SurfaceFile& surface : state.surfaces) add("--surface", surface.path.string());
+  for (const SurfaceFile& surface : state.surfaces) {
+    const glm::ivec3 rgb(255.0f * surface.colour + 0.5f);
+    add("--surface-colour", fmt::format("#{:02x}{:02x}{:02x}", rgb.r, rgb.g, rgb.b));
+  }
+  for (const ClipPlane& plane : state.slices)
+    add("--slice", numbers(plane.point) + "," + numbers(plane.normal));
+  if (state.slice_opacity != 1 && !state.slices.empty())
+    add("--slice-opacity", fmt::format("{}", state.slice_opacity));
+  if (!state.volume && !(state.slices.empty() && state.surfaces.empty())) add("--volume", "off");
   add("--background", state.dark ? "black" : "white");
   if (state.annotations.scalar_bar) command += " --scalar-bar";
   if (state.annotations.axes) command += " --axes";

@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <filesystem>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "render/annotate/annotations.h"
 #include "render/camera/camera.h"
@@ -15,6 +17,13 @@
 #include "tools/viewer/edited_function.h"
 
 namespace curvisplat {
+
+/// A surface of a file, which loadSurfaces() reads.
+struct SurfaceFile {
+  std::filesystem::path path;
+  glm::vec3 colour{0.7f, 0.7f, 0.7f};
+  std::shared_ptr<const TriangleMesh> mesh = nullptr;
+};
 
 struct ViewState {
   std::string variable;
@@ -26,6 +35,10 @@ struct ViewState {
   glm::dvec3 scale{1.0};
   std::optional<WorldBox> clip_box = std::nullopt;
   std::vector<ClipPlane> clip_planes = {};
+  std::vector<SurfaceFile> surfaces = {};
+  std::vector<ClipPlane> slices = {};
+  double slice_opacity = 1;
+  bool volume = true;  // with a slice or a surface it may be left out
   bool lit = false;
   bool dark = false;  // background
   Annotations annotations{true, true, true};
@@ -37,6 +50,9 @@ struct ViewState {
 /// The initial state without a look at the data: the first scalar that varies with a preset, and the data
 /// fitted into the picture beside the scalar bar. Throws Error if the cache has no scalar.
 ViewState firstViewOf(const Manifest& manifest, ImageSize picture);
+
+/// Reads the surfaces that have no mesh yet. Throws Error for one that cannot be read.
+void loadSurfaces(ViewState& state);
 
 /// Selects another scalar and fits the transfer function to its range. Throws UsageError that lists the
 /// scalars if there is none of this name.

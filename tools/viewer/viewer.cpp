@@ -96,7 +96,9 @@ class Viewer {
     } else if (const auto remembered = rememberedStateOf(cache_.cachePath());
                remembered && fs::exists(*remembered)) {
       try {
-        state = viewStateFromJson(readTextFile(*remembered), *remembered, cache_.manifest());
+        ViewState found = viewStateFromJson(readTextFile(*remembered), *remembered, cache_.manifest());
+        loadSurfaces(found);
+        state = std::move(found);
       } catch (const Error& error) {
         printMessage("warning: {}; using the initial view", error.what());
       }
@@ -104,7 +106,20 @@ class Viewer {
     if (options_.scalar && *options_.scalar != state.variable)
       chooseVariable(state, cache_, *options_.scalar);
     if (options_.memory_bytes) state.memory_bytes = *options_.memory_bytes;
+    if (options_.scene) takeScene(*options_.scene, state);
+    loadSurfaces(state);
     return state;
+  }
+
+  /// Surfaces and slices of the command line take the place of those of the state.
+  void takeScene(const SurfaceScene& scene, ViewState& state) const {
+    state.surfaces.clear();
+    for (size_t n = 0; n < scene.surfaces.size(); ++n)
+      state.surfaces.push_back(
+          {fs::absolute(options_.surface_files.at(n)), scene.surfaces[n].colour, scene.surfaces[n].mesh});
+    state.slices = scene.slices;
+    state.slice_opacity = scene.slice_opacity;
+    state.volume = scene.volume;
   }
 
   /// Draws one frame of the window with the effects of all input so far.

@@ -1,0 +1,278 @@
+// Blends what is left of a splat that is cut: at faces, and to the windows of depth between the layers of its
+// pixels. Included once for every instruction set.
+#if defined(CURVISPLAT_PAINT_CUT_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef CURVISPLAT_PAINT_CUT_INL_H
+#undef CURVISPLAT_PAINT_CUT_INL_H
+#else
+#define CURVISPLAT_PAINT_CUT_INL_H
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/cpu/paint_blocks-inl.h"
+#include "render/cpu/paint_shade-inl.h"
+#include "render/cpu/paint_visits-inl.h"
+#include "render/cpu/tile.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace curvisplat {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// The faces of a splat, over kReach deviations and the support's radius.
+struct Faces {
+  float at[ScreenCut::kFaces], by_p[ScreenCut::kFaces], by_q[ScreenCut::kFaces];
+  bool far_side[ScreenCut::kFaces];
+  float mean_per_deviation;  // the scalar's, along the ray
+};
+
+/// Integrals of the biweight's distribution from 0 to x, |x| <= 1: of 1, of -32/5 x, and of x².
+HWY_INLINE V massTo(V x, V x2) {
+  const Floats d;
+  return hn::Mul(
+      x, hn::MulAdd(x2, hn::MulAdd(x2, hn::Set(d, 0.1875f), hn::Set(d, -0.625f)), hn::Set(d, 0.9375f)));
+}
+HWY_INLINE V firstTo(V x2) {
+  const V rest = hn::Sub(hn::Set(Floats(), 1.0f), x2);
+  return hn::Mul(hn::Mul(rest, rest), rest);
+}
+HWY_INLINE V secondTo(V x, V x2) {
+  const Floats d;
+  const V series =
+      hn::MulAdd(x2, hn::MulAdd(x2, hn::Set(d, 0.9375f / 7), hn::Set(d, -0.375f)), hn::Set(d, 0.3125f));
+  return hn::Mul(hn::Mul(x, x2), series);
+}
+
+/// What the faces leave of the pixels: an interval of depths, over kReach deviations; so are its moments.
+struct Interval {
+  V lo, hi;
+
+  HWY_INLINE V share() const {
+    return hn::Max(hn::Sub(massTo(hi, hn::Mul(hi, hi)), massTo(lo, hn::Mul(lo, lo))), hn::Zero(Floats()));
+  }
+  HWY_INLINE static V inverse(V share) {
+    const Floats d;
+    return hn::Div(hn::Set(d, 1.0f), hn::Max(share, hn::Set(d, 1e-6f)));
+  }
+  /// Of slivers there are no digits left: the mean is then held within them.
+  HWY_INLINE V mean(V share) const {
+    const V first = hn::Sub(firstTo(hn::Mul(hi, hi)), firstTo(hn::Mul(lo, lo)));
+    return hn::Clamp(hn::Mul(hn::Mul(hn::Set(Floats(), -5.0f / 32), first), inverse(share)), lo, hi);
+  }
+  /// 1 less the variance in deviations, whose square is 7.
+  HWY_INLINE V lostVariance(V share, V mean) const {
+    const Floats d;
+    const V second = hn::Sub(secondTo(hi, hn::Mul(hi, hi)), secondTo(lo, hn::Mul(lo, lo)));
+    const V variance = hn::NegMulAdd(mean, mean, hn::Mul(second, inverse(share)));
+    const V one = hn::Set(d, 1.0f);
+    return hn::Sub(one, hn::Clamp(hn::Mul(hn::Set(d, 7.0f), variance), hn::Zero(d), one));
+  }
+};
+
+/// A splat's ScreenDepth, as Faces are.
+struct DepthLine {
+  float middle = 0, by_p = 0, by_q = 0, per_depth = 0;
+};
+
+/// A window of depth in a block: [kBlockPixels] each, or null where it has no end.
+struct Window {
+  const float* HWY_RESTRICT nearer = nullptr;
+  const float* HWY_RESTRICT farther = nullptr;
+};
+
+/// What cuts a splat in a block.
+struct Cuts {
+  const Faces& faces;
+  const DepthLine& depth;
+  Window window;
+};
+
+HWY_INLINE Interval intervalAt(const Cuts& cuts, const Pixels& pixels, size_t lane) {
+  const Floats d;
+  const Faces& faces = cuts.faces;
+  V lo = hn::Set(d, -1.0f), hi = hn::Set(d, 1.0f);
+  for (int n = 0; n < ScreenCut::kFaces; ++n) {
+    const V a = hn::MulAdd(hn::Set(d, faces.by_p[n]), pixels.p,
+                           hn::MulAdd(hn::Set(d, faces.by_q[n]), pixels.q, hn::Set(d, faces.at[n])));
+    if (faces.far_side[n])
+      lo = hn::Max(lo, hn::Neg(a));
+    else
+      hi = hn::Min(hi, a);
+  }
+  if (cuts.window.nearer || cuts.window.farther) {
+    const DepthLine& line = cuts.depth;
+    const V middle = hn::MulAdd(hn::Set(d, line.by_p), pixels.p,
+                                hn::MulAdd(hn::Set(d, line.by_q), pixels.q, hn::Set(d, line.middle)));
+    const V scale = hn::Set(d, line.per_depth);
+    if (cuts.window.nearer)
+      lo = hn::Max(lo, hn::Mul(hn::Sub(hn::Load(d, cuts.window.nearer + lane), middle), scale));
+    if (cuts.window.farther)
+      hi = hn::Min(hi, hn::Mul(hn::Sub(hn::Load(d, cuts.window.farther + lane), middle), scale));
+  }
+  lo = hn::Min(lo, hn::Set(d, 1.0f));
+  return {lo, hn::Max(hi, lo)};
+}
+
+/// One block of a splat that is cut, by one parabola, or one colour; what is left moves s by
+/// `per_deviation` a deviation. Whether it is saturated now.
+template <bool kFitted>
+HWY_INLINE bool paintBlock(const Ellipse& e, const Cuts& cuts, const Shade& shade, float per_deviation,
+                           const float* HWY_RESTRICT footprint, float* HWY_RESTRICT block, float x, float y) {
+  const Floats d;
+  const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
+  V most = hn::Zero(d);
+  for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
+    const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
+                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
+    const Interval left = intervalAt(cuts, pixels, lane);
+    const V share = left.share();
+    if (hn::AllTrue(d, hn::Eq(share, hn::Zero(d)))) {
+      most = hn::Max(most, hn::Load(d, block + 3 * kBlockPixels + lane));
+      continue;
+    }
+    V value[4];
+    if constexpr (kFitted) {
+      const V s = hn::MulAdd(left.mean(share), hn::Set(d, per_deviation), shade.s.at(pixels));
+      for (int c = 0; c < 4; ++c)
+        value[c] = hn::MulAdd(hn::MulAdd(hn::Set(d, shade.bend[c]), s, hn::Set(d, shade.by[c])), s,
+                              hn::Set(d, shade.at[c]));
+    } else {
+      for (int c = 0; c < 4; ++c) value[c] = hn::Set(d, shade.at[c]);
+    }
+    most = hn::Max(most, blendUnder<false>(block + lane, hn::Mul(pixels.depth, share), value));
+  }
+  return isSaturated(most);
+}
+
+/// Of a splat that is cut. Whether anything is left of it in the block.
+HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Cuts& cuts,
+                            const ShadingTable& table, const float* HWY_RESTRICT footprint, float x, float y,
+                            LookedUp& out) {
+  const Floats d;
+  const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
+  const Faces& faces = cuts.faces;
+  Intervals intervals;
+  V most = hn::Zero(d);
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
+                                   hn::Add(hn::Load(d, kLaneY + lane), from_y));
+    const Interval left = intervalAt(cuts, pixels, lane);
+    const V share = left.share(), moved = left.mean(share);
+    const V depth = hn::Mul(pixels.depth, share);
+    most = hn::Max(most, depth);
+    const V t = hn::MulAdd(hn::Set(d, scalar.tp), pixels.p, hn::Mul(hn::Set(d, scalar.tq), pixels.q));
+    hn::Store(depth, d, out.depth.at + lane);
+    const V mean = hn::MulAdd(hn::Set(d, faces.mean_per_deviation * ScreenCut::kReach), moved,
+                              hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean)));
+    const float lost = 3 * faces.mean_per_deviation * faces.mean_per_deviation;
+    const V width2 = hn::NegMulAdd(hn::Set(d, lost), left.lostVariance(share, moved),
+                                   hn::Set(d, scalar.half_width * scalar.half_width));
+    locate(table, mean, hn::Sqrt(hn::Max(width2, hn::Zero(d))), lane, intervals);
+    hn::Store(hn::Load(d, intervals.scale.at + lane), d, out.scale.at + lane);
+  }
+  if (hn::AllTrue(d, hn::Eq(most, hn::Zero(d)))) return false;
+  integrate(table, intervals, kLanes, out.integrals);
+  return true;
+}
+
+/// Paints a block's windows, from the nearest on: paint(where, window) says whether the window is saturated then.
+/// Whether nothing behind the first can be seen any more.
+template <typename Paint>
+HWY_INLINE bool paintWindows(const TileWork& work, int block, const Paint& paint) {
+  TileWindows& windows = *work.windows;
+  uint8_t& open = windows.open[static_cast<size_t>(block)];
+  const float* depths = windows.depths + block * kBlockPixels;
+  constexpr int kPixels = kTileSide * kTileSide;
+  for (int n = 0; n < open; ++n) {
+    Window window;
+    if (n > 0) window.nearer = depths + (n - 1) * kPixels;
+    if (n < windows.layers) window.farther = depths + n * kPixels;
+    float* const at = n == 0 ? work.tile : windows.behind + (n - 1) * kTileFloats;
+    if (paint(at + block * kBlockFloats, window)) open = static_cast<uint8_t>(n);
+  }
+  return open == 0;
+}
+
+HWY_INLINE Faces facesOf(const ScreenSplat* record) {
+  const ScreenCut cut = record ? ScreenCut::of(*record) : ScreenCut{};
+  Faces faces;
+  for (size_t face = 0; face < ScreenCut::kFaces; ++face) {
+    faces.at[face] = cut.faces[face][0] * (1 / ScreenCut::kReach);
+    faces.by_p[face] = cut.faces[face][1] * (kSupport / ScreenCut::kReach);
+    faces.by_q[face] = cut.faces[face][2] * (kSupport / ScreenCut::kReach);
+    faces.far_side[face] = (cut.far_sides >> face & 1) != 0;
+  }
+  faces.mean_per_deviation = cut.correlation;
+  return faces;
+}
+
+/// A splat that is cut, and has the number `number`. Returns those of `blocks` that are saturated then.
+HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const Visits& visits,
+                                const Fits& fits, size_t n, size_t number, const float* footprint) {
+  const ScreenSplat& splat = work.splats[number];
+  const SplatCuts records = SplatCuts::beside(&splat, -1);
+  Faces faces = facesOf(records.cut);
+  DepthLine line;
+  if (records.depth) {
+    const ScreenDepth depth = ScreenDepth::of(*records.depth);
+    line = {depth.middle, kSupport * depth.by[0], kSupport * depth.by[1],
+            depth.per_depth * (1 / ScreenCut::kReach)};
+    faces.mean_per_deviation = depth.correlation;
+  }
+  const bool windowed = records.depth && work.windows;
+  const Ellipse e = visits.ellipse(n);
+  Scalar scalar = visits.scalar(n);
+  faces.mean_per_deviation = faces.mean_per_deviation * scalar.half_width * (1 / kSqrt3);
+  if (work.shading.per_pixel)
+    scalar.reach = kSupport * std::sqrt(splat.slope0 * splat.slope0 + splat.slope1 * splat.slope1);
+
+  BlockMask saturated = 0;
+  const auto paint = [&](const auto& paint_block) HWY_ATTR {
+    while (blocks != 0) {
+      const int block = takeFirst(blocks);
+      const auto in_window = [&](float* at, const Window& window) HWY_ATTR {
+        return paint_block(at, Cuts{faces, line, window}, block);
+      };
+      if (windowed ? paintWindows(work, block, in_window) : in_window(work.tile + block * kBlockFloats, {}))
+        saturated |= BlockMask{1} << block;
+    }
+  };
+  const int32_t fit = fits.fit.at[n];
+  // On a logarithmic scale there is no bound of what a narrower distribution sees.
+  if (fit != kOther && !(work.table.logScale() && work.shading.per_pixel)) {
+    Shade shade = shadeOf(fits, n);
+    const float inverse = 1 / std::max(visits.pieces.reach.at[n], 1e-37f);
+    shade.s = {0, inverse * scalar.reach * scalar.tp, inverse * scalar.reach * scalar.tq};
+    const float per_deviation = inverse * faces.mean_per_deviation * ScreenCut::kReach;
+    if (fit == kConstant)
+      paint([&](float* at, const Cuts& cuts, int block) HWY_ATTR {
+        return paintBlock<false>(e, cuts, shade, per_deviation, footprint, at, xOf(block), yOf(block));
+      });
+    else
+      paint([&](float* at, const Cuts& cuts, int block) HWY_ATTR {
+        return paintBlock<true>(e, cuts, shade, per_deviation, footprint, at, xOf(block), yOf(block));
+      });
+    return saturated;
+  }
+  const Lit lit = visits.lit(work, n);
+  if (windowed) {
+    paint([&](float* at, const Cuts& cuts, int block) HWY_ATTR {
+      LookedUp looked_up;
+      return lookUpBlock(e, scalar, cuts, work.table, footprint, xOf(block), yOf(block), looked_up) &&
+             paintLookedUp(looked_up, lit, at);
+    });
+    return saturated;
+  }
+  return paintLookedUpBlocks(work, blocks, lit, [&](float x, float y, LookedUp& out) HWY_ATTR {
+    return lookUpBlock(e, scalar, Cuts{faces, line, {}}, work.table, footprint, x, y, out);
+  });
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace curvisplat
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,261 @@
+// Sixteen splats of a tile at a time, from their records to what is painted: their ellipses, the blocks that they
+// touch, and how their scalar goes there. Included once for every instruction set.
+#if defined(CURVISPLAT_PAINT_VISITS_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef CURVISPLAT_PAINT_VISITS_INL_H
+#undef CURVISPLAT_PAINT_VISITS_INL_H
+#else
+#define CURVISPLAT_PAINT_VISITS_INL_H
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "render/cpu/paint_blocks-inl.h"
+#include "render/cpu/paint_shade-inl.h"
+#include "render/cpu/tile.h"
+#include "render/project/kernel.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace curvisplat {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr auto kSupport = static_cast<float>(kKernelSupport);
+constexpr float kSqrt3 = 1.7320508f;
+constexpr float kReachOfHalfWidth = ScreenCut::kReach / kSqrt3;
+constexpr auto kHalfWidthMask = static_cast<int32_t>(0xffff0000u);  // as light.h packs it
+
+/// Sixteen splats of a tile, ready to be painted.
+struct Visits {
+  Row x, y, a, b, c;      // Ellipse
+  Row tp, tq;             // Scalar's
+  Row cut;                // 1 where the splat is cut; its pieces' reach is then that of the cut, too
+  Row diffuse, specular;  // Lit, in lit pictures
+  Pieces pieces;          // all of the splat that is in the tile
+  Row l11, l21, l22;
+  IntRow x0, y0, x1, y1;  // blocks, the last included; empty where x0 > x1 or y0 > y1
+
+  HWY_INLINE Ellipse ellipse(size_t n) const {
+    return {x.at[n], y.at[n], a.at[n], b.at[n], c.at[n], pieces.amplitude.at[n]};
+  }
+  HWY_INLINE Lit lit(const TileWork& work, size_t n) const {
+    return work.shading.lit ? Lit{diffuse.at[n], specular.at[n]} : Lit{};
+  }
+  HWY_INLINE Scalar scalar(size_t n) const {
+    return {pieces.mean.at[n], pieces.reach.at[n], tp.at[n], tq.at[n], pieces.half_width.at[n]};
+  }
+};
+
+HWY_INLINE V gather(const TileWork& work, hn::Vec<Ints> offsets, size_t member) {
+  return hn::GatherIndex(Floats(), reinterpret_cast<const float*>(work.splats.data()) + member, offsets);
+}
+
+/// The t of the pixels in a box.
+HWY_INLINE Range tOver(V by_x, V by_y, V middle_x, V middle_y, V half_x, V half_y) {
+  const Floats d;
+  const V middle = hn::MulAdd(by_x, middle_x, hn::Mul(by_y, middle_y));
+  const V half = hn::MulAdd(hn::Abs(by_x), half_x, hn::Mul(hn::Abs(by_y), half_y));
+  const V one = hn::Set(d, 1.0f);
+  return {hn::Clamp(hn::Sub(middle, half), hn::Neg(one), one),
+          hn::Clamp(hn::Add(middle, half), hn::Neg(one), one)};
+}
+
+/// From the splats with these numbers.
+HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) {
+  static_assert(sizeof(ScreenSplat) == 10 * sizeof(float));
+  const Floats d;
+  const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f);
+  const V support = hn::Set(d, kSupport), last_pixel = hn::Set(d, kTileSide - 1);
+  for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
+    const auto store = [&](V value, Row& row) HWY_ATTR { hn::Store(value, d, row.at + lane); };
+    const auto offsets = hn::Mul(hn::Load(Ints(), numbers.at + lane), hn::Set(Ints(), 10));
+    const V l11 = gather(work, offsets, 2), l21 = gather(work, offsets, 3), l22 = gather(work, offsets, 4);
+    store(l11, out.l11);
+    store(l21, out.l21);
+    store(l22, out.l22);
+    const V x = hn::Sub(gather(work, offsets, 0), hn::Set(d, static_cast<float>(work.x) + 0.5f));
+    const V y = hn::Sub(gather(work, offsets, 1), hn::Set(d, static_cast<float>(work.y) + 0.5f));
+    const V a = hn::Div(one, hn::Mul(support, l11)), c = hn::Div(one, hn::Mul(support, l22));
+    const V b = hn::Neg(hn::Mul(hn::Mul(l21, support), hn::Mul(a, c)));
+    store(x, out.x);
+    store(y, out.y);
+    store(a, out.a);
+    store(b, out.b);
+    store(c, out.c);
+    const V amplitude = gather(work, offsets, 5);
+    const auto cut = hn::Lt(amplitude, zero);
+    store(hn::Abs(amplitude), out.pieces.amplitude);
+    store(hn::IfThenElseZero(cut, one), out.cut);
+
+    // The pixels of the tile that lie in the ellipse's own rectangle.
+    const V reach_x = hn::Mul(support, l11);
+    const V reach_y = hn::Mul(support, hn::Sqrt(hn::MulAdd(l21, l21, hn::Mul(l22, l22))));
+    const V x0 = hn::Clamp(hn::Ceil(hn::Sub(x, reach_x)), zero, hn::Set(d, kTileSide));
+    const V y0 = hn::Clamp(hn::Ceil(hn::Sub(y, reach_y)), zero, hn::Set(d, kTileSide));
+    const V x1 = hn::Clamp(hn::Floor(hn::Add(x, reach_x)), hn::Neg(one), last_pixel);
+    const V y1 = hn::Clamp(hn::Floor(hn::Add(y, reach_y)), hn::Neg(one), last_pixel);
+    const V block = hn::Set(d, 1.0f / kBlockSide);
+    const auto storeBlocks = [&](V value, IntRow& row) HWY_ATTR {
+      hn::Store(hn::ConvertTo(Ints(), hn::Floor(hn::Mul(value, block))), Ints(), row.at + lane);
+    };
+    // A rectangle between two pixels' centres has x0 > x1, but may lie within a block.
+    const V nothing_x = hn::IfThenElseZero(hn::Gt(x0, x1), hn::Set(d, kTileSide));
+    const V nothing_y = hn::IfThenElseZero(hn::Gt(y0, y1), hn::Set(d, kTileSide));
+    storeBlocks(hn::Add(x0, nothing_x), out.x0);
+    storeBlocks(hn::Add(y0, nothing_y), out.y0);
+    storeBlocks(x1, out.x1);
+    storeBlocks(y1, out.y1);
+
+    if (work.shading.lit) {
+      const auto bits = hn::BitCast(Ints(), gather(work, offsets, 9));
+      const auto share = [&](auto shifted, int32_t mask) HWY_ATTR {
+        const V of_mask = hn::ConvertTo(d, hn::And(shifted, hn::Set(Ints(), mask)));
+        return hn::Mul(of_mask, hn::Set(d, 1.0f / static_cast<float>(mask)));
+      };
+      store(share(hn::ShiftRight<7>(bits), 511), out.diffuse);
+      store(share(bits, 127), out.specular);
+    }
+    store(gather(work, offsets, 6), out.pieces.mean);
+    if (!work.shading.per_pixel) {
+      for (Row* row : {&out.pieces.reach, &out.pieces.half_width, &out.pieces.from, &out.pieces.to, &out.tp,
+                       &out.tq, &out.pieces.width_loss})
+        store(zero, *row);
+      continue;
+    }
+    const V slope0 = gather(work, offsets, 7), slope1 = gather(work, offsets, 8);
+    const V slope = hn::Sqrt(hn::MulAdd(slope0, slope0, hn::Mul(slope1, slope1)));
+    const V inverse = hn::Div(one, hn::Max(slope, hn::Set(d, 1e-37f)));
+    const V tp = hn::Mul(slope0, inverse), tq = hn::Mul(slope1, inverse);
+    store(tp, out.tp);
+    store(tq, out.tq);
+    V half_width = gather(work, offsets, 9);
+    if (work.shading.lit) half_width = hn::And(half_width, hn::BitCast(d, hn::Set(Ints(), kHalfWidthMask)));
+    store(half_width, out.pieces.half_width);
+    Range t = tOver(hn::MulAdd(tp, a, hn::Mul(tq, b)), hn::Mul(tq, c),
+                    hn::Sub(hn::Mul(half, hn::Add(x0, x1)), x), hn::Sub(hn::Mul(half, hn::Add(y0, y1)), y),
+                    hn::Mul(half, hn::Sub(x1, x0)), hn::Mul(half, hn::Sub(y1, y0)));
+    V reach = hn::Mul(support, slope), width_loss = zero;
+    if (!hn::AllFalse(d, cut)) {
+      // ScreenCut's correlation: how far the mean moves by what is left along the ray, which is all over the
+      // splat, and how much narrower the scalar's distribution becomes.
+      const auto in_cut =
+          hn::IfThenElse(hn::RebindMask(Ints(), cut), hn::Set(Ints(), 2 - 10), hn::Set(Ints(), 2));
+      const V mark = hn::Neg(
+          hn::GatherIndex(d, reinterpret_cast<const float*>(work.splats.data()), hn::Add(offsets, in_cut)));
+      const V far_sides = hn::Floor(hn::Mul(mark, hn::Set(d, 0.25f)));
+      const V correlation = hn::Sub(hn::NegMulAdd(far_sides, hn::Set(d, 4.0f), mark), hn::Set(d, 2.0f));
+      const V moved = hn::Mul(hn::Mul(hn::Abs(correlation), half_width), hn::Set(d, kReachOfHalfWidth));
+      const V kept = hn::Sqrt(hn::Max(hn::NegMulAdd(correlation, correlation, one), zero));
+      reach = hn::IfThenElse(cut, hn::Add(reach, moved), reach);
+      width_loss = hn::IfThenElseZero(cut, hn::Mul(half_width, hn::Sub(one, kept)));
+      t = {hn::IfThenElse(cut, hn::Neg(one), t.from), hn::IfThenElse(cut, one, t.to)};
+    }
+    store(reach, out.pieces.reach);
+    store(width_loss, out.pieces.width_loss);
+    store(t.from, out.pieces.from);
+    store(t.to, out.pieces.to);
+  }
+}
+
+/// The blocks of a visit's rectangle that its ellipse touches, row by row: those from `from` to `to`.
+HWY_INLINE void trim(const Visits& visits, size_t n, IntRow& from_block, IntRow& to_block) {
+  const Floats d;
+  // Of pixels at dy, the ellipse covers lean dy ± span √(reach² - dy²); it goes farthest right at dy = tip.
+  const float l11 = visits.l11.at[n], l21 = visits.l21.at[n], l22 = visits.l22.at[n];
+  const float s11 = l21 * l21 + l22 * l22;
+  const V lean = hn::Set(d, l11 * l21 / s11), span = hn::Set(d, l11 * l22 / s11);
+  const V reach2 = hn::Set(d, kSupport * kSupport * s11), tip = hn::Set(d, kSupport * l21);
+  const V x = hn::Set(d, visits.x.at[n]), y = hn::Set(d, visits.y.at[n]);
+  const V block = hn::Set(d, 1.0f / kBlockSide), none = hn::Set(d, kTileBlocks);
+  for (size_t lane = 0; lane < kTileBlocks; lane += hn::Lanes(d)) {
+    const V top = hn::Sub(hn::Mul(hn::Iota(d, static_cast<float>(lane)), hn::Set(d, kBlockSide)), y);
+    const V bottom = hn::Add(top, hn::Set(d, kBlockSide - 1));
+    const V right = hn::Clamp(tip, top, bottom), left = hn::Clamp(hn::Neg(tip), top, bottom);
+    const auto width = [&](V dy) HWY_ATTR {
+      return hn::Mul(span, hn::Sqrt(hn::Max(hn::NegMulAdd(dy, dy, reach2), hn::Zero(d))));
+    };
+    const V to = hn::Add(x, hn::MulAdd(lean, right, width(right)));
+    const V from = hn::Add(x, hn::MulSub(lean, left, width(left)));
+    // A hundredth of a pixel is for rounding.
+    const V last = hn::Floor(hn::Mul(hn::Add(to, hn::Set(d, 0.01f)), block));
+    const V first = hn::Ceil(hn::Mul(hn::Sub(from, hn::Set(d, kBlockSide - 1 + 0.01f)), block));
+    hn::Store(hn::ConvertTo(Ints(), hn::Clamp(first, hn::Zero(d), none)), Ints(), from_block.at + lane);
+    hn::Store(hn::ConvertTo(Ints(), hn::Clamp(last, hn::Set(d, -1.0f), none)), Ints(), to_block.at + lane);
+  }
+}
+
+/// Of a row: `from` to `to`, none where from > to.
+HWY_INLINE BlockMask blocksOfRow(int from, int to) {
+  return from > to ? 0 : (BlockMask{2} << to) - (BlockMask{1} << from);
+}
+
+HWY_INLINE BlockMask blocksOf(const Visits& visits, size_t n) {
+  const int x0 = visits.x0.at[n], y0 = visits.y0.at[n], x1 = visits.x1.at[n], y1 = visits.y1.at[n];
+  BlockMask blocks = 0;
+  if (x0 > x1 || y0 > y1) return blocks;
+  if (y1 - y0 <= 1 || x0 == x1) {
+    const BlockMask row = blocksOfRow(x0, x1);
+    for (int y = y0; y <= y1; ++y) blocks |= row << y * kTileBlocks;
+    return blocks;
+  }
+  IntRow from, to;
+  trim(visits, n, from, to);
+  for (int y = y0; y <= y1; ++y)
+    blocks |= blocksOfRow(std::max(x0, from.at[y]), std::min(x1, to.at[y])) << y * kTileBlocks;
+  return blocks;
+}
+
+HWY_INLINE int takeFirst(BlockMask& blocks) {
+  const int first = std::countr_zero(blocks);
+  blocks &= blocks - 1;
+  return first;
+}
+
+HWY_INLINE float xOf(int block) {
+  return static_cast<float>(block % kTileBlocks * kBlockSide);
+}
+HWY_INLINE float yOf(int block) {
+  return static_cast<float>(block / kTileBlocks * kBlockSide);
+}
+
+/// With a look-up for every pixel: look_up(x, y, where to), false for nothing. A few blocks are looked up
+/// before they are blended: what was written as many narrow vectors is not ready at once to be read as a wide
+/// one.
+template <typename LookUp>
+HWY_INLINE BlockMask paintLookedUpBlocks(const TileWork& work, BlockMask blocks, const Lit& lit,
+                                         const LookUp& look_up) {
+  constexpr int kAtOnce = 8;
+  LookedUp looked_up[kAtOnce];
+  int numbers[kAtOnce];
+  BlockMask saturated = 0;
+  while (blocks != 0) {
+    int count = 0;
+    while (blocks != 0 && count < kAtOnce) {
+      const int block = numbers[count] = takeFirst(blocks);
+      if (look_up(xOf(block), yOf(block), looked_up[count])) ++count;
+    }
+    for (int n = 0; n < count; ++n)
+      if (paintLookedUp(looked_up[n], lit, work.tile + numbers[n] * kBlockFloats))
+        saturated |= BlockMask{1} << numbers[n];
+  }
+  return saturated;
+}
+
+HWY_INLINE Shade shadeOf(const Fits& fits, size_t n) {
+  Shade shade;
+  for (int c = 0; c < 4; ++c) {
+    shade.at[c] = fits.at.of[c].at[n];
+    shade.by[c] = fits.by.of[c].at[n];
+    shade.bend[c] = fits.bend.of[c].at[n];
+  }
+  return shade;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace curvisplat
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,105 @@
+#include "render/project/pixel_layers.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "stream/base/check.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr int kCellSide = 8;
+constexpr float kClear = 1e-6f;
+
+}  // namespace
+
+void PixelLayers::Row::endPixel(size_t first_layer) {
+  const auto begin = layers.begin() + static_cast<std::ptrdiff_t>(first_layer);
+  std::stable_sort(begin, layers.end(),
+                   [](const PixelLayer& a, const PixelLayer& b) { return a.depth < b.depth; });
+  size_t kept = first_layer;
+  for (size_t n = first_layer; n < layers.size(); ++n) {
+    const PixelLayer layer = layers[n];
+    if (layer.colour.w < kClear) continue;
+    if (kept > first_layer && layers[kept - 1].colour.w >= 1) break;
+    if (kept - first_layer == kMostLayers)
+      layers[kept - 1].colour += (1 - layers[kept - 1].colour.w) * layer.colour;
+    else
+      layers[kept++] = layer;
+  }
+  layers.resize(kept);
+  counts.push_back(static_cast<uint8_t>(kept - first_layer));
+}
+
+PixelLayers::PixelLayers(ImageSize size, std::vector<Row> rows, double depth_origin)
+    : size_(size), depth_origin_(depth_origin) {
+  CURVISPLAT_CHECK_OP(rows.size(), ==, static_cast<size_t>(size.height));
+  size_t count = 0;
+  for (const Row& row : rows) count += row.layers.size();
+  begins_.reserve(size.pixels() + 1);
+  begins_.push_back(0);
+  layers_.reserve(count);
+  for (Row& row : rows) {
+    CURVISPLAT_CHECK_OP(row.counts.size(), ==, static_cast<size_t>(size.width));
+    for (const uint8_t layers : row.counts) begins_.push_back(begins_.back() + layers);
+    layers_.insert(layers_.end(), row.layers.begin(), row.layers.end());
+    row = {};
+  }
+  makeLevels();
+}
+
+void PixelLayers::makeLevels() {
+  const auto cellsAlong = [](int pixels) { return (pixels + kCellSide - 1) / kCellSide; };
+  Level finest{cellsAlong(size_.width), cellsAlong(size_.height), {}};
+  finest.cells.resize(static_cast<size_t>(finest.columns) * static_cast<size_t>(finest.rows));
+  for (int y = 0; y < size_.height; ++y)
+    for (int x = 0; x < size_.width; ++x) {
+      const std::span<const PixelLayer> layers = at(x, y);
+      Bounds& cell = finest.cells[static_cast<size_t>(y / kCellSide * finest.columns + x / kCellSide)];
+      windows_ = std::max(windows_, windowsOf(layers));
+      if (!layers.empty()) cell.nearest = std::min(cell.nearest, layers.front().depth);
+      const bool opaque = !layers.empty() && layers.back().colour.w >= 1;
+      cell.hidden = std::max(cell.hidden, opaque ? layers.back().depth : kNowhere);
+    }
+  levels_.push_back(std::move(finest));
+  while (levels_.back().columns > 1 || levels_.back().rows > 1) {
+    const Level& below = levels_.back();
+    Level level{(below.columns + 1) / 2, (below.rows + 1) / 2, {}};
+    level.cells.resize(static_cast<size_t>(level.columns) * static_cast<size_t>(level.rows));
+    for (int y = 0; y < below.rows; ++y)
+      for (int x = 0; x < below.columns; ++x) {
+        const Bounds& from = below.cells[static_cast<size_t>(y * below.columns + x)];
+        Bounds& to = level.cells[static_cast<size_t>(y / 2 * level.columns + x / 2)];
+        to.nearest = std::min(to.nearest, from.nearest);
+        to.hidden = std::max(to.hidden, from.hidden);
+      }
+    levels_.push_back(std::move(level));
+  }
+}
+
+PixelLayers::Bounds PixelLayers::boundsOver(const ScreenBox& box) const {
+  const auto cellOf = [](float at, int pixels) {
+    return static_cast<int>(std::clamp(at, 0.0f, static_cast<float>(pixels - 1))) / kCellSide;
+  };
+  int x0 = cellOf(box.x0, size_.width), x1 = cellOf(box.x1, size_.width);
+  int y0 = cellOf(box.y0, size_.height), y1 = cellOf(box.y1, size_.height);
+  size_t level = 0;
+  for (; x1 - x0 > 1 || y1 - y0 > 1; ++level) x0 /= 2, x1 /= 2, y0 /= 2, y1 /= 2;
+  Bounds bounds;
+  for (int y = y0; y <= y1; ++y)
+    for (int x = x0; x <= x1; ++x) {
+      const Bounds& cell = levels_[level].cells[static_cast<size_t>(y * levels_[level].columns + x)];
+      bounds.nearest = std::min(bounds.nearest, cell.nearest);
+      bounds.hidden = std::max(bounds.hidden, cell.hidden);
+    }
+  return bounds;
+}
+
+uint64_t PixelLayers::bytes() const {
+  uint64_t bytes = begins_.size() * sizeof(uint32_t) + layers_.size() * sizeof(PixelLayer);
+  for (const Level& level : levels_) bytes += level.cells.size() * sizeof(Bounds);
+  return bytes;
+}
+
+}  // namespace curvisplat

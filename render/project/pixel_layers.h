@@ -1,0 +1,97 @@
+// What lies in the volume, pixel by pixel: surfaces and slices, as layers from the nearest to the farthest. Each
+// has a depth and a colour. Layers divide the ray of a pixel into windows of depth:
+//
+//   viewer | window 0 | layer 0 | window 1 | layer 1 | ... behind an opaque layer there is nothing
+//
+// A splat that meets a layer is cut into its parts in the windows (ScreenDepth). Painters accumulate every
+// window on its own; at the end windows and layers are composited front to back. So it does not matter in
+// which order splats of different windows are drawn.
+//
+// Immutable once it is made; any thread. A pixel takes 4 bytes, a layer 20.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "render/image/image_size.h"
+#include "render/project/screen_box.h"
+
+namespace curvisplat {
+
+struct PixelLayer {
+  float depth;       // PixelLayers::depthOrigin() away; perspective: from the eye
+  glm::vec4 colour;  // premultiplied
+};
+
+/// A pixel's colour behind everything: what its windows and layers make of it.
+struct PixelResult {
+  glm::vec3 colour{0.0f};
+  float through = 1;
+
+  void add(const glm::vec3& premultiplied, float transmittance) {
+    colour += through * premultiplied;
+    through *= transmittance;
+  }
+};
+
+class PixelLayers {
+ public:
+  static constexpr int kMostLayers = 4, kMostWindows = kMostLayers + 1;
+  static constexpr float kNowhere = std::numeric_limits<float>::infinity();
+
+  /// The layers of a row of pixels, one pixel after the other.
+  struct Row {
+    std::vector<uint8_t> counts;  // [width]
+    std::vector<PixelLayer> layers;
+
+    /// Ends a pixel, whose layers are the last that were appended, in any order. Sorts them, leaves out what
+    /// is behind an opaque one or clear, and draws what is beyond the fourth at the fourth's depth.
+    void endPixel(size_t first_layer);
+  };
+
+  /// `rows`: from the top. `depth_origin`: orthographic, the distance along the view at which depths begin.
+  PixelLayers(ImageSize size, std::vector<Row> rows, double depth_origin);
+
+  ImageSize size() const { return size_; }
+  double depthOrigin() const { return depth_origin_; }
+  std::span<const PixelLayer> at(int x, int y) const {
+    const size_t pixel = static_cast<size_t>(y) * static_cast<size_t>(size_.width) + static_cast<size_t>(x);
+    return {layers_.data() + begins_[pixel], begins_[pixel + 1] - begins_[pixel]};
+  }
+  /// Of a pixel with these layers.
+  static int windowsOf(std::span<const PixelLayer> layers) {
+    return static_cast<int>(layers.size()) + (layers.empty() || layers.back().colour.w < 1 ? 1 : 0);
+  }
+  /// The most of any pixel.
+  int windows() const { return windows_; }
+  bool empty() const { return layers_.empty(); }
+  uint64_t bytes() const;
+
+  /// Depths between which the layers in a box of pixels lie. What is nearer than `nearest` is in window 0
+  /// everywhere; what is farther than `hidden` lies behind opaque layers everywhere. Infinite where the box has
+  /// no layer, or pixels without an opaque one. It looks at a few cells only, which may be larger than the box.
+  struct Bounds {
+    float nearest = kNowhere, hidden = -kNowhere;
+  };
+  Bounds boundsOver(const ScreenBox& box) const;
+
+ private:
+  struct Level {
+    int columns, rows;
+    std::vector<Bounds> cells;
+  };
+  void makeLevels();
+
+  ImageSize size_;
+  double depth_origin_;
+  std::vector<uint32_t> begins_;  // [pixels + 1], into layers_
+  std::vector<PixelLayer> layers_;
+  std::vector<Level> levels_;  // cells of 8 x 8 pixels, then 16 x 16, ...
+  int windows_ = 1;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,103 @@
+// Decides for each projected splat whether it can be seen. A part of projection.cpp: everything is inline, in the
+// loop over a brick's splats.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "render/colour/classification.h"
+#include "render/project/kernel.h"
+#include "render/project/light.h"
+#include "render/project/painter.h"
+#include "render/project/screen_splat.h"
+#include "render/project/screen_view.h"
+
+namespace curvisplat {
+
+/// Decides for each projected splat whether it can be seen, and keeps those that can.
+class SplatChooser {
+ public:
+  enum class Fate { kOffScreen, kTransparent, kKept };
+
+  /// The vectors get what is kept. `reach`: largestReach().
+  struct Kept {
+    std::vector<ScreenSplat>& splats;
+    std::vector<float>& depths;
+  };
+  SplatChooser(const ScreenView& view, double reach, PixelShading shading, const ClassificationTable& table,
+               const Kept& kept)
+      : table_(table),
+        width_(static_cast<float>(view.size.width)),
+        height_(static_cast<float>(view.size.height)),
+        reach_(1.001f * static_cast<float>(reach)),
+        largest_scalar_(kLargestCells /
+                        std::max(table.logScale() ? 1.0f : std::abs(table.scale()), kMinScale)),
+        per_pixel_(shading.per_pixel),
+        lit_(shading.lit),
+        splats_(kept.splats),
+        depths_(kept.depths) {}
+
+  /// Inline: handed over through memory, a splat that has just been put together stalls on its way into the
+  /// vector, which takes as long as all the rest. `widening`: how much farther than half_width a mean can be.
+  [[gnu::always_inline]] Fate choose(ScreenSplat splat, float depth, const Lit& lit, float widening = 1) {
+    const float reach_x = kSupport * splat.l11;
+    const float reach_y = kSupport * (std::abs(splat.l21) + splat.l22);
+    const bool on_screen = splat.x + reach_x > 0 && splat.x - reach_x < width_ && splat.y + reach_y > 0 &&
+                           splat.y - reach_y < height_;
+    if (!on_screen) return Fate::kOffScreen;
+    if (!per_pixel_) splat.slope0 = splat.slope1 = splat.half_width = 0;
+    float spread = kSupport * (std::abs(splat.slope0) + std::abs(splat.slope1)) + widening * splat.half_width;
+    if (!(std::abs(splat.mean) + spread <= largest_scalar_)) {
+      splat.slope0 = splat.slope1 = splat.half_width = spread = 0;
+      splat.mean = std::clamp(splat.mean, -largest_scalar_, largest_scalar_);
+    }
+    splat.amplitude = std::min(splat.amplitude, kLargestAmplitude);
+    if (!(splat.amplitude > 0) || table_.fullyTransparent(splat.mean - spread, splat.mean + spread))
+      return Fate::kTransparent;
+    if (lit_) splat.half_width = packLit(splat.half_width, lit);
+    splats_.push_back(splat);
+    depths_.push_back(depth);
+    return Fate::kKept;
+  }
+
+  /// Of a splat that is cut, at faces or by layers. Its records come first.
+  Fate chooseCut(const ScreenSplat& splat, float depth, const Lit& lit, const ScreenCut* cut,
+                 const ScreenDepth* along_ray) {
+    const size_t before = splats_.size();
+    // A truncated distribution's mean moves by up to kReach deviations; half_width is √3.
+    const Fate fate = choose(splat, depth, lit, ScreenCut::kReach / std::numbers::sqrt3_v<float>);
+    if (splats_.size() == before) return fate;
+    ScreenSplat kept = splats_.back();
+    kept.amplitude = -kept.amplitude;
+    splats_.pop_back();
+    if (cut) splats_.push_back(cut->record());
+    if (along_ray) splats_.push_back(along_ray->record());
+    splats_.push_back(kept);
+    depths_.resize(splats_.size(), depth);
+    return fate;
+  }
+
+  /// Whether every piece of a splat is transparent, wherever the piece lies. `slope` is the slope as drawn.
+  bool transparentThroughout(float mean, float slope, float variance) const {
+    const float spread = reach_ * slope + ScreenCut::kReach * std::sqrt(slope * slope + variance);
+    return table_.fullyTransparent(mean - spread, mean + spread);
+  }
+
+ private:
+  static constexpr auto kSupport = static_cast<float>(kKernelSupport);
+  // Painters find a scalar's place in the table, and depths, in float: beyond these there are infinities, and
+  // infinity minus infinity is no number. Such a splat is drawn flat, and far outside of the table.
+  static constexpr float kLargestCells = 1e30f, kMinScale = 1e-7f, kLargestAmplitude = 1e30f;
+
+  const ClassificationTable& table_;
+  const float width_, height_;
+  const float reach_;
+  const float largest_scalar_;
+  const bool per_pixel_, lit_;
+  std::vector<ScreenSplat>& splats_;
+  std::vector<float>& depths_;
+};
+
+}  // namespace curvisplat

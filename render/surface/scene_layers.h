@@ -1,0 +1,31 @@
+// Puts surfaces and slices together as the layers of a picture.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "render/project/light.h"
+#include "render/project/pixel_layers.h"
+#include "render/project/screen_view.h"
+#include "render/surface/colour_table.h"
+#include "render/surface/slice_sampler.h"
+#include "render/surface/surface_scene.h"
+
+namespace curvisplat {
+
+struct SceneLook {
+  const ColourTable& colours;              // of scalars
+  std::optional<Light> light;              // none: surfaces have a light at the viewer, slices none
+  std::span<const ClipPlane> clip_planes;  // of slices
+  double depth_origin = 0;
+};
+
+/// The layers of a picture. `slices`: those of the scene that were sampled, complete. Surfaces are drawn in bands of
+/// at most `band_bytes`. Parallel on the caller's TBB arena; the same bits for any number of threads.
+PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
+                     std::span<const std::unique_ptr<SliceSampler>> slices, const SceneLook& look,
+                     uint64_t band_bytes = 32 << 20);
+
+}  // namespace curvisplat

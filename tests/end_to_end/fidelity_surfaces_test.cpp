@@ -1,0 +1,203 @@
+// Surfaces and slices in the volume, against the ray march of the same: splats that meet a surface are cut there,
+// and without that a picture is worse.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <memory>
+#include <numbers>
+#include <vector>
+
+#include "preprocess/scenes/scenes.h"
+#include "render/image/image.h"
+#include "tests/reference/direct_picture.h"
+#include "tests/reference/function_grid.h"
+#include "tests/reference/known_pictures.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr ImageSize kSize{256, 256};
+const glm::vec3 kGrey{0.6f, 0.7f, 0.8f};
+// Across the half-annulus, obliquely.
+const ClipPlane kPlane{{-0.4, 0, 0.5}, {0.6, 0.5, -0.7}};
+const glm::dvec3 kCentre{-0.6, 0.1, 0.55};
+constexpr double kRadius = 0.35;
+
+std::shared_ptr<SurfaceScene> surfaceOf(RawMesh raw) {
+  auto scene = std::make_shared<SurfaceScene>();
+  scene->surfaces.push_back({std::make_shared<TriangleMesh>(meshOf(std::move(raw))), kGrey});
+  return scene;
+}
+
+/// A square that is larger than the picture.
+std::shared_ptr<SurfaceScene> planeScene(const ClipPlane& plane) {
+  const glm::dvec3 n = glm::normalize(plane.normal);
+  const glm::dvec3 u = 8.0 * glm::normalize(glm::cross(n, {0.3, 0.4, 0.8})), v = glm::cross(n, u);
+  return surfaceOf({{plane.point - u - v, plane.point + u - v, plane.point + u + v, plane.point - u + v},
+                    {{0, 1, 2}, {0, 2, 3}}});
+}
+
+std::shared_ptr<SurfaceScene> sphereScene() {
+  constexpr uint32_t kAround = 256, kUp = 128;
+  RawMesh raw;
+  for (uint32_t j = 0; j <= kUp; ++j)
+    for (uint32_t i = 0; i < kAround; ++i) {
+      const double theta = std::numbers::pi * j / kUp, phi = 2 * std::numbers::pi * i / kAround;
+      raw.positions.push_back(kCentre + kRadius * glm::dvec3(std::sin(theta) * std::cos(phi),
+                                                             std::sin(theta) * std::sin(phi),
+                                                             std::cos(theta)));
+    }
+  for (uint32_t j = 0; j < kUp; ++j)
+    for (uint32_t i = 0; i < kAround; ++i) {
+      const uint32_t a = j * kAround + i, b = j * kAround + (i + 1) % kAround;
+      raw.triangles.push_back({a, b, b + kAround});
+      raw.triangles.push_back({a, b + kAround, a + kAround});
+    }
+  return surfaceOf(std::move(raw));
+}
+
+class Surfaces : public testing::Test {
+ protected:
+  /// The mean of `rays` x `rays` rays a pixel.
+  Image marched(const KnownFunction& function, const ReferenceLayers& layers, int rays = 1) const {
+    MarchSteps steps;
+    steps.step = 0.008;
+    const ImageSize size{rays * kSize.width, rays * kSize.height};
+    const Image image =
+        toImage(referenceMarch(field_, function.exact, camera_, size, steps, nullptr, layers));
+    Image mean(kSize);
+    for (int y = 0; y < size.height; ++y)
+      for (int x = 0; x < size.width; ++x)
+        for (int c = 0; c < 4; ++c)
+          mean.pixel(x / rays, y / rays)[c] += image.pixel(x, y)[c] / static_cast<float>(rays * rays);
+    return mean;
+  }
+
+  static double voxelOf(double pixels) {
+    return pixels * 2 * halfAnnulusCamera().parallel_scale / kSize.height;
+  }
+
+  /// Least decibels at the finest level, 4 and 8 pixels; dropping splats by their centres must miss each.
+  void expectWorth(const std::string& name, const std::string& function_name, const ReferenceLayers& layers,
+                   const std::shared_ptr<SurfaceScene>& scene, const std::array<double, 3>& least_db,
+                   int rays = 1) const {
+    const KnownFunction function = KnownFunction::of(function_name);
+    const Image reference = marched(function, layers, rays);
+    for (size_t level = 0; level < 3; ++level) {
+      DirectOptions options;
+      options.scene = scene;
+      options.voxel = std::array{0.0, voxelOf(4), voxelOf(8)}[level];
+      const auto db = [&] {
+        return compareImages(drawDirectly(source_, 0, options, function.table, camera_, kSize), reference)
+            .psnr_db;
+      };
+      const double cut = db();
+      options.cut_splats = false;
+      const double by_centre = db();
+      fmt::print("{}, {}, level {}: {:.1f} dB, by centres {:.1f} dB\n", name, function_name, level, cut,
+                 by_centre);
+      EXPECT_GE(cut, least_db[level]) << name << ", " << function_name << ", level " << level;
+      EXPECT_LT(by_centre, least_db[level]) << name << ", " << function_name << ", level " << level;
+    }
+  }
+
+  const std::shared_ptr<const Scene> annulus_ = makeScene("half-annulus");
+  const SceneField field_{*annulus_};
+  const SceneGridSource source_{annulus_, {64, 32, 32}, 4};
+  Camera camera_ = halfAnnulusCamera();
+};
+
+TEST_F(Surfaces, APlaneCutsTheSplats) {
+  const auto scene = planeScene(kPlane);
+  const auto layers = planeLayer(kPlane.point, kPlane.normal, glm::dvec3(kGrey));
+  expectWorth("plane", "smooth", layers, scene, {70, 50.7, 48.5});
+  expectWorth("plane", "band", layers, scene, {57, 45.7, 41.5});
+  expectWorth("plane", "step", layers, scene, {52, 45.5, 38.5});
+}
+
+TEST_F(Surfaces, ASphereIsLitAndCutsTheSplats) {
+  const auto scene = sphereScene();
+  const auto layers = sphereLayer(kCentre, kRadius, glm::dvec3(kGrey));
+  expectWorth("sphere", "smooth", layers, scene, {50, 46, 44}, 2);
+}
+
+/// The root of the mean squared difference of pixels around which the slice goes on for `margin` pixels.
+double rmsInside(const Image& picture, const Image& reference, const ReferenceLayers& slice,
+                 const Camera& camera, int margin) {
+  const ImageSize size = picture.size;
+  std::vector<uint8_t> there(size.pixels());
+  const glm::dvec3 forward = glm::normalize(camera.focal_point - camera.position);
+  const glm::dvec3 right = glm::normalize(glm::cross(forward, camera.view_up)),
+                   up = glm::cross(right, forward);
+  for (int y = 0; y < size.height; ++y)
+    for (int x = 0; x < size.width; ++x) {
+      const double unit = camera.parallel_scale / size.height;
+      const glm::dvec3 origin =
+          camera.position + unit * (static_cast<double>(2 * x + 1 - size.width) * right +
+                                    static_cast<double>(size.height - 2 * y - 1) * up);
+      there[static_cast<size_t>(y * size.width + x)] = !slice(origin, forward).empty();
+    }
+  double sum = 0;
+  int count = 0;
+  for (int y = margin; y < size.height - margin; ++y)
+    for (int x = margin; x < size.width - margin; ++x) {
+      bool inside = true;
+      for (int v = -margin; v <= margin; ++v)
+        for (int u = -margin; u <= margin; ++u)
+          inside = inside && there[static_cast<size_t>((y + v) * size.width + x + u)];
+      if (!inside) continue;
+      for (int c = 0; c < 3; ++c)
+        sum += std::pow(double{picture.pixel(x, y)[c]} - double{reference.pixel(x, y)[c]}, 2) / 3;
+      ++count;
+    }
+  EXPECT_GT(count, 1000);
+  return std::sqrt(sum / count);
+}
+
+TEST_F(Surfaces, SlicesHaveTheScalarsColours) {
+  // Whose red is the scalar, as are green and blue.
+  const OpticalFunction exact = [](double f) { return OpticalProperties{glm::dvec3(f), 0}; };
+  TransferFunctionDefinition grey = presetDefinition("grey");
+  grey.colour_space = ColourSpace::kRgb;
+  grey.colours = {{0, {0, 0, 0}}, {1, {1, 1, 1}}};
+  const std::pair<double, double> range(0, 1);
+  const TransferFunction function(grey, &range, 1);
+  const auto slice = sliceLayer(field_, exact, kPlane.point, kPlane.normal);
+  MarchSteps steps;
+  const Image reference = toImage(referenceMarch(field_, exact, camera_, kSize, steps, nullptr, slice));
+  const auto scene = std::make_shared<SurfaceScene>();
+  scene->slices = {kPlane};
+  scene->volume = false;
+  const struct {
+    double pixels, most_rms;
+    int margin;
+  } levels[] = {{0, 1e-3, 1}, {4, 2.5e-3, 4}, {8, 8e-3, 8}};
+  for (const auto& level : levels) {
+    DirectOptions options;
+    options.scene = scene;
+    options.voxel = voxelOf(level.pixels);
+    const Image picture = drawDirectly(source_, 0, options, function, camera_, kSize);
+    const double rms = rmsInside(picture, reference, slice, camera_, level.margin);
+    fmt::print("slice, {} pixels: rms {:.3f} % of the range\n", level.pixels, 100 * rms);
+    EXPECT_LT(rms, level.most_rms) << level.pixels;
+  }
+}
+
+TEST_F(Surfaces, TranslucentSlicesLieInTheVolume) {
+  const KnownFunction function = KnownFunction::of("smooth");
+  const auto scene = std::make_shared<SurfaceScene>();
+  scene->slices = {kPlane};
+  scene->slice_opacity = 0.5;
+  const auto slice = sliceLayer(field_, function.exact, kPlane.point, kPlane.normal, 0.5);
+  const Image reference = marched(function, slice);
+  DirectOptions options;
+  options.scene = scene;
+  const Image picture = drawDirectly(source_, 0, options, function.table, camera_, kSize);
+  EXPECT_LT(rmsInside(picture, reference, slice, camera_, 1), 1.5e-3);
+}
+
+}  // namespace
+}  // namespace curvisplat

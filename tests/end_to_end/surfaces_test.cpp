@@ -1,0 +1,155 @@
+// Surfaces and slices through the real program: the same picture by every painter, with any threads and memory; what
+// a wall hides is not read; and what is refused.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "stream/base/file.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+class SurfaceOptions : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    for (const auto& arguments :
+         {std::vector<std::string>{"generate", "wake", "--size", "96x64x48", "-o", file("wake")},
+          {"convert", file("wake.xyz"), file("wake.fun"), "-o", file("wake.splats")}}) {
+      const ProgramResult result = runProgram(arguments);
+      ASSERT_EQ(result.status, 0) << result.err;
+    }
+    writeFileAtomically(*folder_ / "sphere.obj", sphere());
+    // Before all of the wake, seen from +z.
+    writeFileAtomically(
+        *folder_ / "wall.obj",
+        std::string("v -1e3 -1e3 50\nv 1e3 -1e3 50\nv 1e3 1e3 50\nv -1e3 1e3 50\nf 1 2 3 4\n"));
+  }
+  static void TearDownTestSuite() { folder_.reset(); }
+
+  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
+
+  static std::string sphere() {
+    constexpr int kAround = 64, kUp = 32;
+    std::string text;
+    for (int j = 0; j <= kUp; ++j)
+      for (int i = 0; i < kAround; ++i) {
+        const double theta = std::numbers::pi * j / kUp, phi = 2 * std::numbers::pi * i / kAround;
+        text += fmt::format("v {} {} {}\n", 3 + 1.2 * std::sin(theta) * std::cos(phi),
+                            1.2 * std::sin(theta) * std::sin(phi), 1.2 * std::cos(theta));
+      }
+    for (int j = 0; j < kUp; ++j)
+      for (int i = 0; i < kAround; ++i) {
+        const int a = j * kAround + i + 1, b = j * kAround + (i + 1) % kAround + 1;
+        text += fmt::format("f {} {} {} {}\n", a, b, b + kAround, a + kAround);
+      }
+    return text;
+  }
+
+  static ProgramResult render(const std::vector<std::string>& more, const std::string& output = "a.pfm") {
+    std::vector<std::string> arguments{"render",  file("wake.splats"), "-o",     file(output),
+                                       "--size",  "200x150",           "--view", "iso",
+                                       "--stats", file("stats.json")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return runProgram(arguments);
+  }
+  static Image picture(const std::vector<std::string>& more) {
+    const ProgramResult result = render(more);
+    EXPECT_EQ(result.status, 0) << result.err;
+    return readImage(file("a.pfm"));
+  }
+  static nlohmann::json statistics() {
+    return nlohmann::json::parse(readTextFile(file("stats.json")))["frames"][0];
+  }
+
+  static std::unique_ptr<TemporaryFolder> folder_;
+};
+
+std::unique_ptr<TemporaryFolder> SurfaceOptions::folder_;
+
+TEST_F(SurfaceOptions, EveryPainterDrawsTheSame) {
+  for (const char* angle : {"0", "40"}) {
+    std::vector<std::string> options{"--surface",    file("sphere.obj"), "--slice",         "4,0,0,1,0.2,0.1",
+                                     "--slice",      "4,0,0,0,0,1",      "--slice-opacity", "0.6",
+                                     "--clip-plane", "2,0,0,1,0,0"};
+    if (angle != std::string("0")) options.insert(options.end(), {"--view-angle", angle});
+    const auto with = [&](std::vector<std::string> more) {
+      more.insert(more.end(), options.begin(), options.end());
+      return picture(more);
+    };
+    const Image cpu = with({"--backend", "cpu"});
+    const ImageDifference difference = compareImages(cpu, with({"--backend", "osmesa"}));
+    EXPECT_GT(difference.psnr_db, 70) << angle;
+    EXPECT_LT(difference.largest, 2.0 / 255) << angle;
+    EXPECT_EQ(with({"--backend", "cpu", "--threads", "1"}).rgba, cpu.rgba);
+    EXPECT_EQ(with({"--backend", "cpu", "--threads", "3", "--memory", "96M"}).rgba, cpu.rgba);
+  }
+}
+
+TEST_F(SurfaceOptions, WhatAWallHidesIsNotRead) {
+  picture({"--view", "+z", "--surface", file("wall.obj")});
+  EXPECT_EQ(statistics()["bytes_read"], 0);
+  EXPECT_EQ(statistics()["splats_drawn"], 0);
+  picture({"--view=-z", "--surface", file("wall.obj")});
+  EXPECT_GT(statistics()["splats_drawn"], 0);
+}
+
+TEST_F(SurfaceOptions, VolumeOffLeavesSurfacesAndSlices) {
+  const Image alone = picture({"--volume", "off", "--surface", file("sphere.obj"), "--background", "black",
+                               "--surface-colour", "#ff0000"});
+  EXPECT_EQ(statistics()["splats_drawn"], 0);
+  size_t red = 0;
+  for (size_t n = 0; n < alone.rgba.size(); n += 4) red += alone.rgba[n] > 0.25f;
+  EXPECT_GT(red, 300u);
+  picture({"--volume", "off", "--slice", "4,0,0,0,0,1"});
+  EXPECT_GT(statistics()["bytes_read"], 0);
+}
+
+TEST_F(SurfaceOptions, WarnsOfASliceThatMisses) {
+  const ProgramResult result = render({"--slice", "0,0,900,0,0,1"});
+  EXPECT_EQ(result.status, 0);
+  EXPECT_TRUE(result.err.find("warning: --slice 0,0,900,0,0,1 misses the data, which lies in x ") !=
+              std::string::npos)
+      << result.err;
+}
+
+TEST_F(SurfaceOptions, SaysWhatIsWrong) {
+  writeFileAtomically(*folder_ / "cut.stl", readTextFile(file("wall.obj")));
+  const std::string cut = file("cut.stl"), sphere = file("sphere.obj");
+  const struct {
+    std::vector<std::string> options;
+    int status;
+    std::string words;
+  } refused[] = {
+      {{"--slice", "0,0,0,0,0,0"}, 2, "--slice 0,0,0,0,0,0: the normal nx,ny,nz has no direction"},
+      {{"--slice", "0,0,0"}, 2, "--slice 0,0,0: expected px,py,pz,nx,ny,nz"},
+      {{"--slice", "0,0,0,0,0,1", "--slice-opacity", "0"}, 2, "--slice-opacity 0: expected a number above 0"},
+      {{"--volume", "off"}, 2, "--volume off leaves nothing to draw; give a --slice or a --surface"},
+      {{"--volume", "maybe"}, 2, "--volume maybe: expected on or off"},
+      {{"--surface-colour", "#ff0000"}, 2, "--surface-colour needs a surface: --surface FILE"},
+      {{"--surface", sphere, "--surface-colour", "red"}, 2, "--surface-colour red: expected white, black"},
+      {{"--surface", cut}, 1, cut + ": is cut off"},
+      {{"--surface", file("none.stl")}, 1, file("none.stl")}};
+  for (const auto& [options, status, words] : refused) {
+    const ProgramResult result = render(options, "refused.png");
+    EXPECT_EQ(result.status, status) << words << "\n" << result.err;
+    EXPECT_NE(result.err.find(words), std::string::npos) << result.err << "  lacks " << words;
+    EXPECT_FALSE(std::filesystem::exists(file("refused.png")));
+  }
+  std::vector<std::string> many;
+  for (int n = 0; n < 9; ++n) many.insert(many.end(), {"--slice", "0,0,0,0,0,1"});
+  EXPECT_NE(render(many).err.find("--slice: given 9 times; a picture has at most 8 slices"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace curvisplat

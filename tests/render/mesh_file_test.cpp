@@ -1,0 +1,183 @@
+// Surfaces from files: what is read, and what is refused.
+#include "render/mesh/mesh_file.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <glm/geometric.hpp>
+#include <string>
+
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+RawMesh parse(const std::string& text, const std::string& name) {
+  return parseMesh(std::as_bytes(std::span(text)), name);
+}
+
+std::string refusalOf(const std::string& text, const std::string& name) {
+  try {
+    parse(text, name);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+template <typename T>
+void append(std::string& bytes, T value, bool reversed = false) {
+  char raw[sizeof value];
+  std::memcpy(raw, &value, sizeof value);
+  if (reversed) std::reverse(raw, raw + sizeof value);
+  bytes.append(raw, sizeof value);
+}
+
+const float kCorners[4][3] = {{0, 0, 0}, {2, 0, 0}, {2, 1, 0.5f}, {0, 1, 0.5f}};
+
+std::string binaryStl() {
+  std::string bytes(80, ' ');
+  bytes.replace(0, 5, "solid");  // as some programs write
+  append(bytes, uint32_t{2});
+  for (const auto& triangle : {std::array{0, 1, 2}, std::array{0, 2, 3}}) {
+    for (int n = 0; n < 3; ++n) append(bytes, 0.0f);
+    for (const int corner : triangle)
+      for (const float x : kCorners[corner]) append(bytes, x);
+    append(bytes, uint16_t{0});
+  }
+  return bytes;
+}
+
+const std::string kAsciiStl =
+    "solid a quad\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 2 0 0\n   vertex 2 1 0.5\n"
+    "  endloop\n endfacet\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 2 1 0.5\n"
+    "   vertex 0 1 5e-1\n  endloop\n endfacet\nendsolid a quad\n";
+
+const std::string kAsciiPly =
+    "ply\r\nformat ascii 1.0\r\ncomment made by hand\r\nelement vertex 4\r\nproperty float x\r\n"
+    "property double y\r\nproperty float z\r\nproperty uchar red\r\nelement face 1\r\n"
+    "property list uchar int vertex_indices\r\nend_header\r\n0 0 0 255\r\n2 0 0 255\r\n2 1 0.5 255\r\n"
+    "0 1 0.5 255\r\n4 0 1 2 3\r\n";
+
+std::string binaryPly(bool big) {
+  std::string bytes = std::string("ply\nformat binary_") + (big ? "big" : "little") +
+                      "_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+                      "element face 1\nproperty uchar flags\nproperty list uchar uint vertex_index\n"
+                      "end_header\n";
+  for (const auto& corner : kCorners)
+    for (const float x : corner) append(bytes, x, big);
+  append(bytes, uint8_t{7});
+  append(bytes, uint8_t{4});
+  for (uint32_t n = 0; n < 4; ++n) append(bytes, n, big);
+  return bytes;
+}
+
+const std::string kObj =
+    "# a quad\nmtllib a.mtl\nv 0 0 0\nv 2 0 0\nvn 0 0 1\nv 2 1 0.5\nv 0 1 0.5\nf 1/1/1 2//1 -2 4/4\n";
+
+const std::pair<std::string, std::string> kFiles[] = {{binaryStl(), "a.stl"},     {kAsciiStl, "b.STL"},
+                                                      {kAsciiPly, "c.ply"},       {binaryPly(false), "d.ply"},
+                                                      {binaryPly(true), "e.ply"}, {kObj, "f.obj"}};
+
+TEST(MeshFile, ReadsEveryFormat) {
+  for (const auto& [text, name] : kFiles) {
+    const TriangleMesh mesh = meshOf(parse(text, name));
+    ASSERT_EQ(mesh.triangles.size(), 2u) << name;
+    EXPECT_EQ(mesh.positions.size(), 4u) << name;
+    const glm::vec3 normal = glm::normalize(glm::vec3(0, -0.5f, 1));
+    for (const glm::vec3& n : mesh.normals) EXPECT_NEAR(std::abs(glm::dot(n, normal)), 1, 1e-6) << name;
+    double area = 0;
+    for (const auto& [a, b, c] : mesh.triangles)
+      area += 0.5 * double{glm::length(glm::cross(mesh.positions[b] - mesh.positions[a],
+                                                  mesh.positions[c] - mesh.positions[a]))};
+    EXPECT_NEAR(area, 2 * std::hypot(1, 0.5), 1e-6) << name;
+  }
+}
+
+TEST(MeshFile, RefusesEveryFileThatIsCutOff) {
+  for (const auto& [text, name] : kFiles) {
+    // What may be missing: the end of the last line, and of the last number.
+    const size_t last = name.ends_with("obj") ? 0
+                                              : text.size() - (name.ends_with("c.ply") ? 3
+                                                               : name.ends_with("STL") ? 8
+                                                                                       : 1);
+    for (size_t length = 0; length < last; ++length)
+      EXPECT_NE(refusalOf(text.substr(0, length), name), "") << name << " of " << length << " bytes";
+  }
+}
+
+TEST(MeshFile, SaysWhatIsWrong) {
+  const std::pair<std::pair<std::string, std::string>, std::string> refused[] = {
+      {{"", "a.stl"}, "a.stl: is empty; STL, PLY and OBJ files can be read"},
+      {{"hello", "a.txt"},
+       "a.txt: is not a surface that is known (extension '.txt'); STL, PLY and OBJ files can be read"},
+      {{binaryStl().substr(0, 130), "a.stl"}, "a.stl: line 1 has no finite number where one is expected"},
+      {{std::string(80, ' ') + std::string(4, '\xff') + "x", "a.stl"},
+       "a.stl: is cut off: 4294967295 triangles take 214748364834 bytes (found 85)"},
+      {{"v 0 0 0\nv 1 0 nan\n", "a.obj"},
+       "a.obj: line 2 has no finite number where one is expected (found 'nan')"},
+      {{"v 0 0 0\nv 1 0 0\nf 1 2 3\n", "a.obj"}, "a.obj: line 3: a face names vertex 3 of 2"},
+      {{"v 0 0 0\nf 1 1\n", "a.obj"}, "a.obj: line 2: a face has 2 vertices (expected 3 or more)"},
+      {{"v 0 0 0\n", "a.obj"}, "a.obj: has no triangles, so there is nothing to draw"},
+      {{"ply\nformat ascii 1.0\nelement vertex 1000000000000\nproperty float x\nend_header\n1\n", "a.ply"},
+       "a.ply: is cut off: 1000000000000 vertex need 2000000000000 bytes or more (found 3)"},
+      {{"ply\nformat ascii 1.0\nelement vertex 1\nproperty quad x\nend_header\n1\n", "a.ply"},
+       "a.ply: a property has the type 'quad', which PLY files do not have"},
+      {{"ply\nformat middle 1.0\nend_header\n", "a.ply"},
+       "a.ply: the format is 'middle' (expected ascii, binary_little_endian or binary_big_endian)"},
+      {{"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nendloop\nendfacet\nendsolid\n", "a.stl"},
+       "a.stl: line 6: a facet has 1 vertices (expected 3)"}};
+  for (const auto& [file, words] : refused) {
+    const std::string refusal = refusalOf(file.first, file.second);
+    if (file.first.size() == 130) continue;  // of which the text may say anything
+    EXPECT_TRUE(refusal.starts_with(words)) << refusal << "\n  expected " << words;
+    EXPECT_EQ(refusal.find('\n'), std::string::npos) << refusal;
+  }
+}
+
+TEST(TriangleMesh, KeepsEdgesSharp) {
+  RawMesh cube;
+  for (int n = 0; n < 8; ++n) cube.positions.emplace_back(n & 1, n >> 1 & 1, n >> 2);
+  const uint32_t faces[6][4] = {{0, 1, 3, 2}, {4, 5, 7, 6}, {0, 1, 5, 4},
+                                {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 3, 7, 5}};
+  for (const auto& f : faces) {
+    cube.triangles.push_back({f[0], f[1], f[2]});
+    cube.triangles.push_back({f[0], f[2], f[3]});
+  }
+  const TriangleMesh mesh = meshOf(cube);
+  EXPECT_EQ(mesh.positions.size(), 24u);
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const glm::vec3 n = glm::normalize(
+        glm::cross(mesh.positions[b] - mesh.positions[a], mesh.positions[c] - mesh.positions[a]));
+    for (const uint32_t corner : {a, b, c}) EXPECT_NEAR(std::abs(glm::dot(mesh.normals[corner], n)), 1, 1e-6);
+  }
+}
+
+TEST(TriangleMesh, SmoothsWhatIsCurved) {
+  RawMesh sphere;
+  constexpr uint32_t kAround = 48, kUp = 24;
+  for (uint32_t j = 0; j <= kUp; ++j)
+    for (uint32_t i = 0; i < kAround; ++i) {
+      const double theta = M_PI * j / kUp, phi = 2 * M_PI * i / kAround;
+      sphere.positions.emplace_back(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi),
+                                    std::cos(theta));
+    }
+  for (uint32_t j = 0; j < kUp; ++j)
+    for (uint32_t i = 0; i < kAround; ++i) {
+      const uint32_t a = j * kAround + i, b = j * kAround + (i + 1) % kAround;
+      // Either way round.
+      sphere.triangles.push_back(i % 2 ? std::array{a, b, b + kAround} : std::array{b, a, b + kAround});
+      sphere.triangles.push_back({a, b + kAround, a + kAround});
+    }
+  const TriangleMesh mesh = meshOf(sphere);
+  for (size_t n = 0; n < mesh.positions.size(); ++n) {
+    const glm::dvec3 at = mesh.origin + glm::dvec3(mesh.positions[n]);
+    if (std::abs(at.z) < 0.9999) {
+      EXPECT_GT(std::abs(glm::dot(at, glm::dvec3(mesh.normals[n]))), 0.99) << n;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat
