@@ -20,6 +20,10 @@ double thickness(const Splat& splat, const glm::dvec3& q) {
   return 1 / glm::length(gradientOf(splat, q));
 }
 
+bool isUnlike(double a, double b) {
+  return std::max(a, b) > kMaxJointRatio * std::min(a, b);
+}
+
 /// How two parts of one point lie to one another.
 enum class Neighbourhood {
   kLike,      // on two sides of a face, and about as thick
@@ -39,8 +43,10 @@ Neighbourhood neighbourhood(const NodeSplat& a, const NodeSplat& b) {
       if (glm::dot(inward, seen) > kOpposite * glm::length(seen)) continue;
       ++opposite;
       if (!of_a.hasFace(n) || !of_b.hasFace(m)) continue;
-      const double first = thickness(a.splat, inward), second = thickness(b.splat, other);
-      unlike |= std::max(first, second) > kMaxJointRatio * std::min(first, second);
+      // Directions are coded to 0.01 of the cell, which is many times a thin cell's thickness: a joint across
+      // such cells would look unlike. Weights are exact, and halves of one face differ in them as in thickness.
+      unlike |= isUnlike(thickness(a.splat, inward), thickness(b.splat, other)) &&
+                isUnlike(a.splat.weight, b.splat.weight);
     }
   if (opposite == 0) return Neighbourhood::kOther;
   if (opposite > 1) return Neighbourhood::kDiagonal;

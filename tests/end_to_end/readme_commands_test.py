@@ -116,8 +116,21 @@ def write_netcdf(folder):
             file.write(data)
 
 
+def write_stl(folder):
+    """A plate of two triangles."""
+    corners = [(0, 0, 2), (4, 0, 2), (4, 4, 2), (0, 4, 2)]
+    with open(os.path.join(folder, "plate.stl"), "w") as file:
+        file.write("solid plate\n")
+        for triangle in ((0, 1, 2), (0, 2, 3)):
+            file.write("facet normal 0 0 1\nouter loop\n")
+            file.writelines("vertex {} {} {}\n".format(*corners[n]) for n in triangle)
+            file.write("endloop\nendfacet\n")
+        file.write("endsolid plate\n")
+
+
 def make_inputs(folder):
     write_plot3d(folder)
+    write_stl(folder)
     write_vts(folder)
     write_netcdf(folder)
     for name in ["delta_wing/delta_vertex.cgns"]:

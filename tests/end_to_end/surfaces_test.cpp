@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -56,9 +57,12 @@ class SurfaceOptions : public testing::Test {
   }
 
   static ProgramResult render(const std::vector<std::string>& more, const std::string& output = "a.pfm") {
-    std::vector<std::string> arguments{"render",  file("wake.splats"), "-o",     file(output),
-                                       "--size",  "200x150",           "--view", "iso",
-                                       "--stats", file("stats.json")};
+    std::vector<std::string> arguments{"render", file("wake.splats"), "-o",      file(output),
+                                       "--size", "200x150",           "--stats", file("stats.json")};
+    const auto is_view = [](const std::string& word) {
+      return word == "--view" || word.starts_with("--view=");
+    };
+    if (std::none_of(more.begin(), more.end(), is_view)) arguments.insert(arguments.end(), {"--view", "iso"});
     arguments.insert(arguments.end(), more.begin(), more.end());
     return runProgram(arguments);
   }

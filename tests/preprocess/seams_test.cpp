@@ -220,6 +220,23 @@ TEST_F(Seams, HalvesOfUnlikeThicknessStayApartAndEndAtTheFace) {
   }
 }
 
+TEST_F(Seams, AcrossAWallLayerAreAlikeIfTheirCellsAre) {
+  // Cells 500 times as long, across the joint, as they are high; at an angle, so that codes of directions are rounded.
+  const auto sheet = [](double first, uint64_t first_node) {
+    MappedBlock block(4, 4, 4, [&](double i, double j, double k) {
+      const double x = first + i, y = 0.002 * j;
+      return glm::dvec3(0.8 * x - 0.6 * y, 0.6 * x + 0.8 * y, k);
+    });
+    block.addScalar(field);
+    block.first_node = first_node;
+    return block;
+  };
+  std::vector<Piece> faces = facesOf(sheet(0, 0));
+  for (const Piece& face : facesOf(sheet(3, 64))) faces.push_back(face);
+  merge(faces);
+  EXPECT_EQ(merged_, 16u);
+}
+
 TEST_F(Seams, OfFourBlocksUnlikeAlongOneAxisMergeAlongTheOther) {
   std::vector<Piece> faces;
   for (int n = 0; n < 4; ++n) {

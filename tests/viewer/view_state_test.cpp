@@ -142,7 +142,7 @@ TEST(ViewState, TheCommandSaysAll) {
   for (const char* part :
        {"'it'\\''s.splats'", "--scalar 'u v'", "--tf f.json", "--scale 1,1,50",
         "--clip-box 0,1,-0.5,1,0.25,1", "--clip-plane 0,0.5,0,1,0,-2", "--clip-plane 0.25,0,0,0,1,0",
-        "--shade --background black", "--classify flat", "--lod-pixels 2.5", "--scalar-bar --outline",
+        "--shade", "--background black", "--classify flat", "--lod-pixels 2.5", "--scalar-bar --outline",
         "--position 0.1,-3,0.6666666666666666", "--surface /a/wing.stl", "--surface-colour '#ff8000'",
         "--slice 0,0.25,0,0,-1,2", "--slice-opacity 0.5", "--volume off"})
     EXPECT_NE(command.find(part), std::string::npos) << command << " lacks " << part;
