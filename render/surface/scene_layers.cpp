@@ -15,8 +15,8 @@
 namespace curvisplat {
 namespace {
 
-// Samples of one surface belong to one layer if their depths differ by no more than the surface is steep, and no
-// more than so many pixels.
+// Samples of one surface belong to one layer if their depths differ by no more than its slope explains, and by no
+// more than this many pixels.
 constexpr double kSteepest = 4;
 constexpr int kMostShaded = 3;  // triangles of a pixel and layer
 

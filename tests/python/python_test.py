@@ -123,7 +123,7 @@ class CachesAreDescribed(PythonTest):
         with curvisplat.open(self.cache) as cache:
             self.assertEqual(cache.blocks, (("block 1", 48, 40, 24),))
             self.assertEqual(cache.samples, 48 * 40 * 24)
-            self.assertEqual(cache.splats, cache.samples - 39 * 24)  # the wake closes around its cylinder
+            self.assertEqual(cache.splats, cache.samples - 40 * 24)  # the wake closes around its cylinder
             lower, upper = cache.bounds
             self.assertTrue((lower < upper).all())
             inside = cache.probe((lower + upper) / 2)

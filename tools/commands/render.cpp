@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <glm/geometric.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -28,6 +27,7 @@
 #include "tools/commands/empty_picture.h"
 #include "tools/commands/render_statistics.h"
 #include "tools/options/camera_motion.h"
+#include "tools/options/frame_arguments.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/picture_choice.h"
 #include "tools/options/scalar_arguments.h"
@@ -50,97 +50,14 @@ struct RenderArguments {
   ScalarArguments scalar;
   SurfaceArguments surfaces;
   StepArguments steps;
-  std::string size = "600x600", background = "white";
-  std::string classify = "pixel", scale = "1,1,1", backend = "auto", memory = "512M";
-  std::string lod_pixels = "1";
-  std::optional<std::string> clip_box, frame_rate, max_splats;
-  std::vector<std::string> clip_planes;
-  bool shade = false;
-  std::optional<std::string> light, light_direction;
-  unsigned threads = 0;
-  bool keep_going = false;
+  FrameArguments frame;
+  std::string backend = "auto";
+  std::optional<std::string> frame_rate;
   Annotations annotations;
 };
 
 bool severalFrames(const RenderArguments& arguments) {
   return arguments.camera.moves() || arguments.steps.severalSteps();
-}
-
-WorldBox parseClipBox(const std::string& text) {
-  const auto n = parseNumbers("--clip-box", text, "x0,x1,y0,y1,z0,z1");
-  const WorldBox box{{n[0], n[2], n[4]}, {n[1], n[3], n[5]}};
-  for (int axis = 0; axis < 3; ++axis)
-    if (box.lower[axis] > box.upper[axis])
-      throw UsageError("--clip-box {}: the {} range is reversed (found {},{}; expected the smaller first)",
-                       text, "xyz"[axis], box.lower[axis], box.upper[axis]);
-  return box;
-}
-
-std::vector<ClipPlane> parseClipPlanes(const std::vector<std::string>& texts) {
-  if (texts.size() > kMaxClipPlanes)
-    throw UsageError("--clip-plane: given {} times; at most {} planes cut a picture", texts.size(),
-                     kMaxClipPlanes);
-  std::vector<ClipPlane> planes;
-  for (const std::string& text : texts) {
-    const auto n = parseNumbers("--clip-plane", text, "px,py,pz,nx,ny,nz");
-    const ClipPlane plane{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
-    if (!isUsable(plane))
-      throw UsageError("--clip-plane {}: the normal nx,ny,nz has no direction; give one that is not 0,0,0",
-                       text);
-    planes.push_back(plane);
-  }
-  return planes;
-}
-
-std::optional<Light> parseLight(const RenderArguments& arguments) {
-  if (!arguments.shade && !arguments.light && !arguments.light_direction) return std::nullopt;
-  Light light;
-  if (arguments.light) {
-    const auto n = parseNumbers("--light", *arguments.light, "ambient,diffuse,specular");
-    for (const double strength : n)
-      if (!(strength >= 0 && strength <= 1))
-        throw UsageError("--light {}: expected three numbers between 0 and 1", *arguments.light);
-    if (n[0] + n[1] > 1)
-      throw UsageError("--light {}: ambient and diffuse add up to {}; expected at most 1", *arguments.light,
-                       n[0] + n[1]);
-    light.ambient = static_cast<float>(n[0]);
-    light.diffuse = static_cast<float>(n[1]);
-    light.specular = static_cast<float>(n[2]);
-  }
-  if (arguments.light_direction) {
-    light.towards = parsePoint("--light-direction", *arguments.light_direction);
-    if (!(glm::length(*light.towards) > 0))
-      throw UsageError("--light-direction {}: expected a direction that is not 0,0,0",
-                       *arguments.light_direction);
-  }
-  return light;
-}
-
-constexpr double kMinScale = 1e-6, kMaxScale = 1e6;
-
-FrameOptions frameOptions(const RenderArguments& arguments) {
-  FrameOptions options;
-  options.size = parseImageSize("--size", arguments.size);
-  options.lod_pixels = parseNumber("--lod-pixels", arguments.lod_pixels);
-  if (options.lod_pixels < 0)
-    throw UsageError("--lod-pixels {}: expected 0 (the finest level) or more", arguments.lod_pixels);
-  if (arguments.max_splats) options.max_splats = parseCount("--max-splats", *arguments.max_splats);
-  if (arguments.classify != "pixel" && arguments.classify != "flat")
-    throw UsageError("--classify {}: expected pixel or flat", arguments.classify);
-  options.classification = arguments.classify == "pixel" ? Classification::kPixel : Classification::kFlat;
-  options.scale = parsePoint("--scale", arguments.scale);
-  for (int axis = 0; axis < 3; ++axis)
-    if (!(options.scale[axis] >= kMinScale && options.scale[axis] <= kMaxScale))
-      throw UsageError("--scale {}: expected three numbers between {:g} and {:g}", arguments.scale, kMinScale,
-                       kMaxScale);
-  if (arguments.clip_box) options.clip_box = parseClipBox(*arguments.clip_box);
-  options.clip_planes = parseClipPlanes(arguments.clip_planes);
-  options.light = parseLight(arguments);
-  options.background = parseBackground("--background", arguments.background);
-  options.threads = arguments.threads;
-  options.memory_bytes = parseMemory("--memory", arguments.memory);
-  options.keep_going = arguments.keep_going;
-  return options;
 }
 
 /// Throws UsageError if options contradict each other, and Error if an output cannot be written.
@@ -151,7 +68,7 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
   checkOutputName(arguments.output, severalFrames(arguments), size);
   if (arguments.frame_rate && !isMovieName(arguments.output))
     throw UsageError("--frame-rate needs a movie: -o NAME.mp4");
-  if (arguments.background == "transparent" && arguments.output.extension() != ".png" &&
+  if (arguments.frame.background == "transparent" && arguments.output.extension() != ".png" &&
       arguments.output.extension() != ".exr")
     throw UsageError("--background transparent: {} files have no transparency; use .png or .exr",
                      arguments.output.extension().string());
@@ -337,7 +254,7 @@ void printResult(const RenderReport& report) {
 }
 
 void render(const RenderArguments& arguments) {
-  FrameOptions options = frameOptions(arguments);
+  FrameOptions options = frameOptions(arguments.frame);
   checkArguments(arguments, options.size);
   if (options.threads == 0) options.threads = std::max(1u, std::thread::hardware_concurrency());
   const double frames_per_s =
@@ -406,57 +323,57 @@ void addRender(CLI::App& app) {
           "-o,--output", arguments->output,
           "Picture to write: .png, .exr or .pfm. Of several frames: frame_%04d.png, or NAME.mp4 (by ffmpeg)")
       ->required();
-  command->add_option("--size", arguments->size, "Size of the picture, WIDTHxHEIGHT in pixels")
+  command->add_option("--size", arguments->frame.size, "Size of the picture, WIDTHxHEIGHT in pixels")
       ->capture_default_str();
   addScalarOption(*command, arguments->scalar);
 
   const std::string what = "Data and colours";
   addFunctionOptions(*command, arguments->scalar, what);
   command
-      ->add_option("--classify", arguments->classify,
+      ->add_option("--classify", arguments->frame.classify,
                    "Classification: pixel (colour varies within a splat) or flat (one colour per splat)")
       ->capture_default_str()
       ->group(what);
   command
-      ->add_option("--lod-pixels", arguments->lod_pixels,
+      ->add_option("--lod-pixels", arguments->frame.lod_pixels,
                    "Largest screen error of merged splats, in pixels; 0 draws the finest level")
       ->capture_default_str()
       ->group(what);
   command
       ->add_option(
-          "--max-splats", arguments->max_splats,
+          "--max-splats", arguments->frame.max_splats,
           "Splat limit, such as 8M or 500K; the largest screen error is refined first (default: no limit)")
       ->group(what);
-  command->add_option("--scale", arguments->scale, "Scale factors sx,sy,sz of the data")
+  command->add_option("--scale", arguments->frame.scale, "Scale factors sx,sy,sz of the data")
       ->capture_default_str()
       ->group(what);
   command
-      ->add_option("--clip-box", arguments->clip_box,
+      ->add_option("--clip-box", arguments->frame.clip_box,
                    "Box x0,x1,y0,y1,z0,z1 outside which nothing is drawn, in coordinates before --scale")
       ->group(what);
   command
       ->add_option(
-          "--clip-plane", arguments->clip_planes,
+          "--clip-plane", arguments->frame.clip_planes,
           "Plane px,py,pz,nx,ny,nz through the point p: nothing is drawn behind it, where the normal n "
           "does not point. In coordinates before --scale; repeatable, up to 6")
       ->take_all()
       ->allow_extra_args(false)
       ->group(what);
   command
-      ->add_flag("--shade", arguments->shade,
+      ->add_flag("--shade", arguments->frame.shade,
                  "Light the scalar's level surfaces, from where the viewer is, so that shapes stand out")
       ->group(what);
   command
-      ->add_option("--light", arguments->light,
+      ->add_option("--light", arguments->frame.light,
                    "Strengths ambient,diffuse,specular of the light, each 0 to 1 (default: 0.3,0.7,0.25); "
                    "implies --shade")
       ->group(what);
   command
-      ->add_option("--light-direction", arguments->light_direction,
+      ->add_option("--light-direction", arguments->frame.light_direction,
                    "Direction x,y,z towards the light, after --scale (default: the viewer); implies --shade")
       ->group(what);
   command
-      ->add_option("--background", arguments->background,
+      ->add_option("--background", arguments->frame.background,
                    "Background colour: white, black, transparent or #rrggbb")
       ->capture_default_str()
       ->group(what);
@@ -517,10 +434,10 @@ void addRender(CLI::App& app) {
                    "Drawing back end: auto, osmesa, egl or cpu; see info --system")
       ->capture_default_str()
       ->group(how);
-  command->add_option("--memory", arguments->memory, "Memory limit for drawing, such as 512M or 2G")
+  command->add_option("--memory", arguments->frame.memory, "Memory limit for drawing, such as 512M or 2G")
       ->capture_default_str()
       ->group(how);
-  command->add_option("--threads", arguments->threads, "Number of worker threads; 0: one per core")
+  command->add_option("--threads", arguments->frame.threads, "Number of worker threads; 0: one per core")
       ->check(CLI::Range(0u, kMaxThreads))
       ->capture_default_str()
       ->group(how);
@@ -530,7 +447,7 @@ void addRender(CLI::App& app) {
           "Also write the first, coarse picture to this file as soon as it is drawn: .png, .exr or .pfm")
       ->group(how);
   command
-      ->add_flag("--keep-going", arguments->keep_going,
+      ->add_flag("--keep-going", arguments->frame.keep_going,
                  "Draw damaged bricks from a coarser level and print a warning, instead of failing")
       ->group(how);
   command

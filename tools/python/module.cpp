@@ -18,6 +18,7 @@
 #include "stream/base/error.h"
 #include "stream/cache/probe.h"
 #include "tools/options/convert_arguments.h"
+#include "tools/options/frame_arguments.h"
 #include "tools/options/option_parsers.h"
 #include "tools/python/array_source.h"
 #include "tools/python/interruptible.h"
@@ -59,54 +60,23 @@ glm::dvec3 vectorOf(const std::array<double, 3>& v) {
   return {v[0], v[1], v[2]};
 }
 
-/// Sets what `frame` has of the options.
-FrameOptions frameOptions(const py::dict& frame) {
-  FrameOptions options;
-  const auto size = py::cast<std::array<int, 2>>(frame["size"]);
-  options.size = parseImageSize("size", fmt::format("{}x{}", size[0], size[1]));
-  options.lod_pixels = py::cast<double>(frame["lod_pixels"]);
-  if (!(options.lod_pixels >= 0))
-    throw UsageError("lod_pixels is {}; expected 0 (the finest level) or more", options.lod_pixels);
-  options.max_splats = py::cast<std::optional<uint64_t>>(frame["max_splats"]);
-  options.scale = vectorOf(py::cast<std::array<double, 3>>(frame["scale"]));
-  for (int axis = 0; axis < 3; ++axis)
-    if (!(options.scale[axis] >= 1e-6 && options.scale[axis] <= 1e6))
-      throw UsageError("scale has the factor {}; expected three numbers between 1e-06 and 1e+06",
-                       options.scale[axis]);
-  if (!frame["clip_box"].is_none()) {
-    const auto n = py::cast<std::array<double, 6>>(frame["clip_box"]);
-    options.clip_box = WorldBox{{n[0], n[2], n[4]}, {n[1], n[3], n[5]}};
-    for (int axis = 0; axis < 3; ++axis)
-      if (!(options.clip_box->lower[axis] <= options.clip_box->upper[axis]))
-        throw UsageError("clip_box: the {} range is reversed; expected (x0, x1, y0, y1, z0, z1)",
-                         "xyz"[axis]);
-  }
-  for (const auto& n : py::cast<std::vector<std::array<double, 6>>>(frame["clip_planes"])) {
-    options.clip_planes.push_back({{n[0], n[1], n[2]}, {n[3], n[4], n[5]}});
-    if (!isUsable(options.clip_planes.back()))
-      throw UsageError("clip_planes: the normal of plane {} has no direction", options.clip_planes.size());
-  }
-  if (options.clip_planes.size() > kMaxClipPlanes)
-    throw UsageError("clip_planes: {} planes; at most {} cut a picture", options.clip_planes.size(),
-                     kMaxClipPlanes);
-  if (!frame["light"].is_none()) {
-    const auto n = py::cast<std::array<double, 3>>(frame["light"]);
-    for (const double strength : n)
-      if (!(strength >= 0 && strength <= 1)) throw UsageError("light: {} is not between 0 and 1", strength);
-    if (n[0] + n[1] > 1)
-      throw UsageError("light: ambient and diffuse add up to {}; expected at most 1", n[0] + n[1]);
-    options.light = Light();
-    options.light->ambient = static_cast<float>(n[0]);
-    options.light->diffuse = static_cast<float>(n[1]);
-    options.light->specular = static_cast<float>(n[2]);
-    if (!frame["light_direction"].is_none())
-      options.light->towards = vectorOf(py::cast<std::array<double, 3>>(frame["light_direction"]));
-  }
-  options.background = parseBackground("background", py::cast<std::string>(frame["background"]));
-  options.threads = py::cast<unsigned>(frame["threads"]);
-  options.memory_bytes = parseMemory("memory", py::cast<std::string>(frame["memory"]));
-  options.keep_going = py::cast<bool>(frame["keep_going"]);
-  return options;
+FrameArguments frameArguments(const Options& frame, const std::vector<std::string>& clip_planes, bool shade,
+                              unsigned threads, bool keep_going) {
+  FrameArguments arguments;
+  arguments.size = frame.at("size");
+  arguments.background = frame.at("background");
+  arguments.scale = frame.at("scale");
+  arguments.memory = frame.at("memory");
+  arguments.lod_pixels = frame.at("lod_pixels");
+  arguments.clip_box = given(frame, "clip_box");
+  arguments.max_splats = given(frame, "max_splats");
+  arguments.clip_planes = clip_planes;
+  arguments.shade = shade;
+  arguments.light = given(frame, "light");
+  arguments.light_direction = given(frame, "light_direction");
+  arguments.threads = threads;
+  arguments.keep_going = keep_going;
+  return arguments;
 }
 
 py::dict statisticsOf(const FrameStatistics& statistics) {
@@ -121,11 +91,15 @@ py::dict statisticsOf(const FrameStatistics& statistics) {
   return out;
 }
 
+/// `frame`: text by option; clip_planes, shade, threads, keep_going and backend in `others`.
 py::tuple render(OpenCache& cache, const std::string& scalar, const Options& function, const Options& camera,
-                 const py::dict& frame, const py::object& progress) {
+                 const Options& frame, const py::dict& others, const py::object& progress) {
+  const FrameArguments of_frame = frameArguments(
+      frame, py::cast<std::vector<std::string>>(others["clip_planes"]), py::cast<bool>(others["shade"]),
+      py::cast<unsigned>(others["threads"]), py::cast<bool>(others["keep_going"]));
   const PictureArguments arguments{scalarArguments(scalar, function), cameraArguments(camera),
-                                   frameOptions(frame),
-                                   parseBackend(py::cast<std::string>(frame["backend"]))};
+                                   frameOptions(of_frame),
+                                   parseBackend(py::cast<std::string>(others["backend"]))};
   DrawnPicture picture = cache.render(arguments, progress);
   return py::make_tuple(picture.rgba, picture.chosen, picture.notes, statisticsOf(picture.statistics));
 }

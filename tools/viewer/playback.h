@@ -11,7 +11,7 @@ namespace curvisplat {
 
 class Playback {
  public:
-  /// Of a cache with so many steps.
+  /// `steps`: how many the cache has.
   explicit Playback(uint64_t steps) : steps_(steps) {}
 
   uint64_t steps() const { return steps_; }
@@ -20,7 +20,7 @@ class Playback {
   bool loops() const { return loops_; }
   double stepsPerSecond() const { return steps_per_s_; }
 
-  /// Goes to a step, or the last if there are not so many. Returns whether that changes it.
+  /// Goes to a step, or to the last one if it lies behind it. Returns whether that changes the step.
   bool goTo(uint64_t step);
   /// Goes one step on or back; at an end to the other end if it loops. Returns whether that changes it.
   bool advance(bool forwards);

@@ -157,7 +157,7 @@ class Cache:
                view: Optional[str] = None, position: Optional[Vector] = None, focal_point: Optional[Vector] = None,
                view_up: Optional[Vector] = None, parallel_scale: Optional[float] = None,
                view_angle: Optional[float] = None, scale: Vector = (1, 1, 1), clip_box: Optional[Vector] = None,
-               clip_planes: Sequence[Vector] = (), shade: bool = False, light: Vector = (0.3, 0.7, 0.25),
+               clip_planes: Sequence[Vector] = (), shade: bool = False, light: Optional[Vector] = None,
                light_direction: Optional[Vector] = None, background: str = "white", lod_pixels: float = 1,
                max_splats: Optional[int] = None, memory: Union[str, int] = "512M", threads: int = 0,
                backend: str = "auto", keep_going: bool = False, progress: Optional[Progress] = None) -> Picture:
@@ -172,8 +172,8 @@ class Cache:
         view: iso, +x, -x, +y, -y, +z or -z; or a camera by position, focal_point, view_up and parallel_scale (half the
         picture's height) or view_angle (perspective, degrees).
         scale: factors of the data along x, y, z. clip_box: (x0, x1, y0, y1, z0, z1). clip_planes: (px, py, pz, nx, ny, nz)
-        each; nothing is drawn where n does not point. shade: light level surfaces with `light` = (ambient, diffuse,
-        specular), from the viewer or from light_direction.
+        each; nothing is drawn where n does not point. shade: light level surfaces from the viewer; light: (ambient, diffuse,
+        specular), and light_direction turn it on, too.
         lod_pixels: the largest error of a merged splat on the screen; 0 draws the finest level. memory: the limit, in
         bytes or as "512M". progress: called with (phase, done, total, unit).
 
@@ -185,12 +185,12 @@ class Cache:
             function["opacity"] = _opacities(opacity)
         camera = _given(view=view, position=position, focal_point=focal_point, view_up=view_up,
                         parallel_scale=parallel_scale, view_angle=view_angle)
-        lit = shade or light_direction is not None
-        frame = {"size": tuple(size), "lod_pixels": lod_pixels, "max_splats": max_splats, "scale": tuple(scale),
-                 "clip_box": clip_box, "clip_planes": list(clip_planes), "light": tuple(light) if lit else None,
-                 "light_direction": light_direction, "background": background, "threads": threads,
-                 "memory": str(memory), "backend": backend, "keep_going": keep_going}
-        rgba, options, notes, statistics = self._core.render(scalar, function, camera, frame, progress)
+        frame = _given(size="{}x{}".format(*size), background=background, scale=scale, memory=str(memory),
+                       lod_pixels=lod_pixels, clip_box=clip_box, light=light, light_direction=light_direction,
+                       max_splats=None if max_splats is None else str(max_splats))
+        others = {"clip_planes": [_numbers(plane) for plane in clip_planes], "shade": shade, "threads": threads,
+                  "keep_going": keep_going, "backend": backend}
+        rgba, options, notes, statistics = self._core.render(scalar, function, camera, frame, others, progress)
         picture = rgba.view(Picture)
         picture.options, picture.notes, picture.statistics = options, notes, statistics
         return picture

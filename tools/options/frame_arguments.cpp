@@ -1,0 +1,91 @@
+#include "tools/options/frame_arguments.h"
+
+#include <glm/geometric.hpp>
+
+#include "render/project/light.h"
+#include "stream/base/error.h"
+#include "tools/options/option_parsers.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr double kMinScale = 1e-6, kMaxScale = 1e6;
+
+WorldBox parseClipBox(const std::string& text) {
+  const auto n = parseNumbers("--clip-box", text, "x0,x1,y0,y1,z0,z1");
+  const WorldBox box{{n[0], n[2], n[4]}, {n[1], n[3], n[5]}};
+  for (int axis = 0; axis < 3; ++axis)
+    if (box.lower[axis] > box.upper[axis])
+      throw UsageError("--clip-box {}: the {} range is reversed (found {},{}; expected the smaller first)",
+                       text, "xyz"[axis], box.lower[axis], box.upper[axis]);
+  return box;
+}
+
+std::vector<ClipPlane> parseClipPlanes(const std::vector<std::string>& texts) {
+  if (texts.size() > kMaxClipPlanes)
+    throw UsageError("--clip-plane: given {} times; at most {} planes cut a picture", texts.size(),
+                     kMaxClipPlanes);
+  std::vector<ClipPlane> planes;
+  for (const std::string& text : texts) {
+    const auto n = parseNumbers("--clip-plane", text, "px,py,pz,nx,ny,nz");
+    const ClipPlane plane{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
+    if (!isUsable(plane))
+      throw UsageError("--clip-plane {}: the normal nx,ny,nz has no direction; give one that is not 0,0,0",
+                       text);
+    planes.push_back(plane);
+  }
+  return planes;
+}
+
+std::optional<Light> parseLight(const FrameArguments& arguments) {
+  if (!arguments.shade && !arguments.light && !arguments.light_direction) return std::nullopt;
+  Light light;
+  if (arguments.light) {
+    const auto n = parseNumbers("--light", *arguments.light, "ambient,diffuse,specular");
+    for (const double strength : n)
+      if (!(strength >= 0 && strength <= 1))
+        throw UsageError("--light {}: expected three numbers between 0 and 1", *arguments.light);
+    if (n[0] + n[1] > 1)
+      throw UsageError("--light {}: ambient and diffuse add up to {}; expected at most 1", *arguments.light,
+                       n[0] + n[1]);
+    light.ambient = static_cast<float>(n[0]);
+    light.diffuse = static_cast<float>(n[1]);
+    light.specular = static_cast<float>(n[2]);
+  }
+  if (arguments.light_direction) {
+    light.towards = parsePoint("--light-direction", *arguments.light_direction);
+    if (!(glm::length(*light.towards) > 0))
+      throw UsageError("--light-direction {}: expected a direction that is not 0,0,0",
+                       *arguments.light_direction);
+  }
+  return light;
+}
+
+}  // namespace
+
+FrameOptions frameOptions(const FrameArguments& arguments) {
+  FrameOptions options;
+  options.size = parseImageSize("--size", arguments.size);
+  options.lod_pixels = parseNumber("--lod-pixels", arguments.lod_pixels);
+  if (options.lod_pixels < 0)
+    throw UsageError("--lod-pixels {}: expected 0 (the finest level) or more", arguments.lod_pixels);
+  if (arguments.max_splats) options.max_splats = parseCount("--max-splats", *arguments.max_splats);
+  if (arguments.classify != "pixel" && arguments.classify != "flat")
+    throw UsageError("--classify {}: expected pixel or flat", arguments.classify);
+  options.classification = arguments.classify == "pixel" ? Classification::kPixel : Classification::kFlat;
+  options.scale = parsePoint("--scale", arguments.scale);
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(options.scale[axis] >= kMinScale && options.scale[axis] <= kMaxScale))
+      throw UsageError("--scale {}: expected three numbers between {:g} and {:g}", arguments.scale, kMinScale,
+                       kMaxScale);
+  if (arguments.clip_box) options.clip_box = parseClipBox(*arguments.clip_box);
+  options.clip_planes = parseClipPlanes(arguments.clip_planes);
+  options.light = parseLight(arguments);
+  options.background = parseBackground("--background", arguments.background);
+  options.threads = arguments.threads;
+  options.memory_bytes = parseMemory("--memory", arguments.memory);
+  options.keep_going = arguments.keep_going;
+  return options;
+}
+
+}  // namespace curvisplat
