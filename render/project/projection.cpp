@@ -21,7 +21,6 @@ namespace curvisplat {
 namespace {
 
 constexpr size_t kBlock = 256;  // splats at a time: the arrays between the two loops stay in the L1 cache
-constexpr auto kSupport = static_cast<float>(kKernelSupport);
 
 /// The results that the arithmetic loop passes to the loop that chooses.
 struct Block {
