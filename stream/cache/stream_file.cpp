@@ -35,6 +35,12 @@ void beginVariableFile(OutputFile& file) {
   file.append(bytesOf(VariableHeader{}));
 }
 
+void appendValues(OutputFile& file, const EncodedValues& values, BrickVariable& record) {
+  CURVISPLAT_CHECK_OP(record.values.length, ==, 0u);
+  record = values.variable;
+  record.values.offset = appendStream(file, values.bytes);
+}
+
 FileInfo finishVariableFile(OutputFile& file, const std::string& name, std::span<const BrickVariable> table) {
   std::vector<VariableRecord> records;
   records.reserve(table.size());

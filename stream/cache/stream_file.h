@@ -9,6 +9,7 @@
 
 #include "stream/base/file.h"
 #include "stream/cache/manifest.h"
+#include "stream/codec/brick_codec.h"
 #include "stream/model/brick.h"
 
 namespace curvisplat {
@@ -31,6 +32,9 @@ uint64_t appendStream(OutputFile& file, std::span<const std::byte> stream);
 
 /// Begins a var.<number>.bin: reserves space for the header, which finishVariableFile() writes.
 void beginVariableFile(OutputFile& file);
+
+/// Appends the values of a brick and fills its record in the table; once for each brick.
+void appendValues(OutputFile& file, const EncodedValues& values, BrickVariable& record);
 
 /// Appends the table, writes the header and closes the file. `table` is in the order of bricks.bin. `name`:
 /// the file's name in the manifest. Returns the manifest's entry.

@@ -62,12 +62,7 @@ void VariableWriter::removeLeftovers() const {
 
 void VariableWriter::append(uint32_t brick, std::span<const EncodedValues> values) {
   CURVISPLAT_CHECK_OP(values.size(), ==, files_.size());
-  for (size_t n = 0; n < values.size(); ++n) {
-    BrickVariable& record = files_[n].table[brick];
-    CURVISPLAT_CHECK_OP(record.values.length, ==, 0u);
-    record = values[n].variable;
-    record.values.offset = appendStream(files_[n].file, values[n].bytes);
-  }
+  for (size_t n = 0; n < values.size(); ++n) appendValues(files_[n].file, values[n], files_[n].table[brick]);
 }
 
 std::vector<FileInfo> VariableWriter::finish(const std::vector<std::string>& sources) {
