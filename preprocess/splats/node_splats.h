@@ -65,7 +65,7 @@ uint32_t borderCode(const std::array<double, 3>& inwards, bool faces, const Rota
 /// The growth code of a cell that grows by `growth` along i, j and k. `rotate` gives Q's image of a vector.
 template <typename Rotate>
 uint32_t growthCode(const std::array<float, 3>& growth, const Rotate& rotate) {
-  constexpr float kLeast = 1.0f / 32;  // less becomes none
+  constexpr float kLeast = 1.0f / 64;  // less becomes none
   if (std::max({std::abs(growth[0]), std::abs(growth[1]), std::abs(growth[2])}) < kLeast) return kNoGrowth;
   const glm::dmat3 axes(1.0);
   return packGrowthCode({rotate(axes[0]), rotate(axes[1]), rotate(axes[2])},

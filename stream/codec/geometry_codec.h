@@ -17,7 +17,7 @@
 //                  is V = 0.
 //   border codes   the four bytes of the code (stream/model/border_code.h), lowest first; absent (no
 //                  kHasBorders) if the brick has none
-//   growth codes   bits 0-14 of the code (stream/model/growth_code.h), then its other bits; absent (no kHasGrowth)
+//   growth codes   bits 0-17 of the code (stream/model/growth_code.h), then its other bits; absent (no kHasGrowth)
 //                  if the brick has none
 //
 // Shapes or weights that do not fit these codes are stored as raw 64-bit floats (kRawShapes, kRawWeights).
@@ -37,7 +37,7 @@
 namespace curvisplat {
 
 inline constexpr uint8_t kRawShapes = 1, kRawWeights = 2, kHasBorders = 4, kHasGrowth = 8;
-inline constexpr int kGrowthBitsOfFirstArray = 15;
+inline constexpr int kGrowthBitsOfFirstArray = 18;
 inline constexpr size_t kLargestGeometryArrays = 3 + 12 + 2 + 4 + 2;
 
 struct GeometryHeader {

@@ -10,9 +10,9 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kGrowthSteps = 16;
-constexpr int kLargestGrowth = 10;  // in steps
-constexpr int kGrowthBits = 5;
+constexpr double kGrowthSteps = 32;
+constexpr int kLargestGrowth = 20;  // in steps
+constexpr int kGrowthBits = 6;
 constexpr double kRotationStep = 0.08;
 constexpr int kLargestRotation = 7;  // in steps
 constexpr int kRotationBits = 4, kRotationShift = 3 * kGrowthBits;

@@ -14,10 +14,10 @@
 //     symmetric kernel       1.027   1.062   1.116
 //     skewed                 1.003   1.008   1.025
 //
-//   bits 0-4, 5-9, 10-14    g_a in steps of 1/16, -10 to 10, in two's complement
-//        15-18, 19-22, 23-26    x, y, z of the quaternion that takes the frame's axes to ê_a, in steps of
+//   bits 0-5, 6-11, 12-17       g_a in steps of 1/32, -20 to 20, in two's complement
+//        18-21, 22-25, 26-29    x, y, z of the quaternion that takes the frame's axes to ê_a, in steps of
 //                               0.08, -7 to 7; w > 0 follows
-//        27-31              zero
+//        30-31                  zero
 //
 // The order of the axes and their signs are chosen so that the rotation is small. No growth is zero.
 #pragma once

@@ -315,7 +315,7 @@ TEST(Codec, RefusesGrowthThatIsNone) {
   const RootCube root{};
   BrickSplats brick = randomBrick({}, Cell{}, 6);
   brick.growth_codes.assign(brick.size(), kNoGrowth);
-  brick.growth_codes[1] = 11;  // a growth beyond the largest
+  brick.growth_codes[1] = 21;  // a growth beyond the largest
   const EncodedBrick encoded = encodeBrick(root, brick);
   SplatGeometry floats;
   EXPECT_THROW(decodeGeometry(root, encoded.brick, encoded.geometry, floats), Error);

@@ -59,7 +59,7 @@ TEST(GrowthCode, KeepsTheThirdMoment) {
 TEST(GrowthCode, AlongTheFramesOwnAxesIsWithoutRotation) {
   const Axes frame{glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)};
   const uint32_t along_z = packGrowthCode(frame, {0, 0, 0.25});
-  EXPECT_EQ(along_z, 4u << 10);
+  EXPECT_EQ(along_z, 8u << 12);
   // The same moment, seen from other axes.
   EXPECT_EQ(packGrowthCode({-frame[2], frame[0], frame[1]}, {-0.25, 0, 0}), along_z);
   const uint32_t all = packGrowthCode(frame, {0.25, -0.125, 0.0625});
@@ -72,19 +72,19 @@ TEST(GrowthCode, AlongTheFramesOwnAxesIsWithoutRotation) {
 
 TEST(GrowthCode, OfLittleGrowthIsNone) {
   const Axes frame{glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)};
-  EXPECT_EQ(packGrowthCode(frame, {0.03, -0.03, 0}), kNoGrowth);
-  EXPECT_NE(packGrowthCode(frame, {0.04, 0, 0}), kNoGrowth);
+  EXPECT_EQ(packGrowthCode(frame, {0.015, -0.015, 0}), kNoGrowth);
+  EXPECT_NE(packGrowthCode(frame, {0.02, 0, 0}), kNoGrowth);
   EXPECT_EQ(cellGrowth(packGrowthCode(frame, {9, 0, 0})).growth[0], 0.625f);
   for (const float growth : cellGrowth(kNoGrowth).growth) EXPECT_EQ(growth, 0);
 }
 
 TEST(GrowthCode, IsRefusedWhereNothingPacksToIt) {
   EXPECT_TRUE(isPossibleGrowthCode(kNoGrowth));
-  EXPECT_TRUE(isPossibleGrowthCode(10));
-  EXPECT_FALSE(isPossibleGrowthCode(11));            // a growth beyond the largest
-  EXPECT_FALSE(isPossibleGrowthCode(1u << 15));      // a rotation without growth
-  EXPECT_FALSE(isPossibleGrowthCode(1 | 8u << 15));  // -8
-  EXPECT_FALSE(isPossibleGrowthCode(1 | 1u << 27));
+  EXPECT_TRUE(isPossibleGrowthCode(20));
+  EXPECT_FALSE(isPossibleGrowthCode(21));            // a growth beyond the largest
+  EXPECT_FALSE(isPossibleGrowthCode(1u << 18));      // a rotation without growth
+  EXPECT_FALSE(isPossibleGrowthCode(1 | 8u << 18));  // -8
+  EXPECT_FALSE(isPossibleGrowthCode(1 | 1u << 30));
 }
 
 }  // namespace

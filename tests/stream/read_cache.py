@@ -181,8 +181,8 @@ def decode_geometry(data, brick, root):
     out["growth"] = np.zeros(count, np.uint64)
     if flags & GROWTH:
         growth, rotation = contents.values(), contents.values()
-        need(growth.max() < 1 << 15 and rotation.max() < 1 << 12, "growth code")
-        out["growth"] = growth | rotation << np.uint64(15)
+        need(growth.max() < 1 << 18 and rotation.max() < 1 << 12, "growth code")
+        out["growth"] = growth | rotation << np.uint64(18)
     return out
 
 
