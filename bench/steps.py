@@ -56,7 +56,10 @@ def main():
     parser.add_argument("--steps", type=int, default=12)
     parser.add_argument("--memory", default="512M")
     parser.add_argument("--json")
+    parser.add_argument("--smoke", action="store_true", help="a small grid and three steps: whether it runs, not how fast")
     arguments = parser.parse_args()
+    if arguments.smoke:
+        arguments.nodes, arguments.steps = "24x20x12", 3
     arguments.folder.mkdir(parents=True, exist_ok=True)
     out = results.Results()
     for name, moving in (("fixed", False), ("moving", True)):
