@@ -61,6 +61,13 @@ bool severalFrames(const RenderArguments& arguments) {
   return arguments.camera.moves() || arguments.steps.severalSteps();
 }
 
+/// Several steps share a function; a path may go through all of them.
+ChosenFor drawnSteps(const RenderArguments& arguments) {
+  const StepArguments& steps = arguments.steps;
+  const bool may_follow_path = !arguments.camera.path.empty() && !steps.step && !steps.time;
+  return steps.severalSteps() || may_follow_path ? ChosenFor::kSeries : ChosenFor::kStep;
+}
+
 /// Throws UsageError if options contradict each other, and Error if an output cannot be written.
 void checkArguments(const RenderArguments& arguments, ImageSize size) {
   checkMotionArguments(arguments.camera, arguments.steps);
@@ -270,10 +277,11 @@ void render(const RenderArguments& arguments) {
   const size_t variable = chooseVariable(cache, arguments.scalar);
   const VariableInfo& info = manifest.variables[variable];
   const glm::dvec3 lower = manifest.lower * options.scale, upper = manifest.upper * options.scale;
-  PictureChoice choice(cache, variable, options.scale);
+  const ChosenFor drawn = drawnSteps(arguments);
+  PictureChoice choice(cache, variable, options.scale, drawn);
   const TransferFunction transfer_function = choice.function(arguments.scalar);
   for (const std::string& note : transfer_function.notes()) printMessage("note: {}", note);
-  const std::string range_warning = rangeMissesScalar(info, transfer_function);
+  const std::string range_warning = rangeMissesScalar(variableFor(cache, variable, drawn), transfer_function);
   if (!range_warning.empty()) printMessage("warning: {}", range_warning);
 
   options.scene = sceneOf(arguments.surfaces);
