@@ -19,7 +19,7 @@ Camera orbited(const Camera& camera, double degrees);
 struct KeyFrame {
   double time = 0;
   Camera camera;
-  std::optional<double> series_time;  // of the time steps that are drawn
+  std::optional<double> series_time = std::nullopt;  // of the time steps that are drawn
 };
 
 /// A smooth path that passes through each key frame exactly.

@@ -207,12 +207,12 @@ class CacheReader::State::ValuesDecoder {
     const uint64_t at = of_step - back;
     for (const Earlier& known : earlier_)
       if (known.step == at) return arraysOf(*known.values);
-    KeptValues::Values values = of_.kept ? of_.kept->find(of_.at(at)) : nullptr;
-    if (!values) {
-      values = read(at);
-      if (of_.kept) of_.kept->keep(of_.at(at), values);
+    KeptValues::Values known = of_.kept ? of_.kept->find(of_.at(at)) : nullptr;
+    if (!known) {
+      known = read(at);
+      if (of_.kept) of_.kept->keep(of_.at(at), known);
     }
-    earlier_.push_back({at, std::move(values)});
+    earlier_.push_back({at, std::move(known)});
     return arraysOf(*earlier_.back().values);
   }
 
@@ -222,10 +222,10 @@ class CacheReader::State::ValuesDecoder {
     std::vector<std::byte> stream(extent.length);
     State::readInto(file->file, of_.brick, extent, stream, of_.times);
     State::verify(file->file, of_.brick, extent, stream, of_.times);
-    auto values = std::make_shared<SplatVariable>();
-    values->resize(state_.folder->bricks()[of_.brick].splats);
-    decode(at, file->file, stream, arraysOf(*values));
-    return values;
+    auto decoded = std::make_shared<SplatVariable>();
+    decoded->resize(state_.folder->bricks()[of_.brick].splats);
+    decode(at, file->file, stream, arraysOf(*decoded));
+    return decoded;
   }
 
   [[noreturn]] void refuse(const InputFile& file, const std::string& what) const {
