@@ -108,13 +108,13 @@ class SeriesConversion {
   }
 
   void leaveOut(uint64_t number, const std::string& reason) {
-    const std::string step = fmt::format("step {} ({})", number, input_.name(number));
+    const std::string step = fmt::format("step {} ({})", input_.first_number + number, input_.name(number));
     if (!options_.keep_going)
-      throw Error("{}: {} does not fit: {}{}", options_.convert.output.string(), step, reason,
+      throw Error("{}: {} cannot be converted: {}{}", options_.convert.output.string(), step, reason,
                   times_.empty()
                       ? ""
                       : fmt::format("; the cache has the {} steps before it; --keep-going leaves out "
-                                    "steps that do not fit",
+                                    "such steps",
                                     times_.size()));
     ++sums_.left_out;
     report_event_({step, nullptr, nullptr, nullptr, reason});

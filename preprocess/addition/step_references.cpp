@@ -28,8 +28,10 @@ StepReferences::StepReferences(const CacheReader& cache) {
 TimeReferences StepReferences::of(uint32_t brick, size_t variable, Scratch& scratch) const {
   TimeReferences references;
   references.steps_back = steps_back_;
-  for (size_t n = 0; n < readers_.size(); ++n) {
-    readers_[n].readVariable(brick, variable, scratch.values[n]);
+  // The nearer one may be predicted from the one further back, which comes first.
+  KeptValues kept(readers_.size() > 1 ? KeptValues::charge(kMaxBrickSplats) : 0);
+  for (size_t n = readers_.size(); n-- > 0;) {
+    readers_[n].readVariable(brick, variable, scratch.values[n], nullptr, &kept);
     references.values[n] = arraysOf(std::as_const(scratch.values[n]));
   }
   return references;

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 namespace curvisplat {
 namespace {
 
 constexpr uint64_t kMinSplats = 50'000;
 constexpr size_t kMinPoints = 300'000;
+constexpr uint64_t kMaxSteps = 5;
 
 /// A point of the unit cube, of a sequence that fills it evenly (Kronecker's, with powers of the root of
 /// x^5 = x + 1): the same in every run.
@@ -31,6 +33,49 @@ class CubePoints {
   std::array<double, 4> at_{};
 };
 
+/// What the points of several steps have in common.
+struct Sampling {
+  size_t variable;
+  glm::dvec3 scale;
+  float min, max;        // of the values
+  size_t points;         // of a splat
+  double volume_factor;  // of a splat's volume, for one of its points
+};
+
+/// Adds the points of these bricks at the reader's step.
+void addSamples(const CacheReader& cache, std::span<const uint32_t> bricks, const Sampling& of,
+                CubePoints& places, CoarseSamples& samples) {
+  const Manifest& manifest = cache.manifest();
+  SplatGeometry geometry;
+  SplatVariable values;
+  for (const uint32_t brick : bricks) {
+    try {
+      cache.readGeometry(brick, geometry);
+      cache.readVariable(brick, of.variable, values);
+    } catch (const DamagedBrick&) {
+      continue;  // drawing it reports it
+    }
+    const glm::dvec3 corner = manifest.root.cellMin(cache.bricks()[brick].cell);
+    for (size_t n = 0; n < values.size(); ++n) {
+      const double a0 = geometry.axis0[n], a1 = geometry.axis1[n], a2 = geometry.axis2[n];
+      const double l10 = geometry.shear10[n], l20 = geometry.shear20[n], l21 = geometry.shear21[n];
+      const double deviation = std::sqrt(12 * std::max(0.0, static_cast<double>(values.variance[n])));
+      const double volume = of.volume_factor * geometry.weight[n];
+      for (size_t point = 0; point < of.points; ++point) {
+        const auto [u, v, w, t] = places.next();
+        const glm::dvec3 offset(a0 * u, a0 * l10 * u + a1 * v, a0 * l20 * u + a1 * l21 * v + a2 * w);
+        const double value = values.mean[n] + values.slope0[n] * u + values.slope1[n] * v +
+                             values.slope2[n] * w + deviation * t;
+        samples.positions.push_back(
+            of.scale * (corner + glm::dvec3(geometry.x[n], geometry.y[n], geometry.z[n]) + offset));
+        samples.values.push_back(std::clamp(static_cast<float>(value), of.min, of.max));
+        samples.volumes.push_back(volume);
+        samples.volume += volume;
+      }
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<uint32_t> bricksAtALevel(const CacheReader& cache, uint64_t min_splats) {
@@ -51,48 +96,40 @@ std::vector<uint32_t> bricksAtALevel(const CacheReader& cache, uint64_t min_spla
   }
 }
 
-CoarseSamples coarseSamples(const CacheReader& cache, size_t variable, const glm::dvec3& scale) {
-  const Manifest& manifest = cache.manifest();
-  const VariableInfo& info = manifest.variables[variable];
-  const std::vector<uint32_t> chosen = bricksAtALevel(cache, kMinSplats);
+VariableInfo variableFor(const CacheReader& cache, size_t variable, ChosenFor what) {
+  const Manifest& manifest = what == ChosenFor::kSeries ? cache.seriesManifest() : cache.manifest();
+  return manifest.variables[variable];
+}
+
+CoarseSamples coarseSamples(const CacheReader& cache, size_t variable, const glm::dvec3& scale,
+                            ChosenFor what) {
+  const uint64_t of_series = cache.series().steps.size();
+  const uint64_t steps = what == ChosenFor::kSeries ? std::min(of_series, kMaxSteps) : 1;
+  const std::vector<uint32_t> chosen = bricksAtALevel(cache, kMinSplats / steps);
   size_t splats = 0;
-  for (const uint32_t brick : chosen) splats += cache.bricks()[brick].splats;
+  for (const uint32_t brick : chosen) splats += steps * cache.bricks()[brick].splats;
+  const VariableInfo info = variableFor(cache, variable, what);
   const size_t points = splats > 0 ? (kMinPoints + splats - 1) / splats : 1;
+  const double stretch = scale.x * scale.y * scale.z;
+  const Sampling sampling{variable,
+                          scale,
+                          static_cast<float>(info.min),
+                          static_cast<float>(info.max),
+                          points,
+                          stretch / static_cast<double>(points * steps)};
 
   CoarseSamples samples;
   samples.positions.reserve(splats * points);
   samples.values.reserve(splats * points);
   samples.volumes.reserve(splats * points);
-  const double stretch = scale.x * scale.y * scale.z;
-  const auto min = static_cast<float>(info.min), max = static_cast<float>(info.max);
   CubePoints places;
-  SplatGeometry geometry;
-  SplatVariable values;
-  for (const uint32_t brick : chosen) {
-    try {
-      cache.readGeometry(brick, geometry);
-      cache.readVariable(brick, variable, values);
-    } catch (const DamagedBrick&) {
-      continue;  // drawing it reports it
-    }
-    const glm::dvec3 corner = manifest.root.cellMin(cache.bricks()[brick].cell);
-    for (size_t n = 0; n < values.size(); ++n) {
-      const double a0 = geometry.axis0[n], a1 = geometry.axis1[n], a2 = geometry.axis2[n];
-      const double l10 = geometry.shear10[n], l20 = geometry.shear20[n], l21 = geometry.shear21[n];
-      const double deviation = std::sqrt(12 * std::max(0.0, static_cast<double>(values.variance[n])));
-      const double volume = stretch * geometry.weight[n] / static_cast<double>(points);
-      for (size_t point = 0; point < points; ++point) {
-        const auto [u, v, w, t] = places.next();
-        const glm::dvec3 offset(a0 * u, a0 * l10 * u + a1 * v, a0 * l20 * u + a1 * l21 * v + a2 * w);
-        const double value = values.mean[n] + values.slope0[n] * u + values.slope1[n] * v +
-                             values.slope2[n] * w + deviation * t;
-        samples.positions.push_back(
-            scale * (corner + glm::dvec3(geometry.x[n], geometry.y[n], geometry.z[n]) + offset));
-        samples.values.push_back(std::clamp(static_cast<float>(value), min, max));
-        samples.volumes.push_back(volume);
-        samples.volume += volume;
-      }
-    }
+  if (steps == 1) {
+    addSamples(cache, chosen, sampling, places, samples);
+    return samples;
+  }
+  for (uint64_t n = 0; n < steps; ++n) {
+    const CacheReader at_step = cache.atStep(n * (of_series - 1) / (steps - 1));
+    addSamples(at_step, bricksAtALevel(at_step, kMinSplats / steps), sampling, places, samples);
   }
   return samples;
 }

@@ -28,8 +28,16 @@ struct CoarseSamples {
 /// The bricks of the coarsest level with at least `min_splats` splats, including leaves above that level.
 std::vector<uint32_t> bricksAtALevel(const CacheReader& cache, uint64_t min_splats);
 
+/// What a choice is made for: the step that the reader is at, or the whole series, of which five steps at most stand
+/// for all.
+enum class ChosenFor { kStep, kSeries };
+
+/// The variable's range there.
+VariableInfo variableFor(const CacheReader& cache, size_t variable, ChosenFor what);
+
 /// `scale`: factors that positions are multiplied with. Damaged bricks are left out; throws Error if the disk
 /// fails. The same cache gives the same points.
-CoarseSamples coarseSamples(const CacheReader& cache, size_t variable, const glm::dvec3& scale);
+CoarseSamples coarseSamples(const CacheReader& cache, size_t variable, const glm::dvec3& scale,
+                            ChosenFor what = ChosenFor::kStep);
 
 }  // namespace curvisplat

@@ -46,11 +46,11 @@ size_t firstVaryingVariable(const Manifest& manifest) {
   return found == manifest.variables.end() ? 0 : static_cast<size_t>(found - manifest.variables.begin());
 }
 
-FirstChoice::FirstChoice(const CacheReader& cache, size_t variable, const glm::dvec3& scale)
-    : variable_(cache.manifest().variables[variable]),
+FirstChoice::FirstChoice(const CacheReader& cache, size_t variable, const glm::dvec3& scale, ChosenFor what)
+    : variable_(variableFor(cache, variable, what)),
       lower_(scale * cache.manifest().lower),
       upper_(scale * cache.manifest().upper),
-      samples_(coarseSamples(cache, variable, scale)),
+      samples_(coarseSamples(cache, variable, scale, what)),
       silhouette_(widestSilhouette(samples_)) {
   if (samples_.size() > 0) distribution_.emplace(samples_);
 }

@@ -33,7 +33,8 @@ struct ViewChoice {
 class FirstChoice {
  public:
   /// `scale`: factors that the data's positions are multiplied with. Throws Error as reading does.
-  FirstChoice(const CacheReader& cache, size_t variable, const glm::dvec3& scale);
+  FirstChoice(const CacheReader& cache, size_t variable, const glm::dvec3& scale,
+              ChosenFor what = ChosenFor::kStep);
 
   /// Range, opacities and opacity unit; `map`: a preset, or empty to have one chosen.
   FunctionParts function(const std::string& map = "") const;

@@ -92,7 +92,21 @@ CameraPath::CameraPath(std::vector<KeyFrame> key_frames, std::string name)
       throw Error(
           "{}: key frame {} is {} but the first one is not; all key frames need the same projection", name_,
           n, key_frames_[n].camera.projection == Projection::kPerspective ? "perspective" : "orthographic");
+    if (key_frames_[n].series_time.has_value() != key_frames_[0].series_time.has_value())
+      throw Error("{}: key frame {} has {} but the first one has {}; all key frames need it, or none", name_,
+                  n, key_frames_[n].series_time ? "a series_time" : "no series_time",
+                  key_frames_[0].series_time ? "one" : "none");
   }
+}
+
+double CameraPath::seriesTimeAt(double time) const {
+  const auto after = std::upper_bound(key_frames_.begin(), key_frames_.end(), time,
+                                      [](double t, const KeyFrame& key) { return t < key.time; });
+  if (after == key_frames_.begin()) return *key_frames_.front().series_time;
+  const KeyFrame& a = *(after - 1);
+  if (after == key_frames_.end()) return *a.series_time;
+  const double part = (time - a.time) / (after->time - a.time);
+  return *a.series_time + part * (*after->series_time - *a.series_time);
 }
 
 Camera CameraPath::at(double time) const {

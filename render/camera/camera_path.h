@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@ Camera orbited(const Camera& camera, double degrees);
 struct KeyFrame {
   double time = 0;
   Camera camera;
+  std::optional<double> series_time = std::nullopt;  // of the time steps that are drawn
 };
 
 /// A smooth path that passes through each key frame exactly.
@@ -41,6 +43,11 @@ class CameraPath {
   double end() const { return key_frames_.back().time; }
   /// `time` is clamped to [begin(), end()]. Throws Error if the camera coincides with its focal point then.
   Camera at(double time) const;
+
+  /// Whether the key frames have times of the series: all do, or none.
+  bool hasSeriesTimes() const { return key_frames_.front().series_time.has_value(); }
+  /// Linear between the key frames. Call it only if they have such times.
+  double seriesTimeAt(double time) const;
 
  private:
   std::vector<KeyFrame> key_frames_;

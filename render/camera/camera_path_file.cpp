@@ -88,6 +88,8 @@ KeyFrame keyFrame(const KeyFrameObject& object) {
   } else {
     key.camera.parallel_scale = object.number("parallel_scale", 0, INFINITY, "a number above zero");
   }
+  if (object.has("series_time"))
+    key.series_time = object.number("series_time", -INFINITY, INFINITY, "a time of the series, a number");
   return key;
 }
 

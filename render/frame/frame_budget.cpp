@@ -7,6 +7,7 @@
 #include "render/project/projection.h"
 #include "stream/base/error.h"
 #include "stream/model/brick.h"
+#include "stream/model/splats.h"
 
 namespace curvisplat {
 namespace {
@@ -26,6 +27,7 @@ constexpr uint64_t kMaxPagerBytes = 32 << 20;
 // The image, the painter and the index together get whole sixteenths of the memory if there is enough: a
 // picture of a slightly different size then needs no new pools, and the cache keeps its bricks.
 constexpr uint64_t kParts = 16;
+constexpr uint64_t kKeptArrays = 15;  // five of each step
 
 }  // namespace
 
@@ -59,7 +61,9 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
   rest -= sweep_bytes - kMinSweepBytes;
   rest -= ring_bytes - kMinRingBytes;
   rest -= budget.pager_bytes - fixed.least_pager_bytes;
-  budget.cache_bytes = rest;
+  // Of a series, the values of three steps are kept for each brick: the step, and the two that it is predicted from.
+  budget.kept_bytes = fixed.is_series ? rest * kKeptArrays / (kArraysOfSplats + kKeptArrays) : 0;
+  budget.cache_bytes = rest - budget.kept_bytes;
   return budget;
 }
 

@@ -14,6 +14,7 @@ struct FrameBudget {
   size_t sweep_splats = 0;
   uint64_t pager_bytes = 0;  // encoded bricks that are read ahead of the workers
   uint64_t cache_bytes = 0;  // decoded bricks that are kept between frames
+  uint64_t kept_bytes = 0;   // decoded values of several time steps, kept between frames
 
   /// Requirements that do not depend on the budget.
   struct Fixed {
@@ -23,6 +24,7 @@ struct FrameBudget {
     uint64_t output_bytes = 0;       // reserved for the use of the finished picture
     uint64_t splats = 0;             // the most that any picture can have
     ImageSize size;
+    bool is_series = false;  // of several time steps
   };
   /// Divides `memory_bytes` for at most `threads` workers (0: one per core). Workers come first, then the
   /// ring, the pager and the sweep, each up to the size from which more does not help; the cache gets the

@@ -70,7 +70,7 @@ struct FramePipeline::Pools {
         pager(pager_),
         ring(splats),
         sweep(budget.sweep_splats, budget.ring_splats / 2),
-        source(cache, variable, pager, budget.cache_bytes),
+        source(cache, variable, pager, budget.cache_bytes, budget.kept_bytes),
         workers(source, sweep, ring, budget.workers) {}
 
   const FrameBudget budget;
@@ -108,7 +108,8 @@ void FramePipeline::makePools(const FrameOptions& options) {
                                  backend_->bytes(options.size, resourcesOf(options)) + sceneBytes(options),
                                  options.output_bytes,
                                  planner_.mostSplats(),
-                                 options.size};
+                                 options.size,
+                                 cache_.series().steps.size() > 1};
   const FrameBudget budget = FrameBudget::of(options.memory_bytes, fixed, options.threads);
   PagerOptions pager;
   pager.buffer_bytes = budget.pager_bytes;
@@ -244,7 +245,8 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   statistics.largest_level = static_cast<int>(cut.deepest_level);
   statistics.largest_error_px = cut.largest_error_px;
   statistics.workers = pools_->budget.workers;
-  statistics.memory_used_bytes = options.memory_bytes - pools_->budget.cache_bytes + statistics.cache_bytes;
+  statistics.memory_used_bytes = options.memory_bytes - pools_->budget.cache_bytes -
+                                 pools_->budget.kept_bytes + statistics.cache_bytes + statistics.kept_bytes;
   return image;
 }
 

@@ -17,9 +17,9 @@ void StepPlayer::setTransferFunction(const TransferFunction& transfer_function) 
   renderer_->setTransferFunction(transfer_function);
 }
 
-void StepPlayer::goTo(uint64_t step) {
-  if (step == cache_.step()) return;
-  CacheReader next = cache_.atStep(step);
+void StepPlayer::goTo(const StepPosition& position) {
+  if (position == cache_.position()) return;
+  CacheReader next = cache_.at(position);
   if (next.sharesGeometryWith(cache_)) {
     renderer_->changeStep([&] { cache_ = std::move(next); });
     return;

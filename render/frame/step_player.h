@@ -18,8 +18,10 @@ class StepPlayer {
   FrameRenderer& renderer() { return *renderer_; }
   /// Of this step and those to come.
   void setTransferFunction(const TransferFunction& transfer_function);
-  /// Makes `step` the one that is drawn. Throws Error as CacheReader.
-  void goTo(uint64_t step);
+  /// Makes this step, or time between two, the one that is drawn. Throws Error as CacheReader.
+  void goTo(const StepPosition& position);
+  /// The time that is drawn.
+  double time() const { return cache_.time(); }
 
  private:
   CacheReader& cache_;

@@ -10,6 +10,7 @@
 #include "stream/base/file.h"
 #include "stream/base/mutex.h"
 #include "stream/base/stage_timer.h"
+#include "stream/cache/between_steps.h"
 #include "stream/cache/cache_index.h"
 #include "stream/cache/geometry_folder.h"
 #include "stream/codec/brick_codec.h"
@@ -43,6 +44,16 @@ Manifest manifestAtStep(const GeometryFolder& folder, const Manifest& of_series,
 
 }  // namespace
 
+/// What is decoded, and what that costs and may use.
+struct BrickOfVariable {
+  uint32_t brick;
+  size_t variable;
+  ReadTimes& times;
+  KeptValues* kept;
+
+  KeptValues::Key at(uint64_t step) const { return {step, variable, brick}; }
+};
+
 struct CacheReader::State {
   State(const fs::path& cache_path, uint64_t number)
       : cache(cache_path), of_series(std::make_shared<const Manifest>(readManifest(cache_path))) {
@@ -50,9 +61,10 @@ struct CacheReader::State {
     open(number, nullptr);
   }
 
-  State(const State& other, uint64_t number)
+  State(const State& other, const StepPosition& wanted)
       : cache(other.cache), of_series(other.of_series), series(other.series) {
-    open(number, &other);
+    open(wanted.step, &other);
+    if (wanted.part > 0) blendWithNext(wanted.part);
   }
 
   void open(uint64_t number, const State* other) {
@@ -60,13 +72,32 @@ struct CacheReader::State {
       throw Error("{}: has no step {}; it has {}", cache.string(), number,
                   series->steps.size() == 1 ? "one, which is step 0"
                                             : fmt::format("steps 0 to {}", series->steps.size() - 1));
-    step = number;
-    const uint32_t geometry = series->steps[step].geometry;
-    folder = other && other->series->steps[other->step].geometry == geometry
+    position = {number};
+    const uint32_t geometry = series->steps[number].geometry;
+    folder = other && other->series->steps[other->position.step].geometry == geometry
                  ? other->folder
                  : GeometryFolder::open(cache, *of_series, *series, geometry);
-    manifest = manifestAtStep(*folder, *of_series, *series, step);
-    for (size_t v = 0; v < manifest.variables.size(); ++v) values.push_back(folder->values(*series, step, v));
+    manifest = manifestAtStep(*folder, *of_series, *series, number);
+    for (size_t v = 0; v < manifest.variables.size(); ++v)
+      values.push_back(folder->values(*series, number, v));
+  }
+
+  void blendWithNext(double part) {
+    next = std::make_unique<const State>(*this, StepPosition{position.step + 1});
+    if (next->folder != folder)
+      throw Error("{}: steps {} and {} have different grids; values between them cannot be interpolated",
+                  cache.string(), position.step, position.step + 1);
+    position.part = part;
+    manifest.steps.front().time = series->timeAt(position);
+    for (size_t v = 0; v < values.size(); ++v) {
+      VariableInfo& variable = manifest.variables[v];
+      const VariableInfo& later = next->manifest.variables[v];
+      variable.min += part * (later.min - variable.min);
+      variable.max += part * (later.max - variable.max);
+      blended.emplace_back(values[v]->table);
+      for (size_t brick = 0; brick < blended[v].size(); ++brick)
+        blended[v][brick] = blendedRecord(values[v]->table[brick], next->values[v]->table[brick], part);
+    }
   }
 
   /// Reads a brick's stream into the thread's scratch.
@@ -123,15 +154,22 @@ struct CacheReader::State {
     return known;
   }
 
+  /// A stream of the step, verified.
+  void decodeValues(const BrickOfVariable& of, std::span<const std::byte> stream,
+                    const VariableArrays<float>& out) const;
+  void readValues(const BrickOfVariable& of, SplatVariable& out) const;
+
   class ValuesDecoder;
 
   fs::path cache;
   std::shared_ptr<const Manifest> of_series;
   std::shared_ptr<const Series> series;
-  uint64_t step = 0;
+  StepPosition position;
   std::shared_ptr<const GeometryFolder> folder;
-  Manifest manifest;                                      // of the step
+  Manifest manifest;                                      // at the position
   std::vector<std::shared_ptr<const ValuesFile>> values;  // [variable]
+  std::unique_ptr<const State> next;                      // of a position between two steps: the later one
+  std::vector<std::vector<BrickVariable>> blended;        // the tables there
   mutable Mutex opening;
   mutable std::map<std::pair<uint64_t, size_t>, std::shared_ptr<const ValuesFile>> earlier
       GUARDED_BY(opening);
@@ -140,27 +178,26 @@ struct CacheReader::State {
 /// Decodes a brick's values, with those of earlier steps that they are predicted from, each once.
 class CacheReader::State::ValuesDecoder {
  public:
-  ValuesDecoder(const State& state, uint32_t brick, size_t variable, ReadTimes& times)
-      : state_(state), brick_(brick), variable_(variable), times_(times) {}
+  ValuesDecoder(const State& state, const BrickOfVariable& of) : state_(state), of_(of) {}
 
   /// `stream`: that of step `of_step`, verified; it is in `file`.
   void decode(uint64_t of_step, const InputFile& file, std::span<const std::byte> stream,
               const VariableArrays<float>& out) {
     if (++streams_ > kMaxStreams) refuse(file, fmt::format("it needs more than {} streams", kMaxStreams));
     TimeReferences references;
-    State::decode(file, brick_, times_, [&] { references.steps_back = stepsBackOf(stream); });
+    State::decode(file, of_.brick, of_.times, [&] { references.steps_back = stepsBackOf(stream); });
     // The one further back first: the other may be predicted from it as well.
     for (const size_t n : {size_t{1}, size_t{0}})
       if (references.steps_back[n] > 0)
         references.values[n] = earlier(of_step, references.steps_back[n], file);
-    State::decode(file, brick_, times_,
-                  [&] { decodeVariable(state_.folder->bricks()[brick_], stream, out, references); });
+    State::decode(file, of_.brick, of_.times,
+                  [&] { decodeVariable(state_.folder->bricks()[of_.brick], stream, out, references); });
   }
 
  private:
   struct Earlier {
     uint64_t step;
-    SplatVariable values;
+    KeptValues::Values values;
   };
 
   VariableArrays<const float> earlier(uint64_t of_step, uint64_t back, const InputFile& from) {
@@ -168,32 +205,69 @@ class CacheReader::State::ValuesDecoder {
     if (back > of_step || steps[of_step - back].geometry != steps[of_step].geometry)
       refuse(from, fmt::format("it is predicted from {} steps back, where its geometry has no step", back));
     const uint64_t at = of_step - back;
-    for (const auto& known : earlier_)
-      if (known->step == at) return arraysOf(std::as_const(known->values));
-    const auto file = state_.earlierValues(at, variable_);
-    const Extent& extent = file->table[brick_].values;
+    for (const Earlier& known : earlier_)
+      if (known.step == at) return arraysOf(*known.values);
+    KeptValues::Values known = of_.kept ? of_.kept->find(of_.at(at)) : nullptr;
+    if (!known) {
+      known = read(at);
+      if (of_.kept) of_.kept->keep(of_.at(at), known);
+    }
+    earlier_.push_back({at, std::move(known)});
+    return arraysOf(*earlier_.back().values);
+  }
+
+  KeptValues::Values read(uint64_t at) {
+    const auto file = state_.earlierValues(at, of_.variable);
+    const Extent& extent = file->table[of_.brick].values;
     std::vector<std::byte> stream(extent.length);
-    State::readInto(file->file, brick_, extent, stream, times_);
-    State::verify(file->file, brick_, extent, stream, times_);
-    auto decoded = std::make_unique<Earlier>(Earlier{at, {}});
-    decoded->values.resize(state_.folder->bricks()[brick_].splats);
-    decode(at, file->file, stream, arraysOf(decoded->values));
-    earlier_.push_back(std::move(decoded));
-    return arraysOf(std::as_const(earlier_.back()->values));
+    State::readInto(file->file, of_.brick, extent, stream, of_.times);
+    State::verify(file->file, of_.brick, extent, stream, of_.times);
+    auto decoded = std::make_shared<SplatVariable>();
+    decoded->resize(state_.folder->bricks()[of_.brick].splats);
+    decode(at, file->file, stream, arraysOf(*decoded));
+    return decoded;
   }
 
   [[noreturn]] void refuse(const InputFile& file, const std::string& what) const {
-    throw DamagedBrick("{}: brick {}: {}; the file is damaged: convert again", file.path().string(), brick_,
-                       what);
+    throw DamagedBrick("{}: brick {}: {}; the file is damaged: convert again", file.path().string(),
+                       of_.brick, what);
   }
 
   const State& state_;
-  const uint32_t brick_;
-  const size_t variable_;
-  ReadTimes& times_;
+  const BrickOfVariable of_;
   size_t streams_ = 0;
-  std::vector<std::unique_ptr<Earlier>> earlier_;
+  std::vector<Earlier> earlier_;
 };
+
+void CacheReader::State::decodeValues(const BrickOfVariable& of, std::span<const std::byte> stream,
+                                      const VariableArrays<float>& out) const {
+  const auto keep_copy = [&] {
+    auto copy = std::make_shared<SplatVariable>();
+    copy->resize(out.size());
+    copyValues(out, arraysOf(*copy));
+    of.kept->keep(of.at(position.step), std::move(copy));
+  };
+  const bool keeps = of.kept && of.kept->capacity() > 0;
+  if (const auto known = keeps ? of.kept->find(of.at(position.step)) : nullptr) {
+    copyValues(arraysOf(*known), out);
+  } else {
+    ValuesDecoder(*this, of).decode(position.step, values[of.variable]->file, stream, out);
+    if (keeps) keep_copy();
+  }
+  if (!next) return;
+  thread_local SplatVariable later;
+  next->readValues(of, later);
+  blendValues(out, arraysOf(std::as_const(later)), position.part);
+}
+
+void CacheReader::State::readValues(const BrickOfVariable& of, SplatVariable& out) const {
+  const InputFile& file = values[of.variable]->file;
+  const Extent& extent = values[of.variable]->table[of.brick].values;
+  const auto bytes = read(file, of.brick, extent, of.times);
+  verify(file, of.brick, extent, bytes, of.times);
+  out.resize(folder->bricks()[of.brick].splats);
+  decodeValues(of, bytes, arraysOf(out));
+}
 
 CacheReader::CacheReader(const fs::path& cache, uint64_t step)
     : state_(std::make_unique<State>(cache, step)) {}
@@ -222,12 +296,12 @@ const Series& CacheReader::series() const {
   return *state_->series;
 }
 
-uint64_t CacheReader::step() const {
-  return state_->step;
+const StepPosition& CacheReader::position() const {
+  return state_->position;
 }
 
-CacheReader CacheReader::atStep(uint64_t step) const {
-  return CacheReader(std::make_unique<State>(*state_, step));
+CacheReader CacheReader::at(const StepPosition& position) const {
+  return CacheReader(std::make_unique<State>(*state_, position));
 }
 
 bool CacheReader::sharesGeometryWith(const CacheReader& other) const {
@@ -240,7 +314,7 @@ std::span<const Brick> CacheReader::bricks() const {
 
 std::span<const BrickVariable> CacheReader::brickVariables(size_t variable) const {
   CURVISPLAT_CHECK_OP(variable, <, state_->values.size());
-  return state_->values[variable]->table;
+  return state_->next ? state_->blended[variable] : state_->values[variable]->table;
 }
 
 size_t CacheReader::variableNamed(std::string_view name) const {
@@ -275,17 +349,12 @@ void CacheReader::readGeometry(uint32_t brick, SplatGeometry& out, std::vector<N
                 [&] { decodeGeometry(state_->manifest.root, record, bytes, out, runs); });
 }
 
-void CacheReader::readVariable(uint32_t brick, size_t variable, SplatVariable& out, ReadTimes* times) const {
+void CacheReader::readVariable(uint32_t brick, size_t variable, SplatVariable& out, ReadTimes* times,
+                               KeptValues* kept) const {
   ReadTimes ignored;
-  ReadTimes& sums = times ? *times : ignored;
   CURVISPLAT_CHECK_OP(brick, <, state_->folder->bricks().size());
   CURVISPLAT_CHECK_OP(variable, <, state_->values.size());
-  const BrickVariable& record = state_->values[variable]->table[brick];
-  const InputFile& file = state_->values[variable]->file;
-  const auto bytes = State::read(file, brick, record.values, sums);
-  State::verify(file, brick, record.values, bytes, sums);
-  out.resize(state_->folder->bricks()[brick].splats);
-  State::ValuesDecoder(*state_, brick, variable, sums).decode(state_->step, file, bytes, arraysOf(out));
+  state_->readValues({brick, variable, times ? *times : ignored, kept}, out);
 }
 
 void CacheReader::decode(uint32_t brick, std::span<const std::byte> geometry,
@@ -298,12 +367,12 @@ void CacheReader::decode(uint32_t brick, std::span<const std::byte> geometry,
 }
 
 void CacheReader::decode(uint32_t brick, size_t variable, std::span<const std::byte> values,
-                         const VariableArrays<float>& out, ReadTimes& times) const {
+                         const VariableArrays<float>& out, ReadTimes& times, KeptValues* kept) const {
   CURVISPLAT_CHECK_OP(brick, <, state_->folder->bricks().size());
   CURVISPLAT_CHECK_OP(variable, <, state_->values.size());
-  const InputFile& file = state_->values[variable]->file;
-  State::verify(file, brick, state_->values[variable]->table[brick].values, values, times);
-  State::ValuesDecoder(*state_, brick, variable, times).decode(state_->step, file, values, out);
+  const ValuesFile& file = *state_->values[variable];
+  State::verify(file.file, brick, file.table[brick].values, values, times);
+  state_->decodeValues({brick, variable, times, kept}, values, out);
 }
 
 }  // namespace curvisplat

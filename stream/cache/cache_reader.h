@@ -1,5 +1,5 @@
 // Opens a splat cache at a time step and reads bricks. An open reader looks like one of a cache of that step
-// alone. Opening reads the manifest and the tables, and checks every size
+// alone; one between two steps, like that of a cache of blended samples (between_steps.h). Opening reads the manifest and the tables, and checks every size
 // against the real files and every link of the octree. It never reads payloads (streams). An open CacheReader
 // is immutable: any number of threads may read.
 #pragma once
@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "stream/base/error.h"
+#include "stream/cache/kept_values.h"
 #include "stream/cache/manifest.h"
 #include "stream/cache/steps_file.h"
 #include "stream/model/brick.h"
@@ -50,10 +51,16 @@ class CacheReader {
   const std::filesystem::path& cachePath() const;
   const Manifest& seriesManifest() const;
   const Series& series() const;
-  uint64_t step() const;
+  /// The step; of a reader between two steps the earlier.
+  uint64_t step() const { return position().step; }
+  const StepPosition& position() const;
+  double time() const { return series().timeAt(position()); }
   /// The same cache at another step. Shares the tables of the geometry if that is the same. Throws Error as the
   /// constructor.
-  CacheReader atStep(uint64_t step) const;
+  CacheReader atStep(uint64_t step) const { return at({step}); }
+  /// The same, or between two steps, with the extents and streams of the earlier one. Throws Error if the two have
+  /// different geometries.
+  CacheReader at(const StepPosition& position) const;
   /// Whether the bricks and geometry streams of both are the same ones.
   bool sharesGeometryWith(const CacheReader& other) const;
 
@@ -70,7 +77,9 @@ class CacheReader {
   /// early or the stream does not decode, and Error if the disk fails; both name the brick and the file.
   void readGeometry(uint32_t brick, SplatGeometry& out, std::vector<NodeRun>* runs = nullptr,
                     ReadTimes* times = nullptr) const;
-  void readVariable(uint32_t brick, size_t variable, SplatVariable& out, ReadTimes* times = nullptr) const;
+  /// `kept`: values of this cache's steps, which are used where they help, and added to.
+  void readVariable(uint32_t brick, size_t variable, SplatVariable& out, ReadTimes* times = nullptr,
+                    KeptValues* kept = nullptr) const;
 
   /// The payload files, for callers that read streams themselves.
   const std::filesystem::path& geometryPath() const;
@@ -81,7 +90,7 @@ class CacheReader {
   void decode(uint32_t brick, std::span<const std::byte> geometry, const GeometryArrays<float>& out,
               ReadTimes& times) const;
   void decode(uint32_t brick, size_t variable, std::span<const std::byte> values,
-              const VariableArrays<float>& out, ReadTimes& times) const;
+              const VariableArrays<float>& out, ReadTimes& times, KeptValues* kept = nullptr) const;
 
  private:
   struct State;

@@ -169,6 +169,21 @@ uint64_t Series::nearest(double time) const {
   return static_cast<uint64_t>((is_after ? after : before) - steps.begin());
 }
 
+StepPosition Series::between(double time) const {
+  const auto after = std::upper_bound(steps.begin(), steps.end(), time,
+                                      [](double value, const SeriesStep& step) { return value < step.time; });
+  if (after == steps.begin()) return {};
+  const auto step = static_cast<uint64_t>(after - steps.begin()) - 1;
+  if (after == steps.end()) return {step};
+  const double part = (time - steps[step].time) / (after->time - steps[step].time);
+  return part < 1 ? StepPosition{step, part} : StepPosition{step + 1};
+}
+
+double Series::timeAt(const StepPosition& position) const {
+  const double time = steps[position.step].time;
+  return position.part > 0 ? time + position.part * (steps[position.step + 1].time - time) : time;
+}
+
 std::optional<uint32_t> Series::geometryOf(uint64_t grid_checksum) const {
   if (grid_checksum == 0) return std::nullopt;
   for (uint32_t geometry = geometries(); geometry-- > 0;)

@@ -42,6 +42,13 @@ struct SeriesStep {
   std::vector<StepValues> values;  // [variable]
 };
 
+/// A time of a series: that of a step, or one between it and the next.
+struct StepPosition {
+  uint64_t step = 0;
+  double part = 0;  // of the way to the next step: 0 up to, but not including, 1
+  bool operator==(const StepPosition&) const = default;
+};
+
 /// The steps of a cache. One without the feature `steps` has one.
 struct Series {
   std::vector<SeriesStep> steps;
@@ -51,6 +58,9 @@ struct Series {
   uint32_t geometries() const { return static_cast<uint32_t>(first_steps.size()); }
   /// The step whose time is nearest; of two that are equally near the earlier.
   uint64_t nearest(double time) const;
+  /// Where `time` lies between the steps; the first or the last step if it is before or after all.
+  StepPosition between(double time) const;
+  double timeAt(const StepPosition& position) const;
   /// The geometry of the steps whose grid has this checksum.
   std::optional<uint32_t> geometryOf(uint64_t grid_checksum) const;
   /// Appends a step. Its geometry is one of those before or the next.

@@ -1,5 +1,7 @@
 #include "stream/model/splats.h"
 
+#include <algorithm>
+
 namespace curvisplat {
 
 void SplatGeometry::resize(size_t count) {
@@ -18,6 +20,14 @@ GeometryArrays<float> arraysOf(SplatGeometry& g) {
 
 VariableArrays<float> arraysOf(SplatVariable& v) {
   return {v.mean.data(), v.slope0.data(), v.slope1.data(), v.slope2.data(), v.variance.data(), v.size()};
+}
+
+void copyValues(const VariableArrays<const float>& from, const VariableArrays<float>& to) {
+  std::copy_n(from.mean, from.count, to.mean);
+  std::copy_n(from.slope0, from.count, to.slope0);
+  std::copy_n(from.slope1, from.count, to.slope1);
+  std::copy_n(from.slope2, from.count, to.slope2);
+  std::copy_n(from.variance, from.count, to.variance);
 }
 
 GeometryArrays<const float> arraysOf(const SplatGeometry& g) {

@@ -140,6 +140,8 @@ struct VariableArrays {
 /// To write into; what they borrow lives until the next resize().
 GeometryArrays<float> arraysOf(SplatGeometry& geometry);
 VariableArrays<float> arraysOf(SplatVariable& variable);
+/// Both have the same size.
+void copyValues(const VariableArrays<const float>& from, const VariableArrays<float>& to);
 /// To read from.
 GeometryArrays<const float> arraysOf(const SplatGeometry& geometry);
 VariableArrays<const float> arraysOf(const SplatVariable& variable);

@@ -32,8 +32,12 @@ std::vector<uint32_t> bricksOf(std::span<const BrickPart> parts) {
 }  // namespace
 
 BrickSource::BrickSource(const CacheReader& cache, size_t variable, const PagerOptions& pager,
-                         uint64_t cache_bytes)
-    : cache_(cache), variable_(variable), cached_(cache_bytes), pager_(cache, variable, pager) {}
+                         uint64_t cache_bytes, uint64_t kept_bytes)
+    : cache_(cache),
+      variable_(variable),
+      cached_(cache_bytes),
+      kept_(kept_bytes),
+      pager_(cache, variable, pager) {}
 
 void BrickSource::start(std::span<const BrickPart> parts, BrickPager::Unneeded unneeded) {
   parts_.assign(parts.begin(), parts.end());
@@ -94,15 +98,10 @@ std::optional<BrickSource::Splats> BrickSource::read(const BrickPart& part, uint
 
 /// The values of a brick whose geometry is there, of this step. They are read by the worker: a few pages, which the
 /// prefetch of the step has usually brought into memory.
-void BrickSource::refresh(const BrickCache::Pin& pin, uint32_t brick, Scratch& scratch) const {
+void BrickSource::refresh(const BrickCache::Pin& pin, uint32_t brick, Scratch& scratch) {
   pin.refresh([&](const VariableArrays<float>& values) {
-    cache_.readVariable(brick, variable_, scratch.values, &scratch.times);
-    const SplatVariable& read = scratch.values;
-    std::copy(read.mean.begin(), read.mean.end(), values.mean);
-    std::copy(read.slope0.begin(), read.slope0.end(), values.slope0);
-    std::copy(read.slope1.begin(), read.slope1.end(), values.slope1);
-    std::copy(read.slope2.begin(), read.slope2.end(), values.slope2);
-    std::copy(read.variance.begin(), read.variance.end(), values.variance);
+    cache_.readVariable(brick, variable_, scratch.values, &scratch.times, &kept_);
+    copyValues(arraysOf(std::as_const(scratch.values)), values);
   });
 }
 
@@ -137,9 +136,9 @@ std::optional<PagedBrick> BrickSource::await(uint64_t miss, Scratch& scratch) {
 }
 
 void BrickSource::decode(uint32_t brick, const PagedBrick& bytes, const GeometryArrays<float>& geometry,
-                         const VariableArrays<float>& values, Scratch& scratch) const {
+                         const VariableArrays<float>& values, Scratch& scratch) {
   cache_.decode(brick, bytes.geometry(), geometry, scratch.times);
-  cache_.decode(brick, variable_, bytes.values(), values, scratch.times);
+  cache_.decode(brick, variable_, bytes.values(), values, scratch.times, &kept_);
 }
 
 BrickSource::Splats BrickSource::standIn(const BrickPart& part, Scratch& scratch) const {
@@ -269,6 +268,7 @@ void BrickSource::finish(FetchStatistics& statistics) {
   const BrickCache::Statistics kept = cached_.statistics();
   statistics.bricks_resident = kept.bricks;
   statistics.cache_bytes = kept.bytes;
+  statistics.kept_bytes = kept_.statistics().bytes;
   statistics.cache_peak_bytes = kept.peak_bytes;
   statistics.pager_peak_bytes = after.peak_bytes;
 }

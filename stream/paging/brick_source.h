@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "stream/cache/cache_reader.h"
+#include "stream/cache/kept_values.h"
 #include "stream/model/brick.h"
 #include "stream/model/splats.h"
 #include "stream/paging/brick_cache.h"
@@ -33,14 +34,16 @@ struct FetchStatistics {
   uint64_t bricks_cached = 0, bricks_read = 0;
   uint64_t bricks_left_out = 0, bytes_left_out = 0;     // not read, since no longer needed
   uint64_t bricks_resident = 0, cache_bytes = 0;        // decoded and kept, of this frame and others
+  uint64_t kept_bytes = 0;                              // decoded values of several steps
   uint64_t cache_peak_bytes = 0, pager_peak_bytes = 0;  // so far
   std::string read_by;                                  // for example "io_uring, direct"
 };
 
 class BrickSource {
  public:
-  /// `cache` outlives it. `cache_bytes` may be 0. Throws Error.
-  BrickSource(const CacheReader& cache, size_t variable, const PagerOptions& pager, uint64_t cache_bytes);
+  /// `cache` outlives it. `cache_bytes` may be 0; `kept_bytes`, for values of several steps, too. Throws Error.
+  BrickSource(const CacheReader& cache, size_t variable, const PagerOptions& pager, uint64_t cache_bytes,
+              uint64_t kept_bytes = 0);
 
   /// One worker's memory and the time it has spent.
   struct Scratch {
@@ -93,18 +96,19 @@ class BrickSource {
 
  private:
   std::optional<Splats> read(const BrickPart& part, uint64_t miss, Scratch& scratch);
-  void refresh(const BrickCache::Pin& pin, uint32_t brick, Scratch& scratch) const;
+  void refresh(const BrickCache::Pin& pin, uint32_t brick, Scratch& scratch);
   Splats readAlone(const BrickPart& part, Scratch& scratch) const;
   Splats splatsOf(BrickCache::Pin pin, const BrickPart& part) const;
   Splats splatsOf(const Scratch& scratch, const BrickPart& part) const;
   void decode(uint32_t brick, const PagedBrick& bytes, const GeometryArrays<float>& geometry,
-              const VariableArrays<float>& values, Scratch& scratch) const;
+              const VariableArrays<float>& values, Scratch& scratch);
   std::optional<PagedBrick> await(uint64_t miss, Scratch& scratch);
   void keepPart(const BrickPart& part, uint32_t ancestor, Scratch& scratch) const;
 
   const CacheReader& cache_;
   const size_t variable_;
   BrickCache cached_;
+  KeptValues kept_;  // of this step and others: those that it is predicted from, or lies between
   BrickPager pager_;
 
   std::vector<BrickPart> parts_;                      // [sequence]

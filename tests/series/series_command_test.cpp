@@ -176,6 +176,35 @@ TEST_F(SeriesCommand, FollowsWhatASimulationWrites) {
         << name;
 }
 
+TEST_F(SeriesCommand, RangesAreOfTheSeriesOrOfAStep) {
+  generate("f", 3);
+  {  // the last node of the last step
+    std::fstream last(file("f_0002.fun"), std::ios::binary | std::ios::in | std::ios::out);
+    const float value = 5;
+    last.seekp(-4, std::ios::end).write(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  run({"convert", file("f.xyz"), file("f_*.fun"), "-o", file("a.splats")});
+  const CacheReader first(file("a.splats"));
+  const VariableInfo series = first.seriesManifest().variables[0];
+  const VariableInfo step = first.atStep(1).manifest().variables[0];
+  ASSERT_LT(step.max, series.max);
+  const auto rangeOf = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"render", file("a.splats"), "-o", file("r_%d.png"), "--size",
+                                       "40x30",  "--view",         "+z", "--stats",        file("r.json")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    run(arguments);
+    const auto json = nlohmann::json::parse(bytesOfFile(file("r.json")));
+    return json["transfer_function"]["range"].get<std::vector<double>>();
+  };
+  const std::vector<double> of_step{step.min, step.max}, of_series{series.min, series.max};
+  EXPECT_EQ(rangeOf({"--steps", "1:1", "--range", "series"}), of_series);
+  EXPECT_EQ(rangeOf({"--steps", "1:1", "--range", "step"}), of_step);
+  EXPECT_EQ(rangeOf({"--steps", "1:1", "--range", "data"}), of_series);
+  EXPECT_EQ(rangeOf({"--step", "1", "--range", "data"}), of_step);
+  // Chosen from the data, too: the same whichever step comes first.
+  EXPECT_EQ(rangeOf({"--steps", "0:2"}), rangeOf({"--steps", "1:1"}));
+}
+
 TEST_F(SeriesCommand, FileSeriesOfParaView) {
   generate("f", 3);
   // A .series takes files of any format; times are its own.

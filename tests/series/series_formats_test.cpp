@@ -10,6 +10,7 @@
 #include "stream/cache/cache_verify.h"
 #include "tests/support/cgns_writer.h"
 #include "tests/support/earth_files.h"
+#include "tests/support/netcdf_writer.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/vts_writer.h"
@@ -87,6 +88,60 @@ TEST_F(SeriesFormats, TimeDimensionOfNetcdf) {
                       return std::vector<std::string>{file("roms.nc"), "--time-step", std::to_string(step)};
                     },
                     {"--scalar", "temp"});
+}
+
+/// A history of a grid that has a file of its own; `times` in days.
+void writeHistory(const std::string& path, const std::vector<double>& times) {
+  NetcdfWriter writer(path, NetcdfFileType::kClassic);
+  writer.dimension("time", times.size(), true);
+  for (const auto& [name, length] : {std::pair("z", 5), {"y", 6}, {"x", 7}})
+    writer.dimension(name, static_cast<size_t>(length));
+  writer.variable("time", NetcdfNumbers::kDoublePrecision, {"time"}, {{"units", "days since 2000-01-01"}},
+                  [&](const std::vector<size_t>& at) { return times[at[0]]; });
+  writer.variable("temp", NetcdfNumbers::kSinglePrecision, {"time", "z", "y", "x"},
+                  {{"coordinates", "lon lat z"}}, [&](const std::vector<size_t>& at) {
+                    return times[at[0]] + static_cast<double>(at[1] + at[2] * at[3]);
+                  });
+}
+
+TEST_F(SeriesFormats, NetcdfGridWithHistoryFilesOneAfterTheOther) {
+  {
+    NetcdfWriter writer(file("grid.nc"), NetcdfFileType::kClassic);
+    for (const auto& [name, length] : {std::pair("z", 5), {"y", 6}, {"x", 7}})
+      writer.dimension(name, static_cast<size_t>(length));
+    const auto degrees = [](const char* name, const char* unit) {
+      return NetcdfAttributes{{"standard_name", name}, {"units", unit}};
+    };
+    writer.variable("lon", NetcdfNumbers::kDoublePrecision, {"y", "x"}, degrees("longitude", "degrees_east"),
+                    [](const std::vector<size_t>& at) {
+                      return static_cast<double>(at[1]) + 0.1 * static_cast<double>(at[0]);
+                    });
+    writer.variable("lat", NetcdfNumbers::kDoublePrecision, {"y", "x"}, degrees("latitude", "degrees_north"),
+                    [](const std::vector<size_t>& at) { return 40 + static_cast<double>(at[0]); });
+    writer.variable("z", NetcdfNumbers::kDoublePrecision, {"z"},
+                    {{"units", "m"}, {"positive", "down"}, {"axis", "Z"}},
+                    [](const std::vector<size_t>& at) { return 10 * static_cast<double>(at[0]); });
+  }
+  writeHistory(file("his_0001.nc"), {0, 1});
+  writeHistory(file("his_0002.nc"), {2, 3.5});
+  expectEachAsAlone(file("his_*.nc"), {0, 0, 0, 0},
+                    [&](size_t step) {
+                      return std::vector<std::string>{file(step < 2 ? "his_0001.nc" : "his_0002.nc"),
+                                                      "--time-step", std::to_string(step % 2)};
+                    },
+                    {file("grid.nc")});
+  EXPECT_EQ(CacheReader(file("a.splats")).series().steps[3].time, 3.5);
+
+  // A restart that went back: the file and its step are named.
+  writeHistory(file("his_0003.nc"), {4, 3});
+  const ProgramResult back = runProgram({"convert", file("grid.nc"), file("his_0001.nc"), file("his_0002.nc"),
+                                         file("his_0003.nc"), "--steps", "all", "-o", file("c.splats")});
+  EXPECT_EQ(back.status, 1);
+  EXPECT_EQ(lineCount(back.err), 1) << back.err;
+  EXPECT_NE(back.err.find("step 5"), std::string::npos) << back.err;
+  EXPECT_NE(back.err.find("his_0003.nc, time step 1"), std::string::npos) << back.err;
+  EXPECT_NE(back.err.find("its time 3 is not after 4"), std::string::npos) << back.err;
+  EXPECT_EQ(CacheReader(file("c.splats")).series().steps.size(), 5u);
 }
 
 TEST_F(SeriesFormats, BaseIterativeDataOfCgns) {

@@ -86,8 +86,8 @@ TEST_F(StepPlayerTest, DrawsEachStepAsAlone) {
       CacheReader reader(cache());
       const Camera view = camera(reader);
       StepPlayer player(reader, 0, function(), Backend::kCpu);
-      for (const uint64_t step : {0, 1, 2, 3, 2, 0, 3, 4, 5, 4, 1, 1, 5}) {
-        player.goTo(step);
+      for (const uint64_t step : std::vector<uint64_t>{0, 1, 2, 3, 2, 0, 3, 4, 5, 4, 1, 1, 5}) {
+        player.goTo({step});
         if (ahead) player.renderer().prefetch(view, options(memory));
         FrameStatistics statistics;
         EXPECT_EQ(player.renderer().render(view, options(memory), statistics).rgba, wanted[step].rgba)
@@ -103,11 +103,30 @@ TEST_F(StepPlayerTest, KeepsDecodedGeometry) {
   StepPlayer player(reader, 0, function(), Backend::kCpu);
   FrameStatistics first, second;
   player.renderer().render(view, options(512 << 20), first);
-  player.goTo(1);
+  player.goTo({1});
   player.renderer().render(view, options(512 << 20), second);
   EXPECT_GT(first.bricks_read, 0u);
   EXPECT_EQ(second.bricks_read, 0u);  // whole bricks: values alone are read
   EXPECT_EQ(second.bricks_cached, first.bricks_read);
+}
+
+TEST_F(StepPlayerTest, DecodesValuesThatOthersArePredictedFromOnce) {
+  const CacheReader first(cache());
+  const uint32_t bricks = static_cast<uint32_t>(first.bricks().size());
+  KeptValues kept(64 << 20);
+  // Backwards: steps 0 and 1 are decoded for step 2.
+  for (const uint64_t step : std::vector<uint64_t>{2, 1, 0}) {
+    const CacheReader reader = first.atStep(step);
+    for (uint32_t brick = 0; brick < bricks; ++brick) {
+      SplatVariable with, without;
+      reader.readVariable(brick, 0, with, nullptr, &kept);
+      reader.readVariable(brick, 0, without);
+      EXPECT_EQ(with.mean, without.mean);
+      EXPECT_EQ(with.slope2, without.slope2);
+      EXPECT_EQ(with.variance, without.variance);
+    }
+  }
+  EXPECT_GE(kept.statistics().hits, 2u * bricks);
 }
 
 }  // namespace

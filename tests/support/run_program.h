@@ -28,6 +28,7 @@ class RunningProgram {
   RunningProgram& operator=(const RunningProgram&) = delete;
 
   void signal(int number) const;
+  pid_t process() const { return child_; }
   /// What it said, once it has ended. To be called once.
   ProgramResult wait();
 

@@ -2,13 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <set>
-#include <thread>
+#include <string>
 
 #include "preprocess/addition/convert_series.h"
 #include "preprocess/formats/open/series_files.h"
@@ -16,6 +14,8 @@
 #include "stream/base/message.h"
 #include "stream/base/paths.h"
 #include "stream/cache/cache_reader.h"
+#include "tools/commands/folder_events.h"
+#include "tools/commands/written_files.h"
 #include "tools/options/option_parsers.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
@@ -52,12 +52,16 @@ std::vector<StepFiles> chosenSteps(const ConvertArguments& arguments) {
   return chosen;
 }
 
+std::string titleOf(const OpenGridOptions& files) {
+  return files.grid.stem().string();
+}
+
 SeriesOptions seriesOptions(const ConvertArguments& arguments) {
   SeriesOptions options;
   options.convert.output = linkTarget(arguments.adds_steps ? arguments.to : arguments.output);
   options.convert.overwrite = arguments.overwrite;
   options.convert.resume = arguments.resume;
-  options.convert.title = arguments.grid.grid.stem().string();
+  options.convert.title = titleOf(arguments.grid);
   applyCommonOptions(arguments, options.convert);
   options.keep_going = arguments.keep_going;
   options.add = arguments.adds_steps;
@@ -111,60 +115,14 @@ class StepLog {
   double before_ = 0;
 };
 
-constexpr auto kPollInterval = std::chrono::milliseconds(250);
-// A file that has not changed for this long has been written.
-constexpr auto kSettled = std::chrono::seconds(2);
-
-/// The files of a running simulation that have been written and are not in the cache.
-class WrittenFiles {
- public:
-  explicit WrittenFiles(const ConvertArguments& arguments) : arguments_(arguments) {}
-
-  void markDone(const std::vector<std::string>& files) { done_.insert(files.begin(), files.end()); }
-
-  /// The next step whose files are all written; nullopt if there is none yet. Steps come in their order.
-  std::optional<StepFiles> next() {
-    std::vector<StepFiles> steps;
-    try {
-      OpenGridOptions files = arguments_.grid;
-      expandPatterns(files);
-      steps = stepsByName(files);
-    } catch (const Error&) {
-      return std::nullopt;  // none has been written yet, or not every kind of file
-    }
-    for (const StepFiles& step : steps) {
-      if (done_.contains(step.name)) continue;
-      if (!isSettled(step.options)) return std::nullopt;
-      done_.insert(step.name);
-      return step;
-    }
-    return std::nullopt;
-  }
-
- private:
-  /// Whether no file of the step has changed for a while.
-  static bool isSettled(const OpenGridOptions& options) {
-    std::vector<std::filesystem::path> files = options.solutions;
-    files.push_back(options.grid);
-    for (const std::filesystem::path& path : files) {
-      std::error_code error;
-      const auto written = std::filesystem::last_write_time(path, error);
-      if (error || std::filesystem::file_time_type::clock::now() - written < kSettled) return false;
-    }
-    return true;
-  }
-
-  const ConvertArguments& arguments_;
-  std::set<std::string> done_;  // names of steps
-};
-
 /// Converts what a simulation writes until the cache has enough steps. Throws Interrupted.
 void follow(const ConvertArguments& arguments) {
   SeriesOptions options = seriesOptions(arguments);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   StepLog log(progress);
-  WrittenFiles files(arguments);
+  FolderEvents events(foldersOf(arguments.grid));
+  WrittenFiles files(arguments.grid);
   uint64_t steps = 0;
   const std::filesystem::path manifest = options.convert.output / "manifest.json";
   if (options.add || (options.convert.resume && std::filesystem::exists(manifest))) {
@@ -176,13 +134,16 @@ void follow(const ConvertArguments& arguments) {
   while (!arguments.until || steps < *arguments.until) {
     const std::optional<StepFiles> step = files.next();
     if (!step) {
-      progress.throwIfStopped();
-      std::this_thread::sleep_for(kPollInterval);
+      events.wait(files.untilNext(), progress);
       continue;
     }
+    progress.throwIfStopped();
     const std::vector<StepFiles> one{*step};
-    const SeriesReport report = convertSeries(seriesInput(arguments, one), options, progress,
-                                              [&](const SeriesEvent& event) { log.add(event); });
+    if (!options.add) options.convert.title = titleOf(step->options);
+    SeriesInput input = seriesInput(arguments, one);
+    input.first_number = steps;
+    const SeriesReport report =
+        convertSeries(input, options, progress, [&](const SeriesEvent& event) { log.add(event); });
     if (report.converted > 0) fmt::print("step {}: {}\n", report.steps - 1, step->name);
     std::fflush(stdout);
     steps = report.steps;

@@ -28,6 +28,7 @@
 #include "tools/commands/render_statistics.h"
 #include "tools/options/camera_motion.h"
 #include "tools/options/frame_arguments.h"
+#include "tools/options/motion_in_time.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/picture_choice.h"
 #include "tools/options/scalar_arguments.h"
@@ -60,9 +61,16 @@ bool severalFrames(const RenderArguments& arguments) {
   return arguments.camera.moves() || arguments.steps.severalSteps();
 }
 
+/// Several steps share a function; a path may go through all of them.
+ChosenFor drawnSteps(const RenderArguments& arguments) {
+  const StepArguments& steps = arguments.steps;
+  const bool may_follow_path = !arguments.camera.path.empty() && !steps.step && !steps.time;
+  return steps.severalSteps() || may_follow_path ? ChosenFor::kSeries : ChosenFor::kStep;
+}
+
 /// Throws UsageError if options contradict each other, and Error if an output cannot be written.
 void checkArguments(const RenderArguments& arguments, ImageSize size) {
-  checkCameraArguments(arguments.camera);
+  checkMotionArguments(arguments.camera, arguments.steps);
   checkFunctionArguments(arguments.scalar);
   checkSurfaceArguments(arguments.surfaces);
   checkOutputName(arguments.output, severalFrames(arguments), size);
@@ -120,7 +128,7 @@ class FrameRun {
         progress_(progress) {}
 
   /// Pictures that were written are kept if a later frame fails.
-  void draw(const CameraMotion& motion) {
+  void draw(const MotionInTime& motion) {
     const bool moves = severalFrames(arguments_);
     if (moves) progress_.begin("drawing", motion.frames, "frames");
     for (uint64_t number = 0; number < motion.frames; ++number) {
@@ -144,14 +152,15 @@ class FrameRun {
   }
 
  private:
-  void draw(uint64_t number, const CameraMotion& motion, Progress& progress) {
-    player_.goTo(motion.step(number));
+  void draw(uint64_t number, const MotionInTime& motion, Progress& progress) {
+    player_.goTo(motion.position(number));
+    const double time = player_.time();
     const Camera camera = motion.camera(number);
     FrameStatistics statistics;
     if (number > 0 || arguments_.first_image.empty()) {
       const Image image = player_.renderer().render(camera, report_.options, statistics, &progress);
       if (number + 1 < motion.frames) prefetch(motion, number + 1);
-      finish(number, camera, image, statistics);
+      finish(number, {time, camera, statistics}, image);
       return;
     }
     const auto show = [&](const Image& image, bool is_final) {
@@ -160,14 +169,14 @@ class FrameRun {
         report_.time_to_first_image_s = secondsSinceStart();
         report_.first_image = statistics;
       }
-      if (is_final) finish(number, camera, image, statistics);
+      if (is_final) finish(number, {time, camera, statistics}, image);
     };
     player_.renderer().renderProgressively(camera, report_.options, statistics, show, &progress);
   }
 
   /// Reads the next frame's bricks, and goes to its time step, while this frame's picture is written.
-  void prefetch(const CameraMotion& motion, uint64_t number) {
-    player_.goTo(motion.step(number));
+  void prefetch(const MotionInTime& motion, uint64_t number) {
+    player_.goTo(motion.position(number));
     try {
       player_.renderer().prefetch(motion.camera(number), report_.options);
     } catch (const Error&) {
@@ -175,10 +184,12 @@ class FrameRun {
     }
   }
 
-  void finish(uint64_t number, const Camera& camera, const Image& image, const FrameStatistics& statistics) {
+  void finish(uint64_t number, const FrameReport& frame, const Image& image) {
+    const Camera& camera = frame.camera;
+    const FrameStatistics& statistics = frame.statistics;
     annotate(image, camera, [&](const Image& picture) { output_.write(number, picture); });
     if (number == 0 && !report_.first_image) report_.time_to_first_image_s = secondsSinceStart();
-    report_.frames.push_back({camera, statistics});
+    report_.frames.push_back(frame);
     const std::string which = severalFrames(arguments_) ? fmt::format(" of frame {}", number) : "";
     reportUnreadable(which, statistics);
     const RenderedScene scene{manifest_, report_.variable, report_.transfer_function,
@@ -261,15 +272,16 @@ void render(const RenderArguments& arguments) {
       arguments.frame_rate ? parsePositive("--frame-rate", *arguments.frame_rate) : 25;
 
   CacheReader cache = openAtStep(arguments.cache, arguments.steps);
-  const std::vector<uint64_t> steps = chosenSteps(arguments.steps, cache);
+  const std::vector<StepPosition> steps = chosenSteps(arguments.steps, cache);
   const Manifest manifest = cache.manifest();  // of the first step
   const size_t variable = chooseVariable(cache, arguments.scalar);
   const VariableInfo& info = manifest.variables[variable];
   const glm::dvec3 lower = manifest.lower * options.scale, upper = manifest.upper * options.scale;
-  PictureChoice choice(cache, variable, options.scale);
+  const ChosenFor drawn = drawnSteps(arguments);
+  PictureChoice choice(cache, variable, options.scale, drawn);
   const TransferFunction transfer_function = choice.function(arguments.scalar);
   for (const std::string& note : transfer_function.notes()) printMessage("note: {}", note);
-  const std::string range_warning = rangeMissesScalar(info, transfer_function);
+  const std::string range_warning = rangeMissesScalar(variableFor(cache, variable, drawn), transfer_function);
   if (!range_warning.empty()) printMessage("warning: {}", range_warning);
 
   options.scene = sceneOf(arguments.surfaces);
@@ -280,8 +292,9 @@ void render(const RenderArguments& arguments) {
   options.size = dataSize(arguments.annotations, picture, transfer_function);
   options.output_bytes = outputBytes(arguments, picture);
   const CameraArguments camera = choice.camera(arguments.camera, transfer_function, options.size);
-  const CameraMotion motion =
-      withSteps(chooseCameraMotion(framesOf(camera, steps), lower, upper, options.size), steps);
+  const Series series = cache.series();
+  const MotionInTime motion = inTime(chooseCameraMotion(framesOf(camera, steps), lower, upper, options.size),
+                                     series, arguments.steps, steps, arguments.camera.frames);
   requireThreads(options.threads);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
@@ -388,6 +401,7 @@ void addRender(CLI::App& app) {
   const std::string when = "Time steps";
   addStepOptions(*command, arguments->steps, when);
   addStepsOption(*command, arguments->steps, when);
+  addInterpolateOption(*command, arguments->steps, when);
 
   const std::string where = "Camera";
   CameraArguments* camera = &arguments->camera;
@@ -422,7 +436,9 @@ void addRender(CLI::App& app) {
       ->add_option("--path", camera->path,
                    "Camera path: a JSON file of key frames, described in tools/REFERENCE.md")
       ->group(where);
-  command->add_option("--frames", camera->frames, "Number of frames of --orbit or --path (default 90)")
+  command
+      ->add_option("--frames", camera->frames,
+                   "Number of frames of --orbit or --path (default 90), or of --steps with --interpolate")
       ->check(CLI::Range(1u, kMaxFrames))
       ->group(where);
   command->add_option("--frame-rate", arguments->frame_rate, "Frames per second of a movie (default 25)")

@@ -34,7 +34,7 @@ struct Count {
   const char* name;
   uint64_t FrameStatistics::*value;
 };
-constexpr std::array<Count, 27> kCounts{{{"bricks_drawn", &FrameStatistics::bricks_drawn},
+constexpr std::array<Count, 28> kCounts{{{"bricks_drawn", &FrameStatistics::bricks_drawn},
                                          {"bricks_culled", &FrameStatistics::bricks_culled},
                                          {"bricks_out_of_image", &FrameStatistics::bricks_out_of_image},
                                          {"bricks_transparent", &FrameStatistics::bricks_transparent},
@@ -54,6 +54,7 @@ constexpr std::array<Count, 27> kCounts{{{"bricks_drawn", &FrameStatistics::bric
                                          {"bricks_cached", &FrameStatistics::bricks_cached},
                                          {"bricks_resident", &FrameStatistics::bricks_resident},
                                          {"cache_bytes", &FrameStatistics::cache_bytes},
+                                         {"kept_bytes", &FrameStatistics::kept_bytes},
                                          {"memory_used_bytes", &FrameStatistics::memory_used_bytes},
                                          {"ring_peak_bytes", &FrameStatistics::ring_peak_bytes},
                                          {"sweep_peak_bytes", &FrameStatistics::sweep_peak_bytes},
@@ -161,6 +162,7 @@ nlohmann::json statisticsOf(const RenderReport& report) {
   json["frames"] = Json::array();
   for (const FrameReport& frame : report.frames) {
     Json one = toJson(frame.statistics);
+    one["time"] = frame.time;
     one["camera"] = toJson(frame.camera);
     json["frames"].push_back(std::move(one));
   }

@@ -16,6 +16,7 @@ namespace curvisplat {
 
 /// One drawn frame.
 struct FrameReport {
+  double time = 0;  // of the series
   Camera camera;
   FrameStatistics statistics;
 };

@@ -64,37 +64,23 @@ void checkCameraArguments(const CameraArguments& arguments) {
   if (arguments.frames && !arguments.moves()) throw UsageError("--frames needs --orbit or --path");
 }
 
-CameraArguments framesOf(const CameraArguments& arguments, const std::vector<uint64_t>& steps) {
-  CameraArguments with_frames = arguments;
-  if (arguments.moves() && !arguments.frames && steps.size() > 1) with_frames.frames = steps.size();
-  return with_frames;
-}
-
-CameraMotion withSteps(CameraMotion motion, std::vector<uint64_t> steps) {
-  if (motion.frames == 1 && steps.size() > 1) {
-    motion.frames = steps.size();
-    motion.camera = [camera = motion.camera(0)](uint64_t) { return camera; };
-  }
-  motion.step = [steps = std::move(steps), frames = motion.frames](uint64_t frame) {
-    return steps[frame * steps.size() / frames];
-  };
-  return motion;
-}
-
 CameraMotion chooseCameraMotion(const CameraArguments& arguments, const glm::dvec3& lower,
                                 const glm::dvec3& upper, ImageSize size) {
   const uint64_t frames = arguments.frameCount();
   if (!arguments.path.empty()) {
     const auto path = std::make_shared<CameraPath>(CameraPath::fromFile(arguments.path));
     const double step = frames > 1 ? (path->end() - path->begin()) / static_cast<double>(frames - 1) : 0;
-    return {frames, [=](uint64_t frame) {
-              return path->at(frame + 1 == frames && frames > 1
-                                  ? path->end()
-                                  : path->begin() + step * static_cast<double>(frame));
-            }};
+    const auto time = [=](uint64_t frame) {
+      return frame + 1 == frames && frames > 1 ? path->end()
+                                               : path->begin() + step * static_cast<double>(frame);
+    };
+    CameraMotion motion{frames, [=](uint64_t frame) { return path->at(time(frame)); }, {}};
+    if (path->hasSeriesTimes())
+      motion.series_time = [=](uint64_t frame) { return path->seriesTimeAt(time(frame)); };
+    return motion;
   }
   Camera first = placedCamera(arguments, lower, upper, size);
-  if (!arguments.orbit) return {1, [=](uint64_t) { return first; }};
+  if (!arguments.orbit) return {1, [=](uint64_t) { return first; }, {}};
   const double degrees = parseNumber("--orbit", *arguments.orbit);
   const auto turn = [=](uint64_t frame) {
     return degrees * static_cast<double>(frame) / static_cast<double>(frames);
@@ -103,7 +89,7 @@ CameraMotion chooseCameraMotion(const CameraArguments& arguments, const glm::dve
     for (uint64_t frame = 0; frame < frames; ++frame)  // one scale that fits the data into every frame
       first.parallel_scale =
           std::max(first.parallel_scale, orbited(first, turn(frame)).parallelScaleFor(lower, upper, size));
-  return {frames, [=](uint64_t frame) { return orbited(first, turn(frame)); }};
+  return {frames, [=](uint64_t frame) { return orbited(first, turn(frame)); }, {}};
 }
 
 }  // namespace curvisplat

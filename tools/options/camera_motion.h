@@ -33,13 +33,9 @@ void checkCameraArguments(const CameraArguments& arguments);
 struct CameraMotion {
   uint64_t frames = 1;
   std::function<Camera(uint64_t frame)> camera;
-  std::function<uint64_t(uint64_t frame)> step = [](uint64_t) { return uint64_t{0}; };  // of the time
+  /// The series' time of a frame, of a path whose key frames have times; empty otherwise.
+  std::function<double(uint64_t frame)> series_time;
 };
-
-/// The arguments with a frame for each of several time steps, unless --frames says how many.
-CameraArguments framesOf(const CameraArguments& arguments, const std::vector<uint64_t>& steps);
-/// The motion through these time steps, evenly over its frames: a camera that stands gets a frame for each.
-CameraMotion withSteps(CameraMotion motion, std::vector<uint64_t> steps);
 
 /// Requires that checkCameraArguments() accepted the arguments. [lower, upper] is the data's bounding box
 /// after --scale. An orbit of 360 degrees is a loop: its last frame is one step before the first. A path's

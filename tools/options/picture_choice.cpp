@@ -56,7 +56,7 @@ void checkFunctionArguments(const ScalarArguments& arguments) {
 }
 
 const FirstChoice& PictureChoice::data() {
-  if (!data_) data_.emplace(cache_, variable_, scale_);
+  if (!data_) data_.emplace(cache_, variable_, scale_, what_);
   return *data_;
 }
 
@@ -68,6 +68,10 @@ void PictureChoice::add(const std::string& option, const std::string& value) {
 
 std::pair<double, double> PictureChoice::parseRange(const std::string& text) {
   if (text == "data") return {info().min, info().max};
+  for (const auto& [word, what] : {std::pair("step", ChosenFor::kStep), {"series", ChosenFor::kSeries}}) {
+    const VariableInfo there = variableFor(cache_, variable_, what);
+    if (text == word) return {there.min, there.max};
+  }
   const size_t comma = text.find(',');
   const auto end = [&](const std::string& word) {
     if (!word.ends_with('%')) return parseNumber("--range", word);

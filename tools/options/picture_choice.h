@@ -16,9 +16,10 @@ namespace curvisplat {
 
 class PictureChoice {
  public:
-  /// `cache` must outlive this; `scale` as in FrameOptions. Reads nothing.
-  PictureChoice(const CacheReader& cache, size_t variable, const glm::dvec3& scale)
-      : cache_(cache), variable_(variable), scale_(scale) {}
+  /// `cache` must outlive this; `scale` as in FrameOptions; `what` is drawn with one function. Reads nothing.
+  PictureChoice(const CacheReader& cache, size_t variable, const glm::dvec3& scale,
+                ChosenFor what = ChosenFor::kStep)
+      : cache_(cache), variable_(variable), scale_(scale), what_(what) {}
 
   /// Fills in the options that are not given. Throws UsageError, or Error if reading fails or a file does not
   /// hold a transfer function.
@@ -31,7 +32,7 @@ class PictureChoice {
 
  private:
   const FirstChoice& data();
-  const VariableInfo& info() const { return cache_.manifest().variables[variable_]; }
+  VariableInfo info() const { return variableFor(cache_, variable_, what_); }
   std::pair<double, double> parseRange(const std::string& text);
   TransferFunction fromFile(const ScalarArguments& arguments);
   TransferFunction fromParts(FunctionParts parts, const ScalarArguments& arguments);
@@ -44,6 +45,7 @@ class PictureChoice {
   const CacheReader& cache_;
   const size_t variable_;
   const glm::dvec3 scale_;
+  const ChosenFor what_;
   std::optional<FirstChoice> data_;
   std::string chosen_;
 };

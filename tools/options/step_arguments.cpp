@@ -21,25 +21,42 @@ void addStepsOption(CLI::App& command, StepArguments& arguments, const std::stri
       ->group(group);
 }
 
-std::vector<uint64_t> chosenSteps(const StepArguments& arguments, const CacheReader& cache) {
+void addInterpolateOption(CLI::App& command, StepArguments& arguments, const std::string& group) {
+  command
+      .add_flag(
+          "--interpolate", arguments.interpolates,
+          "Draw times between two steps of one grid by linear interpolation of their values, instead of "
+          "the nearest step")
+      ->group(group);
+}
+
+std::vector<StepPosition> chosenSteps(const StepArguments& arguments, const CacheReader& cache) {
   if (arguments.steps && (arguments.step || arguments.time))
     throw UsageError("--steps cannot be combined with --step or --time, which choose one");
   const Series& series = cache.series();
-  if (arguments.steps)
-    return selectedSteps("--steps", parseSteps("--steps", *arguments.steps), series.steps.size());
-  if (arguments.time) return {series.nearest(parseNumber("--time", *arguments.time))};
+  if (arguments.steps) {
+    std::vector<StepPosition> positions;
+    for (const uint64_t step :
+         selectedSteps("--steps", parseSteps("--steps", *arguments.steps), series.steps.size()))
+      positions.push_back({step});
+    return positions;
+  }
+  if (arguments.time) {
+    const double time = parseNumber("--time", *arguments.time);
+    return {arguments.interpolates ? series.between(time) : StepPosition{series.nearest(time)}};
+  }
   const uint64_t step = arguments.step.value_or(0);
   if (step >= series.steps.size())
     throw UsageError(
         "--step {}: is out of range; {} has {}", step, cache.cachePath().string(),
         series.steps.size() == 1 ? "one time step" : fmt::format("steps 0 to {}", series.steps.size() - 1));
-  return {step};
+  return {{step}};
 }
 
 CacheReader openAtStep(const std::filesystem::path& path, const StepArguments& arguments) {
   CacheReader cache(path);
-  const uint64_t step = chosenSteps(arguments, cache).front();
-  return step == cache.step() ? std::move(cache) : cache.atStep(step);
+  const StepPosition position = chosenSteps(arguments, cache).front();
+  return position == cache.position() ? std::move(cache) : cache.at(position);
 }
 
 }  // namespace curvisplat

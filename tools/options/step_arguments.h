@@ -15,6 +15,7 @@ namespace curvisplat {
 struct StepArguments {
   std::optional<uint64_t> step;
   std::optional<std::string> time, steps;
+  bool interpolates = false;
 
   bool severalSteps() const { return steps.has_value(); }
 };
@@ -24,11 +25,14 @@ void addStepOptions(CLI::App& command, StepArguments& arguments, const std::stri
 /// Adds --steps, of which each is a frame.
 void addStepsOption(CLI::App& command, StepArguments& arguments, const std::string& group);
 
-/// The steps to draw, in order: one, unless --steps was given. Throws UsageError if options contradict each other or
-/// the cache has no such step.
-std::vector<uint64_t> chosenSteps(const StepArguments& arguments, const CacheReader& cache);
+/// Adds --interpolate.
+void addInterpolateOption(CLI::App& command, StepArguments& arguments, const std::string& group);
 
-/// The cache at the first of its chosen steps.
+/// What to draw, in order: one, unless --steps was given. Throws UsageError if options contradict each other or the
+/// cache has no such step.
+std::vector<StepPosition> chosenSteps(const StepArguments& arguments, const CacheReader& cache);
+
+/// The cache at the first of its chosen steps. Throws Error as CacheReader.
 CacheReader openAtStep(const std::filesystem::path& path, const StepArguments& arguments);
 
 }  // namespace curvisplat

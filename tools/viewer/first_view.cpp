@@ -3,12 +3,20 @@
 #include "render/automatic/first_choice.h"
 
 namespace curvisplat {
+namespace {
+
+/// One function for all steps: they are played.
+FirstChoice choiceOf(const CacheReader& cache, const std::string& scalar) {
+  return {cache, cache.variableNamed(scalar), glm::dvec3(1), ChosenFor::kSeries};
+}
+
+}  // namespace
 
 ViewState firstViewOf(const CacheReader& cache, const std::string& scalar, ImageSize picture) {
   const Manifest& manifest = cache.manifest();
   ViewState state = firstViewOf(manifest, picture);
   if (!scalar.empty()) state.variable = scalar;
-  const FirstChoice choice(cache, cache.variableNamed(state.variable), glm::dvec3(1));
+  const FirstChoice choice = choiceOf(cache, state.variable);
   state.function = EditedFunction::automatic(choice.function());
   const ImageSize size = dataSize(state.annotations, picture, state.function.function());
   const ViewChoice view = choice.view(state.function.function(), size);
@@ -22,7 +30,7 @@ ViewState firstViewOf(const CacheReader& cache, const std::string& scalar, Image
 }
 
 EditedFunction automaticFunction(const CacheReader& cache, const std::string& scalar) {
-  return EditedFunction::automatic(FirstChoice(cache, cache.variableNamed(scalar), glm::dvec3(1)).function());
+  return EditedFunction::automatic(choiceOf(cache, scalar).function());
 }
 
 void chooseVariable(ViewState& state, const CacheReader& cache, const std::string& name) {

@@ -158,7 +158,7 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
     drawing.player->setTransferFunction(request.function);
   }
   drawing.function_version = request.function_version;
-  drawing.player->goTo(request.step);
+  drawing.player->goTo({request.step});
   FrameRenderer& renderer = drawing.player->renderer();
   {
     const MutexLock lock(mutex_);
@@ -198,7 +198,7 @@ void FrameLoop::readAhead(Drawing& drawing, const FrameRequest& request) {
     const MutexLock lock(mutex_);
     drawing_ = nullptr;  // a step with another geometry has another renderer
   }
-  drawing.player->goTo(*request.next_step);
+  drawing.player->goTo({*request.next_step});
   const double detail_px = request.moving ? drawing.effort.detailPixels() : 0;
   drawing.player->renderer().prefetch(request.camera, request.options,
                                       {.max_splats = drawing.effort.splats(), .detail_px = detail_px});
