@@ -28,6 +28,7 @@
 #include "tools/commands/render_statistics.h"
 #include "tools/options/camera_motion.h"
 #include "tools/options/frame_arguments.h"
+#include "tools/options/frame_part.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/picture_choice.h"
 #include "tools/options/scalar_arguments.h"
@@ -52,12 +53,28 @@ struct RenderArguments {
   StepArguments steps;
   FrameArguments frame;
   std::string backend = "auto";
-  std::optional<std::string> frame_rate;
+  std::optional<std::string> frame_rate, part;
   Annotations annotations;
 };
 
 bool severalFrames(const RenderArguments& arguments) {
   return arguments.camera.moves() || arguments.steps.severalSteps();
+}
+
+void checkPartArguments(const RenderArguments& arguments) {
+  if (!arguments.part) return;
+  parsePart(*arguments.part);
+  if (!severalFrames(arguments))
+    throw UsageError("--part {}: deals out frames, and there is one; give --orbit, --path or --steps",
+                     *arguments.part);
+  if (isMovieName(arguments.output))
+    throw UsageError(
+        "--part {}: a part of a movie cannot be joined with others; write numbered pictures, -o "
+        "frame_%04d.png, and join them with ffmpeg",
+        *arguments.part);
+  if (!arguments.first_image.empty())
+    throw UsageError("--part {}: cannot be combined with --first-image, which is of frame 0 alone",
+                     *arguments.part);
 }
 
 /// Throws UsageError if options contradict each other, and Error if an output cannot be written.
@@ -66,6 +83,7 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
   checkFunctionArguments(arguments.scalar);
   checkSurfaceArguments(arguments.surfaces);
   checkOutputName(arguments.output, severalFrames(arguments), size);
+  checkPartArguments(arguments);
   if (arguments.frame_rate && !isMovieName(arguments.output))
     throw UsageError("--frame-rate needs a movie: -o NAME.mp4");
   if (arguments.frame.background == "transparent" && arguments.output.extension() != ".png" &&
@@ -119,15 +137,17 @@ class FrameRun {
         report_(report),
         progress_(progress) {}
 
-  /// Pictures that were written are kept if a later frame fails.
-  void draw(const CameraMotion& motion) {
+  /// Draws the frames `numbers`. Pictures that were written are kept if a later frame fails.
+  void draw(const CameraMotion& motion, const std::vector<uint64_t>& numbers) {
     const bool moves = severalFrames(arguments_);
-    if (moves) progress_.begin("drawing", motion.frames, "frames");
-    for (uint64_t number = 0; number < motion.frames; ++number) {
+    if (moves) progress_.begin("drawing", numbers.size(), "frames");
+    for (size_t n = 0; n < numbers.size(); ++n) {
+      const uint64_t number = numbers[n];
       Progress of_frame;
       of_frame.stopWith(progress_);
       try {
-        draw(number, motion, moves ? of_frame : progress_);
+        const uint64_t* const next = n + 1 < numbers.size() ? &numbers[n + 1] : nullptr;
+        draw(number, next, motion, moves ? of_frame : progress_);
       } catch (const Interrupted&) {
         throw;
       } catch (const UsageError& error) {
@@ -144,13 +164,13 @@ class FrameRun {
   }
 
  private:
-  void draw(uint64_t number, const CameraMotion& motion, Progress& progress) {
+  void draw(uint64_t number, const uint64_t* next, const CameraMotion& motion, Progress& progress) {
     player_.goTo(motion.step(number));
     const Camera camera = motion.camera(number);
     FrameStatistics statistics;
     if (number > 0 || arguments_.first_image.empty()) {
       const Image image = player_.renderer().render(camera, report_.options, statistics, &progress);
-      if (number + 1 < motion.frames) prefetch(motion, number + 1);
+      if (next) prefetch(motion, *next);
       finish(number, camera, image, statistics);
       return;
     }
@@ -177,13 +197,13 @@ class FrameRun {
 
   void finish(uint64_t number, const Camera& camera, const Image& image, const FrameStatistics& statistics) {
     annotate(image, camera, [&](const Image& picture) { output_.write(number, picture); });
-    if (number == 0 && !report_.first_image) report_.time_to_first_image_s = secondsSinceStart();
-    report_.frames.push_back({camera, statistics});
+    if (report_.frames.empty() && !report_.first_image) report_.time_to_first_image_s = secondsSinceStart();
+    report_.frames.push_back({number, camera, statistics});
     const std::string which = severalFrames(arguments_) ? fmt::format(" of frame {}", number) : "";
     reportUnreadable(which, statistics);
     const RenderedScene scene{manifest_, report_.variable, report_.transfer_function,
                               camera,    report_.options,  statistics};
-    if (number == 0) warnOfPoorPicture(image, scene);
+    if (report_.frames.size() == 1) warnOfPoorPicture(image, scene);
     if (reported_empty_ || !isEmpty(image, report_.options.background)) return;
     reported_empty_ = true;
     progress_.end();
@@ -233,14 +253,18 @@ class FrameRun {
 };
 
 /// What a stopped run has done, and left.
-std::string howFar(const RenderReport& report, uint64_t frames) {
+std::string howFar(const RenderReport& report, uint64_t frames, bool several) {
   const std::string output = report.output.string();
-  if (frames == 1) return fmt::format("interrupted; {} was not written", output);
+  if (!several) return fmt::format("interrupted; {} was not written", output);
   return fmt::format("interrupted after {} of {} frames; {}", report.frames.size(), frames,
                      isMovieName(output) ? output + " was not written" : "the pictures of these are kept");
 }
 
 void printResult(const RenderReport& report) {
+  if (report.frames.empty()) {
+    fmt::print("{}: no frames in this part\n", report.output.string());
+    return;
+  }
   const FrameStatistics& last = report.frames.back().statistics;
   if (report.frames.size() == 1) {
     fmt::print("{}: {} splats of {} in {} bricks, {:.2f} s, {}\n", report.output.string(), last.splats_drawn,
@@ -282,6 +306,8 @@ void render(const RenderArguments& arguments) {
   const CameraArguments camera = choice.camera(arguments.camera, transfer_function, options.size);
   const CameraMotion motion =
       withSteps(chooseCameraMotion(framesOf(camera, steps), lower, upper, options.size), steps);
+  const std::vector<uint64_t> numbers =
+      (arguments.part ? parsePart(*arguments.part) : FramePart{}).of(motion.frames);
   requireThreads(options.threads);
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
@@ -301,11 +327,11 @@ void render(const RenderArguments& arguments) {
     if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, statisticsOf(report));
   };
   try {
-    FrameRun(arguments, manifest, player, *output, report, progress).draw(motion);
+    FrameRun(arguments, manifest, player, *output, report, progress).draw(motion, numbers);
   } catch (const Interrupted& interrupted) {
     progress.end();
     writeReport();
-    throw Interrupted(interrupted.signal(), howFar(report, motion.frames));
+    throw Interrupted(interrupted.signal(), howFar(report, numbers.size(), severalFrames(arguments)));
   }
   writeReport();
   printResult(report);
@@ -426,6 +452,11 @@ void addRender(CLI::App& app) {
       ->check(CLI::Range(1u, kMaxFrames))
       ->group(where);
   command->add_option("--frame-rate", arguments->frame_rate, "Frames per second of a movie (default 25)")
+      ->group(where);
+  command
+      ->add_option("--part", arguments->part,
+                   "Draw part i of n of the frames, i/n with i from 1 to n: frames i-1, i-1+n, i-1+2n, ... "
+                   "under their names of the whole")
       ->group(where);
 
   const std::string how = "Resources";

@@ -161,6 +161,7 @@ nlohmann::json statisticsOf(const RenderReport& report) {
   json["frames"] = Json::array();
   for (const FrameReport& frame : report.frames) {
     Json one = toJson(frame.statistics);
+    one["frame"] = frame.number;
     one["camera"] = toJson(frame.camera);
     json["frames"].push_back(std::move(one));
   }

@@ -16,6 +16,7 @@ namespace curvisplat {
 
 /// One drawn frame.
 struct FrameReport {
+  uint64_t number = 0;
   Camera camera;
   FrameStatistics statistics;
 };
