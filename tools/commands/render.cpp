@@ -35,6 +35,7 @@
 #include "tools/options/step_arguments.h"
 #include "tools/options/surface_arguments.h"
 #include "tools/output/frame_output.h"
+#include "tools/output/launched_ranks.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
@@ -84,6 +85,8 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
   checkSurfaceArguments(arguments.surfaces);
   checkOutputName(arguments.output, severalFrames(arguments), size);
   checkPartArguments(arguments);
+  if (!arguments.first_image.empty() && !launchedRanks().alone())
+    throw UsageError("--first-image {}: one process draws it; start one", arguments.first_image.string());
   if (arguments.frame_rate && !isMovieName(arguments.output))
     throw UsageError("--frame-rate needs a movie: -o NAME.mp4");
   if (arguments.frame.background == "transparent" && arguments.output.extension() != ".png" &&
@@ -121,28 +124,84 @@ uint64_t outputBytes(const RenderArguments& arguments, ImageSize picture) {
   else
     bytes = writingBytes(arguments.output, picture);
   if (!arguments.first_image.empty()) bytes = std::max(bytes, writingBytes(arguments.first_image, picture));
+  // Tiles or pictures of other ranks, as they come and as they are put in their places.
+  if (!launchedRanks().alone()) bytes = std::max(bytes, 2 * 4 * sizeof(float) * picture.pixels());
   if (!(arguments.annotations == Annotations{})) bytes += annotatedBytes(picture);
   return bytes;
 }
 
 /// Draws one frame after another and collects the report. Throws Interrupted after progress.stop().
+///
+/// Several ranks draw a frame each, if there are as many frames: a round. Otherwise they draw each frame together
+/// (FrameOptions::ranks), and rank 0 writes it.
 class FrameRun {
  public:
   FrameRun(const RenderArguments& arguments, const Manifest& manifest, StepPlayer& player,
-           FrameOutput& output, RenderReport& report, Progress& progress)
+           FrameOutput* output, RenderReport& report, Progress& progress)
       : arguments_(arguments),
         manifest_(manifest),
         player_(player),
         output_(output),
         report_(report),
-        progress_(progress) {}
+        progress_(progress),
+        ranks_(launchedRanks()) {}
 
   /// Draws the frames `numbers`. Pictures that were written are kept if a later frame fails.
   void draw(const CameraMotion& motion, const std::vector<uint64_t>& numbers) {
     const bool moves = severalFrames(arguments_);
-    if (moves) progress_.begin("drawing", numbers.size(), "frames");
-    for (size_t n = 0; n < numbers.size(); ++n) {
-      const uint64_t number = numbers[n];
+    const bool dealt = !ranks_.alone() && !report_.options.ranks;
+    const std::vector<uint64_t> own = dealt ? ownOf(numbers) : numbers;
+    const size_t rounds = dealt ? (numbers.size() + ranks_.count() - 1) / ranks_.count() : numbers.size();
+    if (moves) progress_.begin("drawing", own.size(), "frames");
+    for (size_t n = 0; n < rounds; ++n) {
+      picture_ = Image();
+      if (n < own.size()) drawNext(motion, own, n);
+      if (dealt && isMovieName(arguments_.output)) writeRound(numbers, n);
+    }
+    if (dealt) gatherReports(motion);
+    if (output_) output_->finish();
+    progress_.end();
+  }
+
+ private:
+  std::vector<uint64_t> ownOf(const std::vector<uint64_t>& numbers) const {
+    std::vector<uint64_t> own;
+    for (size_t n = ranks_.rank(); n < numbers.size(); n += ranks_.count()) own.push_back(numbers[n]);
+    return own;
+  }
+
+  /// The pictures that the ranks have drawn, into the movie at rank 0.
+  void writeRound(const std::vector<uint64_t>& numbers, size_t round) {
+    for (unsigned rank = 0; rank < ranks_.count(); ++rank) {
+      const size_t at = round * ranks_.count() + rank;
+      if (at >= numbers.size()) return;
+      const bool own = rank == ranks_.rank();
+      std::vector<Ranks::Bytes> sent = ranks_.gather(own ? toBytes(picture_.rgba) : Ranks::Bytes{});
+      if (!ranks_.isFirst()) continue;
+      Image picture;
+      picture.size = report_.picture;
+      picture.rgba = fromBytes<float>(sent[rank]);
+      output_->write(numbers[at], picture);
+    }
+  }
+
+  void gatherReports(const CameraMotion& motion) {
+    const std::vector<Ranks::Bytes> sent = ranks_.gather(packStatistics(report_.frames));
+    if (!ranks_.isFirst()) return;
+    report_.frames.clear();
+    for (const Ranks::Bytes& bytes : sent)
+      for (FrameReport& frame : unpackStatistics(bytes)) {
+        frame.camera = motion.camera(frame.number);
+        report_.frames.push_back(std::move(frame));
+      }
+    std::sort(report_.frames.begin(), report_.frames.end(),
+              [](const FrameReport& a, const FrameReport& b) { return a.number < b.number; });
+  }
+
+  void drawNext(const CameraMotion& motion, const std::vector<uint64_t>& numbers, size_t n) {
+    const bool moves = severalFrames(arguments_);
+    const uint64_t number = numbers[n];
+    {
       Progress of_frame;
       of_frame.stopWith(progress_);
       try {
@@ -157,20 +216,17 @@ class FrameRun {
         if (moves) throw Error("frame {}: {}", number, error.what());
         throw;
       }
-      if (moves) progress_.advance(1);
     }
-    output_.finish();
-    progress_.end();
+    if (moves) progress_.advance(1);
   }
 
- private:
   void draw(uint64_t number, const uint64_t* next, const CameraMotion& motion, Progress& progress) {
     player_.goTo(motion.step(number));
     const Camera camera = motion.camera(number);
     FrameStatistics statistics;
     if (number > 0 || arguments_.first_image.empty()) {
       const Image image = player_.renderer().render(camera, report_.options, statistics, &progress);
-      if (next) prefetch(motion, *next);
+      if (next && !report_.options.ranks) prefetch(motion, *next);
       finish(number, camera, image, statistics);
       return;
     }
@@ -195,10 +251,22 @@ class FrameRun {
     }
   }
 
-  void finish(uint64_t number, const Camera& camera, const Image& image, const FrameStatistics& statistics) {
-    annotate(image, camera, [&](const Image& picture) { output_.write(number, picture); });
+  void finish(uint64_t number, const Camera& camera, const Image& image, FrameStatistics statistics) {
+    std::vector<FrameStatistics> of_ranks;
+    if (report_.options.ranks) {
+      for (const Ranks::Bytes& bytes : ranks_.gather(packStatistics({{number, camera, statistics}})))
+        of_ranks.push_back(unpackStatistics(bytes).front().statistics);
+      if (!ranks_.isFirst()) return;
+      statistics = combined(of_ranks);
+    }
+    annotate(image, camera, [&](const Image& picture) {
+      if (isMovieName(arguments_.output) && !ranks_.alone() && !report_.options.ranks)
+        picture_ = picture;  // for rank 0
+      else
+        output_->write(number, picture);
+    });
     if (report_.frames.empty() && !report_.first_image) report_.time_to_first_image_s = secondsSinceStart();
-    report_.frames.push_back({number, camera, statistics});
+    report_.frames.push_back({number, camera, statistics, std::move(of_ranks)});
     const std::string which = severalFrames(arguments_) ? fmt::format(" of frame {}", number) : "";
     reportUnreadable(which, statistics);
     const RenderedScene scene{manifest_, report_.variable, report_.transfer_function,
@@ -245,9 +313,11 @@ class FrameRun {
   const RenderArguments& arguments_;
   const Manifest& manifest_;
   StepPlayer& player_;
-  FrameOutput& output_;
+  FrameOutput* output_;  // null at ranks that write nothing
   RenderReport& report_;
   Progress& progress_;
+  Ranks& ranks_;
+  Image picture_;  // of a movie's round
   bool reported_empty_ = false;
   std::set<uint32_t> reported_unreadable_;  // bricks
 };
@@ -278,6 +348,7 @@ void printResult(const RenderReport& report) {
 }
 
 void render(const RenderArguments& arguments) {
+  Ranks& ranks = launchedRanks();
   FrameOptions options = frameOptions(arguments.frame);
   checkArguments(arguments, options.size);
   if (options.threads == 0) options.threads = std::max(1u, std::thread::hardware_concurrency());
@@ -308,10 +379,16 @@ void render(const RenderArguments& arguments) {
       withSteps(chooseCameraMotion(framesOf(camera, steps), lower, upper, options.size), steps);
   const std::vector<uint64_t> numbers =
       (arguments.part ? parsePart(*arguments.part) : FramePart{}).of(motion.frames);
+  // A rank has a picture to itself where there are enough of them.
+  if (!ranks.alone() && numbers.size() < ranks.count()) options.ranks = &ranks;
   requireThreads(options.threads);
-  Progress progress{progressBar()};
+  Progress progress{ranks.isFirst() ? progressBar() : Progress::Display{}};
   const StopOnSignals stopping(progress);
-  const auto output = makeFrameOutput(arguments.output, severalFrames(arguments), picture, frames_per_s);
+  const StopRanksWith stopping_ranks(ranks, progress);
+  const bool writes_own = !options.ranks && !isMovieName(arguments.output);
+  const auto output = ranks.isFirst() || writes_own
+                          ? makeFrameOutput(arguments.output, severalFrames(arguments), picture, frames_per_s)
+                          : nullptr;
   StepPlayer player(cache, variable, transfer_function, parseBackend(arguments.backend));
   RenderReport report{arguments.cache,
                       arguments.output,
@@ -320,19 +397,22 @@ void render(const RenderArguments& arguments) {
                       transfer_function,
                       options,
                       player.renderer().backendName(),
+                      ranks.count(),
                       {},
                       {},
                       {}};
   const auto writeReport = [&] {
-    if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, statisticsOf(report));
+    if (!arguments.statistics.empty() && ranks.isFirst())
+      writeStatistics(arguments.statistics, statisticsOf(report));
   };
   try {
-    FrameRun(arguments, manifest, player, *output, report, progress).draw(motion, numbers);
+    FrameRun(arguments, manifest, player, output.get(), report, progress).draw(motion, numbers);
   } catch (const Interrupted& interrupted) {
     progress.end();
     writeReport();
     throw Interrupted(interrupted.signal(), howFar(report, numbers.size(), severalFrames(arguments)));
   }
+  if (!ranks.isFirst()) return;
   writeReport();
   printResult(report);
   if (!choice.chosenOptions().empty()) fmt::print("chosen from the data: {}\n", choice.chosenOptions());
