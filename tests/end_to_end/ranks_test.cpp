@@ -112,6 +112,68 @@ TEST_F(RanksCommand, AreEndedByTheOneThatFails) {
   EXPECT_FALSE(fs::exists(file("never.png")));
 }
 
+TEST_F(RanksCommand, ConvertTogether) {
+  const Files expected = filesOf(file("g.splats"));
+  for (const unsigned count : {2u, 3u}) {
+    fs::remove_all(file("shared.splats"));
+    const ProgramResult shared =
+        runAsRanks(count, {"convert", file("g.xyz"), file("g.fun"), "-o", file("shared.splats"), "--threads",
+                           "1", "--memory", "256M", "--stats", file("c.json")});
+    EXPECT_EQ(shared.status, 0) << shared.err;
+    EXPECT_EQ(lineCount(shared.out), 2) << shared.out;
+    const Files found = filesOf(file("shared.splats"));
+    ASSERT_EQ(found.size(), expected.size());
+    for (const auto& [name, bytes] : expected) EXPECT_TRUE(found.at(name) == bytes) << name;
+    EXPECT_EQ(nlohmann::json::parse(readTextFile(file("c.json")))["ranks"], count);
+  }
+  for (const auto& entry : fs::directory_iterator(folder_->path()))
+    EXPECT_EQ(entry.path().filename().string().find("shared.splats."), std::string::npos) << entry.path();
+}
+
+TEST_F(RanksCommand, ConvertNoSeriesTogether) {
+  const ProgramResult result =
+      runAsRanks(2, {"convert", file("g.xyz"), file("g.fun"), "--add-scalar", "f", "--to", file("g.splats")});
+  EXPECT_EQ(result.status, 2);
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  EXPECT_NE(result.err.find("one process"), std::string::npos) << result.err;
+}
+
+TEST_F(RanksCommand, LeaveNothingWhereOneFailsInAConversion) {
+  // Rank 1 has no grid.
+  const std::string script = file("one_without.sh");
+  writeFileAtomically(script,
+                      fmt::format("#!/bin/sh\n"
+                                  "grid=\"{0}\"\n"
+                                  "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && grid=\"{0}.missing\"\n"
+                                  "exec \"{2}\" convert \"$grid\" \"{1}\" -o \"{3}\"\n",
+                                  file("g.xyz"), file("g.fun"), CURVISPLAT_PROGRAM, file("never.splats")));
+  fs::permissions(script, fs::perms::owner_all);
+  const ProgramResult result = runAsRanks(2, {}, script);
+  EXPECT_EQ(result.status, 1);
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  EXPECT_NE(result.err.find("rank 1 of 2"), std::string::npos) << result.err;
+  for (const auto& entry : fs::directory_iterator(folder_->path()))
+    EXPECT_EQ(entry.path().filename().string().find("never"), std::string::npos) << entry.path();
+}
+
+TEST_F(RanksCommand, AreSimulatedFromTheIndex) {
+  const ProgramResult result = runProgram({"bench", file("g.splats"), "--ranks", "1,2,16,1024", "--size",
+                                           "640x480", "--json", file("b.json"), "--plot", file("plots")});
+  EXPECT_EQ(result.status, 0) << result.err;
+  const auto counts = nlohmann::json::parse(readTextFile(file("b.json")))["ranks"]["counts"];
+  ASSERT_EQ(counts.size(), 4u);
+  EXPECT_EQ(counts[0]["efficiency"], 1);
+  EXPECT_EQ(counts[0]["exchanged_bytes"], 0);
+  for (const auto& one : counts) {
+    EXPECT_LE(one["efficiency"].get<double>(), one["balance"].get<double>() + 1e-9);
+    EXPECT_GE(one["all_bytes"].get<uint64_t>(), counts[0]["all_bytes"].get<uint64_t>());
+  }
+  EXPECT_TRUE(fs::exists(file("plots/ranks.png")));
+  const ProgramResult wrong = runProgram({"bench", file("g.splats"), "--ranks", "0"});
+  EXPECT_EQ(wrong.status, 2);
+  EXPECT_EQ(lineCount(wrong.err), 1) << wrong.err;
+}
+
 TEST_F(RanksCommand, OfWhichThereIsOneNeedNoMpi) {
   const ProgramResult alone = runAsRanks(1, renderTo("alone.exr"));
   EXPECT_EQ(alone.status, 0) << alone.err;
