@@ -156,6 +156,23 @@ TEST_F(RanksCommand, LeaveNothingWhereOneFailsInAConversion) {
     EXPECT_EQ(entry.path().filename().string().find("never"), std::string::npos) << entry.path();
 }
 
+TEST_F(RanksCommand, SayWhichOfThemHasNoRoom) {
+  const std::string script = file("one_full.sh");
+  writeFileAtomically(script,
+                      fmt::format("#!/bin/bash\n"
+                                  "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && ulimit -f 100\n"
+                                  "exec \"{}\" convert \"{}\" \"{}\" -o \"{}\"\n",
+                                  CURVISPLAT_PROGRAM, file("g.xyz"), file("g.fun"), file("never.splats")));
+  fs::permissions(script, fs::perms::owner_all);
+  const ProgramResult result = runAsRanks(3, {}, script);
+  EXPECT_EQ(result.status, 1);
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  EXPECT_NE(result.err.find("rank 1 of 3"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("File too large"), std::string::npos) << result.err;
+  for (const auto& entry : fs::directory_iterator(folder_->path()))
+    EXPECT_EQ(entry.path().filename().string().find("never.splats"), std::string::npos) << entry.path();
+}
+
 TEST_F(RanksCommand, AreSimulatedFromTheIndex) {
   const ProgramResult result = runProgram({"bench", file("g.splats"), "--ranks", "1,2,16,1024", "--size",
                                            "640x480", "--json", file("b.json"), "--plot", file("plots")});

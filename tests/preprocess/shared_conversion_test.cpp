@@ -150,9 +150,9 @@ TEST_F(SharedConversion, IsResumedByAnyNumberOfRanks) {
     options.resume = false;
     // Stopped when the first bricks have been built.
     std::atomic<bool> building = false;
-    const auto interrupted = [&](Ranks& ranks) {
+    const auto interrupted = [&, count = first](Ranks& ranks) {
       ConvertOptions of_rank = options;
-      if (first > 1) of_rank.ranks = &ranks;
+      if (count > 1) of_rank.ranks = &ranks;
       Progress* stopped = nullptr;
       Progress progress([&](const Progress::State* state) {
         if (state && state->phase == "build") {
