@@ -17,6 +17,7 @@
 #include "stream/base/suggestion.h"
 #include "tools/commands/commands.h"
 #include "tools/options/shown_options.h"
+#include "tools/output/launched_ranks.h"
 #include "tools/output/standard_streams.h"
 #include "tools/output/stop_signals.h"
 #include "tools/output/thread_failures.h"
@@ -80,6 +81,13 @@ std::string describe(const CLI::App& app, const CLI::App* command, const CLI::Pa
   return text;
 }
 
+/// Reports a failure, as one rank for all where there are several.
+int fail(const std::string& line, int status) {
+  endRanksAfter(line, status);
+  printMessage(line);
+  return status;
+}
+
 /// Returns the exit status: 0 success, 1 failure, 2 wrong usage, 128 + n stopped by signal n.
 int run(int argc, char** argv) {
   CLI::App app("Render curvilinear simulation grids that are larger than memory.", "curvisplat");
@@ -116,23 +124,17 @@ int run(int argc, char** argv) {
                  command);
     return 2;
   } catch (const UsageError& error) {
-    printMessage("{}", error.what());
-    return 2;
+    return fail(error.what(), 2);
   } catch (const Interrupted& interrupted) {
-    printMessage("{}", interrupted.what());
-    return 128 + interrupted.signal();  // what a shell reports for a process that a signal ended
+    return fail(interrupted.what(), 128 + interrupted.signal());  // as a shell reports for a signal
   } catch (const std::bad_alloc&) {
-    printMessage("out of memory; lower --memory or --size, or use a machine with more memory");
-    return 1;
+    return fail("out of memory; lower --memory or --size, or use a machine with more memory", 1);
   } catch (const std::filesystem::filesystem_error& error) {
-    printMessage("{}: {}", error.path1().string(), error.code().message());
-    return 1;
+    return fail(error.path1().string() + ": " + error.code().message(), 1);
   } catch (const std::exception& error) {
-    if (isForLackOfThreads(error))
-      printMessage("cannot start a thread: {}", kThreadAdvice);
-    else if (std::ferror(stdout) == 0)
-      printMessage("{}", error.what());  // otherwise main() reports it
-    return 1;
+    if (isForLackOfThreads(error)) return fail(std::string("cannot start a thread: ") + kThreadAdvice, 1);
+    // Otherwise main() reports that standard output has failed.
+    return std::ferror(stdout) == 0 ? fail(error.what(), 1) : 1;
   }
 }
 
@@ -144,6 +146,7 @@ int main(int argc, char** argv) {
   curvisplat::openStandardStreams();
   curvisplat::ignoreFileSizeSignal();
   const int status = curvisplat::run(argc, argv);
+  if (status == 0) curvisplat::finishRanks();
   const bool printed = curvisplat::finishStandardOutput();
   return status == 0 && !printed ? 1 : status;
 }

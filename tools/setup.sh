@@ -26,6 +26,8 @@ packages=(
   libglfw3-dev libimgui-dev
   # SIMD for drawing on the processor
   libhwy-dev
+  # several processes
+  libopenmpi-dev openmpi-bin
   # the Python package
   pybind11-dev python3-dev python3-numpy
   # tests and benchmarks

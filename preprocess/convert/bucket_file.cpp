@@ -161,6 +161,7 @@ struct BucketFile::State {
   std::optional<OutputFile> output;   // of a new file
   std::optional<ChunkWriter> writer;  // to it
   std::optional<InputFile> input;     // after close(), or of another's file
+  std::vector<std::unique_ptr<BucketFile>> joined;
   bool leave = false;
 
   void flush(Bucket& bucket) REQUIRES(bucket.mutex) {
@@ -262,30 +263,41 @@ void BucketFile::append(uint32_t number, std::span<const std::byte> records) {
   bucket.buffer.insert(bucket.buffer.end(), records.begin(), records.end());
 }
 
-void BucketFile::close() {
+void BucketFile::join(const std::filesystem::path& path, BucketChains chains) {
+  CURVISPLAT_CHECK_OP(chains.chains.size(), ==, state_->buckets.size());
+  state_->joined.push_back(std::make_unique<BucketFile>(path, std::move(chains)));
+  state_->joined.back()->leave();
+}
+
+void BucketFile::close(bool sync) {
   for (Bucket& bucket : state_->buckets) {
     const MutexLock lock(bucket.mutex);
     if (!bucket.buffer.empty()) state_->flush(bucket);
   }
   state_->writer->finish();
+  if (sync) state_->output->close();
   state_->input.emplace(state_->path, Caching::kDirect);
 }
 
 uint64_t BucketFile::bytes(uint32_t bucket) const {
   const Bucket& of_number = state_->buckets[bucket];
+  uint64_t bytes = 0;
+  for (const auto& other : state_->joined) bytes += other->bytes(bucket);
   const MutexLock lock(of_number.mutex);
-  return of_number.bytes;
+  return bytes + of_number.bytes;
 }
 
 uint64_t BucketFile::size() const {
-  return state_->end;
+  uint64_t size = state_->end;
+  for (const auto& other : state_->joined) size += other->size();
+  return size;
 }
 
 void BucketFile::read(uint32_t bucket, std::vector<std::byte>& out) const {
   if (out.capacity() < bytes(bucket)) out = {};  // or old and new would be in memory together
   out.resize(bytes(bucket));
   size_t done = 0;
-  state_->forEachChunk(bucket, [&](std::span<const std::byte> records) {
+  forEachChunk(bucket, [&](std::span<const std::byte> records) {
     CURVISPLAT_CHECK_OP(done + records.size(), <=, out.size());
     std::copy(records.begin(), records.end(), out.begin() + static_cast<ptrdiff_t>(done));
     done += records.size();
@@ -296,6 +308,7 @@ void BucketFile::read(uint32_t bucket, std::vector<std::byte>& out) const {
 void BucketFile::forEachChunk(uint32_t bucket,
                               const std::function<void(std::span<const std::byte>)>& use) const {
   state_->forEachChunk(bucket, use);
+  for (const auto& other : state_->joined) other->forEachChunk(bucket, use);
 }
 
 }  // namespace curvisplat

@@ -62,9 +62,14 @@ class BucketFile {
   void append(uint32_t bucket, std::span<const std::byte> records);
 
   /// Writes what is left in the buffers and frees them. Reading is possible from here on, by any thread;
-  /// nothing is appended.
-  void close();
+  /// nothing is appended. `sync`: another machine is to read it.
+  void close(bool sync = false);
 
+  /// After close(): the records of another rank's file, which has the same buckets, are read as well. That file
+  /// stays. Throws as the second constructor does.
+  void join(const std::filesystem::path& path, BucketChains chains);
+
+  /// Of its own file.
   BucketChains chains() const;
   uint64_t bytes(uint32_t bucket) const;
   /// All records of a bucket; the order is not to be relied on. Overwrites `out` and keeps its capacity.

@@ -44,18 +44,19 @@ uint32_t buildUnitOf(const BucketTree& tree, uint32_t leaf) {
   return unit;
 }
 
-BucketLoader::BucketLoader(const BucketTree& tree, const BucketFile& file, size_t variables, uint32_t first,
-                           uint64_t most_bytes)
+BucketLoader::BucketLoader(const BucketTree& tree, const BucketFile& file, size_t variables,
+                           const BucketRange& range, uint64_t most_bytes)
     : tree_(&tree),
       file_(&file),
       variables_(variables),
-      position_(first),
+      position_(range.first),
+      end_(range.end),
       most_bytes_(most_bytes),
       ahead_([this](LoadedBucket& loaded) { return fill(loaded); }) {}
 
 bool BucketLoader::fill(LoadedBucket& loaded) {
-  while (position_ < file_->buckets() && file_->bytes(position_) == 0) ++position_;
-  if (position_ == file_->buckets() || ended_) return false;
+  while (position_ < end_ && file_->bytes(position_) == 0) ++position_;
+  if (position_ == end_ || ended_) return false;
   loaded.bucket = position_++;
   loaded.too_large = ended_ = file_->bytes(loaded.bucket) > most_bytes_;
   loaded.parts.clear();

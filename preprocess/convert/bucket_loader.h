@@ -35,13 +35,18 @@ struct LoadedBucket {
   }
 };
 
-/// Loads the buckets from `first` on that are not empty, in order. Ends after one that is too large, so that
+/// The buckets first .. end - 1.
+struct BucketRange {
+  uint32_t first = 0, end = 0;
+};
+
+/// Loads the buckets of a range that are not empty, in order. Ends after one that is too large, so that
 /// its division has the memory for itself. Two buckets of `most_bytes`, and 4 bytes a record
 /// of three, are in memory.
 /// Tree and file must not change meanwhile.
 class BucketLoader {
  public:
-  BucketLoader(const BucketTree& tree, const BucketFile& file, size_t variables, uint32_t first,
+  BucketLoader(const BucketTree& tree, const BucketFile& file, size_t variables, const BucketRange& range,
                uint64_t most_bytes);
 
   /// The next bucket, until the next call; null at the end. Throws Error if the disk fails.
@@ -55,6 +60,7 @@ class BucketLoader {
   const BucketFile* file_;
   const size_t variables_;
   uint32_t position_;
+  const uint32_t end_;
   const uint64_t most_bytes_;
   bool ended_ = false;
   std::vector<uint32_t> tags_;  // [record]: 2 x its part, and 1 if it is irregular

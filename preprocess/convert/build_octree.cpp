@@ -1,15 +1,14 @@
 #include "preprocess/convert/build_octree.h"
 
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
 #include <utility>
 
+#include "preprocess/convert/build_parent.h"
 #include "preprocess/convert/counting_grid.h"
 #include "preprocess/convert/divide_bucket.h"
-#include "preprocess/convert/merge_levels.h"
 #include "preprocess/convert/splat_record.h"
 #include "stream/base/check.h"
 
@@ -30,7 +29,13 @@ OctreeBuilder::OctreeBuilder(const RootCube& root, const std::vector<GridBlock>&
 void OctreeBuilder::build(const BucketFile& file) {
   const std::vector<uint32_t> leaves = tree_->leavesBelow(0);
   takeUpBricks();
-  buildBuckets(file, leaves, finishTakenUp(leaves, file.buckets()));
+  buildBuckets(file, leaves, finishTakenUp(leaves, file.buckets()), file.buckets());
+  CURVISPLAT_CHECK_OP(carried_.size(), ==, 0u);
+}
+
+void OctreeBuilder::buildShare(const BucketFile& file, uint32_t first, uint32_t end) {
+  built_.resize(tree_->size());
+  buildBuckets(file, tree_->leavesBelow(0), first, end);
   CURVISPLAT_CHECK_OP(carried_.size(), ==, 0u);
 }
 
@@ -78,18 +83,18 @@ uint32_t OctreeBuilder::finishTakenUp(const std::vector<uint32_t>& leaves, uint3
   return buckets;
 }
 
-void OctreeBuilder::buildBuckets(const BucketFile& file, const std::vector<uint32_t>& leaves,
-                                 uint32_t first) {
+void OctreeBuilder::buildBuckets(const BucketFile& file, const std::vector<uint32_t>& leaves, uint32_t first,
+                                 uint32_t end) {
   // Now, since dividing one of the buckets gives its leaves numbers in another file.
   std::vector<std::vector<uint32_t>> leaves_of(file.buckets());
   for (const uint32_t leaf : leaves)
     if ((*tree_)[leaf].contents.splats > 0) leaves_of[(*tree_)[leaf].bucket].push_back(leaf);
   uint32_t next = first;
-  while (next < file.buckets()) {
+  while (next < end) {
     bool too_large = false;
     {
-      BucketLoader loader(*tree_, file, variables_, next, plan_.bucket_bytes);
-      next = file.buckets();
+      BucketLoader loader(*tree_, file, variables_, {next, end}, plan_.bucket_bytes);
+      next = end;
       while (LoadedBucket* loaded = loader.next()) {
         too_large = loaded->too_large;
         if (too_large) next = loaded->bucket;
@@ -151,7 +156,7 @@ void OctreeBuilder::buildTooLarge(const BucketFile& file, uint32_t bucket,
   }
   const std::filesystem::path path = temporary_folder_ / fmt::format("divided{}.bin", files_made_++);
   const DividedBucket divided = divideBucket(file, bucket, leaves, variables_, plan_, path, *tree_);
-  buildBuckets(*divided.file, divided.leaves, 0);
+  buildBuckets(*divided.file, divided.leaves, 0, divided.file->buckets());
 }
 
 void OctreeBuilder::buildCoincident(const BucketFile& file, uint32_t bucket, uint32_t leaf) {
@@ -205,25 +210,14 @@ void OctreeBuilder::completeParents(uint32_t node) {
 
 void OctreeBuilder::buildParent(uint32_t node) {
   const uint32_t first_child = (*tree_)[node].first_child;
-  std::array<MergedOctant, 8> octants;
-  tbb::enumerable_thread_specific<OctantMerger> mergers([this] { return OctantMerger(root_, variables_); });
-  tbb::parallel_for(uint32_t{0}, uint32_t{8}, [&](uint32_t octant) {
-    const uint32_t child = first_child + octant;
-    if ((*tree_)[child].contents.splats == 0) return;
-    OctantMerger& merger = mergers.local();
-    merger.begin((*tree_)[child].cell);
-    for (uint64_t n = 0; n < built_[child].bricks; ++n)
-      merger.add(writer_->readBack(built_[child].first_brick + n));
-    octants[octant] = merger.finish();
-  });
-  BuiltCell cell;
-  for (uint32_t octant = 0; octant < 8; ++octant)
-    if (!octants[octant].splats.positions.empty())
-      cell.error = std::max({cell.error, built_[first_child + octant].error, octants[octant].detail});
-  BrickSplats brick = joinOctants((*tree_)[node].cell, variables_, std::move(octants));
-  cell.bricks.push_back({encodeBrick(root_, brick), static_cast<float>(cell.error), false});
-  cell.own_bricks = 1;
-  append(node, std::move(cell));
+  std::array<ChildBricks, 8> children;
+  for (uint32_t octant = 0; octant < 8; ++octant) {
+    const Built& built = built_[first_child + octant];
+    children[octant] = {(*tree_)[first_child + octant].cell,
+                        (*tree_)[first_child + octant].contents.splats > 0 ? built.bricks : 0, built.error,
+                        [this, &built](uint64_t n) { return writer_->readBack(built.first_brick + n); }};
+  }
+  append(node, buildFromChildren(root_, variables_, (*tree_)[node].cell, children));
 }
 
 }  // namespace curvisplat

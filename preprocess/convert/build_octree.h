@@ -36,6 +36,9 @@ class OctreeBuilder {
   /// Builds and appends what is in `file`, which holds the splats of all of the tree, and not yet in the
   /// writer. Throws Error if a disk fails.
   void build(const BucketFile& file);
+  /// The same for the buckets first .. end - 1, into a writer that has nothing: their bricks, and those of all
+  /// cells above them that lie in these buckets as a whole.
+  void buildShare(const BucketFile& file, uint32_t first, uint32_t end);
 
  private:
   /// What was appended for a node of the tree.
@@ -48,7 +51,8 @@ class OctreeBuilder {
   uint32_t finishTakenUp(const std::vector<uint32_t>& leaves, uint32_t buckets);
   uint64_t bricksOf(uint32_t node) const;
   bool isBuilt(uint32_t node) const { return node < built_.size() && built_[node].bricks > 0; }
-  void buildBuckets(const BucketFile& file, const std::vector<uint32_t>& leaves, uint32_t first);
+  void buildBuckets(const BucketFile& file, const std::vector<uint32_t>& leaves, uint32_t first,
+                    uint32_t end);
   void buildLoaded(LoadedBucket& loaded);
   void buildTooLarge(const BucketFile& file, uint32_t bucket, const std::vector<uint32_t>& leaves);
   void buildCoincident(const BucketFile& file, uint32_t bucket, uint32_t leaf);

@@ -180,9 +180,12 @@ BucketChains bucketsOf(const json& from) {
 }
 
 json jsonOf(const ScatteredSplats& splats) {
-  return {{"survey", jsonOf(splats.survey)},    {"degenerate", splats.counts.degenerate},
-          {"inverted", splats.counts.inverted}, {"merged_nodes", splats.merged_nodes},
-          {"tree", jsonOf(splats.tree)},        {"buckets", jsonOf(splats.buckets)}};
+  json of_ranks = json::array();
+  for (const BucketChains& buckets : splats.buckets_of_ranks) of_ranks.push_back(jsonOf(buckets));
+  return {{"buckets_of_ranks", of_ranks},           {"survey", jsonOf(splats.survey)},
+          {"degenerate", splats.counts.degenerate}, {"inverted", splats.counts.inverted},
+          {"merged_nodes", splats.merged_nodes},    {"tree", jsonOf(splats.tree)},
+          {"buckets", jsonOf(splats.buckets)}};
 }
 
 ScatteredSplats splatsOf(const json& from) {
@@ -191,6 +194,11 @@ ScatteredSplats splatsOf(const json& from) {
   splats.counts = {wholeNumber<uint64_t>(from.at("degenerate")), wholeNumber<uint64_t>(from.at("inverted"))};
   splats.merged_nodes = wholeNumber<uint64_t>(from.at("merged_nodes"));
   splats.buckets = bucketsOf(from.at("buckets"));
+  if (from.contains("buckets_of_ranks"))
+    for (const auto& buckets : from.at("buckets_of_ranks")) {
+      splats.buckets_of_ranks.push_back(bucketsOf(buckets));
+      if (splats.buckets_of_ranks.back().chains.size() != splats.buckets.chains.size()) throw NotAJournal();
+    }
   splats.tree = treeOf(from.at("tree"), splats.buckets.chains.size());
   return splats;
 }
@@ -234,19 +242,26 @@ std::string differenceOf(const std::vector<ConversionFact>& before, const std::v
   return before.size() == now.size() ? "" : "it had more or fewer files";
 }
 
-void writeJournal(const std::filesystem::path& folder, const ConversionJournal& journal) {
+std::string journalText(const ConversionJournal& journal) {
   json facts = json::array();
   for (const ConversionFact& fact : journal.facts) facts.push_back({escaped(fact.what), escaped(fact.value)});
   json content = {
       {"version", kJournalVersion}, {"facts", facts}, {"scratch", escaped(journal.scratch.string())}};
   if (journal.splats) content["splats"] = jsonOf(*journal.splats);
   const std::string text = content.dump() + "\n";
-  writeFileAtomically(folder / kJournalName, text + checksumLine(text));
+  return text + checksumLine(text);
+}
+
+void writeJournal(const std::filesystem::path& folder, const ConversionJournal& journal) {
+  writeFileAtomically(folder / kJournalName, journalText(journal));
 }
 
 std::optional<ConversionJournal> readJournal(const std::filesystem::path& folder) {
   if (!std::filesystem::exists(folder / kJournalName)) return std::nullopt;
-  const std::string bytes = readTextFile(folder / kJournalName, kLargestJournal);
+  return journalFrom(readTextFile(folder / kJournalName, kLargestJournal));
+}
+
+std::optional<ConversionJournal> journalFrom(const std::string& bytes) {
   const size_t end = bytes.find('\n') + 1;  // 0 if there is none
   const std::string text = bytes.substr(0, end);
   if (bytes.substr(end) != checksumLine(text)) return std::nullopt;

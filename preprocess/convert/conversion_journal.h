@@ -34,6 +34,10 @@ struct ConversionJournal {
   std::optional<ScatteredSplats> splats;
 };
 
+/// The journal as bytes, and back: none if they are not what this program has written.
+std::string journalText(const ConversionJournal& journal);
+std::optional<ConversionJournal> journalFrom(const std::string& bytes);
+
 /// Throws Error if the disk fails.
 void writeJournal(const std::filesystem::path& folder, const ConversionJournal& journal);
 

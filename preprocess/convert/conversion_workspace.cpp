@@ -1,5 +1,7 @@
 #include "preprocess/convert/conversion_workspace.h"
 
+#include <set>
+
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/cache/brick_log.h"
@@ -69,8 +71,16 @@ ConversionWorkspace::ConversionWorkspace(const fs::path& output, bool overwrite,
 }
 
 void ConversionWorkspace::removeDividedBuckets() const {
-  for (const auto& entry : fs::directory_iterator(scratch()))
-    if (!journal_.splats || entry.path() != splatsFile()) removeFile(entry.path());
+  const size_t files = journal_.splats ? 1 + journal_.splats->buckets_of_ranks.size() : 0;
+  std::set<fs::path> kept;
+  for (unsigned rank = 0; rank < files; ++rank) kept.insert(splatsFileOf(scratch(), rank));
+  for (const auto& entry : fs::directory_iterator(scratch())) {
+    if (kept.contains(entry.path())) continue;
+    if (entry.is_directory() && !entry.is_symlink())
+      removeAll(entry.path());  // a rank's bricks
+    else
+      removeFile(entry.path());
+  }
 }
 
 bool ConversionWorkspace::worthResuming() const {

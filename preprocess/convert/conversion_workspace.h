@@ -16,6 +16,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "preprocess/convert/conversion_journal.h"
@@ -46,7 +47,12 @@ class ConversionWorkspace {
   /// The splats that an interrupted conversion has left; none: they are to be made.
   const std::optional<ScatteredSplats>& splats() const { return journal_.splats; }
   PartialFolder& partial() { return *partial_; }
-  std::filesystem::path splatsFile() const { return scratch_->path() / "splats.bin"; }
+  std::filesystem::path splatsFile() const { return splatsFileOf(scratch_->path(), 0); }
+  /// The splats that a rank has scattered, in the scratch folder.
+  static std::filesystem::path splatsFileOf(const std::filesystem::path& scratch, unsigned rank) {
+    return scratch / (rank == 0 ? "splats.bin" : "splats." + std::to_string(rank) + ".bin");
+  }
+  const ConversionJournal& journal() const { return journal_; }
   const std::filesystem::path& scratch() const { return scratch_->path(); }
 
   void noteSplats(ScatteredSplats splats);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "preprocess/convert/bucket_file.h"
@@ -19,6 +20,8 @@
 #include "preprocess/convert/scan.h"
 #include "preprocess/convert/scatter.h"
 #include "preprocess/convert/scattered_splats.h"
+#include "preprocess/convert/shared_build.h"
+#include "preprocess/convert/shared_passes.h"
 #include "preprocess/convert/splat_origin.h"
 #include "preprocess/convert/splat_record.h"
 #include "stream/base/error.h"
@@ -65,14 +68,15 @@ class Conversion {
  public:
   Conversion(const GridSource& source, const ConvertOptions& options, const MemoryPlan& plan,
              std::vector<ConversionFact> facts, Progress& progress)
-      : options_(options),
-        plan_(plan),
-        progress_(progress),
-        workspace_(options.output, options.overwrite, unfinishedOf(options), temporaryFolder(options),
-                   std::move(facts)),
-        origin_(std::make_unique<GridOrigin>(source, options.scalars, options.blank_value, plan,
-                                             workspace_.scratch())),
-        nodes_(nodesOf(*origin_)) {}
+      : options_(options), plan_(plan), progress_(progress), ranks_(options.ranks) {
+    if (isFirst())
+      workspace_.emplace(options.output, options.overwrite, unfinishedOf(options), temporaryFolder(options),
+                         std::move(facts));
+    shareFolders();
+    origin_ = std::make_unique<GridOrigin>(source, options.scalars, options.blank_value, plan, own_scratch_);
+    nodes_ = nodesOf(*origin_);
+    if (ranks_) shares_splats_ = origin_->shareWith(*ranks_);
+  }
 
   ConvertReport run() {
     const Pass scatter_grid[] = {
@@ -86,14 +90,15 @@ class Conversion {
         {"build", "nodes", nodes_, &Conversion::build},
         {"finish", "bricks", 0, &Conversion::finish},
     };
-    checkRoom();
-    if (workspace_.splats()) {
+    if (isFirst()) checkRoom();
+    if (hasSplats()) {
       try {
         runPasses(take_up_splats);
         runPasses(build_cache);
         return std::move(report_);
       } catch (const LostBuckets&) {
         // The machine went down before all was on its disk. The bricks that are whole still count.
+        if (ranks_) throw;
         forgetSplats();
       }
     }
@@ -105,7 +110,7 @@ class Conversion {
   /// After run() has thrown: whether there is something to resume, which then stays.
   bool leaveForResuming() {
     if (file_) file_->leave();
-    return workspace_.leaveForResuming();
+    return workspace_ && workspace_->leaveForResuming();
   }
 
  private:
@@ -118,7 +123,7 @@ class Conversion {
 
   void runPasses(std::span<const Pass> passes) {
     for (const Pass& pass : passes) {
-      progress_.begin(pass.name, pass.steps, pass.unit);
+      progress_.begin(pass.name, pass.steps / (ranks_ ? ranks_->count() : 1), pass.unit);
       (this->*pass.run)();
       // What a pass has freed goes back to the system: the next one counts on it.
       malloc_trim(0);
@@ -126,48 +131,156 @@ class Conversion {
     progress_.end();
   }
 
+  bool isFirst() const { return !ranks_ || ranks_->isFirst(); }
+  unsigned rank() const { return ranks_ ? ranks_->rank() : 0; }
+  /// Whether this rank calls the origin.
+  bool makesSplats() const { return isFirst() || shares_splats_; }
+
+  /// Rank 0's folders, at every rank; and a folder for each rank's own temporary files.
+  void shareFolders() {
+    if (isFirst()) {
+      scratch_ = std::filesystem::absolute(workspace_->scratch());
+      partial_ = std::filesystem::absolute(workspace_->partial().path());
+    }
+    own_scratch_ = scratch_;
+    if (!ranks_) return;
+    const std::string names = scratch_.string() + '\n' + partial_.string();
+    const auto sent =
+        fromBytes<char>(ranks_->broadcast(toBytes(std::vector<char>(names.begin(), names.end()))));
+    const auto end = std::find(sent.begin(), sent.end(), '\n');
+    scratch_ = std::string(sent.begin(), end);
+    partial_ = std::string(end + 1, sent.end());
+    for (const std::filesystem::path& folder : {scratch_, partial_})
+      if (!std::filesystem::is_directory(folder))
+        throw Error("{}: does not exist here; several ranks need a file system that they share",
+                    folder.string());
+    own_scratch_ = scratch_ / fmt::format("rank{}", rank());
+    removeAll(own_scratch_);
+    makeFolder(own_scratch_);
+  }
+
+  /// Whether an interrupted conversion has left splats that are all there.
+  bool hasSplats() {
+    if (!ranks_) return workspace_->splats().has_value();
+    std::vector<uint8_t> has(1);
+    if (isFirst() && workspace_->splats()) {
+      try {
+        splats_ = *workspace_->splats();
+        openSplats();
+        has[0] = 1;
+      } catch (const LostBuckets&) {
+        forgetSplats();
+      }
+    }
+    return fromBytes<uint8_t>(ranks_->broadcast(toBytes(has)))[0] != 0;
+  }
+
   void scan() {
-    splats_.survey = origin_->survey(progress_);
+    if (makesSplats()) splats_.survey = origin_->survey(progress_);
+    if (ranks_ && !shares_splats_) splats_.survey = broadcastSurvey(splats_.survey, *ranks_);
     checkRanges(splats_.survey, origin_->description(), options_.scalars);
     openWriter();
+    if (!isFirst()) return;
     for (std::string& warning : origin_->warnings(progress_)) report_.warnings.push_back(std::move(warning));
   }
 
   void count() {
     CountingGrid counts(countingLevel(nodes_), plan_.counting_bytes);
-    origin_->count(root_, counts, progress_);
-    counts.close();
-    const uint32_t buckets = planBuckets(counts, plan_, splats_.tree);
-    file_ = std::make_unique<BucketFile>(workspace_.splatsFile(), buckets, plan_.chunkBytes(buckets));
-    contents_.resize(splats_.tree.size());
+    if (makesSplats()) origin_->count(root_, counts, progress_);
+    if (ranks_ && shares_splats_) sendCountsToFirst(counts, *ranks_);
+    if (isFirst()) {
+      counts.close();
+      planBuckets(counts, plan_, splats_.tree);
+    }
+    if (ranks_) splats_.tree = broadcastTree(splats_.tree, *ranks_);
+    uint32_t buckets = 0;
+    for (const uint32_t leaf : splats_.tree.leavesBelow(0))
+      buckets = std::max(buckets, splats_.tree[leaf].bucket + 1);
+    file_ = std::make_unique<BucketFile>(ConversionWorkspace::splatsFileOf(scratch_, rank()), buckets,
+                                         plan_.chunkBytes(buckets));
+    contents_.assign(splats_.tree.size(), {});
   }
 
   SplatTarget target() { return {root_, &splats_.tree, file_.get(), &contents_}; }
 
-  void scatter() { splats_.counts = scatterSplats(*origin_, target(), progress_); }
-
-  void mergeSeams() {
-    splats_.merged_nodes = scatterRest(*origin_, target(), progress_);
-    file_->close();
-    splats_.buckets = file_->chains();
-    splats_.tree.setContents(splats_.tree.leavesBelow(0), contents_);
-    workspace_.noteSplats(splats_);
+  void scatter() {
+    if (makesSplats()) splats_.counts = scatterSplats(*origin_, target(), progress_);
   }
 
-  /// In the place of all before: the splats of a conversion that was interrupted.
+  void mergeSeams() {
+    if (makesSplats()) splats_.merged_nodes = scatterRest(*origin_, target(), progress_);
+    file_->close(ranks_ != nullptr);
+    splats_.buckets = file_->chains();
+    if (ranks_) sumContents(contents_, *ranks_);
+    if (ranks_) splats_.buckets_of_ranks = gatherChains(splats_.buckets, *ranks_);
+    splats_.tree.setContents(splats_.tree.leavesBelow(0), contents_);
+    if (isFirst()) workspace_->noteSplats(splats_);
+    if (!ranks_) return;
+    shareSplats();
+    if (!isFirst()) file_->leave();  // it is to be resumed from
+    for (unsigned other = 0; other < ranks_->count(); ++other)
+      if (other != rank()) file_->join(ConversionWorkspace::splatsFileOf(scratch_, other), chainsOf(other));
+  }
+
+  const BucketChains& chainsOf(unsigned of_rank) const {
+    return of_rank == 0 ? splats_.buckets : splats_.buckets_of_ranks[of_rank - 1];
+  }
+
+  /// What rank 0's journal notes, at every rank.
+  void shareSplats() {
+    std::string text;
+    if (isFirst()) text = journalText(workspace_->journal());
+    const auto sent =
+        fromBytes<char>(ranks_->broadcast(toBytes(std::vector<char>(text.begin(), text.end()))));
+    if (!isFirst()) splats_ = journalFrom(std::string(sent.begin(), sent.end()))->splats.value();
+  }
+
+  /// In the place of all before: the splats of a conversion that was interrupted, which may have had another number
+  /// of ranks.
   void takeUpSplats() {
-    splats_ = *workspace_.splats();
-    file_ = std::make_unique<BucketFile>(workspace_.splatsFile(), splats_.buckets);
+    if (ranks_)
+      shareSplats();
+    else
+      splats_ = *workspace_->splats();
+    if (!file_) openSplats();
     openWriter();
   }
 
+  void openSplats() {
+    const auto file_of = [&](unsigned n) { return ConversionWorkspace::splatsFileOf(scratch_, n); };
+    file_ = std::make_unique<BucketFile>(file_of(0), splats_.buckets);
+    if (!isFirst()) file_->leave();
+    for (unsigned n = 1; n <= splats_.buckets_of_ranks.size(); ++n) file_->join(file_of(n), chainsOf(n));
+  }
+
   void build() {
+    if (ranks_) return buildTogether();
     OctreeBuilder builder(root_, origin_->blocks(), options_.scalars.size(), plan_, splats_.tree, *writer_,
-                          workspace_.scratch(), progress_);
+                          own_scratch_, progress_);
     builder.build(*file_);
   }
 
+  /// Bricks that were appended by an interrupted conversion are made again.
+  void buildTogether() {
+    const BucketRange share = dealBuckets(splats_.tree, file_->buckets(), ranks_->count())[rank()];
+    PartialFolder own_folder(bricksOfRank(scratch_, rank()), true);
+    Progress nothing_to_check;
+    CacheWriter own(own_folder, root_, variables(), nothing_to_check);
+    own.keep(0);
+    OctreeBuilder(root_, origin_->blocks(), options_.scalars.size(), plan_, splats_.tree, own, own_scratch_,
+                  progress_)
+        .buildShare(*file_, share.first, share.end);
+    if (isFirst()) writer_->keep(0);
+    const std::vector<VariableInfo> infos = variables();
+    joinBricks({root_, infos, splats_.tree, scratch_, partial_}, own, writer_.get(), *ranks_);
+  }
+
   void finish() {
+    if (isFirst()) finishCache();
+    if (ranks_) ranks_->barrier();
+  }
+
+  void finishCache() {
     reportCache(writer_->finish(manifest()), report_);
     writer_.reset();
     file_.reset();
@@ -175,30 +288,31 @@ class Conversion {
     report_.degenerate = splats_.counts.degenerate;
     report_.inverted = splats_.counts.inverted;
     report_.merged_nodes = splats_.merged_nodes;
-    report_.temporary_bytes = splats_.buckets.size;
-    report_.resumed = workspace_.resumed();
+    report_.temporary_bytes = splats_.temporaryBytes();
+    report_.resumed = workspace_->resumed();
   }
 
   void checkRoom() const {
     DiskNeeds needs = diskNeeds(nodes_, options_.scalars.size());
-    if (workspace_.splats())
+    if (workspace_->splats())
       needs.temporary_bytes = 0;
     else
       needs.temporary_bytes = std::max(needs.temporary_bytes, origin_->temporaryBytes());
-    needs.cache_bytes -= std::min(needs.cache_bytes, workspace_.bytesInPartial());
+    if (ranks_) needs.temporary_bytes += needs.cache_bytes;  // the bricks of each, before they are joined
+    needs.cache_bytes -= std::min(needs.cache_bytes, workspace_->bytesInPartial());
     if (options_.check_disk_space) checkDiskSpace(needs, options_.output, temporaryFolder(options_));
   }
 
   /// Needs the survey.
   void openWriter() {
     root_ = RootCube::around(splats_.survey.lower, splats_.survey.upper);
-    if (writer_) return;
-    writer_ = std::make_unique<CacheWriter>(workspace_.partial(), root_, variables(), progress_);
-    report_.resumed_bricks = writer_->bricks().size();
+    if (writer_ || !isFirst()) return;
+    writer_ = std::make_unique<CacheWriter>(workspace_->partial(), root_, variables(), progress_);
+    report_.resumed_bricks = ranks_ ? 0 : writer_->bricks().size();
   }
 
   void forgetSplats() {
-    workspace_.forgetSplats();
+    workspace_->forgetSplats();
     file_.reset();
     splats_ = {};
   }
@@ -244,9 +358,13 @@ class Conversion {
   const ConvertOptions& options_;
   const MemoryPlan plan_;
   Progress& progress_;
-  ConversionWorkspace workspace_;  // before what has files in it
+  Ranks* const ranks_;                            // null: this process alone
+  std::optional<ConversionWorkspace> workspace_;  // before what has files in it; rank 0's alone
+  std::filesystem::path scratch_, partial_;       // rank 0's
+  std::filesystem::path own_scratch_;
   std::unique_ptr<SplatOrigin> origin_;
-  const uint64_t nodes_;
+  bool shares_splats_ = false;
+  uint64_t nodes_ = 0;
   ScatteredSplats splats_;
   RootCube root_;
   std::vector<CellContents> contents_;  // [node of the tree], while they are being scattered
@@ -254,6 +372,34 @@ class Conversion {
   std::unique_ptr<CacheWriter> writer_;
   ConvertReport report_;
 };
+
+/// Some buckets for each rank, so that they can be dealt out evenly.
+uint64_t bucketSplatsOfRanks(const GridSource& source, const Ranks& ranks) {
+  constexpr uint64_t kBucketsOfRank = 4;
+  uint64_t nodes = 0;
+  for (const GridBlock& block : source.description().blocks) nodes += block.nodes();
+  return std::max<uint64_t>(nodes / (kBucketsOfRank * ranks.count()), 4 * kMaxBrickSplats);
+}
+
+/// Whether only the traces of a finished conversion were to be removed. Throws Error if the output is in the way.
+/// Rank 0 finds out, for all.
+bool isFinished(const ConvertOptions& options, const std::vector<ConversionFact>& facts) {
+  const auto found = [&] {
+    if (options.resume && ConversionWorkspace::clearIfFinished(options.output, facts)) return true;
+    if (options.resume && !options.overwrite && std::filesystem::exists(options.output / "manifest.json") &&
+        !hasUnfinished(options.output))
+      throw Error(
+          "{}: is there, and no conversion to it was left unfinished: there is nothing to resume; to replace "
+          "it, add --overwrite",
+          options.output.string());
+    checkOutput(options.output, options.overwrite, temporaryFolder(options));
+    return false;
+  };
+  if (!options.ranks) return found();
+  std::vector<uint8_t> finished(1);
+  if (options.ranks->isFirst()) finished[0] = found();
+  return fromBytes<uint8_t>(options.ranks->broadcast(toBytes(finished)))[0] != 0;
+}
 
 /// Runs it. What is to be resumed stays when it is stopped, and on an Error if that is wanted.
 ConvertReport runOrLeave(Conversion& conversion, const ConvertOptions& options) {
@@ -273,26 +419,22 @@ ConvertReport runOrLeave(Conversion& conversion, const ConvertOptions& options) 
 
 }  // namespace
 
-ConvertReport convert(const GridSource& source, const ConvertOptions& options, Progress& progress) {
+ConvertReport convert(const GridSource& source, const ConvertOptions& given, Progress& progress) {
+  ConvertOptions options = given;
+  if (options.ranks && options.ranks->alone()) options.ranks = nullptr;
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   GridOrigin::requireMemory(source, options.scalars, plan);
+  if (options.ranks) plan.limitBuckets(bucketSplatsOfRanks(source, *options.ranks), options.scalars.size());
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
 
   std::vector<ConversionFact> facts = factsOf(source.description(), options.scalars, options.blank_value);
   ConvertReport report;
-  const std::filesystem::path manifest = options.output / "manifest.json";
-  if (options.resume && ConversionWorkspace::clearIfFinished(options.output, facts)) {
+  if (isFinished(options, facts)) {
+    const std::filesystem::path manifest = options.output / "manifest.json";
     report.resumed = true;
     reportCache(Manifest::fromJson(readTextFile(manifest), manifest), report);
     report.resumed_bricks = report.bricks;
-  } else if (options.resume && !options.overwrite && std::filesystem::exists(manifest) &&
-             !hasUnfinished(options.output)) {
-    throw Error(
-        "{}: is there, and no conversion to it was left unfinished: there is nothing to resume; to replace "
-        "it, add --overwrite",
-        options.output.string());
   } else {
-    checkOutput(options.output, options.overwrite, temporaryFolder(options));
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, plan.threads);
     Conversion conversion(source, options, plan, std::move(facts), progress);
     report = runOrLeave(conversion, options);

@@ -10,6 +10,7 @@
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/grid/node_reader.h"
 #include "stream/base/progress.h"
+#include "stream/base/ranks.h"
 
 namespace curvisplat {
 
@@ -25,6 +26,9 @@ struct ConvertOptions {
   std::filesystem::path temporary_folder;  // empty: the folder of the output
   std::string title;                       // empty: the output's name
   std::optional<double> time;              // of the step; otherwise the source's, or 0
+
+  /// Those that convert together: each has the same source and options, and calls convert(). Null: this process alone.
+  Ranks* ranks = nullptr;
 
   /// Smaller buckets than memory would allow: tests make many of them from small grids.
   std::optional<uint64_t> bucket_splats;
@@ -66,6 +70,10 @@ struct ConvertReport {
 /// it wants to keep what is done. An unfinished conversion to the same output is an Error unless `resume` or
 /// `overwrite` (which then begins anew) is set. What has not come so far that something would be lost is
 /// removed in all of these cases.
+///
+/// Several ranks share the work of all passes; scratch folder and output must be on a file system that they share.
+/// Rank 0's report is of the whole. Each keeps to options.memory_bytes. When a rank throws, the others do not end by
+/// themselves: whoever started them ends them, and what rank 0 leaves then is as above.
 ConvertReport convert(const GridSource& source, const ConvertOptions& options, Progress& progress);
 
 }  // namespace curvisplat

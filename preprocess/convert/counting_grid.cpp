@@ -80,6 +80,26 @@ void CountingGrid::add(uint32_t level, std::span<const VoxelRun> runs) {
   }
 }
 
+std::vector<VoxelRun> CountingGrid::takeRuns() {
+  CURVISPLAT_CHECK_OP(trees_->levels.size(), ==, 1u);
+  std::vector<VoxelRun> runs;
+  const CountTree& tree = trees_->levels[0]->tree;
+  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
+    for (auto value = leaf->cbeginValueOn(); value; ++value) {
+      const openvdb::Coord at = value.getCoord();
+      runs.push_back(
+          {{static_cast<uint32_t>(at.x()), static_cast<uint32_t>(at.y()), static_cast<uint32_t>(at.z())},
+           static_cast<uint32_t>(*value)});
+    }
+  trees_->levels[0] = std::make_unique<SizedTree>();
+  return runs;
+}
+
+void CountingGrid::addCoarser(uint32_t level, std::span<const VoxelRun> runs) {
+  while (level_ > level) coarsen();
+  add(level, runs);
+}
+
 void CountingGrid::coarsen() {
   trees_->levels[0] = halved(trees_->levels[0]->tree);
   --level_;

@@ -32,6 +32,11 @@ class CountingGrid {
   /// Runs of voxels of `level`, which is level() or was.
   void add(uint32_t level, std::span<const VoxelRun> runs);
 
+  /// The counts, as runs of level(); none are left.
+  std::vector<VoxelRun> takeRuns();
+  /// Runs of voxels of another grid, which may be coarser than this one: then this one becomes as coarse.
+  void addCoarser(uint32_t level, std::span<const VoxelRun> runs);
+
   /// Makes count() possible; nothing is added afterwards.
   void close();
   /// Positions in `cell`, whose level is at most level(). A voxel counts up to 2^31 - 1.

@@ -1,8 +1,12 @@
 #include "preprocess/convert/grid_origin.h"
 
+#include <algorithm>
+
 #include "preprocess/convert/scan.h"
 #include "preprocess/convert/scatter.h"
+#include "preprocess/convert/shared_passes.h"
 #include "preprocess/grid/slabs.h"
+#include "preprocess/splats/cell_splats.h"
 #include "preprocess/survey/block_overlap.h"
 #include "stream/base/error.h"
 
@@ -32,11 +36,24 @@ AbuttingFaces::Needs GridOrigin::needsOfFaces() const {
   return needs;
 }
 
+/// So many slabs that all ranks have about as many.
+bool GridOrigin::shareWith(Ranks& ranks) {
+  constexpr uint64_t kSlabsOfRank = 8;
+  ranks_ = &ranks;
+  uint64_t nodes = 0;
+  for (const GridBlock& block : blocks()) nodes += block.nodes();
+  const uint64_t share = nodes * slabBytesPerNode(reader_.scalars()) / (kSlabsOfRank * ranks.count());
+  const Halo halo = centring() == Centring::kCell ? kCellSplatHalo : kNodeSplatHalo;
+  plan_.slab_bytes =
+      std::min(plan_.slab_bytes, std::max(share, leastSlabBytes(blocks(), reader_.scalars(), halo)));
+  return true;
+}
+
 GridSurvey GridOrigin::survey(Progress& progress) {
   if (centring() == Centring::kCell)
     faces_ = std::make_unique<AbuttingFaces>(blocks(), description().coordinate_bytes,
                                              plan_.seam_bytes - needsOfFaces().memory_bytes, scratch_);
-  GridSurvey survey = surveyGrid(reader_, plan_.slab_bytes, faces_.get(), progress);
+  GridSurvey survey = surveyGrid(reader_, plan_.slab_bytes, faces_.get(), progress, ranks_);
   if (faces_) faces_->match(progress);
   return survey;
 }
@@ -48,18 +65,25 @@ std::vector<std::string> GridOrigin::warnings(Progress& progress) {
 }
 
 void GridOrigin::count(const RootCube& root, CountingGrid& counts, Progress& progress) {
-  countNodes(reader_.source(), root, plan_.slab_bytes, counts, progress);
+  countNodes(reader_.source(), root, plan_.slab_bytes, counts, progress, shareOf(ranks_));
 }
 
 ScatterCounts GridOrigin::scatter(const SinkOfThread& sink_of_thread, Progress& progress) {
   seams_ = std::make_unique<SeamMerger>(reader_.scalars(), plan_.seam_bytes, scratch_);
+  SlabPass pass(progress);
+  pass.ranks = ranks_;
   const ScatterCounts counts =
-      streamSplats(reader_, faces_.get(), plan_.slab_bytes, sink_of_thread, *seams_, progress);
+      streamSplats(reader_, faces_.get(), plan_.slab_bytes, sink_of_thread, *seams_, pass);
   faces_.reset();
   return counts;
 }
 
 uint64_t GridOrigin::finish(SplatSink& sink, Progress& progress) {
+  if (ranks_) seams_->sendToFirst(*ranks_);
+  if (ranks_ && !ranks_->isFirst()) {
+    seams_.reset();
+    return 0;
+  }
   const uint64_t merged = seams_->finish(description().coordinate_bytes,
                                          [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
                                            sink.add(splat, values);

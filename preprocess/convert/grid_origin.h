@@ -30,6 +30,7 @@ class GridOrigin final : public SplatOrigin {
   const std::vector<GridBlock>& blocks() const override { return description().blocks; }
   uint64_t temporaryBytes() const override;
 
+  bool shareWith(Ranks& ranks) override;
   GridSurvey survey(Progress& progress) override;
   std::vector<std::string> warnings(Progress& progress) override;
   void count(const RootCube& root, CountingGrid& counts, Progress& progress) override;
@@ -40,7 +41,8 @@ class GridOrigin final : public SplatOrigin {
   AbuttingFaces::Needs needsOfFaces() const;
 
   const NodeReader reader_;
-  const MemoryPlan plan_;
+  MemoryPlan plan_;
+  Ranks* ranks_ = nullptr;
   const std::filesystem::path scratch_;
   std::unique_ptr<AbuttingFaces> faces_;  // of cells
   std::unique_ptr<SeamMerger> seams_;     // of nodes

@@ -10,6 +10,7 @@
 #include <glm/common.hpp>
 #include <optional>
 
+#include "preprocess/convert/shared_passes.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/survey/cell_survey.h"
 #include "preprocess/survey/grid_checksum.h"
@@ -78,8 +79,8 @@ void checkExtent(const GridSurvey& survey, const NodeReader& reader) {
 
 }  // namespace
 
-GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces,
-                      Progress& progress) {
+GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces, Progress& progress,
+                      Ranks* ranks) {
   if (reader.centring() == Centring::kCell) {
     const GridSurvey survey = surveyCells(reader, slab_bytes, faces, progress);
     checkExtent(survey, reader);
@@ -88,7 +89,7 @@ GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFac
   GridSurvey survey;
   Bounds total;
   total.ranges.resize(reader.scalars());
-  SlabStream slabs(reader, slab_bytes, kNoHalo);
+  SlabStream slabs(reader, slab_bytes, kNoHalo, shareOf(ranks));
   while (const LoadedSlab* loaded = slabs.next()) {
     const size_t count = loaded->nodes.x.size();
     survey.nodes += count;
@@ -107,6 +108,7 @@ GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFac
   survey.lower = total.lower;
   survey.upper = total.upper;
   survey.ranges = std::move(total.ranges);
+  if (ranks) survey = combinedSurvey(survey, *ranks);
   checkExtent(survey, reader);
   return survey;
 }
@@ -124,9 +126,9 @@ void checkRanges(const GridSurvey& survey, const GridDescription& description,
 }
 
 void countNodes(const GridSource& source, const RootCube& root, uint64_t slab_bytes, CountingGrid& counts,
-                Progress& progress) {
+                Progress& progress, const SlabShare& share) {
   const NodeReader coordinates(source, {}, std::nullopt);
-  SlabStream slabs(coordinates, slab_bytes, kNoHalo);
+  SlabStream slabs(coordinates, slab_bytes, kNoHalo, share);
   while (const LoadedSlab* loaded = slabs.next()) {
     const NodeArrays& nodes = loaded->nodes;
     const size_t tasks = (nodes.x.size() + kNodesPerTask - 1) / kNodesPerTask;

@@ -9,8 +9,10 @@
 
 #include "preprocess/convert/counting_grid.h"
 #include "preprocess/grid/node_reader.h"
+#include "preprocess/grid/slabs.h"
 #include "preprocess/survey/grid_survey.h"
 #include "stream/base/progress.h"
+#include "stream/base/ranks.h"
 #include "stream/model/octree.h"
 
 namespace curvisplat {
@@ -20,8 +22,10 @@ class AbuttingFaces;
 /// Reads all nodes once. Memory: two slabs. Throws Error if no node is there, or if the grid is larger or
 /// smaller than single precision can say. Where scalars stand in cells, those at the blocks' ends are added
 /// to `faces`, unless that is null.
-GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces,
-                      Progress& progress);
+///
+/// With `ranks` each reads a share of the nodes, and all get the result. Cells are read by every rank as a whole.
+GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces, Progress& progress,
+                      Ranks* ranks = nullptr);
 
 /// Throws Error if the values of one of the survey's scalars lie further apart than single precision can say
 /// the square of.
@@ -30,8 +34,9 @@ void checkRanges(const GridSurvey& survey, const GridDescription& description,
 
 /// Counts the nodes that are there by cells of `root`, reading coordinates alone: a node that is blanked for
 /// its scalar's sake is counted, which makes the plan no worse than a little uneven.
+/// `share`: those of a part of the grid's slabs.
 void countNodes(const GridSource& source, const RootCube& root, uint64_t slab_bytes, CountingGrid& counts,
-                Progress& progress);
+                Progress& progress, const SlabShare& share = {});
 
 /// The level to begin counting at: some levels finer than evenly spread nodes would need.
 uint32_t countingLevel(uint64_t nodes);

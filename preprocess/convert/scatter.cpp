@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "preprocess/convert/shared_passes.h"
 #include "preprocess/convert/splat_record.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/splats/cell_splats.h"
@@ -55,7 +56,8 @@ class SplatStream {
     });
   }
 
-  ScatterCounts counts() const {
+  /// All ranks have to call it.
+  ScatterCounts counts(Ranks* ranks) const {
     ScatterCounts counts;
     std::vector<Handedness> of_blocks(blocks_->size());
     for (const Worker& worker : workers_) {
@@ -64,6 +66,11 @@ class SplatStream {
         of_blocks[block].right += worker.handedness[block].right;
         of_blocks[block].left += worker.handedness[block].left;
       }
+    }
+    if (ranks) {
+      static_assert(sizeof(Handedness) == 2 * sizeof(uint64_t));
+      ranks->sum(std::span(&counts.degenerate, 1));
+      ranks->sum(std::span(&of_blocks.front().right, 2 * of_blocks.size()));
     }
     for (const Handedness& of_block : of_blocks) counts.inverted += std::min(of_block.right, of_block.left);
     return counts;
@@ -156,15 +163,15 @@ void RecordRouter::flush() {
 ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces, uint64_t slab_bytes,
                            const SinkOfThread& sink_of_thread, SeamMerger& seams, const SlabPass& pass) {
   SplatStream splats(reader, faces, sink_of_thread, seams, pass.progress);
-  SlabStream slabs(reader, slab_bytes,
-                   reader.centring() == Centring::kCell ? kCellSplatHalo : kNodeSplatHalo);
+  SlabStream slabs(reader, slab_bytes, reader.centring() == Centring::kCell ? kCellSplatHalo : kNodeSplatHalo,
+                   shareOf(pass.ranks));
   while (const LoadedSlab* loaded = slabs.next()) {
     if (pass.see) pass.see(*loaded);
     splats.add(*loaded);
     const GridBlock& block = reader.source().description().blocks[loaded->slab.block];
     pass.progress.advance(rowsOf(loaded->slab.box) * block.ni);
   }
-  return splats.counts();
+  return splats.counts(pass.ranks);
 }
 
 ScatterCounts scatterSplats(SplatOrigin& origin, const SplatTarget& target, Progress& progress) {

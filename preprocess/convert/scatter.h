@@ -17,6 +17,7 @@
 #include "preprocess/splats/abutting_faces.h"
 #include "preprocess/splats/seams.h"
 #include "stream/base/progress.h"
+#include "stream/base/ranks.h"
 #include "stream/model/octree.h"
 
 namespace curvisplat {
@@ -50,7 +51,8 @@ struct SlabPass {
 
   Progress& progress;
   std::function<void(const LoadedSlab&)>
-      see;  // each slab, in order, before its splats are made; may be empty
+      see;                 // each slab, in order, before its splats are made; may be empty
+  Ranks* ranks = nullptr;  // of which each makes the splats of a share; the counts are the whole's
 };
 
 /// Makes all splats, of nodes or of cells as the reader's scalars are, in parallel. Those of block faces go

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "preprocess/convert/bucket_file.h"
 #include "preprocess/convert/bucket_tree.h"
@@ -16,6 +17,13 @@ struct ScatteredSplats {
   uint64_t merged_nodes = 0;
   BucketTree tree;       // with contents, as it was scattered by: before any bucket was divided
   BucketChains buckets;  // of the temporary file
+  std::vector<BucketChains> buckets_of_ranks = {};  // from rank 1 on, where several have scattered
+
+  uint64_t temporaryBytes() const {
+    uint64_t bytes = buckets.size;
+    for (const BucketChains& of_rank : buckets_of_ranks) bytes += of_rank.size;
+    return bytes;
+  }
 };
 
 }  // namespace curvisplat

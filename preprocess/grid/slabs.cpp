@@ -76,11 +76,13 @@ std::vector<NodeBox> cutForTasks(const GridBlock& block, const NodeBox& box, uin
   return tasks;
 }
 
-SlabStream::SlabStream(const NodeReader& reader, uint64_t slab_bytes, Halo halo)
+SlabStream::SlabStream(const NodeReader& reader, uint64_t slab_bytes, Halo halo, const SlabShare& share)
     : slabs_(cutIntoSlabs(reader.source().description().blocks,
                           slab_bytes / slabBytesPerNode(reader.scalars()), halo)),
+      position_(slabs_.size() * share.index / share.count),
+      end_(slabs_.size() * (share.index + 1) / share.count),
       ahead_([this, &reader](LoadedSlab& loaded) {
-        if (position_ == slabs_.size()) return false;
+        if (position_ == end_) return false;
         loaded.slab = slabs_[position_++];
         loaded.blanked = reader.read(loaded.slab.block, loaded.slab.window, loaded.nodes);
         return true;

@@ -56,18 +56,23 @@ struct LoadedSlab {
   BlankCounts blanked;
 };
 
-/// Reads all slabs of a grid, in order, one ahead. `reader` must outlive it. Two slabs of `slab_bytes` are in
+/// One of `count` parts of the slabs of a grid, about as many in each, next to one another.
+struct SlabShare {
+  unsigned index = 0, count = 1;
+};
+
+/// Reads all slabs of a grid, or a share of them, in order, one ahead. `reader` must outlive it. Two slabs of `slab_bytes` are in
 /// memory at any time.
 class SlabStream {
  public:
-  SlabStream(const NodeReader& reader, uint64_t slab_bytes, Halo halo);
+  SlabStream(const NodeReader& reader, uint64_t slab_bytes, Halo halo, const SlabShare& share = {});
 
   /// The next slab, valid until the next call; null at the end. Throws Error if a slab cannot be read.
   const LoadedSlab* next() { return ahead_.next(); }
 
  private:
   std::vector<Slab> slabs_;
-  size_t position_ = 0;
+  size_t position_, end_;
   ReadAhead<LoadedSlab> ahead_;
 };
 

@@ -84,8 +84,11 @@ void SeamSorter::add(const SeamNode& node, std::span<const SplatScalar> values) 
     records_.reserve(capacity_ * record_size_);
   }
   entries_.push_back({node.along, node.splat.node, entries_.size()});
+  pack(node, values, records_);
+}
 
-  const auto put = [&](auto... numbers) { (records_.push_back(numbers), ...); };
+void SeamSorter::pack(const SeamNode& node, std::span<const SplatScalar> values, std::vector<double>& out) {
+  const auto put = [&](auto... numbers) { (out.push_back(numbers), ...); };
   const NodeSplat& n = node.splat;
   const Splat& s = n.splat;
   const uint64_t flags = (n.regular ? kRegular : 0) | (n.on_block_face ? kOnBlockFace : 0) |
@@ -124,6 +127,24 @@ void SeamSorter::unpack(const double* record, SeamNode& node, std::span<SplatSca
     value.mean = get();
     value.slope = get_vector();
     value.variance = get();
+  }
+}
+
+void SeamSorter::drainPacked(const std::function<void(std::span<const double>)>& visit) {
+  std::vector<double> record;
+  drain([&](const SeamNode& node, std::span<const SplatScalar> values) {
+    record.clear();
+    pack(node, values, record);
+    visit(record);
+  });
+}
+
+void SeamSorter::addPacked(std::span<const double> records) {
+  SeamNode node;
+  std::vector<SplatScalar> values(variables_);
+  for (size_t at = 0; at + record_size_ <= records.size(); at += record_size_) {
+    unpack(&records[at], node, values);
+    add(node, values);
   }
 }
 

@@ -38,6 +38,10 @@ class SeamSorter {
   /// Visits all that was added, by (along, node), and forgets it.
   void drain(const Visit& visit);
 
+  /// The same as records of recordBytes(), in doubles, which the sorter of another process can take.
+  void drainPacked(const std::function<void(std::span<const double>)>& visit);
+  void addPacked(std::span<const double> records);
+
  private:
   struct Run {
     uint64_t begin, end;  // bytes of the file
@@ -52,6 +56,7 @@ class SeamSorter {
     }
   };
 
+  static void pack(const SeamNode& node, std::span<const SplatScalar> values, std::vector<double>& out);
   void spill();
   void unpack(const double* record, SeamNode& node, std::span<SplatScalar> values) const;
   void drainRuns(const Visit& visit);

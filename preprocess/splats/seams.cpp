@@ -31,6 +31,35 @@ void SeamMerger::add(const NodeSplat& splat, std::span<const SplatScalar> values
   state_->sorter.add(seamNodeOf(splat), values);
 }
 
+void SeamMerger::sendToFirst(Ranks& ranks) {
+  constexpr size_t kMessageBytes = 4 << 20;
+  SeamSorter& sorter = state_->sorter;
+  Ranks::Bytes message;
+  // A round takes a message of one rank. Its last one is not full.
+  const auto round = [&](unsigned sender) {
+    const bool sends = sender == ranks.rank();
+    const std::vector<Ranks::Bytes> sent = ranks.gather(sends ? message : Ranks::Bytes{});
+    if (ranks.isFirst()) sorter.addPacked(fromBytes<double>(sent[sender]));
+    message.clear();
+    std::vector<uint64_t> full{ranks.isFirst() && sent[sender].size() >= kMessageBytes};
+    ranks.sum(std::span<uint64_t>(full));
+    return full[0] != 0;
+  };
+  for (unsigned sender = 1; sender < ranks.count(); ++sender) {
+    if (sender == ranks.rank()) {
+      sorter.drainPacked([&](std::span<const double> record) {
+        const auto bytes = std::as_bytes(record);
+        message.insert(message.end(), bytes.begin(), bytes.end());
+        if (message.size() >= kMessageBytes) round(sender);
+      });
+      round(sender);
+    } else {
+      while (round(sender)) {
+      }
+    }
+  }
+}
+
 uint64_t SeamMerger::finish(int coordinate_bytes,
                             const std::function<void(const NodeSplat&, std::span<const SplatScalar>)>& sink) {
   uint64_t merged = 0;

@@ -13,6 +13,7 @@
 
 #include "preprocess/splats/joint_nodes.h"
 #include "preprocess/splats/node_splats.h"
+#include "stream/base/ranks.h"
 
 namespace curvisplat {
 
@@ -32,6 +33,9 @@ class SeamMerger {
 
   /// One thread at a time. Every splat is one that isForSeams(). Throws Error if the disk fails.
   void add(const NodeSplat& splat, std::span<const SplatScalar> values);
+
+  /// Brings what the mergers of all ranks were given to rank 0's, a bounded amount at a time. All have to call it.
+  void sendToFirst(Ranks& ranks);
 
   /// Calls `sink` for each splat that is left: its node (and node_position) is the lowest of those merged, and
   /// regular is false. A node that has no other to merge with comes out as it went in. Returns how many nodes

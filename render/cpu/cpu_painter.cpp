@@ -24,8 +24,7 @@ namespace {
 constexpr size_t kEntriesASplat = 4;
 
 size_t tileCount(ImageSize size) {
-  const auto along = [](int pixels) { return static_cast<size_t>((pixels + kTileSide - 1) / kTileSide); };
-  return along(size.width) * along(size.height);
+  return TileSet::tilesOf(size);
 }
 
 /// Blocks along one side of the image; none where first > last.
@@ -110,6 +109,14 @@ void CpuPainter::begin(ImageSize size, const glm::vec4& background, const Classi
   state.bins->open();
   state.arena->execute([&] { state.windows.begin(shading.layers); });
   state.forTiles([&](size_t number) { state.clear(number); });
+}
+
+void CpuPainter::drawOnly(const TileSet& tiles) {
+  for (size_t number = 0; number < tileCount(state_->size); ++number) {
+    if (tiles.has(number)) continue;
+    state_->open[number].store(0, std::memory_order_relaxed);
+    state_->bins->close(static_cast<int>(number));
+  }
 }
 
 /// Nothing in it; what lies outside of the image is saturated from the beginning.

@@ -28,6 +28,7 @@ class CpuPainter final : public Painter {
   DrawingOrder order() const override { return DrawingOrder::kFrontToBack; }
   void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
              PixelShading shading, const PaintResources& resources = {}) override;
+  void drawOnly(const TileSet& tiles) override;
   void draw(std::span<const ScreenSplat> splats) override;
   bool hides(const ScreenBox& box) const override;
   Image end() override;

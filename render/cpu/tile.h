@@ -22,13 +22,13 @@
 #include "render/cpu/shading_table.h"
 #include "render/project/painter.h"
 #include "render/project/screen_splat.h"
+#include "render/project/tile_set.h"
 
 namespace curvisplat {
 
 inline constexpr int kBlockSide = 4;
 inline constexpr int kBlockPixels = kBlockSide * kBlockSide;
 inline constexpr int kBlockFloats = 4 * kBlockPixels;
-inline constexpr int kTileSide = 32;
 inline constexpr int kTileBlocks = kTileSide / kBlockSide;  // along a side
 inline constexpr int kTileFloats = 4 * kTileSide * kTileSide;
 

@@ -3,6 +3,8 @@
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_pipeline.h"
 #include "render/frame/frame_plan.h"
+#include "render/frame/joined_tiles.h"
+#include "stream/base/check.h"
 #include "stream/base/error.h"
 #include "stream/base/stage_timer.h"
 
@@ -27,12 +29,17 @@ struct FrameRenderer::State {
     const StageTimer total(statistics.total_s);
     FramePlan plan =
         timed(statistics.plan_s, [&] { return planner.plan(camera, options, pipeline.order()); });
+    std::vector<uint32_t> owners;
+    if (options.ranks) owners = planner.share(plan, options);
     pipeline.drawLayers(plan, options, statistics);
-    return pipeline.draw(plan, options, statistics, progress);
+    Image image = pipeline.draw(plan, options, statistics, progress);
+    if (options.ranks) joinTiles(image, owners, *options.ranks);
+    return image;
   }
 
   Image renderQuickly(const Camera& camera, const FrameOptions& options, const QuickLimits& limits,
                       FrameStatistics& statistics, bool& is_final, Progress* progress) {
+    CURVISPLAT_CHECK(!options.ranks && "one process draws a quick picture");
     statistics = {};
     const StageTimer total(statistics.total_s);
     QuickPlan quick = timed(statistics.plan_s,

@@ -49,6 +49,8 @@ class FrameRenderer {
   /// Draws one frame. Throws UsageError for an invalid view, and for too little memory or too small a
   /// max_splats (the message says how much is needed); Error if reading or drawing fails; Cancelled after
   /// cancel(). The renderer can be used again after each of them. `statistics` is overwritten.
+  /// With options.ranks all ranks have to call it: rank 0 returns the picture, which has the bits of one
+  /// process's, the others only their tiles. Statistics are each rank's own.
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                Progress* progress = nullptr);
 

@@ -12,6 +12,7 @@
 #include "render/project/projection.h"
 #include "render/project/screen_view.h"
 #include "render/surface/surface_scene.h"
+#include "stream/base/ranks.h"
 #include "stream/paging/pager.h"
 
 namespace curvisplat {
@@ -35,6 +36,8 @@ struct FrameOptions {
   uint64_t output_bytes = 0;  // part of memory_bytes that is reserved for the use of the finished image
   bool keep_going = false;    // draw damaged bricks from an ancestor, and report them
   PagerOptions::Way read_by = PagerOptions::Way::kAutomatic;
+  /// Those that draw the picture together, each some of its tiles; null: this process alone.
+  Ranks* ranks = nullptr;
   bool direct_reads = true;  // bypass the page cache if the file system can
 };
 

@@ -41,6 +41,15 @@ uint64_t sceneBytes(const FrameOptions& options) {
   return bytes;
 }
 
+/// The bricks of a slice that this rank samples.
+SlicePlan shareOf(const SlicePlan& slice, const FrameOptions& options) {
+  if (!options.ranks) return slice;
+  SlicePlan share{slice.plane, {}, slice.complete};
+  for (size_t n = options.ranks->rank(); n < slice.parts.size(); n += options.ranks->count())
+    share.parts.push_back(slice.parts[n]);
+  return share;
+}
+
 /// Waits for the painter's draws when a frame ends, however it ends: the next frame uses the same ring
 /// memory.
 class DrawsFinished {
@@ -162,7 +171,9 @@ void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, Fra
   for (const SlicePlan& slice : plan.slices) {
     samplers.push_back(
         std::make_unique<SliceSampler>(view, slice.plane, info.min, info.max, plan.settings.borders));
-    if (samplers.back()->isSeen()) sampleSlice(slice, *samplers.back(), options, statistics);
+    if (!samplers.back()->isSeen()) continue;
+    sampleSlice(shareOf(slice, options), *samplers.back(), options, statistics);
+    if (options.ranks) samplers.back()->addOthers(*options.ranks);
   }
   const StageTimer timer(statistics.surfaces_s);
   const glm::dvec3 middle = 0.5 * (cache_.manifest().lower + cache_.manifest().upper);
@@ -201,8 +212,8 @@ void FramePipeline::sampleSlice(const SlicePlan& slice, SliceSampler& sampler, c
 
 Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
                           Progress* progress) {
-  const FrameWork work{cache_,    plan.parts, plan.settings,     planner_.table(),
-                       plan.keys, hidden_,    options.keep_going};
+  const FrameWork work{cache_,    plan.parts, plan.settings,      planner_.table(),
+                       plan.keys, hidden_,    options.keep_going, plan.tiles.get()};
   makePools(options);
   {
     const MutexLock lock(mutex_);
@@ -238,7 +249,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   statistics.sweep_peak_bytes = SweepBuffer::bytes(pools_->sweep.peakSplats());
   statistics.slabs = pools_->sweep.slabs();
   statistics.bricks_hidden = pools_->workers.partsHidden() + plan.parts_hidden;
-  statistics.bricks_drawn = cut.parts.size() - statistics.bricks_hidden;
+  statistics.bricks_drawn = cut.parts.size() - statistics.bricks_hidden - plan.parts_elsewhere;
   statistics.bricks_out_of_image = cut.out_of_image;
   statistics.bricks_transparent = cut.transparent;
   statistics.bricks_culled = cut.out_of_image + cut.transparent;
@@ -259,6 +270,7 @@ Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, F
     painter.begin(plan.settings.view.size, options.background, planner_.table(),
                   {plan.settings.per_pixel, plan.settings.light.has_value(), plan.settings.layers},
                   resourcesOf(options));
+    if (plan.tiles) painter.drawOnly(*plan.tiles);
     hidden_.ask(&painter);
     SegmentDrawer drawer(painter, pools_->ring, statistics.painter_waited_s);
     uint64_t seen = 0;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "render/frame/hidden_bricks.h"
+#include "render/frame/tile_dealer.h"
 #include "render/project/kernel.h"
 #include "render/project/screen_view.h"
 #include "stream/base/error.h"
@@ -162,6 +163,22 @@ FramePlan FramePlanner::plan(const Camera& camera, const FrameOptions& options, 
   FramePlan plan = planOf(settings, chooseCut(settings, options, limits), order);
   plan.slices = planSlices(settings, options, limits);
   return plan;
+}
+
+std::vector<uint32_t> FramePlanner::share(FramePlan& plan, const FrameOptions& options) const {
+  Ranks& ranks = *options.ranks;
+  std::vector<uint32_t> owners;
+  if (ranks.isFirst())
+    owners = dealTiles(
+        partCosts(plan.parts, cache_.bricks(), cache_.brickVariables(variable_), plan.settings.view),
+        options.size, ranks.count());
+  owners = fromBytes<uint32_t>(ranks.broadcast(toBytes(owners)));
+  plan.tiles = std::make_shared<TileSet>(options.size, owners, ranks.rank());
+  if (options.keep_going) return owners;  // an ancestor that replaces a damaged brick reaches out of its box
+  plan.parts_elsewhere = std::erase_if(plan.parts, [&](const SweptPart& part) {
+    return !plan.tiles->touches(screenBoxOf(cache_.bricks()[part.part.brick], plan.settings.view));
+  });
+  return owners;
 }
 
 void FramePlanner::addLayers(FramePlan& plan, std::shared_ptr<const PixelLayers> layers,

@@ -41,6 +41,8 @@ struct FramePlan {
   std::vector<SlicePlan> slices = {};
   std::shared_ptr<const PixelLayers> layers = nullptr;  // those of settings, where there are some
   uint64_t parts_hidden = 0;                            // of the cut, behind opaque layers: not in `parts`
+  std::shared_ptr<const TileSet> tiles = nullptr;       // of this rank; null: all
+  uint64_t parts_elsewhere = 0;                         // of the cut, in others' tiles: not in `parts`
 };
 
 /// A part of the cut with its rank and its range of depth keys, as the sweep needs it.
@@ -76,6 +78,10 @@ class FramePlanner {
   ScreenView screenView(const Camera& camera, const FrameOptions& options, ImageSize size) const {
     return screenViewOf(cache_.manifest(), camera, options, size);
   }
+
+  /// Deals the picture out to options.ranks, and leaves out what lies in the tiles of others. Nothing is left out
+  /// if `keep_going`. Returns [tile] its rank. All ranks have to call it.
+  std::vector<uint32_t> share(FramePlan& plan, const FrameOptions& options) const;
 
   /// Puts the layers of its scene into a plan. What is behind opaque ones everywhere is left out, unless
   /// `keep_going`; all is without a volume.

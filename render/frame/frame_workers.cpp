@@ -197,6 +197,7 @@ bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
     const glm::dvec3 cell_min = work_->cache.manifest().root.cellMin(fetched->cell);
     worker.projector.project(work_->settings, work_->table, cell_min, fetched->geometry, fetched->values,
                              fetched->ranges);
+    if (work_->tiles) worker.projector.keepTouching(*work_->tiles);
     worker.keys.resize(worker.projector.depths().size());
     work_->keys.keysOf(worker.projector.depths(), cell_min, part.keys, worker.keys);
   }

@@ -33,6 +33,7 @@ struct FrameWork {
   const DepthKeys& keys;
   const HiddenBricks& hidden;
   bool keep_going = false;
+  const TileSet* tiles = nullptr;  // what is drawn of the picture; null: all
 };
 
 /// The same for a slice.

@@ -14,6 +14,7 @@
 #include "render/project/pixel_layers.h"
 #include "render/project/screen_box.h"
 #include "render/project/screen_splat.h"
+#include "render/project/tile_set.h"
 #include "stream/paging/cut.h"
 
 namespace curvisplat {
@@ -42,6 +43,8 @@ class Painter {
   /// larger than the painter's limit, which it names.
   virtual void begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
                      PixelShading shading, const PaintResources& resources = {}) = 0;
+  /// After begin(): only `tiles` of the picture are wanted; what the others show does not matter.
+  virtual void drawOnly(const TileSet& /*tiles*/) {}
   /// Blends `splats` into the frame in their order: behind all splats drawn so far, or in front of them, as
   /// order() says. The memory may be used again when the call returns, unless drawsUnderWay() counts the
   /// draw.

@@ -336,4 +336,23 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
   counts_.pieces = splats_.size();
 }
 
+void BrickProjector::keepTouching(const TileSet& tiles) {
+  constexpr auto kSupport = static_cast<float>(kKernelSupport);
+  size_t kept = 0, first_record = 0;  // the records of a splat come before it
+  for (size_t n = 0; n < splats_.size(); ++n) {
+    const ScreenSplat& splat = splats_[n];
+    if (isCut(splat)) continue;
+    const float reach_x = kSupport * splat.l11;
+    const float reach_y = kSupport * (std::abs(splat.l21) + splat.l22);
+    if (tiles.touches({splat.x - reach_x, splat.y - reach_y, splat.x + reach_x, splat.y + reach_y}))
+      for (size_t from = first_record; from <= n; ++from, ++kept) {
+        splats_[kept] = splats_[from];
+        depths_[kept] = depths_[from];
+      }
+    first_record = n + 1;
+  }
+  splats_.resize(kept);
+  depths_.resize(kept);
+}
+
 }  // namespace curvisplat

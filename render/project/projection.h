@@ -22,6 +22,7 @@
 #include "render/project/pixel_layers.h"
 #include "render/project/screen_splat.h"
 #include "render/project/screen_view.h"
+#include "render/project/tile_set.h"
 #include "stream/model/border_code.h"
 #include "stream/model/brick.h"
 #include "stream/model/splats.h"
@@ -75,6 +76,10 @@ class BrickProjector {
   /// All splats of a brick.
   void project(const ProjectionSettings& settings, const ClassificationTable& table,
                const glm::dvec3& cell_min, const SplatGeometry& geometry, const SplatVariable& variable);
+
+  /// Leaves out what touches none of the tiles. To be called after project(): how splats are cut must not
+  /// depend on the tiles.
+  void keepTouching(const TileSet& tiles);
 
   /// In the order of the ranges. A splat's ScreenCut and ScreenDepth precede it and have the same depth.
   const std::vector<ScreenSplat>& splats() const { return splats_; }

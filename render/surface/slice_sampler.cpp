@@ -68,6 +68,14 @@ SliceSampler::SliceSampler(const ScreenView& view, const ClipPlane& plane, doubl
   seen_ = view.projection == Projection::kPerspective || std::abs(middle.inverse) > 0;
 }
 
+void SliceSampler::addOthers(Ranks& ranks) {
+  static_assert(sizeof(Sums) == 3 * sizeof(int64_t));
+  ranks.sum(std::span(&sums_.data()->weight, 3 * sums_.size()));
+  int64_t touched = touched_;
+  ranks.sum(std::span(&touched, 1));
+  touched_ = touched > 0;
+}
+
 /// Orthographic: `direction` is where the ray meets the plane, `inverse` 1, or 0 where it does not.
 SliceSampler::Hit SliceSampler::hitOf(double x, double y) const {
   const double a = (x - 0.5 * view_.size.width) / view_.focal_px,

@@ -22,6 +22,7 @@
 #include "render/project/clip_planes.h"
 #include "render/project/screen_view.h"
 #include "render/project/splat_cutter.h"
+#include "stream/base/ranks.h"
 #include "stream/model/border_code.h"
 #include "stream/model/brick.h"
 
@@ -39,6 +40,9 @@ class SliceSampler {
   /// Adds the splats of a brick that `ranges` hold.
   void add(const glm::dvec3& cell_min, const GeometryArrays<const float>& geometry,
            const VariableArrays<const float>& variable, std::span<const SplatRange> ranges);
+
+  /// Adds what the samplers of all other ranks have, which sampled other bricks. All have to call it.
+  void addOthers(Ranks& ranks);
 
   struct Sample {
     double scalar;

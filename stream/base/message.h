@@ -11,6 +11,8 @@ namespace curvisplat {
 /// Prints `text` as one line that begins with "curvisplat: ". If standard error cannot be written (a full
 /// disk, a closed pipe), the message is lost: that is no reason to fail. Any thread.
 void printMessage(std::string_view text) noexcept;
+/// Makes printMessage() print nothing: in processes of which another one prints what all have to say.
+void muteMessages(bool mute = true) noexcept;
 
 template <typename First, typename... Rest>
 void printMessage(fmt::format_string<First, Rest...> format, First&& first, Rest&&... rest) {

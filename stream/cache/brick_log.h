@@ -34,6 +34,8 @@ class BrickLog {
   BrickLog(const std::filesystem::path& folder, size_t variables);
 
   void append(const AppendedBrick& brick);
+  /// Syncs and closes it, so that another machine may read it. Nothing may follow.
+  void close() { file_.close(); }
   /// Truncates the log to its first `count` entries.
   void keep(uint64_t count);
 

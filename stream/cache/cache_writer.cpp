@@ -177,6 +177,42 @@ uint64_t CacheWriter::append(EncodedBrick&& encoded, float error) {
   return s.bricks.size() - 1;
 }
 
+AppendedBrick CacheWriter::appended(uint64_t id) const {
+  const State& s = *state_;
+  AppendedBrick brick{s.bricks[id], s.weights[id], {}};
+  for (const auto& table : s.tables) brick.variables.push_back(table[id]);
+  return brick;
+}
+
+void CacheWriter::closeStreams() {
+  state_->geometry.close();
+  for (OutputFile& file : state_->values) file.close();
+  state_->log.close();
+}
+
+void CacheWriter::reserve(std::vector<AppendedBrick>& bricks) {
+  State& s = *state_;
+  CURVISPLAT_CHECK_OP(s.bricks.size(), ==, 0u);
+  if (bricks.empty()) return;  // finish() reports it
+  uint64_t geometry_end = s.geometry.size();
+  std::vector<uint64_t> values_ends;
+  for (const OutputFile& file : s.values) values_ends.push_back(file.size());
+  const auto place = [](Extent& extent, uint64_t& end) {
+    extent.offset = streamOffset(end, extent.length);
+    end = extent.offset + extent.length;
+  };
+  for (AppendedBrick& brick : bricks) {
+    place(brick.brick.geometry, geometry_end);
+    for (size_t v = 0; v < s.variables.size(); ++v) place(brick.variables[v].values, values_ends[v]);
+    s.add(AppendedBrick(brick));
+  }
+  // The last byte makes the file so long; the stream that it belongs to replaces it.
+  const std::byte last{0};
+  s.geometry.writeAt(geometry_end - 1, std::span(&last, 1));
+  for (size_t v = 0; v < s.variables.size(); ++v)
+    s.values[v].writeAt(values_ends[v] - 1, std::span(&last, 1));
+}
+
 BrickSplats CacheWriter::readBack(uint64_t id) const {
   const State& s = *state_;
   CURVISPLAT_CHECK_OP(id, <, s.bricks.size());

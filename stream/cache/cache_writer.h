@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "stream/base/progress.h"
+#include "stream/cache/brick_log.h"
 #include "stream/cache/manifest.h"
 #include "stream/cache/partial_folder.h"
 #include "stream/codec/brick_codec.h"
@@ -48,6 +49,15 @@ class CacheWriter {
   /// Reads back the brick that append() wrote under `id`, for merging into coarser levels. Any number of
   /// threads may read at the same time, while nothing is appended.
   BrickSplats readBack(uint64_t id) const;
+
+  /// What append() has noted of a brick.
+  AppendedBrick appended(uint64_t id) const;
+  /// Syncs and closes the streams and the log, so that another machine may read them. Only readBack() may follow.
+  void closeStreams();
+
+  /// In place of append(), for bricks whose streams other processes write: sets the offsets of all of them, which
+  /// must come in the same order. Nothing may have been appended. The streams have to be in the files before finish().
+  void reserve(std::vector<AppendedBrick>& bricks);
 
   /// Sorts the records by level and Morton order and links parents and children. Writes bricks.bin, the
   /// variables' tables, bricks.vdb and the manifest, whose root, counts, levels, volume and files it fills

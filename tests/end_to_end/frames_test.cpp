@@ -162,6 +162,40 @@ TEST_F(Frames, NamesWithoutOneNumberAreWrongUsage) {
   EXPECT_TRUE(fs::exists(file("a%d.png")));
 }
 
+TEST_F(Frames, PartsDrawTheFramesOfTheWhole) {
+  const std::vector<std::string> orbit{"--orbit", "360", "--frames", "5"};
+  const auto with = [&](std::vector<std::string> options) {
+    options.insert(options.end(), orbit.begin(), orbit.end());
+    return options;
+  };
+  expectDrawn(with({"-o", file("whole_%d.png")}));
+  for (const char* part : {"1/3", "2/3", "3/3"}) {
+    const std::string json_name = fmt::format("part{}.json", part[0]);
+    expectDrawn(with({"-o", file("part_%d.png"), "--part", part, "--stats", file(json_name)}));
+    for (const auto& frame : json(json_name)["frames"])
+      EXPECT_EQ(frame["frame"].get<int>() % 3, part[0] - '1');
+  }
+  for (int n = 0; n < 5; ++n)
+    EXPECT_EQ(bytes(fmt::format("whole_{}.png", n)), bytes(fmt::format("part_{}.png", n))) << n;
+  // Nothing else: a part writes no frame of another.
+  expectDrawn(with({"-o", file("one_%d.png"), "--part", "2/3"}));
+  for (int n = 0; n < 5; ++n) EXPECT_EQ(fs::exists(file(fmt::format("one_{}.png", n))), n % 3 == 1) << n;
+  // More parts than frames: some have nothing to do.
+  const ProgramResult idle = render(with({"-o", file("idle_%d.png"), "--part", "7/9"}));
+  EXPECT_EQ(idle.status, 0) << idle.err;
+  EXPECT_NE(idle.out.find("no frames in this part"), std::string::npos) << idle.out;
+}
+
+TEST_F(Frames, PartsThatCannotBeAreWrongUsage) {
+  for (const char* part : {"0/3", "4/3", "1", "/3", "1/", "a/3", "1/3x", "-1/3", "1/1000000"})
+    expectRefused({"-o", file("p_%d.png"), "--orbit", "9", "--frames", "2", "--part", part}, 2,
+                  "--part " + std::string(part));
+  expectRefused({"-o", file("p.png"), "--part", "1/2"}, 2, "there is one");
+  expectRefused({"-o", file("p.mp4"), "--orbit", "9", "--part", "1/2"}, 2, "ffmpeg");
+  expectRefused({"-o", file("p_%d.png"), "--orbit", "9", "--part", "1/2", "--first-image", file("f.png")}, 2,
+                "--first-image");
+}
+
 TEST_F(Frames, APathGoesThroughItsKeyFrames) {
   std::ofstream(file("path.json")) << R"({"key_frames": [
     {"time": 0, "position": [5, 0, 0.5], "focal_point": [-0.4, 0, 0.5], "view_up": [0, 0, 1],

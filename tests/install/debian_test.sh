@@ -30,6 +30,12 @@ done
 for depended in $(dpkg-deb --field "$development" Depends | tr -d ','); do
   expect "$depended is a package" dpkg-query --status "$depended" > /dev/null
 done
+for mpi in "$folder"/curvisplat-mpi_*.deb; do
+  [[ -e $mpi ]] || continue  # built without it
+  dpkg --extract "$mpi" "$folder/root"
+  plug_in=$(find "$folder/root/usr/lib" -name curvisplat-mpi.so)
+  expect "the plug-in is where the program looks for it" test "$(basename "$(dirname "$plug_in")")" = curvisplat
+done
 for python in "$folder"/python3-curvisplat_*.deb; do
   [[ -e $python ]] || continue  # built without it
   dpkg --extract "$python" "$folder/root"

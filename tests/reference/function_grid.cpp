@@ -6,7 +6,8 @@
 
 namespace curvisplat {
 
-FunctionGridSource::FunctionGridSource(std::vector<GridBlock> blocks, size_t scalars, Function function)
+FunctionGridSource::FunctionGridSource(std::vector<GridBlock> blocks, size_t scalars, Function function,
+                                       Centring centring)
     : function_(std::move(function)) {
   description_.format = "a function";
   description_.files = {"function"};
@@ -15,6 +16,7 @@ FunctionGridSource::FunctionGridSource(std::vector<GridBlock> blocks, size_t sca
   for (size_t n = 0; n < scalars; ++n) {
     GridScalar scalar;
     scalar.name = fmt::format("s{}", n);
+    scalar.centring = centring;
     description_.scalars.push_back(scalar);
   }
 }

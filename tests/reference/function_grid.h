@@ -25,7 +25,8 @@ class FunctionGridSource : public GridSource {
   using Function = std::function<NodeValues(const GridNode&)>;
 
   /// Scalars are named "s0", "s1", ...
-  FunctionGridSource(std::vector<GridBlock> blocks, size_t scalars, Function function);
+  FunctionGridSource(std::vector<GridBlock> blocks, size_t scalars, Function function,
+                     Centring centring = Centring::kNode);
 
   const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,

@@ -98,6 +98,13 @@ TEST_F(SeriesCommand, DrawsStepsBackwardsInMemoryAndOutOfIt) {
   draw("f.splats", "o_%d.png", {"--steps", "all", "--orbit", "360", "--frames", "8"});
   EXPECT_TRUE(fs::exists(file("o_7.png")));
   EXPECT_FALSE(fs::exists(file("o_8.png")));
+  // Parts have the steps, the cameras and the names of the whole.
+  for (const char* part : {"1/2", "2/2"})
+    draw("f.splats", "p_%d.png", {"--steps", "all", "--orbit", "360", "--frames", "8", "--part", part});
+  for (int n = 0; n < 8; ++n)
+    EXPECT_TRUE(bytesOfFile(file(fmt::format("o_{}.png", n))) ==
+                bytesOfFile(file(fmt::format("p_{}.png", n))))
+        << n;
 }
 
 TEST_F(SeriesCommand, SelectsAddsAndLists) {

@@ -26,6 +26,7 @@ FOLDERS = {
 # Parts of one program, which CMake does not keep apart: what each may include of the others.
 PROGRAM_ROOMS = {
     "tools/output": set(),
+    "tools/mpi": set(),
     "tools/options": {"tools/output"},
     "tools/commands": {"tools/output", "tools/options", "tools/throughput", "tools/viewer"},
     "tools/python": {"tools/output", "tools/options"},

@@ -33,6 +33,7 @@
 #include "tools/throughput/machine.h"
 #include "tools/throughput/measurements.h"
 #include "tools/throughput/plot.h"
+#include "tools/throughput/rank_simulation.h"
 #include "tools/throughput/stage_throughput.h"
 #include "tools/throughput/text_table.h"
 #include "tools/throughput/throughput_report.h"
@@ -52,7 +53,7 @@ struct BenchArguments {
   ScalarArguments scalar;
   CameraArguments camera;
   std::string size = "600x600", lod_pixels = "1,2,4", backend = "auto";
-  std::optional<std::string> nodes, memory;
+  std::optional<std::string> nodes, memory, ranks;
   unsigned threads = 0;
   bool quick = false, converts = false;
 };
@@ -146,6 +147,45 @@ std::pair<std::string, bool> drawingOf(Backend backend, bool card_draws, unsigne
   if (backend == Backend::kEgl || (backend == Backend::kAutomatic && card_draws))
     return {"stages/draw/egl", card_draws};
   return {stageName("draw/cpu", threads), false};
+}
+
+std::vector<uint32_t> parseRanks(const std::string& text) {
+  std::vector<uint32_t> counts;
+  for (size_t begin = 0; begin <= text.size();) {
+    const size_t end = std::min(text.find(',', begin), text.size());
+    const uint64_t count = parseCount("--ranks", text.substr(begin, end - begin));
+    if (count < 1 || count > kMaxSimulatedRanks)
+      throw UsageError("--ranks {}: expected numbers from 1 to {}", text, kMaxSimulatedRanks);
+    counts.push_back(static_cast<uint32_t>(count));
+    begin = end + 1;
+  }
+  return counts;
+}
+
+/// What a picture takes of several processes, found from the index and the view. Nothing is drawn.
+void benchRanks(const BenchArguments& arguments) {
+  FrameOptions options;
+  options.size = parseImageSize("--size", arguments.size);
+  options.lod_pixels = parseErrors(arguments.lod_pixels).front();
+  checkCameraArguments(arguments.camera);
+  const std::vector<uint32_t> counts = parseRanks(*arguments.ranks);
+  const CacheReader cache(arguments.cache);
+  const Manifest& manifest = cache.manifest();
+  const size_t variable = chooseVariable(cache, arguments.scalar);
+  const TransferFunction function = PictureChoice(cache, variable, glm::dvec3(1)).function(arguments.scalar);
+  const Camera camera =
+      chooseCameraMotion(arguments.camera, manifest.lower, manifest.upper, options.size).camera(0);
+  const RankSimulation simulated = simulateRanks({cache, variable, function, options}, camera, counts);
+  fmt::print("{}: {} samples in {} bricks; scalar {}\n", arguments.cache.string(), manifest.nodes,
+             manifest.bricks, manifest.variables[variable].name);
+  printSection(
+      fmt::format("Simulated: one picture of {}x{} pixels at {:g} px, {} splats in {} parts of bricks",
+                  options.size.width, options.size.height, options.lod_pixels,
+                  shortCount(static_cast<double>(simulated.splats)), simulated.parts),
+      rankTable(simulated));
+  Json json = reportOf(arguments, Machine::here(cache.path()), {});
+  json["ranks"] = toJson(simulated);
+  writeResults(arguments, json, rankPlots(simulated));
 }
 
 void benchCache(const BenchArguments& arguments) {
@@ -324,10 +364,19 @@ void addBench(CLI::App& app) {
           "--nodes", arguments->nodes,
           "Approximate number of nodes of the grid, such as 500K (default 8M); each takes 96 bytes of disk")
       ->group(how);
+  CLI::Option* const ranks =
+      command
+          ->add_option(
+              "--ranks", arguments->ranks,
+              "Simulate a picture by N,N,... processes, such as 1,2,4,8, from the cache's index: work, "
+              "bytes and efficiency; nothing is drawn")
+          ->group(what);
+  convert->excludes(ranks);
   command->add_option("--tmp", arguments->temporary_folder, "Temporary directory (default: the system's)")
       ->group(how);
   command->callback([arguments] {
     checkArguments(*arguments);
+    if (arguments->ranks) return benchRanks(*arguments);
     arguments->converts ? benchConversion(*arguments) : benchCache(*arguments);
   });
 }

@@ -22,6 +22,7 @@
 #include "tools/options/convert_arguments.h"
 #include "tools/options/grid_options.h"
 #include "tools/options/option_parsers.h"
+#include "tools/output/launched_ranks.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
@@ -82,6 +83,7 @@ nlohmann::json statistics(const ConvertReport& report, const Progress& progress)
 }
 
 void runConvert(ConvertArguments arguments) {
+  Ranks& ranks = launchedRanks();
   if (arguments.output.empty()) throw UsageError("--output is required, or --add-scalar with --to");
   if (!arguments.output.has_filename()) arguments.output = arguments.output.parent_path();  // "NAME.splats/"
   checkOutputFolder("-o", arguments.output);
@@ -91,6 +93,7 @@ void runConvert(ConvertArguments arguments) {
   if (options.output != arguments.output) checkOutputFolder("-o", options.output);
   options.overwrite = arguments.overwrite;
   options.resume = arguments.resume;
+  options.ranks = &ranks;
   applyCommonOptions(arguments, options);
 
   const auto source = openSource(arguments, arguments.output);
@@ -98,10 +101,13 @@ void runConvert(ConvertArguments arguments) {
   options.title = arguments.grid.grid.stem().string();
 
   requireThreads(arguments.threads);
-  Progress progress{progressBar()};
+  Progress progress{ranks.isFirst() ? progressBar() : Progress::Display{}};
   const StopOnSignals stopping(progress);
+  const StopRanksWith stopping_ranks(ranks, progress);
   const ConvertReport report = convert(*source, options, progress);
-  const nlohmann::json numbers = statistics(report, progress);
+  if (!ranks.isFirst()) return;
+  nlohmann::json numbers = statistics(report, progress);
+  numbers["ranks"] = ranks.count();
   printWarnings(source->description(), arguments.grid.time_step, report);
   printSummary(arguments, report, secondsOf(progress));
   if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, numbers);
@@ -182,8 +188,12 @@ void addConvert(CLI::App& app) {
   addGasOptions(*command, arguments->gas);
   command->callback([arguments] {
     takeScalarsFromSolutions(*arguments);
-    if (isSeries(*arguments)) return runConvertSeries(*arguments);
+    const bool series = isSeries(*arguments);
     const bool adds = !arguments->added_scalars.empty() || !arguments->to.empty();
+    if ((series || adds) && !launchedRanks().alone())
+      throw UsageError("{} one process converts; start one",
+                       series ? "a series of time steps: " : "--add-scalar:");
+    if (series) return runConvertSeries(*arguments);
     adds ? runAddScalar(*arguments) : runConvert(*arguments);
   });
 }

@@ -28,6 +28,7 @@
 #include "tools/commands/render_statistics.h"
 #include "tools/options/camera_motion.h"
 #include "tools/options/frame_arguments.h"
+#include "tools/options/frame_part.h"
 #include "tools/options/motion_in_time.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/picture_choice.h"
@@ -35,6 +36,7 @@
 #include "tools/options/step_arguments.h"
 #include "tools/options/surface_arguments.h"
 #include "tools/output/frame_output.h"
+#include "tools/output/launched_ranks.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
@@ -53,7 +55,7 @@ struct RenderArguments {
   StepArguments steps;
   FrameArguments frame;
   std::string backend = "auto";
-  std::optional<std::string> frame_rate;
+  std::optional<std::string> frame_rate, part;
   Annotations annotations;
 };
 
@@ -68,12 +70,31 @@ ChosenFor drawnSteps(const RenderArguments& arguments) {
   return steps.severalSteps() || may_follow_path ? ChosenFor::kSeries : ChosenFor::kStep;
 }
 
+void checkPartArguments(const RenderArguments& arguments) {
+  if (!arguments.part) return;
+  parsePart(*arguments.part);
+  if (!severalFrames(arguments))
+    throw UsageError("--part {}: deals out frames, and there is one; give --orbit, --path or --steps",
+                     *arguments.part);
+  if (isMovieName(arguments.output))
+    throw UsageError(
+        "--part {}: a part of a movie cannot be joined with others; write numbered pictures, -o "
+        "frame_%04d.png, and join them with ffmpeg",
+        *arguments.part);
+  if (!arguments.first_image.empty())
+    throw UsageError("--part {}: cannot be combined with --first-image, which is of frame 0 alone",
+                     *arguments.part);
+}
+
 /// Throws UsageError if options contradict each other, and Error if an output cannot be written.
 void checkArguments(const RenderArguments& arguments, ImageSize size) {
   checkMotionArguments(arguments.camera, arguments.steps);
   checkFunctionArguments(arguments.scalar);
   checkSurfaceArguments(arguments.surfaces);
   checkOutputName(arguments.output, severalFrames(arguments), size);
+  checkPartArguments(arguments);
+  if (!arguments.first_image.empty() && !launchedRanks().alone())
+    throw UsageError("--first-image {}: one process draws it; start one", arguments.first_image.string());
   if (arguments.frame_rate && !isMovieName(arguments.output))
     throw UsageError("--frame-rate needs a movie: -o NAME.mp4");
   if (arguments.frame.background == "transparent" && arguments.output.extension() != ".png" &&
@@ -111,31 +132,89 @@ uint64_t outputBytes(const RenderArguments& arguments, ImageSize picture) {
   else
     bytes = writingBytes(arguments.output, picture);
   if (!arguments.first_image.empty()) bytes = std::max(bytes, writingBytes(arguments.first_image, picture));
+  // Tiles or pictures of other ranks, as they come and as they are put in their places.
+  if (!launchedRanks().alone()) bytes = std::max(bytes, 2 * 4 * sizeof(float) * picture.pixels());
   if (!(arguments.annotations == Annotations{})) bytes += annotatedBytes(picture);
   return bytes;
 }
 
 /// Draws one frame after another and collects the report. Throws Interrupted after progress.stop().
+///
+/// Several ranks draw a frame each, if there are as many frames: a round. Otherwise they draw each frame together
+/// (FrameOptions::ranks), and rank 0 writes it.
 class FrameRun {
  public:
   FrameRun(const RenderArguments& arguments, const Manifest& manifest, StepPlayer& player,
-           FrameOutput& output, RenderReport& report, Progress& progress)
+           FrameOutput* output, RenderReport& report, Progress& progress)
       : arguments_(arguments),
         manifest_(manifest),
         player_(player),
         output_(output),
         report_(report),
-        progress_(progress) {}
+        progress_(progress),
+        ranks_(launchedRanks()) {}
 
-  /// Pictures that were written are kept if a later frame fails.
-  void draw(const MotionInTime& motion) {
+  /// Draws the frames `numbers`. Pictures that were written are kept if a later frame fails.
+  void draw(const MotionInTime& motion, const std::vector<uint64_t>& numbers) {
     const bool moves = severalFrames(arguments_);
-    if (moves) progress_.begin("drawing", motion.frames, "frames");
-    for (uint64_t number = 0; number < motion.frames; ++number) {
+    const bool dealt = !ranks_.alone() && !report_.options.ranks;
+    const std::vector<uint64_t> own = dealt ? ownOf(numbers) : numbers;
+    const size_t rounds = dealt ? (numbers.size() + ranks_.count() - 1) / ranks_.count() : numbers.size();
+    if (moves) progress_.begin("drawing", own.size(), "frames");
+    for (size_t n = 0; n < rounds; ++n) {
+      picture_ = Image();
+      if (n < own.size()) drawNext(motion, own, n);
+      if (dealt && isMovieName(arguments_.output)) writeRound(numbers, n);
+    }
+    if (dealt) gatherReports(motion);
+    if (output_) output_->finish();
+    progress_.end();
+  }
+
+ private:
+  std::vector<uint64_t> ownOf(const std::vector<uint64_t>& numbers) const {
+    std::vector<uint64_t> own;
+    for (size_t n = ranks_.rank(); n < numbers.size(); n += ranks_.count()) own.push_back(numbers[n]);
+    return own;
+  }
+
+  /// The pictures that the ranks have drawn, into the movie at rank 0.
+  void writeRound(const std::vector<uint64_t>& numbers, size_t round) {
+    for (unsigned rank = 0; rank < ranks_.count(); ++rank) {
+      const size_t at = round * ranks_.count() + rank;
+      if (at >= numbers.size()) return;
+      const bool own = rank == ranks_.rank();
+      std::vector<Ranks::Bytes> sent = ranks_.gather(own ? toBytes(picture_.rgba) : Ranks::Bytes{});
+      if (!ranks_.isFirst()) continue;
+      Image picture;
+      picture.size = report_.picture;
+      picture.rgba = fromBytes<float>(sent[rank]);
+      output_->write(numbers[at], picture);
+    }
+  }
+
+  void gatherReports(const MotionInTime& motion) {
+    const std::vector<Ranks::Bytes> sent = ranks_.gather(packStatistics(report_.frames));
+    if (!ranks_.isFirst()) return;
+    report_.frames.clear();
+    for (const Ranks::Bytes& bytes : sent)
+      for (FrameReport& frame : unpackStatistics(bytes)) {
+        frame.camera = motion.camera(frame.number);
+        report_.frames.push_back(std::move(frame));
+      }
+    std::sort(report_.frames.begin(), report_.frames.end(),
+              [](const FrameReport& a, const FrameReport& b) { return a.number < b.number; });
+  }
+
+  void drawNext(const MotionInTime& motion, const std::vector<uint64_t>& numbers, size_t n) {
+    const bool moves = severalFrames(arguments_);
+    const uint64_t number = numbers[n];
+    {
       Progress of_frame;
       of_frame.stopWith(progress_);
       try {
-        draw(number, motion, moves ? of_frame : progress_);
+        const uint64_t* const next = n + 1 < numbers.size() ? &numbers[n + 1] : nullptr;
+        draw(number, next, motion, moves ? of_frame : progress_);
       } catch (const Interrupted&) {
         throw;
       } catch (const UsageError& error) {
@@ -145,22 +224,19 @@ class FrameRun {
         if (moves) throw Error("frame {}: {}", number, error.what());
         throw;
       }
-      if (moves) progress_.advance(1);
     }
-    output_.finish();
-    progress_.end();
+    if (moves) progress_.advance(1);
   }
 
- private:
-  void draw(uint64_t number, const MotionInTime& motion, Progress& progress) {
+  void draw(uint64_t number, const uint64_t* next, const MotionInTime& motion, Progress& progress) {
     player_.goTo(motion.position(number));
     const double time = player_.time();
     const Camera camera = motion.camera(number);
     FrameStatistics statistics;
     if (number > 0 || arguments_.first_image.empty()) {
       const Image image = player_.renderer().render(camera, report_.options, statistics, &progress);
-      if (number + 1 < motion.frames) prefetch(motion, number + 1);
-      finish(number, {time, camera, statistics}, image);
+      if (next && !report_.options.ranks) prefetch(motion, *next);
+      finish({number, time, camera, statistics}, image);
       return;
     }
     const auto show = [&](const Image& image, bool is_final) {
@@ -169,7 +245,7 @@ class FrameRun {
         report_.time_to_first_image_s = secondsSinceStart();
         report_.first_image = statistics;
       }
-      if (is_final) finish(number, {time, camera, statistics}, image);
+      if (is_final) finish({number, time, camera, statistics}, image);
     };
     player_.renderer().renderProgressively(camera, report_.options, statistics, show, &progress);
   }
@@ -184,17 +260,29 @@ class FrameRun {
     }
   }
 
-  void finish(uint64_t number, const FrameReport& frame, const Image& image) {
+  void finish(FrameReport frame, const Image& image) {
+    if (report_.options.ranks) {
+      for (const Ranks::Bytes& bytes : ranks_.gather(packStatistics({frame})))
+        frame.of_ranks.push_back(unpackStatistics(bytes).front().statistics);
+      if (!ranks_.isFirst()) return;
+      frame.statistics = combined(frame.of_ranks);
+    }
+    const uint64_t number = frame.number;
     const Camera& camera = frame.camera;
     const FrameStatistics& statistics = frame.statistics;
-    annotate(image, camera, [&](const Image& picture) { output_.write(number, picture); });
-    if (number == 0 && !report_.first_image) report_.time_to_first_image_s = secondsSinceStart();
+    annotate(image, camera, [&](const Image& picture) {
+      if (isMovieName(arguments_.output) && !ranks_.alone() && !report_.options.ranks)
+        picture_ = picture;  // for rank 0
+      else
+        output_->write(number, picture);
+    });
+    if (report_.frames.empty() && !report_.first_image) report_.time_to_first_image_s = secondsSinceStart();
     report_.frames.push_back(frame);
     const std::string which = severalFrames(arguments_) ? fmt::format(" of frame {}", number) : "";
     reportUnreadable(which, statistics);
     const RenderedScene scene{manifest_, report_.variable, report_.transfer_function,
                               camera,    report_.options,  statistics};
-    if (number == 0) warnOfPoorPicture(image, scene);
+    if (report_.frames.size() == 1) warnOfPoorPicture(image, scene);
     if (reported_empty_ || !isEmpty(image, report_.options.background)) return;
     reported_empty_ = true;
     progress_.end();
@@ -236,22 +324,28 @@ class FrameRun {
   const RenderArguments& arguments_;
   const Manifest& manifest_;
   StepPlayer& player_;
-  FrameOutput& output_;
+  FrameOutput* output_;  // null at ranks that write nothing
   RenderReport& report_;
   Progress& progress_;
+  Ranks& ranks_;
+  Image picture_;  // of a movie's round
   bool reported_empty_ = false;
   std::set<uint32_t> reported_unreadable_;  // bricks
 };
 
 /// What a stopped run has done, and left.
-std::string howFar(const RenderReport& report, uint64_t frames) {
+std::string howFar(const RenderReport& report, uint64_t frames, bool several) {
   const std::string output = report.output.string();
-  if (frames == 1) return fmt::format("interrupted; {} was not written", output);
+  if (!several) return fmt::format("interrupted; {} was not written", output);
   return fmt::format("interrupted after {} of {} frames; {}", report.frames.size(), frames,
                      isMovieName(output) ? output + " was not written" : "the pictures of these are kept");
 }
 
 void printResult(const RenderReport& report) {
+  if (report.frames.empty()) {
+    fmt::print("{}: no frames in this part\n", report.output.string());
+    return;
+  }
   const FrameStatistics& last = report.frames.back().statistics;
   if (report.frames.size() == 1) {
     fmt::print("{}: {} splats of {} in {} bricks, {:.2f} s, {}\n", report.output.string(), last.splats_drawn,
@@ -265,6 +359,7 @@ void printResult(const RenderReport& report) {
 }
 
 void render(const RenderArguments& arguments) {
+  Ranks& ranks = launchedRanks();
   FrameOptions options = frameOptions(arguments.frame);
   checkArguments(arguments, options.size);
   if (options.threads == 0) options.threads = std::max(1u, std::thread::hardware_concurrency());
@@ -295,10 +390,18 @@ void render(const RenderArguments& arguments) {
   const Series series = cache.series();
   const MotionInTime motion = inTime(chooseCameraMotion(framesOf(camera, steps), lower, upper, options.size),
                                      series, arguments.steps, steps, arguments.camera.frames);
+  const std::vector<uint64_t> numbers =
+      (arguments.part ? parsePart(*arguments.part) : FramePart{}).of(motion.frames);
+  // A rank has a picture to itself where there are enough of them.
+  if (!ranks.alone() && numbers.size() < ranks.count()) options.ranks = &ranks;
   requireThreads(options.threads);
-  Progress progress{progressBar()};
+  Progress progress{ranks.isFirst() ? progressBar() : Progress::Display{}};
   const StopOnSignals stopping(progress);
-  const auto output = makeFrameOutput(arguments.output, severalFrames(arguments), picture, frames_per_s);
+  const StopRanksWith stopping_ranks(ranks, progress);
+  const bool writes_own = !options.ranks && !isMovieName(arguments.output);
+  const auto output = ranks.isFirst() || writes_own
+                          ? makeFrameOutput(arguments.output, severalFrames(arguments), picture, frames_per_s)
+                          : nullptr;
   StepPlayer player(cache, variable, transfer_function, parseBackend(arguments.backend));
   RenderReport report{arguments.cache,
                       arguments.output,
@@ -307,19 +410,22 @@ void render(const RenderArguments& arguments) {
                       transfer_function,
                       options,
                       player.renderer().backendName(),
+                      ranks.count(),
                       {},
                       {},
                       {}};
   const auto writeReport = [&] {
-    if (!arguments.statistics.empty()) writeStatistics(arguments.statistics, statisticsOf(report));
+    if (!arguments.statistics.empty() && ranks.isFirst())
+      writeStatistics(arguments.statistics, statisticsOf(report));
   };
   try {
-    FrameRun(arguments, manifest, player, *output, report, progress).draw(motion);
+    FrameRun(arguments, manifest, player, output.get(), report, progress).draw(motion, numbers);
   } catch (const Interrupted& interrupted) {
     progress.end();
     writeReport();
-    throw Interrupted(interrupted.signal(), howFar(report, motion.frames));
+    throw Interrupted(interrupted.signal(), howFar(report, numbers.size(), severalFrames(arguments)));
   }
+  if (!ranks.isFirst()) return;
   writeReport();
   printResult(report);
   if (!choice.chosenOptions().empty()) fmt::print("chosen from the data: {}\n", choice.chosenOptions());
@@ -442,6 +548,11 @@ void addRender(CLI::App& app) {
       ->check(CLI::Range(1u, kMaxFrames))
       ->group(where);
   command->add_option("--frame-rate", arguments->frame_rate, "Frames per second of a movie (default 25)")
+      ->group(where);
+  command
+      ->add_option("--part", arguments->part,
+                   "Draw part i of n of the frames, i/n with i from 1 to n: frames i-1, i-1+n, i-1+2n, ... "
+                   "under their names of the whole")
       ->group(where);
 
   const std::string how = "Resources";

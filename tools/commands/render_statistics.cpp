@@ -106,6 +106,29 @@ Json toJson(const FrameStatistics& statistics) {
   return json;
 }
 
+FrameStatistics statisticsFrom(const Json& json) {
+  FrameStatistics statistics;
+  for (const Seconds& seconds : kSeconds) statistics.*seconds.value = json["seconds"][seconds.name];
+  for (const Count& count : kCounts) statistics.*count.value = json[count.name];
+  statistics.largest_level = json["largest_level"];
+  const Json& error = json["largest_error_px"];
+  statistics.largest_error_px = error.is_null() ? INFINITY : error.get<double>();
+  statistics.workers = json["workers"];
+  statistics.read_by = json["read_by"];
+  statistics.mean_queue_depth = json[kQueueDepth];
+  for (const Json& failure : json["bricks_unreadable"])
+    statistics.bricks_unreadable.push_back({failure["brick"], failure["reason"]});
+  return statistics;
+}
+
+/// What is the same for all ranks, or is not to be added up.
+bool isLargestOf(uint64_t FrameStatistics::*value) {
+  const std::array alike{&FrameStatistics::bricks_culled, &FrameStatistics::bricks_out_of_image,
+                         &FrameStatistics::bricks_transparent, &FrameStatistics::slabs,
+                         &FrameStatistics::memory_used_bytes};
+  return std::find(alike.begin(), alike.end(), value) != alike.end();
+}
+
 /// Percentiles by the nearest-rank method: always a value of some frame.
 template <typename T>
 Json spread(const std::vector<FrameReport>& frames, T FrameStatistics::*value) {
@@ -126,6 +149,48 @@ Json overFrames(const std::vector<FrameReport>& frames) {
 
 }  // namespace
 
+Ranks::Bytes packStatistics(const std::vector<FrameReport>& frames) {
+  Json json = Json::array();
+  for (const FrameReport& frame : frames) {
+    json.push_back(toJson(frame.statistics));
+    json.back()["frame"] = frame.number;
+    json.back()["time"] = frame.time;
+  }
+  const std::vector<uint8_t> bytes = Json::to_cbor(json);
+  return fromBytes<std::byte>(toBytes(bytes));
+}
+
+std::vector<FrameReport> unpackStatistics(const Ranks::Bytes& bytes) {
+  std::vector<FrameReport> frames;
+  for (const Json& json : Json::from_cbor(fromBytes<uint8_t>(bytes)))
+    frames.push_back({json["frame"], json["time"], {}, statisticsFrom(json)});
+  return frames;
+}
+
+FrameStatistics combined(const std::vector<FrameStatistics>& ranks) {
+  FrameStatistics whole = ranks.front();
+  for (size_t n = 1; n < ranks.size(); ++n) {
+    const FrameStatistics& one = ranks[n];
+    for (const Seconds& seconds : kSeconds) {
+      const bool largest =
+          seconds.value == &FrameStatistics::total_s || seconds.value == &FrameStatistics::plan_s;
+      double& value = whole.*seconds.value;
+      value = largest ? std::max(value, one.*seconds.value) : value + one.*seconds.value;
+    }
+    for (const Count& count : kCounts) {
+      uint64_t& value = whole.*count.value;
+      value = isLargestOf(count.value) ? std::max(value, one.*count.value) : value + one.*count.value;
+    }
+    whole.workers += one.workers;
+    for (const BrickFailure& failure : one.bricks_unreadable) {
+      const auto is_same = [&](const BrickFailure& other) { return other.brick == failure.brick; };
+      if (std::none_of(whole.bricks_unreadable.begin(), whole.bricks_unreadable.end(), is_same))
+        whole.bricks_unreadable.push_back(failure);
+    }
+  }
+  return whole;
+}
+
 nlohmann::json statisticsOf(const RenderReport& report) {
   const FrameOptions& options = report.options;
   Json json = runStatistics();
@@ -134,6 +199,7 @@ nlohmann::json statisticsOf(const RenderReport& report) {
   json["image"] = {
       {"file", report.output.string()}, {"width", report.picture.width}, {"height", report.picture.height}};
   json["backend"] = report.backend;
+  json["ranks"] = report.ranks;
   json["threads"] = options.threads;
   json["memory_bytes"] = options.memory_bytes;
   json["lod_pixels"] = options.lod_pixels;
@@ -163,6 +229,8 @@ nlohmann::json statisticsOf(const RenderReport& report) {
   for (const FrameReport& frame : report.frames) {
     Json one = toJson(frame.statistics);
     one["time"] = frame.time;
+    one["frame"] = frame.number;
+    for (const FrameStatistics& of_rank : frame.of_ranks) one["of_ranks"].push_back(toJson(of_rank));
     one["camera"] = toJson(frame.camera);
     json["frames"].push_back(std::move(one));
   }

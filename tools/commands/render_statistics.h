@@ -10,15 +10,18 @@
 #include "render/camera/camera.h"
 #include "render/colour/transfer_function.h"
 #include "render/frame/frame.h"
+#include "stream/base/ranks.h"
 #include "stream/cache/manifest.h"
 
 namespace curvisplat {
 
 /// One drawn frame.
 struct FrameReport {
+  uint64_t number = 0;
   double time = 0;  // of the series
   Camera camera;
   FrameStatistics statistics;
+  std::vector<FrameStatistics> of_ranks = {};  // that drew it together; `statistics` combines them
 };
 
 /// One run of `render`.
@@ -29,11 +32,19 @@ struct RenderReport {
   const TransferFunction& transfer_function;
   const FrameOptions& options;
   std::string backend;
+  unsigned ranks = 1;
   std::vector<FrameReport> frames;
   std::optional<double> time_to_first_image_s;  // since the process started; nullopt: none, or unknown
   std::optional<FrameStatistics> first_image;   // the coarse one of --first-image
 };
 
 nlohmann::json statisticsOf(const RenderReport& report);
+
+/// Statistics of a frame, or of several, as a message between ranks; and back.
+Ranks::Bytes packStatistics(const std::vector<FrameReport>& frames);
+/// Without cameras.
+std::vector<FrameReport> unpackStatistics(const Ranks::Bytes& bytes);
+/// Of a picture that several ranks drew. A brick that several of them read counts once for each.
+FrameStatistics combined(const std::vector<FrameStatistics>& ranks);
 
 }  // namespace curvisplat

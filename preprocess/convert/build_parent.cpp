@@ -1,0 +1,35 @@
+#include "preprocess/convert/build_parent.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "preprocess/convert/merge_levels.h"
+
+namespace curvisplat {
+
+BuiltCell buildFromChildren(const RootCube& root, size_t variables, const Cell& cell,
+                            const std::array<ChildBricks, 8>& children) {
+  std::array<MergedOctant, 8> octants;
+  tbb::enumerable_thread_specific<OctantMerger> mergers([&] { return OctantMerger(root, variables); });
+  tbb::parallel_for(size_t{0}, size_t{8}, [&](size_t octant) {
+    const ChildBricks& child = children[octant];
+    if (child.bricks == 0) return;
+    OctantMerger& merger = mergers.local();
+    merger.begin(child.cell);
+    for (uint64_t n = 0; n < child.bricks; ++n) merger.add(child.read(n));
+    octants[octant] = merger.finish();
+  });
+  BuiltCell built;
+  for (size_t octant = 0; octant < 8; ++octant)
+    if (!octants[octant].splats.positions.empty())
+      built.error = std::max({built.error, children[octant].error, octants[octant].detail});
+  BrickSplats brick = joinOctants(cell, variables, std::move(octants));
+  built.bricks.push_back({encodeBrick(root, brick), static_cast<float>(built.error), false});
+  built.own_bricks = 1;
+  return built;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,106 @@
+#include "preprocess/convert/shared_passes.h"
+
+#include <algorithm>
+#include <bit>
+#include <glm/common.hpp>
+#include <utility>
+
+namespace curvisplat {
+namespace {
+
+/// Everything as 64 bits: five whole numbers, six of the box, two a scalar.
+Ranks::Bytes pack(const GridSurvey& survey) {
+  std::vector<uint64_t> words{survey.nodes, survey.blanked.by_grid, survey.blanked.by_value,
+                              survey.blanked.not_finite, survey.grid_checksum};
+  const auto put = [&](double number) { words.push_back(std::bit_cast<uint64_t>(number)); };
+  for (int axis = 0; axis < 3; ++axis) put(survey.lower[axis]);
+  for (int axis = 0; axis < 3; ++axis) put(survey.upper[axis]);
+  for (const ScalarRange& range : survey.ranges) {
+    put(range.min);
+    put(range.max);
+  }
+  return toBytes(words);
+}
+
+GridSurvey unpackSurvey(const Ranks::Bytes& bytes) {
+  const auto words = fromBytes<uint64_t>(bytes);
+  size_t at = 5;
+  const auto get = [&] { return std::bit_cast<double>(words[at++]); };
+  GridSurvey survey;
+  survey.nodes = words[0];
+  survey.blanked = {words[1], words[2], words[3]};
+  survey.grid_checksum = words[4];
+  for (int axis = 0; axis < 3; ++axis) survey.lower[axis] = get();
+  for (int axis = 0; axis < 3; ++axis) survey.upper[axis] = get();
+  while (at < words.size()) {
+    const double min = get();
+    survey.ranges.push_back({min, get()});
+  }
+  return survey;
+}
+
+}  // namespace
+
+GridSurvey combinedSurvey(const GridSurvey& share, Ranks& ranks) {
+  GridSurvey whole = share;
+  const std::vector<Ranks::Bytes> shares = ranks.gather(pack(share));
+  for (size_t n = 1; n < shares.size(); ++n) {
+    const GridSurvey one = unpackSurvey(shares[n]);
+    whole.nodes += one.nodes;
+    whole.blanked += one.blanked;
+    whole.grid_checksum += one.grid_checksum;
+    whole.lower = glm::min(whole.lower, one.lower);
+    whole.upper = glm::max(whole.upper, one.upper);
+    for (size_t scalar = 0; scalar < whole.ranges.size(); ++scalar) {
+      whole.ranges[scalar].min = std::min(whole.ranges[scalar].min, one.ranges[scalar].min);
+      whole.ranges[scalar].max = std::max(whole.ranges[scalar].max, one.ranges[scalar].max);
+    }
+  }
+  return broadcastSurvey(whole, ranks);
+}
+
+GridSurvey broadcastSurvey(const GridSurvey& survey, Ranks& ranks) {
+  return unpackSurvey(ranks.broadcast(pack(survey)));
+}
+
+void sendCountsToFirst(CountingGrid& counts, Ranks& ranks) {
+  for (unsigned sender = 1; sender < ranks.count(); ++sender) {
+    const bool sends = sender == ranks.rank();
+    const std::vector<uint32_t> level{counts.level()};
+    const std::vector<Ranks::Bytes> levels = ranks.gather(toBytes(level));
+    const std::vector<Ranks::Bytes> runs = ranks.gather(sends ? toBytes(counts.takeRuns()) : Ranks::Bytes{});
+    if (ranks.isFirst())
+      counts.addCoarser(fromBytes<uint32_t>(levels[sender])[0], fromBytes<VoxelRun>(runs[sender]));
+  }
+}
+
+BucketTree broadcastTree(const BucketTree& tree, Ranks& ranks) {
+  return BucketTree::fromLinks(fromBytes<BucketTree::Link>(ranks.broadcast(toBytes(tree.links()))));
+}
+
+void sumContents(std::vector<CellContents>& contents, Ranks& ranks) {
+  const std::vector<Ranks::Bytes> shares = ranks.gather(toBytes(contents));
+  for (size_t n = 1; n < shares.size(); ++n) {
+    const auto share = fromBytes<CellContents>(shares[n]);
+    for (size_t node = 0; node < contents.size(); ++node) contents[node].add(share[node]);
+  }
+  contents = fromBytes<CellContents>(ranks.broadcast(toBytes(contents)));
+}
+
+std::vector<BucketChains> gatherChains(const BucketChains& chains, Ranks& ranks) {
+  std::vector<uint64_t> words{chains.chunk_bytes, chains.size};
+  for (const BucketChains::Chain& chain : chains.chains)
+    words.insert(words.end(), {chain.last_chunk, chain.bytes});
+  const std::vector<Ranks::Bytes> sent = ranks.gather(toBytes(words));
+  std::vector<BucketChains> of_ranks;
+  for (size_t n = 1; n < sent.size(); ++n) {
+    const auto from = fromBytes<uint64_t>(sent[n]);
+    BucketChains& one = of_ranks.emplace_back();
+    one.chunk_bytes = from[0];
+    one.size = from[1];
+    for (size_t at = 2; at < from.size(); at += 2) one.chains.push_back({from[at], from[at + 1]});
+  }
+  return of_ranks;
+}
+
+}  // namespace curvisplat

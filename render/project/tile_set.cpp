@@ -1,0 +1,40 @@
+#include "render/project/tile_set.h"
+
+#include <algorithm>
+
+#include "stream/base/check.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr float kMargin = 1;  // pixels: between corners and centres, and rounding
+
+/// The tile of a coordinate, and the outermost one of what lies outside.
+int tileAt(float pixel, int tiles) {
+  return static_cast<int>(std::clamp(pixel / kTileSide, 0.0f, static_cast<float>(tiles - 1)));
+}
+
+}  // namespace
+
+TileSet::TileSet(ImageSize size, const std::vector<uint32_t>& owners, uint32_t owner)
+    : columns_(tilesAlong(size.width)),
+      rows_(tilesAlong(size.height)),
+      has_(owners.size()),
+      sums_(static_cast<size_t>((columns_ + 1) * (rows_ + 1))) {
+  CURVISPLAT_CHECK_OP(owners.size(), ==, tilesOf(size));
+  for (size_t tile = 0; tile < owners.size(); ++tile) has_[tile] = owners[tile] == owner;
+  for (int row = 0; row < rows_; ++row)
+    for (int column = 0; column < columns_; ++column)
+      sums_[static_cast<size_t>((row + 1) * (columns_ + 1) + column + 1)] =
+          has_[static_cast<size_t>(row * columns_ + column)] + before(column, row + 1) +
+          before(column + 1, row) - before(column, row);
+}
+
+bool TileSet::touches(const ScreenBox& box) const {
+  if (!(box.x0 <= box.x1 && box.y0 <= box.y1)) return true;  // no numbers: whatever draws it decides
+  const int x0 = tileAt(box.x0 - kMargin, columns_), x1 = tileAt(box.x1 + kMargin, columns_) + 1;
+  const int y0 = tileAt(box.y0 - kMargin, rows_), y1 = tileAt(box.y1 + kMargin, rows_) + 1;
+  return before(x1, y1) - before(x0, y1) - before(x1, y0) + before(x0, y0) > 0;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,77 @@
+#include "stream/base/ranks.h"
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+#include <utility>
+
+#include "stream/base/check.h"
+
+namespace curvisplat {
+
+/// MPI's own waits keep a core busy, which others may need for their work.
+void Ranks::wait() {
+  constexpr int kEagerTries = 1000;
+  constexpr auto kShortest = std::chrono::microseconds(20), kLongest = std::chrono::microseconds(2000);
+  auto pause = kShortest;
+  for (int tries = 0; !transport_->isDone(); ++tries) {
+    if (tries < kEagerTries) {
+      std::this_thread::yield();
+      continue;
+    }
+    if (check_) check_();
+    std::this_thread::sleep_for(pause);
+    pause = std::min(2 * pause, kLongest);
+  }
+}
+
+std::vector<Ranks::Bytes> Ranks::exchange(const std::vector<Bytes>& to) {
+  CURVISPLAT_CHECK_OP(to.size(), ==, count());
+  if (alone()) return to;
+  std::vector<uint64_t> out_bytes, in_bytes(count());
+  for (const Bytes& bytes : to) out_bytes.push_back(bytes.size());
+  transport_->beginSizes(out_bytes.data(), in_bytes.data());
+  wait();
+  std::vector<Bytes> from(count());
+  std::vector<std::span<const std::byte>> out(to.begin(), to.end());
+  std::vector<std::span<std::byte>> in;
+  for (unsigned n = 0; n < count(); ++n) {
+    from[n].resize(in_bytes[n]);
+    in.emplace_back(from[n]);
+  }
+  transport_->beginExchange(out.data(), in.data());
+  wait();
+  return from;
+}
+
+std::vector<Ranks::Bytes> Ranks::gather(Bytes bytes) {
+  std::vector<Bytes> to(count());
+  to[0] = std::move(bytes);
+  std::vector<Bytes> from = exchange(to);
+  if (!isFirst()) from.clear();
+  return from;
+}
+
+Ranks::Bytes Ranks::broadcast(Bytes bytes) {
+  std::vector<Bytes> to(count());
+  if (isFirst()) std::fill(to.begin(), to.end(), bytes);
+  return std::move(exchange(to).front());
+}
+
+void Ranks::barrier() {
+  std::vector<int64_t> nothing(1);
+  sum(std::span<int64_t>(nothing));
+}
+
+void Ranks::sum(std::span<int64_t> values) {
+  if (alone()) return;
+  transport_->beginSum(values);
+  wait();
+}
+
+void Ranks::sum(std::span<uint64_t> values) {
+  // Signed and unsigned sums have the same bits.
+  sum(std::span(reinterpret_cast<int64_t*>(values.data()), values.size()));
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,106 @@
+// Processes that do one job together, on one machine or many, started by mpirun or srun. Each has a number, its
+// rank; most programs run as one rank alone.
+//
+// All ranks make the same calls in the same order, and each call waits for the others. A rank that fails does
+// not call any more: whoever started it ends the others (tools/output/launched_ranks.h).
+//
+// One thread a rank. A message may be of any size; it is in memory at both ends.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <functional>
+#include <memory>
+#include <span>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace curvisplat {
+
+/// What a library for message passing does for Ranks. Nothing throws; a failure of the library ends the process.
+class RankTransport {
+ public:
+  virtual ~RankTransport() = default;
+
+  virtual unsigned rank() const = 0;
+  virtual unsigned count() const = 0;
+
+  /// Each of the three begins a call, which ends when isDone() returns true; until then the memory must stay.
+  ///   out, in  [rank]  a number for each rank, and from each
+  virtual void beginSizes(const uint64_t* out, uint64_t* in) = 0;
+  ///   out, in  [rank]  bytes for each rank, and from each
+  virtual void beginExchange(const std::span<const std::byte>* out, const std::span<std::byte>* in) = 0;
+  ///   values           replaced by the sums over all ranks
+  virtual void beginSum(std::span<int64_t> values) = 0;
+  virtual bool isDone() = 0;
+
+  /// Tells the others that this rank has failed, and waits for nobody.
+  virtual void announceFailure() = 0;
+  /// A rank that has announced its failure to this one; -1: none so far.
+  virtual int failedRank() = 0;
+
+  /// Ends the job in good order. Waits for all.
+  virtual void finish() = 0;
+  /// Ends all ranks at once. Does not return.
+  [[noreturn]] virtual void abort(int status) = 0;
+};
+
+/// The ranks of a job, as one of them sees them.
+class Ranks {
+ public:
+  using Bytes = std::vector<std::byte>;
+
+  /// One rank alone: nothing waits.
+  Ranks() = default;
+  explicit Ranks(std::unique_ptr<RankTransport> transport) : transport_(std::move(transport)) {}
+
+  unsigned rank() const { return transport_ ? transport_->rank() : 0; }
+  unsigned count() const { return transport_ ? transport_->count() : 1; }
+  bool alone() const { return count() == 1; }
+  /// Whether this rank is the one that writes and prints what there is once.
+  bool isFirst() const { return rank() == 0; }
+
+  /// Called again and again while a call waits; what it throws leaves the call. Afterwards there are no more
+  /// calls.
+  void whileWaiting(std::function<void()> check) { check_ = std::move(check); }
+
+  /// Sends to[n] to each rank n. Returns what came from each.
+  std::vector<Bytes> exchange(const std::vector<Bytes>& to);
+  /// At rank 0: what each rank has given; elsewhere nothing.
+  std::vector<Bytes> gather(Bytes bytes);
+  /// What rank 0 has given.
+  Bytes broadcast(Bytes bytes);
+  /// Returns when all ranks have called it.
+  void barrier();
+  /// Replaces `values` by their sums over all ranks.
+  void sum(std::span<int64_t> values);
+  void sum(std::span<uint64_t> values);
+
+  RankTransport* transport() { return transport_.get(); }
+
+ private:
+  void wait();
+
+  std::unique_ptr<RankTransport> transport_;
+  std::function<void()> check_;
+};
+
+/// Numbers, and structures of numbers, as a message; and back.
+template <typename T>
+Ranks::Bytes toBytes(const std::vector<T>& values) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  Ranks::Bytes bytes(values.size() * sizeof(T));
+  if (!bytes.empty()) std::memcpy(bytes.data(), values.data(), bytes.size());
+  return bytes;
+}
+template <typename T>
+std::vector<T> fromBytes(const Ranks::Bytes& bytes) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  std::vector<T> values(bytes.size() / sizeof(T));
+  if (!values.empty()) std::memcpy(values.data(), bytes.data(), values.size() * sizeof(T));
+  return values;
+}
+
+}  // namespace curvisplat

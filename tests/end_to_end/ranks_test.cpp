@@ -1,0 +1,202 @@
+// The program as several ranks under mpirun: the same pictures as one process's, and failures of one line.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "stream/base/file.h"
+#include "tests/support/folder_files.h"
+#include "tests/support/mpi_program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+class RanksCommand : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    ASSERT_EQ(runProgram({"generate", "half-annulus", "--size", "64x32x32", "-o", file("g")}).status, 0);
+    const ProgramResult made = runProgram({"convert", file("g.xyz"), file("g.fun"), "-o", file("g.splats")});
+    ASSERT_EQ(made.status, 0) << made.err;
+  }
+  static void TearDownTestSuite() { folder_.reset(); }
+  void SetUp() override {
+    const std::string why_not = whyNoRanks();
+    if (!why_not.empty()) GTEST_SKIP() << why_not;
+  }
+
+  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
+  static std::vector<std::string> renderTo(const std::string& name, std::vector<std::string> more = {}) {
+    std::vector<std::string> words{"render", file("g.splats"), "-o",        file(name),
+                                   "--size", "150x100",        "--threads", "1"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+  static void expectSameFile(const std::string& a, const std::string& b) {
+    EXPECT_TRUE(readTextFile(file(a)) == readTextFile(file(b))) << a << " and " << b;
+  }
+
+  static std::unique_ptr<TemporaryFolder> folder_;
+};
+
+std::unique_ptr<TemporaryFolder> RanksCommand::folder_;
+
+TEST_F(RanksCommand, DrawOnePictureTogether) {
+  const std::vector<std::string> looks[] = {
+      {}, {"--slice=-0.4,0.1,0.5,1,0.3,0", "--shade", "--outline", "--scalar-bar"}};
+  for (const std::vector<std::string>& look : looks) {
+    ASSERT_EQ(runProgram(renderTo("one.exr", look)).status, 0);
+    for (const unsigned count : {2u, 3u}) {
+      std::vector<std::string> more = look;
+      more.insert(more.end(), {"--stats", file("s.json")});
+      const ProgramResult shared = runAsRanks(count, renderTo("shared.exr", more));
+      EXPECT_EQ(shared.status, 0) << shared.err;
+      EXPECT_EQ(lineCount(shared.out), 2) << shared.out;  // of rank 0 alone
+      expectSameFile("one.exr", "shared.exr");
+      const auto json = nlohmann::json::parse(readTextFile(file("s.json")));
+      EXPECT_EQ(json["ranks"], count);
+      ASSERT_EQ(json["frames"].size(), 1u);
+      EXPECT_EQ(json["frames"][0]["of_ranks"].size(), count);
+    }
+  }
+}
+
+TEST_F(RanksCommand, DealFramesOut) {
+  const std::vector<std::string> orbit{"--orbit", "360", "--frames", "5"};
+  ASSERT_EQ(runProgram(renderTo("one_%d.png", orbit)).status, 0);
+  std::vector<std::string> more = orbit;
+  more.insert(more.end(), {"--stats", file("s.json")});
+  const ProgramResult shared = runAsRanks(2, renderTo("shared_%d.png", more));
+  EXPECT_EQ(shared.status, 0) << shared.err;
+  for (int n = 0; n < 5; ++n) expectSameFile(fmt::format("one_{}.png", n), fmt::format("shared_{}.png", n));
+  const auto frames = nlohmann::json::parse(readTextFile(file("s.json")))["frames"];
+  ASSERT_EQ(frames.size(), 5u);
+  for (int n = 0; n < 5; ++n) EXPECT_EQ(frames[static_cast<size_t>(n)]["frame"], n);
+  // Fewer frames than ranks: each is drawn together.
+  ASSERT_EQ(runAsRanks(3, renderTo("two_%d.png", {"--orbit", "144", "--frames", "2"})).status, 0);
+  expectSameFile("one_0.png", "two_0.png");
+  expectSameFile("one_1.png", "two_1.png");
+}
+
+TEST_F(RanksCommand, SayAFailureOnce) {
+  const ProgramResult usage = runAsRanks(3, renderTo("a.png", {"--lod-pixels", "-1"}));
+  EXPECT_EQ(usage.status, 2);
+  EXPECT_EQ(lineCount(usage.err), 1) << usage.err;
+  EXPECT_NE(usage.err.find("rank 0 of 3"), std::string::npos) << usage.err;
+  EXPECT_NE(usage.err.find("--lod-pixels"), std::string::npos) << usage.err;
+  const ProgramResult first = runAsRanks(2, renderTo("a.png", {"--first-image", file("f.png")}));
+  EXPECT_EQ(first.status, 2);
+  EXPECT_EQ(lineCount(first.err), 1) << first.err;
+}
+
+TEST_F(RanksCommand, AreEndedByTheOneThatFails) {
+  // Rank 1 sees no cache, as on a machine where the file system is not mounted.
+  const std::string script = file("one_blind.sh");
+  writeFileAtomically(
+      script, fmt::format("#!/bin/sh\n"
+                          "cache=\"{}\"\n"
+                          "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && cache=\"{}\"\n"
+                          "exec \"{}\" render \"$cache\" -o \"{}\"\n",
+                          file("g.splats"), file("missing.splats"), CURVISPLAT_PROGRAM, file("never.png")));
+  fs::permissions(script, fs::perms::owner_all);
+  const ProgramResult result = runAsRanks(3, {}, script);
+  EXPECT_EQ(result.status, 1);
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  EXPECT_NE(result.err.find("rank 1 of 3"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("missing.splats"), std::string::npos) << result.err;
+  EXPECT_FALSE(fs::exists(file("never.png")));
+}
+
+TEST_F(RanksCommand, ConvertTogether) {
+  const Files expected = filesOf(file("g.splats"));
+  for (const unsigned count : {2u, 3u}) {
+    fs::remove_all(file("shared.splats"));
+    const ProgramResult shared =
+        runAsRanks(count, {"convert", file("g.xyz"), file("g.fun"), "-o", file("shared.splats"), "--threads",
+                           "1", "--memory", "256M", "--stats", file("c.json")});
+    EXPECT_EQ(shared.status, 0) << shared.err;
+    EXPECT_EQ(lineCount(shared.out), 2) << shared.out;
+    const Files found = filesOf(file("shared.splats"));
+    ASSERT_EQ(found.size(), expected.size());
+    for (const auto& [name, bytes] : expected) EXPECT_TRUE(found.at(name) == bytes) << name;
+    EXPECT_EQ(nlohmann::json::parse(readTextFile(file("c.json")))["ranks"], count);
+  }
+  for (const auto& entry : fs::directory_iterator(folder_->path()))
+    EXPECT_EQ(entry.path().filename().string().find("shared.splats."), std::string::npos) << entry.path();
+}
+
+TEST_F(RanksCommand, ConvertNoSeriesTogether) {
+  const ProgramResult result =
+      runAsRanks(2, {"convert", file("g.xyz"), file("g.fun"), "--add-scalar", "f", "--to", file("g.splats")});
+  EXPECT_EQ(result.status, 2);
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  EXPECT_NE(result.err.find("one process"), std::string::npos) << result.err;
+}
+
+TEST_F(RanksCommand, LeaveNothingWhereOneFailsInAConversion) {
+  // Rank 1 has no grid.
+  const std::string script = file("one_without.sh");
+  writeFileAtomically(script,
+                      fmt::format("#!/bin/sh\n"
+                                  "grid=\"{0}\"\n"
+                                  "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && grid=\"{0}.missing\"\n"
+                                  "exec \"{2}\" convert \"$grid\" \"{1}\" -o \"{3}\"\n",
+                                  file("g.xyz"), file("g.fun"), CURVISPLAT_PROGRAM, file("never.splats")));
+  fs::permissions(script, fs::perms::owner_all);
+  const ProgramResult result = runAsRanks(2, {}, script);
+  EXPECT_EQ(result.status, 1);
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  EXPECT_NE(result.err.find("rank 1 of 2"), std::string::npos) << result.err;
+  for (const auto& entry : fs::directory_iterator(folder_->path()))
+    EXPECT_EQ(entry.path().filename().string().find("never"), std::string::npos) << entry.path();
+}
+
+TEST_F(RanksCommand, SayWhichOfThemHasNoRoom) {
+  const std::string script = file("one_full.sh");
+  writeFileAtomically(script,
+                      fmt::format("#!/bin/bash\n"
+                                  "[ \"$OMPI_COMM_WORLD_RANK\" = 1 ] && ulimit -f 100\n"
+                                  "exec \"{}\" convert \"{}\" \"{}\" -o \"{}\"\n",
+                                  CURVISPLAT_PROGRAM, file("g.xyz"), file("g.fun"), file("never.splats")));
+  fs::permissions(script, fs::perms::owner_all);
+  const ProgramResult result = runAsRanks(3, {}, script);
+  EXPECT_EQ(result.status, 1);
+  EXPECT_EQ(lineCount(result.err), 1) << result.err;
+  EXPECT_NE(result.err.find("rank 1 of 3"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("File too large"), std::string::npos) << result.err;
+  for (const auto& entry : fs::directory_iterator(folder_->path()))
+    EXPECT_EQ(entry.path().filename().string().find("never.splats"), std::string::npos) << entry.path();
+}
+
+TEST_F(RanksCommand, AreSimulatedFromTheIndex) {
+  const ProgramResult result = runProgram({"bench", file("g.splats"), "--ranks", "1,2,16,1024", "--size",
+                                           "640x480", "--json", file("b.json"), "--plot", file("plots")});
+  EXPECT_EQ(result.status, 0) << result.err;
+  const auto counts = nlohmann::json::parse(readTextFile(file("b.json")))["ranks"]["counts"];
+  ASSERT_EQ(counts.size(), 4u);
+  EXPECT_EQ(counts[0]["efficiency"], 1);
+  EXPECT_EQ(counts[0]["exchanged_bytes"], 0);
+  for (const auto& one : counts) {
+    EXPECT_LE(one["efficiency"].get<double>(), one["balance"].get<double>() + 1e-9);
+    EXPECT_GE(one["all_bytes"].get<uint64_t>(), counts[0]["all_bytes"].get<uint64_t>());
+  }
+  EXPECT_TRUE(fs::exists(file("plots/ranks.png")));
+  const ProgramResult wrong = runProgram({"bench", file("g.splats"), "--ranks", "0"});
+  EXPECT_EQ(wrong.status, 2);
+  EXPECT_EQ(lineCount(wrong.err), 1) << wrong.err;
+}
+
+TEST_F(RanksCommand, OfWhichThereIsOneNeedNoMpi) {
+  const ProgramResult alone = runAsRanks(1, renderTo("alone.exr"));
+  EXPECT_EQ(alone.status, 0) << alone.err;
+  ASSERT_EQ(runProgram(renderTo("one.exr")).status, 0);
+  expectSameFile("one.exr", "alone.exr");
+}
+
+}  // namespace
+}  // namespace curvisplat

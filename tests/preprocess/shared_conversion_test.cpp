@@ -1,0 +1,243 @@
+// Several ranks convert one grid together: the cache has the bytes of one process's.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <map>
+#include <memory>
+
+#include "preprocess/convert/convert.h"
+#include "preprocess/convert/shared_build.h"
+#include "preprocess/scenes/scenes.h"
+#include "stream/base/error.h"
+#include "tests/reference/function_grid.h"
+#include "tests/support/folder_files.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/thread_ranks.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+class SharedConversion : public testing::Test {
+ protected:
+  ConvertOptions optionsFor(const GridSource& source, const std::string& name) const {
+    ConvertOptions options;
+    options.output = folder_ / name;
+    options.memory_bytes = uint64_t{512} << 20;
+    options.threads = 1;
+    for (uint32_t n = 0; n < source.description().scalars.size(); ++n) options.scalars.push_back(n);
+    return options;
+  }
+
+  ConvertReport convertBy(unsigned count, const GridSource& source, ConvertOptions options) const {
+    ConvertReport report;
+    runRanks(count, [&](Ranks& ranks) {
+      ConvertOptions of_rank = options;
+      if (count > 1) of_rank.ranks = &ranks;
+      Progress progress;
+      ConvertReport made = convert(source, of_rank, progress);
+      if (ranks.isFirst()) report = std::move(made);
+    });
+    return report;
+  }
+
+  void expectSameBytes(const GridSource& source, std::initializer_list<unsigned> counts,
+                       std::optional<uint64_t> bucket_splats = {}) const {
+    ConvertOptions options = optionsFor(source, "one.splats");
+    options.overwrite = true;
+    options.title = "a grid";
+    const ConvertReport one = convertBy(1, source, options);
+    const Files expected = filesOf(options.output);
+    options.bucket_splats = bucket_splats;
+    options.output = folder_ / "shared.splats";
+    for (const unsigned count : counts) {
+      SCOPED_TRACE(count);
+      const ConvertReport shared = convertBy(count, source, options);
+      const Files found = filesOf(options.output);
+      ASSERT_EQ(found.size(), expected.size());
+      for (const auto& [name, bytes] : expected) EXPECT_TRUE(found.at(name) == bytes) << name;
+      EXPECT_EQ(shared.nodes, one.nodes);
+      EXPECT_EQ(shared.splats, one.splats);
+      EXPECT_EQ(shared.bricks, one.bricks);
+      EXPECT_EQ(shared.blanked.total(), one.blanked.total());
+      EXPECT_EQ(shared.degenerate, one.degenerate);
+      EXPECT_EQ(shared.inverted, one.inverted);
+      EXPECT_EQ(shared.merged_nodes, one.merged_nodes);
+      EXPECT_EQ(shared.volume, one.volume);
+      EXPECT_EQ(entries(), 2u) << "something is left";
+    }
+  }
+
+  size_t entries() const {
+    const fs::directory_iterator all(folder_.path());
+    return static_cast<size_t>(std::distance(begin(all), end(all)));
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(SharedConversion, HasTheBytesOfOneProcess) {
+  expectSameBytes(SceneGridSource(makeScene("half-annulus"), {96, 96, 64}), {2, 3, 4, 7}, 20000);
+}
+
+TEST_F(SharedConversion, HasThemWithBucketsOfAnySize) {
+  const SceneGridSource source(makeScene("half-annulus"), {128, 64, 64});
+  expectSameBytes(source, {2, 3});
+  expectSameBytes(source, {3}, 3000);
+}
+
+/// Two abutting blocks with a common face, and one apart; some nodes blanked.
+FunctionGridSource blocksWithSeams(Centring centring = Centring::kNode) {
+  return FunctionGridSource(
+      {gridBlock(40, 40, 30), gridBlock(30, 40, 30), gridBlock(9, 8, 7)}, 2,
+      [=](const GridNode& node) {
+        const auto x = static_cast<double>(node.i) + (node.block == 0 ? 0 : node.block == 1 ? 39 : 200);
+        const auto y = static_cast<double>(node.j), z = static_cast<double>(node.k);
+        NodeValues values;
+        values.position = {x + 0.2 * std::sin(y), y, z};
+        values.scalars = {static_cast<float>(std::sin(0.1 * x) + y), static_cast<float>(x * z)};
+        values.blank = node.block == 1 && node.i == 20 && node.j < 6;
+        return values;
+      },
+      centring);
+}
+
+TEST_F(SharedConversion, HasThemWithSeamsBlanksAndSeveralScalars) {
+  expectSameBytes(blocksWithSeams(), {2, 3, 4}, 5000);
+}
+
+TEST_F(SharedConversion, HasThemOfCells) {
+  expectSameBytes(blocksWithSeams(Centring::kCell), {2, 3}, 5000);
+}
+
+TEST_F(SharedConversion, HasThemWhereRanksHaveNothingToDo) {
+  expectSameBytes(FunctionGridSource({gridBlock(4, 3, 3)}, 1,
+                                     [](const GridNode& node) {
+                                       const auto x = static_cast<float>(node.i);
+                                       return NodeValues{{x, node.j, node.k}, {x}, false};
+                                     }),
+                  {2, 7});
+}
+
+TEST_F(SharedConversion, HasThemOfNodesThatCoincide) {
+  expectSameBytes(FunctionGridSource({gridBlock(300, 300, 2)}, 1,
+                                     [](const GridNode& node) {
+                                       const bool far = node.i > 290;
+                                       return NodeValues{
+                                           {far ? node.i : 1.0, far ? node.j : 1.0, far ? node.k : 1.0},
+                                           {static_cast<float>(node.i)},
+                                           false};
+                                     }),
+                  {3}, 40000);
+}
+
+TEST_F(SharedConversion, IsResumedByAnyNumberOfRanks) {
+  const SceneGridSource source(makeScene("half-annulus"), {96, 96, 64});
+  ConvertOptions options = optionsFor(source, "one.splats");
+  options.title = "a grid";
+  convertBy(1, source, options);
+  const Files expected = filesOf(options.output);
+  fs::remove_all(options.output);
+  for (const auto& [first, second] : {std::pair{3u, 1u}, {3u, 2u}, {1u, 3u}, {2u, 4u}}) {
+    SCOPED_TRACE(fmt::format("{}, then {}", first, second));
+    options.output = folder_ / "again.splats";
+    options.bucket_splats = 20000;
+    options.resume = false;
+    // Stopped when the first bricks have been built.
+    std::atomic<bool> building = false;
+    const auto interrupted = [&, count = first](Ranks& ranks) {
+      ConvertOptions of_rank = options;
+      if (count > 1) of_rank.ranks = &ranks;
+      Progress* stopped = nullptr;
+      Progress progress([&](const Progress::State* state) {
+        if (state && state->phase == "build") {
+          building = true;
+          if (stopped) stopped->stop(SIGTERM);
+        }
+      });
+      stopped = &progress;
+      ranks.whileWaiting([&] {
+        if (building) progress.stop(SIGTERM);
+        progress.throwIfStopped();
+      });
+      convert(source, of_rank, progress);
+    };
+    EXPECT_THROW(runRanks(first, interrupted), Interrupted);
+    ASSERT_TRUE(fs::exists(folder_ / "again.splats.partial"));
+    options.resume = true;
+    const ConvertReport report = convertBy(second, source, options);
+    EXPECT_TRUE(report.resumed);
+    const Files found = filesOf(options.output);
+    ASSERT_EQ(found.size(), expected.size());
+    for (const auto& [name, bytes] : expected) EXPECT_TRUE(found.at(name) == bytes) << name;
+    EXPECT_EQ(entries(), 1u) << "something is left";
+    fs::remove_all(options.output);
+  }
+}
+
+TEST_F(SharedConversion, NeedsAFileSystemThatAllRanksSee) {
+  const SceneGridSource source(makeScene("half-annulus"), {16, 16, 16});
+  ConvertOptions options = optionsFor(source, "one.splats");
+  try {
+    runRanks(2, [&](Ranks& ranks) {
+      ConvertOptions of_rank = options;
+      of_rank.ranks = &ranks;
+      // As if what rank 0 makes were not seen by rank 1.
+      Progress progress;
+      if (ranks.isFirst()) {
+        convert(source, of_rank, progress);
+      } else {
+        ranks.broadcast({});
+        throw Error("rank 1 sees no such folder");
+      }
+    });
+    FAIL() << "converted";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("rank 1 sees"), std::string::npos);
+  }
+  EXPECT_EQ(entries(), 0u) << "something is left";
+}
+
+// ------------------------------------------------------------------------------------------------ buckets
+
+TEST(DealBuckets, GivesEachBucketToOneRankAndCutsNoUnit) {
+  // A tree of 64 leaves of which each is a bucket, with splats in some of them only.
+  BucketTree tree;
+  tree.split(
+      0, [](const Cell& cell) { return cell.level < 2 ? 2u : 1u; }, 1, 2);
+  const std::vector<uint32_t> leaves = tree.leavesBelow(0);
+  const uint32_t buckets = tree.assignBuckets(
+      leaves, [](uint32_t) { return 1; }, 1);
+  ASSERT_EQ(buckets, 64u);
+  std::vector<CellContents> contents(tree.size());
+  for (size_t n = 0; n < leaves.size(); ++n) {
+    contents[leaves[n]].splats = n % 8 < 5 ? 0 : n < 16 ? 30000 : 40000;
+    contents[leaves[n]].lower = {{n, n, n}};
+    contents[leaves[n]].upper = {{n + 1, n, n}};
+  }
+  tree.setContents(leaves, contents);
+  for (const unsigned ranks : {1u, 2u, 3u, 8u, 100u}) {
+    const std::vector<BucketRange> ranges = dealBuckets(tree, buckets, ranks);
+    ASSERT_EQ(ranges.size(), ranks);
+    uint32_t next = 0;
+    std::map<uint32_t, unsigned> rank_of_unit;
+    for (unsigned rank = 0; rank < ranks; ++rank) {
+      EXPECT_EQ(ranges[rank].first, next);
+      next = ranges[rank].end;
+      for (uint32_t bucket = ranges[rank].first; bucket < ranges[rank].end; ++bucket)
+        if (tree[leaves[bucket]].contents.splats > 0) {
+          const auto [at, is_new] = rank_of_unit.emplace(buildUnitOf(tree, leaves[bucket]), rank);
+          EXPECT_EQ(at->second, rank);
+        }
+    }
+    EXPECT_EQ(next, buckets);
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat

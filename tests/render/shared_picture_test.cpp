@@ -1,0 +1,262 @@
+// Several ranks draw one picture together: rank 0 gets the bits of one process's.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <glm/geometric.hpp>
+#include <memory>
+#include <numeric>
+#include <set>
+#include <vector>
+
+#include "preprocess/scenes/scenes.h"
+#include "render/frame/frame.h"
+#include "render/frame/tile_dealer.h"
+#include "render/project/tile_set.h"
+#include "tests/reference/known_pictures.h"
+#include "tests/support/random_cache.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/thread_ranks.h"
+
+namespace curvisplat {
+namespace {
+
+class SharedPicture : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    convertGrid(SceneGridSource(makeScene("half-annulus"), {160, 80, 64}), *folder_ / "scene.splats");
+    scene_ = std::make_unique<CacheReader>(*folder_ / "scene.splats");
+    writeRandomCache(*folder_ / "random.splats", 5, 30000);
+    random_ = std::make_unique<CacheReader>(*folder_ / "random.splats");
+  }
+  static void TearDownTestSuite() {
+    scene_.reset();
+    random_.reset();
+    folder_.reset();
+  }
+
+  static FrameOptions options() {
+    FrameOptions made;
+    made.size = {210, 150};
+    made.lod_pixels = 1;
+    made.threads = 2;
+    return made;
+  }
+  static TransferFunction function(const CacheReader& cache, double unit = 0.02) {
+    const VariableInfo& info = cache.manifest().variables[0];
+    const double diagonal = glm::length(cache.manifest().upper - cache.manifest().lower);
+    return TransferFunction::preset("cool-warm", info.min, info.max, unit * diagonal);
+  }
+  static Camera camera(const CacheReader& cache) {
+    const Manifest& manifest = cache.manifest();
+    return Camera::named("iso", manifest.lower, manifest.upper, options().size, Projection::kOrthographic,
+                         30);
+  }
+  static Camera inside(const CacheReader& cache) {
+    const Manifest& manifest = cache.manifest();
+    Camera placed = camera(cache);
+    placed.projection = Projection::kPerspective;
+    placed.view_angle_deg = 60;
+    placed.position = manifest.lower + glm::dvec3(0.2, 0.5, 0.5) * (manifest.upper - manifest.lower);
+    placed.focal_point = placed.position + glm::dvec3(1, 0, 0);
+    placed.view_up = {0, 0, 1};
+    return placed;
+  }
+
+  struct Case {
+    const CacheReader* cache;
+    Camera camera;
+    FrameOptions options;
+    double unit = 0.02;
+    Backend backend = Backend::kCpu;
+  };
+  struct Drawn {
+    Image image;
+    std::vector<FrameStatistics> statistics;  // [rank]
+  };
+  static Drawn draw(const Case& what, unsigned count) {
+    Drawn drawn;
+    drawn.statistics.resize(count);
+    runRanks(count, [&](Ranks& ranks) {
+      FrameRenderer renderer(*what.cache, 0, function(*what.cache, what.unit), what.backend);
+      FrameOptions with = what.options;
+      if (count > 1) with.ranks = &ranks;
+      Image image = renderer.render(what.camera, with, drawn.statistics[ranks.rank()]);
+      if (ranks.isFirst()) drawn.image = std::move(image);
+    });
+    return drawn;
+  }
+  static void expectSameBits(const Case& what, std::initializer_list<unsigned> counts = {2, 3, 4, 7}) {
+    const Image whole = draw(what, 1).image;
+    for (const unsigned count : counts) {
+      const Image shared = draw(what, count).image;
+      ASSERT_EQ(shared.rgba.size(), whole.rgba.size());
+      EXPECT_EQ(std::memcmp(shared.rgba.data(), whole.rgba.data(), 4 * whole.rgba.size()), 0)
+          << count << " ranks";
+    }
+  }
+
+  static std::unique_ptr<TemporaryFolder> folder_;
+  static std::unique_ptr<CacheReader> scene_, random_;
+};
+
+std::unique_ptr<TemporaryFolder> SharedPicture::folder_;
+std::unique_ptr<CacheReader> SharedPicture::scene_, SharedPicture::random_;
+
+TEST_F(SharedPicture, HasTheBitsOfOneProcess) {
+  for (const CacheReader* cache : {scene_.get(), random_.get()})
+    for (const Camera& view : {camera(*cache), inside(*cache)}) expectSameBits({cache, view, options()});
+}
+
+TEST_F(SharedPicture, HasThemWhereMuchIsHidden) {
+  expectSameBits({scene_.get(), camera(*scene_), options(), 1e-4});
+}
+
+TEST_F(SharedPicture, HasThemUnderALimitAndInLittleMemory) {
+  FrameOptions limited = options();
+  limited.max_splats = 40000;
+  expectSameBits({scene_.get(), camera(*scene_), limited});
+  FrameOptions small = options();
+  small.lod_pixels = 0;
+  small.memory_bytes = 96 << 20;
+  small.threads = 1;
+  expectSameBits({scene_.get(), camera(*scene_), small});
+}
+
+TEST_F(SharedPicture, HasThemWithLightCutsSurfacesAndSlices) {
+  FrameOptions with = options();
+  with.light = Light{};
+  const Manifest& manifest = scene_->manifest();
+  const glm::dvec3 middle = 0.5 * (manifest.lower + manifest.upper);
+  with.clip_planes = {{middle, {0, 1, 0.3}}};
+  auto scene = std::make_shared<SurfaceScene>();
+  scene->slices = {{middle, {1, 0.2, 0.1}}, {middle + 0.2 * (manifest.upper - middle), {0, 0.1, 1}}};
+  scene->slice_opacity = 0.6f;
+  RawMesh raw;
+  raw.positions = {
+      manifest.lower, {manifest.upper.x, middle.y, middle.z}, {middle.x, manifest.upper.y, manifest.upper.z}};
+  raw.triangles = {{0, 1, 2}};
+  const auto mesh = std::make_shared<TriangleMesh>(meshOf(std::move(raw)));
+  scene->surfaces.push_back({mesh, {0.8, 0.7, 0.2}});
+  with.scene = scene;
+  expectSameBits({scene_.get(), camera(*scene_), with});
+  expectSameBits({scene_.get(), inside(*scene_), with});
+}
+
+TEST_F(SharedPicture, HasThemWithOpenGl) {
+  Case what{scene_.get(), camera(*scene_), options()};
+  what.backend = Backend::kOsmesa;
+  expectSameBits(what, {2, 3});
+}
+
+TEST_F(SharedPicture, HasThemWhereARankHasNothingToDo) {
+  FrameOptions tiny = options();
+  tiny.size = {40, 20};
+  expectSameBits({scene_.get(), camera(*scene_), tiny}, {2, 3, 7});
+}
+
+TEST_F(SharedPicture, ARankReadsOnlyWhatItsTilesNeed) {
+  FrameOptions fine = options();
+  fine.lod_pixels = 0;
+  const Case what{scene_.get(), camera(*scene_), fine};
+  const uint64_t whole = draw(what, 1).statistics[0].bytes_read;
+  uint64_t largest = 0, sum = 0;
+  for (const FrameStatistics& of_rank : draw(what, 4).statistics) {
+    largest = std::max(largest, of_rank.bytes_read);
+    sum += of_rank.bytes_read;
+  }
+  EXPECT_LT(largest, whole);
+  EXPECT_GE(sum, whole);
+  EXPECT_LT(sum, 4 * whole);
+}
+
+TEST_F(SharedPicture, AFailureOfOneRankIsHeardOf) {
+  EXPECT_THROW(runRanks(3,
+                        [&](Ranks& ranks) {
+                          FrameRenderer renderer(*scene_, 0, function(*scene_), Backend::kCpu);
+                          FrameOptions with = options();
+                          with.ranks = &ranks;
+                          if (ranks.rank() == 1) with.memory_bytes = 1 << 20;
+                          FrameStatistics statistics;
+                          renderer.render(camera(*scene_), with, statistics);
+                        }),
+               UsageError);
+}
+
+// ------------------------------------------------------------------------------------------------ tiles
+
+std::vector<PartCost> somePartCosts(ImageSize size, unsigned seed) {
+  std::vector<PartCost> parts;
+  uint32_t state = seed;
+  const auto random = [&](double most) {
+    state = state * 1664525 + 1013904223;
+    return most * (state >> 8) / (1 << 24);
+  };
+  for (int n = 0; n < 400; ++n) {
+    const auto x = static_cast<float>(random(size.width)), y = static_cast<float>(random(size.height));
+    const auto side = static_cast<float>(20 + random(60));
+    parts.push_back({{x, y, x + side, y + side}, 1000, 1500, 100});
+  }
+  return parts;
+}
+
+TEST(TileDealer, DealsEveryTileOnceAndEvenly) {
+  const ImageSize size{640, 480};
+  const std::vector<PartCost> parts = somePartCosts(size, 7);
+  for (const uint32_t ranks : {1u, 2u, 3u, 7u, 16u, 300u, 1000u}) {
+    const std::vector<uint32_t> owners = dealTiles(parts, size, ranks);
+    ASSERT_EQ(owners.size(), 300u);
+    for (const uint32_t owner : owners) ASSERT_LT(owner, ranks);
+    const std::vector<RankWork> work = workOfRanks(parts, size, owners, ranks);
+    uint64_t pixels = 0;
+    double sum = 0, largest = 0;
+    for (const RankWork& one : work) {
+      pixels += one.pixels;
+      sum += one.cost;
+      largest = std::max(largest, one.cost);
+    }
+    EXPECT_EQ(pixels, size.pixels());
+    if (ranks <= 16) {
+      EXPECT_GT(sum / ranks / largest, 0.7) << ranks;
+    }
+  }
+}
+
+TEST(TileDealer, WorkOfOneRankIsTheSumOfItsParts) {
+  const ImageSize size{640, 480};
+  const std::vector<PartCost> parts{{{10, 10, 100, 100}, 5, 7, 11}, {{-100, 10, 100, 90}, 5, 8, 13}};
+  const RankWork work = workOfRanks(parts, size, dealTiles(parts, size, 1), 1)[0];
+  const double tiles = workOfRanks({}, size, dealTiles({}, size, 1), 1)[0].cost;
+  EXPECT_NEAR(work.cost - tiles, 5 + 7 + 5 + 0.5 * 8, 1e-9);  // half of the second lies in the picture
+  EXPECT_EQ(work.bytes, 24u);
+  EXPECT_EQ(work.bricks, 2u);
+}
+
+TEST(TileSet, TouchesWhatALookAtEveryTileFinds) {
+  const ImageSize size{300, 200};
+  std::vector<uint32_t> owners(TileSet::tilesOf(size));
+  for (size_t n = 0; n < owners.size(); ++n) owners[n] = (n * 7 / 3) % 5;
+  const TileSet tiles(size, owners, 2);
+  for (float x = -70; x < 370; x += 13)
+    for (float y = -70; y < 270; y += 11)
+      for (const float side : {0.0f, 5.0f, 40.0f, 200.0f}) {
+        bool touches = false;
+        for (int row = 0; row < tiles.rows(); ++row)
+          for (int column = 0; column < tiles.columns(); ++column) {
+            const auto left = static_cast<float>(column * kTileSide),
+                       top = static_cast<float>(row * kTileSide);
+            touches |= tiles.has(static_cast<size_t>(row * tiles.columns() + column)) &&
+                       x <= left + kTileSide && x + side >= left && y <= top + kTileSide && y + side >= top;
+          }
+        if (touches) {
+          EXPECT_TRUE(tiles.touches({x, y, x + side, y + side})) << x << " " << y << " " << side;
+        }
+      }
+  EXPECT_FALSE(TileSet(size, owners, 9).touches({0, 0, 300, 200}));
+  EXPECT_TRUE(tiles.touches({-INFINITY, -INFINITY, INFINITY, INFINITY}));
+}
+
+}  // namespace
+}  // namespace curvisplat

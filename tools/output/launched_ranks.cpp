@@ -1,0 +1,133 @@
+#include "tools/output/launched_ranks.h"
+
+#include <dlfcn.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <thread>
+
+#include "stream/base/error.h"
+#include "stream/base/message.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::optional<Ranks> started;
+
+/// A number of the environment; 0 where there is none.
+unsigned long numberOf(const char* variable) {
+  const char* const text = std::getenv(variable);
+  return text ? std::strtoul(text, nullptr, 10) : 0;
+}
+
+/// How many processes the launcher says it has started; 1 without a launcher. Within a batch job's script, which no
+/// srun has started, Slurm's numbers are the job's: they count where its process manager speaks as well.
+unsigned long launchedCount() {
+  if (const auto count = numberOf("OMPI_COMM_WORLD_SIZE")) return count;
+  if (const auto count = numberOf("PMI_SIZE")) return count;
+  if (std::getenv("PMIX_RANK") || std::getenv("PMI_RANK"))
+    for (const char* variable : {"SLURM_STEP_NUM_TASKS", "SLURM_NTASKS", "PALS_SIZE"})
+      if (const auto count = numberOf(variable)) return count;
+  return 1;
+}
+
+constexpr const char* kPlugIn = "curvisplat-mpi.so";
+
+/// Beside the program in a build, and where packages put it.
+void* openPlugIn(std::string& why_not) {
+  std::error_code error;
+  const fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
+  for (const fs::path& candidate : {folder / kPlugIn, folder / CURVISPLAT_PLUGINS / kPlugIn}) {
+    if (!fs::exists(candidate, error)) continue;
+    // MPI's own plug-ins look for its symbols among those of the whole process.
+    if (void* const library = ::dlopen(candidate.c_str(), RTLD_NOW | RTLD_GLOBAL)) return library;
+    why_not = ::dlerror();
+    return nullptr;
+  }
+  why_not = std::string(kPlugIn) + " is not installed";
+  return nullptr;
+}
+
+std::unique_ptr<RankTransport> startMpi(unsigned long count) {
+  std::string why_not;
+  void* const library = openPlugIn(why_not);
+  using Start = RankTransport* (*)(const char*);
+  const auto start = library ? reinterpret_cast<Start>(::dlsym(library, "curvisplatStartMpi")) : nullptr;
+  RankTransport* const transport = start ? start(CURVISPLAT_VERSION) : nullptr;
+  if (transport) return std::unique_ptr<RankTransport>(transport);
+  if (library) why_not = "curvisplat-mpi.so is of another version";
+  throw Error(
+      "started as one of {} processes, but without MPI: {}; build with CURVISPLAT_MPI=ON, or start one",
+      count, why_not);
+}
+
+std::string hostName() {
+  char name[256] = "";
+  ::gethostname(name, sizeof name - 1);
+  return name;
+}
+
+/// Whether another rank says within a moment that it has failed.
+bool anotherFails(RankTransport& transport, std::chrono::milliseconds moment) {
+  const auto end = std::chrono::steady_clock::now() + moment;
+  do {
+    if (transport.failedRank() >= 0) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  } while (std::chrono::steady_clock::now() < end);
+  return false;
+}
+
+}  // namespace
+
+Ranks& launchedRanks() {
+  if (started) return *started;
+  const unsigned long count = launchedCount();
+  if (count > 1)
+    started.emplace(startMpi(count));
+  else
+    started.emplace();
+  // What there is once is printed once.
+  if (!started->isFirst() && !std::freopen("/dev/null", "w", stdout))
+    throw Error("/dev/null: cannot be opened");
+  if (!started->isFirst()) muteMessages();
+  return *started;
+}
+
+StopRanksWith::StopRanksWith(Ranks& ranks, const Progress& progress) : ranks_(ranks) {
+  ranks.whileWaiting([&progress] { progress.throwIfStopped(); });
+}
+
+StopRanksWith::~StopRanksWith() {
+  ranks_.whileWaiting({});
+}
+
+void endRanksAfter(const std::string& line, int status) {
+  if (!started || started->alone()) return;
+  using namespace std::chrono_literals;
+  RankTransport& transport = *started->transport();
+  const bool was_stopped = status > 128;  // by a signal, as the launcher sends when another rank has ended
+  // The lowest rank of those that fail of the same cause prints.
+  const bool silent = anotherFails(transport, started->isFirst() && !was_stopped ? 0ms : 300ms) ||
+                      (was_stopped && !started->isFirst());
+  transport.announceFailure();
+  if (!silent) {
+    muteMessages(false);
+    printMessage("rank {} of {} ({}): {}", started->rank(), started->count(), hostName(), line);
+  }
+  // Others see the announcement, and remove their files, before they are ended.
+  if (!silent) std::this_thread::sleep_for(500ms);
+  transport.abort(status);
+}
+
+void finishRanks() {
+  if (started && started->transport()) started->transport()->finish();
+}
+
+}  // namespace curvisplat

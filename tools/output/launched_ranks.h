@@ -1,0 +1,40 @@
+// The ranks that mpirun or srun has started this program as.
+//
+//   alone     no launcher, or one process: MPI is neither loaded nor started
+//   of many   the plug-in curvisplat-mpi.so beside the program, or in lib/curvisplat, starts MPI
+//
+// A rank that fails prints one line and ends the others. Ranks that fail of the same cause, a wrong option for
+// example, leave the line to the first of them.
+#pragma once
+
+#include <string>
+
+#include "stream/base/progress.h"
+#include "stream/base/ranks.h"
+
+namespace curvisplat {
+
+/// Starts them at the first call. Only for commands that share their work; the others are run by each process.
+/// Throws Error if there are several and this build has no MPI.
+Ranks& launchedRanks();
+
+/// Makes calls of the ranks throw Interrupted after progress.stop(), until the end of the scope.
+class StopRanksWith {
+ public:
+  StopRanksWith(Ranks& ranks, const Progress& progress);
+  ~StopRanksWith();
+  StopRanksWith(const StopRanksWith&) = delete;
+  StopRanksWith& operator=(const StopRanksWith&) = delete;
+
+ private:
+  Ranks& ranks_;
+};
+
+/// Where several ranks were started, and a command has failed with `status`: prints the line, unless another rank
+/// does, and ends all ranks. Returns if there is one rank, or none was started; then the caller prints.
+void endRanksAfter(const std::string& line, int status);
+
+/// Ends the ranks in good order, if some were started.
+void finishRanks();
+
+}  // namespace curvisplat

@@ -1,0 +1,56 @@
+// What a picture would take of 1, 2, ... 1024 processes: simulated from a cache's index and a view, by the costs
+// that also deal the tiles out (render/frame/tile_dealer.h). Nothing is read but the index. Pure.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "render/camera/camera.h"
+#include "render/colour/transfer_function.h"
+#include "render/frame/frame_options.h"
+#include "stream/cache/cache_reader.h"
+#include "tools/throughput/plot.h"
+
+namespace curvisplat {
+
+inline constexpr uint32_t kMaxSimulatedRanks = 65536;
+
+/// Work is in units of preparing one splat.
+struct SimulatedRanks {
+  uint32_t ranks = 1;
+  double largest_work = 0, mean_work = 0;
+  double speed_up = 1;  // one rank's work over the largest
+  uint64_t largest_bytes = 0,
+           all_bytes = 0;        // read from the cache; bricks that several ranks read count for each
+  uint64_t exchanged_bytes = 0;  // pixels on their way to rank 0
+
+  /// How even the shares are: the mean over the largest.
+  double balance() const { return largest_work > 0 ? mean_work / largest_work : 1; }
+  /// Speed-up by the number of ranks: less than the balance, since some bricks are prepared by several ranks.
+  double efficiency() const { return speed_up / ranks; }
+};
+
+struct RankSimulation {
+  uint64_t splats = 0, parts = 0;  // of the picture
+  std::vector<SimulatedRanks> counts;
+};
+
+struct SimulatedPicture {
+  const CacheReader& cache;
+  size_t variable;
+  const TransferFunction& function;
+  const FrameOptions& options;
+};
+
+/// Throws UsageError as FrameRenderer::render() does.
+RankSimulation simulateRanks(const SimulatedPicture& picture, const Camera& camera,
+                             const std::vector<uint32_t>& counts);
+
+std::string rankTable(const RankSimulation& simulation);
+nlohmann::ordered_json toJson(const RankSimulation& simulation);
+/// ranks.png: efficiency, and bytes, over the number of ranks.
+Plots rankPlots(const RankSimulation& simulation);
+
+}  // namespace curvisplat
