@@ -56,7 +56,7 @@ struct ConvertReport {
   std::vector<std::string> warnings;
 };
 
-/// Converts. `source` is read three times. The result's bytes depend on source, scalars and blank value
+/// Converts a structured grid (GridSource) or an unstructured one (MeshSource). `source` is read three times. The result's bytes depend on source, scalars and blank value
 /// alone. Throws Error (and UsageError) if something outside fails; then no temporary file and no partial
 /// cache is left, and what stood at the output is as it was. Peak memory, everything counted:
 /// options.memory_bytes.
@@ -66,6 +66,6 @@ struct ConvertReport {
 /// it wants to keep what is done. An unfinished conversion to the same output is an Error unless `resume` or
 /// `overwrite` (which then begins anew) is set. What has not come so far that something would be lost is
 /// removed in all of these cases.
-ConvertReport convert(const GridSource& source, const ConvertOptions& options, Progress& progress);
+ConvertReport convert(const DataSource& source, const ConvertOptions& options, Progress& progress);
 
 }  // namespace curvisplat

@@ -1,0 +1,239 @@
+#include "preprocess/gather/cell_slopes.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstring>
+#include <limits>
+
+#include "preprocess/gather/streams_file.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kCellsPerTask = 256;
+
+struct BodyRecord {
+  uint64_t cell;
+  CellBody body;  // values follow
+};
+
+struct FaceRecord {
+  std::array<uint64_t, 3> corners;  // the lowest, rising
+  uint64_t cell;
+  glm::dvec3 centre;  // of the cell; values follow
+};
+
+struct NeighbourRecord {
+  uint64_t cell, neighbour;
+  glm::dvec3 centre;  // of the neighbour; values follow
+};
+
+uint64_t hashOf(const std::array<uint64_t, 3>& corners) {
+  uint64_t hash = 0;
+  for (const uint64_t corner : corners) {
+    hash ^= corner;
+    hash *= 0x9e3779b97f4a7c15;
+    hash ^= hash >> 29;
+  }
+  return hash;
+}
+
+/// Records of one size, with values behind each.
+template <typename Record>
+class RecordArray {
+ public:
+  explicit RecordArray(size_t fields) : stride_(sizeof(Record) + fields * sizeof(float)) {}
+
+  void load(const StreamsFile& file, size_t stream) {
+    bytes_.resize(file.bytes(stream));
+    size_t at = 0;
+    file.forEach(stream, [&](std::span<const std::byte> records) {
+      std::memcpy(bytes_.data() + at, records.data(), records.size());
+      at += records.size();
+    });
+  }
+  size_t size() const { return bytes_.size() / stride_; }
+  Record operator[](size_t n) const {
+    Record record;
+    std::memcpy(static_cast<void*>(&record), bytes_.data() + n * stride_, sizeof record);
+    return record;
+  }
+  void values(size_t n, std::span<float> out) const {
+    std::memcpy(out.data(), bytes_.data() + n * stride_ + sizeof(Record), out.size_bytes());
+  }
+
+ private:
+  size_t stride_;
+  std::vector<std::byte> bytes_;
+};
+
+template <typename Record>
+void put(std::byte* to, const Record& record, std::span<const float> values) {
+  std::memcpy(to, &record, sizeof record);
+  std::memcpy(to + sizeof record, values.data(), values.size_bytes());
+}
+
+}  // namespace
+
+CellSlopes::CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes, std::filesystem::path folder)
+    : cells_(cells), fields_(fields), memory_bytes_(memory_bytes), folder_(std::move(folder)) {
+  // A cell with about six faces, each of which two cells have.
+  constexpr uint64_t kUsualFaces = 6;
+  const uint64_t value_bytes = fields * sizeof(float);
+  const uint64_t face_bytes = kUsualFaces * (sizeof(FaceRecord) + value_bytes + 2 * sizeof(uint64_t));
+  const uint64_t range_bytes = sizeof(BodyRecord) + value_bytes +
+                               kUsualFaces * (sizeof(NeighbourRecord) + value_bytes + 3 * sizeof(uint64_t)) +
+                               slopeSumCount(fields) * sizeof(double);
+  range_cells_ = std::max<uint64_t>(1, memory_bytes / 2 / range_bytes);
+  const uint64_t ranges = std::max<uint64_t>(1, (cells + range_cells_ - 1) / range_cells_);
+  const uint64_t face_streams = cells * face_bytes / std::max<uint64_t>(1, memory_bytes / 4) + 1;
+  bodies_ = std::make_unique<StreamsFile>(folder_, ranges, memory_bytes / 8);
+  faces_ = std::make_unique<StreamsFile>(
+      folder_, std::min<uint64_t>(face_streams, StreamsFile::mostStreams(memory_bytes / 8)),
+      memory_bytes / 8);
+}
+
+CellSlopes::~CellSlopes() = default;
+
+void CellSlopes::add(const GatheredCells& cells) {
+  std::vector<CellBody> bodies(cells.size());
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, cells.size(), kCellsPerTask),
+                    [&](const tbb::blocked_range<size_t>& part) {
+                      for (size_t n = part.begin(); n < part.end(); ++n)
+                        if (cells.shapes[n] != CellKind::kNone) bodies[n] = bodyOf(cells.view(n, 0));
+                    });
+  std::vector<std::byte> body_record(sizeof(BodyRecord) + fields_ * sizeof(float));
+  std::vector<std::byte> face_record(sizeof(FaceRecord) + fields_ * sizeof(float));
+  std::vector<uint64_t> of_face;
+  for (size_t n = 0; n < cells.size(); ++n) {
+    if (cells.shapes[n] == CellKind::kNone) continue;
+    const std::span<const float> values = std::span(cells.cell_values).subspan(n * fields_, fields_);
+    put(body_record.data(), BodyRecord{cells.numbers[n], bodies[n]}, values);
+    bodies_->append(cells.numbers[n] / range_cells_, body_record);
+
+    const std::span<const uint64_t> corners = cells.cornersOfCell(n);
+    const std::span<const uint32_t> faces = facesOf(cells.shapes[n], cells.view(n, 0).faces);
+    for (size_t at = 0; at < faces.size(); at += faces[at] + size_t{1}) {
+      of_face.clear();
+      for (const uint32_t corner : faces.subspan(at + 1, faces[at])) of_face.push_back(corners[corner]);
+      std::sort(of_face.begin(), of_face.end());
+      of_face.erase(std::unique(of_face.begin(), of_face.end()), of_face.end());
+      if (of_face.size() < 3) continue;  // collapsed
+      const FaceRecord face{{of_face[0], of_face[1], of_face[2]}, cells.numbers[n], bodies[n].centre};
+      put(face_record.data(), face, values);
+      faces_->append(faces_->streams() > 1 ? hashOf(face.corners) % faces_->streams() : 0, face_record);
+    }
+  }
+}
+
+void CellSlopes::matchFaces(size_t stream, StreamsFile& neighbours) {
+  RecordArray<FaceRecord> faces(fields_);
+  faces.load(*faces_, stream);
+  faces_->forget(stream);
+  struct Key {
+    std::array<uint64_t, 3> corners;
+    uint64_t cell;
+    size_t record;
+    bool operator<(const Key& other) const {
+      return corners != other.corners ? corners < other.corners : cell < other.cell;
+    }
+  };
+  std::vector<Key> keys(faces.size());
+  for (size_t n = 0; n < keys.size(); ++n) {
+    const FaceRecord face = faces[n];
+    keys[n] = {face.corners, face.cell, n};
+  }
+  tbb::parallel_sort(keys.begin(), keys.end());
+  std::vector<float> values(fields_);
+  std::vector<std::byte> record(sizeof(NeighbourRecord) + fields_ * sizeof(float));
+  const auto tell = [&](const Key& to, const Key& of) {
+    faces.values(of.record, values);
+    put(record.data(), NeighbourRecord{to.cell, of.cell, faces[of.record].centre}, values);
+    neighbours.append(to.cell / range_cells_, record);
+  };
+  for (size_t first = 0; first < keys.size();) {
+    size_t end = first + 1;
+    while (end < keys.size() && keys[end].corners == keys[first].corners) ++end;
+    if (end - first == 2 && keys[first].cell != keys[first + 1].cell) {
+      tell(keys[first], keys[first + 1]);
+      tell(keys[first + 1], keys[first]);
+    }
+    first = end;
+  }
+}
+
+void CellSlopes::makeSplats(size_t range, const StreamsFile& neighbours, const TakeSplat& take,
+                            PointSums::Counts& counts) const {
+  RecordArray<BodyRecord> bodies(fields_);
+  RecordArray<NeighbourRecord> beside(fields_);
+  bodies.load(*bodies_, range);
+  beside.load(neighbours, range);
+  struct Key {
+    uint64_t cell, neighbour;
+    size_t record;
+    bool operator<(const Key& other) const {
+      return cell != other.cell             ? cell < other.cell
+             : neighbour != other.neighbour ? neighbour < other.neighbour
+                                            : record < other.record;
+    }
+  };
+  std::vector<Key> keys(beside.size());
+  for (size_t n = 0; n < keys.size(); ++n) {
+    const NeighbourRecord record = beside[n];
+    keys[n] = {record.cell, record.neighbour, n};
+  }
+  tbb::parallel_sort(keys.begin(), keys.end());
+  std::atomic<uint64_t> splats = 0, degenerate = 0;
+  tbb::parallel_for(
+      tbb::blocked_range<size_t>(0, bodies.size(), 1024), [&](const tbb::blocked_range<size_t>& part) {
+        NodeSplat splat;
+        std::vector<SplatScalar> values(fields_);
+        std::vector<float> own(fields_), other(fields_);
+        std::vector<double> sums(slopeSumCount(fields_));
+        uint64_t made = 0, flat = 0;
+        auto key = std::lower_bound(keys.begin(), keys.end(), Key{bodies[part.begin()].cell, 0, 0});
+        for (size_t n = part.begin(); n < part.end(); ++n) {
+          const BodyRecord body = bodies[n];
+          bodies.values(n, own);
+          std::fill(sums.begin(), sums.end(), 0.0);
+          for (; key != keys.end() && key->cell == body.cell; ++key) {
+            beside.values(key->record, other);
+            addNeighbour(beside[key->record].centre - body.body.centre, other, own, sums);
+          }
+          if (!(body.body.volume > 0)) ++flat;
+          splatOfCell(body.cell, body.body, own, sums, splat, values);
+          take(splat, values);
+          ++made;
+        }
+        splats += made;
+        degenerate += flat;
+      });
+  counts.splats += splats;
+  counts.degenerate += degenerate;
+}
+
+PointSums::Counts CellSlopes::finish(const TakeSplat& take, const Progress& progress) {
+  bodies_->close();
+  faces_->close();
+  StreamsFile neighbours(folder_, bodies_->streams(), memory_bytes_ / 8);
+  for (size_t stream = 0; stream < faces_->streams(); ++stream) {
+    progress.throwIfStopped();
+    matchFaces(stream, neighbours);
+  }
+  neighbours.close();
+  PointSums::Counts counts;
+  for (size_t range = 0; range < bodies_->streams(); ++range) {
+    progress.throwIfStopped();
+    makeSplats(range, neighbours, take, counts);
+    bodies_->forget(range);
+    neighbours.forget(range);
+  }
+  return counts;
+}
+
+}  // namespace curvisplat
