@@ -285,6 +285,7 @@ ConvertReport convert(const DataSource& source, const ConvertOptions& options, P
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   if (const auto* grid = dynamic_cast<const GridSource*>(&source))
     GridOrigin::requireMemory(*grid, options.scalars, plan);
+  if (options.mesh_bytes) plan.mesh_bytes = *options.mesh_bytes;
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
 
   std::vector<ConversionFact> facts = factsOf(source.description(), options.scalars, options.blank_value);

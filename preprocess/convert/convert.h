@@ -28,6 +28,8 @@ struct ConvertOptions {
 
   /// Smaller buckets than memory would allow: tests make many of them from small grids.
   std::optional<uint64_t> bucket_splats;
+  /// Less memory for an unstructured grid than there is: small ones then take the way of large ones.
+  std::optional<uint64_t> mesh_bytes;
 };
 
 /// A file of the cache, and what it takes.

@@ -87,8 +87,7 @@ CellSlopes::CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes, std
   const uint64_t value_bytes = fields * sizeof(float);
   const uint64_t face_bytes = kUsualFaces * (sizeof(FaceRecord) + value_bytes + 2 * sizeof(uint64_t));
   const uint64_t range_bytes = sizeof(BodyRecord) + value_bytes +
-                               kUsualFaces * (sizeof(NeighbourRecord) + value_bytes + 3 * sizeof(uint64_t)) +
-                               slopeSumCount(fields) * sizeof(double);
+                               kUsualFaces * (sizeof(NeighbourRecord) + value_bytes + 3 * sizeof(uint64_t));
   range_cells_ = std::max<uint64_t>(1, memory_bytes / 2 / range_bytes);
   const uint64_t ranges = std::max<uint64_t>(1, (cells + range_cells_ - 1) / range_cells_);
   const uint64_t face_streams = cells * face_bytes / std::max<uint64_t>(1, memory_bytes / 4) + 1;
@@ -193,20 +192,22 @@ void CellSlopes::makeSplats(size_t range, const StreamsFile& neighbours, const T
       tbb::blocked_range<size_t>(0, bodies.size(), 1024), [&](const tbb::blocked_range<size_t>& part) {
         NodeSplat splat;
         std::vector<SplatScalar> values(fields_);
-        std::vector<float> own(fields_), other(fields_);
-        std::vector<double> sums(slopeSumCount(fields_));
+        std::vector<float> own(fields_), others;
+        std::vector<glm::dvec3> steps;
         uint64_t made = 0, flat = 0;
         auto key = std::lower_bound(keys.begin(), keys.end(), Key{bodies[part.begin()].cell, 0, 0});
         for (size_t n = part.begin(); n < part.end(); ++n) {
           const BodyRecord body = bodies[n];
           bodies.values(n, own);
-          std::fill(sums.begin(), sums.end(), 0.0);
+          steps.clear();
+          others.clear();
           for (; key != keys.end() && key->cell == body.cell; ++key) {
-            beside.values(key->record, other);
-            addNeighbour(beside[key->record].centre - body.body.centre, other, own, sums);
+            others.resize(others.size() + fields_);
+            beside.values(key->record, std::span(others).last(fields_));
+            steps.push_back(beside[key->record].centre - body.body.centre);
           }
           if (!(body.body.volume > 0)) ++flat;
-          splatOfCell(body.cell, body.body, own, sums, splat, values);
+          splatOfCell(body.cell, body.body, own, {steps, others}, splat, values);
           take(splat, values);
           ++made;
         }

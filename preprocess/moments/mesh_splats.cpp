@@ -84,47 +84,61 @@ void splatOfPoint(uint64_t node, const DualCell& dual, NodeSplat& splat, std::sp
   }
 }
 
-void addNeighbour(const glm::dvec3& step, std::span<const float> neighbour, std::span<const float> own,
-                  std::span<double> sums) {
-  const double square = glm::dot(step, step);
-  if (!(square > 0)) return;
-  const glm::dvec3 d = step / square;
-  sums[0] += d.x * step.x;
-  sums[1] += d.x * step.y;
-  sums[2] += d.y * step.y;
-  sums[3] += d.x * step.z;
-  sums[4] += d.y * step.z;
-  sums[5] += d.z * step.z;
-  for (size_t field = 0; field < own.size(); ++field) {
-    const double difference = static_cast<double>(neighbour[field]) - own[field];
-    for (int axis = 0; axis < 3; ++axis)
-      sums[6 + 3 * field + static_cast<size_t>(axis)] += difference * d[axis];
+void leastSquares(const CellNeighbours& neighbours, std::span<const float> own, std::span<glm::dvec3> out) {
+  const size_t fields = own.size();
+  std::array<std::array<double, 3>, 3> a{};
+  std::fill(out.begin(), out.end(), glm::dvec3(0.0));
+  for (size_t n = 0; n < neighbours.steps.size(); ++n) {
+    const glm::dvec3& step = neighbours.steps[n];
+    const double square = glm::dot(step, step);
+    if (!(square > 0)) continue;
+    const glm::dvec3 d = step / square;
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 3; ++column)
+        a[static_cast<size_t>(row)][static_cast<size_t>(column)] += d[row] * step[column];
+    for (size_t field = 0; field < fields; ++field)
+      out[field] += (static_cast<double>(neighbours.values[n * fields + field]) - own[field]) * d;
   }
-}
-
-glm::dvec3 gradientOfSums(std::span<const double> sums, size_t field) {
-  std::array<std::array<double, 3>, 3> a{
-      {{sums[0], sums[1], sums[3]}, {sums[1], sums[2], sums[4]}, {sums[3], sums[4], sums[5]}}};
   std::array<std::array<double, 3>, 3> v;
   eigenvectorsOf(a, v);
   const double most = std::max({a[0][0], a[1][1], a[2][2]});
-  const glm::dvec3 right(sums[6 + 3 * field], sums[7 + 3 * field], sums[8 + 3 * field]);
-  glm::dvec3 gradient(0.0);
-  for (size_t n = 0; n < 3; ++n) {
-    if (!(a[n][n] > kLeastCover * most)) continue;
-    const glm::dvec3 direction(v[0][n], v[1][n], v[2][n]);
-    gradient += glm::dot(direction, right) / a[n][n] * direction;
+  for (size_t field = 0; field < fields; ++field) {
+    const glm::dvec3 right = out[field];
+    out[field] = glm::dvec3(0.0);
+    for (size_t n = 0; n < 3; ++n) {
+      if (!(a[n][n] > kLeastCover * most)) continue;
+      const glm::dvec3 direction(v[0][n], v[1][n], v[2][n]);
+      out[field] += glm::dot(direction, right) / a[n][n] * direction;
+    }
   }
-  return gradient;
 }
 
-void splatOfCell(uint64_t node, const CellBody& body, std::span<const float> cell_values,
-                 std::span<const double> sums, NodeSplat& splat, std::span<SplatScalar> values) {
+void splatOfCell(uint64_t node, const CellBody& body, std::span<const float> own,
+                 const CellNeighbours& neighbours, NodeSplat& splat, std::span<SplatScalar> values) {
   setBody(node, body.centre, body.volume, {body.xx, body.xy, body.yy, body.xz, body.yz, body.zz}, splat);
-  for (size_t field = 0; field < values.size(); ++field) {
+  const size_t fields = own.size();
+  std::vector<glm::dvec3> gradients(fields);
+  leastSquares(neighbours, own, gradients);
+  // The sum of |A⁻¹ d|² over the neighbours: what is left of their differences beyond the gradient is half of it,
+  // times the mean second derivative along a column of A.
+  double reach = 0;
+  for (const glm::dvec3& step : neighbours.steps) {
+    const glm::dvec3 in_cells = inFrameOf(splat.splat, step);
+    reach += glm::dot(in_cells, in_cells);
+  }
+  for (size_t field = 0; field < fields; ++field) {
+    double rest = 0;
+    float least = own[field], most = own[field];
+    for (size_t n = 0; n < neighbours.steps.size(); ++n) {
+      const float value = neighbours.values[n * fields + field];
+      rest += (static_cast<double>(value) - own[field]) - glm::dot(gradients[field], neighbours.steps[n]);
+      least = std::min(least, value);
+      most = std::max(most, value);
+    }
+    const double second = reach > 0 ? 3 * 2 * rest / reach : 0.0;  // of all three columns
+    const double mean = std::clamp<double>(own[field] + kBend * second, least, most);
     // Of h = S g, the slope A⁻¹ h is Aᵀ g.
-    const glm::dvec3 slope = gradientOfSums(sums, field) * splat.splat.factor();
-    values[field] = {cell_values[field], slope, 0.0};
+    values[field] = {mean, gradients[field] * splat.splat.factor(), 0.0};
   }
 }
 

@@ -22,18 +22,18 @@ struct DualCell {
 /// The splat of a dual cell with volume; `node`: its number. Values are [field]. Pure: any thread.
 void splatOfPoint(uint64_t node, const DualCell& dual, NodeSplat& splat, std::span<SplatScalar> values);
 
-/// The sums of the least squares of a cell's slopes: Σ d dᵀ / |d|² and Σ d Δf / |d|² of its neighbours.
-inline constexpr size_t slopeSumCount(size_t fields) {
-  return 6 + 3 * fields;
-}
-/// Adds a neighbour, at `step` from the cell; its values and the cell's, [field].
-void addNeighbour(const glm::dvec3& step, std::span<const float> neighbour, std::span<const float> own,
-                  std::span<double> sums);
-/// The gradient of a field. Directions in which the neighbours say nothing, at borders, have none.
-glm::dvec3 gradientOfSums(std::span<const double> sums, size_t field);
+/// The neighbours of a cell: where their centres are from its own, and their values, [neighbour * fields + field].
+struct CellNeighbours {
+  std::span<const glm::dvec3> steps;
+  std::span<const float> values;
+};
+
+/// The gradients of the fields by least squares, weighted by 1 / distance², [field]. Directions in which the
+/// neighbours say nothing, at borders, have none.
+void leastSquares(const CellNeighbours& neighbours, std::span<const float> own, std::span<glm::dvec3> out);
 
 /// The splat of a cell.
-void splatOfCell(uint64_t node, const CellBody& body, std::span<const float> cell_values,
-                 std::span<const double> sums, NodeSplat& splat, std::span<SplatScalar> values);
+void splatOfCell(uint64_t node, const CellBody& body, std::span<const float> own,
+                 const CellNeighbours& neighbours, NodeSplat& splat, std::span<SplatScalar> values);
 
 }  // namespace curvisplat
