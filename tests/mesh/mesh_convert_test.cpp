@@ -4,8 +4,8 @@
 
 #include <array>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <fstream>
+#include <glm/geometric.hpp>
 #include <limits>
 #include <map>
 #include <random>
@@ -139,8 +139,7 @@ TEST_F(MeshConvert, WeightsSumToTheVolume) {
     volume += std::abs(glm::dot(at(1) - at(0), glm::cross(at(2) - at(0), at(3) - at(0)))) / 6;
   }
   const ArrayMesh mesh({tetrahedra_});
-  for (const uint32_t scalar : {0u, 1u})
-    EXPECT_NEAR(run(mesh, options(scalar)).volume / volume, 1, 1e-4);
+  for (const uint32_t scalar : {0u, 1u}) EXPECT_NEAR(run(mesh, options(scalar)).volume / volume, 1, 1e-4);
 }
 
 TEST_F(MeshConvert, LinearFieldsAreExact) {
@@ -195,9 +194,11 @@ TEST_F(MeshConvert, OddMeshesGetAWordAndNoCrash) {
   piece.points.push_back({1e9, 0, 0});
   const auto c = piece.cells.cornersOfCell(5);
   const std::array<uint64_t, 8> corners{c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]};
-  piece.cells.append(CellKind::kHexahedron, std::array<uint64_t, 8>{corners[0], corners[0], corners[0], corners[0],
-                                                                    corners[0], corners[0], corners[0], corners[0]});
-  piece.cells.append(CellKind::kTetrahedron, std::array<uint64_t, 4>{corners[0], corners[1], corners[1], corners[2]});
+  piece.cells.append(CellKind::kHexahedron,
+                     std::array<uint64_t, 8>{corners[0], corners[0], corners[0], corners[0], corners[0],
+                                             corners[0], corners[0], corners[0]});
+  piece.cells.append(CellKind::kTetrahedron,
+                     std::array<uint64_t, 4>{corners[0], corners[1], corners[1], corners[2]});
   setValues(piece, [&](const glm::dvec3& x) { return x.x; });
   piece.point_values.back() = 1e30f;
   for (const uint32_t scalar : {0u, 1u}) {

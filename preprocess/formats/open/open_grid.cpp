@@ -12,6 +12,7 @@
 #include "preprocess/formats/open/file_series.h"
 #include "preprocess/formats/open/foreign_formats.h"
 #include "preprocess/formats/open/unpacked_source.h"
+#include "preprocess/formats/openfoam/foam_source.h"
 #include "preprocess/formats/plot3d/plot3d_meta.h"
 #include "preprocess/formats/plot3d/plot3d_source.h"
 #include "preprocess/formats/vtk/vtk_legacy.h"
@@ -122,6 +123,12 @@ std::unique_ptr<GridSource> openPart(const OpenGridOptions& options) {
 }
 
 std::unique_ptr<DataSource> openFormat(const OpenGridOptions& options) {
+  if (isFoamCase(options.grid)) {
+    if (!options.solutions.empty())
+      throw Error("{}: is an OpenFOAM case, whose fields are in its folders; leave out {}",
+                  options.grid.string(), options.solutions.front().string());
+    return std::make_unique<FoamSource>(options);
+  }
   if (isRegularFile(options.grid)) {
     const InputFile file(options.grid);
     for (const GridFormat& format : kFormats)
@@ -147,6 +154,10 @@ std::unique_ptr<DataSource> openData(const OpenGridOptions& options) {
   std::unique_ptr<DataSource> source = openUnpacked(complete, openFormat);
   chosenTimeStep(options.grid.string(), source->description().times, options.time_step);
   return source;
+}
+
+bool isGridFolder(const std::filesystem::path& path) {
+  return isFoamCase(path);
 }
 
 std::unique_ptr<GridSource> requireGrid(std::unique_ptr<DataSource> source, const char* cannot) {

@@ -1,6 +1,7 @@
 // Opens a file of any format, structured or unstructured, and matches scalars by name.
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -13,7 +14,10 @@ namespace curvisplat {
 /// A GridSource or a MeshSource. Throws Error with the file, and with what was expected and found.
 std::unique_ptr<DataSource> openData(const OpenGridOptions& options);
 
-/// The same, for a structured grid: throws Error for an unstructured one.
+/// Whether openData() opens this folder: an OpenFOAM case.
+bool isGridFolder(const std::filesystem::path& path);
+
+/// As openData(), for a structured grid: throws Error for an unstructured one.
 std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options);
 
 /// `source` as a structured grid. Throws Error, which says what cannot be done to an unstructured one ("cannot be
