@@ -428,6 +428,91 @@ class MeshFiles(unittest.TestCase):
         (case / "constant" / "polyMesh" / "points").unlink()
         expect_line(case, "points")
 
+    def write_exodus(self, path, form="NETCDF3_64BIT_OFFSET", one_coord=False, shift=0):
+        import netCDF4
+        points, cells = lattice(4), hexahedra(4)
+        tetrahedra = np.concatenate([cells[40:][:, t] for t in
+                                     [(0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)]])
+        blocks = [("HEX8", cells[:40]), ("TETRA4", tetrahedra), ("SHELL4", cells[:3, :4])]
+        p = points @ [1.0, 2.0, 3.0]
+        with netCDF4.Dataset(path, "w", format=form) as f:
+            f.api_version, f.version, f.floating_point_word_size, f.file_size = 4.98, 4.98, 8, 1
+            f.title = "a cube"
+            for name, size in (("len_string", 33), ("len_name", 33), ("four", 4), ("num_dim", 3), ("num_nodes", len(points)),
+                               ("num_elem", sum(len(c) for _, c in blocks)), ("num_el_blk", len(blocks)),
+                               ("num_nod_var", 1), ("num_elem_var", 1), ("time_step", None)):
+                f.createDimension(name, size)
+            f.createVariable("time_whole", "f8", ("time_step",))[:] = [0.25, 0.5]
+            f.createVariable("eb_status", "i4", ("num_el_blk",))[:] = 1
+            ids = f.createVariable("eb_prop1", "i4", ("num_el_blk",))
+            ids.setncattr("name", "ID")
+            ids[:] = [10, 20, 30]
+            if one_coord:
+                f.createVariable("coord", "f8", ("num_dim", "num_nodes"))[:] = points.T
+            else:
+                for axis in range(3):
+                    f.createVariable("coord" + "xyz"[axis], "f8", ("num_nodes",))[:] = points[:, axis]
+            for prefix, name in (("nod", "pressure"), ("elem", "density")):
+                names = f.createVariable(f"name_{prefix}_var", "S1", (f"num_{prefix}_var", "len_name"))
+                names[0] = np.array(list(name.ljust(33, "\0")), "S1")
+            values = f.createVariable("vals_nod_var1", "f8", ("time_step", "num_nodes"))
+            values[0], values[1] = p, p + 1
+            f.createVariable("elem_var_tab", "i4", ("num_el_blk", "num_elem_var"))[:] = [[1], [1], [0]]
+            for n, (kind, c) in enumerate(blocks, 1):
+                f.createDimension(f"num_el_in_blk{n}", len(c))
+                f.createDimension(f"num_nod_per_el{n}", c.shape[1])
+                connect = f.createVariable(f"connect{n}", "i4", (f"num_el_in_blk{n}", f"num_nod_per_el{n}"))
+                connect.elem_type = kind
+                connect[:] = c + 1 + shift
+                if n < 3:
+                    values = f.createVariable(f"vals_elem_var1eb{n}", "f8", ("time_step", f"num_el_in_blk{n}"))
+                    values[0], values[1] = n + np.arange(len(c)) / 100, 0 * c[:, 0]
+        return points, p, blocks
+
+    def test_exodus_files(self):
+        for form, one_coord in (("NETCDF3_64BIT_OFFSET", False), ("NETCDF4", False), ("NETCDF3_CLASSIC", True)):
+            with self.subTest(form=form, one_coord=one_coord):
+                path = self.folder / "mesh.e"
+                points, p, blocks = self.write_exodus(path, form, one_coord)
+                info = self.info(path)
+                self.assertEqual(info["nodes"], len(points))
+                self.assertEqual((info["cells"]["hexahedra"], info["cells"]["tetrahedra"]), (40, 144))
+                self.assertEqual(info["times"], [0.25, 0.5])
+                scalars = {scalar["name"]: scalar for scalar in info["scalars"]}
+                self.assertAlmostEqual(scalars["pressure"]["max"], p.max(), places=5)
+                self.assertAlmostEqual(scalars["density"]["max"], 2 + 1.43, places=5)
+                for scalar in ("pressure", "density"):
+                    self.assertAlmostEqual(self.volume(path, scalar), 1, delta=2e-3)
+                result = self.run_program("info", path, "--json", "--time-step", "1")
+                scalars = {scalar["name"]: scalar for scalar in json.loads(result.stdout)["scalars"]}
+                self.assertAlmostEqual(scalars["pressure"]["max"], p.max() + 1, places=5)
+                if not one_coord:
+                    # VTK's own reader knows the file, too.
+                    reader = vtk.vtkExodusIIReader()
+                    reader.SetFileName(str(path))
+                    reader.UpdateInformation()
+                    reader.Update()
+                    of_hexahedra = reader.GetOutput().GetBlock(0).GetBlock(0)
+                    self.assertEqual(of_hexahedra.GetNumberOfCells(), 40)
+
+    def test_damaged_exodus_files_get_one_line(self):
+        path = self.folder / "mesh.e"
+        self.write_exodus(path)
+        data = path.read_bytes()
+
+        def expect_line():
+            result = self.run_program("convert", path, "-o", self.folder / "d.splats", "--overwrite", "--scalar", "density")
+            self.assertEqual(result.returncode, 1, result.stderr)
+            self.assertEqual(result.stderr.count("\n"), 1, result.stderr)
+            self.assertIn("mesh.e", result.stderr)
+
+        for length in range(40, len(data) - 3000, len(data) // 15):
+            path.write_bytes(data[:length])
+            expect_line()
+        for shift in (-1, 100000):
+            self.write_exodus(path, shift=shift)
+            expect_line()
+
     def test_damaged_files_get_one_line(self):
         grid = cube(2)
         path = self.folder / "mesh.vtu"

@@ -7,6 +7,7 @@
 #include <charconv>
 
 #include "preprocess/formats/cgns/cgns_source.h"
+#include "preprocess/formats/exodus/exodus_source.h"
 #include "preprocess/formats/netcdf/netcdf_source.h"
 #include "preprocess/formats/open/combined_source.h"
 #include "preprocess/formats/open/file_series.h"
@@ -53,7 +54,8 @@ constexpr GridFormat kFormats[] = {
     {isFileSeries, openListedFile, MoreFiles::kNone},  // before .p3d, which takes all JSON files
     {isPlot3dMeta, openStructured<openPlot3dMeta>, MoreFiles::kNone},
     {CgnsFile::recognises, openAs<CgnsSource>,
-     MoreFiles::kCombined},  // before NetCDF, which takes all HDF5 files
+     MoreFiles::kCombined},                              // before NetCDF, which takes all HDF5 files
+    {isExodus, openAs<ExodusSource>, MoreFiles::kNone},  // before NetCDF, which they are
     {NetcdfFile::recognises, openStructured<openNetcdf>, MoreFiles::kByItself},
 };
 
