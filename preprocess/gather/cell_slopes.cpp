@@ -15,7 +15,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr size_t kCellsPerTask = 256;
+constexpr size_t kCellsPerTask = 256, kRecordsPerTask = 16384;
 
 struct BodyRecord {
   uint64_t cell;
@@ -88,7 +88,8 @@ CellSlopes::CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes, std
   const uint64_t face_bytes = kUsualFaces * (sizeof(FaceRecord) + value_bytes + 2 * sizeof(uint64_t));
   const uint64_t range_bytes = sizeof(BodyRecord) + value_bytes +
                                kUsualFaces * (sizeof(NeighbourRecord) + value_bytes + 3 * sizeof(uint64_t));
-  range_cells_ = std::max<uint64_t>(1, memory_bytes / 2 / range_bytes);
+  // Places in a range are of 32 bits.
+  range_cells_ = std::clamp<uint64_t>(memory_bytes / 2 / range_bytes, 1, uint64_t{1} << 26);
   const uint64_t ranges = std::max<uint64_t>(1, (cells + range_cells_ - 1) / range_cells_);
   const uint64_t face_streams = cells * face_bytes / std::max<uint64_t>(1, memory_bytes / 4) + 1;
   bodies_ = std::make_unique<StreamsFile>(folder_, ranges, memory_bytes / 8);
@@ -134,33 +135,48 @@ void CellSlopes::matchFaces(size_t stream, StreamsFile& neighbours) {
   RecordArray<FaceRecord> faces(fields_);
   faces.load(*faces_, stream);
   faces_->forget(stream);
+  // Records of a stream are in the order of the cells.
   struct Key {
-    std::array<uint64_t, 3> corners;
-    uint64_t cell;
+    uint64_t hash;
     size_t record;
     bool operator<(const Key& other) const {
-      return corners != other.corners ? corners < other.corners : cell < other.cell;
+      return hash != other.hash ? hash < other.hash : record < other.record;
     }
   };
   std::vector<Key> keys(faces.size());
-  for (size_t n = 0; n < keys.size(); ++n) {
-    const FaceRecord face = faces[n];
-    keys[n] = {face.corners, face.cell, n};
-  }
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, keys.size(), kRecordsPerTask),
+                    [&](const tbb::blocked_range<size_t>& part) {
+                      for (size_t n = part.begin(); n < part.end(); ++n)
+                        keys[n] = {hashOf(faces[n].corners), n};
+                    });
   tbb::parallel_sort(keys.begin(), keys.end());
   std::vector<float> values(fields_);
   std::vector<std::byte> record(sizeof(NeighbourRecord) + fields_ * sizeof(float));
-  const auto tell = [&](const Key& to, const Key& of) {
-    faces.values(of.record, values);
-    put(record.data(), NeighbourRecord{to.cell, of.cell, faces[of.record].centre}, values);
+  const auto tell = [&](const FaceRecord& to, const FaceRecord& of, size_t of_record) {
+    faces.values(of_record, values);
+    put(record.data(), NeighbourRecord{to.cell, of.cell, of.centre}, values);
     neighbours.append(to.cell / range_cells_, record);
   };
+  const auto join = [&](size_t first, size_t second) {
+    const FaceRecord a = faces[first], b = faces[second];
+    if (a.cell == b.cell) return;
+    tell(a, b, second);
+    tell(b, a, first);
+  };
+  std::vector<std::pair<std::array<uint64_t, 3>, size_t>> same_hash;
   for (size_t first = 0; first < keys.size();) {
     size_t end = first + 1;
-    while (end < keys.size() && keys[end].corners == keys[first].corners) ++end;
-    if (end - first == 2 && keys[first].cell != keys[first + 1].cell) {
-      tell(keys[first], keys[first + 1]);
-      tell(keys[first + 1], keys[first]);
+    while (end < keys.size() && keys[end].hash == keys[first].hash) ++end;
+    // Other faces may have the same hash.
+    same_hash.clear();
+    for (size_t n = first; n < end && end - first > 1; ++n)
+      same_hash.emplace_back(faces[keys[n].record].corners, keys[n].record);
+    if (same_hash.size() > 2) std::sort(same_hash.begin(), same_hash.end());
+    for (size_t n = 0; n < same_hash.size();) {
+      size_t alike = n + 1;
+      while (alike < same_hash.size() && same_hash[alike].first == same_hash[n].first) ++alike;
+      if (alike - n == 2) join(same_hash[n].second, same_hash[n + 1].second);
+      n = alike;
     }
     first = end;
   }
@@ -172,21 +188,17 @@ void CellSlopes::makeSplats(size_t range, const StreamsFile& neighbours, const T
   RecordArray<NeighbourRecord> beside(fields_);
   bodies.load(*bodies_, range);
   beside.load(neighbours, range);
-  struct Key {
-    uint64_t cell, neighbour;
-    size_t record;
-    bool operator<(const Key& other) const {
-      return cell != other.cell             ? cell < other.cell
-             : neighbour != other.neighbour ? neighbour < other.neighbour
-                                            : record < other.record;
-    }
-  };
-  std::vector<Key> keys(beside.size());
-  for (size_t n = 0; n < keys.size(); ++n) {
-    const NeighbourRecord record = beside[n];
-    keys[n] = {record.cell, record.neighbour, n};
+  // Neighbours by cell, in the order of their numbers: `begins` of each cell, among `sorted` records.
+  const uint64_t first_cell = range * range_cells_;
+  std::vector<uint32_t> begins(std::min(range_cells_, cells_ - first_cell) + 1, 0);
+  for (size_t n = 0; n < beside.size(); ++n) ++begins[beside[n].cell - first_cell + 1];
+  for (size_t n = 1; n < begins.size(); ++n) begins[n] += begins[n - 1];
+  std::vector<uint32_t> sorted(beside.size());
+  {
+    std::vector<uint32_t> next(begins.begin(), begins.end() - 1);
+    for (size_t n = 0; n < sorted.size(); ++n)
+      sorted[next[beside[n].cell - first_cell]++] = static_cast<uint32_t>(n);
   }
-  tbb::parallel_sort(keys.begin(), keys.end());
   std::atomic<uint64_t> splats = 0, degenerate = 0;
   tbb::parallel_for(
       tbb::blocked_range<size_t>(0, bodies.size(), 1024), [&](const tbb::blocked_range<size_t>& part) {
@@ -195,16 +207,22 @@ void CellSlopes::makeSplats(size_t range, const StreamsFile& neighbours, const T
         std::vector<float> own(fields_), others;
         std::vector<glm::dvec3> steps;
         uint64_t made = 0, flat = 0;
-        auto key = std::lower_bound(keys.begin(), keys.end(), Key{bodies[part.begin()].cell, 0, 0});
         for (size_t n = part.begin(); n < part.end(); ++n) {
           const BodyRecord body = bodies[n];
           bodies.values(n, own);
           steps.clear();
           others.clear();
-          for (; key != keys.end() && key->cell == body.cell; ++key) {
+          const auto of_cell =
+              std::span(sorted).subspan(begins[body.cell - first_cell],
+                                        begins[body.cell - first_cell + 1] - begins[body.cell - first_cell]);
+          std::sort(of_cell.begin(), of_cell.end(), [&](uint32_t a, uint32_t b) {
+            const uint64_t cell_a = beside[a].neighbour, cell_b = beside[b].neighbour;
+            return cell_a != cell_b ? cell_a < cell_b : a < b;
+          });
+          for (const uint32_t neighbour : of_cell) {
             others.resize(others.size() + fields_);
-            beside.values(key->record, std::span(others).last(fields_));
-            steps.push_back(beside[key->record].centre - body.body.centre);
+            beside.values(neighbour, std::span(others).last(fields_));
+            steps.push_back(beside[neighbour].centre - body.body.centre);
           }
           if (!(body.body.volume > 0)) ++flat;
           splatOfCell(body.cell, body.body, own, {steps, others}, splat, values);

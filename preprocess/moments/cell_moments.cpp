@@ -120,6 +120,26 @@ glm::dvec3 meanOf(std::span<const glm::dvec3> corners) {
   return sum / static_cast<double>(corners.size());
 }
 
+/// Of a tetrahedron: C = (1/20) Σ (y - ȳ)(y - ȳ)ᵀ.
+CellBody bodyOfTetrahedron(std::span<const glm::dvec3> at) {
+  CellBody body;
+  body.volume = sixVolumes(at[1] - at[0], at[2] - at[0], at[3] - at[0]) / 6;
+  body.centre = meanOf(at);
+  if (!(body.volume > 0)) return body;
+  std::array<glm::dvec3, 4> y;
+  for (size_t n = 0; n < 4; ++n) y[n] = at[n] - body.centre;
+  const auto covariance = [&](int i, int j) {
+    return 0.6 * ((y[0][i] * y[0][j] + y[1][i] * y[1][j]) + (y[2][i] * y[2][j] + y[3][i] * y[3][j]));
+  };
+  body.xx = covariance(0, 0);
+  body.xy = covariance(0, 1);
+  body.yy = covariance(1, 1);
+  body.xz = covariance(0, 2);
+  body.yz = covariance(1, 2);
+  body.zz = covariance(2, 2);
+  return body;
+}
+
 }  // namespace
 
 void dualMoments(const CellView& cell, size_t fields, DualScratch& scratch, std::span<double> out) {
@@ -174,6 +194,7 @@ void dualMoments(const CellView& cell, size_t fields, DualScratch& scratch, std:
 }
 
 CellBody bodyOf(const CellView& cell) {
+  if (cell.shape == CellKind::kTetrahedron) return bodyOfTetrahedron(cell.corners);
   CellBody body;
   const glm::dvec3 middle = meanOf(cell.corners);
   std::array<double, 10> sums{};

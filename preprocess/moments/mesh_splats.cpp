@@ -5,6 +5,8 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 #include <limits>
 
 #include "preprocess/splats/shape.h"
@@ -14,6 +16,9 @@ namespace {
 
 // A direction that the neighbours cover less than this, of the best covered one, has no slope.
 constexpr double kLeastCover = 1e-3;
+
+// Squares of what is left beside the diagonal, of the trace's.
+constexpr double kConverged = 1e-30;
 
 /// A length for the shape of a splat without any extent: far below the grid's, and above zero.
 double smallestAxis(const glm::dvec3& centre) {
@@ -35,7 +40,9 @@ void setBody(uint64_t node, const glm::dvec3& centre, double volume, const Symme
 void eigenvectorsOf(std::array<std::array<double, 3>, 3>& a, std::array<std::array<double, 3>, 3>& v) {
   v = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
   for (int sweep = 0; sweep < 12; ++sweep) {
-    if (!(a[0][1] * a[0][1] + a[0][2] * a[0][2] + a[1][2] * a[1][2] > 1e-300)) return;
+    const double trace = a[0][0] + a[1][1] + a[2][2];
+    const double rest = a[0][1] * a[0][1] + a[0][2] * a[0][2] + a[1][2] * a[1][2];
+    if (!(rest > kConverged * trace * trace)) return;
     for (size_t p = 0; p < 2; ++p)
       for (size_t q = p + 1; q < 3; ++q) {
         if (a[p][q] == 0) continue;
@@ -98,6 +105,14 @@ void leastSquares(const CellNeighbours& neighbours, std::span<const float> own, 
         a[static_cast<size_t>(row)][static_cast<size_t>(column)] += d[row] * step[column];
     for (size_t field = 0; field < fields; ++field)
       out[field] += (static_cast<double>(neighbours.values[n * fields + field]) - own[field]) * d;
+  }
+  // With eigenvalues p >= q >= r > 0, r / p is at least 2 p q r / (p + q + r)³: then every direction counts.
+  const glm::dmat3 m(a[0][0], a[0][1], a[0][2], a[1][0], a[1][1], a[1][2], a[2][0], a[2][1], a[2][2]);
+  const double trace = a[0][0] + a[1][1] + a[2][2];
+  if (2 * glm::determinant(m) > kLeastCover * trace * trace * trace) {
+    const glm::dmat3 inverse = glm::inverse(m);
+    for (glm::dvec3& gradient : out) gradient = inverse * gradient;
+    return;
   }
   std::array<std::array<double, 3>, 3> v;
   eigenvectorsOf(a, v);
