@@ -226,6 +226,7 @@ std::vector<ConversionFact> factsOf(const GridDescription& description, const st
     names += (names.empty() ? "" : ", ") + description.scalars[scalar].name;
   uint64_t nodes = 0;
   for (const GridBlock& block : description.blocks) nodes += block.nodes();
+  for (const MeshPiece& piece : description.pieces) nodes += piece.points;
   facts.push_back({"the layout", fmt::format("{}, {} nodes", description.format, nodes)});
   if (description.times.size() > 1) facts.push_back({"--time-step", std::to_string(description.time_step)});
   facts.push_back({"--scalar", names.empty() ? "none" : names});

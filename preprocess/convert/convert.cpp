@@ -15,6 +15,7 @@
 #include "preprocess/convert/counting_grid.h"
 #include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/memory_plan.h"
+#include "preprocess/convert/mesh_origin.h"
 #include "preprocess/convert/plan_buckets.h"
 #include "preprocess/convert/preflight.h"
 #include "preprocess/convert/scan.h"
@@ -63,17 +64,25 @@ void reportCache(const Manifest& written, ConvertReport& report) {
   for (const FileInfo& file : written.files) report.files.push_back({file.name, file.size});
 }
 
+std::unique_ptr<SplatOrigin> originOf(const DataSource& source, const ConvertOptions& options,
+                                      const MemoryPlan& plan, const std::filesystem::path& scratch) {
+  if (const auto* mesh = dynamic_cast<const MeshSource*>(&source))
+    return std::make_unique<MeshOrigin>(*mesh, options.scalars, options.blank_value, plan, scratch);
+  return std::make_unique<GridOrigin>(dynamic_cast<const GridSource&>(source), options.scalars,
+                                      options.blank_value, plan, scratch);
+}
+
 /// A conversion under way: what each pass leaves for the next.
 class Conversion {
  public:
-  Conversion(const GridSource& source, const ConvertOptions& options, const MemoryPlan& plan,
+  Conversion(const DataSource& source, const ConvertOptions& options, const MemoryPlan& plan,
              std::vector<ConversionFact> facts, Progress& progress)
       : options_(options), plan_(plan), progress_(progress), ranks_(options.ranks) {
     if (isFirst())
       workspace_.emplace(options.output, options.overwrite, unfinishedOf(options), temporaryFolder(options),
                          std::move(facts));
     shareFolders();
-    origin_ = std::make_unique<GridOrigin>(source, options.scalars, options.blank_value, plan, own_scratch_);
+    origin_ = originOf(source, options, plan, own_scratch_);
     nodes_ = nodesOf(*origin_);
     if (ranks_) shares_splats_ = origin_->shareWith(*ranks_);
   }
@@ -419,12 +428,19 @@ ConvertReport runOrLeave(Conversion& conversion, const ConvertOptions& options) 
 
 }  // namespace
 
-ConvertReport convert(const GridSource& source, const ConvertOptions& given, Progress& progress) {
+ConvertReport convert(const DataSource& source, const ConvertOptions& given, Progress& progress) {
   ConvertOptions options = given;
   if (options.ranks && options.ranks->alone()) options.ranks = nullptr;
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
-  GridOrigin::requireMemory(source, options.scalars, plan);
-  if (options.ranks) plan.limitBuckets(bucketSplatsOfRanks(source, *options.ranks), options.scalars.size());
+  const auto* const grid = dynamic_cast<const GridSource*>(&source);
+  if (grid) GridOrigin::requireMemory(*grid, options.scalars, plan);
+  if (options.ranks) {
+    if (!grid)
+      throw UsageError("{}: is unstructured, and such grids are converted by one process; start it without mpirun",
+                       source.description().format);
+    plan.limitBuckets(bucketSplatsOfRanks(*grid, *options.ranks), options.scalars.size());
+  }
+  if (options.mesh_bytes) plan.mesh_bytes = *options.mesh_bytes;
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
 
   std::vector<ConversionFact> facts = factsOf(source.description(), options.scalars, options.blank_value);

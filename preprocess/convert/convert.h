@@ -32,6 +32,8 @@ struct ConvertOptions {
 
   /// Smaller buckets than memory would allow: tests make many of them from small grids.
   std::optional<uint64_t> bucket_splats;
+  /// Less memory for an unstructured grid than there is: small ones then take the way of large ones.
+  std::optional<uint64_t> mesh_bytes;
 };
 
 /// A file of the cache, and what it takes.
@@ -60,7 +62,7 @@ struct ConvertReport {
   std::vector<std::string> warnings;
 };
 
-/// Converts. `source` is read three times. The result's bytes depend on source, scalars and blank value
+/// Converts a structured grid (GridSource) or an unstructured one (MeshSource). `source` is read three times. The result's bytes depend on source, scalars and blank value
 /// alone. Throws Error (and UsageError) if something outside fails; then no temporary file and no partial
 /// cache is left, and what stood at the output is as it was. Peak memory, everything counted:
 /// options.memory_bytes.
@@ -73,7 +75,7 @@ struct ConvertReport {
 ///
 /// Several ranks share the work of all passes; scratch folder and output must be on a file system that they share.
 /// Rank 0's report is of the whole. Each keeps to options.memory_bytes. When a rank throws, the others do not end by
-/// themselves: whoever started them ends them, and what rank 0 leaves then is as above.
-ConvertReport convert(const GridSource& source, const ConvertOptions& options, Progress& progress);
+/// themselves: whoever started them ends them, and what rank 0 leaves then is as above. Unstructured grids take one.
+ConvertReport convert(const DataSource& source, const ConvertOptions& options, Progress& progress);
 
 }  // namespace curvisplat

@@ -19,7 +19,7 @@ constexpr uint64_t kMiB = uint64_t{1} << 20;
 // back.
 constexpr uint64_t kProgramBytes = 64 * kMiB;
 constexpr uint64_t kAllocatorShare = 16;
-constexpr uint64_t kSeamShare = 8, kSlabShare = 8;  // of the rest
+constexpr uint64_t kSeamShare = 8, kSlabShare = 8, kMeshShare = 2;  // of the rest
 // Buckets are built from at least so many splats: some bricks at a time for each thread to work on.
 constexpr uint64_t kMinBucketSplats = 4 * kMaxBrickSplats;
 constexpr uint64_t kMinChunkBytes = kMiB / 8, kMaxChunkBytes = kMiB;
@@ -72,6 +72,7 @@ MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads
   plan.slab_bytes = std::min(bytes / kSlabShare, 256 * kMiB);
   plan.counting_bytes = bytes / 8;
   plan.seam_bytes = bytes / kSeamShare;
+  plan.mesh_bytes = bytes / kMeshShare;
 
   plan.chunk_buffer_bytes = bytes / 4;
   plan.most_buckets =
@@ -96,6 +97,10 @@ MemoryPlan MemoryPlan::ofOptions(uint64_t cap_bytes, size_t variables, unsigned 
 
 uint64_t MemoryPlan::capForSeams(uint64_t seam_bytes) {
   return capFor(seam_bytes * kSeamShare);
+}
+
+uint64_t MemoryPlan::capForMesh(uint64_t mesh_bytes) {
+  return capFor(mesh_bytes * kMeshShare);
 }
 
 void MemoryPlan::requireSlabs(uint64_t bytes) {

@@ -4,6 +4,7 @@
 //    scan          2 slabs | seams: faces of cells
 //    count         2 slabs | counting grid
 //    scatter       2 slabs | chunk buffers | seams | a task's splats a thread
+//                  of a mesh: points and sums | chunk buffers | chunks of cells
 //    seams         chunk buffers | seams
 //    build         2 buckets (one is read while the other is built) | a brick's scratch a thread
 #pragma once
@@ -18,6 +19,7 @@ struct MemoryPlan {
   uint64_t slab_bytes = 0;      // each of two
   uint64_t counting_bytes = 0;  // the counting grid
   uint64_t seam_bytes = 0;
+  uint64_t mesh_bytes = 0;          // of an unstructured grid, in the place of slabs and seams
   uint64_t chunk_buffer_bytes = 0;  // the write buffers of all buckets
   uint32_t most_buckets = 0;        // of one temporary file, so that buffers stay large enough to write well
   uint64_t bucket_splats = 0;       // a bucket of more is divided again before it is built
@@ -32,6 +34,8 @@ struct MemoryPlan {
 
   /// The cap of which seams get so much.
   static uint64_t capForSeams(uint64_t seam_bytes);
+  /// The cap of which a mesh gets so much.
+  static uint64_t capForMesh(uint64_t mesh_bytes);
 
   /// Makes slabs at least so large. Throws Error that names a sufficient cap if the cap is too small for that.
   void requireSlabs(uint64_t bytes);

@@ -60,14 +60,15 @@ Bounds united(Bounds a, const Bounds& b) {
   return a;
 }
 
-void checkExtent(const GridSurvey& survey, const NodeReader& reader) {
-  const GridDescription& description = reader.source().description();
+}  // namespace
+
+void checkExtent(const GridSurvey& survey, const GridDescription& description, Centring centring) {
   const std::string file = description.files.empty() ? description.format : description.files.front();
   if (survey.nodes == survey.blanked.total())
     throw Error(
         "{}: every one of the {} {} is blanked ({} by the grid, {} by value, {} not finite in single "
         "precision): there is nothing to draw{}",
-        file, survey.nodes, reader.centring() == Centring::kCell ? "cells" : "nodes", survey.blanked.by_grid,
+        file, survey.nodes, centring == Centring::kCell ? "cells" : "nodes", survey.blanked.by_grid,
         survey.blanked.by_value, survey.blanked.not_finite,
         survey.blanked.by_grid > 0 && !description.blanking.empty() ? "; " + description.blanking : "");
   const glm::dvec3 extent = survey.upper - survey.lower;
@@ -77,13 +78,11 @@ void checkExtent(const GridSurvey& survey, const NodeReader& reader) {
                 kSmallestExtent, kLargestExtent);
 }
 
-}  // namespace
-
 GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces, Progress& progress,
                       Ranks* ranks) {
   if (reader.centring() == Centring::kCell) {
     const GridSurvey survey = surveyCells(reader, slab_bytes, faces, progress);
-    checkExtent(survey, reader);
+    checkExtent(survey, reader.source().description(), reader.centring());
     return survey;
   }
   GridSurvey survey;
@@ -109,7 +108,7 @@ GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFac
   survey.upper = total.upper;
   survey.ranges = std::move(total.ranges);
   if (ranks) survey = combinedSurvey(survey, *ranks);
-  checkExtent(survey, reader);
+  checkExtent(survey, reader.source().description(), reader.centring());
   return survey;
 }
 

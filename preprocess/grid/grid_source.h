@@ -27,6 +27,13 @@ struct GridBlock {
   uint64_t nodes() const { return ni * nj * nk; }
 };
 
+/// A part of an unstructured grid, with points and cells of its own.
+struct MeshPiece {
+  std::string name;  // "piece 1", or the file's own name for it
+  std::string file;  // for messages
+  uint64_t points = 0, cells = 0;
+};
+
 /// Where a scalar's samples lie.
 enum class Centring { kNode, kCell };
 
@@ -57,7 +64,8 @@ struct GasModel {
 struct GridDescription {
   std::string format;  // "PLOT3D grid + Q, big-endian, C, single precision, 1 block"
   std::vector<std::string> files;
-  std::vector<GridBlock> blocks;
+  std::vector<GridBlock> blocks;      // of a structured grid
+  std::vector<MeshPiece> pieces;      // of an unstructured one
   std::vector<GridScalar> scalars;    // all that can be read
   std::vector<FlowConditions> flow;   // for every block of every file that has them
   GasModel gas;                       // as stored in the files
@@ -80,12 +88,15 @@ struct NodeArrays {
   std::vector<std::vector<float>> scalars;  // [requested scalar][node]
 };
 
-class GridSource {
+/// Opened files: a structured grid (GridSource) or an unstructured one (MeshSource, preprocess/mesh).
+class DataSource {
  public:
-  virtual ~GridSource() = default;
-
+  virtual ~DataSource() = default;
   virtual const GridDescription& description() const = 0;
+};
 
+class GridSource : public DataSource {
+ public:
   /// Reads the nodes of `box` in block number `block`: coordinates, the block's own blanking, and the scalars
   /// with the given indices in description().scalars. Any number of threads may read concurrently. Throws
   /// Error with the file and the offset.

@@ -128,7 +128,23 @@ def write_stl(folder):
         file.write("endsolid plate\n")
 
 
+def make_tetrahedra(folder):
+    """A cube of 6 tetrahedra, with pressure at the points."""
+    points = [(i, j, k) for k in (0, 1) for j in (0, 1) for i in (0, 1)]
+    cells = [(0, 1, 3, 7), (0, 3, 2, 7), (0, 2, 6, 7), (0, 6, 4, 7), (0, 4, 5, 7), (0, 5, 1, 7)]
+    words = lambda rows: " ".join(str(number) for row in rows for number in row)
+    with open(os.path.join(folder, "body.vtu"), "w") as file:
+        file.write(f"""<VTKFile type="UnstructuredGrid"><UnstructuredGrid><Piece NumberOfPoints="8" NumberOfCells="6">
+<Points><DataArray type="Float32" NumberOfComponents="3">{words(points)}</DataArray></Points>
+<Cells><DataArray type="Int32" Name="connectivity">{words(cells)}</DataArray>
+<DataArray type="Int32" Name="offsets">4 8 12 16 20 24</DataArray>
+<DataArray type="UInt8" Name="types">10 10 10 10 10 10</DataArray></Cells>
+<PointData><DataArray type="Float32" Name="p">0 1 2 3 4 5 6 7</DataArray></PointData>
+</Piece></UnstructuredGrid></VTKFile>""")
+
+
 def make_inputs(folder):
+    make_tetrahedra(folder)
     write_plot3d(folder)
     write_stl(folder)
     write_vts(folder)

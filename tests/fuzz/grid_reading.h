@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "preprocess/grid/grid_source.h"
+#include "preprocess/mesh/mesh_source.h"
 #include "stream/base/check.h"
 
 namespace curvisplat {
@@ -26,6 +27,24 @@ inline void readGrid(const GridSource& source) {
       for (const auto& values : nodes.scalars) CURVISPLAT_CHECK_OP(values.size(), ==, block.ni * rows);
     }
   }
+}
+
+/// The same of the first points and cells of every piece, as far as there are errors to throw.
+inline void readMesh(const MeshSource& source) {
+  constexpr uint64_t kMax = 4096;
+  const std::vector<MeshPiece>& pieces = source.description().pieces;
+  MeshPoints points;
+  MeshCells cells;
+  for (uint32_t n = 0; n < pieces.size(); ++n) {
+    source.readPoints(n, 0, std::min(kMax, pieces[n].points), {}, points);
+    source.readCells(n, 0, std::min(kMax, pieces[n].cells), {}, cells);
+    checkCells(cells, pieces[n], 0);
+  }
+}
+
+inline void readData(const DataSource& source) {
+  if (const auto* const mesh = dynamic_cast<const MeshSource*>(&source)) return readMesh(*mesh);
+  readGrid(dynamic_cast<const GridSource&>(source));
 }
 
 }  // namespace curvisplat

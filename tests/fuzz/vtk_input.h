@@ -13,9 +13,9 @@ inline void readVtk(std::string_view name, std::span<const std::byte> bytes) {
   options.grid = fuzzFile(name, bytes);
   options.temporary_folder = fuzzFolder();
   if (isVtkXml(InputFile(options.grid)))
-    readGrid(*openVtkXml(options));
+    readData(*openVtkXml(options));
   else if (isVtkLegacy(InputFile(options.grid)))
-    readGrid(*openVtkLegacy(options));
+    readData(*openVtkLegacy(options));
 }
 
 }  // namespace curvisplat

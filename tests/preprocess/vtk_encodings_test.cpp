@@ -240,7 +240,7 @@ TEST(VtkEncodings, WhatIsNotReadIsRefusedByName) {
   const std::tuple<const char*, const char*, const char*> cases[] = {
       {"version=\"1.0\" byte", "compressor=\"vtkLZMADataCompressor\" byte",
        "compressed by vtkLZMADataCompressor"},
-      {"StructuredGrid", "Unstructured", "of type Unstructured; expected a structured grid"},
+      {"StructuredGrid", "Unstructured", "of type Unstructured; expected StructuredGrid"},
       {"LittleEndian", "MiddleEndian", "byte_order MiddleEndian"},
       {"UInt32", "UInt31", "header_type UInt31"},
       {"encoding=\"raw\"", "encoding=\"hex\"", "appended data in hex"},

@@ -139,7 +139,8 @@ TEST_F(VtkLegacy, PartsThatLieAreNamed) {
   const std::string rectilinear =
       "DATASET RECTILINEAR_GRID\nDIMENSIONS 2 2 2\nX_COORDINATES 2 float\n0 1\nY_COORDINATES 2 float\n0 1\n";
   const std::tuple<std::string, const char*> cases[] = {
-      {"DATASET UNSTRUCTURED_GRID\nPOINTS 1 float\n0 0 0\n", "is a UNSTRUCTURED_GRID"},
+      {"DATASET POLYDATA\nPOINTS 1 float\n0 0 0\n", "is a POLYDATA"},
+      {"DATASET UNSTRUCTURED_GRID\nPOINTS 1 float\n0 0 0\n", "has no CELLS"},
       {"DATUM STRUCTURED_GRID\n", "found \"datum\"; expected DATASET"},
       {grid + "POINTS 8 float\n", "has points before DIMENSIONS"},
       {grid + "DIMENSIONS 2 2\n", "found \"\"; expected a count"},

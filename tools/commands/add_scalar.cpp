@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "preprocess/addition/add_scalar.h"
+#include "preprocess/formats/open/open_grid.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
@@ -56,7 +58,9 @@ void runAddScalar(ConvertArguments arguments) {
   options.cache = arguments.to;
   applyCommonOptions(arguments, options);
 
-  const auto source = openSource(arguments, arguments.to);
+  const std::unique_ptr<GridSource> source =
+      requireGrid(openSource(arguments, arguments.to),
+                  "cannot get further scalars later; convert all of them at once (--scalar a,b --overwrite)");
   options.scalars = chooseScalars(arguments, arguments.added_scalars, source->description());
   requireThreads(arguments.threads);
   Progress progress{progressBar()};

@@ -148,7 +148,7 @@ void addSeriesOptions(CLI::App& command, ConvertArguments& arguments) {
 void addConvert(CLI::App& app) {
   auto arguments = std::make_shared<ConvertArguments>();
   CLI::App* command = app.add_subcommand("convert", "Convert a grid to a splat cache, in bounded memory");
-  command->add_option("GRID", arguments->grid.grid, "Grid file: PLOT3D, VTK, CGNS or NetCDF")->required();
+  command->add_option("GRID", arguments->grid.grid, "Grid file: PLOT3D, VTK, CGNS, NetCDF or Exodus; or an OpenFOAM case")->required();
   command->add_option("SOLUTION", arguments->grid.solutions,
                       "Further files of the grid: PLOT3D solution (Q) and function files; NetCDF, VTK or "
                       "CGNS files with fields, "

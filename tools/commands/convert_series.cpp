@@ -9,6 +9,7 @@
 #include <string>
 
 #include "preprocess/addition/convert_series.h"
+#include "preprocess/formats/open/open_grid.h"
 #include "preprocess/formats/open/series_files.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
@@ -75,7 +76,8 @@ SeriesInput seriesInput(const ConvertArguments& arguments, const std::vector<Ste
   input.open = [&](uint64_t step) {
     ConvertArguments of_step = arguments;
     of_step.grid = steps[step].options;
-    return openSource(of_step, arguments.adds_steps ? arguments.to : arguments.output);
+    return requireGrid(openSource(of_step, arguments.adds_steps ? arguments.to : arguments.output),
+                       "cannot be a time series in one cache; convert each step to its own (--time-step)");
   };
   input.scalars = [&](const GridDescription& description) {
     return chooseScalars(arguments, arguments.scalars, description);

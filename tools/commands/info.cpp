@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "preprocess/formats/open/open_grid.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "stream/base/progress.h"
@@ -210,7 +211,8 @@ void printInfo(const InfoOptions& options) {
     throw UsageError("info: expected exactly one of a cache, a grid file and --system");
   if (options.system) return printSystem(options.json);
   const fs::path& path = options.grid.grid;
-  if (fs::is_directory(path) || (!fs::exists(path) && hasUnfinished(path))) return printCacheInfo(options);
+  const bool is_cache = fs::is_directory(path) && !isGridFolder(path);
+  if (is_cache || (!fs::exists(path) && hasUnfinished(path))) return printCacheInfo(options);
   if (options.verify || !options.point.empty())
     throw UsageError("{}: is not a splat cache (a directory); --verify and --probe need one",
                      options.grid.grid.string());

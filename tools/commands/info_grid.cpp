@@ -14,6 +14,7 @@
 #include "preprocess/survey/block_overlap.h"
 #include "preprocess/survey/grid_statistics.h"
 #include "stream/base/progress.h"
+#include "tools/commands/info_mesh.h"
 #include "tools/options/grid_options.h"
 #include "tools/output/progress_bar.h"
 
@@ -263,8 +264,10 @@ void printAsText(const GridInfo& info) {
 }  // namespace
 
 void printGridInfo(const OpenGridOptions& options, const DerivedOptions& derived, bool json) {
-  const std::unique_ptr<GridSource> source = openWithDerived(options, derived);
-  const GridInfo info = inspect(*source);
+  const std::unique_ptr<DataSource> source = openWithDerived(options, derived);
+  if (const auto* const mesh = dynamic_cast<const MeshSource*>(source.get()))
+    return printMeshInfo(*mesh, json);
+  const GridInfo info = inspect(dynamic_cast<const GridSource&>(*source));
   if (json)
     fmt::print("{}\n", asJson(info).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   else

@@ -70,7 +70,7 @@ void takeScalarsFromSolutions(ConvertArguments& arguments) {
   });
 }
 
-std::unique_ptr<GridSource> openSource(const ConvertArguments& arguments,
+std::unique_ptr<DataSource> openSource(const ConvertArguments& arguments,
                                        const std::filesystem::path& cache) {
   OpenGridOptions grid = arguments.grid;
   grid.temporary_folder =

@@ -36,7 +36,7 @@ struct ConvertArguments {
 };
 
 /// Opens the grid. Temporary files go to --tmp, or beside `cache` without it.
-std::unique_ptr<GridSource> openSource(const ConvertArguments& arguments, const std::filesystem::path& cache);
+std::unique_ptr<DataSource> openSource(const ConvertArguments& arguments, const std::filesystem::path& cache);
 
 /// Positions of the scalars `names` in the description: names, lists "a,b", or "all". Without names all that
 /// the files store, at most 16 of one centring; a note says what is left out. Prints a note for each number

@@ -5,6 +5,8 @@
 #include <map>
 #include <string>
 
+#include "preprocess/mesh/mesh_source.h"
+
 namespace curvisplat {
 namespace {
 
@@ -83,8 +85,10 @@ void addGasOptions(CLI::App& app, GasModel& gas) {
       ->group(kGasGroup);
 }
 
-std::unique_ptr<GridSource> openWithDerived(const OpenGridOptions& grid, const DerivedOptions& derived) {
-  return std::make_unique<DerivedSource>(openGrid(grid), derived);
+std::unique_ptr<DataSource> openWithDerived(const OpenGridOptions& grid, const DerivedOptions& derived) {
+  std::unique_ptr<DataSource> source = openData(grid);
+  if (dynamic_cast<const MeshSource*>(source.get())) return source;  // gradients there are not derived
+  return std::make_unique<DerivedSource>(requireGrid(std::move(source), ""), derived);
 }
 
 }  // namespace curvisplat

@@ -163,7 +163,7 @@ py::dict reportOf(const ConvertReport& report) {
   return out;
 }
 
-py::dict convertSource(const GridSource& source, ConvertOptions options, const py::object& progress) {
+py::dict convertSource(const DataSource& source, ConvertOptions options, const py::object& progress) {
   ConvertReport report;
   runInterruptibly(progress, [&](Progress& of_work) { report = convert(source, options, of_work); });
   return reportOf(report);

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "preprocess/formats/open/described_mesh.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
 #include "stream/base/json_text.h"
@@ -80,9 +81,9 @@ bool isFileSeries(const InputFile& file) {
   return file.path().extension() == ".series";
 }
 
-std::unique_ptr<GridSource> openFileSeries(
+std::unique_ptr<DataSource> openFileSeries(
     const OpenGridOptions& options,
-    const std::function<std::unique_ptr<GridSource>(const OpenGridOptions&)>& open) {
+    const std::function<std::unique_ptr<DataSource>(const OpenGridOptions&)>& open) {
   const std::vector<ListedFile> files = filesIn(options.grid);
   std::vector<double> times;
   for (const ListedFile& file : files) times.push_back(file.time);
@@ -96,12 +97,14 @@ std::unique_ptr<GridSource> openFileSeries(
                 files[step].name);
   if (!isRegularFile(of_step.grid))
     throw Error("{}: lists {}, which does not exist", options.grid.string(), of_step.grid.string());
-  std::unique_ptr<GridSource> source = open(of_step);
+  std::unique_ptr<DataSource> source = open(of_step);
   GridDescription description = source->description();
   description.files.push_back(options.grid.string());
   description.times = std::move(times);
   description.time_step = step;
-  return std::make_unique<SeriesSource>(std::move(source), std::move(description));
+  if (auto mesh = describedMesh(source, description)) return mesh;
+  std::unique_ptr<GridSource> grid(dynamic_cast<GridSource*>(source.release()));
+  return std::make_unique<SeriesSource>(std::move(grid), std::move(description));
 }
 
 }  // namespace curvisplat

@@ -16,8 +16,8 @@ namespace curvisplat {
 bool isFileSeries(const InputFile& file);
 
 /// Opens the file of the chosen time step with `open`. Throws Error.
-std::unique_ptr<GridSource> openFileSeries(
+std::unique_ptr<DataSource> openFileSeries(
     const OpenGridOptions& options,
-    const std::function<std::unique_ptr<GridSource>(const OpenGridOptions&)>& open);
+    const std::function<std::unique_ptr<DataSource>(const OpenGridOptions&)>& open);
 
 }  // namespace curvisplat

@@ -7,11 +7,13 @@
 #include <charconv>
 
 #include "preprocess/formats/cgns/cgns_source.h"
+#include "preprocess/formats/exodus/exodus_source.h"
 #include "preprocess/formats/netcdf/netcdf_source.h"
 #include "preprocess/formats/open/combined_source.h"
 #include "preprocess/formats/open/file_series.h"
 #include "preprocess/formats/open/foreign_formats.h"
 #include "preprocess/formats/open/unpacked_source.h"
+#include "preprocess/formats/openfoam/foam_source.h"
 #include "preprocess/formats/plot3d/plot3d_meta.h"
 #include "preprocess/formats/plot3d/plot3d_source.h"
 #include "preprocess/formats/vtk/vtk_legacy.h"
@@ -27,28 +29,34 @@ namespace {
 /// A file format with a signature. A file that none of them recognises is read as PLOT3D, which has none.
 struct GridFormat {
   bool (*recognises)(const InputFile& file);
-  std::unique_ptr<GridSource> (*open)(const OpenGridOptions& options);
+  std::unique_ptr<DataSource> (*open)(const OpenGridOptions& options);
   enum class MoreFiles { kNone, kByItself, kCombined } more_files;  // who reads options.solutions
 };
 using MoreFiles = GridFormat::MoreFiles;
 
 template <typename Source>
-std::unique_ptr<GridSource> openAs(const OpenGridOptions& options) {
+std::unique_ptr<DataSource> openAs(const OpenGridOptions& options) {
   return std::make_unique<Source>(options);
 }
 
-std::unique_ptr<GridSource> openListedFile(const OpenGridOptions& options) {
-  return openFileSeries(options, openGrid);
+template <std::unique_ptr<GridSource> (*open)(const OpenGridOptions&)>
+std::unique_ptr<DataSource> openStructured(const OpenGridOptions& options) {
+  return open(options);
+}
+
+std::unique_ptr<DataSource> openListedFile(const OpenGridOptions& options) {
+  return openFileSeries(options, openData);
 }
 
 constexpr GridFormat kFormats[] = {
     {isVtkXml, openVtkXml, MoreFiles::kCombined},
     {isVtkLegacy, openVtkLegacy, MoreFiles::kCombined},
     {isFileSeries, openListedFile, MoreFiles::kNone},  // before .p3d, which takes all JSON files
-    {isPlot3dMeta, openPlot3dMeta, MoreFiles::kNone},
+    {isPlot3dMeta, openStructured<openPlot3dMeta>, MoreFiles::kNone},
     {CgnsFile::recognises, openAs<CgnsSource>,
-     MoreFiles::kCombined},  // before NetCDF, which takes all HDF5 files
-    {NetcdfFile::recognises, openNetcdf, MoreFiles::kByItself},
+     MoreFiles::kCombined},                              // before NetCDF, which takes all HDF5 files
+    {isExodus, openAs<ExodusSource>, MoreFiles::kNone},  // before NetCDF, which they are
+    {NetcdfFile::recognises, openStructured<openNetcdf>, MoreFiles::kByItself},
 };
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {
@@ -108,14 +116,28 @@ std::string namesIn(const GridDescription& description) {
   return names;
 }
 
-std::unique_ptr<GridSource> openFormat(const OpenGridOptions& options) {
+std::unique_ptr<DataSource> openFormat(const OpenGridOptions& options);
+
+/// Of several files that are to be combined.
+std::unique_ptr<GridSource> openPart(const OpenGridOptions& options) {
+  return requireGrid(openFormat(options),
+                     "cannot be combined with further files; give the file with all arrays alone");
+}
+
+std::unique_ptr<DataSource> openFormat(const OpenGridOptions& options) {
+  if (isFoamCase(options.grid)) {
+    if (!options.solutions.empty())
+      throw Error("{}: is an OpenFOAM case, whose fields are in its folders; leave out {}",
+                  options.grid.string(), options.solutions.front().string());
+    return std::make_unique<FoamSource>(options);
+  }
   if (isRegularFile(options.grid)) {
     const InputFile file(options.grid);
     for (const GridFormat& format : kFormats)
       if (format.recognises(file)) {
         if (options.solutions.empty() || format.more_files == MoreFiles::kByItself)
           return format.open(options);
-        if (format.more_files == MoreFiles::kCombined) return openCombined(options, openFormat);
+        if (format.more_files == MoreFiles::kCombined) return openCombined(options, openPart);
         throw Error("{}: describes its own files; leave out {}", options.grid.string(),
                     options.solutions.front().string());
       }
@@ -128,12 +150,30 @@ std::unique_ptr<GridSource> openFormat(const OpenGridOptions& options) {
 
 }  // namespace
 
-std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options) {
+std::unique_ptr<DataSource> openData(const OpenGridOptions& options) {
   OpenGridOptions complete = options;
   if (complete.temporary_folder.empty()) complete.temporary_folder = std::filesystem::temp_directory_path();
-  std::unique_ptr<GridSource> source = openUnpacked(complete, openFormat);
+  std::unique_ptr<DataSource> source = openUnpacked(complete, openFormat);
   chosenTimeStep(options.grid.string(), source->description().times, options.time_step);
   return source;
+}
+
+bool isGridFolder(const std::filesystem::path& path) {
+  return isFoamCase(path);
+}
+
+std::unique_ptr<GridSource> requireGrid(std::unique_ptr<DataSource> source, const char* cannot) {
+  if (auto* const grid = dynamic_cast<GridSource*>(source.get())) {
+    source.release();
+    return std::unique_ptr<GridSource>(grid);
+  }
+  const GridDescription& description = source->description();
+  throw Error("{}: is an unstructured grid, which {}",
+              description.files.empty() ? description.format : description.files.front(), cannot);
+}
+
+std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options) {
+  return requireGrid(openData(options), "is not read here; expected a structured grid");
 }
 
 std::vector<uint32_t> scalarsNamed(const GridDescription& description,

@@ -1,6 +1,7 @@
-// Opens a grid file of any format, and matches scalars by name.
+// Opens a file of any format, structured or unstructured, and matches scalars by name.
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,8 +11,18 @@
 
 namespace curvisplat {
 
-/// Throws Error with the file, and with what was expected and found.
+/// A GridSource or a MeshSource. Throws Error with the file, and with what was expected and found.
+std::unique_ptr<DataSource> openData(const OpenGridOptions& options);
+
+/// Whether openData() opens this folder: an OpenFOAM case.
+bool isGridFolder(const std::filesystem::path& path);
+
+/// As openData(), for a structured grid: throws Error for an unstructured one.
 std::unique_ptr<GridSource> openGrid(const OpenGridOptions& options);
+
+/// `source` as a structured grid. Throws Error, which says what cannot be done to an unstructured one ("cannot be
+/// added to a cache").
+std::unique_ptr<GridSource> requireGrid(std::unique_ptr<DataSource> source, const char* cannot);
 
 /// Indices into description.scalars for `names`; each is a name, the number of a function file's variable, or
 /// a PLOT3D function number. Without names: the first scalar, if the files hold any. Throws UsageError that

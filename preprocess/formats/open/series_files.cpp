@@ -239,7 +239,7 @@ std::vector<StepFiles> stepsOf(const OpenGridOptions& options) {
   for (StepFiles& step : stepsByName(options)) {
     size_t times = 1;
     if (may_hold_several) {
-      times = std::max<size_t>(1, openGrid(step.options)->description().times.size());
+      times = std::max<size_t>(1, openData(step.options)->description().times.size());
       // Files of one kind are alike: it is the first that tells whether they hold several steps.
       may_hold_several = times > 1 || !steps.empty();
     }

@@ -1,5 +1,6 @@
 #include "preprocess/formats/open/unpacked_source.h"
 
+#include "preprocess/formats/open/described_mesh.h"
 #include "stream/base/error.h"
 #include "stream/base/paths.h"
 
@@ -21,15 +22,22 @@ std::string withOriginals(std::string text, const Unpacked& files) {
   return text;
 }
 
+/// The description of what was opened, with the names of the compressed files.
+GridDescription describedByOriginals(GridDescription description, const Unpacked& files) {
+  for (std::string& file : description.files) file = withOriginals(file, files);
+  for (std::string& warning : description.warnings) warning = withOriginals(warning, files);
+  for (FlowConditions& flow : description.flow) flow.file = withOriginals(flow.file, files);
+  for (MeshPiece& piece : description.pieces) piece.file = withOriginals(piece.file, files);
+  description.format += ", decompressed";
+  return description;
+}
+
 class UnpackedSource final : public GridSource {
  public:
-  UnpackedSource(Unpacked files, std::unique_ptr<GridSource> source)
-      : files_(std::move(files)), source_(std::move(source)), description_(source_->description()) {
-    for (std::string& file : description_.files) file = withOriginals(file, files_);
-    for (std::string& warning : description_.warnings) warning = withOriginals(warning, files_);
-    for (FlowConditions& flow : description_.flow) flow.file = withOriginals(flow.file, files_);
-    description_.format += ", decompressed";
-  }
+  UnpackedSource(std::shared_ptr<const Unpacked> files, std::unique_ptr<GridSource> source)
+      : files_(std::move(files)),
+        source_(std::move(source)),
+        description_(describedByOriginals(source_->description(), *files_)) {}
 
   const GridDescription& description() const override { return description_; }
 
@@ -38,20 +46,20 @@ class UnpackedSource final : public GridSource {
     try {
       source_->read(block, box, scalars, out);
     } catch (const Error& error) {
-      throw Error("{}", withOriginals(error.what(), files_));
+      throw Error("{}", withOriginals(error.what(), *files_));
     }
   }
 
  private:
-  Unpacked files_;
+  std::shared_ptr<const Unpacked> files_;
   std::unique_ptr<GridSource> source_;
   GridDescription description_;
 };
 
 }  // namespace
 
-std::unique_ptr<GridSource> openUnpacked(
-    OpenGridOptions options, const std::function<std::unique_ptr<GridSource>(const OpenGridOptions&)>& open) {
+std::unique_ptr<DataSource> openUnpacked(
+    OpenGridOptions options, const std::function<std::unique_ptr<DataSource>(const OpenGridOptions&)>& open) {
   Unpacked files;
   const auto unpack = [&](std::filesystem::path& path) {
     if (!isRegularFile(path) || !UnpackedFile::recognises(InputFile(path))) return;
@@ -61,14 +69,19 @@ std::unique_ptr<GridSource> openUnpacked(
   unpack(options.grid);
   for (std::filesystem::path& solution : options.solutions) unpack(solution);
   if (files.empty()) return open(options);
-  std::unique_ptr<GridSource> source;
+  std::unique_ptr<DataSource> source;
   try {
     source = open(options);
   } catch (const Error& error) {
     throw Error("{}", withOriginals(error.what(), files));
   }
   for (const auto& file : files) file->removeName();
-  return std::make_unique<UnpackedSource>(std::move(files), std::move(source));
+  const auto held = std::make_shared<const Unpacked>(std::move(files));
+  if (auto mesh = describedMesh(source, describedByOriginals(source->description(), *held),
+                                [held](std::string text) { return withOriginals(std::move(text), *held); }))
+    return mesh;
+  std::unique_ptr<GridSource> grid(dynamic_cast<GridSource*>(source.release()));
+  return std::make_unique<UnpackedSource>(held, std::move(grid));
 }
 
 }  // namespace curvisplat

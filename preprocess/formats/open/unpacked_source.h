@@ -13,7 +13,7 @@ namespace curvisplat {
 
 /// Decompresses the compressed ones among the files of `options` and opens the grid with `open`; without any,
 /// that alone. Messages and the description name the compressed files. Throws Error.
-std::unique_ptr<GridSource> openUnpacked(
-    OpenGridOptions options, const std::function<std::unique_ptr<GridSource>(const OpenGridOptions&)>& open);
+std::unique_ptr<DataSource> openUnpacked(
+    OpenGridOptions options, const std::function<std::unique_ptr<DataSource>(const OpenGridOptions&)>& open);
 
 }  // namespace curvisplat

@@ -10,6 +10,7 @@
 
 #include "preprocess/formats/common/stored_values.h"
 #include "preprocess/formats/common/text_reader.h"
+#include "preprocess/formats/vtk/vtk_mesh_source.h"
 #include "preprocess/formats/vtk/vtk_source.h"
 #include "stream/base/error.h"
 
@@ -64,9 +65,29 @@ class LegacyReader {
         file_(std::make_shared<const PooledFile>(files_.pool, path)),
         text_(file_, 0, file_->size()) {}
 
-  VtkGrid read() {
+  std::unique_ptr<DataSource> read() {
     readHead();
     for (std::string word = nextWord(); !word.empty(); word = nextWord()) readPart(word);
+    if (unstructured_) return std::make_unique<VtkMeshSource>(finishMesh());
+    return std::make_unique<VtkSource>(finishGrid());
+  }
+
+ private:
+  VtkMesh finishMesh() {
+    if (!std::get<VtkPoints>(piece_.nodes).bytes) fail("has no POINTS; the file is truncated");
+    if (!cells_.ends.bytes || !cells_.types.bytes) fail("has no CELLS or CELL_TYPES; the file is truncated");
+    VtkMesh mesh;
+    mesh.names.push_back({"piece 1", file_->name(), std::get<VtkPoints>(piece_.nodes).tuples, cells_.cells});
+    mesh.pieces.push_back(std::move(piece_));
+    mesh.cells.push_back(std::move(cells_));
+    mesh.files = {file_->name()};
+    mesh.times = std::move(grid_.times);
+    mesh.warnings = std::move(grid_.warnings);
+    mesh.format = fmt::format("legacy VTK {}, {}", dataset_, ascii_ ? "ASCII" : "binary");
+    return mesh;
+  }
+
+  VtkGrid finishGrid() {
     finishNodes();
     grid_.pieces.push_back(std::move(piece_));
     grid_.blocks.push_back({"block 1", 0, grid_.pieces.front().extent});
@@ -75,7 +96,6 @@ class LegacyReader {
     return std::move(grid_);
   }
 
- private:
   enum class Owner { kGrid, kPoints, kCells };
 
   template <typename... Args>
@@ -122,8 +142,9 @@ class LegacyReader {
     std::transform(dataset_.begin(), dataset_.end(), dataset_.begin(),
                    [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; });
     uniform_ = dataset_ == "STRUCTURED_POINTS";
-    if (!uniform_ && dataset_ != "STRUCTURED_GRID" && dataset_ != "RECTILINEAR_GRID")
-      fail("is a {}; expected STRUCTURED_GRID, RECTILINEAR_GRID or STRUCTURED_POINTS",
+    unstructured_ = dataset_ == "UNSTRUCTURED_GRID";
+    if (!uniform_ && !unstructured_ && dataset_ != "STRUCTURED_GRID" && dataset_ != "RECTILINEAR_GRID")
+      fail("is a {}; expected STRUCTURED_GRID, RECTILINEAR_GRID, STRUCTURED_POINTS or UNSTRUCTURED_GRID",
            dataset_.substr(0, 30));
     if (dataset_ == "RECTILINEAR_GRID") piece_.nodes = VtkAxes{};
     if (uniform_) piece_.nodes = VtkUniformNodes{};
@@ -135,6 +156,7 @@ class LegacyReader {
     if (word == "field") return readField();
     if (word == "metadata") return skipMetadata();
     if (word == "point_data" || word == "cell_data") return beginData(word == "cell_data");
+    if (owner_ == Owner::kGrid && unstructured_) return readMeshPart(word);
     if (owner_ == Owner::kGrid) return readNodesPart(word);
     readAttribute(word);
   }
@@ -209,13 +231,95 @@ class LegacyReader {
     }
   }
 
+  void readMeshPart(const std::string& word) {
+    if (word == "points") {
+      const uint64_t points = nextCount();
+      piece_.nodes = readNumbers("POINTS", lineOfType(), 3, points);
+    } else if (word == "cells") {
+      const uint64_t first = nextCount(), second = nextCount();
+      restOfLine();
+      wordFollows("offsets") ? readOffsets(first, second) : readCountedCells(first, second);
+    } else if (word == "cell_types") {
+      const uint64_t cells = nextCount();
+      restOfLine();
+      if (cells != cells_.cells)
+        fail("has {} CELL_TYPES; expected {}, one for each cell", cells, cells_.cells);
+      cells_.types = readNumbers("CELL_TYPES", "int", 1, cells);
+    } else {
+      fail("found \"{}\"; expected POINTS, CELLS or CELL_TYPES", word.substr(0, 30));
+    }
+  }
+
+  /// Since version 5 of the format: where each cell begins, and the end of the last; then the points of all.
+  void readOffsets(uint64_t offsets, uint64_t points) {
+    if (offsets == 0) fail("has CELLS without OFFSETS; expected one more than cells");
+    nextWord();
+    const VtkArray begins = readNumbers("OFFSETS", lineOfType(), 1, offsets);
+    if (nextWord() != "connectivity") fail("has no CONNECTIVITY after its OFFSETS");
+    cells_.connectivity = readNumbers("CONNECTIVITY", lineOfType(), 1, points);
+    cells_.cells = offsets - 1;
+    cells_.ends = begins;
+    cells_.ends.tuples = cells_.cells;
+    cells_.ends.bytes = std::make_shared<BytesBehind>(begins.bytes, begins.tupleBytes());
+    cells_.faces_inline = true;
+  }
+
+  /// Before that: of each cell the number of its points, and these.
+  void readCountedCells(uint64_t cells, uint64_t numbers) {
+    cells_.connectivity = readNumbers("CELLS", "int", 1, numbers);
+    cells_.cells = cells;
+    cells_.counted = cells_.faces_inline = true;
+    cells_.ends.name = "CELLS";
+    cells_.ends.type = VtkType::kUint64;
+    cells_.ends.tuples = cells;
+    cells_.ends.order = kMachineByteOrder;
+    if (cells > numbers) fail("has {} cells in {} numbers; expected at least one each", cells, numbers);
+    const auto spooled = std::make_shared<SpooledBytes>(
+        files_.spool, cells * sizeof(uint64_t), [&](const SpoolFile::Sink& sink) { writeEnds(cells, sink); });
+    spooled->fill();
+    cells_.ends.bytes = spooled;
+  }
+
+  void writeEnds(uint64_t cells, const SpoolFile::Sink& sink) {
+    constexpr uint64_t kChunk = 65536;
+    std::vector<uint64_t> numbers, ends;
+    uint64_t loaded = 0, end = 0;  // numbers are those from `loaded` on
+    for (uint64_t cell = 0; cell < cells; ++cell) {
+      if (end >= loaded + numbers.size()) {
+        loaded = end;
+        readIntegers(
+            cells_.connectivity, loaded,
+            std::min(kChunk, cells_.connectivity.tuples - std::min(loaded, cells_.connectivity.tuples)),
+            numbers);
+      }
+      const uint64_t points = numbers.empty() ? cells_.connectivity.tuples : numbers[end - loaded];
+      if (points >= cells_.connectivity.tuples - end)
+        fail("CELLS: cell {} has {} points, more than there are numbers; the file is damaged", cell,
+             static_cast<int64_t>(points));
+      end += points + 1;
+      ends.push_back(end);
+      if (ends.size() < kChunk && cell + 1 < cells) continue;
+      sink(std::as_bytes(std::span(ends)));
+      ends.clear();
+    }
+  }
+
   void beginData(bool of_cells) {
+    if (unstructured_) return beginMeshData(of_cells);
     needExtent("POINT_DATA or CELL_DATA");
     const uint64_t expected = of_cells ? piece_.extent.cells() : piece_.extent.nodes();
     tuples_ = nextCount();
     if (tuples_ != expected)
       fail("has {} {}; expected {} (a grid of {} nodes)", of_cells ? "CELL_DATA" : "POINT_DATA", tuples_,
            expected, piece_.extent.describe());
+    owner_ = of_cells ? Owner::kCells : Owner::kPoints;
+  }
+
+  void beginMeshData(bool of_cells) {
+    const uint64_t expected = of_cells ? cells_.cells : std::get<VtkPoints>(piece_.nodes).tuples;
+    tuples_ = nextCount();
+    if (tuples_ != expected)
+      fail("has {} {}; expected {}", of_cells ? "CELL_DATA" : "POINT_DATA", tuples_, expected);
     owner_ = of_cells ? Owner::kCells : Owner::kPoints;
   }
 
@@ -253,13 +357,14 @@ class LegacyReader {
     addArray(name, words[0], words.size() == 2 ? count(words[1]) : 1);
   }
 
-  bool lookupTableFollows() {
-    constexpr std::string_view kWord = "lookup_table";
-    if (ascii_) return lowered(text_.peekWord()) == kWord;
-    std::string next(kWord.size(), '\0');
+  bool lookupTableFollows() { return wordFollows("lookup_table"); }
+
+  bool wordFollows(std::string_view word) {
+    if (ascii_) return lowered(text_.peekWord()) == word;
+    std::string next(word.size(), '\0');
     if (file_->size() - text_.offset() < next.size()) return false;
     file_->readAt(text_.offset(), std::as_writable_bytes(std::span(next)));
-    return lowered(next) == kWord;
+    return lowered(next) == word;
   }
 
   void readColours() {
@@ -425,10 +530,11 @@ class LegacyReader {
   TextReader text_;
   bool ascii_ = true;
   std::string dataset_;
-  bool uniform_ = false, has_extent_ = false;
+  bool uniform_ = false, unstructured_ = false, has_extent_ = false;
   Owner owner_ = Owner::kGrid;
   uint64_t tuples_ = 0;  // number of tuples of the owner's arrays
   VtkPiece piece_;
+  VtkCells cells_;
   VtkGrid grid_;
 };
 
@@ -441,8 +547,8 @@ bool isVtkLegacy(const InputFile& file) {
   return lowered(begin) == kMagic;
 }
 
-std::unique_ptr<GridSource> openVtkLegacy(const OpenGridOptions& options) {
-  return std::make_unique<VtkSource>(LegacyReader(VtkFiles(options.temporary_folder), options.grid).read());
+std::unique_ptr<DataSource> openVtkLegacy(const OpenGridOptions& options) {
+  return LegacyReader(VtkFiles(options.temporary_folder), options.grid).read();
 }
 
 }  // namespace curvisplat

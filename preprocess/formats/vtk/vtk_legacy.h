@@ -1,4 +1,4 @@
-// Legacy VTK files (.vtk): structured, rectilinear and uniform grids, ASCII and binary.
+// Legacy VTK files (.vtk): structured, rectilinear, uniform and unstructured grids, ASCII and binary.
 #pragma once
 
 #include <memory>
@@ -13,6 +13,6 @@ namespace curvisplat {
 bool isVtkLegacy(const InputFile& file);
 
 /// Numbers in text are spooled to a temporary file first. Throws Error.
-std::unique_ptr<GridSource> openVtkLegacy(const OpenGridOptions& options);
+std::unique_ptr<DataSource> openVtkLegacy(const OpenGridOptions& options);
 
 }  // namespace curvisplat

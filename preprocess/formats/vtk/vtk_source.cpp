@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <set>
 
 #include "preprocess/formats/vtk/vtk_box.h"
 #include "stream/base/check.h"
@@ -14,20 +13,6 @@ namespace curvisplat {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr int kMagnitude = WantedComponent<float>::kMagnitude;
-
-const std::vector<VtkArray>& dataOf(const VtkPiece& piece, Centring centring) {
-  return centring == Centring::kNode ? piece.point_data : piece.cell_data;
-}
-
-/// The name in the form that scalarsNamed() compares.
-std::string asAlias(const std::string& name) {
-  std::string alias;
-  for (const char c : name)
-    if (c != ' ' && c != '_' && c != '-')
-      alias += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return alias;
-}
 
 int coordinateBytes(const VtkPiece& piece) {
   if (const auto* points = std::get_if<VtkPoints>(&piece.nodes)) return bytesOf(points->type) == 8 ? 8 : 4;
@@ -82,10 +67,9 @@ VtkSource::VtkSource(VtkGrid grid) : grid_(std::move(grid)) {
         description_.warnings.end())
       description_.warnings.push_back(std::move(warning));
   addBlocks();
-  addFields(Centring::kNode);
-  addFields(Centring::kCell);
-  for (size_t n = 0; n < fields_.size(); ++n) addScalars(fields_[n], n);
-  warnOfPartialFields();
+  std::vector<size_t> pieces;
+  for (const VtkBlock& block : grid_.blocks) pieces.push_back(block.piece);
+  fields_.describe(grid_.pieces, pieces, description_);
 }
 
 void VtkSource::addBlocks() {
@@ -116,89 +100,15 @@ void VtkSource::addBlocks() {
   grid_.blocks = std::move(blocks);
 }
 
-size_t VtkSource::fieldOf(const VtkArray& array, Centring centring) {
-  const auto same = [&](const Field& field) {
-    return field.name == array.name && field.centring == centring && field.components == array.components;
-  };
-  const auto found = std::find_if(fields_.begin(), fields_.end(), same);
-  if (found != fields_.end()) return static_cast<size_t>(found - fields_.begin());
-  fields_.push_back({array.name, centring, array.components, std::vector<int32_t>(grid_.pieces.size(), -1)});
-  return fields_.size() - 1;
-}
-
-void VtkSource::addFields(Centring centring) {
-  const size_t before = fields_.size();
-  std::string active;
-  for (const VtkBlock& block : grid_.blocks) {
-    const VtkPiece& piece = grid_.pieces[block.piece];
-    const std::vector<VtkArray>& data = dataOf(piece, centring);
-    for (size_t n = 0; n < data.size(); ++n)
-      fields_[fieldOf(data[n], centring)].array_of_piece[block.piece] = static_cast<int32_t>(n);
-    if (active.empty())
-      active = centring == Centring::kNode ? piece.active_point_data : piece.active_cell_data;
-  }
-  std::stable_partition(fields_.begin() + static_cast<ptrdiff_t>(before), fields_.end(),
-                        [&](const Field& field) { return field.name == active; });
-}
-
-void VtkSource::addScalars(const Field& field, size_t number) {
-  std::set<std::string> names;
-  for (const GridScalar& scalar : description_.scalars) names.insert(scalar.name);
-  std::vector<std::string> component_names;
-  for (size_t piece = 0; piece < grid_.pieces.size() && component_names.empty(); ++piece)
-    if (field.array_of_piece[piece] >= 0)
-      component_names =
-          dataOf(grid_.pieces[piece], field.centring)[static_cast<size_t>(field.array_of_piece[piece])]
-              .component_names;
-  const auto add = [&](const std::string& suffix, int component, std::vector<std::string> aliases) {
-    GridScalar scalar;
-    scalar.name = field.name + suffix;
-    scalar.centring = field.centring;
-    if (names.count(scalar.name)) {
-      if (field.centring == Centring::kCell) scalar.name = field.name + ":cell" + suffix;
-      if (names.count(scalar.name)) scalar.name += fmt::format(":{}", number);
-    }
-    scalar.aliases = std::move(aliases);
-    description_.scalars.push_back(std::move(scalar));
-    scalars_.push_back({number, component});
-  };
-  const auto aliasesOf = [&](uint32_t component, bool has_letter) {
-    std::vector<std::string> aliases;
-    const std::string begin = asAlias(field.name) + ":";
-    if (has_letter) aliases.push_back(begin + std::to_string(component));
-    if (component < component_names.size() && !component_names[component].empty())
-      aliases.push_back(begin + asAlias(component_names[component]));
-    return aliases;
-  };
-  if (field.components == 1) return add("", 0, {});
-  const bool vector = field.components <= 3;
-  if (vector) add(":mag", kMagnitude, {asAlias(field.name)});
-  for (uint32_t c = 0; c < field.components; ++c)
-    add(vector ? fmt::format(":{}", "xyz"[c]) : fmt::format(":{}", c), static_cast<int>(c),
-        aliasesOf(c, vector));
-}
-
-void VtkSource::warnOfPartialFields() {
-  for (const Field& field : fields_) {
-    const auto without = std::count_if(grid_.blocks.begin(), grid_.blocks.end(), [&](const VtkBlock& block) {
-      return field.array_of_piece[block.piece] < 0;
-    });
-    if (without > 0)
-      description_.warnings.push_back(
-          fmt::format("{} of {} blocks have no array {}; they are not drawn with it", without,
-                      grid_.blocks.size(), field.name));
-  }
-}
-
-void VtkSource::readField(const Field& field, const VtkBlock& block, const NodeBox& box,
+void VtkSource::readField(const VtkFields::Field& field, const VtkBlock& block, const NodeBox& box,
                           std::span<const WantedComponent<float>> wanted, size_t nodes) const {
   const VtkPiece& piece = grid_.pieces[block.piece];
-  const int32_t position = field.array_of_piece[block.piece];
-  if (position < 0) {
+  const VtkArray* const found = VtkFields::arrayOf(field, grid_.pieces, block.piece);
+  if (!found) {
     for (const WantedComponent<float>& component : wanted) std::fill_n(component.to, nodes, kNaN);
     return;
   }
-  const VtkArray& array = dataOf(piece, field.centring)[static_cast<size_t>(position)];
+  const VtkArray& array = *found;
   const VtkBox node_box = nodesOf(piece, block, box);
   if (field.centring == Centring::kNode) {
     readBox<float>(array, nodeCounts(piece), node_box, wanted);
@@ -226,20 +136,9 @@ void VtkSource::read(uint32_t number, const NodeBox& box, std::span<const uint32
 
   out.scalars.resize(scalars.size());
   for (std::vector<float>& values : out.scalars) values.resize(nodes);
-  // All requested components of an array are read together.
-  std::vector<bool> read(scalars.size());
-  for (size_t n = 0; n < scalars.size(); ++n) {
-    if (read[n]) continue;
-    CURVISPLAT_CHECK_OP(scalars[n], <, scalars_.size());
-    const size_t field = scalars_[scalars[n]].field;
-    std::vector<WantedComponent<float>> wanted;
-    for (size_t m = n; m < scalars.size(); ++m) {
-      if (scalars_[scalars[m]].field != field) continue;
-      wanted.push_back({scalars_[scalars[m]].component, out.scalars[m].data()});
-      read[m] = true;
-    }
-    readField(fields_[field], block, box, wanted, nodes);
-  }
+  fields_.forEachWanted(scalars, out.scalars, [&](const VtkFields::Field& field, const auto& wanted) {
+    readField(field, block, box, wanted, nodes);
+  });
 }
 
 }  // namespace curvisplat

@@ -1,11 +1,11 @@
-// VTK's XML formats of structured grids: .vts, .vtr and .vti, their parallel forms .pvts, .pvtr and .pvti,
-// collections (.vtm, .vtpd, .vtpc) and time series of any of these (.pvd).
+// VTK's XML formats: .vts, .vtr, .vti and .vtu, their parallel forms .pvts, .pvtr, .pvti and .pvtu, collections (.vtm, .vtpd, .vtpc) and time series of any of these (.pvd).
 #pragma once
 
 #include <memory>
 #include <string_view>
 
 #include "preprocess/formats/common/open_grid_options.h"
+#include "preprocess/formats/vtk/vtk_mesh_source.h"
 #include "preprocess/formats/vtk/vtk_xml_file.h"
 #include "preprocess/grid/grid_source.h"
 
@@ -23,7 +23,21 @@ bool hasXmlPieces(std::string_view type);
 /// Throws Error if the file is damaged.
 VtkXmlPieces readXmlPieces(const VtkXmlFile& file, std::vector<std::string>& warnings);
 
-/// Opens a file of any of these formats, at one time step. Throws Error.
-std::unique_ptr<GridSource> openVtkXml(const OpenGridOptions& options);
+/// The pieces of a .vtu file.
+struct VtkXmlMeshPieces {
+  std::vector<VtkPiece> pieces;
+  std::vector<VtkCells> cells;
+  std::string encoding;
+  std::optional<double> time;
+};
+
+/// Whether readXmlMeshPieces() supports files of this type.
+bool hasXmlMeshPieces(std::string_view type);
+/// Pieces without cells are left out. Throws Error if the file is damaged.
+VtkXmlMeshPieces readXmlMeshPieces(const VtkXmlFile& file, std::vector<std::string>& warnings);
+
+/// Opens a file of any of these formats, at one time step. In a collection structured grids come first:
+/// unstructured ones are drawn where there is no other. Throws Error.
+std::unique_ptr<DataSource> openVtkXml(const OpenGridOptions& options);
 
 }  // namespace curvisplat

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "preprocess/formats/vtk/vtk_xml.h"
 #include "stream/base/error.h"
 
@@ -21,6 +23,11 @@ std::optional<double> timeOf(const VtkXmlFile& file) {
     if (std::string(node.attribute("Name").value()) == "TimeValue")
       if (const auto array = file.numericArray(node, 1)) return singleValue(*array);
   return std::nullopt;
+}
+
+std::string encodingOf(const VtkXmlFile& file) {
+  return file.encoding(file.content().find_node(
+      [](const Node& node) { return std::string_view(node.name()) == "DataArray"; }));
 }
 
 VtkPoints pointsOf(const VtkXmlFile& file, const Node& piece, uint64_t nodes) {
@@ -59,12 +66,17 @@ VtkUniformNodes uniformNodesOf(const VtkXmlFile& file) {
   return uniform;
 }
 
-void addArrays(const VtkXmlFile& file, const Node& data, bool of_cells, VtkPiece& piece,
+struct Owner {
+  bool of_cells = false;
+  uint64_t tuples = 0;
+};
+
+void addArrays(const VtkXmlFile& file, const Node& data, const Owner& owner, VtkPiece& piece,
                std::vector<std::string>& warnings) {
-  const uint64_t tuples = of_cells ? piece.extent.cells() : piece.extent.nodes();
-  const auto leaveOut = [&](const Node& node) {
+  const auto [of_cells, tuples] = owner;
+  const auto leaveOut = [&, cells = of_cells](const Node& node) {
     warnings.push_back(fmt::format("left out: array {} of the {} has type {}, which is not drawn",
-                                   node.attribute("Name").value(), of_cells ? "cells" : "points",
+                                   node.attribute("Name").value(), cells ? "cells" : "points",
                                    node.attribute("type").value()));
   };
   for (const Node& node : data.children("DataArray"))
@@ -76,7 +88,65 @@ void addArrays(const VtkXmlFile& file, const Node& data, bool of_cells, VtkPiece
   (of_cells ? piece.active_cell_data : piece.active_point_data) = data.attribute("Scalars").value();
 }
 
+/// An attribute that counts points or cells.
+uint64_t countIn(const VtkXmlFile& file, const Node& piece, const char* attribute) {
+  constexpr double kMost = 1e14;
+  const double count = file.numbers(piece, attribute, 1)[0];
+  if (!(count >= 0) || count > kMost || count != std::trunc(count))
+    file.fail(fmt::format("has {} {}; expected a count", attribute, count));
+  return static_cast<uint64_t>(count);
+}
+
+VtkCells cellsOf(const VtkXmlFile& file, const Node& piece, uint64_t count) {
+  const auto named = [&](const char* name) {
+    return piece.child("Cells").find_child_by_attribute("DataArray", "Name", name);
+  };
+  const auto required = [&](const char* name) {
+    const Node node = named(name);
+    if (!node) file.fail(fmt::format("has a piece without {} in its <Cells>", name));
+    return node;
+  };
+  VtkCells cells;
+  cells.cells = count;
+  cells.types = file.array(required("types"), count);
+  cells.ends = file.array(required("offsets"), count);
+  const uint64_t points = largestOf(cells.ends);
+  if (points == 0) file.fail("has cells without points");
+  cells.connectivity = file.array(required("connectivity"), points);
+  if (named("polyhedron_to_faces"))
+    file.fail("has polyhedra as VTK 9.4 writes them, which are not read; write them with an earlier version");
+  if (!named("faces") || !named("faceoffsets")) return cells;
+  VtkArray ends = file.array(named("faceoffsets"), count);
+  const uint64_t faces = largestOf(ends);
+  if (faces == 0) return cells;  // no polyhedra
+  cells.faces = file.array(named("faces"), faces);
+  cells.face_ends = std::move(ends);
+  return cells;
+}
+
 }  // namespace
+
+bool hasXmlMeshPieces(std::string_view type) {
+  return type == "UnstructuredGrid";
+}
+
+VtkXmlMeshPieces readXmlMeshPieces(const VtkXmlFile& file, std::vector<std::string>& warnings) {
+  VtkXmlMeshPieces read;
+  for (const Node& node : file.content().children("Piece")) {
+    const uint64_t points = countIn(file, node, "NumberOfPoints"),
+                   cells = countIn(file, node, "NumberOfCells");
+    if (points == 0 || cells == 0) continue;
+    VtkPiece piece;
+    piece.nodes = pointsOf(file, node, points);
+    addArrays(file, node.child("PointData"), {false, points}, piece, warnings);
+    addArrays(file, node.child("CellData"), {true, cells}, piece, warnings);
+    read.pieces.push_back(std::move(piece));
+    read.cells.push_back(cellsOf(file, node, cells));
+  }
+  read.encoding = encodingOf(file);
+  read.time = timeOf(file);
+  return read;
+}
 
 bool hasXmlPieces(std::string_view type) {
   return type == "StructuredGrid" || type == "RectilinearGrid" || type == "ImageData";
@@ -95,13 +165,11 @@ VtkXmlPieces readXmlPieces(const VtkXmlFile& file, std::vector<std::string>& war
       piece.nodes = axesOf(file, node, *extent);
     else
       piece.nodes = uniformNodesOf(file);
-    addArrays(file, node.child("PointData"), false, piece, warnings);
-    addArrays(file, node.child("CellData"), true, piece, warnings);
+    addArrays(file, node.child("PointData"), {false, extent->nodes()}, piece, warnings);
+    addArrays(file, node.child("CellData"), {true, extent->cells()}, piece, warnings);
     read.pieces.push_back(std::move(piece));
   }
-  const Node any_array =
-      file.content().find_node([](const Node& node) { return std::string_view(node.name()) == "DataArray"; });
-  read.encoding = file.encoding(any_array);
+  read.encoding = encodingOf(file);
   read.time = timeOf(file);
   return read;
 }

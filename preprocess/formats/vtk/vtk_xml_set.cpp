@@ -24,11 +24,33 @@ class Gatherer {
   explicit Gatherer(const OpenGridOptions& options)
       : files_(options.temporary_folder), time_step_(options.time_step) {}
 
-  VtkGrid gather(const fs::path& path) {
+  std::unique_ptr<DataSource> gather(const fs::path& path) {
     add(path, "");
-    if (grid_.pieces.empty())
-      throw Error("{}: contains no structured grid{}", path.string(),
+    if (grid_.pieces.empty() && mesh_.pieces.empty())
+      throw Error("{}: contains no structured grid and no unstructured one{}", path.string(),
                   left_out_.empty() ? "" : ": " + left_out_);
+    if (grid_.pieces.empty()) return std::make_unique<VtkMeshSource>(finishMesh());
+    return std::make_unique<VtkSource>(finishGrid());
+  }
+
+ private:
+  VtkMesh finishMesh() {
+    if (!left_out_.empty())
+      grid_.warnings.push_back(
+          fmt::format("{} files without unstructured grids are left out: {}", left_out_files_, left_out_));
+    mesh_.format = fmt::format("VTK XML {}{}, {}, {} piece{}", top_type_,
+                               top_type_ == mesh_type_ ? "" : " of " + mesh_type_, mesh_encoding_,
+                               mesh_.pieces.size(), mesh_.pieces.size() == 1 ? "" : "s");
+    mesh_.files = std::move(grid_.files);
+    mesh_.times = std::move(grid_.times);
+    mesh_.time_step = grid_.time_step;
+    mesh_.warnings = std::move(grid_.warnings);
+    return std::move(mesh_);
+  }
+
+  VtkGrid finishGrid() {
+    for (const MeshPiece& piece : mesh_.names)
+      if (left_out_files_++ == 0) left_out_ = fmt::format("{} is of type {}", piece.file, mesh_type_);
     if (!left_out_.empty())
       grid_.warnings.push_back(
           fmt::format("{} files without structured grids are left out: {}", left_out_files_, left_out_));
@@ -38,7 +60,6 @@ class Gatherer {
     return std::move(grid_);
   }
 
- private:
   void add(const fs::path& path, const std::string& name) {
     std::error_code error;
     const fs::path normal = fs::weakly_canonical(path, error);
@@ -51,6 +72,10 @@ class Gatherer {
     if (top_type_.empty()) top_type_ = file.type();
     if (hasXmlPieces(file.type()))
       addPieces(file, name);
+    else if (hasXmlMeshPieces(file.type()))
+      addMesh(file, name);
+    else if (file.type().starts_with('P') && hasXmlMeshPieces(file.type().substr(1)))
+      addParallelMesh(file, name);
     else if (file.type().starts_with('P') && hasXmlPieces(file.type().substr(1)))
       addParallel(file, name);
     else if (file.type() == "vtkMultiBlockDataSet" || file.type() == "vtkPartitionedDataSet" ||
@@ -60,8 +85,8 @@ class Gatherer {
       addTimeStep(file);
     else if (inside_.size() == 1)
       file.fail(
-          fmt::format("is a VTK file of type {}; expected a structured grid: StructuredGrid, "
-                      "RectilinearGrid or ImageData, or a collection of these",
+          fmt::format("is a VTK file of type {}; expected StructuredGrid, RectilinearGrid, ImageData, "
+                      "UnstructuredGrid, or a collection of these",
                       file.type()));
     else
       leaveOut(file);
@@ -111,6 +136,36 @@ class Gatherer {
                       : read.pieces.size() == 1 ? name
                                                 : fmt::format("{}.{}", name, n + 1));
     append(std::move(read.pieces), names);
+  }
+
+  void addMesh(const VtkXmlFile& file, const std::string& name) {
+    VtkXmlMeshPieces read = readXmlMeshPieces(file, grid_.warnings);
+    if (mesh_type_.empty()) {
+      mesh_type_ = file.type();
+      mesh_encoding_ = read.encoding;
+    }
+    if (grid_.times.empty() && read.time) grid_.times = {*read.time};
+    for (size_t n = 0; n < read.pieces.size(); ++n) {
+      if (mesh_.pieces.size() == kMaxPieces)
+        throw Error("{}: has more than {} pieces", grid_.files.front(), kMaxPieces);
+      mesh_.names.push_back({name.empty()              ? fmt::format("piece {}", mesh_.pieces.size() + 1)
+                             : read.pieces.size() == 1 ? name
+                                                       : fmt::format("{}.{}", name, n + 1),
+                             file.name(), std::get<VtkPoints>(read.pieces[n].nodes).tuples,
+                             read.cells[n].cells});
+      mesh_.pieces.push_back(std::move(read.pieces[n]));
+      mesh_.cells.push_back(std::move(read.cells[n]));
+    }
+  }
+
+  void addParallelMesh(const VtkXmlFile& file, const std::string& name) {
+    for (const Node& node : file.content().children("Piece")) {
+      const VtkXmlFile piece_file(files_, pathOf(file, node, "Source"));
+      if ("P" + piece_file.type() != file.type())
+        piece_file.fail(fmt::format("is a {}, but belongs to a {}", piece_file.type(), file.type()));
+      grid_.files.push_back(piece_file.name());
+      addMesh(piece_file, name + (name.empty() ? "" : "/") + piece_file.path().stem().string());
+    }
   }
 
   void addParallel(const VtkXmlFile& file, const std::string& name) {
@@ -172,18 +227,19 @@ class Gatherer {
 
   VtkFiles files_;
   std::optional<uint32_t> time_step_;
-  VtkGrid grid_;
+  VtkGrid grid_;  // and the files, times and warnings of a mesh
+  VtkMesh mesh_;
   std::set<fs::path> inside_;  // the chain of files from the first to the current one
   bool in_time_series_ = false;
-  std::string top_type_, leaf_type_, encoding_;
+  std::string top_type_, leaf_type_, encoding_, mesh_type_, mesh_encoding_;
   std::string left_out_;  // the first file that is left out, and its type
   size_t left_out_files_ = 0;
 };
 
 }  // namespace
 
-std::unique_ptr<GridSource> openVtkXml(const OpenGridOptions& options) {
-  return std::make_unique<VtkSource>(Gatherer(options).gather(options.grid));
+std::unique_ptr<DataSource> openVtkXml(const OpenGridOptions& options) {
+  return Gatherer(options).gather(options.grid);
 }
 
 }  // namespace curvisplat

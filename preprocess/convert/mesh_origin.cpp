@@ -1,0 +1,111 @@
+#include "preprocess/convert/mesh_origin.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "preprocess/convert/mesh_survey.h"
+#include "preprocess/gather/cell_slopes.h"
+#include "preprocess/gather/corner_gather.h"
+#include "preprocess/gather/point_sums.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kPointsPerTask = 16384;
+
+}  // namespace
+
+MeshOrigin::MeshOrigin(const MeshSource& source, std::vector<uint32_t> scalars,
+                       std::optional<double> blank_value, const MemoryPlan& plan,
+                       std::filesystem::path scratch)
+    : reader_(source, std::move(scalars), blank_value), plan_(plan), scratch_(std::move(scratch)) {
+  const bool cells = centring() == Centring::kCell;
+  blocks_.push_back({cells ? "cells" : "points", cells ? reader_.cells() : reader_.points(), 1, 1, false});
+}
+
+uint64_t MeshOrigin::temporaryBytes() const {
+  // Of hexahedra whose points do not fit: references and corners, then cells that wait for their sums.
+  constexpr uint64_t kUsualCorners = 8;
+  const uint64_t corner_bytes = sizeof(glm::dvec3) + sizeof(uint64_t) + reader_.scalars() * sizeof(float);
+  const bool fit = reader_.points() * corner_bytes <= plan_.mesh_bytes / 2;
+  return fit ? 0 : reader_.cells() * kUsualCorners * 2 * corner_bytes;
+}
+
+GridSurvey MeshOrigin::survey(Progress& progress) {
+  if (reader_.points() / 8 > plan_.mesh_bytes / 4)
+    throw Error("--memory: a mesh of {} points needs at least {} MiB", reader_.points(),
+                MemoryPlan::capForMesh(reader_.points() / 2) >> 20);
+  MeshSurvey survey = surveyMesh(reader_, progress);
+  used_ = std::move(survey.used);
+  drawn_cells_ = survey.drawn_cells;
+  numbers_.emplace(reader_, plan_.mesh_bytes / 2, scratch_, progress);
+  return survey.grid;
+}
+
+std::vector<std::string> MeshOrigin::warnings(Progress&) {
+  const auto unused = static_cast<uint64_t>(std::count(used_.begin(), used_.end(), false));
+  std::vector<std::string> warnings;
+  if (unused > 0)
+    warnings.push_back(
+        fmt::format("{} of {} points belong to no solid cell and are left out", unused, reader_.points()));
+  return warnings;
+}
+
+void MeshOrigin::count(const RootCube& root, CountingGrid& counts, Progress& progress) {
+  // Cells lie where points do, about.
+  const bool cells = centring() == Centring::kCell;
+  const uint64_t each = cells ? drawn_cells_ / std::max<uint64_t>(1, reader_.points()) + 1 : 1;
+  const MeshReader positions(reader_.source(), {}, std::nullopt);
+  positions.forEachPoints([&](const LoadedPoints& loaded) {
+    const MeshPoints& points = loaded.points;
+    const size_t tasks = (points.x.size() + kPointsPerTask - 1) / kPointsPerTask;
+    const uint32_t level = counts.level();
+    std::vector<VoxelRuns> runs(tasks, VoxelRuns(level));
+    tbb::parallel_for(size_t{0}, tasks, [&](size_t task) {
+      const size_t end = std::min(points.x.size(), (task + 1) * kPointsPerTask);
+      for (size_t n = task * kPointsPerTask; n < end; ++n)
+        if (used_[loaded.range.number + n] && std::isfinite(points.x[n]))
+          runs[task].add(root.fromWorld({points.x[n], points.y[n], points.z[n]}));
+    });
+    for (const VoxelRuns& of_task : runs) {
+      std::vector<VoxelRun> scaled(of_task.runs().begin(), of_task.runs().end());
+      for (VoxelRun& run : scaled)
+        run.count = static_cast<uint32_t>(std::min<uint64_t>(run.count * each, INT32_MAX));
+      counts.add(level, scaled);
+    }
+    progress.advance(cells ? 0 : points.x.size());
+  });
+}
+
+ScatterCounts MeshOrigin::scatter(const SinkOfThread& sink_of_thread, Progress& progress) {
+  used_ = {};
+  const uint64_t half = plan_.mesh_bytes / 2;
+  CornerGather gather(reader_, *numbers_, half, scratch_, progress);
+  const TakeSplat take = [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
+    sink_of_thread().add(splat, values);
+  };
+  PointSums::Counts counts;
+  if (centring() == Centring::kCell) {
+    CellSlopes slopes(reader_.cells(), reader_.scalars(), half, scratch_);
+    gather.forEach([&](const GatheredCells& cells) { slopes.add(cells); });
+    counts = slopes.finish(take, progress);
+  } else {
+    PointSums sums(reader_.points(), reader_.scalars(), half, scratch_);
+    gather.forEach([&](const GatheredCells& cells) { sums.add(cells); });
+    counts = sums.finish(take, progress);
+  }
+  if (counts.splats == 0)
+    throw Error("{}: every cell has a blanked point: there is nothing to draw",
+                description().files.empty() ? description().format : description().files.front());
+  return {counts.degenerate, 0};
+}
+
+uint64_t MeshOrigin::finish(SplatSink&, Progress&) {
+  return numbers_->merged();
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,50 @@
+// The splats of an unstructured grid: of its points, from the moments of their dual cells, or of its cells where the
+// scalars are cell-centred. DESIGN.md, "Unstructured grids".
+//
+//    survey    cells: which points are used; points: bounds, ranges, which are the same in several pieces
+//    count     points
+//    scatter   cells with their corners (corner_gather) --> point_sums or cell_slopes --> splats
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "preprocess/convert/memory_plan.h"
+#include "preprocess/convert/splat_origin.h"
+#include "preprocess/gather/mesh_reader.h"
+#include "preprocess/gather/point_numbers.h"
+
+namespace curvisplat {
+
+class MeshOrigin final : public SplatOrigin {
+ public:
+  /// `source` must outlive it. Temporary files go to `scratch`. Throws Error if node-centred and cell-centred
+  /// scalars are mixed.
+  MeshOrigin(const MeshSource& source, std::vector<uint32_t> scalars, std::optional<double> blank_value,
+             const MemoryPlan& plan, std::filesystem::path scratch);
+
+  const GridDescription& description() const override { return reader_.source().description(); }
+  Centring centring() const override { return reader_.centring(); }
+  /// One row of samples: the points, or the cells, of all pieces.
+  const std::vector<GridBlock>& blocks() const override { return blocks_; }
+  uint64_t temporaryBytes() const override;
+
+  GridSurvey survey(Progress& progress) override;
+  std::vector<std::string> warnings(Progress& progress) override;
+  void count(const RootCube& root, CountingGrid& counts, Progress& progress) override;
+  ScatterCounts scatter(const SinkOfThread& sink_of_thread, Progress& progress) override;
+  uint64_t finish(SplatSink& sink, Progress& progress) override;
+
+ private:
+  const MeshReader reader_;
+  const MemoryPlan plan_;
+  const std::filesystem::path scratch_;
+  std::vector<GridBlock> blocks_;
+  std::optional<PointNumbers> numbers_;
+  std::vector<bool> used_;  // [point]: a cell that is drawn has it
+  uint64_t drawn_cells_ = 0;
+};
+
+}  // namespace curvisplat

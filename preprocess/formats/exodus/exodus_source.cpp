@@ -1,0 +1,210 @@
+#include "preprocess/formats/exodus/exodus_source.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "preprocess/grid/time_steps.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+uint64_t lengthOf(const NetcdfFile& file, const std::string& dimension) {
+  for (const NetcdfDimension& d : file.dimensions())
+    if (d.name == dimension) return d.length;
+  return 0;
+}
+
+/// "HEX20" -> HEX; the corners of a solid come first in all of them.
+CellKind kindOf(std::string type) {
+  std::transform(type.begin(), type.end(), type.begin(),
+                 [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; });
+  if (type.starts_with("HEX")) return CellKind::kHexahedron;
+  if (type.starts_with("TET")) return CellKind::kTetrahedron;
+  if (type.starts_with("WED")) return CellKind::kWedge;
+  if (type.starts_with("PYR")) return CellKind::kPyramid;
+  return CellKind::kNone;
+}
+
+}  // namespace
+
+bool isExodus(const InputFile& file) {
+  if (!NetcdfFile::recognises(file)) return false;
+  try {
+    const NetcdfFile netcdf(file.path());
+    return lengthOf(netcdf, "num_nodes") > 0 && lengthOf(netcdf, "num_dim") > 0 &&
+           (netcdf.hasAttribute("api_version") || netcdf.hasAttribute("floating_point_word_size"));
+  } catch (const Error&) {
+    return false;  // its reader says what is wrong
+  }
+}
+
+ExodusSource::ExodusSource(const OpenGridOptions& options)
+    : file_(std::make_unique<NetcdfFile>(options.grid)), nodes_(lengthOf(*file_, "num_nodes")) {
+  const std::string name = options.grid.string();
+  if (lengthOf(*file_, "num_dim") != 3)
+    throw Error("{}: is an Exodus file of {} dimensions; expected 3", name, lengthOf(*file_, "num_dim"));
+  findBlocks();
+  const NetcdfVariable* const times = file_->find("time_whole");
+  if (times && times->dims.size() == 1) {
+    description_.times.resize(file_->dimension(*times, 0).length);
+    if (!description_.times.empty())
+      file_->read(*times, {{0}, {description_.times.size()}}, std::span(description_.times));
+  }
+  description_.time_step = chosenTimeStep(name, description_.times, options.time_step);
+  description_.format = fmt::format("Exodus ({}), {} element blocks", file_->kind(), blocks_.size());
+  description_.files = {name};
+  description_.pieces.push_back({"piece 1", name, nodes_, elements_});
+  const NetcdfVariable* const x = file_->find(file_->find("coord") ? "coord" : "coordx");
+  if (!x) throw Error("{}: has no coordinates (coordx)", name);
+  description_.coordinate_bytes = x->value_bytes == 8 ? 8 : 4;
+  findScalars("name_nod_var", "vals_nod_var", Centring::kNode);
+  findScalars("name_elem_var", "vals_elem_var", Centring::kCell);
+}
+
+void ExodusSource::findBlocks() {
+  const std::string name = file_->path().string();
+  uint64_t solid = 0, curved = 0, others = 0;
+  for (size_t number = 1; number <= lengthOf(*file_, "num_el_blk"); ++number) {
+    const NetcdfVariable* const connect = file_->find(fmt::format("connect{}", number));
+    if (!connect) continue;  // an empty block
+    if (connect->dims.size() != 2)
+      throw Error(
+          "{}: {} has {} dimensions; expected elements and their nodes (blocks of polyhedra are not read)",
+          name, connect->name, connect->dims.size());
+    Block block;
+    block.number = number;
+    block.connect = connect;
+    block.first = elements_;
+    block.elements = file_->dimension(*connect, 0).length;
+    block.nodes_each = file_->dimension(*connect, 1).length;
+    const std::string type = connect->text("elem_type");
+    block.kind = kindOf(type);
+    if (block.kind != CellKind::kNone && block.nodes_each < cornersOf(block.kind))
+      throw Error("{}: {} is of {} with {} nodes each, too few; the file is damaged", name, connect->name,
+                  type, block.nodes_each);
+    (block.kind == CellKind::kNone ? others : solid) += block.elements;
+    if (block.nodes_each > cornersOf(block.kind) && block.kind != CellKind::kNone) curved += block.elements;
+    elements_ += block.elements;
+    blocks_.push_back(block);
+  }
+  if (solid == 0)
+    throw Error(
+        "{}: is a finite-element mesh (Exodus) without solid elements ({} others); expected HEX, TET, WEDGE "
+        "or PYRAMID",
+        name, others);
+  if (curved > 0)
+    description_.warnings.push_back(fmt::format(
+        "{} of {} solid elements are of higher order; they are drawn by their corners", curved, solid));
+  if (others > 0)
+    description_.warnings.push_back(
+        fmt::format("{} elements are not HEX, TET, WEDGE or PYRAMID and are left out", others));
+}
+
+std::vector<std::string> ExodusSource::namesIn(const char* variable) const {
+  std::vector<std::string> names;
+  const NetcdfVariable* const found = file_->find(variable);
+  if (!found || found->dims.size() != 2) return names;
+  const std::string text = file_->readText(*found);
+  const auto length = static_cast<size_t>(file_->dimension(*found, 1).length);
+  for (size_t at = 0; length > 0 && at + length <= text.size(); at += length) {
+    std::string name = text.substr(at, length);
+    name = name.substr(0, name.find('\0'));
+    name.erase(name.find_last_not_of(' ') + 1);
+    names.push_back(name);
+  }
+  return names;
+}
+
+void ExodusSource::findScalars(const char* names, const char* values, Centring centring) {
+  const std::vector<std::string> all = namesIn(names);
+  for (size_t n = 0; n < all.size(); ++n) {
+    bool any = false;
+    if (centring == Centring::kNode) any = file_->find(fmt::format("{}{}", values, n + 1)) != nullptr;
+    for (const Block& block : blocks_)
+      any = any || file_->find(fmt::format("{}{}eb{}", values, n + 1, block.number)) != nullptr;
+    if (!any) continue;
+    GridScalar scalar;
+    scalar.name = all[n].empty() ? fmt::format("variable {}", n + 1) : all[n];
+    const auto taken = [&](const GridScalar& other) { return other.name == scalar.name; };
+    if (std::any_of(description_.scalars.begin(), description_.scalars.end(), taken))
+      scalar.name += centring == Centring::kCell ? ":cell" : fmt::format(":{}", n + 1);
+    scalar.centring = centring;
+    description_.scalars.push_back(std::move(scalar));
+    number_of_scalar_.push_back(n + 1);
+  }
+}
+
+/// Values [first, ...) of the open step; NaN without a variable.
+void ExodusSource::readValues(const NetcdfVariable* variable, uint64_t first, std::span<float> to) const {
+  if (!variable) return std::fill(to.begin(), to.end(), kNaN);
+  if (variable->dims.size() != 2 || file_->dimension(*variable, 0).length <= description_.time_step ||
+      first + to.size() > file_->dimension(*variable, 1).length)
+    throw Error("{}: {} has other dimensions than time steps and {} values; the file is damaged",
+                file_->path().string(), variable->name, first + to.size());
+  if (!to.empty()) file_->read(*variable, {{description_.time_step, first}, {1, to.size()}}, to);
+}
+
+void ExodusSource::readPoints(uint32_t, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
+                              MeshPoints& out) const {
+  std::array<std::vector<double>*, 3> axes{&out.x, &out.y, &out.z};
+  const NetcdfVariable* const all = file_->find("coord");
+  for (size_t axis = 0; axis < 3; ++axis) {
+    axes[axis]->resize(count);
+    const std::string name = fmt::format("coord{}", "xyz"[axis]);
+    const NetcdfVariable* const one = file_->find(name);
+    const NetcdfVariable* const variable = all ? all : one;
+    if (!variable || variable->dims.size() != (all ? 2u : 1u) ||
+        file_->dimension(*variable, all ? 1 : 0).length != nodes_ ||
+        (all && file_->dimension(*all, 0).length != 3))
+      throw Error("{}: has no {} of {} nodes; the file is damaged", file_->path().string(), name, nodes_);
+    const NetcdfBox box = all ? NetcdfBox{{axis, first}, {1, count}} : NetcdfBox{{first}, {count}};
+    if (count > 0) file_->read(*variable, box, std::span(*axes[axis]));
+  }
+  out.hidden.assign(count, 0);
+  out.scalars.resize(scalars.size());
+  for (size_t n = 0; n < scalars.size(); ++n) {
+    out.scalars[n].resize(count);
+    readValues(file_->find(fmt::format("vals_nod_var{}", number_of_scalar_.at(scalars[n]))), first,
+               out.scalars[n]);
+  }
+}
+
+void ExodusSource::readCells(uint32_t, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
+                             MeshCells& out) const {
+  out.clear();
+  out.scalars.resize(scalars.size());
+  for (std::vector<float>& values : out.scalars) values.resize(count);
+  std::vector<double> stored;
+  std::vector<uint64_t> points;
+  for (const Block& block : blocks_) {
+    const uint64_t from = std::max(first, block.first),
+                   to = std::min(first + count, block.first + block.elements);
+    if (from >= to) continue;
+    stored.resize((to - from) * block.nodes_each);
+    if (!stored.empty())
+      file_->read(*block.connect, {{from - block.first, 0}, {to - from, block.nodes_each}},
+                  std::span(stored));
+    points.resize(block.nodes_each);
+    for (uint64_t element = 0; element < to - from; ++element) {
+      for (size_t n = 0; n < points.size(); ++n) {
+        // From 1; what is none of them is refused as any number that is too large.
+        const double node = stored[element * block.nodes_each + n];
+        points[n] = node >= 1 && node <= 0x1p53 ? static_cast<uint64_t>(node) - 1
+                                                : std::numeric_limits<uint64_t>::max();
+      }
+      out.append(block.kind, points);
+    }
+    for (size_t n = 0; n < scalars.size(); ++n)
+      readValues(
+          file_->find(fmt::format("vals_elem_var{}eb{}", number_of_scalar_.at(scalars[n]), block.number)),
+          from - block.first, std::span(out.scalars[n]).subspan(from - first, to - from));
+  }
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,69 @@
+// One file of an OpenFOAM case, plain or gzip: its header and one list of numbers, ASCII or binary, which goes to a
+// spool file as numbers of 8 bytes, so that all later reads go by position.
+//
+//    FoamFile { format ascii; class vectorField; arch "LSB;label=32;scalar=64"; ... }
+//    8 ( (0 0 0) (1 0 0) ... )               a list; in binary files bytes follow the opening parenthesis
+//    internalField nonuniform List<scalar> 8 ( ... )    in files of fields; or: uniform 300
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "preprocess/formats/common/spool_file.h"
+#include "preprocess/formats/common/unpacked_file.h"
+
+namespace curvisplat {
+
+/// Numbers of 8 bytes in a spool file.
+struct FoamList {
+  std::shared_ptr<SpoolFile> spool;
+  uint64_t offset = 0, count = 0;  // of numbers
+
+  void read(uint64_t first, std::span<double> to) const;
+  void read(uint64_t first, std::span<uint64_t> to) const;
+};
+
+/// For one thread.
+class FoamFile {
+ public:
+  /// Opens `path`, or `path`.gz where that is what there is. Throws Error if it is not a file of OpenFOAM.
+  FoamFile(const std::filesystem::path& path, std::shared_ptr<SpoolFile> spool,
+           const std::filesystem::path& temporary_folder);
+  ~FoamFile();
+
+  static bool exists(const std::filesystem::path& path);
+
+  /// "volScalarField".
+  const std::string& type() const { return type_; }
+  bool isBinary() const { return binary_; }
+  std::string name() const { return original_.string(); }
+
+  /// The list that comes next, of tuples of `components` numbers. Throws Error if it is damaged.
+  FoamList numbers(size_t components);
+  /// The same, of labels.
+  FoamList labels();
+  /// A faceList or a faceCompactList: where each face begins among the labels, and the end of the last; the labels.
+  struct Faces {
+    FoamList begins, labels;
+  };
+  Faces faces();
+
+  /// Goes to the values of a field. Returns the numbers of a uniform one, and none of a list.
+  std::vector<double> beginField(size_t components);
+
+ private:
+  struct Parser;
+  std::filesystem::path original_;
+  std::unique_ptr<UnpackedFile> unpacked_;
+  std::unique_ptr<Parser> parser_;
+  std::shared_ptr<SpoolFile> spool_;
+  std::filesystem::path temporary_folder_;
+  std::string type_;
+  bool binary_ = false;
+};
+
+}  // namespace curvisplat

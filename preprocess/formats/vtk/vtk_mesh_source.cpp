@@ -1,0 +1,198 @@
+#include "preprocess/formats/vtk/vtk_mesh_source.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "preprocess/formats/vtk/vtk_cell_types.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+// Bits of vtkGhostType (vtkDataSetAttributes). Another piece has a duplicate cell; a duplicate point may well be
+// one of a cell that no other piece has.
+constexpr int kHiddenPoint = 2;
+constexpr int kHiddenCell = 1 | 8 | 32;  // duplicate, refined, hidden
+
+constexpr uint64_t kChunk = 65536;
+// Numbers of points are read as doubles, which hold them up to this.
+constexpr double kLargestInteger = 0x1p53;
+
+void readFlags(const std::optional<VtkArray>& array, uint64_t first, uint64_t count, int bits,
+               std::vector<uint8_t>& out) {
+  out.assign(count, 0);
+  if (!array) return;
+  std::vector<float> flags(count);
+  const WantedComponent<float> wanted{0, flags.data()};
+  readTuples<float>(*array, first, count, std::span(&wanted, 1));
+  for (size_t n = 0; n < count; ++n) out[n] = (static_cast<int>(flags[n]) & bits) != 0;
+}
+
+/// Places where each of some cells begins, and the end of the last, in an array of `length`.
+std::vector<uint64_t> beginsOf(const VtkArray& ends, uint64_t first, uint64_t count, uint64_t length,
+                               const MeshPiece& piece) {
+  std::vector<uint64_t> begins;
+  readIntegers(ends, first - (first > 0), count + (first > 0), begins);
+  if (first == 0) begins.insert(begins.begin(), 0);
+  for (size_t n = 0; n < count; ++n)
+    if (begins[n + 1] < begins[n] || begins[n + 1] > length)
+      throw Error("{}: cell {} ends at place {} of the connectivity; expected {} to {}; the file is damaged",
+                  piece.file, first + n, static_cast<int64_t>(begins[n + 1]), begins[n], length);
+  return begins;
+}
+
+}  // namespace
+
+void readIntegers(const VtkArray& array, uint64_t first, uint64_t count, std::vector<uint64_t>& out) {
+  std::vector<double> values(count);
+  const WantedComponent<double> wanted{0, values.data()};
+  readTuples<double>(array, first, count, std::span(&wanted, 1));
+  out.resize(count);
+  for (size_t n = 0; n < count; ++n)
+    out[n] = values[n] >= 0 && values[n] <= kLargestInteger ? static_cast<uint64_t>(values[n])
+                                                            : std::numeric_limits<uint64_t>::max();
+}
+
+uint64_t largestOf(const VtkArray& array) {
+  uint64_t largest = 0;
+  std::vector<uint64_t> values;
+  for (uint64_t first = 0; first < array.tuples; first += kChunk) {
+    readIntegers(array, first, std::min(kChunk, array.tuples - first), values);
+    for (const uint64_t value : values)
+      if (value != std::numeric_limits<uint64_t>::max()) largest = std::max(largest, value);
+  }
+  return largest;
+}
+
+VtkMeshSource::VtkMeshSource(VtkMesh mesh) : mesh_(std::move(mesh)) {
+  description_.format = mesh_.format;
+  description_.files = mesh_.files;
+  description_.times = mesh_.times;
+  description_.time_step = mesh_.time_step;
+  for (std::string& warning : mesh_.warnings)  // many pieces may give the same warning
+    if (std::find(description_.warnings.begin(), description_.warnings.end(), warning) ==
+        description_.warnings.end())
+      description_.warnings.push_back(std::move(warning));
+  description_.pieces = mesh_.names;
+  description_.coordinate_bytes = 4;
+  std::vector<size_t> pieces;
+  for (size_t n = 0; n < mesh_.pieces.size(); ++n) {
+    pieces.push_back(n);
+    if (bytesOf(std::get<VtkPoints>(mesh_.pieces[n].nodes).type) == 8) description_.coordinate_bytes = 8;
+  }
+  checkTypes();
+  fields_.describe(mesh_.pieces, pieces, description_);
+}
+
+void VtkMeshSource::checkTypes() {
+  std::array<uint64_t, 256> counts{};
+  for (size_t piece = 0; piece < mesh_.cells.size(); ++piece) {
+    const VtkArray& types = mesh_.cells[piece].types;
+    std::vector<uint64_t> values;
+    for (uint64_t first = 0; first < types.tuples; first += kChunk) {
+      readIntegers(types, first, std::min(kChunk, types.tuples - first), values);
+      for (size_t n = 0; n < values.size(); ++n) {
+        if (values[n] > 255 || groupOf(static_cast<uint8_t>(values[n])) == VtkCellGroup::kUnknown)
+          throw Error("{}: cell {} has type {}, which is not one of VTK's types of cells",
+                      mesh_.names[piece].file, first + n, static_cast<int64_t>(values[n]));
+        ++counts[values[n]];
+      }
+    }
+  }
+  std::array<uint64_t, 4> groups{};
+  for (size_t type = 0; type < counts.size(); ++type)
+    groups[static_cast<size_t>(groupOf(static_cast<uint8_t>(type)))] += counts[type];
+  const auto of = [&](VtkCellGroup group) { return groups[static_cast<size_t>(group)]; };
+  const uint64_t solid = of(VtkCellGroup::kLinear) + of(VtkCellGroup::kCurved);
+  if (solid == 0)
+    throw Error(
+        "{}: has no solid cell ({} vertices, lines or faces); expected tetrahedra, hexahedra or others",
+        mesh_.files.empty() ? "" : mesh_.files.front(), of(VtkCellGroup::kNotSolid));
+  if (of(VtkCellGroup::kCurved) > 0)
+    description_.warnings.push_back(
+        fmt::format("{} of {} solid cells are quadratic or of higher order; they are drawn by their corners",
+                    of(VtkCellGroup::kCurved), solid));
+  if (of(VtkCellGroup::kNotSolid) > 0)
+    description_.warnings.push_back(
+        fmt::format("{} cells are vertices, lines or faces and are left out", of(VtkCellGroup::kNotSolid)));
+}
+
+void VtkMeshSource::readScalars(uint32_t piece, uint64_t first, uint64_t count,
+                                std::span<const uint32_t> scalars,
+                                std::vector<std::vector<float>>& out) const {
+  out.resize(scalars.size());
+  for (std::vector<float>& values : out) values.resize(count);
+  fields_.forEachWanted(scalars, out,
+                        [&](const VtkFields::Field& field, std::span<const WantedComponent<float>> wanted) {
+                          if (const VtkArray* const array = VtkFields::arrayOf(field, mesh_.pieces, piece))
+                            return readTuples<float>(*array, first, count, wanted);
+                          for (const WantedComponent<float>& component : wanted)
+                            std::fill_n(component.to, count, std::numeric_limits<float>::quiet_NaN());
+                        });
+}
+
+void VtkMeshSource::readPoints(uint32_t number, uint64_t first, uint64_t count,
+                               std::span<const uint32_t> scalars, MeshPoints& out) const {
+  const VtkPiece& piece = mesh_.pieces.at(number);
+  for (std::vector<double>* const axis : {&out.x, &out.y, &out.z}) axis->resize(count);
+  const std::array<WantedComponent<double>, 3> wanted{
+      {{0, out.x.data()}, {1, out.y.data()}, {2, out.z.data()}}};
+  readTuples<double>(std::get<VtkPoints>(piece.nodes), first, count, wanted);
+  readFlags(piece.point_ghosts, first, count, kHiddenPoint, out.hidden);
+  readScalars(number, first, count, scalars, out.scalars);
+}
+
+void VtkMeshSource::readCells(uint32_t number, uint64_t first, uint64_t count,
+                              std::span<const uint32_t> scalars, MeshCells& out) const {
+  const VtkCells& cells = mesh_.cells.at(number);
+  const MeshPiece& piece = mesh_.names[number];
+  out.clear();
+  std::vector<uint64_t> types, points, faces;
+  readIntegers(cells.types, first, count, types);
+  const std::vector<uint64_t> begins = beginsOf(cells.ends, first, count, cells.connectivity.tuples, piece);
+  readIntegers(cells.connectivity, begins.front(), begins.back() - begins.front(), points);
+  std::vector<uint64_t> face_ends;
+  if (cells.face_ends) readIntegers(*cells.face_ends, first, count, face_ends);
+  // The faces of a polyhedron begin where those of the one before it end.
+  uint64_t face_begin = 0;
+  for (uint64_t back = first; back > 0 && face_begin == 0 && !face_ends.empty();) {
+    const uint64_t from = back - std::min(back, kChunk);
+    std::vector<uint64_t> before;
+    readIntegers(*cells.face_ends, from, back - from, before);
+    for (const uint64_t end : before)
+      if (end != std::numeric_limits<uint64_t>::max()) face_begin = end;
+    back = from;
+  }
+
+  for (size_t n = 0; n < count; ++n) {
+    auto of_cell =
+        std::span<const uint64_t>(points).subspan(begins[n] - begins.front(), begins[n + 1] - begins[n]);
+    if (cells.counted && !of_cell.empty()) of_cell = of_cell.subspan(1);
+    if (types[n] != kVtkPolyhedron) {
+      appendVtkCell(static_cast<uint8_t>(types[n]), of_cell, out);
+      if (out.shapes.back() == CellKind::kNone &&
+          groupOf(static_cast<uint8_t>(types[n])) != VtkCellGroup::kNotSolid)
+        throw Error("{}: cell {} of type {} has {} points, too few; the file is damaged", piece.file,
+                    first + n, types[n], of_cell.size());
+      continue;
+    }
+    if (!cells.faces_inline) {
+      const bool known = n < face_ends.size() && face_ends[n] != std::numeric_limits<uint64_t>::max();
+      if (!known || face_ends[n] <= face_begin || face_ends[n] > cells.faces->tuples)
+        throw Error("{}: polyhedron {} has no faces; the file is damaged", piece.file, first + n);
+      readIntegers(*cells.faces, face_begin, face_ends[n] - face_begin, faces);
+      face_begin = face_ends[n];
+      of_cell = faces;
+    }
+    if (of_cell.empty() || !out.appendPolyhedron(of_cell[0], of_cell.subspan(1)))
+      throw Error("{}: polyhedron {} has faces that do not add up; the file is damaged", piece.file,
+                  first + n);
+  }
+  readFlags(mesh_.pieces[number].cell_ghosts, first, count, kHiddenCell, out.hidden);
+  readScalars(number, first, count, scalars, out.scalars);
+}
+
+}  // namespace curvisplat

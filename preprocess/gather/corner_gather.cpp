@@ -1,0 +1,218 @@
+#include "preprocess/gather/corner_gather.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "preprocess/gather/streams_file.h"
+#include "stream/base/check.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kCornersPerTask = 4096;
+
+/// Calls use(begin, end) for parts of [0, count), in parallel.
+template <typename Use>
+void inParts(size_t count, const Use& use) {
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, count, kCornersPerTask),
+                    [&](const tbb::blocked_range<size_t>& part) { use(part.begin(), part.end()); });
+}
+
+/// Where a corner wants its point.
+struct Reference {
+  uint64_t point, slot;
+};
+
+}  // namespace
+
+CellView GatheredCells::view(size_t n, size_t corner_fields) const {
+  const size_t begin = corner_begin[n], count = corner_begin[n + 1] - begin;
+  return {shapes[n], std::span(at).subspan(begin, count),
+          std::span(corner_values).subspan(begin * corner_fields, count * corner_fields),
+          std::span(faces).subspan(face_begin[n], face_begin[n + 1] - face_begin[n])};
+}
+
+void GatheredCells::clear() {
+  numbers.clear();
+  shapes.clear();
+  corner_begin.assign(1, 0);
+  corners.clear();
+  at.clear();
+  corner_values.clear();
+  face_begin.assign(1, 0);
+  faces.clear();
+  cell_values.clear();
+}
+
+CornerGather::CornerGather(const MeshReader& reader, const PointNumbers& numbers, uint64_t memory_bytes,
+                           std::filesystem::path folder, Progress& progress)
+    : reader_(&reader),
+      numbers_(&numbers),
+      memory_bytes_(memory_bytes),
+      folder_(std::move(folder)),
+      progress_(&progress),
+      corner_fields_(reader.centring() == Centring::kNode ? reader.scalars() : 0),
+      cell_fields_(reader.centring() == Centring::kCell ? reader.scalars() : 0) {}
+
+void CornerGather::take(const LoadedCells& loaded, GatheredCells& out) const {
+  const MeshCells& cells = loaded.cells;
+  uint64_t first_point = 0;
+  for (uint32_t piece = 0; piece < loaded.range.piece; ++piece)
+    first_point += reader_->pieces()[piece].points;
+  for (size_t n = 0; n < cells.size(); ++n) {
+    if (cells.shapes[n] == CellKind::kNone) continue;
+    out.numbers.push_back(loaded.range.number + n);
+    out.shapes.push_back(cells.shapes[n]);
+    for (const uint64_t point : cells.cornersOfCell(n))
+      out.corners.push_back((*numbers_)(first_point + point));
+    out.corner_begin.push_back(out.corners.size());
+    const std::span<const uint32_t> faces = cells.facesOfCell(n);
+    out.faces.insert(out.faces.end(), faces.begin(), faces.end());
+    out.face_begin.push_back(out.faces.size());
+    for (const std::vector<float>& values : cells.scalars) out.cell_values.push_back(values[n]);
+  }
+  out.at.resize(out.corners.size());
+  out.corner_values.resize(out.corners.size() * corner_fields_);
+}
+
+/// Makes the cells with a blanked corner degenerate, without corners: they take part in nothing.
+void CornerGather::dropBlanked(GatheredCells& cells) const {
+  for (size_t n = 0; n < cells.size(); ++n)
+    for (size_t corner = cells.corner_begin[n]; corner < cells.corner_begin[n + 1]; ++corner)
+      if (std::isnan(cells.at[corner].x)) cells.shapes[n] = CellKind::kNone;
+}
+
+void CornerGather::forEach(const std::function<void(const GatheredCells&)>& use) {
+  const uint64_t bytes = reader_->points() * (sizeof(glm::dvec3) + corner_fields_ * sizeof(float));
+  bytes <= memory_bytes_ ? gatherInMemory(use) : gatherByStreams(use);
+}
+
+void CornerGather::gatherInMemory(const std::function<void(const GatheredCells&)>& use) {
+  std::vector<glm::dvec3> at(reader_->points());
+  std::vector<float> values(reader_->points() * corner_fields_);
+  reader_->forEachPoints([&](const LoadedPoints& loaded) {
+    progress_->throwIfStopped();
+    const MeshPoints& points = loaded.points;
+    inParts(points.x.size(), [&](size_t begin, size_t end) {
+      for (size_t n = begin; n < end; ++n) {
+        at[loaded.range.number + n] = {points.x[n], points.y[n], points.z[n]};
+        for (size_t field = 0; field < corner_fields_; ++field)
+          values[(loaded.range.number + n) * corner_fields_ + field] = points.scalars[field][n];
+      }
+    });
+  });
+  GatheredCells cells;
+  reader_->forEachCells([&](const LoadedCells& loaded) {
+    cells.clear();
+    take(loaded, cells);
+    inParts(cells.corners.size(), [&](size_t begin, size_t end) {
+      for (size_t n = begin; n < end; ++n) {
+        cells.at[n] = at[cells.corners[n]];
+        std::copy_n(&values[cells.corners[n] * corner_fields_], corner_fields_,
+                    &cells.corner_values[n * corner_fields_]);
+      }
+    });
+    dropBlanked(cells);
+    use(cells);
+    progress_->advance(loaded.range.count);
+  });
+}
+
+void CornerGather::gatherByStreams(const std::function<void(const GatheredCells&)>& use) {
+  const size_t point_bytes = sizeof(glm::dvec3) + corner_fields_ * sizeof(float);
+  const size_t record_bytes = sizeof(uint64_t) + point_bytes;
+  const uint64_t range_points = std::max<uint64_t>(1, memory_bytes_ / 4 / point_bytes);
+  const uint64_t ranges = (reader_->points() + range_points - 1) / range_points;
+  const uint64_t group_slots = std::max<uint64_t>(1, memory_bytes_ / 4 / (point_bytes + sizeof(uint64_t)));
+
+  StreamsFile references(folder_, ranges, memory_bytes_ / 4);
+  std::vector<Group> groups(1);
+  GatheredCells cells;
+  reader_->forEachCells([&](const LoadedCells& loaded) {
+    progress_->throwIfStopped();
+    cells.clear();
+    take(loaded, cells);
+    if (groups.back().slots > 0 && groups.back().slots + cells.corners.size() > group_slots)
+      groups.push_back({{}, groups.back().first_slot + groups.back().slots, 0});
+    Group& group = groups.back();
+    uint64_t slot = group.first_slot + group.slots;
+    for (const uint64_t point : cells.corners)
+      references.appendRecord(point / range_points, Reference{point, slot++});
+    group.ranges.push_back(loaded.range);
+    group.slots += cells.corners.size();
+  });
+  references.close();
+
+  StreamsFile corners(folder_, groups.size(), memory_bytes_ / 4);
+  {
+    std::vector<std::byte> points, record(record_bytes);
+    for (uint64_t range = 0; range < ranges; ++range) {
+      const uint64_t first = range * range_points, count = std::min(range_points, reader_->points() - first);
+      points.resize(count * point_bytes);
+      reader_->readPoints(first, count, [&](const LoadedPoints& loaded) {
+        progress_->throwIfStopped();
+        std::byte* to = points.data() + (loaded.range.number - first) * point_bytes;
+        for (size_t n = 0; n < loaded.points.x.size(); ++n) {
+          const glm::dvec3 at(loaded.points.x[n], loaded.points.y[n], loaded.points.z[n]);
+          std::memcpy(to, &at, sizeof at);
+          to += sizeof at;
+          for (size_t field = 0; field < corner_fields_; ++field, to += sizeof(float))
+            std::memcpy(to, &loaded.points.scalars[field][n], sizeof(float));
+        }
+      });
+      size_t group = 0;
+      references.forEach(range, [&](std::span<const std::byte> records) {
+        progress_->throwIfStopped();
+        for (size_t at = 0; at < records.size(); at += sizeof(Reference)) {
+          Reference reference;
+          std::memcpy(&reference, records.data() + at, sizeof reference);
+          // Slots rise within a range.
+          while (reference.slot >= groups[group].first_slot + groups[group].slots) ++group;
+          std::memcpy(record.data(), &reference.slot, sizeof reference.slot);
+          std::memcpy(record.data() + sizeof reference.slot,
+                      points.data() + (reference.point - first) * point_bytes, point_bytes);
+          corners.append(group, record);
+        }
+      });
+      references.forget(range);
+    }
+  }
+  corners.close();
+
+  std::vector<std::byte> slots;
+  for (size_t number = 0; number < groups.size(); ++number) {
+    const Group& group = groups[number];
+    slots.resize(group.slots * point_bytes);
+    corners.forEach(number, [&](std::span<const std::byte> records) {
+      for (size_t at = 0; at < records.size(); at += record_bytes) {
+        uint64_t slot;
+        std::memcpy(&slot, records.data() + at, sizeof slot);
+        std::memcpy(slots.data() + (slot - group.first_slot) * point_bytes, records.data() + at + sizeof slot,
+                    point_bytes);
+      }
+    });
+    corners.forget(number);
+    size_t slot = 0;
+    reader_->forEachCells(group.ranges, [&](const LoadedCells& loaded) {
+      cells.clear();
+      take(loaded, cells);
+      for (size_t n = 0; n < cells.corners.size(); ++n, ++slot) {
+        const std::byte* from = slots.data() + slot * point_bytes;
+        std::memcpy(static_cast<void*>(&cells.at[n]), from, sizeof(glm::dvec3));
+        if (corner_fields_ > 0)
+          std::memcpy(&cells.corner_values[n * corner_fields_], from + sizeof(glm::dvec3),
+                      corner_fields_ * sizeof(float));
+      }
+      dropBlanked(cells);
+      use(cells);
+      progress_->advance(loaded.range.count);
+    });
+    CURVISPLAT_CHECK_OP(slot, ==, group.slots);
+  }
+}
+
+}  // namespace curvisplat

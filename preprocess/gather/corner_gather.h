@@ -1,0 +1,74 @@
+// Gives each cell the positions and values of its corners. Cells refer to points by number, and the points of a
+// mesh need not fit in memory:
+//
+//    cells --(point, slot)--> streams by ranges of points --+ points of a range --(slot, position, values)-->
+//                                                                     streams by groups of cells --> cells
+//
+// A slot is the place of a corner among those of all cells, in order. Where the points fit they are read into
+// memory instead, and nothing is written. What comes out is the same.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "preprocess/gather/mesh_reader.h"
+#include "preprocess/gather/point_numbers.h"
+#include "preprocess/moments/cell_moments.h"
+
+namespace curvisplat {
+
+/// Cells with their corners. Only those that are drawn.
+struct GatheredCells {
+  std::vector<uint64_t> numbers;        // [cell] in the whole mesh
+  std::vector<CellKind> shapes;         // [cell]
+  std::vector<size_t> corner_begin{0};  // [cell + 1], in the arrays of corners
+  std::vector<uint64_t> corners;        // PointNumbers'
+  std::vector<glm::dvec3> at;           // [corner]
+  std::vector<float> corner_values;     // [corner * fields + field], of node-centred scalars
+  std::vector<size_t> face_begin{0};    // [cell + 1], in faces
+  std::vector<uint32_t> faces;          // as MeshCells'
+  std::vector<float> cell_values;       // [cell * fields + field], of cell-centred scalars
+
+  size_t size() const { return shapes.size(); }
+  CellView view(size_t n, size_t corner_fields) const;
+  std::span<const uint64_t> cornersOfCell(size_t n) const {
+    return std::span(corners).subspan(corner_begin[n], corner_begin[n + 1] - corner_begin[n]);
+  }
+  void clear();
+};
+
+class CornerGather {
+ public:
+  /// Reads the cells and the points unless the latter fit. Keeps to `memory_bytes` besides a few chunks. All
+  /// references must outlive it.
+  CornerGather(const MeshReader& reader, const PointNumbers& numbers, uint64_t memory_bytes,
+               std::filesystem::path folder, Progress& progress);
+
+  /// Calls `use` for all cells, in order, some at a time. A cell with a blanked corner is left out. Once.
+  void forEach(const std::function<void(const GatheredCells&)>& use);
+
+ private:
+  /// Cells whose corners are in memory together.
+  struct Group {
+    std::vector<MeshRange> ranges;
+    uint64_t first_slot = 0, slots = 0;
+  };
+
+  void gatherInMemory(const std::function<void(const GatheredCells&)>& use);
+  void gatherByStreams(const std::function<void(const GatheredCells&)>& use);
+  /// Takes over what is drawn of the cells, without positions and values.
+  void take(const LoadedCells& loaded, GatheredCells& out) const;
+  void dropBlanked(GatheredCells& cells) const;
+
+  const MeshReader* reader_;
+  const PointNumbers* numbers_;
+  const uint64_t memory_bytes_;
+  const std::filesystem::path folder_;
+  Progress* progress_;
+  const size_t corner_fields_, cell_fields_;
+};
+
+}  // namespace curvisplat

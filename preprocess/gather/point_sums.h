@@ -1,0 +1,50 @@
+// Sums what cells give to their corners, in the order of the cells, and makes a splat of each point: the mesh's
+// node-centred splats. The sums of all points (144 bytes a point with one field) need not fit in memory: cells then
+// wait on disk, once for each range of points that they have corners in.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "preprocess/gather/corner_gather.h"
+#include "preprocess/moments/mesh_splats.h"
+
+namespace curvisplat {
+
+/// Takes a splat and its values, in any thread.
+using TakeSplat = std::function<void(const NodeSplat&, std::span<const SplatScalar>)>;
+
+class PointSums {
+ public:
+  /// For points with numbers below `points`.
+  PointSums(uint64_t points, size_t fields, uint64_t memory_bytes, std::filesystem::path folder);
+  ~PointSums();
+
+  /// Cells in the mesh's order.
+  void add(const GatheredCells& cells);
+
+  struct Counts {
+    uint64_t splats = 0;
+    uint64_t degenerate = 0;  // points whose cells have no volume: their splats have no weight
+  };
+  /// Makes the splats. Once, after all cells.
+  Counts finish(const TakeSplat& take, const Progress& progress);
+
+ private:
+  struct Sums;
+  void accumulate(const GatheredCells& cells, Sums& sums);
+  void write(const GatheredCells& cells);
+  void flushRange(const Sums& sums, const TakeSplat& take, Counts& counts) const;
+
+  const uint64_t points_;
+  const size_t fields_;
+  uint64_t range_points_ = 0;
+  std::unique_ptr<Sums> sums_;                  // of all points, if they fit
+  std::unique_ptr<class StreamsFile> waiting_;  // otherwise: cells by ranges of points
+  std::vector<double> moments_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,77 @@
+#include "preprocess/gather/streams_file.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+
+namespace curvisplat {
+namespace {
+
+/// A name that no other file of streams in this folder has while it is visible.
+std::filesystem::path uniqueName(const std::filesystem::path& folder) {
+  static std::atomic<unsigned> files = 0;
+  return folder / fmt::format("streams-{}-{}.tmp", ::getpid(), files++);
+}
+
+}  // namespace
+
+StreamsFile::StreamsFile(std::filesystem::path folder, size_t streams, uint64_t memory_bytes)
+    : folder_(std::move(folder)),
+      streams_(streams),
+      buffer_bytes_(
+          std::clamp<uint64_t>(memory_bytes / 2 / std::max<size_t>(1, streams), kLeastBuffer, kMostBuffer)),
+      may_stay_(memory_bytes - std::min<uint64_t>(memory_bytes, streams * buffer_bytes_)) {}
+
+StreamsFile::~StreamsFile() = default;
+
+void StreamsFile::append(size_t number, std::span<const std::byte> record) {
+  Stream& stream = streams_[number];
+  if (!stream.buffer.empty() && stream.buffer.size() + record.size() > buffer_bytes_) flush(stream);
+  if (stream.buffer.capacity() == 0) stream.buffer.reserve(std::max(buffer_bytes_, record.size()));
+  stream.buffer.insert(stream.buffer.end(), record.begin(), record.end());
+  stream.bytes += record.size();
+}
+
+void StreamsFile::flush(Stream& stream) {
+  Chunk chunk;
+  chunk.bytes = stream.buffer.size();
+  if (chunk.bytes <= may_stay_) {
+    may_stay_ -= chunk.bytes;
+    chunk.in_memory.swap(stream.buffer);
+  } else {
+    if (!written_) {
+      const std::filesystem::path path = uniqueName(folder_);
+      written_ = std::make_unique<OutputFile>(path);
+      read_ = std::make_unique<InputFile>(path);
+      removeFile(path);
+    }
+    chunk.offset = written_->size();
+    written_->append(std::span<const std::byte>(stream.buffer));
+    stream.buffer.clear();
+  }
+  stream.chunks.push_back(std::move(chunk));
+}
+
+void StreamsFile::close() {
+  for (Stream& stream : streams_) {
+    if (!stream.buffer.empty()) flush(stream);
+    stream.buffer = {};
+  }
+}
+
+void StreamsFile::forEach(size_t number, const std::function<void(std::span<const std::byte>)>& use) const {
+  std::vector<std::byte> buffer;
+  for (const Chunk& chunk : streams_[number].chunks) {
+    if (!chunk.in_memory.empty()) {
+      use(chunk.in_memory);
+      continue;
+    }
+    buffer.resize(chunk.bytes);
+    read_->readAt(chunk.offset, std::span(buffer));
+    use(buffer);
+  }
+}
+
+}  // namespace curvisplat

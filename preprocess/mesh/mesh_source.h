@@ -1,0 +1,38 @@
+// MeshSource, the interface that readers of unstructured grids offer to conversion: points and cells of one or
+// more pieces, read in chunks. The unstructured counterpart of GridSource. No source holds a whole mesh in
+// memory.
+//
+// Cells refer to points by their number in the piece. Pieces may repeat one another's points (partitions do):
+// points of different pieces at the same position are one point (preprocess/gather/point_numbers.h).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "preprocess/grid/grid_source.h"
+#include "preprocess/mesh/mesh_cells.h"
+
+namespace curvisplat {
+
+/// Points of one piece. The source resizes the arrays, which keep their capacity.
+struct MeshPoints {
+  std::vector<double> x, y, z;              // world units
+  std::vector<uint8_t> hidden;              // 1: blanked by the file; always filled
+  std::vector<std::vector<float>> scalars;  // [requested scalar][point]
+};
+
+class MeshSource : public DataSource {
+ public:
+  /// Points [first, first + count) of a piece, and the node-centred scalars with the given indices in
+  /// description().scalars. Any number of threads may read concurrently. Throws Error with the file.
+  virtual void readPoints(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
+                          MeshPoints& out) const = 0;
+
+  /// Cells [first, first + count) of a piece, and cell-centred scalars. Numbers of points are as stored:
+  /// checkCells() (mesh_cells.h) refuses those that do not exist.
+  virtual void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
+                         MeshCells& out) const = 0;
+};
+
+}  // namespace curvisplat

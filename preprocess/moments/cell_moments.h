@@ -1,0 +1,56 @@
+// Moments of the pieces of a cell: what splats of unstructured grids are made of. DESIGN.md, "Unstructured grids".
+//
+// Each face (its centroid φ, the mean of its corners) and each of its edges (a, b) cut the tetrahedron
+// (a, b, φ, c) out of the cell; c is the mean of the cell's corners. Cut in two at the edge's middle m, the pieces
+// (a, m, φ, c) belong to a and (b, m, φ, c) to b: together over all cells they are the dual cell of a point.
+// Fields are linear in each piece. Volumes count without sign, so cells and faces may go round either way; of
+// cells whose corners do not see one another, parts count twice.
+//
+//   moments about an origin, y = x - origin and g = f - f(origin):
+//      0     ∫ 1            4-9   ∫ xx xy yy xz yz zz
+//      1-3   ∫ x y z        then for each field   ∫ g   ∫ gx gy gz   ∫ gg
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "preprocess/mesh/mesh_cells.h"
+
+namespace curvisplat {
+
+inline constexpr size_t momentCount(size_t fields) {
+  return 10 + 5 * fields;
+}
+
+/// A cell with its corners' positions and values, [corner * fields + field].
+struct CellView {
+  CellKind shape = CellKind::kNone;
+  std::span<const glm::dvec3> corners;
+  std::span<const float> values;
+  std::span<const uint32_t> faces;  // of a polyhedron: MeshCells::faces
+};
+
+/// What dualMoments() needs for a while; keeps its capacity.
+struct DualScratch {
+  std::vector<glm::dvec3> at;
+  std::vector<double> values, of_face, sums;
+};
+
+/// Adds nothing: overwrites `out`, [corner * momentCount(fields)], with the moments of what the cell gives to each
+/// of its corners, about that corner and its values. Pure: any thread. Throws nothing but bad_alloc.
+void dualMoments(const CellView& cell, size_t fields, DualScratch& scratch, std::span<double> out);
+
+/// A cell as one splat: its volume (no sign), centroid, and 12 times its covariance.
+struct CellBody {
+  double volume = 0;
+  glm::dvec3 centre{0.0};
+  double xx = 0, xy = 0, yy = 0, xz = 0, yz = 0, zz = 0;
+};
+
+/// Of a cell without volume the centre is the mean of its corners, and the covariance 0.
+CellBody bodyOf(const CellView& cell);
+
+}  // namespace curvisplat

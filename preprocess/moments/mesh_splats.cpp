@@ -1,0 +1,160 @@
+#include "preprocess/moments/mesh_splats.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+
+#include "preprocess/splats/shape.h"
+
+namespace curvisplat {
+namespace {
+
+// A direction that the neighbours cover less than this, of the best covered one, has no slope.
+constexpr double kLeastCover = 1e-3;
+
+// Squares of what is left beside the diagonal, of the trace's.
+constexpr double kConverged = 1e-30;
+
+/// A length for the shape of a splat without any extent: far below the grid's, and above zero.
+double smallestAxis(const glm::dvec3& centre) {
+  const glm::dvec3 here = glm::abs(centre);
+  const double length = std::max({here.x, here.y, here.z});
+  return std::max(kAxisFloor * (length > 0 ? length : 1.0), std::numeric_limits<double>::min());
+}
+
+void setBody(uint64_t node, const glm::dvec3& centre, double volume, const Symmetric3& shape,
+             NodeSplat& splat) {
+  splat = {};
+  splat.node = node;
+  splat.splat.position = splat.node_position = centre;
+  splat.splat.weight = volume;
+  setShape(splat.splat, shape, smallestAxis(centre));
+}
+
+/// Eigenvalues and eigenvectors (columns) of a symmetric matrix, by Jacobi's rotations.
+void eigenvectorsOf(std::array<std::array<double, 3>, 3>& a, std::array<std::array<double, 3>, 3>& v) {
+  v = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  for (int sweep = 0; sweep < 12; ++sweep) {
+    const double trace = a[0][0] + a[1][1] + a[2][2];
+    const double rest = a[0][1] * a[0][1] + a[0][2] * a[0][2] + a[1][2] * a[1][2];
+    if (!(rest > kConverged * trace * trace)) return;
+    for (size_t p = 0; p < 2; ++p)
+      for (size_t q = p + 1; q < 3; ++q) {
+        if (a[p][q] == 0) continue;
+        const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
+        const double t = std::copysign(1.0, theta) / (std::abs(theta) + std::sqrt(theta * theta + 1));
+        const double c = 1 / std::sqrt(t * t + 1), s = t * c;
+        for (size_t k = 0; k < 3; ++k) {
+          const double kp = a[k][p], kq = a[k][q];
+          a[k][p] = c * kp - s * kq;
+          a[k][q] = s * kp + c * kq;
+        }
+        for (size_t k = 0; k < 3; ++k) {
+          const double pk = a[p][k], qk = a[q][k];
+          a[p][k] = c * pk - s * qk;
+          a[q][k] = s * pk + c * qk;
+          const double vp = v[k][p], vq = v[k][q];
+          v[k][p] = c * vp - s * vq;
+          v[k][q] = s * vp + c * vq;
+        }
+      }
+  }
+}
+
+}  // namespace
+
+void splatOfPoint(uint64_t node, const DualCell& dual, NodeSplat& splat, std::span<SplatScalar> values) {
+  const std::span<const double> m = dual.moments;
+  const bool solid = m[0] > 0;
+  const double share = solid ? 1 / m[0] : 0.0;
+  const glm::dvec3 mean(share * m[1], share * m[2], share * m[3]);
+  const auto shape = [&](size_t sum, int i, int j) { return 12 * (share * m[sum] - mean[i] * mean[j]); };
+  setBody(node, dual.point + mean, m[0],
+          {shape(4, 0, 0), shape(5, 0, 1), shape(6, 1, 1), shape(7, 0, 2), shape(8, 1, 2), shape(9, 2, 2)},
+          splat);
+  splat.node_position = dual.point;
+  for (size_t field = 0; field < values.size(); ++field) {
+    const double* of_field = m.data() + 10 + 5 * field;
+    const double g = share * of_field[0];
+    const glm::dvec3 h = 12.0 * (share * glm::dvec3(of_field[1], of_field[2], of_field[3]) - g * mean);
+    const double variance = std::max(0.0, share * of_field[4] - g * g);
+    // A slope never explains more than the variance there is; rounding, or a floored axis, may say so.
+    glm::dvec3 slope = inFrameOf(splat.splat, h);
+    const double explained = glm::dot(slope, slope) / 12;
+    if (explained > variance) slope *= std::sqrt(variance / explained);
+    values[field] = {dual.values[field] + g, slope, 0.0};
+  }
+}
+
+void leastSquares(const CellNeighbours& neighbours, std::span<const float> own, std::span<glm::dvec3> out) {
+  const size_t fields = own.size();
+  std::array<std::array<double, 3>, 3> a{};
+  std::fill(out.begin(), out.end(), glm::dvec3(0.0));
+  for (size_t n = 0; n < neighbours.steps.size(); ++n) {
+    const glm::dvec3& step = neighbours.steps[n];
+    const double square = glm::dot(step, step);
+    if (!(square > 0)) continue;
+    const glm::dvec3 d = step / square;
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 3; ++column)
+        a[static_cast<size_t>(row)][static_cast<size_t>(column)] += d[row] * step[column];
+    for (size_t field = 0; field < fields; ++field)
+      out[field] += (static_cast<double>(neighbours.values[n * fields + field]) - own[field]) * d;
+  }
+  // With eigenvalues p >= q >= r > 0, r / p is at least 2 p q r / (p + q + r)³: then every direction counts.
+  const glm::dmat3 m(a[0][0], a[0][1], a[0][2], a[1][0], a[1][1], a[1][2], a[2][0], a[2][1], a[2][2]);
+  const double trace = a[0][0] + a[1][1] + a[2][2];
+  if (2 * glm::determinant(m) > kLeastCover * trace * trace * trace) {
+    const glm::dmat3 inverse = glm::inverse(m);
+    for (glm::dvec3& gradient : out) gradient = inverse * gradient;
+    return;
+  }
+  std::array<std::array<double, 3>, 3> v;
+  eigenvectorsOf(a, v);
+  const double most = std::max({a[0][0], a[1][1], a[2][2]});
+  for (size_t field = 0; field < fields; ++field) {
+    const glm::dvec3 right = out[field];
+    out[field] = glm::dvec3(0.0);
+    for (size_t n = 0; n < 3; ++n) {
+      if (!(a[n][n] > kLeastCover * most)) continue;
+      const glm::dvec3 direction(v[0][n], v[1][n], v[2][n]);
+      out[field] += glm::dot(direction, right) / a[n][n] * direction;
+    }
+  }
+}
+
+void splatOfCell(uint64_t node, const CellBody& body, std::span<const float> own,
+                 const CellNeighbours& neighbours, NodeSplat& splat, std::span<SplatScalar> values) {
+  setBody(node, body.centre, body.volume, {body.xx, body.xy, body.yy, body.xz, body.yz, body.zz}, splat);
+  const size_t fields = own.size();
+  std::vector<glm::dvec3> gradients(fields);
+  leastSquares(neighbours, own, gradients);
+  // The sum of |A⁻¹ d|² over the neighbours: what is left of their differences beyond the gradient is half of it,
+  // times the mean second derivative along a column of A.
+  double reach = 0;
+  for (const glm::dvec3& step : neighbours.steps) {
+    const glm::dvec3 in_cells = inFrameOf(splat.splat, step);
+    reach += glm::dot(in_cells, in_cells);
+  }
+  for (size_t field = 0; field < fields; ++field) {
+    double rest = 0;
+    float least = own[field], most = own[field];
+    for (size_t n = 0; n < neighbours.steps.size(); ++n) {
+      const float value = neighbours.values[n * fields + field];
+      rest += (static_cast<double>(value) - own[field]) - glm::dot(gradients[field], neighbours.steps[n]);
+      least = std::min(least, value);
+      most = std::max(most, value);
+    }
+    const double second = reach > 0 ? 3 * 2 * rest / reach : 0.0;  // of all three columns
+    const double mean = std::clamp<double>(own[field] + kBend * second, least, most);
+    // Of h = S g, the slope A⁻¹ h is Aᵀ g.
+    values[field] = {mean, gradients[field] * splat.splat.factor(), 0.0};
+  }
+}
+
+}  // namespace curvisplat

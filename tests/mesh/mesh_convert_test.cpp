@@ -1,0 +1,239 @@
+// Conversion of unstructured grids: what must hold whatever the cells, the threads and the memory.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <map>
+#include <random>
+
+#include "preprocess/convert/convert.h"
+#include "preprocess/scenes/scenes.h"
+#include "stream/base/error.h"
+#include "stream/cache/cache_reader.h"
+#include "tests/reference/array_mesh.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+using Files = std::map<std::string, std::string>;
+
+class MeshConvert : public testing::Test {
+ protected:
+  ConvertOptions options(uint32_t scalar) const {
+    ConvertOptions options;
+    options.output = folder_ / "mesh.splats";
+    options.scalars = {scalar};
+    options.overwrite = true;
+    options.memory_bytes = uint64_t{512} << 20;
+    return options;
+  }
+
+  static ConvertReport run(const DataSource& source, const ConvertOptions& options) {
+    Progress progress;
+    return convert(source, options, progress);
+  }
+
+  Files filesOf(const DataSource& source, const ConvertOptions& how) const {
+    run(source, how);
+    Files files;
+    for (const auto& entry : std::filesystem::directory_iterator(how.output)) {
+      std::ifstream file(entry.path(), std::ios::binary);
+      files[entry.path().filename().string()] = std::string(std::istreambuf_iterator<char>(file), {});
+    }
+    return files;
+  }
+
+  std::string errorOf(const DataSource& source, const ConvertOptions& how) const {
+    try {
+      run(source, how);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  const std::shared_ptr<const Scene> scene_ = makeScene("half-annulus");
+  const ArrayPiece tetrahedra_ = tetrahedraOf(*scene_, 16, 8, 8), hexahedra_ = hexahedraOf(*scene_, 16, 8, 8);
+  const TemporaryFolder folder_;
+};
+
+/// A cube with corners at 0 and 1, cut into every shape: prisms, pyramids, tetrahedra and a polyhedron.
+ArrayPiece mixedCube(uint64_t n) {
+  const auto cube = makeScene("half-annulus");
+  ArrayPiece all = hexahedraOf(*cube, n, n, n);
+  for (size_t p = 0; p < all.points.size(); ++p)
+    all.points[p] = glm::dvec3(static_cast<double>(p % (n + 1)), static_cast<double>(p / (n + 1) % (n + 1)),
+                               static_cast<double>(p / (n + 1) / (n + 1))) /
+                    static_cast<double>(n);
+  ArrayPiece out;
+  out.points = all.points;
+  for (size_t cell = 0; cell < all.cells.size(); ++cell) {
+    const auto c = all.cells.cornersOfCell(cell);
+    if (cell % 4 == 0) {
+      out.cells.append(CellKind::kWedge, std::array{c[0], c[1], c[2], c[4], c[5], c[6]});
+      out.cells.append(CellKind::kWedge, std::array{c[0], c[2], c[3], c[4], c[6], c[7]});
+    } else if (cell % 4 == 1) {
+      glm::dvec3 middle(0.0);
+      for (const uint64_t corner : c) middle += all.points[corner] / 8.0;
+      const uint64_t apex = out.points.size();
+      out.points.push_back(middle);
+      constexpr std::array<std::array<size_t, 4>, 6> kFaces{
+          {{0, 1, 2, 3}, {4, 7, 6, 5}, {0, 4, 5, 1}, {1, 5, 6, 2}, {2, 6, 7, 3}, {3, 7, 4, 0}}};
+      for (const auto& f : kFaces)
+        out.cells.append(CellKind::kPyramid, std::array{c[f[0]], c[f[1]], c[f[2]], c[f[3]], apex});
+    } else if (cell % 4 == 2) {
+      std::vector<uint64_t> stream;
+      const auto faces = facesOf(CellKind::kHexahedron, {});
+      for (size_t at = 0; at < faces.size(); at += faces[at] + size_t{1}) {
+        stream.push_back(faces[at]);
+        for (const uint32_t place : faces.subspan(at + 1, faces[at])) stream.push_back(c[place]);
+      }
+      EXPECT_TRUE(out.cells.appendPolyhedron(6, stream));
+    } else {
+      out.cells.append(CellKind::kHexahedron, c);
+    }
+  }
+  // Inner points move a little: the cache rounds weights, and equal ones all the same way.
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> shift(-0.1 / static_cast<double>(n), 0.1 / static_cast<double>(n));
+  for (glm::dvec3& point : out.points)
+    for (int axis = 0; axis < 3; ++axis)
+      if (point[axis] > 0 && point[axis] < 1) point[axis] += shift(random);
+  setValues(out, [](const glm::dvec3& x) { return 3 + x.x - 2 * x.y + 0.5 * x.z; });
+  return out;
+}
+
+TEST_F(MeshConvert, BytesAreTheSameForAnyThreadsAndMemory) {
+  const ArrayMesh meshes[] = {ArrayMesh({shuffled(tetrahedra_, 3)}), ArrayMesh({mixedCube(9)}),
+                              ArrayMesh(split(hexahedra_, 3, [](size_t cell) { return cell / 50 % 3; }))};
+  for (const ArrayMesh& mesh : meshes)
+    for (const uint32_t scalar : {0u, 1u}) {
+      const Files expected = filesOf(mesh, options(scalar));
+      ConvertOptions how = options(scalar);
+      how.threads = 1;
+      EXPECT_EQ(filesOf(mesh, how), expected) << "one thread";
+      for (const uint64_t bytes : {400'000u, 200'000u, 20'000u}) {
+        // Points that pieces share have to fit.
+        if (bytes < 100'000 && mesh.description().pieces.size() > 1) continue;
+        how.mesh_bytes = bytes;
+        EXPECT_EQ(filesOf(mesh, how), expected) << bytes << " bytes";
+      }
+      how.threads = 2;
+      EXPECT_EQ(filesOf(mesh, how), expected) << "two threads and little memory";
+    }
+}
+
+TEST_F(MeshConvert, WeightsSumToTheVolume) {
+  const ArrayMesh cube({mixedCube(10)});
+  for (const uint32_t scalar : {0u, 1u}) EXPECT_NEAR(run(cube, options(scalar)).volume, 1, 1e-4);
+  // The tetrahedra's own volume, which is less than the scene's.
+  double volume = 0;
+  for (size_t n = 0; n < tetrahedra_.cells.size(); ++n) {
+    const auto c = tetrahedra_.cells.cornersOfCell(n);
+    const auto at = [&](size_t corner) { return tetrahedra_.points[c[corner]]; };
+    volume += std::abs(glm::dot(at(1) - at(0), glm::cross(at(2) - at(0), at(3) - at(0)))) / 6;
+  }
+  const ArrayMesh mesh({tetrahedra_});
+  for (const uint32_t scalar : {0u, 1u}) EXPECT_NEAR(run(mesh, options(scalar)).volume / volume, 1, 1e-4);
+}
+
+TEST_F(MeshConvert, LinearFieldsAreExact) {
+  // Of every shape: the mean at the splat's middle, and the slope, are the field's.
+  for (const ArrayPiece& piece : {mixedCube(6), tetrahedra_}) {
+    ArrayPiece linear = piece;
+    const glm::dvec3 gradient(1, -2, 0.5);
+    setValues(linear, [&](const glm::dvec3& x) { return 3 + glm::dot(gradient, x); });
+    run(ArrayMesh({linear}), options(0));
+    const CacheReader cache(folder_ / "mesh.splats");
+    for (uint32_t number = 0; number < cache.bricks().size(); ++number) {
+      if (!cache.bricks()[number].isLeaf()) continue;
+      SplatGeometry geometry;
+      SplatVariable values;
+      cache.readGeometry(number, geometry);
+      cache.readVariable(number, 0, values);
+      const glm::dvec3 corner = cache.manifest().root.cellMin(cache.bricks()[number].cell);
+      for (size_t n = 0; n < geometry.size(); ++n) {
+        const glm::dvec3 x = corner + glm::dvec3(geometry.x[n], geometry.y[n], geometry.z[n]);
+        EXPECT_NEAR(values.mean[n], 3 + glm::dot(gradient, x), 2e-3);
+      }
+    }
+  }
+}
+
+TEST_F(MeshConvert, BlankedPointsTakeTheirCellsAlong) {
+  ArrayPiece piece = hexahedra_;
+  const uint64_t corner = piece.cells.cornersOfCell(0)[0];  // of one cell only
+  const double whole = run(ArrayMesh({piece}), options(0)).volume;
+  const double whole_cells = run(ArrayMesh({piece}), options(1)).volume;
+  piece.point_values[corner] = std::numeric_limits<float>::quiet_NaN();
+  ConvertReport report = run(ArrayMesh({piece}), options(0));
+  EXPECT_EQ(report.blanked.not_finite, 1u);
+  EXPECT_EQ(report.splats, piece.points.size() - 1);
+  EXPECT_LT(report.volume, whole);
+  piece.point_values[corner] = -99;
+  ConvertOptions how = options(0);
+  how.blank_value = -99;
+  report = run(ArrayMesh({piece}), how);
+  EXPECT_EQ(report.blanked.by_value, 1u);
+  const double by_value = report.volume;
+  piece.points[corner].y = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(run(ArrayMesh({piece}), options(0)).volume, by_value);
+  EXPECT_LT(run(ArrayMesh({piece}), options(1)).volume, whole_cells);
+  piece.cell_values[3] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(run(ArrayMesh({piece}), options(1)).blanked.not_finite, 1u);
+}
+
+TEST_F(MeshConvert, OddMeshesGetAWordAndNoCrash) {
+  // A point that no cell has, a cell with repeated corners, one without volume, one that is inside out.
+  ArrayPiece piece = hexahedra_;
+  piece.points.push_back({1e9, 0, 0});
+  const auto c = piece.cells.cornersOfCell(5);
+  const std::array<uint64_t, 8> corners{c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]};
+  piece.cells.append(CellKind::kHexahedron,
+                     std::array<uint64_t, 8>{corners[0], corners[0], corners[0], corners[0], corners[0],
+                                             corners[0], corners[0], corners[0]});
+  piece.cells.append(CellKind::kTetrahedron,
+                     std::array<uint64_t, 4>{corners[0], corners[1], corners[1], corners[2]});
+  setValues(piece, [&](const glm::dvec3& x) { return x.x; });
+  piece.point_values.back() = 1e30f;
+  for (const uint32_t scalar : {0u, 1u}) {
+    const ConvertReport report = run(ArrayMesh({piece}), options(scalar));
+    ASSERT_EQ(report.warnings.size(), 1u);
+    EXPECT_NE(report.warnings[0].find("1 of 1378 points belong to no solid cell"), std::string::npos)
+        << report.warnings[0];
+    EXPECT_NEAR(report.volume, run(ArrayMesh({hexahedra_}), options(scalar)).volume, 1e-3);
+    EXPECT_LT(CacheReader(folder_ / "mesh.splats").manifest().upper.x, 10);
+  }
+}
+
+TEST_F(MeshConvert, WrongNumbersGiveOneLine) {
+  ArrayPiece piece = hexahedra_;
+  piece.cells.corners[100] = piece.points.size();
+  const std::string error = errorOf(ArrayMesh({piece}), options(0));
+  EXPECT_NE(error.find("mesh: cell 12 refers to point 1377; expected 0 to 1376"), std::string::npos) << error;
+  EXPECT_EQ(error.find('\n'), std::string::npos);
+
+  ArrayPiece blank = hexahedra_;
+  for (float& value : blank.point_values) value = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_NE(errorOf(ArrayMesh({blank}), options(0)).find("there is nothing to draw"), std::string::npos);
+
+  ConvertOptions both = options(0);
+  both.scalars = {0, 1};
+  EXPECT_NE(errorOf(ArrayMesh({hexahedra_}), both).find("convert them to two caches"), std::string::npos);
+}
+
+TEST_F(MeshConvert, PiecesShareTheirPoints) {
+  const ArrayMesh parts(split(hexahedra_, 2, [](size_t cell) { return cell < 500 ? 0 : 1; }));
+  const ConvertReport report = run(parts, options(0));
+  EXPECT_EQ(report.splats, hexahedra_.points.size());
+  EXPECT_EQ(report.nodes, hexahedra_.points.size() + report.merged_nodes);
+  EXPECT_GT(report.merged_nodes, 0u);
+}
+
+}  // namespace
+}  // namespace curvisplat

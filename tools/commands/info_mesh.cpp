@@ -1,0 +1,183 @@
+#include "tools/commands/info_mesh.h"
+
+#include <fmt/format.h>
+#include <tbb/info.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "preprocess/convert/mesh_survey.h"
+#include "preprocess/convert/preflight.h"
+#include "preprocess/gather/mesh_reader.h"
+#include "tools/output/progress_bar.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kChunk = 65536;
+constexpr size_t kPiecesListed = 16;
+constexpr std::array<const char*, 6> kKinds{"other",  "tetrahedra", "pyramids",
+                                            "wedges", "hexahedra",  "polyhedra"};
+
+struct MeshInfo {
+  const GridDescription* description = nullptr;
+  uint64_t points = 0, cells = 0, splats = 0;
+  MeshSurvey survey;
+  std::vector<ScalarRange> ranges;  // [scalar]
+  unsigned threads = 1;
+  ConversionEstimate estimate;
+};
+
+void widen(ScalarRange& range, const std::vector<float>& values) {
+  for (const float value : values) {
+    if (!std::isfinite(value)) continue;
+    range.min = std::min<double>(range.min, value);
+    range.max = std::max<double>(range.max, value);
+  }
+}
+
+/// Ranges of the scalars of one centring.
+void measure(const MeshSource& source, Centring centring, MeshInfo& info) {
+  std::vector<uint32_t> scalars;
+  for (uint32_t n = 0; n < info.description->scalars.size(); ++n)
+    if (info.description->scalars[n].centring == centring) scalars.push_back(n);
+  if (scalars.empty()) return;
+  MeshPoints points;
+  MeshCells cells;
+  for (uint32_t piece = 0; piece < info.description->pieces.size(); ++piece) {
+    const MeshPiece& of = info.description->pieces[piece];
+    const bool nodes = centring == Centring::kNode;
+    const uint64_t samples = nodes ? of.points : of.cells;
+    for (uint64_t first = 0; first < samples; first += kChunk) {
+      const uint64_t count = std::min(kChunk, samples - first);
+      nodes ? source.readPoints(piece, first, count, scalars, points)
+            : source.readCells(piece, first, count, scalars, cells);
+      for (size_t n = 0; n < scalars.size(); ++n)
+        widen(info.ranges[scalars[n]], nodes ? points.scalars[n] : cells.scalars[n]);
+    }
+  }
+}
+
+MeshInfo inspect(const MeshSource& source) {
+  MeshInfo info;
+  info.description = &source.description();
+  info.ranges.resize(info.description->scalars.size());
+  const MeshReader reader(source, {}, std::nullopt);
+  info.points = reader.points();
+  info.cells = reader.cells();
+  Progress progress{progressBar()};
+  progress.begin("reading", info.points, "points");
+  info.survey = surveyMesh(reader, progress);
+  measure(source, Centring::kNode, info);
+  measure(source, Centring::kCell, info);
+  const bool by_cell =
+      !info.description->scalars.empty() && info.description->scalars.front().centring == Centring::kCell;
+  info.splats = by_cell ? info.survey.drawn_cells : info.points - info.survey.unused_points;
+  info.threads = static_cast<unsigned>(tbb::info::default_concurrency());
+  info.estimate = estimateConversion(info.splats, info.threads);
+  return info;
+}
+
+bool isEmpty(const ScalarRange& range) {
+  return range.min > range.max;
+}
+
+nlohmann::ordered_json asJson(const MeshInfo& info) {
+  const GridDescription& description = *info.description;
+  nlohmann::ordered_json json;
+  json["format"] = description.format;
+  json["files"] = description.files;
+  json["nodes"] = info.points;
+  json["unused_nodes"] = info.survey.unused_points;
+  json["coordinate_bytes"] = description.coordinate_bytes;
+  json["blanked"] = {{"by_grid", info.survey.grid.blanked.by_grid},
+                     {"not_finite", info.survey.grid.blanked.not_finite}};
+  json["cells"]["count"] = info.cells;
+  for (size_t kind = 0; kind < kKinds.size(); ++kind)
+    json["cells"][kKinds[kind]] = info.survey.cells_of[kind];
+  const glm::dvec3 lower = info.survey.grid.lower, upper = info.survey.grid.upper;
+  json["bounds"] = {{"lower", {lower.x, lower.y, lower.z}}, {"upper", {upper.x, upper.y, upper.z}}};
+  json["pieces"] = nlohmann::ordered_json::array();
+  for (const MeshPiece& piece : description.pieces)
+    json["pieces"].push_back({{"name", piece.name}, {"nodes", piece.points}, {"cells", piece.cells}});
+  json["scalars"] = nlohmann::ordered_json::array();
+  for (size_t n = 0; n < info.ranges.size(); ++n) {
+    const GridScalar& of = description.scalars[n];
+    const bool empty = isEmpty(info.ranges[n]);
+    nlohmann::ordered_json scalar = {{"name", of.name}, {"min", nullptr}, {"max", nullptr}};
+    if (!empty) scalar["min"] = info.ranges[n].min;
+    if (!empty) scalar["max"] = info.ranges[n].max;
+    if (!of.unit.empty()) scalar["unit"] = of.unit;
+    scalar["centring"] = of.centring == Centring::kCell ? "cell" : "node";
+    json["scalars"].push_back(std::move(scalar));
+  }
+  json["times"] = description.times;
+  json["time_step"] = description.time_step;
+  json["estimate"] = {{"splats", info.splats},
+                      {"cache_bytes", info.estimate.cache_bytes},
+                      {"cache_bytes_per_further_scalar", info.estimate.bytes_per_further_scalar},
+                      {"seconds", info.estimate.seconds},
+                      {"threads", info.threads}};
+  json["notes"] = description.notes;
+  json["warnings"] = description.warnings;
+  return json;
+}
+
+void printAsText(const MeshInfo& info) {
+  const GridDescription& description = *info.description;
+  fmt::print("{}\n", description.format);
+  for (const std::string& warning : description.warnings) fmt::print("warning: {}\n", warning);
+  fmt::print("points    {} in {} piece{}; {} in no solid cell, {} blanked by the file, {} not finite\n",
+             info.points, description.pieces.size(), description.pieces.size() == 1 ? "" : "s",
+             info.survey.unused_points, info.survey.grid.blanked.by_grid,
+             info.survey.grid.blanked.not_finite);
+  std::string kinds;
+  for (size_t kind = 1; kind < kKinds.size(); ++kind)
+    if (info.survey.cells_of[kind] > 0)
+      kinds += fmt::format("{}{} {}", kinds.empty() ? "" : ", ", info.survey.cells_of[kind], kKinds[kind]);
+  fmt::print("cells     {}: {}\n", info.cells, kinds);
+  if (description.pieces.size() > 1) {
+    for (size_t n = 0; n < std::min(kPiecesListed, description.pieces.size()); ++n)
+      fmt::print("  {:<9} {} points, {} cells\n", description.pieces[n].name, description.pieces[n].points,
+                 description.pieces[n].cells);
+    if (description.pieces.size() > kPiecesListed)
+      fmt::print("  and {} more\n", description.pieces.size() - kPiecesListed);
+  }
+  for (int axis = 0; axis < 3; ++axis)
+    fmt::print("{}         {:.9g} .. {:.9g}\n", "xyz"[axis], info.survey.grid.lower[axis],
+               info.survey.grid.upper[axis]);
+  for (const std::string& note : description.notes) fmt::print("note      {}\n", note);
+  fmt::print("stored    coordinates in {} precision\n",
+             description.coordinate_bytes == 8 ? "double" : "single");
+  for (size_t n = 0; n < info.ranges.size(); ++n) {
+    const GridScalar& scalar = description.scalars[n];
+    const ScalarRange& range = info.ranges[n];
+    fmt::print("scalar    {}{}{}: {}\n", scalar.name,
+               scalar.unit.empty() ? "" : fmt::format(" [{}]", scalar.unit),
+               scalar.centring == Centring::kCell ? ", cell-centred" : "",
+               isEmpty(range) ? "no value" : fmt::format("{:.6g} .. {:.6g}", range.min, range.max));
+  }
+  const size_t steps = description.times.size();
+  if (steps > 1)
+    fmt::print("times     {} steps, {:.9g} .. {:.9g}; step {} was read\n", steps, description.times.front(),
+               description.times.back(), description.time_step);
+  fmt::print("estimate  a cache of about {:.1f} MiB with one scalar; about {:.1f} s on {} thread{}\n",
+             static_cast<double>(info.estimate.cache_bytes) / (1 << 20), info.estimate.seconds, info.threads,
+             info.threads == 1 ? "" : "s");
+}
+
+}  // namespace
+
+void printMeshInfo(const MeshSource& source, bool json) {
+  const MeshInfo info = inspect(source);
+  if (json)
+    fmt::print("{}\n", asJson(info).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  else
+    printAsText(info);
+}
+
+}  // namespace curvisplat
