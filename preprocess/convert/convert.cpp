@@ -28,6 +28,7 @@
 #include "stream/base/file.h"
 #include "stream/base/paths.h"
 #include "stream/cache/cache_writer.h"
+#include "stream/cache/faces_file.h"
 #include "stream/cache/manifest.h"
 #include "stream/cache/partial_folder.h"
 
@@ -87,14 +88,13 @@ class Conversion {
     const Pass take_up_splats[] = {{"check", "bricks", 0, &Conversion::takeUpSplats}};
     const Pass build_cache[] = {
         {"build", "nodes", nodes_, &Conversion::build},
-        {"finish", "bricks", 0, &Conversion::finish},
     };
     checkRoom();
     if (workspace_.splats()) {
       try {
         runPasses(take_up_splats);
         runPasses(build_cache);
-        return std::move(report_);
+        return end();
       } catch (const LostBuckets&) {
         // The machine went down before all was on its disk. The bricks that are whole still count.
         forgetSplats();
@@ -102,7 +102,7 @@ class Conversion {
     }
     runPasses(scatter_grid);
     runPasses(build_cache);
-    return std::move(report_);
+    return end();
   }
 
   /// After run() has thrown: whether there is something to resume, which then stays.
@@ -127,6 +127,14 @@ class Conversion {
       malloc_trim(0);
     }
     progress_.end();
+  }
+
+  ConvertReport end() {
+    const Pass faces[] = {{"faces", "nodes", nodes_, &Conversion::writeFaces}};
+    const Pass finish[] = {{"finish", "bricks", 0, &Conversion::finish}};
+    if (options_.surfaces) runPasses(faces);
+    runPasses(finish);
+    return std::move(report_);
   }
 
   void scan() {
@@ -178,6 +186,20 @@ class Conversion {
     builder.build(*file_);
   }
 
+  void writeFaces() {
+    std::vector<uint32_t> numbers;
+    for (const VariableInfo& variable : variables()) numbers.push_back(variable.number);
+    const FacesJob job{workspace_.partial().path() / kFacesFileName,
+                       workspace_.scratch(),
+                       splats_.survey.lower,
+                       splats_.survey.upper,
+                       options_.planes,
+                       std::move(numbers),
+                       plan_.slab_bytes,
+                       plan_.seam_bytes};
+    if (auto info = writeGridFaces(reader_, job, progress_)) faces_file_ = std::move(info);
+  }
+
   void finish() {
     reportCache(writer_->finish(manifest()), report_);
     writer_.reset();
@@ -196,6 +218,9 @@ class Conversion {
       needs.temporary_bytes = 0;
     else if (reader_.centring() == Centring::kCell)
       needs.temporary_bytes = std::max(needs.temporary_bytes, needsOfFaces().disk_bytes);
+    if (options_.surfaces)
+      needs.temporary_bytes +=
+          temporaryBytesOfFaces(source_.description().blocks, options_.planes, options_.scalars.size());
     needs.cache_bytes -= std::min(needs.cache_bytes, workspace_.bytesInPartial());
     if (options_.check_disk_space) checkDiskSpace(needs, options_.output, temporaryFolder(options_));
   }
@@ -265,6 +290,7 @@ class Conversion {
     manifest.calendar = description.calendar;
     for (const VariableInfo& variable : manifest.variables) step.variables.push_back(variable.number);
     manifest.steps = {step};
+    if (faces_file_) manifest.files.push_back(*faces_file_);
     return manifest;
   }
 
@@ -282,6 +308,7 @@ class Conversion {
   std::unique_ptr<AbuttingFaces> faces_;  // of cells
   std::unique_ptr<SeamMerger> seams_;     // of nodes
   std::unique_ptr<CacheWriter> writer_;
+  std::optional<FileInfo> faces_file_;
   ConvertReport report_;
 };
 
@@ -310,6 +337,7 @@ ConvertReport convert(const GridSource& source, const ConvertOptions& options, P
       leastSlabBytes(source.description().blocks, options.scalars.size(), cells ? kCellHalo : kNodeHalo));
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
 
+  if (options.surfaces) checkPlanes(source.description(), options.planes);
   std::vector<ConversionFact> facts = factsOf(source.description(), options.scalars, options.blank_value);
   ConvertReport report;
   const std::filesystem::path manifest = options.output / "manifest.json";

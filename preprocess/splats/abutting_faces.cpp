@@ -39,7 +39,7 @@ AbuttingFaces::Needs AbuttingFaces::needsOf(std::span<const GridBlock> blocks) {
   uint64_t faces = 0;
   for (const GridBlock& block : blocks)
     for (const size_t axis : {0u, 1u, 2u}) faces += 2 * facesOfSide(cellsOf(block), axis);
-  return {faces / 8, faces * SeamSorter::recordBytes(0)};
+  return {faces / 4, faces * SeamSorter::recordBytes(0)};
 }
 
 AbuttingFaces::AbuttingFaces(std::span<const GridBlock> blocks, int coordinate_bytes, uint64_t memory_bytes,
@@ -50,10 +50,13 @@ AbuttingFaces::AbuttingFaces(std::span<const GridBlock> blocks, int coordinate_b
     Block& added = blocks_.emplace_back(Block{cellsOf(block), {}});
     for (const size_t axis : {0u, 1u, 2u}) {
       added.first_face[axis] = faces;
-      faces += 2 * facesOfSide(added.cells, axis);
+      const uint64_t of_side = facesOfSide(added.cells, axis);
+      sides_.insert(sides_.end(), {faces, faces + of_side});
+      faces += 2 * of_side;
     }
   }
   abutting_.resize(faces);
+  folded_.resize(faces);
 }
 
 bool AbuttingFaces::isAtEnd(const CellFace& face) const {
@@ -109,7 +112,17 @@ void AbuttingFaces::match(const Progress& progress) {
   centres_.forEachSet(coordinate_bytes_, [&](std::span<const uint64_t> faces) {
     progress.throwIfStopped();
     for (const uint64_t face : faces) abutting_[face] = true;
+    noteFolds(faces);
   });
+}
+
+void AbuttingFaces::noteFolds(std::span<const uint64_t> faces) {
+  const auto side_of = [&](uint64_t face) {
+    return std::upper_bound(sides_.begin(), sides_.end(), face) - sides_.begin();
+  };
+  for (size_t n = 1; n < faces.size(); ++n)
+    for (size_t other = 0; other < n; ++other)
+      if (side_of(faces[n]) == side_of(faces[other])) folded_[faces[n]] = folded_[faces[other]] = true;
 }
 
 }  // namespace curvisplat

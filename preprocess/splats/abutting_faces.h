@@ -60,9 +60,13 @@ class AbuttingFaces {
   void match(const Progress& progress);
   /// Of a face at its block's end, after match(). Any thread.
   bool abuts(const CellFace& face) const { return abutting_[numberOf(face)]; }
+  /// Whether the side of a block that has the face abuts on itself there: a cut behind a body, or a body without
+  /// thickness. After match(). Any thread.
+  bool folds(const CellFace& face) const { return folded_[numberOf(face)]; }
 
  private:
   uint64_t numberOf(const CellFace& face) const;
+  void noteFolds(std::span<const uint64_t> faces);
 
   struct Block {
     std::array<uint64_t, 3> cells;
@@ -71,7 +75,8 @@ class AbuttingFaces {
   std::vector<Block> blocks_;
   int coordinate_bytes_;
   SeamMerger centres_;
-  std::vector<bool> abutting_;  // [face at a block's end]
+  std::vector<bool> abutting_, folded_;  // [face at a block's end]
+  std::vector<uint64_t> sides_;          // the first face of every side
 };
 
 }  // namespace curvisplat

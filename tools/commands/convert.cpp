@@ -92,6 +92,7 @@ void runConvert(ConvertArguments arguments) {
   options.overwrite = arguments.overwrite;
   options.resume = arguments.resume;
   applyCommonOptions(arguments, options);
+  applySurfaceOptions(arguments, options);
 
   const auto source = openSource(arguments, arguments.output);
   options.scalars = chooseScalars(arguments, arguments.scalars, source->description());
@@ -177,6 +178,15 @@ void addConvert(CLI::App& app) {
                     "Resume an interrupted conversion if there is one; keep finished work on an error");
   command->add_flag("--overwrite", arguments->overwrite,
                     "Replace an existing cache; discard an interrupted conversion unless --resume is given");
+  command
+      ->add_option(
+          "--surface", arguments->planes,
+          "Index plane to keep as a surface besides the outer faces: k=10 or \"block 1:k=10\", indices "
+          "from 0; repeatable")
+      ->take_all()
+      ->allow_extra_args(false);
+  command->add_flag("--no-surfaces", arguments->no_surfaces,
+                    "Leave the grid's outer faces out of the cache: render --surface kmin needs them");
   command->add_option("--stats", arguments->statistics, "Write times, bytes and counts to this JSON file");
   addGridOptions(*command, arguments->grid);
   addGasOptions(*command, arguments->gas);

@@ -133,6 +133,8 @@ bool isEmpty(const Image& image, const glm::vec4& background) {
 
 std::vector<std::string> whyEmpty(const RenderedScene& scene) {
   std::vector<std::string> reasons;
+  if (scene.options.scene && !scene.options.scene->drawsSplats())
+    return {"no surface or slice is in sight, and --volume is off; try --view iso or another camera"};
   const double largest = largestExtinction(scene.transfer_function, scene.variable.min, scene.variable.max);
   if (largest == 0) reasons.push_back(whyTransparent(scene));
 
@@ -169,6 +171,13 @@ std::string poorPictureWarning(const Image& image, const RenderedScene& scene,
   constexpr double kMinSeen = 0.005, kMinOther = 0.1;  // of the picture; of what is seen
   const PictureContrast contrast = contrastOf(image, scene.options.background);
   const bool blank = contrast.seen < kMinSeen;
+  // Surfaces and slices have a colour of their own, which no option for the volume changes.
+  if (const auto& layers = scene.options.scene; layers && !layers->empty())
+    return blank ? fmt::format(
+                       "the picture is nearly blank: {:.2g} % of its pixels differ visibly from the "
+                       "background; try --view iso, or another --surface or --slice",
+                       100 * contrast.seen)
+                 : "";
   if (!blank && contrast.other >= kMinOther * contrast.seen) return {};
   const std::string what =
       blank ? fmt::format("nearly blank: {:.2g} % of its pixels differ visibly from the background",
