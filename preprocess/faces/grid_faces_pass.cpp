@@ -72,6 +72,7 @@ class FacesPass {
 
   std::optional<FileInfo> write() {
     spool_.fill(job_.slab_bytes, abutting_, progress_);
+    abutting_.keepFolds();
     abutting_.match(progress_);
     const std::vector<FaceRegion> all_regions = regionsOf(grid_, spool_.faces());
     FacesWriter writer(job_.output, spool_.box(), job_.variables);
@@ -94,7 +95,7 @@ class FacesPass {
 
  private:
   uint64_t sortBytes() const {
-    const uint64_t needs = AbuttingFaces::needsOf(grid_.blocks).memory_bytes;
+    const uint64_t needs = 2 * AbuttingFaces::needsOf(grid_.blocks).memory_bytes;
     if (2 * needs > job_.sort_bytes)
       throw Error("--memory: the faces of so many blocks take {} MiB; give more, or --no-surfaces",
                   (2 * needs >> 20) + 1);

@@ -39,7 +39,7 @@ AbuttingFaces::Needs AbuttingFaces::needsOf(std::span<const GridBlock> blocks) {
   uint64_t faces = 0;
   for (const GridBlock& block : blocks)
     for (const size_t axis : {0u, 1u, 2u}) faces += 2 * facesOfSide(cellsOf(block), axis);
-  return {faces / 4, faces * SeamSorter::recordBytes(0)};
+  return {faces / 8, faces * SeamSorter::recordBytes(0)};
 }
 
 AbuttingFaces::AbuttingFaces(std::span<const GridBlock> blocks, int coordinate_bytes, uint64_t memory_bytes,
@@ -56,7 +56,6 @@ AbuttingFaces::AbuttingFaces(std::span<const GridBlock> blocks, int coordinate_b
     }
   }
   abutting_.resize(faces);
-  folded_.resize(faces);
 }
 
 bool AbuttingFaces::isAtEnd(const CellFace& face) const {
@@ -112,7 +111,7 @@ void AbuttingFaces::match(const Progress& progress) {
   centres_.forEachSet(coordinate_bytes_, [&](std::span<const uint64_t> faces) {
     progress.throwIfStopped();
     for (const uint64_t face : faces) abutting_[face] = true;
-    noteFolds(faces);
+    if (!folded_.empty()) noteFolds(faces);
   });
 }
 

@@ -53,6 +53,9 @@ class AbuttingFaces {
   /// Of a face at its block's end; `corners` of its cell, as Hexahedron takes them. Any thread.
   Centre centreOf(const CellFace& face, const std::array<glm::dvec3, 8>& corners) const;
 
+  /// Before match(): notes which faces fold(). Takes its Needs' memory once more.
+  void keepFolds() { folded_.resize(abutting_.size()); }
+
   /// Of cells that are there. One thread at a time. Throws Error if the disk fails.
   void add(std::span<const Centre> centres);
   /// After the last add(): finds those that abut. Throws Error if the disk fails, Interrupted if a stop is
@@ -61,7 +64,7 @@ class AbuttingFaces {
   /// Of a face at its block's end, after match(). Any thread.
   bool abuts(const CellFace& face) const { return abutting_[numberOf(face)]; }
   /// Whether the side of a block that has the face abuts on itself there: a cut behind a body, or a body without
-  /// thickness. After match(). Any thread.
+  /// thickness. After keepFolds() and match(). Any thread.
   bool folds(const CellFace& face) const { return folded_[numberOf(face)]; }
 
  private:

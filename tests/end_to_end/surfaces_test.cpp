@@ -118,6 +118,16 @@ TEST_F(SurfaceOptions, VolumeOffLeavesSurfacesAndSlices) {
   EXPECT_GT(statistics()["bytes_read"], 0);
 }
 
+/// A surface that fills the picture with one colour is what was asked for: no option of the volume changes it.
+TEST_F(SurfaceOptions, WarningsDoNotSpeakOfTheVolume) {
+  const ProgramResult wall = render({"--view", "+z", "--surface", file("wall.obj")});
+  EXPECT_EQ(wall.err.find("warning"), std::string::npos) << wall.err;
+  const ProgramResult nothing =
+      render({"--volume", "off", "--surface", file("sphere.obj"), "--focal-point", "900,0,0"});
+  EXPECT_NE(nothing.err.find("no surface or slice is in sight"), std::string::npos) << nothing.err;
+  EXPECT_EQ(nothing.err.find("transfer function"), std::string::npos) << nothing.err;
+}
+
 TEST_F(SurfaceOptions, WarnsOfASliceThatMisses) {
   const ProgramResult result = render({"--slice", "0,0,900,0,0,1"});
   EXPECT_EQ(result.status, 0);

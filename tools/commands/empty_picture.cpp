@@ -169,15 +169,10 @@ std::vector<std::string> whyEmpty(const RenderedScene& scene) {
 std::string poorPictureWarning(const Image& image, const RenderedScene& scene,
                                const std::string& function_options) {
   constexpr double kMinSeen = 0.005, kMinOther = 0.1;  // of the picture; of what is seen
+  // Surfaces and slices have a colour of their own, which no option for the volume changes.
+  if (scene.options.scene && !scene.options.scene->empty()) return {};
   const PictureContrast contrast = contrastOf(image, scene.options.background);
   const bool blank = contrast.seen < kMinSeen;
-  // Surfaces and slices have a colour of their own, which no option for the volume changes.
-  if (const auto& layers = scene.options.scene; layers && !layers->empty())
-    return blank ? fmt::format(
-                       "the picture is nearly blank: {:.2g} % of its pixels differ visibly from the "
-                       "background; try --view iso, or another --surface or --slice",
-                       100 * contrast.seen)
-                 : "";
   if (!blank && contrast.other >= kMinOther * contrast.seen) return {};
   const std::string what =
       blank ? fmt::format("nearly blank: {:.2g} % of its pixels differ visibly from the background",
