@@ -113,9 +113,14 @@ void FaceSpool::take(const LoadedSlab& loaded, size_t number) {
     const double steps = std::nearbyint((at - box_.lower[axis]) / box_.step[axis]);
     return static_cast<uint32_t>(std::clamp(steps, 0.0, double{FaceBox::kSteps}));
   };
+  // Rows that follow one another in the file are written at once.
+  const auto is_last = [&](const LatticeBox& box, uint64_t v) {
+    return v + 1 == box.end[1] || box.first[0] > 0 || box.end[0] < face.nodes[0];
+  };
   const LatticeBox part(face, size, loaded.slab.box, face.index);
+  uint64_t first = 0;
   for (uint64_t v = part.first[1]; !part.empty && v < part.end[1]; ++v) {
-    codes.clear();
+    if (codes.empty()) first = v * face.nodes[0] + part.first[0];
     for (uint64_t u = part.first[0]; u < part.end[0]; ++u) {
       const size_t at = placeIn(loaded, size[0], nodeAt(face, face.index, u, v));
       if (isThere(nodes, at, of_cells))
@@ -123,15 +128,16 @@ void FaceSpool::take(const LoadedSlab& loaded, size_t number) {
       else
         codes.push_back({LatticeRow::kNone, 0, 0});
     }
-    out_.writeAt(places_[number].positions + (v * face.nodes[0] + part.first[0]) * kPositionBytes,
-                 std::as_bytes(std::span(codes)));
+    if (!is_last(part, v)) continue;
+    out_.writeAt(places_[number].positions + first * kPositionBytes, std::as_bytes(std::span(codes)));
+    codes.clear();
   }
   if (scalars() == 0) return;
   const uint64_t layer = of_cells ? layerOfCells(face, size) : face.index;
   const LatticeBox of_values(face, size, loaded.slab.box, layer);
   const size_t plane_stride = size[0] * (loaded.slab.window.j1 - loaded.slab.window.j0);
   for (uint64_t v = of_values.first[1]; !of_values.empty && v < of_values.end[1]; ++v) {
-    values.clear();
+    if (values.empty()) first = v * face.nodes[0] + of_values.first[0];
     for (uint64_t u = of_values.first[0]; u < of_values.end[0]; ++u) {
       const Node node = nodeAt(face, layer, u, v);
       const size_t at = placeIn(loaded, size[0], node);
@@ -140,9 +146,10 @@ void FaceSpool::take(const LoadedSlab& loaded, size_t number) {
       const bool none = of_cells && !(has_cell && cellIsThere(nodes, at, size[0], plane_stride));
       for (const std::vector<float>& scalar : nodes.scalars) values.push_back(none ? NAN : scalar[at]);
     }
-    const uint64_t first = v * face.nodes[0] + of_values.first[0];
+    if (!is_last(of_values, v)) continue;
     out_.writeAt(places_[number].scalars + first * scalars() * sizeof(float),
                  std::as_bytes(std::span(values)));
+    values.clear();
   }
 }
 
