@@ -5,7 +5,7 @@
 
 Each size of the scene is generated in FOLDER and converted --conversions times. Caches and the measurements of their
 conversions are kept there and reused, unless --again is given; grids are deleted. A conversion needs 16 bytes a node for the
-grid and 61 for temporary files. Then each cache is drawn --repeats times with each error of --lod-pixels.
+grid and 67 for temporary files. Then each cache is drawn --repeats times with each error of --lod-pixels.
 
 "cached" is the part of the grid's files that is in the page cache when a conversion starts, by mincore: they were just
 written. A cache's files are evicted from the page cache before it is drawn ("cold", checked with mincore), the program's own

@@ -179,12 +179,15 @@ void CellBuilder::State::unpack(const Cell& cell, const RecordSpan& records, Bri
   brick.positions.resize(records.size());
   brick.splats.resize(records.size());
   brick.border_codes.resize(records.size());
+  brick.growth_codes.resize(records.size());
   brick.variables.resize(variables);
   for (auto& values : brick.variables) values.resize(records.size());
   std::vector<SplatScalar> values(variables);
   for (size_t n = 0; n < records.size(); ++n) {
     brick.positions[n] = recordPosition(records[n]);
-    brick.border_codes[n] = unpackRecord(records[n], brick.splats[n], values);
+    const SplatCodes codes = unpackRecord(records[n], brick.splats[n], values);
+    brick.border_codes[n] = codes.border;
+    brick.growth_codes[n] = codes.growth;
     for (size_t variable = 0; variable < variables; ++variable)
       brick.variables[variable][n] = values[variable];
     addToRuns(recordNode(records[n]), brick.runs);

@@ -12,18 +12,15 @@
 #include "preprocess/convert/build_octree.h"
 #include "preprocess/convert/conversion_workspace.h"
 #include "preprocess/convert/counting_grid.h"
+#include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/plan_buckets.h"
 #include "preprocess/convert/preflight.h"
 #include "preprocess/convert/scan.h"
 #include "preprocess/convert/scatter.h"
 #include "preprocess/convert/scattered_splats.h"
+#include "preprocess/convert/splat_origin.h"
 #include "preprocess/convert/splat_record.h"
-#include "preprocess/grid/node_reader.h"
-#include "preprocess/grid/slabs.h"
-#include "preprocess/splats/abutting_faces.h"
-#include "preprocess/splats/seams.h"
-#include "preprocess/survey/block_overlap.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/paths.h"
@@ -35,11 +32,11 @@
 namespace curvisplat {
 namespace {
 
-uint64_t nodesOf(const GridDescription& description) {
+uint64_t nodesOf(const SplatOrigin& origin) {
   uint64_t nodes = 0;
-  for (const GridBlock& block : description.blocks) nodes += block.nodes();
+  for (const GridBlock& block : origin.blocks()) nodes += block.nodes();
   if (nodes >= kMaxNodes)
-    throw Error("{}: has {} nodes; the most that can be converted are {}", description.format, nodes,
+    throw Error("{}: has {} nodes; the most that can be converted are {}", origin.description().format, nodes,
                 kMaxNodes - 1);
   return nodes;
 }
@@ -69,14 +66,14 @@ class Conversion {
  public:
   Conversion(const GridSource& source, const ConvertOptions& options, const MemoryPlan& plan,
              std::vector<ConversionFact> facts, Progress& progress)
-      : source_(source),
-        options_(options),
+      : options_(options),
         plan_(plan),
         progress_(progress),
-        reader_(source, options.scalars, options.blank_value),
-        nodes_(nodesOf(source.description())),
         workspace_(options.output, options.overwrite, unfinishedOf(options), temporaryFolder(options),
-                   std::move(facts)) {}
+                   std::move(facts)),
+        origin_(std::make_unique<GridOrigin>(source, options.scalars, options.blank_value, plan,
+                                             workspace_.scratch())),
+        nodes_(nodesOf(*origin_)) {}
 
   ConvertReport run() {
     const Pass scatter_grid[] = {
@@ -138,35 +135,27 @@ class Conversion {
   }
 
   void scan() {
-    if (reader_.centring() == Centring::kCell) openFaces();
-    splats_.survey = surveyGrid(reader_, plan_.slab_bytes, faces_.get(), progress_);
-    if (faces_) faces_->match(progress_);
-    checkRanges(splats_.survey, source_.description(), options_.scalars);
+    splats_.survey = origin_->survey(progress_);
+    checkRanges(splats_.survey, origin_->description(), options_.scalars);
     openWriter();
-    const std::vector<BlockOverlap> overlaps = findOverlaps(source_, plan_.slab_bytes, progress_);
-    if (!overlaps.empty()) report_.warnings.push_back(overlapWarning(source_.description(), overlaps));
+    for (std::string& warning : origin_->warnings(progress_)) report_.warnings.push_back(std::move(warning));
   }
 
   void count() {
     CountingGrid counts(countingLevel(nodes_), plan_.counting_bytes);
-    countNodes(source_, root_, plan_.slab_bytes, counts, progress_);
+    origin_->count(root_, counts, progress_);
     counts.close();
     const uint32_t buckets = planBuckets(counts, plan_, splats_.tree);
     file_ = std::make_unique<BucketFile>(workspace_.splatsFile(), buckets, plan_.chunkBytes(buckets));
     contents_.resize(splats_.tree.size());
   }
 
-  void scatter() {
-    seams_ = std::make_unique<SeamMerger>(options_.scalars.size(), plan_.seam_bytes, workspace_.scratch());
-    splats_.counts = scatterSplats(reader_, faces_.get(), root_, plan_.slab_bytes, splats_.tree, *file_,
-                                   contents_, *seams_, progress_);
-    faces_.reset();
-  }
+  SplatTarget target() { return {root_, &splats_.tree, file_.get(), &contents_}; }
+
+  void scatter() { splats_.counts = scatterSplats(*origin_, target(), progress_); }
 
   void mergeSeams() {
-    splats_.merged_nodes = scatterSeams(*seams_, source_.description().coordinate_bytes, root_, splats_.tree,
-                                        *file_, contents_, progress_);
-    seams_.reset();
+    splats_.merged_nodes = scatterRest(*origin_, target(), progress_);
     file_->close();
     splats_.buckets = file_->chains();
     splats_.tree.setContents(splats_.tree.leavesBelow(0), contents_);
@@ -181,8 +170,8 @@ class Conversion {
   }
 
   void build() {
-    OctreeBuilder builder(root_, source_.description().blocks, options_.scalars.size(), plan_, splats_.tree,
-                          *writer_, workspace_.scratch(), progress_);
+    OctreeBuilder builder(root_, origin_->blocks(), options_.scalars.size(), plan_, splats_.tree, *writer_,
+                          workspace_.scratch(), progress_);
     builder.build(*file_);
   }
 
@@ -197,7 +186,7 @@ class Conversion {
                        std::move(numbers),
                        plan_.slab_bytes,
                        plan_.seam_bytes};
-    if (auto info = writeGridFaces(reader_, job, progress_)) faces_file_ = std::move(info);
+    faces_file_ = origin_->writeFaces(job, progress_);
   }
 
   void finish() {
@@ -216,29 +205,13 @@ class Conversion {
     DiskNeeds needs = diskNeeds(nodes_, options_.scalars.size());
     if (workspace_.splats())
       needs.temporary_bytes = 0;
-    else if (reader_.centring() == Centring::kCell)
-      needs.temporary_bytes = std::max(needs.temporary_bytes, needsOfFaces().disk_bytes);
+    else
+      needs.temporary_bytes = std::max(needs.temporary_bytes, origin_->temporaryBytes());
     if (options_.surfaces)
       needs.temporary_bytes +=
-          temporaryBytesOfFaces(source_.description().blocks, options_.planes, options_.scalars.size());
+          temporaryBytesOfFaces(origin_->blocks(), options_.planes, options_.scalars.size());
     needs.cache_bytes -= std::min(needs.cache_bytes, workspace_.bytesInPartial());
     if (options_.check_disk_space) checkDiskSpace(needs, options_.output, temporaryFolder(options_));
-  }
-
-  AbuttingFaces::Needs needsOfFaces() const {
-    const AbuttingFaces::Needs needs = AbuttingFaces::needsOf(source_.description().blocks);
-    if (2 * needs.memory_bytes > plan_.seam_bytes)
-      throw Error("--memory: the ends of so many blocks of cells take {} MiB; give at least {} MiB",
-                  (needs.memory_bytes >> 20) + 1,
-                  (MemoryPlan::capForSeams(2 * needs.memory_bytes) >> 20) + 1);
-    return needs;
-  }
-
-  void openFaces() {
-    const GridDescription& grid = source_.description();
-    faces_ =
-        std::make_unique<AbuttingFaces>(grid.blocks, grid.coordinate_bytes,
-                                        plan_.seam_bytes - needsOfFaces().memory_bytes, workspace_.scratch());
   }
 
   /// Needs the survey.
@@ -258,7 +231,7 @@ class Conversion {
   std::vector<VariableInfo> variables() const {
     std::vector<VariableInfo> variables;
     for (size_t n = 0; n < options_.scalars.size(); ++n) {
-      const GridScalar& scalar = source_.description().scalars[options_.scalars[n]];
+      const GridScalar& scalar = origin_->description().scalars[options_.scalars[n]];
       variables.push_back({static_cast<uint32_t>(n), scalar.name, scalar.unit, splats_.survey.ranges[n].min,
                            splats_.survey.ranges[n].max});
     }
@@ -266,7 +239,7 @@ class Conversion {
   }
 
   Manifest manifest() const {
-    const GridDescription& description = source_.description();
+    const GridDescription& description = origin_->description();
     Manifest manifest;
     manifest.title = options_.title.empty() ? options_.output.filename().string() : options_.title;
     manifest.program = "curvisplat " CURVISPLAT_VERSION;
@@ -275,10 +248,10 @@ class Conversion {
     if (options_.blank_value) manifest.reader += fmt::format(", blank value {}", *options_.blank_value);
     manifest.lower = splats_.survey.lower;
     manifest.upper = splats_.survey.upper;
-    for (const GridBlock& block : description.blocks)
+    for (const GridBlock& block : origin_->blocks())
       manifest.blocks.push_back({block.name, block.ni, block.nj, block.nk});
-    manifest.requirements = {kBorderFaces};
-    manifest.cells = reader_.centring() == Centring::kCell;
+    manifest.requirements = {kBorderFaces, kCellGrowth};
+    manifest.cells = origin_->centring() == Centring::kCell;
     manifest.nodes = splats_.survey.nodes;
     manifest.blanked_nodes = splats_.survey.blanked.total();
     manifest.grid_checksum = splats_.survey.grid_checksum;
@@ -294,19 +267,16 @@ class Conversion {
     return manifest;
   }
 
-  const GridSource& source_;
   const ConvertOptions& options_;
   const MemoryPlan plan_;
   Progress& progress_;
-  const NodeReader reader_;
-  const uint64_t nodes_;
   ConversionWorkspace workspace_;  // before what has files in it
+  std::unique_ptr<SplatOrigin> origin_;
+  const uint64_t nodes_;
   ScatteredSplats splats_;
   RootCube root_;
   std::vector<CellContents> contents_;  // [node of the tree], while they are being scattered
   std::unique_ptr<BucketFile> file_;
-  std::unique_ptr<AbuttingFaces> faces_;  // of cells
-  std::unique_ptr<SeamMerger> seams_;     // of nodes
   std::unique_ptr<CacheWriter> writer_;
   std::optional<FileInfo> faces_file_;
   ConvertReport report_;
@@ -332,9 +302,7 @@ ConvertReport runOrLeave(Conversion& conversion, const ConvertOptions& options) 
 
 ConvertReport convert(const GridSource& source, const ConvertOptions& options, Progress& progress) {
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
-  const bool cells = NodeReader(source, options.scalars, options.blank_value).centring() == Centring::kCell;
-  plan.requireSlabs(
-      leastSlabBytes(source.description().blocks, options.scalars.size(), cells ? kCellHalo : kNodeHalo));
+  GridOrigin::requireMemory(source, options.scalars, plan);
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
 
   if (options.surfaces) checkPlanes(source.description(), options.planes);

@@ -23,8 +23,8 @@ struct Handedness {
 /// Makes splats of slabs.
 class SplatStream {
  public:
-  SplatStream(const NodeReader& reader, const AbuttingFaces* faces,
-              const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams, const Progress& progress)
+  SplatStream(const NodeReader& reader, const AbuttingFaces* faces, const SinkOfThread& sink_of_thread,
+              SeamMerger& seams, const Progress& progress)
       : progress_(&progress),
         blocks_(&reader.source().description().blocks),
         variables_(reader.scalars()),
@@ -103,7 +103,7 @@ class SplatStream {
   const size_t variables_;
   const Centring centring_;
   const AbuttingFaces* faces_;
-  const std::function<SplatSink&()>* sink_of_thread_;
+  const SinkOfThread* sink_of_thread_;
   Mutex adding_to_seams_;
   SeamMerger* seams_ PT_GUARDED_BY(adding_to_seams_);
   tbb::enumerable_thread_specific<Worker> workers_;
@@ -112,8 +112,8 @@ class SplatStream {
 /// Packs splats and routes their records. One a thread.
 class RecordSink : public SplatSink {
  public:
-  RecordSink(const RootCube& root, const BucketTree& tree, BucketFile& file)
-      : root_(root), router_(tree, file) {}
+  explicit RecordSink(const SplatTarget& target)
+      : root_(target.root), router_(*target.tree, *target.file), contents_(target.contents) {}
 
   void add(const NodeSplat& splat, std::span<const SplatScalar> values) override {
     const RootPosition position = root_.fromWorld(splat.splat.position);
@@ -122,15 +122,16 @@ class RecordSink : public SplatSink {
     router_.add(record_, position);
   }
 
-  /// Sends what is gathered, and adds what was sent to `contents`.
-  void finish(std::vector<CellContents>& contents) {
+  /// Sends what is gathered, and adds what was sent to the contents.
+  void finish() {
     router_.flush();
-    for (size_t node = 0; node < contents.size(); ++node) contents[node].add(router_.contents()[node]);
+    for (size_t node = 0; node < contents_->size(); ++node) (*contents_)[node].add(router_.contents()[node]);
   }
 
  private:
   const RootCube root_;
   RecordRouter router_;
+  std::vector<CellContents>* contents_;
   std::vector<std::byte> record_;
 };
 
@@ -153,8 +154,7 @@ void RecordRouter::flush() {
 }
 
 ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces, uint64_t slab_bytes,
-                           const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams,
-                           const SlabPass& pass) {
+                           const SinkOfThread& sink_of_thread, SeamMerger& seams, const SlabPass& pass) {
   SplatStream splats(reader, faces, sink_of_thread, seams, pass.progress);
   SlabStream slabs(reader, slab_bytes,
                    reader.centring() == Centring::kCell ? kCellSplatHalo : kNodeSplatHalo);
@@ -167,25 +167,17 @@ ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces,
   return splats.counts();
 }
 
-ScatterCounts scatterSplats(const NodeReader& reader, const AbuttingFaces* faces, const RootCube& root,
-                            uint64_t slab_bytes, const BucketTree& tree, BucketFile& file,
-                            std::vector<CellContents>& contents, SeamMerger& seams, Progress& progress) {
-  tbb::enumerable_thread_specific<RecordSink> sinks([&] { return RecordSink(root, tree, file); });
-  const ScatterCounts counts = streamSplats(
-      reader, faces, slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, seams, progress);
-  for (RecordSink& sink : sinks) sink.finish(contents);
+ScatterCounts scatterSplats(SplatOrigin& origin, const SplatTarget& target, Progress& progress) {
+  tbb::enumerable_thread_specific<RecordSink> sinks([&] { return RecordSink(target); });
+  const ScatterCounts counts = origin.scatter([&]() -> SplatSink& { return sinks.local(); }, progress);
+  for (RecordSink& sink : sinks) sink.finish();
   return counts;
 }
 
-uint64_t scatterSeams(SeamMerger& seams, int coordinate_bytes, const RootCube& root, const BucketTree& tree,
-                      BucketFile& file, std::vector<CellContents>& contents, Progress& progress) {
-  RecordSink sink(root, tree, file);
-  const uint64_t merged =
-      seams.finish(coordinate_bytes, [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
-        sink.add(splat, values);
-        progress.advance(1);
-      });
-  sink.finish(contents);
+uint64_t scatterRest(SplatOrigin& origin, const SplatTarget& target, Progress& progress) {
+  RecordSink sink(target);
+  const uint64_t merged = origin.finish(sink, progress);
+  sink.finish();
   return merged;
 }
 

@@ -1,5 +1,5 @@
-// The pass that makes splats: reads the grid once more, with a halo, and sends each splat to the bucket of
-// the cell that it lies in. Nodes of block faces go through the seam merger first.
+// The pass that makes splats and sends each to the bucket of the cell that it lies in. Of a structured grid it
+// reads the nodes once more, with a halo; those of block faces go through the seam merger first.
 #pragma once
 
 #include <cstddef>
@@ -11,6 +11,7 @@
 
 #include "preprocess/convert/bucket_file.h"
 #include "preprocess/convert/bucket_tree.h"
+#include "preprocess/convert/splat_origin.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/splats/abutting_faces.h"
@@ -41,19 +42,6 @@ class RecordRouter {
   std::vector<std::byte> gathered_;  // for the leaf's bucket
 };
 
-/// Where a pass sends its splats.
-class SplatSink {
- public:
-  virtual ~SplatSink() = default;
-  /// One value a scalar of the reader.
-  virtual void add(const NodeSplat& splat, std::span<const SplatScalar> values) = 0;
-};
-
-struct ScatterCounts {
-  uint64_t degenerate = 0;  // splats with a floored axis
-  uint64_t inverted = 0;    // cells of the handedness that fewer of their block's cells have
-};
-
 /// What a pass over a grid's slabs reports to.
 struct SlabPass {
   SlabPass(Progress& of_pass) : progress(of_pass) {}  // implicit: most passes report nothing else
@@ -69,16 +57,20 @@ struct SlabPass {
 /// to `seams`, the others to what `sink_of_thread` gives: a sink of the calling thread's own, always the same
 /// one. Cells end at borders as computeCellSplats() finds them with `faces`, which may be null.
 ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces, uint64_t slab_bytes,
-                           const std::function<SplatSink&()>& sink_of_thread, SeamMerger& seams,
-                           const SlabPass& pass);
+                           const SinkOfThread& sink_of_thread, SeamMerger& seams, const SlabPass& pass);
 
-/// Routes all splats but those of block faces, which go to `seams`. Adds to `contents` ([node of the tree]).
-ScatterCounts scatterSplats(const NodeReader& reader, const AbuttingFaces* faces, const RootCube& root,
-                            uint64_t slab_bytes, const BucketTree& tree, BucketFile& file,
-                            std::vector<CellContents>& contents, SeamMerger& seams, Progress& progress);
+/// The octree and the buckets that splats are routed to.
+struct SplatTarget {
+  RootCube root;
+  const BucketTree* tree = nullptr;
+  BucketFile* file = nullptr;
+  std::vector<CellContents>* contents = nullptr;  // [node of the tree]: what was routed is added
+};
 
-/// Routes the splats of block faces, merged. Returns how many nodes were merged into another one.
-uint64_t scatterSeams(SeamMerger& seams, int coordinate_bytes, const RootCube& root, const BucketTree& tree,
-                      BucketFile& file, std::vector<CellContents>& contents, Progress& progress);
+/// Routes all splats that the origin makes in scatter().
+ScatterCounts scatterSplats(SplatOrigin& origin, const SplatTarget& target, Progress& progress);
+
+/// Routes those that it makes in finish(). Returns how many samples were merged into another one.
+uint64_t scatterRest(SplatOrigin& origin, const SplatTarget& target, Progress& progress);
 
 }  // namespace curvisplat

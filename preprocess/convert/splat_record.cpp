@@ -67,6 +67,8 @@ void packRecord(const NodeSplat& in, std::span<const SplatScalar> values, const 
   const auto ratio_code = irregular ? uint16_t{0} : static_cast<uint16_t>(ratio * kRatioSteps + 0.5);
   std::memcpy(at, &ratio_code, sizeof ratio_code);
   at += sizeof ratio_code;
+  std::memcpy(at, &in.growth_code, sizeof in.growth_code);
+  at += sizeof in.growth_code;
   for (const SplatScalar& value : values) {
     putFloat(value.mean);
     for (int axis = 0; axis < 3; ++axis) putFloat(value.slope[axis]);
@@ -79,7 +81,7 @@ void packRecord(const NodeSplat& in, std::span<const SplatScalar> values, const 
   }
 }
 
-uint32_t unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScalar> values) {
+SplatCodes unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScalar> values) {
   const bool irregular = recordIsIrregular(record);
   const std::byte* at = record + 24;
   const auto takeFloat = [&at] {
@@ -98,6 +100,9 @@ uint32_t unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScal
   uint16_t ratio_code;
   std::memcpy(&ratio_code, at, sizeof ratio_code);
   at += sizeof ratio_code;
+  SplatCodes codes;
+  std::memcpy(&codes.growth, at, sizeof codes.growth);
+  at += sizeof codes.growth;
   for (SplatScalar& value : values) {
     value.mean = takeFloat();
     for (int axis = 0; axis < 3; ++axis) value.slope[axis] = takeFloat();
@@ -106,14 +111,13 @@ uint32_t unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScal
   splat.weight = product(splat.axis);
   if (!irregular) {
     splat.weight *= ratio_code / kRatioSteps;
-    return kNoBorder;
+    return codes;
   }
   splat.weight *= takeFloat();
-  uint32_t border_code;
-  std::memcpy(&border_code, at, sizeof border_code);
-  at += sizeof border_code;
+  std::memcpy(&codes.border, at, sizeof codes.border);
+  at += sizeof codes.border;
   for (SplatScalar& value : values) value.variance = takeFloat();
-  return border_code;
+  return codes;
 }
 
 }  // namespace curvisplat

@@ -1,4 +1,4 @@
-// A splat as conversion keeps it in temporary files and in a bucket's memory: 47 + 16 v bytes for v
+// A splat as conversion keeps it in temporary files and in a bucket's memory: 51 + 16 v bytes for v
 // variables, not aligned, in the machine's own byte order.
 //
 //    0   node number: 47 bits, and bit 47 says "irregular"     48 bits
@@ -6,9 +6,10 @@
 //   24   a0 a1 a2: floats > 0 without sign and last 7 bits     3 x 24 bits
 //   33   l10 l20 l21                                           3 x float
 //   45   weight / (a0 a1 a2), in steps of 2^-15                16 bits
-//   47   mean w0 w1 w2                                         4 x float a variable
+//   47   growth code                                           32 bits
+//   51   mean w0 w1 w2                                         4 x float a variable
 //        irregular: weight / (a0 a1 a2), in place of the above 1 x float
-//                   half cell                                  32 bits
+//                   border code                                32 bits
 //                   variance                                   1 x float a variable
 //
 // What is not stored of a regular splat (nearly all are) is known: its variances are 0 and its cell is whole.
@@ -36,7 +37,7 @@ namespace curvisplat {
 inline constexpr uint64_t kMaxNodes = uint64_t{1} << 47;
 
 inline constexpr size_t regularRecordBytes(size_t variables) {
-  return 47 + 16 * variables;
+  return 51 + 16 * variables;
 }
 inline constexpr size_t irregularRecordBytes(size_t variables) {
   return regularRecordBytes(variables) + 8 + 4 * variables;
@@ -70,7 +71,7 @@ inline size_t recordBytes(const std::byte* record, size_t variables) {
   return recordIsIrregular(record) ? irregularRecordBytes(variables) : regularRecordBytes(variables);
 }
 
-/// Reads a record's splat (but for its position) and its values, one a variable. Returns the half cell.
-uint32_t unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScalar> values);
+/// Reads a record's splat (but for its position) and its values, one a variable.
+SplatCodes unpackRecord(const std::byte* record, Splat& splat, std::span<SplatScalar> values);
 
 }  // namespace curvisplat

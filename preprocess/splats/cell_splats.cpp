@@ -64,7 +64,7 @@ class Cells {
   }
   void lookAtRow(uint64_t j, uint64_t k);
   void measureRow(uint64_t j, uint64_t k, int axis);
-  double stretchAlong(int axis, uint64_t index, uint64_t count, size_t cell, size_t stride) const;
+  Stretch stretchAlong(int axis, uint64_t index, uint64_t count, size_t cell, size_t stride) const;
   void addCell(uint64_t i, uint64_t j, uint64_t k);
   std::array<glm::dvec3, 8> corners(size_t node) const {
     return cornersAt(in_.nodes->x.data(), in_.nodes->y.data(), in_.nodes->z.data(), node, row_stride_,
@@ -133,18 +133,18 @@ void Cells::measureRow(uint64_t j, uint64_t k, int axis) {
 }
 
 /// Of a cell, number `index` of `count` along the axis; `stride` is from one to the next in the scratch.
-double Cells::stretchAlong(int axis, uint64_t index, uint64_t count, size_t cell, size_t stride) const {
+Stretch Cells::stretchAlong(int axis, uint64_t index, uint64_t count, size_t cell, size_t stride) const {
   const auto is_there = [&](uint64_t before, uint64_t after) {
     return index >= before && index + after < count &&
            scratch_.there[cell + after * stride - before * stride];
   };
-  if (!corrections_.stretch || !is_there(1, 0) || !is_there(0, 1)) return 1;
+  if (!corrections_.stretch || !is_there(1, 0) || !is_there(0, 1)) return {};
   const double* own = scratch_.extent[axis].data() + cell;
   const double before = *(own - stride), after = own[stride];
   // Beyond the last cell is its mirror image, less the steady growth.
   const double before2 = is_there(2, 0) ? *(own - 2 * stride) : before / steadyGrowth(before, *own, after);
   const double after2 = is_there(0, 2) ? own[2 * stride] : after / steadyGrowth(after, *own, before);
-  return stretchOf(before2, before, *own, after, after2);
+  return {stretchOf(before2, before, *own, after, after2), growthOf(before2, before, after, after2)};
 }
 
 /// A length for the shape of a cell without any extent: far below the grid's, and above zero.
@@ -175,6 +175,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
   glm::dvec3 stretch(1.0);
   glm::dvec3 bend(0.0);             // the sum of the centres' second differences
   std::array<double, 3> inwards{};  // along i, j, k: 1 or -1 from a border
+  std::array<float, 3> growth{};
   for (int axis = 0; axis < 3; ++axis) {
     const bool has_before = index[axis] > 0 && scratch_.there[cell - cell_strides[axis]];
     const bool has_after = index[axis] + 1 < cells[axis] && scratch_.there[cell + cell_strides[axis]];
@@ -190,7 +191,9 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
                                           scratch_.centre[has_before ? cell - cell_strides[axis] : cell])
                       : jacobian[axis];
     if (!has_before || !has_after) continue;
-    stretch[axis] = stretchAlong(axis, index[axis], cells[axis], cell, cell_strides[axis]);
+    const Stretch of_axis = stretchAlong(axis, index[axis], cells[axis], cell, cell_strides[axis]);
+    stretch[axis] = of_axis.factor;
+    if (corrections_.growth) growth[axis] = of_axis.growth;
     bend += stretch[axis] * stretch[axis] *
             (scratch_.centre[cell + cell_strides[axis]] + scratch_.centre[cell - cell_strides[axis]] -
              2.0 * scratch_.centre[cell]);
@@ -244,6 +247,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     const auto rotate = [&](const glm::dvec3& v) { return lq.rotate(v); };
     set_values(scale, rotate);
     splat.border_code = borderCode(inwards, splat.regular, rotate);
+    splat.growth_code = splat.regular ? growthCode(growth, rotate) : kNoGrowth;
   } else {
     const CellShape shape = shapeFromJacobian(jacobian, smallestAxis(hexahedron.centre));
     splat.splat.axis = shape.axis;
@@ -259,6 +263,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     const auto rotate = [&](const glm::dvec3& v) { return shape.rotation * v; };
     set_values(scale, rotate);
     splat.border_code = borderCode(inwards, splat.regular, rotate);
+    splat.growth_code = splat.regular ? growthCode(growth, rotate) : kNoGrowth;
   }
   ++count_;
 }

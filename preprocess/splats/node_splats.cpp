@@ -41,6 +41,7 @@ class Window {
         out_(out) {
     for (const auto& scalar : in.nodes->scalars) scalars_.push_back(scalar.data());
     for (auto& row : scratch.stretch) row.assign(ni_, 1.0f);
+    for (auto& row : scratch.growth) row.assign(ni_, 0.0f);
     scratch.has_blank.resize(rowsOf(in.window));
     for (size_t row = 0; row < scratch.has_blank.size(); ++row)
       scratch.has_blank[row] = std::memchr(blank_ + row * ni_, 1, ni_) != nullptr;
@@ -56,7 +57,7 @@ class Window {
   }
   bool anyBlankAround(uint64_t j, uint64_t k) const;
   void stretchRow(uint64_t j, uint64_t k);
-  float stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const;
+  Stretch stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const;
   void addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face, int layer);
   void cutBehindFace(NodeSplat& node, ptrdiff_t at, const Neighbours& neighbours, int layer) const;
   glm::dvec3 position(ptrdiff_t at) const { return {x_[at], y_[at], z_[at]}; }
@@ -147,11 +148,14 @@ void Window::stretchRow(uint64_t j, uint64_t k) {
   const std::array<uint64_t, 3> index{0, j, k}, count{ni_, block.nj, block.nk};
   const std::array<ptrdiff_t, 3> strides{1, row_stride_, plane_stride_};
   for (size_t axis = 0; axis < 3; ++axis) {
-    float* out = scratch_.stretch[axis].data();
+    float *out = scratch_.stretch[axis].data(), *growth = scratch_.growth[axis].data();
     const auto one_by_one = [&](uint64_t begin, uint64_t end) {
       for (uint64_t i = begin; i < end; ++i) {
         const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
-        if (!blank_[at]) out[i] = stretchOfNode(at, strides[axis], axis == 0 ? i : index[axis], count[axis]);
+        if (blank_[at]) continue;
+        const Stretch stretch = stretchOfNode(at, strides[axis], axis == 0 ? i : index[axis], count[axis]);
+        out[i] = stretch.factor;
+        growth[i] = stretch.growth;
       }
     };
     bool whole = true;
@@ -166,16 +170,17 @@ void Window::stretchRow(uint64_t j, uint64_t k) {
       one_by_one(0, ni_);
     } else if (axis == 0) {
       one_by_one(0, kWhole);
-      stretchNodes({x_, y_, z_}, row + static_cast<ptrdiff_t>(kWhole), 1, ni_ - 2 * kWhole, out + kWhole);
+      stretchNodes({x_, y_, z_}, row + static_cast<ptrdiff_t>(kWhole), 1, ni_ - 2 * kWhole, out + kWhole,
+                   growth + kWhole);
       one_by_one(ni_ - kWhole, ni_);
     } else {
-      stretchNodes({x_, y_, z_}, row, strides[axis], ni_, out);
+      stretchNodes({x_, y_, z_}, row, strides[axis], ni_, out, growth);
     }
   }
 }
 
 /// Of a node that is there, number `index` of `count` along the axis of `stride`.
-float Window::stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const {
+Stretch Window::stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const {
   const auto neighbours = [&](uint64_t most, ptrdiff_t step) {
     int found = 0;
     while (found < kStretchReach && static_cast<uint64_t>(found) < most && !blank_[at + (found + 1) * step])
@@ -205,6 +210,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   glm::dvec3 middle(0.0);
   glm::dvec3 bend(0.0);             // the sum of the positions' second differences
   std::array<double, 3> inwards{};  // along i, j, k: 1 or -1 where the cell is a half one
+  std::array<float, 3> growth{};
   double weight_factor = 1;
   for (int axis = 0; axis < 3; ++axis) {
     const glm::dvec3 to_before = node.node_position - position(at + neighbours.before[axis]);
@@ -213,6 +219,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     const bool whole = neighbours.before[axis] != 0 && neighbours.after[axis] != 0;
     if (whole) bend += stretch[axis] * stretch[axis] * (to_after - to_before);
     if (a + b > 0 && (corrections_.middles || !whole)) middle[axis] = 0.5 * (b - a) / (a + b);
+    if (corrections_.growth) growth[axis] = scratch_.growth[axis][i];
     if (whole) continue;
     if (corrections_.border_codes) {
       if (a + b > 0) inwards[axis] = neighbours.before[axis] == 0 ? 1 : -1;
@@ -262,6 +269,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     node.regular = weight_factor == 1;
     node.border_code =
         borderCode(inwards, corrections_.faces, [&](const glm::dvec3& v) { return lq.rotate(v); });
+    node.growth_code = growthCode(growth, [&](const glm::dvec3& v) { return lq.rotate(v); });
     (lq.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
     if (layer != kNoLayer && node.border_code == kNoBorder) cutBehindFace(node, at, neighbours, layer);
     set_values([&](const glm::dvec3& gradient) { return lq.rotate(gradient); },
@@ -278,6 +286,9 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     node.regular = !shape.floored;
     node.border_code = borderCode(inwards, corrections_.faces && !shape.floored,
                                   [&](const glm::dvec3& v) { return shape.rotation * v; });
+    node.growth_code = shape.floored
+                           ? kNoGrowth
+                           : growthCode(growth, [&](const glm::dvec3& v) { return shape.rotation * v; });
     (shape.floored ? out_.degenerate : shape.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
     // Where an axis was raised there is no telling a bend of the scalar from one of the coordinates.
     set_values([&](const glm::dvec3& gradient) { return shape.rotation * gradient; },

@@ -15,6 +15,8 @@
 // stays the scalar's gradient, and its middle stays; that of a half cell moves with the stretch, since its
 // border stays.
 //
+// Where cells grow steadily along an axis the kernel is skewed (stream/model/growth_code.h).
+//
 // A missing neighbour (the block ends, or the node there is blank) makes the cell a half cell along that
 // axis: the Jacobian's column is half of the one difference there is, and the splat sits a quarter cell
 // inwards. Without any neighbour along an axis the column is zero. The border is a face that the splat is to
@@ -24,8 +26,11 @@
 // block's faces.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <glm/mat3x3.hpp>
 #include <span>
 #include <vector>
 
@@ -33,6 +38,7 @@
 #include "preprocess/grid/slabs.h"
 #include "preprocess/splats/stretch.h"
 #include "stream/model/border_code.h"
+#include "stream/model/growth_code.h"
 #include "stream/model/kernel.h"
 #include "stream/model/splats.h"
 
@@ -56,12 +62,23 @@ uint32_t borderCode(const std::array<double, 3>& inwards, bool faces, const Rota
   return count > 0 ? packBorderCode({axes.data(), count}, faces ? (1u << count) - 1 : 0) : kNoBorder;
 }
 
+/// The growth code of a cell that grows by `growth` along i, j and k. `rotate` gives Q's image of a vector.
+template <typename Rotate>
+uint32_t growthCode(const std::array<float, 3>& growth, const Rotate& rotate) {
+  constexpr float kLeast = 1.0f / 32;  // less becomes none
+  if (std::max({std::abs(growth[0]), std::abs(growth[1]), std::abs(growth[2])}) < kLeast) return kNoGrowth;
+  const glm::dmat3 axes(1.0);
+  return packGrowthCode({rotate(axes[0]), rotate(axes[1]), rotate(axes[2])},
+                        {growth[0], growth[1], growth[2]});
+}
+
 /// A node's splat on its way into the cache.
 struct NodeSplat {
   uint64_t node = 0;                 // number in the whole grid: block after block, i fastest, then j, k
   Splat splat;                       // position: world units, moved inwards where the node owns a half cell
   bool regular = true;               // every variable's variance is 0, and the weight is about a0 a1 a2
-  uint32_t border_code = kNoBorder;  // stream/border_code.h
+  uint32_t border_code = kNoBorder;  // stream/model/border_code.h
+  uint32_t growth_code = kNoGrowth;  // stream/model/growth_code.h
   bool on_block_face = false;        // may coincide with a node of another face: to be merged by SeamMerger
   bool behind_face = false;          // its border_code is for a face that SeamMerger may find to be closed
   glm::dvec3 node_position{0.0};     // where the node itself is; behind a face, where the face's node is
@@ -101,12 +118,13 @@ struct NodeSplatCorrections {
   bool middles = true;       // else splats sit at nodes, but for half cells
   bool bends = true;         // of the scalar
   bool stretch = true;       // else splats are as long as their cells
+  bool growth = true;        // else kernels are symmetric; takes stretch
 };
 
 /// What computeNodeSplats() needs for a while; keeps its capacity.
 struct NodeScratch {
-  std::array<std::vector<float>, 3> stretch;  // [axis][node of a row]
-  std::vector<uint8_t> has_blank;             // [row of the window]
+  std::array<std::vector<float>, 3> stretch, growth;  // [axis][node of a row]
+  std::vector<uint8_t> has_blank;                     // [row of the window]
 };
 
 /// Computes the splats of the nodes of `box` that are not blank. Overwrites `out` and keeps its capacity.

@@ -14,8 +14,8 @@
 namespace curvisplat {
 namespace {
 
-// A record: along, across, node, flags, the splat's 10 numbers, node position, spacing; 5 numbers a variable.
-constexpr size_t kNodeSize = 18;
+// A record: along, across, node, flags, growth code, the splat's 10 numbers, node position, spacing; 5 numbers a variable.
+constexpr size_t kNodeSize = 19;
 constexpr size_t kScalarSize = 5;
 constexpr uint64_t kRegular = 1, kOnBlockFace = 2, kBehindFace = 4;  // of the flags
 constexpr int kBorderCodeShift = 32;
@@ -90,7 +90,8 @@ void SeamSorter::add(const SeamNode& node, std::span<const SplatScalar> values) 
   const Splat& s = n.splat;
   const uint64_t flags = (n.regular ? kRegular : 0) | (n.on_block_face ? kOnBlockFace : 0) |
                          (n.behind_face ? kBehindFace : 0) | uint64_t{n.border_code} << kBorderCodeShift;
-  put(node.along, node.across, std::bit_cast<double>(n.node), std::bit_cast<double>(flags));
+  put(node.along, node.across, std::bit_cast<double>(n.node), std::bit_cast<double>(flags),
+      std::bit_cast<double>(uint64_t{n.growth_code}));
   put(s.position.x, s.position.y, s.position.z, s.axis[0], s.axis[1], s.axis[2]);
   put(s.shear[0], s.shear[1], s.shear[2], s.weight);
   put(n.node_position.x, n.node_position.y, n.node_position.z, n.spacing);
@@ -112,6 +113,7 @@ void SeamSorter::unpack(const double* record, SeamNode& node, std::span<SplatSca
   n.on_block_face = (flags & kOnBlockFace) != 0;
   n.behind_face = (flags & kBehindFace) != 0;
   n.border_code = static_cast<uint32_t>(flags >> kBorderCodeShift);
+  n.growth_code = static_cast<uint32_t>(std::bit_cast<uint64_t>(get()));
   n.splat.position = get_vector();
   for (double& axis : n.splat.axis) axis = get();
   for (double& shear : n.splat.shear) shear = get();

@@ -2,14 +2,17 @@
 
 namespace curvisplat {
 
-void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, size_t count, float* out) {
+void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, size_t count, float* factor,
+                  float* growth) {
   const auto last = at + static_cast<ptrdiff_t>(count);
   for (ptrdiff_t n = at; n < last; ++n) {
     // Twice the extents: their ratios count.
     const auto extent = [&](ptrdiff_t steps) {
       return nodes.squaredDistance(n + (steps - 1) * stride, n + (steps + 1) * stride);
     };
-    out[n - at] = stretchOf(extent(-2), extent(-1), extent(0), extent(1), extent(2));
+    const double before2 = extent(-2), before = extent(-1), after = extent(1), after2 = extent(2);
+    factor[n - at] = stretchOf(before2, before, extent(0), after, after2);
+    growth[n - at] = growthOf(before2, before, after, after2);
   }
 }
 
@@ -52,10 +55,10 @@ class LineEnd {
 
 }  // namespace
 
-float stretchOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, int before, int after) {
+Stretch stretchOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, int before, int after) {
   before = std::min(before, kStretchReach);
   after = std::min(after, kStretchReach);
-  if (before + after == 0) return 1;
+  if (before + after == 0) return {};
   const int samples = before + 1 + after;
   const LineEnd first(nodes, at - before * stride, stride, samples);
   const LineEnd last(nodes, at + after * stride, -stride, samples);
@@ -68,8 +71,10 @@ float stretchOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, 
     if (steps == after && after < kStretchReach) return last.own();
     return nodes.squaredDistance(at + (steps - 1) * stride, at + (steps + 1) * stride);
   };
-  return stretchOf(extent(-2, extent), extent(-1, extent), extent(0, extent), extent(1, extent),
-                   extent(2, extent));
+  const double before2 = extent(-2, extent), near_before = extent(-1, extent);
+  const double near_after = extent(1, extent), after2 = extent(2, extent);
+  return {stretchOf(before2, near_before, extent(0, extent), near_after, after2),
+          growthOf(before2, near_before, near_after, after2)};
 }
 
 }  // namespace curvisplat

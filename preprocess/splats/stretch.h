@@ -1,5 +1,5 @@
-// How much longer than its cell a splat is along each lattice axis, so that a uniform medium looks uniform
-// where the sizes of neighbouring cells differ.
+// How much longer than its cell a splat is along each lattice axis, and how cells grow along it, so that a uniform
+// medium looks uniform where the sizes of neighbouring cells differ.
 //
 // Boxes tile space, and boxes that are convolved with one common blur still sum to one everywhere. Along an
 // axis where the cell's extent is h, the kernel's variance is 0.1994 h² = h²/12 + 0.1161 h². The first part
@@ -10,7 +10,9 @@
 //                                    mean with weights 1 4 6 4 1, two passes of [1 2 1]/4 over ln h
 //
 // Cells that grow by a constant factor keep their extents, whatever the factor, since their ln h is linear.
-// Only changes of the growth count: at the borders of spectral elements, say.
+// Only changes of the growth count: at the borders of spectral elements, say. What steady growth needs is a kernel
+// that is skewed (stream/model/growth_code.h): by g, the slope of ln h over the same five extents,
+// smoothed: their differences with weights -1 -2 0 2 1, over 8.
 //
 // A line ends at a block's face and beside a missing cell. There the extents are mirrored, less their steady
 // growth: the smaller of the two growths next to the end, 1 where they disagree or the line is short.
@@ -48,6 +50,25 @@ inline float stretchOf(double before2, double before, double own, double after, 
   return std::abs(squared - 1) < kNearlyOne ? 1.0f : std::sqrt(squared);
 }
 
+/// g, from the same squared extents but the splat's own; 0 where a cell has no extent. To 0.001 up to growths by 1.9,
+/// which is the most it gives.
+inline float growthOf(double before2, double before, double after, double after2) {
+  constexpr float kMost = 3e4f;  // exp(16 g) of that
+  const double product = after2 * after * after, per = before2 * before * before;
+  const bool usable = product > 0 && per > 0 && product < 1e300 && per < 1e300;
+  const double exact = usable ? product / per : 1.0;
+  const auto ratio = static_cast<float>(std::clamp(exact, 1.0 / kMost, 1.0 * kMost));
+  const float growth2 = std::sqrt(std::sqrt(std::sqrt(ratio)));  // exp(2 g)
+  const float t = (growth2 - 1) / (growth2 + 1), t2 = t * t;     // tanh g
+  return t * (1 + t2 * (1.0f / 3 + t2 * (1.0f / 5 + t2 * (1.0f / 7))));
+}
+
+/// What the extents along an axis tell of a splat.
+struct Stretch {
+  float factor = 1;  // s
+  float growth = 0;  // g
+};
+
 /// The steady growth per sample of squared extents, from those of the three samples next to the end of a
 /// line, the nearest first.
 inline double steadyGrowth(double first, double second, double third) {
@@ -68,12 +89,13 @@ struct NodePositions {
   }
 };
 
-/// s of `count` nodes that follow `at` in memory, along the axis of `stride`. Each has three neighbours on
+/// Of `count` nodes that follow `at` in memory, along the axis of `stride`: [count] each. Each has three neighbours on
 /// either side. The same bits as stretchOnLine() would give. Any thread; never allocates.
-void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, size_t count, float* out);
+void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, size_t count, float* factor,
+                  float* growth);
 
-/// s of the node `at`, which has `before` neighbours in a row on one side and `after` on the other; more than
+/// Of the node `at`, which has `before` neighbours in a row on one side and `after` on the other; more than
 /// kStretchReach count as kStretchReach.
-float stretchOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, int before, int after);
+Stretch stretchOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, int before, int after);
 
 }  // namespace curvisplat

@@ -10,6 +10,8 @@
 
 #include "render/cpu/paint_shade-inl.h"
 #include "render/cpu/tile.h"
+#include "render/project/footprint_skew.h"
+#include "render/project/kernel.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace curvisplat {
@@ -22,12 +24,32 @@ static_assert(kLanes == kBlockPixels);
 alignas(64) constexpr float kLaneX[kBlockPixels] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
 alignas(64) constexpr float kLaneY[kBlockPixels] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
 
+/// FootprintSkew's factor as a polynomial in p and q: 1 + p (p1 + p (p3 p + p2q q)) + q (q1 + q (pq2 p + q3 q)).
+struct SkewPolynomial {
+  float p1 = 0, q1 = 0, p3 = 0, p2q = 0, pq2 = 0, q3 = 0;
+
+  explicit SkewPolynomial(uint32_t skew) {
+    if (skew == 0) return;
+    constexpr auto kScale = static_cast<float>(kKernelSupport / kKernelSigma);
+    constexpr float kCubic = kScale * kScale * kScale / 6;
+    const FootprintSkew s = FootprintSkew::unpack(skew);
+    p1 = -0.5f * kScale * (s.t[0] + s.t[2]);
+    q1 = -0.5f * kScale * (s.t[1] + s.t[3]);
+    p3 = kCubic * s.t[0];
+    p2q = 3 * kCubic * s.t[1];
+    pq2 = 3 * kCubic * s.t[2];
+    q3 = kCubic * s.t[3];
+  }
+};
+
 /// An ellipse as its pixels need it. With d the offset from the centre, p = a dx and q = b dx + c dy are u
 /// over the support's radius: the footprint ends where p² + q² = 1.
 struct Ellipse {
   float x, y;  // the centre, from that of the tile's first pixel
   float a, b, c;
   float amplitude;
+  bool skewed;
+  SkewPolynomial skew;
 };
 
 /// 1 - exp(-x), x >= 0, over x: relative error below 1e-6. `kThin`: for x <= ln 2 / 2, with the same bits.
@@ -68,7 +90,17 @@ HWY_INLINE Pixels pixelsAt(const Ellipse& e, const float* HWY_RESTRICT footprint
   };
   const V lo = hn::MulAdd(pair(2), x2, pair(0)), hi = hn::MulAdd(pair(6), x2, pair(4));
   const V f = hn::MulAdd(hn::MulAdd(hn::Set(d, footprint[8]), x4, hi), x4, lo);
-  return {hn::Mul(hn::Mul(f, hn::Set(d, e.amplitude)), hn::Mul(x, x)), p, q};
+  V depth = hn::Mul(hn::Mul(f, hn::Set(d, e.amplitude)), hn::Mul(x, x));
+  if (e.skewed) {
+    const SkewPolynomial& s = e.skew;
+    const V by_p =
+        hn::MulAdd(hn::MulAdd(hn::Set(d, s.p3), p, hn::Mul(hn::Set(d, s.p2q), q)), p, hn::Set(d, s.p1));
+    const V by_q =
+        hn::MulAdd(hn::MulAdd(hn::Set(d, s.q3), q, hn::Mul(hn::Set(d, s.pq2), p)), q, hn::Set(d, s.q1));
+    const V factor = hn::MulAdd(by_p, p, hn::MulAdd(by_q, q, hn::Set(d, 1.0f)));
+    depth = hn::Mul(depth, hn::Max(factor, hn::Zero(d)));
+  }
+  return {depth, p, q};
 }
 
 /// Blends one vector of a block's pixels under what is there. What then still comes through.

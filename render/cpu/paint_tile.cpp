@@ -65,7 +65,8 @@ HWY_NOINLINE BlockMask paintPolyline(const TileWork& work, BlockMask blocks, con
 HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, const Visits& visits,
                                 const Fits& fits, size_t n, const float* footprint) {
   const Ellipse e = visits.ellipse(n);
-  const bool thin = e.amplitude * kPeak * fits.most.at[n] < 0.34f;
+  // A skewed footprint may be a tenth higher than F(0).
+  const bool thin = e.amplitude * kPeak * fits.most.at[n] < (e.skewed ? 0.3f : 0.34f);
   if (fits.fit.at[n] == kConstant) {
     const Shade shade = shadeOf(fits, n);
     if (thin) return paintBlocks<false, true>(work, blocks, e, shade, footprint);
@@ -102,7 +103,7 @@ BlockMask paintTile(const TileWork& work) {
     for (size_t n = begin + count; n < end; ++n) {
       const ScreenSplat& next = work.splats[work.order[n]];
       hwy::Prefetch(&next.x);
-      hwy::Prefetch(&next.half_width);  // which may lie in another cache line
+      hwy::Prefetch(&next.skew);  // which may lie in another cache line
     }
     IntRow numbers;
     for (size_t n = 0; n < kLanes; ++n)

@@ -36,10 +36,15 @@ struct Visits {
   Row diffuse, specular;  // Lit, in lit pictures
   Pieces pieces;          // all of the splat that is in the tile
   Row l11, l21, l22;
+  IntRow skew;            // ScreenSplat's
   IntRow x0, y0, x1, y1;  // blocks, the last included; empty where x0 > x1 or y0 > y1
 
   HWY_INLINE Ellipse ellipse(size_t n) const {
-    return {x.at[n], y.at[n], a.at[n], b.at[n], c.at[n], pieces.amplitude.at[n]};
+    const auto packed = static_cast<uint32_t>(skew.at[n]);
+    return {x.at[n],     y.at[n],
+            a.at[n],     b.at[n],
+            c.at[n],     pieces.amplitude.at[n],
+            packed != 0, SkewPolynomial(packed)};
   }
   HWY_INLINE Lit lit(const TileWork& work, size_t n) const {
     return work.shading.lit ? Lit{diffuse.at[n], specular.at[n]} : Lit{};
@@ -65,13 +70,14 @@ HWY_INLINE Range tOver(V by_x, V by_y, V middle_x, V middle_y, V half_x, V half_
 
 /// From the splats with these numbers.
 HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) {
-  static_assert(sizeof(ScreenSplat) == 10 * sizeof(float));
+  constexpr int32_t kFloats = sizeof(ScreenSplat) / sizeof(float);
+  static_assert(kFloats == 11);
   const Floats d;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0f), half = hn::Set(d, 0.5f);
   const V support = hn::Set(d, kSupport), last_pixel = hn::Set(d, kTileSide - 1);
   for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
     const auto store = [&](V value, Row& row) HWY_ATTR { hn::Store(value, d, row.at + lane); };
-    const auto offsets = hn::Mul(hn::Load(Ints(), numbers.at + lane), hn::Set(Ints(), 10));
+    const auto offsets = hn::Mul(hn::Load(Ints(), numbers.at + lane), hn::Set(Ints(), kFloats));
     const V l11 = gather(work, offsets, 2), l21 = gather(work, offsets, 3), l22 = gather(work, offsets, 4);
     store(l11, out.l11);
     store(l21, out.l21);
@@ -85,6 +91,7 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
     store(a, out.a);
     store(b, out.b);
     store(c, out.c);
+    hn::Store(hn::BitCast(Ints(), gather(work, offsets, 10)), Ints(), out.skew.at + lane);
     const V amplitude = gather(work, offsets, 5);
     const auto cut = hn::Lt(amplitude, zero);
     store(hn::Abs(amplitude), out.pieces.amplitude);
@@ -142,7 +149,7 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
       // ScreenCut's correlation: how far the mean moves by what is left along the ray, which is all over the
       // splat, and how much narrower the scalar's distribution becomes.
       const auto in_cut =
-          hn::IfThenElse(hn::RebindMask(Ints(), cut), hn::Set(Ints(), 2 - 10), hn::Set(Ints(), 2));
+          hn::IfThenElse(hn::RebindMask(Ints(), cut), hn::Set(Ints(), 2 - kFloats), hn::Set(Ints(), 2));
       const V mark = hn::Neg(
           hn::GatherIndex(d, reinterpret_cast<const float*>(work.splats.data()), hn::Add(offsets, in_cut)));
       const V far_sides = hn::Floor(hn::Mul(mark, hn::Set(d, 0.25f)));

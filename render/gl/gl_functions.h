@@ -74,6 +74,7 @@ namespace curvisplat {
   X(Uniform4f, PFNGLUNIFORM4FPROC)                             \
   X(UseProgram, PFNGLUSEPROGRAMPROC)                           \
   X(VertexAttribDivisor, PFNGLVERTEXATTRIBDIVISORPROC)         \
+  X(VertexAttribIPointer, PFNGLVERTEXATTRIBIPOINTERPROC)       \
   X(VertexAttribPointer, PFNGLVERTEXATTRIBPOINTERPROC)         \
   X(Viewport, PFNGLVIEWPORTPROC)
 

@@ -47,22 +47,28 @@ struct TableTexture {
 constexpr size_t kMostRecords = 2;
 
 /// Splats as the shader's instances: ScreenSplat's ten floats as 4 + 4 + 2, and those of the records behind
-/// it, so that there are more in the buffer than are drawn. Leaves itself bound.
+/// it, so that there are more in the buffer than are drawn; then its skew. Leaves itself bound.
 struct InstanceBuffer {
   GlObject buffer, vertex_array;
 
   explicit InstanceBuffer(const GlFunctions& gl) : buffer(makeBuffer(gl)), vertex_array(makeVertexArray(gl)) {
     static constexpr GLint kComponents[] = {4, 4, 2};
     bind(gl);
-    size_t offset = 0;
-    for (GLuint attribute = 0; attribute < 3 * (1 + kMostRecords); ++attribute) {
-      const GLint components = kComponents[attribute % 3];
-      gl.EnableVertexAttribArray(attribute);
-      gl.VertexAttribPointer(attribute, components, GL_FLOAT, GL_FALSE, sizeof(ScreenSplat),
-                             reinterpret_cast<const void*>(offset));
-      gl.VertexAttribDivisor(attribute, 1);
-      offset += static_cast<size_t>(components) * sizeof(float);
+    GLuint attribute = 0;
+    for (size_t record = 0; record <= kMostRecords; ++record) {
+      size_t offset = record * sizeof(ScreenSplat);
+      for (const GLint components : kComponents) {
+        gl.EnableVertexAttribArray(attribute);
+        gl.VertexAttribPointer(attribute, components, GL_FLOAT, GL_FALSE, sizeof(ScreenSplat),
+                               reinterpret_cast<const void*>(offset));
+        gl.VertexAttribDivisor(attribute++, 1);
+        offset += static_cast<size_t>(components) * sizeof(float);
+      }
     }
+    gl.EnableVertexAttribArray(attribute);
+    gl.VertexAttribIPointer(attribute, 1, GL_INT, sizeof(ScreenSplat),
+                            reinterpret_cast<const void*>(offsetof(ScreenSplat, skew)));
+    gl.VertexAttribDivisor(attribute, 1);
   }
 
   void bind(const GlFunctions& gl) const {
@@ -212,6 +218,7 @@ void GlPainter::State::use(const GlProgram& program, const ClassificationTable& 
   gl.Uniform1i(program.uniform("classes"), kClassesUnit);
   gl.Uniform1i(program.uniform("layers"), kLayersUnit);
   gl.Uniform1f(program.uniform("support"), static_cast<float>(kKernelSupport));
+  gl.Uniform1f(program.uniform("deviation"), static_cast<float>(kKernelSigma));
   gl.Uniform1f(program.uniform("footprint_steps"),
                static_cast<float>(kFootprintSteps / (kKernelSupport * kKernelSupport)));
   gl.Uniform1i(program.uniform("cells"), ClassificationTable::kCells);

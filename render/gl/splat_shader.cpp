@@ -15,6 +15,7 @@ layout(location = 5) in vec2 next2;
 layout(location = 6) in vec4 beyond0;  // the record behind that, which is the ScreenCut of one with a ScreenDepth
 layout(location = 7) in vec4 beyond1;
 layout(location = 8) in vec2 beyond2;
+layout(location = 9) in int packed_skew;
 uniform vec2 clip_from_pixel;
 uniform float support;
 uniform bool lit;
@@ -26,7 +27,12 @@ flat out vec4 scalar;   // mean, slope0, slope1, half_width
 flat out mat3 faces;    // a face a column; of the splats that are cut
 flat out vec2 cut;      // far_sides, correlation
 flat out vec2 light;    // diffuse, specular
+flat out vec4 skew;       // t30, t21, t12, t03: footprint_skew.h
 flat out vec4 depth_line;  // of the splats that meet layers: the middle, by u, deviations per depth; else no more than 0
+
+vec4 skewOf(int bits) {
+  return 0.01 * vec4(ivec4(bits << 24, bits << 16, bits << 8, bits) >> 24);
+}
 
 void main() {
   if (part0.z < 0.0) {  // a ScreenCut
@@ -38,6 +44,7 @@ void main() {
     cut = vec2(0.0);
     light = vec2(0.0);
     depth_line = vec4(0.0);
+    skew = vec4(0.0);
     gl_Position = vec4(2.0, 2.0, 0.0, 1.0);
     return;
   }
@@ -56,6 +63,7 @@ void main() {
   u_from_d = vec3(1.0 / part0.z, -part0.w / (part0.z * part1.x), 1.0 / part1.x);
   amplitude = part1.y;
   scalar = vec4(part1.zw, part2);
+  skew = skewOf(packed_skew);
   light = vec2(1.0, 0.0);
   if (lit) {  // light.h
     uint bits = floatBitsToUint(part2.y);
@@ -74,6 +82,7 @@ constexpr const char* kFragmentShader = R"(
 uniform samplerBuffer footprint;  // F and the step to the next, over rho squared
 uniform samplerBuffer classes;    // cumulative: colour times extinction, extinction
 uniform float support;
+uniform float deviation;          // of the kernel, in u
 uniform float footprint_steps;    // per unit of rho squared
 uniform int cells;
 uniform vec2 cells_from_scalar;   // factor, offset
@@ -87,6 +96,7 @@ flat in vec4 scalar;
 flat in mat3 faces;
 flat in vec2 cut;
 flat in vec2 light;
+flat in vec4 skew;
 flat in vec4 depth_line;
 uniform sampler2D layers;  // the depths of the pixel's, from the nearest; infinite where there is none
 layout(location = 0) out vec4 blended0;
@@ -192,6 +202,11 @@ void main() {
   float at = rho2 * footprint_steps;
   vec2 texel = texelFetch(footprint, int(at)).xy;
   float depth = abs(amplitude) * (texel.x + texel.y * fract(at));
+  if (skew != vec4(0.0)) {
+    vec2 v = u / deviation;
+    float cubic = skew.x * v.x * v.x * v.x + 3.0 * v.x * v.y * (skew.y * v.x + skew.z * v.y) + skew.w * v.y * v.y * v.y;
+    depth *= max(0.0, 1.0 + (cubic - 3.0 * ((skew.x + skew.z) * v.x + (skew.y + skew.w) * v.y)) / 6.0);
+  }
 #if WINDOWS > 1 || LAYERED
   vec4 ends = vec4(1.0);
   if (depth_line.w > 0.0) {

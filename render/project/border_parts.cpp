@@ -20,12 +20,6 @@ struct Cholesky {
   }
 };
 
-/// A u.
-glm::vec3 inSpace(const Shape& s, const glm::vec3& u) {
-  return {s.axis0 * u.x, s.axis0 * s.shear10 * u.x + s.axis1 * u.y,
-          s.axis0 * s.shear20 * u.x + s.axis1 * s.shear21 * u.y + s.axis2 * u.z};
-}
-
 /// Lᵀ u.
 glm::vec3 transposed(const Cholesky& l, const glm::vec3& u) {
   return {l.l00 * u.x + l.l10 * u.y + l.l20 * u.z, l.l11 * u.y + l.l21 * u.z, l.l22 * u.z};
@@ -45,6 +39,18 @@ void reshape(SplatPiece& piece, const Cholesky& l) {
   piece.slope = {w.x, w.y, w.z};
 }
 
+/// Lengthens what the growth's axes have along A q by the part's size. Half cells that are cut are skewed by less along
+/// that axis, by least squares in one dimension; cells that are drawn in two parts are not skewed along it.
+void resize(GrowthAxes& growth, const Shape& shape, const glm::vec3& q, const BorderPart& part, bool cut) {
+  constexpr float kAlong = 0.5f, kSkewOfCut = 0.6f;
+  const glm::vec3 along = inSpace(shape, q);
+  for (size_t n = 0; n < growth.count; ++n) {
+    const float share = glm::dot(growth.unit[n], q);
+    growth.along[n] += (part.size - 1) * share * along;
+    if (std::abs(share) > kAlong) growth.growth[n] *= cut ? kSkewOfCut : 0;
+  }
+}
+
 }  // namespace
 
 size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const BorderStyle& style,
@@ -60,6 +66,7 @@ size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const Border
     if (!inward.hasFace(a)) count *= 2;
   for (size_t n = 0; n < count; ++n) {
     glm::vec3 offset(0.0f);
+    GrowthAxes growth = whole.growth;
     float share = 1;
     float m00 = 1, m10 = 0, m11 = 1, m20 = 0, m21 = 0, m22 = 1;
     size_t choice = n;
@@ -68,6 +75,7 @@ size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const Border
       const BorderPart& part = cut ? style.cut : style.parts[choice & 1];
       if (!cut) choice >>= 1;
       const glm::vec3& q = inward.axis[static_cast<size_t>(a)];
+      resize(growth, whole.shape, q, part, cut);
       offset += part.offset * q;
       share *= part.share;
       const float less = 1 - part.size * part.size;
@@ -80,6 +88,7 @@ size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const Border
     }
     SplatPiece& piece = pieces[n];
     piece = whole;
+    piece.growth = growth;
     piece.position += inSpace(whole.shape, offset);
     piece.mean += whole.slope.w0 * offset.x + whole.slope.w1 * offset.y + whole.slope.w2 * offset.z;
     piece.weight *= share;

@@ -7,6 +7,7 @@
 #include "render/project/border_parts.h"
 #include "render/project/clip_planes.h"
 #include "render/project/face_cut.h"
+#include "render/project/footprint_skew.h"
 #include "render/project/kernel.h"
 #include "render/project/light.h"
 #include "render/project/local_layers.h"
@@ -16,6 +17,7 @@
 #include "render/project/splat_maps.h"
 #include "stream/base/check.h"
 #include "stream/model/border_code.h"
+#include "stream/model/growth_code.h"
 
 namespace curvisplat {
 namespace {
@@ -114,6 +116,14 @@ bool place(const PerspectiveMap& map, const SplatPiece& piece, size_t& looks, co
   });
 }
 
+// The map's rows at a position.
+const ScreenRows& rowsAt(const OrthographicMap& map, float, float, float) {
+  return map.rows;
+}
+ScreenRows rowsAt(const PerspectiveMap& map, float x, float y, float z) {
+  return map.rowsAt(map.centreOf(x, y, z));
+}
+
 struct BrickArrays {
   const GeometryArrays<const float>& geometry;
   const VariableArrays<const float>& variable;
@@ -153,7 +163,9 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, const GeometryArr
                          shapeOf(geometry, i),
                          slopeOf(variable, i),
                          variable.mean[i],
-                         geometry.weight[i]};
+                         geometry.weight[i],
+                         {},
+                         growthAxes(shapeOf(geometry, i), geometry.growth_code[i])};
   const glm::dvec3 slope(whole.slope.w0, whole.slope.w1, whole.slope.w2);
   const float scale = cutting.iso ? cutting.iso->scale : 1, offset = cutting.iso ? cutting.iso->offset : 0;
   if (chooser.transparentThroughout(scale * whole.mean + offset,
@@ -185,6 +197,7 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, const GeometryArr
       splat.slope1 *= scale;
       splat.half_width *= scale;
     }
+    if (piece.growth.count > 0) splat.skew = skewOf(at.rows, piece.growth, ellipse);
     ScreenDepth along_ray;
     if (across) {
       along_ray = depthAlongRay(at.rows, at.depth_row, cutting.layers.depthOf(at.depth), piece, ellipse,
@@ -261,10 +274,12 @@ bool projectRange(const Map& map, const Cutting& cutting, const std::optional<Lo
         if (!best) return false;
         fate = *best;
       } else {
-        fate = chooser.choose(
-            {block.x[n], block.y[n], block.l11[n], block.l21[n], block.l22[n], block.amplitude[n],
-             variable.mean[i], block.slope0[n], block.slope1[n], block.half_width[n]},
-            block.depth[n], lit);
+        const Ellipse ellipse = block.ellipse(n);
+        ScreenSplat splat = screenSplat(block.x[n], block.y[n], ellipse, variable.mean[i]);
+        if (const uint32_t code = geometry.growth_code[i]; code != kNoGrowth)
+          splat.skew = skewOf(rowsAt(map, geometry.x[i], geometry.y[i], geometry.z[i]),
+                              growthAxes(shapeOf(geometry, i), code), ellipse);
+        fate = chooser.choose(splat, block.depth[n], lit);
       }
       counts.off_screen += fate == SplatChooser::Fate::kOffScreen;
       counts.transparent += fate == SplatChooser::Fate::kTransparent;

@@ -1,5 +1,5 @@
 // The records that the projection passes to the painters: splats as ellipses on the screen, and what cuts them:
-// faces, and the layers of the pixels. Every record takes 40 bytes.
+// faces, and the layers of the pixels. Every record takes 44 bytes.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@ namespace curvisplat {
 
 /// One splat as the painters take it. With d the offset of a pixel's centre from (x, y) in pixels and u the
 /// solution of L u = d, L = | l11 0; l21 l22 | (S2 and the low-pass = L Lᵀ): rho² = |u|², optical depth per
-/// unit of extinction = amplitude F(rho), scalar = mean + slope·u, spread evenly over ± half_width around
+/// unit of extinction = amplitude F(rho), but for the skew; scalar = mean + slope·u, spread evenly over ± half_width around
 /// that.
 struct ScreenSplat {
   float x, y;            // pixels from the left and the top
@@ -18,8 +18,9 @@ struct ScreenSplat {
   float mean;            // the scalar's unit, and so for the rest
   float slope0, slope1;  // along the columns of L
   float half_width;      // √3 deviations along the ray at rho = 0; in lit pictures with the light (light.h)
+  uint32_t skew = 0;     // of the footprint, packed (footprint_skew.h); 0: none
 };
-static_assert(sizeof(ScreenSplat) == 40);
+static_assert(sizeof(ScreenSplat) == 44);
 
 /// The faces that a splat is cut at: a record of its own, directly before the splat where splats come from
 /// the nearest to the farthest, and directly behind it where they come from the farthest to the nearest. The

@@ -11,6 +11,7 @@ std::array<SplatPiece, 2> halve(const SplatPiece& piece, int column) {
   const glm::vec3 step = 0.25f * columns[column];
   SplatPiece half = piece;
   half.weight *= 0.5f;
+  half.growth.count = 0;
   float& axis = column == 0 ? half.shape.axis0 : column == 1 ? half.shape.axis1 : half.shape.axis2;
   float& slope = column == 0 ? half.slope.w0 : column == 1 ? half.slope.w1 : half.slope.w2;
   const float mean_step = 0.25f * slope;

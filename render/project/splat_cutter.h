@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <glm/vec3.hpp>
 
+#include "render/project/footprint_skew.h"
 #include "render/project/splat_ellipse.h"
 #include "render/project/splat_maps.h"
 
@@ -53,6 +54,7 @@ struct SplatPiece {
   float mean;
   float weight;
   CutFaces faces = {};
+  GrowthAxes growth = {};  // none of what perspective cuts
 };
 
 /// Halves `piece` along `column` (0..2).

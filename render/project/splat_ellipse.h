@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <glm/vec3.hpp>
 
 #include "render/project/kernel.h"
 #include "stream/model/splats.h"
@@ -16,6 +17,12 @@ struct Shape {
   float axis0, axis1, axis2;
   float shear10, shear20, shear21;
 };
+
+/// A u.
+inline glm::vec3 inSpace(const Shape& s, const glm::vec3& u) {
+  return {s.axis0 * u.x, s.axis0 * s.shear10 * u.x + s.axis1 * u.y,
+          s.axis0 * s.shear20 * u.x + s.axis1 * s.shear21 * u.y + s.axis2 * u.z};
+}
 
 /// w: along A's columns.
 struct Slope {

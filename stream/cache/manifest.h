@@ -50,6 +50,7 @@ class OtherVersion : public Error {
 /// What a reader must know of to read a cache, by the names in the manifest. Of a version 2 cache only: it is
 /// one of version 1 but for these.
 inline constexpr const char* kBorderFaces = "border-faces";  // borders are cut at faces (border_code.h)
+inline constexpr const char* kCellGrowth = "cell-growth";    // kernels are skewed (growth_code.h)
 inline constexpr const char* kSteps = "steps";               // a series of time steps (steps_file.h)
 
 struct Manifest {

@@ -31,6 +31,7 @@ void checkInput(const BrickSplats& brick) {
   CURVISPLAT_CHECK_OP(brick.size(), <=, size_t{kMaxBrickSplats});
   CURVISPLAT_CHECK_OP(brick.positions.size(), ==, brick.size());
   if (!brick.border_codes.empty()) CURVISPLAT_CHECK_OP(brick.border_codes.size(), ==, brick.size());
+  if (!brick.growth_codes.empty()) CURVISPLAT_CHECK_OP(brick.growth_codes.size(), ==, brick.size());
   uint64_t nodes = 0;
   for (const NodeRun& run : brick.runs) {
     CURVISPLAT_CHECK_OP(run.count, >=, 1u);
@@ -203,6 +204,7 @@ void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const st
   toFloats(decoded.shear[2], out.shear21);
   toFloats(decoded.weight, out.weight);
   std::copy(decoded.border_code.begin(), decoded.border_code.end(), out.border_code);
+  std::copy(decoded.growth_code.begin(), decoded.growth_code.end(), out.growth_code);
 }
 
 void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,
@@ -239,6 +241,7 @@ BrickSplats decodeForMerging(const RootCube& root, const Brick& brick, std::span
   out.splats.resize(brick.splats);
   fillGeometry(root, decoded, out);
   out.border_codes = decoded.border_code;
+  out.growth_codes = decoded.growth_code;
   SplatVariable variable;
   for (size_t v = 0; v < values.size(); ++v) {
     decodeVariable(brick, variables[v], values[v], variable);

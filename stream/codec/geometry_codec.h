@@ -1,10 +1,11 @@
-// The geometry stream of a brick: node runs, positions, shapes, weights and border codes.
+// The geometry stream of a brick: node runs, positions, shapes, weights, border codes and growth codes.
 //
 //   GeometryHeader | zstd frame: node runs (varints)
 //                              | planes of x, y, z
 //                              | planes of ln a0, ln a1, ln volume, l21, l10, l20
 //                              | planes of the weights
 //                              | planes of the border codes
+//                              | planes of the growth codes
 //
 //   positions      the highest `position_bits` bits of the lattice position in the cell; decoded as the
 //                  middle of their interval
@@ -16,6 +17,8 @@
 //                  is V = 0.
 //   border codes   the four bytes of the code (stream/model/border_code.h), lowest first; absent (no
 //                  kHasBorders) if the brick has none
+//   growth codes   bits 0-14 of the code (stream/model/growth_code.h), then its other bits; absent (no kHasGrowth)
+//                  if the brick has none
 //
 // Shapes or weights that do not fit these codes are stored as raw 64-bit floats (kRawShapes, kRawWeights).
 // stream/FORMAT.md has every formula.
@@ -33,18 +36,19 @@
 
 namespace curvisplat {
 
-inline constexpr uint8_t kRawShapes = 1, kRawWeights = 2, kHasBorders = 4;
-inline constexpr size_t kLargestGeometryArrays = 3 + 12 + 2 + 4;
+inline constexpr uint8_t kRawShapes = 1, kRawWeights = 2, kHasBorders = 4, kHasGrowth = 8;
+inline constexpr int kGrowthBitsOfFirstArray = 15;
+inline constexpr size_t kLargestGeometryArrays = 3 + 12 + 2 + 4 + 2;
 
 struct GeometryHeader {
   uint8_t position_bits;                    //  0: 5..32
-  uint8_t raw;                              //  1: kRawShapes, kRawWeights, kHasBorders
+  uint8_t raw;                              //  1: kRawShapes, kRawWeights, kHasBorders, kHasGrowth
   uint16_t reserved;                        //  2: zero
   uint32_t runs_bytes;                      //  4: length of the varints, unpacked
   double log_axis0, log_axis1, log_volume;  //  8: natural logarithms of the brick's smallest a0, a1, volume
-  // 32: in the order of the planes: x, y, z, ln a0, ln a1, ln volume, l21, l10, l20, weight, border codes
+  // 32: in the order of the planes: x, y, z, ln a0, ln a1, ln volume, l21, l10, l20, weight, border codes, growth codes
   std::array<ArrayCode, kLargestGeometryArrays> arrays;
-  uint8_t more_reserved[6];  // 74: zero
+  uint8_t more_reserved[2];  // 78: zero
 };                           // 80
 static_assert(sizeof(GeometryHeader) == 80);
 
@@ -54,7 +58,7 @@ struct DecodedGeometry {
   std::array<std::vector<uint32_t>, 3> position;  // in units of cell size / 2^position_bits
   std::array<std::vector<double>, 3> axis, shear;
   std::vector<double> weight;
-  std::vector<uint32_t> border_code;
+  std::vector<uint32_t> border_code, growth_code;
   std::vector<NodeRun> runs;
   std::vector<Row> rows;
 

@@ -9,6 +9,7 @@
 #include "stream/codec/geometry_steps.h"
 #include "stream/codec/planes.h"
 #include "stream/model/border_code.h"
+#include "stream/model/growth_code.h"
 
 namespace curvisplat {
 namespace {
@@ -32,6 +33,7 @@ class GeometryDecoder {
     }
     decodeWeights();
     decodeBorders();
+    decodeGrowth();
     checkFinite();
   }
 
@@ -142,6 +144,22 @@ class GeometryDecoder {
     if (!fine) throw Error("a border code is invalid");
   }
 
+  void decodeGrowth() {
+    std::fill(out_.growth_code.begin(), out_.growth_code.end(), kNoGrowth);
+    if (!(header_.raw & kHasGrowth)) return;
+    auto& codes = GeometryDecoder::codes();
+    readPredicted(out_.growth_code);
+    readPredicted(codes);
+    bool fine = true;
+    for (size_t n = 0; n < count_; ++n) {
+      fine &= out_.growth_code[n] >> kGrowthBitsOfFirstArray == 0 &&
+              codes[n] >> (32 - kGrowthBitsOfFirstArray) == 0;
+      out_.growth_code[n] |= codes[n] << kGrowthBitsOfFirstArray;
+      fine &= isPossibleGrowthCode(out_.growth_code[n]);
+    }
+    if (!fine) throw Error("a growth code is invalid");
+  }
+
   /// Throws Error for infinite or NaN numbers, and for axes or weights out of range. One comparison per
   /// element and no branches.
   void checkFinite() const {
@@ -187,7 +205,7 @@ class GeometryDecoder {
 
 size_t arraysOf(const GeometryHeader& header) {
   return 3 + (header.raw & kRawShapes ? 12 : 6) + (header.raw & kRawWeights ? 2 : 1) +
-         (header.raw & kHasBorders ? 4 : 0);
+         (header.raw & kHasBorders ? 4 : 0) + (header.raw & kHasGrowth ? 2 : 0);
 }
 
 }  // namespace
@@ -198,6 +216,7 @@ void DecodedGeometry::resize(size_t count) {
     for (auto& array : *arrays) array.resize(count);
   weight.resize(count);
   border_code.resize(count);
+  growth_code.resize(count);
 }
 
 void decodeGeometryStream(const Cell& cell, uint32_t count, std::span<const std::byte> bytes,
@@ -211,7 +230,8 @@ void decodeGeometryStream(const Cell& cell, uint32_t count, std::span<const std:
       header.position_bits > std::min(kMaxPositionBits, lattice_bits))
     throw Error("it has {} bits per position (expected {} to {})", header.position_bits, kMinPositionBits,
                 std::min(kMaxPositionBits, lattice_bits));
-  if (header.raw > (kRawShapes | kRawWeights | kHasBorders) || header.runs_bytes > kMaxRunBytes * count)
+  if (header.raw > (kRawShapes | kRawWeights | kHasBorders | kHasGrowth) ||
+      header.runs_bytes > kMaxRunBytes * count)
     throw Error("its header is invalid");
   size_t unpacked = header.runs_bytes;
   for (size_t n = 0; n < arraysOf(header); ++n) {

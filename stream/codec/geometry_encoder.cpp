@@ -7,6 +7,7 @@
 #include "stream/codec/geometry_steps.h"
 #include "stream/codec/planes.h"
 #include "stream/model/border_code.h"
+#include "stream/model/growth_code.h"
 #include "stream/model/kernel.h"
 #include "stream/model/shape_extent.h"
 
@@ -50,6 +51,7 @@ class GeometryEncoder {
     }
     encodeWeights();
     encodeBorders();
+    encodeGrowth();
     return planes_.compress(std::as_bytes(std::span(&header_, 1)));
   }
 
@@ -188,6 +190,21 @@ class GeometryEncoder {
       for (size_t n = 0; n < count_; ++n) codes_[n] = border_codes[n] >> shift & 0xff;
       addPredicted(codes_);
     }
+  }
+
+  void encodeGrowth() {
+    const auto& growth_codes = brick_.growth_codes;
+    std::fill(decoded_.growth_code.begin(), decoded_.growth_code.end(), kNoGrowth);
+    if (std::all_of(growth_codes.begin(), growth_codes.end(),
+                    [](uint32_t code) { return code == kNoGrowth; }))
+      return;
+    header_.raw |= kHasGrowth;
+    decoded_.growth_code = growth_codes;
+    constexpr uint32_t kFirst = (1u << kGrowthBitsOfFirstArray) - 1;
+    for (size_t n = 0; n < count_; ++n) codes_[n] = growth_codes[n] & kFirst;
+    addPredicted(codes_);
+    for (size_t n = 0; n < count_; ++n) codes_[n] = growth_codes[n] >> kGrowthBitsOfFirstArray;
+    addPredicted(codes_);
   }
 
   void addPredicted(std::span<const uint32_t> values) {

@@ -18,6 +18,7 @@ struct BrickSplats {
   std::vector<RootPosition> positions;              // in `cell`
   std::vector<Splat> splats;                        // .position is ignored in favour of `positions`
   std::vector<uint32_t> border_codes;               // [splat]; stream/model/border_code.h. Empty: no borders
+  std::vector<uint32_t> growth_codes;               // [splat]; stream/model/growth_code.h. Empty: no growth
   std::vector<std::vector<SplatScalar>> variables;  // [variable][splat]
 
   size_t size() const { return splats.size(); }

@@ -11,9 +11,9 @@ void SplatVariable::resize(size_t count) {
 }
 
 GeometryArrays<float> arraysOf(SplatGeometry& g) {
-  return {g.x.data(),       g.y.data(),      g.z.data(),           g.axis0.data(),
-          g.axis1.data(),   g.axis2.data(),  g.shear10.data(),     g.shear20.data(),
-          g.shear21.data(), g.weight.data(), g.border_code.data(), g.size()};
+  return {g.x.data(),           g.y.data(),           g.z.data(),       g.axis0.data(),   g.axis1.data(),
+          g.axis2.data(),       g.shear10.data(),     g.shear20.data(), g.shear21.data(), g.weight.data(),
+          g.border_code.data(), g.growth_code.data(), g.size()};
 }
 
 VariableArrays<float> arraysOf(SplatVariable& v) {
@@ -21,9 +21,9 @@ VariableArrays<float> arraysOf(SplatVariable& v) {
 }
 
 GeometryArrays<const float> arraysOf(const SplatGeometry& g) {
-  return {g.x.data(),       g.y.data(),      g.z.data(),           g.axis0.data(),
-          g.axis1.data(),   g.axis2.data(),  g.shear10.data(),     g.shear20.data(),
-          g.shear21.data(), g.weight.data(), g.border_code.data(), g.size()};
+  return {g.x.data(),           g.y.data(),           g.z.data(),       g.axis0.data(),   g.axis1.data(),
+          g.axis2.data(),       g.shear10.data(),     g.shear20.data(), g.shear21.data(), g.weight.data(),
+          g.border_code.data(), g.growth_code.data(), g.size()};
 }
 
 VariableArrays<const float> arraysOf(const SplatVariable& v) {

@@ -25,6 +25,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "stream/model/border_code.h"
+#include "stream/model/growth_code.h"
 #include "stream/model/octree.h"
 
 namespace curvisplat {
@@ -57,6 +59,11 @@ struct SplatScalar {
   double variance = 0;
 };
 
+/// What a splat's surroundings are like.
+struct SplatCodes {
+  uint32_t border = kNoBorder, growth = kNoGrowth;  // border_code.h, growth_code.h
+};
+
 /// The geometry of a brick's splats, decoded. All arrays have size() elements.
 struct SplatGeometry {
   std::vector<float> x, y, z;              // world units from the minimum corner of the brick's cell, >= 0
@@ -64,19 +71,22 @@ struct SplatGeometry {
   std::vector<float> shear10, shear20, shear21;
   std::vector<float> weight;          // world units cubed
   std::vector<uint32_t> border_code;  // stream/model/border_code.h: kNoBorder except for cells at a border
+  std::vector<uint32_t>
+      growth_code;  // stream/model/growth_code.h: kNoGrowth where cells are about as long as their neighbours
 
   size_t size() const { return x.size(); }
   void resize(size_t count);
 };
 
-/// Calls visit() with each array of a SplatGeometry or a GeometryArrays; the border codes, which are of another type,
-/// come last.
+/// Calls visit() with each array of a SplatGeometry or a GeometryArrays; the codes, which are of another type, come
+/// last.
 template <typename Geometry, typename Visit>
 void forEachArrayOfGeometry(Geometry&& g, Visit&& visit) {
   for (auto* array :
        {&g.x, &g.y, &g.z, &g.axis0, &g.axis1, &g.axis2, &g.shear10, &g.shear20, &g.shear21, &g.weight})
     visit(*array);
   visit(g.border_code);
+  visit(g.growth_code);
 }
 /// The same for a SplatVariable or a VariableArrays.
 template <typename Variable, typename Visit>
@@ -84,7 +94,7 @@ void forEachArrayOfVariable(Variable&& v, Visit&& visit) {
   for (auto* array : {&v.mean, &v.slope0, &v.slope1, &v.slope2, &v.variance}) visit(*array);
 }
 /// How many arrays these two visit.
-inline constexpr size_t kArraysOfSplats = 16;
+inline constexpr size_t kArraysOfSplats = 17;
 
 /// The geometry's arrays, borrowed: where a decoder writes (T = float) or a projector reads (T = const
 /// float).
@@ -94,12 +104,12 @@ struct GeometryArrays {
   T *axis0, *axis1, *axis2;
   T *shear10, *shear20, *shear21;
   T* weight;
-  std::conditional_t<std::is_const_v<T>, const uint32_t, uint32_t>* border_code;
+  std::conditional_t<std::is_const_v<T>, const uint32_t, uint32_t>*border_code, *growth_code;
   size_t count;
 
   size_t size() const { return count; }
   operator GeometryArrays<const float>() const requires(!std::is_const_v<T>) {
-    return {x, y, z, axis0, axis1, axis2, shear10, shear20, shear21, weight, border_code, count};
+    return {x, y, z, axis0, axis1, axis2, shear10, shear20, shear21, weight, border_code, growth_code, count};
   }
 };
 

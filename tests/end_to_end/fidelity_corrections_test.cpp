@@ -196,6 +196,21 @@ TEST_F(Corrections, StretchOfUnevenCells) {
               40, {}, without);
 }
 
+TEST_F(Corrections, SkewOfGrowingCells) {
+  // A uniform medium in cells that grow by a quarter from one to the next, along two axes.
+  const FunctionGridSource growing({gridBlock(25, 25, 9)}, 1, [](const GridNode& n) {
+    const auto at = [](uint64_t i) { return (std::pow(1.25, static_cast<double>(i)) - 1) / 100; };
+    return NodeValues{{at(n.i), at(n.j), static_cast<double>(n.k) / 8}, {0.5f}, false};
+  });
+  DirectOptions without;
+  without.nodes.growth = false;
+  Camera camera;
+  camera.position = {0.5, 0.5, 4};
+  camera.focal_point = {0.5, 0.5, 0.5};
+  camera.parallel_scale = 0.4;  // no borders
+  expectWorth("skew of growing cells", growing, GridField(growing, 0), "smooth", camera, 50, {}, without);
+}
+
 TEST_F(Corrections, Seams) {
   // Seen along the seams of a uniform medium.
   const auto constant = scene("half-annulus-constant");

@@ -41,16 +41,19 @@ TEST(SplatRecord, RoundTripsToSinglePrecision) {
     }
     std::vector<SplatScalar> values{{0.25, {1, 2, 3}, 0}, {-7, {0.5, 0, -1}, 0}};
     if (!splat.regular) values[1].variance = 0.125;
+    if (n % 3 == 0) splat.growth_code = 0x1234567;
     const RootPosition position{{random() >> 16, random() >> 16, random() >> 16}};
     record.clear();
     packRecord(splat, values, position, record);
-    ASSERT_EQ(record.size(), splat.regular ? 79u : 95u);
+    ASSERT_EQ(record.size(), splat.regular ? 83u : 99u);
     EXPECT_EQ(recordBytes(record.data(), 2), record.size());
     EXPECT_EQ(recordNode(record.data()), splat.node);
     EXPECT_EQ(recordPosition(record.data()), position);
     Splat back;
     std::vector<SplatScalar> values_back(2);
-    EXPECT_EQ(unpackRecord(record.data(), back, values_back), splat.border_code);
+    const SplatCodes codes = unpackRecord(record.data(), back, values_back);
+    EXPECT_EQ(codes.border, splat.border_code);
+    EXPECT_EQ(codes.growth, splat.growth_code);
     for (int axis = 0; axis < 3; ++axis) {
       EXPECT_NEAR(back.axis[axis], splat.splat.axis[axis], 8e-6 * splat.splat.axis[axis]);
       EXPECT_FLOAT_EQ(back.shear[axis], splat.splat.shear[axis]);

@@ -21,10 +21,11 @@ struct Line {
   }
 
   NodePositions nodes() const { return {x.data(), zero.data(), zero.data()}; }
-  float stretch(size_t n) const {
+  Stretch at(size_t n) const {
     return stretchOnLine(nodes(), static_cast<ptrdiff_t>(n), 1, static_cast<int>(n),
                          static_cast<int>(x.size() - 1 - n));
   }
+  float stretch(size_t n) const { return at(n).factor; }
 };
 
 /// The definition, by logarithms.
@@ -56,6 +57,27 @@ TEST(Stretch, LeavesSteadyGrowthAloneWhateverItIs) {
   }
 }
 
+TEST(Stretch, KnowsSteadyGrowthUpToTheEnds) {
+  for (const double growth : {1.0, 0.9, 1.05, 1.25, 1.5, 0.6}) {
+    std::vector<double> steps;
+    for (int n = 0; n < 9; ++n) steps.push_back(std::pow(growth, n));
+    const Line line = Line::ofSteps(steps);
+    for (size_t n = 0; n < line.x.size(); ++n)
+      EXPECT_NEAR(line.at(n).growth, std::log(growth), 0.001) << growth << " " << n;
+  }
+}
+
+TEST(Stretch, GrowthIsTheSmoothedSlopeOfTheLogarithm) {
+  const auto squared = [](double extent) { return extent * extent; };
+  const double before2 = 0.7, before = 1.1, after = 1.3, after2 = 1.2;
+  const double slope = (std::log(after2 / before2) + 2 * std::log(after / before)) / 8;
+  EXPECT_NEAR(growthOf(squared(before2), squared(before), squared(after), squared(after2)), slope, 1e-4);
+  EXPECT_EQ(growthOf(1, 2, 2, 1), 0);
+  EXPECT_EQ(growthOf(0, 1, 1, 1), 0);
+  EXPECT_EQ(growthOf(NAN, 1, 1, 1), 0);
+  EXPECT_LT(growthOf(1, 1, 1e300, 1e300), 0.7);
+}
+
 TEST(Stretch, OfSpectralElementsIsTheSameWhereALineEndsBetweenTwo) {
   // Elements of three steps each, symmetric: their border is a mirror.
   const std::vector<double> whole_steps{1, 1.6, 1, 1, 1.6, 1, 1, 1.6, 1, 1, 1.6, 1};
@@ -80,13 +102,15 @@ TEST(Stretch, OfARowIsThatOfItsNodes) {
   for (const ptrdiff_t stride : {1, 7}) {
     const ptrdiff_t first = 3 * stride;
     const size_t count = x.size() - static_cast<size_t>(6 * stride);
-    std::vector<float> row(count);
-    stretchNodes(nodes, first, stride, count, row.data());
+    std::vector<float> row(count), growth(count);
+    stretchNodes(nodes, first, stride, count, row.data(), growth.data());
     for (size_t n = 0; n < count; ++n) {
       const ptrdiff_t at = first + static_cast<ptrdiff_t>(n);
       const auto before = static_cast<int>(at / stride),
                  after = static_cast<int>((static_cast<ptrdiff_t>(x.size()) - 1 - at) / stride);
-      EXPECT_EQ(row[n], stretchOnLine(nodes, at, stride, before, after)) << stride << " " << n;
+      const Stretch alone = stretchOnLine(nodes, at, stride, before, after);
+      EXPECT_EQ(row[n], alone.factor) << stride << " " << n;
+      EXPECT_EQ(growth[n], alone.growth) << stride << " " << n;
     }
   }
 }

@@ -4,7 +4,7 @@
 //
 //      u64 splats, u64 runs
 //      u64 x 5 for each run: block, k, j, i, count
-//      f32 x splats for each of x y z a0 a1 a2 l10 l20 l21 weight; u32 x splats: border codes
+//      f32 x splats for each of x y z a0 a1 a2 l10 l20 l21 weight; u32 x splats: border codes; the same: growth codes
 //      f32 x splats for each variable and each of mean, slope 0 1 2, variance
 //
 //    dump_cache --make FOLDER   makes caches that use rare parts of the format:
@@ -22,6 +22,7 @@
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_writer.h"
 #include "stream/model/border_code.h"
+#include "stream/model/growth_code.h"
 #include "tests/support/random_cache.h"
 
 namespace curvisplat {
@@ -68,6 +69,8 @@ void addSample(double i, double j, double k, BrickSplats& brick) {
   brick.splats.push_back(splat);
   const glm::dvec3 inward(std::cos(0.1 * i), std::sin(0.1 * i), 0);
   brick.border_codes.push_back(j == 0 ? packBorderCode({&inward, 1}) : kNoBorder);
+  const glm::dvec3 across_inward(-inward.y, inward.x, 0);
+  brick.growth_codes.push_back(packGrowthCode({inward, across_inward, {0, 0, 1}}, {0.1 * j, -0.02 * i, 0}));
   brick.variables[0].push_back({0.01 * (i * i + j * j) + k, {0.02 * i, 0.02 * j, 1}, 0});
   brick.variables[1].push_back({along * across, {along, across, 0}, 0.01 * i});
 }

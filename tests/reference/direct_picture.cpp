@@ -25,13 +25,14 @@ namespace {
 struct DirectSplat {
   Splat splat;
   SplatScalar value;
-  uint32_t border_code = kNoBorder;
+  SplatCodes codes = {};
 };
 
 std::vector<DirectSplat> splatsOf(const GridSource& source, uint32_t scalar, const DirectOptions& options) {
   std::vector<DirectSplat> out;
   const auto take = [&](const NodeSplat& node, std::span<const SplatScalar> values) {
-    out.push_back({node.splat, values[0], options.border_parts ? node.border_code : kNoBorder});
+    out.push_back(
+        {node.splat, values[0], {options.border_parts ? node.border_code : kNoBorder, node.growth_code}});
   };
   SeamMerger seams(1, uint64_t{64} << 20, std::filesystem::temp_directory_path(), options.unlike);
   uint64_t first_node = 0;
@@ -82,7 +83,7 @@ void toArrays(const std::vector<DirectSplat>& splats, const glm::dvec3& origin, 
   variable.resize(splats.size());
   for (size_t n = 0; n < splats.size(); ++n)
     setSplat(geometry, variable, n, splats[n].splat.position - origin, splats[n].splat, splats[n].value,
-             splats[n].border_code);
+             splats[n].codes);
 }
 
 /// The layers of the scene, its slices through these splats.
@@ -128,7 +129,7 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
   }
   glm::dvec3 origin = splats.front().splat.position;
   double low = splats.front().value.mean, high = low;
-  for (const auto& [splat, value, border_code] : splats) {
+  for (const auto& [splat, value, codes] : splats) {
     origin = glm::min(origin, splat.position);
     low = std::min(low, value.mean);
     high = std::max(high, value.mean);

@@ -6,6 +6,7 @@
 #include <random>
 #include <utility>
 
+#include "render/project/footprint_skew.h"
 #include "render/project/light.h"
 
 namespace curvisplat {
@@ -38,6 +39,12 @@ std::vector<ScreenSplat> randomSplats(int count, uint32_t seed, ImageSize size, 
     splats.push_back({width * (1.4f * unit(random) - 0.2f), height * (1.4f * unit(random) - 0.2f), l11, l21,
                       l22, opacity * unit(random), 1.4f * unit(random) - 0.2f, slope * around(random),
                       slope * around(random), 0.2f * unit(random)});
+  }
+  // Half of them skewed, without a change to the numbers above.
+  for (size_t n = 0; n < splats.size(); n += 2) {
+    FootprintSkew skew;
+    for (float& t : skew.t) t = 0.4f * around(random);
+    splats[n].skew = skew.pack();
   }
   return splats;
 }

@@ -18,7 +18,7 @@ ClassificationTable lively(bool log_scale = false);
 /// Without a jump: straight lines fit.
 ClassificationTable smooth(bool log_scale = false);
 
-/// Round, lean and thin ones. Some lie outside of the image, some are larger than it, some much thinner than
+/// Round, lean and thin ones, every other one skewed. Some lie outside of the image, some are larger than it, some much thinner than
 /// a pixel.
 std::vector<ScreenSplat> randomSplats(int count, uint32_t seed, ImageSize size, float slope = 0.3f,
                                       float opacity = 0.5f);

@@ -3,14 +3,13 @@
 
 #include <glm/vec3.hpp>
 
-#include "stream/model/border_code.h"
 #include "stream/model/splats.h"
 
 namespace curvisplat {
 
 /// Sets splat `n`; `position` is from the arrays' origin.
 inline void setSplat(SplatGeometry& geometry, SplatVariable& variable, size_t n, const glm::dvec3& position,
-                     const Splat& splat, const SplatScalar& scalar, uint32_t border_code = kNoBorder) {
+                     const Splat& splat, const SplatScalar& scalar, SplatCodes codes = {}) {
   geometry.x[n] = static_cast<float>(position.x);
   geometry.y[n] = static_cast<float>(position.y);
   geometry.z[n] = static_cast<float>(position.z);
@@ -21,7 +20,8 @@ inline void setSplat(SplatGeometry& geometry, SplatVariable& variable, size_t n,
   geometry.shear20[n] = static_cast<float>(splat.shear[1]);
   geometry.shear21[n] = static_cast<float>(splat.shear[2]);
   geometry.weight[n] = static_cast<float>(splat.weight);
-  geometry.border_code[n] = border_code;
+  geometry.border_code[n] = codes.border;
+  geometry.growth_code[n] = codes.growth;
   variable.mean[n] = static_cast<float>(scalar.mean);
   variable.slope0[n] = static_cast<float>(scalar.slope.x);
   variable.slope1[n] = static_cast<float>(scalar.slope.y);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "render/project/footprint_skew.h"
 #include "render/project/kernel.h"
 #include "render/project/light.h"
 
@@ -71,7 +72,8 @@ glm::dvec4 contribution(const ScreenSplat& splat, const Cuts& cuts, double dx, d
   const double u0 = dx / splat.l11;
   const double u1 = (dy - splat.l21 * u0) / splat.l22;
   const Remainder left = cuts.cut || cuts.depth ? remainderOf(cuts, u0, u1) : Remainder{};
-  const double depth = std::abs(splat.amplitude) * footprint(std::hypot(u0, u1)) * left.share;
+  const double skew = FootprintSkew::unpack(splat.skew).at(u0, u1);
+  const double depth = std::abs(splat.amplitude) * footprint(std::hypot(u0, u1)) * skew * left.share;
   if (depth == 0) return glm::dvec4(0.0);
   const double widest = shading.lit ? unpackHalfWidth(splat.half_width) : splat.half_width;
   const Lit lit = shading.lit ? unpackLit(splat.half_width) : Lit{};

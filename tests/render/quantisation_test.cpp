@@ -39,7 +39,8 @@ Splats inArrays(const RootCube& root, const BrickSplats& brick) {
   variable.resize(brick.size());
   for (size_t n = 0; n < brick.size(); ++n) {
     const glm::dvec3 position = root.toWorld(brick.positions[n]) - root.cellMin(brick.cell);
-    setSplat(geometry, variable, n, position, brick.splats[n], brick.variables[0][n], brick.border_codes[n]);
+    setSplat(geometry, variable, n, position, brick.splats[n], brick.variables[0][n],
+             {brick.border_codes[n], brick.growth_codes[n]});
   }
   return out;
 }
@@ -73,6 +74,7 @@ std::vector<BrickSplats> halfAnnulusBricks(RootCube& root) {
       brick.positions.push_back(root.fromWorld(node.splat.position));
       brick.splats.push_back(node.splat);
       brick.border_codes.push_back(node.border_code);
+      brick.growth_codes.push_back(node.growth_code);
     }
     for (uint64_t row = 0; row < splats.splats.size() / kNodes.ni; ++row)
       brick.runs.push_back({0, 0, row % kNodes.nj, k + row / kNodes.nj, kNodes.ni});

@@ -68,8 +68,8 @@ TEST(BrickCache, GivesBackWhatWasPutIn) {
 }
 
 TEST(BrickCache, ChargesEveryArray) {
-  EXPECT_EQ(BrickCache::charge(16), 16u * 64);
-  EXPECT_EQ(BrickCache::charge(17), 16u * 128);
+  EXPECT_EQ(BrickCache::charge(16), 17u * 64);
+  EXPECT_EQ(BrickCache::charge(17), 17u * 128);
   BrickCache cache(4 * BrickCache::charge(100));
   cache.beginEpoch({});
   for (uint32_t brick = 0; brick < 4; ++brick) EXPECT_TRUE(put(cache, brick, 100));

@@ -13,6 +13,7 @@
 
 #include "stream/base/error.h"
 #include "stream/model/border_code.h"
+#include "stream/model/growth_code.h"
 #include "tests/stream/test_bricks.h"
 
 namespace curvisplat {
@@ -284,6 +285,40 @@ TEST(Codec, KeepsHalfCells) {
   decodeGeometry(root, whole.brick, whole.geometry, floats);
   EXPECT_EQ(floats.border_code, std::vector<uint32_t>(brick.size(), kNoBorder));
   EXPECT_NEAR(encoded.brick.largest_radius / whole.brick.largest_radius, 1 + kCutReach / kKernelRadius, 1e-6);
+}
+
+TEST(Codec, KeepsGrowth) {
+  const RootCube root{};
+  BrickSplats brick = randomBrick({}, Cell{}, 6);
+  const size_t without = encodeBrick(root, brick).geometry.size();
+  brick.growth_codes.assign(brick.size(), kNoGrowth);
+  EXPECT_EQ(encodeBrick(root, brick).geometry.size(), without);
+
+  const std::array<glm::dvec3, 3> axes{glm::dvec3(0, 0.6, 0.8), {1, 0, 0}, {0, -0.8, 0.6}};
+  for (size_t n = 0; n < brick.size(); n += 3)
+    brick.growth_codes[n] = packGrowthCode(axes, {0.2, n % 2 == 0 ? 0 : -0.5, 0.1});
+  const EncodedBrick encoded = encodeBrick(root, brick);
+  EXPECT_EQ(
+      decodeForMerging(root, encoded.brick, encoded.geometry, encoded.variables, encoded.values).growth_codes,
+      brick.growth_codes);
+  SplatGeometry floats;
+  decodeGeometry(root, encoded.brick, encoded.geometry, floats);
+  EXPECT_EQ(floats.growth_code, brick.growth_codes);
+  // Scratch of the brick before is not taken for this one's.
+  brick.growth_codes.clear();
+  const EncodedBrick steady = encodeBrick(root, brick);
+  decodeGeometry(root, steady.brick, steady.geometry, floats);
+  EXPECT_EQ(floats.growth_code, std::vector<uint32_t>(brick.size(), kNoGrowth));
+}
+
+TEST(Codec, RefusesGrowthThatIsNone) {
+  const RootCube root{};
+  BrickSplats brick = randomBrick({}, Cell{}, 6);
+  brick.growth_codes.assign(brick.size(), kNoGrowth);
+  brick.growth_codes[1] = 11;  // a growth beyond the largest
+  const EncodedBrick encoded = encodeBrick(root, brick);
+  SplatGeometry floats;
+  EXPECT_THROW(decodeGeometry(root, encoded.brick, encoded.geometry, floats), Error);
 }
 
 TEST(Codec, CutsOffVariancesThatNoFloatHolds) {

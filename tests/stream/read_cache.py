@@ -15,7 +15,7 @@ import xxhash
 import zstandard
 
 checksum = xxhash.xxh3_64_intdigest
-RAW_SHAPES, RAW_WEIGHTS, BORDERS = 1, 2, 4
+RAW_SHAPES, RAW_WEIGHTS, BORDERS, GROWTH = 1, 2, 4, 8
 SHAPE = ["a0", "a1", "a2", "l10", "l20", "l21"]
 VALUES = ["mean", "slope0", "slope1", "slope2", "variance"]
 
@@ -132,9 +132,10 @@ def rows_of(runs, count):  # runs: (block, k, j, i, count)
 def decode_geometry(data, brick, root):
     bits, flags, _, varint_bytes, log0, log1, log_volume = struct.unpack_from("<BBHIddd", data)
     count, level = brick["splats"], brick["level"]
-    need(flags <= 7 and 5 <= bits <= min(32, 48 - level) and varint_bytes <= 50 * count, "geometry header")
+    need(flags <= 15 and 5 <= bits <= min(32, 48 - level) and varint_bytes <= 50 * count, "geometry header")
     arrays = 3 + (12 if flags & RAW_SHAPES else 6) + (2 if flags & RAW_WEIGHTS else 1) + (4 if flags & BORDERS else 0)
-    contents = Contents(data[80:], varint_bytes, list(zip(data[32:74:2], data[33:74:2]))[:arrays], count)
+    arrays += 2 if flags & GROWTH else 0
+    contents = Contents(data[80:], varint_bytes, list(zip(data[32:78:2], data[33:78:2]))[:arrays], count)
 
     runs, run = [], [0] * 5
     need(len(contents.varints) % 5 == 0, "node runs")
@@ -177,6 +178,11 @@ def decode_geometry(data, brick, root):
         value = contents.values()
         need(value.max() <= 255, "border code")
         out["border"] |= value << np.uint64(8 * byte)
+    out["growth"] = np.zeros(count, np.uint64)
+    if flags & GROWTH:
+        growth, rotation = contents.values(), contents.values()
+        need(growth.max() < 1 << 15 and rotation.max() < 1 << 12, "growth code")
+        out["growth"] = growth | rotation << np.uint64(15)
     return out
 
 
@@ -212,7 +218,7 @@ class Cache:
         self.manifest = json.loads(text)
         version, requires = self.manifest["version"], self.manifest.get("requires", [])
         need(self.manifest["format"] == "curvisplat splat cache" and version == (2 if requires else 1), "format version")
-        need(set(requires) <= {"border-faces", "steps"}, "required feature")
+        need(set(requires) <= {"border-faces", "cell-growth", "steps"}, "required feature")
         self.files = {file["name"]: file for file in self.manifest["files"]}
         if "steps" in requires:
             self.open_step(text)

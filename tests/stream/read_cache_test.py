@@ -57,8 +57,9 @@ def compare(cache, dump, seen):
             sys.exit(f"{cache.folder}: brick {n} has other node runs than the program decodes")
         for name in (*"xyz", *read_cache.SHAPE, "weight"):
             same(n, name, rounded(name, geometry[name], size), np.frombuffer(dump.read(4 * int(splats)), "<f4"), "")
-        border = np.frombuffer(dump.read(4 * int(splats)), "<u4")
-        same(n, "border code", geometry["border"].astype(np.float64), border.astype(np.float64), "")
+        for name in ("border", "growth"):
+            code = np.frombuffer(dump.read(4 * int(splats)), "<u4")
+            same(n, f"{name} code", geometry[name].astype(np.float64), code.astype(np.float64), "")
         for number in cache.tables:
             values = cache.values(number, n)
             for name in read_cache.VALUES:

@@ -1,0 +1,52 @@
+// The splats of a structured grid: of its nodes, or of its cells where the scalars are cell-centred. Those of
+// block faces go through the seam merger, and cells look for the blocks that they abut on.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "preprocess/convert/memory_plan.h"
+#include "preprocess/convert/splat_origin.h"
+#include "preprocess/grid/node_reader.h"
+#include "preprocess/splats/abutting_faces.h"
+#include "preprocess/splats/seams.h"
+
+namespace curvisplat {
+
+class GridOrigin final : public SplatOrigin {
+ public:
+  /// `source` must outlive it. Temporary files go to `scratch`. Throws Error if node-centred and cell-centred
+  /// scalars are mixed.
+  GridOrigin(const GridSource& source, std::vector<uint32_t> scalars, std::optional<double> blank_value,
+             const MemoryPlan& plan, std::filesystem::path scratch);
+
+  /// Makes the plan's slabs large enough for the grid's rows. Throws Error that names a sufficient cap.
+  static void requireMemory(const GridSource& source, const std::vector<uint32_t>& scalars, MemoryPlan& plan);
+
+  const GridDescription& description() const override { return reader_.source().description(); }
+  Centring centring() const override { return reader_.centring(); }
+  const std::vector<GridBlock>& blocks() const override { return description().blocks; }
+  uint64_t temporaryBytes() const override;
+
+  GridSurvey survey(Progress& progress) override;
+  std::vector<std::string> warnings(Progress& progress) override;
+  void count(const RootCube& root, CountingGrid& counts, Progress& progress) override;
+  ScatterCounts scatter(const SinkOfThread& sink_of_thread, Progress& progress) override;
+  uint64_t finish(SplatSink& sink, Progress& progress) override;
+  std::optional<FileInfo> writeFaces(const FacesJob& job, Progress& progress) override {
+    return writeGridFaces(reader_, job, progress);
+  }
+
+ private:
+  AbuttingFaces::Needs needsOfFaces() const;
+
+  const NodeReader reader_;
+  const MemoryPlan plan_;
+  const std::filesystem::path scratch_;
+  std::unique_ptr<AbuttingFaces> faces_;  // of cells
+  std::unique_ptr<SeamMerger> seams_;     // of nodes
+};
+
+}  // namespace curvisplat

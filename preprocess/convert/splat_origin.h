@@ -1,0 +1,73 @@
+// SplatOrigin, the interface between what makes splats and the passes that put them into a cache: a structured
+// grid is one origin (grid_origin.h). Conversion calls, in this order and in one thread:
+//
+//    survey()   --> bounds, ranges, number of samples
+//    warnings()
+//    count()    --> where the splats are dense, about
+//    scatter()  --> splats, from any number of threads
+//    finish()   --> the splats that had to wait for all others
+//
+// and writeFaces(). A conversion that is resumed calls none of the others once all splats are on disk.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "preprocess/convert/counting_grid.h"
+#include "preprocess/faces/grid_faces_pass.h"
+#include "preprocess/grid/grid_source.h"
+#include "preprocess/splats/node_splats.h"
+#include "preprocess/survey/grid_survey.h"
+#include "stream/base/progress.h"
+#include "stream/model/octree.h"
+
+namespace curvisplat {
+
+/// Where a pass sends its splats.
+class SplatSink {
+ public:
+  virtual ~SplatSink() = default;
+  /// One value for each scalar that is converted.
+  virtual void add(const NodeSplat& splat, std::span<const SplatScalar> values) = 0;
+};
+
+/// Gives a sink of the calling thread's own, always the same one.
+using SinkOfThread = std::function<SplatSink&()>;
+
+struct ScatterCounts {
+  uint64_t degenerate = 0;  // splats with a floored axis
+  uint64_t inverted = 0;    // cells of the handedness that fewer of their block's cells have
+};
+
+/// What it returns depends on its files, scalars and blank value alone: not on threads or memory. All functions
+/// throw Error if a file or the disk fails, and Interrupted if the progress is stopped.
+class SplatOrigin {
+ public:
+  virtual ~SplatOrigin() = default;
+
+  virtual const GridDescription& description() const = 0;
+  /// Where the samples are.
+  virtual Centring centring() const = 0;
+  /// The samples' numbers count through these, i fastest; NodeSplat::node is one.
+  virtual const std::vector<GridBlock>& blocks() const = 0;
+  /// Bytes of temporary files that survey() and scatter() need beside the splats', at the most.
+  virtual uint64_t temporaryBytes() const { return 0; }
+
+  /// Throws Error if there is nothing to draw.
+  virtual GridSurvey survey(Progress& progress) = 0;
+  /// What is odd about the grid, a line each.
+  virtual std::vector<std::string> warnings(Progress&) { return {}; }
+  /// Counts the splats by cells of `root`, about: a wrong count makes buckets of uneven sizes, no other cache.
+  virtual void count(const RootCube& root, CountingGrid& counts, Progress& progress) = 0;
+  virtual ScatterCounts scatter(const SinkOfThread& sink_of_thread, Progress& progress) = 0;
+  /// Returns how many samples became part of another one's splat.
+  virtual uint64_t finish(SplatSink&, Progress&) { return 0; }
+  /// At any time, after a resumed conversion too: writes the surfaces of what the splats fill, if it has any.
+  virtual std::optional<FileInfo> writeFaces(const FacesJob&, Progress&) { return std::nullopt; }
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,138 @@
+#include "stream/model/growth_code.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
+#include <numeric>
+
+namespace curvisplat {
+namespace {
+
+constexpr double kGrowthSteps = 16;
+constexpr int kLargestGrowth = 10;  // in steps
+constexpr int kGrowthBits = 5;
+constexpr double kRotationStep = 0.08;
+constexpr int kLargestRotation = 7;  // in steps
+constexpr int kRotationBits = 4, kRotationShift = 3 * kGrowthBits;
+
+uint32_t lowBits(int value, int bits) {
+  return static_cast<uint32_t>(value) & ((1u << bits) - 1);
+}
+int signedBits(uint32_t code, int shift, int bits) {
+  const auto value = static_cast<int>(code >> shift & ((1u << bits) - 1));
+  return value < 1 << (bits - 1) ? value : value - (1 << bits);
+}
+
+/// Unit vectors, and growths in steps.
+struct Steps {
+  std::array<glm::dvec3, 3> axis;
+  std::array<int, 3> growth;
+};
+
+/// The shortest rotation from the frame's axis that is nearest to the one that grows.
+glm::dquat rotationOfOne(Steps& steps, int grows) {
+  const glm::dvec3 from = steps.axis[grows];
+  int to = 0;
+  for (int n = 1; n < 3; ++n)
+    if (std::abs(from[n]) > std::abs(from[to])) to = n;
+  const double sign = from[to] < 0 ? -1 : 1;
+  const int growth = sign < 0 ? -steps.growth[grows] : steps.growth[grows];
+  steps.growth = {};
+  steps.growth[to] = growth;
+  glm::dvec3 frame(0.0);
+  frame[to] = 1;
+  const glm::dvec3 around = glm::cross(frame, sign * from);
+  return glm::normalize(glm::dquat(1 + std::abs(from[to]), around.x, around.y, around.z));
+}
+
+/// The order and the signs of the axes that make the rotation smallest.
+glm::dquat rotationOfAll(Steps& steps) {
+  const auto& axis = steps.axis;
+  std::array<int, 3> order{0, 1, 2}, best = order;
+  double largest = -1;
+  do {
+    const double trace = std::abs(axis[order[0]].x) + std::abs(axis[order[1]].y) + std::abs(axis[order[2]].z);
+    if (trace > largest) {
+      largest = trace;
+      best = order;
+    }
+  } while (std::next_permutation(order.begin(), order.end()));
+  glm::dmat3 frame;
+  std::array<int, 3> growth;
+  int least = 0;
+  for (int n = 0; n < 3; ++n) {
+    const double sign = axis[best[n]][n] < 0 ? -1 : 1;
+    frame[n] = sign * axis[best[n]];
+    growth[n] = static_cast<int>(sign) * steps.growth[best[n]];
+    if (frame[n][n] < frame[least][least]) least = n;
+  }
+  if (glm::determinant(frame) < 0) {
+    frame[least] = -frame[least];
+    growth[least] = -growth[least];
+  }
+  steps.growth = growth;
+  const glm::dquat rotation = glm::normalize(glm::quat_cast(frame));
+  return rotation.w < 0 ? -rotation : rotation;
+}
+
+}  // namespace
+
+uint32_t packGrowthCode(std::array<glm::dvec3, 3> axis, std::array<double, 3> growth) {
+  Steps steps{axis, {}};
+  int count = 0, last = 0, none = 0;
+  for (int n = 0; n < 3; ++n) {
+    steps.growth[n] = static_cast<int>(
+        std::nearbyint(std::clamp(kGrowthSteps * growth[n], -1.0 * kLargestGrowth, 1.0 * kLargestGrowth)));
+    if (steps.growth[n] != 0) {
+      ++count;
+      last = n;
+    } else {
+      none = n;
+    }
+  }
+  if (count == 0) return kNoGrowth;
+  if (count == 2) steps.axis[none] = glm::cross(axis[(none + 1) % 3], axis[(none + 2) % 3]);
+  const glm::dquat rotation = count == 1 ? rotationOfOne(steps, last) : rotationOfAll(steps);
+  uint32_t code = 0;
+  for (int n = 0; n < 3; ++n) code |= lowBits(steps.growth[n], kGrowthBits) << n * kGrowthBits;
+  const std::array<double, 3> numbers{rotation.x, rotation.y, rotation.z};
+  for (int n = 0; n < 3; ++n) {
+    const auto number = static_cast<int>(std::nearbyint(numbers[n] / kRotationStep));
+    code |= lowBits(std::clamp(number, -kLargestRotation, kLargestRotation), kRotationBits)
+            << (kRotationShift + n * kRotationBits);
+  }
+  return code;
+}
+
+CellGrowth cellGrowth(uint32_t growth_code) {
+  CellGrowth result;
+  glm::vec3 q;
+  for (int n = 0; n < 3; ++n) {
+    result.growth[n] =
+        static_cast<float>(signedBits(growth_code, n * kGrowthBits, kGrowthBits) / kGrowthSteps);
+    q[n] = static_cast<float>(signedBits(growth_code, kRotationShift + n * kRotationBits, kRotationBits) *
+                              kRotationStep);
+  }
+  const float w = std::sqrt(std::max(0.0f, 1 - glm::dot(q, q)));
+  const glm::mat3 frame = glm::mat3_cast(glm::normalize(glm::quat(w, q.x, q.y, q.z)));
+  result.axis = {frame[0], frame[1], frame[2]};
+  return result;
+}
+
+bool isPossibleGrowthCode(uint32_t growth_code) {
+  if (growth_code == kNoGrowth) return true;
+  if (growth_code >> (kRotationShift + 3 * kRotationBits) != 0) return false;
+  bool any = false;
+  for (int n = 0; n < 3; ++n) {
+    const int growth = signedBits(growth_code, n * kGrowthBits, kGrowthBits);
+    if (std::abs(growth) > kLargestGrowth) return false;
+    any |= growth != 0;
+    if (signedBits(growth_code, kRotationShift + n * kRotationBits, kRotationBits) < -kLargestRotation)
+      return false;
+  }
+  return any;
+}
+
+}  // namespace curvisplat
