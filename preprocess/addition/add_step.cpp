@@ -192,6 +192,7 @@ class StepAddition {
 
   void addGeometry() {
     ConvertOptions options;
+    options.surfaces = false;  // the first geometry has them
     options.output = options_.cache / geometryFolderName(cache_.series().geometries());
     // A kill between the two steps below leaves a geometry that the series does not have.
     if (std::filesystem::exists(options.output)) removeAll(options.output);

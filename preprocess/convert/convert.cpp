@@ -29,6 +29,7 @@
 #include "stream/base/file.h"
 #include "stream/base/paths.h"
 #include "stream/cache/cache_writer.h"
+#include "stream/cache/faces_file.h"
 #include "stream/cache/manifest.h"
 #include "stream/cache/partial_folder.h"
 
@@ -97,14 +98,13 @@ class Conversion {
     const Pass take_up_splats[] = {{"check", "bricks", 0, &Conversion::takeUpSplats}};
     const Pass build_cache[] = {
         {"build", "nodes", nodes_, &Conversion::build},
-        {"finish", "bricks", 0, &Conversion::finish},
     };
     if (isFirst()) checkRoom();
     if (hasSplats()) {
       try {
         runPasses(take_up_splats);
         runPasses(build_cache);
-        return std::move(report_);
+        return end();
       } catch (const LostBuckets&) {
         // The machine went down before all was on its disk. The bricks that are whole still count.
         if (ranks_) throw;
@@ -113,7 +113,7 @@ class Conversion {
     }
     runPasses(scatter_grid);
     runPasses(build_cache);
-    return std::move(report_);
+    return end();
   }
 
   /// After run() has thrown: whether there is something to resume, which then stays.
@@ -182,6 +182,14 @@ class Conversion {
       }
     }
     return fromBytes<uint8_t>(ranks_->broadcast(toBytes(has)))[0] != 0;
+  }
+
+  ConvertReport end() {
+    const Pass faces[] = {{"faces", "nodes", nodes_, &Conversion::writeFaces}};
+    const Pass finish[] = {{"finish", "bricks", 0, &Conversion::finish}};
+    if (options_.surfaces) runPasses(faces);
+    runPasses(finish);
+    return std::move(report_);
   }
 
   void scan() {
@@ -284,6 +292,21 @@ class Conversion {
     joinBricks({root_, infos, splats_.tree, scratch_, partial_}, own, writer_.get(), *ranks_);
   }
 
+  void writeFaces() {
+    if (!isFirst()) return;
+    std::vector<uint32_t> numbers;
+    for (const VariableInfo& variable : variables()) numbers.push_back(variable.number);
+    const FacesJob job{workspace_->partial().path() / kFacesFileName,
+                       workspace_->scratch(),
+                       splats_.survey.lower,
+                       splats_.survey.upper,
+                       options_.planes,
+                       std::move(numbers),
+                       plan_.slab_bytes,
+                       plan_.seam_bytes};
+    faces_file_ = origin_->writeFaces(job, progress_);
+  }
+
   void finish() {
     if (isFirst()) finishCache();
     if (ranks_) ranks_->barrier();
@@ -308,6 +331,9 @@ class Conversion {
     else
       needs.temporary_bytes = std::max(needs.temporary_bytes, origin_->temporaryBytes());
     if (ranks_) needs.temporary_bytes += needs.cache_bytes;  // the bricks of each, before they are joined
+    if (options_.surfaces)
+      needs.temporary_bytes +=
+          temporaryBytesOfFaces(origin_->blocks(), options_.planes, options_.scalars.size());
     needs.cache_bytes -= std::min(needs.cache_bytes, workspace_->bytesInPartial());
     if (options_.check_disk_space) checkDiskSpace(needs, options_.output, temporaryFolder(options_));
   }
@@ -361,6 +387,7 @@ class Conversion {
     manifest.calendar = description.calendar;
     for (const VariableInfo& variable : manifest.variables) step.variables.push_back(variable.number);
     manifest.steps = {step};
+    if (faces_file_) manifest.files.push_back(*faces_file_);
     return manifest;
   }
 
@@ -379,6 +406,7 @@ class Conversion {
   std::vector<CellContents> contents_;  // [node of the tree], while they are being scattered
   std::unique_ptr<BucketFile> file_;
   std::unique_ptr<CacheWriter> writer_;
+  std::optional<FileInfo> faces_file_;
   ConvertReport report_;
 };
 
@@ -436,13 +464,20 @@ ConvertReport convert(const DataSource& source, const ConvertOptions& given, Pro
   if (grid) GridOrigin::requireMemory(*grid, options.scalars, plan);
   if (options.ranks) {
     if (!grid)
-      throw UsageError("{}: is unstructured, and such grids are converted by one process; start it without mpirun",
-                       source.description().format);
+      throw UsageError(
+          "{}: is unstructured, and such grids are converted by one process; start it without mpirun",
+          source.description().format);
     plan.limitBuckets(bucketSplatsOfRanks(*grid, *options.ranks), options.scalars.size());
   }
   if (options.mesh_bytes) plan.mesh_bytes = *options.mesh_bytes;
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
 
+  if (!grid) {
+    if (!options.planes.empty())
+      throw UsageError("--surface: {} has no index planes", source.description().format);
+    options.surfaces = false;
+  }
+  if (options.surfaces) checkPlanes(source.description(), options.planes);
   std::vector<ConversionFact> facts = factsOf(source.description(), options.scalars, options.blank_value);
   ConvertReport report;
   if (isFinished(options, facts)) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "preprocess/faces/grid_faces_pass.h"
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/grid/node_reader.h"
 #include "stream/base/progress.h"
@@ -26,6 +27,8 @@ struct ConvertOptions {
   std::filesystem::path temporary_folder;  // empty: the folder of the output
   std::string title;                       // empty: the output's name
   std::optional<double> time;              // of the step; otherwise the source's, or 0
+  bool surfaces = true;                    // the grid's outer faces go into the cache
+  std::vector<IndexPlane> planes;          // and these index planes
 
   /// Those that convert together: each has the same source and options, and calls convert(). Null: this process alone.
   Ranks* ranks = nullptr;
@@ -62,7 +65,8 @@ struct ConvertReport {
   std::vector<std::string> warnings;
 };
 
-/// Converts a structured grid (GridSource) or an unstructured one (MeshSource). `source` is read three times. The result's bytes depend on source, scalars and blank value
+/// Converts a structured grid (GridSource) or an unstructured one (MeshSource). `source` is read three times, and once more for surfaces.
+/// The result's bytes depend on source, scalars and blank value
 /// alone. Throws Error (and UsageError) if something outside fails; then no temporary file and no partial
 /// cache is left, and what stood at the output is as it was. Peak memory, everything counted:
 /// options.memory_bytes.

@@ -36,6 +36,9 @@ class GridOrigin final : public SplatOrigin {
   void count(const RootCube& root, CountingGrid& counts, Progress& progress) override;
   ScatterCounts scatter(const SinkOfThread& sink_of_thread, Progress& progress) override;
   uint64_t finish(SplatSink& sink, Progress& progress) override;
+  std::optional<FileInfo> writeFaces(const FacesJob& job, Progress& progress) override {
+    return writeGridFaces(reader_, job, progress);
+  }
 
  private:
   AbuttingFaces::Needs needsOfFaces() const;

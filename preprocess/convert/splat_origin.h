@@ -7,16 +7,18 @@
 //    scatter()  --> splats, from any number of threads
 //    finish()   --> the splats that had to wait for all others
 //
-// A conversion that is resumed calls none of them once all splats are on disk.
+// and writeFaces(). A conversion that is resumed calls none of the others once all splats are on disk.
 #pragma once
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "preprocess/convert/counting_grid.h"
+#include "preprocess/faces/grid_faces_pass.h"
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/splats/node_splats.h"
 #include "preprocess/survey/grid_survey.h"
@@ -71,6 +73,8 @@ class SplatOrigin {
   virtual ScatterCounts scatter(const SinkOfThread& sink_of_thread, Progress& progress) = 0;
   /// Returns how many samples became part of another one's splat.
   virtual uint64_t finish(SplatSink&, Progress&) { return 0; }
+  /// At any time, after a resumed conversion too: writes the surfaces of what the splats fill, if it has any.
+  virtual std::optional<FileInfo> writeFaces(const FacesJob&, Progress&) { return std::nullopt; }
 };
 
 }  // namespace curvisplat

@@ -60,13 +60,21 @@ struct GasModel {
   std::optional<double> constant;  // the gas constant R
 };
 
+/// A boundary condition: nodes of a block that have a name. Indices from 0, the last included.
+struct GridBoundary {
+  std::string name, type;  // "Wing", "BCWallViscous"
+  uint32_t block = 0;
+  std::array<uint64_t, 3> first{}, last{};  // i, j, k; equal along the axis of its face
+};
+
 /// The metadata of a source, for `info` and the manifest.
 struct GridDescription {
   std::string format;  // "PLOT3D grid + Q, big-endian, C, single precision, 1 block"
   std::vector<std::string> files;
-  std::vector<GridBlock> blocks;      // of a structured grid
-  std::vector<MeshPiece> pieces;      // of an unstructured one
-  std::vector<GridScalar> scalars;    // all that can be read
+  std::vector<GridBlock> blocks;    // of a structured grid
+  std::vector<MeshPiece> pieces;    // of an unstructured one
+  std::vector<GridScalar> scalars;  // all that can be read
+  std::vector<GridBoundary> boundaries;
   std::vector<FlowConditions> flow;   // for every block of every file that has them
   GasModel gas;                       // as stored in the files
   int coordinate_bytes = 4;           // 4 or 8: the stored precision of the coordinates

@@ -50,7 +50,9 @@ AbuttingFaces::AbuttingFaces(std::span<const GridBlock> blocks, int coordinate_b
     Block& added = blocks_.emplace_back(Block{cellsOf(block), {}});
     for (const size_t axis : {0u, 1u, 2u}) {
       added.first_face[axis] = faces;
-      faces += 2 * facesOfSide(added.cells, axis);
+      const uint64_t of_side = facesOfSide(added.cells, axis);
+      sides_.insert(sides_.end(), {faces, faces + of_side});
+      faces += 2 * of_side;
     }
   }
   abutting_.resize(faces);
@@ -109,7 +111,17 @@ void AbuttingFaces::match(const Progress& progress) {
   centres_.forEachSet(coordinate_bytes_, [&](std::span<const uint64_t> faces) {
     progress.throwIfStopped();
     for (const uint64_t face : faces) abutting_[face] = true;
+    if (!folded_.empty()) noteFolds(faces);
   });
+}
+
+void AbuttingFaces::noteFolds(std::span<const uint64_t> faces) {
+  const auto side_of = [&](uint64_t face) {
+    return std::upper_bound(sides_.begin(), sides_.end(), face) - sides_.begin();
+  };
+  for (size_t n = 1; n < faces.size(); ++n)
+    for (size_t other = 0; other < n; ++other)
+      if (side_of(faces[n]) == side_of(faces[other])) folded_[faces[n]] = folded_[faces[other]] = true;
 }
 
 }  // namespace curvisplat

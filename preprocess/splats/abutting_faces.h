@@ -53,6 +53,9 @@ class AbuttingFaces {
   /// Of a face at its block's end; `corners` of its cell, as Hexahedron takes them. Any thread.
   Centre centreOf(const CellFace& face, const std::array<glm::dvec3, 8>& corners) const;
 
+  /// Before match(): notes which faces fold(). Takes its Needs' memory once more.
+  void keepFolds() { folded_.resize(abutting_.size()); }
+
   /// Of cells that are there. One thread at a time. Throws Error if the disk fails.
   void add(std::span<const Centre> centres);
   /// After the last add(): finds those that abut. Throws Error if the disk fails, Interrupted if a stop is
@@ -60,9 +63,13 @@ class AbuttingFaces {
   void match(const Progress& progress);
   /// Of a face at its block's end, after match(). Any thread.
   bool abuts(const CellFace& face) const { return abutting_[numberOf(face)]; }
+  /// Whether the side of a block that has the face abuts on itself there: a cut behind a body, or a body without
+  /// thickness. After keepFolds() and match(). Any thread.
+  bool folds(const CellFace& face) const { return folded_[numberOf(face)]; }
 
  private:
   uint64_t numberOf(const CellFace& face) const;
+  void noteFolds(std::span<const uint64_t> faces);
 
   struct Block {
     std::array<uint64_t, 3> cells;
@@ -71,7 +78,8 @@ class AbuttingFaces {
   std::vector<Block> blocks_;
   int coordinate_bytes_;
   SeamMerger centres_;
-  std::vector<bool> abutting_;  // [face at a block's end]
+  std::vector<bool> abutting_, folded_;  // [face at a block's end]
+  std::vector<uint64_t> sides_;          // the first face of every side
 };
 
 }  // namespace curvisplat

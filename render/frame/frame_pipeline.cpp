@@ -38,6 +38,8 @@ uint64_t sceneBytes(const FrameOptions& options) {
       kBandBytes + options.size.pixels() * (kLayerBytes + kSliceBytes * options.scene->slices.size());
   for (const Surface& surface : options.scene->surfaces)
     bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size();
+  if (!options.scene->grid_surfaces.empty())
+    bytes += FaceMeshes::bytes(*options.scene, options.size.pixels());
   return bytes;
 }
 
@@ -164,7 +166,7 @@ bool FramePipeline::beginSlab(const FramePlan& plan, const FrameOptions& options
 }
 
 void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics) {
-  if (!options.scene) return;
+  if (!options.scene || (options.scene->empty() && options.scene->drawsSplats())) return;
   const VariableInfo& info = cache_.manifest().variables[variable_];
   const ScreenView& view = plan.settings.view;
   std::vector<std::unique_ptr<SliceSampler>> samplers;
@@ -184,7 +186,8 @@ void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, Fra
       options.threads ? options.threads : std::max(1u, std::thread::hardware_concurrency());
   tbb::task_arena arena(std::min(static_cast<int>(wanted), tbb::info::default_concurrency()));
   arena.execute([&] {
-    layers = std::make_shared<PixelLayers>(layersOf(*options.scene, view, samplers, look, kBandBytes));
+    const SurfaceScene scene = face_meshes_.withMeshes(options.scene, view, options.lod_pixels);
+    layers = std::make_shared<PixelLayers>(layersOf(scene, view, samplers, look, kBandBytes));
   });
   planner_.addLayers(plan, std::move(layers), options);
 }
@@ -210,9 +213,13 @@ void FramePipeline::sampleSlice(const SlicePlan& slice, SliceSampler& sampler, c
   if (phase_ == Phase::kCancelled) throw Cancelled();
 }
 
+const ClassificationTable& FramePipeline::tableOf(const FramePlan& plan) const {
+  return plan.table ? *plan.table : planner_.table();
+}
+
 Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
                           Progress* progress) {
-  const FrameWork work{cache_,    plan.parts, plan.settings,      planner_.table(),
+  const FrameWork work{cache_,    plan.parts, plan.settings,      tableOf(plan),
                        plan.keys, hidden_,    options.keep_going, plan.tiles.get()};
   makePools(options);
   {
@@ -267,9 +274,8 @@ Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, F
   Image image;
   backend_->run([&](Painter& painter) {
     const DrawsFinished finished(painter);
-    painter.begin(plan.settings.view.size, options.background, planner_.table(),
-                  {plan.settings.per_pixel, plan.settings.light.has_value(), plan.settings.layers},
-                  resourcesOf(options));
+    painter.begin(plan.settings.view.size, options.background, tableOf(plan),
+                  {plan.settings.per_pixel, plan.settings.lit(), plan.settings.layers}, resourcesOf(options));
     if (plan.tiles) painter.drawOnly(*plan.tiles);
     hidden_.ask(&painter);
     SegmentDrawer drawer(painter, pools_->ring, statistics.painter_waited_s);

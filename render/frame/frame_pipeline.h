@@ -25,6 +25,7 @@
 #include "render/frame/frame_plan.h"
 #include "render/frame/frame_statistics.h"
 #include "render/frame/hidden_bricks.h"
+#include "render/surface/face_meshes.h"
 #include "render/surface/slice_sampler.h"
 #include "stream/base/mutex.h"
 #include "stream/base/progress.h"
@@ -78,6 +79,7 @@ class FramePipeline {
  private:
   struct Pools;
 
+  const ClassificationTable& tableOf(const FramePlan& plan) const;
   void sampleSlice(const SlicePlan& slice, SliceSampler& sampler, const FrameOptions& options,
                    FrameStatistics& statistics);
   bool beginSlab(const FramePlan& plan, const FrameOptions& options);
@@ -92,6 +94,7 @@ class FramePipeline {
   const FramePlanner& planner_;
   const std::unique_ptr<PaintingBackend> backend_;
   HiddenBricks hidden_;
+  FaceMeshes face_meshes_;
   uint64_t least_pager_bytes_ = 0;  // that the largest brick of any step so far needs
 
   enum class Phase { kIdle, kRunning, kCancelled };

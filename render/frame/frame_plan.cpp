@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "render/colour/iso_table.h"
 #include "render/frame/hidden_bricks.h"
 #include "render/frame/tile_dealer.h"
 #include "render/project/kernel.h"
@@ -24,18 +25,6 @@ ClassificationTable tableFor(const CacheReader& cache, size_t variable,
                              const TransferFunction& transfer_function) {
   const VariableInfo& info = cache.manifest().variables.at(variable);
   return ClassificationTable::of(transfer_function, info.min, info.max);
-}
-
-/// Returns a test of a brick's value bounds: whether every scalar that its pixels can have is without
-/// extinction.
-TransparentBounds transparentIn(const ClassificationTable& table, const ProjectionSettings& settings) {
-  const double reach = settings.per_pixel ? largestReach(settings.view.low_pass_px2) : 1;
-  return [&table, reach](const ValueBounds& values) {
-    const double deviation = std::hypot(kKernelSigma * values.largest_slope, values.largest_deviation);
-    const double spread = 1.001 * (reach * values.largest_slope + ScreenCut::kReach * deviation);
-    return table.fullyTransparent(static_cast<float>(values.min - spread),
-                                  static_cast<float>(values.max + spread));
-  };
 }
 
 /// n · (x - p) = n/scale · (scale x - scale p).
@@ -108,6 +97,35 @@ ProjectionSettings FramePlanner::settingsFor(const Camera& camera, const FrameOp
   return settings;
 }
 
+/// Returns a test of a brick's value bounds: whether every scalar that its pixels can have is without
+/// extinction, and none is an isovalue.
+TransparentBounds FramePlanner::transparentIn(const ProjectionSettings& settings,
+                                              const FrameOptions& options) const {
+  const double reach = settings.per_pixel ? largestReach(settings.view.low_pass_px2) : 1;
+  const bool volume = !settings.iso || settings.iso->volume;
+  std::vector<double> values;
+  if (settings.iso) values = options.scene->isovalues;
+  return [this, reach, volume, values](const ValueBounds& bounds) {
+    const double deviation = std::hypot(kKernelSigma * bounds.largest_slope, bounds.largest_deviation);
+    const double spread = 1.001 * (reach * bounds.largest_slope + ScreenCut::kReach * deviation);
+    const double low = bounds.min - spread, high = bounds.max + spread;
+    return (!volume || table_.fullyTransparent(static_cast<float>(low), static_cast<float>(high))) &&
+           std::none_of(values.begin(), values.end(), [&](double v) { return v >= low && v <= high; });
+  };
+}
+
+std::shared_ptr<const ClassificationTable> FramePlanner::addIsosurfaces(const FrameOptions& options,
+                                                                        ProjectionSettings& settings) const {
+  if (!options.scene || options.scene->isovalues.empty()) return nullptr;
+  const VariableInfo& info = cache_.manifest().variables[variable_];
+  const IsoTable iso =
+      IsoTable::of(transfer_function_, options.scene->isovalues, -std::log1p(-options.scene->iso_opacity),
+                   info.min, info.max, options.scene->volume);
+  settings.iso = IsoProjection{static_cast<float>(iso.scale), static_cast<float>(iso.offset),
+                               options.light.value_or(Light{}), options.scene->volume};
+  return std::make_shared<ClassificationTable>(iso.table);
+}
+
 CutView FramePlanner::cutViewOf(const ProjectionSettings& settings) const {
   CutView view = settings.view.cutView();
   for (const ClipPlane& plane : settings.clip_planes) view.planes.push_back(cutPlane(plane, settings.view));
@@ -134,7 +152,7 @@ std::vector<SlicePlan> FramePlanner::planSlices(const ProjectionSettings& settin
 Cut FramePlanner::chooseCut(const ProjectionSettings& settings, const FrameOptions& options,
                             const CutOptions& limits) const {
   const CutTree tree{cache_.manifest().root, cache_.bricks(), cache_.brickVariables(variable_), subtrees_};
-  Cut cut = curvisplat::chooseCut(tree, cutViewOf(settings), transparentIn(table_, settings), limits);
+  Cut cut = curvisplat::chooseCut(tree, cutViewOf(settings), transparentIn(settings, options), limits);
   if (options.max_splats && cut.splats > *options.max_splats)
     throw UsageError(
         "{} splats are too few: the coarsest picture of this cache takes {}; give --max-splats that",
@@ -158,9 +176,11 @@ FramePlan FramePlanner::planOf(const ProjectionSettings& settings, Cut cut, Draw
 }
 
 FramePlan FramePlanner::plan(const Camera& camera, const FrameOptions& options, DrawingOrder order) const {
-  const ProjectionSettings settings = settingsFor(camera, options, options.size);
+  ProjectionSettings settings = settingsFor(camera, options, options.size);
+  auto table = addIsosurfaces(options, settings);
   const CutOptions limits = limitsOf(options, order);
   FramePlan plan = planOf(settings, chooseCut(settings, options, limits), order);
+  plan.table = std::move(table);
   plan.slices = planSlices(settings, options, limits);
   return plan;
 }
@@ -185,7 +205,7 @@ void FramePlanner::addLayers(FramePlan& plan, std::shared_ptr<const PixelLayers>
                              const FrameOptions& options) const {
   plan.layers = std::move(layers);
   plan.settings.layers = plan.layers.get();
-  const bool volume = options.scene->volume;
+  const bool volume = options.scene->drawsSplats();
   if (volume && options.keep_going)
     return;  // an ancestor that replaces a damaged brick reaches out of its box
   plan.parts_hidden = std::erase_if(plan.parts, [&](const SweptPart& part) {
@@ -198,14 +218,17 @@ void FramePlanner::addLayers(FramePlan& plan, std::shared_ptr<const PixelLayers>
 
 QuickPlan FramePlanner::planQuick(const Camera& camera, const FrameOptions& options, const QuickLimits& quick,
                                   DrawingOrder order) const {
-  const ProjectionSettings settings = settingsFor(camera, options, options.size);
+  ProjectionSettings settings = settingsFor(camera, options, options.size);
+  auto table = addIsosurfaces(options, settings);
   CutOptions limits = limitsOf(options, order);
   limits.max_splats = std::min(limits.max_splats, quick.max_splats);
   limits.max_bytes = std::min(limits.max_bytes, quick.max_bytes);
   Cut cut = chooseCut(settings, options, limits);
   const ReducedSize size(options.size, std::max(quick.detail_px, cut.complete ? 0 : cut.largest_error_px));
-  FramePlan plan =
-      planOf(size.isWhole() ? settings : settingsFor(camera, options, size.size()), std::move(cut), order);
+  ProjectionSettings reduced = size.isWhole() ? settings : settingsFor(camera, options, size.size());
+  reduced.iso = settings.iso;
+  FramePlan plan = planOf(reduced, std::move(cut), order);
+  plan.table = std::move(table);
   plan.slices = planSlices(plan.settings, options, limits);
   return {std::move(plan), size};
 }

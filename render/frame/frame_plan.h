@@ -38,6 +38,8 @@ struct FramePlan {
   Cut cut;
   DepthKeys keys;
   std::vector<SweptPart> parts;  // of the cut, in the sweep's order
+  std::shared_ptr<const ClassificationTable> table =
+      nullptr;  // of a picture with isosurfaces; null: the planner's
   std::vector<SlicePlan> slices = {};
   std::shared_ptr<const PixelLayers> layers = nullptr;  // those of settings, where there are some
   uint64_t parts_hidden = 0;                            // of the cut, behind opaque layers: not in `parts`
@@ -96,6 +98,9 @@ class FramePlanner {
   uint64_t mostSplats() const;
 
  private:
+  std::shared_ptr<const ClassificationTable> addIsosurfaces(const FrameOptions& options,
+                                                            ProjectionSettings& settings) const;
+  TransparentBounds transparentIn(const ProjectionSettings& settings, const FrameOptions& options) const;
   ProjectionSettings settingsFor(const Camera& camera, const FrameOptions& options, ImageSize size) const;
   CutView cutViewOf(const ProjectionSettings& settings) const;
   Cut chooseCut(const ProjectionSettings& settings, const FrameOptions& options,

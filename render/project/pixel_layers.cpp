@@ -16,8 +16,9 @@ constexpr float kClear = 1e-6f;
 
 void PixelLayers::Row::endPixel(size_t first_layer) {
   const auto begin = layers.begin() + static_cast<std::ptrdiff_t>(first_layer);
-  std::stable_sort(begin, layers.end(),
-                   [](const PixelLayer& a, const PixelLayer& b) { return a.depth < b.depth; });
+  if (layers.size() > first_layer + 1)  // it allocates
+    std::stable_sort(begin, layers.end(),
+                     [](const PixelLayer& a, const PixelLayer& b) { return a.depth < b.depth; });
   size_t kept = first_layer;
   for (size_t n = first_layer; n < layers.size(); ++n) {
     const PixelLayer layer = layers[n];

@@ -22,6 +22,8 @@
 namespace curvisplat {
 namespace {
 
+// Where an isosurface is, the scalar changes: its light is as strong as a surface's.
+constexpr double kIsoLightG0 = 0.01;
 constexpr size_t kBlock = 256;  // splats at a time: the arrays between the two loops stay in the L1 cache
 
 /// The results that the arithmetic loop passes to the loop that chooses.
@@ -132,7 +134,15 @@ struct Cutting {
   const BorderStyle* borders;  // null: cells at borders are drawn as any cell, and clip planes do not cut
   LocalClipPlanes clip;
   LocalLayers layers;
+  const IsoProjection* iso = nullptr;  // of isosurfaces
 };
+
+/// Of isosurfaces: how much the scalar changes along the ray, per unit of depth.
+float changeAlongRay(const PlacedPiece& at, const SplatPiece& piece, const Ellipse& ellipse,
+                     float low_pass_px2) {
+  const ScreenDepth ray = depthAlongRay(at.rows, at.depth_row, at.depth, piece, ellipse, low_pass_px2);
+  return std::abs(ray.correlation) * ellipse.half_width / std::numbers::sqrt3_v<float> * ray.per_depth;
+}
 
 /// How one splat is cut.
 struct SplatCutting {
@@ -157,8 +167,10 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, const GeometryArr
                          {},
                          growthAxes(shapeOf(geometry, i), geometry.growth_code[i])};
   const glm::dvec3 slope(whole.slope.w0, whole.slope.w1, whole.slope.w2);
-  if (chooser.transparentThroughout(whole.mean, static_cast<float>(drawnSlope(slope, border_code)),
-                                    variable.variance[i]))
+  const float scale = cutting.iso ? cutting.iso->scale : 1, offset = cutting.iso ? cutting.iso->offset : 0;
+  if (chooser.transparentThroughout(scale * whole.mean + offset,
+                                    scale * static_cast<float>(drawnSlope(slope, border_code)),
+                                    scale * scale * variable.variance[i]))
     return SplatChooser::Fate::kTransparent;
   auto best = SplatChooser::Fate::kOffScreen;
   // A splat that is cut has a record of its own, as any splat; what it takes beyond that counts.
@@ -178,6 +190,13 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, const GeometryArr
     const size_t records = 1 + (faces ? 1u : 0u) + (across ? 1u : 0u);
     if (left.pieces + own < records) return false;
     ScreenSplat splat = screenSplat(at.x, at.y, ellipse, piece.mean);
+    if (cutting.iso) {
+      splat.amplitude *= changeAlongRay(at, piece, ellipse, map.low_pass_px2);
+      splat.mean = scale * splat.mean + offset;
+      splat.slope0 *= scale;
+      splat.slope1 *= scale;
+      splat.half_width *= scale;
+    }
     if (piece.growth.count > 0) splat.skew = skewOf(at.rows, piece.growth, ellipse);
     ScreenDepth along_ray;
     if (across) {
@@ -233,7 +252,8 @@ bool projectRange(const Map& map, const Cutting& cutting, const std::optional<Lo
         ++counts.clipped;
         continue;
       }
-      bool in_pieces = block.too_wide[n] || how.border_code != kNoBorder || how.clipped;
+      how.layered = cutting.iso != nullptr;
+      bool in_pieces = block.too_wide[n] || how.border_code != kNoBorder || how.clipped || how.layered;
       if (!cutting.layers.empty() && !in_pieces) {
         const LayerSide side = cutting.layers.sideOf(
             block.x[n], block.y[n], block.ellipse(n), block.depth[n],
@@ -316,7 +336,21 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
   std::optional<LocalLight> light;
   if (settings.light) light.emplace(*settings.light, settings.light_g0, settings.view, cell_min);
   SplatChooser chooser(settings.view, largestReach(settings.view.low_pass_px2),
-                       {settings.per_pixel, settings.light.has_value()}, table, {splats_, depths_});
+                       {settings.per_pixel, settings.lit()}, table, {splats_, depths_});
+  Cutting iso_cutting = cutting;
+  std::optional<LocalLight> iso_light;
+  if (settings.iso) {
+    iso_cutting.iso = &*settings.iso;
+    iso_light.emplace(settings.iso->light, kIsoLightG0 * settings.light_g0, settings.view, cell_min);
+  }
+  const bool volume = !settings.iso || settings.iso->volume;
+  const auto projected = [&](const auto& map, bool isosurfaces) {
+    return projectWith(map, isosurfaces ? iso_cutting : cutting, isosurfaces ? iso_light : light, brick,
+                       ranges, chooser, counts_);
+  };
+  const auto projectAll = [&](const auto& map) {
+    return (!volume || projected(map, false)) && (!settings.iso || projected(map, true));
+  };
   // Where the near plane is too near for float, coarser is not less: then what was cut until there is drawn.
   constexpr float kCoarsest = 1e30f;
   bool complete = false;
@@ -325,12 +359,10 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
     splats_.clear();
     depths_.clear();
     counts_ = {};
-    cutting.borders = coarseness == 1 ? &settings.borders : nullptr;
+    cutting.borders = iso_cutting.borders = coarseness == 1 ? &settings.borders : nullptr;
     complete = settings.view.projection == Projection::kOrthographic
-                   ? projectWith(OrthographicMap(settings.view, cell_min), cutting, light, brick, ranges,
-                                 chooser, counts_)
-                   : projectWith(PerspectiveMap(settings.view, cell_min, coarseness), cutting, light, brick,
-                                 ranges, chooser, counts_);
+                   ? projectAll(OrthographicMap(settings.view, cell_min))
+                   : projectAll(PerspectiveMap(settings.view, cell_min, coarseness));
   }
   for (const SplatRange& range : ranges) counts_.read += range.size();
   counts_.pieces = splats_.size();

@@ -41,6 +41,15 @@ struct ProjectionCounts {
                         // cuts
 };
 
+/// How splats are drawn as isosurfaces (render/colour/iso_table.h), besides or in place of the volume: with the
+/// scalar at scale f + offset, and as thick as the scalar changes along the ray, which makes the optical depth of a
+/// crossing the same at all angles.
+struct IsoProjection {
+  float scale = 1, offset = 0;
+  Light light = {};
+  bool volume = true;
+};
+
 /// How to project the splats of a frame; the same for all of them.
 struct ProjectionSettings {
   ScreenView view;
@@ -50,6 +59,10 @@ struct ProjectionSettings {
   double light_g0 = 1;                   // LocalLight's
   BorderStyle borders = kHalfCellStyle;  // kWholeCellStyle where the data is cell-centred
   const PixelLayers* layers = nullptr;   // surfaces and slices in the picture, which splats are cut at
+  std::optional<IsoProjection> iso = std::nullopt;
+
+  /// Whether splats have light: painters must know.
+  bool lit() const { return light.has_value() || iso.has_value(); }
 };
 
 /// Projects bricks. Each projector belongs to one thread.

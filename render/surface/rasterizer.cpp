@@ -2,6 +2,7 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <bit>
@@ -14,8 +15,8 @@ namespace {
 
 constexpr int kGrid = 16;   // to a pixel
 constexpr int kSmall = 64;  // pixels: products of a small triangle's differences have fewer bits than a float
-constexpr float kGuard =
-    1e5f;  // pixels: triangles that reach beyond are clipped there, so that double is exact
+// Pixels: triangles that reach beyond are clipped there, so that double is exact.
+constexpr float kGuard = 1e5f;
 constexpr uint32_t kTrianglesAtOnce = 4096;
 
 /// Bits that increase with the value.
@@ -26,6 +27,12 @@ uint32_t ordered(float value) {
 
 float disordered(uint32_t bits) {
   return std::bit_cast<float>(bits & 0x80000000u ? bits & 0x7fffffffu : ~bits);
+}
+
+/// To even where it lies between two. (Without SSE4 the library's function is a call.)
+int nearestWhole(float value) {
+  constexpr double kMagic = 6755399441055744.0;  // 1.5 * 2^52
+  return static_cast<int>((static_cast<double>(value) + kMagic) - kMagic);
 }
 
 void lower(uint64_t& sample, uint64_t to) {
@@ -44,11 +51,40 @@ SceneTriangles::SceneTriangles(const SurfaceScene& scene, const ScreenView& view
     begins_.push_back(begins_.back() + static_cast<uint32_t>(mesh.triangles.size()));
     std::vector<ScreenVertex>& out = vertices_.emplace_back(mesh.positions.size());
     const size_t number = vertices_.size() - 1;
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, out.size(), kTrianglesAtOnce), [&](const auto& range) {
-      for (size_t n = range.begin(); n < range.end(); ++n)
-        out[n] = project(inView(number, static_cast<uint32_t>(n)));
-    });
+    const PixelBox box = tbb::parallel_reduce(
+        tbb::blocked_range<size_t>(0, out.size(), kTrianglesAtOnce), PixelBox(),
+        [&](const auto& range, PixelBox of_range) {
+          for (size_t n = range.begin(); n < range.end(); ++n) {
+            out[n] = project(inView(number, static_cast<uint32_t>(n)));
+            of_range.add(out[n], view_.size);
+          }
+          return of_range;
+        },
+        [](PixelBox a, const PixelBox& b) {
+          a.add(b);
+          return a;
+        });
+    box_.add(box);
   }
+}
+
+void SceneTriangles::PixelBox::add(const ScreenVertex& vertex, ImageSize size) {
+  if (std::isnan(vertex.value)) {  // before the near plane: it may be anywhere
+    add(PixelBox{0, 0, size.width, size.height});
+    return;
+  }
+  const auto pixel = [](float at, int end) {
+    return static_cast<int>(std::clamp(at, 0.0f, static_cast<float>(end)));
+  };
+  add(PixelBox{pixel(vertex.x - 1, size.width), pixel(vertex.y - 1, size.height),
+               pixel(vertex.x + 2, size.width), pixel(vertex.y + 2, size.height)});
+}
+
+void SceneTriangles::PixelBox::add(const PixelBox& other) {
+  x0 = std::min(x0, other.x0);
+  y0 = std::min(y0, other.y0);
+  x1 = std::max(x1, other.x1);
+  y1 = std::max(y1, other.y1);
 }
 
 glm::dvec3 SceneTriangles::inView(size_t surface, uint32_t vertex) const {
@@ -169,21 +205,27 @@ void SampleBand::drawTriangle(const std::array<ScreenVertex, 3>& corners, uint32
 
 void SampleBand::drawGuarded(const std::array<ScreenVertex, 3>& corners, uint32_t number) {
   Setup setup;
+  std::array<int, 3> grid_x, grid_y;
   for (size_t n = 0; n < 3; ++n) {
-    setup.x[n] = std::nearbyint(corners[n].x * float{kGrid});
-    setup.y[n] = std::nearbyint(corners[n].y * float{kGrid});
+    grid_x[n] = nearestWhole(corners[n].x * float{kGrid});
+    grid_y[n] = nearestWhole(corners[n].y * float{kGrid});
   }
   // The outermost samples are 7/16 from the centre.
-  const auto [least_x, most_x] = std::minmax({setup.x[0], setup.x[1], setup.x[2]});
-  const auto [least_y, most_y] = std::minmax({setup.y[0], setup.y[1], setup.y[2]});
-  const auto pixels = [](double from, double to, int end, int& first, int& last) {
-    first = static_cast<int>(std::max(0.0, std::floor((from - 1) / kGrid)));
-    last = static_cast<int>(std::min<double>(end - 1, std::floor(to / kGrid)));
-  };
-  pixels(least_x, most_x, width_, setup.x0, setup.x1);
-  pixels(least_y, most_y, first_row_ + rows_, setup.y0, setup.y1);
-  setup.y0 = std::max(setup.y0, first_row_);
+  const int least_x = std::min({grid_x[0], grid_x[1], grid_x[2]});
+  const int most_x = std::max({grid_x[0], grid_x[1], grid_x[2]});
+  const int least_y = std::min({grid_y[0], grid_y[1], grid_y[2]});
+  const int most_y = std::max({grid_y[0], grid_y[1], grid_y[2]});
+  constexpr int kGridBits = 4;
+  static_assert(1 << kGridBits == kGrid);
+  setup.x0 = std::max(0, (least_x - 1) >> kGridBits);
+  setup.x1 = std::min(width_ - 1, most_x >> kGridBits);
+  setup.y0 = std::max(first_row_, (least_y - 1) >> kGridBits);
+  setup.y1 = std::min(first_row_ + rows_ - 1, most_y >> kGridBits);
   if (setup.x0 > setup.x1 || setup.y0 > setup.y1) return;
+  for (size_t n = 0; n < 3; ++n) {
+    setup.x[n] = grid_x[n];
+    setup.y[n] = grid_y[n];
+  }
 
   const double area = (setup.x[1] - setup.x[0]) * (setup.y[2] - setup.y[0]) -
                       (setup.y[1] - setup.y[0]) * (setup.x[2] - setup.x[0]);
@@ -196,8 +238,9 @@ void SampleBand::drawGuarded(const std::array<ScreenVertex, 3>& corners, uint32_
   const double exact_area = dx1 * dy2 - dy1 * dx2;
   const double dv1 = static_cast<double>(corners[1].value) - static_cast<double>(corners[0].value);
   const double dv2 = static_cast<double>(corners[2].value) - static_cast<double>(corners[0].value);
-  setup.by_x = exact_area != 0 ? (dv1 * dy2 - dv2 * dy1) / exact_area : 0;
-  setup.by_y = exact_area != 0 ? (dv2 * dx1 - dv1 * dx2) / exact_area : 0;
+  const double per_area = exact_area != 0 ? 1 / exact_area : 0;
+  setup.by_x = (dv1 * dy2 - dv2 * dy1) * per_area;
+  setup.by_y = (dv2 * dx1 - dv1 * dx2) * per_area;
   setup.value = static_cast<double>(corners[0].value) +
                 setup.by_x * (setup.x0 + 0.5 - static_cast<double>(corners[0].x)) +
                 setup.by_y * (setup.y0 + 0.5 - static_cast<double>(corners[0].y));
@@ -214,7 +257,7 @@ void SampleBand::drawGuarded(const std::array<ScreenVertex, 3>& corners, uint32_
 /// Edge functions: positive on the inner side, and on the edge itself for top and left edges.
 template <typename Real>
 void SampleBand::fill(const Setup& setup, uint32_t number) {
-  Real by_x[3], by_y[3], start[3];
+  Real by_x[3], by_y[3], row_start[3], most[3];
   Real offsets[3][kSamples];
   for (size_t edge = 0; edge < 3; ++edge) {
     const size_t a = edge, b = (edge + 1) % 3;
@@ -223,31 +266,40 @@ void SampleBand::fill(const Setup& setup, uint32_t number) {
     const bool takes_edge = by_x[edge] > 0 || (by_x[edge] == 0 && by_y[edge] > 0);
     const auto from_x = static_cast<Real>(kGrid * setup.x0 + kGrid / 2 - setup.x[a]);
     const auto from_y = static_cast<Real>(kGrid * setup.y0 + kGrid / 2 - setup.y[a]);
-    start[edge] = by_x[edge] * from_x + by_y[edge] * from_y - (takes_edge ? Real{0} : Real{0.5f});
+    row_start[edge] = by_x[edge] * from_x + by_y[edge] * from_y + (takes_edge ? Real{0} : Real{-0.5f});
     for (size_t s = 0; s < kSamples; ++s)
       offsets[edge][s] = by_x[edge] * static_cast<Real>(kSampleOffsets[s][0]) +
                          by_y[edge] * static_cast<Real>(kSampleOffsets[s][1]);
+    // No sample's offset is more.
+    most[edge] = static_cast<Real>(kGrid / 2 - 1) * (std::abs(by_x[edge]) + std::abs(by_y[edge]));
+    by_x[edge] *= kGrid;
+    by_y[edge] *= kGrid;
   }
-  float of_sample[kSamples];
-  for (size_t s = 0; s < kSamples; ++s)
-    of_sample[s] =
-        static_cast<float>((setup.by_x * kSampleOffsets[s][0] + setup.by_y * kSampleOffsets[s][1]) / kGrid);
+  const auto value_x = static_cast<float>(setup.by_x / kGrid),
+             value_y = static_cast<float>(setup.by_y / kGrid);
   for (int y = setup.y0; y <= setup.y1; ++y) {
-    const auto down = static_cast<Real>(kGrid * (y - setup.y0));
     uint64_t* row = &samples_[kSamples * (static_cast<size_t>(y - first_row_) * static_cast<size_t>(width_) +
                                           static_cast<size_t>(setup.x0))];
+    Real at[3] = {row_start[0], row_start[1], row_start[2]};
     for (int x = setup.x0; x <= setup.x1; ++x, row += kSamples) {
-      const auto right = static_cast<Real>(kGrid * (x - setup.x0));
-      Real at[3];
-      for (size_t edge = 0; edge < 3; ++edge) at[edge] = start[edge] + by_x[edge] * right + by_y[edge] * down;
-      Real least[kSamples];
-      for (size_t s = 0; s < kSamples; ++s)
-        least[s] = std::min(std::min(at[0] + offsets[0][s], at[1] + offsets[1][s]), at[2] + offsets[2][s]);
-      const auto value =
-          static_cast<float>(setup.value + setup.by_x * (x - setup.x0) + setup.by_y * (y - setup.y0));
-      for (size_t s = 0; s < kSamples; ++s)
-        if (least[s] >= 0) lower(row[s], uint64_t{ordered(value + of_sample[s])} << 32 | number);
+      if (at[0] + most[0] >= 0 && at[1] + most[1] >= 0 && at[2] + most[2] >= 0) {
+        unsigned inside = 0;
+        for (size_t s = 0; s < kSamples; ++s)
+          inside |= static_cast<unsigned>(at[0] + offsets[0][s] >= 0 && at[1] + offsets[1][s] >= 0 &&
+                                          at[2] + offsets[2][s] >= 0)
+                    << s;
+        const auto value =
+            static_cast<float>(setup.value + setup.by_x * (x - setup.x0) + setup.by_y * (y - setup.y0));
+        for (; inside != 0; inside &= inside - 1) {
+          const auto s = static_cast<size_t>(std::countr_zero(inside));
+          const float of_sample = value_x * static_cast<float>(kSampleOffsets[s][0]) +
+                                  value_y * static_cast<float>(kSampleOffsets[s][1]);
+          lower(row[s], uint64_t{ordered(value + of_sample)} << 32 | number);
+        }
+      }
+      for (size_t edge = 0; edge < 3; ++edge) at[edge] += by_x[edge];
     }
+    for (size_t edge = 0; edge < 3; ++edge) row_start[edge] += by_y[edge];
   }
 }
 

@@ -5,7 +5,7 @@
 // mean is its centre. A sample keeps the least (depth, triangle) by an atomic minimum, so the result depends
 // neither on the order of the triangles nor on threads.
 //
-// Costs about 45 ns a triangle smaller than a pixel, and 64 bytes a pixel: the picture is drawn in bands of rows.
+// Costs 64 bytes a pixel: the picture is drawn in bands of rows, and only where triangles may be seen.
 #pragma once
 
 #include <array>
@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -48,6 +49,14 @@ class SceneTriangles {
   };
   Place placeOf(uint32_t number) const;
   uint32_t firstOf(size_t surface) const { return begins_[surface]; }
+  /// Pixels outside of it, [x0, x1) x [y0, y1), see no triangle.
+  struct PixelBox {
+    int x0 = std::numeric_limits<int>::max(), y0 = x0, x1 = 0, y1 = 0;
+    void add(const ScreenVertex& vertex, ImageSize size);
+    void add(const PixelBox& other);
+    bool empty() const { return x0 >= x1 || y0 >= y1; }
+  };
+  const PixelBox& box() const { return box_; }
   const ScreenVertex& vertex(size_t surface, uint32_t vertex) const { return vertices_[surface][vertex]; }
   /// A vertex in view axes, in double.
   glm::dvec3 inView(size_t surface, uint32_t vertex) const;
@@ -62,6 +71,7 @@ class SceneTriangles {
   const double depth_origin_;
   std::vector<uint32_t> begins_;  // [surfaces + 1]
   std::vector<std::vector<ScreenVertex>> vertices_;
+  PixelBox box_;
 };
 
 /// The samples of some rows of the picture.

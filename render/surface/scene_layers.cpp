@@ -17,7 +17,7 @@ namespace {
 
 // Samples of one surface belong to one layer if their depths differ by no more than its slope explains, and by no
 // more than this many pixels.
-constexpr double kSteepest = 4;
+constexpr double kSteepest = 4, kNear = 0.25;
 constexpr int kMostShaded = 3;  // triangles of a pixel and layer
 
 /// Colours of the surfaces' triangles at the pixels.
@@ -44,7 +44,7 @@ class Shader {
     }
     glm::vec3 colour = surface.colour;
     if (surface.by_scalar && !mesh.scalars.empty() && !std::isnan(scalar))
-      colour = look_.colours.at(double{scalar});
+      colour = (surface.colours ? *surface.colours : look_.colours).at(double{scalar});
     return light_.lit(colour, normal, towardsViewer(x, y));
   }
 
@@ -108,25 +108,27 @@ class PixelSurfaces {
     for (size_t n = 0; n < kSamples; ++n)
       if (samples[n] != SampleBand::kNothing) seen[count++] = {samples[n], n};
     if (count == 0) return;
-    const auto by_depth = [](const Seen& a, const Seen& b) { return a.sample < b.sample; };
     const bool one = count == kSamples && std::all_of(seen.begin(), seen.end(), [&](const Seen& s) {
                        return SampleBand::numberOf(s.sample) == SampleBand::numberOf(seen[0].sample);
                      });
-    if (!one) std::sort(seen.begin(), seen.begin() + static_cast<std::ptrdiff_t>(count), by_depth);
+    // Of so few, faster than std::sort.
+    for (size_t n = 1; !one && n < count; ++n) {
+      const Seen moved = seen[n];
+      size_t to = n;
+      for (; to > 0 && moved.sample < seen[to - 1].sample; --to) seen[to] = seen[to - 1];
+      seen[to] = moved;
+    }
     size_t left = kSamples;
     for (size_t begin = 0; begin < count;) {
       size_t end = one ? count : begin + 1;
-      double tolerance = 0;
-      uint32_t steepness_of = ~0u;
       for (; end < count; ++end) {
-        const uint32_t number = SampleBand::numberOf(seen[end - 1].sample);
-        if (number != steepness_of)
-          tolerance = std::max(tolerance, toleranceOf(number, seen[end - 1].sample));
-        steepness_of = number;
         const double gap =
             double{SampleBand::valueOf(seen[end].sample)} - double{SampleBand::valueOf(seen[end - 1].sample)};
-        if (gap > std::max(tolerance, toleranceOf(SampleBand::numberOf(seen[end].sample), seen[end].sample)))
-          break;
+        if (gap <= kNear * pixelOf(seen[end].sample)) continue;  // whatever the slope
+        double tolerance = 0;
+        for (size_t n = begin; n <= end; ++n)
+          tolerance = std::max(tolerance, toleranceOf(SampleBand::numberOf(seen[n].sample), seen[n].sample));
+        if (gap > tolerance) break;
       }
       glm::vec3 colour(0.0f);
       double value = 0;
@@ -157,13 +159,16 @@ class PixelSurfaces {
   }
 
  private:
-  double toleranceOf(uint32_t number, uint64_t sample) const {
+  /// A pixel's size, in values: perspective, d(-1/z) = dz / z², and a pixel is z / focal.
+  double pixelOf(uint64_t sample) const {
     const ScreenView& view = triangles_.view();
-    // A pixel's size, in values: perspective, d(-1/z) = dz / z², and a pixel is z / focal.
-    const double pixel = view.projection == Projection::kPerspective
-                             ? std::abs(double{SampleBand::valueOf(sample)}) / view.focal_px
-                             : 1 / view.focal_px;
-    return std::min(double{shader_.steepness(number)}, kSteepest * pixel) + 0.25 * pixel;
+    return view.projection == Projection::kPerspective
+               ? std::abs(double{SampleBand::valueOf(sample)}) / view.focal_px
+               : 1 / view.focal_px;
+  }
+  double toleranceOf(uint32_t number, uint64_t sample) const {
+    const double pixel = pixelOf(sample);
+    return std::min(double{shader_.steepness(number)}, kSteepest * pixel) + kNear * pixel;
   }
 
   const SceneTriangles& triangles_;
@@ -205,23 +210,30 @@ PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
       layers.push_back({sample->depth, glm::vec4(alpha * colour, alpha)});
     }
   };
-  const bool has_surfaces = triangles.count() > 0;
-  const int band_rows = has_surfaces ? SampleBand::rowsOf(view.size, band_bytes) : view.size.height;
+  const SceneTriangles::PixelBox& box = triangles.box();
+  const int band_rows = SampleBand::rowsOf(view.size, band_bytes);
   std::optional<SampleBand> band;
-  if (has_surfaces) band.emplace(view.size, band_rows);
-  for (int first = 0; first < view.size.height; first += band_rows) {
-    const int count = std::min(band_rows, view.size.height - first);
-    if (band) band->draw(triangles, first, count);
-    tbb::parallel_for(first, first + count, [&](int y) {
+  if (!box.empty()) band.emplace(view.size, std::min(band_rows, box.y1 - box.y0));
+  const auto drawRows = [&](int first, int end, bool has_surfaces) {
+    if (has_surfaces) band->draw(triangles, first, end - first);
+    tbb::parallel_for(first, end, [&](int y) {
       PixelLayers::Row& row = rows[static_cast<size_t>(y)];
       row.counts.reserve(static_cast<size_t>(view.size.width));
       for (int x = 0; x < view.size.width; ++x) {
         const size_t before = row.layers.size();
-        if (band) surfaces.append(band->at(x, y), x, y, row.layers);
+        if (has_surfaces && x >= box.x0 && x < box.x1) surfaces.append(band->at(x, y), x, y, row.layers);
         appendSlices(x, y, row.layers);
         row.endPixel(before);
       }
     });
+  };
+  if (box.empty()) {
+    drawRows(0, view.size.height, false);
+  } else {
+    drawRows(0, box.y0, false);
+    for (int first = box.y0; first < box.y1; first += band_rows)
+      drawRows(first, std::min(first + band_rows, box.y1), true);
+    drawRows(box.y1, view.size.height, false);
   }
   return {view.size, std::move(rows), look.depth_origin};
 }

@@ -1,33 +1,66 @@
 // What is shown in a volume, or in its place: surfaces of triangles, and slices that have the scalar's colours.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "render/mesh/triangle_mesh.h"
 #include "render/project/clip_planes.h"
+#include "render/surface/colour_table.h"
+#include "stream/cache/faces_file.h"
 
 namespace curvisplat {
 
 inline constexpr size_t kMaxSlices = 8;
+/// Of a crossing. More would widen outlines.
+inline constexpr double kIsoOpacity = 0.95;
 
 /// Opaque and lit, from both sides. In data coordinates.
 struct Surface {
   std::shared_ptr<const TriangleMesh> mesh;
   glm::vec3 colour{0.7f, 0.7f, 0.7f};
-  bool by_scalar =
-      false;  // the transfer function's colours for the mesh's scalars; `colour` where it has none
+  // The transfer function's colours for the mesh's scalars; `colour` where it has none.
+  bool by_scalar = false;
+  std::shared_ptr<const ColourTable> colours = nullptr;  // in place of those of the picture's function
+};
+
+/// Faces of the grid from its cache, drawn as a Surface at a level of detail that depends on the view.
+struct GridSurface {
+  /// The quads between nodes [first, last] of a face's lattice.
+  struct Part {
+    uint32_t face = 0;
+    std::array<uint64_t, 2> first{}, last{};
+    bool operator==(const Part&) const = default;
+  };
+  std::shared_ptr<const FacesReader> faces;
+  std::vector<Part> parts;
+  glm::vec3 colour{0.7f, 0.7f, 0.7f};
+  std::optional<size_t> scalar;                          // among those of the faces; none: `colour`
+  std::shared_ptr<const ColourTable> colours = nullptr;  // as Surface
+
+  /// Whether the same patches make the same mesh.
+  bool hasMeshOf(const GridSurface& other) const {
+    return faces == other.faces && parts == other.parts && scalar == other.scalar;
+  }
 };
 
 struct SurfaceScene {
   std::vector<Surface> surfaces;
+  std::vector<GridSurface> grid_surfaces;
   std::vector<ClipPlane> slices;  // planes; either side
   double slice_opacity = 1;
+  std::vector<double> isovalues;  // of the picture's scalar; in the colours of its function
+  double iso_opacity = kIsoOpacity;
   bool volume = true;  // false: surfaces and slices alone
 
-  bool empty() const { return surfaces.empty() && slices.empty(); }
+  /// Whether it has nothing that makes layers: isosurfaces are drawn with the splats.
+  bool empty() const { return surfaces.empty() && grid_surfaces.empty() && slices.empty(); }
+  bool drawsSplats() const { return volume || !isovalues.empty(); }
 };
 
 }  // namespace curvisplat

@@ -261,11 +261,12 @@ Manifest CacheWriter::finish(Manifest manifest) {
     manifest.steps.front().variables.push_back(s.variables[v].number);
   }
 
-  manifest.files.clear();
-  manifest.files.push_back(s.writeIndex(ordered));
+  const std::vector<FileInfo> further = std::move(manifest.files);
+  manifest.files = {s.writeIndex(ordered)};
   manifest.files.push_back(s.closeGeometry(ordered));
   for (size_t v = 0; v < s.variables.size(); ++v) manifest.files.push_back(s.writeTable(v, order));
   manifest.files.push_back(s.writeGrids(ordered));
+  manifest.files.insert(manifest.files.end(), further.begin(), further.end());
   writeFileAtomically(s.folder.path() / "manifest.json", manifest.toJson());
   s.folder.putIntoPlace();
   removeAll(s.folder.target() / kBrickLogName);

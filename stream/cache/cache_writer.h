@@ -61,7 +61,7 @@ class CacheWriter {
 
   /// Sorts the records by level and Morton order and links parents and children. Writes bricks.bin, the
   /// variables' tables, bricks.vdb and the manifest, whose root, counts, levels, volume and files it fills
-  /// in. Renames the folder to its final name. Returns the manifest as written.
+  /// in; files that the manifest lists already stand in the folder, and stay listed. Renames the folder to its final name. Returns the manifest as written.
   Manifest finish(Manifest manifest);
 
  private:

@@ -54,7 +54,8 @@ TEST_F(ConvertOptionsTest, SaysWhatItDid) {
   EXPECT_LE(stats["temporary_bytes"], 66 * 120000);
   std::vector<std::string> phases;
   for (const auto& phase : stats["phases"]) phases.push_back(phase["name"]);
-  EXPECT_EQ(phases, (std::vector<std::string>{"scan", "count", "scatter", "seams", "build", "finish"}));
+  EXPECT_EQ(phases,
+            (std::vector<std::string>{"scan", "count", "scatter", "seams", "build", "faces", "finish"}));
   uint64_t bytes = 0;
   for (const auto& [name, size] : stats["files"].items()) {
     EXPECT_EQ(size, std::filesystem::file_size(folder_ / "wake.splats" / name));

@@ -26,8 +26,11 @@ TEST_F(InfoOfACache, PrintsItForPeople) {
 }
 
 TEST_F(InfoOfACache, PrintsOneJsonObject) {
-  const ProgramResult result = runProgram({"info", path, "--json", "--verify", "--probe", "0,0,0"});
-  EXPECT_EQ(result.status, 0) << result.err;
+  const ProgramResult result = runProgram({"info", path, "--json", "--verify", "--probe", "900,0,0"});
+  EXPECT_EQ(result.status, 1);
+  EXPECT_NE(result.err.find("the point 900, 0, 0 is outside of the data, which lies in x "),
+            std::string::npos)
+      << result.err;
   const auto json = nlohmann::json::parse(result.out);
   EXPECT_EQ(json["bricks"], 10);
   EXPECT_EQ(json["bricks_by_level"].size(), 2u);
@@ -47,7 +50,9 @@ TEST_F(InfoOfACache, ProbesANode) {
   const std::string point = fmt::format("{},{},{}", at.x, at.y, at.z);
   const ProgramResult text = runProgram({"info", folder / "b.splats", "--probe=" + point});
   EXPECT_EQ(text.status, 0) << text.err;
-  EXPECT_NE(text.out.find("counted from 0"), std::string::npos) << text.out;
+  EXPECT_TRUE(text.out.starts_with(point.substr(0, point.find(',')))) << text.out;
+  EXPECT_NE(text.out.substr(0, text.out.find('\n')).find("(counted from 0) at "), std::string::npos)
+      << text.out;
   const ProgramResult result = runProgram({"info", folder / "b.splats", "--json", "--probe=" + point});
   const auto probe = nlohmann::json::parse(result.out)["probe"];
   ASSERT_TRUE(probe.is_object()) << result.out;

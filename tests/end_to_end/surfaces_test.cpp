@@ -118,6 +118,16 @@ TEST_F(SurfaceOptions, VolumeOffLeavesSurfacesAndSlices) {
   EXPECT_GT(statistics()["bytes_read"], 0);
 }
 
+/// A surface that fills the picture with one colour is what was asked for: no option of the volume changes it.
+TEST_F(SurfaceOptions, WarningsDoNotSpeakOfTheVolume) {
+  const ProgramResult wall = render({"--view", "+z", "--surface", file("wall.obj")});
+  EXPECT_EQ(wall.err.find("warning"), std::string::npos) << wall.err;
+  const ProgramResult nothing =
+      render({"--volume", "off", "--surface", file("sphere.obj"), "--focal-point", "900,0,0"});
+  EXPECT_NE(nothing.err.find("no surface or slice is in sight"), std::string::npos) << nothing.err;
+  EXPECT_EQ(nothing.err.find("transfer function"), std::string::npos) << nothing.err;
+}
+
 TEST_F(SurfaceOptions, WarnsOfASliceThatMisses) {
   const ProgramResult result = render({"--slice", "0,0,900,0,0,1"});
   EXPECT_EQ(result.status, 0);
@@ -137,7 +147,9 @@ TEST_F(SurfaceOptions, SaysWhatIsWrong) {
       {{"--slice", "0,0,0,0,0,0"}, 2, "--slice 0,0,0,0,0,0: the normal nx,ny,nz has no direction"},
       {{"--slice", "0,0,0"}, 2, "--slice 0,0,0: expected px,py,pz,nx,ny,nz"},
       {{"--slice", "0,0,0,0,0,1", "--slice-opacity", "0"}, 2, "--slice-opacity 0: expected a number above 0"},
-      {{"--volume", "off"}, 2, "--volume off leaves nothing to draw; give a --slice or a --surface"},
+      {{"--volume", "off"},
+       2,
+       "--volume off leaves nothing to draw; give a --slice, a --surface or an --iso"},
       {{"--volume", "maybe"}, 2, "--volume maybe: expected on or off"},
       {{"--surface-colour", "#ff0000"}, 2, "--surface-colour needs a surface: --surface FILE"},
       {{"--surface", sphere, "--surface-colour", "red"}, 2, "--surface-colour red: expected white, black"},

@@ -41,6 +41,7 @@ Files filesOf(const fs::path& folder) {
 void convertTo(const fs::path& output, const GridSource& source, std::vector<uint32_t> scalars) {
   ConvertOptions options;
   options.output = output;
+  options.surfaces = false;  // their scalars are those of the conversion
   options.scalars = std::move(scalars);
   options.memory_bytes = uint64_t{1} << 30;
   options.blank_value = kBlank;

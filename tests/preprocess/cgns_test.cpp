@@ -274,6 +274,14 @@ TEST_P(Cgns, BoundaryConditionsFamiliesAndUnitsAreNoted) {
   EXPECT_EQ(open()->description().notes,
             (std::vector<std::string>{"boundary conditions: BCInflow 1, BCWall 2", "families: Wing, Body",
                                       "units: Kilogram, Meter, Second, Kelvin, Radian"}));
+  const auto& boundaries = open()->description().boundaries;
+  ASSERT_EQ(boundaries.size(), 3u);
+  EXPECT_EQ(boundaries[0].name, "Wall");
+  EXPECT_EQ(boundaries[0].type, "BCWall");
+  EXPECT_EQ(boundaries[1].block, 1u);
+  EXPECT_EQ(boundaries[2].type, "BCInflow");
+  EXPECT_EQ(boundaries[2].first, (std::array<uint64_t, 3>{0, 0, 0}));
+  EXPECT_EQ(boundaries[2].last, (std::array<uint64_t, 3>{2, 1, 0}));
 }
 
 TEST_P(Cgns, ZonesMayBeThereAtSomeStepsOnly) {

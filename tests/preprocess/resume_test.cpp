@@ -105,6 +105,7 @@ class Resume : public ::testing::Test {
     options.resume = words.resume;
     options.overwrite = words.overwrite;
     options.bucket_splats = words.bucket_splats;
+    options.surfaces = surfaces_;
     return options;
   }
 
@@ -118,6 +119,7 @@ class Resume : public ::testing::Test {
     std::vector<std::string> arguments{grid_, function_, output_, std::to_string(dying_bucket_splats_),
                                        std::to_string(call)};
     arguments.insert(arguments.end(), words.begin(), words.end());
+    if (surfaces_) arguments.emplace_back("surfaces");
     const ProgramResult result = RunningProgram(arguments, CURVISPLAT_DYING_CONVERT).wait();
     if (result.status == 128 + SIGKILL) return std::nullopt;
     EXPECT_EQ(result.status, 0) << result.err;
@@ -178,6 +180,7 @@ class Resume : public ::testing::Test {
   const TemporaryFolder folder_;
   const fs::path grid_ = folder_ / "in.xyz", function_ = folder_ / "in.fun";
   uint64_t dying_bucket_splats_ = kBucketSplats;
+  bool surfaces_ = false;
   fs::path work_, output_;
   std::unique_ptr<GridSource> source_;
   Files expected_;
@@ -255,6 +258,24 @@ TEST_F(Resume, ReplacesAnOldCacheAtOnce) {
     convertNow({true, true, std::nullopt});
     expectWhole();
     if (HasFailure()) return;
+  }
+}
+
+/// Faces come after the bricks, which are all kept.
+TEST_F(Resume, WritesFacesAnew) {
+  surfaces_ = true;
+  convertNow({false, false, std::nullopt});
+  expected_ = filesOf(output_);
+  EXPECT_TRUE(expected_.contains("faces.bin"));
+  fs::remove_all(output_);
+  const int64_t calls = callsOfAll({"writes"});
+  for (int64_t call = calls - 50; call < calls; call += 2) {
+    SCOPED_TRACE(call);
+    killedAt(call);
+    convertNow({true, false, std::nullopt});
+    expectWhole();
+    if (HasFailure()) return;
+    fs::remove_all(output_);
   }
 }
 

@@ -1,6 +1,6 @@
 // A conversion that is killed at a given system call, for tests of what it leaves:
 //
-//    dying_convert GRID FUNCTION OUTPUT BUCKET_SPLATS KILL_AT writes|all [resume] [overwrite]
+//    dying_convert GRID FUNCTION OUTPUT BUCKET_SPLATS KILL_AT writes|all [resume] [overwrite] [surfaces]
 //
 // Converts the first scalar. If the conversion ends before it is killed (KILL_AT -1: always), prints the
 // number of calls.
@@ -34,6 +34,7 @@ int main(int argc, char** argv) {
     options.memory_bytes = leastMemory(1);
     options.title = "killed";
     options.resume = says("resume");
+    options.surfaces = says("surfaces");
     options.overwrite = says("overwrite");
     const auto source = openGrid(grid);
 

@@ -95,6 +95,7 @@ void runConvert(ConvertArguments arguments) {
   options.resume = arguments.resume;
   options.ranks = &ranks;
   applyCommonOptions(arguments, options);
+  applySurfaceOptions(arguments, options);
 
   const auto source = openSource(arguments, arguments.output);
   options.scalars = chooseScalars(arguments, arguments.scalars, source->description());
@@ -148,7 +149,10 @@ void addSeriesOptions(CLI::App& command, ConvertArguments& arguments) {
 void addConvert(CLI::App& app) {
   auto arguments = std::make_shared<ConvertArguments>();
   CLI::App* command = app.add_subcommand("convert", "Convert a grid to a splat cache, in bounded memory");
-  command->add_option("GRID", arguments->grid.grid, "Grid file: PLOT3D, VTK, CGNS, NetCDF or Exodus; or an OpenFOAM case")->required();
+  command
+      ->add_option("GRID", arguments->grid.grid,
+                   "Grid file: PLOT3D, VTK, CGNS, NetCDF or Exodus; or an OpenFOAM case")
+      ->required();
   command->add_option("SOLUTION", arguments->grid.solutions,
                       "Further files of the grid: PLOT3D solution (Q) and function files; NetCDF, VTK or "
                       "CGNS files with fields, "
@@ -183,6 +187,15 @@ void addConvert(CLI::App& app) {
                     "Resume an interrupted conversion if there is one; keep finished work on an error");
   command->add_flag("--overwrite", arguments->overwrite,
                     "Replace an existing cache; discard an interrupted conversion unless --resume is given");
+  command
+      ->add_option(
+          "--surface", arguments->planes,
+          "Index plane to keep as a surface besides the outer faces: k=10 or \"block 1:k=10\", indices "
+          "from 0; repeatable")
+      ->take_all()
+      ->allow_extra_args(false);
+  command->add_flag("--no-surfaces", arguments->no_surfaces,
+                    "Leave the grid's outer faces out of the cache: render --surface kmin needs them");
   command->add_option("--stats", arguments->statistics, "Write times, bytes and counts to this JSON file");
   addGridOptions(*command, arguments->grid);
   addGasOptions(*command, arguments->gas);

@@ -133,6 +133,8 @@ bool isEmpty(const Image& image, const glm::vec4& background) {
 
 std::vector<std::string> whyEmpty(const RenderedScene& scene) {
   std::vector<std::string> reasons;
+  if (scene.options.scene && !scene.options.scene->drawsSplats())
+    return {"no surface or slice is in sight, and --volume is off; try --view iso or another camera"};
   const double largest = largestExtinction(scene.transfer_function, scene.variable.min, scene.variable.max);
   if (largest == 0) reasons.push_back(whyTransparent(scene));
 
@@ -167,6 +169,8 @@ std::vector<std::string> whyEmpty(const RenderedScene& scene) {
 std::string poorPictureWarning(const Image& image, const RenderedScene& scene,
                                const std::string& function_options) {
   constexpr double kMinSeen = 0.005, kMinOther = 0.1;  // of the picture; of what is seen
+  // Surfaces and slices have a colour of their own, which no option for the volume changes.
+  if (scene.options.scene && !scene.options.scene->empty()) return {};
   const PictureContrast contrast = contrastOf(image, scene.options.background);
   const bool blank = contrast.seen < kMinSeen;
   if (!blank && contrast.other >= kMinOther * contrast.seen) return {};

@@ -18,7 +18,6 @@
 #include "stream/cache/cache_verify.h"
 #include "stream/cache/partial_folder.h"
 #include "stream/cache/probe.h"
-#include "stream/model/kernel.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/info_grid.h"
 #include "tools/commands/info_steps.h"
@@ -135,27 +134,32 @@ void printAsJson(const CacheReader& reader, const InfoOptions& options, const Fi
   fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
 }
 
+/// The answer to --probe, in words that need no knowledge of splats.
 void printProbe(const CacheReader& reader, const InfoOptions& options, const Findings& found) {
-  fmt::print("\nat {}, {}, {}: ", options.point[0], options.point[1], options.point[2]);
+  const std::string point = fmt::format("{}, {}, {}", options.point[0], options.point[1], options.point[2]);
   if (!found.probe) {
-    fmt::print("no sample: the point is outside the data\n");
+    fmt::print("{}: outside of the data\n", point);
     return;
   }
   const ProbeResult& probed = *found.probe;
-  fmt::print(
-      "block {}, i {}, j {}, k {} (i, j and k counted from 0); the point is {:.3g} of the way from its "
-      "centre to its "
-      "edge\n",
-      probed.block + 1, probed.i, probed.j, probed.k, probed.distance / kKernelSupport);
+  const std::string block =
+      reader.manifest().blocks.size() > 1 ? fmt::format("block {}, ", probed.block + 1) : "";
+  fmt::print("{}: nearest {} {}i {}, j {}, k {} (counted from 0) at {:.6g}, {:.6g}, {:.6g}\n", point,
+             reader.manifest().cells ? "cell" : "node", block, probed.i, probed.j, probed.k, probed.centre.x,
+             probed.centre.y, probed.centre.z);
   for (size_t v = 0; v < probed.variables.size(); ++v) {
     const VariableInfo& variable = reader.manifest().variables[v];
-    fmt::print("  {:<20} {:.6g} {}({:.6g} at the centre)\n", variable.name, probed.variables[v].value,
-               variable.unit.empty() ? "" : variable.unit + " ", probed.variables[v].mean);
+    fmt::print("  {:<20} {:.6g}{} ({:.6g} there)\n", variable.name, probed.variables[v].value,
+               variable.unit.empty() ? "" : " " + variable.unit, probed.variables[v].mean);
   }
 }
 
 void printAsText(const CacheReader& reader, const InfoOptions& options, const Findings& found) {
   const Manifest& m = reader.manifest();
+  if (!options.point.empty()) {
+    printProbe(reader, options, found);
+    fmt::print("\n");
+  }
   fmt::print("{}\n", m.title);
   fmt::print("written by {} from", m.program);
   for (const std::string& source : m.sources) fmt::print(" {}", source);
@@ -179,7 +183,6 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
   for (const FileInfo& file : m.files)
     fmt::print("{:<18} {:>12} {:>18.3f}\n", file.name, file.size, bytesPerSample(m, file.size));
   fmt::print("{:<18} {:>12} {:>18.3f}\n", "all", totalBytes(m), bytesPerSample(m, totalBytes(m)));
-  if (!options.point.empty()) printProbe(reader, options, found);
   if (options.verify && found.verification.findings.empty())
     fmt::print("\nverified: all {} bricks are intact{}\n", m.bricks,
                reader.series().steps.size() > 1
@@ -204,6 +207,13 @@ void printCacheInfo(const InfoOptions& options) {
   if (!found.verification.findings.empty())
     throw Error("{}: the cache is damaged ({} findings); convert the grid again", options.grid.grid.string(),
                 found.verification.findings.size());
+  if (!options.point.empty() && !found.probe)
+    throw Error(
+        "{}: the point {}, {}, {} is outside of the data, which lies in x {:.6g} to {:.6g}, y {:.6g} to "
+        "{:.6g}, z {:.6g} to {:.6g}",
+        options.grid.grid.string(), options.point[0], options.point[1], options.point[2],
+        reader.manifest().lower.x, reader.manifest().upper.x, reader.manifest().lower.y,
+        reader.manifest().upper.y, reader.manifest().lower.z, reader.manifest().upper.z);
 }
 
 void printInfo(const InfoOptions& options) {
@@ -231,7 +241,8 @@ void addInfo(CLI::App& app) {
   info->add_flag("--verify", options->verify,
                  "Read the whole cache and check it; exit with status 1 if it is damaged");
   info->add_option("--probe", options->point,
-                   "Print the values at x,y,z and the sample (block, i, j, k) they come from")
+                   "Print the values at x,y,z and the nearest node or cell (block, i, j, k) before the rest; "
+                   "exit with status 1 if the point is outside of the data")
       ->delimiter(',')
       ->expected(3);
   addStepOptions(*info, options->steps, "Time steps");

@@ -379,7 +379,14 @@ void render(const RenderArguments& arguments) {
   const std::string range_warning = rangeMissesScalar(variableFor(cache, variable, drawn), transfer_function);
   if (!range_warning.empty()) printMessage("warning: {}", range_warning);
 
-  options.scene = sceneOf(arguments.surfaces);
+  options.scene = sceneOf(arguments.surfaces, cache, variable);
+  if (options.scene && !options.scene->isovalues.empty() && options.scene->volume &&
+      transfer_function.logScale())
+    throw UsageError(
+        "--iso in the volume needs a linear transfer function; this one is logarithmic: add --volume off");
+  if (steps.size() > 1 && !arguments.surfaces.surface_by.empty())
+    throw UsageError("--surface-by {}: faces have the values of the first time step; draw that one alone",
+                     arguments.surfaces.surface_by);
   for (const std::string& miss : slicesThatMiss(arguments.surfaces, manifest.lower, manifest.upper))
     printMessage("warning: {}", miss);
 

@@ -1,6 +1,7 @@
 // `curvisplat view`: opens a window that shows a cache.
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -37,9 +38,15 @@ void view(const ViewArguments& arguments) {
   if (arguments.memory) options.memory_bytes = parseMemory("--memory", *arguments.memory);
   if (arguments.frame_time) options.target_s = parsePositive("--frame-time", *arguments.frame_time) / 1000;
   checkSurfaceArguments(arguments.surfaces);
-  options.scene = sceneOf(arguments.surfaces);
-  options.surface_files.assign(arguments.surfaces.surfaces.begin(), arguments.surfaces.surfaces.end());
   const CacheReader cache = openAtStep(arguments.cache, arguments.steps);
+  // The scalar changes in the window, so faces that are coloured by one keep colours of their own.
+  options.scene = sceneOf(arguments.surfaces, cache, std::numeric_limits<size_t>::max());
+  for (const std::string& surface : arguments.surfaces.surfaces)
+    if (isSurfaceFile(surface))
+      options.surface_files.emplace_back(surface);
+    else
+      options.face_names.emplace_back(surface);
+  options.faces_by = arguments.surfaces.surface_by;
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   try {

@@ -9,6 +9,7 @@
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "stream/base/process_usage.h"
+#include "tools/options/face_names.h"
 #include "tools/options/grid_options.h"
 #include "tools/output/output_paths.h"
 
@@ -116,6 +117,26 @@ void checkStatisticsFile(const ConvertArguments& arguments) {
   inputs.push_back(arguments.grid.grid);
   inputs.insert(inputs.end(), {arguments.to, arguments.output});
   checkOutputFile("--stats", arguments.statistics, inputs);
+}
+
+void applySurfaceOptions(const ConvertArguments& arguments, ConvertOptions& options) {
+  options.surfaces = !arguments.no_surfaces;
+  if (arguments.no_surfaces && !arguments.planes.empty())
+    throw UsageError("--no-surfaces contradicts --surface {}; give one of them", arguments.planes.front());
+  for (const std::string& list : arguments.planes)
+    for (const std::string& text : splitAtCommas(list)) {
+      const auto name = parseFaceName(text);
+      const bool has_range = name && (name->ranges[0] || name->ranges[1] || name->ranges[2]);
+      if (!name || name->at != FaceName::At::kIndex || has_range)
+        throw UsageError(
+            "--surface {}: expected an index plane such as k=10 or \"block 1:k=10\", indices from 0 (the "
+            "outer "
+            "faces go into the cache anyway)",
+            text);
+      const IndexPlane plane{name->block, name->axis, name->index};
+      if (std::find(options.planes.begin(), options.planes.end(), plane) == options.planes.end())
+        options.planes.push_back(plane);
+    }
 }
 
 double secondsOf(const Progress& progress) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "render/surface/surface_scene.h"
+#include "stream/cache/cache_reader.h"
 
 namespace curvisplat {
 
@@ -15,18 +16,26 @@ namespace curvisplat {
 struct SurfaceArguments {
   std::vector<std::string> surfaces, colours, slices;
   std::string slice_opacity = "1", volume = "on";
+  std::string surface_by;
+  std::vector<std::string> isovalues;
+  std::string iso_opacity;
 
-  bool given() const { return !surfaces.empty() || !slices.empty() || volume != "on"; }
+  bool given() const { return !surfaces.empty() || !slices.empty() || !isovalues.empty() || volume != "on"; }
 };
 
-/// Adds --surface, --surface-colour, --slice, --slice-opacity and --volume under the heading `group`.
+/// Adds --surface, --surface-colour, --surface-by, --slice, --slice-opacity and --volume under the heading `group`.
 void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std::string& group);
 
 /// Throws UsageError for what cannot be: without a look at any file.
 void checkSurfaceArguments(const SurfaceArguments& arguments);
 
-/// Reads the surfaces. Null where none of the options is given. Throws Error for a file that is no surface.
-std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments);
+/// Whether --surface names a file: one that is there, or by its extension.
+bool isSurfaceFile(const std::string& text);
+
+/// Reads the surfaces, and finds those of the cache's grid. `drawn`: the variable of the picture. Null where none of the
+/// options is given. Throws Error for a file that is no surface, and for a face that the cache does not have.
+std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, const CacheReader& cache,
+                                            size_t drawn);
 
 /// One line for each slice that does not meet the data's box.
 std::vector<std::string> slicesThatMiss(const SurfaceArguments& arguments, const glm::dvec3& lower,

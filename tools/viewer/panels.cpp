@@ -230,7 +230,8 @@ void Panels::drawSlices(ViewState& state, PanelActions& actions) {
     actions.changed = true;
   }
   actions.dragging |= ImGui::IsItemActive();
-  const bool alone = state.slices.empty() && state.surfaces.empty();
+  const bool alone =
+      state.slices.empty() && state.surfaces.empty() && state.faces.empty() && state.isovalues.empty();
   ImGui::BeginDisabled(alone);
   actions.changed |= ImGui::Checkbox("volume", &state.volume);
   ImGui::EndDisabled();

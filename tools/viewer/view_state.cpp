@@ -167,12 +167,16 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
   options.clip_box = clip_box;
   options.clip_planes = clip_planes;
   if (lit) options.light = Light{};
-  if (!surfaces.empty() || !slices.empty()) {
+  if (!surfaces.empty() || !faces.empty() || !slices.empty() || !isovalues.empty()) {
     auto scene = std::make_shared<SurfaceScene>();
     for (const SurfaceFile& surface : surfaces)
       if (surface.mesh) scene->surfaces.push_back({surface.mesh, surface.colour});
+    for (const NamedFaces& named : faces) scene->grid_surfaces.push_back(named.surface);
     scene->slices = slices;
     scene->slice_opacity = slice_opacity;
+    // Inside the volume they share a table with the function, which is linear then.
+    if (!volume || !function.function().logScale()) scene->isovalues = isovalues;
+    scene->iso_opacity = iso_opacity;
     scene->volume = volume;
     options.scene = std::move(scene);
   }
@@ -333,16 +337,26 @@ std::string renderCommand(const ViewState& state, const std::filesystem::path& c
   for (const ClipPlane& plane : state.clip_planes)
     add("--clip-plane", numbers(plane.point) + "," + numbers(plane.normal));
   if (state.lit) command += " --shade";
-  for (const SurfaceFile& surface : state.surfaces) add("--surface", surface.path.string());
-  for (const SurfaceFile& surface : state.surfaces) {
-    const glm::ivec3 rgb(255.0f * surface.colour + 0.5f);
+  const auto add_colour = [&](const glm::vec3& colour) {
+    const glm::ivec3 rgb(255.0f * colour + 0.5f);
     add("--surface-colour", fmt::format("#{:02x}{:02x}{:02x}", rgb.r, rgb.g, rgb.b));
-  }
+  };
+  for (const SurfaceFile& surface : state.surfaces) add("--surface", surface.path.string());
+  for (const NamedFaces& named : state.faces) add("--surface", named.name);
+  for (const SurfaceFile& surface : state.surfaces) add_colour(surface.colour);
+  for (const NamedFaces& named : state.faces) add_colour(named.surface.colour);
+  if (!state.faces_by.empty()) add("--surface-by", state.faces_by);
   for (const ClipPlane& plane : state.slices)
     add("--slice", numbers(plane.point) + "," + numbers(plane.normal));
   if (state.slice_opacity != 1 && !state.slices.empty())
     add("--slice-opacity", fmt::format("{}", state.slice_opacity));
-  if (!state.volume && !(state.slices.empty() && state.surfaces.empty())) add("--volume", "off");
+  if (!state.isovalues.empty()) {
+    add("--iso", fmt::format("{}", fmt::join(state.isovalues, ",")));
+    add("--iso-opacity", fmt::format("{}", state.iso_opacity));
+  }
+  if (!state.volume &&
+      !(state.slices.empty() && state.surfaces.empty() && state.faces.empty() && state.isovalues.empty()))
+    add("--volume", "off");
   add("--background", state.dark ? "black" : "white");
   if (state.annotations.scalar_bar) command += " --scalar-bar";
   if (state.annotations.axes) command += " --axes";

@@ -25,6 +25,12 @@ struct SurfaceFile {
   std::shared_ptr<const TriangleMesh> mesh = nullptr;
 };
 
+/// Faces of the grid, from the command line. Not saved.
+struct NamedFaces {
+  std::string name;  // as --surface
+  GridSurface surface;
+};
+
 struct ViewState {
   std::string variable;
   Camera camera;
@@ -36,8 +42,12 @@ struct ViewState {
   std::optional<WorldBox> clip_box = std::nullopt;
   std::vector<ClipPlane> clip_planes = {};
   std::vector<SurfaceFile> surfaces = {};
+  std::vector<NamedFaces> faces = {};
+  std::string faces_by = {};  // --surface-by
   std::vector<ClipPlane> slices = {};
   double slice_opacity = 1;
+  std::vector<double> isovalues = {};  // from the command line; not saved
+  double iso_opacity = kIsoOpacity;
   bool volume = true;  // with a slice or a surface it may be left out
   bool lit = false;
   bool dark = false;  // background

@@ -117,6 +117,12 @@ class Viewer {
     for (size_t n = 0; n < scene.surfaces.size(); ++n)
       state.surfaces.push_back(
           {fs::absolute(options_.surface_files.at(n)), scene.surfaces[n].colour, scene.surfaces[n].mesh});
+    state.faces.clear();
+    for (size_t n = 0; n < scene.grid_surfaces.size(); ++n)
+      state.faces.push_back({options_.face_names.at(n), scene.grid_surfaces[n]});
+    state.faces_by = options_.faces_by;
+    state.isovalues = scene.isovalues;
+    state.iso_opacity = scene.iso_opacity;
     state.slices = scene.slices;
     state.slice_opacity = scene.slice_opacity;
     state.volume = scene.volume;

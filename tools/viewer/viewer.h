@@ -23,6 +23,8 @@ struct ViewerOptions {
   std::optional<std::string> scalar;
   std::shared_ptr<const SurfaceScene> scene;         // null: that of the state
   std::vector<std::filesystem::path> surface_files;  // of the scene's surfaces
+  std::vector<std::string> face_names;               // of its grid surfaces
+  std::string faces_by;                              // --surface-by
   std::optional<uint64_t> memory_bytes;
   std::optional<double> target_s;  // per picture while moving; default 0.033 with a graphics card, else 0.1
 };

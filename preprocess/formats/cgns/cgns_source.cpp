@@ -60,6 +60,10 @@ CgnsSource::CgnsSource(const OpenGridOptions& options)
   description_.coordinate_bytes = 4;
   for (const CgnsZone& zone : tree_.zones) {
     const std::string name = tree_.bases > 1 ? zone.base + "/" + zone.name : zone.name;
+    for (GridBoundary boundary : zone.boundaries) {
+      boundary.block = static_cast<uint32_t>(description_.blocks.size());
+      description_.boundaries.push_back(std::move(boundary));
+    }
     description_.blocks.push_back({name, zone.nodes[0], zone.nodes[1], zone.nodes[2], false});
     for (const CgnsArray& axis : zone.coordinates)
       if (axis.shape.type != "R4") description_.coordinate_bytes = 8;

@@ -9,6 +9,7 @@
 #include <set>
 #include <utility>
 
+#include "preprocess/formats/cgns/cgns_boundary.h"
 #include "preprocess/formats/cgns/cgns_steps.h"
 #include "preprocess/formats/cgns/cgns_units.h"
 #include "preprocess/grid/time_steps.h"
@@ -48,7 +49,9 @@ class TreeReader {
   UnitContext below(const Nodes& children, UnitContext units) const;
   CgnsArray arrayOf(const CgnsNode& node, const Dims& dims, const std::array<uint64_t, 6>& rind) const;
   std::array<uint64_t, 6> rindOf(const Nodes& children) const;
-  void noteConditions(const Nodes& zone);
+  void addConditions(const Nodes& children, CgnsZone& zone);
+  void readFamilyType(const CgnsNode& family);
+  std::string familyType(const CgnsNode& condition, const Nodes& details) const;
   void writeNotes();
   void warnOfOmissions();
 
@@ -60,7 +63,8 @@ class TreeReader {
   std::map<std::string, std::vector<std::string>> omitted_;  // reason -> zones
   std::map<std::string, size_t> conditions_;                 // type of boundary condition -> how many
   std::vector<std::string> families_, units_;
-  size_t holes_ = 0;  // sets of overset holes
+  std::map<std::string, std::string> family_types_;  // of the base: family -> type of its boundary condition
+  size_t holes_ = 0;                                 // sets of overset holes
 };
 
 CgnsTree TreeReader::read() {
@@ -84,11 +88,43 @@ CgnsTree TreeReader::read() {
   return std::move(tree_);
 }
 
-void TreeReader::noteConditions(const Nodes& zone) {
-  for (const CgnsNode& node : zone) {
+/// The type of a condition: that of its family where it says so.
+std::string TreeReader::familyType(const CgnsNode& condition, const Nodes& details) const {
+  std::string type = file_.text(condition);
+  if (type != "FamilySpecified") return type;
+  for (const CgnsNode& detail : details)
+    if (detail.label == "FamilyName_t")
+      if (const auto found = family_types_.find(file_.text(detail)); found != family_types_.end())
+        type = found->second;
+  return type;
+}
+
+void TreeReader::readFamilyType(const CgnsNode& family) {
+  try {
+    for (const CgnsNode& child : file_.children(family))
+      if (child.label == "FamilyBC_t") family_types_[family.name] = file_.text(child);
+  } catch (const Error&) {
+    // As with boundaries.
+  }
+}
+
+void TreeReader::addConditions(const Nodes& children, CgnsZone& zone) {
+  for (const CgnsNode& node : children) {
     if (node.label == "ZoneBC_t")
-      for (const CgnsNode& condition : file_.children(node))
-        if (condition.label == "BC_t") ++conditions_[file_.text(condition)];
+      for (const CgnsNode& condition : file_.children(node)) {
+        if (condition.label != "BC_t") continue;
+        ++conditions_[file_.text(condition)];
+        try {
+          const Nodes details = file_.children(condition);
+          auto boundary = cgnsBoundary(file_, details, zone.nodes);
+          if (!boundary) continue;
+          boundary->name = condition.name;
+          boundary->type = familyType(condition, details);
+          zone.boundaries.push_back(std::move(*boundary));
+        } catch (const Error&) {
+          // The volume does not need it, and most files are drawn without boundaries.
+        }
+      }
     if (node.label == "ZoneGridConnectivity_t")
       for (const CgnsNode& connectivity : file_.children(node))
         holes_ += connectivity.label == "OversetHoles_t";
@@ -128,7 +164,10 @@ void TreeReader::readBase(const CgnsNode& base) {
   }
   const UnitContext units = below(children, {});
   for (const CgnsNode& node : children)
-    if (node.label == "Family_t") families_.push_back(node.name);
+    if (node.label == "Family_t") {
+      families_.push_back(node.name);
+      readFamilyType(node);
+    }
   if (units_.empty()) units_ = units.units;
   const CgnsSteps steps = readCgnsSteps(file_, children);
   if (steps.count > 0 && !stored_times_) stored_times_ = steps.times;
@@ -152,7 +191,7 @@ void TreeReader::readZone(const CgnsNode& base, const CgnsNode& node, const Unit
         "{}: {} has {} sizes; expected 9 (nodes, cells and boundary nodes along i, j, k); the file is "
         "damaged",
         file_.path().string(), node.path, sizes.size());
-  CgnsZone zone{base.name, node.name, {}, {}, {}};
+  CgnsZone zone{base.name, node.name, {}, {}, {}, {}};
   for (size_t axis = 0; axis < 3; ++axis) {
     if (!(sizes[axis] >= 1 && sizes[axis] <= kMaxNodes))
       throw Error("{}: {} declares {:g} nodes along {}; the file is damaged", file_.path().string(),
@@ -174,7 +213,7 @@ void TreeReader::readZone(const CgnsNode& base, const CgnsNode& node, const Unit
   zone.coordinates = readCoordinates(*step.grid, zone.nodes);
   const UnitContext units = below(children, base_units);
   for (const CgnsNode& solution : step.solutions) addSolution(solution, units, zone);
-  noteConditions(children);
+  addConditions(children, zone);
   tree_.zones.push_back(std::move(zone));
 }
 

@@ -33,6 +33,7 @@ struct CgnsField {
 
 struct CgnsZone {
   std::string base, name;
+  std::vector<GridBoundary> boundaries;  // block: not set
   std::array<uint64_t, 3> nodes{};       // along i, j, k
   std::array<CgnsArray, 3> coordinates;  // x, y, z
   std::vector<CgnsField> fields;

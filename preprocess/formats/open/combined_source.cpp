@@ -88,6 +88,10 @@ void CombinedSource::describe(const std::vector<std::string>& names) {
   for (size_t g = 0; g < groups_.size(); ++g) {
     const size_t source = groups_[g].sources.front();
     const std::vector<GridBlock>& blocks = sources_[source]->description().blocks;
+    for (GridBoundary boundary : sources_[source]->description().boundaries) {
+      boundary.block += static_cast<uint32_t>(description_.blocks.size());
+      description_.boundaries.push_back(std::move(boundary));
+    }
     for (uint32_t b = 0; b < blocks.size(); ++b) {
       blocks_.emplace_back(g, b);
       GridBlock& block = description_.blocks.emplace_back(blocks[b]);

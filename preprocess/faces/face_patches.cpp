@@ -1,0 +1,267 @@
+#include "preprocess/faces/face_patches.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <map>
+
+#include "stream/codec/face_codec.h"
+
+namespace curvisplat {
+namespace {
+
+// Edges whose lengths differ by less are skipped together.
+constexpr double kAlike = 1.5;
+
+using Pair = std::array<uint64_t, 2>;
+
+uint64_t patchesAlong(const GridFace& face, const std::array<uint32_t, 2>& stride, size_t along) {
+  const uint64_t quads = uint64_t{kPatchQuads} * stride[along];
+  return (face.nodes[along] - 1 + quads - 1) / quads;
+}
+
+/// The mean length of the edges along u and v, of a sample of rows.
+std::array<double, 2> meanEdges(const FaceSpool& spool, uint32_t number) {
+  constexpr uint64_t kRows = 64;
+  const GridFace& face = spool.faces()[number];
+  std::array<double, 2> sum{};
+  std::array<uint64_t, 2> count{};
+  const auto add = [&](size_t along, const std::array<uint32_t, 3>& a, const std::array<uint32_t, 3>& b) {
+    if (a[0] == LatticeRow::kNone || b[0] == LatticeRow::kNone) return;
+    sum[along] += glm::distance(spool.box().at(a), spool.box().at(b));
+    ++count[along];
+  };
+  const uint64_t step = std::max<uint64_t>(1, (face.nodes[1] - 1) / kRows);
+  for (uint64_t v = 0; v + 1 < face.nodes[1]; v += step) {
+    const LatticeRow here = spool.row(number, v), next = spool.row(number, v + 1);
+    for (uint64_t u = 0; u < face.nodes[0]; ++u) {
+      if (u > 0) add(0, here.codes[u - 1], here.codes[u]);
+      add(1, here.codes[u], next.codes[u]);
+    }
+  }
+  return {count[0] ? sum[0] / static_cast<double>(count[0]) : 0,
+          count[1] ? sum[1] / static_cast<double>(count[1]) : 0};
+}
+
+/// Strides of the levels, from 1 until one patch covers the face. Where edges are longer along one axis, the
+/// other is skipped first, so that a boundary layer's quads become square.
+std::vector<std::array<uint32_t, 2>> stridesOf(const GridFace& face, const std::array<double, 2>& edges) {
+  std::vector<std::array<uint32_t, 2>> levels{{1, 1}};
+  while (true) {
+    std::array<uint32_t, 2> stride = levels.back();
+    const bool can[2] = {patchesAlong(face, stride, 0) > 1, patchesAlong(face, stride, 1) > 1};
+    if (!can[0] && !can[1]) return levels;
+    const double length[2] = {edges[0] * stride[0], edges[1] * stride[1]};
+    const std::array<uint32_t, 2> before = stride;
+    for (const size_t n : {size_t{0}, size_t{1}})
+      if (can[n] && (!can[1 - n] || length[n] <= kAlike * length[1 - n])) stride[n] = 2 * before[n];
+    levels.push_back(stride);
+  }
+}
+
+/// A patch, and where it is among those of its level.
+struct Built {
+  FacePatch patch;
+  Pair place{};
+  PatchLattice lattice;
+  bool any = false;  // quad
+};
+
+class PatchBuilder {
+ public:
+  PatchBuilder(const FaceSpool& spool, uint32_t face, const QuadMask& drawn)
+      : spool_(spool), face_(spool.faces()[face]), number_(face), drawn_(drawn) {}
+
+  /// One row of the patches of a level. Decimates rows of nodes as it reads them.
+  std::vector<Built> row(const std::array<uint32_t, 2>& stride, uint64_t patch_v) const {
+    std::vector<Built> built(patchesAlong(face_, stride, 0));
+    for (size_t n = 0; n < built.size(); ++n) begin(built[n], stride, {n, patch_v});
+    const FacePatch& first = built.front().patch;
+    for (uint64_t r = 0; r < first.nodes[1]; ++r) {
+      const LatticeRow nodes = spool_.row(number_, latticeIndex(face_, first, 1, r));
+      for (Built& b : built) append(b, nodes);
+    }
+    tbb::parallel_for(size_t{0}, built.size(), [&](size_t n) { complete(built[n]); });
+    return built;
+  }
+
+ private:
+  void begin(Built& b, const std::array<uint32_t, 2>& stride, const Pair& place) const {
+    b.place = place;
+    FacePatch& patch = b.patch;
+    patch.face = number_;
+    patch.stride = stride;
+    for (size_t n = 0; n < 2; ++n) {
+      patch.first[n] = place[n] * kPatchQuads * stride[n];
+      const uint64_t quads = (face_.nodes[n] - 1 - patch.first[n] + stride[n] - 1) / stride[n];
+      patch.nodes[n] = static_cast<uint16_t>(std::min<uint64_t>(quads, kPatchQuads) + 1);
+    }
+    b.lattice.columns = patch.nodes[0];
+    b.lattice.rows = patch.nodes[1];
+    b.lattice.scalars.resize(spool_.scalars());
+  }
+
+  void append(Built& b, const LatticeRow& row) const {
+    for (uint64_t n = 0; n < b.patch.nodes[0]; ++n) {
+      const uint64_t u = latticeIndex(face_, b.patch, 0, n);
+      for (size_t axis = 0; axis < 3; ++axis) b.lattice.codes[axis].push_back(row.codes[u][axis]);
+      for (size_t s = 0; s < row.scalars.size(); ++s) b.lattice.scalars[s].push_back(row.scalars[s][u]);
+    }
+  }
+
+  void complete(Built& b) const {
+    FacePatch& patch = b.patch;
+    PatchLattice& lattice = b.lattice;
+    const auto missing = [&](size_t n) { return lattice.codes[0][n] == LatticeRow::kNone; };
+    lattice.quads.resize(patch.quadCount());
+    patch.lower = glm::dvec3(std::numeric_limits<double>::infinity());
+    patch.upper = -patch.lower;
+    const bool coarse = patch.stride[0] > 1 || patch.stride[1] > 1;
+    for (uint64_t r = 0; r + 1 < patch.nodes[1]; ++r)
+      for (uint64_t c = 0; c + 1 < patch.nodes[0]; ++c) {
+        const size_t at = r * patch.nodes[0] + c;
+        const size_t corners[4] = {at, at + 1, at + patch.nodes[0] + 1, at + patch.nodes[0]};
+        if (std::any_of(corners, corners + 4, missing)) continue;
+        if (!drawn_.mostOf(latticeIndex(face_, patch, 0, c), latticeIndex(face_, patch, 0, c + 1),
+                           latticeIndex(face_, patch, 1, r), latticeIndex(face_, patch, 1, r + 1)))
+          continue;
+        lattice.quads[r * (patch.nodes[0] - 1u) + c] = 1;
+        b.any = true;
+        glm::dvec3 corner[4];
+        for (int n = 0; n < 4; ++n) {
+          corner[n] = positionOf(lattice, corners[n]);
+          patch.lower = glm::min(patch.lower, corner[n]);
+          patch.upper = glm::max(patch.upper, corner[n]);
+        }
+        for (int n = 0; coarse && n < 4; ++n)
+          patch.error =
+              std::max(patch.error, static_cast<float>(glm::distance(corner[n], corner[(n + 1) % 4])));
+      }
+    fillMissing(lattice);
+  }
+
+  glm::dvec3 positionOf(const PatchLattice& lattice, size_t n) const {
+    return spool_.box().at({lattice.codes[0][n], lattice.codes[1][n], lattice.codes[2][n]});
+  }
+
+  /// Nodes that are not there get what takes no bits: the place and the values of the one before.
+  static void fillMissing(PatchLattice& lattice) {
+    const size_t count = lattice.codes[0].size();
+    size_t first = 0;
+    while (first < count && lattice.codes[0][first] == LatticeRow::kNone) ++first;
+    for (size_t n = 0; n < count; ++n) {
+      if (lattice.codes[0][n] != LatticeRow::kNone) continue;
+      const size_t from = n > 0 ? n - 1 : first;
+      for (auto& codes : lattice.codes) codes[n] = from < count ? codes[from] : 0;
+      for (auto& values : lattice.scalars) values[n] = from < count ? values[from] : 0;
+    }
+  }
+
+  const FaceSpool& spool_;
+  const GridFace& face_;
+  const uint32_t number_;
+  const QuadMask& drawn_;
+};
+
+/// The patches of a level that have a quad or a child, by their places.
+class Level {
+ public:
+  void add(const Pair& place, FacePatch patch) { patches_.emplace(place, std::move(patch)); }
+  bool empty() const { return patches_.empty(); }
+  bool has(const Pair& place) const { return patches_.contains(place); }
+  const FacePatch& at(const Pair& place) const { return patches_.at(place); }
+  std::map<Pair, FacePatch>& all() { return patches_; }
+
+ private:
+  std::map<Pair, FacePatch> patches_;
+};
+
+/// The places of the patches, a level below, that a patch may replace.
+std::vector<Pair> childPlaces(const Pair& place, const std::array<uint32_t, 2>& stride,
+                              const std::array<uint32_t, 2>& fine) {
+  std::vector<Pair> places;
+  const uint64_t by[2] = {stride[0] / fine[0], stride[1] / fine[1]};
+  for (uint64_t v = 0; v < by[1]; ++v)
+    for (uint64_t u = 0; u < by[0]; ++u) places.push_back({place[0] * by[0] + u, place[1] * by[1] + v});
+  return places;
+}
+
+/// All levels in the order of the file: the coarsest first, and the children of a patch next to each other.
+std::vector<FacePatch> inOrder(std::vector<Level>& levels, std::span<const std::array<uint32_t, 2>> strides,
+                               uint32_t first_number) {
+  for (size_t n = 1; n < levels.size(); ++n)
+    for (auto& [place, patch] : levels[n].all())
+      for (const Pair& child : childPlaces(place, strides[n], strides[n - 1])) {
+        if (!levels[n - 1].has(child)) continue;
+        const FacePatch& below = levels[n - 1].at(child);
+        patch.lower = glm::min(patch.lower, below.lower);
+        patch.upper = glm::max(patch.upper, below.upper);
+        patch.error = std::max(patch.error, below.error);
+      }
+  std::vector<FacePatch> patches;
+  std::vector<Pair> places;
+  for (const auto& [place, patch] : levels.back().all()) {
+    patches.push_back(patch);
+    places.push_back(place);
+  }
+  size_t begin = 0;
+  for (size_t n = levels.size() - 1; n > 0; --n) {
+    const size_t end = patches.size();
+    for (size_t parent = begin; parent < end; ++parent)
+      for (const Pair& child : childPlaces(places[parent], strides[n], strides[n - 1])) {
+        if (!levels[n - 1].has(child)) continue;
+        if (patches[parent].child_count++ == 0)
+          patches[parent].first_child = first_number + static_cast<uint32_t>(patches.size());
+        patches.push_back(levels[n - 1].at(child));
+        places.push_back(child);
+      }
+    begin = end;
+  }
+  return patches;
+}
+
+}  // namespace
+
+bool QuadMask::mostOf(uint64_t u0, uint64_t u1, uint64_t v0, uint64_t v1) const {
+  uint64_t count = 0;
+  for (uint64_t v = v0; v < v1; ++v)
+    for (uint64_t u = u0; u < u1; ++u) count += at(u, v);
+  return 2 * count >= (u1 - u0) * (v1 - v0);
+}
+
+std::vector<FacePatch> writePatches(const FaceSpool& spool, uint32_t face, const QuadMask& drawn,
+                                    uint32_t first_number, FacesWriter& writer, const Progress& progress) {
+  const PatchBuilder builder(spool, face, drawn);
+  const auto strides = stridesOf(spool.faces()[face], meanEdges(spool, face));
+  std::vector<Level> levels;
+  for (const std::array<uint32_t, 2>& stride : strides) {
+    Level level;
+    const auto is_needed = [&](const Built& built) {
+      if (built.any || levels.empty()) return built.any;
+      const std::vector<Pair> below = childPlaces(built.place, stride, strides[levels.size() - 1]);
+      return std::any_of(below.begin(), below.end(), [&](const Pair& p) { return levels.back().has(p); });
+    };
+    for (uint64_t v = 0; v < patchesAlong(spool.faces()[face], stride, 1); ++v) {
+      progress.throwIfStopped();
+      std::vector<Built> row = builder.row(stride, v);
+      std::vector<std::vector<std::byte>> streams(row.size());
+      tbb::parallel_for(size_t{0}, row.size(), [&](size_t n) {
+        if (is_needed(row[n])) streams[n] = encodePatch(row[n].lattice);
+      });
+      for (size_t n = 0; n < row.size(); ++n) {
+        if (streams[n].empty()) continue;
+        row[n].patch.extent = writer.append(streams[n]);
+        level.add(row[n].place, row[n].patch);
+      }
+    }
+    if (level.empty()) return {};
+    levels.push_back(std::move(level));
+  }
+  return inOrder(levels, strides, first_number);
+}
+
+}  // namespace curvisplat

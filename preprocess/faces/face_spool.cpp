@@ -1,0 +1,229 @@
+#include "preprocess/faces/face_spool.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "preprocess/grid/hexahedron.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr std::array<std::array<size_t, 2>, 3> kAlong{{{1, 2}, {0, 2}, {0, 1}}};
+constexpr Halo kCorners{0, 1};
+constexpr uint64_t kPositionBytes = 3 * sizeof(uint32_t);
+
+using Node = std::array<uint64_t, 3>;
+
+Node sizeOf(const GridBlock& block) {
+  return {block.ni, block.nj, block.nk};
+}
+
+/// Where a node is in a slab's arrays.
+size_t placeIn(const LoadedSlab& loaded, uint64_t ni, const Node& node) {
+  const NodeBox& window = loaded.slab.window;
+  return ((node[2] - window.k0) * (window.j1 - window.j0) + (node[1] - window.j0)) * ni + node[0];
+}
+
+/// The part of a face's lattice whose nodes (or, of the layer of cells behind it, lowest nodes) are in the box.
+struct LatticeBox {
+  std::array<uint64_t, 2> first{}, end{};
+  bool empty = false;
+
+  LatticeBox(const GridFace& face, const Node& size, const NodeBox& box, uint64_t layer) {
+    const Node from{0, box.j0, box.k0}, to{size[0], box.j1, box.k1};
+    const auto axis = static_cast<size_t>(face.axis);
+    empty = layer < from[axis] || layer >= to[axis];
+    for (size_t n = 0; n < 2; ++n) {
+      first[n] = from[kAlong[axis][n]];
+      end[n] = to[kAlong[axis][n]];
+    }
+  }
+};
+
+Node nodeAt(const GridFace& face, uint64_t layer, uint64_t u, uint64_t v) {
+  const auto axis = static_cast<size_t>(face.axis);
+  Node node{};
+  node[axis] = layer;
+  node[kAlong[axis][0]] = u;
+  node[kAlong[axis][1]] = v;
+  return node;
+}
+
+/// Of the cells behind a face, or at either side of an index plane.
+uint64_t layerOfCells(const GridFace& face, const Node& size) {
+  return std::min(face.index, size[static_cast<size_t>(face.axis)] - 2);
+}
+
+bool isThere(const NodeArrays& nodes, size_t at, bool of_cells) {
+  return of_cells ? !(nodes.blank[at] & kNoNode) : !nodes.blank[at];
+}
+
+/// Without a value: a cell that is not drawn.
+bool cellIsThere(const NodeArrays& nodes, size_t at, size_t row_stride, size_t plane_stride) {
+  return !(cornerMarks(nodes.blank.data(), at, row_stride, plane_stride) & kNoNode) &&
+         !(nodes.blank[at] & (kNoValue | kBlankValue | kValueNotFinite));
+}
+
+}  // namespace
+
+FaceSpool::FaceSpool(const NodeReader& reader, std::vector<GridFace> faces, const FaceBox& box,
+                     const std::filesystem::path& folder)
+    : reader_(reader), faces_(std::move(faces)), box_(box), path_(folder / "faces.tmp"), out_(path_) {
+  uint64_t end = 0;
+  for (const GridFace& face : faces_) {
+    const uint64_t nodes = face.nodes[0] * face.nodes[1];
+    places_.push_back({end, end + nodes * kPositionBytes});
+    end += nodes * (kPositionBytes + scalars() * sizeof(float));
+  }
+}
+
+FaceSpool::~FaceSpool() {
+  removeAll(path_);
+}
+
+void FaceSpool::fill(uint64_t slab_bytes, AbuttingFaces& abutting, Progress& progress) {
+  SlabStream slabs(reader_, slab_bytes, kCorners);
+  size_t first_face = 0, end_face = 0;
+  uint32_t block = std::numeric_limits<uint32_t>::max();
+  while (const LoadedSlab* loaded = slabs.next()) {
+    if (loaded->slab.block != block) {
+      block = loaded->slab.block;
+      const auto in_block = [&](const GridFace& face) { return face.block == block; };
+      first_face = static_cast<size_t>(std::find_if(faces_.begin(), faces_.end(), in_block) - faces_.begin());
+      end_face = first_face;
+      while (end_face < faces_.size() && in_block(faces_[end_face])) ++end_face;
+    }
+    for (size_t face = first_face; face < end_face; ++face) take(*loaded, face);
+    addEnds(*loaded, abutting);
+    progress.advance(rowsOf(loaded->slab.box) * reader_.source().description().blocks[block].ni);
+  }
+  in_.emplace(path_);
+}
+
+void FaceSpool::take(const LoadedSlab& loaded, size_t number) {
+  const GridFace& face = faces_[number];
+  const NodeArrays& nodes = loaded.nodes;
+  const Node size = sizeOf(reader_.source().description().blocks[face.block]);
+  const bool of_cells = ofCells();
+  std::vector<std::array<uint32_t, 3>> codes;
+  std::vector<float> values;
+  const auto code_of = [&](double at, int axis) {
+    if (!(box_.step[axis] > 0)) return 0u;
+    const double steps = std::nearbyint((at - box_.lower[axis]) / box_.step[axis]);
+    return static_cast<uint32_t>(std::clamp(steps, 0.0, double{FaceBox::kSteps}));
+  };
+  // Rows that follow one another in the file are written at once.
+  const auto is_last = [&](const LatticeBox& box, uint64_t v) {
+    return v + 1 == box.end[1] || box.first[0] > 0 || box.end[0] < face.nodes[0];
+  };
+  const LatticeBox part(face, size, loaded.slab.box, face.index);
+  uint64_t first = 0;
+  for (uint64_t v = part.first[1]; !part.empty && v < part.end[1]; ++v) {
+    if (codes.empty()) first = v * face.nodes[0] + part.first[0];
+    for (uint64_t u = part.first[0]; u < part.end[0]; ++u) {
+      const size_t at = placeIn(loaded, size[0], nodeAt(face, face.index, u, v));
+      if (isThere(nodes, at, of_cells))
+        codes.push_back({code_of(nodes.x[at], 0), code_of(nodes.y[at], 1), code_of(nodes.z[at], 2)});
+      else
+        codes.push_back({LatticeRow::kNone, 0, 0});
+    }
+    if (!is_last(part, v)) continue;
+    out_.writeAt(places_[number].positions + first * kPositionBytes, std::as_bytes(std::span(codes)));
+    codes.clear();
+  }
+  if (scalars() == 0) return;
+  const uint64_t layer = of_cells ? layerOfCells(face, size) : face.index;
+  const LatticeBox of_values(face, size, loaded.slab.box, layer);
+  const size_t plane_stride = size[0] * (loaded.slab.window.j1 - loaded.slab.window.j0);
+  for (uint64_t v = of_values.first[1]; !of_values.empty && v < of_values.end[1]; ++v) {
+    if (values.empty()) first = v * face.nodes[0] + of_values.first[0];
+    for (uint64_t u = of_values.first[0]; u < of_values.end[0]; ++u) {
+      const Node node = nodeAt(face, layer, u, v);
+      const size_t at = placeIn(loaded, size[0], node);
+      const bool has_cell =
+          of_cells && node[0] + 1 < size[0] && node[1] + 1 < size[1] && node[2] + 1 < size[2];
+      const bool none = of_cells && !(has_cell && cellIsThere(nodes, at, size[0], plane_stride));
+      for (const std::vector<float>& scalar : nodes.scalars) values.push_back(none ? NAN : scalar[at]);
+    }
+    if (!is_last(of_values, v)) continue;
+    out_.writeAt(places_[number].scalars + first * scalars() * sizeof(float),
+                 std::as_bytes(std::span(values)));
+    values.clear();
+  }
+}
+
+/// Of the cells whose lowest nodes are in the slab's box, and which have their corners at the end.
+void FaceSpool::addEnds(const LoadedSlab& loaded, AbuttingFaces& abutting) const {
+  const Slab& slab = loaded.slab;
+  const NodeArrays& nodes = loaded.nodes;
+  const Node size = sizeOf(reader_.source().description().blocks[slab.block]);
+  const size_t plane_stride = size[0] * (slab.window.j1 - slab.window.j0);
+  std::vector<AbuttingFaces::Centre> centres;
+  const auto add = [&](const CellFace& face, size_t at) {
+    if (ofCells()) {
+      if (!cellIsThere(nodes, at, size[0], plane_stride)) return;
+    } else {
+      const size_t bit = size_t{1} << face.axis;
+      for (size_t corner = 0; corner < 8; ++corner)
+        if (((corner & bit) != 0) == face.upper &&
+            nodes.blank[at + (corner & 1) + (corner >> 1 & 1) * size[0] + (corner >> 2) * plane_stride])
+          return;
+    }
+    centres.push_back(abutting.centreOf(
+        face, cornersAt(nodes.x.data(), nodes.y.data(), nodes.z.data(), at, size[0], plane_stride)));
+  };
+  for (uint64_t k = slab.box.k0; k < std::min(slab.box.k1, size[2] - 1); ++k)
+    for (uint64_t j = slab.box.j0; j < std::min(slab.box.j1, size[1] - 1); ++j) {
+      const bool row_at_end = j == 0 || j + 2 == size[1] || k == 0 || k + 2 == size[2];
+      const size_t row = placeIn(loaded, size[0], {0, j, k});
+      for (uint64_t i = 0; i + 1 < size[0]; i = row_at_end || i + 2 >= size[0] ? i + 1 : size[0] - 2)
+        for (int axis = 0; axis < 3; ++axis)
+          for (const bool upper : {false, true})
+            if (const CellFace face{slab.block, {i, j, k}, axis, upper}; abutting.isAtEnd(face))
+              add(face, row + i);
+    }
+  abutting.add(centres);
+}
+
+std::vector<float> FaceSpool::storedScalars(size_t face, uint64_t v) const {
+  std::vector<float> values(faces_[face].nodes[0] * scalars());
+  in_->readAt(places_[face].scalars + v * values.size() * sizeof(float), std::span(values));
+  return values;
+}
+
+std::vector<uint8_t> FaceSpool::cellsOfRow(size_t face, uint64_t v) const {
+  const std::vector<float> values = storedScalars(face, v);
+  std::vector<uint8_t> there(faces_[face].nodes[0] - 1);
+  for (size_t u = 0; u < there.size(); ++u) there[u] = !std::isnan(values[u * scalars()]);
+  return there;
+}
+
+LatticeRow FaceSpool::row(size_t number, uint64_t v) const {
+  const GridFace& face = faces_[number];
+  LatticeRow row;
+  row.codes.resize(face.nodes[0]);
+  in_->readAt(places_[number].positions + v * face.nodes[0] * kPositionBytes, std::span(row.codes));
+  row.scalars.assign(scalars(), std::vector<float>(face.nodes[0]));
+  if (scalars() == 0) return row;
+  const std::vector<float> here = storedScalars(number, v);
+  if (!ofCells()) {
+    for (size_t s = 0; s < scalars(); ++s)
+      for (size_t u = 0; u < face.nodes[0]; ++u) row.scalars[s][u] = here[u * scalars() + s];
+    return row;
+  }
+  const std::vector<float> before = v > 0 ? storedScalars(number, v - 1) : here;
+  for (size_t s = 0; s < scalars(); ++s)
+    for (size_t u = 0; u < face.nodes[0]; ++u) {
+      double sum = 0;
+      int count = 0;
+      for (const std::vector<float>* of : {&before, &here})
+        for (size_t at = u > 0 ? u - 1 : 0; at <= u; ++at)
+          if (const float value = (*of)[at * scalars() + s]; !std::isnan(value))
+            sum += double{value}, ++count;
+      row.scalars[s][u] = count > 0 ? static_cast<float>(sum / count) : 0;
+    }
+  return row;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,71 @@
+// The nodes of a grid's faces, in a temporary file: read from the grid in one pass, and then as often as levels of
+// detail need them.
+//
+// Of cell-centred data the scalars are those of the layer of cells behind the face, and a node's is the mean of
+// those around it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "preprocess/grid/node_reader.h"
+#include "preprocess/grid/slabs.h"
+#include "preprocess/splats/abutting_faces.h"
+#include "stream/base/file.h"
+#include "stream/base/progress.h"
+#include "stream/model/grid_faces.h"
+
+namespace curvisplat {
+
+/// A row of nodes of a face.
+struct LatticeRow {
+  static constexpr uint32_t kNone = 0xffffffff;  // as the first code: there is no such node
+
+  std::vector<std::array<uint32_t, 3>> codes;  // steps of the FaceBox
+  std::vector<std::vector<float>> scalars;     // [scalar][node]; anything where there is no node
+};
+
+class FaceSpool {
+ public:
+  /// `faces`: their lattices. The file vanishes with the object.
+  FaceSpool(const NodeReader& reader, std::vector<GridFace> faces, const FaceBox& box,
+            const std::filesystem::path& folder);
+  ~FaceSpool();
+  FaceSpool(const FaceSpool&) = delete;
+  FaceSpool& operator=(const FaceSpool&) = delete;
+
+  /// Reads the grid, in slabs of `slab_bytes`, and adds the faces of its cells at blocks' ends to `abutting`.
+  void fill(uint64_t slab_bytes, AbuttingFaces& abutting, Progress& progress);
+
+  std::span<const GridFace> faces() const { return faces_; }
+  const FaceBox& box() const { return box_; }
+  size_t scalars() const { return reader_.scalars(); }
+  /// After fill(). Rows of nodes along u. Any thread.
+  LatticeRow row(size_t face, uint64_t v) const;
+  /// Whether the cells behind the quads of a row are there; nodes decide otherwise. Of cells only.
+  std::vector<uint8_t> cellsOfRow(size_t face, uint64_t v) const;
+  bool ofCells() const { return reader_.centring() == Centring::kCell; }
+
+ private:
+  struct Place {
+    uint64_t positions, scalars;  // offsets of the face's arrays
+  };
+  void take(const LoadedSlab& slab, size_t face);
+  void addEnds(const LoadedSlab& slab, AbuttingFaces& abutting) const;
+  std::vector<float> storedScalars(size_t face, uint64_t v) const;
+
+  const NodeReader& reader_;
+  const std::vector<GridFace> faces_;
+  const FaceBox box_;
+  const std::filesystem::path path_;
+  std::vector<Place> places_;  // [face]
+  OutputFile out_;
+  std::optional<InputFile> in_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,225 @@
+#include "preprocess/faces/grid_faces_pass.h"
+
+#include <algorithm>
+
+#include "preprocess/faces/face_patches.h"
+#include "preprocess/faces/face_spool.h"
+#include "preprocess/splats/abutting_faces.h"
+#include "stream/base/error.h"
+#include "stream/cache/faces_file.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr std::array<std::array<size_t, 2>, 3> kAlong{{{1, 2}, {0, 2}, {0, 1}}};
+
+std::array<uint64_t, 3> sizeOf(const GridBlock& block) {
+  return {block.ni, block.nj, block.nk};
+}
+
+/// All faces that may be drawn, block after block: blocks without volume have none.
+std::vector<GridFace> facesOf(std::span<const GridBlock> blocks, std::span<const IndexPlane> planes) {
+  std::vector<GridFace> faces;
+  for (uint32_t block = 0; block < blocks.size(); ++block) {
+    const std::array<uint64_t, 3> size = sizeOf(blocks[block]);
+    if (std::any_of(size.begin(), size.end(), [](uint64_t n) { return n < 2; })) continue;
+    const auto add = [&](int axis, FaceSide side, uint64_t index) {
+      const auto [u, v] = kAlong[static_cast<size_t>(axis)];
+      faces.push_back({block, axis, side, index, {size[u], size[v]}, kNoPatch});
+    };
+    for (int axis = 0; axis < 3; ++axis) {
+      add(axis, FaceSide::kMin, 0);
+      add(axis, FaceSide::kMax, size[static_cast<size_t>(axis)] - 1);
+    }
+    for (const IndexPlane& plane : planes)
+      if (plane.block.value_or(block) == block && plane.index < size[static_cast<size_t>(plane.axis)])
+        add(plane.axis, FaceSide::kPlane, plane.index);
+  }
+  return faces;
+}
+
+/// The boundaries as parts of faces. Those inside of a block, or of a line or a point, are none.
+std::vector<FaceRegion> regionsOf(const GridDescription& grid, std::span<const GridFace> faces) {
+  std::vector<FaceRegion> regions;
+  for (const GridBoundary& boundary : grid.boundaries)
+    for (uint32_t n = 0; n < faces.size(); ++n) {
+      const GridFace& face = faces[n];
+      const auto axis = static_cast<size_t>(face.axis);
+      if (face.side == FaceSide::kPlane || face.block != boundary.block ||
+          boundary.first[axis] != face.index || boundary.last[axis] != face.index)
+        continue;
+      FaceRegion region{n, {}, {}, boundary.name, boundary.type};
+      bool is_area = true;
+      for (size_t along = 0; along < 2; ++along) {
+        region.first[along] = boundary.first[kAlong[axis][along]];
+        region.last[along] = std::min(boundary.last[kAlong[axis][along]], face.nodes[along] - 1);
+        is_area = is_area && region.first[along] < region.last[along];
+      }
+      if (is_area) regions.push_back(std::move(region));
+    }
+  return regions;
+}
+
+class FacesPass {
+ public:
+  FacesPass(const NodeReader& reader, const FacesJob& job, Progress& progress)
+      : reader_(reader),
+        grid_(reader.source().description()),
+        job_(job),
+        progress_(progress),
+        abutting_(grid_.blocks, grid_.coordinate_bytes, sortBytes(), job.temporary),
+        spool_(reader, facesOf(grid_.blocks, job.planes), FaceBox::of(job.lower, job.upper), job.temporary) {}
+
+  std::optional<FileInfo> write() {
+    spool_.fill(job_.slab_bytes, abutting_, progress_);
+    abutting_.keepFolds();
+    abutting_.match(progress_);
+    const std::vector<FaceRegion> all_regions = regionsOf(grid_, spool_.faces());
+    FacesWriter writer(job_.output, spool_.box(), job_.variables);
+    Written written;
+    for (uint32_t n = 0; n < spool_.faces().size(); ++n) {
+      std::vector<FaceRegion> own;
+      for (const FaceRegion& region : all_regions)
+        if (region.face == n) own.push_back(region);
+      Quads quads = quadsOf(n, own);
+      add(n, spool_.faces()[n].side, quads.drawn, own, writer, written);
+      // A body without thickness is a side that abuts on itself.
+      if (quads.folds && !isPlane(n)) add(n, FaceSide::kPlane, quads.with_folds, {}, writer, written);
+    }
+    const auto& [faces, patches, regions] = written;
+    const FileInfo info = writer.finish(faces, patches, regions);
+    if (!faces.empty()) return info;
+    removeFile(job_.output);
+    return std::nullopt;
+  }
+
+ private:
+  uint64_t sortBytes() const {
+    const uint64_t needs = 2 * AbuttingFaces::needsOf(grid_.blocks).memory_bytes;
+    if (2 * needs > job_.sort_bytes)
+      throw Error("--memory: the faces of so many blocks take {} MiB; give more, or --no-surfaces",
+                  (2 * needs >> 20) + 1);
+    return job_.sort_bytes - needs;
+  }
+
+  struct Written {
+    std::vector<GridFace> faces;
+    std::vector<FacePatch> patches;
+    std::vector<FaceRegion> regions;
+  };
+
+  void add(uint32_t spooled, FaceSide side, const QuadMask& quads, std::vector<FaceRegion> regions,
+           FacesWriter& writer, Written& written) const {
+    std::vector<FacePatch> patches = writePatches(
+        spool_, spooled, quads, static_cast<uint32_t>(written.patches.size()), writer, progress_);
+    if (patches.empty()) return;
+    const auto number = static_cast<uint32_t>(written.faces.size());
+    GridFace& face = written.faces.emplace_back(spool_.faces()[spooled]);
+    face.side = side;
+    face.root = static_cast<uint32_t>(written.patches.size());
+    for (FacePatch& patch : patches) {
+      patch.face = number;
+      written.patches.push_back(patch);
+    }
+    for (FaceRegion& region : regions) {
+      region.face = number;
+      written.regions.push_back(std::move(region));
+    }
+  }
+
+  /// Whether the face was asked for as an index plane, too.
+  bool isPlane(uint32_t number) const {
+    const GridFace& face = spool_.faces()[number];
+    return face.side == FaceSide::kPlane ||
+           std::any_of(spool_.faces().begin(), spool_.faces().end(), [&](const GridFace& other) {
+             return other.side == FaceSide::kPlane && other.block == face.block && other.axis == face.axis &&
+                    other.index == face.index;
+           });
+  }
+
+  struct Quads {
+    QuadMask drawn, with_folds;
+    bool folds = false;
+  };
+
+  /// Of a face: those that another block does not close, and those of boundaries, whose nodes and cells are there.
+  Quads quadsOf(uint32_t number, std::span<const FaceRegion> regions) const {
+    const GridFace& face = spool_.faces()[number];
+    Quads quads{QuadMask(face), QuadMask(face)};
+    QuadMask& drawn = quads.drawn;
+    LatticeRow before = spool_.row(number, 0);
+    for (uint64_t v = 0; v < drawn.rows(); ++v) {
+      progress_.throwIfStopped();
+      LatticeRow next = spool_.row(number, v + 1);
+      std::vector<uint8_t> there(drawn.columns(), 1);
+      if (spool_.ofCells()) there = spool_.cellsOfRow(number, v);
+      for (uint64_t u = 0; u < drawn.columns(); ++u) {
+        bool is_there = there[u];
+        for (const LatticeRow* row : {&before, &next})
+          for (const uint64_t node : {u, u + 1})
+            is_there = is_there && row->codes[node][0] != LatticeRow::kNone;
+        const auto in_region = [&](const FaceRegion& r) {
+          return u >= r.first[0] && u < r.last[0] && v >= r.first[1] && v < r.last[1];
+        };
+        if (!is_there) continue;
+        const bool is_outer = face.side == FaceSide::kPlane || !abutting_.abuts(cellOf(face, u, v));
+        const bool folds = face.side != FaceSide::kPlane && abutting_.folds(cellOf(face, u, v));
+        quads.folds |= folds;
+        if (is_outer || std::any_of(regions.begin(), regions.end(), in_region)) drawn.draw(u, v);
+        if (is_outer || folds) quads.with_folds.draw(u, v);
+      }
+      before = std::move(next);
+    }
+    return quads;
+  }
+
+  static CellFace cellOf(const GridFace& face, uint64_t u, uint64_t v) {
+    const auto axis = static_cast<size_t>(face.axis);
+    CellFace cell{face.block, {}, face.axis, face.side == FaceSide::kMax};
+    cell.cell[axis] = face.side == FaceSide::kMax ? face.index - 1 : 0;
+    cell.cell[kAlong[axis][0]] = u;
+    cell.cell[kAlong[axis][1]] = v;
+    return cell;
+  }
+
+  const NodeReader& reader_;
+  const GridDescription& grid_;
+  const FacesJob& job_;
+  Progress& progress_;
+  AbuttingFaces abutting_;
+  FaceSpool spool_;
+};
+
+}  // namespace
+
+uint64_t temporaryBytesOfFaces(std::span<const GridBlock> blocks, std::span<const IndexPlane> planes,
+                               size_t scalars) {
+  uint64_t nodes = 0;
+  for (const GridFace& face : facesOf(blocks, planes)) nodes += face.nodes[0] * face.nodes[1];
+  return nodes * (12 + 4 * scalars) + AbuttingFaces::needsOf(blocks).disk_bytes;
+}
+
+void checkPlanes(const GridDescription& grid, std::span<const IndexPlane> planes) {
+  for (const IndexPlane& plane : planes) {
+    const char axis = "ijk"[plane.axis];
+    const auto a = static_cast<size_t>(plane.axis);
+    if (plane.block && *plane.block >= grid.blocks.size())
+      throw Error("--surface: the grid has no block {}; it has blocks 1 to {}", *plane.block + 1,
+                  grid.blocks.size());
+    uint64_t most = 0;
+    for (uint32_t n = 0; n < grid.blocks.size(); ++n)
+      if (plane.block.value_or(n) == n) most = std::max(most, sizeOf(grid.blocks[n])[a]);
+    if (plane.index >= most)
+      throw Error("--surface: {} {}={}; expected 0 to {}",
+                  plane.block ? fmt::format("block {} has no", *plane.block + 1) : "no block has", axis,
+                  plane.index, most - 1);
+  }
+}
+
+std::optional<FileInfo> writeGridFaces(const NodeReader& reader, const FacesJob& job, Progress& progress) {
+  const auto& blocks = reader.source().description().blocks;
+  if (facesOf(blocks, job.planes).empty()) return std::nullopt;
+  return FacesPass(reader, job, progress).write();
+}
+
+}  // namespace curvisplat

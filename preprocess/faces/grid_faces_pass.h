@@ -1,0 +1,50 @@
+// Writes the faces of a grid that are drawn as surfaces: the outer faces of its blocks, boundaries with names, and
+// index planes that were asked for.
+//
+//   FaceSpool         nodes of the faces, read from the grid in one pass
+//   AbuttingFaces     quads that another block closes: they are not drawn, unless a boundary has them
+//   writePatches      levels of detail, one face after the other
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "preprocess/grid/node_reader.h"
+#include "stream/base/progress.h"
+#include "stream/cache/manifest.h"
+#include "stream/model/grid_faces.h"
+
+namespace curvisplat {
+
+/// Nodes of one index along an axis, of a block or of all.
+struct IndexPlane {
+  std::optional<uint32_t> block;
+  int axis = 0;
+  uint64_t index = 0;
+  bool operator==(const IndexPlane&) const = default;
+};
+
+struct FacesJob {
+  std::filesystem::path output;       // faces.bin
+  std::filesystem::path temporary;    // folder
+  glm::dvec3 lower{0.0}, upper{0.0};  // of the grid
+  std::vector<IndexPlane> planes;
+  std::vector<uint32_t> variables;  // their numbers in the cache
+  uint64_t slab_bytes = 0, sort_bytes = 0;
+};
+
+/// What it takes on disk besides the result.
+uint64_t temporaryBytesOfFaces(std::span<const GridBlock> blocks, std::span<const IndexPlane> planes,
+                               size_t scalars);
+
+/// Throws Error for a plane that is not in the grid: which indices there are.
+void checkPlanes(const GridDescription& grid, std::span<const IndexPlane> planes);
+
+/// Returns the manifest's entry; none, and no file, if there is no face to draw. The bytes depend neither on
+/// threads nor on memory. Throws Error if the disk fails or the faces do not fit in memory.
+std::optional<FileInfo> writeGridFaces(const NodeReader& reader, const FacesJob& job, Progress& progress);
+
+}  // namespace curvisplat

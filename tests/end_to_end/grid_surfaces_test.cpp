@@ -1,0 +1,272 @@
+// Faces of the grid as surfaces in the volume: against the ray march of the same, at any level of detail, the same
+// picture by every painter, and what is refused.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <memory>
+#include <set>
+
+#include "preprocess/scenes/scenes.h"
+#include "render/image/image_file.h"
+#include "render/surface/face_meshes.h"
+#include "stream/base/error.h"
+#include "tests/reference/known_pictures.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr ImageSize kSize{256, 256};
+const glm::vec3 kGrey{0.6f, 0.7f, 0.8f};
+constexpr double kInner = 0.3;
+
+/// The half-annulus's inner cylinder, jmin, lit from where the viewer is.
+std::vector<ReferenceLayer> innerWall(const Scene& scene, const glm::dvec3& origin,
+                                      const glm::dvec3& direction) {
+  const double a = direction.x * direction.x + direction.y * direction.y;
+  const double b = origin.x * direction.x + origin.y * direction.y;
+  const double c = origin.x * origin.x + origin.y * origin.y - kInner * kInner;
+  const double root2 = b * b - a * c;
+  if (root2 <= 0) return {};
+  for (const double sign : {-1.0, 1.0}) {
+    const double distance = (-b + sign * std::sqrt(root2)) / a;
+    const glm::dvec3 at = origin + distance * direction;
+    const glm::dvec3 normal = glm::dvec3(at.x, at.y, 0) / kInner;
+    if (!scene.contains(at + 1e-9 * normal)) continue;
+    const double facing = std::abs(glm::dot(normal, direction));
+    const glm::dvec3 colour = glm::min(
+        (0.3 + 0.7 * facing) * glm::dvec3(kGrey) + glm::dvec3(0.25 * std::pow(facing, 32)), glm::dvec3(1.0));
+    return {{distance, colour, 1}};
+  }
+  return {};
+}
+
+/// The mean of 2 x 2 rays a pixel.
+Image marched(const Scene& scene, const KnownFunction& function, const Camera& camera) {
+  const SceneField field(scene);
+  MarchSteps steps;
+  steps.step = 0.008;
+  const ImageSize size{2 * kSize.width, 2 * kSize.height};
+  const Image image = toImage(referenceMarch(field, function.exact, camera, size, steps, nullptr,
+                                             [&](const glm::dvec3& origin, const glm::dvec3& direction) {
+                                               return innerWall(scene, origin, direction);
+                                             }));
+  Image mean(kSize);
+  for (int y = 0; y < size.height; ++y)
+    for (int x = 0; x < size.width; ++x)
+      for (int c = 0; c < 4; ++c) mean.pixel(x / 2, y / 2)[c] += image.pixel(x, y)[c] / 4;
+  return mean;
+}
+
+std::shared_ptr<SurfaceScene> sceneOfFace(const std::filesystem::path& cache, int axis, FaceSide side) {
+  auto scene = std::make_shared<SurfaceScene>();
+  GridSurface& surface = scene->grid_surfaces.emplace_back();
+  surface.faces = FacesReader::open(cache, CacheReader(cache).manifest());
+  surface.colour = kGrey;
+  for (uint32_t n = 0; n < surface.faces->faces().size(); ++n) {
+    const GridFace& face = surface.faces->faces()[n];
+    if (face.axis == axis && face.side == side)
+      surface.parts.push_back({n, {0, 0}, {face.nodes[0] - 1, face.nodes[1] - 1}});
+  }
+  return scene;
+}
+
+TEST(GridSurfaces, AWallOfTheGridLiesInTheVolume) {
+  const TemporaryFolder folder;
+  const std::shared_ptr<const Scene> annulus = makeScene("half-annulus");
+  const auto cache = folder / "a.splats";
+  convertGrid(SceneGridSource(annulus, {256, 32, 128}), cache);
+  const KnownFunction function = KnownFunction::of("smooth");
+  const Image reference = marched(*annulus, function, halfAnnulusCamera());
+  FrameOptions options = knownFrame(kSize);
+  options.scene = sceneOfFace(cache, 1, FaceSide::kMin);
+  const struct { double lod, least_db; } levels[] = {{0, 48.5}, {1, 48.5}, {4, 45}};
+  for (const auto& level : levels) {
+    options.lod_pixels = level.lod;
+    const double db =
+        compareImages(drawCache(cache, function.table, halfAnnulusCamera(), options), reference).psnr_db;
+    fmt::print("wall, {} pixels: {:.1f} dB\n", level.lod, db);
+    EXPECT_GE(db, level.least_db) << level.lod;
+  }
+  options.scene = nullptr;
+  EXPECT_LT(compareImages(drawCache(cache, function.table, halfAnnulusCamera(), options), reference).psnr_db,
+            30);
+}
+
+TEST(GridSurfaces, DetailFollowsThePixelsAndTheMemory) {
+  const TemporaryFolder folder;
+  const auto cache = folder / "a.splats";
+  convertGrid(SceneGridSource(makeScene("half-annulus"), {600, 4, 400}), cache);
+  const GridSurface surface = sceneOfFace(cache, 1, FaceSide::kMin)->grid_surfaces[0];
+  const auto view = [&](int pixels, double scale) {
+    Camera camera = halfAnnulusCamera();
+    camera.parallel_scale *= scale;
+    return ScreenView::of(camera, {pixels, pixels}, glm::dvec3(1.0), kLowPass, 1e-3);
+  };
+  const auto nodes_of = [&](const ChosenPatches& chosen) {
+    size_t nodes = 0;
+    for (const auto& [part, patch] : chosen) nodes += surface.faces->patches()[patch].nodeCount();
+    return nodes;
+  };
+  const auto at = [&](int pixels, double lod, double scale = 1, size_t most = 1 << 24) {
+    return nodes_of(choosePatches(surface, view(pixels, scale), lod, most));
+  };
+  EXPECT_GE(at(4096, 0.5), 600u * 400);
+  EXPECT_LT(at(256, 1), 600u * 400 / 2);
+  EXPECT_LT(at(256, 8), 6000u);
+  EXPECT_LT(at(4096, 0.5, 0.05), 600u * 400 / 4);  // most of it is out of sight
+  EXPECT_LE(at(4096, 0.5, 1, 50'000), 50'000u);
+}
+
+/// No ray passes between patches of different levels: a camera near one end sees all levels.
+TEST(GridSurfaces, LevelsMeetWithoutGaps) {
+  const TemporaryFolder folder;
+  const auto cache = folder / "a.splats";
+  convertGrid(SceneGridSource(makeScene("half-annulus"), {600, 4, 400}), cache);
+  FrameOptions options = knownFrame(kSize);
+  auto scene = sceneOfFace(cache, 1, FaceSide::kMax);
+  scene->volume = false;
+  options.scene = scene;
+  options.lod_pixels = 6;
+  Camera camera;
+  camera.projection = Projection::kPerspective;
+  camera.view_angle_deg = 60;
+  camera.position = {-0.5, 0.2, 0.4};
+  camera.focal_point = {-1, 0, 0.5};
+  camera.view_up = {0, 0, 1};
+  const ScreenView view = ScreenView::of(camera, kSize, glm::dvec3(1.0), kLowPass, 1e-3);
+  std::set<std::array<uint32_t, 2>> strides;
+  for (const auto& [part, patch] : choosePatches(scene->grid_surfaces[0], view, 6, 1 << 24))
+    strides.insert(scene->grid_surfaces[0].faces->patches()[patch].stride);
+  EXPECT_GE(strides.size(), 2u);
+  const Image picture = drawCache(cache, KnownFunction::of("smooth").table, camera, options);
+  options.lod_pixels = 0.5;
+  const Image fine = drawCache(cache, KnownFunction::of("smooth").table, camera, options);
+  size_t gaps = 0;
+  for (int y = 0; y < kSize.height; ++y)
+    for (int x = 0; x < kSize.width; ++x)
+      gaps += fine.pixel(x, y)[0] < 0.97f && picture.pixel(x, y)[0] > 0.97f;
+  EXPECT_EQ(gaps, 0u);
+  EXPECT_GT(compareImages(picture, fine).psnr_db, 35);
+}
+
+class GridSurfaceOptions : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    run({"generate", "wake", "--size", "96x64x48", "-o", file("wake")});
+    run({"convert", file("wake.xyz"), file("wake.fun"), "-o", file("wake.splats"), "--surface", "k=20"});
+    run({"convert", file("wake.xyz"), file("wake.fun"), "-o", file("bare.splats"), "--no-surfaces"});
+  }
+  static void TearDownTestSuite() { folder_.reset(); }
+
+  static std::string file(const std::string& name) { return (*folder_ / name).string(); }
+  static void run(const std::vector<std::string>& arguments) {
+    const ProgramResult result = runProgram(arguments);
+    ASSERT_EQ(result.status, 0) << result.err;
+  }
+  static ProgramResult render(std::vector<std::string> more, const std::string& cache = "wake.splats") {
+    more.insert(more.begin(),
+                {"render", file(cache), "-o", file("a.pfm"), "--size", "200x150", "--view", "iso"});
+    return runProgram(more);
+  }
+  static Image picture(const std::vector<std::string>& more) {
+    const ProgramResult result = render(more);
+    EXPECT_EQ(result.status, 0) << result.err;
+    return readImage(file("a.pfm"));
+  }
+
+  static std::unique_ptr<TemporaryFolder> folder_;
+};
+
+std::unique_ptr<TemporaryFolder> GridSurfaceOptions::folder_;
+
+TEST_F(GridSurfaceOptions, EveryPainterDrawsTheSame) {
+  for (const char* angle : {"", "40"}) {
+    std::vector<std::string> options{"--surface",    "jmin,kmax",    "--surface",
+                                     "k=20:i=10-60", "--surface-by", "f"};
+    if (*angle) options.insert(options.end(), {"--view-angle", angle});
+    const auto with = [&](std::vector<std::string> more) {
+      more.insert(more.end(), options.begin(), options.end());
+      return picture(more);
+    };
+    const Image cpu = with({"--backend", "cpu"});
+    EXPECT_GT(compareImages(cpu, with({"--backend", "osmesa"})).psnr_db, 50) << angle;
+    EXPECT_EQ(with({"--backend", "cpu", "--threads", "1"}).rgba, cpu.rgba);
+    EXPECT_EQ(with({"--backend", "cpu", "--threads", "3", "--memory", "160M"}).rgba, cpu.rgba);
+    run({"render",
+         file("wake.splats"),
+         "-o",
+         file("a.pfm"),
+         "--size",
+         "200x150",
+         "--view",
+         "iso",
+         "--backend",
+         "cpu",
+         "--first-image",
+         file("first.png"),
+         "--surface",
+         "jmin,kmax",
+         "--surface",
+         "k=20:i=10-60",
+         "--surface-by",
+         "f",
+         *angle ? "--view-angle" : "--lod-pixels",
+         *angle ? angle : "1"});
+    EXPECT_EQ(readImage(file("a.pfm")).rgba, cpu.rgba);
+  }
+}
+
+TEST_F(GridSurfaceOptions, APartOfAFaceIsAPartOfItsPicture) {
+  const auto seen = [&](const std::string& surface) {
+    const Image image = picture({"--volume", "off", "--surface", surface, "--surface-colour", "#000000"});
+    size_t pixels = 0;
+    for (size_t n = 0; n < image.rgba.size(); n += 4) pixels += image.rgba[n] < 0.5f;
+    return pixels;
+  };
+  const size_t whole = seen("k=20"), left = seen("k=20:i=0-40"), right = seen("k=20:i=40-95");
+  EXPECT_GT(left, 100u);
+  EXPECT_GT(right, 100u);
+  EXPECT_NEAR(static_cast<double>(left + right), static_cast<double>(whole),
+              0.03 * static_cast<double>(whole));
+}
+
+TEST_F(GridSurfaceOptions, SaysWhatThereIs) {
+  const struct {
+    std::vector<std::string> options;
+    std::string cache;
+    int status;
+    std::string words;
+  } refused[] = {{{"--surface", "walls"},
+                  "wake.splats",
+                  1,
+                  "--surface walls names no face of the cache and no file; it has the faces jmin, "},
+                 {{"--surface", "walls"}, "wake.splats", 1, "block 1:k=20, and no boundary conditions"},
+                 {{"--surface", "k=7"}, "wake.splats", 1, "convert --surface \"k=7\" keeps an index plane"},
+                 {{"--surface", "block 2:kmin"}, "wake.splats", 1, "block 2:kmin names no face"},
+                 {{"--surface", "kmin,wing"}, "wake.splats", 1, "--surface wing names no face"},
+                 {{"--surface", "kmin"},
+                  "bare.splats",
+                  1,
+                  "the cache has no surfaces: it was converted with --no-surfaces"},
+                 {{"--surface", "kmin", "--surface-by", "nothing"}, "wake.splats", 1, "--surface-by: "},
+                 {{"--surface-by", "f"}, "wake.splats", 2, "--surface-by f needs faces of the grid"}};
+  for (const auto& [options, cache, status, words] : refused) {
+    const ProgramResult result = render(options, cache);
+    EXPECT_EQ(result.status, status) << words << "\n" << result.err;
+    EXPECT_NE(result.err.find(words), std::string::npos) << result.err << "  lacks " << words;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  }
+  const ProgramResult plane = runProgram(
+      {"convert", file("wake.xyz"), file("wake.fun"), "-o", file("no.splats"), "--surface", "k=200"});
+  EXPECT_EQ(plane.status, 1);
+  EXPECT_NE(plane.err.find("no block has k=200; expected 0 to 47"), std::string::npos) << plane.err;
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,143 @@
+// Isosurfaces among the splats, against the ray march with the exact crossings: alone and in the volume, opaque and
+// translucent, at all levels of detail, and the same picture by every painter.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <memory>
+
+#include "preprocess/scenes/scenes.h"
+#include "render/image/image_file.h"
+#include "tests/reference/known_pictures.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr ImageSize kSize{256, 256};
+constexpr double kValue = 0.5;
+
+glm::dvec3 gradientAt(const Scene& scene, const glm::dvec3& at) {
+  glm::dvec3 gradient;
+  for (int axis = 0; axis < 3; ++axis) {
+    glm::dvec3 step(0.0);
+    step[axis] = 1e-5;
+    gradient[axis] = scene.scalar(at + step) - scene.scalar(at - step);
+  }
+  return gradient;
+}
+
+/// Where the scalar crosses the value, found by bisection.
+std::vector<ReferenceLayer> crossings(const Scene& scene, const glm::dvec3& colour, double opacity,
+                                      const glm::dvec3& origin, const glm::dvec3& direction) {
+  std::vector<ReferenceLayer> found;
+  const auto [lower, upper] = scene.bounds();
+  const double middle = glm::dot(0.5 * (lower + upper) - origin, direction);
+  const double reach = 0.5 * glm::distance(lower, upper);
+  constexpr double kStep = 0.004;
+  const auto at = [&](double t) { return origin + t * direction; };
+  for (double t = middle - reach; t < middle + reach; t += kStep) {
+    const auto value = [&](double x) { return scene.scalar(at(x)) - kValue; };
+    if (!scene.contains(at(t)) || !scene.contains(at(t + kStep)) || (value(t) < 0) == (value(t + kStep) < 0))
+      continue;
+    double low = t, high = t + kStep;
+    for (int n = 0; n < 40; ++n)
+      ((value(0.5 * (low + high)) < 0) == (value(low) < 0) ? low : high) = 0.5 * (low + high);
+    const double facing = std::abs(glm::dot(glm::normalize(gradientAt(scene, at(low))), direction));
+    const glm::dvec3 lit =
+        glm::min((0.3 + 0.7 * facing) * colour + glm::dvec3(0.25 * std::pow(facing, 32)), glm::dvec3(1.0));
+    found.push_back({low, lit, opacity});
+  }
+  return found;
+}
+
+class Isosurfaces : public testing::Test {
+ protected:
+  Isosurfaces() { convertGrid(SceneGridSource(annulus_, {128, 64, 64}), folder_ / "a.splats"); }
+
+  Image marched(const OpticalFunction& exact, const glm::dvec3& colour, double opacity) const {
+    const SceneField field(*annulus_);
+    MarchSteps steps;
+    steps.step = 0.008;
+    return toImage(referenceMarch(field, exact, halfAnnulusCamera(), kSize, steps, nullptr,
+                                  [&](const glm::dvec3& origin, const glm::dvec3& direction) {
+                                    return crossings(*annulus_, colour, opacity, origin, direction);
+                                  }));
+  }
+  Image drawn(const TransferFunction& table, double opacity, bool volume, double lod,
+              Backend backend = Backend::kCpu) const {
+    FrameOptions options = knownFrame(kSize);
+    options.lod_pixels = lod;
+    auto scene = std::make_shared<SurfaceScene>();
+    scene->isovalues = {kValue};
+    scene->iso_opacity = opacity;
+    scene->volume = volume;
+    options.scene = scene;
+    return drawCache(folder_ / "a.splats", table, halfAnnulusCamera(), options, nullptr, backend);
+  }
+
+  const TemporaryFolder folder_;
+  const std::shared_ptr<const Scene> annulus_ = makeScene("half-annulus");
+};
+
+TEST_F(Isosurfaces, CrossingsHaveTheirOpacityAndTheirLight) {
+  const KnownFunction function = KnownFunction::of("smooth");
+  const glm::dvec3 colour = function.table.at(kValue).colour;
+  const OpticalFunction nothing = [](double) { return OpticalProperties{}; };
+  const struct {
+    double opacity;
+    bool volume;
+    double lod, least_db;
+  } pictures[] = {{0.95, false, 0, 35},  {0.95, false, 4, 34.5}, {0.5, false, 0, 33},
+                  {0.95, true, 0, 39.5}, {0.95, true, 4, 39},    {0.5, true, 0, 41}};
+  for (const auto& [opacity, volume, lod, least_db] : pictures) {
+    const Image reference = marched(volume ? function.exact : nothing, colour, opacity);
+    const double db = compareImages(drawn(function.table, opacity, volume, lod), reference).psnr_db;
+    fmt::print("isosurface {} {}, {} pixels: {:.1f} dB\n", opacity, volume ? "in the volume" : "alone", lod,
+               db);
+    EXPECT_GE(db, least_db) << opacity << ' ' << volume << ' ' << lod;
+  }
+}
+
+TEST_F(Isosurfaces, EveryPainterDrawsTheSame) {
+  const TransferFunction table = KnownFunction::of("smooth").table;
+  for (const bool volume : {false, true}) {
+    const Image cpu = drawn(table, 0.95, volume, 1);
+    EXPECT_GT(compareImages(drawn(table, 0.95, volume, 1, Backend::kOsmesa), cpu).psnr_db, 50) << volume;
+  }
+}
+
+TEST_F(Isosurfaces, TheProgramDrawsThemAndSaysWhatIsWrong) {
+  const std::string cache = (folder_ / "a.splats").string(), output = (folder_ / "a.pfm").string();
+  const auto run = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"render", cache, "-o", output, "--size", "150x150", "--view", "iso"});
+    return runProgram(more);
+  };
+  EXPECT_EQ(run({"--iso", "0.4,0.6", "--volume", "off"}).status, 0);
+  const Image once = readImage(output);
+  size_t seen = 0;
+  for (size_t n = 0; n < once.rgba.size(); n += 4) seen += once.rgba[n] < 0.9f;
+  EXPECT_GT(seen, 500u);
+  EXPECT_EQ(
+      run({"--iso", "0.4", "--iso", "0.6", "--volume", "off", "--threads", "1", "--memory", "96M"}).status,
+      0);
+  EXPECT_EQ(readImage(output).rgba, once.rgba);
+  const struct {
+    std::vector<std::string> options;
+    int status;
+    std::string words;
+  } refused[] = {{{"--iso", "7"}, 1, "--iso 7: no isosurface: the values of f go from "},
+                 {{"--iso", "x"}, 2, "--iso"},
+                 {{"--iso-opacity", "0.5"}, 2, "--iso-opacity needs an isosurface: --iso VALUE"},
+                 {{"--iso", "0.5", "--iso-opacity", "2"}, 2, "--iso-opacity 2: expected a number above 0"}};
+  for (const auto& [options, status, words] : refused) {
+    const ProgramResult result = run(options);
+    EXPECT_EQ(result.status, status) << result.err;
+    EXPECT_NE(result.err.find(words), std::string::npos) << result.err << " lacks " << words;
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,201 @@
+// The grid's faces in a cache: which quads are outer faces, what their patches hold at every level of detail, and
+// that the bytes depend on the grid alone.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+
+#include "preprocess/convert/convert.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/cache/faces_file.h"
+#include "tests/reference/function_grid.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+NodeValues bent(const GridNode& node) {
+  const glm::dvec3 at(node.i, node.j, node.k);
+  return {{at.x + 0.1 * std::sin(at.y), at.y * 0.5, at.z + 0.02 * at.x * at.y},
+          {static_cast<float>(at.x + 100 * at.y), static_cast<float>(at.z)},
+          false};
+}
+
+/// Two blocks that abut at the i end of the first.
+FunctionGridSource twoBlocks(uint64_t ni, uint64_t nj, uint64_t nk) {
+  return {{gridBlock(ni, nj, nk), gridBlock(ni, nj, nk)}, 2, [=](const GridNode& node) {
+            GridNode moved = node;
+            moved.i += node.block * (ni - 1);
+            return bent(moved);
+          }};
+}
+
+class GridFacesTest : public testing::Test {
+ protected:
+  std::shared_ptr<const FacesReader> convertAndOpen(const GridSource& source,
+                                                    std::vector<IndexPlane> planes = {}) {
+    ConvertOptions options;
+    options.output = folder_ / "a.splats";
+    options.overwrite = true;
+    options.memory_bytes = memory_;
+    options.threads = threads_;
+    options.planes = std::move(planes);
+    options.scalars = {0, 1};
+    Progress progress;
+    convert(source, options, progress);
+    manifest_ = CacheReader(options.output).manifest();
+    return FacesReader::open(options.output, manifest_);
+  }
+  std::string bytes() const { return readTextFile(folder_ / "a.splats/faces.bin"); }
+
+  TemporaryFolder folder_;
+  Manifest manifest_;
+  uint64_t memory_ = 1 << 30;
+  unsigned threads_ = 2;
+};
+
+uint64_t quadsOf(const FacesReader& faces, const GridFace& face) {
+  uint64_t quads = 0;
+  for (uint32_t n = 0; n < faces.patches().size(); ++n) {
+    const FacePatch& patch = faces.patches()[n];
+    if (&faces.faces()[patch.face] != &face || patch.child_count > 0) continue;
+    for (const uint8_t drawn : faces.read(n).quads) quads += drawn;
+  }
+  return quads;
+}
+
+TEST_F(GridFacesTest, WhatAnotherBlockClosesIsNoOuterFace) {
+  const auto faces = convertAndOpen(twoBlocks(6, 5, 4));
+  ASSERT_TRUE(faces);
+  std::map<std::pair<uint32_t, std::string>, uint64_t> quads;
+  for (const GridFace& face : faces->faces())
+    quads[{face.block, std::string(1, "ijk"[face.axis]) + (face.side == FaceSide::kMin ? "min" : "max")}] =
+        quadsOf(*faces, face);
+  EXPECT_EQ(quads.size(), 10u);
+  EXPECT_FALSE(quads.contains({0, "imax"}));
+  EXPECT_FALSE(quads.contains({1, "imin"}));
+  EXPECT_EQ((quads[{0, "imin"}]), 4u * 3);
+  EXPECT_EQ((quads[{1, "jmax"}]), 5u * 3);
+  EXPECT_EQ((quads[{1, "kmin"}]), 5u * 4);
+}
+
+TEST_F(GridFacesTest, BlankedNodesLeaveHoles) {
+  const auto faces = convertAndOpen(FunctionGridSource({gridBlock(6, 5, 4)}, 2, [](const GridNode& node) {
+    NodeValues values = bent(node);
+    values.blank = node.k == 0 && node.i == 2 && node.j == 2;
+    return values;
+  }));
+  for (const GridFace& face : faces->faces())
+    if (face.axis == 2 && face.side == FaceSide::kMin) {
+      EXPECT_EQ(quadsOf(*faces, face), 5u * 4 - 4);
+    }
+}
+
+TEST_F(GridFacesTest, APlaneInsideIsKeptWhenAskedFor) {
+  const auto faces = convertAndOpen(twoBlocks(6, 5, 4), {{1, 2, 2}});
+  int found = 0;
+  for (const GridFace& face : faces->faces())
+    if (face.side == FaceSide::kPlane) {
+      ++found;
+      EXPECT_EQ(face.block, 1u);
+      EXPECT_EQ(face.index, 2u);
+      EXPECT_EQ(quadsOf(*faces, face), 5u * 4);
+    }
+  EXPECT_EQ(found, 1);
+  EXPECT_THROW(convertAndOpen(twoBlocks(6, 5, 4), {{1, 2, 4}}), Error);
+  EXPECT_THROW(convertAndOpen(twoBlocks(6, 5, 4), {{2, 2, 0}}), Error);
+}
+
+/// A wing without thickness: the side k = 0 is folded onto itself.
+TEST_F(GridFacesTest, ASideThatFoldsIsKeptAsAPlane) {
+  const auto faces = convertAndOpen(FunctionGridSource({gridBlock(5, 9, 4)}, 2, [](const GridNode& node) {
+    const double angle = 3.14159265358979 * (static_cast<double>(node.j) / 4 - 1);
+    const double r = static_cast<double>(node.k);
+    const double x = std::cos(angle) * (2 + r), y = r == 0 ? 0 : std::sin(angle) * r;
+    return NodeValues{{x, y, static_cast<double>(node.i)}, {1, static_cast<float>(node.j)}, false};
+  }));
+  std::set<std::string> names;
+  for (const GridFace& face : faces->faces())
+    if (face.axis == 2)
+      names.insert(face.side == FaceSide::kPlane ? "plane" : face.side == FaceSide::kMin ? "min" : "max");
+  EXPECT_EQ(names, (std::set<std::string>{"max", "plane"}));
+}
+
+/// Positions and values of every patch are those of the grid's nodes; together the finest have every quad once, and
+/// so has every coarser level.
+TEST_F(GridFacesTest, EveryLevelHasTheGridsNodes) {
+  constexpr uint64_t kI = 200, kJ = 90;
+  const auto faces = convertAndOpen(FunctionGridSource({gridBlock(kI, kJ, 2)}, 2, bent));
+  const double tolerance = 1e-6;
+  std::map<std::array<uint32_t, 2>, uint64_t> quads;  // by stride, in finest quads
+  for (uint32_t n = 0; n < faces->patches().size(); ++n) {
+    const FacePatch& patch = faces->patches()[n];
+    const GridFace& face = faces->faces()[patch.face];
+    if (face.axis != 2 || face.side != FaceSide::kMin) continue;
+    const PatchNodes nodes = faces->read(n);
+    const bool coarse = patch.stride[0] > 1 || patch.stride[1] > 1;
+    EXPECT_EQ(patch.child_count > 0, coarse);
+    EXPECT_EQ(patch.error > 0, coarse);
+    for (uint64_t v = 0; v < patch.nodes[1]; ++v)
+      for (uint64_t u = 0; u < patch.nodes[0]; ++u) {
+        const GridNode node{0, latticeIndex(face, patch, 0, u), latticeIndex(face, patch, 1, v), 0};
+        const NodeValues truth = bent(node);
+        const size_t at = v * patch.nodes[0] + u;
+        ASSERT_LT(glm::distance(nodes.positions[at], truth.position), 200 * tolerance);
+        ASSERT_NEAR(nodes.scalars[0][at], truth.scalars[0], 0.2);
+        ASSERT_NEAR(nodes.scalars[1][at], truth.scalars[1], tolerance);
+        if (u + 1 < patch.nodes[0] && v + 1 < patch.nodes[1])
+          quads[patch.stride] +=
+              (latticeIndex(face, patch, 0, u + 1) - node.i) * (latticeIndex(face, patch, 1, v + 1) - node.j);
+      }
+  }
+  ASSERT_GE(quads.size(), 3u);
+  for (const auto& [stride, count] : quads)
+    EXPECT_EQ(count, (kI - 1) * (kJ - 1)) << stride[0] << ' ' << stride[1];
+}
+
+TEST_F(GridFacesTest, BytesDependOnTheGridAlone) {
+  const FunctionGridSource source = twoBlocks(80, 70, 40);
+  convertAndOpen(source);
+  const std::string once = bytes();
+  threads_ = 1;
+  convertAndOpen(source);
+  EXPECT_EQ(bytes(), once);
+  threads_ = 3;
+  memory_ = 200 << 20;
+  convertAndOpen(source);
+  EXPECT_EQ(bytes(), once);
+}
+
+TEST_F(GridFacesTest, ADamagedFileIsRefused) {
+  convertAndOpen(twoBlocks(20, 30, 10));
+  const std::string whole = bytes();
+  const auto path = folder_ / "a.splats/faces.bin";
+  const auto outcome = [&](const std::string& text) {
+    writeFileAtomically(path, text);
+    try {
+      const auto faces = FacesReader::open(folder_ / "a.splats", manifest_);
+      for (uint32_t n = 0; n < faces->patches().size(); ++n) faces->read(n);
+      return false;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("faces.bin"), std::string::npos) << error.what();
+      return true;
+    }
+  };
+  EXPECT_FALSE(outcome(whole));
+  for (size_t length = 0; length < whole.size(); length += 97) EXPECT_TRUE(outcome(whole.substr(0, length)));
+  int missed = 0;
+  for (size_t at = 0; at < whole.size(); at += 61) {
+    std::string flipped = whole;
+    flipped[at] = static_cast<char>(flipped[at] ^ 0x10);
+    missed += !outcome(flipped);
+  }
+  EXPECT_LT(missed, 70);  // zeros between streams are not read
+}
+
+}  // namespace
+}  // namespace curvisplat

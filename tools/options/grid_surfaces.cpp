@@ -1,0 +1,176 @@
+#include "tools/options/grid_surfaces.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <vector>
+
+#include "stream/base/error.h"
+#include "tools/options/face_names.h"
+#include "tools/options/picture_choice.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kNamesListed = 8;
+
+std::string listed(const std::vector<std::string>& names) {
+  const size_t count = std::min(names.size(), kNamesListed);
+  return fmt::format("{}{}", fmt::join(names.begin(), names.begin() + static_cast<ptrdiff_t>(count), ", "),
+                     count < names.size() ? fmt::format(" and {} more", names.size() - count) : "");
+}
+
+std::string nameOf(const GridFace& face) {
+  const char axis = "ijk"[face.axis];
+  if (face.side == FaceSide::kPlane) return fmt::format("block {}:{}={}", face.block + 1, axis, face.index);
+  return fmt::format("{}{}", axis, face.side == FaceSide::kMin ? "min" : "max");
+}
+
+bool isWall(const FaceRegion& region) {
+  return region.type.starts_with("BCWall");
+}
+
+/// What the cache has, for messages.
+std::string whatThereIs(const FacesReader& faces) {
+  std::vector<std::string> names;
+  std::set<std::string> known;
+  for (const GridFace& face : faces.faces())
+    if (const std::string name = nameOf(face); known.insert(name).second) names.push_back(name);
+  std::string text = "it has the faces " + listed(names);
+  std::vector<std::string> boundaries;
+  for (const FaceRegion& region : faces.regions())
+    if (const std::string name = fmt::format("{} ({})", region.name, region.type); known.insert(name).second)
+      boundaries.push_back(name);
+  text += boundaries.empty() ? ", and no boundary conditions" : ", and the boundaries " + listed(boundaries);
+  return text;
+}
+
+class FaceFinder {
+ public:
+  FaceFinder(const FacesReader& faces, const Manifest& manifest, GridSurface& surface)
+      : faces_(faces), manifest_(manifest), surface_(surface) {}
+
+  /// Whether the word named any face.
+  bool add(const std::string& word) {
+    const size_t before = surface_.parts.size();
+    if (word == "all") {
+      for (uint32_t n = 0; n < faces_.faces().size(); ++n)
+        if (faces_.faces()[n].side != FaceSide::kPlane) addFace(n, {});
+    } else if (word == "walls") {
+      addRegions(isWall);
+    } else if (const auto name = parseFaceName(word)) {
+      for (uint32_t n = 0; n < faces_.faces().size(); ++n)
+        if (isNamed(faces_.faces()[n], *name)) addFace(n, *name);
+    }
+    if (surface_.parts.size() == before)
+      addRegions([&](const FaceRegion& region) { return region.name == word || region.type == word; });
+    return surface_.parts.size() > before;
+  }
+
+ private:
+  bool has(const GridFace& like, FaceSide side) const {
+    return std::any_of(faces_.faces().begin(), faces_.faces().end(), [&](const GridFace& face) {
+      return face.side == side && face.block == like.block && face.axis == like.axis &&
+             face.index == like.index;
+    });
+  }
+
+  /// An end's name means its outer face, or its whole plane where that has no outer face: a body without
+  /// thickness. An index means the plane, or the outer face where there is no plane.
+  bool isNamed(const GridFace& face, const FaceName& name) const {
+    if (face.axis != name.axis || name.block.value_or(face.block) != face.block) return false;
+    const bool is_plane = face.side == FaceSide::kPlane;
+    if (name.at == FaceName::At::kIndex)
+      return face.index == name.index && (is_plane || !has(face, FaceSide::kPlane));
+    const bool is_min = name.at == FaceName::At::kMin;
+    const FaceSide side = is_min ? FaceSide::kMin : FaceSide::kMax;
+    return is_plane ? face.index == (is_min ? 0 : lastOf(face)) && !has(face, side) : face.side == side;
+  }
+
+  uint64_t lastOf(const GridFace& face) const {
+    if (face.block >= manifest_.blocks.size()) return 0;
+    const BlockInfo& block = manifest_.blocks[face.block];
+    return (face.axis == 0 ? block.ni : face.axis == 1 ? block.nj : block.nk) - 1;
+  }
+
+  void addFace(uint32_t number, const FaceName& name) {
+    const GridFace& face = faces_.faces()[number];
+    GridSurface::Part part{number, {0, 0}, {face.nodes[0] - 1, face.nodes[1] - 1}};
+    size_t along = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (axis == face.axis) continue;
+      if (const auto& range = name.ranges[static_cast<size_t>(axis)]) {
+        part.first[along] = range->first;
+        part.last[along] = std::min(range->last, part.last[along]);
+      }
+      if (part.first[along] >= part.last[along]) return;
+      ++along;
+    }
+    addPart(part);
+  }
+
+  template <typename Wanted>
+  void addRegions(const Wanted& wanted) {
+    for (const FaceRegion& region : faces_.regions())
+      if (wanted(region)) addPart({region.face, region.first, region.last});
+  }
+
+  void addPart(const GridSurface::Part& part) {
+    if (std::find(surface_.parts.begin(), surface_.parts.end(), part) == surface_.parts.end())
+      surface_.parts.push_back(part);
+  }
+
+  const FacesReader& faces_;
+  const Manifest& manifest_;
+  GridSurface& surface_;
+};
+
+}  // namespace
+
+GridSurface gridSurfaceNamed(const std::string& text, const CacheReader& cache,
+                             const std::shared_ptr<const FacesReader>& faces) {
+  const std::string path = cache.path().string();
+  if (!faces)
+    throw Error(
+        "{}: --surface {}: the cache has no surfaces: it was converted with --no-surfaces or by an earlier "
+        "version; convert again, or name an STL, PLY or OBJ file that exists",
+        path, text);
+  GridSurface surface;
+  surface.faces = faces;
+  FaceFinder finder(*faces, cache.manifest(), surface);
+  for (size_t begin = 0; begin <= text.size();) {
+    const size_t end = std::min(text.find(',', begin), text.size());
+    std::string word = text.substr(begin, end - begin);
+    begin = end + 1;
+    word.erase(0, word.find_first_not_of(' '));
+    if (finder.add(word)) continue;
+    const auto name = parseFaceName(word);
+    const bool is_plane = name && name->at == FaceName::At::kIndex;
+    throw Error("{}: --surface {} names no face of the cache and no file; {}{}", path,
+                word.empty() ? text : word, whatThereIs(*faces),
+                is_plane ? fmt::format("; convert --surface \"{}\" keeps an index plane", word) : "");
+  }
+  return surface;
+}
+
+void colourByScalar(GridSurface& surface, const std::string& name, const CacheReader& cache, size_t drawn) {
+  size_t variable = 0;
+  try {
+    variable = cache.variableNamed(name);
+  } catch (const UsageError& error) {
+    throw Error("--surface-by: {}", error.what());
+  }
+  const VariableInfo& info = cache.manifest().variables[variable];
+  surface.scalar = surface.faces->scalarOf(info.number);
+  if (!surface.scalar)
+    throw Error("{}: --surface-by {}: the faces do not have the scalar, which was added later; convert again",
+                cache.path().string(), name);
+  if (variable == drawn) return;
+  ScalarArguments arguments;
+  arguments.scalar = name;
+  PictureChoice choice(cache, variable, glm::dvec3(1.0));
+  surface.colours = std::make_shared<ColourTable>(choice.function(arguments));
+}
+
+}  // namespace curvisplat
