@@ -274,7 +274,8 @@ TEST_P(Cgns, BoundaryConditionsFamiliesAndUnitsAreNoted) {
   EXPECT_EQ(open()->description().notes,
             (std::vector<std::string>{"boundary conditions: BCInflow 1, BCWall 2", "families: Wing, Body",
                                       "units: Kilogram, Meter, Second, Kelvin, Radian"}));
-  const auto& boundaries = open()->description().boundaries;
+  const auto source = open();
+  const auto& boundaries = source->description().boundaries;
   ASSERT_EQ(boundaries.size(), 3u);
   EXPECT_EQ(boundaries[0].name, "Wall");
   EXPECT_EQ(boundaries[0].type, "BCWall");
