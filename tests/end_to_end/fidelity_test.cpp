@@ -73,13 +73,13 @@ class Fidelity : public testing::Test {
     run(arguments);
   }
 
-  /// OpenGL draws the same picture, and no better.
+  /// OpenGL draws the same picture, and no better but for what the painter leaves out (tile.h).
   static void expectOpenGlAlike(const std::string& name, const Image& picture, const Image& reference,
                                 double psnr_db, const std::string& lod_pixels) {
     render("half-annulus", name, file("gl.pfm"), {"--backend", "osmesa"}, lod_pixels);
     if (HasFatalFailure()) return;
     const Image by_gl = readImage(file("gl.pfm"));
-    EXPECT_GE(psnr_db, compareImages(by_gl, reference).psnr_db - 0.05) << "at " << lod_pixels << " pixels";
+    EXPECT_GE(psnr_db, compareImages(by_gl, reference).psnr_db - 0.1) << "at " << lod_pixels << " pixels";
     const ImageDifference difference = compareImages(picture, by_gl);
     fmt::print("{} at {} pixels: {:.1f} dB, {:.5f} at the most from OpenGL\n", name, lod_pixels,
                difference.psnr_db, difference.largest);
