@@ -9,6 +9,7 @@
 #include "stream/base/check.h"
 #include "stream/codec/brick_codec.h"
 #include "stream/codec/geometry_codec.h"
+#include "stream/model/growth_code.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {
@@ -21,6 +22,7 @@ void checkFinite(const SplatGeometry& splats, float size) {
     for (const float value : *array) CURVISPLAT_CHECK(value > 0 && std::isfinite(value));
   for (const auto* array : {&splats.shear10, &splats.shear20, &splats.shear21, &splats.weight})
     for (const float value : *array) CURVISPLAT_CHECK(std::isfinite(value));
+  for (const uint32_t code : splats.growth_code) CURVISPLAT_CHECK(isPossibleGrowthCode(code));
 }
 
 void run(std::span<const std::byte> bytes) {

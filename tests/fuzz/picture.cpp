@@ -12,6 +12,7 @@
 #include "render/project/projection.h"
 #include "stream/base/check.h"
 #include "stream/model/border_code.h"
+#include "stream/model/growth_code.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace curvisplat {
@@ -39,6 +40,8 @@ struct Splats {
     geometry.weight.push_back(finite(input.take<float>(), 0));
     const auto border_code = input.take<uint32_t>();
     geometry.border_code.push_back(isPossibleBorderCode(border_code) ? border_code : kNoBorder);
+    const auto growth_code = input.take<uint32_t>();
+    geometry.growth_code.push_back(isPossibleGrowthCode(growth_code) ? growth_code : kNoGrowth);
     for (auto* array : {&values.mean, &values.slope0, &values.slope1, &values.slope2})
       array->push_back(finite(input.take<float>(), -kLargest));
     values.variance.push_back(finite(input.take<float>(), 0));
