@@ -1,0 +1,219 @@
+#include "tools/commands/frame_run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "stream/base/error.h"
+#include "stream/base/message.h"
+#include "tools/commands/empty_picture.h"
+#include "tools/output/launched_ranks.h"
+#include "tools/output/run_statistics.h"
+
+namespace curvisplat {
+namespace {
+
+/// See drawFrames().
+class FrameRun {
+ public:
+  FrameRun(const FrameJob& job, Progress& progress)
+      : arguments_(job.arguments),
+        manifest_(job.manifest),
+        player_(job.player),
+        output_(job.output),
+        report_(job.report),
+        progress_(progress),
+        ranks_(launchedRanks()) {}
+
+  void draw(const MotionInTime& motion, const std::vector<uint64_t>& numbers) {
+    const bool moves = severalFrames(arguments_);
+    const bool dealt = !ranks_.alone() && !report_.options.ranks;
+    const std::vector<uint64_t> own = dealt ? ownOf(numbers) : numbers;
+    const size_t rounds = dealt ? (numbers.size() + ranks_.count() - 1) / ranks_.count() : numbers.size();
+    if (moves) progress_.begin("drawing", own.size(), "frames");
+    for (size_t n = 0; n < rounds; ++n) {
+      picture_ = Image();
+      if (n < own.size()) drawNext(motion, own, n);
+      if (dealt && isMovieName(arguments_.output)) writeRound(numbers, n);
+    }
+    if (dealt) gatherReports(motion);
+    if (output_) output_->finish();
+    progress_.end();
+  }
+
+ private:
+  std::vector<uint64_t> ownOf(const std::vector<uint64_t>& numbers) const {
+    std::vector<uint64_t> own;
+    for (size_t n = ranks_.rank(); n < numbers.size(); n += ranks_.count()) own.push_back(numbers[n]);
+    return own;
+  }
+
+  /// The pictures that the ranks have drawn, into the movie at rank 0.
+  void writeRound(const std::vector<uint64_t>& numbers, size_t round) {
+    for (unsigned rank = 0; rank < ranks_.count(); ++rank) {
+      const size_t at = round * ranks_.count() + rank;
+      if (at >= numbers.size()) return;
+      const bool own = rank == ranks_.rank();
+      std::vector<Ranks::Bytes> sent = ranks_.gather(own ? toBytes(picture_.rgba) : Ranks::Bytes{});
+      if (!ranks_.isFirst()) continue;
+      Image picture;
+      picture.size = report_.picture;
+      picture.rgba = fromBytes<float>(sent[rank]);
+      output_->write(numbers[at], picture);
+    }
+  }
+
+  void gatherReports(const MotionInTime& motion) {
+    const std::vector<Ranks::Bytes> sent = ranks_.gather(packStatistics(report_.frames));
+    if (!ranks_.isFirst()) return;
+    report_.frames.clear();
+    for (const Ranks::Bytes& bytes : sent)
+      for (FrameReport& frame : unpackStatistics(bytes)) {
+        frame.camera = motion.camera(frame.number);
+        report_.frames.push_back(std::move(frame));
+      }
+    std::sort(report_.frames.begin(), report_.frames.end(),
+              [](const FrameReport& a, const FrameReport& b) { return a.number < b.number; });
+  }
+
+  void drawNext(const MotionInTime& motion, const std::vector<uint64_t>& numbers, size_t n) {
+    const bool moves = severalFrames(arguments_);
+    const uint64_t number = numbers[n];
+    {
+      Progress of_frame;
+      of_frame.stopWith(progress_);
+      try {
+        const uint64_t* const next = n + 1 < numbers.size() ? &numbers[n + 1] : nullptr;
+        draw(number, next, motion, moves ? of_frame : progress_);
+      } catch (const Interrupted&) {
+        throw;
+      } catch (const UsageError& error) {
+        if (moves) throw UsageError("frame {}: {}", number, error.what());
+        throw;
+      } catch (const Error& error) {
+        if (moves) throw Error("frame {}: {}", number, error.what());
+        throw;
+      }
+    }
+    if (moves) progress_.advance(1);
+  }
+
+  void draw(uint64_t number, const uint64_t* next, const MotionInTime& motion, Progress& progress) {
+    player_.goTo(motion.position(number));
+    const double time = player_.time();
+    const Camera camera = motion.camera(number);
+    FrameStatistics statistics;
+    if (number > 0 || arguments_.first_image.empty()) {
+      const Image image = player_.renderer().render(camera, report_.options, statistics, &progress);
+      if (next && !report_.options.ranks) prefetch(motion, *next);
+      finish({number, time, camera, statistics}, image);
+      return;
+    }
+    const auto show = [&](const Image& image, bool is_final) {
+      if (!report_.first_image) {
+        annotate(image, camera, [&](const Image& picture) { writeImage(picture, arguments_.first_image); });
+        report_.time_to_first_image_s = secondsSinceStart();
+        report_.first_image = statistics;
+      }
+      if (is_final) finish({number, time, camera, statistics}, image);
+    };
+    player_.renderer().renderProgressively(camera, report_.options, statistics, show, &progress);
+  }
+
+  /// Reads the next frame's bricks, and goes to its time step, while this frame's picture is written.
+  void prefetch(const MotionInTime& motion, uint64_t number) {
+    player_.goTo(motion.position(number));
+    try {
+      player_.renderer().prefetch(motion.camera(number), report_.options);
+    } catch (const Error&) {
+      // That frame will report its own invalid camera.
+    }
+  }
+
+  void finish(FrameReport frame, const Image& image) {
+    if (report_.options.ranks) {
+      for (const Ranks::Bytes& bytes : ranks_.gather(packStatistics({frame})))
+        frame.of_ranks.push_back(unpackStatistics(bytes).front().statistics);
+      if (!ranks_.isFirst()) return;
+      frame.statistics = combined(frame.of_ranks);
+    }
+    const uint64_t number = frame.number;
+    const Camera& camera = frame.camera;
+    const FrameStatistics& statistics = frame.statistics;
+    annotate(image, camera, [&](const Image& picture) {
+      if (isMovieName(arguments_.output) && !ranks_.alone() && !report_.options.ranks)
+        picture_ = picture;  // for rank 0
+      else
+        output_->write(number, picture);
+    });
+    if (report_.frames.empty() && !report_.first_image) report_.time_to_first_image_s = secondsSinceStart();
+    report_.frames.push_back(frame);
+    const std::string which = severalFrames(arguments_) ? fmt::format(" of frame {}", number) : "";
+    reportUnreadable(which, statistics);
+    const RenderedScene scene{manifest_, report_.variable, report_.transfer_function,
+                              camera,    report_.options,  statistics};
+    if (report_.frames.size() == 1) warnOfPoorPicture(image, scene);
+    if (reported_empty_ || !isEmpty(image, report_.options.background)) return;
+    reported_empty_ = true;
+    progress_.end();
+    for (const std::string& reason : whyEmpty(scene))
+      printMessage("warning: the picture{} is empty: {}", which, reason);
+  }
+
+  void warnOfPoorPicture(const Image& image, const RenderedScene& scene) {
+    if (isEmpty(image, report_.options.background)) return;  // said with its reasons
+    const std::string warning = poorPictureWarning(image, scene, givenFunctionOptions(arguments_.scalar));
+    if (warning.empty()) return;
+    progress_.end();
+    printMessage("warning: {}", warning);
+  }
+
+  /// Calls write() with the picture, annotated if annotations were requested.
+  template <typename Write>
+  void annotate(const Image& data, const Camera& camera, const Write& write) const {
+    if (arguments_.annotations == Annotations{}) return write(data);
+    const FrameOptions& options = report_.options;
+    write(annotated(data, arguments_.annotations,
+                    {report_.picture, player_.renderer().screenView(camera, options),
+                     report_.transfer_function, scalarTitle(report_.variable.name, report_.variable.unit),
+                     manifest_.lower, manifest_.upper, options.background}));
+  }
+
+  /// Prints one warning for a frame with unreadable bricks that no earlier frame reported; it names the
+  /// first.
+  void reportUnreadable(const std::string& which, const FrameStatistics& statistics) {
+    const BrickFailure* first = nullptr;
+    for (const BrickFailure& failure : statistics.bricks_unreadable)
+      if (reported_unreadable_.insert(failure.brick).second && !first) first = &failure;
+    if (!first) return;
+    progress_.end();
+    printMessage("warning: {} of {} bricks{} cannot be read; they are drawn coarser or left out: {}",
+                 statistics.bricks_unreadable.size(), statistics.bricks_drawn, which, first->reason);
+  }
+
+  const RenderArguments& arguments_;
+  const Manifest& manifest_;
+  StepPlayer& player_;
+  FrameOutput* output_;  // null at ranks that write nothing
+  RenderReport& report_;
+  Progress& progress_;
+  Ranks& ranks_;
+  Image picture_;  // of a movie's round
+  bool reported_empty_ = false;
+  std::set<uint32_t> reported_unreadable_;  // bricks
+};
+
+}  // namespace
+
+bool severalFrames(const RenderArguments& arguments) {
+  return arguments.camera.moves() || arguments.steps.severalSteps();
+}
+
+void drawFrames(const FrameJob& job, const MotionInTime& motion, const std::vector<uint64_t>& numbers,
+                Progress& progress) {
+  FrameRun(job, progress).draw(motion, numbers);
+}
+
+}  // namespace curvisplat
