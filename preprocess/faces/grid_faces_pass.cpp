@@ -63,8 +63,7 @@ std::vector<FaceRegion> regionsOf(const GridDescription& grid, std::span<const G
 class FacesPass {
  public:
   FacesPass(const NodeReader& reader, const FacesJob& job, Progress& progress)
-      : reader_(reader),
-        grid_(reader.source().description()),
+      : grid_(reader.source().description()),
         job_(job),
         progress_(progress),
         abutting_(grid_.blocks, grid_.coordinate_bytes, sortBytes(), job.temporary),
@@ -182,7 +181,6 @@ class FacesPass {
     return cell;
   }
 
-  const NodeReader& reader_;
   const GridDescription& grid_;
   const FacesJob& job_;
   Progress& progress_;
