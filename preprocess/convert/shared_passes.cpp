@@ -1,8 +1,6 @@
 #include "preprocess/convert/shared_passes.h"
 
-#include <algorithm>
 #include <bit>
-#include <glm/common.hpp>
 #include <utility>
 
 namespace curvisplat {
@@ -44,18 +42,7 @@ GridSurvey unpackSurvey(const Ranks::Bytes& bytes) {
 GridSurvey combinedSurvey(const GridSurvey& share, Ranks& ranks) {
   GridSurvey whole = share;
   const std::vector<Ranks::Bytes> shares = ranks.gather(pack(share));
-  for (size_t n = 1; n < shares.size(); ++n) {
-    const GridSurvey one = unpackSurvey(shares[n]);
-    whole.nodes += one.nodes;
-    whole.blanked += one.blanked;
-    whole.grid_checksum += one.grid_checksum;
-    whole.lower = glm::min(whole.lower, one.lower);
-    whole.upper = glm::max(whole.upper, one.upper);
-    for (size_t scalar = 0; scalar < whole.ranges.size(); ++scalar) {
-      whole.ranges[scalar].min = std::min(whole.ranges[scalar].min, one.ranges[scalar].min);
-      whole.ranges[scalar].max = std::max(whole.ranges[scalar].max, one.ranges[scalar].max);
-    }
-  }
+  for (size_t n = 1; n < shares.size(); ++n) whole = unitedSurvey(std::move(whole), unpackSurvey(shares[n]));
   return broadcastSurvey(whole, ranks);
 }
 

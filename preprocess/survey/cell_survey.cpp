@@ -47,18 +47,6 @@ bool addCell(const NodeArrays& nodes, size_t at, size_t row_stride, size_t plane
   return true;
 }
 
-GridSurvey united(GridSurvey a, const GridSurvey& b) {
-  a.nodes += b.nodes;
-  a.blanked += b.blanked;
-  a.lower = glm::min(a.lower, b.lower);
-  a.upper = glm::max(a.upper, b.upper);
-  for (size_t scalar = 0; scalar < a.ranges.size(); ++scalar) {
-    a.ranges[scalar].min = std::min(a.ranges[scalar].min, b.ranges[scalar].min);
-    a.ranges[scalar].max = std::max(a.ranges[scalar].max, b.ranges[scalar].max);
-  }
-  return a;
-}
-
 }  // namespace
 
 GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFaces* faces,
@@ -94,20 +82,20 @@ GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFa
       }
     };
     // Counts, minima and maxima do not depend on how the work is divided.
-    survey =
-        united(std::move(survey),
-               tbb::parallel_reduce(
-                   tbb::blocked_range<size_t>(0, rowsOf(slab.box), kNodesPerTask / block.ni + 1), nothing,
-                   [&](const tbb::blocked_range<size_t>& range, GridSurvey of_range) {
-                     std::vector<AbuttingFaces::Centre> ends;
-                     for (size_t row = range.begin(); row < range.end(); ++row) add_row(row, of_range, ends);
-                     if (!ends.empty()) {
-                       const MutexLock lock(adding_faces);
-                       faces->add(ends);
-                     }
-                     return of_range;
-                   },
-                   united));
+    survey = unitedSurvey(
+        std::move(survey),
+        tbb::parallel_reduce(
+            tbb::blocked_range<size_t>(0, rowsOf(slab.box), kNodesPerTask / block.ni + 1), nothing,
+            [&](const tbb::blocked_range<size_t>& range, GridSurvey of_range) {
+              std::vector<AbuttingFaces::Centre> ends;
+              for (size_t row = range.begin(); row < range.end(); ++row) add_row(row, of_range, ends);
+              if (!ends.empty()) {
+                const MutexLock lock(adding_faces);
+                faces->add(ends);
+              }
+              return of_range;
+            },
+            unitedSurvey));
     survey.grid_checksum += checksumOfGrid(*loaded, block);
     progress.advance(rowsOf(slab.box) * block.ni);
   }

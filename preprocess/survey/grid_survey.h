@@ -25,4 +25,7 @@ struct GridSurvey {
   uint64_t grid_checksum = 0;       // grid_checksum.h
 };
 
+/// Of the samples of both, which have the same scalars and no sample in common.
+GridSurvey unitedSurvey(GridSurvey a, const GridSurvey& b);
+
 }  // namespace curvisplat
