@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "preprocess/formats/vtk/vtk_cell_types.h"
+#include "preprocess/formats/vtk/vtk_description.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -68,14 +69,7 @@ uint64_t largestOf(const VtkArray& array) {
 }
 
 VtkMeshSource::VtkMeshSource(VtkMesh mesh) : mesh_(std::move(mesh)) {
-  description_.format = mesh_.format;
-  description_.files = mesh_.files;
-  description_.times = mesh_.times;
-  description_.time_step = mesh_.time_step;
-  for (std::string& warning : mesh_.warnings)  // many pieces may give the same warning
-    if (std::find(description_.warnings.begin(), description_.warnings.end(), warning) ==
-        description_.warnings.end())
-      description_.warnings.push_back(std::move(warning));
+  describeFiles(mesh_, description_);
   description_.pieces = mesh_.names;
   description_.coordinate_bytes = 4;
   std::vector<size_t> pieces;

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "preprocess/formats/vtk/vtk_box.h"
+#include "preprocess/formats/vtk/vtk_description.h"
 #include "stream/base/check.h"
 #include "stream/base/error.h"
 
@@ -58,14 +59,7 @@ void addDataArray(VtkPiece& piece, bool of_cells, VtkArray array, std::vector<st
 }
 
 VtkSource::VtkSource(VtkGrid grid) : grid_(std::move(grid)) {
-  description_.format = grid_.format;
-  description_.files = grid_.files;
-  description_.times = grid_.times;
-  description_.time_step = grid_.time_step;
-  for (std::string& warning : grid_.warnings)  // many pieces may give the same warning
-    if (std::find(description_.warnings.begin(), description_.warnings.end(), warning) ==
-        description_.warnings.end())
-      description_.warnings.push_back(std::move(warning));
+  describeFiles(grid_, description_);
   addBlocks();
   std::vector<size_t> pieces;
   for (const VtkBlock& block : grid_.blocks) pieces.push_back(block.piece);
