@@ -81,21 +81,19 @@ class FrameRun {
   void drawNext(const MotionInTime& motion, const std::vector<uint64_t>& numbers, size_t n) {
     const bool moves = severalFrames(arguments_);
     const uint64_t number = numbers[n];
-    {
-      Progress of_frame;
-      of_frame.stopWith(progress_);
-      try {
-        const uint64_t* const next = n + 1 < numbers.size() ? &numbers[n + 1] : nullptr;
-        draw(number, next, motion, moves ? of_frame : progress_);
-      } catch (const Interrupted&) {
-        throw;
-      } catch (const UsageError& error) {
-        if (moves) throw UsageError("frame {}: {}", number, error.what());
-        throw;
-      } catch (const Error& error) {
-        if (moves) throw Error("frame {}: {}", number, error.what());
-        throw;
-      }
+    const uint64_t* const next = n + 1 < numbers.size() ? &numbers[n + 1] : nullptr;
+    Progress of_frame;
+    of_frame.stopWith(progress_);
+    try {
+      draw(number, next, motion, moves ? of_frame : progress_);
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const UsageError& error) {
+      if (moves) throw UsageError("frame {}: {}", number, error.what());
+      throw;
+    } catch (const Error& error) {
+      if (moves) throw Error("frame {}: {}", number, error.what());
+      throw;
     }
     if (moves) progress_.advance(1);
   }
