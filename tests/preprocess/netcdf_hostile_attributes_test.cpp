@@ -8,6 +8,7 @@
 
 #include "preprocess/formats/open/open_grid.h"
 #include "stream/base/error.h"
+#include "stream/base/file.h"
 #include "tests/support/earth_files.h"
 #include "tests/support/hdf5_editor.h"
 #include "tests/support/temporary_folder.h"
@@ -133,6 +134,20 @@ TEST_F(NetcdfHostileAttributes, GroupsInCirclesAreRefused) {
     }
   }
   EXPECT_NE(errorOf(file).find("more than the file can hold"), std::string::npos) << errorOf(file);
+}
+
+// HDF5 1.10 frees memory that it has not set where it sorts such a list.
+TEST_F(NetcdfHostileAttributes, ListsThatAreDamagedAreRefused) {
+  const std::string whole = readTextFile(path_);
+  int lists = 0;
+  for (size_t at = whole.find("BTLF"); at != std::string::npos; at = whole.find("BTLF", at + 1)) {
+    std::string damaged = whole;
+    damaged[at + 12] = static_cast<char>(~damaged[at + 12]);
+    const std::filesystem::path file = copy();
+    writeFileAtomically(file, damaged);
+    lists += errorOf(file).find("its list of ") != std::string::npos;
+  }
+  EXPECT_GT(lists, 0);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "preprocess/formats/common/hdf5_attribute.h"
+#include "preprocess/formats/common/hdf5_lists.h"
 #include "stream/base/check.h"
 #include "stream/base/error.h"
 
@@ -31,6 +32,7 @@ struct NodeLink {
 /// The links of a group to nodes, in order of creation if the file tracks it. nullopt if the group cannot be
 /// read.
 std::optional<std::vector<NodeLink>> nodeLinksOf(const Hdf5Group& group) {
+  if (!linksAreWhole(group.id())) return std::nullopt;
   std::vector<NodeLink> links;
   const auto add = [](hid_t, const char* name, const H5L_info_t* info, void* to) -> herr_t {
     try {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "preprocess/formats/common/hdf5_attribute.h"
+#include "preprocess/formats/common/hdf5_lists.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -32,6 +33,7 @@ class Walk {
   }
 
   Netcdf4Structure run(const Hdf5Object& root) {
+    checkAttributes(root, "/");
     if (const auto properties = shape(root, "/", "_NCProperties")) {
       if (properties->kind != H5T_STRING || properties->values != 1)
         damaged("/", "_NCProperties", *properties, "one string");
@@ -42,6 +44,15 @@ class Walk {
   }
 
  private:
+  [[noreturn]] void unreadable(const std::string& place, std::string_view what) const {
+    throw Error("{}: {}: {} cannot be read (HDF5: {}); the file is damaged: copy or write it again",
+                path_.string(), place, what, hdf5Reason());
+  }
+
+  void checkAttributes(const Hdf5Object& object, const std::string& place) const {
+    if (!attributesAreWhole(object.id())) unreadable(place, "its list of attributes");
+  }
+
   [[noreturn]] void damaged(const std::string& place, const char* attribute, const Hdf5AttributeShape& found,
                             std::string_view expected) const {
     throw Error(
@@ -54,10 +65,7 @@ class Walk {
                                           const char* attribute) const {
     if (H5Aexists(object.id(), attribute) <= 0) return std::nullopt;
     const auto found = shapeOf(Hdf5Attribute(H5Aopen(object.id(), attribute, H5P_DEFAULT)));
-    if (!found)
-      throw Error(
-          "{}: {}: attribute '{}' cannot be read (HDF5: {}); the file is damaged: copy or write it again",
-          path_.string(), place, attribute, hdf5Reason());
+    if (!found) unreadable(place, fmt::format("attribute '{}'", attribute));
     return found;
   }
 
@@ -65,6 +73,7 @@ class Walk {
     if (depth > kMaxDepth)
       throw Error("{}: groups are nested more than {} deep; its links form a cycle, or it is damaged",
                   path_.string(), kMaxDepth);
+    if (!linksAreWhole(group.id())) unreadable(place.empty() ? "/" : place, "its list of objects");
     std::vector<std::string> names;
     const auto add = [](hid_t, const char* name, const H5L_info_t*, void* to) -> herr_t {
       try {
@@ -82,6 +91,7 @@ class Walk {
     for (const std::string& name : names) {
       const Hdf5Object object(H5Oopen(group.id(), name.c_str(), H5P_DEFAULT));
       if (!object) continue;
+      checkAttributes(object, place + "/" + name);
       const H5I_type_t type = H5Iget_type(object.id());
       if (type == H5I_GROUP)
         visitGroup(object, place + "/" + name, depth + 1);

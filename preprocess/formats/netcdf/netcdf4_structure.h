@@ -8,7 +8,7 @@
 //   scales      NAME                  one terminated string of fixed length
 //   root        _NCProperties         one string
 //
-// libnetcdf also follows links without recognising cycles. The walk therefore visits objects as it does and
+// The lists of links and attributes are checked as hdf5_lists.h says. libnetcdf also follows links without recognising cycles. The walk therefore visits objects as it does and
 // limits their number to what the file can hold.
 #pragma once
 
@@ -22,8 +22,8 @@ struct Netcdf4Structure {
   bool netcdf4 = false;
 };
 
-/// Throws Error with the object, the attribute, and what was found and expected. Reports nothing that HDF5
-/// cannot open: libnetcdf fails there without harm.
+/// Throws Error with the object, the list or the attribute, and what was found and expected. Reports no object
+/// that HDF5 cannot open: libnetcdf fails there without harm.
 Netcdf4Structure checkNetcdf4Structure(const std::filesystem::path& path);
 
 }  // namespace curvisplat
