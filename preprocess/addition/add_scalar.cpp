@@ -94,6 +94,12 @@ class Addition {
   void scan() {
     pass("scan", manifest().nodes, "nodes", &Addition::survey);
     if (survey_.blanked.by_grid < manifest().blanked_nodes) {
+      if (manifest().overlap == kOverlapOwner)
+        throw Error(
+            "{}: its blocks overlap, and older scalars have no values at some of its {}; convert again with "
+            "all "
+            "scalars",
+            cache_.path().string(), manifest().cells ? "cells" : "nodes");
       // Older scalars have blanked nodes that the grid does not: only the cache knows them.
       pass("drawn nodes", manifest().bricks, "bricks", &Addition::findDrawnNodes);
       if (manifest().splats < manifest().nodes - manifest().blanked_nodes)
@@ -147,6 +153,7 @@ class Addition {
   void scatter() {
     writer_ = std::make_unique<VariableWriter>(lock_, manifest(), this->variables());
     passes_ = std::make_unique<ValuePasses>(cache_, reader_, plan_, scratch_.path(), progress_);
+    passes_->setOverlaps(overlapsFor(manifest(), grid_, plan_.slab_bytes, progress_));
     passes_->scatter();
   }
 

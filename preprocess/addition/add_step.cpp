@@ -131,6 +131,7 @@ class StepAddition {
     const uint64_t expected = cache_.series().steps[cache_.step()].grid_checksum;
     makeScratch();
     ValuePasses passes(cache_, reader_, plan_, scratch_->path(), progress_);
+    passes.setOverlaps(overlapsFor(cache_.manifest(), source_, plan_.slab_bytes, progress_));
     SlabSurvey survey;
     survey.ranges.resize(scalars_.size());
     try {
@@ -162,6 +163,7 @@ class StepAddition {
     const CacheReader cache = cache_.atStep(cache_.series().first_steps[*geometry]);
     makeScratch();
     ValuePasses passes(cache, reader_, plan_, scratch_->path(), progress_);
+    passes.setOverlaps(overlapsFor(cache.manifest(), source_, plan_.slab_bytes, progress_));
     pass("scatter", report_.nodes, "nodes", [&] { passes.scatter(); });
     finishValues(passes, cache);
   }
@@ -206,6 +208,7 @@ class StepAddition {
     options.temporary_folder = temporaryFolder();
     options.title = cache_.seriesManifest().title;
     options.time = report_.time;
+    if (cache_.manifest().overlap == kOverlapAll) options.overlap = Overlap::kAll;
     options.bucket_splats = options_.bucket_splats;
     ConvertReport converted = convert(source_, options, progress_);
     report_.new_geometry = true;

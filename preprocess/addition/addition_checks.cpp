@@ -34,6 +34,12 @@ void checkBlocks(const GridDescription& grid, const CacheReader& cache) {
   }
 }
 
+std::vector<BlockOverlap> overlapsFor(const Manifest& cache, const GridSource& grid, uint64_t slab_bytes,
+                                      const Progress& progress) {
+  if (cache.overlap != kOverlapOwner) return {};
+  return findOverlaps(grid, slab_bytes, progress);
+}
+
 std::filesystem::path newScratch(const std::filesystem::path& cache, const std::filesystem::path& folder) {
   const std::string name = scratchName(cache);
   // The cache is locked, so none of the additions that these belong to lives.

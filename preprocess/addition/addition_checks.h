@@ -4,12 +4,18 @@
 #include <filesystem>
 
 #include "preprocess/grid/grid_source.h"
+#include "preprocess/survey/block_overlap.h"
 #include "stream/cache/cache_reader.h"
 
 namespace curvisplat {
 
 /// Throws Error if the grid's blocks are not those of the cache, which tells at once that it is another grid.
 void checkBlocks(const GridDescription& grid, const CacheReader& cache);
+
+/// The overlaps of the grid's blocks where `cache` draws each point once; else none. Throws Error if the grid cannot be
+/// read.
+std::vector<BlockOverlap> overlapsFor(const Manifest& cache, const GridSource& grid, uint64_t slab_bytes,
+                                      const Progress& progress);
 
 /// A new name in `folder` for the temporary files of an addition to `cache`, which is locked. Removes those of
 /// additions that were killed.

@@ -2,6 +2,7 @@
 
 #include <tbb/enumerable_thread_specific.h>
 
+#include <optional>
 #include <utility>
 
 #include "preprocess/addition/build_values.h"
@@ -28,8 +29,12 @@ void ValuePasses::scatter(std::function<void(const LoadedSlab&)> see) {
                                         unlikeHalvesOf(cache_->manifest()));
 
   tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
-  streamSplats(*reader_, nullptr, plan_.slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, *seams_,
-               {*progress_, std::move(see)});
+  std::optional<BlockOwners> owners;
+  if (!overlaps_.empty()) owners.emplace(ownersReader(*reader_, true), overlaps_, plan_.owner_bytes);
+  SlabPass pass(*progress_, std::move(see));
+  pass.owners = owners ? &*owners : nullptr;
+  streamSplats(
+      *reader_, nullptr, plan_.slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, *seams_, pass);
   for (ValueSink& sink : sinks) sink.flush();
 }
 

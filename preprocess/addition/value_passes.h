@@ -10,6 +10,8 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "preprocess/addition/conversion_order.h"
 #include "preprocess/addition/step_references.h"
@@ -19,6 +21,7 @@
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/splats/seams.h"
+#include "preprocess/survey/block_overlap.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/values_writer.h"
@@ -32,6 +35,8 @@ class ValuePasses {
   ValuePasses(const CacheReader& cache, const NodeReader& reader, const MemoryPlan& plan,
               std::filesystem::path scratch, Progress& progress);
 
+  /// Before scatter(): the overlaps of the grid's blocks, for a cache in which each point is drawn once.
+  void setOverlaps(std::vector<BlockOverlap> overlaps) { overlaps_ = std::move(overlaps); }
   /// `see`: as SlabPass has it. Throws Error if the cache has no cell for a splat.
   void scatter(std::function<void(const LoadedSlab&)> see = {});
   void mergeSeams();
@@ -53,6 +58,7 @@ class ValuePasses {
   const ConversionOrder order_;
   const ValueBuckets buckets_;
   const uint32_t grouped_;
+  std::vector<BlockOverlap> overlaps_;
   std::unique_ptr<BucketFile> file_;
   std::unique_ptr<SeamMerger> seams_;
   uint64_t temporary_bytes_ = 0;

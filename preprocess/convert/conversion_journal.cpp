@@ -182,9 +182,13 @@ BucketChains bucketsOf(const json& from) {
 json jsonOf(const ScatteredSplats& splats) {
   json of_ranks = json::array();
   for (const BucketChains& buckets : splats.buckets_of_ranks) of_ranks.push_back(jsonOf(buckets));
-  return {{"buckets_of_ranks", of_ranks},           {"survey", jsonOf(splats.survey)},
-          {"degenerate", splats.counts.degenerate}, {"inverted", splats.counts.inverted},
-          {"merged_nodes", splats.merged_nodes},    {"tree", jsonOf(splats.tree)},
+  return {{"buckets_of_ranks", of_ranks},
+          {"survey", jsonOf(splats.survey)},
+          {"degenerate", splats.counts.degenerate},
+          {"inverted", splats.counts.inverted},
+          {"overlap", splats.overlap},
+          {"merged_nodes", splats.merged_nodes},
+          {"tree", jsonOf(splats.tree)},
           {"buckets", jsonOf(splats.buckets)}};
 }
 
@@ -192,6 +196,7 @@ ScatteredSplats splatsOf(const json& from) {
   ScatteredSplats splats;
   splats.survey = surveyOf(from.at("survey"));
   splats.counts = {wholeNumber<uint64_t>(from.at("degenerate")), wholeNumber<uint64_t>(from.at("inverted"))};
+  splats.overlap = from.at("overlap");
   splats.merged_nodes = wholeNumber<uint64_t>(from.at("merged_nodes"));
   splats.buckets = bucketsOf(from.at("buckets"));
   if (from.contains("buckets_of_ranks"))
@@ -215,7 +220,7 @@ ConversionJournal journalOf(const json& content) {
 }  // namespace
 
 std::vector<ConversionFact> factsOf(const GridDescription& description, const std::vector<uint32_t>& scalars,
-                                    std::optional<double> blank_value) {
+                                    std::optional<double> blank_value, Overlap overlap) {
   std::vector<ConversionFact> facts;
   facts.push_back(
       {"the program", fmt::format("curvisplat " CURVISPLAT_VERSION ", journal {}", kJournalVersion)});
@@ -231,6 +236,7 @@ std::vector<ConversionFact> factsOf(const GridDescription& description, const st
   if (description.times.size() > 1) facts.push_back({"--time-step", std::to_string(description.time_step)});
   facts.push_back({"--scalar", names.empty() ? "none" : names});
   facts.push_back({"--blank", blank_value ? fmt::format("{}", *blank_value) : "none"});
+  facts.push_back({"--overlap", overlap == Overlap::kAll ? kOverlapAll : kOverlapOwner});
   return facts;
 }
 

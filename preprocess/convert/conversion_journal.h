@@ -10,6 +10,7 @@
 
 #include "preprocess/convert/scattered_splats.h"
 #include "preprocess/grid/grid_source.h"
+#include "preprocess/overset/block_owners.h"
 
 namespace curvisplat {
 
@@ -21,9 +22,9 @@ struct ConversionFact {
   bool operator==(const ConversionFact&) const = default;
 };
 
-/// All such things: program, files as they are now, layout, scalars, blank value. Not memory and threads.
+/// All such things: program, files as they are now, layout, scalars, blank value, overlaps. Not memory and threads.
 std::vector<ConversionFact> factsOf(const GridDescription& description, const std::vector<uint32_t>& scalars,
-                                    std::optional<double> blank_value);
+                                    std::optional<double> blank_value, Overlap overlap);
 
 /// "" or, in words, the first fact in which two conversions differ.
 std::string differenceOf(const std::vector<ConversionFact>& before, const std::vector<ConversionFact>& now);

@@ -70,7 +70,7 @@ std::unique_ptr<SplatOrigin> originOf(const DataSource& source, const ConvertOpt
   if (const auto* mesh = dynamic_cast<const MeshSource*>(&source))
     return std::make_unique<MeshOrigin>(*mesh, options.scalars, options.blank_value, plan, scratch);
   return std::make_unique<GridOrigin>(dynamic_cast<const GridSource&>(source), options.scalars,
-                                      options.blank_value, plan, scratch);
+                                      options.blank_value, options.overlap, plan, scratch);
 }
 
 /// A conversion under way: what each pass leaves for the next.
@@ -198,7 +198,9 @@ class Conversion {
     checkRanges(splats_.survey, origin_->description(), options_.scalars);
     openWriter();
     if (!isFirst()) return;
-    for (std::string& warning : origin_->warnings(progress_)) report_.warnings.push_back(std::move(warning));
+    report_.warnings = origin_->warnings();
+    report_.notes = origin_->notes();
+    splats_.overlap = origin_->overlap();
   }
 
   void count() {
@@ -375,6 +377,7 @@ class Conversion {
     for (const GridBlock& block : origin_->blocks())
       manifest.blocks.push_back({block.name, block.ni, block.nj, block.nk});
     manifest.requirements = {kBorderFaces, kCellGrowth};
+    manifest.overlap = splats_.overlap;
     manifest.cells = origin_->centring() == Centring::kCell;
     manifest.nodes = splats_.survey.nodes;
     manifest.blanked_nodes = splats_.survey.blanked.total();
@@ -470,6 +473,7 @@ ConvertReport convert(const DataSource& source, const ConvertOptions& given, Pro
     plan.limitBuckets(bucketSplatsOfRanks(*grid, *options.ranks), options.scalars.size());
   }
   if (options.mesh_bytes) plan.mesh_bytes = *options.mesh_bytes;
+  if (options.owner_bytes) plan.owner_bytes = *options.owner_bytes;
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
 
   if (!grid) {
@@ -478,7 +482,8 @@ ConvertReport convert(const DataSource& source, const ConvertOptions& given, Pro
     options.surfaces = false;
   }
   if (options.surfaces) checkPlanes(source.description(), options.planes);
-  std::vector<ConversionFact> facts = factsOf(source.description(), options.scalars, options.blank_value);
+  std::vector<ConversionFact> facts =
+      factsOf(source.description(), options.scalars, options.blank_value, options.overlap);
   ConvertReport report;
   if (isFinished(options, facts)) {
     const std::filesystem::path manifest = options.output / "manifest.json";

@@ -10,6 +10,7 @@
 #include "preprocess/faces/grid_faces_pass.h"
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/grid/node_reader.h"
+#include "preprocess/overset/block_owners.h"
 #include "stream/base/progress.h"
 #include "stream/base/ranks.h"
 
@@ -29,6 +30,7 @@ struct ConvertOptions {
   std::optional<double> time;              // of the step; otherwise the source's, or 0
   bool surfaces = true;                    // the grid's outer faces go into the cache
   std::vector<IndexPlane> planes;          // and these index planes
+  Overlap overlap = Overlap::kOwner;       // of blocks
 
   /// Those that convert together: each has the same source and options, and calls convert(). Null: this process alone.
   Ranks* ranks = nullptr;
@@ -37,6 +39,8 @@ struct ConvertOptions {
   std::optional<uint64_t> bucket_splats;
   /// Less memory for an unstructured grid than there is: small ones then take the way of large ones.
   std::optional<uint64_t> mesh_bytes;
+  /// Less memory for the cells of overlapping blocks: small ones are then read in several parts.
+  std::optional<uint64_t> owner_bytes;
 };
 
 /// A file of the cache, and what it takes.
@@ -62,7 +66,7 @@ struct ConvertReport {
   unsigned threads = 0;          // that worked: memory may allow fewer than asked for
   uint64_t memory_bytes = 0;     // the cap that held
   std::vector<FileReport> files;
-  std::vector<std::string> warnings;
+  std::vector<std::string> warnings, notes;
 };
 
 /// Converts a structured grid (GridSource) or an unstructured one (MeshSource). `source` is read three times, and once more for surfaces.

@@ -9,13 +9,17 @@
 #include "preprocess/splats/cell_splats.h"
 #include "preprocess/survey/block_overlap.h"
 #include "stream/base/error.h"
+#include "stream/cache/manifest.h"
 
 namespace curvisplat {
 
 GridOrigin::GridOrigin(const GridSource& source, std::vector<uint32_t> scalars,
-                       std::optional<double> blank_value, const MemoryPlan& plan,
+                       std::optional<double> blank_value, Overlap overlap, const MemoryPlan& plan,
                        std::filesystem::path scratch)
-    : reader_(source, std::move(scalars), blank_value), plan_(plan), scratch_(std::move(scratch)) {}
+    : reader_(source, std::move(scalars), blank_value),
+      overlap_(overlap),
+      plan_(plan),
+      scratch_(std::move(scratch)) {}
 
 void GridOrigin::requireMemory(const GridSource& source, const std::vector<uint32_t>& scalars,
                                MemoryPlan& plan) {
@@ -55,13 +59,27 @@ GridSurvey GridOrigin::survey(Progress& progress) {
                                              plan_.seam_bytes - needsOfFaces().memory_bytes, scratch_);
   GridSurvey survey = surveyGrid(reader_, plan_.slab_bytes, faces_.get(), progress, ranks_);
   if (faces_) faces_->match(progress);
+  has_values_everywhere_ = survey.blanked.by_value == 0 && survey.blanked.not_finite == 0;
+  if (!ranks_ || ranks_->isFirst()) overlaps_ = findOverlaps(reader_.source(), plan_.slab_bytes, progress);
+  if (ranks_) overlaps_ = fromBytes<BlockOverlap>(ranks_->broadcast(toBytes(overlaps_)));
   return survey;
 }
 
-std::vector<std::string> GridOrigin::warnings(Progress& progress) {
-  const std::vector<BlockOverlap> overlaps = findOverlaps(reader_.source(), plan_.slab_bytes, progress);
-  if (overlaps.empty()) return {};
-  return {overlapWarning(description(), overlaps)};
+std::vector<std::string> GridOrigin::warnings() {
+  std::vector<std::string> warnings;
+  if (const std::string line = unsearchedOverlaps(description()); !line.empty()) warnings.push_back(line);
+  if (!hasOwners() && !overlaps_.empty()) warnings.push_back(overlapWarning(description(), overlaps_));
+  return warnings;
+}
+
+std::vector<std::string> GridOrigin::notes() {
+  if (!hasOwners()) return {};
+  return {overlapNote(description(), overlaps_)};
+}
+
+std::string GridOrigin::overlap() const {
+  if (blocks().size() < 2) return "";
+  return overlap_ == Overlap::kAll ? kOverlapAll : overlaps_.empty() ? kOverlapNone : kOverlapOwner;
 }
 
 void GridOrigin::count(const RootCube& root, CountingGrid& counts, Progress& progress) {
@@ -70,8 +88,12 @@ void GridOrigin::count(const RootCube& root, CountingGrid& counts, Progress& pro
 
 ScatterCounts GridOrigin::scatter(const SinkOfThread& sink_of_thread, Progress& progress) {
   seams_ = std::make_unique<SeamMerger>(reader_.scalars(), plan_.seam_bytes, scratch_);
+  std::optional<BlockOwners> owners;
+  if (hasOwners())
+    owners.emplace(ownersReader(reader_, has_values_everywhere_), overlaps_, plan_.owner_bytes);
   SlabPass pass(progress);
   pass.ranks = ranks_;
+  pass.owners = owners ? &*owners : nullptr;
   const ScatterCounts counts =
       streamSplats(reader_, faces_.get(), plan_.slab_bytes, sink_of_thread, *seams_, pass);
   faces_.reset();

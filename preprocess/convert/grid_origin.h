@@ -10,6 +10,7 @@
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/splat_origin.h"
 #include "preprocess/grid/node_reader.h"
+#include "preprocess/overset/block_owners.h"
 #include "preprocess/splats/abutting_faces.h"
 #include "preprocess/splats/seams.h"
 
@@ -20,7 +21,7 @@ class GridOrigin final : public SplatOrigin {
   /// `source` must outlive it. Temporary files go to `scratch`. Throws Error if node-centred and cell-centred
   /// scalars are mixed.
   GridOrigin(const GridSource& source, std::vector<uint32_t> scalars, std::optional<double> blank_value,
-             const MemoryPlan& plan, std::filesystem::path scratch);
+             Overlap overlap, const MemoryPlan& plan, std::filesystem::path scratch);
 
   /// Makes the plan's slabs large enough for the grid's rows. Throws Error that names a sufficient cap.
   static void requireMemory(const GridSource& source, const std::vector<uint32_t>& scalars, MemoryPlan& plan);
@@ -32,7 +33,9 @@ class GridOrigin final : public SplatOrigin {
 
   bool shareWith(Ranks& ranks) override;
   GridSurvey survey(Progress& progress) override;
-  std::vector<std::string> warnings(Progress& progress) override;
+  std::vector<std::string> warnings() override;
+  std::vector<std::string> notes() override;
+  std::string overlap() const override;
   void count(const RootCube& root, CountingGrid& counts, Progress& progress) override;
   ScatterCounts scatter(const SinkOfThread& sink_of_thread, Progress& progress) override;
   uint64_t finish(SplatSink& sink, Progress& progress) override;
@@ -43,10 +46,15 @@ class GridOrigin final : public SplatOrigin {
  private:
   AbuttingFaces::Needs needsOfFaces() const;
 
+  bool hasOwners() const { return overlap_ == Overlap::kOwner && !overlaps_.empty(); }
+
   const NodeReader reader_;
+  const Overlap overlap_;
   MemoryPlan plan_;
   Ranks* ranks_ = nullptr;
   const std::filesystem::path scratch_;
+  std::vector<BlockOverlap> overlaps_;
+  bool has_values_everywhere_ = false;    // where the grid has nodes
   std::unique_ptr<AbuttingFaces> faces_;  // of cells
   std::unique_ptr<SeamMerger> seams_;     // of nodes
 };

@@ -72,6 +72,7 @@ MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads
   plan.slab_bytes = std::min(bytes / kSlabShare, 256 * kMiB);
   plan.counting_bytes = bytes / 8;
   plan.seam_bytes = bytes / kSeamShare;
+  plan.owner_bytes = bytes / 8;
   plan.mesh_bytes = bytes / kMeshShare;
 
   plan.chunk_buffer_bytes = bytes / 4;

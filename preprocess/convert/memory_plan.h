@@ -3,7 +3,7 @@
 //
 //    scan          2 slabs | seams: faces of cells
 //    count         2 slabs | counting grid
-//    scatter       2 slabs | chunk buffers | seams | a task's splats a thread
+//    scatter       2 slabs | chunk buffers | seams | cells of overlapping blocks | a task's splats a thread
 //                  of a mesh: points and sums | chunk buffers | chunks of cells
 //    seams         chunk buffers | seams
 //    build         2 buckets (one is read while the other is built) | a brick's scratch a thread
@@ -19,6 +19,7 @@ struct MemoryPlan {
   uint64_t slab_bytes = 0;      // each of two
   uint64_t counting_bytes = 0;  // the counting grid
   uint64_t seam_bytes = 0;
+  uint64_t owner_bytes = 0;         // the cells of overlapping blocks, while splats are made
   uint64_t mesh_bytes = 0;          // of an unstructured grid, in the place of slabs and seams
   uint64_t chunk_buffer_bytes = 0;  // the write buffers of all buckets
   uint32_t most_buckets = 0;        // of one temporary file, so that buffers stay large enough to write well

@@ -46,7 +46,7 @@ GridSurvey MeshOrigin::survey(Progress& progress) {
   return survey.grid;
 }
 
-std::vector<std::string> MeshOrigin::warnings(Progress&) {
+std::vector<std::string> MeshOrigin::warnings() {
   const auto unused = static_cast<uint64_t>(std::count(used_.begin(), used_.end(), false));
   std::vector<std::string> warnings;
   if (unused > 0)

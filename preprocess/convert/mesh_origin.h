@@ -32,7 +32,7 @@ class MeshOrigin final : public SplatOrigin {
   uint64_t temporaryBytes() const override;
 
   GridSurvey survey(Progress& progress) override;
-  std::vector<std::string> warnings(Progress& progress) override;
+  std::vector<std::string> warnings() override;
   void count(const RootCube& root, CountingGrid& counts, Progress& progress) override;
   ScatterCounts scatter(const SinkOfThread& sink_of_thread, Progress& progress) override;
   uint64_t finish(SplatSink& sink, Progress& progress) override;

@@ -37,10 +37,12 @@ class SplatStream {
           return Worker{{}, {}, {}, 0, std::vector<Handedness>(blocks_->size())};
         }) {}
 
-  void add(const LoadedSlab& loaded) {
+  /// `covered`: of the slab, as BlockOwners::cover() sets it.
+  void add(const LoadedSlab& loaded, std::span<const uint64_t> covered) {
     const Slab& slab = loaded.slab;
     const GridBlock& block = (*blocks_)[slab.block];
-    const BlockWindow window{block, slab.first_node, slab.window, &loaded.nodes};
+    const BlockWindow window{block, slab.first_node, slab.window, &loaded.nodes,
+                             covered.empty() ? nullptr : covered.data()};
     const std::vector<NodeBox> tasks = cutForTasks(block, slab.box, kNodesPerTask);
     tbb::parallel_for(size_t{0}, tasks.size(), [&](size_t task) {
       progress_->throwIfStopped();
@@ -165,9 +167,11 @@ ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces,
   SplatStream splats(reader, faces, sink_of_thread, seams, pass.progress);
   SlabStream slabs(reader, slab_bytes, reader.centring() == Centring::kCell ? kCellSplatHalo : kNodeSplatHalo,
                    shareOf(pass.ranks));
+  std::vector<uint64_t> covered;
   while (const LoadedSlab* loaded = slabs.next()) {
     if (pass.see) pass.see(*loaded);
-    splats.add(*loaded);
+    if (pass.owners) pass.owners->cover(*loaded, covered);
+    splats.add(*loaded, covered);
     const GridBlock& block = reader.source().description().blocks[loaded->slab.block];
     pass.progress.advance(rowsOf(loaded->slab.box) * block.ni);
   }

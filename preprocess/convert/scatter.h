@@ -14,6 +14,7 @@
 #include "preprocess/convert/splat_origin.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
+#include "preprocess/overset/block_owners.h"
 #include "preprocess/splats/abutting_faces.h"
 #include "preprocess/splats/seams.h"
 #include "stream/base/progress.h"
@@ -51,8 +52,9 @@ struct SlabPass {
 
   Progress& progress;
   std::function<void(const LoadedSlab&)>
-      see;                 // each slab, in order, before its splats are made; may be empty
-  Ranks* ranks = nullptr;  // of which each makes the splats of a share; the counts are the whole's
+      see;                        // each slab, in order, before its splats are made; may be empty
+  BlockOwners* owners = nullptr;  // of overlapping blocks; null: all of them are drawn
+  Ranks* ranks = nullptr;         // of which each makes the splats of a share; the counts are the whole's
 };
 
 /// Makes all splats, of nodes or of cells as the reader's scalars are, in parallel. Those of block faces go

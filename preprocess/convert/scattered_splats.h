@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "preprocess/convert/bucket_file.h"
@@ -15,6 +16,7 @@ struct ScatteredSplats {
   GridSurvey survey;
   ScatterCounts counts;
   uint64_t merged_nodes = 0;
+  std::string overlap;   // Manifest::overlap
   BucketTree tree;       // with contents, as it was scattered by: before any bucket was divided
   BucketChains buckets;  // of the temporary file
   std::vector<BucketChains> buckets_of_ranks = {};  // from rank 1 on, where several have scattered

@@ -67,7 +67,11 @@ class SplatOrigin {
   /// Throws Error if there is nothing to draw.
   virtual GridSurvey survey(Progress& progress) = 0;
   /// What is odd about the grid, a line each.
-  virtual std::vector<std::string> warnings(Progress&) { return {}; }
+  virtual std::vector<std::string> warnings() { return {}; }
+  /// What was chosen for it, a line each.
+  virtual std::vector<std::string> notes() { return {}; }
+  /// Manifest::overlap.
+  virtual std::string overlap() const { return ""; }
   /// Counts the splats by cells of `root`, about: a wrong count makes buckets of uneven sizes, no other cache.
   virtual void count(const RootCube& root, CountingGrid& counts, Progress& progress) = 0;
   virtual ScatterCounts scatter(const SinkOfThread& sink_of_thread, Progress& progress) = 0;

@@ -110,6 +110,11 @@ class GridSource : public DataSource {
   /// Error with the file and the offset.
   virtual void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                     NodeArrays& out) const = 0;
+  /// Which nodes of the box are fringe: interpolated from another block (a negative iblank). Fills `out` with 1 or 0
+  /// for each and returns true; returns false if the grid does not tell. As read().
+  virtual bool readFringe(uint32_t /*block*/, const NodeBox& /*box*/, std::vector<uint8_t>& /*out*/) const {
+    return false;
+  }
 };
 
 }  // namespace curvisplat

@@ -10,6 +10,7 @@
 #include "preprocess/grid/hexahedron.h"
 #include "preprocess/grid/lattice_gradient.h"
 #include "preprocess/grid/node_reader.h"
+#include "preprocess/splats/covered_part.h"
 #include "preprocess/splats/lq.h"
 #include "preprocess/splats/shape.h"
 #include "stream/base/check.h"
@@ -221,6 +222,17 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
       *value++ = {mean, scale * rotate(gradient * jacobian), 0.0};
     }
   };
+  bool is_left = true;  // a part of the cell at least
+  const auto keep_part = [&](const auto& rotate) {
+    if (!in_.covered || in_.covered[node] == 0) return;
+    const glm::dmat3 axes(rotate(glm::dvec3(1, 0, 0)), rotate(glm::dvec3(0, 1, 0)),
+                          rotate(glm::dvec3(0, 0, 1)));
+    const size_t variables = in_.nodes->scalars.size();
+    const auto code = keepUncovered(in_.covered[node], axes, splat.splat,
+                                    std::span(out_.values).subspan(count_ * variables, variables));
+    if (code) splat.becomePart(*code);
+    is_left = code.has_value();
+  };
   // Axes that have the volume of the hexahedron, where they are near it; a weight of its own elsewhere.
   const auto set_volume = [&](double stretched) {
     const double determinant = stretched * shrink;
@@ -248,6 +260,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     set_values(scale, rotate);
     splat.border_code = borderCode(inwards, splat.regular, rotate);
     splat.growth_code = splat.regular ? growthCode(growth, rotate) : kNoGrowth;
+    keep_part(rotate);
   } else {
     const CellShape shape = shapeFromJacobian(jacobian, smallestAxis(hexahedron.centre));
     splat.splat.axis = shape.axis;
@@ -264,8 +277,9 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     set_values(scale, rotate);
     splat.border_code = borderCode(inwards, splat.regular, rotate);
     splat.growth_code = splat.regular ? growthCode(growth, rotate) : kNoGrowth;
+    keep_part(rotate);
   }
-  ++count_;
+  count_ += is_left;
 }
 
 }  // namespace

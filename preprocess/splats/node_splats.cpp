@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "preprocess/splats/covered_part.h"
 #include "preprocess/splats/lq.h"
 #include "preprocess/splats/shape.h"
 #include "stream/base/check.h"
@@ -62,6 +63,18 @@ class Window {
   void cutBehindFace(NodeSplat& node, ptrdiff_t at, const Neighbours& neighbours, int layer) const;
   glm::dvec3 position(ptrdiff_t at) const { return {x_[at], y_[at], z_[at]}; }
   double spacing(ptrdiff_t at, const Neighbours& neighbours) const;
+  /// Leaves of the last splat what other blocks do not cover. Returns false if that is nothing.
+  template <typename Rotate>
+  bool keepPart(ptrdiff_t at, const Rotate& rotate) {
+    if (!in_.covered || in_.covered[at] == 0) return true;
+    const glm::dmat3 axes(rotate({1, 0, 0}), rotate({0, 1, 0}), rotate({0, 0, 1}));
+    NodeSplat& node = out_.splats[count_];
+    const auto code =
+        keepUncovered(in_.covered[at], axes, node.splat,
+                      std::span(out_.values).subspan(count_ * scalars_.size(), scalars_.size()));
+    if (code) node.becomePart(*code);
+    return code.has_value();
+  }
   /// A length for the shape of a node without any extent: far below the grid's, and above zero.
   double smallestAxis(ptrdiff_t at, const Neighbours& neighbours) const;
 
@@ -234,6 +247,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   for (int axis = 0; axis < 3; ++axis) jacobian[axis] *= stretch[axis];
   const double shrink = 1 / (stretch[0] * stretch[1] * stretch[2]);  // from the splat's volume to the cell's
 
+  bool is_left = true;  // a part of the cell at least
   // `rotate` gives Q's image of a vector; `to_factor` A⁻¹ of one.
   const auto set_values = [&](const auto& rotate, const auto& to_factor, bool correct_bends) {
     const glm::dvec3 bend_in_cells = correct_bends ? to_factor(bend) : glm::dvec3(0.0);
@@ -278,6 +292,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
                  return glm::dvec3(v0, v1, (v.z - a.a20 * v0 - a.a21 * v1) / a.a22);
                },
                corrections_.bends);
+    is_left = keepPart(at, [&](const glm::dvec3& v) { return lq.rotate(v); });
   } else {
     const CellShape shape = shapeFromJacobian(jacobian, smallestAxis(at, neighbours));
     node.splat.axis = shape.axis;
@@ -293,8 +308,9 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     // Where an axis was raised there is no telling a bend of the scalar from one of the coordinates.
     set_values([&](const glm::dvec3& gradient) { return shape.rotation * gradient; },
                [](const glm::dvec3& v) { return v; }, false);
+    is_left = keepPart(at, [&](const glm::dvec3& v) { return shape.rotation * v; });
   }
-  ++count_;
+  count_ += is_left;
 }
 
 /// Sets the code of a node whose neighbour along an axis is on the block's face, for the plane through that

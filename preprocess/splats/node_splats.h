@@ -87,6 +87,12 @@ struct NodeSplat {
   double spacing = 0;
 
   bool isForSeams() const { return on_block_face || behind_face; }
+  /// After keepUncovered() (covered_part.h), which has left a part of the cell that has this code.
+  void becomePart(uint32_t code) {
+    border_code = border_code == kNoBorder || behind_face ? code : kNoBorder;
+    growth_code = kNoGrowth;
+    regular = behind_face = false;
+  }
 };
 
 /// The splats of some rows of one block. Values are [splat * variables + variable].
@@ -108,6 +114,7 @@ struct BlockWindow {
   uint64_t first_node = 0;  // of the block in the whole grid
   NodeBox window;
   const NodeArrays* nodes = nullptr;  // i fastest; scalars in the order of the cache's variables
+  const uint64_t* covered = nullptr;  // [sample]: by other blocks (covered_part.h); null: nothing is
 };
 
 /// What is done beyond the linear part of the mapping at the node. Conversion does all of it; tests switch

@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "preprocess/grid/hexahedron.h"
+#include "preprocess/grid/hexahedron_location.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/survey/box_tree.h"
@@ -93,32 +94,10 @@ glm::dvec3 pointIn(const std::array<glm::dvec3, 8>& corner, double u, double v, 
   return glm::mix(glm::mix(along_i(0), along_i(2), v), glm::mix(along_i(4), along_i(6), v), w);
 }
 
-/// Whether the trilinear hexahedron contains the point; inverts its map by Newton's method.
+/// Whether the trilinear hexahedron contains the point. Its faces belong to none.
 bool holds(const std::array<glm::dvec3, 8>& corner, const glm::dvec3& point) {
-  glm::dvec3 u(0.0);
-  constexpr int kSteps = 12;
-  for (int step = 0; step < kSteps; ++step) {
-    glm::dvec3 at(0.0);
-    glm::dmat3 jacobian(0.0);
-    for (int c = 0; c < 8; ++c) {
-      const glm::dvec3 side(c & 1 ? 1 : -1, c & 2 ? 1 : -1, c & 4 ? 1 : -1);
-      const glm::dvec3 weight = 0.5 * (1.0 + side * u);
-      const glm::dvec3& node = corner[static_cast<size_t>(c)];
-      at += weight.x * weight.y * weight.z * node;
-      jacobian[0] += 0.5 * side.x * weight.y * weight.z * node;
-      jacobian[1] += 0.5 * side.y * weight.x * weight.z * node;
-      jacobian[2] += 0.5 * side.z * weight.x * weight.y * node;
-    }
-    const double determinant = glm::determinant(jacobian);
-    if (determinant == 0) return false;
-    const glm::dvec3 change = glm::inverse(jacobian) * (point - at);
-    u += change;
-    const double size = glm::length(change);
-    if (!(size < 1e3)) return false;
-    if (size < 1e-6) break;
-    if (step + 1 == kSteps) return false;
-  }
-  return std::abs(u.x) < 1 && std::abs(u.y) < 1 && std::abs(u.z) < 1;
+  const std::optional<glm::dvec3> u = locateInHexahedron(corner, point);
+  return u && std::abs(u->x) < 1 && std::abs(u->y) < 1 && std::abs(u->z) < 1;
 }
 
 /// Some of `points`, given by number, sorted into the cells of a uniform lattice. Borrows the points.
@@ -376,11 +355,10 @@ std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_b
   return overlaps;
 }
 
-std::string overlapWarning(const GridDescription& description, const std::vector<BlockOverlap>& overlaps) {
-  if (description.blocks.size() > kMaxBlocks)
-    return fmt::format("not checked for overlaps between its {} blocks (limit {})", description.blocks.size(),
-                       kMaxBlocks);
-  if (overlaps.empty()) return "";
+namespace {
+
+/// "in about 3.2 cubic units (block 1 and block 2: 3.2, 12 % of the smaller; ...)"
+std::string wordsOf(const GridDescription& description, const std::vector<BlockOverlap>& overlaps) {
   std::vector<BlockOverlap> largest = overlaps;
   std::stable_sort(largest.begin(), largest.end(),
                    [](const BlockOverlap& a, const BlockOverlap& b) { return a.volume > b.volume; });
@@ -389,13 +367,32 @@ std::string overlapWarning(const GridDescription& description, const std::vector
   std::string pairs;
   for (size_t n = 0; n < std::min(kPairsNamed, largest.size()); ++n)
     pairs +=
-        fmt::format("{}{} and {} ({:.3g}, {:.2g} % of the smaller)", n ? "; " : "",
+        fmt::format("{}{} and {}: {:.3g}, {:.2g} % of the smaller", n ? "; " : "",
                     description.blocks[largest[n].first].name, description.blocks[largest[n].second].name,
                     largest[n].volume, 100 * largest[n].share);
   if (largest.size() > kPairsNamed) pairs += fmt::format("; and {} more pairs", largest.size() - kPairsNamed);
+  return fmt::format("in about {:.3g} cubic units ({})", total, pairs);
+}
+
+}  // namespace
+
+std::string unsearchedOverlaps(const GridDescription& description) {
+  if (description.blocks.size() <= kMaxBlocks) return "";
+  return fmt::format("not checked for overlaps between its {} blocks (limit {})", description.blocks.size(),
+                     kMaxBlocks);
+}
+
+std::string overlapWarning(const GridDescription& description, const std::vector<BlockOverlap>& overlaps) {
+  if (overlaps.empty()) return "";
+  return fmt::format("blocks overlap {} and are all drawn there", wordsOf(description, overlaps));
+}
+
+std::string overlapNote(const GridDescription& description, const std::vector<BlockOverlap>& overlaps) {
+  if (overlaps.empty()) return "";
   return fmt::format(
-      "blocks overlap in about {:.3g} cubic units, and are drawn twice there: {}; blank one of them", total,
-      pairs);
+      "blocks overlap {}; each point is drawn once, by the block that has the smallest cells there "
+      "(--overlap all draws every block)",
+      wordsOf(description, overlaps));
 }
 
 }  // namespace curvisplat

@@ -1,5 +1,5 @@
-// Finds blocks that overlap without blanking (overset grids without iblank), where everything would be drawn
-// twice, and warns before conversion.
+// Finds blocks that overlap without blanking (overset grids without iblank), where every block that is drawn would
+// count the data once more. Who draws it is decided in preprocess/overset.
 //
 // Sample points of every block, most of them close to its faces, are located in the cells of all other
 // blocks. Abutting blocks share no volume, whether or not their nodes match on the common face; overlaps of
@@ -30,8 +30,11 @@ struct BlockOverlap {
 std::vector<BlockOverlap> findOverlaps(const GridSource& source, uint64_t slab_bytes,
                                        const Progress& progress);
 
-/// A one-line warning: the largest overlaps by name, and the total volume; or that there are too many blocks
-/// to check. Empty if there are no overlaps.
+/// One line that says that there are too many blocks to search for overlaps; else empty.
+std::string unsearchedOverlaps(const GridDescription& description);
+/// One line, with the largest overlaps by name and the total volume: that all blocks are drawn there, or each point
+/// once. Empty if there are no overlaps.
 std::string overlapWarning(const GridDescription& description, const std::vector<BlockOverlap>& overlaps);
+std::string overlapNote(const GridDescription& description, const std::vector<BlockOverlap>& overlaps);
 
 }  // namespace curvisplat

@@ -28,6 +28,12 @@ struct BoundingBox {
       if (!(lower[axis] < other.upper[axis] && other.lower[axis] < upper[axis])) return false;
     return true;
   }
+  /// Whether they have a point in common.
+  bool touches(const BoundingBox& other) const {
+    for (int axis = 0; axis < 3; ++axis)
+      if (!(lower[axis] <= other.upper[axis] && other.lower[axis] <= upper[axis])) return false;
+    return true;
+  }
   /// Points of the faces are held.
   bool holds(const glm::dvec3& point) const {
     for (int axis = 0; axis < 3; ++axis)

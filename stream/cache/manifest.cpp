@@ -257,6 +257,7 @@ std::string Manifest::toJson() const {
   json["bricks"] = bricks;
   json["levels"] = levels;
   json["volume"] = volume;
+  if (!overlap.empty()) json["overlap"] = overlap;
   if (grid_checksum) json["grid_checksum"] = fmt::format("{:016x}", *grid_checksum);
   if (!time_unit.empty()) json["time_unit"] = time_unit;
   if (!calendar.empty()) json["calendar"] = calendar;
@@ -340,6 +341,7 @@ Manifest Manifest::fromJson(const std::string& text, const std::filesystem::path
   manifest.levels = static_cast<uint32_t>(fields.count("levels", 1, kMaxLevel + 1));
   manifest.volume = fields.number("volume");
   if (manifest.volume < 0) fields.fail("volume", "0 or more", json["volume"]);
+  if (json.contains("overlap")) manifest.overlap = fields.text("overlap");
   if (json.contains("grid_checksum")) manifest.grid_checksum = fields.checksum("grid_checksum");
   if (json.contains("time_unit")) manifest.time_unit = fields.text("time_unit");
   if (json.contains("calendar")) manifest.calendar = fields.text("calendar");

@@ -53,6 +53,11 @@ inline constexpr const char* kBorderFaces = "border-faces";  // borders are cut 
 inline constexpr const char* kCellGrowth = "cell-growth";    // kernels are skewed (growth_code.h)
 inline constexpr const char* kSteps = "steps";               // a series of time steps (steps_file.h)
 
+// Manifest::overlap.
+inline constexpr const char* kOverlapAll = "all";      // every block is drawn
+inline constexpr const char* kOverlapOwner = "owner";  // each point is drawn once (preprocess/overset)
+inline constexpr const char* kOverlapNone = "none";    // that would have been done, but no blocks overlap
+
 struct Manifest {
   std::vector<std::string> requirements;  // "requires"; none: version 1
   std::string title;
@@ -67,8 +72,10 @@ struct Manifest {
   uint64_t blanked_nodes = 0;  // samples that are not drawn: iblank, --blank or not finite
   uint64_t splats = 0;         // at the finest level
   uint64_t bricks = 0;
-  uint32_t levels = 0;                    // deepest level + 1
-  double volume = 0;                      // sum of the finest level's weights
+  uint32_t levels = 0;  // deepest level + 1
+  double volume = 0;    // sum of the finest level's weights
+  std::string
+      overlap;  // what was done where the grid's blocks overlap: kOverlapAll ...; empty: of one block, or not known
   std::optional<uint64_t> grid_checksum;  // of coordinates and blanking: steps in which it is the same share
                                           // their geometry (preprocess/survey/grid_checksum.h)
   std::string time_unit;  // of the steps' times, such as "days since 1900-01-01"; may be empty

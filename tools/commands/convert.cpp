@@ -49,6 +49,7 @@ void printWarnings(const GridDescription& description, std::optional<uint32_t> t
                    const ConvertReport& report) {
   for (const std::string& warning : description.warnings) printMessage("warning: {}", warning);
   for (const std::string& warning : report.warnings) printMessage("warning: {}", warning);
+  for (const std::string& note : report.notes) printMessage("note: {}", note);
   if (const auto note = timeStepNote(description, time_step)) printMessage("note: {}", *note);
   const auto note = [](uint64_t count, const char* what) {
     if (count > 0) printMessage("note: {} {}", count, what);
@@ -95,7 +96,7 @@ void runConvert(ConvertArguments arguments) {
   options.resume = arguments.resume;
   options.ranks = &ranks;
   applyCommonOptions(arguments, options);
-  applySurfaceOptions(arguments, options);
+  applyGridUse(arguments, options);
 
   const auto source = openSource(arguments, arguments.output);
   options.scalars = chooseScalars(arguments, arguments.scalars, source->description());
@@ -196,6 +197,10 @@ void addConvert(CLI::App& app) {
       ->allow_extra_args(false);
   command->add_flag("--no-surfaces", arguments->no_surfaces,
                     "Leave the grid's outer faces out of the cache: render --surface kmin needs them");
+  command->add_option(
+      "--overlap", arguments->overlap,
+      "Where blocks overlap: owner draws each point once, by the block with the smallest cells "
+      "there; all draws every block (default: owner)");
   command->add_option("--stats", arguments->statistics, "Write times, bytes and counts to this JSON file");
   addGridOptions(*command, arguments->grid);
   addGasOptions(*command, arguments->gas);

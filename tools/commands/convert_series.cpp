@@ -64,7 +64,7 @@ SeriesOptions seriesOptions(const ConvertArguments& arguments) {
   options.convert.resume = arguments.resume;
   options.convert.title = titleOf(arguments.grid);
   applyCommonOptions(arguments, options.convert);
-  applySurfaceOptions(arguments, options.convert);
+  applyGridUse(arguments, options.convert);
   options.keep_going = arguments.keep_going;
   options.add = arguments.adds_steps;
   return options;

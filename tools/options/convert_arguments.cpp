@@ -119,7 +119,12 @@ void checkStatisticsFile(const ConvertArguments& arguments) {
   checkOutputFile("--stats", arguments.statistics, inputs);
 }
 
-void applySurfaceOptions(const ConvertArguments& arguments, ConvertOptions& options) {
+void applyGridUse(const ConvertArguments& arguments, ConvertOptions& options) {
+  if (arguments.overlap) {
+    if (*arguments.overlap != "owner" && *arguments.overlap != "all")
+      throw UsageError("--overlap {}: expected owner or all", *arguments.overlap);
+    options.overlap = *arguments.overlap == "all" ? Overlap::kAll : Overlap::kOwner;
+  }
   options.surfaces = !arguments.no_surfaces;
   if (arguments.no_surfaces && !arguments.planes.empty())
     throw UsageError("--no-surfaces contradicts --surface {}; give one of them", arguments.planes.front());

@@ -31,7 +31,8 @@ struct ConvertArguments {
   bool overwrite = false, resume = false, no_preflight = false;
   std::vector<std::string> planes;  // --surface
   bool no_surfaces = false;
-  std::optional<std::string> steps;  // of a series
+  std::optional<std::string> overlap;  // owner or all
+  std::optional<std::string> steps;    // of a series
   std::optional<uint64_t> every;
   bool keep_going = false, adds_steps = false, follows = false;
   std::optional<uint64_t> until;  // steps of a cache that follows a simulation
@@ -49,8 +50,8 @@ std::vector<uint32_t> chooseScalars(const ConvertArguments& arguments, const std
 /// Moves words that are no files from the solutions to the scalars: the second of "--scalar a b".
 void takeScalarsFromSolutions(ConvertArguments& arguments);
 
-/// Of --surface and --no-surfaces. Throws UsageError.
-void applySurfaceOptions(const ConvertArguments& arguments, ConvertOptions& options);
+/// Of --surface, --no-surfaces and --overlap. Throws UsageError.
+void applyGridUse(const ConvertArguments& arguments, ConvertOptions& options);
 
 /// The sum over all phases.
 double secondsOf(const Progress& progress);

@@ -123,6 +123,10 @@ void DerivedSource::describe() {
 
 // ---- computing them ----
 
+bool DerivedSource::readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const {
+  return source_->readFringe(block, box, out);
+}
+
 void DerivedSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                          NodeArrays& out) const {
   const size_t of_source = source_->description().scalars.size();

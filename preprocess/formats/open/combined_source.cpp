@@ -124,6 +124,11 @@ void CombinedSource::describe(const std::vector<std::string>& names) {
   }
 }
 
+bool CombinedSource::readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const {
+  const auto [group, number] = blocks_.at(block);
+  return sources_[groups_[group].sources.front()]->readFringe(number, box, out);
+}
+
 void CombinedSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                           NodeArrays& out) const {
   const size_t group = blocks_.at(block).first;

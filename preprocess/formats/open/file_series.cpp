@@ -69,6 +69,9 @@ class SeriesSource final : public GridSource {
             NodeArrays& out) const override {
     source_->read(block, box, scalars, out);
   }
+  bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override {
+    return source_->readFringe(block, box, out);
+  }
 
  private:
   std::unique_ptr<GridSource> source_;

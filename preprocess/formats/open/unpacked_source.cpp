@@ -49,6 +49,13 @@ class UnpackedSource final : public GridSource {
       throw Error("{}", withOriginals(error.what(), *files_));
     }
   }
+  bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override {
+    try {
+      return source_->readFringe(block, box, out);
+    } catch (const Error& error) {
+      throw Error("{}", withOriginals(error.what(), *files_));
+    }
+  }
 
  private:
   std::shared_ptr<const Unpacked> files_;

@@ -169,6 +169,9 @@ class MetaSource final : public GridSource {
             NodeArrays& out) const override {
     files_->read(block, box, scalars, out);
   }
+  bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override {
+    return files_->readFringe(block, box, out);
+  }
 
  private:
   std::unique_ptr<GridSource> files_;

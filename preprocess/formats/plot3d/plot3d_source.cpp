@@ -147,6 +147,18 @@ void Plot3dSource::makeNamesUnique() {
   }
 }
 
+bool Plot3dSource::readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const {
+  if (!grid_.layout().blanking) return false;
+  std::vector<int32_t> iblank(static_cast<size_t>(nodesOf(description_.blocks[block], box)));
+  grid_.readIblank(block, box, iblank);
+  // -n: interpolated from block n. From its own one at a cut, where it meets itself.
+  const int64_t own = -int64_t{block} - 1;
+  out.resize(iblank.size());
+  std::transform(iblank.begin(), iblank.end(), out.begin(),
+                 [&](int32_t value) { return static_cast<uint8_t>(value < 0 && value != own); });
+  return true;
+}
+
 void Plot3dSource::read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
                         NodeArrays& out) const {
   CURVISPLAT_CHECK_OP(block, <, description_.blocks.size());

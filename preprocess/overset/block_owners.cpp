@@ -1,0 +1,270 @@
+#include "preprocess/overset/block_owners.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <compare>
+#include <utility>
+
+#include "preprocess/splats/covered_part.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr Halo kCorners{0, 1};
+constexpr uint64_t kTreeBytesPerNode = 24;  // of a CellTree, beside the nodes
+constexpr uint64_t kTilesInMemory = 4;      // at least
+
+/// The order in which blocks come: the least owns the point.
+struct Rank {
+  bool fringe = false;
+  CellSize size = kNoCell;
+  uint32_t block = 0;
+  auto operator<=>(const Rank&) const = default;
+};
+
+// How a sample's middle lies to another block.
+constexpr uint8_t kOwned = 1;   // in it, and it owns what the sample has of any of its own block's cells
+constexpr uint8_t kPartly = 2;  // in it, and that depends
+constexpr uint8_t kLost = 4;    // in it, and it owns none of that
+
+}  // namespace
+
+BlockOwners::BlockOwners(NodeReader reader, const std::vector<BlockOverlap>& overlaps, uint64_t memory_bytes)
+    : reader_(std::move(reader)), memory_bytes_(memory_bytes) {
+  const std::vector<GridBlock>& blocks = reader_.source().description().blocks;
+  partners_.resize(blocks.size());
+  tiles_of_.resize(blocks.size());
+  for (const BlockOverlap& overlap : overlaps) {
+    partners_[overlap.first].push_back(overlap.second);
+    partners_[overlap.second].push_back(overlap.first);
+  }
+  for (auto& partners : partners_) std::sort(partners.begin(), partners.end());
+  const uint64_t bytes_per_node = slabBytesPerNode(reader_.scalars()) + kTreeBytesPerNode;
+  const uint64_t window_nodes =
+      std::max(memory_bytes / kTilesInMemory, leastBytes(reader_.source().description(), reader_.scalars())) /
+      bytes_per_node;
+  for (const Slab& slab : cutIntoSlabs(blocks, window_nodes, kCorners)) {
+    if (partners_[slab.block].empty()) continue;
+    const LoadedSlab loaded = read(slab);
+    BoundingBox box;
+    for (size_t n = 0; n < loaded.nodes.x.size(); ++n)
+      if (!loaded.nodes.blank[n]) box.add({loaded.nodes.x[n], loaded.nodes.y[n], loaded.nodes.z[n]});
+    tiles_of_[slab.block].push_back(tiles_.size());
+    tiles_.push_back({slab, box});
+  }
+}
+
+NodeReader ownersReader(const NodeReader& reader, bool everywhere) {
+  if (!everywhere || reader.centring() == Centring::kCell) return reader;
+  return {reader.source(), {}, std::nullopt};  // coordinates alone
+}
+
+uint64_t BlockOwners::leastBytes(const GridDescription& grid, size_t scalars) {
+  const uint64_t bytes = leastSlabBytes(grid.blocks, scalars, kCorners);
+  return bytes + bytes / slabBytesPerNode(scalars) * kTreeBytesPerNode;
+}
+
+LoadedSlab BlockOwners::read(const Slab& slab) const {
+  LoadedSlab loaded;
+  loaded.slab = slab;
+  loaded.blanked = reader_.read(slab.block, slab.window, loaded.nodes);
+  return loaded;
+}
+
+std::vector<uint8_t> BlockOwners::fringeOf(const Slab& slab) const {
+  std::vector<uint8_t> fringe;
+  if (!reader_.source().readFringe(slab.block, slab.window, fringe)) fringe.clear();
+  return fringe;
+}
+
+std::shared_ptr<const CellTree> BlockOwners::treeOf(size_t tile) {
+  const auto found =
+      std::find_if(kept_.begin(), kept_.end(), [&](const Kept& kept) { return kept.tile == tile; });
+  if (found != kept_.end()) {
+    kept_.splice(kept_.begin(), kept_, found);
+    return kept_.front().tree;
+  }
+  const Slab& slab = tiles_[tile].slab;
+  LoadedSlab loaded = read(slab);
+  std::vector<uint8_t> fringe = fringeOf(slab);
+  auto tree = std::make_shared<const CellTree>(reader_.source().description().blocks[slab.block],
+                                               std::move(loaded), std::move(fringe), reader_.centring());
+  kept_bytes_ += tree->bytes();
+  kept_.push_front({tile, std::move(tree)});
+  while (kept_.size() > 1 && kept_bytes_ > memory_bytes_) {
+    kept_bytes_ -= kept_.back().tree->bytes();
+    kept_.pop_back();
+  }
+  return kept_.front().tree;
+}
+
+/// Finds what covers the samples of one slab.
+class BlockOwners::SlabCover {
+ public:
+  SlabCover(BlockOwners& owners, const LoadedSlab& loaded, std::vector<uint64_t>& covered)
+      : owners_(owners),
+        block_(owners.reader_.source().description().blocks[loaded.slab.block]),
+        number_(loaded.slab.block),
+        box_(loaded.slab.box),
+        around_(withNeighbours(loaded.slab)),
+        samples_(block_, loaded, owners.fringeOf(loaded.slab), owners.reader_.centring()),
+        covered_(covered) {
+    covered_.assign(loaded.nodes.x.size(), 0);
+    states_.resize(covered_.size());
+    boxes_.resize(rowsOf(around_));
+    forRows(around_, [&](uint64_t j, uint64_t k) {
+      BoundingBox& box = boxes_[rowAt(j, k)];
+      forSamples(j, k, [&](size_t sample) { samples_.addTo(box, sample); });
+    });
+  }
+
+  void addPartner(uint32_t partner) {
+    std::fill(states_.begin(), states_.end(), uint8_t{0});
+    const std::vector<size_t> tiles = tilesThatMeet(partner);
+    for (const size_t tile : tiles) locateMiddles(*owners_.treeOf(tile), partner);
+    for (const size_t tile : tiles) {
+      const std::shared_ptr<const CellTree> tree = owners_.treeOf(tile);
+      forRows(box_, [&](uint64_t j, uint64_t k) {
+        if (!tree->box().touches(boxAround(j, k))) return;
+        CellTree::Hint hint;
+        forSamples(j, k, [&](size_t sample) { coverSample(*tree, partner, sample, j, k, hint); });
+      });
+    }
+  }
+
+ private:
+  static NodeBox withNeighbours(const Slab& slab) {
+    const NodeBox &box = slab.box, &window = slab.window;
+    return {std::max(window.j0 + 1, box.j0) - 1, std::min(box.j1 + 1, window.j1),
+            std::max(window.k0 + 1, box.k0) - 1, std::min(box.k1 + 1, window.k1)};
+  }
+  size_t rowAt(uint64_t j, uint64_t k) const {
+    return (k - around_.k0) * (around_.j1 - around_.j0) + (j - around_.j0);
+  }
+  template <typename Each>
+  void forRows(const NodeBox& box, const Each& each) const {
+    const uint64_t width = box.j1 - box.j0;
+    tbb::parallel_for(uint64_t{0}, rowsOf(box),
+                      [&](uint64_t n) { each(box.j0 + n % width, box.k0 + n / width); });
+  }
+  template <typename Each>
+  void forSamples(uint64_t j, uint64_t k, const Each& each) const {
+    const size_t first = samples_.elementOf(0, j, k);
+    for (size_t sample = first; sample < first + block_.ni; ++sample)
+      if (samples_.isThere(sample)) each(sample);
+  }
+
+  /// A box around the cells of a row's samples, which reach half way to its neighbours.
+  BoundingBox boxAround(uint64_t j, uint64_t k) const {
+    BoundingBox box = boxes_[rowAt(j, k)];
+    if (box.isEmpty()) return box;
+    for (uint64_t other_k = std::max(k, around_.k0 + 1) - 1; other_k < std::min(k + 2, around_.k1); ++other_k)
+      for (uint64_t other_j = std::max(j, around_.j0 + 1) - 1; other_j < std::min(j + 2, around_.j1);
+           ++other_j)
+        if (const BoundingBox& other = boxes_[rowAt(other_j, other_k)]; !other.isEmpty()) {
+          box.add(other.lower);
+          box.add(other.upper);
+        }
+    const glm::dvec3 margin = 0.5 * (box.upper - box.lower);
+    box.lower -= margin;
+    box.upper += margin;
+    return box;
+  }
+
+  std::vector<size_t> tilesThatMeet(uint32_t partner) const {
+    BoundingBox all;
+    for (const BoundingBox& box : boxes_) {
+      if (box.isEmpty()) continue;
+      all.add(box.lower);
+      all.add(box.upper);
+    }
+    std::vector<size_t> tiles;
+    if (all.isEmpty()) return tiles;
+    const glm::dvec3 margin = 0.5 * (all.upper - all.lower);
+    all.lower -= margin;
+    all.upper += margin;
+    for (const size_t tile : owners_.tiles_of_[partner])
+      if (owners_.tiles_[tile].box.meets(all)) tiles.push_back(tile);
+    return tiles;
+  }
+
+  /// Sets the states of the samples of which a cell of the tree holds the middle.
+  void locateMiddles(const CellTree& tree, uint32_t partner) {
+    forRows(around_, [&](uint64_t j, uint64_t k) {
+      if (!boxes_[rowAt(j, k)].touches(tree.box())) return;
+      CellTree::Hint hint;
+      forSamples(j, k, [&](size_t sample) {
+        const auto [smallest, largest] = samples_.sizes(sample);
+        const bool fringe = samples_.isFringe(sample);
+        const Rank first{fringe, smallest, number_}, last{fringe, largest, number_};
+        tree.anyHolder(samples_.middle(sample), hint, [&](const CellTree::Holder& holder) {
+          const Rank other{tree.isFringe(holder), tree.sizeOf(holder.cell), partner};
+          states_[sample] |= other < first ? kOwned : other < last ? kPartly : kLost;
+          return other < first;
+        });
+      });
+    });
+  }
+
+  /// What the neighbours of a sample and it have in common, and what any of them has.
+  std::pair<uint8_t, uint8_t> statesAround(size_t sample, uint64_t j, uint64_t k) const {
+    const uint64_t i = sample - samples_.elementOf(0, j, k);
+    uint8_t all = 0xff, any = 0;
+    bool outside = false;
+    for (uint64_t kk = std::max(k, around_.k0 + 1) - 1; kk < std::min(k + 2, around_.k1); ++kk)
+      for (uint64_t jj = std::max(j, around_.j0 + 1) - 1; jj < std::min(j + 2, around_.j1); ++jj)
+        for (uint64_t ii = std::max<uint64_t>(i, 1) - 1; ii < std::min(i + 2, block_.ni); ++ii) {
+          const size_t other = samples_.elementOf(ii, jj, kk);
+          if (!samples_.isThere(other)) continue;
+          all &= states_[other];
+          any |= states_[other];
+          outside |= states_[other] == 0;
+        }
+    return {outside ? uint8_t{0} : all, any};
+  }
+
+  void coverSample(const CellTree& tree, uint32_t partner, size_t sample, uint64_t j, uint64_t k,
+                   CellTree::Hint& hint) {
+    uint64_t& covered = covered_[sample];
+    if (covered == kAllCovered) return;
+    const auto [all, any] = statesAround(sample, j, k);
+    if (all == kOwned) {
+      covered = kAllCovered;
+      return;
+    }
+    if (any == kLost) return;
+    const SampleCells::Piece piece = samples_.pieceOf(sample);
+    if (!tree.meets(samples_.boxOf(piece))) return;
+    const bool fringe = samples_.isFringe(sample);
+    const auto& points = cellPoints();
+    for (size_t n = 0; n < kCellPoints; ++n) {
+      if (covered >> n & 1) continue;
+      const auto [point, size] = samples_.pointOf(piece, points[n]);
+      const Rank own{fringe, size, number_};
+      if (tree.anyHolder(point, hint, [&](const CellTree::Holder& holder) {
+            return Rank{tree.isFringe(holder), tree.sizeOf(holder.cell), partner} < own;
+          }))
+        covered |= uint64_t{1} << n;
+    }
+  }
+
+  BlockOwners& owners_;
+  const GridBlock& block_;
+  const uint32_t number_;
+  const NodeBox box_, around_;  // the samples that are wanted; with their neighbours
+  const SampleCells samples_;
+  std::vector<uint64_t>& covered_;
+  std::vector<uint8_t> states_;     // [sample], to one partner
+  std::vector<BoundingBox> boxes_;  // [row of around_], of the samples' middles
+};
+
+void BlockOwners::cover(const LoadedSlab& loaded, std::vector<uint64_t>& covered) {
+  covered.clear();
+  const std::vector<uint32_t>& partners = partners_[loaded.slab.block];
+  if (partners.empty()) return;
+  SlabCover cover(*this, loaded, covered);
+  for (const uint32_t partner : partners) cover.addPartner(partner);
+}
+
+}  // namespace curvisplat

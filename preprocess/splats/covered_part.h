@@ -1,0 +1,34 @@
+// A cell of which another block's cells cover a part: what is left of its splat.
+//
+// The cell is looked at in 64 points. A bit says of each whether another block draws the data there. In lattice
+// directions a point is at ±(2m + 1)/32 of the cell from its middle, m = 0..7 once in each octant, so that along each
+// axis 16 evenly spaced distances occur: a face of the other block that runs along the lattice is found to a
+// sixteenth of a cell. The points stand for equal parts of the cell, and the splat gets the moments of those that
+// are left (DESIGN.md, "Overlapping blocks").
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <span>
+
+#include "stream/model/splats.h"
+
+namespace curvisplat {
+
+inline constexpr size_t kCellPoints = 64;
+inline constexpr uint64_t kAllCovered = ~uint64_t{0};
+
+/// Bit n of what is covered stands for point n: along i, j and k, in cells from the middle.
+const std::array<glm::dvec3, kCellPoints>& cellPoints();
+
+/// Leaves of the splat what is not covered. `axes`: Q's images of the lattice's directions, as node_splats.h has
+/// them. Returns the border code of what is left, which ends where the other block begins; nullopt if nothing is.
+/// Pure: any thread.
+std::optional<uint32_t> keepUncovered(uint64_t covered, const glm::dmat3& axes, Splat& splat,
+                                      std::span<SplatScalar> values);
+
+}  // namespace curvisplat

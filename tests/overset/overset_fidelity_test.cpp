@@ -1,0 +1,78 @@
+// Pictures of overset grids against the field itself.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "preprocess/convert/convert.h"
+#include "preprocess/scenes/scenes.h"
+#include "render/image/image.h"
+#include "render/image/image_file.h"
+#include "tests/reference/known_pictures.h"
+#include "tests/reference/overset_grid.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr ImageSize kSize{256, 256};
+constexpr const char* kFunctions[] = {"smooth", "band", "step"};
+
+class OversetFidelity : public testing::Test {
+ protected:
+  ConvertReport convertTo(const std::string& name, const GridSource& source, Overlap overlap) {
+    ConvertOptions options;
+    options.output = folder_ / name;
+    options.scalars = {0};
+    options.overlap = overlap;
+    options.surfaces = false;
+    Progress progress;
+    return convert(source, options, progress);
+  }
+  Image draw(const std::string& name, const std::string& function) {
+    const Image image =
+        drawCache(folder_ / name, KnownFunction::of(function).table, halfAnnulusCamera(), knownFrame(kSize));
+    if (const char* pictures = std::getenv("CURVISPLAT_PICTURES"))
+      writeImage(image, std::filesystem::path(pictures) / fmt::format("{}_{}.png", name, function));
+    return image;
+  }
+
+  const std::shared_ptr<const Scene> scene_ = makeScene("half-annulus");
+  const TemporaryFolder folder_;
+};
+
+TEST_F(OversetFidelity, TwoThreeAndSixBlocksLookLikeOne) {
+  const GridBlock block = gridBlock(128, 64, 64);
+  convertTo("one.splats", oversetGrid(scene_, block, {}), Overlap::kOwner);
+  const std::map<std::string, double> lost_db{
+      {"smooth", 3.0}, {"band", 1.7}, {"step", 0.5}};  // of two and three
+  std::map<std::string, Image> references;
+  std::map<std::string, double> one_db;
+  for (const std::string function : kFunctions) {
+    references[function] =
+        toImage(referenceMarch(*scene_, KnownFunction::of(function).exact, halfAnnulusCamera(), kSize));
+    one_db[function] = compareImages(draw("one.splats", function), references[function]).psnr_db;
+  }
+  for (const uint64_t nodes : {24u})
+    for (const size_t boxes : {1u, 2u, 5u}) {
+      const FunctionGridSource source = oversetGrid(scene_, block, boxesInHalfAnnulus(boxes, nodes));
+      const std::string name = fmt::format("{}_of_{}.splats", boxes + 1, nodes);
+      const ConvertReport report = convertTo(name, source, Overlap::kOwner);
+      EXPECT_EQ(report.notes.size(), 1u);
+      fmt::print("{} blocks, {} nodes: volume {:.5f} of {:.5f}\n", boxes + 1, nodes, report.volume,
+                 scene_->volume());
+      EXPECT_NEAR(report.volume, scene_->volume(), 0.01 * scene_->volume());
+      for (const char* function : kFunctions) {
+        const double one = one_db[function];
+        const double owned = compareImages(draw(name, function), references[function]).psnr_db;
+        fmt::print("  {}: one block {:.1f} dB, owners {:.1f} dB\n", function, one, owned);
+        EXPECT_GE(owned, one - lost_db.at(function) * (boxes > 2 ? 2.5 : 1)) << function;
+      }
+    }
+}
+
+}  // namespace
+}  // namespace curvisplat
