@@ -113,6 +113,58 @@ void makeNodes(const VtkUniformNodes& uniform, const VtkPiece& piece, const VtkB
       }
 }
 
+/// [cell of the box]: whether a finer patch covers it.
+std::vector<uint8_t> refinedCells(const VtkPiece& piece, const VtkBox& box) {
+  std::vector<uint8_t> refined(static_cast<size_t>(box.size()), 0);
+  for (const VtkExtent& cells : piece.refined) {
+    VtkBox common;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      common.lower[axis] = std::max(box.lower[axis], static_cast<uint64_t>(cells.lower[axis]));
+      common.upper[axis] = std::min(box.upper[axis], static_cast<uint64_t>(cells.upper[axis]) + 1);
+      common.upper[axis] = std::max(common.upper[axis], common.lower[axis]);
+    }
+    if (common.size() == 0) continue;
+    for (uint64_t k = common.lower[2]; k < common.upper[2]; ++k)
+      for (uint64_t j = common.lower[1]; j < common.upper[1]; ++j) {
+        const uint64_t row = ((k - box.lower[2]) * box.along(1) + (j - box.lower[1])) * box.along(0);
+        std::fill_n(refined.begin() + static_cast<ptrdiff_t>(row + common.lower[0] - box.lower[0]),
+                    common.along(0), uint8_t{1});
+      }
+  }
+  return refined;
+}
+
+/// Blanks nodes all of whose cells finer patches cover.
+void blankNodesInRefinedCells(const VtkPiece& piece, const VtkBox& box, std::span<uint8_t> blank) {
+  const std::array<uint64_t, 3> counts = cellCounts(piece);
+  VtkBox around;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    around.lower[axis] = box.lower[axis] - std::min<uint64_t>(box.lower[axis], 1);
+    around.upper[axis] = std::min(box.upper[axis], counts[axis]);
+  }
+  const std::vector<uint8_t> refined = refinedCells(piece, around);
+  const auto all_refined = [&](const std::array<uint64_t, 3>& node) {
+    for (unsigned corner = 0; corner < 8; ++corner) {
+      std::array<uint64_t, 3> cell = node;
+      bool is_cell = true;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        if (corner >> axis & 1) is_cell &= cell[axis]-- > 0;
+        is_cell &= cell[axis] < counts[axis];
+      }
+      if (!is_cell) continue;
+      const uint64_t at =
+          ((cell[2] - around.lower[2]) * around.along(1) + (cell[1] - around.lower[1])) * around.along(0) +
+          (cell[0] - around.lower[0]);
+      if (!refined[at]) return false;
+    }
+    return true;
+  };
+  size_t n = 0;
+  for (uint64_t k = box.lower[2]; k < box.upper[2]; ++k)
+    for (uint64_t j = box.lower[1]; j < box.upper[1]; ++j)
+      for (uint64_t i = box.lower[0]; i < box.upper[0]; ++i, ++n) blank[n] |= all_refined({i, j, k});
+}
+
 }  // namespace
 
 std::array<uint64_t, 3> nodeCounts(const VtkPiece& piece) {
@@ -184,11 +236,18 @@ void readBlank(const VtkPiece& piece, const VtkBox& box, std::span<uint8_t> blan
   if (piece.point_ghosts) mark(*piece.point_ghosts, [](float flags) { return hides(flags, kHiddenPoint); });
   if (piece.visible) mark(*piece.visible, [](float visible) { return visible == 0; });
   if (piece.cell_ghosts) blankNodesOfHiddenCells(piece, box, blank);
+  if (!piece.refined.empty()) blankNodesInRefinedCells(piece, box, blank);
 }
 
 void blankHiddenCells(const VtkPiece& piece, const VtkBox& box, std::span<float> values) {
   const auto cells = static_cast<size_t>(box.along(0) * box.along(1));
-  if (!piece.cell_ghosts || cells == 0) return;
+  if (cells == 0) return;
+  if (!piece.refined.empty()) {
+    const std::vector<uint8_t> refined = refinedCells(piece, box);
+    for (size_t n = 0; n < refined.size(); ++n)
+      if (refined[n]) values[n] = std::numeric_limits<float>::quiet_NaN();
+  }
+  if (!piece.cell_ghosts) return;
   for (uint64_t k = box.lower[2]; k < box.upper[2]; ++k) {
     const std::vector<float> flags = readFlags(*piece.cell_ghosts, cellCounts(piece), plane(box, k));
     float* const to = &values[static_cast<size_t>(k - box.lower[2]) * cells];

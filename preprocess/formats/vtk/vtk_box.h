@@ -32,7 +32,7 @@ std::array<uint64_t, 3> cellCounts(const VtkPiece& piece);
 void readNodes(const VtkPiece& piece, const VtkBox& box, NodeArrays& out);
 /// Overwrites blank, which has box.size() values.
 void readBlank(const VtkPiece& piece, const VtkBox& box, std::span<uint8_t> blank);
-/// Sets `values`, of the cells of `box`, to NaN where vtkGhostType hides the cell.
+/// Sets `values`, of the cells of `box`, to NaN where vtkGhostType hides the cell or a finer patch covers it.
 void blankHiddenCells(const VtkPiece& piece, const VtkBox& box, std::span<float> values);
 
 }  // namespace curvisplat

@@ -36,7 +36,9 @@ struct VtkPiece {
   std::vector<VtkArray> point_data, cell_data;        // one tuple per node, per cell
   std::optional<VtkArray> point_ghosts, cell_ghosts;  // vtkGhostType
   std::optional<VtkArray> visible;                    // one value per node; 0 hides it
-  std::string active_point_data, active_cell_data;    // names of arrays; may be empty
+  std::vector<VtkExtent>
+      refined;  // cells that finer patches of an AMR set cover: indices from the piece's first cell
+  std::string active_point_data, active_cell_data;  // names of arrays; may be empty
 };
 
 /// A block: a whole piece, or a part of one.

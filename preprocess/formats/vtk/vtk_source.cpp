@@ -75,9 +75,9 @@ void VtkSource::addBlocks() {
       continue;
     }
     const VtkPiece& piece = grid_.pieces[block.piece];
-    description_.blocks.push_back({block.name, block.extent.nodesAlong(0), block.extent.nodesAlong(1),
-                                   block.extent.nodesAlong(2),
-                                   piece.point_ghosts || piece.cell_ghosts || piece.visible});
+    description_.blocks.push_back(
+        {block.name, block.extent.nodesAlong(0), block.extent.nodesAlong(1), block.extent.nodesAlong(2),
+         piece.point_ghosts || piece.cell_ghosts || piece.visible || !piece.refined.empty()});
     description_.coordinate_bytes = blocks.empty()
                                         ? coordinateBytes(piece)
                                         : std::min(description_.coordinate_bytes, coordinateBytes(piece));

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "preprocess/formats/vtk/amr_boxes.h"
 #include "preprocess/formats/vtk/vtk_source.h"
 #include "preprocess/formats/vtk/vtk_xml.h"
 #include "preprocess/grid/time_steps.h"
@@ -17,6 +18,7 @@ namespace fs = std::filesystem;
 using Node = pugi::xml_node;
 
 constexpr size_t kMaxPieces = 100'000, kMaxFiles = 100'000;
+constexpr size_t kMaxPatches = 20'000, kMaxLevels = 64;  // of an AMR set
 
 /// Follows the references of a file to other files, and gathers their pieces.
 class Gatherer {
@@ -81,6 +83,8 @@ class Gatherer {
     else if (file.type() == "vtkMultiBlockDataSet" || file.type() == "vtkPartitionedDataSet" ||
              file.type() == "vtkPartitionedDataSetCollection")
       addMembers(file, file.content(), name);
+    else if (file.type() == "vtkOverlappingAMR" || file.type() == "vtkHierarchicalBoxDataSet")
+      addAmr(file, name);
     else if (file.type() == "Collection")
       addTimeStep(file);
     else if (inside_.size() == 1)
@@ -206,6 +210,78 @@ class Gatherer {
             own.empty() ? name + (name.empty() ? "" : "/") + path.stem().string() : name + separator + own);
       }
     }
+  }
+
+  /// The patches of an AMR set, with what finer ones cover.
+  void addAmr(const VtkXmlFile& file, const std::string& name) {
+    std::vector<AmrPatch> patches;
+    std::vector<size_t> pieces;  // [patch]
+    std::map<size_t, Node> levels;
+    for (const Node& node : file.content().children("Block")) {
+      const double level = file.numbers(node, "level", 1)[0];
+      if (!(level >= 0 && level < kMaxLevels) || level != std::floor(level))
+        file.fail(fmt::format("has a level {}; expected 0 to {}", level, kMaxLevels - 1));
+      if (!levels.emplace(static_cast<size_t>(level), node).second)
+        file.fail(fmt::format("has two levels {}", level));
+    }
+    for (const auto& [level, block] : levels)
+      for (const Node& node : block.children("DataSet")) {
+        if (!node.attribute("file")) continue;
+        if (patches.size() == kMaxPatches) file.fail(fmt::format("has more than {} patches", kMaxPatches));
+        const fs::path path = pathOf(file, node, "file");
+        const size_t before = grid_.pieces.size();
+        add(path, name + (name.empty() ? "" : "/") + path.stem().string());
+        if (grid_.pieces.size() == before) continue;  // empty, or left out
+        const AmrPatch patch{level, boxOf(file, node)};
+        const VtkPiece& piece = grid_.pieces.back();
+        for (size_t axis = 0; axis < 3; ++axis)
+          if (grid_.pieces.size() > before + 1 ||
+              piece.extent.nodesAlong(axis) != patch.cells.nodesAlong(axis) + 1)
+            file.fail(fmt::format("{} has {} nodes, which is not its amr_box and a node more along each axis",
+                                  path.string(), piece.extent.describe()));
+        patches.push_back(patch);
+        pieces.push_back(before);
+      }
+    const auto refined = refinedCellsOf(patches, ratiosOf(file, levels));
+    for (size_t n = 0; n < patches.size(); ++n) grid_.pieces[pieces[n]].refined = refined[n];
+  }
+
+  static VtkExtent boxOf(const VtkXmlFile& file, const Node& node) {
+    const std::vector<double> numbers = file.numbers(node, "amr_box", 6);
+    VtkExtent box;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double lower = numbers[2 * axis], upper = numbers[2 * axis + 1];
+      if (!(std::abs(lower) < 1e9 && std::abs(upper) < 1e9 && lower <= upper))
+        file.fail(fmt::format("has an amr_box from {} to {}", lower, upper));
+      box.lower[axis] = static_cast<int64_t>(lower);
+      box.upper[axis] = static_cast<int64_t>(upper);
+    }
+    return box;
+  }
+
+  /// [level]: cells of the next level along a cell, from the levels' spacing or as version 1.0 states it.
+  static std::vector<std::array<int64_t, 3>> ratiosOf(const VtkXmlFile& file,
+                                                      const std::map<size_t, Node>& levels) {
+    std::vector<std::array<int64_t, 3>> ratios(kMaxLevels, {2, 2, 2});
+    for (const auto& [level, block] : levels) {
+      const auto next = levels.find(level + 1);
+      if (next == levels.end()) continue;
+      std::vector<double> ratio(3, 0.0);
+      if (block.attribute("refinement_ratio")) {
+        ratio.assign(3, file.numbers(block, "refinement_ratio", 1)[0]);
+      } else {
+        const std::vector<double> coarse = file.numbers(block, "spacing", 3),
+                                  fine = file.numbers(next->second, "spacing", 3);
+        for (size_t axis = 0; axis < 3; ++axis) ratio[axis] = coarse[axis] / fine[axis];
+      }
+      for (size_t axis = 0; axis < 3; ++axis) {
+        if (!(ratio[axis] >= 1 && ratio[axis] < 1e6) ||
+            std::abs(ratio[axis] - std::round(ratio[axis])) > 1e-3)
+          file.fail(fmt::format("refines level {} by {}; expected a whole number", level, ratio[axis]));
+        ratios[level][axis] = static_cast<int64_t>(std::round(ratio[axis]));
+      }
+    }
+    return ratios;
   }
 
   void addTimeStep(const VtkXmlFile& file) {
