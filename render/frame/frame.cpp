@@ -20,8 +20,8 @@ auto timed(double& seconds, const Work& work) {
 }  // namespace
 
 struct FrameRenderer::State {
-  State(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function, Backend backend)
-      : planner(cache, variable, transfer_function), pipeline(cache, variable, planner, backend) {}
+  State(const CacheReader& cache, const DrawnScalars& scalars, Backend backend)
+      : planner(cache, scalars), pipeline(cache, scalars, planner, backend) {}
 
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                Progress* progress) {
@@ -54,9 +54,8 @@ struct FrameRenderer::State {
   FramePipeline pipeline;
 };
 
-FrameRenderer::FrameRenderer(const CacheReader& cache, size_t variable,
-                             const TransferFunction& transfer_function, Backend backend)
-    : state_(std::make_unique<State>(cache, variable, transfer_function, backend)) {}
+FrameRenderer::FrameRenderer(const CacheReader& cache, const DrawnScalars& scalars, Backend backend)
+    : state_(std::make_unique<State>(cache, scalars, backend)) {}
 
 FrameRenderer::~FrameRenderer() = default;
 

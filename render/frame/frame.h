@@ -25,6 +25,7 @@
 #include "render/colour/transfer_function.h"
 #include "render/frame/backend.h"
 #include "render/frame/cancelled.h"
+#include "render/frame/drawn_scalars.h"
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_options.h"
 #include "render/frame/frame_statistics.h"
@@ -35,7 +36,7 @@
 
 namespace curvisplat {
 
-/// Draws frames of one variable of one cache. Owns the threads and the painter, and the memory that they
+/// Draws frames of one variable, or two, of one cache. Owns the threads and the painter, and the memory that they
 /// share: decoded bricks are kept for the next frame. One caller at a time, except for cancel(). The cache
 /// must outlive the renderer.
 class FrameRenderer {
@@ -43,7 +44,10 @@ class FrameRenderer {
   /// Throws Error if the backend is not available; the message names the library that was tried and its
   /// error.
   FrameRenderer(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function,
-                Backend backend = Backend::kAutomatic);
+                Backend backend = Backend::kAutomatic)
+      : FrameRenderer(cache, DrawnScalars(variable, transfer_function), backend) {}
+  /// Of one scalar, or two.
+  FrameRenderer(const CacheReader& cache, const DrawnScalars& scalars, Backend backend = Backend::kAutomatic);
   ~FrameRenderer();
 
   /// Draws one frame. Throws UsageError for an invalid view, and for too little memory or too small a
@@ -83,7 +87,7 @@ class FrameRenderer {
   /// new step. Throws what `change` throws.
   void changeStep(const std::function<void()>& change);
 
-  /// Takes effect with the next frame. Decoded bricks are kept. Ends a prefetch.
+  /// That of the opacities. Takes effect with the next frame. Decoded bricks are kept. Ends a prefetch.
   void setTransferFunction(const TransferFunction& transfer_function);
 
   /// The projection that render() uses for these arguments. Throws UsageError as render() does.

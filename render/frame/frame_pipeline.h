@@ -33,12 +33,13 @@
 
 namespace curvisplat {
 
-/// The stages and pools of one variable of one cache. One caller at a time, except for cancel().
+/// The stages and pools of one variable, or two, of one cache. One caller at a time, except for cancel().
 class FramePipeline {
  public:
-  /// Draws what `planner` plans for that variable of the cache; both must outlive the pipeline. Throws Error
+  /// Draws what `planner` plans for those variables of the cache; both must outlive the pipeline. Throws Error
   /// if the backend is not available.
-  FramePipeline(const CacheReader& cache, size_t variable, const FramePlanner& planner, Backend backend);
+  FramePipeline(const CacheReader& cache, const DrawnScalars& scalars, const FramePlanner& planner,
+                Backend backend);
   ~FramePipeline();
 
   /// Marks a frame as running: cancel() has an effect only while a Running exists. Its constructor ends a
@@ -91,6 +92,7 @@ class FramePipeline {
 
   const CacheReader& cache_;
   const size_t variable_;
+  const std::optional<size_t> coloured_by_;  // another variable
   const FramePlanner& planner_;
   const std::unique_ptr<PaintingBackend> backend_;
   HiddenBricks hidden_;

@@ -150,7 +150,7 @@ class FrameRun {
     report_.frames.push_back(frame);
     const std::string which = severalFrames(arguments_) ? fmt::format(" of frame {}", number) : "";
     reportUnreadable(which, statistics);
-    const RenderedScene scene{manifest_, report_.variable, report_.transfer_function,
+    const RenderedScene scene{manifest_, report_.variable, report_.function(),
                               camera,    report_.options,  statistics};
     if (report_.frames.size() == 1) warnOfPoorPicture(image, scene);
     if (reported_empty_ || !isEmpty(image, report_.options.background)) return;
@@ -173,10 +173,12 @@ class FrameRun {
   void annotate(const Image& data, const Camera& camera, const Write& write) const {
     if (arguments_.annotations == Annotations{}) return write(data);
     const FrameOptions& options = report_.options;
-    write(annotated(data, arguments_.annotations,
-                    {report_.picture, player_.renderer().screenView(camera, options),
-                     report_.transfer_function, scalarTitle(report_.variable.name, report_.variable.unit),
-                     manifest_.lower, manifest_.upper, options.background}));
+    const VariableInfo& shown = report_.colour_variable ? *report_.colour_variable : report_.variable;
+    const DrawnScalar& coloured = report_.scalars.colour.value_or(report_.scalars.opacity);
+    write(annotated(
+        data, arguments_.annotations,
+        {report_.picture, player_.renderer().screenView(camera, options), coloured.function,
+         scalarTitle(shown.name, shown.unit), manifest_.lower, manifest_.upper, options.background}));
   }
 
   /// Prints one warning for a frame with unreadable bricks that no earlier frame reported; it names the

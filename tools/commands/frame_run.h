@@ -15,6 +15,7 @@
 #include "tools/options/camera_motion.h"
 #include "tools/options/frame_arguments.h"
 #include "tools/options/motion_in_time.h"
+#include "tools/options/opacity_arguments.h"
 #include "tools/options/scalar_arguments.h"
 #include "tools/options/step_arguments.h"
 #include "tools/options/surface_arguments.h"
@@ -27,6 +28,7 @@ struct RenderArguments {
   std::filesystem::path cache, output, first_image, statistics;
   CameraArguments camera;
   ScalarArguments scalar;
+  OpacityArguments opacity;
   SurfaceArguments surfaces;
   StepArguments steps;
   FrameArguments frame;

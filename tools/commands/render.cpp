@@ -28,6 +28,7 @@
 #include "tools/options/frame_arguments.h"
 #include "tools/options/frame_part.h"
 #include "tools/options/motion_in_time.h"
+#include "tools/options/opacity_arguments.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/picture_choice.h"
 #include "tools/options/scalar_arguments.h"
@@ -71,6 +72,7 @@ void checkPartArguments(const RenderArguments& arguments) {
 void checkArguments(const RenderArguments& arguments, ImageSize size) {
   checkMotionArguments(arguments.camera, arguments.steps);
   checkFunctionArguments(arguments.scalar);
+  checkOpacityArguments(arguments.opacity, arguments.scalar, arguments.surfaces);
   checkSurfaceArguments(arguments.surfaces);
   checkOutputName(arguments.output, severalFrames(arguments), size);
   checkPartArguments(arguments);
@@ -155,17 +157,25 @@ void render(const RenderArguments& arguments) {
   CacheReader cache = openAtStep(arguments.cache, arguments.steps);
   const std::vector<StepPosition> steps = chosenSteps(arguments.steps, cache);
   const Manifest manifest = cache.manifest();  // of the first step
-  const size_t variable = chooseVariable(cache, arguments.scalar);
-  const VariableInfo& info = manifest.variables[variable];
+  const size_t shown = chooseVariable(cache, arguments.scalar);
   const glm::dvec3 lower = manifest.lower * options.scale, upper = manifest.upper * options.scale;
   const ChosenFor drawn = drawnSteps(arguments);
-  PictureChoice choice(cache, variable, options.scale, drawn);
-  const TransferFunction transfer_function = choice.function(arguments.scalar);
+  ScalarChoice choice =
+      chooseScalars(arguments.opacity, arguments.scalar, cache, shown, options.scale, drawn);
+  const DrawnScalars& scalars = choice.scalars;
+  const size_t variable = scalars.opacity.variable;
+  const TransferFunction& transfer_function = scalars.opacity.function;
+  const TransferFunction& colours = scalars.colour ? scalars.colour->function : transfer_function;
   for (const std::string& note : transfer_function.notes()) printMessage("note: {}", note);
-  const std::string range_warning = rangeMissesScalar(variableFor(cache, variable, drawn), transfer_function);
-  if (!range_warning.empty()) printMessage("warning: {}", range_warning);
+  if (scalars.colour)
+    for (const std::string& note : colours.notes()) printMessage("note: {}", note);
+  for (const auto& [of, function] : {std::pair(variable, &transfer_function), {shown, &colours}}) {
+    const std::string range_warning = rangeMissesScalar(variableFor(cache, of, drawn), *function);
+    if (!range_warning.empty()) printMessage("warning: {}", range_warning);
+    if (!scalars.colour) break;
+  }
 
-  options.scene = sceneOf(arguments.surfaces, cache, variable);
+  options.scene = sceneOf(arguments.surfaces, cache, shown, variable);
   if (options.scene && !options.scene->isovalues.empty() && options.scene->volume &&
       transfer_function.logScale())
     throw UsageError(
@@ -177,9 +187,9 @@ void render(const RenderArguments& arguments) {
     printMessage("warning: {}", miss);
 
   const ImageSize picture = options.size;
-  options.size = dataSize(arguments.annotations, picture, transfer_function);
+  options.size = dataSize(arguments.annotations, picture, colours);
   options.output_bytes = outputBytes(arguments, picture);
-  const CameraArguments camera = choice.camera(arguments.camera, transfer_function, options.size);
+  const CameraArguments camera = choice.picture.camera(arguments.camera, transfer_function, options.size);
   const Series series = cache.series();
   const MotionInTime motion = inTime(chooseCameraMotion(framesOf(camera, steps), lower, upper, options.size),
                                      series, arguments.steps, steps, arguments.camera.frames);
@@ -195,18 +205,19 @@ void render(const RenderArguments& arguments) {
   const auto output = ranks.isFirst() || writes_own
                           ? makeFrameOutput(arguments.output, severalFrames(arguments), picture, frames_per_s)
                           : nullptr;
-  StepPlayer player(cache, variable, transfer_function, parseBackend(arguments.backend));
+  StepPlayer player(cache, scalars, parseBackend(arguments.backend));
   RenderReport report{arguments.cache,
                       arguments.output,
                       picture,
-                      info,
-                      transfer_function,
+                      scalars,
+                      manifest.variables[variable],
                       options,
                       player.renderer().backendName(),
                       ranks.count(),
                       {},
                       {},
-                      {}};
+                      {},
+                      scalars.colour ? &manifest.variables[shown] : nullptr};
   const auto writeReport = [&] {
     if (!arguments.statistics.empty() && ranks.isFirst())
       writeStatistics(arguments.statistics, statisticsOf(report));
@@ -221,7 +232,10 @@ void render(const RenderArguments& arguments) {
   if (!ranks.isFirst()) return;
   writeReport();
   printResult(report);
-  if (!choice.chosenOptions().empty()) fmt::print("chosen from the data: {}\n", choice.chosenOptions());
+  std::string chosen = choice.chosen_colours;
+  if (const std::string& more = choice.picture.chosenOptions(); !more.empty())
+    chosen += (chosen.empty() ? "" : " ") + more;
+  if (!chosen.empty()) fmt::print("chosen from the data: {}\n", chosen);
 }
 
 }  // namespace
@@ -241,6 +255,8 @@ void addRender(CLI::App& app) {
 
   const std::string what = "Data and colours";
   addFunctionOptions(*command, arguments->scalar, what);
+  const std::string surfaces = "Surfaces and slices";
+  addOpacityOptions(*command, arguments->opacity, what, surfaces);
   command
       ->add_option("--classify", arguments->frame.classify,
                    "Classification: pixel (colour varies within a splat) or flat (one colour per splat)")
@@ -296,7 +312,7 @@ void addRender(CLI::App& app) {
   command->add_flag("--outline", arguments->annotations.outline, "Draw the bounding box of the data")
       ->group(what);
 
-  addSurfaceOptions(*command, arguments->surfaces, "Surfaces and slices");
+  addSurfaceOptions(*command, arguments->surfaces, surfaces);
   const std::string when = "Time steps";
   addStepOptions(*command, arguments->steps, when);
   addStepsOption(*command, arguments->steps, when);

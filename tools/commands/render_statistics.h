@@ -28,14 +28,17 @@ struct FrameReport {
 struct RenderReport {
   std::filesystem::path cache, output;
   ImageSize picture;  // includes the scalar bar; options.size is the data's part
-  const VariableInfo& variable;
-  const TransferFunction& transfer_function;
+  const DrawnScalars& scalars;
+  const VariableInfo& variable;  // of the opacities
   const FrameOptions& options;
   std::string backend;
   unsigned ranks = 1;
   std::vector<FrameReport> frames;
-  std::optional<double> time_to_first_image_s;  // since the process started; nullopt: none, or unknown
-  std::optional<FrameStatistics> first_image;   // the coarse one of --first-image
+  std::optional<double> time_to_first_image_s;    // since the process started; nullopt: none, or unknown
+  std::optional<FrameStatistics> first_image;     // the coarse one of --first-image
+  const VariableInfo* colour_variable = nullptr;  // of pictures of two scalars
+
+  const TransferFunction& function() const { return scalars.opacity.function; }
 };
 
 nlohmann::json statisticsOf(const RenderReport& report);

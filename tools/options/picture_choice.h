@@ -24,6 +24,9 @@ class PictureChoice {
   /// Fills in the options that are not given. Throws UsageError, or Error if reading fails or a file does not
   /// hold a transfer function.
   TransferFunction function(const ScalarArguments& arguments);
+  /// The same, for pictures of two scalars: of the scalar that gives the colours, or the opacities alone.
+  TransferFunction colours(const ScalarArguments& arguments);
+  TransferFunction opacities(const ScalarArguments& arguments);
   /// The arguments, with a view if they have no camera at all. `function`: that of the picture.
   CameraArguments camera(CameraArguments arguments, const TransferFunction& function, ImageSize size);
 
@@ -41,11 +44,14 @@ class PictureChoice {
   TransferFunction withUnit(const TransferFunctionDefinition& definition,
                             const std::pair<double, double>* range, const ScalarArguments& arguments);
   void add(const std::string& option, const std::string& value);
+  bool isSaid(const std::string& option) const;
 
   const CacheReader& cache_;
   const size_t variable_;
   const glm::dvec3 scale_;
   const ChosenFor what_;
+  enum class Part { kAll, kColours, kOpacities };
+  Part part_ = Part::kAll;  // of a function: what is said of it
   std::optional<FirstChoice> data_;
   std::string chosen_;
 };
