@@ -29,6 +29,7 @@
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_options.h"
 #include "render/frame/frame_statistics.h"
+#include "render/frame/pixel_values.h"
 #include "render/image/image.h"
 #include "render/project/screen_view.h"
 #include "stream/base/progress.h"
@@ -57,6 +58,11 @@ class FrameRenderer {
   /// process's, the others only their tiles. Statistics are each rank's own.
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                Progress* progress = nullptr);
+
+  /// The same, with what lies where the picture's pixels have half of their opacity. Takes about three times as long:
+  /// the splats are drawn again, by the processor. Of several ranks the first gets the values.
+  Image renderWithValues(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
+                         PixelValues& values, Progress* progress = nullptr);
 
   using ShowPicture = std::function<void(const Image& image, bool is_final)>;
   /// Calls `show` with a first, coarse picture and then with the picture that render() returns, bit for bit;

@@ -94,11 +94,15 @@ struct FramePipeline::Pools {
 
 FramePipeline::FramePipeline(const CacheReader& cache, const DrawnScalars& scalars,
                              const FramePlanner& planner, Backend backend)
+    : FramePipeline(cache, scalars, planner, makeBackend(backend)) {}
+
+FramePipeline::FramePipeline(const CacheReader& cache, const DrawnScalars& scalars,
+                             const FramePlanner& planner, std::unique_ptr<PaintingBackend> backend)
     : cache_(cache),
       variable_(scalars.opacity.variable),
       coloured_by_(scalars.colour ? std::optional(scalars.colour->variable) : std::nullopt),
       planner_(planner),
-      backend_(makeBackend(backend)) {}
+      backend_(std::move(backend)) {}
 
 FramePipeline::~FramePipeline() {
   endPrefetch();
@@ -139,6 +143,11 @@ void FramePipeline::makePools(const FrameOptions& options) {
                                        backend_->splatMemory(budget.ring_splats));
   const MutexLock lock(mutex_);
   pools_ = std::move(fresh);
+}
+
+void FramePipeline::release() {
+  endPrefetch();
+  dropPools();
 }
 
 void FramePipeline::stepChanged() {

@@ -40,6 +40,8 @@ class FramePipeline {
   /// if the backend is not available.
   FramePipeline(const CacheReader& cache, const DrawnScalars& scalars, const FramePlanner& planner,
                 Backend backend);
+  FramePipeline(const CacheReader& cache, const DrawnScalars& scalars, const FramePlanner& planner,
+                std::unique_ptr<PaintingBackend> backend);
   ~FramePipeline();
 
   /// Marks a frame as running: cancel() has an effect only while a Running exists. Its constructor ends a
@@ -69,6 +71,9 @@ class FramePipeline {
 
   /// Begins to fetch the plan's bricks in the background. Throws UsageError if there is too little memory.
   void prefetch(const FramePlan& plan, const FrameOptions& options);
+
+  /// Gives its memory up until the next frame. Nothing may be drawn meanwhile.
+  void release();
 
   /// The cache is at another step of the same geometry. Nothing may be drawn or fetched meanwhile.
   void stepChanged();

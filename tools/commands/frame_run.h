@@ -7,12 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "render/annotate/annotations.h"
 #include "render/frame/step_player.h"
 #include "stream/base/progress.h"
 #include "stream/cache/manifest.h"
 #include "tools/commands/render_statistics.h"
+#include "tools/options/annotation_arguments.h"
 #include "tools/options/camera_motion.h"
+#include "tools/options/channel_arguments.h"
 #include "tools/options/frame_arguments.h"
 #include "tools/options/motion_in_time.h"
 #include "tools/options/opacity_arguments.h"
@@ -33,11 +34,13 @@ struct RenderArguments {
   StepArguments steps;
   FrameArguments frame;
   std::string backend = "auto";
-  std::optional<std::string> frame_rate, part;
-  Annotations annotations;
+  std::optional<std::string> frame_rate, part, channels;
+  AnnotationArguments annotations;
 };
 
 bool severalFrames(const RenderArguments& arguments);
+/// What the pictures have beside their colours. Throws UsageError.
+ValueChannels channelsOf(const RenderArguments& arguments);
 
 /// What the frames are drawn from, and where they and what is known of them go.
 struct FrameJob {

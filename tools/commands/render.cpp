@@ -25,6 +25,7 @@
 #include "tools/commands/frame_run.h"
 #include "tools/commands/render_statistics.h"
 #include "tools/options/camera_motion.h"
+#include "tools/options/channel_arguments.h"
 #include "tools/options/frame_arguments.h"
 #include "tools/options/frame_part.h"
 #include "tools/options/motion_in_time.h"
@@ -74,6 +75,7 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
   checkFunctionArguments(arguments.scalar);
   checkOpacityArguments(arguments.opacity, arguments.scalar, arguments.surfaces);
   checkSurfaceArguments(arguments.surfaces);
+  checkAnnotationArguments(arguments.annotations);
   checkOutputName(arguments.output, severalFrames(arguments), size);
   checkPartArguments(arguments);
   if (!arguments.first_image.empty() && !launchedRanks().alone())
@@ -85,6 +87,9 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
     throw UsageError("--background transparent: {} files have no transparency; use .png or .exr",
                      arguments.output.extension().string());
   parseBackend(arguments.backend);
+  if (channelsOf(arguments).any() && !arguments.first_image.empty())
+    throw UsageError("--first-image {}: a first picture has no values; leave --channels out",
+                     arguments.first_image.string());
   std::vector<std::filesystem::path> others{arguments.cache, arguments.camera.path,
                                             arguments.scalar.transfer_function.value_or("")};
   checkOutputFile("-o", arguments.output, others);
@@ -114,10 +119,13 @@ uint64_t outputBytes(const RenderArguments& arguments, ImageSize picture) {
     bytes = 3 * picture.pixels();
   else
     bytes = writingBytes(arguments.output, picture);
+  const ValueChannels channels = channelsOf(arguments);
+  if (channels.any())
+    bytes += picture.pixels() * (sizeof(float) * (5 + channels.count()) + kChannelBytes * channels.count());
   if (!arguments.first_image.empty()) bytes = std::max(bytes, writingBytes(arguments.first_image, picture));
   // Tiles or pictures of other ranks, as they come and as they are put in their places.
   if (!launchedRanks().alone()) bytes = std::max(bytes, 2 * 4 * sizeof(float) * picture.pixels());
-  if (!(arguments.annotations == Annotations{})) bytes += annotatedBytes(picture);
+  if (!(arguments.annotations.shown == Annotations{})) bytes += annotatedBytes(picture);
   return bytes;
 }
 
@@ -146,7 +154,12 @@ void printResult(const RenderReport& report) {
              report.variable.name, total_s / static_cast<double>(report.frames.size()), report.backend);
 }
 
-void render(const RenderArguments& arguments) {
+constexpr double kAxesRoom = 0.17;  // around the data, of its box
+
+void render(const RenderArguments& given) {
+  RenderArguments arguments = given;
+  arguments.annotations.shown.scalar_bar |= !arguments.annotations.bar_titles.empty();
+  arguments.annotations.shown.axes_grid |= arguments.annotations.axis_titles.has_value();
   Ranks& ranks = launchedRanks();
   FrameOptions options = frameOptions(arguments.frame);
   checkArguments(arguments, options.size);
@@ -187,12 +200,19 @@ void render(const RenderArguments& arguments) {
     printMessage("warning: {}", miss);
 
   const ImageSize picture = options.size;
-  options.size = dataSize(arguments.annotations, picture, colours);
+  const std::vector<ShownFunction> functions = shownFunctions(
+      arguments.annotations, scalars, manifest, options.scene.get(), arguments.surfaces.surface_by);
+  options.size = dataSize(arguments.annotations.shown, picture, functions);
   options.output_bytes = outputBytes(arguments, picture);
-  const CameraArguments camera = choice.picture.camera(arguments.camera, transfer_function, options.size);
+  const bool has_grid = arguments.annotations.shown.axes_grid;
+  const CameraArguments camera =
+      choice.picture.camera(arguments.camera, transfer_function, options.size, has_grid);
   const Series series = cache.series();
-  const MotionInTime motion = inTime(chooseCameraMotion(framesOf(camera, steps), lower, upper, options.size),
-                                     series, arguments.steps, steps, arguments.camera.frames);
+  // Coordinates need room around the data.
+  const glm::dvec3 room = (has_grid ? kAxesRoom : 0.0) * (upper - lower);
+  const MotionInTime motion =
+      inTime(chooseCameraMotion(framesOf(camera, steps), lower - room, upper + room, options.size), series,
+             arguments.steps, steps, arguments.camera.frames);
   const std::vector<uint64_t> numbers =
       (arguments.part ? parsePart(*arguments.part) : FramePart{}).of(motion.frames);
   // A rank has a picture to itself where there are enough of them.
@@ -217,7 +237,11 @@ void render(const RenderArguments& arguments) {
                       {},
                       {},
                       {},
-                      scalars.colour ? &manifest.variables[shown] : nullptr};
+                      scalars.colour ? &manifest.variables[shown] : nullptr,
+                      functions,
+                      options.background};
+  // The grid lies behind the data, before the background.
+  if (has_grid) options.background = glm::vec4(0);
   const auto writeReport = [&] {
     if (!arguments.statistics.empty() && ranks.isFirst())
       writeStatistics(arguments.statistics, statisticsOf(report));
@@ -306,12 +330,14 @@ void addRender(CLI::App& app) {
       ->capture_default_str()
       ->group(what);
 
-  command->add_flag("--scalar-bar", arguments->annotations.scalar_bar, "Draw a scalar bar beside the data")
-      ->group(what);
-  command->add_flag("--axes", arguments->annotations.axes, "Draw the directions of x, y and z")->group(what);
-  command->add_flag("--outline", arguments->annotations.outline, "Draw the bounding box of the data")
-      ->group(what);
+  addAnnotationOptions(*command, arguments->annotations, what);
 
+  command
+      ->add_option(
+          "--channels", arguments->channels,
+          "What an .exr picture has beside its colours, where each pixel has half of its opacity: some of "
+          "depth,normal,scalar, or none (default: depth). Takes about three times as long")
+      ->group(what);
   addSurfaceOptions(*command, arguments->surfaces, surfaces);
   const std::string when = "Time steps";
   addStepOptions(*command, arguments->steps, when);

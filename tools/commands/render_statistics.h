@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "render/annotate/annotated_scene.h"
 #include "render/camera/camera.h"
 #include "render/colour/transfer_function.h"
 #include "render/frame/frame.h"
@@ -37,6 +38,8 @@ struct RenderReport {
   std::optional<double> time_to_first_image_s;    // since the process started; nullopt: none, or unknown
   std::optional<FrameStatistics> first_image;     // the coarse one of --first-image
   const VariableInfo* colour_variable = nullptr;  // of pictures of two scalars
+  std::vector<ShownFunction> shown = {};          // by scalar bars
+  glm::vec4 background{1, 1, 1, 1};               // that of the options may be left to the annotations
 
   const TransferFunction& function() const { return scalars.opacity.function; }
 };

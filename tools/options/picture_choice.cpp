@@ -176,14 +176,14 @@ TransferFunction PictureChoice::automatic(const ScalarArguments& arguments) {
 }
 
 CameraArguments PictureChoice::camera(CameraArguments arguments, const TransferFunction& function,
-                                      ImageSize size) {
+                                      ImageSize size, bool whole) {
   if (arguments.view || arguments.position || arguments.focal_point || arguments.view_up ||
       arguments.parallel_scale || arguments.view_angle || arguments.moves())
     return arguments;
   const ViewChoice choice = data().view(function, size);
   add("--view", choice.view);
   arguments.view = choice.view;
-  if (!choice.focal_point) return arguments;
+  if (whole || !choice.focal_point) return arguments;
   const glm::dvec3& point = *choice.focal_point;
   arguments.focal_point = fmt::format("{},{},{}", point.x, point.y, point.z);
   arguments.parallel_scale = exact(choice.parallel_scale);

@@ -28,7 +28,9 @@ class PictureChoice {
   TransferFunction colours(const ScalarArguments& arguments);
   TransferFunction opacities(const ScalarArguments& arguments);
   /// The arguments, with a view if they have no camera at all. `function`: that of the picture.
-  CameraArguments camera(CameraArguments arguments, const TransferFunction& function, ImageSize size);
+  /// `whole`: never of a part of the data.
+  CameraArguments camera(CameraArguments arguments, const TransferFunction& function, ImageSize size,
+                         bool whole = false);
 
   /// What was filled in: "--tf viridis --range 0,1"; empty if nothing was.
   const std::string& chosenOptions() const { return chosen_; }

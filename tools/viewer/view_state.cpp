@@ -238,6 +238,7 @@ std::string toJson(const ViewState& state) {
   json["dark"] = state.dark;
   json["scalar_bar"] = state.annotations.scalar_bar;
   json["axes"] = state.annotations.axes;
+  json["axes_grid"] = state.annotations.axes_grid;
   json["outline"] = state.annotations.outline;
   return json.dump(1) + "\n";
 }
@@ -298,7 +299,8 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   if (fields.has("volume")) state.volume = fields.flag("volume");
   state.lit = fields.has("lit") && fields.flag("lit");
   state.dark = fields.flag("dark");
-  state.annotations = {fields.flag("scalar_bar"), fields.flag("axes"), fields.flag("outline")};
+  state.annotations = {fields.flag("scalar_bar"), fields.flag("axes"), fields.flag("outline"),
+                       fields.has("axes_grid") && fields.flag("axes_grid")};
   return state;
 }
 
@@ -360,6 +362,7 @@ std::string renderCommand(const ViewState& state, const std::filesystem::path& c
   add("--background", state.dark ? "black" : "white");
   if (state.annotations.scalar_bar) command += " --scalar-bar";
   if (state.annotations.axes) command += " --axes";
+  if (state.annotations.axes_grid) command += " --axes-grid";
   if (state.annotations.outline) command += " --outline";
   return command;
 }
