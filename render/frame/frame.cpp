@@ -94,7 +94,6 @@ struct FrameRenderer::State {
       if (iso->volume) inputs.boundary = info.max + (info.max - info.min);
     }
     FramePipeline values(cache, scalars, planner, makeValueBackend(inputs));
-    const FramePipeline::Running running(values);
     FrameStatistics ignored;
     return values.draw(plan, options, ignored, progress);
   }
@@ -133,20 +132,20 @@ bool FrameRenderer::drawsInSoftware() const {
 
 Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                             Progress* progress) {
-  const FramePipeline::Running running(state_->pipeline);
+  state_->pipeline.endPrefetch();
   return state_->render(camera, options, statistics, progress);
 }
 
 Image FrameRenderer::renderWithValues(const Camera& camera, const FrameOptions& options,
                                       FrameStatistics& statistics, PixelValues& values, Progress* progress) {
-  const FramePipeline::Running running(state_->pipeline);
+  state_->pipeline.endPrefetch();
   return state_->renderWithValues(camera, options, statistics, values, progress);
 }
 
 void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions& options,
                                         FrameStatistics& statistics, const ShowPicture& show,
                                         Progress* progress) {
-  const FramePipeline::Running running(state_->pipeline);
+  state_->pipeline.endPrefetch();
   bool is_final = false;
   Image picture = state_->renderQuickly(camera, options, kFirstPicture, statistics, is_final, progress);
   show(picture, is_final);
@@ -157,12 +156,8 @@ void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions
 
 Image FrameRenderer::renderQuickly(const Camera& camera, const FrameOptions& options,
                                    const QuickLimits& limits, FrameStatistics& statistics, bool& is_final) {
-  const FramePipeline::Running running(state_->pipeline);
+  state_->pipeline.endPrefetch();
   return state_->renderQuickly(camera, options, limits, statistics, is_final, nullptr);
-}
-
-void FrameRenderer::cancel() {
-  state_->pipeline.cancel();
 }
 
 void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options) {
@@ -183,14 +178,14 @@ void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options, 
 }
 
 void FrameRenderer::changeStep(const std::function<void()>& change) {
-  const FramePipeline::Running running(state_->pipeline);
+  state_->pipeline.endPrefetch();
   change();
   state_->planner.stepChanged();
   state_->pipeline.stepChanged();
 }
 
 void FrameRenderer::setTransferFunction(const TransferFunction& transfer_function) {
-  const FramePipeline::Running running(state_->pipeline);
+  state_->pipeline.endPrefetch();
   state_->planner.setTransferFunction(transfer_function);
 }
 

@@ -6,6 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/mat2x2.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 #include <limits>
 #include <numbers>
 #include <optional>
@@ -73,6 +77,12 @@ struct UnpackedSplat {
     }
     return std::max(0.0, shareBelow(hi) - shareBelow(lo));
   }
+};
+
+/// Where a splat takes a pixel to its half: the pixel, u, and the depth.
+struct Found {
+  int x, y;
+  double u0, u1, depth;
 };
 
 class ValuePainter final : public Painter {
@@ -189,29 +199,62 @@ class ValuePainter final : public Painter {
     if (after <= pixel.target) {
       // Where in the splat: its depths are taken for a uniform distribution of their deviation.
       const double part = std::log(pixel.through / pixel.target) / (depth * extinction);
-      take(of, pixel, u0, u1,
-           z + (2 * std::clamp(part, 0.0, 1.0) - 1) * std::numbers::sqrt3 / of.depth.per_depth);
+      take(of, pixel,
+           {x, y, u0, u1,
+            z + (2 * std::clamp(part, 0.0, 1.0) - 1) * std::numbers::sqrt3 / of.depth.per_depth});
     }
     pixel.through = after;
   }
 
-  void take(const UnpackedSplat& of, Halfway& pixel, double u0, double u1, double z) const {
+  /// How the scalar changes at one depth, per pixel, and along the ray. The record's numbers are of a screen with the
+  /// low-pass; with q the depth's change in the frame of A and S2' = S2 + low-pass, it has S2'⁻¹ B q, and from its
+  /// deviation |q|² is known: so is what they would be without.
+  glm::dvec3 gradientOf(const UnpackedSplat& of, const ScreenSplat& s) const {
+    constexpr double kLeastHidden = 1e-12;
+    const double l11 = s.l11, l21 = s.l21, l22 = s.l22;
+    const auto perPixel = [&](double by0, double by1) {
+      return glm::dvec2(by0 / l11 - by1 * l21 / (l11 * l22), by1 / l22);
+    };
+    const glm::dmat2 passed(l11 * l11, l11 * l21, l11 * l21, l21 * l21 + l22 * l22);
+    const glm::dmat2 shape = passed - glm::dmat2(inputs_.view.low_pass_px2 - inputs_.view.slope_low_pass_px2);
+    const glm::dvec2 depth = perPixel(of.depth.by[0], of.depth.by[1]), bq = passed * depth;
+    const double sigma_per_depth = kKernelSigma * of.depth.per_depth,
+                 hidden = 1 / (sigma_per_depth * sigma_per_depth);
+    const double q2 = hidden + glm::dot(depth, bq);
+    const double least = kLeastHidden * q2;
+    const double determinant = glm::determinant(shape);
+    const glm::dvec2 by = determinant > 0 ? glm::inverse(shape) * bq : depth;
+    const double own = std::max(q2 - glm::dot(by, bq), least);
+    const double along = of.depth.correlation * of.half_width / (std::numbers::sqrt3 * kKernelSigma);
+    const double ratio = determinant > 0 ? glm::determinant(passed) / determinant : 1;
+    const double per_depth = along * std::sqrt(ratio * hidden) / own;
+    return {perPixel(s.slope0, s.slope1) - per_depth * by, per_depth};
+  }
+
+  /// Columns: how a point in view axes moves from pixel to pixel at one depth, and along the ray.
+  glm::dmat3 placeSlopes(int x, int y, double depth) const {
+    const ScreenView& view = inputs_.view;
+    const double pixel = 1 / view.focal_px;
+    if (view.projection == Projection::kOrthographic) return {pixel, 0, 0, 0, pixel, 0, 0, 0, 1};
+    const glm::dvec3 ray((x + 0.5 - 0.5 * view.size.width) * pixel,
+                         (y + 0.5 - 0.5 * view.size.height) * pixel, 1);
+    const double length = glm::length(ray);
+    const glm::dvec3 along = ray / length;
+    const auto across = [&](const glm::dvec3& step) {
+      return depth * pixel / length * (step - glm::dot(step, along) * along);
+    };
+    return {across({1, 0, 0}), across({0, 1, 0}), along};
+  }
+
+  void take(const UnpackedSplat& of, Halfway& pixel, const Found& found) const {
+    const auto [x, y, u0, u1, z] = found;
     const ScreenSplat& s = of.splat;
     pixel.found = true;
     double f = s.mean + s.slope0 * u0 + s.slope1 * u1;
     if (f > inputs_.boundary) f = (f - inputs_.offset) / inputs_.scale;
     if (of.colour) f = of.colour->mean + of.colour->slope[0] * u0 + of.colour->slope[1] * u1;
-    // Along the columns of L to along x and y; then at one depth instead of along the rays.
-    const auto perPixel = [&](double by0, double by1) {
-      return glm::dvec2(by0 / s.l11 - by1 * s.l21 / (s.l11 * s.l22), by1 / s.l22);
-    };
-    const double per_depth = of.depth.correlation * of.half_width / std::numbers::sqrt3 * of.depth.per_depth;
-    const glm::dvec2 across =
-        perPixel(s.slope0, s.slope1) - per_depth * perPixel(of.depth.by[0], of.depth.by[1]);
-    const ScreenView& view = inputs_.view;
-    const double pixels =
-        view.projection == Projection::kPerspective ? view.focal_px / std::max(z, 1e-30) : view.focal_px;
-    glm::dvec3 n(pixels * across, per_depth);
+    const glm::dvec3 gradient = gradientOf(of, s);
+    glm::dvec3 n = glm::inverse(glm::transpose(placeSlopes(x, y, z))) * gradient;
     const double length = glm::length(n);
     n = length > 0 && std::isfinite(length) ? n / length
                                             : glm::dvec3(std::numeric_limits<double>::quiet_NaN());

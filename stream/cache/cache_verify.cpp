@@ -10,6 +10,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/cache/brick_grids.h"
+#include "stream/cache/cache_file.h"
 #include "stream/cache/faces_file.h"
 #include "stream/model/border_code.h"
 #include "stream/model/shape_extent.h"
@@ -197,7 +198,7 @@ class Verifier {
   void verifyGrids() {
     const std::filesystem::path path = reader_.path() / "bricks.vdb";
     try {
-      const InputFile file(path);
+      const InputFile file(cacheFile(reader_.path(), "bricks.vdb"));
       if (file.size() > kMaxGridBytes * (bricks_.size() + 1))
         return find("{}: is too large for {} bricks (found {} bytes)", path.string(), bricks_.size(),
                     file.size());

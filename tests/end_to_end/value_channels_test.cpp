@@ -97,11 +97,11 @@ class ValueChannelsTest : public testing::Test {
         all[1].push_back(std::abs(values.scalar[n] - exact->scalar));
         const double cosine = std::abs(glm::dot(glm::dvec3(values.normal[n]), exact->normal));
         all[2].push_back(std::acos(std::min(cosine, 1.0)) * 180 / std::numbers::pi);
-        EXPECT_LE(glm::dot(glm::dvec3(values.normal[n]), direction), 0.1);
+        EXPECT_LE(glm::dot(glm::dvec3(values.normal[n]), direction), 0.3);
       }
     std::array<double, 3> medians{};
     for (size_t of = 0; of < 3; ++of) {
-      EXPECT_GT(all[of].size(), 40u);
+      EXPECT_GT(all[of].size(), 20u);
       if (all[of].empty()) continue;
       std::nth_element(all[of].begin(), all[of].begin() + static_cast<std::ptrdiff_t>(all[of].size() / 2),
                        all[of].end());
