@@ -61,6 +61,7 @@ size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const Border
     pieces[0].faces.add({inward.axis[0], inward.distance, true});
     return 1;
   }
+  const BorderPart cut_part = inward.ratio > 0 ? mergedPart(inward) : style.cut;
   size_t count = 1;
   for (int a = 0; a < inward.count; ++a)
     if (!inward.hasFace(a)) count *= 2;
@@ -72,7 +73,7 @@ size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const Border
     size_t choice = n;
     for (int a = 0; a < inward.count; ++a) {
       const bool cut = inward.hasFace(a);
-      const BorderPart& part = cut ? style.cut : style.parts[choice & 1];
+      const BorderPart& part = cut ? cut_part : style.parts[choice & 1];
       if (!cut) choice >>= 1;
       const glm::vec3& q = inward.axis[static_cast<size_t>(a)];
       resize(growth, whole.shape, q, part, cut);
