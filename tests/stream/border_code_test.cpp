@@ -142,7 +142,7 @@ TEST(HalfCell, SlopesAreThoseThatAreDrawn) {
   const glm::dvec3 inward[] = {{0, 0, 1}}, slope(0.3, 0, 0.4);
   EXPECT_DOUBLE_EQ(drawnSlope(slope, kNoBorder), 0.5);
   EXPECT_DOUBLE_EQ(drawnSlope(slope, packBorderCode(inward)), 0.5);
-  const double wide = kHalfCellStyle.cut.size * 0.4;
+  const double wide = (kHalfCellStyle.cut.size + 0.13) * 0.4;
   EXPECT_NEAR(drawnSlope(slope, packBorderCode(inward, 1)), std::hypot(0.3, wide), 0.01);
 }
 
