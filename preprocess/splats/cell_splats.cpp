@@ -252,35 +252,22 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     return scale;
   };
 
-  const LqFactors lq({jacobian[0].x, jacobian[1].x, jacobian[2].x},
-                     {jacobian[0].y, jacobian[1].y, jacobian[2].y},
-                     {jacobian[0].z, jacobian[1].z, jacobian[2].z});
-  const Lower3& a = lq.lower;
-  if (surelyAboveFloor(a)) {
-    splat.splat.axis = {a.a00, a.a11, a.a22};
-    splat.splat.shear = {a.a10 * lq.inverse_a00, a.a20 * lq.inverse_a00, a.a21 * lq.inverse_a11};
-    const double scale = set_volume(lq.determinant);
-    const auto rotate = [&](const glm::dvec3& v) { return lq.rotate(v); };
-    set_values(scale, rotate);
-    splat.border_code = borderCode(inwards, splat.regular, rotate);
-    splat.growth_code = splat.regular ? growthCode(growth, rotate) : kNoGrowth;
-  } else {
-    const CellShape shape = shapeFromJacobian(jacobian, smallestAxis(hexahedron.centre));
-    splat.splat.axis = shape.axis;
-    splat.splat.shear = shape.shear;
-    double scale = 1;
-    if (shape.floored) {
-      splat.regular = false;
-      splat.splat.weight = std::abs(shape.determinant * shrink + hexahedron.volume_beyond);
-      ++out_.degenerate;
-    } else {
-      scale = set_volume(shape.determinant);
-    }
-    const auto rotate = [&](const glm::dvec3& v) { return shape.rotation * v; };
-    set_values(scale, rotate);
-    splat.border_code = borderCode(inwards, splat.regular, rotate);
-    splat.growth_code = splat.regular ? growthCode(growth, rotate) : kNoGrowth;
-  }
+  splatFromJacobian(
+      jacobian, splat.splat, [&] { return smallestAxis(hexahedron.centre); },
+      [&](const auto& frame) {
+        double scale = 1;
+        if (frame.floored()) {
+          splat.regular = false;
+          splat.splat.weight = std::abs(frame.determinant() * shrink + hexahedron.volume_beyond);
+          ++out_.degenerate;
+        } else {
+          scale = set_volume(frame.determinant());
+        }
+        const auto rotate = [&](const glm::dvec3& v) { return frame.rotate(v); };
+        set_values(scale, rotate);
+        splat.border_code = borderCode(inwards, splat.regular, rotate);
+        splat.growth_code = splat.regular ? growthCode(growth, rotate) : kNoGrowth;
+      });
   ++count_;
 }
 

@@ -237,9 +237,13 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   for (int axis = 0; axis < 3; ++axis) jacobian[axis] *= stretch[axis];
   const double shrink = 1 / (stretch[0] * stretch[1] * stretch[2]);  // from the splat's volume to the cell's
 
-  // `rotate` gives Q's image of a vector; `to_factor` A⁻¹ of one.
-  const auto set_values = [&](const auto& rotate, const auto& to_factor, bool correct_bends) {
-    const glm::dvec3 bend_in_cells = correct_bends ? to_factor(bend) : glm::dvec3(0.0);
+  const auto set_values = [&](const auto& frame) {
+    constexpr bool kPlain = std::remove_cvref_t<decltype(frame)>::kIsPlain;
+    // Where an axis was raised there is no telling a bend of the scalar from one of the coordinates.
+    const bool correct_bends = kPlain && corrections_.bends;
+    glm::dvec3 bend_in_cells(0.0);
+    if constexpr (kPlain)
+      if (correct_bends) bend_in_cells = frame.inFrame(bend);
     SplatScalar* value = out_.values.data() + count_ * scalars_.size();
     for (const float* f : scalars_) {
       const double here = f[at];
@@ -253,7 +257,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
         least = std::min({least, before, after});
         most = std::max({most, before, after});
       }
-      const glm::dvec3 slope = rotate(gradient * stretch);
+      const glm::dvec3 slope = frame.rotate(gradient * stretch);
       double mean = here + glm::dot(gradient, middle);
       if (correct_bends)
         mean = std::clamp(mean + kBend * (second - glm::dot(slope, bend_in_cells)), least, most);
@@ -261,42 +265,21 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     }
   };
 
-  const LqFactors lq({jacobian[0].x, jacobian[1].x, jacobian[2].x},
-                     {jacobian[0].y, jacobian[1].y, jacobian[2].y},
-                     {jacobian[0].z, jacobian[1].z, jacobian[2].z});
-  const Lower3& a = lq.lower;
-  if (surelyAboveFloor(a)) {
-    node.splat.axis = {a.a00, a.a11, a.a22};
-    node.splat.shear = {a.a10 * lq.inverse_a00, a.a20 * lq.inverse_a00, a.a21 * lq.inverse_a11};
-    node.splat.weight = a.a00 * a.a11 * a.a22 * weight_factor * shrink;
-    node.regular = weight_factor == 1;
-    node.border_code =
-        borderCode(inwards, corrections_.faces, [&](const glm::dvec3& v) { return lq.rotate(v); });
-    node.growth_code = growthCode(growth, [&](const glm::dvec3& v) { return lq.rotate(v); });
-    (lq.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
-    if (layer != kNoLayer && node.border_code == kNoBorder) cutBehindFace(node, at, neighbours, layer);
-    set_values([&](const glm::dvec3& gradient) { return lq.rotate(gradient); },
-               [&](const glm::dvec3& v) {
-                 const double v0 = v.x * lq.inverse_a00, v1 = (v.y - a.a10 * v0) * lq.inverse_a11;
-                 return glm::dvec3(v0, v1, (v.z - a.a20 * v0 - a.a21 * v1) / a.a22);
-               },
-               corrections_.bends);
-  } else {
-    const CellShape shape = shapeFromJacobian(jacobian, smallestAxis(at, neighbours));
-    node.splat.axis = shape.axis;
-    node.splat.shear = shape.shear;
-    node.splat.weight = std::abs(shape.determinant) * weight_factor * shrink;
-    node.regular = !shape.floored;
-    node.border_code = borderCode(inwards, corrections_.faces && !shape.floored,
-                                  [&](const glm::dvec3& v) { return shape.rotation * v; });
-    node.growth_code = shape.floored
-                           ? kNoGrowth
-                           : growthCode(growth, [&](const glm::dvec3& v) { return shape.rotation * v; });
-    (shape.floored ? out_.degenerate : shape.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
-    // Where an axis was raised there is no telling a bend of the scalar from one of the coordinates.
-    set_values([&](const glm::dvec3& gradient) { return shape.rotation * gradient; },
-               [](const glm::dvec3& v) { return v; }, false);
-  }
+  splatFromJacobian(
+      jacobian, node.splat, [&] { return smallestAxis(at, neighbours); },
+      [&](const auto& frame) {
+        const auto rotate = [&](const glm::dvec3& v) { return frame.rotate(v); };
+        node.splat.weight = std::abs(frame.determinant()) * weight_factor * shrink;
+        node.regular = !frame.floored() && weight_factor == 1;
+        node.border_code = borderCode(inwards, corrections_.faces && !frame.floored(), rotate);
+        node.growth_code = frame.floored() ? kNoGrowth : growthCode(growth, rotate);
+        (frame.floored()           ? out_.degenerate
+         : frame.determinant() < 0 ? out_.left_handed
+                                   : out_.right_handed) += 1;
+        if (frame.kIsPlain && layer != kNoLayer && node.border_code == kNoBorder)
+          cutBehindFace(node, at, neighbours, layer);
+        set_values(frame);
+      });
   ++count_;
 }
 

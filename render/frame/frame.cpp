@@ -70,14 +70,14 @@ bool FrameRenderer::drawsInSoftware() const {
 
 Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                             Progress* progress) {
-  const FramePipeline::Running running(state_->pipeline);
+  state_->pipeline.endPrefetch();
   return state_->render(camera, options, statistics, progress);
 }
 
 void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions& options,
                                         FrameStatistics& statistics, const ShowPicture& show,
                                         Progress* progress) {
-  const FramePipeline::Running running(state_->pipeline);
+  state_->pipeline.endPrefetch();
   bool is_final = false;
   Image picture = state_->renderQuickly(camera, options, kFirstPicture, statistics, is_final, progress);
   show(picture, is_final);
@@ -88,12 +88,8 @@ void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions
 
 Image FrameRenderer::renderQuickly(const Camera& camera, const FrameOptions& options,
                                    const QuickLimits& limits, FrameStatistics& statistics, bool& is_final) {
-  const FramePipeline::Running running(state_->pipeline);
+  state_->pipeline.endPrefetch();
   return state_->renderQuickly(camera, options, limits, statistics, is_final, nullptr);
-}
-
-void FrameRenderer::cancel() {
-  state_->pipeline.cancel();
 }
 
 void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options) {
@@ -114,14 +110,14 @@ void FrameRenderer::prefetch(const Camera& camera, const FrameOptions& options, 
 }
 
 void FrameRenderer::changeStep(const std::function<void()>& change) {
-  const FramePipeline::Running running(state_->pipeline);
+  state_->pipeline.endPrefetch();
   change();
   state_->planner.stepChanged();
   state_->pipeline.stepChanged();
 }
 
 void FrameRenderer::setTransferFunction(const TransferFunction& transfer_function) {
-  const FramePipeline::Running running(state_->pipeline);
+  state_->pipeline.endPrefetch();
   state_->planner.setTransferFunction(transfer_function);
 }
 

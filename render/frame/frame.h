@@ -24,7 +24,6 @@
 #include "render/camera/camera.h"
 #include "render/colour/transfer_function.h"
 #include "render/frame/backend.h"
-#include "render/frame/cancelled.h"
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_options.h"
 #include "render/frame/frame_statistics.h"
@@ -36,8 +35,8 @@
 namespace curvisplat {
 
 /// Draws frames of one variable of one cache. Owns the threads and the painter, and the memory that they
-/// share: decoded bricks are kept for the next frame. One caller at a time, except for cancel(). The cache
-/// must outlive the renderer.
+/// share: decoded bricks are kept for the next frame. One caller at a time. The cache must outlive
+/// the renderer.
 class FrameRenderer {
  public:
   /// Throws Error if the backend is not available; the message names the library that was tried and its
@@ -47,8 +46,9 @@ class FrameRenderer {
   ~FrameRenderer();
 
   /// Draws one frame. Throws UsageError for an invalid view, and for too little memory or too small a
-  /// max_splats (the message says how much is needed); Error if reading or drawing fails; Cancelled after
-  /// cancel(). The renderer can be used again after each of them. `statistics` is overwritten.
+  /// max_splats (the message says how much is needed); Error if reading or drawing fails;
+  /// Interrupted once options.stop or `progress` are stopped, at the latest when each worker has finished its brick and the
+  /// painter its segment. The renderer can be used again after each of them. `statistics` is overwritten.
   /// With options.ranks all ranks have to call it: rank 0 returns the picture, which has the bits of one
   /// process's, the others only their tiles. Statistics are each rank's own.
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
@@ -66,10 +66,6 @@ class FrameRenderer {
   /// picture. Throws as render() does.
   Image renderQuickly(const Camera& camera, const FrameOptions& options, const QuickLimits& limits,
                       FrameStatistics& statistics, bool& is_final);
-
-  /// Makes a running call of the three functions above throw Cancelled, at the latest when each worker has
-  /// finished its brick and the painter its segment. Does not affect a call that has not begun. Any thread.
-  void cancel();
 
   /// Begins to read and decode, in the background, the bricks that render() with the same arguments will
   /// need, as far as they fit in the cache of bricks. The next frame or prefetch() ends it. Its errors are

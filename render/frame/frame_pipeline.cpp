@@ -16,6 +16,7 @@
 #include "render/frame/sweep_buffer.h"
 #include "render/surface/scene_layers.h"
 #include "stream/base/error.h"
+#include "stream/base/interrupted.h"
 #include "stream/base/stage_timer.h"
 #include "stream/paging/brick_source.h"
 #include "stream/paging/pager.h"
@@ -100,17 +101,6 @@ FramePipeline::~FramePipeline() {
   endPrefetch();
 }
 
-FramePipeline::Running::Running(FramePipeline& pipeline) : pipeline_(pipeline) {
-  pipeline.endPrefetch();
-  const MutexLock lock(pipeline.mutex_);
-  pipeline.phase_ = Phase::kRunning;
-}
-
-FramePipeline::Running::~Running() {
-  const MutexLock lock(pipeline_.mutex_);
-  pipeline_.phase_ = Phase::kIdle;
-}
-
 void FramePipeline::makePools(const FrameOptions& options) {
   // Steps differ in this; the pools stay.
   least_pager_bytes_ = std::max(least_pager_bytes_, BrickPager::leastBufferBytes(cache_, variable_));
@@ -140,7 +130,7 @@ void FramePipeline::stepChanged() {
   if (pools_) pools_->source.stepChanged();
 }
 
-// Memory is allocated and freed without holding the lock, so that cancel() need not wait for it.
+// Memory is allocated and freed without holding the lock, so that a stop need not wait for it.
 void FramePipeline::dropPools() {
   std::unique_ptr<Pools> old;  // freed after the lock is released
   const MutexLock lock(mutex_);
@@ -150,7 +140,7 @@ void FramePipeline::dropPools() {
 /// Starts the stages on the next slab. False if no slab is left.
 bool FramePipeline::beginSlab(const FramePlan& plan, const FrameOptions& options) {
   const MutexLock lock(mutex_);
-  if (phase_ == Phase::kCancelled) throw Cancelled();
+  throwIfStopped(options.stop);
   if (!pools_->sweep.beginSlab(plan.parts)) return false;
   pools_->ring.resume();
   std::vector<BrickPart> parts;
@@ -196,10 +186,11 @@ void FramePipeline::sampleSlice(const SlicePlan& slice, SliceSampler& sampler, c
                                 FrameStatistics& statistics) {
   makePools(options);
   const SliceWork work{cache_, slice.parts, sampler, options.keep_going};
+  const std::stop_callback on_stop(options.stop, [this] { stopStages(); });
   try {
     {
       const MutexLock lock(mutex_);
-      if (phase_ == Phase::kCancelled) throw Cancelled();
+      throwIfStopped(options.stop);
       pools_->source.start(slice.parts);
       pools_->workers.startSampling(work);
     }
@@ -209,8 +200,7 @@ void FramePipeline::sampleSlice(const SlicePlan& slice, SliceSampler& sampler, c
     dropPools();
     throw;
   }
-  const MutexLock lock(mutex_);
-  if (phase_ == Phase::kCancelled) throw Cancelled();
+  throwIfStopped(options.stop);
 }
 
 const ClassificationTable& FramePipeline::tableOf(const FramePlan& plan) const {
@@ -222,9 +212,10 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   const FrameWork work{cache_,    plan.parts, plan.settings,      tableOf(plan),
                        plan.keys, hidden_,    options.keep_going, plan.tiles.get()};
   makePools(options);
+  const std::stop_callback on_stop(options.stop, [this] { stopStages(); });
   {
     const MutexLock lock(mutex_);
-    if (phase_ == Phase::kCancelled) throw Cancelled();
+    throwIfStopped(options.stop);
     pools_->ring.reset();
     pools_->sweep.beginFrame();
     pools_->workers.beginFrame(work);
@@ -245,10 +236,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
     dropPools();  // a reading thread that has failed cannot serve the next frame
     throw;
   }
-  {
-    const MutexLock lock(mutex_);
-    if (phase_ == Phase::kCancelled) throw Cancelled();
-  }
+  throwIfStopped(options.stop);
   if (progress) progress->end();
 
   const Cut& cut = plan.cut;
@@ -268,7 +256,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   return image;
 }
 
-/// The stage "draw". No picture where the ring was closed: a worker has failed, or the frame was cancelled.
+/// The stage "draw". No picture where the ring was closed: a worker has failed, or a stop was requested.
 Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
                            Progress* progress) {
   Image image;
@@ -301,10 +289,9 @@ Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, F
   return image;
 }
 
-void FramePipeline::cancel() {
+/// Called by whoever requests a stop, in its thread.
+void FramePipeline::stopStages() {
   const MutexLock lock(mutex_);
-  if (phase_ == Phase::kIdle) return;
-  phase_ = Phase::kCancelled;
   if (pools_) pools_->workers.stop();
 }
 

@@ -8,6 +8,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/cache/brick_grids.h"
+#include "stream/cache/cache_file.h"
 #include "stream/model/border_code.h"
 #include "stream/model/shape_extent.h"
 
@@ -193,7 +194,7 @@ class Verifier {
   void verifyGrids() {
     const std::filesystem::path path = reader_.path() / "bricks.vdb";
     try {
-      const InputFile file(path);
+      const InputFile file(cacheFile(reader_.path(), "bricks.vdb"));
       if (file.size() > kMaxGridBytes * (bricks_.size() + 1))
         return find("{}: is too large for {} bricks (found {} bytes)", path.string(), bricks_.size(),
                     file.size());

@@ -24,6 +24,7 @@
 #include "tools/viewer/playback.h"
 #include "tools/viewer/state_files.h"
 #include "tools/viewer/view_state.h"
+#include "tools/viewer/widget_places.h"
 #include "tools/viewer/window.h"
 
 namespace curvisplat {
@@ -146,6 +147,7 @@ class Viewer {
       if (std::exchange(copy_requested_, false)) copyCommand();
     }
     window_.endFrame(glm::vec3(state_.background()));
+    writeWidgetPlaces();
   }
 
   /// Size in pixels of the picture beside the panels.
