@@ -146,8 +146,18 @@ Stretch Cells::stretchAlong(int axis, uint64_t index, uint64_t count, size_t cel
     return index >= before && index + after < count &&
            scratch_.there[cell + after * stride - before * stride];
   };
-  if (!corrections_.stretch || !is_there(1, 0) || !is_there(0, 1)) return {};
+  if (!corrections_.stretch || is_there(1, 0) + is_there(0, 1) == 0) return {};
   const double* own = scratch_.extent[axis].data() + cell;
+  if (!is_there(1, 0)) {
+    if (!is_there(0, 2)) return {};
+    const double near = own[stride], far = own[2 * stride], steady = steadyGrowth(*own, near, far);
+    return {1, growthOf(*own / (steady * steady), *own / steady, near, far)};
+  }
+  if (!is_there(0, 1)) {
+    if (!is_there(2, 0)) return {};
+    const double near = *(own - stride), far = *(own - 2 * stride), steady = steadyGrowth(*own, near, far);
+    return {1, growthOf(far, near, *own / steady, *own / (steady * steady))};
+  }
   const double before = *(own - stride), after = own[stride];
   // Beyond the last cell is its mirror image, less the steady growth.
   const double before2 = is_there(2, 0) ? *(own - 2 * stride) : before / steadyGrowth(before, *own, after);
@@ -185,6 +195,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
   glm::dvec3 bend(0.0);             // the sum of the centres' second differences
   std::array<double, 3> inwards{};  // along i, j, k: 1 or -1 from a border
   std::array<float, 3> growth{};
+  glm::dvec3 drift(0.0);
   for (int axis = 0; axis < 3; ++axis) {
     const bool has_before = index[axis] > 0 && scratch_.there[cell - cell_strides[axis]];
     const bool has_after = index[axis] + 1 < cells[axis] && scratch_.there[cell + cell_strides[axis]];
@@ -199,14 +210,18 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
                       ? per_step[axis] * (scratch_.centre[has_after ? cell + cell_strides[axis] : cell] -
                                           scratch_.centre[has_before ? cell - cell_strides[axis] : cell])
                       : jacobian[axis];
-    if (!has_before || !has_after) continue;
+    const bool inside = has_before && has_after;
+    if (!inside && inwards[axis] == 0) continue;
     const Stretch of_axis = stretchAlong(axis, index[axis], cells[axis], cell, cell_strides[axis]);
-    stretch[axis] = of_axis.factor;
     if (corrections_.growth) growth[axis] = of_axis.growth;
+    if (!inside) continue;
+    stretch[axis] = of_axis.factor;
+    drift += kDrift * growth[axis] * jacobian[axis];
     bend += stretch[axis] * stretch[axis] *
             (scratch_.centre[cell + cell_strides[axis]] + scratch_.centre[cell - cell_strides[axis]] -
              2.0 * scratch_.centre[cell]);
   }
+  splat.splat.position += drift;
   const double shrink = 1 / (stretch[0] * stretch[1] * stretch[2]);  // from the splat's volume to the cell's
   const LatticeGradient gradient_of(steps);
   for (int axis = 0; axis < 3; ++axis) jacobian[axis] *= stretch[axis];
@@ -226,7 +241,8 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
       }
       // What tangents miss where the scalar bends: node_splats.h.
       const glm::dvec3 gradient = gradient_of(differences);
-      const double mean = std::clamp(here + kBend * (second - glm::dot(gradient, bend)), least, most);
+      const double mean = std::clamp(
+          here + glm::dot(gradient, drift) + kBend * (second - glm::dot(gradient, bend)), least, most);
       *value++ = {mean, scale * rotate(gradient * jacobian), 0.0};
     }
   };

@@ -231,7 +231,10 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     if (whole) bend += stretch[axis] * stretch[axis] * (to_after - to_before);
     if (a + b > 0 && (corrections_.middles || !whole)) middle[axis] = 0.5 * (b - a) / (a + b);
     if (corrections_.growth) growth[axis] = scratch_.growth[axis][in_part];
-    if (whole) continue;
+    if (whole) {
+      middle[axis] += kDrift * growth[axis];
+      continue;
+    }
     if (corrections_.border_codes) {
       if (a + b > 0) inwards[axis] = neighbours.before[axis] == 0 ? 1 : -1;
       middle[axis] *= stretch[axis];

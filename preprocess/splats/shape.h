@@ -47,6 +47,9 @@ glm::dvec3 gradientOf(const Splat& splat, const glm::dvec3& w);
 /// S = A Aᵀ of a splat.
 Symmetric3 shapeMatrix(const Splat& splat);
 
+/// `s` with its eigenvalues raised to `least` (> 0).
+Symmetric3 raisedTo(const Symmetric3& s, double least);
+
 /// The singular values of `m`, largest first: the semi-axes of the ellipsoid that `m` makes of the unit
 /// sphere. Of a splat: singularValues(splat.factor()). Exact to a few units in the last place of each for
 /// matrices whose columns are badly scaled, and of the largest otherwise.
