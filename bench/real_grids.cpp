@@ -34,6 +34,7 @@
 #include "render/image/image_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "tests/reference/direct_picture.h"
 #include "tests/reference/global_order.h"
 #include "tests/reference/grid_field.h"
 #include "tests/reference/known_pictures.h"
@@ -144,7 +145,7 @@ struct Settings {
   std::filesystem::path folder, data;
   std::string only = ".*", views = ".*", json;
   int pixels = 256;
-  double lod_pixels = 0;
+  double lod_pixels = 0, voxel_pixels = 0;
   bool for_vtk = false;
 };
 
@@ -198,7 +199,7 @@ class Measurement {
   void measure(const RealGrid& named) {
     const OpenGrid grid(named);
     const std::filesystem::path cache = settings_.folder / (grid.name + ".splats");
-    convertGrid(*grid.source, cache, grid.scalar);
+    if (settings_.voxel_pixels == 0) convertGrid(*grid.source, cache, grid.scalar);
     PictureSheet sheet(size_, 1);
     for (const NamedView& view : chosenViews(grid)) {
       std::vector<Image> pictures;
@@ -268,6 +269,15 @@ class Measurement {
     return options;
   }
 
+  /// By the cache, or of splats that are merged into voxels here.
+  Image drawn(const OpenGrid& grid, const std::filesystem::path& cache, const NamedView& view,
+              const TransferFunction& function) const {
+    if (settings_.voxel_pixels == 0) return drawCache(cache, function, view.camera, frame());
+    DirectOptions options;
+    options.voxel = settings_.voxel_pixels * 2 * view.camera.parallel_scale / size_.height;
+    return drawDirectly(*grid.source, grid.scalar, options, function, view.camera, size_);
+  }
+
   static void show(const Image& picture, const Image& exact, const Image& vtk, float gain,
                    std::vector<Image>& pictures) {
     const bool has_truth = exact.size.pixels() > 0;
@@ -285,8 +295,7 @@ class Measurement {
       return OpticalProperties{glm::dvec3(0.0), extinction};
     };
     const Image exact = truth(grid, view, "uniform", medium, true);
-    const Image picture =
-        drawCache(cache, uniformMedium(extinction, grid.field.range()), view.camera, frame());
+    const Image picture = drawn(grid, cache, view, uniformMedium(extinction, grid.field.range()));
     const Image vtk = byVtk(grid, view, "uniform_vtk");
     const Ripple ours = rippleOf(picture, exact);
     row["rms_percent"] = ours.rms_percent;
@@ -306,10 +315,13 @@ class Measurement {
                      nlohmann::json& row, std::vector<Image>& pictures) const {
     const auto [low, high] = grid.field.range();
     const KnownFunction function = KnownFunction::of("smooth", low, high, grid.length);
-    const Image picture = drawCache(cache, function.table, view.camera, frame());
-    const Image sorted =
-        globallySorted(CacheReader(cache), function.table, Backend::kCpu, view.camera, frame());
-    row["order_255"] = 255 * compareImages(picture, sorted).largest;
+    const Image picture = drawn(grid, cache, view, function.table);
+    row["order_255"] = 0.0;
+    if (settings_.voxel_pixels == 0) {
+      const Image sorted =
+          globallySorted(CacheReader(cache), function.table, Backend::kCpu, view.camera, frame());
+      row["order_255"] = 255 * compareImages(picture, sorted).largest;
+    }
     Image exact, vtk;
     if (!grid.field.ofCells()) {
       exact = truth(grid, view, "scalar", function.exact, false);
@@ -367,6 +379,9 @@ int run(int argc, char** argv) {
   app.add_option("--pixels", settings.pixels, "Width and height of the pictures (default 256)")
       ->check(CLI::Range(16, 2048));
   app.add_option("--lod-pixels", settings.lod_pixels, "Screen error (default 0: the finest level)");
+  app.add_option("--voxel-pixels", settings.voxel_pixels,
+                 "Merge the finest splats into voxels of this size instead, as coarse levels do; not for "
+                 "grids of cells");
   app.add_flag("--for-vtk", settings.for_vtk, "Only write what peers/vtk_views.py needs");
   app.add_option("--json", settings.json, "Write the table as JSON to this file");
   CLI11_PARSE(app, argc, argv);

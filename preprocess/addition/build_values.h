@@ -55,7 +55,9 @@ class ValueBuilder {
   [[noreturn]] void refuse(uint32_t position, const std::string& what) const;
 
   const Brick& brickAt(uint32_t position) const { return cache_->bricks()[(*order_)[position]]; }
-  OctantMerger newMerger() const { return {cache_->manifest().root, variables_}; }
+  OctantMerger newMerger() const {
+    return {cache_->manifest().root, variables_, cache_->manifest().hasFeature(kMergedBorders)};
+  }
 
   const CacheReader* cache_;
   const ConversionOrder* order_;

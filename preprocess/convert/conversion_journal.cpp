@@ -10,7 +10,7 @@
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/base/json_text.h"
+#include "stream/base/json_document.h"
 
 namespace curvisplat {
 namespace {
@@ -48,10 +48,8 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
-/// A text with the checksum of a journal's, and not one that this program has written.
-struct NotAJournal {};
-
-std::string unescaped(const std::string& text) {
+std::string unescaped(const JsonField& field) {
+  const std::string text = field.text();
   std::string out;
   for (size_t n = 0; n < text.size(); ++n) {
     if (text[n] != '%') {
@@ -61,26 +59,19 @@ std::string unescaped(const std::string& text) {
     unsigned byte = 0;
     const char* const begin = text.data() + n + 1;
     if (n + 2 >= text.size() || std::from_chars(begin, begin + 2, byte, 16).ptr != begin + 2)
-      throw NotAJournal();
+      field.fail("text with %XX for bytes");
     out += static_cast<char>(byte);
     n += 2;
   }
   return out;
 }
 
-template <typename Number>
-Number wholeNumber(const json& from) {
-  if (!from.is_number_unsigned() || from.get<uint64_t>() > std::numeric_limits<Number>::max())
-    throw NotAJournal();
-  return from.get<Number>();
+uint32_t smallCount(const JsonField& field) {
+  return static_cast<uint32_t>(field.count(0, std::numeric_limits<uint32_t>::max()));
 }
 
 json jsonOf(const glm::dvec3& vector) {
   return {vector.x, vector.y, vector.z};
-}
-
-glm::dvec3 vectorOf(const json& from) {
-  return {from.at(0).get<double>(), from.at(1).get<double>(), from.at(2).get<double>()};
 }
 
 json jsonOf(const GridSurvey& survey) {
@@ -94,17 +85,16 @@ json jsonOf(const GridSurvey& survey) {
           {"ranges", ranges}};
 }
 
-GridSurvey surveyOf(const json& from) {
+GridSurvey surveyOf(const JsonField& from) {
   GridSurvey survey;
-  survey.nodes = wholeNumber<uint64_t>(from.at("nodes"));
-  survey.grid_checksum = from.at("grid_checksum").get<uint64_t>();
-  const auto& blanked = from.at("blanked");
-  survey.blanked = {wholeNumber<uint64_t>(blanked.at(0)), wholeNumber<uint64_t>(blanked.at(1)),
-                    wholeNumber<uint64_t>(blanked.at(2))};
-  survey.lower = vectorOf(from.at("lower"));
-  survey.upper = vectorOf(from.at("upper"));
-  for (const auto& range : from.at("ranges"))
-    survey.ranges.push_back({range.at(0).get<double>(), range.at(1).get<double>()});
+  survey.nodes = from.at("nodes").count();
+  survey.grid_checksum = from.at("grid_checksum").count();
+  const JsonField blanked = from.at("blanked");
+  survey.blanked = {blanked[0].count(), blanked[1].count(), blanked[2].count()};
+  survey.lower = from.at("lower").point();
+  survey.upper = from.at("upper").point();
+  for (const JsonField& range : from.at("ranges").elements())
+    survey.ranges.push_back({range[0].number(), range[1].number()});
   return survey;
 }
 
@@ -126,9 +116,9 @@ json jsonOf(const BucketTree& tree) {
 }
 
 /// Children come after their parent, and are no one else's: in the order in which the tree was split.
-void requireTree(const std::vector<BucketTree::Link>& links, size_t buckets) {
+bool isTree(const std::vector<BucketTree::Link>& links, size_t buckets) {
   std::vector<uint32_t> level(links.size(), BucketTree::kNone);
-  if (links.empty()) throw NotAJournal();
+  if (links.empty()) return false;
   level[0] = 0;
   for (size_t node = 0; node < links.size(); ++node) {
     const BucketTree::Link& link = links[node];
@@ -137,29 +127,30 @@ void requireTree(const std::vector<BucketTree::Link>& links, size_t buckets) {
                           (leaf ? link.bucket < buckets
                                 : link.first_child > node && links.size() - link.first_child >= 8 &&
                                       link.first_child < links.size() && level[node] < kMaxLevel);
-    if (!possible) throw NotAJournal();
+    if (!possible) return false;
     for (uint32_t octant = 0; !leaf && octant < 8; ++octant) {
       uint32_t& child = level[link.first_child + octant];
-      if (child != BucketTree::kNone) throw NotAJournal();
+      if (child != BucketTree::kNone) return false;
       child = level[node] + 1;
     }
   }
+  return true;
 }
 
-BucketTree treeOf(const json& nodes, size_t buckets) {
+BucketTree treeOf(const JsonField& nodes, size_t buckets) {
   std::vector<BucketTree::Link> links;
   std::vector<CellContents> contents;
-  for (const auto& row : nodes) {
-    links.push_back({wholeNumber<uint32_t>(row.at(0)), wholeNumber<uint32_t>(row.at(1))});
+  for (const JsonField& row : nodes.elements()) {
+    links.push_back({smallCount(row[0]), smallCount(row[1])});
     contents.emplace_back();
     if (row.size() == 2) continue;
-    contents.back().splats = wholeNumber<uint64_t>(row.at(2));
+    contents.back().splats = row[2].count();
     for (size_t axis = 0; axis < 3; ++axis) {
-      contents.back().lower.at[axis] = wholeNumber<uint64_t>(row.at(3 + axis));
-      contents.back().upper.at[axis] = wholeNumber<uint64_t>(row.at(6 + axis));
+      contents.back().lower.at[axis] = row[3 + axis].count();
+      contents.back().upper.at[axis] = row[6 + axis].count();
     }
   }
-  requireTree(links, buckets);
+  if (!isTree(links, buckets)) nodes.fail("the nodes of a tree");
   BucketTree tree = BucketTree::fromLinks(links);
   tree.setContents(tree.leavesBelow(0), contents);
   return tree;
@@ -171,11 +162,10 @@ json jsonOf(const BucketChains& buckets) {
   return {{"chunk_bytes", buckets.chunk_bytes}, {"size", buckets.size}, {"chains", chains}};
 }
 
-BucketChains bucketsOf(const json& from) {
-  BucketChains buckets{
-      wholeNumber<uint64_t>(from.at("chunk_bytes")), wholeNumber<uint64_t>(from.at("size")), {}};
-  for (const auto& chain : from.at("chains"))
-    buckets.chains.push_back({wholeNumber<uint64_t>(chain.at(0)), wholeNumber<uint64_t>(chain.at(1))});
+BucketChains bucketsOf(const JsonField& from) {
+  BucketChains buckets{from.at("chunk_bytes").count(), from.at("size").count(), {}};
+  for (const JsonField& chain : from.at("chains").elements())
+    buckets.chains.push_back({chain[0].count(), chain[1].count()});
   return buckets;
 }
 
@@ -192,28 +182,29 @@ json jsonOf(const ScatteredSplats& splats) {
           {"buckets", jsonOf(splats.buckets)}};
 }
 
-ScatteredSplats splatsOf(const json& from) {
+ScatteredSplats splatsOf(const JsonField& from) {
   ScatteredSplats splats;
   splats.survey = surveyOf(from.at("survey"));
-  splats.counts = {wholeNumber<uint64_t>(from.at("degenerate")), wholeNumber<uint64_t>(from.at("inverted"))};
-  splats.overlap = from.at("overlap");
-  splats.merged_nodes = wholeNumber<uint64_t>(from.at("merged_nodes"));
+  splats.counts = {from.at("degenerate").count(), from.at("inverted").count()};
+  splats.overlap = from.at("overlap").text();
+  splats.merged_nodes = from.at("merged_nodes").count();
   splats.buckets = bucketsOf(from.at("buckets"));
-  if (from.contains("buckets_of_ranks"))
-    for (const auto& buckets : from.at("buckets_of_ranks")) {
+  if (const auto ranks = from.find("buckets_of_ranks"))
+    for (const JsonField& buckets : ranks->elements()) {
       splats.buckets_of_ranks.push_back(bucketsOf(buckets));
-      if (splats.buckets_of_ranks.back().chains.size() != splats.buckets.chains.size()) throw NotAJournal();
+      if (splats.buckets_of_ranks.back().chains.size() != splats.buckets.chains.size())
+        buckets.fail("as many chains as 'buckets'");
     }
   splats.tree = treeOf(from.at("tree"), splats.buckets.chains.size());
   return splats;
 }
 
-ConversionJournal journalOf(const json& content) {
+ConversionJournal journalOf(const JsonField& content) {
   ConversionJournal journal;
-  for (const auto& fact : content.at("facts"))
-    journal.facts.push_back({unescaped(fact.at(0)), unescaped(fact.at(1))});
+  for (const JsonField& fact : content.at("facts").elements())
+    journal.facts.push_back({unescaped(fact[0]), unescaped(fact[1])});
   journal.scratch = unescaped(content.at("scratch"));
-  if (content.contains("splats")) journal.splats = splatsOf(content.at("splats"));
+  if (const auto splats = content.find("splats")) journal.splats = splatsOf(*splats);
   return journal;
 }
 
@@ -273,14 +264,13 @@ std::optional<ConversionJournal> journalFrom(const std::string& bytes) {
   const std::string text = bytes.substr(0, end);
   if (bytes.substr(end) != checksumLine(text)) return std::nullopt;
   try {
-    requireShallowJson(text, kJournalName);
-    const json content = json::parse(text);
-    if (content.at("version") != kJournalVersion) return std::nullopt;
-    return journalOf(content);
-  } catch (const json::exception&) {
-  } catch (const NotAJournal&) {
+    const JsonDocument document(text, kJournalName, "a journal");
+    if (document.root().at("version").json() != kJournalVersion) return std::nullopt;
+    return journalOf(document.root());
+  } catch (const Error&) {
+    // A text with the checksum of a journal's, and not one that this program has written.
+    return std::nullopt;
   }
-  return std::nullopt;
 }
 
 }  // namespace curvisplat

@@ -376,7 +376,7 @@ class Conversion {
     manifest.upper = splats_.survey.upper;
     for (const GridBlock& block : origin_->blocks())
       manifest.blocks.push_back({block.name, block.ni, block.nj, block.nk});
-    manifest.requirements = {kBorderFaces, kCellGrowth};
+    manifest.requirements = {kBorderFaces, kCellGrowth, kMergedBorders};
     manifest.overlap = splats_.overlap;
     manifest.cells = origin_->centring() == Centring::kCell;
     manifest.nodes = splats_.survey.nodes;

@@ -15,9 +15,10 @@ constexpr uint64_t kOctantMask = (uint64_t{1} << kOctantBits) - 1;
 
 }  // namespace
 
-OctantMerger::OctantMerger(const RootCube& root, size_t variables)
+OctantMerger::OctantMerger(const RootCube& root, size_t variables, bool even)
     : root_(root),
       variables_(variables),
+      even_(even),
       unit_(std::ldexp(root.size, -kPositionBits)),
       voxels_(variables, kOctantVoxels),
       values_(variables) {}
@@ -26,7 +27,7 @@ void OctantMerger::begin(const Cell& child) {
   CURVISPLAT_CHECK_OP(child.level, >, 0u);
   child_ = child;
   shift_ = kPositionBits - static_cast<int>(child.level) - kOctantBits;
-  voxels_.clear();
+  voxels_.clear(even_ ? std::ldexp(unit_, shift_) : 0);
 }
 
 size_t OctantMerger::voxelOf(const RootPosition& position) const {
@@ -54,7 +55,10 @@ void OctantMerger::add(const BrickSplats& brick) {
       from_corner[axis] = unit_ * (static_cast<double>(position.at[axis] & in_voxel) + 0.5);
     for (size_t variable = 0; variable < variables_; ++variable)
       values_[variable] = brick.variables[variable][n];
-    voxels_.add(voxelOf(position), from_corner, brick.splats[n], values_);
+    SplatCodes codes;
+    if (!brick.border_codes.empty()) codes.border = brick.border_codes[n];
+    if (!brick.growth_codes.empty()) codes.growth = brick.growth_codes[n];
+    voxels_.add(voxelOf(position), from_corner, brick.splats[n], values_, codes);
   }
 }
 
@@ -66,7 +70,7 @@ MergedOctant OctantMerger::finish() {
   for (size_t voxel = 0; voxel < kOctantVoxels; ++voxel) {
     if (voxels_.count(voxel) == 0) continue;
     Splat splat;
-    voxels_.finish(voxel, splat, values_);
+    const SplatCodes codes = voxels_.finish(voxel, splat, values_);
     merged.detail = std::max(merged.detail, voxels_.detail(voxel));
     // The centre of a cluster lies among its members, thus in the voxel; rounding must not take it out.
     RootPosition position = voxelCorner(voxel);
@@ -75,6 +79,8 @@ MergedOctant OctantMerger::finish() {
           static_cast<uint64_t>(std::clamp(splat.position[axis] / unit_, 0.0, last_in_voxel));
     merged.splats.positions.push_back(position);
     merged.splats.splats.push_back(splat);
+    merged.splats.border_codes.push_back(codes.border);
+    merged.splats.growth_codes.push_back(codes.growth);
     for (size_t variable = 0; variable < variables_; ++variable)
       merged.splats.variables[variable].push_back(values_[variable]);
   }
@@ -89,11 +95,15 @@ BrickSplats joinOctants(const Cell& cell, size_t variables, std::array<MergedOct
   for (const MergedOctant& octant : octants) size += octant.splats.size();
   brick.positions.reserve(size);
   brick.splats.reserve(size);
+  brick.border_codes.reserve(size);
+  brick.growth_codes.reserve(size);
   for (auto& values : brick.variables) values.reserve(size);
   for (MergedOctant& octant : octants) {
     const BrickSplats from = std::exchange(octant.splats, {});
     brick.positions.insert(brick.positions.end(), from.positions.begin(), from.positions.end());
     brick.splats.insert(brick.splats.end(), from.splats.begin(), from.splats.end());
+    brick.border_codes.insert(brick.border_codes.end(), from.border_codes.begin(), from.border_codes.end());
+    brick.growth_codes.insert(brick.growth_codes.end(), from.growth_codes.begin(), from.growth_codes.end());
     for (size_t variable = 0; variable < from.variables.size(); ++variable)
       brick.variables[variable].insert(brick.variables[variable].end(), from.variables[variable].begin(),
                                        from.variables[variable].end());

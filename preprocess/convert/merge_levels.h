@@ -25,7 +25,8 @@ struct MergedOctant {
 /// Merges one child at a time. For one thread; keeps its voxels' memory.
 class OctantMerger {
  public:
-  OctantMerger(const RootCube& root, size_t variables);
+  /// `even`: merged splats have an even blur and end at faces, as in caches with kMergedBorders.
+  OctantMerger(const RootCube& root, size_t variables, bool even = true);
 
   /// Starts `child` (not the root), whose bricks follow.
   void begin(const Cell& child);
@@ -39,6 +40,7 @@ class OctantMerger {
 
   const RootCube root_;
   const size_t variables_;
+  const bool even_;
   const double unit_;  // world units of a step of RootPosition
   VoxelMerger voxels_;
   Cell child_;

@@ -34,10 +34,14 @@ class Cells {
         known_{box.j0 - std::min<uint64_t>(box.j0, kReach), std::min(box.j1 + kReach, in.block.nj - 1),
                box.k0 - std::min<uint64_t>(box.k0, kReach), std::min(box.k1 + kReach, in.block.nk - 1)},
         cells_i_(in.block.ni - 1),
+        i0_(in.i0),
+        i1_(in.endOfPart(cells_i_)),
+        known_i0_(i0_ - std::min(i0_, kReach)),
+        known_i1_(std::min(i1_ + kReach, cells_i_)),
         corrections_(corrections),
         scratch_(scratch),
         out_(out) {
-    scratch_.centre.resize(cells_i_ * rowsOf(known_));
+    scratch_.centre.resize((known_i1_ - known_i0_) * rowsOf(known_));
     scratch_.there.resize(scratch_.centre.size());
     for (auto& extent : scratch_.extent) extent.resize(scratch_.centre.size());
     for (uint64_t k = known_.k0; k < known_.k1; ++k)
@@ -45,7 +49,7 @@ class Cells {
   }
 
   void addRow(uint64_t j, uint64_t k) {
-    for (uint64_t i = 0; i < cells_i_; ++i)
+    for (uint64_t i = i0_; i < i1_; ++i)
       if (scratch_.there[cellAt(i, j, k)]) addCell(i, j, k);
   }
   size_t count() const { return count_; }
@@ -55,7 +59,8 @@ class Cells {
     return (k - in_.window.k0) * plane_stride_ + (j - in_.window.j0) * row_stride_ + i;
   }
   size_t cellAt(uint64_t i, uint64_t j, uint64_t k) const {
-    return ((k - known_.k0) * (known_.j1 - known_.j0) + (j - known_.j0)) * cells_i_ + i;
+    return ((k - known_.k0) * (known_.j1 - known_.j0) + (j - known_.j0)) * (known_i1_ - known_i0_) +
+           (i - known_i0_);
   }
   /// For a side on which the block has no neighbour.
   bool isBorder(const std::array<uint64_t, 3>& cell, int axis, bool upper) const {
@@ -78,8 +83,10 @@ class Cells {
   const NodeBox box_;
   const BlockEnds& ends_;
   const size_t row_stride_, plane_stride_;
-  const NodeBox known_;  // cells that are in the scratch: the box and its neighbours
-  const uint64_t cells_i_;
+  const NodeBox known_;                 // cells that are in the scratch: the box and its neighbours
+  const uint64_t cells_i_;              // of a row
+  const uint64_t i0_, i1_;              // its part
+  const uint64_t known_i0_, known_i1_;  // with its neighbours
   const NodeSplatCorrections corrections_;
   CellScratch& scratch_;
   NodeSplats& out_;
@@ -88,7 +95,8 @@ class Cells {
 
 void Cells::lookAtRow(uint64_t j, uint64_t k) {
   const uint8_t* marks = in_.nodes->blank.data();
-  const size_t node = nodeAt(0, j, k), cell = cellAt(0, j, k);
+  const size_t node = nodeAt(known_i0_, j, k), cell = cellAt(known_i0_, j, k);
+  const size_t cells = known_i1_ - known_i0_;
   const double* const axes[] = {in_.nodes->x.data() + node, in_.nodes->y.data() + node,
                                 in_.nodes->z.data() + node};
   for (int axis = 0; axis < 3; ++axis) {
@@ -97,13 +105,13 @@ void Cells::lookAtRow(uint64_t j, uint64_t k) {
       return (a[i] + a[i + row_stride_]) + (a[i + plane_stride_] + a[i + row_stride_ + plane_stride_]);
     };
     double before = column(0);
-    for (size_t i = 0; i < cells_i_; ++i) {
+    for (size_t i = 0; i < cells; ++i) {
       const double after = column(i + 1);
       scratch_.centre[cell + i][axis] = 0.125 * (before + after);
       before = after;
     }
   }
-  for (size_t i = 0; i < cells_i_; ++i)
+  for (size_t i = 0; i < cells; ++i)
     scratch_.there[cell + i] =
         marks[node + i] == 0 && (cornerMarks(marks, node + i, row_stride_, plane_stride_) & kNoNode) == 0;
 
@@ -118,11 +126,11 @@ void Cells::lookAtRow(uint64_t j, uint64_t k) {
 void Cells::measureRow(uint64_t j, uint64_t k, int axis) {
   const std::array<size_t, 3> strides{1, row_stride_, plane_stride_};
   const size_t along = strides[axis], across = strides[(axis + 1) % 3], other = strides[(axis + 2) % 3];
-  const size_t node = nodeAt(0, j, k);
+  const size_t node = nodeAt(known_i0_, j, k);
   const double *x = in_.nodes->x.data() + node, *y = in_.nodes->y.data() + node,
                *z = in_.nodes->z.data() + node;
-  double* out = scratch_.extent[axis].data() + cellAt(0, j, k);
-  for (size_t i = 0; i < cells_i_; ++i) {
+  double* out = scratch_.extent[axis].data() + cellAt(known_i0_, j, k);
+  for (size_t i = 0; i < known_i1_ - known_i0_; ++i) {
     const auto edges = [&](const double* a) {
       const double* b = a + along;
       return ((b[i] - a[i]) + (b[i + across] - a[i + across])) +
@@ -139,8 +147,18 @@ Stretch Cells::stretchAlong(int axis, uint64_t index, uint64_t count, size_t cel
     return index >= before && index + after < count &&
            scratch_.there[cell + after * stride - before * stride];
   };
-  if (!corrections_.stretch || !is_there(1, 0) || !is_there(0, 1)) return {};
+  if (!corrections_.stretch || is_there(1, 0) + is_there(0, 1) == 0) return {};
   const double* own = scratch_.extent[axis].data() + cell;
+  if (!is_there(1, 0)) {
+    if (!is_there(0, 2)) return {};
+    const double near = own[stride], far = own[2 * stride], steady = steadyGrowth(*own, near, far);
+    return {1, growthOf(*own / (steady * steady), *own / steady, near, far)};
+  }
+  if (!is_there(0, 1)) {
+    if (!is_there(2, 0)) return {};
+    const double near = *(own - stride), far = *(own - 2 * stride), steady = steadyGrowth(*own, near, far);
+    return {1, growthOf(far, near, *own / steady, *own / (steady * steady))};
+  }
   const double before = *(own - stride), after = own[stride];
   // Beyond the last cell is its mirror image, less the steady growth.
   const double before2 = is_there(2, 0) ? *(own - 2 * stride) : before / steadyGrowth(before, *own, after);
@@ -168,7 +186,8 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
 
   const std::array<uint64_t, 3> index{i, j, k};
   const std::array<uint64_t, 3> cells{cells_i_, in_.block.nj - 1, in_.block.nk - 1};
-  const std::array<size_t, 3> cell_strides{1, cells_i_, cells_i_ * (known_.j1 - known_.j0)};
+  const std::array<size_t, 3> cell_strides{1, known_i1_ - known_i0_,
+                                           (known_i1_ - known_i0_) * (known_.j1 - known_.j0)};
   const std::array<size_t, 3> node_strides{1, row_stride_, plane_stride_};
   std::array<size_t, 3> before, after;  // elements of NodeArrays
   std::array<double, 3> per_step;
@@ -177,6 +196,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
   glm::dvec3 bend(0.0);             // the sum of the centres' second differences
   std::array<double, 3> inwards{};  // along i, j, k: 1 or -1 from a border
   std::array<float, 3> growth{};
+  glm::dvec3 drift(0.0);
   for (int axis = 0; axis < 3; ++axis) {
     const bool has_before = index[axis] > 0 && scratch_.there[cell - cell_strides[axis]];
     const bool has_after = index[axis] + 1 < cells[axis] && scratch_.there[cell + cell_strides[axis]];
@@ -191,14 +211,18 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
                       ? per_step[axis] * (scratch_.centre[has_after ? cell + cell_strides[axis] : cell] -
                                           scratch_.centre[has_before ? cell - cell_strides[axis] : cell])
                       : jacobian[axis];
-    if (!has_before || !has_after) continue;
+    const bool inside = has_before && has_after;
+    if (!inside && inwards[axis] == 0) continue;
     const Stretch of_axis = stretchAlong(axis, index[axis], cells[axis], cell, cell_strides[axis]);
-    stretch[axis] = of_axis.factor;
     if (corrections_.growth) growth[axis] = of_axis.growth;
+    if (!inside) continue;
+    stretch[axis] = of_axis.factor;
+    drift += kDrift * growth[axis] * jacobian[axis];
     bend += stretch[axis] * stretch[axis] *
             (scratch_.centre[cell + cell_strides[axis]] + scratch_.centre[cell - cell_strides[axis]] -
              2.0 * scratch_.centre[cell]);
   }
+  splat.splat.position += drift;
   const double shrink = 1 / (stretch[0] * stretch[1] * stretch[2]);  // from the splat's volume to the cell's
   const LatticeGradient gradient_of(steps);
   for (int axis = 0; axis < 3; ++axis) jacobian[axis] *= stretch[axis];
@@ -218,7 +242,8 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
       }
       // What tangents miss where the scalar bends: node_splats.h.
       const glm::dvec3 gradient = gradient_of(differences);
-      const double mean = std::clamp(here + kBend * (second - glm::dot(gradient, bend)), least, most);
+      const double mean = std::clamp(
+          here + glm::dot(gradient, drift) + kBend * (second - glm::dot(gradient, bend)), least, most);
       *value++ = {mean, scale * rotate(gradient * jacobian), 0.0};
     }
   };
@@ -248,37 +273,23 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     return scale;
   };
 
-  const LqFactors lq({jacobian[0].x, jacobian[1].x, jacobian[2].x},
-                     {jacobian[0].y, jacobian[1].y, jacobian[2].y},
-                     {jacobian[0].z, jacobian[1].z, jacobian[2].z});
-  const Lower3& a = lq.lower;
-  if (surelyAboveFloor(a)) {
-    splat.splat.axis = {a.a00, a.a11, a.a22};
-    splat.splat.shear = {a.a10 * lq.inverse_a00, a.a20 * lq.inverse_a00, a.a21 * lq.inverse_a11};
-    const double scale = set_volume(lq.determinant);
-    const auto rotate = [&](const glm::dvec3& v) { return lq.rotate(v); };
-    set_values(scale, rotate);
-    splat.border_code = borderCode(inwards, splat.regular, rotate);
-    splat.growth_code = splat.regular ? growthCode(growth, rotate) : kNoGrowth;
-    keep_part(rotate);
-  } else {
-    const CellShape shape = shapeFromJacobian(jacobian, smallestAxis(hexahedron.centre));
-    splat.splat.axis = shape.axis;
-    splat.splat.shear = shape.shear;
-    double scale = 1;
-    if (shape.floored) {
-      splat.regular = false;
-      splat.splat.weight = std::abs(shape.determinant * shrink + hexahedron.volume_beyond);
-      ++out_.degenerate;
-    } else {
-      scale = set_volume(shape.determinant);
-    }
-    const auto rotate = [&](const glm::dvec3& v) { return shape.rotation * v; };
-    set_values(scale, rotate);
-    splat.border_code = borderCode(inwards, splat.regular, rotate);
-    splat.growth_code = splat.regular ? growthCode(growth, rotate) : kNoGrowth;
-    keep_part(rotate);
-  }
+  splatFromJacobian(
+      jacobian, splat.splat, [&] { return smallestAxis(hexahedron.centre); },
+      [&](const auto& frame) {
+        double scale = 1;
+        if (frame.floored()) {
+          splat.regular = false;
+          splat.splat.weight = std::abs(frame.determinant() * shrink + hexahedron.volume_beyond);
+          ++out_.degenerate;
+        } else {
+          scale = set_volume(frame.determinant());
+        }
+        const auto rotate = [&](const glm::dvec3& v) { return frame.rotate(v); };
+        set_values(scale, rotate);
+        splat.border_code = borderCode(inwards, splat.regular, rotate);
+        splat.growth_code = splat.regular ? growthCode(growth, rotate) : kNoGrowth;
+        keep_part(rotate);
+      });
   count_ += is_left;
 }
 
@@ -299,7 +310,9 @@ void computeCellSplats(const BlockWindow& in, const NodeBox& box, const BlockEnd
   const NodeBox cells{box.j0, std::min(box.j1, block.nj - 1), box.k0, std::min(box.k1, block.nk - 1)};
   if (cells.j0 >= cells.j1 || cells.k0 >= cells.k1) return;
 
-  const size_t most = (block.ni - 1) * rowsOf(cells);
+  const uint64_t end = in.endOfPart(block.ni - 1);
+  if (in.i0 >= end) return;
+  const size_t most = (end - in.i0) * rowsOf(cells);
   const size_t variables = in.nodes->scalars.size();
   out.splats.resize(most);
   out.values.resize(most * variables);

@@ -55,6 +55,38 @@ double largestEigenvalue(const Symmetric3& s) {
   return third + 2 * spread * std::cos(std::acos(cosine) / 3);
 }
 
+/// Gives the splat of a voxel the blur that all of the lattice's have: of the voxel's size, or of the cells' where they
+/// are longer; but across the borders. Gradients and means stay.
+void blurEvenly(const Symmetric3& cells, double voxel_size, const VoxelPlanes& planes, Splat& splat,
+                std::span<SplatScalar> values) {
+  constexpr double kBlur = 0.582;  // of the kernel's variance (stretch.h)
+  constexpr double kMostSteeper = 2;
+  const Symmetric3 own = shapeMatrix(splat), even = raisedTo(cells, voxel_size * voxel_size);
+  glm::dmat3 more(even.xx - own.xx, even.xy - own.xy, even.xz - own.xz, even.xy - own.xy, even.yy - own.yy,
+                  even.yz - own.yz, even.xz - own.xz, even.yz - own.yz, even.zz - own.zz);
+  for (size_t n = 0; n < planes.count; ++n) {
+    const glm::dvec3& q = planes.planes[n].inward;
+    const glm::dmat3 along = glm::dmat3(1.0) - glm::outerProduct(q, q);
+    more = along * more * along;
+  }
+  Symmetric3 shape = own;
+  addScaled(shape, kBlur, {more[0][0], more[0][1], more[1][1], more[0][2], more[1][2], more[2][2]});
+  const double d1 = shape.xx * shape.yy - shape.xy * shape.xy;
+  const double d2 = shape.xx * (shape.yy * shape.zz - shape.yz * shape.yz) -
+                    shape.xy * (shape.xy * shape.zz - shape.yz * shape.xz) +
+                    shape.xz * (shape.xy * shape.yz - shape.yy * shape.xz);
+  if (!(shape.xx > 0 && d1 > 0 && d2 > 0)) return;
+  const Splat before = splat;
+  setShape(splat, shape, splat.axis[0]);
+  for (SplatScalar& value : values) {
+    // A sliver's scalar, carried on as steeply over a voxel's length, would leave the data's range.
+    const double most = kMostSteeper * glm::length(value.slope);
+    value.slope = gradientOf(before, value.slope) * splat.factor();
+    const double length = glm::length(value.slope);
+    if (length > most) value.slope *= most / length;
+  }
+}
+
 }  // namespace
 
 VoxelMerger::VoxelMerger(size_t variables, size_t voxels, double spread)
@@ -62,21 +94,27 @@ VoxelMerger::VoxelMerger(size_t variables, size_t voxels, double spread)
       spread_(spread),
       clusters_(voxels),
       first_(voxels),
+      first_codes_(voxels),
       first_values_(voxels * variables),
       sums_(voxels),
-      variable_sums_(voxels * variables) {}
+      variable_sums_(voxels * variables),
+      faces_(voxels) {}
 
-void VoxelMerger::clear() {
+void VoxelMerger::clear(double voxel_size) {
   std::fill(clusters_.begin(), clusters_.end(), Cluster{});
+  faces_.clear();
+  voxel_size_ = voxel_size;
 }
 
 void VoxelMerger::add(size_t voxel, const glm::dvec3& position, const Splat& splat,
-                      std::span<const SplatScalar> values) {
+                      std::span<const SplatScalar> values, const SplatCodes& codes) {
+  if (voxel_size_ > 0 && codes.border != kNoBorder) faces_.add(voxel, position, splat, codes.border);
   Cluster& cluster = clusters_[voxel];
   SplatScalar* first_values = first_values_.data() + voxel * variables_;
   if (cluster.count++ == 0) {
     first_[voxel] = splat;
     first_[voxel].position = position;
+    first_codes_[voxel] = codes;
     std::copy_n(values.data(), variables_, first_values);
     return;
   }
@@ -119,14 +157,14 @@ void VoxelMerger::accumulate(size_t voxel, const glm::dvec3& position, const Spl
   }
 }
 
-void VoxelMerger::finish(size_t voxel, Splat& splat, std::span<SplatScalar> values) const {
+SplatCodes VoxelMerger::finish(size_t voxel, Splat& splat, std::span<SplatScalar> values) const {
   const Splat& first = first_[voxel];
   const SplatScalar* first_values = first_values_.data() + voxel * variables_;
   CURVISPLAT_CHECK_OP(clusters_[voxel].count, >, 0u);
   if (clusters_[voxel].count == 1) {
     splat = first;
     std::copy_n(first_values, variables_, values.data());
-    return;
+    return first_codes_[voxel];
   }
 
   const GeometrySums& sums = sums_[voxel];
@@ -151,6 +189,15 @@ void VoxelMerger::finish(size_t voxel, Splat& splat, std::span<SplatScalar> valu
     if (explained > t) slope *= std::sqrt(t / explained);
     values[v] = {first_values[v].mean + mean, slope, std::max(0.0, t - explained)};
   }
+  return voxel_size_ > 0 ? finishInLattice(voxel, splat, values) : SplatCodes{};
+}
+
+SplatCodes VoxelMerger::finishInLattice(size_t voxel, Splat& splat, std::span<SplatScalar> values) const {
+  const VoxelPlanes planes = faces_.of(voxel);
+  Symmetric3 cells;
+  addScaled(cells, 1 / sums_[voxel].weight, sums_[voxel].shape);
+  blurEvenly(cells, voxel_size_, planes, splat, values);
+  return {mergedBorderCode(planes, splat.position, splat, voxel_size_), kNoGrowth};
 }
 
 double VoxelMerger::detail(size_t voxel) const {

@@ -1,8 +1,8 @@
 // Moment matching: several splats become one that stands for all of them. DESIGN.md, "Merging".
 //
 // Sums are kept about the first splat added, so that a cluster far from the origin loses no digits. They
-// depend, in their last bits, on the order of the calls. A cluster of any size takes 216 bytes and 80 a
-// variable.
+// depend, in their last bits, on the order of the calls. A cluster of any size takes 228 bytes and 80 a
+// variable, and 88 for each face.
 #pragma once
 
 #include <cstddef>
@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "preprocess/splats/merged_faces.h"
 #include "preprocess/splats/shape.h"
 #include "stream/model/splats.h"
 
@@ -22,21 +23,24 @@ class VoxelMerger {
   /// `spread`: what the covariance of the centres counts in a merged shape. 12 makes n³ unit cells one of
   /// shape n² I; other values are for tests.
   VoxelMerger(size_t variables, size_t voxels, double spread = 12);
-  /// Empties every voxel. Costs 8 bytes of writing a voxel.
-  void clear();
+  /// Empties every voxel. Costs 12 bytes of writing a voxel. `voxel_size`: the length of the voxels' edges, in world
+  /// units, where they are a lattice's, whose splats are to tile space (finish()); 0: they are not.
+  void clear(double voxel_size = 0);
 
   /// Adds a splat to cluster `voxel`. `position` goes before splat.position: world units from any origin that
   /// is common to the voxel's splats. `values` has one element a variable.
-  void add(size_t voxel, const glm::dvec3& position, const Splat& splat, std::span<const SplatScalar> values);
+  void add(size_t voxel, const glm::dvec3& position, const Splat& splat, std::span<const SplatScalar> values,
+           const SplatCodes& codes = {});
 
   size_t voxels() const { return clusters_.size(); }
   /// Splats added to `voxel`. finish() and detail() are for voxels that have some.
   uint32_t count(size_t voxel) const { return clusters_[voxel].count; }
 
-  /// Overwrites `splat` (position from the same origin) and `values`. A single splat comes back as it went
-  /// in, to the bit. If all weights are zero the average is unweighted and the weight is zero. Degenerate
-  /// axes are floored as in shape.h.
-  void finish(size_t voxel, Splat& splat, std::span<SplatScalar> values) const;
+  /// Overwrites `splat` (position from the same origin) and `values`, and returns the codes. A single splat comes back as
+  /// it went in, to the bit. If all weights are zero the average is unweighted and the weight is zero.
+  /// Degenerate axes are floored as in shape.h. Of a lattice's voxels a splat that is merged has the moments of a cell
+  /// with the blur that belongs to the lattice, and ends at the faces that its splats end at.
+  SplatCodes finish(size_t voxel, Splat& splat, std::span<SplatScalar> values) const;
 
   /// World units: the square root of the largest eigenvalue of 12 x the covariance of the merged centres (n³
   /// unit cells: √(n² - 1)). 0 for a single splat. What Brick::error is the largest of.
@@ -61,16 +65,19 @@ class VoxelMerger {
         false;  // a weight > 0 has come; until then each splat counts as 1, from then on by its weight
   };
 
+  SplatCodes finishInLattice(size_t voxel, Splat& splat, std::span<SplatScalar> values) const;
   void accumulate(size_t voxel, const glm::dvec3& position, const Splat& splat, const SplatScalar* values);
   void clearSums(size_t voxel);
 
   size_t variables_;
-  double spread_;
+  double spread_, voxel_size_ = 0;
   std::vector<Cluster> clusters_;
   std::vector<Splat> first_;                 // [voxel], of its first splat
+  std::vector<SplatCodes> first_codes_;      // the same
   std::vector<SplatScalar> first_values_;    // [voxel][variable]
   std::vector<GeometrySums> sums_;           // [voxel], valid from the second splat on
   std::vector<VariableSums> variable_sums_;  // [voxel][variable], as sums_
+  MergedFaces faces_;
 };
 
 /// One cluster. As VoxelMerger.

@@ -36,16 +36,20 @@ class Window {
         z_(in.nodes->z.data()),
         blank_(in.nodes->blank.data()),
         ni_(in.block.ni),
+        i0_(in.i0),
+        i1_(in.endOfPart(in.block.ni)),
         row_stride_(static_cast<ptrdiff_t>(ni_)),
         plane_stride_(static_cast<ptrdiff_t>(ni_ * (in.window.j1 - in.window.j0))),
         scratch_(scratch),
         out_(out) {
     for (const auto& scalar : in.nodes->scalars) scalars_.push_back(scalar.data());
-    for (auto& row : scratch.stretch) row.assign(ni_, 1.0f);
-    for (auto& row : scratch.growth) row.assign(ni_, 0.0f);
+    for (auto& row : scratch.stretch) row.assign(i1_ - i0_, 1.0f);
+    for (auto& row : scratch.growth) row.assign(i1_ - i0_, 0.0f);
     scratch.has_blank.resize(rowsOf(in.window));
+    const uint64_t first = i0_ - std::min<uint64_t>(i0_, kStretchReach);
+    const uint64_t end = std::min(i1_ + kStretchReach, ni_);
     for (size_t row = 0; row < scratch.has_blank.size(); ++row)
-      scratch.has_blank[row] = std::memchr(blank_ + row * ni_, 1, ni_) != nullptr;
+      scratch.has_blank[row] = std::memchr(blank_ + row * ni_ + first, 1, end - first) != nullptr;
   }
 
   void addRow(uint64_t j, uint64_t k);
@@ -83,7 +87,7 @@ class Window {
   const double *x_, *y_, *z_;
   const uint8_t* blank_;
   std::vector<const float*> scalars_;
-  uint64_t ni_;
+  uint64_t ni_, i0_, i1_;  // of a row; its part
   ptrdiff_t row_stride_, plane_stride_;
   uint64_t first_node_of_row_ = 0;
   NodeScratch& scratch_;
@@ -127,13 +131,14 @@ void Window::addRow(uint64_t j, uint64_t k) {
 
   if (corrections_.stretch) stretchRow(j, k);
   if (!anyBlankAround(j, k)) {
-    addNode(0, row, at_i(0), true, kNoLayer);
-    for (uint64_t i = 1; i + 1 < ni_; ++i)
+    if (i0_ == 0) addNode(0, row, at_i(0), true, kNoLayer);
+    for (uint64_t i = std::max<uint64_t>(1, i0_); i < std::min(i1_, ni_ - 1); ++i)
       addNode(i, row + static_cast<ptrdiff_t>(i), inner, on_face, layer_at(i));
-    if (ni_ > 1) addNode(ni_ - 1, row + static_cast<ptrdiff_t>(ni_ - 1), at_i(ni_ - 1), true, kNoLayer);
+    if (ni_ > 1 && i1_ == ni_)
+      addNode(ni_ - 1, row + static_cast<ptrdiff_t>(ni_ - 1), at_i(ni_ - 1), true, kNoLayer);
     return;
   }
-  for (uint64_t i = 0; i < ni_; ++i) {
+  for (uint64_t i = i0_; i < i1_; ++i) {
     const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
     if (blank_[at]) continue;
     Neighbours neighbours = at_i(i);
@@ -152,7 +157,7 @@ bool Window::anyBlankAround(uint64_t j, uint64_t k) const {
          (k > 0 && hasBlank(j, k - 1)) || (k + 1 < block.nk && hasBlank(j, k + 1));
 }
 
-/// Fills the scratch with the stretch of a row's nodes.
+/// Fills the scratch with the stretch of the nodes of a row's part.
 void Window::stretchRow(uint64_t j, uint64_t k) {
   constexpr uint64_t kWhole = kStretchReach - 1;  // neighbours on a side that stretchNodes() needs
   const GridBlock& block = in_.block;
@@ -167,9 +172,14 @@ void Window::stretchRow(uint64_t j, uint64_t k) {
         const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
         if (blank_[at]) continue;
         const Stretch stretch = stretchOfNode(at, strides[axis], axis == 0 ? i : index[axis], count[axis]);
-        out[i] = stretch.factor;
-        growth[i] = stretch.growth;
+        out[i - i0_] = stretch.factor;
+        growth[i - i0_] = stretch.growth;
       }
+    };
+    const auto at_once = [&](uint64_t begin, uint64_t end) {
+      if (begin >= end) return;
+      stretchNodes({x_, y_, z_}, row + static_cast<ptrdiff_t>(begin), strides[axis], end - begin,
+                   out + (begin - i0_), growth + (begin - i0_));
     };
     bool whole = true;
     if (axis == 0) {
@@ -180,14 +190,13 @@ void Window::stretchRow(uint64_t j, uint64_t k) {
         whole = !(axis == 1 ? hasBlank(j + n - kWhole, k) : hasBlank(j, k + n - kWhole));
     }
     if (!whole) {
-      one_by_one(0, ni_);
+      one_by_one(i0_, i1_);
     } else if (axis == 0) {
-      one_by_one(0, kWhole);
-      stretchNodes({x_, y_, z_}, row + static_cast<ptrdiff_t>(kWhole), 1, ni_ - 2 * kWhole, out + kWhole,
-                   growth + kWhole);
-      one_by_one(ni_ - kWhole, ni_);
+      one_by_one(i0_, std::min(kWhole, i1_));
+      at_once(std::max(kWhole, i0_), std::min(ni_ - kWhole, i1_));
+      one_by_one(std::max(ni_ - kWhole, i0_), i1_);
     } else {
-      stretchNodes({x_, y_, z_}, row, strides[axis], ni_, out, growth);
+      at_once(i0_, i1_);
     }
   }
 }
@@ -205,7 +214,9 @@ Stretch Window::stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, ui
 }
 
 inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face, int layer) {
-  const glm::dvec3 stretch(scratch_.stretch[0][i], scratch_.stretch[1][i], scratch_.stretch[2][i]);
+  const uint64_t in_part = i - i0_;
+  const glm::dvec3 stretch(scratch_.stretch[0][in_part], scratch_.stretch[1][in_part],
+                           scratch_.stretch[2][in_part]);
   NodeSplat& node = out_.splats[count_];
   node.node = first_node_of_row_ + i;
   node.node_position = position(at);
@@ -232,8 +243,11 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     const bool whole = neighbours.before[axis] != 0 && neighbours.after[axis] != 0;
     if (whole) bend += stretch[axis] * stretch[axis] * (to_after - to_before);
     if (a + b > 0 && (corrections_.middles || !whole)) middle[axis] = 0.5 * (b - a) / (a + b);
-    if (corrections_.growth) growth[axis] = scratch_.growth[axis][i];
-    if (whole) continue;
+    if (corrections_.growth) growth[axis] = scratch_.growth[axis][in_part];
+    if (whole) {
+      middle[axis] += kDrift * growth[axis];
+      continue;
+    }
     if (corrections_.border_codes) {
       if (a + b > 0) inwards[axis] = neighbours.before[axis] == 0 ? 1 : -1;
       middle[axis] *= stretch[axis];
@@ -248,9 +262,13 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   const double shrink = 1 / (stretch[0] * stretch[1] * stretch[2]);  // from the splat's volume to the cell's
 
   bool is_left = true;  // a part of the cell at least
-  // `rotate` gives Q's image of a vector; `to_factor` A⁻¹ of one.
-  const auto set_values = [&](const auto& rotate, const auto& to_factor, bool correct_bends) {
-    const glm::dvec3 bend_in_cells = correct_bends ? to_factor(bend) : glm::dvec3(0.0);
+  const auto set_values = [&](const auto& frame) {
+    constexpr bool kPlain = std::remove_cvref_t<decltype(frame)>::kIsPlain;
+    // Where an axis was raised there is no telling a bend of the scalar from one of the coordinates.
+    const bool correct_bends = kPlain && corrections_.bends;
+    glm::dvec3 bend_in_cells(0.0);
+    if constexpr (kPlain)
+      if (correct_bends) bend_in_cells = frame.inFrame(bend);
     SplatScalar* value = out_.values.data() + count_ * scalars_.size();
     for (const float* f : scalars_) {
       const double here = f[at];
@@ -264,7 +282,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
         least = std::min({least, before, after});
         most = std::max({most, before, after});
       }
-      const glm::dvec3 slope = rotate(gradient * stretch);
+      const glm::dvec3 slope = frame.rotate(gradient * stretch);
       double mean = here + glm::dot(gradient, middle);
       if (correct_bends)
         mean = std::clamp(mean + kBend * (second - glm::dot(slope, bend_in_cells)), least, most);
@@ -272,44 +290,22 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     }
   };
 
-  const LqFactors lq({jacobian[0].x, jacobian[1].x, jacobian[2].x},
-                     {jacobian[0].y, jacobian[1].y, jacobian[2].y},
-                     {jacobian[0].z, jacobian[1].z, jacobian[2].z});
-  const Lower3& a = lq.lower;
-  if (surelyAboveFloor(a)) {
-    node.splat.axis = {a.a00, a.a11, a.a22};
-    node.splat.shear = {a.a10 * lq.inverse_a00, a.a20 * lq.inverse_a00, a.a21 * lq.inverse_a11};
-    node.splat.weight = a.a00 * a.a11 * a.a22 * weight_factor * shrink;
-    node.regular = weight_factor == 1;
-    node.border_code =
-        borderCode(inwards, corrections_.faces, [&](const glm::dvec3& v) { return lq.rotate(v); });
-    node.growth_code = growthCode(growth, [&](const glm::dvec3& v) { return lq.rotate(v); });
-    (lq.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
-    if (layer != kNoLayer && node.border_code == kNoBorder) cutBehindFace(node, at, neighbours, layer);
-    set_values([&](const glm::dvec3& gradient) { return lq.rotate(gradient); },
-               [&](const glm::dvec3& v) {
-                 const double v0 = v.x * lq.inverse_a00, v1 = (v.y - a.a10 * v0) * lq.inverse_a11;
-                 return glm::dvec3(v0, v1, (v.z - a.a20 * v0 - a.a21 * v1) / a.a22);
-               },
-               corrections_.bends);
-    is_left = keepPart(at, [&](const glm::dvec3& v) { return lq.rotate(v); });
-  } else {
-    const CellShape shape = shapeFromJacobian(jacobian, smallestAxis(at, neighbours));
-    node.splat.axis = shape.axis;
-    node.splat.shear = shape.shear;
-    node.splat.weight = std::abs(shape.determinant) * weight_factor * shrink;
-    node.regular = !shape.floored;
-    node.border_code = borderCode(inwards, corrections_.faces && !shape.floored,
-                                  [&](const glm::dvec3& v) { return shape.rotation * v; });
-    node.growth_code = shape.floored
-                           ? kNoGrowth
-                           : growthCode(growth, [&](const glm::dvec3& v) { return shape.rotation * v; });
-    (shape.floored ? out_.degenerate : shape.determinant < 0 ? out_.left_handed : out_.right_handed) += 1;
-    // Where an axis was raised there is no telling a bend of the scalar from one of the coordinates.
-    set_values([&](const glm::dvec3& gradient) { return shape.rotation * gradient; },
-               [](const glm::dvec3& v) { return v; }, false);
-    is_left = keepPart(at, [&](const glm::dvec3& v) { return shape.rotation * v; });
-  }
+  splatFromJacobian(
+      jacobian, node.splat, [&] { return smallestAxis(at, neighbours); },
+      [&](const auto& frame) {
+        const auto rotate = [&](const glm::dvec3& v) { return frame.rotate(v); };
+        node.splat.weight = std::abs(frame.determinant()) * weight_factor * shrink;
+        node.regular = !frame.floored() && weight_factor == 1;
+        node.border_code = borderCode(inwards, corrections_.faces && !frame.floored(), rotate);
+        node.growth_code = frame.floored() ? kNoGrowth : growthCode(growth, rotate);
+        (frame.floored()           ? out_.degenerate
+         : frame.determinant() < 0 ? out_.left_handed
+                                   : out_.right_handed) += 1;
+        if (frame.kIsPlain && layer != kNoLayer && node.border_code == kNoBorder)
+          cutBehindFace(node, at, neighbours, layer);
+        set_values(frame);
+        is_left = keepPart(at, rotate);
+      });
   count_ += is_left;
 }
 
@@ -383,7 +379,8 @@ void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeScratch& s
 
   // Sized for the most there can be and cut afterwards: in a run over equal boxes nothing is initialised
   // twice.
-  const size_t most = in.block.ni * (box.j1 - box.j0) * (box.k1 - box.k0);
+  CURVISPLAT_CHECK_OP(in.i0, <, in.endOfPart(in.block.ni));
+  const size_t most = (in.endOfPart(in.block.ni) - in.i0) * (box.j1 - box.j0) * (box.k1 - box.k0);
   const size_t variables = in.nodes->scalars.size();
   out.splats.resize(most);
   out.values.resize(most * variables);

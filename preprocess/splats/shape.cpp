@@ -183,6 +183,26 @@ Symmetric3 shapeMatrix(const Splat& splat) {
           a20 * a20 + a21 * a21 + a22 * a22};
 }
 
+Symmetric3 raisedTo(const Symmetric3& s, double least) {
+  Symmetric3 raised{least, 0, least, 0, 0, least};
+  if (s.xx + s.yy + s.zz <= least) return raised;
+  const double scale = 1 / std::max({s.xx, s.yy, s.zz});
+  const Svd svd = decompose({scale * s.xx, scale * s.xy, scale * s.xz, scale * s.xy, scale * s.yy,
+                             scale * s.yz, scale * s.xz, scale * s.yz, scale * s.zz});
+  for (int n = 0; n < 3; ++n) {
+    const double more = svd.sigma[n] / scale - least;
+    if (!(more > 0)) break;
+    const glm::dvec3& v = svd.v[n];
+    raised.xx += more * v.x * v.x;
+    raised.xy += more * v.x * v.y;
+    raised.yy += more * v.y * v.y;
+    raised.xz += more * v.x * v.z;
+    raised.yz += more * v.y * v.z;
+    raised.zz += more * v.z * v.z;
+  }
+  return raised;
+}
+
 std::array<double, 3> singularValues(const glm::dmat3& m) {
   const double scale = largestEntry(m);
   if (!(scale > 0)) return {0, 0, 0};

@@ -47,6 +47,9 @@ glm::dvec3 gradientOf(const Splat& splat, const glm::dvec3& w);
 /// S = A Aᵀ of a splat.
 Symmetric3 shapeMatrix(const Splat& splat);
 
+/// `s` with its eigenvalues raised to `least` (> 0).
+Symmetric3 raisedTo(const Symmetric3& s, double least);
+
 /// The singular values of `m`, largest first: the semi-axes of the ellipsoid that `m` makes of the unit
 /// sphere. Of a splat: singularValues(splat.factor()). Exact to a few units in the last place of each for
 /// matrices whose columns are badly scaled, and of the largest otherwise.
@@ -65,6 +68,52 @@ inline bool surelyAboveFloor(const Lower3& a) {
   const double determinant = c5 * a.a22;
   constexpr double kMargin = 1.01;  // for the rounding of c2
   return determinant * determinant > kMargin * kAxisFloor * kAxisFloor * norm2 * adjugate2;
+}
+
+/// J = A Q of a cell whose singular values are surely above the floor: the quick way, without one of them computed.
+struct PlainFrame {
+  static constexpr bool kIsPlain = true;
+  const LqFactors& lq;
+
+  glm::dvec3 rotate(const glm::dvec3& v) const { return lq.rotate(v); }
+  /// A⁻¹ v.
+  glm::dvec3 inFrame(const glm::dvec3& v) const {
+    const Lower3& a = lq.lower;
+    const double v0 = v.x * lq.inverse_a00, v1 = (v.y - a.a10 * v0) * lq.inverse_a11;
+    return {v0, v1, (v.z - a.a20 * v0 - a.a21 * v1) / a.a22};
+  }
+  double determinant() const { return lq.determinant; }
+  bool floored() const { return false; }
+};
+
+/// The same of any other cell.
+struct AnyFrame {
+  static constexpr bool kIsPlain = false;
+  const CellShape& shape;
+
+  glm::dvec3 rotate(const glm::dvec3& v) const { return shape.rotation * v; }
+  double determinant() const { return shape.determinant; }
+  bool floored() const { return shape.floored; }
+};
+
+/// Sets axis and shear of `splat` from a Jacobian of any rank, then calls `use` with the cell's frame, a PlainFrame or
+/// an AnyFrame. `smallest()`: as shapeFromJacobian's.
+template <typename Smallest, typename Use>
+void splatFromJacobian(const glm::dmat3& jacobian, Splat& splat, const Smallest& smallest, const Use& use) {
+  const LqFactors lq({jacobian[0].x, jacobian[1].x, jacobian[2].x},
+                     {jacobian[0].y, jacobian[1].y, jacobian[2].y},
+                     {jacobian[0].z, jacobian[1].z, jacobian[2].z});
+  const Lower3& a = lq.lower;
+  if (surelyAboveFloor(a)) {
+    splat.axis = {a.a00, a.a11, a.a22};
+    splat.shear = {a.a10 * lq.inverse_a00, a.a20 * lq.inverse_a00, a.a21 * lq.inverse_a11};
+    use(PlainFrame{lq});
+  } else {
+    const CellShape shape = shapeFromJacobian(jacobian, smallest());
+    splat.axis = shape.axis;
+    splat.shear = shape.shear;
+    use(AnyFrame{shape});
+  }
 }
 
 }  // namespace curvisplat

@@ -17,114 +17,63 @@
 #include "render/colour/transfer_function.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "stream/base/json_text.h"
+#include "stream/base/json_document.h"
 
 namespace curvisplat {
 namespace {
 
 using Json = nlohmann::json;
 
-/// The JSON object of one preset, with its place for messages.
-class PresetObject {
- public:
-  PresetObject(const std::filesystem::path& path, const Json& object) : path_(path), object_(object) {
-    if (!object.is_object())
-      throw Error("{}: expected a colour-map preset (a JSON object, or a list of them), found {}",
-                  path.string(), kind(object));
-    name_ = path.stem().string();
-    if (const Json* name = find("Name")) {
-      if (!name->is_string()) fail("Name", "a string", kind(*name));
-      name_ = name->get<std::string>();
-      for (char& c : name_)
-        if (static_cast<unsigned char>(c) < ' ') c = ' ';  // messages are one line
-    }
-  }
+/// A list of numbers, `tuple` for each point; one point or more.
+std::vector<double> tuplesOf(const JsonField& list, size_t tuple, std::string_view form) {
+  std::vector<double> values = list.numbers();
+  if (values.empty() || values.size() % tuple != 0)
+    list.fail(fmt::format("{} numbers a point ({}), not {} in all", tuple, form, values.size()));
+  return values;
+}
 
-  const std::string& name() const { return name_; }
-  std::string origin() const { return fmt::format("{}: preset '{}'", path_.string(), name_); }
+/// 0, 1, true or false.
+bool flagIn(const JsonField& preset, const char* name, bool otherwise) {
+  const auto field = preset.find(name);
+  if (!field) return otherwise;
+  const Json& value = field->json();
+  if (value != true && value != false && value != 0 && value != 1) field->fail("0, 1, true or false");
+  return value == true || value == 1;
+}
 
-  const Json* find(const char* field) const {
-    const auto found = object_.find(field);
-    return found == object_.end() ? nullptr : &*found;
-  }
-
-  [[noreturn]] void fail(const char* field, std::string_view expected, std::string_view found) const {
-    throw Error("{}, field {}: expected {}, found {}", origin(), field, expected, found);
-  }
-
-  /// A list of numbers, `tuple` for each point; one point or more.
-  std::vector<double> numbers(const char* field, size_t tuple, std::string_view form) const {
-    const Json* list = find(field);
-    if (!list) fail(field, fmt::format("a list of numbers, {} a point", form), "no such field");
-    if (!list->is_array()) fail(field, fmt::format("a list of numbers, {} a point", form), kind(*list));
-    std::vector<double> values;
-    for (const Json& value : *list) {
-      if (!value.is_number())
-        fail(field, "numbers alone", fmt::format("{} at position {}", kind(value), values.size()));
-      values.push_back(value.get<double>());
-    }
-    if (values.empty() || values.size() % tuple != 0)
-      fail(field, fmt::format("{} numbers a point ({})", tuple, form),
-           fmt::format("{} numbers", values.size()));
-    return values;
-  }
-
-  /// 0, 1, true or false.
-  bool flag(const char* field, bool otherwise) const {
-    const Json* value = find(field);
-    if (!value) return otherwise;
-    if (value->is_boolean()) return value->get<bool>();
-    if (value->is_number() && (*value == 0 || *value == 1)) return *value == 1;
-    fail(field, "0, 1, true or false", kind(*value));
-  }
-
-  void checkUnit(const char* field, double value, std::string_view what) const {
-    if (!(value >= 0 && value <= 1))
-      fail(field, fmt::format("{} between 0 and 1", what), fmt::format("{}", value));
-  }
-
-  /// `value`, or its type, in short.
-  static std::string kind(const Json& value) {
-    if (value.is_structured()) return fmt::format("a JSON {}", value.type_name());
-    return value.dump().substr(0, 60);
-  }
-
- private:
-  const std::filesystem::path& path_;
-  const Json& object_;
-  std::string name_;
-};
+void checkUnit(const JsonField& field, std::string_view what) {
+  if (const double value = field.number(); !(value >= 0 && value <= 1))
+    field.fail(fmt::format("{} between 0 and 1", what));
+}
 
 /// Sorts by x, as ParaView does; points with equal x keep the file's order.
 template <typename Point>
-void sortPoints(std::vector<Point>& points, const PresetObject& preset, const char* field) {
+void sortPoints(std::vector<Point>& points, const JsonField& list) {
   std::stable_sort(points.begin(), points.end(), [](const Point& a, const Point& b) { return a.x < b.x; });
-  if (!(points.front().x < points.back().x))
-    preset.fail(field, "points at two or more different scalars",
-                fmt::format("{} at {}", points.size(), points.front().x));
+  if (!(points.front().x < points.back().x)) list.fail("points at two or more different scalars");
 }
 
-std::vector<ColourPoint> readColours(const PresetObject& preset) {
-  const auto numbers = preset.numbers("RGBPoints", 4, "x, red, green, blue");
+std::vector<ColourPoint> readColours(const JsonField& list) {
+  const auto numbers = tuplesOf(list, 4, "x, red, green, blue");
   std::vector<ColourPoint> points;
   for (size_t n = 0; n < numbers.size(); n += 4) {
-    for (size_t c = 1; c < 4; ++c) preset.checkUnit("RGBPoints", numbers[n + c], "colours");
+    for (size_t c = 1; c < 4; ++c) checkUnit(list[n + c], "colours");
     points.push_back({numbers[n], {numbers[n + 1], numbers[n + 2], numbers[n + 3]}});
   }
-  sortPoints(points, preset, "RGBPoints");
+  sortPoints(points, list);
   return points;
 }
 
-std::vector<OpacityPoint> readOpacities(const PresetObject& preset) {
-  const auto numbers = preset.numbers("Points", 4, "x, opacity, midpoint, sharpness");
+std::vector<OpacityPoint> readOpacities(const JsonField& list) {
+  const auto numbers = tuplesOf(list, 4, "x, opacity, midpoint, sharpness");
   std::vector<OpacityPoint> points;
   for (size_t n = 0; n < numbers.size(); n += 4) {
-    preset.checkUnit("Points", numbers[n + 1], "opacities");
-    preset.checkUnit("Points", numbers[n + 2], "midpoints");
-    preset.checkUnit("Points", numbers[n + 3], "sharpnesses");
+    checkUnit(list[n + 1], "opacities");
+    checkUnit(list[n + 2], "midpoints");
+    checkUnit(list[n + 3], "sharpnesses");
     points.push_back({numbers[n], numbers[n + 1], numbers[n + 2], numbers[n + 3]});
   }
-  sortPoints(points, preset, "Points");
+  sortPoints(points, list);
   return points;
 }
 
@@ -146,36 +95,26 @@ const char* nameOf(ColourSpace space) {
   return "RGB";
 }
 
-ColourSpace readColourSpace(const PresetObject& preset) {
-  const Json* field = preset.find("ColorSpace");
+ColourSpace readColourSpace(const JsonField& preset) {
+  const auto field = preset.find("ColorSpace");
   if (!field) return ColourSpace::kRgb;
   const std::pair<const char*, ColourSpace> known[] = {
       {"RGB", ColourSpace::kRgb},
-      {"HSV", preset.flag("HSVWrap", true) ? ColourSpace::kHsv : ColourSpace::kHsvNoWrap},
+      {"HSV", flagIn(preset, "HSVWrap", true) ? ColourSpace::kHsv : ColourSpace::kHsvNoWrap},
       {"HSVNoWrap", ColourSpace::kHsvNoWrap},
       {"Lab", ColourSpace::kLab},
       {"Diverging", ColourSpace::kDiverging},
       {"Step", ColourSpace::kStep}};
   for (const auto& [name, space] : known)
-    if (*field == name) return space;
-  preset.fail("ColorSpace", "RGB, HSV, HSVNoWrap, Lab, Diverging or Step", PresetObject::kind(*field));
+    if (field->json() == name) return space;
+  field->fail("RGB, HSV, HSVNoWrap, Lab, Diverging or Step");
 }
 
-void refuseCategories(const PresetObject& preset) {
-  const bool no_points = !preset.find("RGBPoints");
-  if (preset.find("IndexedColors") && (no_points || preset.flag("IndexedLookup", false)))
-    preset.fail("IndexedColors", "a continuous colour map (RGBPoints)",
-                "a map of categories, which have no order along a scalar; choose another preset");
-}
-
-Json parse(const std::string& text, const std::filesystem::path& path) {
-  requireShallowJson(text, path.string());
-  try {
-    return Json::parse(text);
-  } catch (const Json::exception& error) {
-    throw Error("{}: expected a ParaView colour-map preset in JSON, found {}", path.string(),
-                jsonFault(text, error));
-  }
+void refuseCategories(const JsonField& preset) {
+  const auto categories = preset.find("IndexedColors");
+  if (categories && (!preset.has("RGBPoints") || flagIn(preset, "IndexedLookup", false)))
+    categories->fail(
+        "a continuous colour map, RGBPoints; categories have no order along a scalar: choose another preset");
 }
 
 }  // namespace
@@ -185,40 +124,40 @@ TransferFunctionDefinition readParaViewPreset(const std::filesystem::path& path)
 }
 
 TransferFunctionDefinition parseParaViewPreset(const std::string& text, const std::filesystem::path& path) {
-  const Json file = parse(text, path);
-  if (file.is_array() && file.empty())
-    throw Error("{}: expected a colour-map preset, found an empty list", path.string());
-  const PresetObject preset(path, file.is_array() ? file.front() : file);
+  const JsonDocument document(text, path.string(), "a colour-map preset of ParaView's");
+  const JsonField root = document.root();
+  if (root.isArray() && root.size() == 0) root.fail("a colour-map preset");
+  const JsonField preset = root.isArray() ? root[0] : root;
+  if (!preset.isObject()) preset.fail("a colour-map preset, an object or a list of them");
   refuseCategories(preset);
 
   TransferFunctionDefinition definition;
-  definition.name = preset.name();
-  definition.origin = preset.origin();
+  const auto name = preset.find("Name");
+  definition.name = oneLine(name ? name->text() : path.stem().string());
+  definition.origin = fmt::format("{}: preset '{}'", path.string(), definition.name);
   definition.colour_space = readColourSpace(preset);
-  definition.colours = readColours(preset);
-  definition.log_scale = preset.flag("UseLogScale", false) || preset.flag("LogScale", false);
+  definition.colours = readColours(preset.at("RGBPoints"));
+  definition.log_scale = flagIn(preset, "UseLogScale", false) || flagIn(preset, "LogScale", false);
   const auto note = [&](std::string words) {
     definition.notes.push_back(fmt::format("{}: {}", path.string(), words));
   };
-  if (file.is_array() && file.size() > 1)
-    note(fmt::format("holds {} presets; the first, '{}', is used", file.size(), preset.name()));
-  if (preset.find("Points"))
-    definition.opacities = readOpacities(preset);
+  if (root.isArray() && root.size() > 1)
+    note(fmt::format("holds {} presets; the first, '{}', is used", root.size(), definition.name));
+  if (const auto points = preset.find("Points"))
+    definition.opacities = readOpacities(*points);
   else
     note("no Points in the file: the default opacity ramp is used");
-  if (preset.find("NanColor")) {
-    const auto rgb = preset.numbers("NanColor", 3, "red, green, blue");
-    if (rgb.size() != 3) preset.fail("NanColor", "3 numbers", fmt::format("{}", rgb.size()));
-    for (const double channel : rgb) preset.checkUnit("NanColor", channel, "colours");
-    definition.nan_colour = {rgb[0], rgb[1], rgb[2]};
+  if (const auto colour = preset.find("NanColor")) {
+    const glm::dvec3 rgb = colour->point();
+    for (size_t channel = 0; channel < 3; ++channel) checkUnit((*colour)[channel], "colours");
+    definition.nan_colour = {rgb.x, rgb.y, rgb.z};
     note("NanColor is not used: a cache does not contain samples that are NaN");
   }
-  if (const Json* unit = preset.find("ScalarOpacityUnitDistance")) {
-    if (!unit->is_number() || !(unit->get<double>() > 0))
-      preset.fail("ScalarOpacityUnitDistance", "a length above zero", PresetObject::kind(*unit));
-    definition.opacity_unit = unit->get<double>();
+  if (const auto unit = preset.find("ScalarOpacityUnitDistance")) {
+    definition.opacity_unit = unit->number();
+    if (!(definition.opacity_unit > 0)) unit->fail("a length above zero");
   }
-  if (preset.flag("UseBelowRangeColor", false) || preset.flag("UseAboveRangeColor", false))
+  if (flagIn(preset, "UseBelowRangeColor", false) || flagIn(preset, "UseAboveRangeColor", false))
     note("colours below and above the range are not used; the colours at its ends continue");
   return definition;
 }

@@ -6,6 +6,7 @@
 #include <glm/vec4.hpp>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <vector>
 
 #include "render/image/image_size.h"
@@ -39,6 +40,7 @@ struct FrameOptions {
   /// Those that draw the picture together, each some of its tiles; null: this process alone.
   Ranks* ranks = nullptr;
   bool direct_reads = true;  // bypass the page cache if the file system can
+  std::stop_token stop;      // ends the drawing with Interrupted
 };
 
 }  // namespace curvisplat

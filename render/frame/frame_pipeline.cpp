@@ -16,6 +16,7 @@
 #include "render/frame/sweep_buffer.h"
 #include "render/surface/scene_layers.h"
 #include "stream/base/error.h"
+#include "stream/base/interrupted.h"
 #include "stream/base/stage_timer.h"
 #include "stream/paging/brick_source.h"
 #include "stream/paging/pager.h"
@@ -75,13 +76,13 @@ class DrawsFinished {
 
 /// The memory and threads that frames share, sized from the budget.
 struct FramePipeline::Pools {
-  Pools(const CacheReader& cache, size_t variable, const FrameBudget& budget_, const PagerOptions& pager_,
-        std::span<ScreenSplat> splats)
+  Pools(const CacheReader& cache, const BrickSource::Variables& variables, const FrameBudget& budget_,
+        const PagerOptions& pager_, std::span<ScreenSplat> splats)
       : budget(budget_),
         pager(pager_),
         ring(splats),
         sweep(budget.sweep_splats, budget.ring_splats / 2),
-        source(cache, variable, pager, budget.cache_bytes, budget.kept_bytes),
+        source(cache, variables, pager, budget.cache_bytes, budget.kept_bytes),
         workers(source, sweep, ring, budget.workers) {}
 
   const FrameBudget budget;
@@ -92,23 +93,20 @@ struct FramePipeline::Pools {
   FrameWorkers workers;
 };
 
-FramePipeline::FramePipeline(const CacheReader& cache, size_t variable, const FramePlanner& planner,
-                             Backend backend)
-    : cache_(cache), variable_(variable), planner_(planner), backend_(makeBackend(backend)) {}
+FramePipeline::FramePipeline(const CacheReader& cache, const DrawnScalars& scalars,
+                             const FramePlanner& planner, Backend backend)
+    : FramePipeline(cache, scalars, planner, makeBackend(backend)) {}
+
+FramePipeline::FramePipeline(const CacheReader& cache, const DrawnScalars& scalars,
+                             const FramePlanner& planner, std::unique_ptr<PaintingBackend> backend)
+    : cache_(cache),
+      variable_(scalars.opacity.variable),
+      coloured_by_(scalars.colour ? std::optional(scalars.colour->variable) : std::nullopt),
+      planner_(planner),
+      backend_(std::move(backend)) {}
 
 FramePipeline::~FramePipeline() {
   endPrefetch();
-}
-
-FramePipeline::Running::Running(FramePipeline& pipeline) : pipeline_(pipeline) {
-  pipeline.endPrefetch();
-  const MutexLock lock(pipeline.mutex_);
-  pipeline.phase_ = Phase::kRunning;
-}
-
-FramePipeline::Running::~Running() {
-  const MutexLock lock(pipeline_.mutex_);
-  pipeline_.phase_ = Phase::kIdle;
 }
 
 void FramePipeline::makePools(const FrameOptions& options) {
@@ -120,7 +118,8 @@ void FramePipeline::makePools(const FrameOptions& options) {
                                  options.output_bytes,
                                  planner_.mostSplats(),
                                  options.size,
-                                 cache_.series().steps.size() > 1};
+                                 cache_.series().steps.size() > 1,
+                                 coloured_by_.has_value()};
   const FrameBudget budget = FrameBudget::of(options.memory_bytes, fixed, options.threads);
   PagerOptions pager;
   pager.buffer_bytes = budget.pager_bytes;
@@ -130,17 +129,22 @@ void FramePipeline::makePools(const FrameOptions& options) {
       pools_->pager.direct == pager.direct)
     return;
   dropPools();  // before the new ones take their memory
-  auto fresh =
-      std::make_unique<Pools>(cache_, variable_, budget, pager, backend_->splatMemory(budget.ring_splats));
+  auto fresh = std::make_unique<Pools>(cache_, BrickSource::Variables(variable_, coloured_by_), budget, pager,
+                                       backend_->splatMemory(budget.ring_splats));
   const MutexLock lock(mutex_);
   pools_ = std::move(fresh);
+}
+
+void FramePipeline::release() {
+  endPrefetch();
+  dropPools();
 }
 
 void FramePipeline::stepChanged() {
   if (pools_) pools_->source.stepChanged();
 }
 
-// Memory is allocated and freed without holding the lock, so that cancel() need not wait for it.
+// Memory is allocated and freed without holding the lock, so that a stop need not wait for it.
 void FramePipeline::dropPools() {
   std::unique_ptr<Pools> old;  // freed after the lock is released
   const MutexLock lock(mutex_);
@@ -150,7 +154,7 @@ void FramePipeline::dropPools() {
 /// Starts the stages on the next slab. False if no slab is left.
 bool FramePipeline::beginSlab(const FramePlan& plan, const FrameOptions& options) {
   const MutexLock lock(mutex_);
-  if (phase_ == Phase::kCancelled) throw Cancelled();
+  throwIfStopped(options.stop);
   if (!pools_->sweep.beginSlab(plan.parts)) return false;
   pools_->ring.resume();
   std::vector<BrickPart> parts;
@@ -167,7 +171,7 @@ bool FramePipeline::beginSlab(const FramePlan& plan, const FrameOptions& options
 
 void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics) {
   if (!options.scene || (options.scene->empty() && options.scene->drawsSplats())) return;
-  const VariableInfo& info = cache_.manifest().variables[variable_];
+  const VariableInfo& info = cache_.manifest().variables[coloured_by_.value_or(variable_)];
   const ScreenView& view = plan.settings.view;
   std::vector<std::unique_ptr<SliceSampler>> samplers;
   for (const SlicePlan& slice : plan.slices) {
@@ -196,10 +200,11 @@ void FramePipeline::sampleSlice(const SlicePlan& slice, SliceSampler& sampler, c
                                 FrameStatistics& statistics) {
   makePools(options);
   const SliceWork work{cache_, slice.parts, sampler, options.keep_going};
+  const std::stop_callback on_stop(options.stop, [this] { stopStages(); });
   try {
     {
       const MutexLock lock(mutex_);
-      if (phase_ == Phase::kCancelled) throw Cancelled();
+      throwIfStopped(options.stop);
       pools_->source.start(slice.parts);
       pools_->workers.startSampling(work);
     }
@@ -209,8 +214,7 @@ void FramePipeline::sampleSlice(const SlicePlan& slice, SliceSampler& sampler, c
     dropPools();
     throw;
   }
-  const MutexLock lock(mutex_);
-  if (phase_ == Phase::kCancelled) throw Cancelled();
+  throwIfStopped(options.stop);
 }
 
 const ClassificationTable& FramePipeline::tableOf(const FramePlan& plan) const {
@@ -222,9 +226,10 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   const FrameWork work{cache_,    plan.parts, plan.settings,      tableOf(plan),
                        plan.keys, hidden_,    options.keep_going, plan.tiles.get()};
   makePools(options);
+  const std::stop_callback on_stop(options.stop, [this] { stopStages(); });
   {
     const MutexLock lock(mutex_);
-    if (phase_ == Phase::kCancelled) throw Cancelled();
+    throwIfStopped(options.stop);
     pools_->ring.reset();
     pools_->sweep.beginFrame();
     pools_->workers.beginFrame(work);
@@ -245,10 +250,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
     dropPools();  // a reading thread that has failed cannot serve the next frame
     throw;
   }
-  {
-    const MutexLock lock(mutex_);
-    if (phase_ == Phase::kCancelled) throw Cancelled();
-  }
+  throwIfStopped(options.stop);
   if (progress) progress->end();
 
   const Cut& cut = plan.cut;
@@ -268,14 +270,16 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   return image;
 }
 
-/// The stage "draw". No picture where the ring was closed: a worker has failed, or the frame was cancelled.
+/// The stage "draw". No picture where the ring was closed: a worker has failed, or a stop was requested.
 Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
                            Progress* progress) {
   Image image;
   backend_->run([&](Painter& painter) {
     const DrawsFinished finished(painter);
-    painter.begin(plan.settings.view.size, options.background, tableOf(plan),
-                  {plan.settings.per_pixel, plan.settings.lit(), plan.settings.layers}, resourcesOf(options));
+    painter.begin(
+        plan.settings.view.size, options.background, tableOf(plan),
+        {plan.settings.per_pixel, plan.settings.lit(), plan.settings.layers, planner_.colourClasses()},
+        resourcesOf(options));
     if (plan.tiles) painter.drawOnly(*plan.tiles);
     hidden_.ask(&painter);
     SegmentDrawer drawer(painter, pools_->ring, statistics.painter_waited_s);
@@ -301,10 +305,9 @@ Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, F
   return image;
 }
 
-void FramePipeline::cancel() {
+/// Called by whoever requests a stop, in its thread.
+void FramePipeline::stopStages() {
   const MutexLock lock(mutex_);
-  if (phase_ == Phase::kIdle) return;
-  phase_ = Phase::kCancelled;
   if (pools_) pools_->workers.stop();
 }
 

@@ -11,16 +11,14 @@
 // All memory is in pools, which are allocated when the first frame needs them and sized from the budget. They
 // are replaced only if the budget's shares change. Between frames the workers can fill the cache of bricks.
 //
-//   idle --Running made--> running --cancel()--> cancelled: the stages are stopped, draw() throws
-//    ^                        |                      |
-//    +--Running destroyed-----+----------------------+
+// A stop that is requested in another thread closes the stages' queues; the thread that draws then finds no more to do,
+// and throws.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 
 #include "render/frame/backend.h"
-#include "render/frame/cancelled.h"
 #include "render/frame/frame_options.h"
 #include "render/frame/frame_plan.h"
 #include "render/frame/frame_statistics.h"
@@ -33,41 +31,32 @@
 
 namespace curvisplat {
 
-/// The stages and pools of one variable of one cache. One caller at a time, except for cancel().
+/// The stages and pools of one variable, or two, of one cache. One caller at a time.
 class FramePipeline {
  public:
-  /// Draws what `planner` plans for that variable of the cache; both must outlive the pipeline. Throws Error
+  /// Draws what `planner` plans for those variables of the cache; both must outlive the pipeline. Throws Error
   /// if the backend is not available.
-  FramePipeline(const CacheReader& cache, size_t variable, const FramePlanner& planner, Backend backend);
+  FramePipeline(const CacheReader& cache, const DrawnScalars& scalars, const FramePlanner& planner,
+                Backend backend);
+  FramePipeline(const CacheReader& cache, const DrawnScalars& scalars, const FramePlanner& planner,
+                std::unique_ptr<PaintingBackend> backend);
   ~FramePipeline();
 
-  /// Marks a frame as running: cancel() has an effect only while a Running exists. Its constructor ends a
-  /// prefetch.
-  class Running {
-   public:
-    explicit Running(FramePipeline& pipeline);
-    ~Running();
-    Running(const Running&) = delete;
-    Running& operator=(const Running&) = delete;
-
-   private:
-    FramePipeline& pipeline_;
-  };
-
+  /// Before a frame, and before what it draws is changed.
+  void endPrefetch();
   /// Fetches, prepares and draws. Memory is divided for a picture of options.size, which may be larger than
-  /// the plan's. Adds to `statistics`. Throws as FrameRenderer::render() does. Call it while a Running
-  /// exists.
+  /// the plan's. Adds to `statistics`. Throws as FrameRenderer::render() does.
   Image draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
              Progress* progress);
   /// Draws the surfaces and slices of options.scene, if there is one, and puts them into the plan as its layers.
   /// Before draw(), and as draw().
   void drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics);
-  /// Makes draw() and drawLayers() throw Cancelled until the next Running is made. Does nothing if no Running exists. Any
-  /// thread.
-  void cancel();
 
   /// Begins to fetch the plan's bricks in the background. Throws UsageError if there is too little memory.
   void prefetch(const FramePlan& plan, const FrameOptions& options);
+
+  /// Gives its memory up until the next frame. Nothing may be drawn meanwhile.
+  void release();
 
   /// The cache is at another step of the same geometry. Nothing may be drawn or fetched meanwhile.
   void stepChanged();
@@ -83,7 +72,7 @@ class FramePipeline {
   void sampleSlice(const SlicePlan& slice, SliceSampler& sampler, const FrameOptions& options,
                    FrameStatistics& statistics);
   bool beginSlab(const FramePlan& plan, const FrameOptions& options);
-  void endPrefetch();
+  void stopStages();
   void makePools(const FrameOptions& options);
   void dropPools();
   Image paint(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
@@ -91,15 +80,14 @@ class FramePipeline {
 
   const CacheReader& cache_;
   const size_t variable_;
+  const std::optional<size_t> coloured_by_;  // another variable
   const FramePlanner& planner_;
   const std::unique_ptr<PaintingBackend> backend_;
   HiddenBricks hidden_;
   FaceMeshes face_meshes_;
   uint64_t least_pager_bytes_ = 0;  // that the largest brick of any step so far needs
 
-  enum class Phase { kIdle, kRunning, kCancelled };
-  Mutex mutex_;  // cancel() comes from another thread
-  Phase phase_ GUARDED_BY(mutex_) = Phase::kIdle;
+  Mutex mutex_;  // a stop comes from another thread
   // Replaced with the mutex held; the thread that draws, which replaces them, reads them without it.
   std::unique_ptr<Pools> pools_;
 };

@@ -1,5 +1,6 @@
 #include "render/project/border_parts.h"
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 
@@ -39,10 +40,38 @@ void reshape(SplatPiece& piece, const Cholesky& l) {
   piece.slope = {w.x, w.y, w.z};
 }
 
+constexpr float kAlong = 0.5f;  // of the cosine: a lattice's axis that is this direction
+
+/// How a cell at a border is cut where cells grow from the border inwards by e^g: by least squares in one dimension, for
+/// g from -0.25 to 0.5. Of half cells, and of whole ones. The slopes and reaches of border_code.h allow for it.
+BorderPart cutOfGrowing(const BorderPart& cut, float g) {
+  if (g == 0) return cut;
+  const bool half = cut.size == kHalfCellStyle.cut.size;
+  g = std::max(g, -0.25f);
+  if (half) {
+    const float curved = std::min(g, 0.3f);
+    return {cut.offset + g * (0.52f + 0.4f * curved), cut.size - g * (0.63f + 0.45f * curved),
+            cut.share - g * (0.76f + 0.9f * curved)};
+  }
+  const float more = std::max(g, 0.0f), less = std::min(g, 0.0f);
+  return {cut.offset + 0.08f * more + 0.02f * less, cut.size + 0.07f * more + 0.12f * less,
+          cut.share + 0.065f * less};
+}
+
+/// The growth along q.
+float growthAlong(const GrowthAxes& growth, const glm::vec3& q) {
+  float along = 0;
+  for (size_t n = 0; n < growth.count; ++n) {
+    const float share = glm::dot(growth.unit[n], q);
+    if (std::abs(share) > kAlong) along += share < 0 ? -growth.growth[n] : growth.growth[n];
+  }
+  return along;
+}
+
 /// Lengthens what the growth's axes have along A q by the part's size. Half cells that are cut are skewed by less along
 /// that axis, by least squares in one dimension; cells that are drawn in two parts are not skewed along it.
 void resize(GrowthAxes& growth, const Shape& shape, const glm::vec3& q, const BorderPart& part, bool cut) {
-  constexpr float kAlong = 0.5f, kSkewOfCut = 0.6f;
+  constexpr float kSkewOfCut = 0.6f;
   const glm::vec3 along = inSpace(shape, q);
   for (size_t n = 0; n < growth.count; ++n) {
     const float share = glm::dot(growth.unit[n], q);
@@ -72,9 +101,11 @@ size_t partsAtBorder(const SplatPiece& whole, uint32_t border_code, const Border
     size_t choice = n;
     for (int a = 0; a < inward.count; ++a) {
       const bool cut = inward.hasFace(a);
-      const BorderPart& part = cut ? style.cut : style.parts[choice & 1];
-      if (!cut) choice >>= 1;
       const glm::vec3& q = inward.axis[static_cast<size_t>(a)];
+      const BorderPart part = !cut               ? style.parts[choice & 1]
+                              : inward.ratio > 0 ? mergedPart(inward)
+                                                 : cutOfGrowing(style.cut, growthAlong(whole.growth, q));
+      if (!cut) choice >>= 1;
       resize(growth, whole.shape, q, part, cut);
       offset += part.offset * q;
       share *= part.share;

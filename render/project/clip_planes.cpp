@@ -11,7 +11,7 @@ namespace curvisplat {
 namespace {
 
 constexpr auto kSupport = static_cast<float>(kKernelSupport);
-constexpr auto kSupportAtBorder = static_cast<float>(kKernelSupport + kCutReach);  // as it is drawn
+constexpr auto kSupportAtBorder = static_cast<float>(kKernelSupport + kMergedReach);  // as it is drawn
 
 /// Aᵀ n: its length is how far the unit sphere's image reaches along n.
 glm::vec3 inFrame(const Shape& s, const glm::vec3& n) {

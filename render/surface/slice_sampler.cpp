@@ -102,7 +102,7 @@ void SliceSampler::add(const glm::dvec3& cell_min, const GeometryArrays<const fl
       const Shape shape = shapeOf(geometry, i);
       const float distance = n.x * geometry.x[i] + n.y * geometry.y[i] + n.z * geometry.z[i] + offset;
       const uint32_t border_code = geometry.border_code[i];
-      const auto support = static_cast<float>(kKernelSupport + (border_code == kNoBorder ? 0 : kCutReach));
+      const auto support = static_cast<float>(kKernelSupport + (border_code == kNoBorder ? 0 : kMergedReach));
       if (!(std::abs(distance) < support * reachAlong(shape, n))) continue;
       const SplatPiece whole{{geometry.x[i], geometry.y[i], geometry.z[i]},
                              shape,

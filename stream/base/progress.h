@@ -9,22 +9,11 @@
 #include <utility>
 #include <vector>
 
-#include "stream/base/error.h"
+#include "stream/base/interrupted.h"
 #include "stream/base/mutex.h"
 #include "stream/base/process_usage.h"
 
 namespace curvisplat {
-
-/// Thrown when the job was asked to stop. Not a failure.
-class Interrupted : public Error {
- public:
-  Interrupted(int signal, const std::string& text) : Error(text), signal_(signal) {}
-  /// The signal that Progress::stop() was given.
-  int signal() const { return signal_; }
-
- private:
-  int signal_;
-};
 
 /// Progress of a job in phases. begin() is for the thread that runs the job. advance() is for any thread and
 /// costs an atomic addition.
@@ -56,7 +45,7 @@ class Progress {
   void end();
 
   /// Asks the job to stop at its next throwIfStopped() because of `signal`. Any thread; safe in a signal
-  /// handler.
+  /// handler, which std::stop_source is not.
   void stop(int signal) { stop_signal_ = signal; }
   /// Throws Interrupted after stop(). Any thread; costs a load.
   void throwIfStopped() const {

@@ -40,7 +40,6 @@ GeometryFolder::GeometryFolder(fs::path folder, Manifest manifest)
       bricks_(readBricks(path_, manifest_)),
       geometry_(cacheFile(path_, manifest_.steps.front().geometry)) {
   checkFile(geometry_, manifest_);
-  checkGrids();
 }
 
 std::shared_ptr<const GeometryFolder> GeometryFolder::open(const fs::path& cache, const Manifest& manifest,
@@ -80,16 +79,6 @@ std::shared_ptr<const ValuesFile> GeometryFolder::values(const Series& series, u
   auto opened = std::make_shared<const ValuesFile>(ValuesFile{std::move(file), std::move(table)});
   known = opened;
   return opened;
-}
-
-/// Only checks that bricks.vdb exists and has the right size. The reader does not need it, and OpenVDB's
-/// parser trusts its input.
-void GeometryFolder::checkGrids() const {
-  const fs::path grids = cacheFile(path_, "bricks.vdb");
-  std::error_code error;
-  const uint64_t bytes = fs::file_size(grids, error);
-  if (error) throw Error("{}: {}; the cache is incomplete: convert again", grids.string(), error.message());
-  checkFile(grids, bytes, manifest_);
 }
 
 }  // namespace curvisplat

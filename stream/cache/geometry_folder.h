@@ -41,8 +41,6 @@ class GeometryFolder {
   std::shared_ptr<const ValuesFile> values(const Series& series, uint64_t step, size_t variable) const;
 
  private:
-  void checkGrids() const;
-
   std::filesystem::path path_;
   Manifest manifest_;
   std::vector<Brick> bricks_;

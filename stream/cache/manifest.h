@@ -51,7 +51,9 @@ class OtherVersion : public Error {
 /// one of version 1 but for these.
 inline constexpr const char* kBorderFaces = "border-faces";  // borders are cut at faces (border_code.h)
 inline constexpr const char* kCellGrowth = "cell-growth";    // kernels are skewed (growth_code.h)
-inline constexpr const char* kSteps = "steps";               // a series of time steps (steps_file.h)
+inline constexpr const char* kMergedBorders =
+    "merged-borders";  // merged splats are cut at faces (border_code.h), and have an even blur
+inline constexpr const char* kSteps = "steps";  // a series of time steps (steps_file.h)
 
 // Manifest::overlap.
 inline constexpr const char* kOverlapAll = "all";      // every block is drawn

@@ -140,18 +140,6 @@ void decodeNaming(const Brick& brick, const char* stream, Decode decode) {
   }
 }
 
-void toFloats(const std::vector<double>& from, float* to) {
-  const double* f = from.data();
-  for (size_t n = 0; n < from.size(); ++n) to[n] = static_cast<float>(f[n]);
-}
-
-/// An axis too small for a float becomes the smallest normal float: smaller divisors would overflow.
-void toAxisFloats(const std::vector<double>& from, float* to) {
-  const double* f = from.data();
-  for (size_t n = 0; n < from.size(); ++n)
-    to[n] = std::max(static_cast<float>(f[n]), std::numeric_limits<float>::min());
-}
-
 /// Centres of the position intervals, relative to the cell's minimum corner. `inside`: the largest float
 /// inside the cell, because rounding must not move a splat out of its cell.
 void toCoordinates(const std::vector<uint32_t>& from, double interval, float inside, float* to) {
@@ -187,8 +175,11 @@ EncodedValues encodeValues(std::span<const NodeRun> runs, std::span<const uint32
 void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const std::byte> bytes,
                     const GeometryArrays<float>& out) {
   CURVISPLAT_CHECK_OP(out.size(), ==, brick.splats);
-  DecodedGeometry& decoded = scratchGeometry();
-  decodeNaming(brick, "geometry", [&] { decodeGeometryStream(brick.cell, brick.splats, bytes, decoded); });
+  DecodedPlaces& decoded = scratchGeometry();
+  const ShapeArrays<float> shapes{
+      {out.axis0, out.axis1, out.axis2}, {out.shear10, out.shear20, out.shear21}, out.weight};
+  decodeNaming(brick, "geometry",
+               [&] { decodeGeometryStream(brick.cell, brick.splats, bytes, decoded, shapes); });
   const double size = root.cellSize(brick.cell.level);
   const double interval = std::ldexp(size, -decoded.position_bits);
   const float rounded = static_cast<float>(size);
@@ -196,13 +187,6 @@ void decodeGeometry(const RootCube& root, const Brick& brick, std::span<const st
   toCoordinates(decoded.position[0], interval, inside, out.x);
   toCoordinates(decoded.position[1], interval, inside, out.y);
   toCoordinates(decoded.position[2], interval, inside, out.z);
-  toAxisFloats(decoded.axis[0], out.axis0);
-  toAxisFloats(decoded.axis[1], out.axis1);
-  toAxisFloats(decoded.axis[2], out.axis2);
-  toFloats(decoded.shear[0], out.shear10);
-  toFloats(decoded.shear[1], out.shear20);
-  toFloats(decoded.shear[2], out.shear21);
-  toFloats(decoded.weight, out.weight);
   std::copy(decoded.border_code.begin(), decoded.border_code.end(), out.border_code);
   std::copy(decoded.growth_code.begin(), decoded.growth_code.end(), out.growth_code);
 }

@@ -52,15 +52,27 @@ struct GeometryHeader {
 };                           // 80
 static_assert(sizeof(GeometryHeader) == 80);
 
-/// A brick's geometry, decoded in double. Reusable scratch memory.
-struct DecodedGeometry {
+/// A brick's geometry without shapes and weights, decoded. Reusable scratch memory.
+struct DecodedPlaces {
   int position_bits = 0;
   std::array<std::vector<uint32_t>, 3> position;  // in units of cell size / 2^position_bits
-  std::array<std::vector<double>, 3> axis, shear;
-  std::vector<double> weight;
   std::vector<uint32_t> border_code, growth_code;
   std::vector<NodeRun> runs;
   std::vector<Row> rows;
+};
+
+/// Arrays of shapes and weights to decode into; borrowed. Floats are the doubles, rounded; an axis too small for a float
+/// becomes the smallest normal one: smaller divisors would overflow.
+template <typename Number>
+struct ShapeArrays {
+  std::array<Number*, 3> axis, shear;
+  Number* weight;
+};
+
+/// A brick's geometry, decoded in double. Reusable scratch memory.
+struct DecodedGeometry : DecodedPlaces {
+  std::array<std::vector<double>, 3> axis, shear;
+  std::vector<double> weight;
 
   void resize(size_t count);
 };
@@ -69,9 +81,12 @@ struct DecodedGeometry {
 std::vector<std::byte> encodeGeometryStream(const RootCube& root, const BrickSplats& brick,
                                             DecodedGeometry& decoded);
 
-/// Decodes untrusted bytes: throws Error unless they hold exactly `count` finite splats in `cell`.
+/// Decodes untrusted bytes: throws Error unless they hold exactly `count` finite splats in `cell`. For merging.
 void decodeGeometryStream(const Cell& cell, uint32_t count, std::span<const std::byte> bytes,
                           DecodedGeometry& out);
+/// The same, straight to floats. For drawing.
+void decodeGeometryStream(const Cell& cell, uint32_t count, std::span<const std::byte> bytes,
+                          DecodedPlaces& places, const ShapeArrays<float>& shapes);
 
 /// The lattice position that `code`, the highest `position_bits` bits in the cell, stands for: the interval's
 /// middle.

@@ -101,12 +101,20 @@ class GeometryEncoder {
                     header_.log_volume, volume, decoded_.axis[2]))
       return false;
     for (size_t n = 0; n < count_; ++n) decoded_.axis[2][n] /= decoded_.axis[0][n] * decoded_.axis[1][n];
-    return encodeShear(2, ShearSteps::l21, [&](size_t n) { return brick_.splats[n].shear[2]; }) &&
-           encodeShear(0, ShearSteps::l10, [&](size_t n) { return brick_.splats[n].shear[0]; }) &&
-           encodeShear(1, ShearSteps::l20, [&](size_t n) {
-             const auto& shear = brick_.splats[n].shear;
-             return shear[1] + shear[2] * (decoded_.shear[0][n] - shear[0]);
-           });
+    const auto &a0 = decoded_.axis[0], &a1 = decoded_.axis[1], &a2 = decoded_.axis[2],
+               &l21 = decoded_.shear[2];
+    return encodeShear(
+               2, [&](size_t n) { return ShearSteps::l21(a1[n], a2[n]); },
+               [&](size_t n) { return brick_.splats[n].shear[2]; }) &&
+           encodeShear(
+               0, [&](size_t n) { return ShearSteps::l10(a0[n], a1[n], a2[n], l21[n]); },
+               [&](size_t n) { return brick_.splats[n].shear[0]; }) &&
+           encodeShear(
+               1, [&](size_t n) { return ShearSteps::l20(a0[n], a2[n]); },
+               [&](size_t n) {
+                 const auto& shear = brick_.splats[n].shear;
+                 return shear[1] + shear[2] * (decoded_.shear[0][n] - shear[0]);
+               });
   }
 
   template <typename Log>
@@ -133,7 +141,7 @@ class GeometryEncoder {
     auto& out = decoded_.shear[which];
     bool fits = true;
     for (size_t n = 0; n < count_; ++n) {
-      const double step = step_of(decoded_, n);
+      const double step = step_of(n);
       const double code = std::nearbyint(target(n) / step);
       fits &= std::abs(code) < kLargestShearCode;  // false for NaN
       const int32_t kept = fits ? static_cast<int32_t>(code) : 0;

@@ -37,16 +37,12 @@ inline constexpr size_t kMaxRunBytes = 50;  // five varints
 /// depends on the decoded l21, because an error of l10 moves the third axis by l21 times as much. Steps are
 /// powers of two, so that neighbouring splats mostly share them and their codes can be predicted.
 struct ShearSteps {
-  static double l21(const DecodedGeometry& d, size_t n) {
-    return powerOfTwo(kShearStep * d.axis[2][n] / d.axis[1][n]);
+  static double l21(double a1, double a2) { return powerOfTwo(kShearStep * a2 / a1); }
+  static double l10(double a0, double a1, double a2, double l21) {
+    const double lever = std::abs(l21) * a1 / a2;
+    return powerOfTwo(kShearStep * a1 / (a0 * std::max(1.0, lever)));
   }
-  static double l10(const DecodedGeometry& d, size_t n) {
-    const double lever = std::abs(d.shear[2][n]) * d.axis[1][n] / d.axis[2][n];
-    return powerOfTwo(kShearStep * d.axis[1][n] / (d.axis[0][n] * std::max(1.0, lever)));
-  }
-  static double l20(const DecodedGeometry& d, size_t n) {
-    return powerOfTwo(kShearStep * d.axis[2][n] / d.axis[0][n]);
-  }
+  static double l20(double a0, double a2) { return powerOfTwo(kShearStep * a2 / a0); }
 
  private:
   /// The largest power of two that is not above `step` (> 0): the mantissa is cleared.

@@ -7,6 +7,8 @@
 #include <glm/mat3x3.hpp>
 #include <numbers>
 
+#include "stream/model/kernel.h"
+
 namespace curvisplat {
 namespace {
 
@@ -27,6 +29,11 @@ glm::dquat rotationOf(std::span<const glm::dvec3> inward) {
 constexpr uint32_t kLayer = 4;
 constexpr int kInwardShift = 8, kDistanceShift = 24;
 constexpr double kDistanceSteps = 128;  // to a cell
+constexpr int kRatioShift = 3;
+constexpr uint32_t kRatioBits = 0x1f;
+constexpr double kSmallestRatio = 0.75, kRatioSteps = 10;  // to a factor of 2
+constexpr uint32_t kMostRatio = 21;                        // of 3
+constexpr double kLongestNext = 3;                         // splats behind, to a merged one's length
 
 /// In 16 bits: the octahedron |x| + |y| + |z| = 1, its lower half folded outwards.
 uint32_t packDirection(const glm::dvec3& q) {
@@ -63,6 +70,14 @@ uint32_t packLayerCode(const glm::dvec3& inward, double distance) {
   return kLayer | packDirection(inward) << kInwardShift | static_cast<uint32_t>(steps) << kDistanceShift;
 }
 
+uint32_t packMergedCode(const glm::dvec3& inward, double distance, double ratio) {
+  if (!(distance <= 1 && ratio > 0)) return kNoBorder;
+  const uint32_t code = packLayerCode(inward, distance);
+  if (code == kNoBorder) return kNoBorder;
+  const double step = 1 + kRatioSteps * std::log2(std::max(ratio, kSmallestRatio) / kSmallestRatio);
+  return code | static_cast<uint32_t>(std::min(std::round(step), 1.0 * kMostRatio)) << kRatioShift;
+}
+
 uint32_t packBorderCode(std::span<const glm::dvec3> inward, uint32_t faces) {
   if (inward.empty()) return kNoBorder;
   const glm::dquat rotation = rotationOf(inward);
@@ -92,7 +107,11 @@ InwardAxes inwardAxes(uint32_t border_code) {
     inward.axis[0] = unpackDirection(border_code >> kInwardShift & 0xffff);
     inward.faces = 1;
     inward.distance = static_cast<float>((border_code >> kDistanceShift) / kDistanceSteps);
-    inward.behind = true;
+    const uint32_t ratio = border_code >> kRatioShift & kRatioBits;
+    inward.behind = ratio == 0;
+    if (ratio != 0)
+      inward.ratio = static_cast<float>(std::min(kSmallestRatio * std::exp2((ratio - 1) / kRatioSteps),
+                                                 kLongestNext / (2.0 * inward.distance)));
     return inward;
   }
   inward.faces = border_code >> kFacesShift & 7;
@@ -116,23 +135,41 @@ InwardAxes inwardAxes(uint32_t border_code) {
 bool isPossibleBorderCode(uint32_t border_code) {
   if (border_code == kNoBorder) return true;
   const uint32_t count = border_code & 3, faces = border_code >> kFacesShift & 7;
-  if (count == 0) return (border_code & 0xff) == kLayer && border_code >> kDistanceShift != 0;
+  if (count == 0) {
+    const uint32_t ratio = border_code >> kRatioShift & kRatioBits, distance = border_code >> kDistanceShift;
+    return (border_code & 7) == kLayer && ratio <= kMostRatio && distance != 0 &&
+           (ratio == 0 || distance <= kDistanceSteps);
+  }
   return faces >> count == 0;
 }
 
+BorderPart mergedPart(const InwardAxes& inward) {
+  const float thickness = 2 * inward.distance, w = 1 / inward.ratio;
+  const float next = thickness * inward.ratio;  // the length of the splats behind
+  const float middle = next * (-0.498f + w * (0.951f + w * (-0.218f + w * 0.0226f)));
+  return {middle - inward.distance, next * (1 + w * (0.0203f + w * (0.2107f + w * 0.0311f))),
+          inward.ratio * (1 + w * (0.0938f + w * (0.4622f - w * 0.0497f)))};
+}
+
 double borderReach(uint32_t border_code) {
-  if ((border_code & 3) == 0) return 0;
-  return (border_code >> kFacesShift & 7) != 0 ? kCutReach : kPartsReach;
+  if (border_code == kNoBorder) return 0;
+  if ((border_code & 3) != 0) return (border_code >> kFacesShift & 7) != 0 ? kCutReach : kPartsReach;
+  if ((border_code >> kRatioShift & kRatioBits) == 0) return 0;
+  const BorderPart part = mergedPart(inwardAxes(border_code));
+  return std::max(0.0, part.offset + kKernelSupport * (part.size - 1));
 }
 
 double drawnSlope(const glm::dvec3& slope, uint32_t border_code) {
   double squared = glm::dot(slope, slope);
-  if ((border_code & 3) == 0) return std::sqrt(squared);
-  constexpr double kWidest = std::max(kHalfCellStyle.cut.size, kWholeCellStyle.cut.size);
+  if (border_code == kNoBorder) return std::sqrt(squared);
+  // A half cell's, with what cells that shrink inwards add (render/project/border_parts.cpp).
+  constexpr double kWidest = kHalfCellStyle.cut.size + 0.13;
   const InwardAxes inward = inwardAxes(border_code);
+  if (inward.behind) return std::sqrt(squared);
+  const double widest = inward.ratio > 0 ? std::max(mergedPart(inward).size, 1.0f) : kWidest;
   for (int n = 0; n < inward.count; ++n) {
     const double along = glm::dot(slope, glm::dvec3(inward.axis[static_cast<size_t>(n)]));
-    if (inward.hasFace(n)) squared += (kWidest * kWidest - 1) * along * along;
+    if (inward.hasFace(n)) squared += (widest * widest - 1) * along * along;
   }
   return std::sqrt(squared);
 }

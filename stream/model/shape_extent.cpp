@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <limits>
 
 #include "stream/model/border_code.h"
@@ -66,9 +67,16 @@ double smallestSingularValue(std::span<const Splat> splats) {
 }
 
 double largestReach(std::span<const Splat> splats, std::span<const uint32_t> border_codes) {
+  const double largest = largestSingularValue(splats);
   double beyond = 0;
-  for (const uint32_t border_code : border_codes) beyond = std::max(beyond, borderReach(border_code));
-  return (kKernelSupport + beyond) * largestSingularValue(splats);
+  for (size_t n = 0; n < border_codes.size(); ++n) {
+    if (border_codes[n] == kNoBorder) continue;
+    const InwardAxes inward = inwardAxes(border_codes[n]);
+    const double length =
+        inward.ratio > 0 ? glm::length(splats[n].factor() * glm::dvec3(inward.axis[0])) : largest;
+    beyond = std::max(beyond, borderReach(border_codes[n]) * length);
+  }
+  return kKernelSupport * largest + beyond;
 }
 
 }  // namespace curvisplat

@@ -254,6 +254,30 @@ TEST_F(Corrections, SpreadOfMergedShapes) {
               "smooth", camera, 35, with, without);
 }
 
+/// Along the rows of a uniform medium in cells 0.02 apart, in voxels of 0.06: two or three cells each.
+void expectEvenMergedSplatsWorth(const std::string& what, double parallel_scale, double least_db) {
+  const FunctionGridSource source({gridBlock(51, 51, 51)}, 1, [](const GridNode& n) {
+    const glm::dvec3 at(static_cast<double>(n.i), static_cast<double>(n.j), static_cast<double>(n.k));
+    return NodeValues{at / 50.0, {0.5f}, false};
+  });
+  Camera camera;
+  camera.position = {0.5, 0.5, 4};
+  camera.focal_point = {0.5, 0.5, 0.5};
+  camera.parallel_scale = parallel_scale;
+  DirectOptions with, without;
+  with.voxel = without.voxel = 0.053;
+  without.even = false;
+  expectWorth(what, source, GridField(source, 0), "smooth", camera, least_db, with, without);
+}
+
+TEST_F(Corrections, EvenBlurOfMergedSplats) {
+  expectEvenMergedSplatsWorth("even blur of merged splats", 0.35, 40);  // no borders
+}
+
+TEST_F(Corrections, BordersOfMergedSplats) {
+  expectEvenMergedSplatsWorth("borders of merged splats", 0.6, 30);
+}
+
 TEST_F(Corrections, VarianceOfMergedSplats) {
   // Noise that a voxel cannot resolve: how often each scalar is in it is all that is left of it.
   std::mt19937_64 random(7);

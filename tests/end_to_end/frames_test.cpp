@@ -214,7 +214,7 @@ TEST_F(Frames, APathGoesThroughItsKeyFrames) {
   EXPECT_NE(bytes("path_2.png"), bytes("path_3.png"));
   std::ofstream(file("broken.json")) << R"({"key_frames": [{"time": 0, "position": [5, 0]}]})";
   expectRefused({"-o", file("broken_%d.png"), "--path", file("broken.json"), "--frames", "5"}, 1,
-                "key frame 0, field position");
+                "key_frames[0].position");
   expectRefused({"-o", file("broken_%d.png"), "--path", file("none.json"), "--frames", "5"}, 1, "none.json");
 }
 

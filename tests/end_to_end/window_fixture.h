@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <sstream>
@@ -22,22 +23,11 @@
 
 namespace curvisplat {
 
-/// Where things are in a window with its panels shown.
-struct WindowPlaces {
+class WindowTest : public testing::Test {
+ protected:
   using Place = std::pair<int, int>;
   static constexpr int kPanel = 338;  // the picture begins right of it
   static constexpr Place kPicture{520, 300};
-  static constexpr Place kScalars{100, 17}, kSecondScalar{60, 58};
-  static constexpr Place kHighInTheCurve{100, 50};
-  static constexpr Place kRangeBegin{50, 201};
-  static constexpr Place kLogScale{18, 225}, kPresetsPoints{245, 225};
-  static constexpr Place kLoad{26, 294}, kSave{70, 294};
-  static constexpr Place kDark{257, 363};
-  static constexpr Place kClipHeader{60, 501}, kClip{18, 524}, kClipX{50, 547};
-};
-
-class WindowTest : public testing::Test, protected WindowPlaces {
- protected:
   static constexpr ImageSize kScreen{1000, 700}, kWindow{900, 600};
 
   static void SetUpTestSuite() {
@@ -45,6 +35,7 @@ class WindowTest : public testing::Test, protected WindowPlaces {
     old_folder_ = std::filesystem::current_path();
     std::filesystem::current_path(folder_->path());  // where pictures are saved
     setenv("XDG_CONFIG_HOME", file("config").c_str(), 1);
+    setenv("CURVISPLAT_WIDGETS", file("widgets").c_str(), 1);
     run({"generate", "half-annulus", "--size", "48x24x24", "-o", "a"});
     run({"convert", "a.xyz", "a.fun", "-o", "a.splats", "--scalar", "f", "--scalar", "volume"});
   }
@@ -75,6 +66,7 @@ class WindowTest : public testing::Test, protected WindowPlaces {
                    {"view", cache_ + ".splats", "--size", fmt::format("{}x{}", size.width, size.height)});
     saved_ = 0;
     while (std::filesystem::exists(picture(saved_ + 1, cache_))) ++saved_;
+    std::filesystem::remove("widgets");
     window_ = std::make_unique<RunningProgram>(options);
     moveTo(kPicture);
     // The panels are dark grey, the screen behind the window is black.
@@ -84,10 +76,33 @@ class WindowTest : public testing::Test, protected WindowPlaces {
   void act(const std::vector<std::string>& words) { display_->act(words); }
   void press(const std::string& key) { act({"key", key}); }
   void moveTo(Place place) { act({"mousemove", std::to_string(place.first), std::to_string(place.second)}); }
+  /// A place in a widget of the panels, which is waited for. `across` and `down`: shares of its size.
+  static Place placeOf(const std::string& widget, double across = 0.5, double down = 0.5) {
+    std::optional<Place> place;
+    EXPECT_TRUE(eventually([&] { return (place = placeNow(widget, across, down)).has_value(); })) << widget;
+    return place.value_or(kPicture);
+  }
+  static bool isShown(const std::string& widget) { return placeNow(widget, 0, 0).has_value(); }
   /// The next click, or a drag in the panels, is for another frame of the window's: save() lies between.
   void click(Place place) {
     moveTo(place);
     act({"click", "1"});
+  }
+  void click(const std::string& widget) { click(placeOf(widget)); }
+  void addPoint() { click(placeOf("curve", 0.28, 0.2)); }
+  void chooseScalar(const std::string& name) {
+    click("scalar");
+    click("scalar " + name);  // in the list, once it is open
+    EXPECT_TRUE(eventually([&] { return !isShown("scalar " + name); }));
+  }
+  void resize(ImageSize size) {
+    act({"search", "--onlyvisible", "--name", "curvisplat", "windowsize", std::to_string(size.width),
+         std::to_string(size.height)});
+    const auto is_black = [](const float* pixel) { return pixel[0] < 0.01f; };
+    EXPECT_TRUE(eventually([&] {
+      const Image screen = display_->screenshot();
+      return is_black(screen.pixel(10, size.height + 10)) && !is_black(screen.pixel(10, size.height - 10));
+    }));
   }
   void drag(int button, int dx, int dy, Place from = kPicture) {
     const std::string number = std::to_string(button);
@@ -158,6 +173,19 @@ class WindowTest : public testing::Test, protected WindowPlaces {
         RunningProgram({"sh", "-c", "set -- " + command + "; shift; printf '%s\\n' \"$@\""}, "/usr/bin/env")
             .wait();
     return linesOf(result.out);
+  }
+
+  static std::optional<Place> placeNow(const std::string& widget, double across, double down) {
+    std::ifstream file("widgets");
+    for (std::string line; std::getline(file, line);) {
+      std::istringstream words(line);
+      int x = 0, y = 0, width = 0, height = 0;
+      std::string name;
+      words >> x >> y >> width >> height;
+      if (std::getline(words >> std::ws, name) && name == widget)
+        return Place{x + static_cast<int>(across * width), y + static_cast<int>(down * height)};
+    }
+    return std::nullopt;
   }
 
   std::string cache_ = "a";  // its name without .splats

@@ -61,7 +61,7 @@ TEST_F(WindowTest, ShowsWhatIsDoneToIt) {
   press("o");
   const Image perspective = save();
   EXPECT_LT(difference(rotated, perspective), 45);
-  click(kHighInTheCurve);
+  addPoint();
   // The edit is on the screen, without anything else that would make it draw.
   EXPECT_TRUE(eventually([&] { return difference(shown(first.size), perspective) < 35; }, 5));
   const Image edited = saveAndCopy();
@@ -180,26 +180,23 @@ TEST_F(WindowsCamera, FliesThroughTheData) {
 TEST_F(WindowTest, ACommandDrawsScaleRangeAndClipBox) {
   open();
   save();
-  click(kScalars);
-  eventually([&] { return display_->screenshot().pixel(150, 40)[2] > 0.5f; }, 1);  // the list is open
-  click(kSecondScalar);  // volumes: above zero, as a logarithm needs
+  chooseScalar("volume");  // volumes: above zero, as a logarithm needs
   const Image linear = save();
-  click(kLogScale);
+  click("log scale");
   const Image logarithmic = save();
   EXPECT_LT(difference(linear, logarithmic), 40);
-  moveTo(kRangeBegin);
-  act({"click", "1"});
+  click(placeOf("range", 0.15));
   act({"type", "2e-5"});
   press("Return");
   const Image ranged = save();
   EXPECT_LT(difference(logarithmic, ranged), 45);
-  click(kClipHeader);
+  click("Clip box");
   save();
-  click(kClip);
+  click("clip");
   save();
-  drag(1, 150, 0, kClipX);
+  drag(1, 150, 0, placeOf("clip x", 0.15));
   save();
-  click(kDark);
+  click("dark");
   const Image clipped = saveAndCopy();
   EXPECT_LT(difference(ranged, clipped), 20);
   const auto commands = close();
@@ -217,17 +214,17 @@ TEST_F(WindowTest, ACommandDrawsScaleRangeAndClipBox) {
 TEST_F(WindowTest, SavesAndLoadsAFunction) {
   open();
   const Image chosen = save();
-  click(kPresetsPoints);
+  click("reset points");
   const Image preset = save();
   EXPECT_LT(difference(chosen, preset), 35);
-  click(kHighInTheCurve);
+  addPoint();
   const Image edited = save();
   EXPECT_LT(difference(preset, edited), 35);
-  click(kSave);
+  click("save");
   EXPECT_TRUE(eventually([&] { return fs::exists("function.json"); }));
-  click(kPresetsPoints);
+  click("reset points");
   EXPECT_GE(difference(save(), preset), 50);
-  click(kLoad);
+  click("load");
   const Image loaded = saveAndCopy();
   EXPECT_GE(difference(loaded, edited), 50);
   auto command = close().at(0);
@@ -252,7 +249,7 @@ TEST_F(WindowTest, OpensAStateFile) {
   open();
   const Image first = save();
   drag(1, 90, -30);
-  click(kDark);
+  click("dark");
   const Image before = save();
   close();
   const auto remembered = fs::directory_iterator("config/curvisplat/views")->path();
@@ -284,9 +281,7 @@ TEST_F(WindowTest, ClosesInOrderWhenASignalAsksItTo) {
 TEST_F(WindowTest, ShowsAnotherScalarFromItsList) {
   open();
   const Image f = save();
-  click(kScalars);
-  eventually([&] { return display_->screenshot().pixel(150, 40)[2] > 0.5f; }, 1);  // the list is open
-  click(kSecondScalar);
+  chooseScalar("volume");
   const Image volume = saveAndCopy();
   EXPECT_LT(difference(f, volume), 25);
   const auto commands = close();
@@ -298,8 +293,7 @@ TEST_F(WindowTest, ShowsAnotherScalarFromItsList) {
 TEST_F(WindowTest, FollowsTheWindowsSize) {
   open();
   save();
-  act({"search", "--onlyvisible", "--name", "curvisplat", "windowsize", "800", "500"});
-  eventually([&] { return display_->screenshot().pixel(10, 590)[0] < 0.01f; });
+  resize({800, 500});
   const Image resized = saveAndCopy();
   EXPECT_EQ(resized.size.width, 800 - kPanel);
   EXPECT_EQ(resized.size.height, 500);

@@ -271,6 +271,83 @@ TEST(VoxelMerger, KeepsVoxelsApartAndForgetsThemOnClear) {
   }
 }
 
+/// Unit cells with their middles at `middles`, merged in a voxel of the size `voxel_size`.
+Piece mergedInVoxel(double voxel_size, const std::vector<glm::dvec3>& middles) {
+  VoxelMerger voxels(1, 1);
+  voxels.clear(voxel_size);
+  Piece out;
+  for (const glm::dvec3& at : middles) {
+    Splat splat;
+    splat.weight = 1;
+    const SplatScalar value{0.25 * at.x, {0.25, 0, 0}, 0};
+    voxels.add(0, at, splat, {&value, 1});
+  }
+  voxels.finish(0, out.splat, {&out.value, 1});
+  return out;
+}
+
+TEST(VoxelMerger, SplatsOfALatticeHaveItsBlur) {
+  const std::vector<glm::dvec3> two{{0, 0, 0}, {1, 0, 0}};
+  const Piece own = mergedInVoxel(0, two), even = mergedInVoxel(3, two);
+  EXPECT_NEAR(own.splat.axis[0], 2, 1e-12);
+  EXPECT_NEAR(even.splat.axis[0], std::sqrt(0.418 * 4 + 0.582 * 9), 1e-12);
+  EXPECT_NEAR(even.splat.axis[1], std::sqrt(0.418 + 0.582 * 9), 1e-12);
+  EXPECT_EQ(even.splat.weight, own.splat.weight);
+  EXPECT_EQ(even.splat.position, own.splat.position);
+  EXPECT_EQ(even.value.mean, own.value.mean);
+  EXPECT_EQ(even.value.variance, own.value.variance);
+  EXPECT_NEAR(gradientOf(even.splat, even.value.slope).x, 0.25, 1e-12);
+  // Cells that are longer than a voxel keep their own.
+  const Piece longer = mergedInVoxel(0.5, {{0, 0, 0}, {0, 0.1, 0}});
+  EXPECT_NEAR(longer.splat.axis[0], 1, 1e-12);
+}
+
+struct Cell {
+  glm::dvec3 middle, size;
+  uint32_t border_code;
+};
+
+/// The code of cells that are boxes.
+InwardAxes borderInVoxel(double voxel_size, const std::vector<Cell>& cells) {
+  VoxelMerger voxels(0, 1);
+  voxels.clear(voxel_size);
+  for (const auto& [middle, size, border_code] : cells) {
+    const Splat splat{{}, {size.x, size.y, size.z}, {}, size.x * size.y * size.z};
+    voxels.add(0, middle, splat, {}, {border_code, kNoGrowth});
+  }
+  Splat out;
+  return inwardAxes(voxels.finish(0, out, {}).border);
+}
+
+TEST(VoxelMerger, SplatsOfALatticeEndAtTheirFaces) {
+  const glm::dvec3 up(0, 0, 1), down(0, 0, -1), half(1, 1, 0.5), whole(1, 1, 1), right(1, 0, 0);
+  const uint32_t face = packBorderCode({&up, 1}, 1), behind = packLayerCode(up, 1);
+  // A half cell and the whole one behind it: 1.5 long, in a voxel of 2.
+  const InwardAxes found = borderInVoxel(2, {{{0, 0, 0.25}, half, face}, {{0, 0, 1}, whole, behind}});
+  ASSERT_EQ(found.count, 1);
+  EXPECT_LT(glm::distance(glm::dvec3(found.axis[0]), up), 0.02);
+  EXPECT_NEAR(found.distance, 0.5, 0.01);
+  EXPECT_NEAR(found.ratio, 2 / 1.5, 0.08);
+  EXPECT_FALSE(found.behind);
+  // Only what lies behind the border's cells.
+  const InwardAxes next = borderInVoxel(2, {{{0, 0, 1}, whole, behind}, {{0, 0, 2}, whole, kNoBorder}});
+  EXPECT_TRUE(next.behind);
+  EXPECT_NEAR(next.distance, 0.75, 0.01);
+  // An edge.
+  const glm::dvec3 both[] = {up, right};
+  const uint32_t edge = packBorderCode({both, 2}, 3);
+  EXPECT_EQ(borderInVoxel(1, {{{0.25, 0, 0.25}, {0.5, 1, 0.5}, edge}, {{0.25, 1, 0.25}, {0.5, 1, 0.5}, edge}})
+                .count,
+            2);
+  // A layer that ends at both sides, borders that are no faces, and cells on both sides of the plane.
+  const uint32_t other = packBorderCode({&down, 1}, 1), parts = packBorderCode({&up, 1}, 0);
+  EXPECT_EQ(borderInVoxel(2, {{{0, 0, 0.25}, half, face}, {{0, 0, 0.75}, half, other}}).count, 0);
+  EXPECT_EQ(borderInVoxel(2, {{{0, 0, 0.25}, half, parts}, {{0, 0, 1}, whole, kNoBorder}}).count, 0);
+  EXPECT_EQ(borderInVoxel(2, {{{0, 0, 0.25}, half, face}, {{1, 0, -0.5}, whole, kNoBorder}}).count, 0);
+  // One comes back with its own.
+  EXPECT_EQ(borderInVoxel(2, {{{0, 0, 0.25}, half, edge}}).count, 2);
+}
+
 TEST(VoxelMerger, DetailIsTheSpreadOfTheCentres) {
   SplatMerger merger(0);
   Splat splat;

@@ -74,12 +74,12 @@ TEST_F(Plot3dMeta, RefusesWhatIsWrongByItsKey) {
   EXPECT_EQ(errorOf(with(R"("gamma": 1.4)")), "");
   for (const auto& [entry, wanted] :
        std::vector<std::pair<std::string, std::string>>{{R"("2D": true)", "only 3-D"},
-                                                        {R"("byte-order": "middle")", "'byte-order' is"},
-                                                        {R"("byte-order": 3)", "'byte-order' is"},
+                                                        {R"("byte-order": "middle")", "byte-order is"},
+                                                        {R"("byte-order": 3)", "byte-order is"},
                                                         {R"("precision": 16)", "32 or 64"},
                                                         {R"("gamma": "x")", "expected a finite number"},
                                                         {R"("multi-grid": 1)", "true or false"},
-                                                        {R"("function-names": "u")", "an array of strings"},
+                                                        {R"("function-names": "u")", "function-names is"},
                                                         {R"("byte-order": "little")", "a.xyz"}}) {
     const std::string error = errorOf(with(entry));
     EXPECT_NE(error.find(wanted), std::string::npos) << entry << ": " << error;

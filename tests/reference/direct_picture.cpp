@@ -66,11 +66,12 @@ std::vector<DirectSplat> mergedIntoVoxels(const std::vector<DirectSplat>& splats
   };
   for (const DirectSplat& s : splats) voxels.emplace(voxelOf(s), voxels.size());
   VoxelMerger merger(1, voxels.size(), options.spread);
+  merger.clear(options.even ? options.voxel : 0);
   for (const DirectSplat& s : splats)
-    merger.add(voxels.at(voxelOf(s)), s.splat.position, s.splat, std::span(&s.value, 1));
+    merger.add(voxels.at(voxelOf(s)), s.splat.position, s.splat, std::span(&s.value, 1), s.codes);
   std::vector<DirectSplat> merged(voxels.size());
   for (size_t n = 0; n < merged.size(); ++n) {
-    merger.finish(n, merged[n].splat, std::span(&merged[n].value, 1));
+    merged[n].codes = merger.finish(n, merged[n].splat, std::span(&merged[n].value, 1));
     if (!options.variance) merged[n].value.variance = 0;
   }
   return merged;
@@ -158,11 +159,11 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
   for (const uint32_t n : farthestFirst(projector.depths())) {
     if (options.scene && !options.scene->volume) break;
     // A splat's records come behind it.
-    if (layers && !options.cut_splats && !isCut(projector.splats()[n]))
+    if (layers && !options.cut_splats && !isRecord(projector.splats()[n]))
       is_behind = isBehind(*layers, projector.splats()[n], projector.depths()[n]);
     if (is_behind) continue;
     ScreenSplat splat = projector.splats()[n];
-    if (isCut(splat)) {
+    if (isRecord(splat)) {
       sorted.push_back(splat);
       continue;
     }

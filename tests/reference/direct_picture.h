@@ -27,6 +27,7 @@ struct DirectOptions {
   bool border_parts = true;  // else half cells are drawn as one splat
   double voxel = 0;          // world units: splats are merged into voxels of this size; 0: they are not
   double spread = 12;        // as VoxelMerger
+  bool even = true;          // else merged splats have the blur of their own size, and end at no faces
   bool variance = true;      // else merged splats forget the variance that their slope does not explain
 
   std::vector<ClipPlane> clip_planes;

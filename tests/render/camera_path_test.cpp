@@ -214,15 +214,15 @@ TEST_F(CameraPathFile, IsReadAsItIsWritten) {
 }
 
 TEST_F(CameraPathFile, SaysWhatIsWrong) {
-  expectRefused("", "camera path in JSON");
-  expectRefused("[1, 2", "camera path in JSON");
-  expectRefused("\xff\xfe\x01", "camera path in JSON");
-  expectRefused("[]", "found a JSON array");
+  expectRefused("", "expected a camera path");
+  expectRefused("[1, 2", "expected a camera path");
+  expectRefused("\xff\xfe\x01", "expected a camera path");
+  expectRefused("[]", "found [], expected an object");
   expectRefused("{}", "key_frames");
   expectRefused(R"({"key_frames": 7})", "expected a list");
   expectRefused(file(""), "at least one key frame");
-  expectRefused(file("null"), "key frame 0");
-  expectRefused(file(keyFrame() + ", [1]"), "key frame 1");
+  expectRefused(file("null"), "key_frames[0]");
+  expectRefused(file(keyFrame() + ", [1]"), "key_frames[1]");
   expectRefused(file(keyFrame() + "," + keyFrame()), "times must increase");
   expectRefused(file(keyFrame() + "," + keyFrame("time", "1.0000000001")), "times must increase");
   expectRefused(file(keyFrame() + "," + keyFrame("time", "0")), "key frame 1 is at time 0");
@@ -236,20 +236,20 @@ TEST_F(CameraPathFile, SaysWhatIsWrong) {
 
   const struct {
     const char *field, *text, *word;
-  } cases[] = {{"time", "", "no such field"},
+  } cases[] = {{"time", "", "is missing"},
                {"time", "\"now\"", "\"now\""},
                {"time", "1e31", "1e+30"},
                {"time", "1e999", "JSON"},
                {"time", "null", "null"},
-               {"position", "", "no such field"},
-               {"position", "[1, 2]", "2 values"},
-               {"position", "[1, 2, 3, 4]", "4 values"},
-               {"position", "[1, 2, \"3\"]", "three numbers"},
-               {"position", "{\"x\": 1}", "a JSON object"},
+               {"position", "", "is missing"},
+               {"position", "[1, 2]", "three numbers"},
+               {"position", "[1, 2, 3, 4]", "three numbers"},
+               {"position", "[1, 2, \"3\"]", "position[2]"},
+               {"position", "{\"x\": 1}", "found an object"},
                {"position", "[1, 2, -2e30]", "1e+30"},
                {"position", "[0, 0, 0.5]", "another point"},
                {"focal_point", "true", "true"},
-               {"view_up", "", "no such field"},
+               {"view_up", "", "is missing"},
                {"view_up", "[0, 0, 0]", "a direction"},
                {"parallel_scale", "", "neither"},
                {"parallel_scale", "0", "above zero"},

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <random>
+#include <stop_token>
 #include <thread>
 
 #include "render/frame/frame.h"
@@ -136,7 +137,7 @@ TEST_P(FrameStreamingTest, PrefetchingMakesTheNextFrameWarm) {
   prefetched.prefetch(camera("-x"), wanted);  // and is left behind
 }
 
-TEST_P(FrameStreamingTest, CanBeCancelledAtAnyMoment) {
+TEST_P(FrameStreamingTest, CanBeStoppedAtAnyMoment) {
   FrameRenderer renderer(*cache_, 0, function(), GetParam());
   FrameStatistics statistics;
   FrameOptions wanted = options();
@@ -146,37 +147,39 @@ TEST_P(FrameStreamingTest, CanBeCancelledAtAnyMoment) {
   const Image expected = renderer.render(camera("iso"), wanted, statistics);
 
   constexpr int kRounds = 1000;
+  std::vector<std::stop_source> stops(kRounds);
   std::atomic<int> round = -1, ended = -1;
-  std::thread canceller([&] {
+  std::thread stopper([&] {
     std::mt19937 random(5);
     for (int n = 0; n < kRounds; ++n) {
       for (int now; (now = round.load()) < n;) round.wait(now);
-      // Some moment of the frame, and again and again until it has ended.
+      // Some moment of the frame, or after it.
       for (uint32_t turns = random() % (random() % 2 ? 100'000 : 2'000'000); turns > 0 && ended < n;
            --turns) {
       }
-      for (; ended < n; std::this_thread::yield()) renderer.cancel();
+      stops[static_cast<size_t>(n)].request_stop();
     }
   });
-  int cancelled = 0, whole = 0;
+  int stopped = 0, whole = 0;
   for (int n = 0; n < kRounds; ++n) {
     wanted.read_by = n / 50 % 2 ? Way::kThreads : Way::kAutomatic;
+    wanted.stop = stops[static_cast<size_t>(n)].get_token();
     round = n;
     round.notify_one();
     try {
       const Image image = renderer.render(camera("iso"), wanted, statistics);
       EXPECT_EQ(image.rgba, expected.rgba);
       ++whole;
-    } catch (const Cancelled&) {
-      ++cancelled;
+    } catch (const Interrupted&) {
+      ++stopped;
     }
     ended = n;
     if (n % 7 == 0) renderer.prefetch(camera("+z"), wanted);
   }
-  canceller.join();
-  EXPECT_EQ(cancelled + whole, kRounds);
-  EXPECT_GT(cancelled, 0);
-  renderer.cancel();  // nothing is under way
+  stopper.join();
+  EXPECT_EQ(stopped + whole, kRounds);
+  EXPECT_GT(stopped, 0);
+  wanted.stop = {};
   EXPECT_EQ(renderer.render(camera("iso"), wanted, statistics).rgba, expected.rgba);
 }
 
@@ -196,7 +199,7 @@ TEST_P(FrameStreamingTest, PartsOfBricksArePagedAndKept) {
     EXPECT_NE(expected.rgba, whole.rgba);
     const uint64_t bricks = statistics.bricks_read;
     const FramePlan plan =
-        FramePlanner(*cache_, 0, function()).plan(camera("+x"), wanted, DrawingOrder::kFrontToBack);
+        FramePlanner(*cache_, {0, function()}).plan(camera("+x"), wanted, DrawingOrder::kFrontToBack);
     in_part |= std::any_of(plan.parts.begin(), plan.parts.end(),
                            [](const SweptPart& part) { return !part.part.whole(); });
     for (const uint64_t memory : {least, uint64_t{4} << 30})

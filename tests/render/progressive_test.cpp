@@ -107,18 +107,21 @@ TEST_F(ProgressiveTest, WhatShowThrowsEndsTheFrame) {
   EXPECT_NO_THROW(renderer.render(camera(Projection::kOrthographic), options(4), statistics));
 }
 
-TEST_F(ProgressiveTest, CanBeCancelledBetweenItsPicturesAndBeginsFromTheCacheOfBricks) {
+TEST_F(ProgressiveTest, CanBeStoppedBetweenItsPicturesAndBeginsFromTheCacheOfBricks) {
   const Camera iso = camera(Projection::kOrthographic);
   FrameRenderer renderer(*cache_, 0, function());
   FrameStatistics statistics;
   int shown = 0;
-  EXPECT_THROW(renderer.renderProgressively(iso, options(0.3), statistics,
+  std::stop_source stop;
+  FrameOptions wanted = options(0.3);
+  wanted.stop = stop.get_token();
+  EXPECT_THROW(renderer.renderProgressively(iso, wanted, statistics,
                                             [&](const Image&, bool) {
                                               ++shown;
                                               EXPECT_GT(statistics.bricks_read, 0u);
-                                              renderer.cancel();
+                                              stop.request_stop();
                                             }),
-               Cancelled);
+               Interrupted);
   EXPECT_EQ(shown, 1);
   const auto expectWarm = [&](const Image&, bool is_final) {
     ++shown;

@@ -25,6 +25,7 @@ Xvfb -displayfd 3 -screen 0 1000x700x24 -noreset -nolisten tcp 3> display 2> xvf
 DISPLAY=:$(head -n 1 display)
 export DISPLAY
 : > view.log
+export CURVISPLAT_WIDGETS=$PWD/widgets
 "$program" view wake.splats --size 900x600 --memory 96M > view.log 2> view.err &
 pid=$!
 
@@ -73,17 +74,35 @@ saved() {
   done
   fail "no picture was saved"
 }
+# at NAME [ACROSS [DOWN]]: a place in that widget, in percent of its size; waits for it.
+at() {
+  until_ 100 grep -qsE "^[0-9 -]+ $1\$" widgets || fail "there is no widget $1" >&2
+  awk -v name="$1" -v across="${2:-50}" -v down="${3:-50}" '{
+    x = $1; y = $2; w = $3; h = $4
+    for (n = 0; n < 4; ++n) sub(/^[^ ]+ /, "")
+    if ($0 == name) print int(x + across / 100 * w), int(y + down / 100 * h)
+  }' widgets
+}
+# press NAME [ACROSS [DOWN [BUTTON]]]: clicks on it.
+press() {
+  local place
+  place=$(at "${@:1:3}")
+  # shellcheck disable=SC2086
+  do_ mousemove $place click "${4:-1}"
+}
+# add_point, remove_point: of the opacity curve, at one place.
+add_point() { press curve 28 20; }
+remove_point() { press curve 28 20 3; }
 # drag BUTTON X Y: from the middle of the picture to there.
 drag() {
   do_ mousemove 600 300 mousedown "$1" mousemove 640 320 mousemove 690 350 mousemove "$2" "$3" mouseup "$1" mousemove 600 300
 }
-# show NAME Y: that scalar, from this height of the panel's list. The list and the click on it are for frames of their own:
-# between them, the window is asked.
+# show NAME: that scalar. The list and the click on it are for frames of their own: between them, the window is asked.
 show() {
   for ((again = 0; again < 10; ++again)); do
-    do_ mousemove 100 17 click 1
+    press scalar
     asked > /dev/null
-    do_ mousemove 60 "$2" click 1
+    press "scalar $1"
     ! asked | grep -qE -- "--scalar $1( |\$)" || return 0
   done
   fail "the scalar $1 cannot be chosen"
@@ -91,12 +110,12 @@ show() {
 resize() { do_ search --onlyvisible --name curvisplat windowsize "$1" "$2"; }
 # presets_points: the function as it began; a button of the panel's.
 presets_points() {
-  do_ mousemove 245 225 click 1
+  press "reset points"
   asked > /dev/null
 }
 # home: everything as it was first. An "o" too few or too many is put right.
 home() {
-  show f 38
+  show f
   for ((again = 0; again < 4; ++again)); do
     presets_points
     do_ key z key r
@@ -108,11 +127,11 @@ home() {
 
 asked > /dev/null  # it hears
 # As home() leaves it: the window begins with a function chosen from the data, until one is edited.
-do_ mousemove 100 50 click 1
+add_point
 asked > /dev/null
-do_ mousemove 100 50 click 3
-show j 58
-show f 38
+remove_point
+show j
+show f
 presets_points
 do_ key z key r
 saved first
@@ -125,12 +144,12 @@ while [ $SECONDS -lt $end ]; do
   drag 2 640 340
   do_ click --repeat 5 5 key o
   # A point of the function and another scalar; both back.
-  do_ mousemove 100 50 click 1
+  add_point
   asked > /dev/null
-  do_ mousemove 100 50 click 3
-  show j 58
+  remove_point
+  show j
   presets_points
-  show f 38
+  show f
   resize 800 500
   do_ key o
   asked > /dev/null

@@ -9,6 +9,8 @@
 #include <random>
 #include <vector>
 
+#include "stream/model/kernel.h"
+
 namespace curvisplat {
 namespace {
 
@@ -91,15 +93,56 @@ TEST(LayerBehindAFace, KeepsItsDirectionAndDistance) {
   }
   for (const double outside : {-1.0, 0.0, 2.5, 1e300, std::nan("")})
     EXPECT_EQ(packLayerCode({0, 0, 1}, outside), kNoBorder) << outside;
-  EXPECT_FALSE(isPossibleBorderCode(0x80000014));
+  EXPECT_FALSE(isPossibleBorderCode(0x800000fc));
   EXPECT_FALSE(isPossibleBorderCode(0x00000104));
+}
+
+TEST(MergedSplatAtAFace, KeepsItsDirectionDistanceAndRatio) {
+  std::mt19937 random(9);
+  std::uniform_real_distribution<double> unit(0, 1);
+  for (int n = 0; n < 3000; ++n) {
+    const glm::dvec3 inward = randomAxes(random)[0];
+    const double distance = 0.01 + 0.99 * unit(random), ratio = 0.75 * std::exp2(2 * unit(random));
+    const uint32_t code = packMergedCode(inward, distance, ratio);
+    ASSERT_TRUE(isPossibleBorderCode(code));
+    const InwardAxes kept = inwardAxes(code);
+    ASSERT_EQ(kept.count, 1);
+    EXPECT_TRUE(kept.hasFace(0));
+    EXPECT_FALSE(kept.behind);
+    ASSERT_LT(glm::distance(glm::dvec3(kept.axis[0]), inward), 0.02) << code;
+    ASSERT_NEAR(kept.distance, distance, 0.5 / 128 + 1e-9);
+    ASSERT_NEAR(std::log2(kept.ratio / std::min(ratio, 1.5 / kept.distance)), 0, 0.051);
+    const BorderPart part = mergedPart(kept);
+    EXPECT_LE(part.offset + kKernelSupport * (part.size - 1), kMergedReach);
+    EXPECT_GE(borderReach(code), part.offset + kKernelSupport * (part.size - 1));
+    EXPECT_GT(part.size, 0);
+    EXPECT_GT(part.share, 1);
+  }
+  for (const double outside : {-1.0, 0.0, 1.1, 1e300, std::nan("")})
+    EXPECT_EQ(packMergedCode({0, 0, 1}, outside, 1), kNoBorder) << outside;
+  for (const double ratio : {-1.0, 0.0, std::nan("")})
+    EXPECT_EQ(packMergedCode({0, 0, 1}, 0.5, ratio), kNoBorder) << ratio;
+  EXPECT_TRUE(isPossibleBorderCode(0x400000ac));
+  EXPECT_FALSE(isPossibleBorderCode(0x400000b4));  // a ratio that is too large
+  EXPECT_FALSE(isPossibleBorderCode(0x8100000c));  // too far from the face
+}
+
+TEST(MergedSplatAtAFace, IsDrawnAsACellIs) {
+  const auto expect_like = [](const BorderPart& cell, double ratio) {
+    const BorderPart part = mergedPart(inwardAxes(packMergedCode({0, 0, 1}, 0.5, ratio)));
+    EXPECT_NEAR(part.offset, cell.offset, 0.04 * ratio) << ratio;
+    EXPECT_NEAR(part.size, cell.size, 0.04 * ratio) << ratio;
+    EXPECT_NEAR(part.share, cell.share, 0.04 * ratio) << ratio;
+  };
+  expect_like(kWholeCellStyle.cut, 1);
+  expect_like(kHalfCellStyle.cut, 2);
 }
 
 TEST(HalfCell, SlopesAreThoseThatAreDrawn) {
   const glm::dvec3 inward[] = {{0, 0, 1}}, slope(0.3, 0, 0.4);
   EXPECT_DOUBLE_EQ(drawnSlope(slope, kNoBorder), 0.5);
   EXPECT_DOUBLE_EQ(drawnSlope(slope, packBorderCode(inward)), 0.5);
-  const double wide = kHalfCellStyle.cut.size * 0.4;
+  const double wide = (kHalfCellStyle.cut.size + 0.13) * 0.4;
   EXPECT_NEAR(drawnSlope(slope, packBorderCode(inward, 1)), std::hypot(0.3, wide), 0.01);
 }
 

@@ -61,6 +61,17 @@ TEST_F(VerifyCache, FindsDamagedPayloads) {
   }
 }
 
+TEST_F(VerifyCache, FindsThatTheFileForOtherProgramsIsMissingShortOrALink) {
+  const std::filesystem::path grids = path / "bricks.vdb", elsewhere = path / "elsewhere";
+  const std::string good = bytesOfFile(grids);
+  overwriteFile(grids, good.substr(1));
+  EXPECT_TRUE(anySays(findings(), "bricks.vdb"));
+  std::filesystem::rename(grids, elsewhere);
+  EXPECT_TRUE(anySays(findings(), "bricks.vdb"));
+  std::filesystem::create_symlink(elsewhere, grids);
+  EXPECT_TRUE(anySays(findings(), "is a symbolic link"));
+}
+
 TEST_F(VerifyCache, FindsRecordsThatDoNotFitTheirBricks) {
   changeRecord(2, [](BrickRecord& r) { r.upper[1] -= 0.3 * (r.upper[1] - r.lower[1]); });
   changeRecord(3, [](BrickRecord& r) { r.largest_radius *= 0.9f; });

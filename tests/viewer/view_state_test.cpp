@@ -112,15 +112,15 @@ TEST(ViewState, ErrorsNameFileAndField) {
     }
     return "";
   };
-  EXPECT_EQ(messageOf("[]"), "a.json: expected an object, found []");
+  EXPECT_EQ(messageOf("[]"), "a.json: is invalid (found [], expected an object)");
   EXPECT_EQ(messageOf("{\n  \"a\": 1,\n  oops\n}"),
-            "a.json: expected the state of a window in JSON, found a syntax error at line 3, column 3");
-  EXPECT_EQ(messageOf(" \n"), "a.json: expected the state of a window in JSON, found no text");
+            "a.json: is not JSON (found a syntax error at line 3, column 3, expected the state of a window)");
+  EXPECT_EQ(messageOf(" \n"), "a.json: is not JSON (found no text, expected the state of a window)");
   EXPECT_EQ(messageOf("{\"a\": 1e999}"),
-            "a.json: expected the state of a window in JSON, found a number that is too large");
+            "a.json: is not JSON (found a number that is too large, expected the state of a window)");
   nlohmann::json json = nlohmann::json::parse(toJson(changedState()));
   json["camera"] = 5;
-  EXPECT_EQ(messageOf(json.dump()), "a.json: field camera: expected an object, found 5");
+  EXPECT_EQ(messageOf(json.dump()), "a.json: camera is invalid (found 5, expected an object)");
 }
 
 TEST(ViewState, VariablesKeepTheFunctionOverTheirOwnRange) {

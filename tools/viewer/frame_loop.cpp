@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "render/frame/step_player.h"
-#include "stream/base/error.h"
+#include "stream/base/interrupted.h"
 #include "stream/base/thread_name.h"
 
 namespace curvisplat {
@@ -64,7 +64,7 @@ FrameLoop::~FrameLoop() {
   {
     const MutexLock lock(mutex_);
     stopping_ = true;
-    if (drawing_) drawing_->cancel();
+    drawing_.request_stop();
   }
   changed_.notify_all();
   thread_.join();
@@ -73,7 +73,7 @@ FrameLoop::~FrameLoop() {
 uint64_t FrameLoop::request(FrameRequest request) {
   const MutexLock lock(mutex_);
   pending_ = std::move(request);
-  if (drawing_ && cancellable_) drawing_->cancel();
+  if (at_rest_) drawing_.request_stop();
   changed_.notify_all();
   return ++newest_;
 }
@@ -81,8 +81,6 @@ uint64_t FrameLoop::request(FrameRequest request) {
 std::optional<ShownFrame> FrameLoop::take() {
   const MutexLock lock(mutex_);
   if (failure_) std::rethrow_exception(ended_ ? failure_ : std::exchange(failure_, nullptr));
-  // Repeats the cancel() of request(), which has no effect on a frame that had not begun yet.
-  if (pending_ && drawing_ && cancellable_) drawing_->cancel();
   return std::exchange(shown_, std::nullopt);
 }
 
@@ -121,15 +119,18 @@ void FrameLoop::loop() {
   while (true) {
     while (!pending_ && !stopping_) changed_.wait(lock);
     if (stopping_) return;
-    const FrameRequest request = *std::exchange(pending_, std::nullopt);
+    FrameRequest request = *std::exchange(pending_, std::nullopt);
     const uint64_t number = newest_;
+    drawing_ = std::stop_source();
+    request.options.stop = drawing_.get_token();
     serving_ = true;
+    at_rest_ = !request.moving;
     lock.unlock();
     std::exception_ptr failure;
     bool ends = false;
     try {
       serve(drawing, request, number);
-    } catch (const Cancelled&) {
+    } catch (const Interrupted&) {
     } catch (const UsageError&) {
       failure = std::current_exception();
     } catch (...) {
@@ -137,8 +138,7 @@ void FrameLoop::loop() {
       ends = true;
     }
     lock.lock();
-    serving_ = false;
-    drawing_ = nullptr;
+    serving_ = at_rest_ = false;
     if (failure) failure_ = failure;
     ended_ = ends;
     lock.unlock();
@@ -152,7 +152,8 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
   if (!drawing.player || drawing.variable != request.variable) {
     drawing.player.reset();  // frees its memory before the next one allocates
     if (request.step != cache_.step()) cache_ = cache_.atStep(request.step);
-    drawing.player = std::make_unique<StepPlayer>(cache_, request.variable, request.function, backend_);
+    drawing.player =
+        std::make_unique<StepPlayer>(cache_, DrawnScalars(request.variable, request.function), backend_);
     drawing.variable = request.variable;
   } else if (drawing.function_version != request.function_version) {
     drawing.player->setTransferFunction(request.function);
@@ -162,9 +163,6 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
   FrameRenderer& renderer = drawing.player->renderer();
   {
     const MutexLock lock(mutex_);
-    if (stopping_) return;  // the destructor found no renderer to cancel
-    drawing_ = &renderer;
-    cancellable_ = !request.moving;
     backend_name_ = renderer.backendName();
     software_ = renderer.drawsInSoftware();
   }
@@ -194,10 +192,6 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
 
 /// Goes to the step that is likely to be wanted next, and begins to decode it while this one is looked at.
 void FrameLoop::readAhead(Drawing& drawing, const FrameRequest& request) {
-  {
-    const MutexLock lock(mutex_);
-    drawing_ = nullptr;  // a step with another geometry has another renderer
-  }
   drawing.player->goTo({*request.next_step});
   const double detail_px = request.moving ? drawing.effort.detailPixels() : 0;
   drawing.player->renderer().prefetch(request.camera, request.options,

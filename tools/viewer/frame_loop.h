@@ -5,7 +5,7 @@
 //
 // While the camera moves, each picture is as fine as its time budget allows and is always completed; the next
 // one begins when it is shown. At rest, each picture draws four times the splats of the previous one, and is
-// cancelled by the next request.
+// stopped by the next request.
 #pragma once
 
 #include <algorithm>
@@ -14,6 +14,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
@@ -73,7 +74,7 @@ class FrameLoop {
   /// Calls `wake` on the loop's thread whenever take() has something to return. Opens the cache for itself, since it
   /// goes from step to step.
   FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake);
-  /// Cancels the picture being drawn.
+  /// Stops the picture being drawn.
   ~FrameLoop();
   FrameLoop(const FrameLoop&) = delete;
   FrameLoop& operator=(const FrameLoop&) = delete;
@@ -105,10 +106,10 @@ class FrameLoop {
   mutable Mutex mutex_;
   ConditionVariable changed_;
   std::optional<FrameRequest> pending_ GUARDED_BY(mutex_);
-  uint64_t newest_ GUARDED_BY(mutex_) = 0;               // number of the newest request
-  bool serving_ GUARDED_BY(mutex_) = false;              // a request is being drawn
-  bool cancellable_ GUARDED_BY(mutex_) = false;          // and its camera is at rest
-  FrameRenderer* drawing_ GUARDED_BY(mutex_) = nullptr;  // for cancel()
+  uint64_t newest_ GUARDED_BY(mutex_) = 0;   // number of the newest request
+  bool serving_ GUARDED_BY(mutex_) = false;  // a request is being drawn
+  bool at_rest_ GUARDED_BY(mutex_) = false;  // and its camera does not move
+  std::stop_source drawing_ GUARDED_BY(mutex_);
   std::optional<ShownFrame> shown_ GUARDED_BY(mutex_);
   std::exception_ptr failure_ GUARDED_BY(mutex_);
   bool ended_ GUARDED_BY(mutex_) = false;  // by an error

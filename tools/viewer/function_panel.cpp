@@ -12,6 +12,7 @@
 #include "stream/base/error.h"
 #include "tools/viewer/first_view.h"
 #include "tools/viewer/histogram.h"
+#include "tools/viewer/widget_places.h"
 
 namespace curvisplat {
 namespace {
@@ -136,6 +137,7 @@ bool FunctionPanel::drawCurve(EditedFunction& function) {
                       {ImGui::GetContentRegionAvail().x, kCurveLines * ImGui::GetTextLineHeight()}};
   ImGui::InvisibleButton("curve", canvas.size,
                          ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
+  nameWidget("curve");
   const ImVec2 mouse = ImGui::GetIO().MousePos;
   const bool over = ImGui::IsItemHovered();
   const std::optional<size_t> near = over ? pointNear(function, canvas, mouse) : std::nullopt;
@@ -186,12 +188,16 @@ bool FunctionPanel::drawRange(EditedFunction& function, const VariableInfo& vari
   double ends[2] = {function.range().first, function.range().second};
   if (ImGui::InputScalarN("range", ImGuiDataType_Double, ends, 2, nullptr, nullptr, "%.6g", kNumber))
     changed |= function.setRange(ends[0], ends[1]);
+  nameWidget("range");
   bool log_scale = function.logScale();
   if (ImGui::Checkbox("log scale", &log_scale)) changed |= function.setLogScale(log_scale);
+  nameWidget("log scale");
   ImGui::SameLine();
   if (ImGui::Button("full range")) changed |= function.setRange(variable.min, variable.max);
   ImGui::SameLine();
-  if (ImGui::Button("reset points")) {
+  const bool resets = ImGui::Button("reset points");
+  nameWidget("reset points");
+  if (resets) {
     const std::string name = function.isPreset() ? function.preset() : function.definition().name;
     try {
       function =
@@ -213,13 +219,17 @@ bool FunctionPanel::drawFile(EditedFunction& function) {
   bool changed = false;
   ImGui::InputText("file", &file_);
   try {
-    if (ImGui::Button("load")) {
+    const bool loads = ImGui::Button("load");
+    nameWidget("load");
+    if (loads) {
       function = EditedFunction(readParaViewPreset(file_), function.opacityUnit());
       message_ = "loaded";
       changed = true;
     }
     ImGui::SameLine();
-    if (ImGui::Button("save")) {
+    const bool saves = ImGui::Button("save");
+    nameWidget("save");
+    if (saves) {
       writeFileDurably(file_, toParaViewPreset(function.definition()));
       message_ = "saved; draw with it: render --tf " + file_;
     }

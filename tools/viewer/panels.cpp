@@ -10,6 +10,7 @@
 
 #include "stream/base/process_usage.h"
 #include "tools/viewer/first_view.h"
+#include "tools/viewer/widget_places.h"
 
 namespace curvisplat {
 namespace {
@@ -55,11 +56,15 @@ PanelActions Panels::draw(ViewState& state, size_t variable, const PanelFacts& f
   if (ImGui::BeginCombo("scalar", state.variable.c_str())) {
     for (const VariableInfo& one : cache_.manifest().variables) {
       const bool chosen = one.name == state.variable;
-      if (!ImGui::Selectable(scalarTitle(one.name, one.unit).c_str(), chosen) || chosen) continue;
+      const bool chooses = ImGui::Selectable(scalarTitle(one.name, one.unit).c_str(), chosen) && !chosen;
+      nameWidget("scalar " + one.name);
+      if (!chooses) continue;
       chooseVariable(state, cache_, one.name);
       actions.function_changed = true;
     }
     ImGui::EndCombo();
+  } else {
+    nameWidget("scalar");
   }
   // `variable` is outdated if another one was chosen just now; draw the editor from the next frame on.
   if (cache_.manifest().variables[variable].name == state.variable)
@@ -68,7 +73,9 @@ PanelActions Panels::draw(ViewState& state, size_t variable, const PanelFacts& f
   actions.dragging |= function_.isDragging();
   if (ImGui::CollapsingHeader("View", ImGuiTreeNodeFlags_DefaultOpen)) drawView(state, actions, facts);
   if (ImGui::CollapsingHeader("Detail", ImGuiTreeNodeFlags_DefaultOpen)) drawDetail(state, actions);
-  if (ImGui::CollapsingHeader("Clip box")) drawClipBox(state, actions);
+  const bool clips = ImGui::CollapsingHeader("Clip box");
+  nameWidget("Clip box");
+  if (clips) drawClipBox(state, actions);
   if (ImGui::CollapsingHeader("Clip planes")) drawPlanes(state.clip_planes, kMaxClipPlanes, state, actions);
   if (ImGui::CollapsingHeader("Slices")) drawSlices(state, actions);
   if (ImGui::CollapsingHeader("Statistics", ImGuiTreeNodeFlags_DefaultOpen)) drawStatistics(state, facts);
@@ -112,9 +119,12 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
   ImGui::SameLine();
   actions.changed |= ImGui::Checkbox("axes", &state.annotations.axes);
   ImGui::SameLine();
+  actions.changed |= ImGui::Checkbox("axes grid", &state.annotations.axes_grid);
+  ImGui::SameLine();
   actions.changed |= ImGui::Checkbox("outline", &state.annotations.outline);
   ImGui::SameLine();
   actions.changed |= ImGui::Checkbox("dark", &state.dark);
+  nameWidget("dark");
   if (ImGui::Button("save picture (p)")) actions.save_picture = true;
   ImGui::SameLine();
   if (ImGui::Button("copy command (c)")) actions.copy_command = true;
@@ -143,7 +153,9 @@ void Panels::drawDetail(ViewState& state, PanelActions& actions) {
 void Panels::drawClipBox(ViewState& state, PanelActions& actions) {
   const Manifest& manifest = cache_.manifest();
   bool on = state.clip_box.has_value();
-  if (ImGui::Checkbox("clip", &on)) {
+  const bool toggled = ImGui::Checkbox("clip", &on);
+  nameWidget("clip");
+  if (toggled) {
     if (on)
       state.clip_box = WorldBox{manifest.lower, manifest.upper};
     else
@@ -164,6 +176,7 @@ void Panels::drawClipBox(ViewState& state, PanelActions& actions) {
       actions.changed = true;
     }
     actions.dragging |= ImGui::IsItemActive();
+    nameWidget(fmt::format("clip {}", kNames[static_cast<size_t>(axis)]));
   }
 }
 

@@ -11,7 +11,7 @@
 #include "render/automatic/first_choice.h"
 #include "render/mesh/mesh_file.h"
 #include "stream/base/error.h"
-#include "stream/base/json_text.h"
+#include "stream/base/json_document.h"
 
 namespace curvisplat {
 namespace {
@@ -20,71 +20,9 @@ using Json = nlohmann::ordered_json;
 
 constexpr size_t kMaxSurfaces = 64;
 
-/// Fields of one object of a state file.
-class Fields {
- public:
-  Fields(const std::filesystem::path& path, std::string name, const Json& object)
-      : path_(path), name_(std::move(name)), object_(object) {
-    if (!object.is_object())
-      throw Error("{}: {}expected an object, found {}", path_.string(),
-                  name_.empty() ? "" : fmt::format("field {}: ", name_.substr(0, name_.size() - 1)),
-                  object.dump().substr(0, 60));
-  }
-
-  Fields object(const char* field) const { return Fields(path_, name_ + field + ".", at(field)); }
-  /// The objects of an array, of at most `most`.
-  std::vector<Fields> objects(const char* field, size_t most) const {
-    const Json& array = at(field);
-    if (!array.is_array() || array.size() > most) fail(field, fmt::format("at most {} objects", most));
-    std::vector<Fields> all;
-    for (size_t n = 0; n < array.size(); ++n)
-      all.emplace_back(path_, fmt::format("{}{}[{}].", name_, field, n), array[n]);
-    return all;
-  }
-  bool has(const char* field) const { return object_.contains(field) && !object_.at(field).is_null(); }
-
-  const Json& at(const char* field) const {
-    const auto found = object_.find(field);
-    if (found == object_.end()) fail(field, "a value");
-    return *found;
-  }
-  double number(const char* field, double at_least, double at_most) const {
-    const Json& value = at(field);
-    if (!value.is_number() || !(value >= at_least && value <= at_most))
-      fail(field, fmt::format("a number from {} to {}", at_least, at_most));
-    return value.get<double>();
-  }
-  double positive(const char* field) const { return number(field, 1e-300, 1e300); }
-  bool flag(const char* field) const {
-    if (!at(field).is_boolean()) fail(field, "true or false");
-    return at(field).get<bool>();
-  }
-  std::string text(const char* field) const {
-    if (!at(field).is_string()) fail(field, "a string");
-    return at(field).get<std::string>();
-  }
-  glm::dvec3 point(const char* field) const {
-    const Json& value = at(field);
-    if (!value.is_array() || value.size() != 3) fail(field, "three numbers");
-    glm::dvec3 result;
-    for (int axis = 0; axis < 3; ++axis) {
-      const Json& number = value[static_cast<size_t>(axis)];
-      if (!number.is_number() || !std::isfinite(number.get<double>())) fail(field, "three numbers");
-      result[axis] = number.get<double>();
-    }
-    return result;
-  }
-  [[noreturn]] void fail(const char* field, std::string_view expected) const {
-    const auto found = object_.is_object() ? object_.find(field) : object_.end();
-    throw Error("{}: field {}{}: expected {}, found {}", path_.string(), name_, field, expected,
-                found == object_.end() ? "none" : found->dump().substr(0, 60));
-  }
-
- private:
-  const std::filesystem::path& path_;
-  std::string name_;
-  const Json& object_;
-};
+double positive(const JsonField& field) {
+  return field.number(1e-300, 1e300);
+}
 
 Json jsonOf(const glm::dvec3& point) {
   return {point.x, point.y, point.z};
@@ -98,12 +36,13 @@ Json jsonOf(const std::vector<ClipPlane>& planes) {
 }
 
 /// At most `most`; states of earlier versions have none.
-std::vector<ClipPlane> planesFrom(const Fields& fields, const char* name, size_t most) {
+std::vector<ClipPlane> planesFrom(const JsonField& fields, const char* name, size_t most) {
   std::vector<ClipPlane> planes;
-  if (!fields.has(name)) return planes;
-  for (const Fields& field : fields.objects(name, most)) {
-    planes.push_back({field.point("point"), field.point("normal")});
-    if (!isUsable(planes.back())) field.fail("normal", "a direction");
+  const auto list = fields.find(name);
+  if (!list) return planes;
+  for (const JsonField& entry : list->elements(most)) {
+    planes.push_back({entry.at("point").point(), entry.at("normal").point()});
+    if (!isUsable(planes.back())) entry.at("normal").fail("a direction");
   }
   return planes;
 }
@@ -117,16 +56,39 @@ Json jsonOf(const Camera& camera) {
           {"view_angle", camera.view_angle_deg}};
 }
 
-Camera cameraFrom(const Fields& fields) {
+Camera cameraFrom(const JsonField& fields) {
   Camera camera;
-  camera.position = fields.point("position");
-  camera.focal_point = fields.point("focal_point");
-  camera.view_up = fields.point("view_up");
-  camera.projection = fields.flag("perspective") ? Projection::kPerspective : Projection::kOrthographic;
-  camera.parallel_scale = fields.positive("parallel_scale");
-  camera.view_angle_deg = fields.number("view_angle", 1e-3, 179);
-  if (camera.position == camera.focal_point) fields.fail("position", "another point than focal_point");
+  camera.position = fields.at("position").point();
+  camera.focal_point = fields.at("focal_point").point();
+  camera.view_up = fields.at("view_up").point();
+  camera.projection = fields.at("perspective").flag() ? Projection::kPerspective : Projection::kOrthographic;
+  camera.parallel_scale = positive(fields.at("parallel_scale"));
+  camera.view_angle_deg = fields.at("view_angle").number(1e-3, 179);
+  if (camera.position == camera.focal_point) fields.at("position").fail("another point than focal_point");
   return camera;
+}
+
+EditedFunction functionFrom(const JsonField& fields, const std::filesystem::path& path, double opacity_unit) {
+  EditedFunction function(parseParaViewPreset(fields.at("function").json().dump(), path), opacity_unit);
+  const JsonField preset = fields.at("preset");
+  if (preset.text() == EditedFunction::kAutomatic) {
+    function.setAutomatic();
+  } else if (!preset.text().empty()) {
+    try {
+      const auto [low, high] = function.range();
+      return EditedFunction(preset.text(), low, high, function.opacityUnit());
+    } catch (const UsageError&) {
+      preset.fail("the name of a colour map (curvisplat colormaps lists them)");
+    }
+  }
+  return function;
+}
+
+WorldBox boxFrom(const JsonField& fields) {
+  const WorldBox box{fields.at("lower").point(), fields.at("upper").point()};
+  for (int axis = 0; axis < 3; ++axis)
+    if (box.lower[axis] > box.upper[axis]) fields.at("lower").fail("less than upper");
+  return box;
 }
 
 const VariableInfo* find(const Manifest& manifest, const std::string& name) {
@@ -238,67 +200,44 @@ std::string toJson(const ViewState& state) {
   json["dark"] = state.dark;
   json["scalar_bar"] = state.annotations.scalar_bar;
   json["axes"] = state.annotations.axes;
+  json["axes_grid"] = state.annotations.axes_grid;
   json["outline"] = state.annotations.outline;
   return json.dump(1) + "\n";
 }
 
 ViewState viewStateFromJson(const std::string& text, const std::filesystem::path& path,
                             const Manifest& manifest) {
-  requireShallowJson(text, path.string());
-  Json json;
-  try {
-    json = Json::parse(text);
-  } catch (const Json::exception& error) {
-    throw Error("{}: expected the state of a window in JSON, found {}", path.string(),
-                jsonFault(text, error));
-  }
-  const Fields fields(path, "", json);
-  if (fields.number("curvisplat_view", 0, 1e9) != 1)
-    fields.fail("curvisplat_view", "1, the only version this program reads");
+  const JsonDocument document(text, path.string(), "the state of a window");
+  const JsonField fields = document.root();
+  if (const JsonField version = fields.at("curvisplat_view"); version.json() != 1)
+    version.fail("1, the only version this program reads");
+  const JsonField variable = fields.at("variable"), scale = fields.at("scale");
+  if (!find(manifest, variable.text())) variable.fail("a scalar of the cache");
+  const glm::dvec3 factors = scale.point();
+  if (!(std::min({factors.x, factors.y, factors.z}) > 0)) scale.fail("three numbers above zero");
 
-  const std::string variable = fields.text("variable");
-  if (!find(manifest, variable)) fields.fail("variable", "a scalar of the cache");
-  const Camera camera = cameraFrom(fields.object("camera"));
-  const glm::dvec3 scale = fields.point("scale");
-  if (!(std::min({scale.x, scale.y, scale.z}) > 0)) fields.fail("scale", "three numbers above zero");
-  EditedFunction function(parseParaViewPreset(fields.at("function").dump(), path),
-                          defaultOpacityUnit(manifest, scale));
-  if (const std::string preset = fields.text("preset"); preset == EditedFunction::kAutomatic) {
-    function.setAutomatic();
-  } else if (!preset.empty()) {
-    try {
-      function =
-          EditedFunction(preset, function.range().first, function.range().second, function.opacityUnit());
-    } catch (const UsageError&) {
-      fields.fail("preset", "the name of a colour map (curvisplat colormaps lists them)");
-    }
-  }
-
-  ViewState state{variable, camera, function};
-  state.lod_pixels = fields.number("lod_pixels", 0, 1e6);
-  state.memory_bytes = static_cast<uint64_t>(fields.number("memory_bytes", 1, 1e18));
-  state.classification = fields.flag("flat") ? Classification::kFlat : Classification::kPixel;
-  state.scale = scale;
-  if (fields.has("clip_box")) {
-    const Fields box = fields.object("clip_box");
-    state.clip_box = WorldBox{box.point("lower"), box.point("upper")};
-    for (int axis = 0; axis < 3; ++axis)
-      if (state.clip_box->lower[axis] > state.clip_box->upper[axis]) box.fail("lower", "less than upper");
-  }
+  ViewState state{variable.text(), cameraFrom(fields.at("camera")),
+                  functionFrom(fields, path, defaultOpacityUnit(manifest, factors))};
+  state.lod_pixels = fields.at("lod_pixels").number(0, 1e6);
+  state.memory_bytes = static_cast<uint64_t>(fields.at("memory_bytes").number(1, 1e18));
+  state.classification = fields.at("flat").flag() ? Classification::kFlat : Classification::kPixel;
+  state.scale = factors;
+  if (const auto box = fields.find("clip_box")) state.clip_box = boxFrom(*box);
   state.clip_planes = planesFrom(fields, "clip_planes", kMaxClipPlanes);
   state.slices = planesFrom(fields, "slices", kMaxSlices);
-  if (fields.has("surfaces"))
-    for (const Fields& field : fields.objects("surfaces", kMaxSurfaces)) {
-      const glm::dvec3 colour = field.point("colour");
+  if (const auto surfaces = fields.find("surfaces"))
+    for (const JsonField& surface : surfaces->elements(kMaxSurfaces)) {
+      const glm::dvec3 colour = surface.at("colour").point();
       for (int c = 0; c < 3; ++c)
-        if (!(colour[c] >= 0 && colour[c] <= 1)) field.fail("colour", "three numbers from 0 to 1");
-      state.surfaces.push_back({field.text("file"), glm::vec3(colour)});
+        if (!(colour[c] >= 0 && colour[c] <= 1)) surface.at("colour").fail("three numbers from 0 to 1");
+      state.surfaces.push_back({surface.at("file").text(), glm::vec3(colour)});
     }
-  if (fields.has("slice_opacity")) state.slice_opacity = fields.number("slice_opacity", 1e-3, 1);
-  if (fields.has("volume")) state.volume = fields.flag("volume");
-  state.lit = fields.has("lit") && fields.flag("lit");
-  state.dark = fields.flag("dark");
-  state.annotations = {fields.flag("scalar_bar"), fields.flag("axes"), fields.flag("outline")};
+  if (const auto opacity = fields.find("slice_opacity")) state.slice_opacity = opacity->number(1e-3, 1);
+  if (const auto volume = fields.find("volume")) state.volume = volume->flag();
+  if (const auto lit = fields.find("lit")) state.lit = lit->flag();
+  state.dark = fields.at("dark").flag();
+  state.annotations = {fields.at("scalar_bar").flag(), fields.at("axes").flag(), fields.at("outline").flag()};
+  if (const auto grid = fields.find("axes_grid")) state.annotations.axes_grid = grid->flag();
   return state;
 }
 
@@ -360,6 +299,7 @@ std::string renderCommand(const ViewState& state, const std::filesystem::path& c
   add("--background", state.dark ? "black" : "white");
   if (state.annotations.scalar_bar) command += " --scalar-bar";
   if (state.annotations.axes) command += " --axes";
+  if (state.annotations.axes_grid) command += " --axes-grid";
   if (state.annotations.outline) command += " --outline";
   return command;
 }

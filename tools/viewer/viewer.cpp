@@ -24,6 +24,7 @@
 #include "tools/viewer/playback.h"
 #include "tools/viewer/state_files.h"
 #include "tools/viewer/view_state.h"
+#include "tools/viewer/widget_places.h"
 #include "tools/viewer/window.h"
 
 namespace curvisplat {
@@ -146,6 +147,7 @@ class Viewer {
       if (std::exchange(copy_requested_, false)) copyCommand();
     }
     window_.endFrame(glm::vec3(state_.background()));
+    writeWidgetPlaces();
   }
 
   /// Size in pixels of the picture beside the panels.
@@ -265,8 +267,7 @@ class Viewer {
     const VariableInfo& info = manifest.variables[variable()];
     return {picture_size_,
             screenViewOf(manifest, state_.camera, state_.frameOptions(data_size_), data_size_),
-            function,
-            scalarTitle(info.name, info.unit),
+            {{&function, scalarTitle(info.name, info.unit)}},
             manifest.lower,
             manifest.upper,
             state_.background()};

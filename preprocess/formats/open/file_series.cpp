@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,13 +11,11 @@
 #include "preprocess/formats/open/described_mesh.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
-#include "stream/base/json_text.h"
+#include "stream/base/json_document.h"
 #include "stream/base/paths.h"
 
 namespace curvisplat {
 namespace {
-
-using Json = nlohmann::json;
 
 struct ListedFile {
   double time = 0;
@@ -26,33 +23,15 @@ struct ListedFile {
 };
 
 std::vector<ListedFile> filesIn(const std::filesystem::path& path) {
-  const std::string text = readTextFile(path);
-  requireShallowJson(text, path.string());
-  Json json;
-  try {
-    json = Json::parse(text);
-  } catch (const Json::exception& error) {
-    throw Error("{}: is not valid JSON (.series files are JSON): found {}", path.string(),
-                jsonFault(text, error));
-  }
-  const auto fail = [&](const char* what) {
-    throw Error("{}: {}; expected {{\"files\": [{{\"name\": ..., \"time\": ...}}, ...]}}", path.string(),
-                what);
-  };
-  if (!json.is_object() || !json.contains("files") || !json["files"].is_array()) fail("has no list 'files'");
+  const JsonDocument document(readTextFile(path), path.string(),
+                              "{\"files\": [{\"name\": ..., \"time\": ...}, ...]}");
+  const JsonField list = document.root().at("files");
   std::vector<ListedFile> files;
-  for (const Json& entry : json["files"]) {
-    if (!entry.is_object() || !entry.contains("name") || !entry["name"].is_string())
-      fail("has a file without a name");
-    ListedFile file{static_cast<double>(files.size()), entry["name"].get<std::string>()};
-    if (entry.contains("time")) {
-      if (!entry["time"].is_number() || !std::isfinite(entry["time"].get<double>()))
-        fail("has a time that is not a number");
-      file.time = entry["time"].get<double>();
-    }
-    files.push_back(std::move(file));
+  for (const JsonField& entry : list.elements()) {
+    const auto time = entry.find("time");
+    files.push_back({time ? time->number() : static_cast<double>(files.size()), entry.at("name").text()});
   }
-  if (files.empty()) fail("lists no files");
+  if (files.empty()) list.fail("one file or more");
   std::stable_sort(files.begin(), files.end(),
                    [](const ListedFile& a, const ListedFile& b) { return a.time < b.time; });
   return files;

@@ -1,0 +1,43 @@
+#include "tools/viewer/widget_places.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <utility>
+
+namespace curvisplat {
+namespace {
+
+struct Places {
+  const char* const file = std::getenv("CURVISPLAT_WIDGETS");
+  std::string now, written;
+};
+
+Places& places() {
+  static Places places;
+  return places;
+}
+
+}  // namespace
+
+void nameWidget(const std::string& name) {
+  if (!places().file) return;
+  const ImVec2 at = ImGui::GetItemRectMin(), size = ImGui::GetItemRectSize();
+  places().now += fmt::format("{:.0f} {:.0f} {:.0f} {:.0f} {}\n", at.x, at.y, size.x, size.y, name);
+}
+
+void writeWidgetPlaces() {
+  const char* const file = places().file;
+  const std::string now = std::exchange(places().now, {});
+  if (!file || now == places().written) return;
+  const std::string part = std::string(file) + ".part";
+  std::ofstream(part) << now;
+  std::error_code ignored;
+  std::filesystem::rename(part, file, ignored);
+  places().written = now;
+}
+
+}  // namespace curvisplat
