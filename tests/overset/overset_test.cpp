@@ -8,6 +8,7 @@
 #include "preprocess/addition/add_scalar.h"
 #include "preprocess/addition/add_step.h"
 #include "preprocess/convert/convert.h"
+#include "preprocess/formats/open/open_grid.h"
 #include "preprocess/scenes/scenes.h"
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
@@ -231,6 +232,46 @@ TEST_F(Overset, AFringeIsDrawnByTheBlockThatItWasInterpolatedFrom) {
     }
   }
   EXPECT_EQ(of_fine, 13u * 13 * 13);
+}
+
+/// A grid without scalars, with its nodes' x as one.
+class WithX : public GridSource {
+ public:
+  explicit WithX(const std::filesystem::path& path) {
+    OpenGridOptions options;
+    options.grid = path;
+    source_ = openGrid(options);
+    description_ = source_->description();
+    description_.scalars = {{"x", "", {}}};
+  }
+  const GridDescription& description() const override { return description_; }
+  void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
+            NodeArrays& out) const override {
+    source_->read(block, box, {}, out);
+    out.scalars.assign(scalars.size(), std::vector<float>(out.x.begin(), out.x.end()));
+  }
+
+ private:
+  std::unique_ptr<GridSource> source_;
+  GridDescription description_;
+};
+
+// The same cylinder with blocks that abut, and with blocks that overlap.
+TEST_F(Overset, ARealGridHasTheVolumeOfItsDomain) {
+  const std::filesystem::path folder = std::filesystem::path(CURVISPLAT_SHARED_DATA) / "overset";
+  if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << "needs " << folder;
+  const WithX abutting(folder / "cylinder_chimera_abutting.x");
+  const WithX overlapping(folder / "cylinder_chimera_overlapping_singledonor.x");
+  const ConvertReport expected = convertWith(abutting, optionsFor("abutting.splats"));
+  EXPECT_TRUE(expected.notes.empty());
+  const ConvertReport owned = convertWith(overlapping, optionsFor("owned.splats"));
+  ConvertOptions options = optionsFor("all.splats");
+  options.overlap = Overlap::kAll;
+  const ConvertReport all = convertWith(overlapping, options);
+  std::printf("abutting %g, owners %g, all %g; %s\n", expected.volume, owned.volume, all.volume,
+              owned.notes.at(0).c_str());
+  EXPECT_NEAR(owned.volume, expected.volume, 1e-3 * expected.volume);
+  EXPECT_GT(all.volume, 1.003 * expected.volume);
 }
 
 }  // namespace
