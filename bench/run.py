@@ -77,14 +77,14 @@ def step_convert(paths, form):
 
 def step_scaling(paths, form):
     return [[sys.executable, HERE / "scaling.py", paths.folder / "scaling", "--program", paths.program, *form.scaling,
-             "--json", paths.json("scaling"), "--plot", paths.folder / "scaling.svg"]]
+             "--json", paths.json("scaling"), "--plot", paths.folder / "scaling.png"]]
 
 
 def step_peers(paths, form):
     fin = ["--fin", *paths.fin] if paths.fin else []
     return [[sys.executable, HERE / "peers/compare_peers.py", paths.folder / "peers", "--program", paths.program,
              "--reference", paths.bench / "curvisplat_reference", *form.peers, *fin, "--json", paths.json("peers"),
-             "--plot", paths.folder / "peers.svg", "--table", paths.folder / "peers.md"]]
+             "--plot", paths.folder / "peers.png", "--table", paths.folder / "peers.md"]]
 
 
 def step_fidelity(paths, form):

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures conversion and rendering at growing sizes: rates, bytes, first picture, frame, memory, and how each grows.
 
-    bench/scaling.py FOLDER --nodes 1M,8M,64M [--json OUT.json] [--plot OUT.svg]
+    bench/scaling.py FOLDER --nodes 1M,8M,64M [--json OUT.json] [--plot OUT.png]
 
 Each size of the scene is generated in FOLDER and converted --conversions times. Caches and the measurements of their
 conversions are kept there and reused, unless --again is given; grids are deleted. A conversion needs 16 bytes a node for the
@@ -22,7 +22,7 @@ import statistics
 
 import page_cache
 import results
-from line_plot import exponent_of, write_line_plots
+from line_plot import exponent_of, trends_of, write_line_plots
 
 SUFFIX = {"": 1, "K": 1000, "M": 1000**2, "G": 1000**3}
 MIB = 2**20
@@ -160,7 +160,7 @@ def plots_of(rows):
                 for lod_pixels in rows[0]["pictures"]}
 
     def plot(title, y_name, of):
-        return {"title": title, "x_name": "nodes", "y_name": y_name, "lines": of, "trend": True}
+        return {"title": title, "x_name": "nodes", "y_name": y_name, "log_values": True, "lines": of}
 
     return [plot("Conversion", "seconds", {"convert": line(lambda row: row["conversion"]["seconds"])}),
             plot("What a cache takes", "bytes", {"cache": line(lambda row: row["conversion"]["cache_bytes"])}),
@@ -211,7 +211,8 @@ def main():
         out.write(arguments.json, "scaling", version, words=vars(arguments) | {"folder": str(arguments.folder)},
                   base=base, sizes=rows)
     if arguments.plot:
-        write_line_plots(arguments.plot, plots)
+        write_line_plots(arguments.program, arguments.plot,
+                         [plot | {"lines": trends_of(plot["lines"])} for plot in plots])
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 """Draws the same grid, camera and transfer function with curvisplat and with VTK, in one run.
 
     bench/peers/compare_peers.py FOLDER [--sizes 40x32x32,100x100x100] [--fin GRID SOLUTION] [--functions smooth]
-                                 [--json OUT.json] [--plot OUT.svg] [--table OUT.md]
+                                 [--json OUT.json] [--plot OUT.png] [--table OUT.md]
 
 The half-annulus scene is generated in FOLDER in each of --sizes; --fin draws the density of a PLOT3D grid with a Q file, such as
 the blunt fin (40x32x32). Every picture is compared with the reference march of curvisplat_reference: of the analytic field for
@@ -215,9 +215,10 @@ def plots_of(rows, function):
         return {name: sorted(line) for name, line in of.items()}
 
     def plot(title, y_name, value, **more):
-        return {"title": f"{title} ({function})", "x_name": "nodes", "y_name": y_name, "lines": lines(value), **more}
+        return {"title": f"{title} ({function})", "x_name": "nodes", "y_name": y_name, "lines": lines(value),
+                "log_values": True, **more}
     return [plot("Build, once", "seconds", "build_s"), plot("A frame", "seconds", "frame_s"),
-            plot("Peak memory", "bytes", "peak_memory_bytes"), plot("Against the reference", "dB", "psnr_db", linear_y=True)]
+            plot("Peak memory", "bytes", "peak_memory_bytes"), plot("Against the reference", "dB", "psnr_db", log_values=False)]
 
 
 @contextlib.contextmanager
@@ -304,7 +305,7 @@ def main():
     if arguments.json:
         out.write(arguments.json, "peers", version, picture=arguments.picture, rows=rows)
     if arguments.plot and any(row["case"] != "fin" for row in rows):
-        write_line_plots(arguments.plot, plots_of(rows, arguments.functions[0]))
+        write_line_plots(arguments.program, arguments.plot, plots_of(rows, arguments.functions[0]))
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@
 #include "preprocess/addition/cache_grid.h"
 #include "preprocess/addition/value_passes.h"
 #include "preprocess/addition/value_record.h"
+#include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/preflight.h"
 #include "preprocess/convert/scan.h"
@@ -194,6 +195,7 @@ class Addition {
 
 AddScalarReport addScalars(const GridSource& source, const AddScalarOptions& options, Progress& progress) {
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
+  GridOrigin::requireMemory(source, options.scalars, plan);
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
   if (options.most_buckets) plan.most_buckets = *options.most_buckets;
 

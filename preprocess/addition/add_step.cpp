@@ -13,6 +13,7 @@
 #include "preprocess/addition/step_references.h"
 #include "preprocess/addition/value_passes.h"
 #include "preprocess/addition/value_record.h"
+#include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/preflight.h"
 #include "preprocess/convert/scan.h"
@@ -89,6 +90,7 @@ class StepAddition {
         scalars_(scalarsOf(source.description(), cache_.seriesManifest())),
         plan_(MemoryPlan::ofOptions(options.memory_bytes, scalars_.size(), options.threads)),
         reader_(source, scalars_, options.blank_value) {
+    GridOrigin::requireMemory(source, scalars_, plan_);
     if (options.bucket_splats) plan_.limitBuckets(*options.bucket_splats, scalars_.size());
     report_.step = cache_.series().steps.size();
     report_.nodes = cache_.manifest().nodes;

@@ -21,7 +21,7 @@ void GridOrigin::requireMemory(const GridSource& source, const std::vector<uint3
                                MemoryPlan& plan) {
   const bool cells = NodeReader(source, scalars, std::nullopt).centring() == Centring::kCell;
   plan.requireSlabs(
-      leastSlabBytes(source.description().blocks, scalars.size(), cells ? kCellHalo : kNodeHalo));
+      leastSlabBytes(source.description().blocks, scalars.size(), cells ? kCellSplatHalo : kNodeSplatHalo));
 }
 
 uint64_t GridOrigin::temporaryBytes() const {

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "preprocess/convert/splat_record.h"
+#include "preprocess/grid/slabs.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/model/brick.h"
@@ -104,10 +105,11 @@ uint64_t MemoryPlan::capForMesh(uint64_t mesh_bytes) {
 }
 
 void MemoryPlan::requireSlabs(uint64_t bytes) {
-  if (capFor(bytes * kSlabShare) > cap_bytes)
+  const uint64_t of_two = (bytes + kSlabsOfLongRows - 1) / kSlabsOfLongRows;
+  if (capFor(of_two * kSlabShare) > cap_bytes)
     throw Error("--memory: the grid's rows along i are long and need at least {} MiB; {} MiB were given",
-                (capFor(bytes * kSlabShare) >> 20) + 1, cap_bytes >> 20);
-  slab_bytes = std::max(slab_bytes, bytes);
+                (capFor(of_two * kSlabShare) >> 20) + 1, cap_bytes >> 20);
+  slab_bytes = std::max(slab_bytes, of_two);
 }
 
 void MemoryPlan::limitBuckets(uint64_t splats, size_t variables) {

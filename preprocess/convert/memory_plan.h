@@ -16,7 +16,7 @@ namespace curvisplat {
 
 struct MemoryPlan {
   uint64_t cap_bytes = 0;       // that all of it keeps
-  uint64_t slab_bytes = 0;      // each of two
+  uint64_t slab_bytes = 0;      // each of two; one of long rows may have kSlabsOfLongRows times as much
   uint64_t counting_bytes = 0;  // the counting grid
   uint64_t seam_bytes = 0;
   uint64_t mesh_bytes = 0;          // of an unstructured grid, in the place of slabs and seams
@@ -37,7 +37,7 @@ struct MemoryPlan {
   /// The cap of which a mesh gets so much.
   static uint64_t capForMesh(uint64_t mesh_bytes);
 
-  /// Makes slabs at least so large. Throws Error that names a sufficient cap if the cap is too small for that.
+  /// Makes room for slabs of long rows that are so large. Throws Error that names a sufficient cap if the cap is too small for that.
   void requireSlabs(uint64_t bytes);
 
   /// Makes buckets smaller than they could be.

@@ -1,7 +1,6 @@
 #include "preprocess/convert/preflight.h"
 
 #include <sys/stat.h>
-#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include "preprocess/convert/splat_record.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/free_space.h"
 #include "stream/base/paths.h"
 #include "stream/cache/partial_folder.h"
 
@@ -36,9 +36,9 @@ struct Disk {
 
 std::optional<Disk> diskOf(const std::filesystem::path& folder) {
   struct stat status {};
-  struct statvfs disk {};
-  if (::stat(folder.c_str(), &status) != 0 || ::statvfs(folder.c_str(), &disk) != 0) return std::nullopt;
-  return Disk{status.st_dev, uint64_t{disk.f_bavail} * disk.f_frsize};
+  const std::optional<uint64_t> free_bytes = freeBytes(folder);
+  if (!free_bytes || ::stat(folder.c_str(), &status) != 0) return std::nullopt;
+  return Disk{status.st_dev, *free_bytes};
 }
 
 /// In MiB or GiB, so that numbers which differ are printed differently.

@@ -14,7 +14,7 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kNodesPerTask = 4096;
+constexpr uint64_t kNodesPerTask = 4096, kNodesOfRowPerTask = 16384;  // longer rows are cut
 constexpr size_t kGatheredBytes = 32 << 10;
 
 struct Handedness {
@@ -40,15 +40,19 @@ class SplatStream {
   void add(const LoadedSlab& loaded) {
     const Slab& slab = loaded.slab;
     const GridBlock& block = (*blocks_)[slab.block];
-    const BlockWindow window{block, slab.first_node, slab.window, &loaded.nodes};
-    const std::vector<NodeBox> tasks = cutForTasks(block, slab.box, kNodesPerTask);
-    tbb::parallel_for(size_t{0}, tasks.size(), [&](size_t task) {
+    const std::vector<NodeBox> boxes = cutForTasks(block, slab.box, kNodesPerTask);
+    const uint64_t parts = (block.ni + kNodesOfRowPerTask - 1) / kNodesOfRowPerTask;
+    tbb::parallel_for(size_t{0}, boxes.size() * parts, [&](size_t task) {
       progress_->throwIfStopped();
+      const uint64_t i0 = task % parts * kNodesOfRowPerTask;
+      const NodeBox& box = boxes[task / parts];
+      const BlockWindow window{block, slab.first_node,        slab.window, &loaded.nodes,
+                               i0,    i0 + kNodesOfRowPerTask};
       Worker& worker = workers_.local();
       if (centring_ == Centring::kCell)
-        computeCellSplats(window, tasks[task], {slab.block, faces_}, worker.cells, worker.splats);
+        computeCellSplats(window, box, {slab.block, faces_}, worker.cells, worker.splats);
       else
-        computeNodeSplats(window, tasks[task], worker.nodes, worker.splats);
+        computeNodeSplats(window, box, worker.nodes, worker.splats);
       worker.degenerate += worker.splats.degenerate;
       worker.handedness[slab.block].right += worker.splats.right_handed;
       worker.handedness[slab.block].left += worker.splats.left_handed;

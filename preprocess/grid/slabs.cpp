@@ -77,15 +77,24 @@ std::vector<NodeBox> cutForTasks(const GridBlock& block, const NodeBox& box, uin
 }
 
 SlabStream::SlabStream(const NodeReader& reader, uint64_t slab_bytes, Halo halo, const SlabShare& share)
-    : slabs_(cutIntoSlabs(reader.source().description().blocks,
-                          slab_bytes / slabBytesPerNode(reader.scalars()), halo)),
+    : SlabStream(reader, slab_bytes,
+                 leastSlabBytes(reader.source().description().blocks, reader.scalars(), halo), halo, share) {}
+
+SlabStream::SlabStream(const NodeReader& reader, uint64_t slab_bytes, uint64_t least_bytes, Halo halo,
+                       const SlabShare& share)
+    : slabs_(cutIntoSlabs(
+          reader.source().description().blocks,
+          (least_bytes > slab_bytes ? kSlabsOfLongRows : 1) * slab_bytes / slabBytesPerNode(reader.scalars()),
+          halo)),
       position_(slabs_.size() * share.index / share.count),
       end_(slabs_.size() * (share.index + 1) / share.count),
-      ahead_([this, &reader](LoadedSlab& loaded) {
-        if (position_ == end_) return false;
-        loaded.slab = slabs_[position_++];
-        loaded.blanked = reader.read(loaded.slab.block, loaded.slab.window, loaded.nodes);
-        return true;
-      }) {}
+      ahead_(
+          [this, &reader](LoadedSlab& loaded) {
+            if (position_ == end_) return false;
+            loaded.slab = slabs_[position_++];
+            loaded.blanked = reader.read(loaded.slab.block, loaded.slab.window, loaded.nodes);
+            return true;
+          },
+          least_bytes > slab_bytes ? 1 : 2) {}
 
 }  // namespace curvisplat

@@ -46,6 +46,9 @@ std::vector<Slab> cutIntoSlabs(const std::vector<GridBlock>& blocks, uint64_t wi
 /// Size of the largest window that cutIntoSlabs() cannot divide: a row and its neighbours.
 uint64_t leastSlabBytes(const std::vector<GridBlock>& blocks, size_t scalars, Halo halo);
 
+/// So many times `slab_bytes` may be one slab of long rows, since it is alone in memory.
+inline constexpr uint64_t kSlabsOfLongRows = 3;
+
 /// Cuts `box` into boxes of about `nodes` nodes, one for each task.
 std::vector<NodeBox> cutForTasks(const GridBlock& block, const NodeBox& box, uint64_t nodes);
 
@@ -61,8 +64,8 @@ struct SlabShare {
   unsigned index = 0, count = 1;
 };
 
-/// Reads all slabs of a grid, or a share of them, in order, one ahead. `reader` must outlive it. Two slabs of `slab_bytes` are in
-/// memory at any time.
+/// Reads all slabs of a grid, or a share of them, in order, one ahead. `reader` must outlive it. Two slabs of
+/// `slab_bytes` are in memory at any time; where rows are too long for that, one of kSlabsOfLongRows as much.
 class SlabStream {
  public:
   SlabStream(const NodeReader& reader, uint64_t slab_bytes, Halo halo, const SlabShare& share = {});
@@ -71,6 +74,9 @@ class SlabStream {
   const LoadedSlab* next() { return ahead_.next(); }
 
  private:
+  SlabStream(const NodeReader& reader, uint64_t slab_bytes, uint64_t least_bytes, Halo halo,
+             const SlabShare& share);
+
   std::vector<Slab> slabs_;
   size_t position_, end_;
   ReadAhead<LoadedSlab> ahead_;

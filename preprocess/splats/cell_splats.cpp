@@ -33,10 +33,14 @@ class Cells {
         known_{box.j0 - std::min<uint64_t>(box.j0, kReach), std::min(box.j1 + kReach, in.block.nj - 1),
                box.k0 - std::min<uint64_t>(box.k0, kReach), std::min(box.k1 + kReach, in.block.nk - 1)},
         cells_i_(in.block.ni - 1),
+        i0_(in.i0),
+        i1_(in.endOfPart(cells_i_)),
+        known_i0_(i0_ - std::min(i0_, kReach)),
+        known_i1_(std::min(i1_ + kReach, cells_i_)),
         corrections_(corrections),
         scratch_(scratch),
         out_(out) {
-    scratch_.centre.resize(cells_i_ * rowsOf(known_));
+    scratch_.centre.resize((known_i1_ - known_i0_) * rowsOf(known_));
     scratch_.there.resize(scratch_.centre.size());
     for (auto& extent : scratch_.extent) extent.resize(scratch_.centre.size());
     for (uint64_t k = known_.k0; k < known_.k1; ++k)
@@ -44,7 +48,7 @@ class Cells {
   }
 
   void addRow(uint64_t j, uint64_t k) {
-    for (uint64_t i = 0; i < cells_i_; ++i)
+    for (uint64_t i = i0_; i < i1_; ++i)
       if (scratch_.there[cellAt(i, j, k)]) addCell(i, j, k);
   }
   size_t count() const { return count_; }
@@ -54,7 +58,8 @@ class Cells {
     return (k - in_.window.k0) * plane_stride_ + (j - in_.window.j0) * row_stride_ + i;
   }
   size_t cellAt(uint64_t i, uint64_t j, uint64_t k) const {
-    return ((k - known_.k0) * (known_.j1 - known_.j0) + (j - known_.j0)) * cells_i_ + i;
+    return ((k - known_.k0) * (known_.j1 - known_.j0) + (j - known_.j0)) * (known_i1_ - known_i0_) +
+           (i - known_i0_);
   }
   /// For a side on which the block has no neighbour.
   bool isBorder(const std::array<uint64_t, 3>& cell, int axis, bool upper) const {
@@ -77,8 +82,10 @@ class Cells {
   const NodeBox box_;
   const BlockEnds& ends_;
   const size_t row_stride_, plane_stride_;
-  const NodeBox known_;  // cells that are in the scratch: the box and its neighbours
-  const uint64_t cells_i_;
+  const NodeBox known_;                 // cells that are in the scratch: the box and its neighbours
+  const uint64_t cells_i_;              // of a row
+  const uint64_t i0_, i1_;              // its part
+  const uint64_t known_i0_, known_i1_;  // with its neighbours
   const NodeSplatCorrections corrections_;
   CellScratch& scratch_;
   NodeSplats& out_;
@@ -87,7 +94,8 @@ class Cells {
 
 void Cells::lookAtRow(uint64_t j, uint64_t k) {
   const uint8_t* marks = in_.nodes->blank.data();
-  const size_t node = nodeAt(0, j, k), cell = cellAt(0, j, k);
+  const size_t node = nodeAt(known_i0_, j, k), cell = cellAt(known_i0_, j, k);
+  const size_t cells = known_i1_ - known_i0_;
   const double* const axes[] = {in_.nodes->x.data() + node, in_.nodes->y.data() + node,
                                 in_.nodes->z.data() + node};
   for (int axis = 0; axis < 3; ++axis) {
@@ -96,13 +104,13 @@ void Cells::lookAtRow(uint64_t j, uint64_t k) {
       return (a[i] + a[i + row_stride_]) + (a[i + plane_stride_] + a[i + row_stride_ + plane_stride_]);
     };
     double before = column(0);
-    for (size_t i = 0; i < cells_i_; ++i) {
+    for (size_t i = 0; i < cells; ++i) {
       const double after = column(i + 1);
       scratch_.centre[cell + i][axis] = 0.125 * (before + after);
       before = after;
     }
   }
-  for (size_t i = 0; i < cells_i_; ++i)
+  for (size_t i = 0; i < cells; ++i)
     scratch_.there[cell + i] =
         marks[node + i] == 0 && (cornerMarks(marks, node + i, row_stride_, plane_stride_) & kNoNode) == 0;
 
@@ -117,11 +125,11 @@ void Cells::lookAtRow(uint64_t j, uint64_t k) {
 void Cells::measureRow(uint64_t j, uint64_t k, int axis) {
   const std::array<size_t, 3> strides{1, row_stride_, plane_stride_};
   const size_t along = strides[axis], across = strides[(axis + 1) % 3], other = strides[(axis + 2) % 3];
-  const size_t node = nodeAt(0, j, k);
+  const size_t node = nodeAt(known_i0_, j, k);
   const double *x = in_.nodes->x.data() + node, *y = in_.nodes->y.data() + node,
                *z = in_.nodes->z.data() + node;
-  double* out = scratch_.extent[axis].data() + cellAt(0, j, k);
-  for (size_t i = 0; i < cells_i_; ++i) {
+  double* out = scratch_.extent[axis].data() + cellAt(known_i0_, j, k);
+  for (size_t i = 0; i < known_i1_ - known_i0_; ++i) {
     const auto edges = [&](const double* a) {
       const double* b = a + along;
       return ((b[i] - a[i]) + (b[i + across] - a[i + across])) +
@@ -177,7 +185,8 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
 
   const std::array<uint64_t, 3> index{i, j, k};
   const std::array<uint64_t, 3> cells{cells_i_, in_.block.nj - 1, in_.block.nk - 1};
-  const std::array<size_t, 3> cell_strides{1, cells_i_, cells_i_ * (known_.j1 - known_.j0)};
+  const std::array<size_t, 3> cell_strides{1, known_i1_ - known_i0_,
+                                           (known_i1_ - known_i0_) * (known_.j1 - known_.j0)};
   const std::array<size_t, 3> node_strides{1, row_stride_, plane_stride_};
   std::array<size_t, 3> before, after;  // elements of NodeArrays
   std::array<double, 3> per_step;
@@ -288,7 +297,9 @@ void computeCellSplats(const BlockWindow& in, const NodeBox& box, const BlockEnd
   const NodeBox cells{box.j0, std::min(box.j1, block.nj - 1), box.k0, std::min(box.k1, block.nk - 1)};
   if (cells.j0 >= cells.j1 || cells.k0 >= cells.k1) return;
 
-  const size_t most = (block.ni - 1) * rowsOf(cells);
+  const uint64_t end = in.endOfPart(block.ni - 1);
+  if (in.i0 >= end) return;
+  const size_t most = (end - in.i0) * rowsOf(cells);
   const size_t variables = in.nodes->scalars.size();
   out.splats.resize(most);
   out.values.resize(most * variables);

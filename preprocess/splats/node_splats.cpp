@@ -35,16 +35,20 @@ class Window {
         z_(in.nodes->z.data()),
         blank_(in.nodes->blank.data()),
         ni_(in.block.ni),
+        i0_(in.i0),
+        i1_(in.endOfPart(in.block.ni)),
         row_stride_(static_cast<ptrdiff_t>(ni_)),
         plane_stride_(static_cast<ptrdiff_t>(ni_ * (in.window.j1 - in.window.j0))),
         scratch_(scratch),
         out_(out) {
     for (const auto& scalar : in.nodes->scalars) scalars_.push_back(scalar.data());
-    for (auto& row : scratch.stretch) row.assign(ni_, 1.0f);
-    for (auto& row : scratch.growth) row.assign(ni_, 0.0f);
+    for (auto& row : scratch.stretch) row.assign(i1_ - i0_, 1.0f);
+    for (auto& row : scratch.growth) row.assign(i1_ - i0_, 0.0f);
     scratch.has_blank.resize(rowsOf(in.window));
+    const uint64_t first = i0_ - std::min<uint64_t>(i0_, kStretchReach);
+    const uint64_t end = std::min(i1_ + kStretchReach, ni_);
     for (size_t row = 0; row < scratch.has_blank.size(); ++row)
-      scratch.has_blank[row] = std::memchr(blank_ + row * ni_, 1, ni_) != nullptr;
+      scratch.has_blank[row] = std::memchr(blank_ + row * ni_ + first, 1, end - first) != nullptr;
   }
 
   void addRow(uint64_t j, uint64_t k);
@@ -70,7 +74,7 @@ class Window {
   const double *x_, *y_, *z_;
   const uint8_t* blank_;
   std::vector<const float*> scalars_;
-  uint64_t ni_;
+  uint64_t ni_, i0_, i1_;  // of a row; its part
   ptrdiff_t row_stride_, plane_stride_;
   uint64_t first_node_of_row_ = 0;
   NodeScratch& scratch_;
@@ -114,13 +118,14 @@ void Window::addRow(uint64_t j, uint64_t k) {
 
   if (corrections_.stretch) stretchRow(j, k);
   if (!anyBlankAround(j, k)) {
-    addNode(0, row, at_i(0), true, kNoLayer);
-    for (uint64_t i = 1; i + 1 < ni_; ++i)
+    if (i0_ == 0) addNode(0, row, at_i(0), true, kNoLayer);
+    for (uint64_t i = std::max<uint64_t>(1, i0_); i < std::min(i1_, ni_ - 1); ++i)
       addNode(i, row + static_cast<ptrdiff_t>(i), inner, on_face, layer_at(i));
-    if (ni_ > 1) addNode(ni_ - 1, row + static_cast<ptrdiff_t>(ni_ - 1), at_i(ni_ - 1), true, kNoLayer);
+    if (ni_ > 1 && i1_ == ni_)
+      addNode(ni_ - 1, row + static_cast<ptrdiff_t>(ni_ - 1), at_i(ni_ - 1), true, kNoLayer);
     return;
   }
-  for (uint64_t i = 0; i < ni_; ++i) {
+  for (uint64_t i = i0_; i < i1_; ++i) {
     const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
     if (blank_[at]) continue;
     Neighbours neighbours = at_i(i);
@@ -139,7 +144,7 @@ bool Window::anyBlankAround(uint64_t j, uint64_t k) const {
          (k > 0 && hasBlank(j, k - 1)) || (k + 1 < block.nk && hasBlank(j, k + 1));
 }
 
-/// Fills the scratch with the stretch of a row's nodes.
+/// Fills the scratch with the stretch of the nodes of a row's part.
 void Window::stretchRow(uint64_t j, uint64_t k) {
   constexpr uint64_t kWhole = kStretchReach - 1;  // neighbours on a side that stretchNodes() needs
   const GridBlock& block = in_.block;
@@ -154,9 +159,14 @@ void Window::stretchRow(uint64_t j, uint64_t k) {
         const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
         if (blank_[at]) continue;
         const Stretch stretch = stretchOfNode(at, strides[axis], axis == 0 ? i : index[axis], count[axis]);
-        out[i] = stretch.factor;
-        growth[i] = stretch.growth;
+        out[i - i0_] = stretch.factor;
+        growth[i - i0_] = stretch.growth;
       }
+    };
+    const auto at_once = [&](uint64_t begin, uint64_t end) {
+      if (begin >= end) return;
+      stretchNodes({x_, y_, z_}, row + static_cast<ptrdiff_t>(begin), strides[axis], end - begin,
+                   out + (begin - i0_), growth + (begin - i0_));
     };
     bool whole = true;
     if (axis == 0) {
@@ -167,14 +177,13 @@ void Window::stretchRow(uint64_t j, uint64_t k) {
         whole = !(axis == 1 ? hasBlank(j + n - kWhole, k) : hasBlank(j, k + n - kWhole));
     }
     if (!whole) {
-      one_by_one(0, ni_);
+      one_by_one(i0_, i1_);
     } else if (axis == 0) {
-      one_by_one(0, kWhole);
-      stretchNodes({x_, y_, z_}, row + static_cast<ptrdiff_t>(kWhole), 1, ni_ - 2 * kWhole, out + kWhole,
-                   growth + kWhole);
-      one_by_one(ni_ - kWhole, ni_);
+      one_by_one(i0_, std::min(kWhole, i1_));
+      at_once(std::max(kWhole, i0_), std::min(ni_ - kWhole, i1_));
+      one_by_one(std::max(ni_ - kWhole, i0_), i1_);
     } else {
-      stretchNodes({x_, y_, z_}, row, strides[axis], ni_, out, growth);
+      at_once(i0_, i1_);
     }
   }
 }
@@ -192,7 +201,9 @@ Stretch Window::stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, ui
 }
 
 inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face, int layer) {
-  const glm::dvec3 stretch(scratch_.stretch[0][i], scratch_.stretch[1][i], scratch_.stretch[2][i]);
+  const uint64_t in_part = i - i0_;
+  const glm::dvec3 stretch(scratch_.stretch[0][in_part], scratch_.stretch[1][in_part],
+                           scratch_.stretch[2][in_part]);
   NodeSplat& node = out_.splats[count_];
   node.node = first_node_of_row_ + i;
   node.node_position = position(at);
@@ -219,7 +230,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     const bool whole = neighbours.before[axis] != 0 && neighbours.after[axis] != 0;
     if (whole) bend += stretch[axis] * stretch[axis] * (to_after - to_before);
     if (a + b > 0 && (corrections_.middles || !whole)) middle[axis] = 0.5 * (b - a) / (a + b);
-    if (corrections_.growth) growth[axis] = scratch_.growth[axis][i];
+    if (corrections_.growth) growth[axis] = scratch_.growth[axis][in_part];
     if (whole) {
       middle[axis] += kDrift * growth[axis];
       continue;
@@ -353,7 +364,8 @@ void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeScratch& s
 
   // Sized for the most there can be and cut afterwards: in a run over equal boxes nothing is initialised
   // twice.
-  const size_t most = in.block.ni * (box.j1 - box.j0) * (box.k1 - box.k0);
+  CURVISPLAT_CHECK_OP(in.i0, <, in.endOfPart(in.block.ni));
+  const size_t most = (in.endOfPart(in.block.ni) - in.i0) * (box.j1 - box.j0) * (box.k1 - box.k0);
   const size_t variables = in.nodes->scalars.size();
   out.splats.resize(most);
   out.values.resize(most * variables);

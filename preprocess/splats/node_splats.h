@@ -108,6 +108,9 @@ struct BlockWindow {
   uint64_t first_node = 0;  // of the block in the whole grid
   NodeBox window;
   const NodeArrays* nodes = nullptr;  // i fastest; scalars in the order of the cache's variables
+  uint64_t i0 = 0, i1 = UINT64_MAX;   // of each row of the box, splats are made of these nodes only
+
+  uint64_t endOfPart(uint64_t count) const { return std::min(i1, count); }
 };
 
 /// What is done beyond the linear part of the mapping at the node. Conversion does all of it; tests switch
@@ -123,7 +126,7 @@ struct NodeSplatCorrections {
 
 /// What computeNodeSplats() needs for a while; keeps its capacity.
 struct NodeScratch {
-  std::array<std::vector<float>, 3> stretch, growth;  // [axis][node of a row]
+  std::array<std::vector<float>, 3> stretch, growth;  // [axis][node of a row's part]
   std::vector<uint8_t> has_blank;                     // [row of the window]
 };
 

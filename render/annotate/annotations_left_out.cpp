@@ -14,6 +14,12 @@ void refuse(const Annotations& annotations) {
 
 }  // namespace
 
+ImageSize dataSize(const Annotations& annotations, ImageSize picture,
+                   std::span<const ShownFunction> /*functions*/) {
+  refuse(annotations);
+  return picture;
+}
+
 ImageSize dataSize(const Annotations& annotations, ImageSize picture, const TransferFunction& /*function*/) {
   refuse(annotations);
   return picture;

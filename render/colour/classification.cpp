@@ -1,5 +1,7 @@
 #include "render/colour/classification.h"
 
+#include <utility>
+
 #include "stream/base/check.h"
 
 namespace curvisplat {
@@ -13,8 +15,11 @@ glm::dvec4 weighted(const TransferFunction::Value& value) {
 
 }  // namespace
 
-ClassificationTable ClassificationTable::of(const TransferFunction& transfer_function, double data_low,
-                                            double data_high) {
+namespace {
+
+/// The part of a function's range that a table for data in [data_low, data_high] covers.
+std::pair<double, double> coveredRange(const TransferFunction& transfer_function, double data_low,
+                                       double data_high) {
   const double margin = 0.25 * (data_high - data_low);
   const auto [from, to] = transfer_function.range();
   double low = std::clamp(from, data_low - margin, data_high + margin);
@@ -22,8 +27,25 @@ ClassificationTable ClassificationTable::of(const TransferFunction& transfer_fun
   if (transfer_function.logScale()) low = std::max(low, from);  // the margin may have reached below zero
   // A constant field, or a transfer function that is constant over the data: any interval will do.
   if (!(high > low)) high = low + std::max(std::abs(low), 1.0) * 1e-3;
+  return {low, high};
+}
+
+}  // namespace
+
+ClassificationTable ClassificationTable::of(const TransferFunction& transfer_function, double data_low,
+                                            double data_high) {
+  const auto [low, high] = coveredRange(transfer_function, data_low, data_high);
   return {[&](double scalar) { return transfer_function.at(scalar); }, low, high,
           transfer_function.logScale()};
+}
+
+ClassificationTable ClassificationTable::ofColours(const TransferFunction& transfer_function, double data_low,
+                                                   double data_high) {
+  const auto [low, high] = coveredRange(transfer_function, data_low, data_high);
+  return {[&](double scalar) {
+            return TransferFunction::Value{transfer_function.at(scalar).colour, 1};
+          },
+          low, high, transfer_function.logScale()};
 }
 
 ClassificationTable::ClassificationTable(const std::function<TransferFunction::Value(double)>& at, double low,

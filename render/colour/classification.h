@@ -31,6 +31,10 @@ class ClassificationTable {
   /// at a pixel can lie beyond the samples' values.
   static ClassificationTable of(const TransferFunction& transfer_function, double data_low, double data_high);
 
+  /// The same of the colours alone, with extinction 1 everywhere: mean() is the mean colour.
+  static ClassificationTable ofColours(const TransferFunction& transfer_function, double data_low,
+                                       double data_high);
+
   /// Tabulates the transfer function `at` over [low, high], low < high; outside, it is at(low) and at(high).
   /// `log_scale`: cells are equally wide in log(scalar), and low > 0.
   ClassificationTable(const std::function<TransferFunction::Value(double)>& at, double low, double high,

@@ -68,7 +68,7 @@ struct CpuPainter::State {
   std::unique_ptr<std::atomic<BlockMask>[]> open;  // [tile]: written by who paints it, read by anyone
   WindowTiles windows;
   std::optional<SplatBins> bins;
-  std::optional<ShadingTable> table;
+  std::optional<ShadingTable> table, colours;
   std::optional<tbb::task_arena> arena;
   PixelShading shading;
   double upload_s = 0, draw_s = 0;
@@ -101,6 +101,8 @@ void CpuPainter::begin(ImageSize size, const glm::vec4& background, const Classi
   state.upload_s = state.draw_s = 0;
   state.shading = shading;
   state.table.emplace(table);
+  state.colours.reset();
+  if (shading.colours) state.colours.emplace(*shading.colours);
   if (size.width != state.size.width || size.height != state.size.height || threads != state.threads ||
       resources.batch_splats != state.batch_splats)
     state.allocate(size, threads, resources.batch_splats);
@@ -161,7 +163,7 @@ void CpuPainter::State::paintBatch() {
     const BlockMask left = paintTile({tile(number), static_cast<int>(number % columns) * kTileSide,
                                       static_cast<int>(number / columns) * kTileSide,
                                       open[number].load(std::memory_order_relaxed), bins->splats(), order,
-                                      *table, shading, windows.tile(number)});
+                                      *table, colours ? &*colours : nullptr, shading, windows.tile(number)});
     open[number].store(left, std::memory_order_relaxed);
     if (left == 0) bins->close(static_cast<int>(number));
   });

@@ -209,19 +209,21 @@ HWY_INLINE Faces facesOf(const ScreenSplat* record) {
   return faces;
 }
 
+HWY_INLINE DepthLine depthLineOf(const ScreenSplat* record) {
+  if (!record) return {};
+  const ScreenDepth depth = ScreenDepth::of(*record);
+  return {depth.middle, kSupport * depth.by[0], kSupport * depth.by[1],
+          depth.per_depth * (1 / ScreenCut::kReach)};
+}
+
 /// A splat that is cut, and has the number `number`. Returns those of `blocks` that are saturated then.
 HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const Visits& visits,
                                 const Fits& fits, size_t n, size_t number, const float* footprint) {
   const ScreenSplat& splat = work.splats[number];
-  const SplatCuts records = SplatCuts::beside(&splat, -1);
+  const SplatRecords records = SplatRecords::beside(&splat, -1, false);
   Faces faces = facesOf(records.cut);
-  DepthLine line;
-  if (records.depth) {
-    const ScreenDepth depth = ScreenDepth::of(*records.depth);
-    line = {depth.middle, kSupport * depth.by[0], kSupport * depth.by[1],
-            depth.per_depth * (1 / ScreenCut::kReach)};
-    faces.mean_per_deviation = depth.correlation;
-  }
+  const DepthLine line = depthLineOf(records.depth);
+  if (records.depth) faces.mean_per_deviation = ScreenDepth::of(*records.depth).correlation;
   const bool windowed = records.depth && work.windows;
   const Ellipse e = visits.ellipse(n);
   Scalar scalar = visits.scalar(n);

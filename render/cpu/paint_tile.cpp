@@ -13,6 +13,7 @@
 #include <hwy/highway.h>
 
 #include "render/cpu/paint_blocks-inl.h"
+#include "render/cpu/paint_coloured-inl.h"
 #include "render/cpu/paint_cut-inl.h"
 #include "render/cpu/paint_shade-inl.h"
 #include "render/cpu/paint_visits-inl.h"
@@ -96,6 +97,7 @@ BlockMask paintTile(const TileWork& work) {
   BlockMask open = work.open;
   Visits visits;
   Fits fits{};
+  ColourVisits colours;
   for (size_t begin = 0; begin < work.order.size() && open != 0; begin += kLanes) {
     const size_t count = std::min(kLanes, work.order.size() - begin);
     // The next sixteen come from anywhere in the batch.
@@ -113,11 +115,19 @@ BlockMask paintTile(const TileWork& work) {
       fitPieces(work.table, visits.pieces, count, fits);
     else
       fitMeans(work.table, visits.pieces, count, fits);
-    if (work.shading.lit) fits.light(visits.diffuse, visits.specular);
+    if (work.colours)
+      setUpColours(work, numbers, visits, count, colours);
+    else if (work.shading.lit)
+      fits.light(visits.diffuse, visits.specular);
     for (size_t n = 0; n < count; ++n) {
       if (fits.fit.at[n] == kNothing) continue;
       const BlockMask blocks = blocksOf(visits, n) & open;
       if (blocks == 0) continue;
+      if (work.colours) {
+        open &= ~paintColoured(work, blocks, {visits, fits, colours, n}, static_cast<size_t>(numbers.at[n]),
+                               footprint);
+        continue;
+      }
       open &= ~(visits.cut.at[n] != 0
                     ? paintCut(work, blocks, visits, fits, n, static_cast<size_t>(numbers.at[n]), footprint)
                     : paintVisit(work, blocks, visits, fits, n, footprint));

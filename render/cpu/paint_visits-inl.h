@@ -148,8 +148,9 @@ HWY_INLINE void setUp(const TileWork& work, const IntRow& numbers, Visits& out) 
     if (!hn::AllFalse(d, cut)) {
       // ScreenCut's correlation: how far the mean moves by what is left along the ray, which is all over the
       // splat, and how much narrower the scalar's distribution becomes.
+      const int32_t beside = (work.colours ? -2 : -1) * kFloats;
       const auto in_cut =
-          hn::IfThenElse(hn::RebindMask(Ints(), cut), hn::Set(Ints(), 2 - kFloats), hn::Set(Ints(), 2));
+          hn::IfThenElse(hn::RebindMask(Ints(), cut), hn::Set(Ints(), 2 + beside), hn::Set(Ints(), 2));
       const V mark = hn::Neg(
           hn::GatherIndex(d, reinterpret_cast<const float*>(work.splats.data()), hn::Add(offsets, in_cut)));
       const V far_sides = hn::Floor(hn::Mul(mark, hn::Set(d, 0.25f)));

@@ -31,12 +31,12 @@ SplatBins::SplatBins(ImageSize size, size_t splats, size_t entries, unsigned pie
       begins_(tileCount(size) + 1),
       piece_ends_(pieces * tileCount(size)),
       closed_(tileCount(size)) {
-  splats_.reserve(splats + 2);
-  tiles_.reserve(splats + 2);
+  splats_.reserve(splats + 3);
+  tiles_.reserve(splats + 3);
 }
 
 uint64_t SplatBins::bytes(ImageSize size, size_t splats, size_t entries, unsigned pieces) {
-  return (splats + 2) * (sizeof(ScreenSplat) + sizeof(Tiles)) +
+  return (splats + 3) * (sizeof(ScreenSplat) + sizeof(Tiles)) +
          sizeof(uint32_t) * (std::max(entries, tileCount(size)) + pieces * tileCount(size)) +
          sizeof(size_t) * (tileCount(size) + 1) + tileCount(size);
 }
@@ -70,7 +70,7 @@ bool SplatBins::allClosed(const Tiles& tiles) const {
 size_t SplatBins::add(std::span<const ScreenSplat> splats) {
   size_t added = 0;
   for (; added < splats.size() && splats_.size() < most_splats_; ++added) {
-    if (isCut(splats[added])) {
+    if (isRecord(splats[added])) {
       records_[record_count_++ % records_.size()] = splats[added];
       continue;
     }

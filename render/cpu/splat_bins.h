@@ -19,7 +19,7 @@ namespace curvisplat {
 
 class SplatBins {
  public:
-  /// For batches of at most `splats` splats and their records, or up to two more where the last is a splat with
+  /// For batches of at most `splats` splats and their records, or up to three more where the last is a splat with
   /// its records, which touch `entries` tiles in all.
   SplatBins(ImageSize size, size_t splats, size_t entries, unsigned pieces);
   static uint64_t bytes(ImageSize size, size_t splats, size_t entries, unsigned pieces);
@@ -64,7 +64,7 @@ class SplatBins {
   const size_t most_splats_, most_entries_;
   const unsigned pieces_;
   std::vector<ScreenSplat> splats_;
-  std::array<ScreenSplat, 2> records_{};  // of the next splat that has some
+  std::array<ScreenSplat, 3> records_{};  // of the next splat that has some
   size_t record_count_ = 0;
   std::vector<Tiles> tiles_;  // [splats_]
   size_t entry_count_ = 0;

@@ -61,6 +61,7 @@ struct TileWork {
   std::span<const ScreenSplat> splats;  // one that is cut behind its records
   std::span<const uint32_t> order;      // of `splats`, nearest first
   const ShadingTable& table;
+  const ShadingTable* colours;  // of pictures of two scalars; else null
   PixelShading shading;
   TileWindows* windows = nullptr;  // null: no layers, and no splats with a ScreenDepth
 };

@@ -1,9 +1,12 @@
 #include "render/frame/frame.h"
 
+#include <limits>
+
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_pipeline.h"
 #include "render/frame/frame_plan.h"
 #include "render/frame/joined_tiles.h"
+#include "render/frame/value_painter.h"
 #include "stream/base/check.h"
 #include "stream/base/error.h"
 #include "stream/base/stage_timer.h"
@@ -20,8 +23,11 @@ auto timed(double& seconds, const Work& work) {
 }  // namespace
 
 struct FrameRenderer::State {
-  State(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function, Backend backend)
-      : planner(cache, variable, transfer_function), pipeline(cache, variable, planner, backend) {}
+  State(const CacheReader& cache_, const DrawnScalars& scalars_, Backend backend)
+      : cache(cache_),
+        scalars(scalars_),
+        planner(cache_, scalars_),
+        pipeline(cache_, scalars_, planner, backend) {}
 
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                Progress* progress) {
@@ -37,6 +43,61 @@ struct FrameRenderer::State {
     return image;
   }
 
+  Image renderWithValues(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
+                         PixelValues& values, Progress* progress) {
+    FrameOptions clear = options;
+    clear.background = glm::vec4(0.0f);
+    statistics = {};
+    const StageTimer total(statistics.total_s);
+    FramePlan plan = timed(statistics.plan_s, [&] { return planner.plan(camera, clear, pipeline.order()); });
+    std::vector<uint32_t> owners;
+    if (options.ranks) owners = planner.share(plan, clear);
+    pipeline.drawLayers(plan, clear, statistics);
+    Image image = pipeline.draw(plan, clear, statistics, progress);
+    pipeline.release();
+    Image painted = paintValues(camera, clear, plan, image, progress);
+    if (options.ranks) {
+      joinTiles(image, owners, *options.ranks);
+      joinTiles(painted, owners, *options.ranks);
+    }
+    if (!options.ranks || options.ranks->isFirst())
+      values = pixelValuesOf(painted, plan.settings.view, depthOrigin(plan));
+    for (size_t n = 0; n < image.rgba.size(); n += 4) {
+      const float through = 1 - image.rgba[n + 3];
+      for (size_t c = 0; c < 4; ++c) image.rgba[n + c] += through * options.background[static_cast<int>(c)];
+    }
+    return image;
+  }
+
+  /// That of layers, without which all is as far away as the data.
+  double depthOrigin(const FramePlan& plan) const {
+    if (plan.layers) return plan.layers->depthOrigin();
+    const ScreenView& view = plan.settings.view;
+    const glm::dvec3 middle = 0.5 * (cache.manifest().lower + cache.manifest().upper);
+    return view.projection == Projection::kPerspective ? 0 : view.viewFromData(middle).z;
+  }
+
+  /// Of the plan's picture.
+  Image paintValues(const Camera& camera, const FrameOptions& options, const FramePlan& drawn,
+                    const Image& picture, Progress* progress) const {
+    FramePlan plan = planner.plan(camera, options, DrawingOrder::kFrontToBack);
+    if (options.ranks) planner.share(plan, options);
+    if (drawn.layers) planner.addLayers(plan, drawn.layers, options);
+    const PixelLayers all = everywhere(picture.size, depthOrigin(drawn));
+    plan.settings.layers = &all;
+    const VariableInfo& info = cache.manifest().variables[scalars.opacity.variable];
+    ValueInputs inputs{picture, drawn.layers.get(), plan.settings.view};
+    inputs.boundary = std::numeric_limits<double>::infinity();
+    if (const auto& iso = plan.settings.iso) {
+      inputs.scale = iso->scale;
+      inputs.offset = iso->offset;
+      if (iso->volume) inputs.boundary = info.max + (info.max - info.min);
+    }
+    FramePipeline values(cache, scalars, planner, makeValueBackend(inputs));
+    FrameStatistics ignored;
+    return values.draw(plan, options, ignored, progress);
+  }
+
   Image renderQuickly(const Camera& camera, const FrameOptions& options, const QuickLimits& limits,
                       FrameStatistics& statistics, bool& is_final, Progress* progress) {
     CURVISPLAT_CHECK(!options.ranks && "one process draws a quick picture");
@@ -50,13 +111,14 @@ struct FrameRenderer::State {
     return quick.size.isWhole() ? picture : quick.size.enlarge(picture);
   }
 
+  const CacheReader& cache;
+  const DrawnScalars scalars;  // their variables; functions may change
   FramePlanner planner;
   FramePipeline pipeline;
 };
 
-FrameRenderer::FrameRenderer(const CacheReader& cache, size_t variable,
-                             const TransferFunction& transfer_function, Backend backend)
-    : state_(std::make_unique<State>(cache, variable, transfer_function, backend)) {}
+FrameRenderer::FrameRenderer(const CacheReader& cache, const DrawnScalars& scalars, Backend backend)
+    : state_(std::make_unique<State>(cache, scalars, backend)) {}
 
 FrameRenderer::~FrameRenderer() = default;
 
@@ -72,6 +134,12 @@ Image FrameRenderer::render(const Camera& camera, const FrameOptions& options, F
                             Progress* progress) {
   state_->pipeline.endPrefetch();
   return state_->render(camera, options, statistics, progress);
+}
+
+Image FrameRenderer::renderWithValues(const Camera& camera, const FrameOptions& options,
+                                      FrameStatistics& statistics, PixelValues& values, Progress* progress) {
+  state_->pipeline.endPrefetch();
+  return state_->renderWithValues(camera, options, statistics, values, progress);
 }
 
 void FrameRenderer::renderProgressively(const Camera& camera, const FrameOptions& options,

@@ -24,9 +24,11 @@
 #include "render/camera/camera.h"
 #include "render/colour/transfer_function.h"
 #include "render/frame/backend.h"
+#include "render/frame/drawn_scalars.h"
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_options.h"
 #include "render/frame/frame_statistics.h"
+#include "render/frame/pixel_values.h"
 #include "render/image/image.h"
 #include "render/project/screen_view.h"
 #include "stream/base/progress.h"
@@ -34,7 +36,7 @@
 
 namespace curvisplat {
 
-/// Draws frames of one variable of one cache. Owns the threads and the painter, and the memory that they
+/// Draws frames of one variable, or two, of one cache. Owns the threads and the painter, and the memory that they
 /// share: decoded bricks are kept for the next frame. One caller at a time. The cache must outlive
 /// the renderer.
 class FrameRenderer {
@@ -42,7 +44,10 @@ class FrameRenderer {
   /// Throws Error if the backend is not available; the message names the library that was tried and its
   /// error.
   FrameRenderer(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function,
-                Backend backend = Backend::kAutomatic);
+                Backend backend = Backend::kAutomatic)
+      : FrameRenderer(cache, DrawnScalars(variable, transfer_function), backend) {}
+  /// Of one scalar, or two.
+  FrameRenderer(const CacheReader& cache, const DrawnScalars& scalars, Backend backend = Backend::kAutomatic);
   ~FrameRenderer();
 
   /// Draws one frame. Throws UsageError for an invalid view, and for too little memory or too small a
@@ -53,6 +58,11 @@ class FrameRenderer {
   /// process's, the others only their tiles. Statistics are each rank's own.
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                Progress* progress = nullptr);
+
+  /// The same, with what lies where the picture's pixels have half of their opacity. Takes about three times as long:
+  /// the splats are drawn again, by the processor. Of several ranks the first gets the values.
+  Image renderWithValues(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
+                         PixelValues& values, Progress* progress = nullptr);
 
   using ShowPicture = std::function<void(const Image& image, bool is_final)>;
   /// Calls `show` with a first, coarse picture and then with the picture that render() returns, bit for bit;
@@ -79,7 +89,7 @@ class FrameRenderer {
   /// new step. Throws what `change` throws.
   void changeStep(const std::function<void()>& change);
 
-  /// Takes effect with the next frame. Decoded bricks are kept. Ends a prefetch.
+  /// That of the opacities. Takes effect with the next frame. Decoded bricks are kept. Ends a prefetch.
   void setTransferFunction(const TransferFunction& transfer_function);
 
   /// The projection that render() uses for these arguments. Throws UsageError as render() does.

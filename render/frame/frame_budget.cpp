@@ -19,6 +19,9 @@ constexpr uint64_t kWorkerBytes = kReadingBytes + uint64_t{kMaxBrickSplats} * 16
                                   BrickProjector::kMaxSplats * (sizeof(ScreenSplat) + sizeof(float)) +
                                   BrickProjector::kMaxSplats * (4 + 2 * sizeof(DepthItem)) +
                                   SweepBuffer::kMaxBatch * 2 * sizeof(DepthItem) + (1 << 20);
+// In pictures of two scalars: the second one's values, and a record for each splat.
+constexpr uint64_t kSecondScalarBytes =
+    uint64_t{kMaxBrickSplats} * (5 * sizeof(float) + sizeof(ScreenSplat) + 8 + 2 * sizeof(DepthItem));
 constexpr uint64_t kMinRingBytes = 32768 * sizeof(ScreenSplat);
 constexpr uint64_t kMinSweepBytes = SweepBuffer::bytes(73728);
 // Larger buffers do not make a frame faster: they only even out bricks that take different times.
@@ -35,7 +38,8 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
   const uint64_t image_bytes = 4 * sizeof(float) * fixed.size.pixels();
   const uint64_t exact = fixed.index_bytes + fixed.painter_bytes + image_bytes + fixed.output_bytes;
   const uint64_t pools = kMinRingBytes + kMinSweepBytes + fixed.least_pager_bytes;
-  const uint64_t least = exact + pools + kWorkerBytes;
+  const uint64_t worker_bytes = kWorkerBytes + (fixed.two_scalars ? kSecondScalarBytes : 0);
+  const uint64_t least = exact + pools + worker_bytes;
   if (memory_bytes < least)
     throw UsageError(
         "{:.4g} MiB of memory are too little for {}x{} pixels of this cache; give at least {} MiB with "
@@ -46,10 +50,10 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
   const uint64_t rounded = (exact + part - 1) / part * part;
   const unsigned wanted = threads ? threads : std::max(1u, std::thread::hardware_concurrency());
   FrameBudget budget;
-  const uint64_t taken = rounded + pools + wanted * kWorkerBytes <= memory_bytes ? rounded : exact;
+  const uint64_t taken = rounded + pools + wanted * worker_bytes <= memory_bytes ? rounded : exact;
   budget.workers =
-      static_cast<unsigned>(std::min<uint64_t>(wanted, (memory_bytes - taken - pools) / kWorkerBytes));
-  uint64_t rest = memory_bytes - taken - pools - budget.workers * kWorkerBytes;
+      static_cast<unsigned>(std::min<uint64_t>(wanted, (memory_bytes - taken - pools) / worker_bytes));
+  uint64_t rest = memory_bytes - taken - pools - budget.workers * worker_bytes;
   const uint64_t share = rest / 4;
   const uint64_t ring_bytes = std::min(kMinRingBytes + share, kMaxRingBytes);
   budget.ring_splats = ring_bytes / sizeof(ScreenSplat);

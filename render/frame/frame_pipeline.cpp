@@ -76,13 +76,13 @@ class DrawsFinished {
 
 /// The memory and threads that frames share, sized from the budget.
 struct FramePipeline::Pools {
-  Pools(const CacheReader& cache, size_t variable, const FrameBudget& budget_, const PagerOptions& pager_,
-        std::span<ScreenSplat> splats)
+  Pools(const CacheReader& cache, const BrickSource::Variables& variables, const FrameBudget& budget_,
+        const PagerOptions& pager_, std::span<ScreenSplat> splats)
       : budget(budget_),
         pager(pager_),
         ring(splats),
         sweep(budget.sweep_splats, budget.ring_splats / 2),
-        source(cache, variable, pager, budget.cache_bytes, budget.kept_bytes),
+        source(cache, variables, pager, budget.cache_bytes, budget.kept_bytes),
         workers(source, sweep, ring, budget.workers) {}
 
   const FrameBudget budget;
@@ -93,9 +93,17 @@ struct FramePipeline::Pools {
   FrameWorkers workers;
 };
 
-FramePipeline::FramePipeline(const CacheReader& cache, size_t variable, const FramePlanner& planner,
-                             Backend backend)
-    : cache_(cache), variable_(variable), planner_(planner), backend_(makeBackend(backend)) {}
+FramePipeline::FramePipeline(const CacheReader& cache, const DrawnScalars& scalars,
+                             const FramePlanner& planner, Backend backend)
+    : FramePipeline(cache, scalars, planner, makeBackend(backend)) {}
+
+FramePipeline::FramePipeline(const CacheReader& cache, const DrawnScalars& scalars,
+                             const FramePlanner& planner, std::unique_ptr<PaintingBackend> backend)
+    : cache_(cache),
+      variable_(scalars.opacity.variable),
+      coloured_by_(scalars.colour ? std::optional(scalars.colour->variable) : std::nullopt),
+      planner_(planner),
+      backend_(std::move(backend)) {}
 
 FramePipeline::~FramePipeline() {
   endPrefetch();
@@ -110,7 +118,8 @@ void FramePipeline::makePools(const FrameOptions& options) {
                                  options.output_bytes,
                                  planner_.mostSplats(),
                                  options.size,
-                                 cache_.series().steps.size() > 1};
+                                 cache_.series().steps.size() > 1,
+                                 coloured_by_.has_value()};
   const FrameBudget budget = FrameBudget::of(options.memory_bytes, fixed, options.threads);
   PagerOptions pager;
   pager.buffer_bytes = budget.pager_bytes;
@@ -120,10 +129,15 @@ void FramePipeline::makePools(const FrameOptions& options) {
       pools_->pager.direct == pager.direct)
     return;
   dropPools();  // before the new ones take their memory
-  auto fresh =
-      std::make_unique<Pools>(cache_, variable_, budget, pager, backend_->splatMemory(budget.ring_splats));
+  auto fresh = std::make_unique<Pools>(cache_, BrickSource::Variables(variable_, coloured_by_), budget, pager,
+                                       backend_->splatMemory(budget.ring_splats));
   const MutexLock lock(mutex_);
   pools_ = std::move(fresh);
+}
+
+void FramePipeline::release() {
+  endPrefetch();
+  dropPools();
 }
 
 void FramePipeline::stepChanged() {
@@ -157,7 +171,7 @@ bool FramePipeline::beginSlab(const FramePlan& plan, const FrameOptions& options
 
 void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics) {
   if (!options.scene || (options.scene->empty() && options.scene->drawsSplats())) return;
-  const VariableInfo& info = cache_.manifest().variables[variable_];
+  const VariableInfo& info = cache_.manifest().variables[coloured_by_.value_or(variable_)];
   const ScreenView& view = plan.settings.view;
   std::vector<std::unique_ptr<SliceSampler>> samplers;
   for (const SlicePlan& slice : plan.slices) {
@@ -262,8 +276,10 @@ Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, F
   Image image;
   backend_->run([&](Painter& painter) {
     const DrawsFinished finished(painter);
-    painter.begin(plan.settings.view.size, options.background, tableOf(plan),
-                  {plan.settings.per_pixel, plan.settings.lit(), plan.settings.layers}, resourcesOf(options));
+    painter.begin(
+        plan.settings.view.size, options.background, tableOf(plan),
+        {plan.settings.per_pixel, plan.settings.lit(), plan.settings.layers, planner_.colourClasses()},
+        resourcesOf(options));
     if (plan.tiles) painter.drawOnly(*plan.tiles);
     hidden_.ask(&painter);
     SegmentDrawer drawer(painter, pools_->ring, statistics.painter_waited_s);

@@ -31,12 +31,15 @@
 
 namespace curvisplat {
 
-/// The stages and pools of one variable of one cache. One caller at a time.
+/// The stages and pools of one variable, or two, of one cache. One caller at a time.
 class FramePipeline {
  public:
-  /// Draws what `planner` plans for that variable of the cache; both must outlive the pipeline. Throws Error
+  /// Draws what `planner` plans for those variables of the cache; both must outlive the pipeline. Throws Error
   /// if the backend is not available.
-  FramePipeline(const CacheReader& cache, size_t variable, const FramePlanner& planner, Backend backend);
+  FramePipeline(const CacheReader& cache, const DrawnScalars& scalars, const FramePlanner& planner,
+                Backend backend);
+  FramePipeline(const CacheReader& cache, const DrawnScalars& scalars, const FramePlanner& planner,
+                std::unique_ptr<PaintingBackend> backend);
   ~FramePipeline();
 
   /// Before a frame, and before what it draws is changed.
@@ -51,6 +54,9 @@ class FramePipeline {
 
   /// Begins to fetch the plan's bricks in the background. Throws UsageError if there is too little memory.
   void prefetch(const FramePlan& plan, const FrameOptions& options);
+
+  /// Gives its memory up until the next frame. Nothing may be drawn meanwhile.
+  void release();
 
   /// The cache is at another step of the same geometry. Nothing may be drawn or fetched meanwhile.
   void stepChanged();
@@ -74,6 +80,7 @@ class FramePipeline {
 
   const CacheReader& cache_;
   const size_t variable_;
+  const std::optional<size_t> coloured_by_;  // another variable
   const FramePlanner& planner_;
   const std::unique_ptr<PaintingBackend> backend_;
   HiddenBricks hidden_;

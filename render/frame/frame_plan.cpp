@@ -27,6 +27,13 @@ ClassificationTable tableFor(const CacheReader& cache, size_t variable,
   return ClassificationTable::of(transfer_function, info.min, info.max);
 }
 
+std::optional<ClassificationTable> colourClassesFor(const CacheReader& cache,
+                                                    const std::optional<DrawnScalar>& scalar) {
+  if (!scalar) return std::nullopt;
+  const VariableInfo& info = cache.manifest().variables.at(scalar->variable);
+  return ClassificationTable::ofColours(scalar->function, info.min, info.max);
+}
+
 /// n · (x - p) = n/scale · (scale x - scale p).
 CutView::Plane cutPlane(const ClipPlane& plane, const ScreenView& view) {
   const glm::dvec3 normal = glm::normalize(plane.normal / view.scale);
@@ -43,15 +50,16 @@ CutOptions limitsOf(const FrameOptions& options, DrawingOrder order) {
 
 }  // namespace
 
-FramePlanner::FramePlanner(const CacheReader& cache, size_t variable,
-                           const TransferFunction& transfer_function)
+FramePlanner::FramePlanner(const CacheReader& cache, const DrawnScalars& scalars)
     : cache_(cache),
-      variable_(variable),
-      transfer_function_(transfer_function),
-      table_(tableFor(cache, variable, transfer_function)),
-      colours_(transfer_function),
-      scalar_range_(transfer_function.range()),
-      subtrees_(subtreeBounds(cache.bricks(), cache.brickVariables(variable))) {}
+      variable_(scalars.opacity.variable),
+      transfer_function_(scalars.opacity.function),
+      table_(tableFor(cache, variable_, transfer_function_)),
+      coloured_by_(scalars.colour),
+      colours_(coloured_by_ ? coloured_by_->function : transfer_function_),
+      colour_classes_(colourClassesFor(cache, coloured_by_)),
+      scalar_range_(transfer_function_.range()),
+      subtrees_(subtreeBounds(cache.bricks(), cache.brickVariables(variable_))) {}
 
 uint64_t FramePlanner::bytes() const {
   return cache_.bricks().size() *
@@ -68,13 +76,14 @@ uint64_t FramePlanner::mostSplats() const {
 
 void FramePlanner::stepChanged() {
   table_ = tableFor(cache_, variable_, transfer_function_);
+  colour_classes_ = colourClassesFor(cache_, coloured_by_);
   subtrees_ = subtreeBounds(cache_.bricks(), cache_.brickVariables(variable_));
 }
 
 void FramePlanner::setTransferFunction(const TransferFunction& transfer_function) {
   transfer_function_ = transfer_function;
   table_ = tableFor(cache_, variable_, transfer_function);
-  colours_ = ColourTable(transfer_function);
+  if (!coloured_by_) colours_ = ColourTable(transfer_function);
   scalar_range_ = transfer_function.range();
 }
 

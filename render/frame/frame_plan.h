@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "render/camera/camera.h"
 #include "render/colour/classification.h"
+#include "render/frame/drawn_scalars.h"
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_options.h"
 #include "render/frame/sweep_buffer.h"
@@ -62,10 +64,10 @@ struct QuickPlan {
   }
 };
 
-/// Plans frames of one variable of one cache, which must outlive it. Any number of threads may plan.
+/// Plans frames of one variable, or two, of one cache, which must outlive it. Any number of threads may plan.
 class FramePlanner {
  public:
-  FramePlanner(const CacheReader& cache, size_t variable, const TransferFunction& transfer_function);
+  FramePlanner(const CacheReader& cache, const DrawnScalars& scalars);
 
   /// Throws UsageError for an invalid view, and if options.max_splats is too small.
   FramePlan plan(const Camera& camera, const FrameOptions& options, DrawingOrder order) const;
@@ -91,6 +93,8 @@ class FramePlanner {
                  const FrameOptions& options) const;
 
   const ClassificationTable& table() const { return table_; }
+  /// Of pictures of two scalars: what PixelShading::colours is.
+  const ClassificationTable* colourClasses() const { return colour_classes_ ? &*colour_classes_ : nullptr; }
   const ColourTable& colours() const { return colours_; }
   /// Memory in bytes of the octree, and of what plans and the later stages note about its bricks.
   uint64_t bytes() const;
@@ -113,7 +117,9 @@ class FramePlanner {
   const size_t variable_;
   TransferFunction transfer_function_;
   ClassificationTable table_;
+  const std::optional<DrawnScalar> coloured_by_;
   ColourTable colours_;
+  std::optional<ClassificationTable> colour_classes_;
   std::pair<double, double> scalar_range_;  // of the transfer function
   std::vector<ValueBounds> subtrees_;
 };

@@ -149,8 +149,8 @@ void FrameWorkers::sample(Worker& worker, const SliceWork& work) {
       const auto fetched = fetch(worker, sequence, work.parts[sequence], work.keep_going);
       if (!fetched) return;
       const StageTimer timer(worker.statistics.project_s);
-      work.sampler.add(work.cache.manifest().root.cellMin(fetched->cell), fetched->geometry, fetched->values,
-                       fetched->ranges);
+      work.sampler.add(work.cache.manifest().root.cellMin(fetched->cell), fetched->geometry,
+                       fetched->second.value_or(fetched->values), fetched->ranges);
     }
   } catch (...) {
     fail();
@@ -195,8 +195,8 @@ bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
     }
     const StageTimer timer(worker.statistics.project_s);
     const glm::dvec3 cell_min = work_->cache.manifest().root.cellMin(fetched->cell);
-    worker.projector.project(work_->settings, work_->table, cell_min, fetched->geometry, fetched->values,
-                             fetched->ranges);
+    worker.projector.project(work_->settings, work_->table, cell_min, fetched->geometry,
+                             {fetched->values, fetched->second}, fetched->ranges);
     if (work_->tiles) worker.projector.keepTouching(*work_->tiles);
     worker.keys.resize(worker.projector.depths().size());
     work_->keys.keysOf(worker.projector.depths(), cell_min, part.keys, worker.keys);

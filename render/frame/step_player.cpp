@@ -4,16 +4,14 @@
 
 namespace curvisplat {
 
-StepPlayer::StepPlayer(CacheReader& cache, size_t variable, const TransferFunction& transfer_function,
-                       Backend backend)
+StepPlayer::StepPlayer(CacheReader& cache, const DrawnScalars& scalars, Backend backend)
     : cache_(cache),
-      variable_(variable),
-      transfer_function_(transfer_function),
+      scalars_(scalars),
       backend_(backend),
-      renderer_(std::make_unique<FrameRenderer>(cache, variable, transfer_function, backend)) {}
+      renderer_(std::make_unique<FrameRenderer>(cache, scalars, backend)) {}
 
 void StepPlayer::setTransferFunction(const TransferFunction& transfer_function) {
-  transfer_function_ = transfer_function;
+  scalars_.opacity.function = transfer_function;
   renderer_->setTransferFunction(transfer_function);
 }
 
@@ -26,7 +24,7 @@ void StepPlayer::goTo(const StepPosition& position) {
   }
   renderer_.reset();  // reads the cache
   cache_ = std::move(next);
-  renderer_ = std::make_unique<FrameRenderer>(cache_, variable_, transfer_function_, backend_);
+  renderer_ = std::make_unique<FrameRenderer>(cache_, scalars_, backend_);
 }
 
 }  // namespace curvisplat

@@ -13,10 +13,10 @@ namespace curvisplat {
 class StepPlayer {
  public:
   /// `cache` must outlive it, and is at the step that is drawn. Throws Error as FrameRenderer.
-  StepPlayer(CacheReader& cache, size_t variable, const TransferFunction& transfer_function, Backend backend);
+  StepPlayer(CacheReader& cache, const DrawnScalars& scalars, Backend backend);
 
   FrameRenderer& renderer() { return *renderer_; }
-  /// Of this step and those to come.
+  /// Of the opacities, of this step and those to come.
   void setTransferFunction(const TransferFunction& transfer_function);
   /// Makes this step, or time between two, the one that is drawn. Throws Error as CacheReader.
   void goTo(const StepPosition& position);
@@ -25,8 +25,7 @@ class StepPlayer {
 
  private:
   CacheReader& cache_;
-  const size_t variable_;
-  TransferFunction transfer_function_;
+  DrawnScalars scalars_;
   const Backend backend_;
   std::unique_ptr<FrameRenderer> renderer_;
 };

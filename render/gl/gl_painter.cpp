@@ -24,7 +24,7 @@ constexpr int kFootprintSteps = 1024;
 // splats took 330 MiB. Two draws under way keep all its threads busy.
 constexpr size_t kSplatsPerDraw = 16384;
 constexpr size_t kDrawsInFlight = 2;
-constexpr GLint kFootprintUnit = 0, kClassesUnit = 1, kLayersUnit = 2;
+constexpr GLint kFootprintUnit = 0, kClassesUnit = 1, kLayersUnit = 2, kColoursUnit = 3;
 
 /// A table that shaders read by index, exactly: no filtering, no size limit worth a thought.
 struct TableTexture {
@@ -44,31 +44,42 @@ struct TableTexture {
 };
 
 /// How many records of a splat may come behind it.
-constexpr size_t kMostRecords = 2;
+constexpr size_t kMostRecords = 3;
 
-/// Splats as the shader's instances: ScreenSplat's ten floats as 4 + 4 + 2, and those of the records behind
-/// it, so that there are more in the buffer than are drawn; then its skew. Leaves itself bound.
+/// Splats as the shader's instances: ScreenSplat's ten floats as 4 + 4 + 2, and those of the two records that cut it,
+/// so that there are more in the buffer than are drawn; its skew; and its ScreenColour. Leaves itself bound.
 struct InstanceBuffer {
   GlObject buffer, vertex_array;
 
   explicit InstanceBuffer(const GlFunctions& gl) : buffer(makeBuffer(gl)), vertex_array(makeVertexArray(gl)) {
+    setUp(gl, false);
+  }
+
+  /// `coloured`: a ScreenColour lies between a splat and what cuts it.
+  void setUp(const GlFunctions& gl, bool coloured) {
     static constexpr GLint kComponents[] = {4, 4, 2};
     bind(gl);
     GLuint attribute = 0;
-    for (size_t record = 0; record <= kMostRecords; ++record) {
-      size_t offset = record * sizeof(ScreenSplat);
+    const auto point = [&](GLint components, size_t offset) {
+      gl.EnableVertexAttribArray(attribute);
+      gl.VertexAttribPointer(attribute, components, GL_FLOAT, GL_FALSE, sizeof(ScreenSplat),
+                             reinterpret_cast<const void*>(offset));
+      gl.VertexAttribDivisor(attribute++, 1);
+    };
+    for (size_t record = 0; record < 3; ++record) {
+      size_t offset = (record > 0 && coloured ? record + 1 : record) * sizeof(ScreenSplat);
       for (const GLint components : kComponents) {
-        gl.EnableVertexAttribArray(attribute);
-        gl.VertexAttribPointer(attribute, components, GL_FLOAT, GL_FALSE, sizeof(ScreenSplat),
-                               reinterpret_cast<const void*>(offset));
-        gl.VertexAttribDivisor(attribute++, 1);
+        point(components, offset);
         offset += static_cast<size_t>(components) * sizeof(float);
       }
     }
     gl.EnableVertexAttribArray(attribute);
     gl.VertexAttribIPointer(attribute, 1, GL_INT, sizeof(ScreenSplat),
                             reinterpret_cast<const void*>(offsetof(ScreenSplat, skew)));
-    gl.VertexAttribDivisor(attribute, 1);
+    gl.VertexAttribDivisor(attribute++, 1);
+    if (!coloured) return;
+    point(4, sizeof(ScreenSplat));
+    point(1, sizeof(ScreenSplat) + 4 * sizeof(float));
   }
 
   void bind(const GlFunctions& gl) const {
@@ -87,9 +98,12 @@ std::vector<std::array<float, 2>> footprintTexels() {
 }
 
 /// How many of the last of `splats` belong to a splat of which records are still to come. Farthest first.
-size_t lacksRecords(std::span<const ScreenSplat> splats) {
-  if (hasCut(splats.back())) return 1;
-  return isDepth(splats.back()) && ScreenDepth::of(splats.back()).has_cut ? 2 : 0;
+size_t lacksRecords(std::span<const ScreenSplat> splats, bool coloured) {
+  const ScreenSplat& last = splats.back();
+  if (!isRecord(last)) return coloured || hasCut(last) ? 1 : 0;
+  if (isColour(last)) return hasCut(splats[splats.size() - 2]) ? 2 : 0;
+  if (isDepth(last) && ScreenDepth::of(last).has_cut) return coloured ? 3 : 2;
+  return 0;
 }
 
 }  // namespace
@@ -99,13 +113,15 @@ struct GlPainter::State {
       : gl(functions),
         footprint(gl),
         classes(gl),
+        colour_classes(gl),
         copied(gl),
         framebuffer(makeFramebuffer(gl)),
         layers_texture(makeTexture(gl)) {}
 
   const GlFunctions& gl;
   std::map<int, GlProgram> programs;  // by their kinds, each compiled when it is first needed
-  TableTexture footprint, classes;
+  TableTexture footprint, classes, colour_classes;
+  bool coloured = false;                 // splats have ScreenColours
   InstanceBuffer copied;                 // what lies elsewhere is copied here to be drawn
   std::optional<InstanceBuffer> mapped;  // what lies here is not
   std::span<ScreenSplat> mapped_splats;
@@ -126,11 +142,12 @@ struct GlPainter::State {
 
   void allocate(ImageSize wanted, int windows);
   void loadLayers();
+  void useRecords(bool with_colours);
   const GlProgram& program(const SplatShaderKind& kind);
   int windows() const { return layers ? layers->windows() : 1; }
   void drawPart(std::span<const ScreenSplat> splats);
   void finishOldest();
-  void use(const GlProgram& program, const ClassificationTable& table, bool lit) const;
+  void use(const GlProgram& program, const ClassificationTable& table, const PixelShading& shading) const;
 };
 
 GlPainter::GlPainter(const GlContext& context) : state_(std::make_unique<State>(context.functions())) {
@@ -146,7 +163,8 @@ GlPainter::GlPainter(const GlContext& context) : state_(std::make_unique<State>(
 GlPainter::~GlPainter() = default;
 
 const GlProgram& GlPainter::State::program(const SplatShaderKind& kind) {
-  const int key = 8 * kind.windows + 4 * kind.layered + 2 * kind.log_scale + kind.per_pixel;
+  const int key = 32 * kind.windows + 16 * kind.coloured + 8 * kind.colour_log_scale + 4 * kind.layered +
+                  2 * kind.log_scale + kind.per_pixel;
   auto found = programs.find(key);
   if (found == programs.end())
     found = programs.emplace(key, GlProgram(gl, splatVertexShader(), splatFragmentShader(kind))).first;
@@ -191,6 +209,14 @@ void GlPainter::State::allocate(ImageSize wanted, int windows) {
   size = wanted;
 }
 
+/// Whether splats have ScreenColours.
+void GlPainter::State::useRecords(bool with_colours) {
+  if (with_colours == coloured) return;
+  coloured = with_colours;
+  copied.setUp(gl, coloured);
+  if (mapped) mapped->setUp(gl, coloured);
+}
+
 /// The depths of the pixels' layers, as the shader reads them.
 void GlPainter::State::loadLayers() {
   static_assert(PixelLayers::kMostLayers == 4);
@@ -209,11 +235,12 @@ void GlPainter::State::loadLayers() {
   gl.check("loading the depths of surfaces");
 }
 
-void GlPainter::State::use(const GlProgram& program, const ClassificationTable& table, bool lit) const {
+void GlPainter::State::use(const GlProgram& program, const ClassificationTable& table,
+                           const PixelShading& shading) const {
   gl.UseProgram(program.name());
   gl.Uniform2f(program.uniform("clip_from_pixel"), 2.0f / static_cast<float>(size.width),
                2.0f / static_cast<float>(size.height));
-  gl.Uniform1i(program.uniform("lit"), lit ? 1 : 0);
+  gl.Uniform1i(program.uniform("lit"), shading.lit ? 1 : 0);
   gl.Uniform1i(program.uniform("footprint"), kFootprintUnit);
   gl.Uniform1i(program.uniform("classes"), kClassesUnit);
   gl.Uniform1i(program.uniform("layers"), kLayersUnit);
@@ -222,11 +249,17 @@ void GlPainter::State::use(const GlProgram& program, const ClassificationTable& 
   gl.Uniform1f(program.uniform("footprint_steps"),
                static_cast<float>(kFootprintSteps / (kKernelSupport * kKernelSupport)));
   gl.Uniform1i(program.uniform("cells"), ClassificationTable::kCells);
-  gl.Uniform2f(program.uniform("cells_from_scalar"), table.scale(), table.bias());
   gl.Uniform1f(program.uniform("least_logarithmic"), ClassificationTable::kMinLogarithmic);
-  const glm::vec4 below = table.below(), above = table.above();
-  gl.Uniform4f(program.uniform("below"), below.x, below.y, below.z, below.w);
-  gl.Uniform4f(program.uniform("above"), above.x, above.y, above.z, above.w);
+  const auto set = [&](const char* cells, const char* low, const char* high, const ClassificationTable& of) {
+    const glm::vec4 below = of.below(), above = of.above();
+    gl.Uniform2f(program.uniform(cells), of.scale(), of.bias());
+    gl.Uniform4f(program.uniform(low), below.x, below.y, below.z, below.w);
+    gl.Uniform4f(program.uniform(high), above.x, above.y, above.z, above.w);
+  };
+  set("cells_from_scalar", "below", "above", table);
+  if (!shading.colours) return;
+  gl.Uniform1i(program.uniform("colours"), kColoursUnit);
+  set("cells_from_colour", "colours_below", "colours_above", *shading.colours);
 }
 
 void GlPainter::begin(ImageSize size, const glm::vec4& background, const ClassificationTable& table,
@@ -240,11 +273,16 @@ void GlPainter::begin(ImageSize size, const glm::vec4& background, const Classif
   state_->allocate(size, windows);
   if (state_->layers) state_->loadLayers();
   state_->classes.fill(gl, kClassesUnit, GL_RGBA32F, table.cumulative());
+  state_->useRecords(shading.colours != nullptr);
+  if (shading.colours)
+    state_->colour_classes.fill(gl, kColoursUnit, GL_RGBA32F, shading.colours->cumulative());
   state_->use(state_->program({.per_pixel = shading.per_pixel,
                                .log_scale = table.logScale(),
                                .layered = state_->layers != nullptr,
+                               .coloured = shading.colours != nullptr,
+                               .colour_log_scale = shading.colours && shading.colours->logScale(),
                                .windows = windows}),
-              table, shading.lit);
+              table, shading);
   gl.Viewport(0, 0, size.width, size.height);
   state_->background = background;
   // With layers the picture is put together in end().
@@ -262,6 +300,7 @@ std::span<ScreenSplat> GlPainter::mapSplats(size_t count) {
   state.mapped_splats = {};
   if (!gl.has44()) return {};
   state.mapped.emplace(gl);
+  state.mapped->setUp(gl, state.coloured);
   const auto bytes = static_cast<GLsizeiptr>((count + kMostRecords) * sizeof(ScreenSplat));
   constexpr GLbitfield kHow = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
   gl.BufferStorage(GL_ARRAY_BUFFER, bytes, nullptr, kHow);
@@ -276,14 +315,14 @@ void GlPainter::draw(std::span<const ScreenSplat> splats) {
   ++state.draws;
   for (; !state.held.empty() && !splats.empty(); splats = splats.subspan(1)) {
     state.held.push_back(splats.front());
-    if (lacksRecords(state.held) > 0) continue;
+    if (lacksRecords(state.held, state.coloured) > 0) continue;
     state.drawPart(state.held);
     state.held.clear();
   }
   while (!splats.empty()) {
     size_t count = std::min(splats.size(), kSplatsPerDraw);
-    while (count < splats.size() && lacksRecords(splats.first(count)) > 0) ++count;
-    const size_t last = lacksRecords(splats.first(count));
+    while (count < splats.size() && lacksRecords(splats.first(count), state.coloured) > 0) ++count;
+    const size_t last = lacksRecords(splats.first(count), state.coloured);
     if (last > 0) state.held.assign(splats.begin() + static_cast<std::ptrdiff_t>(count - last), splats.end());
     if (count > last) state.drawPart(splats.first(count - last));
     splats = splats.subspan(count);

@@ -16,6 +16,8 @@ layout(location = 6) in vec4 beyond0;  // the record behind that, which is the S
 layout(location = 7) in vec4 beyond1;
 layout(location = 8) in vec2 beyond2;
 layout(location = 9) in int packed_skew;
+layout(location = 10) in vec4 colour0;  // its ScreenColour, which then lies before those
+layout(location = 11) in float colour1;
 uniform vec2 clip_from_pixel;
 uniform float support;
 uniform bool lit;
@@ -24,6 +26,8 @@ flat out vec2 centre;
 flat out vec3 u_from_d;  // of L: 1 / l11, -l21 / (l11 l22), 1 / l22
 flat out float amplitude;
 flat out vec4 scalar;   // mean, slope0, slope1, half_width
+flat out vec4 colour;   // the same of the scalar of the colours
+flat out float colour_correlation;
 flat out mat3 faces;    // a face a column; of the splats that are cut
 flat out vec2 cut;      // far_sides, correlation
 flat out vec2 light;    // diffuse, specular
@@ -40,6 +44,8 @@ void main() {
     u_from_d = vec3(0.0);
     amplitude = 0.0;
     scalar = vec4(0.0);
+    colour = vec4(0.0);
+    colour_correlation = 0.0;
     faces = mat3(0.0);
     cut = vec2(0.0);
     light = vec2(0.0);
@@ -63,6 +69,8 @@ void main() {
   u_from_d = vec3(1.0 / part0.z, -part0.w / (part0.z * part1.x), 1.0 / part1.x);
   amplitude = part1.y;
   scalar = vec4(part1.zw, part2);
+  colour = vec4(colour0.xyw, colour1);
+  colour_correlation = -colour0.z - 194.0;
   skew = skewOf(packed_skew);
   light = vec2(1.0, 0.0);
   if (lit) {  // light.h
@@ -86,6 +94,10 @@ uniform float deviation;          // of the kernel, in u
 uniform float footprint_steps;    // per unit of rho squared
 uniform int cells;
 uniform vec2 cells_from_scalar;   // factor, offset
+uniform samplerBuffer colours;    // those of the colours' scalar, with extinction 1, and so for the rest
+uniform vec2 cells_from_colour;
+uniform vec4 colours_below;
+uniform vec4 colours_above;
 uniform float least_logarithmic;
 uniform vec4 below;
 uniform vec4 above;
@@ -93,6 +105,8 @@ flat in vec2 centre;
 flat in vec3 u_from_d;
 flat in float amplitude;
 flat in vec4 scalar;
+flat in vec4 colour;
+flat in float colour_correlation;
 flat in mat3 faces;
 flat in vec2 cut;
 flat in vec2 light;
@@ -113,17 +127,25 @@ layout(location = 3) out vec4 blended3;
 layout(location = 4) out vec4 blended4;
 #endif
 
-float cellsOf(float value) {
-  float v = LOG_SCALE ? log(max(value, least_logarithmic)) : value;
-  return v * cells_from_scalar.x + cells_from_scalar.y;
+float cellsOf(float value, bool log_scale, vec2 cells_from) {
+  float v = log_scale ? log(max(value, least_logarithmic)) : value;
+  return v * cells_from.x + cells_from.y;
 }
 
-vec4 integral(float x) {
+vec4 integral(samplerBuffer table, float x, vec4 below_all, vec4 above_all) {
   float inside = clamp(x, 0.0, float(cells));
   int cell = min(int(inside), cells - 1);
-  vec4 from = texelFetch(classes, cell);
-  return from + (texelFetch(classes, cell + 1) - from) * (inside - float(cell)) + below * min(x, 0.0) +
-         above * max(x - float(cells), 0.0);
+  vec4 from = texelFetch(table, cell);
+  return from + (texelFetch(table, cell + 1) - from) * (inside - float(cell)) + below_all * min(x, 0.0) +
+         above_all * max(x - float(cells), 0.0);
+}
+
+// The bounds of mean +- width in a table. Beyond an end of it all is the same; float tells cells apart only near it.
+vec2 interval(float mean, float width, bool log_scale, vec2 cells_from) {
+  float from = min(cellsOf(mean - width, log_scale, cells_from), float(cells) + 1.0);
+  float to = max(cellsOf(mean + width, log_scale, cells_from), -1.0);
+  float widen = max(0.0, 0.5 * (1.0 - (to - from)));
+  return vec2(from - widen, to + widen);
 }
 
 // 1 - exp(-x) without cancellation
@@ -160,28 +182,34 @@ vec3 remainder(vec2 u, float lo, float hi) {
   return vec3(share, mean, left.z / max(share, 1e-6) - mean * mean);
 }
 
+// Of a scalar (mean, slopes, half_width) at u; by its correlation with the depth, what is left of the depths moves the
+// mean and narrows the width.
+vec2 intervalOf(vec4 of, float correlation, vec2 u, float moved, float lost, bool log_scale, vec2 cells_from) {
+  float mean = PER_PIXEL ? of.x + dot(of.yz, u) : of.x;
+  float width = PER_PIXEL ? of.w : 0.0;
+  float deviation = correlation * width * 0.57735027;
+  mean += deviation * kReach * moved;
+  width = lost > 0.0 ? sqrt(max(0.0, width * width - 3.0 * deviation * deviation * lost)) : width;
+  return interval(mean, width, log_scale, cells_from);
+}
+
 // What is seen of a splat with this optical depth per extinction, between two depths.
 vec4 seenBetween(vec2 u, float depth, float lo, float hi) {
-  float mean = PER_PIXEL ? scalar.x + dot(scalar.yz, u) : scalar.x;
-  float width = PER_PIXEL ? scalar.w : 0.0;
-  if (amplitude < 0.0) {
-    vec3 left = remainder(u, lo, hi);
-    float deviation = cut.y * width * 0.57735027;
-    depth *= left.x;
-    mean += deviation * kReach * left.y;
-    float lost = 1.0 - clamp(7.0 * left.z, 0.0, 1.0);
-    width = sqrt(max(0.0, width * width - 3.0 * deviation * deviation * lost));
-  }
-  // Beyond an end of the table all is the same; float tells cells apart only near it.
-  float from = min(cellsOf(mean - width), float(cells) + 1.0), to = max(cellsOf(mean + width), -1.0);
-  float widen = max(0.0, 0.5 * (1.0 - (to - from)));
-  from -= widen;
-  to += widen;
-  vec4 seen = max((integral(to) - integral(from)) / (to - from), 0.0);
+  vec3 left = vec3(1.0, 0.0, 0.0);
+  if (amplitude < 0.0) left = remainder(u, lo, hi);
+  float lost = amplitude < 0.0 ? 1.0 - clamp(7.0 * left.z, 0.0, 1.0) : 0.0;
+  depth *= left.x;
+  vec2 ends = intervalOf(scalar, cut.y, u, left.y, lost, LOG_SCALE, cells_from_scalar);
+  vec4 seen = max((integral(classes, ends.y, below, above) - integral(classes, ends.x, below, above)) / (ends.y - ends.x), 0.0);
+#if COLOURED
+  ends = intervalOf(colour, colour_correlation, u, left.y, lost, COLOUR_LOG_SCALE, cells_from_colour);
+  seen.rgb = max((integral(colours, ends.y, colours_below, colours_above) -
+                  integral(colours, ends.x, colours_below, colours_above)).rgb / (ends.y - ends.x), 0.0) * seen.w;
+#endif
 
   float alpha = absorbed(seen.w * depth);
-  vec3 colour = seen.rgb * light.x + seen.w * light.y;
-  return vec4(seen.w > 0.0 ? colour * (alpha / seen.w) : vec3(0.0), alpha);
+  vec3 lit = seen.rgb * light.x + seen.w * light.y;
+  return vec4(seen.w > 0.0 ? lit * (alpha / seen.w) : vec3(0.0), alpha);
 }
 
 #if WINDOWS > 1 || LAYERED
@@ -241,8 +269,9 @@ std::string splatVertexShader() {
 std::string splatFragmentShader(SplatShaderKind kind) {
   return fmt::format(
       "#version 330 core\n#define PER_PIXEL {}\n#define LOG_SCALE {}\n#define LAYERED {:d}\n#define WINDOWS "
-      "{}\n{}",
-      kind.per_pixel, kind.log_scale, kind.layered, kind.windows, kFragmentShader);
+      "{}\n#define COLOURED {:d}\n#define COLOUR_LOG_SCALE {}\n{}",
+      kind.per_pixel, kind.log_scale, kind.layered, kind.windows, kind.coloured, kind.colour_log_scale,
+      kFragmentShader);
 }
 
 }  // namespace curvisplat

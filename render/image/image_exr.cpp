@@ -234,19 +234,32 @@ struct TinyExrFile {
 }  // namespace
 
 Bytes encodeExr(const Image& image) {
-  // In alphabetical order, as the format requires.
+  return encodeExr(image, {});
+}
+
+Bytes encodeExr(const Image& image, std::span<const ImageChannel> more) {
   constexpr std::string_view kNames = "ABGR";
   constexpr std::array<size_t, 4> kFrom{3, 2, 1, 0};
-  const size_t first = isOpaque(image) ? 1 : 0, channels = 4 - first;
-  const size_t pixels = image.rgba.size() / 4;
-  std::vector<std::vector<float>> planes(channels, std::vector<float>(pixels));
+  const size_t first = isOpaque(image) ? 1 : 0, pixels = image.rgba.size() / 4;
+  // In alphabetical order, as the format requires.
+  std::map<std::string, std::vector<float>> planes;
+  for (size_t c = first; c < 4; ++c) {
+    std::vector<float>& plane = planes[std::string(1, kNames[c])];
+    plane.resize(pixels);
+    for (size_t n = 0; n < pixels; ++n) plane[n] = image.rgba[4 * n + kFrom[c]];
+  }
+  for (const ImageChannel& channel : more) {
+    CURVISPLAT_CHECK_OP(channel.values.size(), ==, pixels);
+    planes[channel.name] = channel.values;
+  }
+  const size_t channels = planes.size();
   std::vector<unsigned char*> plane_pointers;
   std::vector<EXRChannelInfo> infos(channels);
   std::vector<int> types(channels, TINYEXR_PIXELTYPE_FLOAT);
-  for (size_t c = 0; c < channels; ++c) {
-    for (size_t n = 0; n < pixels; ++n) planes[c][n] = image.rgba[4 * n + kFrom[first + c]];
-    plane_pointers.push_back(reinterpret_cast<unsigned char*>(planes[c].data()));
-    infos[c].name[0] = kNames[first + c];
+  for (auto& [name, plane] : planes) {
+    EXRChannelInfo& info = infos[plane_pointers.size()];
+    std::copy_n(name.data(), std::min(name.size(), sizeof info.name - 1), info.name);
+    plane_pointers.push_back(reinterpret_cast<unsigned char*>(plane.data()));
   }
 
   // Borrows its arrays to TinyEXR, which must not free them.
@@ -276,6 +289,24 @@ Bytes encodeExr(const Image& image) {
   const std::unique_ptr<unsigned char, decltype(&std::free)> owner(memory, &std::free);
   const auto* begin = reinterpret_cast<const std::byte*>(memory);
   return {begin, begin + size};
+}
+
+std::vector<ImageChannel> decodeExrChannels(std::span<const std::byte> bytes, const std::string& name) {
+  Cursor cursor(bytes, name);
+  const ExrLayout layout = takeHeader(cursor, name);
+  requireChunks(cursor, layout, bytes, name);
+  const std::span memory(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+  TinyExrFile exr;
+  exr.parseHeader(memory, name);
+  exr.loadPixels(memory, name);
+  const auto pixels = static_cast<size_t>(exr.image.width) * static_cast<size_t>(exr.image.height);
+  std::vector<ImageChannel> channels;
+  for (int n = 0; n < exr.header.num_channels; ++n) {
+    const std::string_view channel = exr.header.channels[n].name;
+    if (channel.size() == 1 && std::string_view("RGBAY").find(channel) != std::string_view::npos) continue;
+    channels.push_back({std::string(channel), {exr.plane(n), exr.plane(n) + pixels}});
+  }
+  return channels;
 }
 
 Image decodeExr(std::span<const std::byte> bytes, const std::string& name) {

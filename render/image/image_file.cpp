@@ -50,6 +50,22 @@ void writeImage(const Image& image, const std::filesystem::path& path) {
   writeFileDurably(path, formatByName(path).encode(image));
 }
 
+void writeExr(const Image& image, std::span<const ImageChannel> more, const std::filesystem::path& path) {
+  CURVISPLAT_CHECK(image.size.width > 0 && image.size.width <= kLargestImageSide);
+  CURVISPLAT_CHECK(image.size.height > 0 && image.size.height <= kLargestImageSide);
+  writeFileDurably(path, encodeExr(image, more));
+}
+
+std::vector<ImageChannel> readChannels(const std::filesystem::path& path) {
+  const InputFile file(path);
+  if (file.size() > kLargestFile)
+    throw Error("{}: has {} bytes; image files of at most {} bytes are read", path.string(), file.size(),
+                kLargestFile);
+  Bytes bytes(file.size());
+  file.readAt(0, std::span(bytes));
+  return decodeExrChannels(bytes, path.string());
+}
+
 uint64_t writingBytes(const std::filesystem::path& path, ImageSize size) {
   return formatByName(path).pixel_bytes * size.pixels();
 }

@@ -3,8 +3,11 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <span>
+#include <vector>
 
 #include "render/image/image.h"
+#include "render/image/image_channel.h"
 
 namespace curvisplat {
 
@@ -13,6 +16,12 @@ namespace curvisplat {
 /// file appears whole or not at all. Throws UsageError for any other extension, Error if the file cannot be
 /// written.
 void writeImage(const Image& image, const std::filesystem::path& path);
+/// With further channels, as EXR.
+void writeExr(const Image& image, std::span<const ImageChannel> more, const std::filesystem::path& path);
+/// The memory that a further channel takes for each pixel, beside its own.
+inline constexpr uint64_t kChannelBytes = 8;
+/// The channels of an EXR file but for its colours. Throws Error.
+std::vector<ImageChannel> readChannels(const std::filesystem::path& path);
 /// Throws UsageError for a name that writeImage() would refuse. For checking before long work.
 void checkImageName(const std::filesystem::path& path);
 /// Memory that writeImage() needs for an image of `size`, beside the image itself.

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "render/image/image.h"
+#include "render/image/image_channel.h"
 
 namespace curvisplat {
 
@@ -21,10 +22,13 @@ inline constexpr int kLargestImageSide = 1 << 16;
 
 Bytes encodePng(const Image& image);
 Bytes encodeExr(const Image& image);
+Bytes encodeExr(const Image& image, std::span<const ImageChannel> more);
 Bytes encodePfm(const Image& image);
 
 Image decodePng(std::span<const std::byte> bytes, const std::string& name);
 Image decodeExr(std::span<const std::byte> bytes, const std::string& name);
+/// The channels that are no colours.
+std::vector<ImageChannel> decodeExrChannels(std::span<const std::byte> bytes, const std::string& name);
 Image decodePfm(std::span<const std::byte> bytes, const std::string& name);
 
 /// Throws Error unless width and height are in [1, kLargestImageSide] and `packed_bytes` can hold that many

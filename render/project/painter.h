@@ -30,6 +30,9 @@ struct PixelShading {
   bool per_pixel = true;  // from the splat's slope and width; false: one colour and extinction per splat
   bool lit = false;       // splats carry light (light.h)
   const PixelLayers* layers = nullptr;  // of the picture's size, in it; outlive the frame
+  /// In pictures of two scalars: the colours, with extinction 1, of the scalar of the splats' ScreenColours, which all
+  /// of them have then. Of the other table's values the extinctions alone count. Outlives the frame; null: none.
+  const ClassificationTable* colours = nullptr;
 };
 
 class Painter {

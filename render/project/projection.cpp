@@ -6,11 +6,13 @@
 
 #include "render/project/border_parts.h"
 #include "render/project/clip_planes.h"
+#include "render/project/colour_scalar.h"
 #include "render/project/face_cut.h"
 #include "render/project/footprint_skew.h"
 #include "render/project/kernel.h"
 #include "render/project/light.h"
 #include "render/project/local_layers.h"
+#include "render/project/placed_piece.h"
 #include "render/project/splat_chooser.h"
 #include "render/project/splat_cutter.h"
 #include "render/project/splat_ellipse.h"
@@ -91,42 +93,10 @@ struct CutBudget {
   size_t looks = 16 * BrickProjector::kMaxPieces;
 };
 
-/// Where a piece lies, and the map that is linear there.
-struct PlacedPiece {
-  float x, y, depth, volume;
-  ScreenRows rows;
-  glm::vec3 depth_row;
-};
-
-/// Calls take(piece, its place) for what is to be drawn of `piece`; false as soon as take() gives it, or
-/// after more `looks` at pieces, which it counts down.
-template <typename Take>
-bool place(const OrthographicMap& map, const SplatPiece& piece, size_t&, const Take& take) {
-  const float x = piece.position.x, y = piece.position.y, z = piece.position.z;
-  return take(piece, PlacedPiece{map.x + map.rows.x0 * x + map.rows.y0 * y + map.rows.z0 * z,
-                                 map.y + map.rows.x1 * x + map.rows.y1 * y + map.rows.z1 * z,
-                                 map.depth.x * x + map.depth.y * y + map.depth.z * z, map.volume, map.rows,
-                                 map.depth});
-}
-template <typename Take>
-bool place(const PerspectiveMap& map, const SplatPiece& piece, size_t& looks, const Take& take) {
-  return cutUp(map, piece, looks, [&](const SplatPiece& part, const PerspectiveMap::Centre& centre) {
-    return take(part, PlacedPiece{map.pixelX(centre), map.pixelY(centre), centre.distance,
-                                  map.volumeAt(centre), map.rowsAt(centre), map.depthRowAt(centre)});
-  });
-}
-
-// The map's rows at a position.
-const ScreenRows& rowsAt(const OrthographicMap& map, float, float, float) {
-  return map.rows;
-}
-ScreenRows rowsAt(const PerspectiveMap& map, float x, float y, float z) {
-  return map.rowsAt(map.centreOf(x, y, z));
-}
-
 struct BrickArrays {
   const GeometryArrays<const float>& geometry;
   const VariableArrays<const float>& variable;
+  const VariableArrays<const float>* colours;  // null: of pictures of one scalar
 };
 
 /// What cuts the splats of a brick.
@@ -144,6 +114,17 @@ float changeAlongRay(const PlacedPiece& at, const SplatPiece& piece, const Ellip
   return std::abs(ray.correlation) * ellipse.half_width / std::numbers::sqrt3_v<float> * ray.per_depth;
 }
 
+SplatPiece wholeOf(const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
+                   size_t i) {
+  return {{geometry.x[i], geometry.y[i], geometry.z[i]},
+          shapeOf(geometry, i),
+          slopeOf(variable, i),
+          variable.mean[i],
+          geometry.weight[i],
+          {},
+          growthAxes(shapeOf(geometry, i), geometry.growth_code[i])};
+}
+
 /// How one splat is cut.
 struct SplatCutting {
   uint32_t border_code = kNoBorder;
@@ -154,18 +135,12 @@ struct SplatCutting {
 /// Takes splat `i` to the parts and pieces that it is drawn as, and chooses among them: the best fate of any.
 /// Nothing if that takes more than what is `left`, which it counts down.
 template <typename Map>
-std::optional<SplatChooser::Fate> choosePieces(const Map& map, const GeometryArrays<const float>& geometry,
-                                               const VariableArrays<const float>& variable, size_t i,
+std::optional<SplatChooser::Fate> choosePieces(const Map& map, const BrickArrays& brick, size_t i,
                                                const Cutting& cutting, const SplatCutting& how,
                                                const Lit& lit, SplatChooser& chooser, CutBudget& left) {
+  const VariableArrays<const float>& variable = brick.variable;
   const uint32_t border_code = how.border_code;
-  const SplatPiece whole{{geometry.x[i], geometry.y[i], geometry.z[i]},
-                         shapeOf(geometry, i),
-                         slopeOf(variable, i),
-                         variable.mean[i],
-                         geometry.weight[i],
-                         {},
-                         growthAxes(shapeOf(geometry, i), geometry.growth_code[i])};
+  const SplatPiece whole = wholeOf(brick.geometry, variable, i);
   const glm::dvec3 slope(whole.slope.w0, whole.slope.w1, whole.slope.w2);
   const float scale = cutting.iso ? cutting.iso->scale : 1, offset = cutting.iso ? cutting.iso->offset : 0;
   if (chooser.transparentThroughout(scale * whole.mean + offset,
@@ -174,7 +149,9 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, const GeometryArr
     return SplatChooser::Fate::kTransparent;
   auto best = SplatChooser::Fate::kOffScreen;
   // A splat that is cut has a record of its own, as any splat; what it takes beyond that counts.
-  size_t own = how.clipped || how.layered || inwardAxes(border_code).faces != 0 ? 1 : 0;
+  const size_t least = brick.colours ? 2 : 1;
+  size_t own = how.clipped || how.layered || inwardAxes(border_code).faces != 0 ? least : 0;
+  const SplatPiece* coloured = nullptr;  // the part that is placed, with the scalar of the colours
   const auto take = [&](const SplatPiece& piece, const PlacedPiece& at) {
     if (left.pieces + own == 0) return false;
     const Ellipse ellipse = ellipseOf(at.rows, piece.shape, piece.slope, variable.variance[i],
@@ -187,7 +164,7 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, const GeometryArr
     const Remains remains = cutAtFaces(at.rows, piece, ellipse, map.low_pass_px2, cut);
     if (remains == Remains::kNothing) return true;
     const bool faces = remains == Remains::kSome, across = side == LayerSide::kAcross;
-    const size_t records = 1 + (faces ? 1u : 0u) + (across ? 1u : 0u);
+    const size_t records = least + (faces ? 1u : 0u) + (across ? 1u : 0u);
     if (left.pieces + own < records) return false;
     ScreenSplat splat = screenSplat(at.x, at.y, ellipse, piece.mean);
     if (cutting.iso) {
@@ -204,9 +181,14 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, const GeometryArr
                                 map.low_pass_px2);
       along_ray.has_cut = faces;
     }
-    const auto fate = records == 1 ? chooser.choose(splat, at.depth, lit)
-                                   : chooser.chooseCut(splat, at.depth, lit, faces ? &cut : nullptr,
-                                                       across ? &along_ray : nullptr);
+    ScreenColour colour;
+    if (coloured)
+      colour = colourOf(map, at, withScalarOf(*coloured, piece), brick.colours->variance[i], faces, across);
+    const auto fate = records == 1
+                          ? chooser.choose(splat, at.depth, lit)
+                          : chooser.chooseWith({faces ? &cut : nullptr, across ? &along_ray : nullptr,
+                                                coloured ? &colour : nullptr},
+                                               splat, at.depth, lit);
     if (fate == SplatChooser::Fate::kKept) {
       left.pieces -= records - own;
       own = 0;
@@ -214,13 +196,16 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, const GeometryArr
     best = std::max(best, fate);
     return true;
   };
-  BorderPieces parts;
-  size_t count = 1;
-  if (border_code == kNoBorder)
-    parts[0] = whole;
-  else
-    count = partsAtBorder(whole, border_code, *cutting.borders, parts);
+  const auto divide = [&](const SplatPiece& piece, BorderPieces& parts) {
+    if (border_code != kNoBorder) return partsAtBorder(piece, border_code, *cutting.borders, parts);
+    parts[0] = piece;
+    return size_t{1};
+  };
+  BorderPieces parts, coloured_parts;
+  const size_t count = divide(whole, parts);
+  if (brick.colours) divide(wholeOf(brick.geometry, *brick.colours, i), coloured_parts);
   for (size_t n = 0; n < count; ++n) {
+    if (brick.colours) coloured = &coloured_parts[n];
     if (how.clipped) cutting.clip.addFaces(parts[n]);
     if (!place(map, parts[n], left.looks, take)) return {};
   }
@@ -270,7 +255,7 @@ bool projectRange(const Map& map, const Cutting& cutting, const std::optional<Lo
                         slopeOf(variable, i));
       SplatChooser::Fate fate;
       if (in_pieces) {
-        const auto best = choosePieces(map, geometry, variable, i, cutting, how, lit, chooser, left);
+        const auto best = choosePieces(map, brick, i, cutting, how, lit, chooser, left);
         if (!best) return false;
         fate = *best;
       } else {
@@ -279,7 +264,12 @@ bool projectRange(const Map& map, const Cutting& cutting, const std::optional<Lo
         if (const uint32_t code = geometry.growth_code[i]; code != kNoGrowth)
           splat.skew = skewOf(rowsAt(map, geometry.x[i], geometry.y[i], geometry.z[i]),
                               growthAxes(shapeOf(geometry, i), code), ellipse);
-        fate = chooser.choose(splat, block.depth[n], lit);
+        if (brick.colours) {
+          const ScreenColour colour = colourOf(map, geometry, *brick.colours, i);
+          fate = chooser.chooseWith({nullptr, nullptr, &colour}, splat, block.depth[n], lit);
+        } else {
+          fate = chooser.choose(splat, block.depth[n], lit);
+        }
       }
       counts.off_screen += fate == SplatChooser::Fate::kOffScreen;
       counts.transparent += fate == SplatChooser::Fate::kTransparent;
@@ -326,13 +316,13 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
 
 void BrickProjector::project(const ProjectionSettings& settings, const ClassificationTable& table,
                              const glm::dvec3& cell_min, const GeometryArrays<const float>& geometry,
-                             const VariableArrays<const float>& variable,
-                             std::span<const SplatRange> ranges) {
-  CURVISPLAT_CHECK_OP(geometry.size(), ==, variable.size());
+                             const BrickValues& values, std::span<const SplatRange> ranges) {
+  CURVISPLAT_CHECK_OP(geometry.size(), ==, values.scalar.size());
+  if (values.colours) CURVISPLAT_CHECK_OP(geometry.size(), ==, values.colours->size());
   for (const SplatRange& range : ranges) CURVISPLAT_CHECK_OP(range.end, <=, geometry.size());
   Cutting cutting{nullptr, LocalClipPlanes(settings.clip_planes, cell_min),
                   LocalLayers(settings.layers, settings.view, cell_min)};
-  const BrickArrays brick{geometry, variable};
+  const BrickArrays brick{geometry, values.scalar, values.colours ? &*values.colours : nullptr};
   std::optional<LocalLight> light;
   if (settings.light) light.emplace(*settings.light, settings.light_g0, settings.view, cell_min);
   SplatChooser chooser(settings.view, largestReach(settings.view.low_pass_px2),
@@ -373,7 +363,7 @@ void BrickProjector::keepTouching(const TileSet& tiles) {
   size_t kept = 0, first_record = 0;  // the records of a splat come before it
   for (size_t n = 0; n < splats_.size(); ++n) {
     const ScreenSplat& splat = splats_[n];
-    if (isCut(splat)) continue;
+    if (isRecord(splat)) continue;
     const float reach_x = kSupport * splat.l11;
     const float reach_y = kSupport * (std::abs(splat.l21) + splat.l22);
     if (tiles.touches({splat.x - reach_x, splat.y - reach_y, splat.x + reach_x, splat.y + reach_y}))

@@ -65,17 +65,31 @@ struct ProjectionSettings {
   bool lit() const { return light.has_value() || iso.has_value(); }
 };
 
+/// The values of a brick's splats: of the scalar that is classified, and in pictures of two scalars of that which gives
+/// the colours.
+struct BrickValues {
+  VariableArrays<const float> scalar;
+  std::optional<VariableArrays<const float>> colours = std::nullopt;
+
+  BrickValues(const VariableArrays<const float>& of_scalar) : scalar(of_scalar) {}
+  BrickValues(const VariableArrays<float>& of_scalar) : scalar(of_scalar) {}
+  BrickValues(const VariableArrays<const float>& of_scalar,
+              const std::optional<VariableArrays<const float>>& of_colours)
+      : scalar(of_scalar), colours(of_colours) {}
+};
+
 /// Projects bricks. Each projector belongs to one thread.
 class BrickProjector {
  public:
-  /// A brick gives at most kMaxBrickSplats splats plus this many records of pieces. If borders and
+  /// A brick gives at most kMaxBrickSplats splats, each with a ScreenColour in pictures of two scalars, plus this many
+  /// records of pieces. If borders and
   /// perspective would make more, cells at borders are drawn like any cell, clip planes keep or drop whole
   /// splats instead of cutting them, and perspective cuts more coarsely and drops more of the splats that are
   /// close to the eye.
   static constexpr size_t kMaxPieces = 65536;
   static constexpr size_t kMaxSplats = kMaxBrickSplats + kMaxPieces;
 
-  /// Allocates all memory that project() will need.
+  /// Allocates all memory that project() will need, but for what kMaxBrickSplats ScreenColours take.
   BrickProjector();
 
   /// Projects the splats of a brick that `ranges` hold; `cell_min` is the minimum corner of its cell. Leaves
@@ -85,7 +99,7 @@ class BrickProjector {
   /// Overwrites splats() and depths(). Pure.
   void project(const ProjectionSettings& settings, const ClassificationTable& table,
                const glm::dvec3& cell_min, const GeometryArrays<const float>& geometry,
-               const VariableArrays<const float>& variable, std::span<const SplatRange> ranges);
+               const BrickValues& values, std::span<const SplatRange> ranges);
   /// All splats of a brick.
   void project(const ProjectionSettings& settings, const ClassificationTable& table,
                const glm::dvec3& cell_min, const SplatGeometry& geometry, const SplatVariable& variable);
@@ -94,7 +108,7 @@ class BrickProjector {
   /// depend on the tiles.
   void keepTouching(const TileSet& tiles);
 
-  /// In the order of the ranges. A splat's ScreenCut and ScreenDepth precede it and have the same depth.
+  /// In the order of the ranges. A splat's records precede it and have the same depth.
   const std::vector<ScreenSplat>& splats() const { return splats_; }
   /// [splats()], larger is farther: orthographic, distance along the view from any origin; perspective,
   /// distance from the eye.

@@ -1,5 +1,6 @@
-// The records that the projection passes to the painters: splats as ellipses on the screen, and what cuts them:
-// faces, and the layers of the pixels. Every record takes 44 bytes.
+// The records that the projection passes to the painters: splats as ellipses on the screen; what cuts them: faces,
+// and the layers of the pixels; and the scalar of their colours, if it is not that of their opacity. Every record
+// takes 44 bytes.
 #pragma once
 
 #include <array>
@@ -43,7 +44,7 @@ struct ScreenCut {
   static constexpr float kNoFace = 4;          // > √7
   static constexpr float kReach = 2.6457513f;  // √7
 
-  /// As a record among splats, which isCut() tells from splats, and back.
+  /// As a record among splats, which isRecord() tells from splats, and back.
   ScreenSplat record() const;
   static ScreenCut of(const ScreenSplat& record);
 };
@@ -63,16 +64,31 @@ struct ScreenDepth {
   static ScreenDepth of(const ScreenSplat& record);
 };
 
-/// Whether a record is a ScreenCut or a ScreenDepth, which isDepth() tells apart.
-inline bool isCut(const ScreenSplat& record) {
-  return record.l11 < 0;
+/// The scalar that a splat takes its colours from, where the opacity is another's: along the columns of L as the
+/// splat's own scalar. In pictures of two scalars every splat has one, directly beside it, before any other record.
+struct ScreenColour {
+  float mean = 0;
+  std::array<float, 2> slope{};
+  float half_width = 0;
+  float correlation = 0;  // of this scalar and depth along the ray, as the cuts see it
+
+  ScreenSplat record() const;
+  static ScreenColour of(const ScreenSplat& record);
+};
+
+/// Whether an element is no splat but a record: a ScreenCut, a ScreenDepth or a ScreenColour.
+inline bool isRecord(const ScreenSplat& element) {
+  return element.l11 < 0;
 }
-inline bool isDepth(const ScreenSplat& record) {
-  return record.l11 < -32;
+inline bool isColour(const ScreenSplat& element) {
+  return element.l11 < -128;
 }
-/// Whether a splat has one of them, or both.
+inline bool isDepth(const ScreenSplat& element) {
+  return element.l11 < -32 && !isColour(element);
+}
+/// Whether a splat has a ScreenCut, a ScreenDepth, or both.
 inline bool hasCut(const ScreenSplat& splat) {
-  return splat.amplitude < 0 && !isCut(splat);
+  return splat.amplitude < 0 && !isRecord(splat);
 }
 
 // l11 holds all that is not a face: -(4 far_sides + 2 + correlation).
@@ -105,16 +121,35 @@ inline ScreenDepth ScreenDepth::of(const ScreenSplat& r) {
   return depth;
 }
 
-/// What lies beside a splat that is cut: its records, found from the one next to it on. `step` is -1 where
-/// splats come from the nearest to the farthest, else 1.
-struct SplatCuts {
+inline ScreenSplat ScreenColour::record() const {
+  return {mean, slope[0], -194.0f - correlation, slope[1], half_width, 0, 0, 0, 0, 0};
+}
+inline ScreenColour ScreenColour::of(const ScreenSplat& r) {
+  return {r.x, {r.y, r.l21}, r.l22, -r.l11 - 194.0f};
+}
+
+/// A splat's records, found beside it. `step` is -1 where splats come from the nearest to the farthest, else 1.
+struct SplatRecords {
   const ScreenSplat* cut = nullptr;
   const ScreenSplat* depth = nullptr;
+  const ScreenSplat* colour = nullptr;
 
-  static SplatCuts beside(const ScreenSplat* splat, int step) {
-    const ScreenSplat* const next = splat + step;
-    if (!isDepth(*next)) return {next, nullptr};
-    return {ScreenDepth::of(*next).has_cut ? next + step : nullptr, next};
+  /// `coloured`: the picture is of two scalars.
+  static SplatRecords beside(const ScreenSplat* splat, int step, bool coloured) {
+    SplatRecords records;
+    const ScreenSplat* next = splat + step;
+    if (coloured) {
+      records.colour = next;
+      next += step;
+    }
+    if (!hasCut(*splat)) return records;
+    const bool placed = isDepth(*next);
+    if (placed) records.depth = next;
+    if (!placed)
+      records.cut = next;
+    else if (ScreenDepth::of(*next).has_cut)
+      records.cut = next + step;
+    return records;
   }
 };
 

@@ -62,18 +62,26 @@ class SplatChooser {
     return Fate::kKept;
   }
 
-  /// Of a splat that is cut, at faces or by layers. Its records come first.
-  Fate chooseCut(const ScreenSplat& splat, float depth, const Lit& lit, const ScreenCut* cut,
-                 const ScreenDepth* along_ray) {
+  /// What a splat has besides itself; null: none.
+  struct Records {
+    const ScreenCut* cut = nullptr;
+    const ScreenDepth* along_ray = nullptr;
+    const ScreenColour* colour = nullptr;
+  };
+  /// Of a splat with records, which come first.
+  Fate chooseWith(const Records& records, const ScreenSplat& splat, float depth, const Lit& lit) {
     const size_t before = splats_.size();
+    const bool is_cut = records.cut || records.along_ray;
     // A truncated distribution's mean moves by up to kReach deviations; half_width is √3.
-    const Fate fate = choose(splat, depth, lit, ScreenCut::kReach / std::numbers::sqrt3_v<float>);
+    const Fate fate =
+        choose(splat, depth, lit, is_cut ? ScreenCut::kReach / std::numbers::sqrt3_v<float> : 1.0f);
     if (splats_.size() == before) return fate;
     ScreenSplat kept = splats_.back();
-    kept.amplitude = -kept.amplitude;
+    if (is_cut) kept.amplitude = -kept.amplitude;
     splats_.pop_back();
-    if (cut) splats_.push_back(cut->record());
-    if (along_ray) splats_.push_back(along_ray->record());
+    if (records.cut) splats_.push_back(records.cut->record());
+    if (records.along_ray) splats_.push_back(records.along_ray->record());
+    if (records.colour) splats_.push_back(inBounds(*records.colour).record());
     splats_.push_back(kept);
     depths_.resize(splats_.size(), depth);
     return fate;
@@ -86,10 +94,23 @@ class SplatChooser {
   }
 
  private:
+  /// As splats themselves are kept finite.
+  ScreenColour inBounds(ScreenColour colour) const {
+    const float spread =
+        kSupport * (std::abs(colour.slope[0]) + std::abs(colour.slope[1])) + colour.half_width;
+    if (!(std::abs(colour.mean) + spread <= kLargestColour)) {
+      colour.slope = {};
+      colour.half_width = 0;
+      colour.mean = std::clamp(colour.mean, -kLargestColour, kLargestColour);
+    }
+    return colour;
+  }
+
   static constexpr auto kSupport = static_cast<float>(kKernelSupport);
   // Painters find a scalar's place in the table, and depths, in float: beyond these there are infinities, and
   // infinity minus infinity is no number. Such a splat is drawn flat, and far outside of the table.
-  static constexpr float kLargestCells = 1e30f, kMinScale = 1e-7f, kLargestAmplitude = 1e30f;
+  static constexpr float kLargestCells = 1e30f, kMinScale = 1e-7f, kLargestAmplitude = 1e30f,
+                         kLargestColour = 1e22f;
 
   const ClassificationTable& table_;
   const float width_, height_;

@@ -40,8 +40,9 @@ struct GridSurface {
   std::shared_ptr<const FacesReader> faces;
   std::vector<Part> parts;
   glm::vec3 colour{0.7f, 0.7f, 0.7f};
-  std::optional<size_t> scalar;                          // among those of the faces; none: `colour`
-  std::shared_ptr<const ColourTable> colours = nullptr;  // as Surface
+  std::optional<size_t> scalar;                                // among those of the faces; none: `colour`
+  std::shared_ptr<const ColourTable> colours = nullptr;        // as Surface
+  std::shared_ptr<const TransferFunction> function = nullptr;  // that `colours` are of
 
   /// Whether the same patches make the same mesh.
   bool hasMeshOf(const GridSurface& other) const {

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/common.hpp>
+#include <glm/vector_relational.hpp>
 
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/cache/brick_grids.h"
 #include "stream/cache/cache_file.h"
+#include "stream/cache/faces_file.h"
 #include "stream/model/border_code.h"
 #include "stream/model/shape_extent.h"
 
@@ -35,6 +38,7 @@ class Verifier {
     }
     verifyWeights();
     verifyGrids();
+    verifyFaces();
     if (progress) progress->end();
     return std::move(result_);
   }
@@ -210,6 +214,44 @@ class Verifier {
         result_.notes.push_back(
             fmt::format("{}: the checksum is right, but the contents were not compared with bricks.bin: {}",
                         path.string(), not_compared));
+    } catch (const Error& error) {
+      find("{}", error.what());
+    }
+  }
+
+  void verifyFaces() {
+    try {
+      const auto faces = FacesReader::open(reader_.path(), reader_.manifest());
+      if (!faces) return;
+      for (uint32_t n = 0; n < faces->patches().size(); ++n) verifyPatch(*faces, n);
+    } catch (const Error& error) {
+      find("{}", error.what());
+    }
+  }
+
+  void verifyPatch(const FacesReader& faces, uint32_t n) {
+    const FacePatch& patch = faces.patches()[n];
+    const auto contains = [&](const glm::dvec3& point) {
+      // Nodes are rounded to steps, boxes are of what was rounded.
+      const glm::dvec3 slack = faces.box().step;
+      return glm::all(glm::greaterThanEqual(point, patch.lower - slack)) &&
+             glm::all(glm::lessThanEqual(point, patch.upper + slack));
+    };
+    const auto wrong = [&](const std::string& what) {
+      find("{}: patch {} of the faces: {}", faces.path().string(), n, what);
+    };
+    for (size_t c = patch.first_child; c < patch.first_child + size_t{patch.child_count}; ++c)
+      if (!contains(faces.patches()[c].lower) || !contains(faces.patches()[c].upper))
+        return wrong(fmt::format("its box does not hold that of its child {}", c));
+    try {
+      const PatchNodes nodes = faces.read(n);
+      const size_t columns = patch.nodes[0], quads = columns - 1;
+      for (size_t q = 0; q < nodes.quads.size(); ++q) {
+        if (!nodes.quads[q]) continue;
+        const size_t corner = q / quads * columns + q % quads;
+        for (const size_t node : {corner, corner + 1, corner + columns, corner + columns + 1})
+          if (!contains(nodes.positions[node])) return wrong("a quad reaches out of its box");
+      }
     } catch (const Error& error) {
       find("{}", error.what());
     }

@@ -12,14 +12,23 @@ namespace curvisplat {
 namespace {
 
 /// Copies the splats of `kept` to the front of the arrays, in their order.
-void compact(std::span<const uint32_t> kept, SplatGeometry& g, SplatVariable& v) {
+void compact(std::span<const uint32_t> kept, BrickSource::Scratch& scratch) {
   const auto keep = [&](auto& array) {
     for (size_t n = 0; n < kept.size(); ++n) array[n] = array[kept[n]];
   };
-  forEachArrayOfGeometry(g, keep);
-  forEachArrayOfVariable(v, keep);
-  g.resize(kept.size());
-  v.resize(kept.size());
+  forEachArrayOfGeometry(scratch.geometry, keep);
+  scratch.geometry.resize(kept.size());
+  for (SplatVariable* values : {&scratch.values, &scratch.second}) {
+    if (values->size() == 0) continue;
+    forEachArrayOfVariable(*values, keep);
+    values->resize(kept.size());
+  }
+}
+
+void clear(BrickSource::Scratch& scratch) {
+  scratch.geometry.resize(0);
+  scratch.values.resize(0);
+  scratch.second.resize(0);
 }
 
 std::vector<uint32_t> bricksOf(std::span<const BrickPart> parts) {
@@ -31,13 +40,14 @@ std::vector<uint32_t> bricksOf(std::span<const BrickPart> parts) {
 
 }  // namespace
 
-BrickSource::BrickSource(const CacheReader& cache, size_t variable, const PagerOptions& pager,
+BrickSource::BrickSource(const CacheReader& cache, const Variables& variables, const PagerOptions& pager,
                          uint64_t cache_bytes, uint64_t kept_bytes)
     : cache_(cache),
-      variable_(variable),
+      variable_(variables.first),
+      second_(variables.second),
       cached_(cache_bytes),
       kept_(kept_bytes),
-      pager_(cache, variable, pager) {}
+      pager_(cache, variables.first, pager) {}
 
 void BrickSource::start(std::span<const BrickPart> parts, BrickPager::Unneeded unneeded) {
   parts_.assign(parts.begin(), parts.end());
@@ -58,6 +68,20 @@ void BrickSource::start(std::span<const BrickPart> parts, BrickPager::Unneeded u
 }
 
 std::optional<BrickSource::Splats> BrickSource::take(uint64_t sequence, Scratch& scratch) {
+  std::optional<Splats> splats = takeFirst(sequence, scratch);
+  if (!splats || !second_) return splats;
+  const uint32_t brick = parts_[sequence].brick;
+  if (splats->geometry.size() == 0) {
+    scratch.second.resize(0);
+  } else {
+    cache_.readVariable(brick, *second_, scratch.second, &scratch.times, &kept_);
+    second_bytes_ += cache_.brickVariables(*second_)[brick].values.length;
+  }
+  splats->second = arraysOf(std::as_const(scratch.second));
+  return splats;
+}
+
+std::optional<BrickSource::Splats> BrickSource::takeFirst(uint64_t sequence, Scratch& scratch) {
   CURVISPLAT_CHECK_OP(sequence, <, parts_.size());
   const BrickPart& part = parts_[sequence];
   if (pins_[sequence]) {
@@ -145,16 +169,13 @@ BrickSource::Splats BrickSource::standIn(const BrickPart& part, Scratch& scratch
   const auto bricks = cache_.bricks();
   Brick stored;  // what is in the scratch
   stored.cell = bricks[part.brick].cell;
-  scratch.geometry.resize(0);
-  scratch.values.resize(0);
+  clear(scratch);
   for (uint32_t ancestor = bricks[part.brick].parent; ancestor != kNoBrick;
        ancestor = bricks[ancestor].parent) {
     try {
-      cache_.readGeometry(ancestor, scratch.geometry, nullptr, &scratch.times);
-      cache_.readVariable(ancestor, variable_, scratch.values, &scratch.times);
+      readAncestor(ancestor, scratch);
     } catch (const DamagedBrick&) {
-      scratch.geometry.resize(0);
-      scratch.values.resize(0);
+      clear(scratch);
       continue;  // the next one, then
     }
     keepPart(part, ancestor, scratch);
@@ -164,7 +185,16 @@ BrickSource::Splats BrickSource::standIn(const BrickPart& part, Scratch& scratch
   stored.splats = static_cast<uint32_t>(scratch.geometry.size());
   const SplatGeometry& geometry = scratch.geometry;
   const SplatVariable& values = scratch.values;
-  return {arraysOf(geometry), arraysOf(values), SplatRanges(stored, kAllOctants), stored.cell, std::nullopt};
+  Splats splats{arraysOf(geometry), arraysOf(values), SplatRanges(stored, kAllOctants), stored.cell,
+                std::nullopt};
+  if (second_) splats.second = arraysOf(std::as_const(scratch.second));
+  return splats;
+}
+
+void BrickSource::readAncestor(uint32_t brick, Scratch& scratch) const {
+  cache_.readGeometry(brick, scratch.geometry, nullptr, &scratch.times);
+  cache_.readVariable(brick, variable_, scratch.values, &scratch.times);
+  if (second_) cache_.readVariable(brick, *second_, scratch.second, &scratch.times);
 }
 
 /// Of `ancestor` in the scratch, what stands for the space of `part`.
@@ -191,7 +221,7 @@ void BrickSource::keepPart(const BrickPart& part, uint32_t ancestor, Scratch& sc
   for (const SplatRange& range : SplatRanges(bricks[ancestor], octant))
     for (uint32_t n = range.begin; n < range.end; ++n)
       if (all || stands(n)) kept.push_back(n);
-  compact(kept, scratch.geometry, scratch.values);
+  compact(kept, scratch);
 
   // A cell that could not be split has several bricks; this one is a part of what is stood in for.
   double of_cell = 0;
@@ -259,7 +289,7 @@ void BrickSource::finish(FetchStatistics& statistics) {
   const double depth_s = statistics.mean_queue_depth * statistics.read_s + after.depth_s - before_.depth_s;
   statistics.read_s += after.reading_s - before_.reading_s;
   statistics.mean_queue_depth = statistics.read_s > 0 ? depth_s / statistics.read_s : 0;
-  statistics.bytes_read += after.bytes - before_.bytes;
+  statistics.bytes_read += after.bytes - before_.bytes + second_bytes_.exchange(0);
   statistics.read_requests += after.requests - before_.requests;
   statistics.bricks_cached += hits_;
   statistics.bricks_left_out += after.bricks_left_out - before_.bricks_left_out;

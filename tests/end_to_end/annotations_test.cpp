@@ -86,6 +86,61 @@ TEST_F(Annotations, TheScalarBarStandsBesideTheData) {
   for (int y = 0; y < 160; ++y) EXPECT_EQ(whole.pixel(data - 1, y)[2], 1) << y;
 }
 
+TEST_F(Annotations, TheAxesGridLiesBehindTheDataAndHasCoordinatesAroundIt) {
+  const std::vector<std::string> view{"--size", "400x320", "--view", "iso", "--background", "black"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.end(), view.begin(), view.end());
+    return render(more, "a.pfm");
+  };
+  // The same view: room for coordinates is in the grid's.
+  const std::vector<std::string> camera{"--parallel-scale", "2.2"};
+  const auto zoomed = [&](std::vector<std::string> more) {
+    more.insert(more.end(), camera.begin(), camera.end());
+    return with(more);
+  };
+  const std::vector<std::string> opaque{"--tf",      "grey",    "--range",        "0,1",
+                                        "--opacity", "0:1,1:1", "--opacity-unit", "0.001"};
+  const auto solid = [&](std::vector<std::string> more) {
+    more.insert(more.end(), opaque.begin(), opaque.end());
+    return zoomed(more);
+  };
+  const Image plain = solid({}), grid = solid({"--axes-grid"});
+  EXPECT_GT(changed(plain, grid, 0, 400, 0, 320), 1500);
+  // Where the data is opaque, no line of the grid.
+  int inside = 0, over = 0;
+  for (int y = 120; y < 200; ++y)
+    for (int x = 150; x < 250; ++x) {
+      if (plain.pixel(x, y)[0] < 0.2f) continue;
+      ++inside;
+      over += std::abs(plain.pixel(x, y)[0] - grid.pixel(x, y)[0]) > 0.05f;
+    }
+  EXPECT_GT(inside, 500);
+  EXPECT_LT(over, inside / 20);
+  const Image titled = solid({"--axes-titles", "east [km],north [km],depth [m]"});
+  EXPECT_GT(changed(grid, titled, 0, 400, 0, 320), 50);
+  // Without a zoom the coordinates have room: nothing at the picture's edges.
+  const Image whole = with({"--axes-grid"});
+  for (int x = 0; x < 400; ++x)
+    for (const int y : {0, 319}) EXPECT_LT(whole.pixel(x, y)[0], 0.5f) << x << ' ' << y;
+  const ProgramResult wrong =
+      runProgram({"render", file("a.splats"), "-o", file("b.png"), "--axes-titles", "x,y"});
+  EXPECT_EQ(wrong.status, 2);
+  EXPECT_NE(wrong.err.find("--axes-titles x,y: expected three titles, X,Y,Z"), std::string::npos)
+      << wrong.err;
+}
+
+TEST_F(Annotations, EachFunctionHasABarWithATitleOfItsOwn) {
+  const Image one = render({"--scalar-bar"}),
+              other = render({"--scalar-bar-title", "height above the plate"});
+  EXPECT_GT(changed(one, other, 140, 200, 0, 160), 20);
+  const ProgramResult wrong = runProgram({"render", file("a.splats"), "-o", file("b.png"),
+                                          "--scalar-bar-title", "a", "--scalar-bar-title", "b"});
+  EXPECT_EQ(wrong.status, 2);
+  EXPECT_NE(wrong.err.find("--scalar-bar-title: given 2 times; the picture shows 1 function"),
+            std::string::npos)
+      << wrong.err;
+}
+
 TEST_F(Annotations, TheScalarBarHasTheFunctionsColoursTheHighestOnTop) {
   const Image grey = render({"--scalar-bar", "--tf", "grey", "--background", "#ff0000"});
   // Down the first column that is all grey and not the frame.

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <glm/geometric.hpp>
 #include <memory>
 #include <set>
@@ -13,6 +15,7 @@
 #include "render/image/image_file.h"
 #include "render/surface/face_meshes.h"
 #include "stream/base/error.h"
+#include "stream/cache/faces_file.h"
 #include "tests/reference/known_pictures.h"
 #include "tests/support/run_program.h"
 #include "tests/support/temporary_folder.h"
@@ -234,6 +237,29 @@ TEST_F(GridSurfaceOptions, APartOfAFaceIsAPartOfItsPicture) {
   EXPECT_GT(right, 100u);
   EXPECT_NEAR(static_cast<double>(left + right), static_cast<double>(whole),
               0.03 * static_cast<double>(whole));
+}
+
+TEST_F(GridSurfaceOptions, VerifyFindsDamagedFaces) {
+  const std::filesystem::path damaged = file("damaged.splats");
+  std::filesystem::copy(file("wake.splats"), damaged, std::filesystem::copy_options::recursive);
+  EXPECT_EQ(runProgram({"info", damaged.string(), "--verify"}).status, 0);
+  const auto flip = [&](uint64_t at) {
+    std::fstream faces(damaged / "faces.bin", std::ios::in | std::ios::out | std::ios::binary);
+    faces.seekg(static_cast<std::streamoff>(at));
+    const int byte = faces.get();
+    faces.seekp(static_cast<std::streamoff>(at));
+    faces.put(static_cast<char>(byte ^ 1));
+  };
+  flip(sizeof(FacesHeader) + 100);  // in the stream of a patch
+  const ProgramResult of_stream = runProgram({"info", damaged.string(), "--verify"});
+  EXPECT_EQ(of_stream.status, 1);
+  const std::string said = of_stream.out + of_stream.err;
+  EXPECT_NE(said.find("of the faces: has a wrong checksum"), std::string::npos) << said;
+  flip(sizeof(FacesHeader) + 100);
+  flip(std::filesystem::file_size(damaged / "faces.bin") - 200);  // in the table
+  const ProgramResult of_table = runProgram({"info", damaged.string(), "--verify"});
+  EXPECT_EQ(of_table.status, 1);
+  EXPECT_NE((of_table.out + of_table.err).find("faces.bin: has a wrong checksum"), std::string::npos);
 }
 
 TEST_F(GridSurfaceOptions, SaysWhatThereIs) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -77,6 +78,27 @@ TEST_F(LimitsTest, ConversionNamesTheLeastMemoryThatItTakes) {
   EXPECT_FALSE(std::filesystem::exists(file("least.splats")));
   const ProgramResult taken = convert(least);
   EXPECT_EQ(taken.status, 0) << taken.err;
+}
+
+TEST_F(LimitsTest, LongRowsAreConvertedWithinTheMemory) {
+  struct Case {
+    const char* size;
+    int mebibytes;
+  };
+  // All rows of a thin grid at once; and a row with all of its neighbours.
+  for (const Case& grid : {Case{"300000x3x2", 256}, Case{"10000x10x11", 192}}) {
+    SCOPED_TRACE(grid.size);
+    ASSERT_EQ(runProgram({"generate", "wake", "--size", grid.size, "-o", file("long")}).status, 0);
+    const ProgramResult result =
+        runProgram({"convert", file("long.xyz"), file("long.fun"), "-o", file("long.splats"), "--overwrite",
+                    "--memory", mebibytes(grid.mebibytes), "--stats", file("long.json")});
+    EXPECT_EQ(result.status, 0) << result.err;
+    const auto stats = nlohmann::json::parse(readTextFile(file("long.json")));
+    EXPECT_LE(stats["peak_memory_bytes"].get<uint64_t>(), static_cast<uint64_t>(grid.mebibytes) << 20);
+    const ProgramResult added = runProgram({"convert", file("long.xyz"), "--add-scalar", "j", "--to",
+                                            file("long.splats"), "--memory", mebibytes(grid.mebibytes)});
+    EXPECT_EQ(added.status, 0) << added.err;
+  }
 }
 
 TEST_F(LimitsTest, AddingAScalarNamesTheLeastMemoryThatItTakes) {

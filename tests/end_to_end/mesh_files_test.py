@@ -9,6 +9,7 @@ import gzip
 import json
 import pathlib
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -512,6 +513,13 @@ class MeshFiles(unittest.TestCase):
         for shift in (-1, 100000):
             self.write_exodus(path, shift=shift)
             expect_line()
+        # A number of blocks that no file has: only those that are there are looked at.
+        self.write_exodus(path)
+        data = path.read_bytes()
+        name = data.index(b"num_el_blk") + 12
+        path.write_bytes(data[:name] + struct.pack(">I", 0x7ffffff0) + data[name + 4:])
+        result = subprocess.run([PROGRAM, "info", path], capture_output=True, text=True, timeout=60, check=False)
+        self.assertLess(result.returncode, 2, result.stderr)
 
     def test_damaged_files_get_one_line(self):
         grid = cube(2)

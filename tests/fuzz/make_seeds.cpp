@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <random>
+#include <tuple>
 
 #include "preprocess/convert/conversion_journal.h"
 #include "render/colour/transfer_function.h"
@@ -14,6 +15,8 @@
 #include "render/image/image_file.h"
 #include "stream/cache/brick_log.h"
 #include "stream/cache/cache_format.h"
+#include "stream/cache/faces_file.h"
+#include "stream/codec/face_codec.h"
 #include "stream/codec/geometry_codec.h"
 #include "stream/codec/values_codec.h"
 #include "stream/model/border_code.h"
@@ -130,6 +133,48 @@ void writeTables(const Seeds& seeds) {
     if (flags & 1) seed.text(bricks.substr(0, sizeof(BricksHeader)));
     seeds.write("brick_table", fmt::format("flags_{}", flags), seed.text(records).whole());
   }
+}
+
+/// A face of 5 x 3 nodes in two levels, with a hole, two scalars and a name.
+void writeFaces(const Seeds& seeds) {
+  const TemporaryFolder folder;
+  const fs::path path = folder / "faces.bin";
+  FacesWriter writer(path, FaceBox::of(glm::dvec3(-1), glm::dvec3(1)), {0, 3});
+  std::vector<FacePatch> patches;
+  for (const auto& [stride, columns, first] : {std::tuple(2u, 3u, 0u), {1u, 3u, 0u}, {1u, 3u, 2u}}) {
+    FacePatch patch;
+    patch.first = {first, 0};
+    patch.stride = {stride, 1};
+    patch.nodes = {static_cast<uint16_t>(columns), 3};
+    patch.lower = glm::dvec3(-1);
+    patch.upper = glm::dvec3(1);
+    PatchLattice lattice;
+    lattice.columns = static_cast<uint16_t>(columns);
+    lattice.rows = 3;
+    lattice.scalars.resize(2);
+    for (uint32_t v = 0; v < 3; ++v)
+      for (uint32_t u = 0; u < columns; ++u) {
+        const uint32_t at = first + u * stride;
+        lattice.codes[0].push_back(at * (FaceBox::kSteps / 4));
+        lattice.codes[1].push_back(v * (FaceBox::kSteps / 2));
+        lattice.codes[2].push_back(at * v * 1000);
+        lattice.scalars[0].push_back(static_cast<float>(at) + 0.25f * static_cast<float>(v));
+        lattice.scalars[1].push_back(7);
+      }
+    lattice.quads.assign(4, 1);
+    lattice.quads[1] = 0;
+    patch.extent = writer.append(encodePatch(lattice));
+    patches.push_back(patch);
+  }
+  patches[0].first_child = 1;
+  patches[0].child_count = 2;
+  patches[0].error = 1;
+  GridFace face;
+  face.nodes = {5, 3};
+  face.root = 0;
+  const FaceRegion region{0, {1, 0}, {3, 2}, "Wing", "BCWall"};
+  writer.finish({&face, 1}, patches, {&region, 1});
+  seeds.write("faces", "two_levels", bytesOfFile(path));
 }
 
 void writeBrickLog(const Seeds& seeds) {
@@ -447,6 +492,7 @@ int main(int argc, char** argv) {
   const Seeds seeds(argv[1]);
   writeStreams(seeds);
   writeTables(seeds);
+  writeFaces(seeds);
   writeBrickLog(seeds);
   writeJournals(seeds);
   writeSplats(seeds);

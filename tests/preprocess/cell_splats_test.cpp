@@ -281,6 +281,37 @@ TEST(CellSplats, OfWindowsAreThoseOfTheWhole) {
   EXPECT_GT(borders, 5u * 7 * 8 - 3 * 5 * 6);
 }
 
+TEST(CellSplats, OfPartsOfRowsAreThoseOfTheWhole) {
+  CellBlock grid(18, 5, 6, [](double i, double j, double k) {
+    return halfAnnulus((i + 0.2 * std::sin(2 * i)) / 17, j / 4, k / 5);
+  });
+  grid.addCellScalar([](const glm::dvec3& p) { return p.x * p.y + p.z; });
+  grid.nodes.blank[grid.at(9, 2, 3)] = kNoNode;
+  const NodeSplats whole = grid.cellSplats({});
+  NodeSplats part;
+  CellScratch scratch;
+  for (const uint64_t nodes : {1u, 2u, 5u, 17u}) {
+    size_t seen = 0;
+    for (uint64_t i0 = 0; i0 < 18; i0 += nodes) {
+      BlockWindow window = grid.window();
+      window.i0 = i0;
+      window.i1 = i0 + nodes;
+      computeCellSplats(window, {0, 5, 0, 6}, {}, scratch, part);
+      for (size_t n = 0; n < part.splats.size(); ++n, ++seen) {
+        size_t same = 0;
+        while (same < whole.splats.size() && whole.splats[same].node != part.splats[n].node) ++same;
+        ASSERT_LT(same, whole.splats.size());
+        EXPECT_EQ(part.splats[n].splat.position, whole.splats[same].splat.position);
+        EXPECT_EQ(part.splats[n].splat.axis, whole.splats[same].splat.axis);
+        EXPECT_EQ(part.splats[n].growth_code, whole.splats[same].growth_code);
+        EXPECT_EQ(part.values[n].slope, whole.values[same].slope);
+        EXPECT_EQ(part.values[n].mean, whole.values[same].mean);
+      }
+    }
+    EXPECT_EQ(seen, whole.splats.size()) << nodes;
+  }
+}
+
 TEST(CellSplats, OfUnevenCellsAreStretchedByTheirNeighbours) {
   // Two groups of three cells, in turn along each axis.
   const std::vector<double> x{0, 1, 2.6, 3.6, 4.6, 6.2, 7.2};

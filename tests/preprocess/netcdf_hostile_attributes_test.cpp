@@ -10,6 +10,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "tests/support/earth_files.h"
+#include "tests/support/hdf5_checksum.h"
 #include "tests/support/hdf5_editor.h"
 #include "tests/support/temporary_folder.h"
 
@@ -145,9 +146,38 @@ TEST_F(NetcdfHostileAttributes, ListsThatAreDamagedAreRefused) {
     damaged[at + 12] = static_cast<char>(~damaged[at + 12]);
     const std::filesystem::path file = copy();
     writeFileAtomically(file, damaged);
-    lists += errorOf(file).find("its list of ") != std::string::npos;
+    const std::string error = errorOf(file);
+    lists +=
+        error.find("its list of ") != std::string::npos || error.find("HDF5 crashes") != std::string::npos;
   }
   EXPECT_GT(lists, 0);
+}
+
+// Structures that say something else than was written, with the right checksum: what HDF5 1.10 does not survive is
+// found by the process of a trial.
+TEST_F(NetcdfHostileAttributes, StructuresThatCrashHdf5AreRefused) {
+  const std::string whole = readTextFile(path_);
+  // A B-tree's header: its depth. A heap's header: the length of its identifiers, the size of its blocks.
+  struct Field {
+    const char* structure;
+    size_t at;
+  };
+  int crashed = 0, tried = 0;
+  for (const Field& field : {Field{"BTHD", 12}, Field{"BTHD", 10}, Field{"FRHP", 5}, Field{"FRHP", 113}})
+    for (size_t begin = whole.find(field.structure); begin != std::string::npos;
+         begin = whole.find(field.structure, begin + 1)) {
+      std::string damaged = whole;
+      damaged[begin + field.at] = static_cast<char>(damaged[begin + field.at] + 1);
+      if (!renewChecksum(whole, begin, damaged)) continue;
+      ++tried;
+      const std::filesystem::path file = copy();
+      writeFileAtomically(file, damaged);
+      const std::string error = errorOf(file);
+      EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+      crashed += error.find("HDF5 crashes on its structures") != std::string::npos;
+    }
+  EXPECT_GT(tried, 0);
+  EXPECT_GT(crashed, 0) << "of " << tried;
 }
 
 }  // namespace

@@ -331,6 +331,35 @@ TEST(NodeSplats, DoNotDependOnTheWindow) {
   EXPECT_EQ(whole.splats.front().node, 1000u);
 }
 
+TEST(NodeSplats, OfPartsOfRowsAreThoseOfTheWhole) {
+  const auto uneven = [](double n) { return n + 0.2 * std::sin(2 * n); };
+  MappedBlock grid(23, 5, 6, [&](double i, double j, double k) {
+    return halfAnnulus(uneven(i) / 23, uneven(j) / 5, uneven(k) / 6);
+  });
+  grid.addScalar([](const glm::dvec3& p) { return p.z * p.x; });
+  grid.nodes.blank[grid.at(11, 3, 4)] = 1;
+  const NodeSplats whole = grid.splats();
+  NodeScratch scratch;
+  NodeSplats part;
+  for (const uint64_t nodes : {1u, 2u, 5u, 16u, 22u}) {
+    std::vector<size_t> seen(whole.splats.size());
+    for (uint64_t i0 = 0; i0 < 23; i0 += nodes) {
+      BlockWindow window = grid.window();
+      window.i0 = i0;
+      window.i1 = i0 + nodes;
+      computeNodeSplats(window, {0, 5, 0, 6}, scratch, part);
+      for (size_t n = 0; n < part.splats.size(); ++n) {
+        const auto found = std::lower_bound(whole.splats.begin(), whole.splats.end(), part.splats[n].node,
+                                            [](const NodeSplat& a, uint64_t node) { return a.node < node; });
+        ASSERT_NE(found, whole.splats.end());
+        EXPECT_TRUE(sameSplat(part, whole, n, static_cast<size_t>(found - whole.splats.begin())));
+        ++seen[static_cast<size_t>(found - whole.splats.begin())];
+      }
+    }
+    EXPECT_EQ(std::count(seen.begin(), seen.end(), 1u), static_cast<ptrdiff_t>(seen.size())) << nodes;
+  }
+}
+
 TEST(NodeSplats, OnAPolarAxisAreFlooredAndHaveNoVolume) {
   MappedBlock grid(13, 5, 4, [](double i, double j, double k) {
     return glm::dvec3(j * std::cos(i * M_PI / 6), j * std::sin(i * M_PI / 6), k);

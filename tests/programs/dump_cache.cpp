@@ -7,6 +7,11 @@
 //      f32 x splats for each of x y z a0 a1 a2 l10 l20 l21 weight; u32 x splats: border codes; the same: growth codes
 //      f32 x splats for each variable and each of mean, slope 0 1 2, variance
 //
+//    dump_cache --faces CACHE   writes every patch of the cache's faces:
+//
+//      u64 nodes, u64 quads, u64 scalars
+//      f64 x 3 x nodes: positions; u8 x quads: drawn; f32 x nodes for each scalar
+//
 //    dump_cache --make FOLDER   makes caches that use rare parts of the format:
 //
 //      random.splats            a tree of three levels with random splats, runs and weights
@@ -21,6 +26,7 @@
 
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/cache_writer.h"
+#include "stream/cache/faces_file.h"
 #include "stream/model/border_code.h"
 #include "stream/model/growth_code.h"
 #include "tests/support/random_cache.h"
@@ -49,6 +55,19 @@ void dump(const fs::path& cache, uint64_t step) {
       reader.readVariable(n, variable, v);
       forEachArrayOfVariable(v, [](const auto& array) { write(array); });
     }
+  }
+}
+
+void dumpFaces(const fs::path& cache) {
+  const CacheReader reader(cache);
+  const auto faces = FacesReader::open(reader.path(), reader.manifest());
+  if (!faces) return;
+  for (uint32_t n = 0; n < faces->patches().size(); ++n) {
+    const PatchNodes nodes = faces->read(n);
+    write<uint64_t>({nodes.positions.size(), nodes.quads.size(), nodes.scalars.size()});
+    write(nodes.positions);
+    write(nodes.quads);
+    for (const std::vector<float>& scalar : nodes.scalars) write(scalar);
   }
 }
 
@@ -143,13 +162,17 @@ void make(const fs::path& folder) {
 
 int main(int argc, char** argv) {
   const bool is_making = argc == 3 && std::string_view(argv[1]) == "--make";
+  const bool of_faces = argc == 3 && std::string_view(argv[1]) == "--faces";
   if (!is_making && argc != 2 && argc != 3) {
-    fmt::print(stderr, "usage: dump_cache CACHE [STEP] | dump_cache --make FOLDER\n");
+    fmt::print(stderr,
+               "usage: dump_cache CACHE [STEP] | dump_cache --faces CACHE | dump_cache --make FOLDER\n");
     return 2;
   }
   try {
     if (is_making)
       curvisplat::make(argv[2]);
+    else if (of_faces)
+      curvisplat::dumpFaces(argv[2]);
     else
       curvisplat::dump(argv[1], argc == 3 ? std::stoull(argv[2]) : 0);
     return std::fflush(stdout) == 0 ? 0 : 1;

@@ -7,6 +7,7 @@
 //
 //    blocks.splats   three blocks, two of which share a face, and a hole; levels, two scalars
 //    cells.splats    a block with a scalar in its cells
+//    faces.splats    a block whose faces have levels of detail and a hole
 //    *.json, *.png   what a reader must get out of them (tests/support/cache_summary.h)
 #include <fmt/format.h>
 
@@ -76,6 +77,15 @@ void makeAll(const fs::path& folder) {
   });
   make(CellGridSource(nodes, {[](const GridCell& cell) { return cell.centre.x * cell.centre.z; }}), {0},
        folder / "cells.splats");
+  GridBlock with_hole = gridBlock(70, 6, 3);
+  with_hole.has_blanking = true;
+  const FunctionGridSource tube({with_hole}, 1, [](const GridNode& node) {
+    const double angle = 0.05 * static_cast<double>(node.i), radius = 1 + 0.1 * static_cast<double>(node.j);
+    const glm::dvec3 at(radius * std::cos(angle), radius * std::sin(angle),
+                        0.5 * static_cast<double>(node.k));
+    return NodeValues{at, {static_cast<float>(angle)}, node.i > 40 && node.i < 46 && node.j > 2};
+  });
+  make(tube, {0}, folder / "faces.splats");
 }
 
 }  // namespace

@@ -159,11 +159,11 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
   for (const uint32_t n : farthestFirst(projector.depths())) {
     if (options.scene && !options.scene->volume) break;
     // A splat's records come behind it.
-    if (layers && !options.cut_splats && !isCut(projector.splats()[n]))
+    if (layers && !options.cut_splats && !isRecord(projector.splats()[n]))
       is_behind = isBehind(*layers, projector.splats()[n], projector.depths()[n]);
     if (is_behind) continue;
     ScreenSplat splat = projector.splats()[n];
-    if (isCut(splat)) {
+    if (isRecord(splat)) {
       sorted.push_back(splat);
       continue;
     }

@@ -17,7 +17,7 @@ struct Placed {
 
 Image globallySorted(const CacheReader& cache, const TransferFunction& transfer_function, Backend backend,
                      const Camera& camera, const FrameOptions& options) {
-  const FramePlanner planner(cache, 0, transfer_function);
+  const FramePlanner planner(cache, {0, transfer_function});
   const FramePlan plan = planner.plan(camera, options, DrawingOrder::kFrontToBack);
   std::vector<Placed> placed;
   BrickProjector projector;

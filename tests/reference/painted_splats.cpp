@@ -81,7 +81,7 @@ std::vector<ScreenSplat> placeSome(const std::vector<ScreenSplat>& splats, uint3
   std::uniform_real_distribution<float> unit(0, 1), around(-1, 1);
   std::vector<ScreenSplat> out;
   for (size_t n = 0; n < splats.size(); ++n) {
-    if (isCut(splats[n])) continue;
+    if (isRecord(splats[n])) continue;
     out.push_back(splats[n]);
     const bool is_cut = hasCut(splats[n]);
     if (n % 3 != 2) {
@@ -121,8 +121,25 @@ std::vector<ScreenSplat> lit(std::vector<ScreenSplat> splats, uint32_t seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> unit(0, 1);
   for (ScreenSplat& splat : splats)
-    if (!isCut(splat)) splat.half_width = packLit(splat.half_width, {unit(random), 0.5f * unit(random)});
+    if (!isRecord(splat)) splat.half_width = packLit(splat.half_width, {unit(random), 0.5f * unit(random)});
   return splats;
+}
+
+std::vector<ScreenSplat> colourAll(const std::vector<ScreenSplat>& splats, uint32_t seed, float slope) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> unit(0, 1), around(-1, 1);
+  std::vector<ScreenSplat> out;
+  for (const ScreenSplat& splat : splats) {
+    out.push_back(splat);
+    if (isRecord(splat)) continue;
+    const float correlation = around(random);
+    out.push_back(ScreenColour{1.4f * unit(random) - 0.2f,
+                               {slope * around(random), slope * around(random)},
+                               0.2f * unit(random),
+                               correlation}
+                      .record());
+  }
+  return out;
 }
 
 Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const ClassificationTable& table,

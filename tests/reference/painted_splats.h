@@ -37,6 +37,9 @@ PixelLayers randomLayers(ImageSize size, uint32_t seed);
 /// The same splats in their order, each with light of its own.
 std::vector<ScreenSplat> lit(std::vector<ScreenSplat> splats, uint32_t seed);
 
+/// The same splats in their order, each with a ScreenColour.
+std::vector<ScreenSplat> colourAll(const std::vector<ScreenSplat>& splats, uint32_t seed, float slope = 0.3f);
+
 /// A frame, in the painter's own order. `splats`: farthest first.
 Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const ClassificationTable& table,
                  PixelShading shading, ImageSize size, const glm::vec4& background = {1, 1, 1, 1},

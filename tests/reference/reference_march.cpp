@@ -56,11 +56,26 @@ std::optional<std::pair<double, double>> partInBox(const Ray& ray, const glm::dv
   return std::pair(begin, end);
 }
 
+using PointColour = std::function<glm::dvec3(const glm::dvec3& world)>;
+
+/// What lights the field, what lies in it, and its colours where they are another scalar's.
+struct Surroundings {
+  const ReferenceLight* light = nullptr;
+  const ReferenceLayers& layers;
+  const PointColour* colour = nullptr;
+};
+
 class Marcher {
  public:
   Marcher(const ReferenceField& field, const OpticalFunction& function, const Ray& ray,
-          const MarchSteps& steps, const ReferenceLight* light)
-      : field_(field), probe_(field.probe()), function_(function), ray_(ray), steps_(steps), light_(light) {}
+          const MarchSteps& steps, const Surroundings& around)
+      : field_(field),
+        probe_(field.probe()),
+        function_(function),
+        ray_(ray),
+        steps_(steps),
+        light_(around.light),
+        colour_at_(around.colour) {}
 
   /// `layers`: from the nearest.
   ReferencePixel march(double begin, double end, const std::vector<ReferenceLayer>& layers) {
@@ -161,6 +176,7 @@ class Marcher {
     if (!scalar && !first_) return {};
     if (!scalar) return held_;
     held_ = function_(*scalar);
+    if (colour_at_ && held_.extinction > 0) held_.colour = (*colour_at_)(ray_.at(t));
     if (light_ && held_.extinction > 0) held_.colour = lit(held_.colour, gradient(ray_.at(t), *scalar));
     return held_;
   }
@@ -223,17 +239,12 @@ class Marcher {
   Ray ray_;
   const MarchSteps& steps_;
   const ReferenceLight* light_;
+  const PointColour* colour_at_;
   std::optional<double> first_;  // between first_ and last_ the field is there
   double last_ = 0;
   OpticalProperties held_;  // of the last point found since first_ was set
   glm::dvec3 colour_{0.0};
   double transmittance_ = 1;
-};
-
-/// What lights the field, and what lies in it.
-struct Surroundings {
-  const ReferenceLight* light = nullptr;
-  const ReferenceLayers& layers;
 };
 
 std::vector<ReferenceLayer> layersAlong(const ReferenceLayers& layers, const Ray& ray, double near) {
@@ -261,7 +272,7 @@ void marchPixels(const ReferenceField& field, const OpticalFunction& function, c
       const bool from_eye = camera.projection == Projection::kPerspective;
       const double near = from_eye ? steps.near / glm::dot(ray.direction, forward) : 0.0;
       const auto [begin, end] = part.value_or(std::pair(near, near));
-      image.pixels[p] = Marcher(field, function, ray, steps, around.light)
+      image.pixels[p] = Marcher(field, function, ray, steps, around)
                             .march(std::max(begin, near), end, layersAlong(around.layers, ray, near));
     }
   });
@@ -348,6 +359,14 @@ ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction
                               const ReferenceLight* light, const ReferenceLayers& layers) {
   ReferenceImage image{size, std::vector<ReferencePixel>(size.pixels())};
   marchPixels(field, function, camera, steps, {light, layers}, std::vector<uint8_t>(size.pixels(), 1), image);
+  return image;
+}
+
+ReferenceImage referenceMarch(const ReferenceField& field, const TwoScalars& scalars, const Camera& camera,
+                              ImageSize size, const MarchSteps& steps, const ReferenceLayers& layers) {
+  ReferenceImage image{size, std::vector<ReferencePixel>(size.pixels())};
+  marchPixels(field, scalars.function, camera, steps, {nullptr, layers, &scalars.colour},
+              std::vector<uint8_t>(size.pixels(), 1), image);
   return image;
 }
 

@@ -88,6 +88,14 @@ ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction
 ReferenceImage referenceMarch(const Scene& scene, const OpticalFunction& function, const Camera& camera,
                               ImageSize size, double step = 0.004);
 
+/// Two scalars: `function` has the opacities, by the field's scalar, and `colour` the colours at a point of the world.
+struct TwoScalars {
+  OpticalFunction function;
+  std::function<glm::dvec3(const glm::dvec3& world)> colour;
+};
+ReferenceImage referenceMarch(const ReferenceField& field, const TwoScalars& scalars, const Camera& camera,
+                              ImageSize size, const MarchSteps& steps, const ReferenceLayers& layers = {});
+
 /// Halves the steps until two successive pictures agree at `agreement_db` or more, six times at the most, and
 /// gives the finer one. `reached_db` gets their agreement. Where the field knows its crossings, pixels whose
 /// neighbourhood has settled are not marched again.

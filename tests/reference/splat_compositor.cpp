@@ -39,6 +39,7 @@ struct Cuts {
   std::optional<ScreenCut> cut;
   std::optional<ScreenDepth> depth;
   Window window = {};
+  const ScreenSplat* colour = nullptr;
 
   double correlation() const { return depth ? depth->correlation : cut ? cut->correlation : 0; }
 };
@@ -75,16 +76,20 @@ glm::dvec4 contribution(const ScreenSplat& splat, const Cuts& cuts, double dx, d
   const double skew = FootprintSkew::unpack(splat.skew).at(u0, u1);
   const double depth = std::abs(splat.amplitude) * footprint(std::hypot(u0, u1)) * skew * left.share;
   if (depth == 0) return glm::dvec4(0.0);
-  const double widest = shading.lit ? unpackHalfWidth(splat.half_width) : splat.half_width;
+  const float widest = shading.lit ? unpackHalfWidth(splat.half_width) : splat.half_width;
   const Lit lit = shading.lit ? unpackLit(splat.half_width) : Lit{};
-  double f = splat.mean, half_width = 0;
-  if (shading.per_pixel) {
-    const double deviation = cuts.correlation() * widest / std::sqrt(3.0);
-    f += double{splat.slope0} * u0 + double{splat.slope1} * u1 + deviation * left.mean;
-    half_width = std::sqrt(std::max(0.0, widest * widest - 3 * deviation * deviation * (1 - left.variance)));
-  }
-  const glm::dvec4 mean = table.mean(f, half_width);
+  const auto meanOf = [&](const ClassificationTable& of, const ScreenColour& scalar) {
+    if (!shading.per_pixel) return of.mean(scalar.mean, 0);
+    const double w = scalar.half_width, deviation = scalar.correlation * w / std::sqrt(3.0);
+    return of.mean(
+        scalar.mean + double{scalar.slope[0]} * u0 + double{scalar.slope[1]} * u1 + deviation * left.mean,
+        std::sqrt(std::max(0.0, w * w - 3 * deviation * deviation * (1 - left.variance))));
+  };
+  glm::dvec4 mean = meanOf(
+      table, {splat.mean, {splat.slope0, splat.slope1}, widest, static_cast<float>(cuts.correlation())});
   if (mean.w == 0) return glm::dvec4(0.0);
+  if (cuts.colour)
+    mean = glm::dvec4(mean.w * glm::dvec3(meanOf(*shading.colours, ScreenColour::of(*cuts.colour))), mean.w);
   const double alpha = -std::expm1(-mean.w * depth);
   const glm::dvec3 colour = double{lit.diffuse} * glm::dvec3(mean) / mean.w + double{lit.specular};
   return glm::dvec4(colour, 1.0) * alpha;
@@ -107,12 +112,13 @@ Image compositeSplats(std::span<const ScreenSplat> splats, const ClassificationT
                             window < layers.size() ? double{layers[window].depth} : INFINITY};
         for (size_t n = 0; n < splats.size(); ++n) {
           const ScreenSplat& splat = splats[n];
-          if (isCut(splat)) continue;
+          if (isRecord(splat)) continue;
           Cuts cuts{{}, {}, depths};
-          if (hasCut(splat)) {
-            const SplatCuts records = SplatCuts::beside(&splat, 1);
+          if (hasCut(splat) || shading.colours) {
+            const SplatRecords records = SplatRecords::beside(&splat, 1, shading.colours != nullptr);
             if (records.cut) cuts.cut = ScreenCut::of(*records.cut);
             if (records.depth) cuts.depth = ScreenDepth::of(*records.depth);
+            cuts.colour = records.colour;
           }
           if (!cuts.depth && window > 0) continue;
           const glm::dvec4 above =

@@ -135,7 +135,7 @@ TEST(ScreenCut, IsARecordThatIsNoSplat) {
     cut.far_sides = random() % 8;
     cut.correlation = n % 3 == 0 ? static_cast<float>(n % 2 * 2 - 1) : around(random);
     const ScreenSplat record = cut.record();
-    EXPECT_TRUE(isCut(record));
+    EXPECT_TRUE(isRecord(record));
     EXPECT_FALSE(hasCut(record));
     const ScreenCut back = ScreenCut::of(record);
     EXPECT_EQ(back.faces, cut.faces);

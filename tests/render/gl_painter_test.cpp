@@ -32,7 +32,7 @@ TEST(GlPainter, DrawsFromMappedMemoryWithoutCopying) {
   const ImageSize size{160, 120};
   auto splats = cutSome(randomSplats(3000, 8, size), 6);
   splats.resize(4000);
-  ASSERT_TRUE(isCut(splats.back()) || !hasCut(splats.back()));
+  ASSERT_TRUE(isRecord(splats.back()) || !hasCut(splats.back()));
   const auto table = lively();
   GlThread gl(GlLibrary::kOsmesa);
   gl.run([&](const GlContext& context) {

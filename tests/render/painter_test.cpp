@@ -125,23 +125,60 @@ TEST_P(PainterTest, LightsSplatsAsSpecified) {
   }
 }
 
+TEST_P(PainterTest, ColoursSplatsByAnotherScalarAsSpecified) {
+  const ImageSize size{70, 50};
+  const PixelLayers layers = randomLayers(size, 3);
+  const glm::vec4 background{0.1f, 0.2f, 0.05f, 0.3f};
+  const auto value = [](double f) {
+    return TransferFunction::Value{{f, 0.5 + 0.5 * std::sin(12 * f), f > 0.4 ? 1 : 0.2}, 1};
+  };
+  const ClassificationTable colour_tables[] = {{value, 0, 1}, {value, 0.01, 1, true}};
+  for (const float slope : {0.05f, 3.0f})
+    for (const bool per_pixel : {true, false})
+      for (const bool light : {true, false})
+        for (const auto& table : {lively(), smooth(true)})
+          for (const bool layered : {true, false}) {
+            auto splats = cutSome(randomSplats(120, 9, size, slope), 4);
+            if (layered) splats = placeSome(splats, 5);
+            splats = colourAll(light ? lit(splats, 11) : splats, 13, slope);
+            const PixelShading shading{per_pixel, light, layered ? &layers : nullptr,
+                                       &colour_tables[layered ? 1 : 0]};
+            const Image drawn = paint(splats, table, shading, size, background);
+            const Image specified = compositeSplats(splats, table, shading, size, background);
+            EXPECT_GT(compareImages(drawn, specified).psnr_db, 70)
+                << "slope " << slope << ", per pixel: " << per_pixel << ", layered: " << layered;
+            EXPECT_LT(largestDifference(drawn, specified), 5e-3)
+                << "slope " << slope << ", per pixel: " << per_pixel << ", layered: " << layered;
+          }
+  // And of one scalar in the next picture.
+  const auto splats = randomSplats(200, 9, size);
+  EXPECT_GT(compareImages(paint(splats, lively(), true, size),
+                          compositeSplats(splats, lively(), {true}, size, kWhite))
+                .psnr_db,
+            70);
+}
+
 TEST_P(PainterTest, CutsSplatsWhereverADrawEnds) {
   const ImageSize size{90, 60};
   const PixelLayers layers = randomLayers(size, 3);
-  const PixelShading shading{true, false, &layers};
-  const auto splats = placeSome(cutSome(randomSplats(200, 21, size), 5), 6);
-  const Image whole = paint(splats, lively(), shading, size, kWhite);
-  for (const size_t at_once : {1, 2, 7}) {
-    Image image;
-    backend_->run([&](Painter& painter) {
-      std::vector<ScreenSplat> ordered = splats;
-      if (painter.order() == DrawingOrder::kFrontToBack) std::reverse(ordered.begin(), ordered.end());
-      painter.begin(size, kWhite, lively_, shading);
-      for (size_t begin = 0; begin < ordered.size(); begin += at_once)
-        painter.draw(std::span(ordered).subspan(begin, std::min(at_once, ordered.size() - begin)));
-      image = painter.end();
-    });
-    EXPECT_EQ(image.rgba, whole.rgba) << at_once;
+  const ClassificationTable colours = smooth();
+  for (const bool coloured : {false, true}) {
+    const PixelShading shading{true, false, &layers, coloured ? &colours : nullptr};
+    auto splats = placeSome(cutSome(randomSplats(200, 21, size), 5), 6);
+    if (coloured) splats = colourAll(splats, 8);
+    const Image whole = paint(splats, lively(), shading, size, kWhite);
+    for (const size_t at_once : {1, 2, 7}) {
+      Image image;
+      backend_->run([&](Painter& painter) {
+        std::vector<ScreenSplat> ordered = splats;
+        if (painter.order() == DrawingOrder::kFrontToBack) std::reverse(ordered.begin(), ordered.end());
+        painter.begin(size, kWhite, lively_, shading);
+        for (size_t begin = 0; begin < ordered.size(); begin += at_once)
+          painter.draw(std::span(ordered).subspan(begin, std::min(at_once, ordered.size() - begin)));
+        image = painter.end();
+      });
+      EXPECT_EQ(image.rgba, whole.rgba) << at_once;
+    }
   }
 }
 

@@ -133,7 +133,7 @@ TEST_F(Interpolation, DrawsTheSameWhateverWasDrawnBefore) {
   const StepPosition positions[] = {{0, 0},    {0, 0.5}, {1, 0},   {2, 0.75},
                                     {2, 0.25}, {3, 0},   {0, 0.5}, {1, 0.5}};
   CacheReader reader(cache());
-  StepPlayer player(reader, 0, function(), Backend::kCpu);
+  StepPlayer player(reader, {0, function()}, Backend::kCpu);
   for (const StepPosition& position : positions) {
     SCOPED_TRACE(position.step + position.part);
     const CacheReader alone = CacheReader(cache()).at(position);

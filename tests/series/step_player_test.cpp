@@ -85,7 +85,7 @@ TEST_F(StepPlayerTest, DrawsEachStepAsAlone) {
     for (const bool ahead : {false, true}) {
       CacheReader reader(cache());
       const Camera view = camera(reader);
-      StepPlayer player(reader, 0, function(), Backend::kCpu);
+      StepPlayer player(reader, {0, function()}, Backend::kCpu);
       for (const uint64_t step : std::vector<uint64_t>{0, 1, 2, 3, 2, 0, 3, 4, 5, 4, 1, 1, 5}) {
         player.goTo({step});
         if (ahead) player.renderer().prefetch(view, options(memory));
@@ -100,7 +100,7 @@ TEST_F(StepPlayerTest, DrawsEachStepAsAlone) {
 TEST_F(StepPlayerTest, KeepsDecodedGeometry) {
   CacheReader reader(cache());
   const Camera view = camera(reader);
-  StepPlayer player(reader, 0, function(), Backend::kCpu);
+  StepPlayer player(reader, {0, function()}, Backend::kCpu);
   FrameStatistics first, second;
   player.renderer().render(view, options(512 << 20), first);
   player.goTo({1});

@@ -82,10 +82,10 @@ def predicted(predictor, rows, residuals):
 
 class Contents:
     """The unpacked frame of a stream: its varints, and its arrays one after another."""
-    def __init__(self, frame, varint_bytes, codes, count, timed=False):
-        self.codes, self.at, self.count, self.rows = list(codes), varint_bytes, count, None
+    def __init__(self, frame, varint_bytes, codes, count, timed=False, before=0):  # `before`: bytes of another kind
+        self.codes, self.at, self.count, self.rows = list(codes), varint_bytes + before, count, None
         need(all((predictor & ~8 if timed else predictor) <= 4 and planes <= 4 for predictor, planes in self.codes), "array code")
-        size = varint_bytes + sum(planes for _, planes in self.codes) * count
+        size = varint_bytes + before + sum(planes for _, planes in self.codes) * count
         need(zstandard.frame_content_size(frame) == size, "size of a frame")
         self.data = zstandard.ZstdDecompressor().decompress(frame)
         self.varints = list(varints(self.data[:varint_bytes]))
@@ -307,6 +307,50 @@ class Cache:
             need(back <= step and self.steps[step - back][1] == self.steps[step][1], "reference")
             return self.values(number, n, step - back)
         return decode_values(data, self.bricks[n]["splats"], reference)
+
+
+class Faces:
+    """faces.bin of an open cache: faces, patches, regions, and the nodes of a patch."""
+    def __init__(self, cache):
+        self.cache, self.file = cache, cache.load("faces.bin")
+        magic, version, v, *counts, _, table = struct.unpack_from("<8s6IQ", self.file)
+        need((magic, version) == (b"CVSfaces", 1), "header of faces.bin")
+        cache.verify("faces.bin", self.file[:88] + self.file[table:])
+        self.box = np.array(struct.unpack_from("<6d", self.file, 40)).reshape(2, 3)
+        sizes = [4 * v, *(count * size for count, size in zip(counts, (40, 112, 136)))]
+        need(table + sum(sizes) == len(self.file), "size of the table of faces.bin")
+        ends = np.cumsum([table, *sizes]).tolist()
+        parts = [self.file[begin:end] for begin, end in zip(ends, ends[1:])]
+        self.variables = np.frombuffer(parts[0], "<u4").tolist()
+        self.faces = [dict(block=f[0], axis=f[1], side=f[2], index=f[4], nodes=f[5:7], root=f[7])
+                      for f in struct.iter_unpack("<IBBHQQQII", parts[1])]
+        self.patches = [dict(face=f[0], stride=f[1:3], nodes=f[3:5], first=f[5:7], children=f[7:9], error=f[9],
+                             extent=(f[11], f[10], f[12]), box=f[13:19])
+                        for f in struct.iter_unpack("<III2H2QIIfIQQ6d", parts[2])]
+        self.regions = [dict(face=f[0], first=f[2:4], last=f[4:6], name=f[6].rstrip(b"\0").decode(),
+                             type=f[7].rstrip(b"\0").decode()) for f in struct.iter_unpack("<II4Q64s32s", parts[3])]
+
+    def lattice(self, n):
+        """The nodes of the face that a patch has, along u and v."""
+        patch = self.patches[n]
+        return [np.minimum(f + s * np.arange(count), last - 1) for f, s, count, last in
+                zip(patch["first"], patch["stride"], patch["nodes"], self.faces[patch["face"]]["nodes"])]
+
+    def patch(self, n):
+        """Positions, which quads are drawn, and scalars."""
+        data, (columns, rows) = self.cache.stream("faces.bin", self.patches[n]["extent"]), self.patches[n]["nodes"]
+        u, v, scalars, *codes = struct.unpack_from("<HHI6B", data)
+        need((u, v, scalars) == (columns, rows, len(self.variables)), "header of a patch")
+        heads = [struct.unpack_from("<ffBB", data, 16 + 12 * s) for s in range(scalars)]
+        quads = (columns - 1) * (rows - 1)
+        frame, codes = data[16 + 12 * scalars:], [*zip(codes[::2], codes[1::2]), *(head[2:] for head in heads)]
+        contents = Contents(frame, 0, codes, columns * rows, before=(quads + 7) // 8)
+        drawn = np.unpackbits(np.frombuffer(contents.data, np.uint8, (quads + 7) // 8), bitorder="little")[:quads]
+        contents.rows = [(row * columns, columns, (row - 1) * columns if row else None) for row in range(rows)]
+        code = np.stack([contents.values() for _ in range(3)], axis=1).astype(np.float64)
+        need(code.max() < 2 ** 26, "coordinate of a patch")
+        values = [lower + (upper - lower) * contents.values().astype(np.float64) / 65535 for lower, upper, *_ in heads]
+        return self.box[0] + self.box[1] * code, drawn, values
 
 
 def main(folder, step=0):

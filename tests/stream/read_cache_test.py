@@ -78,6 +78,36 @@ def compare(cache, dump, seen):
     print(f"{cache.folder}: {len(cache.bricks)} bricks, {numbers} numbers agree")
 
 
+def compare_faces(cache, dump):
+    faces, numbers = read_cache.Faces(cache), 0
+    for n, patch in enumerate(faces.patches):
+        nodes, quads, scalars = (int(count) for count in np.frombuffer(dump.read(24), "<u8"))
+        positions, drawn, values = faces.patch(n)
+        theirs = [np.frombuffer(dump.read(24 * nodes), "<f8").reshape(-1, 3), np.frombuffer(dump.read(quads), "u1")]
+        theirs += [np.frombuffer(dump.read(4 * nodes), "<f4") for _ in range(scalars)]
+        if not np.allclose(positions, theirs[0], rtol=1e-15, atol=1e-14) or (drawn != theirs[1]).any():
+            sys.exit(f"{cache.folder}: patch {n} of the faces: other nodes or quads than the program decodes")
+        for ours, value in zip(values, theirs[2:], strict=True):
+            if not (np.abs(ours.astype(np.float32) - value) <= np.spacing(np.abs(value))).all():
+                sys.exit(f"{cache.folder}: patch {n} of the faces: other values than the program decodes")
+        numbers += positions.size + drawn.size + scalars * nodes
+        # Nodes lie where the lattice says: a parent's are among its children's.
+        for c in range(patch["children"][0], patch["children"][0] + patch["children"][1]):
+            u, v = np.intersect1d(faces.lattice(n)[0], faces.lattice(c)[0]), np.intersect1d(faces.lattice(n)[1], faces.lattice(c)[1])
+            place = [[np.searchsorted(lattice, along) for lattice, along in zip(faces.lattice(p), (u, v))] for p in (n, c)]
+            ours, of_child = (nodes_at(faces, p, *at) for p, at in zip((n, c), place))
+            if not len(u) or not len(v) or not np.array_equal(ours, of_child):
+                sys.exit(f"{cache.folder}: patch {n} of the faces: a node is elsewhere in its child {c}")
+    if dump.read(1) or not faces.patches:
+        sys.exit(f"{cache.folder}: the program decodes other patches")
+    print(f"{cache.folder}: {len(faces.faces)} faces, {len(faces.patches)} patches, {numbers} numbers agree")
+
+
+def nodes_at(faces, patch, u, v):
+    columns, rows = faces.patches[patch]["nodes"]
+    return faces.patch(patch)[0].reshape(rows, columns, 3)[np.ix_(v, u)]
+
+
 def main(program, *caches):
     seen = set()
     with tempfile.TemporaryDirectory() as folder:
@@ -85,9 +115,14 @@ def main(program, *caches):
         made = sorted(pathlib.Path(folder).glob("*.splats"))
         for path in [*caches, *made]:
             dump = subprocess.run([program, path], check=True, stdout=subprocess.PIPE).stdout
-            compare(read_cache.Cache(path), io.BytesIO(dump), seen)
+            cache = read_cache.Cache(path)
+            compare(cache, io.BytesIO(dump), seen)
+            if "faces.bin" in cache.files:
+                dump = subprocess.run([program, "--faces", path], check=True, stdout=subprocess.PIPE).stdout
+                compare_faces(cache, io.BytesIO(dump))
+                seen.add("faces")
     wanted = {f"{kind} predictor {n}" for kind in ("geometry", "values") for n in range(5)}
-    wanted |= {"flag 1", "flag 2", "flag 4", "values with rows", "values without rows"}
+    wanted |= {"flag 1", "flag 2", "flag 4", "values with rows", "values without rows", "faces"}
     if not made or wanted - seen:
         sys.exit(f"no cache uses: {', '.join(sorted(wanted - seen))}")
 

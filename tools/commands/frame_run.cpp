@@ -9,6 +9,7 @@
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "tools/commands/empty_picture.h"
+#include "tools/options/channel_arguments.h"
 #include "tools/output/launched_ranks.h"
 #include "tools/output/run_statistics.h"
 
@@ -25,7 +26,8 @@ class FrameRun {
         output_(job.output),
         report_(job.report),
         progress_(progress),
-        ranks_(launchedRanks()) {}
+        ranks_(launchedRanks()),
+        channels_(channelsOf(job.arguments)) {}
 
   void draw(const MotionInTime& motion, const std::vector<uint64_t>& numbers) {
     const bool moves = severalFrames(arguments_);
@@ -103,6 +105,12 @@ class FrameRun {
     const double time = player_.time();
     const Camera camera = motion.camera(number);
     FrameStatistics statistics;
+    if (channels_.any()) {
+      const Image image =
+          player_.renderer().renderWithValues(camera, report_.options, statistics, values_, &progress);
+      finish({number, time, camera, statistics}, image);
+      return;
+    }
     if (number > 0 || arguments_.first_image.empty()) {
       const Image image = player_.renderer().render(camera, report_.options, statistics, &progress);
       if (next && !report_.options.ranks) prefetch(motion, *next);
@@ -143,6 +151,8 @@ class FrameRun {
     annotate(image, camera, [&](const Image& picture) {
       if (isMovieName(arguments_.output) && !ranks_.alone() && !report_.options.ranks)
         picture_ = picture;  // for rank 0
+      else if (channels_.any())
+        output_->writeWith(number, picture, imageChannels(channels_, values_, report_.picture));
       else
         output_->write(number, picture);
     });
@@ -150,7 +160,7 @@ class FrameRun {
     report_.frames.push_back(frame);
     const std::string which = severalFrames(arguments_) ? fmt::format(" of frame {}", number) : "";
     reportUnreadable(which, statistics);
-    const RenderedScene scene{manifest_, report_.variable, report_.transfer_function,
+    const RenderedScene scene{manifest_, report_.variable, report_.function(),
                               camera,    report_.options,  statistics};
     if (report_.frames.size() == 1) warnOfPoorPicture(image, scene);
     if (reported_empty_ || !isEmpty(image, report_.options.background)) return;
@@ -171,12 +181,13 @@ class FrameRun {
   /// Calls write() with the picture, annotated if annotations were requested.
   template <typename Write>
   void annotate(const Image& data, const Camera& camera, const Write& write) const {
-    if (arguments_.annotations == Annotations{}) return write(data);
+    const Annotations& annotations = arguments_.annotations.shown;
+    if (annotations == Annotations{}) return write(data);
     const FrameOptions& options = report_.options;
-    write(annotated(data, arguments_.annotations,
-                    {report_.picture, player_.renderer().screenView(camera, options),
-                     report_.transfer_function, scalarTitle(report_.variable.name, report_.variable.unit),
-                     manifest_.lower, manifest_.upper, options.background}));
+    write(annotated(
+        data, annotations,
+        {report_.picture, player_.renderer().screenView(camera, options), report_.shown, manifest_.lower,
+         manifest_.upper, report_.background, axisTitles(arguments_.annotations)}));
   }
 
   /// Prints one warning for a frame with unreadable bricks that no earlier frame reported; it names the
@@ -198,12 +209,20 @@ class FrameRun {
   RenderReport& report_;
   Progress& progress_;
   Ranks& ranks_;
-  Image picture_;  // of a movie's round
+  const ValueChannels channels_;
+  PixelValues values_;  // of the frame
+  Image picture_;       // of a movie's round
   bool reported_empty_ = false;
   std::set<uint32_t> reported_unreadable_;  // bricks
 };
 
 }  // namespace
+
+ValueChannels channelsOf(const RenderArguments& arguments) {
+  // A first picture has none, so they have to be asked for.
+  if (!arguments.channels && !arguments.first_image.empty()) return {};
+  return valueChannels(arguments.channels, arguments.output);
+}
 
 bool severalFrames(const RenderArguments& arguments) {
   return arguments.camera.moves() || arguments.steps.severalSteps();

@@ -7,14 +7,16 @@
 #include <string>
 #include <vector>
 
-#include "render/annotate/annotations.h"
 #include "render/frame/step_player.h"
 #include "stream/base/progress.h"
 #include "stream/cache/manifest.h"
 #include "tools/commands/render_statistics.h"
+#include "tools/options/annotation_arguments.h"
 #include "tools/options/camera_motion.h"
+#include "tools/options/channel_arguments.h"
 #include "tools/options/frame_arguments.h"
 #include "tools/options/motion_in_time.h"
+#include "tools/options/opacity_arguments.h"
 #include "tools/options/scalar_arguments.h"
 #include "tools/options/step_arguments.h"
 #include "tools/options/surface_arguments.h"
@@ -27,15 +29,18 @@ struct RenderArguments {
   std::filesystem::path cache, output, first_image, statistics;
   CameraArguments camera;
   ScalarArguments scalar;
+  OpacityArguments opacity;
   SurfaceArguments surfaces;
   StepArguments steps;
   FrameArguments frame;
   std::string backend = "auto";
-  std::optional<std::string> frame_rate, part;
-  Annotations annotations;
+  std::optional<std::string> frame_rate, part, channels;
+  AnnotationArguments annotations;
 };
 
 bool severalFrames(const RenderArguments& arguments);
+/// What the pictures have beside their colours. Throws UsageError.
+ValueChannels channelsOf(const RenderArguments& arguments);
 
 /// What the frames are drawn from, and where they and what is known of them go.
 struct FrameJob {

@@ -1,19 +1,18 @@
 #include "tools/commands/info_grid.h"
 
 #include <fmt/format.h>
-#include <tbb/info.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
 
-#include "preprocess/convert/preflight.h"
 #include "preprocess/grid/calendar.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/survey/block_overlap.h"
 #include "preprocess/survey/grid_statistics.h"
 #include "stream/base/progress.h"
+#include "tools/commands/info_estimate.h"
 #include "tools/commands/info_mesh.h"
 #include "tools/options/grid_options.h"
 #include "tools/output/progress_bar.h"
@@ -30,10 +29,8 @@ struct GridInfo {
   std::vector<uint32_t> stored, derived;  // positions in description->scalars
   GridStatistics statistics;              // ranges are those of `stored`
   std::vector<BlockOverlap> overlaps;
-  uint64_t nodes = 0, splats = 0;
-  bool splats_are_cells = false;  // of a conversion of the first scalar
-  unsigned threads = 1;
-  ConversionEstimate estimate;
+  uint64_t nodes = 0;
+  InfoEstimate estimate;  // of a conversion of the first scalar
 
   const GridScalar& scalar(uint32_t position) const { return description->scalars[position]; }
 };
@@ -51,12 +48,9 @@ GridInfo inspect(const GridSource& source) {
       std::max(kSlabBytes, leastSlabBytes(description.blocks, info.stored.size(), kCellHalo));
   info.statistics = measureGrid(source, info.stored, slab_bytes, progress);
   info.overlaps = findOverlaps(source, slab_bytes, progress);
-  info.splats_are_cells =
-      !info.stored.empty() && info.scalar(info.stored.front()).centring == Centring::kCell;
-  info.splats =
-      info.splats_are_cells ? info.statistics.cells() : info.nodes - info.statistics.blank().total();
-  info.threads = static_cast<unsigned>(tbb::info::default_concurrency());
-  info.estimate = estimateConversion(info.splats, info.threads);
+  const bool by_cell = !info.stored.empty() && info.scalar(info.stored.front()).centring == Centring::kCell;
+  info.estimate =
+      InfoEstimate(by_cell ? info.statistics.cells() : info.nodes - info.statistics.blank().total());
   return info;
 }
 
@@ -176,11 +170,7 @@ nlohmann::ordered_json asJson(const GridInfo& info) {
         {{"blocks", {description.blocks[overlap.first].name, description.blocks[overlap.second].name}},
          {"volume", overlap.volume},
          {"share_of_smaller", overlap.share}});
-  json["estimate"] = {{"splats", info.splats},
-                      {"cache_bytes", info.estimate.cache_bytes},
-                      {"cache_bytes_per_further_scalar", info.estimate.bytes_per_further_scalar},
-                      {"seconds", info.estimate.seconds},
-                      {"threads", info.threads}};
+  json["estimate"] = info.estimate.toJson();
   json["notes"] = description.notes;
   json["warnings"] = description.warnings;
   return json;
@@ -222,12 +212,6 @@ void printScalars(const GridInfo& info) {
   fmt::print("derived   {}\n", names);
 }
 
-std::string sizeText(uint64_t bytes) {
-  const auto mebibytes = static_cast<double>(bytes) / static_cast<double>(1 << 20);
-  return mebibytes < 1024 ? fmt::format("{:.1f} MiB", mebibytes)
-                          : fmt::format("{:.1f} GiB", mebibytes / 1024);
-}
-
 void printAsText(const GridInfo& info) {
   const GridDescription& description = *info.description;
   fmt::print("{}\n", description.format);
@@ -254,11 +238,7 @@ void printAsText(const GridInfo& info) {
                flow.block + 1, flow.mach, flow.alpha, flow.reynolds, flow.time);
   }
   printTimes(description);
-  fmt::print(
-      "estimate  a cache of about {} with one scalar, {} more per additional scalar; about {:.1f} s on {} "
-      "thread{}\n",
-      sizeText(info.estimate.cache_bytes), sizeText(info.estimate.bytes_per_further_scalar),
-      info.estimate.seconds, info.threads, info.threads == 1 ? "" : "s");
+  fmt::print("estimate  {}\n", info.estimate.toText());
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 #include "tools/commands/info_mesh.h"
 
 #include <fmt/format.h>
-#include <tbb/info.h>
 
 #include <algorithm>
 #include <array>
@@ -11,8 +10,8 @@
 #include <optional>
 
 #include "preprocess/convert/mesh_survey.h"
-#include "preprocess/convert/preflight.h"
 #include "preprocess/gather/mesh_reader.h"
+#include "tools/commands/info_estimate.h"
 #include "tools/output/progress_bar.h"
 
 namespace curvisplat {
@@ -25,11 +24,10 @@ constexpr std::array<const char*, 6> kKinds{"other",  "tetrahedra", "pyramids",
 
 struct MeshInfo {
   const GridDescription* description = nullptr;
-  uint64_t points = 0, cells = 0, splats = 0;
+  uint64_t points = 0, cells = 0;
   MeshSurvey survey;
   std::vector<ScalarRange> ranges;  // [scalar]
-  unsigned threads = 1;
-  ConversionEstimate estimate;
+  InfoEstimate estimate;
 };
 
 void widen(ScalarRange& range, const std::vector<float>& values) {
@@ -76,9 +74,7 @@ MeshInfo inspect(const MeshSource& source) {
   measure(source, Centring::kCell, info);
   const bool by_cell =
       !info.description->scalars.empty() && info.description->scalars.front().centring == Centring::kCell;
-  info.splats = by_cell ? info.survey.drawn_cells : info.points - info.survey.unused_points;
-  info.threads = static_cast<unsigned>(tbb::info::default_concurrency());
-  info.estimate = estimateConversion(info.splats, info.threads);
+  info.estimate = InfoEstimate(by_cell ? info.survey.drawn_cells : info.points - info.survey.unused_points);
   return info;
 }
 
@@ -117,11 +113,7 @@ nlohmann::ordered_json asJson(const MeshInfo& info) {
   }
   json["times"] = description.times;
   json["time_step"] = description.time_step;
-  json["estimate"] = {{"splats", info.splats},
-                      {"cache_bytes", info.estimate.cache_bytes},
-                      {"cache_bytes_per_further_scalar", info.estimate.bytes_per_further_scalar},
-                      {"seconds", info.estimate.seconds},
-                      {"threads", info.threads}};
+  json["estimate"] = info.estimate.toJson();
   json["notes"] = description.notes;
   json["warnings"] = description.warnings;
   return json;
@@ -165,9 +157,7 @@ void printAsText(const MeshInfo& info) {
   if (steps > 1)
     fmt::print("times     {} steps, {:.9g} .. {:.9g}; step {} was read\n", steps, description.times.front(),
                description.times.back(), description.time_step);
-  fmt::print("estimate  a cache of about {:.1f} MiB with one scalar; about {:.1f} s on {} thread{}\n",
-             static_cast<double>(info.estimate.cache_bytes) / (1 << 20), info.estimate.seconds, info.threads,
-             info.threads == 1 ? "" : "s");
+  fmt::print("estimate  {}\n", info.estimate.toText());
 }
 
 }  // namespace

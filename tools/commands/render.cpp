@@ -25,9 +25,11 @@
 #include "tools/commands/frame_run.h"
 #include "tools/commands/render_statistics.h"
 #include "tools/options/camera_motion.h"
+#include "tools/options/channel_arguments.h"
 #include "tools/options/frame_arguments.h"
 #include "tools/options/frame_part.h"
 #include "tools/options/motion_in_time.h"
+#include "tools/options/opacity_arguments.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/picture_choice.h"
 #include "tools/options/scalar_arguments.h"
@@ -71,7 +73,9 @@ void checkPartArguments(const RenderArguments& arguments) {
 void checkArguments(const RenderArguments& arguments, ImageSize size) {
   checkMotionArguments(arguments.camera, arguments.steps);
   checkFunctionArguments(arguments.scalar);
+  checkOpacityArguments(arguments.opacity, arguments.scalar, arguments.surfaces);
   checkSurfaceArguments(arguments.surfaces);
+  checkAnnotationArguments(arguments.annotations);
   checkOutputName(arguments.output, severalFrames(arguments), size);
   checkPartArguments(arguments);
   if (!arguments.first_image.empty() && !launchedRanks().alone())
@@ -83,6 +87,9 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
     throw UsageError("--background transparent: {} files have no transparency; use .png or .exr",
                      arguments.output.extension().string());
   parseBackend(arguments.backend);
+  if (channelsOf(arguments).any() && !arguments.first_image.empty())
+    throw UsageError("--first-image {}: a first picture has no values; leave --channels out",
+                     arguments.first_image.string());
   std::vector<std::filesystem::path> others{arguments.cache, arguments.camera.path,
                                             arguments.scalar.transfer_function.value_or("")};
   checkOutputFile("-o", arguments.output, others);
@@ -112,10 +119,13 @@ uint64_t outputBytes(const RenderArguments& arguments, ImageSize picture) {
     bytes = 3 * picture.pixels();
   else
     bytes = writingBytes(arguments.output, picture);
+  const ValueChannels channels = channelsOf(arguments);
+  if (channels.any())
+    bytes += picture.pixels() * (sizeof(float) * (5 + channels.count()) + kChannelBytes * channels.count());
   if (!arguments.first_image.empty()) bytes = std::max(bytes, writingBytes(arguments.first_image, picture));
   // Tiles or pictures of other ranks, as they come and as they are put in their places.
   if (!launchedRanks().alone()) bytes = std::max(bytes, 2 * 4 * sizeof(float) * picture.pixels());
-  if (!(arguments.annotations == Annotations{})) bytes += annotatedBytes(picture);
+  if (!(arguments.annotations.shown == Annotations{})) bytes += annotatedBytes(picture);
   return bytes;
 }
 
@@ -144,7 +154,12 @@ void printResult(const RenderReport& report) {
              report.variable.name, total_s / static_cast<double>(report.frames.size()), report.backend);
 }
 
-void render(const RenderArguments& arguments) {
+constexpr double kAxesRoom = 0.17;  // around the data, of its box
+
+void render(const RenderArguments& given) {
+  RenderArguments arguments = given;
+  arguments.annotations.shown.scalar_bar |= !arguments.annotations.bar_titles.empty();
+  arguments.annotations.shown.axes_grid |= arguments.annotations.axis_titles.has_value();
   Ranks& ranks = launchedRanks();
   FrameOptions options = frameOptions(arguments.frame);
   checkArguments(arguments, options.size);
@@ -155,17 +170,25 @@ void render(const RenderArguments& arguments) {
   CacheReader cache = openAtStep(arguments.cache, arguments.steps);
   const std::vector<StepPosition> steps = chosenSteps(arguments.steps, cache);
   const Manifest manifest = cache.manifest();  // of the first step
-  const size_t variable = chooseVariable(cache, arguments.scalar);
-  const VariableInfo& info = manifest.variables[variable];
+  const size_t shown = chooseVariable(cache, arguments.scalar);
   const glm::dvec3 lower = manifest.lower * options.scale, upper = manifest.upper * options.scale;
   const ChosenFor drawn = drawnSteps(arguments);
-  PictureChoice choice(cache, variable, options.scale, drawn);
-  const TransferFunction transfer_function = choice.function(arguments.scalar);
+  ScalarChoice choice =
+      chooseScalars(arguments.opacity, arguments.scalar, cache, shown, options.scale, drawn);
+  const DrawnScalars& scalars = choice.scalars;
+  const size_t variable = scalars.opacity.variable;
+  const TransferFunction& transfer_function = scalars.opacity.function;
+  const TransferFunction& colours = scalars.colour ? scalars.colour->function : transfer_function;
   for (const std::string& note : transfer_function.notes()) printMessage("note: {}", note);
-  const std::string range_warning = rangeMissesScalar(variableFor(cache, variable, drawn), transfer_function);
-  if (!range_warning.empty()) printMessage("warning: {}", range_warning);
+  if (scalars.colour)
+    for (const std::string& note : colours.notes()) printMessage("note: {}", note);
+  for (const auto& [of, function] : {std::pair(variable, &transfer_function), {shown, &colours}}) {
+    const std::string range_warning = rangeMissesScalar(variableFor(cache, of, drawn), *function);
+    if (!range_warning.empty()) printMessage("warning: {}", range_warning);
+    if (!scalars.colour) break;
+  }
 
-  options.scene = sceneOf(arguments.surfaces, cache, variable);
+  options.scene = sceneOf(arguments.surfaces, cache, shown, variable);
   if (options.scene && !options.scene->isovalues.empty() && options.scene->volume &&
       transfer_function.logScale())
     throw UsageError(
@@ -177,12 +200,19 @@ void render(const RenderArguments& arguments) {
     printMessage("warning: {}", miss);
 
   const ImageSize picture = options.size;
-  options.size = dataSize(arguments.annotations, picture, transfer_function);
+  const std::vector<ShownFunction> functions = shownFunctions(
+      arguments.annotations, scalars, manifest, options.scene.get(), arguments.surfaces.surface_by);
+  options.size = dataSize(arguments.annotations.shown, picture, functions);
   options.output_bytes = outputBytes(arguments, picture);
-  const CameraArguments camera = choice.camera(arguments.camera, transfer_function, options.size);
+  const bool has_grid = arguments.annotations.shown.axes_grid;
+  const CameraArguments camera =
+      choice.picture.camera(arguments.camera, transfer_function, options.size, has_grid);
   const Series series = cache.series();
-  const MotionInTime motion = inTime(chooseCameraMotion(framesOf(camera, steps), lower, upper, options.size),
-                                     series, arguments.steps, steps, arguments.camera.frames);
+  // Coordinates need room around the data.
+  const glm::dvec3 room = (has_grid ? kAxesRoom : 0.0) * (upper - lower);
+  const MotionInTime motion =
+      inTime(chooseCameraMotion(framesOf(camera, steps), lower - room, upper + room, options.size), series,
+             arguments.steps, steps, arguments.camera.frames);
   const std::vector<uint64_t> numbers =
       (arguments.part ? parsePart(*arguments.part) : FramePart{}).of(motion.frames);
   // A rank has a picture to itself where there are enough of them.
@@ -195,18 +225,23 @@ void render(const RenderArguments& arguments) {
   const auto output = ranks.isFirst() || writes_own
                           ? makeFrameOutput(arguments.output, severalFrames(arguments), picture, frames_per_s)
                           : nullptr;
-  StepPlayer player(cache, variable, transfer_function, parseBackend(arguments.backend));
+  StepPlayer player(cache, scalars, parseBackend(arguments.backend));
   RenderReport report{arguments.cache,
                       arguments.output,
                       picture,
-                      info,
-                      transfer_function,
+                      scalars,
+                      manifest.variables[variable],
                       options,
                       player.renderer().backendName(),
                       ranks.count(),
                       {},
                       {},
-                      {}};
+                      {},
+                      scalars.colour ? &manifest.variables[shown] : nullptr,
+                      functions,
+                      options.background};
+  // The grid lies behind the data, before the background.
+  if (has_grid) options.background = glm::vec4(0);
   const auto writeReport = [&] {
     if (!arguments.statistics.empty() && ranks.isFirst())
       writeStatistics(arguments.statistics, statisticsOf(report));
@@ -221,7 +256,10 @@ void render(const RenderArguments& arguments) {
   if (!ranks.isFirst()) return;
   writeReport();
   printResult(report);
-  if (!choice.chosenOptions().empty()) fmt::print("chosen from the data: {}\n", choice.chosenOptions());
+  std::string chosen = choice.chosen_colours;
+  if (const std::string& more = choice.picture.chosenOptions(); !more.empty())
+    chosen += (chosen.empty() ? "" : " ") + more;
+  if (!chosen.empty()) fmt::print("chosen from the data: {}\n", chosen);
 }
 
 }  // namespace
@@ -241,6 +279,8 @@ void addRender(CLI::App& app) {
 
   const std::string what = "Data and colours";
   addFunctionOptions(*command, arguments->scalar, what);
+  const std::string surfaces = "Surfaces and slices";
+  addOpacityOptions(*command, arguments->opacity, what, surfaces);
   command
       ->add_option("--classify", arguments->frame.classify,
                    "Classification: pixel (colour varies within a splat) or flat (one colour per splat)")
@@ -290,13 +330,15 @@ void addRender(CLI::App& app) {
       ->capture_default_str()
       ->group(what);
 
-  command->add_flag("--scalar-bar", arguments->annotations.scalar_bar, "Draw a scalar bar beside the data")
-      ->group(what);
-  command->add_flag("--axes", arguments->annotations.axes, "Draw the directions of x, y and z")->group(what);
-  command->add_flag("--outline", arguments->annotations.outline, "Draw the bounding box of the data")
-      ->group(what);
+  addAnnotationOptions(*command, arguments->annotations, what);
 
-  addSurfaceOptions(*command, arguments->surfaces, "Surfaces and slices");
+  command
+      ->add_option(
+          "--channels", arguments->channels,
+          "What an .exr picture has beside its colours, where each pixel has half of its opacity: some of "
+          "depth,normal,scalar, or none (default: depth). Takes about three times as long")
+      ->group(what);
+  addSurfaceOptions(*command, arguments->surfaces, surfaces);
   const std::string when = "Time steps";
   addStepOptions(*command, arguments->steps, when);
   addStepsOption(*command, arguments->steps, when);

@@ -221,7 +221,12 @@ nlohmann::json statisticsOf(const RenderReport& report) {
   }
   const glm::vec4& background = options.background;
   json["background"] = {background.r, background.g, background.b, background.a};
-  json["transfer_function"] = toJson(report.transfer_function);
+  json["transfer_function"] = toJson(report.function());
+  if (report.colour_variable) {
+    const VariableInfo& info = *report.colour_variable;
+    json["colour_scalar"] = {{"name", info.name}, {"range", {info.min, info.max}}};
+    json["colour_function"] = toJson(report.scalars.colour->function);
+  }
   json["time_to_first_image_s"] = nullptr;
   if (report.time_to_first_image_s) json["time_to_first_image_s"] = *report.time_to_first_image_s;
   if (report.first_image) json["first_image"] = toJson(*report.first_image);

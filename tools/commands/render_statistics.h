@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "render/annotate/annotated_scene.h"
 #include "render/camera/camera.h"
 #include "render/colour/transfer_function.h"
 #include "render/frame/frame.h"
@@ -28,14 +29,19 @@ struct FrameReport {
 struct RenderReport {
   std::filesystem::path cache, output;
   ImageSize picture;  // includes the scalar bar; options.size is the data's part
-  const VariableInfo& variable;
-  const TransferFunction& transfer_function;
+  const DrawnScalars& scalars;
+  const VariableInfo& variable;  // of the opacities
   const FrameOptions& options;
   std::string backend;
   unsigned ranks = 1;
   std::vector<FrameReport> frames;
-  std::optional<double> time_to_first_image_s;  // since the process started; nullopt: none, or unknown
-  std::optional<FrameStatistics> first_image;   // the coarse one of --first-image
+  std::optional<double> time_to_first_image_s;    // since the process started; nullopt: none, or unknown
+  std::optional<FrameStatistics> first_image;     // the coarse one of --first-image
+  const VariableInfo* colour_variable = nullptr;  // of pictures of two scalars
+  std::vector<ShownFunction> shown = {};          // by scalar bars
+  glm::vec4 background{1, 1, 1, 1};               // that of the options may be left to the annotations
+
+  const TransferFunction& function() const { return scalars.opacity.function; }
 };
 
 nlohmann::json statisticsOf(const RenderReport& report);

@@ -40,7 +40,8 @@ void view(const ViewArguments& arguments) {
   checkSurfaceArguments(arguments.surfaces);
   const CacheReader cache = openAtStep(arguments.cache, arguments.steps);
   // The scalar changes in the window, so faces that are coloured by one keep colours of their own.
-  options.scene = sceneOf(arguments.surfaces, cache, std::numeric_limits<size_t>::max());
+  options.scene = sceneOf(arguments.surfaces, cache, std::numeric_limits<size_t>::max(),
+                          std::numeric_limits<size_t>::max());
   for (const std::string& surface : arguments.surfaces.surfaces)
     if (isSurfaceFile(surface))
       options.surface_files.emplace_back(surface);

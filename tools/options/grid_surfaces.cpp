@@ -170,7 +170,8 @@ void colourByScalar(GridSurface& surface, const std::string& name, const CacheRe
   ScalarArguments arguments;
   arguments.scalar = name;
   PictureChoice choice(cache, variable, glm::dvec3(1.0));
-  surface.colours = std::make_shared<ColourTable>(choice.function(arguments));
+  surface.function = std::make_shared<TransferFunction>(choice.function(arguments));
+  surface.colours = std::make_shared<ColourTable>(*surface.function);
 }
 
 }  // namespace curvisplat

@@ -60,10 +60,20 @@ const FirstChoice& PictureChoice::data() {
   return *data_;
 }
 
+/// Whether an option that was filled in is one of the picture's.
+bool PictureChoice::isSaid(const std::string& option) const {
+  const bool of_opacities = option.starts_with("--opacity");
+  const bool of_colours = option == "--tf" || option == "--scalar";
+  return part_ == Part::kAll || (part_ == Part::kColours ? !of_opacities : !of_colours);
+}
+
 void PictureChoice::add(const std::string& option, const std::string& value) {
+  if (!isSaid(option)) return;
   if (!chosen_.empty()) chosen_ += ' ';
+  const bool has_own = part_ == Part::kOpacities && (option == "--range" || option == "--asinh");
   // The parser would take a separate value with a minus sign for an option.
-  chosen_ += option + (value.starts_with('-') ? '=' : ' ') + value;
+  chosen_ +=
+      (has_own ? "--opacity" + option.substr(1) : option) + (value.starts_with('-') ? '=' : ' ') + value;
 }
 
 std::pair<double, double> PictureChoice::parseRange(const std::string& text) {
@@ -105,6 +115,16 @@ TransferFunction PictureChoice::function(const ScalarArguments& arguments) {
   if (arguments.asinh) parts.asinh = parseAsinh(*arguments.asinh);
   parts.opacities = opacitiesOf(arguments);
   return fromParts(std::move(parts), arguments);
+}
+
+TransferFunction PictureChoice::colours(const ScalarArguments& arguments) {
+  part_ = Part::kColours;
+  return function(arguments);
+}
+
+TransferFunction PictureChoice::opacities(const ScalarArguments& arguments) {
+  part_ = Part::kOpacities;
+  return function(arguments);
 }
 
 TransferFunction PictureChoice::withUnit(const TransferFunctionDefinition& definition,
@@ -156,14 +176,14 @@ TransferFunction PictureChoice::automatic(const ScalarArguments& arguments) {
 }
 
 CameraArguments PictureChoice::camera(CameraArguments arguments, const TransferFunction& function,
-                                      ImageSize size) {
+                                      ImageSize size, bool whole) {
   if (arguments.view || arguments.position || arguments.focal_point || arguments.view_up ||
       arguments.parallel_scale || arguments.view_angle || arguments.moves())
     return arguments;
   const ViewChoice choice = data().view(function, size);
   add("--view", choice.view);
   arguments.view = choice.view;
-  if (!choice.focal_point) return arguments;
+  if (whole || !choice.focal_point) return arguments;
   const glm::dvec3& point = *choice.focal_point;
   arguments.focal_point = fmt::format("{},{},{}", point.x, point.y, point.z);
   arguments.parallel_scale = exact(choice.parallel_scale);

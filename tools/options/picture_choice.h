@@ -24,8 +24,13 @@ class PictureChoice {
   /// Fills in the options that are not given. Throws UsageError, or Error if reading fails or a file does not
   /// hold a transfer function.
   TransferFunction function(const ScalarArguments& arguments);
+  /// The same, for pictures of two scalars: of the scalar that gives the colours, or the opacities alone.
+  TransferFunction colours(const ScalarArguments& arguments);
+  TransferFunction opacities(const ScalarArguments& arguments);
   /// The arguments, with a view if they have no camera at all. `function`: that of the picture.
-  CameraArguments camera(CameraArguments arguments, const TransferFunction& function, ImageSize size);
+  /// `whole`: never of a part of the data.
+  CameraArguments camera(CameraArguments arguments, const TransferFunction& function, ImageSize size,
+                         bool whole = false);
 
   /// What was filled in: "--tf viridis --range 0,1"; empty if nothing was.
   const std::string& chosenOptions() const { return chosen_; }
@@ -41,11 +46,14 @@ class PictureChoice {
   TransferFunction withUnit(const TransferFunctionDefinition& definition,
                             const std::pair<double, double>* range, const ScalarArguments& arguments);
   void add(const std::string& option, const std::string& value);
+  bool isSaid(const std::string& option) const;
 
   const CacheReader& cache_;
   const size_t variable_;
   const glm::dvec3 scale_;
   const ChosenFor what_;
+  enum class Part { kAll, kColours, kOpacities };
+  Part part_ = Part::kAll;  // of a function: what is said of it
   std::optional<FirstChoice> data_;
   std::string chosen_;
 };

@@ -171,7 +171,7 @@ bool isSurfaceFile(const std::string& text) {
 }
 
 std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, const CacheReader& cache,
-                                            size_t drawn) {
+                                            size_t drawn, size_t classified) {
   if (!arguments.given()) return nullptr;
   auto scene = std::make_shared<SurfaceScene>();
   const bool of_grid = !std::all_of(arguments.surfaces.begin(), arguments.surfaces.end(), isSurfaceFile);
@@ -198,7 +198,7 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
   scene->isovalues = parseIsovalues(arguments.isovalues);
   scene->iso_opacity = parseIsoOpacity(arguments.iso_opacity);
   scene->volume = arguments.volume == "on";
-  requireIsovalues(*scene, cache, drawn);
+  requireIsovalues(*scene, cache, classified);
   return scene;
 }
 

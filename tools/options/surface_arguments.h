@@ -32,10 +32,10 @@ void checkSurfaceArguments(const SurfaceArguments& arguments);
 /// Whether --surface names a file: one that is there, or by its extension.
 bool isSurfaceFile(const std::string& text);
 
-/// Reads the surfaces, and finds those of the cache's grid. `drawn`: the variable of the picture. Null where none of the
-/// options is given. Throws Error for a file that is no surface, and for a face that the cache does not have.
+/// Reads the surfaces, and finds those of the cache's grid. `drawn`: the variable of the picture's colours, `classified`:
+/// that of its opacities and isosurfaces. Null where none of the options is given. Throws Error for a file that is no surface, and for a face that the cache does not have.
 std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, const CacheReader& cache,
-                                            size_t drawn);
+                                            size_t drawn, size_t classified);
 
 /// One line for each slice that does not meet the data's box.
 std::vector<std::string> slicesThatMiss(const SurfaceArguments& arguments, const glm::dvec3& lower,

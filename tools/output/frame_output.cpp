@@ -20,6 +20,9 @@ class SingleFile : public FrameOutput {
  public:
   explicit SingleFile(std::filesystem::path path) : path_(std::move(path)) {}
   void write(uint64_t, const Image& image) override { writeImage(image, path_); }
+  void writeWith(uint64_t, const Image& image, std::span<const ImageChannel> more) override {
+    writeExr(image, more, path_);
+  }
 
  private:
   const std::filesystem::path path_;
@@ -29,6 +32,9 @@ class NumberedFiles : public FrameOutput {
  public:
   explicit NumberedFiles(const std::filesystem::path& pattern) : names_(pattern) {}
   void write(uint64_t frame, const Image& image) override { writeImage(image, names_.of(frame)); }
+  void writeWith(uint64_t frame, const Image& image, std::span<const ImageChannel> more) override {
+    writeExr(image, more, names_.of(frame));
+  }
 
  private:
   const FrameNames names_;

@@ -4,9 +4,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "render/image/image.h"
+#include "render/image/image_channel.h"
 
 namespace curvisplat {
 
@@ -33,6 +35,10 @@ class FrameOutput {
  public:
   virtual ~FrameOutput() = default;
   virtual void write(uint64_t frame, const Image& image) = 0;
+  /// With further channels: to .exr files.
+  virtual void writeWith(uint64_t frame, const Image& image, std::span<const ImageChannel> /*more*/) {
+    write(frame, image);
+  }
   /// Call once after the last frame: completes the output.
   virtual void finish() {}
 };

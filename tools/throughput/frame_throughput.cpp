@@ -29,7 +29,7 @@ class Frames {
         effort_(effort),
         to_(to),
         progress_(progress),
-        planner_(scene.cache, scene.variable, scene.transfer_function) {}
+        planner_(scene.cache, {scene.variable, scene.transfer_function}) {}
 
   void measure(const FrameConfiguration& configuration) {
     const Cut cut =

@@ -29,6 +29,7 @@ constexpr std::array<Colour, 7> kColours{{{0.00, 0.45, 0.70},
 constexpr Colour kInk{0.13, 0.13, 0.13}, kGrid{0.87, 0.87, 0.87}, kFaint{0.4, 0.4, 0.4};
 constexpr double kPixelsPerPoint = 2;  // for high-resolution displays
 constexpr double kPanelWidth = 460, kLineHeight = 320, kBarHeight = 19, kLegendHeight = 20;
+constexpr size_t kMostInARow = 3;
 constexpr double kFont = 12, kTitleFont = 14;
 
 class Canvas {
@@ -123,10 +124,10 @@ double drawLegend(Canvas* canvas, double left, double top, double width,
   return y - top + kLegendHeight;
 }
 
-void drawTitle(Canvas& canvas, double left, const std::string& title) {
+void drawTitle(Canvas& canvas, double left, double top, const std::string& title) {
   canvas.font(kTitleFont, true);
   canvas.ink(kInk);
-  canvas.text(left + 12, 24, title);
+  canvas.text(left + 12, top + 24, title);
   canvas.font(kFont);
 }
 
@@ -252,7 +253,7 @@ void drawBody(Canvas& canvas, double left, double top, const BarPanel& panel) {
   drawBars(canvas, left, top, panel);
 }
 
-/// Draws title, legend and body of each panel, from left to right.
+/// Draws title, legend and body of each panel, from left to right and in rows.
 template <typename Panel>
 std::vector<std::byte> drawPanels(const std::vector<Panel>& panels) {
   CURVISPLAT_CHECK(!panels.empty());
@@ -266,13 +267,15 @@ std::vector<std::byte> drawPanels(const std::vector<Panel>& panels) {
       legend_height = std::max(legend_height, drawLegend(nullptr, 0, 0, kPanelWidth - 36, names, ruler));
     body_height = std::max(body_height, heightOf(panel));
   }
-  const double top = kLegendTop + legend_height + 4;
-  Canvas canvas(kPanelWidth * static_cast<double>(panels.size()), top + body_height + 8);
+  const double body_top = kLegendTop + legend_height + 4, height = body_top + body_height + 8;
+  const size_t columns = std::min(panels.size(), kMostInARow), rows = (panels.size() + columns - 1) / columns;
+  Canvas canvas(kPanelWidth * static_cast<double>(columns), height * static_cast<double>(rows));
   for (size_t n = 0; n < panels.size(); ++n) {
-    const double left = kPanelWidth * static_cast<double>(n);
-    drawTitle(canvas, left, panels[n].title);
-    drawLegend(&canvas, left + 12, kLegendTop, kPanelWidth - 36, namesOf(panels[n]), canvas);
-    drawBody(canvas, left, top, panels[n]);
+    const double left = kPanelWidth * static_cast<double>(n % columns);
+    const double top = height * static_cast<double>(n / columns);
+    drawTitle(canvas, left, top, panels[n].title);
+    drawLegend(&canvas, left + 12, top + kLegendTop, kPanelWidth - 36, namesOf(panels[n]), canvas);
+    drawBody(canvas, left, top + body_top, panels[n]);
   }
   return canvas.png();
 }

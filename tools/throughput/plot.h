@@ -46,7 +46,7 @@ using Plots = std::map<std::string, std::vector<std::byte>>;
 /// Throws UsageError in a program that was built without plots; drawPlot() then gives no bytes.
 void requirePlots();
 
-/// Draws the panels side by side. Returns the bytes of a PNG file. Throws Error.
+/// Draws the panels side by side, at most three in a row. Returns the bytes of a PNG file. Throws Error.
 std::vector<std::byte> drawPlot(const std::vector<LinePanel>& panels);
 std::vector<std::byte> drawPlot(const std::vector<BarPanel>& panels);
 

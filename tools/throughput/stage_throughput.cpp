@@ -49,7 +49,7 @@ class Stages {
         effort_(effort),
         to_(to),
         progress_(progress),
-        planner_(scene.cache, scene.variable, scene.transfer_function),
+        planner_(scene.cache, {scene.variable, scene.transfer_function}),
         plan_(planner_.plan(scene.orbit(1).front(), scene.options, DrawingOrder::kFrontToBack)) {
     report_.frame_splats = plan_.cut.splats;
   }

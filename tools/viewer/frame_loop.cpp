@@ -152,7 +152,8 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
   if (!drawing.player || drawing.variable != request.variable) {
     drawing.player.reset();  // frees its memory before the next one allocates
     if (request.step != cache_.step()) cache_ = cache_.atStep(request.step);
-    drawing.player = std::make_unique<StepPlayer>(cache_, request.variable, request.function, backend_);
+    drawing.player =
+        std::make_unique<StepPlayer>(cache_, DrawnScalars(request.variable, request.function), backend_);
     drawing.variable = request.variable;
   } else if (drawing.function_version != request.function_version) {
     drawing.player->setTransferFunction(request.function);

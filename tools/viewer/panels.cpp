@@ -119,6 +119,8 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
   ImGui::SameLine();
   actions.changed |= ImGui::Checkbox("axes", &state.annotations.axes);
   ImGui::SameLine();
+  actions.changed |= ImGui::Checkbox("axes grid", &state.annotations.axes_grid);
+  ImGui::SameLine();
   actions.changed |= ImGui::Checkbox("outline", &state.annotations.outline);
   ImGui::SameLine();
   actions.changed |= ImGui::Checkbox("dark", &state.dark);

@@ -200,6 +200,7 @@ std::string toJson(const ViewState& state) {
   json["dark"] = state.dark;
   json["scalar_bar"] = state.annotations.scalar_bar;
   json["axes"] = state.annotations.axes;
+  json["axes_grid"] = state.annotations.axes_grid;
   json["outline"] = state.annotations.outline;
   return json.dump(1) + "\n";
 }
@@ -236,6 +237,7 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   if (const auto lit = fields.find("lit")) state.lit = lit->flag();
   state.dark = fields.at("dark").flag();
   state.annotations = {fields.at("scalar_bar").flag(), fields.at("axes").flag(), fields.at("outline").flag()};
+  if (const auto grid = fields.find("axes_grid")) state.annotations.axes_grid = grid->flag();
   return state;
 }
 
@@ -297,6 +299,7 @@ std::string renderCommand(const ViewState& state, const std::filesystem::path& c
   add("--background", state.dark ? "black" : "white");
   if (state.annotations.scalar_bar) command += " --scalar-bar";
   if (state.annotations.axes) command += " --axes";
+  if (state.annotations.axes_grid) command += " --axes-grid";
   if (state.annotations.outline) command += " --outline";
   return command;
 }

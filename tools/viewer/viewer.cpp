@@ -267,8 +267,7 @@ class Viewer {
     const VariableInfo& info = manifest.variables[variable()];
     return {picture_size_,
             screenViewOf(manifest, state_.camera, state_.frameOptions(data_size_), data_size_),
-            function,
-            scalarTitle(info.name, info.unit),
+            {{&function, scalarTitle(info.name, info.unit)}},
             manifest.lower,
             manifest.upper,
             state_.background()};

@@ -7,6 +7,7 @@
 
 #include "preprocess/formats/common/hdf5_attribute.h"
 #include "preprocess/formats/common/hdf5_lists.h"
+#include "preprocess/formats/common/hdf5_trial.h"
 #include "stream/base/check.h"
 #include "stream/base/error.h"
 
@@ -23,6 +24,7 @@ constexpr int kMaxLinks = 100;
 // Smallest size of a node in a file: a link, and a group with three attributes.
 constexpr uint64_t kMinNodeBytes = 32;
 constexpr uint64_t kSmallFileNodes = 4096;
+constexpr size_t kTriedNodes = 5000;
 
 struct NodeLink {
   std::string name;
@@ -58,6 +60,10 @@ std::string placeOf(const std::string& node_path) {
 }  // namespace
 
 CgnsHdf5::CgnsHdf5(std::filesystem::path path) : path_(std::move(path)) {
+  tryHdf5(path_, [this] {
+    size_t most = kTriedNodes;
+    CgnsHdf5(path_).visitAll({}, 0, most);
+  });
   const QuietHdf5 quiet;
   Hdf5File file(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
   if (!file) unreadable("", "the file");
@@ -79,6 +85,7 @@ CgnsHdf5::~CgnsHdf5() {
 }
 
 bool CgnsHdf5::recognises(const std::filesystem::path& path) {
+  tryHdf5(path);
   const QuietHdf5 quiet;
   const Hdf5File file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
   return file && H5Lexists(file.id(), kLibraryVersion, H5P_DEFAULT) > 0 &&
@@ -190,6 +197,26 @@ std::vector<CgnsNode> CgnsHdf5::children(const CgnsNode& node) const {
     nodes.push_back(std::move(child));
   }
   return nodes;
+}
+
+void CgnsHdf5::visitAll(const CgnsNode& node, int depth, size_t& most) const {
+  constexpr int kMaxDepth = 8;  // links may form cycles
+  if (depth > kMaxDepth) return;
+  // An Error may be of a node that nobody needs.
+  const auto quietly = [](const auto& call) {
+    try {
+      call();
+    } catch (const Error&) {
+    }
+  };
+  std::vector<CgnsNode> nodes;
+  quietly([&] { nodes = children(node); });
+  for (const CgnsNode& child : nodes) {
+    if (most == 0) return;
+    --most;
+    quietly([&] { shape(child); });
+    visitAll(child, depth + 1, most);
+  }
 }
 
 CgnsHdf5::Data CgnsHdf5::openData(const Hdf5Group& group, const std::string& node_path) const {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "stream/base/error.h"
+#include "stream/base/free_space.h"
 
 namespace curvisplat {
 namespace {
@@ -153,10 +154,10 @@ class Spooler {
   }
 
   void checkSpaceFor(uint64_t values, uint64_t line) const {
-    const uint64_t available = std::filesystem::space(folder_.empty() ? "." : folder_).available;
-    if (values > available / sizeof(double))
+    const std::optional<uint64_t> available = freeBytes(folder_);
+    if (available && values > *available / sizeof(double))
       throw Error("{}: line {} repeats a number {} times, too many for the {} bytes free in {}", name(), line,
-                  values, available, folder_.string());
+                  values, *available, folder_.string());
   }
 
   void put(double value) {

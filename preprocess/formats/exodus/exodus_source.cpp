@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <limits>
 
 #include "preprocess/grid/time_steps.h"
@@ -18,6 +19,27 @@ uint64_t lengthOf(const NetcdfFile& file, const std::string& dimension) {
   for (const NetcdfDimension& d : file.dimensions())
     if (d.name == dimension) return d.length;
   return 0;
+}
+
+// Elements of the highest order that the format knows have 64 nodes.
+constexpr uint64_t kMostNodes = 1024;
+
+/// The numbers of the element blocks, of their variables connect1, connect2, ...: a damaged dimension num_el_blk
+/// may be any number.
+std::vector<size_t> blocksIn(const NetcdfFile& file) {
+  constexpr std::string_view kPrefix = "connect";
+  const uint64_t most = lengthOf(file, "num_el_blk");
+  std::vector<size_t> numbers;
+  for (const NetcdfVariable& variable : file.variables()) {
+    if (!variable.name.starts_with(kPrefix)) continue;
+    const std::string_view digits = std::string_view(variable.name).substr(kPrefix.size());
+    size_t number = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+    const bool whole = error == std::errc{} && end == digits.data() + digits.size() && digits[0] != '0';
+    if (whole && number <= most) numbers.push_back(number);
+  }
+  std::sort(numbers.begin(), numbers.end());
+  return numbers;
 }
 
 /// "HEX20" -> HEX; the corners of a solid come first in all of them.
@@ -70,9 +92,8 @@ ExodusSource::ExodusSource(const OpenGridOptions& options)
 void ExodusSource::findBlocks() {
   const std::string name = file_->path().string();
   uint64_t solid = 0, curved = 0, others = 0;
-  for (size_t number = 1; number <= lengthOf(*file_, "num_el_blk"); ++number) {
+  for (const size_t number : blocksIn(*file_)) {
     const NetcdfVariable* const connect = file_->find(fmt::format("connect{}", number));
-    if (!connect) continue;  // an empty block
     if (connect->dims.size() != 2)
       throw Error(
           "{}: {} has {} dimensions; expected elements and their nodes (blocks of polyhedra are not read)",
@@ -88,6 +109,9 @@ void ExodusSource::findBlocks() {
     if (block.kind != CellKind::kNone && block.nodes_each < cornersOf(block.kind))
       throw Error("{}: {} is of {} with {} nodes each, too few; the file is damaged", name, connect->name,
                   type, block.nodes_each);
+    if (block.kind != CellKind::kNone && block.nodes_each > kMostNodes)
+      throw Error("{}: {} is of {} with {} nodes each; expected at most {}; the file is damaged", name,
+                  connect->name, type, block.nodes_each, kMostNodes);
     (block.kind == CellKind::kNone ? others : solid) += block.elements;
     if (block.nodes_each > cornersOf(block.kind) && block.kind != CellKind::kNone) curved += block.elements;
     elements_ += block.elements;
@@ -186,15 +210,16 @@ void ExodusSource::readCells(uint32_t, uint64_t first, uint64_t count, std::span
     const uint64_t from = std::max(first, block.first),
                    to = std::min(first + count, block.first + block.elements);
     if (from >= to) continue;
-    stored.resize((to - from) * block.nodes_each);
+    // Of elements that are left out nothing is read: they may have any number of nodes.
+    const uint64_t nodes_each = block.kind == CellKind::kNone ? 0 : block.nodes_each;
+    stored.resize((to - from) * nodes_each);
     if (!stored.empty())
-      file_->read(*block.connect, {{from - block.first, 0}, {to - from, block.nodes_each}},
-                  std::span(stored));
-    points.resize(block.nodes_each);
+      file_->read(*block.connect, {{from - block.first, 0}, {to - from, nodes_each}}, std::span(stored));
+    points.resize(nodes_each);
     for (uint64_t element = 0; element < to - from; ++element) {
       for (size_t n = 0; n < points.size(); ++n) {
         // From 1; what is none of them is refused as any number that is too large.
-        const double node = stored[element * block.nodes_each + n];
+        const double node = stored[element * nodes_each + n];
         points[n] = node >= 1 && node <= 0x1p53 ? static_cast<uint64_t>(node) - 1
                                                 : std::numeric_limits<uint64_t>::max();
       }

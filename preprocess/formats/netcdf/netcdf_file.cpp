@@ -13,6 +13,7 @@
 #include <numeric>
 
 #include "preprocess/formats/common/hdf5_handle.h"
+#include "preprocess/formats/common/hdf5_trial.h"
 #include "preprocess/formats/netcdf/netcdf4_structure.h"
 #include "preprocess/formats/netcdf/netcdf_classic.h"
 #include "stream/base/check.h"
@@ -118,8 +119,10 @@ NetcdfFile::NetcdfFile(const std::filesystem::path& path) : path_(path) {
   if (bytes >= begin.size()) file.readAt(0, std::span<char>(begin));
   if (isClassic({begin.data(), begin.size()}))
     checkClassicNetcdf(file);
-  else
+  else {
+    tryHdf5(path, [&] { const NetcdfFile again(path); });
     plain_hdf5_ = !checkNetcdf4Structure(path).netcdf4;
+  }
   const QuietHdf5 quiet;
   nc_set_chunk_cache(kChunkCacheBytes, kChunkCacheSlots, kChunkCachePreemption);
   // NetCDF takes some relative paths for URLs.

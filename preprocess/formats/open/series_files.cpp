@@ -181,7 +181,7 @@ StepSelection parseSteps(const std::string& option, const std::string& text) {
 std::vector<uint64_t> selectedSteps(const std::string& option, const StepSelection& selection,
                                     uint64_t count) {
   std::vector<uint64_t> numbers;
-  const uint64_t end = selection.last ? std::min(count, *selection.last + 1) : count;
+  const uint64_t end = selection.last && *selection.last < count ? *selection.last + 1 : count;
   for (uint64_t step = selection.first; step < end; step += std::min(selection.stride, count))
     numbers.push_back(step);
   if (numbers.empty())

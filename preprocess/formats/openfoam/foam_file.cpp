@@ -77,6 +77,10 @@ struct FoamFile::Parser {
     return c == '(' || c == ')' || c == '{' || c == '}' || c == '[' || c == ']' || c == ';';
   }
 
+  void add(std::string& word, int c) const {
+    word += static_cast<char>(c);
+    if (word.size() > 1000) fail("has a word of more than 1000 characters; the file is damaged");
+  }
   std::string token() {
     for (;;) {
       while (isSpace(peek())) take();
@@ -97,13 +101,10 @@ struct FoamFile::Parser {
       std::string word(1, static_cast<char>(c));
       if (isPunctuation(c)) return word;
       if (c == '"') {
-        for (int next = take(); next >= 0 && next != '"'; next = take()) word += static_cast<char>(next);
+        for (int next = take(); next >= 0 && next != '"'; next = take()) add(word, next);
         return word;
       }
-      while (peek() >= 0 && !isSpace(peek()) && !isPunctuation(peek())) {
-        word += static_cast<char>(take());
-        if (word.size() > 1000) fail("has a word of more than 1000 characters; the file is damaged");
-      }
+      while (peek() >= 0 && !isSpace(peek()) && !isPunctuation(peek())) add(word, take());
       return word;
     }
   }

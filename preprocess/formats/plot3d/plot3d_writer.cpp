@@ -13,6 +13,7 @@
 
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/free_space.h"
 
 namespace curvisplat {
 namespace {
@@ -119,10 +120,10 @@ class Writer {
   void requireSpace(const BlockOffsets& sizes) const {
     const std::filesystem::path folder = std::filesystem::absolute(grid_.path()).parent_path();
     const uint64_t needed = sizes.grid + sizes.function;
-    const uint64_t available = std::filesystem::space(folder).available;
-    if (available < needed)
+    const std::optional<uint64_t> available = freeBytes(folder);
+    if (available && *available < needed)
       throw Error("{}: needs {} bytes, but only {} are free; free some space or write elsewhere",
-                  folder.string(), needed, available);
+                  folder.string(), needed, *available);
   }
 
   void writeBlock(uint32_t b) {

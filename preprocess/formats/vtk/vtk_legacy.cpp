@@ -4,12 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
-#include <sstream>
 
 #include "preprocess/formats/common/stored_values.h"
-#include "preprocess/formats/common/text_reader.h"
+#include "preprocess/formats/vtk/vtk_legacy_file.h"
 #include "preprocess/formats/vtk/vtk_mesh_source.h"
 #include "preprocess/formats/vtk/vtk_source.h"
 #include "stream/base/error.h"
@@ -17,53 +15,13 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kMaxNodes = 100'000'000'000'000;
+constexpr uint64_t kMaxNodes = VtkLegacyFile::kMaxCount;
 constexpr uint64_t kMaxAlongAxis = uint64_t{1} << 30;
 
-constexpr std::pair<const char*, VtkType> kTypes[] = {
-    {"char", VtkType::kInt8},
-    {"signed_char", VtkType::kInt8},
-    {"unsigned_char", VtkType::kUint8},
-    {"short", VtkType::kInt16},
-    {"unsigned_short", VtkType::kUint16},
-    {"int", VtkType::kInt32},
-    {"vtkidtype", VtkType::kInt32},
-    {"unsigned_int", VtkType::kUint32},
-    {"long", VtkType::kInt64},
-    {"vtktypeint64", VtkType::kInt64},
-    {"unsigned_long", VtkType::kUint64},
-    {"vtktypeuint64", VtkType::kUint64},
-    {"float", VtkType::kFloat32},
-    {"double", VtkType::kFloat64},
-};
-
-std::string lowered(std::string_view text) {
-  std::string lower(text);
-  for (char& c : lower)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return lower;
-}
-
-/// Decodes %20 and the like; legacy files encode special characters in names.
-std::string decodedName(std::string_view text) {
-  std::string name;
-  for (size_t n = 0; n < text.size(); ++n) {
-    unsigned code = 0;
-    const bool coded = text[n] == '%' && n + 2 < text.size() &&
-                       std::from_chars(&text[n + 1], &text[n + 1] + 2, code, 16).ptr == &text[n + 1] + 2;
-    name += coded ? static_cast<char>(code) : text[n];
-    if (coded) n += 2;
-  }
-  return name;
-}
-
 /// Reads the file from beginning to end. It is a sequence of parts, each a line of keywords and its numbers.
-class LegacyReader {
+class LegacyReader : VtkLegacyFile {
  public:
-  LegacyReader(const VtkFiles& files, const std::filesystem::path& path)
-      : files_(files),
-        file_(std::make_shared<const PooledFile>(files_.pool, path)),
-        text_(file_, 0, file_->size()) {}
+  using VtkLegacyFile::VtkLegacyFile;
 
   std::unique_ptr<DataSource> read() {
     readHead();
@@ -97,34 +55,6 @@ class LegacyReader {
   }
 
   enum class Owner { kGrid, kPoints, kCells };
-
-  template <typename... Args>
-  [[noreturn]] void fail(fmt::format_string<Args...> format, Args&&... args) const {
-    throw Error("{}: byte {}: {}", file_->name(), text_.offset(),
-                printable(fmt::format(format, std::forward<Args>(args)...)));
-  }
-
-  std::string nextWord() { return lowered(text_.word()); }
-  std::string nextName() {
-    const std::string_view word = text_.word();
-    if (word.empty()) fail("ends where a name was expected; the file is truncated");
-    return decodedName(word);
-  }
-  /// The remaining words of the line.
-  std::vector<std::string> restOfLine() {
-    std::istringstream line{std::string(text_.line().value_or(""))};
-    std::vector<std::string> words;
-    for (std::string word; line >> word;) words.push_back(word);
-    return words;
-  }
-  uint64_t count(std::string_view word) const {
-    uint64_t value = 0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc{} || end != word.data() + word.size() || value > kMaxNodes)
-      fail("found \"{}\"; expected a count", word.substr(0, 30));
-    return value;
-  }
-  uint64_t nextCount() { return count(text_.word()); }
 
   void readHead() {
     text_.line();  // "# vtk DataFile Version 3.0"
@@ -359,14 +289,6 @@ class LegacyReader {
 
   bool lookupTableFollows() { return wordFollows("lookup_table"); }
 
-  bool wordFollows(std::string_view word) {
-    if (ascii_) return lowered(text_.peekWord()) == word;
-    std::string next(word.size(), '\0');
-    if (file_->size() - text_.offset() < next.size()) return false;
-    file_->readAt(text_.offset(), std::as_writable_bytes(std::span(next)));
-    return lowered(next) == word;
-  }
-
   void readColours() {
     const std::string name = nextName();
     const std::vector<std::string> words = restOfLine();
@@ -427,93 +349,10 @@ class LegacyReader {
     return true;
   }
 
-  /// Binary files have eight bits in a byte, and padding at the end of the array.
-  void skipBits(const std::string& name, uint64_t components, uint64_t tuples) {
-    const uint64_t left = file_->size() - text_.offset();
-    if (components > kMaxComponents || (components > 0 && tuples > 8 * left / components))
-      fail("array {} needs {} x {} bits, but only {} bytes are left; the file is truncated or damaged", name,
-           tuples, components, left);
-    const uint64_t bits = tuples * components;
-    if (!ascii_) return text_.seek(text_.offset() + (bits + 7) / 8);
-    for (uint64_t n = 0; n < bits; ++n) text_.number();
-  }
-
-  void skipStrings(uint64_t components, uint64_t tuples) {
-    const uint64_t strings = tuples > 0 && components > kMaxNodes / tuples ? kMaxNodes : tuples * components;
-    for (uint64_t n = 0; n < strings; ++n) {
-      if (ascii_) {
-        if (!text_.line()) fail("ends inside an array of strings; the file is truncated");
-        continue;
-      }
-      // The first two bits of a length give its size: 8, 4, 2 or 1 bytes.
-      std::byte first;
-      file_->readAt(text_.offset(), std::span(&first, 1));
-      const auto bytes = size_t{8} >> std::to_integer<unsigned>(first >> 6);
-      std::array<std::byte, 8> length{};
-      file_->readAt(text_.offset(), std::span(length).last(bytes));
-      length[8 - bytes] &= std::byte{0x3f};
-      const auto skipped = loadStored<uint64_t>(length.data(), kMachineByteOrder != ByteOrder::kBig);
-      if (skipped > file_->size() - text_.offset() - bytes)
-        fail("declares a string of {} bytes; the file is truncated or damaged", skipped);
-      text_.seek(text_.offset() + bytes + skipped);
-    }
-  }
-
-  /// Skips everything up to and including the next empty line.
-  void skipMetadata() {
-    text_.line();
-    for (;;) {
-      const auto line = text_.line();
-      if (!line || line->find_first_not_of(" \t") == std::string_view::npos) return;
-    }
-  }
-
-  /// Reads the type, the last word before the numbers, and the line break; binary numbers follow at once.
-  std::string lineOfType() {
-    const std::vector<std::string> words = restOfLine();
-    if (words.size() != 1) fail("found {} words; expected a type", words.size());
-    return words[0];
-  }
-
   void addArray(const std::string& name, const std::string& type, uint64_t components) {
     if (skipIfNotDrawn(name, type, components, tuples_)) return;
     addDataArray(piece_, owner_ == Owner::kCells, readNumbers(name, type, components, tuples_),
                  grid_.warnings);
-  }
-
-  VtkArray readNumbers(const std::string& name, const std::string& type, uint64_t components,
-                       uint64_t tuples) {
-    VtkArray array;
-    array.name = name;
-    const std::string type_word = lowered(type);
-    const auto* const known = std::find_if(std::begin(kTypes), std::end(kTypes),
-                                           [&](const auto& entry) { return type_word == entry.first; });
-    if (known == std::end(kTypes))
-      fail("array {} has type {}; expected float, double or an integer", name, type);
-    if (components == 0 || components > kMaxComponents)
-      fail("array {} has {} components; expected 1 to {}", name, components, kMaxComponents);
-    array.type = known->second;
-    array.components = static_cast<uint32_t>(components);
-    array.tuples = tuples;
-    const uint64_t numbers = tuples * components, bytes = tuples * array.tupleBytes();
-    const uint64_t left = file_->size() - text_.offset();
-    // In text, a number needs a digit and a space.
-    if (ascii_ ? numbers > (left + 1) / 2 : bytes > left)
-      fail("array {} needs {} numbers, but only {} bytes are left; the file is truncated or damaged", name,
-           numbers, left);
-    if (ascii_) {
-      array.order = kMachineByteOrder;
-      const auto spooled = std::make_shared<SpooledBytes>(
-          files_.spool, bytes,
-          [&](const SpoolFile::Sink& sink) { packNumbers(text_, numbers, array.type, sink); });
-      spooled->fill();
-      array.bytes = spooled;
-    } else {
-      array.order = ByteOrder::kBig;
-      array.bytes = std::make_shared<FileBytes>(file_, text_.offset(), text_.offset() + bytes);
-      text_.seek(text_.offset() + bytes);
-    }
-    return array;
   }
 
   void finishNodes() const {
@@ -525,10 +364,6 @@ class LegacyReader {
       fail("has no POINTS; the file is truncated");
   }
 
-  VtkFiles files_;
-  std::shared_ptr<const PooledFile> file_;
-  TextReader text_;
-  bool ascii_ = true;
   std::string dataset_;
   bool uniform_ = false, unstructured_ = false, has_extent_ = false;
   Owner owner_ = Owner::kGrid;

@@ -1,0 +1,101 @@
+// What annotations are drawn with: a canvas of Cairo's, ink, text and lines in space.
+#pragma once
+
+#include <cairo/cairo.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "render/image/image.h"
+#include "render/project/screen_view.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+
+/// A transparent Cairo surface for lines and text, to be composited over an Image.
+class Canvas {
+ public:
+  explicit Canvas(ImageSize size)
+      : surface_(cairo_image_surface_create(CAIRO_FORMAT_ARGB32, size.width, size.height)),
+        cairo_(cairo_create(surface_.get())) {
+    if (const cairo_status_t status = cairo_status(cairo_.get()); status != CAIRO_STATUS_SUCCESS)
+      throw Error("cannot annotate an image of {}x{} pixels: {}", size.width, size.height,
+                  cairo_status_to_string(status));
+    cairo_select_font_face(cairo_.get(), "sans", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+    cairo_set_line_cap(cairo_.get(), CAIRO_LINE_CAP_ROUND);
+  }
+
+  cairo_t* get() const { return cairo_.get(); }
+
+  /// Calls `use` with the channels (0..1, premultiplied) of every pixel that is not transparent.
+  template <typename Use>
+  void forEachPixel(const Use& use) const {
+    cairo_surface_flush(surface_.get());
+    const unsigned char* const bytes = cairo_image_surface_get_data(surface_.get());
+    const int stride = cairo_image_surface_get_stride(surface_.get());
+    const int width = cairo_image_surface_get_width(surface_.get());
+    const int height = cairo_image_surface_get_height(surface_.get());
+    for (int y = 0; y < height; ++y) {
+      // Cairo's ARGB32: 32-bit words in the machine's byte order, alpha in the highest byte.
+      const auto* const row = reinterpret_cast<const uint32_t*>(bytes + static_cast<ptrdiff_t>(y) * stride);
+      for (int x = 0; x < width; ++x) {
+        const uint32_t argb = row[x];
+        if (argb == 0) continue;
+        const auto channel = [&](int shift) { return static_cast<float>(argb >> shift & 255) / 255; };
+        use(x, y, glm::vec4(channel(16), channel(8), channel(0), channel(24)));
+      }
+    }
+  }
+
+ private:
+  struct Destroy {
+    void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
+    void operator()(cairo_t* cairo) const { cairo_destroy(cairo); }
+  };
+  std::unique_ptr<cairo_surface_t, Destroy> surface_;
+  std::unique_ptr<cairo_t, Destroy> cairo_;
+};
+
+inline glm::dvec3 inkFor(const glm::vec4& background) {
+  const glm::dvec3 over_white = glm::dvec3(background) + (1.0 - background.a);
+  return glm::dvec3(glm::dot(over_white, glm::dvec3(0.299, 0.587, 0.114)) > 0.5 ? 0.0 : 1.0);
+}
+
+inline void setInk(cairo_t* cairo, const glm::dvec3& rgb, double alpha = 1) {
+  cairo_set_source_rgba(cairo, rgb.x, rgb.y, rgb.z, alpha);
+}
+
+inline double fontSize(ImageSize size) {
+  return std::clamp(size.height / 42.0, 9.0, 96.0);
+}
+
+/// Draws text centred on `centre`.
+inline void drawText(cairo_t* cairo, const glm::dvec2& centre, const std::string& text) {
+  cairo_text_extents_t extents;
+  cairo_text_extents(cairo, text.c_str(), &extents);
+  cairo_move_to(cairo, centre.x - extents.x_bearing - extents.width / 2,
+                centre.y - extents.y_bearing - extents.height / 2);
+  cairo_show_text(cairo, text.c_str());
+}
+
+/// The projection of the part of a line that is in front of the near plane; nullopt if none is.
+inline std::optional<std::pair<glm::dvec2, glm::dvec2>> lineInImage(const ScreenView& view, glm::dvec3 a,
+                                                                    glm::dvec3 b) {
+  if (view.projection == Projection::kPerspective) {
+    if (a.z < view.near && b.z < view.near) return std::nullopt;
+    if (a.z < view.near) a += (view.near - a.z) / (b.z - a.z) * (b - a);
+    if (b.z < view.near) b += (view.near - b.z) / (a.z - b.z) * (a - b);
+  }
+  return std::pair{view.pixelFromView(a), view.pixelFromView(b)};
+}
+
+}  // namespace curvisplat

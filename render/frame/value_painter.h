@@ -1,0 +1,31 @@
+// A painter of values in place of colours: it finds where each pixel has half of its opacity, and what is there. Front to
+// back on the processor, splat by splat; some ten times as slow as CpuPainter, but for what lies behind the half.
+//
+// The splats have to have ScreenDepths, all of them: their picture has layers (everywhere()) that lie before everything.
+// The real layers, if there are any, take their part of the opacity where their depth is reached.
+#pragma once
+
+#include <memory>
+
+#include "render/frame/backend.h"
+#include "render/project/painter.h"
+#include "render/project/screen_view.h"
+
+namespace curvisplat {
+
+/// What the painter needs to know; borrowed.
+struct ValueInputs {
+  const Image& picture;       // that has been drawn, over a transparent background: its opacities
+  const PixelLayers* layers;  // the real ones; may be null
+  const ScreenView& view;
+  // Scalars above the boundary are those of isosurfaces (iso_table.h): scale f + offset.
+  double boundary = 0, scale = 1, offset = 0;
+};
+
+/// Layers that make all splats have ScreenDepths.
+PixelLayers everywhere(ImageSize size, double depth_origin);
+
+/// end() returns an image as pixelValuesOf() takes it.
+std::unique_ptr<PaintingBackend> makeValueBackend(const ValueInputs& inputs);
+
+}  // namespace curvisplat

@@ -1,0 +1,248 @@
+// Pictures of two scalars: the opacity of one and the colours of another, against the ray march of both; with clip
+// planes, slices and isosurfaces; and the same picture by every painter, with any threads and memory.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <memory>
+
+#include "preprocess/convert/convert.h"
+#include "preprocess/scenes/scenes.h"
+#include "render/image/image_file.h"
+#include "stream/base/progress.h"
+#include "tests/reference/function_grid.h"
+#include "tests/reference/known_pictures.h"
+#include "tests/support/run_program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr ImageSize kSize{256, 256};
+constexpr uint64_t kNodes[3] = {128, 64, 64};
+
+/// The scalar of the colours.
+double hueAt(const glm::dvec3& at) {
+  return 0.5 + 0.5 * std::sin(4 * at.x + 3 * at.y) * std::cos(3 * at.z);
+}
+
+const TransferFunction& hues() {
+  static const TransferFunction function = TransferFunction::preset("cool-warm", 0, 1, 1);
+  return function;
+}
+
+class TwoScalarsTest : public testing::Test {
+ protected:
+  TwoScalarsTest() {
+    const FunctionGridSource source(
+        {gridBlock(kNodes[0], kNodes[1], kNodes[2])}, 2, [this](const GridNode& node) {
+          const glm::dvec3 uvw(double(node.i) / (kNodes[0] - 1), double(node.j) / (kNodes[1] - 1),
+                               double(node.k) / (kNodes[2] - 1));
+          const glm::dvec3 at = annulus_->position(uvw);
+          return NodeValues{at, {float(annulus_->scalar(at)), float(hueAt(at))}};
+        });
+    ConvertOptions options;
+    options.output = folder_ / "a.splats";
+    options.scalars = {0, 1};
+    Progress progress;
+    convert(source, options, progress);
+  }
+
+  Image marched(const OpticalFunction& opacity, const ReferenceField& field,
+                const ReferenceLayers& layers = {}) const {
+    MarchSteps steps;
+    steps.step = 0.008;
+    const TwoScalars scalars{opacity, [](const glm::dvec3& at) { return hues().at(hueAt(at)).colour; }};
+    return toImage(referenceMarch(field, scalars, halfAnnulusCamera(), kSize, steps, layers));
+  }
+  Image drawn(const TransferFunction& opacity, const FrameOptions& options,
+              Backend backend = Backend::kCpu) const {
+    const CacheReader cache(folder_ / "a.splats");
+    FrameRenderer renderer(cache, DrawnScalars({0, opacity}, {1, hues()}), backend);
+    FrameStatistics statistics;
+    return renderer.render(halfAnnulusCamera(), options, statistics);
+  }
+  static double db(const Image& image, const Image& reference) {
+    return compareImages(image, reference).psnr_db;
+  }
+
+  const TemporaryFolder folder_;
+  const std::shared_ptr<const Scene> annulus_ = makeScene("half-annulus");
+  const SceneField field_{*annulus_};
+};
+
+TEST_F(TwoScalarsTest, AreThoseOfTheRayMarchAtAllLevels) {
+  const struct {
+    std::string function;
+    std::array<double, 3> least_db;  // finest, 4 pixels, 8 pixels
+  } pictures[] = {{"smooth", {79, 69.5, 61.5}}, {"band", {73.5, 65, 59.5}}, {"step", {65.5, 65, 58.5}}};
+  for (const auto& [name, least_db] : pictures) {
+    const KnownFunction function = KnownFunction::of(name);
+    const Image reference = marched(function.exact, field_);
+    for (size_t level = 0; level < 3; ++level) {
+      FrameOptions options = knownFrame(kSize);
+      options.lod_pixels = std::array{0.0, 4.0, 8.0}[level];
+      const double all = db(drawn(function.table, options), reference);
+      options.classification = Classification::kFlat;
+      const double flat = db(drawn(function.table, options), reference);
+      fmt::print("two scalars, {}, level {}: {:.1f} dB, one value a splat {:.1f} dB\n", name, level, all,
+                 flat);
+      EXPECT_GE(all, least_db[level]) << name << ", level " << level;
+      EXPECT_LT(flat, least_db[level]) << name << ", level " << level;
+    }
+  }
+}
+
+TEST_F(TwoScalarsTest, AreCutByClipPlanes) {
+  const ClipPlane plane{{-0.4, 0, 0.5}, {0.6, 0.5, -0.7}};
+  const KnownFunction function = KnownFunction::of("smooth");
+  const Image reference = marched(function.exact, ClippedField(field_, {plane}));
+  FrameOptions options = knownFrame(kSize);
+  options.clip_planes = {plane};
+  for (const double lod : {0.0, 4.0}) {
+    options.lod_pixels = lod;
+    const double all = db(drawn(function.table, options), reference);
+    fmt::print("two scalars, clipped, {} pixels: {:.1f} dB\n", lod, all);
+    EXPECT_GE(all, lod == 0 ? 79 : 64.5);
+  }
+}
+
+TEST_F(TwoScalarsTest, SlicesHaveTheColours) {
+  const glm::dvec3 point(-0.4, 0, 0.5), normal(0.6, 0.5, -0.7);
+  const KnownFunction function = KnownFunction::of("smooth");
+  const ReferenceLayers layers = [&](const glm::dvec3& origin, const glm::dvec3& direction) {
+    const double distance = glm::dot(normal, point - origin) / glm::dot(normal, direction);
+    const glm::dvec3 at = origin + distance * direction;
+    std::vector<ReferenceLayer> found;
+    if (annulus_->contains(at)) found.push_back({distance, hues().at(hueAt(at)).colour, 0.6});
+    return found;
+  };
+  const Image reference = marched(function.exact, field_, layers);
+  FrameOptions options = knownFrame(kSize);
+  auto scene = std::make_shared<SurfaceScene>();
+  scene->slices = {{point, normal}};
+  scene->slice_opacity = 0.6;
+  options.scene = scene;
+  const double all = db(drawn(function.table, options), reference);
+  fmt::print("two scalars, slice: {:.1f} dB\n", all);
+  EXPECT_GE(all, 45);  // outlines of the slice are smooth here
+}
+
+TEST_F(TwoScalarsTest, IsosurfacesHaveTheColours) {
+  // Where the isosurface of the one scalar is, the other's colours are.
+  FrameOptions options = knownFrame(kSize);
+  auto scene = std::make_shared<SurfaceScene>();
+  scene->isovalues = {0.5};
+  scene->volume = false;
+  options.scene = scene;
+  const TransferFunction opacity = KnownFunction::of("smooth").table;
+  const Image coloured = drawn(opacity, options);
+  const CacheReader cache(folder_ / "a.splats");
+  FrameRenderer renderer(cache, 0, opacity, Backend::kCpu);
+  FrameStatistics statistics;
+  const Image plain = renderer.render(halfAnnulusCamera(), options, statistics);
+  const Camera camera = halfAnnulusCamera();
+  const glm::dvec3 forward = glm::normalize(camera.focal_point - camera.position);
+  const glm::dvec3 right = glm::normalize(glm::cross(forward, camera.view_up)),
+                   up = glm::cross(right, forward);
+  size_t compared = 0, wrong = 0;
+  for (int y = 8; y < kSize.height; y += 8)
+    for (int x = 8; x < kSize.width; x += 8) {
+      const double across = camera.parallel_scale * (2 * (x + 0.5) - kSize.width) / kSize.height;
+      const double upwards = camera.parallel_scale * (kSize.height - 2 * (y + 0.5)) / kSize.height;
+      const glm::dvec3 origin = camera.position + across * right + upwards * up;
+      std::optional<glm::dvec3> first;
+      for (double t = 0; t < 12 && !first; t += 0.002) {
+        const glm::dvec3 a = origin + t * forward, b = origin + (t + 0.002) * forward;
+        if (annulus_->contains(a) && annulus_->contains(b) &&
+            (annulus_->scalar(a) < 0.5) != (annulus_->scalar(b) < 0.5))
+          first = a;
+      }
+      if (!first || plain.pixel(x, y)[3] < 0.99f) continue;
+      // Light is a factor and something white: the differences between channels show the colour.
+      const glm::dvec3 c = hues().at(hueAt(*first)).colour;
+      const float* pixel = coloured.pixel(x, y);
+      const double light = (pixel[0] - pixel[2]) / (c.r - c.b);
+      if (std::abs(c.r - c.b) < 0.3) continue;
+      ++compared;
+      wrong += !(light > 0.1 && light < 1.1);
+    }
+  EXPECT_GT(compared, 40u);
+  EXPECT_LE(10 * wrong, compared);
+}
+
+TEST_F(TwoScalarsTest, EveryPainterDrawsTheSame) {
+  const TransferFunction opacity = KnownFunction::of("smooth").table;
+  FrameOptions options = knownFrame(kSize);
+  for (const bool full : {false, true}) {
+    if (full) {
+      auto scene = std::make_shared<SurfaceScene>();
+      scene->slices = {{{-0.4, 0, 0.5}, {0.6, 0.5, -0.7}}};
+      scene->slice_opacity = 0.5;
+      scene->isovalues = {0.7};
+      options.scene = scene;
+      options.light = Light{};
+      options.clip_planes = {{{0, 0, 0.8}, {0, 0.1, -1}}};
+    }
+    const Image cpu = drawn(opacity, options);
+    EXPECT_GT(db(drawn(opacity, options, Backend::kOsmesa), cpu), 50) << full;
+    for (const auto& [threads, memory] : {std::pair(1u, uint64_t{512} << 20), {2u, uint64_t{160} << 20}}) {
+      FrameOptions other = options;
+      other.threads = threads;
+      other.memory_bytes = memory;
+      EXPECT_EQ(drawn(opacity, other).rgba, cpu.rgba) << full << ", " << threads << " threads";
+    }
+  }
+}
+
+TEST_F(TwoScalarsTest, TheProgramDrawsThemAndSaysWhatIsWrong) {
+  const std::string cache = (folder_ / "a.splats").string(), output = (folder_ / "a.pfm").string();
+  const auto run = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"render", cache, "-o", output, "--size", "150x150", "--view", "iso"});
+    return runProgram(more);
+  };
+  const ProgramResult chosen = run({"--scalar", "s1", "--opacity-by", "s0"});
+  EXPECT_EQ(chosen.status, 0) << chosen.err;
+  const Image once = readImage(output);
+  // What it chose draws the same picture.
+  const std::string words = "chosen from the data: ";
+  const size_t at = chosen.out.find(words);
+  ASSERT_NE(at, std::string::npos) << chosen.out;
+  std::vector<std::string> same{"--scalar", "s1", "--opacity-by", "s0"};
+  std::string rest = chosen.out.substr(at + words.size());
+  rest.resize(rest.find('\n'));
+  for (size_t begin = 0; begin < rest.size();) {
+    const size_t end = std::min(rest.find(' ', begin), rest.size());
+    same.push_back(rest.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  EXPECT_NE(rest.find("--opacity-range"), std::string::npos) << rest;
+  EXPECT_EQ(run(same).status, 0) << rest;
+  EXPECT_EQ(readImage(output).rgba, once.rgba) << rest;
+
+  EXPECT_EQ(run({"--scalar", "s1", "--iso-by", "s0", "--iso", "0.5", "--volume", "off"}).status, 0);
+  const struct {
+    std::vector<std::string> options;
+    int status;
+    std::string words;
+  } refused[] = {
+      {{"--opacity-by", "x"}, 1, "--opacity-by: " + cache + ": the cache has no scalar 'x'; it has s0, s1"},
+      {{"--opacity-range", "0,1"}, 2, "--opacity-range 0,1: needs --opacity-by NAME"},
+      {{"--iso-by", "s1"}, 2, "--iso-by s1: needs an isosurface: --iso VALUE"},
+      {{"--iso-by", "s1", "--iso", "0.5"}, 2, "add --opacity-by s1, or --volume off"},
+      {{"--opacity-by", "s0", "--iso-by", "s1", "--iso", "0.5"}, 2, "a picture has two scalars"},
+      {{"--opacity-by", "s0", "--iso", "7"}, 1, "--iso 7: no isosurface: the values of s0 go from "},
+      {{"--opacity-by", "s0", "--opacity-tf", "viridis"},
+       2,
+       "--opacity-tf viridis: expected a ParaView preset"}};
+  for (const auto& [options, status, expected] : refused) {
+    const ProgramResult result = run(options);
+    EXPECT_EQ(result.status, status) << result.err;
+    EXPECT_NE(result.err.find(expected), std::string::npos) << result.err << " lacks " << expected;
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,182 @@
+#!/usr/bin/python3
+"""make_mesh_seeds.py FOLDER writes the seeds of unstructured grids, of lists of time steps and of steps.bin: FOLDER/<target>/<seed>.
+
+What others wrote: VTK (python3-vtk9) and libnetcdf (python3-netcdf4). The other seeds are make_seeds's.
+"""
+import json
+import pathlib
+import struct
+import sys
+import tempfile
+
+import netCDF4
+import numpy as np
+import vtk
+from vtk.util.numpy_support import numpy_to_vtk
+
+OUT = pathlib.Path(sys.argv[1])
+POINTS = np.array([[i, j, k] for k in range(3) for j in range(2) for i in range(2)], "f8")
+CELLS = np.array([[0, 1, 3, 2, 4, 5, 7, 6], [4, 5, 7, 6, 8, 9, 11, 10]])
+FACES = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
+
+
+def put(target, name, data):
+    (OUT / target).mkdir(parents=True, exist_ok=True)
+    (OUT / target / name).write_bytes(data)
+
+
+def grid():
+    of = vtk.vtkUnstructuredGrid()
+    points = vtk.vtkPoints()
+    points.SetData(numpy_to_vtk(POINTS.astype("f4"), deep=True))
+    of.SetPoints(points)
+    of.InsertNextCell(vtk.VTK_HEXAHEDRON, 8, [int(p) for p in CELLS[0]])
+    of.InsertNextCell(vtk.VTK_TETRA, 4, [4, 5, 6, 8])
+    return of
+
+
+def polyhedra():
+    of = grid()
+    faces = vtk.vtkIdList()
+    faces.InsertNextId(6)
+    for face in FACES:
+        faces.InsertNextId(4)
+        for corner in face:
+            faces.InsertNextId(int(CELLS[1][corner]))
+    of.InsertNextCell(vtk.VTK_POLYHEDRON, faces)
+    return of
+
+
+def with_values(of, ghosts=False):
+    for data, count, name in ((of.GetPointData(), of.GetNumberOfPoints(), "p"), (of.GetCellData(), of.GetNumberOfCells(), "c")):
+        values = numpy_to_vtk(np.arange(count, dtype="f4"), deep=True)
+        values.SetName(name)
+        data.AddArray(values)
+        if ghosts:
+            flags = numpy_to_vtk((np.arange(count) == 1).astype("u1"), deep=True)
+            flags.SetName("vtkGhostType")
+            data.AddArray(flags)
+    return of
+
+
+def vtk_seeds(folder):
+    def written(writer, of, name):
+        writer.SetFileName(str(folder / name))
+        writer.SetInputData(of)
+        writer.Write()
+        return (folder / name).read_bytes()
+
+    for mode in ("Ascii", "Binary", "Appended"):
+        for packed in ("None", "ZLib", "LZ4"):
+            if packed != "None" and mode == "Ascii":
+                continue
+            writer = vtk.vtkXMLUnstructuredGridWriter()
+            getattr(writer, f"SetDataModeTo{mode}")()
+            getattr(writer, f"SetCompressorTypeTo{packed}")()
+            writer.SetEncodeAppendedData(packed == "ZLib")
+            of = with_values(polyhedra(), ghosts=packed == "None")
+            put("vtk_xml", f"mesh_{mode}_{packed}".lower(), written(writer, of, "a.vtu"))
+    for version in (42, 51):
+        for binary in (False, True):
+            writer = vtk.vtkUnstructuredGridWriter()
+            writer.SetFileVersion(version)
+            writer.SetFileTypeToBinary() if binary else writer.SetFileTypeToASCII()
+            of = with_values(polyhedra() if version == 42 else grid(), ghosts=True)
+            put("vtk_legacy", f"mesh_{version}_{'binary' if binary else 'ascii'}", written(writer, of, "a.vtk"))
+
+
+def foam_seeds():
+    number, faces, owner, neighbour = {}, [], [], {}
+    for n, cell in enumerate(CELLS):
+        for face in FACES:
+            corners = [int(cell[corner]) for corner in face]
+            key = tuple(sorted(corners))
+            if key in number:
+                neighbour[number[key]] = n
+                continue
+            number[key] = len(faces)
+            faces.append(corners)
+            owner.append(n)
+    order = sorted(range(len(faces)), key=lambda face: face not in neighbour)
+    faces, owner = [faces[f] for f in order], [owner[f] for f in order]
+    beyond = list(neighbour.values())
+
+    def head(kind, binary, arch):
+        return f"FoamFile\n{{ format {'binary' if binary else 'ascii'}; {arch}class {kind}; }}\n// *\n".encode()
+
+    def text(values):
+        rows = (str(v) if np.ndim(v) == 0 else "(" + " ".join(map(str, v)) + ")" for v in values)
+        return f"{len(values)}\n(\n{chr(10).join(rows)}\n)\n".encode()
+
+    def binary(values, kind):
+        return f"{len(values)}(".encode() + np.ascontiguousarray(values, kind).tobytes() + b")"
+
+    def case(name, files):
+        put("openfoam", name, b"".join(struct.pack("<H", len(f)) + f for f in files[:5]) + files[5])
+
+    p = [1.5, -2.5]
+    u = [[1, 2, 3], [4, 5, 6]]
+    field = b"dimensions [0 2 -2 0 0 0 0];\ninternalField nonuniform List<scalar> "
+    ending = b";\nboundaryField { }\n"
+    of_faces = f"{len(faces)}\n(\n".encode() + b"".join(f"{len(f)}({' '.join(map(str, f))})\n".encode() for f in faces) + b")\n"
+    case("ascii", [head("vectorField", False, "") + text(POINTS), head("faceList", False, "") + of_faces,
+                   head("labelList", False, "") + text(owner), head("labelList", False, "") + text(beyond),
+                   head("volScalarField", False, "") + field + text(p) + ending,
+                   head("volVectorField", False, "") + b"internalField uniform (1 2 3);\n"])
+    for bits, order_of in ((32, "LSB"), (64, "MSB")):
+        arch = f'arch "{order_of};label={bits};scalar=64"; '
+        mark = "<" if order_of == "LSB" else ">"
+        label, scalar = f"{mark}i{bits // 8}", f"{mark}f8"
+        ends = np.cumsum([0] + [len(f) for f in faces])
+        case(f"binary_{bits}", [head("vectorField", True, arch) + binary(POINTS, scalar),
+                                head("faceCompactList", True, arch) + binary(ends, label) + b"\n" + binary(sum(faces, []), label),
+                                head("labelList", True, arch) + binary(owner, label),
+                                head("labelList", True, arch) + binary(beyond, label),
+                                head("volScalarField", True, arch) + field + binary(p, scalar) + ending,
+                                head("volVectorField", True, arch) + b"internalField nonuniform List<vector> " +
+                                b"2(" + np.array(u, scalar).tobytes() + b")" + ending])
+
+
+def exodus_seeds(folder):
+    for form in ("NETCDF3_CLASSIC", "NETCDF3_64BIT_OFFSET", "NETCDF3_64BIT_DATA"):
+        path = folder / "a.exo"
+        with netCDF4.Dataset(path, "w", format=form) as f:
+            f.api_version, f.floating_point_word_size = np.float32(5.1), np.int32(8)
+            for name, size in (("len_name", 5), ("time_step", None), ("num_dim", 3), ("num_nodes", 12), ("num_el_blk", 2),
+                               ("e1", 2), ("n1", 8), ("e2", 1), ("n2", 4), ("num_nod_var", 1), ("num_elem_var", 1)):
+                f.createDimension(name, size)
+            f.createVariable("time_whole", "f8", ("time_step",))[:] = [0, 1]
+            if form == "NETCDF3_CLASSIC":
+                f.createVariable("coord", "f8", ("num_dim", "num_nodes"))[:] = POINTS.T
+            else:
+                for axis in range(3):
+                    f.createVariable("coord" + "xyz"[axis], "f4", ("num_nodes",))[:] = POINTS[:, axis]
+            for number, kind, cells in ((1, "HEX8", CELLS), (2, "TETRA4", CELLS[:1, :4])):
+                connect = f.createVariable(f"connect{number}", "i4", (f"e{number}", f"n{number}"))
+                connect.elem_type = kind
+                connect[:] = cells + 1
+            for prefix, name in (("nod", "temp"), ("elem", "dens")):
+                names = f.createVariable(f"name_{prefix}_var", "S1", (f"num_{prefix}_var", "len_name"))
+                names[0] = np.array(list(name.ljust(5, "\0")), "S1")
+            f.createVariable("vals_nod_var1", "f8", ("time_step", "num_nodes"))[:] = np.arange(24).reshape(2, 12)
+            f.createVariable("vals_elem_var1eb1", "f4", ("time_step", "e1"))[:] = [[1, 2], [3, 4]]
+        put("exodus", form.lower(), path.read_bytes())
+
+
+def lists_of_steps():
+    files = [{"name": f"step{n}.vts", "time": n / 2} for n in (0, 1)]
+    put("file_series", "two_steps", json.dumps({"file-series-version": "1.0", "files": files}).encode())
+    put("file_series", "without_times", json.dumps({"files": [{"name": "step1.vts"}]}).encode())
+    for variables, steps in ((1, 1), (2, 3)):
+        data = b"CVSsteps" + struct.pack("<II", 1, variables)
+        for step in range(steps):
+            data += struct.pack("<dIIQQ", step / 4, step // 2, 0, 7 * (step // 2), 5)
+            data += struct.pack("<ddQQ", -1, step, 100, 3) * variables
+        put("steps", f"{steps}_of_{variables}", bytes([variables - 1]) + data)
+
+
+with tempfile.TemporaryDirectory() as name:
+    vtk_seeds(pathlib.Path(name))
+    exodus_seeds(pathlib.Path(name))
+foam_seeds()
+lists_of_steps()

@@ -1,0 +1,112 @@
+#include "tools/options/opacity_arguments.h"
+
+#include <utility>
+
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+/// The scalar of the opacities; empty where there is one scalar.
+const std::string& nameOf(const OpacityArguments& arguments) {
+  return arguments.scalar.empty() ? arguments.iso_scalar : arguments.scalar;
+}
+
+/// What the opacities' function is chosen from.
+ScalarArguments opacitiesOf(const OpacityArguments& arguments, const ScalarArguments& scalar) {
+  ScalarArguments of;
+  of.scalar = nameOf(arguments);
+  of.transfer_function = arguments.function;
+  of.range = arguments.range;
+  of.asinh = arguments.asinh;
+  of.opacity = scalar.opacity;
+  of.opacity_unit = scalar.opacity_unit;
+  return of;
+}
+
+size_t variableOf(const CacheReader& cache, const OpacityArguments& arguments) {
+  try {
+    return cache.variableNamed(nameOf(arguments));
+  } catch (const UsageError& error) {
+    throw Error("{}: {}", arguments.scalar.empty() ? "--iso-by" : "--opacity-by", error.what());
+  }
+}
+
+}  // namespace
+
+void addOpacityOptions(CLI::App& command, OpacityArguments& arguments, const std::string& group,
+                       const std::string& surfaces_group) {
+  command
+      .add_option("--opacity-by", arguments.scalar,
+                  "Name of another scalar, which gives the opacities; --scalar gives the colours. "
+                  "--opacity and --opacity-unit are then of this one")
+      ->group(group);
+  command
+      .add_option("--opacity-range", arguments.range,
+                  "Range of the --opacity-by scalar along which --opacity lies, as --range (default: chosen "
+                  "from the data)")
+      ->group(group);
+  command
+      .add_option("--opacity-asinh", arguments.asinh, "As --asinh, of the --opacity-by scalar: CENTRE,WIDTH")
+      ->group(group);
+  command
+      .add_option("--opacity-tf", arguments.function,
+                  "ParaView preset (.json) whose opacities are taken for the --opacity-by scalar")
+      ->group(group);
+  command
+      .add_option("--iso-by", arguments.iso_scalar,
+                  "Name of the scalar whose isosurfaces --iso draws, in the colours of --scalar; with the "
+                  "volume, that of --opacity-by (default: that, or the --scalar)")
+      ->group(surfaces_group);
+}
+
+void checkOpacityArguments(const OpacityArguments& arguments, const ScalarArguments& scalar,
+                           const SurfaceArguments& surfaces) {
+  if (!arguments.iso_scalar.empty()) {
+    if (surfaces.isovalues.empty())
+      throw UsageError("--iso-by {}: needs an isosurface: --iso VALUE", arguments.iso_scalar);
+    if (!arguments.scalar.empty() && arguments.scalar != arguments.iso_scalar)
+      throw UsageError(
+          "--iso-by {}: a picture has two scalars, and the isosurfaces are those of --opacity-by {}; leave "
+          "one of the two out",
+          arguments.iso_scalar, arguments.scalar);
+    if (arguments.scalar.empty() && surfaces.volume == "on")
+      throw UsageError(
+          "--iso-by {}: with the volume, its opacities are that scalar's: add --opacity-by {}, "
+          "or --volume off",
+          arguments.iso_scalar, arguments.iso_scalar);
+  }
+  if (arguments.scalar.empty()) {
+    const std::pair<const char*, const std::optional<std::string>&> given[] = {
+        {"--opacity-range", arguments.range},
+        {"--opacity-asinh", arguments.asinh},
+        {"--opacity-tf", arguments.function}};
+    for (const auto& [option, value] : given)
+      if (value) throw UsageError("{} {}: needs --opacity-by NAME", option, *value);
+    return;
+  }
+  if (arguments.function && !arguments.function->ends_with(".json"))
+    throw UsageError("--opacity-tf {}: expected a ParaView preset, NAME.json", *arguments.function);
+  checkFunctionArguments(opacitiesOf(arguments, scalar));
+}
+
+ScalarChoice chooseScalars(const OpacityArguments& arguments, const ScalarArguments& scalar,
+                           const CacheReader& cache, size_t shown, const glm::dvec3& scale, ChosenFor what) {
+  if (nameOf(arguments).empty()) {
+    PictureChoice picture(cache, shown, scale, what);
+    DrawnScalars scalars(shown, picture.function(scalar));
+    return {std::move(scalars), std::move(picture), {}};
+  }
+  const size_t variable = variableOf(cache, arguments);
+  ScalarArguments colours = scalar;
+  colours.opacity.reset();
+  colours.opacity_unit.reset();
+  PictureChoice of_colours(cache, shown, scale, what);
+  DrawnScalar colour{shown, of_colours.colours(colours)};
+  PictureChoice picture(cache, variable, scale, what);
+  DrawnScalar opacity{variable, picture.opacities(opacitiesOf(arguments, scalar))};
+  return {DrawnScalars(std::move(opacity), std::move(colour)), std::move(picture),
+          of_colours.chosenOptions()};
+}
+
+}  // namespace curvisplat

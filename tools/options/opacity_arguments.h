@@ -1,0 +1,42 @@
+// Options of pictures of two scalars: the colours of --scalar, the opacities of --opacity-by.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+
+#include "render/frame/drawn_scalars.h"
+#include "tools/options/picture_choice.h"
+#include "tools/options/scalar_arguments.h"
+#include "tools/options/surface_arguments.h"
+
+namespace curvisplat {
+
+/// Command-line arguments as given; checked and parsed later.
+struct OpacityArguments {
+  std::string scalar;                                 // of the opacities
+  std::string iso_scalar;                             // of the isosurfaces
+  std::optional<std::string> range, asinh, function;  // of the opacities
+};
+
+/// Adds --opacity-by, --opacity-range, --opacity-asinh and --opacity-tf, and --iso-by, under these headings.
+void addOpacityOptions(CLI::App& command, OpacityArguments& arguments, const std::string& group,
+                       const std::string& surfaces_group);
+
+/// Throws UsageError if options contradict each other: without a look at any file.
+void checkOpacityArguments(const OpacityArguments& arguments, const ScalarArguments& scalar,
+                           const SurfaceArguments& surfaces);
+
+/// The scalars of a picture with their functions, and the choice of the one whose opacities are drawn, which chooses
+/// the view as well.
+struct ScalarChoice {
+  DrawnScalars scalars;
+  PictureChoice picture;
+  std::string chosen_colours;  // of two scalars: as PictureChoice::chosenOptions(), of the colours
+};
+
+/// `shown`: the variable of --scalar. Throws as PictureChoice.
+ScalarChoice chooseScalars(const OpacityArguments& arguments, const ScalarArguments& scalar,
+                           const CacheReader& cache, size_t shown, const glm::dvec3& scale, ChosenFor what);
+
+}  // namespace curvisplat
