@@ -9,7 +9,7 @@ grid and 67 for temporary files. Then each cache is drawn --repeats times with e
 
 "cached" is the part of the grid's files that is in the page cache when a conversion starts, by mincore: they were just
 written. A cache's files are evicted from the page cache before it is drawn ("cold", checked with mincore), the program's own
-files are not. "first" is the time from the start of the process until a first, coarse picture is in its file, "frame" the time
+files are not. A conversion whose peak passes --convert-memory ends the script with status 1. "first" is the time from the start of the process until a first, coarse picture is in its file, "frame" the time
 of the whole picture once the cache is open. "peak" is the peak memory of the process, and "above" the part that a cache of
 eight splats does not need: program, driver and image take the rest.
 """
@@ -19,6 +19,7 @@ import os
 import pathlib
 import re
 import statistics
+import sys
 
 import page_cache
 import results
@@ -33,6 +34,13 @@ def count_of(text):
     if not match:
         raise argparse.ArgumentTypeError(f"'{text}' is not a number of nodes; expected one such as 64M")
     return int(match[1]) * SUFFIX[match[2]]
+
+
+def bytes_of(text):
+    match = re.fullmatch(r"(\d+)([KMG]?)", text)
+    if not match:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a size; expected one such as 512M")
+    return int(match[1]) * 1024 ** " KMG".index(match[2] or " ")
 
 
 def counts_of(text):
@@ -109,6 +117,13 @@ def value_of(told, keys):
     for key in keys:
         told = told[key]
     return told
+
+
+def beyond_cap(rows, cap):
+    """A line for each size whose conversion took more memory than it was given."""
+    return [f"conversion of {row['nodes'] / 1e6:.3g} M nodes took {row['conversion']['peak_memory_bytes'] / MIB:.1f} MiB, more than "
+            f"--convert-memory, {cap / MIB:.0f} MiB"
+            for row in rows if row["conversion"]["peak_memory_bytes"] > cap]
 
 
 def middle(runs, *keys):
@@ -213,7 +228,11 @@ def main():
     if arguments.plot:
         write_line_plots(arguments.program, arguments.plot,
                          [plot | {"lines": trends_of(plot["lines"])} for plot in plots])
+    passed = beyond_cap(rows, bytes_of(arguments.convert_memory))
+    for line in passed:
+        print(line)
+    return 1 if passed else 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -101,7 +101,9 @@ TEST(NodeSplats, OfAnUnevenGridAreStretchedButKeepVolumeAndMiddle) {
   grid.addScalar([](const glm::dvec3& p) { return p.x; });
   NodeSplatCorrections corrections;
   corrections.stretch = false;
-  const NodeSplats plain = grid.splats(corrections), stretched = grid.splats();
+  NodeSplatCorrections even;
+  even.growth = false;
+  const NodeSplats plain = grid.splats(corrections), stretched = grid.splats(even);
   EXPECT_NEAR(totalWeight(stretched) / totalWeight(plain), 1, 1e-12);
   for (uint64_t i = 0; i < 13; ++i) {
     const size_t n = grid.at(i, 2, 2);
@@ -124,6 +126,24 @@ TEST(NodeSplats, OfAnUnevenGridAreStretchedButKeepVolumeAndMiddle) {
     // The gradient stays.
     EXPECT_NEAR(stretched.values[n].slope.x / after.axis[0], plain.values[n].slope.x / before.axis[0], 1e-5);
     EXPECT_NEAR(stretched.values[n].mean, after.position.x, 1e-5);
+  }
+}
+
+// Towards the larger cells, the scalar along with it; half cells stay.
+TEST(NodeSplats, OfAGrowingGridDrift) {
+  MappedBlock grid(13, 5, 5, [](double i, double j, double k) { return glm::dvec3(std::pow(1.2, i), j, k); });
+  grid.addScalar([](const glm::dvec3& p) { return p.x; });
+  NodeSplatCorrections even;
+  even.growth = false;
+  const NodeSplats without = grid.splats(even), drifted = grid.splats();
+  for (uint64_t i = 0; i < 13; ++i) {
+    const size_t n = grid.at(i, 2, 2);
+    const Splat &before = without.splats[n].splat, &after = drifted.splats[n].splat;
+    const double moved = i == 0 || i == 12 ? 0 : kDrift * std::log(1.2) * before.axis[0];
+    EXPECT_NEAR(after.position.x, before.position.x + moved, 2e-3 * before.axis[0]) << i;
+    EXPECT_EQ(after.weight, before.weight);
+    EXPECT_NEAR(drifted.values[n].mean - without.values[n].mean, after.position.x - before.position.x,
+                2e-3 * before.axis[0]);
   }
 }
 
