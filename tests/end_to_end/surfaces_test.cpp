@@ -9,6 +9,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <sstream>
 
 #include "render/image/image.h"
 #include "render/image/image_file.h"
@@ -97,6 +98,50 @@ TEST_F(SurfaceOptions, EveryPainterDrawsTheSame) {
     EXPECT_EQ(with({"--backend", "cpu", "--threads", "1"}).rgba, cpu.rgba);
     EXPECT_EQ(with({"--backend", "cpu", "--threads", "3", "--memory", "96M"}).rgba, cpu.rgba);
   }
+}
+
+TEST_F(SurfaceOptions, APolygonFileOfVtkIsTheSameSurface) {
+  // The sphere's points and polygons, as they are in its OBJ file.
+  std::istringstream obj(sphere());
+  std::string points, connectivity, offsets, word;
+  int count = 0, cells = 0;
+  for (std::string line; std::getline(obj, line);) {
+    std::istringstream words(line);
+    words >> word;
+    if (word == "v") {
+      points += line.substr(1) + "\n";
+      ++count;
+      continue;
+    }
+    for (int corner = 0; words >> corner;) connectivity += fmt::format("{} ", corner - 1);
+    offsets += fmt::format("{} ", 4 * ++cells);
+  }
+  const std::string text = fmt::format(
+      "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" byte_order=\"LittleEndian\">\n"
+      "<PolyData><Piece NumberOfPoints=\"{}\" NumberOfPolys=\"{}\">\n"
+      "<Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" "
+      "format=\"ascii\">\n{}</DataArray></Points>\n"
+      "<Polys><DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">{}</DataArray>\n"
+      "<DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">{}</DataArray></Polys>\n"
+      "</Piece></PolyData></VTKFile>\n",
+      count, cells, points, connectivity, offsets);
+  writeFileAtomically(file("sphere.vtp"), text);
+  EXPECT_EQ(picture({"--surface", file("sphere.vtp")}).rgba, picture({"--surface", file("sphere.obj")}).rgba);
+
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string changed = text;
+    changed.replace(changed.find(from), from.size(), to);
+    writeFileAtomically(file("wrong.vtp"), changed);
+    const ProgramResult result = render({"--surface", file("wrong.vtp")});
+    EXPECT_EQ(result.status, 1) << result.err;
+    return result.err;
+  };
+  EXPECT_NE(with("ascii\">0 ", "ascii\">99999 ").find("a cell names a point that is not there"),
+            std::string::npos);
+  EXPECT_NE(with("ascii\">4 8", "ascii\">8 4").find("the offsets of its cells do not increase"),
+            std::string::npos);
+  EXPECT_NE(with("NumberOfPolys", "NumberOfLines").find("has no polygons"), std::string::npos);
+  EXPECT_NE(with("</PolyData></VTKFile>", "").find("wrong.vtp: "), std::string::npos);
 }
 
 TEST_F(SurfaceOptions, WhatAWallHidesIsNotRead) {

@@ -38,6 +38,10 @@ void view(const ViewArguments& arguments) {
   if (arguments.memory) options.memory_bytes = parseMemory("--memory", *arguments.memory);
   if (arguments.frame_time) options.target_s = parsePositive("--frame-time", *arguments.frame_time) / 1000;
   checkSurfaceArguments(arguments.surfaces);
+  for (const std::string& surface : arguments.surfaces.surfaces)
+    if (isVtp(surface))
+      throw UsageError("--surface {}: the window shows STL, PLY and OBJ files; render draws .vtp files",
+                       surface);
   const CacheReader cache = openAtStep(arguments.cache, arguments.steps);
   // The scalar changes in the window, so faces that are coloured by one keep colours of their own.
   options.scene = sceneOf(arguments.surfaces, cache, std::numeric_limits<size_t>::max(),

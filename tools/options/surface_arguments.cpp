@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec4.hpp>
 
+#include "preprocess/formats/vtk/vtk_surface.h"
 #include "render/mesh/mesh_file.h"
 #include "stream/base/error.h"
 #include "tools/options/grid_surfaces.h"
@@ -17,6 +18,12 @@
 
 namespace curvisplat {
 namespace {
+
+std::string extensionOf(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return extension;
+}
 
 std::vector<ClipPlane> parseSlices(const std::vector<std::string>& texts) {
   if (texts.size() > kMaxSlices)
@@ -64,6 +71,12 @@ glm::vec3 parseColour(const std::string& text) {
   return glm::vec3(parseBackground("--surface-colour", text));
 }
 
+TriangleMesh meshFromFile(const std::filesystem::path& path) {
+  if (!isVtp(path)) return readMeshFile(path);
+  VtkSurface surface = readVtkSurface(path);
+  return meshOf({std::move(surface.points), std::move(surface.triangles)});
+}
+
 void requireIsovalues(const SurfaceScene& scene, const CacheReader& cache, size_t drawn) {
   if (drawn >= cache.manifest().variables.size()) return;  // of a window, which may show any
   const VariableInfo& info = cache.manifest().variables[drawn];
@@ -92,7 +105,7 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
           "--surface", arguments.surfaces,
           "Opaque surface in the volume, lit: faces of the grid (imin, imax, ... kmax, \"block 3:k=min\", "
           "all, "
-          "walls, or a boundary condition's name; several with commas), or an STL, PLY or OBJ file in "
+          "walls, or a boundary condition's name; several with commas), or an STL, PLY, OBJ or VTP file in "
           "coordinates before --scale; repeatable")
       ->take_all()
       ->allow_extra_args(false)
@@ -161,13 +174,16 @@ void checkSurfaceArguments(const SurfaceArguments& arguments) {
     throw UsageError("--volume off leaves nothing to draw; give a --slice, a --surface or an --iso");
 }
 
+bool isVtp(const std::filesystem::path& path) {
+  return extensionOf(path) == ".vtp";
+}
+
 bool isSurfaceFile(const std::string& text) {
   std::error_code ignored;
   if (std::filesystem::exists(text, ignored)) return true;
-  std::string extension = std::filesystem::path(text).extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string extension = extensionOf(text);
   return text.find('/') != std::string::npos || extension == ".stl" || extension == ".ply" ||
-         extension == ".obj";
+         extension == ".obj" || extension == ".vtp";
 }
 
 std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, const CacheReader& cache,
@@ -184,7 +200,7 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
             : parseColour(arguments.colours.size() == 1 ? arguments.colours[0] : arguments.colours.at(n));
     if (isSurfaceFile(arguments.surfaces[n])) {
       Surface& surface = scene->surfaces.emplace_back();
-      surface.mesh = std::make_shared<TriangleMesh>(readMeshFile(arguments.surfaces[n]));
+      surface.mesh = std::make_shared<TriangleMesh>(meshFromFile(arguments.surfaces[n]));
       surface.colour = colour;
       continue;
     }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <string>
@@ -28,6 +29,9 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
 
 /// Throws UsageError for what cannot be: without a look at any file.
 void checkSurfaceArguments(const SurfaceArguments& arguments);
+
+/// Whether it is a .vtp file, by its extension.
+bool isVtp(const std::filesystem::path& path);
 
 /// Whether --surface names a file: one that is there, or by its extension.
 bool isSurfaceFile(const std::string& text);
