@@ -17,22 +17,14 @@ double numberOf(const JsonField& field) {
   return field.number(-kLargestNumber, kLargestNumber);
 }
 
-glm::dvec3 pointOf(const JsonField& field) {
-  const glm::dvec3 point = field.point();
-  for (int axis = 0; axis < 3; ++axis)
-    if (std::abs(point[axis]) > kLargestNumber)
-      field.fail(fmt::format("three numbers of magnitude up to {}", kLargestNumber));
-  return point;
-}
-
 KeyFrame keyFrame(const JsonField& fields) {
   KeyFrame key;
   key.time = numberOf(fields.at("time"));
-  key.camera.position = pointOf(fields.at("position"));
-  key.camera.focal_point = pointOf(fields.at("focal_point"));
+  key.camera.position = fields.at("position").point(kLargestNumber);
+  key.camera.focal_point = fields.at("focal_point").point(kLargestNumber);
   if (key.camera.position == key.camera.focal_point)
     fields.at("focal_point").fail("another point than position");
-  key.camera.view_up = pointOf(fields.at("view_up"));
+  key.camera.view_up = fields.at("view_up").point(kLargestNumber);
   if (!(glm::length(key.camera.view_up) > 0)) fields.at("view_up").fail("a direction");
   const auto scale = fields.find("parallel_scale"), angle = fields.find("view_angle");
   if (scale.has_value() == angle.has_value())

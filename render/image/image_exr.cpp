@@ -231,6 +231,18 @@ struct TinyExrFile {
   }
 };
 
+/// Throws Error unless TinyEXR can be given the file.
+ExrLayout checkFile(std::span<const std::byte> bytes, const std::string& name) {
+  Cursor cursor(bytes, name);
+  const ExrLayout layout = takeHeader(cursor, name);
+  requireChunks(cursor, layout, bytes, name);
+  return layout;
+}
+
+std::span<const unsigned char> memoryOf(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()};
+}
+
 }  // namespace
 
 Bytes encodeExr(const Image& image) {
@@ -292,10 +304,8 @@ Bytes encodeExr(const Image& image, std::span<const ImageChannel> more) {
 }
 
 std::vector<ImageChannel> decodeExrChannels(std::span<const std::byte> bytes, const std::string& name) {
-  Cursor cursor(bytes, name);
-  const ExrLayout layout = takeHeader(cursor, name);
-  requireChunks(cursor, layout, bytes, name);
-  const std::span memory(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+  checkFile(bytes, name);
+  const std::span memory = memoryOf(bytes);
   TinyExrFile exr;
   exr.parseHeader(memory, name);
   exr.loadPixels(memory, name);
@@ -310,11 +320,8 @@ std::vector<ImageChannel> decodeExrChannels(std::span<const std::byte> bytes, co
 }
 
 Image decodeExr(std::span<const std::byte> bytes, const std::string& name) {
-  Cursor cursor(bytes, name);
-  const ExrLayout layout = takeHeader(cursor, name);
-  requireChunks(cursor, layout, bytes, name);
-
-  const std::span memory(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+  const ExrLayout layout = checkFile(bytes, name);
+  const std::span memory = memoryOf(bytes);
   TinyExrFile exr;
   exr.parseHeader(memory, name);
   const bool grey = exr.channelNamed("Y") >= 0;

@@ -187,9 +187,12 @@ uint64_t JsonField::count(uint64_t least, uint64_t most) const {
   return value_->get<uint64_t>();
 }
 
-glm::dvec3 JsonField::point() const {
+glm::dvec3 JsonField::point(double largest) const {
   if (!(value_->is_array() && value_->size() == 3)) fail("three numbers");
-  return {(*this)[0].number(), (*this)[1].number(), (*this)[2].number()};
+  const glm::dvec3 point((*this)[0].number(), (*this)[1].number(), (*this)[2].number());
+  if (std::max({std::abs(point.x), std::abs(point.y), std::abs(point.z)}) > largest)
+    fail(fmt::format("three numbers of magnitude up to {}", largest));
+  return point;
 }
 
 std::vector<double> JsonField::numbers() const {

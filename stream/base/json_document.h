@@ -50,7 +50,8 @@ class JsonField {
   /// From `least` to `most`.
   double number(double least, double most) const;
   uint64_t count(uint64_t least = 0, uint64_t most = std::numeric_limits<uint64_t>::max()) const;
-  glm::dvec3 point() const;
+  /// Three numbers of magnitudes up to `largest`.
+  glm::dvec3 point(double largest = std::numeric_limits<double>::max()) const;
   std::vector<double> numbers() const;
   std::vector<std::string> texts() const;
 

@@ -5,6 +5,7 @@
 #include "stream/cache/cache_file.h"
 #include "stream/cache/cache_index.h"
 #include "stream/cache/partial_folder.h"
+#include "stream/model/border_code.h"
 
 namespace curvisplat {
 namespace {
@@ -76,6 +77,8 @@ std::shared_ptr<const ValuesFile> GeometryFolder::values(const Series& series, u
   FileInfo info{name, series.steps[step].values[variable].size, series.steps[step].values[variable].checksum};
   if (!manifest_.hasFeature(kSteps) && series.isFirstOfGeometry(step)) info = checkFile(file, manifest_);
   std::vector<BrickVariable> table = readVariableTable(file, info, bricks_);
+  if (manifest_.hasEarlierSlopes())
+    for (BrickVariable& record : table) record.largest_slope *= static_cast<float>(kEarlierSlopes);
   auto opened = std::make_shared<const ValuesFile>(ValuesFile{std::move(file), std::move(table)});
   known = opened;
   return opened;

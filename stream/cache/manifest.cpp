@@ -40,14 +40,6 @@ Json jsonOf(const glm::dvec3& v) {
   return Json::array({v.x, v.y, v.z});
 }
 
-glm::dvec3 pointOf(const JsonField& field) {
-  const glm::dvec3 point = field.point();
-  for (int axis = 0; axis < 3; ++axis)
-    if (std::abs(point[axis]) > kLargestCoordinate)
-      field.fail(fmt::format("three numbers of magnitude up to {}", kLargestCoordinate));
-  return point;
-}
-
 /// Checksums are strings of 16 hexadecimal digits, because many JSON readers convert numbers to doubles.
 uint64_t checksumIn(const JsonField& field) {
   const std::string digits = field.text();
@@ -84,12 +76,12 @@ bool allDifferent(std::vector<T> values) {
 
 void readRoot(const JsonField& fields, Manifest& manifest) {
   const JsonField root = fields.at("root"), size = root.at("size");
-  manifest.root.min = pointOf(root.at("min"));
+  manifest.root.min = root.at("min").point(kLargestCoordinate);
   manifest.root.size = size.number();
   if (!(manifest.root.size > 0 && manifest.root.size <= kLargestCoordinate))
     size.fail(fmt::format("a number above 0, up to {}", kLargestCoordinate));
-  manifest.lower = pointOf(fields.at("lower"));
-  manifest.upper = pointOf(fields.at("upper"));
+  manifest.lower = fields.at("lower").point(kLargestCoordinate);
+  manifest.upper = fields.at("upper").point(kLargestCoordinate);
   for (int axis = 0; axis < 3; ++axis)
     if (manifest.lower[axis] > manifest.upper[axis]) fields.at("lower").fail("at most 'upper'");
 }

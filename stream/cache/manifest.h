@@ -87,6 +87,8 @@ struct Manifest {
   std::vector<FileInfo> files;  // all files of the cache except the manifest
 
   bool hasFeature(const char* feature) const;
+  /// Whether records have slopes from before kEarlierSlopes (border_code.h).
+  bool hasEarlierSlopes() const { return hasFeature(kBorderFaces) && !hasFeature(kMergedBorders); }
 
   std::string toJson() const;
   /// Throws an Error that names `path` if a field is missing, of the wrong type or out of range, or if a

@@ -162,8 +162,7 @@ double borderReach(uint32_t border_code) {
 double drawnSlope(const glm::dvec3& slope, uint32_t border_code) {
   double squared = glm::dot(slope, slope);
   if (border_code == kNoBorder) return std::sqrt(squared);
-  // A half cell's, with what cells that shrink inwards add (render/project/border_parts.cpp).
-  constexpr double kWidest = kHalfCellStyle.cut.size + 0.13;
+  constexpr double kWidest = kHalfCellStyle.cut.size + kWidening;
   const InwardAxes inward = inwardAxes(border_code);
   if (inward.behind) return std::sqrt(squared);
   const double widest = inward.ratio > 0 ? std::max(mergedPart(inward).size, 1.0f) : kWidest;

@@ -116,7 +116,7 @@ TEST_F(FidelityProperties, BlocksThatAbutLookLikeOne) {
     const ImageDifference difference = compareImages(uncut_step, directly);
     fmt::print("{} blocks, step, without the codec: {:.1f} dB, {:.2f}/255\n", cuts[0] * cuts[1] * cuts[2],
                difference.psnr_db, 255 * difference.largest);
-    EXPECT_GE(difference.psnr_db, 100);
+    EXPECT_GE(difference.psnr_db, 95);  // growth is estimated from the nodes of a block
     EXPECT_LE(difference.largest, 0.5 / 255);
   }
 }

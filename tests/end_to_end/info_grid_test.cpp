@@ -53,7 +53,12 @@ TEST_F(InfoGrid, TellsOfOverlapsAndSoDoesConversion) {
   const ProgramResult converted =
       runProgram({"convert", overlapping, "-o", folder_ / "o.splats", "--scalar", "volume"});
   EXPECT_EQ(converted.status, 0) << converted.err;
-  EXPECT_TRUE(contains(converted.err, "warning: blocks overlap in about ")) << converted.err;
+  EXPECT_TRUE(contains(converted.err, "note: blocks overlap in about ")) << converted.err;
+  EXPECT_TRUE(contains(converted.err, "each point is drawn once")) << converted.err;
+  const ProgramResult all = runProgram(
+      {"convert", overlapping, "-o", folder_ / "all.splats", "--scalar", "volume", "--overlap", "all"});
+  EXPECT_EQ(all.status, 0) << all.err;
+  EXPECT_TRUE(contains(all.err, "warning: blocks overlap in about ")) << all.err;
   const ProgramResult abutting = runProgram({"convert", shared("overset/cylinder_chimera_abutting.x"), "-o",
                                              folder_ / "a.splats", "--scalar", "k"});
   EXPECT_EQ(abutting.status, 0) << abutting.err;

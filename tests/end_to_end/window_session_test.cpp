@@ -48,14 +48,16 @@ TEST_F(WindowSession, LeavesAScreenshotOfEveryStep) {
   addPoint();
   shows("4_opacity_edited", 30);
   chooseScalar("volume");
-  shows("5_another_scalar", 35);
+  shows("5_another_scalar", 30);
   click("dark");
   shows("6_dark", 15);
   resize({900, 640});
   shows("7_resized", 30);
   const Image picture = saveAndCopy();
   writeImage(picture, folder() / "8_saved.png");
-  expectDraws(close().at(0), picture);
+  const auto command = close().at(0);
+  EXPECT_EQ(valueOf(command, "--scalar"), "volume");
+  expectDraws(command, picture);
 }
 
 }  // namespace

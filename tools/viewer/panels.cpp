@@ -120,7 +120,6 @@ void Panels::drawView(ViewState& state, PanelActions& actions, const PanelFacts&
   actions.changed |= ImGui::Checkbox("axes", &state.annotations.axes);
   ImGui::SameLine();
   actions.changed |= ImGui::Checkbox("axes grid", &state.annotations.axes_grid);
-  ImGui::SameLine();
   actions.changed |= ImGui::Checkbox("outline", &state.annotations.outline);
   ImGui::SameLine();
   actions.changed |= ImGui::Checkbox("dark", &state.dark);

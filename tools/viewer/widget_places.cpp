@@ -24,7 +24,8 @@ Places& places() {
 }  // namespace
 
 void nameWidget(const std::string& name) {
-  if (!places().file) return;
+  // A list that has just opened does not know its size yet, and so not its place.
+  if (!places().file || ImGui::IsWindowAppearing()) return;
   const ImVec2 at = ImGui::GetItemRectMin(), size = ImGui::GetItemRectSize();
   places().now += fmt::format("{:.0f} {:.0f} {:.0f} {:.0f} {}\n", at.x, at.y, size.x, size.y, name);
 }

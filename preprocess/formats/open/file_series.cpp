@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "preprocess/formats/open/described_mesh.h"
+#include "preprocess/formats/common/described_source.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
 #include "stream/base/json_document.h"
@@ -37,26 +37,6 @@ std::vector<ListedFile> filesIn(const std::filesystem::path& path) {
   return files;
 }
 
-/// A file of the series, with the times of all.
-class SeriesSource final : public GridSource {
- public:
-  SeriesSource(std::unique_ptr<GridSource> source, GridDescription description)
-      : source_(std::move(source)), description_(std::move(description)) {}
-
-  const GridDescription& description() const override { return description_; }
-  void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-            NodeArrays& out) const override {
-    source_->read(block, box, scalars, out);
-  }
-  bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override {
-    return source_->readFringe(block, box, out);
-  }
-
- private:
-  std::unique_ptr<GridSource> source_;
-  GridDescription description_;
-};
-
 }  // namespace
 
 bool isFileSeries(const InputFile& file) {
@@ -84,9 +64,7 @@ std::unique_ptr<DataSource> openFileSeries(
   description.files.push_back(options.grid.string());
   description.times = std::move(times);
   description.time_step = step;
-  if (auto mesh = describedMesh(source, description)) return mesh;
-  std::unique_ptr<GridSource> grid(dynamic_cast<GridSource*>(source.release()));
-  return std::make_unique<SeriesSource>(std::move(grid), std::move(description));
+  return described(std::move(source), std::move(description));
 }
 
 }  // namespace curvisplat

@@ -1,6 +1,6 @@
 #include "preprocess/formats/open/unpacked_source.h"
 
-#include "preprocess/formats/open/described_mesh.h"
+#include "preprocess/formats/common/described_source.h"
 #include "stream/base/error.h"
 #include "stream/base/paths.h"
 
@@ -32,37 +32,6 @@ GridDescription describedByOriginals(GridDescription description, const Unpacked
   return description;
 }
 
-class UnpackedSource final : public GridSource {
- public:
-  UnpackedSource(std::shared_ptr<const Unpacked> files, std::unique_ptr<GridSource> source)
-      : files_(std::move(files)),
-        source_(std::move(source)),
-        description_(describedByOriginals(source_->description(), *files_)) {}
-
-  const GridDescription& description() const override { return description_; }
-
-  void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-            NodeArrays& out) const override {
-    try {
-      source_->read(block, box, scalars, out);
-    } catch (const Error& error) {
-      throw Error("{}", withOriginals(error.what(), *files_));
-    }
-  }
-  bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override {
-    try {
-      return source_->readFringe(block, box, out);
-    } catch (const Error& error) {
-      throw Error("{}", withOriginals(error.what(), *files_));
-    }
-  }
-
- private:
-  std::shared_ptr<const Unpacked> files_;
-  std::unique_ptr<GridSource> source_;
-  GridDescription description_;
-};
-
 }  // namespace
 
 std::unique_ptr<DataSource> openUnpacked(
@@ -84,11 +53,9 @@ std::unique_ptr<DataSource> openUnpacked(
   }
   for (const auto& file : files) file->removeName();
   const auto held = std::make_shared<const Unpacked>(std::move(files));
-  if (auto mesh = describedMesh(source, describedByOriginals(source->description(), *held),
-                                [held](std::string text) { return withOriginals(std::move(text), *held); }))
-    return mesh;
-  std::unique_ptr<GridSource> grid(dynamic_cast<GridSource*>(source.release()));
-  return std::make_unique<UnpackedSource>(held, std::move(grid));
+  GridDescription description = describedByOriginals(source->description(), *held);
+  return described(std::move(source), std::move(description),
+                   [held](std::string text) { return withOriginals(std::move(text), *held); });
 }
 
 }  // namespace curvisplat

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "preprocess/formats/common/described_source.h"
 #include "preprocess/formats/plot3d/plot3d_source.h"
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
@@ -99,26 +100,6 @@ void takeLayout(const JsonField& meta, Plot3dForce& force) {
   }
 }
 
-/// A Plot3dSource with the times and the gas of the .p3d file.
-class MetaSource final : public GridSource {
- public:
-  MetaSource(std::unique_ptr<GridSource> files, GridDescription description)
-      : files_(std::move(files)), description_(std::move(description)) {}
-
-  const GridDescription& description() const override { return description_; }
-  void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
-            NodeArrays& out) const override {
-    files_->read(block, box, scalars, out);
-  }
-  bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override {
-    return files_->readFringe(block, box, out);
-  }
-
- private:
-  std::unique_ptr<GridSource> files_;
-  GridDescription description_;
-};
-
 }  // namespace
 
 bool isPlot3dMeta(const InputFile& file) {
@@ -161,7 +142,7 @@ std::unique_ptr<GridSource> openPlot3dMeta(const OpenGridOptions& options) {
   }
   of_step.solutions.insert(of_step.solutions.end(), options.solutions.begin(), options.solutions.end());
 
-  auto files = std::make_unique<Plot3dSource>(of_step);
+  std::unique_ptr<GridSource> files = std::make_unique<Plot3dSource>(of_step);
   GridDescription description = files->description();
   description.files.push_back(options.grid.string());
   if (const auto gamma = meta.find("gamma")) description.gas.gamma = gamma->number();
@@ -169,7 +150,7 @@ std::unique_ptr<GridSource> openPlot3dMeta(const OpenGridOptions& options) {
   description.times = std::move(times);
   description.time_step = number;
   description.warnings.insert(description.warnings.begin(), warnings.begin(), warnings.end());
-  return std::make_unique<MetaSource>(std::move(files), std::move(description));
+  return described(std::move(files), std::move(description));
 }
 
 }  // namespace curvisplat
