@@ -26,13 +26,7 @@ constexpr double kSmallestExtent = 1e-9, kLargestExtent = 1e12;
 // Splats hold variances, squares of differences of values; and they are added up.
 constexpr double kLargestRange = 1e18;
 
-struct Bounds {
-  glm::dvec3 lower{std::numeric_limits<double>::infinity()};
-  glm::dvec3 upper{-std::numeric_limits<double>::infinity()};
-  std::vector<ScalarRange> ranges;
-};
-
-void widen(Bounds& bounds, const NodeArrays& nodes, size_t begin, size_t end) {
+void widen(GridSurvey& bounds, const NodeArrays& nodes, size_t begin, size_t end) {
   for (size_t n = begin; n < end; ++n) {
     if (nodes.blank[n]) continue;
     const glm::dvec3 position(nodes.x[n], nodes.y[n], nodes.z[n]);
@@ -48,16 +42,6 @@ void widen(Bounds& bounds, const NodeArrays& nodes, size_t begin, size_t end) {
       range.max = std::max<double>(range.max, values[n]);
     }
   }
-}
-
-Bounds united(Bounds a, const Bounds& b) {
-  a.lower = glm::min(a.lower, b.lower);
-  a.upper = glm::max(a.upper, b.upper);
-  for (size_t scalar = 0; scalar < a.ranges.size(); ++scalar) {
-    a.ranges[scalar].min = std::min(a.ranges[scalar].min, b.ranges[scalar].min);
-    a.ranges[scalar].max = std::max(a.ranges[scalar].max, b.ranges[scalar].max);
-  }
-  return a;
 }
 
 }  // namespace
@@ -85,28 +69,26 @@ GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFac
     checkExtent(survey, reader.source().description(), reader.centring());
     return survey;
   }
-  GridSurvey survey;
-  Bounds total;
-  total.ranges.resize(reader.scalars());
+  GridSurvey none;
+  none.ranges.resize(reader.scalars());
+  GridSurvey survey = none;
   SlabStream slabs(reader, slab_bytes, kNoHalo, shareOf(ranks));
   while (const LoadedSlab* loaded = slabs.next()) {
     const size_t count = loaded->nodes.x.size();
-    survey.nodes += count;
-    survey.blanked += loaded->blanked;
-    survey.grid_checksum += checksumOfGrid(*loaded, reader.source().description().blocks[loaded->slab.block]);
     // The smallest and the largest do not depend on how the work is divided.
-    total = tbb::parallel_reduce(
-        tbb::blocked_range<size_t>(0, count, kNodesPerTask), total,
-        [&](const tbb::blocked_range<size_t>& range, Bounds bounds) {
+    GridSurvey of_slab = tbb::parallel_reduce(
+        tbb::blocked_range<size_t>(0, count, kNodesPerTask), none,
+        [&](const tbb::blocked_range<size_t>& range, GridSurvey bounds) {
           widen(bounds, loaded->nodes, range.begin(), range.end());
           return bounds;
         },
-        united);
+        unitedSurvey);
+    of_slab.nodes = count;
+    of_slab.blanked = loaded->blanked;
+    of_slab.grid_checksum = checksumOfGrid(*loaded, reader.source().description().blocks[loaded->slab.block]);
+    survey = unitedSurvey(std::move(survey), of_slab);
     progress.advance(count);
   }
-  survey.lower = total.lower;
-  survey.upper = total.upper;
-  survey.ranges = std::move(total.ranges);
   if (ranks) survey = combinedSurvey(survey, *ranks);
   checkExtent(survey, reader.source().description(), reader.centring());
   return survey;

@@ -139,6 +139,10 @@ class BlockOwners::SlabCover {
     return {std::max(window.j0 + 1, box.j0) - 1, std::min(box.j1 + 1, window.j1),
             std::max(window.k0 + 1, box.k0) - 1, std::min(box.k1 + 1, window.k1)};
   }
+  static BoundingBox twiceAsLarge(const BoundingBox& box) {
+    const glm::dvec3 margin = 0.5 * (box.upper - box.lower);
+    return {box.lower - margin, box.upper + margin};
+  }
   size_t rowAt(uint64_t j, uint64_t k) const {
     return (k - around_.k0) * (around_.j1 - around_.j0) + (j - around_.j0);
   }
@@ -162,28 +166,16 @@ class BlockOwners::SlabCover {
     for (uint64_t other_k = std::max(k, around_.k0 + 1) - 1; other_k < std::min(k + 2, around_.k1); ++other_k)
       for (uint64_t other_j = std::max(j, around_.j0 + 1) - 1; other_j < std::min(j + 2, around_.j1);
            ++other_j)
-        if (const BoundingBox& other = boxes_[rowAt(other_j, other_k)]; !other.isEmpty()) {
-          box.add(other.lower);
-          box.add(other.upper);
-        }
-    const glm::dvec3 margin = 0.5 * (box.upper - box.lower);
-    box.lower -= margin;
-    box.upper += margin;
-    return box;
+        box.add(boxes_[rowAt(other_j, other_k)]);
+    return twiceAsLarge(box);
   }
 
   std::vector<size_t> tilesThatMeet(uint32_t partner) const {
     BoundingBox all;
-    for (const BoundingBox& box : boxes_) {
-      if (box.isEmpty()) continue;
-      all.add(box.lower);
-      all.add(box.upper);
-    }
+    for (const BoundingBox& box : boxes_) all.add(box);
     std::vector<size_t> tiles;
     if (all.isEmpty()) return tiles;
-    const glm::dvec3 margin = 0.5 * (all.upper - all.lower);
-    all.lower -= margin;
-    all.upper += margin;
+    all = twiceAsLarge(all);
     for (const size_t tile : owners_.tiles_of_[partner])
       if (owners_.tiles_[tile].box.meets(all)) tiles.push_back(tile);
     return tiles;

@@ -25,8 +25,7 @@ void BoxTree::build(uint32_t begin, uint32_t end) {
   nodes_.push_back({{}, begin, end, 0});
   BoundingBox centres;
   for (uint32_t n = begin; n < end; ++n) {
-    nodes_[node].box.add(boxes_[n].box.lower);
-    nodes_[node].box.add(boxes_[n].box.upper);
+    nodes_[node].box.add(boxes_[n].box);
     centres.add(centreOf(boxes_[n].box));
   }
   if (end - begin <= kLeafBoxes) return;

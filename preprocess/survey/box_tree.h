@@ -21,6 +21,10 @@ struct BoundingBox {
     lower = glm::min(lower, point);
     upper = glm::max(upper, point);
   }
+  void add(const BoundingBox& other) {
+    lower = glm::min(lower, other.lower);
+    upper = glm::max(upper, other.upper);
+  }
   bool isEmpty() const { return !(lower.x <= upper.x && lower.y <= upper.y && lower.z <= upper.z); }
   /// Whether they share more than a face.
   bool meets(const BoundingBox& other) const {
