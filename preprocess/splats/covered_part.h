@@ -25,7 +25,7 @@ inline constexpr uint64_t kAllCovered = ~uint64_t{0};
 /// Bit n of what is covered stands for point n: along i, j and k, in cells from the middle.
 const std::array<glm::dvec3, kCellPoints>& cellPoints();
 
-/// Leaves of the splat what is not covered. `axes`: Q's images of the lattice's directions, as node_splats.h has
+/// Cuts the covered part off the splat. `axes`: Q's images of the lattice's directions, as node_splats.h has
 /// them. Returns the border code of what is left, which ends where the other block begins; nullopt if nothing is.
 /// Pure: any thread.
 std::optional<uint32_t> keepUncovered(uint64_t covered, const glm::dmat3& axes, Splat& splat,
