@@ -53,9 +53,8 @@ constexpr GridFormat kFormats[] = {
     {isVtkLegacy, openVtkLegacy, MoreFiles::kCombined},
     {isFileSeries, openListedFile, MoreFiles::kNone},  // before .p3d, which takes all JSON files
     {isPlot3dMeta, openStructured<openPlot3dMeta>, MoreFiles::kNone},
-    {CgnsFile::recognises, openAs<CgnsSource>,
-     MoreFiles::kCombined},                              // before NetCDF, which takes all HDF5 files
-    {isExodus, openAs<ExodusSource>, MoreFiles::kNone},  // before NetCDF, which they are
+    {CgnsFile::recognises, openCgns, MoreFiles::kCombined},  // before NetCDF, which takes all HDF5 files
+    {isExodus, openAs<ExodusSource>, MoreFiles::kNone},      // before NetCDF, which they are
     {NetcdfFile::recognises, openStructured<openNetcdf>, MoreFiles::kByItself},
 };
 
