@@ -163,6 +163,21 @@ def exodus_seeds(folder):
         put("exodus", form.lower(), path.read_bytes())
 
 
+def su2_seeds():
+    cells = "".join("12 " + " ".join(map(str, cell)) + f" {n}\n" for n, cell in enumerate(CELLS))
+    points = "".join(" ".join(map(str, point)) + f" {n}\n" for n, point in enumerate(POINTS))
+    zone = (f"% a mesh\nNDIME= 3\nNELEM= {len(CELLS)}\n{cells}NPOIN= {len(POINTS)}\n{points}"
+            "NMARK= 1\nMARKER_TAG= wall\nMARKER_ELEMS= 1\n9 0 1 3 2\n")
+    names, values = ["x", "y", "z", "Density"], np.column_stack([POINTS, np.arange(len(POINTS))])
+    text = ",".join(f'"{name}"' for name in ["PointID", *names]) + "\n" + "".join(
+        ",".join([str(n), *map(str, row)]) + "\n" for n, row in enumerate(values.tolist()))
+    binary = (struct.pack("<5i", 535532, len(names), len(POINTS), 1, 8) +
+              b"".join(name.encode().ljust(33, b"\0") for name in names) + values.astype("<f8").tobytes())
+    for name, mesh, restart in (("mesh", zone, b""), ("csv", zone, text.encode()), ("binary", zone, binary),
+                                ("zones", f"NZONE= 2\nIZONE= 1\n{zone}IZONE= 2\n{zone}", b"")):
+        put("su2", name, struct.pack("<H", len(mesh)) + mesh.encode() + restart)
+
+
 def lists_of_steps():
     files = [{"name": f"step{n}.vts", "time": n / 2} for n in (0, 1)]
     put("file_series", "two_steps", json.dumps({"file-series-version": "1.0", "files": files}).encode())
@@ -179,4 +194,5 @@ with tempfile.TemporaryDirectory() as name:
     vtk_seeds(pathlib.Path(name))
     exodus_seeds(pathlib.Path(name))
 foam_seeds()
+su2_seeds()
 lists_of_steps()

@@ -70,35 +70,6 @@ CgnsIntegers spooledIntegers(SpooledNumbers numbers) {
   return {[numbers](uint64_t first, std::span<int64_t> to) { numbers.read(first, to); }, count};
 }
 
-/// Writes integers to a spool file of its own, some at a time.
-class IntegerSpool {
- public:
-  explicit IntegerSpool(const std::filesystem::path& folder) {
-    numbers_.spool = std::make_shared<SpoolFile>(folder);
-  }
-  void add(int64_t value) {
-    pending_.push_back(value);
-    if (pending_.size() == kChunk) flush();
-  }
-  CgnsIntegers finish() {
-    flush();
-    return spooledIntegers(numbers_);
-  }
-
- private:
-  void flush() {
-    if (pending_.empty()) return;
-    const uint64_t at = numbers_.spool->append(
-        [&](const SpoolFile::Sink& sink) { sink(std::as_bytes(std::span(pending_))); });
-    if (numbers_.count == 0) numbers_.offset = at;
-    numbers_.count += pending_.size();
-    pending_.clear();
-  }
-
-  SpooledNumbers numbers_;
-  std::vector<int64_t> pending_;
-};
-
 class SectionReader {
  public:
   SectionReader(const CgnsFile& file, const CgnsNode& node, const std::filesystem::path& folder)
@@ -186,7 +157,7 @@ void SectionReader::checkBegins(const CgnsSection& section) const {
 
 /// Of files before CGNS 3.4. Elements of NGON_n and NFACE_n are written without their lengths.
 void SectionReader::findBegins(CgnsSection& section) const {
-  IntegerSpool begins(folder_), members(folder_);
+  NumberSpool<int64_t> begins(folder_), members(folder_);
   const bool counted = section.type != kCgnsMixed;
   std::vector<int64_t> values;
   uint64_t left = 0, elements = 0;  // numbers of this element that are to come
@@ -216,8 +187,8 @@ void SectionReader::findBegins(CgnsSection& section) const {
   if (elements != section.elements || left > 0)
     damaged("ends within element {} of {}", elements, section.elements);
   begins.add(written);
-  section.begins = begins.finish();
-  if (counted) section.connectivity = members.finish();
+  section.begins = spooledIntegers(begins.finish());
+  if (counted) section.connectivity = spooledIntegers(members.finish());
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "preprocess/formats/openfoam/foam_source.h"
 #include "preprocess/formats/plot3d/plot3d_meta.h"
 #include "preprocess/formats/plot3d/plot3d_source.h"
+#include "preprocess/formats/su2/su2_source.h"
 #include "preprocess/formats/vtk/vtk_legacy.h"
 #include "preprocess/formats/vtk/vtk_xml.h"
 #include "preprocess/grid/scalar_names.h"
@@ -56,6 +57,7 @@ constexpr GridFormat kFormats[] = {
     {CgnsFile::recognises, openCgns, MoreFiles::kCombined},  // before NetCDF, which takes all HDF5 files
     {isExodus, openAs<ExodusSource>, MoreFiles::kNone},      // before NetCDF, which they are
     {NetcdfFile::recognises, openStructured<openNetcdf>, MoreFiles::kByItself},
+    {isSu2, openAs<Su2Source>, MoreFiles::kByItself},
 };
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {
