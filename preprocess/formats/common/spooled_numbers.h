@@ -42,6 +42,11 @@ class NumberSpool {
     if (pending_.size() == kPending) flush();
   }
   uint64_t size() const { return added_; }
+  /// What has been added; more may follow.
+  SpooledNumbers soFar() {
+    flush();
+    return numbers_;
+  }
   SpooledNumbers finish() {
     flush();
     return std::move(numbers_);

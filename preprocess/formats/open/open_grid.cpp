@@ -7,6 +7,7 @@
 #include <charconv>
 
 #include "preprocess/formats/cgns/cgns_source.h"
+#include "preprocess/formats/ensight/ensight_source.h"
 #include "preprocess/formats/exodus/exodus_source.h"
 #include "preprocess/formats/netcdf/netcdf_source.h"
 #include "preprocess/formats/open/combined_source.h"
@@ -57,6 +58,7 @@ constexpr GridFormat kFormats[] = {
     {CgnsFile::recognises, openCgns, MoreFiles::kCombined},  // before NetCDF, which takes all HDF5 files
     {isExodus, openAs<ExodusSource>, MoreFiles::kNone},      // before NetCDF, which they are
     {NetcdfFile::recognises, openStructured<openNetcdf>, MoreFiles::kByItself},
+    {isEnsightCase, openEnsight, MoreFiles::kNone},
     {isSu2, openAs<Su2Source>, MoreFiles::kByItself},
 };
 
