@@ -15,6 +15,7 @@
 #include "preprocess/survey/cell_survey.h"
 #include "preprocess/survey/grid_checksum.h"
 #include "stream/base/error.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -79,6 +80,7 @@ GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFac
     GridSurvey of_slab = tbb::parallel_reduce(
         tbb::blocked_range<size_t>(0, count, kNodesPerTask), none,
         [&](const tbb::blocked_range<size_t>& range, GridSurvey bounds) {
+          const TraceScope trace("scan nodes");
           widen(bounds, loaded->nodes, range.begin(), range.end());
           return bounds;
         },
@@ -116,10 +118,12 @@ void countNodes(const GridSource& source, const RootCube& root, uint64_t slab_by
     const uint32_t level = counts.level();
     std::vector<VoxelRuns> runs(tasks, VoxelRuns(level));
     tbb::parallel_for(size_t{0}, tasks, [&](size_t task) {
+      const TraceScope trace("count nodes");
       const size_t end = std::min(nodes.x.size(), (task + 1) * kNodesPerTask);
       for (size_t n = task * kNodesPerTask; n < end; ++n)
         if (!nodes.blank[n]) runs[task].add(root.fromWorld({nodes.x[n], nodes.y[n], nodes.z[n]}));
     });
+    const TraceScope trace("add counts");
     for (const VoxelRuns& of_task : runs) counts.add(level, of_task.runs());
     progress.advance(nodes.x.size());
   }
