@@ -272,11 +272,13 @@ class Conversion {
     for (unsigned n = 1; n <= splats_.buckets_of_ranks.size(); ++n) file_->join(file_of(n), chainsOf(n));
   }
 
+  OctreePlan octreePlan() const {
+    return {root_, origin_->blocks(), options_.scalars.size(), plan_, own_scratch_};
+  }
+
   void build() {
     if (ranks_) return buildTogether();
-    OctreeBuilder builder(root_, origin_->blocks(), options_.scalars.size(), plan_, splats_.tree, *writer_,
-                          own_scratch_, progress_);
-    builder.build(*file_);
+    OctreeBuilder(octreePlan(), splats_.tree, *writer_, progress_).build(*file_);
   }
 
   /// Bricks that were appended by an interrupted conversion are made again.
@@ -286,9 +288,7 @@ class Conversion {
     Progress nothing_to_check;
     CacheWriter own(own_folder, root_, variables(), nothing_to_check);
     own.keep(0);
-    OctreeBuilder(root_, origin_->blocks(), options_.scalars.size(), plan_, splats_.tree, own, own_scratch_,
-                  progress_)
-        .buildShare(*file_, share.first, share.end);
+    OctreeBuilder(octreePlan(), splats_.tree, own, progress_).buildShare(*file_, share.first, share.end);
     if (isFirst()) writer_->keep(0);
     const std::vector<VariableInfo> infos = variables();
     joinBricks({root_, infos, splats_.tree, scratch_, partial_}, own, writer_.get(), *ranks_);
