@@ -37,12 +37,8 @@ std::optional<std::string> given(const Options& options, const std::string& name
 }
 
 ScalarArguments scalarArguments(const Options& function) {
-  return {function.at("scalar"),
-          given(function, "tf"),
-          given(function, "range"),
-          given(function, "opacity"),
-          given(function, "asinh"),
-          given(function, "opacity_unit")};
+  return {function.at("scalar"),      given(function, "tf"),    given(function, "range"),
+          given(function, "opacity"), given(function, "asinh"), given(function, "opacity_unit")};
 }
 
 CameraArguments cameraArguments(const Options& camera) {
@@ -97,8 +93,7 @@ py::tuple render(OpenCache& cache, const Options& function, const Options& camer
   const FrameArguments of_frame = frameArguments(
       frame, py::cast<std::vector<std::string>>(others["clip_planes"]), py::cast<bool>(others["shade"]),
       py::cast<unsigned>(others["threads"]), py::cast<bool>(others["keep_going"]));
-  const PictureArguments arguments{scalarArguments(function), cameraArguments(camera),
-                                   frameOptions(of_frame),
+  const PictureArguments arguments{scalarArguments(function), cameraArguments(camera), frameOptions(of_frame),
                                    parseBackend(py::cast<std::string>(others["backend"]))};
   DrawnPicture picture = cache.render(arguments, progress);
   return py::make_tuple(picture.rgba, picture.chosen, picture.notes, statisticsOf(picture.statistics));
@@ -202,7 +197,8 @@ py::dict convertCallable(const std::filesystem::path& output,
 
 py::dict convertFiles(const std::filesystem::path& output, const std::filesystem::path& grid,
                       const std::vector<std::filesystem::path>& solutions,
-                      const std::vector<std::string>& scalars, const py::dict& given_options, const py::object& progress) {
+                      const std::vector<std::string>& scalars, const py::dict& given_options,
+                      const py::object& progress) {
   ConvertArguments arguments;
   arguments.grid.grid = grid;
   arguments.grid.solutions = solutions;
