@@ -250,8 +250,9 @@ class Measurement {
         steps.step = 0.016 * grid.length;
         steps.cells = 1;
         steps.depth_tolerance = 5e-4;
-        writeImage(toImage(convergedMarch(grid.field, function, view.camera, size_, steps, kAgreementDb)),
-                   path);
+        writeImage(
+            toImage(convergedMarch(grid.field, function, view.camera, size_, steps, kAgreementDb).image),
+            path);
       }
     }
     return readImage(path);

@@ -262,7 +262,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   statistics.bricks_out_of_image = cut.out_of_image;
   statistics.bricks_transparent = cut.transparent;
   statistics.bricks_culled = cut.out_of_image + cut.transparent;
-  statistics.largest_level = static_cast<int>(cut.deepest_level);
+  statistics.largest_level = cut.deepest_level;
   statistics.largest_error_px = cut.largest_error_px;
   statistics.workers = pools_->budget.workers;
   statistics.memory_used_bytes = options.memory_bytes - pools_->budget.cache_bytes -

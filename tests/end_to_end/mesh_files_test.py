@@ -102,7 +102,7 @@ def with_scalars(grid):
     return grid
 
 
-def write_xml(grid, path, mode="Appended", compressor="ZLib", raw=True, order="LittleEndian", header="UInt32"):
+def write_xml(grid, path, mode="Appended", compressor="ZLib", *, raw=True, order="LittleEndian", header="UInt32"):
     writer = vtk.vtkXMLUnstructuredGridWriter()
     writer.SetFileName(str(path))
     writer.SetInputData(grid)
@@ -242,7 +242,7 @@ class MeshFiles(unittest.TestCase):
             for compressor in ("None", "ZLib", "LZ4"):
                 for order, header in (("LittleEndian", "UInt32"), ("BigEndian", "UInt64")):
                     with self.subTest(mode=mode, raw=raw, compressor=compressor, order=order):
-                        write_xml(grid, path, mode, compressor, raw, order, header)
+                        write_xml(grid, path, mode, compressor, raw=raw, order=order, header=header)
                         self.check(path, grid)
 
     def test_legacy_files(self):
