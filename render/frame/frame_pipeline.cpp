@@ -181,7 +181,7 @@ void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, Fra
     sampleSlice(shareOf(slice, options), *samplers.back(), options, statistics);
     if (options.ranks) samplers.back()->addOthers(*options.ranks);
   }
-  const StageTimer timer(statistics.surfaces_s);
+  const StageTimer timer(statistics.surfaces_s, "draw surfaces");
   const glm::dvec3 middle = 0.5 * (cache_.manifest().lower + cache_.manifest().upper);
   const SceneLook look{planner_.colours(), options.light, plan.settings.clip_planes,
                        view.projection == Projection::kPerspective ? 0 : view.viewFromData(middle).z};
