@@ -81,7 +81,7 @@ def with_scalars(grid):
     return grid
 
 
-def write_xml(grid, path, mode="Appended", compressor="ZLib", raw=True, order="LittleEndian", header="UInt32"):
+def write_xml(grid, path, mode="Appended", compressor="ZLib", *, raw=True, order="LittleEndian", header="UInt32"):
     writer = vtk.vtkXMLUnstructuredGridWriter()
     writer.SetFileName(str(path))
     writer.SetInputData(grid)

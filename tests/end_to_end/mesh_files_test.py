@@ -144,7 +144,7 @@ class MeshFiles(unittest.TestCase):
             for compressor in ("None", "ZLib", "LZ4"):
                 for order, header in (("LittleEndian", "UInt32"), ("BigEndian", "UInt64")):
                     with self.subTest(mode=mode, raw=raw, compressor=compressor, order=order):
-                        write_xml(grid, path, mode, compressor, raw, order, header)
+                        write_xml(grid, path, mode, compressor, raw=raw, order=order, header=header)
                         self.check(path, grid)
 
     def test_legacy_files(self):
