@@ -399,6 +399,22 @@ class Su2Meshes(MeshFormats):
                 self.assertIn("boundaries: lower, upper", info["notes"])
                 self.expect_same([self.path, self.restart], grid, {"c": None})
 
+    def test_derived_scalars(self):
+        mesh = Mesh(2)
+        self.write(mesh)
+        names = ["x", "y", "z", "Density", "Momentum_x", "Momentum_y", "Momentum_z", "Energy"]
+        rho, energy = 1 + mesh.p, 20 + mesh.p
+        table = np.column_stack([mesh.points, rho, rho * 2, rho, 0 * rho, energy])
+        head = np.array([535532, len(names), len(table), 1, 8], "<i4").tobytes()
+        text = b"".join(name.encode().ljust(33, b"\0") for name in names)
+        self.restart.write_bytes(head + text + table.astype("<f8").tobytes())
+        scalars = {s["name"]: s for s in self.info(self.path, self.restart)["scalars"]}
+        pressure = 0.4 * (energy - 0.5 * rho * 5)
+        self.assertAlmostEqual(scalars["pressure"]["max"], pressure.max(), places=5)
+        self.assertAlmostEqual(scalars["mach_number"]["min"], np.sqrt(5 * rho / (1.4 * pressure)).min(), places=5)
+        self.assertNotIn("vorticity_magnitude", scalars)
+        self.assertAlmostEqual(self.cache([self.path, self.restart], "mach_number")[1], 1, delta=2e-3)
+
     def test_zones(self):
         mesh = Mesh()
         self.write(mesh, zones=2)
