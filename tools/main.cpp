@@ -100,6 +100,7 @@ int run(int argc, char** argv) {
   addInfo(app);
   addRender(app);
   addView(app);
+  addServe(app);
   addBench(app);
   addGenerate(app);
   addCompare(app);

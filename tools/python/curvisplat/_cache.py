@@ -180,7 +180,7 @@ class Cache:
         Raises UsageError for options that make no sense, Error if reading or drawing fails, KeyboardInterrupt after
         Ctrl-C.
         """
-        function = _given(tf=colours, range=range, asinh=asinh, opacity_unit=opacity_unit)
+        function = _given(scalar=scalar, tf=colours, range=range, asinh=asinh, opacity_unit=opacity_unit)
         if opacity is not None:
             function["opacity"] = _opacities(opacity)
         camera = _given(view=view, position=position, focal_point=focal_point, view_up=view_up,
@@ -190,7 +190,7 @@ class Cache:
                        max_splats=None if max_splats is None else str(max_splats))
         others = {"clip_planes": [_numbers(plane) for plane in clip_planes], "shade": shade, "threads": threads,
                   "keep_going": keep_going, "backend": backend}
-        rgba, options, notes, statistics = self._core.render(scalar, function, camera, frame, others, progress)
+        rgba, options, notes, statistics = self._core.render(function, camera, frame, others, progress)
         picture = rgba.view(Picture)
         picture.options, picture.notes, picture.statistics = options, notes, statistics
         return picture
