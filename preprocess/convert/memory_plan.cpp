@@ -115,7 +115,8 @@ void MemoryPlan::requireSlabs(uint64_t bytes) {
 }
 
 uint64_t MemoryPlan::expectedPeak(uint64_t splats, size_t variables) const {
-  const uint64_t in_buckets = std::min(splats, 2 * plannedBucketSplats());
+  // Cells fill a bucket to three quarters, mostly; two are in memory.
+  const uint64_t in_buckets = std::min(splats, plannedBucketSplats() * 3 / 2);
   const uint64_t build = in_buckets * bucketBytesPerSplat(variables) + threads * brickScratchBytes(variables);
   const uint64_t slabs = 2 * std::min(slab_bytes, splats * slabBytesPerNode(variables));
   const uint64_t scatter = slabs + std::min(chunk_buffer_bytes, splats * regularRecordBytes(variables));
