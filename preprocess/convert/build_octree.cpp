@@ -11,6 +11,7 @@
 #include "preprocess/convert/divide_bucket.h"
 #include "preprocess/convert/splat_record.h"
 #include "stream/base/check.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 
@@ -179,6 +180,7 @@ void OctreeBuilder::buildCoincident(const BucketFile& file, uint32_t bucket, uin
 }
 
 void OctreeBuilder::append(uint32_t node, BuiltCell&& cell) {
+  const TraceScope trace("append bricks");
   built_.resize(std::max(built_.size(), tree_->size()));
   Built& built = built_[node];
   for (size_t n = 0; n < cell.bricks.size(); ++n) {

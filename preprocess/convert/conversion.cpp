@@ -27,6 +27,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/paths.h"
+#include "stream/base/trace.h"
 #include "stream/cache/cache_writer.h"
 #include "stream/cache/faces_file.h"
 #include "stream/cache/partial_folder.h"
@@ -130,6 +131,7 @@ class Conversion {
 
   void runPasses(std::span<const Pass> passes) {
     for (const Pass& pass : passes) {
+      const TraceScope trace(pass.name, TraceKind::kStage);
       progress_.begin(pass.name, pass.steps / (ranks_ ? ranks_->count() : 1), pass.unit);
       (this->*pass.run)();
       // What a pass has freed goes back to the system: the next one counts on it.

@@ -7,6 +7,7 @@
 
 #include "preprocess/convert/splat_record.h"
 #include "preprocess/grid/slabs.h"
+#include "stream/base/byte_text.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/model/brick.h"
@@ -64,8 +65,8 @@ uint64_t defaultMemory() {
 
 MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads) {
   if (cap_bytes < leastMemory(variables))
-    throw Error("--memory: conversion of {} scalars takes at least {} MiB; {:.4g} MiB were given", variables,
-                leastMemory(variables) / kMiB, static_cast<double>(cap_bytes) / static_cast<double>(kMiB));
+    throw Error("--memory {}: conversion of {} scalar{} takes at least {}", byteText(cap_bytes), variables,
+                variables == 1 ? "" : "s", byteText(leastMemory(variables)));
   const uint64_t bytes = cap_bytes - cap_bytes / kAllocatorShare - kProgramBytes;
 
   MemoryPlan plan;
@@ -108,8 +109,8 @@ uint64_t MemoryPlan::capForMesh(uint64_t mesh_bytes) {
 void MemoryPlan::requireSlabs(uint64_t bytes) {
   const uint64_t of_two = (bytes + kSlabsOfLongRows - 1) / kSlabsOfLongRows;
   if (capFor(of_two * kSlabShare) > cap_bytes)
-    throw Error("--memory: the grid's rows along i are long and need at least {} MiB; {} MiB were given",
-                (capFor(of_two * kSlabShare) >> 20) + 1, cap_bytes >> 20);
+    throw Error("--memory {}: the grid's rows along i are long and need at least {} MiB", byteText(cap_bytes),
+                (capFor(of_two * kSlabShare) >> 20) + 1);
   slab_bytes = std::max(slab_bytes, of_two);
 }
 

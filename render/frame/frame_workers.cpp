@@ -104,7 +104,7 @@ void FrameWorkers::loop(Worker& worker) {
     while (true) {
       std::optional<SweepBuffer::Batch> batch;
       {
-        const StageTimer timer(worker.statistics.workers_waited_s);
+        const StageTimer timer(worker.statistics.workers_waited_s, "wait for a batch", TraceKind::kWait);
         batch = sweep_.awaitNext();
       }
       if (!batch) break;
@@ -130,7 +130,7 @@ void FrameWorkers::sample(Worker& worker, const SliceWork& work) {
     for (uint64_t sequence = next_++; sequence < work.parts.size(); sequence = next_++) {
       const auto fetched = fetch(worker, sequence, work.parts[sequence], work.keep_going);
       if (!fetched) return;
-      const StageTimer timer(worker.statistics.project_s);
+      const StageTimer timer(worker.statistics.project_s, "sample slice");
       work.sampler.add(work.cache.manifest().root.cellMin(fetched->cell), fetched->geometry,
                        fetched->second.value_or(fetched->values), fetched->ranges);
     }
@@ -175,7 +175,7 @@ bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
       markSeen(number, Seen::kHidden);
       return passOver(sequence);
     }
-    const StageTimer timer(worker.statistics.project_s);
+    const StageTimer timer(worker.statistics.project_s, "project brick");
     const glm::dvec3 cell_min = work_->cache.manifest().root.cellMin(fetched->cell);
     worker.projector.project(work_->settings, work_->table, cell_min, fetched->geometry,
                              {fetched->values, fetched->second}, fetched->ranges);
@@ -225,11 +225,11 @@ bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t rank) {
   PrepareStatistics& statistics = worker.statistics;
   std::span<const DepthItem> sorted;
   {
-    const StageTimer timer(statistics.sort_s);
+    const StageTimer timer(statistics.sort_s, "sort brick");
     sorted = worker.sorter.sort(worker.keys, work_->keys.order());
   }
   {
-    const StageTimer timer(statistics.workers_waited_s);
+    const StageTimer timer(statistics.workers_waited_s, "wait for its turn", TraceKind::kWait);
     if (!sweep_.awaitTurn(sequence)) return false;
   }
   std::shared_ptr<SweepBuffer::Run> run;
@@ -238,10 +238,10 @@ bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t rank) {
       if (!hand(worker, *batch)) return false;
       continue;
     }
-    const StageTimer timer(statistics.workers_waited_s);
+    const StageTimer timer(statistics.workers_waited_s, "wait for space", TraceKind::kWait);
     if (!sweep_.awaitSpace(rank, sorted)) return false;
   }
-  const StageTimer timer(statistics.sort_s);
+  const StageTimer timer(statistics.sort_s, "fill sweep");
   sweep_.fill(*run, sorted, worker.projector.splats());
   return true;
 }
@@ -251,18 +251,18 @@ bool FrameWorkers::hand(Worker& worker, const SweepBuffer::Batch& batch) {
   std::span<const DepthItem> sorted;
   std::optional<std::span<ScreenSplat>> segment;
   {
-    const StageTimer timer(worker.statistics.sort_s);
+    const StageTimer timer(worker.statistics.sort_s, "sort batch");
     sweep_.itemsOf(batch, worker.batch_sorter.items(batch.count));
     sorted = worker.batch_sorter.sort();
   }
   {
-    const StageTimer timer(worker.statistics.workers_waited_s);
+    const StageTimer timer(worker.statistics.workers_waited_s, "wait for the ring", TraceKind::kWait);
     if (!sweep_.awaitFilled(batch)) return false;
     segment = ring_.acquire(batch.sequence, batch.count);
   }
   if (!segment) return false;
   {
-    const StageTimer timer(worker.statistics.sort_s);
+    const StageTimer timer(worker.statistics.sort_s, "copy batch");
     sweep_.copy(sorted, *segment);
     sweep_.giveBack(batch);
   }

@@ -62,6 +62,17 @@ void writeTexts(const Seeds& seeds) {
   state.camera.projection = Projection::kPerspective;
   state.function.addPoint(0.3, 0.4);
   seeds.write("view_state", "changed", toJson(state));
+  seeds.write(
+      "client_message", "view",
+      R"({"type": "view", "number": 7, "cache": 0, "size": [800, 600], "moving": true, "step": 0, "next": 1, "state": )" +
+          toJson(state) + "}");
+  seeds.write("client_message", "open", R"({"type": "open", "cache": 0, "size": [800, 600]})");
+  seeds.write("client_message", "choose", R"({"type": "choose", "cache": 2, "scalar": "density"})");
+  seeds.write(
+      "client_message", "histogram",
+      R"({"type": "histogram", "cache": 0, "scalar": "density", "low": 0.1, "high": 1, "log": true})");
+  seeds.write("client_message", "colours", R"({"type": "colours", "map": "viridis"})");
+  seeds.write("client_message", "shown", R"({"type": "shown", "picture": 3})");
 }
 
 void writeImages(const Seeds& seeds) {

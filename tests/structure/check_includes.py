@@ -29,7 +29,7 @@ PROGRAM_ROOMS = {
     "tools/output": set(),
     "tools/mpi": set(),
     "tools/options": {"tools/output"},
-    "tools/commands": {"tools/output", "tools/options", "tools/throughput", "tools/viewer"},
+    "tools/commands": {"tools/output", "tools/options", "tools/serve", "tools/throughput", "tools/viewer"},
     "tools/python": {"tools/output", "tools/options"},
     "tools": {"tools/output", "tools/options", "tools/commands"},
 }

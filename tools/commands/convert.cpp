@@ -28,6 +28,7 @@
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
 #include "tools/output/thread_failures.h"
+#include "tools/output/trace_of_run.h"
 
 namespace curvisplat {
 namespace {
@@ -202,6 +203,7 @@ void addConvert(CLI::App& app) {
       "Where blocks overlap: owner draws each point once, by the block with the smallest cells "
       "there; all draws every block (default: owner)");
   command->add_option("--stats", arguments->statistics, "Write times, bytes and counts to this JSON file");
+  command->add_option("--trace", arguments->trace, kTraceHelp);
   addGridOptions(*command, arguments->grid);
   addGasOptions(*command, arguments->gas);
   command->callback([arguments] {
@@ -211,8 +213,12 @@ void addConvert(CLI::App& app) {
     if ((series || adds) && !launchedRanks().alone())
       throw UsageError("{} one process converts; start one",
                        series ? "a series of time steps: " : "--add-scalar:");
-    if (series) return runConvertSeries(*arguments);
-    adds ? runAddScalar(*arguments) : runConvert(*arguments);
+    TraceOfRun trace(arguments->trace, gridAndCaches(*arguments));
+    if (series)
+      runConvertSeries(*arguments);
+    else
+      adds ? runAddScalar(*arguments) : runConvert(*arguments);
+    trace.end();
   });
 }
 

@@ -42,6 +42,7 @@
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
 #include "tools/output/thread_failures.h"
+#include "tools/output/trace_of_run.h"
 
 namespace curvisplat {
 namespace {
@@ -416,7 +417,12 @@ void addRender(CLI::App& app) {
       ->add_option("--stats", arguments->statistics,
                    "Write times, bytes and counts of every frame to this JSON file")
       ->group(how);
-  command->callback([arguments] { render(*arguments); });
+  command->add_option("--trace", arguments->trace, kTraceHelp)->group(how);
+  command->callback([arguments] {
+    TraceOfRun trace(arguments->trace, {arguments->cache, arguments->output, arguments->statistics});
+    render(*arguments);
+    trace.end();
+  });
 }
 
 }  // namespace curvisplat

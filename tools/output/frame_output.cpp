@@ -11,17 +11,29 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/paths.h"
+#include "stream/base/trace.h"
 #include "tools/output/movie_writer.h"
 
 namespace curvisplat {
 namespace {
 
+/// A picture that is encoded and written.
+void writeTraced(const Image& image, const std::filesystem::path& path) {
+  const TraceScope trace("write picture");
+  writeImage(image, path);
+}
+
+void writeTraced(const Image& image, std::span<const ImageChannel> more, const std::filesystem::path& path) {
+  const TraceScope trace("write picture");
+  writeExr(image, more, path);
+}
+
 class SingleFile : public FrameOutput {
  public:
   explicit SingleFile(std::filesystem::path path) : path_(std::move(path)) {}
-  void write(uint64_t, const Image& image) override { writeImage(image, path_); }
+  void write(uint64_t, const Image& image) override { writeTraced(image, path_); }
   void writeWith(uint64_t, const Image& image, std::span<const ImageChannel> more) override {
-    writeExr(image, more, path_);
+    writeTraced(image, more, path_);
   }
 
  private:
@@ -31,9 +43,9 @@ class SingleFile : public FrameOutput {
 class NumberedFiles : public FrameOutput {
  public:
   explicit NumberedFiles(const std::filesystem::path& pattern) : names_(pattern) {}
-  void write(uint64_t frame, const Image& image) override { writeImage(image, names_.of(frame)); }
+  void write(uint64_t frame, const Image& image) override { writeTraced(image, names_.of(frame)); }
   void writeWith(uint64_t frame, const Image& image, std::span<const ImageChannel> more) override {
-    writeExr(image, more, names_.of(frame));
+    writeTraced(image, more, names_.of(frame));
   }
 
  private:
