@@ -116,7 +116,8 @@ FramePipeline::~FramePipeline() {
 
 void FramePipeline::makePools(const FrameOptions& options) {
   // Steps differ in this; the pools stay.
-  least_pager_bytes_ = std::max(least_pager_bytes_, BrickPager::leastBufferBytes(cache_, variable_));
+  least_pager_bytes_ =
+      std::max(least_pager_bytes_, BrickPager::leastBufferBytes(cache_, {variable_, coloured_by_}));
   const FrameBudget::Fixed fixed{planner_.bytes(),
                                  least_pager_bytes_,
                                  backend_->bytes(options.size, resourcesOf(options)) + sceneBytes(options),
