@@ -43,6 +43,7 @@ void view(const ViewArguments& arguments) {
       throw UsageError("--surface {}: the window shows STL, PLY and OBJ files; render draws .vtp files",
                        surface);
   const CacheReader cache = openAtStep(arguments.cache, arguments.steps);
+  requireFixedFaces(arguments.surfaces, cache);
   // The scalar changes in the window, so faces that are coloured by one keep colours of their own.
   options.scene = sceneOf(arguments.surfaces, cache, std::numeric_limits<size_t>::max(),
                           std::numeric_limits<size_t>::max());
