@@ -33,8 +33,8 @@ bool isFinished(const ConvertOptions& options, const std::vector<ConversionFact>
     if (options.resume && !options.overwrite && std::filesystem::exists(options.output / "manifest.json") &&
         !hasUnfinished(options.output))
       throw Error(
-          "{}: is there, and no conversion to it was left unfinished: there is nothing to resume; to replace "
-          "it, add --overwrite",
+          "{}: exists, and no unfinished conversion to it does: there is nothing to resume; to replace it, "
+          "add --overwrite",
           options.output.string());
     checkOutput(options.output, options.overwrite, temporaryFolder(options));
     return false;

@@ -145,8 +145,10 @@ void FoamSource::listFacesOfCells(Piece& piece, const FoamList& owner, const Foa
         // Of a boundary face some versions say -1, in 32 or in 64 bits.
         if (list == &neighbour && values[n] >= 0xffffffff) continue;
         if (values[n] >= faces)
-          throw Error("{}: face {} is of cell {}, of which there cannot be so many; the mesh is damaged",
-                      meshFile(piece.folder, "owner").string(), first + n, static_cast<int64_t>(values[n]));
+          throw Error(
+              "{}: face {} belongs to cell {}, which is more cells than the faces can bound; the mesh is "
+              "damaged",
+              meshFile(piece.folder, "owner").string(), first + n, static_cast<int64_t>(values[n]));
         cells = std::max(cells, values[n] + 1);
       }
     });
