@@ -199,7 +199,7 @@ void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, Fra
     samplers.back()->addOthers(*options.ranks);
     if (opacities) opacities->addOthers(*options.ranks);
   }
-  const StageTimer timer(statistics.surfaces_s);
+  const StageTimer timer(statistics.surfaces_s, "draw surfaces");
   const glm::dvec3 middle = 0.5 * (cache_.manifest().lower + cache_.manifest().upper);
   std::optional<ColourTable> opacities;
   if (options.scene->slices_by_function) opacities.emplace(planner_.transferFunction());
@@ -283,7 +283,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   statistics.bricks_out_of_image = cut.out_of_image;
   statistics.bricks_transparent = cut.transparent;
   statistics.bricks_culled = cut.out_of_image + cut.transparent;
-  statistics.largest_level = static_cast<int>(cut.deepest_level);
+  statistics.largest_level = cut.deepest_level;
   statistics.largest_error_px = cut.largest_error_px;
   statistics.workers = pools_->budget.workers;
   statistics.memory_used_bytes = options.memory_bytes - pools_->budget.cache_bytes -

@@ -153,7 +153,7 @@ BrickSource::Splats BrickSource::splatsOf(const Scratch& scratch, const BrickPar
 }
 
 std::optional<PagedBrick> BrickSource::await(uint64_t miss, Scratch& scratch) {
-  const StageTimer timer(scratch.waited_s);
+  const StageTimer timer(scratch.waited_s, "wait for a brick", TraceKind::kWait);
   return pager_.take(miss);
 }
 

@@ -27,7 +27,7 @@ namespace curvisplat {
 
 /// Command-line arguments as given; checked and parsed later.
 struct RenderArguments {
-  std::filesystem::path cache, output, first_image, statistics;
+  std::filesystem::path cache, output, first_image, statistics, trace;
   CameraArguments camera;
   ScalarArguments scalar;
   OpacityArguments opacity;

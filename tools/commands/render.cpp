@@ -37,11 +37,13 @@
 #include "tools/options/surface_arguments.h"
 #include "tools/output/frame_output.h"
 #include "tools/output/launched_ranks.h"
+#include "tools/output/movie_writer.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
 #include "tools/output/thread_failures.h"
+#include "tools/output/trace_of_run.h"
 
 namespace curvisplat {
 namespace {
@@ -81,7 +83,7 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
   if (!arguments.first_image.empty() && !launchedRanks().alone())
     throw UsageError("--first-image {}: one process draws it; start one", arguments.first_image.string());
   if (arguments.frame_rate && !isMovieName(arguments.output))
-    throw UsageError("--frame-rate needs a movie: -o NAME.mp4");
+    throw UsageError("--frame-rate needs a movie: -o NAME.mp4 or NAME.gif");
   if (arguments.frame.background == "transparent" && arguments.output.extension() != ".png" &&
       arguments.output.extension() != ".exr")
     throw UsageError("--background transparent: {} files have no transparency; use .png or .exr",
@@ -269,9 +271,9 @@ void addRender(CLI::App& app) {
   CLI::App* command = app.add_subcommand("render", "Render a cache to pictures or a movie");
   command->add_option("CACHE", arguments->cache, "Splat cache, a directory NAME.splats")->required();
   command
-      ->add_option(
-          "-o,--output", arguments->output,
-          "Picture to write: .png, .exr or .pfm. Of several frames: frame_%04d.png, or NAME.mp4 (by ffmpeg)")
+      ->add_option("-o,--output", arguments->output,
+                   "Picture to write: .png, .exr or .pfm. Of several frames: frame_%04d.png, or NAME.mp4 or "
+                   ".gif (by ffmpeg)")
       ->required();
   command->add_option("--size", arguments->frame.size, "Size of the picture, WIDTHxHEIGHT in pixels")
       ->capture_default_str();
@@ -416,7 +418,12 @@ void addRender(CLI::App& app) {
       ->add_option("--stats", arguments->statistics,
                    "Write times, bytes and counts of every frame to this JSON file")
       ->group(how);
-  command->callback([arguments] { render(*arguments); });
+  command->add_option("--trace", arguments->trace, kTraceHelp)->group(how);
+  command->callback([arguments] {
+    TraceOfRun trace(arguments->trace, {arguments->cache, arguments->output, arguments->statistics});
+    render(*arguments);
+    trace.end();
+  });
 }
 
 }  // namespace curvisplat
