@@ -44,7 +44,8 @@ class Window {
         out_(out) {
     for (const auto& scalar : in.nodes->scalars) scalars_.push_back(scalar.data());
     for (auto& row : scratch.stretch) row.assign(i1_ - i0_, 1.0f);
-    for (auto& row : scratch.growth) row.assign(i1_ - i0_, 0.0f);
+    for (auto* rows : {&scratch.growth, &scratch.drift})
+      for (auto& row : *rows) row.assign(i1_ - i0_, 0.0f);
     scratch.has_blank.resize(rowsOf(in.window));
     const uint64_t first = i0_ - std::min<uint64_t>(i0_, kStretchReach);
     const uint64_t end = std::min(i1_ + kStretchReach, ni_);
@@ -176,7 +177,8 @@ void Window::stretchRow(uint64_t j, uint64_t k) {
   const std::array<uint64_t, 3> index{0, j, k}, count{ni_, block.nj, block.nk};
   const std::array<ptrdiff_t, 3> strides{1, row_stride_, plane_stride_};
   for (size_t axis = 0; axis < 3; ++axis) {
-    float *out = scratch_.stretch[axis].data(), *growth = scratch_.growth[axis].data();
+    float *out = scratch_.stretch[axis].data(), *growth = scratch_.growth[axis].data(),
+          *drift = scratch_.drift[axis].data();
     const auto one_by_one = [&](uint64_t begin, uint64_t end) {
       for (uint64_t i = begin; i < end; ++i) {
         const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
@@ -184,12 +186,13 @@ void Window::stretchRow(uint64_t j, uint64_t k) {
         const Stretch stretch = stretchOfNode(at, strides[axis], axis == 0 ? i : index[axis], count[axis]);
         out[i - i0_] = stretch.factor;
         growth[i - i0_] = stretch.growth;
+        drift[i - i0_] = stretch.drift;
       }
     };
     const auto at_once = [&](uint64_t begin, uint64_t end) {
       if (begin >= end) return;
       stretchNodes({x_, y_, z_}, row + static_cast<ptrdiff_t>(begin), strides[axis], end - begin,
-                   out + (begin - i0_), growth + (begin - i0_));
+                   {out + (begin - i0_), growth + (begin - i0_), drift + (begin - i0_)});
     };
     bool whole = true;
     if (axis == 0) {
@@ -259,7 +262,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     if (a + b > 0 && (corrections_.middles || !whole)) middle[axis] = 0.5 * (b - a) / (a + b);
     if (corrections_.growth) growth[axis] = scratch_.growth[axis][in_part];
     if (whole) {
-      middle[axis] += kDrift * growth[axis];
+      if (corrections_.growth) middle[axis] += scratch_.drift[axis][in_part];
       continue;
     }
     if (corrections_.border_codes) {

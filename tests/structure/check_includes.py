@@ -30,7 +30,7 @@ PROGRAM_ROOMS = {
     "tools/mpi": set(),
     "tools/options": {"tools/output"},
     "tools/commands": {"tools/output", "tools/options", "tools/serve", "tools/throughput", "tools/viewer"},
-    "tools/python": {"tools/output", "tools/options"},
+    "tools/python": {"tools/output", "tools/options", "tools/viewer"},
     "tools": {"tools/output", "tools/options", "tools/commands"},
 }
 

@@ -75,6 +75,19 @@ FrameArguments frameArguments(const Options& frame, const std::vector<std::strin
   return arguments;
 }
 
+SurfaceArguments surfaceArguments(const py::dict& others) {
+  SurfaceArguments arguments;
+  arguments.surfaces = py::cast<std::vector<std::string>>(others["surfaces"]);
+  arguments.colours = py::cast<std::vector<std::string>>(others["surface_colours"]);
+  arguments.surface_by = py::cast<std::string>(others["surface_by"]);
+  arguments.slices = py::cast<std::vector<std::string>>(others["slices"]);
+  arguments.slice_opacity = py::cast<std::string>(others["slice_opacity"]);
+  arguments.isovalues = py::cast<std::vector<std::string>>(others["isovalues"]);
+  if (others.contains("iso_opacity")) arguments.iso_opacity = py::cast<std::string>(others["iso_opacity"]);
+  arguments.volume = py::cast<bool>(others["volume"]) ? "on" : "off";
+  return arguments;
+}
+
 py::dict statisticsOf(const FrameStatistics& statistics) {
   py::dict out;
   out["splats_drawn"] = statistics.splats_drawn;
@@ -87,13 +100,17 @@ py::dict statisticsOf(const FrameStatistics& statistics) {
   return out;
 }
 
-/// `function`, `camera`, `frame`: text by option; clip_planes, shade, threads, keep_going and backend in `others`.
+/// `frame`: text by option; `others`: lists, flags and numbers.
 py::tuple render(OpenCache& cache, const Options& function, const Options& camera, const Options& frame,
                  const py::dict& others, const py::object& progress) {
   const FrameArguments of_frame = frameArguments(
       frame, py::cast<std::vector<std::string>>(others["clip_planes"]), py::cast<bool>(others["shade"]),
       py::cast<unsigned>(others["threads"]), py::cast<bool>(others["keep_going"]));
-  const PictureArguments arguments{scalarArguments(function), cameraArguments(camera), frameOptions(of_frame),
+  const PictureArguments arguments{scalarArguments(function),
+                                   cameraArguments(camera),
+                                   frameOptions(of_frame),
+                                   surfaceArguments(others),
+                                   py::cast<uint64_t>(others["step"]),
                                    parseBackend(py::cast<std::string>(others["backend"]))};
   DrawnPicture picture = cache.render(arguments, progress);
   return py::make_tuple(picture.rgba, picture.chosen, picture.notes, statisticsOf(picture.statistics));
@@ -108,6 +125,18 @@ py::list scalarsOf(const OpenCache& cache) {
 
 std::array<double, 3> arrayOf(const glm::dvec3& v) {
   return {v.x, v.y, v.z};
+}
+
+std::vector<double> timesOf(const OpenCache& cache) {
+  std::vector<double> times;
+  for (const SeriesStep& step : cache.reader().series().steps) times.push_back(step.time);
+  return times;
+}
+
+std::vector<double> histogramOfCache(const OpenCache& cache, const std::string& scalar,
+                                     const std::pair<double, double>& range, bool log, size_t bins) {
+  const py::gil_scoped_release released;
+  return cache.histogram({scalar, range.first, range.second, log, bins});
 }
 
 /// None where the point is outside of the data.
@@ -230,6 +259,10 @@ PYBIND11_MODULE(_core, module) {
       .def("render", &render)
       .def("release", &OpenCache::release)
       .def("probe", &probeAt)
+      .def("histogram", &histogramOfCache)
+      .def_property_readonly("times", &timesOf)
+      .def_property_readonly("time_unit",
+                             [](const OpenCache& cache) { return cache.reader().seriesManifest().time_unit; })
       .def_property_readonly("path", [](const OpenCache& cache) { return cache.path().string(); })
       .def_property_readonly("scalars", &scalarsOf)
       .def_property_readonly("lower",
