@@ -151,9 +151,8 @@ Subtree CellBuilder::State::buildInner(const Cell& cell, RecordSpan records, boo
     children[octant] =
         build(cell.child(static_cast<int>(octant)), records.subspan(begins[octant], count), false);
   });
-  // Where the loop around this one was cancelled, because another part of it threw, this one ends early and
-  // without a word: its cell is not to be made of what is there. What the other part threw is what is heard
-  // of.
+  // If another task of the enclosing loop has thrown, TBB cancels this loop, too, which then returns normally with children
+  // missing. The cell must not be built from the rest; of the two exceptions the first one is reported.
   for (size_t octant = 0; octant < 8; ++octant)
     if (begins[octant] != begins[octant + 1] && !children[octant].octant)
       throw Error("the bricks of a cell were not all built");

@@ -114,6 +114,16 @@ void MemoryPlan::requireSlabs(uint64_t bytes) {
   slab_bytes = std::max(slab_bytes, of_two);
 }
 
+uint64_t MemoryPlan::expectedPeak(uint64_t splats, size_t variables) const {
+  // Cells fill a bucket to three quarters, mostly; two are in memory.
+  const uint64_t in_buckets = std::min(splats, plannedBucketSplats() * 3 / 2);
+  const uint64_t build = in_buckets * bucketBytesPerSplat(variables) + threads * brickScratchBytes(variables);
+  const uint64_t slabs = 2 * std::min(slab_bytes, splats * slabBytesPerNode(variables));
+  const uint64_t scatter = slabs + std::min(chunk_buffer_bytes, splats * regularRecordBytes(variables));
+  // The counting grid takes half of what it may, the other half is for its coarser levels.
+  return std::min(cap_bytes, kProgramBytes + std::max({build, slabs + counting_bytes / 2, scatter}));
+}
+
 void MemoryPlan::limitBuckets(uint64_t splats, size_t variables) {
   bucket_splats = std::min(bucket_splats, splats);
   bucket_bytes = bucket_splats * regularRecordBytes(variables);

@@ -24,21 +24,26 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kBandBytes = 32 << 20;  // of surfaces' samples
+constexpr uint64_t kSampleTileBytes = 256 << 10;  // of a thread
 
 PaintResources resourcesOf(const FrameOptions& options) {
   return {.threads = options.threads};
 }
 
-/// About what a scene takes: its meshes and their vertices on the screen, samples of slices, bands of samples of
-/// surfaces, and a layer and a half a pixel with a window behind it. The same for all pictures of one size.
+unsigned threadsOf(const FrameOptions& options) {
+  return options.threads ? options.threads : std::max(1u, std::thread::hardware_concurrency());
+}
+
+/// About what a scene takes: its meshes, their vertices on the screen and their triangles in tiles, samples of slices
+/// and of surfaces, and a layer and a half a pixel with a window behind it. The same for all pictures of one size.
 uint64_t sceneBytes(const FrameOptions& options) {
   if (!options.scene || options.scene->empty()) return 0;
-  constexpr uint64_t kLayerBytes = 56, kSliceBytes = 24, kVertexBytes = 12;
-  uint64_t bytes =
-      kBandBytes + options.size.pixels() * (kLayerBytes + kSliceBytes * options.scene->slices.size());
+  constexpr uint64_t kLayerBytes = 56, kSliceBytes = 24, kVertexBytes = 12, kTriangleBytes = 8;
+  uint64_t bytes = kSampleTileBytes * threadsOf(options) +
+                   options.size.pixels() * (kLayerBytes + kSliceBytes * options.scene->slices.size());
   for (const Surface& surface : options.scene->surfaces)
-    bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size();
+    bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size() +
+             kTriangleBytes * surface.mesh->triangles.size();
   if (!options.scene->grid_surfaces.empty())
     bytes += FaceMeshes::bytes(*options.scene, options.size.pixels());
   return bytes;
@@ -186,12 +191,10 @@ void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, Fra
   const SceneLook look{planner_.colours(), options.light, plan.settings.clip_planes,
                        view.projection == Projection::kPerspective ? 0 : view.viewFromData(middle).z};
   std::shared_ptr<const PixelLayers> layers;
-  const unsigned wanted =
-      options.threads ? options.threads : std::max(1u, std::thread::hardware_concurrency());
-  tbb::task_arena arena(std::min(static_cast<int>(wanted), tbb::info::default_concurrency()));
+  tbb::task_arena arena(std::min(static_cast<int>(threadsOf(options)), tbb::info::default_concurrency()));
   arena.execute([&] {
     const SurfaceScene scene = face_meshes_.withMeshes(options.scene, view, options.lod_pixels);
-    layers = std::make_shared<PixelLayers>(layersOf(scene, view, samplers, look, kBandBytes));
+    layers = std::make_shared<PixelLayers>(layersOf(scene, view, samplers, look));
   });
   planner_.addLayers(plan, std::move(layers), options);
 }
@@ -262,7 +265,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   statistics.bricks_out_of_image = cut.out_of_image;
   statistics.bricks_transparent = cut.transparent;
   statistics.bricks_culled = cut.out_of_image + cut.transparent;
-  statistics.largest_level = static_cast<int>(cut.deepest_level);
+  statistics.largest_level = cut.deepest_level;
   statistics.largest_error_px = cut.largest_error_px;
   statistics.workers = pools_->budget.workers;
   statistics.memory_used_bytes = options.memory_bytes - pools_->budget.cache_bytes -

@@ -15,7 +15,7 @@ struct FrameWorkers::Worker {
   std::vector<uint32_t> keys;
   DepthSorter sorter;        // of a brick
   DepthSorter batch_sorter;  // has its turn while a brick waits for space
-  FrameStatistics statistics;
+  PrepareStatistics statistics;
 };
 
 FrameWorkers::FrameWorkers(BrickSource& source, SweepBuffer& sweep, SegmentRing& ring, unsigned count)
@@ -65,29 +65,11 @@ void FrameWorkers::begin() {
 void FrameWorkers::finish(FrameStatistics& sum) {
   team_.wait();
   for (const auto& worker : workers_) {
-    const FrameStatistics& part = worker->statistics;
+    combine(sum, worker->statistics);
     sum.verify_s += worker->scratch.times.verify_s;
     sum.decode_s += worker->scratch.times.decode_s;
     sum.read_waited_s += worker->scratch.waited_s;
-    sum.project_s += part.project_s;
-    sum.sort_s += part.sort_s;
-    sum.workers_waited_s += part.workers_waited_s;
-    sum.splats_read += part.splats_read;
-    sum.splats_clipped += part.splats_clipped;
-    sum.splats_behind += part.splats_behind;
-    sum.splats_off_screen += part.splats_off_screen;
-    sum.splats_transparent += part.splats_transparent;
-    sum.splats_drawn += part.splats_drawn;
-    sum.bricks_again += part.bricks_again;
-    for (const BrickFailure& failure : part.bricks_unreadable) sum.bricks_unreadable.push_back(failure);
   }
-  std::sort(sum.bricks_unreadable.begin(), sum.bricks_unreadable.end(),
-            [](const BrickFailure& a, const BrickFailure& b) { return a.brick < b.brick; });
-  // A brick that is drawn in several slabs was reported once for each.
-  const auto again =
-      std::unique(sum.bricks_unreadable.begin(), sum.bricks_unreadable.end(),
-                  [](const BrickFailure& a, const BrickFailure& b) { return a.brick == b.brick; });
-  sum.bricks_unreadable.erase(again, sum.bricks_unreadable.end());
   const MutexLock lock(failing_);
   if (first_failure_) std::rethrow_exception(first_failure_);
 }
@@ -216,7 +198,7 @@ uint64_t FrameWorkers::partsHidden() const {
 
 /// Adds a projected part to the statistics, in the first slab that it is in only.
 void FrameWorkers::count(Worker& worker, uint32_t number) {
-  FrameStatistics& statistics = worker.statistics;
+  PrepareStatistics& statistics = worker.statistics;
   if (seen_[number] == Seen::kProjected) {
     ++statistics.bricks_again;
     return;
@@ -240,7 +222,7 @@ bool FrameWorkers::passOver(uint64_t sequence) {
 
 /// Enters the splats that the worker has projected into the sweep.
 bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t rank) {
-  FrameStatistics& statistics = worker.statistics;
+  PrepareStatistics& statistics = worker.statistics;
   std::span<const DepthItem> sorted;
   {
     const StageTimer timer(statistics.sort_s, "sort brick");

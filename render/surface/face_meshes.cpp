@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kFinestPixels = 0.5;
 constexpr size_t kLeastNodes = 1 << 16;
-constexpr uint64_t kBytesANode = 120;  // while a mesh is made: nodes, triangles, and the mesh itself
+constexpr uint64_t kBytesANode = 136;  // while a mesh is made: nodes, triangles, and the mesh itself
 
 size_t mostNodes(uint64_t pixels) {
   return std::max<size_t>(kLeastNodes, pixels);

@@ -83,7 +83,7 @@ void toArrays(const std::vector<DirectSplat>& splats, const glm::dvec3& origin, 
   geometry.resize(splats.size());
   variable.resize(splats.size());
   for (size_t n = 0; n < splats.size(); ++n)
-    setSplat(geometry, variable, n, splats[n].splat.position - origin, splats[n].splat, splats[n].value,
+    setSplat({geometry, variable}, n, splats[n].splat.position - origin, splats[n].splat, splats[n].value,
              splats[n].codes);
 }
 
@@ -176,7 +176,7 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
   }
   CpuPainter painter;
   return paintFrame(painter, sorted, table,
-                    {options.per_pixel, options.light.has_value(), layers ? &*layers : nullptr}, size);
+                    {options.per_pixel, options.light.has_value(), layers ? &*layers : nullptr}, {size});
 }
 
 }  // namespace curvisplat

@@ -19,6 +19,7 @@
 #include "tools/commands/add_scalar.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/convert_series.h"
+#include "tools/commands/dry_run.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/grid_options.h"
 #include "tools/options/option_parsers.h"
@@ -99,9 +100,10 @@ void runConvert(ConvertArguments arguments) {
   applyCommonOptions(arguments, options);
   applyGridUse(arguments, options);
 
-  const auto source = openSource(arguments, arguments.output);
+  std::unique_ptr<DataSource> source = openSource(arguments, arguments.output);
   options.scalars = chooseScalars(arguments, arguments.scalars, source->description());
   options.title = arguments.grid.grid.stem().string();
+  if (arguments.dry_run) return dryRun(std::move(source), options, arguments);
 
   requireThreads(arguments.threads);
   Progress progress{ranks.isFirst() ? progressBar() : Progress::Display{}};
@@ -183,6 +185,8 @@ void addConvert(CLI::App& app) {
       ->check(CLI::Range(0u, kMaxThreads));
   command->add_option("--tmp", arguments->temporary_folder,
                       "Directory for temporary files (default: beside the cache)");
+  command->add_flag("--dry-run", arguments->dry_run,
+                    "Say what the conversion will take (bytes, memory, time), from a sample of the grid");
   command->add_flag("--no-preflight", arguments->no_preflight,
                     "Do not check before the work that the disks have room");
   command->add_flag("--resume", arguments->resume,
@@ -210,6 +214,11 @@ void addConvert(CLI::App& app) {
     takeScalarsFromSolutions(*arguments);
     const bool series = isSeries(*arguments);
     const bool adds = !arguments->added_scalars.empty() || !arguments->to.empty();
+    if (arguments->dry_run && (adds || arguments->follows))
+      throw UsageError(
+          "--dry-run: is for a new cache; leave out --add-scalar, --add-steps, --to and --follow");
+    if (arguments->dry_run && !launchedRanks().alone())
+      throw UsageError("--dry-run: one process samples; start one");
     if ((series || adds) && !launchedRanks().alone())
       throw UsageError("{} one process converts; start one",
                        series ? "a series of time steps: " : "--add-scalar:");

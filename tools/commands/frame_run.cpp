@@ -11,6 +11,7 @@
 #include "tools/commands/empty_picture.h"
 #include "tools/options/channel_arguments.h"
 #include "tools/output/launched_ranks.h"
+#include "tools/output/movie_writer.h"
 #include "tools/output/run_statistics.h"
 
 namespace curvisplat {

@@ -37,6 +37,7 @@
 #include "tools/options/surface_arguments.h"
 #include "tools/output/frame_output.h"
 #include "tools/output/launched_ranks.h"
+#include "tools/output/movie_writer.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
@@ -82,7 +83,7 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
   if (!arguments.first_image.empty() && !launchedRanks().alone())
     throw UsageError("--first-image {}: one process draws it; start one", arguments.first_image.string());
   if (arguments.frame_rate && !isMovieName(arguments.output))
-    throw UsageError("--frame-rate needs a movie: -o NAME.mp4");
+    throw UsageError("--frame-rate needs a movie: -o NAME.mp4 or NAME.gif");
   if (arguments.frame.background == "transparent" && arguments.output.extension() != ".png" &&
       arguments.output.extension() != ".exr")
     throw UsageError("--background transparent: {} files have no transparency; use .png or .exr",
@@ -270,9 +271,9 @@ void addRender(CLI::App& app) {
   CLI::App* command = app.add_subcommand("render", "Render a cache to pictures or a movie");
   command->add_option("CACHE", arguments->cache, "Splat cache, a directory NAME.splats")->required();
   command
-      ->add_option(
-          "-o,--output", arguments->output,
-          "Picture to write: .png, .exr or .pfm. Of several frames: frame_%04d.png, or NAME.mp4 (by ffmpeg)")
+      ->add_option("-o,--output", arguments->output,
+                   "Picture to write: .png, .exr or .pfm. Of several frames: frame_%04d.png, or NAME.mp4 or "
+                   ".gif (by ffmpeg)")
       ->required();
   command->add_option("--size", arguments->frame.size, "Size of the picture, WIDTHxHEIGHT in pixels")
       ->capture_default_str();

@@ -28,7 +28,7 @@ struct ConvertArguments {
   std::optional<double> blank_value;
   std::optional<std::string> memory;
   unsigned threads = 0;
-  bool overwrite = false, resume = false, no_preflight = false;
+  bool overwrite = false, resume = false, no_preflight = false, dry_run = false;
   std::vector<std::string> planes;  // --surface
   bool no_surfaces = false;
   std::optional<std::string> overlap;  // owner or all

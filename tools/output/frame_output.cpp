@@ -112,22 +112,15 @@ bool FrameNames::include(const std::filesystem::path& path, uint64_t frames) con
          std::filesystem::equivalent(folderOf(path), folderOf(of(frame)), none_there);
 }
 
-bool isMovieName(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending == ".mp4";
-}
-
 void checkOutputName(const std::filesystem::path& path, bool frames, ImageSize size) {
   if (!isMovieName(path)) {
     if (frames) (void)FrameNames(path);
     checkImageName(path);
     return;
   }
-  if (!frames) throw UsageError("-o {}: a movie needs --orbit or --path", path.string());
-  if (size.width % 2 != 0 || size.height % 2 != 0)
-    throw UsageError("--size {}x{}: the width and height of a movie must be even", size.width, size.height);
+  if (!frames) throw UsageError("-o {}: a movie needs --orbit, --path or --steps", path.string());
+  if (!isGifName(path) && (size.width % 2 != 0 || size.height % 2 != 0))
+    throw UsageError("--size {}x{}: the width and height of an .mp4 must be even", size.width, size.height);
 }
 
 std::unique_ptr<FrameOutput> makeFrameOutput(const std::filesystem::path& path, bool frames, ImageSize size,

@@ -36,13 +36,9 @@ std::optional<std::string> given(const Options& options, const std::string& name
   return found == options.end() ? std::nullopt : std::optional(found->second);
 }
 
-ScalarArguments scalarArguments(const std::string& scalar, const Options& function) {
-  return {scalar,
-          given(function, "tf"),
-          given(function, "range"),
-          given(function, "opacity"),
-          given(function, "asinh"),
-          given(function, "opacity_unit")};
+ScalarArguments scalarArguments(const Options& function) {
+  return {function.at("scalar"),      given(function, "tf"),    given(function, "range"),
+          given(function, "opacity"), given(function, "asinh"), given(function, "opacity_unit")};
 }
 
 CameraArguments cameraArguments(const Options& camera) {
@@ -104,13 +100,13 @@ py::dict statisticsOf(const FrameStatistics& statistics) {
   return out;
 }
 
-/// `frame`: text by option; `others`: lists, flags and numbers.
-py::tuple render(OpenCache& cache, const std::string& scalar, const Options& function, const Options& camera,
-                 const Options& frame, const py::dict& others, const py::object& progress) {
+/// `function`, `camera`, `frame`: text by option; `others`: lists, flags and numbers.
+py::tuple render(OpenCache& cache, const Options& function, const Options& camera, const Options& frame,
+                 const py::dict& others, const py::object& progress) {
   const FrameArguments of_frame = frameArguments(
       frame, py::cast<std::vector<std::string>>(others["clip_planes"]), py::cast<bool>(others["shade"]),
       py::cast<unsigned>(others["threads"]), py::cast<bool>(others["keep_going"]));
-  const PictureArguments arguments{scalarArguments(scalar, function),
+  const PictureArguments arguments{scalarArguments(function),
                                    cameraArguments(camera),
                                    frameOptions(of_frame),
                                    surfaceArguments(others),
@@ -230,12 +226,12 @@ py::dict convertCallable(const std::filesystem::path& output,
 
 py::dict convertFiles(const std::filesystem::path& output, const std::filesystem::path& grid,
                       const std::vector<std::filesystem::path>& solutions,
-                      const std::vector<std::string>& scalars, std::optional<uint32_t> time_step,
-                      const py::dict& given_options, const py::object& progress) {
+                      const std::vector<std::string>& scalars, const py::dict& given_options,
+                      const py::object& progress) {
   ConvertArguments arguments;
   arguments.grid.grid = grid;
   arguments.grid.solutions = solutions;
-  arguments.grid.time_step = time_step;
+  arguments.grid.time_step = py::cast<std::optional<uint32_t>>(given_options["time_step"]);
   ConvertOptions options = convertOptions(output, given_options);
   if (options.title.empty()) options.title = grid.stem().string();
   ConvertReport report;

@@ -214,7 +214,7 @@ class Cache:
         Raises UsageError for options that make no sense, Error if reading or drawing fails, KeyboardInterrupt after
         Ctrl-C.
         """
-        function = _given(tf=colours, range=range, asinh=asinh, opacity_unit=opacity_unit)
+        function = _given(scalar=scalar, tf=colours, range=range, asinh=asinh, opacity_unit=opacity_unit)
         if opacity is not None:
             function["opacity"] = _opacities(opacity)
         camera = _given(view=view, position=position, focal_point=focal_point, view_up=view_up,
@@ -230,7 +230,7 @@ class Cache:
                   "keep_going": keep_going, "backend": backend}
         if iso_opacity is not None:
             others["iso_opacity"] = _number(iso_opacity)
-        rgba, options, notes, statistics = self._core.render(scalar, function, camera, frame, others, progress)
+        rgba, options, notes, statistics = self._core.render(function, camera, frame, others, progress)
         picture = rgba.view(Picture)
         picture.options, picture.notes, picture.statistics = options, notes, statistics
         return picture
