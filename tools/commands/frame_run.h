@@ -28,6 +28,7 @@ namespace curvisplat {
 /// Command-line arguments as given; checked and parsed later.
 struct RenderArguments {
   std::filesystem::path cache, output, first_image, statistics, trace;
+  std::vector<std::filesystem::path> solutions;  // of a grid in place of the cache
   CameraArguments camera;
   ScalarArguments scalar;
   OpacityArguments opacity;

@@ -28,6 +28,7 @@
 #include "tools/options/channel_arguments.h"
 #include "tools/options/frame_arguments.h"
 #include "tools/options/frame_part.h"
+#include "tools/options/kept_caches.h"
 #include "tools/options/motion_in_time.h"
 #include "tools/options/opacity_arguments.h"
 #include "tools/options/option_parsers.h"
@@ -156,6 +157,18 @@ void printResult(const RenderReport& report) {
              report.variable.name, total_s / static_cast<double>(report.frames.size()), report.backend);
 }
 
+/// The cache; of a grid the one that is kept for it.
+std::filesystem::path cacheToDraw(const RenderArguments& arguments) {
+  std::vector<std::filesystem::path> files{arguments.cache};
+  files.insert(files.end(), arguments.solutions.begin(), arguments.solutions.end());
+  if (!isGrid(files)) return arguments.cache;
+  if (!launchedRanks().alone())
+    throw Error("{}: several processes draw from a cache; convert the grid first", files.front().string());
+  Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
+  return keptCacheOf(files, progress, [](const std::string& text) { printMessage("{}", text); });
+}
+
 constexpr double kAxesRoom = 0.17;  // around the data, of its box
 
 void render(const RenderArguments& given) {
@@ -169,6 +182,7 @@ void render(const RenderArguments& given) {
   const double frames_per_s =
       arguments.frame_rate ? parsePositive("--frame-rate", *arguments.frame_rate) : 25;
 
+  arguments.cache = cacheToDraw(arguments);
   CacheReader cache = openAtStep(arguments.cache, arguments.steps);
   const std::vector<StepPosition> steps = chosenSteps(arguments.steps, cache);
   const Manifest manifest = cache.manifest();  // of the first step
@@ -269,7 +283,13 @@ void render(const RenderArguments& given) {
 void addRender(CLI::App& app) {
   auto arguments = std::make_shared<RenderArguments>();
   CLI::App* command = app.add_subcommand("render", "Render a cache to pictures or a movie");
-  command->add_option("CACHE", arguments->cache, "Splat cache, a directory NAME.splats")->required();
+  command
+      ->add_option(
+          "CACHE", arguments->cache,
+          "Splat cache, a directory NAME.splats; or a grid, which is converted into the user's cache "
+          "folder")
+      ->required();
+  command->add_option("SOLUTION", arguments->solutions, "Further files of the grid");
   command
       ->add_option("-o,--output", arguments->output,
                    "Picture to write: .png, .exr or .pfm. Of several frames: frame_%04d.png, or NAME.mp4 or "

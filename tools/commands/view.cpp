@@ -1,16 +1,19 @@
 // `curvisplat view`: opens a window that shows a cache.
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "stream/base/error.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
+#include "tools/options/kept_caches.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/step_arguments.h"
 #include "tools/options/surface_arguments.h"
@@ -22,13 +25,34 @@ namespace curvisplat {
 namespace {
 
 struct ViewArguments {
-  std::filesystem::path cache;
+  std::vector<std::filesystem::path>
+      files;  // a cache, or a grid with its solutions; none: chosen in the window
   std::string size = "1200x800", backend = "auto";
   std::optional<std::filesystem::path> state;
   std::optional<std::string> scalar, memory, frame_time;
   SurfaceArguments surfaces;
   StepArguments steps;
 };
+
+/// The surfaces and slices of the command line.
+void takeScene(const ViewArguments& arguments, const CacheReader& cache, ViewerOptions& options) {
+  // The scalar changes in the window, so faces that are coloured by one keep colours of their own.
+  options.scene = sceneOf(arguments.surfaces, cache, std::numeric_limits<size_t>::max(),
+                          std::numeric_limits<size_t>::max());
+  for (const std::string& surface : arguments.surfaces.surfaces)
+    if (isSurfaceFile(surface))
+      options.surface_files.emplace_back(surface);
+    else
+      options.face_names.emplace_back(surface);
+  options.faces_by = arguments.surfaces.surface_by;
+}
+
+/// What needs a cache from the beginning.
+void checkGridOptions(const ViewArguments& arguments) {
+  if (arguments.surfaces.given() || arguments.steps.step || arguments.steps.time)
+    throw UsageError("--surface, --slice, --iso, --step and --time need a cache: convert {} first",
+                     arguments.files.front().string());
+}
 
 void view(const ViewArguments& arguments) {
   ViewerOptions options;
@@ -43,17 +67,19 @@ void view(const ViewArguments& arguments) {
     if (isVtp(surface))
       throw UsageError("--surface {}: the window shows STL, PLY and OBJ files; render draws .vtp files",
                        surface);
-  CacheReader cache = openAtStep(arguments.cache, arguments.steps);
-  requireFixedFaces(arguments.surfaces, cache);
-  // The scalar changes in the window, so faces that are coloured by one keep colours of their own.
-  options.scene = sceneOf(arguments.surfaces, cache, std::numeric_limits<size_t>::max(),
-                          std::numeric_limits<size_t>::max());
-  for (const std::string& surface : arguments.surfaces.surfaces)
-    if (isSurfaceFile(surface))
-      options.surface_files.emplace_back(surface);
-    else
-      options.face_names.emplace_back(surface);
-  options.faces_by = arguments.surfaces.surface_by;
+  std::optional<CacheReader> cache;
+  options.to_cache = [](const std::vector<std::filesystem::path>& files, Progress& progress,
+                        const std::function<void(const std::string&)>& say) {
+    return isGrid(files) ? keptCacheOf(files, progress, say) : files.front();
+  };
+  if (!arguments.files.empty() && !isGrid(arguments.files)) {
+    cache = openAtStep(arguments.files.front(), arguments.steps);
+    requireFixedFaces(arguments.surfaces, *cache);
+    takeScene(arguments, *cache, options);
+  } else if (!arguments.files.empty()) {
+    options.files = arguments.files;
+    checkGridOptions(arguments);
+  }
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   try {
@@ -67,8 +93,11 @@ void view(const ViewArguments& arguments) {
 
 void addView(CLI::App& app) {
   auto arguments = std::make_shared<ViewArguments>();
-  CLI::App* command = app.add_subcommand("view", "Show a cache in a window");
-  command->add_option("CACHE", arguments->cache, "Splat cache, a directory NAME.splats")->required();
+  CLI::App* command = app.add_subcommand("view", "Show a cache or a grid in a window");
+  command->add_option(
+      "FILE", arguments->files,
+      "Splat cache, a directory NAME.splats; or a grid and its solutions, which are converted "
+      "into the user's cache folder. Without, the window asks for one");
   command->add_option("--size", arguments->size, "Size of the window, WIDTHxHEIGHT in pixels")
       ->capture_default_str();
   command->add_option("--scalar", arguments->scalar, "Name of the scalar to show (default: as last time)");

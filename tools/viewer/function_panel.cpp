@@ -276,7 +276,7 @@ bool FunctionPanel::drawMaps(EditedFunction& function, const VariableInfo& varia
   const std::string shown =
       map.empty() ? "(edited)"
                   : map + (function.isAutomatic() ? fmt::format(" ({})", EditedFunction::kAutomatic) : "");
-  const bool open = ImGui::BeginCombo("##colours", shown.c_str(), ImGuiComboFlags_HeightLargest);
+  const bool open = ImGui::BeginCombo("##colours", shown.c_str(), ImGuiComboFlags_HeightLarge);
   if (!open) {
     nameWidget("colours");
     return false;

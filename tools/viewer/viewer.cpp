@@ -14,6 +14,7 @@
 #include "stream/base/message.h"
 #include "tools/viewer/cache_view.h"
 #include "tools/viewer/menus.h"
+#include "tools/viewer/opening.h"
 #include "tools/viewer/state_files.h"
 #include "tools/viewer/widget_places.h"
 #include "tools/viewer/window.h"
@@ -36,7 +37,11 @@ class Viewer {
     printMessage("window: OpenGL {}", window_.contextName());
     if (settings_.light_theme) window_.setLightTheme(true);
     if (settings_.text_scale != 1) window_.setTextScale(settings_.text_scale);
-    if (cache) show(std::move(*cache), options);
+    if (cache) {
+      const fs::path path = fs::absolute(cache->cachePath());
+      show(std::move(*cache), options, {path});
+    }
+    if (!options.files.empty()) open(options.files);
   }
 
   /// Saves the state when the window closes, also when a signal closes it.
@@ -61,25 +66,64 @@ class Viewer {
     }
   }
 
-  void show(CacheReader cache, const ViewerOptions& options) {
+  void show(CacheReader cache, const ViewerOptions& options, const std::vector<fs::path>& files) {
     if (view_) view_->remember();
-    const fs::path path = cache.cachePath();
     auto next = std::make_unique<CacheView>(std::move(cache), options, window_, toasts_, dialog_, layout());
     view_ = std::move(next);
-    window_.setTitle(fmt::format("{} - curvisplat", path.filename().string()));
-    settings_.opened({fs::absolute(path).string()});
+    window_.setTitle(fmt::format("{} - curvisplat", files.front().filename().string()));
+    std::vector<std::string> names;
+    for (const fs::path& file : files) names.push_back(fs::absolute(file).string());
+    settings_.opened(std::move(names));
   }
 
-  /// What was chosen in a dialog, a menu, or dropped.
-  void open(const std::vector<std::string>& files) {
+  /// What was chosen in a dialog or a menu, or dropped: a cache at once, a grid when it is converted.
+  void open(const std::vector<fs::path>& files) {
+    opening_.reset();  // the one before is given up
+    opening_ = std::make_unique<Opening>(files, options_, Window::wake);
+  }
+
+  /// Shows what has been opened.
+  void takeOpened() {
+    if (!opening_) return;
+    for (const std::string& text : opening_->takeMessages()) toasts_.add(text, glfwGetTime());
+    if (!opening_->isDone()) return;
+    const std::unique_ptr<Opening> done = std::move(opening_);
     try {
       ViewerOptions options;
+      if (!view_ && done->files() == options_.files) options = options_;
       options.backend = options_.backend;
       options.target_s = options_.target_s;
-      show(CacheReader(files.front()), options);
+      options.memory_bytes = options_.memory_bytes;
+      show(CacheReader(done->take()), options, done->files());
+    } catch (const Interrupted&) {
     } catch (const Error& error) {
+      printMessage("warning: {}", error.what());
       toasts_.add(error.what(), glfwGetTime(), true);
     }
+  }
+
+  /// In the corner of the picture, where it hides nothing that is looked at.
+  void drawOpening(const Rectangle& picture) {
+    if (!opening_) return;
+    const float unit = ImGui::GetFontSize();
+    ImGui::SetNextWindowPos({static_cast<float>(picture.x) + unit, static_cast<float>(picture.y) + unit});
+    ImGui::SetNextWindowSize({26 * unit, 0});
+    ImGui::Begin("opening", nullptr,
+                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
+                     ImGuiWindowFlags_AlwaysAutoResize);
+    window_.coverCurrent();
+    std::string names;
+    for (const fs::path& file : opening_->files()) {
+      names += file.filename().string();
+      names += ' ';
+    }
+    ImGui::Text("opening %s", names.c_str());
+    ImGui::ProgressBar(opening_->part(), {-1, 0}, opening_->phase().c_str());
+    nameWidget("opening");
+    const bool stops = ImGui::Button("stop");
+    nameWidget("stop opening");
+    ImGui::End();
+    if (stops) opening_.reset();
   }
 
   WindowLayout layout() const {
@@ -106,6 +150,7 @@ class Viewer {
       view_->draw(place);
     else
       drawWelcome(place);
+    drawOpening(place.picture);
     drawKeys(keys_shown_, window_);
     drawMessages(toasts_, messages_shown_, window_);
     drawToasts(toasts_, place.picture, glfwGetTime(), window_);
@@ -116,17 +161,12 @@ class Viewer {
     // What replaces the view or the font waits until the frame is over.
     applyLook();
     if (chosen && chosen->purpose == FileDialog::Purpose::kOpenData)
-      openAll(chosen->files);
+      open(chosen->files);
     else if (chosen && view_)
       view_->take(*chosen);
-    if (const auto files = std::exchange(to_open_, std::nullopt)) open(*files);
-    if (const std::vector<std::string> dropped = window_.takeDropped(); !dropped.empty()) open(dropped);
-  }
-
-  void openAll(const std::vector<fs::path>& files) {
-    std::vector<std::string> names;
-    for (const fs::path& file : files) names.push_back(file.string());
-    open(names);
+    if (const auto files = std::exchange(to_open_, std::nullopt)) open({files->begin(), files->end()});
+    if (const auto dropped = window_.takeDropped(); !dropped.empty()) open({dropped.begin(), dropped.end()});
+    takeOpened();
   }
 
   void drawMenuBar() {
@@ -148,6 +188,7 @@ class Viewer {
     ImGui::Begin("welcome", nullptr,
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                      ImGuiWindowFlags_NoBringToFrontOnFocus);
+    if (opening_) return ImGui::End();  // its progress is shown in this place
     ImGui::TextUnformatted("Drop a cache or a grid with its solution here, or");
     if (ImGui::Button("open...")) run(Command::kOpen);
     nameWidget("open");
@@ -252,6 +293,7 @@ class Viewer {
   Toasts toasts_;
   FileDialog dialog_;
   std::unique_ptr<CacheView> view_;
+  std::unique_ptr<Opening> opening_;
   bool panels_shown_ = true, keys_shown_ = false, messages_shown_ = false, look_changed_ = false;
   std::optional<std::vector<std::string>> to_open_;
 };

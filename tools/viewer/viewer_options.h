@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,6 +12,7 @@
 #include "render/camera/camera.h"
 #include "render/frame/backend.h"
 #include "render/surface/surface_scene.h"
+#include "stream/base/progress.h"
 
 namespace curvisplat {
 
@@ -24,6 +26,11 @@ struct ViewerOptions {
   std::vector<std::string> face_names;               // of its grid surfaces
   std::string faces_by;                              // --surface-by
   std::optional<uint64_t> memory_bytes;
+  /// Makes a cache of files that are none, on a thread of its own; returns its path, or that of a cache itself.
+  std::function<std::filesystem::path(const std::vector<std::filesystem::path>& files, Progress& progress,
+                                      const std::function<void(const std::string&)>& say)>
+      to_cache;
+  std::vector<std::filesystem::path> files;  // to open first, in place of a cache
   std::optional<double> target_s;  // per picture while moving; default 0.033 with a graphics card, else 0.1
 };
 

@@ -1,0 +1,259 @@
+// What panels and menus of the window do: values and markers, planes in the picture, two scalars, undo, saved views,
+// messages, keys.
+#include <fstream>
+#include <iterator>
+#include <regex>
+
+#include "tests/end_to_end/window_fixture.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+class WindowPanels : public WindowTest {
+ protected:
+  /// The name of the widget that begins so, once it is there.
+  static std::string widget(const std::string& begin) {
+    std::string name;
+    EXPECT_TRUE(eventually([&] {
+      std::ifstream file("widgets");
+      for (std::string line; std::getline(file, line);) {
+        const size_t at = line.find(" " + begin);
+        if (at == std::string::npos) continue;
+        name = line.substr(at + 1);
+        return true;
+      }
+      return false;
+    })) << begin;
+    return name;
+  }
+  /// Chooses an item of a menu.
+  void choose(const std::string& menu, const std::string& item) {
+    click("menu " + menu);
+    click("item " + item);
+  }
+  /// Unfolds the list of markers, below others that make room. Each click is for a frame of its own.
+  void openMarkers() {
+    for (const char* section : {"Colours and opacities", "Picture", "Markers"}) {
+      save();
+      click(section);
+    }
+    save();
+  }
+  static bool gone(const std::string& begin) {
+    return eventually([&] { return !hasWidget(begin); });
+  }
+};
+
+TEST_F(WindowPanels, TheValueUnderTheMouseIsThatOfTheData) {
+  open();
+  save();
+  const std::string status = widget("status f ");
+  std::smatch parts;
+  ASSERT_TRUE(std::regex_search(
+      status, parts, std::regex("f (\\S+) at (\\S+), (\\S+), (\\S+); node i (\\d+), j (\\d+), k (\\d+)")))
+      << status;
+  // `info --probe` finds the same sample there.
+  const ProgramResult probed =
+      runProgram({"info", "a.splats", "--probe", parts[2].str(), parts[3].str(), parts[4].str()});
+  EXPECT_NE(probed.out.find(fmt::format("i {}, j {}, k {}", parts[5].str(), parts[6].str(), parts[7].str())),
+            std::string::npos)
+      << status << "\n"
+      << probed.out << probed.err;
+  close();
+}
+
+TEST_F(WindowPanels, AClickKeepsAMarkerWhichIsRenamedUndoneAndRemoved) {
+  open();
+  save();
+  widget("status f ");
+  click(kPicture);
+  widget("message marker 1: f ");
+  widget("sign of marker 1");
+  press("ctrl+z");
+  EXPECT_TRUE(gone("sign of marker 1"));
+  press("ctrl+shift+z");
+  widget("sign of marker 1");
+  openMarkers();
+  click("marker 1");
+  save();  // the field has heard the click
+  act({"key", "ctrl+a"});
+  act({"type", "nose"});
+  press("Return");
+  close();
+  const auto state = fs::directory_iterator("config/curvisplat/views")->path();
+  std::ifstream file(state);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  EXPECT_NE(text.find("\"nose\""), std::string::npos) << text;
+  open();
+  widget("sign of marker 1");
+  openMarkers();
+  click("remove marker 1");
+  EXPECT_TRUE(gone("sign of marker 1"));
+  close();
+}
+
+TEST_F(WindowPanels, APlaneIsDraggedInThePicture) {
+  open();
+  press("x");
+  const Image whole = save();
+  choose("Picture", "Add a clip plane");
+  save();
+  press("z");  // from another side: the plane is seen edge on
+  const Image cut = saveAndCopy();
+  drag(1, 0, 60, placeOf("handle 1"));
+  const Image moved = saveAndCopy();
+  EXPECT_LT(difference(cut, moved), 40);
+  EXPECT_LT(difference(whole, cut), 40);
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 2u);
+  EXPECT_NE(valueOf(commands[0], "--clip-plane"), valueOf(commands[1], "--clip-plane"));
+  // The camera stayed: the handle was dragged, not the picture.
+  EXPECT_EQ(valueOf(commands[0], "--position"), valueOf(commands[1], "--position"));
+  expectDraws(commands[1], moved);
+}
+
+TEST_F(WindowPanels, OpacitiesOfAnotherScalar) {
+  open();
+  const Image one = save();
+  click("opacity by");
+  click("opacity by volume");
+  const Image two = saveAndCopy();
+  EXPECT_LT(difference(one, two), 40);
+  click("opacity by");
+  click("opacity by the same scalar");
+  EXPECT_GE(difference(save(), one), 50);
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 1u);
+  EXPECT_EQ(valueOf(commands[0], "--scalar"), "f");
+  EXPECT_EQ(valueOf(commands[0], "--opacity-by"), "volume");
+  expectDraws(commands[0], two);
+}
+
+TEST_F(WindowPanels, UndoAndRedo) {
+  open();
+  const Image first = save();
+  press("b");
+  const Image dark = save();
+  EXPECT_LT(difference(first, dark), 20);
+  drag(1, 90, 30);
+  const Image turned = save();
+  press("ctrl+z");
+  EXPECT_GE(difference(save(), dark), 50);
+  press("ctrl+z");
+  EXPECT_GE(difference(save(), first), 50);
+  press("ctrl+y");
+  press("ctrl+y");
+  EXPECT_GE(difference(save(), turned), 50);
+  close();
+}
+
+TEST_F(WindowPanels, SavesSeveralViews) {
+  open();
+  const Image first = save();
+  click("Colours and opacities");  // room for the names
+  save();
+  click("view name");
+  act({"type", "a/b view"});  // keys of the window are letters here
+  press("Return");
+  widget("view a/b view");
+  press("b");
+  const Image dark = save();
+  EXPECT_LT(difference(first, dark), 20);
+  choose("View", "Save this view...");
+  widget("view view 2");
+  click("view a/b view");
+  EXPECT_GE(difference(save(), first), 50);
+  close();
+  open();
+  save();
+  click("Colours and opacities");
+  save();
+  click("view view 2");
+  EXPECT_GE(difference(save(), dark), 50);
+  click("remove view view 2");
+  EXPECT_TRUE(gone("view view 2"));
+  close();
+}
+
+TEST_F(WindowPanels, KeysAndMessagesAreShown) {
+  open();
+  save();
+  widget("message saved ");
+  EXPECT_TRUE(gone("message saved "));  // by itself
+  press("F1");
+  widget("window Keys and mouse");
+  press("Escape");
+  EXPECT_TRUE(gone("window Keys and mouse"));
+  press("question");
+  widget("window Keys and mouse");
+  press("F1");
+  EXPECT_TRUE(gone("window Keys and mouse"));
+  choose("Window", "Messages");
+  widget("window Messages");
+  close();
+}
+
+TEST_F(WindowPanels, TypingSavesNothingAndEndsNothing) {
+  open();
+  const Image first = save();
+  const auto pictures = [] {
+    return std::count_if(fs::directory_iterator("."), fs::directory_iterator(),
+                         [](const fs::directory_entry& entry) { return entry.path().extension() == ".png"; });
+  };
+  const auto before = pictures();
+  act({"type", "pcgsnop quit"});
+  press("Escape");
+  press("F1");
+  widget("window Keys and mouse");  // the window lives, and has seen the keys
+  EXPECT_EQ(pictures(), before);
+  close();
+}
+
+TEST_F(WindowPanels, ThemeAndTextSizeAreRemembered) {
+  open();
+  save();
+  const auto panelWidth = [] { return placeOf("picture", 0, 0).first; };
+  const int before = panelWidth();
+  choose("Window", "Light theme");
+  press("ctrl+equal");
+  EXPECT_TRUE(eventually([&] { return panelWidth() > before; }));
+  // A panel's paper, below its last line of text.
+  const auto paper = [&] { return display_->screenshot().pixel(panelWidth() - 40, kWindow.height - 4)[0]; };
+  EXPECT_TRUE(eventually([&] { return paper() > 0.7f; }));
+  close();
+  open();
+  EXPECT_TRUE(eventually([&] { return panelWidth() > before && paper() > 0.7f; }));
+  close();
+}
+
+TEST_F(WindowPanels, EditsColoursAndKeepsThemBesideThePicture) {
+  open();
+  const Image first = save();
+  for (const char* next : {"Scalar", "colour points", "edit these colours"}) {
+    click(next);
+    save();
+  }
+  placeOf("colour 9");  // nine, each with its picker
+  const Image edited = saveAndCopy();
+  EXPECT_GT(difference(first, edited), 25);  // nearly the same colours, of fewer points
+  const auto command = close().at(0);
+  EXPECT_EQ(valueOf(command, "--tf"), "a_colours.json");
+  expectDraws(command, edited);
+}
+
+TEST_F(WindowPanels, ColourMapsAreChosenFromTheirSwatches) {
+  open();
+  const Image first = save();
+  click("colours");
+  click("colours inferno");
+  const Image inferno = saveAndCopy();
+  EXPECT_LT(difference(first, inferno), 40);
+  const auto command = close().at(0);
+  EXPECT_EQ(valueOf(command, "--tf"), "inferno");
+  expectDraws(command, inferno);
+}
+
+}  // namespace
+}  // namespace curvisplat

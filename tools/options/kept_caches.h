@@ -1,0 +1,41 @@
+// Caches of grids that were opened without `convert`: kept in the user's cache folder, $XDG_CACHE_HOME/curvisplat or
+// ~/.cache/curvisplat, and found again by the contents of the grid's files, wherever these lie.
+//
+//   <folder>/<key>/NAME.splats      NAME: of the grid's file
+//   <folder>/<key>/used             its time: when it was opened last; locked while it is made
+//   <folder>/known/<file>           checksum of a file that has not changed since, by its path
+//
+// When they take more than the limit (CURVISPLAT_CACHE_SIZE, default 20G), those that were not used for longest are
+// removed. Readers that have one open keep what they have read.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stream/base/progress.h"
+
+namespace curvisplat {
+
+/// The cache folder; nullopt if neither XDG_CACHE_HOME nor HOME is set.
+std::optional<std::filesystem::path> keptFolder();
+
+/// Whether these are the files of a grid, not a cache: a regular file, or a folder of a grid.
+bool isGrid(const std::vector<std::filesystem::path>& files);
+
+/// The cache of a grid's files: the one that is kept, or a new one, made with all default options of `convert`. `say`
+/// gets its warnings and notes. Throws Error as opening and converting do, Interrupted once `progress` is stopped.
+std::filesystem::path keptCacheOf(const std::vector<std::filesystem::path>& files, Progress& progress,
+                                  const std::function<void(const std::string&)>& say);
+
+/// Removes the caches in `folder` that were not used for longest, until the rest takes `limit` bytes at most. Keeps
+/// `kept`, and those that are being made.
+void limitKeptCaches(const std::filesystem::path& folder, uint64_t limit, const std::filesystem::path& kept);
+
+/// What messages and menus call the files: their names without folders.
+std::string namesOf(const std::vector<std::filesystem::path>& files);
+
+}  // namespace curvisplat
