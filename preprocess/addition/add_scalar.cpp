@@ -8,6 +8,7 @@
 
 #include "preprocess/addition/addition_checks.h"
 #include "preprocess/addition/cache_grid.h"
+#include "preprocess/addition/further_faces.h"
 #include "preprocess/addition/value_passes.h"
 #include "preprocess/addition/value_record.h"
 #include "preprocess/convert/grid_origin.h"
@@ -19,6 +20,7 @@
 #include "stream/base/paths.h"
 #include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
+#include "stream/cache/faces_file.h"
 #include "stream/cache/variable_writer.h"
 
 namespace curvisplat {
@@ -79,6 +81,7 @@ class Addition {
     pass("scatter", manifest().nodes, "nodes", &Addition::scatter);
     pass("seams", 0, "nodes", &Addition::mergeSeams);
     pass("build", manifest().splats, "splats", &Addition::build);
+    pass("faces", manifest().nodes, "nodes", &Addition::writeFaces);
     pass("finish", 0, "bricks", &Addition::finish);
     progress_.end();
     return std::move(report_);
@@ -163,6 +166,12 @@ class Addition {
   void build() {
     passes_->build(*writer_);
     passes_.reset();
+  }
+
+  void writeFaces() {
+    const std::vector<uint32_t> numbers = writer_->numbers();
+    const FurtherFaces job{cache_, reader_, scratch_.path(), facesFileOfVariable(numbers.front()), numbers};
+    if (const auto file = writeFurtherFaces(job, plan_, progress_)) writer_->addFile(*file);
   }
 
   void finish() {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <utility>
 
 #include "stream/base/error.h"
 
@@ -34,6 +35,11 @@ double AsinhScale::scalar(double coordinate) const {
 TransferFunctionDefinition FunctionParts::definition() const {
   TransferFunctionDefinition preset = presetDefinition(map);
   if (!opacities.empty()) preset.opacities = opacities;
+  return spreadOver(std::move(preset), range, asinh);
+}
+
+TransferFunctionDefinition spreadOver(TransferFunctionDefinition preset, std::pair<double, double> range,
+                                      const std::optional<AsinhScale>& asinh) {
   const auto [low, high] = range;
   if (!(low < high)) throw UsageError("the range {},{} of a transfer function must increase", low, high);
   if (!asinh) {

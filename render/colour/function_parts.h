@@ -22,6 +22,11 @@ struct AsinhScale {
   double scalar(double coordinate) const;
 };
 
+/// A definition over 0..1 spread over `range`: linearly, or by `asinh`, where its curves are replaced by short straight
+/// lines. Throws UsageError if the range is reversed or empty.
+TransferFunctionDefinition spreadOver(TransferFunctionDefinition definition, std::pair<double, double> range,
+                                      const std::optional<AsinhScale>& asinh);
+
 struct FunctionParts {
   std::string map = "viridis";  // a preset
   std::pair<double, double> range{0, 1};

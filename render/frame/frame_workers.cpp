@@ -131,8 +131,10 @@ void FrameWorkers::sample(Worker& worker, const SliceWork& work) {
       const auto fetched = fetch(worker, sequence, work.parts[sequence], work.keep_going);
       if (!fetched) return;
       const StageTimer timer(worker.statistics.project_s, "sample slice");
-      work.sampler.add(work.cache.manifest().root.cellMin(fetched->cell), fetched->geometry,
-                       fetched->second.value_or(fetched->values), fetched->ranges);
+      const glm::dvec3 cell_min = work.cache.manifest().root.cellMin(fetched->cell);
+      work.sampler.add(cell_min, fetched->geometry, fetched->second.value_or(fetched->values),
+                       fetched->ranges);
+      if (work.opacities) work.opacities->add(cell_min, fetched->geometry, fetched->values, fetched->ranges);
     }
   } catch (...) {
     fail();

@@ -6,15 +6,15 @@
 #include <limits>
 
 namespace curvisplat {
-namespace {
 
-/// A point of the picture at a depth, in view axes.
 glm::dvec3 placeOf(const ScreenView& view, int x, int y, double depth) {
   const double across = (x + 0.5 - 0.5 * view.size.width) / view.focal_px;
   const double down = (y + 0.5 - 0.5 * view.size.height) / view.focal_px;
   if (view.projection == Projection::kPerspective) return depth * glm::normalize(glm::dvec3(across, down, 1));
   return {across, down, depth};
 }
+
+namespace {
 
 /// Of a layer's pixel, from the neighbours that are nearest in depth; 0 without neighbours.
 glm::dvec3 layerNormal(const ScreenView& view, const std::vector<float>& depths, int x, int y) {

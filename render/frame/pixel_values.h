@@ -18,6 +18,9 @@ struct PixelValues {
       normal;  // towards the viewer, in coordinates after --scale; length 1, or 0 if unknown
 };
 
+/// The point in view axes at a depth of a pixel's centre: the inverse of PixelValues::depth.
+glm::dvec3 placeOf(const ScreenView& view, int x, int y, double depth);
+
 /// What ValuePainter leaves in an image: depth from `depth_origin`, scalar, and the first two components of the normal
 /// in view axes, or kOfLayer where a layer is seen, whose normal is found from its neighbours' depths.
 inline constexpr float kOfLayer = 2;

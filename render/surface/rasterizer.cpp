@@ -38,14 +38,16 @@ void clipToGuard(std::vector<ScreenVertex>& polygon, float ScreenVertex::*axis, 
 
 }  // namespace
 
-bool SampleTile::draw(const SceneTriangles& triangles, const TriangleBins& bins, int column, int row) {
+bool SampleTile::draw(const SceneTriangles& triangles, const TriangleBins& bins, int column, int row,
+                      const SampleTile* before) {
   x0_ = column * kSampleTileWidth;
   y0_ = row * kSampleTileHeight;
   x1_ = std::min(x0_ + kSampleTileWidth, triangles.view().size.width) - 1;
   y1_ = std::min(y0_ + kSampleTileHeight, triangles.view().size.height) - 1;
+  before_ = before;
   bool cleared = false;
   std::array<uint32_t, kLeftAtOnce> left;
-  return bins.forTile(column, row, [&](size_t surface, std::span<const uint32_t> seen) {
+  const bool any = bins.forTile(column, row, [&](size_t surface, std::span<const uint32_t> seen) {
     if (!std::exchange(cleared, true)) {
       PixelSamples nothing;
       nothing.values.fill(INFINITY);
@@ -55,10 +57,10 @@ bool SampleTile::draw(const SceneTriangles& triangles, const TriangleBins& bins,
     const TriangleMesh& mesh = *triangles.scene().surfaces[surface].mesh;
     const std::vector<ScreenVertex>& vertices = triangles.verticesOf(surface);
     for (; !seen.empty(); seen = seen.subspan(std::min(kLeftAtOnce, seen.size()))) {
-      const size_t count =
-          drawSmallTriangles({vertices.data(), mesh.triangles.data(),
-                              seen.first(std::min(kLeftAtOnce, seen.size())), triangles.firstOf(surface)},
-                             {samples_.data(), x0_, y0_, x1_, y1_}, left.data());
+      const size_t count = drawSmallTriangles(
+          {vertices.data(), mesh.triangles.data(), seen.first(std::min(kLeftAtOnce, seen.size())),
+           triangles.firstOf(surface)},
+          {samples_.data(), before ? before->samples_.data() : nullptr, x0_, y0_, x1_, y1_}, left.data());
       for (size_t n = 0; n < count; ++n) {
         const auto& corners = mesh.triangles[left[n]];
         const uint32_t number = triangles.firstOf(surface) + left[n];
@@ -74,6 +76,11 @@ bool SampleTile::draw(const SceneTriangles& triangles, const TriangleBins& bins,
       }
     }
   });
+  // All of it may lie before what is asked for.
+  return any && (!before || std::any_of(samples_.begin(), samples_.end(), [](const PixelSamples& pixel) {
+           return std::any_of(pixel.numbers.begin(), pixel.numbers.end(),
+                              [](uint32_t number) { return number != PixelSamples::kNothing; });
+         }));
 }
 
 /// Coordinates in 1/16 pixel.
@@ -174,6 +181,11 @@ void SampleTile::fill(const Setup& setup, uint32_t number) {
               !(at[0] + offsets[0][s] >= 0 && at[1] + offsets[1][s] >= 0 && at[2] + offsets[2][s] >= 0))
             continue;
           const float here = value + of_sample[s];
+          if (before_) {
+            const PixelSamples& nearer = before_->at(x, y);
+            if (here < nearer.values[s] || (here == nearer.values[s] && number <= nearer.numbers[s]))
+              continue;
+          }
           if (here > pixel->values[s] || (here == pixel->values[s] && number >= pixel->numbers[s])) continue;
           pixel->values[s] = here;
           pixel->numbers[s] = number;

@@ -21,8 +21,10 @@ class SampleTile {
  public:
   SampleTile() : samples_(static_cast<size_t>(kSampleTileWidth) * kSampleTileHeight) {}
 
-  /// Draws the triangles that a tile sees. False if there are none: then samples are undefined.
-  bool draw(const SceneTriangles& triangles, const TriangleBins& bins, int column, int row);
+  /// Draws the triangles that a tile sees; with `before`, of the same tile, those that lie behind what its samples
+  /// see. False if nothing is seen: then samples are undefined.
+  bool draw(const SceneTriangles& triangles, const TriangleBins& bins, int column, int row,
+            const SampleTile* before = nullptr);
 
   int x0() const { return x0_; }
   int y0() const { return y0_; }
@@ -40,7 +42,8 @@ class SampleTile {
   void fill(const Setup& setup, uint32_t number);
 
   int x0_ = 0, y0_ = 0, x1_ = -1, y1_ = -1;
-  std::vector<PixelSamples> samples_;  // [kSampleTileHeight][kSampleTileWidth]
+  const SampleTile* before_ = nullptr;  // while it draws
+  std::vector<PixelSamples> samples_;   // [kSampleTileHeight][kSampleTileWidth]
 };
 
 }  // namespace curvisplat

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -38,6 +39,7 @@ class Shader {
   /// What light falls on.
   struct Point {
     glm::vec3 colour{0.0f}, normal{0.0f};
+    float opacity = 0;
   };
   /// Of a triangle at a point of the picture.
   Point pointAt(uint32_t number, float x, float y) const {
@@ -46,7 +48,7 @@ class Shader {
     const TriangleMesh& mesh = *surface.mesh;
     const auto& corners = mesh.triangles[triangle];
     const glm::vec3 share = sharesAt(surface_number, corners, x, y);
-    Point point{surface.colour};
+    Point point{surface.colour, glm::vec3(0.0f), static_cast<float>(surface.opacity.factor)};
     float scalar = 0;
     const glm::vec3 first = mesh.normals[corners[0]];
     for (int n = 0; n < 3; ++n) {
@@ -55,9 +57,15 @@ class Shader {
       point.normal += share[n] * of_corner;
       if (!mesh.scalars.empty()) scalar += share[n] * mesh.scalars[corners[static_cast<size_t>(n)]];
     }
-    if (surface.by_scalar && !mesh.scalars.empty() && !std::isnan(scalar))
-      point.colour = (surface.colours ? *surface.colours : look_.colours).at(double{scalar});
+    if (surface.by_scalar && !mesh.scalars.empty() && !std::isnan(scalar)) {
+      const ColourTable& colours = surface.colours ? *surface.colours : look_.colours;
+      point.colour = colours.at(double{scalar});
+      if (surface.opacity.by_function) point.opacity *= colours.opacityAt(double{scalar});
+    }
     return point;
+  }
+  bool isOpaque(uint32_t number) const {
+    return triangles_.scene().surfaces[triangles_.placeOf(number).surface].opacity.opaque();
   }
   glm::vec3 lit(const Point& point, float x, float y) const {
     return light_.lit(point.colour, point.normal, towardsViewer(triangles_.view(), x, y));
@@ -103,32 +111,38 @@ class Shader {
 class PixelSurfaces {
  public:
   PixelSurfaces(const SceneTriangles& triangles, const Shader& shader)
-      : triangles_(triangles), shader_(shader) {}
+      : triangles_(triangles),
+        shader_(shader),
+        has_translucent_(std::any_of(triangles.scene().surfaces.begin(), triangles.scene().surfaces.end(),
+                                     [](const Surface& surface) { return !surface.opacity.opaque(); })) {}
 
-  void append(const PixelSamples& samples, int x, int y, std::vector<PixelLayer>& layers) const {
+  /// Whether what lies behind a surface may be seen through it.
+  bool hasTranslucent() const { return has_translucent_; }
+
+  /// `hidden`: the samples behind something opaque, which are left out; adds to it.
+  void append(const PixelSamples& samples, int x, int y, unsigned& hidden,
+              std::vector<PixelLayer>& layers) const {
     std::array<Seen, kSamples> seen;
     size_t count = 0, nearest = 0;
     float farthest = -INFINITY;
     for (size_t n = 0; n < kSamples; ++n) {
-      if (samples.numbers[n] == PixelSamples::kNothing) continue;
+      if (samples.numbers[n] == PixelSamples::kNothing || (hidden >> n & 1) != 0) continue;
       seen[count] = {samples.values[n], samples.numbers[n], static_cast<uint32_t>(n)};
       if (seen[count] < seen[nearest]) nearest = count;
       farthest = std::max(farthest, samples.values[n]);
       ++count;
     }
     if (count == 0) return;
+    size_t left = kSamples - static_cast<size_t>(std::popcount(hidden));
     // Most pixels have one layer: its samples need not be in order.
     if (double{farthest} - double{seen[nearest].value} <= toleranceOf(seen[nearest])) {
-      layers.push_back(layerOf(std::span(seen).first(count), x, y, static_cast<float>(count) / kSamples));
+      layers.push_back(layerOf(std::span(seen).first(count), x, y, left, hidden));
       return;
     }
     std::sort(seen.begin(), seen.begin() + static_cast<ptrdiff_t>(count));
-    size_t left = kSamples;
     for (size_t begin = 0; begin < count;) {
       const size_t end = endOfLayer(seen, begin, count);
-      const float alpha = static_cast<float>(end - begin) / static_cast<float>(left);
-      left -= end - begin;
-      layers.push_back(layerOf(std::span(seen).subspan(begin, end - begin), x, y, alpha));
+      layers.push_back(layerOf(std::span(seen).subspan(begin, end - begin), x, y, left, hidden));
       begin = end;
     }
   }
@@ -160,8 +174,21 @@ class PixelSurfaces {
     return end;
   }
 
-  /// Of the samples of one layer.
-  PixelLayer layerOf(std::span<const Seen> seen, int x, int y, float alpha) const {
+  /// Of the samples of one layer. `left`: samples that nothing opaque has hidden so far.
+  PixelLayer layerOf(std::span<const Seen> seen, int x, int y, size_t& left, unsigned& hidden) const {
+    size_t opaque = seen.size();
+    if (has_translucent_) {
+      opaque = 0;
+      for (const Seen& sample : seen)
+        if (shader_.isOpaque(sample.number)) {
+          ++opaque;
+          hidden |= 1u << sample.place;
+        }
+    }
+    // Opaque ones hide what is left; translucent ones cover their part of the pixel.
+    const float part_of =
+        static_cast<float>(seen.size()) / static_cast<float>(opaque == seen.size() ? left : kSamples);
+    left -= opaque;
     struct Part {
       uint32_t number;
       float x, y, count;
@@ -193,9 +220,11 @@ class PixelSurfaces {
       smooth = smooth && std::abs(facing) > kSmooth;
       mean.colour += part.count * points[n].colour;
       mean.normal += part.count * points[n].normal;
+      mean.opacity += part.count * points[n].opacity;
       shaded += part.count;
     }
     mean.colour /= shaded;
+    const float alpha = has_translucent_ ? part_of * mean.opacity / shaded : part_of;
     glm::vec3 colour(0.0f);
     if (smooth)
       colour = shader_.lit(mean, middle_x, middle_y);
@@ -220,6 +249,7 @@ class PixelSurfaces {
 
   const SceneTriangles& triangles_;
   const Shader& shader_;
+  const bool has_translucent_;
 };
 
 /// What clip planes leave of a slice at a point, smoothed over a pixel.
@@ -240,14 +270,15 @@ class PixelSlices {
   bool empty() const { return slices_.empty(); }
 
   void append(int x, int y, std::vector<PixelLayer>& layers) const {
-    for (const auto& slice : slices_) {
+    for (size_t n = 0; n < slices_.size(); ++n) {
+      const auto& slice = slices_[n];
       const auto sample = slice->at(x, y, look_.depth_origin);
       if (!sample) continue;
       const glm::dvec3 in_view = view_.viewFromData(sample->at);
       const double pixel = (view_.projection == Projection::kPerspective ? in_view.z : 1) / view_.focal_px /
                            std::max({view_.scale.x, view_.scale.y, view_.scale.z});
       const float alpha = sample->coverage * coverageAt(look_.clip_planes, sample->at, pixel) *
-                          static_cast<float>(scene_.slice_opacity);
+                          static_cast<float>(scene_.slice_opacity) * opacityOf(n, *sample, x, y);
       glm::vec3 colour = look_.colours.at(sample->scalar);
       if (look_.light)
         colour = light_.lit(colour, glm::vec3(slice->plane().normal),
@@ -257,6 +288,14 @@ class PixelSlices {
   }
 
  private:
+  /// By the function.
+  float opacityOf(size_t slice, const SliceSampler::Sample& sample, int x, int y) const {
+    if (!scene_.slices_by_function || !look_.opacities) return 1;
+    if (look_.opacity_slices.empty()) return look_.opacities->opacityAt(sample.scalar);
+    const auto other = look_.opacity_slices[slice]->at(x, y, look_.depth_origin);
+    return other ? look_.opacities->opacityAt(other->scalar) : 0;
+  }
+
   const SurfaceScene& scene_;
   const ScreenView& view_;
   const std::span<const std::unique_ptr<SliceSampler>> slices_;
@@ -275,15 +314,21 @@ PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
   const PixelSlices pixel_slices(scene, view, slices, look);
   const auto columns = static_cast<size_t>(bins.columns());
   std::vector<PixelLayers::Row> rows(columns * static_cast<size_t>(view.size.height));
-  tbb::enumerable_thread_specific<SampleTile> tiles;
+  // One tile after the other: what is seen first, and through it, what lies behind.
+  tbb::enumerable_thread_specific<std::vector<SampleTile>> tiles_of_threads;
   tbb::parallel_for(size_t{0}, columns * static_cast<size_t>(bins.rows()), [&](size_t number) {
-    SampleTile& tile = tiles.local();
+    std::vector<SampleTile>& tiles = tiles_of_threads.local();
+    tiles.resize(pixel_surfaces.hasTranslucent() ? PixelLayers::kMostLayers : 1);
     const auto column = static_cast<int>(number % columns), row = static_cast<int>(number / columns);
-    const bool has_surfaces = tile.draw(triangles, bins, column, row);
+    size_t drawn = 0;
+    while (drawn < tiles.size() &&
+           tiles[drawn].draw(triangles, bins, column, row, drawn > 0 ? &tiles[drawn - 1] : nullptr))
+      ++drawn;
+    const SampleTile& tile = tiles.front();
     for (int y = tile.y0(); y <= tile.y1(); ++y) {
       PixelLayers::Row& out = rows[static_cast<size_t>(y) * columns + number % columns];
       const auto width = static_cast<size_t>(tile.x1() - tile.x0() + 1);
-      if (!has_surfaces && pixel_slices.empty()) {
+      if (drawn == 0 && pixel_slices.empty()) {
         out.counts.assign(width, 0);
         continue;
       }
@@ -291,7 +336,8 @@ PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
       out.layers.reserve(width);
       for (int x = tile.x0(); x <= tile.x1(); ++x) {
         const size_t before = out.layers.size();
-        if (has_surfaces) pixel_surfaces.append(tile.at(x, y), x, y, out.layers);
+        unsigned hidden = 0;  // bits of samples
+        for (size_t n = 0; n < drawn; ++n) pixel_surfaces.append(tiles[n].at(x, y), x, y, hidden, out.layers);
         pixel_slices.append(x, y, out.layers);
         out.endPixel(before);
       }

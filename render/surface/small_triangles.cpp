@@ -148,7 +148,8 @@ HWY_INLINE void fill(const Setups& s, size_t n, uint32_t number, const SampleBox
   constexpr float kPixel = 1 << kGridBits;
   for (int y = y0; y <= s.y1.at[n]; ++y) {
     const auto down = static_cast<float>(y - y0);
-    PixelSamples* pixel = box.samples + (y - box.y0) * kSampleTileWidth + (x0 - box.x0);
+    const ptrdiff_t first = ptrdiff_t{y - box.y0} * kSampleTileWidth + (x0 - box.x0);
+    PixelSamples* pixel = box.samples + first;
     for (int x = x0; x <= s.x1.at[n]; ++x, ++pixel) {
       const auto across = static_cast<float>(x - x0);
       float at[3];
@@ -165,8 +166,14 @@ HWY_INLINE void fill(const Setups& s, size_t n, uint32_t number, const SampleBox
             hn::Min(hn::Max(hn::Add(hn::Set(d, middle), hn::Load(d, values + part)), least), most);
         const auto seen = hn::Load(d, pixel->values.data() + part);
         const auto seen_number = hn::Load(du, pixel->numbers.data() + part);
-        const auto first = hn::And(hn::Eq(value, seen), hn::RebindMask(d, hn::Lt(own, seen_number)));
-        const auto nearer = hn::And(inside, hn::Or(hn::Lt(value, seen), first));
+        const auto same = hn::And(hn::Eq(value, seen), hn::RebindMask(d, hn::Lt(own, seen_number)));
+        auto nearer = hn::And(inside, hn::Or(hn::Lt(value, seen), same));
+        if (box.before) {
+          const PixelSamples& before = box.before[pixel - box.samples];
+          const auto bound = hn::Load(d, before.values.data() + part);
+          const auto after = hn::RebindMask(d, hn::Lt(hn::Load(du, before.numbers.data() + part), own));
+          nearer = hn::And(nearer, hn::Or(hn::Lt(bound, value), hn::And(hn::Eq(bound, value), after)));
+        }
         hn::Store(hn::IfThenElse(nearer, value, seen), d, pixel->values.data() + part);
         hn::Store(hn::IfThenElse(hn::RebindMask(du, nearer), own, seen_number), du,
                   pixel->numbers.data() + part);

@@ -23,6 +23,7 @@ struct SmallTriangles {
 /// Pixels [x0, x1] x [y0, y1] of the picture, with rows of kSampleTileWidth.
 struct SampleBox {
   PixelSamples* samples;
+  const PixelSamples* before;  // only what lies behind these is drawn; may be null
   int x0, y0, x1, y1;
 };
 

@@ -26,8 +26,7 @@ namespace curvisplat {
 class WindowTest : public testing::Test {
  protected:
   using Place = std::pair<int, int>;
-  static constexpr int kPanel = 338;  // the picture begins right of it
-  static constexpr Place kPicture{520, 300};
+  static constexpr Place kPicture{560, 300};
   static constexpr ImageSize kScreen{1000, 700}, kWindow{900, 600};
 
   static void SetUpTestSuite() {
@@ -110,23 +109,23 @@ class WindowTest : public testing::Test {
     act({"mouseup", number});
     moveTo(kPicture);
   }
-  /// The final picture, as saved by `p`: all that was done before is in it.
+  /// The final picture, as saved by Ctrl+S: all that was done before is in it.
   Image save() {
     const std::string name = picture(++saved_, cache_);
     EXPECT_TRUE(eventually([&] {
-      if (!std::filesystem::exists(name)) press("p");  // a key may come before the window hears
+      if (!std::filesystem::exists(name)) press("ctrl+s");  // a key may come before the window hears
       return eventually([&] { return std::filesystem::exists(name); }, 5);
     }));
     return readImage(name);
   }
   /// The same, and the command that draws it is among those that close() returns.
   Image saveAndCopy() {
-    press("c");
+    press("ctrl+c");
     return save();
   }
   /// Closes the window: the words of the commands that were copied, without the program's name.
   std::vector<std::vector<std::string>> close() {
-    press("Escape");
+    press("ctrl+q");
     const ProgramResult result = window_->wait();
     EXPECT_EQ(result.status, 0) << result.err;
     std::vector<std::vector<std::string>> commands;
@@ -139,11 +138,47 @@ class WindowTest : public testing::Test {
   }
   /// The part of the screen where the window shows the picture.
   Image shown(ImageSize size) const {
+    for (int n = 0; n < 3 && hasWidget("message "); ++n) clickAway();
     const Image screen = display_->screenshot();
+    const auto [left, top] = placeOf("picture", 0, 0);
     Image part(size);
-    for (int y = 0; y < size.height; ++y)
-      for (int x = 0; x < size.width; ++x) std::copy_n(screen.pixel(kPanel + x, y), 4, part.pixel(x, y));
+    for (int y = 0; y < size.height && top + y < screen.size.height; ++y)
+      for (int x = 0; x < size.width && left + x < screen.size.width; ++x)
+        std::copy_n(screen.pixel(left + x, top + y), 4, part.pixel(x, y));
     return part;
+  }
+  /// Clicks the newest message away.
+  void clickAway() const {
+    std::ifstream file("widgets");
+    for (std::string line; std::getline(file, line);) {
+      std::istringstream words(line);
+      int x = 0, y = 0, number = 0;
+      std::string name;
+      words >> x >> y >> number >> number >> name;
+      if (name != "message") continue;
+      display_->act({"mousemove", std::to_string(x + 4), std::to_string(y + 4), "click", "1", "mousemove",
+                     std::to_string(kPicture.first), std::to_string(kPicture.second)});
+      eventually([&] { return !hasWidget(line.substr(line.find("message"))); }, 5);
+      return;
+    }
+  }
+  /// The picture's size in the window.
+  static ImageSize pictureSize() {
+    const auto [left, top] = placeOf("picture", 0, 0);
+    const auto [right, bottom] = placeOf("picture", 1, 1);
+    return {right - left, bottom - top};
+  }
+  /// Whether a widget or a message whose name begins so is in the window.
+  static bool hasWidget(const std::string& begin) {
+    std::ifstream file("widgets");
+    for (std::string line; std::getline(file, line);) {
+      std::istringstream words(line);
+      int number = 0;
+      std::string name;
+      words >> number >> number >> number >> number;
+      if (std::getline(words >> std::ws, name) && name.starts_with(begin)) return true;
+    }
+    return false;
   }
   /// The command's picture is `picture`.
   static void expectDraws(const std::vector<std::string>& command, const Image& picture) {

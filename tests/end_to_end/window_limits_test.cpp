@@ -46,7 +46,7 @@ class WindowLimitsTest : public testing::Test {
     return window;
   }
   ProgramResult closed(RunningProgram& window) const {
-    display_->act({"key", "Escape"});
+    display_->act({"key", "ctrl+q"});
     return window.wait();
   }
 

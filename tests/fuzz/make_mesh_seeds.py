@@ -207,6 +207,35 @@ def ensight_seeds():
                           bytes([kind]) + struct.pack("<H", len(geometry)) + geometry + file)
 
 
+def columns_seeds(folder):
+    nodes = np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1.0]])
+    faces = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
+    for kind in ("ugrid", "icon", "mpas"):
+        path = folder / "a.nc"
+        with netCDF4.Dataset(path, "w", format="NETCDF3_CLASSIC") as f:
+            for name, size in (("Time", None), ("layer", 2), ("level", 3), ("cell", 2), ("node", 6), ("corner", 4)):
+                f.createDimension(name, size)
+            longitude, latitude = {"ugrid": ("lon", "lat"), "icon": ("vlon", "vlat"), "mpas": ("lonVertex", "latVertex")}[kind]
+            for name, axis in ((longitude, 0), (latitude, 1)):
+                f.createVariable(name, "f8", ("node",))[:] = nodes[:, axis]
+            if kind == "ugrid":
+                mesh = f.createVariable("mesh", "i4")
+                mesh.cf_role, mesh.topology_dimension = "mesh_topology", np.int32(2)
+                mesh.node_coordinates, mesh.face_node_connectivity = "lon lat", "corners"
+                f.createVariable("corners", "i4", ("cell", "corner"))[:] = faces
+            elif kind == "icon":
+                f.createVariable("vertex_of_cell", "i4", ("corner", "cell"))[:] = faces.T + 1
+            else:
+                f.createVariable("verticesOnCell", "i4", ("cell", "corner"))[:] = faces + 1
+                f.createVariable("nEdgesOnCell", "i4", ("cell",))[:] = [4, 3]
+                f.createVariable("zgrid", "f8", ("cell", "level"))[:] = [[0, 1, 2], [1, 2, 3]]
+            layer = f.createVariable("layer", "f8", ("layer",))
+            layer.units, layer.positive = "m", "up"
+            layer[:] = [10, 20]
+            f.createVariable("t", "f4", ("Time", "cell", "layer") if kind == "mpas" else ("Time", "layer", "cell"))[0] = [[1, 2], [3, 4]]
+        put("columns", kind, path.read_bytes())
+
+
 def lists_of_steps():
     files = [{"name": f"step{n}.vts", "time": n / 2} for n in (0, 1)]
     put("file_series", "two_steps", json.dumps({"file-series-version": "1.0", "files": files}).encode())
@@ -222,6 +251,7 @@ def lists_of_steps():
 with tempfile.TemporaryDirectory() as name:
     vtk_seeds(pathlib.Path(name))
     exodus_seeds(pathlib.Path(name))
+    columns_seeds(pathlib.Path(name))
 foam_seeds()
 su2_seeds()
 ensight_seeds()

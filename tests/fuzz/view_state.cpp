@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "stream/base/check.h"
+#include "tools/viewer/render_command.h"
 #include "tools/viewer/view_state.h"
 
 #include "tests/fuzz/fuzz_target.h"
@@ -32,7 +33,7 @@ void run(std::span<const std::byte> bytes) {
   const std::string text = toJson(state);
   const std::string again = toJson(viewStateFromJson(text, "again.json", manifest));
   CURVISPLAT_CHECK(isSame(nlohmann::json::parse(again), nlohmann::json::parse(text)));
-  const std::string command = renderCommand(state, "a.splats", {600, 400}, "function.json");
+  const std::string command = renderCommand(state, {"a.splats", {600, 400}, "function.json", "opacity.json"});
   CURVISPLAT_CHECK(command.find('\n') == std::string::npos);
   state.function.function();
 }

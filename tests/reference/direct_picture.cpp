@@ -100,8 +100,9 @@ PixelLayers sceneLayers(const SurfaceScene& scene, const ProjectionSettings& set
   }
   const double depth_origin =
       settings.view.projection == Projection::kPerspective ? 0 : settings.view.viewFromData(origin).z;
+  const ColourTable colours(function);
   return layersOf(scene, settings.view, slices,
-                  {ColourTable(function), settings.light, settings.clip_planes, depth_origin});
+                  {colours, settings.light, settings.clip_planes, depth_origin, &colours});
 }
 
 /// Whether the layers of its pixel hide a splat's centre; depths from the layers' origin.

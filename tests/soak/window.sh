@@ -50,7 +50,7 @@ asked() {
   local before
   before=$(commands)
   for ((again = 0; again < 60; ++again)); do
-    do_ mousemove 600 300 key c
+    do_ mousemove 600 300 key ctrl+c
     if until_ 20 more_commands "$before"; then
       until_ 100 more_commands $((before + again)) || true  # an answer for every key, lest the next is taken for one
       tail -n 1 view.log
@@ -65,7 +65,7 @@ saved() {
   local name
   name=$(printf 'wake_%04d.png' $(($(find . -maxdepth 1 -name 'wake_*.png' | wc -l) + 1)))
   for ((again = 0; again < 4; ++again)); do
-    do_ mousemove 600 300 key p
+    do_ mousemove 600 300 key ctrl+s
     if until_ 300 test -s "$name"; then
       asked > "$1.command"  # by then the picture is written
       cp "$name" "$1.png"
@@ -161,7 +161,7 @@ while [ $SECONDS -lt $end ]; do
 done
 home
 saved last
-do_ key Escape
+do_ key ctrl+q
 wait "$pid" || fail "view: $(cat view.err)"
 echo "$rounds rounds in $session_s s; scalars shown: $(grep -o -- '--scalar [a-z]' view.log | sort | uniq -c | tr '\n' ' ')"
 judge window.txt $slack

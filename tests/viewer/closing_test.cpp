@@ -52,7 +52,8 @@ std::unique_ptr<TemporaryFolder> ClosingTest::folder_;
 TEST_P(ClosingTest, LeavesNoThreadAndNoFile) {
   const CacheReader cache(*folder_ / "scene.splats");
   const auto files = openFiles();
-  FrameRequest request{0, 1, TransferFunction::preset("viridis", 0, 1, 0.05), halfAnnulusCamera(), {}};
+  FrameRequest request{
+      DrawnScalars(0, TransferFunction::preset("viridis", 0, 1, 0.05)), 1, halfAnnulusCamera(), {}};
   request.options.size = {160, 120};
   request.options.lod_pixels = 0;
   request.options.read_by = GetParam();

@@ -25,7 +25,8 @@ class FrameLoopTest : public testing::Test {
   static void TearDownTestSuite() { folder_.reset(); }
 
   static FrameRequest requestOf(double parallel_scale = 1.25) {
-    FrameRequest request{0, 1, TransferFunction::preset("viridis", 0, 1, 0.05), halfAnnulusCamera(), {}};
+    FrameRequest request{
+        DrawnScalars(0, TransferFunction::preset("viridis", 0, 1, 0.05)), 1, halfAnnulusCamera(), {}};
     request.camera.parallel_scale = parallel_scale;
     request.options.size = {160, 120};
     request.options.lod_pixels = 0.3;
@@ -72,7 +73,7 @@ TEST_F(FrameLoopTest, RefinesToThePictureThatRenderDraws) {
   ASSERT_FALSE(frames.empty());
   EXPECT_TRUE(frames.back().is_final);
   EXPECT_EQ(frames.back().request, number);
-  FrameRenderer renderer(cache_, 0, request.function, Backend::kCpu);
+  FrameRenderer renderer(cache_, 0, request.scalars.opacity.function, Backend::kCpu);
   FrameStatistics statistics;
   EXPECT_EQ(frames.back().image.rgba, renderer.render(request.camera, request.options, statistics).rgba);
 }
@@ -125,7 +126,7 @@ TEST_F(FrameLoopTest, AnotherFunctionChangesThePicture) {
   FrameRequest request = requestOf();
   loop.request(request);
   const Image viridis = all(loop).back().image;
-  request.function = TransferFunction::preset("inferno", 0, 1, 0.05);
+  request.scalars.opacity.function = TransferFunction::preset("inferno", 0, 1, 0.05);
   request.function_version = 2;
   loop.request(request);
   const std::vector<ShownFrame> frames = all(loop);
@@ -133,7 +134,7 @@ TEST_F(FrameLoopTest, AnotherFunctionChangesThePicture) {
   // It shows in the first picture already.
   EXPECT_GT(compareImages(frames.front().image, inferno).psnr_db,
             compareImages(frames.front().image, viridis).psnr_db + 5);
-  FrameRenderer renderer(cache_, 0, request.function, Backend::kCpu);
+  FrameRenderer renderer(cache_, 0, request.scalars.opacity.function, Backend::kCpu);
   FrameStatistics statistics;
   EXPECT_EQ(inferno.rgba, renderer.render(request.camera, request.options, statistics).rgba);
 }

@@ -22,6 +22,11 @@ ViewState changedState() {
   chooseVariable(state, manifest(), "u v");
   state.camera.position = {0.1, -3, 2.0 / 3};
   state.function.addPoint(0.3, 0.7);
+  state.function.thinColours();
+  state.function.setColour(1, {1, 0, 0.5});
+  state.opacity_by = OpacityScalar{"density", EditedFunction("inferno", 0.5, 2, 0.1)};
+  state.opacity_by->function.addPoint(0.25, 0.5);
+  state.markers = {{"nose", {0.5, 0.25, 0.125}, "density", "kg/m3", 1.5, 2, 3, 4, 5}};
   state.lod_pixels = 2.5;
   state.scale = {1, 1, 50};
   state.clip_box = WorldBox{{0, -0.5, 0.25}, {1, 1, 1}};
@@ -133,19 +138,35 @@ TEST(ViewState, VariablesKeepTheFunctionOverTheirOwnRange) {
   EXPECT_THROW(chooseVariable(state, manifest(), "w"), UsageError);
 }
 
-TEST(ViewState, TheCommandSaysAll) {
+TEST(ViewState, AnAutomaticFunctionComesBackWithItsScale) {
   ViewState state = firstViewOf(manifest(), {300, 200});
-  EXPECT_EQ(renderCommand(state, "a b.splats", {300, 200}, "f.json").substr(0, 109),
-            "curvisplat render 'a b.splats' -o picture.png --size 300x200 --scalar density --tf viridis "
-            "--range 0.5,3 --op");
-  const std::string command = renderCommand(changedState(), "it's.splats", {30, 20}, "f.json");
-  for (const char* part :
-       {"'it'\\''s.splats'", "--scalar 'u v'", "--tf f.json", "--scale 1,1,50",
-        "--clip-box 0,1,-0.5,1,0.25,1", "--clip-plane 0,0.5,0,1,0,-2", "--clip-plane 0.25,0,0,0,1,0",
-        "--shade", "--background black", "--classify flat", "--lod-pixels 2.5", "--scalar-bar --outline",
-        "--position 0.1,-3,0.6666666666666666", "--surface /a/wing.stl", "--surface-colour '#ff8000'",
-        "--slice 0,0.25,0,0,-1,2", "--slice-opacity 0.5", "--volume off"})
-    EXPECT_NE(command.find(part), std::string::npos) << command << " lacks " << part;
+  const FunctionParts parts{"inferno", {0.5, 3}, AsinhScale{1, 0.25}, {{0, 0.5}, {0.25, 0}, {1, 0.75}}, 0.5};
+  state.function = EditedFunction::automatic(parts);
+  const ViewState again = viewStateFromJson(toJson(state), "a.json", manifest());
+  EXPECT_TRUE(again.function.isAutomatic());
+  ASSERT_TRUE(again.function.parts());
+  EXPECT_EQ(again.function.parts()->asinh->width, 0.25);
+  EXPECT_EQ(again.function.points().size(), 3u);
+  // It is the function that the parts state, and edits keep its scale.
+  for (const double scalar : {0.5, 0.8, 1.0, 1.7, 3.0}) {
+    EXPECT_NEAR(again.function.function().at(scalar).extinction, parts.function().at(scalar).extinction,
+                1e-9);
+    EXPECT_NEAR(again.function.scalarAt(again.function.coordinateOf(scalar)), scalar, 1e-12);
+  }
+}
+
+TEST(ViewState, MarkersAndTheOpacityScalarComeBack) {
+  const ViewState again = viewStateFromJson(toJson(changedState()), "a.json", manifest());
+  ASSERT_TRUE(again.opacity_by);
+  EXPECT_EQ(again.opacity_by->variable, "density");
+  EXPECT_EQ(again.opacity_by->function.range(), std::pair(0.5, 2.0));
+  ASSERT_EQ(again.markers.size(), 1u);
+  EXPECT_EQ(again.markers[0].name, "nose");
+  EXPECT_EQ(again.markers[0].point, glm::dvec3(0.5, 0.25, 0.125));
+  EXPECT_EQ(again.markers[0].k, 5u);
+  auto json = nlohmann::json::parse(toJson(changedState()));
+  json["opacity_by"]["variable"] = "pressure";
+  EXPECT_THROW(viewStateFromJson(json.dump(), "a.json", manifest()), Error);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -49,6 +50,7 @@ struct FrameJob {
   StepPlayer& player;
   FrameOutput* output;  // null at ranks that write nothing
   RenderReport& report;
+  std::function<void()> step_changed;  // called when the player is at another step than before
 };
 
 /// Draws the frames `numbers`. Pictures that were written are kept if a later frame fails. Throws Interrupted after

@@ -195,9 +195,6 @@ void render(const RenderArguments& given) {
       transfer_function.logScale())
     throw UsageError(
         "--iso in the volume needs a linear transfer function; this one is logarithmic: add --volume off");
-  if (steps.size() > 1 && !arguments.surfaces.surface_by.empty())
-    throw UsageError("--surface-by {}: faces have the values of the first time step; draw that one alone",
-                     arguments.surfaces.surface_by);
   for (const std::string& miss : slicesThatMiss(arguments.surfaces, manifest.lower, manifest.upper))
     printMessage("warning: {}", miss);
 
@@ -248,8 +245,11 @@ void render(const RenderArguments& given) {
     if (!arguments.statistics.empty() && ranks.isFirst())
       writeStatistics(arguments.statistics, statisticsOf(report));
   };
+  const auto step_changed = [&, first = options.scene] {
+    options.scene = sceneAt(arguments.surfaces, cache, first);
+  };
   try {
-    drawFrames({arguments, manifest, player, output.get(), report}, motion, numbers, progress);
+    drawFrames({arguments, manifest, player, output.get(), report, step_changed}, motion, numbers, progress);
   } catch (const Interrupted& interrupted) {
     progress.end();
     writeReport();

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "stream/base/error.h"
 #include "stream/base/progress.h"
@@ -42,7 +43,8 @@ void view(const ViewArguments& arguments) {
     if (isVtp(surface))
       throw UsageError("--surface {}: the window shows STL, PLY and OBJ files; render draws .vtp files",
                        surface);
-  const CacheReader cache = openAtStep(arguments.cache, arguments.steps);
+  CacheReader cache = openAtStep(arguments.cache, arguments.steps);
+  requireFixedFaces(arguments.surfaces, cache);
   // The scalar changes in the window, so faces that are coloured by one keep colours of their own.
   options.scene = sceneOf(arguments.surfaces, cache, std::numeric_limits<size_t>::max(),
                           std::numeric_limits<size_t>::max());
@@ -55,7 +57,7 @@ void view(const ViewArguments& arguments) {
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
   try {
-    runViewer(cache, options, progress);
+    runViewer(std::move(cache), options, progress);
   } catch (const UsageError& error) {
     throw Error("{}", error.what());  // the cache decides, not the usage
   }

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
+#include <utility>
 
+#include "render/automatic/rounded.h"
 #include "render/colour/colour_map.h"
 #include "stream/base/check.h"
 
@@ -20,7 +23,8 @@ EditedFunction::EditedFunction(const std::string& preset, double low, double hig
     : definition_(presetDefinition(preset)),
       range_(intervalAround(low, high)),
       opacity_unit_(opacity_unit),
-      preset_(preset) {
+      preset_(preset),
+      map_(preset) {
   CURVISPLAT_CHECK_OP(opacity_unit, >, 0);
 }
 
@@ -45,27 +49,70 @@ EditedFunction::EditedFunction(const TransferFunctionDefinition& definition, dou
   if (colours.back().x < 1) colours.push_back({1, colours.back().rgb});
 }
 
+EditedFunction::EditedFunction(const FunctionParts& parts)
+    : EditedFunction(parts.map, parts.range.first, parts.range.second, parts.opacity_unit) {
+  range_ = parts.range;
+  asinh_ = parts.asinh;
+  if (parts.opacities.empty()) return;
+  definition_.opacities = parts.opacities;
+  edited();
+}
+
 EditedFunction EditedFunction::automatic(const FunctionParts& parts) {
-  EditedFunction function(parts.definition(), parts.opacity_unit);
+  EditedFunction function(parts);
   function.setAutomatic();
   return function;
 }
 
+std::optional<FunctionParts> EditedFunction::parts(bool rounded) const {
+  constexpr int kDigits = 6, kPointDigits = 4;
+  constexpr size_t kMaxPoints = 24;
+  const auto is_plain = [](const OpacityPoint& p) { return p.midpoint == 0.5 && p.sharpness == 0; };
+  if (map_.empty() || logScale() || points().size() > kMaxPoints ||
+      !std::all_of(points().begin(), points().end(), is_plain))
+    return std::nullopt;
+  FunctionParts parts{map_, range_, asinh_, {}, opacity_unit_};
+  if (preset_ != map_ || asinh_) parts.opacities = points();
+  if (!rounded) return parts;
+  const double span = range_.second - range_.first;
+  parts.range = {roundedTo(range_.first, span, kDigits), roundedTo(range_.second, span, kDigits)};
+  if (!(parts.range.first < parts.range.second)) parts.range = range_;
+  parts.opacity_unit = roundedTo(opacity_unit_, opacity_unit_, kDigits);
+  for (OpacityPoint& point : parts.opacities)
+    point = {roundedTo(point.x, 1, kPointDigits),
+             point.opacity > 0 ? roundedTo(point.opacity, point.opacity, kPointDigits) : 0};
+  return parts;
+}
+
+double EditedFunction::scalarAt(double x) const {
+  const auto [low, high] = range_;
+  if (x == 0) return low;
+  if (x == 1) return high;
+  if (asinh_) return asinh_->scalar(std::lerp(asinh_->coordinate(low), asinh_->coordinate(high), x));
+  return logScale() ? low * std::pow(high / low, x) : std::lerp(low, high, x);
+}
+
+double EditedFunction::coordinateOf(double scalar) const {
+  const auto [low, high] = range_;
+  if (asinh_) {
+    const double begin = asinh_->coordinate(low);
+    return (asinh_->coordinate(scalar) - begin) / (asinh_->coordinate(high) - begin);
+  }
+  return logScale() ? std::log(scalar / low) / std::log(high / low) : (scalar - low) / (high - low);
+}
+
 TransferFunction EditedFunction::function() const {
+  if (asinh_) return TransferFunction(definition(), nullptr, opacity_unit_);
   return TransferFunction(definition_, &range_, opacity_unit_);
 }
 
 TransferFunctionDefinition EditedFunction::definition() const {
   TransferFunctionDefinition definition = definition_;
-  const auto [low, high] = range_;
-  const auto toScalar = [&, low = low, high = high](double x) {
-    if (x == 0) return low;
-    if (x == 1) return high;
-    return definition.log_scale ? low * std::pow(high / low, x) : std::lerp(low, high, x);
-  };
+  definition.opacity_unit = opacity_unit_;
+  if (asinh_) return spreadOver(std::move(definition), range_, asinh_);
+  const auto toScalar = [&](double x) { return scalarAt(x); };
   mapPoints(definition.colours, toScalar);
   mapPoints(definition.opacities, toScalar);
-  definition.opacity_unit = opacity_unit_;
   return definition;
 }
 
@@ -76,6 +123,7 @@ bool EditedFunction::setRange(double low, double high) {
 }
 
 void EditedFunction::fitRange(double low, double high) {
+  asinh_.reset();  // its centre is of the data
   if (logScale() && !(low > 0)) setLogScale(false);
   const auto [from, to] = intervalAround(low, high);
   setRange(from, to);
@@ -85,6 +133,7 @@ bool EditedFunction::setLogScale(bool log_scale) {
   if (log_scale == logScale()) return true;
   if (log_scale && !(range_.first > 0)) return false;
   definition_.log_scale = log_scale;
+  asinh_.reset();
   edited();
   return true;
 }
@@ -124,6 +173,50 @@ void EditedFunction::setColours(const std::string& preset) {
   definition_.colour_space = from.colour_space;
   definition_.name = from.name;
   edited();
+  map_ = preset;
+}
+
+void EditedFunction::thinColours() {
+  constexpr size_t kMost = 12, kThinned = 9;
+  if (definition_.colours.size() <= kMost) return;
+  std::vector<ColourPoint> thinned;
+  for (size_t n = 0; n < kThinned; ++n) {
+    const double x = static_cast<double>(n) / (kThinned - 1);
+    thinned.push_back({x, colourAt(x)});
+  }
+  definition_.colours = std::move(thinned);
+  definition_.colour_space = ColourSpace::kLab;
+  coloursEdited();
+}
+
+void EditedFunction::setColour(size_t point, const glm::dvec3& rgb) {
+  CURVISPLAT_CHECK_OP(point, <, definition_.colours.size());
+  definition_.colours[point].rgb = glm::clamp(rgb, glm::dvec3(0), glm::dvec3(1));
+  coloursEdited();
+}
+
+void EditedFunction::moveColour(size_t point, double x) {
+  auto& colours = definition_.colours;
+  if (point == 0 || point + 1 >= colours.size()) return;
+  colours[point].x = std::clamp(x, colours[point - 1].x, colours[point + 1].x);
+  coloursEdited();
+}
+
+size_t EditedFunction::addColour(double x) {
+  auto& colours = definition_.colours;
+  const ColourPoint added{std::clamp(x, 0.0, 1.0), colourAt(x)};
+  const auto next = std::find_if(colours.begin() + 1, colours.end() - 1,
+                                 [&](const ColourPoint& point) { return point.x > added.x; });
+  const auto at = colours.insert(next, added);
+  coloursEdited();
+  return static_cast<size_t>(at - colours.begin());
+}
+
+void EditedFunction::removeColour(size_t point) {
+  auto& colours = definition_.colours;
+  if (point == 0 || point + 1 >= colours.size()) return;
+  colours.erase(colours.begin() + static_cast<ptrdiff_t>(point));
+  coloursEdited();
 }
 
 glm::dvec3 EditedFunction::colourAt(double x) const {

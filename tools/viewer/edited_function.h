@@ -1,12 +1,13 @@
 // The transfer function that the user edits: opacity points, colours from a preset or a file, a range and an
 // opacity unit.
 //
-// Points have coordinates on [0, 1], which is mapped to the range linearly or, on a logarithmic scale,
-// logarithmically. There is always an opacity point at 0 and one at 1. A value type; not thread-safe.
+// Points have coordinates on [0, 1], which is mapped to the range linearly, on a logarithmic scale logarithmically, or
+// by an asinh (of a function chosen from the data). There is always an opacity point at 0 and one at 1. A value type; not thread-safe.
 #pragma once
 
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,6 +31,12 @@ class EditedFunction {
   static EditedFunction automatic(const FunctionParts& parts);
   static constexpr const char* kAutomatic = "automatic";
 
+  /// The same function as options state it.
+  explicit EditedFunction(const FunctionParts& parts);
+  /// The function as options state it; nullopt if options cannot: colours were edited, the scale is logarithmic, or
+  /// a file gave curves. `rounded`: with as few digits as cannot be seen.
+  std::optional<FunctionParts> parts(bool rounded = false) const;
+
   TransferFunction function() const;
   /// The same function with points at scalar values, as in a ParaView preset.
   TransferFunctionDefinition definition() const;
@@ -47,6 +54,10 @@ class EditedFunction {
   /// Sets the range of a scalar. Widens an empty range, and switches to a linear scale unless low > 0.
   void fitRange(double low, double high);
   bool logScale() const { return definition_.log_scale; }
+  bool asinhScale() const { return asinh_.has_value(); }
+  /// The scalar at a coordinate, and the coordinate of a scalar, which may lie outside 0..1.
+  double scalarAt(double x) const;
+  double coordinateOf(double scalar) const;
   /// Returns false and changes nothing if the range is not above zero.
   bool setLogScale(bool log_scale);
   double opacityUnit() const { return opacity_unit_; }
@@ -62,16 +73,31 @@ class EditedFunction {
 
   /// Sets the colours of a built-in preset; keeps the opacities.
   void setColours(const std::string& preset);
+  /// The colour map whose colours these are; empty if they were edited or come from a file.
+  const std::string& map() const { return map_; }
+
+  const std::vector<ColourPoint>& colours() const { return definition_.colours; }
+  /// Replaces many colour points by nine, which people can edit. Does nothing if there are at most twelve.
+  void thinColours();
+  void setColour(size_t point, const glm::dvec3& rgb);
+  /// Between the neighbours; does nothing for the first and the last point.
+  void moveColour(size_t point, double x);
+  /// Adds a point with the colour that is there. Returns its index.
+  size_t addColour(double x);
+  /// Does nothing for the first and the last point.
+  void removeColour(size_t point);
   /// Colour at `x`, 0..1 over the range.
   glm::dvec3 colourAt(double x) const;
 
  private:
   void edited() { preset_.clear(); }
+  void coloursEdited() { preset_.clear(), map_.clear(); }
 
   TransferFunctionDefinition definition_;  // on [0, 1]
   std::pair<double, double> range_;
   double opacity_unit_ = 1;
-  std::string preset_;
+  std::string preset_, map_;
+  std::optional<AsinhScale> asinh_;  // not with a logarithmic scale
 };
 
 }  // namespace curvisplat

@@ -49,8 +49,9 @@ struct FrameLoop::Drawing {
   explicit Drawing(uint64_t coarsest) : effort(coarsest) {}
 
   std::unique_ptr<StepPlayer> player;  // of one variable
-  size_t variable = 0;
+  std::vector<size_t> variables;
   uint64_t function_version = 0;
+  std::optional<FrameRequest> last;  // that was drawn
   Effort effort;
 };
 
@@ -73,6 +74,8 @@ FrameLoop::~FrameLoop() {
 uint64_t FrameLoop::request(FrameRequest request) {
   const MutexLock lock(mutex_);
   pending_ = std::move(request);
+  values_wanted_ = false;
+  values_.reset();
   if (at_rest_) drawing_.request_stop();
   changed_.notify_all();
   return ++newest_;
@@ -82,6 +85,17 @@ std::optional<ShownFrame> FrameLoop::take() {
   const MutexLock lock(mutex_);
   if (failure_) std::rethrow_exception(ended_ ? failure_ : std::exchange(failure_, nullptr));
   return std::exchange(shown_, std::nullopt);
+}
+
+void FrameLoop::requestValues() {
+  const MutexLock lock(mutex_);
+  values_wanted_ = true;
+  changed_.notify_all();
+}
+
+std::optional<ShownValues> FrameLoop::takeValues() {
+  const MutexLock lock(mutex_);
+  return std::exchange(values_, std::nullopt);
 }
 
 bool FrameLoop::busy() const {
@@ -117,19 +131,24 @@ void FrameLoop::loop() {
   Drawing drawing(coarsestSplats(cache_));
   MutexLock lock(mutex_);
   while (true) {
-    while (!pending_ && !stopping_) changed_.wait(lock);
+    while (!pending_ && !stopping_ && !(values_wanted_ && drawing.last)) changed_.wait(lock);
     if (stopping_) return;
-    FrameRequest request = *std::exchange(pending_, std::nullopt);
+    const bool draws = pending_.has_value();
+    FrameRequest request = draws ? *std::exchange(pending_, std::nullopt) : *drawing.last;
+    if (!draws) values_wanted_ = false;
     const uint64_t number = newest_;
     drawing_ = std::stop_source();
     request.options.stop = drawing_.get_token();
-    serving_ = true;
-    at_rest_ = !request.moving;
+    serving_ = draws;
+    at_rest_ = !draws || !request.moving;
     lock.unlock();
     std::exception_ptr failure;
     bool ends = false;
     try {
-      serve(drawing, request, number);
+      if (draws)
+        serve(drawing, request, number);
+      else
+        findValues(drawing, request, number);
     } catch (const Interrupted&) {
     } catch (const UsageError&) {
       failure = std::current_exception();
@@ -149,16 +168,21 @@ void FrameLoop::loop() {
 }
 
 void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t number) {
-  if (!drawing.player || drawing.variable != request.variable) {
+  const DrawnScalars& scalars = request.scalars;
+  std::vector<size_t> variables{scalars.opacity.variable};
+  if (scalars.colour) variables.push_back(scalars.colour->variable);
+  const bool same_function = drawing.function_version == request.function_version;
+  // Of two scalars, the renderer can change neither the colours nor which of the functions changed.
+  if (!drawing.player || drawing.variables != variables || (scalars.colour && !same_function)) {
     drawing.player.reset();  // frees its memory before the next one allocates
     if (request.step != cache_.step()) cache_ = cache_.atStep(request.step);
-    drawing.player =
-        std::make_unique<StepPlayer>(cache_, DrawnScalars(request.variable, request.function), backend_);
-    drawing.variable = request.variable;
-  } else if (drawing.function_version != request.function_version) {
-    drawing.player->setTransferFunction(request.function);
+    drawing.player = std::make_unique<StepPlayer>(cache_, scalars, backend_);
+    drawing.variables = variables;
+  } else if (!same_function) {
+    drawing.player->setTransferFunction(scalars.opacity.function);
   }
   drawing.function_version = request.function_version;
+  drawing.last = request;
   drawing.player->goTo({request.step});
   FrameRenderer& renderer = drawing.player->renderer();
   {
@@ -173,6 +197,8 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
     ShownFrame frame;
     frame.request = number;
     frame.step = request.step;
+    frame.camera = request.camera;
+    frame.options = request.options;
     frame.image = renderer.renderQuickly(request.camera, request.options,
                                          {.max_splats = splats, .detail_px = detail_px}, frame.statistics,
                                          frame.is_final);
@@ -188,6 +214,26 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
     if (request.next_step) readAhead(drawing, request);
     if (is_final || request.moving || superseded(number)) return;
   }
+}
+
+/// The place under the mouse need not be known to the pixel, and the values there are read from the data: a quarter of
+/// the pixels take a quarter of the time.
+void FrameLoop::findValues(Drawing& drawing, FrameRequest request, uint64_t number) {
+  drawing.player->goTo({request.step});
+  ShownValues found;
+  found.request = number;
+  found.step = request.step;
+  found.camera = request.camera;
+  ImageSize& size = request.options.size;
+  size = {std::max(1, size.width / 2), std::max(1, size.height / 2)};
+  found.options = request.options;
+  FrameStatistics ignored;
+  drawing.player->renderer().renderWithValues(request.camera, request.options, ignored, found.values);
+  {
+    const MutexLock lock(mutex_);
+    if (number == newest_) values_ = std::move(found);
+  }
+  wake_();
 }
 
 /// Goes to the step that is likely to be wanted next, and begins to decode it while this one is looked at.

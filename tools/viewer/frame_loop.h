@@ -26,9 +26,8 @@
 namespace curvisplat {
 
 struct FrameRequest {
-  size_t variable = 0;
-  uint64_t function_version = 0;  // changes whenever the function changes
-  TransferFunction function;
+  DrawnScalars scalars;
+  uint64_t function_version = 0;  // changes whenever a function changes
   Camera camera;
   FrameOptions options;
   bool moving = false;
@@ -44,6 +43,17 @@ struct ShownFrame {
   uint64_t request = 0;  // what request() returned
   uint64_t step = 0;
   bool is_final = false;  // the same picture as FrameRenderer::render() draws
+  Camera camera;          // of the request
+  FrameOptions options;
+};
+
+/// What lies under each pixel of a picture that is shown, for the mouse. Of half as many pixels each way.
+struct ShownValues {
+  PixelValues values;
+  uint64_t request = 0;  // of the picture
+  uint64_t step = 0;
+  Camera camera;
+  FrameOptions options;  // with the size of `values`
 };
 
 /// Chooses the number of splats and the resolution of a picture so that it takes a given time. Learns from
@@ -84,6 +94,10 @@ class FrameLoop {
   /// The newest picture since the last take(), or nullopt. Throws the error of reading or drawing that ended
   /// the loop, or UsageError (too little memory for this size), which ends only the request.
   std::optional<ShownFrame> take();
+  /// Asks for the values of the newest request's picture, once that is shown. A request ends it.
+  void requestValues();
+  /// Those that were asked for, once.
+  std::optional<ShownValues> takeValues();
   /// Whether more pictures of the newest request will follow.
   bool busy() const;
   /// Name of the drawing back end; empty until the first picture.
@@ -96,6 +110,7 @@ class FrameLoop {
   void loop();
   void serve(Drawing& drawing, const FrameRequest& request, uint64_t number);
   void readAhead(Drawing& drawing, const FrameRequest& request);
+  void findValues(Drawing& drawing, FrameRequest request, uint64_t number);
   bool superseded(uint64_t number) const;
   void publish(ShownFrame frame);
 
@@ -111,6 +126,8 @@ class FrameLoop {
   bool at_rest_ GUARDED_BY(mutex_) = false;  // and its camera does not move
   std::stop_source drawing_ GUARDED_BY(mutex_);
   std::optional<ShownFrame> shown_ GUARDED_BY(mutex_);
+  bool values_wanted_ GUARDED_BY(mutex_) = false;
+  std::optional<ShownValues> values_ GUARDED_BY(mutex_);
   std::exception_ptr failure_ GUARDED_BY(mutex_);
   bool ended_ GUARDED_BY(mutex_) = false;  // by an error
   bool stopping_ GUARDED_BY(mutex_) = false;

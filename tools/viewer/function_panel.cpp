@@ -1,17 +1,18 @@
 #include "tools/viewer/function_panel.h"
 
+#include <fmt/format.h>
 #include <imgui.h>
-#include <imgui_stdlib.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <sstream>
+#include <map>
 
-#include "stream/base/durable_file.h"
+#include "render/colour/published_maps.h"
 #include "stream/base/error.h"
 #include "tools/viewer/first_view.h"
 #include "tools/viewer/histogram.h"
+#include "tools/viewer/labels.h"
 #include "tools/viewer/widget_places.h"
 
 namespace curvisplat {
@@ -36,12 +37,11 @@ double opacityAt(float height) {
   return static_cast<double>(height) * static_cast<double>(height);
 }
 
-std::vector<std::string> presets() {
-  std::vector<std::string> names;
-  std::istringstream list(presetNames());
-  for (std::string name; std::getline(list, name, ',');)
-    names.push_back(name.substr(name.find_first_not_of(' ')));
-  return names;
+/// The definitions of the colour maps, each made once.
+const TransferFunctionDefinition& definitionOf(const std::string& map) {
+  static std::map<std::string, TransferFunctionDefinition> made;
+  const auto found = made.find(map);
+  return found != made.end() ? found->second : made.emplace(map, presetDefinition(map)).first->second;
 }
 
 /// The rectangle of the curve.
@@ -98,15 +98,47 @@ void paintCurve(const EditedFunction& function, const std::vector<double>& histo
   }
 }
 
-void paintColours(const EditedFunction& function) {
-  const ImVec2 lower = ImGui::GetCursorScreenPos();
-  const ImVec2 size(ImGui::GetContentRegionAvail().x, ImGui::GetTextLineHeight());
+/// A strip of colours: `at` gives that of each part, 0..1.
+template <typename At>
+void paintStrip(const ImVec2& lower, const ImVec2& size, const At& at) {
   ImDrawList* const list = ImGui::GetWindowDrawList();
   for (float x = 0; x < size.x; x += 2)
     list->AddRectFilled({lower.x + x, lower.y},
                         {std::min(lower.x + x + 2, lower.x + size.x), lower.y + size.y},
-                        toImGui(function.colourAt(x / size.x)));
+                        toImGui(at(static_cast<double>(x / size.x))));
+}
+
+void paintColours(const EditedFunction& function) {
+  const ImVec2 size(ImGui::GetContentRegionAvail().x, ImGui::GetTextLineHeight());
+  paintStrip(ImGui::GetCursorScreenPos(), size, [&](double x) { return function.colourAt(x); });
   ImGui::Dummy(size);
+}
+
+/// Five scalars under the curve or the colours, each below its place.
+void paintNumbers(const EditedFunction& function) {
+  const ImVec2 lower = ImGui::GetCursorScreenPos();
+  const float width = ImGui::GetContentRegionAvail().x;
+  constexpr int kNumbers = 4;
+  for (int n = 0; n <= kNumbers; ++n) {
+    const float part = static_cast<float>(n) / kNumbers;
+    const std::string text = fmt::format("{:.3g}", function.scalarAt(static_cast<double>(part)));
+    const float own = ImGui::CalcTextSize(text.c_str()).x;
+    ImGui::GetWindowDrawList()->AddText({lower.x + part * (width - own), lower.y},
+                                        ImGui::GetColorU32(ImGuiCol_Text), text.c_str());
+  }
+  ImGui::Dummy({width, ImGui::GetTextLineHeight()});
+}
+
+/// Opacities at the left of the curve, each at its height.
+void paintHeights(const Canvas& canvas) {
+  const float down = 0.5f * ImGui::GetFontSize();
+  for (const double opacity : {0.05, 0.25, 0.5, 1.0}) {
+    const ImVec2 at = canvas.at(0, heightOf(opacity));
+    ImDrawList* const list = ImGui::GetWindowDrawList();
+    list->AddLine(at, {at.x + canvas.size.x, at.y}, IM_COL32(255, 255, 255, 28));
+    const float y = std::clamp(at.y - down, canvas.lower.y, canvas.lower.y + canvas.size.y - 2 * down);
+    list->AddText({at.x + 3, y}, IM_COL32(190, 190, 190, 255), fmt::format("{:g}", opacity).c_str());
+  }
 }
 
 }  // namespace
@@ -116,20 +148,51 @@ void FunctionPanel::updateHistogram(const EditedFunction& function, size_t varia
     if (pending_histogram_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
     histogram_ = pending_histogram_.get();
   }
-  const HistogramOf of{variable, function.range(), function.logScale()};
+  const HistogramOf of{variable, function.range(), function.logScale(), function.asinhScale()};
   if (histogram_of_ == of) return;
   histogram_of_ = of;
-  pending_histogram_ = std::async(std::launch::async, [&cache = cache_, of] {
-    return histogramOf(cache, of.variable, of.range.first, of.range.second, of.log_scale, kBins);
+  pending_histogram_ = std::async(std::launch::async, [&cache = cache_, variable, function] {
+    return histogramOf(cache, variable, function, kBins);
   });
 }
 
-bool FunctionPanel::draw(EditedFunction& function, size_t variable) {
+FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t variable, Shows shows) {
+  const VariableInfo& info = cache_.manifest().variables[variable];
+  Result result;
+  ImGui::PushID(this);
   updateHistogram(function, variable);
-  bool changed = drawCurve(function);
-  paintColours(function);
-  changed |= drawRange(function, cache_.manifest().variables[variable]);
-  return drawFile(function) || changed;
+  if (shows != Shows::kColours) result.changed |= drawCurve(function);
+  if (shows != Shows::kOpacities) paintColours(function);
+  paintNumbers(function);
+  if (shows != Shows::kOpacities) result.changed |= drawMaps(function, info);
+  result.changed |= drawRange(function, info);
+  if (shows != Shows::kColours) result.changed |= drawUnit(function);
+  if (shows != Shows::kColours && ImGui::TreeNode("opacity points")) {
+    nameWidget("opacity points");
+    result.changed |= drawPoints(function);
+    ImGui::TreePop();
+  } else if (shows != Shows::kColours) {
+    nameWidget("opacity points");
+  }
+  if (shows != Shows::kOpacities && ImGui::TreeNode("colour points")) {
+    nameWidget("colour points");
+    result.changed |= drawColours(function);
+    ImGui::TreePop();
+  } else if (shows != Shows::kOpacities) {
+    nameWidget("colour points");
+  }
+  if (shows != Shows::kOpacities) {
+    result.load = ImGui::Button("load...");
+    nameWidget("load");
+    hint("colours and opacities from a ParaView preset, .json");
+    ImGui::SameLine();
+    result.save = ImGui::Button("save...");
+    nameWidget("save");
+    hint("as a ParaView preset, which render --tf draws with");
+  }
+  result.dragging = dragged_.has_value();
+  ImGui::PopID();
+  return result;
 }
 
 bool FunctionPanel::drawCurve(EditedFunction& function) {
@@ -158,24 +221,89 @@ bool FunctionPanel::drawCurve(EditedFunction& function) {
     changed = true;
   }
   paintCurve(function, histogram_, canvas);
+  paintHeights(canvas);
   if (const auto shown = dragged_ ? dragged_ : near) {
-    const auto& points = function.points();
-    const TransferFunctionDefinition definition = function.definition();
-    ImGui::SetTooltip("%.6g: opacity %.4g\nright click to remove", definition.opacities[*shown].x,
-                      points[*shown].opacity);
+    const OpacityPoint& point = function.points()[*shown];
+    ImGui::SetTooltip("%.6g: opacity %.4g\nright click to remove", function.scalarAt(point.x), point.opacity);
+  } else if (over) {
+    const double x = static_cast<double>(canvas.xOf(mouse));
+    const auto bin = static_cast<size_t>(x * static_cast<double>(histogram_.size()));
+    const double share = histogram_.empty() ? 0 : histogram_[std::min(bin, histogram_.size() - 1)];
+    ImGui::SetTooltip("%.6g: opacity %.4g, %.3g %% of the volume\nclick to add a point", function.scalarAt(x),
+                      OpacityCurve(function.points()).at(x), 100 * share);
   }
   return changed;
 }
 
-bool FunctionPanel::drawRange(EditedFunction& function, const VariableInfo& variable) {
+bool FunctionPanel::drawPoints(EditedFunction& function) {
   bool changed = false;
-  if (ImGui::BeginCombo("colours", function.preset().empty() ? "(edited)" : function.preset().c_str())) {
-    if (ImGui::Selectable(EditedFunction::kAutomatic)) {
-      function = automaticFunction(cache_, variable.name);
+  size_t removed = 0;
+  const float half = 0.38f * ImGui::GetContentRegionAvail().x;
+  for (size_t n = 0; n < function.points().size(); ++n) {
+    const OpacityPoint point = function.points()[n];
+    const bool end = n == 0 || n + 1 == function.points().size();
+    ImGui::PushID(static_cast<int>(n));
+    double scalar = function.scalarAt(point.x), opacity = point.opacity;
+    ImGui::SetNextItemWidth(half);
+    ImGui::BeginDisabled(end);
+    bool moved = ImGui::InputScalar("##x", ImGuiDataType_Double, &scalar, nullptr, nullptr, "%.5g", kNumber);
+    nameWidget(fmt::format("point {} scalar", n + 1));
+    ImGui::EndDisabled();
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(half);
+    moved |=
+        ImGui::InputScalar("##opacity", ImGuiDataType_Double, &opacity, nullptr, nullptr, "%.4g", kNumber);
+    nameWidget(fmt::format("point {} opacity", n + 1));
+    if (moved) {
+      function.movePoint(n, end ? point.x : function.coordinateOf(scalar), opacity);
       changed = true;
     }
-    for (const std::string& name : presets()) {
-      if (!ImGui::Selectable(name.c_str())) continue;
+    ImGui::SameLine();
+    ImGui::BeginDisabled(end);
+    if (ImGui::Button("x")) removed = n;
+    ImGui::EndDisabled();
+    ImGui::PopID();
+  }
+  if (removed == 0) return changed;
+  function.removePoint(removed);
+  return true;
+}
+
+bool FunctionPanel::drawMaps(EditedFunction& function, const VariableInfo& variable) {
+  bool changed = false;
+  label("colours");
+  const std::string& map = function.map();
+  const std::string shown =
+      map.empty() ? "(edited)"
+                  : map + (function.isAutomatic() ? fmt::format(" ({})", EditedFunction::kAutomatic) : "");
+  const bool open = ImGui::BeginCombo("##colours", shown.c_str(), ImGuiComboFlags_HeightLargest);
+  if (!open) {
+    nameWidget("colours");
+    return false;
+  }
+  if (ImGui::Selectable("chosen from the data")) {
+    function = automaticFunction(cache_, variable.name);
+    changed = true;
+  }
+  nameWidget("colours chosen from the data");
+  for (const auto& [category, title] : {std::pair(MapCategory::kSequential, "sequential"),
+                                        {MapCategory::kDiverging, "diverging"},
+                                        {MapCategory::kCyclic, "cyclic"}}) {
+    ImGui::TextDisabled("%s", title);
+    for (const PublishedMap& one : builtInMaps()) {
+      if (one.category != category) continue;
+      const std::string name(one.name);
+      const ImVec2 at = ImGui::GetCursorScreenPos();
+      const float swatch = 7 * ImGui::GetFontSize();
+      const bool chosen = ImGui::Selectable(("##" + name).c_str(), name == map);
+      nameWidget("colours " + name);
+      const TransferFunctionDefinition& preset = definitionOf(name);
+      const ColourMap colours(preset.colours, preset.colour_space);
+      paintStrip({at.x, at.y + 1}, {swatch, ImGui::GetTextLineHeight() - 2},
+                 [&](double x) { return colours.at(x); });
+      ImGui::GetWindowDrawList()->AddText({at.x + swatch + 8, at.y}, ImGui::GetColorU32(ImGuiCol_Text),
+                                          name.c_str());
+      if (!chosen) continue;
       if (!function.isPreset())
         function.setColours(name);  // keep the edited opacities
       else
@@ -183,60 +311,101 @@ bool FunctionPanel::drawRange(EditedFunction& function, const VariableInfo& vari
             EditedFunction(name, function.range().first, function.range().second, function.opacityUnit());
       changed = true;
     }
-    ImGui::EndCombo();
   }
-  double ends[2] = {function.range().first, function.range().second};
-  if (ImGui::InputScalarN("range", ImGuiDataType_Double, ends, 2, nullptr, nullptr, "%.6g", kNumber))
-    changed |= function.setRange(ends[0], ends[1]);
-  nameWidget("range");
-  bool log_scale = function.logScale();
-  if (ImGui::Checkbox("log scale", &log_scale)) changed |= function.setLogScale(log_scale);
-  nameWidget("log scale");
-  ImGui::SameLine();
-  if (ImGui::Button("full range")) changed |= function.setRange(variable.min, variable.max);
-  ImGui::SameLine();
-  const bool resets = ImGui::Button("reset points");
-  nameWidget("reset points");
-  if (resets) {
-    const std::string name = function.isPreset() ? function.preset() : function.definition().name;
-    try {
-      function =
-          EditedFunction(name, function.range().first, function.range().second, function.opacityUnit());
+  ImGui::EndCombo();
+  return changed;
+}
+
+bool FunctionPanel::drawColours(EditedFunction& function) {
+  constexpr size_t kMany = 12;
+  if (function.colours().size() > kMany) {
+    const bool thins = ImGui::Button("edit these colours");
+    nameWidget("edit these colours");
+    hint("nine points in place of the colour map");
+    if (thins) function.thinColours();
+    return thins;
+  }
+  bool changed = false;
+  size_t removed = 0;
+  for (size_t n = 0; n < function.colours().size(); ++n) {
+    const ColourPoint point = function.colours()[n];
+    const bool end = n == 0 || n + 1 == function.colours().size();
+    ImGui::PushID(static_cast<int>(n));
+    float rgb[3] = {static_cast<float>(point.rgb.x), static_cast<float>(point.rgb.y),
+                    static_cast<float>(point.rgb.z)};
+    if (ImGui::ColorEdit3("##colour", rgb, ImGuiColorEditFlags_NoInputs)) {
+      function.setColour(n, {double{rgb[0]}, double{rgb[1]}, double{rgb[2]}});
       changed = true;
-    } catch (const UsageError& error) {
-      message_ = error.what();
     }
+    nameWidget(fmt::format("colour {}", n + 1));
+    ImGui::SameLine();
+    double scalar = function.scalarAt(point.x);
+    ImGui::SetNextItemWidth(0.4f * ImGui::GetContentRegionAvail().x);
+    ImGui::BeginDisabled(end);
+    if (ImGui::InputScalar("##x", ImGuiDataType_Double, &scalar, nullptr, nullptr, "%.5g", kNumber)) {
+      function.moveColour(n, function.coordinateOf(scalar));
+      changed = true;
+    }
+    ImGui::SameLine();
+    if (ImGui::Button("x")) removed = n;
+    ImGui::EndDisabled();
+    if (!end || n == 0) {
+      ImGui::SameLine();
+      if (ImGui::Button("+")) {
+        function.addColour(0.5 * (point.x + function.colours()[n + 1].x));
+        changed = true;
+      }
+      hint("a colour between this one and the next");
+    }
+    ImGui::PopID();
   }
-  double unit = function.opacityUnit();
-  if (ImGui::InputScalar("opacity unit", ImGuiDataType_Double, &unit, nullptr, nullptr, "%.4g", kNumber)) {
-    function.setOpacityUnit(unit);
+  if (removed > 0) {
+    function.removeColour(removed);
     changed = true;
   }
   return changed;
 }
 
-bool FunctionPanel::drawFile(EditedFunction& function) {
+bool FunctionPanel::drawRange(EditedFunction& function, const VariableInfo& variable) {
   bool changed = false;
-  ImGui::InputText("file", &file_);
-  try {
-    const bool loads = ImGui::Button("load");
-    nameWidget("load");
-    if (loads) {
-      function = EditedFunction(readParaViewPreset(file_), function.opacityUnit());
-      message_ = "loaded";
-      changed = true;
-    }
-    ImGui::SameLine();
-    const bool saves = ImGui::Button("save");
-    nameWidget("save");
-    if (saves) {
-      writeFileDurably(file_, toParaViewPreset(function.definition()));
-      message_ = "saved; draw with it: render --tf " + file_;
-    }
-  } catch (const Error& error) {
-    message_ = error.what();
+  double ends[2] = {function.range().first, function.range().second};
+  label("range");
+  if (ImGui::InputScalarN("##range", ImGuiDataType_Double, ends, 2, nullptr, nullptr, "%.6g", kNumber)) {
+    if (!function.setRange(ends[0], ends[1]))
+      throw UsageError("range {:.6g} to {:.6g}: expected a lower end below the upper one{}", ends[0], ends[1],
+                       function.logScale() ? ", and above zero on a logarithmic scale" : "");
+    changed = true;
   }
-  if (!message_.empty()) ImGui::TextWrapped("%s", message_.c_str());
+  nameWidget("range");
+  bool log_scale = function.logScale();
+  if (option("log scale", log_scale)) {
+    if (!function.setLogScale(log_scale))
+      throw UsageError("log scale: the range begins at {:.6g}; expected above zero", ends[0]);
+    changed = true;
+  }
+  ImGui::SameLine();
+  if (ImGui::Button("full range")) changed |= function.setRange(variable.min, variable.max);
+  nameWidget("full range");
+  ImGui::SameLine();
+  const bool resets = ImGui::Button("reset points");
+  nameWidget("reset points");
+  hint("the colour map with its own opacities");
+  if (resets) {
+    const std::string name = function.map().empty() ? "viridis" : function.map();
+    function = EditedFunction(name, function.range().first, function.range().second, function.opacityUnit());
+    changed = true;
+  }
+  return changed;
+}
+
+bool FunctionPanel::drawUnit(EditedFunction& function) {
+  double unit = function.opacityUnit();
+  label("opacity unit");
+  const bool changed =
+      ImGui::InputScalar("##opacity unit", ImGuiDataType_Double, &unit, nullptr, nullptr, "%.4g", kNumber);
+  if (changed) function.setOpacityUnit(unit);
+  nameWidget("opacity unit");
+  hint("the length over which the opacity accumulates: smaller is more opaque");
   return changed;
 }
 

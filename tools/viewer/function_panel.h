@@ -1,4 +1,5 @@
-// The editor of the transfer function: a histogram with the opacity points over it, and the colours below.
+// The editor of the transfer function: a histogram with the opacity points over it, the colours below, and numbers on
+// both axes.
 #pragma once
 
 #include <future>
@@ -16,16 +17,24 @@ class FunctionPanel {
  public:
   explicit FunctionPanel(const CacheReader& cache) : cache_(cache) {}
 
-  /// Draws into the current Dear ImGui window. Returns true if the function changed. `variable`: position in
-  /// the manifest's variables.
-  bool draw(EditedFunction& function, size_t variable);
-  /// Whether a point is being dragged.
-  bool isDragging() const { return dragged_.has_value(); }
+  /// Of a picture of two scalars, each function gives only one of the two.
+  enum class Shows { kAll, kColours, kOpacities };
+  struct Result {
+    bool changed = false;
+    bool dragging = false;            // a point is being dragged
+    bool load = false, save = false;  // the user asked to load a function, or to save this one
+  };
+  /// Draws into the current Dear ImGui window. `variable`: position in the manifest's variables. Throws UsageError for
+  /// what the user asked for and cannot be.
+  Result draw(EditedFunction& function, size_t variable, Shows shows);
 
  private:
   bool drawCurve(EditedFunction& function);
+  bool drawPoints(EditedFunction& function);
+  bool drawMaps(EditedFunction& function, const VariableInfo& variable);
+  bool drawColours(EditedFunction& function);
   bool drawRange(EditedFunction& function, const VariableInfo& variable);
-  bool drawFile(EditedFunction& function);
+  bool drawUnit(EditedFunction& function);
   /// Takes the finished histogram, and starts computing another one if the function's range has changed.
   /// Throws what reading throws.
   void updateHistogram(const EditedFunction& function, size_t variable);
@@ -36,13 +45,11 @@ class FunctionPanel {
   struct HistogramOf {
     size_t variable;
     std::pair<double, double> range;
-    bool log_scale;
+    bool log_scale, asinh_scale;
     bool operator==(const HistogramOf&) const = default;
   };
   std::optional<HistogramOf> histogram_of_;             // shown or being computed
   std::future<std::vector<double>> pending_histogram_;  // on another thread, because it reads the cache
-  std::string file_ = "function.json";
-  std::string message_;  // about the last load or save
 };
 
 }  // namespace curvisplat

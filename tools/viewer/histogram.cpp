@@ -1,10 +1,8 @@
 #include "tools/viewer/histogram.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "render/automatic/coarse_samples.h"
-#include "stream/base/check.h"
 
 namespace curvisplat {
 namespace {
@@ -13,10 +11,9 @@ constexpr uint64_t kMinSplats = 20'000;
 
 }  // namespace
 
-std::vector<double> histogramOf(const CacheReader& cache, size_t variable, double low, double high,
-                                bool log_scale, size_t bins) {
-  CURVISPLAT_CHECK_OP(low, <, high);
-  CURVISPLAT_CHECK(!log_scale || low > 0);
+std::vector<double> histogramOf(const CacheReader& cache, size_t variable, const EditedFunction& function,
+                                size_t bins) {
+  const auto [low, high] = function.range();
   std::vector<double> volumes(bins, 0.0);
   double total = 0;
   SplatGeometry geometry;
@@ -28,8 +25,7 @@ std::vector<double> histogramOf(const CacheReader& cache, size_t variable, doubl
       total += geometry.weight[n];
       const double value = values.mean[n];
       if (!(value >= low && value <= high)) continue;
-      const double part =
-          log_scale ? std::log(value / low) / std::log(high / low) : (value - low) / (high - low);
+      const double part = std::clamp(function.coordinateOf(value), 0.0, 1.0);
       volumes[std::min(bins - 1, static_cast<size_t>(part * static_cast<double>(bins)))] +=
           geometry.weight[n];
     }

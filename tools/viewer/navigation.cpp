@@ -65,28 +65,32 @@ bool Navigation::fly(const Window& window, Camera& camera) {
   return true;
 }
 
-bool Navigation::press(const Window::Key& key, Camera& camera, ImageSize size) {
-  if (key.control) return false;
-  const auto along = [&](const char* plus, const char* minus) {
-    camera = Camera::named(key.shift ? minus : plus, lower_, upper_, size, camera.projection,
-                           camera.view_angle_deg);
+bool Navigation::run(Command command, Camera& camera, ImageSize size) {
+  const auto look = [&](const char* from) {
+    camera = Camera::named(from, lower_, upper_, size, camera.projection, camera.view_angle_deg);
     return true;
   };
-  switch (key.code) {
-    case GLFW_KEY_R:
+  switch (command) {
+    case Command::kFit:
       camera = refitted(camera, lower_, upper_, size);
       return true;
-    case GLFW_KEY_X:
-      return along("+x", "-x");
-    case GLFW_KEY_Y:
-      return along("+y", "-y");
-    case GLFW_KEY_Z:
-      return along("+z", "-z");
-    case GLFW_KEY_O:
+    case Command::kLookPlusX:
+      return look("+x");
+    case Command::kLookMinusX:
+      return look("-x");
+    case Command::kLookPlusY:
+      return look("+y");
+    case Command::kLookMinusY:
+      return look("-y");
+    case Command::kLookPlusZ:
+      return look("+z");
+    case Command::kLookMinusZ:
+      return look("-z");
+    case Command::kOtherProjection:
       camera = withOtherProjection(camera);
       flies_ = flies_ && camera.projection == Projection::kPerspective;
       return true;
-    case GLFW_KEY_F:
+    case Command::kFly:
       flies_ = !flies_;
       if (flies_ && camera.projection == Projection::kOrthographic) camera = withOtherProjection(camera);
       return true;

@@ -1,15 +1,15 @@
-// Applies mouse and keys to the camera, as in ParaView:
+// Applies mouse and commands to the camera, as in ParaView:
 //
-//   left drag                   rotate    r            fit the data into the window
-//   middle or shift+left drag   pan       x y z        look from +x, +y, +z; with shift from -x, -y, -z
-//   wheel or right drag         zoom      o            switch between orthographic and perspective
-//   f   fly: w s forwards and backwards, a d left and right, q e down and up, left drag looks around
+//   left drag                   rotate
+//   middle or shift+left drag   pan
+//   wheel or right drag         zoom
+//   flying: w s forwards and backwards, a d left and right, q e down and up, left drag looks around
 #pragma once
 
 #include <glm/vec3.hpp>
 
 #include "render/camera/camera.h"
-#include "tools/viewer/window.h"
+#include "tools/viewer/window_commands.h"
 
 namespace curvisplat {
 
@@ -21,8 +21,8 @@ class Navigation {
   /// Applies the input since the last frame of Dear ImGui. Returns true if the camera moved. Call within a
   /// frame.
   bool update(Window& window, Camera& camera, ImageSize size);
-  /// Returns true if the key moved the camera or changed its mode.
-  bool press(const Window::Key& key, Camera& camera, ImageSize size);
+  /// Returns true if the command moved the camera or changed its mode.
+  bool run(Command command, Camera& camera, ImageSize size);
 
   /// Whether the camera moves or moved less than 0.2 s ago, so that a coarse picture suffices.
   bool isMoving() const;

@@ -1,62 +1,56 @@
-// The panels beside the picture: scalar and transfer function, view, detail, cuts, statistics.
+// The panels beside the picture: time, scalars and their functions, picture, cuts, views, markers, statistics. Nothing in
+// them changes its size while it is used: what does not apply is greyed out.
 #pragma once
 
-#include <cstdint>
-#include <optional>
 #include <string>
+#include <vector>
 
 #include "stream/cache/cache_reader.h"
-#include "tools/viewer/frame_loop.h"
+#include "tools/viewer/cut_panel.h"
 #include "tools/viewer/function_panel.h"
+#include "tools/viewer/panel_actions.h"
 #include "tools/viewer/playback.h"
+#include "tools/viewer/statistics_panel.h"
 #include "tools/viewer/view_state.h"
 
 namespace curvisplat {
 
 /// What the panels display but cannot change.
 struct PanelFacts {
-  const FrameStatistics* statistics = nullptr;  // of the shown picture; null if there is none
-  bool is_final = false;
-  bool busy = false;
+  ShownStatistics shown;
   bool flies = false;
-  std::string backend;
-  Playback* playback = nullptr;  // of a series; the panels set its speed and loop
-  std::string message;           // the last result or error of a user action
-};
-
-/// What the user did in the panels.
-struct PanelActions {
-  bool changed = false;           // the picture must be drawn again
-  bool function_changed = false;  // implies `changed`
-  bool dragging = false;          // a control is being dragged: a coarse picture suffices
-  bool save_picture = false, copy_command = false;
-  std::optional<uint64_t> step;  // to go to
-  bool toggle_play = false;
-  bool reset_camera = false, other_projection = false, toggle_flight = false;
+  Playback* playback = nullptr;    // of a series; the panels set its speed and loop
+  std::vector<std::string> views;  // saved ones, by name
+  Rectangle place;                 // of the panels in the window
 };
 
 class Panels {
  public:
-  explicit Panels(const CacheReader& cache) : cache_(cache), function_(cache) {}
+  explicit Panels(const CacheReader& cache)
+      : cache_(cache), cuts_(cache), function_(cache), opacity_function_(cache) {}
 
-  /// Width of the panels, at the left of the window, in Dear ImGui units.
-  static float width();
+  /// Width of the panels in Dear ImGui units, for text of this height.
+  static float width(float text_height) { return 26 * text_height; }
 
-  /// Draws the panels into the current Dear ImGui frame and applies edits to `state`. `variable`: position of
-  /// state.variable in the manifest.
-  PanelActions draw(ViewState& state, size_t variable, const PanelFacts& facts);
+  /// Draws the panels into the current Dear ImGui frame and applies edits to `state`.
+  PanelActions draw(ViewState& state, const PanelFacts& facts);
 
  private:
   void drawTime(PanelActions& actions, Playback& playback);
+  void drawScalars(ViewState& state, PanelActions& actions);
+  void drawFunctions(ViewState& state, PanelActions& actions);
   void drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts);
+  void drawSavedViews(PanelActions& actions, const std::vector<std::string>& views);
+  void drawPicture(ViewState& state, PanelActions& actions);
   void drawDetail(ViewState& state, PanelActions& actions);
-  void drawClipBox(ViewState& state, PanelActions& actions);
-  void drawSlices(ViewState& state, PanelActions& actions);
-  void drawPlanes(std::vector<ClipPlane>& planes, size_t most, const ViewState& state, PanelActions& actions);
-  void drawStatistics(const ViewState& state, const PanelFacts& facts);
 
   const CacheReader& cache_;
-  FunctionPanel function_;
+  CutPanel cuts_;
+  FunctionPanel function_, opacity_function_;
+  std::string view_name_;
 };
+
+/// The opacities of another scalar than the one that is shown; an empty name: of the same.
+void chooseOpacityScalar(ViewState& state, const CacheReader& cache, const std::string& name);
 
 }  // namespace curvisplat

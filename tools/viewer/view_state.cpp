@@ -18,7 +18,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr size_t kMaxSurfaces = 64;
+constexpr size_t kMaxSurfaces = 64, kMaxMarkers = 1000;
 
 double positive(const JsonField& field) {
   return field.number(1e-300, 1e300);
@@ -68,20 +68,89 @@ Camera cameraFrom(const JsonField& fields) {
   return camera;
 }
 
-EditedFunction functionFrom(const JsonField& fields, const std::filesystem::path& path, double opacity_unit) {
-  EditedFunction function(parseParaViewPreset(fields.at("function").json().dump(), path), opacity_unit);
-  const JsonField preset = fields.at("preset");
-  if (preset.text() == EditedFunction::kAutomatic) {
-    function.setAutomatic();
-  } else if (!preset.text().empty()) {
-    try {
-      const auto [low, high] = function.range();
-      return EditedFunction(preset.text(), low, high, function.opacityUnit());
-    } catch (const UsageError&) {
-      preset.fail("the name of a colour map (curvisplat colormaps lists them)");
-    }
+/// What options can state of a function; null if they cannot.
+Json partsOf(const EditedFunction& function) {
+  const auto parts = function.parts();
+  if (!parts) return nullptr;
+  Json json = {{"map", parts->map}, {"range", {parts->range.first, parts->range.second}}};
+  if (parts->asinh) json["asinh"] = {parts->asinh->centre, parts->asinh->width};
+  if (!parts->opacities.empty()) json["opacities"] = textOf(parts->opacities);
+  json["opacity_unit"] = parts->opacity_unit;
+  return json;
+}
+
+std::pair<double, double> pairFrom(const JsonField& field) {
+  const std::vector<JsonField> both = field.elements(2);
+  if (both.size() != 2) field.fail("two numbers");
+  return {both[0].number(-1e300, 1e300), both[1].number(-1e300, 1e300)};
+}
+
+FunctionParts partsFrom(const JsonField& fields) {
+  FunctionParts parts{fields.at("map").text(), pairFrom(fields.at("range")), {}, {}, 1};
+  if (!(parts.range.first < parts.range.second)) fields.at("range").fail("an increasing range");
+  if (const auto asinh = fields.find("asinh")) {
+    const auto [centre, width] = pairFrom(*asinh);
+    if (!(width > 0)) asinh->fail("a width above zero");
+    parts.asinh = AsinhScale{centre, width};
   }
-  return function;
+  if (const auto opacities = fields.find("opacities"))
+    parts.opacities = parseOpacities("opacities", opacities->text());
+  parts.opacity_unit = positive(fields.at("opacity_unit"));
+  return parts;
+}
+
+/// The function of `fields`: preset, parts and points. States of earlier versions have no parts.
+EditedFunction functionFrom(const JsonField& fields, const std::filesystem::path& path, double opacity_unit) {
+  const JsonField preset = fields.at("preset");
+  const bool automatic = preset.text() == EditedFunction::kAutomatic;
+  try {
+    if (const auto parts = fields.find("parts")) {
+      const FunctionParts read = partsFrom(*parts);
+      if (automatic) return EditedFunction::automatic(read);
+      // A preset with its own opacities has this name.
+      if (preset.text().empty() || preset.text() == read.map) return EditedFunction(read);
+    }
+    EditedFunction function(parseParaViewPreset(fields.at("function").json().dump(), path), opacity_unit);
+    if (automatic)
+      function.setAutomatic();
+    else if (!preset.text().empty())
+      return EditedFunction(preset.text(), function.range().first, function.range().second,
+                            function.opacityUnit());
+    return function;
+  } catch (const UsageError&) {
+    preset.fail("the name of a colour map (curvisplat colormaps lists them)");
+  }
+}
+
+void put(Json& json, const EditedFunction& function) {
+  json["preset"] = function.preset();
+  json["parts"] = partsOf(function);
+  json["function"] = Json::parse(toParaViewPreset(function.definition())).front();
+}
+
+Json jsonOf(const Marker& marker) {
+  return {{"name", marker.name},
+          {"point", jsonOf(marker.point)},
+          {"scalar", marker.scalar},
+          {"unit", marker.unit},
+          {"value", marker.value},
+          {"block", marker.block},
+          {"i", marker.i},
+          {"j", marker.j},
+          {"k", marker.k}};
+}
+
+Marker markerFrom(const JsonField& fields) {
+  const auto index = [&](const char* name) { return static_cast<uint64_t>(fields.at(name).number(0, 1e15)); };
+  return {fields.at("name").text(),
+          fields.at("point").point(),
+          fields.at("scalar").text(),
+          fields.at("unit").text(),
+          fields.at("value").number(-1e300, 1e300),
+          static_cast<uint32_t>(fields.at("block").number(0, 4e9)),
+          index("i"),
+          index("j"),
+          index("k")};
 }
 
 WorldBox boxFrom(const JsonField& fields) {
@@ -100,22 +169,6 @@ const VariableInfo* find(const Manifest& manifest, const std::string& name) {
 double defaultOpacityUnit(const Manifest& manifest, const glm::dvec3& scale) {
   const double diagonal = glm::length(scale * (manifest.upper - manifest.lower));
   return diagonal > 0 ? diagonal / 100 : 1;
-}
-
-/// `word` quoted for a shell.
-std::string quoted(const std::string& word) {
-  const bool plain = !word.empty() && std::all_of(word.begin(), word.end(), [](unsigned char c) {
-    return std::isalnum(c) ||
-           std::string_view("_-./,:=+@%").find(static_cast<char>(c)) != std::string_view::npos;
-  });
-  if (plain) return word;
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return text + "'";
-}
-
-std::string numbers(const glm::dvec3& point) {
-  return fmt::format("{},{},{}", point.x, point.y, point.z);
 }
 
 }  // namespace
@@ -179,8 +232,12 @@ void chooseVariable(ViewState& state, const Manifest& manifest, const std::strin
 
 std::string toJson(const ViewState& state) {
   Json json = {{"curvisplat_view", 1}, {"variable", state.variable}, {"camera", jsonOf(state.camera)}};
-  json["preset"] = state.function.preset();
-  json["function"] = Json::parse(toParaViewPreset(state.function.definition())).front();
+  put(json, state.function);
+  json["opacity_by"] = nullptr;
+  if (state.opacity_by) {
+    json["opacity_by"] = {{"variable", state.opacity_by->variable}};
+    put(json["opacity_by"], state.opacity_by->function);
+  }
   json["lod_pixels"] = state.lod_pixels;
   json["memory_bytes"] = state.memory_bytes;
   json["flat"] = state.classification == Classification::kFlat;
@@ -202,6 +259,8 @@ std::string toJson(const ViewState& state) {
   json["axes"] = state.annotations.axes;
   json["axes_grid"] = state.annotations.axes_grid;
   json["outline"] = state.annotations.outline;
+  json["markers"] = Json::array();
+  for (const Marker& marker : state.markers) json["markers"].push_back(jsonOf(marker));
   return json.dump(1) + "\n";
 }
 
@@ -238,70 +297,16 @@ ViewState viewStateFromJson(const std::string& text, const std::filesystem::path
   state.dark = fields.at("dark").flag();
   state.annotations = {fields.at("scalar_bar").flag(), fields.at("axes").flag(), fields.at("outline").flag()};
   if (const auto grid = fields.find("axes_grid")) state.annotations.axes_grid = grid->flag();
+  if (const auto opacity = fields.find("opacity_by")) {
+    const JsonField by = opacity->at("variable");
+    if (!find(manifest, by.text())) by.fail("a scalar of the cache");
+    state.opacity_by =
+        OpacityScalar{by.text(), functionFrom(*opacity, path, defaultOpacityUnit(manifest, factors))};
+  }
+  if (const auto markers = fields.find("markers"))
+    for (const JsonField& marker : markers->elements(kMaxMarkers))
+      state.markers.push_back(markerFrom(marker));
   return state;
-}
-
-std::string renderCommand(const ViewState& state, const std::filesystem::path& cache, ImageSize size,
-                          const std::filesystem::path& function_file) {
-  std::string command = "curvisplat render " + quoted(cache.string()) + " -o picture.png";
-  const auto add = [&](const std::string& option, const std::string& value) {
-    // The parser would take a separate value with a minus sign for an option.
-    command +=
-        value.starts_with('-') ? " " + option + "=" + quoted(value) : " " + option + " " + quoted(value);
-  };
-  add("--size", fmt::format("{}x{}", size.width, size.height));
-  add("--scalar", state.variable);
-  const EditedFunction& function = state.function;
-  if (!function.isPreset()) {
-    add("--tf", function_file.string());
-  } else {
-    add("--tf", function.preset());
-    add("--range", fmt::format("{},{}", function.range().first, function.range().second));
-  }
-  add("--opacity-unit", fmt::format("{}", function.opacityUnit()));
-  add("--position", numbers(state.camera.position));
-  add("--focal-point", numbers(state.camera.focal_point));
-  add("--view-up", numbers(state.camera.view_up));
-  if (state.camera.projection == Projection::kPerspective)
-    add("--view-angle", fmt::format("{}", state.camera.view_angle_deg));
-  else
-    add("--parallel-scale", fmt::format("{}", state.camera.parallel_scale));
-  add("--lod-pixels", fmt::format("{}", state.lod_pixels));
-  if (state.classification == Classification::kFlat) add("--classify", "flat");
-  if (state.scale != glm::dvec3(1.0)) add("--scale", numbers(state.scale));
-  if (state.clip_box) {
-    const auto& [lower, upper] = *state.clip_box;
-    add("--clip-box", fmt::format("{},{},{},{},{},{}", lower.x, upper.x, lower.y, upper.y, lower.z, upper.z));
-  }
-  for (const ClipPlane& plane : state.clip_planes)
-    add("--clip-plane", numbers(plane.point) + "," + numbers(plane.normal));
-  if (state.lit) command += " --shade";
-  const auto add_colour = [&](const glm::vec3& colour) {
-    const glm::ivec3 rgb(255.0f * colour + 0.5f);
-    add("--surface-colour", fmt::format("#{:02x}{:02x}{:02x}", rgb.r, rgb.g, rgb.b));
-  };
-  for (const SurfaceFile& surface : state.surfaces) add("--surface", surface.path.string());
-  for (const NamedFaces& named : state.faces) add("--surface", named.name);
-  for (const SurfaceFile& surface : state.surfaces) add_colour(surface.colour);
-  for (const NamedFaces& named : state.faces) add_colour(named.surface.colour);
-  if (!state.faces_by.empty()) add("--surface-by", state.faces_by);
-  for (const ClipPlane& plane : state.slices)
-    add("--slice", numbers(plane.point) + "," + numbers(plane.normal));
-  if (state.slice_opacity != 1 && !state.slices.empty())
-    add("--slice-opacity", fmt::format("{}", state.slice_opacity));
-  if (!state.isovalues.empty()) {
-    add("--iso", fmt::format("{}", fmt::join(state.isovalues, ",")));
-    add("--iso-opacity", fmt::format("{}", state.iso_opacity));
-  }
-  if (!state.volume &&
-      !(state.slices.empty() && state.surfaces.empty() && state.faces.empty() && state.isovalues.empty()))
-    add("--volume", "off");
-  add("--background", state.dark ? "black" : "white");
-  if (state.annotations.scalar_bar) command += " --scalar-bar";
-  if (state.annotations.axes) command += " --axes";
-  if (state.annotations.axes_grid) command += " --axes-grid";
-  if (state.annotations.outline) command += " --outline";
-  return command;
 }
 
 }  // namespace curvisplat

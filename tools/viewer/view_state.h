@@ -31,6 +31,22 @@ struct NamedFaces {
   GridSurface surface;
 };
 
+/// A place in the data that was clicked, and what was found there.
+struct Marker {
+  std::string name;
+  glm::dvec3 point{0.0};  // data coordinates
+  std::string scalar, unit;
+  double value = 0;
+  uint32_t block = 0;  // of the nearest node or cell; block, i, j and k count from 0
+  uint64_t i = 0, j = 0, k = 0;
+};
+
+/// The scalar whose opacities are drawn, where it is not the one that gives the colours.
+struct OpacityScalar {
+  std::string variable;
+  EditedFunction function;
+};
+
 struct ViewState {
   std::string variable;
   Camera camera;
@@ -52,6 +68,8 @@ struct ViewState {
   bool lit = false;
   bool dark = false;  // background
   Annotations annotations{true, true, true};
+  std::optional<OpacityScalar> opacity_by = std::nullopt;
+  std::vector<Marker> markers = {};
 
   glm::vec4 background() const { return dark ? glm::vec4(0, 0, 0, 1) : glm::vec4(1); }
   FrameOptions frameOptions(ImageSize size) const;
@@ -73,10 +91,5 @@ std::string toJson(const ViewState& state);
 /// range, or the scalar that the cache lacks.
 ViewState viewStateFromJson(const std::string& text, const std::filesystem::path& path,
                             const Manifest& manifest);
-
-/// The shell command that renders this view; its numbers round-trip exactly. `function_file`: the file that
-/// holds the transfer function; used unless the function is a preset.
-std::string renderCommand(const ViewState& state, const std::filesystem::path& cache, ImageSize size,
-                          const std::filesystem::path& function_file);
 
 }  // namespace curvisplat

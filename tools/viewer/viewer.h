@@ -1,37 +1,17 @@
-// The window that shows a cache: picture, panels, and the main loop that connects them with the frame loop.
+// The window: what is opened in it, its menus, and the main loop.
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
-#include <memory>
 #include <optional>
-#include <string>
-#include <vector>
 
-#include "render/camera/camera.h"
-#include "render/frame/backend.h"
-#include "render/surface/surface_scene.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
+#include "tools/viewer/viewer_options.h"
 
 namespace curvisplat {
 
-struct ViewerOptions {
-  ImageSize size{1200, 800};
-  Backend backend = Backend::kAutomatic;
-  std::optional<std::filesystem::path> state;  // default: the saved state of this cache
-  std::optional<std::string> scalar;
-  std::shared_ptr<const SurfaceScene> scene;         // null: that of the state
-  std::vector<std::filesystem::path> surface_files;  // of the scene's surfaces
-  std::vector<std::string> face_names;               // of its grid surfaces
-  std::string faces_by;                              // --surface-by
-  std::optional<uint64_t> memory_bytes;
-  std::optional<double> target_s;  // per picture while moving; default 0.033 with a graphics card, else 0.1
-};
-
 /// Opens the window and returns when the user closes it. Checks `stopped` twice a second; once it is stopped,
 /// closes the window and throws Interrupted. Throws Error if no window can be opened or the cache cannot be
-/// read, and UsageError for a scalar that the cache lacks.
-void runViewer(const CacheReader& cache, const ViewerOptions& options, const Progress& stopped);
+/// read, and UsageError for a scalar that the cache lacks. Without a cache, the window offers to open one.
+void runViewer(std::optional<CacheReader> cache, const ViewerOptions& options, const Progress& stopped);
 
 }  // namespace curvisplat

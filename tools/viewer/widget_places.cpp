@@ -27,7 +27,13 @@ void nameWidget(const std::string& name) {
   // A list that has just opened does not know its size yet, and so not its place.
   if (!places().file || ImGui::IsWindowAppearing()) return;
   const ImVec2 at = ImGui::GetItemRectMin(), size = ImGui::GetItemRectSize();
-  places().now += fmt::format("{:.0f} {:.0f} {:.0f} {:.0f} {}\n", at.x, at.y, size.x, size.y, name);
+  nameArea(name, static_cast<double>(at.x), static_cast<double>(at.y), static_cast<double>(size.x),
+           static_cast<double>(size.y));
+}
+
+void nameArea(const std::string& name, double x, double y, double width, double height) {
+  if (places().file)
+    places().now += fmt::format("{:.0f} {:.0f} {:.0f} {:.0f} {}\n", x, y, width, height, name);
 }
 
 void writeWidgetPlaces() {

@@ -10,6 +10,9 @@ namespace curvisplat {
 /// Names the item that Dear ImGui drew last.
 void nameWidget(const std::string& name);
 
+/// Names a rectangle that is not an item.
+void nameArea(const std::string& name, double x, double y, double width, double height);
+
 /// At the end of a frame. The file is replaced when something has changed; a failure to write it is not reported.
 void writeWidgetPlaces();
 

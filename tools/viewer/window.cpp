@@ -6,13 +6,20 @@
 #include <backends/imgui_impl_opengl3.h>
 #include <imgui.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
+#include <glm/geometric.hpp>
+#include <string_view>
 #include <utility>
 
 #include "stream/base/error.h"
+#include "tools/viewer/fonts.h"
 
 namespace curvisplat {
 namespace {
+
+constexpr double kClickReach = 4;  // a button that moves further than this drags
 
 std::string last_glfw_error;  // main thread only
 
@@ -101,6 +108,8 @@ Window::Window(const std::string& title, ImageSize size) : library_(std::make_un
   glfwSetScrollCallback(window_, onWheel);
   glfwSetWindowSizeCallback(window_, onSize);
   glfwSetFramebufferSizeCallback(window_, onPixels);
+  glfwSetCharCallback(window_, onLetter);
+  glfwSetDropCallback(window_, onDrop);
   int height = 0;
   glfwGetWindowSize(window_, &width_, &height);
   glfwGetFramebufferSize(window_, &pixels_.width, &pixels_.height);
@@ -110,10 +119,43 @@ Window::Window(const std::string& title, ImageSize size) : library_(std::make_un
   ImGui::GetIO().IniFilename = nullptr;
   float scale_x = 1, scale_y = 1;
   glfwGetWindowContentScale(window_, &scale_x, &scale_y);
-  ImGui::GetStyle().ScaleAllSizes(scale_x);
-  ImGui::GetIO().FontGlobalScale = scale_x;
+  content_scale_ = static_cast<double>(scale_x);
   ImGui_ImplGlfw_InitForOpenGL(window_, true);
   ImGui_ImplOpenGL3_Init("#version 330 core");
+  applyLook();
+}
+
+/// Where the window system counts the mouse in larger units than pixels, the content's scale is in them already.
+void Window::applyLook() {
+  constexpr double kTextPixels = 14;  // at scale 1
+  const double units = std::max(0.5, content_scale_ / pixelScale() * text_scale_);
+  text_height_ = static_cast<float>(std::lround(kTextPixels * units));
+  ImGuiStyle style;
+  light_ ? ImGui::StyleColorsLight(&style) : ImGui::StyleColorsDark(&style);
+  style.WindowRounding = style.FrameRounding = style.PopupRounding = style.GrabRounding = 3;
+  style.WindowBorderSize = 0;
+  if (light_) style.FrameBorderSize = 1;
+  style.Colors[ImGuiCol_PopupBg].w = style.Colors[ImGuiCol_WindowBg].w = 1;
+  style.ScaleAllSizes(static_cast<float>(units));
+  ImGui::GetStyle() = style;
+  line_height_ = static_cast<double>(text_height_ + 2 * style.FramePadding.y);
+  loadFont(static_cast<float>(text_height_ * pixelScale()), static_cast<float>(pixelScale()));
+  ImGui_ImplOpenGL3_DestroyFontsTexture();
+  ImGui_ImplOpenGL3_CreateFontsTexture();
+}
+
+void Window::setTitle(const std::string& title) {
+  glfwSetWindowTitle(window_, title.c_str());
+}
+
+void Window::setTextScale(double scale) {
+  text_scale_ = std::clamp(scale, 0.5, 4.0);
+  applyLook();
+}
+
+void Window::setLightTheme(bool light) {
+  light_ = light;
+  applyLook();
 }
 
 Window::~Window() {
@@ -161,7 +203,18 @@ void Window::beginFrame() {
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
   showInput();
+  last_covers_ = std::exchange(covers_, {});
   ImGui::NewFrame();
+}
+
+void Window::coverCurrent() {
+  const ImVec2 at = ImGui::GetWindowPos(), size = ImGui::GetWindowSize();
+  cover({at.x, at.y, size.x, size.y});
+}
+
+std::optional<glm::dvec2> Window::pointed() const {
+  if (isDragging() || !overPicture()) return std::nullopt;
+  return mouse_;
 }
 
 void Window::endFrame(const glm::vec3& background) {
@@ -189,7 +242,9 @@ void Window::onPixels(GLFWwindow* window, int width, int height) {
 void Window::onKey(GLFWwindow* window, int key, int, int action, int mods) {
   auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
   self->input_ = true;
+  if (action == GLFW_RELEASE) self->with_control_.erase(key);
   if (action != GLFW_PRESS) return;
+  if (mods & GLFW_MOD_CONTROL) self->with_control_.insert(key);
   if (key >= 0) self->fresh_keys_.push_back(key);  // some keys have no GLFW code
   self->keys_.push_back({key, (mods & GLFW_MOD_SHIFT) != 0, (mods & GLFW_MOD_CONTROL) != 0});
 }
@@ -197,8 +252,23 @@ void Window::onKey(GLFWwindow* window, int key, int, int action, int mods) {
 std::vector<Window::Key> Window::takeKeys() {
   if (!mouse_events_.empty()) return {};
   std::vector<Key> keys = std::exchange(keys_, {});
-  if (ImGui::GetIO().WantTextInput) keys.clear();
+  const auto edits = [](const Key& key) {
+    if (key.code == GLFW_KEY_F1) return false;
+    if (!key.control) return true;
+    return std::string_view("ACVXYZ").find(static_cast<char>(key.code)) != std::string_view::npos;
+  };
+  if (ImGui::GetIO().WantTextInput) std::erase_if(keys, edits);
   return keys;
+}
+
+void Window::onLetter(GLFWwindow* window, unsigned letter) {
+  if (letter == '?') static_cast<Window*>(glfwGetWindowUserPointer(window))->keys_.push_back({kQuestionMark});
+}
+
+void Window::onDrop(GLFWwindow* window, int count, const char** paths) {
+  auto* const self = static_cast<Window*>(glfwGetWindowUserPointer(window));
+  self->input_ = true;
+  self->dropped_.insert(self->dropped_.end(), paths, paths + count);
 }
 
 bool Window::takeInput() {
@@ -206,7 +276,9 @@ bool Window::takeInput() {
 }
 
 bool Window::overPicture() const {
-  return mouse_.x >= picture_left_;
+  return picture_.contains(mouse_) &&
+         std::none_of(last_covers_.begin(), last_covers_.end(),
+                      [this](const Rectangle& cover) { return cover.contains(mouse_); });
 }
 
 void Window::onButton(GLFWwindow* window, int button, int action, int mods) {
@@ -218,8 +290,12 @@ void Window::onButton(GLFWwindow* window, int button, int action, int mods) {
     if (!self->overPicture()) return;
     self->dragged_button_ = button;
     self->dragged_with_shift_ = (mods & GLFW_MOD_SHIFT) != 0;
+    self->pressed_at_ = self->mouse_;
   } else if (action == GLFW_RELEASE && button == self->dragged_button_) {
     self->dragged_button_ = -1;
+    const bool stayed = glm::length(self->mouse_ - self->pressed_at_) < kClickReach;
+    if (stayed && button == GLFW_MOUSE_BUTTON_LEFT && !self->dragged_with_shift_)
+      self->clicks_.push_back(self->mouse_);
   }
 }
 
@@ -246,7 +322,8 @@ double Window::takeWheel() {
 }
 
 bool Window::isDown(int key) const {
-  return !ImGui::GetIO().WantTextInput && glfwGetKey(window_, key) == GLFW_PRESS;
+  return !ImGui::GetIO().WantTextInput && !with_control_.contains(key) &&
+         glfwGetKey(window_, key) == GLFW_PRESS;
 }
 
 void Window::setClipboard(const std::string& text) {

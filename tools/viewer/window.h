@@ -6,7 +6,10 @@
 #include <deque>
 #include <glm/vec2.hpp>
 #include <memory>
+#include <optional>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "render/camera/camera.h"
@@ -15,6 +18,14 @@
 struct GLFWwindow;
 
 namespace curvisplat {
+
+/// In Dear ImGui units, from the upper left corner.
+struct Rectangle {
+  double x = 0, y = 0, width = 0, height = 0;
+  bool contains(const glm::dvec2& point) const {
+    return point.x >= x && point.y >= y && point.x < x + width && point.y < y + height;
+  }
+};
 
 /// The window system of this machine, for `info --system`.
 struct WindowReport {
@@ -51,16 +62,18 @@ class Window {
   double pixelScale() const;
 
   struct Key {
-    int code = 0;  // GLFW_KEY_...
+    int code = 0;  // GLFW_KEY_... or kQuestionMark
     bool shift = false, control = false;
   };
-  /// Keys pressed since the last call, except those typed into a text field. Empty while Dear ImGui has yet
-  /// to see earlier clicks.
+  static constexpr int kQuestionMark = -'?';  // which is on another key in each country
+  /// Keys pressed since the last call. While text is typed, only F1 and those with Control that do not edit. Empty
+  /// while Dear ImGui has yet to see earlier clicks.
   std::vector<Key> takeKeys();
   /// Whether this Dear ImGui frame contains a click that may precede the keys.
   bool showsClick() const { return shows_click_; }
   /// Whether a key, a button or the wheel was used since the last call.
   bool takeInput();
+  /// Whether a key is held that was pressed without Control.
   bool isDown(int key) const;
 
   /// Movement of the mouse while a button is down that was pressed over the picture. Recorded per event with
@@ -75,8 +88,27 @@ class Window {
   double takeWheel();
   /// Whether a drag is in progress.
   bool isDragging() const { return dragged_button_ >= 0; }
-  /// Left edge of the picture in Dear ImGui units.
-  void setPictureLeft(double left) { picture_left_ = left; }
+  /// Where the picture is, in Dear ImGui units.
+  void setPicture(const Rectangle& place) { picture_ = place; }
+  /// What begins in this rectangle is not for the picture under it: call in every frame that it is there.
+  void cover(const Rectangle& place) { covers_.push_back(place); }
+  /// The same of the current Dear ImGui window.
+  void coverCurrent();
+  /// Clicks of the left button on the picture without a movement, since the last call; Dear ImGui units.
+  std::vector<glm::dvec2> takeClicks() { return std::exchange(clicks_, {}); }
+  /// The mouse, if it is over the picture and no button is down.
+  std::optional<glm::dvec2> pointed() const;
+  /// Paths of files dropped on the window since the last call.
+  std::vector<std::string> takeDropped() { return std::exchange(dropped_, {}); }
+
+  /// Height of a line of text, without the space between lines, in Dear ImGui units.
+  float textHeight() const { return text_height_; }
+  /// Height of a menu bar: a line with the space that a widget has around it.
+  double lineHeight() const { return line_height_; }
+  void setTitle(const std::string& title);
+  /// Makes text and widgets larger than the display asks for. 0.5 to 4; between frames.
+  void setTextScale(double scale);
+  void setLightTheme(bool light);
 
   void setClipboard(const std::string& text);
   const GlFunctions& gl() const { return *gl_; }
@@ -90,8 +122,11 @@ class Window {
   static void onWheel(GLFWwindow* window, double x, double y);
   static void onSize(GLFWwindow* window, int width, int height);
   static void onPixels(GLFWwindow* window, int width, int height);
+  static void onLetter(GLFWwindow* window, unsigned letter);
+  static void onDrop(GLFWwindow* window, int count, const char** paths);
   bool overPicture() const;
   void showInput();
+  void applyLook();
 
   friend WindowReport examineWindow();
   struct Library;  // initialises and terminates GLFW
@@ -104,14 +139,22 @@ class Window {
   int width_ = 0;  // in units of the mouse
 
   std::vector<Key> keys_;
+  std::set<int> with_control_;           // that are down, and were pressed so
   std::vector<int> fresh_keys_;          // pressed since the last Dear ImGui frame
   std::vector<int> shown_keys_;          // reported as down in its last frame
   std::deque<glm::dvec2> mouse_events_;  // positions of button events that it has yet to see
   bool shows_click_ = false;
   bool input_ = true;
 
-  double picture_left_ = 0;
-  glm::dvec2 mouse_{0.0};
+  Rectangle picture_;
+  std::vector<Rectangle> covers_, last_covers_;  // of this frame, and of the one that is shown
+  std::vector<glm::dvec2> clicks_;
+  std::vector<std::string> dropped_;
+  float text_height_ = 0;
+  double line_height_ = 0;
+  double text_scale_ = 1, content_scale_ = 1;
+  bool light_ = false;
+  glm::dvec2 mouse_{0.0}, pressed_at_{0.0};
   int dragged_button_ = -1;
   bool dragged_with_shift_ = false;
   std::vector<Drag> drags_;

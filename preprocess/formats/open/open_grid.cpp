@@ -7,6 +7,7 @@
 #include <charconv>
 
 #include "preprocess/formats/cgns/cgns_source.h"
+#include "preprocess/formats/columns/columns_source.h"
 #include "preprocess/formats/ensight/ensight_source.h"
 #include "preprocess/formats/exodus/exodus_source.h"
 #include "preprocess/formats/netcdf/netcdf_source.h"
@@ -50,6 +51,11 @@ std::unique_ptr<DataSource> openListedFile(const OpenGridOptions& options) {
   return openFileSeries(options, openData);
 }
 
+std::unique_ptr<DataSource> openNetcdfGrid(const OpenGridOptions& options) {
+  if (isColumnsGrid(options)) return std::make_unique<ColumnsSource>(options);
+  return openNetcdf(options);
+}
+
 constexpr GridFormat kFormats[] = {
     {isVtkXml, openVtkXml, MoreFiles::kCombined},
     {isVtkLegacy, openVtkLegacy, MoreFiles::kCombined},
@@ -57,7 +63,7 @@ constexpr GridFormat kFormats[] = {
     {isPlot3dMeta, openStructured<openPlot3dMeta>, MoreFiles::kNone},
     {CgnsFile::recognises, openCgns, MoreFiles::kCombined},  // before NetCDF, which takes all HDF5 files
     {isExodus, openAs<ExodusSource>, MoreFiles::kNone},      // before NetCDF, which they are
-    {NetcdfFile::recognises, openStructured<openNetcdf>, MoreFiles::kByItself},
+    {NetcdfFile::recognises, openNetcdfGrid, MoreFiles::kByItself},
     {isEnsightCase, openEnsight, MoreFiles::kNone},
     {isSu2, openAs<Su2Source>, MoreFiles::kByItself},
 };

@@ -1,0 +1,74 @@
+#include "tools/viewer/toasts.h"
+
+#include <gtest/gtest.h>
+
+#include "tools/viewer/history.h"
+#include "tools/viewer/window_commands.h"
+
+namespace curvisplat {
+namespace {
+
+TEST(Toasts, GoAwayInTheOrderOfTheirEnds) {
+  Toasts toasts;
+  toasts.add("saved", 0);
+  toasts.add("cannot be saved", 0, true);
+  ASSERT_EQ(toasts.shown(1).size(), 2u);
+  ASSERT_EQ(toasts.shown(30).size(), 1u);
+  EXPECT_TRUE(toasts.shown(30)[0].is_error);
+  EXPECT_TRUE(toasts.shown(100).empty());
+  EXPECT_EQ(toasts.log().size(), 2u);
+}
+
+TEST(Toasts, TheSameTextIsOne) {
+  Toasts toasts;
+  toasts.add("saved", 0);
+  toasts.add("saved", 3);
+  ASSERT_EQ(toasts.shown(3).size(), 1u);
+  EXPECT_GT(toasts.shown(3)[0].ends_s, 7);
+  toasts.remove(0);
+  EXPECT_TRUE(toasts.shown(3).empty());
+}
+
+TEST(History, GoesBackAndForth) {
+  Manifest manifest;
+  manifest.upper = {1, 1, 1};
+  manifest.variables = {{0, "density", "", 0, 1}};
+  ViewState state = firstViewOf(manifest, {300, 200});
+  History history(state);
+  history.record(state);  // unchanged
+  EXPECT_FALSE(history.canUndo());
+  state.dark = true;
+  history.record(state);
+  state.lit = true;
+  history.record(state);
+  ASSERT_TRUE(history.canUndo());
+  EXPECT_FALSE(history.undo()->lit);
+  EXPECT_FALSE(history.undo()->dark);
+  EXPECT_EQ(history.undo(), nullptr);
+  const ViewState again = *history.redo();
+  EXPECT_TRUE(again.dark);
+  ViewState other = again;
+  other.lod_pixels = 3;
+  history.record(other);  // what could be redone is gone
+  EXPECT_FALSE(history.canRedo());
+  EXPECT_EQ(history.undo()->lod_pixels, 1);
+}
+
+TEST(Commands, EachKeyHasOne) {
+  for (const CommandInfo& info : commands()) {
+    if (info.key == 0) continue;
+    EXPECT_EQ(commandOf({info.key, info.shift, info.control}), info.command) << info.label;
+    EXPECT_NE(std::string(info.key_name), "") << info.label;
+  }
+}
+
+TEST(Commands, NoLetterAloneWritesAFileOrEndsTheWindow) {
+  for (const Command command :
+       {Command::kSavePicture, Command::kSavePictureAs, Command::kQuit, Command::kSaveView, Command::kOpen}) {
+    const CommandInfo& info = infoOf(command);
+    EXPECT_TRUE(info.key == 0 || info.control) << info.label;
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,269 @@
+// The picture of a cache in the window, and what is saved of it.
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <cmath>
+#include <cstdio>
+
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+
+#include "render/frame/frame_plan.h"
+#include "render/image/image_file.h"
+#include "stream/base/durable_file.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "tools/viewer/cache_view.h"
+#include "tools/viewer/first_view.h"
+#include "tools/viewer/marker_panel.h"
+#include "tools/viewer/picture_layout.h"
+#include "tools/viewer/picture_values.h"
+#include "tools/viewer/render_command.h"
+#include "tools/viewer/state_files.h"
+#include "tools/viewer/widget_places.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kPointedFor_s = 0.3;  // the mouse rests that long before values are looked for
+
+ImVec2 toImGui(double x, double y) {
+  return {static_cast<float>(x), static_cast<float>(y)};
+}
+
+}  // namespace
+
+void CacheView::showPicture(const WindowLayout& layout) {
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  const Rectangle& place = layout.picture;
+  const double right = place.x + place.width, bottom = place.y + place.height;
+  nameArea("picture", place.x, place.y, place.width, place.height);
+  const glm::vec4 paper = state_.background();
+  list->AddRectFilled(toImGui(place.x, place.y), toImGui(right, bottom),
+                      ImGui::ColorConvertFloat4ToU32({paper.x, paper.y, paper.z, 1}));
+  if (!picture_.isEmpty())
+    list->AddImage(picture_.id(), toImGui(place.x, place.y),
+                   toImGui(right - shown_strip_ * place.width, bottom));
+  if (!overlay_.isEmpty()) list->AddImage(overlay_.id(), toImGui(place.x, place.y), toImGui(right, bottom));
+}
+
+/// By the picture that is shown.
+std::optional<glm::dvec2> CacheView::placeOf(const glm::dvec3& point, const WindowLayout& layout) const {
+  if (!shown_) return std::nullopt;
+  const ScreenView view = screenViewOf(manifest(), shown_->camera, shown_->options, shown_->options.size);
+  const glm::dvec3 seen = view.viewFromData(point);
+  if (view.projection == Projection::kPerspective && seen.z < view.near) return std::nullopt;
+  const glm::dvec2 pixel = view.pixelFromView(seen);
+  const double width = (1 - shown_strip_) * layout.picture.width;
+  return glm::dvec2(layout.picture.x + pixel.x / view.size.width * width,
+                    layout.picture.y + pixel.y / view.size.height * layout.picture.height);
+}
+
+void CacheView::showPlanesAndMarkers(const WindowLayout& layout) {
+  const auto place = [&](const glm::dvec3& point) { return placeOf(point, layout); };
+  changed_ |= handles_.draw(state_, manifest(), place, window_);
+  drawMarkerSigns(state_, place);
+}
+
+/// Where the mouse rests, the values there are found: first the depth of the picture's pixels, then what the data have
+/// at that point. A click makes a marker of it.
+void CacheView::probe(const WindowLayout& layout) {
+  const double width = (1 - shown_strip_) * layout.picture.width;
+  const auto pixelAt = [&](const glm::dvec2& at) {
+    return glm::dvec2((at.x - layout.picture.x) / width * data_size_.width,
+                      (at.y - layout.picture.y) / layout.picture.height * data_size_.height);
+  };
+  for (const glm::dvec2& click : window_.takeClicks()) clicked_ = pixelAt(click);
+  const auto pointed = window_.pointed();
+  if (!pointed || *pointed != pointed_) {
+    pointed_since_s_ = glfwGetTime();
+    pointed_ = pointed.value_or(glm::dvec2(-1.0));
+    if (!pointed) probed_.clear();
+  }
+  const bool rests = pointed && glfwGetTime() - pointed_since_s_ > kPointedFor_s;
+  if ((rests || clicked_) && isFinal() && !frames_.busy() && values_asked_for_ != request_) {
+    values_asked_for_ = request_;
+    frames_.requestValues();
+  }
+  if (values_ && values_->request == request_) {
+    const auto question = [&](const glm::dvec2& pixel) -> std::optional<PointProbe::Question> {
+      const auto point = pointSeenAt(*values_, manifest(), pixel, data_size_);
+      if (!point) return std::nullopt;
+      return PointProbe::Question{*point, cache_.variableNamed(state_.variable), playback_.step()};
+    };
+    if (clicked_) {
+      marker_question_ = question(*std::exchange(clicked_, std::nullopt));
+      if (marker_question_)
+        probe_.ask(*marker_question_, true);
+      else
+        say("There is nothing at this place.");
+    } else if (pointed && !marker_question_) {
+      if (const auto asked = question(pixelAt(*pointed)))
+        probe_.ask(*asked);
+      else
+        probed_.clear();
+    }
+  }
+  const auto answer = probe_.take();
+  if (!answer) return;
+  const VariableInfo& variable = manifest().variables[answer->question.variable];
+  const bool for_marker = marker_question_ && *marker_question_ == answer->question;
+  if (for_marker) marker_question_.reset();
+  if (!answer->found) {
+    probed_ = "outside of the data";
+    return;
+  }
+  const Marker marker = markerOf(state_, variable, answer->question.point, *answer->found);
+  probed_ = textOf(marker, manifest().blocks.size(), manifest().cells);
+  if (!for_marker) return;
+  state_.markers.push_back(marker);
+  rests_ = false;
+  say(fmt::format("marker {}: {}", marker.name, probed_));
+}
+
+void CacheView::drawStatus(const WindowLayout& layout) {
+  const Rectangle& place = layout.status;
+  ImGui::SetNextWindowPos(toImGui(place.x, place.y));
+  ImGui::SetNextWindowSize(toImGui(place.width, place.height));
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowMinSize, ImVec2(1, 1));
+  ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding,
+                      ImVec2(ImGui::GetStyle().FramePadding.x * 2, ImGui::GetStyle().FramePadding.y));
+  ImGui::Begin("status", nullptr,
+               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
+                   ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoNav);
+  const bool looks = values_asked_for_ == request_ && !(values_ && values_->request == request_);
+  const bool points = window_.pointed().has_value();
+  const std::string text = !probed_.empty()       ? probed_
+                           : looks && points      ? "reading the value under the mouse ..."
+                           : points && !isFinal() ? "values when the picture is final"
+                                                  : "";
+  ImGui::TextUnformatted(text.c_str());
+  nameArea("status " + text, place.x, place.y, place.width, place.height);
+  const std::string state =
+      stateOfPicture({shown_ ? &shown_->statistics : nullptr, isFinal(), frames_.busy(), ""});
+  ImGui::SameLine(static_cast<float>(place.width) - ImGui::CalcTextSize(state.c_str()).x -
+                  2 * ImGui::GetStyle().FramePadding.x);
+  ImGui::TextDisabled("%s", state.c_str());
+  ImGui::End();
+  ImGui::PopStyleVar(2);
+}
+
+void CacheView::savePictureIfFinal() {
+  if (!save_to_ || !isFinal()) return;
+  fs::path file = *std::exchange(save_to_, std::nullopt);
+  const bool numbered = file.empty();
+  for (int number = 1; file.empty() || (numbered && fs::exists(file)); ++number)
+    file = fmt::format("{}_{:04}.png", cache_.cachePath().stem().string(), number);
+  try {
+    const ShownFunctions functions(state_, manifest());
+    const AnnotatedScene scene =
+        sceneOf(state_, manifest(), functions, shown_->camera, shown_->options, picture_size_);
+    writeImage(annotated(shown_->image, state_.annotations, scene), file);
+    say("saved " + fs::absolute(file).string());
+  } catch (const Error& error) {
+    say(error.what(), true);
+  }
+}
+
+void CacheView::copyCommand(bool turns) {
+  try {
+    CommandOptions options{shortPath(cache_.cachePath()), picture_size_, {}, {}, turns};
+    const auto keep = [&](const EditedFunction& function, const char* what, fs::path& file) {
+      if (!needsFile(function)) return;
+      // Beside the picture that the command will write.
+      file = fmt::format("{}_{}.json", cache_.cachePath().stem().string(), what);
+      writeFileDurably(file, toParaViewPreset(function.definition()));
+    };
+    keep(state_.function, "colours", options.function_file);
+    if (state_.opacity_by) keep(state_.opacity_by->function, "opacities", options.opacity_file);
+    const std::string command = renderCommand(state_, options) +
+                                (playback_.steps() > 1 ? fmt::format(" --step {}", playback_.step()) : "");
+    window_.setClipboard(command);
+    fmt::print("{}\n", command);
+    std::fflush(stdout);
+    say(turns ? "copied the command for a movie" : "copied the command for this picture");
+  } catch (const Error& error) {
+    say(error.what(), true);
+  }
+}
+
+void CacheView::take(const FileDialog::Chosen& chosen) {
+  const fs::path& file = chosen.files.front();
+  try {
+    switch (chosen.purpose) {
+      case FileDialog::Purpose::kLoadFunction:
+        state_.function = EditedFunction(readParaViewPreset(file), state_.function.opacityUnit());
+        ++function_version_;
+        changed_ = true;
+        return;
+      case FileDialog::Purpose::kSaveFunction:
+        writeFileDurably(file, toParaViewPreset(state_.function.definition()));
+        return say(
+            fmt::format("saved {}; draw with it: render --tf {}", file.string(), shortPath(file).string()));
+      case FileDialog::Purpose::kSavePicture:
+        save_to_ = file;
+        return;
+      case FileDialog::Purpose::kOpenData:
+        return;
+    }
+  } catch (const Error& error) {
+    say(error.what(), true);
+  }
+}
+
+void CacheView::saveView(const std::string& name) {
+  try {
+    writeState(savedViewOf(cache_.cachePath(), name), toJson(state_));
+    views_ = savedViewsOf(cache_.cachePath());
+    say(fmt::format("saved the view \"{}\": View, Saved views", name));
+  } catch (const Error& error) {
+    say(error.what(), true);
+  }
+}
+
+void CacheView::loadView(const std::string& name) {
+  try {
+    const fs::path file = savedViewOf(cache_.cachePath(), name);
+    ViewState state = viewStateFromJson(readTextFile(file), file, manifest());
+    state.faces = state_.faces;  // of the command line
+    state.faces_by = state_.faces_by;
+    state.isovalues = state_.isovalues;
+    loadSurfaces(state);
+    restore(&state);
+  } catch (const Error& error) {
+    say(error.what(), true);
+  }
+}
+
+std::vector<std::string> CacheView::otherScalars() const {
+  std::vector<std::string> names{"the same scalar"};
+  for (const VariableInfo& one : manifest().variables)
+    if (one.name != state_.variable) names.push_back(one.name);
+  return names;
+}
+
+void CacheView::addTo(MenuFacts& facts) const {
+  for (const VariableInfo& one : manifest().variables) facts.scalars.push_back(one.name);
+  facts.scalar = state_.variable;
+  facts.opacity_scalars = otherScalars();
+  facts.opacity_scalar = state_.opacity_by ? state_.opacity_by->variable : facts.opacity_scalars.front();
+  facts.views = views_;
+}
+
+void CacheView::choose(const MenuChoice& choice) {
+  if (choice.view) loadView(*choice.view);
+  if (choice.scalar && *choice.scalar != state_.variable) {
+    chooseVariable(state_, cache_, *choice.scalar);
+    if (state_.opacity_by && state_.opacity_by->variable == *choice.scalar) state_.opacity_by.reset();
+  }
+  if (choice.opacity_scalar)
+    chooseOpacityScalar(state_, cache_,
+                        *choice.opacity_scalar == otherScalars().front() ? "" : *choice.opacity_scalar);
+  if (!choice.scalar && !choice.opacity_scalar) return;
+  ++function_version_;
+  changed_ = true;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,131 @@
+#include "tools/viewer/cut_panel.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "tools/viewer/labels.h"
+#include "tools/viewer/widget_places.h"
+
+namespace curvisplat {
+
+void CutPanel::draw(ViewState& state, PanelActions& actions) {
+  if (section("Clip box", false)) drawClipBox(state, actions);
+  if (section("Clip planes", false)) drawPlanes(state.clip_planes, kMaxClipPlanes, state, actions);
+  if (section("Slices", false)) drawSlices(state, actions);
+}
+
+/// A plane's normal in data coordinates is its normal after --scale, times the scale.
+ClipPlane planeBeforeViewer(const Manifest& manifest, const ViewState& state) {
+  return {0.5 * (manifest.lower + manifest.upper),
+          glm::normalize((state.camera.focal_point - state.camera.position) * state.scale)};
+}
+
+void CutPanel::drawClipBox(ViewState& state, PanelActions& actions) {
+  const Manifest& manifest = cache_.manifest();
+  bool on = state.clip_box.has_value();
+  if (option("clip", on)) {
+    if (on)
+      state.clip_box = WorldBox{manifest.lower, manifest.upper};
+    else
+      state.clip_box.reset();
+    actions.changed = true;
+  }
+  // The lines are always there: nothing moves when the box is switched on.
+  const WorldBox whole{manifest.lower, manifest.upper};
+  ImGui::BeginDisabled(!on);
+  for (int axis = 0; axis < 3; ++axis) {
+    constexpr std::array<const char*, 3> kNames{"x", "y", "z"};
+    const float lowest = static_cast<float>(manifest.lower[axis]);
+    const float highest = static_cast<float>(manifest.upper[axis]);
+    const WorldBox& box = state.clip_box ? *state.clip_box : whole;
+    float lower = static_cast<float>(box.lower[axis]), upper = static_cast<float>(box.upper[axis]);
+    const char* const name = kNames[static_cast<size_t>(axis)];
+    label(name);
+    if (ImGui::DragFloatRange2(fmt::format("##{}", name).c_str(), &lower, &upper, (highest - lowest) / 500,
+                               lowest, highest, "%.4g", "%.4g", ImGuiSliderFlags_AlwaysClamp)) {
+      state.clip_box->lower[axis] = static_cast<double>(lower);
+      state.clip_box->upper[axis] = static_cast<double>(std::max(lower, upper));
+      actions.changed = true;
+    }
+    actions.dragging |= ImGui::IsItemActive();
+    nameWidget(fmt::format("clip {}", name));
+  }
+  ImGui::EndDisabled();
+}
+
+/// Each plane has a direction and a place along it, which can also be dragged in the picture.
+void CutPanel::drawPlanes(std::vector<ClipPlane>& planes, size_t most, const ViewState& state,
+                          PanelActions& actions) {
+  const Manifest& manifest = cache_.manifest();
+  const glm::dvec3 middle = 0.5 * (manifest.lower + manifest.upper);
+  const glm::dvec3 half = 0.5 * (manifest.upper - manifest.lower);
+  const bool clips = &planes == &state.clip_planes;
+  ImGui::PushID(&planes);
+  ImGui::BeginDisabled(planes.size() >= most);
+  commandButton(clips ? Command::kAddClipPlane : Command::kAddSlice, actions);
+  ImGui::EndDisabled();
+  size_t removed = planes.size();
+  for (size_t n = 0; n < planes.size(); ++n) {
+    ClipPlane& plane = planes[n];
+    ImGui::PushID(static_cast<int>(n));
+    ImGui::Separator();
+    const auto turn = [&](const char* label, const glm::dvec3& normal) {
+      if (!ImGui::Button(label)) return;
+      plane.normal = normal;
+      actions.changed = true;
+    };
+    turn("x", {1, 0, 0});
+    ImGui::SameLine();
+    turn("y", {0, 1, 0});
+    ImGui::SameLine();
+    turn("z", {0, 0, 1});
+    ImGui::SameLine();
+    turn("view", planeBeforeViewer(manifest, state).normal);
+    ImGui::SameLine();
+    turn("flip", -plane.normal);
+    ImGui::SameLine();
+    if (ImGui::Button("remove")) removed = n;
+    nameWidget(fmt::format("remove {} {}", clips ? "clip plane" : "slice", n + 1));
+    // From the data's one end along the normal to the other.
+    const double reach = glm::dot(half, glm::abs(plane.normal));
+    const double length2 = glm::dot(plane.normal, plane.normal);
+    double place = glm::dot(plane.normal, plane.point - middle);
+    float share = reach > 0 ? static_cast<float>(0.5 + 0.5 * place / reach) : 0.5f;
+    label(fmt::format("place {}", n + 1).c_str());
+    if (ImGui::SliderFloat("##place", &share, 0, 1, "%.3f")) {
+      place = reach * (2 * static_cast<double>(share) - 1);
+      plane.point = middle + (place / length2) * plane.normal;
+      actions.changed = true;
+    }
+    actions.dragging |= ImGui::IsItemActive();
+    ImGui::PopID();
+  }
+  ImGui::PopID();
+  if (removed == planes.size()) return;
+  planes.erase(planes.begin() + static_cast<ptrdiff_t>(removed));
+  actions.changed = true;
+}
+
+/// Without a slice or a surface there is nothing to show but the volume.
+void CutPanel::drawSlices(ViewState& state, PanelActions& actions) {
+  auto opacity = static_cast<float>(state.slice_opacity);
+  label("opacity");
+  if (ImGui::SliderFloat("##opacity", &opacity, 0.05f, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp)) {
+    state.slice_opacity = static_cast<double>(opacity);
+    actions.changed = true;
+  }
+  actions.dragging |= ImGui::IsItemActive();
+  const bool alone =
+      state.slices.empty() && state.surfaces.empty() && state.faces.empty() && state.isovalues.empty();
+  ImGui::BeginDisabled(alone);
+  actions.changed |= ImGui::Checkbox("volume", &state.volume);
+  ImGui::EndDisabled();
+  drawPlanes(state.slices, kMaxSlices, state, actions);
+}
+
+}  // namespace curvisplat

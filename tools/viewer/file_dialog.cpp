@@ -1,0 +1,209 @@
+#include "tools/viewer/file_dialog.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+#include <imgui_stdlib.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <sstream>
+#include <system_error>
+
+#include "stream/base/error.h"
+#include "tools/viewer/widget_places.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Look {
+  const char *title, *button;
+  bool saves = false;
+  std::vector<std::string> endings = {};
+};
+
+Look lookOf(FileDialog::Purpose purpose) {
+  switch (purpose) {
+    case FileDialog::Purpose::kOpenData:
+      return {"Open a cache or a grid", "open"};
+    case FileDialog::Purpose::kLoadFunction:
+      return {"Load colours and opacities", "load", false, {".json"}};
+    case FileDialog::Purpose::kSaveFunction:
+      return {"Save colours and opacities", "save", true, {".json"}};
+    case FileDialog::Purpose::kSavePicture:
+      return {"Save picture", "save", true, {".png", ".exr", ".pfm"}};
+  }
+  return {"", ""};
+}
+
+bool isCache(const fs::path& path) {
+  return path.extension() == ".splats";
+}
+
+std::string sizeText(uint64_t bytes) {
+  const auto number = static_cast<double>(bytes);
+  if (number < 1e3) return fmt::format("{} B", bytes);
+  if (number < 1e6) return fmt::format("{:.0f} kB", number / 1e3);
+  return number < 1e9 ? fmt::format("{:.1f} MB", number / 1e6) : fmt::format("{:.2f} GB", number / 1e9);
+}
+
+}  // namespace
+
+std::vector<FolderEntry> entriesOf(const fs::path& folder, const std::vector<std::string>& endings) {
+  std::vector<FolderEntry> entries;
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    const std::string name = at->path().filename().string();
+    if (name.starts_with('.')) continue;
+    std::error_code ignored;
+    const bool is_folder = at->is_directory(ignored) && !isCache(name);
+    const bool fits = endings.empty() || std::find(endings.begin(), endings.end(),
+                                                   at->path().extension().string()) != endings.end();
+    if (!is_folder && !fits) continue;
+    const uint64_t bytes = is_folder || isCache(name) ? 0 : at->file_size(ignored);
+    entries.push_back({name, is_folder, ignored ? 0 : bytes});
+  }
+  if (error) throw Error("{}: cannot be read: {}", folder.string(), error.message());
+  std::sort(entries.begin(), entries.end(), [](const FolderEntry& a, const FolderEntry& b) {
+    return a.is_folder != b.is_folder ? a.is_folder : a.name < b.name;
+  });
+  return entries;
+}
+
+void FileDialog::open(Purpose purpose, const std::string& name) {
+  purpose_ = purpose;
+  opens_ = true;
+  name_ = name;
+  std::error_code ignored;
+  enter(folder_.empty() ? fs::current_path(ignored) : folder_);
+}
+
+void FileDialog::enter(const fs::path& folder) {
+  error_.clear();
+  overwrites_.clear();
+  try {
+    entries_ = entriesOf(folder, lookOf(*purpose_).endings);
+    folder_ = folder;
+  } catch (const Error& error) {
+    error_ = error.what();
+  }
+}
+
+std::optional<FileDialog::Chosen> FileDialog::draw(Window& window) {
+  if (!purpose_) return std::nullopt;
+  const Look look = lookOf(*purpose_);
+  if (std::exchange(opens_, false)) ImGui::OpenPopup(look.title);
+  const ImVec2 whole = ImGui::GetIO().DisplaySize;
+  const float unit = ImGui::GetFontSize();
+  ImGui::SetNextWindowSize({std::min(46 * unit, whole.x), std::min(32 * unit, whole.y)}, ImGuiCond_Appearing);
+  ImGui::SetNextWindowPos({0.5f * whole.x, 0.5f * whole.y}, ImGuiCond_Appearing, {0.5f, 0.5f});
+  if (!ImGui::BeginPopupModal(look.title)) {
+    purpose_.reset();
+    return std::nullopt;
+  }
+  window.cover({0, 0, static_cast<double>(whole.x), static_cast<double>(whole.y)});
+  bool accepts = false;
+  if (ImGui::Button("up")) enter(folder_.parent_path());
+  nameWidget("file up");
+  ImGui::SameLine();
+  const char* const home = std::getenv("HOME");
+  if (home && ImGui::Button("home")) enter(home);
+  if (home) ImGui::SameLine();
+  ImGui::TextUnformatted(folder_.c_str());
+  drawEntries(accepts);
+  ImGui::SetNextItemWidth(-1);
+  if (ImGui::IsWindowAppearing()) ImGui::SetKeyboardFocusHere();
+  accepts |= ImGui::InputTextWithHint("##name", look.saves ? "name" : "name, or a path", &name_,
+                                      ImGuiInputTextFlags_EnterReturnsTrue);
+  nameWidget("file name");
+  accepts |= ImGui::Button(look.button);
+  nameWidget("file accept");
+  ImGui::SameLine();
+  const bool cancels = ImGui::Button("cancel") || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape));
+  nameWidget("file cancel");
+  ImGui::SameLine();
+  ImGui::TextUnformatted(error_.c_str());
+  std::optional<Chosen> chosen;
+  if (accepts) chosen = accept();
+  if (cancels || chosen) {
+    ImGui::CloseCurrentPopup();
+    purpose_.reset();
+  }
+  ImGui::EndPopup();
+  return chosen;
+}
+
+/// A click takes a name, with Control several; a double click opens.
+void FileDialog::drawEntries(bool& accepts) {
+  const float below = 2.6f * ImGui::GetFrameHeightWithSpacing();
+  ImGui::BeginChild("entries", {0, -below}, true);
+  std::optional<fs::path> entered;
+  for (const FolderEntry& entry : entries_) {
+    const std::string shown = entry.is_folder ? entry.name + "/" : entry.name;
+    const bool chosen =
+        ImGui::Selectable(shown.c_str(), name_ == entry.name,
+                          ImGuiSelectableFlags_AllowDoubleClick | ImGuiSelectableFlags_DontClosePopups);
+    nameWidget("file " + entry.name);
+    if (!entry.is_folder && entry.bytes > 0) {
+      const std::string size = sizeText(entry.bytes);
+      ImGui::SameLine(ImGui::GetContentRegionMax().x - ImGui::CalcTextSize(size.c_str()).x);
+      ImGui::TextDisabled("%s", size.c_str());
+    }
+    if (!chosen) continue;
+    const bool twice = ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left);
+    if (entry.is_folder) {
+      if (twice) entered = folder_ / entry.name;
+      continue;
+    }
+    if (ImGui::GetIO().KeyCtrl && *purpose_ == Purpose::kOpenData && !name_.empty() && !twice)
+      name_ += " " + entry.name;
+    else
+      name_ = entry.name;
+    accepts |= twice;
+  }
+  ImGui::EndChild();
+  if (entered) enter(*entered);
+}
+
+std::optional<FileDialog::Chosen> FileDialog::accept() {
+  const Look look = lookOf(*purpose_);
+  std::error_code ignored;
+  const auto whole = [&](const std::string& name) {
+    return fs::path(name).is_absolute() ? fs::path(name) : folder_ / name;
+  };
+  if (name_.empty()) return std::nullopt;
+  if (const fs::path path = whole(name_); fs::is_directory(path, ignored) && !isCache(path)) {
+    enter(path);
+    name_.clear();
+    return std::nullopt;
+  }
+  Chosen chosen{*purpose_, {}};
+  if (look.saves) {
+    fs::path path = whole(name_);
+    if (path.extension().empty()) path += look.endings.front();
+    // The second time it is meant.
+    if (fs::exists(path, ignored) && overwrites_ != path.string()) {
+      overwrites_ = path.string();
+      error_ = path.filename().string() + " exists; save again to replace it";
+      return std::nullopt;
+    }
+    chosen.files.push_back(path);
+    return chosen;
+  }
+  if (fs::exists(whole(name_), ignored)) {
+    chosen.files.push_back(whole(name_));  // perhaps with spaces in its name
+    return chosen;
+  }
+  std::istringstream names(name_);
+  for (std::string name; names >> name;) {
+    if (!fs::exists(whole(name), ignored)) {
+      error_ = name + " does not exist";
+      return std::nullopt;
+    }
+    chosen.files.push_back(whole(name));
+  }
+  return chosen;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,53 @@
+// Chooses files in the window. Our own: Debian has no library for it, and those in the desktop's own style ask programs
+// that a cluster's login node does not have.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/viewer/window.h"
+
+namespace curvisplat {
+
+/// What a folder has to show.
+struct FolderEntry {
+  std::string name;
+  bool is_folder = false;  // to go into; a cache is none
+  uint64_t bytes = 0;
+};
+
+/// Folders first, by name, without those that begin with a dot; files with one of the endings, or all if there are none.
+/// Throws Error if the folder cannot be read.
+std::vector<FolderEntry> entriesOf(const std::filesystem::path& folder,
+                                   const std::vector<std::string>& endings);
+
+class FileDialog {
+ public:
+  enum class Purpose { kOpenData, kLoadFunction, kSaveFunction, kSavePicture };
+  struct Chosen {
+    Purpose purpose;
+    std::vector<std::filesystem::path> files;
+  };
+
+  /// Opens it with the next draw(), in the folder it was in last. `name`: the one that is offered.
+  void open(Purpose purpose, const std::string& name = "");
+  bool isOpen() const { return purpose_.has_value(); }
+  /// Draws it, if it is open. Returns what was chosen, once.
+  std::optional<Chosen> draw(Window& window);
+
+ private:
+  void enter(const std::filesystem::path& folder);
+  void drawEntries(bool& accepts);
+  std::optional<Chosen> accept();
+
+  std::optional<Purpose> purpose_;
+  bool opens_ = false;
+  std::filesystem::path folder_;
+  std::vector<FolderEntry> entries_;
+  std::string name_, error_, overwrites_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,190 @@
+#include "tools/viewer/menus.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <string_view>
+
+#include "tools/viewer/widget_places.h"
+
+namespace curvisplat {
+namespace {
+
+/// "grid.xyz q.bin", without folders.
+std::string shortNames(const std::vector<std::string>& files) {
+  std::string text;
+  for (const std::string& file : files) {
+    if (!text.empty()) text += ' ';
+    text += std::filesystem::path(file).filename().string();
+  }
+  return text;
+}
+
+void chooseOne(const char* title, const std::vector<std::string>& names, const std::string& now,
+               std::optional<std::string>& choice, Window& window) {
+  const bool open = ImGui::BeginMenu(title, !names.empty());
+  if (!open) {
+    nameWidget(fmt::format("menu {}", title));
+    return;
+  }
+  window.coverCurrent();
+  for (const std::string& name : names) {
+    if (ImGui::MenuItem(name.c_str(), nullptr, name == now)) choice = name;
+    nameWidget(fmt::format("item {} {}", title, name));
+  }
+  ImGui::EndMenu();
+}
+
+void chooseRecent(const MenuFacts& facts, MenuChoice& choice, Window& window) {
+  if (!ImGui::BeginMenu("Open recent", !facts.recent.empty())) {
+    nameWidget("menu Open recent");
+    return;
+  }
+  window.coverCurrent();
+  for (size_t n = 0; n < facts.recent.size(); ++n) {
+    const std::string label = fmt::format("{}##{}", shortNames(facts.recent[n]), n);
+    if (ImGui::MenuItem(label.c_str())) choice.open = facts.recent[n];
+    nameWidget(fmt::format("item Open recent {}", n + 1));
+    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", facts.recent[n].front().c_str());
+  }
+  ImGui::EndMenu();
+}
+
+void drawMenu(std::string_view menu, const MenuFacts& facts, MenuChoice& choice, Window& window) {
+  for (const CommandInfo& info : commands()) {
+    if (menu != info.menu) continue;
+    if (info.begins_group) ImGui::Separator();
+    const bool enabled = facts.is_enabled(info.command);
+    if (ImGui::MenuItem(info.label, info.key_name, facts.is_checked(info.command), enabled))
+      choice.commands.push_back(info.command);
+    nameWidget(fmt::format("item {}", info.label));
+    if (info.command == Command::kOpen) chooseRecent(facts, choice, window);
+  }
+  if (menu == "View") chooseOne("Saved views", facts.views, "", choice.view, window);
+}
+
+/// A window in the middle of the screen.
+bool beginWindow(const char* title, bool& open, Window& window) {
+  const ImVec2 whole = ImGui::GetIO().DisplaySize;
+  const float unit = ImGui::GetFontSize();
+  ImGui::SetNextWindowSize({std::min(40 * unit, whole.x), std::min(38 * unit, whole.y)}, ImGuiCond_Appearing);
+  ImGui::SetNextWindowPos({0.5f * whole.x, 0.5f * whole.y}, ImGuiCond_Appearing, {0.5f, 0.5f});
+  const bool shown =
+      ImGui::Begin(title, &open, ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoCollapse);
+  window.coverCurrent();
+  nameArea(fmt::format("window {}", title), static_cast<double>(ImGui::GetWindowPos().x),
+           static_cast<double>(ImGui::GetWindowPos().y), static_cast<double>(ImGui::GetWindowSize().x),
+           static_cast<double>(ImGui::GetWindowSize().y));
+  if (ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape))) open = false;
+  return shown;
+}
+
+}  // namespace
+
+MenuChoice drawMenus(const MenuFacts& facts, Window& window) {
+  MenuChoice choice;
+  if (!ImGui::BeginMainMenuBar()) return choice;
+  window.coverCurrent();
+  for (const char* menu : {"File", "Edit", "View", "Picture", "Data", "Time", "Window", "Help"}) {
+    const bool open = ImGui::BeginMenu(menu);
+    if (open) {
+      window.coverCurrent();
+      drawMenu(menu, facts, choice, window);
+      if (std::string_view(menu) == "Data") {
+        chooseOne("Scalar", facts.scalars, facts.scalar, choice.scalar, window);
+        chooseOne("Opacity by", facts.opacity_scalars, facts.opacity_scalar, choice.opacity_scalar, window);
+      }
+      ImGui::EndMenu();
+    }
+    // The item of a menu that is open is no longer the last one.
+    if (!open) nameWidget(fmt::format("menu {}", menu));
+  }
+  ImGui::EndMainMenuBar();
+  return choice;
+}
+
+void drawToasts(Toasts& toasts, const Rectangle& picture, double now_s, Window& window) {
+  const auto unit = static_cast<double>(ImGui::GetFontSize());
+  const auto& shown = toasts.shown(now_s);
+  double bottom = picture.y + picture.height - 0.7 * unit;
+  std::optional<size_t> removed;
+  for (size_t n = shown.size(); n-- > 0;) {
+    const Toast& toast = shown[n];
+    const double width = std::min(36 * unit, picture.width - 1.4 * unit);
+    const ImVec2 text =
+        ImGui::CalcTextSize(toast.text.c_str(), nullptr, false, static_cast<float>(width - unit));
+    const double height = static_cast<double>(text.y) + unit;
+    const double used = std::min(width, static_cast<double>(text.x) + 1.2 * unit);
+    bottom -= height;
+    if (bottom < picture.y) break;
+    ImGui::SetNextWindowPos(
+        {static_cast<float>(picture.x + picture.width - used - 0.7 * unit), static_cast<float>(bottom)});
+    ImGui::SetNextWindowSize({static_cast<float>(used), static_cast<float>(height)});
+    ImGui::PushStyleColor(ImGuiCol_WindowBg,
+                          toast.is_error ? IM_COL32(110, 25, 25, 240) : IM_COL32(35, 40, 48, 235));
+    ImGui::PushStyleColor(ImGuiCol_Text, IM_COL32(245, 245, 245, 255));
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding,
+                        ImVec2(ImGui::GetFontSize() / 2, ImGui::GetFontSize() / 2));
+    ImGui::Begin(fmt::format("toast {}", n).c_str(), nullptr,
+                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoMove |
+                     ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav);
+    window.coverCurrent();
+    ImGui::PushTextWrapPos(0);
+    ImGui::TextUnformatted(toast.text.c_str());
+    ImGui::PopTextWrapPos();
+    nameArea(fmt::format("message {}", toast.text), picture.x + picture.width - used - 0.7 * unit, bottom,
+             used, height);
+    if (ImGui::IsWindowHovered() && ImGui::IsMouseClicked(ImGuiMouseButton_Left)) removed = n;
+    ImGui::End();
+    ImGui::PopStyleVar();
+    ImGui::PopStyleColor(2);
+    bottom -= 0.4 * unit;
+  }
+  if (removed) toasts.remove(*removed);
+}
+
+void drawKeys(bool& open, Window& window) {
+  if (!open) return;
+  constexpr std::array<std::pair<const char*, const char*>, 7> kMouse{{
+      {"left drag", "rotate; while flying, look around"},
+      {"right drag, wheel", "zoom"},
+      {"middle drag, Shift + left drag", "move the picture"},
+      {"click", "keep the value there as a marker"},
+      {"drag a round handle", "move a clip plane or a slice"},
+      {"click into the curve", "add an opacity point; drag it; right click removes it"},
+      {"drop files", "open them"},
+  }};
+  if (beginWindow("Keys and mouse", open, window)) {
+    const auto row = [](const char* key, const char* what) {
+      ImGui::TableNextRow();
+      ImGui::TableNextColumn();
+      ImGui::TextUnformatted(key);
+      ImGui::TableNextColumn();
+      ImGui::TextUnformatted(what);
+    };
+    if (ImGui::BeginTable("keys", 2, ImGuiTableFlags_SizingFixedFit | ImGuiTableFlags_RowBg)) {
+      for (const auto& [key, what] : kMouse) row(key, what);
+      for (const CommandInfo& info : commands())
+        if (*info.key_name) row(info.key_name, info.label);
+      ImGui::EndTable();
+    }
+  }
+  ImGui::End();
+}
+
+void drawMessages(const Toasts& toasts, bool& open, Window& window) {
+  if (!open) return;
+  if (beginWindow("Messages", open, window)) {
+    if (toasts.log().empty()) ImGui::TextDisabled("There were none.");
+    for (const std::string& text : toasts.log()) {
+      ImGui::TextWrapped("%s", text.c_str());
+      ImGui::Separator();
+    }
+  }
+  ImGui::End();
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,26 @@
+// What the user did in the panels and menus during a frame.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/viewer/window_commands.h"
+
+namespace curvisplat {
+
+struct PanelActions {
+  bool changed = false;           // the picture must be drawn again
+  bool function_changed = false;  // implies `changed`
+  bool dragging = false;          // a control is being dragged: a coarse picture suffices
+  std::vector<Command> commands;
+  std::optional<uint64_t> step;  // to go to
+  bool load_function = false, save_function = false;
+  std::optional<std::string> load_view, save_view, remove_view;  // by name
+  std::string error;                                             // of what the user asked for
+
+  void run(Command command) { commands.push_back(command); }
+};
+
+}  // namespace curvisplat

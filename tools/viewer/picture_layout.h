@@ -1,0 +1,34 @@
+// How a picture is divided and annotated, the same as `render` does it.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "render/annotate/annotations.h"
+#include "stream/cache/manifest.h"
+#include "tools/viewer/view_state.h"
+
+namespace curvisplat {
+
+/// A state's functions, ready to be drawn and annotated. Outlives what it gives.
+class ShownFunctions {
+ public:
+  ShownFunctions(const ViewState& state, const Manifest& manifest);
+
+  DrawnScalars scalars(const CacheReader& cache, const ViewState& state) const;
+  std::vector<ShownFunction> bars() const;
+
+ private:
+  TransferFunction colours_;
+  std::optional<TransferFunction> opacities_;
+  std::string title_, opacity_title_;
+};
+
+/// The part of a picture that shows the data.
+ImageSize dataSizeOf(const ViewState& state, const Manifest& manifest, ImageSize picture);
+
+/// What is annotated in a picture that was drawn with this camera and these options.
+AnnotatedScene sceneOf(const ViewState& state, const Manifest& manifest, const ShownFunctions& functions,
+                       const Camera& camera, const FrameOptions& options, ImageSize picture);
+
+}  // namespace curvisplat

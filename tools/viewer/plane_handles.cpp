@@ -1,0 +1,105 @@
+#include "tools/viewer/plane_handles.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "tools/viewer/widget_places.h"
+
+namespace curvisplat {
+namespace {
+
+ImVec2 toImGui(const glm::dvec2& point) {
+  return {static_cast<float>(point.x), static_cast<float>(point.y)};
+}
+
+/// The plane's point nearest to the middle of the data, its normal at unit length, and two directions in it.
+struct Frame {
+  glm::dvec3 middle, normal, across, up;
+};
+
+Frame frameOf(const ClipPlane& plane, const Manifest& manifest) {
+  const glm::dvec3 centre = 0.5 * (manifest.lower + manifest.upper);
+  const glm::dvec3 normal = glm::normalize(plane.normal);
+  const glm::dvec3 middle = centre + glm::dot(normal, plane.point - centre) * normal;
+  const glm::dvec3 other = std::abs(normal.z) < 0.9 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0);
+  const glm::dvec3 across = glm::normalize(glm::cross(other, normal));
+  return {middle, normal, across, glm::cross(normal, across)};
+}
+
+/// Half the extent of the data along a direction.
+double reachAlong(const glm::dvec3& direction, const Manifest& manifest) {
+  return glm::dot(0.5 * (manifest.upper - manifest.lower), glm::abs(direction));
+}
+
+}  // namespace
+
+double shiftAlong(const glm::dvec2& from, const glm::dvec2& to, const glm::dvec2& movement) {
+  const glm::dvec2 along = to - from;
+  const double length2 = glm::dot(along, along);
+  return length2 < 1 ? 0 : glm::dot(movement, along) / length2;
+}
+
+bool PlaneHandles::draw(ViewState& state, const Manifest& manifest, const PlaceInWindow& place,
+                        Window& window) {
+  if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) dragged_.reset();
+  bool moved = false;
+  size_t number = 0;
+  for (auto* planes : {&state.clip_planes, &state.slices})
+    for (ClipPlane& plane : *planes) {
+      moved |= drawOne(plane, number, manifest, place, window);
+      ++number;
+    }
+  return moved;
+}
+
+bool PlaneHandles::drawOne(ClipPlane& plane, size_t number, const Manifest& manifest,
+                           const PlaceInWindow& place, Window& window) {
+  const Frame frame = frameOf(plane, manifest);
+  const double reach = reachAlong(frame.normal, manifest);
+  const double wide = reachAlong(frame.across, manifest), high = reachAlong(frame.up, manifest);
+  const auto handle = place(frame.middle);
+  // A plane that faces the viewer is moved by dragging upwards.
+  const auto end = place(frame.middle + reach * frame.normal);
+  if (!handle || !end) return false;
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  const bool dragged = dragged_ == number;
+  const ImU32 colour = dragged ? IM_COL32(255, 200, 60, 255) : IM_COL32(235, 140, 30, 255);
+  std::array<ImVec2, 4> corners;
+  bool seen = true;
+  for (size_t n = 0; n < 4; ++n) {
+    const double x = n == 0 || n == 3 ? -wide : wide, y = n < 2 ? -high : high;
+    const auto corner = place(frame.middle + x * frame.across + y * frame.up);
+    seen &= corner.has_value();
+    if (corner) corners[n] = toImGui(*corner);
+  }
+  if (seen) list->AddPolyline(corners.data(), 4, colour, ImDrawFlags_Closed, 1.5f);
+  const double size = 0.45 * static_cast<double>(ImGui::GetFontSize());
+  list->AddLine(toImGui(*handle), toImGui(*handle + 0.3 * (*end - *handle)), colour, 2);
+  list->AddCircleFilled(toImGui(*handle), static_cast<float>(size), colour);
+  list->AddCircle(toImGui(*handle), static_cast<float>(size), IM_COL32(0, 0, 0, 255));
+  const Rectangle grip{handle->x - size, handle->y - size, 2 * size, 2 * size};
+  window.cover(grip);
+  nameArea(fmt::format("handle {}", number + 1), grip.x, grip.y, grip.width, grip.height);
+
+  const ImGuiIO& io = ImGui::GetIO();
+  const glm::dvec2 mouse(static_cast<double>(io.MousePos.x), static_cast<double>(io.MousePos.y));
+  if (ImGui::IsMouseClicked(ImGuiMouseButton_Left) && grip.contains(mouse) && !dragged_) dragged_ = number;
+  if (dragged_ != number) return false;
+  const glm::dvec2 movement = mouse - *handle;
+  const bool faces = glm::length(*end - *handle) < 8;
+  const double share =
+      faces ? -static_cast<double>(io.MouseDelta.y) / 200 : shiftAlong(*handle, *end, movement);
+  const double now = glm::dot(frame.normal, plane.point - 0.5 * (manifest.lower + manifest.upper));
+  const double then = std::clamp(now + share * reach, -reach, reach);
+  if (then == now || (!faces && glm::length(movement) < 0.5)) return false;
+  plane.point += (then - now) * frame.normal;
+  return true;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,170 @@
+#include "tools/viewer/render_command.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+#include <string_view>
+#include <system_error>
+
+#include "render/automatic/rounded.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr int kDigits = 6;  // of the picture's height, or of the number itself
+
+/// `word` quoted for a shell.
+std::string quoted(const std::string& word) {
+  const bool plain = !word.empty() && std::all_of(word.begin(), word.end(), [](unsigned char c) {
+    return std::isalnum(c) ||
+           std::string_view("_-./,:=+@%").find(static_cast<char>(c)) != std::string_view::npos;
+  });
+  if (plain) return word;
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return text + "'";
+}
+
+std::string numbers(const glm::dvec3& point, double scale) {
+  const auto part = [scale](double x) { return roundedTo(x, scale, kDigits); };
+  return fmt::format("{},{},{}", part(point.x), part(point.y), part(point.z));
+}
+
+std::string number(double value) {
+  return fmt::format("{}", value == 0 ? 0 : roundedTo(value, std::abs(value), kDigits));
+}
+
+class Words {
+ public:
+  explicit Words(std::string begin) : text_(std::move(begin)) {}
+  void add(const std::string& option, const std::string& value) {
+    // The parser would take a separate value with a minus sign for an option.
+    text_ += value.starts_with('-') ? " " + option + "=" + quoted(value) : " " + option + " " + quoted(value);
+  }
+  void add(const std::string& flag) { text_ += " " + flag; }
+  const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+};
+
+void addFunction(const EditedFunction& function, const std::filesystem::path& file, Words& words) {
+  const auto parts = function.parts(true);
+  if (!parts) return words.add("--tf", file.string());
+  words.add("--tf", parts->map);
+  words.add("--range", fmt::format("{},{}", parts->range.first, parts->range.second));
+  if (parts->asinh) words.add("--asinh", fmt::format("{},{}", parts->asinh->centre, parts->asinh->width));
+}
+
+void addOpacities(const EditedFunction& function, Words& words) {
+  const auto parts = function.parts(true);
+  if (parts && !parts->opacities.empty()) words.add("--opacity", textOf(parts->opacities));
+  words.add("--opacity-unit", number(function.opacityUnit()));
+}
+
+/// Of pictures of two scalars: colours of one, opacities of the other.
+void addFunctions(const ViewState& state, const CommandOptions& options, Words& words) {
+  addFunction(state.function, options.function_file, words);
+  if (!state.opacity_by) return addOpacities(state.function, words);
+  const auto& [variable, function] = *state.opacity_by;
+  words.add("--opacity-by", variable);
+  if (const auto parts = function.parts(true)) {
+    words.add("--opacity-range", fmt::format("{},{}", parts->range.first, parts->range.second));
+    if (parts->asinh)
+      words.add("--opacity-asinh", fmt::format("{},{}", parts->asinh->centre, parts->asinh->width));
+  } else {
+    words.add("--opacity-tf", options.opacity_file.string());
+  }
+  addOpacities(function, words);
+}
+
+void addCamera(const Camera& camera, Words& words) {
+  const bool perspective = camera.projection == Projection::kPerspective;
+  const double half_height = perspective ? glm::length(camera.position - camera.focal_point) *
+                                               std::tan(0.5 * glm::radians(camera.view_angle_deg))
+                                         : camera.parallel_scale;
+  words.add("--position", numbers(camera.position, half_height));
+  words.add("--focal-point", numbers(camera.focal_point, half_height));
+  if (camera.view_up != glm::dvec3(0, 0, 1)) words.add("--view-up", numbers(camera.view_up, 1));
+  if (perspective)
+    words.add("--view-angle", number(camera.view_angle_deg));
+  else
+    words.add("--parallel-scale", number(camera.parallel_scale));
+}
+
+std::string text(const ClipPlane& plane) {
+  const double size = std::max({1e-300, glm::length(plane.point)});
+  return numbers(plane.point, size) + "," + numbers(plane.normal, glm::length(plane.normal));
+}
+
+void addSurfaces(const ViewState& state, Words& words) {
+  const auto add_colour = [&](const glm::vec3& colour) {
+    const glm::ivec3 rgb(255.0f * colour + 0.5f);
+    words.add("--surface-colour", fmt::format("#{:02x}{:02x}{:02x}", rgb.r, rgb.g, rgb.b));
+  };
+  for (const SurfaceFile& surface : state.surfaces) words.add("--surface", shortPath(surface.path).string());
+  for (const NamedFaces& named : state.faces) words.add("--surface", named.name);
+  for (const SurfaceFile& surface : state.surfaces) add_colour(surface.colour);
+  for (const NamedFaces& named : state.faces) add_colour(named.surface.colour);
+  if (!state.faces_by.empty()) words.add("--surface-by", state.faces_by);
+  for (const ClipPlane& plane : state.slices) words.add("--slice", text(plane));
+  if (state.slice_opacity != 1 && !state.slices.empty())
+    words.add("--slice-opacity", number(state.slice_opacity));
+  if (!state.isovalues.empty()) {
+    words.add("--iso", fmt::format("{}", fmt::join(state.isovalues, ",")));
+    words.add("--iso-opacity", number(state.iso_opacity));
+  }
+  if (!state.volume &&
+      !(state.slices.empty() && state.surfaces.empty() && state.faces.empty() && state.isovalues.empty()))
+    words.add("--volume", "off");
+}
+
+}  // namespace
+
+bool needsFile(const EditedFunction& function) {
+  return !function.parts();
+}
+
+std::filesystem::path shortPath(const std::filesystem::path& path) {
+  std::error_code ignored;
+  const std::filesystem::path whole = std::filesystem::weakly_canonical(path, ignored);
+  const std::filesystem::path relative =
+      whole.lexically_relative(std::filesystem::weakly_canonical(".", ignored));
+  return relative.empty() || *relative.begin() == ".." ? whole : relative;
+}
+
+std::string renderCommand(const ViewState& state, const CommandOptions& options) {
+  Words words("curvisplat render " + quoted(options.cache.string()) + " -o " +
+              (options.turns ? "movie.mp4" : "picture.png"));
+  words.add("--size", fmt::format("{}x{}", options.size.width, options.size.height));
+  words.add("--scalar", state.variable);
+  addFunctions(state, options, words);
+  addCamera(state.camera, words);
+  if (options.turns) words.add("--orbit", "360");
+  if (state.lod_pixels != 1) words.add("--lod-pixels", number(state.lod_pixels));
+  if (state.classification == Classification::kFlat) words.add("--classify", "flat");
+  if (state.scale != glm::dvec3(1.0))
+    words.add("--scale", fmt::format("{},{},{}", state.scale.x, state.scale.y, state.scale.z));
+  if (state.clip_box) {
+    const auto& [lower, upper] = *state.clip_box;
+    const double size = glm::length(upper - lower);
+    const auto part = [size](double x) { return roundedTo(x, size, kDigits); };
+    words.add("--clip-box", fmt::format("{},{},{},{},{},{}", part(lower.x), part(upper.x), part(lower.y),
+                                        part(upper.y), part(lower.z), part(upper.z)));
+  }
+  for (const ClipPlane& plane : state.clip_planes) words.add("--clip-plane", text(plane));
+  if (state.lit) words.add("--shade");
+  addSurfaces(state, words);
+  if (state.dark) words.add("--background", "black");
+  if (state.annotations.scalar_bar) words.add("--scalar-bar");
+  if (state.annotations.axes) words.add("--axes");
+  if (state.annotations.axes_grid) words.add("--axes-grid");
+  if (state.annotations.outline) words.add("--outline");
+  return words.text();
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,38 @@
+#include "tools/viewer/toasts.h"
+
+#include <algorithm>
+#include <cstddef>
+
+namespace curvisplat {
+namespace {
+
+constexpr double kShortest_s = 4, kPerLetter_s = 0.06, kError_s = 60;
+constexpr size_t kMaxShown = 3, kMaxLog = 100;
+
+}  // namespace
+
+void Toasts::add(const std::string& text, double now_s, bool is_error) {
+  const double ends_s =
+      now_s + (is_error ? kError_s : kShortest_s + kPerLetter_s * static_cast<double>(text.size()));
+  const auto same =
+      std::find_if(shown_.begin(), shown_.end(), [&](const Toast& toast) { return toast.text == text; });
+  if (same != shown_.end()) {
+    same->ends_s = ends_s;
+    return;
+  }
+  shown_.push_back({text, is_error, ends_s});
+  if (shown_.size() > kMaxShown) shown_.pop_front();
+  log_.push_back(text);
+  if (log_.size() > kMaxLog) log_.pop_front();
+}
+
+const std::deque<Toast>& Toasts::shown(double now_s) {
+  std::erase_if(shown_, [now_s](const Toast& toast) { return toast.ends_s <= now_s; });
+  return shown_;
+}
+
+void Toasts::remove(size_t n) {
+  if (n < shown_.size()) shown_.erase(shown_.begin() + static_cast<ptrdiff_t>(n));
+}
+
+}  // namespace curvisplat
