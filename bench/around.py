@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures what is drawn around the volume: light, clip planes, an opaque body, two scalars, surfaces of many quads.
+"""Measures what is drawn around the volume: light, clip planes, an opaque body, two scalars, depth, surfaces of many quads.
 
     bench/around.py FOLDER [--program PROGRAM] [--frames 8] [--rounds 5]
 
@@ -60,7 +60,7 @@ def main():
     wake, plate = made("wake", "192x128x96", "--scalar", "f,jacobian"), made("plate", "1025x1025x3")
     body = folder / "body.stl"
     write_sphere(body, (2, 0, 2), 3)
-    picture = ["-o", folder / "a_%02d.pfm", "--size", "600x600", "--range", "0,1", "--opacity", "0:0,0.3:0,0.5:0.3,1:0.8",
+    picture = ["--size", "600x600", "--range", "0,1", "--opacity", "0:0,0.3:0,0.5:0.3,1:0.8",
                "--opacity-unit", "0.05", "--backend", "cpu", "--orbit", "40"]
     planes = [f"{x},{y},{z},{-x},{-y},{2 - z}" for x, y, z in
               ((6, 0, 2), (-6, 0, 2), (0, 6, 2), (0, -6, 2), (3, 3, 3.2), (3, -3, 0.8))]
@@ -68,12 +68,14 @@ def main():
     names = [variable["name"] for variable in scalar["variables"]]
     variants = {"plain": [], "lit": ["--shade"], "six clip planes": [f"--clip-plane={plane}" for plane in planes],
                 "opaque body": ["--surface", body],
-                "two scalars": ["--scalar", names[1], "--opacity-by", names[0], "--opacity-range", "0,1"]}
+                "two scalars": ["--scalar", names[1], "--opacity-by", names[0], "--opacity-range", "0,1"],
+                "depth (.exr)": []}
     ratios = {name: [] for name in variants}
     for _ in range(arguments.rounds):
         times = {}
         for name, options in variants.items():
-            command = [program, "render", wake, *picture, *options]
+            output = folder / ("a_%02d.exr" if name.endswith("(.exr)") else "a_%02d.pfm")
+            command = [program, "render", wake, "-o", output, *picture, *options]
             times[name] = (processor_seconds([*command, "--frames", str(arguments.frames + 1)]) -
                            processor_seconds([*command, "--frames", "1"])) / arguments.frames
         for name in variants:

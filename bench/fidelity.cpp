@@ -192,12 +192,12 @@ class Measurement {
       MarchSteps steps;
       steps.step = 0.016 * grid.length;
       steps.cells = 2;
-      double reached = 0;
-      const Image image =
-          toImage(convergedMarch(*grid.field, function.exact, view.camera, size_, steps, 75, &reached));
-      if (reached < 75)
-        fmt::print(stderr, "{}: successive references agree to {:.1f} dB only\n", path.string(), reached);
-      writeImage(image, path);
+      const ConvergedImage reference =
+          convergedMarch(*grid.field, function.exact, view.camera, size_, steps, 75);
+      if (reference.agreement_db < 75)
+        fmt::print(stderr, "{}: successive references agree to {:.1f} dB only\n", path.string(),
+                   reference.agreement_db);
+      writeImage(toImage(reference.image), path);
     }
     return readImage(path);
   }

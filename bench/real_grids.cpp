@@ -146,7 +146,7 @@ struct Settings {
   std::string only = ".*", views = ".*", json;
   int pixels = 256;
   double lod_pixels = 0, voxel_pixels = 0;
-  bool for_vtk = false;
+  bool for_vtk = false, keep_drawn = false;
 };
 
 /// A grid with all that its pictures need.
@@ -250,8 +250,9 @@ class Measurement {
         steps.step = 0.016 * grid.length;
         steps.cells = 1;
         steps.depth_tolerance = 5e-4;
-        writeImage(toImage(convergedMarch(grid.field, function, view.camera, size_, steps, kAgreementDb)),
-                   path);
+        writeImage(
+            toImage(convergedMarch(grid.field, function, view.camera, size_, steps, kAgreementDb).image),
+            path);
       }
     }
     return readImage(path);
@@ -296,6 +297,7 @@ class Measurement {
     };
     const Image exact = truth(grid, view, "uniform", medium, true);
     const Image picture = drawn(grid, cache, view, uniformMedium(extinction, grid.field.range()));
+    if (settings_.keep_drawn) writeImage(picture, pathOf(grid, view, "uniform_drawn", "pfm"));
     const Image vtk = byVtk(grid, view, "uniform_vtk");
     const Ripple ours = rippleOf(picture, exact);
     row["rms_percent"] = ours.rms_percent;
@@ -382,6 +384,8 @@ int run(int argc, char** argv) {
   app.add_option("--voxel-pixels", settings.voxel_pixels,
                  "Merge the finest splats into voxels of this size instead, as coarse levels do; not for "
                  "grids of cells");
+  app.add_flag("--keep-drawn", settings.keep_drawn,
+               "Keep the pictures of the uniform medium, beside the marched ones");
   app.add_flag("--for-vtk", settings.for_vtk, "Only write what peers/vtk_views.py needs");
   app.add_option("--json", settings.json, "Write the table as JSON to this file");
   CLI11_PARSE(app, argc, argv);

@@ -72,11 +72,10 @@ void march(const ReferenceField& field, const Words& words) {
   MarchSteps steps;
   steps.step = 0.016 * words.length;
   steps.cells = 2;
-  double reached = 0;
-  writeImage(toImage(convergedMarch(field, function.exact, cameraOf(words), size, steps, words.agreement_db,
-                                    &reached)),
-             words.output);
-  fmt::print("{{\"agreement_db\": {:.2f}}}\n", reached);
+  const ConvergedImage reference =
+      convergedMarch(field, function.exact, cameraOf(words), size, steps, words.agreement_db);
+  writeImage(toImage(reference.image), words.output);
+  fmt::print("{{\"agreement_db\": {:.2f}}}\n", reference.agreement_db);
 }
 
 int run(int argc, char** argv) {

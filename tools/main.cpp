@@ -68,6 +68,8 @@ std::string describe(const CLI::App& app, const CLI::App* command, const CLI::Pa
     for (const std::string& argument : command->remaining())
       if (argument.size() > 1 && argument[0] == '-') return leftOver(app, command);
   }
+  if (std::regex_match(text, found, std::regex("(\\S+): 1 required \\S+ missing")))
+    return found[1].str() + " needs a value";
   if (std::regex_match(text, found, std::regex("Could not convert: (\\S+) = (.*)")) && command) {
     const CLI::Option* const option = command->get_option_no_throw(found[1]);
     const bool is_whole = option && option->get_type_name().starts_with("UINT");
@@ -98,6 +100,7 @@ int run(int argc, char** argv) {
   addInfo(app);
   addRender(app);
   addView(app);
+  addServe(app);
   addBench(app);
   addGenerate(app);
   addCompare(app);

@@ -24,6 +24,8 @@ packages=(
   libcairo2-dev fonts-dejavu-core
   # the window
   libglfw3-dev libimgui-dev
+  # the server: Boost.Beast, pictures while they move
+  libboost-dev libjpeg62-turbo-dev
   # SIMD for drawing on the processor
   libhwy-dev
   # several processes

@@ -15,6 +15,7 @@ is the peak memory of the process; for curvisplat that of its picture, with that
 """
 import argparse
 import contextlib
+import dataclasses
 import json
 import math
 import os
@@ -52,15 +53,20 @@ def camera_along(direction, focal_point, distance, parallel_scale):
             "view_up": [0, 0, 1], "parallel_scale": parallel_scale}
 
 
+@dataclasses.dataclass
 class Case:
     """A grid, with its camera, range and reference."""
-
-    def __init__(self, name, grid, solution, scalar, kind, array, camera, value_range, length, truth):
-        self.name, self.grid, self.solution, self.scalar = name, grid, solution, scalar
-        self.kind, self.array = kind, array  # VTK's names
-        self.camera, self.range, self.length = camera, value_range, length
-        self.truth = truth  # arguments of curvisplat_reference
-        self.nodes = 0
+    name: str
+    grid: pathlib.Path
+    solution: pathlib.Path
+    scalar: str
+    kind: str  # VTK's, as the array's name
+    array: str
+    camera: dict
+    range: tuple
+    length: float
+    truth: list  # arguments of curvisplat_reference
+    nodes: int = 0
 
     def camera_words(self):
         def words(vector):
@@ -130,7 +136,8 @@ def converted(arguments, case):
     return cache, json.loads(told.read_text())
 
 
-def drawn_by_us(arguments, case, cache, conversion, function, technique, picture):
+def drawn_by_us(arguments, case, made, function, technique, picture):
+    cache, conversion = made
     told = arguments.folder / "render.json"
     words = own_words(arguments, case, function, OWN_TECHNIQUES[technique])
     results.run([arguments.program, "render", cache, "-o", picture, *words])
@@ -171,14 +178,14 @@ def measure(arguments, case, out):
     """Returns a row for every technique and function."""
     told = json.loads(results.run([arguments.program, "info", case.grid, case.solution, "--json"]))
     case.nodes = told["nodes"]
-    cache, conversion = converted(arguments, case)
+    made = converted(arguments, case)
     rows = []
     for function in arguments.functions:
         truth = truth_of(arguments, case, function)
         for technique in arguments.techniques:
             picture = arguments.folder / f"{case.name}_{function}_{technique}.png"
             if technique in OWN_TECHNIQUES:
-                row = drawn_by_us(arguments, case, cache, conversion, function, technique, picture)
+                row = drawn_by_us(arguments, case, made, function, technique, picture)
             else:
                 row = drawn_by_vtk(arguments, case, function, technique, picture)
             row |= {"case": case.name, "nodes": case.nodes, "function": function, "technique": technique,

@@ -8,6 +8,7 @@
 
 #include "preprocess/addition/addition_checks.h"
 #include "preprocess/addition/cache_grid.h"
+#include "preprocess/addition/further_faces.h"
 #include "preprocess/addition/value_passes.h"
 #include "preprocess/addition/value_record.h"
 #include "preprocess/convert/grid_origin.h"
@@ -19,6 +20,7 @@
 #include "stream/base/paths.h"
 #include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
+#include "stream/cache/faces_file.h"
 #include "stream/cache/variable_writer.h"
 
 namespace curvisplat {
@@ -79,6 +81,7 @@ class Addition {
     pass("scatter", manifest().nodes, "nodes", &Addition::scatter);
     pass("seams", 0, "nodes", &Addition::mergeSeams);
     pass("build", manifest().splats, "splats", &Addition::build);
+    pass("faces", manifest().nodes, "nodes", &Addition::writeFaces);
     pass("finish", 0, "bricks", &Addition::finish);
     progress_.end();
     return std::move(report_);
@@ -98,8 +101,7 @@ class Addition {
       if (manifest().overlap == kOverlapOwner)
         throw Error(
             "{}: its blocks overlap, and older scalars have no values at some of its {}; convert again with "
-            "all "
-            "scalars",
+            "all scalars",
             cache_.path().string(), manifest().cells ? "cells" : "nodes");
       // Older scalars have blanked nodes that the grid does not: only the cache knows them.
       pass("drawn nodes", manifest().bricks, "bricks", &Addition::findDrawnNodes);
@@ -121,33 +123,31 @@ class Addition {
     const uint64_t missing = survey_.blanked.by_value + survey_.blanked.not_finite;
     if (survey_.blanked.by_grid != manifest().blanked_nodes)
       throw Error(
-          "{}: leaves out {} {} of its grid, and of this one it would be {}; this grid is not the one "
-          "the cache was made from, or scalars were missing at nodes where blocks meet: convert again with "
-          "all scalars",
+          "{}: {} {} were blanked when it was made, and this grid blanks {}; it is not the one the cache was "
+          "made from, or scalars were missing at nodes where blocks meet: convert again with all scalars",
           cache_.path().string(), manifest().blanked_nodes, manifest().cells ? "cells" : "nodes",
           survey_.blanked.by_grid);
     if (missing > 0)
       throw Error(
-          "{}: {} of the {} that it draws have no value of {} ({} not finite in single precision, {} with "
-          "the "
-          "blank value), and every splat needs one; convert again with all scalars",
+          "{}: {} of its {} have no value of {} ({} not finite in single precision, {} with the blank "
+          "value), and every splat needs one; convert again with all scalars",
           cache_.path().string(), missing, manifest().cells ? "cells" : "nodes", joined(report_.scalars),
           survey_.blanked.not_finite, survey_.blanked.by_value);
     checkRanges(survey_, grid_.description(), options_.scalars);
     if (survey_.lower != manifest().lower || survey_.upper != manifest().upper)
       throw Error(
-          "{}: its grid spans ({}, {}, {}) to ({}, {}, {}), and this one ({}, {}, {}) to ({}, {}, {}): it "
-          "is another",
+          "{}: was made from a grid from ({}, {}, {}) to ({}, {}, {}); this grid goes from ({}, {}, {}) to "
+          "({}, {}, {}) and is not the one the cache was made from",
           cache_.path().string(), manifest().lower.x, manifest().lower.y, manifest().lower.z,
           manifest().upper.x, manifest().upper.y, manifest().upper.z, survey_.lower.x, survey_.lower.y,
           survey_.lower.z, survey_.upper.x, survey_.upper.y, survey_.upper.z);
   }
 
   void checkCentring() const {
-    const auto words = [](bool cells) { return cells ? "in cells" : "at nodes"; };
+    const auto words = [](bool cells) { return cells ? "cell" : "node"; };
     const bool cells = reader_.centring() == Centring::kCell;
     if (cells != manifest().cells)
-      throw Error("{}: its scalars stand {}, and {} {}; convert it to a cache of its own",
+      throw Error("{}: its scalars are {}-centred, but {} is {}-centred; convert it to a cache of its own",
                   cache_.path().string(), words(manifest().cells), joined(report_.scalars), words(cells));
   }
 
@@ -166,6 +166,12 @@ class Addition {
   void build() {
     passes_->build(*writer_);
     passes_.reset();
+  }
+
+  void writeFaces() {
+    const std::vector<uint32_t> numbers = writer_->numbers();
+    const FurtherFaces job{cache_, reader_, scratch_.path(), facesFileOfVariable(numbers.front()), numbers};
+    if (const auto file = writeFurtherFaces(job, plan_, progress_)) writer_->addFile(*file);
   }
 
   void finish() {

@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "preprocess/addition/addition_checks.h"
+#include "preprocess/addition/further_faces.h"
 #include "preprocess/addition/step_references.h"
 #include "preprocess/addition/value_passes.h"
 #include "preprocess/addition/value_record.h"
@@ -24,6 +25,7 @@
 #include "stream/base/paths.h"
 #include "stream/cache/cache_lock.h"
 #include "stream/cache/cache_reader.h"
+#include "stream/cache/faces_file.h"
 #include "stream/cache/step_writer.h"
 
 namespace curvisplat {
@@ -189,14 +191,22 @@ class StepAddition {
       const StepReferences references(cache);
       passes.build(writer, &references);
     });
+    NewStep step = newStep();
+    pass("faces", report_.nodes, "nodes", [&] {
+      std::vector<uint32_t> numbers;
+      for (const VariableInfo& variable : cache.manifest().variables) numbers.push_back(variable.number);
+      const FurtherFaces job{cache, reader_, scratch_->path(), facesFileOfStep(report_.step), numbers};
+      if (const auto file = writeFurtherFaces(job, plan_, progress_)) step.files.push_back(*file);
+    });
     pass("finish", 0, "bricks", [&] {
-      for (const FileInfo& file : writer.finish(newStep())) report_.files.push_back({file.name, file.size});
+      for (const FileInfo& file : writer.finish(step)) report_.files.push_back({file.name, file.size});
     });
   }
 
   void addGeometry() {
     ConvertOptions options;
-    options.surfaces = false;  // the first geometry has them
+    options.surfaces = FacesReader::open(cache_.path(), cache_.manifest()) != nullptr;
+    options.planes = planesOf(cache_);
     options.output = options_.cache / geometryFolderName(cache_.series().geometries());
     // A kill between the two steps below leaves a geometry that the series does not have.
     if (std::filesystem::exists(options.output)) removeAll(options.output);

@@ -22,15 +22,18 @@ std::string scratchName(const std::filesystem::path& cache) {
 void checkBlocks(const GridDescription& grid, const CacheReader& cache) {
   const std::vector<BlockInfo>& blocks = cache.manifest().blocks;
   if (grid.blocks.size() != blocks.size())
-    throw Error("{}: was made from a grid of {} blocks, and this one has {}: it is another",
-                cache.path().string(), blocks.size(), grid.blocks.size());
+    throw Error(
+        "{}: was made from a grid of {} blocks; this grid has {} and is not the one the cache was made from",
+        cache.path().string(), blocks.size(), grid.blocks.size());
   for (size_t n = 0; n < blocks.size(); ++n) {
     const GridBlock& found = grid.blocks[n];
     const BlockInfo& expected = blocks[n];
     if (found.ni != expected.ni || found.nj != expected.nj || found.nk != expected.nk)
-      throw Error("{}: block {} of its grid has {}x{}x{} nodes, and of this one {}x{}x{}: it is another",
-                  cache.path().string(), n + 1, expected.ni, expected.nj, expected.nk, found.ni, found.nj,
-                  found.nk);
+      throw Error(
+          "{}: block {} had {}x{}x{} nodes when the cache was made; in this grid it has {}x{}x{}, so it is "
+          "not the "
+          "one the cache was made from",
+          cache.path().string(), n + 1, expected.ni, expected.nj, expected.nk, found.ni, found.nj, found.nk);
   }
 }
 

@@ -1,7 +1,5 @@
 #include "preprocess/convert/bucket_file.h"
 
-#include <pthread.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cstring>
@@ -15,6 +13,8 @@
 #include "stream/base/checksum.h"
 #include "stream/base/file.h"
 #include "stream/base/mutex.h"
+#include "stream/base/thread_name.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -57,7 +57,10 @@ class ChunkWriter {
   /// Waits while too many chunks wait. Throws what writing threw.
   void write(Chunk chunk) {
     MutexLock lock(mutex_);
-    while (waiting_.size() >= BucketFile::kWaitingChunks && !error_) changed_.wait(lock);
+    if (waiting_.size() >= BucketFile::kWaitingChunks) {
+      const TraceScope trace("wait for writing", TraceKind::kWait);
+      while (waiting_.size() >= BucketFile::kWaitingChunks && !error_) changed_.wait(lock);
+    }
     if (error_) std::rethrow_exception(error_);
     waiting_.push_back(std::move(chunk));
     changed_.notify_all();
@@ -91,7 +94,7 @@ class ChunkWriter {
   }
 
   void writeAll() {
-    pthread_setname_np(pthread_self(), "bucket-writer");
+    nameThisThread("bucket-writer");
     MutexLock lock(mutex_);
     for (;;) {
       while (!stopped_ && waiting_.empty()) changed_.wait(lock);
@@ -100,6 +103,7 @@ class ChunkWriter {
       lock.unlock();
       std::exception_ptr error;
       try {
+        const TraceScope trace("write splats");
         ChunkHeader header;
         std::memcpy(&header, chunk.bytes.data(), sizeof header);
         header.checksum = checksumOf(

@@ -12,6 +12,7 @@
 #include "preprocess/convert/splat_record.h"
 #include "stream/base/check.h"
 #include "stream/base/error.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -121,6 +122,7 @@ Subtree CellBuilder::State::build(const Cell& cell, RecordSpan records, bool is_
 }
 
 Subtree CellBuilder::State::buildLeaf(const Cell& cell, RecordSpan records, bool is_top) {
+  const TraceScope trace("build leaf");
   sortByNode(records);
   Scratch& own = scratch.local();
   if (!is_top) own.merger.begin(cell);
@@ -137,7 +139,11 @@ Subtree CellBuilder::State::buildLeaf(const Cell& cell, RecordSpan records, bool
 }
 
 Subtree CellBuilder::State::buildInner(const Cell& cell, RecordSpan records, bool is_top) {
-  const std::array<size_t, 9> begins = divide(cell, records);
+  std::array<size_t, 9> begins;
+  {
+    const TraceScope trace("divide cell");
+    begins = divide(cell, records);
+  }
   std::array<Subtree, 8> children;
   tbb::parallel_for(size_t{0}, size_t{8}, [&](size_t octant) {
     const size_t count = begins[octant + 1] - begins[octant];
@@ -145,13 +151,13 @@ Subtree CellBuilder::State::buildInner(const Cell& cell, RecordSpan records, boo
     children[octant] =
         build(cell.child(static_cast<int>(octant)), records.subspan(begins[octant], count), false);
   });
-  // Where the loop around this one was cancelled, because another part of it threw, this one ends early and
-  // without a word: its cell is not to be made of what is there. What the other part threw is what is heard
-  // of.
+  // If another task of the enclosing loop has thrown, TBB cancels this loop, too, which then returns normally with children
+  // missing. The cell must not be built from the rest; of the two exceptions the first one is reported.
   for (size_t octant = 0; octant < 8; ++octant)
     if (begins[octant] != begins[octant + 1] && !children[octant].octant)
       throw Error("the bricks of a cell were not all built");
 
+  const TraceScope trace("build inner brick");
   Subtree inner;
   std::array<MergedOctant, 8> octants;
   for (size_t octant = 0; octant < 8; ++octant) {

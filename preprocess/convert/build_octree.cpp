@@ -11,20 +11,20 @@
 #include "preprocess/convert/divide_bucket.h"
 #include "preprocess/convert/splat_record.h"
 #include "stream/base/check.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 
-OctreeBuilder::OctreeBuilder(const RootCube& root, const std::vector<GridBlock>& blocks, size_t variables,
-                             const MemoryPlan& plan, BucketTree& tree, CacheWriter& writer,
-                             std::filesystem::path temporary_folder, Progress& progress)
-    : root_(root),
-      variables_(variables),
-      plan_(plan),
+OctreeBuilder::OctreeBuilder(const OctreePlan& plan, BucketTree& tree, CacheWriter& writer,
+                             Progress& progress)
+    : root_(plan.root),
+      variables_(plan.variables),
+      plan_(plan.memory),
       tree_(&tree),
       writer_(&writer),
-      temporary_folder_(std::move(temporary_folder)),
+      temporary_folder_(plan.temporary_folder),
       progress_(&progress),
-      cells_(root, blocks, variables, progress) {}
+      cells_(plan.root, plan.blocks, plan.variables, progress) {}
 
 void OctreeBuilder::build(const BucketFile& file) {
   const std::vector<uint32_t> leaves = tree_->leavesBelow(0);
@@ -155,7 +155,7 @@ void OctreeBuilder::buildTooLarge(const BucketFile& file, uint32_t bucket,
     return;
   }
   const std::filesystem::path path = temporary_folder_ / fmt::format("divided{}.bin", files_made_++);
-  const DividedBucket divided = divideBucket(file, bucket, leaves, variables_, plan_, path, *tree_);
+  const DividedBucket divided = divideBucket({file, bucket, leaves}, variables_, plan_, path, *tree_);
   buildBuckets(*divided.file, divided.leaves, 0, divided.file->buckets());
 }
 
@@ -180,6 +180,7 @@ void OctreeBuilder::buildCoincident(const BucketFile& file, uint32_t bucket, uin
 }
 
 void OctreeBuilder::append(uint32_t node, BuiltCell&& cell) {
+  const TraceScope trace("append bricks");
   built_.resize(std::max(built_.size(), tree_->size()));
   Built& built = built_[node];
   for (size_t n = 0; n < cell.bricks.size(); ++n) {

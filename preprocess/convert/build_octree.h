@@ -26,12 +26,19 @@
 
 namespace curvisplat {
 
+/// What bricks are built of, and with.
+struct OctreePlan {
+  const RootCube& root;
+  const std::vector<GridBlock>& blocks;
+  size_t variables;
+  const MemoryPlan& memory;
+  std::filesystem::path temporary_folder;
+};
+
 class OctreeBuilder {
  public:
   /// All references must outlive it. `tree` grows where a bucket has to be divided.
-  OctreeBuilder(const RootCube& root, const std::vector<GridBlock>& blocks, size_t variables,
-                const MemoryPlan& plan, BucketTree& tree, CacheWriter& writer,
-                std::filesystem::path temporary_folder, Progress& progress);
+  OctreeBuilder(const OctreePlan& plan, BucketTree& tree, CacheWriter& writer, Progress& progress);
 
   /// Builds and appends what is in `file`, which holds the splats of all of the tree, and not yet in the
   /// writer. Throws Error if a disk fails.

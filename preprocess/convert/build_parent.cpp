@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "preprocess/convert/merge_levels.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 
@@ -17,11 +18,13 @@ BuiltCell buildFromChildren(const RootCube& root, size_t variables, const Cell& 
   tbb::parallel_for(size_t{0}, size_t{8}, [&](size_t octant) {
     const ChildBricks& child = children[octant];
     if (child.bricks == 0) return;
+    const TraceScope trace("merge octant");
     OctantMerger& merger = mergers.local();
     merger.begin(child.cell);
     for (uint64_t n = 0; n < child.bricks; ++n) merger.add(child.read(n));
     octants[octant] = merger.finish();
   });
+  const TraceScope trace("build parent");
   BuiltCell built;
   for (size_t octant = 0; octant < 8; ++octant)
     if (!octants[octant].splats.positions.empty())

@@ -44,12 +44,12 @@ ConversionWorkspace::ConversionWorkspace(const fs::path& output, bool overwrite,
   if (found && worthResuming() && unfinished != Unfinished::kRemove) {
     if (unfinished == Unfinished::kRefuse)
       throw Error(
-          "{}: is an unfinished conversion to this output; go on with it by --resume, or begin anew with "
+          "{}: is an unfinished conversion to this output; continue it with --resume, or start anew with "
           "--overwrite",
           partial_->path().string());
     const std::string difference = differenceOf(journal_.facts, facts);
     if (!difference.empty())
-      throw Error("{}: cannot be resumed: {}; begin anew with --overwrite instead of --resume",
+      throw Error("{}: cannot be resumed: {}; start anew with --overwrite instead of --resume",
                   partial_->path().string(), difference);
     resumed_ = true;
     if (isScratch(journal_.scratch, output)) {

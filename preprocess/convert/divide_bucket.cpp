@@ -51,11 +51,10 @@ std::vector<uint32_t> placesOfRecords(std::span<const std::byte> records, size_t
   return places;
 }
 
-DividedBucket divideBucket(const BucketFile& from, uint32_t bucket, const std::vector<uint32_t>& leaves,
-                           size_t variables, const MemoryPlan& plan, const std::filesystem::path& path,
-                           BucketTree& tree) {
+DividedBucket divideBucket(const BucketOfLeaves& from, size_t variables, const MemoryPlan& plan,
+                           const std::filesystem::path& path, BucketTree& tree) {
   CountingGrid counts(kMaxLevel, plan.counting_bytes);
-  from.forEachChunk(bucket, [&](std::span<const std::byte> chunk) {
+  from.file.forEachChunk(from.bucket, [&](std::span<const std::byte> chunk) {
     VoxelRuns runs(counts.level());
     forEachRecord(chunk, variables,
                   [&](std::span<const std::byte> record) { runs.add(recordPosition(record.data())); });
@@ -64,8 +63,8 @@ DividedBucket divideBucket(const BucketFile& from, uint32_t bucket, const std::v
   counts.close();
 
   DividedBucket divided;
-  const size_t leaves_before = leaves.size();
-  for (const uint32_t leaf : leaves) {
+  const size_t leaves_before = from.leaves.size();
+  for (const uint32_t leaf : from.leaves) {
     const CellContents& contents = tree[leaf].contents;
     if (contents.splats > plan.plannedBucketSplats() && !contents.coincide())
       tree.split(
@@ -84,7 +83,7 @@ DividedBucket divideBucket(const BucketFile& from, uint32_t bucket, const std::v
 
   divided.file = std::make_unique<BucketFile>(path, buckets, plan.chunkBytes(buckets));
   RecordRouter router(tree, *divided.file);
-  forEachRecordOf(from, bucket, variables, [&](std::span<const std::byte> record) {
+  forEachRecordOf(from.file, from.bucket, variables, [&](std::span<const std::byte> record) {
     router.add(record, recordPosition(record.data()));
   });
   router.flush();

@@ -24,12 +24,17 @@ struct DividedBucket {
   std::vector<uint32_t> leaves;  // of the tree, in Morton order: what the file's buckets hold
 };
 
-/// Splits `leaves` (all that have splats in `bucket`, in Morton order) where they hold too many, and scatters
-/// the bucket's records into a new file at `path`. Memory: the counting grid and chunk buffers. Throws Error
-/// if a disk fails.
-DividedBucket divideBucket(const BucketFile& from, uint32_t bucket, const std::vector<uint32_t>& leaves,
-                           size_t variables, const MemoryPlan& plan, const std::filesystem::path& path,
-                           BucketTree& tree);
+/// A bucket, and the leaves of the tree that have splats in it, in Morton order.
+struct BucketOfLeaves {
+  const BucketFile& file;
+  uint32_t bucket;
+  const std::vector<uint32_t>& leaves;
+};
+
+/// Splits the leaves where they hold too many splats, and scatters the bucket's records into a new file at
+/// `path`. Memory: the counting grid and chunk buffers. Throws Error if a disk fails.
+DividedBucket divideBucket(const BucketOfLeaves& from, size_t variables, const MemoryPlan& plan,
+                           const std::filesystem::path& path, BucketTree& tree);
 
 /// Calls `use` for each record of a bucket of any size, ordered by node. Memory: one bucket and chunk
 /// buffers.

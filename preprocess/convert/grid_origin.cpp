@@ -35,7 +35,7 @@ uint64_t GridOrigin::temporaryBytes() const {
 AbuttingFaces::Needs GridOrigin::needsOfFaces() const {
   const AbuttingFaces::Needs needs = AbuttingFaces::needsOf(blocks());
   if (2 * needs.memory_bytes > plan_.seam_bytes)
-    throw Error("--memory: the ends of so many blocks of cells take {} MiB; give at least {} MiB",
+    throw Error("--memory: matching the faces of this grid's blocks takes {} MiB; give at least {} MiB",
                 (needs.memory_bytes >> 20) + 1, (MemoryPlan::capForSeams(2 * needs.memory_bytes) >> 20) + 1);
   return needs;
 }

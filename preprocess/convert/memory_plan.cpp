@@ -7,6 +7,7 @@
 
 #include "preprocess/convert/splat_record.h"
 #include "preprocess/grid/slabs.h"
+#include "stream/base/byte_text.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/model/brick.h"
@@ -64,8 +65,8 @@ uint64_t defaultMemory() {
 
 MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads) {
   if (cap_bytes < leastMemory(variables))
-    throw Error("--memory: conversion of {} scalars takes at least {} MiB; {:.4g} MiB were given", variables,
-                leastMemory(variables) / kMiB, static_cast<double>(cap_bytes) / static_cast<double>(kMiB));
+    throw Error("--memory {}: conversion of {} scalar{} takes at least {}", byteText(cap_bytes), variables,
+                variables == 1 ? "" : "s", byteText(leastMemory(variables)));
   const uint64_t bytes = cap_bytes - cap_bytes / kAllocatorShare - kProgramBytes;
 
   MemoryPlan plan;
@@ -108,9 +109,19 @@ uint64_t MemoryPlan::capForMesh(uint64_t mesh_bytes) {
 void MemoryPlan::requireSlabs(uint64_t bytes) {
   const uint64_t of_two = (bytes + kSlabsOfLongRows - 1) / kSlabsOfLongRows;
   if (capFor(of_two * kSlabShare) > cap_bytes)
-    throw Error("--memory: the grid's rows along i are long and need at least {} MiB; {} MiB were given",
-                (capFor(of_two * kSlabShare) >> 20) + 1, cap_bytes >> 20);
+    throw Error("--memory {}: the grid's rows along i are long and need at least {} MiB", byteText(cap_bytes),
+                (capFor(of_two * kSlabShare) >> 20) + 1);
   slab_bytes = std::max(slab_bytes, of_two);
+}
+
+uint64_t MemoryPlan::expectedPeak(uint64_t splats, size_t variables) const {
+  // Cells fill a bucket to three quarters, mostly; two are in memory.
+  const uint64_t in_buckets = std::min(splats, plannedBucketSplats() * 3 / 2);
+  const uint64_t build = in_buckets * bucketBytesPerSplat(variables) + threads * brickScratchBytes(variables);
+  const uint64_t slabs = 2 * std::min(slab_bytes, splats * slabBytesPerNode(variables));
+  const uint64_t scatter = slabs + std::min(chunk_buffer_bytes, splats * regularRecordBytes(variables));
+  // The counting grid takes half of what it may, the other half is for its coarser levels.
+  return std::min(cap_bytes, kProgramBytes + std::max({build, slabs + counting_bytes / 2, scatter}));
 }
 
 void MemoryPlan::limitBuckets(uint64_t splats, size_t variables) {

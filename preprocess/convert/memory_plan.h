@@ -45,6 +45,8 @@ struct MemoryPlan {
   void limitBuckets(uint64_t splats, size_t variables);
   /// A bucket's write buffer, where a file has so many buckets.
   size_t chunkBytes(uint32_t buckets) const;
+  /// About the peak of a conversion of so many splats: most take less than the cap.
+  uint64_t expectedPeak(uint64_t splats, size_t variables) const;
   /// What is planned for, with room for the splats that counts of nodes do not foresee.
   uint64_t plannedBucketSplats() const { return bucket_splats - bucket_splats / 5; }
 };

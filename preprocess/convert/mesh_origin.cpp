@@ -11,6 +11,7 @@
 #include "preprocess/gather/corner_gather.h"
 #include "preprocess/gather/point_sums.h"
 #include "stream/base/error.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -66,6 +67,7 @@ void MeshOrigin::count(const RootCube& root, CountingGrid& counts, Progress& pro
     const uint32_t level = counts.level();
     std::vector<VoxelRuns> runs(tasks, VoxelRuns(level));
     tbb::parallel_for(size_t{0}, tasks, [&](size_t task) {
+      const TraceScope trace("splats of cells");
       const size_t end = std::min(points.x.size(), (task + 1) * kPointsPerTask);
       for (size_t n = task * kPointsPerTask; n < end; ++n)
         if (used_[loaded.range.number + n] && std::isfinite(points.x[n]))

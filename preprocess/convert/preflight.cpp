@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "preprocess/convert/splat_record.h"
+#include "stream/base/byte_text.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/free_space.h"
@@ -41,18 +42,11 @@ std::optional<Disk> diskOf(const std::filesystem::path& folder) {
   return Disk{status.st_dev, *free_bytes};
 }
 
-/// In MiB or GiB, so that numbers which differ are printed differently.
-std::string sizeText(uint64_t bytes) {
-  const double mebibytes = static_cast<double>(bytes) / static_cast<double>(1 << 20);
-  return mebibytes < 10'000 ? fmt::format("{:.2f} MiB", mebibytes)
-                            : fmt::format("{:.2f} GiB", mebibytes / 1024);
-}
-
 void checkRoom(const std::filesystem::path& folder, const Disk& disk, uint64_t bytes, const char* what,
                const char* hint) {
   if (disk.free_bytes < bytes)
     throw Error("{}: {} need about {}, and {} are free; {}, or try regardless with --no-preflight",
-                folder.string(), what, sizeText(bytes), sizeText(disk.free_bytes), hint);
+                folder.string(), what, byteText(bytes), byteText(disk.free_bytes), hint);
 }
 
 uint64_t withMargin(uint64_t temporary) {

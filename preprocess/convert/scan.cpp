@@ -2,6 +2,7 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
@@ -15,11 +16,13 @@
 #include "preprocess/survey/cell_survey.h"
 #include "preprocess/survey/grid_checksum.h"
 #include "stream/base/error.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr size_t kNodesPerTask = 16384;
+constexpr size_t kNodesAtOnce = size_t{1} << 18;  // 4 MiB of runs at most
 
 // Splats are stored in single precision, their weights in units cubed.
 constexpr double kSmallestExtent = 1e-9, kLargestExtent = 1e12;
@@ -43,6 +46,50 @@ void widen(GridSurvey& bounds, const NodeArrays& nodes, size_t begin, size_t end
     }
   }
 }
+
+/// Counts slabs a part at a time: while the threads gather one part's voxels, one of them adds those of the part before
+/// to the counts, in the order of the nodes.
+class PartCounter {
+ public:
+  PartCounter(const RootCube& root, CountingGrid& counts) : root_(root), counts_(counts) {}
+
+  void add(const NodeArrays& nodes) {
+    for (size_t begin = 0; begin < nodes.x.size(); begin += kNodesAtOnce)
+      addPart(nodes, begin, std::min(nodes.x.size(), begin + kNodesAtOnce));
+  }
+  /// To be called at the end.
+  void finish() { addGathered(); }
+
+ private:
+  void addPart(const NodeArrays& nodes, size_t begin, size_t end) {
+    std::vector<VoxelRuns> gathered((end - begin + kNodesPerTask - 1) / kNodesPerTask,
+                                    VoxelRuns(counts_.level()));
+    tbb::parallel_invoke([&] { addGathered(); },
+                         [&] {
+                           tbb::parallel_for(size_t{0}, gathered.size(), [&](size_t task) {
+                             const size_t first = begin + task * kNodesPerTask;
+                             gather(nodes, first, std::min(end, first + kNodesPerTask), gathered[task]);
+                           });
+                         });
+    gathered_ = std::move(gathered);
+  }
+
+  void gather(const NodeArrays& nodes, size_t begin, size_t end, VoxelRuns& runs) const {
+    const TraceScope trace("count nodes");
+    for (size_t n = begin; n < end; ++n)
+      if (!nodes.blank[n]) runs.add(root_.fromWorld({nodes.x[n], nodes.y[n], nodes.z[n]}));
+  }
+
+  void addGathered() {
+    const TraceScope trace("add counts");
+    for (const VoxelRuns& runs : gathered_) counts_.add(runs.level(), runs.runs());
+    gathered_.clear();
+  }
+
+  const RootCube& root_;
+  CountingGrid& counts_;
+  std::vector<VoxelRuns> gathered_;  // not yet added
+};
 
 }  // namespace
 
@@ -79,6 +126,7 @@ GridSurvey surveyGrid(const NodeReader& reader, uint64_t slab_bytes, AbuttingFac
     GridSurvey of_slab = tbb::parallel_reduce(
         tbb::blocked_range<size_t>(0, count, kNodesPerTask), none,
         [&](const tbb::blocked_range<size_t>& range, GridSurvey bounds) {
+          const TraceScope trace("scan nodes");
           widen(bounds, loaded->nodes, range.begin(), range.end());
           return bounds;
         },
@@ -110,19 +158,12 @@ void countNodes(const GridSource& source, const RootCube& root, uint64_t slab_by
                 Progress& progress, const SlabShare& share) {
   const NodeReader coordinates(source, {}, std::nullopt);
   SlabStream slabs(coordinates, slab_bytes, kNoHalo, share);
+  PartCounter counter(root, counts);
   while (const LoadedSlab* loaded = slabs.next()) {
-    const NodeArrays& nodes = loaded->nodes;
-    const size_t tasks = (nodes.x.size() + kNodesPerTask - 1) / kNodesPerTask;
-    const uint32_t level = counts.level();
-    std::vector<VoxelRuns> runs(tasks, VoxelRuns(level));
-    tbb::parallel_for(size_t{0}, tasks, [&](size_t task) {
-      const size_t end = std::min(nodes.x.size(), (task + 1) * kNodesPerTask);
-      for (size_t n = task * kNodesPerTask; n < end; ++n)
-        if (!nodes.blank[n]) runs[task].add(root.fromWorld({nodes.x[n], nodes.y[n], nodes.z[n]}));
-    });
-    for (const VoxelRuns& of_task : runs) counts.add(level, of_task.runs());
-    progress.advance(nodes.x.size());
+    counter.add(loaded->nodes);
+    progress.advance(loaded->nodes.x.size());
   }
+  counter.finish();
 }
 
 uint32_t countingLevel(uint64_t nodes) {

@@ -20,7 +20,7 @@ namespace curvisplat {
 class AbuttingFaces;
 
 /// Reads all nodes once. Memory: two slabs. Throws Error if no node is there, or if the grid is larger or
-/// smaller than single precision can say. Where scalars stand in cells, those at the blocks' ends are added
+/// smaller than single precision can say. Where scalars are cell-centred, those at the blocks' ends are added
 /// to `faces`, unless that is null.
 ///
 /// With `ranks` each reads a share of the nodes, and all get the result. Cells are read by every rank as a whole.

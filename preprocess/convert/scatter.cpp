@@ -10,6 +10,7 @@
 #include "preprocess/grid/slabs.h"
 #include "preprocess/splats/cell_splats.h"
 #include "stream/base/mutex.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -45,6 +46,7 @@ class SplatStream {
     const uint64_t parts = (block.ni + kNodesOfRowPerTask - 1) / kNodesOfRowPerTask;
     tbb::parallel_for(size_t{0}, boxes.size() * parts, [&](size_t task) {
       progress_->throwIfStopped();
+      const TraceScope trace("make splats");
       const uint64_t i0 = task % parts * kNodesOfRowPerTask;
       const NodeBox& box = boxes[task / parts];
       BlockWindow window{block, slab.first_node, slab.window, &loaded.nodes, i0, i0 + kNodesOfRowPerTask};
@@ -105,6 +107,7 @@ class SplatStream {
         sink.add(splats.splats[n], valuesOf(splats, n));
     }
     if (!has_faces) return;
+    const TraceScope trace("add to seams");
     const MutexLock lock(adding_to_seams_);
     for (size_t n = 0; n < splats.splats.size(); ++n)
       if (splats.splats[n].isForSeams()) seams_->add(splats.splats[n], valuesOf(splats, n));
@@ -172,7 +175,10 @@ ScatterCounts streamSplats(const NodeReader& reader, const AbuttingFaces* faces,
                    shareOf(pass.ranks));
   std::vector<uint64_t> covered;
   while (const LoadedSlab* loaded = slabs.next()) {
-    if (pass.see) pass.see(*loaded);
+    if (pass.see) {
+      const TraceScope trace("see slab");
+      pass.see(*loaded);
+    }
     if (pass.owners) pass.owners->cover(*loaded, covered);
     splats.add(*loaded, covered);
     const GridBlock& block = reader.source().description().blocks[loaded->slab.block];
@@ -190,6 +196,7 @@ ScatterCounts scatterSplats(SplatOrigin& origin, const SplatTarget& target, Prog
 
 uint64_t scatterRest(SplatOrigin& origin, const SplatTarget& target, Progress& progress) {
   RecordSink sink(target);
+  const TraceScope trace("merge seams");
   const uint64_t merged = origin.finish(sink, progress);
   sink.finish();
   return merged;

@@ -160,8 +160,8 @@ std::vector<Part> partsOf(const SharedBuild& build, const CacheWriter& own,
       bricks = readBrickLog(folder, build.variables.size());
     if (bricks.size() != counts[rank])
       throw Error(
-          "{}: shows {} of the {} bricks that rank {} has written; the ranks need a file system that they "
-          "share",
+          "{}: only {} of the {} bricks that rank {} has written can be seen here; the ranks need a file "
+          "system that they share",
           folder.string(), bricks.size(), counts[rank], rank);
     parts.push_back({BrickFiles(folder, build.variables), std::move(bricks)});
   }

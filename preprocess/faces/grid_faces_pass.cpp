@@ -96,7 +96,7 @@ class FacesPass {
   uint64_t sortBytes() const {
     const uint64_t needs = 2 * AbuttingFaces::needsOf(grid_.blocks).memory_bytes;
     if (2 * needs > job_.sort_bytes)
-      throw Error("--memory: the faces of so many blocks take {} MiB; give more, or --no-surfaces",
+      throw Error("--memory: the faces of this grid's blocks take {} MiB; give more, or add --no-surfaces",
                   (2 * needs >> 20) + 1);
     return job_.sort_bytes - needs;
   }

@@ -3,8 +3,6 @@
 // are reused and keep their capacity; or one, where two are too large, and then nothing is read ahead.
 #pragma once
 
-#include <pthread.h>
-
 #include <array>
 #include <cstdint>
 #include <exception>
@@ -13,6 +11,8 @@
 #include <utility>
 
 #include "stream/base/mutex.h"
+#include "stream/base/thread_name.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 
@@ -42,7 +42,10 @@ class ReadAhead {
     MutexLock lock(mutex_);
     given_back_ = taken_;
     changed_.notify_all();
-    while (filled_ <= taken_ && !ended_) changed_.wait(lock);
+    {
+      const TraceScope trace("wait for reading", TraceKind::kWait);
+      while (filled_ <= taken_ && !ended_) changed_.wait(lock);
+    }
     if (filled_ > taken_) return &values_[taken_++ % count_];
     if (error_) std::rethrow_exception(error_);
     return nullptr;
@@ -50,7 +53,7 @@ class ReadAhead {
 
  private:
   void fillAll() {
-    pthread_setname_np(pthread_self(), "read-ahead");
+    nameThisThread("read-ahead");
     for (uint64_t filled = 0;; ++filled) {
       {
         MutexLock lock(mutex_);
@@ -60,6 +63,7 @@ class ReadAhead {
       bool more = false;
       std::exception_ptr error;
       try {
+        const TraceScope trace("read ahead");
         more = fill_(values_[filled % count_]);
       } catch (...) {
         error = std::current_exception();

@@ -70,6 +70,25 @@ void MeshCells::append(CellKind shape, std::span<const uint64_t> of_cell) {
   hidden.push_back(0);
 }
 
+void MeshCells::appendPrism(std::span<const uint64_t> points) {
+  const size_t sides = points.size() / 2;
+  if (sides < 3 || points.size() % 2 != 0) return append(CellKind::kNone, {});
+  if (sides == 3) return append(CellKind::kWedge, points);
+  if (sides == 4) return append(CellKind::kHexahedron, points);
+  std::vector<uint64_t> stream;
+  for (const size_t end : {size_t{0}, sides}) {
+    stream.push_back(sides);
+    for (size_t n = 0; n < sides; ++n) stream.push_back(points[end + n]);
+  }
+  for (size_t n = 0; n < sides; ++n) {
+    const size_t next = n + 1 == sides ? 0 : n + 1;
+    for (const uint64_t word :
+         {uint64_t{4}, points[n], points[next], points[sides + next], points[sides + n]})
+      stream.push_back(word);
+  }
+  appendPolyhedron(sides + 2, stream);
+}
+
 bool MeshCells::appendPolyhedron(uint64_t count, std::span<const uint64_t> stream) {
   const size_t begin = corners.size(), faces_before = faces.size();
   bool good = count >= 4;

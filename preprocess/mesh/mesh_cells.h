@@ -56,6 +56,8 @@ struct MeshCells {
   void clear();
   /// A cell of any shape but kPolyhedron; further corners (of quadratic cells) are left out.
   void append(CellKind shape, std::span<const uint64_t> of_cell);
+  /// A prism over a polygon: the points of its bottom, then those of its top. kNone with fewer than 6 or an odd number.
+  void appendPrism(std::span<const uint64_t> points);
   /// A polyhedron: of each face the number of its points and the points themselves, `count` faces in all. Returns
   /// false, and appends a cell of kNone, if `stream` is not exactly that.
   bool appendPolyhedron(uint64_t count, std::span<const uint64_t> stream);

@@ -152,18 +152,18 @@ Stretch Cells::stretchAlong(int axis, uint64_t index, uint64_t count, size_t cel
   if (!is_there(1, 0)) {
     if (!is_there(0, 2)) return {};
     const double near = own[stride], far = own[2 * stride], steady = steadyGrowth(*own, near, far);
-    return {1, growthOf(*own / (steady * steady), *own / steady, near, far)};
+    return {1, stretchOf(*own / (steady * steady), *own / steady, *own, near, far).growth};
   }
   if (!is_there(0, 1)) {
     if (!is_there(2, 0)) return {};
     const double near = *(own - stride), far = *(own - 2 * stride), steady = steadyGrowth(*own, near, far);
-    return {1, growthOf(far, near, *own / steady, *own / (steady * steady))};
+    return {1, stretchOf(far, near, *own, *own / steady, *own / (steady * steady)).growth};
   }
   const double before = *(own - stride), after = own[stride];
   // Beyond the last cell is its mirror image, less the steady growth.
   const double before2 = is_there(2, 0) ? *(own - 2 * stride) : before / steadyGrowth(before, *own, after);
   const double after2 = is_there(0, 2) ? own[2 * stride] : after / steadyGrowth(after, *own, before);
-  return {stretchOf(before2, before, *own, after, after2), growthOf(before2, before, after, after2)};
+  return stretchOf(before2, before, *own, after, after2);
 }
 
 /// A length for the shape of a cell without any extent: far below the grid's, and above zero.
@@ -217,7 +217,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     if (corrections_.growth) growth[axis] = of_axis.growth;
     if (!inside) continue;
     stretch[axis] = of_axis.factor;
-    drift += kDrift * growth[axis] * jacobian[axis];
+    if (corrections_.growth) drift += static_cast<double>(of_axis.drift) * jacobian[axis];
     bend += stretch[axis] * stretch[axis] *
             (scratch_.centre[cell + cell_strides[axis]] + scratch_.centre[cell - cell_strides[axis]] -
              2.0 * scratch_.centre[cell]);

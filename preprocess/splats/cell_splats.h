@@ -1,4 +1,4 @@
-// Cells to splats, for values that stand in cells: the cell is the splat, its centre, Jacobian and volume
+// Cells to splats, for cell-centred values: the cell is the splat, its centre, Jacobian and volume
 // those of the hexahedron between its eight nodes. Nothing is averaged to nodes, there are no half cells, and
 // cells of abutting blocks abut: nothing is merged at seams.
 //

@@ -44,7 +44,8 @@ class Window {
         out_(out) {
     for (const auto& scalar : in.nodes->scalars) scalars_.push_back(scalar.data());
     for (auto& row : scratch.stretch) row.assign(i1_ - i0_, 1.0f);
-    for (auto& row : scratch.growth) row.assign(i1_ - i0_, 0.0f);
+    for (auto* rows : {&scratch.growth, &scratch.drift})
+      for (auto& row : *rows) row.assign(i1_ - i0_, 0.0f);
     scratch.has_blank.resize(rowsOf(in.window));
     const uint64_t first = i0_ - std::min<uint64_t>(i0_, kStretchReach);
     const uint64_t end = std::min(i1_ + kStretchReach, ni_);
@@ -94,6 +95,16 @@ class Window {
   NodeSplats& out_;
   size_t count_ = 0;
 };
+
+/// How far a cell's middle lies beside the line through its column, where the grid line bends at the node: the
+/// cell's two halves go straight to either neighbour, `before` and `after` away, and weigh as much as they are
+/// long.
+inline glm::dvec3 asideOf(const glm::dvec3& to_before, const glm::dvec3& to_after, double before,
+                          double after) {
+  if (!(before + after > 0)) return glm::dvec3(0.0);
+  const double share = before / (before + after);
+  return 0.25 * (share * to_after - (1 - share) * to_before);
+}
 
 bool isFace(uint64_t index, uint64_t count) {
   return index == 0 || index + 1 == count;
@@ -166,7 +177,8 @@ void Window::stretchRow(uint64_t j, uint64_t k) {
   const std::array<uint64_t, 3> index{0, j, k}, count{ni_, block.nj, block.nk};
   const std::array<ptrdiff_t, 3> strides{1, row_stride_, plane_stride_};
   for (size_t axis = 0; axis < 3; ++axis) {
-    float *out = scratch_.stretch[axis].data(), *growth = scratch_.growth[axis].data();
+    float *out = scratch_.stretch[axis].data(), *growth = scratch_.growth[axis].data(),
+          *drift = scratch_.drift[axis].data();
     const auto one_by_one = [&](uint64_t begin, uint64_t end) {
       for (uint64_t i = begin; i < end; ++i) {
         const ptrdiff_t at = row + static_cast<ptrdiff_t>(i);
@@ -174,12 +186,13 @@ void Window::stretchRow(uint64_t j, uint64_t k) {
         const Stretch stretch = stretchOfNode(at, strides[axis], axis == 0 ? i : index[axis], count[axis]);
         out[i - i0_] = stretch.factor;
         growth[i - i0_] = stretch.growth;
+        drift[i - i0_] = stretch.drift;
       }
     };
     const auto at_once = [&](uint64_t begin, uint64_t end) {
       if (begin >= end) return;
       stretchNodes({x_, y_, z_}, row + static_cast<ptrdiff_t>(begin), strides[axis], end - begin,
-                   out + (begin - i0_), growth + (begin - i0_));
+                   {out + (begin - i0_), growth + (begin - i0_), drift + (begin - i0_)});
     };
     bool whole = true;
     if (axis == 0) {
@@ -228,11 +241,12 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   for (int axis = 0; axis < 3; ++axis)
     jacobian[axis] = 0.5 * (position(at + neighbours.after[axis]) - position(at + neighbours.before[axis]));
 
-  // Where the middle of the cell is from the node, in cells. The cell reaches half way to either neighbour,
-  // at distances a and b: its middle is (b - a) / 4 away, of a length of (a + b) / 2. With one neighbour
-  // only, that is a quarter of the difference, inwards, of the splat's length: its border stays.
+  // Where the middle of the cell is from the node along its columns, in cells. The cell reaches half way to
+  // either neighbour, at distances a and b: its middle is (b - a) / 4 away, of a length of (a + b) / 2. With one
+  // neighbour only, that is a quarter of the difference, inwards, of the splat's length: its border stays.
   glm::dvec3 middle(0.0);
   glm::dvec3 bend(0.0);             // the sum of the positions' second differences
+  glm::dvec3 aside(0.0);            // from the node to the cell's middle, across the columns
   std::array<double, 3> inwards{};  // along i, j, k: 1 or -1 where the cell is a half one
   std::array<float, 3> growth{};
   double weight_factor = 1;
@@ -241,11 +255,14 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     const glm::dvec3 to_after = position(at + neighbours.after[axis]) - node.node_position;
     const double a = glm::length(to_before), b = glm::length(to_after);
     const bool whole = neighbours.before[axis] != 0 && neighbours.after[axis] != 0;
-    if (whole) bend += stretch[axis] * stretch[axis] * (to_after - to_before);
+    if (whole) {
+      bend += stretch[axis] * stretch[axis] * (to_after - to_before);
+      if (corrections_.middles) aside += asideOf(to_before, to_after, a, b);
+    }
     if (a + b > 0 && (corrections_.middles || !whole)) middle[axis] = 0.5 * (b - a) / (a + b);
     if (corrections_.growth) growth[axis] = scratch_.growth[axis][in_part];
     if (whole) {
-      middle[axis] += kDrift * growth[axis];
+      if (corrections_.growth) middle[axis] += scratch_.drift[axis][in_part];
       continue;
     }
     if (corrections_.border_codes) {
@@ -257,7 +274,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
       weight_factor *= 0.5;
     }
   }
-  node.splat.position = node.node_position + jacobian * middle;
+  node.splat.position = node.node_position + jacobian * middle + aside;
   for (int axis = 0; axis < 3; ++axis) jacobian[axis] *= stretch[axis];
   const double shrink = 1 / (stretch[0] * stretch[1] * stretch[2]);  // from the splat's volume to the cell's
 
@@ -266,9 +283,11 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
     constexpr bool kPlain = std::remove_cvref_t<decltype(frame)>::kIsPlain;
     // Where an axis was raised there is no telling a bend of the scalar from one of the coordinates.
     const bool correct_bends = kPlain && corrections_.bends;
-    glm::dvec3 bend_in_cells(0.0);
-    if constexpr (kPlain)
+    glm::dvec3 bend_in_cells(0.0), aside_in_cells(0.0);
+    if constexpr (kPlain) {
       if (correct_bends) bend_in_cells = frame.inFrame(bend);
+      aside_in_cells = frame.inFrame(aside);
+    }
     SplatScalar* value = out_.values.data() + count_ * scalars_.size();
     for (const float* f : scalars_) {
       const double here = f[at];
@@ -283,7 +302,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
         most = std::max({most, before, after});
       }
       const glm::dvec3 slope = frame.rotate(gradient * stretch);
-      double mean = here + glm::dot(gradient, middle);
+      double mean = here + glm::dot(gradient, middle) + glm::dot(slope, aside_in_cells);
       if (correct_bends)
         mean = std::clamp(mean + kBend * (second - glm::dot(slope, bend_in_cells)), least, most);
       *value++ = {mean, slope, 0.0};
@@ -331,8 +350,17 @@ void Window::cutBehindFace(NodeSplat& node, ptrdiff_t at, const Neighbours& neig
   const auto along = [&](int other) {
     return position(on_face + beside.after[other]) - position(on_face + beside.before[other]);
   };
-  const glm::dvec3 face_position = position(on_face), inward = position(at) - face_position;
+  const glm::dvec3 inward = position(at) - position(on_face);
+  glm::dvec3 face_position = position(on_face);
   glm::dvec3 normal = glm::cross(along(u), along(v));
+  if (corrections_.middles) {
+    for (int other : {u, v}) {
+      if (beside.before[other] == 0 || beside.after[other] == 0) continue;
+      const glm::dvec3 to_before = position(on_face) - position(on_face + beside.before[other]);
+      const glm::dvec3 to_after = position(on_face + beside.after[other]) - position(on_face);
+      face_position += asideOf(to_before, to_after, glm::length(to_before), glm::length(to_after));
+    }
+  }
   const double across = glm::dot(normal, inward);
   if (!(std::abs(across) > kMinAcross * glm::length(normal) * glm::length(inward))) return;
   if (across < 0) normal = -normal;
@@ -344,7 +372,7 @@ void Window::cutBehindFace(NodeSplat& node, ptrdiff_t at, const Neighbours& neig
   if (code == kNoBorder) return;
   node.border_code = code;
   node.behind_face = true;
-  node.node_position = face_position;
+  node.node_position = position(on_face);
   node.spacing = spacing(on_face, beside);
 }
 

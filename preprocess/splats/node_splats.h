@@ -3,6 +3,9 @@
 // A node's cell reaches half way to its neighbours, and the splat sits in the cell's middle. On an even grid
 // that is the node; where spacing changes quickly (spectral elements: a factor of 1.6 from cell to cell)
 // splats at the nodes themselves would draw stripes of +-30 %, and those in the middles draw a third of that.
+// Where grid lines bend, the cell has a kink at the node, and its middle lies beside the node, on the inner
+// side: by an eighth of the second difference. The faces that splats at borders are cut at move with it, to the
+// middle of the kinked face.
 //
 // A splat says what the scalar is at its middle and how it changes from there: a tangent. Tangents of the
 // neighbours do not meet where the scalar bends, and their weighted mean is off by half the second
@@ -133,8 +136,8 @@ struct NodeSplatCorrections {
 
 /// What computeNodeSplats() needs for a while; keeps its capacity.
 struct NodeScratch {
-  std::array<std::vector<float>, 3> stretch, growth;  // [axis][node of a row's part]
-  std::vector<uint8_t> has_blank;                     // [row of the window]
+  std::array<std::vector<float>, 3> stretch, growth, drift;  // [axis][node of a row's part]
+  std::vector<uint8_t> has_blank;                            // [row of the window]
 };
 
 /// Computes the splats of the nodes of `box` that are not blank. Overwrites `out` and keeps its capacity.

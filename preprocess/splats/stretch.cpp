@@ -2,17 +2,19 @@
 
 namespace curvisplat {
 
-void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, size_t count, float* factor,
-                  float* growth) {
+void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, size_t count,
+                  const StretchRow& out) {
+  float *const factor = out.factor, *const growth = out.growth, *const drift = out.drift;
   const auto last = at + static_cast<ptrdiff_t>(count);
   for (ptrdiff_t n = at; n < last; ++n) {
     // Twice the extents: their ratios count.
     const auto extent = [&](ptrdiff_t steps) {
       return nodes.squaredDistance(n + (steps - 1) * stride, n + (steps + 1) * stride);
     };
-    const double before2 = extent(-2), before = extent(-1), after = extent(1), after2 = extent(2);
-    factor[n - at] = stretchOf(before2, before, extent(0), after, after2);
-    growth[n - at] = growthOf(before2, before, after, after2);
+    const Stretch found = stretchOf(extent(-2), extent(-1), extent(0), extent(1), extent(2));
+    factor[n - at] = found.factor;
+    growth[n - at] = found.growth;
+    drift[n - at] = found.drift;
   }
 }
 
@@ -73,8 +75,7 @@ Stretch stretchOnLine(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride
   };
   const double before2 = extent(-2, extent), near_before = extent(-1, extent);
   const double near_after = extent(1, extent), after2 = extent(2, extent);
-  return {stretchOf(before2, near_before, extent(0, extent), near_after, after2),
-          growthOf(before2, near_before, near_after, after2)};
+  return stretchOf(before2, near_before, extent(0, extent), near_after, after2);
 }
 
 }  // namespace curvisplat

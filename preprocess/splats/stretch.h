@@ -1,18 +1,28 @@
-// How much longer than its cell a splat is along each lattice axis, and how cells grow along it, so that a uniform
-// medium looks uniform where the sizes of neighbouring cells differ.
+// How much longer than its cell a splat is along each lattice axis, how it is skewed there, and how far it is
+// from the cell's middle, so that a uniform medium looks uniform where the sizes of neighbouring cells differ.
 //
-// Boxes tile space, and boxes that are convolved with one common blur still sum to one everywhere. Along an
-// axis where the cell's extent is h, the kernel's variance is 0.1994 h² = h²/12 + 0.1161 h². The first part
-// is the box, the second is the blur: 58.2 % of the variance, which must vary slowly from cell to cell. So
-// the splat's extent is s h, with
+// Boxes tile space, and boxes that are convolved with one common blur still sum to one everywhere. A kernel is a
+// box, of 41.8 % of its variance, and a blur, which must vary slowly from cell to cell: so a splat is wider than
+// a cell that is small for its neighbours, and skewed where cells grow (stream/model/growth_code.h). With the
+// logarithms l of five extents along the axis's grid line, less that of the splat's own cell,
 //
-//     s² = 0.418 + 0.582 (ĥ/h)²      ĥ: the extents along the axis's grid line, smoothed: their geometric
-//                                    mean with weights 1 4 6 4 1, two passes of [1 2 1]/4 over ln h
+//     curve = l(-1) + l(1)    far_curve = l(-2) + l(2)    slope = l(1) - l(-1)    bend = l(2) - l(-2) - 2 slope
 //
-// Cells that grow by a constant factor keep their extents, whatever the factor, since their ln h is linear.
-// Only changes of the growth count: at the borders of spectral elements, say. What steady growth needs is a kernel
-// that is skewed (stream/model/growth_code.h): by g, the slope of ln h over the same five extents,
-// smoothed: their differences with weights -1 -2 0 2 1, over 8.
+//     ln s  = 0.1531 curve + 0.0828 curve² - 0.0418 bend slope         s: the splat's length over the cell's
+//     g     = slope (1/2 + 0.2892 curve - 0.0667 far_curve) + bend (0.0676 + 0.1392 curve)
+//     drift = slope (0.07 + 0.0457 curve)                              towards the larger cells, in cells
+//
+// Where cells grow by a constant factor e^g only `slope` is not zero: s is 1, and the drift 0.14 g. That makes up
+// for blurs that widen with the cells, which carry more from each into the smaller ones than they get back: a
+// medium would be 1 + 0.14 g² too dense. The other numbers are by least squares over lines in one dimension:
+// Gauss-Lobatto elements, growing elements, tanh spacing in blocks, jumps, random walks. p98/p2 of the density
+// in a uniform medium, with these, and with s² = 0.418 + 0.582 (ĥ/h)², ĥ the geometric mean with weights 1 4 6 4 1,
+// g the slope of ln h over the same five, and 0.14 g:
+//
+//     elements of 4, 5, 6, 7, 9 steps       1.013 1.020 1.021 1.025 1.028       1.047 1.050 1.054 1.057 1.063
+//     3, 5, 7 steps, elements growing 1.42  1.019 1.024 1.032                   1.035 1.056 1.062
+//     tanh, blocks of 8, three strengths    1.044 1.057 1.069                   1.079 1.107 1.139
+//     jumps by 1.5, by 2                    1.007 1.015                         1.010 1.025
 //
 // A line ends at a block's face and beside a missing cell. There the extents are mirrored, less their steady
 // growth: the smaller of the two growths next to the end, 1 where they disagree or the line is short.
@@ -21,10 +31,11 @@
 // elements (ripple of 1.34 % and 1.22 %, for 1.36 % and 1.24 % this way), makes curved boundary layers
 // thicker (the neighbours' long axes lean out of the layer) and harms cells that grow by 1.25 or more (1.1 to
 // 1.6 % on a dome of 1.25, 1.7 to 2.1 % at 1.5); the arithmetic mean of h², which has the latter fault too;
-// four passes (no gain).
+// four passes (no gain); weights that flow to smaller cells (no gain); a drift in proportion to g (gains half as much).
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -34,45 +45,51 @@ namespace curvisplat {
 /// How far along a line the samples reach that determine s, on either side.
 inline constexpr int kStretchReach = 4;
 
-/// s from the squared extents of five cells in a row, the third of which is the splat's own. Between 0.81 and
-/// 1.35; 1 where it is nearly 1 (a stored shape cannot be told from it) or a cell has no extent.
-inline float stretchOf(double before2, double before, double own, double after, double after2) {
-  constexpr float kLargest = 32;       // of (ĥ/h)⁸: what a jump of the sizes may do
-  constexpr float kNearlyOne = 4e-4f;  // of s²
-  const double per_own2 = 1 / (own * own);
-  const double near = before * after * per_own2, far = before2 * after2 * per_own2;
-  const bool usable = near > 0 && far > 0 && near < 1e30 && far < 1e30;
-  // Single precision: it is quicker, and bits do not depend on vector instructions.
-  const float near_ratio = usable ? static_cast<float>(near) : 1.0f;
-  const float far_ratio = usable ? static_cast<float>(far) : 1.0f;
-  const float smoothed8 = std::clamp(near_ratio * std::sqrt(std::sqrt(far_ratio)), 1 / kLargest, kLargest);
-  const float squared = 0.418f + 0.582f * std::sqrt(std::sqrt(smoothed8));
-  return std::abs(squared - 1) < kNearlyOne ? 1.0f : std::sqrt(squared);
-}
-
-/// g, from the same squared extents but the splat's own; 0 where a cell has no extent. To 0.001 up to growths by 1.9,
-/// which is the most it gives.
-inline float growthOf(double before2, double before, double after, double after2) {
-  constexpr float kMost = 3e4f;  // exp(16 g) of that
-  const double product = after2 * after * after, per = before2 * before * before;
-  const bool usable = product > 0 && per > 0 && product < 1e300 && per < 1e300;
-  const double exact = usable ? product / per : 1.0;
-  const auto ratio = static_cast<float>(std::clamp(exact, 1.0 / kMost, 1.0 * kMost));
-  const float growth2 = std::sqrt(std::sqrt(std::sqrt(ratio)));  // exp(2 g)
-  const float t = (growth2 - 1) / (growth2 + 1), t2 = t * t;     // tanh g
-  return t * (1 + t2 * (1.0f / 3 + t2 * (1.0f / 5 + t2 * (1.0f / 7))));
-}
-
-/// How far a splat lies from its cell's middle towards the larger cells, in the cell's length and for g = 1. Blurs that widen with
-/// the cells carry more from each into the smaller ones than they get back: a medium is 1 + 0.14 g² too dense, 2.4 % at a
-/// growth by 1.5, unless splats move by half the slope of the blur's variance (0.1161 h²) and the skew's part.
+/// How far a splat lies from its cell's middle where cells grow by e^g, in the cell's length and for g = 1.
 inline constexpr double kDrift = 0.14;
 
 /// What the extents along an axis tell of a splat.
 struct Stretch {
-  float factor = 1;  // s
+  float factor = 1;  // s: between 0.74 and 1.57
   float growth = 0;  // g
+  float drift = 0;
 };
+
+/// ln √x of a positive number, to 1e-6. Single precision: it is quicker, and bits do not depend on vector instructions.
+inline float halfLogarithm(float x) {
+  constexpr uint32_t kRootOfHalf = 0x3f3504f3;
+  const auto bits = std::bit_cast<uint32_t>(x);
+  const int32_t power = static_cast<int32_t>(bits - kRootOfHalf) >> 23;
+  const float part = std::bit_cast<float>(bits - (static_cast<uint32_t>(power) << 23));
+  const float t = (part - 1) / (part + 1), t2 = t * t;
+  return 0.34657359f * static_cast<float>(power) + t * (1 + t2 * (1.0f / 3 + t2 * (1.0f / 5)));
+}
+
+/// From the squared extents of five cells in a row, the third of which is the splat's own. s is 1 where it is nearly 1 (a stored
+/// shape cannot be told from it); all is as in an even grid where a cell has no extent.
+inline Stretch stretchOf(double before2, double before, double own, double after, double after2) {
+  constexpr float kNearlyOne = 2e-4f;
+  constexpr double kLargest = 1e6;  // of squared ratios
+  const double per_own = 1 / own;
+  const auto is_usable = [](double x) { return x > 0 && x < 1e300; };
+  const bool usable = is_usable(before2) & is_usable(before) & is_usable(own) & is_usable(after) &
+                      is_usable(after2) & is_usable(per_own);
+  const auto logarithm = [&](double extent) {
+    const double ratio = usable ? extent * per_own : 1.0;
+    return halfLogarithm(static_cast<float>(std::clamp(ratio, 1 / kLargest, kLargest)));
+  };
+  const float l0 = logarithm(before2), l1 = logarithm(before), l2 = logarithm(after), l3 = logarithm(after2);
+  const float slope = l2 - l1;
+  const float curve = std::clamp(l1 + l2, -1.25f, 1.25f), far_curve = std::clamp(l0 + l3, -2.0f, 2.0f);
+  const float bend = std::clamp((l3 - l0) - 2 * slope, -1.5f, 1.5f);
+  const float x = std::clamp(curve * (0.1531f + 0.0828f * curve) - 0.0418f * (bend * slope), -0.3f, 0.45f);
+  const float s = 1 + x * (1 + x * (1.0f / 2 + x * (1.0f / 6 + x * (1.0f / 24))));
+  return {
+      std::abs(x) < kNearlyOne ? 1.0f : s,
+      std::clamp(slope * (0.5f + 0.2892f * curve - 0.0667f * far_curve) + bend * (0.0676f + 0.1392f * curve),
+                 -0.65f, 0.65f),
+      std::clamp(slope * (0.5f * static_cast<float>(kDrift) + 0.0457f * curve), -0.125f, 0.125f)};
+}
 
 /// The steady growth per sample of squared extents, from those of the three samples next to the end of a
 /// line, the nearest first.
@@ -94,10 +111,15 @@ struct NodePositions {
   }
 };
 
-/// Of `count` nodes that follow `at` in memory, along the axis of `stride`: [count] each. Each has three neighbours on
-/// either side. The same bits as stretchOnLine() would give. Any thread; never allocates.
-void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, size_t count, float* factor,
-                  float* growth);
+/// Stretch of the nodes of a row.
+struct StretchRow {
+  float *factor, *growth, *drift;
+};
+
+/// Of `count` nodes that follow `at` in memory, along the axis of `stride`. Each has three neighbours on either side. The same
+/// bits as stretchOnLine() would give. Any thread; never allocates.
+void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, size_t count,
+                  const StretchRow& out);
 
 /// Of the node `at`, which has `before` neighbours in a row on one side and `after` on the other; more than
 /// kStretchReach count as kStretchReach.

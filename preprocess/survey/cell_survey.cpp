@@ -11,6 +11,7 @@
 #include "preprocess/grid/slabs.h"
 #include "preprocess/survey/grid_checksum.h"
 #include "stream/base/mutex.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -87,6 +88,7 @@ GridSurvey surveyCells(const NodeReader& reader, uint64_t slab_bytes, AbuttingFa
         tbb::parallel_reduce(
             tbb::blocked_range<size_t>(0, rowsOf(slab.box), kNodesPerTask / block.ni + 1), nothing,
             [&](const tbb::blocked_range<size_t>& range, GridSurvey of_range) {
+              const TraceScope trace("scan cells");
               std::vector<AbuttingFaces::Centre> ends;
               for (size_t row = range.begin(); row < range.end(); ++row) add_row(row, of_range, ends);
               if (!ends.empty()) {

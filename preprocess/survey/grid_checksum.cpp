@@ -8,6 +8,7 @@
 #include <span>
 
 #include "stream/base/checksum.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -39,6 +40,7 @@ uint64_t checksumOfGrid(const LoadedSlab& loaded, const GridBlock& block) {
   return tbb::parallel_reduce(
       tbb::blocked_range<uint64_t>(0, rowsOf(slab.box), kNodesPerTask / block.ni + 1), uint64_t{0},
       [&](const tbb::blocked_range<uint64_t>& range, uint64_t sum) {
+        const TraceScope trace("checksum");
         for (uint64_t row = range.begin(); row < range.end(); ++row) sum += of_row(row);
         return sum;
       },

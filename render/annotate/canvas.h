@@ -10,40 +10,34 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "render/annotate/cairo_surface.h"
 #include "render/image/image.h"
 #include "render/project/screen_view.h"
-#include "stream/base/error.h"
 
 namespace curvisplat {
 
 /// A transparent Cairo surface for lines and text, to be composited over an Image.
 class Canvas {
  public:
-  explicit Canvas(ImageSize size)
-      : surface_(cairo_image_surface_create(CAIRO_FORMAT_ARGB32, size.width, size.height)),
-        cairo_(cairo_create(surface_.get())) {
-    if (const cairo_status_t status = cairo_status(cairo_.get()); status != CAIRO_STATUS_SUCCESS)
-      throw Error("cannot annotate an image of {}x{} pixels: {}", size.width, size.height,
-                  cairo_status_to_string(status));
-    cairo_select_font_face(cairo_.get(), "sans", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
-    cairo_set_line_cap(cairo_.get(), CAIRO_LINE_CAP_ROUND);
+  explicit Canvas(ImageSize size) : surface_(CAIRO_FORMAT_ARGB32, size.width, size.height) {
+    cairo_select_font_face(get(), "sans", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+    cairo_set_line_cap(get(), CAIRO_LINE_CAP_ROUND);
   }
 
-  cairo_t* get() const { return cairo_.get(); }
+  cairo_t* get() const { return surface_.cairo(); }
 
   /// Calls `use` with the channels (0..1, premultiplied) of every pixel that is not transparent.
   template <typename Use>
   void forEachPixel(const Use& use) const {
-    cairo_surface_flush(surface_.get());
-    const unsigned char* const bytes = cairo_image_surface_get_data(surface_.get());
-    const int stride = cairo_image_surface_get_stride(surface_.get());
-    const int width = cairo_image_surface_get_width(surface_.get());
-    const int height = cairo_image_surface_get_height(surface_.get());
+    cairo_surface_t* const surface = surface_.flushed();
+    const unsigned char* const bytes = cairo_image_surface_get_data(surface);
+    const int stride = cairo_image_surface_get_stride(surface);
+    const int width = cairo_image_surface_get_width(surface);
+    const int height = cairo_image_surface_get_height(surface);
     for (int y = 0; y < height; ++y) {
       // Cairo's ARGB32: 32-bit words in the machine's byte order, alpha in the highest byte.
       const auto* const row = reinterpret_cast<const uint32_t*>(bytes + static_cast<ptrdiff_t>(y) * stride);
@@ -57,12 +51,7 @@ class Canvas {
   }
 
  private:
-  struct Destroy {
-    void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
-    void operator()(cairo_t* cairo) const { cairo_destroy(cairo); }
-  };
-  std::unique_ptr<cairo_surface_t, Destroy> surface_;
-  std::unique_ptr<cairo_t, Destroy> cairo_;
+  CairoSurface surface_;
 };
 
 inline glm::dvec3 inkFor(const glm::vec4& background) {

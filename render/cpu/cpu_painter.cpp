@@ -16,6 +16,7 @@
 #include "render/cpu/tile.h"
 #include "render/cpu/tile_windows.h"
 #include "stream/base/stage_timer.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -154,11 +155,12 @@ void CpuPainter::State::allocate(ImageSize wanted, unsigned threads_, size_t bat
 }
 
 void CpuPainter::State::paintBatch() {
-  const StageTimer timer(draw_s);
+  const StageTimer timer(draw_s, "paint batch", TraceKind::kStage);
   arena->execute([this] { bins->sort(); });
   forTiles([this](size_t number) {
     const std::span<const uint32_t> order = bins->tile(static_cast<int>(number));
     if (order.empty()) return;
+    const TraceScope trace("paint tile");
     const auto columns = static_cast<size_t>(bins->columns());
     const BlockMask left = paintTile({tile(number), static_cast<int>(number % columns) * kTileSide,
                                       static_cast<int>(number / columns) * kTileSide,
@@ -175,7 +177,7 @@ void CpuPainter::draw(std::span<const ScreenSplat> splats) {
   while (!splats.empty()) {
     size_t added;
     {
-      const StageTimer timer(state.upload_s);
+      const StageTimer timer(state.upload_s, "bin splats");
       added = state.bins->add(splats);
     }
     splats = splats.subspan(added);
@@ -200,10 +202,11 @@ bool CpuPainter::hides(const ScreenBox& box) const {
 Image CpuPainter::end() {
   State& state = *state_;
   if (!state.bins->empty()) state.paintBatch();
-  const StageTimer timer(state.draw_s);
+  const StageTimer timer(state.draw_s, "finish picture", TraceKind::kStage);
   Image image(state.size);
   const auto columns = static_cast<size_t>(state.bins->columns());
   state.forTiles([&](size_t number) {
+    const TraceScope trace("finish tile");
     const float* tile = state.tile(number);
     const TileWindows* const windows = state.windows.tile(number);
     const int x0 = static_cast<int>(number % columns) * kTileSide;

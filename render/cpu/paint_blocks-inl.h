@@ -52,6 +52,11 @@ struct Ellipse {
   SkewPolynomial skew;
 };
 
+/// Where a block's first pixel is in the tile.
+struct Corner {
+  float x, y;
+};
+
 /// 1 - exp(-x), x >= 0, over x: relative error below 1e-6. `kThin`: for x <= ln 2 / 2, with the same bits.
 template <bool kThin>
 HWY_INLINE V absorbedOf(V x) {
@@ -142,12 +147,12 @@ HWY_INLINE bool isSaturated(V transmittance) {
   return hn::AllTrue(Floats(), hn::Lt(transmittance, hn::Set(Floats(), kSaturated)));
 }
 
-/// One block. `x`, `y`: of its first pixel, in the tile. Whether it is saturated now.
+/// One block. Whether it is saturated now.
 template <bool kFitted, bool kThin>
 HWY_INLINE bool paintBlock(const Ellipse& e, const Shade& shade, const float* HWY_RESTRICT footprint,
-                           float* HWY_RESTRICT block, float x, float y) {
+                           float* HWY_RESTRICT block, Corner corner) {
   const Floats d;
-  const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
+  const V from_x = hn::Set(d, corner.x - e.x), from_y = hn::Set(d, corner.y - e.y);
   V most = hn::Zero(d);
   for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
     const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
@@ -183,9 +188,9 @@ HWY_INLINE V lookUp(const Row& row, hn::Vec<Ints> n) {
 
 /// One block, by a polyline. Whether it is saturated now.
 HWY_INLINE bool paintBlock(const Ellipse& e, const Polyline& line, const Along& along,
-                           const float* HWY_RESTRICT footprint, float* HWY_RESTRICT block, float x, float y) {
+                           const float* HWY_RESTRICT footprint, float* HWY_RESTRICT block, Corner corner) {
   const Floats d;
-  const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
+  const V from_x = hn::Set(d, corner.x - e.x), from_y = hn::Set(d, corner.y - e.y);
   V most = hn::Zero(d);
   for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
     const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
@@ -212,21 +217,28 @@ struct LookedUp {
   alignas(64) float integrals[4 * kLanes];  // of one pixel after the other
 };
 
-HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const ShadingTable& table,
-                            const float* HWY_RESTRICT footprint, float x, float y, LookedUp& out) {
+/// What pixels are looked up in: the integrals of the classification, and footprintPolynomial().
+struct Tables {
+  const ShadingTable& shading;
+  const float* footprint;
+};
+
+HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Tables& tables, Corner corner,
+                            LookedUp& out) {
+  const float* HWY_RESTRICT footprint = tables.footprint;
   const Floats d;
-  const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
+  const V from_x = hn::Set(d, corner.x - e.x), from_y = hn::Set(d, corner.y - e.y);
   Intervals intervals;
   for (size_t lane = 0; lane < kLanes; lane += hn::Lanes(d)) {
     const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
                                    hn::Add(hn::Load(d, kLaneY + lane), from_y));
     const V t = hn::MulAdd(hn::Set(d, scalar.tp), pixels.p, hn::Mul(hn::Set(d, scalar.tq), pixels.q));
     hn::Store(pixels.depth, d, out.depth.at + lane);
-    locate(table, hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean)),
+    locate(tables.shading, hn::MulAdd(hn::Set(d, scalar.reach), t, hn::Set(d, scalar.mean)),
            hn::Set(d, scalar.half_width), lane, intervals);
     hn::Store(hn::Load(d, intervals.scale.at + lane), d, out.scale.at + lane);
   }
-  integrate(table, intervals, kLanes, out.integrals);
+  integrate(tables.shading, intervals, kLanes, out.integrals);
   return true;
 }
 

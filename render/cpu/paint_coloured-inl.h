@@ -164,9 +164,9 @@ struct Coloured {
 
 /// One block. Whether it is saturated now.
 HWY_NOINLINE bool paintBlock(Coloured& splat, const Window& window, const float* HWY_RESTRICT footprint,
-                             float* HWY_RESTRICT block, float x, float y) {
+                             float* HWY_RESTRICT block, Corner corner) {
   const Floats d;
-  const V from_x = hn::Set(d, x - splat.e.x), from_y = hn::Set(d, y - splat.e.y);
+  const V from_x = hn::Set(d, corner.x - splat.e.x), from_y = hn::Set(d, corner.y - splat.e.y);
   const Cuts cuts{splat.faces, splat.line, window};
   Intervals of_opacity, of_colour;
   Row depths;
@@ -248,7 +248,7 @@ HWY_NOINLINE BlockMask paintColoured(const TileWork& work, BlockMask blocks, con
   while (blocks != 0) {
     const int block = takeFirst(blocks);
     const auto in_window = [&](float* at_block, const Window& window) HWY_ATTR {
-      return paintBlock(splat, window, footprint, at_block, xOf(block), yOf(block));
+      return paintBlock(splat, window, footprint, at_block, cornerOf(block));
     };
     if (windowed ? paintWindows(work, block, in_window) : in_window(work.tile + block * kBlockFloats, {}))
       saturated |= BlockMask{1} << block;

@@ -116,13 +116,19 @@ HWY_INLINE Interval intervalAt(const Cuts& cuts, const Pixels& pixels, size_t la
   return {lo, hn::Max(hi, lo)};
 }
 
-/// One block of a splat that is cut, by one parabola, or one colour; what is left moves s by
-/// `per_deviation` a deviation. Whether it is saturated now.
+/// The shade of a splat that is cut: what is left of the depths moves s by `per_deviation` a deviation.
+struct CutShade {
+  Shade whole;
+  float per_deviation;
+};
+
+/// One block of a splat that is cut, by one parabola, or one colour. Whether it is saturated now.
 template <bool kFitted>
-HWY_INLINE bool paintBlock(const Ellipse& e, const Cuts& cuts, const Shade& shade, float per_deviation,
-                           const float* HWY_RESTRICT footprint, float* HWY_RESTRICT block, float x, float y) {
+HWY_INLINE bool paintBlock(const Ellipse& e, const Cuts& cuts, const CutShade& cut_shade,
+                           const float* HWY_RESTRICT footprint, float* HWY_RESTRICT block, Corner corner) {
+  const Shade& shade = cut_shade.whole;
   const Floats d;
-  const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
+  const V from_x = hn::Set(d, corner.x - e.x), from_y = hn::Set(d, corner.y - e.y);
   V most = hn::Zero(d);
   for (size_t lane = 0; lane < kBlockPixels; lane += hn::Lanes(d)) {
     const Pixels pixels = pixelsAt(e, footprint, hn::Add(hn::Load(d, kLaneX + lane), from_x),
@@ -135,7 +141,7 @@ HWY_INLINE bool paintBlock(const Ellipse& e, const Cuts& cuts, const Shade& shad
     }
     V value[4];
     if constexpr (kFitted) {
-      const V s = hn::MulAdd(left.mean(share), hn::Set(d, per_deviation), shade.s.at(pixels));
+      const V s = hn::MulAdd(left.mean(share), hn::Set(d, cut_shade.per_deviation), shade.s.at(pixels));
       for (int c = 0; c < 4; ++c)
         value[c] = hn::MulAdd(hn::MulAdd(hn::Set(d, shade.bend[c]), s, hn::Set(d, shade.by[c])), s,
                               hn::Set(d, shade.at[c]));
@@ -148,11 +154,11 @@ HWY_INLINE bool paintBlock(const Ellipse& e, const Cuts& cuts, const Shade& shad
 }
 
 /// Of a splat that is cut. Whether anything is left of it in the block.
-HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Cuts& cuts,
-                            const ShadingTable& table, const float* HWY_RESTRICT footprint, float x, float y,
-                            LookedUp& out) {
+HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Cuts& cuts, const Tables& tables,
+                            Corner corner, LookedUp& out) {
   const Floats d;
-  const V from_x = hn::Set(d, x - e.x), from_y = hn::Set(d, y - e.y);
+  const float* HWY_RESTRICT footprint = tables.footprint;
+  const V from_x = hn::Set(d, corner.x - e.x), from_y = hn::Set(d, corner.y - e.y);
   const Faces& faces = cuts.faces;
   Intervals intervals;
   V most = hn::Zero(d);
@@ -170,11 +176,11 @@ HWY_INLINE bool lookUpBlock(const Ellipse& e, const Scalar& scalar, const Cuts& 
     const float lost = 3 * faces.mean_per_deviation * faces.mean_per_deviation;
     const V width2 = hn::NegMulAdd(hn::Set(d, lost), left.lostVariance(share, moved),
                                    hn::Set(d, scalar.half_width * scalar.half_width));
-    locate(table, mean, hn::Sqrt(hn::Max(width2, hn::Zero(d))), lane, intervals);
+    locate(tables.shading, mean, hn::Sqrt(hn::Max(width2, hn::Zero(d))), lane, intervals);
     hn::Store(hn::Load(d, intervals.scale.at + lane), d, out.scale.at + lane);
   }
   if (hn::AllTrue(d, hn::Eq(most, hn::Zero(d)))) return false;
-  integrate(table, intervals, kLanes, out.integrals);
+  integrate(tables.shading, intervals, kLanes, out.integrals);
   return true;
 }
 
@@ -217,16 +223,16 @@ HWY_INLINE DepthLine depthLineOf(const ScreenSplat* record) {
 }
 
 /// A splat that is cut, and has the number `number`. Returns those of `blocks` that are saturated then.
-HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const Visits& visits,
-                                const Fits& fits, size_t n, size_t number, const float* footprint) {
+HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const Visit& visit, size_t number,
+                                const float* footprint) {
   const ScreenSplat& splat = work.splats[number];
   const SplatRecords records = SplatRecords::beside(&splat, -1, false);
   Faces faces = facesOf(records.cut);
   const DepthLine line = depthLineOf(records.depth);
   if (records.depth) faces.mean_per_deviation = ScreenDepth::of(*records.depth).correlation;
   const bool windowed = records.depth && work.windows;
-  const Ellipse e = visits.ellipse(n);
-  Scalar scalar = visits.scalar(n);
+  const Ellipse e = visit.ellipse();
+  Scalar scalar = visit.scalar();
   faces.mean_per_deviation = faces.mean_per_deviation * scalar.half_width * (1 / kSqrt3);
   if (work.shading.per_pixel)
     scalar.reach = kSupport * std::sqrt(splat.slope0 * splat.slope0 + splat.slope1 * splat.slope1);
@@ -242,34 +248,32 @@ HWY_NOINLINE BlockMask paintCut(const TileWork& work, BlockMask blocks, const Vi
         saturated |= BlockMask{1} << block;
     }
   };
-  const int32_t fit = fits.fit.at[n];
+  const int32_t fit = visit.fit();
   // On a logarithmic scale there is no bound of what a narrower distribution sees.
   if (fit != kOther && !(work.table.logScale() && work.shading.per_pixel)) {
-    Shade shade = shadeOf(fits, n);
-    const float inverse = 1 / std::max(visits.pieces.reach.at[n], 1e-37f);
-    shade.s = {0, inverse * scalar.reach * scalar.tp, inverse * scalar.reach * scalar.tq};
-    const float per_deviation = inverse * faces.mean_per_deviation * ScreenCut::kReach;
+    const float inverse = 1 / std::max(visit.all.pieces.reach.at[visit.n], 1e-37f);
+    CutShade shade{shadeOf(visit.fits, visit.n), inverse * faces.mean_per_deviation * ScreenCut::kReach};
+    shade.whole.s = {0, inverse * scalar.reach * scalar.tp, inverse * scalar.reach * scalar.tq};
     if (fit == kConstant)
-      paint([&](float* at, const Cuts& cuts, int block) HWY_ATTR {
-        return paintBlock<false>(e, cuts, shade, per_deviation, footprint, at, xOf(block), yOf(block));
-      });
+      paint([&](float* at, const Cuts& cuts, int block)
+                HWY_ATTR { return paintBlock<false>(e, cuts, shade, footprint, at, cornerOf(block)); });
     else
-      paint([&](float* at, const Cuts& cuts, int block) HWY_ATTR {
-        return paintBlock<true>(e, cuts, shade, per_deviation, footprint, at, xOf(block), yOf(block));
-      });
+      paint([&](float* at, const Cuts& cuts, int block)
+                HWY_ATTR { return paintBlock<true>(e, cuts, shade, footprint, at, cornerOf(block)); });
     return saturated;
   }
-  const Lit lit = visits.lit(work, n);
+  const Tables tables{work.table, footprint};
+  const Lit lit = visit.all.lit(work, visit.n);
   if (windowed) {
     paint([&](float* at, const Cuts& cuts, int block) HWY_ATTR {
       LookedUp looked_up;
-      return lookUpBlock(e, scalar, cuts, work.table, footprint, xOf(block), yOf(block), looked_up) &&
+      return lookUpBlock(e, scalar, cuts, tables, cornerOf(block), looked_up) &&
              paintLookedUp(looked_up, lit, at);
     });
     return saturated;
   }
-  return paintLookedUpBlocks(work, blocks, lit, [&](float x, float y, LookedUp& out) HWY_ATTR {
-    return lookUpBlock(e, scalar, Cuts{faces, line, {}}, work.table, footprint, x, y, out);
+  return paintLookedUpBlocks(work, blocks, lit, [&](Corner corner, LookedUp& out) HWY_ATTR {
+    return lookUpBlock(e, scalar, Cuts{faces, line, {}}, tables, corner, out);
   });
 }
 

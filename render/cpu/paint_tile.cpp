@@ -31,8 +31,7 @@ HWY_INLINE BlockMask paintBlocks(const TileWork& work, BlockMask blocks, const E
   BlockMask saturated = 0;
   while (blocks != 0) {
     const int block = takeFirst(blocks);
-    if (paintBlock<kFitted, kThin>(e, shade, footprint, work.tile + block * kBlockFloats, xOf(block),
-                                   yOf(block)))
+    if (paintBlock<kFitted, kThin>(e, shade, footprint, work.tile + block * kBlockFloats, cornerOf(block)))
       saturated |= BlockMask{1} << block;
   }
   return saturated;
@@ -40,8 +39,8 @@ HWY_INLINE BlockMask paintBlocks(const TileWork& work, BlockMask blocks, const E
 
 HWY_NOINLINE BlockMask paintPixelByPixel(const TileWork& work, BlockMask blocks, const Ellipse& e,
                                          const Scalar& scalar, const Lit& lit, const float* footprint) {
-  return paintLookedUpBlocks(work, blocks, lit, [&](float x, float y, LookedUp& out) HWY_ATTR {
-    return lookUpBlock(e, scalar, work.table, footprint, x, y, out);
+  return paintLookedUpBlocks(work, blocks, lit, [&](Corner corner, LookedUp& out) HWY_ATTR {
+    return lookUpBlock(e, scalar, {work.table, footprint}, corner, out);
   });
 }
 
@@ -57,24 +56,25 @@ HWY_NOINLINE BlockMask paintPolyline(const TileWork& work, BlockMask blocks, con
   BlockMask saturated = 0;
   while (blocks != 0) {
     const int block = takeFirst(blocks);
-    if (paintBlock(e, line, s, footprint, work.tile + block * kBlockFloats, xOf(block), yOf(block)))
+    if (paintBlock(e, line, s, footprint, work.tile + block * kBlockFloats, cornerOf(block)))
       saturated |= BlockMask{1} << block;
   }
   return saturated;
 }
 
-HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, const Visits& visits,
-                                const Fits& fits, size_t n, const float* footprint) {
-  const Ellipse e = visits.ellipse(n);
+HWY_INLINE BlockMask paintVisit(const TileWork& work, BlockMask blocks, const Visit& visit,
+                                const float* footprint) {
+  const auto& [visits, fits, n] = visit;
+  const Ellipse e = visit.ellipse();
   // A skewed footprint may be a tenth higher than F(0).
   const bool thin = e.amplitude * kPeak * fits.most.at[n] < (e.skewed ? 0.3f : 0.34f);
-  if (fits.fit.at[n] == kConstant) {
+  if (visit.fit() == kConstant) {
     const Shade shade = shadeOf(fits, n);
     if (thin) return paintBlocks<false, true>(work, blocks, e, shade, footprint);
     return paintBlocks<false, false>(work, blocks, e, shade, footprint);
   }
-  const Scalar scalar = visits.scalar(n);
-  if (fits.fit.at[n] == kParabola) {
+  const Scalar scalar = visit.scalar();
+  if (visit.fit() == kParabola) {
     Shade shade = shadeOf(fits, n);
     shade.s = along(visits.pieces, n, scalar, -1, 1);
     if (thin) return paintBlocks<true, true>(work, blocks, e, shade, footprint);
@@ -128,9 +128,10 @@ BlockMask paintTile(const TileWork& work) {
                                footprint);
         continue;
       }
+      const Visit visit{visits, fits, n};
       open &= ~(visits.cut.at[n] != 0
-                    ? paintCut(work, blocks, visits, fits, n, static_cast<size_t>(numbers.at[n]), footprint)
-                    : paintVisit(work, blocks, visits, fits, n, footprint));
+                    ? paintCut(work, blocks, visit, static_cast<size_t>(numbers.at[n]), footprint)
+                    : paintVisit(work, blocks, visit, footprint));
     }
   }
   return open;

@@ -222,14 +222,12 @@ HWY_INLINE int takeFirst(BlockMask& blocks) {
   return first;
 }
 
-HWY_INLINE float xOf(int block) {
-  return static_cast<float>(block % kTileBlocks * kBlockSide);
-}
-HWY_INLINE float yOf(int block) {
-  return static_cast<float>(block / kTileBlocks * kBlockSide);
+HWY_INLINE Corner cornerOf(int block) {
+  return {static_cast<float>(block % kTileBlocks * kBlockSide),
+          static_cast<float>(block / kTileBlocks * kBlockSide)};
 }
 
-/// With a look-up for every pixel: look_up(x, y, where to), false for nothing. A few blocks are looked up
+/// With a look-up for every pixel: look_up(corner, where to), false for nothing. A few blocks are looked up
 /// before they are blended: what was written as many narrow vectors is not ready at once to be read as a wide
 /// one.
 template <typename LookUp>
@@ -243,7 +241,7 @@ HWY_INLINE BlockMask paintLookedUpBlocks(const TileWork& work, BlockMask blocks,
     int count = 0;
     while (blocks != 0 && count < kAtOnce) {
       const int block = numbers[count] = takeFirst(blocks);
-      if (look_up(xOf(block), yOf(block), looked_up[count])) ++count;
+      if (look_up(cornerOf(block), looked_up[count])) ++count;
     }
     for (int n = 0; n < count; ++n)
       if (paintLookedUp(looked_up[n], lit, work.tile + numbers[n] * kBlockFloats))
@@ -251,6 +249,17 @@ HWY_INLINE BlockMask paintLookedUpBlocks(const TileWork& work, BlockMask blocks,
   }
   return saturated;
 }
+
+/// Visit `n` of sixteen.
+struct Visit {
+  const Visits& all;
+  const Fits& fits;
+  size_t n;
+
+  HWY_INLINE Ellipse ellipse() const { return all.ellipse(n); }
+  HWY_INLINE Scalar scalar() const { return all.scalar(n); }
+  HWY_INLINE int32_t fit() const { return fits.fit.at[n]; }
+};
 
 HWY_INLINE Shade shadeOf(const Fits& fits, size_t n) {
   Shade shade;

@@ -7,6 +7,7 @@
 
 #include "render/cpu/tile.h"
 #include "render/project/kernel.h"
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 namespace {
@@ -111,6 +112,7 @@ void SplatBins::sort() {
   std::fill(piece_ends_.begin(), piece_ends_.end(), 0);
   const auto forPieces = [&](const auto& visit) {
     tbb::parallel_for(size_t{0}, size_t{pieces_}, [&](size_t piece) {
+      const TraceScope trace("sort bins");
       uint32_t* ends = &piece_ends_[piece * tiles];
       forPiece(piece, [&](size_t tile, size_t n) { visit(ends[tile], n); });
     });

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "render/export/gaussian_glb.h"
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 
@@ -128,8 +129,8 @@ std::vector<std::byte> gzip(std::span<const std::byte> bytes) {
 }  // namespace
 
 void checkGaussianName(const std::filesystem::path& path) {
-  if (path.extension() != ".ply" && path.extension() != ".spz")
-    throw UsageError("{}: expected a name that ends in .ply or .spz", path.string());
+  if (path.extension() != ".ply" && path.extension() != ".spz" && path.extension() != ".glb")
+    throw UsageError("{}: expected a name that ends in .ply, .spz or .glb", path.string());
 }
 
 SpzFrame spzFrameOf(std::span<const GaussianSplat> splats) {
@@ -146,7 +147,9 @@ SpzFrame spzFrameOf(std::span<const GaussianSplat> splats) {
 
 void writeGaussians(std::span<const GaussianSplat> splats, const std::filesystem::path& path) {
   checkGaussianName(path);
-  const std::vector<std::byte> bytes = path.extension() == ".ply" ? plyOf(splats) : gzip(spzBytes(splats));
+  const std::vector<std::byte> bytes = path.extension() == ".ply"   ? plyOf(splats)
+                                       : path.extension() == ".glb" ? glbOf(splats)
+                                                                    : gzip(spzBytes(splats));
   writeFileDurably(path, bytes);
 }
 

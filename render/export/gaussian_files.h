@@ -18,6 +18,7 @@ void checkGaussianName(const std::filesystem::path& path);
 ///          (zero), f_dc (colour), opacity (logit), scale (logarithm), rot (w, x, y, z); 68 bytes a splat
 ///   .spz   Niantic's packed format, version 2, compressed with gzip: positions to 1/4096 of a unit, scales in
 ///          steps of 6 %; about 16 bytes a splat. Positions are shifted and scaled to fit, see `SpzFrame`
+///   .glb   binary glTF with KHR_gaussian_splatting (gaussian_glb.h); 60 bytes a splat
 void writeGaussians(std::span<const GaussianSplat> splats, const std::filesystem::path& path);
 
 /// How .spz files are scaled: a position p is stored as (p - centre) * scale, so that the data's box is 1,000 units wide.

@@ -15,8 +15,8 @@ namespace curvisplat {
 namespace {
 
 template <typename Work>
-auto timed(double& seconds, const Work& work) {
-  const StageTimer timer(seconds);
+auto timed(double& seconds, const char* name, const Work& work) {
+  const StageTimer timer(seconds, name);
   return work();
 }
 
@@ -32,9 +32,9 @@ struct FrameRenderer::State {
   Image render(const Camera& camera, const FrameOptions& options, FrameStatistics& statistics,
                Progress* progress) {
     statistics = {};
-    const StageTimer total(statistics.total_s);
+    const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
     FramePlan plan =
-        timed(statistics.plan_s, [&] { return planner.plan(camera, options, pipeline.order()); });
+        timed(statistics.plan_s, "plan", [&] { return planner.plan(camera, options, pipeline.order()); });
     std::vector<uint32_t> owners;
     if (options.ranks) owners = planner.share(plan, options);
     pipeline.drawLayers(plan, options, statistics);
@@ -48,8 +48,9 @@ struct FrameRenderer::State {
     FrameOptions clear = options;
     clear.background = glm::vec4(0.0f);
     statistics = {};
-    const StageTimer total(statistics.total_s);
-    FramePlan plan = timed(statistics.plan_s, [&] { return planner.plan(camera, clear, pipeline.order()); });
+    const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
+    FramePlan plan =
+        timed(statistics.plan_s, "plan", [&] { return planner.plan(camera, clear, pipeline.order()); });
     std::vector<uint32_t> owners;
     if (options.ranks) owners = planner.share(plan, clear);
     pipeline.drawLayers(plan, clear, statistics);
@@ -102,8 +103,8 @@ struct FrameRenderer::State {
                       FrameStatistics& statistics, bool& is_final, Progress* progress) {
     CURVISPLAT_CHECK(!options.ranks && "one process draws a quick picture");
     statistics = {};
-    const StageTimer total(statistics.total_s);
-    QuickPlan quick = timed(statistics.plan_s,
+    const StageTimer total(statistics.total_s, "frame", TraceKind::kStage);
+    QuickPlan quick = timed(statistics.plan_s, "plan",
                             [&] { return planner.planQuick(camera, options, limits, pipeline.order()); });
     is_final = quick.isFinal();
     pipeline.drawLayers(quick.plan, options, statistics);

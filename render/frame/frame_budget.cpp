@@ -5,6 +5,7 @@
 
 #include "render/frame/sweep_buffer.h"
 #include "render/project/projection.h"
+#include "stream/base/byte_text.h"
 #include "stream/base/error.h"
 #include "stream/model/brick.h"
 #include "stream/model/splats.h"
@@ -41,11 +42,8 @@ FrameBudget FrameBudget::of(uint64_t memory_bytes, const Fixed& fixed, unsigned 
   const uint64_t worker_bytes = kWorkerBytes + (fixed.two_scalars ? kSecondScalarBytes : 0);
   const uint64_t least = exact + pools + worker_bytes;
   if (memory_bytes < least)
-    throw UsageError(
-        "{:.4g} MiB of memory are too little for {}x{} pixels of this cache; give at least {} MiB with "
-        "--memory",
-        static_cast<double>(memory_bytes) / (1 << 20), fixed.size.width, fixed.size.height,
-        (least >> 20) + 1);
+    throw UsageError("--memory {}: too little for {}x{} pixels of this cache; give at least {} MiB",
+                     byteText(memory_bytes), fixed.size.width, fixed.size.height, (least >> 20) + 1);
   const uint64_t part = memory_bytes / kParts;
   const uint64_t rounded = (exact + part - 1) / part * part;
   const unsigned wanted = threads ? threads : std::max(1u, std::thread::hardware_concurrency());

@@ -24,21 +24,31 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kBandBytes = 32 << 20;  // of surfaces' samples
+constexpr uint64_t kSampleTileBytes = 256 << 10;  // of a thread
 
 PaintResources resourcesOf(const FrameOptions& options) {
   return {.threads = options.threads};
 }
 
-/// About what a scene takes: its meshes and their vertices on the screen, samples of slices, bands of samples of
-/// surfaces, and a layer and a half a pixel with a window behind it. The same for all pictures of one size.
+unsigned threadsOf(const FrameOptions& options) {
+  return options.threads ? options.threads : std::max(1u, std::thread::hardware_concurrency());
+}
+
+/// About what a scene takes: its meshes, their vertices on the screen and their triangles in tiles, samples of slices
+/// and of surfaces, and a layer and a half a pixel with a window behind it. The same for all pictures of one size.
 uint64_t sceneBytes(const FrameOptions& options) {
   if (!options.scene || options.scene->empty()) return 0;
-  constexpr uint64_t kLayerBytes = 56, kSliceBytes = 24, kVertexBytes = 12;
-  uint64_t bytes =
-      kBandBytes + options.size.pixels() * (kLayerBytes + kSliceBytes * options.scene->slices.size());
+  const uint64_t slice_bytes = options.scene->slices_by_function ? 48 : 24;  // of two scalars
+  const auto is_translucent = [](const auto& surface) { return !surface.opacity.opaque(); };
+  const bool peels =
+      std::any_of(options.scene->surfaces.begin(), options.scene->surfaces.end(), is_translucent) ||
+      std::any_of(options.scene->grid_surfaces.begin(), options.scene->grid_surfaces.end(), is_translucent);
+  constexpr uint64_t kLayerBytes = 56, kVertexBytes = 12, kTriangleBytes = 8;
+  uint64_t bytes = kSampleTileBytes * (peels ? PixelLayers::kMostLayers : 1) * threadsOf(options) +
+                   options.size.pixels() * (kLayerBytes + slice_bytes * options.scene->slices.size());
   for (const Surface& surface : options.scene->surfaces)
-    bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size();
+    bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size() +
+             kTriangleBytes * surface.mesh->triangles.size();
   if (!options.scene->grid_surfaces.empty())
     bytes += FaceMeshes::bytes(*options.scene, options.size.pixels());
   return bytes;
@@ -111,7 +121,8 @@ FramePipeline::~FramePipeline() {
 
 void FramePipeline::makePools(const FrameOptions& options) {
   // Steps differ in this; the pools stay.
-  least_pager_bytes_ = std::max(least_pager_bytes_, BrickPager::leastBufferBytes(cache_, variable_));
+  least_pager_bytes_ =
+      std::max(least_pager_bytes_, BrickPager::leastBufferBytes(cache_, {variable_, coloured_by_}));
   const FrameBudget::Fixed fixed{planner_.bytes(),
                                  least_pager_bytes_,
                                  backend_->bytes(options.size, resourcesOf(options)) + sceneBytes(options),
@@ -171,41 +182,51 @@ bool FramePipeline::beginSlab(const FramePlan& plan, const FrameOptions& options
 
 void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics) {
   if (!options.scene || (options.scene->empty() && options.scene->drawsSplats())) return;
-  const VariableInfo& info = cache_.manifest().variables[coloured_by_.value_or(variable_)];
   const ScreenView& view = plan.settings.view;
-  std::vector<std::unique_ptr<SliceSampler>> samplers;
+  const auto samplerOf = [&](const SlicePlan& slice, size_t variable) {
+    const VariableInfo& info = cache_.manifest().variables[variable];
+    return std::make_unique<SliceSampler>(view, slice.plane, info.min, info.max, plan.settings.borders);
+  };
+  std::vector<std::unique_ptr<SliceSampler>> samplers, of_opacity;
   for (const SlicePlan& slice : plan.slices) {
-    samplers.push_back(
-        std::make_unique<SliceSampler>(view, slice.plane, info.min, info.max, plan.settings.borders));
+    samplers.push_back(samplerOf(slice, coloured_by_.value_or(variable_)));
+    if (coloured_by_ && options.scene->slices_by_function) of_opacity.push_back(samplerOf(slice, variable_));
     if (!samplers.back()->isSeen()) continue;
-    sampleSlice(shareOf(slice, options), *samplers.back(), options, statistics);
-    if (options.ranks) samplers.back()->addOthers(*options.ranks);
+    SliceSampler* const opacities = of_opacity.empty() ? nullptr : of_opacity.back().get();
+    const SlicePlan share = shareOf(slice, options);
+    sampleSlice({cache_, share.parts, *samplers.back(), opacities, options.keep_going}, options, statistics);
+    if (!options.ranks) continue;
+    samplers.back()->addOthers(*options.ranks);
+    if (opacities) opacities->addOthers(*options.ranks);
   }
-  const StageTimer timer(statistics.surfaces_s);
+  const StageTimer timer(statistics.surfaces_s, "draw surfaces");
   const glm::dvec3 middle = 0.5 * (cache_.manifest().lower + cache_.manifest().upper);
-  const SceneLook look{planner_.colours(), options.light, plan.settings.clip_planes,
-                       view.projection == Projection::kPerspective ? 0 : view.viewFromData(middle).z};
+  std::optional<ColourTable> opacities;
+  if (options.scene->slices_by_function) opacities.emplace(planner_.transferFunction());
+  const SceneLook look{planner_.colours(),
+                       options.light,
+                       plan.settings.clip_planes,
+                       view.projection == Projection::kPerspective ? 0 : view.viewFromData(middle).z,
+                       opacities ? &*opacities : nullptr,
+                       of_opacity};
   std::shared_ptr<const PixelLayers> layers;
-  const unsigned wanted =
-      options.threads ? options.threads : std::max(1u, std::thread::hardware_concurrency());
-  tbb::task_arena arena(std::min(static_cast<int>(wanted), tbb::info::default_concurrency()));
+  tbb::task_arena arena(std::min(static_cast<int>(threadsOf(options)), tbb::info::default_concurrency()));
   arena.execute([&] {
     const SurfaceScene scene = face_meshes_.withMeshes(options.scene, view, options.lod_pixels);
-    layers = std::make_shared<PixelLayers>(layersOf(scene, view, samplers, look, kBandBytes));
+    layers = std::make_shared<PixelLayers>(layersOf(scene, view, samplers, look));
   });
   planner_.addLayers(plan, std::move(layers), options);
 }
 
-void FramePipeline::sampleSlice(const SlicePlan& slice, SliceSampler& sampler, const FrameOptions& options,
+void FramePipeline::sampleSlice(const SliceWork& work, const FrameOptions& options,
                                 FrameStatistics& statistics) {
   makePools(options);
-  const SliceWork work{cache_, slice.parts, sampler, options.keep_going};
   const std::stop_callback on_stop(options.stop, [this] { stopStages(); });
   try {
     {
       const MutexLock lock(mutex_);
       throwIfStopped(options.stop);
-      pools_->source.start(slice.parts);
+      pools_->source.start(work.parts);
       pools_->workers.startSampling(work);
     }
     pools_->workers.finish(statistics);
@@ -262,7 +283,7 @@ Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, Fr
   statistics.bricks_out_of_image = cut.out_of_image;
   statistics.bricks_transparent = cut.transparent;
   statistics.bricks_culled = cut.out_of_image + cut.transparent;
-  statistics.largest_level = static_cast<int>(cut.deepest_level);
+  statistics.largest_level = cut.deepest_level;
   statistics.largest_error_px = cut.largest_error_px;
   statistics.workers = pools_->budget.workers;
   statistics.memory_used_bytes = options.memory_bytes - pools_->budget.cache_bytes -

@@ -31,6 +31,8 @@
 
 namespace curvisplat {
 
+struct SliceWork;
+
 /// The stages and pools of one variable, or two, of one cache. One caller at a time.
 class FramePipeline {
  public:
@@ -69,8 +71,7 @@ class FramePipeline {
   struct Pools;
 
   const ClassificationTable& tableOf(const FramePlan& plan) const;
-  void sampleSlice(const SlicePlan& slice, SliceSampler& sampler, const FrameOptions& options,
-                   FrameStatistics& statistics);
+  void sampleSlice(const SliceWork& work, const FrameOptions& options, FrameStatistics& statistics);
   bool beginSlab(const FramePlan& plan, const FrameOptions& options);
   void stopStages();
   void makePools(const FrameOptions& options);

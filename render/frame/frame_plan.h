@@ -96,6 +96,8 @@ class FramePlanner {
   /// Of pictures of two scalars: what PixelShading::colours is.
   const ClassificationTable* colourClasses() const { return colour_classes_ ? &*colour_classes_ : nullptr; }
   const ColourTable& colours() const { return colours_; }
+  /// Of the opacities.
+  const TransferFunction& transferFunction() const { return transfer_function_; }
   /// Memory in bytes of the octree, and of what plans and the later stages note about its bricks.
   uint64_t bytes() const;
   /// The most splats that any picture can have: those of the cache's finest level, with their border parts.

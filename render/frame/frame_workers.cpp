@@ -15,7 +15,7 @@ struct FrameWorkers::Worker {
   std::vector<uint32_t> keys;
   DepthSorter sorter;        // of a brick
   DepthSorter batch_sorter;  // has its turn while a brick waits for space
-  FrameStatistics statistics;
+  PrepareStatistics statistics;
 };
 
 FrameWorkers::FrameWorkers(BrickSource& source, SweepBuffer& sweep, SegmentRing& ring, unsigned count)
@@ -65,29 +65,11 @@ void FrameWorkers::begin() {
 void FrameWorkers::finish(FrameStatistics& sum) {
   team_.wait();
   for (const auto& worker : workers_) {
-    const FrameStatistics& part = worker->statistics;
+    combine(sum, worker->statistics);
     sum.verify_s += worker->scratch.times.verify_s;
     sum.decode_s += worker->scratch.times.decode_s;
     sum.read_waited_s += worker->scratch.waited_s;
-    sum.project_s += part.project_s;
-    sum.sort_s += part.sort_s;
-    sum.workers_waited_s += part.workers_waited_s;
-    sum.splats_read += part.splats_read;
-    sum.splats_clipped += part.splats_clipped;
-    sum.splats_behind += part.splats_behind;
-    sum.splats_off_screen += part.splats_off_screen;
-    sum.splats_transparent += part.splats_transparent;
-    sum.splats_drawn += part.splats_drawn;
-    sum.bricks_again += part.bricks_again;
-    for (const BrickFailure& failure : part.bricks_unreadable) sum.bricks_unreadable.push_back(failure);
   }
-  std::sort(sum.bricks_unreadable.begin(), sum.bricks_unreadable.end(),
-            [](const BrickFailure& a, const BrickFailure& b) { return a.brick < b.brick; });
-  // A brick that is drawn in several slabs was reported once for each.
-  const auto again =
-      std::unique(sum.bricks_unreadable.begin(), sum.bricks_unreadable.end(),
-                  [](const BrickFailure& a, const BrickFailure& b) { return a.brick == b.brick; });
-  sum.bricks_unreadable.erase(again, sum.bricks_unreadable.end());
   const MutexLock lock(failing_);
   if (first_failure_) std::rethrow_exception(first_failure_);
 }
@@ -122,7 +104,7 @@ void FrameWorkers::loop(Worker& worker) {
     while (true) {
       std::optional<SweepBuffer::Batch> batch;
       {
-        const StageTimer timer(worker.statistics.workers_waited_s);
+        const StageTimer timer(worker.statistics.workers_waited_s, "wait for a batch", TraceKind::kWait);
         batch = sweep_.awaitNext();
       }
       if (!batch) break;
@@ -148,9 +130,11 @@ void FrameWorkers::sample(Worker& worker, const SliceWork& work) {
     for (uint64_t sequence = next_++; sequence < work.parts.size(); sequence = next_++) {
       const auto fetched = fetch(worker, sequence, work.parts[sequence], work.keep_going);
       if (!fetched) return;
-      const StageTimer timer(worker.statistics.project_s);
-      work.sampler.add(work.cache.manifest().root.cellMin(fetched->cell), fetched->geometry,
-                       fetched->second.value_or(fetched->values), fetched->ranges);
+      const StageTimer timer(worker.statistics.project_s, "sample slice");
+      const glm::dvec3 cell_min = work.cache.manifest().root.cellMin(fetched->cell);
+      work.sampler.add(cell_min, fetched->geometry, fetched->second.value_or(fetched->values),
+                       fetched->ranges);
+      if (work.opacities) work.opacities->add(cell_min, fetched->geometry, fetched->values, fetched->ranges);
     }
   } catch (...) {
     fail();
@@ -193,7 +177,7 @@ bool FrameWorkers::prepare(Worker& worker, uint64_t sequence) {
       markSeen(number, Seen::kHidden);
       return passOver(sequence);
     }
-    const StageTimer timer(worker.statistics.project_s);
+    const StageTimer timer(worker.statistics.project_s, "project brick");
     const glm::dvec3 cell_min = work_->cache.manifest().root.cellMin(fetched->cell);
     worker.projector.project(work_->settings, work_->table, cell_min, fetched->geometry,
                              {fetched->values, fetched->second}, fetched->ranges);
@@ -216,7 +200,7 @@ uint64_t FrameWorkers::partsHidden() const {
 
 /// Adds a projected part to the statistics, in the first slab that it is in only.
 void FrameWorkers::count(Worker& worker, uint32_t number) {
-  FrameStatistics& statistics = worker.statistics;
+  PrepareStatistics& statistics = worker.statistics;
   if (seen_[number] == Seen::kProjected) {
     ++statistics.bricks_again;
     return;
@@ -240,14 +224,14 @@ bool FrameWorkers::passOver(uint64_t sequence) {
 
 /// Enters the splats that the worker has projected into the sweep.
 bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t rank) {
-  FrameStatistics& statistics = worker.statistics;
+  PrepareStatistics& statistics = worker.statistics;
   std::span<const DepthItem> sorted;
   {
-    const StageTimer timer(statistics.sort_s);
+    const StageTimer timer(statistics.sort_s, "sort brick");
     sorted = worker.sorter.sort(worker.keys, work_->keys.order());
   }
   {
-    const StageTimer timer(statistics.workers_waited_s);
+    const StageTimer timer(statistics.workers_waited_s, "wait for its turn", TraceKind::kWait);
     if (!sweep_.awaitTurn(sequence)) return false;
   }
   std::shared_ptr<SweepBuffer::Run> run;
@@ -256,10 +240,10 @@ bool FrameWorkers::enter(Worker& worker, uint64_t sequence, uint32_t rank) {
       if (!hand(worker, *batch)) return false;
       continue;
     }
-    const StageTimer timer(statistics.workers_waited_s);
+    const StageTimer timer(statistics.workers_waited_s, "wait for space", TraceKind::kWait);
     if (!sweep_.awaitSpace(rank, sorted)) return false;
   }
-  const StageTimer timer(statistics.sort_s);
+  const StageTimer timer(statistics.sort_s, "fill sweep");
   sweep_.fill(*run, sorted, worker.projector.splats());
   return true;
 }
@@ -269,18 +253,18 @@ bool FrameWorkers::hand(Worker& worker, const SweepBuffer::Batch& batch) {
   std::span<const DepthItem> sorted;
   std::optional<std::span<ScreenSplat>> segment;
   {
-    const StageTimer timer(worker.statistics.sort_s);
+    const StageTimer timer(worker.statistics.sort_s, "sort batch");
     sweep_.itemsOf(batch, worker.batch_sorter.items(batch.count));
     sorted = worker.batch_sorter.sort();
   }
   {
-    const StageTimer timer(worker.statistics.workers_waited_s);
+    const StageTimer timer(worker.statistics.workers_waited_s, "wait for the ring", TraceKind::kWait);
     if (!sweep_.awaitFilled(batch)) return false;
     segment = ring_.acquire(batch.sequence, batch.count);
   }
   if (!segment) return false;
   {
-    const StageTimer timer(worker.statistics.sort_s);
+    const StageTimer timer(worker.statistics.sort_s, "copy batch");
     sweep_.copy(sorted, *segment);
     sweep_.giveBack(batch);
   }

@@ -41,6 +41,7 @@ struct SliceWork {
   const CacheReader& cache;
   std::span<const BrickPart> parts;
   SliceSampler& sampler;
+  SliceSampler* opacities = nullptr;  // of two scalars: samples the first, or null
   bool keep_going = false;
 };
 

@@ -122,7 +122,8 @@ class CurrentContext {
       if (failure.empty()) return;
       said += fmt::format("{}{}: {}", said.empty() ? "" : "; ", platform.name, failure);
     }
-    throw Error("EGL gives no core context of OpenGL 3.3 ({})", said.empty() ? "it knows no device" : said);
+    throw Error("EGL cannot make an OpenGL 3.3 core context ({})",
+                said.empty() ? "it found no device" : said);
   }
   /// The display stays initialised: it is the process's, and other contexts may use it.
   ~CurrentContext() {

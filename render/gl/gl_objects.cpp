@@ -23,8 +23,8 @@ class Shader {
     gl_.GetShaderInfoLog(name_, static_cast<GLsizei>(said.size()), &said_length, said.data());
     said.resize(static_cast<size_t>(said_length));
     gl_.DeleteShader(name_);
-    throw Error("OpenGL does not compile a {} shader of ours: {}",
-                kind == GL_VERTEX_SHADER ? "vertex" : "fragment", said);
+    throw Error("OpenGL cannot compile the {} shader: {}", kind == GL_VERTEX_SHADER ? "vertex" : "fragment",
+                said);
   }
   ~Shader() { gl_.DeleteShader(name_); }
   Shader(const Shader&) = delete;
@@ -53,7 +53,7 @@ GlProgram::GlProgram(const GlFunctions& gl, std::string_view vertex_source, std:
   gl.GetProgramInfoLog(name_, static_cast<GLsizei>(said.size()), &length, said.data());
   said.resize(static_cast<size_t>(length));
   gl.DeleteProgram(name_);
-  throw Error("OpenGL does not link a program of ours: {}", said);
+  throw Error("OpenGL cannot link the shaders: {}", said);
 }
 
 GlProgram::~GlProgram() {

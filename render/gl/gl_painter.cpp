@@ -335,7 +335,7 @@ void GlPainter::State::drawPart(std::span<const ScreenSplat> splats) {
   const std::less_equal<const ScreenSplat*> not_after;
   if (!mapped_splats.empty() && not_after(mapped_splats.data(), splats.data()) &&
       not_after(splats.data() + splats.size(), mapped_splats.data() + mapped_splats.size())) {
-    const StageTimer timer(draw_s);
+    const StageTimer timer(draw_s, "draw (OpenGL)");
     mapped->bind(gl);
     gl.BeginQuery(GL_TIME_ELAPSED, query.name());
     gl.DrawArraysInstancedBaseInstance(GL_TRIANGLE_STRIP, 0, 4, count,
@@ -344,17 +344,17 @@ void GlPainter::State::drawPart(std::span<const ScreenSplat> splats) {
     copied.bind(gl);
     {
       // Fresh storage each time: the driver keeps what it still draws from.
-      const StageTimer timer(upload_s);
+      const StageTimer timer(upload_s, "upload splats");
       const auto bytes = static_cast<GLsizeiptr>(splats.size_bytes());
       gl.BufferData(GL_ARRAY_BUFFER, bytes + static_cast<GLsizeiptr>(kMostRecords * sizeof(ScreenSplat)),
                     nullptr, GL_STREAM_DRAW);
       gl.BufferSubData(GL_ARRAY_BUFFER, 0, bytes, splats.data());
     }
-    const StageTimer timer(draw_s);
+    const StageTimer timer(draw_s, "draw (OpenGL)");
     gl.BeginQuery(GL_TIME_ELAPSED, query.name());
     gl.DrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, count);
   }
-  const StageTimer timer(draw_s);
+  const StageTimer timer(draw_s, "draw (OpenGL)");
   gl.EndQuery(GL_TIME_ELAPSED);
   gl.check("drawing splats");
   in_flight.push_back({GlFence(gl), std::move(query), draws});
@@ -375,14 +375,14 @@ size_t GlPainter::drawsUnderWay() const {
 }
 
 void GlPainter::finishDraws() {
-  const StageTimer timer(state_->draw_s);
+  const StageTimer timer(state_->draw_s, "draw (OpenGL)");
   while (!state_->in_flight.empty()) state_->finishOldest();
 }
 
 Image GlPainter::end() {
   const GlFunctions& gl = state_->gl;
   finishDraws();
-  const StageTimer timer(state_->draw_s);
+  const StageTimer timer(state_->draw_s, "draw (OpenGL)");
   const State& state = *state_;
   std::vector<Image> windows;
   for (int n = 0; n < state.windows(); ++n) {

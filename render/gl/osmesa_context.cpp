@@ -58,7 +58,7 @@ class CurrentContext {
                                           3,
                                           0};
     context_ = mesa_.create_context(kAttributes, nullptr);
-    if (!context_) throw Error("OSMesa gives no core context of OpenGL 3.3; Mesa 11.2 or newer is needed");
+    if (!context_) throw Error("OSMesa cannot make an OpenGL 3.3 core context; Mesa 11.2 or newer is needed");
     if (!mesa_.make_current(context_, pixels_.data(), GL_UNSIGNED_BYTE, kSide, kSide)) {
       mesa_.destroy_context(context_);
       throw Error("OSMesa cannot make its context current on this thread");

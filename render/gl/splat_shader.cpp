@@ -182,14 +182,14 @@ vec3 remainder(vec2 u, float lo, float hi) {
   return vec3(share, mean, left.z / max(share, 1e-6) - mean * mean);
 }
 
-// Of a scalar (mean, slopes, half_width) at u; by its correlation with the depth, what is left of the depths moves the
-// mean and narrows the width.
-vec2 intervalOf(vec4 of, float correlation, vec2 u, float moved, float lost, bool log_scale, vec2 cells_from) {
+// Of a scalar (mean, slopes, half_width) at u. By its correlation with the depth, what is left of the depths moves the
+// mean and narrows the width: `left` has their mean, and the part of their variance that is lost.
+vec2 intervalOf(vec4 of, float correlation, vec2 u, vec2 left, bool log_scale, vec2 cells_from) {
   float mean = PER_PIXEL ? of.x + dot(of.yz, u) : of.x;
   float width = PER_PIXEL ? of.w : 0.0;
   float deviation = correlation * width * 0.57735027;
-  mean += deviation * kReach * moved;
-  width = lost > 0.0 ? sqrt(max(0.0, width * width - 3.0 * deviation * deviation * lost)) : width;
+  mean += deviation * kReach * left.x;
+  width = left.y > 0.0 ? sqrt(max(0.0, width * width - 3.0 * deviation * deviation * left.y)) : width;
   return interval(mean, width, log_scale, cells_from);
 }
 
@@ -199,10 +199,10 @@ vec4 seenBetween(vec2 u, float depth, float lo, float hi) {
   if (amplitude < 0.0) left = remainder(u, lo, hi);
   float lost = amplitude < 0.0 ? 1.0 - clamp(7.0 * left.z, 0.0, 1.0) : 0.0;
   depth *= left.x;
-  vec2 ends = intervalOf(scalar, cut.y, u, left.y, lost, LOG_SCALE, cells_from_scalar);
+  vec2 ends = intervalOf(scalar, cut.y, u, vec2(left.y, lost), LOG_SCALE, cells_from_scalar);
   vec4 seen = max((integral(classes, ends.y, below, above) - integral(classes, ends.x, below, above)) / (ends.y - ends.x), 0.0);
 #if COLOURED
-  ends = intervalOf(colour, colour_correlation, u, left.y, lost, COLOUR_LOG_SCALE, cells_from_colour);
+  ends = intervalOf(colour, colour_correlation, u, vec2(left.y, lost), COLOUR_LOG_SCALE, cells_from_colour);
   seen.rgb = max((integral(colours, ends.y, colours_below, colours_above) -
                   integral(colours, ends.x, colours_below, colours_above)).rgb / (ends.y - ends.x), 0.0) * seen.w;
 #endif

@@ -84,10 +84,15 @@ void writeRow(const Image& image, int y, bool opaque, png_bytep row) {
   }
 }
 
-bool writeAll(PngWriter& writer, Bytes& out, const Image& image, bool opaque, png_bytep row) {
+bool writeAll(PngWriter& writer, Bytes& out, const Image& image, PngEffort effort, png_bytep row) {
+  const bool opaque = isOpaque(image);
   if (setjmp(png_jmpbuf(writer.png))) return false;
   png_set_write_fn(writer.png, &out, appendBytes, nullptr);
   png_set_user_limits(writer.png, kLargestImageSide, kLargestImageSide);
+  if (effort == PngEffort::kQuick) {
+    png_set_compression_level(writer.png, 1);
+    png_set_filter(writer.png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
+  }
   png_set_IHDR(writer.png, writer.info, static_cast<png_uint_32>(image.size.width),
                static_cast<png_uint_32>(image.size.height), 8,
                opaque ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_RGB_ALPHA, PNG_INTERLACE_NONE,
@@ -132,10 +137,14 @@ std::vector<png_bytep> rowPointers(std::vector<png_byte>& pixels, size_t rows) {
 }  // namespace
 
 Bytes encodePng(const Image& image) {
+  return encodePng(image, PngEffort::kUsual);
+}
+
+Bytes encodePng(const Image& image, PngEffort effort) {
   std::vector<png_byte> row(4 * static_cast<size_t>(image.size.width));
   PngWriter writer;
   Bytes bytes;
-  if (!writeAll(writer, bytes, image, isOpaque(image), row.data()))
+  if (!writeAll(writer, bytes, image, effort, row.data()))
     throw Error("an image of {} x {} pixels cannot be written as PNG: {}", image.size.width,
                 image.size.height, writer.message.text);
   return bytes;

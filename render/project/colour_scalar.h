@@ -16,15 +16,15 @@ namespace curvisplat {
 template <typename Map>
 ScreenColour colourOf(const Map& map, const PlacedPiece& at, const SplatPiece& piece, float variance,
                       bool faces, bool across) {
-  const Ellipse e = ellipseOf(at.rows, piece.shape, piece.slope, variance, piece.weight * at.volume,
-                              map.low_pass_px2, map.slope_low_pass_px2);
+  const Ellipse e =
+      ellipseOf(at.rows, piece.shape, piece.slope, variance, piece.weight * at.volume, map.low_pass);
   ScreenColour colour{piece.mean, {e.slope0, e.slope1}, e.half_width, 0};
   if (across) {
     colour.correlation =
-        depthAlongRay(at.rows, at.depth_row, at.depth, piece, e, map.low_pass_px2).correlation;
+        depthAlongRay(at.rows, at.depth_row, at.depth, piece, e, map.low_pass.footprint_px2).correlation;
   } else if (faces) {
     ScreenCut cut;
-    cutAtFaces(at.rows, piece, e, map.low_pass_px2, cut);
+    cutAtFaces(at.rows, piece, e, map.low_pass.footprint_px2, cut);
     colour.correlation = cut.correlation;
   }
   return colour;
@@ -55,8 +55,7 @@ template <typename Map>
 ScreenColour colourOf(const Map& map, const GeometryArrays<const float>& geometry,
                       const VariableArrays<const float>& colours, size_t i) {
   const Ellipse e = ellipseOf(rowsAt(map, geometry.x[i], geometry.y[i], geometry.z[i]), shapeOf(geometry, i),
-                              slopeOf(colours, i), colours.variance[i], geometry.weight[i], map.low_pass_px2,
-                              map.slope_low_pass_px2);
+                              slopeOf(colours, i), colours.variance[i], geometry.weight[i], map.low_pass);
   return {colours.mean[i], {e.slope0, e.slope1}, e.half_width, 0};
 }
 

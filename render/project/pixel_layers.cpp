@@ -1,5 +1,7 @@
 #include "render/project/pixel_layers.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -35,18 +37,22 @@ void PixelLayers::Row::endPixel(size_t first_layer) {
 
 PixelLayers::PixelLayers(ImageSize size, std::vector<Row> rows, double depth_origin)
     : size_(size), depth_origin_(depth_origin) {
-  CURVISPLAT_CHECK_OP(rows.size(), ==, static_cast<size_t>(size.height));
-  size_t count = 0;
-  for (const Row& row : rows) count += row.layers.size();
-  begins_.reserve(size.pixels() + 1);
-  begins_.push_back(0);
-  layers_.reserve(count);
-  for (Row& row : rows) {
-    CURVISPLAT_CHECK_OP(row.counts.size(), ==, static_cast<size_t>(size.width));
-    for (const uint8_t layers : row.counts) begins_.push_back(begins_.back() + layers);
-    layers_.insert(layers_.end(), row.layers.begin(), row.layers.end());
-    row = {};
+  std::vector<size_t> first_layer(rows.size() + 1), first_pixel(rows.size() + 1);
+  for (size_t n = 0; n < rows.size(); ++n) {
+    first_layer[n + 1] = first_layer[n] + rows[n].layers.size();
+    first_pixel[n + 1] = first_pixel[n] + rows[n].counts.size();
   }
+  CURVISPLAT_CHECK_OP(first_pixel.back(), ==, size.pixels());
+  begins_.resize(size.pixels() + 1);
+  layers_.resize(first_layer.back());
+  tbb::parallel_for(size_t{0}, rows.size(), [&](size_t n) {
+    auto begin = static_cast<uint32_t>(first_layer[n]);
+    for (size_t pixel = 0; pixel < rows[n].counts.size(); ++pixel)
+      begins_[first_pixel[n] + pixel + 1] = begin += rows[n].counts[pixel];
+    std::copy(rows[n].layers.begin(), rows[n].layers.end(),
+              layers_.begin() + static_cast<std::ptrdiff_t>(first_layer[n]));
+    rows[n] = {};
+  });
   makeLevels();
 }
 
@@ -54,15 +60,20 @@ void PixelLayers::makeLevels() {
   const auto cellsAlong = [](int pixels) { return (pixels + kCellSide - 1) / kCellSide; };
   Level finest{cellsAlong(size_.width), cellsAlong(size_.height), {}};
   finest.cells.resize(static_cast<size_t>(finest.columns) * static_cast<size_t>(finest.rows));
-  for (int y = 0; y < size_.height; ++y)
-    for (int x = 0; x < size_.width; ++x) {
-      const std::span<const PixelLayer> layers = at(x, y);
-      Bounds& cell = finest.cells[static_cast<size_t>(y / kCellSide * finest.columns + x / kCellSide)];
-      windows_ = std::max(windows_, windowsOf(layers));
-      if (!layers.empty()) cell.nearest = std::min(cell.nearest, layers.front().depth);
-      const bool opaque = !layers.empty() && layers.back().colour.w >= 1;
-      cell.hidden = std::max(cell.hidden, opaque ? layers.back().depth : kNowhere);
-    }
+  std::vector<int> windows(static_cast<size_t>(finest.rows));
+  tbb::parallel_for(0, finest.rows, [&](int row) {
+    for (int y = row * kCellSide; y < std::min((row + 1) * kCellSide, size_.height); ++y)
+      for (int x = 0; x < size_.width; ++x) {
+        const std::span<const PixelLayer> layers = at(x, y);
+        Bounds& cell = finest.cells[static_cast<size_t>(row * finest.columns + x / kCellSide)];
+        int& of_row = windows[static_cast<size_t>(row)];
+        of_row = std::max(of_row, windowsOf(layers));
+        if (!layers.empty()) cell.nearest = std::min(cell.nearest, layers.front().depth);
+        const bool opaque = !layers.empty() && layers.back().colour.w >= 1;
+        cell.hidden = std::max(cell.hidden, opaque ? layers.back().depth : kNowhere);
+      }
+  });
+  windows_ = std::max(1, *std::max_element(windows.begin(), windows.end()));
   levels_.push_back(std::move(finest));
   while (levels_.back().columns > 1 || levels_.back().rows > 1) {
     const Level& below = levels_.back();

@@ -43,9 +43,9 @@ class PixelLayers {
   static constexpr int kMostLayers = 4, kMostWindows = kMostLayers + 1;
   static constexpr float kNowhere = std::numeric_limits<float>::infinity();
 
-  /// The layers of a row of pixels, one pixel after the other.
+  /// The layers of a row of pixels, or of a piece of it, one pixel after the other.
   struct Row {
-    std::vector<uint8_t> counts;  // [width]
+    std::vector<uint8_t> counts;  // [pixels]
     std::vector<PixelLayer> layers;
 
     /// Ends a pixel, whose layers are the last that were appended, in any order. Sorts them, leaves out what
@@ -53,7 +53,7 @@ class PixelLayers {
     void endPixel(size_t first_layer);
   };
 
-  /// `rows`: from the top. `depth_origin`: orthographic, the distance along the view at which depths begin.
+  /// `rows`: from the top, each whole or in pieces from the left. Parallel on the caller's TBB arena. `depth_origin`: orthographic, the distance along the view at which depths begin.
   PixelLayers(ImageSize size, std::vector<Row> rows, double depth_origin);
 
   ImageSize size() const { return size_; }

@@ -65,7 +65,7 @@ void computeBlock(const OrthographicMap& map, const GeometryArrays<const float>&
     block.depth[n] = map.depth.x * x + map.depth.y * y + map.depth.z * z;
     block.too_wide[n] = 0;
     block.set(n, ellipseOf(map.rows, shapeOf(geometry, i), slopeOf(variable, i), variable.variance[i],
-                           geometry.weight[i] * map.volume, map.low_pass_px2, map.slope_low_pass_px2));
+                           geometry.weight[i] * map.volume, map.low_pass));
   }
 }
 
@@ -81,9 +81,8 @@ void computeBlock(const PerspectiveMap& map, const GeometryArrays<const float>& 
     block.y[n] = map.pixelY(centre);
     block.depth[n] = centre.distance;
     block.too_wide[n] = map.tooWide(centre, map.radiusOf(shape));
-    block.set(n,
-              ellipseOf(map.rowsAt(centre), shape, slopeOf(variable, i), variable.variance[i],
-                        geometry.weight[i] * map.volumeAt(centre), map.low_pass_px2, map.slope_low_pass_px2));
+    block.set(n, ellipseOf(map.rowsAt(centre), shape, slopeOf(variable, i), variable.variance[i],
+                           geometry.weight[i] * map.volumeAt(centre), map.low_pass));
   }
 }
 
@@ -125,6 +124,16 @@ SplatPiece wholeOf(const GeometryArrays<const float>& geometry, const VariableAr
           growthAxes(shapeOf(geometry, i), geometry.growth_code[i])};
 }
 
+/// The projection of one brick by one map.
+struct BrickPass {
+  const BrickArrays& brick;
+  const Cutting& cutting;
+  const std::optional<LocalLight>& light;
+  SplatChooser& chooser;
+  ProjectionCounts& counts;
+  CutBudget left = {};
+};
+
 /// How one splat is cut.
 struct SplatCutting {
   uint32_t border_code = kNoBorder;
@@ -133,11 +142,14 @@ struct SplatCutting {
 };
 
 /// Takes splat `i` to the parts and pieces that it is drawn as, and chooses among them: the best fate of any.
-/// Nothing if that takes more than what is `left`, which it counts down.
+/// Nothing if that takes more than what the pass has left, which it counts down.
 template <typename Map>
-std::optional<SplatChooser::Fate> choosePieces(const Map& map, const BrickArrays& brick, size_t i,
-                                               const Cutting& cutting, const SplatCutting& how,
-                                               const Lit& lit, SplatChooser& chooser, CutBudget& left) {
+std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, size_t i,
+                                               const SplatCutting& how, const Lit& lit) {
+  const BrickArrays& brick = pass.brick;
+  const Cutting& cutting = pass.cutting;
+  SplatChooser& chooser = pass.chooser;
+  CutBudget& left = pass.left;
   const VariableArrays<const float>& variable = brick.variable;
   const uint32_t border_code = how.border_code;
   const SplatPiece whole = wholeOf(brick.geometry, variable, i);
@@ -155,20 +167,20 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, const BrickArrays
   const auto take = [&](const SplatPiece& piece, const PlacedPiece& at) {
     if (left.pieces + own == 0) return false;
     const Ellipse ellipse = ellipseOf(at.rows, piece.shape, piece.slope, variable.variance[i],
-                                      piece.weight * at.volume, map.low_pass_px2, map.slope_low_pass_px2);
+                                      piece.weight * at.volume, map.low_pass);
     LayerSide side = LayerSide::kBefore;
     if (!cutting.layers.empty())
       side = cutting.layers.sideOf(at.x, at.y, ellipse, at.depth, at.depth_row, piece.shape);
     if (side == LayerSide::kBehind) return true;
     ScreenCut cut;
-    const Remains remains = cutAtFaces(at.rows, piece, ellipse, map.low_pass_px2, cut);
+    const Remains remains = cutAtFaces(at.rows, piece, ellipse, map.low_pass.footprint_px2, cut);
     if (remains == Remains::kNothing) return true;
     const bool faces = remains == Remains::kSome, across = side == LayerSide::kAcross;
     const size_t records = least + (faces ? 1u : 0u) + (across ? 1u : 0u);
     if (left.pieces + own < records) return false;
     ScreenSplat splat = screenSplat(at.x, at.y, ellipse, piece.mean);
     if (cutting.iso) {
-      splat.amplitude *= changeAlongRay(at, piece, ellipse, map.low_pass_px2);
+      splat.amplitude *= changeAlongRay(at, piece, ellipse, map.low_pass.footprint_px2);
       splat.mean = scale * splat.mean + offset;
       splat.slope0 *= scale;
       splat.slope1 *= scale;
@@ -178,7 +190,7 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, const BrickArrays
     ScreenDepth along_ray;
     if (across) {
       along_ray = depthAlongRay(at.rows, at.depth_row, cutting.layers.depthOf(at.depth), piece, ellipse,
-                                map.low_pass_px2);
+                                map.low_pass.footprint_px2);
       along_ray.has_cut = faces;
     }
     ScreenColour colour;
@@ -212,11 +224,12 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, const BrickArrays
   return best;
 }
 
-/// False if the brick would take more than what is `left`, which it counts down.
+/// False if the range would take more than what the pass has left, which it counts down.
 template <typename Map>
-bool projectRange(const Map& map, const Cutting& cutting, const std::optional<LocalLight>& light,
-                  const BrickArrays& brick, const SplatRange& range, SplatChooser& chooser, CutBudget& left,
-                  ProjectionCounts& counts) {
+bool projectRange(const Map& map, BrickPass& pass, const SplatRange& range) {
+  const BrickArrays& brick = pass.brick;
+  const Cutting& cutting = pass.cutting;
+  ProjectionCounts& counts = pass.counts;
   const GeometryArrays<const float>& geometry = brick.geometry;
   const VariableArrays<const float>& variable = brick.variable;
   Block block;
@@ -250,12 +263,12 @@ bool projectRange(const Map& map, const Cutting& cutting, const std::optional<Lo
         in_pieces = how.layered = side == LayerSide::kAcross;
       }
       Lit lit;
-      if (light)
-        lit = light->of(geometry.x[i], geometry.y[i], geometry.z[i], shapeOf(geometry, i),
-                        slopeOf(variable, i));
+      if (pass.light)
+        lit = pass.light->of(geometry.x[i], geometry.y[i], geometry.z[i], shapeOf(geometry, i),
+                             slopeOf(variable, i));
       SplatChooser::Fate fate;
       if (in_pieces) {
-        const auto best = choosePieces(map, brick, i, cutting, how, lit, chooser, left);
+        const auto best = choosePieces(map, pass, i, how, lit);
         if (!best) return false;
         fate = *best;
       } else {
@@ -266,9 +279,9 @@ bool projectRange(const Map& map, const Cutting& cutting, const std::optional<Lo
                               growthAxes(shapeOf(geometry, i), code), ellipse);
         if (brick.colours) {
           const ScreenColour colour = colourOf(map, geometry, *brick.colours, i);
-          fate = chooser.chooseWith({nullptr, nullptr, &colour}, splat, block.depth[n], lit);
+          fate = pass.chooser.chooseWith({nullptr, nullptr, &colour}, splat, block.depth[n], lit);
         } else {
-          fate = chooser.choose(splat, block.depth[n], lit);
+          fate = pass.chooser.choose(splat, block.depth[n], lit);
         }
       }
       counts.off_screen += fate == SplatChooser::Fate::kOffScreen;
@@ -277,16 +290,6 @@ bool projectRange(const Map& map, const Cutting& cutting, const std::optional<Lo
     }
   }
   return true;
-}
-
-template <typename Map>
-bool projectWith(const Map& map, const Cutting& cutting, const std::optional<LocalLight>& light,
-                 const BrickArrays& brick, std::span<const SplatRange> ranges, SplatChooser& chooser,
-                 ProjectionCounts& counts) {
-  CutBudget left;
-  return std::all_of(ranges.begin(), ranges.end(), [&](const SplatRange& range) {
-    return projectRange(map, cutting, light, brick, range, chooser, left, counts);
-  });
 }
 
 }  // namespace
@@ -335,8 +338,10 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
   }
   const bool volume = !settings.iso || settings.iso->volume;
   const auto projected = [&](const auto& map, bool isosurfaces) {
-    return projectWith(map, isosurfaces ? iso_cutting : cutting, isosurfaces ? iso_light : light, brick,
-                       ranges, chooser, counts_);
+    BrickPass pass{brick, isosurfaces ? iso_cutting : cutting, isosurfaces ? iso_light : light, chooser,
+                   counts_};
+    return std::all_of(ranges.begin(), ranges.end(),
+                       [&](const SplatRange& range) { return projectRange(map, pass, range); });
   };
   const auto projectAll = [&](const auto& map) {
     return (!volume || projected(map, false)) && (!settings.iso || projected(map, true));

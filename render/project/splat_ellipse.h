@@ -49,10 +49,15 @@ struct Ellipse {
   float l11, l21, l22, amplitude, slope0, slope1, half_width;
 };
 
+/// What is added to covariances on the screen, in pixels²: to the footprint's, and to that which gives the slope.
+struct LowPass {
+  float footprint_px2, slope_px2;
+};
+
 /// `volume`: V times the map's determinant, depth included; pixels² times length.
 [[gnu::always_inline]] inline Ellipse ellipseOf(const ScreenRows& p, const Shape& s, const Slope& w,
-                                                float variance, float volume, float low_pass_px2,
-                                                float slope_low_pass_px2) {
+                                                float variance, float volume, const LowPass& low_pass) {
+  const float low_pass_px2 = low_pass.footprint_px2, slope_low_pass_px2 = low_pass.slope_px2;
   // B = P A, by rows.
   const float b00 = s.axis0 * (p.x0 + p.y0 * s.shear10 + p.z0 * s.shear20);
   const float b01 = s.axis1 * (p.y0 + p.z0 * s.shear21);

@@ -12,8 +12,7 @@ OrthographicMap::OrthographicMap(const ScreenView& view, const glm::dvec3& origi
           static_cast<float>(along.x),  static_cast<float>(along.y),  static_cast<float>(along.z)};
   depth = glm::vec3(view.forward * view.scale);
   volume = static_cast<float>(view.focal_px * view.focal_px * view.scale.x * view.scale.y * view.scale.z);
-  low_pass_px2 = static_cast<float>(view.low_pass_px2);
-  slope_low_pass_px2 = static_cast<float>(view.slope_low_pass_px2);
+  low_pass = {static_cast<float>(view.low_pass_px2), static_cast<float>(view.slope_low_pass_px2)};
 }
 
 PerspectiveMap::PerspectiveMap(const ScreenView& view, const glm::dvec3& origin_, float coarseness)
@@ -28,9 +27,8 @@ PerspectiveMap::PerspectiveMap(const ScreenView& view, const glm::dvec3& origin_
       volume(static_cast<float>(view.scale.x * view.scale.y * view.scale.z)),
       near(static_cast<float>(view.near) * coarseness),
       widest(static_cast<float>(view.widest) * coarseness),
-      low_pass_px2(static_cast<float>(view.low_pass_px2)),
-      slope_low_pass_px2(static_cast<float>(view.slope_low_pass_px2)) {
-  const auto reach = static_cast<float>(kKernelSupport) * std::sqrt(low_pass_px2);
+      low_pass{static_cast<float>(view.low_pass_px2), static_cast<float>(view.slope_low_pass_px2)} {
+  const auto reach = static_cast<float>(kKernelSupport) * std::sqrt(low_pass.footprint_px2);
   tangent_x = (middle_x + reach) / focal_px;
   tangent_y = (middle_y + reach) / focal_px;
   slant_x = std::sqrt(1 + tangent_x * tangent_x);

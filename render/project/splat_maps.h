@@ -16,7 +16,7 @@ struct OrthographicMap {
   ScreenRows rows;  // pixels to a unit of the data
   glm::vec3 depth;  // stretched units along the view
   float volume;     // pixels² and stretched depth to a unit cubed of the data
-  float low_pass_px2, slope_low_pass_px2;
+  LowPass low_pass;
 
   OrthographicMap(const ScreenView& view, const glm::dvec3& origin);
 
@@ -38,7 +38,7 @@ struct PerspectiveMap {
   float middle_x, middle_y, focal_px;
   float volume;  // the stretch's
   float near, widest;
-  float low_pass_px2, slope_low_pass_px2;
+  LowPass low_pass;
   float tangent_x, tangent_y;  // of the image's edges, the low-pass' reach added
   float slant_x, slant_y;      // √(1 + tangent²)
 

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kFinestPixels = 0.5;
 constexpr size_t kLeastNodes = 1 << 16;
-constexpr uint64_t kBytesANode = 120;  // while a mesh is made: nodes, triangles, and the mesh itself
+constexpr uint64_t kBytesANode = 136;  // while a mesh is made: nodes, triangles, and the mesh itself
 
 size_t mostNodes(uint64_t pixels) {
   return std::max<size_t>(kLeastNodes, pixels);
@@ -236,7 +236,8 @@ SurfaceScene FaceMeshes::withMeshes(const std::shared_ptr<const SurfaceScene>& s
       kept_[n].surface = surface;
       kept_[n].chosen = std::move(chosen);
     }
-    drawn.surfaces.push_back({kept_[n].mesh, surface.colour, surface.scalar.has_value(), surface.colours});
+    drawn.surfaces.push_back(
+        {kept_[n].mesh, surface.colour, surface.scalar.has_value(), surface.colours, surface.opacity});
   }
   return drawn;
 }

@@ -1,9 +1,11 @@
 #include "render/surface/scene_layers.h"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -18,7 +20,15 @@ namespace {
 // Samples of one surface belong to one layer if their depths differ by no more than its slope explains, and by no
 // more than this many pixels.
 constexpr double kSteepest = 4, kNear = 0.25;
-constexpr int kMostShaded = 3;  // triangles of a pixel and layer
+constexpr size_t kMostShaded = 3;  // triangles of a pixel and layer
+constexpr float kSmooth = 0.97f;   // of the cosine between normals: what is in a pixel is lit once
+
+glm::vec3 towardsViewer(const ScreenView& view, float x, float y) {
+  if (view.projection != Projection::kPerspective) return glm::vec3(-view.forward);
+  const double across = (double{x} - 0.5 * view.size.width) / view.focal_px;
+  const double down = (double{y} - 0.5 * view.size.height) / view.focal_px;
+  return glm::vec3(-glm::normalize(view.forward + across * view.right + down * view.down));
+}
 
 /// Colours of the surfaces' triangles at the pixels.
 class Shader {
@@ -26,26 +36,39 @@ class Shader {
   Shader(const SceneTriangles& triangles, const SceneLook& look)
       : triangles_(triangles), look_(look), light_(look.light, triangles.view()) {}
 
+  /// What light falls on.
+  struct Point {
+    glm::vec3 colour{0.0f}, normal{0.0f};
+    float opacity = 0;
+  };
   /// Of a triangle at a point of the picture.
-  glm::vec3 colourAt(uint32_t number, float x, float y) const {
+  Point pointAt(uint32_t number, float x, float y) const {
     const auto [surface_number, triangle] = triangles_.placeOf(number);
     const Surface& surface = triangles_.scene().surfaces[surface_number];
     const TriangleMesh& mesh = *surface.mesh;
     const auto& corners = mesh.triangles[triangle];
     const glm::vec3 share = sharesAt(surface_number, corners, x, y);
-    glm::vec3 normal(0.0f);
+    Point point{surface.colour, glm::vec3(0.0f), static_cast<float>(surface.opacity.factor)};
     float scalar = 0;
     const glm::vec3 first = mesh.normals[corners[0]];
     for (int n = 0; n < 3; ++n) {
       glm::vec3 of_corner = mesh.normals[corners[static_cast<size_t>(n)]];
       if (glm::dot(of_corner, first) < 0) of_corner = -of_corner;
-      normal += share[n] * of_corner;
+      point.normal += share[n] * of_corner;
       if (!mesh.scalars.empty()) scalar += share[n] * mesh.scalars[corners[static_cast<size_t>(n)]];
     }
-    glm::vec3 colour = surface.colour;
-    if (surface.by_scalar && !mesh.scalars.empty() && !std::isnan(scalar))
-      colour = (surface.colours ? *surface.colours : look_.colours).at(double{scalar});
-    return light_.lit(colour, normal, towardsViewer(x, y));
+    if (surface.by_scalar && !mesh.scalars.empty() && !std::isnan(scalar)) {
+      const ColourTable& colours = surface.colours ? *surface.colours : look_.colours;
+      point.colour = colours.at(double{scalar});
+      if (surface.opacity.by_function) point.opacity *= colours.opacityAt(double{scalar});
+    }
+    return point;
+  }
+  bool isOpaque(uint32_t number) const {
+    return triangles_.scene().surfaces[triangles_.placeOf(number).surface].opacity.opaque();
+  }
+  glm::vec3 lit(const Point& point, float x, float y) const {
+    return light_.lit(point.colour, point.normal, towardsViewer(triangles_.view(), x, y));
   }
 
   /// How much the depth changes over a pixel, at most.
@@ -60,14 +83,6 @@ class Shader {
     const float by_y = (c.value - a.value) * (b.x - a.x) - (b.value - a.value) * (c.x - a.x);
     const float steep = (std::abs(by_x) + std::abs(by_y)) / std::abs(area);
     return std::isfinite(steep) ? steep : 1e30f;
-  }
-
-  glm::vec3 towardsViewer(float x, float y) const {
-    const ScreenView& view = triangles_.view();
-    if (view.projection != Projection::kPerspective) return glm::vec3(-view.forward);
-    const double across = (double{x} - 0.5 * view.size.width) / view.focal_px;
-    const double down = (double{y} - 0.5 * view.size.height) / view.focal_px;
-    return glm::vec3(-glm::normalize(view.forward + across * view.right + down * view.down));
   }
 
  private:
@@ -96,83 +111,145 @@ class Shader {
 class PixelSurfaces {
  public:
   PixelSurfaces(const SceneTriangles& triangles, const Shader& shader)
-      : triangles_(triangles), shader_(shader) {}
+      : triangles_(triangles),
+        shader_(shader),
+        has_translucent_(std::any_of(triangles.scene().surfaces.begin(), triangles.scene().surfaces.end(),
+                                     [](const Surface& surface) { return !surface.opacity.opaque(); })) {}
 
-  void append(std::span<const uint64_t> samples, int x, int y, std::vector<PixelLayer>& layers) const {
-    struct Seen {
-      uint64_t sample;
-      size_t place;
-    };
+  /// Whether what lies behind a surface may be seen through it.
+  bool hasTranslucent() const { return has_translucent_; }
+
+  /// `hidden`: the samples behind something opaque, which are left out; adds to it.
+  void append(const PixelSamples& samples, int x, int y, unsigned& hidden,
+              std::vector<PixelLayer>& layers) const {
     std::array<Seen, kSamples> seen;
-    size_t count = 0;
-    for (size_t n = 0; n < kSamples; ++n)
-      if (samples[n] != SampleBand::kNothing) seen[count++] = {samples[n], n};
-    if (count == 0) return;
-    const bool one = count == kSamples && std::all_of(seen.begin(), seen.end(), [&](const Seen& s) {
-                       return SampleBand::numberOf(s.sample) == SampleBand::numberOf(seen[0].sample);
-                     });
-    // Of so few, faster than std::sort.
-    for (size_t n = 1; !one && n < count; ++n) {
-      const Seen moved = seen[n];
-      size_t to = n;
-      for (; to > 0 && moved.sample < seen[to - 1].sample; --to) seen[to] = seen[to - 1];
-      seen[to] = moved;
+    size_t count = 0, nearest = 0;
+    float farthest = -INFINITY;
+    for (size_t n = 0; n < kSamples; ++n) {
+      if (samples.numbers[n] == PixelSamples::kNothing || (hidden >> n & 1) != 0) continue;
+      seen[count] = {samples.values[n], samples.numbers[n], static_cast<uint32_t>(n)};
+      if (seen[count] < seen[nearest]) nearest = count;
+      farthest = std::max(farthest, samples.values[n]);
+      ++count;
     }
-    size_t left = kSamples;
+    if (count == 0) return;
+    size_t left = kSamples - static_cast<size_t>(std::popcount(hidden));
+    // Most pixels have one layer: its samples need not be in order.
+    if (double{farthest} - double{seen[nearest].value} <= toleranceOf(seen[nearest])) {
+      layers.push_back(layerOf(std::span(seen).first(count), x, y, left, hidden));
+      return;
+    }
+    std::sort(seen.begin(), seen.begin() + static_cast<ptrdiff_t>(count));
     for (size_t begin = 0; begin < count;) {
-      size_t end = one ? count : begin + 1;
-      for (; end < count; ++end) {
-        const double gap =
-            double{SampleBand::valueOf(seen[end].sample)} - double{SampleBand::valueOf(seen[end - 1].sample)};
-        if (gap <= kNear * pixelOf(seen[end].sample)) continue;  // whatever the slope
-        double tolerance = 0;
-        for (size_t n = begin; n <= end; ++n)
-          tolerance = std::max(tolerance, toleranceOf(SampleBand::numberOf(seen[n].sample), seen[n].sample));
-        if (gap > tolerance) break;
-      }
-      glm::vec3 colour(0.0f);
-      double value = 0;
-      float shaded = 0;
-      size_t shades = 0;
-      for (size_t n = begin; n < end;) {
-        const uint32_t number = SampleBand::numberOf(seen[n].sample);
-        float at_x = 0, at_y = 0, of_this = 0;
-        for (; n < end && SampleBand::numberOf(seen[n].sample) == number; ++n) {
-          value += double{SampleBand::valueOf(seen[n].sample)};
-          at_x += static_cast<float>(kSampleOffsets[seen[n].place][0]);
-          at_y += static_cast<float>(kSampleOffsets[seen[n].place][1]);
-          ++of_this;
-        }
-        if (shades++ >= kMostShaded) continue;
-        colour += of_this * shader_.colourAt(number, static_cast<float>(x) + 0.5f + at_x / (16 * of_this),
-                                             static_cast<float>(y) + 0.5f + at_y / (16 * of_this));
-        shaded += of_this;
-      }
-      const auto taken = end - begin;
-      const float alpha = static_cast<float>(taken) / static_cast<float>(left);
-      left -= taken;
-      layers.push_back({triangles_.depthOf(static_cast<float>(value / static_cast<double>(taken)),
-                                           static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f),
-                        glm::vec4(alpha * colour / shaded, alpha)});
+      const size_t end = endOfLayer(seen, begin, count);
+      layers.push_back(layerOf(std::span(seen).subspan(begin, end - begin), x, y, left, hidden));
       begin = end;
     }
   }
 
  private:
-  /// A pixel's size, in values: perspective, d(-1/z) = dz / z², and a pixel is z / focal.
-  double pixelOf(uint64_t sample) const {
-    const ScreenView& view = triangles_.view();
-    return view.projection == Projection::kPerspective
-               ? std::abs(double{SampleBand::valueOf(sample)}) / view.focal_px
-               : 1 / view.focal_px;
+  /// A sample.
+  struct Seen {
+    float value;
+    uint32_t number, place;
+
+    bool operator<(const Seen& other) const {
+      return value < other.value || (value == other.value && number < other.number);
+    }
+  };
+
+  /// Of sorted samples, the first that is not of the layer that begins at `begin`.
+  size_t endOfLayer(const std::array<Seen, kSamples>& seen, size_t begin, size_t count) const {
+    double tolerance = 0;
+    size_t known = begin;  // the samples before it are in the tolerance
+    size_t end = begin + 1;
+    for (; end < count; ++end) {
+      const double gap = double{seen[end].value} - double{seen[end - 1].value};
+      if (gap <= kNear * pixelOf(seen[end].value)) continue;  // whatever the slope
+      for (; known <= end; ++known)
+        if (known == begin || seen[known].number != seen[known - 1].number)
+          tolerance = std::max(tolerance, toleranceOf(seen[known]));
+      if (gap > tolerance) break;
+    }
+    return end;
   }
-  double toleranceOf(uint32_t number, uint64_t sample) const {
-    const double pixel = pixelOf(sample);
-    return std::min(double{shader_.steepness(number)}, kSteepest * pixel) + kNear * pixel;
+
+  /// Of the samples of one layer. `left`: samples that nothing opaque has hidden so far.
+  PixelLayer layerOf(std::span<const Seen> seen, int x, int y, size_t& left, unsigned& hidden) const {
+    size_t opaque = seen.size();
+    if (has_translucent_) {
+      opaque = 0;
+      for (const Seen& sample : seen)
+        if (shader_.isOpaque(sample.number)) {
+          ++opaque;
+          hidden |= 1u << sample.place;
+        }
+    }
+    // Opaque ones hide what is left; translucent ones cover their part of the pixel.
+    const float part_of =
+        static_cast<float>(seen.size()) / static_cast<float>(opaque == seen.size() ? left : kSamples);
+    left -= opaque;
+    struct Part {
+      uint32_t number;
+      float x, y, count;
+    };
+    std::array<Part, kMostShaded> parts;
+    size_t count = 0;
+    double value = 0;
+    for (const Seen& sample : seen) {
+      value += double{sample.value};
+      size_t n = 0;
+      while (n < count && parts[n].number != sample.number) ++n;
+      if (n == kMostShaded) continue;
+      if (n == count) parts[count++] = {sample.number, 0, 0, 0};
+      parts[n].x += static_cast<float>(kSampleOffsets[sample.place][0]);
+      parts[n].y += static_cast<float>(kSampleOffsets[sample.place][1]);
+      ++parts[n].count;
+    }
+    const float middle_x = static_cast<float>(x) + 0.5f, middle_y = static_cast<float>(y) + 0.5f;
+    std::array<Shader::Point, kMostShaded> points;
+    Shader::Point mean;
+    float shaded = 0;
+    bool smooth = true;
+    for (size_t n = 0; n < count; ++n) {
+      const Part& part = parts[n];
+      points[n] = shader_.pointAt(part.number, middle_x + part.x / (16 * part.count),
+                                  middle_y + part.y / (16 * part.count));
+      const float facing = glm::dot(points[n].normal, points[0].normal);
+      if (facing < 0) points[n].normal = -points[n].normal;
+      smooth = smooth && std::abs(facing) > kSmooth;
+      mean.colour += part.count * points[n].colour;
+      mean.normal += part.count * points[n].normal;
+      mean.opacity += part.count * points[n].opacity;
+      shaded += part.count;
+    }
+    mean.colour /= shaded;
+    const float alpha = has_translucent_ ? part_of * mean.opacity / shaded : part_of;
+    glm::vec3 colour(0.0f);
+    if (smooth)
+      colour = shader_.lit(mean, middle_x, middle_y);
+    else
+      for (size_t n = 0; n < count; ++n)
+        colour += parts[n].count / shaded * shader_.lit(points[n], middle_x, middle_y);
+    return {
+        triangles_.depthOf(static_cast<float>(value / static_cast<double>(seen.size())), middle_x, middle_y),
+        glm::vec4(alpha * colour, alpha)};
+  }
+
+  /// A pixel's size, in values: perspective, d(-1/z) = dz / z², and a pixel is z / focal.
+  double pixelOf(float value) const {
+    const ScreenView& view = triangles_.view();
+    return view.projection == Projection::kPerspective ? std::abs(double{value}) / view.focal_px
+                                                       : 1 / view.focal_px;
+  }
+  double toleranceOf(const Seen& sample) const {
+    const double pixel = pixelOf(sample.value);
+    return std::min(double{shader_.steepness(sample.number)}, kSteepest * pixel) + kNear * pixel;
   }
 
   const SceneTriangles& triangles_;
   const Shader& shader_;
+  const bool has_translucent_;
 };
 
 /// What clip planes leave of a slice at a point, smoothed over a pixel.
@@ -183,58 +260,89 @@ float coverageAt(std::span<const ClipPlane> planes, const glm::dvec3& at, double
   return static_cast<float>(coverage);
 }
 
+/// The layers that slices make of a pixel.
+class PixelSlices {
+ public:
+  PixelSlices(const SurfaceScene& scene, const ScreenView& view,
+              std::span<const std::unique_ptr<SliceSampler>> slices, const SceneLook& look)
+      : scene_(scene), view_(view), slices_(slices), look_(look), light_(look.light, view) {}
+
+  bool empty() const { return slices_.empty(); }
+
+  void append(int x, int y, std::vector<PixelLayer>& layers) const {
+    for (size_t n = 0; n < slices_.size(); ++n) {
+      const auto& slice = slices_[n];
+      const auto sample = slice->at(x, y, look_.depth_origin);
+      if (!sample) continue;
+      const glm::dvec3 in_view = view_.viewFromData(sample->at);
+      const double pixel = (view_.projection == Projection::kPerspective ? in_view.z : 1) / view_.focal_px /
+                           std::max({view_.scale.x, view_.scale.y, view_.scale.z});
+      const float alpha = sample->coverage * coverageAt(look_.clip_planes, sample->at, pixel) *
+                          static_cast<float>(scene_.slice_opacity) * opacityOf(n, *sample, x, y);
+      glm::vec3 colour = look_.colours.at(sample->scalar);
+      if (look_.light)
+        colour = light_.lit(colour, glm::vec3(slice->plane().normal),
+                            towardsViewer(view_, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f));
+      layers.push_back({sample->depth, glm::vec4(alpha * colour, alpha)});
+    }
+  }
+
+ private:
+  /// By the function.
+  float opacityOf(size_t slice, const SliceSampler::Sample& sample, int x, int y) const {
+    if (!scene_.slices_by_function || !look_.opacities) return 1;
+    if (look_.opacity_slices.empty()) return look_.opacities->opacityAt(sample.scalar);
+    const auto other = look_.opacity_slices[slice]->at(x, y, look_.depth_origin);
+    return other ? look_.opacities->opacityAt(other->scalar) : 0;
+  }
+
+  const SurfaceScene& scene_;
+  const ScreenView& view_;
+  const std::span<const std::unique_ptr<SliceSampler>> slices_;
+  const SceneLook& look_;
+  const SurfaceLight light_;
+};
+
 }  // namespace
 
 PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
-                     std::span<const std::unique_ptr<SliceSampler>> slices, const SceneLook& look,
-                     uint64_t band_bytes) {
+                     std::span<const std::unique_ptr<SliceSampler>> slices, const SceneLook& look) {
   const SceneTriangles triangles(scene, view, look.depth_origin);
+  const TriangleBins bins(triangles);
   const Shader shader(triangles, look);
-  const PixelSurfaces surfaces(triangles, shader);
-  const SurfaceLight slice_light(look.light, view);
-  std::vector<PixelLayers::Row> rows(static_cast<size_t>(view.size.height));
-  const auto appendSlices = [&](int x, int y, std::vector<PixelLayer>& layers) {
-    for (const auto& slice : slices) {
-      const auto sample = slice->at(x, y, look.depth_origin);
-      if (!sample) continue;
-      const glm::dvec3 in_view = view.viewFromData(sample->at);
-      const double pixel = (view.projection == Projection::kPerspective ? in_view.z : 1) / view.focal_px /
-                           std::max({view.scale.x, view.scale.y, view.scale.z});
-      const float alpha = sample->coverage * coverageAt(look.clip_planes, sample->at, pixel) *
-                          static_cast<float>(scene.slice_opacity);
-      glm::vec3 colour = look.colours.at(sample->scalar);
-      if (look.light)
-        colour =
-            slice_light.lit(colour, glm::vec3(slice->plane().normal),
-                            shader.towardsViewer(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f));
-      layers.push_back({sample->depth, glm::vec4(alpha * colour, alpha)});
-    }
-  };
-  const SceneTriangles::PixelBox& box = triangles.box();
-  const int band_rows = SampleBand::rowsOf(view.size, band_bytes);
-  std::optional<SampleBand> band;
-  if (!box.empty()) band.emplace(view.size, std::min(band_rows, box.y1 - box.y0));
-  const auto drawRows = [&](int first, int end, bool has_surfaces) {
-    if (has_surfaces) band->draw(triangles, first, end - first);
-    tbb::parallel_for(first, end, [&](int y) {
-      PixelLayers::Row& row = rows[static_cast<size_t>(y)];
-      row.counts.reserve(static_cast<size_t>(view.size.width));
-      for (int x = 0; x < view.size.width; ++x) {
-        const size_t before = row.layers.size();
-        if (has_surfaces && x >= box.x0 && x < box.x1) surfaces.append(band->at(x, y), x, y, row.layers);
-        appendSlices(x, y, row.layers);
-        row.endPixel(before);
+  const PixelSurfaces pixel_surfaces(triangles, shader);
+  const PixelSlices pixel_slices(scene, view, slices, look);
+  const auto columns = static_cast<size_t>(bins.columns());
+  std::vector<PixelLayers::Row> rows(columns * static_cast<size_t>(view.size.height));
+  // One tile after the other: what is seen first, and through it, what lies behind.
+  tbb::enumerable_thread_specific<std::vector<SampleTile>> tiles_of_threads;
+  tbb::parallel_for(size_t{0}, columns * static_cast<size_t>(bins.rows()), [&](size_t number) {
+    std::vector<SampleTile>& tiles = tiles_of_threads.local();
+    tiles.resize(pixel_surfaces.hasTranslucent() ? PixelLayers::kMostLayers : 1);
+    const auto column = static_cast<int>(number % columns), row = static_cast<int>(number / columns);
+    size_t drawn = 0;
+    while (drawn < tiles.size() &&
+           tiles[drawn].draw(triangles, bins, column, row, drawn > 0 ? &tiles[drawn - 1] : nullptr))
+      ++drawn;
+    const SampleTile& tile = tiles.front();
+    for (int y = tile.y0(); y <= tile.y1(); ++y) {
+      PixelLayers::Row& out = rows[static_cast<size_t>(y) * columns + number % columns];
+      const auto width = static_cast<size_t>(tile.x1() - tile.x0() + 1);
+      if (drawn == 0 && pixel_slices.empty()) {
+        out.counts.assign(width, 0);
+        continue;
       }
-    });
-  };
-  if (box.empty()) {
-    drawRows(0, view.size.height, false);
-  } else {
-    drawRows(0, box.y0, false);
-    for (int first = box.y0; first < box.y1; first += band_rows)
-      drawRows(first, std::min(first + band_rows, box.y1), true);
-    drawRows(box.y1, view.size.height, false);
-  }
+      out.counts.reserve(width);
+      out.layers.reserve(width);
+      for (int x = tile.x0(); x <= tile.x1(); ++x) {
+        const size_t before = out.layers.size();
+        unsigned hidden = 0;  // bits of samples
+        for (size_t n = 0; n < drawn; ++n) pixel_surfaces.append(tiles[n].at(x, y), x, y, hidden, out.layers);
+        pixel_slices.append(x, y, out.layers);
+        out.endPixel(before);
+      }
+    }
+  });
   return {view.size, std::move(rows), look.depth_origin};
 }
 

@@ -20,12 +20,16 @@ struct SceneLook {
   std::optional<Light> light;              // none: surfaces have a light at the viewer, slices none
   std::span<const ClipPlane> clip_planes;  // of slices
   double depth_origin = 0;
+  // Of slices whose opacities are a function's: it, and where it is of another scalar, that one's samples.
+  const ColourTable* opacities = nullptr;
+  std::span<const std::unique_ptr<SliceSampler>> opacity_slices = {};
 };
 
-/// The layers of a picture. `slices`: those of the scene that were sampled, complete. Surfaces are drawn in bands of
-/// at most `band_bytes`. Parallel on the caller's TBB arena; the same bits for any number of threads.
+/// The layers of a picture. `slices`: those of the scene that were sampled, complete. Takes 256 KiB a thread (with
+/// translucent surfaces 1 MiB), and 12
+/// bytes a vertex and some 6 a triangle of surfaces. Parallel on the caller's TBB arena; the same bits for any number
+/// of threads.
 PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
-                     std::span<const std::unique_ptr<SliceSampler>> slices, const SceneLook& look,
-                     uint64_t band_bytes = 32 << 20);
+                     std::span<const std::unique_ptr<SliceSampler>> slices, const SceneLook& look);
 
 }  // namespace curvisplat

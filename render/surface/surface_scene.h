@@ -20,13 +20,22 @@ inline constexpr size_t kMaxSlices = 8;
 /// Of a crossing. More would widen outlines.
 inline constexpr double kIsoOpacity = 0.95;
 
-/// Opaque and lit, from both sides. In data coordinates.
+/// How much of what lies behind a surface or a slice it hides.
+struct SheetOpacity {
+  double factor = 1;
+  bool by_function = false;  // times the opacity that the transfer function of its colours has for the scalar
+
+  bool opaque() const { return factor >= 1 && !by_function; }
+};
+
+/// Lit, from both sides. In data coordinates.
 struct Surface {
   std::shared_ptr<const TriangleMesh> mesh;
   glm::vec3 colour{0.7f, 0.7f, 0.7f};
   // The transfer function's colours for the mesh's scalars; `colour` where it has none.
   bool by_scalar = false;
   std::shared_ptr<const ColourTable> colours = nullptr;  // in place of those of the picture's function
+  SheetOpacity opacity = {};                             // by_function: where `by_scalar`
 };
 
 /// Faces of the grid from its cache, drawn as a Surface at a level of detail that depends on the view.
@@ -43,6 +52,7 @@ struct GridSurface {
   std::optional<size_t> scalar;                                // among those of the faces; none: `colour`
   std::shared_ptr<const ColourTable> colours = nullptr;        // as Surface
   std::shared_ptr<const TransferFunction> function = nullptr;  // that `colours` are of
+  SheetOpacity opacity = {};
 
   /// Whether the same patches make the same mesh.
   bool hasMeshOf(const GridSurface& other) const {
@@ -55,7 +65,8 @@ struct SurfaceScene {
   std::vector<GridSurface> grid_surfaces;
   std::vector<ClipPlane> slices;  // planes; either side
   double slice_opacity = 1;
-  std::vector<double> isovalues;  // of the picture's scalar; in the colours of its function
+  bool slices_by_function = false;  // times the function's opacity; of two scalars, of that of the opacities
+  std::vector<double> isovalues;    // of the picture's scalar; in the colours of its function
   double iso_opacity = kIsoOpacity;
   bool volume = true;  // false: surfaces and slices alone
 

@@ -1,13 +1,18 @@
-// Measures the time that a scope takes and adds it to a sum of seconds.
+// Measures the time that a scope takes and adds it to a sum of seconds. The scope is also in the trace, if one is
+// written.
 #pragma once
 
 #include <chrono>
+
+#include "stream/base/trace.h"
 
 namespace curvisplat {
 
 class StageTimer {
  public:
-  explicit StageTimer(double& seconds) : seconds_(seconds), start_(std::chrono::steady_clock::now()) {}
+  /// `name`, `kind`: in the trace, see TraceScope.
+  StageTimer(double& seconds, const char* name, TraceKind kind = TraceKind::kWork)
+      : trace_(name, kind), seconds_(seconds), start_(std::chrono::steady_clock::now()) {}
   ~StageTimer() {
     seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   }
@@ -15,6 +20,7 @@ class StageTimer {
   StageTimer& operator=(const StageTimer&) = delete;
 
  private:
+  const TraceScope trace_;
   double& seconds_;
   const std::chrono::steady_clock::time_point start_;
 };

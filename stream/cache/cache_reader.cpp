@@ -111,7 +111,7 @@ struct CacheReader::State {
 
   static void readInto(const InputFile& file, uint32_t brick, const Extent& extent, std::span<std::byte> to,
                        ReadTimes& times) {
-    const StageTimer timer(times.read_s);
+    const StageTimer timer(times.read_s, "read brick");
     try {
       file.readAt(extent.offset, to);
     } catch (const TruncatedFile& error) {
@@ -123,7 +123,7 @@ struct CacheReader::State {
 
   static void verify(const InputFile& file, uint32_t brick, const Extent& extent,
                      std::span<const std::byte> bytes, ReadTimes& times) {
-    const StageTimer timer(times.verify_s);
+    const StageTimer timer(times.verify_s, "verify brick");
     CURVISPLAT_CHECK_OP(bytes.size(), ==, extent.length);
     const uint64_t found = checksumOf(bytes);
     if (found != extent.checksum)
@@ -136,7 +136,7 @@ struct CacheReader::State {
   /// Runs `work`, which decodes a verified stream, and prefixes its errors with file and brick.
   template <typename Work>
   static void decode(const InputFile& file, uint32_t brick, ReadTimes& times, const Work& work) {
-    const StageTimer timer(times.decode_s);
+    const StageTimer timer(times.decode_s, "decode brick");
     try {
       work();
     } catch (const DamagedBrick&) {

@@ -224,12 +224,14 @@ class Verifier {
   }
 
   void verifyFaces() {
-    try {
-      const auto faces = FacesReader::open(reader_.path(), reader_.manifest());
-      if (!faces) return;
-      for (uint32_t n = 0; n < faces->patches().size(); ++n) verifyPatch(*faces, n);
-    } catch (const Error& error) {
-      find("{}", error.what());
+    for (const FileInfo& info : reader_.manifest().files) {
+      if (!isFacesFile(info.name)) continue;
+      try {
+        const auto faces = FacesReader::open(reader_.path(), reader_.manifest(), info.name);
+        for (uint32_t n = 0; n < faces->patches().size(); ++n) verifyPatch(*faces, n);
+      } catch (const Error& error) {
+        find("{}", error.what());
+      }
     }
   }
 

@@ -162,6 +162,18 @@ class FacesChecker {
 
 }  // namespace
 
+std::string facesFileOfVariable(uint32_t number) {
+  return fmt::format("faces.var{}.bin", number);
+}
+
+std::string facesFileOfStep(uint64_t step) {
+  return fmt::format("faces.step{}.bin", step);
+}
+
+bool isFacesFile(const std::string& name) {
+  return name.starts_with("faces.") && name.ends_with(".bin");
+}
+
 FacesWriter::FacesWriter(const std::filesystem::path& path, const FaceBox& box,
                          std::vector<uint32_t> variables)
     : file_(path), box_(box), variables_(std::move(variables)) {
@@ -200,16 +212,16 @@ FileInfo FacesWriter::finish(std::span<const GridFace> faces, std::span<const Fa
     checksum.add(part);
   }
   file_.writeAt(0, bytesOf(header));
-  const FileInfo info{kFacesFileName, file_.size(), checksum.value()};
+  const FileInfo info{file_.path().filename().string(), file_.size(), checksum.value()};
   file_.close();
   return info;
 }
 
-std::shared_ptr<const FacesReader> FacesReader::open(const std::filesystem::path& cache,
-                                                     const Manifest& manifest) {
+std::shared_ptr<const FacesReader> FacesReader::open(const std::filesystem::path& folder,
+                                                     const Manifest& manifest, const std::string& name) {
   for (const FileInfo& info : manifest.files)
-    if (info.name == kFacesFileName)
-      return std::shared_ptr<const FacesReader>(new FacesReader(cacheFile(cache, kFacesFileName), info));
+    if (info.name == name)
+      return std::shared_ptr<const FacesReader>(new FacesReader(cacheFile(folder, name.c_str()), info));
   return nullptr;
 }
 

@@ -4,6 +4,9 @@
 //   FacesHeader | streams of patches | zeros | numbers of variables | FaceRecord x faces | PatchRecord x patches
 //   ^ offset 0                               ^ table_offset         | RegionRecord x regions
 //
+// Files of the same form in the cache's own folder have the same faces with other values: faces.var<v>.bin those of
+// variables that were added, v the first, and faces.step<s>.bin those of step s, where the geometry has several steps.
+//
 // Streams are aligned as in geometry.bin. The manifest's checksum is that of the header and the table.
 #pragma once
 
@@ -24,6 +27,10 @@
 namespace curvisplat {
 
 inline constexpr const char* kFacesFileName = "faces.bin";
+std::string facesFileOfVariable(uint32_t number);
+std::string facesFileOfStep(uint64_t step);
+/// Whether the name is that of any file of faces.
+bool isFacesFile(const std::string& name);
 inline constexpr std::array<char, 8> kFacesMagic{'C', 'V', 'S', 'f', 'a', 'c', 'e', 's'};
 
 struct FacesHeader {
@@ -90,9 +97,10 @@ class FacesWriter {
 /// The faces of a cache. Opening reads the tables and checks them. Immutable: any thread reads.
 class FacesReader {
  public:
-  /// Null if the cache has no faces. Throws Error if the file is damaged.
-  static std::shared_ptr<const FacesReader> open(const std::filesystem::path& cache,
-                                                 const Manifest& manifest);
+  /// Null if the manifest does not list the file. Throws Error if it is damaged.
+  static std::shared_ptr<const FacesReader> open(const std::filesystem::path& folder,
+                                                 const Manifest& manifest,
+                                                 const std::string& name = kFacesFileName);
 
   const std::filesystem::path& path() const { return file_.path(); }
   std::span<const GridFace> faces() const { return faces_; }

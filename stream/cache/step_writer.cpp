@@ -35,14 +35,13 @@ void putStep(const CacheLock& lock, Manifest manifest, Series series, SeriesStep
     variable.max = std::max(variable.max, added.ranges[v].max);
   }
   series.add(std::move(step));
+  manifest.files.insert(manifest.files.end(), added.files.begin(), added.files.end());
   const FileInfo info = appendStep(lock.cache(), manifest, series);
   std::erase_if(manifest.files, [](const FileInfo& file) { return file.name == kStepsFileName; });
   manifest.files.push_back(info);
-  if (!manifest.hasFeature(kSteps)) {
-    // The name must be on the disk before a manifest that lists it.
-    syncDirectory(lock.cache());
-    manifest.requirements.push_back(kSteps);
-  }
+  if (!manifest.hasFeature(kSteps) || !added.files.empty())
+    syncDirectory(lock.cache());  // names must be on the disk before a manifest that lists them
+  if (!manifest.hasFeature(kSteps)) manifest.requirements.push_back(kSteps);
   addSources(added.sources, manifest);
   replaceManifest(lock.cache(), manifest);
 }

@@ -25,6 +25,7 @@ struct NewStep {
   double time = 0;
   std::vector<StepRange> ranges;     // [variable]
   std::vector<std::string> sources;  // files
+  std::vector<FileInfo> files = {};  // further ones in the cache's folder, complete
 };
 
 /// For one thread at a time.

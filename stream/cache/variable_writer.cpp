@@ -10,6 +10,7 @@
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/cache/cache_index.h"
+#include "stream/cache/faces_file.h"
 #include "stream/cache/replace_manifest.h"
 #include "stream/cache/stream_file.h"
 
@@ -47,6 +48,7 @@ VariableWriter::~VariableWriter() {
   // If another cache has replaced this one, files of these names are that cache's.
   if (in_place_ || !lock_->isStillThere()) return;
   for (const NewFile& file : files_) removeAll(file.is_renamed ? file.path : file.part);
+  for (const FileInfo& other : others_) removeAll(lock_->cache() / other.name);
 }
 
 /// Removes the files that a killed program left behind: those that the manifest does not list.
@@ -56,8 +58,15 @@ void VariableWriter::removeLeftovers() const {
     const std::string name = entry.path().filename().string();
     const bool is_known = std::any_of(manifest_.files.begin(), manifest_.files.end(),
                                       [&](const FileInfo& file) { return file.name == name; });
-    if (!is_known && (name.starts_with("var.") || name.ends_with(kPartSuffix))) removeAll(entry.path());
+    if (!is_known && (name.starts_with("var.") || isFacesFile(name) || name.ends_with(kPartSuffix)))
+      removeAll(entry.path());
   }
+}
+
+std::vector<uint32_t> VariableWriter::numbers() const {
+  std::vector<uint32_t> numbers;
+  for (const NewFile& file : files_) numbers.push_back(file.variable.number);
+  return numbers;
 }
 
 void VariableWriter::append(uint32_t brick, std::span<const EncodedValues> values) {
@@ -69,6 +78,7 @@ std::vector<FileInfo> VariableWriter::finish(const std::vector<std::string>& sou
   std::vector<FileInfo> infos;
   for (NewFile& file : files_)
     infos.push_back(finishVariableFile(file.file, variableFileName(file.variable), file.table));
+  infos.insert(infos.end(), others_.begin(), others_.end());
   if (!lock_->isStillThere())
     throw Error(
         "{}: another program has replaced the cache; the new cache was not changed: add the scalar to it "

@@ -28,6 +28,11 @@ class VariableWriter : public ValuesWriter {
 
   void append(uint32_t brick, std::span<const EncodedValues> values) override;
 
+  /// The numbers of the new variables.
+  std::vector<uint32_t> numbers() const;
+  /// A further file of the cache's folder, complete: finish() lists it; removed unless that succeeds.
+  void addFile(const FileInfo& file) { others_.push_back(file); }
+
   /// Writes the tables, syncs, and puts the files and the manifest into place. Adds those `sources` to the
   /// manifest that it does not list yet. Returns the manifest's entries for the new files. After an Error the
   /// cache is what it was; after NameNotSynced it has the new files, though a power loss may undo that.
@@ -47,6 +52,7 @@ class VariableWriter : public ValuesWriter {
   const CacheLock* lock_;
   Manifest manifest_;
   std::vector<NewFile> files_;
+  std::vector<FileInfo> others_;
   bool in_place_ = false;
 };
 

@@ -12,20 +12,30 @@ namespace {
 // Arrays begin at whole cache lines.
 constexpr uint64_t kLineFloats = Arena::kBlockAlignment / sizeof(float);
 
+/// Arrays of a variable.
+uint64_t arraysOfVariable() {
+  uint64_t count = 0;
+  VariableArrays<float> arrays{};
+  forEachArrayOfVariable(arrays, [&](auto&) { ++count; });
+  return count;
+}
+
 uint64_t strideOf(uint64_t splats) {
   return (splats + kLineFloats - 1) / kLineFloats * kLineFloats;
 }
 
 }  // namespace
 
-BrickCache::BrickCache(uint64_t capacity_bytes) : capacity_(capacity_bytes), arena_(capacity_bytes) {}
+BrickCache::BrickCache(uint64_t capacity_bytes, bool two_variables)
+    : capacity_(capacity_bytes), two_variables_(two_variables), arena_(capacity_bytes) {}
 
 BrickCache::~BrickCache() {
   CURVISPLAT_CHECK_OP(entries_.size(), ==, unpinned_.size());
 }
 
-uint64_t BrickCache::charge(uint64_t splats) {
-  return Arena::charge(kArraysOfSplats * strideOf(splats) * sizeof(float));
+uint64_t BrickCache::charge(uint64_t splats, bool two_variables) {
+  const uint64_t arrays = kArraysOfSplats + (two_variables ? arraysOfVariable() : 0);
+  return Arena::charge(arrays * strideOf(splats) * sizeof(float));
 }
 
 void BrickCache::beginEpoch(const std::vector<uint32_t>& bricks) {
@@ -55,7 +65,7 @@ std::optional<BrickCache::Pin> BrickCache::find(uint32_t brick) {
 }
 
 std::optional<BrickCache::Slot> BrickCache::makeSlot(uint32_t brick, uint32_t splats) {
-  const uint64_t stride = strideOf(splats), bytes = charge(splats);
+  const uint64_t stride = strideOf(splats), bytes = charge(splats, two_variables_);
   const MutexLock lock(mutex_);
   if (bytes > capacity_ || entries_.contains(brick)) return {};
   std::byte* block = arena_.allocate(bytes);
@@ -79,6 +89,10 @@ std::optional<BrickCache::Slot> BrickCache::makeSlot(uint32_t brick, uint32_t sp
   };
   forEachArrayOfGeometry(entry.geometry, place);
   forEachArrayOfVariable(entry.values, place);
+  if (two_variables_) {
+    forEachArrayOfVariable(entry.second, place);
+    entry.second.count = splats;
+  }
   entry.geometry.count = entry.values.count = splats;
   ++statistics_.bricks;
   statistics_.bytes += bytes;
@@ -144,6 +158,10 @@ VariableArrays<const float> BrickCache::Pin::values() const {
   return entry_->values;
 }
 
+VariableArrays<const float> BrickCache::Pin::second() const {
+  return entry_->second;
+}
+
 BrickCache::Slot::Slot(Slot&& other) noexcept
     : cache_(std::exchange(other.cache_, nullptr)), entry_(other.entry_) {}
 
@@ -160,6 +178,10 @@ const GeometryArrays<float>& BrickCache::Slot::geometry() const {
 
 const VariableArrays<float>& BrickCache::Slot::values() const {
   return entry_->values;
+}
+
+const VariableArrays<float>& BrickCache::Slot::second() const {
+  return entry_->second;
 }
 
 BrickCache::Pin BrickCache::Slot::keep() && {

@@ -1,6 +1,6 @@
-// Decoded bricks of one variable that outlive a frame, in an arena of fixed size.
+// Decoded bricks of one variable, or two, that outlive a frame, in an arena of fixed size.
 //
-// Invariant: every brick is charged the bytes of its 16 arrays; the charges and the holes make up the
+// Invariant: every brick is charged the bytes of its 17 arrays, or 21 with a second variable; the charges and the holes make up the
 // capacity; a pinned brick is never evicted. Of the others the least recently used is evicted first, but none
 // that was used in the current epoch (a frame, or a prefetch). If a frame needs more bricks than the cache
 // holds, plain least recently used would evict each brick shortly before the next frame needs it, and nothing
@@ -28,7 +28,7 @@ class BrickCache {
   struct Entry;
 
  public:
-  explicit BrickCache(uint64_t capacity_bytes);
+  explicit BrickCache(uint64_t capacity_bytes, bool two_variables = false);
   ~BrickCache();
 
   /// Keeps a brick in the cache. Move-only; the cache must outlive it.
@@ -40,12 +40,13 @@ class BrickCache {
 
     GeometryArrays<const float> geometry() const;
     VariableArrays<const float> values() const;
-    /// Calls `decode` to fill the values anew if they are of an earlier step. One thread for each brick. If it
+    VariableArrays<const float> second() const;  // of two variables
+    /// Calls decode(values, second) to fill the values anew if they are of an earlier step. One thread for each brick. If it
     /// throws, they stay what they were.
     template <typename Decode>
     void refresh(const Decode& decode) const {
       if (entry_->step == cache_->step_) return;
-      decode(entry_->values);
+      decode(entry_->values, entry_->second);
       entry_->step = cache_->step_;
     }
 
@@ -66,6 +67,7 @@ class BrickCache {
 
     const GeometryArrays<float>& geometry() const;
     const VariableArrays<float>& values() const;
+    const VariableArrays<float>& second() const;
     /// Call it when the arrays are filled: find() finds the brick from now on.
     Pin keep() &&;
 
@@ -102,7 +104,7 @@ class BrickCache {
   Statistics statistics() const;
   uint64_t capacity() const { return capacity_; }
   /// The bytes that a brick of `splats` splats is charged.
-  static uint64_t charge(uint64_t splats);
+  static uint64_t charge(uint64_t splats, bool two_variables = false);
 
  private:
   struct Entry {
@@ -110,7 +112,7 @@ class BrickCache {
     uint64_t bytes = 0, epoch = 0;
     std::byte* block = nullptr;
     GeometryArrays<float> geometry{};
-    VariableArrays<float> values{};
+    VariableArrays<float> values{}, second{};
     uint32_t pins = 0;
     bool whole = false;                    // filled: find() finds it
     uint64_t step = 0;                     // whose values it has, in the cache's count
@@ -121,6 +123,7 @@ class BrickCache {
   void remove(Entry& entry) REQUIRES(mutex_);
 
   const uint64_t capacity_;
+  const bool two_variables_;
   mutable Mutex mutex_;  // guards the entries' pins and epochs, too
   Arena arena_ GUARDED_BY(mutex_);
   std::unordered_map<uint32_t, Entry> entries_ GUARDED_BY(mutex_);

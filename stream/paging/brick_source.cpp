@@ -45,9 +45,9 @@ BrickSource::BrickSource(const CacheReader& cache, const Variables& variables, c
     : cache_(cache),
       variable_(variables.first),
       second_(variables.second),
-      cached_(cache_bytes),
+      cached_(cache_bytes, variables.second.has_value()),
       kept_(kept_bytes),
-      pager_(cache, variables.first, pager) {}
+      pager_(cache, variables, pager) {}
 
 void BrickSource::start(std::span<const BrickPart> parts, BrickPager::Unneeded unneeded) {
   parts_.assign(parts.begin(), parts.end());
@@ -68,20 +68,6 @@ void BrickSource::start(std::span<const BrickPart> parts, BrickPager::Unneeded u
 }
 
 std::optional<BrickSource::Splats> BrickSource::take(uint64_t sequence, Scratch& scratch) {
-  std::optional<Splats> splats = takeFirst(sequence, scratch);
-  if (!splats || !second_) return splats;
-  const uint32_t brick = parts_[sequence].brick;
-  if (splats->geometry.size() == 0) {
-    scratch.second.resize(0);
-  } else {
-    cache_.readVariable(brick, *second_, scratch.second, &scratch.times, &kept_);
-    second_bytes_ += cache_.brickVariables(*second_)[brick].values.length;
-  }
-  splats->second = arraysOf(std::as_const(scratch.second));
-  return splats;
-}
-
-std::optional<BrickSource::Splats> BrickSource::takeFirst(uint64_t sequence, Scratch& scratch) {
   CURVISPLAT_CHECK_OP(sequence, <, parts_.size());
   const BrickPart& part = parts_[sequence];
   if (pins_[sequence]) {
@@ -101,30 +87,35 @@ std::optional<BrickSource::Splats> BrickSource::read(const BrickPart& part, uint
   if (bytes->isLeftOut()) {
     scratch.geometry.resize(0);
     scratch.values.resize(0);
-    return Splats{arraysOf(std::as_const(scratch.geometry)), arraysOf(std::as_const(scratch.values)),
-                  SplatRanges(Brick(), kAllOctants), cache_.bricks()[part.brick].cell, std::nullopt};
+    scratch.second.resize(0);
+    Splats none{arraysOf(std::as_const(scratch.geometry)), arraysOf(std::as_const(scratch.values)),
+                SplatRanges(Brick(), kAllOctants), cache_.bricks()[part.brick].cell, std::nullopt};
+    if (second_) none.second = arraysOf(std::as_const(scratch.second));
+    return none;
   }
   if (!bytes->readable()) {
     // The read may have failed for a neighbour's sake. If not, this says what is wrong.
     bytes.reset();
     return readAlone(part, scratch);
   }
-  const uint32_t splats = cache_.bricks()[part.brick].splats;
-  if (auto slot = cached_.makeSlot(part.brick, splats)) {
-    decode(part.brick, *bytes, slot->geometry(), slot->values(), scratch);
+  if (auto slot = cached_.makeSlot(part.brick, cache_.bricks()[part.brick].splats)) {
+    decode(part.brick, *bytes, *slot, scratch);
     return splatsOf(std::move(*slot).keep(), part);
   }
-  scratch.geometry.resize(splats);
-  scratch.values.resize(splats);
-  decode(part.brick, *bytes, arraysOf(scratch.geometry), arraysOf(scratch.values), scratch);
+  decode(part.brick, *bytes, scratch);
   return splatsOf(scratch, part);
 }
 
 /// The values of a brick whose geometry is there, of this step. They are read by the worker: a few pages, which the
 /// prefetch of the step has usually brought into memory.
 void BrickSource::refresh(const BrickCache::Pin& pin, uint32_t brick, Scratch& scratch) {
-  pin.refresh([&](const VariableArrays<float>& values) {
+  pin.refresh([&](const VariableArrays<float>& values, const VariableArrays<float>& second) {
+    // Both are read before either is replaced.
     cache_.readVariable(brick, variable_, scratch.values, &scratch.times, &kept_);
+    if (second_) {
+      cache_.readVariable(brick, *second_, scratch.second, &scratch.times, &kept_);
+      copyValues(arraysOf(std::as_const(scratch.second)), second);
+    }
     copyValues(arraysOf(std::as_const(scratch.values)), values);
   });
 }
@@ -140,29 +131,48 @@ void BrickSource::stepChanged() {
 BrickSource::Splats BrickSource::readAlone(const BrickPart& part, Scratch& scratch) const {
   cache_.readGeometry(part.brick, scratch.geometry, nullptr, &scratch.times);
   cache_.readVariable(part.brick, variable_, scratch.values, &scratch.times);
+  if (second_) cache_.readVariable(part.brick, *second_, scratch.second, &scratch.times);
   return splatsOf(scratch, part);
 }
 
 BrickSource::Splats BrickSource::splatsOf(BrickCache::Pin pin, const BrickPart& part) const {
   const Brick& brick = cache_.bricks()[part.brick];
-  return {pin.geometry(), pin.values(), SplatRanges(brick, part.octants), brick.cell, std::move(pin)};
+  const auto second = second_ ? std::optional(pin.second()) : std::nullopt;
+  return {pin.geometry(), pin.values(), SplatRanges(brick, part.octants), brick.cell, std::move(pin), second};
 }
 
 BrickSource::Splats BrickSource::splatsOf(const Scratch& scratch, const BrickPart& part) const {
   const Brick& brick = cache_.bricks()[part.brick];
-  return {arraysOf(scratch.geometry), arraysOf(scratch.values), SplatRanges(brick, part.octants), brick.cell,
-          std::nullopt};
+  const auto second = second_ ? std::optional(arraysOf(scratch.second)) : std::nullopt;
+  return {arraysOf(scratch.geometry),
+          arraysOf(scratch.values),
+          SplatRanges(brick, part.octants),
+          brick.cell,
+          std::nullopt,
+          second};
 }
 
 std::optional<PagedBrick> BrickSource::await(uint64_t miss, Scratch& scratch) {
-  const StageTimer timer(scratch.waited_s);
+  const StageTimer timer(scratch.waited_s, "wait for a brick", TraceKind::kWait);
   return pager_.take(miss);
 }
 
-void BrickSource::decode(uint32_t brick, const PagedBrick& bytes, const GeometryArrays<float>& geometry,
-                         const VariableArrays<float>& values, Scratch& scratch) {
-  cache_.decode(brick, bytes.geometry(), geometry, scratch.times);
-  cache_.decode(brick, variable_, bytes.values(), values, scratch.times, &kept_);
+void BrickSource::decode(uint32_t brick, const PagedBrick& bytes, const BrickCache::Slot& slot,
+                         Scratch& scratch) {
+  cache_.decode(brick, bytes.geometry(), slot.geometry(), scratch.times);
+  cache_.decode(brick, variable_, bytes.values(), slot.values(), scratch.times, &kept_);
+  if (second_) cache_.decode(brick, *second_, bytes.second(), slot.second(), scratch.times, &kept_);
+}
+
+void BrickSource::decode(uint32_t brick, const PagedBrick& bytes, Scratch& scratch) {
+  const uint32_t splats = cache_.bricks()[brick].splats;
+  scratch.geometry.resize(splats);
+  scratch.values.resize(splats);
+  cache_.decode(brick, bytes.geometry(), arraysOf(scratch.geometry), scratch.times);
+  cache_.decode(brick, variable_, bytes.values(), arraysOf(scratch.values), scratch.times, &kept_);
+  if (!second_) return;
+  scratch.second.resize(splats);
+  cache_.decode(brick, *second_, bytes.second(), arraysOf(scratch.second), scratch.times, &kept_);
 }
 
 BrickSource::Splats BrickSource::standIn(const BrickPart& part, Scratch& scratch) const {
@@ -243,7 +253,7 @@ void BrickSource::startPrefetch(std::span<const BrickPart> parts) {
   std::unordered_set<uint32_t> seen;
   for (const uint32_t brick : bricks) {
     if (!seen.insert(brick).second) continue;
-    bytes += BrickCache::charge(cache_.bricks()[brick].splats);
+    bytes += BrickCache::charge(cache_.bricks()[brick].splats, second_.has_value());
     if (bytes > cached_.capacity()) break;
     if (!cached_.contains(brick))
       to_prefetch_.push_back(brick);
@@ -271,7 +281,7 @@ bool BrickSource::prefetchNext(Scratch& scratch) {
   if (!bytes->readable()) return true;  // the frame will tell
   auto slot = cached_.makeSlot(brick, cache_.bricks()[brick].splats);
   if (!slot) return false;
-  decode(brick, *bytes, slot->geometry(), slot->values(), scratch);
+  decode(brick, *bytes, *slot, scratch);
   std::move(*slot).keep();
   return true;
 }
@@ -289,7 +299,7 @@ void BrickSource::finish(FetchStatistics& statistics) {
   const double depth_s = statistics.mean_queue_depth * statistics.read_s + after.depth_s - before_.depth_s;
   statistics.read_s += after.reading_s - before_.reading_s;
   statistics.mean_queue_depth = statistics.read_s > 0 ? depth_s / statistics.read_s : 0;
-  statistics.bytes_read += after.bytes - before_.bytes + second_bytes_.exchange(0);
+  statistics.bytes_read += after.bytes - before_.bytes;
   statistics.read_requests += after.requests - before_.requests;
   statistics.bricks_cached += hits_;
   statistics.bricks_left_out += after.bricks_left_out - before_.bricks_left_out;

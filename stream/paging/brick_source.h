@@ -4,7 +4,7 @@
 //   start(parts)         cache: pin the bricks it has    pager: read the others ahead
 //   take(n)  workers     the pin, or: wait for the bytes, verify, decode (into the cache if it has space)
 //
-// A second variable, if there is one, is read by the workers themselves and is not kept.
+// A second variable, if there is one, is read and kept like the first.
 //
 // No brick has two parts in a frame. Where a brick comes from affects times only: decoding always gives the
 // same numbers.
@@ -43,16 +43,8 @@ struct FetchStatistics {
 
 class BrickSource {
  public:
-  /// The second variable is one that the splats have as well.
-  struct Variables {
-    size_t first = 0;
-    std::optional<size_t> second = std::nullopt;
-
-    Variables(size_t only) : first(only) {}
-    Variables(size_t of_both, std::optional<size_t> other) : first(of_both), second(other) {}
-  };
-  /// `cache` outlives it. `cache_bytes` may be 0; `kept_bytes`, for values of several steps or of the second variable,
-  /// too. Throws Error.
+  using Variables = ReadVariables;
+  /// `cache` outlives it. `cache_bytes` may be 0; `kept_bytes`, for values of several steps, too. Throws Error.
   BrickSource(const CacheReader& cache, const Variables& variables, const PagerOptions& pager,
               uint64_t cache_bytes, uint64_t kept_bytes = 0);
 
@@ -107,14 +99,13 @@ class BrickSource {
   const BrickCache& cached() const { return cached_; }
 
  private:
-  std::optional<Splats> takeFirst(uint64_t sequence, Scratch& scratch);
   std::optional<Splats> read(const BrickPart& part, uint64_t miss, Scratch& scratch);
   void refresh(const BrickCache::Pin& pin, uint32_t brick, Scratch& scratch);
   Splats readAlone(const BrickPart& part, Scratch& scratch) const;
   Splats splatsOf(BrickCache::Pin pin, const BrickPart& part) const;
   Splats splatsOf(const Scratch& scratch, const BrickPart& part) const;
-  void decode(uint32_t brick, const PagedBrick& bytes, const GeometryArrays<float>& geometry,
-              const VariableArrays<float>& values, Scratch& scratch);
+  void decode(uint32_t brick, const PagedBrick& bytes, const BrickCache::Slot& slot, Scratch& scratch);
+  void decode(uint32_t brick, const PagedBrick& bytes, Scratch& scratch);
   std::optional<PagedBrick> await(uint64_t miss, Scratch& scratch);
   void keepPart(const BrickPart& part, uint32_t ancestor, Scratch& scratch) const;
   void readAncestor(uint32_t brick, Scratch& scratch) const;
@@ -130,8 +121,7 @@ class BrickSource {
   std::vector<std::optional<BrickCache::Pin>> pins_;  // [sequence]
   std::vector<uint32_t> misses_;                      // [sequence]: place among those read
   std::vector<uint32_t> to_prefetch_, to_refresh_;
-  std::atomic<uint64_t> second_bytes_ = 0;  // read of the second variable
-  uint64_t reads_ = 0, hits_ = 0;           // bricks that the pager was asked for, and that it was not
+  uint64_t reads_ = 0, hits_ = 0;  // bricks that the pager was asked for, and that it was not
   std::atomic<uint64_t> next_prefetch_ = 0;
   std::atomic<bool> prefetch_stopped_ = false;
   PagerStatistics before_;

@@ -20,8 +20,9 @@ constexpr uint64_t kBatchesInBuffer = 8;
 // A read that the kernel puts off (EAGAIN, EINTR) so many times in a row has failed.
 constexpr uint8_t kMaxPutOff = 100;
 
-BrickExtents extentsOf(const CacheReader& cache, size_t variable, uint32_t brick) {
-  return {cache.bricks()[brick].geometry, cache.brickVariables(variable)[brick].values};
+BrickExtents extentsOf(const CacheReader& cache, const ReadVariables& variables, uint32_t brick) {
+  return {cache.bricks()[brick].geometry, cache.brickVariables(variables.first)[brick].values,
+          variables.second ? cache.brickVariables(*variables.second)[brick].values : Extent{}};
 }
 
 std::unique_ptr<AsyncReads> makeReads(const PagerOptions& options) {
@@ -45,21 +46,23 @@ PagedBrick::PagedBrick(PagedBrick&& other) noexcept
       sequence_(other.sequence_),
       readable_(other.readable_),
       left_out_(other.left_out_),
-      geometry_(other.geometry_),
-      values_(other.values_) {}
+      streams_(other.streams_) {}
 
 PagedBrick::~PagedBrick() {
   if (pager_) pager_->giveBack(sequence_);
 }
 
-BrickPager::BrickPager(const CacheReader& cache, size_t variable, const PagerOptions& options)
+BrickPager::BrickPager(const CacheReader& cache, const ReadVariables& variables, const PagerOptions& options)
     : cache_(cache),
-      variable_(variable),
+      variables_(variables),
       depth_(options.queue_depth),
       direct_(options.direct),
       capacity_(roundedToPages(options.buffer_bytes)),
       files_{std::make_unique<DirectFile>(cache.geometryPath(), options.direct),
-             std::make_unique<DirectFile>(cache.valuesPath(variable), options.direct)},
+             std::make_unique<DirectFile>(cache.valuesPath(variables.first), options.direct),
+             variables.second
+                 ? std::make_unique<DirectFile>(cache.valuesPath(*variables.second), options.direct)
+                 : nullptr},
       buffer_(static_cast<std::byte*>(std::aligned_alloc(kPageBytes, capacity_))),
       reads_(makeReads(options)),
       under_way_(depth_) {
@@ -79,10 +82,10 @@ BrickPager::~BrickPager() {
   thread_.join();
 }
 
-uint64_t BrickPager::leastBufferBytes(const CacheReader& cache, size_t variable) {
+uint64_t BrickPager::leastBufferBytes(const CacheReader& cache, const ReadVariables& variables) {
   uint64_t most = kPageBytes;
   for (uint32_t brick = 0; brick < cache.bricks().size(); ++brick)
-    most = std::max(most, pagedBytes(extentsOf(cache, variable, brick)));
+    most = std::max(most, pagedBytes(extentsOf(cache, variables, brick)));
   return most;
 }
 
@@ -102,7 +105,7 @@ void BrickPager::start(std::vector<uint32_t> bricks, Unneeded unneeded) {
   left_out_.assign(bricks_.size(), 0);
   extents_.clear();
   extents_.reserve(bricks_.size());
-  for (const uint32_t brick : bricks_) extents_.push_back(extentsOf(cache_, variable_, brick));
+  for (const uint32_t brick : bricks_) extents_.push_back(extentsOf(cache_, variables_, brick));
   stopped_ = false;
   reads_->wake();
 }
@@ -113,7 +116,9 @@ void BrickPager::stepChanged() {
   while (!failure_ && reads_under_way_ > 0) idle_.wait(lock);
   if (failure_) std::rethrow_exception(failure_);
   CURVISPLAT_CHECK_OP(lent_, ==, 0u);
-  files_[1] = std::make_unique<DirectFile>(cache_.valuesPath(variable_), direct_);
+  files_[1] = std::make_unique<DirectFile>(cache_.valuesPath(variables_.first), direct_);
+  if (variables_.second)
+    files_[2] = std::make_unique<DirectFile>(cache_.valuesPath(*variables_.second), direct_);
 }
 
 void BrickPager::stop() {
@@ -136,10 +141,13 @@ std::optional<PagedBrick> BrickPager::take(uint64_t sequence) {
   ++lent_;
   if (!batch.readable[n]) {
     ++statistics_.bricks_unreadable;
-    return PagedBrick(*this, sequence, false, {}, {});
+    return PagedBrick(*this, sequence, std::nullopt);
   }
-  return PagedBrick(*this, sequence, true, {bytes + brick.place[0], extents_[sequence][0].length},
-                    {bytes + brick.place[1], extents_[sequence][1].length});
+  std::array<std::span<const std::byte>, kBrickStreams> streams;
+  for (size_t stream = 0; stream < kBrickStreams; ++stream)
+    if (const uint32_t length = extents_[sequence][stream].length; length > 0)
+      streams[stream] = {bytes + brick.place[stream], length};
+  return PagedBrick(*this, sequence, streams);
 }
 
 PagerStatistics BrickPager::statistics() const {
@@ -195,7 +203,10 @@ void BrickPager::planAhead() {
     batch.begin = *begin;
     batch.done.assign(batch.plan.reads.size(), 0);
     batch.put_off.assign(batch.plan.reads.size(), 0);
-    batch.missing.assign(batch.plan.bricks.size(), kBrickStreams);
+    batch.missing.clear();
+    for (const BatchBrick& brick : batch.plan.bricks)
+      batch.missing.push_back(static_cast<uint8_t>(
+          kBrickStreams - std::count(brick.read.begin(), brick.read.end(), BatchBrick::kNoRead)));
     batch.readable.assign(batch.plan.bricks.size(), 1);
     batch.kept = static_cast<uint32_t>(batch.plan.bricks.size());
     planned_ += batch.kept;

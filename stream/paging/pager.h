@@ -63,9 +63,14 @@ class BrickPager;
 /// The bytes of one brick, lent: dropping it gives them back.
 class PagedBrick {
  public:
-  PagedBrick(BrickPager& pager, uint64_t sequence, bool readable, std::span<const std::byte> geometry,
-             std::span<const std::byte> values)
-      : pager_(&pager), sequence_(sequence), readable_(readable), geometry_(geometry), values_(values) {}
+  using Streams = std::array<std::span<const std::byte>, kBrickStreams>;
+
+  /// `streams`: nullopt where it is not readable.
+  PagedBrick(BrickPager& pager, uint64_t sequence, const std::optional<Streams>& streams)
+      : pager_(&pager),
+        sequence_(sequence),
+        readable_(streams.has_value()),
+        streams_(streams.value_or(Streams())) {}
   /// One that was not read because it was not needed any more.
   static PagedBrick leftOut() { return PagedBrick(); }
   ~PagedBrick();
@@ -76,8 +81,9 @@ class PagedBrick {
   bool readable() const { return readable_; }
   /// Nobody wants it: there are no bytes.
   bool isLeftOut() const { return left_out_; }
-  std::span<const std::byte> geometry() const { return geometry_; }
-  std::span<const std::byte> values() const { return values_; }
+  std::span<const std::byte> geometry() const { return streams_[0]; }
+  std::span<const std::byte> values() const { return streams_[1]; }
+  std::span<const std::byte> second() const { return streams_[2]; }  // of two variables
 
  private:
   PagedBrick() : left_out_(true) {}
@@ -86,21 +92,30 @@ class PagedBrick {
   uint64_t sequence_ = 0;
   bool readable_ = false;
   bool left_out_ = false;
-  std::span<const std::byte> geometry_, values_;
+  Streams streams_;
+};
+
+/// One variable of a cache, or two that the splats have.
+struct ReadVariables {
+  size_t first = 0;
+  std::optional<size_t> second = std::nullopt;
+
+  ReadVariables(size_t only) : first(only) {}
+  ReadVariables(size_t of_both, std::optional<size_t> other) : first(of_both), second(other) {}
 };
 
 class BrickPager {
  public:
-  /// Opens the files of one variable of `cache`, which outlives it, and starts the thread "pager". Throws
+  /// Opens the files of `cache`, which outlives it, and starts the thread "pager". Throws
   /// Error.
-  BrickPager(const CacheReader& cache, size_t variable, const PagerOptions& options);
+  BrickPager(const CacheReader& cache, const ReadVariables& variables, const PagerOptions& options);
   /// stop(), and waits for the reads under way.
   ~BrickPager();
   BrickPager(const BrickPager&) = delete;
   BrickPager& operator=(const BrickPager&) = delete;
 
   /// The buffer that the largest brick needs: it can then be read, one after the other.
-  static uint64_t leastBufferBytes(const CacheReader& cache, size_t variable);
+  static uint64_t leastBufferBytes(const CacheReader& cache, const ReadVariables& variables);
 
   /// Says of a brick that nobody needs it any more; it stays so.
   using Unneeded = std::function<bool(uint32_t brick)>;
@@ -158,7 +173,7 @@ class BrickPager {
   void countReads(int change) REQUIRES(mutex_);
 
   const CacheReader& cache_;
-  const size_t variable_;
+  const ReadVariables variables_;
   const unsigned depth_;
   const bool direct_;
   const uint64_t capacity_;

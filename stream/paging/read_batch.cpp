@@ -32,7 +32,8 @@ size_t bricksWithin(std::span<const BrickExtents> bricks, uint64_t limit_bytes) 
 
 uint64_t pagedBytes(const BrickExtents& brick) {
   uint64_t bytes = 0;
-  for (const Extent& extent : brick) bytes += pagesEnd(extent) - pageOf(extent.offset);
+  for (const Extent& extent : brick)
+    if (extent.length > 0) bytes += pagesEnd(extent) - pageOf(extent.offset);
   return bytes;
 }
 
@@ -51,6 +52,10 @@ ReadBatch planBatch(std::span<const BrickExtents> all, uint64_t limit_bytes) {
     const size_t first_read = batch.reads.size();
     for (const uint32_t brick : order) {
       const Extent& extent = bricks[brick][stream];
+      if (extent.length == 0) {
+        batch.bricks[brick].read[stream] = BatchBrick::kNoRead;
+        continue;
+      }
       const uint64_t begin = pageOf(extent.offset), end = pagesEnd(extent);
       BatchRead* read = batch.reads.size() > first_read ? &batch.reads.back() : nullptr;
       const uint64_t read_end = read ? read->offset + read->length : 0;
@@ -87,6 +92,7 @@ ReadBatch planBatch(std::span<const BrickExtents> all, uint64_t limit_bytes) {
   for (size_t n = 0; n < bricks.size(); ++n)
     for (size_t stream = 0; stream < kBrickStreams; ++stream) {
       BatchBrick& brick = batch.bricks[n];
+      if (brick.read[stream] == BatchBrick::kNoRead) continue;
       brick.read[stream] = place_of[brick.read[stream]];
       const BatchRead& read = batch.reads[brick.read[stream]];
       brick.place[stream] = read.place + static_cast<uint32_t>(bricks[n][stream].offset - read.offset);

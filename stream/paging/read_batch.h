@@ -18,8 +18,8 @@
 
 namespace curvisplat {
 
-inline constexpr size_t kBrickStreams = 2;  // geometry, then the values of one variable
-/// Where one brick's streams lie, each in a file of its own.
+inline constexpr size_t kBrickStreams = 3;  // geometry, then the values of one variable or two
+/// Where one brick's streams lie, each in a file of its own. One of length 0 is not read.
 using BrickExtents = std::array<Extent, kBrickStreams>;
 
 /// Reading a gap of this many bytes takes less time than one more request.
@@ -38,6 +38,8 @@ struct BatchRead {
 };
 
 struct BatchBrick {
+  static constexpr uint32_t kNoRead = 0xffffffff;
+
   std::array<uint32_t, kBrickStreams> place;  // of the streams in the batch's buffer
   std::array<uint32_t, kBrickStreams> read;   // that brings them
 };

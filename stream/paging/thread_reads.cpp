@@ -9,6 +9,7 @@
 #include "stream/base/file.h"
 #include "stream/base/mutex.h"
 #include "stream/base/thread_name.h"
+#include "stream/base/trace.h"
 #include "stream/paging/async_reads.h"
 
 namespace curvisplat {
@@ -67,9 +68,13 @@ class ThreadReads : public AsyncReads {
       const AsyncRead read = waiting_.front();
       waiting_.pop_front();
       lock.unlock();
-      const ssize_t got =
-          SystemCalls::current().pread(read.fd, read.to, read.count, static_cast<int64_t>(read.offset));
-      const int error = errno;
+      ssize_t got;
+      int error;
+      {
+        const TraceScope trace("read");
+        got = SystemCalls::current().pread(read.fd, read.to, read.count, static_cast<int64_t>(read.offset));
+        error = errno;
+      }
       lock.lock();
       ended_.push_back({read.tag, got < 0 ? -error : got});
       changed_.notify_one();

@@ -94,7 +94,7 @@ def write_legacy(grid, name, binary, version=51):
     assert writer.Write()
 
 
-def write_xml(writer, grid, name, mode, compressor=None, encoded=False, block=1 << 15, bits=32, big=False):
+def write_xml(writer, grid, name, mode, compressor=None, *, encoded=False, block=1 << 15, bits=32, big=False):
     if grid is not None:
         writer.SetInputData(grid)
     writer.SetFileName(str(FOLDER / name))

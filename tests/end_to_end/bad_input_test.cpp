@@ -224,11 +224,12 @@ TEST_F(BadInput, OptionValuesThatAreNone) {
   refused({"convert", file("scene.xyz"), "--threads", "1025"},
           "--threads '1025': expected a number from 0 to 1024");
   refused({"convert", file("scene.xyz"), "--threads", ""}, "--threads ''");
+  refused({"convert", file("scene.xyz"), "-o"}, "--output needs a value");
   expectOneLine(runProgram({"convert", file("scene.xyz"), file("scene.fun"), "-o", file("little.splats"),
                             "--memory", "1K"}),
-                1, {"0.0009766 MiB were given"});
+                1, {"--memory 1 KiB: conversion of 1 scalar takes at least 144 MiB"});
   expectOneLine(runProgram({"render", file("whole.splats"), "-o", file("a.png"), "--memory", "1K"}), 2,
-                {"0.0009766 MiB of memory are too little"});
+                {"--memory 1 KiB: too little"});
 }
 
 TEST_F(BadInput, MisspeltSubcommandIsToldWhichThereAre) {

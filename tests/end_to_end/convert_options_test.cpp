@@ -97,5 +97,47 @@ TEST_F(ConvertOptionsTest, TakesATrailingSlash) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "slash.splats" / "manifest.json"));
 }
 
+/// --dry-run's forecast, and the conversion that it is of.
+void expectForecastHolds(const std::vector<std::string>& conversion, const TemporaryFolder& folder) {
+  std::vector<std::string> dry = conversion, real = conversion;
+  dry.insert(dry.end(), {"--dry-run", "--stats", (folder / "dry.json").string()});
+  real.insert(real.end(), {"--stats", (folder / "real.json").string()});
+  const ProgramResult forecast = runProgram(dry);
+  ASSERT_EQ(forecast.status, 0) << forecast.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "out.splats"));
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path()))
+    EXPECT_EQ(entry.path().filename().string().find("dry-run"), std::string::npos) << entry.path();
+  const ProgramResult converted = runProgram(real);
+  ASSERT_EQ(converted.status, 0) << converted.err;
+  uint64_t bytes = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "out.splats"))
+    bytes += entry.file_size();
+  const auto found = nlohmann::json::parse(readTextFile(folder / "dry.json"))["dry_run"];
+  EXPECT_NEAR(found["cache_bytes"].get<double>() / static_cast<double>(bytes), 1, 0.05) << forecast.out;
+}
+
+TEST_F(ConvertOptionsTest, ADryRunForetellsAndLeavesNothing) {
+  expectForecastHolds({"convert", file("wake.xyz"), file("wake.fun"), "-o", file("out.splats")}, folder_);
+}
+
+TEST_F(ConvertOptionsTest, ADryRunOfASeriesCountsItsSteps) {
+  ASSERT_EQ(runProgram({"generate", "wake", "--size", "40x30x20", "--steps", "4", "-o", file("s")}).status,
+            0);
+  expectForecastHolds({"convert", file("s.xyz"), file("s_*.fun"), "-o", file("out.splats")}, folder_);
+}
+
+TEST_F(ConvertOptionsTest, ADryRunIsOfANewCache) {
+  const ProgramResult added = runProgram(
+      {"convert", file("wake.xyz"), "--add-scalar", "i", "--to", file("wake.splats"), "--dry-run"});
+  EXPECT_EQ(added.status, 2);
+  EXPECT_EQ(
+      added.err,
+      "curvisplat: --dry-run: is for a new cache; leave out --add-scalar, --add-steps, --to and --follow\n");
+  ASSERT_EQ(convert({}).status, 0);
+  const ProgramResult in_the_way = convert({"--dry-run"});
+  EXPECT_EQ(in_the_way.status, 1);
+  EXPECT_NE(in_the_way.err.find("--overwrite"), std::string::npos) << in_the_way.err;
+}
+
 }  // namespace
 }  // namespace curvisplat

@@ -26,7 +26,7 @@ Image marched(const ReferenceField& field, const KnownFunction& function, const 
   MarchSteps steps;
   steps.step = 0.016;
   steps.cells = 1;
-  return toImage(referenceMarch(field, function.exact, camera, size, steps, light));
+  return toImage(referenceMarch(field, function.exact, camera, size, steps, {light}));
 }
 
 /// The mean of `side` x `side` pixels each.
@@ -44,16 +44,23 @@ Image averaged(const Image& image, int side) {
   return out;
 }
 
-/// Expects `least_db` of `with` against the reference, of `rays` x `rays` rays a pixel, and less than that of
-/// `without`.
-void expectWorth(const std::string& what, const GridSource& source, const ReferenceField& field,
-                 const std::string& function_name, const Camera& camera, double least_db,
-                 const DirectOptions& with, const DirectOptions& without, int rays = 1) {
-  const KnownFunction function = KnownFunction::of(function_name);
-  const Image reference =
-      averaged(marched(field, function, camera, {rays * kSize.width, rays * kSize.height}), rays);
+/// A picture, and its reference of `rays` x `rays` rays a pixel.
+struct KnownPicture {
+  const GridSource& source;
+  const ReferenceField& field;
+  std::string function;
+  Camera camera;
+  int rays = 1;
+};
+
+/// Expects `least_db` of `with` against the reference, and less than that of `without`.
+void expectWorth(const std::string& what, const KnownPicture& known, double least_db,
+                 const DirectOptions& with, const DirectOptions& without) {
+  const KnownFunction function = KnownFunction::of(known.function);
+  const ImageSize size{known.rays * kSize.width, known.rays * kSize.height};
+  const Image reference = averaged(marched(known.field, function, known.camera, size), known.rays);
   const auto db = [&](const DirectOptions& options) {
-    const Image picture = drawDirectly(source, 0, options, function.table, camera, kSize);
+    const Image picture = drawDirectly(known.source, 0, options, function.table, known.camera, kSize);
     return compareImages(picture, reference).psnr_db;
   };
   const double with_db = db(with), without_db = db(without);
@@ -76,13 +83,13 @@ class Corrections : public testing::Test {
 TEST_F(Corrections, HalfCells) {
   DirectOptions without;
   without.nodes.border_codes = false;
-  expectWorth("half cells", source_, field_, "smooth", halfAnnulusCamera(), 56, {}, without);
+  expectWorth("half cells", {source_, field_, "smooth", halfAnnulusCamera()}, 56, {}, without);
 }
 
 TEST_F(Corrections, PartsAtBorders) {
   DirectOptions without;
   without.border_parts = false;
-  expectWorth("parts at borders", source_, field_, "smooth", halfAnnulusCamera(), 62, {}, without);
+  expectWorth("parts at borders", {source_, field_, "smooth", halfAnnulusCamera()}, 62, {}, without);
 }
 
 TEST_F(Corrections, FacesOfBorders) {
@@ -92,10 +99,10 @@ TEST_F(Corrections, FacesOfBorders) {
   const SceneGridSource source(constant, {64, 32, 32}, 4);
   DirectOptions without;
   without.nodes.faces = false;
-  expectWorth("faces of borders, seen edge-on", source, SceneField(*constant), "smooth", edgeOnCamera(), 37.5,
-              {}, without, 4);
-  expectWorth("faces of borders, seen obliquely", source, SceneField(*constant), "smooth",
-              halfAnnulusCamera(), 57, {}, without);
+  expectWorth("faces of borders, seen edge-on", {source, SceneField(*constant), "smooth", edgeOnCamera(), 4},
+              37.5, {}, without);
+  expectWorth("faces of borders, seen obliquely",
+              {source, SceneField(*constant), "smooth", halfAnnulusCamera()}, 57, {}, without);
 }
 
 /// Through the middle of the half-annulus: across the view, along it, and both.
@@ -116,9 +123,9 @@ TEST_F(Corrections, CutsAtClipPlanes) {
     with.clip_planes = cut.planes;
     DirectOptions without = with;
     without.cut_splats = false;
-    expectWorth(cut.name, source_, clipped, "smooth", halfAnnulusCamera(), cut.finest_db, with, without);
+    expectWorth(cut.name, {source_, clipped, "smooth", halfAnnulusCamera()}, cut.finest_db, with, without);
     with.voxel = without.voxel = 4 * 2 * halfAnnulusCamera().parallel_scale / kSize.height;
-    expectWorth(std::string(cut.name) + ", 4 pixels", source_, clipped, "smooth", halfAnnulusCamera(),
+    expectWorth(std::string(cut.name) + ", 4 pixels", {source_, clipped, "smooth", halfAnnulusCamera()},
                 cut.merged_db, with, without);
   }
 }
@@ -158,7 +165,7 @@ TEST_F(Corrections, LightFromEachSplatsGradient) {
 TEST_F(Corrections, BendsOfTheScalar) {
   DirectOptions without;
   without.nodes.bends = false;
-  expectWorth("bends of the scalar", source_, field_, "band", halfAnnulusCamera(), 58, {}, without);
+  expectWorth("bends of the scalar", {source_, field_, "band", halfAnnulusCamera()}, 58, {}, without);
 }
 
 /// A uniform medium in spectral elements: nodes at Gauss-Legendre-Lobatto points, each element's own.
@@ -184,7 +191,7 @@ TEST_F(Corrections, MiddlesOfCells) {
   DirectOptions with, without;
   with.nodes.stretch = without.nodes.stretch = false;
   without.nodes.middles = false;
-  expectWorth("middles of cells", spectral, GridField(spectral, 0), "smooth", insideSpectralElements(), 34,
+  expectWorth("middles of cells", {spectral, GridField(spectral, 0), "smooth", insideSpectralElements()}, 34,
               with, without);
 }
 
@@ -192,8 +199,8 @@ TEST_F(Corrections, StretchOfUnevenCells) {
   const FunctionGridSource spectral = spectralElements();
   DirectOptions without;
   without.nodes.stretch = false;
-  expectWorth("stretch of uneven cells", spectral, GridField(spectral, 0), "smooth", insideSpectralElements(),
-              40, {}, without);
+  expectWorth("stretch of uneven cells",
+              {spectral, GridField(spectral, 0), "smooth", insideSpectralElements()}, 40, {}, without);
 }
 
 TEST_F(Corrections, SkewOfGrowingCells) {
@@ -208,7 +215,7 @@ TEST_F(Corrections, SkewOfGrowingCells) {
   camera.position = {0.5, 0.5, 4};
   camera.focal_point = {0.5, 0.5, 0.5};
   camera.parallel_scale = 0.4;  // no borders
-  expectWorth("skew of growing cells", growing, GridField(growing, 0), "smooth", camera, 56, {}, without);
+  expectWorth("skew of growing cells", {growing, GridField(growing, 0), "smooth", camera}, 56, {}, without);
 }
 
 TEST_F(Corrections, BordersOfGrowingCells) {
@@ -228,7 +235,8 @@ TEST_F(Corrections, BordersOfGrowingCells) {
   camera.position = {0.5, 0.5, 4};
   camera.focal_point = {0.5, 0.5, 0.5};
   camera.parallel_scale = 0.47;
-  expectWorth("borders of growing cells", growing, GridField(growing, 0), "smooth", camera, 56, {}, without);
+  expectWorth("borders of growing cells", {growing, GridField(growing, 0), "smooth", camera}, 56, {},
+              without);
 }
 
 TEST_F(Corrections, Seams) {
@@ -241,8 +249,10 @@ TEST_F(Corrections, Seams) {
   Camera camera = edgeOnCamera();
   camera.focal_point = {-0.55, 0, 0.5};
   camera.parallel_scale = 0.2;  // no borders
-  expectWorth("seams", RearrangedGridSource(SceneGridSource(constant, {64, 32, 32}, 4), how),
-              SceneField(*constant), "smooth", camera, 64, {}, without);
+  expectWorth("seams",
+              {RearrangedGridSource(SceneGridSource(constant, {64, 32, 32}, 4), how), SceneField(*constant),
+               "smooth", camera},
+              64, {}, without);
 }
 
 TEST_F(Corrections, SeamsOfUnlikeBlocks) {
@@ -258,7 +268,7 @@ TEST_F(Corrections, SeamsOfUnlikeBlocks) {
   camera.position = {0, 0.5, 10};
   camera.view_up = {0, 1, 0};
   camera.parallel_scale = 0.3;  // no borders
-  expectWorth("seams of unlike blocks", source, GridField(source, 0), "smooth", camera, 56, {}, without);
+  expectWorth("seams of unlike blocks", {source, GridField(source, 0), "smooth", camera}, 56, {}, without);
 }
 
 TEST_F(Corrections, SpreadOfMergedShapes) {
@@ -270,8 +280,9 @@ TEST_F(Corrections, SpreadOfMergedShapes) {
   Camera camera = edgeOnCamera();
   camera.focal_point = {-0.55, 0, 0.5};
   camera.parallel_scale = 0.2;  // no borders
-  expectWorth("spread of merged shapes", SceneGridSource(constant, {128, 64, 64}, 4), SceneField(*constant),
-              "smooth", camera, 50, with, without);
+  expectWorth("spread of merged shapes",
+              {SceneGridSource(constant, {128, 64, 64}, 4), SceneField(*constant), "smooth", camera}, 50,
+              with, without);
 }
 
 /// Along the rows of a uniform medium in cells 0.02 apart, in voxels of 0.06: two or three cells each.
@@ -287,7 +298,7 @@ void expectEvenMergedSplatsWorth(const std::string& what, double parallel_scale,
   DirectOptions with, without;
   with.voxel = without.voxel = 0.053;
   without.even = false;
-  expectWorth(what, source, GridField(source, 0), "smooth", camera, least_db, with, without);
+  expectWorth(what, {source, GridField(source, 0), "smooth", camera}, least_db, with, without);
 }
 
 TEST_F(Corrections, EvenBlurOfMergedSplats) {
@@ -328,32 +339,32 @@ TEST_F(Corrections, VarianceOfMergedSplats) {
 TEST_F(Corrections, ClassificationPerPixel) {
   DirectOptions without;
   without.per_pixel = false;
-  expectWorth("classification per pixel", source_, field_, "band", halfAnnulusCamera(), 50, {}, without);
+  expectWorth("classification per pixel", {source_, field_, "band", halfAnnulusCamera()}, 50, {}, without);
 }
 
 TEST_F(Corrections, SlopeAlongTheRay) {
   DirectOptions without;
   without.hidden_slope = false;
-  expectWorth("slope along the ray", source_, field_, "band", halfAnnulusCamera(), 58.5, {}, without);
+  expectWorth("slope along the ray", {source_, field_, "band", halfAnnulusCamera()}, 58.5, {}, without);
 }
 
 TEST_F(Corrections, SlopeOfTheFieldNotOfThePixel) {
   DirectOptions with, without;
   with.low_pass_px2 = without.low_pass_px2 = 1.5;
   without.slope_low_pass_px2 = 1.5;
-  expectWorth("slope of the field", source_, field_, "step", halfAnnulusCamera(), 45, with, without);
+  expectWorth("slope of the field", {source_, field_, "step", halfAnnulusCamera()}, 45, with, without);
 }
 
 TEST_F(Corrections, LowPassNoWiderThanNeeded) {
   DirectOptions without;
   without.low_pass_px2 = 1.5;
-  expectWorth("narrow low-pass", source_, field_, "band", halfAnnulusCamera(), 58, {}, without);
+  expectWorth("narrow low-pass", {source_, field_, "band", halfAnnulusCamera()}, 58, {}, without);
 }
 
 TEST_F(Corrections, DistanceIsNotDepth) {
   DirectOptions without;
   without.secant = false;
-  expectWorth("distance in perspective", source_, field_, "smooth", perspectiveCamera(90), 45, {}, without);
+  expectWorth("distance in perspective", {source_, field_, "smooth", perspectiveCamera(90)}, 45, {}, without);
 }
 
 TEST_F(Corrections, WideSplatsAreCut) {
@@ -365,7 +376,7 @@ TEST_F(Corrections, WideSplatsAreCut) {
   camera.view_angle_deg = 90;
   DirectOptions without;
   without.widest = 1e9;
-  expectWorth("cutting of wide splats", source_, field_, "smooth", camera, 42, {}, without);
+  expectWorth("cutting of wide splats", {source_, field_, "smooth", camera}, 42, {}, without);
 }
 
 }  // namespace

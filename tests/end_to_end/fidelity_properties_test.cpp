@@ -50,7 +50,8 @@ Image marched(const Scene& scene, const std::string& function, const Camera& cam
   MarchSteps steps;
   steps.step = 0.016;
   steps.near = near;
-  return toImage(convergedMarch(SceneField(scene), KnownFunction::of(function).exact, camera, size, steps));
+  return toImage(
+      convergedMarch(SceneField(scene), KnownFunction::of(function).exact, camera, size, steps).image);
 }
 
 TEST_F(FidelityProperties, PicturesConvergeWithTheGrid) {

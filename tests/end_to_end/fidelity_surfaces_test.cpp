@@ -67,7 +67,7 @@ class Surfaces : public testing::Test {
     steps.step = 0.008;
     const ImageSize size{rays * kSize.width, rays * kSize.height};
     const Image image =
-        toImage(referenceMarch(field_, function.exact, camera_, size, steps, nullptr, layers));
+        toImage(referenceMarch(field_, function.exact, camera_, size, steps, {nullptr, layers}));
     Image mean(kSize);
     for (int y = 0; y < size.height; ++y)
       for (int x = 0; x < size.width; ++x)
@@ -167,7 +167,7 @@ TEST_F(Surfaces, SlicesHaveTheScalarsColours) {
   const TransferFunction function(grey, &range, 1);
   const auto slice = sliceLayer(field_, exact, kPlane.point, kPlane.normal);
   MarchSteps steps;
-  const Image reference = toImage(referenceMarch(field_, exact, camera_, kSize, steps, nullptr, slice));
+  const Image reference = toImage(referenceMarch(field_, exact, camera_, kSize, steps, {nullptr, slice}));
   const auto scene = std::make_shared<SurfaceScene>();
   scene->slices = {kPlane};
   scene->volume = false;

@@ -412,7 +412,7 @@ TEST_F(Frames, AMovieThatFailsLeavesNothing) {
   for (const auto& entry : fs::directory_iterator(folder_->path()))
     for (const char* part : {"failed", ".curvisplat"})
       EXPECT_EQ(entry.path().filename().string().find(part), std::string::npos) << entry.path();
-  expectRefused({"-o", file("failed.mp4")}, 2, "--orbit or --path");
+  expectRefused({"-o", file("failed.mp4")}, 2, "--orbit, --path or --steps");
   expectRefused({"-o", file("failed.mp4"), "--orbit", "9", "--frames", "2", "--size", "65x48"}, 2, "even");
   expectRefused({"-o", file("failed.mp4"), "--orbit", "9", "--frames", "2", "--background", "transparent"}, 2,
                 "transparent");
@@ -425,6 +425,8 @@ TEST_F(Frames, AMovieIsMadeWhereThereIsFfmpeg) {
   expectDrawn({"-o", file("real.mp4"), "--orbit", "90", "--frames", "10"});
   const std::string head = bytes("real.mp4").substr(0, 12);
   EXPECT_EQ(head.substr(4, 4), "ftyp");
+  expectDrawn({"-o", file("real.gif"), "--orbit", "90", "--frames", "3", "--size", "65x47"});
+  EXPECT_EQ(bytes("real.gif").substr(0, 6), "GIF89a");
 }
 
 }  // namespace

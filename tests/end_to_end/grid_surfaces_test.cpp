@@ -54,10 +54,11 @@ Image marched(const Scene& scene, const KnownFunction& function, const Camera& c
   MarchSteps steps;
   steps.step = 0.008;
   const ImageSize size{2 * kSize.width, 2 * kSize.height};
-  const Image image = toImage(referenceMarch(field, function.exact, camera, size, steps, nullptr,
-                                             [&](const glm::dvec3& origin, const glm::dvec3& direction) {
-                                               return innerWall(scene, origin, direction);
-                                             }));
+  const Image image =
+      toImage(referenceMarch(field, function.exact, camera, size, steps,
+                             {nullptr, [&](const glm::dvec3& origin, const glm::dvec3& direction) {
+                                return innerWall(scene, origin, direction);
+                              }}));
   Image mean(kSize);
   for (int y = 0; y < size.height; ++y)
     for (int x = 0; x < size.width; ++x)

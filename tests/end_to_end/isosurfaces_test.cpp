@@ -61,10 +61,10 @@ class Isosurfaces : public testing::Test {
     const SceneField field(*annulus_);
     MarchSteps steps;
     steps.step = 0.008;
-    return toImage(referenceMarch(field, exact, halfAnnulusCamera(), kSize, steps, nullptr,
-                                  [&](const glm::dvec3& origin, const glm::dvec3& direction) {
-                                    return crossings(*annulus_, colour, opacity, origin, direction);
-                                  }));
+    return toImage(referenceMarch(field, exact, halfAnnulusCamera(), kSize, steps,
+                                  {nullptr, [&](const glm::dvec3& origin, const glm::dvec3& direction) {
+                                     return crossings(*annulus_, colour, opacity, origin, direction);
+                                   }}));
   }
   Image drawn(const TransferFunction& table, double opacity, bool volume, double lod,
               Backend backend = Backend::kCpu) const {

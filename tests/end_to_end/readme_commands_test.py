@@ -1,31 +1,33 @@
 #!/usr/bin/env python3
-"""Runs the commands that README.md and tools/REFERENCE.md quote, and checks what the project's documents point at.
+"""Runs the commands that README.md and tools/REFERENCE.md quote, and checks those of all other pages, and their links.
 
     readme_commands_test.py PROGRAM      exit status 1 if anything failed, with a line for each failure
 
-- Every indented line that begins with `curvisplat` is run, in the order of the page, with small grids and pictures in
-  place of large ones. Input files are made here; real ones are taken from ../shared/data where that exists, and commands
-  that need one which is neither there nor can be made are reported as skipped.
+- In README.md and tools/REFERENCE.md every indented line that begins with `curvisplat` is run, in the order of the page, with
+  small grids and pictures in place of large ones. All input files are made here.
 - `curvisplat view` is run without a display: it has to fail for that reason, and not for its options.
-- Other indented commands, and scripts named in `code`, have to exist and be executable.
+- In all pages the scripts and programs of indented commands have to exist, scripts have to be executable, and the options have
+  to be in their --help; presets and targets of CMake have to be defined. bench/README.md's scripts are run in short by
+  bench/run.py --smoke.
 - Relative links and pictures of every page have to lead to a file.
 """
 
+import functools
+import json
 import math
 import os
 import re
 import shlex
+import shutil
 import struct
 import subprocess
 import sys
 import tempfile
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-SHARED_DATA = os.path.join(ROOT, "..", "shared", "data")
 PAGES_WITH_COMMANDS = ["README.md", "tools/REFERENCE.md"]
 NI, NJ, NK = 12, 10, 8  # of the grids made here
 
-not_made = set()  # outputs of commands that were skipped
 failures = []
 
 
@@ -43,7 +45,7 @@ def lattice():
 
 
 def write_plot3d(folder):
-    """A grid and a Q file: single precision, big-endian, without record markers, as NASA's blunt fin."""
+    """A grid and a Q file: single precision, big-endian, without record markers, as NASA's blunt fin; and a series of two."""
     nodes = list(lattice())
     dimensions = struct.pack(">3i", NI, NJ, NK)
     with open(os.path.join(folder, "bluntfinxyz.bin"), "wb") as file:
@@ -57,6 +59,9 @@ def write_plot3d(folder):
         file.write(dimensions + struct.pack(">4f", 2.95, 0, 1e6, 0))
         for values in [density, *momentum, energy]:
             file.write(struct.pack(f">{len(values)}f", *values))
+    shutil.copy(os.path.join(folder, "bluntfinxyz.bin"), os.path.join(folder, "grid.xyz"))
+    for step in ("0", "1"):
+        shutil.copy(os.path.join(folder, "bluntfinq.bin"), os.path.join(folder, f"q.{step}"))
 
 
 def write_vts(folder):
@@ -76,8 +81,8 @@ def write_vts(folder):
             f"{points}</DataArray></Points></Piece></StructuredGrid></VTKFile>\n")
 
 
-def write_netcdf(folder):
-    """Longitude, latitude, depth and temp(depth, lat, lon), in NetCDF's classic format."""
+def write_netcdf(path, dimensions, variables):
+    """A file in NetCDF's classic format. `variables`: (name, numbers of its dimensions, attributes, values)."""
     def text(name):
         data = name.encode()
         return struct.pack(">i", len(data)) + data + b"\0" * (-len(data) % 4)
@@ -86,34 +91,40 @@ def write_netcdf(folder):
         return struct.pack(">2i", 12, len(pairs)) + b"".join(
             text(name) + struct.pack(">i", 2) + text(value) for name, value in pairs)
 
-    def floats(values):
-        return struct.pack(f">{len(values)}f", *values)
-
-    dimensions = [("depth", NK), ("lat", NJ), ("lon", NI)]
-    temperatures = [20 - 2 * k + math.sin(0.5 * i) + math.cos(0.4 * j)
-                    for k in range(NK) for j in range(NJ) for i in range(NI)]
-    variables = [
-        ("depth", [0], [("standard_name", "depth"), ("units", "m"), ("positive", "down")],
-         floats([10.0 * (k + 1) ** 2 for k in range(NK)])),
-        ("lat", [1], [("standard_name", "latitude"), ("units", "degrees_north")], floats([40 + 0.5 * j for j in range(NJ)])),
-        ("lon", [2], [("standard_name", "longitude"), ("units", "degrees_east")], floats([0.5 * i - 20 for i in range(NI)])),
-        ("temp", [0, 1, 2], [("units", "degC")], floats(temperatures)),
-    ]
     head = b"CDF\x01" + struct.pack(">i", 0)
     head += struct.pack(">2i", 10, len(dimensions))
     head += b"".join(text(name) + struct.pack(">i", length) for name, length in dimensions)
     head += attributes([("Conventions", "CF-1.8")])
     head += struct.pack(">2i", 11, len(variables))
     entries = [text(name) + struct.pack(f">{1 + len(shape)}i", len(shape), *shape) + attributes(pairs) +
-               struct.pack(">2i", 5, len(data)) for name, shape, pairs, data in variables]
+               struct.pack(">2i", 5, 4 * len(values)) for name, shape, pairs, values in variables]
     begin = len(head) + sum(len(entry) + 4 for entry in entries)
-    with open(os.path.join(folder, "ocean.nc"), "wb") as file:
+    with open(path, "wb") as file:
         file.write(head)
-        for entry, (_, _, _, data) in zip(entries, variables):
+        for entry, (_, _, _, values) in zip(entries, variables):
             file.write(entry + struct.pack(">i", begin))
-            begin += len(data)
-        for _, _, _, data in variables:
-            file.write(data)
+            begin += 4 * len(values)
+        for _, _, _, values in variables:
+            file.write(struct.pack(f">{len(values)}f", *values))
+
+
+def write_ocean(folder):
+    """temp(depth, lat, lon) along axes; and the same on a curvilinear grid whose coordinates are in a file of their own."""
+    temperatures = [20 - 2 * k + math.sin(0.5 * i) + math.cos(0.4 * j)
+                    for k in range(NK) for j in range(NJ) for i in range(NI)]
+    depth = ("depth", [0], [("standard_name", "depth"), ("units", "m"), ("positive", "down")],
+             [10.0 * (k + 1) ** 2 for k in range(NK)])
+    lat, lon = ([("standard_name", name), ("units", unit)] for name, unit in (("latitude", "degrees_north"),
+                                                                              ("longitude", "degrees_east")))
+    write_netcdf(os.path.join(folder, "ocean.nc"), [("depth", NK), ("lat", NJ), ("lon", NI)], [
+        depth, ("lat", [1], lat, [40 + 0.5 * j for j in range(NJ)]), ("lon", [2], lon, [0.5 * i - 20 for i in range(NI)]),
+        ("temp", [0, 1, 2], [("units", "degC")], temperatures)])
+    dimensions = [("depth", NK), ("y", NJ), ("x", NI)]
+    write_netcdf(os.path.join(folder, "his.nc"), dimensions, [
+        depth, ("temp", [0, 1, 2], [("units", "degC"), ("coordinates", "lat lon")], temperatures)])
+    write_netcdf(os.path.join(folder, "grid.nc"), dimensions[1:], [
+        ("lat", [0, 1], lat, [40 + 0.5 * j + 0.1 * i for j in range(NJ) for i in range(NI)]),
+        ("lon", [0, 1], lon, [0.5 * i - 20 - 0.1 * j for j in range(NJ) for i in range(NI)])])
 
 
 def write_stl(folder):
@@ -148,11 +159,8 @@ def make_inputs(folder):
     write_plot3d(folder)
     write_stl(folder)
     write_vts(folder)
-    write_netcdf(folder)
-    for name in ["delta_wing/delta_vertex.cgns"]:
-        real = os.path.join(SHARED_DATA, name)
-        if os.path.exists(real):
-            os.symlink(os.path.abspath(real), os.path.join(folder, os.path.basename(name)))
+    write_ocean(folder)
+    os.symlink(os.path.join(ROOT, "tests/data/cgns/flow.cgns"), os.path.join(folder, "delta_vertex.cgns"))
     os.symlink(os.path.join(ROOT, "tools"), os.path.join(folder, "tools"))
 
 
@@ -162,7 +170,7 @@ def shortened(words):
     for n, word in enumerate(words[:-1]):
         if word == "--size":
             words[n + 1] = "48x24x16" if words[1] == "generate" else "96x54"
-        elif word == "--frames":
+        elif word in ("--frames", "--until"):
             words[n + 1] = "2"
     if words[1] == "render" and "--size" not in words:
         words += ["--size", "64x64"]
@@ -171,26 +179,13 @@ def shortened(words):
     return words
 
 
-def missing_input(words, folder):
-    """A file that the command reads and that is not there, if any; or that a skipped command would have made."""
-    for word in words[2:]:
-        if word in not_made:
-            return word
-        if re.fullmatch(r"[\w./]+\.(cgns|nc|vts|xyz|bin|fun|q)", word) and not os.path.exists(os.path.join(folder, word)):
-            return word
-    return None
-
-
 def run_command(page, line, program, folder):
     words = shlex.split(line, comments=True)
-    absent = missing_input(words, folder)
-    if absent:
-        print(f"skipped, {absent} is not here: {line}")
-        not_made.update(words[n + 1] for n, word in enumerate(words[:-1]) if word == "-o")
-        return
     environment = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
     environment["XDG_CONFIG_HOME"] = os.path.join(folder, "config")
     command = shortened(words)
+    if words[1] == "serve":  # goes on for ever; its tests are in tests/serve
+        command = ["curvisplat", "serve", "--help"]
     result = subprocess.run([program, *command[1:]], cwd=folder, env=environment, stdin=subprocess.DEVNULL,
                             capture_output=True, text=True, errors="replace", check=False)
     said = result.stderr.strip()
@@ -202,7 +197,9 @@ def run_command(page, line, program, folder):
 
 
 def indented_commands(text):
-    return [line.strip() for line in re.findall(r"^(?: {4}){1,2}(\S.*)$", text, re.MULTILINE)]
+    """Also those that go on behind a backslash, or are joined by &&."""
+    for block in re.findall(r"^(?: {4}){1,2}(\S.*(?:\\\n.*)*)$", text, re.MULTILINE):
+        yield from (command.strip() for command in re.sub(r"\\\n\s*", "", block).split("&&"))
 
 
 def check_script(page, path):
@@ -211,6 +208,84 @@ def check_script(page, path):
         fail(page, f"{path} does not exist")
     elif not os.access(full, os.X_OK):
         fail(page, f"{path} is not executable")
+
+
+@functools.cache
+def help_of(*command):
+    """What --help prints; None if it cannot be run here."""
+    result = subprocess.run([*command, "--help"], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    if "ModuleNotFoundError" in result.stderr:
+        return None
+    return result.stdout + result.stderr
+
+
+def check_options(page, line, words, known):
+    if known is None:
+        return
+    for word in words:
+        option = word.strip("[]").split("=")[0]
+        if option.startswith("--") and not re.search(re.escape(option) + r"\b", known):
+            fail(page, f"{line}: {words[0]} has no option {option}")
+
+
+def check_cmake(page, line, words):
+    with open(os.path.join(ROOT, "CMakePresets.json"), encoding="utf-8") as file:
+        presets = {preset["name"] for preset in json.load(file)["configurePresets"]}
+    defined = ""
+    for folder, _, names in os.walk(ROOT):
+        if "CMakeLists.txt" in names and "/build" not in folder[len(ROOT):]:
+            with open(os.path.join(folder, "CMakeLists.txt"), encoding="utf-8") as file:
+                defined += file.read()
+    for word, value in zip(words, words[1:]):
+        if word == "--preset" and value not in presets:
+            fail(page, f"{line}: there is no preset {value}")
+        if word == "--target" and not re.search(rf"\((?:TARGET )?{value}\b", defined):
+            fail(page, f"{line}: there is no target {value}")
+    for option in re.findall(r"-D(CURVISPLAT_\w+)=", line):
+        if not re.search(rf"\(\s*{option}\b", defined):
+            fail(page, f"{line}: there is no option {option}")
+
+
+@functools.cache
+def is_target(build, name):
+    """Whether a program of this name is built there, at some time."""
+    path = os.path.join(build, "build.ninja")
+    if not os.path.exists(path):
+        return True
+    with open(path, encoding="utf-8") as file:
+        return re.search(rf"[ /]{name}:", file.read()) is not None
+
+
+def check_command(page, line, program):
+    """A command that is not run: what it names has to exist."""
+    build = os.path.dirname(os.path.dirname(program))
+    try:
+        words = shlex.split(line, comments=True)
+    except ValueError:  # an apostrophe: a diagram, not a command
+        return
+    while words and (re.match(r"[A-Z_]+=", words[0]) or words[0] in ("xvfb-run", "sudo")):
+        words = words[1:]
+    if words and words[0] in ("mpirun", "srun") and "curvisplat" in words:
+        words = words[words.index("curvisplat"):]
+    if len(words) < 2:
+        return
+    if words[0] == "curvisplat" and re.fullmatch(r"[a-z]+", words[1]):
+        known = help_of(program, words[1])
+        if "Usage:" not in known or words[1] not in known:
+            fail(page, f"{line}: there is no subcommand {words[1]}")
+        check_options(page, line, words, known)
+    elif re.match(r"(tools|bench|tests)/[\w/]+\.(py|sh)$", words[0]):
+        check_script(page, words[0])
+        if words[0].endswith(".py"):
+            check_options(page, line, words, help_of(sys.executable, os.path.join(ROOT, words[0])))
+    elif words[0].startswith("build/release/") and os.path.isdir(os.path.join(build, "bench")):
+        path = os.path.join(build, words[0][len("build/release/"):])
+        if os.path.exists(path):
+            check_options(page, line, words, help_of(path))
+        elif not is_target(build, os.path.basename(path)):
+            fail(page, f"{line}: {words[0]} is not built by that name")
+    elif words[0] == "cmake":
+        check_cmake(page, line, words)
 
 
 def check_links(page, text):
@@ -243,15 +318,17 @@ def main():
                 if line.startswith("curvisplat "):
                     run_command(page, line, program, folder)
                     run += 1
-                elif re.match(r"(tools|bench)/", line):
-                    check_script(page, line.split()[0])
             if run == 0:
                 fail(page, "quotes no command; is it laid out differently?")
-            for path in re.findall(r"`((?:tools|bench)/[\w/]+\.(?:sh|py))\b", text):
-                check_script(page, path)
     for page in pages():
         with open(os.path.join(ROOT, page), encoding="utf-8") as file:
-            check_links(page, file.read())
+            text = file.read()
+        check_links(page, text)
+        for path in re.findall(r"`((?:tools|bench|tests)/[\w/]+\.(?:sh|py))\b", text):
+            check_script(page, path)
+        for line in indented_commands(text):
+            if page not in PAGES_WITH_COMMANDS or not line.startswith("curvisplat "):
+                check_command(page, line, program)
     for failure in failures:
         print(failure, file=sys.stderr)
     sys.exit(1 if failures else 0)

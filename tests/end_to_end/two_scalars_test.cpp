@@ -130,6 +130,33 @@ TEST_F(TwoScalarsTest, SlicesHaveTheColours) {
   EXPECT_GE(all, 45);  // outlines of the slice are smooth here
 }
 
+TEST_F(TwoScalarsTest, SlicesHaveTheOpacitiesOfTheOther) {
+  const glm::dvec3 point(-0.4, 0, 0.5), normal(0.6, 0.5, -0.7);
+  const KnownFunction function = KnownFunction::of("smooth");
+  const double unit = function.table.opacityUnit();
+  const ReferenceLayers layers = [&](const glm::dvec3& origin, const glm::dvec3& direction) {
+    const double distance = glm::dot(normal, point - origin) / glm::dot(normal, direction);
+    const glm::dvec3 at = origin + distance * direction;
+    std::vector<ReferenceLayer> found;
+    if (!annulus_->contains(at)) return found;
+    const double opacity = -std::expm1(-function.exact(annulus_->scalar(at)).extinction * unit);
+    found.push_back({distance, hues().at(hueAt(at)).colour, opacity});
+    return found;
+  };
+  const Image reference = marched(function.exact, field_, layers);
+  FrameOptions options = knownFrame(kSize);
+  auto scene = std::make_shared<SurfaceScene>();
+  scene->slices = {{point, normal}};
+  options.scene = scene;
+  const double even = db(drawn(function.table, options), reference);
+  scene->slices_by_function = true;
+  const double by_function = db(drawn(function.table, options), reference);
+  fmt::print("two scalars, slice with the opacity of the other: {:.1f} dB, evenly {:.1f} dB\n", by_function,
+             even);
+  EXPECT_GE(by_function, 45);  // outlines of the slice are smooth here
+  EXPECT_LT(even, 40);
+}
+
 TEST_F(TwoScalarsTest, IsosurfacesHaveTheColours) {
   // Where the isosurface of the one scalar is, the other's colours are.
   FrameOptions options = knownFrame(kSize);

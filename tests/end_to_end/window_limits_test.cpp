@@ -75,7 +75,7 @@ TEST_F(WindowLimitsTest, TooLittleMemoryIsSaid) {
   EXPECT_TRUE(eventually([&] { return display_->screenshot().pixel(650, 350)[0] < 0.01f; }));
   const ProgramResult result = closed(*window);
   EXPECT_EQ(result.status, 0) << result.err;
-  EXPECT_NE(result.err.find("warning: 1 MiB of memory are too little"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("warning: --memory 1 MiB: too little"), std::string::npos) << result.err;
   EXPECT_NE(result.err.find("give at least"), std::string::npos) << result.err;
 }
 

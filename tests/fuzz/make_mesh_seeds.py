@@ -163,6 +163,79 @@ def exodus_seeds(folder):
         put("exodus", form.lower(), path.read_bytes())
 
 
+def su2_seeds():
+    cells = "".join("12 " + " ".join(map(str, cell)) + f" {n}\n" for n, cell in enumerate(CELLS))
+    points = "".join(" ".join(map(str, point)) + f" {n}\n" for n, point in enumerate(POINTS))
+    zone = (f"% a mesh\nNDIME= 3\nNELEM= {len(CELLS)}\n{cells}NPOIN= {len(POINTS)}\n{points}"
+            "NMARK= 1\nMARKER_TAG= wall\nMARKER_ELEMS= 1\n9 0 1 3 2\n")
+    names, values = ["x", "y", "z", "Density"], np.column_stack([POINTS, np.arange(len(POINTS))])
+    text = ",".join(f'"{name}"' for name in ["PointID", *names]) + "\n" + "".join(
+        ",".join([str(n), *map(str, row)]) + "\n" for n, row in enumerate(values.tolist()))
+    binary = (struct.pack("<5i", 535532, len(names), len(POINTS), 1, 8) +
+              b"".join(name.encode().ljust(33, b"\0") for name in names) + values.astype("<f8").tobytes())
+    for name, mesh, restart in (("mesh", zone, b""), ("csv", zone, text.encode()), ("binary", zone, binary),
+                                ("zones", f"NZONE= 2\nIZONE= 1\n{zone}IZONE= 2\n{zone}", b"")):
+        put("su2", name, struct.pack("<H", len(mesh)) + mesh.encode() + restart)
+
+
+def ensight_seeds():
+    for name, order in (("ascii", ""), ("binary", "<"), ("big_endian", ">")):
+        for block in (False, True):
+            def text(*lines):
+                return b"".join(line.encode().ljust(80) if order else line.encode() + b"\n" for line in lines)
+
+            def numbers(values, kind):
+                values = np.ravel(values)
+                if order:
+                    return values.astype(f"{order}{kind}4").tobytes()
+                return "".join(f"{v:d}\n" if kind == "i" else f"{v:12.5e}\n" for v in values).encode()
+
+            head = text(*(["C Binary"] if order else []), "a", "b", "node id off", "element id given", "part") + numbers([1], "i")
+            if block:
+                geometry = head + text("part", "block iblanked") + numbers([2, 2, 3], "i") + numbers(POINTS.T, "f") + numbers([1] * 12, "i")
+                values = text("v", "part") + numbers([1], "i") + text("block") + numbers(np.arange(12.0), "f")
+            else:
+                faces = [[int(CELLS[1][corner]) + 1 for corner in face] for face in FACES]
+                geometry = (head + text("part", "coordinates") + numbers([12], "i") + numbers(POINTS.T, "f") +
+                            text("hexa8") + numbers([1, 1], "i") + numbers(CELLS[0] + 1, "i") + text("nfaced") + numbers([1, 2, 6], "i") +
+                            numbers([4] * 6, "i") + numbers(faces, "i"))
+                values = text("v", "part") + numbers([1], "i") + text("coordinates") + numbers(np.arange(36.0), "f")
+            of_cells = text("v", "part") + numbers([1], "i") + text("hexa8") + numbers([1], "f") + text("nfaced undef") + numbers([9, 2], "f")
+            for kind, file in ((0, values), (1, values if block else of_cells), (2, values)):
+                if not (block and kind):
+                    put("ensight", f"{name}_{'block' if block else 'mesh'}_{kind}",
+                          bytes([kind]) + struct.pack("<H", len(geometry)) + geometry + file)
+
+
+def columns_seeds(folder):
+    nodes = np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1.0]])
+    faces = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
+    for kind in ("ugrid", "icon", "mpas"):
+        path = folder / "a.nc"
+        with netCDF4.Dataset(path, "w", format="NETCDF3_CLASSIC") as f:
+            for name, size in (("Time", None), ("layer", 2), ("level", 3), ("cell", 2), ("node", 6), ("corner", 4)):
+                f.createDimension(name, size)
+            longitude, latitude = {"ugrid": ("lon", "lat"), "icon": ("vlon", "vlat"), "mpas": ("lonVertex", "latVertex")}[kind]
+            for name, axis in ((longitude, 0), (latitude, 1)):
+                f.createVariable(name, "f8", ("node",))[:] = nodes[:, axis]
+            if kind == "ugrid":
+                mesh = f.createVariable("mesh", "i4")
+                mesh.cf_role, mesh.topology_dimension = "mesh_topology", np.int32(2)
+                mesh.node_coordinates, mesh.face_node_connectivity = "lon lat", "corners"
+                f.createVariable("corners", "i4", ("cell", "corner"))[:] = faces
+            elif kind == "icon":
+                f.createVariable("vertex_of_cell", "i4", ("corner", "cell"))[:] = faces.T + 1
+            else:
+                f.createVariable("verticesOnCell", "i4", ("cell", "corner"))[:] = faces + 1
+                f.createVariable("nEdgesOnCell", "i4", ("cell",))[:] = [4, 3]
+                f.createVariable("zgrid", "f8", ("cell", "level"))[:] = [[0, 1, 2], [1, 2, 3]]
+            layer = f.createVariable("layer", "f8", ("layer",))
+            layer.units, layer.positive = "m", "up"
+            layer[:] = [10, 20]
+            f.createVariable("t", "f4", ("Time", "cell", "layer") if kind == "mpas" else ("Time", "layer", "cell"))[0] = [[1, 2], [3, 4]]
+        put("columns", kind, path.read_bytes())
+
+
 def lists_of_steps():
     files = [{"name": f"step{n}.vts", "time": n / 2} for n in (0, 1)]
     put("file_series", "two_steps", json.dumps({"file-series-version": "1.0", "files": files}).encode())
@@ -178,5 +251,8 @@ def lists_of_steps():
 with tempfile.TemporaryDirectory() as name:
     vtk_seeds(pathlib.Path(name))
     exodus_seeds(pathlib.Path(name))
+    columns_seeds(pathlib.Path(name))
 foam_seeds()
+su2_seeds()
+ensight_seeds()
 lists_of_steps()

@@ -17,12 +17,12 @@ exec pkg-config "$@"
 END
 chmod +x "$folder/pkg-config"
 without=(-DCMAKE_DISABLE_FIND_PACKAGE_glfw3=ON -DPKG_CONFIG_EXECUTABLE="$folder/pkg-config" -DCURVISPLAT_TESTS=OFF)
-parts=(-DCURVISPLAT_WINDOW=OFF -DCURVISPLAT_ANNOTATIONS=OFF)
+parts=(-DCURVISPLAT_WINDOW=OFF -DCURVISPLAT_ANNOTATIONS=OFF -DCURVISPLAT_SERVER=OFF)
 
 quietly cmake -G Ninja -S "$root" -B "$folder/build" "${without[@]}" "${parts[@]}" -DCURVISPLAT_THROUGHPUT=OFF
 tools=tools/CMakeFiles/curvisplat.dir
 quietly cmake --build "$folder/build" --target \
-  $tools/viewer/window_left_out.cpp.o $tools/commands/{view,bench}_left_out.cpp.o \
+  $tools/viewer/window_left_out.cpp.o $tools/commands/{view,serve,bench}_left_out.cpp.o \
   render/annotate/CMakeFiles/curvisplat_render_annotate.dir/annotations_left_out.cpp.o
 
 quietly cmake -S "$root" -B "$folder/build" -DCURVISPLAT_THROUGHPUT=ON

@@ -298,7 +298,8 @@ TEST_F(ToAnExistingCache, RefusesNamesThatItHas) {
 
 TEST_F(ToAnExistingCache, RefusesAnotherGrid) {
   const AddScalarOptions options = adding(cache, {1});
-  expectRefused(bentBoxSource(44, 44, 45), options, "44x44x44 nodes, and of this one 44x44x45");
+  expectRefused(bentBoxSource(44, 44, 45), options,
+                "44x44x44 nodes when the cache was made; in this grid it has 44x44x45");
   expectRefused(
       FunctionGridSource({block, block}, 3, [&](const GridNode& node) { return bentBox(node, block); }),
       options, "grid of 1 blocks");
@@ -339,9 +340,8 @@ TEST_F(ToAnExistingCache, RefusesMissingValues) {
     if (node.i == 3 && node.j == 4) values.scalars[1] = kNotANumber;
     if (node.i == 5 && node.j == 4) values.scalars[2] = kBlank;
   });
-  expectRefused(lacking, adding(cache, {1}),
-                "44 of the nodes that it draws have no value of s1 (44 not finite");
-  expectRefused(lacking, adding(cache, {1, 2}), "88 of the nodes that it draws have no value of s1, s2");
+  expectRefused(lacking, adding(cache, {1}), "44 of its nodes have no value of s1 (44 not finite");
+  expectRefused(lacking, adding(cache, {1, 2}), "88 of its nodes have no value of s1, s2");
 }
 
 TEST_F(ToAnExistingCache, RefusesWhatIsNoCache) {

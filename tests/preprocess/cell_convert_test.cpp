@@ -1,4 +1,4 @@
-// Conversion of scalars that stand in cells, as a whole.
+// Conversion of cell-centred scalars, as a whole.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -126,7 +126,7 @@ TEST(CellConvert, NamesTheMemoryThatManySmallBlocksTake) {
   const TemporaryFolder folder;
   ConvertOptions options = optionsFor(folder / "c.splats", {0});
   const std::string error = errorOf([&] { convertQuietly(source, options); });
-  EXPECT_NE(error.find("the ends of so many blocks of cells take 215 MiB; give at least 3731 MiB"),
+  EXPECT_NE(error.find("matching the faces of this grid's blocks takes 215 MiB; give at least 3731 MiB"),
             std::string::npos)
       << error;
   EXPECT_FALSE(std::filesystem::exists(options.output));
@@ -185,7 +185,7 @@ TEST(CellConvert, AddsAScalarAsIfItHadBeenThereFromTheStart) {
   EXPECT_TRUE(both == one);
 
   const std::string error = errorOf([&] { addQuietly(scene.source, folder / "one.splats", 0); });
-  EXPECT_NE(error.find("stand in cells, and f at nodes"), std::string::npos) << error;
+  EXPECT_NE(error.find("are cell-centred, but f is node-centred"), std::string::npos) << error;
 }
 
 TEST(CellConvert, AddsToTheCellsThatOlderScalarsLeft) {

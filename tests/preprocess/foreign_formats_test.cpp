@@ -60,11 +60,6 @@ TEST_F(ForeignFormats, TextAndBinaryFilesAreNamed) {
     write("a.dat", text);
     expectNamed("a.dat", "a Tecplot text file");
   }
-  for (const char* text : {"FORMAT\ntype: ensight gold\n\nGEOMETRY\nmodel: a.geo\n",
-                           "# written by x\r\nFORMAT\r\ntype:   EnSight Gold\r\n"}) {
-    write("a.case", text);
-    expectNamed("a.case", "an EnSight case file");
-  }
   write("a.geo", "C Binary" + std::string(72, ' '));
   expectNamed("a.geo", "an EnSight geometry file");
   write("b.geo", "\x50\0\0\0Fortran Binary"s + std::string(72, ' '));

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <random>
@@ -92,7 +94,76 @@ TEST(NodeSplats, OfAnUnevenGridTileIt) {
   EXPECT_NEAR(end, x.back(), 1e-12);
 }
 
-// The same cells: a splat's axes are stretched, its weight is the cell's, and so is its middle.
+/// The middle of a node's cell between straight-edged cells, by sampling: with `on_face`, of the part that lies in the
+/// plane k = 0.
+glm::dvec3 sampledMiddle(const std::function<glm::dvec3(double, double, double)>& node, const glm::dvec3& at,
+                         bool on_face) {
+  constexpr int kSamples = 8;
+  const auto trilinear = [&](const glm::dvec3& p) {
+    const glm::dvec3 low = glm::floor(p), part = p - low;
+    glm::dvec3 sum(0.0);
+    for (int c = 0; c < 8; ++c) {
+      const glm::dvec3 step(c & 1, c >> 1 & 1, c >> 2);
+      const glm::dvec3 share = glm::mix(1.0 - part, part, step), corner = low + step;
+      sum += share.x * share.y * share.z * node(corner.x, corner.y, corner.z);
+    }
+    return sum;
+  };
+  glm::dvec3 sum(0.0);
+  double weight = 0;
+  const int samples_k = on_face ? 1 : kSamples;
+  for (int i = 0; i < kSamples; ++i)
+    for (int j = 0; j < kSamples; ++j)
+      for (int k = 0; k < samples_k; ++k) {
+        constexpr double kStep = 1e-4;
+        const auto from = [](int n) { return (n + 0.5) / kSamples - 0.5; };
+        const double w = on_face ? 0 : at.z > 0 ? from(k) : 0.5 * (from(k) + 0.5);
+        const glm::dvec3 p = at + glm::dvec3(from(i), from(j), w), here = trilinear(p);
+        glm::dmat3 jacobian;
+        for (int axis = 0; axis < 3; ++axis) {
+          glm::dvec3 next = p;
+          next[axis] += kStep;
+          jacobian[axis] = (trilinear(next) - here) / kStep;
+        }
+        const double volume = std::abs(glm::determinant(jacobian));
+        sum += volume * here;
+        weight += volume;
+      }
+  return sum / weight;
+}
+
+// Few cells around a bend, as rays see them: polygons. The middles of cells lie on the inner side of their nodes, and
+// the faces that splats are cut at on that of the face's nodes.
+TEST(NodeSplats, OfABentGridLieInTheMiddleOfTheirKinkedCells) {
+  const auto node = [](double i, double j, double k) {
+    const double angle = 0.3 * i + 0.01 * i * i, radius = 3 + 0.3 * k;
+    return glm::dvec3(radius * std::cos(angle), radius * std::sin(angle), 0.4 * j);
+  };
+  MappedBlock grid(7, 5, 6, node);
+  grid.addScalar([](const glm::dvec3& p) { return p.x + 2 * p.y - p.z; });
+  NodeSplatCorrections corrections;
+  corrections.stretch = corrections.growth = corrections.bends = false;
+  const NodeSplats out = grid.splats(corrections);
+  for (uint64_t k : {0, 1, 3}) {
+    const size_t at = grid.at(3, 2, k);
+    const Splat& splat = out.splats[at].splat;
+    const glm::dvec3 expected = sampledMiddle(node, glm::dvec3(3, 2, k), false);
+    EXPECT_LT(glm::distance(splat.position, expected), 0.005) << k;
+    EXPECT_GT(glm::distance(splat.position, node(3, 2, std::max(k + 0.0, 0.25))), 0.03) << k;
+    EXPECT_NEAR(out.values[at].mean, expected.x + 2 * expected.y - expected.z, 0.015) << k;
+    if (k == 3) continue;
+    // The plane that it is cut at.
+    const InwardAxes inward = inwardAxes(out.splats[at].border_code);
+    ASSERT_TRUE(inward.hasFace(0)) << k;
+    const glm::dvec3 normal = glm::normalize(gradientOf(splat, glm::dvec3(inward.axis[0])));
+    const double distance = inward.distance * glm::dot(normal, splat.factor() * glm::dvec3(inward.axis[0]));
+    const glm::dvec3 on_face = sampledMiddle(node, glm::dvec3(3, 2, 0), true);
+    EXPECT_NEAR(glm::dot(normal, splat.position - on_face), distance, 0.01) << k;
+    EXPECT_GT(std::abs(glm::dot(normal, splat.position - node(3, 2, 0)) - distance), 0.03) << k;
+  }
+}
+
+// The cells of OfAnUnevenGridTileIt: a splat's axes are stretched, its weight is the cell's, and so is its middle.
 TEST(NodeSplats, OfAnUnevenGridAreStretchedButKeepVolumeAndMiddle) {
   const std::vector<double> x{0, 1, 2.6, 3.6, 4.6, 6.2, 7.2, 8.2, 9.8, 10.8, 11.8, 13.4, 14.4};
   MappedBlock grid(13, 5, 5, [&](double i, double j, double k) {

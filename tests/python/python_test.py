@@ -14,6 +14,7 @@ import tempfile
 import threading
 import time
 import unittest
+import urllib.request
 
 import numpy as np
 
@@ -109,6 +110,32 @@ class Pictures(PythonTest):
         del cache
         np.testing.assert_array_equal(picture, before)
 
+    def test_of_surfaces_and_slices_are_the_commands(self):
+        with curvisplat.open(self.cache) as cache:
+            lower, upper = cache.bounds
+            plane = [*(lower + upper) / 2, 0, 0, 1]
+            text = ",".join(map(repr, map(float, plane)))
+            self.expect_same(cache.render(size=(160, 120), slices=[plane], slice_opacity=0.5), "--slice=" + text, "--slice-opacity", "0.5")
+            self.expect_same(cache.render(size=(160, 120), surfaces=["kmin"], surface_by=cache.scalars[0].name, volume=False),
+                             "--surface", "kmin", "--surface-by", cache.scalars[0].name, "--volume", "off")
+            middle = (cache.scalars[0].min + cache.scalars[0].max) / 2
+            self.expect_same(cache.render(size=(160, 120), isovalues=[middle]), "--iso", repr(middle))
+            with self.assertRaisesRegex(curvisplat.UsageError, "--volume|volume"):
+                cache.render(size=(16, 12), volume=False)
+
+    def test_of_time_steps_are_the_commands(self):
+        command("generate", "wake", "--size", "24x20x12", "--steps", "3", "-o", self.folder / "steps")
+        command("convert", self.folder / "steps.xyz", self.folder / "steps_*.fun", "-o", self.folder / "steps.splats")
+        with curvisplat.open(self.folder / "steps.splats") as cache:
+            self.assertEqual(len(cache.times), 3)
+            self.assertTrue((np.diff(cache.times) > 0).all())
+            for step in (2, 0, 1):
+                path = self.folder / "step.pfm"
+                command("render", self.folder / "steps.splats", "-o", path, "--size", "80x60", "--step", step)
+                np.testing.assert_array_equal(np.asarray(cache.render(size=(80, 60), step=step))[..., :3], read_pfm(path))
+            with self.assertRaisesRegex(curvisplat.UsageError, "the last one is 2"):
+                cache.render(size=(16, 12), step=3)
+
     def test_report_progress(self):
         seen = []
         with curvisplat.open(self.cache) as cache:
@@ -116,6 +143,51 @@ class Pictures(PythonTest):
         for phase, done, total, unit in seen:
             self.assertEqual((phase, unit), ("drawing", "bricks"))
             self.assertLessEqual(done, total)
+
+
+class Histograms(PythonTest):
+    def test_are_shares_of_the_volume(self):
+        k, j, i = np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 2, 9), np.linspace(0, 3, 65), indexing="ij")
+        path = self.folder / "ramp.splats"
+        curvisplat.convert_arrays(path, curvisplat.Block(i, j, k, {"x": i.copy(), "one": np.ones_like(i)}))
+        with curvisplat.open(path) as cache:
+            shares, ends = cache.histogram("x", bins=6)
+            self.assertEqual((len(shares), len(ends)), (6, 7))
+            np.testing.assert_allclose(ends, np.linspace(0, 3, 7))
+            np.testing.assert_allclose(shares, np.full(6, 1 / 6), atol=0.02)  # x is even over the box
+            shares, _ = cache.histogram("x", bins=4, range=(0, 1.5))
+            self.assertAlmostEqual(float(shares.sum()), 0.5, delta=0.02)
+            shares, ends = cache.histogram("x", bins=2, range=(0.03, 3), log=True)
+            np.testing.assert_allclose(ends, [0.03, 0.3, 3])
+            self.assertGreater(shares[1], 5 * shares[0])
+            self.assertAlmostEqual(float(cache.histogram("one")[0].sum()), 1, places=6)
+            for bad in ((1, 1), (2, 1)):
+                with self.assertRaisesRegex(curvisplat.UsageError, "increases"):
+                    cache.histogram("x", range=bad)
+            with self.assertRaisesRegex(curvisplat.UsageError, "above zero"):
+                cache.histogram("x", range=(0, 1), log=True)
+            with self.assertRaisesRegex(curvisplat.UsageError, "no scalar"):
+                cache.histogram("y", range=(0, 1))
+
+
+class Views(PythonTest):
+    def test_are_pages_that_end_with_them(self):
+        with curvisplat.open(self.cache) as cache, cache.view(program=PROGRAM, height=300) as view:
+            self.assertIn(f'src="{view.url}"', view._repr_html_())
+            self.assertIn('height="300"', view._repr_html_())
+            with urllib.request.urlopen(view.url) as page:
+                self.assertIn(b"<canvas", page.read())
+            self.assertTrue(view.is_open)
+        self.assertFalse(view.is_open)
+        with self.assertRaises(OSError):
+            urllib.request.urlopen(view.url)
+
+    def test_say_what_is_wrong(self):
+        with curvisplat.open(self.cache) as cache:
+            with self.assertRaisesRegex(curvisplat.Error, "cannot be run"):
+                cache.view(program="/nowhere/curvisplat")
+            with self.assertRaisesRegex(curvisplat.Error, "^unknown subcommand|has no server|.+"):
+                cache.view(program="/bin/false")
 
 
 class CachesAreDescribed(PythonTest):

@@ -83,7 +83,7 @@ void toArrays(const std::vector<DirectSplat>& splats, const glm::dvec3& origin, 
   geometry.resize(splats.size());
   variable.resize(splats.size());
   for (size_t n = 0; n < splats.size(); ++n)
-    setSplat(geometry, variable, n, splats[n].splat.position - origin, splats[n].splat, splats[n].value,
+    setSplat({geometry, variable}, n, splats[n].splat.position - origin, splats[n].splat, splats[n].value,
              splats[n].codes);
 }
 
@@ -100,8 +100,9 @@ PixelLayers sceneLayers(const SurfaceScene& scene, const ProjectionSettings& set
   }
   const double depth_origin =
       settings.view.projection == Projection::kPerspective ? 0 : settings.view.viewFromData(origin).z;
+  const ColourTable colours(function);
   return layersOf(scene, settings.view, slices,
-                  {ColourTable(function), settings.light, settings.clip_planes, depth_origin});
+                  {colours, settings.light, settings.clip_planes, depth_origin, &colours});
 }
 
 /// Whether the layers of its pixel hide a splat's centre; depths from the layers' origin.
@@ -176,7 +177,7 @@ Image drawDirectly(const GridSource& source, uint32_t scalar, const DirectOption
   }
   CpuPainter painter;
   return paintFrame(painter, sorted, table,
-                    {options.per_pixel, options.light.has_value(), layers ? &*layers : nullptr}, size);
+                    {options.per_pixel, options.light.has_value(), layers ? &*layers : nullptr}, {size});
 }
 
 }  // namespace curvisplat

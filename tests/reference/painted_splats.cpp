@@ -143,11 +143,10 @@ std::vector<ScreenSplat> colourAll(const std::vector<ScreenSplat>& splats, uint3
 }
 
 Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const ClassificationTable& table,
-                 PixelShading shading, ImageSize size, const glm::vec4& background,
-                 const PaintResources& resources) {
+                 PixelShading shading, const EmptyPicture& empty, const PaintResources& resources) {
   std::vector<ScreenSplat> ordered(splats.begin(), splats.end());
   if (painter.order() == DrawingOrder::kFrontToBack) std::reverse(ordered.begin(), ordered.end());
-  painter.begin(size, background, table, shading, resources);
+  painter.begin(empty.size, empty.background, table, shading, resources);
   painter.draw(ordered);
   return painter.end();
 }

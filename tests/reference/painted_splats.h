@@ -40,10 +40,15 @@ std::vector<ScreenSplat> lit(std::vector<ScreenSplat> splats, uint32_t seed);
 /// The same splats in their order, each with a ScreenColour.
 std::vector<ScreenSplat> colourAll(const std::vector<ScreenSplat>& splats, uint32_t seed, float slope = 0.3f);
 
+/// A picture before anything is painted.
+struct EmptyPicture {
+  ImageSize size;
+  glm::vec4 background = {1, 1, 1, 1};
+};
+
 /// A frame, in the painter's own order. `splats`: farthest first.
 Image paintFrame(Painter& painter, std::span<const ScreenSplat> splats, const ClassificationTable& table,
-                 PixelShading shading, ImageSize size, const glm::vec4& background = {1, 1, 1, 1},
-                 const PaintResources& resources = {});
+                 PixelShading shading, const EmptyPicture& empty, const PaintResources& resources = {});
 
 /// Of any channel of any pixel; infinite where `a` is not finite.
 double largestDifference(const Image& a, const Image& b);

@@ -256,10 +256,17 @@ std::vector<ReferenceLayer> layersAlong(const ReferenceLayers& layers, const Ray
   return found;
 }
 
+struct March {
+  const ReferenceField& field;
+  const OpticalFunction& function;
+  const Camera& camera;
+  const MarchSteps& steps;
+  Surroundings around;
+};
+
 /// The pixels of `image` for which `wanted` is not 0.
-void marchPixels(const ReferenceField& field, const OpticalFunction& function, const Camera& camera,
-                 const MarchSteps& steps, const Surroundings& around, const std::vector<uint8_t>& wanted,
-                 ReferenceImage& image) {
+void marchPixels(const March& march, const std::vector<uint8_t>& wanted, ReferenceImage& image) {
+  const auto& [field, function, camera, steps, around] = march;
   const ImageSize size = image.size;
   const auto [lower, upper] = field.bounds();
   const glm::dvec3 forward = glm::normalize(camera.focal_point - camera.position);
@@ -356,16 +363,17 @@ OpticalProperties stepFunction(double f) {
 
 ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction& function,
                               const Camera& camera, ImageSize size, const MarchSteps& steps,
-                              const ReferenceLight* light, const ReferenceLayers& layers) {
+                              const ReferenceExtras& extras) {
   ReferenceImage image{size, std::vector<ReferencePixel>(size.pixels())};
-  marchPixels(field, function, camera, steps, {light, layers}, std::vector<uint8_t>(size.pixels(), 1), image);
+  marchPixels({field, function, camera, steps, {extras.light, extras.layers}},
+              std::vector<uint8_t>(size.pixels(), 1), image);
   return image;
 }
 
 ReferenceImage referenceMarch(const ReferenceField& field, const TwoScalars& scalars, const Camera& camera,
                               ImageSize size, const MarchSteps& steps, const ReferenceLayers& layers) {
   ReferenceImage image{size, std::vector<ReferencePixel>(size.pixels())};
-  marchPixels(field, scalars.function, camera, steps, {nullptr, layers, &scalars.colour},
+  marchPixels({field, scalars.function, camera, steps, {nullptr, layers, &scalars.colour}},
               std::vector<uint8_t>(size.pixels(), 1), image);
   return image;
 }
@@ -377,10 +385,10 @@ ReferenceImage referenceMarch(const Scene& scene, const OpticalFunction& functio
   return referenceMarch(SceneField(scene), function, camera, size, steps);
 }
 
-ReferenceImage convergedMarch(const ReferenceField& field, const OpticalFunction& function,
-                              const Camera& camera, ImageSize size, MarchSteps steps, double agreement_db,
-                              double* reached_db) {
+ConvergedImage convergedMarch(const ReferenceField& field, const OpticalFunction& function,
+                              const Camera& camera, ImageSize size, MarchSteps steps, double agreement_db) {
   constexpr int kMaxHalvingsOfSteps = 6;
+  const ReferenceLayers no_layers;
   std::vector<double> none;
   const bool exact_ends = field.crossings(camera.position, camera.focal_point - camera.position, none);
   const double tolerance = 0.25 * std::pow(10, -agreement_db / 20);
@@ -391,7 +399,7 @@ ReferenceImage convergedMarch(const ReferenceField& field, const OpticalFunction
     steps.step *= 0.5;
     steps.cells *= 0.5;
     ReferenceImage finer = image;
-    marchPixels(field, function, camera, steps, {nullptr, {}}, wanted, finer);
+    marchPixels({field, function, camera, steps, {nullptr, no_layers}}, wanted, finer);
     double sum = 0;
     for (size_t p = 0; p < image.pixels.size(); ++p) {
       const glm::dvec3 d = finer.pixels[p].colour - image.pixels[p].colour;
@@ -401,8 +409,7 @@ ReferenceImage convergedMarch(const ReferenceField& field, const OpticalFunction
     if (exact_ends) wanted = unsettled(image, finer, tolerance);
     image = std::move(finer);
   }
-  if (reached_db) *reached_db = agreement;
-  return image;
+  return {std::move(image), agreement};
 }
 
 Image toImage(const ReferenceImage& reference) {

@@ -79,12 +79,18 @@ ReferenceLayers sphereLayer(const glm::dvec3& centre, double radius, const glm::
 ReferenceLayers sliceLayer(const ReferenceField& field, const OpticalFunction& function,
                            const glm::dvec3& point, const glm::dvec3& normal, double opacity = 1);
 
+/// What a picture has besides the field: light on it, and layers in it.
+struct ReferenceExtras {
+  const ReferenceLight* light = nullptr;
+  ReferenceLayers layers = {};
+};
+
 /// Marches every pixel, from the plane of the viewer on. Where the field does not know its crossings, a part
 /// of a ray inside or outside of it that is shorter than a step may be missed. Parallel; the result does not
 /// depend on the threads.
 ReferenceImage referenceMarch(const ReferenceField& field, const OpticalFunction& function,
                               const Camera& camera, ImageSize size, const MarchSteps& steps,
-                              const ReferenceLight* light = nullptr, const ReferenceLayers& layers = {});
+                              const ReferenceExtras& extras = {});
 ReferenceImage referenceMarch(const Scene& scene, const OpticalFunction& function, const Camera& camera,
                               ImageSize size, double step = 0.004);
 
@@ -96,12 +102,17 @@ struct TwoScalars {
 ReferenceImage referenceMarch(const ReferenceField& field, const TwoScalars& scalars, const Camera& camera,
                               ImageSize size, const MarchSteps& steps, const ReferenceLayers& layers = {});
 
+struct ConvergedImage {
+  ReferenceImage image;
+  double agreement_db = 0;  // with the one of steps twice as long
+};
+
 /// Halves the steps until two successive pictures agree at `agreement_db` or more, six times at the most, and
-/// gives the finer one. `reached_db` gets their agreement. Where the field knows its crossings, pixels whose
+/// gives the finer one. Where the field knows its crossings, pixels whose
 /// neighbourhood has settled are not marched again.
-ReferenceImage convergedMarch(const ReferenceField& field, const OpticalFunction& function,
+ConvergedImage convergedMarch(const ReferenceField& field, const OpticalFunction& function,
                               const Camera& camera, ImageSize size, MarchSteps steps = {},
-                              double agreement_db = 75, double* reached_db = nullptr);
+                              double agreement_db = 75);
 
 /// As a picture over white.
 Image toImage(const ReferenceImage& reference);

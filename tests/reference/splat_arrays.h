@@ -7,9 +7,15 @@
 
 namespace curvisplat {
 
+struct SplatArrays {
+  SplatGeometry& geometry;
+  SplatVariable& variable;
+};
+
 /// Sets splat `n`; `position` is from the arrays' origin.
-inline void setSplat(SplatGeometry& geometry, SplatVariable& variable, size_t n, const glm::dvec3& position,
-                     const Splat& splat, const SplatScalar& scalar, SplatCodes codes = {}) {
+inline void setSplat(const SplatArrays& arrays, size_t n, const glm::dvec3& position, const Splat& splat,
+                     const SplatScalar& scalar, SplatCodes codes = {}) {
+  const auto& [geometry, variable] = arrays;
   geometry.x[n] = static_cast<float>(position.x);
   geometry.y[n] = static_cast<float>(position.y);
   geometry.z[n] = static_cast<float>(position.z);

@@ -159,7 +159,7 @@ struct Brick {
     splat.axis = {0.1, 0.1, 0.1};
     splat.weight = 1e-3;
     for (size_t n = 0; n < count; ++n)
-      setSplat(geometry, variable, n, {0.5, 0.5, 0.5}, splat, {0.5, {0.1, 0, 0}, 0}, {border_code});
+      setSplat({geometry, variable}, n, {0.5, 0.5, 0.5}, splat, {0.5, {0.1, 0, 0}, 0}, {border_code});
   }
 };
 

@@ -22,7 +22,7 @@ constexpr glm::vec4 kWhite{1, 1, 1, 1};
 Image paint(std::span<const ScreenSplat> splats, const ClassificationTable& table, bool per_pixel,
             ImageSize size, const glm::vec4& background = kWhite, const PaintResources& resources = {}) {
   CpuPainter painter;
-  return paintFrame(painter, splats, table, {per_pixel}, size, background, resources);
+  return paintFrame(painter, splats, table, {per_pixel}, {size, background}, resources);
 }
 
 /// Every instruction set that this processor has and this program was built for, one after the other.
@@ -191,7 +191,7 @@ TEST(CpuPainter, DrawsNothingBehindWhatIsOpaque) {
   auto splats = far;
   splats.push_back(wall);
   CpuPainter painter;
-  const Image image = paintFrame(painter, splats, lively(), {}, size, kWhite, {2, 100});
+  const Image image = paintFrame(painter, splats, lively(), {}, {size, kWhite}, {2, 100});
   EXPECT_EQ(image.rgba, paint({&wall, 1}, lively(), true, size).rgba);
   EXPECT_GE(painter.hiddenSplats(), 1900u);
   EXPECT_LE(painter.hiddenSplats(), 2000u);

@@ -42,7 +42,7 @@ struct Example {
     view = {right, down, glm::cross(right, down) / 20.0f};
   }
 
-  Ellipse ellipse() const { return ellipseOf(rows, piece.shape, piece.slope, 0, 1, kLowPass2, 0.01f); }
+  Ellipse ellipse() const { return ellipseOf(rows, piece.shape, piece.slope, 0, 1, {kLowPass2, 0.01f}); }
 };
 
 // By the shape's matrix and the face's normal in the world, as one would write it down.
@@ -105,7 +105,7 @@ TEST(FaceCut, IsAntialiasedEdgeOn) {
     piece.faces.add({{1, 0, 0}, 0});
     const ScreenRows rows{1, 0, 0, 0, 1, 0};
     ScreenCut cut;
-    ASSERT_EQ(cutAtFaces(rows, piece, ellipseOf(rows, piece.shape, piece.slope, 0, 1, kLowPass2, 0.01f),
+    ASSERT_EQ(cutAtFaces(rows, piece, ellipseOf(rows, piece.shape, piece.slope, 0, 1, {kLowPass2, 0.01f}),
                          kLowPass2, cut),
               Remains::kSome);
     const double step_px = size / cut.faces[0][1];  // a deviation
@@ -120,7 +120,7 @@ TEST(FaceCut, OfTheNextLayerIsLeftOutWhereItIsSeenFaceOn) {
       SplatPiece piece{{0, 0, 0}, {1, 1, 1, 0, 0, 0}, {0, 0, 0}, 0, 1};
       piece.faces.add({inward, 0.8f, edge_on});
       ScreenCut cut;
-      const Ellipse ellipse = ellipseOf(rows, piece.shape, piece.slope, 0, 1, kLowPass2, 0.01f);
+      const Ellipse ellipse = ellipseOf(rows, piece.shape, piece.slope, 0, 1, {kLowPass2, 0.01f});
       EXPECT_EQ(cutAtFaces(rows, piece, ellipse, kLowPass2, cut),
                 edge_on && inward.z == 1 ? Remains::kAll : Remains::kSome);
     }

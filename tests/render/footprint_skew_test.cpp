@@ -47,7 +47,7 @@ TEST(FootprintSkew, IsTheSkewedKernelsIntegralAlongTheRay) {
   const uint32_t code = packGrowthCode({turn[0], turn[1], turn[2]}, {0.3, -0.2, 0});
   const CellGrowth cell = cellGrowth(code);
   const ScreenRows rows{5, 1, -2, 0.5f, 4, 3};
-  const Ellipse ellipse = ellipseOf(rows, shape, {}, 0, 1, 0, 1e-6f);
+  const Ellipse ellipse = ellipseOf(rows, shape, {}, 0, 1, {0, 1e-6f});
   const FootprintSkew skew = FootprintSkew::unpack(skewOf(rows, growthAxes(shape, code), ellipse));
 
   // In the frame of A, in deviations: the screen's u is W v with orthonormal rows, and the ray goes along their

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
 #include <string>
@@ -115,6 +116,65 @@ TEST(GaussianFiles, OfPlyHaveTheirNumbersInTheirPlaces) {
   const std::array<float, 17> expected{
       1, 2, 3, 0, 0, 0, 0, 1.7724539f, -1.7724539f, 0, std::log(0.5f), 0, std::log(2.0f), 1, 0, 0, 0};
   for (size_t n = 0; n < 17; ++n) EXPECT_NEAR(numbers[n], expected[n], 1e-6) << n;
+}
+
+/// The attribute of a .glb, as floats.
+std::vector<float> floatsOf(const nlohmann::json& gltf, std::string_view binary, const char* name) {
+  const auto& accessor =
+      gltf["accessors"][gltf["meshes"][0]["primitives"][0]["attributes"][name].get<size_t>()];
+  const auto& view = gltf["bufferViews"][accessor["bufferView"].get<size_t>()];
+  std::vector<float> numbers(view["byteLength"].get<size_t>() / sizeof(float));
+  std::memcpy(numbers.data(), binary.data() + view["byteOffset"].get<size_t>(),
+              view["byteLength"].get<size_t>());
+  return numbers;
+}
+
+TEST(GaussianFiles, OfGlbHaveTheExtensionsAttributesAndZUpwards) {
+  const TemporaryFolder folder;
+  std::vector<GaussianSplat> splats(3);
+  splats[0].position = {1, 2, 3};
+  splats[0].deviation = {0.5f, 1, 2};
+  splats[0].colour = {0.5f, 1, 0};
+  splats[0].opacity = 0.25f;
+  splats[1].position = {-1, 5, 0};
+  splats[2].position = {0, 0, 7};
+  writeGaussians(splats, folder / "some.glb");
+  std::ifstream file(folder / "some.glb", std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  std::array<uint32_t, 5> head;
+  std::memcpy(head.data(), text.data(), sizeof head);
+  EXPECT_EQ(text.substr(0, 4), "glTF");
+  EXPECT_EQ(head[1], 2u);
+  EXPECT_EQ(head[2], text.size());
+  EXPECT_EQ(head[3] % 4, 0u);
+  EXPECT_EQ(text.substr(16, 4), "JSON");
+  const auto gltf = nlohmann::json::parse(text.substr(20, head[3]));
+  EXPECT_EQ(text.substr(20 + head[3] + 4, 4), std::string("BIN\0", 4));
+  const std::string_view binary = std::string_view(text).substr(20 + head[3] + 8);
+  EXPECT_EQ(gltf["buffers"][0]["byteLength"], binary.size());
+  EXPECT_EQ(binary.size(), 3u * 60);
+
+  const auto& primitive = gltf["meshes"][0]["primitives"][0];
+  EXPECT_EQ(primitive["mode"], 0);
+  EXPECT_EQ(primitive["extensions"]["KHR_gaussian_splatting"]["kernel"], "ellipse");
+  EXPECT_EQ(gltf["extensionsUsed"][0], "KHR_gaussian_splatting");
+  EXPECT_EQ(gltf["accessors"][0]["min"], nlohmann::json({-1, 0, -5}));
+  EXPECT_EQ(gltf["accessors"][0]["max"], nlohmann::json({1, 7, 0}));
+  EXPECT_EQ(floatsOf(gltf, binary, "POSITION"), (std::vector<float>{1, 3, -2, -1, 0, -5, 0, 7, 0}));
+  EXPECT_EQ(floatsOf(gltf, binary, "KHR_gaussian_splatting:OPACITY")[0], 0.25f);
+  const auto scale = floatsOf(gltf, binary, "KHR_gaussian_splatting:SCALE");
+  EXPECT_EQ((std::vector<float>(scale.begin(), scale.begin() + 3)), (std::vector<float>{0.5f, 1, 2}));
+  EXPECT_NEAR(floatsOf(gltf, binary, "KHR_gaussian_splatting:SH_DEGREE_0_COEF_0")[1], 1.7724539f, 1e-6);
+  // The splat's third axis, z, points along glTF's y.
+  const auto q = floatsOf(gltf, binary, "KHR_gaussian_splatting:ROTATION");
+  const glm::vec3 axis = glm::quat(q[3], q[0], q[1], q[2]) * glm::vec3(0, 0, 1);
+  EXPECT_NEAR(glm::length(axis - glm::vec3(0, 1, 0)), 0, 1e-6);
+}
+
+TEST(GaussianFiles, OfGlbNeedASplat) {
+  const TemporaryFolder folder;
+  EXPECT_THROW(writeGaussians({}, folder / "none.glb"), Error);
+  EXPECT_FALSE(std::filesystem::exists(folder / "none.glb"));
 }
 
 }  // namespace

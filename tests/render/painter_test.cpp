@@ -28,8 +28,9 @@ class PainterTest : public testing::TestWithParam<Backend> {
   Image paint(std::span<const ScreenSplat> splats, const ClassificationTable& table,
               const PixelShading& shading, ImageSize size, const glm::vec4& background) {
     Image image;
-    backend_->run(
-        [&](Painter& painter) { image = paintFrame(painter, splats, table, shading, size, background); });
+    backend_->run([&](Painter& painter) {
+      image = paintFrame(painter, splats, table, shading, {size, background});
+    });
     return image;
   }
 

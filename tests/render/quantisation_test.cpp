@@ -39,7 +39,7 @@ Splats inArrays(const RootCube& root, const BrickSplats& brick) {
   variable.resize(brick.size());
   for (size_t n = 0; n < brick.size(); ++n) {
     const glm::dvec3 position = root.toWorld(brick.positions[n]) - root.cellMin(brick.cell);
-    setSplat(geometry, variable, n, position, brick.splats[n], brick.variables[0][n],
+    setSplat({geometry, variable}, n, position, brick.splats[n], brick.variables[0][n],
              {brick.border_codes[n], brick.growth_codes[n]});
   }
   return out;

@@ -87,9 +87,10 @@ TEST_F(PagerTest, BatchesBringEveryStreamOnce) {
   for (int round = 0; round < 200; ++round) {
     // Streams in file order, some touching, some far apart; asked for in any order.
     std::vector<BrickExtents> bricks(1 + random() % 300);
-    uint64_t ends[kBrickStreams] = {0, 0};
+    uint64_t ends[kBrickStreams] = {};
     for (BrickExtents& brick : bricks)
       for (size_t stream = 0; stream < kBrickStreams; ++stream) {
+        if (stream == 2 && round % 3 == 0) continue;  // one variable
         brick[stream].length = static_cast<uint32_t>(1 + random() % (random() % 8 == 0 ? 300'000 : 9'000));
         brick[stream].offset = streamOffset(ends[stream], brick[stream].length);
         if (random() % 10 == 0) brick[stream].offset += random() % 200 * kPageBytes;
@@ -112,8 +113,10 @@ TEST_F(PagerTest, BatchesBringEveryStreamOnce) {
     ASSERT_EQ(place, batch.bytes);
     for (size_t n = 0; n < batch.bricks.size(); ++n)
       for (size_t stream = 0; stream < kBrickStreams; ++stream) {
-        const BatchRead& read = batch.reads.at(batch.bricks[n].read[stream]);
         const Extent& extent = bricks[n][stream];
+        ASSERT_EQ(extent.length == 0, batch.bricks[n].read[stream] == BatchBrick::kNoRead);
+        if (extent.length == 0) continue;
+        const BatchRead& read = batch.reads.at(batch.bricks[n].read[stream]);
         ASSERT_EQ(read.stream, stream);
         ASSERT_GE(extent.offset, read.offset);
         ASSERT_LE(extent.offset + extent.length, read.offset + read.needed);

@@ -15,6 +15,7 @@ try:
     import numpy as np
 
     import read_cache
+    import read_faces
 except ModuleNotFoundError as error:
     print(f"skipped: {error}; install python3-numpy, python3-zstandard and python3-xxhash")
     sys.exit(77)
@@ -79,7 +80,7 @@ def compare(cache, dump, seen):
 
 
 def compare_faces(cache, dump):
-    faces, numbers = read_cache.Faces(cache), 0
+    faces, numbers = read_faces.Faces(cache), 0
     for n, patch in enumerate(faces.patches):
         nodes, quads, scalars = (int(count) for count in np.frombuffer(dump.read(24), "<u8"))
         positions, drawn, values = faces.patch(n)

@@ -8,6 +8,7 @@
           in what they include and in what they link
   folder  tools -> {preprocess, render} -> stream; only tests/ and bench/ include tests/, nothing includes bench/
   room    a room includes what its curvisplat_room() links: a header what is PUBLIC, a source also what is PRIVATE
+  table   the README of a folder of rooms lists each, after those that it includes
 """
 import dataclasses
 import pathlib
@@ -28,8 +29,8 @@ PROGRAM_ROOMS = {
     "tools/output": set(),
     "tools/mpi": set(),
     "tools/options": {"tools/output"},
-    "tools/commands": {"tools/output", "tools/options", "tools/throughput", "tools/viewer"},
-    "tools/python": {"tools/output", "tools/options"},
+    "tools/commands": {"tools/output", "tools/options", "tools/serve", "tools/throughput", "tools/viewer"},
+    "tools/python": {"tools/output", "tools/options", "tools/viewer"},
     "tools": {"tools/output", "tools/options", "tools/commands"},
 }
 
@@ -199,6 +200,25 @@ def room_faults(includes, rooms):
     return faults + [f"{folder}/CMakeLists.txt has no curvisplat_room()" for folder in sorted(homeless)]
 
 
+def table_faults(includes, root):
+    """What the tables of rooms say of the order."""
+    faults = []
+    for top in ("stream", "preprocess", "render"):
+        table = root / top / "README.md"
+        if not table.exists():
+            continue
+        order = re.findall(r"^\| \[`?(\w+)`?\]\(", table.read_text(), re.M)
+        inside = [(include, include.file.split("/"), include.included.split("/"))
+                  for include in includes if include.file.startswith(top + "/")]
+        for room in sorted({a[1] for _, a, _ in inside if len(a) > 2} - set(order)):
+            faults.append(f"{top}/README.md: its table has no row for {room}/")
+        for include, a, b in inside:
+            if b[0] == top and a[1] in order and b[1] in order and order.index(b[1]) > order.index(a[1]):
+                faults.append(f"{include.file}:{include.line}: includes {include.included}, "
+                              f"but {top}/README.md lists {b[1]} below {a[1]}")
+    return faults
+
+
 def check(root):
     includes, faults = read_includes(root)
     rooms = read_rooms(root)
@@ -210,6 +230,7 @@ def check(root):
         faults.append(f"cycle of links: {', '.join(cycle)}")
     faults += folder_faults(includes)
     faults += room_faults(includes, rooms)
+    faults += table_faults(includes, root)
     return includes, faults
 
 

@@ -93,6 +93,13 @@ class Checks(unittest.TestCase):
     def test_parts_of_the_program_out_of_order(self):
         self.finds("tools/output/ may not include", {"tools/output/up.cpp": '#include "tools/commands/view.h"'})
 
+    def test_a_table_of_rooms_in_another_order(self):
+        cache = "| [`cache`](cache/README.md) | files |\n"
+        base = "| [`base`](base/README.md) | errors |\n"
+        self.assertEqual(self.faults({"stream/README.md": base + cache}), [])
+        self.finds("README.md lists base below cache", {"stream/README.md": cache + base})
+        self.finds("its table has no row for cache/", {"stream/README.md": base})
+
     def test_a_folder_without_a_room(self):
         self.finds("stream/new/CMakeLists.txt has no", {"stream/new/new.cpp": '#include "stream/base/error.h"'})
 

@@ -10,6 +10,7 @@ void addConvert(CLI::App& app);
 void addInfo(CLI::App& app);
 void addRender(CLI::App& app);
 void addView(CLI::App& app);
+void addServe(CLI::App& app);
 void addBench(CLI::App& app);
 void addGenerate(CLI::App& app);
 void addCompare(CLI::App& app);

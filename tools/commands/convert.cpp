@@ -19,6 +19,7 @@
 #include "tools/commands/add_scalar.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/convert_series.h"
+#include "tools/commands/dry_run.h"
 #include "tools/options/convert_arguments.h"
 #include "tools/options/grid_options.h"
 #include "tools/options/option_parsers.h"
@@ -28,6 +29,7 @@
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
 #include "tools/output/thread_failures.h"
+#include "tools/output/trace_of_run.h"
 
 namespace curvisplat {
 namespace {
@@ -98,9 +100,10 @@ void runConvert(ConvertArguments arguments) {
   applyCommonOptions(arguments, options);
   applyGridUse(arguments, options);
 
-  const auto source = openSource(arguments, arguments.output);
+  std::unique_ptr<DataSource> source = openSource(arguments, arguments.output);
   options.scalars = chooseScalars(arguments, arguments.scalars, source->description());
   options.title = arguments.grid.grid.stem().string();
+  if (arguments.dry_run) return dryRun(std::move(source), options, arguments);
 
   requireThreads(arguments.threads);
   Progress progress{ranks.isFirst() ? progressBar() : Progress::Display{}};
@@ -182,6 +185,8 @@ void addConvert(CLI::App& app) {
       ->check(CLI::Range(0u, kMaxThreads));
   command->add_option("--tmp", arguments->temporary_folder,
                       "Directory for temporary files (default: beside the cache)");
+  command->add_flag("--dry-run", arguments->dry_run,
+                    "Say what the conversion will take (bytes, memory, time), from a sample of the grid");
   command->add_flag("--no-preflight", arguments->no_preflight,
                     "Do not check before the work that the disks have room");
   command->add_flag("--resume", arguments->resume,
@@ -202,17 +207,27 @@ void addConvert(CLI::App& app) {
       "Where blocks overlap: owner draws each point once, by the block with the smallest cells "
       "there; all draws every block (default: owner)");
   command->add_option("--stats", arguments->statistics, "Write times, bytes and counts to this JSON file");
+  command->add_option("--trace", arguments->trace, kTraceHelp);
   addGridOptions(*command, arguments->grid);
   addGasOptions(*command, arguments->gas);
   command->callback([arguments] {
     takeScalarsFromSolutions(*arguments);
     const bool series = isSeries(*arguments);
     const bool adds = !arguments->added_scalars.empty() || !arguments->to.empty();
+    if (arguments->dry_run && (adds || arguments->follows))
+      throw UsageError(
+          "--dry-run: is for a new cache; leave out --add-scalar, --add-steps, --to and --follow");
+    if (arguments->dry_run && !launchedRanks().alone())
+      throw UsageError("--dry-run: one process samples; start one");
     if ((series || adds) && !launchedRanks().alone())
       throw UsageError("{} one process converts; start one",
                        series ? "a series of time steps: " : "--add-scalar:");
-    if (series) return runConvertSeries(*arguments);
-    adds ? runAddScalar(*arguments) : runConvert(*arguments);
+    TraceOfRun trace(arguments->trace, gridAndCaches(*arguments));
+    if (series)
+      runConvertSeries(*arguments);
+    else
+      adds ? runAddScalar(*arguments) : runConvert(*arguments);
+    trace.end();
   });
 }
 

@@ -15,6 +15,7 @@
 #include "stream/base/message.h"
 #include "stream/base/paths.h"
 #include "stream/cache/cache_reader.h"
+#include "tools/commands/dry_run.h"
 #include "tools/commands/folder_events.h"
 #include "tools/commands/written_files.h"
 #include "tools/options/option_parsers.h"
@@ -179,6 +180,7 @@ void runConvertSeries(ConvertArguments arguments) {
   const SeriesOptions options = seriesOptions(arguments);
   const std::vector<StepFiles> steps = chosenSteps(arguments);
   const SeriesInput input = seriesInput(arguments, steps);
+  if (arguments.dry_run) return dryRunOfSeries(input, options, arguments);
 
   requireThreads(arguments.threads);
   Progress progress{progressBar()};

@@ -126,7 +126,7 @@ void addExport(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "export", "Export a cache as 3D Gaussian splats, which web viewers and game engines draw");
   command->add_option("CACHE", arguments->cache, "Splat cache, a directory NAME.splats")->required();
-  command->add_option("-o,--output", arguments->output, "File to write: .ply or .spz")->required();
+  command->add_option("-o,--output", arguments->output, "File to write: .ply, .spz or .glb")->required();
   addScalarOption(*command, arguments->scalar);
   addFunctionOptions(*command, arguments->scalar, "Data and colours");
   command

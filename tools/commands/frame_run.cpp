@@ -11,6 +11,7 @@
 #include "tools/commands/empty_picture.h"
 #include "tools/options/channel_arguments.h"
 #include "tools/output/launched_ranks.h"
+#include "tools/output/movie_writer.h"
 #include "tools/output/run_statistics.h"
 
 namespace curvisplat {
@@ -25,6 +26,7 @@ class FrameRun {
         player_(job.player),
         output_(job.output),
         report_(job.report),
+        step_changed_(job.step_changed),
         progress_(progress),
         ranks_(launchedRanks()),
         channels_(channelsOf(job.arguments)) {}
@@ -100,8 +102,15 @@ class FrameRun {
     if (moves) progress_.advance(1);
   }
 
+  void goTo(const StepPosition& position) {
+    player_.goTo(position);
+    if (step_ == position.step) return;
+    step_changed_();
+    step_ = position.step;
+  }
+
   void draw(uint64_t number, const uint64_t* next, const MotionInTime& motion, Progress& progress) {
-    player_.goTo(motion.position(number));
+    goTo(motion.position(number));
     const double time = player_.time();
     const Camera camera = motion.camera(number);
     FrameStatistics statistics;
@@ -130,7 +139,7 @@ class FrameRun {
 
   /// Reads the next frame's bricks, and goes to its time step, while this frame's picture is written.
   void prefetch(const MotionInTime& motion, uint64_t number) {
-    player_.goTo(motion.position(number));
+    goTo(motion.position(number));
     try {
       player_.renderer().prefetch(motion.camera(number), report_.options);
     } catch (const Error&) {
@@ -207,6 +216,8 @@ class FrameRun {
   StepPlayer& player_;
   FrameOutput* output_;  // null at ranks that write nothing
   RenderReport& report_;
+  const std::function<void()> step_changed_;
+  std::optional<uint64_t> step_;
   Progress& progress_;
   Ranks& ranks_;
   const ValueChannels channels_;

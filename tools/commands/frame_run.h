@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,7 +27,7 @@ namespace curvisplat {
 
 /// Command-line arguments as given; checked and parsed later.
 struct RenderArguments {
-  std::filesystem::path cache, output, first_image, statistics;
+  std::filesystem::path cache, output, first_image, statistics, trace;
   std::vector<std::filesystem::path> solutions;  // of a grid in place of the cache
   CameraArguments camera;
   ScalarArguments scalar;
@@ -50,6 +51,7 @@ struct FrameJob {
   StepPlayer& player;
   FrameOutput* output;  // null at ranks that write nothing
   RenderReport& report;
+  std::function<void()> step_changed;  // called when the player is at another step than before
 };
 
 /// Draws the frames `numbers`. Pictures that were written are kept if a later frame fails. Throws Interrupted after

@@ -5,16 +5,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "stream/base/byte_text.h"
+
 namespace curvisplat {
-namespace {
-
-std::string sizeText(uint64_t bytes) {
-  const auto mebibytes = static_cast<double>(bytes) / static_cast<double>(1 << 20);
-  return mebibytes < 1024 ? fmt::format("{:.1f} MiB", mebibytes)
-                          : fmt::format("{:.1f} GiB", mebibytes / 1024);
-}
-
-}  // namespace
 
 InfoEstimate::InfoEstimate(uint64_t splats)
     : splats_(splats),
@@ -32,7 +25,7 @@ nlohmann::ordered_json InfoEstimate::toJson() const {
 std::string InfoEstimate::toText() const {
   return fmt::format(
       "a cache of about {} with one scalar, {} more per additional scalar; about {:.1f} s on {} thread{}",
-      sizeText(needs_.cache_bytes), sizeText(needs_.bytes_per_further_scalar), needs_.seconds, threads_,
+      byteText(needs_.cache_bytes), byteText(needs_.bytes_per_further_scalar), needs_.seconds, threads_,
       threads_ == 1 ? "" : "s");
 }
 

@@ -38,11 +38,13 @@
 #include "tools/options/surface_arguments.h"
 #include "tools/output/frame_output.h"
 #include "tools/output/launched_ranks.h"
+#include "tools/output/movie_writer.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
 #include "tools/output/stop_signals.h"
 #include "tools/output/thread_failures.h"
+#include "tools/output/trace_of_run.h"
 
 namespace curvisplat {
 namespace {
@@ -82,7 +84,7 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
   if (!arguments.first_image.empty() && !launchedRanks().alone())
     throw UsageError("--first-image {}: one process draws it; start one", arguments.first_image.string());
   if (arguments.frame_rate && !isMovieName(arguments.output))
-    throw UsageError("--frame-rate needs a movie: -o NAME.mp4");
+    throw UsageError("--frame-rate needs a movie: -o NAME.mp4 or NAME.gif");
   if (arguments.frame.background == "transparent" && arguments.output.extension() != ".png" &&
       arguments.output.extension() != ".exr")
     throw UsageError("--background transparent: {} files have no transparency; use .png or .exr",
@@ -207,9 +209,6 @@ void render(const RenderArguments& given) {
       transfer_function.logScale())
     throw UsageError(
         "--iso in the volume needs a linear transfer function; this one is logarithmic: add --volume off");
-  if (steps.size() > 1 && !arguments.surfaces.surface_by.empty())
-    throw UsageError("--surface-by {}: faces have the values of the first time step; draw that one alone",
-                     arguments.surfaces.surface_by);
   for (const std::string& miss : slicesThatMiss(arguments.surfaces, manifest.lower, manifest.upper))
     printMessage("warning: {}", miss);
 
@@ -260,8 +259,11 @@ void render(const RenderArguments& given) {
     if (!arguments.statistics.empty() && ranks.isFirst())
       writeStatistics(arguments.statistics, statisticsOf(report));
   };
+  const auto step_changed = [&, first = options.scene] {
+    options.scene = sceneAt(arguments.surfaces, cache, first);
+  };
   try {
-    drawFrames({arguments, manifest, player, output.get(), report}, motion, numbers, progress);
+    drawFrames({arguments, manifest, player, output.get(), report, step_changed}, motion, numbers, progress);
   } catch (const Interrupted& interrupted) {
     progress.end();
     writeReport();
@@ -289,9 +291,9 @@ void addRender(CLI::App& app) {
       ->required();
   command->add_option("SOLUTION", arguments->solutions, "Further files of the grid");
   command
-      ->add_option(
-          "-o,--output", arguments->output,
-          "Picture to write: .png, .exr or .pfm. Of several frames: frame_%04d.png, or NAME.mp4 (by ffmpeg)")
+      ->add_option("-o,--output", arguments->output,
+                   "Picture to write: .png, .exr or .pfm. Of several frames: frame_%04d.png, or NAME.mp4 or "
+                   ".gif (by ffmpeg)")
       ->required();
   command->add_option("--size", arguments->frame.size, "Size of the picture, WIDTHxHEIGHT in pixels")
       ->capture_default_str();
@@ -436,7 +438,12 @@ void addRender(CLI::App& app) {
       ->add_option("--stats", arguments->statistics,
                    "Write times, bytes and counts of every frame to this JSON file")
       ->group(how);
-  command->callback([arguments] { render(*arguments); });
+  command->add_option("--trace", arguments->trace, kTraceHelp)->group(how);
+  command->callback([arguments] {
+    TraceOfRun trace(arguments->trace, {arguments->cache, arguments->output, arguments->statistics});
+    render(*arguments);
+    trace.end();
+  });
 }
 
 }  // namespace curvisplat

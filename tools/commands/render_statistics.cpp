@@ -1,9 +1,10 @@
 #include "tools/commands/render_statistics.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <type_traits>
+#include <variant>
 
 #include "tools/output/run_statistics.h"
 
@@ -11,59 +12,19 @@ namespace curvisplat {
 namespace {
 
 using Json = nlohmann::json;
+using FrameField = StatisticsField<FrameStatistics>;
 
-struct Seconds {
-  const char* name;
-  double FrameStatistics::*value;
-};
-constexpr std::array<Seconds, 13> kSeconds{{{"plan", &FrameStatistics::plan_s},
-                                            {"read", &FrameStatistics::read_s},
-                                            {"verify", &FrameStatistics::verify_s},
-                                            {"decode", &FrameStatistics::decode_s},
-                                            {"project", &FrameStatistics::project_s},
-                                            {"sort", &FrameStatistics::sort_s},
-                                            {"upload", &FrameStatistics::upload_s},
-                                            {"draw", &FrameStatistics::draw_s},
-                                            {"gl_draw", &FrameStatistics::gl_draw_s},
-                                            {"total", &FrameStatistics::total_s},
-                                            {"workers_waited", &FrameStatistics::workers_waited_s},
-                                            {"workers_waited_for_reads", &FrameStatistics::read_waited_s},
-                                            {"painter_waited", &FrameStatistics::painter_waited_s}}};
+Json& placeOf(Json& json, const FrameField& field) {
+  return (field.seconds ? json["seconds"] : json)[field.name];
+}
 
-struct Count {
-  const char* name;
-  uint64_t FrameStatistics::*value;
-};
-constexpr std::array<Count, 28> kCounts{{{"bricks_drawn", &FrameStatistics::bricks_drawn},
-                                         {"bricks_culled", &FrameStatistics::bricks_culled},
-                                         {"bricks_out_of_image", &FrameStatistics::bricks_out_of_image},
-                                         {"bricks_transparent", &FrameStatistics::bricks_transparent},
-                                         {"bricks_hidden", &FrameStatistics::bricks_hidden},
-                                         {"splats_read", &FrameStatistics::splats_read},
-                                         {"splats_clipped", &FrameStatistics::splats_clipped},
-                                         {"splats_behind", &FrameStatistics::splats_behind},
-                                         {"splats_off_screen", &FrameStatistics::splats_off_screen},
-                                         {"splats_transparent", &FrameStatistics::splats_transparent},
-                                         {"splats_drawn", &FrameStatistics::splats_drawn},
-                                         {"splats_hidden", &FrameStatistics::splats_hidden},
-                                         {"bytes_read", &FrameStatistics::bytes_read},
-                                         {"read_requests", &FrameStatistics::read_requests},
-                                         {"bricks_read", &FrameStatistics::bricks_read},
-                                         {"bricks_left_out", &FrameStatistics::bricks_left_out},
-                                         {"bytes_left_out", &FrameStatistics::bytes_left_out},
-                                         {"bricks_cached", &FrameStatistics::bricks_cached},
-                                         {"bricks_resident", &FrameStatistics::bricks_resident},
-                                         {"cache_bytes", &FrameStatistics::cache_bytes},
-                                         {"kept_bytes", &FrameStatistics::kept_bytes},
-                                         {"memory_used_bytes", &FrameStatistics::memory_used_bytes},
-                                         {"ring_peak_bytes", &FrameStatistics::ring_peak_bytes},
-                                         {"sweep_peak_bytes", &FrameStatistics::sweep_peak_bytes},
-                                         {"slabs", &FrameStatistics::slabs},
-                                         {"bricks_again", &FrameStatistics::bricks_again},
-                                         {"pager_peak_bytes", &FrameStatistics::pager_peak_bytes},
-                                         {"cache_peak_bytes", &FrameStatistics::cache_peak_bytes}}};
-
-constexpr const char* kQueueDepth = "mean_queue_depth";
+Json jsonOf(uint64_t number) {
+  return number;
+}
+/// An error on the screen is infinite near a perspective camera.
+Json jsonOf(double number) {
+  return std::isfinite(number) ? Json(number) : Json();
+}
 
 Json toJson(const glm::dvec3& v) {
   return {v.x, v.y, v.z};
@@ -92,14 +53,9 @@ Json toJson(const TransferFunction& function) {
 
 Json toJson(const FrameStatistics& statistics) {
   Json json;
-  for (const Seconds& seconds : kSeconds) json["seconds"][seconds.name] = statistics.*seconds.value;
-  for (const Count& count : kCounts) json[count.name] = statistics.*count.value;
-  json["largest_level"] = statistics.largest_level;
-  json["largest_error_px"] = nullptr;  // infinite near a perspective camera
-  if (std::isfinite(statistics.largest_error_px)) json["largest_error_px"] = statistics.largest_error_px;
-  json["workers"] = statistics.workers;
+  for (const FrameField& field : statisticsFields())
+    field.visit(statistics, [&](auto number) { placeOf(json, field) = jsonOf(number); });
   json["read_by"] = statistics.read_by;
-  json[kQueueDepth] = statistics.mean_queue_depth;
   json["bricks_unreadable"] = Json::array();
   for (const BrickFailure& failure : statistics.bricks_unreadable)
     json["bricks_unreadable"].push_back({{"brick", failure.brick}, {"reason", failure.reason}});
@@ -108,25 +64,18 @@ Json toJson(const FrameStatistics& statistics) {
 
 FrameStatistics statisticsFrom(const Json& json) {
   FrameStatistics statistics;
-  for (const Seconds& seconds : kSeconds) statistics.*seconds.value = json["seconds"][seconds.name];
-  for (const Count& count : kCounts) statistics.*count.value = json[count.name];
-  statistics.largest_level = json["largest_level"];
-  const Json& error = json["largest_error_px"];
-  statistics.largest_error_px = error.is_null() ? INFINITY : error.get<double>();
-  statistics.workers = json["workers"];
+  for (const FrameField& field : statisticsFields())
+    field.visit(statistics, [&](auto& number) {
+      const Json& stored = (field.seconds ? json["seconds"] : json)[field.name];
+      if constexpr (std::is_same_v<decltype(number), double&>)
+        number = stored.is_null() ? INFINITY : stored.get<double>();
+      else
+        number = stored;
+    });
   statistics.read_by = json["read_by"];
-  statistics.mean_queue_depth = json[kQueueDepth];
   for (const Json& failure : json["bricks_unreadable"])
     statistics.bricks_unreadable.push_back({failure["brick"], failure["reason"]});
   return statistics;
-}
-
-/// What is the same for all ranks, or is not to be added up.
-bool isLargestOf(uint64_t FrameStatistics::*value) {
-  const std::array alike{&FrameStatistics::bricks_culled, &FrameStatistics::bricks_out_of_image,
-                         &FrameStatistics::bricks_transparent, &FrameStatistics::slabs,
-                         &FrameStatistics::memory_used_bytes};
-  return std::find(alike.begin(), alike.end(), value) != alike.end();
 }
 
 /// Percentiles by the nearest-rank method: always a value of some frame.
@@ -135,15 +84,16 @@ Json spread(const std::vector<FrameReport>& frames, T FrameStatistics::*value) {
   std::vector<T> values;
   for (const FrameReport& frame : frames) values.push_back(frame.statistics.*value);
   std::sort(values.begin(), values.end());
-  const auto percentile = [&](size_t percent) { return values[(values.size() * percent + 99) / 100 - 1]; };
-  return {{"p50", percentile(50)}, {"p95", percentile(95)}, {"max", values.back()}};
+  const auto percentile = [&](size_t percent) {
+    return jsonOf(values[(values.size() * percent + 99) / 100 - 1]);
+  };
+  return {{"p50", percentile(50)}, {"p95", percentile(95)}, {"max", jsonOf(values.back())}};
 }
 
 Json overFrames(const std::vector<FrameReport>& frames) {
   Json json{{"frames", frames.size()}};
-  for (const Seconds& seconds : kSeconds) json["seconds"][seconds.name] = spread(frames, seconds.value);
-  for (const Count& count : kCounts) json[count.name] = spread(frames, count.value);
-  json[kQueueDepth] = spread<double>(frames, &FrameStatistics::mean_queue_depth);
+  for (const FrameField& field : statisticsFields())
+    std::visit([&](auto member) { placeOf(json, field) = spread(frames, member); }, field.value);
   return json;
 }
 
@@ -169,25 +119,7 @@ std::vector<FrameReport> unpackStatistics(const Ranks::Bytes& bytes) {
 
 FrameStatistics combined(const std::vector<FrameStatistics>& ranks) {
   FrameStatistics whole = ranks.front();
-  for (size_t n = 1; n < ranks.size(); ++n) {
-    const FrameStatistics& one = ranks[n];
-    for (const Seconds& seconds : kSeconds) {
-      const bool largest =
-          seconds.value == &FrameStatistics::total_s || seconds.value == &FrameStatistics::plan_s;
-      double& value = whole.*seconds.value;
-      value = largest ? std::max(value, one.*seconds.value) : value + one.*seconds.value;
-    }
-    for (const Count& count : kCounts) {
-      uint64_t& value = whole.*count.value;
-      value = isLargestOf(count.value) ? std::max(value, one.*count.value) : value + one.*count.value;
-    }
-    whole.workers += one.workers;
-    for (const BrickFailure& failure : one.bricks_unreadable) {
-      const auto is_same = [&](const BrickFailure& other) { return other.brick == failure.brick; };
-      if (std::none_of(whole.bricks_unreadable.begin(), whole.bricks_unreadable.end(), is_same))
-        whole.bricks_unreadable.push_back(failure);
-    }
-  }
+  for (size_t n = 1; n < ranks.size(); ++n) combine(whole, ranks[n]);
   return whole;
 }
 

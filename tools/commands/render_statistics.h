@@ -50,7 +50,7 @@ nlohmann::json statisticsOf(const RenderReport& report);
 Ranks::Bytes packStatistics(const std::vector<FrameReport>& frames);
 /// Without cameras.
 std::vector<FrameReport> unpackStatistics(const Ranks::Bytes& bytes);
-/// Of a picture that several ranks drew. A brick that several of them read counts once for each.
+/// Of a picture that several ranks drew (combine).
 FrameStatistics combined(const std::vector<FrameStatistics>& ranks);
 
 }  // namespace curvisplat

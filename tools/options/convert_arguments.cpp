@@ -111,12 +111,16 @@ std::vector<uint32_t> chooseScalars(const ConvertArguments& arguments, const std
   }
 }
 
+std::vector<std::filesystem::path> gridAndCaches(const ConvertArguments& arguments) {
+  std::vector<std::filesystem::path> paths = arguments.grid.solutions;
+  paths.push_back(arguments.grid.grid);
+  paths.insert(paths.end(), {arguments.to, arguments.output});
+  return paths;
+}
+
 void checkStatisticsFile(const ConvertArguments& arguments) {
-  if (arguments.statistics.empty()) return;
-  std::vector<std::filesystem::path> inputs = arguments.grid.solutions;
-  inputs.push_back(arguments.grid.grid);
-  inputs.insert(inputs.end(), {arguments.to, arguments.output});
-  checkOutputFile("--stats", arguments.statistics, inputs);
+  if (!arguments.statistics.empty())
+    checkOutputFile("--stats", arguments.statistics, gridAndCaches(arguments));
 }
 
 void applyGridUse(const ConvertArguments& arguments, ConvertOptions& options) {

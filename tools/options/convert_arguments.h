@@ -24,11 +24,11 @@ struct ConvertArguments {
   OpenGridOptions grid;
   GasModel gas;
   std::vector<std::string> scalars, added_scalars;
-  std::filesystem::path output, to, temporary_folder, statistics;
+  std::filesystem::path output, to, temporary_folder, statistics, trace;
   std::optional<double> blank_value;
   std::optional<std::string> memory;
   unsigned threads = 0;
-  bool overwrite = false, resume = false, no_preflight = false;
+  bool overwrite = false, resume = false, no_preflight = false, dry_run = false;
   std::vector<std::string> planes;  // --surface
   bool no_surfaces = false;
   std::optional<std::string> overlap;  // owner or all
@@ -60,6 +60,9 @@ uint64_t totalBytes(std::span<const FileReport> files);
 double mebibytes(uint64_t bytes);
 /// ", peak memory 123 MiB", of this process so far; empty where the system does not tell.
 std::string peakMemoryText();
+
+/// The files of the grid, and the caches: what --stats and --trace must not overwrite.
+std::vector<std::filesystem::path> gridAndCaches(const ConvertArguments& arguments);
 
 /// Throws Error if the --stats file cannot be written or is one of the inputs or outputs.
 void checkStatisticsFile(const ConvertArguments& arguments);

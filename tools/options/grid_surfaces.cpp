@@ -126,6 +126,14 @@ class FaceFinder {
   GridSurface& surface_;
 };
 
+size_t variableOf(const std::string& name, const CacheReader& cache) {
+  try {
+    return cache.variableNamed(name);
+  } catch (const UsageError& error) {
+    throw Error("--surface-by: {}", error.what());
+  }
+}
+
 }  // namespace
 
 GridSurface gridSurfaceNamed(const std::string& text, const CacheReader& cache,
@@ -154,18 +162,29 @@ GridSurface gridSurfaceNamed(const std::string& text, const CacheReader& cache,
   return surface;
 }
 
-void colourByScalar(GridSurface& surface, const std::string& name, const CacheReader& cache, size_t drawn) {
-  size_t variable = 0;
-  try {
-    variable = cache.variableNamed(name);
-  } catch (const UsageError& error) {
-    throw Error("--surface-by: {}", error.what());
+std::shared_ptr<const FacesReader> facesWith(const std::string& name, const CacheReader& cache) {
+  auto own = FacesReader::open(cache.path(), cache.manifest());
+  if (!own || name.empty()) return own;
+  const uint32_t number = cache.manifest().variables[variableOf(name, cache)].number;
+  const Series& series = cache.series();
+  const uint64_t step = cache.step(), first = series.first_steps[series.steps[step].geometry];
+  if (step == first && own->scalarOf(number)) return own;
+  if (step != first) {
+    if (auto faces = FacesReader::open(cache.cachePath(), cache.seriesManifest(), facesFileOfStep(step)))
+      if (faces->scalarOf(number)) return faces;
+  } else {
+    for (const VariableInfo& added : cache.manifest().variables)
+      if (auto faces = FacesReader::open(cache.path(), cache.manifest(), facesFileOfVariable(added.number)))
+        if (faces->scalarOf(number)) return faces;
   }
-  const VariableInfo& info = cache.manifest().variables[variable];
-  surface.scalar = surface.faces->scalarOf(info.number);
-  if (!surface.scalar)
-    throw Error("{}: --surface-by {}: the faces do not have the scalar, which was added later; convert again",
-                cache.path().string(), name);
+  throw Error(
+      "{}: --surface-by {}: an earlier version added {} without the values of the faces; convert again",
+      cache.cachePath().string(), name, step != first ? fmt::format("step {}", step) : "the scalar");
+}
+
+void colourByScalar(GridSurface& surface, const std::string& name, const CacheReader& cache, size_t drawn) {
+  const size_t variable = variableOf(name, cache);
+  surface.scalar = surface.faces->scalarOf(cache.manifest().variables[variable].number);
   if (variable == drawn) return;
   ScalarArguments arguments;
   arguments.scalar = name;

@@ -13,8 +13,12 @@ namespace curvisplat {
 GridSurface gridSurfaceNamed(const std::string& text, const CacheReader& cache,
                              const std::shared_ptr<const FacesReader>& faces);
 
-/// Colours the surface by the scalar `name`: the picture's colours if it is the scalar `drawn`, else those that are
-/// chosen from its own data. Throws Error if the cache or its faces do not have it.
+/// The faces of the cache's step; those with the values of the scalar `name` there, if one is named. Null if the cache
+/// has no faces. Throws Error if it has, but not with these values.
+std::shared_ptr<const FacesReader> facesWith(const std::string& name, const CacheReader& cache);
+
+/// Colours the surface, whose faces have it, by the scalar `name`: the picture's colours if it is the scalar `drawn`,
+/// else those that are chosen from its own data.
 void colourByScalar(GridSurface& surface, const std::string& name, const CacheReader& cache, size_t drawn);
 
 }  // namespace curvisplat

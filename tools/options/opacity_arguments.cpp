@@ -9,16 +9,13 @@ namespace {
 
 /// The scalar of the opacities; empty where there is one scalar.
 const std::string& nameOf(const OpacityArguments& arguments) {
-  return arguments.scalar.empty() ? arguments.iso_scalar : arguments.scalar;
+  return arguments.by.scalar.empty() ? arguments.iso_scalar : arguments.by.scalar;
 }
 
 /// What the opacities' function is chosen from.
 ScalarArguments opacitiesOf(const OpacityArguments& arguments, const ScalarArguments& scalar) {
-  ScalarArguments of;
+  ScalarArguments of = arguments.by;
   of.scalar = nameOf(arguments);
-  of.transfer_function = arguments.function;
-  of.range = arguments.range;
-  of.asinh = arguments.asinh;
   of.opacity = scalar.opacity;
   of.opacity_unit = scalar.opacity_unit;
   return of;
@@ -28,7 +25,7 @@ size_t variableOf(const CacheReader& cache, const OpacityArguments& arguments) {
   try {
     return cache.variableNamed(nameOf(arguments));
   } catch (const UsageError& error) {
-    throw Error("{}: {}", arguments.scalar.empty() ? "--iso-by" : "--opacity-by", error.what());
+    throw Error("{}: {}", arguments.by.scalar.empty() ? "--iso-by" : "--opacity-by", error.what());
   }
 }
 
@@ -37,20 +34,21 @@ size_t variableOf(const CacheReader& cache, const OpacityArguments& arguments) {
 void addOpacityOptions(CLI::App& command, OpacityArguments& arguments, const std::string& group,
                        const std::string& surfaces_group) {
   command
-      .add_option("--opacity-by", arguments.scalar,
+      .add_option("--opacity-by", arguments.by.scalar,
                   "Name of another scalar, which gives the opacities; --scalar gives the colours. "
                   "--opacity and --opacity-unit are then of this one")
       ->group(group);
   command
-      .add_option("--opacity-range", arguments.range,
+      .add_option("--opacity-range", arguments.by.range,
                   "Range of the --opacity-by scalar along which --opacity lies, as --range (default: chosen "
                   "from the data)")
       ->group(group);
   command
-      .add_option("--opacity-asinh", arguments.asinh, "As --asinh, of the --opacity-by scalar: CENTRE,WIDTH")
+      .add_option("--opacity-asinh", arguments.by.asinh,
+                  "As --asinh, of the --opacity-by scalar: CENTRE,WIDTH")
       ->group(group);
   command
-      .add_option("--opacity-tf", arguments.function,
+      .add_option("--opacity-tf", arguments.by.transfer_function,
                   "ParaView preset (.json) whose opacities are taken for the --opacity-by scalar")
       ->group(group);
   command
@@ -65,28 +63,29 @@ void checkOpacityArguments(const OpacityArguments& arguments, const ScalarArgume
   if (!arguments.iso_scalar.empty()) {
     if (surfaces.isovalues.empty())
       throw UsageError("--iso-by {}: needs an isosurface: --iso VALUE", arguments.iso_scalar);
-    if (!arguments.scalar.empty() && arguments.scalar != arguments.iso_scalar)
+    if (!arguments.by.scalar.empty() && arguments.by.scalar != arguments.iso_scalar)
       throw UsageError(
           "--iso-by {}: a picture has two scalars, and the isosurfaces are those of --opacity-by {}; leave "
           "one of the two out",
-          arguments.iso_scalar, arguments.scalar);
-    if (arguments.scalar.empty() && surfaces.volume == "on")
+          arguments.iso_scalar, arguments.by.scalar);
+    if (arguments.by.scalar.empty() && surfaces.volume == "on")
       throw UsageError(
           "--iso-by {}: with the volume, its opacities are that scalar's: add --opacity-by {}, "
           "or --volume off",
           arguments.iso_scalar, arguments.iso_scalar);
   }
-  if (arguments.scalar.empty()) {
+  if (arguments.by.scalar.empty()) {
     const std::pair<const char*, const std::optional<std::string>&> given[] = {
-        {"--opacity-range", arguments.range},
-        {"--opacity-asinh", arguments.asinh},
-        {"--opacity-tf", arguments.function}};
+        {"--opacity-range", arguments.by.range},
+        {"--opacity-asinh", arguments.by.asinh},
+        {"--opacity-tf", arguments.by.transfer_function}};
     for (const auto& [option, value] : given)
       if (value) throw UsageError("{} {}: needs --opacity-by NAME", option, *value);
     return;
   }
-  if (arguments.function && !arguments.function->ends_with(".json"))
-    throw UsageError("--opacity-tf {}: expected a ParaView preset, NAME.json", *arguments.function);
+  if (arguments.by.transfer_function && !arguments.by.transfer_function->ends_with(".json"))
+    throw UsageError("--opacity-tf {}: expected a ParaView preset, NAME.json",
+                     *arguments.by.transfer_function);
   checkFunctionArguments(opacitiesOf(arguments, scalar));
 }
 

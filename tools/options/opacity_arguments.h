@@ -2,7 +2,6 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <optional>
 #include <string>
 
 #include "render/frame/drawn_scalars.h"
@@ -14,9 +13,9 @@ namespace curvisplat {
 
 /// Command-line arguments as given; checked and parsed later.
 struct OpacityArguments {
-  std::string scalar;                                 // of the opacities
-  std::string iso_scalar;                             // of the isosurfaces
-  std::optional<std::string> range, asinh, function;  // of the opacities
+  /// Of the opacities. Their points and unit are --opacity and --opacity-unit, which ScalarArguments of the --scalar has.
+  ScalarArguments by;
+  std::string iso_scalar;  // of the isosurfaces
 };
 
 /// Adds --opacity-by, --opacity-range, --opacity-asinh and --opacity-tf, and --iso-by, under these headings.

@@ -39,11 +39,39 @@ std::vector<ClipPlane> parseSlices(const std::vector<std::string>& texts) {
   return planes;
 }
 
-double parseSliceOpacity(const std::string& text) {
-  const double opacity = parseNumber("--slice-opacity", text);
-  if (!(opacity > 0 && opacity <= 1))
-    throw UsageError("--slice-opacity {}: expected a number above 0 and at most 1", text);
+/// A number, or "function", perhaps with a factor: function, 0.5 or function*0.5.
+SheetOpacity parseSheetOpacity(const std::string& option, const std::string& text) {
+  constexpr std::string_view kFunction = "function";
+  SheetOpacity opacity;
+  opacity.by_function = text.starts_with(kFunction);
+  std::string factor = opacity.by_function ? text.substr(kFunction.size()) : text;
+  if (opacity.by_function && factor.empty()) return opacity;
+  if (opacity.by_function && factor.front() == '*') factor.erase(0, 1);
+  opacity.factor = parseNumber(option, factor);
+  if (!(opacity.factor > 0 && opacity.factor <= 1))
+    throw UsageError("{} {}: expected a number above 0 and at most 1, or function, or function*NUMBER",
+                     option, text);
   return opacity;
+}
+
+/// Of surface number n.
+SheetOpacity surfaceOpacity(const SurfaceArguments& arguments, size_t n) {
+  const auto& texts = arguments.surface_opacities;
+  return texts.empty() ? SheetOpacity()
+                       : parseSheetOpacity("--surface-opacity", texts.size() == 1 ? texts[0] : texts.at(n));
+}
+
+void checkSurfaceOpacities(const SurfaceArguments& arguments) {
+  const auto& texts = arguments.surface_opacities;
+  for (const std::string& text : texts)
+    if (parseSheetOpacity("--surface-opacity", text).by_function && arguments.surface_by.empty())
+      throw UsageError("--surface-opacity {}: of which scalar? Add --surface-by NAME", text);
+  if (texts.size() > 1 && texts.size() != arguments.surfaces.size())
+    throw UsageError(
+        "--surface-opacity: given {} times for {} surfaces; give it once, or once for each --surface",
+        texts.size(), arguments.surfaces.size());
+  if (!texts.empty() && arguments.surfaces.empty())
+    throw UsageError("--surface-opacity needs a surface: --surface FILE");
 }
 
 std::vector<double> parseIsovalues(const std::vector<std::string>& texts) {
@@ -67,7 +95,7 @@ double parseIsoOpacity(const std::string& text) {
 
 glm::vec3 parseColour(const std::string& text) {
   if (text == "transparent")
-    throw UsageError("--surface-colour transparent: surfaces are opaque; give #rrggbb");
+    throw UsageError("--surface-colour transparent: give #rrggbb, and --surface-opacity");
   return glm::vec3(parseBackground("--surface-colour", text));
 }
 
@@ -84,17 +112,6 @@ void requireIsovalues(const SurfaceScene& scene, const CacheReader& cache, size_
     if (!(value >= info.min && value <= info.max))
       throw Error("--iso {}: no isosurface: the values of {} go from {:.6g} to {:.6g}", value, info.name,
                   info.min, info.max);
-}
-
-/// Faces are those of the first step: another geometry has others, and other steps have other values.
-void requireFacesOfSteps(const SurfaceArguments& arguments, const CacheReader& cache) {
-  const auto& steps = cache.series().steps;
-  if (std::any_of(steps.begin(), steps.end(), [](const auto& step) { return step.geometry > 0; }))
-    throw Error("{}: --surface: the grid of the series moves, and the cache has its first step's faces only",
-                cache.cachePath().string());
-  if (!arguments.surface_by.empty() && steps.size() > 1 && cache.step() > 0)
-    throw Error("{}: --surface-by {}: the faces have the values of step 0, and step {} is drawn",
-                cache.cachePath().string(), arguments.surface_by, cache.step());
 }
 
 }  // namespace
@@ -123,6 +140,14 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
           "is drawn, else colours chosen from its data")
       ->group(group);
   command
+      .add_option(
+          "--surface-opacity", arguments.surface_opacities,
+          "Opacity of the surfaces, above 0 and at most 1, or one for each in their order (default 1); "
+          "function: that of the function of --surface-by")
+      ->take_all()
+      ->allow_extra_args(false)
+      ->group(group);
+  command
       .add_option("--slice", arguments.slices,
                   "Slice px,py,pz,nx,ny,nz through the point p, at right angles to n, with the transfer "
                   "function's colours. In coordinates before --scale; repeatable, up to 8")
@@ -130,7 +155,10 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
       ->allow_extra_args(false)
       ->group(group);
   command
-      .add_option("--slice-opacity", arguments.slice_opacity, "Opacity of the slices, above 0 and at most 1")
+      .add_option(
+          "--slice-opacity", arguments.slice_opacity,
+          "Opacity of the slices, above 0 and at most 1; function: that of the transfer function (with "
+          "--opacity-by, of its scalar's), or function*NUMBER")
       ->capture_default_str()
       ->group(group);
   command
@@ -152,7 +180,8 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
 
 void checkSurfaceArguments(const SurfaceArguments& arguments) {
   parseSlices(arguments.slices);
-  parseSliceOpacity(arguments.slice_opacity);
+  parseSheetOpacity("--slice-opacity", arguments.slice_opacity);
+  checkSurfaceOpacities(arguments);
   for (const std::string& colour : arguments.colours) parseColour(colour);
   if (arguments.colours.size() > 1 && arguments.colours.size() != arguments.surfaces.size())
     throw UsageError(
@@ -186,13 +215,43 @@ bool isSurfaceFile(const std::string& text) {
          extension == ".obj" || extension == ".vtp";
 }
 
+bool hasFaces(const SurfaceArguments& arguments) {
+  return !std::all_of(arguments.surfaces.begin(), arguments.surfaces.end(), isSurfaceFile);
+}
+
+std::shared_ptr<const SurfaceScene> sceneAt(const SurfaceArguments& arguments, const CacheReader& cache,
+                                            const std::shared_ptr<const SurfaceScene>& first) {
+  const bool moves = cache.series().geometries() > 1;
+  if (!first || !hasFaces(arguments) || (!moves && arguments.surface_by.empty())) return first;
+  auto scene = std::make_shared<SurfaceScene>(*first);
+  const auto faces = facesWith(arguments.surface_by, cache);
+  size_t of_grid = 0;
+  for (const std::string& text : arguments.surfaces) {
+    if (isSurfaceFile(text)) continue;
+    GridSurface& surface = scene->grid_surfaces[of_grid++];
+    GridSurface named = gridSurfaceNamed(text, cache, faces);
+    surface.faces = faces;
+    surface.parts = std::move(named.parts);
+    if (!surface.scalar) continue;
+    const size_t variable = cache.variableNamed(arguments.surface_by);
+    surface.scalar = faces->scalarOf(cache.manifest().variables[variable].number);
+  }
+  return scene;
+}
+
+void requireFixedFaces(const SurfaceArguments& arguments, const CacheReader& cache) {
+  if (hasFaces(arguments) && cache.series().geometries() > 1)
+    throw Error(
+        "{}: --surface: the grid of the series moves, and the window shows faces of one step; render draws "
+        "them",
+        cache.cachePath().string());
+}
+
 std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, const CacheReader& cache,
                                             size_t drawn, size_t classified) {
   if (!arguments.given()) return nullptr;
   auto scene = std::make_shared<SurfaceScene>();
-  const bool of_grid = !std::all_of(arguments.surfaces.begin(), arguments.surfaces.end(), isSurfaceFile);
-  if (of_grid) requireFacesOfSteps(arguments, cache);
-  const auto faces = of_grid ? FacesReader::open(cache.path(), cache.manifest()) : nullptr;
+  const auto faces = hasFaces(arguments) ? facesWith(arguments.surface_by, cache) : nullptr;
   for (size_t n = 0; n < arguments.surfaces.size(); ++n) {
     const glm::vec3 colour =
         arguments.colours.empty()
@@ -202,15 +261,19 @@ std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, c
       Surface& surface = scene->surfaces.emplace_back();
       surface.mesh = std::make_shared<TriangleMesh>(meshFromFile(arguments.surfaces[n]));
       surface.colour = colour;
+      surface.opacity = surfaceOpacity(arguments, n);
       continue;
     }
     GridSurface& surface =
         scene->grid_surfaces.emplace_back(gridSurfaceNamed(arguments.surfaces[n], cache, faces));
     surface.colour = colour;
+    surface.opacity = surfaceOpacity(arguments, n);
     if (!arguments.surface_by.empty()) colourByScalar(surface, arguments.surface_by, cache, drawn);
   }
   scene->slices = parseSlices(arguments.slices);
-  scene->slice_opacity = parseSliceOpacity(arguments.slice_opacity);
+  const SheetOpacity of_slices = parseSheetOpacity("--slice-opacity", arguments.slice_opacity);
+  scene->slice_opacity = of_slices.factor;
+  scene->slices_by_function = of_slices.by_function;
   scene->isovalues = parseIsovalues(arguments.isovalues);
   scene->iso_opacity = parseIsoOpacity(arguments.iso_opacity);
   scene->volume = arguments.volume == "on";

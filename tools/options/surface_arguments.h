@@ -16,6 +16,7 @@ namespace curvisplat {
 /// Command-line arguments as given; checked and parsed later.
 struct SurfaceArguments {
   std::vector<std::string> surfaces, colours, slices;
+  std::vector<std::string> surface_opacities;
   std::string slice_opacity = "1", volume = "on";
   std::string surface_by;
   std::vector<std::string> isovalues;
@@ -36,10 +37,21 @@ bool isVtp(const std::filesystem::path& path);
 /// Whether --surface names a file: one that is there, or by its extension.
 bool isSurfaceFile(const std::string& text);
 
+/// Whether any is a face of the grid.
+bool hasFaces(const SurfaceArguments& arguments);
+
 /// Reads the surfaces, and finds those of the cache's grid. `drawn`: the variable of the picture's colours, `classified`:
 /// that of its opacities and isosurfaces. Null where none of the options is given. Throws Error for a file that is no surface, and for a face that the cache does not have.
 std::shared_ptr<const SurfaceScene> sceneOf(const SurfaceArguments& arguments, const CacheReader& cache,
                                             size_t drawn, size_t classified);
+
+/// The scene at another step of the cache: the faces of its geometry, and their values there, in the colours of
+/// `first`. Throws Error as sceneOf().
+std::shared_ptr<const SurfaceScene> sceneAt(const SurfaceArguments& arguments, const CacheReader& cache,
+                                            const std::shared_ptr<const SurfaceScene>& first);
+
+/// For the window, whose faces stay from step to step. Throws Error if they would not.
+void requireFixedFaces(const SurfaceArguments& arguments, const CacheReader& cache);
 
 /// One line for each slice that does not meet the data's box.
 std::vector<std::string> slicesThatMiss(const SurfaceArguments& arguments, const glm::dvec3& lower,

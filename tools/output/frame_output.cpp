@@ -11,17 +11,29 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/paths.h"
+#include "stream/base/trace.h"
 #include "tools/output/movie_writer.h"
 
 namespace curvisplat {
 namespace {
 
+/// A picture that is encoded and written.
+void writeTraced(const Image& image, const std::filesystem::path& path) {
+  const TraceScope trace("write picture");
+  writeImage(image, path);
+}
+
+void writeTraced(const Image& image, std::span<const ImageChannel> more, const std::filesystem::path& path) {
+  const TraceScope trace("write picture");
+  writeExr(image, more, path);
+}
+
 class SingleFile : public FrameOutput {
  public:
   explicit SingleFile(std::filesystem::path path) : path_(std::move(path)) {}
-  void write(uint64_t, const Image& image) override { writeImage(image, path_); }
+  void write(uint64_t, const Image& image) override { writeTraced(image, path_); }
   void writeWith(uint64_t, const Image& image, std::span<const ImageChannel> more) override {
-    writeExr(image, more, path_);
+    writeTraced(image, more, path_);
   }
 
  private:
@@ -31,9 +43,9 @@ class SingleFile : public FrameOutput {
 class NumberedFiles : public FrameOutput {
  public:
   explicit NumberedFiles(const std::filesystem::path& pattern) : names_(pattern) {}
-  void write(uint64_t frame, const Image& image) override { writeImage(image, names_.of(frame)); }
+  void write(uint64_t frame, const Image& image) override { writeTraced(image, names_.of(frame)); }
   void writeWith(uint64_t frame, const Image& image, std::span<const ImageChannel> more) override {
-    writeExr(image, more, names_.of(frame));
+    writeTraced(image, more, names_.of(frame));
   }
 
  private:
@@ -100,22 +112,15 @@ bool FrameNames::include(const std::filesystem::path& path, uint64_t frames) con
          std::filesystem::equivalent(folderOf(path), folderOf(of(frame)), none_there);
 }
 
-bool isMovieName(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending == ".mp4";
-}
-
 void checkOutputName(const std::filesystem::path& path, bool frames, ImageSize size) {
   if (!isMovieName(path)) {
     if (frames) (void)FrameNames(path);
     checkImageName(path);
     return;
   }
-  if (!frames) throw UsageError("-o {}: a movie needs --orbit or --path", path.string());
-  if (size.width % 2 != 0 || size.height % 2 != 0)
-    throw UsageError("--size {}x{}: the width and height of a movie must be even", size.width, size.height);
+  if (!frames) throw UsageError("-o {}: a movie needs --orbit, --path or --steps", path.string());
+  if (!isGifName(path) && (size.width % 2 != 0 || size.height % 2 != 0))
+    throw UsageError("--size {}x{}: the width and height of an .mp4 must be even", size.width, size.height);
 }
 
 std::unique_ptr<FrameOutput> makeFrameOutput(const std::filesystem::path& path, bool frames, ImageSize size,

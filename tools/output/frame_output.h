@@ -43,8 +43,6 @@ class FrameOutput {
   virtual void finish() {}
 };
 
-bool isMovieName(const std::filesystem::path& path);
-
 /// Throws UsageError if `path` does not suit the output: one picture, or `frames` (a pattern or a movie).
 void checkOutputName(const std::filesystem::path& path, bool frames, ImageSize size);
 

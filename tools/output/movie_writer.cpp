@@ -8,7 +8,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <csignal>
 #include <cstring>
@@ -64,7 +66,34 @@ std::string firstLineOf(int file) {
   return text.substr(0, text.find('\n'));
 }
 
+std::string endingOf(const std::filesystem::path& path) {
+  std::string ending = path.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending;
+}
+
+/// H.264 for .mp4. GIFs have 256 colours: a palette for each frame, so that no frame waits for the last.
+std::vector<std::string> encoderOf(bool is_gif) {
+  if (is_gif)
+    return {"-filter_complex",
+            "split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1:dither=sierra2_4a",
+            "-loop",
+            "0",
+            "-f",
+            "gif"};
+  return {"-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4"};
+}
+
 }  // namespace
+
+bool isMovieName(const std::filesystem::path& path) {
+  return endingOf(path) == ".mp4" || isGifName(path);
+}
+
+bool isGifName(const std::filesystem::path& path) {
+  return endingOf(path) == ".gif";
+}
 
 MovieWriter::MovieWriter(const std::filesystem::path& path, ImageSize size, double frames_per_s)
     : unfinished_(writableTarget(path)), size_(size), pixels_(3 * size.pixels()) {
@@ -81,33 +110,24 @@ MovieWriter::MovieWriter(const std::filesystem::path& path, ImageSize size, doub
     // ffmpeg would take a relative name that begins with a dash for an option, and one with a colon for a
     // protocol.
     const std::string output = std::filesystem::absolute(unfinished_.path()).string();
-    process_ = start({"ffmpeg",
-                      "-nostdin",
-                      "-loglevel",
-                      "error",
-                      "-y",
-                      "-f",
-                      "rawvideo",
-                      "-pixel_format",
-                      "rgb24",
-                      "-video_size",
-                      fmt::format("{}x{}", size.width, size.height),
-                      "-framerate",
-                      fmt::format("{}", frames_per_s),
-                      "-i",
-                      "pipe:0",
-                      "-c:v",
-                      "libx264",
-                      "-crf",
-                      "18",
-                      "-pix_fmt",
-                      "yuv420p",
-                      "-movflags",
-                      "+faststart",
-                      "-f",
-                      "mp4",
-                      "file:" + output},
-                     ends[1], errors_, path);
+    std::vector<std::string> arguments{"ffmpeg",
+                                       "-nostdin",
+                                       "-loglevel",
+                                       "error",
+                                       "-y",
+                                       "-f",
+                                       "rawvideo",
+                                       "-pixel_format",
+                                       "rgb24",
+                                       "-video_size",
+                                       fmt::format("{}x{}", size.width, size.height),
+                                       "-framerate",
+                                       fmt::format("{}", frames_per_s),
+                                       "-i",
+                                       "pipe:0"};
+    for (std::string& word : encoderOf(isGifName(path))) arguments.push_back(std::move(word));
+    arguments.push_back("file:" + output);
+    process_ = start(std::move(arguments), ends[1], errors_, path);
   } catch (...) {
     close(ends[1]);
     close(errors_);

@@ -12,10 +12,14 @@
 
 namespace curvisplat {
 
+/// Whether the name ends in .mp4 or .gif, in letters of any case.
+bool isMovieName(const std::filesystem::path& path);
+bool isGifName(const std::filesystem::path& path);
+
 /// For one thread. Unless finish() was called, the destructor ends ffmpeg and removes the unfinished movie.
 class MovieWriter {
  public:
-  /// Starts ffmpeg with an H.264 encoder. Width and height must be even. Follows a link at `path`. Throws
+  /// Starts ffmpeg, with an encoder for H.264 (.mp4: width and height must be even) or for GIF. Follows a link at `path`. Throws
   /// Error if ffmpeg is not in PATH, or if `path` exists and is not a regular file.
   MovieWriter(const std::filesystem::path& path, ImageSize size, double frames_per_s);
   ~MovieWriter();

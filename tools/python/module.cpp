@@ -36,13 +36,9 @@ std::optional<std::string> given(const Options& options, const std::string& name
   return found == options.end() ? std::nullopt : std::optional(found->second);
 }
 
-ScalarArguments scalarArguments(const std::string& scalar, const Options& function) {
-  return {scalar,
-          given(function, "tf"),
-          given(function, "range"),
-          given(function, "opacity"),
-          given(function, "asinh"),
-          given(function, "opacity_unit")};
+ScalarArguments scalarArguments(const Options& function) {
+  return {function.at("scalar"),      given(function, "tf"),    given(function, "range"),
+          given(function, "opacity"), given(function, "asinh"), given(function, "opacity_unit")};
 }
 
 CameraArguments cameraArguments(const Options& camera) {
@@ -79,6 +75,19 @@ FrameArguments frameArguments(const Options& frame, const std::vector<std::strin
   return arguments;
 }
 
+SurfaceArguments surfaceArguments(const py::dict& others) {
+  SurfaceArguments arguments;
+  arguments.surfaces = py::cast<std::vector<std::string>>(others["surfaces"]);
+  arguments.colours = py::cast<std::vector<std::string>>(others["surface_colours"]);
+  arguments.surface_by = py::cast<std::string>(others["surface_by"]);
+  arguments.slices = py::cast<std::vector<std::string>>(others["slices"]);
+  arguments.slice_opacity = py::cast<std::string>(others["slice_opacity"]);
+  arguments.isovalues = py::cast<std::vector<std::string>>(others["isovalues"]);
+  if (others.contains("iso_opacity")) arguments.iso_opacity = py::cast<std::string>(others["iso_opacity"]);
+  arguments.volume = py::cast<bool>(others["volume"]) ? "on" : "off";
+  return arguments;
+}
+
 py::dict statisticsOf(const FrameStatistics& statistics) {
   py::dict out;
   out["splats_drawn"] = statistics.splats_drawn;
@@ -91,14 +100,17 @@ py::dict statisticsOf(const FrameStatistics& statistics) {
   return out;
 }
 
-/// `frame`: text by option; clip_planes, shade, threads, keep_going and backend in `others`.
-py::tuple render(OpenCache& cache, const std::string& scalar, const Options& function, const Options& camera,
-                 const Options& frame, const py::dict& others, const py::object& progress) {
+/// `frame`: text by option; `others`: lists, flags and numbers.
+py::tuple render(OpenCache& cache, const Options& function, const Options& camera, const Options& frame,
+                 const py::dict& others, const py::object& progress) {
   const FrameArguments of_frame = frameArguments(
       frame, py::cast<std::vector<std::string>>(others["clip_planes"]), py::cast<bool>(others["shade"]),
       py::cast<unsigned>(others["threads"]), py::cast<bool>(others["keep_going"]));
-  const PictureArguments arguments{scalarArguments(scalar, function), cameraArguments(camera),
+  const PictureArguments arguments{scalarArguments(function),
+                                   cameraArguments(camera),
                                    frameOptions(of_frame),
+                                   surfaceArguments(others),
+                                   py::cast<uint64_t>(others["step"]),
                                    parseBackend(py::cast<std::string>(others["backend"]))};
   DrawnPicture picture = cache.render(arguments, progress);
   return py::make_tuple(picture.rgba, picture.chosen, picture.notes, statisticsOf(picture.statistics));
@@ -113,6 +125,18 @@ py::list scalarsOf(const OpenCache& cache) {
 
 std::array<double, 3> arrayOf(const glm::dvec3& v) {
   return {v.x, v.y, v.z};
+}
+
+std::vector<double> timesOf(const OpenCache& cache) {
+  std::vector<double> times;
+  for (const SeriesStep& step : cache.reader().series().steps) times.push_back(step.time);
+  return times;
+}
+
+std::vector<double> histogramOfCache(const OpenCache& cache, const std::string& scalar,
+                                     const std::pair<double, double>& range, bool log, size_t bins) {
+  const py::gil_scoped_release released;
+  return cache.histogram({scalar, range.first, range.second, log, bins});
 }
 
 /// None where the point is outside of the data.
@@ -202,12 +226,12 @@ py::dict convertCallable(const std::filesystem::path& output,
 
 py::dict convertFiles(const std::filesystem::path& output, const std::filesystem::path& grid,
                       const std::vector<std::filesystem::path>& solutions,
-                      const std::vector<std::string>& scalars, std::optional<uint32_t> time_step,
-                      const py::dict& given_options, const py::object& progress) {
+                      const std::vector<std::string>& scalars, const py::dict& given_options,
+                      const py::object& progress) {
   ConvertArguments arguments;
   arguments.grid.grid = grid;
   arguments.grid.solutions = solutions;
-  arguments.grid.time_step = time_step;
+  arguments.grid.time_step = py::cast<std::optional<uint32_t>>(given_options["time_step"]);
   ConvertOptions options = convertOptions(output, given_options);
   if (options.title.empty()) options.title = grid.stem().string();
   ConvertReport report;
@@ -235,6 +259,10 @@ PYBIND11_MODULE(_core, module) {
       .def("render", &render)
       .def("release", &OpenCache::release)
       .def("probe", &probeAt)
+      .def("histogram", &histogramOfCache)
+      .def_property_readonly("times", &timesOf)
+      .def_property_readonly("time_unit",
+                             [](const OpenCache& cache) { return cache.reader().seriesManifest().time_unit; })
       .def_property_readonly("path", [](const OpenCache& cache) { return cache.path().string(); })
       .def_property_readonly("scalars", &scalarsOf)
       .def_property_readonly("lower",

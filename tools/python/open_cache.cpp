@@ -6,6 +6,7 @@
 #include "stream/base/error.h"
 #include "tools/options/picture_choice.h"
 #include "tools/python/interruptible.h"
+#include "tools/viewer/histogram.h"
 
 namespace py = pybind11;
 
@@ -38,31 +39,51 @@ py::array_t<float> arrayOf(Image image) {
 }  // namespace
 
 FrameRenderer& OpenCache::rendererOf(size_t variable, Backend backend, const TransferFunction& function) {
-  if (renderer_ && variable == variable_ && backend == backend_) {
-    renderer_->setTransferFunction(function);
-    return *renderer_;
+  if (player_ && variable == variable_ && backend == backend_) {
+    player_->setTransferFunction(function);
+    return player_->renderer();
   }
-  renderer_.reset();  // its memory is given back before the next one takes some
-  renderer_ = std::make_unique<FrameRenderer>(reader_, variable, function, backend);
+  player_.reset();  // its memory is given back before the next one takes some
+  player_ = std::make_unique<StepPlayer>(reader_, DrawnScalars(variable, function), backend);
   variable_ = variable;
   backend_ = backend;
-  return *renderer_;
+  return player_->renderer();
+}
+
+void OpenCache::goTo(uint64_t step) {
+  if (const size_t steps = reader_.series().steps.size(); step >= steps)
+    throw UsageError("{}: there is no step {}; the last one is {}", path_.string(), step, steps - 1);
+  if (player_)
+    player_->goTo({step});
+  else if (step != reader_.step())
+    reader_ = reader_.atStep(step);
+}
+
+std::vector<double> OpenCache::histogram(const HistogramArguments& arguments) const {
+  const size_t variable = reader_.variableNamed(arguments.scalar);
+  if (!(arguments.low < arguments.high) || (arguments.log && !(arguments.low > 0)))
+    throw UsageError("a histogram from {} to {}: expected a range that increases{}", arguments.low,
+                     arguments.high, arguments.log ? " and is above zero" : "");
+  return histogramOf(reader_, variable, arguments.low, arguments.high, arguments.log, arguments.bins);
 }
 
 DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::object& progress) {
   const Busy busy(busy_);
   checkCameraArguments(arguments.camera);
+  checkSurfaceArguments(arguments.surfaces);
   DrawnPicture picture;
   Image image;
   runInterruptibly(progress, [&](Progress& of_work) {
+    goTo(arguments.step);
     const Manifest& manifest = reader_.manifest();
-    const FrameOptions& frame = arguments.frame;
+    FrameOptions frame = arguments.frame;
     const size_t variable = chooseVariable(reader_, arguments.scalar);
     PictureChoice choice(reader_, variable, frame.scale);
     const TransferFunction function = choice.function(arguments.scalar);
     const CameraArguments camera = choice.camera(arguments.camera, function, frame.size);
     const CameraMotion motion =
         chooseCameraMotion(camera, manifest.lower * frame.scale, manifest.upper * frame.scale, frame.size);
+    frame.scene = sceneOf(arguments.surfaces, reader_, variable, variable);
     image = rendererOf(variable, arguments.backend, function)
                 .render(motion.camera(0), frame, picture.statistics, &of_work);
     picture.chosen = choice.chosenOptions();
@@ -74,7 +95,7 @@ DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::obje
 
 void OpenCache::release() {
   const Busy busy(busy_);
-  renderer_.reset();
+  player_.reset();
 }
 
 }  // namespace curvisplat::python

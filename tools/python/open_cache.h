@@ -9,10 +9,11 @@
 #include <optional>
 #include <string>
 
-#include "render/frame/frame.h"
+#include "render/frame/step_player.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/options/camera_motion.h"
 #include "tools/options/scalar_arguments.h"
+#include "tools/options/surface_arguments.h"
 
 namespace curvisplat::python {
 
@@ -21,6 +22,8 @@ struct PictureArguments {
   ScalarArguments scalar;
   CameraArguments camera;
   FrameOptions frame;
+  SurfaceArguments surfaces;
+  uint64_t step = 0;
   Backend backend = Backend::kAutomatic;
 };
 
@@ -29,6 +32,14 @@ struct DrawnPicture {
   std::string chosen;             // options of `curvisplat render` that draw the same picture
   std::vector<std::string> notes;
   FrameStatistics statistics;
+};
+
+/// A share of the data's volume for each of `bins` intervals from `low` to `high`.
+struct HistogramArguments {
+  std::string scalar;
+  double low = 0, high = 1;
+  bool log = false;
+  size_t bins = 0;
 };
 
 /// One call at a time: a second thread that calls render() gets a UsageError. Threads and decoded bricks are kept from one picture of a
@@ -42,15 +53,18 @@ class OpenCache {
   const std::filesystem::path& path() const { return path_; }
   /// Throws UsageError and Error as `curvisplat render` does, and what stops runInterruptibly().
   DrawnPicture render(const PictureArguments& arguments, const pybind11::object& progress);
+  /// Of the step that was drawn last. Throws UsageError for a range that is empty, or not above zero where `log`.
+  std::vector<double> histogram(const HistogramArguments& arguments) const;
   /// Ends threads and gives back their memory; the next picture starts them again.
   void release();
 
  private:
+  void goTo(uint64_t step);
   FrameRenderer& rendererOf(size_t variable, Backend backend, const TransferFunction& function);
 
   const std::filesystem::path path_;
-  const CacheReader reader_;
-  std::unique_ptr<FrameRenderer> renderer_;
+  CacheReader reader_;
+  std::unique_ptr<StepPlayer> player_;  // of reader_
   size_t variable_ = 0;
   Backend backend_ = Backend::kAutomatic;
   bool busy_ = false;  // touched with the interpreter's lock held

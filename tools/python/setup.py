@@ -20,7 +20,7 @@ class CMakeBuild(build_ext):
         folder = os.environ.get("CURVISPLAT_BUILD")
         if folder is None:
             folder = str(pathlib.Path(self.build_temp).resolve())
-            off = [f"-DCURVISPLAT_{part}=OFF" for part in ("TESTS", "WINDOW", "ANNOTATIONS", "THROUGHPUT")]
+            off = [f"-DCURVISPLAT_{part}=OFF" for part in ("TESTS", "WINDOW", "ANNOTATIONS", "THROUGHPUT", "SERVER")]
             subprocess.run(["cmake", "-S", ROOT, "-B", folder, "-G", "Ninja", "-DCURVISPLAT_PYTHON=ON", *off], check=True)
         subprocess.run(["cmake", "--build", folder, "--target", "curvisplat_python"], check=True)
         (module,) = (pathlib.Path(folder) / "tools/python/curvisplat").glob("_core*.so")

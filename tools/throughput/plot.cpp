@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <memory>
 #include <set>
 
 #include "render/annotate/axis_ticks.h"
+#include "render/annotate/cairo_surface.h"
 #include "stream/base/check.h"
 #include "stream/base/error.h"
 
@@ -32,22 +32,19 @@ constexpr double kPanelWidth = 460, kLineHeight = 320, kBarHeight = 19, kLegendH
 constexpr size_t kMostInARow = 3;
 constexpr double kFont = 12, kTitleFont = 14;
 
-class Canvas {
+/// Sizes in points.
+class PlotCanvas {
  public:
-  Canvas(double width, double height)
-      : surface_(cairo_image_surface_create(CAIRO_FORMAT_RGB24,
-                                            static_cast<int>(std::ceil(kPixelsPerPoint * width)),
-                                            static_cast<int>(std::ceil(kPixelsPerPoint * height)))),
-        cairo_(cairo_create(surface_.get())) {
-    if (const cairo_status_t status = cairo_status(cairo_.get()); status != CAIRO_STATUS_SUCCESS)
-      throw Error("cannot draw a plot of {} by {} points: {}", width, height, cairo_status_to_string(status));
+  PlotCanvas(double width, double height)
+      : surface_(CAIRO_FORMAT_RGB24, static_cast<int>(std::ceil(kPixelsPerPoint * width)),
+                 static_cast<int>(std::ceil(kPixelsPerPoint * height))) {
     cairo_scale(get(), kPixelsPerPoint, kPixelsPerPoint);
     cairo_set_source_rgb(get(), 1, 1, 1);
     cairo_paint(get());
     cairo_set_line_join(get(), CAIRO_LINE_JOIN_ROUND);
   }
 
-  cairo_t* get() const { return cairo_.get(); }
+  cairo_t* get() const { return surface_.cairo(); }
 
   void ink(const Colour& colour) { cairo_set_source_rgb(get(), colour.r, colour.g, colour.b); }
   void font(double size, bool bold = false) {
@@ -86,25 +83,19 @@ class Canvas {
                   reinterpret_cast<const std::byte*>(from) + count);
       return CAIRO_STATUS_SUCCESS;
     };
-    cairo_surface_flush(surface_.get());
-    const cairo_status_t status = cairo_surface_write_to_png_stream(surface_.get(), append, &bytes);
+    const cairo_status_t status = cairo_surface_write_to_png_stream(surface_.flushed(), append, &bytes);
     if (status != CAIRO_STATUS_SUCCESS)
       throw Error("cannot write a plot as PNG: {}", cairo_status_to_string(status));
     return bytes;
   }
 
  private:
-  struct Destroy {
-    void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
-    void operator()(cairo_t* cairo) const { cairo_destroy(cairo); }
-  };
-  std::unique_ptr<cairo_surface_t, Destroy> surface_;
-  std::unique_ptr<cairo_t, Destroy> cairo_;
+  CairoSurface surface_;
 };
 
 /// Draws a legend of colour patches and names in rows; with a null canvas only measures. Returns the height.
-double drawLegend(Canvas* canvas, double left, double top, double width,
-                  const std::vector<std::string>& names, Canvas& measure) {
+double drawLegend(PlotCanvas* canvas, double left, double top, double width,
+                  const std::vector<std::string>& names, PlotCanvas& measure) {
   double x = left, y = top;
   for (size_t n = 0; n < names.size(); ++n) {
     const double needed = 18 + measure.widthOf(names[n]) + 14;
@@ -124,7 +115,7 @@ double drawLegend(Canvas* canvas, double left, double top, double width,
   return y - top + kLegendHeight;
 }
 
-void drawTitle(Canvas& canvas, double left, double top, const std::string& title) {
+void drawTitle(PlotCanvas& canvas, double left, double top, const std::string& title) {
   canvas.font(kTitleFont, true);
   canvas.ink(kInk);
   canvas.text(left + 12, top + 24, title);
@@ -133,7 +124,7 @@ void drawTitle(Canvas& canvas, double left, double top, const std::string& title
 
 // --------------------------------------------------------------------------------------------- lines
 
-void drawLines(Canvas& canvas, double panel_left, double panel_top, const LinePanel& panel) {
+void drawLines(PlotCanvas& canvas, double panel_left, double panel_top, const LinePanel& panel) {
   std::set<double> xs, ys;
   for (const PlotLine& line : panel.lines)
     for (const auto& [x, y] : line.points) {
@@ -205,7 +196,7 @@ double heightOf(const BarPanel& panel) {
   return kBarHeight * static_cast<double>(panel.bars.size()) + 58;
 }
 
-void drawBars(Canvas& canvas, double panel_left, double panel_top, const BarPanel& panel) {
+void drawBars(PlotCanvas& canvas, double panel_left, double panel_top, const BarPanel& panel) {
   double largest = 0, label_width = 0, text_width = 0;
   for (const Bar& bar : panel.bars) {
     largest = std::max(largest, bar.value);
@@ -246,10 +237,10 @@ std::vector<std::string> namesOf(const BarPanel& panel) {
 double heightOf(const LinePanel&) {
   return kLineHeight;
 }
-void drawBody(Canvas& canvas, double left, double top, const LinePanel& panel) {
+void drawBody(PlotCanvas& canvas, double left, double top, const LinePanel& panel) {
   drawLines(canvas, left, top, panel);
 }
-void drawBody(Canvas& canvas, double left, double top, const BarPanel& panel) {
+void drawBody(PlotCanvas& canvas, double left, double top, const BarPanel& panel) {
   drawBars(canvas, left, top, panel);
 }
 
@@ -258,7 +249,7 @@ template <typename Panel>
 std::vector<std::byte> drawPanels(const std::vector<Panel>& panels) {
   CURVISPLAT_CHECK(!panels.empty());
   constexpr double kLegendTop = 36;
-  Canvas ruler(1, 1);
+  PlotCanvas ruler(1, 1);
   ruler.font(kFont);
   double legend_height = 0, body_height = 0;
   for (const Panel& panel : panels) {
@@ -269,7 +260,7 @@ std::vector<std::byte> drawPanels(const std::vector<Panel>& panels) {
   }
   const double body_top = kLegendTop + legend_height + 4, height = body_top + body_height + 8;
   const size_t columns = std::min(panels.size(), kMostInARow), rows = (panels.size() + columns - 1) / columns;
-  Canvas canvas(kPanelWidth * static_cast<double>(columns), height * static_cast<double>(rows));
+  PlotCanvas canvas(kPanelWidth * static_cast<double>(columns), height * static_cast<double>(rows));
   for (size_t n = 0; n < panels.size(); ++n) {
     const double left = kPanelWidth * static_cast<double>(n % columns);
     const double top = height * static_cast<double>(n / columns);

@@ -286,9 +286,13 @@ void CgnsHdf5::readBox(const CgnsNode& node, const CgnsBox& box, hid_t type, voi
   const Data data = openData(open(node.path), node.path);
   checkNumbers(data, node.path);
   std::array<hsize_t, H5S_MAX_RANK> dims{};
-  if (H5Sget_simple_extent_ndims(data.space.id()) != 3 ||
-      H5Sget_simple_extent_dims(data.space.id(), dims.data(), nullptr) != 3)
-    damaged(node.path, "has data that is not three-dimensional");
+  const int rank = H5Sget_simple_extent_ndims(data.space.id());
+  if (rank < 1 || rank > 3 || H5Sget_simple_extent_dims(data.space.id(), dims.data(), nullptr) != rank)
+    damaged(node.path, "has data of more than three dimensions");
+  // A list is a row.
+  const auto absent = static_cast<size_t>(3 - rank);
+  std::rotate(dims.begin(), dims.begin() + rank, dims.begin() + 3);
+  std::fill_n(dims.begin(), absent, hsize_t{1});
   std::array<hsize_t, 3> first, count;
   for (size_t axis = 0; axis < 3; ++axis) {
     first[2 - axis] = box.first[axis];
@@ -303,8 +307,8 @@ void CgnsHdf5::readBox(const CgnsNode& node, const CgnsBox& box, hid_t type, voi
   const Hdf5Space memory(H5Screate_simple(3, memory_dims.data(), nullptr));
   if (!memory ||
       H5Sselect_hyperslab(memory.id(), H5S_SELECT_SET, none.data(), nullptr, count.data(), nullptr) < 0 ||
-      H5Sselect_hyperslab(data.space.id(), H5S_SELECT_SET, first.data(), nullptr, count.data(), nullptr) <
-          0 ||
+      H5Sselect_hyperslab(data.space.id(), H5S_SELECT_SET, first.data() + absent, nullptr,
+                          count.data() + absent, nullptr) < 0 ||
       H5Dread(data.set.id(), type, memory.id(), data.space.id(), H5P_DEFAULT, to) < 0)
     unreadable(node.path, "its data");
 }

@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "preprocess/formats/cgns/cgns_description.h"
 #include "preprocess/formats/cgns/cgns_file.h"
 #include "preprocess/formats/cgns/cgns_tree.h"
 #include "preprocess/formats/common/open_grid_options.h"
@@ -22,27 +23,23 @@ namespace curvisplat {
 /// and "Density:cell". VelocityX, VelocityY and VelocityZ also give their magnitude, "Velocity:mag".
 class CgnsSource final : public GridSource {
  public:
-  /// Throws Error.
-  explicit CgnsSource(const OpenGridOptions& options);
+  CgnsSource(std::shared_ptr<const CgnsFile> file, CgnsTree tree, uint32_t time_step);
 
   const GridDescription& description() const override { return description_; }
   void read(uint32_t block, const NodeBox& box, std::span<const uint32_t> scalars,
             NodeArrays& out) const override;
 
  private:
-  /// The arrays of a scalar on a zone: one, or three for the magnitude of a vector. Empty: the scalar is NaN.
-  using Arrays = std::vector<const CgnsArray*>;
-
-  void addScalars();
-  void addVectors();
-  void warnOfGaps();
-  void readScalar(const CgnsZone& zone, const NodeBox& box, const Arrays& arrays, Centring centring,
+  void readScalar(const CgnsZone& zone, const NodeBox& box, const CgnsArrays& arrays, Centring centring,
                   std::vector<float>& to) const;
 
-  CgnsFile file_;
+  std::shared_ptr<const CgnsFile> file_;
   CgnsTree tree_;
   GridDescription description_;
-  std::vector<std::vector<Arrays>> arrays_;  // [scalar][zone]
+  std::vector<std::vector<CgnsArrays>> arrays_;  // [scalar][zone]
 };
+
+/// Structured zones as a CgnsSource, or unstructured ones as a CgnsMeshSource. Throws Error.
+std::unique_ptr<DataSource> openCgns(const OpenGridOptions& options);
 
 }  // namespace curvisplat

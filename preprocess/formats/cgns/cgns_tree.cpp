@@ -21,12 +21,18 @@ namespace {
 constexpr size_t kNamesListed = 3;
 // Largest number of nodes along an axis: 2^31 - 1, the limit of 32-bit sizes.
 constexpr double kMaxNodes = 2147483647.0;
+constexpr double kMaxPoints = 0x1p53;  // of unstructured zones
 
 using Nodes = std::vector<CgnsNode>;
-using Dims = std::array<uint64_t, 3>;
+using Dims = std::vector<uint64_t>;  // three, or one of unstructured zones
 
 std::string describe(const Dims& dims) {
-  return fmt::format("{}x{}x{}", dims[0], dims[1], dims[2]);
+  return fmt::format("{}", fmt::join(dims, "x"));
+}
+
+Dims dimsOf(const CgnsZone& zone) {
+  if (!zone.sections.empty()) return {zone.nodes[0]};
+  return {zone.nodes.begin(), zone.nodes.end()};
 }
 
 /// Units apply to all descendants that do not set their own.
@@ -44,11 +50,13 @@ class TreeReader {
  private:
   void readBase(const CgnsNode& base);
   void readZone(const CgnsNode& base, const CgnsNode& node, const UnitContext& units, const CgnsSteps& steps);
+  void chooseZones();
   std::array<CgnsArray, 3> readCoordinates(const CgnsNode& grid, const Dims& nodes) const;
   void addSolution(const CgnsNode& solution, UnitContext units, CgnsZone& zone);
   UnitContext below(const Nodes& children, UnitContext units) const;
-  CgnsArray arrayOf(const CgnsNode& node, const Dims& dims, const std::array<uint64_t, 6>& rind) const;
-  std::array<uint64_t, 6> rindOf(const Nodes& children) const;
+  CgnsArray arrayOf(const CgnsNode& node, const Dims& dims, const std::vector<uint64_t>& rind) const;
+  std::vector<uint64_t> rindOf(const Nodes& children, size_t axes) const;
+  bool setSizes(const CgnsNode& node, bool unstructured, CgnsZone& zone);
   void addConditions(const Nodes& children, CgnsZone& zone);
   void readFamilyType(const CgnsNode& family);
   std::string familyType(const CgnsNode& condition, const Nodes& details) const;
@@ -83,6 +91,7 @@ CgnsTree TreeReader::read() {
     for (size_t n = 0; n < implied_steps_; ++n) tree_.times.push_back(static_cast<double>(n));
   }
   chosenTimeStep(file_.path().string(), tree_.times, step_);
+  chooseZones();
   warnOfOmissions();
   writeNotes();
   return std::move(tree_);
@@ -116,6 +125,7 @@ void TreeReader::addConditions(const Nodes& children, CgnsZone& zone) {
         ++conditions_[file_.text(condition)];
         try {
           const Nodes details = file_.children(condition);
+          if (!zone.sections.empty()) continue;
           auto boundary = cgnsBoundary(file_, details, zone.nodes);
           if (!boundary) continue;
           boundary->name = condition.name;
@@ -177,30 +187,54 @@ void TreeReader::readBase(const CgnsNode& base) {
   if (tree_.zones.size() > before) ++tree_.bases;
 }
 
-void TreeReader::readZone(const CgnsNode& base, const CgnsNode& node, const UnitContext& base_units,
-                          const CgnsSteps& steps) {
-  const Nodes children = file_.children(node);
-  for (const CgnsNode& child : children)
-    if (child.label == "ZoneType_t" && file_.text(child) != "Structured") {
-      omitted_["unstructured (only structured zones are read)"].push_back(node.path.substr(1));
-      return;
-    }
+/// Sets the numbers of nodes and cells. False if the zone is left out.
+bool TreeReader::setSizes(const CgnsNode& node, bool unstructured, CgnsZone& zone) {
   const std::vector<double> sizes = file_.numbers(node);
-  if (sizes.size() != 9)
-    throw Error(
-        "{}: {} has {} sizes; expected 9 (nodes, cells and boundary nodes along i, j, k); the file is "
-        "damaged",
-        file_.path().string(), node.path, sizes.size());
-  CgnsZone zone{base.name, node.name, {}, {}, {}, {}};
+  const size_t expected = unstructured ? 3 : 9;
+  if (sizes.size() != expected)
+    throw Error("{}: {} has {} sizes; expected {} (nodes, cells and boundary nodes{}); the file is damaged",
+                file_.path().string(), node.path, sizes.size(), expected,
+                unstructured ? "" : " along i, j, k");
+  if (unstructured) {
+    if (!(sizes[0] >= 1 && sizes[0] <= kMaxPoints && sizes[1] >= 0 && sizes[1] <= kMaxPoints))
+      throw Error("{}: {} declares {:g} nodes and {:g} cells; the file is damaged", file_.path().string(),
+                  node.path, sizes[0], sizes[1]);
+    zone.nodes = {static_cast<uint64_t>(sizes[0]), 1, 1};
+    zone.cells = static_cast<uint64_t>(sizes[1]);
+    return true;
+  }
   for (size_t axis = 0; axis < 3; ++axis) {
     if (!(sizes[axis] >= 1 && sizes[axis] <= kMaxNodes))
       throw Error("{}: {} declares {:g} nodes along {}; the file is damaged", file_.path().string(),
                   node.path, sizes[axis], "ijk"[axis]);
     zone.nodes[axis] = static_cast<uint64_t>(sizes[axis]);
   }
-  if (*std::min_element(zone.nodes.begin(), zone.nodes.end()) < 2) {
-    omitted_["of a single plane of nodes (volumes are needed)"].push_back(
-        fmt::format("{} ({})", node.path.substr(1), describe(zone.nodes)));
+  if (*std::min_element(zone.nodes.begin(), zone.nodes.end()) >= 2) return true;
+  omitted_["of a single plane of nodes (volumes are needed)"].push_back(
+      fmt::format("{} ({})", node.path.substr(1), describe(dimsOf(zone))));
+  return false;
+}
+
+void TreeReader::readZone(const CgnsNode& base, const CgnsNode& node, const UnitContext& base_units,
+                          const CgnsSteps& steps) {
+  const Nodes children = file_.children(node);
+  const auto type = std::find_if(children.begin(), children.end(),
+                                 [](const CgnsNode& child) { return child.label == "ZoneType_t"; });
+  const std::string kind = type == children.end() ? "Structured" : file_.text(*type);
+  const bool unstructured = kind == "Unstructured";
+  if (!unstructured && kind != "Structured") {
+    omitted_[fmt::format("of type {} (expected Structured or Unstructured)", kind)].push_back(
+        node.path.substr(1));
+    return;
+  }
+  CgnsZone zone;
+  zone.base = base.name;
+  zone.name = node.name;
+  if (!setSizes(node, unstructured, zone)) return;
+  for (const CgnsNode& child : children)
+    if (unstructured && child.label == "Elements_t") zone.sections.push_back(child);
+  if (unstructured && zone.sections.empty()) {
+    omitted_["without elements"].push_back(node.path.substr(1));
     return;
   }
 
@@ -210,7 +244,7 @@ void TreeReader::readZone(const CgnsNode& base, const CgnsNode& node, const Unit
     omitted_["without coordinates"].push_back(node.path.substr(1));
     return;
   }
-  zone.coordinates = readCoordinates(*step.grid, zone.nodes);
+  zone.coordinates = readCoordinates(*step.grid, dimsOf(zone));
   const UnitContext units = below(children, base_units);
   for (const CgnsNode& solution : step.solutions) addSolution(solution, units, zone);
   addConditions(children, zone);
@@ -219,7 +253,7 @@ void TreeReader::readZone(const CgnsNode& base, const CgnsNode& node, const Unit
 
 std::array<CgnsArray, 3> TreeReader::readCoordinates(const CgnsNode& grid, const Dims& nodes) const {
   const Nodes children = file_.children(grid);
-  const std::array<uint64_t, 6> rind = rindOf(children);
+  const std::vector<uint64_t> rind = rindOf(children, nodes.size());
   std::array<CgnsArray, 3> coordinates;
   std::string found;
   int known = 0;
@@ -261,10 +295,14 @@ void TreeReader::addSolution(const CgnsNode& solution, UnitContext units, CgnsZo
     }
   }
   units = below(children, units);
-  const std::array<uint64_t, 6> rind = rindOf(children);
-  Dims dims = zone.nodes;
-  if (centring == Centring::kCell)
-    for (uint64_t& n : dims) --n;
+  Dims dims = dimsOf(zone);
+  const std::vector<uint64_t> rind = rindOf(children, dims.size());
+  if (centring == Centring::kCell) {
+    if (dims.size() == 1)
+      dims[0] = zone.cells;
+    else
+      for (uint64_t& n : dims) --n;
+  }
   for (const CgnsNode& child : children) {
     if (child.label != "DataArray_t") continue;
     const Nodes details = file_.children(child);
@@ -287,14 +325,17 @@ UnitContext TreeReader::below(const Nodes& children, UnitContext units) const {
 }
 
 CgnsArray TreeReader::arrayOf(const CgnsNode& node, const Dims& dims,
-                              const std::array<uint64_t, 6>& rind) const {
-  CgnsArray array{node, file_.shape(node), {rind[0], rind[2], rind[4]}};
-  const Dims expected{dims[0] + rind[0] + rind[1], dims[1] + rind[2] + rind[3], dims[2] + rind[4] + rind[5]};
-  if (!std::equal(array.shape.dims.begin(), array.shape.dims.end(), expected.begin(), expected.end()))
+                              const std::vector<uint64_t>& rind) const {
+  CgnsArray array{node, file_.shape(node), {}};
+  Dims expected = dims;
+  for (size_t axis = 0; axis < dims.size(); ++axis) {
+    array.rind[axis] = rind[2 * axis];
+    expected[axis] += rind[2 * axis] + rind[2 * axis + 1];
+  }
+  if (array.shape.dims != expected)
     throw Error(
         "{}: {} has {} values; expected {} (the zone's size plus its rind planes); the file is damaged",
-        file_.path().string(), node.path,
-        array.shape.dims.empty() ? "no" : fmt::format("{}", fmt::join(array.shape.dims, "x")),
+        file_.path().string(), node.path, array.shape.dims.empty() ? "no" : describe(array.shape.dims),
         describe(expected));
   if (!array.shape.number())
     throw Error("{}: {} has values of type '{}'; expected R4, R8, I4 or I8", file_.path().string(), node.path,
@@ -302,15 +343,17 @@ CgnsArray TreeReader::arrayOf(const CgnsNode& node, const Dims& dims,
   return array;
 }
 
-std::array<uint64_t, 6> TreeReader::rindOf(const Nodes& children) const {
-  std::array<uint64_t, 6> rind{};
+/// Planes at the lower and upper end of each axis; of an unstructured zone samples before and after its own.
+std::vector<uint64_t> TreeReader::rindOf(const Nodes& children, size_t axes) const {
+  std::vector<uint64_t> rind(2 * axes);
   for (const CgnsNode& child : children) {
     if (child.label != "Rind_t") continue;
     const std::vector<double> planes = file_.numbers(child);
-    if (planes.size() != 6)
-      throw Error("{}: {} has {} numbers; expected 6 (planes at the lower and upper end of i, j, k)",
-                  file_.path().string(), child.path, planes.size());
-    for (size_t n = 0; n < 6; ++n) {
+    if (planes.size() != rind.size())
+      throw Error("{}: {} has {} numbers; expected {} (planes at the lower and upper end of {})",
+                  file_.path().string(), child.path, planes.size(), rind.size(),
+                  axes == 3 ? "i, j, k" : "its list");
+    for (size_t n = 0; n < rind.size(); ++n) {
       if (!(planes[n] >= 0 && planes[n] <= kMaxNodes))
         throw Error("{}: {} declares {:g} planes; the file is damaged", file_.path().string(), child.path,
                     planes[n]);
@@ -318,6 +361,22 @@ std::array<uint64_t, 6> TreeReader::rindOf(const Nodes& children) const {
     }
   }
   return rind;
+}
+
+/// Structured zones where there are any.
+void TreeReader::chooseZones() {
+  const auto is_mesh = [](const CgnsZone& zone) { return !zone.sections.empty(); };
+  const auto meshes = std::count_if(tree_.zones.begin(), tree_.zones.end(), is_mesh);
+  tree_.unstructured = meshes > 0 && meshes == std::ssize(tree_.zones);
+  if (meshes == 0 || tree_.unstructured) return;
+  for (const CgnsZone& zone : tree_.zones)
+    if (is_mesh(zone))
+      omitted_["unstructured (a cache holds structured or unstructured zones; the structured ones are read)"]
+          .push_back(zone.base + "/" + zone.name);
+  std::erase_if(tree_.zones, is_mesh);
+  std::set<std::string> bases;
+  for (const CgnsZone& zone : tree_.zones) bases.insert(zone.base);
+  tree_.bases = bases.size();
 }
 
 void TreeReader::warnOfOmissions() {

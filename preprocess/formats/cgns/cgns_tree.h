@@ -1,5 +1,5 @@
-// The structured zones of a CGNS file, with their coordinates and solutions at one time step. Reads names and
-// sizes only, no samples.
+// The zones of a CGNS file, with their coordinates and solutions at one time step. Reads names and sizes only, no
+// samples. Structured zones, or if there are none the unstructured ones.
 //
 // The time steps are those of BaseIterativeData; ZoneIterativeData assigns solutions and coordinates to them.
 // Where it is missing, a zone's solutions are consecutive steps: each is assigned to the first step that has
@@ -34,20 +34,23 @@ struct CgnsField {
 struct CgnsZone {
   std::string base, name;
   std::vector<GridBoundary> boundaries;  // block: not set
-  std::array<uint64_t, 3> nodes{};       // along i, j, k
+  std::array<uint64_t, 3> nodes{};       // along i, j, k; of an unstructured zone all, 1, 1
+  uint64_t cells = 0;                    // of an unstructured zone, as it declares them
+  std::vector<CgnsNode> sections;        // of an unstructured zone: Elements_t
   std::array<CgnsArray, 3> coordinates;  // x, y, z
   std::vector<CgnsField> fields;
 };
 
 struct CgnsTree {
-  std::vector<CgnsZone> zones;  // at least one
-  size_t bases = 0;             // number of bases that the zones belong to
-  std::vector<double> times;    // [step]; 0, 1, ... if the file stores no times; empty: no time steps
+  std::vector<CgnsZone> zones;  // at least one; all structured or all unstructured
+  bool unstructured = false;
+  size_t bases = 0;           // number of bases that the zones belong to
+  std::vector<double> times;  // [step]; 0, 1, ... if the file stores no times; empty: no time steps
   std::vector<std::string> warnings;
   std::vector<std::string> notes;  // boundary conditions, families, units
 };
 
-/// Throws Error if the file has nothing to draw (only surfaces or unstructured zones), if its coordinates are
+/// Throws Error if the file has nothing to draw (only surfaces), if its coordinates are
 /// not Cartesian, if it has no step `step`, or if it is inconsistent.
 CgnsTree readCgnsTree(const CgnsFile& file, uint32_t step);
 

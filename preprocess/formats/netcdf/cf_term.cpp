@@ -11,9 +11,16 @@ struct Between {
   double weight_first, weight_next;
 };
 
-/// Weights at the block's node `n` for a term of `length` points, one more or one fewer than the nodes.
-Between between(uint64_t n, int longer, uint64_t length) {
-  if (longer > 0) return {n, 0.5, 0.5};
+/// The points of a term along an axis that has one node more or fewer: -1, or 1 if there are more points.
+struct TermPoints {
+  uint64_t length;
+  int longer;
+};
+
+/// Weights at the block's node `n`.
+Between between(uint64_t n, const TermPoints& points) {
+  const uint64_t length = points.length;
+  if (points.longer > 0) return {n, 0.5, 0.5};
   if (length < 2) return {0, 1, 0};
   if (n == 0) return {0, 1.5, -0.5};
   if (n == length) return {length - 2, -0.5, 1.5};
@@ -22,7 +29,7 @@ Between between(uint64_t n, int longer, uint64_t length) {
 
 /// Interpolates along `axis` to the nodes [begin, end). `from` has the term's values from point `point` on.
 CfValues resampled(const CfValues& from, size_t axis, uint64_t begin, uint64_t end, uint64_t point,
-                   int longer, uint64_t length) {
+                   const TermPoints& points) {
   CfValues to;
   to.count = from.count;
   to.count[axis] = end - begin;
@@ -31,7 +38,7 @@ CfValues resampled(const CfValues& from, size_t axis, uint64_t begin, uint64_t e
     for (uint64_t j = 0; j < to.count[1]; ++j)
       for (uint64_t i = 0; i < to.count[0]; ++i) {
         std::array<uint64_t, 3> index{i, j, k};
-        const Between weights = between(begin + index[axis], longer, length);
+        const Between weights = between(begin + index[axis], points);
         index[axis] = weights.first - point;
         const uint64_t n = index[0] + strides[1] * index[1] + strides[2] * index[2];
         const uint64_t next = index[axis] + 1 < from.count[axis] ? n + strides[axis] : n;
@@ -101,8 +108,9 @@ NetcdfBox CfTerm::boxOf(const CfRange& range) const {
     if (!along_[axis]) continue;
     uint64_t begin = range.begin[axis], end = range.end[axis];
     if (longer_[axis] != 0) {
-      begin = between(begin, longer_[axis], length_[axis]).first;
-      end = std::min(between(end - 1, longer_[axis], length_[axis]).first + 2, length_[axis]);
+      const TermPoints points{length_[axis], longer_[axis]};
+      begin = between(begin, points).first;
+      end = std::min(between(end - 1, points).first + 2, points.length);
     }
     box.start[*along_[axis]] = begin;
     box.count[*along_[axis]] = end - begin;
@@ -141,7 +149,7 @@ CfValues CfTerm::read(const NetcdfFiles& file, const CfRange& range) const {
   for (size_t axis = 0; axis < 3; ++axis)
     if (longer_[axis] != 0)
       values = resampled(values, axis, range.begin[axis], range.end[axis], box.start[*along_[axis]],
-                         longer_[axis], length_[axis]);
+                         {length_[axis], longer_[axis]});
   return values;
 }
 

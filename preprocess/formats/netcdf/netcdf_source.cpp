@@ -98,7 +98,10 @@ CfGrid NetcdfSource::chooseGrid(const NetcdfFiles& file, const OpenGridOptions& 
   CfGrids found = findCfGrids(file, options.time_step.value_or(0));
   if (found.grids.empty()) {
     if (const auto format = foreignNetcdf(file))
-      throw Error("{}: is {}; only structured (curvilinear) grids are read", file.path().string(), *format);
+      throw Error(
+          "{}: is {}; structured grids are read, and UGRID, ICON and MPAS in files that have their faces "
+          "and nodes",
+          file.path().string(), *format);
     std::string why = "no variable has three dimensions in space";
     if (!found.left_out.empty()) {
       const auto reasons = byReason(found.left_out);

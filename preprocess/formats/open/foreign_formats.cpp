@@ -25,11 +25,11 @@ constexpr Magic kMagics[] = {
     {"CDF\x05"sv, "a NetCDF file"},
     {"#!TDV"sv, "a Tecplot binary file, which is not read"},
     {"#!SZPLT"sv, "a Tecplot binary file, which is not read"},
-    {"C Binary"sv, "an EnSight geometry file, which is not read"},
-    {"\x50\0\0\0Fortran Binary"sv, "an EnSight geometry file, which is not read"},
+    {"C Binary"sv, "an EnSight geometry file (give its case file instead)"},
+    {"\x50\0\0\0Fortran Binary"sv, "an EnSight geometry file in Fortran Binary, which is not read"},
     {"\0\0\0\x50"
      "Fortran Binary"sv,
-     "an EnSight geometry file, which is not read"},
+     "an EnSight geometry file in Fortran Binary, which is not read"},
     {"GRIB"sv, "a GRIB file, which is not read"},
     {"\x0e\x03\x13\x01"sv, "an HDF4 file, which is not read"},
     {"{"sv, "a JSON file (give a .p3d file alone, instead of the grid)"},
@@ -57,18 +57,10 @@ std::optional<std::string> foreignText(std::string begin) {
     return "an XDMF file, which is not read";
   if (begin.starts_with("<?xml")) return "an XML file";
   std::istringstream lines(begin);
-  bool format = false;
   for (std::string line; std::getline(lines, line);) {
     const size_t first = line.find_first_not_of(" \t\r");
     if (first == std::string::npos || line[first] == '#') continue;
     line.erase(0, first);
-    if (format) {
-      if (line.starts_with("type:") && line.find("ensight") != std::string::npos)
-        return "an EnSight case file, which is not read";
-      return std::nullopt;
-    }
-    format = line.starts_with("format");
-    if (format) continue;
     for (const std::string_view word : {"title"sv, "variables"sv, "zone"sv, "filetype"sv}) {
       if (!line.starts_with(word)) continue;
       const size_t next = line.find_first_not_of(" \t", word.size());

@@ -7,6 +7,8 @@
 #include <charconv>
 
 #include "preprocess/formats/cgns/cgns_source.h"
+#include "preprocess/formats/columns/columns_source.h"
+#include "preprocess/formats/ensight/ensight_source.h"
 #include "preprocess/formats/exodus/exodus_source.h"
 #include "preprocess/formats/netcdf/netcdf_source.h"
 #include "preprocess/formats/open/combined_source.h"
@@ -16,6 +18,7 @@
 #include "preprocess/formats/openfoam/foam_source.h"
 #include "preprocess/formats/plot3d/plot3d_meta.h"
 #include "preprocess/formats/plot3d/plot3d_source.h"
+#include "preprocess/formats/su2/su2_source.h"
 #include "preprocess/formats/vtk/vtk_legacy.h"
 #include "preprocess/formats/vtk/vtk_xml.h"
 #include "preprocess/grid/scalar_names.h"
@@ -48,15 +51,21 @@ std::unique_ptr<DataSource> openListedFile(const OpenGridOptions& options) {
   return openFileSeries(options, openData);
 }
 
+std::unique_ptr<DataSource> openNetcdfGrid(const OpenGridOptions& options) {
+  if (isColumnsGrid(options)) return std::make_unique<ColumnsSource>(options);
+  return openNetcdf(options);
+}
+
 constexpr GridFormat kFormats[] = {
     {isVtkXml, openVtkXml, MoreFiles::kCombined},
     {isVtkLegacy, openVtkLegacy, MoreFiles::kCombined},
     {isFileSeries, openListedFile, MoreFiles::kNone},  // before .p3d, which takes all JSON files
     {isPlot3dMeta, openStructured<openPlot3dMeta>, MoreFiles::kNone},
-    {CgnsFile::recognises, openAs<CgnsSource>,
-     MoreFiles::kCombined},                              // before NetCDF, which takes all HDF5 files
-    {isExodus, openAs<ExodusSource>, MoreFiles::kNone},  // before NetCDF, which they are
-    {NetcdfFile::recognises, openStructured<openNetcdf>, MoreFiles::kByItself},
+    {CgnsFile::recognises, openCgns, MoreFiles::kCombined},  // before NetCDF, which takes all HDF5 files
+    {isExodus, openAs<ExodusSource>, MoreFiles::kNone},      // before NetCDF, which they are
+    {NetcdfFile::recognises, openNetcdfGrid, MoreFiles::kByItself},
+    {isEnsightCase, openEnsight, MoreFiles::kNone},
+    {isSu2, openAs<Su2Source>, MoreFiles::kByItself},
 };
 
 void refuseForeign(const std::filesystem::path& path, const char* expected) {

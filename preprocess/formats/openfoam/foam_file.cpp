@@ -155,14 +155,6 @@ struct FoamFile::Parser {
   }
 };
 
-void FoamList::read(uint64_t first, std::span<double> to) const {
-  spool->readAt(offset + first * sizeof(double), std::as_writable_bytes(to));
-}
-
-void FoamList::read(uint64_t first, std::span<uint64_t> to) const {
-  spool->readAt(offset + first * sizeof(uint64_t), std::as_writable_bytes(to));
-}
-
 bool FoamFile::exists(const std::filesystem::path& path) {
   std::error_code error;
   std::filesystem::path packed = path;

@@ -13,19 +13,12 @@
 #include <string_view>
 #include <vector>
 
-#include "preprocess/formats/common/spool_file.h"
+#include "preprocess/formats/common/spooled_numbers.h"
 #include "preprocess/formats/common/unpacked_file.h"
 
 namespace curvisplat {
 
-/// Numbers of 8 bytes in a spool file.
-struct FoamList {
-  std::shared_ptr<SpoolFile> spool;
-  uint64_t offset = 0, count = 0;  // of numbers
-
-  void read(uint64_t first, std::span<double> to) const;
-  void read(uint64_t first, std::span<uint64_t> to) const;
-};
+using FoamList = SpooledNumbers;
 
 /// For one thread.
 class FoamFile {

@@ -15,8 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Cells whose faces are sorted in memory by one pass; and the most faces that may lie between faces that are read together.
-constexpr uint64_t kCellsAtOnce = 500'000, kMostGap = 512;
 constexpr uint64_t kChunk = 65536;
 
 bool hasMesh(const fs::path& folder) {
@@ -134,10 +132,10 @@ void FoamSource::openPiece(const fs::path& folder) {
                 faces, owner.count, neighbour.count);
   listFacesOfCells(*piece, owner, neighbour);
   description_.pieces.push_back(
-      {folder.filename().string(), faces_file, piece->points.count / 3, piece->cells});
+      {folder.filename().string(), faces_file, piece->points.count / 3, piece->cells.cells});
 }
 
-/// Sorts faces by cell, as many cells at a time as memory holds the faces of.
+/// Counts the cells and lists the faces of each.
 void FoamSource::listFacesOfCells(Piece& piece, const FoamList& owner, const FoamList& neighbour) {
   uint64_t cells = 0;
   const auto faces = owner.count;
@@ -147,46 +145,23 @@ void FoamSource::listFacesOfCells(Piece& piece, const FoamList& owner, const Foa
         // Of a boundary face some versions say -1, in 32 or in 64 bits.
         if (list == &neighbour && values[n] >= 0xffffffff) continue;
         if (values[n] >= faces)
-          throw Error("{}: face {} is of cell {}, of which there cannot be so many; the mesh is damaged",
-                      meshFile(piece.folder, "owner").string(), first + n, static_cast<int64_t>(values[n]));
+          throw Error(
+              "{}: face {} belongs to cell {}, which is more cells than the faces can bound; the mesh is "
+              "damaged",
+              meshFile(piece.folder, "owner").string(), first + n, static_cast<int64_t>(values[n]));
         cells = std::max(cells, values[n] + 1);
       }
     });
-  piece.cells = cells;
-  uint64_t total = 0;
-  const auto write = [&](const SpoolFile::Sink& to_begins, const SpoolFile::Sink& to_faces) {
-    for (uint64_t first_cell = 0; first_cell < cells; first_cell += kCellsAtOnce) {
-      const uint64_t count = std::min(kCellsAtOnce, cells - first_cell);
-      std::vector<uint64_t> begins(count + 1, 0), sorted;
-      const auto forEachFace = [&](const auto& use) {
+  piece.cells = sortFacesByCell(
+      cells,
+      [&](const auto& use) {
         for (const FoamList* list : {&owner, &neighbour})
           forEachLabel(*list, [&](uint64_t first, const std::vector<uint64_t>& values) {
             for (size_t n = 0; n < values.size(); ++n)
-              if (values[n] >= first_cell && values[n] < first_cell + count)
-                use(values[n] - first_cell, first + n);
+              if (values[n] < cells) use(first + n, values[n]);
           });
-      };
-      forEachFace([&](uint64_t cell, uint64_t) { ++begins[cell + 1]; });
-      for (uint64_t cell = 0; cell < count; ++cell) begins[cell + 1] += begins[cell];
-      sorted.resize(begins.back());
-      std::vector<uint64_t> next(begins.begin(), begins.end() - 1);
-      forEachFace([&](uint64_t cell, uint64_t face) { sorted[next[cell]++] = face; });
-      for (uint64_t& begin : begins) begin += total;
-      to_begins(std::as_bytes(std::span(begins).first(count)));
-      total += sorted.size();
-      if (!sorted.empty()) to_faces(std::as_bytes(std::span(sorted)));
-    }
-    to_begins(std::as_bytes(std::span(&total, 1)));
-  };
-  // One file has one writer at a time.
-  piece.cell_begins.spool = std::make_shared<SpoolFile>(temporary_folder_);
-  piece.cell_faces.spool = spool_;
-  piece.cell_begins.offset = piece.cell_begins.spool->append([&](const SpoolFile::Sink& to_begins) {
-    piece.cell_faces.offset =
-        spool_->append([&](const SpoolFile::Sink& to_faces) { write(to_begins, to_faces); });
-  });
-  piece.cell_faces.count = total;
-  piece.cell_begins.count = cells + 1;
+      },
+      spool_, temporary_folder_);
 }
 
 void FoamSource::findFields() {
@@ -238,9 +213,9 @@ const FoamList& FoamSource::valuesOf(uint32_t number, size_t field, std::vector<
     values.uniform = file.beginField(fields_[field].components);
     if (values.uniform.empty()) {
       values.list = file.numbers(fields_[field].components);
-      if (values.list.count != piece.cells * fields_[field].components)
+      if (values.list.count != piece.cells.cells * fields_[field].components)
         throw Error("{}: has {} values; expected {}, one for each cell", file.name(),
-                    values.list.count / fields_[field].components, piece.cells);
+                    values.list.count / fields_[field].components, piece.cells.cells);
     }
     values.read = true;
   }
@@ -267,50 +242,14 @@ void FoamSource::readCells(uint32_t number, uint64_t first, uint64_t count, std:
   const Piece& piece = pieces_[number];
   out.clear();
   std::vector<uint64_t> begins(count + 1);
-  piece.cell_begins.read(first, std::span(begins));
+  piece.cells.begins.read(first, std::span(begins));
   std::vector<uint64_t> faces(begins.back() - begins.front());
-  if (!faces.empty()) piece.cell_faces.read(begins.front(), std::span(faces));
-
-  // Where each face begins and its points, in runs of faces that lie close together.
-  std::vector<uint64_t> sorted = faces;
-  std::sort(sorted.begin(), sorted.end());
-  sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
-  std::vector<uint64_t> place(sorted.size()), length(sorted.size()), labels, ends;
-  for (size_t from = 0; from < sorted.size();) {
-    size_t to = from + 1;
-    while (to < sorted.size() && sorted[to] - sorted[to - 1] < kMostGap) ++to;
-    ends.resize(sorted[to - 1] - sorted[from] + 2);
-    piece.faces.begins.read(sorted[from], std::span(ends));
-    for (size_t n = 1; n < ends.size(); ++n)
-      if (ends[n] < ends[n - 1] || ends[n] > piece.faces.labels.count)
-        throw Error("{}: face {} ends before it begins; the mesh is damaged",
-                    description_.pieces[number].file, sorted[from] + n - 1);
-    const size_t loaded = labels.size();
-    labels.resize(loaded + (ends.back() - ends.front()));
-    if (labels.size() > loaded) piece.faces.labels.read(ends.front(), std::span(labels).subspan(loaded));
-    for (size_t n = from; n < to; ++n) {
-      const uint64_t in_run = sorted[n] - sorted[from];
-      place[n] = loaded + (ends[in_run] - ends.front());
-      length[n] = ends[in_run + 1] - ends[in_run];
-    }
-    from = to;
-  }
-
-  std::vector<uint64_t> stream;
-  for (size_t n = 0; n < count; ++n) {
-    stream.clear();
-    const auto of_cell = std::span(faces).subspan(begins[n] - begins.front(), begins[n + 1] - begins[n]);
-    for (const uint64_t face : of_cell) {
-      const auto found =
-          static_cast<size_t>(std::lower_bound(sorted.begin(), sorted.end(), face) - sorted.begin());
-      stream.push_back(length[found]);
-      const auto points = std::span(labels).subspan(place[found], length[found]);
-      stream.insert(stream.end(), points.begin(), points.end());
-    }
-    if (!out.appendPolyhedron(of_cell.size(), stream))
-      throw Error("{}: cell {} has {} faces, or one with too few points; the mesh is damaged",
-                  description_.pieces[number].file, first + n, of_cell.size());
-  }
+  piece.cells.faces.read(begins.front(), std::span(faces));
+  const FoamList &face_begins = piece.faces.begins, &labels = piece.faces.labels;
+  const FaceLists lists{[&](uint64_t from, std::span<uint64_t> to) { face_begins.read(from, to); },
+                        [&](uint64_t from, std::span<uint64_t> to) { labels.read(from, to); },
+                        face_begins.count > 0 ? face_begins.count - 1 : 0, labels.count};
+  appendCellsOfFaces(lists, {begins, faces, description_.pieces[number].file, first}, out);
 
   out.scalars.resize(scalars.size());
   std::vector<double> values, uniform;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "preprocess/formats/common/cells_of_faces.h"
 #include "preprocess/formats/common/open_grid_options.h"
 #include "preprocess/formats/openfoam/foam_file.h"
 #include "preprocess/mesh/mesh_source.h"
@@ -35,8 +36,7 @@ class FoamSource final : public MeshSource {
     std::filesystem::path folder;  // the case's, or a processor's
     FoamList points;               // 3 numbers each
     FoamFile::Faces faces;
-    FoamList cell_begins, cell_faces;  // the faces of each cell
-    uint64_t cells = 0;
+    CellFaces cells;
   };
   struct Field {
     std::string name;

@@ -39,21 +39,10 @@ CellKind kindOf(uint8_t type) {
   }
 }
 
-/// A prism over a polygon of `sides`, whose points are those of its bottom, then those of its top.
+/// A prism over a polygon of `sides`; further points are left out.
 void appendPrism(size_t sides, std::span<const uint64_t> points, MeshCells& out) {
   if (points.size() < 2 * sides) return out.append(CellKind::kNone, {});
-  std::vector<uint64_t> faces;
-  for (const size_t end : {size_t{0}, sides}) {
-    faces.push_back(sides);
-    for (size_t n = 0; n < sides; ++n) faces.push_back(points[end + n]);
-  }
-  for (size_t n = 0; n < sides; ++n) {
-    const size_t next = n + 1 == sides ? 0 : n + 1;
-    for (const uint64_t word :
-         {uint64_t{4}, points[n], points[next], points[sides + next], points[sides + n]})
-      faces.push_back(word);
-  }
-  out.appendPolyhedron(sides + 2, faces);
+  out.appendPrism(points.first(2 * sides));
 }
 
 }  // namespace

@@ -14,6 +14,7 @@ from ._cache import Cache, Picture, Scalar, open
 from ._convert import Report, convert, convert_arrays, convert_callable
 from ._core import Error, UsageError, colour_maps
 from ._core import version as __version__
+from ._view import View
 
-__all__ = ["Block", "Cache", "Error", "Picture", "Report", "Scalar", "UsageError", "colour_maps", "convert",
+__all__ = ["Block", "Cache", "Error", "Picture", "Report", "Scalar", "UsageError", "View", "colour_maps", "convert",
            "convert_arrays", "convert_callable", "from_xarray", "open"]

@@ -10,6 +10,7 @@ from typing import Any, Callable, NamedTuple, Optional, Sequence, Tuple, Union
 import numpy as np
 
 from . import _core
+from ._view import View
 
 Vector = Sequence[float]
 Progress = Callable[[str, int, int, str], None]
@@ -145,6 +146,34 @@ class Cache:
         """(name, ni, nj, nk) of each block."""
         return tuple(self._core.blocks)
 
+    @property
+    def times(self) -> np.ndarray:
+        """The time of each step; one for a cache that is no series. Their unit is `time_unit`."""
+        return np.array(self._core.times)
+
+    @property
+    def time_unit(self) -> str:
+        """Of the times, such as "days since 1900-01-01"; "" if unknown."""
+        return self._core.time_unit
+
+    def histogram(self, scalar: str = "", *, bins: int = 128, range: Optional[Tuple[float, float]] = None,
+                  log: bool = False) -> Tuple[np.ndarray, np.ndarray]:
+        """The share of the data's volume in each of `bins` intervals, and the bins + 1 ends of the intervals.
+
+        scalar: a name (default: the first). range: (low, high), by default that of the scalar. log: intervals of equal
+        width in the logarithm. Of the step that was drawn last, from a coarse level: fast for any cache."""
+        of = next((s for s in self.scalars if not scalar or s.name == scalar), None)
+        low, high = range if range is not None or of is None else (of.min, of.max)
+        if not low < high and range is None:
+            low, high = low - 0.5, low + 0.5
+        shares = np.array(self._core.histogram(scalar, (float(low), float(high)), log, int(bins)))
+        return shares, np.geomspace(low, high, bins + 1) if log else np.linspace(low, high, bins + 1)
+
+    def view(self, *, height: int = 600, program: Optional[str] = None) -> View:
+        """The cache in a browser or a notebook, to move in: `curvisplat serve` on this machine. A notebook shows the result; its
+        `url` is for a browser on this machine. It ends by `close()` or with the interpreter."""
+        return View(self.path, height, program)
+
     def probe(self, point: Vector) -> Optional[dict]:
         """The sample at a point: {"values": {scalar: value}, "block": from 1, "index": (i, j, k) from 0, "position": of the
         sample}. None if the point is outside of the grid."""
@@ -157,7 +186,10 @@ class Cache:
                view: Optional[str] = None, position: Optional[Vector] = None, focal_point: Optional[Vector] = None,
                view_up: Optional[Vector] = None, parallel_scale: Optional[float] = None,
                view_angle: Optional[float] = None, scale: Vector = (1, 1, 1), clip_box: Optional[Vector] = None,
-               clip_planes: Sequence[Vector] = (), shade: bool = False, light: Optional[Vector] = None,
+               clip_planes: Sequence[Vector] = (), step: int = 0, surfaces: Sequence[str] = (),
+               surface_colours: Sequence[str] = (), surface_by: str = "", slices: Sequence[Vector] = (),
+               slice_opacity: float = 1, isovalues: Sequence[float] = (), iso_opacity: Optional[float] = None,
+               volume: bool = True, shade: bool = False, light: Optional[Vector] = None,
                light_direction: Optional[Vector] = None, background: str = "white", lod_pixels: float = 1,
                max_splats: Optional[int] = None, memory: Union[str, int] = "512M", threads: int = 0,
                backend: str = "auto", keep_going: bool = False, progress: Optional[Progress] = None) -> Picture:
@@ -172,7 +204,9 @@ class Cache:
         view: iso, +x, -x, +y, -y, +z or -z; or a camera by position, focal_point, view_up and parallel_scale (half the
         picture's height) or view_angle (perspective, degrees).
         scale: factors of the data along x, y, z. clip_box: (x0, x1, y0, y1, z0, z1). clip_planes: (px, py, pz, nx, ny, nz)
-        each; nothing is drawn where n does not point. shade: light level surfaces from the viewer; light: (ambient, diffuse,
+        each; nothing is drawn where n does not point. step: of a series. surfaces: files, or faces of the grid such as "kmin";
+        surface_by: the scalar that colours them, or surface_colours. slices: (px, py, pz, nx, ny, nz) each. isovalues of the
+        scalar. volume: False leaves the volume out. shade: light level surfaces from the viewer; light: (ambient, diffuse,
         specular), and light_direction turn it on, too.
         lod_pixels: the largest error of a merged splat on the screen; 0 draws the finest level. memory: the limit, in
         bytes or as "512M". progress: called with (phase, done, total, unit).
@@ -180,7 +214,7 @@ class Cache:
         Raises UsageError for options that make no sense, Error if reading or drawing fails, KeyboardInterrupt after
         Ctrl-C.
         """
-        function = _given(tf=colours, range=range, asinh=asinh, opacity_unit=opacity_unit)
+        function = _given(scalar=scalar, tf=colours, range=range, asinh=asinh, opacity_unit=opacity_unit)
         if opacity is not None:
             function["opacity"] = _opacities(opacity)
         camera = _given(view=view, position=position, focal_point=focal_point, view_up=view_up,
@@ -188,9 +222,15 @@ class Cache:
         frame = _given(size="{}x{}".format(*size), background=background, scale=scale, memory=str(memory),
                        lod_pixels=lod_pixels, clip_box=clip_box, light=light, light_direction=light_direction,
                        max_splats=None if max_splats is None else str(max_splats))
-        others = {"clip_planes": [_numbers(plane) for plane in clip_planes], "shade": shade, "threads": threads,
+        others = {"clip_planes": [_numbers(plane) for plane in clip_planes], "step": int(step),
+                  "surfaces": [os.fspath(surface) for surface in surfaces], "surface_colours": list(surface_colours),
+                  "surface_by": surface_by, "slices": [_numbers(plane) for plane in slices],
+                  "slice_opacity": _number(slice_opacity), "isovalues": [_number(value) for value in isovalues],
+                  "volume": bool(volume), "shade": shade, "threads": threads,
                   "keep_going": keep_going, "backend": backend}
-        rgba, options, notes, statistics = self._core.render(scalar, function, camera, frame, others, progress)
+        if iso_opacity is not None:
+            others["iso_opacity"] = _number(iso_opacity)
+        rgba, options, notes, statistics = self._core.render(function, camera, frame, others, progress)
         picture = rgba.view(Picture)
         picture.options, picture.notes, picture.statistics = options, notes, statistics
         return picture

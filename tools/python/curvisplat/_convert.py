@@ -46,9 +46,10 @@ def convert(output: Path, grid: Path, solutions: Sequence[Path] = (), *, scalars
     `resume` was given.
     """
     options = _options(overwrite, resume, blank_value, memory, threads, title)
+    options["time_step"] = time_step
     names = [scalars] if isinstance(scalars, str) else list(scalars)
     return Report(**_core.convert_files(os.fspath(output), os.fspath(grid), [os.fspath(path) for path in solutions], names,
-                                        time_step, options, progress))
+                                        options, progress))
 
 
 def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = None, overwrite: bool = False,

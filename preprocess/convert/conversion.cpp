@@ -1,0 +1,405 @@
+#include "preprocess/convert/conversion.h"
+
+#include <malloc.h>
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "preprocess/convert/bucket_file.h"
+#include "preprocess/convert/bucket_tree.h"
+#include "preprocess/convert/build_octree.h"
+#include "preprocess/convert/conversion_workspace.h"
+#include "preprocess/convert/counting_grid.h"
+#include "preprocess/convert/grid_origin.h"
+#include "preprocess/convert/mesh_origin.h"
+#include "preprocess/convert/new_manifest.h"
+#include "preprocess/convert/plan_buckets.h"
+#include "preprocess/convert/preflight.h"
+#include "preprocess/convert/scan.h"
+#include "preprocess/convert/scatter.h"
+#include "preprocess/convert/scattered_splats.h"
+#include "preprocess/convert/shared_build.h"
+#include "preprocess/convert/shared_passes.h"
+#include "preprocess/convert/splat_origin.h"
+#include "preprocess/convert/splat_record.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/base/paths.h"
+#include "stream/base/trace.h"
+#include "stream/cache/cache_writer.h"
+#include "stream/cache/faces_file.h"
+#include "stream/cache/partial_folder.h"
+
+namespace curvisplat {
+
+std::filesystem::path temporaryFolder(const ConvertOptions& options) {
+  return options.temporary_folder.empty() ? folderOf(options.output) : options.temporary_folder;
+}
+
+void reportCache(const Manifest& written, ConvertReport& report) {
+  report.centring = written.cells ? Centring::kCell : Centring::kNode;
+  report.nodes = written.nodes;
+  report.splats = written.splats;
+  report.bricks = written.bricks;
+  report.levels = written.levels;
+  report.volume = written.volume;
+  for (const FileInfo& file : written.files) report.files.push_back({file.name, file.size});
+}
+
+namespace {
+
+uint64_t nodesOf(const SplatOrigin& origin) {
+  uint64_t nodes = 0;
+  for (const GridBlock& block : origin.blocks()) nodes += block.nodes();
+  if (nodes >= kMaxNodes)
+    throw Error("{}: has {} nodes; the most that can be converted are {}", origin.description().format, nodes,
+                kMaxNodes - 1);
+  return nodes;
+}
+
+Unfinished unfinishedOf(const ConvertOptions& options) {
+  if (options.resume) return Unfinished::kResume;
+  return options.overwrite ? Unfinished::kRemove : Unfinished::kRefuse;
+}
+
+std::unique_ptr<SplatOrigin> originOf(const DataSource& source, const ConvertOptions& options,
+                                      const MemoryPlan& plan, const std::filesystem::path& scratch) {
+  if (const auto* mesh = dynamic_cast<const MeshSource*>(&source))
+    return std::make_unique<MeshOrigin>(*mesh, options.scalars, options.blank_value, plan, scratch);
+  return std::make_unique<GridOrigin>(dynamic_cast<const GridSource&>(source), options.scalars,
+                                      options.blank_value, options.overlap, plan, scratch);
+}
+
+/// A conversion under way: what each pass leaves for the next.
+class Conversion {
+ public:
+  Conversion(const DataSource& source, const ConvertOptions& options, const MemoryPlan& plan,
+             std::vector<ConversionFact> facts, Progress& progress)
+      : options_(options), plan_(plan), progress_(progress), ranks_(options.ranks) {
+    if (isFirst())
+      workspace_.emplace(options.output, options.overwrite, unfinishedOf(options), temporaryFolder(options),
+                         std::move(facts));
+    shareFolders();
+    origin_ = originOf(source, options, plan, own_scratch_);
+    nodes_ = nodesOf(*origin_);
+    if (ranks_) shares_splats_ = origin_->shareWith(*ranks_);
+  }
+
+  ConvertReport run() {
+    const Pass scatter_grid[] = {
+        {"scan", "nodes", nodes_, &Conversion::scan},
+        {"count", "nodes", nodes_, &Conversion::count},
+        {"scatter", "nodes", nodes_, &Conversion::scatter},
+        {"seams", "nodes", 0, &Conversion::mergeSeams},
+    };
+    const Pass take_up_splats[] = {{"check", "bricks", 0, &Conversion::takeUpSplats}};
+    const Pass build_cache[] = {
+        {"build", "nodes", nodes_, &Conversion::build},
+    };
+    if (isFirst()) checkRoom();
+    if (hasSplats()) {
+      try {
+        runPasses(take_up_splats);
+        runPasses(build_cache);
+        return end();
+      } catch (const LostBuckets&) {
+        // The machine went down before all was on its disk. The bricks that are whole still count.
+        if (ranks_) throw;
+        forgetSplats();
+      }
+    }
+    runPasses(scatter_grid);
+    runPasses(build_cache);
+    return end();
+  }
+
+  /// After run() has thrown: whether there is something to resume, which then stays.
+  bool leaveForResuming() {
+    if (file_) file_->leave();
+    return workspace_ && workspace_->leaveForResuming();
+  }
+
+ private:
+  struct Pass {
+    const char* name;
+    const char* unit;
+    uint64_t steps;  // 0: not known
+    void (Conversion::*run)();
+  };
+
+  void runPasses(std::span<const Pass> passes) {
+    for (const Pass& pass : passes) {
+      const TraceScope trace(pass.name, TraceKind::kStage);
+      progress_.begin(pass.name, pass.steps / (ranks_ ? ranks_->count() : 1), pass.unit);
+      (this->*pass.run)();
+      // What a pass has freed goes back to the system: the next one counts on it.
+      malloc_trim(0);
+    }
+    progress_.end();
+  }
+
+  bool isFirst() const { return !ranks_ || ranks_->isFirst(); }
+  unsigned rank() const { return ranks_ ? ranks_->rank() : 0; }
+  /// Whether this rank calls the origin.
+  bool makesSplats() const { return isFirst() || shares_splats_; }
+
+  /// Rank 0's folders, at every rank; and a folder for each rank's own temporary files.
+  void shareFolders() {
+    if (isFirst()) {
+      scratch_ = std::filesystem::absolute(workspace_->scratch());
+      partial_ = std::filesystem::absolute(workspace_->partial().path());
+    }
+    own_scratch_ = scratch_;
+    if (!ranks_) return;
+    const std::string names = scratch_.string() + '\n' + partial_.string();
+    const auto sent =
+        fromBytes<char>(ranks_->broadcast(toBytes(std::vector<char>(names.begin(), names.end()))));
+    const auto end = std::find(sent.begin(), sent.end(), '\n');
+    scratch_ = std::string(sent.begin(), end);
+    partial_ = std::string(end + 1, sent.end());
+    for (const std::filesystem::path& folder : {scratch_, partial_})
+      if (!std::filesystem::is_directory(folder))
+        throw Error("{}: does not exist here; several ranks need a file system that they share",
+                    folder.string());
+    own_scratch_ = scratch_ / fmt::format("rank{}", rank());
+    removeAll(own_scratch_);
+    makeFolder(own_scratch_);
+  }
+
+  /// Whether an interrupted conversion has left splats that are all there.
+  bool hasSplats() {
+    if (!ranks_) return workspace_->splats().has_value();
+    std::vector<uint8_t> has(1);
+    if (isFirst() && workspace_->splats()) {
+      try {
+        splats_ = *workspace_->splats();
+        openSplats();
+        has[0] = 1;
+      } catch (const LostBuckets&) {
+        forgetSplats();
+      }
+    }
+    return fromBytes<uint8_t>(ranks_->broadcast(toBytes(has)))[0] != 0;
+  }
+
+  ConvertReport end() {
+    const Pass faces[] = {{"faces", "nodes", nodes_, &Conversion::writeFaces}};
+    const Pass finish[] = {{"finish", "bricks", 0, &Conversion::finish}};
+    if (options_.surfaces) runPasses(faces);
+    runPasses(finish);
+    return std::move(report_);
+  }
+
+  void scan() {
+    if (makesSplats()) splats_.survey = origin_->survey(progress_);
+    if (ranks_ && !shares_splats_) splats_.survey = broadcastSurvey(splats_.survey, *ranks_);
+    checkRanges(splats_.survey, origin_->description(), options_.scalars);
+    openWriter();
+    if (!isFirst()) return;
+    report_.warnings = origin_->warnings();
+    report_.notes = origin_->notes();
+    splats_.overlap = origin_->overlap();
+  }
+
+  void count() {
+    CountingGrid counts(countingLevel(nodes_), plan_.counting_bytes);
+    if (makesSplats()) origin_->count(root_, counts, progress_);
+    if (ranks_ && shares_splats_) sendCountsToFirst(counts, *ranks_);
+    if (isFirst()) {
+      counts.close();
+      planBuckets(counts, plan_, splats_.tree);
+    }
+    if (ranks_) splats_.tree = broadcastTree(splats_.tree, *ranks_);
+    uint32_t buckets = 0;
+    for (const uint32_t leaf : splats_.tree.leavesBelow(0))
+      buckets = std::max(buckets, splats_.tree[leaf].bucket + 1);
+    file_ = std::make_unique<BucketFile>(ConversionWorkspace::splatsFileOf(scratch_, rank()), buckets,
+                                         plan_.chunkBytes(buckets));
+    contents_.assign(splats_.tree.size(), {});
+  }
+
+  SplatTarget target() { return {root_, &splats_.tree, file_.get(), &contents_}; }
+
+  void scatter() {
+    if (makesSplats()) splats_.counts = scatterSplats(*origin_, target(), progress_);
+  }
+
+  void mergeSeams() {
+    if (makesSplats()) splats_.merged_nodes = scatterRest(*origin_, target(), progress_);
+    file_->close(ranks_ != nullptr);
+    splats_.buckets = file_->chains();
+    if (ranks_) sumContents(contents_, *ranks_);
+    if (ranks_) splats_.buckets_of_ranks = gatherChains(splats_.buckets, *ranks_);
+    splats_.tree.setContents(splats_.tree.leavesBelow(0), contents_);
+    if (isFirst()) workspace_->noteSplats(splats_);
+    if (!ranks_) return;
+    shareSplats();
+    if (!isFirst()) file_->leave();  // it is to be resumed from
+    for (unsigned other = 0; other < ranks_->count(); ++other)
+      if (other != rank()) file_->join(ConversionWorkspace::splatsFileOf(scratch_, other), chainsOf(other));
+  }
+
+  const BucketChains& chainsOf(unsigned of_rank) const {
+    return of_rank == 0 ? splats_.buckets : splats_.buckets_of_ranks[of_rank - 1];
+  }
+
+  /// What rank 0's journal notes, at every rank.
+  void shareSplats() {
+    std::string text;
+    if (isFirst()) text = journalText(workspace_->journal());
+    const auto sent =
+        fromBytes<char>(ranks_->broadcast(toBytes(std::vector<char>(text.begin(), text.end()))));
+    if (!isFirst()) splats_ = journalFrom(std::string(sent.begin(), sent.end()))->splats.value();
+  }
+
+  /// In the place of all before: the splats of a conversion that was interrupted, which may have had another number
+  /// of ranks.
+  void takeUpSplats() {
+    if (ranks_)
+      shareSplats();
+    else
+      splats_ = *workspace_->splats();
+    if (!file_) openSplats();
+    openWriter();
+  }
+
+  void openSplats() {
+    const auto file_of = [&](unsigned n) { return ConversionWorkspace::splatsFileOf(scratch_, n); };
+    file_ = std::make_unique<BucketFile>(file_of(0), splats_.buckets);
+    if (!isFirst()) file_->leave();
+    for (unsigned n = 1; n <= splats_.buckets_of_ranks.size(); ++n) file_->join(file_of(n), chainsOf(n));
+  }
+
+  OctreePlan octreePlan() const {
+    return {root_, origin_->blocks(), options_.scalars.size(), plan_, own_scratch_};
+  }
+
+  void build() {
+    if (ranks_) return buildTogether();
+    OctreeBuilder(octreePlan(), splats_.tree, *writer_, progress_).build(*file_);
+  }
+
+  /// Bricks that were appended by an interrupted conversion are made again.
+  void buildTogether() {
+    const BucketRange share = dealBuckets(splats_.tree, file_->buckets(), ranks_->count())[rank()];
+    PartialFolder own_folder(bricksOfRank(scratch_, rank()), true);
+    Progress nothing_to_check;
+    CacheWriter own(own_folder, root_, variables(), nothing_to_check);
+    own.keep(0);
+    OctreeBuilder(octreePlan(), splats_.tree, own, progress_).buildShare(*file_, share.first, share.end);
+    if (isFirst()) writer_->keep(0);
+    const std::vector<VariableInfo> infos = variables();
+    joinBricks({root_, infos, splats_.tree, scratch_, partial_}, own, writer_.get(), *ranks_);
+  }
+
+  void writeFaces() {
+    if (!isFirst()) return;
+    std::vector<uint32_t> numbers;
+    for (const VariableInfo& variable : variables()) numbers.push_back(variable.number);
+    const FacesJob job{workspace_->partial().path() / kFacesFileName,
+                       workspace_->scratch(),
+                       splats_.survey.lower,
+                       splats_.survey.upper,
+                       options_.planes,
+                       std::move(numbers),
+                       plan_.slab_bytes,
+                       plan_.seam_bytes};
+    faces_file_ = origin_->writeFaces(job, progress_);
+  }
+
+  void finish() {
+    if (isFirst()) finishCache();
+    if (ranks_) ranks_->barrier();
+  }
+
+  void finishCache() {
+    reportCache(writer_->finish(manifest()), report_);
+    writer_.reset();
+    file_.reset();
+    report_.blanked = splats_.survey.blanked;
+    report_.degenerate = splats_.counts.degenerate;
+    report_.inverted = splats_.counts.inverted;
+    report_.merged_nodes = splats_.merged_nodes;
+    report_.temporary_bytes = splats_.temporaryBytes();
+    report_.resumed = workspace_->resumed();
+  }
+
+  void checkRoom() const {
+    DiskNeeds needs = diskNeeds(nodes_, options_.scalars.size());
+    if (workspace_->splats())
+      needs.temporary_bytes = 0;
+    else
+      needs.temporary_bytes = std::max(needs.temporary_bytes, origin_->temporaryBytes());
+    if (ranks_) needs.temporary_bytes += needs.cache_bytes;  // the bricks of each, before they are joined
+    if (options_.surfaces)
+      needs.temporary_bytes +=
+          temporaryBytesOfFaces(origin_->blocks(), options_.planes, options_.scalars.size());
+    needs.cache_bytes -= std::min(needs.cache_bytes, workspace_->bytesInPartial());
+    if (options_.check_disk_space) checkDiskSpace(needs, options_.output, temporaryFolder(options_));
+  }
+
+  /// Needs the survey.
+  void openWriter() {
+    root_ = RootCube::around(splats_.survey.lower, splats_.survey.upper);
+    if (writer_ || !isFirst()) return;
+    writer_ = std::make_unique<CacheWriter>(workspace_->partial(), root_, variables(), progress_);
+    report_.resumed_bricks = ranks_ ? 0 : writer_->bricks().size();
+  }
+
+  void forgetSplats() {
+    workspace_->forgetSplats();
+    file_.reset();
+    splats_ = {};
+  }
+
+  std::vector<VariableInfo> variables() const {
+    return variablesOf(origin_->description(), options_.scalars, splats_.survey);
+  }
+
+  Manifest manifest() const {
+    Manifest manifest = manifestOf(*origin_, options_, splats_);
+    if (faces_file_) manifest.files.push_back(*faces_file_);
+    return manifest;
+  }
+
+  const ConvertOptions& options_;
+  const MemoryPlan plan_;
+  Progress& progress_;
+  Ranks* const ranks_;                            // null: this process alone
+  std::optional<ConversionWorkspace> workspace_;  // before what has files in it; rank 0's alone
+  std::filesystem::path scratch_, partial_;       // rank 0's
+  std::filesystem::path own_scratch_;
+  std::unique_ptr<SplatOrigin> origin_;
+  bool shares_splats_ = false;
+  uint64_t nodes_ = 0;
+  ScatteredSplats splats_;
+  RootCube root_;
+  std::vector<CellContents> contents_;  // [node of the tree], while they are being scattered
+  std::unique_ptr<BucketFile> file_;
+  std::unique_ptr<CacheWriter> writer_;
+  std::optional<FileInfo> faces_file_;
+  ConvertReport report_;
+};
+
+}  // namespace
+
+ConvertReport runConversion(const DataSource& source, const ConvertOptions& options, const MemoryPlan& plan,
+                            std::vector<ConversionFact> facts, Progress& progress) {
+  Conversion conversion(source, options, plan, std::move(facts), progress);
+  try {
+    return conversion.run();
+  } catch (const Interrupted& interrupted) {
+    const char* what = conversion.leaveForResuming()
+                           ? "interrupted; the same command with --resume goes on from here"
+                           : "interrupted before there was anything to resume; its temporary files are gone";
+    throw Interrupted(interrupted.signal(), fmt::format("{}: {}", options.output.string(), what));
+  } catch (const Error& error) {
+    if (options.resume && conversion.leaveForResuming())
+      throw Error("{}; what is done is kept, and --resume goes on from it", error.what());
+    throw;
+  }
+}
+
+}  // namespace curvisplat

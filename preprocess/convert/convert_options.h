@@ -1,0 +1,71 @@
+// What a conversion is asked for, and what it reports.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "preprocess/faces/grid_faces_pass.h"
+#include "preprocess/grid/grid_source.h"
+#include "preprocess/grid/node_reader.h"
+#include "preprocess/overset/block_owners.h"
+#include "stream/base/ranks.h"
+
+namespace curvisplat {
+
+struct ConvertOptions {
+  std::filesystem::path output;            // NAME.splats, without a trailing slash
+  bool check_disk_space = true;            // before the work
+  bool overwrite = false;                  // an existing cache is replaced once the new one is complete
+  bool resume = false;                     // continue an interrupted conversion, if there is one
+  std::vector<uint32_t> scalars;           // positions in the source's description; the cache's variables
+  std::optional<double> blank_value;       // samples with this value of any scalar are blanked
+  uint64_t memory_bytes = 0;               // 0: defaultMemory()
+  unsigned threads = 0;                    // 0: as many as the machine has
+  std::filesystem::path temporary_folder;  // empty: the folder of the output
+  std::string title;                       // empty: the output's name
+  std::optional<double> time;              // of the step; otherwise the source's, or 0
+  bool surfaces = true;                    // store the grid's outer faces in the cache
+  std::vector<IndexPlane> planes;          // and these index planes
+  Overlap overlap = Overlap::kOwner;       // of blocks
+
+  /// Processes that convert together: each has the same source and options, and calls convert(). Null: this process alone.
+  Ranks* ranks = nullptr;
+
+  /// For tests: buckets smaller than memory would allow, so that a small grid has many.
+  std::optional<uint64_t> bucket_splats;
+  /// For tests: a memory limit for unstructured grids, so that small ones are processed like large ones.
+  std::optional<uint64_t> mesh_bytes;
+  /// For tests: a memory limit for the cells of overlapping blocks, so that small ones are read in several parts.
+  std::optional<uint64_t> owner_bytes;
+};
+
+/// A file of the cache, and its size.
+struct FileReport {
+  std::string name;
+  uint64_t bytes = 0;
+};
+
+/// What a conversion did, and what was unusual about the grid.
+struct ConvertReport {
+  Centring centring = Centring::kNode;  // of the scalars: `nodes` and `blanked` count nodes, or cells
+  uint64_t nodes = 0;
+  BlankCounts blanked;
+  uint64_t degenerate = 0;    // splats with an axis of length zero, which got a minimum length
+  uint64_t inverted = 0;      // cells of the other handedness than most of their block
+  uint64_t merged_nodes = 0;  // nodes on block faces that were merged into the splat of another node
+  uint64_t splats = 0, bricks = 0;
+  uint32_t levels = 0;
+  double volume = 0;
+  uint64_t temporary_bytes = 0;  // of the scattered splats
+  bool resumed = false;          // an interrupted conversion was continued
+  uint64_t resumed_bricks = 0;   // bricks that the interrupted one had made
+  unsigned threads = 0;          // that worked: memory may allow fewer than asked for
+  uint64_t memory_bytes = 0;     // the memory limit that was kept
+  std::vector<FileReport> files;
+  std::vector<std::string> warnings, notes;
+};
+
+}  // namespace curvisplat

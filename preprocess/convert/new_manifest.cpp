@@ -1,0 +1,46 @@
+#include "preprocess/convert/new_manifest.h"
+
+namespace curvisplat {
+
+std::vector<VariableInfo> variablesOf(const GridDescription& description, std::span<const uint32_t> scalars,
+                                      const GridSurvey& survey) {
+  std::vector<VariableInfo> variables;
+  for (size_t n = 0; n < scalars.size(); ++n) {
+    const GridScalar& scalar = description.scalars[scalars[n]];
+    variables.push_back(
+        {static_cast<uint32_t>(n), scalar.name, scalar.unit, survey.ranges[n].min, survey.ranges[n].max});
+  }
+  return variables;
+}
+
+Manifest manifestOf(const SplatOrigin& origin, const ConvertOptions& options, const ScatteredSplats& splats) {
+  const GridDescription& description = origin.description();
+  const GridSurvey& survey = splats.survey;
+  Manifest manifest;
+  manifest.title = options.title.empty() ? options.output.filename().string() : options.title;
+  manifest.program = "curvisplat " CURVISPLAT_VERSION;
+  manifest.sources = description.files;
+  manifest.reader = description.format;
+  if (options.blank_value) manifest.reader += fmt::format(", blank value {}", *options.blank_value);
+  manifest.lower = survey.lower;
+  manifest.upper = survey.upper;
+  for (const GridBlock& block : origin.blocks())
+    manifest.blocks.push_back({block.name, block.ni, block.nj, block.nk});
+  manifest.requirements = {kBorderFaces, kCellGrowth, kMergedBorders};
+  manifest.overlap = splats.overlap;
+  manifest.cells = origin.centring() == Centring::kCell;
+  manifest.nodes = survey.nodes;
+  manifest.blanked_nodes = survey.blanked.total();
+  manifest.grid_checksum = survey.grid_checksum;
+  manifest.variables = variablesOf(description, options.scalars, survey);
+  StepInfo step;
+  if (!description.times.empty()) step.time = description.times[description.time_step];
+  if (options.time) step.time = *options.time;
+  manifest.time_unit = description.time_unit;
+  manifest.calendar = description.calendar;
+  for (const VariableInfo& variable : manifest.variables) step.variables.push_back(variable.number);
+  manifest.steps = {step};
+  return manifest;
+}
+
+}  // namespace curvisplat

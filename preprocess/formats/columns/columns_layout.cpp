@@ -1,0 +1,316 @@
+#include "preprocess/formats/columns/columns_layout.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "preprocess/formats/netcdf/cf_roles.h"
+#include "preprocess/formats/netcdf/standard_atmosphere.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kMostSides = 64, kMostLevels = 1 << 20;
+
+std::optional<size_t> dimensionNamed(const NetcdfFiles& file, std::string_view name) {
+  for (size_t n = 0; n < file.dimensions().size(); ++n)
+    if (file.dimensions()[n].name == name) return n;
+  return std::nullopt;
+}
+
+bool hasDimension(const NetcdfVariable& variable, size_t dim) {
+  return std::find(variable.dims.begin(), variable.dims.end(), dim) != variable.dims.end();
+}
+
+double numberIn(const NetcdfVariable& variable, const char* attribute, double otherwise) {
+  const auto found = variable.attributes.find(attribute);
+  return found == variable.attributes.end() || found->second.numbers.empty() ? otherwise
+                                                                             : found->second.numbers[0];
+}
+
+/// The variable whose attribute says what it is.
+const NetcdfVariable* withText(const NetcdfFiles& file, const char* attribute, std::string_view text) {
+  for (const NetcdfVariable& variable : file.variables())
+    if (variable.text(attribute) == text) return &variable;
+  return nullptr;
+}
+
+const NetcdfVariable& required(const NetcdfFiles& file, std::string_view name, const std::string& format) {
+  const NetcdfVariable* const found = file.find(name);
+  if (!found)
+    throw Error("{}: is a grid of {} without {}; give the file that has it, too (convert DATA GRID)",
+                file.path().string(), format, name);
+  return *found;
+}
+
+/// Sets faces, nodes and sides from the variables.
+void setSizes(const NetcdfFiles& file, ColumnsMap& map) {
+  const NetcdfVariable &nodes = *map.nodes_of_face, &longitude = *map.longitude;
+  if (nodes.dims.size() != 2 || !hasDimension(nodes, map.face_dim) || longitude.dims.size() != 1 ||
+      map.latitude->dims != longitude.dims)
+    throw Error("{}: {} or {} has other dimensions than faces and their nodes; the file is damaged",
+                file.path().string(), nodes.name, longitude.name);
+  const size_t side_axis = nodes.dims[0] == map.face_dim ? 1 : 0;
+  map.node_dim = longitude.dims[0];
+  map.faces = file.dimensions()[map.face_dim].length;
+  map.nodes = file.dimensions()[map.node_dim].length;
+  map.most_sides = file.dimension(nodes, side_axis).length;
+  if (map.most_sides < 3 || map.most_sides > kMostSides || map.faces == 0 || map.nodes == 0)
+    throw Error("{}: has {} faces of up to {} nodes; expected 3 to {}", file.path().string(), map.faces,
+                map.most_sides, kMostSides);
+}
+
+ColumnsMap ugridOf(const NetcdfFiles& file, const NetcdfVariable& topology) {
+  ColumnsMap map;
+  map.format = "UGRID";
+  if (numberIn(topology, "topology_dimension", 2) != 2)
+    throw Error("{}: is a mesh of UGRID of topology_dimension {:g}; expected 2, faces with layers",
+                file.path().string(), numberIn(topology, "topology_dimension", 2));
+  map.nodes_of_face = &required(file, topology.text("face_node_connectivity"), "UGRID");
+  map.first_node = numberIn(*map.nodes_of_face, "start_index", 0);
+  std::istringstream names(topology.text("node_coordinates"));
+  std::string first, second;
+  names >> first >> second;
+  map.longitude = &required(file, first, "UGRID");
+  map.latitude = &required(file, second, "UGRID");
+  const CfRole role = cfRole(file, *map.longitude);
+  if (role == CfRole::kLatitude || role == CfRole::kY) std::swap(map.longitude, map.latitude);
+  // Faces come first unless the file says otherwise.
+  const auto face = dimensionNamed(file, topology.text("face_dimension"));
+  if (map.nodes_of_face->dims.empty())
+    throw Error("{}: {} has no dimensions; the file is damaged", file.path().string(),
+                map.nodes_of_face->name);
+  map.face_dim = face.value_or(map.nodes_of_face->dims[0]);
+  return map;
+}
+
+/// 1-D values in kilometres upwards; empty if they are no heights.
+std::vector<double> heightsOf(const NetcdfFiles& file, const NetcdfVariable& variable,
+                              const NetcdfVariable& meaning) {
+  const std::string unit = meaning.text("units").empty() ? variable.text("units") : meaning.text("units");
+  const auto length = kilometresOf(unit), pressure = pascalsOf(unit);
+  if (!length && !pressure) return {};
+  NetcdfBox box;
+  for (size_t axis = 0; axis < variable.dims.size(); ++axis) {
+    box.start.push_back(0);
+    box.count.push_back(file.dimension(variable, axis).length);
+  }
+  if (box.values() > 2 * kMostLevels) return {};
+  std::vector<double> values(box.values());
+  file.read(variable, box, std::span(values));
+  for (double& value : values)
+    value = length ? value * *length * (growsDownwards(meaning) ? -1 : 1)
+                   : standardAltitude(value * *pressure) * 1e-3;
+  return values;
+}
+
+/// Levels around values that are in the middle of layers.
+std::vector<double> around(const std::vector<double>& middles) {
+  std::vector<double> levels;
+  if (middles.size() < 2) return levels;
+  levels.push_back(middles[0] - (middles[1] - middles[0]) / 2);
+  for (size_t n = 0; n + 1 < middles.size(); ++n) levels.push_back((middles[n] + middles[n + 1]) / 2);
+  const size_t last = middles.size() - 1;
+  levels.push_back(middles[last] + (middles[last] - middles[last - 1]) / 2);
+  return levels;
+}
+
+/// The heights by the coordinate variable of the layers.
+std::vector<double> levelsOf(const NetcdfFiles& file, const NetcdfVariable& coordinate, bool between) {
+  std::vector<double> middles = heightsOf(file, coordinate, coordinate);
+  if (!between || middles.empty()) return middles;
+  const NetcdfVariable* const bounds = file.find(coordinate.text("bounds"));
+  if (bounds && bounds->dims.size() == 2 && file.dimension(*bounds, 1).length == 2) {
+    const std::vector<double> ends = heightsOf(file, *bounds, coordinate);
+    if (ends.size() == 2 * middles.size()) {
+      std::vector<double> levels;
+      for (size_t n = 0; n < middles.size(); ++n) levels.push_back(ends[2 * n]);
+      levels.push_back(ends.back());
+      return levels;
+    }
+  }
+  return around(middles);
+}
+
+/// A variable of heights at the levels of each face: one level more than layers.
+const NetcdfVariable* heightsOfFaces(const NetcdfFiles& file, const ColumnsMap& map, uint64_t layers) {
+  for (const char* const name : {"zgrid", "z_ifc", "HHL", "z_mc_ifc"}) {
+    const NetcdfVariable* const found = file.find(name);
+    if (!found || !found->numeric || !hasDimension(*found, map.face_dim)) continue;
+    for (size_t axis = 0; axis < found->dims.size(); ++axis)
+      if (found->dims[axis] != map.face_dim && file.dimension(*found, axis).length == layers + 1)
+        return found;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+std::optional<ColumnsMap> findColumnsMap(const NetcdfFiles& file) {
+  ColumnsMap map;
+  const NetcdfVariable* const topology = withText(file, "cf_role", "mesh_topology");
+  if (const NetcdfVariable* const of_cell = file.find("vertex_of_cell")) {
+    map.format = "ICON";
+    map.nodes_of_face = of_cell;
+    map.first_node = 1;
+    map.longitude = &required(file, "vlon", map.format);
+    map.latitude = &required(file, "vlat", map.format);
+    const auto cell = dimensionNamed(file, "cell"), ncells = dimensionNamed(file, "ncells");
+    if (!cell && !ncells) throw Error("{}: has no dimension cell; the file is damaged", file.path().string());
+    map.face_dim = cell && hasDimension(*of_cell, *cell) ? *cell : ncells.value_or(0);
+  } else if (const NetcdfVariable* const on_cell = file.find("verticesOnCell")) {
+    map.format = "MPAS";
+    map.nodes_of_face = on_cell;
+    map.first_node = 1;
+    map.sides = &required(file, "nEdgesOnCell", map.format);
+    const bool plane = file.text("on_a_sphere").starts_with("NO");
+    map.longitude = &required(file, plane ? "xVertex" : "lonVertex", map.format);
+    map.latitude = &required(file, plane ? "yVertex" : "latVertex", map.format);
+    if (on_cell->dims.empty())
+      throw Error("{}: verticesOnCell has no dimensions; the file is damaged", file.path().string());
+    map.face_dim = on_cell->dims[0];
+  } else if (topology) {
+    map = ugridOf(file, *topology);
+  } else {
+    return std::nullopt;
+  }
+  setSizes(file, map);
+  return map;
+}
+
+ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& map,
+                                    const std::vector<std::string>& wanted,
+                                    std::vector<std::string>& warnings) {
+  std::vector<ColumnsScalars> groups;
+  for (const NetcdfVariable& variable : file.variables()) {
+    if (!variable.numeric || variable.name == "zgrid" || variable.name == "z_ifc") continue;
+    const bool faces = hasDimension(variable, map.face_dim);
+    if (faces == hasDimension(variable, map.node_dim)) continue;
+    const size_t across = faces ? map.face_dim : map.node_dim;
+    // Besides the layers: time, and dimensions of length 1.
+    std::vector<size_t> others;
+    std::optional<size_t> time;
+    for (size_t axis = 0; axis < variable.dims.size(); ++axis) {
+      const NetcdfDimension& dimension = file.dimension(variable, axis);
+      const NetcdfVariable* const coordinate = file.find(dimension.name);
+      const bool is_time = dimension.unlimited || dimension.name == "time" || dimension.name == "Time" ||
+                           (coordinate && cfRole(file, *coordinate) == CfRole::kTime);
+      if (is_time)
+        time = variable.dims[axis];
+      else if (variable.dims[axis] != across && dimension.length != 1)
+        others.push_back(variable.dims[axis]);
+    }
+    const uint64_t layers = others.size() == 1 ? file.dimensions()[others[0]].length : 0;
+    if (layers < 2 || layers > kMostLevels || &variable == map.nodes_of_face) continue;
+    const Centring centring = faces ? Centring::kCell : Centring::kNode;
+    auto group = std::find_if(groups.begin(), groups.end(), [&](const ColumnsScalars& g) {
+      return g.centring == centring && g.layer_dim == others[0] && g.time_dim == time;
+    });
+    if (group == groups.end()) {
+      const auto place = [&](size_t dim) {
+        return std::find(variable.dims.begin(), variable.dims.end(), dim);
+      };
+      groups.push_back({centring, others[0], layers, place(others[0]) > place(across), {}, time});
+      group = groups.end() - 1;
+    }
+    group->variables.push_back(&variable);
+  }
+  // What has three dimensions but is of the map itself (edgesOnCell, ...) are integers without layers' heights.
+  std::erase_if(groups, [&](const ColumnsScalars& g) {
+    try {
+      findColumnsHeights(file, map, g);
+      return false;
+    } catch (const Error&) {
+      return groups.size() > 1;
+    }
+  });
+  if (groups.empty())
+    throw Error(
+        "{}: is a grid of {} without a variable of faces or nodes and layers: there is nothing to fill",
+        file.path().string(), map.format);
+  auto chosen = std::max_element(groups.begin(), groups.end(), [](const auto& a, const auto& b) {
+    return a.variables.size() < b.variables.size();
+  });
+  for (auto group = groups.begin(); group != groups.end() && !wanted.empty(); ++group)
+    for (const NetcdfVariable* const variable : group->variables)
+      if (variable->name == wanted[0]) chosen = group;
+  for (auto group = groups.begin(); group != groups.end(); ++group)
+    if (group != chosen)
+      warnings.push_back(fmt::format("{} is on other layers or points than {}; choose it with --scalar",
+                                     group->variables[0]->name, chosen->variables[0]->name));
+  return *chosen;
+}
+
+ColumnsHeights findColumnsHeights(const NetcdfFiles& file, const ColumnsMap& map,
+                                  const ColumnsScalars& scalars) {
+  const bool between = scalars.centring == Centring::kCell;
+  const uint64_t levels = scalars.layers + (between ? 1 : 0);
+  ColumnsHeights heights;
+  if (const NetcdfVariable* const of_faces = between ? heightsOfFaces(file, map, scalars.layers) : nullptr) {
+    heights.of_faces = of_faces;
+    heights.scale = kilometresOf(of_faces->text("units")).value_or(1e-3);
+    heights.words = of_faces->name;
+    return heights;
+  }
+  const std::string& name = file.dimensions()[scalars.layer_dim].name;
+  for (const NetcdfVariable& variable : file.variables()) {
+    if (variable.dims != std::vector{scalars.layer_dim} || !variable.numeric) continue;
+    if (variable.name == "refBottomDepth" && between) {
+      heights.levels = {0.0};
+      for (const double depth : heightsOf(file, variable, variable))
+        heights.levels.push_back(-std::abs(depth));
+    } else if (variable.name == name || cfRole(file, variable) == CfRole::kVertical ||
+               !variable.text("positive").empty()) {
+      heights.levels = levelsOf(file, variable, between);
+    }
+    heights.words = variable.name;
+    const bool finite = std::all_of(heights.levels.begin(), heights.levels.end(),
+                                    [](double height) { return std::isfinite(height); });
+    if (heights.levels.size() == levels && finite) return heights;
+  }
+  throw Error(
+      "{}: the layers of {} ({}) have no heights; expected {}a coordinate {} with a unit of length or "
+      "pressure",
+      file.path().string(), map.format, name,
+      map.format == "ICON"   ? "z_ifc (give the file that has it, too), or "
+      : map.format == "MPAS" ? "zgrid or refBottomDepth (give the file that has it, too), or "
+                             : "",
+      name);
+}
+
+ColumnsReader::ColumnsReader(const NetcdfFiles& file, const NetcdfVariable& variable, size_t across_dim,
+                             size_t layer_dim, size_t step)
+    : file_(file), variable_(variable) {
+  for (size_t axis = 0; axis < variable.dims.size(); ++axis) {
+    if (variable.dims[axis] == across_dim) across_axis_ = axis;
+    if (variable.dims[axis] == layer_dim) layer_axis_ = axis;
+    const bool other = variable.dims[axis] != across_dim && variable.dims[axis] != layer_dim;
+    const uint64_t length = file.dimension(variable, axis).length;
+    box_.start.push_back(other && step < length ? step : 0);
+    box_.count.push_back(1);
+  }
+}
+
+template <typename Value>
+ColumnsReader::Box<Value> ColumnsReader::read(uint64_t across, uint64_t count, uint64_t layer,
+                                              uint64_t layers) const {
+  NetcdfBox box = box_;
+  box.start[across_axis_] = across;
+  box.count[across_axis_] = count;
+  box.start[layer_axis_] = layer;
+  box.count[layer_axis_] = layers;
+  Box<Value> read;
+  read.values.resize(count * layers);
+  (across_axis_ < layer_axis_ ? read.across_stride : read.layer_stride) =
+      across_axis_ < layer_axis_ ? layers : count;
+  if (!read.values.empty()) file_.read(variable_, box, std::span(read.values));
+  return read;
+}
+
+template ColumnsReader::Box<float> ColumnsReader::read<float>(uint64_t, uint64_t, uint64_t, uint64_t) const;
+template ColumnsReader::Box<double> ColumnsReader::read<double>(uint64_t, uint64_t, uint64_t, uint64_t) const;
+
+}  // namespace curvisplat

@@ -1,0 +1,252 @@
+#include "preprocess/formats/columns/columns_source.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "preprocess/formats/netcdf/cf_roles.h"
+#include "preprocess/grid/scalar_names.h"
+#include "preprocess/grid/time_steps.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kFacesAtOnce = 65536;
+
+std::vector<std::filesystem::path> filesOf(const OpenGridOptions& options) {
+  std::vector<std::filesystem::path> files{options.grid};
+  files.insert(files.end(), options.solutions.begin(), options.solutions.end());
+  return files;
+}
+
+ColumnsMap mapOf(const NetcdfFiles& file) {
+  auto map = findColumnsMap(file);
+  if (!map) throw Error("{}: has no faces by UGRID, ICON or MPAS", file.path().string());
+  return std::move(*map);
+}
+
+}  // namespace
+
+bool isColumnsGrid(const OpenGridOptions& options) {
+  try {
+    return findColumnsMap(NetcdfFiles(filesOf(options))).has_value();
+  } catch (const Error&) {
+    return false;  // the reader of structured grids says what is wrong
+  }
+}
+
+ColumnsSource::ColumnsSource(const OpenGridOptions& options)
+    : file_(filesOf(options)),
+      map_(mapOf(file_)),
+      scalars_(chooseColumnsScalars(file_, map_, options.scalars, description_.warnings)),
+      heights_(findColumnsHeights(file_, map_, scalars_)) {
+  findTimes(options);
+  const std::string unit = lowerCase(map_.longitude->text("units"));
+  const auto length = kilometresOf(unit);
+  const bool radians = unit.starts_with("rad") || (unit.empty() && map_.format != "UGRID");
+  const bool plane = length.has_value() || map_.longitude->name == "xVertex";
+  to_degrees_ = plane ? length.value_or(1e-3) : radians ? 180 / std::numbers::pi : 1;
+  globe_.emplace(options.globe, !plane, 0.0);
+  deepest_ =
+      map_.format == "MPAS" && scalars_.centring == Centring::kCell ? file_.find("maxLevelCell") : nullptr;
+  if (deepest_ && (deepest_->dims != std::vector{map_.face_dim} || !deepest_->numeric)) deepest_ = nullptr;
+  if (heights_.levels.empty()) spoolHeights(options.temporary_folder);
+  describe(options);
+}
+
+void ColumnsSource::findTimes(const OpenGridOptions& options) {
+  if (scalars_.time_dim) {
+    const NetcdfDimension& dimension = file_.dimensions()[*scalars_.time_dim];
+    description_.times.resize(dimension.length);
+    for (size_t n = 0; n < dimension.length; ++n) description_.times[n] = static_cast<double>(n);
+    const NetcdfVariable* const time = file_.find(dimension.name);
+    if (time && time->numeric && time->dims == std::vector{*scalars_.time_dim} && dimension.length > 0) {
+      file_.read(*time, {{0}, {dimension.length}}, std::span(description_.times));
+      description_.time_unit = time->text("units");
+      description_.calendar = time->text("calendar");
+    }
+    if (dimension.length == 0)
+      throw Error("{}: has no time step: dimension {} has length 0", file_.path().string(), dimension.name);
+  }
+  description_.time_step = chosenTimeStep(file_.path().string(), description_.times, options.time_step);
+}
+
+void ColumnsSource::describe(const OpenGridOptions& options) {
+  description_.files = file_.paths();
+  description_.coordinate_bytes = 8;
+  const bool cells = scalars_.centring == Centring::kCell;
+  const uint64_t prisms = cells ? scalars_.layers : scalars_.layers - 1;
+  description_.pieces.push_back({fmt::format("{} faces, {} layers", map_.faces, prisms),
+                                 file_.path().string(), map_.nodes * levels(), map_.faces * prisms});
+  for (const NetcdfVariable* const variable : scalars_.variables) {
+    GridScalar scalar{variable->name, variable->text("units"), {}, 0, scalars_.centring};
+    if (const std::string name = simplifiedName(variable->text("standard_name")); !name.empty())
+      scalar.aliases.push_back(name);
+    description_.scalars.push_back(std::move(scalar));
+  }
+  const std::string shape = globe_->sphere() ? fmt::format("on a sphere of {:g} km", options.globe.radius_km)
+                                             : std::string("on a flat map");
+  description_.format =
+      fmt::format("{} ({}), {} faces, {}, heights of {} times {:g}, in km", map_.format, file_.kind(),
+                  map_.faces, shape, heights_.words, options.globe.vertical_scale);
+  const auto& duplicates = file_.duplicates();
+  description_.warnings.insert(description_.warnings.end(), duplicates.begin(), duplicates.end());
+}
+
+uint64_t ColumnsSource::levels() const {
+  return scalars_.layers + (scalars_.centring == Centring::kCell ? 1 : 0);
+}
+
+uint64_t ColumnsSource::pointOf(uint64_t node, uint64_t level) const {
+  return scalars_.layer_fastest ? node * levels() + level : level * map_.nodes + node;
+}
+
+/// Cuts samples [first, first + count) of `columns` columns of `layers` layers into boxes.
+template <typename Use>
+void ColumnsSource::forEachPart(uint64_t first, uint64_t count, uint64_t columns, uint64_t layers,
+                                const Use& use) const {
+  if (scalars_.layer_fastest) {
+    if (count == 0) return;
+    const uint64_t column = first / layers;
+    use(Part{column, (first + count - 1) / layers - column + 1, 0, layers, first % layers, count});
+    return;
+  }
+  while (count > 0) {
+    const uint64_t layer = first / columns, across = first % columns;
+    const uint64_t taken = std::min(count, columns - across);
+    use(Part{across, taken, layer, 1, 0, taken});
+    first += taken;
+    count -= taken;
+  }
+}
+
+std::vector<int64_t> ColumnsSource::nodesOf(uint64_t first, uint64_t count) const {
+  const NetcdfVariable& variable = *map_.nodes_of_face;
+  const bool faces_first = variable.dims[0] == map_.face_dim;
+  const uint64_t sides = map_.most_sides;
+  std::vector<double> stored(count * sides);
+  const NetcdfBox box =
+      faces_first ? NetcdfBox{{first, 0}, {count, sides}} : NetcdfBox{{0, first}, {sides, count}};
+  if (!stored.empty()) file_.read(variable, box, std::span(stored));
+  std::vector<double> given(count, static_cast<double>(sides));
+  if (map_.sides && count > 0) file_.read(*map_.sides, {{first}, {count}}, std::span(given));
+  std::vector<int64_t> nodes(count * sides, -1);
+  for (uint64_t n = 0; n < count; ++n)
+    for (uint64_t side = 0; side < sides && static_cast<double>(side) < given[n]; ++side) {
+      const double node = stored[faces_first ? n * sides + side : side * count + n] - map_.first_node;
+      if (std::isnan(node) || (node < 0 && map_.format == "UGRID")) break;  // a fill value: fewer sides
+      if (!(node >= 0 && node < static_cast<double>(map_.nodes)))
+        throw Error("{}: face {} has the node {:g}; expected {} to {}; the file is damaged",
+                    file_.path().string(), first + n, node + map_.first_node, map_.first_node,
+                    static_cast<double>(map_.nodes) - 1 + map_.first_node);
+      nodes[n * sides + side] = static_cast<int64_t>(node);
+    }
+  return nodes;
+}
+
+void ColumnsSource::spoolHeights(const std::filesystem::path& folder) {
+  size_t level_dim = map_.face_dim;
+  for (const size_t dim : heights_.of_faces->dims)
+    if (dim != map_.face_dim && file_.dimensions()[dim].length == levels()) level_dim = dim;
+  const ColumnsReader reader(file_, *heights_.of_faces, map_.face_dim, level_dim, description_.time_step);
+  NumberSpool<double> spool(folder);
+  for (uint64_t level = 0; level < levels(); ++level) {
+    std::vector<double> sums(map_.nodes, 0.0);
+    std::vector<uint32_t> counts(map_.nodes, 0);
+    for (uint64_t first = 0; first < map_.faces; first += kFacesAtOnce) {
+      const uint64_t count = std::min(kFacesAtOnce, map_.faces - first);
+      const auto heights = reader.read<double>(first, count, level, 1);
+      const std::vector<int64_t> nodes = nodesOf(first, count);
+      for (size_t n = 0; n < nodes.size(); ++n) {
+        if (nodes[n] < 0) continue;
+        sums[static_cast<size_t>(nodes[n])] += heights.value(n / map_.most_sides, 0);
+        ++counts[static_cast<size_t>(nodes[n])];
+      }
+    }
+    for (size_t n = 0; n < sums.size(); ++n) spool.add(sums[n] / counts[n] * heights_.scale);
+  }
+  node_heights_ = spool.finish();
+}
+
+std::vector<double> ColumnsSource::readAngles(const NetcdfVariable& variable, uint64_t first,
+                                              uint64_t count) const {
+  std::vector<double> values(count);
+  if (count > 0) file_.read(variable, {{first}, {count}}, std::span(values));
+  for (double& value : values) value *= to_degrees_;
+  return values;
+}
+
+void ColumnsSource::readScalars(uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
+                                std::vector<std::vector<float>>& out) const {
+  const bool cells = scalars_.centring == Centring::kCell;
+  const size_t across_dim = cells ? map_.face_dim : map_.node_dim;
+  out.resize(scalars.size());
+  for (size_t s = 0; s < scalars.size(); ++s) {
+    const ColumnsReader reader(file_, *scalars_.variables.at(scalars[s]), across_dim, scalars_.layer_dim,
+                               scalars_.time_dim ? description_.time_step : 0);
+    out[s].clear();
+    forEachPart(first, count, cells ? map_.faces : map_.nodes, scalars_.layers, [&](const Part& part) {
+      const auto box = reader.read<float>(part.across, part.columns, part.layer, part.layers);
+      for (uint64_t n = part.skipped; n < part.skipped + part.taken; ++n)
+        out[s].push_back(box.value(n / part.layers, n % part.layers));
+    });
+  }
+}
+
+void ColumnsSource::readPoints(uint32_t, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
+                               MeshPoints& out) const {
+  for (std::vector<double>* const axis : {&out.x, &out.y, &out.z}) axis->clear();
+  forEachPart(first, count, map_.nodes, levels(), [&](const Part& part) {
+    const std::vector<double> longitude = readAngles(*map_.longitude, part.across, part.columns);
+    const std::vector<double> latitude = readAngles(*map_.latitude, part.across, part.columns);
+    std::vector<double> heights(part.columns * part.layers);
+    for (uint64_t layer = 0; layer < part.layers; ++layer) {
+      const auto row = std::span(heights).subspan(layer * part.columns, part.columns);
+      if (heights_.levels.empty())
+        node_heights_.read((part.layer + layer) * map_.nodes + part.across, row);
+      else
+        std::fill(row.begin(), row.end(), heights_.levels[part.layer + layer]);
+    }
+    for (uint64_t n = part.skipped; n < part.skipped + part.taken; ++n) {
+      const uint64_t column = n / part.layers, layer = n % part.layers;
+      const GlobePlace place = globe_->place(globe_->column(longitude[column], latitude[column]),
+                                             heights[layer * part.columns + column]);
+      out.x.push_back(place.x);
+      out.y.push_back(place.y);
+      out.z.push_back(place.z);
+    }
+  });
+  out.hidden.assign(count, 0);
+  out.scalars.clear();
+  if (scalars_.centring == Centring::kNode) readScalars(first, count, scalars, out.scalars);
+}
+
+void ColumnsSource::readCells(uint32_t, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
+                              MeshCells& out) const {
+  out.clear();
+  const uint64_t layers = levels() - 1;
+  std::vector<uint64_t> points;
+  forEachPart(first, count, map_.faces, layers, [&](const Part& part) {
+    const std::vector<int64_t> nodes = nodesOf(part.across, part.columns);
+    std::vector<double> deepest(part.columns, std::numeric_limits<double>::infinity());
+    if (deepest_) file_.read(*deepest_, {{part.across}, {part.columns}}, std::span(deepest));
+    for (uint64_t n = part.skipped; n < part.skipped + part.taken; ++n) {
+      const uint64_t column = n / part.layers, layer = part.layer + n % part.layers;
+      points.clear();
+      for (const uint64_t level : {layer, layer + 1})
+        for (uint64_t side = 0; side < map_.most_sides; ++side)
+          if (const int64_t node = nodes[column * map_.most_sides + side]; node >= 0)
+            points.push_back(pointOf(static_cast<uint64_t>(node), level));
+      out.appendPrism(points);
+      if (static_cast<double>(layer) >= deepest[column]) out.hidden.back() = 1;
+    }
+  });
+  out.scalars.clear();
+  if (scalars_.centring == Centring::kCell) readScalars(first, count, scalars, out.scalars);
+}
+
+}  // namespace curvisplat

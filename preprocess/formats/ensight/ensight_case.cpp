@@ -1,0 +1,241 @@
+#include "preprocess/formats/ensight/ensight_case.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <sstream>
+#include <string_view>
+
+#include "preprocess/formats/common/ascii_spool.h"
+#include "preprocess/formats/common/text_reader.h"
+#include "preprocess/grid/time_steps.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint64_t kLooked = 2048;
+constexpr double kMostSteps = 1 << 20;
+
+std::string trimmed(std::string_view text) {
+  const size_t first = text.find_first_not_of(" \t\r"), last = text.find_last_not_of(" \t\r");
+  return first == std::string_view::npos ? "" : std::string(text.substr(first, last - first + 1));
+}
+
+std::string lower(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
+std::vector<std::string> wordsOf(const std::string& text) {
+  std::istringstream stream(text);
+  std::vector<std::string> words;
+  for (std::string word; stream >> word;) words.push_back(word);
+  return words;
+}
+
+struct TimeSet {
+  std::vector<double> times, numbers;  // numbers: in the names of files
+  double steps = 0, start = 0, increment = 1;
+};
+
+/// A line of GEOMETRY or VARIABLE: the sets of times and of files, if any, then words.
+struct Entry {
+  size_t time_set = 0;  // 0: none
+  bool file_set = false;
+  std::vector<std::string> words;
+};
+
+Entry entryOf(const std::string& value, size_t least) {
+  Entry entry;
+  entry.words = wordsOf(value);
+  // Up to two whole numbers come first.
+  for (int n = 0; n < 2 && entry.words.size() > least; ++n) {
+    double number = 0;
+    if (!parseNumber(entry.words[0], number) || number < 1 || number > kMostSteps) break;
+    if (n == 0) entry.time_set = static_cast<size_t>(number);
+    entry.file_set = n == 1;
+    entry.words.erase(entry.words.begin());
+  }
+  return entry;
+}
+
+class CaseReader {
+ public:
+  explicit CaseReader(const std::filesystem::path& path) : path_(path) {}
+  EnsightCase run(std::optional<uint32_t> step);
+
+ private:
+  void readLines();
+  void takeLine(const std::string& key, const std::string& value);
+  void takeTime(const std::string& key, const std::string& value);
+  void takeVariable(const std::string& key, const std::string& value);
+  std::filesystem::path fileOf(const Entry& entry, const std::string& name, double time) const;
+
+  const std::filesystem::path& path_;
+  std::string section_, key_;
+  std::string type_;
+  std::optional<Entry> model_;
+  struct Variable {
+    EnsightVariable variable;
+    Entry entry;
+  };
+  std::vector<Variable> variables_;
+  std::map<size_t, TimeSet> sets_;
+  TimeSet* set_ = nullptr;
+  std::vector<std::string> skipped_;
+};
+
+void CaseReader::readLines() {
+  const auto file = std::make_shared<const PooledFile>(std::make_shared<OpenFiles>(), path_);
+  TextReader text(file, 0, file->size());
+  while (const auto line = text.line()) {
+    const std::string words = trimmed(line->substr(0, line->find('#')));
+    if (words.empty()) continue;
+    const size_t colon = words.find(':');
+    if (colon != std::string::npos) {
+      takeLine(lower(trimmed(words.substr(0, colon))), trimmed(words.substr(colon + 1)));
+      continue;
+    }
+    double number = 0;
+    if (parseNumber(wordsOf(words)[0], number))
+      takeTime(key_, words);  // more numbers of the line above
+    else
+      section_ = lower(words);
+  }
+}
+
+void CaseReader::takeLine(const std::string& key, const std::string& value) {
+  key_ = key;
+  if (section_ == "format" && key == "type") type_ = lower(value);
+  if (section_ == "geometry" && key == "model") model_ = entryOf(value, 1);
+  if (section_ == "geometry" && key != "model") skipped_.push_back(fmt::format("{} geometry", key));
+  if (section_ == "variable") takeVariable(key, value);
+  if (section_ == "time") takeTime(key, value);
+}
+
+void CaseReader::takeTime(const std::string& key, const std::string& value) {
+  if (section_ != "time") return;
+  const std::vector<std::string> words = wordsOf(value);
+  std::vector<double> numbers;
+  for (const std::string& word : words) {
+    double number = 0;
+    if (!parseNumber(word, number)) break;
+    numbers.push_back(number);
+  }
+  if (numbers.empty()) return;
+  if (key == "time set") {
+    set_ = &sets_[numbers[0] >= 1 && numbers[0] <= kMostSteps ? static_cast<size_t>(numbers[0]) : 1];
+    return;
+  }
+  if (!set_)
+    throw Error("{}: has '{}' before 'time set'; the file is damaged", path_.string(), printable(key));
+  if (key == "number of steps") set_->steps = numbers[0];
+  if (key == "filename start number") set_->start = numbers[0];
+  if (key == "filename increment") set_->increment = numbers[0];
+  if (key == "time values") set_->times.insert(set_->times.end(), numbers.begin(), numbers.end());
+  if (key == "filename numbers") set_->numbers.insert(set_->numbers.end(), numbers.begin(), numbers.end());
+}
+
+void CaseReader::takeVariable(const std::string& key, const std::string& value) {
+  Variable variable;
+  const bool vector = key.starts_with("vector per ");
+  if ((!vector && !key.starts_with("scalar per ")) || key.ends_with("measured node")) {
+    if (!key.starts_with("constant ")) skipped_.push_back(fmt::format("'{}'", printable(key)));
+    return;
+  }
+  variable.entry = entryOf(value, 2);
+  if (variable.entry.words.size() < 2)
+    throw Error("{}: '{}: {}' does not name a variable and its file; the file is damaged", path_.string(),
+                key, printable(value));
+  variable.variable.name = variable.entry.words[0];
+  variable.variable.components = vector ? 3 : 1;
+  variable.variable.centring = key.ends_with("element") ? Centring::kCell : Centring::kNode;
+  variables_.push_back(std::move(variable));
+}
+
+/// The file of the time, relative to the case file's folder. Stars stand for the number of its step.
+std::filesystem::path CaseReader::fileOf(const Entry& entry, const std::string& name, double time) const {
+  if (entry.file_set)
+    throw Error(
+        "{}: has all steps of {} in one file (file sets), which is not read; write a file for each step",
+        path_.string(), printable(name));
+  std::string file = name;
+  if (file.size() > 2 && file.front() == '"' && file.back() == '"') file = file.substr(1, file.size() - 2);
+  const size_t star = file.find('*');
+  if (star != std::string::npos) {
+    const size_t stars = std::min(file.find_first_not_of('*', star), file.size()) - star;
+    const auto found = sets_.find(std::max<size_t>(entry.time_set, 1));
+    if (found == sets_.end() || found->second.times.empty())
+      throw Error("{}: {} is of several steps, but there is no time set", path_.string(), printable(name));
+    const TimeSet& set = found->second;
+    // The last step that is not later.
+    const auto next = std::upper_bound(set.times.begin(), set.times.end(), time);
+    const auto step = static_cast<size_t>(std::max<ptrdiff_t>(0, next - set.times.begin() - 1));
+    const double number =
+        step < set.numbers.size() ? set.numbers[step] : set.start + static_cast<double>(step) * set.increment;
+    if (!(number >= 0 && number < 1e15))
+      throw Error("{}: the files of {} have the number {}; expected one from 0", path_.string(),
+                  printable(name), number);
+    file = file.substr(0, star) + fmt::format("{:0{}}", static_cast<uint64_t>(number), stars) +
+           file.substr(star + stars);
+  }
+  return path_.parent_path() / file;
+}
+
+EnsightCase CaseReader::run(std::optional<uint32_t> step) {
+  readLines();
+  if (type_ != "ensight gold")
+    throw Error(
+        "{}: is of type '{}'; expected 'ensight gold' (EnSight 5 and 6 are not read: save it as Gold)",
+        path_.string(), printable(type_));
+  if (!model_ || model_->words.empty()) throw Error("{}: names no geometry (model:)", path_.string());
+  EnsightCase result;
+  for (const auto& [number, set] : sets_) {
+    if (set.steps != static_cast<double>(set.times.size()) || !(set.steps <= kMostSteps) ||
+        !std::is_sorted(set.times.begin(), set.times.end()))
+      throw Error(
+          "{}: time set {} has {} times for {:g} steps, or times that do not rise; the file is damaged",
+          path_.string(), number, set.times.size(), set.steps);
+    result.times.insert(result.times.end(), set.times.begin(), set.times.end());
+  }
+  std::sort(result.times.begin(), result.times.end());
+  result.times.erase(std::unique(result.times.begin(), result.times.end()), result.times.end());
+  result.time_step = chosenTimeStep(path_.string(), result.times, step);
+  const double time = result.times.empty() ? 0 : result.times[result.time_step];
+  result.geometry = fileOf(*model_, model_->words[0], time);
+  for (Variable& one : variables_) {
+    one.variable.file = fileOf(one.entry, one.entry.words[1], time);
+    result.variables.push_back(std::move(one.variable));
+  }
+  if (!skipped_.empty())
+    result.warnings.push_back(fmt::format(
+        "left out: {}; scalars and vectors per node and per element are read", fmt::join(skipped_, ", ")));
+  return result;
+}
+
+}  // namespace
+
+bool isEnsightCase(const InputFile& file) {
+  std::string begin(static_cast<size_t>(std::min<uint64_t>(file.size(), kLooked)), '\0');
+  file.readAt(0, std::span(begin.data(), begin.size()));
+  if (begin.find('\0') != std::string::npos) return false;
+  std::istringstream lines(begin);
+  bool format = false;
+  for (std::string line; std::getline(lines, line);) {
+    const std::string words = lower(trimmed(line));
+    if (words.empty() || words[0] == '#') continue;
+    if (format) return words.starts_with("type:") && words.find("ensight") != std::string::npos;
+    if (words != "format") return false;
+    format = true;
+  }
+  return false;
+}
+
+EnsightCase readEnsightCase(const std::filesystem::path& path, std::optional<uint32_t> step) {
+  return CaseReader(path).run(step);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,43 @@
+// The case file of EnSight Gold: a text that names the files of a geometry and of its variables, and their times.
+//
+//    FORMAT              GEOMETRY               VARIABLE                              TIME
+//    type: ensight gold  model: 1 mesh.***.geo  scalar per node: 1 p pressure.***     time set: 1
+//                                                                                     number of steps: 2
+//                                                                                     filename start number: 0
+//                                                                                     filename increment: 1
+//                                                                                     time values: 0.0 0.5
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "preprocess/grid/grid_source.h"
+#include "stream/base/file.h"
+
+namespace curvisplat {
+
+/// Whether the text begins with FORMAT and a type of EnSight.
+bool isEnsightCase(const InputFile& file);
+
+struct EnsightVariable {
+  std::string name;
+  size_t components = 1;  // 1 or 3
+  Centring centring = Centring::kNode;
+  std::filesystem::path file;  // of the open step
+};
+
+struct EnsightCase {
+  std::filesystem::path geometry;  // of the open step
+  std::vector<EnsightVariable> variables;
+  std::vector<double> times;
+  uint32_t time_step = 0;
+  std::vector<std::string> warnings;  // of what is left out
+};
+
+/// Throws Error if the case is damaged, of another version than Gold, or has all steps in one file.
+EnsightCase readEnsightCase(const std::filesystem::path& path, std::optional<uint32_t> step);
+
+}  // namespace curvisplat

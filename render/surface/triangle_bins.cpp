@@ -1,0 +1,100 @@
+#include "render/surface/triangle_bins.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/surface/pixel_samples.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint32_t kTrianglesAtOnce = 4096;
+
+}  // namespace
+
+TriangleBins::TriangleBins(const SceneTriangles& triangles)
+    : columns_((triangles.view().size.width + kSampleTileWidth - 1) / kSampleTileWidth),
+      rows_((triangles.view().size.height + kSampleTileHeight - 1) / kSampleTileHeight),
+      size_(triangles.view().size) {
+  for (size_t surface = 0; surface < triangles.scene().surfaces.size(); ++surface) {
+    const auto count = static_cast<uint32_t>(triangles.scene().surfaces[surface].mesh->triangles.size());
+    for (uint32_t first = 0; first < count; first += kTrianglesAtOnce) {
+      Batch& batch = batches_.emplace_back();
+      batch.surface = surface;
+      batch.first = first;
+      batch.count = std::min(kTrianglesAtOnce, count - first);
+    }
+  }
+  tbb::parallel_for(size_t{0}, batches_.size(), [&](size_t n) { sort(triangles, batches_[n]); });
+}
+
+/// Vertices on the grid of samples lie up to 1/32 pixel away, and samples 1/16 inside of their pixels.
+TriangleBins::TileBox TriangleBins::tilesOf(const ScreenVertex* vertices, size_t count) const {
+  float x0 = vertices[0].x, x1 = x0, y0 = vertices[0].y, y1 = y0;
+  for (size_t n = 1; n < count; ++n) {
+    x0 = std::min(x0, vertices[n].x);
+    x1 = std::max(x1, vertices[n].x);
+    y0 = std::min(y0, vertices[n].y);
+    y1 = std::max(y1, vertices[n].y);
+  }
+  const auto width = static_cast<float>(size_.width), height = static_cast<float>(size_.height);
+  // NaN and infinity are nowhere.
+  if (!(x0 < width && x1 >= 0 && y0 < height && y1 >= 0 && x0 > -INFINITY && x1 < INFINITY &&
+        y0 > -INFINITY && y1 < INFINITY))
+    return {};
+  const auto tile = [](float at, float most, int side) {
+    return static_cast<int16_t>(static_cast<unsigned>(std::clamp(at, 0.0f, most - 1)) /
+                                static_cast<unsigned>(side));
+  };
+  return {tile(x0, width, kSampleTileWidth), tile(y0, height, kSampleTileHeight),
+          tile(x1, width, kSampleTileWidth), tile(y1, height, kSampleTileHeight)};
+}
+
+void TriangleBins::sort(const SceneTriangles& triangles, Batch& batch) const {
+  const TriangleMesh& mesh = *triangles.scene().surfaces[batch.surface].mesh;
+  const std::vector<ScreenVertex>& vertices = triangles.verticesOf(batch.surface);
+  std::vector<TileBox> boxes(batch.count);
+  TileBox all{static_cast<int16_t>(columns_), static_cast<int16_t>(rows_), -1, -1};
+  for (uint32_t n = 0; n < batch.count; ++n) {
+    const auto& corners = mesh.triangles[batch.first + n];
+    const ScreenVertex at[3] = {vertices[corners[0]], vertices[corners[1]], vertices[corners[2]]};
+    if (std::isnan(at[0].value + at[1].value + at[2].value)) {
+      const NearPolygon polygon = triangles.behindNear(batch.surface, corners);
+      boxes[n] = polygon.count < 3 ? TileBox() : tilesOf(polygon.vertices.data(), polygon.count);
+    } else {
+      boxes[n] = tilesOf(at, 3);
+    }
+    if (boxes[n].empty()) continue;
+    all.x0 = std::min(all.x0, boxes[n].x0);
+    all.y0 = std::min(all.y0, boxes[n].y0);
+    all.x1 = std::max(all.x1, boxes[n].x1);
+    all.y1 = std::max(all.y1, boxes[n].y1);
+  }
+  if (all.empty()) return;
+  batch.box = all;
+  const auto width = static_cast<size_t>(all.x1 - all.x0 + 1);
+  const auto tileAt = [&](int x, int y) {
+    return static_cast<size_t>(y - all.y0) * width + static_cast<size_t>(x - all.x0);
+  };
+  const auto forEach = [&](const auto& visit) {
+    for (uint32_t n = 0; n < batch.count; ++n) {
+      const TileBox& box = boxes[n];
+      if (box.x0 == box.x1 && box.y0 == box.y1) {
+        visit(tileAt(box.x0, box.y0), batch.first + n);
+        continue;
+      }
+      for (int y = box.y0; y <= box.y1; ++y)
+        for (int x = box.x0; x <= box.x1; ++x) visit(tileAt(x, y), batch.first + n);
+    }
+  };
+  batch.begins.assign(width * static_cast<size_t>(all.y1 - all.y0 + 1) + 2, 0);
+  forEach([&](size_t tile, uint32_t) { ++batch.begins[tile + 2]; });
+  for (size_t n = 2; n < batch.begins.size(); ++n) batch.begins[n] += batch.begins[n - 1];
+  batch.numbers.resize(batch.begins.back());
+  forEach([&](size_t tile, uint32_t number) { batch.numbers[batch.begins[tile + 1]++] = number; });
+  batch.begins.pop_back();
+}
+
+}  // namespace curvisplat

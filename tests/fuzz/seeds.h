@@ -1,0 +1,54 @@
+// Where the seeds of fuzzing go, and how their bytes are put together.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "tests/stream/test_bricks.h"
+
+namespace curvisplat {
+
+/// Puts an input together.
+class Seed {
+ public:
+  template <typename T>
+  Seed& add(const T& value) {
+    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
+    return *this;
+  }
+  Seed& bytes(std::span<const std::byte> bytes) {
+    bytes_.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    return *this;
+  }
+  Seed& text(std::string_view text) {
+    bytes_ += text;
+    return *this;
+  }
+  const std::string& whole() const { return bytes_; }
+
+ private:
+  std::string bytes_;
+};
+
+class Seeds {
+ public:
+  explicit Seeds(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+  void write(const std::string& target, const std::string& name, const std::string& bytes) const {
+    std::filesystem::create_directories(folder_ / target);
+    overwriteFile(folder_ / target / name, bytes);
+  }
+
+ private:
+  std::filesystem::path folder_;
+};
+
+/// Of the cache's files.
+void writeCacheSeeds(const Seeds& seeds);
+/// Of grids, surfaces and pictures.
+void writeInputSeeds(const Seeds& seeds);
+
+}  // namespace curvisplat

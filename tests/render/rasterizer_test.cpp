@@ -1,0 +1,186 @@
+// Triangles at the samples of pixels, against a slow twin that asks every triangle at every sample.
+#include "render/surface/rasterizer.h"
+
+#include <gtest/gtest.h>
+#include <tbb/task_arena.h>
+
+#include <cmath>
+#include <memory>
+#include <random>
+
+#include "render/surface/scene_layers.h"
+
+namespace curvisplat {
+namespace {
+
+// Neither side is a multiple of a tile's.
+constexpr ImageSize kSize{300, 70};
+
+Camera cameraOf(Projection projection) {
+  Camera camera;
+  camera.position = {0, 0, 5};
+  camera.projection = projection;
+  camera.parallel_scale = 1;
+  camera.view_angle_deg = 24;
+  return camera;
+}
+
+/// Triangles of sizes from a hundredth of a pixel to many times the picture, some out of it, some without an area.
+SurfaceScene randomScene(double deepest) {
+  std::mt19937 random(7);
+  const auto between = [&](double low, double high) {
+    return low + (high - low) * static_cast<double>(random()) / 4294967295.0;
+  };
+  SurfaceScene scene;
+  for (int surface = 0; surface < 2; ++surface) {
+    auto mesh = std::make_shared<TriangleMesh>();
+    for (uint32_t n = 0; n < 1500; ++n) {
+      const double size = std::pow(10, between(-3, n % 200 == 0 ? 1.5 : -0.5));
+      const glm::vec3 at(between(-4.5, 4.5), between(-1.2, 1.2), between(-1, deepest));
+      for (int corner = 0; corner < 3; ++corner)
+        mesh->positions.push_back(
+            at + glm::vec3(between(-size, size), between(-size, size), between(-size, size)));
+      if (n % 50 == 0) mesh->positions.back() = at;
+      mesh->triangles.push_back({3 * n, 3 * n + 1, 3 * n + 2});
+    }
+    mesh->normals.assign(mesh->positions.size(), {0, 0, 1});
+    scene.surfaces.push_back({mesh});
+  }
+  return scene;
+}
+
+/// In the exact arithmetic of whole numbers.
+bool covers(const std::array<ScreenVertex, 3>& v, int64_t x, int64_t y) {
+  int64_t gx[3], gy[3];
+  for (size_t n = 0; n < 3; ++n)
+    gx[n] = std::llrint(double{v[n].x} * 16), gy[n] = std::llrint(double{v[n].y} * 16);
+  const int64_t area = (gx[1] - gx[0]) * (gy[2] - gy[0]) - (gy[1] - gy[0]) * (gx[2] - gx[0]);
+  if (area == 0) return false;
+  for (size_t n = 0; n < 3; ++n) {
+    const size_t m = (n + 1) % 3;
+    const int64_t sign = area < 0 ? -1 : 1, a = -sign * (gy[m] - gy[n]), b = sign * (gx[m] - gx[n]);
+    const int64_t at = a * (x - gx[n]) + b * (y - gy[n]);
+    if (at < 0 || (at == 0 && !(a > 0 || (a == 0 && b > 0)))) return false;
+  }
+  return true;
+}
+
+double valueAt(const std::array<ScreenVertex, 3>& v, double x, double y) {
+  const auto cross = [](double ax, double ay, double bx, double by) { return ax * by - ay * bx; };
+  const double dx1 = double{v[1].x} - double{v[0].x}, dy1 = double{v[1].y} - double{v[0].y};
+  const double dx2 = double{v[2].x} - double{v[0].x}, dy2 = double{v[2].y} - double{v[0].y};
+  const double px = x - double{v[0].x}, py = y - double{v[0].y};
+  const double area = cross(dx1, dy1, dx2, dy2);
+  return double{v[0].value} + cross(px, py, dx2, dy2) / area * (double{v[1].value} - double{v[0].value}) +
+         cross(dx1, dy1, px, py) / area * (double{v[2].value} - double{v[0].value});
+}
+
+/// What lies behind the near plane, as the rasterizer has it.
+std::vector<std::array<ScreenVertex, 3>> partsOf(const SceneTriangles& triangles, size_t surface,
+                                                 uint32_t n) {
+  const auto& corners = triangles.scene().surfaces[surface].mesh->triangles[n];
+  const std::array<ScreenVertex, 3> at{triangles.vertex(surface, corners[0]),
+                                       triangles.vertex(surface, corners[1]),
+                                       triangles.vertex(surface, corners[2])};
+  if (!std::isnan(at[0].value + at[1].value + at[2].value)) return {at};
+  const NearPolygon polygon = triangles.behindNear(surface, corners);
+  std::vector<std::array<ScreenVertex, 3>> parts;
+  for (size_t v = 2; v < polygon.count; ++v)
+    parts.push_back({polygon.vertices[0], polygon.vertices[v - 1], polygon.vertices[v]});
+  return parts;
+}
+
+class Rasterizer : public testing::TestWithParam<Projection> {};
+
+TEST_P(Rasterizer, SeesWhatIsNearestAtEverySample) {
+  const SurfaceScene scene = randomScene(GetParam() == Projection::kPerspective ? 5.5 : 3);
+  const ScreenView view = ScreenView::of(cameraOf(GetParam()), kSize, glm::dvec3(1.0), kLowPass, 0.1);
+  const SceneTriangles triangles(scene, view, 0);
+  const TriangleBins bins(triangles);
+  size_t nothing = 0, compared = 0;
+  SampleTile tile;
+  for (int row = 0; row < bins.rows(); ++row)
+    for (int column = 0; column < bins.columns(); ++column) {
+      const bool any = tile.draw(triangles, bins, column, row);
+      struct Truth {
+        double value = INFINITY;
+        bool near_other = false;  // another lies so near that rounding decides
+        uint32_t number = PixelSamples::kNothing;
+      };
+      const auto width = static_cast<size_t>(tile.x1() - tile.x0() + 1);
+      std::vector<Truth> truth(kSamples * width * static_cast<size_t>(tile.y1() - tile.y0() + 1));
+      for (uint32_t number = 0; number < triangles.count(); ++number) {
+        const auto [surface, n] = triangles.placeOf(number);
+        for (const auto& part : partsOf(triangles, surface, n)) {
+          const auto [left, right] = std::minmax({part[0].x, part[1].x, part[2].x});
+          const auto [top, bottom] = std::minmax({part[0].y, part[1].y, part[2].y});
+          const auto within = [](float at, int low, int high) {
+            return static_cast<int>(std::clamp(at, static_cast<float>(low), static_cast<float>(high)));
+          };
+          if (right < static_cast<float>(tile.x0() - 1) || bottom < static_cast<float>(tile.y0() - 1))
+            continue;
+          for (int y = within(top - 1, tile.y0(), tile.y1() + 1); y <= within(bottom + 1, 0, tile.y1()); ++y)
+            for (int x = within(left - 1, tile.x0(), tile.x1() + 1); x <= within(right + 1, 0, tile.x1());
+                 ++x)
+              for (size_t s = 0; s < kSamples; ++s) {
+                const int sx = 16 * x + 8 + kSampleOffsets[s][0], sy = 16 * y + 8 + kSampleOffsets[s][1];
+                if (!covers(part, sx, sy)) continue;
+                const auto [least, most] = std::minmax({part[0].value, part[1].value, part[2].value});
+                const double value =
+                    std::clamp(valueAt(part, sx / 16.0, sy / 16.0), double{least}, double{most});
+                Truth& at = truth[kSamples * (static_cast<size_t>(y - tile.y0()) * width +
+                                              static_cast<size_t>(x - tile.x0())) +
+                                  s];
+                const double tolerance = 2e-4 * std::max(1.0, double{most} - double{least});
+                at.near_other = std::abs(value - at.value) < tolerance || (at.near_other && value > at.value);
+                if (value < at.value) at.value = value, at.number = number;
+              }
+        }
+      }
+      size_t wrong = 0;
+      for (int y = tile.y0(); y <= tile.y1(); ++y)
+        for (int x = tile.x0(); x <= tile.x1(); ++x)
+          for (size_t s = 0; s < kSamples; ++s) {
+            const Truth& at = truth[kSamples * (static_cast<size_t>(y - tile.y0()) * width +
+                                                static_cast<size_t>(x - tile.x0())) +
+                                    s];
+            const uint32_t seen = any ? tile.at(x, y).numbers[s] : PixelSamples::kNothing;
+            nothing += seen == PixelSamples::kNothing;
+            if (at.near_other) continue;
+            ++compared;
+            wrong += seen != at.number;
+          }
+      EXPECT_EQ(wrong, 0u) << "tile " << column << ", " << row;
+    }
+  EXPECT_GT(nothing, 1000u);
+  EXPECT_GT(compared, kSamples * kSize.pixels() / 2);
+}
+
+TEST_P(Rasterizer, TheLayersAreTheSameForAnyThreads) {
+  const SurfaceScene scene = randomScene(GetParam() == Projection::kPerspective ? 5.5 : 3);
+  const ScreenView view = ScreenView::of(cameraOf(GetParam()), kSize, glm::dvec3(1.0), kLowPass, 0.1);
+  const ColourTable colours(TransferFunction::preset("viridis", 0, 1, 1));
+  const SceneLook look{colours, {}, {}, 0};
+  const auto drawn = [&](int threads) {
+    tbb::task_arena arena(threads);
+    return arena.execute([&] { return layersOf(scene, view, {}, look); });
+  };
+  const PixelLayers one = drawn(1), two = drawn(2);
+  size_t layers = 0;
+  for (int y = 0; y < kSize.height; ++y)
+    for (int x = 0; x < kSize.width; ++x) {
+      const auto a = one.at(x, y), b = two.at(x, y);
+      ASSERT_EQ(a.size(), b.size());
+      layers += a.size();
+      for (size_t n = 0; n < a.size(); ++n) {
+        ASSERT_EQ(a[n].depth, b[n].depth);
+        ASSERT_EQ(a[n].colour, b[n].colour);
+      }
+    }
+  EXPECT_GT(layers, 1000u);
+}
+
+INSTANTIATE_TEST_SUITE_P(, Rasterizer, testing::Values(Projection::kOrthographic, Projection::kPerspective));
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,283 @@
+#!/usr/bin/python3
+"""Drives the server's page in Chromium: navigation, the function's editor, cuts, time, sizes, lost connections.
+
+    page_test.py PROGRAM [FOLDER]    FOLDER: keeps the screenshots there
+"""
+import base64
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+from serving import Chromium, serving, wait_for  # noqa: E402
+
+program = pathlib.Path(sys.argv[1]).resolve()
+shots = pathlib.Path(sys.argv[2]) if len(sys.argv) > 2 else None
+failures = []
+PAGE = "window.curvisplatPage"
+FINAL = f"{PAGE}.header && {PAGE}.header.final && {PAGE}.idle()"
+MIDDLE = (800, 400)
+
+
+def expect(condition, what):
+    if not condition:
+        failures.append(what)
+        print("FAILED:", what)
+
+
+def shot(tab, name):
+    if shots:
+        shots.mkdir(parents=True, exist_ok=True)
+        tab.screenshot(shots / f"{name}.png")
+
+
+def rest(tab):
+    """Waits until the picture of the page's last request is lossless, and returns its pixels' sum."""
+    tab.wait(FINAL, "a final picture")
+    return tab.run("""(() => { const c = document.getElementById('picture');
+      const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let h = 0;
+      for (let n = 0; n < d.length; ++n) h = (h * 31 + d[n]) >>> 0; return h; })()""")
+
+
+def changes(tab, act, what, name=None):
+    """`act` leads to another final picture."""
+    before = rest(tab)
+    act()
+    try:
+        wait_for(lambda: rest(tab) != before, f"{what} to change the picture", 20)
+    except AssertionError as error:
+        expect(False, error)
+    if name:
+        shot(tab, name)
+
+
+def set_value(tab, selector, value):
+    tab.run(f"(() => {{ const e = document.querySelector('{selector}'); if (e.type === 'checkbox') e.checked = {value!r} === 'on';"
+            f"else e.value = {value!r}; e.dispatchEvent(new Event('input')); e.dispatchEvent(new Event('change')); }})()")
+
+
+def opened(browser, url, size=(1280, 800)):
+    tab = browser.tab(url, size)
+    tab.wait(f"{PAGE} && {PAGE}.pictures > 0", "a first picture")
+    return tab
+
+
+def is_the_commands_picture(tab, server_caches):
+    """The lossless picture on the page is the file that `render` writes."""
+    rest(tab)
+    state = tab.run(f"{PAGE}.state")
+    camera, function = state["camera"], state["function"]
+    with tempfile.TemporaryDirectory() as folder:
+        import json
+        pathlib.Path(folder, "f.json").write_text(json.dumps([function]))
+        width, height = tab.run(f"[{PAGE}.header.width, {PAGE}.header.height]")
+        numbers = lambda p: ",".join(repr(x) for x in p)  # noqa: E731
+        command = [program, "render", server_caches[0], "-o", f"{folder}/p.png", "--size", f"{width}x{height}", "--scalar", state["variable"],
+                   "--tf", f"{folder}/f.json", f"--position={numbers(camera['position'])}", f"--focal-point={numbers(camera['focal_point'])}",
+                   f"--view-up={numbers(camera['view_up'])}", "--parallel-scale", repr(camera["parallel_scale"]),
+                   "--scalar-bar", "--axes", "--outline", "--background", "white"]
+        subprocess.run(command, check=True, capture_output=True)
+        png = base64.b64encode(pathlib.Path(folder, "p.png").read_bytes()).decode()
+        differing = tab.run(f"""(async () => {{
+          const image = await createImageBitmap(await (await fetchPng('{png}')));
+          function fetchPng(text) {{ return new Blob([Uint8Array.from(atob(text), c => c.charCodeAt(0))], {{type: 'image/png'}}); }}
+          const c = document.getElementById('picture'), other = new OffscreenCanvas(c.width, c.height);
+          other.getContext('2d').drawImage(image, 0, 0);
+          const a = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+          const b = other.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+          let n = 0; for (let k = 0; k < a.length; ++k) n += a[k] !== b[k]; return n; }})()""")
+        expect(differing == 0, f"the page has the pixels of `render`: {differing} bytes differ")
+
+
+def navigation(browser, server, caches):
+    tab = opened(browser, server.url)
+    shot(tab, "first")
+    is_the_commands_picture(tab, caches)
+    before = tab.run(f"{PAGE}.pictures")
+    changes(tab, lambda: tab.drag(MIDDLE, (950, 480), steps=20, pause_s=0.03), "dragging", "rotated")
+    expect(tab.run(f"{PAGE}.pictures") - before > 3, "pictures come while the mouse moves")
+    camera = tab.run(f"{PAGE}.state.camera")
+    changes(tab, lambda: tab.drag(MIDDLE, (850, 420), modifiers=8), "shift and drag")
+    moved = tab.run(f"{PAGE}.state.camera")
+    expect(camera["focal_point"] != moved["focal_point"] and camera["view_up"] == moved["view_up"], "shift and drag moves the camera sideways")
+    changes(tab, lambda: tab.drag(MIDDLE, (800, 450), button="right"), "dragging with the right button")
+    moved = tab.run(f"{PAGE}.state.camera")
+    changes(tab, lambda: tab.mouse("mouseWheel", *MIDDLE, deltaX=0, deltaY=-300), "the wheel", "zoomed")
+    expect(tab.run(f"{PAGE}.state.camera.parallel_scale") < moved["parallel_scale"], "the wheel zooms in")
+    tab.click("#picture")
+    for key in "xYzor":
+        changes(tab, lambda key=key: tab.key(key), f"the key {key}", f"key_{key}")
+    expect(tab.run(f"{PAGE}.state.camera.perspective"), "the key o changes the projection")
+    changes(tab, lambda: tab.click("#projection"), "the button of the projection")
+    tab.key("h")
+    tab.wait("document.getElementById('panel').offsetWidth === 0", "the panel to hide")
+    rest(tab)
+    expect(tab.run(f"{PAGE}.header.width") == 1280, "the picture takes the panel's place")
+    tab.key("h")
+    expect(tab.run(f"{PAGE}.errors.length") == 0, f"no errors: {tab.run(PAGE + '.errors')}")
+    return tab
+
+
+def editing(tab):
+    rest(tab)
+    x, y = tab.place("#curve")
+    points = tab.run(f"{PAGE}.state.function.Points.length")
+    changes(tab, lambda: tab.drag((x - 40, y - 40), (x - 40, y - 50), steps=5, pause_s=0.03), "a new point", "edited")
+    expect(tab.run(f"{PAGE}.state.function.Points.length") == points + 4, "a click adds a point")
+    changes(tab, lambda: tab.run(f"""document.getElementById('curve').dispatchEvent(new MouseEvent('dblclick',
+      {{clientX: {x - 40}, clientY: {y - 50}, bubbles: true}}))"""), "removing a point")
+    expect(tab.run(f"{PAGE}.state.function.Points.length") == points, "a double-click removes it")
+    changes(tab, lambda: set_value(tab, "#map", "magma"), "other colours", "colours")
+    changes(tab, lambda: set_value(tab, "#high", "0.8"), "another range")
+    changes(tab, lambda: set_value(tab, "#unit", "0.5"), "another opacity unit")
+    changes(tab, lambda: tab.click("#automatic"), "the automatic function")
+    for name in ("scalar_bar", "axes", "axes_grid", "outline", "dark", "lit"):
+        changes(tab, lambda name=name: tab.click(f"#{name}"), name)
+    shot(tab, "dark_and_lit")
+    tab.run("document.querySelectorAll('details').forEach(d => { d.open = true; })")
+    changes(tab, lambda: (set_value(tab, "#clip", "on"), set_value(tab, "#clip-x-upper", "0.6")), "the clip box", "clipped")
+    set_value(tab, "#clip", "off")
+    changes(tab, lambda: tab.click("#add-clip"), "a clip plane")
+    changes(tab, lambda: set_value(tab, "#clip_planes input", "0.3"), "moving the plane")
+    changes(tab, lambda: tab.run("document.querySelector('#clip_planes button:last-of-type').click()"), "removing the plane")
+    changes(tab, lambda: (tab.click("#add-slice"), set_value(tab, "#volume", "off")), "a slice", "slice")
+    tab.run("document.querySelector('#slices button:last-of-type').click()")
+    set_value(tab, "#volume", "on")
+    rest(tab)
+    expect(tab.run(f"{PAGE}.errors.length") == 0, f"no errors: {tab.run(PAGE + '.errors')}")
+
+
+def sizes(tab):
+    for width, height, ratio in ((640, 480, 1), (390, 844, 2), (1920, 1080, 1), (1280, 800, 1)):
+        tab.resize(width, height, ratio)
+        time.sleep(0.3)
+        rest(tab)
+        shot(tab, f"size_{width}")
+        stage = tab.run("(() => { const r = document.getElementById('stage').getBoundingClientRect(); return [r.width, r.height]; })()")
+        header = tab.run(f"[{PAGE}.header.width, {PAGE}.header.height]")
+        expect(all(abs(a * ratio - b) <= 1 for a, b in zip(stage, header)), f"a page of {width}x{height}: {stage}, {header}")
+    # A phone: one finger rotates, two zoom and move.
+    tab.resize(390, 844, 2, mobile=True)
+    time.sleep(0.3)
+    rest(tab)
+    camera = tab.run(f"{PAGE}.state.camera")
+    tab.touch("touchStart", (100, 150))
+    for n in range(10):
+        tab.touch("touchMove", (100 + 5 * n, 150))
+    tab.touch("touchEnd")
+    rest(tab)
+    turned = tab.run(f"{PAGE}.state.camera")
+    expect(turned["position"] != camera["position"] and turned["parallel_scale"] == camera["parallel_scale"], "a finger rotates")
+    tab.touch("touchStart", (100, 150), (200, 150))
+    for n in range(10):
+        tab.touch("touchMove", (100 - 3 * n, 150), (200 + 3 * n, 150))
+    tab.touch("touchEnd")
+    rest(tab)
+    shot(tab, "phone")
+    expect(tab.run(f"{PAGE}.state.camera.parallel_scale") < 0.9 * turned["parallel_scale"], "two fingers zoom")
+    tab.resize(1280, 800)
+
+
+def time_steps(browser, server):
+    tab = opened(browser, server.url)
+    rest(tab)
+    tab.run("document.getElementById('cache').value = 1; document.getElementById('cache').onchange()")
+    tab.wait("!document.getElementById('time').hidden", "the series")
+    rest(tab)
+    changes(tab, lambda: set_value(tab, "#step", "2"), "another step", "step")
+    seen = set()
+    tab.click("#play")
+    wait_for(lambda: seen.add(tab.run(f"{PAGE}.header.step")) or len(seen) == 4, "all steps to be played")
+    shot(tab, "playing")
+    tab.click("#play")
+    rest(tab)
+    expect(tab.run(f"{PAGE}.errors.length") == 0, f"no errors: {tab.run(PAGE + '.errors')}")
+    # Each cache comes back as it was left.
+    step = tab.run(f"{PAGE}.header.step")
+    tab.run("document.getElementById('cache').value = 0; document.getElementById('cache').onchange()")
+    rest(tab)
+    tab.run("document.getElementById('cache').value = 1; document.getElementById('cache').onchange()")
+    tab.wait(f"{PAGE}.header.step === {step}", "the step that was left")
+    return tab
+
+
+def lost_connection(browser, caches, folder):
+    token = pathlib.Path(folder, "token")
+    token.write_text("an-address-that-stays-0123456789\n")
+    token.chmod(0o600)
+    with serving(program, caches, "--token-file", str(token)) as server:
+        tab = opened(browser, server.url)
+        tab.drag(MIDDLE, (900, 450), steps=5)
+        before = rest(tab)
+        camera = tab.run(f"{PAGE}.state.camera")
+        server.kill()
+        tab.wait("!document.getElementById('status').hidden", "the page to say that the connection is lost")
+        shot(tab, "lost")
+        with serving(program, caches, "--token-file", str(token), port=server.port):
+            tab.wait(f"{PAGE}.connections === 2", "the page to come back")
+            tab.wait("document.getElementById('status').hidden", "the message to go")
+            time.sleep(0.3)
+            expect(rest(tab) == before, "the picture is the one before")
+            expect(tab.run(f"{PAGE}.state.camera") == camera, "the camera is the one before")
+
+
+def wrong_token(browser, server):
+    tab = browser.tab(server.url[:-1] + ("0" if server.url[-1] != "0" else "1"))
+    tab.wait("document.body && document.body.textContent.includes('token is wrong')", "the refusal")
+    shot(tab, "wrong_token")
+    expect(not tab.run(f"Boolean({PAGE})"), "a wrong token gets no page")
+    # A page that is not the server's cannot connect, even with the token.
+    refused = browser.tab().run(f"""new Promise(done => {{
+      const s = new WebSocket("ws://{server.host}/socket?token={server.token}");
+      s.onopen = () => done("open"); s.onerror = () => done("refused"); }})""")
+    expect(refused == "refused", f"another page's socket: {refused}")
+
+
+def ten_clients(browser, caches):
+    with serving(program, caches, "--viewer-memory", "128M", "--memory", "1280M") as server:
+        tabs = [browser.tab(server.url, (480, 360)) for _ in range(10)]  # each in a window: hidden pages ask for nothing
+        for n, tab in enumerate(tabs):
+            tab.wait(f"{PAGE} && {PAGE}.pictures > 0", f"client {n}'s picture")
+        tab_11 = browser.tab(server.url, (480, 360))
+        tab_11.wait("document.getElementById('status') && document.getElementById('status').textContent.includes('as many viewers')", "the eleventh to be told")
+        shot(tab_11, "eleventh")
+        for n, tab in enumerate(tabs):
+            tab.run(f"{PAGE}.state.camera.parallel_scale *= {1 + 0.05 * n}; window.dispatchEvent(new Event('nothing'))")
+            tab.drag((390, 150), (420 + 2 * n, 160), steps=4)
+        sums = {rest(tab) for tab in tabs}
+        expect(len(sums) == 10, f"ten clients have ten views: {len(sums)}")
+        print(f"ten clients: {server.kilobytes()} kB, {server.threads()} threads")
+        for tab in tabs + [tab_11]:
+            tab.call("Page.navigate", url="about:blank")
+        wait_for(lambda: server.threads() < 12, "the viewers to end")
+
+
+with tempfile.TemporaryDirectory() as folder:
+    subprocess.run([program, "generate", "half-annulus", "--size", "48x32x24", "-o", f"{folder}/g"], check=True, capture_output=True)
+    subprocess.run([program, "convert", f"{folder}/g.xyz", f"{folder}/g.fun", "-o", f"{folder}/annulus.splats"], check=True, capture_output=True)
+    subprocess.run([program, "generate", "wake", "--size", "32x24x16", "--steps", "4", "-o", f"{folder}/w"], check=True, capture_output=True)
+    subprocess.run([program, "convert", f"{folder}/w.xyz", f"{folder}/w_*.fun", "-o", f"{folder}/wake.splats"], check=True, capture_output=True)
+    caches = [f"{folder}/annulus.splats", f"{folder}/wake.splats"]
+    browser = Chromium()
+    try:
+        with serving(program, caches) as server:
+            tab = navigation(browser, server, caches)
+            print("navigation done")
+            editing(tab)
+            print("editing done")
+            sizes(tab)
+            print("sizes done")
+            time_steps(browser, server)
+            print("time steps done")
+            wrong_token(browser, server)
+            expect(server.stop() == 130, "Ctrl-C ends the server with pages open")
+        lost_connection(browser, caches, folder)
+        print("lost connection done")
+        ten_clients(browser, caches)
+    finally:
+        browser.close()
+
+print(f"{len(failures)} failures")
+sys.exit(1 if failures else 0)

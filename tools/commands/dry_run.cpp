@@ -1,0 +1,233 @@
+#include "tools/commands/dry_run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "preprocess/convert/memory_plan.h"
+#include "preprocess/convert/preflight.h"
+#include "preprocess/convert/scratch_folder.h"
+#include "preprocess/faces/grid_faces_pass.h"
+#include "preprocess/grid/sample_source.h"
+#include "stream/base/byte_text.h"
+#include "stream/base/free_space.h"
+#include "stream/cache/faces_file.h"
+#include "tools/output/progress_bar.h"
+#include "tools/output/run_statistics.h"
+#include "tools/output/stop_signals.h"
+#include "tools/output/thread_failures.h"
+
+namespace curvisplat {
+namespace {
+
+struct Forecast {
+  uint64_t samples = 0, sampled = 0, steps = 1;
+  uint64_t cache_bytes = 0, temporary_bytes = 0, memory_bytes = 0;
+  double seconds = 0, sampling_seconds = 0;
+  unsigned threads = 0;
+};
+
+uint64_t nodesOf(const GridDescription& description) {
+  uint64_t nodes = 0;
+  for (const GridBlock& block : description.blocks) nodes += block.nodes();
+  for (const MeshPiece& piece : description.pieces) nodes += piece.points;
+  return nodes;
+}
+
+uint64_t times(uint64_t count, double factor) {
+  return static_cast<uint64_t>(std::llround(static_cast<double>(count) * factor));
+}
+
+/// How much larger the whole is than its sample.
+struct Scale {
+  double volume = 1, faces = 1;
+
+  uint64_t bytesOf(const std::vector<FileReport>& files) const {
+    uint64_t bytes = 0;
+    for (const FileReport& file : files)
+      bytes += times(file.bytes, file.name == kFacesFileName ? faces : volume);
+    return bytes;
+  }
+};
+
+Scale scaleOf(const GridDescription& whole, const GridDescription& sample, const ConvertOptions& options) {
+  const auto of_faces = [&](const GridDescription& grid, std::span<const IndexPlane> planes) {
+    return static_cast<double>(temporaryBytesOfFaces(grid.blocks, planes, options.scalars.size()));
+  };
+  return {static_cast<double>(nodesOf(whole)) / static_cast<double>(nodesOf(sample)),
+          of_faces(whole, options.planes) / of_faces(sample, {})};
+}
+
+std::filesystem::path temporaryFolderOf(const ConvertOptions& options) {
+  const std::filesystem::path output = std::filesystem::absolute(options.output);
+  return options.temporary_folder.empty() ? output.parent_path() : options.temporary_folder;
+}
+
+/// The options for a sample, which is converted within `folder`.
+ConvertOptions ofSample(const ConvertOptions& options, const std::filesystem::path& folder) {
+  ConvertOptions of_sample = options;
+  of_sample.output = folder / "sample.splats";
+  of_sample.temporary_folder = folder;
+  of_sample.overwrite = of_sample.resume = false;
+  of_sample.planes.clear();  // the sample may not have them
+  of_sample.ranks = nullptr;
+  return of_sample;
+}
+
+std::string timeText(double seconds) {
+  if (seconds < 10) return fmt::format("{:.1f} s", seconds);
+  if (seconds < 120) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 7200) return fmt::format("{:.0f} min", seconds / 60);
+  return fmt::format("{:.1f} h", seconds / 3600);
+}
+
+std::string freeText(const std::filesystem::path& folder) {
+  const auto bytes = freeBytes(folder);
+  return bytes ? fmt::format(" ({} are free)", byteText(*bytes)) : "";
+}
+
+void print(const Forecast& forecast, const ConvertOptions& options) {
+  const std::filesystem::path output = std::filesystem::absolute(options.output).parent_path();
+  const double samples = static_cast<double>(forecast.samples) * static_cast<double>(forecast.steps);
+  const std::string of_steps = forecast.steps > 1 ? fmt::format(" in each of {} steps", forecast.steps) : "";
+  if (forecast.sampled > 0)
+    fmt::print("{} samples{}; as {} of them took, converted now in {}, all will take about\n",
+               forecast.samples, of_steps, forecast.sampled, timeText(forecast.sampling_seconds));
+  else
+    fmt::print("{} samples; unstructured grids are not sampled, but by experience this one will take about\n",
+               forecast.samples);
+  fmt::print("  cache      {} in {}{}, {:.2f} bytes per sample{}\n", byteText(forecast.cache_bytes),
+             output.string(), freeText(output), static_cast<double>(forecast.cache_bytes) / samples,
+             forecast.steps > 1 ? " and step" : "");
+  const std::filesystem::path temporary = temporaryFolderOf(options);
+  fmt::print("  temporary  {} in {}{}\n", byteText(forecast.temporary_bytes), temporary.string(),
+             freeText(temporary));
+  fmt::print("  memory     {}\n", byteText(forecast.memory_bytes));
+  fmt::print("  time       {}, {} thread{}\n", timeText(forecast.seconds), forecast.threads,
+             forecast.threads == 1 ? "" : "s");
+}
+
+void finish(const Forecast& forecast, const ConvertOptions& options, const ConvertArguments& arguments) {
+  print(forecast, options);
+  if (arguments.statistics.empty()) return;
+  nlohmann::json json = runStatistics();
+  json["dry_run"] = {{"samples", forecast.samples},
+                     {"sampled", forecast.sampled},
+                     {"steps", forecast.steps},
+                     {"cache_bytes", forecast.cache_bytes},
+                     {"temporary_bytes", forecast.temporary_bytes},
+                     {"memory_bytes", forecast.memory_bytes},
+                     {"seconds", forecast.seconds},
+                     {"threads", forecast.threads}};
+  writeStatistics(arguments.statistics, json);
+}
+
+/// What the conversion of one step takes, from `report` of its sample.
+Forecast forecastOf(const ConvertReport& report, const GridDescription& whole, const Scale& scale,
+                    const ConvertOptions& options) {
+  Forecast forecast;
+  forecast.samples = nodesOf(whole);
+  forecast.sampled = report.nodes;
+  forecast.threads = report.threads;
+  forecast.cache_bytes = scale.bytesOf(report.files);
+  forecast.temporary_bytes = times(report.temporary_bytes, scale.volume);
+  const MemoryPlan plan =
+      MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
+  forecast.memory_bytes = plan.expectedPeak(times(report.splats, scale.volume), options.scalars.size());
+  return forecast;
+}
+
+Forecast forecastOfMesh(const GridDescription& mesh, const ConvertOptions& options) {
+  const MemoryPlan plan =
+      MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
+  Forecast forecast;
+  forecast.samples = nodesOf(mesh);
+  forecast.threads = plan.threads;
+  const ConversionEstimate estimate = estimateConversion(forecast.samples, plan.threads);
+  const DiskNeeds needs = diskNeeds(forecast.samples, options.scalars.size());
+  forecast.cache_bytes =
+      estimate.cache_bytes + (options.scalars.size() - 1) * estimate.bytes_per_further_scalar;
+  forecast.temporary_bytes = needs.temporary_bytes;
+  forecast.memory_bytes = plan.expectedPeak(forecast.samples, options.scalars.size());
+  forecast.seconds = estimate.seconds;
+  return forecast;
+}
+
+}  // namespace
+
+void dryRun(std::unique_ptr<DataSource> source, const ConvertOptions& options,
+            const ConvertArguments& arguments) {
+  checkOutput(options.output, options.overwrite || options.resume, temporaryFolderOf(options));
+  const GridDescription whole = source->description();
+  if (!dynamic_cast<GridSource*>(source.get()))
+    return finish(forecastOfMesh(whole, options), options, arguments);
+  checkPlanes(whole, options.planes);
+  const std::unique_ptr<GridSource> sample =
+      sampleOf(std::unique_ptr<GridSource>(dynamic_cast<GridSource*>(source.release())), kSampledNodes);
+
+  requireThreads(options.threads);
+  Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
+  const ScratchFolder folder(ScratchFolder::newPath(temporaryFolderOf(options), "dry-run"),
+                             ScratchFolder::Folder::kMake);
+  const ConvertReport report = convert(*sample, ofSample(options, folder.path()), progress);
+  const Scale scale = scaleOf(whole, sample->description(), options);
+  Forecast forecast = forecastOf(report, whole, scale, options);
+  forecast.sampling_seconds = secondsOf(progress);
+  forecast.seconds = scale.volume * forecast.sampling_seconds;
+  finish(forecast, options, arguments);
+}
+
+void dryRunOfSeries(const SeriesInput& input, const SeriesOptions& options,
+                    const ConvertArguments& arguments) {
+  checkOutput(options.convert.output, options.convert.overwrite || options.convert.resume,
+              temporaryFolderOf(options.convert));
+  requireThreads(options.convert.threads);
+  Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
+  const ScratchFolder folder(ScratchFolder::newPath(temporaryFolderOf(options.convert), "dry-run"),
+                             ScratchFolder::Folder::kMake);
+  SeriesOptions of_sample = options;
+  of_sample.convert = ofSample(options.convert, folder.path());
+  GridDescription whole, part;
+  SeriesInput sample = input;
+  sample.count = std::min<uint64_t>(2, input.count);
+  sample.open = [&](uint64_t step) {
+    std::unique_ptr<GridSource> grid = input.open(step);
+    whole = grid->description();
+    grid = sampleOf(std::move(grid), kSampledNodes);
+    part = grid->description();
+    return grid;
+  };
+  ConvertOptions with_scalars = options.convert;
+  sample.scalars = [&](const GridDescription& description) {
+    return with_scalars.scalars = input.scalars(description);
+  };
+
+  Forecast forecast;
+  double first_s = 0, further_s = 0;
+  uint64_t further_bytes = 0;
+  convertSeries(sample, of_sample, progress, [&](const SeriesEvent& event) {
+    if (!event.added && !event.converted) return;
+    const Scale scale = scaleOf(whole, part, with_scalars);
+    if (event.converted) {
+      forecast = forecastOf(*event.converted, whole, scale, with_scalars);
+      first_s = secondsOf(progress) * scale.volume;
+    } else {
+      further_s = secondsOf(progress) * scale.volume - first_s;
+      further_bytes = scale.bytesOf(event.added->files);
+    }
+  });
+  forecast.steps = input.count;
+  const auto further = static_cast<double>(input.count - 1);
+  forecast.cache_bytes += times(further_bytes, further);
+  forecast.seconds = first_s + further * further_s;
+  forecast.sampling_seconds = secondsOf(progress);
+  finish(forecast, options.convert, arguments);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,112 @@
+// `curvisplat serve`: shows caches in browsers.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <boost/asio/ip/address.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stream/base/error.h"
+#include "stream/base/message.h"
+#include "stream/base/progress.h"
+#include "tools/commands/commands.h"
+#include "tools/options/option_parsers.h"
+#include "tools/output/stop_signals.h"
+#include "tools/serve/access.h"
+#include "tools/serve/server.h"
+
+namespace curvisplat {
+namespace {
+
+struct ServeArguments {
+  std::vector<std::filesystem::path> caches;
+  std::string listen = "127.0.0.1", memory = "4G", viewer_memory = "512M", backend = "auto";
+  uint16_t port = 8642;
+  std::vector<std::string> hosts;
+  std::optional<std::filesystem::path> token_file;
+  std::optional<std::string> frame_time;
+};
+
+ServerOptions optionsFrom(const ServeArguments& arguments) {
+  ServerOptions options;
+  options.address = arguments.listen;
+  options.port = arguments.port;
+  options.host_names = arguments.hosts;
+  options.each.memory_bytes = parseByteSize("--viewer-memory", arguments.viewer_memory);
+  options.each.backend = parseBackend(arguments.backend);
+  if (arguments.frame_time)
+    options.each.target_s = parsePositive("--frame-time", *arguments.frame_time) / 1000;
+  const uint64_t memory = parseByteSize("--memory", arguments.memory);
+  options.viewers = memory / options.each.memory_bytes;
+  if (options.viewers == 0)
+    throw UsageError("--memory {} is less than one viewer's: {} (--viewer-memory)", arguments.memory,
+                     arguments.viewer_memory);
+  options.token = arguments.token_file ? readToken(*arguments.token_file) : newToken();
+  return options;
+}
+
+void warnOfNetwork(const ServerOptions& options) {
+  boost::system::error_code error;
+  const auto address = boost::asio::ip::make_address(options.address, error);
+  if (error || address.is_loopback()) return;
+  printMessage(
+      "warning: --listen {}: whoever can read this network's traffic can read the address and the pictures, "
+      "which are "
+      "not encrypted; an SSH tunnel to a server without --listen is safer",
+      options.address);
+}
+
+void serve(const ServeArguments& arguments) {
+  const ServerOptions options = optionsFrom(arguments);
+  warnOfNetwork(options);
+  const ServedCaches caches(arguments.caches);
+  Progress progress;
+  const StopOnSignals stopping(progress);
+  runServer(caches, options, progress, [&](const std::string& address) {
+    fmt::print("{}\n", address);
+    std::fflush(stdout);
+    printMessage(
+        "serving {} cache{} to at most {} viewer{} at a time; whoever has the address above can look at {}",
+        caches.size(), caches.size() == 1 ? "" : "s", options.viewers, options.viewers == 1 ? "" : "s",
+        caches.size() == 1 ? "it" : "them");
+  });
+}
+
+}  // namespace
+
+void addServe(CLI::App& app) {
+  auto arguments = std::make_shared<ServeArguments>();
+  CLI::App* command = app.add_subcommand("serve", "Show caches in a web browser");
+  command->add_option("CACHE", arguments->caches, "Splat caches, directories NAME.splats")->required();
+  command->add_option("--port", arguments->port, "Port to listen at; 0: any that is free")
+      ->capture_default_str();
+  command
+      ->add_option("--listen", arguments->listen,
+                   "Address to listen at; others than the loopback's let other machines connect, unencrypted")
+      ->capture_default_str();
+  command->add_option(
+      "--host", arguments->hosts,
+      "Further name by which browsers reach the server, beside localhost and addresses in digits");
+  command->add_option("--token-file", arguments->token_file,
+                      "File with the token of the address, for its owner alone (default: a new token)");
+  command->add_option("--viewer-memory", arguments->viewer_memory, "Memory limit of each viewer")
+      ->capture_default_str();
+  command
+      ->add_option("--memory", arguments->memory,
+                   "Memory limit of all viewers together: with --viewer-memory, how many there can be")
+      ->capture_default_str();
+  command
+      ->add_option("--backend", arguments->backend,
+                   "Drawing back end: auto, osmesa, egl or cpu; see info --system")
+      ->capture_default_str();
+  command->add_option("--frame-time", arguments->frame_time,
+                      "Time budget of a picture while the camera moves, in ms (default 50)");
+  command->callback([arguments] { serve(*arguments); });
+}
+
+}  // namespace curvisplat

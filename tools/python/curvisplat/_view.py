@@ -1,0 +1,82 @@
+"""A cache in a browser or a notebook: the server, as a process of its own."""
+
+from __future__ import annotations
+
+import html
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import weakref
+from typing import Any, Optional
+
+from . import _core
+
+
+def _program() -> str:
+    """The program that belongs to this package: beside it in a build tree, or installed."""
+    here = pathlib.Path(__file__).resolve()
+    beside = here.parents[2] / "curvisplat"
+    if os.access(beside, os.X_OK) and beside.is_file():
+        return str(beside)
+    found = shutil.which("curvisplat")
+    if found is None:
+        raise _core.Error("the program curvisplat is not in PATH; view() needs it: install it, or give its path as program=")
+    return found
+
+
+def _end(process: subprocess.Popen) -> None:
+    if process.poll() is None:
+        process.terminate()
+        try:
+            process.wait(10)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+    if process.stdout:
+        process.stdout.close()
+
+
+class View:
+    """A running server. A notebook shows its page; `url` opens it in a browser on this machine."""
+
+    def __init__(self, path: str, height: int = 600, program: Optional[str] = None):
+        self.height = int(height)
+        command = [program or _program(), "serve", path, "--port", "0"]
+        with tempfile.TemporaryFile("w+") as messages:  # of its start; nobody reads later ones
+            try:
+                # A session of its own: Ctrl-C in the interpreter is not meant for it.
+                process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=messages, text=True, start_new_session=True)
+            except OSError as error:
+                raise _core.Error(f"{command[0]}: cannot be run: {error.strerror}") from error
+            assert process.stdout is not None
+            self.url = process.stdout.readline().strip()
+            if not self.url:
+                _end(process)
+                messages.seek(0)
+                raise _core.Error(messages.read().strip().removeprefix("curvisplat: ") or f"{command[0]} has no server")
+        self._end = weakref.finalize(self, _end, process)
+
+    def close(self) -> None:
+        """Ends the server. Pages that show it say so."""
+        self._end()
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the server has not been ended."""
+        return self._end.alive
+
+    def __enter__(self) -> "View":
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<curvisplat.View {self.url if self.is_open else 'closed'}>"
+
+    def _repr_html_(self) -> str:
+        """The page in a frame. The browser must be on this machine, or have a tunnel to the port."""
+        return (f'<iframe src="{html.escape(self.url)}" width="100%" height="{self.height}" style="border: 0" '
+                'allow="fullscreen" title="curvisplat"></iframe>')

@@ -1,0 +1,111 @@
+#include "tools/serve/access.h"
+
+#include <fmt/format.h>
+#include <sys/random.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/asio/ip/address.hpp>
+#include <cctype>
+
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kShortestToken = 16, kLongestToken = 256;
+
+bool isSameText(std::string_view a, std::string_view b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+}
+
+bool isPort(std::string_view text) {
+  return !text.empty() && text.size() <= 5 &&
+         std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c); });
+}
+
+/// The name in "name", "name:port", "[address]" and "[address]:port"; empty for anything else.
+std::string_view nameIn(std::string_view host) {
+  if (host.starts_with('[')) {
+    const size_t end = host.find(']');
+    if (end == std::string_view::npos) return {};
+    const std::string_view rest = host.substr(end + 1);
+    return rest.empty() || (rest[0] == ':' && isPort(rest.substr(1))) ? host.substr(1, end - 1)
+                                                                      : std::string_view{};
+  }
+  const size_t colon = host.find(':');
+  if (colon == std::string_view::npos) return host;
+  return isPort(host.substr(colon + 1)) ? host.substr(0, colon) : std::string_view{};
+}
+
+}  // namespace
+
+std::string newToken() {
+  std::array<unsigned char, 16> bytes{};
+  if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
+    throw Error("the kernel gave no random numbers for a token; give one with --token-file");
+  return fmt::format("{:02x}", fmt::join(bytes, ""));
+}
+
+std::string readToken(const std::filesystem::path& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) == 0 && (status.st_mode & (S_IRWXG | S_IRWXO)) != 0)
+    throw Error("{}: others may read the token (found mode {:03o}, expected 600); run chmod 600 on it",
+                path.string(), status.st_mode & 0777u);
+  std::string token = readTextFile(path);
+  token.resize(std::min(token.size(), token.find_first_of("\r\n")));
+  const bool plain = std::all_of(token.begin(), token.end(),
+                                 [](unsigned char c) { return std::isalnum(c) || c == '-' || c == '_'; });
+  if (!plain || token.size() < kShortestToken || token.size() > kLongestToken)
+    throw Error("{}: is not a token (found {} characters, expected {} to {} letters, digits, '-' and '_')",
+                path.string(), token.size(), kShortestToken, kLongestToken);
+  return token;
+}
+
+bool isSameToken(std::string_view given, std::string_view expected) {
+  if (expected.empty()) return false;
+  // One pass over what is expected, whatever was given; a shorter text is compared with padding.
+  volatile unsigned difference = given.size() == expected.size() ? 0 : 1;
+  for (size_t n = 0; n < expected.size(); ++n) {
+    const unsigned char c = n < given.size() ? static_cast<unsigned char>(given[n]) : 0;
+    difference = difference | (c ^ static_cast<unsigned char>(expected[n]));
+  }
+  return difference == 0;
+}
+
+RequestTarget targetOf(std::string_view target) {
+  RequestTarget result;
+  const size_t query = target.find('?');
+  result.path = target.substr(0, query);
+  if (query == std::string_view::npos) return result;
+  std::string_view rest = target.substr(query + 1);
+  while (!rest.empty()) {
+    const std::string_view field = rest.substr(0, rest.find('&'));
+    constexpr std::string_view kToken = "token=";
+    if (field.starts_with(kToken)) result.token = field.substr(kToken.size());
+    rest.remove_prefix(std::min(rest.size(), field.size() + 1));
+  }
+  return result;
+}
+
+bool isKnownHost(std::string_view host, const std::vector<std::string>& names) {
+  const std::string_view name = nameIn(host);
+  if (name.empty()) return false;
+  if (isSameText(name, "localhost")) return true;
+  boost::system::error_code not_an_address;
+  boost::asio::ip::make_address(std::string(name), not_an_address);
+  if (!not_an_address) return true;
+  return std::any_of(names.begin(), names.end(),
+                     [&](const std::string& known) { return isSameText(name, known); });
+}
+
+bool isOwnOrigin(std::string_view origin, std::string_view host) {
+  for (const std::string_view scheme : {"http://", "https://"})
+    if (origin.starts_with(scheme) && isSameText(origin.substr(scheme.size()), host)) return !host.empty();
+  return false;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,151 @@
+// JPEG by libjpeg, which reports failure by a call that must not return: as for PNG in render/image, the functions here
+// that call setjmp have no objects to destroy.
+#include "tools/serve/picture_message.h"
+
+#include <jpeglib.h>
+
+#include <algorithm>
+#include <bit>
+#include <csetjmp>
+#include <cstddef>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+#include "render/image/image_formats.h"
+#include "stream/base/error.h"
+
+namespace curvisplat {
+namespace {
+
+static_assert(std::endian::native == std::endian::little);
+
+struct JpegErrors : jpeg_error_mgr {
+  std::jmp_buf stop;
+  char text[JMSG_LENGTH_MAX] = "";
+};
+
+[[noreturn]] void onError(j_common_ptr jpeg) {
+  auto* const errors = static_cast<JpegErrors*>(jpeg->err);
+  errors->format_message(jpeg, errors->text);
+  std::longjmp(errors->stop, 1);
+}
+
+/// Owns the compressor, and the memory that it writes to.
+struct JpegWriter {
+  JpegErrors errors;
+  jpeg_compress_struct jpeg{};
+  unsigned char* bytes = nullptr;
+  unsigned long size = 0;
+
+  JpegWriter() {
+    jpeg.err = jpeg_std_error(&errors);
+    errors.error_exit = onError;
+  }
+  ~JpegWriter() {
+    jpeg_destroy_compress(&jpeg);
+    std::free(bytes);
+  }
+  JpegWriter(const JpegWriter&) = delete;
+  JpegWriter& operator=(const JpegWriter&) = delete;
+};
+
+/// Red, green and blue in bytes, rows from the top.
+struct BytePicture {
+  ImageSize size;
+  std::vector<unsigned char> rgb;
+};
+
+bool writeAll(JpegWriter& writer, const BytePicture& picture, int quality) {
+  if (setjmp(writer.errors.stop)) return false;
+  jpeg_create_compress(&writer.jpeg);
+  jpeg_mem_dest(&writer.jpeg, &writer.bytes, &writer.size);
+  writer.jpeg.image_width = static_cast<JDIMENSION>(picture.size.width);
+  writer.jpeg.image_height = static_cast<JDIMENSION>(picture.size.height);
+  writer.jpeg.input_components = 3;
+  writer.jpeg.in_color_space = JCS_RGB;
+  jpeg_set_defaults(&writer.jpeg);
+  jpeg_set_quality(&writer.jpeg, quality, TRUE);
+  writer.jpeg.dct_method = JDCT_IFAST;
+  jpeg_start_compress(&writer.jpeg, TRUE);
+  const size_t row_bytes = 3 * static_cast<size_t>(picture.size.width);
+  while (writer.jpeg.next_scanline < writer.jpeg.image_height) {
+    auto* row = const_cast<JSAMPROW>(picture.rgb.data() + row_bytes * writer.jpeg.next_scanline);
+    jpeg_write_scanlines(&writer.jpeg, &row, 1);
+  }
+  jpeg_finish_compress(&writer.jpeg);
+  return true;
+}
+
+/// The mean of each `reduction` x `reduction` pixels; those that are left over at the right and below are left out.
+BytePicture reduced(const Image& image, int reduction) {
+  BytePicture picture{{std::max(1, image.size.width / reduction), std::max(1, image.size.height / reduction)},
+                      {}};
+  picture.rgb.resize(3 * static_cast<size_t>(picture.size.width) * static_cast<size_t>(picture.size.height));
+  const int columns = std::min(reduction, image.size.width), rows = std::min(reduction, image.size.height);
+  const float share = 1 / static_cast<float>(columns * rows);
+  unsigned char* to = picture.rgb.data();
+  for (int y = 0; y < picture.size.height; ++y)
+    for (int x = 0; x < picture.size.width; ++x)
+      for (int c = 0; c < 3; ++c) {
+        float sum = 0;
+        for (int v = 0; v < rows; ++v)
+          for (int u = 0; u < columns; ++u) sum += image.pixel(x * reduction + u, y * reduction + v)[c];
+        *to++ = toByte(sum * share);
+      }
+  return picture;
+}
+
+/// Not toByte(): a loop that the compiler turns into vector instructions.
+BytePicture whole(const Image& image) {
+  BytePicture picture{image.size, {}};
+  const size_t pixels = image.rgba.size() / 4;
+  picture.rgb.resize(3 * pixels);
+  for (size_t n = 0; n < pixels; ++n)
+    for (size_t c = 0; c < 3; ++c)
+      picture.rgb[3 * n + c] =
+          static_cast<unsigned char>(std::min(1.0f, std::max(0.0f, image.rgba[4 * n + c])) * 255 + 0.5f);
+  return picture;
+}
+
+template <typename T>
+void put(std::string& bytes, size_t at, const T& value) {
+  std::memcpy(bytes.data() + at, &value, sizeof value);
+}
+
+std::string message(const PictureHeader& header, const void* file, size_t file_bytes) {
+  std::string bytes(kPictureHeaderBytes + file_bytes, '\0');
+  std::memcpy(bytes.data(), "CVP1", 4);
+  put(bytes, 4, header.picture);
+  put(bytes, 8, header.request);
+  put(bytes, 16, header.step);
+  put(bytes, 20, static_cast<uint16_t>(header.size.width));
+  put(bytes, 22, static_cast<uint16_t>(header.size.height));
+  put(bytes, 24, static_cast<uint8_t>(header.is_png));
+  put(bytes, 25, static_cast<uint8_t>(header.is_final));
+  put(bytes, 26, header.level);
+  put(bytes, 28, header.seconds);
+  put(bytes, 32, header.error_px);
+  put(bytes, 36, header.splats);
+  std::memcpy(bytes.data() + kPictureHeaderBytes, file, file_bytes);
+  return bytes;
+}
+
+}  // namespace
+
+std::string losslessMessage(const PictureHeader& header, const Image& image) {
+  const Bytes file = encodePng(image, PngEffort::kQuick);
+  return message(header, file.data(), file.size());
+}
+
+std::string jpegMessage(const PictureHeader& header, const Image& image, const PictureQuality& quality) {
+  const BytePicture picture = quality.reduction > 1 ? reduced(image, quality.reduction) : whole(image);
+  JpegWriter writer;
+  if (!writeAll(writer, picture, quality.jpeg))
+    throw Error("a picture of {} x {} pixels cannot be written as JPEG: {}", picture.size.width,
+                picture.size.height, writer.errors.text);
+  return message(header, writer.bytes, writer.size);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,248 @@
+#include "tools/serve/remote_viewer.h"
+
+#include <chrono>
+#include <deque>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "render/annotate/annotations.h"
+#include "render/frame/frame_plan.h"
+#include "stream/base/error.h"
+#include "stream/base/message.h"
+#include "stream/base/thread_name.h"
+#include "tools/serve/line_quality.h"
+#include "tools/serve/picture_message.h"
+#include "tools/viewer/frame_loop.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr size_t kMostReports =
+    16;  // that wait to be read; a page sends as many as there are pictures on their way
+constexpr size_t kMostAsked = 64;
+
+double clockSeconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/// A request that the frame loop has, as far as its pictures need it.
+struct Asked {
+  uint64_t request = 0;  // the frame loop's number
+  double number = 0;     // the page's
+  bool moving = false;
+  ViewState state;
+  ImageSize picture, data;
+};
+
+}  // namespace
+
+/// What belongs to the viewer's thread.
+class RemoteViewer::Work {
+ public:
+  explicit Work(RemoteViewer& viewer) : viewer_(viewer), caches_(viewer.caches_), limits_(viewer.limits_) {}
+
+  /// Answers what has come in.
+  void serve(Inbox inbox) {
+    for (const uint64_t picture : inbox.shown) line_.shown(picture, clockSeconds());
+    if (inbox.open) answer([&] { return caches_.cacheText(*inbox.open); });
+    if (inbox.view) wanted_ = std::move(inbox.view);
+    woken_ |= inbox.woken;
+    advance();
+    // These may take some tenths of a second: behind the picture.
+    if (inbox.function) answer([&] { return caches_.functionText(*inbox.function); });
+    if (inbox.histogram) answer([&] { return caches_.histogramText(*inbox.histogram); });
+    if (inbox.colours) answer([&] { return ServedCaches::coloursText(*inbox.colours); });
+  }
+
+ private:
+  void advance() {
+    if (wanted_ && (line_.isOpen() || !wanted_->moving)) ask(*std::exchange(wanted_, std::nullopt));
+    if (woken_ && line_.isOpen()) {
+      woken_ = false;
+      show();
+    }
+  }
+
+  template <typename Text>
+  void answer(const Text& text) {
+    try {
+      viewer_.send_(text(), true);
+    } catch (const Error& error) {
+      report(error);
+    }
+  }
+
+  void report(const Error& error) {
+    // What a page has asked wrongly is its own affair; what the disk or a file has is the server's, too.
+    if (!dynamic_cast<const UsageError*>(&error)) printMessage("warning: a viewer: {}", error.what());
+    viewer_.send_(caches_.errorText(error.what()), true);
+  }
+
+  void ask(const ViewRequest& view) {
+    const CacheReader& reader = caches_.reader(view.cache);
+    try {
+      if (view.step >= reader.series().steps.size())
+        throw UsageError("there is no step {}; the last one is {}", view.step,
+                         reader.series().steps.size() - 1);
+      ViewState state = viewStateFromJson(view.state, "view", reader.manifest());
+      state.surfaces.clear();  // they name files
+      state.memory_bytes = limits_.memory_bytes;
+      request(view, std::move(state));
+    } catch (const UsageError& error) {
+      report(error);
+    } catch (const Error& error) {
+      report(UsageError(error.what()));
+    }
+  }
+
+  void request(const ViewRequest& view, ViewState state) {
+    const CacheReader& reader = caches_.reader(view.cache);
+    const TransferFunction function = state.function.function();
+    const nlohmann::json parsed = nlohmann::json::parse(view.state);
+    std::string text = parsed.at("preset").dump() + parsed.at("function").dump();
+    if (text != function_text_) {
+      function_text_ = std::move(text);
+      ++function_version_;
+    }
+    const ImageSize data = dataSize(state.annotations, view.size, function);
+    FrameRequest request{reader.variableNamed(state.variable), function_version_, function, state.camera,
+                         state.frameOptions(data)};
+    screenViewOf(reader.manifest(), state.camera, request.options, data);  // refuses what cannot be drawn
+    request.moving = view.moving;
+    request.target_s = limits_.target_s;
+    request.step = view.step;
+    if (view.next && *view.next < reader.series().steps.size()) request.next_step = view.next;
+    if (!frames_ || cache_ != view.cache) {
+      frames_.reset();  // frees its memory before the next one allocates
+      frames_ = std::make_unique<FrameLoop>(reader, limits_.backend, [this] { viewer_.wake(); });
+      cache_ = view.cache;
+      asked_.clear();
+    }
+    const uint64_t number = frames_->request(std::move(request));
+    // A page that asks faster than pictures come does not make this grow.
+    if (asked_.size() == kMostAsked) asked_.pop_front();
+    asked_.push_back(
+        {number, static_cast<double>(view.number), view.moving, std::move(state), view.size, data});
+  }
+
+  /// Sends the newest picture, if there is one.
+  void show() {
+    if (!frames_) return;
+    std::optional<ShownFrame> frame;
+    try {
+      frame = frames_->take();
+    } catch (const UsageError& error) {
+      report(error);
+    } catch (const Error& error) {
+      report(error);
+      frames_.reset();  // it has ended; the next request begins anew
+      return;
+    }
+    if (!frame) return;
+    while (!asked_.empty() && asked_.front().request < frame->request) asked_.pop_front();
+    if (asked_.empty() || asked_.front().request != frame->request) return;
+    send(asked_.front(), *frame);
+  }
+
+  void send(const Asked& asked, const ShownFrame& frame) {
+    const TransferFunction function = asked.state.function.function();
+    const Manifest& manifest = caches_.reader(cache_).manifest();
+    const VariableInfo& variable =
+        manifest.variables[caches_.reader(cache_).variableNamed(asked.state.variable)];
+    const AnnotatedScene scene{
+        asked.picture,
+        screenViewOf(manifest, asked.state.camera, asked.state.frameOptions(asked.data), asked.data),
+        {{&function, scalarTitle(variable.name, variable.unit)}},
+        manifest.lower,
+        manifest.upper,
+        asked.state.background()};
+    const Image picture = annotated(frame.image, asked.state.annotations, scene);
+    PictureHeader header;
+    header.picture = ++pictures_;
+    header.request = asked.number;
+    header.step = static_cast<uint32_t>(frame.step);
+    header.size = asked.picture;
+    header.is_final = frame.is_final && !asked.moving;
+    header.is_png = header.is_final;
+    header.level = static_cast<uint8_t>(line_.level());
+    header.seconds = static_cast<float>(frame.statistics.total_s);
+    header.error_px = static_cast<float>(frame.statistics.largest_error_px);
+    header.splats = static_cast<uint32_t>(frame.statistics.splats_drawn);
+    std::string message =
+        header.is_png ? losslessMessage(header, picture) : jpegMessage(header, picture, line_.quality());
+    line_.sent(header.picture, clockSeconds(), !header.is_png);
+    viewer_.send_(std::move(message), false);
+  }
+
+  RemoteViewer& viewer_;
+  const ServedCaches& caches_;
+  const ViewerLimits& limits_;
+  std::optional<ViewRequest> wanted_;  // waits until the line is open
+  bool woken_ = false;
+  size_t cache_ = 0;
+  std::string function_text_;
+  uint64_t function_version_ = 0;
+  std::deque<Asked> asked_;
+  LineQuality line_;
+  uint32_t pictures_ = 0;
+  std::unique_ptr<FrameLoop> frames_;  // the last: its thread calls wake()
+};
+
+RemoteViewer::RemoteViewer(const ServedCaches& caches, const ViewerLimits& limits, Send send)
+    : caches_(caches), limits_(limits), send_(std::move(send)), thread_([this] { loop(); }) {}
+
+RemoteViewer::~RemoteViewer() {
+  {
+    const MutexLock lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+void RemoteViewer::receive(ClientMessage message) {
+  {
+    const MutexLock lock(mutex_);
+    if (auto* const open = std::get_if<OpenRequest>(&message)) inbox_.open = *open;
+    if (auto* const view = std::get_if<ViewRequest>(&message)) inbox_.view = std::move(*view);
+    if (auto* const function = std::get_if<FunctionRequest>(&message)) inbox_.function = std::move(*function);
+    if (auto* const one = std::get_if<HistogramRequest>(&message)) inbox_.histogram = std::move(*one);
+    if (auto* const colours = std::get_if<ColoursRequest>(&message)) inbox_.colours = std::move(*colours);
+    if (auto* const shown = std::get_if<ShownReport>(&message))
+      if (inbox_.shown.size() < kMostReports) inbox_.shown.push_back(shown->picture);
+    news_ = true;
+  }
+  changed_.notify_all();
+}
+
+void RemoteViewer::wake() {
+  {
+    const MutexLock lock(mutex_);
+    inbox_.woken = news_ = true;
+  }
+  changed_.notify_all();
+}
+
+void RemoteViewer::loop() {
+  nameThisThread("viewer");
+  Work work(*this);
+  send_(caches_.helloText(), true);
+  while (true) {
+    Inbox inbox;
+    {
+      MutexLock lock(mutex_);
+      while (!news_ && !stopping_) changed_.wait(lock);
+      if (stopping_) return;
+      news_ = false;
+      inbox = std::exchange(inbox_, {});
+    }
+    try {
+      work.serve(std::move(inbox));
+    } catch (const std::exception& error) {  // such as a lack of memory: of this viewer alone
+      printMessage("warning: a viewer: {}", error.what());
+      send_(caches_.errorText("the server could not do this; its messages say why"), true);
+    }
+  }
+}
+
+}  // namespace curvisplat

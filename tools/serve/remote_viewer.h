@@ -1,0 +1,76 @@
+// One viewer of the server: answers the messages of one page, on a thread of its own.
+//
+//   connection --receive()--> [ viewer's thread ] --request()--> [ frame loop's thread draws ]
+//       ^                        |        ^                             |
+//       +--------send()----------+        +----------- wake ------------+
+//                 encoded
+//
+// Of each kind of request only the newest is kept, so that no page can make this grow. While the camera moves, the next
+// picture is asked for as soon as fewer than three are on their way to the page: neither the drawing
+// nor the line gets ahead of what the page shows. At rest, pictures become finer, and the last one is lossless: the
+// same as `curvisplat render` writes.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "render/frame/backend.h"
+#include "stream/base/mutex.h"
+#include "tools/serve/client_message.h"
+#include "tools/serve/served_caches.h"
+
+namespace curvisplat {
+
+struct ViewerLimits {
+  uint64_t memory_bytes = 512 << 20;  // for drawing
+  double target_s = 0.05;             // to draw a picture while the camera moves
+  Backend backend = Backend::kAutomatic;
+};
+
+class RemoteViewer {
+ public:
+  /// Sends a message: a text, or bytes. Called on the viewer's thread.
+  using Send = std::function<void(std::string message, bool is_text)>;
+
+  /// `caches` must outlive it.
+  RemoteViewer(const ServedCaches& caches, const ViewerLimits& limits, Send send);
+  /// Stops the picture being drawn, and waits for it.
+  ~RemoteViewer();
+  RemoteViewer(const RemoteViewer&) = delete;
+  RemoteViewer& operator=(const RemoteViewer&) = delete;
+
+  /// Takes a request, in place of the one of its kind that has not been answered yet. Any thread.
+  void receive(ClientMessage message);
+
+ private:
+  class Work;
+  struct Inbox {
+    std::optional<OpenRequest> open;
+    std::optional<ViewRequest> view;
+    std::optional<FunctionRequest> function;
+    std::optional<HistogramRequest> histogram;
+    std::optional<ColoursRequest> colours;
+    std::vector<uint64_t> shown;
+    bool woken = false;  // the frame loop has something
+  };
+  void loop();
+  void wake();
+
+  const ServedCaches& caches_;
+  const ViewerLimits limits_;
+  const Send send_;
+
+  Mutex mutex_;
+  ConditionVariable changed_;
+  Inbox inbox_ GUARDED_BY(mutex_);
+  bool news_ GUARDED_BY(mutex_) = false;
+  bool stopping_ GUARDED_BY(mutex_) = false;
+  std::thread thread_;
+};
+
+}  // namespace curvisplat

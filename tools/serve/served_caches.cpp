@@ -1,0 +1,153 @@
+#include "tools/serve/served_caches.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "render/colour/published_maps.h"
+#include "stream/base/error.h"
+#include "tools/viewer/first_view.h"
+#include "tools/viewer/histogram.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr ImageSize kFirstSize{1200, 800};
+constexpr size_t kBins = 128;
+constexpr int kStripColours = 128;
+
+std::string textOf(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+/// Colours along a function's range, as "rrggbb...".
+std::string stripOf(const EditedFunction& function) {
+  std::string strip;
+  for (int n = 0; n < kStripColours; ++n) {
+    const glm::dvec3 colour = 255.0 * function.colourAt(n / (kStripColours - 1.0)) + 0.5;
+    strip += fmt::format("{:02x}{:02x}{:02x}", static_cast<int>(colour.r), static_cast<int>(colour.g),
+                         static_cast<int>(colour.b));
+  }
+  return strip;
+}
+
+void addFunction(Json& json, const EditedFunction& function) {
+  json["preset"] = function.preset();
+  json["function"] = Json::parse(toParaViewPreset(function.definition())).front();
+  json["strip"] = stripOf(function);
+}
+
+Json jsonOf(const glm::dvec3& point) {
+  return {point.x, point.y, point.z};
+}
+
+std::string nameOf(const fs::path& path) {
+  const fs::path folder = path.has_filename() ? path : path.parent_path();
+  return folder.stem().string();
+}
+
+size_t variableOf(const CacheReader& reader, const std::string& name, const std::string& scalar) {
+  const auto& variables = reader.manifest().variables;
+  for (size_t n = 0; n < variables.size(); ++n)
+    if (variables[n].name == scalar) return n;
+  throw UsageError("{} has no scalar '{}'", name, scalar);
+}
+
+}  // namespace
+
+ServedCaches::ServedCaches(const std::vector<fs::path>& paths) {
+  for (const fs::path& path : paths) {
+    std::string name = nameOf(path);
+    const auto same = std::count_if(caches_.begin(), caches_.end(), [&](const Served& other) {
+      return nameOf(other.reader.cachePath()) == name;
+    });
+    if (same > 0) name += fmt::format(" ({})", same + 1);
+    CacheReader reader(path);
+    ViewState first = firstViewOf(reader, "", kFirstSize);
+    caches_.push_back({std::move(name), std::move(reader), std::move(first)});
+  }
+}
+
+/// The camera was chosen for the usual shape of a window; a narrower one sees as much of the data's width.
+ViewState ServedCaches::firstView(size_t cache, ImageSize size) const {
+  ViewState state = caches_[cache].first;
+  const double usual = static_cast<double>(kFirstSize.width) / kFirstSize.height;
+  const double narrower = usual * size.height / size.width;
+  if (narrower > 1) state.camera.parallel_scale *= narrower;
+  return state;
+}
+
+std::string ServedCaches::helloText() const {
+  Json json = {{"type", "hello"}, {"program", "curvisplat " CURVISPLAT_VERSION}};
+  json["caches"] = Json::array();
+  for (const Served& cache : caches_) json["caches"].push_back(cache.name);
+  json["maps"] = Json::array();
+  for (const PublishedMap& map : builtInMaps()) json["maps"].push_back(map.name);
+  json["most_pixels"] = kMostPixels;
+  json["largest_side"] = kLargestSide;
+  return textOf(json);
+}
+
+std::string ServedCaches::cacheText(const OpenRequest& request) const {
+  const Served& cache = caches_[request.cache];
+  const Manifest& manifest = cache.reader.manifest();
+  Json json = {{"type", "cache"}, {"cache", request.cache}, {"name", cache.name}};
+  json["lower"] = jsonOf(manifest.lower);
+  json["upper"] = jsonOf(manifest.upper);
+  json["samples"] = manifest.nodes;
+  json["scalars"] = Json::array();
+  for (const VariableInfo& variable : manifest.variables)
+    json["scalars"].push_back({{"name", variable.name},
+                               {"title", scalarTitle(variable.name, variable.unit)},
+                               {"low", variable.min},
+                               {"high", variable.max}});
+  json["times"] = Json::array();
+  for (const SeriesStep& step : cache.reader.series().steps) json["times"].push_back(step.time);
+  json["time_unit"] = cache.reader.seriesManifest().time_unit;
+  const ViewState state = firstView(request.cache, request.size);
+  json["state"] = Json::parse(toJson(state));
+  json["strip"] = stripOf(state.function);
+  return textOf(json);
+}
+
+std::string ServedCaches::functionText(const FunctionRequest& request) const {
+  const Served& cache = caches_[request.cache];
+  variableOf(cache.reader, cache.name, request.scalar);
+  const MutexLock lock(reading_);
+  Json json = {{"type", "function"}, {"cache", request.cache}, {"scalar", request.scalar}};
+  addFunction(json, automaticFunction(cache.reader, request.scalar));
+  return textOf(json);
+}
+
+std::string ServedCaches::histogramText(const HistogramRequest& request) const {
+  const Served& cache = caches_[request.cache];
+  const size_t variable = variableOf(cache.reader, cache.name, request.scalar);
+  const MutexLock lock(reading_);
+  Json json = {{"type", "histogram"}, {"cache", request.cache}, {"scalar", request.scalar},
+               {"low", request.low},  {"high", request.high},   {"log", request.log}};
+  json["bins"] = histogramOf(cache.reader, variable, request.low, request.high, request.log, kBins);
+  return textOf(json);
+}
+
+std::string ServedCaches::coloursText(const ColoursRequest& request) {
+  Json json = {{"type", "colours"}, {"map", request.map}};
+  addFunction(json, EditedFunction(request.map, 0, 1, 1));
+  return textOf(json);
+}
+
+std::string ServedCaches::errorText(std::string text) const {
+  for (const Served& cache : caches_)
+    for (const fs::path& path : {cache.reader.path(), cache.reader.cachePath()})
+      for (size_t at = text.find(path.string()); at != std::string::npos; at = text.find(path.string(), at)) {
+        text.replace(at, path.string().size(), cache.name);
+        at += cache.name.size();
+      }
+  return textOf({{"type", "error"}, {"text", text}});
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,53 @@
+// The caches that a server shows: opened once, before it listens, with the view that each begins with. Pages know a
+// cache by its number and its name; where it lies on the machine leaves no function here.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "stream/base/mutex.h"
+#include "stream/cache/cache_reader.h"
+#include "tools/serve/client_message.h"
+#include "tools/viewer/view_state.h"
+
+namespace curvisplat {
+
+class ServedCaches {
+ public:
+  /// Throws Error as CacheReader; 0.1 to 0.3 s a cache. Requires one path or more.
+  explicit ServedCaches(const std::vector<std::filesystem::path>& paths);
+
+  size_t size() const { return caches_.size(); }
+  const CacheReader& reader(size_t cache) const { return caches_[cache].reader; }
+  const std::string& name(size_t cache) const { return caches_[cache].name; }
+
+  /// The view of a cache before anything is chosen, for a picture of this size. Any thread.
+  ViewState firstView(size_t cache, ImageSize size) const;
+
+  // Texts for pages, JSON. Those that read the cache do so one after the other, for all viewers. Any thread.
+
+  /// The names of all caches and colour maps.
+  std::string helloText() const;
+  /// What a page has to know of a cache, and the first view.
+  std::string cacheText(const OpenRequest& request) const;
+  /// Throw UsageError for a scalar or map that does not exist, Error as reading does.
+  std::string functionText(const FunctionRequest& request) const;
+  std::string histogramText(const HistogramRequest& request) const;
+  static std::string coloursText(const ColoursRequest& request);
+
+  /// An error for a page: `text` without paths of this machine.
+  std::string errorText(std::string text) const;
+
+ private:
+  struct Served {
+    std::string name;
+    CacheReader reader;
+    ViewState first;
+  };
+  std::vector<Served> caches_;
+  mutable Mutex reading_;  // held while a coarse level is read: its memory is not part of a viewer's limit
+};
+
+}  // namespace curvisplat
