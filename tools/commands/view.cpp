@@ -36,6 +36,7 @@ struct ViewArguments {
 
 /// The surfaces and slices of the command line.
 void takeScene(const ViewArguments& arguments, const CacheReader& cache, ViewerOptions& options) {
+  requireFixedFaces(arguments.surfaces, cache);
   // The scalar changes in the window, so faces that are coloured by one keep colours of their own.
   options.scene = sceneOf(arguments.surfaces, cache, std::numeric_limits<size_t>::max(),
                           std::numeric_limits<size_t>::max());
