@@ -1,6 +1,6 @@
-// Adds scalars to a cache that is there, without touching its geometry: the grid is read again with the new
-// scalars, and their values go to the bricks that have the splats. The new files have the bytes that they
-// would have had if the cache had been made with all of its scalars at once.
+// Adds scalars to an existing cache without changing its geometry: reads the grid again with the new scalars,
+// and brings each value to the brick that has its splat. The new files have the same bytes as if the cache
+// had been converted with all scalars at once.
 #pragma once
 
 #include <cstdint>
@@ -16,9 +16,9 @@
 namespace curvisplat {
 
 struct AddScalarOptions {
-  std::filesystem::path cache;             // that is to have them
+  std::filesystem::path cache;             // to which they are added
   std::vector<uint32_t> scalars;           // positions in the source's description
-  std::optional<double> blank_value;       // a drawn node must not have it
+  std::optional<double> blank_value;       // no drawn node may have it
   uint64_t memory_bytes = 0;               // 0: defaultMemory()
   unsigned threads = 0;                    // 0: as many as the machine has
   bool check_disk_space = true;            // before the work
@@ -34,7 +34,7 @@ struct AddScalarReport {
   uint64_t nodes = 0, splats = 0;
   uint64_t temporary_bytes = 0;   // of the scattered values
   unsigned threads = 0;           // that worked
-  uint64_t memory_bytes = 0;      // the cap that held
+  uint64_t memory_bytes = 0;      // the limit that was kept
   std::vector<FileReport> files;  // the new ones
 };
 

@@ -15,13 +15,13 @@ namespace curvisplat {
 
 struct AddStepOptions {
   std::filesystem::path cache;
-  std::optional<double> time;         // otherwise the source's, or one more than the last step's
-  std::optional<double> blank_value;  // as the other steps were converted with
-  uint64_t memory_bytes = 0;          // 0: defaultMemory()
-  unsigned threads = 0;               // 0: as many as the machine has
-  bool check_disk_space = true;       // before the work
-  bool resume = false;                // go on from an interrupted conversion of this step, if there is one
-  bool expect_new_geometry = false;   // for speed alone: the step before had a geometry of its own
+  std::optional<double> time;              // otherwise the source's, or one more than the last step's
+  std::optional<double> blank_value;       // as the other steps were converted with
+  uint64_t memory_bytes = 0;               // 0: defaultMemory()
+  unsigned threads = 0;                    // 0: as many as the machine has
+  bool check_disk_space = true;            // before the work
+  bool resume = false;                     // continue an interrupted conversion of this step, if there is one
+  bool expect_new_geometry = false;        // for speed only: the previous step had a new geometry
   std::filesystem::path temporary_folder;  // empty: the folder of the cache
 
   /// Smaller buckets than memory would allow: for tests.

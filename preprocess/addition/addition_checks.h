@@ -9,7 +9,7 @@
 
 namespace curvisplat {
 
-/// Throws Error if the grid's blocks are not those of the cache, which tells at once that it is another grid.
+/// Throws Error if number or sizes of the grid's blocks differ from the cache's: then it is a different grid.
 void checkBlocks(const GridDescription& grid, const CacheReader& cache);
 
 /// The overlaps of the grid's blocks where `cache` draws each point once; else none. Throws Error if the grid cannot be

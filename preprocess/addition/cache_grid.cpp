@@ -11,7 +11,7 @@
 namespace curvisplat {
 namespace {
 
-/// For splats that nobody wants.
+/// Discards splats.
 class NoSink : public SplatSink {
  public:
   void add(const NodeSplat&, std::span<const SplatScalar>) override {}

@@ -1,6 +1,6 @@
-// A grid with the nodes that a cache has drawn, whatever scalars are read from it now: blank is what the
-// cache has no splat of, so that every cell comes out as it did when the cache was made. Where splats stand
-// for cells, those that the cache has not have no value (NaN).
+// A grid restricted to the nodes that a cache draws, whichever scalars are read from it now: nodes without a
+// splat in the cache are blanked, so that every splat comes out as it did when the cache was made. With
+// cell-centred scalars, cells without a splat in the cache have the value NaN.
 #pragma once
 
 #include <cstdint>
@@ -29,8 +29,8 @@ class CacheGrid : public GridSource {
   /// Blanks nodes that `cache` has no splat of, too. Throws Error if a disk fails.
   void restrictTo(const CacheReader& cache, const MemoryPlan& plan,
                   const std::filesystem::path& temporary_folder, Progress& progress);
-  /// Takes back those that were merged into others at seams, by merging the grid's faces again. To be called
-  /// after restrictTo(), and while nobody reads.
+  /// Restores the nodes that were merged into others at seams, by merging the grid's faces again. To be called
+  /// after restrictTo(), while no other thread reads.
   void addMergedFaces(const MemoryPlan& plan, UnlikeHalves unlike,
                       const std::filesystem::path& temporary_folder, Progress& progress);
 

@@ -1,5 +1,5 @@
-// Converts a series of time steps to one cache: the first step as always, then each further one is added
-// (add_step.h). So from the first step on there is a whole cache of the steps so far, at every moment.
+// Converts a series of time steps to one cache: converts the first step, then adds each further one
+// (add_step.h). From the first step on, the cache is complete at every moment and has the steps so far.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,7 @@ struct SeriesInput {
 struct SeriesOptions {
   ConvertOptions convert;   // of the first step; `scalars` is not used
   bool keep_going = false;  // leave out steps that do not fit
-  bool add = false;         // to the cache that is there, which has other steps
+  bool add = false;         // to an existing cache, which has other steps
 };
 
 /// One step that was converted, or left out for `reason`.
@@ -51,8 +51,8 @@ struct SeriesReport {
   uint64_t nodes = 0;           // of a step
 };
 
-/// Converts or, with options.convert.resume, goes on from where an interrupted conversion of the same series
-/// stopped: steps that the cache has at the same time are passed over. `report` is called after each step. Throws
+/// Converts a series. With options.convert.resume it continues an interrupted conversion of the same series:
+/// steps that the cache has already, by their times, are skipped. `report` is called after each step. Throws
 /// Error that names the step that does not fit, unless options.keep_going, and Interrupted; the cache keeps the
 /// steps so far.
 SeriesReport convertSeries(const SeriesInput& input, const SeriesOptions& options, Progress& progress,

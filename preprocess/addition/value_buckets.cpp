@@ -13,8 +13,8 @@ namespace {
 
 constexpr size_t kGatheredBytes = 32 << 10;
 
-/// What a brick takes of a bucket while it is built: its records and their places, its geometry, what is
-/// encoded of it, and what is merged of it for its parent.
+/// Memory for a brick of a bucket while it is built: its records and their places, its geometry, its encoded
+/// values, and the values merged from it for its parent.
 uint64_t bytesOf(const Brick& brick, size_t variables) {
   const uint64_t splats = brick.splats;
   const uint64_t merged =

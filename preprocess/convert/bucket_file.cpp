@@ -43,7 +43,7 @@ struct DirectAllocator {
 /// A chunk in memory, at an address for direct transfers.
 using ChunkBuffer = std::vector<std::byte, DirectAllocator<std::byte>>;
 
-/// Writes chunks in a thread of its own, so that no worker waits for the disk unless it is far behind.
+/// Writes chunks in its own thread, so that workers wait for the disk only when it is far behind.
 class ChunkWriter {
  public:
   struct Chunk {

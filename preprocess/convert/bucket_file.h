@@ -43,11 +43,11 @@ struct BucketChains {
 
 class BucketFile {
  public:
-  /// Makes `path`. A bucket's buffer has `chunk_bytes`, a multiple of kDirectAlignment; it is there while the
-  /// bucket has something in it. Four more may wait for the disk.
+  /// Makes `path`. A bucket has a buffer of `chunk_bytes`, a multiple of kDirectAlignment, while it has unwritten
+  /// records. Up to four more buffers may be waiting for the disk.
   BucketFile(const std::filesystem::path& path, uint32_t buckets, size_t chunk_bytes);
-  /// Opens what another process has made. Each chunk that is read is checked: LostBuckets is thrown here or
-  /// by reading if the file is not as it was.
+  /// Opens a file that another process has made. Checks each chunk that is read: throws LostBuckets here or
+  /// when reading if the file has changed.
   BucketFile(const std::filesystem::path& path, BucketChains chains);
   /// Removes the file, unless it is to be left.
   ~BucketFile();
@@ -62,7 +62,7 @@ class BucketFile {
   void append(uint32_t bucket, std::span<const std::byte> records);
 
   /// Writes what is left in the buffers and frees them. Reading is possible from here on, by any thread;
-  /// nothing is appended. `sync`: another machine is to read it.
+  /// nothing can be appended. `sync`: another machine will read it.
   void close(bool sync = false);
 
   /// After close(): the records of another rank's file, which has the same buckets, are read as well. That file

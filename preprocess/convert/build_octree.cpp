@@ -39,8 +39,8 @@ void OctreeBuilder::buildShare(const BucketFile& file, uint32_t first, uint32_t 
   CURVISPLAT_CHECK_OP(carried_.size(), ==, 0u);
 }
 
-/// How many bricks of its own a node that has splats gets, if it is not below the unit that they are built
-/// in.
+/// Number of bricks of a node that has splats and is not below the cell that is built as a whole
+/// (buildUnitOf).
 uint64_t OctreeBuilder::bricksOf(uint32_t node) const {
   const CellContents& contents = (*tree_)[node].contents;
   if ((*tree_)[node].cell.level < kMaxLevel && !contents.coincide()) return 1;

@@ -1,6 +1,6 @@
-// What an unfinished conversion says of itself, to the one that goes on from it: what it converts, where its
-// temporary files are, and what the splats are once they are all on disk. A file of JSON and its checksum in
-// the partial folder, written whole or not at all; of this program's own version only.
+// The state of an unfinished conversion, for the one that resumes it: its input, its temporary folder and,
+// once all splats are on disk, where they are. A JSON file with a checksum in the partial folder, replaced
+// atomically. Only the version of the program that wrote it reads it.
 #pragma once
 
 #include <filesystem>

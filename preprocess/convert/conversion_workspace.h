@@ -1,4 +1,4 @@
-// The folders that a conversion works in, and what it finds in them of one that was interrupted.
+// The folders that a conversion works in, and the files of an interrupted conversion that it finds there.
 //
 //    NAME.splats.partial/    beside the output, locked: the cache as it grows, and
 //      journal               what is converted, where the scratch folder is, and the splats once all are there
@@ -9,8 +9,8 @@
 //      ^                          |  ^             | one by one
 //      +------- lost by the disk -+  +-- goes on --+
 //
-// A process may die anywhere: what it leaves is checked by whoever goes on from it. Worth going on from is
-// what has all splats, or some bricks. Anything less is removed and made again.
+// A process may die at any moment, so a conversion that resumes checks all files that it finds. It resumes
+// only if all splats, or some bricks, are there. Otherwise it removes the files and starts anew.
 #pragma once
 
 #include <filesystem>
@@ -39,12 +39,12 @@ class ConversionWorkspace {
   /// resumed had other `facts`.
   ConversionWorkspace(const std::filesystem::path& output, bool overwrite, Unfinished unfinished,
                       const std::filesystem::path& temporary_folder, std::vector<ConversionFact> facts);
-  /// Removes the folders, unless leaveForResuming() was called; once the cache is in place, what is left of
-  /// the work.
+  /// Removes the folders unless leaveForResuming() was called; once the cache is in place, only the temporary
+  /// files that are left.
   ~ConversionWorkspace();
 
   bool resumed() const { return resumed_; }
-  /// The splats that an interrupted conversion has left; none: they are to be made.
+  /// The splats that an interrupted conversion has left; nullopt: they have to be made.
   const std::optional<ScatteredSplats>& splats() const { return journal_.splats; }
   PartialFolder& partial() { return *partial_; }
   std::filesystem::path splatsFile() const { return splatsFileOf(scratch_->path(), 0); }
@@ -56,15 +56,15 @@ class ConversionWorkspace {
   const std::filesystem::path& scratch() const { return scratch_->path(); }
 
   void noteSplats(ScatteredSplats splats);
-  /// They are not what they were.
+  /// After LostBuckets: the splats on disk are damaged.
   void forgetSplats();
 
-  /// Bytes that the folders take already, for who asks whether there is room.
+  /// Bytes that the partial folder takes already, which need no further disk space.
   uint64_t bytesInPartial() const;
 
   /// Leaves the folders for a later conversion if they are worth it. Returns whether they are.
   bool leaveForResuming();
-  /// A conversion that was killed between putting its cache into place and clearFinished(): clears for it,
+  /// If a conversion was killed after its cache was in place and before clearFinished(): removes its files
   /// and returns true. Facts as above.
   static bool clearIfFinished(const std::filesystem::path& output, const std::vector<ConversionFact>& facts);
 

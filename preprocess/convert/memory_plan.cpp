@@ -22,7 +22,7 @@ constexpr uint64_t kMiB = uint64_t{1} << 20;
 constexpr uint64_t kProgramBytes = 64 * kMiB;
 constexpr uint64_t kAllocatorShare = 16;
 constexpr uint64_t kSeamShare = 8, kSlabShare = 8, kMeshShare = 2;  // of the rest
-// Buckets are built from at least so many splats: some bricks at a time for each thread to work on.
+// The fewest splats of a bucket: some bricks for each thread to work on.
 constexpr uint64_t kMinBucketSplats = 4 * kMaxBrickSplats;
 constexpr uint64_t kMinChunkBytes = kMiB / 8, kMaxChunkBytes = kMiB;
 constexpr uint32_t kMaxBuckets = 4096;
@@ -33,7 +33,7 @@ uint64_t brickScratchBytes(size_t variables) {
   return kMaxBrickSplats * (200 + 100 * variables);
 }
 
-/// A splat of a bucket: its record, its place in two orders, and what is encoded of it.
+/// Bytes for a splat of a bucket: its record, its place in two orders, and its encoded form.
 uint64_t bucketBytesPerSplat(size_t variables) {
   return regularRecordBytes(variables) + 2 * sizeof(uint32_t) + 12 + 10 * variables;
 }

@@ -1,5 +1,5 @@
-// How conversion splits the bytes it is given among what it keeps in memory. The passes follow one another,
-// so each may have nearly all; what lives through several (the program itself) comes off first.
+// How a conversion divides the memory it may use. The passes run one after the other, so each may use nearly
+// all of it, less what the program itself needs throughout.
 //
 //    scan          2 slabs | seams: faces of cells
 //    count         2 slabs | counting grid
@@ -15,46 +15,46 @@
 namespace curvisplat {
 
 struct MemoryPlan {
-  uint64_t cap_bytes = 0;       // that all of it keeps
+  uint64_t cap_bytes = 0;       // limit of the process
   uint64_t slab_bytes = 0;      // each of two; one of long rows may have kSlabsOfLongRows times as much
   uint64_t counting_bytes = 0;  // the counting grid
   uint64_t seam_bytes = 0;
   uint64_t owner_bytes = 0;         // the cells of overlapping blocks, while splats are made
-  uint64_t mesh_bytes = 0;          // of an unstructured grid, in the place of slabs and seams
+  uint64_t mesh_bytes = 0;          // of an unstructured grid, instead of slabs and seams
   uint64_t chunk_buffer_bytes = 0;  // the write buffers of all buckets
   uint32_t most_buckets = 0;        // of one temporary file, so that buffers stay large enough to write well
-  uint64_t bucket_splats = 0;       // a bucket of more is divided again before it is built
+  uint64_t bucket_splats = 0;       // larger buckets are divided before they are built
   uint64_t bucket_bytes = 0;        // the records of such a bucket
-  unsigned threads = 0;             // that may work at once: each has its scratch
+  unsigned threads = 0;             // working at once, each with scratch memory
 
   /// `threads` is what the user grants. Throws Error if `cap_bytes` is less than leastMemory().
   static MemoryPlan of(uint64_t cap_bytes, size_t variables, unsigned threads);
 
-  /// The same, of options as they are given: 0 is defaultMemory(), or as many threads as the machine has.
+  /// The same for unparsed options: 0 stands for defaultMemory(), or for as many threads as the machine has.
   static MemoryPlan ofOptions(uint64_t cap_bytes, size_t variables, unsigned threads);
 
-  /// The cap of which seams get so much.
+  /// The limit at which seams get this much.
   static uint64_t capForSeams(uint64_t seam_bytes);
-  /// The cap of which a mesh gets so much.
+  /// The limit at which a mesh gets this much.
   static uint64_t capForMesh(uint64_t mesh_bytes);
 
-  /// Makes room for slabs of long rows that are so large. Throws Error that names a sufficient cap if the cap is too small for that.
+  /// Makes room for slabs of `bytes`, which long rows need. Throws Error that names a sufficient limit if there is too little.
   void requireSlabs(uint64_t bytes);
 
   /// Makes buckets smaller than they could be.
   void limitBuckets(uint64_t splats, size_t variables);
-  /// A bucket's write buffer, where a file has so many buckets.
+  /// The size of a bucket's write buffer in a file of `buckets`.
   size_t chunkBytes(uint32_t buckets) const;
-  /// About the peak of a conversion of so many splats: most take less than the cap.
+  /// The approximate peak memory of a conversion of `splats`: often less than the limit.
   uint64_t expectedPeak(uint64_t splats, size_t variables) const;
-  /// What is planned for, with room for the splats that counts of nodes do not foresee.
+  /// The size that buckets are planned for, with a reserve for splats that the count of nodes misses.
   uint64_t plannedBucketSplats() const { return bucket_splats - bucket_splats / 5; }
 };
 
-/// The smallest cap that conversion of so many variables keeps.
+/// The smallest limit within which `variables` can be converted.
 uint64_t leastMemory(size_t variables);
 
-/// What the machine has.
+/// Memory of the machine.
 uint64_t machineMemory();
 
 /// 2 GiB or a quarter of the machine's memory, the smaller.

@@ -1,5 +1,5 @@
-// What would make a long conversion fail at its end is asked at its beginning: is the output's name free, can
-// the folders be written, and is there room on their disks.
+// Checks before a long conversion what would make it fail at its end: that the output may be written, that
+// its folders are writable, and that their disks have room.
 #pragma once
 
 #include <cstddef>

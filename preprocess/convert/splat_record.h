@@ -33,7 +33,7 @@
 
 namespace curvisplat {
 
-/// A grid may have so many nodes.
+/// Largest number of nodes of a grid.
 inline constexpr uint64_t kMaxNodes = uint64_t{1} << 47;
 
 inline constexpr size_t regularRecordBytes(size_t variables) {

@@ -1,5 +1,5 @@
-// Where the cells of one block's end abut on those of another's, or of the same block's other end: there the
-// data goes on, and the cells have no border. For cell-centred data, whose cells are not merged at seams.
+// Finds where the cells at the end of a block abut on cells of another block, or of the same block's other
+// end: there the data continues and the cells have no border. For cell-centred data, which has no seams.
 #pragma once
 
 #include <array>
@@ -23,13 +23,13 @@ struct CellFace {
   bool upper = false;
 };
 
-/// Two faces at blocks' ends abut if their centres coincide, by SeamMerger's measure of what coincides; on
-/// which sides of them the cells lie is not asked. One that has collapsed to an edge (at an axis) or to a
-/// point is no border either. What abuts otherwise is not found: faces of other sizes, and those beside cells
-/// that are not there though another block has them.
+/// Two faces at blocks' ends abut if their centres coincide, by SeamMerger's tolerance; on which side of them
+/// the cells lie does not matter. A face that has collapsed to an edge (at an axis) or to a point is no border
+/// either. Not found are abutting faces of different sizes, and faces beside a blanked cell in whose place
+/// another block has a cell.
 class AbuttingFaces {
  public:
-  /// What a grid's faces at blocks' ends take.
+  /// Memory and disk space for the faces at the ends of a grid's blocks.
   struct Needs {
     uint64_t memory_bytes = 0;  // as long as it lives
     uint64_t disk_bytes = 0;    // until match() returns, at the most
@@ -56,7 +56,7 @@ class AbuttingFaces {
   /// Before match(): notes which faces fold(). Takes its Needs' memory once more.
   void keepFolds() { folded_.resize(abutting_.size()); }
 
-  /// Of cells that are there. One thread at a time. Throws Error if the disk fails.
+  /// Faces of cells that are not blanked. One thread at a time. Throws Error if the disk fails.
   void add(std::span<const Centre> centres);
   /// After the last add(): finds those that abut. Throws Error if the disk fails, Interrupted if a stop is
   /// asked for.

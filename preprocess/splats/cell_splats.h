@@ -6,7 +6,7 @@
 // constant field has the same density in every cell. Along each lattice axis they are stretched as those of
 // nodes are (stretch.h), but not where the cell is the last one in its block or beside one that is missing:
 // whether that is a border depends on other blocks. The slope is that of the linear field through the centres
-// of the neighbouring cells; a missing one (the block ends, or it is not there) makes the difference one-sided.
+// of the neighbouring cells; where one is missing (block end, blanked) the difference is one-sided.
 //
 // A cell that has no neighbour ends at a border, and its splat remembers where (stream/border_code.h); there is
 // a neighbour, too, where blocks abut.
@@ -26,7 +26,7 @@ namespace curvisplat {
 /// What is beyond the ends of a block.
 struct BlockEnds {
   size_t block = 0;
-  const AbuttingFaces* faces = nullptr;  // null: cells are not told that they end at borders
+  const AbuttingFaces* faces = nullptr;  // null: no cell ends at a border
 };
 
 /// What is read around the cells of a box: two cells on either side, and the nodes behind the last.
@@ -39,10 +39,10 @@ struct CellScratch {
   std::array<std::vector<double>, 3> extent;  // squared, along i, j, k; times 16
 };
 
-/// Computes the splats of the cells whose lowest nodes are in `box` and that are there: all of their corners
-/// are, and their values. A splat's number is that of the cell's lowest node. `in.window` is `box` and
-/// kCellSplatHalo where the block goes on; `in.nodes` as a NodeReader of cell-centred scalars gives them.
-/// Overwrites `out` and keeps its capacity. Of the corrections only `stretch` is for cells. Pure: any
+/// Computes the splats of the cells whose lowest nodes are in `box`, except for cells with a blanked corner or
+/// value. A splat has the number of its cell's lowest node. `in.window` is `box` with kCellSplatHalo around it
+/// inside the block; `in.nodes` are as a NodeReader of cell-centred scalars reads them.
+/// Overwrites `out` and keeps its capacity. Of the corrections only `stretch` applies to cells. Pure: any
 /// thread. Throws nothing but bad_alloc.
 void computeCellSplats(const BlockWindow& in, const NodeBox& box, const BlockEnds& ends, CellScratch& scratch,
                        NodeSplats& out, const NodeSplatCorrections& corrections = {});

@@ -1,6 +1,6 @@
-// A cell of which another block's cells cover a part: what is left of its splat.
+// A cell that is partly covered by cells of another block: what is left of its splat.
 //
-// The cell is looked at in 64 points. A bit says of each whether another block draws the data there. In lattice
+// The cell is sampled at 64 points. A bit for each says whether another block draws the data there. In lattice
 // directions a point is at ±(2m + 1)/32 of the cell from its middle, m = 0..7 once in each octant, so that along each
 // axis 16 evenly spaced distances occur: a face of the other block that runs along the lattice is found to a
 // sixteenth of a cell. The points stand for equal parts of the cell, and the splat gets the moments of those that

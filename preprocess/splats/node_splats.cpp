@@ -281,7 +281,7 @@ inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbou
   bool is_left = true;  // a part of the cell at least
   const auto set_values = [&](const auto& frame) {
     constexpr bool kPlain = std::remove_cvref_t<decltype(frame)>::kIsPlain;
-    // Where an axis was raised there is no telling a bend of the scalar from one of the coordinates.
+    // Along a floored axis, a bend of the scalar cannot be told from one of the coordinates.
     const bool correct_bends = kPlain && corrections_.bends;
     glm::dvec3 bend_in_cells(0.0), aside_in_cells(0.0);
     if constexpr (kPlain) {

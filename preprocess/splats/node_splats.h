@@ -111,7 +111,7 @@ struct NodeSplats {
 inline constexpr Halo kNodeSplatHalo{kStretchReach, kStretchReach};
 
 /// A window of one block: `nodes` holds `window`, which is `box` and its halo (kNodeSplatHalo) in j and k
-/// where the block goes on.
+/// inside the block.
 struct BlockWindow {
   GridBlock block;
   uint64_t first_node = 0;  // of the block in the whole grid
@@ -123,8 +123,8 @@ struct BlockWindow {
   uint64_t endOfPart(uint64_t count) const { return std::min(i1, count); }
 };
 
-/// What is done beyond the linear part of the mapping at the node. Conversion does all of it; tests switch
-/// one off and see what it is worth.
+/// Corrections beyond the linear part of the mapping at the node. Conversion makes all of them; tests switch
+/// single ones off to measure what they are worth.
 struct NodeSplatCorrections {
   bool border_codes = true;  // else a border's node has a whole cell of half the weight, around itself
   bool faces = true;         // to be cut at; else cells at borders are drawn in parts

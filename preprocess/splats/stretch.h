@@ -10,7 +10,7 @@
 //
 //     ln s  = 0.1531 curve + 0.0828 curve² - 0.0418 bend slope         s: the splat's length over the cell's
 //     g     = slope (1/2 + 0.2892 curve - 0.0667 far_curve) + bend (0.0676 + 0.1392 curve)
-//     drift = slope (0.07 + 0.0457 curve)                              towards the larger cells, in cells
+//     drift = slope (0.07 + 0.0457 curve) + 0.0033 bend                towards the larger cells, in cells
 //
 // Where cells grow by a constant factor e^g only `slope` is not zero: s is 1, and the drift 0.14 g. That makes up
 // for blurs that widen with the cells, which carry more from each into the smaller ones than they get back: a
@@ -19,10 +19,10 @@
 // in a uniform medium, with these, and with s² = 0.418 + 0.582 (ĥ/h)², ĥ the geometric mean with weights 1 4 6 4 1,
 // g the slope of ln h over the same five, and 0.14 g:
 //
-//     elements of 4, 5, 6, 7, 9 steps       1.013 1.020 1.021 1.025 1.028       1.047 1.050 1.054 1.057 1.063
-//     3, 5, 7 steps, elements growing 1.42  1.019 1.024 1.032                   1.035 1.056 1.062
-//     tanh, blocks of 8, three strengths    1.044 1.057 1.069                   1.079 1.107 1.139
-//     jumps by 1.5, by 2                    1.007 1.015                         1.010 1.025
+//     elements of 4, 5, 6, 7, 9 steps       1.008 1.021 1.020 1.022 1.027       1.047 1.050 1.054 1.057 1.063
+//     3, 5, 7 steps, elements growing 1.42  1.016 1.025 1.028                   1.035 1.056 1.062
+//     tanh, blocks of 8, three strengths    1.044 1.058 1.070                   1.079 1.107 1.139
+//     jumps by 1.5, by 2                    1.005 1.011                         1.010 1.025
 //
 // A line ends at a block's face and beside a missing cell. There the extents are mirrored, less their steady
 // growth: the smaller of the two growths next to the end, 1 where they disagree or the line is short.
@@ -88,7 +88,8 @@ inline Stretch stretchOf(double before2, double before, double own, double after
       std::abs(x) < kNearlyOne ? 1.0f : s,
       std::clamp(slope * (0.5f + 0.2892f * curve - 0.0667f * far_curve) + bend * (0.0676f + 0.1392f * curve),
                  -0.65f, 0.65f),
-      std::clamp(slope * (0.5f * static_cast<float>(kDrift) + 0.0457f * curve), -0.125f, 0.125f)};
+      std::clamp(slope * (0.5f * static_cast<float>(kDrift) + 0.0457f * curve) + 0.0033f * bend, -0.125f,
+                 0.125f)};
 }
 
 /// The steady growth per sample of squared extents, from those of the three samples next to the end of a

@@ -1,9 +1,9 @@
 // Draws screen splats on the processor's cores: batches of splats, sorted into the tiles that they touch;
 // every tile painted by one thread, in vectors (tile.h). DESIGN.md, "Painting".
 //
-// Nearest first, each under what is there; what can hardly be seen any more is left out, by less than 1/4096
-// of any channel (tile.h). That is the only way it works, since it costs less even where nothing is hidden:
-// two multiplications fewer a pixel.
+// Splats are blended nearest first, each under those before it. Splats that change no channel by 1/4096 or
+// more are left out (tile.h). There is no painter from back to front: this order is cheaper even where
+// nothing is hidden, by two multiplications a pixel.
 //
 // The picture's bits depend neither on threads nor on batches: a pixel's splats are blended one after the
 // other, in their order.

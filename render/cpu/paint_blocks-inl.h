@@ -108,7 +108,7 @@ HWY_INLINE Pixels pixelsAt(const Ellipse& e, const float* HWY_RESTRICT footprint
   return {depth, p, q};
 }
 
-/// Blends one vector of a block's pixels under what is there. What then still comes through.
+/// Blends one vector of a block's pixels under the splats before it. Returns the transmittance that is left.
 template <bool kThin>
 HWY_INLINE V blendUnder(float* HWY_RESTRICT at, V depth, const V (&value)[4]) {
   const Floats d;

@@ -1,15 +1,15 @@
-// How the CPU's painter keeps a frame: square tiles, one after the other in rows, each small enough for a
-// core's nearest cache, each painted by one thread at a time.
+// The frame in memory, as the processor's painter keeps it: square tiles, row by row. A tile fits in a core's
+// first-level cache and is painted by one thread at a time.
 //
 //   tile    8 x 8 blocks in rows           16 KiB
 //   block   4 x 4 pixels                   256 bytes, 4 cache lines
 //   in it   red [16], green [16], blue [16] (premultiplied), transmittance [16], each in rows of 4
 //
-// Splats come nearest first, and each is blended under what is there: a block behind which nothing can be
-// seen takes no more. Let T < kSaturated be the largest transmittance of its pixels then. What would still
-// have been added to any of them is T times what the rest makes of a colour or an opacity in 0..1: less than
-// 1/4096, a sixteenth of a step of 8 bits, and the picture so 72 dB or more from the one with everything in
-// it. A block's state after so many splats is the same however they were batched, and so are the bits.
+// Splats come nearest first, and each is blended under those before it. A block is saturated, and takes no
+// more splats, once the largest transmittance T of its pixels is below kSaturated. The remaining splats could
+// have added at most T times a colour or an opacity in 0..1 to a pixel: less than 1/4096, a sixteenth of an
+// 8-bit step, so the picture differs from the complete one by 72 dB or more. Whether a block is saturated
+// after a given splat does not depend on how splats were batched, so the bits of the picture do not either.
 //
 // A block is one vector of 16 floats a channel, or a few narrower ones: no vector is ever partly filled or
 // unaligned, and a small splat touches few.
@@ -32,10 +32,10 @@ inline constexpr int kBlockFloats = 4 * kBlockPixels;
 inline constexpr int kTileBlocks = kTileSide / kBlockSide;  // along a side
 inline constexpr int kTileFloats = 4 * kTileSide * kTileSide;
 
-// A splat's mean extinction, and colour times extinction, are looked up for every pixel, or where a constant
-// or a parabola over the splat (or 4x4 of its pixels) is known to be no farther from that than this part of
-// the largest extinction there (of all splats together less than e^-1 / 256 of opacity), or this optical
-// depth. The flat splat, one colour for all of it, is the constant.
+// A splat's mean extinction, and colour times extinction, are looked up for every pixel, unless a constant or
+// a parabola over the splat (or over 4x4 of its pixels) is known to differ by less than this part of the
+// largest extinction there (which changes the opacity of all splats together by less than e^-1 / 256), or by
+// less than this optical depth. A flat splat, which has one colour throughout, is a constant.
 inline constexpr float kRelativeError = 1.0f / 256;
 inline constexpr float kDepthError = 2e-5f;
 

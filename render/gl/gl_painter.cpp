@@ -125,7 +125,7 @@ struct GlPainter::State {
   InstanceBuffer copied;                 // what lies elsewhere is copied here to be drawn
   std::optional<InstanceBuffer> mapped;  // what lies here is not
   std::span<ScreenSplat> mapped_splats;
-  std::vector<ScreenSplat> held;  // the last splat of a draw, with the records of it that have come
+  std::vector<ScreenSplat> held;  // the last splat of a draw, with those of its records that have arrived
   GlObject framebuffer, layers_texture;
   std::vector<GlObject> colours;  // an attachment for each window of depth
   ImageSize size{0, 0};

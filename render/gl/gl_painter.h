@@ -30,8 +30,8 @@ class GlPainter final : public Painter {
   double drawSeconds() const override;
   double glSeconds() const override;
 
-  /// A buffer of OpenGL's for so many splats, mapped for as long as it is there: until the next call. Empty
-  /// where OpenGL is older than 4.4.
+  /// An OpenGL buffer for `count` splats, persistently mapped; valid until the next call. Empty if OpenGL is
+  /// older than 4.4.
   std::span<ScreenSplat> mapSplats(size_t count);
 
  private:

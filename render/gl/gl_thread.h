@@ -1,4 +1,4 @@
-// The one thread that owns the OpenGL context. Whatever touches GL runs on it, as a job that the caller waits
+// The one thread that owns the OpenGL context. All calls of OpenGL run on it, in jobs that the caller waits
 // for.
 #pragma once
 
@@ -35,7 +35,7 @@ class GlThread {
 
   Mutex mutex_;
   ConditionVariable changed_;
-  const Job* job_ GUARDED_BY(mutex_) = nullptr;  // to be run; null when it has
+  const Job* job_ GUARDED_BY(mutex_) = nullptr;  // the job to run; null once it has run
   std::exception_ptr error_ GUARDED_BY(mutex_);  // of the last job
   bool stopping_ GUARDED_BY(mutex_) = false;
 

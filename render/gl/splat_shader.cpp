@@ -112,7 +112,7 @@ flat in vec2 cut;
 flat in vec2 light;
 flat in vec4 skew;
 flat in vec4 depth_line;
-uniform sampler2D layers;  // the depths of the pixel's, from the nearest; infinite where there is none
+uniform sampler2D layers;  // depths of the pixel's layers, nearest first; infinite beyond the last
 layout(location = 0) out vec4 blended0;
 #if WINDOWS > 1
 layout(location = 1) out vec4 blended1;
@@ -140,7 +140,7 @@ vec4 integral(samplerBuffer table, float x, vec4 below_all, vec4 above_all) {
          above_all * max(x - float(cells), 0.0);
 }
 
-// The bounds of mean +- width in a table. Beyond an end of it all is the same; float tells cells apart only near it.
+// The bounds of mean +- width in a table, in cells. Limited to a cell beyond its ends, where nothing changes any more.
 vec2 interval(float mean, float width, bool log_scale, vec2 cells_from) {
   float from = min(cellsOf(mean - width, log_scale, cells_from), float(cells) + 1.0);
   float to = max(cellsOf(mean + width, log_scale, cells_from), -1.0);

@@ -1,7 +1,7 @@
 // Depths as integers, the keys by which a frame's splats are sorted.
 //
 // A key depends only on the splat, its brick and the view, and never lies outside of the range that the
-// brick's box gives. If bricks are taken in the order of those ranges, the index therefore tells which keys
+// brick's box gives. If bricks are taken in the order of those ranges, the index alone says which keys
 // can still come. A splat's key is the depth of its centre. If a piece of a splat (at a border, or cut in
 // perspective) has its centre outside of the box of its brick's centres, it gets the box's nearest or
 // farthest key.

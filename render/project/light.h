@@ -5,8 +5,8 @@
 //     diffuse  = 1 - strength + strength (ambient + diffuse |n · l|)      times the colour
 //     specular = strength specular |n · h|³²                              white, beside the colour
 //
-// with n = g/|g|, l towards the light and h half way between l and the viewer. A gradient has no side, hence
-// |.|. Where the scalar hardly changes there is no surface to light, and the strength goes to 0. The
+// with n = g/|g|, l towards the light and h half way between l and the viewer. Both sides of a surface are
+// lit, hence |.|. Where the scalar hardly changes there is no surface, and the strength goes to 0. The
 // threshold g0 is the range of the transfer function divided by the data's diagonal. It does not depend on
 // the cells' sizes, so that all levels of detail look alike.
 #pragma once
@@ -22,7 +22,7 @@ namespace curvisplat {
 
 struct Light {
   float ambient = 0.3f, diffuse = 0.7f, specular = 0.25f;  // each 0 to 1; ambient + diffuse at most 1
-  std::optional<glm::dvec3> towards;  // the light, from everywhere; none: it is where the viewer is
+  std::optional<glm::dvec3> towards;  // towards the light, a direction; nullopt: towards the viewer
 };
 
 /// The factor of a splat's colour, and the amount of white to add; each 0 to 1.

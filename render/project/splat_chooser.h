@@ -107,8 +107,8 @@ class SplatChooser {
   }
 
   static constexpr auto kSupport = static_cast<float>(kKernelSupport);
-  // Painters find a scalar's place in the table, and depths, in float: beyond these there are infinities, and
-  // infinity minus infinity is no number. Such a splat is drawn flat, and far outside of the table.
+  // Painters compute places in the table and depths in float. Beyond these limits that gives infinities, whose
+  // difference is NaN. A splat beyond them is drawn flat, with a scalar far outside of the table.
   static constexpr float kLargestCells = 1e30f, kMinScale = 1e-7f, kLargestAmplitude = 1e30f,
                          kLargestColour = 1e22f;
 

@@ -61,9 +61,9 @@ struct SplatPiece {
 std::array<SplatPiece, 2> halve(const SplatPiece& piece, int column);
 
 /// Calls take(piece, centre) for the parts of `piece` that are small for their distance and may be in sight.
-/// Stops, and returns false, as soon as take() does, or when `looks_left`, which it counts down, is used up:
-/// a splat that is very large for where it is has parts without end, of which hardly any is taken. One that
-/// is too large or too far for float's squares is in no cache of ours, and is left out.
+/// Returns false as soon as take() does, or when `looks_left`, which it counts down, reaches zero: a splat
+/// that is very large for its distance has endless parts, few of which are taken. Splats that are too large
+/// or too far for their squares to be floats are left out; no cache of this program has them.
 template <typename Take>
 bool cutUp(const PerspectiveMap& map, const SplatPiece& piece, size_t& looks_left, const Take& take) {
   if (looks_left == 0) return false;

@@ -1,104 +1,16 @@
 #!/usr/bin/python3
 """model_files_test.py CURVISPLAT
 
-Writes NetCDF files as models and their tools write them, with netCDF4, and compares what `curvisplat info` measures
-(dimensions, ranges, blanked nodes, bounds and volume) with what numpy makes of the same arrays by the conventions'
-formulas, written down here once more. Exit status 77 (skipped) without python3-netcdf4.
+NetCDF files as models and their tools write them: masks, heights, dates, damage. model_files.py says how. Exit status 77
+(skipped) without python3-netcdf4.
 """
-import json
-import pathlib
 import subprocess
-import sys
-import tempfile
 import unittest
 
-try:
-    import netCDF4
-    import numpy as np
-except ModuleNotFoundError as error:
-    print(f"skipped: {error}; install python3-netcdf4 and python3-numpy")
-    sys.exit(77)
-
-PROGRAM = sys.argv.pop(1)
-RADIUS = 6371.0  # kilometres
-RANDOM = np.random.default_rng(1)
+from model_files import PROGRAM, RANDOM, File, ModelFileTest, netCDF4, np, sphere, standard_altitude
 
 
-def sphere(longitude, latitude, height_km):
-    """World positions of broadcastable arrays, indexed (k, j, i)."""
-    longitude, latitude, height_km = np.broadcast_arrays(longitude, latitude, height_km)
-    east, north, r = np.radians(longitude), np.radians(latitude), RADIUS + height_km
-    return np.stack([r * np.cos(north) * np.cos(east), r * np.cos(north) * np.sin(east), r * np.sin(north)], -1)
-
-
-def volume(places):
-    """The sum of the cells' volumes, each from six tetrahedra: exact to the cells' curvature."""
-    c = [places[k : k - 1 or None, j : j - 1 or None, i : i - 1 or None] for k in (0, 1) for j in (0, 1) for i in (0, 1)]
-    total = 0
-    for a, b in ((1, 3), (3, 2), (2, 6), (6, 4), (4, 5), (5, 1)):
-        total = total + np.einsum("...i,...i", c[a] - c[0], np.cross(c[b] - c[0], c[7] - c[0])) / 6
-    return abs(total.sum())
-
-
-def standard_altitude(pascals):
-    """Kilometres: the barometric formula, integrated downwards from 0 to 90 km in steps of a metre."""
-    h = np.arange(-2000.0, 90000.0)  # geopotential metres
-    feet = [0, 11000, 20000, 32000, 47000, 51000, 71000]
-    lapses = [-0.0065, 0, 0.001, 0.0028, 0, -0.0028, -0.002]
-    lapse = np.select([h < foot for foot in feet[1:]], lapses[:-1], lapses[-1])
-    temperature = np.concatenate([[288.15 + 0.0065 * 2000], 288.15 + 13 + np.cumsum(lapse[:-1])])
-    middle = (temperature[1:] + temperature[:-1]) / 2
-    log_pressure = np.concatenate([[0], np.cumsum(-9.80665 / (287.05287 * middle))])
-    log_pressure += np.log(101325) - np.interp(0, h, log_pressure)
-    geopotential = np.interp(-np.log(pascals), -log_pressure, h)
-    return 1e-3 * 6356766 * geopotential / (6356766 - geopotential)
-
-
-class File(netCDF4.Dataset):
-    """A file with dimensions of the given lengths; a length of None is unlimited."""
-
-    def __init__(self, path, dimensions, **options):
-        super().__init__(path, "w", **options)
-        for name, length in dimensions.items():
-            self.createDimension(name, length)
-
-    def add(self, name, dimensions, values, kind="f8", fill=None, **attributes):
-        variable = self.createVariable(name, kind, tuple(dimensions.split()), fill_value=fill)
-        variable.setncatts(attributes)
-        variable.set_auto_maskandscale(False)
-        variable[...] = values
-        return variable
-
-
-class ModelFiles(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-
-    def file(self, name="file.nc", **dimensions):
-        return File(self.folder / name, dimensions)
-
-    def info(self, *words, fails=False):
-        words = [str(self.folder / word) if "." in str(word) else word for word in words or ("file.nc",)]
-        done = subprocess.run([PROGRAM, "info", "--json", *words], capture_output=True, text=True)
-        self.assertEqual(done.returncode != 0, fails, done.stderr)
-        return done.stderr if fails else json.loads(done.stdout)
-
-    def expect(self, info, places, values, near=1e-4, scalar=0):
-        """`values`: NaN where a node is blanked."""
-        there = ~np.isnan(values)
-        block = info["blocks"][0]
-        self.assertEqual((block["nk"], block["nj"], block["ni"]), values.shape)
-        self.assertEqual(info["blanked"]["by_grid"], (~there).sum())
-        self.assertEqual(info["blanked"]["not_finite"], 0)
-        np.testing.assert_allclose(info["bounds"]["lower"], places[there].min(axis=0), atol=near)
-        np.testing.assert_allclose(info["bounds"]["upper"], places[there].max(axis=0), atol=near)
-        measured = info["scalars"][scalar]
-        np.testing.assert_allclose([measured["min"], measured["max"]], [values[there].min(), values[there].max()], rtol=1e-6)
-        if there.all():
-            np.testing.assert_allclose(abs(block["volume"]), volume(places), rtol=0.01)
-
+class ModelFiles(ModelFileTest):
     # -- masks, from one file or two
 
     def roms(self, name, lon, lat, temp, attributes=None, **masks):
@@ -193,12 +105,6 @@ class ModelFiles(unittest.TestCase):
         self.assertEqual(self.info()["blanked"]["by_grid"], 0)
 
     # -- heights
-
-    def air(self, f, ni=12, nj=8):
-        lon, lat = np.linspace(0, 33, ni), np.linspace(10, 31, nj)
-        f.add("lon", "lon", lon, units="degrees_east")
-        f.add("lat", "lat", lat, units="degrees_north")
-        return lon, lat[:, None]
 
     def test_pressure_levels_in_every_unit(self):
         levels = np.array([1, 10, 100, 300, 500, 850, 1000, 1030.0])
@@ -300,98 +206,6 @@ class ModelFiles(unittest.TestCase):
                 f.add("T", "lev lat lon", RANDOM.random((5, 8, 12)))
             self.assertIn(words, self.info("file.nc", fails=True))
 
-    # -- maps
-
-    def test_a_rotated_pole(self):
-        rlon, rlat, t = np.linspace(-10, 12, 12), np.linspace(-8, 8, 8), RANDOM.random((3, 8, 12)).astype("f4")
-        for turn in (0.0, 20.0):
-            with self.file(rlon=12, rlat=8, height=3) as f:
-                f.add("rlon", "rlon", rlon, units="degrees", standard_name="grid_longitude")
-                f.add("rlat", "rlat", rlat, units="degrees", standard_name="grid_latitude")
-                f.add("height", "height", [10.0, 1000, 5000], units="m", positive="up")
-                f.add("rotated_pole", "", 0, "i4", grid_mapping_name="rotated_latitude_longitude",
-                      grid_north_pole_latitude=39.25, grid_north_pole_longitude=-162.0, north_pole_grid_longitude=turn)
-                f.add("T", "height rlat rlon", t, "f4", grid_mapping="rotated_pole")
-            # The grid's sphere is turned about its axis, tilted until its pole stands at the pole's latitude, and turned
-            # to the pole's longitude.
-            at = sphere(rlon - turn, rlat[:, None], 1e-3 * np.array([10.0, 1000, 5000])[:, None, None])
-            tilt, around = np.radians(90 - 39.25), np.radians(-162.0)
-            y = np.array([[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]])
-            z = np.array([[np.cos(around), -np.sin(around), 0], [np.sin(around), np.cos(around), 0], [0, 0, 1]])
-            half = np.diag([-1.0, -1.0, 1.0])  # grid longitude 0 is the meridian that points away from the pole
-            self.expect(self.info(), at @ half.T @ y.T @ z.T, t)
-
-    def test_lambert_and_stereographic_maps(self):
-        x, y, t = np.arange(12) * 1e5 - 5e5, np.arange(8) * 1e5 - 4e5, RANDOM.random((3, 8, 12)).astype("f4")
-        metres = RADIUS * 1e3
-        north, n = y[:, None], np.sin(np.radians(45))
-        # A cone that touches the sphere at 45 degrees north; the plane that touches it at the pole.
-        rho0 = metres / np.tan(np.radians(45))
-        rho = np.hypot(x, rho0 - north)
-        cone = (10 + np.degrees(np.arctan2(x, rho0 - north)) / n,
-                np.degrees(2 * np.arctan((rho0 / rho) ** (1 / n) * np.tan(np.radians(67.5))) - np.pi / 2))
-        pole = (-45 + np.degrees(np.arctan2(x, -north)), 90 - 2 * np.degrees(np.arctan(np.hypot(x, north) / (2 * metres))))
-        cases = [
-            ({"grid_mapping_name": "lambert_conformal_conic", "standard_parallel": 45.0,
-              "longitude_of_central_meridian": 10.0, "latitude_of_projection_origin": 45.0}, cone),
-            ({"grid_mapping_name": "polar_stereographic", "straight_vertical_longitude_from_pole": -45.0,
-              "latitude_of_projection_origin": 90.0, "scale_factor_at_projection_origin": 1.0}, pole),
-        ]
-        for mapping, (lon, lat) in cases:
-            for unit, scale in (("m", 1), ("km", 1e-3)):
-                with self.subTest(mapping["grid_mapping_name"], unit=unit):
-                    with self.file(x=12, y=8, z=3) as f:
-                        f.add("x", "x", x * scale, units=unit, standard_name="projection_x_coordinate")
-                        f.add("y", "y", y * scale, units=unit, standard_name="projection_y_coordinate")
-                        f.add("z", "z", [10.0, 1000, 5000], units="m", standard_name="height")
-                        f.add("crs", "", 0, "i4", earth_radius=metres, **mapping)
-                        f.add("T", "z y x", t, "f4", grid_mapping="crs")
-                    height = 1e-3 * np.array([10.0, 1000, 5000])[:, None, None]
-                    self.expect(self.info(), sphere(lon, lat, height), t)
-                    flat = np.stack(np.broadcast_arrays(1e-3 * x, 1e-3 * north, height), -1)
-                    self.expect(self.info("file.nc", "--flat"), flat, t)
-
-    def test_a_projection_that_is_not_known(self):
-        with self.file(rlon=12, rlat=8, height=3) as f:
-            f.add("rlon", "rlon", np.arange(12.0), units="degrees", standard_name="grid_longitude")
-            f.add("rlat", "rlat", np.arange(8.0), units="degrees", standard_name="grid_latitude")
-            f.add("height", "height", [10.0, 1000, 5000], units="m", positive="up")
-            f.add("T", "height rlat rlon", RANDOM.random((3, 8, 12)), "f4")
-        self.assertIn("degrees from a rotated pole, but no grid_mapping", self.info("file.nc", fails=True))
-
-    # -- dimensions
-
-    def test_planes_and_indices(self):
-        t = RANDOM.random((3, 8, 12)).astype("f4")
-        i, j, k = np.arange(12.0), np.arange(8.0)[:, None], np.arange(3.0)[:, None, None]
-        with self.file(x=12, y=8, z=3) as f:
-            f.add("x", "x", i, units="km", standard_name="plane_x_coordinate")
-            f.add("y", "y", j[:, 0], units="km", standard_name="plane_y_coordinate")
-            f.add("z", "z", k[:, 0, 0], units="km", standard_name="height")
-            f.add("T", "z y x", t, "f4")
-        places = np.stack(np.broadcast_arrays(i, j, k), -1)
-        self.expect(self.info(), places, t)
-        with self.file(a=12, b=8, c=3) as f:
-            f.add("T", "c b a", t, "f4")
-        info = self.info()
-        self.expect(info, places, t)
-        self.assertIn("have no coordinates", " ".join(info["warnings"]))
-        with self.file(a=12, b=8, c=3) as f:
-            f.DX, f.DY = 2000.0, 4000.0
-            f.add("z", "c", 500 * k[:, 0, 0], units="m", standard_name="height")
-            f.add("T", "c b a", t, "f4")
-        self.expect(self.info(), np.stack(np.broadcast_arrays(2 * i, 4 * j, 0.5 * k), -1), t)
-
-    def test_an_unlimited_dimension_that_is_not_time(self):
-        t = RANDOM.random((3, 8, 12)).astype("f4")
-        with self.file(lon=12, lat=8, height=None) as f:
-            lon, lat = self.air(f)
-            f.add("height", "height", [10.0, 1000, 5000], units="m", positive="up")
-            f.add("T", "height lat lon", t, "f4")
-        info = self.info()
-        self.expect(info, sphere(lon, lat, 1e-3 * np.array([10.0, 1000, 5000])[:, None, None]), t)
-        self.assertEqual(info["times"], [])
-
     # -- when, and what is missing
 
     def test_dates_of_every_calendar(self):
@@ -479,73 +293,6 @@ class ModelFiles(unittest.TestCase):
                 self.assertRegex(done.stderr, r"^curvisplat: [^\n]*\n$")
         print(f"{refused} of 250 damaged files refused")
         self.assertGreater(refused, 50)
-
-    # -- around the Earth
-
-    def globe(self, lon, lat, t, **attributes):
-        """Writes two levels of a grid with longitudes and latitudes of every column."""
-        nj, ni = lon.shape
-        with self.file(x=ni, y=nj, z=2) as f:
-            f.add("lon", "y x", lon, units="degrees_east")
-            f.add("lat", "y x", lat, units="degrees_north")
-            f.add("z", "z", [0.0, 100e3], units="m", standard_name="height")
-            f.add("t", "z y x", t, "f4", **attributes)
-        return self.info()
-
-    def test_global_longitude_closes(self):
-        lat, height = np.linspace(-80, 80, 41), np.array([0, 100.0])[:, None, None]
-        for first, last in ((0, 355), (-177.5, 177.5), (2.5, 362.5), (0, 360), (180, -180)):
-            with self.subTest(first):
-                lon = np.linspace(first, last, 73 if (last - first) % 360 == 0 else 72)
-                t = RANDOM.random((2, 41, len(lon))).astype("f4")
-                if len(lon) == 73:
-                    t[..., -1] = t[..., 0]
-                info = self.globe(*np.meshgrid(lon, lat), t)
-                whole = np.linspace(first, first + (360 if last > first else -360), 73)
-                self.expect(info, sphere(whole, lat[:, None], height), np.concatenate([t, t[..., :1]], -1)[..., :73])
-                self.assertEqual("closed around the Earth" in info["format"], len(lon) == 72)
-        # Columns on both sides that repeat others, as NEMO's; and three quarters of the Earth.
-        lon = np.arange(-5, 365, 5.0)
-        t = RANDOM.random((2, 41, 72)).astype("f4")
-        t = np.concatenate([t[..., -1:], t, t[..., :1]], -1)
-        info = self.globe(*np.meshgrid(lon, lat), t)
-        self.expect(info, sphere(lon[:-1], lat[:, None], height), t[..., :-1])
-        info = self.globe(*np.meshgrid(np.arange(0, 270, 5.0), lat), t[..., :54])
-        self.assertEqual(info["blocks"][0]["ni"], 54)
-
-    def test_tripolar_grids_close_at_their_fold(self):
-        # Confocal ellipses: their innermost row is a segment, whose two sides are the two halves of the fold.
-        columns, rows, top = 48, 9, 1.2
-        height = np.array([0, 100.0])[:, None, None]
-        step = top / (rows - 1)
-
-        def places(v, u):
-            x, y = np.cosh(u)[:, None] * np.cos(v), np.sinh(u)[:, None] * np.sin(v)
-            return np.degrees(np.arctan2(y, x)), 90 - 15 * np.hypot(x, y)
-
-        at_points = 2 * np.pi * np.arange(columns) / columns
-        between = at_points + np.pi / columns
-        through_points = step * np.arange(rows - 1, -3, -1)
-        through_edges = step * (np.arange(rows - 1, -2, -1) + 0.5)
-        cases = {
-            "through points": (at_points, through_points[:-2], 0),
-            "through points, repeated": (at_points, through_points[:-1], 1),
-            "through edges": (between, through_edges[:-1], -1),
-            "through edges, repeated": (between, through_edges, 0),
-        }
-        for name, (v, u, dropped) in cases.items():
-            for halo in (False, True):
-                with self.subTest(name, halo=halo):
-                    angle = np.concatenate([v[-1:], v, v[:1]]) if halo else v
-                    t = RANDOM.random((2, len(u), len(angle))).astype("f4")
-                    info = self.globe(*places(angle, u), t)
-                    block = info["blocks"][0]
-                    self.assertEqual((block["nj"], block["ni"]), (len(u) - dropped, columns + 1))
-                    lon, lat = places(np.append(v, v[0]), np.linspace(u[0], 0, 60))
-                    np.testing.assert_allclose(abs(block["volume"]), volume(sphere(lon, lat, height)), rtol=0.01)
-                    hidden = columns + 1 - columns // 2 if "edges" in name else 0
-                    self.assertIn(info["blanked"]["by_grid"], (2 * hidden, 2 * hidden - 2))
-                    self.assertEqual("fold" in info["format"], name != "through points")
 
 
 if __name__ == "__main__":

@@ -168,6 +168,8 @@ class Histograms(PythonTest):
                 cache.histogram("x", range=(0, 1), log=True)
             with self.assertRaisesRegex(curvisplat.UsageError, "no scalar"):
                 cache.histogram("y", range=(0, 1))
+            with self.assertRaisesRegex(curvisplat.UsageError, "no scalar"):
+                cache.histogram("y")
 
 
 class Views(PythonTest):

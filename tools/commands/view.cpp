@@ -75,6 +75,7 @@ void view(const ViewArguments& arguments) {
   };
   if (!arguments.files.empty() && !isGrid(arguments.files)) {
     cache = openAtStep(arguments.files.front(), arguments.steps);
+    requireFixedFaces(arguments.surfaces, *cache);
     takeScene(arguments, *cache, options);
   } else if (!arguments.files.empty()) {
     options.files = arguments.files;

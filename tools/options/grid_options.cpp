@@ -5,6 +5,7 @@
 #include <map>
 #include <string>
 
+#include "preprocess/formats/derived/derived_mesh.h"
 #include "preprocess/mesh/mesh_source.h"
 
 namespace curvisplat {
@@ -87,7 +88,10 @@ void addGasOptions(CLI::App& app, GasModel& gas) {
 
 std::unique_ptr<DataSource> openWithDerived(const OpenGridOptions& grid, const DerivedOptions& derived) {
   std::unique_ptr<DataSource> source = openData(grid);
-  if (dynamic_cast<const MeshSource*>(source.get())) return source;  // gradients there are not derived
+  if (auto* const mesh = dynamic_cast<MeshSource*>(source.get())) {
+    source.release();
+    return std::make_unique<DerivedMeshSource>(std::unique_ptr<MeshSource>(mesh), derived);
+  }
   return std::make_unique<DerivedSource>(requireGrid(std::move(source), ""), derived);
 }
 

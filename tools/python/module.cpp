@@ -100,7 +100,7 @@ py::dict statisticsOf(const FrameStatistics& statistics) {
   return out;
 }
 
-/// `frame`: text by option; `others`: lists, flags and numbers.
+/// `function`, `camera`, `frame`: text by option; `others`: lists, flags and numbers.
 py::tuple render(OpenCache& cache, const Options& function, const Options& camera, const Options& frame,
                  const py::dict& others, const py::object& progress) {
   const FrameArguments of_frame = frameArguments(

@@ -105,8 +105,8 @@ class RemoteViewer::Work {
       ++function_version_;
     }
     const ImageSize data = dataSize(state.annotations, view.size, function);
-    FrameRequest request{reader.variableNamed(state.variable), function_version_, function, state.camera,
-                         state.frameOptions(data)};
+    FrameRequest request{DrawnScalars(reader.variableNamed(state.variable), function), function_version_,
+                         state.camera, state.frameOptions(data)};
     screenViewOf(reader.manifest(), state.camera, request.options, data);  // refuses what cannot be drawn
     request.moving = view.moving;
     request.target_s = limits_.target_s;

@@ -11,15 +11,11 @@
 #include <optional>
 #include <vector>
 
+#include "preprocess/formats/derived/flow_inputs.h"
 #include "preprocess/formats/derived/flow_window.h"
 #include "preprocess/grid/grid_source.h"
 
 namespace curvisplat {
-
-struct DerivedOptions {
-  GasModel gas;                       // overrides the files' values; the defaults are 1.4 and 1
-  std::optional<double> blank_value;  // samples with this value are blanked
-};
 
 class DerivedSource final : public GridSource {
  public:
@@ -32,7 +28,6 @@ class DerivedSource final : public GridSource {
   bool readFringe(uint32_t block, const NodeBox& box, std::vector<uint8_t>& out) const override;
 
  private:
-  void findInputs();
   void describe();
   bool offers(const QuantityInfo& quantity) const;
 

@@ -168,16 +168,7 @@ double FlowWindow::input(const std::optional<uint32_t>& scalar, size_t n) const 
 }
 
 FlowState FlowWindow::flowAt(size_t n) const {
-  FlowState flow;
-  flow.density = input(inputs_.density, n);
-  const bool stored_velocity = allThere(inputs_.velocity);
-  for (int axis = 0; axis < 3; ++axis)
-    flow.velocity[axis] =
-        stored_velocity ? input(inputs_.velocity[axis], n) : input(inputs_.momentum[axis], n) / flow.density;
-  flow.pressure = inputs_.pressure
-                      ? input(inputs_.pressure, n)
-                      : pressureOf(flow.density, flow.velocity, input(inputs_.energy, n), gas_.gamma);
-  return flow;
+  return flowFrom(inputs_, gas_, [&](const std::optional<uint32_t>& scalar) { return input(scalar, n); });
 }
 
 /// The neighbours of a sample along an axis for which `has` is true; the sample itself where there is none.

@@ -26,6 +26,20 @@ struct FlowInputs {
   std::vector<uint32_t> neededFor(unsigned needs) const;
 };
 
+/// The flow from its inputs: input(scalar) is the value of one, or NaN.
+template <typename Input>
+FlowState flowFrom(const FlowInputs& inputs, const PerfectGas& gas, const Input& input) {
+  FlowState flow;
+  flow.density = input(inputs.density);
+  const bool stored = inputs.velocity[0] && inputs.velocity[1] && inputs.velocity[2];
+  for (size_t axis = 0; axis < 3; ++axis)
+    flow.velocity[static_cast<int>(axis)] =
+        stored ? input(inputs.velocity[axis]) : input(inputs.momentum[axis]) / flow.density;
+  flow.pressure = inputs.pressure ? input(inputs.pressure)
+                                  : pressureOf(flow.density, flow.velocity, input(inputs.energy), gas.gamma);
+  return flow;
+}
+
 /// Processes a block piece by piece, in one thread. Its buffers keep their capacity.
 class FlowWindow {
  public:

@@ -163,7 +163,7 @@ class Cache:
         scalar: a name (default: the first). range: (low, high), by default that of the scalar. log: intervals of equal
         width in the logarithm. Of the step that was drawn last, from a coarse level: fast for any cache."""
         of = next((s for s in self.scalars if not scalar or s.name == scalar), None)
-        low, high = range if range is not None or of is None else (of.min, of.max)
+        low, high = range if range is not None else (of.min, of.max) if of else (0, 1)  # no such scalar: said below
         if not low < high and range is None:
             low, high = low - 0.5, low + 0.5
         shares = np.array(self._core.histogram(scalar, (float(low), float(high)), log, int(bins)))

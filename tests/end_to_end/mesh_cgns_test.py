@@ -1,0 +1,188 @@
+#!/usr/bin/python3
+"""mesh_cgns_test.py CURVISPLAT
+
+Unstructured zones of CGNS, written by libcgns: mesh_formats.py says how. Exit status 77 (skipped) without python3-vtk9.
+"""
+import unittest
+
+from mesh_formats import Mesh, MeshFormats, np, vtk
+
+import cgns_library as cg
+
+
+@unittest.skipUnless(cg.library(), "no libcgns")
+class CgnsMeshes(MeshFormats):
+    def setUp(self):
+        super().setUp()
+        self.path = self.folder / "mesh.cgns"
+
+    def finish(self, file, mesh):
+        file.solution("Nodes", cg.VERTEX, {"p": mesh.p})
+        file.solution("Cells", cg.CELL_CENTER, {"c": mesh.c})
+
+    def write_sections(self, mesh, kind=cg.HDF5, wall=True):
+        kinds = {4: cg.TETRA_4, 5: cg.PYRA_5, 6: cg.PENTA_6, 8: cg.HEXA_8}
+        with cg.CgnsFile(self.path, kind) as file:
+            file.base()
+            file.family("Walls")
+            file.zone("Cube", mesh.points, len(mesh.cells))
+            if wall:
+                file.section("wall", cg.QUAD_4, mesh.cells[0][None, :4] + 1)
+            for n, run in enumerate(mesh.runs()):
+                file.section(f"run {n}", kinds[run.shape[1]], run + 1)
+            file.wall("Bottom", [1, 2, 3])
+            self.finish(file, mesh)
+
+    def mixed(self, mesh, faces=0):
+        kinds = {4: cg.TETRA_4, 5: cg.PYRA_5, 6: cg.PENTA_6, 8: cg.HEXA_8}
+        words = [[cg.QUAD_4, *(mesh.cells[0][:4] + 1)]] * faces + [[kinds[len(c)], *(c + 1)] for c in mesh.cells]
+        begins = np.cumsum([0] + [len(w) for w in words])
+        return np.concatenate(words), begins
+
+    def write_polyhedra(self, mesh, cells=True, parents=True):
+        faces, sides, of_cells = mesh.faces()
+        with cg.CgnsFile(self.path) as file:
+            file.base()
+            file.zone("Cube", mesh.points, len(mesh.cells))
+            half = len(faces) // 2
+            for name, part in (("low", faces[:half]), ("high", faces[half:])):
+                section = file.section(name, cg.NGON, np.concatenate(part) + 1, len(part),
+                                       np.cumsum([0] + [len(f) for f in part]))
+                if parents:
+                    of = sides[:half] if name == "low" else sides[half:]
+                    first = len(faces) + 1
+                    file.parents(section, np.array([s[0] + first for s in of]),
+                                 np.array([s[1] + first if len(s) > 1 else 0 for s in of]))
+            if cells:
+                signed = [[-(f + 1) if turned else f + 1 for f, turned in cell] for cell in of_cells]
+                file.section("cells", cg.NFACE, np.concatenate(signed), len(signed),
+                             np.cumsum([0] + [len(c) for c in signed]))
+            self.finish(file, mesh)
+        if cells:
+            return [[faces[f] for f, _ in cell] for cell in of_cells]
+        # By the sides of faces: first the one, then the other.
+        sorted_cells = [[] for _ in mesh.cells]
+        for part in (range(half), range(half, len(faces))):
+            for side in (0, 1):
+                for face in part:
+                    if side < len(sides[face]):
+                        sorted_cells[sides[face][side]].append(faces[face])
+        return sorted_cells
+
+    def old_layout(self, *sections):
+        """Rewrites sections as CGNS before 3.4 had them: lengths among the numbers, no offsets."""
+        import h5py
+        with h5py.File(self.path, "r+") as file:
+            for name in sections:
+                group = file[f"Base/Cube/{name}"]
+                words = group["ElementConnectivity/ data"][:]
+                begins = group["ElementStartOffset/ data"][:]
+                if group[" data"][0] != cg.MIXED:
+                    words = np.concatenate([[b - a, *words[a:b]] for a, b in zip(begins, begins[1:])]).astype("i4")
+                del group["ElementStartOffset"]
+                del group["ElementConnectivity/ data"]
+                group["ElementConnectivity"].create_dataset(" data", data=words)
+
+    def test_sections_of_one_kind(self):
+        mesh = Mesh()
+        for kind in (cg.HDF5, cg.ADF):
+            with self.subTest(kind=kind):
+                self.write_sections(mesh, kind)
+                info = self.info(self.path)
+                self.assertEqual(info["nodes"], len(mesh.points))
+                self.assertEqual(info["cells"]["count"], len(mesh.cells))
+                self.assertIn("unstructured zone", info["format"])
+                self.assertTrue(any("BCWall" in note for note in info["notes"]), info["notes"])
+                self.assertTrue(any("Walls" in note for note in info["notes"]), info["notes"])
+                self.expect_same([self.path], mesh.vtk())
+
+    def test_mixed_sections(self):
+        mesh = Mesh()
+        words, begins = self.mixed(mesh)
+        with cg.CgnsFile(self.path) as file:
+            file.base()
+            file.zone("Cube", mesh.points, len(mesh.cells))
+            file.section("all", cg.MIXED, words, len(mesh.cells), begins)
+            self.finish(file, mesh)
+        self.expect_same([self.path], mesh.vtk())
+        self.old_layout("all")
+        self.expect_same([self.path], mesh.vtk())
+
+    def test_mixed_sections_with_faces(self):
+        mesh = Mesh()
+        words, begins = self.mixed(mesh, faces=3)
+        with cg.CgnsFile(self.path) as file:
+            file.base()
+            file.zone("Cube", mesh.points, len(mesh.cells))
+            file.section("all", cg.MIXED, words, len(mesh.cells) + 3, begins)
+            self.finish(file, mesh)
+        warnings = self.info(self.path)["warnings"]
+        self.assertTrue(any("3 elements are nodes, lines or faces" in w for w in warnings), warnings)
+        self.assertTrue(any("cell-centred fields" in w for w in warnings), warnings)
+        self.expect_same([self.path], mesh.vtk(), {"c": None})
+
+    def test_polyhedra(self):
+        mesh = Mesh()
+        self.expect_same([self.path], mesh.vtk(self.write_polyhedra(mesh, parents=False)))
+        self.old_layout("low", "high", "cells")
+        self.expect_same([self.path], mesh.vtk(self.write_polyhedra(mesh)))
+        self.expect_same([self.path], mesh.vtk(self.write_polyhedra(mesh, cells=False)))
+        self.write_polyhedra(mesh, cells=False, parents=False)
+        self.expect_line(self.path, words="neither cells (NFACE_n) nor ParentElements")
+
+    def test_several_zones_and_quadratic_elements(self):
+        mesh = Mesh(kinds=(8,))
+        middles = np.array([(mesh.points[c[a]] + mesh.points[c[b]]) / 2 for c in mesh.cells for a, b in
+                            [(0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 5), (2, 6), (3, 7), (4, 5), (5, 6), (6, 7), (7, 4)]])
+        points = np.concatenate([mesh.points, middles])
+        half = len(mesh.cells) // 2
+        with cg.CgnsFile(self.path) as file:
+            file.base()
+            for name, part in (("Low", range(half)), ("High", range(half, len(mesh.cells)))):
+                file.zone(name, points, half)
+                number = len(mesh.points) + 12 * np.array(part)[:, None] + np.arange(12)
+                file.section("bricks", cg.HEXA_20, np.concatenate([np.array(mesh.cells)[part], number], 1) + 1)
+                file.solution("Cells", cg.CELL_CENTER, {"c": mesh.c[part]})
+        info = self.info(self.path)
+        self.assertEqual(info["cells"]["count"], len(mesh.cells))
+        self.assertTrue(any("higher order" in w for w in info["warnings"]), info["warnings"])
+        self.assertAlmostEqual(self.cache([self.path], "c")[1], 1, delta=2e-3)
+
+    def test_the_reader_of_vtk_agrees(self):
+        mesh = Mesh()
+        self.write_sections(mesh, wall=False)
+        reader = vtk.vtkCGNSReader()
+        reader.SetFileName(str(self.path))
+        reader.UpdateInformation()
+        reader.EnableAllPointArrays()
+        reader.EnableAllCellArrays()
+        reader.Update()
+        grid = reader.GetOutput().GetBlock(0).GetBlock(0)
+        while not grid.IsA("vtkUnstructuredGrid"):
+            grid = grid.GetBlock(0)
+        self.assertEqual(grid.GetNumberOfCells(), len(mesh.cells))
+        self.expect_same([self.path], grid)
+
+    def test_damage(self):
+        mesh = Mesh(2)
+        self.write_sections(mesh, cg.ADF)
+        self.assertGreater(self.expect_harmless(self.path), 40)
+        self.write_polyhedra(mesh)
+        self.assertGreater(self.expect_harmless(self.path), 40)
+
+    def test_numbers_that_do_not_exist(self):
+        import h5py
+        mesh = Mesh(2)
+        for where, value in (("low/ElementConnectivity", 10**6), ("cells/ElementConnectivity", 0),
+                             ("cells/ElementConnectivity", -(2**31)), ("cells/ElementStartOffset", -1),
+                             ("low/ElementStartOffset", 2**31 - 1), ("cells/ElementRange", 2**31 - 1)):
+            with self.subTest(where=where, value=value):
+                self.write_polyhedra(mesh)
+                with h5py.File(self.path, "r+") as file:
+                    data = file[f"Base/Cube/{where}/ data"]
+                    data[min(len(data) - 1, 3)] = value
+                self.expect_line(self.path, words="mesh.cgns")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,124 @@
+#!/usr/bin/python3
+"""mesh_su2_test.py CURVISPLAT
+
+SU2's native meshes and restart files: mesh_formats.py says how. Exit status 77 (skipped) without python3-vtk9.
+"""
+import unittest
+
+from mesh_formats import Mesh, MeshFormats, np
+
+try:
+    import meshio
+except ModuleNotFoundError:
+    meshio = None
+
+
+class Su2Meshes(MeshFormats):
+    def setUp(self):
+        super().setUp()
+        self.path, self.restart = self.folder / "mesh.su2", self.folder / "restart_flow"
+
+    def write(self, mesh, numbered=True, zones=1):
+        kinds = {4: 10, 5: 14, 6: 13, 8: 12}
+        with self.path.open("w") as out:
+            if zones > 1:
+                out.write(f"NZONE= {zones}\n")
+            for zone in range(zones):
+                of_zone = range(zone * len(mesh.cells) // zones, (zone + 1) * len(mesh.cells) // zones)
+                out.write((f"IZONE= {zone + 1}\n" if zones > 1 else "") + "%\n% a comment\nNDIME= 3\n"
+                          f"NELEM= {len(of_zone)}\n")
+                for n in of_zone:
+                    corners = " ".join(str(c) for c in mesh.cells[n])
+                    out.write(f"{kinds[len(mesh.cells[n])]} {corners}{f' {n}' if numbered else ''}\n")
+                out.write(f"NPOIN= {len(mesh.points)}{f' {len(mesh.points)}' if numbered else ''}\n")
+                for n, point in enumerate(mesh.points.tolist()):
+                    out.write(" ".join(map(repr, point)) + (f" {n}\n" if numbered else "\n"))
+                out.write("NMARK= 2\nMARKER_TAG= lower\nMARKER_ELEMS= 1\n9 0 1 6 5\nMARKER_TAG= upper\nMARKER_ELEMS= 1\n9 1 2 7 6\n")
+
+    def write_restart(self, mesh, how, order="<"):
+        names = ["x", "y", "z", "p", "Momentum_x"]
+        table = np.column_stack([mesh.points, mesh.p, 2 * mesh.p])
+        if how == "binary":
+            head = np.array([535532, len(names), len(table), 1, 8], order + "i4").tobytes()
+            text = b"".join(name.encode().ljust(33, b"\0") for name in names)
+            self.restart.write_bytes(head + text + table.astype(order + "f8").tobytes() + bytes(8 * 8 + 4))
+            return
+        between = ", " if how == "csv" else "\t"
+        with self.restart.open("w") as out:
+            out.write(between.join(f'"{name}"' for name in ["PointID", *names]) + "\n")
+            for n, row in enumerate(table.tolist()):
+                out.write(between.join([str(n), *map(repr, row)]) + "\n")
+            out.write("EXT_ITER= 3\n" if how == "dat" else "")
+
+    def test_meshes_and_restarts(self):
+        mesh = Mesh()
+        grid = mesh.vtk()
+        for numbered, how, order in ((True, "csv", "<"), (False, "dat", "<"), (True, "binary", "<"), (False, "binary", ">")):
+            with self.subTest(numbered=numbered, how=how, order=order):
+                self.write(mesh, numbered)
+                self.write_restart(mesh, how, order)
+                info = self.info(self.path, self.restart)
+                self.assertEqual([s["name"] for s in info["scalars"]], ["p", "Momentum_x"])
+                self.assertEqual(info["cells"]["count"], len(mesh.cells))
+                self.assertIn("boundaries: lower, upper", info["notes"])
+                self.expect_same([self.path, self.restart], grid, {"c": None})
+
+    def test_derived_scalars(self):
+        mesh = Mesh(2)
+        self.write(mesh)
+        names = ["x", "y", "z", "Density", "Momentum_x", "Momentum_y", "Momentum_z", "Energy"]
+        rho, energy = 1 + mesh.p, 20 + mesh.p
+        table = np.column_stack([mesh.points, rho, rho * 2, rho, 0 * rho, energy])
+        head = np.array([535532, len(names), len(table), 1, 8], "<i4").tobytes()
+        text = b"".join(name.encode().ljust(33, b"\0") for name in names)
+        self.restart.write_bytes(head + text + table.astype("<f8").tobytes())
+        scalars = {s["name"]: s for s in self.info(self.path, self.restart)["scalars"]}
+        pressure = 0.4 * (energy - 0.5 * rho * 5)
+        self.assertAlmostEqual(scalars["pressure"]["max"], pressure.max(), places=5)
+        self.assertAlmostEqual(scalars["mach_number"]["min"], np.sqrt(5 * rho / (1.4 * pressure)).min(), places=5)
+        self.assertNotIn("vorticity_magnitude", scalars)
+        self.assertAlmostEqual(self.cache([self.path, self.restart], "mach_number")[1], 1, delta=2e-3)
+
+    def test_zones(self):
+        mesh = Mesh()
+        self.write(mesh, zones=2)
+        self.write_restart(mesh, "binary")
+        other = self.folder / "restart_other"
+        other.write_bytes(self.restart.read_bytes())
+        self.assertEqual(self.info(self.path, self.restart, other)["cells"]["count"], len(mesh.cells))
+        self.assertAlmostEqual(self.cache([self.path, self.restart, other], "p")[1], 1, delta=2e-3)
+        self.expect_line(self.path, self.restart, words="has 2 zones, but 1 restart files")
+
+    @unittest.skipUnless(meshio, "no python3-meshio")
+    def test_meshio_agrees(self):
+        mesh = Mesh(kinds=(8, 4))
+        cells = [("hexahedron" if run.shape[1] == 8 else "tetra", run) for run in mesh.runs()]
+        meshio.write(self.path, meshio.Mesh(mesh.points, cells))
+        self.write_restart(mesh, "csv")
+        self.expect_same([self.path, self.restart], mesh.vtk(), {"c": None})
+        self.write(mesh)
+        read = meshio.read(self.path)
+        np.testing.assert_array_equal(read.points, mesh.points)
+        self.assertEqual(sum(len(b.data) for b in read.cells if b.type in ("hexahedron", "tetra")), len(mesh.cells))
+
+    def test_damage(self):
+        mesh = Mesh(2)
+        self.write(mesh)
+        self.assertGreater(self.expect_harmless(self.path, scalar="volume"), 40)
+        for how in ("csv", "binary"):
+            self.write_restart(mesh, how)
+            data = self.restart.read_bytes()
+            for n in range(1, 20):
+                self.restart.write_bytes(data[:len(data) * n // 24])
+                self.expect_line(self.path, self.restart, scalar="p", words="restart_flow")
+        text = self.path.read_text()
+        for old, new, words in (("NDIME= 3", "NDIME= 2", "is a mesh of 2 dimensions"), ("NELEM= ", "NELEM= 1", "is not an element"),
+                                ("\n12 ", "\n77 ", "is not an element"), ("NPOIN", "NPOINT", "has 0 points"),
+                                ("\n12 0 ", "\n12 99999 ", "refers to point 99999"), ("NDIME= 3", "NDIME= -1", "the count")):
+            self.write_restart(mesh, "csv")
+            self.path.write_text(text.replace(old, new, 1))
+            self.expect_line(self.path, *([self.restart] if "refers" in words else []), scalar="p", words=words)
+
+
+if __name__ == "__main__":
+    unittest.main()
