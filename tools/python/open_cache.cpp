@@ -64,7 +64,9 @@ std::vector<double> OpenCache::histogram(const HistogramArguments& arguments) co
   if (!(arguments.low < arguments.high) || (arguments.log && !(arguments.low > 0)))
     throw UsageError("a histogram from {} to {}: expected a range that increases{}", arguments.low,
                      arguments.high, arguments.log ? " and is above zero" : "");
-  return histogramOf(reader_, variable, arguments.low, arguments.high, arguments.log, arguments.bins);
+  EditedFunction function("viridis", arguments.low, arguments.high, 1);
+  function.setLogScale(arguments.log);
+  return histogramOf(reader_, variable, function, arguments.bins);
 }
 
 DrawnPicture OpenCache::render(const PictureArguments& arguments, const py::object& progress) {
