@@ -78,7 +78,8 @@ TEST_F(WindowPanels, AClickKeepsAMarkerWhichIsRenamedUndoneAndRemoved) {
   openMarkers();
   click("marker 1");
   save();  // the field has heard the click
-  act({"key", "ctrl+a"});
+  press("ctrl+a");
+  save();  // Dear ImGui takes letters before keys of the same frame
   act({"type", "nose"});
   press("Return");
   close();
