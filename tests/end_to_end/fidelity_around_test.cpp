@@ -30,7 +30,7 @@ class AroundTheVolume : public testing::Test {
                 const ReferenceLight* light) const {
     MarchSteps steps;
     steps.step = 0.008;
-    return toImage(referenceMarch(field, function.exact, camera_, kSize, steps, light));
+    return toImage(referenceMarch(field, function.exact, camera_, kSize, steps, {light}));
   }
   static DirectOptions atLevel(size_t level) {
     DirectOptions options;

@@ -45,7 +45,7 @@ class Sheets : public testing::Test {
   Image marched(const KnownFunction& function, const ReferenceLayers& layers) const {
     MarchSteps steps;
     steps.step = 0.008;
-    return toImage(referenceMarch(field_, function.exact, camera_, kSize, steps, nullptr, layers));
+    return toImage(referenceMarch(field_, function.exact, camera_, kSize, steps, {nullptr, layers}));
   }
 
   const std::shared_ptr<const Scene> annulus_ = makeScene("half-annulus");

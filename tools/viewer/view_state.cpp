@@ -106,9 +106,11 @@ EditedFunction functionFrom(const JsonField& fields, const std::filesystem::path
   try {
     if (const auto parts = fields.find("parts")) {
       const FunctionParts read = partsFrom(*parts);
-      if (automatic) return EditedFunction::automatic(read);
-      // A preset with its own opacities has this name.
-      if (preset.text().empty() || preset.text() == read.map) return EditedFunction(read);
+      EditedFunction function(read);
+      if (automatic) function.setAutomatic();
+      // The points are what counts: who changes them may not know of the parts.
+      const Json points = Json::parse(toParaViewPreset(function.definition())).front();
+      if (points == fields.at("function").json() && function.preset() == preset.text()) return function;
     }
     EditedFunction function(parseParaViewPreset(fields.at("function").json().dump(), path), opacity_unit);
     if (automatic)
