@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "render/automatic/coarse_samples.h"
-#include "stream/base/check.h"
 
 namespace curvisplat {
 namespace {
@@ -34,14 +33,6 @@ std::vector<double> histogramOf(const CacheReader& cache, size_t variable, const
   if (total > 0)
     for (double& volume : volumes) volume /= total;
   return volumes;
-}
-
-std::vector<double> histogramOf(const CacheReader& cache, size_t variable, double low, double high,
-                                bool log_scale, size_t bins) {
-  CURVISPLAT_CHECK_OP(low, <, high);
-  EditedFunction function("viridis", low, high, 1);
-  CURVISPLAT_CHECK(function.setLogScale(log_scale));
-  return histogramOf(cache, variable, function, bins);
 }
 
 }  // namespace curvisplat

@@ -14,9 +14,5 @@ namespace curvisplat {
 /// does.
 std::vector<double> histogramOf(const CacheReader& cache, size_t variable, const EditedFunction& function,
                                 size_t bins);
-/// The same over [low, high], of equal width on a linear or logarithmic scale. Requires low < high, and low > 0 on a
-/// logarithmic scale.
-std::vector<double> histogramOf(const CacheReader& cache, size_t variable, double low, double high,
-                                bool log_scale, size_t bins);
 
 }  // namespace curvisplat
