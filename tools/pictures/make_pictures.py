@@ -83,7 +83,7 @@ def draw_window(program, cache, folder):
             environment = dict(os.environ, DISPLAY=":" + number.readline().strip(), XDG_CONFIG_HOME=str(folder))
         window = subprocess.Popen([program, "view", cache, "--size", size, "--state", folder / "state.json"],
                                   env=environment, stderr=subprocess.DEVNULL)
-        time.sleep(8)  # until the picture is final
+        time.sleep(20)  # until the picture is final
         xwd = subprocess.run(["xwd", "-root", "-silent"], env=environment, check=True, capture_output=True).stdout
         window.terminate()
         window.wait()
