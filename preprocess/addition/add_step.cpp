@@ -191,15 +191,14 @@ class StepAddition {
       const StepReferences references(cache);
       passes.build(writer, &references);
     });
-    NewStep step = newStep();
     pass("faces", report_.nodes, "nodes", [&] {
       std::vector<uint32_t> numbers;
       for (const VariableInfo& variable : cache.manifest().variables) numbers.push_back(variable.number);
       const FurtherFaces job{cache, reader_, scratch_->path(), facesFileOfStep(report_.step), numbers};
-      if (const auto file = writeFurtherFaces(job, plan_, progress_)) step.files.push_back(*file);
+      if (const auto file = writeFurtherFaces(job, plan_, progress_)) writer.addFile(*file);
     });
     pass("finish", 0, "bricks", [&] {
-      for (const FileInfo& file : writer.finish(step)) report_.files.push_back({file.name, file.size});
+      for (const FileInfo& file : writer.finish(newStep())) report_.files.push_back({file.name, file.size});
     });
   }
 

@@ -23,8 +23,8 @@ void checkBlocks(const GridDescription& grid, const CacheReader& cache) {
   const std::vector<BlockInfo>& blocks = cache.manifest().blocks;
   if (grid.blocks.size() != blocks.size())
     throw Error(
-        "{}: was made from a grid of {} blocks; this grid has {} and is not the one the cache was made from",
-        cache.path().string(), blocks.size(), grid.blocks.size());
+        "{}: was made from a grid of {} block{}; this grid has {} and is not the one the cache was made from",
+        cache.path().string(), blocks.size(), blocks.size() == 1 ? "" : "s", grid.blocks.size());
   for (size_t n = 0; n < blocks.size(); ++n) {
     const GridBlock& found = grid.blocks[n];
     const BlockInfo& expected = blocks[n];

@@ -25,10 +25,15 @@ std::optional<FileInfo> writeFurtherFaces(const FurtherFaces& job, const MemoryP
   if (!FacesReader::open(job.cache.path(), job.cache.manifest())) return std::nullopt;
   const std::filesystem::path output = job.cache.cachePath() / job.name;
   removeAll(output);  // a killed program's
-  return writeGridFaces(job.reader,
-                        {output, job.scratch, job.cache.manifest().lower, job.cache.manifest().upper,
-                         planesOf(job.cache), job.variables, plan.slab_bytes, plan.seam_bytes},
-                        progress);
+  try {
+    return writeGridFaces(job.reader,
+                          {output, job.scratch, job.cache.manifest().lower, job.cache.manifest().upper,
+                           planesOf(job.cache), job.variables, plan.slab_bytes, plan.seam_bytes},
+                          progress);
+  } catch (...) {
+    removeAll(output);
+    throw;
+  }
 }
 
 }  // namespace curvisplat

@@ -15,7 +15,8 @@
 // Where cells grow by a constant factor e^g only `slope` is not zero: s is 1, and the drift 0.14 g. That makes up
 // for blurs that widen with the cells, which carry more from each into the smaller ones than they get back: a
 // medium would be 1 + 0.14 g² too dense. The other numbers are by least squares over lines in one dimension:
-// Gauss-Lobatto elements, growing elements, tanh spacing in blocks, jumps, random walks. p98/p2 of the density
+// Gauss-Lobatto elements, growing elements, tanh spacing in blocks, jumps, random walks. Of six forms that were
+// fitted the one was kept that served the real grids of bench/README.md best, nek above all. p98/p2 of the density
 // in a uniform medium, with these, and with s² = 0.418 + 0.582 (ĥ/h)², ĥ the geometric mean with weights 1 4 6 4 1,
 // g the slope of ln h over the same five, and 0.14 g:
 //
@@ -31,7 +32,7 @@
 // elements (ripple of 1.34 % and 1.22 %, for 1.36 % and 1.24 % this way), makes curved boundary layers
 // thicker (the neighbours' long axes lean out of the layer) and harms cells that grow by 1.25 or more (1.1 to
 // 1.6 % on a dome of 1.25, 1.7 to 2.1 % at 1.5); the arithmetic mean of h², which has the latter fault too;
-// four passes (no gain); weights that flow to smaller cells (no gain); a drift in proportion to g (gains half as much).
+// four passes (no gain); weights that flow to smaller cells (no gain in such fits); a drift in proportion to g (gains half as much).
 #pragma once
 
 #include <algorithm>

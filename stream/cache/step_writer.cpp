@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <span>
 #include <utility>
 
 #include "stream/base/check.h"
@@ -25,8 +26,9 @@ void requireStillThere(const CacheLock& lock) {
       lock.cache().string());
 }
 
-/// Appends the step to the series and replaces the manifest.
-void putStep(const CacheLock& lock, Manifest manifest, Series series, SeriesStep step, const NewStep& added) {
+/// Appends the step to the series and replaces the manifest. `files`: further ones of the step.
+void putStep(const CacheLock& lock, Manifest manifest, Series series, SeriesStep step, const NewStep& added,
+             std::span<const FileInfo> files) {
   for (size_t v = 0; v < manifest.variables.size(); ++v) {
     step.values[v].min = added.ranges[v].min;
     step.values[v].max = added.ranges[v].max;
@@ -35,11 +37,11 @@ void putStep(const CacheLock& lock, Manifest manifest, Series series, SeriesStep
     variable.max = std::max(variable.max, added.ranges[v].max);
   }
   series.add(std::move(step));
-  manifest.files.insert(manifest.files.end(), added.files.begin(), added.files.end());
+  manifest.files.insert(manifest.files.end(), files.begin(), files.end());
   const FileInfo info = appendStep(lock.cache(), manifest, series);
   std::erase_if(manifest.files, [](const FileInfo& file) { return file.name == kStepsFileName; });
   manifest.files.push_back(info);
-  if (!manifest.hasFeature(kSteps) || !added.files.empty())
+  if (!manifest.hasFeature(kSteps) || !files.empty())
     syncDirectory(lock.cache());  // names must be on the disk before a manifest that lists them
   if (!manifest.hasFeature(kSteps)) manifest.requirements.push_back(kSteps);
   addSources(added.sources, manifest);
@@ -69,6 +71,7 @@ StepWriter::~StepWriter() {
   // If another cache has replaced this one, files of these names are that cache's.
   if (in_place_ || !lock_->isStillThere()) return;
   for (const NewFile& file : files_) removeAll(file.is_renamed ? file.path : file.part);
+  for (const FileInfo& other : others_) removeAll(lock_->cache() / other.name);
 }
 
 void StepWriter::append(uint32_t brick, std::span<const EncodedValues> values) {
@@ -84,6 +87,7 @@ std::vector<FileInfo> StepWriter::finish(const NewStep& added) {
     infos.push_back(finishVariableFile(file.file, file.path.filename().string(), file.table));
     step.values.push_back({0, 0, infos.back().size, infos.back().checksum});
   }
+  infos.insert(infos.end(), others_.begin(), others_.end());
   requireStillThere(*lock_);
   for (NewFile& file : files_) {
     if (SystemCalls::current().rename(file.part.c_str(), file.path.c_str()) < 0)
@@ -93,7 +97,7 @@ std::vector<FileInfo> StepWriter::finish(const NewStep& added) {
   }
   syncDirectory(folder_);
   try {
-    putStep(*lock_, manifest_, series_, std::move(step), added);
+    putStep(*lock_, manifest_, series_, std::move(step), added, others_);
   } catch (const NameNotSynced&) {
     in_place_ = true;
     throw;
@@ -121,7 +125,7 @@ void addGeometryStep(const CacheLock& lock, const CacheReader& cache, const NewS
   CURVISPLAT_CHECK_OP(step.values.size(), ==, cache.seriesManifest().variables.size());
   requireStillThere(lock);
   syncDirectory(lock.cache());
-  putStep(lock, cache.seriesManifest(), series, std::move(step), added);
+  putStep(lock, cache.seriesManifest(), series, std::move(step), added, {});
 }
 
 }  // namespace curvisplat

@@ -25,7 +25,6 @@ struct NewStep {
   double time = 0;
   std::vector<StepRange> ranges;     // [variable]
   std::vector<std::string> sources;  // files
-  std::vector<FileInfo> files = {};  // further ones in the cache's folder, complete
 };
 
 /// For one thread at a time.
@@ -40,6 +39,9 @@ class StepWriter : public ValuesWriter {
   StepWriter& operator=(const StepWriter&) = delete;
 
   void append(uint32_t brick, std::span<const EncodedValues> values) override;
+
+  /// A further file of the step, which is complete in the cache's folder.
+  void addFile(const FileInfo& file) { others_.push_back(file); }
 
   /// Writes the tables, syncs, and puts files and manifest into place. Returns the new files. After an Error the
   /// cache is what it was.
@@ -59,6 +61,7 @@ class StepWriter : public ValuesWriter {
   const Series series_;
   const uint32_t geometry_;
   std::vector<NewFile> files_;  // [variable]
+  std::vector<FileInfo> others_;
   bool in_place_ = false;
 };
 

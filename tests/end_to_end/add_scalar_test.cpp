@@ -57,8 +57,8 @@ TEST_F(AddScalarCommand, AddsAScalarThatCanBeDrawn) {
 
   const auto stats = nlohmann::json::parse(readTextFile(file("stats.json")));
   EXPECT_EQ(stats["samples"], 60 * 40 * 20);
-  EXPECT_EQ(stats["phases"].size(), 5u);
-  EXPECT_EQ(stats["files"].size(), 1u);
+  EXPECT_EQ(stats["phases"].size(), 6u);
+  EXPECT_EQ(stats["files"].size(), 2u);  // of the scalar, and of its values on faces
 
   run({"info", cache, "--verify"});
   const auto info = nlohmann::json::parse(run({"info", cache, "--json"}).out);

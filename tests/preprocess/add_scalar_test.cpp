@@ -302,9 +302,9 @@ TEST_F(ToAnExistingCache, RefusesAnotherGrid) {
                 "44x44x44 nodes when the cache was made; in this grid it has 44x44x45");
   expectRefused(
       FunctionGridSource({block, block}, 3, [&](const GridNode& node) { return bentBox(node, block); }),
-      options, "grid of 1 blocks");
+      options, "1 block");
   expectRefused(changed([](const GridNode&, NodeValues& values) { values.position *= 1.5; }), options,
-                "spans");
+                "was made from a grid from");
   expectRefused(changed([](const GridNode& node, NodeValues& values) { values.blank = node.i == 9; }),
                 options, "not the one the cache was made from");
   // The same bounds and counts from here on. A node elsewhere in its cell, or in another's cell:

@@ -85,7 +85,7 @@ TEST(CellConvert, KeepsEveryCellAndTheVolumeOfTheHexahedra) {
   EXPECT_EQ(report.merged_nodes, 0u);
   EXPECT_EQ(report.blanked.total(), 0u);
   // Of the mapping: chords cut off (dθ)²/6 of an annulus.
-  EXPECT_NEAR(report.volume / makeScene("half-annulus")->volume(), 1 - std::pow(M_PI / 32, 2) / 6, 1e-5);
+  EXPECT_NEAR(report.volume / makeScene("half-annulus")->volume(), 1 - std::pow(M_PI / 32, 2) / 6, 1e-4);
   const CacheReader cache(folder / "c.splats");
   EXPECT_TRUE(cache.manifest().cells);
   EXPECT_EQ(cache.manifest().blocks[0].ni, 33u);
@@ -180,7 +180,8 @@ TEST(CellConvert, AddsAScalarAsIfItHadBeenThereFromTheStart) {
   Files both = filesOf(folder / "both.splats"), one = filesOf(folder / "one.splats");
   for (Files* files : {&both, &one}) {
     files->erase("manifest.json");
-    files->erase("faces.bin");  // which has the scalars of the conversion
+    // faces.bin has the scalars of the conversion, faces.var1.bin that of the addition.
+    std::erase_if(*files, [](const auto& file) { return file.first.starts_with("faces."); });
   }
   EXPECT_TRUE(both == one);
 

@@ -48,8 +48,7 @@ struct Scale {
 
   uint64_t bytesOf(const std::vector<FileReport>& files) const {
     uint64_t bytes = 0;
-    for (const FileReport& file : files)
-      bytes += times(file.bytes, file.name == kFacesFileName ? faces : volume);
+    for (const FileReport& file : files) bytes += times(file.bytes, isFacesFile(file.name) ? faces : volume);
     return bytes;
   }
 };
