@@ -138,7 +138,7 @@ TEST_F(ConversionSweep, ALargerOneIsWholeOrNothing) {
   writeFiles(output_, both_);
   ASSERT_GT(CacheReader(output_).manifest().levels, 1u);
   testing::FaultSweep conversion = converting({}), addition = adding();
-  conversion.step = addition.step = 5;
+  conversion.step = addition.step = 11;
   EXPECT_GE(conversion.run(testing::kFailsOnce), 15);
   ASSERT_FALSE(HasFailure());
   EXPECT_GE(addition.run(testing::kFailsOnce), 8);

@@ -266,9 +266,11 @@ struct March {
 
 /// The pixels of `image` for which `wanted` is not 0.
 void marchPixels(const March& march, const std::vector<uint8_t>& wanted, ReferenceImage& image) {
-  const auto& [field, function, camera, steps, around] = march;
+  const Camera& camera = march.camera;
+  const MarchSteps& steps = march.steps;
+  const Surroundings& around = march.around;
   const ImageSize size = image.size;
-  const auto [lower, upper] = field.bounds();
+  const auto [lower, upper] = march.field.bounds();
   const glm::dvec3 forward = glm::normalize(camera.focal_point - camera.position);
   tbb::parallel_for(0, size.height, [&, lower = lower, upper = upper](int y) {
     for (int x = 0; x < size.width; ++x) {
@@ -279,7 +281,7 @@ void marchPixels(const March& march, const std::vector<uint8_t>& wanted, Referen
       const bool from_eye = camera.projection == Projection::kPerspective;
       const double near = from_eye ? steps.near / glm::dot(ray.direction, forward) : 0.0;
       const auto [begin, end] = part.value_or(std::pair(near, near));
-      image.pixels[p] = Marcher(field, function, ray, steps, around)
+      image.pixels[p] = Marcher(march.field, march.function, ray, steps, around)
                             .march(std::max(begin, near), end, layersAlong(around.layers, ray, near));
     }
   });
