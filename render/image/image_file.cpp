@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstring>
 #include <string_view>
 
@@ -11,6 +10,7 @@
 #include "stream/base/durable_file.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "stream/base/paths.h"
 
 namespace curvisplat {
 namespace {
@@ -34,9 +34,7 @@ constexpr size_t kLongestMagic = 4;
 constexpr uint64_t kLargestFile = uint64_t{8} << 30;  // 16384 x 16384 pixels of four floats are 4 GiB
 
 const Format& formatByName(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = extensionOf(path);
   for (const Format& format : kFormats)
     if (format.encode != nullptr && ending == format.ending) return format;
   throw UsageError("{}: unknown image format; the name must end in .png, .exr or .pfm", path.string());

@@ -1,5 +1,7 @@
 #include "stream/base/paths.h"
 
+#include <algorithm>
+#include <cctype>
 #include <system_error>
 
 #include "stream/base/error.h"
@@ -8,6 +10,13 @@ namespace curvisplat {
 
 std::filesystem::path folderOf(const std::filesystem::path& path) {
   return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+}
+
+std::string extensionOf(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
 }
 
 bool isRegularFile(const std::filesystem::path& path) noexcept {

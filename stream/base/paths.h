@@ -2,11 +2,15 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 namespace curvisplat {
 
 /// The folder that contains `path`: "." for a plain name.
 std::filesystem::path folderOf(const std::filesystem::path& path);
+
+/// ".png" of "a.PNG": the ending of the name, in small letters; empty if there is none.
+std::string extensionOf(const std::filesystem::path& path);
 
 /// Whether `path` is a regular file, or links that end at one. False for names that no file can have, such as
 /// names that are too long.

@@ -32,5 +32,11 @@ TEST(Paths, LinksLeadToWhatIsThereOrToBe) {
   EXPECT_THROW(writableTarget(folder / "folder"), Error);
 }
 
+TEST(Paths, ExtensionsAreInSmallLetters) {
+  EXPECT_EQ(extensionOf("a/b.PnG"), ".png");
+  EXPECT_EQ(extensionOf("a.tar.GZ"), ".gz");
+  EXPECT_EQ(extensionOf("a.b/name"), "");
+}
+
 }  // namespace
 }  // namespace curvisplat

@@ -9,7 +9,7 @@
 
 namespace curvisplat {
 
-/// Nodes of the sample: three seconds on two cores. Grids of up to so many are converted whole.
+/// How many nodes a sample has: they take some seconds on two cores. A smaller grid is converted whole.
 inline constexpr uint64_t kSampledNodes = 8'000'000;
 
 /// Prints bytes, memory and time that convert() of `source` with these options will take, and writes them to --stats. Of

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <glm/common.hpp>
@@ -13,17 +12,12 @@
 #include "preprocess/formats/vtk/vtk_surface.h"
 #include "render/mesh/mesh_file.h"
 #include "stream/base/error.h"
+#include "stream/base/paths.h"
 #include "tools/options/grid_surfaces.h"
 #include "tools/options/option_parsers.h"
 
 namespace curvisplat {
 namespace {
-
-std::string extensionOf(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension;
-}
 
 std::vector<ClipPlane> parseSlices(const std::vector<std::string>& texts) {
   if (texts.size() > kMaxSlices)

@@ -8,9 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
-#include <cctype>
 #include <cerrno>
 #include <csignal>
 #include <cstring>
@@ -66,13 +64,6 @@ std::string firstLineOf(int file) {
   return text.substr(0, text.find('\n'));
 }
 
-std::string endingOf(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending;
-}
-
 /// H.264 for .mp4. GIFs have 256 colours: a palette for each frame, so that no frame waits for the last.
 std::vector<std::string> encoderOf(bool is_gif) {
   if (is_gif)
@@ -88,11 +79,11 @@ std::vector<std::string> encoderOf(bool is_gif) {
 }  // namespace
 
 bool isMovieName(const std::filesystem::path& path) {
-  return endingOf(path) == ".mp4" || isGifName(path);
+  return extensionOf(path) == ".mp4" || isGifName(path);
 }
 
 bool isGifName(const std::filesystem::path& path) {
-  return endingOf(path) == ".gif";
+  return extensionOf(path) == ".gif";
 }
 
 MovieWriter::MovieWriter(const std::filesystem::path& path, ImageSize size, double frames_per_s)
