@@ -32,10 +32,8 @@ bool isFinished(const ConvertOptions& options, const std::vector<ConversionFact>
     if (options.resume && ConversionWorkspace::clearIfFinished(options.output, facts)) return true;
     if (options.resume && !options.overwrite && std::filesystem::exists(options.output / "manifest.json") &&
         !hasUnfinished(options.output))
-      throw Error(
-          "{}: exists, and no unfinished conversion to it does: there is nothing to resume; to replace it, "
-          "add --overwrite",
-          options.output.string());
+      throw Error("{}: is complete, so there is nothing to resume; to replace it, add --overwrite",
+                  options.output.string());
     checkOutput(options.output, options.overwrite, temporaryFolder(options));
     return false;
   };
@@ -56,7 +54,7 @@ ConvertReport convert(const DataSource& source, const ConvertOptions& given, Pro
   if (options.ranks) {
     if (!grid)
       throw UsageError(
-          "{}: is unstructured, and such grids are converted by one process; start it without mpirun",
+          "{}: is unstructured; such grids are converted by one process: start curvisplat without mpirun",
           source.description().format);
     plan.limitBuckets(bucketSplatsOfRanks(*grid, *options.ranks), options.scalars.size());
   }

@@ -70,8 +70,9 @@ Cut cutOf(const CacheReader& cache, size_t variable, uint64_t max_splats) {
       {cache.manifest().root, cache.bricks(), variables, subtrees}, view,
       [](const ValueBounds&) { return false; }, options);
   if (cut.splats > max_splats)
-    throw UsageError("{}: {} splats are too few: the coarsest level has {}; give --max-splats that",
-                     cache.path().string(), max_splats, cut.splats);
+    throw UsageError(
+        "{}: --max-splats {} is less than the coarsest level has ({} splats); give at least that",
+        cache.path().string(), max_splats, cut.splats);
   return cut;
 }
 
