@@ -26,7 +26,6 @@ namespace curvisplat {
 class WindowTest : public testing::Test {
  protected:
   using Place = std::pair<int, int>;
-  static constexpr Place kPicture{560, 300};
   static constexpr ImageSize kScreen{1000, 700}, kWindow{900, 600};
 
   static void SetUpTestSuite() {
@@ -67,7 +66,8 @@ class WindowTest : public testing::Test {
     while (std::filesystem::exists(picture(saved_ + 1, cache_))) ++saved_;
     std::filesystem::remove("widgets");
     window_ = std::make_unique<RunningProgram>(options);
-    moveTo(kPicture);
+    rest_ = {size.width / 2, size.height / 2};
+    moveTo(rest_);
     // The panels are dark grey, the screen behind the window is black.
     ASSERT_TRUE(eventually([&] { return display_->screenshot().pixel(10, size.height - 10)[0] > 0.01f; }));
   }
@@ -79,7 +79,7 @@ class WindowTest : public testing::Test {
   static Place placeOf(const std::string& widget, double across = 0.5, double down = 0.5) {
     std::optional<Place> place;
     EXPECT_TRUE(eventually([&] { return (place = placeNow(widget, across, down)).has_value(); })) << widget;
-    return place.value_or(kPicture);
+    return place.value_or(Place{});
   }
   /// The next click, or a drag in the panels, is for another frame of the window's: save() lies between.
   void click(Place place) {
@@ -101,13 +101,21 @@ class WindowTest : public testing::Test {
       return is_black(screen.pixel(10, size.height + 10)) && !is_black(screen.pixel(10, size.height - 10));
     }));
   }
-  void drag(int button, int dx, int dy, Place from = kPicture) {
+  void drag(int button, Place from, Place to) {
     const std::string number = std::to_string(button);
     moveTo(from);
     act({"mousedown", number});
-    for (int step = 1; step <= 4; ++step) moveTo({from.first + step * dx / 4, from.second + step * dy / 4});
+    for (int step = 1; step <= 4; ++step)
+      moveTo({from.first + step * (to.first - from.first) / 4,
+              from.second + step * (to.second - from.second) / 4});
     act({"mouseup", number});
-    moveTo(kPicture);
+    moveTo(rest_);
+  }
+  /// A drag from the picture's middle, by shares of its width and height. Returns it in pixels.
+  Place dragPicture(int button, double across, double down) {
+    const Place from = placeOf("picture"), to = placeOf("picture", 0.5 + across, 0.5 + down);
+    drag(button, from, to);
+    return {to.first - from.first, to.second - from.second};
   }
   /// The final picture, as saved by Ctrl+S: all that was done before is in it.
   Image save() {
@@ -157,7 +165,7 @@ class WindowTest : public testing::Test {
       words >> x >> y >> number >> number >> name;
       if (name != "message") continue;
       display_->act({"mousemove", std::to_string(x + 4), std::to_string(y + 4), "click", "1", "mousemove",
-                     std::to_string(kPicture.first), std::to_string(kPicture.second)});
+                     std::to_string(rest_.first), std::to_string(rest_.second)});
       eventually([&] { return !hasWidget(line.substr(line.find("message"))); }, 5);
       return;
     }
@@ -224,6 +232,7 @@ class WindowTest : public testing::Test {
   std::string cache_ = "a";  // its name without .splats
   std::optional<VirtualDisplay> display_;
   std::unique_ptr<RunningProgram> window_;
+  Place rest_{};  // where the mouse stays: the window's middle, which is in the picture if there is one
 
  private:
   static inline std::unique_ptr<TemporaryFolder> folder_;

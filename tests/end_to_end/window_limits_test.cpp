@@ -31,18 +31,21 @@ class WindowLimitsTest : public testing::Test {
   void SetUp() override {
     if (const std::string missing = VirtualDisplay::missing(); !missing.empty())
       GTEST_SKIP() << missing << " is not installed";
-    display_.emplace(ImageSize{700, 400});
+    display_.emplace(kScreen);
     setenv("XDG_CONFIG_HOME", file("config").c_str(), 1);
   }
 
+  static constexpr ImageSize kScreen{700, 400};
+
   static std::string file(const std::string& name) { return (*folder_ / name).string(); }
 
-  /// A window in the screen's corner, with the mouse over it.
+  /// A window as large as the screen, with the mouse over it.
   std::unique_ptr<RunningProgram> open(std::vector<std::string> options = {}) const {
-    options.insert(options.begin(), {"view", file("a.splats"), "--size", "700x400"});
+    options.insert(options.begin(),
+                   {"view", file("a.splats"), "--size", fmt::format("{}x{}", kScreen.width, kScreen.height)});
     auto window = std::make_unique<RunningProgram>(options);
-    display_->act({"mousemove", "600", "300"});
-    EXPECT_TRUE(eventually([&] { return display_->screenshot().pixel(10, 390)[0] > 0.01f; }));
+    display_->act({"mousemove", std::to_string(kScreen.width / 2), std::to_string(kScreen.height / 2)});
+    EXPECT_TRUE(eventually([&] { return display_->screenshot().pixel(10, kScreen.height - 10)[0] > 0.01f; }));
     return window;
   }
   ProgramResult closed(RunningProgram& window) const {
@@ -71,8 +74,11 @@ TEST_F(WindowLimitsTest, ClosesWhileItLoads) {
 TEST_F(WindowLimitsTest, TooLittleMemoryIsSaid) {
   const auto window = open({"--memory", "1M"});
   // Another size, another word: the window lives.
-  display_->act({"search", "--onlyvisible", "--name", "curvisplat", "windowsize", "600", "300"});
-  EXPECT_TRUE(eventually([&] { return display_->screenshot().pixel(650, 350)[0] < 0.01f; }));
+  const ImageSize smaller{kScreen.width - 100, kScreen.height - 100};
+  display_->act({"search", "--onlyvisible", "--name", "curvisplat", "windowsize",
+                 std::to_string(smaller.width), std::to_string(smaller.height)});
+  EXPECT_TRUE(eventually(
+      [&] { return display_->screenshot().pixel(smaller.width + 50, smaller.height + 50)[0] < 0.01f; }));
   const ProgramResult result = closed(*window);
   EXPECT_EQ(result.status, 0) << result.err;
   EXPECT_NE(result.err.find("warning: --memory 1 MiB: too little"), std::string::npos) << result.err;

@@ -92,10 +92,11 @@ class WindowOpening : public KeptCaches {
   void openWith(const std::vector<std::string>& files) {
     std::vector<std::string> words{"view"};
     words.insert(words.end(), files.begin(), files.end());
-    words.insert(words.end(), {"--size", "900x600"});
+    words.insert(words.end(), {"--size", fmt::format("{}x{}", kWindow.width, kWindow.height)});
     fs::remove("widgets");
     window_ = std::make_unique<RunningProgram>(words);
-    moveTo(kPicture);
+    rest_ = {kWindow.width / 2, kWindow.height / 2};
+    moveTo(rest_);
   }
 };
 

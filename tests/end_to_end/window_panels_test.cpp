@@ -68,7 +68,7 @@ TEST_F(WindowPanels, AClickKeepsAMarkerWhichIsRenamedUndoneAndRemoved) {
   open();
   save();
   widget("status f ");
-  click(kPicture);
+  click(placeOf("picture"));
   widget("message marker 1: f ");
   widget("sign of marker 1");
   press("ctrl+z");
@@ -103,7 +103,8 @@ TEST_F(WindowPanels, APlaneIsDraggedInThePicture) {
   save();
   press("z");  // from another side: the plane is seen edge on
   const Image cut = saveAndCopy();
-  drag(1, 0, 60, placeOf("handle 1"));
+  const Place handle = placeOf("handle 1");
+  drag(1, handle, {handle.first, handle.second + pictureSize().height / 10});
   const Image moved = saveAndCopy();
   EXPECT_LT(difference(cut, moved), 40);
   EXPECT_LT(difference(whole, cut), 40);
@@ -138,7 +139,7 @@ TEST_F(WindowPanels, UndoAndRedo) {
   press("b");
   const Image dark = save();
   EXPECT_LT(difference(first, dark), 20);
-  drag(1, 90, 30);
+  dragPicture(1, 0.15, 0.05);
   const Image turned = save();
   press("ctrl+z");
   EXPECT_GE(difference(save(), dark), 50);

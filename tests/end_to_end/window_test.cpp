@@ -57,7 +57,7 @@ TEST_F(WindowTest, ShowsWhatIsDoneToIt) {
   EXPECT_TRUE(eventually([&] { return difference(shown(first.size), first) > 45; }, 5))
       << difference(shown(first.size), first);
 
-  drag(1, 120, 60);
+  dragPicture(1, 0.2, 0.1);
   const Image rotated = save();
   EXPECT_LT(difference(first, rotated), 30);
   press("o");
@@ -78,16 +78,17 @@ TEST_F(WindowTest, ShowsWhatIsDoneToIt) {
 TEST_F(WindowsCamera, DragsAndTheWheelMoveIt) {
   open();
   const Image first = saveAndCopy();
-  drag(1, 60, 0);
+  dragPicture(1, 0.1, 0);
   const Image rotated = saveAndCopy();
-  drag(2, 80, -40);
+  const Place panned_by = dragPicture(2, 0.13, -0.07);
   const Image panned = saveAndCopy();
-  drag(3, 0, -50);
+  const Place zoomed_by = dragPicture(3, 0, -0.09);
   const Image zoomed = saveAndCopy();
   act({"click", "--repeat", "4", "5"});  // the wheel, towards the user
   const Image further = saveAndCopy();
   act({"keydown", "shift"});
-  drag(1, -80, 40);
+  const Place middle = placeOf("picture");
+  drag(1, middle, {middle.first - panned_by.first, middle.second - panned_by.second});
   act({"keyup", "shift"});
   const Image panned_back = saveAndCopy();
   press("r");
@@ -102,12 +103,14 @@ TEST_F(WindowsCamera, DragsAndTheWheelMoveIt) {
   EXPECT_LT(difference(first, rotated), 30);
 
   const glm::dvec3 shift = seen[2].focal_point - seen[1].focal_point;
-  EXPECT_GT(glm::length(shift), 0.01);
+  // The data follows the mouse: a pixel is 2 parallel scales over the height.
+  const double pixel = 2 * seen[1].parallel_scale / first.size.height;
+  EXPECT_NEAR(glm::length(shift), pixel * std::hypot(panned_by.first, panned_by.second), kRounded);
   EXPECT_NEAR(glm::dot(shift, seen[1].forward()), 0, kRounded);
   EXPECT_LE(glm::length(seen[2].position - seen[1].position - shift), kRounded);
   EXPECT_LT(difference(rotated, panned), 30);
 
-  EXPECT_NEAR(seen[3].parallel_scale, seen[2].parallel_scale / std::pow(1.01, 50), kRounded);
+  EXPECT_NEAR(seen[3].parallel_scale, seen[2].parallel_scale / std::pow(1.01, -zoomed_by.second), kRounded);
   EXPECT_LE(glm::length(seen[3].focal_point - seen[2].focal_point), kRounded);
   EXPECT_LT(difference(panned, zoomed), 30);
   EXPECT_NEAR(seen[4].parallel_scale, seen[3].parallel_scale * std::pow(1.1, 4), kRounded);
@@ -156,7 +159,7 @@ TEST_F(WindowsCamera, FliesThroughTheData) {
     act({"keyup", key});
     before = saveAndCopy();
   }
-  drag(1, 60, 20);  // looks around
+  dragPicture(1, 0.1, 0.03);  // looks around
   saveAndCopy();
   act({"click", "4"});
   saveAndCopy();
@@ -199,7 +202,7 @@ TEST_F(WindowTest, ACommandDrawsScaleRangeAndClipBox) {
   save();
   click("clip");
   save();
-  drag(1, 150, 0, placeOf("clip x", 0.15));
+  drag(1, placeOf("clip x", 0.15), placeOf("clip x", 0.8));
   save();
   click("dark");
   const Image clipped = saveAndCopy();
@@ -245,7 +248,7 @@ TEST_F(WindowTest, SavesAndLoadsAFunction) {
 
 TEST_F(WindowTest, ComesBackAsItWasLeft) {
   open();
-  drag(1, 90, -30);
+  dragPicture(1, 0.15, -0.05);
   press("o");
   const Image before = save();
   close();
@@ -257,7 +260,7 @@ TEST_F(WindowTest, ComesBackAsItWasLeft) {
 TEST_F(WindowTest, OpensAStateFile) {
   open();
   const Image first = save();
-  drag(1, 90, -30);
+  dragPicture(1, 0.15, -0.05);
   click("dark");
   const Image before = save();
   close();
@@ -275,7 +278,7 @@ TEST_F(WindowTest, OpensAStateFile) {
 TEST_F(WindowTest, ClosesInOrderWhenASignalAsksItTo) {
   for (const int signal : {SIGTERM, SIGINT, SIGHUP}) {
     open();
-    drag(1, 40, 10);
+    dragPicture(1, 0.07, 0.02);
     const Image before = save();
     window_->signal(signal);
     const ProgramResult result = window_->wait();

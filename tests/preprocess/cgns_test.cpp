@@ -2,84 +2,12 @@
 // what was written, wherever it stands in the file, and what cannot be drawn is said in words.
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <thread>
 
-#include "preprocess/formats/open/open_grid.h"
-#include "stream/base/error.h"
-#include "tests/support/cgns_writer.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/preprocess/cgns_fixture.h"
 
 namespace curvisplat {
 namespace {
-
-CgnsFunction linear(double scale, double offset = 0) {
-  return [=](int64_t i, int64_t j, int64_t k) {
-    return offset + scale * static_cast<double>(i + 100 * j + 10'000 * k);
-  };
-}
-
-std::vector<CgnsWriterField> cartesian(double offset = 0) {
-  return {
-      {"CoordinateX", linear(0.25, offset)}, {"CoordinateY", linear(-1)}, {"CoordinateZ", linear(3, 0.5)}};
-}
-
-class Cgns : public testing::TestWithParam<CgnsFileType> {
- protected:
-  CgnsWriter writer() const { return CgnsWriter(path_, GetParam()); }
-
-  std::unique_ptr<GridSource> open(std::optional<uint32_t> step = {}) const {
-    OpenGridOptions options;
-    options.grid = path_;
-    options.time_step = step;
-    return openGrid(options);
-  }
-
-  std::string errorOf(std::optional<uint32_t> step = {}) const {
-    try {
-      open(step);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
-  }
-
-  static NodeArrays readAll(const GridSource& source, uint32_t block, const std::vector<uint32_t>& scalars) {
-    NodeArrays nodes;
-    const GridBlock& dims = source.description().blocks.at(block);
-    source.read(block, {0, dims.nj, 0, dims.nk}, scalars, nodes);
-    return nodes;
-  }
-
-  TemporaryFolder folder_;
-  std::filesystem::path path_ = folder_ / "grid.cgns";
-};
-
-/// Every node of `box` has the values of the functions; of a cell's, NaN where there is no cell.
-void expectValues(const GridSource& source, uint32_t block, const NodeBox& box, uint32_t scalar,
-                  const CgnsFunction& value, double x_offset = 0) {
-  const GridBlock& dims = source.description().blocks.at(block);
-  NodeArrays nodes;
-  source.read(block, box, std::span(&scalar, 1), nodes);
-  ASSERT_EQ(nodes.x.size(), dims.ni * (box.j1 - box.j0) * (box.k1 - box.k0));
-  const bool cells = source.description().scalars.at(scalar).centring == Centring::kCell;
-  const std::vector<CgnsWriterField> axes = cartesian(x_offset);
-  size_t n = 0;
-  for (uint64_t k = box.k0; k < box.k1; ++k)
-    for (uint64_t j = box.j0; j < box.j1; ++j)
-      for (uint64_t i = 0; i < dims.ni; ++i, ++n) {
-        const auto ii = static_cast<int64_t>(i), jj = static_cast<int64_t>(j), kk = static_cast<int64_t>(k);
-        ASSERT_EQ(nodes.x[n], axes[0].value(ii, jj, kk)) << i << ", " << j << ", " << k;
-        ASSERT_EQ(nodes.y[n], axes[1].value(ii, jj, kk)) << i << ", " << j << ", " << k;
-        ASSERT_EQ(nodes.z[n], axes[2].value(ii, jj, kk)) << i << ", " << j << ", " << k;
-        ASSERT_EQ(nodes.blank[n], 0);
-        if (cells && (i + 1 == dims.ni || j + 1 == dims.nj || k + 1 == dims.nk))
-          ASSERT_TRUE(std::isnan(nodes.scalars[0][n])) << i << ", " << j << ", " << k;
-        else
-          ASSERT_EQ(nodes.scalars[0][n], static_cast<float>(value(ii, jj, kk)))
-              << i << ", " << j << ", " << k;
-      }
-}
 
 void expectAllBoxes(const GridSource& source, uint32_t scalar, const CgnsFunction& value) {
   const GridBlock& dims = source.description().blocks.at(0);
@@ -209,54 +137,6 @@ TEST_P(Cgns, ZonesOfAllBasesAreBlocks) {
   expectValues(*source, 1, {0, 2, 0, 2}, 0, linear(2), 8);
 }
 
-TEST_P(Cgns, StepsAreThoseOfTheIterativeData) {
-  {
-    CgnsWriter file = writer();
-    file.base("Base");
-    file.baseSteps({0.5, 1.5, 2.5});
-    file.zone("Moving", {3, 2, 2});
-    file.coordinates("GridCoordinates", cartesian());
-    file.coordinates("Grid 2", cartesian(64));
-    file.solution("S 1", "Vertex", {{"Density", linear(1)}});
-    file.solution("S 2", "Vertex", {{"Density", linear(2)}});
-    file.zoneSteps({"S 2", "S 1", "Null"}, {"GridCoordinates", "Grid 2", "Grid 2"});
-  }
-  const auto first = open();
-  EXPECT_EQ(first->description().times, (std::vector<double>{0.5, 1.5, 2.5}));
-  EXPECT_EQ(first->description().time_step, 0u);
-  expectValues(*first, 0, {0, 2, 0, 2}, 0, linear(2));
-  const auto second = open(1);
-  EXPECT_EQ(second->description().time_step, 1u);
-  expectValues(*second, 0, {0, 2, 0, 2}, 0, linear(1), 64);
-  EXPECT_TRUE(open(2)->description().scalars.empty());
-  EXPECT_NE(errorOf(3).find("has 3 time steps; --time-step 3 is out of range"), std::string::npos)
-      << errorOf(3);
-}
-
-TEST_P(Cgns, StepsOfIossAreInTablesOfTheirOwn) {
-  // Its FlowSolutionPointers name solutions that need not exist; there is a table for each location besides.
-  {
-    CgnsWriter file = writer();
-    file.base("Base");
-    file.baseSteps({0.5, 1.5});
-    file.zone("Zone", {3, 2, 2});
-    file.coordinates("GridCoordinates", cartesian());
-    for (const int step : {1, 2}) {
-      file.solution("Nodes@" + std::to_string(step), "Vertex", {{"Density", linear(step)}});
-      file.solution("Cells@" + std::to_string(step), "CellCenter", {{"Density", linear(step)}});
-    }
-    file.zoneSteps({"Solution@1", "Nodes@2"});
-    file.pointers("VertexSolutionPointers", {"Nodes@1", "Nodes@2"});
-    file.pointers("CellCenterSolutionPointers", {"Null", "Cells@2"});
-  }
-  const auto first = open();
-  ASSERT_EQ(first->description().scalars.size(), 1u);
-  expectValues(*first, 0, {0, 2, 0, 2}, 0, linear(1));
-  const auto second = open(1);
-  ASSERT_EQ(second->description().scalars.size(), 2u);
-  expectValues(*second, 0, {0, 2, 0, 2}, 0, linear(2));
-}
-
 TEST_P(Cgns, BoundaryConditionsFamiliesAndUnitsAreNoted) {
   {
     CgnsWriter file = writer();
@@ -283,55 +163,6 @@ TEST_P(Cgns, BoundaryConditionsFamiliesAndUnitsAreNoted) {
   EXPECT_EQ(boundaries[2].type, "BCInflow");
   EXPECT_EQ(boundaries[2].first, (std::array<uint64_t, 3>{0, 0, 0}));
   EXPECT_EQ(boundaries[2].last, (std::array<uint64_t, 3>{2, 1, 0}));
-}
-
-TEST_P(Cgns, ZonesMayBeThereAtSomeStepsOnly) {
-  {
-    CgnsWriter file = writer();
-    file.base("Base");
-    file.baseSteps({100, 200}, {{"First", "Always"}, {"Always", "Second"}}, true);
-    for (const char* zone : {"First", "Always", "Second"}) {
-      file.zone(zone, {3, 2, 2});
-      file.coordinates("GridCoordinates", cartesian());
-    }
-  }
-  const auto first = open(), second = open(1);
-  EXPECT_EQ(first->description().times, (std::vector<double>{100, 200}));
-  ASSERT_EQ(first->description().blocks.size(), 2u);
-  EXPECT_EQ(first->description().blocks[0].name, "First");
-  EXPECT_EQ(first->description().blocks[1].name, "Always");
-  ASSERT_EQ(second->description().blocks.size(), 2u);
-  EXPECT_EQ(second->description().blocks[0].name, "Always");
-  EXPECT_EQ(second->description().blocks[1].name, "Second");
-}
-
-TEST_P(Cgns, SolutionsWithoutTimesFollowOneAnother) {
-  {
-    CgnsWriter file = writer();
-    file.base("Base");
-    file.zone("Zone", {3, 2, 2});
-    file.coordinates("GridCoordinates", cartesian());
-    file.solution("First", "Vertex", {{"Density", linear(1)}});
-    file.solution("Turbulence", "Vertex", {{"ViscosityEddy", linear(5)}});
-    file.solution("Cells", "CellCenter", {{"Density", linear(6)}});
-    file.solution("Second", "Vertex", {{"Density", linear(2)}});
-    file.zone("Steady", {3, 2, 2});
-    file.coordinates("GridCoordinates", cartesian());
-    file.solution("Only", "Vertex", {{"Density", linear(3)}});
-  }
-  const auto first = open();
-  EXPECT_EQ(first->description().times, (std::vector<double>{0, 1}));
-  ASSERT_EQ(first->description().scalars.size(), 3u);
-  EXPECT_EQ(first->description().scalars[0].name, "Density:node");
-  EXPECT_EQ(first->description().scalars[2].name, "Density:cell");
-  expectValues(*first, 0, {0, 2, 0, 2}, 0, linear(1));
-  expectValues(*first, 0, {0, 2, 0, 2}, 1, linear(5));
-  expectValues(*first, 0, {0, 2, 0, 2}, 2, linear(6));
-  const auto second = open(1);
-  ASSERT_EQ(second->description().scalars.size(), 1u);
-  EXPECT_EQ(second->description().scalars[0].name, "Density");
-  expectValues(*second, 0, {0, 2, 0, 2}, 0, linear(2));
-  expectValues(*second, 1, {0, 2, 0, 2}, 0, linear(3));
 }
 
 TEST_P(Cgns, ZonesWithoutTheFieldAreNotDrawnAndNamed) {

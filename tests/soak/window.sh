@@ -45,12 +45,23 @@ until_() {
 # Each answer of the window to a key comes after everything that was done before it.
 commands() { wc -l < view.log; }
 more_commands() { [ "$(commands)" -gt "$1" ]; }
+# at NAME [ACROSS [DOWN]]: a place in that widget, in percent of its size; waits for it.
+at() {
+  until_ 100 grep -qsE "^[0-9 -]+ $1\$" widgets || fail "there is no widget $1" >&2
+  awk -v name="$1" -v across="${2:-50}" -v down="${3:-50}" '{
+    x = $1; y = $2; w = $3; h = $4
+    for (n = 0; n < 4; ++n) sub(/^[^ ]+ /, "")
+    if ($0 == name) print int(x + across / 100 * w), int(y + down / 100 * h)
+  }' widgets
+}
 # asked: what the window shows now, as the command that draws it.
 asked() {
-  local before
+  local before place
   before=$(commands)
+  place=$(at picture)
   for ((again = 0; again < 60; ++again)); do
-    do_ mousemove 600 300 key ctrl+c
+    # shellcheck disable=SC2086
+    do_ mousemove $place key ctrl+c
     if until_ 20 more_commands "$before"; then
       until_ 100 more_commands $((before + again)) || true  # an answer for every key, lest the next is taken for one
       tail -n 1 view.log
@@ -62,10 +73,12 @@ asked() {
 }
 # saved NAME: its final picture.
 saved() {
-  local name
+  local name place
+  place=$(at picture)
   name=$(printf 'wake_%04d.png' $(($(find . -maxdepth 1 -name 'wake_*.png' | wc -l) + 1)))
   for ((again = 0; again < 4; ++again)); do
-    do_ mousemove 600 300 key ctrl+s
+    # shellcheck disable=SC2086
+    do_ mousemove $place key ctrl+s
     if until_ 300 test -s "$name"; then
       asked > "$1.command"  # by then the picture is written
       cp "$name" "$1.png"
@@ -73,15 +86,6 @@ saved() {
     fi
   done
   fail "no picture was saved"
-}
-# at NAME [ACROSS [DOWN]]: a place in that widget, in percent of its size; waits for it.
-at() {
-  until_ 100 grep -qsE "^[0-9 -]+ $1\$" widgets || fail "there is no widget $1" >&2
-  awk -v name="$1" -v across="${2:-50}" -v down="${3:-50}" '{
-    x = $1; y = $2; w = $3; h = $4
-    for (n = 0; n < 4; ++n) sub(/^[^ ]+ /, "")
-    if ($0 == name) print int(x + across / 100 * w), int(y + down / 100 * h)
-  }' widgets
 }
 # press NAME [ACROSS [DOWN [BUTTON]]]: clicks on it.
 press() {
@@ -93,9 +97,14 @@ press() {
 # add_point, remove_point: of the opacity curve, at one place.
 add_point() { press curve 28 20; }
 remove_point() { press curve 28 20 3; }
-# drag BUTTON X Y: from the middle of the picture to there.
+# drag BUTTON ACROSS DOWN: from the middle of the picture to that place in it, in percent of its size.
 drag() {
-  do_ mousemove 600 300 mousedown "$1" mousemove 640 320 mousemove 690 350 mousemove "$2" "$3" mouseup "$1" mousemove 600 300
+  local from half to
+  from=$(at picture)
+  half=$(at picture $(((50 + $2) / 2)) $(((50 + $3) / 2)))
+  to=$(at picture "$2" "$3")
+  # shellcheck disable=SC2086
+  do_ mousemove $from mousedown "$1" mousemove $half mousemove $to mouseup "$1" mousemove $from
 }
 # show NAME: that scalar. The list and the click on it are for frames of their own: between them, the window is asked.
 show() {
@@ -139,9 +148,9 @@ watch "$pid" window.txt $interval_s &
 end=$((SECONDS + session_s))
 rounds=0
 while [ $SECONDS -lt $end ]; do
-  drag 1 720 420
+  drag 1 70 70
   do_ click --repeat 5 4
-  drag 2 640 340
+  drag 2 57 57
   do_ click --repeat 5 5 key o
   # A point of the function and another scalar; both back.
   add_point
@@ -153,7 +162,7 @@ while [ $SECONDS -lt $end ]; do
   resize 800 500
   do_ key o
   asked > /dev/null
-  drag 3 600 340
+  drag 3 50 57
   resize 900 600
   do_ key z key r
   asked > /dev/null

@@ -1,0 +1,204 @@
+// How the splats of nodes are corrected where cells grow, shrink or bend: their places, lengths and means.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <vector>
+
+#include "preprocess/splats/node_splats.h"
+#include "preprocess/splats/shape.h"
+#include "tests/reference/mapped_block.h"
+
+namespace curvisplat {
+namespace {
+
+// Spectral elements: neighbouring cells 1.6 times as long as one another, again and again. Splats at the
+// nodes would lie at uneven distances, and a constant field would show stripes.
+TEST(NodeSplats, OfAnUnevenGridTileIt) {
+  const std::vector<double> x{0, 1, 2.6, 3.6, 4.3, 5.4, 6.1, 6.6};
+  const MappedBlock grid(
+      8, 3, 3, [&](double i, double j, double k) { return glm::dvec3(x[static_cast<size_t>(i)], j, k); });
+  NodeSplatCorrections corrections;
+  corrections.stretch = false;
+  const NodeSplats out = grid.splats(corrections);
+  double end = 0;
+  for (size_t i = 0; i < x.size(); ++i) {
+    const NodeSplat& node = out.splats[grid.at(i, 1, 1)];
+    EXPECT_NEAR(node.splat.position.x - 0.5 * node.splat.axis[0], end, 1e-12) << i;
+    end = node.splat.position.x + 0.5 * node.splat.axis[0];
+    EXPECT_NEAR(node.splat.position.y, 1, 1e-12);
+  }
+  EXPECT_NEAR(end, x.back(), 1e-12);
+}
+
+/// The middle of a node's cell between straight-edged cells, by sampling: with `on_face`, of the part that lies in the
+/// plane k = 0.
+glm::dvec3 sampledMiddle(const std::function<glm::dvec3(double, double, double)>& node, const glm::dvec3& at,
+                         bool on_face) {
+  constexpr int kSamples = 8;
+  const auto trilinear = [&](const glm::dvec3& p) {
+    const glm::dvec3 low = glm::floor(p), part = p - low;
+    glm::dvec3 sum(0.0);
+    for (int c = 0; c < 8; ++c) {
+      const glm::dvec3 step(c & 1, c >> 1 & 1, c >> 2);
+      const glm::dvec3 share = glm::mix(1.0 - part, part, step), corner = low + step;
+      sum += share.x * share.y * share.z * node(corner.x, corner.y, corner.z);
+    }
+    return sum;
+  };
+  glm::dvec3 sum(0.0);
+  double weight = 0;
+  const int samples_k = on_face ? 1 : kSamples;
+  for (int i = 0; i < kSamples; ++i)
+    for (int j = 0; j < kSamples; ++j)
+      for (int k = 0; k < samples_k; ++k) {
+        constexpr double kStep = 1e-4;
+        const auto from = [](int n) { return (n + 0.5) / kSamples - 0.5; };
+        const double w = on_face ? 0 : at.z > 0 ? from(k) : 0.5 * (from(k) + 0.5);
+        const glm::dvec3 p = at + glm::dvec3(from(i), from(j), w), here = trilinear(p);
+        glm::dmat3 jacobian;
+        for (int axis = 0; axis < 3; ++axis) {
+          glm::dvec3 next = p;
+          next[axis] += kStep;
+          jacobian[axis] = (trilinear(next) - here) / kStep;
+        }
+        const double volume = std::abs(glm::determinant(jacobian));
+        sum += volume * here;
+        weight += volume;
+      }
+  return sum / weight;
+}
+
+// Few cells around a bend, as rays see them: polygons. The middles of cells lie on the inner side of their nodes, and
+// the faces that splats are cut at on that of the face's nodes.
+TEST(NodeSplats, OfABentGridLieInTheMiddleOfTheirKinkedCells) {
+  const auto node = [](double i, double j, double k) {
+    const double angle = 0.3 * i + 0.01 * i * i, radius = 3 + 0.3 * k;
+    return glm::dvec3(radius * std::cos(angle), radius * std::sin(angle), 0.4 * j);
+  };
+  MappedBlock grid(7, 5, 6, node);
+  grid.addScalar([](const glm::dvec3& p) { return p.x + 2 * p.y - p.z; });
+  NodeSplatCorrections corrections;
+  corrections.stretch = corrections.growth = corrections.bends = false;
+  const NodeSplats out = grid.splats(corrections);
+  for (uint64_t k : {0, 1, 3}) {
+    const size_t at = grid.at(3, 2, k);
+    const Splat& splat = out.splats[at].splat;
+    const glm::dvec3 expected = sampledMiddle(node, glm::dvec3(3, 2, k), false);
+    EXPECT_LT(glm::distance(splat.position, expected), 0.005) << k;
+    EXPECT_GT(glm::distance(splat.position, node(3, 2, std::max(k + 0.0, 0.25))), 0.03) << k;
+    EXPECT_NEAR(out.values[at].mean, expected.x + 2 * expected.y - expected.z, 0.015) << k;
+    if (k == 3) continue;
+    // The plane that it is cut at.
+    const InwardAxes inward = inwardAxes(out.splats[at].border_code);
+    ASSERT_TRUE(inward.hasFace(0)) << k;
+    const glm::dvec3 normal = glm::normalize(gradientOf(splat, glm::dvec3(inward.axis[0])));
+    const double distance = inward.distance * glm::dot(normal, splat.factor() * glm::dvec3(inward.axis[0]));
+    const glm::dvec3 on_face = sampledMiddle(node, glm::dvec3(3, 2, 0), true);
+    EXPECT_NEAR(glm::dot(normal, splat.position - on_face), distance, 0.01) << k;
+    EXPECT_GT(std::abs(glm::dot(normal, splat.position - node(3, 2, 0)) - distance), 0.03) << k;
+  }
+}
+
+// The cells of OfAnUnevenGridTileIt: a splat's axes are stretched, its weight is the cell's, and so is its middle.
+TEST(NodeSplats, OfAnUnevenGridAreStretchedButKeepVolumeAndMiddle) {
+  const std::vector<double> x{0, 1, 2.6, 3.6, 4.6, 6.2, 7.2, 8.2, 9.8, 10.8, 11.8, 13.4, 14.4};
+  MappedBlock grid(13, 5, 5, [&](double i, double j, double k) {
+    return glm::dvec3(x[static_cast<size_t>(i)], j + 0.2 * x[static_cast<size_t>(i)], k);
+  });
+  grid.addScalar([](const glm::dvec3& p) { return p.x; });
+  NodeSplatCorrections corrections;
+  corrections.stretch = false;
+  NodeSplatCorrections even;
+  even.growth = false;
+  const NodeSplats plain = grid.splats(corrections), stretched = grid.splats(even);
+  EXPECT_NEAR(totalWeight(stretched) / totalWeight(plain), 1, 1e-12);
+  for (uint64_t i = 0; i < 13; ++i) {
+    const size_t n = grid.at(i, 2, 2);
+    const Splat &before = plain.splats[n].splat, &after = stretched.splats[n].splat;
+    const double s = after.axis[0] / before.axis[0];
+    // Nodes between two elements of three steps have the smallest cells.
+    if (i % 3 == 0) {
+      EXPECT_GT(s, 1.05) << i;
+    } else {
+      EXPECT_LT(s, 0.99) << i;
+    }
+    EXPECT_NEAR(after.weight / before.weight, 1, 1e-12);
+    // Across the stretched column the cell is as it was.
+    EXPECT_NEAR(after.axis[1] / before.axis[1], 1, 1e-12);
+    EXPECT_NEAR(after.shear[0], before.shear[0], 1e-12);
+    // The middle of a half cell follows the stretch from the border on; others stay.
+    const bool at_border = i == 0 || i == 12;
+    const double moved = at_border ? (s - 1) * 0.5 * before.axis[0] * (i == 0 ? 1 : -1) : 0;
+    EXPECT_NEAR(after.position.x, before.position.x + moved, 1e-12) << i;
+    // The gradient stays.
+    EXPECT_NEAR(stretched.values[n].slope.x / after.axis[0], plain.values[n].slope.x / before.axis[0], 1e-5);
+    EXPECT_NEAR(stretched.values[n].mean, after.position.x, 1e-5);
+  }
+}
+
+// Towards the larger cells, the scalar along with it; half cells stay.
+TEST(NodeSplats, OfAGrowingGridDrift) {
+  MappedBlock grid(13, 5, 5, [](double i, double j, double k) { return glm::dvec3(std::pow(1.2, i), j, k); });
+  grid.addScalar([](const glm::dvec3& p) { return p.x; });
+  NodeSplatCorrections even;
+  even.growth = false;
+  const NodeSplats without = grid.splats(even), drifted = grid.splats();
+  for (uint64_t i = 0; i < 13; ++i) {
+    const size_t n = grid.at(i, 2, 2);
+    const Splat &before = without.splats[n].splat, &after = drifted.splats[n].splat;
+    const double moved = i == 0 || i == 12 ? 0 : kDrift * std::log(1.2) * before.axis[0];
+    EXPECT_NEAR(after.position.x, before.position.x + moved, 2e-3 * before.axis[0]) << i;
+    EXPECT_EQ(after.weight, before.weight);
+    EXPECT_NEAR(drifted.values[n].mean - without.values[n].mean, after.position.x - before.position.x,
+                2e-3 * before.axis[0]);
+  }
+}
+
+TEST(NodeSplats, BesideABlankAreStretchedAsAtTheEndOfABlock) {
+  const auto x = [](double i) { return i + 0.3 * std::sin(2 * i); };
+  const auto mapping = [&](double i, double j, double k) { return glm::dvec3(x(k), x(i), x(j)); };
+  MappedBlock holed(9, 8, 14, mapping);
+  for (uint64_t j = 0; j < 8; ++j)
+    for (uint64_t i = 0; i < 9; ++i) holed.nodes.blank[holed.at(i, j, 8)] = 1;
+  const NodeSplats found = holed.splats(), expected = MappedBlock(9, 8, 8, mapping).splats();
+  for (size_t n = 0; n < expected.splats.size(); ++n) {
+    EXPECT_EQ(found.splats[n].splat.axis, expected.splats[n].splat.axis) << n;
+    EXPECT_EQ(found.splats[n].splat.weight, expected.splats[n].splat.weight) << n;
+  }
+}
+
+// The weighted mean of tangents x² about the nodes: at a node it must be the node's own value, wherever the
+// cells grow.
+TEST(NodeSplats, MeansMakeUpForWhatTangentsMiss) {
+  for (const double growth : {1.0, 1.1}) {
+    const auto x = [&](double i) { return growth == 1 ? i : (std::pow(growth, i) - 1) / (growth - 1); };
+    MappedBlock block(9, 5, 5, [&](double i, double j, double k) { return glm::dvec3(x(i), j, k); });
+    block.addScalar([](const glm::dvec3& p) { return p.x * p.x; });
+    const NodeSplats splats = block.splats();
+    for (uint64_t i = 1; i + 1 < 9; ++i) {
+      const size_t n = block.at(i, 2, 2);
+      const Splat& splat = splats.splats[n].splat;
+      const double spacing = splat.axis[0], here = splat.position.x;
+      // Half the second derivative, 1, times the kernel's variance.
+      EXPECT_NEAR(splats.values[n].mean, here * here + 0.1994 * spacing * spacing,
+                  growth == 1 ? 1e-4 * here * here : 0.02 * spacing * spacing)
+          << growth << " " << i;
+    }
+  }
+}
+
+TEST(NodeSplats, MeansStayWithinTheNeighboursValues) {
+  MappedBlock block(9, 9, 9, [](double i, double j, double k) { return glm::dvec3(i, j, k); });
+  block.addScalar([](const glm::dvec3& p) { return p.x + p.y > 8 ? 1.0 : 0.0; });
+  for (const SplatScalar& value : block.splats().values) {
+    EXPECT_GE(value.mean, 0);
+    EXPECT_LE(value.mean, 1);
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat
