@@ -60,7 +60,9 @@ std::string closestTo(std::string_view word, std::span<const std::string> candid
   for (const std::string& candidate : candidates) {
     if (candidate.size() > 2 * kMaxWord) continue;
     const size_t letters = distance(word, candidate);
-    if (letters >= least) continue;
+    const bool is_closer_in_a_tie =
+        letters == least && !best.empty() && beginsWith(candidate, word) && !beginsWith(best, word);
+    if (letters >= least && !is_closer_in_a_tie) continue;
     least = letters;
     best = candidate;
   }

@@ -77,8 +77,9 @@ void addMissingScalars(const fs::path& cache, const std::vector<fs::path>& files
                        const std::vector<std::string>& names, Progress& progress) {
   std::set<std::string> missing(names.begin(), names.end());
   missing.erase("");
-  for (const VariableInfo& variable : CacheReader(cache).manifest().variables) missing.erase(variable.name);
-  if (missing.empty() || CacheReader(cache).series().steps.size() > 1) return;
+  const CacheReader reader(cache);
+  for (const VariableInfo& variable : reader.manifest().variables) missing.erase(variable.name);
+  if (missing.empty() || reader.series().steps.size() > 1) return;
   for (const FurtherScalar& one : furtherScalarsOf(cache, files))
     if (missing.contains(one.name)) addFurtherScalar(cache, files, one.name, progress);
 }

@@ -64,8 +64,14 @@ std::optional<glm::dvec2> CacheView::placeOf(const glm::dvec3& point, const Wind
 
 void CacheView::showPlanesAndMarkers(const WindowLayout& layout) {
   const auto place = [&](const glm::dvec3& point) { return placeOf(point, layout); };
+  // Not over the scalar bars.
+  const Rectangle& whole = layout.picture;
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  list->PushClipRect(toImGui(whole.x, whole.y),
+                     toImGui(whole.x + (1 - shown_strip_) * whole.width, whole.y + whole.height));
   changed_ |= handles_.draw(state_, manifest(), place, window_);
   drawMarkerSigns(state_, place);
+  list->PopClipRect();
 }
 
 /// Where the mouse rests, the values there are found: first the depth of the picture's pixels, then what the data have
@@ -193,7 +199,8 @@ void CacheView::copyCommand(bool turns) {
     window_.setClipboard(command);
     fmt::print("{}\n", command);
     std::fflush(stdout);
-    say(turns ? "copied the command for a movie" : "copied the command for this picture");
+    say(fmt::format("copied the command for {}; paste it into a terminal",
+                    turns ? "a movie" : "this picture"));
   } catch (const Error& error) {
     say(error.what(), true);
   }
