@@ -68,7 +68,7 @@ void facesOfCells(const GatheredCells& cells, size_t record_bytes,
                         for (size_t at = 0; at < faces.size(); at += faces[at] + size_t{1}, ++to) {
                           CellFace face{n, faces.subspan(at + 1, faces[at]), {}, {}};
                           out.corners[to] = lowestOf(cells.cornersOfCell(n), face.corners);
-                          if (out.corners[to] == kCollapsed) continue;
+                          if (out.corners[to][2] == UINT64_MAX) continue;
                           measure(view.corners, middle, face);
                           put(face, std::span(out.records).subspan(to * record_bytes, record_bytes));
                         }
@@ -76,7 +76,7 @@ void facesOfCells(const GatheredCells& cells, size_t record_bytes,
                     });
   size_t kept = 0;
   for (size_t n = 0; n < out.corners.size(); ++n) {
-    if (out.corners[n] == kCollapsed) continue;
+    if (out.corners[n][2] == UINT64_MAX) continue;
     if (kept != n) {
       out.corners[kept] = out.corners[n];
       std::memmove(out.records.data() + kept * record_bytes, out.records.data() + n * record_bytes,

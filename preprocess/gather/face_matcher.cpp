@@ -20,6 +20,10 @@ uint64_t hashOf(const FaceCorners& corners) {
   return hash;
 }
 
+bool areSame(const FaceCorners& a, const FaceCorners& b) {
+  return ((a[0] ^ b[0]) | (a[1] ^ b[1]) | (a[2] ^ b[2])) == 0;
+}
+
 }  // namespace
 
 FaceMatcher::FaceMatcher(size_t record_bytes, uint64_t faces, uint64_t memory_bytes,
@@ -84,7 +88,7 @@ void FaceMatcher::add(const FaceRecords& faces, const TakePair& pair) {
     const auto record = std::span(faces.records).subspan(n * record_bytes_, record_bytes_);
     const uint64_t bucket = bucketOf(corners);
     uint32_t same = buckets_[bucket];
-    while (same != kNone && waiting_[same].corners != corners) same = waiting_[same].next;
+    while (same != kNone && !areSame(waiting_[same].corners, corners)) same = waiting_[same].next;
     if (same != kNone) {
       pair(recordOf(same), record);
       unlink(same);

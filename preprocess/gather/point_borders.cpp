@@ -1,6 +1,5 @@
 #include "preprocess/gather/point_borders.h"
 
-#include <algorithm>
 #include <array>
 #include <cstring>
 
@@ -21,9 +20,9 @@ FaceRecord recordOf(const GatheredCells& cells, const CellFace& face) {
   FaceRecord record{};
   const std::span<const uint64_t> corners = cells.cornersOfCell(face.cell);
   const auto put = [&](uint64_t corner) {
-    const auto end = record.corners.begin() + record.count;
-    if (record.count < kMostCorners && std::find(record.corners.begin(), end, corner) == end)
-      record.corners[record.count++] = corner;
+    bool known = record.count == kMostCorners;
+    for (uint32_t n = 0; n < record.count; ++n) known |= record.corners[n] == corner;
+    if (!known) record.corners[record.count++] = corner;
   };
   for (const uint32_t place : face.corners) put(corners[place]);
   record.of_face = record.count;

@@ -3,6 +3,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <atomic>
@@ -18,7 +19,6 @@ namespace {
 constexpr size_t kCellsPerTask = 256;
 // Points whose numbers differ in this many lowest bits are summed by one task.
 constexpr uint64_t kStripe = 4096;
-constexpr size_t kStripes = 16;
 constexpr size_t kMomentBytes = size_t{16} << 20;  // of a batch of cells
 constexpr size_t kCellsPerRead = 8192;
 
@@ -115,6 +115,8 @@ void PointSums::accumulate(const GatheredCells& cells, Sums& sums) {
   const size_t stride = momentCount(fields_);
   const size_t most_corners = std::max<size_t>(1, kMomentBytes / (stride * sizeof(double)));
   const uint64_t end_point = sums.first + sums.at.size();
+  const auto threads = static_cast<size_t>(tbb::this_task_arena::max_concurrency());
+  const size_t stripes = threads == 1 ? 1 : 2 * threads;  // each looks at all corners
   tbb::enumerable_thread_specific<DualScratch> scratch;
   for (size_t begin = 0; begin < cells.size();) {
     size_t end = begin + 1;
@@ -136,12 +138,12 @@ void PointSums::accumulate(const GatheredCells& cells, Sums& sums) {
                         }
                       });
     // Each point's sum has the order of the cells, whoever adds them.
-    tbb::parallel_for(size_t{0}, kStripes, [&](size_t stripe) {
+    tbb::parallel_for(size_t{0}, stripes, [&](size_t stripe) {
       for (size_t n = begin; n < end; ++n) {
         if (cells.shapes[n] == CellKind::kNone) continue;
         for (size_t corner = cells.corner_begin[n]; corner < cells.corner_begin[n + 1]; ++corner) {
           const uint64_t point = cells.corners[corner];
-          if (point / kStripe % kStripes != stripe || point < sums.first || point >= end_point) continue;
+          if (point / kStripe % stripes != stripe || point < sums.first || point >= end_point) continue;
           const size_t to = point - sums.first;
           if (std::isnan(sums.at[to].x)) {
             sums.at[to] = cells.at[corner];
