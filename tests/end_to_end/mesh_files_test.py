@@ -226,9 +226,15 @@ class MeshFiles(unittest.TestCase):
             '<DataSet timestep="3" file="step1.vtu"/></Collection></VTKFile>')
         info = self.check(self.folder / "run.pvd", grid)
         self.assertEqual(info["times"], [1, 3])
-        result = self.run_program("convert", self.folder / "run.pvd", "-o", self.folder / "s.splats", "--steps", "all")
-        self.assertIn("cannot be a time series", result.stderr)
-        self.assertEqual(result.returncode, 1)
+        cache = self.folder / "s.splats"
+        for files in ((self.folder / "run.pvd", "--steps", "all"), (self.folder / "step0.vtu", self.folder / "step1.vtu")):
+            result = self.run_program("convert", *files, "-o", cache, "--scalar", "p", "--overwrite")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn("2 steps, 2 of them converted now, 0 with a geometry of their own", result.stdout)
+        result = self.run_program("convert", self.folder / "step0.vtu", "-o", cache, "--scalar", "c", "--overwrite")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        result = self.run_program("convert", self.folder / "step0.vtu", "--add-scalar", "p", "--to", cache)
+        self.assertIn("its scalars are cell-centred, but p is node-centred", result.stderr)
 
     def test_compressed_as_a_whole(self):
         grid = cube(2)
@@ -474,8 +480,9 @@ class MeshFiles(unittest.TestCase):
         write_xml(grid, path)
         self.volume(path, "p")
         result = self.run_program("convert", path, "--add-scalar", "v:x", "--to", self.folder / "mesh.splats")
-        self.assertEqual(result.returncode, 1)
-        self.assertIn("cannot get further scalars later", result.stderr)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        result = self.run_program("convert", path, "--add-scalar", "v:x", "--to", self.folder / "mesh.splats")
+        self.assertIn("has a scalar 'v:x' already", result.stderr)
         write_xml(grid, self.folder / "fields.vtu")
         result = self.run_program("convert", path, self.folder / "fields.vtu", "-o", self.folder / "two.splats")
         self.assertEqual(result.returncode, 1)

@@ -89,6 +89,15 @@ class Su2Meshes(MeshFormats):
         self.assertEqual(self.info(self.path, self.restart, other)["cells"]["count"], len(mesh.cells))
         self.assertAlmostEqual(self.cache([self.path, self.restart, other], "p")[1], 1, delta=2e-3)
         self.expect_line(self.path, self.restart, words="has 2 zones, but 1 restart files")
+        # Names that differ in a number alone are steps elsewhere.
+        numbered = [self.folder / "restart_0.dat", self.folder / "restart_1.dat"]
+        for path in numbered:
+            path.write_bytes(self.restart.read_bytes())
+        self.assertAlmostEqual(self.cache([self.path, *numbered], "p")[1], 1, delta=2e-3)
+        self.write(mesh)
+        result = self.run_program("convert", self.path, *numbered, "-o", self.folder / "steps.splats", "--scalar", "p")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("2 steps, 2 of them converted now, 0 with a geometry of their own", result.stdout)
 
     @unittest.skipUnless(meshio, "no python3-meshio")
     def test_meshio_agrees(self):
