@@ -33,7 +33,7 @@ case $form in
     # The smoke test of bench/ also draws with VTK; tests/stream/read_cache.py, tests/python and the tests of files
     # that others write need the others.
     "$root/tools/setup.sh" python3-vtk9 python3-numpy python3-zstandard python3-xxhash python3-netcdf4 zstd \
-      python3-xarray python3-pip python3-setuptools python3-wheel
+      python3-xarray python3-pip python3-setuptools python3-wheel python3-openvdb
     "$root/tools/build.sh"
     run release "$@"
     ;;
