@@ -12,7 +12,9 @@ namespace {
 
 constexpr double kPartVariance = 1.0 / 256;  // of a sixteenth of a cell, times 12
 
-// A part is cut at its end like the half cell at a border.
+// A part is cut at its end like the half cell at a border. Of slices of whole cells, and of those that are nearly whole, too few
+// points say where that is.
+constexpr double kLeastCut = 0.1;     // of the cell
 constexpr double kLeastShift = 1e-3;  // of the middle, in cells: the rest may lie around what is covered
 
 /// 12 times the covariance of the points that are left, and of the part of the cell that each stands for; of all
@@ -69,33 +71,44 @@ glm::dvec3 solved(const glm::dmat3& lower, const glm::dvec3& v) {
   return {x, y, (v.z - lower[0][2] * x - lower[1][2] * y) / lower[2][2]};
 }
 
-/// How a part ends, in the frame of its own A. `inward`: from the face between the blocks, unit length in that frame, or
-/// zero; `distance`: of that face from the part's middle, in its lengths.
-uint32_t borderOf(const glm::dmat3& lower, const glm::dvec3& inward, double distance,
-                  const CoveredCell& cell) {
+/// The face between the blocks: where it is seen from a part's middle, in the frame of its own A.
+struct PartFace {
+  glm::dvec3 inward{0.0};  // unit length; zero if there is none
+  double distance = 0.5;   // in lengths of the part
+  bool is_sure = false;    // enough points tell
+};
+
+/// How a part ends. Where that is where the whole cell ended, the border's direction is better known than the points tell.
+uint32_t borderOf(const glm::dmat3& lower, PartFace face, const CoveredCell& cell) {
   constexpr double kAlong = 0.7;  // cosine of directions that are about the same
-  const bool is_cut = inward != glm::dvec3(0.0);
-  std::array<glm::dvec3, 3> axes{inward};
-  uint32_t faces = is_cut ? 1 : 0;
-  size_t count = faces;
-  InwardAxes whole = inwardAxes(cell.border_code);
-  if (whole.behind) whole.count = 0;
-  double next = 1;
-  for (int n = 0; n < whole.count && count < 3; ++n) {
-    glm::dvec3 axis = glm::normalize(solved(lower, glm::dvec3(whole.axis[static_cast<size_t>(n)])));
-    const double along = is_cut ? glm::dot(axis, inward) : 0;
+  const InwardAxes whole = inwardAxes(cell.border_code);
+  std::array<glm::dvec3, 3> axes;
+  size_t count = 0;
+  uint32_t faces = 0;
+  bool at_border = false;
+  for (int n = 0; n < whole.count && !whole.behind; ++n) {
+    const glm::dvec3 axis = glm::normalize(solved(lower, glm::dvec3(whole.axis[static_cast<size_t>(n)])));
+    const double along = glm::dot(axis, face.inward);
     if (along < -kAlong) return kNoBorder;  // between two faces
-    if (along > kAlong) {
-      next = cell.next;
-      continue;
-    }
-    for (size_t m = 0; m < count; ++m) axis -= glm::dot(axis, axes[m]) * axes[m];
     if (whole.hasFace(n)) faces |= 1u << count;
-    axes[count++] = glm::normalize(axis);
+    axes[count++] = axis;
+    if (along <= kAlong) continue;
+    face = {axis, 0.5, true};
+    at_border = true;
   }
-  // Cells behind the face are longer than what is left of this one.
-  if (is_cut && count == 1)
-    return packMergedCode(inward, distance, next / (2 * distance * glm::length(lower * inward)));
+  if (face.is_sure && count == (at_border ? 1 : 0)) {
+    // Cells behind the face are longer than what is left of this one.
+    const double next = (at_border ? cell.next : 1) / glm::length(lower * face.inward);
+    return packMergedCode(face.inward, face.distance, next / (2 * face.distance));
+  }
+  if (face.is_sure && !at_border && count < 3) {
+    faces |= 1u << count;
+    axes[count++] = face.inward;
+  }
+  for (size_t n = 1; n < count; ++n) {
+    for (size_t m = 0; m < n; ++m) axes[n] -= glm::dot(axes[n], axes[m]) * axes[m];
+    axes[n] = glm::normalize(axes[n]);
+  }
   return packBorderCode({axes.data(), count}, faces);
 }
 
@@ -124,8 +137,8 @@ std::optional<uint32_t> keepUncovered(const CoveredCell& cell, Splat& splat, std
   PartMoments part = momentsOf(~cell.covered);
   // The face between the blocks is about at right angles to where the rest's middle is.
   const double shift = glm::length(part.middle);
-  const bool is_cut = shift > kLeastShift;
-  const double to_face = is_cut ? shift + planeDistance(cell.covered, part.middle / shift) : 0;
+  const bool has_face = shift > kLeastShift;
+  const double to_face = has_face ? shift + planeDistance(cell.covered, part.middle / shift) : 0;
   part.middle = cell.axes * part.middle;
   part.shape = cell.axes * part.shape * glm::transpose(cell.axes);
   const glm::dmat3 lower = choleskyOf(part.shape);
@@ -138,11 +151,14 @@ std::optional<uint32_t> keepUncovered(const CoveredCell& cell, Splat& splat, std
     value.mean += glm::dot(value.slope, part.middle);
     value.slope = glm::transpose(lower) * value.slope;
   }
-  if (!is_cut) return borderOf(lower, glm::dvec3(0.0), 0, cell);
-  const glm::dvec3 inward =
-      glm::transpose(lower) * part.middle / shift;  // as long as the cell is to the part
-  const double length = glm::length(inward);
-  return borderOf(lower, inward / length, to_face / length, cell);
+  PartFace face;
+  if (has_face) {
+    const glm::dvec3 inward =
+        glm::transpose(lower) * part.middle / shift;  // as long as the cell is to the part
+    const double length = glm::length(inward);
+    face = {inward / length, to_face / length, part.share >= kLeastCut && part.share <= 1 - kLeastCut};
+  }
+  return borderOf(lower, face, cell);
 }
 
 }  // namespace curvisplat
