@@ -205,10 +205,6 @@ void render(const RenderArguments& given) {
   }
 
   options.scene = sceneOf(arguments.surfaces, cache, shown, variable);
-  if (options.scene && !options.scene->isovalues.empty() && options.scene->volume &&
-      transfer_function.logScale())
-    throw UsageError(
-        "--iso in the volume needs a linear transfer function; this one is logarithmic: add --volume off");
   for (const std::string& miss : slicesThatMiss(arguments.surfaces, manifest.lower, manifest.upper))
     printMessage("warning: {}", miss);
 

@@ -80,10 +80,10 @@ std::vector<double> parseIsovalues(const std::vector<std::string>& texts) {
 }
 
 double parseIsoOpacity(const std::string& text) {
-  if (text.empty()) return kIsoOpacity;
+  if (text.empty()) return 1;
   const double opacity = parseNumber("--iso-opacity", text);
-  if (!(opacity > 0 && opacity <= 0.99))
-    throw UsageError("--iso-opacity {}: expected a number above 0 and at most 0.99", text);
+  if (!(opacity > 0 && opacity <= 1))
+    throw UsageError("--iso-opacity {}: expected a number above 0 and at most 1", text);
   return opacity;
 }
 
@@ -164,7 +164,7 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
       ->group(group);
   command
       .add_option("--iso-opacity", arguments.iso_opacity,
-                  "Opacity of the isosurfaces, above 0 and at most 0.99 (default 0.95)")
+                  "Opacity of the isosurfaces, above 0 and at most 1 (default 1)")
       ->group(group);
   command
       .add_option("--volume", arguments.volume, "on, or off to draw surfaces, slices and isosurfaces alone")
