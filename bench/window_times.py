@@ -6,6 +6,8 @@ until the screen changes, at moments spread over the refinement; from Escape unt
 screen is polled about every millisecond through Xlib: a screenshot by another program would take longer than what is measured.
 
     bench/window_times.py CACHE [--inputs 40] [--backend cpu] [--program build/release/tools/curvisplat]
+    bench/window_times.py GRID SOLUTION              # while it converts: until the preview, and input until the whole is there
+    bench/window_times.py CACHE --add-scalar NAME    # and input while the scalar is added from the cache's sources
 
 Needs Xvfb, libX11 and libXtst (installed with xdotool). Nothing else should run meanwhile.
 """
@@ -91,9 +93,46 @@ def spread(name, seconds):
           f"all within {1000 * ordered[-1]:.0f} ms")
 
 
+def place_of(widgets, name, seconds=30):
+    """The middle of a widget, by its name (CURVISPLAT_WIDGETS)."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        lines = [line.split(" ", 4) for line in widgets.read_text().splitlines()] if widgets.exists() else []
+        for x, y, width, height, found in lines:
+            if found == name:
+                return int(x) + int(width) // 2, int(y) + int(height) // 2
+        time.sleep(0.02)
+    raise SystemExit(f"the window has no '{name}'")
+
+
+def click(display, place):
+    display.move(*place)
+    time.sleep(0.1)
+    for down in (1, 0):
+        display.button(down)
+        time.sleep(0.05)
+
+
+def is_there(widgets, name):
+    return widgets.exists() and any(line.split(" ", 4)[4] == name for line in widgets.read_text().splitlines())
+
+
+def measure_keys(display, chance, goes_on):
+    """Keys, as long as something goes on."""
+    keys = []
+    while goes_on() and len(keys) < 500:
+        time.sleep(chance.uniform(0.05, 0.4))
+        keys.append(display.seconds_until_changed(PANEL, lambda: display.key("h")))
+    if len(keys) % 2:
+        display.key("h")  # the panels are there again
+        time.sleep(0.5)
+    return keys
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("cache", type=pathlib.Path)
+    parser.add_argument("cache", type=pathlib.Path, nargs="+", help="a cache, or a grid and its solutions")
+    parser.add_argument("--add-scalar", help="of the cache's sources, which is added to it")
     parser.add_argument("--inputs", type=int, default=40)
     parser.add_argument("--backend", default="auto")
     root = pathlib.Path(__file__).resolve().parent.parent
@@ -108,18 +147,36 @@ def main():
             while not pathlib.Path(f"/tmp/.X11-unix/X{name[1:]}").exists():
                 time.sleep(0.01)
             display = Display(name)
-            environment = dict(os.environ, DISPLAY=name, XDG_CONFIG_HOME=folder)
+            widgets = pathlib.Path(folder) / "widgets"
+            environment = dict(os.environ, DISPLAY=name, XDG_CONFIG_HOME=folder, XDG_CACHE_HOME=folder,
+                               CURVISPLAT_WIDGETS=str(widgets))
             blank = display.pixels(PANEL)
             start = time.monotonic()
             window = subprocess.Popen(
-                [words.program.resolve(), "view", words.cache.resolve(), "--size", "%dx%d" % SIZE, "--backend",
+                [words.program.resolve(), "view", *[file.resolve() for file in words.cache], "--size", "%dx%d" % SIZE, "--backend",
                  words.backend], cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            converts = not words.cache[0].is_dir()
             while display.pixels(PANEL) == blank:
                 time.sleep(0.001)
             print(f"window on the screen after {1000 * (time.monotonic() - start):.0f} ms")
             while not coloured(display.pixels(PICTURE)):
                 time.sleep(0.005)
             print(f"data on the screen after {1000 * (time.monotonic() - start):.0f} ms")
+            if converts:
+                place_of(widgets, "curve")
+                if is_there(widgets, "opening"):
+                    print("that is a preview")
+                    spread("keys while it converts", measure_keys(display, chance, lambda: is_there(widgets, "opening")))
+                print(f"the whole is there after {time.monotonic() - start:.1f} s")
+                display.seconds_until_changed(PANEL, lambda: display.key("h"))
+                display.seconds_until_changed(PANEL, lambda: display.key("h"))
+            if words.add_scalar:
+                click(display, place_of(widgets, "scalar"))
+                click(display, place_of(widgets, "further scalar " + words.add_scalar))
+                place_of(widgets, "opening")
+                display.move(700, 400)
+                spread("keys while a scalar is added",
+                       measure_keys(display, chance, lambda: is_there(widgets, "opening")))
 
             keys, drags = [], []
             display.move(700, 400)

@@ -13,6 +13,7 @@
 #include "render/mesh/mesh_file.h"
 #include "stream/base/error.h"
 #include "stream/base/paths.h"
+#include "tools/options/choices.h"
 #include "tools/options/grid_surfaces.h"
 #include "tools/options/option_parsers.h"
 
@@ -186,8 +187,7 @@ void checkSurfaceArguments(const SurfaceArguments& arguments) {
   if (!arguments.surface_by.empty() &&
       std::all_of(arguments.surfaces.begin(), arguments.surfaces.end(), isSurfaceFile))
     throw UsageError("--surface-by {} needs faces of the grid, such as --surface kmin", arguments.surface_by);
-  if (arguments.volume != "on" && arguments.volume != "off")
-    throw UsageError("--volume {}: expected on or off", arguments.volume);
+  requireChoice("--volume", arguments.volume, {"on", "off"});
   parseIsovalues(arguments.isovalues);
   parseIsoOpacity(arguments.iso_opacity);
   if (!arguments.iso_opacity.empty() && arguments.isovalues.empty())
