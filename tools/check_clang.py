@@ -5,6 +5,7 @@ by .clang-tidy as well. Takes the commands of build/release, which tools/build.s
 (tools/cmake/common_headers.h, and GoogleTest) is parsed once for all that are compiled alike: half of the time.
 
     tools/check_clang.py [--tidy] [FILE ...]    these; without any, all sources
+    tools/check_clang.py [--tidy] --since REV   those that have changed since this commit
 """
 
 import argparse
@@ -38,6 +39,15 @@ def commands(chosen):
     if missing:
         sys.exit(f"check_clang: {min(missing)}: no target compiles this file; name a .cpp file of the build")
     return sorted((file, *rest) for file, rest in ours.items())
+
+
+def changed_since(revision):
+    """The sources that have changed since a commit, in the working tree as well, and still exist."""
+    run = subprocess.run(["git", "diff", "--name-only", "--diff-filter=d", revision, "--", "*.cpp"], cwd=ROOT, text=True,
+                         capture_output=True)
+    if run.returncode:
+        sys.exit(f"check_clang: --since {revision}: {run.stderr.strip()}; name a commit of this repository")
+    return {ROOT / line for line in run.stdout.splitlines()}
 
 
 def clang_arguments(arguments):
@@ -106,12 +116,19 @@ def tidy(files):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tidy", action="store_true", help="run clang-tidy, too")
+    parser.add_argument("--since", metavar="REV", help="check the sources that have changed since this commit")
     parser.add_argument("files", nargs="*", type=pathlib.Path)
     options = parser.parse_args()
+    chosen = {file.resolve() for file in options.files}
+    if options.since:
+        chosen |= changed_since(options.since)
+        if not chosen:
+            print(f"check_clang: no source has changed since {options.since}")
+            return 0
     packages = ["clang-14"] + (["clang-tidy-14"] if options.tidy else [])
     subprocess.run([ROOT / "tools/setup.sh", *packages], check=True)
 
-    jobs = commands({file.resolve() for file in options.files})
+    jobs = commands(chosen)
     with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
         headers = CommonHeaders(pathlib.Path(folder), jobs)
         found = [output for output in pool.map(lambda job: check(job, headers), jobs) if output]
