@@ -127,10 +127,9 @@ void view(const ViewArguments& arguments) {
 void addView(CLI::App& app) {
   auto arguments = std::make_shared<ViewArguments>();
   CLI::App* command = app.add_subcommand("view", "Show a cache or a grid in a window");
-  command->add_option(
-      "FILE", arguments->files,
-      "Splat cache, a directory NAME.splats; or a grid and its solutions, which are converted "
-      "into the user's cache folder. Without, the window asks for one");
+  command->add_option("FILE", arguments->files,
+                      "Splat cache, a directory NAME.splats; or a grid and its solutions, which are "
+                      "converted into the user's cache folder. If none is given, the window asks for one");
   command->add_option("--size", arguments->size, "Size of the window, WIDTHxHEIGHT in pixels")
       ->capture_default_str();
   command->add_option("--scalar", arguments->scalar, "Name of the scalar to show (default: as last time)");

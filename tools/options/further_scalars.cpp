@@ -6,7 +6,6 @@
 #include <system_error>
 
 #include "preprocess/addition/add_scalar.h"
-#include "preprocess/formats/open/open_grid.h"
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/options/convert_arguments.h"
@@ -22,11 +21,6 @@ ConvertArguments argumentsFor(const std::vector<fs::path>& files, const fs::path
   arguments.grid.solutions.assign(files.begin() + 1, files.end());
   arguments.to = cache;
   return arguments;
-}
-
-std::unique_ptr<GridSource> openFor(const ConvertArguments& arguments) {
-  return requireGrid(openSource(arguments, arguments.to),
-                     "cannot get further scalars later; convert all of them at once");
 }
 
 }  // namespace
@@ -47,7 +41,7 @@ std::vector<FurtherScalar> furtherScalarsOf(const fs::path& cache, const std::ve
   const CacheReader reader(cache);
   if (reader.series().steps.size() > 1)
     throw Error("{}: is a series of time steps, to which no scalar can be added", cache.string());
-  const auto source = openFor(argumentsFor(files, cache));
+  const auto source = openSource(argumentsFor(files, cache), cache);
   std::set<std::string> names;
   for (const VariableInfo& variable : reader.manifest().variables) names.insert(variable.name);
   const Centring centring = reader.manifest().cells ? Centring::kCell : Centring::kNode;
@@ -62,7 +56,7 @@ void addFurtherScalar(const fs::path& cache, const std::vector<fs::path>& files,
                       Progress& progress) {
   ConvertArguments arguments = argumentsFor(files, cache);
   arguments.added_scalars = {name};
-  const auto source = openFor(arguments);
+  const auto source = openSource(arguments, cache);
   AddScalarOptions options;
   options.cache = cache;
   options.scalars = chooseScalars(arguments, arguments.added_scalars, source->description());

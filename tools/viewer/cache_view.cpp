@@ -20,8 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kIdleWait_s = 0.5;
-constexpr double kMovingWait_s = 0.03;  // while flying, and until the camera is at rest
+constexpr double kIdleWaitSeconds = 0.5;
+constexpr double kMovingWaitSeconds = 0.03;  // while flying, and until the camera is at rest
 
 double clockSeconds() {
   return glfwGetTime();
@@ -333,7 +333,7 @@ double CacheView::wait() const {
   if (playback_.isPlaying() && isShown() && playback_.wait(clockSeconds()) <= 0) return 0;
   const bool short_wait =
       navigation_.isMoving() || ImGui::IsAnyItemActive() || playback_.isPlaying() || probe_.busy();
-  return short_wait ? kMovingWait_s : kIdleWait_s;
+  return short_wait ? kMovingWaitSeconds : kIdleWaitSeconds;
 }
 
 /// A state at which the user rests is one to go back to.

@@ -27,8 +27,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMaxNamedFiles = 4;   // in a command; of a longer series its kept cache
-constexpr double kPointedFor_s = 0.3;  // the mouse rests that long before values are looked for
+constexpr size_t kMaxNamedFiles = 4;  // in a command; of a longer series its kept cache
+constexpr double kPointedForSeconds = 0.3;  // the mouse rests that long before values are looked for
 
 ImVec2 toImGui(double x, double y) {
   return {static_cast<float>(x), static_cast<float>(y)};
@@ -89,7 +89,7 @@ void CacheView::probe(const WindowLayout& layout) {
     pointed_ = pointed.value_or(glm::dvec2(-1.0));
     if (!pointed) probed_.clear();
   }
-  const bool rests = pointed && glfwGetTime() - pointed_since_s_ > kPointedFor_s;
+  const bool rests = pointed && glfwGetTime() - pointed_since_s_ > kPointedForSeconds;
   if ((rests || clicked_) && isFinal() && !frames_.busy() && values_asked_for_ != request_) {
     values_asked_for_ = request_;
     frames_.requestValues();

@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 
 // New pictures and input end a wait early. Longer waits leave the processor to the renderer when both share
 // it.
-constexpr double kIdleWait_s = 0.5;
+constexpr double kIdleWaitSeconds = 0.5;
 constexpr int kFramesAfterInput = 2;  // Dear ImGui needs them to settle
 constexpr double kTextStep = 1.125;
 constexpr size_t kMaxTitle = 60;
@@ -70,7 +70,7 @@ class Viewer {
     int frames_to_settle = kFramesAfterInput;
     while (window_.isOpen()) {
       stopped.throwIfStopped();
-      window_.wait(frames_to_settle > 0 ? 0 : view_ ? view_->wait() : kIdleWait_s);
+      window_.wait(frames_to_settle > 0 ? 0 : view_ ? view_->wait() : kIdleWaitSeconds);
       frames_to_settle = window_.takeInput() ? kFramesAfterInput : std::max(0, frames_to_settle - 1);
       update();
     }
