@@ -110,7 +110,8 @@ TEST(Verdict, ACardThatDrawsIsNotAdvised) {
   judged.draws_apart = true;
   EXPECT_EQ(judge(judged, speeds(), {}).stage, "drawing");
   EXPECT_FALSE(says(judge(judged, speeds(), {}), "graphics card would"));
-  EXPECT_EQ(judge(judged, speeds(), {}).lines.back(), "to draw this faster, buy a faster graphics card");
+  EXPECT_EQ(judge(judged, speeds(), {}).lines.back(),
+            "to draw this faster, buy a faster graphics card; a faster disk would change little");
   StageSpeeds fast = speeds();
   fast.draw_splats_s = 1e9;
   EXPECT_EQ(judge(judged, fast, {}).stage, "projecting");
