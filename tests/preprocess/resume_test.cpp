@@ -211,7 +211,8 @@ TEST_F(Resume, TakesUpOrDropsTheBricksOfALargeCell) {
   dying_bucket_splats_ = 1'000'000;
   const int64_t calls = callsOfAll({"writes"});
   size_t most = 0;
-  for (int64_t call = calls - kCallsToFinish - 34; call < calls - kCallsToFinish; call += testing::isWholeSweep() ? 2 : 5) {
+  for (int64_t call = calls - kCallsToFinish - 34; call < calls - kCallsToFinish;
+       call += testing::isWholeSweep() ? 2 : 5) {
     SCOPED_TRACE(call);
     killedAt(call);
     if (readJournal(partial())->splats) most = std::max(most, readBrickLog(partial(), 1).size());

@@ -8,7 +8,9 @@
 namespace curvisplat::testing {
 
 /// Whether all places are to be tried: CURVISPLAT_WHOLE_SWEEPS is set, as tools/test.sh --whole does.
-inline bool isWholeSweep() { return std::getenv("CURVISPLAT_WHOLE_SWEEPS") != nullptr; }
+inline bool isWholeSweep() {
+  return std::getenv("CURVISPLAT_WHOLE_SWEEPS") != nullptr;
+}
 
 /// The place to try after this one. The first ones, where files are opened and made, are all tried; of the others
 /// usually one in `stride`, which should have no divisor in common with what repeats in the job.

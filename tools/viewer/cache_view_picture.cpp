@@ -27,7 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMaxNamedFiles = 4;  // in a command; of a longer series its kept cache
+constexpr size_t kMaxNamedFiles = 4;        // in a command; of a longer series its kept cache
 constexpr double kPointedForSeconds = 0.3;  // the mouse rests that long before values are looked for
 
 ImVec2 toImGui(double x, double y) {
