@@ -136,6 +136,7 @@ std::string meantBy(const std::string& word, const Manifest& manifest, const Fac
                        : fmt::format(" (the grid has blocks 1 to {})", blocks);
   std::vector<std::string> names{"imin", "imax", "jmin", "jmax", "kmin", "kmax", "all", "walls"};
   for (const FaceRegion& region : faces.regions()) names.push_back(region.name);
+  std::erase(names, word);  // a name that there is, of which this cache has nothing
   return didYouMean(word, names);
 }
 
