@@ -89,6 +89,8 @@ TEST(Verdict, AGainWithinTheSpreadIsNone) {
   EXPECT_FALSE(advised());
   same.spread_s = coarser.spread_s = 0.01;
   EXPECT_TRUE(advised());
+  coarser.splats_prepared = judged.splats_prepared;  // no coarser in truth
+  EXPECT_FALSE(advised());
 }
 
 TEST(Verdict, ReadingBoundsWithASlowDisk) {
