@@ -97,7 +97,7 @@ void checkExtent(const GridSurvey& survey, const GridDescription& description, C
   const std::string file = description.files.empty() ? description.format : description.files.front();
   if (survey.nodes == survey.blanked.total())
     throw Error(
-        "{}: every one of the {} {} is blanked ({} by the grid, {} by value, {} not finite in single "
+        "{}: all {} {} are blanked ({} by the grid, {} by value, {} not finite in single "
         "precision): there is nothing to draw{}",
         file, survey.nodes, centring == Centring::kCell ? "cells" : "nodes", survey.blanked.by_grid,
         survey.blanked.by_value, survey.blanked.not_finite,
@@ -148,8 +148,8 @@ void checkRanges(const GridSurvey& survey, const GridDescription& description,
     const auto [min, max] = survey.ranges.at(n);
     if (max - min <= kLargestRange) continue;
     throw Error(
-        "{}: its values go from {:g} to {:g}, more than {:g} apart; if one of them says that there is no "
-        "value, name it with --blank, else scale them",
+        "{}: its values go from {:g} to {:g}, more than {:g} apart; if one of them marks missing values, "
+        "give it to --blank; otherwise scale the values",
         description.scalars.at(scalars[n]).name, min, max, kLargestRange);
   }
 }

@@ -79,7 +79,7 @@ class Window {
     const glm::dmat3 axes(rotate({1, 0, 0}), rotate({0, 1, 0}), rotate({0, 0, 1}));
     NodeSplat& node = out_.splats[count_];
     const auto code =
-        keepUncovered(in_.covered[at], axes, node.splat,
+        keepUncovered({in_.covered[at], axes, node.border_code, 2}, node.splat,
                       std::span(out_.values).subspan(count_ * scalars_.size(), scalars_.size()));
     if (code) node.becomePart(*code);
     return code.has_value();

@@ -92,7 +92,7 @@ struct NodeSplat {
   bool isForSeams() const { return on_block_face || behind_face; }
   /// After keepUncovered() (covered_part.h), which has left a part of the cell that has this code.
   void becomePart(uint32_t code) {
-    border_code = border_code == kNoBorder || behind_face ? code : kNoBorder;
+    border_code = code;
     growth_code = kNoGrowth;
     regular = behind_face = false;
   }
