@@ -44,7 +44,7 @@ RawMesh parseMesh(std::span<const std::byte> bytes, const std::filesystem::path&
   for (const auto& triangle : mesh.triangles)
     for (const uint32_t corner : triangle)
       if (corner >= mesh.positions.size())
-        throw Error("{}: a face names vertex {} of {}", path.string(), uint64_t{corner} + 1,
+        throw Error("{}: a face uses vertex {}, but the file has {}", path.string(), uint64_t{corner} + 1,
                     mesh.positions.size());
   constexpr double kLargest = 1e18;  // products of two lengths fit in a float
   for (size_t n = 0; n < mesh.positions.size(); ++n)

@@ -128,8 +128,9 @@ class Values {
       least += header_.ascii ? 2 : bytesOf(property.counted_by.value_or(property.type));
     const uint64_t left = header_.ascii ? text_.left() + 1 : bytes_.size() - at_;
     if (least == 0 || element.count > left / least)
-      throw Error("{}: is cut off: {} {} need {} bytes or more (found {})", path_.string(), element.count,
-                  element.name.substr(0, 32), element.count * std::max<uint64_t>(least, 1), left);
+      throw Error("{}: is cut off: {} of element {} need {} bytes or more (found {})", path_.string(),
+                  element.count, element.name.substr(0, 32), element.count * std::max<uint64_t>(least, 1),
+                  left);
   }
   uint64_t left() const { return header_.ascii ? text_.left() : bytes_.size() - at_; }
 
@@ -212,7 +213,7 @@ void readFaces(const Element& element, Values& values, const std::filesystem::pa
       if (property.name != "vertex_indices" && property.name != "vertex_index") continue;
       for (const double corner : list)
         if (!(corner >= 0 && corner < static_cast<double>(mesh.positions.size())))
-          throw Error("{}: face {} names vertex {} of {}", path.string(), face, corner,
+          throw Error("{}: face {} uses vertex {}, but the file has {}", path.string(), face, corner,
                       mesh.positions.size());
       addPolygon(mesh, list);
     }
