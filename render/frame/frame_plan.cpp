@@ -168,7 +168,8 @@ Cut FramePlanner::chooseCut(const ProjectionSettings& settings, const FrameOptio
   Cut cut = curvisplat::chooseCut(tree, cutViewOf(settings), transparentIn(settings), limits);
   if (options.max_splats && cut.splats > *options.max_splats)
     throw UsageError(
-        "{} splats are too few: the coarsest picture of this cache takes {}; give --max-splats that",
+        "--max-splats {} is less than the coarsest picture of this cache takes ({} splats); give at least "
+        "that",
         *options.max_splats, cut.splats);
   return cut;
 }
