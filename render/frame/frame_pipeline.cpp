@@ -49,7 +49,7 @@ tbb::task_arena arenaOf(const FrameOptions& options) {
 /// and of surfaces, and a layer and a half a pixel with a window behind it. The same for all pictures of one size.
 uint64_t sceneBytes(const FrameOptions& options) {
   if (!options.scene || options.scene->empty()) return 0;
-  const uint64_t slice_bytes = options.scene->slices_by_function ? 48 : 24;  // of two scalars
+  const uint64_t slice_bytes = options.scene->slices_by_function ? 144 : 72;  // of two scalars
   const auto is_translucent = [](const auto& surface) { return !surface.opacity.opaque(); };
   const bool peels =
       std::any_of(options.scene->surfaces.begin(), options.scene->surfaces.end(), is_translucent) ||

@@ -159,7 +159,7 @@ class IsoLayers::Tracer {
         const auto hits = rays_.hits(rays[n]).all();
         if (next[n] == hits.size() || hits[next[n]].depth > nearest + kSameLayer * side(nearest)) continue;
         const IsoHit& hit = hits[next[n]++];
-        const float alpha = static_cast<float>(look_.opacity) * hit.coverage;
+        const auto alpha = static_cast<float>(look_.opacity);
         layer.colour +=
             through[n] * alpha * glm::vec4(colourOf(hit, packet.x[rays[n]], packet.y[rays[n]]), 1.0f);
         through[n] *= 1 - alpha;
@@ -185,7 +185,7 @@ class IsoLayers::Tracer {
 
   IsoPacket emptyPacket() const {
     IsoPacket packet;
-    packet.least_opacity = static_cast<float>(look_.opacity);
+    packet.opacity = static_cast<float>(look_.opacity);
     return packet;
   }
   void addRay(IsoPacket& packet, int pixel, const std::array<float, 2>& offset) const {

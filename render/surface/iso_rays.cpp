@@ -7,7 +7,6 @@
 #include <numeric>
 
 #include "render/project/kernel.h"
-#include "render/surface/pixel_rays.h"
 
 namespace curvisplat {
 namespace {
@@ -19,7 +18,7 @@ constexpr float kStep = 0.35f;         // of half the support of the shortest sp
 constexpr size_t kMostSteps = 4096;    // of a packet
 constexpr float kLeastWeight = 0.02f;  // below it there is no field
 // Inside the data the weights add up to about 1, less what the neighbours have that do not hold the value.
-constexpr float kOutside = 0.1f, kInside = 0.25f;
+constexpr float kLeastInside = 0.15f;
 constexpr float kHidden = 1.0f / 4096;
 constexpr int kRefinements = 4;
 
@@ -167,19 +166,15 @@ void IsoRays::refine(float value, const Place& begin, const Place& end, unsigned
   guess();
 }
 
-/// A pixel's side at a depth, in stretched units.
-float IsoRays::widthAt(double depth) const {
-  return static_cast<float>((perspective_ ? depth : 1) / settings_.view.focal_px);
-}
-
-/// What clip planes leave of a point in view axes.
-float IsoRays::clipCoverage(const glm::dvec3& at) const {
-  if (settings_.clip_planes.empty()) return 1;
+/// Whether clip planes take away a point in view axes.
+bool IsoRays::isClipped(const glm::dvec3& at) const {
+  if (settings_.clip_planes.empty()) return false;
   const ScreenView& view = settings_.view;
   const double along = at.z + (perspective_ ? 0 : settings_.depth_origin);
   const glm::dvec3 world =
       (view.eye + at.x * view.right + at.y * view.down + along * view.forward) / view.scale;
-  return coverageAt(settings_.clip_planes, world, pixelSide(view, at.z));
+  return std::any_of(settings_.clip_planes.begin(), settings_.clip_planes.end(),
+                     [&](const ClipPlane& plane) { return glm::dot(plane.normal, world - plane.point) < 0; });
 }
 
 /// What the splats have at a crossing.
@@ -194,10 +189,8 @@ void IsoRays::take(const IsoPacket& packet, const Row& z, size_t value, unsigned
     const glm::dvec2 across = acrossAt(packet, ray);
     const double depth = base_depth_ + double{z[ray]};
     if (perspective_ && depth < settings_.view.near) continue;
-    const float width = widthAt(depth);
     const glm::dvec3 at(across * (perspective_ ? depth : 1.0), depth);
-    const float clipped = clipCoverage(at);
-    if (!(clipped > 0)) continue;
+    if (isClipped(at)) continue;
     Point point;
     for (const Crossed* crossed : active_) {
       const IsoSplat& s = *crossed->splat->splat;
@@ -211,33 +204,26 @@ void IsoRays::take(const IsoPacket& packet, const Row& z, size_t value, unsigned
       point.gradient += w * glm::vec3(glm::dot(s.slope, s.by_right), glm::dot(s.slope, s.by_down),
                                       glm::dot(s.slope, s.by_forward));
       point.colour += w * (s.colour_mean + glm::dot(s.colour_slope, u));
-      float inside = 1;
-      for (const CutFace& face : crossed->splat->faces) {
-        const float a_pixel =
-            width * std::hypot(glm::dot(face.inward, s.by_right), glm::dot(face.inward, s.by_down));
-        const float distance = glm::dot(face.inward, u) + face.distance;
-        inside *= std::clamp(0.5f + distance / std::max(a_pixel, 1e-30f), 0.0f, 1.0f);
-      }
-      point.outside += w * (1 - inside);
+      const bool outside =
+          std::any_of(crossed->splat->faces.begin(), crossed->splat->faces.end(),
+                      [&](const CutFace& face) { return glm::dot(face.inward, u) + face.distance < 0; });
+      if (outside) point.outside += w;
     }
-    if (!(point.weight > kOutside)) continue;
-    const float kept = 1 - point.outside / point.weight;
-    const float coverage = clipped * kept * std::min(1.0f, (point.weight - kOutside) / (kInside - kOutside));
-    if (!(coverage > 1e-3f)) continue;
+    if (!(point.weight > kLeastInside) || point.outside > 0.5f * point.weight) continue;
     addHit(ray,
            {depth, point.gradient / point.weight, static_cast<float>(settings_.values[value]),
-            point.colour / point.weight, coverage},
-           packet.least_opacity);
+            point.colour / point.weight},
+           packet.opacity);
   }
 }
 
-void IsoRays::addHit(size_t ray, const IsoHit& hit, float least_opacity) {
+void IsoRays::addHit(size_t ray, const IsoHit& hit, float opacity) {
   Hits& hits = hits_[ray];
   if (hits.count == kMostHits) return;
   size_t n = hits.count++;
   for (; n > 0 && hits.hit[n - 1].depth > hit.depth; --n) hits.hit[n] = hits.hit[n - 1];
   hits.hit[n] = hit;
-  through_[ray] *= 1 - least_opacity * hit.coverage;
+  through_[ray] *= 1 - opacity;
   if (hits.count == kMostHits) through_[ray] = 0;
 }
 

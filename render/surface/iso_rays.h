@@ -27,7 +27,6 @@ struct IsoHit {
   glm::vec3 gradient;   // in view axes, of a stretched unit
   float scalar;         // the isovalue
   float colour_scalar;  // that of the scalar that has the colours
-  float coverage;       // what the data's borders and clip planes leave of it
 };
 
 /// Rays that lie close together: points of the picture.
@@ -36,7 +35,7 @@ struct IsoPacket {
 
   std::array<float, kRays> x{}, y{};
   size_t count = 0;
-  float least_opacity = 1;  // of a crossing: what lies behind those that hide it need not be found
+  float opacity = 1;  // of a crossing: what lies behind those that hide it need not be found
 };
 
 class IsoRays {
@@ -85,9 +84,8 @@ class IsoRays {
   void fieldAt(const Row& z, Field& field) const;
   void refine(float value, const Place& begin, const Place& end, unsigned rays, Row& z) const;
   void take(const IsoPacket& packet, const Row& z, size_t value, unsigned rays);
-  void addHit(size_t ray, const IsoHit& hit, float least_opacity);
-  float widthAt(double depth) const;
-  float clipCoverage(const glm::dvec3& at) const;
+  void addHit(size_t ray, const IsoHit& hit, float opacity);
+  bool isClipped(const glm::dvec3& at) const;
 
   const IsoSplats::Settings settings_;
   const bool perspective_;
