@@ -70,7 +70,8 @@ def main():
             if isinstance(message, dict):
                 raise SystemExit(str(message))
             now = time.monotonic()
-            first = first or now
+            if first is None:
+                first, until_first = now, processor_seconds(server.process)
             if now > first + 1 and not sent:
                 sent, counted = processor_seconds(server.process), now
             if sent:
@@ -81,7 +82,7 @@ def main():
         used = processor_seconds(server.process) - sent
         passed = time.monotonic() - counted
     middle = sorted(pictures)[len(pictures) // 2]
-    print(f"first picture after {first - begin:.2f} s; {len(pictures) / passed:.1f} pictures a second; {1000 * used / len(pictures):.1f} ms of the "
+    print(f"first picture after {first - begin:.2f} s and {until_first:.2f} s of the processors; {len(pictures) / passed:.1f} pictures a second; {1000 * used / len(pictures):.1f} ms of the "
           f"processors each; median of {middle[0] / 1024:.0f} KiB, drawn in {1000 * middle[1]:.1f} ms, of {middle[2]} splats")
 
 

@@ -525,6 +525,7 @@ class Interrupts(PythonTest):
                     cache.render(size=(900, 900), lod_pixels=0)
             timer.join()
         self.assertLessEqual(threads(), before_threads)
+        print(f"100 renders and 20 interrupted ones: {threads() - before_threads} threads and {(resident() - before) / (1 << 20):.1f} MiB more")
         self.assertLess(resident() - before, 64 << 20)
         cache.close()
 
