@@ -2,6 +2,7 @@
 # Runs setup.sh, builds everything and runs the tests. Passes its arguments to ctest, for example -R render.
 #
 #   tools/test.sh [CTEST OPTIONS]                    all tests
+#   tools/test.sh --whole [CTEST OPTIONS]            all tests, and of damage and faults every place, not one in several
 #   tools/test.sh --sanitize [CTEST OPTIONS]         all tests with the address and undefined-behaviour sanitizers, then
 #                                                    the multithreaded ones with the thread sanitizer; takes hours
 #   tools/test.sh --sanitize=short [CTEST OPTIONS]   only the tests of stream/ with the first two; takes minutes
@@ -12,11 +13,12 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 run() {
   local preset=$1
   shift
-  ctest --test-dir "$root/build/$preset" --output-on-failure --no-tests=error -j2 "$@"
+  ctest --test-dir "$root/build/$preset" --output-on-failure --no-tests=error -j"$(nproc)" "$@"
 }
 
 form=plain
 case ${1:-} in
+  --whole) export CURVISPLAT_WHOLE_SWEEPS=1 && shift ;;
   --sanitize) form=whole && shift ;;
   --sanitize=short) form=short && shift ;;
 esac

@@ -124,8 +124,9 @@ class Refinement {
       : cache_(cache), classifier_(classifier), max_splats_(max_splats) {
     for (uint32_t n = 0; n < cache.bricks().size() && cache.bricks()[n].parent == kNoBrick; ++n) take(n);
     if (splats_ > max_splats)
-      throw UsageError("{}: {} splats are too few: the coarsest level has {}; give --max-splats that",
-                       cache.path().string(), max_splats, splats_);
+      throw UsageError(
+          "{}: --max-splats {} is less than the coarsest level has ({} splats); give at least that",
+          cache.path().string(), max_splats, splats_);
   }
 
   std::vector<GaussianSplat> run(Progress& progress) {

@@ -169,8 +169,9 @@ void addExport(CLI::App& app) {
       ->add_option("--memory", arguments->memory,
                    "Memory limit for the grids, or for the pictures of the comparison")
       ->capture_default_str();
-  command->add_flag("--no-comparison", arguments->no_comparison,
-                    "Do not draw and compare the splats from 12 directions");
+  command->add_flag(
+      "--no-comparison", arguments->no_comparison,
+      "Skip drawing the exported splats from 12 directions to compare them with curvisplat's pictures");
   command->callback([arguments] { exportCache(*arguments); });
 }
 

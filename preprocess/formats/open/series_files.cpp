@@ -9,6 +9,7 @@
 #include <map>
 
 #include "preprocess/formats/open/open_grid.h"
+#include "preprocess/formats/su2/su2_source.h"
 #include "stream/base/error.h"
 #include "stream/base/paths.h"
 
@@ -94,9 +95,17 @@ std::vector<fs::path> filesLike(const fs::path& path, const std::string& pattern
     if (fnmatch(pattern.c_str(), name.c_str(), FNM_PERIOD) == 0)
       files.push_back(path.has_parent_path() ? folder / name : fs::path(name));
   }
-  if (files.empty()) throw Error("{}: no file has a name like that", path.string());
+  if (files.empty()) throw Error("{}: no file matches this pattern", path.string());
   sortNaturally(files);
   return files;
+}
+
+/// Whether these are a SU2 mesh of several zones and a restart file for each of them: one step, though the names of the
+/// restart files differ in a number alone.
+bool areZones(const OpenGridOptions& options) {
+  if (options.solutions.size() < 2 || !isRegularFile(options.grid)) return false;
+  const InputFile mesh(options.grid);
+  return isSu2(mesh) && su2Zones(mesh) == options.solutions.size();
 }
 
 /// The files of a series as its steps use them.
@@ -127,9 +136,7 @@ Groups groupsOf(const OpenGridOptions& options) {
     if (files.size() == 1) return;
     if (groups.steps > 1 && groups.steps != files.size())
       throw Error(
-          "{}: has {} files of this kind, and there are {} of another; a series needs as many of each as it "
-          "has "
-          "steps",
+          "{}: has {} files of this kind, but {} of another; a series needs one of each kind for every step",
           files.front().string(), files.size(), groups.steps);
     groups.steps = files.size();
   };
@@ -210,6 +217,7 @@ void expandPatterns(OpenGridOptions& options) {
 }
 
 bool hasSeveralStepFiles(const OpenGridOptions& options) {
+  if (areZones(options)) return false;
   std::vector<std::string> shapes{shapeOf(options.grid)};
   for (const fs::path& path : options.solutions) shapes.push_back(shapeOf(path));
   std::sort(shapes.begin(), shapes.end());
@@ -217,6 +225,7 @@ bool hasSeveralStepFiles(const OpenGridOptions& options) {
 }
 
 std::vector<StepFiles> stepsByName(const OpenGridOptions& options) {
+  if (areZones(options)) return {{options, options.grid.string()}};
   const Groups groups = groupsOf(options);
   std::vector<StepFiles> steps;
   for (size_t n = 0; n < groups.steps; ++n) {

@@ -1,0 +1,44 @@
+// The outer faces that splats end at, by ranges of the splats' numbers, through one temporary file.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "preprocess/gather/streams_file.h"
+#include "preprocess/moments/mesh_borders.h"
+
+namespace curvisplat {
+
+class OuterPlanes {
+ public:
+  OuterPlanes(size_t ranges, uint64_t range_size, uint64_t memory_bytes, std::filesystem::path folder)
+      : range_size_(range_size), file_(std::move(folder), ranges, memory_bytes) {}
+
+  /// One thread. A plane without area is left out.
+  void add(uint64_t number, const OuterPlane& plane);
+  void close() { file_.close(); }
+
+  /// The planes of a range; what comes out does not depend on the order in which they came in.
+  class OfRange {
+   public:
+    /// Of a splat. Any thread; `scratch` keeps its capacity.
+    std::span<const OuterPlane> of(uint64_t number, std::vector<OuterPlane>& scratch) const;
+
+   private:
+    friend class OuterPlanes;
+    struct Record {
+      uint64_t number, touches;
+      std::array<double, 3> inward, point;
+    };
+    std::vector<Record> records_;  // by number
+  };
+  OfRange load(size_t range);
+
+ private:
+  const uint64_t range_size_;
+  StreamsFile file_;
+};
+
+}  // namespace curvisplat
