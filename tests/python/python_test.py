@@ -392,6 +392,43 @@ class Arrays(PythonTest):
             self.assertEqual((first / name).read_bytes(), (second / name).read_bytes(), name)
         self.assertGreater(largest, 0)
 
+    def test_are_appended_as_steps(self):
+        x, y, z, t = bent_duct()
+        steps = self.folder / "appended.splats"
+        curvisplat.convert_arrays(steps, curvisplat.Block(x, y, z, {"t": t}), time=1.5)
+        self.assertEqual(curvisplat.append_arrays(steps, curvisplat.Block(x, y, z, {"t": 2 * t}), time=2.5), 2)
+        self.assertEqual(curvisplat.append_arrays(steps, curvisplat.Block(x, y, z, {"t": 3 * t})), 3)
+        with curvisplat.open(steps) as cache:
+            np.testing.assert_array_equal(cache.times, [1.5, 2.5, 3.5])
+            first, last = (cache.points(step=step).values for step in (0, 2))
+            np.testing.assert_allclose(last, 3 * first, rtol=1e-3)
+        for wrong, words in (({"time": 3.0}, "time"), ({}, "has no scalar|no scalar")):
+            scalars = {"t": t} if wrong else {"u": t}
+            with self.assertRaisesRegex(curvisplat.Error, words):
+                curvisplat.append_arrays(steps, curvisplat.Block(x, y, z, scalars), **wrong)
+        with self.assertRaises(curvisplat.Error):
+            curvisplat.append_arrays(self.folder / "none.splats", curvisplat.Block(x, y, z, {"t": t}))
+        with curvisplat.open(steps) as cache:
+            self.assertEqual(len(cache.times), 3)
+
+    def test_of_a_solver_that_runs(self):
+        package = pathlib.Path(__file__).resolve().parents[2] / "tools" / "python" / "examples" / "solver.py"
+        name = self.folder / "heat"
+        done = subprocess.run([sys.executable, package, name], capture_output=True, text=True, env=os.environ)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        means = [float(line.rsplit(" ", 1)[1]) for line in done.stdout.splitlines() if line.startswith("step")]
+        self.assertEqual(len(means), 5)
+        self.assertTrue(all(a < b for a, b in zip(means, means[1:])), means)  # heat comes in
+        with curvisplat.open(f"{name}.splats") as cache:
+            self.assertEqual(len(cache.times), 5)
+            for step in range(len(means)):
+                points = cache.points(step=step)
+                self.assertLessEqual(points.values.max(), 100.01)
+            # Diffusion from one end: the temperature falls along the duct, the same at all heights.
+            angle = np.arctan2(points.positions[:, 1], points.positions[:, 0])
+            self.assertLess(np.corrcoef(angle, points.values)[0, 1], -0.7)
+        self.assertGreater((self.folder / "heat.png").stat().st_size, 2000)
+
     def test_of_xarray(self):
         try:
             import xarray
@@ -488,6 +525,7 @@ class Interrupts(PythonTest):
                     cache.render(size=(900, 900), lod_pixels=0)
             timer.join()
         self.assertLessEqual(threads(), before_threads)
+        print(f"100 renders and 20 interrupted ones: {threads() - before_threads} threads and {(resident() - before) / (1 << 20):.1f} MiB more")
         self.assertLess(resident() - before, 64 << 20)
         cache.close()
 

@@ -8,10 +8,12 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "preprocess/addition/convert_series.h"
 #include "preprocess/convert/convert.h"
 #include "render/camera/camera_path.h"
 #include "render/colour/published_maps.h"
@@ -243,8 +245,8 @@ std::vector<uint32_t> allScalars(const ScalarNames& names) {
   return all;
 }
 
-py::dict convertArrays(const std::filesystem::path& output, const py::list& blocks, const ScalarNames& names,
-                       const py::dict& given_options, const py::object& progress) {
+std::unique_ptr<GridSource> sourceOf(const py::list& blocks, const ScalarNames& names,
+                                     const py::dict& given_options) {
   std::vector<BlockArrays> arrays;
   for (const py::handle& object : blocks) {
     const auto block = py::cast<py::tuple>(object);  // name, x, y, z, [scalar], blank
@@ -253,10 +255,37 @@ py::dict convertArrays(const std::filesystem::path& output, const py::list& bloc
       of_block.scalars.push_back(py::cast<py::array>(scalar));
     arrays.push_back(std::move(of_block));
   }
+  return sourceOfArrays(std::move(arrays), names, py::cast<std::optional<double>>(given_options["time"]));
+}
+
+py::dict convertArrays(const std::filesystem::path& output, const py::list& blocks, const ScalarNames& names,
+                       const py::dict& given_options, const py::object& progress) {
   ConvertOptions options = convertOptions(output, given_options);
   options.scalars = allScalars(names);
-  const auto source = sourceOfArrays(std::move(arrays), names);
+  const auto source = sourceOf(blocks, names, given_options);
+  options.time = py::cast<std::optional<double>>(given_options["time"]);
   return convertSource(*source, std::move(options), progress);
+}
+
+/// The steps that the cache has then.
+uint64_t appendArrays(const std::filesystem::path& cache, const py::list& blocks, const ScalarNames& names,
+                      const py::dict& given_options, const py::object& progress) {
+  SeriesOptions options;
+  options.convert = convertOptions(cache, given_options);
+  options.add = true;
+  // Opened at once: its errors name the array.
+  std::unique_ptr<GridSource> source = sourceOf(blocks, names, given_options);
+  SeriesInput input;
+  input.count = 1;
+  input.name = [](uint64_t) { return std::string("arrays in memory"); };
+  input.open = [&](uint64_t) { return std::move(source); };
+  input.scalars = [&](const GridDescription&) { return allScalars(names); };
+  SeriesReport report;
+  runInterruptibly(progress, [&](Progress& of_work) {
+    input.first_number = CacheReader(cache).series().steps.size();
+    report = convertSeries(input, options, of_work, [](const SeriesEvent&) {});
+  });
+  return report.steps;
 }
 
 py::dict convertCallable(const std::filesystem::path& output,
@@ -338,6 +367,7 @@ PYBIND11_MODULE(_core, module) {
       });
   module.def("orbited", &orbitedCamera);
   module.def("convert_arrays", &convertArrays);
+  module.def("append_arrays", &appendArrays);
   module.def("convert_callable", &convertCallable);
   module.def("convert_files", &convertFiles);
   module.def("colour_maps", [] {
