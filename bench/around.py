@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures what is drawn around the volume: light, clip planes, an opaque body, two scalars, depth, surfaces of many quads.
 
-    bench/around.py FOLDER [--program PROGRAM] [--frames 8] [--rounds 5]
+    bench/around.py FOLDER [--program PROGRAM] [--frames 8] [--rounds 5] [--smoke]
 
 Grids and caches are made in FOLDER and reused. Variants of one picture take turns, round after round, as orbits of --frames
 frames; a ratio is the median over the rounds of a variant's processor time a frame over the plain picture's in the same
@@ -45,7 +45,11 @@ def main():
     parser.add_argument("--program", default="build/release/tools/curvisplat")
     parser.add_argument("--frames", type=int, default=8)
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--smoke", action="store_true", help="tiny grids and pictures, one round: whether it runs, not how fast")
     arguments = parser.parse_args()
+    if arguments.smoke:
+        arguments.frames = arguments.rounds = 1
+    grid, quads, pixels = ("24x16x12", "33x33x3", "64x64") if arguments.smoke else ("192x128x96", "1025x1025x3", "600x600")
     folder, program = arguments.folder, arguments.program
     folder.mkdir(parents=True, exist_ok=True)
 
@@ -57,10 +61,10 @@ def main():
             subprocess.run([program, "convert", f"{grid}.xyz", f"{grid}.fun", "-o", cache, *options], check=True)
         return cache
 
-    wake, plate = made("wake", "192x128x96", "--scalar", "f,jacobian"), made("plate", "1025x1025x3")
+    wake, plate = made("wake", grid, "--scalar", "f,jacobian"), made("plate", quads)
     body = folder / "body.stl"
     write_sphere(body, (2, 0, 2), 3)
-    picture = ["--size", "600x600", "--range", "0,1", "--opacity", "0:0,0.3:0,0.5:0.3,1:0.8",
+    picture = ["--size", pixels, "--range", "0,1", "--opacity", "0:0,0.3:0,0.5:0.3,1:0.8",
                "--opacity-unit", "0.05", "--backend", "cpu", "--orbit", "40"]
     planes = [f"{x},{y},{z},{-x},{-y},{2 - z}" for x, y, z in
               ((6, 0, 2), (-6, 0, 2), (0, 6, 2), (0, -6, 2), (3, 3, 3.2), (3, -3, 0.8))]
@@ -79,17 +83,19 @@ def main():
             times[name] = (processor_seconds([*command, "--frames", str(arguments.frames + 1)]) -
                            processor_seconds([*command, "--frames", "1"])) / arguments.frames
         for name in variants:
-            ratios[name].append(times[name] / times["plain"])
+            # A frame of --smoke takes less than the clock's tick.
+            ratios[name].append(times[name] / times["plain"] if times["plain"] > 0 else math.nan)
     for name in variants:
         print(f"{name:16} {statistics.median(ratios[name]):.2f} of the plain picture "
               f"({min(ratios[name]):.2f} to {max(ratios[name]):.2f})")
     stats = folder / "stats.json"
-    command = [program, "render", plate, "-o", folder / "b_%02d.pfm", "--size", "600x600", "--surface", "kmax", "--volume", "off",
+    command = [program, "render", plate, "-o", folder / "b_%02d.pfm", "--size", pixels, "--surface", "kmax", "--volume", "off",
                "--lod-pixels", "0", "--orbit", "40", "--frames", str(arguments.frames + 1), "--stats", stats]
     seconds = []
     processor = processor_seconds(command)
     seconds = [frame["seconds"]["total"] for frame in json.loads(stats.read_text())["frames"]][1:]
-    print(f"2^20 quads       {1000 * statistics.median(seconds):.0f} ms a frame ({1000 * min(seconds):.0f} to "
+    quads = (int(quads.split("x")[0]) - 1) ** 2
+    print(f"{f'{quads} quads':16} {1000 * statistics.median(seconds):.0f} ms a frame ({1000 * min(seconds):.0f} to "
           f"{1000 * max(seconds):.0f}), {1000 * processor / len(seconds):.0f} ms of processor time with the start")
 
 

@@ -40,7 +40,7 @@ void checkNames(const std::vector<std::string>& names, const CacheReader& cache)
   for (const VariableInfo& variable : cache.manifest().variables) present.push_back(variable.name);
   for (const std::string& name : names)
     if (std::find(present.begin(), present.end(), name) != present.end())
-      throw UsageError("{}: has a scalar '{}' already; it has {}", cache.path().string(), name,
+      throw UsageError("{}: already has a scalar '{}'; it has {}", cache.path().string(), name,
                        joined(present));
 }
 
@@ -66,7 +66,7 @@ class Addition {
     report_.splats = manifest().splats;
     if (cache_.series().steps.size() > 1)
       throw Error(
-          "{}: is a series of {} steps, to which no scalar can be added; convert the series again with all "
+          "{}: is a series of {} steps; scalars cannot be added to a series: convert it again with all "
           "scalars",
           cache_.path().string(), cache_.series().steps.size());
     if (const auto* const mesh = dynamic_cast<const MeshSource*>(&source)) {

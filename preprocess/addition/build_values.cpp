@@ -111,10 +111,9 @@ ValueBuilder::Built ValueBuilder::buildInner(uint32_t position, const LoadedValu
   }
   for (const auto& values : brick.variables)
     if (values.size() != brick.size())
-      refuse(position,
-             fmt::format("what is below it merges to {} splats, and it has {}; the cache is damaged, or "
-                         "another version's: convert again",
-                         values.size(), brick.size()));
+      refuse(position, fmt::format("its children merge to {} splats, but it has {}; the cache is damaged or "
+                                   "was written by another version: convert again",
+                                   values.size(), brick.size()));
   Built built;
   encode(position, brick, built);
   if (brick.cell.level > 0) {
@@ -152,7 +151,7 @@ void ValueBuilder::takeValues(uint32_t position, LoadedValues& loaded, BrickSpla
   constexpr const char* kOtherGrid = "this grid is not the one the cache was made from";
   const RecordSpan records = loaded.records(position);
   if (records.size() != brick.size())
-    refuse(position, fmt::format("it has {} splats, and the grid gives it {}; {}", brick.size(),
+    refuse(position, fmt::format("it has {} splats, but the grid has {} there; {}", brick.size(),
                                  records.size(), kOtherGrid));
   sortByNode(records);
 
@@ -180,17 +179,19 @@ void ValueBuilder::takeValues(uint32_t position, LoadedValues& loaded, BrickSpla
       const std::byte* record = records[n];
       const uint64_t node = recordNode(record);
       if (node != first + in_run)
-        refuse(position, fmt::format("it has {}, and the grid puts {} there; {}",
+        refuse(position, fmt::format("it has {}, but the grid has {} there; {}",
                                      numbers_.nameOf(first + in_run), numbers_.nameOf(node), kOtherGrid));
       if (!isAt(placeInCell(brick.positions[n], brick.cell), valueRecordPlace(record)))
-        refuse(position, fmt::format("{} is elsewhere in the grid; {}", numbers_.nameOf(node), kOtherGrid));
+        refuse(position,
+               fmt::format("{} has another position in the grid; {}", numbers_.nameOf(node), kOtherGrid));
       unpackValueRecord(record, values);
       for (size_t v = 0; v < variables_; ++v) brick.variables[v][n] = values[v];
     }
   }
   if (n != brick.size())
-    refuse(position, fmt::format("it has {} splats, and its runs {}; the cache is damaged: convert again",
-                                 brick.size(), n));
+    refuse(position,
+           fmt::format("it has {} splats, but its runs hold {} nodes; the cache is damaged: convert again",
+                       brick.size(), n));
 }
 
 void ValueBuilder::encode(uint32_t position, BrickSplats& brick, Built& built) const {

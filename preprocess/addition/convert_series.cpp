@@ -122,9 +122,8 @@ class SeriesConversion {
 
   std::string whereItStands(const std::string& of_first) const {
     if (times_.empty()) return of_first;
-    return fmt::format(
-        "{}: interrupted; it has {} steps, and the same command with --resume goes on from there",
-        options_.convert.output.string(), times_.size());
+    return fmt::format("{}: interrupted after {} steps; continue with the same command and --resume",
+                       options_.convert.output.string(), times_.size());
   }
 
   const SeriesInput& input_;

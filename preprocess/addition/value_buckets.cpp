@@ -54,9 +54,8 @@ void ValueSink::add(const NodeSplat& splat, std::span<const SplatScalar> values)
   if (leaf_ == kNoBrick || leaf_shares_ || !cache_->bricks()[leaf_].cell.contains(position)) {
     const uint32_t leaf = order_->leafOf(position, splat.node);
     if (leaf == kNoBrick)
-      throw Error(
-          "{}: has no splat where the grid has that of {}; this grid is not the one the cache was made from",
-          cache_->path().string(), NodeNumbers(cache_->manifest().blocks).nameOf(splat.node));
+      throw Error("{}: has no splat at {} of the grid; this grid is not the one the cache was made from",
+                  cache_->path().string(), NodeNumbers(cache_->manifest().blocks).nameOf(splat.node));
     const uint32_t number = buckets_->of(order_->positionOf(leaf)) / grouped_;
     if (number != number_) flush();
     number_ = number;
@@ -139,7 +138,7 @@ void ValueLoader::load(const BucketFile& file, uint32_t number, uint32_t bucket,
       splats += cache_->bricks()[(*order_)[out.first + n]].splats;
   if (file.bytes(number) > splats * maxValueRecordBytes(variables_))
     throw Error(
-        "{}: {} of its bricks hold {} splats, and the grid has more there; this grid is not the one the "
+        "{}: {} of its bricks hold {} splats, but the grid has more there; this grid is not the one the "
         "cache was made from",
         cache_->path().string(), bricks, splats);
   file.read(number, out.bytes);

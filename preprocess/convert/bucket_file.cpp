@@ -224,7 +224,8 @@ BucketFile::BucketFile(const std::filesystem::path& path, uint32_t buckets, size
 
 BucketFile::BucketFile(const std::filesystem::path& path, BucketChains chains)
     : state_(std::make_unique<State>(path, chains)) {
-  if (!std::filesystem::exists(path)) throw LostBuckets("{}: is gone; convert the grid again", path.string());
+  if (!std::filesystem::exists(path))
+    throw LostBuckets("{}: was removed during the conversion; convert the grid again", path.string());
   state_->input.emplace(path, Caching::kDirect);
   state_->require(state_->input->size() >= chains.size, state_->input->size());
 }

@@ -54,7 +54,7 @@ uint64_t nodesOf(const SplatOrigin& origin) {
   uint64_t nodes = 0;
   for (const GridBlock& block : origin.blocks()) nodes += block.nodes();
   if (nodes >= kMaxNodes)
-    throw Error("{}: has {} nodes; the most that can be converted are {}", origin.description().format, nodes,
+    throw Error("{}: has {} nodes; at most {} can be converted", origin.description().format, nodes,
                 kMaxNodes - 1);
   return nodes;
 }
@@ -204,7 +204,8 @@ class Conversion {
   }
 
   void count() {
-    CountingGrid counts(countingLevel(nodes_), plan_.counting_bytes);
+    CountingGrid counts(countingLevel(nodes_, splats_.survey.upper - splats_.survey.lower),
+                        plan_.counting_bytes);
     if (makesSplats()) origin_->count(root_, counts, progress_);
     if (ranks_ && shares_splats_) sendCountsToFirst(counts, *ranks_);
     if (isFirst()) {
@@ -391,13 +392,14 @@ ConvertReport runConversion(const DataSource& source, const ConvertOptions& opti
   try {
     return conversion.run();
   } catch (const Interrupted& interrupted) {
-    const char* what = conversion.leaveForResuming()
-                           ? "interrupted; the same command with --resume goes on from here"
-                           : "interrupted before there was anything to resume; its temporary files are gone";
+    const char* what =
+        conversion.leaveForResuming()
+            ? "interrupted; continue with the same command and --resume"
+            : "interrupted before there was anything to resume; its temporary files were removed";
     throw Interrupted(interrupted.signal(), fmt::format("{}: {}", options.output.string(), what));
   } catch (const Error& error) {
     if (options.resume && conversion.leaveForResuming())
-      throw Error("{}; what is done is kept, and --resume goes on from it", error.what());
+      throw Error("{}; finished work is kept: continue with --resume", error.what());
     throw;
   }
 }

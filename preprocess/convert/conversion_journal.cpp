@@ -235,9 +235,9 @@ std::string differenceOf(const std::vector<ConversionFact>& before, const std::v
   for (size_t n = 0; n < std::min(before.size(), now.size()); ++n)
     if (before[n] != now[n])
       return before[n].what == now[n].what
-                 ? fmt::format("{} was {}, and is now {}", now[n].what, before[n].value, now[n].value)
-                 : fmt::format("it had other files: {} was {}", before[n].what, before[n].value);
-  return before.size() == now.size() ? "" : "it had more or fewer files";
+                 ? fmt::format("{} has changed from {} to {}", now[n].what, before[n].value, now[n].value)
+                 : fmt::format("its files have changed: {} was {}", before[n].what, before[n].value);
+  return before.size() == now.size() ? "" : "the number of its files has changed";
 }
 
 std::string journalText(const ConversionJournal& journal) {

@@ -33,10 +33,8 @@ bool isFinished(const ConvertOptions& options, const std::vector<ConversionFact>
     if (options.resume && ConversionWorkspace::clearIfFinished(options.output, facts)) return true;
     if (options.resume && !options.overwrite && std::filesystem::exists(options.output / "manifest.json") &&
         !hasUnfinished(options.output))
-      throw Error(
-          "{}: exists, and no unfinished conversion to it does: there is nothing to resume; to replace it, "
-          "add --overwrite",
-          options.output.string());
+      throw Error("{}: is complete, so there is nothing to resume; to replace it, add --overwrite",
+                  options.output.string());
     checkOutput(options.output, options.overwrite, temporaryFolder(options));
     return false;
   };

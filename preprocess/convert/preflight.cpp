@@ -45,7 +45,7 @@ std::optional<Disk> diskOf(const std::filesystem::path& folder) {
 void checkRoom(const std::filesystem::path& folder, const Disk& disk, uint64_t bytes, const char* what,
                const char* hint) {
   if (disk.free_bytes < bytes)
-    throw Error("{}: {} need about {}, and {} are free; {}, or try regardless with --no-preflight",
+    throw Error("{}: {} need about {}, but only {} are free; {}, or skip this check with --no-preflight",
                 folder.string(), what, byteText(bytes), byteText(disk.free_bytes), hint);
 }
 

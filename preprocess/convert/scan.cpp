@@ -97,7 +97,7 @@ void checkExtent(const GridSurvey& survey, const GridDescription& description, C
   const std::string file = description.files.empty() ? description.format : description.files.front();
   if (survey.nodes == survey.blanked.total())
     throw Error(
-        "{}: every one of the {} {} is blanked ({} by the grid, {} by value, {} not finite in single "
+        "{}: all {} {} are blanked ({} by the grid, {} by value, {} not finite in single "
         "precision): there is nothing to draw{}",
         file, survey.nodes, centring == Centring::kCell ? "cells" : "nodes", survey.blanked.by_grid,
         survey.blanked.by_value, survey.blanked.not_finite,
@@ -148,8 +148,8 @@ void checkRanges(const GridSurvey& survey, const GridDescription& description,
     const auto [min, max] = survey.ranges.at(n);
     if (max - min <= kLargestRange) continue;
     throw Error(
-        "{}: its values go from {:g} to {:g}, more than {:g} apart; if one of them says that there is no "
-        "value, name it with --blank, else scale them",
+        "{}: its values go from {:g} to {:g}, more than {:g} apart; if one of them marks missing values, "
+        "give it to --blank; otherwise scale the values",
         description.scalars.at(scalars[n]).name, min, max, kLargestRange);
   }
 }
@@ -166,9 +166,13 @@ void countNodes(const GridSource& source, const RootCube& root, uint64_t slab_by
   counter.finish();
 }
 
-uint32_t countingLevel(uint64_t nodes) {
-  const auto per_axis = static_cast<uint64_t>(std::ceil(std::cbrt(static_cast<double>(nodes))));
-  return std::min<uint32_t>(static_cast<uint32_t>(std::bit_width(per_axis)) + 3, kMaxLevel);
+uint32_t countingLevel(uint64_t nodes, const glm::dvec3& extent) {
+  constexpr double kThinnest = 1e-3;  // of a box, where the grid is a plane or a line
+  const double longest = std::max({extent.x, extent.y, extent.z});
+  double share = 1;  // of the cube
+  for (int axis = 0; axis < 3 && longest > 0; ++axis) share *= std::max(extent[axis] / longest, kThinnest);
+  const auto per_axis = static_cast<uint64_t>(std::ceil(std::cbrt(static_cast<double>(nodes) / share)));
+  return std::min<uint32_t>(static_cast<uint32_t>(std::bit_width(per_axis)) + 1, kMaxLevel);
 }
 
 }  // namespace curvisplat

@@ -20,7 +20,7 @@ ScratchFolder::ScratchFolder(std::filesystem::path path, Folder folder) : path_(
   try {
     makeFolder(path_);
   } catch (const Error& error) {
-    throw Error("{}; it is for temporary files: name another place with --tmp", error.what());
+    throw Error("{}; temporary files go there: choose another directory with --tmp", error.what());
   }
 }
 

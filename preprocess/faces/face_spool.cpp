@@ -69,17 +69,13 @@ bool cellIsThere(const NodeArrays& nodes, size_t at, size_t row_stride, size_t p
 
 FaceSpool::FaceSpool(const NodeReader& reader, std::vector<GridFace> faces, const FaceBox& box,
                      const std::filesystem::path& folder)
-    : reader_(reader), faces_(std::move(faces)), box_(box), path_(folder / "faces.tmp"), out_(path_) {
+    : reader_(reader), faces_(std::move(faces)), box_(box), file_(folder) {
   uint64_t end = 0;
   for (const GridFace& face : faces_) {
     const uint64_t nodes = face.nodes[0] * face.nodes[1];
     places_.push_back({end, end + nodes * kPositionBytes});
     end += nodes * (kPositionBytes + scalars() * sizeof(float));
   }
-}
-
-FaceSpool::~FaceSpool() {
-  removeAll(path_);
 }
 
 void FaceSpool::fill(uint64_t slab_bytes, AbuttingFaces& abutting, Progress& progress) {
@@ -98,7 +94,6 @@ void FaceSpool::fill(uint64_t slab_bytes, AbuttingFaces& abutting, Progress& pro
     addEnds(*loaded, abutting);
     progress.advance(rowsOf(loaded->slab.box) * reader_.source().description().blocks[block].ni);
   }
-  in_.emplace(path_);
 }
 
 void FaceSpool::take(const LoadedSlab& loaded, size_t number) {
@@ -129,7 +124,7 @@ void FaceSpool::take(const LoadedSlab& loaded, size_t number) {
         codes.push_back({LatticeRow::kNone, 0, 0});
     }
     if (!is_last(part, v)) continue;
-    out_.writeAt(places_[number].positions + first * kPositionBytes, std::as_bytes(std::span(codes)));
+    file_.out().writeAt(places_[number].positions + first * kPositionBytes, std::as_bytes(std::span(codes)));
     codes.clear();
   }
   if (scalars() == 0) return;
@@ -147,8 +142,8 @@ void FaceSpool::take(const LoadedSlab& loaded, size_t number) {
       for (const std::vector<float>& scalar : nodes.scalars) values.push_back(none ? NAN : scalar[at]);
     }
     if (!is_last(of_values, v)) continue;
-    out_.writeAt(places_[number].scalars + first * scalars() * sizeof(float),
-                 std::as_bytes(std::span(values)));
+    file_.out().writeAt(places_[number].scalars + first * scalars() * sizeof(float),
+                        std::as_bytes(std::span(values)));
     values.clear();
   }
 }
@@ -188,7 +183,7 @@ void FaceSpool::addEnds(const LoadedSlab& loaded, AbuttingFaces& abutting) const
 
 std::vector<float> FaceSpool::storedScalars(size_t face, uint64_t v) const {
   std::vector<float> values(faces_[face].nodes[0] * scalars());
-  in_->readAt(places_[face].scalars + v * values.size() * sizeof(float), std::span(values));
+  file_.in().readAt(places_[face].scalars + v * values.size() * sizeof(float), std::span(values));
   return values;
 }
 
@@ -203,7 +198,7 @@ LatticeRow FaceSpool::row(size_t number, uint64_t v) const {
   const GridFace& face = faces_[number];
   LatticeRow row;
   row.codes.resize(face.nodes[0]);
-  in_->readAt(places_[number].positions + v * face.nodes[0] * kPositionBytes, std::span(row.codes));
+  file_.in().readAt(places_[number].positions + v * face.nodes[0] * kPositionBytes, std::span(row.codes));
   row.scalars.assign(scalars(), std::vector<float>(face.nodes[0]));
   if (scalars() == 0) return row;
   const std::vector<float> here = storedScalars(number, v);

@@ -9,14 +9,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <glm/vec3.hpp>
-#include <optional>
 #include <span>
 #include <vector>
 
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/splats/abutting_faces.h"
-#include "stream/base/file.h"
+#include "stream/base/nameless_file.h"
 #include "stream/base/progress.h"
 #include "stream/model/grid_faces.h"
 
@@ -32,10 +31,9 @@ struct LatticeRow {
 
 class FaceSpool {
  public:
-  /// `faces`: their lattices. The file vanishes with the object.
+  /// `faces`: their lattices.
   FaceSpool(const NodeReader& reader, std::vector<GridFace> faces, const FaceBox& box,
             const std::filesystem::path& folder);
-  ~FaceSpool();
   FaceSpool(const FaceSpool&) = delete;
   FaceSpool& operator=(const FaceSpool&) = delete;
 
@@ -62,10 +60,8 @@ class FaceSpool {
   const NodeReader& reader_;
   const std::vector<GridFace> faces_;
   const FaceBox box_;
-  const std::filesystem::path path_;
   std::vector<Place> places_;  // [face]
-  OutputFile out_;
-  std::optional<InputFile> in_;
+  NamelessFile file_;
 };
 
 }  // namespace curvisplat

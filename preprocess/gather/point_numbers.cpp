@@ -62,7 +62,7 @@ PointNumbers::PointNumbers(const MeshReader& reader, uint64_t memory_bytes,
       first = end;
     }
     if (merged_.size() * sizeof(merged_.front()) > memory_bytes / 4)
-      throw Error("--memory: {} points are in several pieces of the mesh, more than fit; give more memory",
+      throw Error("--memory: {} points are shared by pieces of the mesh, more than fit; increase --memory",
                   merged_.size());
   }
   tbb::parallel_sort(merged_.begin(), merged_.end());

@@ -1,22 +1,8 @@
 #include "preprocess/gather/streams_file.h"
 
-#include <fmt/format.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <atomic>
 
 namespace curvisplat {
-namespace {
-
-/// A name that no other file of streams in this folder has while it is visible.
-std::filesystem::path uniqueName(const std::filesystem::path& folder) {
-  static std::atomic<unsigned> files = 0;
-  return folder / fmt::format("streams-{}-{}.tmp", ::getpid(), files++);
-}
-
-}  // namespace
-
 StreamsFile::StreamsFile(std::filesystem::path folder, size_t streams, uint64_t memory_bytes)
     : folder_(std::move(folder)),
       streams_(streams),
@@ -41,14 +27,9 @@ void StreamsFile::flush(Stream& stream) {
     may_stay_ -= chunk.bytes;
     chunk.in_memory.swap(stream.buffer);
   } else {
-    if (!written_) {
-      const std::filesystem::path path = uniqueName(folder_);
-      written_ = std::make_unique<OutputFile>(path);
-      read_ = std::make_unique<InputFile>(path);
-      removeFile(path);
-    }
-    chunk.offset = written_->size();
-    written_->append(std::span<const std::byte>(stream.buffer));
+    if (!file_) file_ = std::make_unique<NamelessFile>(folder_);
+    chunk.offset = file_->out().size();
+    file_->out().append(std::span<const std::byte>(stream.buffer));
     stream.buffer.clear();
   }
   stream.chunks.push_back(std::move(chunk));
@@ -69,7 +50,7 @@ void StreamsFile::forEach(size_t number, const std::function<void(std::span<cons
       continue;
     }
     buffer.resize(chunk.bytes);
-    read_->readAt(chunk.offset, std::span(buffer));
+    file_->in().readAt(chunk.offset, std::span(buffer));
     use(buffer);
   }
 }

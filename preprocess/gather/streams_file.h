@@ -3,7 +3,7 @@
 // a stream are the same for any number of threads and any memory.
 //
 // A stream is a chain of chunks; the first chunks stay in memory as long as there is room, and a small mesh makes
-// no file at all. The file has no name once it is open: it vanishes with the process, however that ends.
+// no file at all.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "stream/base/file.h"
+#include "stream/base/nameless_file.h"
 
 namespace curvisplat {
 
@@ -63,8 +63,7 @@ class StreamsFile {
   std::vector<Stream> streams_;
   size_t buffer_bytes_;
   uint64_t may_stay_;  // bytes of further chunks that may stay in memory
-  std::unique_ptr<OutputFile> written_;
-  std::unique_ptr<InputFile> read_;
+  std::unique_ptr<NamelessFile> file_;
 };
 
 }  // namespace curvisplat

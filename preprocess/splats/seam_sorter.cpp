@@ -1,10 +1,6 @@
 #include "preprocess/splats/seam_sorter.h"
 
-#include <fmt/format.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <atomic>
 #include <bit>
 #include <queue>
 #include <utility>
@@ -21,12 +17,6 @@ constexpr uint64_t kRegular = 1, kOnBlockFace = 2, kBehindFace = 4;  // of the f
 constexpr int kBorderCodeShift = 32;
 
 constexpr size_t kWriteSize = 32 << 10;  // doubles
-
-/// A name that no other sorter in this folder has while it is visible.
-std::filesystem::path uniqueName(const std::filesystem::path& folder) {
-  static std::atomic<unsigned> sorters = 0;
-  return folder / fmt::format("seams-{}-{}.tmp", ::getpid(), sorters++);
-}
 
 /// Reads a run from the file, a buffer of whole records at a time.
 class RunReader {
@@ -149,25 +139,20 @@ void SeamSorter::addPacked(std::span<const double> records) {
 }
 
 void SeamSorter::spill() {
-  if (!written_) {
-    const std::filesystem::path path = uniqueName(folder_);
-    written_ = std::make_unique<OutputFile>(path);
-    read_ = std::make_unique<InputFile>(path);
-    // Open, it lives on without a name, and no kill can leave it behind.
-    removeFile(path);
-  }
+  if (!file_) file_ = std::make_unique<NamelessFile>(folder_);
+  OutputFile& out = file_->out();
   std::sort(entries_.begin(), entries_.end());
-  const uint64_t begin = written_->size();
+  const uint64_t begin = out.size();
   std::vector<double> block;
   for (const Entry& entry : entries_) {
     const double* record = records_.data() + entry.record * record_size_;
     block.insert(block.end(), record, record + record_size_);
     if (block.size() < kWriteSize) continue;
-    written_->append(std::span<const double>(block));
+    out.append(std::span<const double>(block));
     block.clear();
   }
-  written_->append(std::span<const double>(block));
-  runs_.push_back({begin, written_->size()});
+  out.append(std::span<const double>(block));
+  runs_.push_back({begin, out.size()});
   entries_.clear();
   records_.clear();
 }
@@ -193,7 +178,8 @@ void SeamSorter::drainRuns(const Visit& visit) {
   const size_t buffer_records =
       std::max<uint64_t>(1, memory_bytes_ / runs_.size() / (record_size_ * sizeof(double)));
   std::vector<RunReader> readers;
-  for (const Run& run : runs_) readers.emplace_back(*read_, run.begin, run.end, record_size_, buffer_records);
+  for (const Run& run : runs_)
+    readers.emplace_back(file_->in(), run.begin, run.end, record_size_, buffer_records);
 
   SeamNode node;
   std::vector<SplatScalar> values(variables_);
@@ -214,8 +200,7 @@ void SeamSorter::drainRuns(const Visit& visit) {
     push_head(run);
   }
   runs_.clear();
-  read_.reset();
-  written_.reset();
+  file_.reset();
 }
 
 }  // namespace curvisplat

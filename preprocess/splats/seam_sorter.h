@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "preprocess/splats/node_splats.h"
-#include "stream/base/file.h"
+#include "stream/base/nameless_file.h"
 
 namespace curvisplat {
 
@@ -68,8 +68,7 @@ class SeamSorter {
   std::filesystem::path folder_;
   std::vector<double> records_;  // packed
   std::vector<Entry> entries_;   // [record], until they are sorted
-  std::unique_ptr<OutputFile> written_;
-  std::unique_ptr<InputFile> read_;
+  std::unique_ptr<NamelessFile> file_;
   std::vector<Run> runs_;
 };
 

@@ -80,7 +80,7 @@ class Glb {
     text.resize((text.size() + 3) / 4 * 4, ' ');
     const uint64_t total = 12 + 8 + text.size() + 8 + bytes_.size();
     if (total > std::numeric_limits<uint32_t>::max())
-      throw Error("{} splats make a .glb of {} bytes, which its header cannot say; lower --max-splats",
+      throw Error("{} splats make a .glb of {} bytes, but its header allows 4 GiB; lower --max-splats",
                   splats_, total);
     std::vector<std::byte> out;
     out.reserve(total);

@@ -29,7 +29,7 @@ RawMesh parse(std::string_view bytes, const std::filesystem::path& path) {
   if (bytes.starts_with("solid")) return parseAsciiStl(bytes, path);
   if (extension == ".stl") return parseBinaryStl(bytes, path);
   if (extension == ".obj") return parseObj(bytes, path);
-  throw Error("{}: is not a surface that is known (extension '{}'); {}", path.string(), extension, kFormats);
+  throw Error("{}: unknown surface format (extension '{}'); {}", path.string(), extension, kFormats);
 }
 
 }  // namespace
@@ -44,7 +44,7 @@ RawMesh parseMesh(std::span<const std::byte> bytes, const std::filesystem::path&
   for (const auto& triangle : mesh.triangles)
     for (const uint32_t corner : triangle)
       if (corner >= mesh.positions.size())
-        throw Error("{}: a face names vertex {} of {}", path.string(), uint64_t{corner} + 1,
+        throw Error("{}: a face refers to vertex {}, but there are {}", path.string(), uint64_t{corner} + 1,
                     mesh.positions.size());
   constexpr double kLargest = 1e18;  // products of two lengths fit in a float
   for (size_t n = 0; n < mesh.positions.size(); ++n)

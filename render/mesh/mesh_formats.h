@@ -57,7 +57,7 @@ class MeshText {
     const char* const begin = found.data() + (found.starts_with('+') ? 1 : 0);
     const auto [end, error] = std::from_chars(begin, found.data() + found.size(), value);
     if (found.empty())
-      throw Error("{}: is cut off: it ends in line {} within a list of numbers", path_.string(), line_);
+      throw Error("{}: is truncated: it ends in line {} within a list of numbers", path_.string(), line_);
     if (error != std::errc{} || end != found.data() + found.size() || !std::isfinite(value))
       throw Error("{}: line {} has no finite number where one is expected (found '{}')", path_.string(),
                   line_, found.substr(0, 32));

@@ -27,7 +27,8 @@ RawMesh parseObj(std::string_view bytes, const std::filesystem::path& path) {
         const auto count = static_cast<int64_t>(mesh.positions.size());
         const int64_t at = number < 0 ? count + number : number - 1;
         if (at < 0 || at >= count)
-          throw Error("{}: line {}: a face names vertex {} of {}", path.string(), text.line(), number, count);
+          throw Error("{}: line {}: a face refers to vertex {}, but there are {}", path.string(), text.line(),
+                      number, count);
         corners.push_back(at);
       }
       if (corners.size() < 3)

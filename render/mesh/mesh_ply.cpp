@@ -99,7 +99,7 @@ Header parseHeader(std::string_view bytes, const std::filesystem::path& path) {
       property.name = text.wordOfLine();
     }
   }
-  throw Error("{}: is cut off: the header has no end_header in its first {} bytes", path.string(),
+  throw Error("{}: is truncated: the header has no end_header in its first {} bytes", path.string(),
               kMostHeader);
 }
 
@@ -113,7 +113,7 @@ class Values {
     if (header_.ascii) return text_.number();
     const size_t size = bytesOf(type);
     if (bytes_.size() - at_ < size)
-      throw Error("{}: is cut off: it ends within its {}", path_.string(), element_);
+      throw Error("{}: is truncated: it ends within its {}", path_.string(), element_);
     unsigned char raw[8];
     std::memcpy(raw, bytes_.data() + at_, size);
     at_ += size;
@@ -128,7 +128,7 @@ class Values {
       least += header_.ascii ? 2 : bytesOf(property.counted_by.value_or(property.type));
     const uint64_t left = header_.ascii ? text_.left() + 1 : bytes_.size() - at_;
     if (least == 0 || element.count > left / least)
-      throw Error("{}: is cut off: {} {} need {} bytes or more (found {})", path_.string(), element.count,
+      throw Error("{}: is truncated: {} {} need {} bytes or more (found {})", path_.string(), element.count,
                   element.name.substr(0, 32), element.count * std::max<uint64_t>(least, 1), left);
   }
   uint64_t left() const { return header_.ascii ? text_.left() : bytes_.size() - at_; }
@@ -195,7 +195,7 @@ void readList(const Property& property, Values& values, const std::filesystem::p
               std::vector<double>& list) {
   const double count = values.next(*property.counted_by);
   if (!(count >= 0 && count <= static_cast<double>(values.left())))
-    throw Error("{}: is cut off: a list of {} elements goes beyond its end", path.string(), count);
+    throw Error("{}: is truncated: a list of {} elements goes beyond its end", path.string(), count);
   list.resize(static_cast<size_t>(count));
   for (double& value : list) value = values.next(property.type);
 }
@@ -212,7 +212,7 @@ void readFaces(const Element& element, Values& values, const std::filesystem::pa
       if (property.name != "vertex_indices" && property.name != "vertex_index") continue;
       for (const double corner : list)
         if (!(corner >= 0 && corner < static_cast<double>(mesh.positions.size())))
-          throw Error("{}: face {} names vertex {} of {}", path.string(), face, corner,
+          throw Error("{}: face {} refers to vertex {}, but there are {}", path.string(), face, corner,
                       mesh.positions.size());
       addPolygon(mesh, list);
     }

@@ -23,11 +23,11 @@ bool isBinaryStl(std::string_view bytes) {
 
 RawMesh parseBinaryStl(std::string_view bytes, const std::filesystem::path& path) {
   if (bytes.size() < kHeader)
-    throw Error("{}: is cut off: a binary STL file has {} bytes before its triangles (found {})",
+    throw Error("{}: is truncated: a binary STL file has {} bytes before its triangles (found {})",
                 path.string(), kHeader, bytes.size());
   const uint64_t expected = kHeader + kRecord * uint64_t{countOf(bytes)};
   if (bytes.size() < expected)
-    throw Error("{}: is cut off: {} triangles take {} bytes (found {})", path.string(), countOf(bytes),
+    throw Error("{}: is truncated: {} triangles take {} bytes (found {})", path.string(), countOf(bytes),
                 expected, bytes.size());
   RawMesh mesh;
   const size_t count = countOf(bytes);
@@ -78,7 +78,7 @@ RawMesh parseAsciiStl(std::string_view bytes, const std::filesystem::path& path)
     }
   }
   if (corners != 0 || !ended)
-    throw Error("{}: is cut off: it ends in line {} without endsolid", path.string(), text.line());
+    throw Error("{}: is truncated: it ends in line {} without endsolid", path.string(), text.line());
   return mesh;
 }
 

@@ -256,7 +256,7 @@ class Verifier {
         if (!nodes.quads[q]) continue;
         const size_t corner = q / quads * columns + q % quads;
         for (const size_t node : {corner, corner + 1, corner + columns, corner + columns + 1})
-          if (!contains(nodes.positions[node])) return wrong("a quad reaches out of its box");
+          if (!contains(nodes.positions[node])) return wrong("a quad extends beyond its box");
       }
     } catch (const Error& error) {
       find("{}", error.what());

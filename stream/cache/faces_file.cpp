@@ -97,12 +97,12 @@ class FacesChecker {
 
   void checkFace(size_t n) const {
     const GridFace& face = faces_[n];
-    if (face.axis > 2 || face.side > FaceSide::kPlane) refuse("face", n, "its axis or side is none");
+    if (face.axis > 2 || face.side > FaceSide::kPlane) refuse("face", n, "its axis or side is invalid");
     for (const uint64_t nodes : face.nodes)
       if (nodes < 2 || nodes > kMostNodes)
         refuse("face", n, fmt::format("it has {} nodes along an axis", nodes));
     if (face.root >= patches_.size() || patches_[face.root].face != n)
-      refuse("face", n, "its coarsest patch is not one of it");
+      refuse("face", n, "its coarsest patch belongs to another face");
   }
 
   void checkPatch(size_t n, uint64_t streams_end, size_t variables) const {
@@ -130,7 +130,7 @@ class FacesChecker {
     const uint64_t most = patch.nodeCount() * 8 * (4 + variables) + 4096;
     if (patch.extent.offset < sizeof(FacesHeader) || patch.extent.length > most ||
         patch.extent.offset > streams_end || patch.extent.length > streams_end - patch.extent.offset)
-      refuse("patch", n, "its stream is not in the file");
+      refuse("patch", n, "its stream is outside the file");
   }
 
   void checkTree() const {
@@ -138,7 +138,7 @@ class FacesChecker {
     for (const FacePatch& patch : patches_) reached += patch.child_count;
     if (reached != patches_.size())
       throw Error(
-          "{}: has {} patches and {} that a face or a patch names; the file is damaged: convert again",
+          "{}: has {} patches, but its faces and patches refer to {}; the file is damaged: convert again",
           path_.string(), patches_.size(), reached);
   }
 

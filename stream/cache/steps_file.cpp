@@ -79,7 +79,7 @@ class StepsReader {
     const uint64_t steps = info.size < sizeof(StepsHeader) ? 0 : (info.size - sizeof(StepsHeader)) / record;
     if (steps == 0 || steps > kMaxSteps || sizeof(StepsHeader) + steps * record != info.size)
       throw Error(
-          "{}: has {} bytes, which hold no whole number of steps; the cache is damaged: convert again",
+          "{}: has {} bytes, which is not a whole number of steps; the cache is damaged: convert again",
           path_.string(), info.size);
     bytes_.resize(info.size);
     file.readAt(0, std::span(bytes_));
@@ -126,7 +126,8 @@ class StepsReader {
     for (const StepValues& values : step.values)
       fine &= values.min >= -kLargest && values.min <= values.max && values.max <= kLargest;
     if (!fine)
-      throw Error("{}: step {} is invalid; the file is damaged or another program's", path_.string(), number);
+      throw Error("{}: step {} is invalid; the file is damaged or was written by another program",
+                  path_.string(), number);
     return step;
   }
 

@@ -56,13 +56,13 @@ class UringReads : public AsyncReads {
       const int result = io_uring_submit_and_wait(&ring_, 1);
       const bool is_put_off = result == -EAGAIN || result == -EBUSY;
       if (result < 0 && result != -EINTR && !(is_put_off && ++put_off < kMaxPutOff))
-        throw Error("reading by io_uring broke off: {}", std::strerror(-result));
+        throw Error("reading with io_uring failed: {}", std::strerror(-result));
     }
     const AsyncReadEnd ended{io_uring_cqe_get_data64(end), end->res};
     io_uring_cqe_seen(&ring_, end);
     if (ended.tag == kWakeTag) {
       listening_ = false;
-      if (!drain()) throw Error("reading by io_uring broke off: its thread can no longer be woken");
+      if (!drain()) throw Error("reading with io_uring failed: its thread can no longer be woken");
       listen();
       return {};
     }

@@ -131,7 +131,7 @@ TEST_F(InterruptedConversion, KilledItIsInTheWayOfAnother) {
   EXPECT_NE(another.err.find("--resume"), std::string::npos) << another.err;
   const ProgramResult different = convert({"--resume", "--blank", "7"});
   EXPECT_EQ(different.status, 1);
-  EXPECT_NE(different.err.find("--blank was none, and is now 7"), std::string::npos) << different.err;
+  EXPECT_NE(different.err.find("--blank has changed from none to 7"), std::string::npos) << different.err;
   EXPECT_EQ(convert({"--overwrite"}).status, 0);
   expectWhole();
 }

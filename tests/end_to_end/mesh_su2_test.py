@@ -5,6 +5,7 @@ SU2's native meshes and restart files: mesh_formats.py says how. Exit status 77 
 """
 import unittest
 
+from sweep import some_of
 from mesh_formats import Mesh, MeshFormats, np
 
 try:
@@ -113,11 +114,11 @@ class Su2Meshes(MeshFormats):
     def test_damage(self):
         mesh = Mesh(2)
         self.write(mesh)
-        self.assertGreater(self.expect_harmless(self.path, scalar="volume"), 40)
+        self.assertGreater(self.expect_harmless(self.path, scalar="volume"), 1 / 3)
         for how in ("csv", "binary"):
             self.write_restart(mesh, how)
             data = self.restart.read_bytes()
-            for n in range(1, 20):
+            for n in some_of(range(1, 20)):
                 self.restart.write_bytes(data[:len(data) * n // 24])
                 self.expect_line(self.path, self.restart, scalar="p", words="restart_flow")
         text = self.path.read_text()

@@ -136,7 +136,7 @@ TEST_F(SurfaceOptions, APolygonFileOfVtkIsTheSameSurface) {
     EXPECT_EQ(result.status, 1) << result.err;
     return result.err;
   };
-  EXPECT_NE(with("ascii\">0 ", "ascii\">99999 ").find("a cell names a point that is not there"),
+  EXPECT_NE(with("ascii\">0 ", "ascii\">99999 ").find("a cell refers to a point that does not exist"),
             std::string::npos);
   EXPECT_NE(with("ascii\">4 8", "ascii\">8 4").find("the offsets of its cells do not increase"),
             std::string::npos);
@@ -169,7 +169,8 @@ TEST_F(SurfaceOptions, WarningsDoNotSpeakOfTheVolume) {
   EXPECT_EQ(wall.err.find("warning"), std::string::npos) << wall.err;
   const ProgramResult nothing =
       render({"--volume", "off", "--surface", file("sphere.obj"), "--focal-point", "900,0,0"});
-  EXPECT_NE(nothing.err.find("no surface or slice is in sight"), std::string::npos) << nothing.err;
+  EXPECT_NE(nothing.err.find("no surface, slice or isosurface is in sight"), std::string::npos)
+      << nothing.err;
   EXPECT_EQ(nothing.err.find("transfer function"), std::string::npos) << nothing.err;
 }
 
@@ -198,7 +199,7 @@ TEST_F(SurfaceOptions, SaysWhatIsWrong) {
       {{"--volume", "maybe"}, 2, "--volume maybe: expected on or off"},
       {{"--surface-colour", "#ff0000"}, 2, "--surface-colour needs a surface: --surface FILE"},
       {{"--surface", sphere, "--surface-colour", "red"}, 2, "--surface-colour red: expected white, black"},
-      {{"--surface", cut}, 1, cut + ": is cut off"},
+      {{"--surface", cut}, 1, cut + ": is truncated"},
       {{"--surface", file("none.stl")}, 1, file("none.stl")}};
   for (const auto& [options, status, words] : refused) {
     const ProgramResult result = render(options, "refused.png");

@@ -293,7 +293,7 @@ class ToAnExistingCache : public ::testing::Test {
 
 TEST_F(ToAnExistingCache, RefusesNamesThatItHas) {
   EXPECT_THROW(addQuietly(source, adding(cache, {1, 0})), UsageError);
-  expectRefused(source, adding(cache, {0}), "has a scalar 's0' already; it has s0");
+  expectRefused(source, adding(cache, {0}), "already has a scalar 's0'; it has s0");
 }
 
 TEST_F(ToAnExistingCache, RefusesAnotherGrid) {
@@ -332,7 +332,7 @@ TEST_F(ToAnExistingCache, RefusesOtherNodesInTheSamePlace) {
   convertTo(cache, allButOne(9), {0});
   before = filesOf(cache);
   expectRefused(allButOne(10), adding(cache, {1}),
-                "it has node 10 5 5 of block 1, and the grid puts node 9 5 5");
+                "it has node 10 5 5 of block 1, but the grid has node 9 5 5");
 }
 
 TEST_F(ToAnExistingCache, RefusesMissingValues) {

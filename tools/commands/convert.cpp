@@ -129,7 +129,8 @@ void addSeriesOptions(CLI::App& command, ConvertArguments& arguments) {
       ->group(kGroup);
   command
       .add_flag("--keep-going", arguments.keep_going,
-                "Leave out time steps that do not fit: other blocks, a missing scalar, a time that goes back")
+                "Leave out time steps that do not fit: other blocks, a missing scalar, a time that does not "
+                "increase")
       ->group(kGroup);
   command
       .add_flag("--add-steps", arguments.adds_steps,
@@ -185,10 +186,11 @@ void addConvert(CLI::App& app) {
       ->check(CLI::Range(0u, kMaxThreads));
   command->add_option("--tmp", arguments->temporary_folder,
                       "Directory for temporary files (default: beside the cache)");
-  command->add_flag("--dry-run", arguments->dry_run,
-                    "Say what the conversion will take (bytes, memory, time), from a sample of the grid");
+  command->add_flag(
+      "--dry-run", arguments->dry_run,
+      "Print what the conversion will take (bytes, memory, time), estimated from a sample of the grid");
   command->add_flag("--no-preflight", arguments->no_preflight,
-                    "Do not check before the work that the disks have room");
+                    "Skip the check for free disk space before the conversion");
   command->add_flag("--resume", arguments->resume,
                     "Resume an interrupted conversion if there is one; keep finished work on an error");
   command->add_flag("--overwrite", arguments->overwrite,
@@ -200,8 +202,9 @@ void addConvert(CLI::App& app) {
           "from 0; repeatable")
       ->take_all()
       ->allow_extra_args(false);
-  command->add_flag("--no-surfaces", arguments->no_surfaces,
-                    "Leave the grid's outer faces out of the cache: render --surface kmin needs them");
+  command->add_flag(
+      "--no-surfaces", arguments->no_surfaces,
+      "Leave the grid's outer faces out of the cache (render --surface kmin and the like need them)");
   command->add_option(
       "--overlap", arguments->overlap,
       "Where blocks overlap: owner draws each point once, by the block with the smallest cells "
@@ -218,9 +221,9 @@ void addConvert(CLI::App& app) {
       throw UsageError(
           "--dry-run: is for a new cache; leave out --add-scalar, --add-steps, --to and --follow");
     if (arguments->dry_run && !launchedRanks().alone())
-      throw UsageError("--dry-run: one process samples; start one");
+      throw UsageError("--dry-run runs in one process; start curvisplat without mpirun");
     if ((series || adds) && !launchedRanks().alone())
-      throw UsageError("{} one process converts; start one",
+      throw UsageError("{} one process converts; start curvisplat without mpirun",
                        series ? "a series of time steps: " : "--add-scalar:");
     TraceOfRun trace(arguments->trace, gridAndCaches(*arguments));
     if (series)

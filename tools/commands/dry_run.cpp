@@ -94,11 +94,10 @@ void print(const Forecast& forecast, const ConvertOptions& options) {
   const double samples = static_cast<double>(forecast.samples) * static_cast<double>(forecast.steps);
   const std::string of_steps = forecast.steps > 1 ? fmt::format(" in each of {} steps", forecast.steps) : "";
   if (forecast.sampled > 0)
-    fmt::print("{} samples{}; as {} of them took, converted now in {}, all will take about\n",
-               forecast.samples, of_steps, forecast.sampled, timeText(forecast.sampling_seconds));
+    fmt::print("{} samples{}; estimated from {} of them, converted in {}:\n", forecast.samples, of_steps,
+               forecast.sampled, timeText(forecast.sampling_seconds));
   else
-    fmt::print("{} samples; unstructured grids are not sampled, but by experience this one will take about\n",
-               forecast.samples);
+    fmt::print("{} samples; estimated from conversions of other unstructured grids:\n", forecast.samples);
   fmt::print("  cache      {} in {}{}, {:.2f} bytes per sample{}\n", byteText(forecast.cache_bytes),
              output.string(), freeText(output), static_cast<double>(forecast.cache_bytes) / samples,
              forecast.steps > 1 ? " and step" : "");

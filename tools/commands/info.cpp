@@ -234,15 +234,15 @@ void printInfo(const InfoOptions& options) {
 void addInfo(CLI::App& app) {
   CLI::App* info = app.add_subcommand("info", "Print the contents of a cache or a grid");
   const auto options = std::make_shared<InfoOptions>();
-  info->add_option("path", options->grid.grid, "Splat cache (a directory) or grid file");
-  info->add_option("solution", options->grid.solutions, "Further files of the grid, as for convert");
+  info->add_option("PATH", options->grid.grid, "Splat cache (a directory) or grid file");
+  info->add_option("SOLUTION", options->grid.solutions, "Further files of the grid, as for convert");
   info->add_flag("--json", options->json, "Print one JSON object");
   info->add_flag("--system", options->system, "Print the drawing back ends of this machine instead");
   info->add_flag("--verify", options->verify,
                  "Read the whole cache and check it; exit with status 1 if it is damaged");
   info->add_option("--probe", options->point,
                    "Print the values at x,y,z and the nearest node or cell (block, i, j, k) before the rest; "
-                   "exit with status 1 if the point is outside of the data")
+                   "exit with status 1 if the point is outside the data")
       ->delimiter(',')
       ->expected(3);
   addStepOptions(*info, options->steps, "Time steps");

@@ -28,6 +28,7 @@
 #include "tools/options/channel_arguments.h"
 #include "tools/options/frame_arguments.h"
 #include "tools/options/frame_part.h"
+#include "tools/options/further_scalars.h"
 #include "tools/options/kept_caches.h"
 #include "tools/options/motion_in_time.h"
 #include "tools/options/opacity_arguments.h"
@@ -60,8 +61,9 @@ void checkPartArguments(const RenderArguments& arguments) {
   if (!arguments.part) return;
   parsePart(*arguments.part);
   if (!severalFrames(arguments))
-    throw UsageError("--part {}: deals out frames, and there is one; give --orbit, --path or --steps",
-                     *arguments.part);
+    throw UsageError(
+        "--part {}: shares out several frames, but there is only one; give --orbit, --path or --steps",
+        *arguments.part);
   if (isMovieName(arguments.output))
     throw UsageError(
         "--part {}: a part of a movie cannot be joined with others; write numbered pictures, -o "
@@ -82,7 +84,8 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
   checkOutputName(arguments.output, severalFrames(arguments), size);
   checkPartArguments(arguments);
   if (!arguments.first_image.empty() && !launchedRanks().alone())
-    throw UsageError("--first-image {}: one process draws it; start one", arguments.first_image.string());
+    throw UsageError("--first-image {}: one process draws it; start curvisplat without mpirun",
+                     arguments.first_image.string());
   if (arguments.frame_rate && !isMovieName(arguments.output))
     throw UsageError("--frame-rate needs a movie: -o NAME.mp4 or NAME.gif");
   if (arguments.frame.background == "transparent" && arguments.output.extension() != ".png" &&
@@ -91,7 +94,7 @@ void checkArguments(const RenderArguments& arguments, ImageSize size) {
                      arguments.output.extension().string());
   parseBackend(arguments.backend);
   if (channelsOf(arguments).any() && !arguments.first_image.empty())
-    throw UsageError("--first-image {}: a first picture has no values; leave --channels out",
+    throw UsageError("--first-image {}: a first picture has no channels of values; leave out --channels",
                      arguments.first_image.string());
   std::vector<std::filesystem::path> others{arguments.cache, arguments.camera.path,
                                             arguments.scalar.transfer_function.value_or("")};
@@ -166,7 +169,11 @@ std::filesystem::path cacheToDraw(const RenderArguments& arguments) {
     throw Error("{}: several processes draw from a cache; convert the grid first", files.front().string());
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
-  return keptCacheOf(files, progress, [](const std::string& text) { printMessage("{}", text); });
+  KeptCacheEvents events;
+  events.say = [](const std::string& text) { printMessage("{}", text); };
+  std::filesystem::path cache = keptCacheOf(files, progress, events);
+  addMissingScalars(cache, files, {arguments.scalar.scalar, arguments.opacity.by.scalar}, progress);
+  return cache;
 }
 
 constexpr double kAxesRoom = 0.17;  // around the data, of its box
@@ -205,10 +212,6 @@ void render(const RenderArguments& given) {
   }
 
   options.scene = sceneOf(arguments.surfaces, cache, shown, variable);
-  if (options.scene && !options.scene->isovalues.empty() && options.scene->volume &&
-      transfer_function.logScale())
-    throw UsageError(
-        "--iso in the volume needs a linear transfer function; this one is logarithmic: add --volume off");
   for (const std::string& miss : slicesThatMiss(arguments.surfaces, manifest.lower, manifest.upper))
     printMessage("warning: {}", miss);
 
@@ -355,10 +358,10 @@ void addRender(CLI::App& app) {
   addAnnotationOptions(*command, arguments->annotations, what);
 
   command
-      ->add_option(
-          "--channels", arguments->channels,
-          "What an .exr picture has beside its colours, where each pixel has half of its opacity: some of "
-          "depth,normal,scalar, or none (default: depth). Takes about three times as long")
+      ->add_option("--channels", arguments->channels,
+                   "Further channels of an .exr picture: depth,normal,scalar or some of them, each taken "
+                   "where half of the pixel's opacity lies in front; or none (default: depth). Drawing takes "
+                   "about three times as long")
       ->group(what);
   addSurfaceOptions(*command, arguments->surfaces, surfaces);
   const std::string when = "Time steps";
@@ -408,8 +411,8 @@ void addRender(CLI::App& app) {
       ->group(where);
   command
       ->add_option("--part", arguments->part,
-                   "Draw part i of n of the frames, i/n with i from 1 to n: frames i-1, i-1+n, i-1+2n, ... "
-                   "under their names of the whole")
+                   "Draw only part i of n of the frames, given as i/n: frames i-1, i-1+n, i-1+2n, ..., named "
+                   "as in the whole sequence")
       ->group(where);
 
   const std::string how = "Resources";

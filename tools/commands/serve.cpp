@@ -71,7 +71,8 @@ void serve(const ServeArguments& arguments) {
     fmt::print("{}\n", address);
     std::fflush(stdout);
     printMessage(
-        "serving {} cache{} to at most {} viewer{} at a time; whoever has the address above can look at {}",
+        "serving {} cache{} to at most {} viewer{} at a time; anyone who has the address above can look at "
+        "{}",
         caches.size(), caches.size() == 1 ? "" : "s", options.viewers, options.viewers == 1 ? "" : "s",
         caches.size() == 1 ? "it" : "them");
   });
@@ -83,22 +84,23 @@ void addServe(CLI::App& app) {
   auto arguments = std::make_shared<ServeArguments>();
   CLI::App* command = app.add_subcommand("serve", "Show caches in a web browser");
   command->add_option("CACHE", arguments->caches, "Splat caches, directories NAME.splats")->required();
-  command->add_option("--port", arguments->port, "Port to listen at; 0: any that is free")
-      ->capture_default_str();
+  command->add_option("--port", arguments->port, "Port to listen on; 0: any free one")->capture_default_str();
   command
       ->add_option("--listen", arguments->listen,
-                   "Address to listen at; others than the loopback's let other machines connect, unencrypted")
+                   "Address to listen on; any but the loopback's lets other machines connect, unencrypted")
       ->capture_default_str();
   command->add_option(
       "--host", arguments->hosts,
-      "Further name by which browsers reach the server, beside localhost and addresses in digits");
-  command->add_option("--token-file", arguments->token_file,
-                      "File with the token of the address, for its owner alone (default: a new token)");
+      "Further host name under which browsers may reach the server, besides localhost and numeric addresses");
+  command->add_option(
+      "--token-file", arguments->token_file,
+      "File with the access token of the address, readable by its owner only (default: a new random token)");
   command->add_option("--viewer-memory", arguments->viewer_memory, "Memory limit of each viewer")
       ->capture_default_str();
   command
-      ->add_option("--memory", arguments->memory,
-                   "Memory limit of all viewers together: with --viewer-memory, how many there can be")
+      ->add_option(
+          "--memory", arguments->memory,
+          "Memory limit of all viewers together; divided by --viewer-memory, the largest number of viewers")
       ->capture_default_str();
   command
       ->add_option("--backend", arguments->backend,

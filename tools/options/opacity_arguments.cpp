@@ -35,17 +35,17 @@ void addOpacityOptions(CLI::App& command, OpacityArguments& arguments, const std
                        const std::string& surfaces_group) {
   command
       .add_option("--opacity-by", arguments.by.scalar,
-                  "Name of another scalar, which gives the opacities; --scalar gives the colours. "
-                  "--opacity and --opacity-unit are then of this one")
+                  "Name of another scalar, which gives the opacities, while --scalar gives the colours. "
+                  "--opacity and --opacity-unit then apply to it")
       ->group(group);
   command
       .add_option("--opacity-range", arguments.by.range,
-                  "Range of the --opacity-by scalar along which --opacity lies, as --range (default: chosen "
+                  "Range of the --opacity-by scalar for --opacity, given as for --range (default: chosen "
                   "from the data)")
       ->group(group);
   command
       .add_option("--opacity-asinh", arguments.by.asinh,
-                  "As --asinh, of the --opacity-by scalar: CENTRE,WIDTH")
+                  "CENTRE,WIDTH as for --asinh, for the --opacity-by scalar")
       ->group(group);
   command
       .add_option("--opacity-tf", arguments.by.transfer_function,

@@ -21,11 +21,11 @@ void addFunctionOptions(CLI::App& command, ScalarArguments& arguments, const std
           "reversed), or the path of a ParaView preset (.json) (default: chosen from the data)")
       ->group(group);
   command
-      .add_option(
-          "--range", arguments.range,
-          "Scalar range of the transfer function: LO,HI; percentiles of the volume, such as 1%,99%; "
-          "or data, all values of what is drawn; step, of the first step drawn; series, of all time steps "
-          "(default: chosen from the data; with a file, the file's)")
+      .add_option("--range", arguments.range,
+                  "Scalar range of the transfer function: LO,HI; percentiles of the volume, such as 1%,99%; "
+                  "data: all values, of the series with --steps; step: those of the first step drawn; "
+                  "series: those of all time steps "
+                  "(default: chosen from the data; with a file, the file's)")
       ->group(group);
   command
       .add_option("--opacity", arguments.opacity,
@@ -64,6 +64,12 @@ size_t chooseVariable(const CacheReader& cache, const ScalarArguments& arguments
   try {
     return cache.variableNamed(arguments.scalar);
   } catch (const UsageError& error) {
+    if (arguments.scalar == "all" || arguments.scalar.find(',') != std::string::npos)
+      throw Error(
+          "--scalar {}: a picture shows one scalar; draw each by a command of its own, or take the opacities "
+          "of a "
+          "second with --opacity-by",
+          arguments.scalar);
     throw Error("{}", error.what());
   }
 }

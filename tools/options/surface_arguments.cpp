@@ -13,6 +13,7 @@
 #include "render/mesh/mesh_file.h"
 #include "stream/base/error.h"
 #include "stream/base/paths.h"
+#include "tools/options/choices.h"
 #include "tools/options/grid_surfaces.h"
 #include "tools/options/option_parsers.h"
 
@@ -59,7 +60,7 @@ void checkSurfaceOpacities(const SurfaceArguments& arguments) {
   const auto& texts = arguments.surface_opacities;
   for (const std::string& text : texts)
     if (parseSheetOpacity("--surface-opacity", text).by_function && arguments.surface_by.empty())
-      throw UsageError("--surface-opacity {}: of which scalar? Add --surface-by NAME", text);
+      throw UsageError("--surface-opacity {}: needs the scalar of the function; add --surface-by NAME", text);
   if (texts.size() > 1 && texts.size() != arguments.surfaces.size())
     throw UsageError(
         "--surface-opacity: given {} times for {} surfaces; give it once, or once for each --surface",
@@ -80,10 +81,10 @@ std::vector<double> parseIsovalues(const std::vector<std::string>& texts) {
 }
 
 double parseIsoOpacity(const std::string& text) {
-  if (text.empty()) return kIsoOpacity;
+  if (text.empty()) return 1;
   const double opacity = parseNumber("--iso-opacity", text);
-  if (!(opacity > 0 && opacity <= 0.99))
-    throw UsageError("--iso-opacity {}: expected a number above 0 and at most 0.99", text);
+  if (!(opacity > 0 && opacity <= 1))
+    throw UsageError("--iso-opacity {}: expected a number above 0 and at most 1", text);
   return opacity;
 }
 
@@ -134,10 +135,9 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
           "is drawn, else colours chosen from its data")
       ->group(group);
   command
-      .add_option(
-          "--surface-opacity", arguments.surface_opacities,
-          "Opacity of the surfaces, above 0 and at most 1, or one for each in their order (default 1); "
-          "function: that of the function of --surface-by")
+      .add_option("--surface-opacity", arguments.surface_opacities,
+                  "Opacity of the surfaces, above 0 and at most 1, or one for each in their order (default "
+                  "1); function: by the transfer function of the --surface-by scalar")
       ->take_all()
       ->allow_extra_args(false)
       ->group(group);
@@ -149,10 +149,9 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
       ->allow_extra_args(false)
       ->group(group);
   command
-      .add_option(
-          "--slice-opacity", arguments.slice_opacity,
-          "Opacity of the slices, above 0 and at most 1; function: that of the transfer function (with "
-          "--opacity-by, of its scalar's), or function*NUMBER")
+      .add_option("--slice-opacity", arguments.slice_opacity,
+                  "Opacity of the slices, above 0 and at most 1; function: by the transfer function (that of "
+                  "--opacity-by, if given); function*NUMBER: NUMBER times that")
       ->capture_default_str()
       ->group(group);
   command
@@ -164,7 +163,7 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
       ->group(group);
   command
       .add_option("--iso-opacity", arguments.iso_opacity,
-                  "Opacity of the isosurfaces, above 0 and at most 0.99 (default 0.95)")
+                  "Opacity of the isosurfaces, above 0 and at most 1 (default 1)")
       ->group(group);
   command
       .add_option("--volume", arguments.volume, "on, or off to draw surfaces, slices and isosurfaces alone")
@@ -186,8 +185,7 @@ void checkSurfaceArguments(const SurfaceArguments& arguments) {
   if (!arguments.surface_by.empty() &&
       std::all_of(arguments.surfaces.begin(), arguments.surfaces.end(), isSurfaceFile))
     throw UsageError("--surface-by {} needs faces of the grid, such as --surface kmin", arguments.surface_by);
-  if (arguments.volume != "on" && arguments.volume != "off")
-    throw UsageError("--volume {}: expected on or off", arguments.volume);
+  requireChoice("--volume", arguments.volume, {"on", "off"});
   parseIsovalues(arguments.isovalues);
   parseIsoOpacity(arguments.iso_opacity);
   if (!arguments.iso_opacity.empty() && arguments.isovalues.empty())

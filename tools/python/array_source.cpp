@@ -212,7 +212,7 @@ class CallableSource : public GridSource {
     for (const uint32_t scalar : scalars) wanted.append(description_.scalars[scalar].name);
     const auto result = py::cast<py::tuple>(read_(number, box.k0, box.k1, box.j0, box.j1, wanted));
     if (result.size() != 5)
-      throw Error("read() returned {} things; expected (x, y, z, [values], blank)", result.size());
+      throw Error("read() returned {} items; expected (x, y, z, [values], blank)", result.size());
     copy(result[0], "x", shape, out.x);
     copy(result[1], "y", shape, out.y);
     copy(result[2], "z", shape, out.z);

@@ -82,9 +82,8 @@ void Connection::start() {
 void Connection::answer(const Request& request) {
   const RequestTarget target = targetOf(viewOf(request.target()));
   if (!isKnownHost(viewOf(request[http::field::host]), host_.options().host_names))
-    return refuse(
-        http::status::misdirected_request,
-        "this server does not know the name that you have reached it by; start it with --host NAME");
+    return refuse(http::status::misdirected_request,
+                  "unknown host name; to allow it, start the server with --host NAME");
   const bool is_socket = target.path == kPath;
   if (!is_socket && target.path != "/") return refuse(http::status::not_found, "there is nothing here");
   if (!isSameToken(target.token, host_.options().token))

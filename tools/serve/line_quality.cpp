@@ -6,9 +6,9 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kLate_s = 0.12;   // beyond the line's own delay
-constexpr double kEarly_s = 0.04;  // beyond it
-constexpr double kTooLong_s = 1;   // no line's own delay
+constexpr double kLateSeconds = 0.12;   // beyond the line's own delay
+constexpr double kEarlySeconds = 0.04;  // beyond it
+constexpr double kTooLongSeconds = 1;   // no line's own delay
 constexpr int kInTimeToRefine = 12;
 constexpr size_t kLately = 100;
 
@@ -43,10 +43,10 @@ void LineQuality::learn(double delay_s) {
   if (delays_.size() > kLately) delays_.pop_front();
   const double over_s = delay_s - *std::min_element(delays_.begin(), delays_.end());
   ++since_change_;
-  in_time_ = over_s < kEarly_s ? in_time_ + 1 : 0;
+  in_time_ = over_s < kEarlySeconds ? in_time_ + 1 : 0;
   int level = level_;
   // Pictures that were on their way at the last change say nothing about this level.
-  if ((over_s > kLate_s || delay_s > kTooLong_s) && since_change_ > static_cast<int>(kMostOnTheWay))
+  if ((over_s > kLateSeconds || delay_s > kTooLongSeconds) && since_change_ > static_cast<int>(kMostOnTheWay))
     level = std::min(kCoarsest, level_ + 1);
   else if (in_time_ >= kInTimeToRefine)
     level = std::max(0, level_ - 1);

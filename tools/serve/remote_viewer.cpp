@@ -240,7 +240,8 @@ void RemoteViewer::loop() {
       work.serve(std::move(inbox));
     } catch (const std::exception& error) {  // such as a lack of memory: of this viewer alone
       printMessage("warning: a viewer: {}", error.what());
-      send_(caches_.errorText("the server could not do this; its messages say why"), true);
+      send_(caches_.errorText("the server could not do this; the reason is in its messages (standard error)"),
+            true);
     }
   }
 }

@@ -143,7 +143,7 @@ class Server : public ConnectionHost {
     if (!error) acceptor_.bind(endpoint, error);
     if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
     if (error)
-      throw Error("{}:{}: cannot be listened at: {}; give another --port, or --port 0 for any that is free",
+      throw Error("{}:{}: cannot listen: {}; give another --port, or --port 0 for any that is free",
                   options_.address, options_.port, error.message());
   }
 

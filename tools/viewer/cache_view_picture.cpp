@@ -27,7 +27,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kPointedFor_s = 0.3;  // the mouse rests that long before values are looked for
+constexpr size_t kMaxNamedFiles = 4;        // in a command; of a longer series its kept cache
+constexpr double kPointedForSeconds = 0.3;  // the mouse rests that long before values are looked for
 
 ImVec2 toImGui(double x, double y) {
   return {static_cast<float>(x), static_cast<float>(y)};
@@ -82,7 +83,7 @@ void CacheView::probe(const WindowLayout& layout) {
     pointed_ = pointed.value_or(glm::dvec2(-1.0));
     if (!pointed) probed_.clear();
   }
-  const bool rests = pointed && glfwGetTime() - pointed_since_s_ > kPointedFor_s;
+  const bool rests = pointed && glfwGetTime() - pointed_since_s_ > kPointedForSeconds;
   if ((rests || clicked_) && isFinal() && !frames_.busy() && values_asked_for_ != request_) {
     values_asked_for_ = request_;
     frames_.requestValues();
@@ -117,6 +118,8 @@ void CacheView::probe(const WindowLayout& layout) {
   }
   const Marker marker = markerOf(state_, variable, answer->question.point, *answer->found);
   probed_ = textOf(marker, manifest().blocks.size(), manifest().cells);
+  // Its nodes are not those of the grid.
+  if (preview_) probed_ = probed_.substr(0, probed_.find(';')) + ", of the preview";
   if (!for_marker) return;
   state_.markers.push_back(marker);
   rests_ = false;
@@ -142,10 +145,12 @@ void CacheView::drawStatus(const WindowLayout& layout) {
   ImGui::TextUnformatted(text.c_str());
   nameArea("status " + text, place.x, place.y, place.width, place.height);
   const std::string state =
+      (preview_ ? fmt::format("preview of {}, ", preview_->what) : "") +
       stateOfPicture({shown_ ? &shown_->statistics : nullptr, isFinal(), frames_.busy(), ""});
   ImGui::SameLine(static_cast<float>(place.width) - ImGui::CalcTextSize(state.c_str()).x -
                   2 * ImGui::GetStyle().FramePadding.x);
   ImGui::TextDisabled("%s", state.c_str());
+  nameWidget("state " + state);
   ImGui::End();
   ImGui::PopStyleVar(2);
 }
@@ -161,7 +166,8 @@ void CacheView::savePictureIfFinal() {
     const AnnotatedScene scene =
         sceneOf(state_, manifest(), functions, shown_->camera, shown_->options, picture_size_);
     writeImage(annotated(shown_->image, state_.annotations, scene), file);
-    say("saved " + fs::absolute(file).string());
+    say("saved " + fs::absolute(file).string() +
+        (preview_ ? fmt::format(", of the preview ({})", preview_->what) : ""));
   } catch (const Error& error) {
     say(error.what(), true);
   }
@@ -169,7 +175,11 @@ void CacheView::savePictureIfFinal() {
 
 void CacheView::copyCommand(bool turns) {
   try {
-    CommandOptions options{shortPath(cache_.cachePath()), picture_size_, {}, {}, turns};
+    CommandOptions options{shortPath(whole()), picture_size_, {}, {}, turns};
+    if (!grid_files_.empty() && grid_files_.size() <= kMaxNamedFiles) {
+      options.cache = shortPath(grid_files_.front());
+      for (size_t n = 1; n < grid_files_.size(); ++n) options.solutions.push_back(shortPath(grid_files_[n]));
+    }
     const auto keep = [&](const EditedFunction& function, const char* what, fs::path& file) {
       if (!needsFile(function)) return;
       // Beside the picture that the command will write.
@@ -215,8 +225,8 @@ void CacheView::take(const FileDialog::Chosen& chosen) {
 
 void CacheView::saveView(const std::string& name) {
   try {
-    writeState(savedViewOf(cache_.cachePath(), name), toJson(state_));
-    views_ = savedViewsOf(cache_.cachePath());
+    writeState(savedViewOf(whole(), name), toJson(state_));
+    views_ = savedViewsOf(whole());
     say(fmt::format("saved the view \"{}\": View, Saved views", name));
   } catch (const Error& error) {
     say(error.what(), true);
@@ -225,7 +235,7 @@ void CacheView::saveView(const std::string& name) {
 
 void CacheView::loadView(const std::string& name) {
   try {
-    const fs::path file = savedViewOf(cache_.cachePath(), name);
+    const fs::path file = savedViewOf(whole(), name);
     ViewState state = viewStateFromJson(readTextFile(file), file, manifest());
     state.faces = state_.faces;  // of the command line
     state.faces_by = state_.faces_by;
@@ -244,16 +254,20 @@ std::vector<std::string> CacheView::otherScalars() const {
   return names;
 }
 
-void CacheView::addTo(MenuFacts& facts) const {
+void CacheView::addTo(MenuFacts& facts) {
   for (const VariableInfo& one : manifest().variables) facts.scalars.push_back(one.name);
   facts.scalar = state_.variable;
   facts.opacity_scalars = otherScalars();
   facts.opacity_scalar = state_.opacity_by ? state_.opacity_by->variable : facts.opacity_scalars.front();
   facts.views = views_;
+  facts.further = further_.known();
+  facts.further.is_busy = adds_scalar_;
 }
 
 void CacheView::choose(const MenuChoice& choice) {
   if (choice.view) loadView(*choice.view);
+  if (choice.looks_for_scalars) further_.look();
+  if (choice.add_scalar) wanted_scalar_ = choice.add_scalar;
   if (choice.scalar && *choice.scalar != state_.variable) {
     chooseVariable(state_, cache_, *choice.scalar);
     if (state_.opacity_by && state_.opacity_by->variable == *choice.scalar) state_.opacity_by.reset();

@@ -64,7 +64,7 @@ FrameLoop::FrameLoop(const CacheReader& cache, Backend backend, std::function<vo
 FrameLoop::~FrameLoop() {
   {
     const MutexLock lock(mutex_);
-    stopping_ = true;
+    state_ = State::kStopping;
     drawing_.request_stop();
   }
   changed_.notify_all();
@@ -76,14 +76,15 @@ uint64_t FrameLoop::request(FrameRequest request) {
   pending_ = std::move(request);
   values_wanted_ = false;
   values_.reset();
-  if (at_rest_) drawing_.request_stop();
+  if (isStoppedByRequests()) drawing_.request_stop();
   changed_.notify_all();
   return ++newest_;
 }
 
 std::optional<ShownFrame> FrameLoop::take() {
   const MutexLock lock(mutex_);
-  if (failure_) std::rethrow_exception(ended_ ? failure_ : std::exchange(failure_, nullptr));
+  if (failure_)
+    std::rethrow_exception(state_ == State::kFailed ? failure_ : std::exchange(failure_, nullptr));
   return std::exchange(shown_, std::nullopt);
 }
 
@@ -100,7 +101,7 @@ std::optional<ShownValues> FrameLoop::takeValues() {
 
 bool FrameLoop::busy() const {
   const MutexLock lock(mutex_);
-  return !ended_ && (pending_ || serving_);
+  return state_ != State::kFailed && (pending_ || state_ == State::kMoving || state_ == State::kRefining);
 }
 
 std::string FrameLoop::backendName() const {
@@ -115,7 +116,7 @@ bool FrameLoop::drawsInSoftware() const {
 
 bool FrameLoop::superseded(uint64_t number) const {
   const MutexLock lock(mutex_);
-  return stopping_ || number != newest_;
+  return state_ == State::kStopping || number != newest_;
 }
 
 void FrameLoop::publish(ShownFrame frame) {
@@ -131,16 +132,15 @@ void FrameLoop::loop() {
   Drawing drawing(coarsestSplats(cache_));
   MutexLock lock(mutex_);
   while (true) {
-    while (!pending_ && !stopping_ && !(values_wanted_ && drawing.last)) changed_.wait(lock);
-    if (stopping_) return;
+    while (!pending_ && state_ != State::kStopping && !(values_wanted_ && drawing.last)) changed_.wait(lock);
+    if (state_ == State::kStopping) return;
     const bool draws = pending_.has_value();
     FrameRequest request = draws ? *std::exchange(pending_, std::nullopt) : *drawing.last;
     if (!draws) values_wanted_ = false;
     const uint64_t number = newest_;
     drawing_ = std::stop_source();
     request.options.stop = drawing_.get_token();
-    serving_ = draws;
-    at_rest_ = !draws || !request.moving;
+    state_ = !draws ? State::kValues : request.moving ? State::kMoving : State::kRefining;
     lock.unlock();
     std::exception_ptr failure;
     bool ends = false;
@@ -157,9 +157,8 @@ void FrameLoop::loop() {
       ends = true;
     }
     lock.lock();
-    serving_ = at_rest_ = false;
     if (failure) failure_ = failure;
-    ended_ = ends;
+    if (state_ != State::kStopping) state_ = ends ? State::kFailed : State::kIdle;
     lock.unlock();
     wake_();
     if (ends) return;

@@ -6,6 +6,18 @@
 // While the camera moves, each picture is as fine as its time budget allows and is always completed; the next
 // one begins when it is shown. At rest, each picture draws four times the splats of the previous one, and is
 // stopped by the next request.
+//
+//             a request whose camera moves
+//   kIdle <------------------------------> kMoving     its one picture is completed
+//     ^  \      a request at rest
+//     |   \------------------------------> kRefining   until the picture is final; the next request stops it
+//     |    \    requestValues()
+//     |     \----------------------------> kValues     of the last picture; the next request stops it
+//     |                                        |
+//     '--------- done, or stopped -------------'
+//
+//   each of these --an error of reading or drawing--> kFailed     take() throws it; nothing is drawn any more
+//   every state   --destructor----------------------> kStopping   the thread ends
 #pragma once
 
 #include <algorithm>
@@ -106,12 +118,18 @@ class FrameLoop {
   bool drawsInSoftware() const;
 
  private:
+  enum class State { kIdle, kMoving, kRefining, kValues, kFailed, kStopping };  // the diagram above
   struct Drawing;
+
   void loop();
   void serve(Drawing& drawing, const FrameRequest& request, uint64_t number);
   void readAhead(Drawing& drawing, const FrameRequest& request);
   void findValues(Drawing& drawing, FrameRequest request, uint64_t number);
   bool superseded(uint64_t number) const;
+  /// Whether the next request stops what is being done.
+  bool isStoppedByRequests() const REQUIRES(mutex_) {
+    return state_ == State::kRefining || state_ == State::kValues;
+  }
   void publish(ShownFrame frame);
 
   CacheReader cache_;  // at the step that is drawn; of the loop's thread
@@ -120,17 +138,14 @@ class FrameLoop {
 
   mutable Mutex mutex_;
   ConditionVariable changed_;
+  State state_ GUARDED_BY(mutex_) = State::kIdle;
   std::optional<FrameRequest> pending_ GUARDED_BY(mutex_);
-  uint64_t newest_ GUARDED_BY(mutex_) = 0;   // number of the newest request
-  bool serving_ GUARDED_BY(mutex_) = false;  // a request is being drawn
-  bool at_rest_ GUARDED_BY(mutex_) = false;  // and its camera does not move
+  uint64_t newest_ GUARDED_BY(mutex_) = 0;  // number of the newest request
   std::stop_source drawing_ GUARDED_BY(mutex_);
   std::optional<ShownFrame> shown_ GUARDED_BY(mutex_);
   bool values_wanted_ GUARDED_BY(mutex_) = false;
   std::optional<ShownValues> values_ GUARDED_BY(mutex_);
-  std::exception_ptr failure_ GUARDED_BY(mutex_);
-  bool ended_ GUARDED_BY(mutex_) = false;  // by an error
-  bool stopping_ GUARDED_BY(mutex_) = false;
+  std::exception_ptr failure_ GUARDED_BY(mutex_);  // of the loop in kFailed, else of the last request
   std::string backend_name_ GUARDED_BY(mutex_);
   bool software_ GUARDED_BY(mutex_) = true;
   std::thread thread_;

@@ -13,16 +13,16 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kRestAfter_s = 0.2;        // no movement for this time
-constexpr double kWheelFactor = 1.1;        // per notch
-constexpr double kDragFactor = 1.01;        // per pixel
-constexpr double kWheelFlight = 0.02;       // in diagonals of the data per notch
-constexpr double kFlightDiagonals_s = 0.2;  // in diagonals of the data per second
+constexpr double kRestAfterSeconds = 0.2;        // no movement for this time
+constexpr double kWheelFactor = 1.1;             // per notch
+constexpr double kDragFactor = 1.01;             // per pixel
+constexpr double kWheelFlight = 0.02;            // in diagonals of the data per notch
+constexpr double kFlightDiagonalsSeconds = 0.2;  // in diagonals of the data per second
 
 }  // namespace
 
 bool Navigation::isMoving() const {
-  return holds_ || (moved_at_s_ >= 0 && ImGui::GetTime() - moved_at_s_ < kRestAfter_s);
+  return holds_ || (moved_at_s_ >= 0 && ImGui::GetTime() - moved_at_s_ < kRestAfterSeconds);
 }
 
 bool Navigation::update(Window& window, Camera& camera, ImageSize size) {
@@ -61,7 +61,7 @@ bool Navigation::fly(const Window& window, Camera& camera) {
                              towards(GLFW_KEY_W, GLFW_KEY_S));
   if (direction == glm::dvec3(0.0)) return false;
   const double passed_s = std::min(0.1, static_cast<double>(ImGui::GetIO().DeltaTime));
-  camera = flown(camera, passed_s * kFlightDiagonals_s * glm::length(upper_ - lower_) * direction);
+  camera = flown(camera, passed_s * kFlightDiagonalsSeconds * glm::length(upper_ - lower_) * direction);
   return true;
 }
 

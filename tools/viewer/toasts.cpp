@@ -6,14 +6,15 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kShortest_s = 4, kPerLetter_s = 0.06, kError_s = 60;
+constexpr double kShortestSeconds = 4, kPerLetterSeconds = 0.06, kErrorSeconds = 60;
 constexpr size_t kMaxShown = 3, kMaxLog = 100;
 
 }  // namespace
 
 void Toasts::add(const std::string& text, double now_s, bool is_error) {
   const double ends_s =
-      now_s + (is_error ? kError_s : kShortest_s + kPerLetter_s * static_cast<double>(text.size()));
+      now_s +
+      (is_error ? kErrorSeconds : kShortestSeconds + kPerLetterSeconds * static_cast<double>(text.size()));
   const auto same =
       std::find_if(shown_.begin(), shown_.end(), [&](const Toast& toast) { return toast.text == text; });
   if (same != shown_.end()) {

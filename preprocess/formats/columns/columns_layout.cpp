@@ -229,7 +229,7 @@ ColumnsScalars chooseColumnsScalars(const NetcdfFiles& file, const ColumnsMap& m
   });
   if (groups.empty())
     throw Error(
-        "{}: is a grid of {} without a variable of faces or nodes and layers: there is nothing to fill",
+        "{}: is a grid of {} without a variable of faces or nodes and layers: no part of it has a volume",
         file.path().string(), map.format);
   auto chosen = std::max_element(groups.begin(), groups.end(), [](const auto& a, const auto& b) {
     return a.variables.size() < b.variables.size();

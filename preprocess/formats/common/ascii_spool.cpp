@@ -1,10 +1,6 @@
 #include "preprocess/formats/common/ascii_spool.h"
 
-#include <fmt/format.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <atomic>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
@@ -13,6 +9,7 @@
 
 #include "stream/base/error.h"
 #include "stream/base/free_space.h"
+#include "stream/base/nameless_file.h"
 
 namespace curvisplat {
 namespace {
@@ -60,7 +57,7 @@ bool parseFortranNumber(std::string_view token, double& value) {
 class Spooler {
  public:
   Spooler(const InputFile& text, const std::filesystem::path& folder)
-      : text_(text), folder_(folder), temporary_(unusedName()), in_(std::make_shared<InputFile>(open())) {
+      : text_(text), folder_(folder), file_(std::make_shared<NamelessFile>(folder)) {
     pending_.reserve(kChunkBytes / sizeof(double));
   }
 
@@ -86,30 +83,12 @@ class Spooler {
       std::copy(stop, end, chunk.data());
     }
     flush();
-    out_->close();
-    return {in_, written_, significant_digits_};
+    file_->out().close();
+    return {std::shared_ptr<const InputFile>(file_, &file_->in()), written_, significant_digits_};
   }
 
  private:
   std::string name() const { return text_.path().string(); }
-
-  std::filesystem::path unusedName() const {
-    static std::atomic<unsigned> spools = 0;
-    return folder_ / fmt::format("{}.{}.{}.spool", text_.path().filename().string(), ::getpid(), spools++);
-  }
-
-  /// Creates the file, opens it for reading, and unlinks it at once.
-  InputFile open() {
-    out_ = std::make_unique<OutputFile>(temporary_);
-    try {
-      InputFile in(temporary_);
-      removeFile(temporary_);
-      return in;
-    } catch (...) {
-      removeAll(temporary_);
-      throw;
-    }
-  }
 
   void parse(const char* const begin, const char* const end) {
     for (const char* at = begin;;) {
@@ -166,16 +145,14 @@ class Spooler {
   }
 
   void flush() {
-    out_->append(std::span<const double>(pending_));
+    file_->out().append(std::span<const double>(pending_));
     written_ += pending_.size();
     pending_.clear();
   }
 
   const InputFile& text_;
   const std::filesystem::path folder_;
-  const std::filesystem::path temporary_;
-  std::unique_ptr<OutputFile> out_;
-  const std::shared_ptr<const InputFile> in_;
+  const std::shared_ptr<NamelessFile> file_;
   std::vector<double> pending_;
   uint64_t written_ = 0;
   uint64_t lines_ = 0;  // that ended before the current chunk

@@ -23,8 +23,7 @@ struct AsciiSpool {
 /// Parses a number in the notation of C, C++ or Fortran. False unless `text` is exactly one number.
 bool parseNumber(std::string_view text, double& value);
 
-/// The temporary file is already unlinked when this returns, so that the system frees its space after the
-/// last user closes it, even if the program crashes. Throws Error with the line that is not a number, or if
+/// The file is a NamelessFile in `folder`. Throws Error with the line that is not a number, or if
 /// `folder` has too little space.
 AsciiSpool spoolAscii(const InputFile& text, const std::filesystem::path& folder);
 

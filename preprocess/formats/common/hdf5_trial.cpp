@@ -205,7 +205,7 @@ void tryHdf5(const std::filesystem::path& path, const std::function<void()>& mor
     if (errno != EINTR) return;  // somebody else has waited for it
   if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU)
     throw Error(
-        "{}: HDF5 does not come to an end with it in {} s; the file is damaged: copy or write it again",
+        "{}: HDF5 does not finish reading it within {} s; the file is damaged: copy or write it again",
         path.string(), most_seconds);
   const bool stopped =
       WIFSIGNALED(status) && std::find(kStops.begin(), kStops.end(), WTERMSIG(status)) != kStops.end();

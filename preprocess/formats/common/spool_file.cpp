@@ -1,31 +1,13 @@
 #include "preprocess/formats/common/spool_file.h"
 
-#include <fmt/format.h>
-#include <unistd.h>
-
-#include <atomic>
-
 #include "stream/base/check.h"
 
 namespace curvisplat {
 
-void SpoolFile::create() {
-  static std::atomic<unsigned> spools = 0;
-  const std::filesystem::path path = folder_ / fmt::format("curvisplat.{}.{}.spool", ::getpid(), spools++);
-  out_ = std::make_unique<OutputFile>(path);
-  try {
-    in_ = std::make_unique<InputFile>(path);
-    removeFile(path);
-  } catch (...) {
-    removeAll(path);
-    throw;
-  }
-}
-
 uint64_t SpoolFile::append(const std::function<void(const Sink&)>& write) {
   const MutexLock lock(mutex_);
-  if (!in_) create();
-  OutputFile& out = *out_;
+  if (!file_) file_ = std::make_unique<NamelessFile>(folder_);
+  OutputFile& out = file_->out();
   const uint64_t begin = out.size();
   write([&out](std::span<const std::byte> bytes) { out.append(bytes); });
   return begin;

@@ -9,13 +9,12 @@
 #include <string>
 
 #include "preprocess/formats/common/byte_source.h"
-#include "stream/base/file.h"
 #include "stream/base/mutex.h"
+#include "stream/base/nameless_file.h"
 
 namespace curvisplat {
 
-/// Created, and unlinked at once, when the first bytes are appended: the system frees its space after the
-/// last user closes it, even if the program crashes. Thread-safe.
+/// Created when the first bytes are appended. Thread-safe.
 class SpoolFile {
  public:
   explicit SpoolFile(std::filesystem::path folder) : folder_(std::move(folder)) {}
@@ -28,15 +27,12 @@ class SpoolFile {
   uint64_t append(const std::function<void(const Sink&)>& write);
 
   /// Only for bytes whose append() has returned.
-  void readAt(uint64_t offset, std::span<std::byte> to) const { in_->readAt(offset, to); }
+  void readAt(uint64_t offset, std::span<std::byte> to) const { file_->in().readAt(offset, to); }
 
  private:
-  void create() REQUIRES(mutex_);
-
   const std::filesystem::path folder_;
   Mutex mutex_;
-  std::unique_ptr<OutputFile> out_ GUARDED_BY(mutex_);
-  std::unique_ptr<InputFile> in_;  // created under the mutex, before the first append() returns
+  std::unique_ptr<NamelessFile> file_;  // created under the mutex, before the first append() returns
 };
 
 /// Bytes that are produced at the first read and then kept in a spool file.

@@ -177,7 +177,7 @@ std::filesystem::path CaseReader::fileOf(const Entry& entry, const std::string& 
     const double number =
         step < set.numbers.size() ? set.numbers[step] : set.start + static_cast<double>(step) * set.increment;
     if (!(number >= 0 && number < 1e15))
-      throw Error("{}: the files of {} have the number {}; expected one from 0", path_.string(),
+      throw Error("{}: the files of {} have the number {}; expected 0 or more", path_.string(),
                   printable(name), number);
     file = file.substr(0, star) + fmt::format("{:0{}}", static_cast<uint64_t>(number), stars) +
            file.substr(star + stars);

@@ -133,7 +133,7 @@ uint64_t EnsightFile::integer(bool decides_order) {
     text_->line();
   }
   if (!(value >= 0 && value <= kMostCount))
-    throw Error("{}: has the count {} at byte {}; expected one from 0; the file is damaged", name(), value,
+    throw Error("{}: has the count {} at byte {}; expected 0 or more; the file is damaged", name(), value,
                 binary_ ? at_ - 4 : text_->offset());
   return static_cast<uint64_t>(value);
 }

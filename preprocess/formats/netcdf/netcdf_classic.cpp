@@ -113,10 +113,10 @@ class Header {
   }
 
   uint64_t typeBytes() {
-    constexpr std::array<uint64_t, 12> bytes{0, 1, 1, 2, 4, 4, 8, 1, 2, 4, 8, 8};  // byte, char, short, ...
+    constexpr std::array<uint64_t, 12> kBytes{0, 1, 1, 2, 4, 4, 8, 1, 2, 4, 8, 8};  // byte, char, short, ...
     const uint64_t type = cursor_.number(4);
-    if (type == 0 || type >= bytes.size()) cursor_.damaged("an unknown type");
-    return bytes[type];
+    if (type == 0 || type >= kBytes.size()) cursor_.damaged("an unknown type");
+    return kBytes[type];
   }
 
   void skipAttributes() {

@@ -95,7 +95,7 @@ std::vector<fs::path> filesLike(const fs::path& path, const std::string& pattern
     if (fnmatch(pattern.c_str(), name.c_str(), FNM_PERIOD) == 0)
       files.push_back(path.has_parent_path() ? folder / name : fs::path(name));
   }
-  if (files.empty()) throw Error("{}: no file has a name like that", path.string());
+  if (files.empty()) throw Error("{}: no file matches this pattern", path.string());
   sortNaturally(files);
   return files;
 }
@@ -136,9 +136,7 @@ Groups groupsOf(const OpenGridOptions& options) {
     if (files.size() == 1) return;
     if (groups.steps > 1 && groups.steps != files.size())
       throw Error(
-          "{}: has {} files of this kind, and there are {} of another; a series needs as many of each as it "
-          "has "
-          "steps",
+          "{}: has {} files of this kind, but {} of another; a series needs one of each kind for every step",
           files.front().string(), files.size(), groups.steps);
     groups.steps = files.size();
   };

@@ -170,7 +170,7 @@ class Detection {
     const auto furthest = std::max_element(misfits.begin(), misfits.end(),
                                            [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
     std::string finding = "no header of plausible dimensions was found";
-    if (furthest != misfits.end() && furthest->reached >= LayoutMisfit::first_record) {
+    if (furthest != misfits.end() && furthest->reached >= LayoutMisfit::kFirstRecord) {
       finding = fmt::format("read as {} {}: {}", describeAttempt(furthest->layout),
                             curvisplat::describe(furthest->layout.kind), furthest->reason);
     }

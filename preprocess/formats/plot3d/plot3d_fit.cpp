@@ -71,8 +71,8 @@ std::vector<std::vector<uint64_t>> hopRecords(PayloadFile& payload, const Plot3d
       try {
         records[b].push_back(payload.nextRecord());
       } catch (const RecordMismatch& mismatch) {
-        throw LayoutMisfit{LayoutMisfit::dimensions, fmt::format("block {} of {} nodes: {}", b + 1,
-                                                                 describe(blocks[b]), mismatch.what())};
+        throw LayoutMisfit{LayoutMisfit::kDimensions, fmt::format("block {} of {} nodes: {}", b + 1,
+                                                                  describe(blocks[b]), mismatch.what())};
       }
     }
   }
@@ -101,11 +101,11 @@ void fitRecords(const std::vector<Plot3dLayout>& layouts, PayloadFile payload, c
     if (matches) continue;
     if (isPlanes(layouts, block, header.components, records[b].back()))
       throw LayoutMisfit{
-          LayoutMisfit::known_structure,
+          LayoutMisfit::kKnownStructure,
           fmt::format("block {} of {} nodes has a record for each k-plane; expected the whole format (one "
                       "record per block)",
                       b + 1, describe(block))};
-    throw LayoutMisfit{LayoutMisfit::dimensions,
+    throw LayoutMisfit{LayoutMisfit::kDimensions,
                        fmt::format("block {} of {} nodes has a record of {} bytes; expected {}", b + 1,
                                    describe(block), records[b].back(), expectations(layouts, expected))};
   }
@@ -125,7 +125,7 @@ void fitRecords(const std::vector<Plot3dLayout>& layouts, PayloadFile payload, c
     fits |= exact;
   }
   if (!fits)
-    throw LayoutMisfit{LayoutMisfit::dimensions, "the records of its blocks differ in precision or iblank"};
+    throw LayoutMisfit{LayoutMisfit::kDimensions, "the records of its blocks differ in precision or iblank"};
 }
 
 void fitSize(const std::vector<Plot3dLayout>& layouts, const PayloadFile& payload, const Plot3dHeader& header,
@@ -155,7 +155,7 @@ void fitSize(const std::vector<Plot3dLayout>& layouts, const PayloadFile& payloa
   const bool near = expected(layouts.front()) / 4 <= payload.size();
   const uint64_t unit = layouts.front().ascii ? sizeof(double) : 1;
   throw LayoutMisfit{
-      near ? LayoutMisfit::dimensions : LayoutMisfit::first_record,
+      near ? LayoutMisfit::kDimensions : LayoutMisfit::kFirstRecord,
       fmt::format("{}: found {} {}; expected {}", curvisplat::describe(header.blocks), payload.size() / unit,
                   unit == 1 ? "bytes" : "numbers",
                   expectations(layouts, [&](const Plot3dLayout& l) { return expected(l) / unit; }))};
@@ -176,7 +176,7 @@ void fitHeader(const Plot3dCandidates& candidates, const Plot3dLayout& base, Plo
     if (!base.two_dimensional)
       found.misfits.push_back({misfit.reached, base, misfit.reason, std::move(blocks)});
   } catch (const RecordMismatch& mismatch) {
-    if (!base.two_dimensional) found.misfits.push_back({LayoutMisfit::nothing, base, mismatch.what(), {}});
+    if (!base.two_dimensional) found.misfits.push_back({LayoutMisfit::kNothing, base, mismatch.what(), {}});
   }
 }
 

@@ -26,7 +26,7 @@ struct Plot3dFit {
 
 /// Why a layout does not fit, and how far it fitted. The misfit that got furthest is reported.
 struct Plot3dMisfit {
-  LayoutMisfit::Reached reached = LayoutMisfit::nothing;
+  LayoutMisfit::Reached reached = LayoutMisfit::kNothing;
   Plot3dLayout layout;  // the properties decided so far
   std::string reason;
   std::vector<Plot3dBlock> blocks;  // from `dimensions` on

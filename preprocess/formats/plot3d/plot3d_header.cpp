@@ -27,7 +27,7 @@ class HeaderReader {
   std::vector<int64_t> integers(uint64_t count) {
     const uint64_t width = layout_.integerBytes();
     if (offset_ > payload_.size() || count > (payload_.size() - offset_) / width)
-      throw LayoutMisfit{LayoutMisfit::first_record,
+      throw LayoutMisfit{LayoutMisfit::kFirstRecord,
                          fmt::format("the file ends within a header of {} numbers", count)};
     std::vector<std::byte> bytes(count * width);
     payload_.readAt(offset_, bytes);
@@ -45,7 +45,7 @@ class HeaderReader {
  private:
   static int64_t integerOf(double number) {
     if (!(std::abs(number) < 1e15) || number != std::trunc(number))
-      throw LayoutMisfit{LayoutMisfit::first_record, fmt::format("found {} instead of a dimension", number)};
+      throw LayoutMisfit{LayoutMisfit::kFirstRecord, fmt::format("found {} instead of a dimension", number)};
     return static_cast<int64_t>(number);
   }
 
@@ -57,11 +57,11 @@ class HeaderReader {
 uint64_t readBlockCount(HeaderReader& reader, const Plot3dLayout& layout, uint64_t file_size) {
   if (!layout.multi_block) return 1;
   if (const auto bytes = reader.record(); bytes && *bytes != 4)
-    throw LayoutMisfit{LayoutMisfit::nothing,
+    throw LayoutMisfit{LayoutMisfit::kNothing,
                        fmt::format("the first record has {} bytes; expected 4, a block count", *bytes)};
   const int64_t count = reader.integers(1).front();
   if (count < 1 || count > kMaxBlocks || static_cast<uint64_t>(count) > file_size / layout.integerBytes())
-    throw LayoutMisfit{LayoutMisfit::nothing, fmt::format("a block count of {} is impossible", count)};
+    throw LayoutMisfit{LayoutMisfit::kNothing, fmt::format("a block count of {} is impossible", count)};
   return static_cast<uint64_t>(count);
 }
 
@@ -85,7 +85,7 @@ uint64_t checkedNodes(const Plot3dLayout& layout, const int64_t* dimensions, uin
   }
   if (!possible || nodes > limit)
     throw LayoutMisfit{
-        LayoutMisfit::first_record,
+        LayoutMisfit::kFirstRecord,
         fmt::format("block {} of {} nodes is impossible in a file of this size", b + 1, words)};
   return nodes;
 }
@@ -97,7 +97,7 @@ void readQuantities(const std::vector<int64_t>& numbers, uint64_t nodes_left, ui
   const uint64_t nodes = file_size - nodes_left;
   if (quantities < 5 || static_cast<uint64_t>(quantities) > file_size / nodes || species < 0 ||
       species > quantities)
-    throw LayoutMisfit{LayoutMisfit::first_record,
+    throw LayoutMisfit{LayoutMisfit::kFirstRecord,
                        fmt::format("{} quantities of {} species are impossible", quantities, species)};
   header.components = static_cast<uint32_t>(quantities);
   header.species = static_cast<uint32_t>(species);
@@ -113,7 +113,7 @@ Plot3dHeader readPlot3dHeader(PayloadFile& payload, const Plot3dLayout& layout, 
   const uint64_t overall = layout.kind == Plot3dKind::kOverflow ? 2 : 0;  // nq and nqc
   if (const auto bytes = reader.record(); bytes && *bytes != 4 * (numbers * count + overall)) {
     const std::string explanation = explainDimensionRecord(layout, count, *bytes);
-    throw LayoutMisfit{explanation.empty() ? LayoutMisfit::first_record : LayoutMisfit::known_structure,
+    throw LayoutMisfit{explanation.empty() ? LayoutMisfit::kFirstRecord : LayoutMisfit::kKnownStructure,
                        fmt::format("the dimension record has {} bytes, but {} block{} of a {} need {}{}",
                                    *bytes, count, count == 1 ? "" : "s", describe(layout.kind),
                                    4 * (numbers * count + overall), explanation)};
@@ -134,11 +134,12 @@ Plot3dHeader readPlot3dHeader(PayloadFile& payload, const Plot3dLayout& layout, 
     if (layout.kind != Plot3dKind::kFunction) continue;
     const int64_t variables = at[axes];
     if (variables < 1 || static_cast<uint64_t>(variables) > file_size / nodes)
-      throw LayoutMisfit{LayoutMisfit::first_record,
+      throw LayoutMisfit{LayoutMisfit::kFirstRecord,
                          fmt::format("block {} has {} variables", b + 1, variables)};
     if (b > 0 && variables != header.components)
-      throw LayoutMisfit{LayoutMisfit::dimensions, fmt::format("block {} has {} variables and block 1 has {}",
-                                                               b + 1, variables, header.components)};
+      throw LayoutMisfit{
+          LayoutMisfit::kDimensions,
+          fmt::format("block {} has {} variables and block 1 has {}", b + 1, variables, header.components)};
     header.components = static_cast<uint32_t>(variables);
   }
   if (layout.kind == Plot3dKind::kOverflow) readQuantities(quantities, nodes_left, file_size, header);

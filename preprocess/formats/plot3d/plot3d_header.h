@@ -13,10 +13,10 @@ namespace curvisplat {
 /// Thrown to end the attempt with one layout; records how far it got. Never leaves plot3d_fit.
 struct LayoutMisfit {
   enum Reached {
-    nothing,         // neither the first record nor the block count is valid
-    first_record,    // a header with impossible dimensions
-    dimensions,      // possible dimensions, but the sizes differ
-    known_structure  // recognised as a structure that is not read
+    kNothing,        // neither the first record nor the block count is valid
+    kFirstRecord,    // a header with impossible dimensions
+    kDimensions,     // possible dimensions, but the sizes differ
+    kKnownStructure  // recognised as a structure that is not read
   };
   Reached reached;
   std::string reason;

@@ -38,7 +38,7 @@ class PieceReader {
     const uint64_t points = countOf("NumberOfPoints");
     if (points == 0) return;
     const VtkArray array = file_.array(piece_.child("Points").child("DataArray"), points);
-    if (array.components != 3) file_.fail("its points have other than three coordinates");
+    if (array.components != 3) file_.fail("its points do not have three coordinates");
     forTuples(array, 3, [&](const auto& values, size_t n) {
       const glm::dvec3 at(values[0][n], values[1][n], values[2][n]);
       if (!std::isfinite(at.x) || !std::isfinite(at.y) || !std::isfinite(at.z))
@@ -86,7 +86,7 @@ class PieceReader {
               [&](const auto& values, size_t n) {
                 const double point = values[0][n];
                 if (!(point >= 0 && point < static_cast<double>(out_.points.size() - first_)))
-                  file_.fail("a cell names a point that is not there");
+                  file_.fail("a cell refers to a point that does not exist");
                 corners.push_back(static_cast<uint32_t>(static_cast<uint64_t>(point) + first_));
                 ++at;
                 finish();

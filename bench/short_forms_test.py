@@ -1,0 +1,62 @@
+#!/usr/bin/env python3
+"""short_forms_test.py CURVISPLAT FOLDER
+
+Runs the scripts that nothing else runs, in their short forms: whether they work and print what they promise. No figure
+is judged.
+"""
+import pathlib
+import shutil
+import subprocess
+import sys
+import unittest
+
+PROGRAM, FOLDER = pathlib.Path(sys.argv.pop(1)).absolute(), pathlib.Path(sys.argv.pop(1)).absolute()
+SCRIPTS = pathlib.Path(__file__).resolve().parent
+
+
+def run(script, *arguments, status=0):
+    done = subprocess.run([sys.executable, str(SCRIPTS / script), *map(str, arguments), "--program", str(PROGRAM)],
+                          capture_output=True, text=True)
+    assert done.returncode == status, f"{script}: {done.returncode}\n{done.stdout}{done.stderr}"
+    return done.stdout
+
+
+class ShortForms(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        shutil.rmtree(FOLDER, ignore_errors=True)
+        FOLDER.mkdir(parents=True)
+
+    def test_around(self):
+        lines = run("around.py", FOLDER / "around", "--smoke").splitlines()[-7:]
+        for n, name in enumerate(["plain", "lit", "six clip planes", "opaque body", "two scalars", "depth (.exr)"]):
+            self.assertTrue(lines[n].startswith(name), lines)
+            self.assertIn("of the plain picture", lines[n])
+        self.assertRegex(lines[6], r"^1024 quads +\d+ ms a frame")
+
+    def test_window_times(self):
+        for needed in ("Xvfb", "xdotool"):
+            if not shutil.which(needed):
+                self.skipTest(f"{needed} is not installed")
+        made = FOLDER / "window"
+        subprocess.run([PROGRAM, "generate", "half-annulus", "--size", "24x12x12", "-o", made], check=True, capture_output=True)
+        cache = f"{made}.splats"
+        subprocess.run([PROGRAM, "convert", f"{made}.xyz", f"{made}.fun", "-o", cache], check=True, capture_output=True)
+        lines = run("window_times.py", cache, "--inputs", 2).splitlines()
+        for begin, line in zip(["window on the screen after", "data on the screen after", "keys: 2 samples",
+                                "movements: 2 samples", "peak memory", "closed"], lines, strict=True):
+            self.assertTrue(line.startswith(begin), lines)
+
+    def test_format_memory(self):
+        grid = FOLDER / "cube.vtk"
+        nodes = range(8 ** 3)
+        grid.write_text("\n".join(["# vtk DataFile Version 3.0", "cube", "ASCII", "DATASET STRUCTURED_GRID", "DIMENSIONS 8 8 8",
+                                   f"POINTS {len(nodes)} float", *(f"{n % 8} {n // 8 % 8} {n // 64}" for n in nodes),
+                                   f"POINT_DATA {len(nodes)}", "SCALARS p float 1", "LOOKUP_TABLE default",
+                                   *(str(n) for n in nodes), ""]))
+        lines = run("format_memory.py", grid, "--scalar", "p", "--memory", "1G").splitlines()
+        self.assertRegex(lines[-1], r"^\| cube.vtk \| 512 \| \d+\.\d \| \d+ \| 1024 \|$")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,57 @@
+"""What the tests of files with unstructured grids share: the program, a folder, and what `info` and `convert` make of a file."""
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+import vtk
+from vtk.util.numpy_support import vtk_to_numpy
+
+PROGRAM = str(pathlib.Path(sys.argv.pop(1)).resolve())
+
+
+class MeshCase(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def run_program(self, *words):
+        return subprocess.run([PROGRAM, *map(str, words)], capture_output=True, text=True)
+
+    def info(self, path):
+        result = self.run_program("info", path, "--json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return json.loads(result.stdout)
+
+    def volume(self, path, scalar):
+        cache = self.folder / "mesh.splats"
+        result = self.run_program("convert", path, "-o", cache, "--scalar", scalar, "--overwrite")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return json.loads((cache / "manifest.json").read_text())["volume"]
+
+    def check(self, path, grid):
+        info = self.info(path)
+        self.assertEqual(info["nodes"], grid.GetNumberOfPoints())
+        self.assertEqual(info["cells"]["count"], grid.GetNumberOfCells())
+        points = vtk_to_numpy(grid.GetPoints().GetData())
+        used = np.zeros(len(points), bool)
+        for n in range(grid.GetNumberOfCells()):
+            cell = grid.GetCell(n)
+            corners = 8 if cell.GetCellType() == vtk.VTK_QUADRATIC_HEXAHEDRON else cell.GetNumberOfPoints()
+            if cell.GetCellDimension() == 3:
+                used[[cell.GetPointId(m) for m in range(corners)]] = True
+        self.assertEqual(info["unused_nodes"], int((~used).sum()))
+        np.testing.assert_allclose(info["bounds"]["lower"], points[used].min(0), rtol=1e-6)
+        np.testing.assert_allclose(info["bounds"]["upper"], points[used].max(0), rtol=1e-6)
+        arrays = {"p": vtk_to_numpy(grid.GetPointData().GetArray("p")),
+                  "v:mag": np.linalg.norm(vtk_to_numpy(grid.GetPointData().GetArray("v")), axis=1),
+                  "c": vtk_to_numpy(grid.GetCellData().GetArray("c"))}
+        scalars = {scalar["name"]: scalar for scalar in info["scalars"]}
+        for name, values in arrays.items():
+            self.assertAlmostEqual(scalars[name]["min"], values.min(), places=5)
+            self.assertAlmostEqual(scalars[name]["max"], values.max(), places=5)
+        return info
