@@ -56,15 +56,18 @@ void PointBorders::add(const GatheredCells& cells) {
 
 void PointBorders::finish(const Progress& progress) {
   records_ = {};
+  uint64_t face = 0;
   faces_.finish([](std::span<const std::byte>, std::span<const std::byte>) {},
                 [&](std::span<const std::byte> bytes) {
                   FaceRecord record;
                   std::memcpy(static_cast<void*>(&record), bytes.data(), sizeof record);
                   for (uint32_t n = 0; n < record.count; ++n)
-                    planes_.add(record.corners[n], {record.inward, record.centre, n < record.of_face});
+                    planes_.add(record.corners[n], {record.inward, record.centre, n < record.of_face}, face);
+                  ++face;
                 },
                 progress);
   planes_.close();
+  planes_.leaveOutClosed();
 }
 
 }  // namespace curvisplat

@@ -3,13 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <vector>
 
 #include "preprocess/convert/convert.h"
 #include "preprocess/scenes/scenes.h"
 #include "render/image/image.h"
+#include "stream/cache/cache_reader.h"
 #include "tests/reference/array_mesh.h"
 #include "tests/reference/known_pictures.h"
 #include "tests/support/temporary_folder.h"
@@ -119,6 +122,60 @@ TEST_F(MeshBorders, OfPoints) {
 TEST_F(MeshBorders, OfCells) {
   expectEven("hexahedra", hexahedraOf(*scene_, 31, 15, 15), 1, 47.5, 36);
   expectEven("tetrahedra", tetrahedraOf(*scene_, 24, 12, 12), 1, 43.5, 33);
+}
+
+/// Boxes of hexahedra side by side along x: n cells to a unit of length in each.
+ArrayPiece boxes(std::initializer_list<uint64_t> cells) {
+  ArrayPiece all;
+  std::map<std::array<uint64_t, 3>, uint64_t> numbers;  // points, in 1/64
+  uint64_t box = 0;
+  for (const uint64_t n : cells) {
+    const auto point = [&](uint64_t i, uint64_t j, uint64_t k) {
+      const std::array<uint64_t, 3> at{64 * box + 64 * i / n, 64 * j / n, 64 * k / n};
+      const auto [found, is_new] = numbers.emplace(at, all.points.size());
+      if (is_new) all.points.push_back(glm::dvec3(at[0], at[1], at[2]) / 64.0);
+      return found->second;
+    };
+    for (uint64_t k = 0; k < n; ++k)
+      for (uint64_t j = 0; j < n; ++j)
+        for (uint64_t i = 0; i < n; ++i)
+          all.cells.append(CellKind::kHexahedron,
+                           std::array{point(i, j, k), point(i + 1, j, k), point(i + 1, j + 1, k),
+                                      point(i, j + 1, k), point(i, j, k + 1), point(i + 1, j, k + 1),
+                                      point(i + 1, j + 1, k + 1), point(i, j + 1, k + 1)});
+    ++box;
+  }
+  setValues(all, [](const glm::dvec3& x) { return x.x; });
+  return all;
+}
+
+TEST_F(MeshBorders, HangingNodesAreInside) {
+  ConvertOptions options;
+  options.output = folder_ / "boxes.splats";
+  options.scalars = {0};
+  Progress progress;
+  convert(ArrayMesh({boxes({8, 16})}), options, progress);
+  const CacheReader cache(options.output);
+  size_t inside = 0, cut = 0;
+  for (uint32_t number = 0; number < cache.bricks().size(); ++number) {
+    if (!cache.bricks()[number].isLeaf()) continue;
+    SplatGeometry geometry;
+    cache.readGeometry(number, geometry);
+    const glm::dvec3 corner = cache.manifest().root.cellMin(cache.bricks()[number].cell);
+    for (size_t n = 0; n < geometry.size(); ++n) {
+      const glm::dvec3 x = corner + glm::dvec3(geometry.x[n], geometry.y[n], geometry.z[n]);
+      const double edge = std::min({x.x, 2 - x.x, x.y, 1 - x.y, x.z, 1 - x.z});
+      if (edge < 0.02) {
+        ++cut;
+        EXPECT_NE(geometry.border_code[n], kNoBorder) << x.x << ' ' << x.y << ' ' << x.z;
+      }
+      if (edge < 0.2 || std::abs(x.x - 1) > 0.2) continue;
+      ++inside;
+      EXPECT_EQ(geometry.border_code[n], kNoBorder) << x.x << ' ' << x.y << ' ' << x.z;
+    }
+  }
+  EXPECT_GT(inside, 100u);
+  EXPECT_GT(cut, 500u);
 }
 
 }  // namespace
