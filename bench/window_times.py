@@ -6,6 +6,8 @@ until the screen changes, at moments spread over the refinement; from Ctrl+Q unt
 screen is polled about every millisecond through Xlib: a screenshot by another program would take longer than what is measured.
 
     bench/window_times.py CACHE [--inputs 40] [--backend cpu] [--program build/release/tools/curvisplat]
+    bench/window_times.py GRID SOLUTION              # while it converts: until the preview, and input until the whole is there
+    bench/window_times.py CACHE --add-scalar NAME    # and input while the scalar is added from the cache's sources
 
 Needs Xvfb, libX11 and libXtst (installed with xdotool). Nothing else should run meanwhile.
 """
@@ -103,9 +105,35 @@ def spread(name, seconds):
           f"all within {1000 * ordered[-1]:.0f} ms")
 
 
+def click(display, widget, places):
+    left, top, width, height = place_of(widget, places)
+    display.move(left + width // 2, top + height // 2)
+    time.sleep(0.1)
+    for down in (1, 0):
+        display.button(down)
+        time.sleep(0.05)
+
+
+def is_there(widget, places):
+    return places.exists() and any(line.split(maxsplit=4)[4:] == [widget] for line in places.read_text().splitlines())
+
+
+def measure_keys(display, chance, panel, goes_on):
+    """Keys, as long as something goes on."""
+    keys = []
+    while goes_on() and len(keys) < 500:
+        time.sleep(chance.uniform(0.05, 0.4))
+        keys.append(display.seconds_until_changed(panel, lambda: display.key("h")))
+    if len(keys) % 2:
+        display.key("h")  # the panels are there again
+        time.sleep(0.5)
+    return keys
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("cache", type=pathlib.Path)
+    parser.add_argument("cache", type=pathlib.Path, nargs="+", help="a cache, or a grid and its solutions")
+    parser.add_argument("--add-scalar", help="of the cache's sources, which is added to it")
     parser.add_argument("--inputs", type=int, default=40)
     parser.add_argument("--backend", default="auto")
     root = pathlib.Path(__file__).resolve().parent.parent
@@ -123,13 +151,15 @@ def main():
                 name = f":{file.readline().strip()}"
             display = Display(name)
             places = pathlib.Path(folder) / "widgets"
-            environment = dict(os.environ, DISPLAY=name, XDG_CONFIG_HOME=folder, CURVISPLAT_WIDGETS=str(places))
+            environment = dict(os.environ, DISPLAY=name, XDG_CONFIG_HOME=folder, XDG_CACHE_HOME=folder,
+                               CURVISPLAT_WIDGETS=str(places))
             screen = (0, 0, *SIZE)
             blank = display.pixels(screen)
             start = time.monotonic()
             window = subprocess.Popen(
-                [words.program.resolve(), "view", words.cache.resolve(), "--size", "%dx%d" % SIZE, "--backend",
+                [words.program.resolve(), "view", *[file.resolve() for file in words.cache], "--size", "%dx%d" % SIZE, "--backend",
                  words.backend], cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            converts = not words.cache[0].is_dir()
             while display.pixels(screen) == blank:
                 time.sleep(0.001)
             print(f"window on the screen after {1000 * (time.monotonic() - start):.0f} ms")
@@ -141,6 +171,21 @@ def main():
             while not coloured(display.pixels(picture)):
                 time.sleep(0.005)
             print(f"data on the screen after {1000 * (time.monotonic() - start):.0f} ms")
+            if converts:
+                if is_there("opening", places):
+                    print("that is a preview")
+                    goes_on = lambda: is_there("opening", places)
+                    spread("keys while it converts", measure_keys(display, chance, panel, goes_on))
+                print(f"the whole is there after {time.monotonic() - start:.1f} s")
+                display.seconds_until_changed(panel, lambda: display.key("h"))
+                display.seconds_until_changed(panel, lambda: display.key("h"))
+            if words.add_scalar:
+                click(display, "scalar", places)
+                click(display, "further scalar " + words.add_scalar, places)
+                place_of("opening", places)
+                display.move(*middle)
+                spread("keys while a scalar is added",
+                       measure_keys(display, chance, panel, lambda: is_there("opening", places)))
 
             keys, drags = [], []
             display.move(*middle)

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Checks sources with Clang 14, without output: its warnings, which are errors, and -Wthread-safety, which checks
 that members are only touched while their mutex is held (stream/base/mutex.h). With --tidy, clang-tidy checks them
-by .clang-tidy as well. Takes the commands of build/release, which tools/build.sh configures.
+by .clang-tidy as well. Takes the commands of build/release, which tools/build.sh configures. What most sources include
+(tools/cmake/common_headers.h, and GoogleTest) is parsed once for all that are compiled alike: half of the time.
 
     tools/check_clang.py [--tidy] [FILE ...]    these; without any, all sources
     tools/check_clang.py [--tidy] --since REV   those that have changed since this commit
@@ -15,6 +16,7 @@ import pathlib
 import shlex
 import subprocess
 import sys
+import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # GCC's commands name warnings and pragmas that Clang does not know; and Clang warns of & between cheap conditions.
@@ -48,9 +50,8 @@ def changed_since(revision):
     return {ROOT / line for line in run.stdout.splitlines()}
 
 
-def check(job):
-    """Clang's output if it finds anything."""
-    file, folder, arguments = job
+def clang_arguments(arguments):
+    """Those of the compiler's that are left for Clang."""
     kept = []
     rest = iter(arguments)
     for argument in rest:
@@ -58,8 +59,50 @@ def check(job):
             next(rest)
         elif not argument.endswith("ccache") and not os.path.basename(argument).startswith(("c++", "g++")):
             kept.append(argument)
-    run = subprocess.run(["clang++-14", *kept, *FLAGS, "-fsyntax-only", str(file)], cwd=folder, text=True,
-                         capture_output=True)
+    return kept
+
+
+class CommonHeaders:
+    """What most sources include, precompiled: once for each set of flags that Clang requires to be the same."""
+
+    LEAST_SOURCES = 8  # of one set of flags; fewer cost less without
+
+    def __init__(self, folder, jobs):
+        self.headers = {}
+        groups = {}
+        for file, cwd, arguments in jobs:
+            groups.setdefault(self.key(file, arguments), []).append((cwd, clang_arguments(arguments)))
+        for key, members in groups.items():
+            if len(members) >= self.LEAST_SOURCES:
+                self.headers[key] = self.precompile(folder / f"{len(self.headers)}.pch", *key[:1], members)
+
+    @staticmethod
+    def key(file, arguments):
+        is_test = file.name.endswith("_test.cpp")
+        return (is_test, *sorted(a for a in arguments if a.startswith(("-f", "-s", "-O", "-m", "-p"))))
+
+    @staticmethod
+    def precompile(output, is_test, members):
+        """Without the macros and folders that only some of its sources have."""
+        cwd, first = members[0]
+        common = set(first).intersection(*(arguments for _, arguments in members))
+        kept = [a for n, a in enumerate(first) if a in common and first[n - 1] != "-isystem" and a != "-isystem"]
+        words = ["clang++-14", *kept, *FLAGS]
+        words += ["-include", "gtest/gtest.h"] if is_test else []
+        words += ["-x", "c++-header", str(ROOT / "tools/cmake/common_headers.h"), "-o", str(output)]
+        subprocess.run(words, cwd=cwd, check=True)
+        return output
+
+    def flags(self, file, arguments):
+        header = self.headers.get(self.key(file, arguments))
+        return ["-include-pch", str(header)] if header else []
+
+
+def check(job, headers):
+    """Clang's output if it finds anything."""
+    file, folder, arguments = job
+    words = ["clang++-14", *clang_arguments(arguments), *FLAGS, *headers.flags(file, arguments), "-fsyntax-only", str(file)]
+    run = subprocess.run(words, cwd=folder, text=True, capture_output=True)
     return run.stderr if run.returncode else ""
 
 
@@ -86,8 +129,9 @@ def main():
     subprocess.run([ROOT / "tools/setup.sh", *packages], check=True)
 
     jobs = commands(chosen)
-    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        found = [output for output in pool.map(check, jobs) if output]
+    with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        headers = CommonHeaders(pathlib.Path(folder), jobs)
+        found = [output for output in pool.map(lambda job: check(job, headers), jobs) if output]
     for output in found:
         print(output, end="")
     failed = bool(found) or (options.tidy and tidy([job[0] for job in jobs]) != 0)

@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <regex>
+#include <sstream>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "stream/base/error.h"
@@ -41,19 +44,33 @@ bool isForLackOfThreads(const std::exception& error) {
 constexpr const char* kThreadAdvice =
     "the system has none left; raise the limits of processes and memory (ulimit -u, ulimit -v)";
 
+/// What other programs call our options.
+constexpr std::pair<const char*, const char*> kForeignOptions[] = {
+    {"--colormap", "--tf"},     {"--colourmap", "--tf"},        {"--cmap", "--tf"},
+    {"--palette", "--tf"},      {"--time-step", "--step"},      {"--timestep", "--step"},
+    {"--resolution", "--size"}, {"--width", "--size"},          {"--height", "--size"},
+    {"--variable", "--scalar"}, {"--field", "--scalar"},        {"--array", "--scalar"},
+    {"--isosurface", "--iso"},  {"--contour", "--iso"},         {"--bg", "--background"},
+    {"--fps", "--frame-rate"},  {"--zoom", "--parallel-scale"}, {"--camera", "--position"},
+    {"--clip", "--clip-plane"}, {"--lighting", "--shade"},      {"--out", "--output"},
+    {"--force", "--overwrite"}, {"--jobs", "--threads"},        {"--up", "--view-up"}};
+
+std::string unknownOption(const CLI::App& command, const std::string& name) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options())
+    for (const std::string& known : option->get_lnames()) names.push_back("--" + known);
+  for (const auto& [foreign, ours] : kForeignOptions)
+    if (name == foreign && std::find(names.begin(), names.end(), ours) != names.end())
+      return fmt::format("unknown option {} (did you mean {}?)", name, ours);
+  return fmt::format("unknown option {}{}", name, didYouMean(name, names));
+}
+
 /// The first word that is left over, with the option that it may stand for.
 std::string leftOver(const CLI::App& app, const CLI::App* command) {
   for (const std::string& word : app.remaining(true)) {
     if (word == "--") continue;
     if (!word.starts_with('-')) return fmt::format("unexpected argument '{}'", word);
-    const std::string name = word.substr(0, word.find('='));
-    std::vector<std::string> names;
-    if (command)
-      for (const CLI::Option* option : command->get_options())
-        for (const std::string& known : option->get_lnames()) names.push_back("--" + known);
-    const std::string close = closestTo(name, names);
-    return fmt::format("unknown option {}{}", name,
-                       close.empty() ? "" : fmt::format(" (did you mean {}?)", close));
+    return unknownOption(command ? *command : app, word.substr(0, word.find('=')));
   }
   return "unexpected argument";
 }
@@ -76,6 +93,15 @@ std::string describe(const CLI::App& app, const CLI::App* command, const CLI::Pa
     return fmt::format("{} '{}': is not a {}, or is too large", found[1].str(), found[2].str(),
                        is_whole ? "whole number from 0 on" : "number");
   }
+  if (std::regex_match(text, found, std::regex("(\\S+): (.*) not in \\{(.*)\\}"))) {
+    std::vector<std::string> choices;
+    std::istringstream list(found[3].str());
+    for (std::string choice; std::getline(list, choice, ',');) choices.push_back(choice);
+    return fmt::format("{} '{}': expected one of {}{}", found[1].str(), found[2].str(),
+                       fmt::join(choices, ", "), didYouMean(found[2].str(), choices));
+  }
+  if (std::regex_match(text, found, std::regex("(\\S+): At least (\\d+) required but received (\\d+)")))
+    return fmt::format("{} needs {} values, found {}", found[1].str(), found[2].str(), found[3].str());
   if (std::regex_match(text, found,
                        std::regex("(\\S+): Value (.*) not in range \\[?(\\S+) (?:to|-) ([^\\]]+)\\]?")))
     return fmt::format("{} '{}': expected a number from {} to {}", found[1].str(), found[2].str(),
@@ -115,9 +141,12 @@ int run(int argc, char** argv) {
     if (argc > 1 && argv[1][0] != '-' && app.get_subcommands().empty()) {
       std::vector<std::string> names;
       for (const CLI::App* shown : shownCommands(app)) names.push_back(shown->get_name());
-      const std::string close = closestTo(argv[1], names);
-      printMessage("unknown subcommand '{}'{}; expected one of {}", argv[1],
-                   close.empty() ? "" : fmt::format("; did you mean {}?", close), namesOf(app));
+      printMessage("unknown subcommand '{}'{}; expected one of {}", argv[1], didYouMean(argv[1], names),
+                   namesOf(app));
+      return 2;
+    }
+    if (argc > 1 && argv[1][0] == '-' && app.get_subcommands().empty() && error.get_exit_code() != 0) {
+      printMessage("{}; see curvisplat --help", unknownOption(app, argv[1]));
       return 2;
     }
     if (error.get_exit_code() == 0) return app.exit(error);  // --help and --version

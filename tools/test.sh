@@ -2,6 +2,7 @@
 # Runs setup.sh, builds everything and runs the tests. Passes its arguments to ctest, for example -R render.
 #
 #   tools/test.sh [CTEST OPTIONS]                    all tests
+#   tools/test.sh --whole [CTEST OPTIONS]            all tests, and of damage and faults every place, not one in several
 #   tools/test.sh --sanitize [CTEST OPTIONS]         all tests with the address and undefined-behaviour sanitizers, then
 #                                                    the multithreaded ones with the thread sanitizer; takes hours
 #   tools/test.sh --sanitize=short [CTEST OPTIONS]   only the tests of stream/ with the first two; takes minutes
@@ -12,11 +13,12 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 run() {
   local preset=$1
   shift
-  ctest --test-dir "$root/build/$preset" --output-on-failure --no-tests=error -j2 "$@"
+  ctest --test-dir "$root/build/$preset" --output-on-failure --no-tests=error -j"$(nproc)" "$@"
 }
 
 form=plain
 case ${1:-} in
+  --whole) export CURVISPLAT_WHOLE_SWEEPS=1 && shift ;;
   --sanitize) form=whole && shift ;;
   --sanitize=short) form=short && shift ;;
 esac
@@ -31,7 +33,7 @@ case $form in
     # The smoke test of bench/ also draws with VTK; tests/stream/read_cache.py, tests/python and the tests of files
     # that others write need the others.
     "$root/tools/setup.sh" python3-vtk9 python3-numpy python3-zstandard python3-xxhash python3-netcdf4 zstd \
-      python3-xarray python3-pip python3-setuptools python3-wheel
+      python3-xarray python3-pip python3-setuptools python3-wheel python3-openvdb
     "$root/tools/build.sh"
     run release "$@"
     ;;

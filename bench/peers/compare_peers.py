@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Draws the same grid, camera and transfer function with curvisplat and with VTK, in one run.
 
-    bench/peers/compare_peers.py FOLDER [--sizes 40x32x32,100x100x100] [--fin GRID SOLUTION] [--functions smooth]
+    bench/peers/compare_peers.py FOLDER [--sizes 40x32x32,100x100x100] [--tetrahedra 64x32x32] [--fin GRID SOLUTION] [--functions smooth]
                                  [--json OUT.json] [--plot OUT.png] [--table OUT.md]
 
-The half-annulus scene is generated in FOLDER in each of --sizes; --fin draws the density of a PLOT3D grid with a Q file, such as
+The half-annulus scene is generated in FOLDER in each of --sizes; for --tetrahedra its cells are cut into tetrahedra by VTK, and all programs read
+the same .vtu file; --fin draws the density of a PLOT3D grid with a Q file, such as
 the blunt fin (40x32x32). Every picture is compared with the reference march of curvisplat_reference: of the analytic field for
 the scene, of the trilinear field in the grid's own cells for --fin. All programs get the extinctions and colours of
 tests/data/half_annulus_*.json over white, an orthographic camera and one sample a pixel, and write PNG.
@@ -58,7 +59,7 @@ class Case:
     """A grid, with its camera, range and reference."""
     name: str
     grid: pathlib.Path
-    solution: pathlib.Path
+    solution: pathlib.Path | None
     scalar: str
     kind: str  # VTK's, as the array's name
     array: str
@@ -67,6 +68,9 @@ class Case:
     length: float
     truth: list  # arguments of curvisplat_reference
     nodes: int = 0
+
+    def files(self):
+        return [file for file in (self.grid, self.solution) if file]
 
     def camera_words(self):
         def words(vector):
@@ -81,6 +85,17 @@ def scene_case(arguments, size):
     camera = camera_along([0.8, 0.35, -0.45], [-0.4, 0, 0.5], 4, 1.25)
     return Case(f"half-annulus-{size}", prefix.with_suffix(".xyz"), prefix.with_suffix(".fun"), "1", "function",
                 "Function0", camera, (0, 1), 1, ["--scene", "half-annulus", "--clustering", CLUSTERING])
+
+
+def tetrahedra_case(arguments, size):
+    case = scene_case(arguments, size)
+    grid = arguments.folder / f"half_annulus_tetrahedra_{size}.vtu"
+    job = grid.with_suffix(".job.json")
+    job.write_text(json.dumps({"grid": str(case.grid), "solution": str(case.solution), "solution_kind": case.kind, "array": case.array,
+                               "write_tetrahedra": str(grid)}))
+    results.run([arguments.vtk_python, HERE / "vtk_render.py", job])
+    job.unlink()
+    return dataclasses.replace(case, name=f"half-annulus-tetrahedra-{size}", grid=grid, solution=None, scalar="scalar", array="scalar")
 
 
 def fin_case(arguments, grid, solution):
@@ -131,7 +146,7 @@ def own_words(arguments, case, function, lod_pixels):
 
 def converted(arguments, case):
     cache, told = arguments.folder / f"{case.name}.splats", arguments.folder / "convert.json"
-    results.run([arguments.program, "convert", case.grid, case.solution, "-o", cache, "--scalar", case.scalar,
+    results.run([arguments.program, "convert", *case.files(), "-o", cache, "--scalar", case.scalar,
                  "--overwrite", "--stats", told])
     return cache, json.loads(told.read_text())
 
@@ -156,7 +171,7 @@ def drawn_by_us(arguments, case, made, function, technique, picture):
 def truth_of(arguments, case, function):
     """The reference picture; made once."""
     # One picture serves all grids of an analytic field; any other grid has its own.
-    what = re.sub("-[0-9x]+$", "", case.name) if case.name != "fin" else f"fin_{pathlib.Path(case.grid).stem}"
+    what = re.sub("(-tetrahedra)?-[0-9x]+$", "", case.name) if case.name != "fin" else f"fin_{pathlib.Path(case.grid).stem}"
     path = arguments.folder / f"truth_{what}_{function}_{arguments.picture}.pfm"
     if not path.exists():
         print(f"marching {path}", flush=True)
@@ -176,7 +191,7 @@ def psnr_of(arguments, picture, truth):
 
 def measure(arguments, case, out):
     """Returns a row for every technique and function."""
-    told = json.loads(results.run([arguments.program, "info", case.grid, case.solution, "--json"]))
+    told = json.loads(results.run([arguments.program, "info", *case.files(), "--json"]))
     case.nodes = told["nodes"]
     made = converted(arguments, case)
     rows = []
@@ -276,6 +291,7 @@ def parsed():
     every = [*VTK_TECHNIQUES, *OWN_TECHNIQUES]
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--sizes", default="40x32x32,100x100x100", help="nodes of the half-annulus; '' for none")
+    parser.add_argument("--tetrahedra", default="", help="the same, cut into tetrahedra: nodes of the grid")
     parser.add_argument("--fin", nargs=2, metavar=("GRID", "SOLUTION"), help="a PLOT3D grid and Q file")
     parser.add_argument("--functions", default=["smooth"], type=one_of(["smooth", "band", "step"]))
     parser.add_argument("--techniques", default=[one for one in every if one != "zsweep"], type=one_of(every))
@@ -302,6 +318,7 @@ def main():
         arguments.vtk_python = python_with_vtk(arguments.vtk_python)
     cases = [fin_case(arguments, *map(pathlib.Path, arguments.fin))] if arguments.fin else []
     cases += [scene_case(arguments, size) for size in arguments.sizes.split(",") if size]
+    cases += [tetrahedra_case(arguments, size) for size in arguments.tetrahedra.split(",") if size]
     out, rows = results.Results(), []
     print(HEADING)
     with display(arguments.display):

@@ -4,6 +4,7 @@
     xvfb-run vtk_render.py JOB.json
 
 JOB.json is written by compare_peers.py: files, scalar, technique, camera, size, function, frames and the picture to write.
+A job with "write_tetrahedra" cuts the grid into tetrahedra and writes these to that .vtu file, which may be a job's grid.
 The result, one JSON object, goes to standard output. Each picture has a process of its own, whose peak memory is the technique's.
 Needs Debian's python3-vtk9, or any Python with VTK 9.
 """
@@ -16,8 +17,20 @@ import time
 import vtk
 
 
+def read_tetrahedra(job):
+    reader = vtk.vtkXMLUnstructuredGridReader()
+    reader.SetFileName(job["grid"])
+    reader.Update()
+    grid = reader.GetOutput()
+    if not grid.GetPointData().SetActiveScalars("scalar") + 1:
+        sys.exit(f"{job['grid']}: VTK does not find 'scalar' in it")
+    return grid
+
+
 def read_grid(job):
-    """The first block, with the scalar in single precision at its points."""
+    """The first block, with the scalar in single precision at its points; or an unstructured grid of tetrahedra."""
+    if job["grid"].endswith(".vtu"):
+        return read_tetrahedra(job)
     reader = vtk.vtkMultiBlockPLOT3DReader()
     reader.AutoDetectFormatOn()
     reader.SetXYZFileName(job["grid"])
@@ -66,6 +79,8 @@ def build(job, grid):
         mapper.SetSampleDistance(0.5 * min(image.GetSpacing()))
         mapper.SetInputData(image)
         return mapper, told
+    if job["grid"].endswith(".vtu"):
+        return mapper_of(technique, grid), {"tetrahedra": grid.GetNumberOfCells()}
     cells, told = tetrahedra_of(grid)
     return mapper_of(technique, cells), told
 
@@ -163,6 +178,11 @@ def drawn_by(window):
 def main():
     with open(sys.argv[1]) as file:
         job = json.load(file)
+    if "write_tetrahedra" in job:
+        writer = vtk.vtkXMLUnstructuredGridWriter()
+        writer.SetFileName(job["write_tetrahedra"])
+        writer.SetInputData(tetrahedra_of(read_grid(job))[0])
+        sys.exit(0 if writer.Write() else 1)
     clock = time.perf_counter
     begin = clock()
     grid = read_grid(job)

@@ -4,15 +4,18 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <glm/vector_relational.hpp>
 #include <memory>
 
 #include "preprocess/addition/addition_checks.h"
 #include "preprocess/addition/cache_grid.h"
+#include "preprocess/addition/drawn_mesh.h"
 #include "preprocess/addition/further_faces.h"
 #include "preprocess/addition/value_passes.h"
 #include "preprocess/addition/value_record.h"
 #include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/memory_plan.h"
+#include "preprocess/convert/mesh_origin.h"
 #include "preprocess/convert/preflight.h"
 #include "preprocess/convert/scan.h"
 #include "preprocess/convert/scratch_folder.h"
@@ -48,15 +51,14 @@ std::filesystem::path temporaryFolder(const AddScalarOptions& options) {
 /// An addition under way: what each pass leaves for the next.
 class Addition {
  public:
-  Addition(const GridSource& source, const AddScalarOptions& options, const MemoryPlan& plan,
+  Addition(const DataSource& source, const AddScalarOptions& options, const MemoryPlan& plan,
            Progress& progress)
       : options_(options),
         plan_(plan),
         progress_(progress),
         lock_(options.cache),
         cache_(options.cache),
-        grid_(source),
-        reader_(grid_, options.scalars, options.blank_value),
+        description_(source.description()),
         scratch_(newScratch(options.cache, temporaryFolder(options)), ScratchFolder::Folder::kMake) {
     for (const uint32_t scalar : options.scalars)
       report_.scalars.push_back(source.description().scalars[scalar].name);
@@ -67,8 +69,15 @@ class Addition {
           "{}: is a series of {} steps; scalars cannot be added to a series: convert it again with all "
           "scalars",
           cache_.path().string(), cache_.series().steps.size());
-    checkBlocks(source.description(), cache_);
+    if (const auto* const mesh = dynamic_cast<const MeshSource*>(&source)) {
+      mesh_ = std::make_unique<DrawnMesh>(*mesh);
+      newOrigin();
+    } else {
+      grid_ = std::make_unique<CacheGrid>(dynamic_cast<const GridSource&>(source));
+      reader_ = std::make_unique<NodeReader>(*grid_, options.scalars, options.blank_value);
+    }
     checkCentring();
+    checkBlocks(mesh_ ? origin_->blocks() : description_.blocks, cache_);
     checkNames(report_.scalars, cache_);
     if (options.check_disk_space)
       checkDiskSpace(diskNeedsOfAdding(manifest().splats, options.scalars.size(),
@@ -105,23 +114,36 @@ class Addition {
             cache_.path().string(), manifest().cells ? "cells" : "nodes");
       // Older scalars have blanked nodes that the grid does not: only the cache knows them.
       pass("drawn nodes", manifest().bricks, "bricks", &Addition::findDrawnNodes);
-      if (manifest().splats < manifest().nodes - manifest().blanked_nodes)
+      if (grid_ && manifest().splats < manifest().nodes - manifest().blanked_nodes)
         pass("merged nodes", manifest().nodes, "nodes", &Addition::findMergedNodes);
       pass("scan again", manifest().nodes, "nodes", &Addition::survey);
     }
     checkSurvey();
   }
 
-  void survey() { survey_ = surveyGrid(reader_, plan_.slab_bytes, nullptr, progress_); }
+  void survey() {
+    survey_ = mesh_ ? origin_->survey(progress_) : surveyGrid(*reader_, plan_.slab_bytes, nullptr, progress_);
+  }
+  void newOrigin() {
+    origin_ =
+        std::make_unique<MeshOrigin>(*mesh_, options_.scalars, options_.blank_value, plan_, scratch_.path());
+  }
 
   void findMergedNodes() {
-    grid_.addMergedFaces(plan_, unlikeHalvesOf(manifest()), scratch_.path(), progress_);
+    grid_->addMergedFaces(plan_, unlikeHalvesOf(manifest()), scratch_.path(), progress_);
   }
-  void findDrawnNodes() { grid_.restrictTo(cache_, plan_, scratch_.path(), progress_); }
+  void findDrawnNodes() {
+    if (grid_) return grid_->restrictTo(cache_, plan_, scratch_.path(), progress_);
+    mesh_->restrictTo(cache_, plan_, scratch_.path(), progress_);
+    newOrigin();
+  }
 
   void checkSurvey() const {
     const uint64_t missing = survey_.blanked.by_value + survey_.blanked.not_finite;
-    if (survey_.blanked.by_grid != manifest().blanked_nodes)
+    // Of a mesh, samples that lost all their cells to blanked ones have no splat, either.
+    const bool restricted = mesh_ && mesh_->restricted();
+    if (restricted ? survey_.blanked.by_grid < manifest().blanked_nodes
+                   : survey_.blanked.by_grid != manifest().blanked_nodes)
       throw Error(
           "{}: {} {} were blanked when it was made, and this grid blanks {}; it is not the one the cache was "
           "made from, or scalars were missing at nodes where blocks meet: convert again with all scalars",
@@ -133,8 +155,14 @@ class Addition {
           "value), and every splat needs one; convert again with all scalars",
           cache_.path().string(), missing, manifest().cells ? "cells" : "nodes", joined(report_.scalars),
           survey_.blanked.not_finite, survey_.blanked.by_value);
-    checkRanges(survey_, grid_.description(), options_.scalars);
-    if (survey_.lower != manifest().lower || survey_.upper != manifest().upper)
+    checkRanges(survey_, description_, options_.scalars);
+    const auto inside = [](const glm::dvec3& a, const glm::dvec3& b) {
+      return glm::all(glm::lessThanEqual(a, b));
+    };
+    const bool same_extent =
+        restricted ? inside(manifest().lower, survey_.lower) && inside(survey_.upper, manifest().upper)
+                   : survey_.lower == manifest().lower && survey_.upper == manifest().upper;
+    if (!same_extent)
       throw Error(
           "{}: was made from a grid from ({}, {}, {}) to ({}, {}, {}); this grid goes from ({}, {}, {}) to "
           "({}, {}, {}) and is not the one the cache was made from",
@@ -145,7 +173,7 @@ class Addition {
 
   void checkCentring() const {
     const auto words = [](bool cells) { return cells ? "cell" : "node"; };
-    const bool cells = reader_.centring() == Centring::kCell;
+    const bool cells = (mesh_ ? origin_->centring() : reader_->centring()) == Centring::kCell;
     if (cells != manifest().cells)
       throw Error("{}: its scalars are {}-centred, but {} is {}-centred; convert it to a cache of its own",
                   cache_.path().string(), words(manifest().cells), joined(report_.scalars), words(cells));
@@ -153,9 +181,11 @@ class Addition {
 
   void scatter() {
     writer_ = std::make_unique<VariableWriter>(lock_, manifest(), this->variables());
-    passes_ = std::make_unique<ValuePasses>(cache_, reader_, plan_, scratch_.path(), progress_);
-    passes_->setOverlaps(overlapsFor(manifest(), grid_, plan_.slab_bytes, progress_));
-    passes_->scatter();
+    passes_ =
+        std::make_unique<ValuePasses>(cache_, options_.scalars.size(), plan_, scratch_.path(), progress_);
+    if (mesh_) return passes_->scatter(*origin_);
+    passes_->setOverlaps(overlapsFor(manifest(), *grid_, plan_.slab_bytes, progress_));
+    passes_->scatter(*reader_);
   }
 
   void mergeSeams() {
@@ -169,20 +199,21 @@ class Addition {
   }
 
   void writeFaces() {
+    if (mesh_) return;
     const std::vector<uint32_t> numbers = writer_->numbers();
-    const FurtherFaces job{cache_, reader_, scratch_.path(), facesFileOfVariable(numbers.front()), numbers};
+    const FurtherFaces job{cache_, *reader_, scratch_.path(), facesFileOfVariable(numbers.front()), numbers};
     if (const auto file = writeFurtherFaces(job, plan_, progress_)) writer_->addFile(*file);
   }
 
   void finish() {
-    for (const FileInfo& file : writer_->finish(grid_.description().files))
+    for (const FileInfo& file : writer_->finish(description_.files))
       report_.files.push_back({file.name, file.size});
   }
 
   std::vector<VariableInfo> variables() const {
     std::vector<VariableInfo> variables;
     for (size_t n = 0; n < options_.scalars.size(); ++n) {
-      const GridScalar& scalar = grid_.description().scalars[options_.scalars[n]];
+      const GridScalar& scalar = description_.scalars[options_.scalars[n]];
       variables.push_back({0, scalar.name, scalar.unit, survey_.ranges[n].min, survey_.ranges[n].max});
     }
     return variables;
@@ -195,9 +226,13 @@ class Addition {
   Progress& progress_;
   const CacheLock lock_;  // before the cache is read
   const CacheReader cache_;
-  CacheGrid grid_;
-  const NodeReader reader_;
+  const GridDescription& description_;
   const ScratchFolder scratch_;  // before what has files in it
+  // Of a structured grid, or of an unstructured one.
+  std::unique_ptr<CacheGrid> grid_;
+  std::unique_ptr<NodeReader> reader_;
+  std::unique_ptr<DrawnMesh> mesh_;
+  std::unique_ptr<MeshOrigin> origin_;
   GridSurvey survey_;
   std::unique_ptr<VariableWriter> writer_;
   std::unique_ptr<ValuePasses> passes_;
@@ -206,9 +241,10 @@ class Addition {
 
 }  // namespace
 
-AddScalarReport addScalars(const GridSource& source, const AddScalarOptions& options, Progress& progress) {
+AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& options, Progress& progress) {
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
-  GridOrigin::requireMemory(source, options.scalars, plan);
+  if (const auto* const grid = dynamic_cast<const GridSource*>(&source))
+    GridOrigin::requireMemory(*grid, options.scalars, plan);
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());
   if (options.most_buckets) plan.most_buckets = *options.most_buckets;
 

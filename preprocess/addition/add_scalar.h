@@ -43,6 +43,6 @@ struct AddScalarReport {
 /// grid is not the one the cache was made from, if a value is missing, or if something outside fails;
 /// UsageError if the cache has a scalar of the name. Then the cache is as it was. Peak memory, everything
 /// counted: options.memory_bytes.
-AddScalarReport addScalars(const GridSource& source, const AddScalarOptions& options, Progress& progress);
+AddScalarReport addScalars(const DataSource& source, const AddScalarOptions& options, Progress& progress);
 
 }  // namespace curvisplat

@@ -16,6 +16,7 @@
 #include "preprocess/addition/value_record.h"
 #include "preprocess/convert/grid_origin.h"
 #include "preprocess/convert/memory_plan.h"
+#include "preprocess/convert/mesh_origin.h"
 #include "preprocess/convert/preflight.h"
 #include "preprocess/convert/scan.h"
 #include "preprocess/convert/scratch_folder.h"
@@ -83,7 +84,7 @@ struct SlabSurvey {
 /// A step on its way into the cache: what each pass leaves for the next.
 class StepAddition {
  public:
-  StepAddition(const GridSource& source, const AddStepOptions& options, Progress& progress)
+  StepAddition(const DataSource& source, const AddStepOptions& options, Progress& progress)
       : source_(source),
         options_(options),
         progress_(progress),
@@ -91,13 +92,20 @@ class StepAddition {
         cache_(openAtLastStep(options.cache)),
         scalars_(scalarsOf(source.description(), cache_.seriesManifest())),
         plan_(MemoryPlan::ofOptions(options.memory_bytes, scalars_.size(), options.threads)),
-        reader_(source, scalars_, options.blank_value) {
-    GridOrigin::requireMemory(source, scalars_, plan_);
+        grid_(dynamic_cast<const GridSource*>(&source)) {
+    if (grid_) GridOrigin::requireMemory(*grid_, scalars_, plan_);
     if (options.bucket_splats) plan_.limitBuckets(*options.bucket_splats, scalars_.size());
     report_.step = cache_.series().steps.size();
     report_.nodes = cache_.manifest().nodes;
-    checkBlocks(source.description(), cache_);
-    if ((reader_.centring() == Centring::kCell) != cache_.manifest().cells)
+    if (grid_) {
+      reader_ = std::make_unique<NodeReader>(*grid_, scalars_, options.blank_value);
+    } else {
+      makeScratch();
+      origin_ = std::make_unique<MeshOrigin>(dynamic_cast<const MeshSource&>(source), scalars_,
+                                             options.blank_value, plan_, scratch_->path());
+    }
+    checkBlocks(grid_ ? source.description().blocks : origin_->blocks(), cache_);
+    if ((centring() == Centring::kCell) != cache_.manifest().cells)
       throw Error("its scalars are {}-centred; those of the steps before it are {}-centred",
                   cache_.manifest().cells ? "node" : "cell", cache_.manifest().cells ? "cell" : "node");
     chooseTime();
@@ -106,13 +114,15 @@ class StepAddition {
   AddStepReport run() {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, plan_.threads);
     const bool known = cache_.series().steps[cache_.step()].grid_checksum != 0;
-    const bool try_first = known && !options_.expect_new_geometry && reader_.centring() == Centring::kNode;
+    const bool try_first = grid_ && known && !options_.expect_new_geometry && centring() == Centring::kNode;
     if (!try_first || !addToLastGeometry()) addAfterScan();
     progress_.end();
     return std::move(report_);
   }
 
  private:
+  Centring centring() const { return grid_ ? reader_->centring() : origin_->centring(); }
+
   void chooseTime() {
     const double last = cache_.series().steps.back().time;
     const std::optional<double> stated = options_.time ? options_.time : timeOf(source_.description());
@@ -134,13 +144,13 @@ class StepAddition {
   bool addToLastGeometry() {
     const uint64_t expected = cache_.series().steps[cache_.step()].grid_checksum;
     makeScratch();
-    ValuePasses passes(cache_, reader_, plan_, scratch_->path(), progress_);
-    passes.setOverlaps(overlapsFor(cache_.manifest(), source_, plan_.slab_bytes, progress_));
+    ValuePasses passes(cache_, scalars_.size(), plan_, scratch_->path(), progress_);
+    passes.setOverlaps(overlapsFor(cache_.manifest(), *grid_, plan_.slab_bytes, progress_));
     SlabSurvey survey;
     survey.ranges.resize(scalars_.size());
     try {
       pass("scatter", report_.nodes, "nodes", [&] {
-        passes.scatter([&](const LoadedSlab& loaded) {
+        passes.scatter(*reader_, [&](const LoadedSlab& loaded) {
           survey.add(loaded, source_.description().blocks[loaded.slab.block]);
         });
       });
@@ -156,19 +166,22 @@ class StepAddition {
   }
 
   void addAfterScan() {
-    scratch_.reset();
+    if (grid_) scratch_.reset();
     GridSurvey survey;
-    pass("scan", report_.nodes, "nodes",
-         [&] { survey = surveyGrid(reader_, plan_.slab_bytes, nullptr, progress_); });
+    pass("scan", report_.nodes, "nodes", [&] {
+      survey =
+          grid_ ? surveyGrid(*reader_, plan_.slab_bytes, nullptr, progress_) : origin_->survey(progress_);
+    });
     checkRanges(survey, source_.description(), scalars_);
     ranges_ = survey.ranges;
     const auto geometry = cache_.series().geometryOf(survey.grid_checksum);
     if (!geometry) return addGeometry();
     const CacheReader cache = cache_.atStep(cache_.series().first_steps[*geometry]);
-    makeScratch();
-    ValuePasses passes(cache, reader_, plan_, scratch_->path(), progress_);
-    passes.setOverlaps(overlapsFor(cache.manifest(), source_, plan_.slab_bytes, progress_));
-    pass("scatter", report_.nodes, "nodes", [&] { passes.scatter(); });
+    if (grid_) makeScratch();
+    ValuePasses passes(cache, scalars_.size(), plan_, scratch_->path(), progress_);
+    if (grid_) passes.setOverlaps(overlapsFor(cache.manifest(), *grid_, plan_.slab_bytes, progress_));
+    pass("scatter", report_.nodes, "nodes",
+         [&] { grid_ ? passes.scatter(*reader_) : passes.scatter(*origin_); });
     finishValues(passes, cache);
   }
 
@@ -191,12 +204,13 @@ class StepAddition {
       const StepReferences references(cache);
       passes.build(writer, &references);
     });
-    pass("faces", report_.nodes, "nodes", [&] {
-      std::vector<uint32_t> numbers;
-      for (const VariableInfo& variable : cache.manifest().variables) numbers.push_back(variable.number);
-      const FurtherFaces job{cache, reader_, scratch_->path(), facesFileOfStep(report_.step), numbers};
-      if (const auto file = writeFurtherFaces(job, plan_, progress_)) writer.addFile(*file);
-    });
+    if (grid_)
+      pass("faces", report_.nodes, "nodes", [&] {
+        std::vector<uint32_t> numbers;
+        for (const VariableInfo& variable : cache.manifest().variables) numbers.push_back(variable.number);
+        const FurtherFaces job{cache, *reader_, scratch_->path(), facesFileOfStep(report_.step), numbers};
+        if (const auto file = writeFurtherFaces(job, plan_, progress_)) writer.addFile(*file);
+      });
     pass("finish", 0, "bricks", [&] {
       for (const FileInfo& file : writer.finish(newStep())) report_.files.push_back({file.name, file.size});
     });
@@ -237,15 +251,17 @@ class StepAddition {
     return options_.temporary_folder.empty() ? folderOf(options_.cache) : options_.temporary_folder;
   }
 
-  const GridSource& source_;
+  const DataSource& source_;
   const AddStepOptions& options_;
   Progress& progress_;
   const CacheLock lock_;  // before the cache is read
   const CacheReader cache_;
   const std::vector<uint32_t> scalars_;
   MemoryPlan plan_;
-  const NodeReader reader_;
   std::unique_ptr<ScratchFolder> scratch_;  // before what has files in it
+  const GridSource* const grid_;            // null: unstructured
+  std::unique_ptr<NodeReader> reader_;      // of a structured grid
+  std::unique_ptr<MeshOrigin> origin_;      // of an unstructured one
   std::vector<ScalarRange> ranges_;
   AddStepReport report_;
 };
@@ -258,7 +274,7 @@ std::optional<double> timeOf(const GridDescription& description) {
   return std::nullopt;
 }
 
-AddStepReport addStep(const GridSource& source, const AddStepOptions& options, Progress& progress) {
+AddStepReport addStep(const DataSource& source, const AddStepOptions& options, Progress& progress) {
   checkWritable(options.cache, "; name a splat cache that you may change");
   return StepAddition(source, options, progress).run();
 }

@@ -44,6 +44,6 @@ std::optional<double> timeOf(const GridDescription& description);
 /// missing scalar, a time that is not after the last; or if something outside fails. Then the cache is as it was.
 /// Killed at any moment it leaves the cache with the steps before. Peak memory, everything counted:
 /// options.memory_bytes.
-AddStepReport addStep(const GridSource& source, const AddStepOptions& options, Progress& progress);
+AddStepReport addStep(const DataSource& source, const AddStepOptions& options, Progress& progress);
 
 }  // namespace curvisplat

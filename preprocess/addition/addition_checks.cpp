@@ -19,15 +19,19 @@ std::string scratchName(const std::filesystem::path& cache) {
 
 }  // namespace
 
-void checkBlocks(const GridDescription& grid, const CacheReader& cache) {
+void checkBlocks(const std::vector<GridBlock>& grid, const CacheReader& cache) {
   const std::vector<BlockInfo>& blocks = cache.manifest().blocks;
-  if (grid.blocks.size() != blocks.size())
+  if (grid.size() != blocks.size())
     throw Error(
         "{}: was made from a grid of {} block{}; this grid has {} and is not the one the cache was made from",
-        cache.path().string(), blocks.size(), blocks.size() == 1 ? "" : "s", grid.blocks.size());
+        cache.path().string(), blocks.size(), blocks.size() == 1 ? "" : "s", grid.size());
   for (size_t n = 0; n < blocks.size(); ++n) {
-    const GridBlock& found = grid.blocks[n];
+    const GridBlock& found = grid[n];
     const BlockInfo& expected = blocks[n];
+    if (found.nj == 1 && found.nk == 1 && expected.nj == 1 && expected.nk == 1 && found.ni != expected.ni)
+      throw Error(
+          "{}: was made from a grid of {} {}; this grid has {} and is not the one the cache was made from",
+          cache.path().string(), expected.ni, expected.name, found.ni);
     if (found.ni != expected.ni || found.nj != expected.nj || found.nk != expected.nk)
       throw Error(
           "{}: block {} had {}x{}x{} nodes when the cache was made; in this grid it has {}x{}x{}, so it is "

@@ -10,7 +10,7 @@
 namespace curvisplat {
 
 /// Throws Error if number or sizes of the grid's blocks differ from the cache's: then it is a different grid.
-void checkBlocks(const GridDescription& grid, const CacheReader& cache);
+void checkBlocks(const std::vector<GridBlock>& grid, const CacheReader& cache);
 
 /// The overlaps of the grid's blocks where `cache` draws each point once; else none. Throws Error if the grid cannot be
 /// read.

@@ -54,7 +54,7 @@ class SeriesConversion {
 
   void take(uint64_t number) {
     progress_.throwIfStopped();
-    const std::unique_ptr<GridSource> source = input_.open(number);
+    const std::unique_ptr<DataSource> source = input_.open(number);
     if (next_ < known_) {
       const double last = next_ == 0 ? -1 : times_[next_ - 1];
       const double time = timeOf(source->description()).value_or(last + 1);
@@ -75,7 +75,7 @@ class SeriesConversion {
     ++sums_.converted;
   }
 
-  void convertFirst(uint64_t number, const GridSource& source) {
+  void convertFirst(uint64_t number, const DataSource& source) {
     ConvertOptions options = options_.convert;
     options.scalars = input_.scalars(source.description());
     options.time = timeOf(source.description()).value_or(0);
@@ -87,7 +87,7 @@ class SeriesConversion {
     report_event_({input_.name(number), nullptr, &converted, &source.description(), ""});
   }
 
-  void add(uint64_t number, const GridSource& source) {
+  void add(uint64_t number, const DataSource& source) {
     const ConvertOptions& all = options_.convert;
     AddStepOptions options;
     options.cache = all.output;

@@ -23,7 +23,7 @@ struct SeriesInput {
   /// Names a step for messages: "q.0100" or "run.nc, time step 3".
   std::function<std::string(uint64_t)> name;
   /// Throws Error.
-  std::function<std::unique_ptr<GridSource>(uint64_t)> open;
+  std::function<std::unique_ptr<DataSource>(uint64_t)> open;
   /// Positions of the scalars to convert, for the first step. Throws Error.
   std::function<std::vector<uint32_t>(const GridDescription&)> scalars;
 };

@@ -11,51 +11,66 @@
 
 namespace curvisplat {
 
-ValuePasses::ValuePasses(const CacheReader& cache, const NodeReader& reader, const MemoryPlan& plan,
+ValuePasses::ValuePasses(const CacheReader& cache, size_t variables, const MemoryPlan& plan,
                          std::filesystem::path scratch, Progress& progress)
     : cache_(&cache),
-      reader_(&reader),
+      variables_(variables),
       plan_(plan),
       scratch_(std::move(scratch)),
       progress_(&progress),
       order_(cache),
-      buckets_(cache.bricks(), order_, reader.scalars(), plan.bucket_bytes),
+      buckets_(cache.bricks(), order_, variables, plan.bucket_bytes),
       grouped_(ValueLoader::grouping(buckets_.size(), plan)) {}
 
-void ValuePasses::scatter(std::function<void(const LoadedSlab&)> see) {
+void ValuePasses::openFile() {
   const uint32_t numbers = (buckets_.size() + grouped_ - 1) / grouped_;
   file_ = std::make_unique<BucketFile>(scratch_ / "values.bin", numbers, plan_.chunkBytes(numbers));
-  seams_ = std::make_unique<SeamMerger>(reader_->scalars(), plan_.seam_bytes, scratch_,
+}
+
+void ValuePasses::scatter(SplatOrigin& origin) {
+  openFile();
+  tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
+  origin.scatter([&]() -> SplatSink& { return sinks.local(); }, *progress_);
+  ValueSink last = newSink();
+  origin.finish(last, *progress_);
+  last.flush();
+  for (ValueSink& sink : sinks) sink.flush();
+}
+
+void ValuePasses::scatter(const NodeReader& reader, std::function<void(const LoadedSlab&)> see) {
+  openFile();
+  seams_ = std::make_unique<SeamMerger>(variables_, plan_.seam_bytes, scratch_,
                                         unlikeHalvesOf(cache_->manifest()));
+  coordinate_bytes_ = reader.source().description().coordinate_bytes;
 
   tbb::enumerable_thread_specific<ValueSink> sinks([this] { return newSink(); });
   std::optional<BlockOwners> owners;
-  if (!overlaps_.empty()) owners.emplace(ownersReader(*reader_, true), overlaps_, plan_.owner_bytes);
+  if (!overlaps_.empty()) owners.emplace(ownersReader(reader, true), overlaps_, plan_.owner_bytes);
   SlabPass pass(*progress_, std::move(see));
   pass.owners = owners ? &*owners : nullptr;
   streamSplats(
-      *reader_, nullptr, plan_.slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, *seams_, pass);
+      reader, nullptr, plan_.slab_bytes, [&]() -> SplatSink& { return sinks.local(); }, *seams_, pass);
   for (ValueSink& sink : sinks) sink.flush();
 }
 
 void ValuePasses::mergeSeams() {
-  ValueSink sink = newSink();
-  seams_->finish(reader_->source().description().coordinate_bytes,
-                 [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
-                   sink.add(splat, values);
-                   progress_->advance(1);
-                 });
-  sink.flush();
-  seams_.reset();
+  if (seams_) {
+    ValueSink sink = newSink();
+    seams_->finish(coordinate_bytes_, [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
+      sink.add(splat, values);
+      progress_->advance(1);
+    });
+    sink.flush();
+    seams_.reset();
+  }
   file_->close();
   temporary_bytes_ = file_->size();
 }
 
 void ValuePasses::build(ValuesWriter& writer, const StepReferences* references) {
-  const size_t variables = reader_->scalars();
-  ValueBuilder builder(*cache_, order_, buckets_, variables, writer, *progress_);
+  ValueBuilder builder(*cache_, order_, buckets_, variables_, writer, *progress_);
   if (references) builder.predictFrom(*references);
-  ValueLoader loader(*cache_, order_, buckets_, variables, plan_, scratch_);
+  ValueLoader loader(*cache_, order_, buckets_, variables_, plan_, scratch_);
   loader.forEach(*file_, 0, buckets_.size(), grouped_, [&](LoadedValues& loaded) { builder.build(loaded); });
   file_.reset();
 }

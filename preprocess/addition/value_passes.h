@@ -18,6 +18,7 @@
 #include "preprocess/addition/value_buckets.h"
 #include "preprocess/convert/bucket_file.h"
 #include "preprocess/convert/memory_plan.h"
+#include "preprocess/convert/splat_origin.h"
 #include "preprocess/grid/node_reader.h"
 #include "preprocess/grid/slabs.h"
 #include "preprocess/splats/seams.h"
@@ -32,13 +33,15 @@ namespace curvisplat {
 class ValuePasses {
  public:
   /// All references must outlive it. `scratch`: a folder for temporary files.
-  ValuePasses(const CacheReader& cache, const NodeReader& reader, const MemoryPlan& plan,
+  ValuePasses(const CacheReader& cache, size_t variables, const MemoryPlan& plan,
               std::filesystem::path scratch, Progress& progress);
 
   /// Before scatter(): the overlaps of the grid's blocks, for a cache in which each point is drawn once.
   void setOverlaps(std::vector<BlockOverlap> overlaps) { overlaps_ = std::move(overlaps); }
   /// `see`: as SlabPass has it. Throws Error if the cache has no cell for a splat.
-  void scatter(std::function<void(const LoadedSlab&)> see = {});
+  void scatter(const NodeReader& reader, std::function<void(const LoadedSlab&)> see = {});
+  /// Of an unstructured grid, after its survey().
+  void scatter(SplatOrigin& origin);
   void mergeSeams();
   /// `references`: what the values are predicted from; may be null. Throws Error if the splats are not those of the
   /// cache.
@@ -48,10 +51,11 @@ class ValuePasses {
   uint64_t temporaryBytes() const { return temporary_bytes_; }
 
  private:
+  void openFile();
   ValueSink newSink() const { return {*cache_, order_, buckets_, grouped_, *file_}; }
 
   const CacheReader* cache_;
-  const NodeReader* reader_;
+  const size_t variables_;
   const MemoryPlan plan_;
   const std::filesystem::path scratch_;
   Progress* progress_;
@@ -61,6 +65,7 @@ class ValuePasses {
   std::vector<BlockOverlap> overlaps_;
   std::unique_ptr<BucketFile> file_;
   std::unique_ptr<SeamMerger> seams_;
+  int coordinate_bytes_ = 0;
   uint64_t temporary_bytes_ = 0;
 };
 

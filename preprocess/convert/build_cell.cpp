@@ -35,6 +35,7 @@ std::array<size_t, 9> divide(const Cell& cell, RecordSpan records) {
   std::vector<uint8_t> octants(records.size());
   std::array<size_t, 9> begins{};
   for (size_t n = 0; n < records.size(); ++n) {
+    records.prefetchAfter(n);
     octants[n] = static_cast<uint8_t>(octantOf(recordPosition(records[n]), cell));
     ++begins[octants[n] + size_t{1}];
   }
@@ -58,6 +59,7 @@ void sortByNode(RecordSpan records) {
   std::vector<Key> keys(records.size()), sorted(records.size());
   uint64_t least = UINT64_MAX, most = 0;
   for (size_t n = 0; n < records.size(); ++n) {
+    records.prefetchAfter(n);
     keys[n] = {recordNode(records[n]), records.places[n]};
     least = std::min(least, keys[n].node);
     most = std::max(most, keys[n].node);
@@ -190,6 +192,7 @@ void CellBuilder::State::unpack(const Cell& cell, const RecordSpan& records, Bri
   for (auto& values : brick.variables) values.resize(records.size());
   std::vector<SplatScalar> values(variables);
   for (size_t n = 0; n < records.size(); ++n) {
+    records.prefetchAfter(n);
     brick.positions[n] = recordPosition(records[n]);
     const SplatCodes codes = unpackRecord(records[n], brick.splats[n], values);
     brick.border_codes[n] = codes.border;

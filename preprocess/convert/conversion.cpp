@@ -204,7 +204,8 @@ class Conversion {
   }
 
   void count() {
-    CountingGrid counts(countingLevel(nodes_), plan_.counting_bytes);
+    CountingGrid counts(countingLevel(nodes_, splats_.survey.upper - splats_.survey.lower),
+                        plan_.counting_bytes);
     if (makesSplats()) origin_->count(root_, counts, progress_);
     if (ranks_ && shares_splats_) sendCountsToFirst(counts, *ranks_);
     if (isFirst()) {

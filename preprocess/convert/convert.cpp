@@ -18,10 +18,11 @@ namespace curvisplat {
 namespace {
 
 /// Some buckets for each rank, so that they can be dealt out evenly.
-uint64_t bucketSplatsOfRanks(const GridSource& source, const Ranks& ranks) {
+uint64_t bucketSplatsOfRanks(const DataSource& source, const Ranks& ranks) {
   constexpr uint64_t kBucketsOfRank = 4;
   uint64_t nodes = 0;
   for (const GridBlock& block : source.description().blocks) nodes += block.nodes();
+  for (const MeshPiece& piece : source.description().pieces) nodes += std::max(piece.points, piece.cells);
   return std::max<uint64_t>(nodes / (kBucketsOfRank * ranks.count()), 4 * kMaxBrickSplats);
 }
 
@@ -51,13 +52,7 @@ ConvertReport convert(const DataSource& source, const ConvertOptions& given, Pro
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   const auto* const grid = dynamic_cast<const GridSource*>(&source);
   if (grid) GridOrigin::requireMemory(*grid, options.scalars, plan);
-  if (options.ranks) {
-    if (!grid)
-      throw UsageError(
-          "{}: is unstructured; such grids are converted by one process: start curvisplat without mpirun",
-          source.description().format);
-    plan.limitBuckets(bucketSplatsOfRanks(*grid, *options.ranks), options.scalars.size());
-  }
+  if (options.ranks) plan.limitBuckets(bucketSplatsOfRanks(source, *options.ranks), options.scalars.size());
   if (options.mesh_bytes) plan.mesh_bytes = *options.mesh_bytes;
   if (options.owner_bytes) plan.owner_bytes = *options.owner_bytes;
   if (options.bucket_splats) plan.limitBuckets(*options.bucket_splats, options.scalars.size());

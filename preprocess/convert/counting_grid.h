@@ -57,7 +57,7 @@ class VoxelRuns {
   explicit VoxelRuns(uint32_t level) : level_(level) {}
   void add(const RootPosition& position) {
     const Cell cell = Cell::of(position, level_);
-    if (runs_.empty() || runs_.back().voxel != cell.at || runs_.back().count == UINT32_MAX)
+    if (runs_.empty() || !isSame(runs_.back().voxel, cell.at) || runs_.back().count == UINT32_MAX)
       runs_.push_back({cell.at, 0});
     ++runs_.back().count;
   }
@@ -65,6 +65,11 @@ class VoxelRuns {
   std::span<const VoxelRun> runs() const { return runs_; }
 
  private:
+  /// Where == would call memcmp().
+  static bool isSame(const std::array<uint32_t, 3>& a, const std::array<uint32_t, 3>& b) {
+    return ((a[0] ^ b[0]) | (a[1] ^ b[1]) | (a[2] ^ b[2])) == 0;
+  }
+
   uint32_t level_;
   std::vector<VoxelRun> runs_;
 };

@@ -71,7 +71,7 @@ MergedOctant OctantMerger::finish() {
     if (voxels_.count(voxel) == 0) continue;
     Splat splat;
     const SplatCodes codes = voxels_.finish(voxel, splat, values_);
-    merged.detail = std::max(merged.detail, voxels_.detail(voxel));
+    merged.detail = voxels_.detail(voxel, merged.detail);
     // The centre of a cluster lies among its members, thus in the voxel; rounding must not take it out.
     RootPosition position = voxelCorner(voxel);
     for (int axis = 0; axis < 3; ++axis)

@@ -96,7 +96,7 @@ ScatterCounts MeshOrigin::scatter(const SinkOfThread& sink_of_thread, Progress& 
     gather.forEach([&](const GatheredCells& cells) { slopes.add(cells); });
     counts = slopes.finish(take, progress);
   } else {
-    PointSums sums(reader_.points(), reader_.scalars(), half, scratch_);
+    PointSums sums(reader_.points(), drawn_cells_, reader_.scalars(), half, scratch_);
     gather.forEach([&](const GatheredCells& cells) { sums.add(cells); });
     counts = sums.finish(take, progress);
   }

@@ -166,9 +166,13 @@ void countNodes(const GridSource& source, const RootCube& root, uint64_t slab_by
   counter.finish();
 }
 
-uint32_t countingLevel(uint64_t nodes) {
-  const auto per_axis = static_cast<uint64_t>(std::ceil(std::cbrt(static_cast<double>(nodes))));
-  return std::min<uint32_t>(static_cast<uint32_t>(std::bit_width(per_axis)) + 3, kMaxLevel);
+uint32_t countingLevel(uint64_t nodes, const glm::dvec3& extent) {
+  constexpr double kThinnest = 1e-3;  // of a box, where the grid is a plane or a line
+  const double longest = std::max({extent.x, extent.y, extent.z});
+  double share = 1;  // of the cube
+  for (int axis = 0; axis < 3 && longest > 0; ++axis) share *= std::max(extent[axis] / longest, kThinnest);
+  const auto per_axis = static_cast<uint64_t>(std::ceil(std::cbrt(static_cast<double>(nodes) / share)));
+  return std::min<uint32_t>(static_cast<uint32_t>(std::bit_width(per_axis)) + 1, kMaxLevel);
 }
 
 }  // namespace curvisplat

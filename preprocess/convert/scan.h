@@ -41,7 +41,8 @@ void checkRanges(const GridSurvey& survey, const GridDescription& description,
 void countNodes(const GridSource& source, const RootCube& root, uint64_t slab_bytes, CountingGrid& counts,
                 Progress& progress, const SlabShare& share = {});
 
-/// The level to begin counting at: some levels finer than evenly spread nodes would need.
-uint32_t countingLevel(uint64_t nodes);
+/// The level to begin counting at: of voxels that nodes spread evenly over a box of `extent` would have to themselves. Nodes
+/// may lie thousands of times as densely without more of them in a voxel than in a bucket.
+uint32_t countingLevel(uint64_t nodes, const glm::dvec3& extent);
 
 }  // namespace curvisplat

@@ -15,7 +15,8 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kNodesPerTask = 4096, kNodesOfRowPerTask = 16384;  // longer rows are cut
+constexpr uint64_t kNodesPerTask = 1024;        // their splats stay in a core's cache until they are sent
+constexpr uint64_t kNodesOfRowPerTask = 16384;  // longer rows are cut
 constexpr size_t kGatheredBytes = 32 << 10;
 
 struct Handedness {

@@ -91,10 +91,10 @@ SplatCodes unpackRecord(const std::byte* record, Splat& splat, std::span<SplatSc
     return static_cast<double>(single);
   };
   for (double& axis : splat.axis) {
-    uint32_t bits = 0;
-    std::memcpy(&bits, at, 3);
+    uint32_t bits;  // as recordWord48()
+    std::memcpy(&bits, at, sizeof bits);
     at += 3;
-    axis = axisOf(bits);
+    axis = axisOf(bits & 0xffffff);
   }
   for (double& shear : splat.shear) shear = takeFloat();
   uint16_t ratio_code;

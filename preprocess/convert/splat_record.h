@@ -53,10 +53,12 @@ inline float recordFloat(double value) {
 void packRecord(const NodeSplat& splat, std::span<const SplatScalar> values, const RootPosition& position,
                 std::vector<std::byte>& out);
 
+/// A word of 48 bits, by one load: two bytes more of the record follow each. (Two short loads would be put together in memory,
+/// and the load of the whole would wait for them.)
 inline uint64_t recordWord48(const std::byte* at) {
-  uint64_t word = 0;
-  std::memcpy(&word, at, 6);
-  return word;
+  uint64_t word;
+  std::memcpy(&word, at, sizeof word);
+  return word & ((uint64_t{1} << 48) - 1);
 }
 inline bool recordIsIrregular(const std::byte* record) {
   return (recordWord48(record) >> 47) != 0;

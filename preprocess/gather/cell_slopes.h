@@ -1,11 +1,9 @@
 // Makes a splat of each cell: the mesh's cell-centred splats. Slopes are by least squares over the cells that share
 // a face. Nothing grows with the mesh but what is on disk:
 //
-//    cells --+-- bodies, values ----------------------------> streams by ranges of cells --+
-//            +-- faces --> streams by a hash of the corners                                 +--> splats
-//                             sorted: two alike are neighbours --> streams by ranges of cells
-//
-// Faces are alike if their three lowest corners are; a face that more than two cells have joins none of them.
+//    cells --+-- bodies, values -------------------------------> streams by ranges of cells --+
+//            +-- faces --> face_matcher --+-- pairs: neighbours --> the same                  +--> splats
+//                                         +-- outer ones ---------> the same                --+
 #pragma once
 
 #include <cstdint>
@@ -13,7 +11,9 @@
 #include <memory>
 #include <vector>
 
+#include "preprocess/gather/cell_faces.h"
 #include "preprocess/gather/corner_gather.h"
+#include "preprocess/gather/outer_planes.h"
 #include "preprocess/gather/point_sums.h"
 
 namespace curvisplat {
@@ -21,7 +21,7 @@ namespace curvisplat {
 class CellSlopes {
  public:
   /// For cells with numbers below `cells`; `fields`: at least one value each.
-  CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes, std::filesystem::path folder);
+  CellSlopes(uint64_t cells, size_t fields, uint64_t memory_bytes, const std::filesystem::path& folder);
   ~CellSlopes();
 
   /// Cells in the mesh's order.
@@ -31,17 +31,18 @@ class CellSlopes {
   PointSums::Counts finish(const TakeSplat& take, const Progress& progress);
 
  private:
-  void matchFaces(size_t stream, class StreamsFile& neighbours);
-  void makeSplats(size_t range, const class StreamsFile& neighbours, const TakeSplat& take,
-                  PointSums::Counts& counts) const;
+  std::span<const float> valuesOf(const GatheredCells& cells, size_t n) const;
+  void join(std::span<const std::byte> first, std::span<const std::byte> second);
+  void makeSplats(size_t range, const TakeSplat& take, PointSums::Counts& counts);
 
   const uint64_t cells_;
   const size_t fields_;
-  const uint64_t memory_bytes_;
-  const std::filesystem::path folder_;
   uint64_t range_cells_ = 0;
-  std::unique_ptr<class StreamsFile> bodies_, faces_;
-  std::vector<std::byte> batch_;
+  std::unique_ptr<class StreamsFile> bodies_, neighbours_;
+  std::unique_ptr<FaceMatcher> faces_;
+  std::unique_ptr<OuterPlanes> planes_;
+  FaceRecords records_;
+  std::vector<std::byte> neighbour_;
 };
 
 }  // namespace curvisplat

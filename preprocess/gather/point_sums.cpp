@@ -3,6 +3,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <atomic>
@@ -18,7 +19,6 @@ namespace {
 constexpr size_t kCellsPerTask = 256;
 // Points whose numbers differ in this many lowest bits are summed by one task.
 constexpr uint64_t kStripe = 4096;
-constexpr size_t kStripes = 16;
 constexpr size_t kMomentBytes = size_t{16} << 20;  // of a batch of cells
 constexpr size_t kCellsPerRead = 8192;
 
@@ -59,23 +59,32 @@ struct PointSums::Sums {
   std::vector<double> moments;  // [point * momentCount + moment]
 };
 
-PointSums::PointSums(uint64_t points, size_t fields, uint64_t memory_bytes, std::filesystem::path folder)
+PointSums::PointSums(uint64_t points, uint64_t cells, size_t fields, uint64_t memory_bytes,
+                     const std::filesystem::path& folder)
     : points_(points), fields_(fields) {
+  const uint64_t border_bytes = memory_bytes / 8;
+  memory_bytes -= border_bytes + std::min(PointBorders::waitingBytes(cells), memory_bytes / 4);
+  const auto with_borders = [&] {
+    borders_ = std::make_unique<PointBorders>(points, range_points_, cells, border_bytes, folder);
+  };
   const uint64_t bytes = sizeof(glm::dvec3) + fields * sizeof(float) + momentCount(fields) * sizeof(double);
   if (points * bytes <= memory_bytes) {
     range_points_ = std::max<uint64_t>(1, points);
     sums_ = std::make_unique<Sums>(0, points, fields);
+    with_borders();
     return;
   }
   // Ranges are summed once the corners' positions are no longer in memory.
   range_points_ = std::max<uint64_t>(1, memory_bytes * 3 / 2 / bytes);
   const uint64_t ranges = (points + range_points_ - 1) / range_points_;
-  waiting_ = std::make_unique<StreamsFile>(std::move(folder), ranges, memory_bytes / 4);
+  waiting_ = std::make_unique<StreamsFile>(folder, ranges, memory_bytes / 4);
+  with_borders();
 }
 
 PointSums::~PointSums() = default;
 
 void PointSums::add(const GatheredCells& cells) {
+  borders_->add(cells);
   sums_ ? accumulate(cells, *sums_) : write(cells);
 }
 
@@ -106,6 +115,8 @@ void PointSums::accumulate(const GatheredCells& cells, Sums& sums) {
   const size_t stride = momentCount(fields_);
   const size_t most_corners = std::max<size_t>(1, kMomentBytes / (stride * sizeof(double)));
   const uint64_t end_point = sums.first + sums.at.size();
+  const auto threads = static_cast<size_t>(tbb::this_task_arena::max_concurrency());
+  const size_t stripes = threads == 1 ? 1 : 2 * threads;  // each looks at all corners
   tbb::enumerable_thread_specific<DualScratch> scratch;
   for (size_t begin = 0; begin < cells.size();) {
     size_t end = begin + 1;
@@ -127,12 +138,12 @@ void PointSums::accumulate(const GatheredCells& cells, Sums& sums) {
                         }
                       });
     // Each point's sum has the order of the cells, whoever adds them.
-    tbb::parallel_for(size_t{0}, kStripes, [&](size_t stripe) {
+    tbb::parallel_for(size_t{0}, stripes, [&](size_t stripe) {
       for (size_t n = begin; n < end; ++n) {
         if (cells.shapes[n] == CellKind::kNone) continue;
         for (size_t corner = cells.corner_begin[n]; corner < cells.corner_begin[n + 1]; ++corner) {
           const uint64_t point = cells.corners[corner];
-          if (point / kStripe % kStripes != stripe || point < sums.first || point >= end_point) continue;
+          if (point / kStripe % stripes != stripe || point < sums.first || point >= end_point) continue;
           const size_t to = point - sums.first;
           if (std::isnan(sums.at[to].x)) {
             sums.at[to] = cells.at[corner];
@@ -149,35 +160,39 @@ void PointSums::accumulate(const GatheredCells& cells, Sums& sums) {
   }
 }
 
-void PointSums::flushRange(const Sums& sums, const TakeSplat& take, Counts& counts) const {
+void PointSums::flushRange(const Sums& sums, const OuterPlanes::OfRange& planes, const TakeSplat& take,
+                           Counts& counts) const {
   const size_t stride = momentCount(fields_);
   std::atomic<uint64_t> splats = 0, degenerate = 0;
-  tbb::parallel_for(tbb::blocked_range<size_t>(0, sums.at.size(), 1024),
-                    [&](const tbb::blocked_range<size_t>& part) {
-                      NodeSplat splat;
-                      std::vector<SplatScalar> values(fields_);
-                      uint64_t made = 0, flat = 0;
-                      for (size_t n = part.begin(); n < part.end(); ++n) {
-                        if (std::isnan(sums.at[n].x)) continue;
-                        if (!(sums.moments[n * stride] > 0)) ++flat;
-                        splatOfPoint(sums.first + n,
-                                     {sums.at[n], std::span(sums.values).subspan(n * fields_, fields_),
-                                      std::span(sums.moments).subspan(n * stride, stride)},
-                                     splat, values);
-                        take(splat, values);
-                        ++made;
-                      }
-                      splats += made;
-                      degenerate += flat;
-                    });
+  tbb::parallel_for(
+      tbb::blocked_range<size_t>(0, sums.at.size(), 1024), [&](const tbb::blocked_range<size_t>& part) {
+        NodeSplat splat;
+        std::vector<SplatScalar> values(fields_);
+        std::vector<OuterPlane> of_point;
+        uint64_t made = 0, flat = 0;
+        for (size_t n = part.begin(); n < part.end(); ++n) {
+          if (std::isnan(sums.at[n].x)) continue;
+          if (!(sums.moments[n * stride] > 0)) ++flat;
+          splatOfPoint(sums.first + n,
+                       {sums.at[n], std::span(sums.values).subspan(n * fields_, fields_),
+                        std::span(sums.moments).subspan(n * stride, stride)},
+                       splat, values);
+          splat.border_code = meshBorderCode(planes.of(sums.first + n, of_point), splat.splat, kNextOfPoints);
+          take(splat, values);
+          ++made;
+        }
+        splats += made;
+        degenerate += flat;
+      });
   counts.splats += splats;
   counts.degenerate += degenerate;
 }
 
 PointSums::Counts PointSums::finish(const TakeSplat& take, const Progress& progress) {
   Counts counts;
+  borders_->finish(progress);
   if (sums_) {
-    flushRange(*sums_, take, counts);
+    flushRange(*sums_, borders_->load(0), take, counts);
     sums_.reset();
     return counts;
   }
@@ -210,7 +225,7 @@ PointSums::Counts PointSums::finish(const TakeSplat& take, const Progress& progr
     });
     sum();
     waiting_->forget(range);
-    flushRange(sums, take, counts);
+    flushRange(sums, borders_->load(range), take, counts);
   }
   return counts;
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "preprocess/gather/corner_gather.h"
+#include "preprocess/gather/point_borders.h"
 #include "preprocess/moments/mesh_splats.h"
 
 namespace curvisplat {
@@ -19,8 +20,9 @@ using TakeSplat = std::function<void(const NodeSplat&, std::span<const SplatScal
 
 class PointSums {
  public:
-  /// For points with numbers below `points`.
-  PointSums(uint64_t points, size_t fields, uint64_t memory_bytes, std::filesystem::path folder);
+  /// For points with numbers below `points` and about so many cells.
+  PointSums(uint64_t points, uint64_t cells, size_t fields, uint64_t memory_bytes,
+            const std::filesystem::path& folder);
   ~PointSums();
 
   /// Cells in the mesh's order.
@@ -37,13 +39,15 @@ class PointSums {
   struct Sums;
   void accumulate(const GatheredCells& cells, Sums& sums);
   void write(const GatheredCells& cells);
-  void flushRange(const Sums& sums, const TakeSplat& take, Counts& counts) const;
+  void flushRange(const Sums& sums, const OuterPlanes::OfRange& planes, const TakeSplat& take,
+                  Counts& counts) const;
 
   const uint64_t points_;
   const size_t fields_;
   uint64_t range_points_ = 0;
   std::unique_ptr<Sums> sums_;                  // of all points, if they fit
   std::unique_ptr<class StreamsFile> waiting_;  // otherwise: cells by ranges of points
+  std::unique_ptr<PointBorders> borders_;
   std::vector<double> moments_;
 };
 

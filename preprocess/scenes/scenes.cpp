@@ -10,6 +10,7 @@
 #include "preprocess/scenes/rough_scenes.h"
 #include "stream/base/check.h"
 #include "stream/base/error.h"
+#include "stream/base/suggestion.h"
 
 namespace curvisplat {
 namespace {
@@ -282,7 +283,8 @@ std::vector<std::shared_ptr<const Scene>> makeScenes(std::string_view name,
 
   const auto names = sceneNames();
   if (std::find(names.begin(), names.end(), name) == names.end())
-    throw UsageError("there is no scene '{}'; available: {}", name, fmt::join(names, ", "));
+    throw UsageError("there is no scene '{}'{}; available: {}", name, didYouMean(name, names),
+                     fmt::join(names, ", "));
   if (clustering) throw UsageError("scene '{}' has its own spacing; omit --clustering", name);
   if (name == "sheared-waves") return {std::make_shared<ShearedWaves>(std::string(name))};
   if (name == "spectral") return {makeSpectral()};

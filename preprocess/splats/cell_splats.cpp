@@ -253,7 +253,7 @@ void Cells::addCell(uint64_t i, uint64_t j, uint64_t k) {
     const glm::dmat3 axes(rotate(glm::dvec3(1, 0, 0)), rotate(glm::dvec3(0, 1, 0)),
                           rotate(glm::dvec3(0, 0, 1)));
     const size_t variables = in_.nodes->scalars.size();
-    const auto code = keepUncovered(in_.covered[node], axes, splat.splat,
+    const auto code = keepUncovered({in_.covered[node], axes, splat.border_code, 1}, splat.splat,
                                     std::span(out_.values).subspan(count_ * variables, variables));
     if (code) splat.becomePart(*code);
     is_left = code.has_value();

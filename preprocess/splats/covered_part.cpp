@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
@@ -11,8 +12,9 @@ namespace {
 
 constexpr double kPartVariance = 1.0 / 256;  // of a sixteenth of a cell, times 12
 
-// A part is cut at its end like the half cell at a border, but for slices and cells that are nearly whole.
-constexpr double kLeastCut = 0.15;    // of the cell
+// A part is cut at its end like the half cell at a border. Of slices of whole cells, and of those that are nearly whole, too few
+// points say where that is.
+constexpr double kLeastCut = 0.1;     // of the cell
 constexpr double kLeastShift = 1e-3;  // of the middle, in cells: the rest may lie around what is covered
 
 /// 12 times the covariance of the points that are left, and of the part of the cell that each stands for; of all
@@ -22,6 +24,17 @@ struct PartMoments {
   glm::dvec3 middle{0.0};
   glm::dmat3 shape{0.0};
 };
+
+/// How far from the cell's middle, against `inward` (unit length, along i, j, k), a plane parts the points that are covered
+/// from the others: as many of all points lie beyond it as are covered.
+double planeDistance(uint64_t covered, const glm::dvec3& inward) {
+  std::array<double, kCellPoints> along;
+  std::transform(cellPoints().begin(), cellPoints().end(), along.begin(),
+                 [&](const glm::dvec3& point) { return -glm::dot(inward, point); });
+  std::sort(along.begin(), along.end(), std::greater<>());
+  const auto beyond = static_cast<size_t>(std::popcount(covered));
+  return 0.5 * (along[beyond - 1] + along[beyond]);
+}
 
 PartMoments momentsOf(uint64_t left) {
   const auto& points = cellPoints();
@@ -52,6 +65,53 @@ glm::dmat3 choleskyOf(const glm::dmat3& m) {
   return l;
 }
 
+/// L⁻¹ v.
+glm::dvec3 solved(const glm::dmat3& lower, const glm::dvec3& v) {
+  const double x = v.x / lower[0][0], y = (v.y - lower[0][1] * x) / lower[1][1];
+  return {x, y, (v.z - lower[0][2] * x - lower[1][2] * y) / lower[2][2]};
+}
+
+/// The face between the blocks: where it is seen from a part's middle, in the frame of its own A.
+struct PartFace {
+  glm::dvec3 inward{0.0};  // unit length; zero if there is none
+  double distance = 0.5;   // in lengths of the part
+  bool is_sure = false;    // enough points tell
+};
+
+/// How a part ends. Where that is where the whole cell ended, the border's direction is better known than the points tell.
+uint32_t borderOf(const glm::dmat3& lower, PartFace face, const CoveredCell& cell) {
+  constexpr double kAlong = 0.7;  // cosine of directions that are about the same
+  const InwardAxes whole = inwardAxes(cell.border_code);
+  std::array<glm::dvec3, 3> axes;
+  size_t count = 0;
+  uint32_t faces = 0;
+  bool at_border = false;
+  for (int n = 0; n < whole.count && !whole.behind; ++n) {
+    const glm::dvec3 axis = glm::normalize(solved(lower, glm::dvec3(whole.axis[static_cast<size_t>(n)])));
+    const double along = glm::dot(axis, face.inward);
+    if (along < -kAlong) return kNoBorder;  // between two faces
+    if (whole.hasFace(n)) faces |= 1u << count;
+    axes[count++] = axis;
+    if (along <= kAlong) continue;
+    face = {axis, 0.5, true};
+    at_border = true;
+  }
+  if (face.is_sure && count == (at_border ? 1 : 0)) {
+    // Cells behind the face are longer than what is left of this one.
+    const double next = (at_border ? cell.next : 1) / glm::length(lower * face.inward);
+    return packMergedCode(face.inward, face.distance, next / (2 * face.distance));
+  }
+  if (face.is_sure && !at_border && count < 3) {
+    faces |= 1u << count;
+    axes[count++] = face.inward;
+  }
+  for (size_t n = 1; n < count; ++n) {
+    for (size_t m = 0; m < n; ++m) axes[n] -= glm::dot(axes[n], axes[m]) * axes[m];
+    axes[n] = glm::normalize(axes[n]);
+  }
+  return packBorderCode({axes.data(), count}, faces);
+}
+
 }  // namespace
 
 const std::array<glm::dvec3, kCellPoints>& cellPoints() {
@@ -71,13 +131,16 @@ const std::array<glm::dvec3, kCellPoints>& cellPoints() {
   return points;
 }
 
-std::optional<uint32_t> keepUncovered(uint64_t covered, const glm::dmat3& axes, Splat& splat,
-                                      std::span<SplatScalar> values) {
-  if (covered == 0) return kNoBorder;
-  if (covered == kAllCovered) return std::nullopt;
-  PartMoments part = momentsOf(~covered);
-  part.middle = axes * part.middle;
-  part.shape = axes * part.shape * glm::transpose(axes);
+std::optional<uint32_t> keepUncovered(const CoveredCell& cell, Splat& splat, std::span<SplatScalar> values) {
+  if (cell.covered == 0) return cell.border_code;
+  if (cell.covered == kAllCovered) return std::nullopt;
+  PartMoments part = momentsOf(~cell.covered);
+  // The face between the blocks is about at right angles to where the rest's middle is.
+  const double shift = glm::length(part.middle);
+  const bool has_face = shift > kLeastShift;
+  const double to_face = has_face ? shift + planeDistance(cell.covered, part.middle / shift) : 0;
+  part.middle = cell.axes * part.middle;
+  part.shape = cell.axes * part.shape * glm::transpose(cell.axes);
   const glm::dmat3 lower = choleskyOf(part.shape);
   const glm::dmat3 factor = splat.factor() * lower;
   splat.position += splat.factor() * part.middle;
@@ -88,12 +151,14 @@ std::optional<uint32_t> keepUncovered(uint64_t covered, const glm::dmat3& axes, 
     value.mean += glm::dot(value.slope, part.middle);
     value.slope = glm::transpose(lower) * value.slope;
   }
-  // The face between the blocks is about at right angles to where the rest's middle is.
-  const glm::dvec3 inward = glm::transpose(lower) * part.middle;
-  const double length = glm::length(inward);
-  if (part.share < kLeastCut || part.share > 1 - kLeastCut || !(length > kLeastShift)) return kNoBorder;
-  const std::array<glm::dvec3, 1> axis{inward / length};
-  return packBorderCode(axis, 1);
+  PartFace face;
+  if (has_face) {
+    const glm::dvec3 inward =
+        glm::transpose(lower) * part.middle / shift;  // as long as the cell is to the part
+    const double length = glm::length(inward);
+    face = {inward / length, to_face / length, part.share >= kLeastCut && part.share <= 1 - kLeastCut};
+  }
+  return borderOf(lower, face, cell);
 }
 
 }  // namespace curvisplat

@@ -25,10 +25,16 @@ inline constexpr uint64_t kAllCovered = ~uint64_t{0};
 /// Bit n of what is covered stands for point n: along i, j and k, in cells from the middle.
 const std::array<glm::dvec3, kCellPoints>& cellPoints();
 
-/// Cuts the covered part off the splat. `axes`: Q's images of the lattice's directions, as node_splats.h has
-/// them. Returns the border code of what is left, which ends where the other block begins; nullopt if nothing is.
-/// Pure: any thread.
-std::optional<uint32_t> keepUncovered(uint64_t covered, const glm::dmat3& axes, Splat& splat,
-                                      std::span<SplatScalar> values);
+/// A cell that other blocks cover a part of.
+struct CoveredCell {
+  uint64_t covered;
+  glm::dmat3 axes;       // Q's images of the lattice's directions, as node_splats.h has them
+  uint32_t border_code;  // of the whole cell; a code of the layer behind a face counts as none
+  double next;           // how long the cell behind a border is, in cells that end there: 2 behind half ones
+};
+
+/// Cuts the covered part off the splat. Returns the border code of what is left, which ends where the other block begins,
+/// and at the whole cell's borders; nullopt if nothing is left. Pure: any thread.
+std::optional<uint32_t> keepUncovered(const CoveredCell& cell, Splat& splat, std::span<SplatScalar> values);
 
 }  // namespace curvisplat

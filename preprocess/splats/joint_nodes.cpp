@@ -71,32 +71,6 @@ std::vector<size_t> groupsAtJoints(std::span<const SplatWithValues> parts) {
   return group;
 }
 
-/// The growth code of a part as the splat has it that the part was merged into. Halves do not grow along the axis
-/// across their joint, and along the others they have what the merged one has.
-uint32_t growthIn(const Splat& merged, const NodeSplat& part) {
-  constexpr float kAlong = 0.7f;
-  const CellGrowth of_part = cellGrowth(part.growth_code);
-  const InwardAxes inward = inwardAxes(part.border_code);
-  const auto is_inward = [&](const glm::vec3& axis) {
-    return std::any_of(inward.axis.begin(), inward.axis.begin() + inward.count,
-                       [&](const glm::vec3& q) { return std::abs(glm::dot(q, axis)) > kAlong; });
-  };
-  std::array<glm::dvec3, 3> axis{};
-  std::array<double, 3> growth{};
-  size_t count = 0;
-  for (size_t n = 0; n < 3; ++n) {
-    if (of_part.growth[n] == 0 || is_inward(of_part.axis[n])) continue;
-    glm::dvec3 along = inFrameOf(merged, part.splat.factor() * glm::dvec3(of_part.axis[n]));
-    const double length = glm::length(along);
-    if (count == 2 || !(length > 0.7 && length < 1.4)) return kNoGrowth;
-    along /= length;
-    if (count == 1) along = glm::normalize(along - glm::dot(along, axis[0]) * axis[0]);
-    axis[count] = along;
-    growth[count++] = of_part.growth[n];
-  }
-  return packGrowthCode(axis, growth);
-}
-
 }  // namespace
 
 MergedParts::MergedParts(const NodeSplat& first, std::span<const SplatScalar> values)
@@ -112,6 +86,7 @@ void MergedParts::add(const NodeSplat& part, std::span<const SplatScalar> values
   merger_.add(part.splat.position, part.splat, values);
   bend_.add(part.splat, part.splat.position - origin_, values);
   borders_.add(part.splat, part.border_code);
+  growth_.add(part);
   if (part.node < lowest_.splat.node) lowest_.splat = part;
 }
 
@@ -122,7 +97,10 @@ SplatWithValues MergedParts::finish() const {
   bend_.correct(merged.values);
   merged.splat.border_code = borders_.of(merged.splat.splat);
   merged.splat.regular = false;
-  merged.splat.growth_code = growthIn(merged.splat.splat, lowest_.splat);
+  const JointGrowth::Found growth = growth_.of(merged.splat.splat, lowest_.splat);
+  merged.splat.growth_code = growth.code;
+  merged.splat.splat.position += merged.splat.splat.factor() * growth.drift;
+  for (SplatScalar& value : merged.values) value.mean += glm::dot(value.slope, growth.drift);
   return merged;
 }
 

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "preprocess/splats/bend_of_parts.h"
+#include "preprocess/splats/joint_growth.h"
 #include "preprocess/splats/merge.h"
 #include "preprocess/splats/node_splats.h"
 #include "preprocess/splats/open_borders.h"
@@ -49,6 +50,7 @@ class MergedParts {
   SplatMerger merger_;
   BendOfParts bend_;
   OpenBorders borders_;
+  JointGrowth growth_;
   std::vector<uint64_t> nodes_;
 };
 

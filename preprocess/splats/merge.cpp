@@ -42,13 +42,15 @@ glm::dvec3 solveFactor(const Splat& splat, const glm::dvec3& h) {
   return {v0 / splat.axis[0], v1 / splat.axis[1], v2 / splat.axis[2]};
 }
 
-/// By the roots of the characteristic polynomial, in closed form: 1e-8 at worst (two equal largest ones).
-double largestEigenvalue(const Symmetric3& s) {
+/// By the roots of the characteristic polynomial, in closed form: 1e-8 at worst (two equal largest ones). Or a bound of it
+/// that is not above `least`.
+double largestEigenvalue(const Symmetric3& s, double least) {
   const double third = (s.xx + s.yy + s.zz) / 3;
   const double x = s.xx - third, y = s.yy - third, z = s.zz - third;
   const double off2 = s.xy * s.xy + s.xz * s.xz + s.yz * s.yz;
   const double spread = std::sqrt((x * x + y * y + z * z + 2 * off2) / 6);
   if (!(spread > 0)) return third;
+  if (third + 2 * spread <= least) return third + 2 * spread;
   const double determinant =
       x * (y * z - s.yz * s.yz) - s.xy * (s.xy * z - s.yz * s.xz) + s.xz * (s.xy * s.yz - y * s.xz);
   const double cosine = std::clamp(determinant / (2 * spread * spread * spread), -1.0, 1.0);
@@ -200,14 +202,16 @@ SplatCodes VoxelMerger::finishInLattice(size_t voxel, Splat& splat, std::span<Sp
   return {mergedBorderCode(planes, splat.position, splat, voxel_size_), kNoGrowth};
 }
 
-double VoxelMerger::detail(size_t voxel) const {
+double VoxelMerger::detail(size_t voxel, double least) const {
   CURVISPLAT_CHECK_OP(clusters_[voxel].count, >, 0u);
-  if (clusters_[voxel].count == 1) return 0;
+  if (clusters_[voxel].count == 1) return least;
   const GeometrySums& sums = sums_[voxel];
   Symmetric3 covariance;
   addScaled(covariance, 1 / sums.weight, sums.centre2);
   addSquare(covariance, -1, sums.centre / sums.weight);
-  return std::sqrt(12 * std::max(0.0, largestEigenvalue(covariance)));
+  constexpr double kBelowOne = 1 - 1e-12;
+  const double largest = largestEigenvalue(covariance, kBelowOne * least * least / 12);
+  return std::max(least, std::sqrt(12 * std::max(0.0, largest)));
 }
 
 }  // namespace curvisplat

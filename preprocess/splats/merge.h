@@ -43,8 +43,9 @@ class VoxelMerger {
   SplatCodes finish(size_t voxel, Splat& splat, std::span<SplatScalar> values) const;
 
   /// World units: the square root of the largest eigenvalue of 12 x the covariance of the merged centres (n³
-  /// unit cells: √(n² - 1)). 0 for a single splat. What Brick::error is the largest of.
-  double detail(size_t voxel) const;
+  /// unit cells: √(n² - 1)). 0 for a single splat. What Brick::error is the largest of. Or `least`, if that is more, which
+  /// most often is known from a bound.
+  double detail(size_t voxel, double least = 0) const;
 
  private:
   // Sums about the first splat's position and means: e and d. Each term times the splat's weight.

@@ -12,7 +12,7 @@ constexpr double kSimilar = 0.7;    // cosine: of one plane
 constexpr double kOpposite = -0.5;  // of two that close one another, or of a layer thinner than a voxel
 constexpr double kEven = 0.9;       // the length of a mean of unit vectors that are about the same
 // How far a splat's middle is from a face that it ends at, in its lengths: a box's is 1/2, a wedge's 0.41 or 0.82.
-constexpr double kNearest = 0.38, kFarthest = 0.85;
+constexpr double kNearest = 0.37, kFarthest = 0.85;
 constexpr double kTouching = 0.3;  // what part of its section has to
 
 }  // namespace

@@ -24,12 +24,20 @@ struct Neighbours {
   std::array<ptrdiff_t, 3> before{}, after{};  // along i, j, k; <= 0 and >= 0
 };
 
-/// What the nodes of a window have in common.
+/// The rows of `window` that the splats of `box` may depend on.
+NodeBox rowsAround(const NodeBox& box, const NodeBox& window) {
+  constexpr uint64_t kReach = kStretchReach;
+  return {std::max(window.j0, box.j0 - std::min(box.j0, kReach)), std::min(window.j1, box.j1 + kReach),
+          std::max(window.k0, box.k0 - std::min(box.k0, kReach)), std::min(window.k1, box.k1 + kReach)};
+}
+
+/// What the nodes of a box of a window have in common.
 class Window {
  public:
-  Window(const BlockWindow& in, const NodeSplatCorrections& corrections, NodeScratch& scratch,
-         NodeSplats& out)
+  Window(const BlockWindow& in, const NodeBox& box, const NodeSplatCorrections& corrections,
+         NodeScratch& scratch, NodeSplats& out)
       : in_(in),
+        near_(rowsAround(box, in.window)),
         corrections_(corrections),
         x_(in.nodes->x.data()),
         y_(in.nodes->y.data()),
@@ -46,11 +54,7 @@ class Window {
     for (auto& row : scratch.stretch) row.assign(i1_ - i0_, 1.0f);
     for (auto* rows : {&scratch.growth, &scratch.drift})
       for (auto& row : *rows) row.assign(i1_ - i0_, 0.0f);
-    scratch.has_blank.resize(rowsOf(in.window));
-    const uint64_t first = i0_ - std::min<uint64_t>(i0_, kStretchReach);
-    const uint64_t end = std::min(i1_ + kStretchReach, ni_);
-    for (size_t row = 0; row < scratch.has_blank.size(); ++row)
-      scratch.has_blank[row] = std::memchr(blank_ + row * ni_ + first, 1, end - first) != nullptr;
+    findBlanks();
   }
 
   void addRow(uint64_t j, uint64_t k);
@@ -58,9 +62,9 @@ class Window {
 
  private:
   bool hasBlank(uint64_t j, uint64_t k) const {
-    return scratch_.has_blank[(k - in_.window.k0) * (in_.window.j1 - in_.window.j0) + (j - in_.window.j0)] !=
-           0;
+    return scratch_.has_blank[(k - near_.k0) * (near_.j1 - near_.j0) + (j - near_.j0)] != 0;
   }
+  void findBlanks();
   bool anyBlankAround(uint64_t j, uint64_t k) const;
   void stretchRow(uint64_t j, uint64_t k);
   Stretch stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const;
@@ -75,7 +79,7 @@ class Window {
     const glm::dmat3 axes(rotate({1, 0, 0}), rotate({0, 1, 0}), rotate({0, 0, 1}));
     NodeSplat& node = out_.splats[count_];
     const auto code =
-        keepUncovered(in_.covered[at], axes, node.splat,
+        keepUncovered({in_.covered[at], axes, node.border_code, 2}, node.splat,
                       std::span(out_.values).subspan(count_ * scalars_.size(), scalars_.size()));
     if (code) node.becomePart(*code);
     return code.has_value();
@@ -84,6 +88,7 @@ class Window {
   double smallestAxis(ptrdiff_t at, const Neighbours& neighbours) const;
 
   const BlockWindow& in_;
+  const NodeBox near_;
   const NodeSplatCorrections corrections_;
   const double *x_, *y_, *z_;
   const uint8_t* blank_;
@@ -116,6 +121,19 @@ constexpr int kNoLayer = -1;
 int layerOf(int axis, uint64_t index, uint64_t count) {
   if (count < 4) return kNoLayer;
   return index == 1 ? 2 * axis : index + 2 == count ? 2 * axis + 1 : kNoLayer;
+}
+
+void Window::findBlanks() {
+  const uint64_t first = i0_ - std::min<uint64_t>(i0_, kStretchReach);
+  const uint64_t count = std::min(i1_ + kStretchReach, ni_) - first;
+  const uint64_t rows_a_plane = in_.window.j1 - in_.window.j0;
+  scratch_.has_blank.clear();
+  for (uint64_t k = near_.k0; k < near_.k1; ++k) {
+    for (uint64_t j = near_.j0; j < near_.j1; ++j) {
+      const uint64_t row = (k - in_.window.k0) * rows_a_plane + (j - in_.window.j0);
+      scratch_.has_blank.push_back(std::memchr(blank_ + row * ni_ + first, 1, count) != nullptr);
+    }
+  }
 }
 
 void Window::addRow(uint64_t j, uint64_t k) {
@@ -414,7 +432,7 @@ void computeNodeSplats(const BlockWindow& in, const NodeBox& box, NodeScratch& s
   out.values.resize(most * variables);
   out.degenerate = out.right_handed = out.left_handed = 0;
 
-  Window rows(in, corrections, scratch, out);
+  Window rows(in, box, corrections, scratch, out);
   for (uint64_t k = box.k0; k < box.k1; ++k)
     for (uint64_t j = box.j0; j < box.j1; ++j) rows.addRow(j, k);
   out.splats.resize(rows.count());

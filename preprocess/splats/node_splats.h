@@ -92,7 +92,7 @@ struct NodeSplat {
   bool isForSeams() const { return on_block_face || behind_face; }
   /// After keepUncovered() (covered_part.h), which has left a part of the cell that has this code.
   void becomePart(uint32_t code) {
-    border_code = border_code == kNoBorder || behind_face ? code : kNoBorder;
+    border_code = code;
     growth_code = kNoGrowth;
     regular = behind_face = false;
   }
@@ -137,7 +137,7 @@ struct NodeSplatCorrections {
 /// What computeNodeSplats() needs for a while; keeps its capacity.
 struct NodeScratch {
   std::array<std::vector<float>, 3> stretch, growth, drift;  // [axis][node of a row's part]
-  std::vector<uint8_t> has_blank;                            // [row of the window]
+  std::vector<uint8_t> has_blank;                            // [row around the box]
 };
 
 /// Computes the splats of the nodes of `box` that are not blank. Overwrites `out` and keeps its capacity.

@@ -185,7 +185,11 @@ Symmetric3 shapeMatrix(const Splat& splat) {
 
 Symmetric3 raisedTo(const Symmetric3& s, double least) {
   Symmetric3 raised{least, 0, least, 0, 0, least};
-  if (s.xx + s.yy + s.zz <= least) return raised;
+  // No eigenvalue is above the norm.
+  constexpr double kBelowOne = 1 - 1e-12;
+  const double norm2 =
+      s.xx * s.xx + s.yy * s.yy + s.zz * s.zz + 2 * (s.xy * s.xy + s.xz * s.xz + s.yz * s.yz);
+  if (s.xx + s.yy + s.zz <= least || norm2 < kBelowOne * least * least) return raised;
   const double scale = 1 / std::max({s.xx, s.yy, s.zz});
   const Svd svd = decompose({scale * s.xx, scale * s.xy, scale * s.xz, scale * s.xy, scale * s.yy,
                              scale * s.yz, scale * s.xz, scale * s.yz, scale * s.zz});

@@ -1,9 +1,11 @@
 #include "preprocess/splats/stretch.h"
 
+#include "stream/base/vector_clones.h"
+
 namespace curvisplat {
 
-void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride, size_t count,
-                  const StretchRow& out) {
+CURVISPLAT_VECTOR_CLONES void stretchNodes(const NodePositions& nodes, ptrdiff_t at, ptrdiff_t stride,
+                                           size_t count, const StretchRow& out) {
   float *const factor = out.factor, *const growth = out.growth, *const drift = out.drift;
   const auto last = at + static_cast<ptrdiff_t>(count);
   for (ptrdiff_t n = at; n < last; ++n) {

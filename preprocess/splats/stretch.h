@@ -57,7 +57,7 @@ struct Stretch {
 };
 
 /// ln √x of a positive number, to 1e-6. Single precision: it is quicker, and bits do not depend on vector instructions.
-inline float halfLogarithm(float x) {
+[[gnu::always_inline]] inline float halfLogarithm(float x) {
   constexpr uint32_t kRootOfHalf = 0x3f3504f3;
   const auto bits = std::bit_cast<uint32_t>(x);
   const int32_t power = static_cast<int32_t>(bits - kRootOfHalf) >> 23;
@@ -68,7 +68,8 @@ inline float halfLogarithm(float x) {
 
 /// From the squared extents of five cells in a row, the third of which is the splat's own. s is 1 where it is nearly 1 (a stored
 /// shape cannot be told from it); all is as in an even grid where a cell has no extent.
-inline Stretch stretchOf(double before2, double before, double own, double after, double after2) {
+[[gnu::always_inline]] inline Stretch stretchOf(double before2, double before, double own, double after,
+                                                double after2) {
   constexpr float kNearlyOne = 2e-4f;
   constexpr double kLargest = 1e6;  // of squared ratios
   const double per_own = 1 / own;

@@ -103,16 +103,22 @@ Canvas drawn(const Annotations& annotations, const AnnotatedScene& scene, bool l
 
 /// Puts the background, and the grid's lines on it, behind a picture.
 void putBehind(Image& picture, const Annotations& annotations, const AnnotatedScene& scene) {
+  if (!annotations.axes_grid) {
+    const glm::vec4 behind = scene.background;
+    for (size_t n = 0; n < picture.rgba.size(); n += 4) {
+      const float through = 1 - picture.rgba[n + 3];
+      for (size_t c = 0; c < 4; ++c) picture.rgba[n + c] += through * behind[static_cast<int>(c)];
+    }
+    return;
+  }
   Image behind(picture.size);
   for (size_t n = 0; n < behind.rgba.size(); ++n) behind.rgba[n] = scene.background[static_cast<int>(n % 4)];
-  if (annotations.axes_grid) {
-    Canvas canvas(picture.size);
-    drawAxesGrid(canvas.get(), scene, inkFor(scene.background));
-    canvas.forEachPixel([&](int x, int y, const glm::vec4& over) {
-      float* const pixel = behind.pixel(x, y);
-      for (int c = 0; c < 4; ++c) pixel[c] = over[c] + (1 - over.a) * pixel[c];
-    });
-  }
+  Canvas canvas(picture.size);
+  drawAxesGrid(canvas.get(), scene, inkFor(scene.background));
+  canvas.forEachPixel([&](int x, int y, const glm::vec4& over) {
+    float* const pixel = behind.pixel(x, y);
+    for (int c = 0; c < 4; ++c) pixel[c] = over[c] + (1 - over.a) * pixel[c];
+  });
   for (size_t n = 0; n < picture.rgba.size(); n += 4) {
     const float through = 1 - picture.rgba[n + 3];
     for (size_t c = 0; c < 4; ++c) picture.rgba[n + c] += through * behind.rgba[n + c];

@@ -1,12 +1,18 @@
 #include "render/camera/camera.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "stream/base/error.h"
+#include "stream/base/suggestion.h"
 
 namespace curvisplat {
 namespace {
@@ -61,6 +67,18 @@ glm::dvec3 directionOf(const Camera& camera) {
   return towards / distance;
 }
 
+/// The view that other programs, or people, call so: " (did you mean +z?)".
+std::string meantBy(std::string_view view) {
+  constexpr std::pair<std::string_view, const char*> kOthers[] = {
+      {"top", "+z"},   {"bottom", "-z"}, {"front", "-y"}, {"back", "+y"}, {"left", "-x"},
+      {"right", "+x"}, {"x", "+x"},      {"y", "+y"},     {"z", "+z"},    {"3d", "iso"}};
+  for (const auto& [other, ours] : kOthers)
+    if (other == view) return fmt::format(" (did you mean {}?)", ours);
+  std::vector<std::string> names;
+  for (const NamedView& named : kNamedViews) names.emplace_back(named.name);
+  return didYouMean(view, names);
+}
+
 }  // namespace
 
 Camera Camera::named(std::string_view view, const glm::dvec3& lower, const glm::dvec3& upper, ImageSize size,
@@ -68,7 +86,7 @@ Camera Camera::named(std::string_view view, const glm::dvec3& lower, const glm::
   const auto found = std::find_if(kNamedViews.begin(), kNamedViews.end(),
                                   [&](const NamedView& named) { return named.name == view; });
   if (found == kNamedViews.end())
-    throw UsageError("unknown view '{}'; expected iso, +x, -x, +y, -y, +z or -z", view);
+    throw UsageError("unknown view '{}'{}; expected iso, +x, -x, +y, -y, +z or -z", view, meantBy(view));
 
   double diagonal = glm::length(upper - lower);
   if (!(diagonal > 0)) diagonal = 1;

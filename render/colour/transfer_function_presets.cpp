@@ -139,7 +139,7 @@ std::span<const PublishedMap> builtInMaps() {
 
 TransferFunctionDefinition presetDefinition(std::string_view name) {
   if (const auto definition = findPreset(name)) return *definition;
-  if (name.ends_with("_r"))
+  if (name.ends_with("_r") || name.ends_with("_R"))
     if (auto definition = findPreset(name.substr(0, name.size() - 2))) {
       reverse(*definition);
       definition->name = name;
@@ -147,11 +147,10 @@ TransferFunctionDefinition presetDefinition(std::string_view name) {
     }
   std::vector<std::string> names;
   for (const PublishedMap& map : builtInMaps()) names.emplace_back(map.name);
-  const std::string close = closestTo(name, names);
   throw UsageError(
       "unknown transfer function '{}'{}; expected a colour map such as viridis or cool-warm (curvisplat "
       "colormaps lists them) or a file whose name ends in .json",
-      name, close.empty() ? "" : fmt::format(" (did you mean {}?)", close));
+      name, didYouMean(name, names));
 }
 
 std::string presetNames() {

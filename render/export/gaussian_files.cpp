@@ -130,7 +130,7 @@ std::vector<std::byte> gzip(std::span<const std::byte> bytes) {
 
 void checkGaussianName(const std::filesystem::path& path) {
   if (path.extension() != ".ply" && path.extension() != ".spz" && path.extension() != ".glb")
-    throw UsageError("{}: expected a name that ends in .ply, .spz or .glb", path.string());
+    throw UsageError("{}: expected a name that ends in .ply, .spz, .glb or .vdb", path.string());
 }
 
 SpzFrame spzFrameOf(std::span<const GaussianSplat> splats) {

@@ -5,17 +5,23 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/mat3x3.hpp>
+#include <map>
 #include <numbers>
+#include <queue>
+#include <utility>
 
 #include "render/colour/classification.h"
 #include "stream/base/error.h"
 #include "stream/model/kernel.h"
-#include "stream/paging/cut.h"
 
 namespace curvisplat {
 namespace {
 
 constexpr float kMinOpacity = 1.0f / 255;
+// Viewers blend in eight bits: much of what splats fainter than this absorb is rounded away. Finer levels, whose splats are
+// fainter, are left out where they would have more than a share of it in such splats.
+constexpr float kFaintOpacity = 0.015f;
+constexpr double kMostFaint = 0.3;
 // Viewers store opacities as logits, and few have more than eight bits.
 constexpr double kMaxOpacity = 0.999;
 
@@ -58,23 +64,126 @@ double surfaceOf(const glm::dvec3& a) {
   return 4 * std::numbers::pi * std::pow((ab + ac + bc) / 3, 1 / kPower);
 }
 
-/// The cut of all of the data whose bricks have the least detail merged away.
-Cut cutOf(const CacheReader& cache, size_t variable, uint64_t max_splats) {
-  const auto variables = cache.brickVariables(variable);
-  const std::vector<ValueBounds> subtrees = subtreeBounds(cache.bricks(), variables);
-  CutView view;  // a world unit is a pixel: detail counts by its size
-  CutOptions options;
-  options.lod_pixels = 0;
-  options.max_splats = max_splats;
-  Cut cut = chooseCut(
-      {cache.manifest().root, cache.bricks(), variables, subtrees}, view,
-      [](const ValueBounds&) { return false; }, options);
-  if (cut.splats > max_splats)
-    throw UsageError(
-        "{}: --max-splats {} is less than the coarsest level has ({} splats); give at least that",
-        cache.path().string(), max_splats, cut.splats);
-  return cut;
+/// What classifies the splats of bricks.
+struct Classifier {
+  const CacheReader& cache;
+  size_t variable;
+  ClassificationTable table;
+};
+
+/// The Gaussians of a brick, and how much of what they absorb is absorbed by faint ones, 0 to 1.
+struct BrickGaussians {
+  std::vector<GaussianSplat> splats;
+  double faint = 0, all = 0;  // opacity times area
+};
+
+BrickGaussians gaussiansOf(const Classifier& classifier, uint32_t brick) {
+  const CacheReader& cache = classifier.cache;
+  SplatGeometry g;
+  SplatVariable v;
+  cache.readGeometry(brick, g);
+  cache.readVariable(brick, classifier.variable, v);
+  const glm::dvec3 corner = cache.manifest().root.cellMin(cache.bricks()[brick].cell);
+  BrickGaussians out;
+  for (size_t n = 0; n < g.size(); ++n) {
+    const double slope2 = double{v.slope0[n]} * v.slope0[n] + double{v.slope1[n]} * v.slope1[n] +
+                          double{v.slope2[n]} * v.slope2[n];
+    const double half_width =
+        std::sqrt(3 * (kKernelSigma * kKernelSigma * slope2 + std::max(0.0f, v.variance[n])));
+    const glm::dvec4 mean = classifier.table.mean(v.mean[n], half_width);
+    if (!(mean.w > 0)) continue;
+    const double a0 = g.axis0[n], a1 = g.axis1[n], a2 = g.axis2[n];
+    const glm::dmat3 a{a0, a0 * g.shear10[n], a0 * g.shear20[n], 0, a1, a1 * g.shear21[n], 0, 0, a2};
+    GaussianSplat splat = gaussianOf(corner + glm::dvec3(g.x[n], g.y[n], g.z[n]), a, g.weight[n], mean.w);
+    const glm::vec3& d = splat.deviation;
+    const double absorbed = splat.opacity * surfaceOf(glm::dvec3(d));
+    out.all += absorbed;
+    if (splat.opacity < kFaintOpacity) out.faint += absorbed;
+    if (splat.opacity < kMinOpacity) continue;
+    // Viewers leave out where a footprint is under 1/255: 1/(255 o) of it.
+    splat.opacity = std::min(splat.opacity + kMinOpacity, static_cast<float>(kMaxOpacity));
+    splat.colour = glm::vec3(glm::dvec3(mean) / mean.w);
+    out.splats.push_back(splat);
+  }
+  return out;
 }
+
+/// A brick that may be replaced by its children.
+struct Candidate {
+  uint32_t brick;
+  float error;
+  bool operator<(const Candidate& other) const {
+    return error != other.error ? error < other.error : brick > other.brick;
+  }
+};
+
+/// Goes down the octree, the largest detail first, as far as the limit allows and the splats do not become faint.
+class Refinement {
+ public:
+  Refinement(const CacheReader& cache, const Classifier& classifier, uint64_t max_splats)
+      : cache_(cache), classifier_(classifier), max_splats_(max_splats) {
+    for (uint32_t n = 0; n < cache.bricks().size() && cache.bricks()[n].parent == kNoBrick; ++n) take(n);
+    if (splats_ > max_splats)
+      throw UsageError(
+          "{}: --max-splats {} is less than the coarsest level has ({} splats); give at least that",
+          cache.path().string(), max_splats, splats_);
+  }
+
+  std::vector<GaussianSplat> run(Progress& progress) {
+    progress.begin("exporting", cache_.bricks().size(), "bricks");
+    while (!candidates_.empty()) {
+      const Candidate next = candidates_.top();
+      candidates_.pop();
+      refine(next.brick);
+      progress.advance(1);
+    }
+    progress.end();
+    std::vector<GaussianSplat> out;
+    for (const auto& [brick, gaussians] : taken_) {
+      (void)brick;
+      out.insert(out.end(), gaussians.splats.begin(), gaussians.splats.end());
+    }
+    return out;
+  }
+
+ private:
+  void take(uint32_t brick) {
+    taken_.emplace(brick, gaussiansOf(classifier_, brick));
+    added(brick);
+  }
+  void added(uint32_t brick) {
+    splats_ += cache_.bricks()[brick].splats;
+    if (!cache_.bricks()[brick].isLeaf()) candidates_.push({brick, cache_.bricks()[brick].error});
+  }
+
+  void refine(uint32_t number) {
+    const Brick& brick = cache_.bricks()[number];
+    uint64_t splats = splats_ - brick.splats;
+    for (uint32_t n = 0; n < brick.child_count; ++n) splats += cache_.bricks()[brick.first_child + n].splats;
+    if (splats > max_splats_) return;
+    std::vector<BrickGaussians> children;
+    double faint = 0, all = 0;
+    for (uint32_t n = 0; n < brick.child_count; ++n) {
+      children.push_back(gaussiansOf(classifier_, brick.first_child + n));
+      faint += children.back().faint;
+      all += children.back().all;
+    }
+    if (faint > kMostFaint * all) return;
+    taken_.erase(number);
+    splats_ -= brick.splats;
+    for (uint32_t n = 0; n < brick.child_count; ++n) {
+      taken_.emplace(brick.first_child + n, std::move(children[n]));
+      added(brick.first_child + n);
+    }
+  }
+
+  const CacheReader& cache_;
+  const Classifier& classifier_;
+  const uint64_t max_splats_;
+  std::map<uint32_t, BrickGaussians> taken_;
+  std::priority_queue<Candidate> candidates_;
+  uint64_t splats_ = 0;
+};
 
 }  // namespace
 
@@ -116,37 +225,8 @@ std::vector<GaussianSplat> gaussianSplats(const CacheReader& cache, size_t varia
                                           const TransferFunction& function, uint64_t max_splats,
                                           Progress& progress) {
   const VariableInfo& info = cache.manifest().variables.at(variable);
-  const ClassificationTable table = ClassificationTable::of(function, info.min, info.max);
-  const Cut cut = cutOf(cache, variable, max_splats);
-  progress.begin("exporting", cut.parts.size(), "bricks");
-  std::vector<GaussianSplat> out;
-  out.reserve(cut.splats);
-  SplatGeometry g;
-  SplatVariable v;
-  for (const BrickPart& part : cut.parts) {
-    const Brick& brick = cache.bricks()[part.brick];
-    cache.readGeometry(part.brick, g);
-    cache.readVariable(part.brick, variable, v);
-    const glm::dvec3 corner = cache.manifest().root.cellMin(brick.cell);
-    for (const SplatRange& range : SplatRanges(brick, part.octants))
-      for (uint32_t n = range.begin; n < range.end; ++n) {
-        const double slope2 = double{v.slope0[n]} * v.slope0[n] + double{v.slope1[n]} * v.slope1[n] +
-                              double{v.slope2[n]} * v.slope2[n];
-        const double half_width =
-            std::sqrt(3 * (kKernelSigma * kKernelSigma * slope2 + std::max(0.0f, v.variance[n])));
-        const glm::dvec4 mean = table.mean(v.mean[n], half_width);
-        if (!(mean.w > 0)) continue;
-        const double a0 = g.axis0[n], a1 = g.axis1[n], a2 = g.axis2[n];
-        const glm::dmat3 a{a0, a0 * g.shear10[n], a0 * g.shear20[n], 0, a1, a1 * g.shear21[n], 0, 0, a2};
-        GaussianSplat splat = gaussianOf(corner + glm::dvec3(g.x[n], g.y[n], g.z[n]), a, g.weight[n], mean.w);
-        if (splat.opacity < kMinOpacity) continue;
-        splat.colour = glm::vec3(glm::dvec3(mean) / mean.w);
-        out.push_back(splat);
-      }
-    progress.advance(1);
-  }
-  progress.end();
-  return out;
+  const Classifier classifier{cache, variable, ClassificationTable::of(function, info.min, info.max)};
+  return Refinement(cache, classifier, max_splats).run(progress);
 }
 
 }  // namespace curvisplat

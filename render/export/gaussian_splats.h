@@ -40,9 +40,10 @@ GaussianOpacity gaussianOpacity(double optical_depth);
 /// colour.
 GaussianSplat gaussianOf(const glm::dvec3& position, const glm::dmat3& a, double weight, double extinction);
 
-/// The splats of the finest levels that have at most `max_splats` splats, the largest detail first; those that are nearly
-/// transparent (opacity under 1/255, which viewers leave out) are left out. Takes 64 bytes a splat. Throws UsageError if
-/// the coarsest level has more splats, and as CacheReader does.
+/// The splats of the finest levels that have at most `max_splats` splats, the largest detail first, as far as they do not become
+/// faint: viewers blend in eight bits, which round much of a faint splat away. Those that are nearly transparent (opacity under
+/// 1/255, which viewers leave out) are left out, and the others get what viewers leave out of their footprints. Takes 64 bytes a
+/// splat. Throws UsageError if the coarsest level has more splats, and as CacheReader does.
 std::vector<GaussianSplat> gaussianSplats(const CacheReader& cache, size_t variable,
                                           const TransferFunction& function, uint64_t max_splats,
                                           Progress& progress);

@@ -1,6 +1,7 @@
 #include "render/frame/first_picture.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -29,6 +30,15 @@ std::vector<Between> positions(int whole, int reduced, double scale) {
   return found;
 }
 
+/// A row of the reduced picture at the columns of the whole one.
+void widen(const float* row, const std::vector<Between>& columns, float* out) {
+  for (const Between& column : columns) {
+    const float *const left = row + 4 * column.first, *const right = row + 4 * column.second;
+    for (int c = 0; c < 4; ++c) out[c] = left[c] + column.part * (right[c] - left[c]);
+    out += 4;
+  }
+}
+
 }  // namespace
 
 ReducedSize::ReducedSize(ImageSize size, double detail_px) : whole_(size), reduced_(size) {
@@ -47,18 +57,24 @@ Image ReducedSize::enlarge(const Image& picture) const {
   const std::vector<Between> columns = positions(whole_.width, reduced_.width, scale);
   const std::vector<Between> rows = positions(whole_.height, reduced_.height, scale);
   Image image(whole_);
-  for (int y = 0; y < whole_.height; ++y)
-    for (int x = 0; x < whole_.width; ++x) {
-      const float* const corners[2][2] = {
-          {picture.pixel(columns[x].first, rows[y].first), picture.pixel(columns[x].second, rows[y].first)},
-          {picture.pixel(columns[x].first, rows[y].second),
-           picture.pixel(columns[x].second, rows[y].second)}};
-      for (int c = 0; c < 4; ++c) {
-        const float upper = std::lerp(corners[0][0][c], corners[0][1][c], columns[x].part);
-        const float lower = std::lerp(corners[1][0][c], corners[1][1][c], columns[x].part);
-        image.pixel(x, y)[c] = std::lerp(upper, lower, rows[y].part);
-      }
+  const size_t row_floats = 4 * static_cast<size_t>(whole_.width);
+  // The rows of the reduced picture, made as wide as the whole one: each lies above or below several rows of it.
+  std::array<std::vector<float>, 2> wide{std::vector<float>(row_floats), std::vector<float>(row_floats)};
+  std::array<int, 2> held{-1, -1};
+  const auto widened = [&](int row) -> const float* {
+    const auto slot = static_cast<size_t>(row % 2);
+    if (held[slot] != row) {
+      held[slot] = row;
+      widen(picture.pixel(0, row), columns, wide[slot].data());
     }
+    return wide[slot].data();
+  };
+  for (int y = 0; y < whole_.height; ++y) {
+    const Between& row = rows[static_cast<size_t>(y)];
+    const float *const upper = widened(row.first), *const lower = widened(row.second);
+    float* const out = image.pixel(0, y);
+    for (size_t n = 0; n < row_floats; ++n) out[n] = upper[n] + row.part * (lower[n] - upper[n]);
+  }
   return image;
 }
 

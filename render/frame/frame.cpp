@@ -1,7 +1,5 @@
 #include "render/frame/frame.h"
 
-#include <limits>
-
 #include "render/frame/first_picture.h"
 #include "render/frame/frame_pipeline.h"
 #include "render/frame/frame_plan.h"
@@ -86,14 +84,7 @@ struct FrameRenderer::State {
     if (drawn.layers) planner.addLayers(plan, drawn.layers, options);
     const PixelLayers all = everywhere(picture.size, depthOrigin(drawn));
     plan.settings.layers = &all;
-    const VariableInfo& info = cache.manifest().variables[scalars.opacity.variable];
-    ValueInputs inputs{picture, drawn.layers.get(), plan.settings.view};
-    inputs.boundary = std::numeric_limits<double>::infinity();
-    if (const auto& iso = plan.settings.iso) {
-      inputs.scale = iso->scale;
-      inputs.offset = iso->offset;
-      if (iso->volume) inputs.boundary = info.max + (info.max - info.min);
-    }
+    const ValueInputs inputs{picture, drawn.layers.get(), plan.settings.view};
     FramePipeline values(cache, scalars, planner, makeValueBackend(inputs));
     FrameStatistics ignored;
     return values.draw(plan, options, ignored, progress);

@@ -4,6 +4,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <limits>
 #include <span>
 #include <thread>
 #include <utility>
@@ -34,21 +35,35 @@ unsigned threadsOf(const FrameOptions& options) {
   return options.threads ? options.threads : std::max(1u, std::thread::hardware_concurrency());
 }
 
+/// What the splats of isosurfaces may take; where it is too little they are found in several parts of the picture.
+uint64_t isoSplatBytes(const FrameOptions& options) {
+  constexpr uint64_t kLeastBytes = 4 << 20;
+  return std::max(kLeastBytes, options.memory_bytes / 8);
+}
+
+tbb::task_arena arenaOf(const FrameOptions& options) {
+  return tbb::task_arena(std::min(static_cast<int>(threadsOf(options)), tbb::info::default_concurrency()));
+}
+
 /// About what a scene takes: its meshes, their vertices on the screen and their triangles in tiles, samples of slices
 /// and of surfaces, and a layer and a half a pixel with a window behind it. The same for all pictures of one size.
 uint64_t sceneBytes(const FrameOptions& options) {
   if (!options.scene || options.scene->empty()) return 0;
-  const uint64_t slice_bytes = options.scene->slices_by_function ? 48 : 24;  // of two scalars
+  const uint64_t slice_bytes = options.scene->slices_by_function ? 144 : 72;  // of two scalars
   const auto is_translucent = [](const auto& surface) { return !surface.opacity.opaque(); };
   const bool peels =
       std::any_of(options.scene->surfaces.begin(), options.scene->surfaces.end(), is_translucent) ||
       std::any_of(options.scene->grid_surfaces.begin(), options.scene->grid_surfaces.end(), is_translucent);
-  constexpr uint64_t kLayerBytes = 56, kVertexBytes = 12, kTriangleBytes = 8;
+  constexpr uint64_t kLayerBytes = 64, kIsoTracerBytes = 2 << 20, kIsoBytesAPixel = 48, kVertexBytes = 12,
+                     kTriangleBytes = 8;
   uint64_t bytes = kSampleTileBytes * (peels ? PixelLayers::kMostLayers : 1) * threadsOf(options) +
                    options.size.pixels() * (kLayerBytes + slice_bytes * options.scene->slices.size());
   for (const Surface& surface : options.scene->surfaces)
     bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size() +
              kTriangleBytes * surface.mesh->triangles.size();
+  if (!options.scene->isovalues.empty())
+    bytes += isoSplatBytes(options) + kIsoTracerBytes * threadsOf(options) +
+             kIsoBytesAPixel * options.size.pixels();
   if (!options.scene->grid_surfaces.empty())
     bytes += FaceMeshes::bytes(*options.scene, options.size.pixels());
   return bytes;
@@ -181,7 +196,7 @@ bool FramePipeline::beginSlab(const FramePlan& plan, const FrameOptions& options
 }
 
 void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics) {
-  if (!options.scene || (options.scene->empty() && options.scene->drawsSplats())) return;
+  if (!options.scene || (options.scene->empty() && options.scene->volume)) return;
   const ScreenView& view = plan.settings.view;
   const auto samplerOf = [&](const SlicePlan& slice, size_t variable) {
     const VariableInfo& info = cache_.manifest().variables[variable];
@@ -194,32 +209,73 @@ void FramePipeline::drawLayers(FramePlan& plan, const FrameOptions& options, Fra
     if (!samplers.back()->isSeen()) continue;
     SliceSampler* const opacities = of_opacity.empty() ? nullptr : of_opacity.back().get();
     const SlicePlan share = shareOf(slice, options);
-    sampleSlice({cache_, share.parts, *samplers.back(), opacities, options.keep_going}, options, statistics);
+    const auto take = [&](size_t, const glm::dvec3& cell_min, const BrickSource::Splats& splats) {
+      samplers.back()->add(cell_min, splats.geometry, splats.second.value_or(splats.values), splats.ranges);
+      if (opacities) opacities->add(cell_min, splats.geometry, splats.values, splats.ranges);
+    };
+    sample({cache_, share.parts, take, options.keep_going}, options, statistics);
     if (!options.ranks) continue;
     samplers.back()->addOthers(*options.ranks);
     if (opacities) opacities->addOthers(*options.ranks);
   }
-  const StageTimer timer(statistics.surfaces_s, "draw surfaces");
   const glm::dvec3 middle = 0.5 * (cache_.manifest().lower + cache_.manifest().upper);
+  const double depth_origin = view.projection == Projection::kPerspective ? 0 : view.viewFromData(middle).z;
+  const auto isosurfaces = this->isosurfaces(plan, options, depth_origin, statistics);
+  const StageTimer timer(statistics.surfaces_s, "draw surfaces");
   std::optional<ColourTable> opacities;
   if (options.scene->slices_by_function) opacities.emplace(planner_.transferFunction());
   const SceneLook look{planner_.colours(),
                        options.light,
                        plan.settings.clip_planes,
-                       view.projection == Projection::kPerspective ? 0 : view.viewFromData(middle).z,
+                       depth_origin,
                        opacities ? &*opacities : nullptr,
-                       of_opacity};
+                       of_opacity,
+                       isosurfaces ? &*isosurfaces : nullptr};
   std::shared_ptr<const PixelLayers> layers;
-  tbb::task_arena arena(std::min(static_cast<int>(threadsOf(options)), tbb::info::default_concurrency()));
-  arena.execute([&] {
+  arenaOf(options).execute([&] {
     const SurfaceScene scene = face_meshes_.withMeshes(options.scene, view, options.lod_pixels);
     layers = std::make_shared<PixelLayers>(layersOf(scene, view, samplers, look));
   });
   planner_.addLayers(plan, std::move(layers), options);
 }
 
-void FramePipeline::sampleSlice(const SliceWork& work, const FrameOptions& options,
-                                FrameStatistics& statistics) {
+/// A part of the picture after the other, each as large as its splats fit into the memory; a tile always does.
+std::optional<IsoLayers> FramePipeline::isosurfaces(const FramePlan& plan, const FrameOptions& options,
+                                                    double depth_origin, FrameStatistics& statistics) {
+  if (options.scene->isovalues.empty()) return std::nullopt;
+  const ProjectionSettings& settings = plan.settings;
+  IsoLayers layers(settings.view.size);
+  std::vector<TileRange> left{{0, layers.tiles()}};
+  while (!left.empty()) {
+    const TileRange tiles = left.back();
+    left.pop_back();
+    const uint64_t most_bytes =
+        tiles.count() > 1 ? isoSplatBytes(options) : std::numeric_limits<uint64_t>::max();
+    IsoSplats splats({settings.view, options.scene->isovalues, settings.borders, settings.clip_planes,
+                      depth_origin, tiles, most_bytes},
+                     plan.iso_parts.size());
+    const auto take = [&](size_t part, const glm::dvec3& cell_min, const BrickSource::Splats& of_part) {
+      splats.add(part, cell_min, of_part.geometry, of_part.values,
+                 of_part.second ? &*of_part.second : nullptr, of_part.ranges);
+    };
+    sample({cache_, plan.iso_parts, take, options.keep_going}, options, statistics);
+    if (splats.overflowed()) {
+      const size_t middle = (tiles.begin + tiles.end) / 2;
+      left.push_back({middle, tiles.end});
+      left.push_back({tiles.begin, middle});
+      continue;
+    }
+    const StageTimer timer(statistics.surfaces_s, "draw isosurfaces");
+    arenaOf(options).execute([&] {
+      splats.sort();
+      layers.draw(splats, {planner_.colours(), options.light, options.scene->iso_opacity});
+    });
+  }
+  return layers;
+}
+
+void FramePipeline::sample(const SamplingWork& work, const FrameOptions& options,
+                           FrameStatistics& statistics) {
   makePools(options);
   const std::stop_callback on_stop(options.stop, [this] { stopStages(); });
   try {
@@ -238,13 +294,9 @@ void FramePipeline::sampleSlice(const SliceWork& work, const FrameOptions& optio
   throwIfStopped(options.stop);
 }
 
-const ClassificationTable& FramePipeline::tableOf(const FramePlan& plan) const {
-  return plan.table ? *plan.table : planner_.table();
-}
-
 Image FramePipeline::draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
                           Progress* progress) {
-  const FrameWork work{cache_,    plan.parts, plan.settings,      tableOf(plan),
+  const FrameWork work{cache_,    plan.parts, plan.settings,      planner_.table(),
                        plan.keys, hidden_,    options.keep_going, plan.tiles.get()};
   makePools(options);
   const std::stop_callback on_stop(options.stop, [this] { stopStages(); });
@@ -298,7 +350,7 @@ Image FramePipeline::paint(const FramePlan& plan, const FrameOptions& options, F
   backend_->run([&](Painter& painter) {
     const DrawsFinished finished(painter);
     painter.begin(
-        plan.settings.view.size, options.background, tableOf(plan),
+        plan.settings.view.size, options.background, planner_.table(),
         {plan.settings.per_pixel, plan.settings.lit(), plan.settings.layers, planner_.colourClasses()},
         resourcesOf(options));
     if (plan.tiles) painter.drawOnly(*plan.tiles);

@@ -24,6 +24,7 @@
 #include "render/frame/frame_statistics.h"
 #include "render/frame/hidden_bricks.h"
 #include "render/surface/face_meshes.h"
+#include "render/surface/iso_layers.h"
 #include "render/surface/slice_sampler.h"
 #include "stream/base/mutex.h"
 #include "stream/base/progress.h"
@@ -31,7 +32,7 @@
 
 namespace curvisplat {
 
-struct SliceWork;
+struct SamplingWork;
 
 /// The stages and pools of one variable, or two, of one cache. One caller at a time.
 class FramePipeline {
@@ -50,7 +51,7 @@ class FramePipeline {
   /// the plan's. Adds to `statistics`. Throws as FrameRenderer::render() does.
   Image draw(const FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics,
              Progress* progress);
-  /// Draws the surfaces and slices of options.scene, if there is one, and puts them into the plan as its layers.
+  /// Draws the surfaces, slices and isosurfaces of options.scene, if there is one, and puts them into the plan as its layers.
   /// Before draw(), and as draw().
   void drawLayers(FramePlan& plan, const FrameOptions& options, FrameStatistics& statistics);
 
@@ -70,8 +71,9 @@ class FramePipeline {
  private:
   struct Pools;
 
-  const ClassificationTable& tableOf(const FramePlan& plan) const;
-  void sampleSlice(const SliceWork& work, const FrameOptions& options, FrameStatistics& statistics);
+  void sample(const SamplingWork& work, const FrameOptions& options, FrameStatistics& statistics);
+  std::optional<IsoLayers> isosurfaces(const FramePlan& plan, const FrameOptions& options,
+                                       double depth_origin, FrameStatistics& statistics);
   bool beginSlab(const FramePlan& plan, const FrameOptions& options);
   void stopStages();
   void makePools(const FrameOptions& options);

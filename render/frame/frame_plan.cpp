@@ -5,7 +5,6 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
-#include "render/colour/iso_table.h"
 #include "render/frame/hidden_bricks.h"
 #include "render/frame/tile_dealer.h"
 #include "render/project/kernel.h"
@@ -38,6 +37,13 @@ std::optional<ClassificationTable> colourClassesFor(const CacheReader& cache,
 CutView::Plane cutPlane(const ClipPlane& plane, const ScreenView& view) {
   const glm::dvec3 normal = glm::normalize(plane.normal / view.scale);
   return {normal, -glm::dot(normal, view.scale * plane.point)};
+}
+
+/// The scalars that splats with these bounds can have.
+std::pair<double, double> spreadOf(const ValueBounds& bounds, double reach) {
+  const double deviation = std::hypot(kKernelSigma * bounds.largest_slope, bounds.largest_deviation);
+  const double spread = 1.001 * (reach * bounds.largest_slope + ScreenCut::kReach * deviation);
+  return {bounds.min - spread, bounds.max + spread};
 }
 
 CutOptions limitsOf(const FrameOptions& options, DrawingOrder order) {
@@ -106,33 +112,13 @@ ProjectionSettings FramePlanner::settingsFor(const Camera& camera, const FrameOp
   return settings;
 }
 
-/// Returns a test of a brick's value bounds: whether every scalar that its pixels can have is without
-/// extinction, and none is an isovalue.
-TransparentBounds FramePlanner::transparentIn(const ProjectionSettings& settings,
-                                              const FrameOptions& options) const {
+/// Returns a test of a brick's value bounds: whether every scalar that its pixels can have is without extinction.
+TransparentBounds FramePlanner::transparentIn(const ProjectionSettings& settings) const {
   const double reach = settings.per_pixel ? largestReach(settings.view.low_pass_px2) : 1;
-  const bool volume = !settings.iso || settings.iso->volume;
-  std::vector<double> values;
-  if (settings.iso) values = options.scene->isovalues;
-  return [this, reach, volume, values](const ValueBounds& bounds) {
-    const double deviation = std::hypot(kKernelSigma * bounds.largest_slope, bounds.largest_deviation);
-    const double spread = 1.001 * (reach * bounds.largest_slope + ScreenCut::kReach * deviation);
-    const double low = bounds.min - spread, high = bounds.max + spread;
-    return (!volume || table_.fullyTransparent(static_cast<float>(low), static_cast<float>(high))) &&
-           std::none_of(values.begin(), values.end(), [&](double v) { return v >= low && v <= high; });
+  return [this, reach](const ValueBounds& bounds) {
+    const auto [low, high] = spreadOf(bounds, reach);
+    return table_.fullyTransparent(static_cast<float>(low), static_cast<float>(high));
   };
-}
-
-std::shared_ptr<const ClassificationTable> FramePlanner::addIsosurfaces(const FrameOptions& options,
-                                                                        ProjectionSettings& settings) const {
-  if (!options.scene || options.scene->isovalues.empty()) return nullptr;
-  const VariableInfo& info = cache_.manifest().variables[variable_];
-  const IsoTable iso =
-      IsoTable::of(transfer_function_, options.scene->isovalues, -std::log1p(-options.scene->iso_opacity),
-                   info.min, info.max, options.scene->volume);
-  settings.iso = IsoProjection{static_cast<float>(iso.scale), static_cast<float>(iso.offset),
-                               options.light.value_or(Light{}), options.scene->volume};
-  return std::make_shared<ClassificationTable>(iso.table);
 }
 
 CutView FramePlanner::cutViewOf(const ProjectionSettings& settings) const {
@@ -158,10 +144,28 @@ std::vector<SlicePlan> FramePlanner::planSlices(const ProjectionSettings& settin
   return slices;
 }
 
+/// What is transparent in the volume is there. In the order of the bricks, which is the same for all painters.
+void FramePlanner::planIsosurfaces(const FrameOptions& options, const CutOptions& limits,
+                                   FramePlan& plan) const {
+  if (!options.scene || options.scene->isovalues.empty()) return;
+  const CutTree tree{cache_.manifest().root, cache_.bricks(), cache_.brickVariables(variable_), subtrees_};
+  const double reach = largestReach(plan.settings.view.low_pass_px2);
+  const auto has_none = [&](const ValueBounds& bounds) {
+    const auto [low, high] = spreadOf(bounds, reach);
+    const auto& values = options.scene->isovalues;
+    return std::none_of(values.begin(), values.end(), [&](double v) { return v >= low && v <= high; });
+  };
+  Cut cut = curvisplat::chooseCut(tree, cutViewOf(plan.settings), has_none, limits);
+  plan.iso_parts = std::move(cut.parts);
+  plan.iso_complete = cut.complete;
+  std::sort(plan.iso_parts.begin(), plan.iso_parts.end(),
+            [](const BrickPart& a, const BrickPart& b) { return a.brick < b.brick; });
+}
+
 Cut FramePlanner::chooseCut(const ProjectionSettings& settings, const FrameOptions& options,
                             const CutOptions& limits) const {
   const CutTree tree{cache_.manifest().root, cache_.bricks(), cache_.brickVariables(variable_), subtrees_};
-  Cut cut = curvisplat::chooseCut(tree, cutViewOf(settings), transparentIn(settings, options), limits);
+  Cut cut = curvisplat::chooseCut(tree, cutViewOf(settings), transparentIn(settings), limits);
   if (options.max_splats && cut.splats > *options.max_splats)
     throw UsageError(
         "--max-splats {} is less than the coarsest picture of this cache takes ({} splats); give at least "
@@ -186,12 +190,11 @@ FramePlan FramePlanner::planOf(const ProjectionSettings& settings, Cut cut, Draw
 }
 
 FramePlan FramePlanner::plan(const Camera& camera, const FrameOptions& options, DrawingOrder order) const {
-  ProjectionSettings settings = settingsFor(camera, options, options.size);
-  auto table = addIsosurfaces(options, settings);
+  const ProjectionSettings settings = settingsFor(camera, options, options.size);
   const CutOptions limits = limitsOf(options, order);
   FramePlan plan = planOf(settings, chooseCut(settings, options, limits), order);
-  plan.table = std::move(table);
   plan.slices = planSlices(settings, options, limits);
+  planIsosurfaces(options, limits, plan);
   return plan;
 }
 
@@ -215,7 +218,7 @@ void FramePlanner::addLayers(FramePlan& plan, std::shared_ptr<const PixelLayers>
                              const FrameOptions& options) const {
   plan.layers = std::move(layers);
   plan.settings.layers = plan.layers.get();
-  const bool volume = options.scene->drawsSplats();
+  const bool volume = options.scene->volume;
   if (volume && options.keep_going)
     return;  // an ancestor that replaces a damaged brick reaches out of its box
   plan.parts_hidden = std::erase_if(plan.parts, [&](const SweptPart& part) {
@@ -228,18 +231,16 @@ void FramePlanner::addLayers(FramePlan& plan, std::shared_ptr<const PixelLayers>
 
 QuickPlan FramePlanner::planQuick(const Camera& camera, const FrameOptions& options, const QuickLimits& quick,
                                   DrawingOrder order) const {
-  ProjectionSettings settings = settingsFor(camera, options, options.size);
-  auto table = addIsosurfaces(options, settings);
+  const ProjectionSettings settings = settingsFor(camera, options, options.size);
   CutOptions limits = limitsOf(options, order);
   limits.max_splats = std::min(limits.max_splats, quick.max_splats);
   limits.max_bytes = std::min(limits.max_bytes, quick.max_bytes);
   Cut cut = chooseCut(settings, options, limits);
   const ReducedSize size(options.size, std::max(quick.detail_px, cut.complete ? 0 : cut.largest_error_px));
   ProjectionSettings reduced = size.isWhole() ? settings : settingsFor(camera, options, size.size());
-  reduced.iso = settings.iso;
   FramePlan plan = planOf(reduced, std::move(cut), order);
-  plan.table = std::move(table);
   plan.slices = planSlices(plan.settings, options, limits);
+  planIsosurfaces(options, limits, plan);
   return {std::move(plan), size};
 }
 

@@ -40,9 +40,9 @@ struct FramePlan {
   Cut cut;
   DepthKeys keys;
   std::vector<SweptPart> parts;  // of the cut, in the sweep's order
-  std::shared_ptr<const ClassificationTable> table =
-      nullptr;  // of a picture with isosurfaces; null: the planner's
   std::vector<SlicePlan> slices = {};
+  std::vector<BrickPart> iso_parts = {};                // that may have isosurfaces
+  bool iso_complete = true;                             // as Cut's
   std::shared_ptr<const PixelLayers> layers = nullptr;  // those of settings, where there are some
   uint64_t parts_hidden = 0;                            // of the cut, behind opaque layers: not in `parts`
   std::shared_ptr<const TileSet> tiles = nullptr;       // of this rank; null: all
@@ -59,7 +59,7 @@ struct QuickPlan {
 
   /// Whether the picture is the final one: no brick is left to refine, and it has all pixels.
   bool isFinal() const {
-    return plan.cut.complete && size.isWhole() &&
+    return plan.cut.complete && plan.iso_complete && size.isWhole() &&
            std::all_of(plan.slices.begin(), plan.slices.end(), [](const SlicePlan& s) { return s.complete; });
   }
 };
@@ -104,9 +104,8 @@ class FramePlanner {
   uint64_t mostSplats() const;
 
  private:
-  std::shared_ptr<const ClassificationTable> addIsosurfaces(const FrameOptions& options,
-                                                            ProjectionSettings& settings) const;
-  TransparentBounds transparentIn(const ProjectionSettings& settings, const FrameOptions& options) const;
+  TransparentBounds transparentIn(const ProjectionSettings& settings) const;
+  void planIsosurfaces(const FrameOptions& options, const CutOptions& limits, FramePlan& plan) const;
   ProjectionSettings settingsFor(const Camera& camera, const FrameOptions& options, ImageSize size) const;
   CutView cutViewOf(const ProjectionSettings& settings) const;
   Cut chooseCut(const ProjectionSettings& settings, const FrameOptions& options,

@@ -44,7 +44,7 @@ void FrameWorkers::start() {
   team_.start([this](unsigned number) { loop(*workers_[number]); });
 }
 
-void FrameWorkers::startSampling(const SliceWork& work) {
+void FrameWorkers::startSampling(const SamplingWork& work) {
   begin();
   team_.start([this, work](unsigned number) { sample(*workers_[number], work); });
 }
@@ -125,16 +125,13 @@ void FrameWorkers::fail() {
   stop();
 }
 
-void FrameWorkers::sample(Worker& worker, const SliceWork& work) {
+void FrameWorkers::sample(Worker& worker, const SamplingWork& work) {
   try {
     for (uint64_t sequence = next_++; sequence < work.parts.size(); sequence = next_++) {
       const auto fetched = fetch(worker, sequence, work.parts[sequence], work.keep_going);
       if (!fetched) return;
-      const StageTimer timer(worker.statistics.project_s, "sample slice");
-      const glm::dvec3 cell_min = work.cache.manifest().root.cellMin(fetched->cell);
-      work.sampler.add(cell_min, fetched->geometry, fetched->second.value_or(fetched->values),
-                       fetched->ranges);
-      if (work.opacities) work.opacities->add(cell_min, fetched->geometry, fetched->values, fetched->ranges);
+      const StageTimer timer(worker.statistics.project_s, "sample splats");
+      work.take(sequence, work.cache.manifest().root.cellMin(fetched->cell), *fetched);
     }
   } catch (...) {
     fail();

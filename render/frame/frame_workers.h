@@ -36,12 +36,12 @@ struct FrameWork {
   const TileSet* tiles = nullptr;  // what is drawn of the picture; null: all
 };
 
-/// The same for a slice.
-struct SliceWork {
+/// The same for what is found from splats before the picture is drawn: slices and isosurfaces.
+struct SamplingWork {
   const CacheReader& cache;
   std::span<const BrickPart> parts;
-  SliceSampler& sampler;
-  SliceSampler* opacities = nullptr;  // of two scalars: samples the first, or null
+  /// Takes the splats of parts[part], whose positions count from `cell_min`. Any thread.
+  std::function<void(size_t part, const glm::dvec3& cell_min, const BrickSource::Splats& splats)> take;
   bool keep_going = false;
 };
 
@@ -70,8 +70,8 @@ class FrameWorkers {
   /// Stops sweep, ring and source. Any thread.
   void stop();
 
-  /// Starts the workers on the parts that a slice crosses, which the source must have. finish() waits for them.
-  void startSampling(const SliceWork& work);
+  /// Starts the workers on the parts of `work`, which the source must have. finish() waits for them.
+  void startSampling(const SamplingWork& work);
 
   /// Begins a prefetch, for which the source must be ready. Errors of bricks are left to the frame to report.
   void startPrefetch();
@@ -83,7 +83,7 @@ class FrameWorkers {
   enum class Seen : uint8_t { kNo, kHidden, kProjected };
 
   void loop(Worker& worker);
-  void sample(Worker& worker, const SliceWork& work);
+  void sample(Worker& worker, const SamplingWork& work);
   void begin();
   void fail();
   // Return false if the sweep, the ring or the source was stopped.

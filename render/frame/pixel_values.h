@@ -13,7 +13,7 @@ namespace curvisplat {
 struct PixelValues {
   ImageSize size;
   std::vector<float> depth;   // from the eye; orthographic: along the view, from the camera's position
-  std::vector<float> scalar;  // NaN on surfaces and slices
+  std::vector<float> scalar;  // NaN on surfaces without one
   std::vector<glm::vec3>
       normal;  // towards the viewer, in coordinates after --scale; length 1, or 0 if unknown
 };

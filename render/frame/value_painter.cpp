@@ -295,7 +295,6 @@ class ValuePainter final : public Painter {
     const ScreenSplat& s = of.splat;
     pixel.found = true;
     double f = s.mean + s.slope0 * u0 + s.slope1 * u1;
-    if (f > inputs_.boundary) f = (f - inputs_.offset) / inputs_.scale;
     if (of.colour) f = of.colour->mean + of.colour->slope[0] * u0 + of.colour->slope[1] * u1;
     const glm::dvec3 gradient = gradientOf(of, s);
     glm::dvec3 n = glm::inverse(glm::transpose(placeSlopes(x, y, z))) * gradient;
@@ -316,7 +315,7 @@ class ValuePainter final : public Painter {
       pixel.through *= 1 - layer.colour.w;
       if (pixel.through > pixel.target) continue;
       pixel.found = true;
-      const float values[4] = {layer.depth, std::numeric_limits<float>::quiet_NaN(), kOfLayer, kOfLayer};
+      const float values[4] = {layer.depth, layer.scalar, kOfLayer, kOfLayer};
       std::copy_n(values, 4, pixel.values);
     }
   }

@@ -18,8 +18,6 @@ struct ValueInputs {
   const Image& picture;       // that has been drawn, over a transparent background: its opacities
   const PixelLayers* layers;  // the real ones; may be null
   const ScreenView& view;
-  // Scalars above the boundary are those of isosurfaces (iso_table.h): scale f + offset.
-  double boundary = 0, scale = 1, offset = 0;
 };
 
 /// Layers that make all splats have ScreenDepths.

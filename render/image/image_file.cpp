@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "render/image/image_formats.h"
 #include "stream/base/check.h"
@@ -11,6 +13,7 @@
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/base/paths.h"
+#include "stream/base/suggestion.h"
 
 namespace curvisplat {
 namespace {
@@ -37,7 +40,8 @@ const Format& formatByName(const std::filesystem::path& path) {
   const std::string ending = extensionOf(path);
   for (const Format& format : kFormats)
     if (format.encode != nullptr && ending == format.ending) return format;
-  throw UsageError("{}: unknown image format; the name must end in .png, .exr or .pfm", path.string());
+  throw UsageError("{}: unknown image format{}; the name must end in .png, .exr or .pfm", path.string(),
+                   didYouMean(ending, std::vector<std::string>{".png", ".exr", ".pfm"}));
 }
 
 }  // namespace

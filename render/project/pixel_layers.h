@@ -7,7 +7,7 @@
 // window on its own; at the end windows and layers are composited front to back. So it does not matter in
 // which order splats of different windows are drawn.
 //
-// Immutable once it is made; any thread. A pixel takes 4 bytes, a layer 20.
+// Immutable once it is made; any thread. A pixel takes 4 bytes, a layer 24.
 #pragma once
 
 #include <cstdint>
@@ -25,6 +25,7 @@ namespace curvisplat {
 struct PixelLayer {
   float depth;       // PixelLayers::depthOrigin() away; perspective: from the eye
   glm::vec4 colour;  // premultiplied
+  float scalar = std::numeric_limits<float>::quiet_NaN();  // there; NaN: none
 };
 
 /// A pixel's colour behind everything: what its windows and layers make of it.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "render/project/border_parts.h"
 #include "render/project/clip_planes.h"
@@ -24,8 +23,6 @@
 namespace curvisplat {
 namespace {
 
-// Where an isosurface is, the scalar changes: its light is as strong as a surface's.
-constexpr double kIsoLightG0 = 0.01;
 constexpr size_t kBlock = 256;  // splats at a time: the arrays between the two loops stay in the L1 cache
 
 /// The results that the arithmetic loop passes to the loop that chooses.
@@ -103,15 +100,7 @@ struct Cutting {
   const BorderStyle* borders;  // null: cells at borders are drawn as any cell, and clip planes do not cut
   LocalClipPlanes clip;
   LocalLayers layers;
-  const IsoProjection* iso = nullptr;  // of isosurfaces
 };
-
-/// Of isosurfaces: how much the scalar changes along the ray, per unit of depth.
-float changeAlongRay(const PlacedPiece& at, const SplatPiece& piece, const Ellipse& ellipse,
-                     float low_pass_px2) {
-  const ScreenDepth ray = depthAlongRay(at.rows, at.depth_row, at.depth, piece, ellipse, low_pass_px2);
-  return std::abs(ray.correlation) * ellipse.half_width / std::numbers::sqrt3_v<float> * ray.per_depth;
-}
 
 SplatPiece wholeOf(const GeometryArrays<const float>& geometry, const VariableArrays<const float>& variable,
                    size_t i) {
@@ -154,10 +143,8 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
   const uint32_t border_code = how.border_code;
   const SplatPiece whole = wholeOf(brick.geometry, variable, i);
   const glm::dvec3 slope(whole.slope.w0, whole.slope.w1, whole.slope.w2);
-  const float scale = cutting.iso ? cutting.iso->scale : 1, offset = cutting.iso ? cutting.iso->offset : 0;
-  if (chooser.transparentThroughout(scale * whole.mean + offset,
-                                    scale * static_cast<float>(drawnSlope(slope, border_code)),
-                                    scale * scale * variable.variance[i]))
+  if (chooser.transparentThroughout(whole.mean, static_cast<float>(drawnSlope(slope, border_code)),
+                                    variable.variance[i]))
     return SplatChooser::Fate::kTransparent;
   auto best = SplatChooser::Fate::kOffScreen;
   // A splat that is cut has a record of its own, as any splat; what it takes beyond that counts.
@@ -179,13 +166,6 @@ std::optional<SplatChooser::Fate> choosePieces(const Map& map, BrickPass& pass, 
     const size_t records = least + (faces ? 1u : 0u) + (across ? 1u : 0u);
     if (left.pieces + own < records) return false;
     ScreenSplat splat = screenSplat(at.x, at.y, ellipse, piece.mean);
-    if (cutting.iso) {
-      splat.amplitude *= changeAlongRay(at, piece, ellipse, map.low_pass.footprint_px2);
-      splat.mean = scale * splat.mean + offset;
-      splat.slope0 *= scale;
-      splat.slope1 *= scale;
-      splat.half_width *= scale;
-    }
     if (piece.growth.count > 0) splat.skew = skewOf(at.rows, piece.growth, ellipse);
     ScreenDepth along_ray;
     if (across) {
@@ -250,8 +230,7 @@ bool projectRange(const Map& map, BrickPass& pass, const SplatRange& range) {
         ++counts.clipped;
         continue;
       }
-      how.layered = cutting.iso != nullptr;
-      bool in_pieces = block.too_wide[n] || how.border_code != kNoBorder || how.clipped || how.layered;
+      bool in_pieces = block.too_wide[n] || how.border_code != kNoBorder || how.clipped;
       if (!cutting.layers.empty() && !in_pieces) {
         const LayerSide side = cutting.layers.sideOf(
             block.x[n], block.y[n], block.ellipse(n), block.depth[n],
@@ -330,21 +309,10 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
   if (settings.light) light.emplace(*settings.light, settings.light_g0, settings.view, cell_min);
   SplatChooser chooser(settings.view, largestReach(settings.view.low_pass_px2),
                        {settings.per_pixel, settings.lit()}, table, {splats_, depths_});
-  Cutting iso_cutting = cutting;
-  std::optional<LocalLight> iso_light;
-  if (settings.iso) {
-    iso_cutting.iso = &*settings.iso;
-    iso_light.emplace(settings.iso->light, kIsoLightG0 * settings.light_g0, settings.view, cell_min);
-  }
-  const bool volume = !settings.iso || settings.iso->volume;
-  const auto projected = [&](const auto& map, bool isosurfaces) {
-    BrickPass pass{brick, isosurfaces ? iso_cutting : cutting, isosurfaces ? iso_light : light, chooser,
-                   counts_};
+  const auto projectAll = [&](const auto& map) {
+    BrickPass pass{brick, cutting, light, chooser, counts_};
     return std::all_of(ranges.begin(), ranges.end(),
                        [&](const SplatRange& range) { return projectRange(map, pass, range); });
-  };
-  const auto projectAll = [&](const auto& map) {
-    return (!volume || projected(map, false)) && (!settings.iso || projected(map, true));
   };
   // Where the near plane is too near for float, coarser is not less: then what was cut until there is drawn.
   constexpr float kCoarsest = 1e30f;
@@ -354,7 +322,7 @@ void BrickProjector::project(const ProjectionSettings& settings, const Classific
     splats_.clear();
     depths_.clear();
     counts_ = {};
-    cutting.borders = iso_cutting.borders = coarseness == 1 ? &settings.borders : nullptr;
+    cutting.borders = coarseness == 1 ? &settings.borders : nullptr;
     complete = settings.view.projection == Projection::kOrthographic
                    ? projectAll(OrthographicMap(settings.view, cell_min))
                    : projectAll(PerspectiveMap(settings.view, cell_min, coarseness));

@@ -41,15 +41,6 @@ struct ProjectionCounts {
                         // cuts
 };
 
-/// How splats are drawn as isosurfaces (render/colour/iso_table.h), besides or in place of the volume: with the
-/// scalar at scale f + offset, and as thick as the scalar changes along the ray, which makes the optical depth of a
-/// crossing the same at all angles.
-struct IsoProjection {
-  float scale = 1, offset = 0;
-  Light light = {};
-  bool volume = true;
-};
-
 /// How to project the splats of a frame; the same for all of them.
 struct ProjectionSettings {
   ScreenView view;
@@ -59,10 +50,9 @@ struct ProjectionSettings {
   double light_g0 = 1;                   // LocalLight's
   BorderStyle borders = kHalfCellStyle;  // kWholeCellStyle where the data is cell-centred
   const PixelLayers* layers = nullptr;   // surfaces and slices in the picture, which splats are cut at
-  std::optional<IsoProjection> iso = std::nullopt;
 
   /// Whether splats have light: painters must know.
-  bool lit() const { return light.has_value() || iso.has_value(); }
+  bool lit() const { return light.has_value(); }
 };
 
 /// The values of a brick's splats: of the scalar that is classified, and in pictures of two scalars of that which gives

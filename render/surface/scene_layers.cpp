@@ -11,6 +11,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "render/surface/pixel_rays.h"
 #include "render/surface/rasterizer.h"
 #include "render/surface/surface_light.h"
 
@@ -22,13 +23,6 @@ namespace {
 constexpr double kSteepest = 4, kNear = 0.25;
 constexpr size_t kMostShaded = 3;  // triangles of a pixel and layer
 constexpr float kSmooth = 0.97f;   // of the cosine between normals: what is in a pixel is lit once
-
-glm::vec3 towardsViewer(const ScreenView& view, float x, float y) {
-  if (view.projection != Projection::kPerspective) return glm::vec3(-view.forward);
-  const double across = (double{x} - 0.5 * view.size.width) / view.focal_px;
-  const double down = (double{y} - 0.5 * view.size.height) / view.focal_px;
-  return glm::vec3(-glm::normalize(view.forward + across * view.right + down * view.down));
-}
 
 /// Colours of the surfaces' triangles at the pixels.
 class Shader {
@@ -252,14 +246,6 @@ class PixelSurfaces {
   const bool has_translucent_;
 };
 
-/// What clip planes leave of a slice at a point, smoothed over a pixel.
-float coverageAt(std::span<const ClipPlane> planes, const glm::dvec3& at, double pixel) {
-  double coverage = 1;
-  for (const ClipPlane& plane : planes)
-    coverage *= std::clamp(0.5 + glm::dot(glm::normalize(plane.normal), at - plane.point) / pixel, 0.0, 1.0);
-  return static_cast<float>(coverage);
-}
-
 /// The layers that slices make of a pixel.
 class PixelSlices {
  public:
@@ -274,16 +260,14 @@ class PixelSlices {
       const auto& slice = slices_[n];
       const auto sample = slice->at(x, y, look_.depth_origin);
       if (!sample) continue;
-      const glm::dvec3 in_view = view_.viewFromData(sample->at);
-      const double pixel = (view_.projection == Projection::kPerspective ? in_view.z : 1) / view_.focal_px /
-                           std::max({view_.scale.x, view_.scale.y, view_.scale.z});
+      const double pixel = pixelSide(view_, view_.viewFromData(sample->at).z);
       const float alpha = sample->coverage * coverageAt(look_.clip_planes, sample->at, pixel) *
                           static_cast<float>(scene_.slice_opacity) * opacityOf(n, *sample, x, y);
       glm::vec3 colour = look_.colours.at(sample->scalar);
       if (look_.light)
         colour = light_.lit(colour, glm::vec3(slice->plane().normal),
                             towardsViewer(view_, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f));
-      layers.push_back({sample->depth, glm::vec4(alpha * colour, alpha)});
+      layers.push_back({sample->depth, glm::vec4(alpha * colour, alpha), static_cast<float>(sample->scalar)});
     }
   }
 
@@ -328,7 +312,7 @@ PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
     for (int y = tile.y0(); y <= tile.y1(); ++y) {
       PixelLayers::Row& out = rows[static_cast<size_t>(y) * columns + number % columns];
       const auto width = static_cast<size_t>(tile.x1() - tile.x0() + 1);
-      if (drawn == 0 && pixel_slices.empty()) {
+      if (drawn == 0 && pixel_slices.empty() && !look.isosurfaces) {
         out.counts.assign(width, 0);
         continue;
       }
@@ -339,6 +323,10 @@ PixelLayers layersOf(const SurfaceScene& scene, const ScreenView& view,
         unsigned hidden = 0;  // bits of samples
         for (size_t n = 0; n < drawn; ++n) pixel_surfaces.append(tiles[n].at(x, y), x, y, hidden, out.layers);
         pixel_slices.append(x, y, out.layers);
+        if (look.isosurfaces) {
+          const auto crossings = look.isosurfaces->at(x, y);
+          out.layers.insert(out.layers.end(), crossings.begin(), crossings.end());
+        }
         out.endPixel(before);
       }
     }

@@ -10,6 +10,7 @@
 #include "render/project/pixel_layers.h"
 #include "render/project/screen_view.h"
 #include "render/surface/colour_table.h"
+#include "render/surface/iso_layers.h"
 #include "render/surface/slice_sampler.h"
 #include "render/surface/surface_scene.h"
 
@@ -23,6 +24,7 @@ struct SceneLook {
   // Of slices whose opacities are a function's: it, and where it is of another scalar, that one's samples.
   const ColourTable* opacities = nullptr;
   std::span<const std::unique_ptr<SliceSampler>> opacity_slices = {};
+  const IsoLayers* isosurfaces = nullptr;
 };
 
 /// The layers of a picture. `slices`: those of the scene that were sampled, complete. Takes 256 KiB a thread (with

@@ -1,4 +1,4 @@
-// What is shown in a volume, or in its place: surfaces of triangles, and slices that have the scalar's colours.
+// What is shown in a volume, or in its place: surfaces of triangles, slices and isosurfaces that have the scalar's colours.
 #pragma once
 
 #include <array>
@@ -17,8 +17,6 @@
 namespace curvisplat {
 
 inline constexpr size_t kMaxSlices = 8;
-/// Of a crossing. More would widen outlines.
-inline constexpr double kIsoOpacity = 0.95;
 
 /// How much of what lies behind a surface or a slice it hides.
 struct SheetOpacity {
@@ -67,12 +65,13 @@ struct SurfaceScene {
   double slice_opacity = 1;
   bool slices_by_function = false;  // times the function's opacity; of two scalars, of that of the opacities
   std::vector<double> isovalues;    // of the picture's scalar; in the colours of its function
-  double iso_opacity = kIsoOpacity;
-  bool volume = true;  // false: surfaces and slices alone
+  double iso_opacity = 1;
+  bool volume = true;  // false: surfaces, slices and isosurfaces alone
 
-  /// Whether it has nothing that makes layers: isosurfaces are drawn with the splats.
-  bool empty() const { return surfaces.empty() && grid_surfaces.empty() && slices.empty(); }
-  bool drawsSplats() const { return volume || !isovalues.empty(); }
+  /// Whether it has nothing that makes layers.
+  bool empty() const {
+    return surfaces.empty() && grid_surfaces.empty() && slices.empty() && isovalues.empty();
+  }
 };
 
 }  // namespace curvisplat

@@ -1,5 +1,7 @@
 #include "stream/base/suggestion.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <vector>
@@ -29,6 +31,25 @@ size_t distance(std::string_view a, std::string_view b) {
   return last[b.size()];
 }
 
+bool beginsWith(std::string_view word, std::string_view begin) {
+  return word.size() >= begin.size() && std::equal(begin.begin(), begin.end(), word.begin(),
+                                                   [](char a, char b) { return lower(a) == lower(b); });
+}
+
+/// The shortest candidate that the word begins, or that begins the word, of three letters at least.
+std::string sharingTheBegin(std::string_view word, std::span<const std::string> candidates) {
+  std::string best;
+  for (const std::string& candidate : candidates) {
+    const std::string_view letters =
+        std::string_view(candidate).substr(std::min(candidate.size(), candidate.find_first_not_of('-')));
+    const std::string_view own = word.substr(std::min(word.size(), word.find_first_not_of('-')));
+    if (std::min(letters.size(), own.size()) < 3) continue;
+    if (!beginsWith(letters, own) && !beginsWith(own, letters)) continue;
+    if (best.empty() || candidate.size() < best.size()) best = candidate;
+  }
+  return best;
+}
+
 }  // namespace
 
 std::string closestTo(std::string_view word, std::span<const std::string> candidates) {
@@ -39,11 +60,18 @@ std::string closestTo(std::string_view word, std::span<const std::string> candid
   for (const std::string& candidate : candidates) {
     if (candidate.size() > 2 * kMaxWord) continue;
     const size_t letters = distance(word, candidate);
-    if (letters >= least) continue;
+    const bool is_closer_in_a_tie =
+        letters == least && !best.empty() && beginsWith(candidate, word) && !beginsWith(best, word);
+    if (letters >= least && !is_closer_in_a_tie) continue;
     least = letters;
     best = candidate;
   }
-  return best;
+  return best.empty() ? sharingTheBegin(word, candidates) : best;
+}
+
+std::string didYouMean(std::string_view word, std::span<const std::string> candidates) {
+  const std::string close = closestTo(word, candidates);
+  return close.empty() ? "" : fmt::format(" (did you mean {}?)", close);
 }
 
 }  // namespace curvisplat

@@ -10,6 +10,7 @@
 #include "stream/base/file.h"
 #include "stream/base/mutex.h"
 #include "stream/base/stage_timer.h"
+#include "stream/base/suggestion.h"
 #include "stream/cache/between_steps.h"
 #include "stream/cache/cache_index.h"
 #include "stream/cache/geometry_folder.h"
@@ -319,13 +320,16 @@ std::span<const BrickVariable> CacheReader::brickVariables(size_t variable) cons
 
 size_t CacheReader::variableNamed(std::string_view name) const {
   const auto& variables = state_->manifest.variables;
-  std::string names;
+  std::string listed;
+  std::vector<std::string> names;
   for (size_t n = 0; n < variables.size(); ++n) {
     if (name.empty() || variables[n].name == name) return n;
-    names += (n ? ", " : "") + variables[n].name;
+    listed += (n ? ", " : "") + variables[n].name;
+    names.push_back(variables[n].name);
   }
   if (variables.empty()) throw UsageError("{}: the cache has no scalars", path().string());
-  throw UsageError("{}: the cache has no scalar '{}'; it has {}", path().string(), name, names);
+  throw UsageError("{}: the cache has no scalar '{}'{}; it has {}", path().string(), name,
+                   didYouMean(name, names), listed);
 }
 
 const fs::path& CacheReader::geometryPath() const {

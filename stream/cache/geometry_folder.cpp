@@ -1,7 +1,12 @@
 #include "stream/cache/geometry_folder.h"
 
+#include <string>
+#include <system_error>
+#include <vector>
+
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
+#include "stream/base/suggestion.h"
 #include "stream/cache/cache_file.h"
 #include "stream/cache/cache_index.h"
 #include "stream/cache/partial_folder.h"
@@ -12,6 +17,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// The paths of the caches in the folder of one that is missing, as that is written.
+std::vector<std::string> cachesBeside(const fs::path& cache) {
+  constexpr size_t kMost = 1000;
+  std::vector<std::string> caches;
+  std::error_code error;
+  const fs::path folder = cache.parent_path();
+  for (fs::directory_iterator at(folder.empty() ? "." : folder, error), end;
+       !error && at != end && caches.size() < kMost; at.increment(error))
+    if (at->path().extension() == ".splats") caches.push_back((folder / at->path().filename()).string());
+  return caches;
+}
+
 }  // namespace
 
 Manifest readManifest(const fs::path& cache) {
@@ -20,8 +37,9 @@ Manifest readManifest(const fs::path& cache) {
       throw Error("{}: its conversion is unfinished; repeat the convert command with --resume to continue it",
                   cache.string());
     throw Error(
-        "{}: does not exist; expected a splat cache (convert the grid first: curvisplat convert GRID -o {})",
-        cache.string(), cache.string());
+        "{}: does not exist{}; expected a splat cache (convert the grid first: curvisplat convert GRID -o "
+        "{})",
+        cache.string(), didYouMean(cache.string(), cachesBeside(cache)), cache.string());
   }
   if (!fs::is_directory(cache))
     throw Error(

@@ -93,12 +93,13 @@ class GeometryEncoder {
 
   bool encodeShapes() {
     LogTable axis0, axis1, volume;
-    if (!encodeLogs([](const Splat& s) { return std::log(s.axis[0]); }, kAxisStep, header_.log_axis0, axis0,
-                    decoded_.axis[0]) ||
-        !encodeLogs([](const Splat& s) { return std::log(s.axis[1]); }, kAxisStep, header_.log_axis1, axis1,
-                    decoded_.axis[1]) ||
+    const auto as_it_is = [] { return 0.0; };
+    if (!encodeLogs([](const Splat& s) { return std::log(s.axis[0]); }, kAxisStep,
+                    {header_.log_axis0, axis0, decoded_.axis[0]}, as_it_is) ||
+        !encodeLogs([](const Splat& s) { return std::log(s.axis[1]); }, kAxisStep,
+                    {header_.log_axis1, axis1, decoded_.axis[1]}, as_it_is) ||
         !encodeLogs([](const Splat& s) { return std::log(s.axis[0] * s.axis[1] * s.axis[2]); }, kVolumeStep,
-                    header_.log_volume, volume, decoded_.axis[2]))
+                    {header_.log_volume, volume, decoded_.axis[2]}, [&] { return missingVolume(); }))
       return false;
     for (size_t n = 0; n < count_; ++n) decoded_.axis[2][n] /= decoded_.axis[0][n] * decoded_.axis[1][n];
     const auto &a0 = decoded_.axis[0], &a1 = decoded_.axis[1], &a2 = decoded_.axis[2],
@@ -117,8 +118,16 @@ class GeometryEncoder {
                });
   }
 
-  template <typename Log>
-  bool encodeLogs(Log log, double step, double& base, LogTable& table, std::vector<double>& out) {
+  /// Where the codes of logarithms start, and what they decode to.
+  struct DecodedLogs {
+    double& base;
+    LogTable& table;
+    std::vector<double>& out;
+  };
+
+  /// `shift()` is added to the base once all are decoded.
+  template <typename Log, typename Shift>
+  bool encodeLogs(Log log, double step, const DecodedLogs& decoded, const Shift& shift) {
     double lowest = std::numeric_limits<double>::infinity(), highest = -lowest;
     for (size_t n = 0; n < count_; ++n) {
       targets_[n] = log(brick_.splats[n]);
@@ -126,14 +135,33 @@ class GeometryEncoder {
       highest = std::max(highest, targets_[n]);
     }
     if (!((highest - lowest) / step < kLargestLogCode)) return false;
-    base = lowest;
-    table = LogTable(lowest, step, static_cast<uint32_t>((highest - lowest) / step) + 1);
-    for (size_t n = 0; n < count_; ++n) {
+    const auto largest = static_cast<uint32_t>((highest - lowest) / step) + 1;
+    for (size_t n = 0; n < count_; ++n)
       codes_[n] = static_cast<uint32_t>((targets_[n] - lowest) / step + 0.5);
-      out[n] = table[codes_[n]];
-    }
+    const auto decode = [&](double base) {
+      decoded.base = base;
+      decoded.table = LogTable(base, step, largest);
+      for (size_t n = 0; n < count_; ++n) decoded.out[n] = decoded.table[codes_[n]];
+    };
+    decode(lowest);
+    if (const double more = shift(); more != 0) decode(lowest + more);
     addPredicted(codes_);
     return true;
+  }
+
+  /// The logarithm of what the decoded volumes lack for the weights to have the right sum. Cells that are all alike, or all a little
+  /// longer than their weight, are rounded in one direction; the rounding of a brick would not average out.
+  double missingVolume() const {
+    constexpr double kMost = 0.25 * kVolumeStep;  // of shapes, which have a bound to keep
+    double exact = 0, decoded = 0;
+    for (size_t n = 0; n < count_; ++n) {
+      const double weight = brick_.splats[n].weight, volume = decoded_.axis[2][n];
+      exact += weight;
+      // As encodeWeights(): other weights have codes of their own, and errors either way.
+      decoded += std::abs(weight - volume) < 0.5 * kWeightStep * volume ? volume : weight;
+    }
+    const double ratio = exact / decoded;
+    return ratio > 0 && std::isfinite(ratio) ? std::clamp(std::log(ratio), -kMost, kMost) : 0.0;
   }
 
   template <typename StepOf, typename Target>

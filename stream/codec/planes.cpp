@@ -54,6 +54,9 @@ uint8_t PlaneWriter::add(std::span<const uint32_t> values) {
   uint32_t any = 0;
   for (uint32_t value : values) any |= value;
   const auto planes = static_cast<uint8_t>((std::bit_width(any) + 7) / 8);
+  constexpr size_t kPlanesOfMost = 8;  // room for some arrays at once
+  if (bytes_.capacity() - bytes_.size() < planes * values.size())
+    bytes_.reserve(bytes_.size() + kPlanesOfMost * values.size());
   for (int plane = 0; plane < planes; ++plane) {
     const size_t from = bytes_.size();
     bytes_.resize(from + values.size());
@@ -70,10 +73,12 @@ std::vector<std::byte> PlaneWriter::compress(std::span<const std::byte> header) 
   checked(ZSTD_CCtx_setParameter(context, ZSTD_c_compressionLevel, kZstdLevel));
   checked(ZSTD_CCtx_setPledgedSrcSize(context, bytes_.size()));
 
-  std::vector<std::byte> out(header.begin(), header.end());
-  // Each flushed block adds three bytes of header and whatever zstd had buffered.
-  out.resize(header.size() + ZSTD_compressBound(bytes_.size()) + 64 * (ends_.size() + 1));
-  ZSTD_outBuffer to{out.data(), out.size(), header.size()};
+  // Each flushed block adds three bytes of header and whatever zstd had buffered. What is returned has no such room, since
+  // many bricks wait for being written.
+  thread_local std::vector<std::byte> scratch;
+  const size_t most = ZSTD_compressBound(bytes_.size()) + 64 * (ends_.size() + 1);
+  if (scratch.size() < most) scratch.resize(most);
+  ZSTD_outBuffer to{scratch.data(), most, 0};
   size_t from = 0;
   for (size_t n = 0; n < ends_.size(); ++n) {
     const bool last = n + 1 == ends_.size();
@@ -87,7 +92,10 @@ std::vector<std::byte> PlaneWriter::compress(std::span<const std::byte> header) 
     ZSTD_inBuffer nothing{nullptr, 0, 0};
     CURVISPLAT_CHECK_OP(checked(ZSTD_compressStream2(context, &to, &nothing, ZSTD_e_end)), ==, 0u);
   }
-  out.resize(to.pos);
+  std::vector<std::byte> out;
+  out.reserve(header.size() + to.pos);
+  out.insert(out.end(), header.begin(), header.end());
+  out.insert(out.end(), scratch.begin(), scratch.begin() + static_cast<ptrdiff_t>(to.pos));
   return out;
 }
 

@@ -17,6 +17,12 @@ constexpr double kRotationStep = 0.08;
 constexpr int kLargestRotation = 7;  // in steps
 constexpr int kRotationBits = 4, kRotationShift = 3 * kGrowthBits;
 
+/// std::nearbyint() of a number far below 2^51, without a call.
+int nearestInteger(double x) {
+  constexpr double kShift = 0x1.8p52;
+  return static_cast<int>((x + kShift) - kShift);
+}
+
 uint32_t lowBits(int value, int bits) {
   return static_cast<uint32_t>(value) & ((1u << bits) - 1);
 }
@@ -49,16 +55,18 @@ glm::dquat rotationOfOne(Steps& steps, int grows) {
 
 /// The order and the signs of the axes that make the rotation smallest.
 glm::dquat rotationOfAll(Steps& steps) {
+  constexpr std::array<std::array<int, 3>, 6> kOrders{
+      {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}};
   const auto& axis = steps.axis;
-  std::array<int, 3> order{0, 1, 2}, best = order;
+  std::array<int, 3> best = kOrders[0];
   double largest = -1;
-  do {
+  for (const std::array<int, 3>& order : kOrders) {
     const double trace = std::abs(axis[order[0]].x) + std::abs(axis[order[1]].y) + std::abs(axis[order[2]].z);
     if (trace > largest) {
       largest = trace;
       best = order;
     }
-  } while (std::next_permutation(order.begin(), order.end()));
+  }
   glm::dmat3 frame;
   std::array<int, 3> growth;
   int least = 0;
@@ -83,8 +91,8 @@ uint32_t packGrowthCode(std::array<glm::dvec3, 3> axis, std::array<double, 3> gr
   Steps steps{axis, {}};
   int count = 0, last = 0, none = 0;
   for (int n = 0; n < 3; ++n) {
-    steps.growth[n] = static_cast<int>(
-        std::nearbyint(std::clamp(kGrowthSteps * growth[n], -1.0 * kLargestGrowth, 1.0 * kLargestGrowth)));
+    steps.growth[n] =
+        nearestInteger(std::clamp(kGrowthSteps * growth[n], -1.0 * kLargestGrowth, 1.0 * kLargestGrowth));
     if (steps.growth[n] != 0) {
       ++count;
       last = n;
@@ -99,7 +107,7 @@ uint32_t packGrowthCode(std::array<glm::dvec3, 3> axis, std::array<double, 3> gr
   for (int n = 0; n < 3; ++n) code |= lowBits(steps.growth[n], kGrowthBits) << n * kGrowthBits;
   const std::array<double, 3> numbers{rotation.x, rotation.y, rotation.z};
   for (int n = 0; n < 3; ++n) {
-    const auto number = static_cast<int>(std::nearbyint(numbers[n] / kRotationStep));
+    const int number = nearestInteger(numbers[n] / kRotationStep);
     code |= lowBits(std::clamp(number, -kLargestRotation, kLargestRotation), kRotationBits)
             << (kRotationShift + n * kRotationBits);
   }

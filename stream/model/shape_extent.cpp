@@ -21,8 +21,12 @@ class LargestEigenvalue {
     const double xz = l20 * l00, yz = l20 * l10 + l21 * l11, zz = l20 * l20 + l21 * l21 + l22 * l22;
     const double q = (xx + yy + zz) / 3;
     const double a = xx - q, b = yy - q, c = zz - q;
-    const double p = std::sqrt((a * a + b * b + c * c + 2 * (xy * xy + xz * xz + yz * yz)) / 6);
-    // The eigenvalues are q + 2 p cos(angle + 2/3 pi n): q + 2 p bounds them and rules out most.
+    const double p2 = (a * a + b * b + c * c + 2 * (xy * xy + xz * xz + yz * yz)) / 6;
+    // The eigenvalues are q + 2 p cos(angle + 2/3 pi n): q + 2 p bounds them and rules out most, without p's root.
+    constexpr double kBelowOne = 1 - 1e-12;
+    const double room = best_ - q;
+    if (room > 0 && 4 * p2 < kBelowOne * room * room) return;
+    const double p = std::sqrt(p2);
     if (q + 2 * p <= best_) return;
     double largest = q;
     if (p > 0) {

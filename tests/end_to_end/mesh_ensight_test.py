@@ -6,6 +6,7 @@ EnSight Gold, structured and unstructured: mesh_formats.py says how. Exit status
 import ctypes
 import unittest
 
+from sweep import IS_WHOLE, some_of
 from mesh_formats import RANDOM, Mesh, MeshFormats, np, numpy_to_vtk, vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
@@ -230,8 +231,8 @@ class EnsightCases(MeshFormats):
         mesh = self.rounded(Mesh(2))
         for order in (None, "<"):
             self.write(mesh, order)
-            self.assertGreater(self.expect_damage("mesh.geo"), 20)
-            self.assertGreater(self.expect_damage("c.003"), 10)
+            self.assertGreater(self.expect_damage("mesh.geo"), 20 if IS_WHOLE else 6)
+            self.assertGreater(self.expect_damage("c.003"), 10 if IS_WHOLE else 3)
         for old, new, words in (("ensight gold", "ensight", "expected 'ensight gold'"), ("mesh.geo", "none.geo", "none.geo"),
                                 ("model: 1 mesh.geo", "model: 1 1 mesh.geo", "file sets"), ("steps: 2", "steps: 3", "time set 1"),
                                 ("p p.***", "p", "cannot be opened"), ("1.5", "-1.5", "time set 1")):
@@ -249,7 +250,7 @@ class EnsightCases(MeshFormats):
             wrong = bytearray(data)
             wrong[n] ^= int(RANDOM.integers(1, 256))
             damaged.append(bytes(wrong))
-        for bytes_of in damaged:
+        for bytes_of in some_of(damaged, 3):
             path.write_bytes(bytes_of)
             result = self.run_program("convert", self.path, "-o", self.folder / "d.splats", "--overwrite", "--scalar", "c")
             self.assertIn(result.returncode, (0, 1, 2), result.stderr)

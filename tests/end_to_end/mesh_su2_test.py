@@ -5,6 +5,7 @@ SU2's native meshes and restart files: mesh_formats.py says how. Exit status 77 
 """
 import unittest
 
+from sweep import some_of
 from mesh_formats import Mesh, MeshFormats, np
 
 try:
@@ -88,6 +89,15 @@ class Su2Meshes(MeshFormats):
         self.assertEqual(self.info(self.path, self.restart, other)["cells"]["count"], len(mesh.cells))
         self.assertAlmostEqual(self.cache([self.path, self.restart, other], "p")[1], 1, delta=2e-3)
         self.expect_line(self.path, self.restart, words="has 2 zones, but 1 restart files")
+        # Names that differ in a number alone are steps elsewhere.
+        numbered = [self.folder / "restart_0.dat", self.folder / "restart_1.dat"]
+        for path in numbered:
+            path.write_bytes(self.restart.read_bytes())
+        self.assertAlmostEqual(self.cache([self.path, *numbered], "p")[1], 1, delta=2e-3)
+        self.write(mesh)
+        result = self.run_program("convert", self.path, *numbered, "-o", self.folder / "steps.splats", "--scalar", "p")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("2 steps, 2 of them converted now, 0 with a geometry of their own", result.stdout)
 
     @unittest.skipUnless(meshio, "no python3-meshio")
     def test_meshio_agrees(self):
@@ -104,11 +114,11 @@ class Su2Meshes(MeshFormats):
     def test_damage(self):
         mesh = Mesh(2)
         self.write(mesh)
-        self.assertGreater(self.expect_harmless(self.path, scalar="volume"), 40)
+        self.assertGreater(self.expect_harmless(self.path, scalar="volume"), 1 / 3)
         for how in ("csv", "binary"):
             self.write_restart(mesh, how)
             data = self.restart.read_bytes()
-            for n in range(1, 20):
+            for n in some_of(range(1, 20)):
                 self.restart.write_bytes(data[:len(data) * n // 24])
                 self.expect_line(self.path, self.restart, scalar="p", words="restart_flow")
         text = self.path.read_text()

@@ -169,7 +169,8 @@ TEST_F(SurfaceOptions, WarningsDoNotSpeakOfTheVolume) {
   EXPECT_EQ(wall.err.find("warning"), std::string::npos) << wall.err;
   const ProgramResult nothing =
       render({"--volume", "off", "--surface", file("sphere.obj"), "--focal-point", "900,0,0"});
-  EXPECT_NE(nothing.err.find("no surface or slice is in sight"), std::string::npos) << nothing.err;
+  EXPECT_NE(nothing.err.find("no surface, slice or isosurface is in sight"), std::string::npos)
+      << nothing.err;
   EXPECT_EQ(nothing.err.find("transfer function"), std::string::npos) << nothing.err;
 }
 

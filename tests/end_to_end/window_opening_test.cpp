@@ -74,6 +74,33 @@ TEST_F(KeptCaches, TheLeastRecentlyUsedGoFirst) {
   EXPECT_EQ(names, (std::vector<std::string>{"a.splats", "c.splats"}));
 }
 
+/// A .p3d file names others: their bytes count.
+TEST_F(KeptCaches, AreMadeAgainWhenANamedFileChanges) {
+  run({"generate", "half-annulus", "--size", "20x12x12", "-o", "named"});
+  std::ofstream("named.p3d") << R"({"filenames": [{"xyz": "named.xyz", "function": "named.fun"}]})";
+  const auto draw = [] {
+    const ProgramResult result = runProgram({"render", "named.p3d", "-o", "p.png", "--size", "60x50"});
+    EXPECT_EQ(result.status, 0) << result.err;
+  };
+  draw();
+  draw();
+  EXPECT_EQ(kept().size(), 1u);
+  run({"generate", "half-annulus", "--size", "22x12x12", "-o", "named"});
+  draw();
+  EXPECT_EQ(kept().size(), 2u);
+}
+
+TEST_F(KeptCaches, RenderAddsAScalarThatTheFilesHave) {
+  const ProgramResult result =
+      runProgram({"render", "a.xyz", "a.fun", "-o", "v.png", "--size", "60x50", "--scalar", "volume"});
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_NE(result.out.find("volume"), std::string::npos) << result.out;
+  const ProgramResult unknown =
+      runProgram({"render", "a.xyz", "a.fun", "-o", "v.png", "--size", "60x50", "--scalar", "volum"});
+  EXPECT_EQ(unknown.status, 1);
+  EXPECT_NE(unknown.err.find("did you mean volume?"), std::string::npos) << unknown.err;
+}
+
 TEST_F(KeptCaches, ErrorsNameTheFile) {
   std::ofstream("no.xyz") << "no grid";
   const ProgramResult result = render("no.xyz", "a.fun");
@@ -97,6 +124,31 @@ class WindowOpening : public KeptCaches {
     window_ = std::make_unique<RunningProgram>(words);
     rest_ = {kWindow.width / 2, kWindow.height / 2};
     moveTo(rest_);
+  }
+  static std::string outputOf(const std::vector<std::string>& words) {
+    return RunningProgram(std::vector<std::string>(words.begin() + 1, words.end()), words.front()).wait().out;
+  }
+  static std::string windowNumber() {
+    const std::string out =
+        outputOf({"/usr/bin/env", "xdotool", "search", "--onlyvisible", "--name", "curvisplat"});
+    return out.substr(0, out.find('\n'));
+  }
+  static std::string titleOfWindow() {
+    return outputOf({"/usr/bin/env", "xdotool", "getwindowname", windowNumber()});
+  }
+  /// As from a file manager.
+  static void drop(const std::vector<std::string>& files) {
+    std::vector<std::string> words{"python3", CURVISPLAT_TEST_DATA "/../support/drop_files.py",
+                                   windowNumber(), "560", "300"};
+    words.insert(words.end(), files.begin(), files.end());
+    const ProgramResult result = RunningProgram(words, "/usr/bin/env").wait();
+    EXPECT_EQ(result.status, 0) << result.err;
+  }
+  /// The folder of the only cache that is kept or being made.
+  static fs::path onlyPlace() {
+    for (const auto& entry : fs::directory_iterator("kept/curvisplat"))
+      if (fs::exists(entry.path() / "used")) return entry.path();
+    return {};
   }
 };
 
@@ -130,9 +182,124 @@ TEST_F(WindowOpening, AnswersWhileItConverts) {
   press("F1");
   placeOf("window Keys and mouse");
   EXPECT_TRUE(hasWidget("stop opening"));  // it goes on
+  press("F1");
+  EXPECT_TRUE(eventually([] { return hasWidget("state preview"); }));
   click("stop opening");
   EXPECT_TRUE(eventually([] { return !hasWidget("stop opening"); }));
-  EXPECT_FALSE(hasWidget("curve"));  // nothing was opened
+  close();
+  EXPECT_TRUE(kept().empty());
+}
+
+/// A coarse sample is shown before a large grid is converted, and the whole takes its place.
+TEST_F(WindowOpening, ShowsAPreviewUntilTheWholeIsThere) {
+  run({"generate", "half-annulus", "--size", "128x96x96", "-o", "middle"});
+  openWith({"middle.xyz", "middle.fun"});
+  EXPECT_TRUE(eventually([] { return hasWidget("state preview of every 2nd index plane"); }));
+  EXPECT_TRUE(fs::exists(onlyPlace() / "preview"));
+  EXPECT_TRUE(eventually([] { return !hasWidget("state preview") && hasWidget("state "); }, 300));
+  EXPECT_FALSE(hasWidget("opening"));
+  EXPECT_FALSE(fs::exists(onlyPlace() / "preview"));
+  ASSERT_EQ(kept().size(), 1u);
+  EXPECT_EQ(kept()[0].filename(), "middle.splats");
+  cache_ = "middle";
+  const Image picture = saveAndCopy();
+  const auto command = close().at(0);
+  cache_ = "a";
+  // The command names the grid, not a folder of the user's.
+  EXPECT_EQ(std::vector<std::string>(command.begin(), command.begin() + 3),
+            (std::vector<std::string>{"render", "middle.xyz", "middle.fun"}));
+  expectDraws(command, picture);
+}
+
+TEST_F(WindowOpening, APreviewThatIsStoppedSaysSo) {
+  run({"generate", "half-annulus", "--size", "256x160x160", "-o", "large"});
+  openWith({"large.xyz", "large.fun"});
+  EXPECT_TRUE(eventually([] { return hasWidget("state preview of every 4th index plane"); }));
+  click("stop opening");
+  EXPECT_TRUE(eventually([] { return hasWidget("message Stopped. What is shown is a preview"); }));
+  EXPECT_TRUE(hasWidget("state preview"));
+  close();
+  EXPECT_TRUE(kept().empty());
+}
+
+/// What was changed in the preview stays when the whole comes.
+TEST_F(WindowOpening, ThePreviewHandsItsViewOn) {
+  run({"generate", "half-annulus", "--size", "128x96x96", "-o", "middle"});
+  openWith({"middle.xyz", "middle.fun"});
+  EXPECT_TRUE(eventually([] { return hasWidget("state preview"); }));
+  press("x");
+  EXPECT_TRUE(eventually([] { return !hasWidget("state preview") && hasWidget("state "); }, 300));
+  cache_ = "middle";
+  saveAndCopy();
+  const auto command = close().at(0);
+  cache_ = "a";
+  const std::string position = valueOf(command, "--position"), focus = valueOf(command, "--focal-point");
+  // From +x: y and z are the focal point's.
+  EXPECT_EQ(position.substr(position.find(',')), focus.substr(focus.find(',')));
+}
+
+TEST_F(WindowOpening, AFileDroppedIsOpened) {
+  openWith({});
+  placeOf("open");
+  drop({"a.xyz", "a.fun"});
+  placeOf("curve");
+  EXPECT_EQ(kept().size(), 1u);
+  drop({"a.splats"});
+  EXPECT_TRUE(eventually([this] { return titleOfWindow().starts_with("a.splats"); }));
+  close();
+}
+
+TEST_F(WindowOpening, ASeriesIsOpened) {
+  run({"generate", "wake", "--size", "24x16x12", "--steps", "3", "-o", "s"});
+  openWith({"s.xyz", "s_0000.fun", "s_0001.fun", "s_0002.fun"});
+  placeOf("step");
+  close();
+  ASSERT_EQ(kept().size(), 1u);
+  const ProgramResult drawn =
+      runProgram({"render", "s.xyz", "s_%04d.fun", "--steps", "all", "-o", "s_%d.png", "--size", "60x50"});
+  EXPECT_EQ(drawn.status, 0) << drawn.err;
+  EXPECT_TRUE(fs::exists("s_2.png"));
+  EXPECT_EQ(kept().size(), 1u);  // the same one
+}
+
+class FurtherScalarTest : public WindowOpening {
+ protected:
+  void SetUp() override {
+    WindowOpening::SetUp();
+    if (IsSkipped()) return;
+    run({"convert", "a.xyz", "a.fun", "-o", "one.splats", "--scalar", "f", "--overwrite"});
+    cache_ = "one";
+  }
+};
+
+TEST_F(FurtherScalarTest, AScalarOfTheSourcesIsAddedWhenItIsChosen) {
+  open();
+  click("scalar");
+  placeOf("scalar f");
+  click("further scalar volume");
+  EXPECT_TRUE(eventually([] {
+    const ProgramResult info = runProgram({"info", "one.splats"});
+    return info.out.find("volume") != std::string::npos;
+  }));
+  saveAndCopy();
+  while (!eventually([] { return !hasWidget("opening"); }, 5)) {
+  }
+  saveAndCopy();
+  press("ctrl+z");  // the scalar before
+  saveAndCopy();
+  const auto commands = close();
+  ASSERT_EQ(commands.size(), 3u);
+  EXPECT_EQ(valueOf(commands[1], "--scalar"), "volume");
+  EXPECT_EQ(valueOf(commands[2], "--scalar"), "f");
+}
+
+TEST_F(FurtherScalarTest, WithoutTheSourcesNoneIsOffered) {
+  fs::rename("a.fun", "away.fun");
+  open();
+  click("scalar");
+  placeOf("scalar f");
+  EXPECT_FALSE(hasWidget("further scalar"));
+  fs::rename("away.fun", "a.fun");
   close();
 }
 

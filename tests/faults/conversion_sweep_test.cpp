@@ -138,10 +138,10 @@ TEST_F(ConversionSweep, ALargerOneIsWholeOrNothing) {
   writeFiles(output_, both_);
   ASSERT_GT(CacheReader(output_).manifest().levels, 1u);
   testing::FaultSweep conversion = converting({}), addition = adding();
-  conversion.step = addition.step = 11;
-  EXPECT_GE(conversion.run(testing::kFailsOnce), 15);
+  conversion.stride = addition.stride = 37;
+  EXPECT_GE(conversion.run(testing::kFailsOnce), 20);
   ASSERT_FALSE(HasFailure());
-  EXPECT_GE(addition.run(testing::kFailsOnce), 8);
+  EXPECT_GE(addition.run(testing::kFailsOnce), 14);
 }
 
 TEST_F(ConversionSweep, ShortInterruptedAndSlowTransfersChangeNothing) {

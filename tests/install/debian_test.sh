@@ -41,6 +41,10 @@ for python in "$folder"/python3-curvisplat_*.deb; do
   dpkg --extract "$python" "$folder/root"
   expect "the unpacked Python package is that version" test "$(PYTHONPATH=$folder/root/usr/lib/python3/dist-packages \
     /usr/bin/python3 -c 'import curvisplat; print(curvisplat.__version__)')" = "$version"
+  expect "it has ParaView's plugin" test -f "$folder/root/usr/share/curvisplat/curvisplat_paraview.py"
+  PYTHONPATH=$folder/root/usr/lib/python3/dist-packages /usr/bin/python3 \
+    "$(dirname "$0")/../python/python_test.py" "$folder/root/usr/bin/curvisplat" Pictures > "$folder/log" 2>&1 ||
+    { cat "$folder/log"; echo "FAILED: tests of the unpacked Python package"; exit 1; }
 done
 echo "$(basename "$program"): $(($(stat -c %s "$program") / 1024)) KiB;" \
   "$(basename "$development"): $(($(stat -c %s "$development") / 1024)) KiB"

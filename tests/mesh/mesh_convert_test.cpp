@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <csignal>
 #include <fstream>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -15,14 +17,16 @@
 #include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
 #include "tests/reference/array_mesh.h"
+#include "tests/support/faulty_system_calls.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/thread_ranks.h"
 
 namespace curvisplat {
 namespace {
 
 using Files = std::map<std::string, std::string>;
 
-class MeshConvert : public testing::Test {
+class MeshConvert : public ::testing::Test {
  protected:
   ConvertOptions options(uint32_t scalar) const {
     ConvertOptions options;
@@ -40,8 +44,11 @@ class MeshConvert : public testing::Test {
 
   Files filesOf(const DataSource& source, const ConvertOptions& how) const {
     run(source, how);
+    return filesIn(how.output);
+  }
+  static Files filesIn(const std::filesystem::path& folder) {
     Files files;
-    for (const auto& entry : std::filesystem::directory_iterator(how.output)) {
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
       std::ifstream file(entry.path(), std::ios::binary);
       files[entry.path().filename().string()] = std::string(std::istreambuf_iterator<char>(file), {});
     }
@@ -126,6 +133,75 @@ TEST_F(MeshConvert, BytesAreTheSameForAnyThreadsAndMemory) {
       how.threads = 2;
       EXPECT_EQ(filesOf(mesh, how), expected) << "two threads and little memory";
     }
+}
+
+TEST_F(MeshConvert, SeveralRanksMakeTheSameBytes) {
+  // More than a bucket may have, so that ranks share the building.
+  const ArrayMesh meshes[] = {
+      ArrayMesh({shuffled(tetrahedraOf(*scene_, 40, 20, 20), 3)}),
+      ArrayMesh(split(hexahedraOf(*scene_, 60, 30, 30), 3, [](size_t cell) { return cell / 500 % 3; }))};
+  for (const ArrayMesh& mesh : meshes)
+    for (const uint32_t scalar : {0u, 1u}) {
+      ConvertOptions how = options(scalar);
+      how.threads = 1;
+      const Files expected = filesOf(mesh, how);
+      for (const unsigned count : {2u, 3u}) {
+        runRanks(count, [&](Ranks& ranks) {
+          ConvertOptions of_rank = how;
+          of_rank.ranks = &ranks;
+          of_rank.bucket_splats = 9000;
+          run(mesh, of_rank);
+        });
+        EXPECT_EQ(filesIn(how.output), expected) << count << " ranks";
+      }
+    }
+}
+
+/// Stops the conversion at a write.
+class StoppingSystemCalls : public SystemCalls {
+ public:
+  StoppingSystemCalls(Progress& progress, int64_t stop_at) : progress_(progress), left_(stop_at) {}
+  ssize_t pwrite(int fd, const void* from, size_t count, int64_t offset) override {
+    if (left_-- == 0) progress_.stop(SIGINT);
+    return SystemCalls::pwrite(fd, from, count, offset);
+  }
+
+ private:
+  Progress& progress_;
+  std::atomic<int64_t> left_;
+};
+
+TEST_F(MeshConvert, InterruptedConversionsResumeToTheSameBytes) {
+  const ArrayMesh mesh({shuffled(tetrahedraOf(*scene_, 30, 15, 15), 3)});
+  for (const uint32_t scalar : {0u, 1u}) {
+    ConvertOptions how = options(scalar);
+    how.bucket_splats = 9000;
+    how.mesh_bytes = 400'000;
+    const Files expected = filesOf(mesh, how);
+    removeAll(how.output);
+    int interrupted = 0;
+    for (int64_t stop_at = 1; stop_at < 400; stop_at += 23) {
+      Progress progress;
+      StoppingSystemCalls calls(progress, stop_at);
+      const ScopedSystemCalls scoped(calls);
+      ConvertOptions part = how;
+      part.overwrite = false;
+      part.resume = interrupted > 0;
+      try {
+        convert(mesh, part, progress);
+        break;
+      } catch (const Interrupted&) {
+        ++interrupted;
+      }
+    }
+    EXPECT_GT(interrupted, 0);
+    if (!std::filesystem::exists(how.output / "manifest.json")) {
+      how.overwrite = false;
+      how.resume = true;
+      run(mesh, how);
+    }
+    EXPECT_EQ(filesIn(how.output), expected);
+  }
 }
 
 TEST_F(MeshConvert, WeightsSumToTheVolume) {

@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <glm/vec3.hpp>
 #include <map>
 #include <random>
+
+#include "preprocess/convert/scan.h"
 
 namespace curvisplat {
 namespace {
@@ -75,6 +79,25 @@ TEST(CountingGrid, ClustersStayFineWhereTheyFit) {
   counts.close();
   EXPECT_EQ(counts.level(), 20u);
   EXPECT_EQ(counts.count({18, {0, 0, 0}}), 100000u);
+}
+
+TEST(CountingLevel, IsThatOfVoxelsWithANodeEach) {
+  const auto voxelsInBox = [](const glm::dvec3& extent, uint32_t level) {
+    const double along = std::ldexp(1.0, static_cast<int>(level));
+    return extent.x * along * extent.y * along * extent.z * along;
+  };
+  for (const glm::dvec3& extent : {glm::dvec3(1, 1, 1), glm::dvec3(1, 1, 0.01), glm::dvec3(0.03, 1, 0.02)}) {
+    for (const uint64_t nodes : {1000u, 1000000u, 512000000u}) {
+      const double voxels = voxelsInBox(extent, countingLevel(nodes, extent));
+      EXPECT_GE(voxels, 8.0 * static_cast<double>(nodes));  // so that clusters show
+      EXPECT_LE(voxels, 64.1 * static_cast<double>(nodes));
+    }
+  }
+  // In any unit; and of grids without an extent along some axes.
+  EXPECT_EQ(countingLevel(1000000, {3e-6, 3e-6, 3e-6}), countingLevel(1000000, {1, 1, 1}));
+  EXPECT_GT(countingLevel(1000000, {1, 1, 0}), countingLevel(1000000, {1, 1, 1}));
+  EXPECT_EQ(countingLevel(1000000, {0, 0, 0}), countingLevel(1000000, {1, 1, 1}));
+  EXPECT_LE(countingLevel(uint64_t{1} << 47, {1, 0, 0}), static_cast<uint32_t>(kMaxLevel));
 }
 
 TEST(CountingGrid, SaturatesInsteadOfOverflowing) {

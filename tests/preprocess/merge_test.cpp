@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -359,6 +360,21 @@ TEST(VoxelMerger, DetailIsTheSpreadOfTheCentres) {
   for (const glm::dvec3& at : {glm::dvec3(4, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(4, 1, 0)})
     merger.add(turn * at, splat, {});
   EXPECT_NEAR(merger.detail(), std::sqrt(12 * 4.0), 1e-9);
+}
+
+TEST(VoxelMerger, DetailIsTheLeastGivenWhereThatIsMore) {
+  std::mt19937_64 random(8);
+  std::uniform_real_distribution<double> coordinate(-1, 1);
+  Splat splat;
+  splat.weight = 1;
+  for (int repetition = 0; repetition < 200; ++repetition) {
+    VoxelMerger merger(0, 1);
+    for (int n = 0; n < 4; ++n)
+      merger.add(0, {coordinate(random), coordinate(random), coordinate(random)}, splat, {});
+    const double detail = merger.detail(0);
+    for (const double factor : {0.0, 0.5, 0.99, 1 - 1e-13, 1.0, 1 + 1e-13, 1.01, 2.0})
+      EXPECT_EQ(merger.detail(0, factor * detail), std::max(detail, factor * detail)) << factor;
+  }
 }
 
 }  // namespace

@@ -132,6 +132,75 @@ TEST_F(Seams, OfTwoBlocksVanish) {
   expectSame(cut, whole);
 }
 
+/// The splats of block faces, out of all.
+std::vector<Piece> facesOf(const MappedBlock& block) {
+  const NodeSplats splats = block.splats();
+  std::vector<Piece> faces;
+  for (size_t n = 0; n < splats.splats.size(); ++n)
+    if (splats.splats[n].on_block_face) faces.push_back({splats.splats[n], splats.values[n]});
+  return faces;
+}
+
+/// Nodes of a block whose cells are `size` wide along each axis, from `first` on.
+MappedBlock boxBlock(const glm::dvec3& first, const glm::dvec3& size, uint64_t first_node) {
+  MappedBlock block(4, 4, 4,
+                    [&](double i, double j, double k) { return first + size * glm::dvec3(i, j, k); });
+  block.addScalar(field);
+  block.first_node = first_node;
+  return block;
+}
+
+/// The pieces at a point, of blocks merged along their faces.
+std::vector<Piece> piecesAt(const std::vector<Piece>& pieces, const glm::dvec3& point) {
+  std::vector<Piece> there;
+  for (const Piece& piece : pieces)
+    if (glm::distance(piece.node.node_position, point) < 1e-9) there.push_back(piece);
+  return there;
+}
+
+/// Cells that grow along i, by `growth` from one to the next.
+MappedBlock growingBlock(uint64_t first, uint64_t count, double growth, uint64_t first_node) {
+  MappedBlock block(count, 5, 6, [&](double i, double j, double k) {
+    return glm::dvec3((std::pow(growth, i + static_cast<double>(first)) - 1) / (growth - 1), j, k);
+  });
+  block.addScalar(field);
+  block.first_node = first_node;
+  return block;
+}
+
+TEST_F(Seams, OfGrowingCellsAreSkewedAsTheCellsBesideThem) {
+  for (const double growth : {1.2, 0.85}) {
+    const MappedBlock uncut = growingBlock(0, 13, growth, 0);
+    std::vector<Piece> faces = facesOf(growingBlock(0, 7, growth, 0));
+    const std::vector<Piece> others = facesOf(growingBlock(6, 7, growth, 210));
+    faces.insert(faces.end(), others.begin(), others.end());
+    const std::vector<Piece> joined = merge(faces);
+    const NodeSplats whole = uncut.splats();
+    const auto expected = std::find_if(whole.splats.begin(), whole.splats.end(),
+                                       [&](const NodeSplat& n) { return n.node == uncut.at(6, 2, 2); });
+    ASSERT_NE(expected, whole.splats.end());
+    const std::vector<Piece> there = piecesAt(joined, expected->node_position);
+    ASSERT_EQ(there.size(), 1u);
+    const Splat &found = there[0].node.splat, &exact = expected->splat;
+    // The drift is 0.03 and 0.02 of a cell.
+    EXPECT_LT(glm::distance(found.position, exact.position), 0.002 * exact.axis[0]) << growth;
+    const float skew = cellGrowth(there[0].node.growth_code).growth[0];
+    EXPECT_NEAR(skew, cellGrowth(expected->growth_code).growth[0], 0.032) << growth;
+    EXPECT_NEAR(skew, std::log(growth), 0.03) << growth;
+    const double mean = whole.values[static_cast<size_t>(expected - whole.splats.begin())].mean;
+    EXPECT_NEAR(there[0].value.mean, mean, 0.002 * exact.axis[0]) << growth;
+  }
+}
+
+TEST_F(Seams, OfEvenBlocksOfOtherSizesGrowByHalfOfTheJump) {
+  std::vector<Piece> faces = facesOf(boxBlock({0, 0, 0}, {1, 1, 1}, 0));
+  const std::vector<Piece> others = facesOf(boxBlock({3, 0, 0}, {1.25, 1, 1}, 64));
+  faces.insert(faces.end(), others.begin(), others.end());
+  const std::vector<Piece> there = piecesAt(merge(faces), {3, 1, 1});
+  ASSERT_EQ(there.size(), 1u);
+  EXPECT_NEAR(cellGrowth(there[0].node.growth_code).growth[0], 0.5 * std::log(1.25), 0.016);
+}
+
 TEST_F(Seams, LeaveNoFaceToTheLayerBehindThem) {
   const Places cut =
       mergeBlocks({affineBlock({0, 0, 0}, {6, 6, 6}, 0), affineBlock({5, 0, 0}, {6, 6, 6}, 6 * 6 * 6)});
@@ -166,32 +235,6 @@ TEST_F(Seams, OfEightBlocksVanishAtTheirCommonCornerToo) {
   const Piece& piece = cut.at({std::lround(corner.x), std::lround(corner.y), std::lround(corner.z)});
   EXPECT_EQ(piece.node.node, blocks[0].at(3, 3, 3));
   EXPECT_FALSE(piece.node.regular);
-}
-
-/// The splats of block faces, out of all.
-std::vector<Piece> facesOf(const MappedBlock& block) {
-  const NodeSplats splats = block.splats();
-  std::vector<Piece> faces;
-  for (size_t n = 0; n < splats.splats.size(); ++n)
-    if (splats.splats[n].on_block_face) faces.push_back({splats.splats[n], splats.values[n]});
-  return faces;
-}
-
-/// Nodes of a block whose cells are `size` wide along each axis, from `first` on.
-MappedBlock boxBlock(const glm::dvec3& first, const glm::dvec3& size, uint64_t first_node) {
-  MappedBlock block(4, 4, 4,
-                    [&](double i, double j, double k) { return first + size * glm::dvec3(i, j, k); });
-  block.addScalar(field);
-  block.first_node = first_node;
-  return block;
-}
-
-/// The pieces at a point, of blocks merged along their faces.
-std::vector<Piece> piecesAt(const std::vector<Piece>& pieces, const glm::dvec3& point) {
-  std::vector<Piece> there;
-  for (const Piece& piece : pieces)
-    if (glm::distance(piece.node.node_position, point) < 1e-9) there.push_back(piece);
-  return there;
 }
 
 TEST_F(Seams, HalvesOfUnlikeThicknessStayApartAndEndAtTheFace) {

@@ -173,6 +173,29 @@ TEST(SetShape, RaisesSingularAxes) {
   }
 }
 
+TEST(RaisedTo, RaisesWhatIsBelowAndNothingElse) {
+  std::mt19937_64 random(9);
+  const glm::dmat3 turn = randomRotation(random);
+  const auto turned = [&](double a, double b, double c) {
+    const glm::dmat3 m = turn * glm::dmat3(a, 0, 0, 0, b, 0, 0, 0, c) * glm::transpose(turn);
+    return Symmetric3{m[0][0], m[1][0], m[1][1], m[2][0], m[2][1], m[2][2]};
+  };
+  const auto expect = [](const Symmetric3& found, const Symmetric3& wanted) {
+    EXPECT_NEAR(found.xx, wanted.xx, 1e-14);
+    EXPECT_NEAR(found.xy, wanted.xy, 1e-14);
+    EXPECT_NEAR(found.yy, wanted.yy, 1e-14);
+    EXPECT_NEAR(found.xz, wanted.xz, 1e-14);
+    EXPECT_NEAR(found.yz, wanted.yz, 1e-14);
+    EXPECT_NEAR(found.zz, wanted.zz, 1e-14);
+  };
+  const Symmetric3 unit{1, 0, 1, 0, 0, 1};
+  expect(raisedTo(turned(0.3, 0.2, 0.1), 1), unit);  // a trace below
+  expect(raisedTo(turned(0.6, 0.5, 0.4), 1), unit);  // a norm below
+  expect(raisedTo(turned(0.9, 0.8, 0.7), 1), unit);  // eigenvalues below
+  expect(raisedTo(turned(1.1, 0.1, 0.1), 1), turned(1.1, 1, 1));
+  expect(raisedTo(turned(3, 2, 0.1), 1), turned(3, 2, 1));
+}
+
 TEST(SingularValues, KeepTheDigitsOfThinColumns) {
   std::mt19937_64 random(6);
   const glm::dmat3 m = randomRotation(random) * diagonal(1, 1e-7, 1e-12);

@@ -16,6 +16,7 @@ try:
     import nbformat
     from nbconvert.preprocessors import ExecutePreprocessor
     import ipykernel  # noqa: F401
+    import netCDF4  # noqa: F401
 except ImportError as error:
     print(f"skipped: {error}")
     sys.exit(77)
@@ -48,7 +49,7 @@ with tempfile.TemporaryDirectory() as folder:
         pictures = [base64.b64decode(output["image/png"]) for output in outputs if "image/png" in output]
         pages = [output["text/html"] for output in outputs if "<iframe" in output.get("text/html", "")]
         print(f"{path.stem}: {len(pictures)} pictures of {sum(map(len, pictures))} bytes, {len(pages)} pages")
-        assert len(pictures) == {"blunt_fin": 4, "time_series": 2}[path.stem], pictures
+        assert len(pictures) == {"blunt_fin": 4, "ocean": 3, "time_series": 2}[path.stem], pictures
         assert all(len(picture) > 5000 for picture in pictures), "a picture is empty"
         assert len(pages) == (1 if path.stem == "blunt_fin" else 0)
         for n, picture in enumerate(pictures if kept else ()):

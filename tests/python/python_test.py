@@ -145,6 +145,118 @@ class Pictures(PythonTest):
             self.assertLessEqual(done, total)
 
 
+class CamerasAndFunctions(PythonTest):
+    def test_are_the_options_that_they_stand_for(self):
+        function = curvisplat.TransferFunction("magma", (0.1, 0.6), [(0, 0), (1, 0.7)], opacity_unit=0.3)
+        camera = curvisplat.Camera((20, -9, 8), (4, 0, 2), view_angle=35)
+        with curvisplat.open(self.cache) as cache:
+            picture = cache.render(size=(160, 120), camera=camera, function=function)
+            self.expect_same(picture, "--tf", "magma", "--range", "0.1,0.6", "--opacity", "0:0,1:0.7", "--opacity-unit", 0.3,
+                             "--position", "20,-9,8", "--focal-point", "4,0,2", "--view-up", "0,0,1", "--view-angle", 35)
+            self.assertEqual(function.replaced(colours="inferno").range, (0.1, 0.6))
+            with self.assertRaisesRegex(curvisplat.UsageError, "view cannot be combined with camera"):
+                cache.render(camera=camera, view="+x")
+            with self.assertRaisesRegex(curvisplat.UsageError, "range cannot be combined with function"):
+                cache.render(function=function, range=(0, 1))
+        with self.assertRaisesRegex(curvisplat.UsageError, "not both"):
+            curvisplat.Camera((1, 2, 3), parallel_scale=1, view_angle=30)
+        with self.assertRaisesRegex(curvisplat.UsageError, "position: has 2 numbers"):
+            curvisplat.Camera((1, 2))
+
+    def test_orbit_as_the_command_does(self):
+        frames = 3
+        command("render", self.cache, "-o", self.folder / "orbit_%d.pfm", "--size", "80x60", "--view", "+x", "--orbit", 360, "--frames", frames)
+        with curvisplat.open(self.cache) as cache:
+            cameras = cache.orbit("+x", frames=frames, size=(80, 60))
+            self.assertEqual(len(cameras), frames)
+            for number, camera in enumerate(cameras):
+                (path,) = self.folder.glob(f"orbit_{number}.pfm")
+                picture = cache.render(size=(80, 60), camera=camera)
+                np.testing.assert_array_equal(np.asarray(picture)[..., :3], read_pfm(path), str(number))
+            around = curvisplat.orbit(cameras[0], frames)
+            self.assertEqual(around, cameras)
+            with self.assertRaisesRegex(curvisplat.UsageError, "expected from 1"):
+                cache.orbit(frames=0)
+            with self.assertRaisesRegex(curvisplat.UsageError, "expected one or more"):
+                curvisplat.orbit(cameras[0], 0)
+        back = curvisplat.Camera((3, 0, 0), parallel_scale=2).turned(180)
+        np.testing.assert_allclose(back.position, (-3, 0, 0), atol=1e-12)
+        self.assertEqual(back.parallel_scale, 2)
+
+
+class Data(PythonTest):
+    """Arrays of a cache, against closed forms."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        k, j, i = np.meshgrid(np.linspace(0, 4, 48), np.linspace(0, 3, 44), np.linspace(0, 2, 40), indexing="ij")
+        cls.ramp = cls.folder / "ramp.splats"
+        curvisplat.convert_arrays(cls.ramp, curvisplat.Block(i, j, k, {"t": i + 2 * j + 3 * k}))
+
+    def test_are_sampled(self):
+        with curvisplat.open(self.ramp) as cache:
+            samples = cache.sample(size=40)
+            self.assertEqual(samples.value.shape, (40, 30, 20))
+            np.testing.assert_allclose(samples.spacing, 0.1)
+            np.testing.assert_allclose(samples.origin, 0.05)
+            self.assertAlmostEqual(samples.density.sum(dtype="f8") * 1e-3, 24, delta=0.05)
+            z, y, x = np.meshgrid(*(0.05 + 0.1 * np.arange(n) for n in (40, 30, 20)), indexing="ij")
+            self.assertLess(np.abs(samples.value - (x + 2 * y + 3 * z)).max(), 0.1)
+            self.assertLess(np.abs(samples.value - (x + 2 * y + 3 * z))[2:-2, 2:-2, 2:-2].max(), 0.01)
+            # Beyond the data there is nothing; a slab of it alone has the same bits.
+            wide = cache.sample(size=(40, 30, 40), box=(0, 4, 0, 3, 0, 4))
+            self.assertTrue(np.isnan(wide.value[:, :, 25:]).all() and (wide.density[:, :, 25:] == 0).all())
+            coarse = cache.sample(size=8, level=0)
+            self.assertAlmostEqual(float(coarse.density.sum()) * 0.125, 24, delta=1)
+            self.assertTrue(np.array_equal(cache.sample(size=40).value, samples.value))
+
+    def test_are_points(self):
+        with curvisplat.open(self.ramp) as cache:
+            points = cache.points()
+            self.assertEqual(len(points.values), 40 * 44 * 48)
+            self.assertLess(np.abs(points.values - points.positions @ [1, 2, 3]).max(), 0.02)
+            self.assertAlmostEqual(points.volumes.sum(dtype="f8"), 24, delta=0.03)
+            inner = cache.points(box=(0.5, 1.5, 1, 2, 1, 3))
+            self.assertTrue(((inner.positions > [0.5, 1, 1]) & (inner.positions < [1.5, 2, 3])).all())
+            spacing = np.array([2 / 39, 3 / 43, 4 / 47])
+            np.testing.assert_allclose(inner.shapes, np.broadcast_to(np.diag(spacing**2), inner.shapes.shape), rtol=0.05, atol=1e-4)
+            self.assertLess(len(cache.points(level=0).values), 40 * 44 * 48)
+
+    def test_are_of_a_step_and_say_what_is_wrong(self):
+        with curvisplat.open(self.ramp) as cache:
+            for wrong, words in (({"size": 0}, "size"), ({"size": (1, 2)}, "expected one number or three"), ({"box": (0, 1)}, "expected .x0"),
+                                 ({"box": (1, 0, 0, 1, 0, 1)}, "empty"), ({"step": 1}, "no step 1"), ({"level": 9}, "no level 9"),
+                                 ({"scalar": "u"}, "no scalar"), ({"size": (100000, 100000, 100000)}, "more than")):
+                with self.assertRaisesRegex(curvisplat.UsageError, words):
+                    cache.sample(**wrong)
+            for wrong, words in (({"level": 9}, "no level 9"), ({"step": 1}, "no step 1")):
+                with self.assertRaisesRegex(curvisplat.UsageError, words):
+                    cache.points(**wrong)
+
+    def test_are_documented_and_typed(self):
+        """Everything public has a docstring, and what the stubs say of the module is there."""
+        import ast
+        import inspect
+        for name in curvisplat.__all__:
+            thing = getattr(curvisplat, name)
+            if name != "colour_maps":
+                self.assertTrue(inspect.getdoc(thing), name)
+            if inspect.isclass(thing) and not issubclass(thing, (Exception, np.ndarray, tuple)):
+                for method, function in vars(thing).items():
+                    if not method.startswith("_") and callable(function):
+                        self.assertTrue(inspect.getdoc(function), f"{name}.{method}")
+        folder = pathlib.Path(curvisplat.__file__).parent
+        self.assertTrue((folder / "py.typed").is_file())
+        stubs = ast.parse((folder / "_core.pyi").read_text())
+        declared = {node.name for node in stubs.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
+        self.assertEqual(declared - {name for name in dir(curvisplat._core) if not name.startswith("_")}, set())
+        (of_cache,) = [node for node in stubs.body if isinstance(node, ast.ClassDef) and node.name == "OpenCache"]
+        methods = {node.name for node in of_cache.body if isinstance(node, ast.FunctionDef)}
+        self.assertEqual({m for m in dir(curvisplat._core.OpenCache) if not m.startswith("_")} - methods
+                         - {node.target.id for node in of_cache.body if isinstance(node, ast.AnnAssign)}, set())
+
+
 class Histograms(PythonTest):
     def test_are_shares_of_the_volume(self):
         k, j, i = np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 2, 9), np.linspace(0, 3, 65), indexing="ij")
@@ -280,6 +392,43 @@ class Arrays(PythonTest):
             self.assertEqual((first / name).read_bytes(), (second / name).read_bytes(), name)
         self.assertGreater(largest, 0)
 
+    def test_are_appended_as_steps(self):
+        x, y, z, t = bent_duct()
+        steps = self.folder / "appended.splats"
+        curvisplat.convert_arrays(steps, curvisplat.Block(x, y, z, {"t": t}), time=1.5)
+        self.assertEqual(curvisplat.append_arrays(steps, curvisplat.Block(x, y, z, {"t": 2 * t}), time=2.5), 2)
+        self.assertEqual(curvisplat.append_arrays(steps, curvisplat.Block(x, y, z, {"t": 3 * t})), 3)
+        with curvisplat.open(steps) as cache:
+            np.testing.assert_array_equal(cache.times, [1.5, 2.5, 3.5])
+            first, last = (cache.points(step=step).values for step in (0, 2))
+            np.testing.assert_allclose(last, 3 * first, rtol=1e-3)
+        for wrong, words in (({"time": 3.0}, "time"), ({}, "has no scalar|no scalar")):
+            scalars = {"t": t} if wrong else {"u": t}
+            with self.assertRaisesRegex(curvisplat.Error, words):
+                curvisplat.append_arrays(steps, curvisplat.Block(x, y, z, scalars), **wrong)
+        with self.assertRaises(curvisplat.Error):
+            curvisplat.append_arrays(self.folder / "none.splats", curvisplat.Block(x, y, z, {"t": t}))
+        with curvisplat.open(steps) as cache:
+            self.assertEqual(len(cache.times), 3)
+
+    def test_of_a_solver_that_runs(self):
+        package = pathlib.Path(__file__).resolve().parents[2] / "tools" / "python" / "examples" / "solver.py"
+        name = self.folder / "heat"
+        done = subprocess.run([sys.executable, package, name], capture_output=True, text=True, env=os.environ)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        means = [float(line.rsplit(" ", 1)[1]) for line in done.stdout.splitlines() if line.startswith("step")]
+        self.assertEqual(len(means), 5)
+        self.assertTrue(all(a < b for a, b in zip(means, means[1:])), means)  # heat comes in
+        with curvisplat.open(f"{name}.splats") as cache:
+            self.assertEqual(len(cache.times), 5)
+            for step in range(len(means)):
+                points = cache.points(step=step)
+                self.assertLessEqual(points.values.max(), 100.01)
+            # Diffusion from one end: the temperature falls along the duct, the same at all heights.
+            angle = np.arctan2(points.positions[:, 1], points.positions[:, 0])
+            self.assertLess(np.corrcoef(angle, points.values)[0, 1], -0.7)
+        self.assertGreater((self.folder / "heat.png").stat().st_size, 2000)
+
     def test_of_xarray(self):
         try:
             import xarray
@@ -376,6 +525,7 @@ class Interrupts(PythonTest):
                     cache.render(size=(900, 900), lod_pixels=0)
             timer.join()
         self.assertLessEqual(threads(), before_threads)
+        print(f"100 renders and 20 interrupted ones: {threads() - before_threads} threads and {(resident() - before) / (1 << 20):.1f} MiB more")
         self.assertLess(resident() - before, 64 << 20)
         cache.close()
 

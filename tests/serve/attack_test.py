@@ -220,6 +220,7 @@ def broken_messages(server):
     base = viewer.facts["state"]
     for text in ("", "[]", "{}", '{"type": 1}', '{"type": "open"}', '{"type": "open", "cache": 99, "size": [1, 1]}', "[" * 5000, '"\\ud800"',
                  '{"type": "view", "number": 1e400}', '{"type": "histogram", "cache": 0, "scalar": "none", "low": 0, "high": 1, "log": false}',
+                 '{"type": "pick"}', '{"type": "pick", "x": 2, "y": 0}', '{"type": "pick", "x": "a", "y": 0}',
                  '{"type": "colours", "map": "../../etc/passwd"}', '{"type": "choose", "cache": 0, "scalar": "/etc/passwd"}'):
         viewer.socket.send(text)
         expect(viewer.text("error")["text"], f"'{text[:30]}' is answered with an error")
@@ -254,6 +255,18 @@ def broken_messages(server):
                 expect(False, f"the server lives after {place}.{field} = {value}")
                 return
     print(f"{drawn} odd views drawn, {refused} refused")
+    # Places that nothing is seen at, and many at once: one line or a marker each, of the newest.
+    viewer.view(base)
+    viewer.picture()
+    for x, y in ((0, 0), (1, 1), (0.5, 0.5)):
+        for _ in range(20):
+            viewer.send(type="pick", x=x, y=y)
+        while True:
+            message = viewer.receive()
+            if isinstance(message, dict) and message["type"] in ("error", "marker"):
+                expect(str(folder) not in json.dumps(message), f"no path in {message}")
+                break
+    expect(server.is_alive(), "the server lives after clicks")
     # Surfaces name files: none is read.
     secret = pathlib.Path(folder, "secret.stl")
     secret.write_text("solid x\nendsolid x\n")

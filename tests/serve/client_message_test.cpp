@@ -34,6 +34,10 @@ TEST(ClientMessage, IsReadWithEachType) {
   EXPECT_EQ(histogram.low, -1);
   EXPECT_EQ(histogram.high, 2);
   EXPECT_EQ(parsed<ColoursRequest>(R"({"type": "colours", "map": "viridis"})").map, "viridis");
+  const auto pick = parsed<PickRequest>(R"({"type": "pick", "x": 0.25, "y": 1})");
+  EXPECT_EQ(pick.x, 0.25);
+  EXPECT_EQ(pick.y, 1);
+  EXPECT_THROW(parsed<PickRequest>(R"({"type": "pick", "x": 1.1, "y": 0})"), Error);
   EXPECT_EQ(parsed<ShownReport>(R"({"type": "shown", "picture": 3})").picture, 3u);
 }
 

@@ -58,6 +58,19 @@ def set_value(tab, selector, value):
             f"else e.value = {value!r}; e.dispatchEvent(new Event('input')); e.dispatchEvent(new Event('change')); }})()")
 
 
+def drag_until(tab, condition):
+    """Moves the mouse with its button down until the condition holds."""
+    way = iter(range(10 ** 9))
+
+    def moved():
+        tab.mouse("mouseMoved", MIDDLE[0] + next(way) % 150, MIDDLE[1] + 30, buttons=1)
+        return condition()
+
+    tab.mouse("mousePressed", *MIDDLE, buttons=1)
+    wait_for(moved, "pictures to come while the mouse moves")
+    tab.mouse("mouseReleased", MIDDLE[0] + 100, MIDDLE[1] + 30)
+
+
 def opened(browser, url, size=(1280, 800)):
     tab = browser.tab(url, size)
     tab.wait(f"{PAGE} && {PAGE}.pictures > 0", "a first picture")
@@ -96,8 +109,7 @@ def navigation(browser, server, caches):
     shot(tab, "first")
     is_the_commands_picture(tab, caches)
     before = tab.run(f"{PAGE}.pictures")
-    changes(tab, lambda: tab.drag(MIDDLE, (950, 480), steps=20, pause_s=0.03), "dragging", "rotated")
-    expect(tab.run(f"{PAGE}.pictures") - before > 3, "pictures come while the mouse moves")
+    changes(tab, lambda: drag_until(tab, lambda: tab.run(f"{PAGE}.pictures") - before > 3), "dragging", "rotated")
     camera = tab.run(f"{PAGE}.state.camera")
     changes(tab, lambda: tab.drag(MIDDLE, (850, 420), modifiers=8), "shift and drag")
     moved = tab.run(f"{PAGE}.state.camera")
@@ -106,7 +118,7 @@ def navigation(browser, server, caches):
     moved = tab.run(f"{PAGE}.state.camera")
     changes(tab, lambda: tab.mouse("mouseWheel", *MIDDLE, deltaX=0, deltaY=-300), "the wheel", "zoomed")
     expect(tab.run(f"{PAGE}.state.camera.parallel_scale") < moved["parallel_scale"], "the wheel zooms in")
-    tab.click("#picture")
+    tab.run("document.getElementById('picture').focus()")
     for key in "xYzor":
         changes(tab, lambda key=key: tab.key(key), f"the key {key}", f"key_{key}")
     expect(tab.run(f"{PAGE}.state.camera.perspective"), "the key o changes the projection")
@@ -200,7 +212,6 @@ def time_steps(browser, server):
     rest(tab)
     tab.run("document.getElementById('cache').value = 1; document.getElementById('cache').onchange()")
     tab.wait(f"{PAGE}.header.step === {step}", "the step that was left")
-    return tab
 
 
 def lost_connection(browser, caches, folder):
@@ -221,6 +232,85 @@ def lost_connection(browser, caches, folder):
             time.sleep(0.3)
             expect(rest(tab) == before, "the picture is the one before")
             expect(tab.run(f"{PAGE}.state.camera") == camera, "the camera is the one before")
+
+
+def flying(tab):
+    rest(tab)
+    tab.run("document.getElementById('picture').focus()")
+    tab.key("f")
+    tab.wait(f"{PAGE}.state.camera.perspective", "flying to be in perspective")
+    before = rest(tab)
+    camera = tab.run(f"{PAGE}.state.camera")
+    tab.call("Input.dispatchKeyEvent", type="keyDown", key="w", text="w")
+    tab.wait(f"JSON.stringify({PAGE}.state.camera.position) !== JSON.stringify({camera['position']})", "w to move the viewer")
+    time.sleep(0.3)
+    tab.call("Input.dispatchKeyEvent", type="keyUp", key="w")
+    flown = tab.run(f"{PAGE}.state.camera")
+    ahead = [f - p for f, p in zip(camera["focal_point"], camera["position"])]
+    way = [b - a for a, b in zip(camera["position"], flown["position"])]
+    cosine = sum(a * w for a, w in zip(ahead, way)) / (sum(a * a for a in ahead) * sum(w * w for w in way)) ** 0.5
+    expect(cosine > 0.9999, f"w flies forwards: {cosine}")
+    expect(rest(tab) != before, "flying changes the picture")
+    shot(tab, "flown")
+    tab.drag(MIDDLE, (860, 400), steps=5)
+    turned = tab.run(f"{PAGE}.state.camera")
+    expect(turned["focal_point"] != flown["focal_point"], "while flying, a drag looks around")
+    expect(all(abs(a - b) < 1e-9 for a, b in zip(turned["position"], flown["position"])), "and stays where it is")
+    tab.key("f")
+    tab.key("o")
+    tab.key("r")
+    rest(tab)
+    expect(not tab.run(f"{PAGE}.state.camera.perspective"), "orthographic again")
+
+
+def markers(tab):
+    """A click finds what is seen there; its sign follows the camera."""
+    tab.run(f"{PAGE}.state.markers.length = 0")
+    tab.key("z")
+    rest(tab)
+    # Somewhere the data are.
+    for x, y in ((800, 400), (760, 300), (700, 300), (860, 300), (700, 500)):
+        tab.mouse("mousePressed", x, y, buttons=1)
+        tab.mouse("mouseReleased", x, y)
+        try:
+            wait_for(lambda: tab.run(f"{PAGE}.state.markers.length"), "a marker", 10)
+            break
+        except AssertionError:
+            tab.run(f"{PAGE}.errors.length = 0")
+    else:
+        expect(False, "a click into the data makes a marker")
+        return
+    marker = tab.run(f"{PAGE}.state.markers[0]")
+    expect(marker["name"] == "1" and marker["value"] == marker["value"] and len(marker["point"]) == 3, f"a marker: {marker}")
+    sign = "(() => { const r = document.querySelector('.sign').getBoundingClientRect(); return [r.x, r.y + r.height / 2]; })()"
+    left, middle = tab.run(sign)
+    expect(abs(left - 8 - x) < 4 and abs(middle - y) < 4, f"its sign is at the click: {left - 8}, {middle}, not {x}, {y}")
+    tab.drag((600, 400), (640, 420), modifiers=8)
+    rest(tab)
+    moved = tab.run(sign)
+    expect(abs(moved[0] - left - 40) < 4 and abs(moved[1] - middle - 20) < 4, f"it moves with the data: {moved}, from {[left, middle]}")
+    shot(tab, "marker")
+    tab.run("document.querySelector('#markers button').click()")
+    expect(tab.run(f"{PAGE}.state.markers.length") == 0 and not tab.run("Boolean(document.querySelector('.sign'))"), "a marker is removed")
+
+
+def two_scalars(tab):
+    names = tab.run("[...document.getElementById('opacity_by').options].map(o => o.value)")
+    changes(tab, lambda: set_value(tab, "#opacity_by", names[1]), "another scalar's opacities", "two_scalars")
+    expect(tab.run(f"{PAGE}.state.opacity_by.variable") == names[1], "the opacities are the other scalar's")
+    own = tab.run(f"{PAGE}.state.function.Points")
+    set_value(tab, "#edits", "opacities")
+    changes(tab, lambda: set_value(tab, "#unit", "0.05"), "the other function's opacity unit")
+    expect(tab.run(f"{PAGE}.state.opacity_by.function.ScalarOpacityUnitDistance") == 0.05, "the other function is edited")
+    expect(tab.run(f"{PAGE}.state.function.Points") == own, "the colours' function is as it was")
+    changes(tab, lambda: set_value(tab, "#opacity_by", ""), "the same scalar again")
+    expect(tab.run(f"{PAGE}.state.opacity_by") is None, "one scalar again")
+    expect(tab.run(f"{PAGE}.errors.length") == 0, f"no errors: {tab.run(PAGE + '.errors')}")
+
+
+def reversed_floats(data):
+    """Another scalar of the same grid."""
+    return b"".join(data[n:n + 4] for n in range(len(data) - 4, -4, -4))
 
 
 def wrong_token(browser, server):
@@ -259,6 +349,10 @@ with tempfile.TemporaryDirectory() as folder:
     subprocess.run([program, "convert", f"{folder}/g.xyz", f"{folder}/g.fun", "-o", f"{folder}/annulus.splats"], check=True, capture_output=True)
     subprocess.run([program, "generate", "wake", "--size", "32x24x16", "--steps", "4", "-o", f"{folder}/w"], check=True, capture_output=True)
     subprocess.run([program, "convert", f"{folder}/w.xyz", f"{folder}/w_*.fun", "-o", f"{folder}/wake.splats"], check=True, capture_output=True)
+    # Two scalars.
+    one = pathlib.Path(folder, "g.fun").read_bytes()
+    pathlib.Path(folder, "two.fun").write_bytes(one[:12] + b"\2\0\0\0" + one[16:] + reversed_floats(one[16:]))
+    subprocess.run([program, "convert", f"{folder}/g.xyz", f"{folder}/two.fun", "-o", f"{folder}/two.splats"], check=True, capture_output=True)
     caches = [f"{folder}/annulus.splats", f"{folder}/wake.splats"]
     browser = Chromium()
     try:
@@ -267,12 +361,19 @@ with tempfile.TemporaryDirectory() as folder:
             print("navigation done")
             editing(tab)
             print("editing done")
+            markers(tab)
+            print("markers done")
+            flying(tab)
+            print("flying done")
             sizes(tab)
             print("sizes done")
             time_steps(browser, server)
             print("time steps done")
             wrong_token(browser, server)
             expect(server.stop() == 130, "Ctrl-C ends the server with pages open")
+        with serving(program, [f"{folder}/two.splats"]) as server:
+            two_scalars(opened(browser, server.url))
+            print("two scalars done")
         lost_connection(browser, caches, folder)
         print("lost connection done")
         ten_clients(browser, caches)

@@ -156,14 +156,16 @@ class Tab:
 
 
 class Chromium:
-    def __init__(self):
+    """`options`: of the command line; without any it has no WebGL."""
+
+    def __init__(self, *options):
         program = shutil.which("chromium") or shutil.which("chromium-browser")
         if not program:
             print("skipped: chromium is not installed")
             sys.exit(77)
         self.folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         self.process = subprocess.Popen(
-            [program, "--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-dev-shm-usage",
+            [program, "--headless=new", "--no-sandbox", *(options or ("--disable-gpu",)), "--no-first-run", "--disable-dev-shm-usage",
              "--disable-background-networking", "--disable-backgrounding-occluded-windows", "--disable-renderer-backgrounding", "--disable-component-update", "--hide-scrollbars",
              "--remote-debugging-port=0", f"--user-data-dir={self.folder.name}", "about:blank"],
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "stream/base/error.h"
+#include "tests/support/sweep.h"
 
 namespace curvisplat::testing {
 namespace {
@@ -19,7 +20,8 @@ bool tellsWhy(const std::string& line, const Fault& fault) {
 }  // namespace
 
 int64_t FaultSweep::run(const Fault& fault) const {
-  for (int64_t at = 0;; at += step) {
+  int64_t tried = 0;
+  for (int64_t at = 0;; at = nextInSweep(at, stride), ++tried) {
     const ::testing::ScopedTrace trace(__FILE__, __LINE__, fmt::format("{} at {}", fault.name, at));
     prepare();
     const size_t descriptors = openDescriptors();
@@ -43,7 +45,7 @@ int64_t FaultSweep::run(const Fault& fault) const {
     outcome.has_struck = faulty.has_failed;
     EXPECT_TRUE(outcome.has_struck || outcome.error.empty()) << outcome.error;
     check(outcome);
-    if (!outcome.has_struck || ::testing::Test::HasFailure()) return at / step;
+    if (!outcome.has_struck || ::testing::Test::HasFailure()) return tried;
   }
 }
 

@@ -1,5 +1,5 @@
 // Does a job again and again, and each time something else goes wrong with the disk: the first call fails,
-// the second one, ... until the job ends before it comes to that.
+// the second one, ... until the job ends before it comes to that (sweep.h says which are tried).
 #pragma once
 
 #include <functional>
@@ -37,10 +37,10 @@ struct FaultSweep {
   std::string to_be_cut;   // only files whose paths begin so become shorter
   std::function<void()> prepare, job;
   std::function<void(const FaultOutcome&)> check;
-  int64_t step = 1;
+  int64_t stride = 5;  // of nextInSweep()
 
-  /// Calls prepare(), job() with the fault at the n-th call, and check(outcome), for n from 0 on in steps,
-  /// until the fault is not reached any more. Expects that a failing job throws an Error of one line that
+  /// Calls prepare(), job() with the fault at the n-th call, and check(outcome), for n from 0 on as
+  /// nextInSweep() says, until the fault is not reached any more. Expects that a failing job throws an Error of one line that
   /// names a path and the reason, and that no descriptor is lost. Returns how many faults were tried.
   int64_t run(const Fault& fault) const;
 };

@@ -5,6 +5,8 @@
 #include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
+#include <array>
+
 namespace curvisplat {
 namespace {
 
@@ -51,6 +53,8 @@ TEST(Verdict, DrawingOnTheCoresBounds) {
   EXPECT_TRUE(
       says(verdict, "a graphics card would draw instead of the cores; their remaining work takes 70.0 ms"))
       << all(verdict);
+  EXPECT_EQ(verdict.lines.back(),
+            "to draw this faster, buy a graphics card; a faster disk would change little");
   // 8 MB a frame at 1 GB/s.
   EXPECT_TRUE(says(verdict, "the disk could sustain 125.0 such frames per second")) << all(verdict);
 }
@@ -71,6 +75,24 @@ TEST(Verdict, DecodingBoundsWhereBricksAreReadEachTime) {
   EXPECT_NE(judge(judged, slow, {}).stage, "decoding");
 }
 
+/// A coarser picture is advised only where it is measured to be faster.
+TEST(Verdict, AGainWithinTheSpreadIsNone) {
+  const JudgedFrame judged = frame();
+  OtherFrame same{judged.seconds, judged.lod_pixels, judged.threads, judged.memory_bytes, 1000, 0.1};
+  OtherFrame coarser = same;
+  coarser.lod_pixels = 2 * judged.lod_pixels;
+  coarser.seconds = 0.7 * judged.seconds;
+  const auto advised = [&] {
+    return says(judge(judged, speeds(), std::array{same, coarser}),
+                fmt::format("--lod-pixels {:g} takes", coarser.lod_pixels));
+  };
+  EXPECT_FALSE(advised());
+  same.spread_s = coarser.spread_s = 0.01;
+  EXPECT_TRUE(advised());
+  coarser.splats_prepared = judged.splats_prepared;  // no coarser in truth
+  EXPECT_FALSE(advised());
+}
+
 TEST(Verdict, ReadingBoundsWithASlowDisk) {
   JudgedFrame judged = frame();
   judged.read_fraction = 1;
@@ -81,7 +103,7 @@ TEST(Verdict, ReadingBoundsWithASlowDisk) {
   EXPECT_EQ(verdict.stage, "reading");
   EXPECT_TRUE(says(verdict, "reading bounds the frame: in isolation it takes 8.00 s of 9.00 s"))
       << all(verdict);
-  EXPECT_TRUE(says(verdict, "a faster disk would help")) << all(verdict);
+  EXPECT_TRUE(says(verdict, "to draw this faster, buy a faster disk")) << all(verdict);
   EXPECT_TRUE(says(verdict, "could sustain 0.1 such frames")) << all(verdict);
 }
 
@@ -89,7 +111,9 @@ TEST(Verdict, ACardThatDrawsIsNotAdvised) {
   JudgedFrame judged = frame();
   judged.draws_apart = true;
   EXPECT_EQ(judge(judged, speeds(), {}).stage, "drawing");
-  EXPECT_FALSE(says(judge(judged, speeds(), {}), "graphics card"));
+  EXPECT_FALSE(says(judge(judged, speeds(), {}), "graphics card would"));
+  EXPECT_EQ(judge(judged, speeds(), {}).lines.back(),
+            "to draw this faster, buy a faster graphics card; a faster disk would change little");
   StageSpeeds fast = speeds();
   fast.draw_splats_s = 1e9;
   EXPECT_EQ(judge(judged, fast, {}).stage, "projecting");

@@ -59,9 +59,7 @@ void runAddScalar(ConvertArguments arguments) {
   options.cache = arguments.to;
   applyCommonOptions(arguments, options);
 
-  const std::unique_ptr<GridSource> source =
-      requireGrid(openSource(arguments, arguments.to),
-                  "cannot get further scalars later; convert all of them at once (--scalar a,b --overwrite)");
+  const std::unique_ptr<DataSource> source = openSource(arguments, arguments.to);
   options.scalars = chooseScalars(arguments, arguments.added_scalars, source->description());
   requireThreads(arguments.threads);
   Progress progress{progressBar()};

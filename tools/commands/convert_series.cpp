@@ -9,7 +9,6 @@
 #include <string>
 
 #include "preprocess/addition/convert_series.h"
-#include "preprocess/formats/open/open_grid.h"
 #include "preprocess/formats/open/series_files.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
@@ -19,6 +18,7 @@
 #include "tools/commands/folder_events.h"
 #include "tools/commands/written_files.h"
 #include "tools/options/option_parsers.h"
+#include "tools/options/series_input.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
@@ -69,22 +69,6 @@ SeriesOptions seriesOptions(const ConvertArguments& arguments) {
   options.keep_going = arguments.keep_going;
   options.add = arguments.adds_steps;
   return options;
-}
-
-SeriesInput seriesInput(const ConvertArguments& arguments, const std::vector<StepFiles>& steps) {
-  SeriesInput input;
-  input.count = steps.size();
-  input.name = [&](uint64_t step) { return steps[step].name; };
-  input.open = [&](uint64_t step) {
-    ConvertArguments of_step = arguments;
-    of_step.grid = steps[step].options;
-    return requireGrid(openSource(of_step, arguments.adds_steps ? arguments.to : arguments.output),
-                       "cannot be a time series in one cache; convert each step to its own (--time-step)");
-  };
-  input.scalars = [&](const GridDescription& description) {
-    return chooseScalars(arguments, arguments.scalars, description);
-  };
-  return input;
 }
 
 /// Prints each step as it comes, and keeps what --stats reports.

@@ -195,7 +195,8 @@ void dryRunOfSeries(const SeriesInput& input, const SeriesOptions& options,
   SeriesInput sample = input;
   sample.count = std::min<uint64_t>(2, input.count);
   sample.open = [&](uint64_t step) {
-    std::unique_ptr<GridSource> grid = input.open(step);
+    std::unique_ptr<GridSource> grid =
+        requireGrid(input.open(step), "is not sampled in series; take --dry-run of one step (--time-step)");
     whole = grid->description();
     grid = sampleOf(std::move(grid), kSampledNodes);
     part = grid->description();

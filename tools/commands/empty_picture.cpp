@@ -133,8 +133,9 @@ bool isEmpty(const Image& image, const glm::vec4& background) {
 
 std::vector<std::string> whyEmpty(const RenderedScene& scene) {
   std::vector<std::string> reasons;
-  if (scene.options.scene && !scene.options.scene->drawsSplats())
-    return {"no surface or slice is in sight, and --volume is off; try --view iso or another camera"};
+  if (scene.options.scene && !scene.options.scene->volume)
+    return {
+        "no surface, slice or isosurface is in sight, and --volume is off; try --view iso or another camera"};
   const double largest = largestExtinction(scene.transfer_function, scene.variable.min, scene.variable.max);
   if (largest == 0) reasons.push_back(whyTransparent(scene));
 

@@ -1,4 +1,4 @@
-// `curvisplat export`: a classified cut of a cache as 3D Gaussian splats.
+// `curvisplat export`: a classified cut of a cache as 3D Gaussian splats, or its scalar on sparse regular grids.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -13,6 +13,7 @@
 
 #include "render/export/gaussian_files.h"
 #include "render/export/gaussian_picture.h"
+#include "render/export/vdb_file.h"
 #include "render/frame/frame.h"
 #include "stream/base/message.h"
 #include "stream/base/progress.h"
@@ -21,6 +22,7 @@
 #include "tools/options/option_parsers.h"
 #include "tools/options/picture_choice.h"
 #include "tools/options/scalar_arguments.h"
+#include "tools/options/step_arguments.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/stop_signals.h"
@@ -31,9 +33,12 @@ namespace {
 struct ExportArguments {
   std::filesystem::path cache, output;
   ScalarArguments scalar;
-  std::string max_splats = "1M", memory = "512M";
+  std::string max_splats = "1M", voxels = "256", memory = "512M";
+  StepArguments step;
   bool no_comparison = false;
 };
+
+constexpr uint64_t kMaxVoxels = 8192;  // along a side
 
 constexpr ImageSize kComparedSize{512, 512};
 
@@ -81,14 +86,37 @@ Comparison compare(const CacheReader& cache, size_t variable, const TransferFunc
   return {-10 * std::log10(squares), -10 * std::log10(largest)};
 }
 
+double mebibytesOf(const std::filesystem::path& file) {
+  return static_cast<double>(std::filesystem::file_size(file)) / (1 << 20);
+}
+
+void exportVdb(const ExportArguments& arguments) {
+  VdbOptions options;
+  const uint64_t voxels = parseCount("--voxels", arguments.voxels);
+  if (voxels > kMaxVoxels)
+    throw UsageError("--voxels {}: expected at most {} along the longest side", voxels, kMaxVoxels);
+  options.voxels = static_cast<uint32_t>(voxels);
+  options.memory_bytes = parseMemory("--memory", arguments.memory);
+  const CacheReader cache = openAtStep(arguments.cache, arguments.step);
+  const size_t variable = chooseVariable(cache, arguments.scalar);
+  Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
+  const VdbReport report = writeVdb(cache, variable, options, arguments.output, progress);
+  fmt::print("{}: value and density of {} in {} voxels of {:g} units, {:.1f} MiB\n",
+             arguments.output.string(), cache.manifest().variables[variable].name, report.active,
+             report.voxel_size, mebibytesOf(arguments.output));
+}
+
 void exportCache(const ExportArguments& arguments) {
-  checkGaussianName(arguments.output);
+  const bool vdb = arguments.output.extension() == ".vdb";
+  if (!vdb) checkGaussianName(arguments.output);
   checkFunctionArguments(arguments.scalar);
   checkOutputFile("-o", arguments.output, {arguments.cache, arguments.scalar.transfer_function.value_or("")});
+  if (vdb) return exportVdb(arguments);
   const uint64_t max_splats = parseCount("--max-splats", arguments.max_splats);
   const uint64_t memory = parseMemory("--memory", arguments.memory);
 
-  const CacheReader cache(arguments.cache);
+  const CacheReader cache = openAtStep(arguments.cache, arguments.step);
   const size_t variable = chooseVariable(cache, arguments.scalar);
   PictureChoice choice(cache, variable, glm::dvec3(1));
   const TransferFunction function = choice.function(arguments.scalar);
@@ -104,8 +132,7 @@ void exportCache(const ExportArguments& arguments) {
         arguments.cache.string(), cache.manifest().variables[variable].name);
   writeGaussians(splats, arguments.output);
   fmt::print("{}: {} splats of {}, {:.1f} MiB\n", arguments.output.string(), splats.size(),
-             cache.manifest().variables[variable].name,
-             static_cast<double>(std::filesystem::file_size(arguments.output)) / (1 << 20));
+             cache.manifest().variables[variable].name, mebibytesOf(arguments.output));
   if (!arguments.no_comparison) {
     const Comparison found = compare(cache, variable, function, splats, memory, progress);
     fmt::print("against curvisplat's own pictures from 12 directions: {:.1f} dB, {:.1f} dB at worst\n",
@@ -124,16 +151,23 @@ void exportCache(const ExportArguments& arguments) {
 void addExport(CLI::App& app) {
   auto arguments = std::make_shared<ExportArguments>();
   CLI::App* command = app.add_subcommand(
-      "export", "Export a cache as 3D Gaussian splats, which web viewers and game engines draw");
+      "export",
+      "Export a cache as 3D Gaussian splats, which web viewers and game engines draw, or as OpenVDB grids");
   command->add_option("CACHE", arguments->cache, "Splat cache, a directory NAME.splats")->required();
-  command->add_option("-o,--output", arguments->output, "File to write: .ply, .spz or .glb")->required();
+  command->add_option("-o,--output", arguments->output, "File to write: .ply, .spz or .glb; .vdb for grids")
+      ->required();
   addScalarOption(*command, arguments->scalar);
   addFunctionOptions(*command, arguments->scalar, "Data and colours");
+  addStepOptions(*command, arguments->step, "Data and colours");
   command
       ->add_option("--max-splats", arguments->max_splats,
                    "Splat limit, such as 8M or 500K; the largest detail is kept first")
       ->capture_default_str();
-  command->add_option("--memory", arguments->memory, "Memory limit for the pictures of the comparison")
+  command->add_option("--voxels", arguments->voxels, ".vdb: voxels along the longest side of the data")
+      ->capture_default_str();
+  command
+      ->add_option("--memory", arguments->memory,
+                   "Memory limit for the grids, or for the pictures of the comparison")
       ->capture_default_str();
   command->add_flag(
       "--no-comparison", arguments->no_comparison,

@@ -67,6 +67,8 @@ void generateSteps(const GenerateOptions& options) {
 }
 
 void generate(const GenerateOptions& options) {
+  makeScenes(options.scene, options.clustering);  // the scene's name first
+  if (options.size.empty()) throw UsageError("--size NIxNJxNK is required, such as --size 128x64x64");
   if (options.steps) return generateSteps(options);
   if (options.moving) throw UsageError("--moving needs --steps");
   const SceneGridSource source(makeScenes(options.scene, options.clustering), parseSize(options.size));
@@ -84,7 +86,7 @@ void addGenerate(CLI::App& app) {
   CLI::App* command = app.add_subcommand("generate", "Write an analytic scene as PLOT3D files of any size");
   command->add_option("SCENE", options->scene, fmt::format("Scene: one of {}", fmt::join(sceneNames(), ", ")))
       ->required();
-  command->add_option("--size", options->size, "Number of nodes along i, j and k: NIxNJxNK")->required();
+  command->add_option("--size", options->size, "Number of nodes along i, j and k: NIxNJxNK");
   command
       ->add_option("-o,--output", options->prefix,
                    "Prefix of the files to write: PREFIX.xyz, PREFIX.fun and PREFIX.nam")

@@ -28,6 +28,7 @@
 #include "tools/options/channel_arguments.h"
 #include "tools/options/frame_arguments.h"
 #include "tools/options/frame_part.h"
+#include "tools/options/further_scalars.h"
 #include "tools/options/kept_caches.h"
 #include "tools/options/motion_in_time.h"
 #include "tools/options/opacity_arguments.h"
@@ -168,7 +169,11 @@ std::filesystem::path cacheToDraw(const RenderArguments& arguments) {
     throw Error("{}: several processes draw from a cache; convert the grid first", files.front().string());
   Progress progress{progressBar()};
   const StopOnSignals stopping(progress);
-  return keptCacheOf(files, progress, [](const std::string& text) { printMessage("{}", text); });
+  KeptCacheEvents events;
+  events.say = [](const std::string& text) { printMessage("{}", text); };
+  std::filesystem::path cache = keptCacheOf(files, progress, events);
+  addMissingScalars(cache, files, {arguments.scalar.scalar, arguments.opacity.by.scalar}, progress);
+  return cache;
 }
 
 constexpr double kAxesRoom = 0.17;  // around the data, of its box
@@ -207,10 +212,6 @@ void render(const RenderArguments& given) {
   }
 
   options.scene = sceneOf(arguments.surfaces, cache, shown, variable);
-  if (options.scene && !options.scene->isovalues.empty() && options.scene->volume &&
-      transfer_function.logScale())
-    throw UsageError(
-        "--iso in the volume needs a linear transfer function; this one is logarithmic: add --volume off");
   for (const std::string& miss : slicesThatMiss(arguments.surfaces, manifest.lower, manifest.upper))
     printMessage("warning: {}", miss);
 

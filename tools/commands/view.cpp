@@ -1,5 +1,8 @@
 // `curvisplat view`: opens a window that shows a cache.
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <limits>
@@ -13,6 +16,7 @@
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/commands/commands.h"
+#include "tools/options/further_scalars.h"
 #include "tools/options/kept_caches.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/step_arguments.h"
@@ -55,6 +59,37 @@ void checkGridOptions(const ViewArguments& arguments) {
                      arguments.files.front().string());
 }
 
+std::string whatOf(const KeptPreview& preview) {
+  constexpr std::array<const char*, 4> kEndings{"th", "st", "nd", "rd"};
+  const uint64_t last = preview.stride % 10, tens = preview.stride / 10 % 10;
+  return preview.stride == 1 ? "the first time step"
+                             : fmt::format("every {}{} index plane", preview.stride,
+                                           kEndings[tens != 1 && last < kEndings.size() ? last : 0]);
+}
+
+ConversionServices conversionServices() {
+  using Paths = ConversionServices::Paths;
+  ConversionServices services;
+  services.to_cache = [](const Paths& files, Progress& progress, const OpeningEvents& events) {
+    if (!isGrid(files)) return files.front();
+    KeptCacheEvents kept;
+    kept.say = events.say;
+    kept.preview = [&](const KeptPreview& preview) {
+      events.preview({preview.cache, preview.whole, whatOf(preview)});
+    };
+    return keptCacheOf(files, progress, kept);
+  };
+  services.sources_of = sourcesOf;
+  services.further_scalars = [](const std::filesystem::path& cache, const Paths& files) {
+    std::vector<SourceScalar> scalars;
+    for (FurtherScalar& one : furtherScalarsOf(cache, files))
+      scalars.push_back({std::move(one.name), std::move(one.unit), one.derived});
+    return scalars;
+  };
+  services.add_scalar = addFurtherScalar;
+  return services;
+}
+
 void view(const ViewArguments& arguments) {
   ViewerOptions options;
   options.size = parseImageSize("--size", arguments.size);
@@ -69,10 +104,7 @@ void view(const ViewArguments& arguments) {
       throw UsageError("--surface {}: the window shows STL, PLY and OBJ files; render draws .vtp files",
                        surface);
   std::optional<CacheReader> cache;
-  options.to_cache = [](const std::vector<std::filesystem::path>& files, Progress& progress,
-                        const std::function<void(const std::string&)>& say) {
-    return isGrid(files) ? keptCacheOf(files, progress, say) : files.front();
-  };
+  options.conversion = conversionServices();
   if (!arguments.files.empty() && !isGrid(arguments.files)) {
     cache = openAtStep(arguments.files.front(), arguments.steps);
     requireFixedFaces(arguments.surfaces, *cache);

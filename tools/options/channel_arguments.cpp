@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cctype>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "stream/base/error.h"
+#include "stream/base/suggestion.h"
 
 namespace curvisplat {
 namespace {
@@ -39,8 +42,8 @@ ValueChannels valueChannels(const std::optional<std::string>& text, const std::f
       channels.scalar = true;
     else
       throw UsageError(
-          "--channels {}: unknown channel '{}'; expected none, or some of depth, normal and scalar", *text,
-          word);
+          "--channels {}: unknown channel '{}'{}; expected none, or some of depth, normal and scalar", *text,
+          word, didYouMean(word, std::vector<std::string>{"depth", "normal", "scalar"}));
   }
   return channels;
 }

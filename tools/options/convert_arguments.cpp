@@ -9,6 +9,7 @@
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "stream/base/process_usage.h"
+#include "tools/options/choices.h"
 #include "tools/options/face_names.h"
 #include "tools/options/grid_options.h"
 #include "tools/output/output_paths.h"
@@ -125,8 +126,7 @@ void checkStatisticsFile(const ConvertArguments& arguments) {
 
 void applyGridUse(const ConvertArguments& arguments, ConvertOptions& options) {
   if (arguments.overlap) {
-    if (*arguments.overlap != "owner" && *arguments.overlap != "all")
-      throw UsageError("--overlap {}: expected owner or all", *arguments.overlap);
+    requireChoice("--overlap", *arguments.overlap, {"owner", "all"});
     options.overlap = *arguments.overlap == "all" ? Overlap::kAll : Overlap::kOwner;
   }
   options.surfaces = !arguments.no_surfaces;

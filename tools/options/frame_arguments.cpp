@@ -4,6 +4,7 @@
 
 #include "render/project/light.h"
 #include "stream/base/error.h"
+#include "tools/options/choices.h"
 #include "tools/options/option_parsers.h"
 
 namespace curvisplat {
@@ -70,8 +71,7 @@ FrameOptions frameOptions(const FrameArguments& arguments) {
   if (options.lod_pixels < 0)
     throw UsageError("--lod-pixels {}: expected 0 (the finest level) or more", arguments.lod_pixels);
   if (arguments.max_splats) options.max_splats = parseCount("--max-splats", *arguments.max_splats);
-  if (arguments.classify != "pixel" && arguments.classify != "flat")
-    throw UsageError("--classify {}: expected pixel or flat", arguments.classify);
+  requireChoice("--classify", arguments.classify, {"pixel", "flat"});
   options.classification = arguments.classify == "pixel" ? Classification::kPixel : Classification::kFlat;
   options.scale = parsePoint("--scale", arguments.scale);
   for (int axis = 0; axis < 3; ++axis)

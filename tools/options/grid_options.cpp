@@ -6,6 +6,7 @@
 #include <string>
 
 #include "preprocess/formats/derived/derived_mesh.h"
+#include "preprocess/gather/gradient_mesh.h"
 #include "preprocess/mesh/mesh_source.h"
 
 namespace curvisplat {
@@ -90,7 +91,9 @@ std::unique_ptr<DataSource> openWithDerived(const OpenGridOptions& grid, const D
   std::unique_ptr<DataSource> source = openData(grid);
   if (auto* const mesh = dynamic_cast<MeshSource*>(source.get())) {
     source.release();
-    return std::make_unique<DerivedMeshSource>(std::unique_ptr<MeshSource>(mesh), derived);
+    return std::make_unique<GradientMesh>(
+        std::make_unique<DerivedMeshSource>(std::unique_ptr<MeshSource>(mesh), derived), derived,
+        grid.temporary_folder.empty() ? std::filesystem::temp_directory_path() : grid.temporary_folder);
   }
   return std::make_unique<DerivedSource>(requireGrid(std::move(source), ""), derived);
 }

@@ -17,7 +17,7 @@ void addGridOptions(CLI::App& app, OpenGridOptions& options);
 /// Adds --gamma and --gas-constant.
 void addGasOptions(CLI::App& app, GasModel& gas);
 
-/// Opens the grid and adds the scalars that can be derived from its own; to an unstructured grid, none.
+/// Opens the grid and adds the scalars that can be derived from its own.
 std::unique_ptr<DataSource> openWithDerived(const OpenGridOptions& grid, const DerivedOptions& derived);
 
 }  // namespace curvisplat

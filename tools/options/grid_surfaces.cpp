@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "stream/base/error.h"
+#include "stream/base/suggestion.h"
 #include "tools/options/face_names.h"
 #include "tools/options/picture_choice.h"
 
@@ -126,6 +127,19 @@ class FaceFinder {
   GridSurface& surface_;
 };
 
+/// What is wrong with a name that no face has: a block that there is not, or a letter.
+std::string meantBy(const std::string& word, const Manifest& manifest, const FacesReader& faces) {
+  const auto name = parseFaceName(word);
+  const size_t blocks = manifest.blocks.size();
+  if (word.starts_with("block") && (!name || name->at != FaceName::At::kIndex))
+    return blocks == 1 ? " (the grid has one block, block 1)"
+                       : fmt::format(" (the grid has blocks 1 to {})", blocks);
+  std::vector<std::string> names{"imin", "imax", "jmin", "jmax", "kmin", "kmax", "all", "walls"};
+  for (const FaceRegion& region : faces.regions()) names.push_back(region.name);
+  std::erase(names, word);  // a name that there is, of which this cache has nothing
+  return didYouMean(word, names);
+}
+
 size_t variableOf(const std::string& name, const CacheReader& cache) {
   try {
     return cache.variableNamed(name);
@@ -155,8 +169,8 @@ GridSurface gridSurfaceNamed(const std::string& text, const CacheReader& cache,
     if (finder.add(word)) continue;
     const auto name = parseFaceName(word);
     const bool is_plane = name && name->at == FaceName::At::kIndex;
-    throw Error("{}: --surface {} names no face of the cache and no file; {}{}", path,
-                word.empty() ? text : word, whatThereIs(*faces),
+    throw Error("{}: --surface {} names no face of the cache and no file{}; {}{}", path,
+                word.empty() ? text : word, meantBy(word, cache.manifest(), *faces), whatThereIs(*faces),
                 is_plane ? fmt::format("; convert --surface \"{}\" keeps an index plane", word) : "");
   }
   return surface;

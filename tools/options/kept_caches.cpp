@@ -14,12 +14,11 @@
 #include <system_error>
 #include <thread>
 
-#include "preprocess/convert/convert.h"
 #include "preprocess/formats/open/open_grid.h"
+#include "preprocess/formats/open/series_files.h"
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
-#include "tools/options/convert_arguments.h"
 #include "tools/options/option_parsers.h"
 
 namespace curvisplat {
@@ -117,22 +116,66 @@ uint64_t bytesIn(const fs::path& folder) {
   return bytes;
 }
 
-void makeCache(const std::vector<fs::path>& files, const fs::path& output, Progress& progress,
-               const std::function<void(const std::string&)>& say) {
-  ConvertArguments arguments;
-  arguments.grid.grid = files.front();
-  arguments.grid.solutions.assign(files.begin() + 1, files.end());
-  const auto source = openSource(arguments, output);
-  ConvertOptions options;
-  options.output = output;
-  options.overwrite = true;
-  options.scalars = chooseScalars(arguments, {}, source->description());
-  options.title = files.front().stem().string();
-  options.temporary_folder = output.parent_path();
-  const ConvertReport report = convert(*source, options, progress);
-  for (const std::string& warning : source->description().warnings) say("warning: " + warning);
-  for (const std::string& warning : report.warnings) say("warning: " + warning);
-  for (const std::string& note : report.notes) say("note: " + note);
+bool isSmallText(const fs::path& file, std::string& text) {
+  constexpr uint64_t kMaxText = 4 << 20;
+  std::error_code error;
+  if (fs::file_size(file, error) > kMaxText || error) return false;
+  text = readTextFile(file);
+  const size_t first = text.find_first_not_of(" \t\r\n");
+  return first != std::string::npos && (text[first] == '<' || text[first] == '{');
+}
+
+/// Adds `file`: of a folder all files; and those that a small text (.pvd, .vtm, .p3d) names between quotes.
+void addFilesOf(const fs::path& file, std::vector<fs::path>& all, int depth = 0) {
+  std::error_code error;
+  if (fs::is_directory(file, error)) {
+    const auto begin = static_cast<std::ptrdiff_t>(all.size());
+    for (fs::recursive_directory_iterator at(file, error), end; !error && at != end; at.increment(error))
+      if (std::error_code no_file; at->is_regular_file(no_file)) all.push_back(at->path());
+    std::sort(all.begin() + begin, all.end());
+    return;
+  }
+  all.push_back(file);
+  constexpr int kMaxDepth = 3;  // a .pvd of .vtm of .vts
+  std::string text;
+  if (depth == kMaxDepth || !isSmallText(file, text)) return;
+  for (size_t begin = text.find('"'); begin != std::string::npos;) {
+    const size_t end = text.find('"', begin + 1);
+    if (end == std::string::npos) return;
+    const std::string word = text.substr(begin + 1, std::min<size_t>(end - begin - 1, 4096));
+    const fs::path named = file.parent_path() / word;
+    if (word.find('.') != std::string::npos && fs::is_regular_file(named, error) && named != file)
+      addFilesOf(named, all, depth + 1);
+    begin = text.find('"', end + 1);
+  }
+}
+
+/// What makes two grids the same: the program, the bytes of the files, and their names, since names of scalars can lie
+/// beside a file, and the grid's name becomes the cache's.
+uint64_t contentsOf(const std::vector<fs::path>& files, const fs::path& known, Progress& progress) {
+  progress.begin("looking for a kept cache", 0, "bytes");
+  std::vector<fs::path> all;
+  for (const fs::path& file : files) addFilesOf(file, all);
+  std::string contents = CURVISPLAT_VERSION;
+  for (const fs::path& file : all) contents += fmt::format(" {:016x}", checksumOf(file, known, progress));
+  contents += ' ';
+  contents += namesOf(files);
+  return checksumOfText(contents);
+}
+
+/// The files as paths that hold in any folder, with those that match a pattern.
+std::vector<fs::path> wholePaths(const std::vector<fs::path>& given) {
+  OpenGridOptions options;
+  options.grid = given.front();
+  options.solutions.assign(given.begin() + 1, given.end());
+  expandPatterns(options);
+  std::vector<fs::path> files{options.grid};
+  files.insert(files.end(), options.solutions.begin(), options.solutions.end());
+  for (fs::path& file : files) {
+    file = fs::absolute(file).lexically_normal();
+    if (!file.has_filename()) file = file.parent_path();  // "case/"
+  }
+  return files;
 }
 
 uint64_t limitOfFolder() {
@@ -152,7 +195,11 @@ std::optional<fs::path> keptFolder() {
 
 bool isGrid(const std::vector<fs::path>& files) {
   std::error_code ignored;
-  return files.size() > 1 || fs::is_regular_file(files.front(), ignored) || isGridFolder(files.front());
+  if (files.size() > 1 || fs::is_regular_file(files.front(), ignored) || isGridFolder(files.front()))
+    return true;
+  // A quoted pattern of a series' files.
+  return !fs::exists(files.front(), ignored) &&
+         files.front().string().find_first_of("*?%") != std::string::npos;
 }
 
 std::string namesOf(const std::vector<fs::path>& files) {
@@ -164,34 +211,24 @@ std::string namesOf(const std::vector<fs::path>& files) {
   return names;
 }
 
-fs::path keptCacheOf(const std::vector<fs::path>& files, Progress& progress,
-                     const std::function<void(const std::string&)>& say) {
+fs::path keptCacheOf(const std::vector<fs::path>& given, Progress& progress, const KeptCacheEvents& events) {
   const auto folder = keptFolder();
   if (!folder)
     throw Error(
         "{}: cannot find the user's cache folder: neither XDG_CACHE_HOME nor HOME is set; use convert",
-        files.front().string());
-  if (isGridFolder(files.front()))
-    throw Error("{}: a case of several files has to be converted first: curvisplat convert {} -o NAME.splats",
-                files.front().string(), files.front().string());
+        given.front().string());
   const uint64_t limit = limitOfFolder();
   std::error_code error;
   fs::create_directories(*folder / "known", error);
   if (error) throw Error("{}: cannot create the directory: {}", folder->string(), error.message());
-  progress.begin("looking for a kept cache", 0, "bytes");
-  std::string contents = CURVISPLAT_VERSION;
-  for (const fs::path& file : files)
-    contents += fmt::format(" {:016x}", checksumOf(file, *folder / "known", progress));
-  // Names of scalars can lie beside a file; the grid's name becomes the cache's.
-  contents += ' ';
-  contents += namesOf(files);
-  const fs::path place = *folder / fmt::format("{:016x}", checksumOfText(contents));
+  const std::vector<fs::path> files = wholePaths(given);
+  const fs::path place = *folder / fmt::format("{:016x}", contentsOf(files, *folder / "known", progress));
   const fs::path cache = place / (files.front().stem().string() + ".splats");
   fs::create_directories(place, error);
   if (error) throw Error("{}: cannot create the directory: {}", place.string(), error.message());
   {
     const MakingLock lock(place / "used", progress);
-    if (!fs::exists(cache / "manifest.json", error)) makeCache(files, cache, progress, say);
+    if (!fs::exists(cache / "manifest.json", error)) makeKeptCache(files, cache, progress, events);
     fs::last_write_time(place / "used", fs::file_time_type::clock::now(), error);
   }
   limitKeptCaches(*folder, limit, place);

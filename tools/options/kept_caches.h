@@ -2,6 +2,7 @@
 // ~/.cache/curvisplat, and found again by the contents of the grid's files, wherever these lie.
 //
 //   <folder>/<key>/NAME.splats      NAME: of the grid's file
+//   <folder>/<key>/preview          a coarse cache, while the other is made and until the window has left it
 //   <folder>/<key>/used             its time: when it was opened last; locked while it is made
 //   <folder>/known/<file>           checksum of a file that has not changed since, by its path
 //
@@ -11,25 +12,25 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "stream/base/progress.h"
+#include "tools/options/kept_conversion.h"
 
 namespace curvisplat {
 
 /// The cache folder; nullopt if neither XDG_CACHE_HOME nor HOME is set.
 std::optional<std::filesystem::path> keptFolder();
 
-/// Whether these are the files of a grid, not a cache: a regular file, or a folder of a grid.
+/// Whether these are the files of a grid, not a cache: a regular file, a folder of a grid, or a pattern of files.
 bool isGrid(const std::vector<std::filesystem::path>& files);
 
-/// The cache of a grid's files: the one that is kept, or a new one, made with all default options of `convert`. `say`
-/// gets its warnings and notes. Throws Error as opening and converting do, Interrupted once `progress` is stopped.
+/// The cache of a grid's files, or of a series' (q.0 q.1 ...): the one that is kept, or a new one, made with all default
+/// options of `convert`. Throws Error as opening and converting do, Interrupted once `progress` is stopped.
 std::filesystem::path keptCacheOf(const std::vector<std::filesystem::path>& files, Progress& progress,
-                                  const std::function<void(const std::string&)>& say);
+                                  const KeptCacheEvents& events);
 
 /// Removes the caches in `folder` that were not used for longest, until the rest takes `limit` bytes at most. Keeps
 /// `kept`, and those that are being made.

@@ -1,5 +1,7 @@
 #include "tools/options/option_parsers.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -8,6 +10,8 @@
 
 #include "preprocess/convert/memory_plan.h"
 #include "stream/base/error.h"
+#include "stream/base/suggestion.h"
+#include "tools/options/choices.h"
 
 namespace curvisplat {
 namespace {
@@ -33,6 +37,15 @@ std::vector<std::string_view> split(std::string_view text, char separator) {
   }
 }
 
+/// " (did you mean 600x400?)" for "600*400" or "600,400".
+std::string withTheRightSign(std::string_view text) {
+  std::string meant(text);
+  for (char& letter : meant)
+    if (std::string_view("*,X; ").find(letter) != std::string_view::npos) letter = 'x';
+  const bool is_size = meant != text && meant.find_first_not_of("0123456789x") == std::string::npos;
+  return is_size ? fmt::format(" (did you mean {}?)", meant) : "";
+}
+
 }  // namespace
 
 double parseNumber(std::string_view option, std::string_view text) {
@@ -55,7 +68,8 @@ std::vector<double> parseNumbers(std::string_view option, std::string_view text,
   }
   const size_t expected = split(form, ',').size();
   if (numbers.size() != expected)
-    throw UsageError("{} {}: expected {}, found {} numbers", option, text, form, numbers.size());
+    throw UsageError("{} {}: expected {}, found {} number{}", option, text, form, numbers.size(),
+                     numbers.size() == 1 ? "" : "s");
   return numbers;
 }
 
@@ -69,12 +83,13 @@ std::vector<uint64_t> parseExtents(std::string_view option, std::string_view tex
   for (const std::string_view part : split(text, 'x')) {
     const auto extent = parseWhole<uint64_t>(part);
     if (!extent || *extent == 0)
-      throw UsageError("{} {}: expected {}, but '{}' is not a whole number above zero", option, text, form,
-                       part);
+      throw UsageError("{} {}: expected {}, but '{}' is not a whole number above zero{}", option, text, form,
+                       part, withTheRightSign(text));
     extents.push_back(*extent);
   }
-  if (extents.size() != split(form, 'x').size())
-    throw UsageError("{} {}: expected {}, found {} numbers", option, text, form, extents.size());
+  if (const size_t found = extents.size(); found != split(form, 'x').size())
+    throw UsageError("{} {}: expected {}, found {} number{}", option, text, form, found,
+                     found == 1 ? "" : "s");
   return extents;
 }
 
@@ -134,7 +149,9 @@ glm::vec4 parseBackground(std::string_view option, std::string_view text) {
       return {static_cast<float>(rgb >> 16 & 255) / 255, static_cast<float>(rgb >> 8 & 255) / 255,
               static_cast<float>(rgb & 255) / 255, 1};
   }
-  throw UsageError("{} {}: expected white, black, transparent or #rrggbb", option, text);
+  const std::vector<std::string> names{"white", "black", "transparent"};
+  throw UsageError("{} {}: expected white, black, transparent or #rrggbb{}", option, text,
+                   didYouMean(text, names));
 }
 
 Backend parseBackend(std::string_view text) {
@@ -142,7 +159,8 @@ Backend parseBackend(std::string_view text) {
   if (text == "osmesa") return Backend::kOsmesa;
   if (text == "egl") return Backend::kEgl;
   if (text == "cpu") return Backend::kCpu;
-  throw UsageError("--backend {}: expected auto, osmesa, egl or cpu", text);
+  requireChoice("--backend", text, {"auto", "osmesa", "egl", "cpu"});
+  return Backend::kAutomatic;
 }
 
 }  // namespace curvisplat

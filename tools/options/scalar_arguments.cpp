@@ -64,6 +64,12 @@ size_t chooseVariable(const CacheReader& cache, const ScalarArguments& arguments
   try {
     return cache.variableNamed(arguments.scalar);
   } catch (const UsageError& error) {
+    if (arguments.scalar == "all" || arguments.scalar.find(',') != std::string::npos)
+      throw Error(
+          "--scalar {}: a picture shows one scalar; draw each by a command of its own, or take the opacities "
+          "of a "
+          "second with --opacity-by",
+          arguments.scalar);
     throw Error("{}", error.what());
   }
 }

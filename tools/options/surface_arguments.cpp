@@ -13,6 +13,7 @@
 #include "render/mesh/mesh_file.h"
 #include "stream/base/error.h"
 #include "stream/base/paths.h"
+#include "tools/options/choices.h"
 #include "tools/options/grid_surfaces.h"
 #include "tools/options/option_parsers.h"
 
@@ -80,10 +81,10 @@ std::vector<double> parseIsovalues(const std::vector<std::string>& texts) {
 }
 
 double parseIsoOpacity(const std::string& text) {
-  if (text.empty()) return kIsoOpacity;
+  if (text.empty()) return 1;
   const double opacity = parseNumber("--iso-opacity", text);
-  if (!(opacity > 0 && opacity <= 0.99))
-    throw UsageError("--iso-opacity {}: expected a number above 0 and at most 0.99", text);
+  if (!(opacity > 0 && opacity <= 1))
+    throw UsageError("--iso-opacity {}: expected a number above 0 and at most 1", text);
   return opacity;
 }
 
@@ -162,7 +163,7 @@ void addSurfaceOptions(CLI::App& command, SurfaceArguments& arguments, const std
       ->group(group);
   command
       .add_option("--iso-opacity", arguments.iso_opacity,
-                  "Opacity of the isosurfaces, above 0 and at most 0.99 (default 0.95)")
+                  "Opacity of the isosurfaces, above 0 and at most 1 (default 1)")
       ->group(group);
   command
       .add_option("--volume", arguments.volume, "on, or off to draw surfaces, slices and isosurfaces alone")
@@ -184,8 +185,7 @@ void checkSurfaceArguments(const SurfaceArguments& arguments) {
   if (!arguments.surface_by.empty() &&
       std::all_of(arguments.surfaces.begin(), arguments.surfaces.end(), isSurfaceFile))
     throw UsageError("--surface-by {} needs faces of the grid, such as --surface kmin", arguments.surface_by);
-  if (arguments.volume != "on" && arguments.volume != "off")
-    throw UsageError("--volume {}: expected on or off", arguments.volume);
+  requireChoice("--volume", arguments.volume, {"on", "off"});
   parseIsovalues(arguments.isovalues);
   parseIsoOpacity(arguments.iso_opacity);
   if (!arguments.iso_opacity.empty() && arguments.isovalues.empty())

@@ -64,7 +64,8 @@ class Movie : public FrameOutput {
 };
 
 [[noreturn]] void refusePattern(const std::string& pattern, std::string_view why) {
-  throw UsageError("-o {}: {}; use a name such as frame_%04d.png", pattern, why);
+  throw UsageError("-o {}: {}; use a name such as frame_%04d.png, or a movie: .mp4, .webm or .gif", pattern,
+                   why);
 }
 
 }  // namespace

@@ -2,15 +2,23 @@
 """Draws a sheet of default pictures: what `render CACHE -o PICTURE` shows of real grids, without any option.
 
     tools/pictures/default_pictures.py DATA SHEET.png [--program ...] [--only NAME,...] [--keep FOLDER] [OPTION ...]
+    tools/pictures/default_pictures.py DATA SHEET.png --pairs FOLDER --seed 1
 
 DATA is a folder like shared/data (its README.md lists the grids). Prints one line for each picture, in the order of the
 sheet (left to right, top to bottom): the share of pixels that differ by 0.1 or more from the background and from the
-most frequent colour, and the options that were chosen. OPTIONs after -- are given to every `render`.
+most frequent colour, and the options that were chosen. Exit status 1 if more than a fifth of the pictures have less than
+5 %. OPTIONs after -- are given to every `render`.
+
+--pairs writes FOLDER/pairs_1.png, pairs_2.png, ...: each of our pictures beside VTK's (vtk_default_volume.py, as ParaView draws a
+volume without settings), pairs and sides in random order, without names. Judge each half "usable" or not (the main feature is
+visible, not one colour, not nearly blank) before opening FOLDER/key.json, which says what they are. Another --seed shuffles anew.
 """
 import argparse
 import array
 import collections
+import json
 import pathlib
+import random
 import struct
 import subprocess
 import sys
@@ -20,13 +28,20 @@ import zlib
 HERE = pathlib.Path(__file__).resolve().parent
 SIDE = 240
 
-# name: (files, or a scene to generate; options of convert; scalars, which are drawn one by one)
+COLUMNS_OF_PAIRS, ROWS_OF_PAIRS = 2, 4
+# What VTK calls a scalar of ours.
+VTK_NAMES = {"density": "Density", "momentum_x": "Momentum:x", "momentum_y": "Momentum:y", "momentum_z": "Momentum:z",
+             "energy": "StagnationEnergy", "MomentumX": "Momentum:x", "uo": "Function0", "depth": "Function1", "1": "Function0", "2": "Function1", "3": "Function2",
+             "4": "Function3"}
+
+# name: (files, or a scene to generate; scalars, which are drawn one by one)
 GRIDS = {
-    "bluntfin": (["bluntfin/bluntfinxyz.bin", "bluntfin/bluntfinq.bin"], ["density", "pressure", "mach_number"]),
+    "bluntfin": (["bluntfin/bluntfinxyz.bin", "bluntfin/bluntfinq.bin"],
+                 ["density", "momentum_x", "momentum_y", "momentum_z", "energy"]),
     "delta_wing": (["delta_wing/delta_vertex.cgns"], ["Density", "mach_number", "vorticity_magnitude"]),
     "lox_post": (["lox_post/postxyz.bin", "lox_post/postq.bin"],
                  ["density", "momentum_x", "momentum_y", "momentum_z", "energy"]),
-    "combustor": (["combustor/combxyz.bin", "combustor/combq.bin"], ["density", "momentum_x", "momentum_y", "momentum_z"]),
+    "combustor": (["combustor/combxyz.bin", "combustor/combq.bin"], ["density", "momentum_x", "momentum_y", "momentum_z", "energy"]),
     "nek": (["nek/Combined_PressureSide_Block.xyz", "nek/pressure.fun"], ["1", "2", "3", "4"]),
     "vtk_sample": (["vtk/SampleStructGrid.vtk"], ["scalars"]),
     "vtk_comb": (["vtk/multicomb_0.vts"], ["Density", "Momentum:mag"]),
@@ -73,6 +88,42 @@ def write_png(path, width, height, rows):
                      chunk(b"IDAT", zlib.compress(raw)) + chunk(b"IEND", b""))
 
 
+def read_ppm(path):
+    data = path.read_bytes()
+    header = [line for line in data.split(b"\n", 5) if not line.startswith(b"#")]  # VTK writes a comment
+    fields = b" ".join(header[:3]).split()
+    width, height = int(fields[1]), int(fields[2])
+    pixels = data[-3 * width * height:]
+    assert fields[0] == b"P6"
+    return [[byte / 255 for byte in pixels[3 * width * y:3 * width * (y + 1)]] for y in range(height)]
+
+
+def draw_by_vtk(files, scalar, folder):
+    picture = folder / "vtk.ppm"
+    words = ["xvfb-run", "-a", "/usr/bin/python3", HERE / "vtk_default_volume.py", picture, SIDE, scalar, *files]
+    result = subprocess.run([str(word) for word in words], capture_output=True, text=True)
+    if result.returncode:
+        print(f"VTK draws no {scalar} of {files[0]}: {result.stderr.strip().splitlines()[-1]}")
+        return [[0.5] * (3 * SIDE) for _ in range(SIDE)]
+    return read_ppm(picture)
+
+
+def write_pairs(pairs, folder, seed):
+    """pairs: (name, ours, VTK's)."""
+    folder.mkdir(parents=True, exist_ok=True)
+    chance, key = random.Random(seed), []
+    pairs = chance.sample(pairs, len(pairs))
+    on_sheet = COLUMNS_OF_PAIRS * ROWS_OF_PAIRS
+    for first in range(0, len(pairs), on_sheet):
+        halves = []
+        for name, *drawn in pairs[first:first + on_sheet]:
+            swapped = chance.random() < 0.5
+            halves += reversed(drawn) if swapped else drawn
+            key.append({"pair": len(key) + 1, "name": name, "ours": "right" if swapped else "left"})
+        write_sheet(folder / f"pairs_{first // on_sheet + 1}.png", halves, 2 * COLUMNS_OF_PAIRS)
+    (folder / "key.json").write_text(json.dumps(key, indent=1))
+
+
 def write_sheet(path, pictures, columns):
     gap = 4
     cell = SIDE + gap
@@ -87,6 +138,10 @@ def write_sheet(path, pictures, columns):
     write_png(path, width, height, sheet)
 
 
+def inputs_of(name, files, data, folder):
+    return [folder / f"{name}.xyz", folder / f"{name}.fun"] if isinstance(files, str) else [data / file for file in files]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", type=pathlib.Path)
@@ -95,6 +150,8 @@ def main():
     parser.add_argument("--only", default="")
     parser.add_argument("--keep", type=pathlib.Path, help="folder for the caches, which are made once")
     parser.add_argument("--columns", type=int, default=6)
+    parser.add_argument("--pairs", type=pathlib.Path, help="folder for pairs with VTK's pictures, to be judged blind")
+    parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("options", nargs="*")
     arguments = parser.parse_args()
 
@@ -104,7 +161,7 @@ def main():
             sys.exit(result.stderr)
         return result.stdout
 
-    pictures, poor = [], 0
+    pictures, pairs, poor = [], [], 0
     with tempfile.TemporaryDirectory() as temporary:
         folder = arguments.keep or pathlib.Path(temporary)
         folder.mkdir(exist_ok=True)
@@ -115,22 +172,26 @@ def main():
             if not cache.exists():
                 if isinstance(files, str):
                     run("generate", files, "--size", "96x48x24", "-o", folder / name)
-                    inputs = [folder / f"{name}.xyz", folder / f"{name}.fun"]
-                    run("convert", *inputs, "-o", cache)
-                else:
-                    chosen = [word for scalar in scalars for word in ("--scalar", scalar)]
-                    run("convert", *[arguments.data / file for file in files], "-o", cache, *chosen)
+                chosen = [] if isinstance(files, str) else ["--scalar", ",".join(scalars)]
+                run("convert", *inputs_of(name, files, arguments.data, folder), "-o", cache, *chosen)
             for scalar in scalars:
                 picture = folder / f"{name}.pfm"
                 choice = [] if isinstance(files, str) else ["--scalar", scalar]
                 out = run("render", cache, "-o", picture, "--size", f"{SIDE}x{SIDE}", *choice, *arguments.options)
                 rows = read_pfm(picture)[2]
                 pictures.append(rows)
+                if arguments.pairs:
+                    sources = inputs_of(name, files, arguments.data, folder)
+                    pairs.append((f"{name} {scalar}", rows, draw_by_vtk(sources, "Function0" if name == "globe"
+                                                                         else VTK_NAMES.get(scalar, scalar), folder)))
                 share = contrast(rows)
                 poor += share < 0.05
                 print(f"{len(pictures):3} {name:12} {scalar:20} {100 * share:5.1f} %  {out.splitlines()[-1]}")
     write_sheet(arguments.sheet, pictures, arguments.columns)
+    if arguments.pairs:
+        write_pairs(pairs, arguments.pairs, arguments.seed)
     print(f"{arguments.sheet}: {len(pictures)} pictures, {poor} of them with less than 5 % contrast")
+    return 1 if poor > 0.2 * len(pictures) else 0
 
 
 if __name__ == "__main__":

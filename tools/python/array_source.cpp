@@ -135,8 +135,9 @@ std::vector<GridScalar> describedScalars(const ScalarNames& names) {
 
 class ArraySource : public GridSource {
  public:
-  ArraySource(std::vector<BlockArrays> blocks, const ScalarNames& names) {
+  ArraySource(std::vector<BlockArrays> blocks, const ScalarNames& names, std::optional<double> time) {
     description_.format = "arrays in memory";
+    if (time) description_.times = {*time};
     description_.scalars = describedScalars(names);
     description_.coordinate_bytes = 4;
     for (const BlockArrays& block : blocks) {
@@ -243,8 +244,9 @@ class CallableSource : public GridSource {
 
 }  // namespace
 
-std::unique_ptr<GridSource> sourceOfArrays(std::vector<BlockArrays> blocks, const ScalarNames& names) {
-  return std::make_unique<ArraySource>(std::move(blocks), names);
+std::unique_ptr<GridSource> sourceOfArrays(std::vector<BlockArrays> blocks, const ScalarNames& names,
+                                           std::optional<double> time) {
+  return std::make_unique<ArraySource>(std::move(blocks), names, time);
 }
 
 std::unique_ptr<GridSource> sourceOfCallable(const std::vector<std::array<uint64_t, 3>>& shapes,

@@ -5,6 +5,7 @@
 #include <pybind11/pybind11.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,7 +27,9 @@ struct BlockArrays {
 using ScalarNames = std::vector<std::pair<std::string, std::string>>;
 
 /// Throws UsageError for arrays of other types or shapes. Reading needs no lock: the arrays must not change meanwhile.
-std::unique_ptr<GridSource> sourceOfArrays(std::vector<BlockArrays> blocks, const ScalarNames& names);
+/// `time`: of this step, if it is one of a series.
+std::unique_ptr<GridSource> sourceOfArrays(std::vector<BlockArrays> blocks, const ScalarNames& names,
+                                           std::optional<double> time = {});
 
 /// A grid that Python reads box by box. `shapes`: (nk, nj, ni) of each block. `read`: called with (block, k0, k1, j0, j1, [scalar]),
 /// returns (x, y, z, values, blank): arrays of shape (k1 - k0, j1 - j0, ni), `values` a list of them, `blank` None or of bool. Takes the interpreter's lock for each

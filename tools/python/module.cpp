@@ -8,11 +8,14 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "preprocess/addition/convert_series.h"
 #include "preprocess/convert/convert.h"
+#include "render/camera/camera_path.h"
 #include "render/colour/published_maps.h"
 #include "render/image/image_file.h"
 #include "stream/base/error.h"
@@ -21,6 +24,7 @@
 #include "tools/options/frame_arguments.h"
 #include "tools/options/option_parsers.h"
 #include "tools/python/array_source.h"
+#include "tools/python/cache_arrays.h"
 #include "tools/python/interruptible.h"
 #include "tools/python/open_cache.h"
 
@@ -49,6 +53,7 @@ CameraArguments cameraArguments(const Options& camera) {
   arguments.view_up = given(camera, "view_up");
   arguments.parallel_scale = given(camera, "parallel_scale");
   arguments.view_angle = given(camera, "view_angle");
+  arguments.orbit = given(camera, "orbit");
   return arguments;
 }
 
@@ -139,6 +144,38 @@ std::vector<double> histogramOfCache(const OpenCache& cache, const std::string& 
   return cache.histogram({scalar, range.first, range.second, log, bins});
 }
 
+/// (position, focal_point, view_up, parallel_scale) of each frame.
+py::list camerasOf(const OpenCache& cache, const Options& camera, const std::string& size,
+                   const std::string& scale, uint64_t frames) {
+  CameraArguments arguments = cameraArguments(camera);
+  arguments.frames = frames;
+  checkCameraArguments(arguments);
+  if (frames == 0 || frames > kMaxFrames)
+    throw UsageError("{} frames: expected from 1 to {}", frames, kMaxFrames);
+  const Manifest& manifest = cache.reader().manifest();
+  const glm::dvec3 factors = parsePoint("scale", scale);
+  const CameraMotion motion = chooseCameraMotion(arguments, manifest.lower * factors,
+                                                 manifest.upper * factors, parseImageSize("size", size));
+  py::list out;
+  for (uint64_t frame = 0; frame < motion.frames; ++frame) {
+    const Camera at = motion.camera(frame);
+    out.append(py::make_tuple(arrayOf(at.position), arrayOf(at.focal_point), arrayOf(at.view_up),
+                              at.parallel_scale));
+  }
+  return out;
+}
+
+py::tuple orbitedCamera(const std::array<double, 3>& position, const std::array<double, 3>& focal_point,
+                        const std::array<double, 3>& view_up, double degrees) {
+  Camera camera;
+  camera.position = vectorOf(position);
+  camera.focal_point = vectorOf(focal_point);
+  camera.view_up = vectorOf(view_up);
+  const Camera turned = orbited(camera, degrees);
+  return py::make_tuple(py::tuple(py::cast(arrayOf(turned.position))),
+                        py::tuple(py::cast(arrayOf(turned.view_up))));
+}
+
 /// None where the point is outside of the data.
 py::object probeAt(const OpenCache& cache, const std::array<double, 3>& point) {
   const CacheReader& reader = cache.reader();
@@ -155,6 +192,15 @@ py::object probeAt(const OpenCache& cache, const std::array<double, 3>& point) {
   out["index"] = py::make_tuple(found->i, found->j, found->k);
   out["position"] = arrayOf(found->centre);
   return out;
+}
+
+py::tuple sample(const OpenCache& cache, const DataChoice& choice, const std::array<uint32_t, 3>& size,
+                 const py::object& progress) {
+  return sampledArrays(cache.reader(), choice, size, progress);
+}
+
+py::tuple points(const OpenCache& cache, const DataChoice& choice, const py::object& progress) {
+  return pointArrays(cache.reader(), choice, progress);
 }
 
 /// The options of a conversion that both kinds of input have.
@@ -199,8 +245,8 @@ std::vector<uint32_t> allScalars(const ScalarNames& names) {
   return all;
 }
 
-py::dict convertArrays(const std::filesystem::path& output, const py::list& blocks, const ScalarNames& names,
-                       const py::dict& given_options, const py::object& progress) {
+std::unique_ptr<GridSource> sourceOf(const py::list& blocks, const ScalarNames& names,
+                                     const py::dict& given_options) {
   std::vector<BlockArrays> arrays;
   for (const py::handle& object : blocks) {
     const auto block = py::cast<py::tuple>(object);  // name, x, y, z, [scalar], blank
@@ -209,10 +255,37 @@ py::dict convertArrays(const std::filesystem::path& output, const py::list& bloc
       of_block.scalars.push_back(py::cast<py::array>(scalar));
     arrays.push_back(std::move(of_block));
   }
+  return sourceOfArrays(std::move(arrays), names, py::cast<std::optional<double>>(given_options["time"]));
+}
+
+py::dict convertArrays(const std::filesystem::path& output, const py::list& blocks, const ScalarNames& names,
+                       const py::dict& given_options, const py::object& progress) {
   ConvertOptions options = convertOptions(output, given_options);
   options.scalars = allScalars(names);
-  const auto source = sourceOfArrays(std::move(arrays), names);
+  const auto source = sourceOf(blocks, names, given_options);
+  options.time = py::cast<std::optional<double>>(given_options["time"]);
   return convertSource(*source, std::move(options), progress);
+}
+
+/// The steps that the cache has then.
+uint64_t appendArrays(const std::filesystem::path& cache, const py::list& blocks, const ScalarNames& names,
+                      const py::dict& given_options, const py::object& progress) {
+  SeriesOptions options;
+  options.convert = convertOptions(cache, given_options);
+  options.add = true;
+  // Opened at once: its errors name the array.
+  std::unique_ptr<GridSource> source = sourceOf(blocks, names, given_options);
+  SeriesInput input;
+  input.count = 1;
+  input.name = [](uint64_t) { return std::string("arrays in memory"); };
+  input.open = [&](uint64_t) { return std::move(source); };
+  input.scalars = [&](const GridDescription&) { return allScalars(names); };
+  SeriesReport report;
+  runInterruptibly(progress, [&](Progress& of_work) {
+    input.first_number = CacheReader(cache).series().steps.size();
+    report = convertSeries(input, options, of_work, [](const SeriesEvent&) {});
+  });
+  return report.steps;
 }
 
 py::dict convertCallable(const std::filesystem::path& output,
@@ -254,11 +327,19 @@ PYBIND11_MODULE(_core, module) {
   const py::tuple usage_bases = py::make_tuple(error, py::reinterpret_borrow<py::object>(PyExc_ValueError));
   py::register_exception<UsageError>(module, "UsageError", usage_bases);
 
+  py::class_<DataChoice>(module, "DataChoice")
+      .def(py::init([](const std::string& scalar, const std::array<double, 3>& lower,
+                       const std::array<double, 3>& upper, std::optional<uint32_t> level, uint64_t step) {
+        return DataChoice{scalar, lower, upper, level, step};
+      }));
   py::class_<OpenCache>(module, "OpenCache")
       .def(py::init<std::filesystem::path>())
       .def("render", &render)
       .def("release", &OpenCache::release)
       .def("probe", &probeAt)
+      .def("cameras", &camerasOf)
+      .def("sample", &sample)
+      .def("points", &points)
       .def("histogram", &histogramOfCache)
       .def_property_readonly("times", &timesOf)
       .def_property_readonly("time_unit",
@@ -284,7 +365,9 @@ PYBIND11_MODULE(_core, module) {
           out.append(py::make_tuple(block.name, block.ni, block.nj, block.nk));
         return out;
       });
+  module.def("orbited", &orbitedCamera);
   module.def("convert_arrays", &convertArrays);
+  module.def("append_arrays", &appendArrays);
   module.def("convert_callable", &convertCallable);
   module.def("convert_files", &convertFiles);
   module.def("colour_maps", [] {

@@ -70,8 +70,9 @@ ClientMessage parseClientMessage(std::string_view text, size_t caches) {
   if (name == "choose") return FunctionRequest{cacheIn(message, caches), nameIn(message, "scalar")};
   if (name == "histogram") return histogramIn(message, caches);
   if (name == "colours") return ColoursRequest{nameIn(message, "map")};
+  if (name == "pick") return PickRequest{message.at("x").number(0, 1), message.at("y").number(0, 1)};
   if (name == "shown") return ShownReport{message.at("picture").count(0, kMostNumber)};
-  type.fail("open, view, choose, histogram, colours or shown");
+  type.fail("open, view, choose, histogram, colours, pick or shown");
 }
 
 }  // namespace curvisplat

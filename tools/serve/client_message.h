@@ -7,6 +7,7 @@
 //   {"type": "choose", "cache": 0, "scalar": "density"}                asks for the automatic function of a scalar
 //   {"type": "histogram", "cache": 0, "scalar": "density", "low": 0, "high": 1, "log": false}
 //   {"type": "colours", "map": "viridis"}                              asks for a colour map's points
+//   {"type": "pick", "x": 0.4, "y": 0.7}                               asks what is seen there in the picture at rest; shares of its sides
 //   {"type": "shown", "picture": 3}                                    the page has drawn this picture
 #pragma once
 
@@ -53,12 +54,15 @@ struct HistogramRequest {
 struct ColoursRequest {
   std::string map;
 };
+struct PickRequest {
+  double x = 0, y = 0;  // 0..1, from the upper left corner
+};
 struct ShownReport {
   uint64_t picture = 0;
 };
 
-using ClientMessage =
-    std::variant<OpenRequest, ViewRequest, FunctionRequest, HistogramRequest, ColoursRequest, ShownReport>;
+using ClientMessage = std::variant<OpenRequest, ViewRequest, FunctionRequest, HistogramRequest,
+                                   ColoursRequest, PickRequest, ShownReport>;
 
 /// `caches`: how many are served. Throws Error that begins with "message" for anything else.
 ClientMessage parseClientMessage(std::string_view text, size_t caches);

@@ -128,6 +128,7 @@ std::string message(const PictureHeader& header, const void* file, size_t file_b
   put(bytes, 28, header.seconds);
   put(bytes, 32, header.error_px);
   put(bytes, 36, header.splats);
+  put(bytes, 40, static_cast<uint16_t>(header.data_width));
   std::memcpy(bytes.data() + kPictureHeaderBytes, file, file_bytes);
   return bytes;
 }

@@ -1,4 +1,4 @@
-// A picture on its way to a page: a header of 40 bytes, and the bytes of a JPEG or PNG file.
+// A picture on its way to a page: a header of 44 bytes, and the bytes of a JPEG or PNG file.
 //
 //   byte  0  4  "CVP1"
 //         4  4  picture     counted from 1 for each viewer; the page reports it as shown
@@ -13,6 +13,8 @@
 //        28  4  seconds     that it took to draw, a float
 //        32  4  error_px    the largest error on the screen, a float
 //        36  4  splats      drawn
+//        40  2  data_width  of the part that shows the data, at the left, in pixels
+//        42  2  unused
 //
 // Numbers are little-endian.
 #pragma once
@@ -34,8 +36,9 @@ struct PictureHeader {
   uint8_t level = 0;
   float seconds = 0, error_px = 0;
   uint32_t splats = 0;
+  int data_width = 0;
 };
-inline constexpr size_t kPictureHeaderBytes = 40;
+inline constexpr size_t kPictureHeaderBytes = 44;
 
 /// The message of a picture that is lossless.
 std::string losslessMessage(const PictureHeader& header, const Image& image);

@@ -13,6 +13,8 @@
 #include "tools/serve/line_quality.h"
 #include "tools/serve/picture_message.h"
 #include "tools/viewer/frame_loop.h"
+#include "tools/viewer/picture_layout.h"
+#include "tools/viewer/picture_values.h"
 
 namespace curvisplat {
 namespace {
@@ -46,8 +48,13 @@ class RemoteViewer::Work {
     for (const uint64_t picture : inbox.shown) line_.shown(picture, clockSeconds());
     if (inbox.open) answer([&] { return caches_.cacheText(*inbox.open); });
     if (inbox.view) wanted_ = std::move(inbox.view);
+    if (inbox.pick && frames_ && !asked_.empty()) {
+      picked_ = inbox.pick;
+      frames_->requestValues();
+    }
     woken_ |= inbox.woken;
     advance();
+    if (picked_ && frames_) answer([&] { return pickedText(); });
     // These may take some tenths of a second: behind the picture.
     if (inbox.function) answer([&] { return caches_.functionText(*inbox.function); });
     if (inbox.histogram) answer([&] { return caches_.histogramText(*inbox.histogram); });
@@ -63,10 +70,24 @@ class RemoteViewer::Work {
     }
   }
 
+  /// Once the values of the picture are there: the sample that is seen at the picked place. Empty until then.
+  std::string pickedText() {
+    const std::optional<ShownValues> values = frames_->takeValues();
+    if (!values) return {};
+    const PickRequest pick = *std::exchange(picked_, std::nullopt);
+    const Asked& asked = asked_.back();
+    if (values->request != asked.request) return {};
+    const CacheReader& reader = caches_.reader(cache_);
+    const glm::dvec2 pixel(pick.x * asked.picture.width, pick.y * asked.picture.height);
+    const auto point = pointSeenAt(*values, reader.manifest(), pixel, asked.data);
+    if (!point) throw UsageError("there is nothing at this place");
+    return caches_.markerText(cache_, {asked.state.variable, values->step}, *point);
+  }
+
   template <typename Text>
   void answer(const Text& text) {
     try {
-      viewer_.send_(text(), true);
+      if (std::string message = text(); !message.empty()) viewer_.send_(std::move(message), true);
     } catch (const Error& error) {
       report(error);
     }
@@ -97,18 +118,20 @@ class RemoteViewer::Work {
 
   void request(const ViewRequest& view, ViewState state) {
     const CacheReader& reader = caches_.reader(view.cache);
-    const TransferFunction function = state.function.function();
+    const ShownFunctions functions(state, reader.manifest());
     const nlohmann::json parsed = nlohmann::json::parse(view.state);
     std::string text = parsed.at("preset").dump() + parsed.at("function").dump();
+    if (state.opacity_by) text += parsed.at("opacity_by").dump();
     if (text != function_text_) {
       function_text_ = std::move(text);
       ++function_version_;
     }
-    const ImageSize data = dataSize(state.annotations, view.size, function);
-    FrameRequest request{DrawnScalars(reader.variableNamed(state.variable), function), function_version_,
-                         state.camera, state.frameOptions(data)};
+    const ImageSize data = dataSizeOf(state, reader.manifest(), view.size);
+    FrameRequest request{functions.scalars(reader, state), function_version_, state.camera,
+                         state.frameOptions(data)};
     screenViewOf(reader.manifest(), state.camera, request.options, data);  // refuses what cannot be drawn
     request.moving = view.moving;
+    request.wants_bytes = false;
     request.target_s = limits_.target_s;
     request.step = view.step;
     if (view.next && *view.next < reader.series().steps.size()) request.next_step = view.next;
@@ -118,6 +141,7 @@ class RemoteViewer::Work {
       cache_ = view.cache;
       asked_.clear();
     }
+    picked_.reset();  // it was of another picture
     const uint64_t number = frames_->request(std::move(request));
     // A page that asks faster than pictures come does not make this grow.
     if (asked_.size() == kMostAsked) asked_.pop_front();
@@ -145,23 +169,17 @@ class RemoteViewer::Work {
   }
 
   void send(const Asked& asked, const ShownFrame& frame) {
-    const TransferFunction function = asked.state.function.function();
     const Manifest& manifest = caches_.reader(cache_).manifest();
-    const VariableInfo& variable =
-        manifest.variables[caches_.reader(cache_).variableNamed(asked.state.variable)];
-    const AnnotatedScene scene{
-        asked.picture,
-        screenViewOf(manifest, asked.state.camera, asked.state.frameOptions(asked.data), asked.data),
-        {{&function, scalarTitle(variable.name, variable.unit)}},
-        manifest.lower,
-        manifest.upper,
-        asked.state.background()};
+    const ShownFunctions functions(asked.state, manifest);
+    const AnnotatedScene scene = sceneOf(asked.state, manifest, functions, asked.state.camera,
+                                         asked.state.frameOptions(asked.data), asked.picture);
     const Image picture = annotated(frame.image, asked.state.annotations, scene);
     PictureHeader header;
     header.picture = ++pictures_;
     header.request = asked.number;
     header.step = static_cast<uint32_t>(frame.step);
     header.size = asked.picture;
+    header.data_width = asked.data.width;
     header.is_final = frame.is_final && !asked.moving;
     header.is_png = header.is_final;
     header.level = static_cast<uint8_t>(line_.level());
@@ -178,6 +196,7 @@ class RemoteViewer::Work {
   const ServedCaches& caches_;
   const ViewerLimits& limits_;
   std::optional<ViewRequest> wanted_;  // waits until the line is open
+  std::optional<PickRequest> picked_;  // waits for the picture's values
   bool woken_ = false;
   size_t cache_ = 0;
   std::string function_text_;
@@ -208,6 +227,7 @@ void RemoteViewer::receive(ClientMessage message) {
     if (auto* const function = std::get_if<FunctionRequest>(&message)) inbox_.function = std::move(*function);
     if (auto* const one = std::get_if<HistogramRequest>(&message)) inbox_.histogram = std::move(*one);
     if (auto* const colours = std::get_if<ColoursRequest>(&message)) inbox_.colours = std::move(*colours);
+    if (auto* const pick = std::get_if<PickRequest>(&message)) inbox_.pick = *pick;
     if (auto* const shown = std::get_if<ShownReport>(&message))
       if (inbox_.shown.size() < kMostReports) inbox_.shown.push_back(shown->picture);
     news_ = true;

@@ -55,6 +55,7 @@ class RemoteViewer {
     std::optional<FunctionRequest> function;
     std::optional<HistogramRequest> histogram;
     std::optional<ColoursRequest> colours;
+    std::optional<PickRequest> pick;
     std::vector<uint64_t> shown;
     bool woken = false;  // the frame loop has something
   };

@@ -8,6 +8,7 @@
 
 #include "render/colour/published_maps.h"
 #include "stream/base/error.h"
+#include "stream/cache/probe.h"
 #include "tools/viewer/first_view.h"
 #include "tools/viewer/histogram.h"
 
@@ -134,6 +135,26 @@ std::string ServedCaches::histogramText(const HistogramRequest& request) const {
   function.setLogScale(request.log);
   json["bins"] = histogramOf(cache.reader, variable, function, kBins);
   return textOf(json);
+}
+
+std::string ServedCaches::markerText(size_t number, const MarkedScalar& scalar,
+                                     const glm::dvec3& point) const {
+  const Served& cache = caches_[number];
+  const size_t variable = variableOf(cache.reader, cache.name, scalar.name);
+  const MutexLock lock(reading_);
+  const CacheReader reader = cache.reader.atStep(scalar.step);
+  const auto found = probe(reader, {&variable, 1}, point);
+  if (!found) throw UsageError("there is nothing at this place");
+  // As ViewState's JSON has markers, without a name.
+  const Json marker = {{"point", jsonOf(point)},
+                       {"scalar", scalar.name},
+                       {"unit", reader.manifest().variables[variable].unit},
+                       {"value", found->variables.at(0).value},
+                       {"block", found->block},
+                       {"i", found->i},
+                       {"j", found->j},
+                       {"k", found->k}};
+  return textOf({{"type", "marker"}, {"cache", number}, {"marker", marker}});
 }
 
 std::string ServedCaches::coloursText(const ColoursRequest& request) {

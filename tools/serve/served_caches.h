@@ -35,6 +35,12 @@ class ServedCaches {
   /// Throw UsageError for a scalar or map that does not exist, Error as reading does.
   std::string functionText(const FunctionRequest& request) const;
   std::string histogramText(const HistogramRequest& request) const;
+  /// What the data have at a point, of a scalar at a step. UsageError outside of the data.
+  struct MarkedScalar {
+    std::string name;
+    uint64_t step = 0;
+  };
+  std::string markerText(size_t cache, const MarkedScalar& scalar, const glm::dvec3& point) const;
   static std::string coloursText(const ColoursRequest& request);
 
   /// An error for a page: `text` without paths of this machine.

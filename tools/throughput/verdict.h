@@ -41,7 +41,8 @@ struct Verdict {
   std::string stage;  // "reading", "decoding", "projecting", "sorting" or "drawing"
   double share =
       0;  // the stage's share, 0..1, of the time of the bounding resource (disk, cores or graphics card)
-  /// Text for the user: what bounds the frame, then what would help, then what the disk could sustain.
+  /// Text for the user: what bounds the frame, then what would help, then what the disk could sustain; last, what to
+  /// buy.
   std::vector<std::string> lines;
 };
 

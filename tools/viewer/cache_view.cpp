@@ -38,35 +38,53 @@ ImageSize pixelsOf(const Rectangle& place, const Window& window) {
   return window.pixels().width > 0 ? ImageSize{pixels(place.width), pixels(place.height)} : ImageSize{0, 0};
 }
 
+/// The files that can have further scalars; none of a preview or of a series, to which none can be added.
+std::vector<fs::path> sourcesFor(const CacheReader& cache, const ViewerOptions& options) {
+  if (options.preview || cache.series().steps.size() > 1 || !options.conversion.sources_of) return {};
+  if (!options.grid_files.empty()) return options.grid_files;
+  return options.conversion.sources_of(cache.seriesManifest(), cache.cachePath());
+}
+
 }  // namespace
 
 CacheView::CacheView(CacheReader cache, const ViewerOptions& options, Window& window, Toasts& toasts,
                      FileDialog& dialog, const WindowLayout& layout)
     : cache_(std::move(cache)),
       target_s_(options.target_s),
+      preview_(options.preview),
+      grid_files_(options.grid_files),
       window_(window),
       toasts_(toasts),
       dialog_(dialog),
       state_(openingState(options, pixelsOf(layout.picture, window))),
       first_function_(state_.function),
-      history_(state_),
+      first_state_(toJson(state_)),
+      history_(options.carried ? options.carried->history : History(state_)),
       panels_(cache_),
       playback_(cache_.series().steps.size()),
       frames_(cache_, options.backend, Window::wake),
       picture_(window.gl()),
       overlay_(window.gl()),
-      views_(savedViewsOf(cache_.cachePath())),
+      views_(savedViewsOf(whole())),
+      further_(options.conversion, cache_.cachePath(), sourcesFor(cache_, options), Window::wake),
       probe_(cache_) {
   playback_.goTo(cache_.step());
   navigation_.setBounds(state_.scale * manifest().lower, state_.scale * manifest().upper);
 }
 
 ViewState CacheView::openingState(const ViewerOptions& options, ImageSize picture) {
+  if (options.carried) {
+    ViewState state = options.carried->state;
+    if (options.scalar && *options.scalar != state.variable)
+      chooseVariable(state, cache_, *options.scalar);
+    else if (state.function.isAutomatic())
+      state.function = automaticFunction(cache_, state.variable);
+    return state;
+  }
   ViewState state = firstViewOf(cache_, options.scalar.value_or(""), picture);
   if (options.state) {
     state = viewStateFromJson(readTextFile(*options.state), *options.state, manifest());
-  } else if (const auto remembered = rememberedStateOf(cache_.cachePath());
-             remembered && fs::exists(*remembered)) {
+  } else if (const auto remembered = rememberedStateOf(whole()); remembered && fs::exists(*remembered)) {
     try {
       ViewState found = viewStateFromJson(readTextFile(*remembered), *remembered, manifest());
       loadSurfaces(found);
@@ -164,20 +182,25 @@ void CacheView::drawPanels(const WindowLayout& layout) {
   facts.playback = &playback_;
   facts.views = views_;
   facts.place = layout.panels;
+  FurtherScalars further = further_.known();
+  further.is_busy = adds_scalar_;
+  facts.further = &further;
   const PanelActions actions = panels_.draw(state_, facts);
   if (actions.step) changed_ |= playback_.goTo(*actions.step);
   dragging_ = actions.dragging;
   changed_ |= actions.changed;
   if (actions.function_changed) ++function_version_;
   for (const Command command : actions.commands) run(command);
+  if (actions.looks_for_scalars) further_.look();
+  if (actions.add_scalar) wanted_scalar_ = actions.add_scalar;
   if (actions.load_function) dialog_.open(FileDialog::Purpose::kLoadFunction);
   if (actions.save_function) dialog_.open(FileDialog::Purpose::kSaveFunction, "function.json");
   if (actions.save_view) saveView(*actions.save_view);
   if (actions.load_view) loadView(*actions.load_view);
   if (actions.remove_view) {
     std::error_code ignored;
-    fs::remove(savedViewOf(cache_.cachePath(), *actions.remove_view), ignored);
-    views_ = savedViewsOf(cache_.cachePath());
+    fs::remove(savedViewOf(whole(), *actions.remove_view), ignored);
+    views_ = savedViewsOf(whole());
   }
   if (!actions.error.empty()) say(actions.error, true);
 }
@@ -327,8 +350,19 @@ void CacheView::restore(const ViewState* state) {
   changed_ = true;
 }
 
+std::shared_ptr<const CarriedView> CacheView::carried() const {
+  if (isUntouchedPreview()) return nullptr;
+  return std::make_shared<const CarriedView>(CarriedView{state_, history_});
+}
+
+std::optional<std::string> CacheView::takeWantedScalar(bool is_busy) {
+  adds_scalar_ = is_busy;
+  return std::exchange(wanted_scalar_, std::nullopt);
+}
+
 void CacheView::remember() const {
-  const auto file = rememberedStateOf(cache_.cachePath());
+  if (isUntouchedPreview()) return;
+  const auto file = rememberedStateOf(whole());
   if (!file) return;
   try {
     writeState(*file, toJson(state_));

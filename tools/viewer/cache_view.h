@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "stream/cache/cache_reader.h"
 #include "tools/viewer/file_dialog.h"
 #include "tools/viewer/frame_loop.h"
+#include "tools/viewer/further_scalar_list.h"
 #include "tools/viewer/history.h"
 #include "tools/viewer/menus.h"
 #include "tools/viewer/navigation.h"
@@ -29,6 +31,12 @@ struct WindowLayout {
   bool shows_panels = true;
 };
 
+/// What one view of a grid hands to the next: from a preview to the whole, or when a scalar was added.
+struct CarriedView {
+  ViewState state;
+  History history;
+};
+
 class CacheView {
  public:
   /// `options.state`, `scalar` and `scene` are of this cache. Throws Error as reading the cache or the state does.
@@ -41,14 +49,23 @@ class CacheView {
   void run(Command command);
   void choose(const MenuChoice& choice);
   void take(const FileDialog::Chosen& chosen);
-  void addTo(MenuFacts& facts) const;
+  void addTo(MenuFacts& facts);
   bool isEnabled(Command command) const;
   bool isChecked(Command command) const;
 
   /// Seconds until the next frame is due without input.
   double wait() const;
-  /// Saves the state for the next time.
+  /// Saves the state for the next time; that of a preview only if the user has changed it.
   void remember() const;
+
+  /// For another view of the same grid. nullptr if this is a preview that the user has left as it was.
+  std::shared_ptr<const CarriedView> carried() const;
+  const std::optional<Preview>& preview() const { return preview_; }
+  const std::vector<std::filesystem::path>& gridFiles() const { return grid_files_; }
+  /// A scalar of the sources that is to be added to the cache, once. `is_busy`: one is being added.
+  std::optional<std::string> takeWantedScalar(bool is_busy);
+  const std::vector<std::filesystem::path>& sources() const { return further_.files(); }
+  const std::filesystem::path& cachePath() const { return cache_.cachePath(); }
 
  private:
   ViewState openingState(const ViewerOptions& options, ImageSize picture);
@@ -70,6 +87,9 @@ class CacheView {
   void saveView(const std::string& name);
   void loadView(const std::string& name);
   std::vector<std::string> otherScalars() const;
+  /// The cache that is shown, or the one that it is a preview of: what states and views are kept for.
+  const std::filesystem::path& whole() const { return preview_ ? preview_->whole : cache_.cachePath(); }
+  bool isUntouchedPreview() const { return preview_ && toJson(state_) == first_state_; }
   std::optional<glm::dvec2> placeOf(const glm::dvec3& point, const WindowLayout& layout) const;
   bool isShown() const { return shown_ && shown_->request == request_; }
   bool isFinal() const { return isShown() && shown_->is_final; }
@@ -78,11 +98,14 @@ class CacheView {
 
   const CacheReader cache_;
   const std::optional<double> target_s_;
+  const std::optional<Preview> preview_;
+  const std::vector<std::filesystem::path> grid_files_;  // that were opened, if the cache is kept for them
   Window& window_;
   Toasts& toasts_;
   FileDialog& dialog_;
   ViewState state_;
   const EditedFunction first_function_;
+  const std::string first_state_;
   History history_;
   Panels panels_;
   PlaneHandles handles_;
@@ -91,6 +114,9 @@ class CacheView {
   FrameLoop frames_;
   PictureTexture picture_, overlay_;
   std::vector<std::string> views_;
+  FurtherScalarList further_;
+  bool adds_scalar_ = false;  // one is being added
+  std::optional<std::string> wanted_scalar_;
 
   bool changed_ = true;  // since the newest request
   uint64_t function_version_ = 1, request_ = 0;

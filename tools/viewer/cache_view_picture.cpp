@@ -27,6 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr size_t kMaxNamedFiles = 4;        // in a command; of a longer series its kept cache
 constexpr double kPointedForSeconds = 0.3;  // the mouse rests that long before values are looked for
 
 ImVec2 toImGui(double x, double y) {
@@ -63,8 +64,14 @@ std::optional<glm::dvec2> CacheView::placeOf(const glm::dvec3& point, const Wind
 
 void CacheView::showPlanesAndMarkers(const WindowLayout& layout) {
   const auto place = [&](const glm::dvec3& point) { return placeOf(point, layout); };
+  // Not over the scalar bars.
+  const Rectangle& whole = layout.picture;
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  list->PushClipRect(toImGui(whole.x, whole.y),
+                     toImGui(whole.x + (1 - shown_strip_) * whole.width, whole.y + whole.height));
   changed_ |= handles_.draw(state_, manifest(), place, window_);
   drawMarkerSigns(state_, place);
+  list->PopClipRect();
 }
 
 /// Where the mouse rests, the values there are found: first the depth of the picture's pixels, then what the data have
@@ -117,6 +124,8 @@ void CacheView::probe(const WindowLayout& layout) {
   }
   const Marker marker = markerOf(state_, variable, answer->question.point, *answer->found);
   probed_ = textOf(marker, manifest().blocks.size(), manifest().cells);
+  // Its nodes are not those of the grid.
+  if (preview_) probed_ = probed_.substr(0, probed_.find(';')) + ", of the preview";
   if (!for_marker) return;
   state_.markers.push_back(marker);
   rests_ = false;
@@ -142,10 +151,12 @@ void CacheView::drawStatus(const WindowLayout& layout) {
   ImGui::TextUnformatted(text.c_str());
   nameArea("status " + text, place.x, place.y, place.width, place.height);
   const std::string state =
+      (preview_ ? fmt::format("preview of {}, ", preview_->what) : "") +
       stateOfPicture({shown_ ? &shown_->statistics : nullptr, isFinal(), frames_.busy(), ""});
   ImGui::SameLine(static_cast<float>(place.width) - ImGui::CalcTextSize(state.c_str()).x -
                   2 * ImGui::GetStyle().FramePadding.x);
   ImGui::TextDisabled("%s", state.c_str());
+  nameWidget("state " + state);
   ImGui::End();
   ImGui::PopStyleVar(2);
 }
@@ -161,7 +172,8 @@ void CacheView::savePictureIfFinal() {
     const AnnotatedScene scene =
         sceneOf(state_, manifest(), functions, shown_->camera, shown_->options, picture_size_);
     writeImage(annotated(shown_->image, state_.annotations, scene), file);
-    say("saved " + fs::absolute(file).string());
+    say("saved " + fs::absolute(file).string() +
+        (preview_ ? fmt::format(", of the preview ({})", preview_->what) : ""));
   } catch (const Error& error) {
     say(error.what(), true);
   }
@@ -169,7 +181,11 @@ void CacheView::savePictureIfFinal() {
 
 void CacheView::copyCommand(bool turns) {
   try {
-    CommandOptions options{shortPath(cache_.cachePath()), picture_size_, {}, {}, turns};
+    CommandOptions options{shortPath(whole()), picture_size_, {}, {}, turns};
+    if (!grid_files_.empty() && grid_files_.size() <= kMaxNamedFiles) {
+      options.cache = shortPath(grid_files_.front());
+      for (size_t n = 1; n < grid_files_.size(); ++n) options.solutions.push_back(shortPath(grid_files_[n]));
+    }
     const auto keep = [&](const EditedFunction& function, const char* what, fs::path& file) {
       if (!needsFile(function)) return;
       // Beside the picture that the command will write.
@@ -183,7 +199,8 @@ void CacheView::copyCommand(bool turns) {
     window_.setClipboard(command);
     fmt::print("{}\n", command);
     std::fflush(stdout);
-    say(turns ? "copied the command for a movie" : "copied the command for this picture");
+    say(fmt::format("copied the command for {}; paste it into a terminal",
+                    turns ? "a movie" : "this picture"));
   } catch (const Error& error) {
     say(error.what(), true);
   }
@@ -215,8 +232,8 @@ void CacheView::take(const FileDialog::Chosen& chosen) {
 
 void CacheView::saveView(const std::string& name) {
   try {
-    writeState(savedViewOf(cache_.cachePath(), name), toJson(state_));
-    views_ = savedViewsOf(cache_.cachePath());
+    writeState(savedViewOf(whole(), name), toJson(state_));
+    views_ = savedViewsOf(whole());
     say(fmt::format("saved the view \"{}\": View, Saved views", name));
   } catch (const Error& error) {
     say(error.what(), true);
@@ -225,7 +242,7 @@ void CacheView::saveView(const std::string& name) {
 
 void CacheView::loadView(const std::string& name) {
   try {
-    const fs::path file = savedViewOf(cache_.cachePath(), name);
+    const fs::path file = savedViewOf(whole(), name);
     ViewState state = viewStateFromJson(readTextFile(file), file, manifest());
     state.faces = state_.faces;  // of the command line
     state.faces_by = state_.faces_by;
@@ -244,16 +261,20 @@ std::vector<std::string> CacheView::otherScalars() const {
   return names;
 }
 
-void CacheView::addTo(MenuFacts& facts) const {
+void CacheView::addTo(MenuFacts& facts) {
   for (const VariableInfo& one : manifest().variables) facts.scalars.push_back(one.name);
   facts.scalar = state_.variable;
   facts.opacity_scalars = otherScalars();
   facts.opacity_scalar = state_.opacity_by ? state_.opacity_by->variable : facts.opacity_scalars.front();
   facts.views = views_;
+  facts.further = further_.known();
+  facts.further.is_busy = adds_scalar_;
 }
 
 void CacheView::choose(const MenuChoice& choice) {
   if (choice.view) loadView(*choice.view);
+  if (choice.looks_for_scalars) further_.look();
+  if (choice.add_scalar) wanted_scalar_ = choice.add_scalar;
   if (choice.scalar && *choice.scalar != state_.variable) {
     chooseVariable(state_, cache_, *choice.scalar);
     if (state_.opacity_by && state_.opacity_by->variable == *choice.scalar) state_.opacity_by.reset();

@@ -201,7 +201,7 @@ void FrameLoop::serve(Drawing& drawing, const FrameRequest& request, uint64_t nu
     frame.image = renderer.renderQuickly(request.camera, request.options,
                                          {.max_splats = splats, .detail_px = detail_px}, frame.statistics,
                                          frame.is_final);
-    frame.bytes = bytesOf(frame.image);
+    if (request.wants_bytes) frame.bytes = bytesOf(frame.image);
     if (request.moving) {
       // Drawing fewer splats than the limit does not mean that the view is complete: the next level may
       // exceed it.

@@ -45,12 +45,13 @@ struct FrameRequest {
   bool moving = false;
   double target_s = 0.1;                   // time budget of a picture while moving
   uint64_t step = 0;                       // time step
+  bool wants_bytes = true;                 // ShownFrame::bytes; a picture of 1280 x 800 pixels takes 3 ms
   std::optional<uint64_t> next_step = {};  // is likely to be wanted next, with this camera: read ahead
 };
 
 struct ShownFrame {
   Image image;
-  std::vector<uint8_t> bytes;  // the image as 8-bit RGBA, clamped
+  std::vector<uint8_t> bytes;  // the image as 8-bit RGBA, clamped; empty unless the request wants it
   FrameStatistics statistics;
   uint64_t request = 0;  // what request() returned
   uint64_t step = 0;

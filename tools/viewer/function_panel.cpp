@@ -21,7 +21,8 @@ namespace {
 constexpr size_t kBins = 128;
 constexpr ImGuiInputTextFlags kNumber =
     ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_CharsScientific;
-constexpr float kGrabRadius = 8;  // pixels around a point
+constexpr float kGrabRadius = 0.6f;  // around a point, in lines of text
+constexpr float kPointRadius = 0.38f;
 constexpr float kCurveLines = 9;  // height in lines of text
 
 ImU32 toImGui(const glm::dvec3& rgb) {
@@ -59,7 +60,7 @@ struct Canvas {
 
 std::optional<size_t> pointNear(const EditedFunction& function, const Canvas& canvas, const ImVec2& mouse) {
   std::optional<size_t> nearest;
-  float least = kGrabRadius;
+  float least = kGrabRadius * ImGui::GetFontSize();
   for (size_t n = 0; n < function.points().size(); ++n) {
     const ImVec2 at = canvas.at(function.points()[n].x, heightOf(function.points()[n].opacity));
     const float distance = std::hypot(at.x - mouse.x, at.y - mouse.y);
@@ -83,18 +84,19 @@ void paintCurve(const EditedFunction& function, const std::vector<double>& histo
                         canvas.at(x + 1.0 / static_cast<double>(histogram.size()), 0),
                         IM_COL32(96, 104, 120, 255));
   }
+  const float unit = ImGui::GetFontSize();
   const OpacityCurve curve(function.points());
   ImVec2 before = canvas.at(0, heightOf(curve.at(0)));
   for (float x = 1; x <= canvas.size.x; ++x) {
     const double part = x / canvas.size.x;
     const ImVec2 now = canvas.at(part, heightOf(curve.at(part)));
-    list->AddLine(before, now, IM_COL32(250, 250, 250, 255), 1.5f);
+    list->AddLine(before, now, IM_COL32(250, 250, 250, 255), 0.11f * unit);
     before = now;
   }
   for (const OpacityPoint& point : function.points()) {
     const ImVec2 at = canvas.at(point.x, heightOf(point.opacity));
-    list->AddCircleFilled(at, 5, toImGui(function.colourAt(point.x)));
-    list->AddCircle(at, 5, IM_COL32(255, 255, 255, 255));
+    list->AddCircleFilled(at, kPointRadius * unit, toImGui(function.colourAt(point.x)));
+    list->AddCircle(at, kPointRadius * unit, IM_COL32(255, 255, 255, 255), 0, 0.08f * unit);
   }
 }
 
@@ -182,11 +184,11 @@ FunctionPanel::Result FunctionPanel::draw(EditedFunction& function, size_t varia
     nameWidget("colour points");
   }
   if (shows != Shows::kOpacities) {
-    result.load = ImGui::Button("load...");
+    result.load = ImGui::Button("load from file...");
     nameWidget("load");
     hint("colours and opacities from a ParaView preset, .json");
     ImGui::SameLine();
-    result.save = ImGui::Button("save...");
+    result.save = ImGui::Button("save to file...");
     nameWidget("save");
     hint("as a ParaView preset, which render --tf draws with");
   }

@@ -38,6 +38,23 @@ void chooseOne(const char* title, const std::vector<std::string>& names, const s
   ImGui::EndMenu();
 }
 
+/// Scalars of the cache's sources that it lacks.
+void chooseFurther(const FurtherScalars& further, MenuChoice& choice, Window& window) {
+  if (!ImGui::BeginMenu("Add scalar", !further.from.empty() && !further.is_busy)) {
+    nameWidget("menu Add scalar");
+    return;
+  }
+  window.coverCurrent();
+  choice.looks_for_scalars = true;
+  if (further.is_looking) ImGui::TextDisabled("looking into %s ...", further.from.c_str());
+  if (!further.error.empty()) ImGui::TextDisabled("%s", further.error.c_str());
+  for (const SourceScalar& one : further.scalars) {
+    if (ImGui::MenuItem(one.name.c_str(), one.derived ? "computed" : nullptr)) choice.add_scalar = one.name;
+    nameWidget("item Add scalar " + one.name);
+  }
+  ImGui::EndMenu();
+}
+
 void chooseRecent(const MenuFacts& facts, MenuChoice& choice, Window& window) {
   if (!ImGui::BeginMenu("Open recent", !facts.recent.empty())) {
     nameWidget("menu Open recent");
@@ -96,6 +113,7 @@ MenuChoice drawMenus(const MenuFacts& facts, Window& window) {
       if (std::string_view(menu) == "Data") {
         chooseOne("Scalar", facts.scalars, facts.scalar, choice.scalar, window);
         chooseOne("Opacity by", facts.opacity_scalars, facts.opacity_scalar, choice.opacity_scalar, window);
+        chooseFurther(facts.further, choice, window);
       }
       ImGui::EndMenu();
     }

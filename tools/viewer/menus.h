@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "tools/viewer/further_scalar_list.h"
 #include "tools/viewer/state_files.h"
 #include "tools/viewer/toasts.h"
 #include "tools/viewer/window_commands.h"
@@ -18,13 +19,15 @@ struct MenuFacts {
   std::vector<std::vector<std::string>> recent;
   std::vector<std::string> scalars, opacity_scalars, views;
   std::string scalar, opacity_scalar;  // those that are shown
+  FurtherScalars further;
 };
 
 /// What was chosen in them.
 struct MenuChoice {
   std::vector<Command> commands;
   std::optional<std::vector<std::string>> open;  // files
-  std::optional<std::string> scalar, opacity_scalar, view;
+  std::optional<std::string> scalar, opacity_scalar, view, add_scalar;
+  bool looks_for_scalars = false;  // for what the cache's sources have and the cache lacks
 };
 
 /// Draws the bar over the window's whole width. Its height is that of a frame of Dear ImGui's.

@@ -15,8 +15,8 @@ constexpr int kNice = 10;  // of the threads that convert: the window and its pi
 
 }  // namespace
 
-Opening::Opening(std::vector<std::filesystem::path> files, const ViewerOptions& options, void (*wake)())
-    : files_(std::move(files)), progress_([this, wake](const Progress::State* state) {
+Opening::Opening(std::string title, Work work, void (*wake)())
+    : title_(std::move(title)), progress_([this, wake](const Progress::State* state) {
         if (!state) return;
         {
           const MutexLock lock(mutex_);
@@ -26,7 +26,7 @@ Opening::Opening(std::vector<std::filesystem::path> files, const ViewerOptions& 
         }
         wake();
       }) {
-  cache_ = std::async(std::launch::async, [this, wake, to_cache = options.to_cache] {
+  cache_ = std::async(std::launch::async, [this, wake, work = std::move(work)] {
     nameThisThread("opening");
     // Of this thread alone, and of those that it starts: Linux gives each thread its own.
     setpriority(PRIO_PROCESS, 0, kNice);
@@ -34,10 +34,19 @@ Opening::Opening(std::vector<std::filesystem::path> files, const ViewerOptions& 
       void (*wake)();
       ~Wake() { wake(); }
     } const at_the_end{wake};
-    return to_cache(files_, progress_, [this](const std::string& text) {
+    OpeningEvents events;
+    events.say = [this](const std::string& text) {
       const MutexLock lock(mutex_);
       messages_.push_back(text);
-    });
+    };
+    events.preview = [this, wake](Preview preview) {
+      {
+        const MutexLock lock(mutex_);
+        preview_ = std::move(preview);
+      }
+      wake();
+    };
+    return work(progress_, events);
   });
 }
 
@@ -59,6 +68,11 @@ float Opening::part() const {
 std::vector<std::string> Opening::takeMessages() {
   const MutexLock lock(mutex_);
   return std::exchange(messages_, {});
+}
+
+std::optional<Preview> Opening::takePreview() {
+  const MutexLock lock(mutex_);
+  return std::exchange(preview_, std::nullopt);
 }
 
 bool Opening::isDone() const {

@@ -18,7 +18,9 @@ struct PanelActions {
   std::optional<uint64_t> step;  // to go to
   bool load_function = false, save_function = false;
   std::optional<std::string> load_view, save_view, remove_view;  // by name
-  std::string error;                                             // of what the user asked for
+  bool looks_for_scalars = false;         // for what the sources have and the cache lacks
+  std::optional<std::string> add_scalar;  // of those
+  std::string error;                      // of what the user asked for
 
   void run(Command command) { commands.push_back(command); }
 };

@@ -34,7 +34,7 @@ PanelActions Panels::draw(ViewState& state, const PanelFacts& facts) {
   try {
     if (facts.playback && facts.playback->steps() > 1 && section("Time", true))
       drawTime(actions, *facts.playback);
-    if (section("Scalar", true)) drawScalars(state, actions);
+    if (section("Scalar", true)) drawScalars(state, facts.further, actions);
     if (section("Colours and opacities", true)) drawFunctions(state, actions);
   } catch (const UsageError& error) {
     actions.error = error.what();
@@ -69,7 +69,30 @@ void Panels::drawTime(PanelActions& actions, Playback& playback) {
   if (option("loop", loops)) playback.setLoop(loops);
 }
 
-void Panels::drawScalars(ViewState& state, PanelActions& actions) {
+namespace {
+
+/// What the sources have besides, at the end of the list of scalars.
+void drawFurther(const FurtherScalars& further, PanelActions& actions) {
+  if (further.from.empty()) return;
+  actions.looks_for_scalars = true;
+  ImGui::Separator();
+  ImGui::TextDisabled("%s", further.is_looking ? "looking for more ..."
+                            : further.is_busy  ? "one is being added"
+                                               : "more, added when chosen:");
+  if (!further.error.empty()) ImGui::TextDisabled("%s", further.error.c_str());
+  ImGui::BeginDisabled(further.is_busy);
+  for (const SourceScalar& one : further.scalars) {
+    if (ImGui::Selectable(
+            fmt::format("{}{}", scalarTitle(one.name, one.unit), one.derived ? "  (computed)" : "").c_str()))
+      actions.add_scalar = one.name;
+    nameWidget("further scalar " + one.name);
+  }
+  ImGui::EndDisabled();
+}
+
+}  // namespace
+
+void Panels::drawScalars(ViewState& state, const FurtherScalars* further, PanelActions& actions) {
   const auto& variables = cache_.manifest().variables;
   label("scalar");
   if (ImGui::BeginCombo("##scalar", state.variable.c_str(), ImGuiComboFlags_HeightLarge)) {
@@ -82,6 +105,7 @@ void Panels::drawScalars(ViewState& state, PanelActions& actions) {
       if (state.opacity_by && state.opacity_by->variable == one.name) state.opacity_by.reset();
       actions.function_changed = true;
     }
+    if (further) drawFurther(*further, actions);
     ImGui::EndCombo();
   } else {
     nameWidget("scalar");

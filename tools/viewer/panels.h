@@ -8,6 +8,7 @@
 #include "stream/cache/cache_reader.h"
 #include "tools/viewer/cut_panel.h"
 #include "tools/viewer/function_panel.h"
+#include "tools/viewer/further_scalar_list.h"
 #include "tools/viewer/panel_actions.h"
 #include "tools/viewer/playback.h"
 #include "tools/viewer/statistics_panel.h"
@@ -22,6 +23,7 @@ struct PanelFacts {
   Playback* playback = nullptr;    // of a series; the panels set its speed and loop
   std::vector<std::string> views;  // saved ones, by name
   Rectangle place;                 // of the panels in the window
+  const FurtherScalars* further = nullptr;
 };
 
 class Panels {
@@ -37,7 +39,7 @@ class Panels {
 
  private:
   void drawTime(PanelActions& actions, Playback& playback);
-  void drawScalars(ViewState& state, PanelActions& actions);
+  void drawScalars(ViewState& state, const FurtherScalars* further, PanelActions& actions);
   void drawFunctions(ViewState& state, PanelActions& actions);
   void drawView(ViewState& state, PanelActions& actions, const PanelFacts& facts);
   void drawSavedViews(PanelActions& actions, const std::vector<std::string>& views);

@@ -78,9 +78,10 @@ bool PlaneHandles::drawOne(ClipPlane& plane, size_t number, const Manifest& mani
     seen &= corner.has_value();
     if (corner) corners[n] = toImGui(*corner);
   }
-  if (seen) list->AddPolyline(corners.data(), 4, colour, ImDrawFlags_Closed, 1.5f);
+  if (seen) list->AddPolyline(corners.data(), 4, colour, ImDrawFlags_Closed, 0.11f * ImGui::GetFontSize());
   const double size = 0.45 * static_cast<double>(ImGui::GetFontSize());
-  list->AddLine(toImGui(*handle), toImGui(*handle + 0.3 * (*end - *handle)), colour, 2);
+  list->AddLine(toImGui(*handle), toImGui(*handle + 0.3 * (*end - *handle)), colour,
+                0.15f * ImGui::GetFontSize());
   list->AddCircleFilled(toImGui(*handle), static_cast<float>(size), colour);
   list->AddCircle(toImGui(*handle), static_cast<float>(size), IM_COL32(0, 0, 0, 255));
   const Rectangle grip{handle->x - size, handle->y - size, 2 * size, 2 * size};

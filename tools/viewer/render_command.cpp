@@ -138,8 +138,10 @@ std::filesystem::path shortPath(const std::filesystem::path& path) {
 }
 
 std::string renderCommand(const ViewState& state, const CommandOptions& options) {
-  Words words("curvisplat render " + quoted(options.cache.string()) + " -o " +
-              (options.turns ? "movie.mp4" : "picture.png"));
+  std::string files = quoted(options.cache.string());
+  for (const std::filesystem::path& file : options.solutions)
+    files += fmt::format(" {}", quoted(file.string()));
+  Words words(fmt::format("curvisplat render {} -o {}", files, options.turns ? "movie.mp4" : "picture.png"));
   words.add("--size", fmt::format("{}x{}", options.size.width, options.size.height));
   words.add("--scalar", state.variable);
   addFunctions(state, options, words);

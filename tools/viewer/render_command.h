@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "tools/viewer/view_state.h"
 
@@ -15,6 +16,7 @@ struct CommandOptions {
   ImageSize size;
   std::filesystem::path function_file, opacity_file;  // those that needFile() asks for
   bool turns = false;                                 // a movie: once around the focal point
+  std::vector<std::filesystem::path> solutions = {};  // where `cache` is a grid: its further files
 };
 
 /// Whether options cannot state the function: it has to be in a file (toParaViewPreset()).

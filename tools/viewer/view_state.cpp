@@ -191,8 +191,7 @@ FrameOptions ViewState::frameOptions(ImageSize size) const {
     for (const NamedFaces& named : faces) scene->grid_surfaces.push_back(named.surface);
     scene->slices = slices;
     scene->slice_opacity = slice_opacity;
-    // Inside the volume they share a table with the function, which is linear then.
-    if (!volume || !function.function().logScale()) scene->isovalues = isovalues;
+    scene->isovalues = isovalues;
     scene->iso_opacity = iso_opacity;
     scene->volume = volume;
     options.scene = std::move(scene);

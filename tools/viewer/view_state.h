@@ -63,7 +63,7 @@ struct ViewState {
   std::vector<ClipPlane> slices = {};
   double slice_opacity = 1;
   std::vector<double> isovalues = {};  // from the command line; not saved
-  double iso_opacity = kIsoOpacity;
+  double iso_opacity = 1;
   bool volume = true;  // with a slice or a surface it may be left out
   bool lit = false;
   bool dark = false;  // background

@@ -29,6 +29,7 @@ namespace fs = std::filesystem;
 constexpr double kIdleWaitSeconds = 0.5;
 constexpr int kFramesAfterInput = 2;  // Dear ImGui needs them to settle
 constexpr double kTextStep = 1.125;
+constexpr size_t kMaxTitle = 60;
 
 class Viewer {
  public:
@@ -43,6 +44,15 @@ class Viewer {
     }
     if (!options.files.empty()) open(options.files);
   }
+
+  ~Viewer() {
+    opening_.reset();
+    const std::optional<Preview> left = view_ ? view_->preview() : std::nullopt;
+    view_.reset();
+    if (left) removePreview(*left);
+  }
+  Viewer(const Viewer&) = delete;
+  Viewer& operator=(const Viewer&) = delete;
 
   /// Saves the state when the window closes, also when a signal closes it.
   void run(const Progress& stopped) {
@@ -69,7 +79,9 @@ class Viewer {
   void show(CacheReader cache, const ViewerOptions& options, const std::vector<fs::path>& files) {
     if (view_) view_->remember();
     auto next = std::make_unique<CacheView>(std::move(cache), options, window_, toasts_, dialog_, layout());
+    const std::optional<Preview> left = view_ ? view_->preview() : std::nullopt;
     view_ = std::move(next);
+    if (left) removePreview(*left);
     window_.setTitle(fmt::format("{} - curvisplat", files.front().filename().string()));
     std::vector<std::string> names;
     for (const fs::path& file : files) names.push_back(fs::absolute(file).string());
@@ -79,26 +91,84 @@ class Viewer {
   /// What was chosen in a dialog or a menu, or dropped: a cache at once, a grid when it is converted.
   void open(const std::vector<fs::path>& files) {
     opening_.reset();  // the one before is given up
-    opening_ = std::make_unique<Opening>(files, options_, Window::wake);
+    opening_files_ = files;
+    adds_to_.reset();
+    std::string names;
+    for (const fs::path& file : files) names += fmt::format(" {}", file.filename().string());
+    if (names.size() > kMaxTitle)
+      names = fmt::format("{} ... ({} files)", names.substr(0, kMaxTitle), files.size());
+    opening_ = std::make_unique<Opening>(
+        "opening" + names,
+        [this, files](Progress& progress, const OpeningEvents& events) {
+          return options_.conversion.to_cache(files, progress, events);
+        },
+        Window::wake);
+  }
+
+  /// Adds a scalar of the sources to the cache that is shown.
+  void add(const std::string& scalar) {
+    if (opening_) return;
+    adds_to_ = scalar;
+    opening_ = std::make_unique<Opening>(
+        "adding " + scalar,
+        [this, scalar, cache = view_->cachePath(), files = view_->sources()](Progress& progress,
+                                                                             const OpeningEvents&) {
+          options_.conversion.add_scalar(cache, files, scalar, progress);
+          return cache;
+        },
+        Window::wake);
+  }
+
+  /// The options of a view of what is opened now.
+  ViewerOptions viewOptions() const {
+    ViewerOptions options;
+    if ((!view_ || view_->preview()) && opening_files_ == options_.files) options = options_;
+    options.backend = options_.backend;
+    options.target_s = options_.target_s;
+    options.memory_bytes = options_.memory_bytes;
+    options.conversion = options_.conversion;
+    return options;
   }
 
   /// Shows what has been opened.
   void takeOpened() {
     if (!opening_) return;
     for (const std::string& text : opening_->takeMessages()) toasts_.add(text, glfwGetTime());
+    if (auto preview = opening_->takePreview()) showPreview(*preview);
     if (!opening_->isDone()) return;
     const std::unique_ptr<Opening> done = std::move(opening_);
     try {
-      ViewerOptions options;
-      if (!view_ && done->files() == options_.files) options = options_;
-      options.backend = options_.backend;
-      options.target_s = options_.target_s;
-      options.memory_bytes = options_.memory_bytes;
-      show(CacheReader(done->take()), options, done->files());
+      const fs::path cache = done->take();
+      ViewerOptions options = viewOptions();
+      if (adds_to_) {
+        options.grid_files = view_->gridFiles();
+        options.carried = view_->carried();
+        options.scalar = adds_to_;
+        return show(CacheReader(cache), options,
+                    options.grid_files.empty() ? std::vector{cache} : options.grid_files);
+      }
+      const bool is_kept = opening_files_.size() > 1 || opening_files_.front() != cache;
+      if (is_kept) options.grid_files = opening_files_;
+      const auto preview = view_ ? view_->preview() : std::nullopt;
+      if (preview && preview->whole == cache) options.carried = view_->carried();
+      show(CacheReader(cache), options, opening_files_);
     } catch (const Interrupted&) {
     } catch (const Error& error) {
       printMessage("warning: {}", error.what());
       toasts_.add(error.what(), glfwGetTime(), true);
+    }
+  }
+
+  /// A coarse cache of what is being opened, until it is complete.
+  void showPreview(const Preview& preview) {
+    try {
+      ViewerOptions options = viewOptions();
+      options.grid_files = opening_files_;
+      options.preview = preview;
+      show(CacheReader(preview.cache), options, opening_files_);
+      toasts_.add(fmt::format("A preview of {}; the whole follows.", preview.what), glfwGetTime());
+    } catch (const Error& error) {
+      toasts_.add(fmt::format("no preview: {}", error.what()), glfwGetTime());
     }
   }
 
@@ -112,18 +182,25 @@ class Viewer {
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                      ImGuiWindowFlags_AlwaysAutoResize);
     window_.coverCurrent();
-    std::string names;
-    for (const fs::path& file : opening_->files()) {
-      names += file.filename().string();
-      names += ' ';
-    }
-    ImGui::Text("opening %s", names.c_str());
+    ImGui::TextUnformatted(opening_->title().c_str());
+    if (view_ && view_->preview() && !adds_to_)
+      ImGui::TextDisabled("what is shown is a preview: %s", view_->preview()->what.c_str());
     ImGui::ProgressBar(opening_->part(), {-1, 0}, opening_->phase().c_str());
     nameWidget("opening");
     const bool stops = ImGui::Button("stop");
     nameWidget("stop opening");
     ImGui::End();
     if (stops) opening_.reset();
+    if (stops && view_ && view_->preview())
+      toasts_.add(fmt::format("Stopped. What is shown is a preview of {}.", view_->preview()->what),
+                  glfwGetTime());
+  }
+
+  /// Nothing reads it any longer. That of a series is the series' own cache, which has been moved.
+  static void removePreview(const Preview& preview) {
+    std::error_code ignored;
+    const fs::path folder = preview.cache.parent_path();
+    if (folder.filename() == "preview") fs::remove_all(folder, ignored);
   }
 
   WindowLayout layout() const {
@@ -166,6 +243,9 @@ class Viewer {
       view_->take(*chosen);
     if (const auto files = std::exchange(to_open_, std::nullopt)) open({files->begin(), files->end()});
     if (const auto dropped = window_.takeDropped(); !dropped.empty()) open({dropped.begin(), dropped.end()});
+    const bool is_busy = opening_ != nullptr;
+    if (view_)
+      if (const auto scalar = view_->takeWantedScalar(is_busy)) add(*scalar);
     takeOpened();
   }
 
@@ -293,6 +373,8 @@ class Viewer {
   Toasts toasts_;
   FileDialog dialog_;
   std::unique_ptr<CacheView> view_;
+  std::vector<fs::path> opening_files_;  // that are being opened, or were
+  std::optional<std::string> adds_to_;   // the scalar that is being added instead
   std::unique_ptr<Opening> opening_;
   bool panels_shown_ = true, keys_shown_ = false, messages_shown_ = false, look_changed_ = false;
   std::optional<std::vector<std::string>> to_open_;

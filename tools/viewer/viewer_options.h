@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,9 +11,11 @@
 #include "render/camera/camera.h"
 #include "render/frame/backend.h"
 #include "render/surface/surface_scene.h"
-#include "stream/base/progress.h"
+#include "tools/viewer/conversion_services.h"
 
 namespace curvisplat {
+
+struct CarriedView;
 
 struct ViewerOptions {
   ImageSize size{1200, 800};
@@ -26,12 +27,15 @@ struct ViewerOptions {
   std::vector<std::string> face_names;               // of its grid surfaces
   std::string faces_by;                              // --surface-by
   std::optional<uint64_t> memory_bytes;
-  /// Makes a cache of files that are none, on a thread of its own; returns its path, or that of a cache itself.
-  std::function<std::filesystem::path(const std::vector<std::filesystem::path>& files, Progress& progress,
-                                      const std::function<void(const std::string&)>& say)>
-      to_cache;
+  ConversionServices conversion;
   std::vector<std::filesystem::path> files;  // to open first, in place of a cache
   std::optional<double> target_s;  // per picture while moving; default 0.033 with a graphics card, else 0.1
+
+  /// Of the cache that is shown: the grid's files that were opened, if it is a kept cache of them; what it is a preview
+  /// of; and the view that it continues, of the same grid.
+  std::vector<std::filesystem::path> grid_files;
+  std::optional<Preview> preview;
+  std::shared_ptr<const CarriedView> carried;
 };
 
 }  // namespace curvisplat

@@ -1,5 +1,6 @@
 // Scalars that no file holds, for unstructured grids: those of flow_quantities.h that a sample's own density, velocity
-// and pressure give. Gradients, and the Jacobian and the volume of structured grids, are not offered.
+// and pressure give. Those of gradients: preprocess/gather/gradient_mesh.h. The Jacobian and
+// the volume of structured grids are not offered.
 #pragma once
 
 #include <memory>

@@ -25,6 +25,7 @@
 #include "preprocess/grid/time_steps.h"
 #include "stream/base/error.h"
 #include "stream/base/paths.h"
+#include "stream/base/suggestion.h"
 
 namespace curvisplat {
 namespace {
@@ -198,7 +199,11 @@ std::vector<uint32_t> scalarsNamed(const GridDescription& description,
   for (const std::string& name : names) {
     const std::vector<uint32_t> candidates = candidatesFor(description, name);
     if (candidates.size() > 1) throw UsageError("scalar '{}' is ambiguous; {}", name, namesIn(description));
-    if (candidates.empty()) throw UsageError("there is no scalar '{}'; {}", name, namesIn(description));
+    if (candidates.empty()) {
+      std::vector<std::string> known;
+      for (const GridScalar& scalar : description.scalars) known.push_back(scalar.name);
+      throw UsageError("there is no scalar '{}'{}; {}", name, didYouMean(name, known), namesIn(description));
+    }
     if (std::find(positions.begin(), positions.end(), candidates.front()) != positions.end())
       throw UsageError("scalar '{}' is requested twice", name);
     positions.push_back(candidates.front());

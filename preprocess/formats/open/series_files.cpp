@@ -9,6 +9,7 @@
 #include <map>
 
 #include "preprocess/formats/open/open_grid.h"
+#include "preprocess/formats/su2/su2_source.h"
 #include "stream/base/error.h"
 #include "stream/base/paths.h"
 
@@ -97,6 +98,14 @@ std::vector<fs::path> filesLike(const fs::path& path, const std::string& pattern
   if (files.empty()) throw Error("{}: no file matches this pattern", path.string());
   sortNaturally(files);
   return files;
+}
+
+/// Whether these are a SU2 mesh of several zones and a restart file for each of them: one step, though the names of the
+/// restart files differ in a number alone.
+bool areZones(const OpenGridOptions& options) {
+  if (options.solutions.size() < 2 || !isRegularFile(options.grid)) return false;
+  const InputFile mesh(options.grid);
+  return isSu2(mesh) && su2Zones(mesh) == options.solutions.size();
 }
 
 /// The files of a series as its steps use them.
@@ -208,6 +217,7 @@ void expandPatterns(OpenGridOptions& options) {
 }
 
 bool hasSeveralStepFiles(const OpenGridOptions& options) {
+  if (areZones(options)) return false;
   std::vector<std::string> shapes{shapeOf(options.grid)};
   for (const fs::path& path : options.solutions) shapes.push_back(shapeOf(path));
   std::sort(shapes.begin(), shapes.end());
@@ -215,6 +225,7 @@ bool hasSeveralStepFiles(const OpenGridOptions& options) {
 }
 
 std::vector<StepFiles> stepsByName(const OpenGridOptions& options) {
+  if (areZones(options)) return {{options, options.grid.string()}};
   const Groups groups = groupsOf(options);
   std::vector<StepFiles> steps;
   for (size_t n = 0; n < groups.steps; ++n) {

@@ -5,6 +5,8 @@
 //   'q.*' 'q.%04d'        patterns of such names, quoted from the shell: all files that match
 //   one file              .pvd, .vtk.series and the like, .p3d, CGNS, NetCDF: its time steps
 //   several such files    the steps of one after those of the other
+//
+// As many restart files as a SU2 mesh has zones are one step.
 #pragma once
 
 #include <cstdint>
@@ -41,10 +43,10 @@ std::vector<uint64_t> selectedSteps(const std::string& option, const StepSelecti
 /// among the solutions.
 void expandPatterns(OpenGridOptions& options);
 
-/// Whether the names of the files alone make them several steps.
+/// Whether the names of the files make them several steps; only a SU2 mesh is opened.
 bool hasSeveralStepFiles(const OpenGridOptions& options);
 
-/// The steps that the names of the files tell, without opening any: a file with several steps counts as one.
+/// The steps that the names of the files tell, without opening any but a SU2 mesh: a file with several steps counts as one.
 std::vector<StepFiles> stepsByName(const OpenGridOptions& options);
 
 /// All steps of the files, whose patterns have been expanded. One at least. Opens files that may hold several

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
+#include <optional>
 #include <string_view>
 
 #include "stream/base/error.h"
@@ -14,7 +16,10 @@ constexpr uint64_t kLooked = 4096;
 
 }  // namespace
 
-bool isSu2(const InputFile& file) {
+namespace {
+
+/// The first line that is neither empty nor a comment, without the spaces before it; empty if the beginning has none.
+std::string firstLineOf(const InputFile& file) {
   std::string begin(static_cast<size_t>(std::min<uint64_t>(file.size(), kLooked)), '\0');
   file.readAt(0, std::span(begin.data(), begin.size()));
   for (size_t at = 0; at < begin.size();) {
@@ -22,15 +27,33 @@ bool isSu2(const InputFile& file) {
     std::string_view line = std::string_view(begin).substr(at, end - at);
     line.remove_prefix(std::min(line.find_first_not_of(" \t\r"), line.size()));
     at = end + 1;
-    if (line.empty() || line[0] == '%') continue;
-    for (const char* const key : {"NDIME", "NZONE"})
-      if (line.starts_with(key)) {
-        const size_t next = line.find_first_not_of(" \t", std::string_view(key).size());
-        return next != std::string_view::npos && line[next] == '=';
-      }
-    return false;
+    if (!line.empty() && line[0] != '%') return std::string(line);
   }
-  return false;
+  return "";
+}
+
+/// What follows "KEY =" in the line; nullopt if it has another key.
+std::optional<std::string_view> valueOf(std::string_view line, std::string_view key) {
+  if (!line.starts_with(key)) return std::nullopt;
+  const size_t next = line.find_first_not_of(" \t", key.size());
+  if (next == std::string_view::npos || line[next] != '=') return std::nullopt;
+  line.remove_prefix(std::min(line.find_first_not_of(" \t", next + 1), line.size()));
+  return line;
+}
+
+}  // namespace
+
+bool isSu2(const InputFile& file) {
+  const std::string line = firstLineOf(file);
+  return valueOf(line, "NDIME") || valueOf(line, "NZONE");
+}
+
+uint64_t su2Zones(const InputFile& file) {
+  const std::string line = firstLineOf(file);
+  const auto value = valueOf(line, "NZONE");
+  uint64_t zones = 1;
+  if (value) std::from_chars(value->data(), value->data() + value->size(), zones);
+  return zones;
 }
 
 Su2Source::Su2Source(const OpenGridOptions& options) {
@@ -62,6 +85,8 @@ void Su2Source::openRestarts(const OpenGridOptions& options) {
     restarts_.emplace_back(std::make_shared<const PooledFile>(pool, files[n]), zones_[piece].mesh.points(),
                            options.temporary_folder);
     description_.files.push_back(files[n].string());
+    if (zones_.size() > 1)
+      description_.notes.push_back(fmt::format("zone {} has the values of {}", n + 1, files[n].string()));
     const std::vector<std::string>& names = restarts_.back().names();
     if (piece > 0 && names != restarts_.front().names())
       throw Error("{}: has other variables than {}; expected the same", files[n].string(), files[0].string());

@@ -14,6 +14,8 @@ namespace curvisplat {
 
 /// Whether the text begins with one of SU2's keys.
 bool isSu2(const InputFile& file);
+/// Of such a file, as its first key says: 1 without NZONE.
+uint64_t su2Zones(const InputFile& file);
 
 /// Zones are pieces. options.solutions: restart files of the one zone, or one for each zone, in their order.
 class Su2Source final : public MeshSource {

@@ -10,11 +10,13 @@ Positions and lengths are in the grid's own unit. Colours are premultiplied by a
 """
 
 from ._arrays import Block, from_xarray
-from ._cache import Cache, Picture, Scalar, open
-from ._convert import Report, convert, convert_arrays, convert_callable
+from ._cache import Cache, Picture, Points, Samples, Scalar, open
+from ._camera import Camera, orbit
+from ._convert import Report, append_arrays, convert, convert_arrays, convert_callable
 from ._core import Error, UsageError, colour_maps
 from ._core import version as __version__
+from ._function import TransferFunction
 from ._view import View
 
-__all__ = ["Block", "Cache", "Error", "Picture", "Report", "Scalar", "UsageError", "View", "colour_maps", "convert",
-           "convert_arrays", "convert_callable", "from_xarray", "open"]
+__all__ = ["Block", "Cache", "Camera", "Error", "Picture", "Points", "Report", "Samples", "Scalar", "TransferFunction", "UsageError",
+           "View", "append_arrays", "colour_maps", "convert", "convert_arrays", "convert_callable", "from_xarray", "open", "orbit"]

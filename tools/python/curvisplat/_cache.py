@@ -10,6 +10,8 @@ from typing import Any, Callable, NamedTuple, Optional, Sequence, Tuple, Union
 import numpy as np
 
 from . import _core
+from ._camera import Camera
+from ._function import TransferFunction
 from ._view import View
 
 Vector = Sequence[float]
@@ -23,6 +25,29 @@ class Scalar(NamedTuple):
     unit: str
     min: float
     max: float
+
+
+class Samples(NamedTuple):
+    """Means over the boxes of a regular lattice: arrays of shape (nz, ny, nx), float32.
+
+    `value`: of the scalar; NaN where there is no data. `density`: 1 inside the data to within a tenth, less in boxes at its
+    border, 0 outside. `origin`: the middle of the first box, (x, y, z); `spacing`: of the middles.
+    """
+
+    value: np.ndarray
+    density: np.ndarray
+    origin: np.ndarray
+    spacing: np.ndarray
+
+
+class Points(NamedTuple):
+    """The splats of a level. `positions` (n, 3), float64; `values` of the scalar at them (n); `volumes` of the space that each
+    stands for (n), the grid's unit cubed; `shapes` (n, 3, 3): S of the ellipsoid x S⁻¹ x = 1, one grid spacing wide each way. float32."""
+
+    positions: np.ndarray
+    values: np.ndarray
+    volumes: np.ndarray
+    shapes: np.ndarray
 
 
 class Picture(np.ndarray):
@@ -79,6 +104,23 @@ def _opacities(value: Any) -> str:
 
 def _given(**options: Any) -> dict:
     return {name: _text(value) for name, value in options.items() if value is not None}
+
+
+def _instead(whole: Any, name: str, **parts: Any) -> dict:
+    """The options of a Camera or TransferFunction, or those given one by one."""
+    given = {part: value for part, value in parts.items() if value is not None}
+    if whole is None:
+        return given
+    if given:
+        raise _core.UsageError(f"{next(iter(given))} cannot be combined with {name}, which has it")
+    return whole.options()
+
+
+def _function_texts(colours: Any = None, opacity: Any = None, **others: Any) -> dict:
+    texts = _given(tf=None if colours is None else os.fspath(colours), **others)
+    if opacity is not None:
+        texts["opacity"] = _opacities(opacity)
+    return texts
 
 
 class Cache:
@@ -179,8 +221,60 @@ class Cache:
         sample}. None if the point is outside of the grid."""
         return self._core.probe([float(x) for x in point])
 
-    def render(self, scalar: str = "", *, size: Tuple[int, int] = (600, 600),
-               colours: Optional[str] = None, range: Union[str, Tuple[float, float], None] = None,
+    def _box(self, box: Optional[Vector]) -> Tuple[list, list]:
+        if box is None:
+            return list(self._core.lower), list(self._core.upper)
+        values = [float(x) for x in box]
+        if len(values) != 6:
+            raise _core.UsageError(f"a box of {len(values)} numbers: expected (x0, x1, y0, y1, z0, z1)")
+        return values[0::2], values[1::2]
+
+    def sample(self, scalar: str = "", *, size: Union[int, Tuple[int, int, int]] = 128, box: Optional[Vector] = None,
+               level: Optional[int] = None, step: int = 0, progress: Optional[Progress] = None) -> Samples:
+        """The scalar on a regular lattice.
+
+        scalar: a name (default: the first). size: boxes along (x, y, z), or along the longest side. box: (x0, x1, y0, y1, z0,
+        z1), by default that of the grid. level: the octree's, 0 is the coarsest; by default the coarsest whose detail is half a box. step: of a series.
+        Raises UsageError for what makes no sense, Error if reading fails, KeyboardInterrupt after Ctrl-C.
+        """
+        lower, upper = self._box(box)
+        extent = np.subtract(upper, lower)
+        if isinstance(size, (int, np.integer)) and size > 0:
+            widest = max(float(extent.max()), 1e-300)
+            size = tuple(int(max(1, np.ceil(size * max(side, 0) / widest - 1e-6))) for side in extent)
+        if np.ndim(size) != 1 or len(size) != 3 or min(size) < 1:
+            raise _core.UsageError(f"a size of {size}: expected one number or three, above zero")
+        choice = _core.DataChoice(scalar, lower, upper, level, int(step))
+        value, density = self._core.sample(choice, [int(n) for n in size], progress)
+        spacing = extent / np.asarray(size)
+        return Samples(value, density, np.asarray(lower) + spacing / 2, spacing)
+
+    def points(self, scalar: str = "", *, level: Optional[int] = None, box: Optional[Vector] = None, step: int = 0,
+               progress: Optional[Progress] = None) -> Points:
+        """The splats of a level with their centres in a box.
+
+        level: of the octree, 0 is the coarsest; by default the finest, which has a splat for each sample. Others as in sample(), which
+        this raises as, too.
+        """
+        lower, upper = self._box(box)
+        return Points(*self._core.points(_core.DataChoice(scalar, lower, upper, level, int(step)), progress))
+
+    def camera(self, view: str = "iso", *, size: Tuple[int, int] = (600, 600), scale: Vector = (1, 1, 1),
+               view_angle: Optional[float] = None) -> Camera:
+        """A camera that has all of the data in a picture of this size: iso, +x, -x, +y, -y, +z or -z; with view_angle (degrees) in
+        perspective."""
+        return self.orbit(view, frames=1, degrees=0, size=size, scale=scale, view_angle=view_angle)[0]
+
+    def orbit(self, view: str = "iso", *, frames: int = 90, degrees: float = 360, size: Tuple[int, int] = (600, 600),
+              scale: Vector = (1, 1, 1), view_angle: Optional[float] = None) -> Sequence[Camera]:
+        """The cameras of `curvisplat render --orbit`, one a frame, which all have all of the data in the picture."""
+        options = _given(view=view, view_angle=view_angle, orbit=degrees)
+        cameras = self._core.cameras(options, "{}x{}".format(*size), _numbers(scale), int(frames))
+        return [Camera(position, focal_point, view_up, None if view_angle else half, view_angle)
+                for position, focal_point, view_up, half in cameras]
+
+    def render(self, scalar: str = "", *, camera: Optional[Camera] = None, function: Optional[TransferFunction] = None,
+               size: Tuple[int, int] = (600, 600), colours: Optional[str] = None, range: Union[str, Tuple[float, float], None] = None,
                opacity: Union[str, Sequence[Tuple[float, float]], None] = None,
                asinh: Optional[Tuple[float, float]] = None, opacity_unit: Optional[float] = None,
                view: Optional[str] = None, position: Optional[Vector] = None, focal_point: Optional[Vector] = None,
@@ -198,6 +292,7 @@ class Cache:
         What is left out is chosen from the data; `Picture.options` says what was.
 
         scalar: a name (default: the first that is not constant). size: (width, height) in pixels.
+        camera, function: instead of the options that they have.
         colours: a colour map (`curvisplat.colour_maps()`; NAME_r is reversed) or the path of a ParaView preset.
         range: (low, high), "data", or percentiles such as "1%,99%". opacity: points (position 0..1, opacity 0..1), "ramp" or
         "auto". asinh: (centre, width). opacity_unit: the length over which opacity accumulates.
@@ -214,11 +309,10 @@ class Cache:
         Raises UsageError for options that make no sense, Error if reading or drawing fails, KeyboardInterrupt after
         Ctrl-C.
         """
-        function = _given(scalar=scalar, tf=colours, range=range, asinh=asinh, opacity_unit=opacity_unit)
-        if opacity is not None:
-            function["opacity"] = _opacities(opacity)
-        camera = _given(view=view, position=position, focal_point=focal_point, view_up=view_up,
-                        parallel_scale=parallel_scale, view_angle=view_angle)
+        of_function = _instead(function, "function", colours=colours, range=range, opacity=opacity, asinh=asinh,
+                               opacity_unit=opacity_unit)
+        of_camera = _instead(camera, "camera", view=view, position=position, focal_point=focal_point, view_up=view_up,
+                             parallel_scale=parallel_scale, view_angle=view_angle)
         frame = _given(size="{}x{}".format(*size), background=background, scale=scale, memory=str(memory),
                        lod_pixels=lod_pixels, clip_box=clip_box, light=light, light_direction=light_direction,
                        max_splats=None if max_splats is None else str(max_splats))
@@ -230,7 +324,8 @@ class Cache:
                   "keep_going": keep_going, "backend": backend}
         if iso_opacity is not None:
             others["iso_opacity"] = _number(iso_opacity)
-        rgba, options, notes, statistics = self._core.render(function, camera, frame, others, progress)
+        rgba, options, notes, statistics = self._core.render(
+            {"scalar": scalar, **_function_texts(**of_function)}, _given(**of_camera), frame, others, progress)
         picture = rgba.view(Picture)
         picture.options, picture.notes, picture.statistics = options, notes, statistics
         return picture

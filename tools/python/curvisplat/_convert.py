@@ -52,13 +52,8 @@ def convert(output: Path, grid: Path, solutions: Sequence[Path] = (), *, scalars
                                         options, progress))
 
 
-def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = None, overwrite: bool = False,
-                   memory: Union[str, int, None] = None, threads: int = 0, title: str = "",
-                   progress: Optional[Progress] = None) -> Report:
-    """Converts blocks in memory to the cache `output`. Samples that are NaN are not drawn. The arrays must not change meanwhile. `memory` does not count them.
-
-    Raises as convert() does; UsageError for arrays whose types or shapes do not fit.
-    """
+def _tuples(blocks: Sequence[Block]) -> Tuple[list, list]:
+    """The blocks and the scalars as the module takes them."""
     if not blocks:
         raise _core.UsageError("no block to convert; pass one Block or more")
     names = list(blocks[0].scalars)
@@ -72,8 +67,34 @@ def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = 
         blank = None if block.blank is None else np.asarray(block.blank)
         values = [_values(block.scalars[scalar]) for scalar in names]
         tuples.append((name, np.asarray(block.x), np.asarray(block.y), np.asarray(block.z), values, blank))
+    return tuples, units
+
+
+def convert_arrays(output: Path, *blocks: Block, blank_value: Optional[float] = None, overwrite: bool = False,
+                   memory: Union[str, int, None] = None, threads: int = 0, title: str = "", time: Optional[float] = None,
+                   progress: Optional[Progress] = None) -> Report:
+    """Converts blocks in memory to the cache `output`. Samples that are NaN are not drawn. The arrays must not change meanwhile. `memory` does not count them.
+
+    time: of this step, if others are to follow by append_arrays(). Raises as convert() does; UsageError for arrays whose types or
+    shapes do not fit.
+    """
+    tuples, units = _tuples(blocks)
     options = _options(overwrite, False, blank_value, memory, threads, title)
+    options["time"] = None if time is None else float(time)
     return Report(**_core.convert_arrays(os.fspath(output), tuples, units, options, progress))
+
+
+def append_arrays(cache: Path, *blocks: Block, time: Optional[float] = None, blank_value: Optional[float] = None,
+                  memory: Union[str, int, None] = None, threads: int = 0, progress: Optional[Progress] = None) -> int:
+    """Adds a time step to a cache: blocks of the same shapes, with the cache's scalars. Returns how many steps it has then.
+
+    time: after that of the last step; by default one more. The cache can be looked at meanwhile, and has the steps before if this
+    fails or is interrupted. Raises as convert_arrays().
+    """
+    tuples, units = _tuples(blocks)
+    options = _options(False, False, blank_value, memory, threads, "")
+    options["time"] = None if time is None else float(time)
+    return _core.append_arrays(os.fspath(cache), tuples, units, options, progress)
 
 
 def convert_callable(output: Path, shapes: Sequence[Tuple[int, int, int]], read: Callable[..., Tuple[Any, ...]],

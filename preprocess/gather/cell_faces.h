@@ -1,0 +1,24 @@
+// The faces of gathered cells, for FaceMatcher.
+#pragma once
+
+#include <glm/vec3.hpp>
+
+#include "preprocess/gather/corner_gather.h"
+#include "preprocess/gather/face_matcher.h"
+
+namespace curvisplat {
+
+/// A face as one of its cells has it.
+struct CellFace {
+  size_t cell = 0;                    // among the gathered ones
+  std::span<const uint32_t> corners;  // places among the cell's
+  glm::dvec3 inward{0.0};             // at right angles to it, as long as its area, into the cell
+  glm::dvec3 centre{0.0};             // the mean of its corners
+};
+
+/// Overwrites `out` with the faces of all cells in their order, in parallel; `put` writes a face's record, of
+/// `record_bytes`. Collapsed faces, with fewer than three corners, are left out.
+void facesOfCells(const GatheredCells& cells, size_t record_bytes,
+                  const std::function<void(const CellFace&, std::span<std::byte>)>& put, FaceRecords& out);
+
+}  // namespace curvisplat

@@ -1,0 +1,158 @@
+#include "preprocess/gather/face_matcher.h"
+
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <utility>
+
+namespace curvisplat {
+namespace {
+
+uint64_t hashOf(const FaceCorners& corners) {
+  uint64_t hash = 0;
+  for (const uint64_t corner : corners) {
+    hash ^= corner;
+    hash *= 0x9e3779b97f4a7c15;
+    hash ^= hash >> 29;
+  }
+  return hash;
+}
+
+bool areSame(const FaceCorners& a, const FaceCorners& b) {
+  return ((a[0] ^ b[0]) | (a[1] ^ b[1]) | (a[2] ^ b[2])) == 0;
+}
+
+}  // namespace
+
+FaceMatcher::FaceMatcher(size_t record_bytes, uint64_t faces, uint64_t memory_bytes,
+                         std::filesystem::path folder)
+    : record_bytes_(record_bytes) {
+  const uint64_t most = std::min<uint64_t>(std::max<uint64_t>(faces, 1), kMostWaiting);
+  buckets_.assign(std::bit_ceil(2 * most), kNone);
+  // A stream is sorted in memory.
+  const uint64_t bytes = faces * (sizeof(FaceCorners) + record_bytes + 2 * sizeof(uint64_t));
+  const uint64_t streams = bytes / std::max<uint64_t>(1, memory_bytes / 2) + 1;
+  spilled_ = std::make_unique<StreamsFile>(
+      std::move(folder), std::min<uint64_t>(streams, StreamsFile::mostStreams(memory_bytes / 4)),
+      memory_bytes / 4);
+  scratch_.resize(sizeof(FaceCorners) + record_bytes);
+}
+
+FaceMatcher::~FaceMatcher() = default;
+
+uint64_t FaceMatcher::waitingBytes(size_t record_bytes, uint64_t faces) {
+  return std::min<uint64_t>(faces, kMostWaiting) * (sizeof(Waiting) + record_bytes + 4 * sizeof(uint32_t));
+}
+
+uint64_t FaceMatcher::bucketOf(const FaceCorners& corners) const {
+  return hashOf(corners) & (buckets_.size() - 1);
+}
+
+void FaceMatcher::unlink(uint32_t entry) {
+  uint32_t* link = &buckets_[bucketOf(waiting_[entry].corners)];
+  while (*link != entry) link = &waiting_[*link].next;
+  *link = waiting_[entry].next;
+  waiting_[entry].single = false;
+}
+
+void FaceMatcher::spill(uint32_t entry) {
+  const FaceCorners& corners = waiting_[entry].corners;
+  std::memcpy(scratch_.data(), &corners, sizeof corners);
+  std::memcpy(scratch_.data() + sizeof corners, recordOf(entry).data(), record_bytes_);
+  spilled_->append(spilled_->streams() > 1 ? (hashOf(corners) >> 32) % spilled_->streams() : 0, scratch_);
+}
+
+uint32_t FaceMatcher::newEntry() {
+  if (!free_.empty()) {
+    const uint32_t entry = free_.back();
+    free_.pop_back();
+    return entry;
+  }
+  if (waiting_.size() < kMostWaiting) {
+    waiting_.emplace_back();
+    records_.resize(records_.size() + record_bytes_);
+    return static_cast<uint32_t>(waiting_.size() - 1);
+  }
+  const uint32_t entry = next_to_spill_;
+  next_to_spill_ = (next_to_spill_ + 1) % kMostWaiting;
+  spill(entry);
+  unlink(entry);
+  return entry;
+}
+
+void FaceMatcher::add(const FaceRecords& faces, const TakePair& pair) {
+  for (size_t n = 0; n < faces.corners.size(); ++n) {
+    const FaceCorners& corners = faces.corners[n];
+    const auto record = std::span(faces.records).subspan(n * record_bytes_, record_bytes_);
+    const uint64_t bucket = bucketOf(corners);
+    uint32_t same = buckets_[bucket];
+    while (same != kNone && !areSame(waiting_[same].corners, corners)) same = waiting_[same].next;
+    if (same != kNone) {
+      pair(recordOf(same), record);
+      unlink(same);
+      free_.push_back(same);
+      continue;
+    }
+    const uint32_t entry = newEntry();
+    waiting_[entry] = {corners, buckets_[bucket], true};
+    buckets_[bucket] = entry;
+    std::memcpy(recordOf(entry).data(), record.data(), record_bytes_);
+  }
+}
+
+void FaceMatcher::matchStream(size_t stream, const TakePair& pair, const TakeSingle& single) const {
+  const size_t stride = sizeof(FaceCorners) + record_bytes_;
+  std::vector<std::byte> bytes(spilled_->bytes(stream));
+  size_t end = 0;
+  spilled_->forEach(stream, [&](std::span<const std::byte> records) {
+    std::memcpy(bytes.data() + end, records.data(), records.size());
+    end += records.size();
+  });
+  const auto cornersAt = [&](size_t n) {
+    FaceCorners corners;
+    std::memcpy(&corners, bytes.data() + n * stride, sizeof corners);
+    return corners;
+  };
+  const auto recordAt = [&](size_t n) {
+    return std::span<const std::byte>(bytes).subspan(n * stride + sizeof(FaceCorners), record_bytes_);
+  };
+  std::vector<std::pair<uint64_t, size_t>> keys(bytes.size() / stride);  // hash, record
+  for (size_t n = 0; n < keys.size(); ++n) keys[n] = {hashOf(cornersAt(n)), n};
+  tbb::parallel_sort(keys.begin(), keys.end());
+  std::vector<std::pair<FaceCorners, size_t>> same_hash;
+  for (size_t first = 0; first < keys.size();) {
+    size_t last = first + 1;
+    while (last < keys.size() && keys[last].first == keys[first].first) ++last;
+    same_hash.clear();  // other faces may have the same hash
+    for (size_t n = first; n < last; ++n) same_hash.emplace_back(cornersAt(keys[n].second), keys[n].second);
+    if (same_hash.size() > 2) std::sort(same_hash.begin(), same_hash.end());
+    for (size_t n = 0; n < same_hash.size();) {
+      if (n + 1 < same_hash.size() && same_hash[n].first == same_hash[n + 1].first) {
+        pair(recordAt(same_hash[n].second), recordAt(same_hash[n + 1].second));
+        n += 2;
+      } else {
+        single(recordAt(same_hash[n].second));
+        ++n;
+      }
+    }
+    first = last;
+  }
+}
+
+void FaceMatcher::finish(const TakePair& pair, const TakeSingle& single, const Progress& progress) {
+  for (uint32_t entry = 0; entry < waiting_.size(); ++entry)
+    if (waiting_[entry].single) spill(entry);
+  free_ = buckets_ = {};
+  waiting_ = {};
+  records_ = {};
+  spilled_->close();
+  for (size_t stream = 0; stream < spilled_->streams(); ++stream) {
+    progress.throwIfStopped();
+    matchStream(stream, pair, single);
+    spilled_->forget(stream);
+  }
+}
+
+}  // namespace curvisplat

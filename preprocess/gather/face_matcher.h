@@ -1,0 +1,85 @@
+// Finds which faces two cells share, and which only one has: the outer ones. Cells come in the mesh's order, and
+// most pairs are near one another there: up to 2^17 faces without their second cell wait in memory. If there are more,
+// some go to disk, and are sorted at the end.
+//
+//    faces --> waiting in memory --+--> pairs
+//                   | too many     |
+//                   +--> streams by a hash of the corners, sorted --> pairs, single ones
+//
+// Faces are alike if their three lowest corners are. How many wait does not depend on the memory that there is, so
+// which two of three alike faces are a pair does not, either.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "preprocess/gather/streams_file.h"
+#include "stream/base/progress.h"
+
+namespace curvisplat {
+
+/// The lowest three corners of a face, rising.
+using FaceCorners = std::array<uint64_t, 3>;
+
+/// Faces and what belongs to each: a record of FaceMatcher's size.
+struct FaceRecords {
+  std::vector<FaceCorners> corners;
+  std::vector<std::byte> records;
+
+  void clear() {
+    corners.clear();
+    records.clear();
+  }
+};
+
+class FaceMatcher {
+ public:
+  using TakePair = std::function<void(std::span<const std::byte>, std::span<const std::byte>)>;
+  using TakeSingle = std::function<void(std::span<const std::byte>)>;
+
+  /// For about `faces` of them. Streams keep to `memory_bytes`, beside the faces that wait (waitingBytes()).
+  FaceMatcher(size_t record_bytes, uint64_t faces, uint64_t memory_bytes, std::filesystem::path folder);
+  ~FaceMatcher();
+
+  /// Calls pair(earlier, later) for some of the pairs, in this thread.
+  void add(const FaceRecords& faces, const TakePair& pair);
+  /// The others, and those without another. Once, after all faces.
+  void finish(const TakePair& pair, const TakeSingle& single, const Progress& progress);
+
+  static constexpr uint32_t kMostWaiting = uint32_t{1} << 17;
+  /// Of as many faces as wait at the most.
+  static uint64_t waitingBytes(size_t record_bytes, uint64_t faces);
+
+ private:
+  static constexpr uint32_t kNone = UINT32_MAX;
+  struct Waiting {
+    FaceCorners corners;
+    uint32_t next;  // of the same bucket
+    bool single;
+  };
+  uint32_t newEntry();
+  void spill(uint32_t entry);
+  void unlink(uint32_t entry);
+  std::span<std::byte> recordOf(uint32_t entry) {
+    return std::span(records_).subspan(entry * record_bytes_, record_bytes_);
+  }
+  uint64_t bucketOf(const FaceCorners& corners) const;
+  void matchStream(size_t stream, const TakePair& pair, const TakeSingle& single) const;
+
+  const size_t record_bytes_;
+  std::vector<uint32_t> buckets_;  // the first entry of each
+  std::vector<Waiting> waiting_;
+  std::vector<std::byte> records_;
+  std::vector<uint32_t> free_;  // of waiting_
+  uint32_t next_to_spill_ = 0;
+  std::unique_ptr<StreamsFile> spilled_;
+  std::vector<std::byte> scratch_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,35 @@
+// Which outer faces the splats of points end at: those that have the point, and for points behind, those of a cell
+// that has the point.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+
+#include "preprocess/gather/cell_faces.h"
+#include "preprocess/gather/outer_planes.h"
+
+namespace curvisplat {
+
+class PointBorders {
+ public:
+  /// For ranges of `range_points` numbers. `cells`: about how many there will be.
+  PointBorders(uint64_t points, uint64_t range_points, uint64_t cells, uint64_t memory_bytes,
+               const std::filesystem::path& folder);
+
+  /// Cells in the mesh's order.
+  void add(const GatheredCells& cells);
+  /// Once, after all cells; then load().
+  void finish(const Progress& progress);
+  OuterPlanes::OfRange load(size_t range) { return planes_.load(range); }
+
+  /// Of the faces that wait for their second cell, whatever memory there is.
+  static uint64_t waitingBytes(uint64_t cells);
+
+ private:
+  FaceMatcher faces_;
+  OuterPlanes planes_;
+  FaceRecords records_;
+};
+
+}  // namespace curvisplat

@@ -1,0 +1,118 @@
+#include "render/export/vdb_file.h"
+
+#include <openvdb/io/File.h>
+#include <openvdb/openvdb.h>
+#include <tbb/info.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "render/export/field_sampler.h"
+#include "stream/base/durable_file.h"
+#include "stream/base/error.h"
+#include "stream/base/paths.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr uint32_t kSlab = 8;  // planes: a row of OpenVDB's leaves
+
+SampleLattice latticeOf(const Manifest& manifest, uint32_t voxels) {
+  const glm::dvec3 extent = manifest.upper - manifest.lower;
+  const double widest = std::max({extent.x, extent.y, extent.z});
+  const double voxel = (widest > 0 ? widest : 1) / voxels;
+  SampleLattice lattice{manifest.lower + 0.5 * glm::dvec3(voxel), glm::dvec3(voxel), {}};
+  for (int axis = 0; axis < 3; ++axis)
+    lattice.size[static_cast<size_t>(axis)] =
+        std::clamp(static_cast<uint32_t>(std::ceil(extent[axis] / voxel - 1e-6)), 1u, voxels);
+  return lattice;
+}
+
+/// How many threads may sample at a time, so that half of the memory is left for the grids.
+unsigned threadsFor(const SampleLattice& lattice, const VdbOptions& options) {
+  const uint64_t slab = kSampleBytes * kSlab * lattice.planePoints();
+  const uint64_t most = options.memory_bytes / 2 / slab;
+  if (most == 0)
+    throw UsageError(
+        "{} x {} x {} voxels: {} MiB are too few to sample them; give --memory {}M or fewer --voxels",
+        lattice.size[0], lattice.size[1], lattice.size[2], options.memory_bytes >> 20, (2 * slab >> 20) + 1);
+  const unsigned wanted =
+      options.threads > 0 ? options.threads : static_cast<unsigned>(tbb::info::default_concurrency());
+  return static_cast<unsigned>(std::min<uint64_t>(wanted, most));
+}
+
+class Grids {
+ public:
+  Grids(const SampleLattice& lattice, uint64_t memory_bytes)
+      : size_(lattice.size), memory_bytes_(memory_bytes) {
+    value = openvdb::FloatGrid::create(0.0f);
+    density = openvdb::FloatGrid::create(0.0f);
+    value->setName("value");
+    density->setName("density");
+    density->setGridClass(openvdb::GRID_FOG_VOLUME);
+    const openvdb::math::Transform::Ptr transform =
+        openvdb::math::Transform::createLinearTransform(lattice.spacing.x);
+    transform->postTranslate({lattice.origin.x, lattice.origin.y, lattice.origin.z});
+    value->setTransform(transform);
+    density->setTransform(transform->copy());
+  }
+
+  void add(uint32_t k_begin, uint32_t k_end, const FieldSamples& samples) {
+    auto values = value->getAccessor(), densities = density->getAccessor();
+    size_t n = 0;
+    for (uint32_t k = k_begin; k < k_end; ++k)
+      for (uint32_t j = 0; j < size_[1]; ++j)
+        for (uint32_t i = 0; i < size_[0]; ++i, ++n) {
+          if (!(samples.density[n] > kLeastDensity)) continue;
+          const openvdb::Coord at(static_cast<int>(i), static_cast<int>(j), static_cast<int>(k));
+          values.setValue(at, samples.value[n]);
+          densities.setValue(at, samples.density[n]);
+        }
+    if (value->memUsage() + density->memUsage() > memory_bytes_ / 2)
+      throw UsageError("the voxels take more than half of {} MiB; give a larger --memory or fewer --voxels",
+                       memory_bytes_ >> 20);
+  }
+
+  openvdb::FloatGrid::Ptr value, density;
+
+ private:
+  const std::array<uint32_t, 3> size_;
+  const uint64_t memory_bytes_;
+};
+
+void writeGrids(const Grids& grids, const std::filesystem::path& path) {
+  TemporaryFile temporary(writableTarget(path));
+  try {
+    openvdb::io::File file(temporary.path().string());
+    file.setCompression(openvdb::io::COMPRESS_ZIP | openvdb::io::COMPRESS_ACTIVE_MASK);
+    file.write(openvdb::GridPtrVec{grids.density, grids.value});
+    file.close();
+  } catch (const std::exception& error) {  // OpenVDB's, and those of streams
+    throw Error("{}: cannot be written: {}", path.string(), temporary.aboutTarget(error.what()));
+  }
+  temporary.putIntoPlace();
+}
+
+}  // namespace
+
+VdbReport writeVdb(const CacheReader& cache, size_t variable, const VdbOptions& options,
+                   const std::filesystem::path& path, Progress& progress) {
+  openvdb::initialize();
+  const SampleLattice lattice = latticeOf(cache.manifest(), options.voxels);
+  const unsigned threads = threadsFor(lattice, options);
+  const FieldSampler sampler(cache, variable, bricksOfDetail(cache, 0.5 * lattice.spacing.x), lattice);
+  Grids grids(lattice, options.memory_bytes);
+  sampler.sweep(kSlab, threads, progress, [&](uint32_t k_begin, uint32_t k_end, const FieldSamples& samples) {
+    grids.add(k_begin, k_end, samples);
+  });
+  const VariableInfo& info = cache.manifest().variables.at(variable);
+  grids.value->insertMeta("scalar", openvdb::StringMetadata(info.name));
+  grids.value->insertMeta("unit", openvdb::StringMetadata(info.unit));
+  grids.value->insertMeta("time", openvdb::DoubleMetadata(cache.time()));
+  writeGrids(grids, path);
+  return {grids.density->activeVoxelCount(), lattice.origin - 0.5 * lattice.spacing, lattice.spacing.x};
+}
+
+}  // namespace curvisplat

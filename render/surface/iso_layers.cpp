@@ -1,0 +1,245 @@
+#include "render/surface/iso_layers.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "render/project/tile_set.h"
+#include "render/surface/pixel_rays.h"
+#include "render/surface/surface_light.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr int kPixels = kTileSide * kTileSide;
+constexpr int kBlock = 4, kBlocks = kTileSide / kBlock;
+// Rays of a pixel at an outline, from its middle.
+constexpr std::array<std::array<float, 2>, 4> kOffsets{
+    {{-0.125f, -0.375f}, {0.375f, -0.125f}, {-0.375f, 0.125f}, {0.125f, 0.375f}}};
+constexpr double kFold = 4;          // pixels, between the depths of neighbours
+constexpr float kGrazing = 0.25f;    // the cosine between ray and normal
+constexpr double kSameLayer = 8;     // pixels, between the rays of one pixel
+constexpr double kOwnLayers = 1e-3;  // of what still comes through
+
+/// What a pixel's middle ray has found, to be compared with its neighbours.
+struct Seen {
+  size_t count = 0;
+  double depth = 0;
+  bool grazing = false;
+};
+
+}  // namespace
+
+/// The work of one thread.
+class IsoLayers::Tracer {
+ public:
+  Tracer(const IsoSplats& splats, const Look& look)
+      : splats_(splats),
+        view_(splats.settings().view),
+        perspective_(view_.projection == Projection::kPerspective),
+        look_(look),
+        light_(look.light, view_),
+        rays_(splats.settings()) {}
+
+  void draw(size_t number, int x0, int y0, Tile& tile) {
+    x0_ = x0;
+    y0_ = y0;
+    width_ = std::min(kTileSide, view_.size.width - x0);
+    height_ = std::min(kTileSide, view_.size.height - y0);
+    sortRows(number);
+    for (auto& pixel : pixels_) pixel.clear();
+    seen_.fill({});
+    for (int row = 0; row < kBlocks; ++row)
+      for (int column = 0; column < kBlocks; ++column) traceBlock(column, row);
+    for (int row = 0; row < kBlocks; ++row) smoothRow(row);
+    tile.begins.assign(1, 0);
+    for (const auto& pixel : pixels_) {
+      tile.layers.insert(tile.layers.end(), pixel.begin(), pixel.end());
+      tile.begins.push_back(static_cast<uint32_t>(tile.layers.size()));
+    }
+  }
+
+ private:
+  /// Splats by the rows of blocks that they touch.
+  void sortRows(size_t number) {
+    for (auto& row : rows_) row.clear();
+    for (const IsoSplats::Placed& placed : splats_.inTile(number)) {
+      const auto rowAt = [&](float y) {
+        return static_cast<size_t>(std::clamp((y - static_cast<float>(y0_)) / kBlock, 0.0f, kBlocks - 0.5f));
+      };
+      for (size_t row = rowAt(placed.splat->y0); row <= rowAt(placed.splat->y1); ++row)
+        rows_[row].push_back(placed);
+    }
+  }
+
+  void traceBlock(int column, int row) {
+    IsoPacket packet = emptyPacket();
+    std::array<int, IsoPacket::kRays> pixels{};
+    for (int y = row * kBlock; y < std::min((row + 1) * kBlock, height_); ++y)
+      for (int x = column * kBlock; x < std::min((column + 1) * kBlock, width_); ++x) {
+        pixels[packet.count] = y * kTileSide + x;
+        addRay(packet, pixels[packet.count], {0, 0});
+      }
+    if (packet.count == 0) return;
+    rays_.trace(packet, rows_[static_cast<size_t>(row)]);
+    for (size_t ray = 0; ray < packet.count; ++ray) {
+      const auto hits = rays_.hits(ray).all();
+      if (hits.empty()) continue;
+      const auto pixel = static_cast<size_t>(pixels[ray]);
+      const glm::vec3 n = hits[0].gradient;
+      const glm::vec3 along = perspective_ ? rayOf(packet.x[ray], packet.y[ray]) : glm::vec3(0, 0, 1);
+      seen_[pixel] = {hits.size(), hits[0].depth,
+                      std::abs(glm::dot(n, along)) < kGrazing * glm::length(n) * glm::length(along)};
+      merge(std::span(&ray, 1), packet, pixels_[pixel]);
+    }
+  }
+
+  /// Again, with four rays, where something ends.
+  void smoothRow(int row) {
+    IsoPacket packet = emptyPacket();
+    std::array<int, IsoPacket::kRays> pixels{};
+    const auto trace = [&] {
+      if (packet.count == 0) return;
+      rays_.trace(packet, rows_[static_cast<size_t>(row)]);
+      for (size_t begin = 0; begin < packet.count; begin += kOffsets.size()) {
+        std::array<size_t, kOffsets.size()> rays{};
+        for (size_t n = 0; n < rays.size(); ++n) rays[n] = begin + n;
+        auto& layers = pixels_[static_cast<size_t>(pixels[begin])];
+        layers.clear();
+        merge(rays, packet, layers);
+      }
+      packet.count = 0;
+    };
+    for (int y = row * kBlock; y < std::min((row + 1) * kBlock, height_); ++y)
+      for (int x = 0; x < width_; ++x) {
+        if (!isOutline(x, y)) continue;
+        for (const auto& offset : kOffsets) {
+          pixels[packet.count] = y * kTileSide + x;
+          addRay(packet, pixels[packet.count], offset);
+        }
+        if (packet.count == IsoPacket::kRays) trace();
+      }
+    trace();
+  }
+
+  bool isOutline(int x, int y) const {
+    const Seen& own = seenAt(x, y);
+    if (own.count > 0 && own.grazing) return true;
+    for (const auto& [dx, dy] : {std::pair(1, 0), {-1, 0}, {0, 1}, {0, -1}}) {
+      if (x + dx < 0 || y + dy < 0 || x + dx >= width_ || y + dy >= height_) continue;
+      const Seen& other = seenAt(x + dx, y + dy);
+      if (own.count != other.count) return true;
+      if (own.count > 0 && std::abs(own.depth - other.depth) > kFold * side(own.depth)) return true;
+    }
+    return false;
+  }
+
+  /// Layers of the crossings of a pixel's rays: those of different rays that lie close together make one.
+  void merge(std::span<const size_t> rays, const IsoPacket& packet, std::vector<PixelLayer>& layers) const {
+    std::array<size_t, kOffsets.size()> next{};
+    std::array<float, kOffsets.size()> through;
+    through.fill(1);
+    while (true) {
+      double nearest = INFINITY;
+      float left = 0;
+      for (size_t n = 0; n < rays.size(); ++n) {
+        const auto hits = rays_.hits(rays[n]).all();
+        left += through[n];
+        if (next[n] < hits.size()) nearest = std::min(nearest, hits[next[n]].depth);
+      }
+      if (!std::isfinite(nearest) || left < kOwnLayers) return;
+      PixelLayer layer{0, glm::vec4(0.0f), 0};
+      double depth = 0;
+      float count = 0;
+      for (size_t n = 0; n < rays.size(); ++n) {
+        const auto hits = rays_.hits(rays[n]).all();
+        if (next[n] == hits.size() || hits[next[n]].depth > nearest + kSameLayer * side(nearest)) continue;
+        const IsoHit& hit = hits[next[n]++];
+        const auto alpha = static_cast<float>(look_.opacity);
+        layer.colour +=
+            through[n] * alpha * glm::vec4(colourOf(hit, packet.x[rays[n]], packet.y[rays[n]]), 1.0f);
+        through[n] *= 1 - alpha;
+        layer.scalar += hit.scalar;
+        depth += depthOf(hit.depth, packet.x[rays[n]], packet.y[rays[n]]);
+        ++count;
+      }
+      layer.colour /= left;
+      layer.colour.w = std::min(layer.colour.w, 1.0f);
+      layer.scalar /= count;
+      layer.depth = static_cast<float>(depth / double{count});
+      layers.push_back(layer);
+    }
+  }
+
+  glm::vec3 colourOf(const IsoHit& hit, float x, float y) const {
+    const glm::dvec3 n(hit.gradient);
+    // A gradient: in data coordinates it is larger where they are stretched.
+    const glm::dvec3 of_data = view_.scale * (n.x * view_.right + n.y * view_.down + n.z * view_.forward);
+    return light_.lit(look_.colours.at(double{hit.colour_scalar}), glm::vec3(of_data),
+                      towardsViewer(view_, x, y));
+  }
+
+  IsoPacket emptyPacket() const {
+    IsoPacket packet;
+    packet.opacity = static_cast<float>(look_.opacity);
+    return packet;
+  }
+  void addRay(IsoPacket& packet, int pixel, const std::array<float, 2>& offset) const {
+    packet.x[packet.count] = static_cast<float>(x0_ + pixel % kTileSide) + 0.5f + offset[0];
+    packet.y[packet.count] = static_cast<float>(y0_ + pixel / kTileSide) + 0.5f + offset[1];
+    ++packet.count;
+  }
+  const Seen& seenAt(int x, int y) const { return seen_[static_cast<size_t>(y * kTileSide + x)]; }
+  double side(double depth) const { return (perspective_ ? depth : 1) / view_.focal_px; }
+  /// In view axes, at the depth 1.
+  glm::vec3 rayOf(float x, float y) const {
+    return {(double{x} - 0.5 * view_.size.width) / view_.focal_px,
+            (double{y} - 0.5 * view_.size.height) / view_.focal_px, 1};
+  }
+  /// PixelLayers'.
+  double depthOf(double along_view, float x, float y) const {
+    return perspective_ ? along_view * double{glm::length(rayOf(x, y))} : along_view;
+  }
+
+  const IsoSplats& splats_;
+  const ScreenView& view_;
+  const bool perspective_;
+  const Look& look_;
+  const SurfaceLight light_;
+  IsoRays rays_;
+  int x0_ = 0, y0_ = 0, width_ = 0, height_ = 0;
+  std::array<std::vector<IsoSplats::Placed>, kBlocks> rows_;
+  std::array<std::vector<PixelLayer>, kPixels> pixels_;
+  std::array<Seen, kPixels> seen_;
+};
+
+IsoLayers::IsoLayers(ImageSize size)
+    : size_(size),
+      columns_((static_cast<size_t>(size.width) + kTileSide - 1) / kTileSide),
+      tiles_(TileSet::tilesOf(size)) {}
+
+void IsoLayers::draw(const IsoSplats& splats, const Look& look) {
+  tbb::enumerable_thread_specific<std::unique_ptr<Tracer>> tracers;
+  const TileRange& range = splats.settings().tiles;
+  tbb::parallel_for(range.begin, range.end, [&](size_t number) {
+    if (splats.inTile(number).empty()) return;
+    std::unique_ptr<Tracer>& tracer = tracers.local();
+    if (!tracer) tracer = std::make_unique<Tracer>(splats, look);
+    tracer->draw(number, static_cast<int>(number % columns_) * kTileSide,
+                 static_cast<int>(number / columns_) * kTileSide, tiles_[number]);
+  });
+}
+
+std::span<const PixelLayer> IsoLayers::at(int x, int y) const {
+  const Tile& tile =
+      tiles_[static_cast<size_t>(y / kTileSide) * columns_ + static_cast<size_t>(x / kTileSide)];
+  if (tile.begins.empty()) return {};
+  const auto pixel = static_cast<size_t>(y % kTileSide * kTileSide + x % kTileSide);
+  return std::span(tile.layers).subspan(tile.begins[pixel], tile.begins[pixel + 1] - tile.begins[pixel]);
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,46 @@
+// Isosurfaces as layers of the pixels. A ray through the middle of each pixel; four through those at outlines and
+// folds, where a neighbour sees something else.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "render/project/light.h"
+#include "render/project/pixel_layers.h"
+#include "render/surface/colour_table.h"
+#include "render/surface/iso_rays.h"
+
+namespace curvisplat {
+
+class IsoLayers {
+ public:
+  struct Look {
+    const ColourTable& colours;
+    std::optional<Light> light;  // none: a light at the viewer
+    double opacity = 1;          // of a crossing
+  };
+  explicit IsoLayers(ImageSize size);
+
+  size_t tiles() const { return tiles_.size(); }
+  /// Traces the tiles of the splats, which have to be complete and sorted. Parallel on the caller's TBB arena; takes
+  /// some 2 MB a thread. The same bits for any threads and ranges of tiles.
+  void draw(const IsoSplats& splats, const Look& look);
+
+  /// Of a pixel: from the nearest on.
+  std::span<const PixelLayer> at(int x, int y) const;
+
+ private:
+  struct Tile {
+    std::vector<uint32_t> begins;  // [pixels of a whole tile + 1], or empty: nothing
+    std::vector<PixelLayer> layers;
+  };
+  class Tracer;
+
+  ImageSize size_;
+  size_t columns_;
+  std::vector<Tile> tiles_;
+};
+
+}  // namespace curvisplat

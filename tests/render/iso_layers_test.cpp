@@ -1,0 +1,157 @@
+// Isosurfaces of splats on a lattice: where a linear field and a sphere have them, and the same bits for any threads
+// and ranges of tiles.
+#include <gtest/gtest.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <vector>
+
+#include "render/project/tile_set.h"
+#include "render/surface/iso_layers.h"
+#include "stream/model/border_code.h"
+#include "tests/reference/known_pictures.h"
+#include "tests/reference/splat_arrays.h"
+
+namespace curvisplat {
+namespace {
+
+constexpr ImageSize kSize{96, 80};
+constexpr int kCells = 24;  // along an edge of the cube [-1, 1]³
+
+class IsoLayersTest : public testing::Test {
+ protected:
+  using Field = std::function<double(const glm::dvec3&)>;
+
+  IsoLayersTest() {
+    camera_.position = {3, 2, 1.5};
+    camera_.parallel_scale = 1.6;
+    geometry_.resize(kCells * kCells * kCells);
+    variable_.resize(geometry_.size());
+  }
+
+  void setField(const Field& f) {
+    const double h = 2.0 / kCells;
+    for (size_t n = 0; n < geometry_.size(); ++n) {
+      const glm::dvec3 at =
+          h * (glm::dvec3(n % kCells, n / kCells % kCells, n / kCells / kCells) + 0.5) - 1.0;
+      SplatScalar value;
+      value.mean = f(at);
+      for (int axis = 0; axis < 3; ++axis) {
+        glm::dvec3 step(0.0);
+        step[axis] = 0.5 * h;
+        value.slope[axis] = f(at + step) - f(at - step);
+      }
+      setSplat({geometry_, variable_}, n, at, {at, {h, h, h}, {0, 0, 0}, h * h * h}, value);
+    }
+  }
+
+  IsoLayers drawn(std::vector<double> values, const std::vector<TileRange>& ranges, int threads = 1) {
+    view_ = ScreenView::of(camera_, kSize, glm::dvec3(1), kLowPass, 1e-3);
+    const ColourTable colours(KnownFunction::of("smooth").table);
+    IsoLayers layers(kSize);
+    for (const TileRange& tiles : ranges) {
+      IsoSplats splats({view_, values, kHalfCellStyle, planes_, 0, tiles, uint64_t{1} << 30}, 1);
+      const SplatRange all{0, static_cast<uint32_t>(geometry_.size())};
+      splats.add(0, glm::dvec3(0.0), arraysOf(geometry_), arraysOf(variable_), nullptr, {&all, 1});
+      splats.sort();
+      tbb::task_arena arena(threads);
+      arena.execute([&] { layers.draw(splats, {colours, std::nullopt, 1}); });
+    }
+    return layers;
+  }
+  static TileRange all() { return {0, TileSet::tilesOf(kSize)}; }
+
+  glm::dvec3 placeAt(int x, int y, double depth) const {
+    const glm::dvec2 across =
+        (glm::dvec2(x + 0.5, y + 0.5) - 0.5 * glm::dvec2(kSize.width, kSize.height)) / view_.focal_px;
+    if (view_.projection == Projection::kPerspective) {
+      const glm::dvec3 ray = view_.forward + across.x * view_.right + across.y * view_.down;
+      return view_.eye + depth * glm::normalize(ray);
+    }
+    return view_.eye + across.x * view_.right + across.y * view_.down + depth * view_.forward;
+  }
+
+  Camera camera_;
+  ScreenView view_;
+  std::vector<ClipPlane> planes_;
+  SplatGeometry geometry_;
+  SplatVariable variable_;
+};
+
+TEST_F(IsoLayersTest, ThatOfALinearFieldIsAPlane) {
+  const glm::dvec3 n(0.3, -0.5, 0.8);
+  setField([&](const glm::dvec3& at) { return glm::dot(n, at); });
+  for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
+    camera_.projection = projection;
+    const IsoLayers layers = drawn({0.1}, {all()});
+    size_t seen = 0;
+    for (int y = 0; y < kSize.height; ++y)
+      for (int x = 0; x < kSize.width; ++x) {
+        const auto found = layers.at(x, y);
+        // Not at outlines, where rays do not all meet it.
+        if (found.size() != 1 || found[0].colour.w < 1) continue;
+        ++seen;
+        EXPECT_NEAR(glm::dot(n, placeAt(x, y, double{found[0].depth})), 0.1, 2e-3) << x << ' ' << y;
+      }
+    EXPECT_GT(seen, 300u);
+  }
+}
+
+TEST_F(IsoLayersTest, ThatOfASphereIsRound) {
+  setField([](const glm::dvec3& at) { return glm::length(at); });
+  const IsoLayers layers = drawn({0.7}, {all()});
+  double worst = 0;
+  size_t seen = 0;
+  for (int y = 0; y < kSize.height; ++y)
+    for (int x = 0; x < kSize.width; ++x)
+      for (const PixelLayer& layer : layers.at(x, y)) {
+        if (layer.colour.w < 1) continue;
+        EXPECT_EQ(layer.scalar, 0.7f);
+        worst = std::max(worst, std::abs(glm::length(placeAt(x, y, double{layer.depth})) - 0.7));
+        ++seen;
+      }
+  EXPECT_GT(seen, 800u);
+  // A cell is 0.083 long. By splats' own crossings it is 0.006.
+  EXPECT_LT(worst, 0.0025);
+}
+
+TEST_F(IsoLayersTest, ClipPlanesOpenIt) {
+  setField([](const glm::dvec3& at) { return glm::length(at); });
+  planes_ = {{glm::dvec3(0.0), glm::dvec3(-1, 0, 0)}};
+  const IsoLayers layers = drawn({0.7}, {all()});
+  const auto middle = layers.at(kSize.width / 2, kSize.height / 2);
+  ASSERT_EQ(middle.size(), 1u);
+  const glm::dvec3 at = placeAt(kSize.width / 2, kSize.height / 2, double{middle[0].depth});
+  EXPECT_NEAR(glm::length(at), 0.7, 0.003);
+  EXPECT_LT(at.x, 0);  // its back, seen from within
+}
+
+TEST_F(IsoLayersTest, BitsDependNeitherOnThreadsNorOnRanges) {
+  setField([](const glm::dvec3& at) { return glm::length(at) + 0.1 * std::sin(9 * at.x); });
+  const IsoLayers whole = drawn({0.5, 0.8}, {all()});
+  const size_t tiles = whole.tiles();
+  const IsoLayers parts = drawn({0.5, 0.8}, {{0, 2}, {2, 5}, {5, tiles}}, 2);
+  for (int y = 0; y < kSize.height; ++y)
+    for (int x = 0; x < kSize.width; ++x) {
+      const auto a = whole.at(x, y), b = parts.at(x, y);
+      ASSERT_EQ(a.size(), b.size()) << x << ' ' << y;
+      for (size_t n = 0; n < a.size(); ++n)
+        EXPECT_TRUE(a[n].depth == b[n].depth && a[n].colour == b[n].colour) << x << ' ' << y;
+    }
+}
+
+TEST_F(IsoLayersTest, TooManySplatsForTheMemoryAreReported) {
+  setField([](const glm::dvec3& at) { return glm::length(at); });
+  view_ = ScreenView::of(camera_, kSize, glm::dvec3(1), kLowPass, 1e-3);
+  const std::vector<double> values{0.7};
+  IsoSplats splats({view_, values, kHalfCellStyle, {}, 0, all(), 10000}, 1);
+  const SplatRange every{0, static_cast<uint32_t>(geometry_.size())};
+  splats.add(0, glm::dvec3(0.0), arraysOf(geometry_), arraysOf(variable_), nullptr, {&every, 1});
+  EXPECT_TRUE(splats.overflowed());
+}
+
+}  // namespace
+}  // namespace curvisplat

@@ -1,0 +1,81 @@
+#include "tools/options/further_scalars.h"
+
+#include <algorithm>
+#include <memory>
+#include <set>
+#include <system_error>
+
+#include "preprocess/addition/add_scalar.h"
+#include "stream/base/error.h"
+#include "stream/cache/cache_reader.h"
+#include "tools/options/convert_arguments.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+ConvertArguments argumentsFor(const std::vector<fs::path>& files, const fs::path& cache) {
+  ConvertArguments arguments;
+  arguments.grid.grid = files.front();
+  arguments.grid.solutions.assign(files.begin() + 1, files.end());
+  arguments.to = cache;
+  return arguments;
+}
+
+}  // namespace
+
+std::vector<fs::path> sourcesOf(const Manifest& manifest, const fs::path& cache) {
+  std::vector<fs::path> files;
+  std::error_code ignored;
+  for (const std::string& source : manifest.sources) {
+    const fs::path given = source, beside = fs::absolute(cache).parent_path() / given.filename();
+    const fs::path found = fs::exists(given, ignored) ? given : beside;
+    if (!fs::exists(found, ignored)) return {};
+    files.push_back(fs::absolute(found));
+  }
+  return files;
+}
+
+std::vector<FurtherScalar> furtherScalarsOf(const fs::path& cache, const std::vector<fs::path>& files) {
+  const CacheReader reader(cache);
+  if (reader.series().steps.size() > 1)
+    throw Error("{}: is a series of time steps, to which no scalar can be added", cache.string());
+  const auto source = openSource(argumentsFor(files, cache), cache);
+  std::set<std::string> names;
+  for (const VariableInfo& variable : reader.manifest().variables) names.insert(variable.name);
+  const Centring centring = reader.manifest().cells ? Centring::kCell : Centring::kNode;
+  std::vector<FurtherScalar> further;
+  for (const GridScalar& scalar : source->description().scalars)
+    if (scalar.centring == centring && names.insert(scalar.name).second)
+      further.push_back({scalar.name, scalar.unit, scalar.derived});
+  return further;
+}
+
+void addFurtherScalar(const fs::path& cache, const std::vector<fs::path>& files, const std::string& name,
+                      Progress& progress) {
+  ConvertArguments arguments = argumentsFor(files, cache);
+  arguments.added_scalars = {name};
+  const auto source = openSource(arguments, cache);
+  AddScalarOptions options;
+  options.cache = cache;
+  options.scalars = chooseScalars(arguments, arguments.added_scalars, source->description());
+  try {
+    addScalars(*source, options, progress);
+  } catch (const UsageError& error) {
+    throw Error("{}", error.what());
+  }
+}
+
+void addMissingScalars(const fs::path& cache, const std::vector<fs::path>& files,
+                       const std::vector<std::string>& names, Progress& progress) {
+  std::set<std::string> missing(names.begin(), names.end());
+  missing.erase("");
+  const CacheReader reader(cache);
+  for (const VariableInfo& variable : reader.manifest().variables) missing.erase(variable.name);
+  if (missing.empty() || reader.series().steps.size() > 1) return;
+  for (const FurtherScalar& one : furtherScalarsOf(cache, files))
+    if (missing.contains(one.name)) addFurtherScalar(cache, files, one.name, progress);
+}
+
+}  // namespace curvisplat

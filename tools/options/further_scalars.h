@@ -1,0 +1,36 @@
+// Scalars that a cache lacks and the files that it was made from have: which ones, and how one gets into the cache.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "stream/base/progress.h"
+#include "stream/cache/manifest.h"
+
+namespace curvisplat {
+
+struct FurtherScalar {
+  std::string name, unit;
+  bool derived = false;  // computed from others
+};
+
+/// The files that a cache names as its sources, as far as they are still there: as given, or beside the cache. Empty if
+/// one is missing.
+std::vector<std::filesystem::path> sourcesOf(const Manifest& manifest, const std::filesystem::path& cache);
+
+/// What `files` have and `cache` lacks, of the same centring, in the order of the files. Opens the files. Throws Error if
+/// they cannot be opened, or if the cache takes no further scalars: an unstructured grid's, or a series.
+std::vector<FurtherScalar> furtherScalarsOf(const std::filesystem::path& cache,
+                                            const std::vector<std::filesystem::path>& files);
+
+/// Adds the scalar to the cache. Throws Error as furtherScalarsOf() and addScalars() do, Interrupted once `progress` is
+/// stopped; then the cache is as it was.
+void addFurtherScalar(const std::filesystem::path& cache, const std::vector<std::filesystem::path>& files,
+                      const std::string& name, Progress& progress);
+
+/// Adds those of `names` that the cache lacks and the files have; passes over empty names and others.
+void addMissingScalars(const std::filesystem::path& cache, const std::vector<std::filesystem::path>& files,
+                       const std::vector<std::string>& names, Progress& progress);
+
+}  // namespace curvisplat

@@ -1,0 +1,95 @@
+#include "tools/options/kept_conversion.h"
+
+#include <memory>
+#include <system_error>
+
+#include "preprocess/addition/convert_series.h"
+#include "preprocess/convert/convert.h"
+#include "preprocess/formats/open/series_files.h"
+#include "preprocess/grid/thinned_source.h"
+#include "stream/base/error.h"
+#include "tools/options/convert_arguments.h"
+#include "tools/options/series_input.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+ConvertOptions optionsFor(const fs::path& output, const std::string& title) {
+  ConvertOptions options;
+  options.output = output;
+  options.overwrite = true;
+  options.title = title;
+  options.temporary_folder = output.parent_path();
+  return options;
+}
+
+void sayAll(const KeptCacheEvents& events, const GridDescription& source, const ConvertReport& report) {
+  for (const std::string& warning : source.warnings) events.say("warning: " + warning);
+  for (const std::string& warning : report.warnings) events.say("warning: " + warning);
+  for (const std::string& note : report.notes) events.say("note: " + note);
+}
+
+/// A cache of every n-th index plane, if the grid is large. A grid that cannot be thinned, or a preview that fails, has
+/// none: the conversion of the whole says what is wrong.
+void makePreview(const DataSource& source, const ConvertOptions& whole, Progress& progress,
+                 const KeptCacheEvents& events) {
+  const auto* const grid = dynamic_cast<const GridSource*>(&source);
+  if (!events.preview || !grid) return;
+  uint64_t nodes = 0;
+  for (const GridBlock& block : grid->description().blocks) nodes += block.nodes();
+  if (nodes <= kNodesWithoutPreview) return;
+  const uint64_t stride = strideFor(grid->description(), kNodesWithoutPreview / 4);
+  const fs::path folder = whole.output.parent_path() / "preview";
+  ConvertOptions options = whole;
+  options.output = folder / whole.output.filename();
+  options.temporary_folder = folder;
+  options.surfaces = false;
+  try {
+    fs::create_directories(folder);
+    convert(*thinned(*grid, stride), options, progress);
+    events.preview({options.output, whole.output, stride});
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error&) {
+  } catch (const fs::filesystem_error&) {
+  }
+}
+
+/// A series is made beside its place, since a cache of its first steps looks complete.
+void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& progress,
+                const KeptCacheEvents& events) {
+  const fs::path folder = output.parent_path() / "series";
+  fs::create_directories(folder);
+  arguments.output = folder / output.filename();
+  const std::vector<StepFiles> steps = stepsOf(arguments.grid);
+  SeriesOptions options;
+  options.convert = optionsFor(arguments.output, arguments.grid.grid.stem().string());
+  convertSeries(seriesInput(arguments, steps), options, progress, [&](const SeriesEvent& event) {
+    if (!event.converted) return;
+    if (event.source) sayAll(events, *event.source, *event.converted);
+    if (events.preview) events.preview({arguments.output, output, 1});
+  });
+  fs::rename(arguments.output, output);
+}
+
+}  // namespace
+
+void makeKeptCache(const std::vector<fs::path>& files, const fs::path& output, Progress& progress,
+                   const KeptCacheEvents& events) {
+  std::error_code ignored;  // what an interrupted conversion left
+  for (const char* const left : {"preview", "series"}) fs::remove_all(output.parent_path() / left, ignored);
+  ConvertArguments arguments;
+  arguments.grid.grid = files.front();
+  arguments.grid.solutions.assign(files.begin() + 1, files.end());
+  arguments.output = output;
+  if (hasSeveralStepFiles(arguments.grid)) return makeSeries(arguments, output, progress, events);
+  const auto source = openSource(arguments, output);
+  ConvertOptions options = optionsFor(output, files.front().stem().string());
+  options.scalars = chooseScalars(arguments, {}, source->description());
+  makePreview(*source, options, progress, events);
+  sayAll(events, source->description(), convert(*source, options, progress));
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,20 @@
+#include "tools/options/series_input.h"
+
+namespace curvisplat {
+
+SeriesInput seriesInput(const ConvertArguments& arguments, const std::vector<StepFiles>& steps) {
+  SeriesInput input;
+  input.count = steps.size();
+  input.name = [&](uint64_t step) { return steps[step].name; };
+  input.open = [&](uint64_t step) {
+    ConvertArguments of_step = arguments;
+    of_step.grid = steps[step].options;
+    return openSource(of_step, arguments.adds_steps ? arguments.to : arguments.output);
+  };
+  input.scalars = [&](const GridDescription& description) {
+    return chooseScalars(arguments, arguments.scalars, description);
+  };
+  return input;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,15 @@
+// The time steps of a series, as convertSeries() takes them, from the arguments of a conversion.
+#pragma once
+
+#include <vector>
+
+#include "preprocess/addition/convert_series.h"
+#include "preprocess/formats/open/series_files.h"
+#include "tools/options/convert_arguments.h"
+
+namespace curvisplat {
+
+/// Opens each step as `arguments` say, and chooses the scalars of the first. Both must outlive the input.
+SeriesInput seriesInput(const ConvertArguments& arguments, const std::vector<StepFiles>& steps);
+
+}  // namespace curvisplat

@@ -1,0 +1,33 @@
+// A cache's data as numpy arrays: means on a regular lattice, and the splats of a level.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "stream/cache/cache_reader.h"
+
+namespace curvisplat::python {
+
+/// What to take the data from. The level is the octree's, or, if there is none, chosen for the lattice; of points it is the finest.
+struct DataChoice {
+  std::string scalar;
+  std::array<double, 3> lower{}, upper{};
+  std::optional<uint32_t> level;
+  uint64_t step = 0;
+};
+
+/// (value, density), float32 of shape (nz, ny, nx): means over the boxes that the choice's box is divided into. Throws UsageError for
+/// an empty box or size, and as FieldSampler does.
+pybind11::tuple sampledArrays(const CacheReader& cache, const DataChoice& choice,
+                              const std::array<uint32_t, 3>& size, const pybind11::object& progress);
+
+/// (positions (n, 3), float64; values (n), volumes (n), shapes (n, 3, 3), float32) of the splats with their centres in the box.
+pybind11::tuple pointArrays(const CacheReader& cache, const DataChoice& choice,
+                            const pybind11::object& progress);
+
+}  // namespace curvisplat::python
