@@ -76,7 +76,7 @@ BrickPager::~BrickPager() {
   stop();
   {
     const MutexLock lock(mutex_);
-    ending_ = true;
+    state_ = State::kEnding;
   }
   reads_->wake();
   thread_.join();
@@ -91,10 +91,7 @@ uint64_t BrickPager::leastBufferBytes(const CacheReader& cache, const ReadVariab
 
 void BrickPager::start(std::vector<uint32_t> bricks, Unneeded unneeded) {
   MutexLock lock(mutex_);
-  stopped_ = true;
-  while (!failure_ && reads_under_way_ > 0) idle_.wait(lock);
-  if (failure_) std::rethrow_exception(failure_);
-  CURVISPLAT_CHECK_OP(lent_, ==, 0u);
+  awaitIdle(lock);
   first_batch_ += batches_.size();
   next_batch_ = first_batch_;
   batches_.clear();
@@ -106,16 +103,13 @@ void BrickPager::start(std::vector<uint32_t> bricks, Unneeded unneeded) {
   extents_.clear();
   extents_.reserve(bricks_.size());
   for (const uint32_t brick : bricks_) extents_.push_back(extentsOf(cache_, variables_, brick));
-  stopped_ = false;
+  state_ = State::kReading;
   reads_->wake();
 }
 
 void BrickPager::stepChanged() {
   MutexLock lock(mutex_);
-  stopped_ = true;
-  while (!failure_ && reads_under_way_ > 0) idle_.wait(lock);
-  if (failure_) std::rethrow_exception(failure_);
-  CURVISPLAT_CHECK_OP(lent_, ==, 0u);
+  awaitIdle(lock);
   files_[1] = std::make_unique<DirectFile>(cache_.valuesPath(variables_.first), direct_);
   if (variables_.second)
     files_[2] = std::make_unique<DirectFile>(cache_.valuesPath(*variables_.second), direct_);
@@ -123,16 +117,28 @@ void BrickPager::stepChanged() {
 
 void BrickPager::stop() {
   const MutexLock lock(mutex_);
-  stopped_ = true;
+  haltReading();
   arrived_.notify_all();
+}
+
+void BrickPager::haltReading() {
+  if (state_ == State::kReading) state_ = State::kStopped;
+}
+
+/// Stops, and waits until no read is under way. Throws the failure that broke reading.
+void BrickPager::awaitIdle(MutexLock& lock) {
+  haltReading();
+  while (state_ != State::kBroken && reads_under_way_ > 0) idle_.wait(lock);
+  if (state_ == State::kBroken) std::rethrow_exception(failure_);
+  CURVISPLAT_CHECK_OP(lent_, ==, 0u);
 }
 
 std::optional<PagedBrick> BrickPager::take(uint64_t sequence) {
   MutexLock lock(mutex_);
-  CURVISPLAT_CHECK(stopped_ || sequence < extents_.size());
-  while (!failure_ && !stopped_ && !hasArrived(sequence)) arrived_.wait(lock);
-  if (failure_) std::rethrow_exception(failure_);
-  if (stopped_) return {};
+  CURVISPLAT_CHECK(state_ != State::kReading || sequence < extents_.size());
+  while (state_ == State::kReading && !hasArrived(sequence)) arrived_.wait(lock);
+  if (state_ == State::kBroken) std::rethrow_exception(failure_);
+  if (state_ != State::kReading) return {};
   if (left_out_[sequence]) return PagedBrick::leftOut();
   const Batch& batch = batchOf(sequence);
   const size_t n = sequence - batch.first;
@@ -165,8 +171,8 @@ void BrickPager::loop() {
   nameThisThread("pager");
   try {
     MutexLock lock(mutex_);
-    while (!ending_) {
-      if (!stopped_) {
+    while (state_ != State::kEnding) {
+      if (state_ == State::kReading) {
         planAhead();
         submitReads();
       }
@@ -178,6 +184,7 @@ void BrickPager::loop() {
   } catch (...) {
     const MutexLock lock(mutex_);
     failure_ = std::current_exception();
+    state_ = State::kBroken;
     arrived_.notify_all();
     idle_.notify_all();
   }
@@ -274,7 +281,7 @@ void BrickPager::complete(const AsyncReadEnd& end) {
   free_tags_.push_back(end.tag);
   countReads(-1);
   if (reads_under_way_ == 0) idle_.notify_all();
-  if (stopped_) return;
+  if (state_ != State::kReading) return;
   Batch& batch = batches_[read.batch - first_batch_];
   uint32_t& done = batch.done[read.read];
   const bool is_put_off = end.result == -EINTR || end.result == -EAGAIN;

@@ -11,6 +11,14 @@
 // threads; by SystemCalls::pread whenever a test has put a double in place of the system's calls. A read that
 // fails, ends early or is put off for ever marks its bricks unreadable: whether one of them can be read
 // alone, and what is wrong if not, is for CacheReader to say.
+//
+//                start()
+//   kStopped ---------------> kReading      bricks are planned, read and handed out
+//       ^                        |
+//       '--------- stop() -------'          nothing is submitted or handed out; reads under way may still end
+//
+//   each of these --the way of reading fails--> kBroken    take() and start() throw the failure; the thread has ended
+//   every state   --destructor----------------> kEnding    the thread ends
 #pragma once
 
 #include <array>
@@ -141,6 +149,8 @@ class BrickPager {
  private:
   friend class PagedBrick;
 
+  enum class State { kStopped, kReading, kBroken, kEnding };  // the diagram above
+
   struct Batch {
     ReadBatch plan;
     uint64_t first = 0;             // sequence of its first brick
@@ -160,11 +170,13 @@ class BrickPager {
   };
 
   void loop();
+  void haltReading() REQUIRES(mutex_);
+  void awaitIdle(MutexLock& lock) REQUIRES(mutex_);
   void planAhead() REQUIRES(mutex_);
   std::span<const BrickExtents> nextNeeded() REQUIRES(mutex_);
   std::optional<uint64_t> spaceFor(uint64_t bytes) const REQUIRES(mutex_);
   void submitReads() REQUIRES(mutex_);
-  void submit(uint64_t batch, uint32_t read, bool direct) REQUIRES(mutex_);
+  void submit(uint64_t number, uint32_t read_number, bool direct) REQUIRES(mutex_);
   void complete(const AsyncReadEnd& end) REQUIRES(mutex_);
   void finishRead(Batch& batch, uint32_t read, bool good) REQUIRES(mutex_);
   bool hasArrived(uint64_t sequence) REQUIRES(mutex_);
@@ -204,10 +216,9 @@ class BrickPager {
   unsigned reads_under_way_ GUARDED_BY(mutex_) = 0;
   uint64_t lent_ GUARDED_BY(mutex_) = 0;            // bricks handed out and not given back
   bool direct_refused_ GUARDED_BY(mutex_) = false;  // by a read: the file system is not what it said
-  bool stopped_ GUARDED_BY(mutex_) = true;          // nothing is submitted or handed out
   bool wants_space_ GUARDED_BY(mutex_) = false;
-  bool ending_ GUARDED_BY(mutex_) = false;
-  std::exception_ptr failure_ GUARDED_BY(mutex_);
+  State state_ GUARDED_BY(mutex_) = State::kStopped;
+  std::exception_ptr failure_ GUARDED_BY(mutex_);  // in kBroken
   PagerStatistics statistics_ GUARDED_BY(mutex_);
   std::chrono::steady_clock::time_point counted_ GUARDED_BY(mutex_);
 
