@@ -132,7 +132,7 @@ TEST_F(BadInput, UnwritableCache) {
   expectOneLine(result, 1, {"nowhere"});
 }
 
-TEST_F(BadInput, CacheThatIsThere) {
+TEST_F(BadInput, ExistingCacheIsNotOverwritten) {
   const std::string before = readTextFile(file("whole.splats/manifest.json"));
   const ProgramResult result =
       runProgram({"convert", file("scene.xyz"), file("scene.fun"), "-o", file("whole.splats")});
@@ -141,7 +141,7 @@ TEST_F(BadInput, CacheThatIsThere) {
   EXPECT_EQ(readTextFile(file("whole.splats/manifest.json")), before);
 }
 
-TEST_F(BadInput, FileThatIsNoCacheIsNotOverwritten) {
+TEST_F(BadInput, OrdinaryFileIsNotOverwritten) {
   writeFileAtomically(file("letter"), std::string("precious"));
   const ProgramResult result =
       runProgram({"convert", file("scene.xyz"), file("scene.fun"), "-o", file("letter"), "--overwrite"});
@@ -211,7 +211,7 @@ TEST_F(BadInput, WrongUsage) {
                 {"--sise"});
 }
 
-TEST_F(BadInput, OptionValuesThatAreNone) {
+TEST_F(BadInput, InvalidOptionValues) {
   const auto refused = [](const std::vector<std::string>& arguments, const std::string& text) {
     expectOneLine(runProgram(arguments), 2, {text});
   };
@@ -232,7 +232,7 @@ TEST_F(BadInput, OptionValuesThatAreNone) {
                 {"--memory 1 KiB: too little"});
 }
 
-TEST_F(BadInput, MisspeltSubcommandIsToldWhichThereAre) {
+TEST_F(BadInput, MisspeltSubcommandGetsTheListOfThem) {
   expectOneLine(runProgram({"rendr", file("whole.splats")}), 2,
                 {"rendr", "did you mean render?", "convert", "info"});
   expectOneLine(runProgram({"render", file("whole.splats"), "-o", file("a.png"), "--sise", "9x9"}), 2,
@@ -246,17 +246,17 @@ TEST_F(BadInput, UnknownScene) {
   expectOneLine(result, 2, {"pipe", "half-annulus", "wake"});
 }
 
-TEST_F(BadInput, SizeOfASceneThatIsNone) {
+TEST_F(BadInput, InvalidSizeOfAScene) {
   for (const char* size :
        {"", "4", "4x4", "4x4x4x4", "4x4x1", "ax4x4", "-4x4x4", "4x4x4 ", "99999999999999999999x4x4"})
     expectOneLine(runProgram({"generate", "wake", "--size", size, "-o", file("sized")}), 2, {"NIxNJxNK"});
 }
 
-TEST_F(BadInput, ComparedFileThatIsNoPicture) {
+TEST_F(BadInput, ComparingAFileThatIsNotAPicture) {
   expectOneLine(runProgram({"compare", file("text.xyz"), file("text.xyz")}), 1, {"text.xyz", "PNG"});
 }
 
-TEST_F(BadInput, InfoOfNothing) {
+TEST_F(BadInput, InfoWithoutAnArgument) {
   expectOneLine(runProgram({"info", file("missing.splats")}), 1, {"missing.splats"});
   expectOneLine(runProgram({"info", file("text.xyz")}), 1, {"text.xyz"});
 }

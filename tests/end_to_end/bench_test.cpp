@@ -119,7 +119,7 @@ TEST_F(Bench, ConversionThatIsInterruptedLeavesNothingBehind) {
   EXPECT_TRUE(fs::is_empty(tmp));
 }
 
-TEST_F(Bench, SaysWhatIsWrong) {
+TEST_F(Bench, ReportsWrongUsage) {
   writeCache();
   const std::string cache = file("a.splats");
   expectOneLine(runProgram({"bench"}), 2, "--convert");

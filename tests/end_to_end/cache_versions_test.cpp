@@ -72,7 +72,7 @@ TEST(CacheVersions, FacesAreStillRead) {
   }
 }
 
-TEST(CacheVersions, OthersAreRefusedWithWhatToDo) {
+TEST(CacheVersions, UnknownVersionsAreRefusedWithAdvice) {
   const TemporaryFolder folder;
   const fs::path cache = folder / "a.splats";
   fs::copy(fs::path(CURVISPLAT_TEST_DATA) / "caches/version_1/cells.splats", cache);
@@ -103,7 +103,7 @@ TEST(CacheVersions, OthersAreRefusedWithWhatToDo) {
   }
 }
 
-TEST(CacheVersions, OnesThatRequireWhatIsUnknownAreRefused) {
+TEST(CacheVersions, UnknownFeaturesAreRefused) {
   const TemporaryFolder folder;
   const fs::path cache = folder / "a.splats";
   fs::copy(fs::path(CURVISPLAT_TEST_DATA) / "caches/version_2/cells.splats", cache);

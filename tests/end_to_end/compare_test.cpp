@@ -28,14 +28,14 @@ class Compare : public testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(Compare, SaysIdenticalAcrossFormats) {
+TEST_F(Compare, ReportsIdenticalPicturesAcrossFormats) {
   const ProgramResult result =
       runProgram({"compare", file("white.pfm"), file("white.png"), "--min-psnr", "200"});
   EXPECT_EQ(result.status, 0) << result.err;
   EXPECT_EQ(result.out, "identical\n");
 }
 
-TEST_F(Compare, SaysHowFarAndWhere) {
+TEST_F(Compare, ReportsPsnrAndTheWorstPixel) {
   const ProgramResult result =
       runProgram({"compare", file("white.pfm"), file("dot.pfm"), "--min-psnr", "25.8"});
   EXPECT_EQ(result.status, 0) << result.err;

@@ -40,7 +40,7 @@ class ConvertOptionsTest : public testing::Test {
   const TemporaryFolder folder_;
 };
 
-TEST_F(ConvertOptionsTest, SaysWhatItDid) {
+TEST_F(ConvertOptionsTest, PrintsWhatItDid) {
   const ProgramResult result = convert({"--stats", file("stats.json")});
   ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_EQ(lineCount(result.out), 2) << result.out;
@@ -72,7 +72,7 @@ TEST_F(ConvertOptionsTest, GivesTheSameCacheForAnyThreadsAndMemory) {
   EXPECT_TRUE(cacheFiles() == one);
 }
 
-TEST_F(ConvertOptionsTest, PutsTemporaryFilesWhereItIsToldAndTakesThemAway) {
+TEST_F(ConvertOptionsTest, PutsTemporaryFilesIntoTheGivenFolderAndRemovesThem) {
   std::filesystem::create_directory(folder_ / "tmp");
   ASSERT_EQ(convert({"--tmp", file("tmp")}).status, 0);
   EXPECT_TRUE(std::filesystem::is_empty(folder_ / "tmp"));
@@ -116,7 +116,7 @@ void expectForecastHolds(const std::vector<std::string>& conversion, const Tempo
   EXPECT_NEAR(found["cache_bytes"].get<double>() / static_cast<double>(bytes), 1, 0.05) << forecast.out;
 }
 
-TEST_F(ConvertOptionsTest, ADryRunForetellsAndLeavesNothing) {
+TEST_F(ConvertOptionsTest, ADryRunPredictsCostsAndLeavesNothing) {
   expectForecastHolds({"convert", file("wake.xyz"), file("wake.fun"), "-o", file("out.splats")}, folder_);
 }
 
@@ -126,7 +126,7 @@ TEST_F(ConvertOptionsTest, ADryRunOfASeriesCountsItsSteps) {
   expectForecastHolds({"convert", file("s.xyz"), file("s_*.fun"), "-o", file("out.splats")}, folder_);
 }
 
-TEST_F(ConvertOptionsTest, ADryRunIsOfANewCache) {
+TEST_F(ConvertOptionsTest, ADryRunNeedsANewCache) {
   const ProgramResult added = runProgram(
       {"convert", file("wake.xyz"), "--add-scalar", "i", "--to", file("wake.splats"), "--dry-run"});
   EXPECT_EQ(added.status, 2);

@@ -48,7 +48,7 @@ class DefaultPictures : public testing::TestWithParam<const char*> {
   TemporaryFolder folder_;
 };
 
-TEST_P(DefaultPictures, ShowSomethingAndCanBeDrawnAgain) {
+TEST_P(DefaultPictures, ShowSomethingAndAreDrawnAgainByThePrintedOptions) {
   convert(GetParam(), "48x32x24");
   const ProgramResult result = render({});
   EXPECT_EQ(result.err, "");

@@ -140,7 +140,7 @@ TEST_F(Frames, AnOrbitKeepsAllOfTheDataInEveryPicture) {
   }
 }
 
-TEST_F(Frames, NamesWithoutOneNumberAreWrongUsage) {
+TEST_F(Frames, NamesNeedExactlyOneFrameNumber) {
   for (const char* name : {"a.png", "a%d%d.png", "a%s.png", "a%.png", "a%5.png", "a%x.png", "a%-3d.png",
                            "a%ld.png", "a%0100d.png", "a%%d.png", "a%d_%04d.exr"})
     expectRefused({"-o", file(name), "--orbit", "90", "--frames", "2"}, 2, "frame_%04d.png");
@@ -186,7 +186,7 @@ TEST_F(Frames, PartsDrawTheFramesOfTheWhole) {
   EXPECT_NE(idle.out.find("no frames in this part"), std::string::npos) << idle.out;
 }
 
-TEST_F(Frames, PartsThatCannotBeAreWrongUsage) {
+TEST_F(Frames, ImpossiblePartsAreWrongUsage) {
   for (const char* part : {"0/3", "4/3", "1", "/3", "1/", "a/3", "1/3x", "-1/3", "1/1000000"})
     expectRefused({"-o", file("p_%d.png"), "--orbit", "9", "--frames", "2", "--part", part}, 2,
                   "--part " + std::string(part));
@@ -280,7 +280,7 @@ TEST_F(Frames, MaxSplatsHolds) {
   EXPECT_NE(bytes("few.exr"), bytes("free.exr"));
 }
 
-TEST_F(Frames, AFirstImageIsThereBeforeAndLikeTheFinalOne) {
+TEST_F(Frames, AFirstImageIsWrittenEarlierAndLooksLikeTheFinalOne) {
   const std::vector<std::string> direct{"render", large(),   "-o",         file("direct.exr"),
                                         "--size", "256x256", "--channels", "none"};
   std::vector<std::string> progressive = direct;
@@ -325,7 +325,7 @@ TEST_F(Frames, AMovieIsRawFramesToFfmpeg) {
   }
 }
 
-TEST_F(Frames, ThatASignalStopsAreReportedAndLeaveNothingUnfinished) {
+TEST_F(Frames, StoppedByASignalAreReportedAndLeaveNothingUnfinished) {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     const fs::path out = folder_->path() / fmt::format("stopped{}", signal);
     fs::create_directory(out);
@@ -345,7 +345,7 @@ TEST_F(Frames, ThatASignalStopsAreReportedAndLeaveNothingUnfinished) {
   }
 }
 
-TEST_F(Frames, AMovieThatASignalStopsIsNotThere) {
+TEST_F(Frames, AMovieStoppedByASignalIsRemoved) {
   const fs::path out = folder_->path() / "stopped_movie";
   fs::create_directory(out);
   const ScopedEnvironment path("PATH", folderWith("ffmpeg",
@@ -367,7 +367,7 @@ TEST_F(Frames, AMovieThatASignalStopsIsNotThere) {
   EXPECT_TRUE(fs::is_empty(out));
 }
 
-TEST_F(Frames, WhatAKilledRunHasLeftIsRemovedByTheNext) {
+TEST_F(Frames, LeftoversOfAKilledRunAreRemovedByTheNext) {
   const fs::path out = folder_->path() / "killed";
   fs::create_directory(out);
   {

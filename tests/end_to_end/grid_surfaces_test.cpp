@@ -263,7 +263,7 @@ TEST_F(GridSurfaceOptions, VerifyFindsDamagedFaces) {
   EXPECT_NE((of_table.out + of_table.err).find("faces.bin: has a wrong checksum"), std::string::npos);
 }
 
-TEST_F(GridSurfaceOptions, SaysWhatThereIs) {
+TEST_F(GridSurfaceOptions, UnknownFacesGetTheListOfThem) {
   const struct {
     std::vector<std::string> options;
     std::string cache;

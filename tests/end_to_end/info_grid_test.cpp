@@ -26,7 +26,7 @@ class InfoGrid : public testing::Test {
   const TemporaryFolder folder_;
 };
 
-TEST_F(InfoGrid, TellsAllThatThereIsToKnow) {
+TEST_F(InfoGrid, PrintsAllProperties) {
   const std::vector<std::string> files{shared("bluntfin/bluntfinxyz.bin"), shared("bluntfin/bluntfinq.bin")};
   const ProgramResult text = runProgram({"info", files[0], files[1]});
   EXPECT_EQ(text.status, 0) << text.err;
@@ -45,7 +45,7 @@ TEST_F(InfoGrid, TellsAllThatThereIsToKnow) {
   EXPECT_TRUE(json["overlaps"].empty());
 }
 
-TEST_F(InfoGrid, TellsOfOverlapsAndSoDoesConversion) {
+TEST_F(InfoGrid, InfoAndConvertReportOverlaps) {
   const std::string overlapping = shared("overset/cylinder_chimera_overlapping_singledonor.x");
   const ProgramResult info = runProgram({"info", overlapping, "--json"});
   EXPECT_EQ(info.status, 0) << info.err;
@@ -66,7 +66,7 @@ TEST_F(InfoGrid, TellsOfOverlapsAndSoDoesConversion) {
 }
 
 // Every PLOT3D file converts, or is refused for a stated reason.
-TEST_F(InfoGrid, EveryPlot3dFileConvertsOrSaysWhyNot) {
+TEST_F(InfoGrid, EveryPlot3dFileConvertsOrIsRefusedWithAReason) {
   const struct {
     std::vector<std::string> files;
     std::string scalar;   // "": none is named

@@ -121,7 +121,7 @@ TEST_F(InterruptedConversion, KilledItIsResumed) {
   }
 }
 
-TEST_F(InterruptedConversion, KilledItIsInTheWayOfAnother) {
+TEST_F(InterruptedConversion, KilledItBlocksAnotherToTheSameOutput) {
   const auto program = startedUntil(1);
   program->signal(SIGKILL);
   program->wait();
@@ -136,7 +136,7 @@ TEST_F(InterruptedConversion, KilledItIsInTheWayOfAnother) {
   expectWhole();
 }
 
-TEST_F(InterruptedConversion, StoppedItSaysHowToGoOn) {
+TEST_F(InterruptedConversion, StoppedItPrintsHowToContinue) {
   for (const int signal : {SIGINT, SIGTERM}) {
     // On a busy machine the signal may come when all is done: then it is tried again.
     ProgramResult stopped;
@@ -170,7 +170,7 @@ TEST_F(InterruptedConversion, StoppedEarlyItLeavesNothing) {
   EXPECT_EQ(entries(), 0);
 }
 
-TEST_F(InterruptedConversion, IsAloneWithItsOutput) {
+TEST_F(InterruptedConversion, LocksItsOutput) {
   const auto program = startedUntil(0);
   program->signal(SIGSTOP);
   for (const char* word : {"--resume", "--overwrite"}) {
@@ -235,7 +235,7 @@ TEST_F(InterruptedConversion, OnAFullDiskLosesNothing) {
   expectWhole();  // the old one
 }
 
-TEST_F(InterruptedConversion, OnAFullDiskKeepsWhatIsToBeResumed) {
+TEST_F(InterruptedConversion, OnAFullDiskKeepsFinishedWorkForResuming) {
   const SmallDisk disk(folder_ / "disk");
   if (!disk.mounted()) GTEST_SKIP() << "no small disk can be mounted: " << disk.why();
   output_ = folder_ / "disk/a.splats";

@@ -142,7 +142,7 @@ TEST_F(Isosurfaces, EveryPainterDrawsTheSame) {
   }
 }
 
-TEST_F(Isosurfaces, TheProgramDrawsThemAndSaysWhatIsWrong) {
+TEST_F(Isosurfaces, TheProgramDrawsThemAndRefusesWrongUsage) {
   const std::string cache = (folder_ / "a.splats").string(), output = (folder_ / "a.pfm").string();
   const auto run = [&](std::vector<std::string> more) {
     more.insert(more.begin(), {"render", cache, "-o", output, "--size", "150x150", "--view", "iso"});

@@ -82,7 +82,7 @@ TEST_F(OddDataTest, ACacheOfOneSplatIsDrawn) {
   EXPECT_EQ(runProgram({"info", file("cube.splats"), "--verify"}).status, 0);
 }
 
-TEST_F(OddDataTest, OneNodeThatIsLeftHasNoVolumeAndThatIsSaid) {
+TEST_F(OddDataTest, ASingleRemainingNodeHasNoVolumeWhichIsReported) {
   expectConverted(2, [](const GridNode& node, NodeValues& values) {
     values.scalars[0] = 1;
     values.blank = node.i + node.j + node.k > 0;
@@ -92,7 +92,7 @@ TEST_F(OddDataTest, OneNodeThatIsLeftHasNoVolumeAndThatIsSaid) {
   EXPECT_TRUE(said("7 of 8")) << said_;
 }
 
-TEST_F(OddDataTest, NodesInOnePointHaveNoVolumeAndThatIsSaid) {
+TEST_F(OddDataTest, NodesInOnePointHaveNoVolumeWhichIsReported) {
   expectConverted(4, [](const GridNode& node, NodeValues& values) {
     values.position = {1, 2, 3};
     along(node, values);
@@ -100,7 +100,7 @@ TEST_F(OddDataTest, NodesInOnePointHaveNoVolumeAndThatIsSaid) {
   expectEmpty({}, "the data has no volume");
 }
 
-TEST_F(OddDataTest, NothingLeftIsNoCache) {
+TEST_F(OddDataTest, AGridWithoutNodesIsNotConverted) {
   const ProgramResult result = convert(2, [](const GridNode&, NodeValues& values) { values.blank = true; });
   EXPECT_EQ(result.status, 1);
   EXPECT_EQ(lineCount(result.err), 1) << result.err;
@@ -164,7 +164,7 @@ TEST_F(OddDataTest, ValuesThatHardlyDifferAreAConstant) {
   EXPECT_TRUE(said("everywhere")) << said_;
 }
 
-TEST_F(OddDataTest, WhatIsNotFiniteIsCountedSkippedAndReported) {
+TEST_F(OddDataTest, NonFiniteSamplesAreCountedSkippedAndReported) {
   const float infinity = std::numeric_limits<float>::infinity();
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const CubeNode node = [&](const GridNode& number, NodeValues& values) {

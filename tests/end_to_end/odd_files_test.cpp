@@ -60,7 +60,7 @@ class OddFiles : public testing::Test {
   const TemporaryFolder folder_;
 };
 
-TEST_F(OddFiles, APipeIsNoInput) {
+TEST_F(OddFiles, APipeIsRefusedAsInput) {
   const std::string pipe = file("pipe"), no_file = "is not a regular file";
   expectRefused({"info", pipe}, no_file);
   expectRefused({"convert", pipe, "-o", file("a.splats")}, no_file);
@@ -76,7 +76,7 @@ TEST_F(OddFiles, APipeIsNoInput) {
   expectRefused(cubeArguments(folder_ / "cube", {"--overwrite"}, folder_ / "odd.splats"), no_file);
 }
 
-TEST_F(OddFiles, WhatIsNoFileIsNotReplaced) {
+TEST_F(OddFiles, OnlyRegularFilesAreReplaced) {
   fs::create_symlink(file("pipe"), file("pipe.png"));
   fs::create_directory(file("folder.png"));
   for (const char* name : {"pipe.png", "folder.png"})
@@ -98,14 +98,14 @@ TEST_F(OddFiles, ALinkIsFollowed) {
   }
 }
 
-TEST_F(OddFiles, LinksThatLeadRoundAreRefused) {
+TEST_F(OddFiles, CyclesOfLinksAreRefused) {
   fs::create_symlink(file("b.png"), file("a.png"));
   fs::create_symlink(file("a.png"), file("b.png"));
   expectRefused({"render", cache(), "-o", file("a.png"), "--size", "16x16"}, "form a cycle");
   EXPECT_TRUE(fs::is_symlink(file("a.png")));
 }
 
-TEST_F(OddFiles, WhatIsReadIsNotOverwritten) {
+TEST_F(OddFiles, InputsAreNotOverwritten) {
   const std::string grid = readTextFile(file("cube.xyz"));
   expectRefused(cubeArguments(folder_ / "cube", {"--stats", file("cube.xyz")}, folder_ / "b.splats"),
                 "would overwrite");
@@ -182,7 +182,7 @@ TEST_F(OddFiles, AFileSizeLimitIsAnErrorLikeAFullDisk) {
   }
 }
 
-TEST_F(OddFiles, WithoutProcItWorksAndStatisticsLackWhatItTells) {
+TEST_F(OddFiles, WithoutProcItWorksAndStatisticsLackMemory) {
   const auto without = [&](const std::string& command) {
     const std::string in_folder =
         "mount -t tmpfs none /proc && cd '" + folder_.path().string() + "' && exec " CURVISPLAT_PROGRAM " ";
@@ -230,7 +230,7 @@ TEST_F(OddFiles, WithoutThreadsItEndsWithOneLine) {
   }
 }
 
-TEST_F(OddFiles, ASmallDiskIsRefusedWithNumbersThatDifferOrTried) {
+TEST_F(OddFiles, ASmallDiskIsRefusedWithBothSizesOrTried) {
   writeCube(folder_ / "more", 24,
             [](const GridNode& node, NodeValues& values) { values.scalars[0] = static_cast<float>(node.i); });
   fs::create_directory(folder_ / "disk");
@@ -296,7 +296,7 @@ TEST_F(OddFiles, ProgramsMayWriteTheSamePicture) {
     EXPECT_NE(entry.path().extension(), ".part") << entry.path();
 }
 
-TEST_F(OddFiles, AHugeFileIsNoPicture) {
+TEST_F(OddFiles, AHugeFileIsRefusedAsAPicture) {
   for (const std::string magic : {"\x89PNG", "PF", "nothing"}) {
     std::ofstream(file("huge.png"), std::ios::binary) << magic;
     fs::resize_file(file("huge.png"), uint64_t{1} << 40);

@@ -28,7 +28,7 @@ void expectDone(const std::vector<std::string>& arguments) {
   EXPECT_EQ(result.status, 0) << arguments[0] << ": " << result.err;
 }
 
-TEST(OddNames, AreTakenEverywhere) {
+TEST(OddNames, WorkEverywhere) {
   const TemporaryFolder folder;
   const fs::path inside = folder / "Größe ρ/two  words 'n\" %d";
   fs::create_directories(inside);
@@ -67,7 +67,7 @@ TEST(OddNames, AreTakenEverywhere) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder / "Größe ρ"), {}), 1);
 }
 
-TEST(OddNames, OfNoEncodingAreTaken) {
+TEST(OddNames, WorkWithoutAValidEncoding) {
   const TemporaryFolder folder;
   const fs::path prefix = folder / "lat\xfcn";
   writeCube(prefix, 8, along, "r\xfc");

@@ -66,7 +66,7 @@ TEST_F(RanksCommand, DrawOnePictureTogether) {
   }
 }
 
-TEST_F(RanksCommand, DealFramesOut) {
+TEST_F(RanksCommand, ShareOutFrames) {
   const std::vector<std::string> orbit{"--orbit", "360", "--frames", "5"};
   ASSERT_EQ(runProgram(renderTo("one_%d.png", orbit)).status, 0);
   std::vector<std::string> more = orbit;
@@ -83,7 +83,7 @@ TEST_F(RanksCommand, DealFramesOut) {
   expectSameFile("one_1.png", "two_1.png");
 }
 
-TEST_F(RanksCommand, SayAFailureOnce) {
+TEST_F(RanksCommand, ReportAFailureOnce) {
   const ProgramResult usage = runAsRanks(3, renderTo("a.png", {"--lod-pixels", "-1"}));
   EXPECT_EQ(usage.status, 2);
   EXPECT_EQ(lineCount(usage.err), 1) << usage.err;
@@ -130,7 +130,7 @@ TEST_F(RanksCommand, ConvertTogether) {
     EXPECT_EQ(entry.path().filename().string().find("shared.splats."), std::string::npos) << entry.path();
 }
 
-TEST_F(RanksCommand, ConvertNoSeriesTogether) {
+TEST_F(RanksCommand, RefuseToConvertASeries) {
   const ProgramResult result =
       runAsRanks(2, {"convert", file("g.xyz"), file("g.fun"), "--add-scalar", "f", "--to", file("g.splats")});
   EXPECT_EQ(result.status, 2);
@@ -156,7 +156,7 @@ TEST_F(RanksCommand, LeaveNothingWhereOneFailsInAConversion) {
     EXPECT_EQ(entry.path().filename().string().find("never"), std::string::npos) << entry.path();
 }
 
-TEST_F(RanksCommand, SayWhichOfThemHasNoRoom) {
+TEST_F(RanksCommand, NameTheRankWhoseDiskIsFull) {
   const std::string script = file("one_full.sh");
   writeFileAtomically(script,
                       fmt::format("#!/bin/bash\n"
@@ -191,7 +191,7 @@ TEST_F(RanksCommand, AreSimulatedFromTheIndex) {
   EXPECT_EQ(lineCount(wrong.err), 1) << wrong.err;
 }
 
-TEST_F(RanksCommand, OfWhichThereIsOneNeedNoMpi) {
+TEST_F(RanksCommand, ASingleOneNeedsNoMpi) {
   const ProgramResult alone = runAsRanks(1, renderTo("alone.exr"));
   EXPECT_EQ(alone.status, 0) << alone.err;
   ASSERT_EQ(runProgram(renderTo("one.exr")).status, 0);

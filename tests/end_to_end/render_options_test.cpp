@@ -113,7 +113,7 @@ TEST_F(RenderOptions, DefaultsGiveAPictureAndTheOptionsThatWereChosen) {
   EXPECT_GT(pixelsOtherThan(image, {1, 1, 1, 1}), 96u * 96 / 10);
 }
 
-TEST_F(RenderOptions, SizeIsThePictures) {
+TEST_F(RenderOptions, SizeIsThatOfThePicture) {
   const Image image = render({"--size", "120x40"});
   EXPECT_EQ(image.size.width, 120);
   EXPECT_EQ(image.size.height, 40);
@@ -245,7 +245,7 @@ TEST_F(RenderOptions, ARangeThatMissesTheScalarIsWarnedOf) {
   EXPECT_EQ(last_.err.find("empty"), std::string::npos) << last_.err;
 }
 
-TEST_F(RenderOptions, AnEmptyPictureSaysWhy) {
+TEST_F(RenderOptions, AnEmptyPictureIsExplained) {
   EXPECT_EQ(pixelsOtherThan(render({"--clip-box", "5,6,5,6,5,6"}), {1, 1, 1, 1}), 0u);
   EXPECT_NE(last_.err.find("--clip-box contains none of the data"), std::string::npos) << last_.err;
   EXPECT_EQ(pixelsOtherThan(render({"--clip-plane", "9,0,0,1,0,0"}), {1, 1, 1, 1}), 0u);
@@ -260,7 +260,7 @@ TEST_F(RenderOptions, AnEmptyPictureSaysWhy) {
   EXPECT_NE(last_.err.find("--opacity-unit"), std::string::npos) << last_.err;
 }
 
-TEST_F(RenderOptions, TransferFunctionFilesAreUsedAndTheirNotesTold) {
+TEST_F(RenderOptions, TransferFunctionFilesAreUsedAndTheirNotesPrinted) {
   std::ofstream(file("red.json")) << R"([{"Name": "red", "RGBPoints": [0,1,0,0, 1,1,0,0]}])";
   const Image image = render({"--tf", file("red.json"), "--background", "black"});
   EXPECT_EQ(lineCount(last_.err), 1) << last_.err;
@@ -283,7 +283,7 @@ TEST_F(RenderOptions, FlatClassificationAndLodDiffer) {
   EXPECT_GT(compareImages(pixel, render({"--lod-pixels", "0", "--classify", "flat"})).largest, 1e-3);
 }
 
-TEST_F(RenderOptions, WrongWordsAreUsageErrors) {
+TEST_F(RenderOptions, WrongOptionsAreUsageErrors) {
   const struct {
     std::vector<std::string> options;
     const char* word;
@@ -358,7 +358,7 @@ TEST_F(RenderOptions, BadInputAndOutputAreOneLine) {
   expectRefused({"render", cache(), "-o", file("folder.png")}, 1, "folder.png");
 }
 
-TEST_F(RenderOptions, MoreMemoryThanThereIsIsABoundLikeAnyOther) {
+TEST_F(RenderOptions, ALimitAboveTheMachinesMemoryIsAccepted) {
   render({"--memory", "1000T"});
   const ProgramResult result = runProgram(
       {"convert", file("plain.xyz"), file("plain.fun"), "-o", file("bounded.splats"), "--memory", "1000T"});
@@ -371,7 +371,7 @@ TEST_F(RenderOptions, AnUnknownScalarNamesThoseThereAre) {
   render({"--scalar", "f"});
 }
 
-TEST_F(RenderOptions, StatisticsTellWhatWasDone) {
+TEST_F(RenderOptions, StatisticsReportWhatWasDone) {
   const std::string stats = file("stats.json");
   render({"--stats", stats, "--threads", "2", "--view-angle", "25", "--scale", "1,1,2", "--memory", "64M"});
   const auto json = nlohmann::json::parse(readTextFile(stats));

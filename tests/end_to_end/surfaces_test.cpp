@@ -164,7 +164,7 @@ TEST_F(SurfaceOptions, VolumeOffLeavesSurfacesAndSlices) {
 }
 
 /// A surface that fills the picture with one colour is what was asked for: no option of the volume changes it.
-TEST_F(SurfaceOptions, WarningsDoNotSpeakOfTheVolume) {
+TEST_F(SurfaceOptions, WarningsOfSurfacesAloneDoNotMentionTheVolume) {
   const ProgramResult wall = render({"--view", "+z", "--surface", file("wall.obj")});
   EXPECT_EQ(wall.err.find("warning"), std::string::npos) << wall.err;
   const ProgramResult nothing =
@@ -182,7 +182,7 @@ TEST_F(SurfaceOptions, WarnsOfASliceThatMisses) {
       << result.err;
 }
 
-TEST_F(SurfaceOptions, SaysWhatIsWrong) {
+TEST_F(SurfaceOptions, RefusesWrongUsage) {
   writeFileAtomically(*folder_ / "cut.stl", readTextFile(file("wall.obj")));
   const std::string cut = file("cut.stl"), sphere = file("sphere.obj");
   const struct {

@@ -224,7 +224,7 @@ TEST_F(TwoScalarsTest, EveryPainterDrawsTheSame) {
   }
 }
 
-TEST_F(TwoScalarsTest, TheProgramDrawsThemAndSaysWhatIsWrong) {
+TEST_F(TwoScalarsTest, TheProgramDrawsThemAndRefusesWrongUsage) {
   const std::string cache = (folder_ / "a.splats").string(), output = (folder_ / "a.pfm").string();
   const auto run = [&](std::vector<std::string> more) {
     more.insert(more.begin(), {"render", cache, "-o", output, "--size", "150x150", "--view", "iso"});

@@ -168,7 +168,7 @@ class UntrustedCache : public testing::Test {
   int count_ = 0;
 };
 
-TEST_F(UntrustedCache, IsReadWhereNothingIsWrong) {
+TEST_F(UntrustedCache, IsReadIfItIsSound) {
   const fs::path cache = harmed([](HostileCache&) {});
   EXPECT_EQ(runWithLittleMemory({"info", cache.string()}).status, 0);
   EXPECT_EQ(findingsIn(cache).find("finding: brick"), std::string::npos);
@@ -217,7 +217,7 @@ TEST_F(UntrustedCache, SizesAndOffsetsDoNotOverflow) {
   });
 }
 
-TEST_F(UntrustedCache, CountsTakeNoMemoryBeforeTheyAreTrue) {
+TEST_F(UntrustedCache, CountsAreCheckedBeforeMemoryIsAllocated) {
   expectRefused("it has 4294967295 splats", [](HostileCache& cache) { cache.bricks[0].splats = kMax32; });
   expectRefused("bricks", [](HostileCache& cache) { cache.manifest["bricks"] = 0x7fffffff; });
   // A file of 288 GiB that takes no space.
@@ -316,7 +316,7 @@ TEST_F(UntrustedCache, StreamsUnpackToWhatTheirRecordAllows) {
   });
 }
 
-TEST_F(UntrustedCache, TheTreeIsATree) {
+TEST_F(UntrustedCache, ItsTreeHasNoCycles) {
   expectRefused("children from brick", [](HostileCache& cache) { cache.bricks[1].first_child = 1; });
   expectRefused("children from brick", [](HostileCache& cache) { cache.bricks[1].first_child = 0; });
   expectRefused("its parent is brick", [](HostileCache& cache) { cache.bricks[9].parent = 9; });
@@ -330,7 +330,7 @@ TEST_F(UntrustedCache, TheTreeIsATree) {
   });
 }
 
-TEST_F(UntrustedCache, NumbersAreNumbers) {
+TEST_F(UntrustedCache, ItsNumbersAreFinite) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const auto nan = static_cast<float>(kNan), infinite = std::numeric_limits<float>::infinity();
   expectRefused("is not inside its cell", [&](HostileCache& cache) { cache.bricks[2].lower[1] = kNan; });

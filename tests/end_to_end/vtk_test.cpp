@@ -24,7 +24,7 @@ class VtkProgram : public testing::Test {
   const std::string cache_ = (folder_ / "out.splats").string();
 };
 
-TEST_F(VtkProgram, TellsOfTimeStepsUnlessOneIsChosen) {
+TEST_F(VtkProgram, ReportsTimeStepsUnlessOneIsChosen) {
   ProgramResult result = convert(kMade + "series.pvd");
   ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_NE(
@@ -62,7 +62,7 @@ TEST_F(VtkProgram, ConvertsValuesInCells) {
   EXPECT_EQ(CacheReader(cache_).manifest().splats, 8u * 7 * 6);
 }
 
-TEST_F(VtkProgram, InfoTellsOfNodesAndCells) {
+TEST_F(VtkProgram, InfoReportsNodesAndCells) {
   const ProgramResult result = runProgram({"info", "--json", kMade + "blocks.vtm"});
   ASSERT_EQ(result.status, 0) << result.err;
   const auto json = nlohmann::json::parse(result.out);

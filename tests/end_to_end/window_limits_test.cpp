@@ -71,7 +71,7 @@ TEST_F(WindowLimitsTest, ClosesWhileItLoads) {
   }
 }
 
-TEST_F(WindowLimitsTest, TooLittleMemoryIsSaid) {
+TEST_F(WindowLimitsTest, TooLittleMemoryIsReported) {
   const auto window = open({"--memory", "1M"});
   // Another size, another word: the window lives.
   const ImageSize smaller{kScreen.width - 100, kScreen.height - 100};

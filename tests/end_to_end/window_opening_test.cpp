@@ -303,7 +303,7 @@ TEST_F(FurtherScalarTest, WithoutTheSourcesNoneIsOffered) {
   close();
 }
 
-TEST_F(WindowOpening, WhatCannotBeOpenedIsSaidAndTheWindowLives) {
+TEST_F(WindowOpening, AFileThatCannotBeOpenedIsReportedAndTheWindowLives) {
   std::ofstream("no.xyz") << "no grid";
   openWith({"no.xyz", "a.fun"});
   EXPECT_TRUE(eventually([] { return hasWidget("message "); }));

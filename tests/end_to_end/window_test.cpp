@@ -48,7 +48,7 @@ class WindowsCamera : public WindowTest {
   }
 };
 
-TEST_F(WindowTest, ShowsWhatIsDoneToIt) {
+TEST_F(WindowTest, ShowsEachChange) {
   open();
   const Image first = save();
   EXPECT_EQ(first.size.width, pictureSize().width);

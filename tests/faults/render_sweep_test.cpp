@@ -82,7 +82,7 @@ TEST_F(RenderSweep, APictureIsRightOrNotThere) {
 }
 
 /// What cannot be read is not taken for a damaged brick; what has been cut off is.
-TEST_F(RenderSweep, GoingOnIsForDamageNotForAFailingDisk) {
+TEST_F(RenderSweep, KeepGoingIsForDamageNotForAFailingDisk) {
   keep_going_ = true;
   for (const Fault& fault : {testing::kFailsOnce, testing::kFailsFromThenOn}) {
     testing::FaultSweep sweep = drawing();

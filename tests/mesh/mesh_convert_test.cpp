@@ -264,7 +264,7 @@ TEST_F(MeshConvert, BlankedPointsTakeTheirCellsAlong) {
   EXPECT_EQ(run(ArrayMesh({piece}), options(1)).blanked.not_finite, 1u);
 }
 
-TEST_F(MeshConvert, OddMeshesGetAWordAndNoCrash) {
+TEST_F(MeshConvert, OddMeshesAreConvertedAndTheirOdditiesCounted) {
   // A point that no cell has, a cell with repeated corners, one without volume, one that is inside out.
   ArrayPiece piece = hexahedra_;
   piece.points.push_back({1e9, 0, 0});

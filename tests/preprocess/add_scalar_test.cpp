@@ -227,7 +227,7 @@ TEST(AddScalar, LeavesOutWhatOlderScalarsBlanked) {
   }));
 }
 
-TEST(AddScalar, RefusesWhatTheCacheDoesNotTell) {
+TEST(AddScalar, RefusesBlanksThatTheCacheLeavesAmbiguous) {
   // Of nodes that coincide, the older scalar blanked some: were the others merged, or blanked too?
   const TemporaryFolder folder;
   const GridBlock block = gridBlock(33, 20, 10);
@@ -344,7 +344,7 @@ TEST_F(ToAnExistingCache, RefusesMissingValues) {
   expectRefused(lacking, adding(cache, {1, 2}), "88 of its nodes have no value of s1, s2");
 }
 
-TEST_F(ToAnExistingCache, RefusesWhatIsNoCache) {
+TEST_F(ToAnExistingCache, RefusesAFolderThatIsNotACache) {
   fs::create_directory(folder / "empty");
   EXPECT_NE(refusal(source, adding(folder / "empty", {1})), "");
   EXPECT_NE(refusal(source, adding(folder / "missing", {1})), "");

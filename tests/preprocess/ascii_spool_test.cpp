@@ -43,7 +43,7 @@ TEST(AsciiSpool, ReadsNumbersAsFortranWritesThem) {
   EXPECT_EQ(spooled(folder, "\n \n"), std::vector<double>{});
 }
 
-TEST(AsciiSpool, ReadsWhatIsNoFiniteNumber) {
+TEST(AsciiSpool, ReadsNonFiniteNumbers) {
   const TestFolder folder("spool-nan");
   const std::vector<double> values = spooled(folder, "NaN -Infinity inf 1E400 1E-400");
   ASSERT_EQ(values.size(), 5u);
@@ -54,7 +54,7 @@ TEST(AsciiSpool, ReadsWhatIsNoFiniteNumber) {
   EXPECT_EQ(values[4], 0);
 }
 
-TEST(AsciiSpool, NamesTheLineThatIsNoNumber) {
+TEST(AsciiSpool, NamesTheLineThatIsNotANumber) {
   const TestFolder folder("spool-errors");
   for (const char* bad :
        {"x", "1.5x", "0x10", "*5", "2*", "0*3", "-1*3", "1.5*2", "2*3*4", "1e", "--1", "1..2", "**"}) {

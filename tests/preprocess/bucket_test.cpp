@@ -124,7 +124,7 @@ TEST(BucketFile, IsGoneAfterwards) {
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
-TEST(BucketFile, TellsOfAFullDisk) {
+TEST(BucketFile, ReportsAFullDisk) {
   const TemporaryFolder folder;
   testing::FaultySystemCalls disk;
   disk.fail_write_at = 5;
@@ -139,7 +139,7 @@ TEST(BucketFile, TellsOfAFullDisk) {
       Error);
 }
 
-TEST(BucketTree, SplitsWhereThereIsMuchAndFindsTheLeaf) {
+TEST(BucketTree, SplitsFullCellsAndFindsTheLeafOfAPosition) {
   const auto count = [](const Cell& cell) -> uint64_t {
     return cell.at == std::array<uint32_t, 3>{0, 0, 0} ? 1000 >> cell.level : 1;
   };

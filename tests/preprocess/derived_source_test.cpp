@@ -392,7 +392,7 @@ TEST(DerivedSource, AFileVariablesNumberComesFirst) {
   EXPECT_EQ(source.description().scalars[scalarsNamed(source.description(), {"113"})[0]].name, "sound_speed");
 }
 
-TEST(DerivedSource, RefusesAGasThatThereIsNot) {
+TEST(DerivedSource, RefusesAnImpossibleGas) {
   for (const GasModel gas : {GasModel{1.0, {}}, GasModel{NAN, {}}, GasModel{{}, 0.0}, GasModel{{}, -1.0}})
     EXPECT_THROW(DerivedSource(bentFlow(3, vortexFlow), DerivedOptions{gas, {}}), UsageError);
 }

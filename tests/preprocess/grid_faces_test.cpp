@@ -68,7 +68,7 @@ uint64_t quadsOf(const FacesReader& faces, const GridFace& face) {
   return quads;
 }
 
-TEST_F(GridFacesTest, WhatAnotherBlockClosesIsNoOuterFace) {
+TEST_F(GridFacesTest, AFaceClosedByAnotherBlockIsNotAnOuterFace) {
   const auto faces = convertAndOpen(twoBlocks(6, 5, 4));
   ASSERT_TRUE(faces);
   std::map<std::pair<uint32_t, std::string>, uint64_t> quads;

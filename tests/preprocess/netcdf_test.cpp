@@ -141,7 +141,7 @@ TEST_P(Netcdf, ARangeInUnpackedUnitsBlanksUnpackedValues) {
   EXPECT_EQ(drawn(0.01, {{"valid_range", NetcdfDoubleList{{200, 300}}}}), "01234567");
 }
 
-TEST_P(Netcdf, AGridWithoutAnyValueSaysWhy) {
+TEST_P(Netcdf, AGridWithoutAnyValueIsExplained) {
   {
     NetcdfWriter file(path_, GetParam());
     addAxes(file, 4, 3, 2);
@@ -182,7 +182,7 @@ TEST_P(Netcdf, LengthsAreFlat) {
   EXPECT_NE(errorOf().find("x and y are lengths; --sphere needs degrees"), std::string::npos) << errorOf();
 }
 
-TEST_P(Netcdf, WhatIsNoGridIsSaid) {
+TEST_P(Netcdf, AVariableThatIsNotAGridIsExplained) {
   {
     NetcdfWriter file(path_, GetParam());
     addAxes(file, 4, 3, 2);

@@ -158,7 +158,7 @@ TEST(Plot3dDamage, TrailingBytesAreAWarning) {
   }
 }
 
-TEST(Plot3dDamage, TruncatedIblankIsNoTrailingBytes) {
+TEST(Plot3dDamage, ATruncatedIblankIsNotTakenForTrailingBytes) {
   const TestFolder folder("truncated-iblank");
   const Plot3dLayout layout{Plot3dKind::kGrid, false, kBig, kC, 4, false, true};
   Bytes file = plot3dBytes(layout, {testBlock(9, 8, 7, 0)});
@@ -168,7 +168,7 @@ TEST(Plot3dDamage, TruncatedIblankIsNoTrailingBytes) {
   EXPECT_NE(error.find("--iblank no"), std::string::npos) << error;
 }
 
-TEST(Plot3dDamage, TruncatedFilesSayWhatWasExpected) {
+TEST(Plot3dDamage, TruncatedFilesAreReportedWithTheExpectedSize) {
   const TestFolder folder("truncated");
   const Plot3dLayout layout{Plot3dKind::kGrid, false, kBig, kC, 4, false, false};
   Bytes file = plot3dBytes(layout, {testBlock(9, 8, 7, 0)});
@@ -251,7 +251,7 @@ class BadDisk : public SystemCalls {
   int64_t good_bytes_;
 };
 
-TEST(Plot3dDamage, AFailingDiskIsNoQuestionOfLayout) {
+TEST(Plot3dDamage, AFailingDiskIsNotTakenForAnotherLayout) {
   const TestFolder folder("bad-disk");
   const Plot3dLayout layout{Plot3dKind::kGrid, false, kBig, kFortran, 4, true, false};
   const Bytes file = plot3dBytes(layout, {testBlock(9, 8, 7, 0), testBlock(3, 3, 3, 0)});

@@ -201,7 +201,7 @@ TEST(Plot3dLayouts, ThreadsReadAtOnce) {
 }
 
 /// Small sizes make coincidences between layouts likely.
-TEST(Plot3dLayouts, IsNeverTheWrongOne) {
+TEST(Plot3dLayouts, AreNeverMistakenForOneAnother) {
   const TestFolder folder("small");
   std::mt19937_64 random(7);
   const auto layouts = everyBinaryLayout();

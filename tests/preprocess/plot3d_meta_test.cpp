@@ -51,7 +51,7 @@ class Plot3dMeta : public testing::Test {
                   {"time": 4.5, "xyz": "b.xyz", "q": "b.q"}]})";
 };
 
-TEST_F(Plot3dMeta, SaysWhichFilesAndHow) {
+TEST_F(Plot3dMeta, NamesFilesAndTheirLayout) {
   const auto first = open(whole_);
   const GridDescription& description = first->description();
   EXPECT_EQ(description.blocks[0].ni, 5u);

@@ -280,7 +280,7 @@ TEST_F(RealFiles, ForeignFilesAreNamed) {
   EXPECT_NE(errorOf("bluntfin/missing.xyz").find("cannot be opened"), std::string::npos);
 }
 
-TEST_F(RealFiles, ASolutionIsNoGrid) {
+TEST_F(RealFiles, ASolutionIsRefusedAsAGrid) {
   const std::string error = errorOf("bluntfin/bluntfinq.bin");
   EXPECT_NE(error.find("fit no PLOT3D grid"), std::string::npos) << error;
 }

@@ -207,7 +207,7 @@ TEST_F(Resume, CompletesWhateverCallWasTheLast) {
 
 /// Where all is one bucket, its bricks are worth nothing until the topmost is there; unless the splats are
 /// lost, and the new plan knows smaller cells.
-TEST_F(Resume, TakesUpOrDropsTheBricksOfALargeCell) {
+TEST_F(Resume, ContinuesOrDropsTheBricksOfALargeCell) {
   dying_bucket_splats_ = 1'000'000;
   const int64_t calls = callsOfAll({"writes"});
   size_t most = 0;
@@ -295,7 +295,7 @@ TEST_F(Resume, CompletesAfterBeingKilledAgainAndAgain) {
   }
 }
 
-TEST_F(Resume, MakesAgainWhatTheDiskHasLost) {
+TEST_F(Resume, RebuildsWhatTheDiskHasLost) {
   const auto cut = [](const fs::path& path, uint64_t left) { fs::resize_file(path, left); };
   const auto flip = [](const fs::path& path, size_t byte) {
     std::string bytes = bytesOf(path);
@@ -338,7 +338,7 @@ TEST_F(Resume, MakesAgainWhatTheDiskHasLost) {
   }
 }
 
-TEST_F(Resume, TellsWhatWasDone) {
+TEST_F(Resume, ReportsFinishedWork) {
   killInBuild();
   const size_t done = readBrickLog(partial(), 1).size();
   Progress progress;
@@ -379,7 +379,7 @@ TEST_F(Resume, BeginsAnewIfOverwritingIsAllowed) {
   expectWhole();
 }
 
-TEST_F(Resume, TellsThatTheCacheIsWhole) {
+TEST_F(Resume, ReportsThatTheCacheIsComplete) {
   convertNow({});
   try {
     convertNow({true, false, std::nullopt});
@@ -391,13 +391,13 @@ TEST_F(Resume, TellsThatTheCacheIsWhole) {
   expectWhole();
 }
 
-TEST_F(Resume, NeedsNothingToResume) {
+TEST_F(Resume, WorksWithoutAnInterruptedConversion) {
   const ConvertReport report = convertNow({true, false, std::nullopt});
   EXPECT_FALSE(report.resumed);
   expectWhole();
 }
 
-TEST_F(Resume, AStoppedConversionLeavesWhatIsWorthIt) {
+TEST_F(Resume, AStoppedConversionKeepsWhatCanBeResumed) {
   testing::FaultySystemCalls counting;
   {
     const ScopedSystemCalls scope(counting);

@@ -92,7 +92,7 @@ TEST_P(EveryScene, HasAScalarWithinItsRange) {
   }
 }
 
-TEST(HalfAnnulus, IsWhatTheDesignSays) {
+TEST(HalfAnnulus, HasItsDefinedPositionsAndScalar) {
   const auto scene = makeScene("half-annulus", 5);
   const double u = 0.3, v = 0.7, w = 0.6;
   const double theta = std::numbers::pi * u;
@@ -197,7 +197,7 @@ TEST(SceneGridSource, ReadsTheSameNodesInAnyBox) {
   EXPECT_NEAR(all.y.back(), corner.y, 1e-7);
 }
 
-TEST(MakeScene, RefusesWhatThereIsNot) {
+TEST(MakeScene, RefusesUnknownScenesAndOptions) {
   try {
     makeScene("pipe");
     FAIL();

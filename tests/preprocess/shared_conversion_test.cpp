@@ -85,7 +85,7 @@ TEST_F(SharedConversion, HasTheBytesOfOneProcess) {
   expectSameBytes(SceneGridSource(makeScene("half-annulus"), {96, 96, 64}), {2, 3, 4, 7}, 20000);
 }
 
-TEST_F(SharedConversion, HasThemWithBucketsOfAnySize) {
+TEST_F(SharedConversion, HasTheBytesWithBucketsOfAnySize) {
   const SceneGridSource source(makeScene("half-annulus"), {128, 64, 64});
   expectSameBytes(source, {2, 3});
   expectSameBytes(source, {3}, 3000);
@@ -107,15 +107,15 @@ FunctionGridSource blocksWithSeams(Centring centring = Centring::kNode) {
       centring);
 }
 
-TEST_F(SharedConversion, HasThemWithSeamsBlanksAndSeveralScalars) {
+TEST_F(SharedConversion, HasTheBytesWithSeamsBlanksAndSeveralScalars) {
   expectSameBytes(blocksWithSeams(), {2, 3, 4}, 5000);
 }
 
-TEST_F(SharedConversion, HasThemOfCells) {
+TEST_F(SharedConversion, HasTheBytesOfCells) {
   expectSameBytes(blocksWithSeams(Centring::kCell), {2, 3}, 5000);
 }
 
-TEST_F(SharedConversion, HasThemWhereRanksHaveNothingToDo) {
+TEST_F(SharedConversion, HasTheBytesWhereRanksHaveNothingToDo) {
   expectSameBytes(FunctionGridSource({gridBlock(4, 3, 3)}, 1,
                                      [](const GridNode& node) {
                                        const auto x = static_cast<float>(node.i);
@@ -124,7 +124,7 @@ TEST_F(SharedConversion, HasThemWhereRanksHaveNothingToDo) {
                   {2, 7});
 }
 
-TEST_F(SharedConversion, HasThemOfNodesThatCoincide) {
+TEST_F(SharedConversion, HasTheBytesOfNodesThatCoincide) {
   expectSameBytes(FunctionGridSource({gridBlock(300, 300, 2)}, 1,
                                      [](const GridNode& node) {
                                        const bool far = node.i > 290;

@@ -229,7 +229,7 @@ TEST(VtkEncodings, BlocksLargerThanMemoryAllows) {
   EXPECT_NE(error.find("cannot be read in parts"), std::string::npos) << error;
 }
 
-TEST(VtkEncodings, WhatIsNotReadIsRefusedByName) {
+TEST(VtkEncodings, UnsupportedEncodingsAreRefusedByName) {
   const TestFolder folder("vts-refused");
   const std::string file = vtsFile(annulusVtsGrid(3, 3, 3), {});
   const auto changed = [&](const std::string& from, const std::string& to) {

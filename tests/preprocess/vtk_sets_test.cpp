@@ -238,7 +238,7 @@ TEST(VtkSets, ManyPiecesNeedFewOpenFiles) {
   EXPECT_LT(files, 100);
 }
 
-TEST(VtkSets, WhoHasNotChosenAStepIsTold) {
+TEST(VtkSets, AStepThatWasNotChosenIsReported) {
   GridDescription description;
   EXPECT_FALSE(timeStepNote(description, std::nullopt));
   description.times = {0, 1, 2.5};

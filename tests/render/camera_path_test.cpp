@@ -213,7 +213,7 @@ TEST_F(CameraPathFile, IsReadAsItIsWritten) {
   EXPECT_EQ(perspective.at(0).view_angle_deg, 40);
 }
 
-TEST_F(CameraPathFile, SaysWhatIsWrong) {
+TEST_F(CameraPathFile, NamesTheWrongField) {
   expectRefused("", "expected a camera path");
   expectRefused("[1, 2", "expected a camera path");
   expectRefused("\xff\xfe\x01", "expected a camera path");
@@ -267,7 +267,7 @@ TEST_F(CameraPathFile, SaysWhatIsWrong) {
         "view_angle");
 }
 
-TEST_F(CameraPathFile, SaysWhereTheCameraMeetsItsFocalPoint) {
+TEST_F(CameraPathFile, NamesTheTimeAtWhichTheCameraMeetsItsFocalPoint) {
   const CameraPath path = read(file(keyFrame("focal_point", "[0, 0, 0]") + "," +
                                     R"({"time": 2, "position": [-1, -2, -3], "focal_point": [0, 0, 0],
                                         "view_up": [0, 0, 1], "parallel_scale": 1})"));

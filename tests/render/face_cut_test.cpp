@@ -126,7 +126,7 @@ TEST(FaceCut, OfTheNextLayerIsLeftOutWhereItIsSeenFaceOn) {
     }
 }
 
-TEST(ScreenCut, IsARecordThatIsNoSplat) {
+TEST(ScreenCut, IsARecordThatIsNotASplat) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> around(-1, 1);
   for (int n = 0; n < 1000; ++n) {

@@ -234,7 +234,7 @@ TEST_P(FrameStreamingTest, AFailingDiskEndsTheFrameOnce) {
   }
 }
 
-TEST_P(FrameStreamingTest, KeepsGoingFromTheAncestorIfAsked) {
+TEST_P(FrameStreamingTest, KeepGoingDrawsTheNearestReadableAncestor) {
   FrameStatistics statistics;
   const Image whole =
       FrameRenderer(*cache_, 0, function(), GetParam()).render(camera("iso"), options(), statistics);

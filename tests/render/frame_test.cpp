@@ -163,7 +163,7 @@ TEST_P(FrameTest, IsThatOfOneGlobalDepthSort) {
   }
 }
 
-TEST_P(FrameTest, SaysWhereSplatsWent) {
+TEST_P(FrameTest, CountsWhySplatsWereLeftOut) {
   const CacheReader& cache = lattice(0, {1.0 / kLatticeSide, 0, 0});
   FrameStatistics statistics;
   // Only the half from 0.5 on can be seen; slopes reach a little further.
@@ -258,7 +258,7 @@ TEST_P(FrameTest, ADamagedBrickEndsTheFrameWithItsName) {
   EXPECT_NO_THROW(renderer.render(cameraFrom({0, 0, 1}), options(1e3), statistics));
 }
 
-TEST_P(FrameTest, SaysHowMuchMemoryItTakes) {
+TEST_P(FrameTest, ReportsTheMemoryItTakes) {
   FrameRenderer renderer(lattice(0.5, glm::dvec3(0)), 0, uniform(0.1), GetParam());
   FrameOptions little = options();
   little.memory_bytes = 1 << 20;

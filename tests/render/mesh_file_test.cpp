@@ -95,7 +95,7 @@ TEST(MeshFile, ReadsEveryFormat) {
   }
 }
 
-TEST(MeshFile, RefusesEveryFileThatIsCutOff) {
+TEST(MeshFile, RefusesEveryTruncatedFile) {
   for (const auto& [text, name] : kFiles) {
     // What may be missing: the end of the last line, and of the last number.
     const size_t last = name.ends_with("obj") ? 0
@@ -107,7 +107,7 @@ TEST(MeshFile, RefusesEveryFileThatIsCutOff) {
   }
 }
 
-TEST(MeshFile, SaysWhatIsWrong) {
+TEST(MeshFile, NamesTheWrongLine) {
   const std::pair<std::pair<std::string, std::string>, std::string> refused[] = {
       {{"", "a.stl"}, "a.stl: is empty; STL, PLY and OBJ files can be read"},
       {{"hello", "a.txt"},

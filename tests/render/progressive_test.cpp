@@ -149,7 +149,7 @@ TEST_F(ProgressiveTest, MoreSplatsMakeABetterPictureAndNeverMoreThanAsked) {
   }
 }
 
-TEST_F(ProgressiveTest, SaysHowManySplatsTheCoarsestPictureTakes) {
+TEST_F(ProgressiveTest, ReportsHowManySplatsTheCoarsestPictureTakes) {
   FrameRenderer renderer(*cache_, 0, function());
   FrameStatistics statistics;
   FrameOptions few = options(0);

@@ -110,11 +110,11 @@ TEST_F(SharedPicture, HasTheBitsOfOneProcess) {
     for (const Camera& view : {camera(*cache), inside(*cache)}) expectSameBits({cache, view, options()});
 }
 
-TEST_F(SharedPicture, HasThemWhereMuchIsHidden) {
+TEST_F(SharedPicture, HasTheBitsWhereMuchIsHidden) {
   expectSameBits({scene_.get(), camera(*scene_), options(), 1e-4});
 }
 
-TEST_F(SharedPicture, HasThemUnderALimitAndInLittleMemory) {
+TEST_F(SharedPicture, HasTheBitsUnderALimitAndInLittleMemory) {
   FrameOptions limited = options();
   limited.max_splats = 40000;
   expectSameBits({scene_.get(), camera(*scene_), limited});
@@ -125,7 +125,7 @@ TEST_F(SharedPicture, HasThemUnderALimitAndInLittleMemory) {
   expectSameBits({scene_.get(), camera(*scene_), small});
 }
 
-TEST_F(SharedPicture, HasThemWithLightCutsSurfacesAndSlices) {
+TEST_F(SharedPicture, HasTheBitsWithLightCutsSurfacesAndSlices) {
   FrameOptions with = options();
   with.light = Light{};
   const Manifest& manifest = scene_->manifest();
@@ -145,13 +145,13 @@ TEST_F(SharedPicture, HasThemWithLightCutsSurfacesAndSlices) {
   expectSameBits({scene_.get(), inside(*scene_), with});
 }
 
-TEST_F(SharedPicture, HasThemWithOpenGl) {
+TEST_F(SharedPicture, HasTheBitsWithOpenGl) {
   Case what{scene_.get(), camera(*scene_), options()};
   what.backend = Backend::kOsmesa;
   expectSameBits(what, {2, 3});
 }
 
-TEST_F(SharedPicture, HasThemWhereARankHasNothingToDo) {
+TEST_F(SharedPicture, HasTheBitsWhereARankHasNothingToDo) {
   FrameOptions tiny = options();
   tiny.size = {40, 20};
   expectSameBits({scene_.get(), camera(*scene_), tiny}, {2, 3, 7});
@@ -172,7 +172,7 @@ TEST_F(SharedPicture, ARankReadsOnlyWhatItsTilesNeed) {
   EXPECT_LT(sum, 4 * whole);
 }
 
-TEST_F(SharedPicture, AFailureOfOneRankIsHeardOf) {
+TEST_F(SharedPicture, AFailureOfOneRankReachesAll) {
   EXPECT_THROW(runRanks(3,
                         [&](Ranks& ranks) {
                           FrameRenderer renderer(*scene_, 0, function(*scene_), Backend::kCpu);

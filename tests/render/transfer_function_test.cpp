@@ -151,7 +151,7 @@ TEST_F(TransferFunctionFile, IsTakenAsItIs) {
   EXPECT_NEAR(function.at(15).extinction, -std::log(0.5) / 5, 1e-12);
 }
 
-TEST_F(TransferFunctionFile, AListsFirstPresetIsUsedAndSaidSo) {
+TEST_F(TransferFunctionFile, TheFirstPresetOfAListIsUsedWhichIsReported) {
   Json other = plain_;
   other["Name"] = "other";
   const TransferFunction function = open(Json::array({plain_, other}).dump());
@@ -201,7 +201,7 @@ TEST_F(TransferFunctionFile, OpacityOneIsCapped) {
   EXPECT_NEAR(open(preset, nullptr, 2).at(12).extinction, -std::log(1e-4) / 2, 1e-9);
 }
 
-TEST_F(TransferFunctionFile, WithoutPointsGetsTheDefaultRampAndSaysSo) {
+TEST_F(TransferFunctionFile, WithoutPointsGetsTheDefaultRampWhichIsReported) {
   Json preset = plain_;
   preset.erase("Points");
   const TransferFunction function = open(preset);
@@ -276,7 +276,7 @@ TEST_F(TransferFunctionFile, AReversedRangeIsWrongUsage) {
   EXPECT_THROW(open(plain_, &range), UsageError);
 }
 
-TEST_F(TransferFunctionFile, NanColorIsReadAndItsIdlenessSaid) {
+TEST_F(TransferFunctionFile, NanColorIsReadButReportedAsUnused) {
   Json preset = plain_;
   preset["NanColor"] = {0.25, 0, 1};
   const TransferFunction function = open(preset);

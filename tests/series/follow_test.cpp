@@ -49,7 +49,7 @@ class Follow : public testing::Test {
   const TemporaryFolder folder;
 };
 
-TEST_F(Follow, IsToldOfChanges) {
+TEST_F(Follow, NoticesChanges) {
   generate(2);
   fs::rename(file("w_0001.fun"), file("later"));
   RunningProgram following(

@@ -72,7 +72,7 @@ TEST(TimePrediction, DecodesToTheSameNumbersInFewerBytes) {
   expectSame(decoded(third_timed, two), decoded(third_stream));
 }
 
-TEST(TimePrediction, IsLeftOutWhereItGainsNothing) {
+TEST(TimePrediction, IsNotUsedWhereItGainsNothing) {
   const std::vector<Row> rows{{0, kCount, kNoRow}};
   auto first = valuesAt(0, 1, 1), second = valuesAt(0, 2, 1);
   const SplatVariable values = decoded(encodeValuesStream(rows, first));

@@ -80,7 +80,7 @@ TEST(ClientMessage, RefusesWithOneLineThatNamesThePlace) {
   refuses("{\"type\": \"colours\", \"map\": \"\xff\xfe\"}", "is not JSON");
 }
 
-TEST(MessageRate, LetsAPersonPassAndAFloodNot) {
+TEST(MessageRate, AllowsAPersonsPaceAndRefusesAFlood) {
   MessageRate person;
   for (int n = 0; n < 6000; ++n) ASSERT_TRUE(person.take(n / 120.0)) << n;
   MessageRate flood;

@@ -24,7 +24,7 @@ glm::dmat3 randomAxes(std::mt19937& random) {
   return axes;
 }
 
-TEST(HalfCell, KeepsItsDirections) {
+TEST(BorderCode, KeepsItsDirections) {
   std::mt19937 random(1);
   for (int n = 0; n < 3000; ++n) {
     const glm::dmat3 axes = randomAxes(random);
@@ -43,7 +43,7 @@ TEST(HalfCell, KeepsItsDirections) {
   }
 }
 
-TEST(HalfCell, AlongTheFramesOwnAxes) {
+TEST(BorderCode, AlongTheFramesOwnAxes) {
   for (const double sign : {1.0, -1.0})
     for (int axis = 0; axis < 3; ++axis) {
       glm::dvec3 along(0.0);
@@ -53,13 +53,13 @@ TEST(HalfCell, AlongTheFramesOwnAxes) {
     }
 }
 
-TEST(HalfCell, OfNoDirectionIsAWholeCell) {
+TEST(BorderCode, OfNoDirectionIsAWholeCell) {
   EXPECT_EQ(packBorderCode({}), kNoBorder);
   EXPECT_EQ(inwardAxes(kNoBorder).count, 0);
   EXPECT_TRUE(isPossibleBorderCode(kNoBorder));
 }
 
-TEST(HalfCell, IsRefusedWhereNothingPacksToIt) {
+TEST(BorderCode, IsRefusedWhereNothingPacksToIt) {
   EXPECT_FALSE(isPossibleBorderCode(0x00000004));  // reversed, but no axis
   EXPECT_FALSE(isPossibleBorderCode(0x01000000));
   EXPECT_TRUE(isPossibleBorderCode(0x00000021));
@@ -67,7 +67,7 @@ TEST(HalfCell, IsRefusedWhereNothingPacksToIt) {
   EXPECT_FALSE(isPossibleBorderCode(0x00000082));
 }
 
-TEST(HalfCell, OfAnyBytesHasFiniteUnitAxes) {
+TEST(BorderCode, OfAnyBytesHasFiniteUnitAxes) {
   std::mt19937 random(2);
   for (int n = 0; n < 3000; ++n) {
     const InwardAxes axes = inwardAxes(static_cast<uint32_t>(random()) | 1);
@@ -138,7 +138,7 @@ TEST(MergedSplatAtAFace, IsDrawnAsACellIs) {
   expect_like(kHalfCellStyle.cut, 2);
 }
 
-TEST(HalfCell, SlopesAreThoseThatAreDrawn) {
+TEST(BorderCode, SlopesAreThoseThatAreDrawn) {
   const glm::dvec3 inward[] = {{0, 0, 1}}, slope(0.3, 0, 0.4);
   EXPECT_DOUBLE_EQ(drawnSlope(slope, kNoBorder), 0.5);
   EXPECT_DOUBLE_EQ(drawnSlope(slope, packBorderCode(inward)), 0.5);
@@ -146,7 +146,7 @@ TEST(HalfCell, SlopesAreThoseThatAreDrawn) {
   EXPECT_NEAR(drawnSlope(slope, packBorderCode(inward, 1)), std::hypot(0.3, wide), 0.01);
 }
 
-TEST(HalfCell, ItsPartsHaveItsWeight) {
+TEST(BorderCode, ItsPartsHaveItsWeight) {
   for (const BorderStyle& style : {kHalfCellStyle, kWholeCellStyle}) {
     float sum = 0;
     for (const BorderPart& part : style.parts) {

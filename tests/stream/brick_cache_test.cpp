@@ -79,7 +79,7 @@ TEST(BrickCache, ChargesEveryArray) {
   EXPECT_EQ(cache.statistics().evictions, 0u);
 }
 
-TEST(BrickCache, RoomThatIsNotKeptIsFreeAgain) {
+TEST(BrickCache, SpaceThatIsNotKeptIsFreeAgain) {
   BrickCache cache(BrickCache::charge(100));
   cache.beginEpoch({});
   for (int n = 0; n < 3; ++n) EXPECT_TRUE(cache.makeSlot(1, 100));
@@ -88,7 +88,7 @@ TEST(BrickCache, RoomThatIsNotKeptIsFreeAgain) {
   EXPECT_TRUE(put(cache, 2, 100));
 }
 
-TEST(BrickCache, ThrowsOutTheLeastRecentlyUsed) {
+TEST(BrickCache, EvictsTheLeastRecentlyUsed) {
   BrickCache cache(3 * BrickCache::charge(100));
   cache.beginEpoch({});
   for (const uint32_t brick : {1u, 2u, 3u}) put(cache, brick, 100);
@@ -119,7 +119,7 @@ TEST(BrickCache, KeepsWhatIsPinned) {
   EXPECT_TRUE(holds(*again, 1, 100));
 }
 
-TEST(BrickCache, KeepsWhatTheTurnWants) {
+TEST(BrickCache, KeepsBricksOfTheCurrentEpoch) {
   BrickCache cache(2 * BrickCache::charge(100));
   cache.beginEpoch({});
   put(cache, 1, 100);

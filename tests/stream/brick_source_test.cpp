@@ -202,7 +202,7 @@ TEST_F(BrickSourceTest, AReadThatFailsOnceIsTriedAgain) {
   EXPECT_EQ(takeAll(source, order_, 3, statistics), order_.size());
 }
 
-TEST_F(BrickSourceTest, DamageIsFoundAndStoodInFor) {
+TEST_F(BrickSourceTest, DamageIsFoundAndReplacedByAnAncestor) {
   const auto bricks = cache_->bricks();
   // A leaf in the middle, one of a cell's two bricks, and an inner brick.
   uint32_t leaf = kNoBrick, twin = kNoBrick;

@@ -166,7 +166,7 @@ TEST(Cache, TwoConversionsToOneOutputRefuse) {
   EXPECT_PRED2(says, errorOf([&] { CacheWriter second(path / "", true, RootCube{}, {}); }), "running");
 }
 
-TEST(Cache, ADeadConversionsRestIsCleared) {
+TEST(Cache, LeftoversOfAKilledConversionAreCleared) {
   const TemporaryFolder folder;
   fs::create_directories(folder.path() / "a.splats.partial/inner");
   overwriteFile(folder.path() / "a.splats.partial/lock", std::string(kPartialMark));
@@ -227,7 +227,7 @@ TEST(Cache, AForeignFolderBesideAMarkedCacheIsRefused) {
   EXPECT_EQ(bytesOfFile(partial / "precious"), "mine");
 }
 
-TEST(Cache, AConversionKilledBeforeItsMarkLeavesNothingInTheWay) {
+TEST(Cache, AConversionKilledBeforeItIsMarkedDoesNotBlockTheNext) {
   const TemporaryFolder folder;
   const fs::path target = folder.path() / "a.splats", partial = folder.path() / "a.splats.partial";
   fs::create_directory(partial);

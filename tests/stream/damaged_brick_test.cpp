@@ -81,7 +81,7 @@ TEST(DamagedBrick, SurvivesFlippedBits) {
   }
 }
 
-TEST(DamagedBrick, RefusesAnotherCount) {
+TEST(DamagedBrick, RefusesAWrongCount) {
   BrickSplats brick = randomBrick({}, Cell{}, 10);
   const EncodedBrick encoded = encodeBrick(RootCube{}, brick);
   SplatGeometry geometry;

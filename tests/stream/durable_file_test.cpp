@@ -62,7 +62,7 @@ TEST_F(DurableFile, ReplacesWhatIsThereAndFollowsLinks) {
   EXPECT_EQ(readTextFile(path), "new");
 }
 
-TEST_F(DurableFile, ThatFailsIsAsItWas) {
+TEST_F(DurableFile, AFailedReplacementKeepsTheOldFile) {
   constexpr int64_t FaultySystemCalls::*kFaults[] = {&FaultySystemCalls::fail_write_at,
                                                      &FaultySystemCalls::fail_sync_at,
                                                      &FaultySystemCalls::fail_rename_at};
@@ -89,7 +89,7 @@ TEST_F(DurableFile, ThatFailsIsAsItWas) {
   }
 }
 
-TEST_F(DurableFile, ThatCannotBePutBackIsReportedAsWritten) {
+TEST_F(DurableFile, AReplacementThatCannotBeUndoneIsReportedAsWritten) {
   writeFileDurably(path, "old");
   WithoutExchange calls;
   calls.fail_sync_at = 1;  // of the folder
@@ -111,7 +111,7 @@ TEST_F(DurableFile, TemporaryFilesHaveNamesOfTheirOwn) {
   EXPECT_THROW(TemporaryFile(folder / "none" / "file"), Error);
 }
 
-TEST_F(DurableFile, ThatAKilledRunHasLeftIsRemoved) {
+TEST_F(DurableFile, LeftoversOfAKilledRunAreRemoved) {
   fs::path left;
   const pid_t child = fork();
   ASSERT_GE(child, 0);

@@ -76,7 +76,7 @@ TEST(Manifest, NoBitOfItChangesUnnoticed) {
   }
 }
 
-TEST(Manifest, TellsOfCells) {
+TEST(Manifest, RecordsCellCentring) {
   Manifest m = example();
   EXPECT_FALSE(Manifest::fromJson(m.toJson(), "m").cells);
   m.cells = true;
@@ -210,7 +210,7 @@ TEST(Manifest, RefusesBracketsWithoutEnd) {
   EXPECT_EQ(Manifest::fromJson(json.dump(), "m").title.size(), 1001u);
 }
 
-TEST(Manifest, TextsAreOneLineAndNothingToATerminal) {
+TEST(Manifest, TextsAreOneLineWithoutControlCharacters) {
   Json json = withoutChecksum(example());
   json["title"] = "a\nb\x1b[2Jc\x7f";
   json["variables"][0]["name"] = "p\r\ncurvisplat: done";

@@ -249,7 +249,7 @@ TEST_F(PagerTest, JoinsReads) {
   EXPECT_LT(pager.statistics().requests, bricks() / 2);
 }
 
-TEST_F(PagerTest, GoesThroughTheDoubleOfTheSystem) {
+TEST_F(PagerTest, ReadsThroughSystemCallsThatATestReplaced) {
   FaultySystemCalls faulty;
   const ScopedSystemCalls scope(faulty);
   BrickPager pager(*cache_, 0, {});

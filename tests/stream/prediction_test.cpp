@@ -126,7 +126,7 @@ std::vector<std::byte> valuesWithRows(uint32_t count, const std::vector<uint64_t
   return planes.compress(std::as_bytes(std::span(&header, 1)));
 }
 
-TEST(Values, RefuseRowsThatLie) {
+TEST(Values, RefuseInvalidRows) {
   SplatVariable values;
   values.resize(8);
   const VariableArrays<float> out = arraysOf(values);

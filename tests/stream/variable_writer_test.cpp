@@ -35,7 +35,7 @@ class AddedVariable : public ::testing::Test {
   const std::filesystem::path path = folder / "a.splats";
 };
 
-TEST_F(AddedVariable, IsThereBesideTheOthers) {
+TEST_F(AddedVariable, IsReadBesideTheOthers) {
   const std::string geometry = bytesOfFile(path / "geometry.bin"), mach = bytesOfFile(path / "var.1.bin");
   {
     const CacheLock lock(path);
@@ -103,7 +103,7 @@ TEST_F(AddedVariable, IsNotThereIfAnySyncFails) {
   EXPECT_EQ(filesInCache(), files + 1);
 }
 
-TEST_F(AddedVariable, LeavesACacheAloneThatHasComeInItsPlace) {
+TEST_F(AddedVariable, LeavesAReplacedCacheAlone) {
   {
     const CacheLock lock(path);
     const CacheReader reader(path);
@@ -117,7 +117,7 @@ TEST_F(AddedVariable, LeavesACacheAloneThatHasComeInItsPlace) {
   EXPECT_EQ(filesInCache(), 6u);
 }
 
-TEST_F(AddedVariable, IsOneProgramsWorkAtATime) {
+TEST_F(AddedVariable, IsLockedAgainstOtherPrograms) {
   const CacheLock lock(path);
   EXPECT_THROW(CacheLock{path}, Error);
   EXPECT_NO_THROW(CacheReader{path});

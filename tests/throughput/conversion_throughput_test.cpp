@@ -55,7 +55,7 @@ TEST(ConversionThroughput, LeavesNothingWhenItIsStopped) {
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
-TEST(ConversionThroughput, AsksForSpaceBeforeAnyWork) {
+TEST(ConversionThroughput, ChecksFreeSpaceBeforeAnyWork) {
   const TemporaryFolder folder;
   Measurements measurements;
   Progress progress;

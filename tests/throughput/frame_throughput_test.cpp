@@ -134,7 +134,7 @@ TEST_F(ThroughputOfACache, EveryStageIsMeasuredOrLeftOut) {
   EXPECT_EQ(report.backends.size(), 3u);
 }
 
-TEST_F(ThroughputOfACache, NothingToSeeIsSaid) {
+TEST_F(ThroughputOfACache, AnEmptyPictureIsReported) {
   const VariableInfo& info = cache_->manifest().variables[0];
   function_ = TransferFunction::preset("viridis", info.max + 100, info.max + 101, 1);
   Measurements measurements;

@@ -56,7 +56,7 @@ TEST_F(PageCache, WhatWasReadIsInMemoryAndWhatWasDroppedIsNot) {
   EXPECT_EQ(residenceOf(files[1]), (PageResidence{kPages, 0}));
 }
 
-TEST_F(PageCache, TellsOfAPartOfAFile) {
+TEST_F(PageCache, CountsPagesOfAPartOfAFile) {
   const auto path = writeFile(folder_ / "a");
   const auto page = static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
   readAll(path);
@@ -75,7 +75,7 @@ TEST_F(PageCache, DropsWhatWasJustWritten) {
 }
 
 // Pages that another mapping uses stay, and that is said.
-TEST_F(PageCache, SaysWhenPagesStay) {
+TEST_F(PageCache, ReportsPagesThatStay) {
   const std::array files{writeFile(folder_ / "a")};
   const InputFile opened(files[0]);
   const int fd = SystemCalls::current().open(files[0].c_str(), 0, 0);
@@ -90,7 +90,7 @@ TEST_F(PageCache, SaysWhenPagesStay) {
   EXPECT_EQ(dropPages(files), std::nullopt);
 }
 
-TEST(PageCacheInMemory, StaysAndIsCalledByItsName) {
+TEST(PageCacheInMemory, OfAFileSystemInMemoryStaysAndIsNamed) {
   if (!std::filesystem::is_directory("/dev/shm") || fileSystemOf("/dev/shm") != "tmpfs")
     GTEST_SKIP() << "/dev/shm is no tmpfs";
   const auto path = std::filesystem::path("/dev/shm") / fmt::format("curvisplat-test-{}", ::getpid());

@@ -173,14 +173,14 @@ TEST(Verdict, ADifferenceWithinTheSpreadIsNone) {
   EXPECT_TRUE(says(judge(four, speeds(), cores), "--threads 4 instead of 1: no difference measured"));
 }
 
-TEST(Verdict, TellsOfTimeThatNoStageTakes) {
+TEST(Verdict, ReportsTimeThatNoStageTakes) {
   JudgedFrame judged = frame();
   EXPECT_FALSE(says(judge(judged, speeds(), {}), "overhead"));
   judged.seconds = 0.94;  // twice the stages' 0.47
   EXPECT_TRUE(says(judge(judged, speeds(), {}), "50 % of the frame is overhead"));
 }
 
-TEST(Verdict, SaysNothingOfADiskThatWasNotMeasured) {
+TEST(Verdict, DoesNotJudgeADiskThatWasNotMeasured) {
   StageSpeeds unknown = speeds();
   unknown.read_bytes_s = std::nullopt;
   EXPECT_FALSE(says(judge(frame(), unknown, {}), "the disk"));

@@ -77,7 +77,7 @@ TEST(EditedFunction, ChangesMakeItNoPreset) {
   EXPECT_EQ(edited.preset(), "");
 }
 
-TEST(EditedFunction, RangesWithoutSenseAreNotTaken) {
+TEST(EditedFunction, InvalidRangesAreRefused) {
   EditedFunction edited("grey", -1, 1, 1);
   EXPECT_FALSE(edited.setLogScale(true));
   EXPECT_FALSE(edited.setRange(2, 2));

@@ -32,7 +32,7 @@ TEST(RenderCommand, LeavesDefaultsOut) {
             "--parallel-scale 0.7");
 }
 
-TEST(RenderCommand, SaysAll) {
+TEST(RenderCommand, HasEveryOption) {
   ViewState state = firstViewOf(manifest(), {300, 200});
   chooseVariable(state, manifest(), "u v");
   state.camera.position = {0.1, -3, 2.0 / 3};
@@ -87,7 +87,7 @@ TEST(RenderCommand, OfAnAutomaticFunctionHasItsScale) {
   expectParts(commandOf(state), {"--tf inferno", "--asinh 1,0.25", "--opacity 0:0.5,0.25:0,1:0.75"});
 }
 
-TEST(RenderCommand, OnlyWhatOptionsCannotSayNeedsAFile) {
+TEST(RenderCommand, OnlySettingsWithoutAnOptionNeedAFile) {
   EditedFunction function("viridis", 1, 2, 1);
   function.addPoint(0.5, 0.5);
   EXPECT_FALSE(needsFile(function));
