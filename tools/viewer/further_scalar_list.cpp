@@ -1,9 +1,9 @@
 #include "tools/viewer/further_scalar_list.h"
 
 #include <chrono>
+#include <exception>
 #include <utility>
 
-#include "stream/base/error.h"
 #include "stream/base/thread_name.h"
 
 namespace curvisplat {
@@ -35,7 +35,7 @@ const FurtherScalars& FurtherScalarList::known() {
   known_.is_looking = false;
   try {
     known_.scalars = found_.get();
-  } catch (const Error& error) {
+  } catch (const std::exception& error) {
     known_.error = error.what();
   }
   return known_;
