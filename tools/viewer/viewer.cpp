@@ -14,6 +14,7 @@
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "tools/viewer/cache_view.h"
+#include "tools/viewer/further_scalar_list.h"
 #include "tools/viewer/menus.h"
 #include "tools/viewer/opening.h"
 #include "tools/viewer/state_files.h"
@@ -46,6 +47,11 @@ class Viewer {
     if (!options.files.empty()) open(options.files);
   }
 
+  ~Viewer() {
+    opening_.reset();
+    view_.reset();
+    FurtherScalarList::waitForThreads();
+  }
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
 
