@@ -137,6 +137,13 @@ class VdbExport(unittest.TestCase):
         self.assertFalse((self.folder / "never.vdb").exists())
         self.assertEqual([p.name for p in self.folder.iterdir() if p.name.startswith(".curvisplat")], [])
 
+    def test_options_of_other_files_are_refused(self):
+        of_splats = (["--opacity", "ramp"], ["--range", "0,1"], ["--tf", "viridis"], ["--max-splats", "1M"], ["--no-comparison"])
+        for name, options in [("never.vdb", words) for words in of_splats] + [("never.ply", ["--voxels", 20])]:
+            message = run("export", self.folder / "ring.splats", "-o", self.folder / name, *options, fails=True)
+            self.assertIn(f"{options[0]} cannot be combined with", message)
+            self.assertFalse((self.folder / name).exists())
+
 
 if __name__ == "__main__":
     unittest.main(verbosity=1)

@@ -101,6 +101,21 @@ TEST_F(KeptCaches, RenderAddsAScalarThatTheFilesHave) {
   EXPECT_NE(unknown.err.find("did you mean volume?"), std::string::npos) << unknown.err;
 }
 
+/// One adds it, the others wait; the pattern is not expanded by a shell.
+TEST_F(KeptCaches, ProcessesThatNeedOneScalarAtOnceAllDraw) {
+  ASSERT_EQ(render("a.xyz", "a.fun").status, 0);
+  std::vector<std::unique_ptr<RunningProgram>> all;
+  for (int n = 1; n <= 4; ++n)
+    all.push_back(std::make_unique<RunningProgram>(std::vector<std::string>{
+        "render", "a.xyz", "a.fu*", "-o", "part_%d.png", "--size", "60x50", "--scalar", "volume", "--orbit",
+        "90", "--frames", "4", "--part", fmt::format("{}/4", n)}));
+  for (const auto& one : all) {
+    const ProgramResult result = one->wait();
+    EXPECT_EQ(result.status, 0) << result.err;
+  }
+  EXPECT_EQ(kept().size(), 1u);
+}
+
 TEST_F(KeptCaches, ErrorsNameTheFile) {
   std::ofstream("no.xyz") << "no grid";
   const ProgramResult result = render("no.xyz", "a.fun");
@@ -144,11 +159,15 @@ class WindowOpening : public KeptCaches {
     const ProgramResult result = RunningProgram(words, "/usr/bin/env").wait();
     EXPECT_EQ(result.status, 0) << result.err;
   }
-  /// The folder of the only cache that is kept or being made.
-  static fs::path onlyPlace() {
-    for (const auto& entry : fs::directory_iterator("kept/curvisplat"))
-      if (fs::exists(entry.path() / "used")) return entry.path();
-    return {};
+  /// How many folders of previews there are.
+  static size_t previewFolders() {
+    size_t count = 0;
+    std::error_code gone;
+    for (const auto& place : fs::directory_iterator("kept/curvisplat"))
+      for (fs::directory_iterator at(place, gone), end; !gone && at != end; at.increment(gone))
+        for (const char* const name : {"preview.", "series."})
+          count += at->path().filename().string().starts_with(name);
+    return count;
   }
 };
 
@@ -195,10 +214,10 @@ TEST_F(WindowOpening, ShowsAPreviewUntilTheWholeIsThere) {
   run({"generate", "half-annulus", "--size", "128x96x96", "-o", "middle"});
   openWith({"middle.xyz", "middle.fun"});
   EXPECT_TRUE(eventually([] { return hasWidget("state preview of every 2nd index plane"); }));
-  EXPECT_TRUE(fs::exists(onlyPlace() / "preview"));
+  EXPECT_EQ(previewFolders(), 1u);
   EXPECT_TRUE(eventually([] { return !hasWidget("state preview") && hasWidget("state "); }, 300));
   EXPECT_FALSE(hasWidget("opening"));
-  EXPECT_FALSE(fs::exists(onlyPlace() / "preview"));
+  EXPECT_EQ(previewFolders(), 0u);
   ASSERT_EQ(kept().size(), 1u);
   EXPECT_EQ(kept()[0].filename(), "middle.splats");
   cache_ = "middle";
@@ -220,6 +239,43 @@ TEST_F(WindowOpening, APreviewThatIsStoppedSaysSo) {
   EXPECT_TRUE(hasWidget("state preview"));
   close();
   EXPECT_TRUE(kept().empty());
+}
+
+/// The second preview is not the first one's, which is removed when the view changes.
+TEST_F(WindowOpening, AGridThatWasStoppedIsOpenedAgain) {
+  run({"generate", "half-annulus", "--size", "256x160x160", "-o", "large"});
+  openWith({"large.xyz", "large.fun"});
+  EXPECT_TRUE(eventually([] { return hasWidget("state preview"); }));
+  click("stop opening");
+  EXPECT_TRUE(eventually([] { return hasWidget("message Stopped"); }));
+  EXPECT_EQ(previewFolders(), 1u);
+  drop({"large.xyz", "large.fun"});
+  EXPECT_TRUE(eventually([] { return previewFolders() == 2; }));
+  EXPECT_TRUE(eventually([] { return previewFolders() == 1; }));  // the view has changed
+  click("stop opening");
+  cache_ = "large";
+  press("x");  // reads more of it
+  save();
+  EXPECT_FALSE(hasWidget("message large"));
+  cache_ = "a";
+  close();
+  EXPECT_EQ(previewFolders(), 0u);
+}
+
+TEST_F(WindowOpening, AnErrorOfAPictureIsSaidAndTheWindowLives) {
+  fs::copy("a.splats", "gone.splats", fs::copy_options::recursive);
+  cache_ = "gone";
+  open();
+  save();
+  fs::remove_all("gone.splats");
+  chooseScalar("volume");  // whose files are opened now
+  EXPECT_TRUE(eventually([] { return hasWidget("message "); }));
+  press("x");  // asks again
+  drop({"a.splats"});
+  EXPECT_TRUE(eventually([] { return titleOfWindow().starts_with("a.splats"); }));
+  cache_ = "a";
+  save();
+  close();
 }
 
 /// What was changed in the preview stays when the whole comes.
@@ -262,6 +318,21 @@ TEST_F(WindowOpening, ASeriesIsOpened) {
   EXPECT_EQ(kept().size(), 1u);  // the same one
 }
 
+/// Of a series that was stopped nothing stays once the window has left it.
+TEST_F(WindowOpening, ASeriesThatIsStoppedLeavesNothing) {
+  run({"generate", "wake", "--size", "96x64x48", "--steps", "8", "-o", "long"});
+  std::vector<std::string> files{"long.xyz"};
+  for (int n = 0; n < 8; ++n) files.push_back(fmt::format("long_{:04}.fun", n));
+  openWith(files);
+  EXPECT_TRUE(eventually([] { return hasWidget("state preview of the first time step"); }));
+  click("stop opening");
+  EXPECT_TRUE(eventually([] { return !hasWidget("stop opening"); }));
+  EXPECT_EQ(previewFolders(), 1u);
+  close();
+  EXPECT_EQ(previewFolders(), 0u);
+  EXPECT_TRUE(kept().empty());
+}
+
 class FurtherScalarTest : public WindowOpening {
  protected:
   void SetUp() override {
@@ -282,8 +353,7 @@ TEST_F(FurtherScalarTest, AScalarOfTheSourcesIsAddedWhenItIsChosen) {
     return info.out.find("volume") != std::string::npos;
   }));
   saveAndCopy();
-  while (!eventually([] { return !hasWidget("opening"); }, 5)) {
-  }
+  ASSERT_TRUE(eventually([] { return !hasWidget("opening"); }, 300));
   saveAndCopy();
   press("ctrl+z");  // the scalar before
   saveAndCopy();

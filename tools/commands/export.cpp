@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <glm/geometric.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "render/export/gaussian_picture.h"
 #include "render/export/vdb_file.h"
 #include "render/frame/frame.h"
+#include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "stream/base/progress.h"
 #include "stream/cache/cache_reader.h"
@@ -33,12 +35,14 @@ namespace {
 struct ExportArguments {
   std::filesystem::path cache, output;
   ScalarArguments scalar;
-  std::string max_splats = "1M", voxels = "256", memory = "512M";
+  std::optional<std::string> max_splats, voxels;
+  std::string memory = "512M";
   StepArguments step;
   bool no_comparison = false;
 };
 
 constexpr uint64_t kMaxVoxels = 8192;  // along a side
+constexpr const char *kDefaultSplats = "1M", *kDefaultVoxels = "256";
 
 constexpr ImageSize kComparedSize{512, 512};
 
@@ -92,7 +96,7 @@ double mebibytesOf(const std::filesystem::path& file) {
 
 void exportVdb(const ExportArguments& arguments) {
   VdbOptions options;
-  const uint64_t voxels = parseCount("--voxels", arguments.voxels);
+  const uint64_t voxels = parseCount("--voxels", arguments.voxels.value_or(kDefaultVoxels));
   if (voxels > kMaxVoxels)
     throw UsageError("--voxels {}: expected at most {} along the longest side", voxels, kMaxVoxels);
   options.voxels = static_cast<uint32_t>(voxels);
@@ -107,13 +111,28 @@ void exportVdb(const ExportArguments& arguments) {
              report.voxel_size, mebibytesOf(arguments.output));
 }
 
+/// Grids hold the scalar itself, as it is stored; splats are drawn.
+void refuseOptionsOfOtherFiles(const ExportArguments& arguments, bool vdb) {
+  if (!vdb && arguments.voxels)
+    throw UsageError("--voxels cannot be combined with {}: it is of .vdb files; give --max-splats",
+                     arguments.output.string());
+  std::string given = givenFunctionOptions(arguments.scalar);
+  if (given.empty() && arguments.max_splats) given = "--max-splats";
+  if (given.empty() && arguments.no_comparison) given = "--no-comparison";
+  if (vdb && !given.empty())
+    throw UsageError(
+        "{} cannot be combined with {}: a .vdb file has the values of the scalar, without colours", given,
+        arguments.output.string());
+}
+
 void exportCache(const ExportArguments& arguments) {
   const bool vdb = arguments.output.extension() == ".vdb";
   if (!vdb) checkGaussianName(arguments.output);
+  refuseOptionsOfOtherFiles(arguments, vdb);
   checkFunctionArguments(arguments.scalar);
   checkOutputFile("-o", arguments.output, {arguments.cache, arguments.scalar.transfer_function.value_or("")});
   if (vdb) return exportVdb(arguments);
-  const uint64_t max_splats = parseCount("--max-splats", arguments.max_splats);
+  const uint64_t max_splats = parseCount("--max-splats", arguments.max_splats.value_or(kDefaultSplats));
   const uint64_t memory = parseMemory("--memory", arguments.memory);
 
   const CacheReader cache = openAtStep(arguments.cache, arguments.step);
@@ -162,9 +181,9 @@ void addExport(CLI::App& app) {
   command
       ->add_option("--max-splats", arguments->max_splats,
                    "Splat limit, such as 8M or 500K; the largest detail is kept first")
-      ->capture_default_str();
+      ->default_str(kDefaultSplats);
   command->add_option("--voxels", arguments->voxels, ".vdb: voxels along the longest side of the data")
-      ->capture_default_str();
+      ->default_str(kDefaultVoxels);
   command
       ->add_option("--memory", arguments->memory,
                    "Memory limit for the grids, or for the pictures of the comparison")

@@ -29,7 +29,6 @@
 #include "tools/options/channel_arguments.h"
 #include "tools/options/frame_arguments.h"
 #include "tools/options/frame_part.h"
-#include "tools/options/further_scalars.h"
 #include "tools/options/kept_caches.h"
 #include "tools/options/motion_in_time.h"
 #include "tools/options/opacity_arguments.h"
@@ -173,9 +172,7 @@ std::filesystem::path cacheToDraw(const RenderArguments& arguments) {
   const StopOnSignals stopping(progress);
   KeptCacheEvents events;
   events.say = [](const std::string& text) { printMessage("{}", text); };
-  std::filesystem::path cache = keptCacheOf(files, progress, events);
-  addMissingScalars(cache, files, {arguments.scalar.scalar, arguments.opacity.by.scalar}, progress);
-  return cache;
+  return keptCacheOf(files, progress, events, {arguments.scalar.scalar, arguments.opacity.by.scalar});
 }
 
 constexpr double kAxesRoom = 0.17;  // around the data, of its box

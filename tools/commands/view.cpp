@@ -75,7 +75,7 @@ ConversionServices conversionServices() {
     KeptCacheEvents kept;
     kept.say = events.say;
     kept.preview = [&](const KeptPreview& preview) {
-      events.preview({preview.cache, preview.whole, whatOf(preview)});
+      events.preview({preview.cache, preview.whole, whatOf(preview), preview.folder});
     };
     return keptCacheOf(files, progress, kept);
   };

@@ -20,7 +20,7 @@ struct FurtherScalar {
 std::vector<std::filesystem::path> sourcesOf(const Manifest& manifest, const std::filesystem::path& cache);
 
 /// What `files` have and `cache` lacks, of the same centring, in the order of the files. Opens the files. Throws Error if
-/// they cannot be opened, or if the cache takes no further scalars: an unstructured grid's, or a series.
+/// they cannot be opened, or if the cache takes no further scalars: a series.
 std::vector<FurtherScalar> furtherScalarsOf(const std::filesystem::path& cache,
                                             const std::vector<std::filesystem::path>& files);
 
@@ -29,7 +29,8 @@ std::vector<FurtherScalar> furtherScalarsOf(const std::filesystem::path& cache,
 void addFurtherScalar(const std::filesystem::path& cache, const std::vector<std::filesystem::path>& files,
                       const std::string& name, Progress& progress);
 
-/// Adds those of `names` that the cache lacks and the files have; passes over empty names and others.
+/// Adds those of `names` that the cache lacks and the files have; passes over empty names and others. Not while
+/// another process adds to the cache: keptCacheOf() has its lock.
 void addMissingScalars(const std::filesystem::path& cache, const std::vector<std::filesystem::path>& files,
                        const std::vector<std::string>& names, Progress& progress);
 

@@ -19,6 +19,7 @@
 #include "stream/base/checksum.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
+#include "tools/options/further_scalars.h"
 #include "tools/options/option_parsers.h"
 
 namespace curvisplat {
@@ -211,7 +212,8 @@ std::string namesOf(const std::vector<fs::path>& files) {
   return names;
 }
 
-fs::path keptCacheOf(const std::vector<fs::path>& given, Progress& progress, const KeptCacheEvents& events) {
+fs::path keptCacheOf(const std::vector<fs::path>& given, Progress& progress, const KeptCacheEvents& events,
+                     const std::vector<std::string>& scalars) {
   const auto folder = keptFolder();
   if (!folder)
     throw Error(
@@ -229,6 +231,7 @@ fs::path keptCacheOf(const std::vector<fs::path>& given, Progress& progress, con
   {
     const MakingLock lock(place / "used", progress);
     if (!fs::exists(cache / "manifest.json", error)) makeKeptCache(files, cache, progress, events);
+    addMissingScalars(cache, files, scalars, progress);
     fs::last_write_time(place / "used", fs::file_time_type::clock::now(), error);
   }
   limitKeptCaches(*folder, limit, place);

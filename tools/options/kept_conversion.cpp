@@ -16,6 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char *kPreview = "preview", *kSeries = "series";  // names of folders
+
 ConvertOptions optionsFor(const fs::path& output, const std::string& title) {
   ConvertOptions options;
   options.output = output;
@@ -31,25 +33,30 @@ void sayAll(const KeptCacheEvents& events, const GridDescription& source, const 
   for (const std::string& note : report.notes) events.say("note: " + note);
 }
 
+uint64_t nodesOf(const GridSource& grid) {
+  uint64_t nodes = 0;
+  for (const GridBlock& block : grid.description().blocks) nodes += block.nodes();
+  return nodes;
+}
+
 /// A cache of every n-th index plane, if the grid is large. A grid that cannot be thinned, or a preview that fails, has
 /// none: the conversion of the whole says what is wrong.
 void makePreview(const DataSource& source, const ConvertOptions& whole, Progress& progress,
                  const KeptCacheEvents& events) {
   const auto* const grid = dynamic_cast<const GridSource*>(&source);
   if (!events.preview || !grid) return;
-  uint64_t nodes = 0;
-  for (const GridBlock& block : grid->description().blocks) nodes += block.nodes();
-  if (nodes <= kNodesWithoutPreview) return;
+  if (nodesOf(*grid) <= kNodesWithoutPreview) return;
   const uint64_t stride = strideFor(grid->description(), kNodesWithoutPreview / 4);
-  const fs::path folder = whole.output.parent_path() / "preview";
+  const auto coarse = thinned(*grid, stride);
+  if (nodesOf(*coarse) > kNodesWithoutPreview) return;  // of many small blocks
   ConvertOptions options = whole;
-  options.output = folder / whole.output.filename();
-  options.temporary_folder = folder;
   options.surfaces = false;
   try {
-    fs::create_directories(folder);
-    convert(*thinned(*grid, stride), options, progress);
-    events.preview({options.output, whole.output, stride});
+    const auto folder = std::make_shared<const PreviewFolder>(whole.output.parent_path(), kPreview);
+    options.output = folder->path() / whole.output.filename();
+    options.temporary_folder = folder->path();
+    convert(*coarse, options, progress);
+    events.preview({options.output, whole.output, stride, folder});
   } catch (const Interrupted&) {
     throw;
   } catch (const Error&) {
@@ -57,29 +64,33 @@ void makePreview(const DataSource& source, const ConvertOptions& whole, Progress
   }
 }
 
-/// A series is made beside its place, since a cache of its first steps looks complete.
+/// A series is made beside its place, since a cache of its first steps looks complete. It is not moved when it is, since
+/// a view may read it: a link takes the place.
 void makeSeries(ConvertArguments& arguments, const fs::path& output, Progress& progress,
                 const KeptCacheEvents& events) {
-  const fs::path folder = output.parent_path() / "series";
-  fs::create_directories(folder);
-  arguments.output = folder / output.filename();
+  const auto folder = std::make_shared<PreviewFolder>(output.parent_path(), kSeries);
+  arguments.output = folder->path() / output.filename();
   const std::vector<StepFiles> steps = stepsOf(arguments.grid);
   SeriesOptions options;
   options.convert = optionsFor(arguments.output, arguments.grid.grid.stem().string());
   convertSeries(seriesInput(arguments, steps), options, progress, [&](const SeriesEvent& event) {
     if (!event.converted) return;
     if (event.source) sayAll(events, *event.source, *event.converted);
-    if (events.preview) events.preview({arguments.output, output, 1});
+    if (events.preview) events.preview({arguments.output, output, 1, folder});
   });
-  fs::rename(arguments.output, output);
+  std::error_code error;
+  if (fs::is_symlink(output, error)) fs::remove(output, error);  // to a series that someone has removed
+  fs::create_directory_symlink(folder->path().filename() / output.filename(), output, error);
+  if (error) throw Error("{}: cannot create the link: {}", output.string(), error.message());
+  folder->keep();
 }
 
 }  // namespace
 
 void makeKeptCache(const std::vector<fs::path>& files, const fs::path& output, Progress& progress,
                    const KeptCacheEvents& events) {
-  std::error_code ignored;  // what an interrupted conversion left
-  for (const char* const left : {"preview", "series"}) fs::remove_all(output.parent_path() / left, ignored);
+  for (const char* const name : {kPreview, kSeries})
+    PreviewFolder::removeLeftOnes(output.parent_path(), name);
   ConvertArguments arguments;
   arguments.grid.grid = files.front();
   arguments.grid.solutions.assign(files.begin() + 1, files.end());

@@ -5,10 +5,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "stream/base/progress.h"
+#include "tools/options/preview_folder.h"
 
 namespace curvisplat {
 
@@ -16,6 +18,7 @@ namespace curvisplat {
 struct KeptPreview {
   std::filesystem::path cache, whole;  // what there is now, and what it will be
   uint64_t stride = 1;                 // it is of every stride-th index plane; 1: of the first time step
+  std::shared_ptr<const PreviewFolder> folder;  // of `cache`, which is there while this is held
 };
 
 /// Who is told of a conversion. Called from the thread that converts.
@@ -28,8 +31,9 @@ struct KeptCacheEvents {
 inline constexpr uint64_t kNodesWithoutPreview = 1'000'000;
 
 /// Converts the grid or the series of time steps in `files` to `output`, which is complete or does not exist. Previews
-/// and scratch files are in the same folder, and go with it; a preview stays until the next conversion there. Throws
-/// Error as opening and converting do, Interrupted once `progress` is stopped.
+/// and scratch files are in the same folder, and go with it; a preview stays while it is held. A series stays in the
+/// folder of its preview, and `output` links to it. Throws Error as opening and converting do, Interrupted once
+/// `progress` is stopped.
 void makeKeptCache(const std::vector<std::filesystem::path>& files, const std::filesystem::path& output,
                    Progress& progress, const KeptCacheEvents& events);
 

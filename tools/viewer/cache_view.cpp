@@ -62,12 +62,13 @@ CacheView::CacheView(CacheReader cache, const ViewerOptions& options, Window& wi
       history_(options.carried ? options.carried->history : History(state_)),
       panels_(cache_),
       playback_(cache_.series().steps.size()),
-      frames_(cache_, options.backend, Window::wake),
+      backend_(options.backend),
       picture_(window.gl()),
       overlay_(window.gl()),
       views_(savedViewsOf(whole())),
       further_(options.conversion, cache_.cachePath(), sourcesFor(cache_, options), Window::wake),
       probe_(cache_) {
+  frames_.emplace(cache_, backend_, Window::wake);
   playback_.goTo(cache_.step());
   navigation_.setBounds(state_.scale * manifest().lower, state_.scale * manifest().upper);
 }
@@ -143,17 +144,35 @@ void CacheView::draw(const WindowLayout& layout) {
 }
 
 void CacheView::takeFrame() {
+  if (frames_failed_) return;
   try {
-    if (std::optional<ShownFrame> frame = frames_.take()) {
+    if (std::optional<ShownFrame> frame = frames_->take()) {
       picture_.set(frame->bytes, frame->image.size);
       shown_ = std::move(frame);
+      frame_error_.clear();
       annotate();
     }
-    if (std::optional<ShownValues> values = frames_.takeValues()) values_ = std::move(values);
+    if (std::optional<ShownValues> values = frames_->takeValues()) values_ = std::move(values);
   } catch (const UsageError& error) {
-    printMessage("warning: {}", error.what());
-    say(error.what(), true);
+    reportFrame(error);
+  } catch (const Error& error) {
+    reportFrame(error);
+    frames_failed_ = true;
   }
+}
+
+/// An error of a picture, such as a disk that is gone: the window and what it shows stay.
+void CacheView::reportFrame(const Error& error) {
+  if (std::exchange(frame_error_, error.what()) != error.what()) printMessage("warning: {}", error.what());
+  say(error.what(), true);
+}
+
+/// The loop has ended with an error: what is asked now is tried by a new one, whose requests are counted anew.
+void CacheView::restartFrames() {
+  frames_.emplace(cache_, backend_, Window::wake);
+  frames_failed_ = false;
+  if (shown_) shown_->request = 0;
+  values_asked_for_ = 0;
 }
 
 /// Outline and axes are those of the picture that is shown, not of the camera that it will have next.
@@ -177,7 +196,7 @@ void CacheView::react(const WindowLayout& layout) {
 
 void CacheView::drawPanels(const WindowLayout& layout) {
   PanelFacts facts;
-  facts.shown = {shown_ ? &shown_->statistics : nullptr, isFinal(), frames_.busy(), frames_.backendName()};
+  facts.shown = {shown_ ? &shown_->statistics : nullptr, isFinal(), frames_->busy(), frames_->backendName()};
   facts.flies = navigation_.flies();
   facts.playback = &playback_;
   facts.views = views_;
@@ -212,8 +231,9 @@ void CacheView::ask(bool moving) {
   request.moving = moving;
   request.step = playback_.step();
   request.next_step = playback_.next();
-  request.target_s = target_s_.value_or(frames_.drawsInSoftware() ? 0.1 : 0.033);
-  request_ = frames_.request(std::move(request));
+  if (frames_failed_) restartFrames();
+  request.target_s = target_s_.value_or(frames_->drawsInSoftware() ? 0.1 : 0.033);
+  request_ = frames_->request(std::move(request));
   was_moving_ = moving;
   changed_ = false;
   rests_ = false;

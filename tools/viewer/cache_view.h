@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "stream/base/error.h"
 #include "stream/cache/cache_reader.h"
 #include "tools/viewer/file_dialog.h"
 #include "tools/viewer/frame_loop.h"
@@ -71,6 +72,8 @@ class CacheView {
   ViewState openingState(const ViewerOptions& options, ImageSize picture);
   void takeScene(const SurfaceScene& scene, const ViewerOptions& options, ViewState& state) const;
   void takeFrame();
+  void reportFrame(const Error& error);
+  void restartFrames();
   void react(const WindowLayout& layout);
   void drawPanels(const WindowLayout& layout);
   void ask(bool moving);
@@ -111,7 +114,10 @@ class CacheView {
   PlaneHandles handles_;
   Playback playback_;
   Navigation navigation_;
-  FrameLoop frames_;
+  const Backend backend_;
+  std::optional<FrameLoop> frames_;
+  bool frames_failed_ = false;  // the loop has ended
+  std::string frame_error_;     // the last that was said, until a picture comes
   PictureTexture picture_, overlay_;
   std::vector<std::string> views_;
   FurtherScalarList further_;

@@ -90,9 +90,9 @@ void CacheView::probe(const WindowLayout& layout) {
     if (!pointed) probed_.clear();
   }
   const bool rests = pointed && glfwGetTime() - pointed_since_s_ > kPointedForSeconds;
-  if ((rests || clicked_) && isFinal() && !frames_.busy() && values_asked_for_ != request_) {
+  if ((rests || clicked_) && isFinal() && !frames_->busy() && values_asked_for_ != request_) {
     values_asked_for_ = request_;
-    frames_.requestValues();
+    frames_->requestValues();
   }
   if (values_ && values_->request == request_) {
     const auto question = [&](const glm::dvec2& pixel) -> std::optional<PointProbe::Question> {
@@ -152,7 +152,7 @@ void CacheView::drawStatus(const WindowLayout& layout) {
   nameArea("status " + text, place.x, place.y, place.width, place.height);
   const std::string state =
       (preview_ ? fmt::format("preview of {}, ", preview_->what) : "") +
-      stateOfPicture({shown_ ? &shown_->statistics : nullptr, isFinal(), frames_.busy(), ""});
+      stateOfPicture({shown_ ? &shown_->statistics : nullptr, isFinal(), frames_->busy(), ""});
   ImGui::SameLine(static_cast<float>(place.width) - ImGui::CalcTextSize(state.c_str()).x -
                   2 * ImGui::GetStyle().FramePadding.x);
   ImGui::TextDisabled("%s", state.c_str());

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,8 @@ namespace curvisplat {
 /// A coarse cache that is shown while the whole one is made.
 struct Preview {
   std::filesystem::path cache, whole;
-  std::string what;  // "every 4th index plane"
+  std::string what;                    // "every 4th index plane"
+  std::shared_ptr<const void> folder;  // what keeps `cache` there while this is held
 };
 
 /// Whom a conversion tells what it has.

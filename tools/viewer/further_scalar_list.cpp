@@ -1,12 +1,25 @@
 #include "tools/viewer/further_scalar_list.h"
 
 #include <chrono>
+#include <exception>
 #include <utility>
 
-#include "stream/base/error.h"
 #include "stream/base/thread_name.h"
 
 namespace curvisplat {
+namespace {
+
+/// What the threads of lists that are gone will find, and nobody asks for. For the main thread.
+std::vector<std::future<std::vector<SourceScalar>>>& leftThreads() {
+  static std::vector<std::future<std::vector<SourceScalar>>> left;
+  return left;
+}
+
+bool isReady(const std::future<std::vector<SourceScalar>>& found) {
+  return found.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+}
+
+}  // namespace
 
 FurtherScalarList::FurtherScalarList(const ConversionServices& services, std::filesystem::path cache,
                                      std::vector<std::filesystem::path> files, void (*wake)())
@@ -17,25 +30,36 @@ FurtherScalarList::FurtherScalarList(const ConversionServices& services, std::fi
   }
 }
 
+FurtherScalarList::~FurtherScalarList() {
+  std::erase_if(leftThreads(), isReady);
+  if (found_.valid() && !isReady(found_)) leftThreads().push_back(std::move(found_));
+}
+
+void FurtherScalarList::waitForThreads() {
+  leftThreads().clear();
+}
+
 void FurtherScalarList::look() {
   if (files_.empty() || std::exchange(asked_, true)) return;
   known_.is_looking = true;
-  found_ = std::async(std::launch::async, [this] {
-    nameThisThread("scalars");
-    struct Wake {
-      void (*wake)();
-      ~Wake() { wake(); }
-    } const at_the_end{wake_};
-    return services_.further_scalars(cache_, files_);
-  });
+  // Of its own copies: the thread can outlive the list.
+  found_ = std::async(std::launch::async,
+                      [look = services_.further_scalars, cache = cache_, files = files_, wake = wake_] {
+                        nameThisThread("scalars");
+                        struct Wake {
+                          void (*call)();
+                          ~Wake() { call(); }
+                        } const at_the_end{wake};
+                        return look(cache, files);
+                      });
 }
 
 const FurtherScalars& FurtherScalarList::known() {
-  if (!found_.valid() || found_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return known_;
+  if (!found_.valid() || !isReady(found_)) return known_;
   known_.is_looking = false;
   try {
     known_.scalars = found_.get();
-  } catch (const Error& error) {
+  } catch (const std::exception& error) {
     known_.error = error.what();
   }
   return known_;

@@ -24,8 +24,12 @@ class FurtherScalarList {
   /// `files` may be empty: then there are none. Calls `wake` when something is found. Opens nothing yet.
   FurtherScalarList(const ConversionServices& services, std::filesystem::path cache,
                     std::vector<std::filesystem::path> files, void (*wake)());
-  /// Waits for the thread.
-  ~FurtherScalarList() = default;
+  /// Does not wait for the thread, which may be reading for long: another view is to come at once.
+  ~FurtherScalarList();
+  FurtherScalarList(const FurtherScalarList&) = delete;
+  FurtherScalarList& operator=(const FurtherScalarList&) = delete;
+  /// Waits for the threads of all lists that are gone. Before what `wake` needs ends.
+  static void waitForThreads();
 
   /// Looks, if nobody has asked before.
   void look();

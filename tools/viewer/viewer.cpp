@@ -7,12 +7,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <memory>
 #include <utility>
 
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "tools/viewer/cache_view.h"
+#include "tools/viewer/further_scalar_list.h"
 #include "tools/viewer/menus.h"
 #include "tools/viewer/opening.h"
 #include "tools/viewer/state_files.h"
@@ -47,9 +49,8 @@ class Viewer {
 
   ~Viewer() {
     opening_.reset();
-    const std::optional<Preview> left = view_ ? view_->preview() : std::nullopt;
     view_.reset();
-    if (left) removePreview(*left);
+    FurtherScalarList::waitForThreads();
   }
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
@@ -78,10 +79,7 @@ class Viewer {
 
   void show(CacheReader cache, const ViewerOptions& options, const std::vector<fs::path>& files) {
     if (view_) view_->remember();
-    auto next = std::make_unique<CacheView>(std::move(cache), options, window_, toasts_, dialog_, layout());
-    const std::optional<Preview> left = view_ ? view_->preview() : std::nullopt;
-    view_ = std::move(next);
-    if (left) removePreview(*left);
+    view_ = std::make_unique<CacheView>(std::move(cache), options, window_, toasts_, dialog_, layout());
     window_.setTitle(fmt::format("{} - curvisplat", files.front().filename().string()));
     std::vector<std::string> names;
     for (const fs::path& file : files) names.push_back(fs::absolute(file).string());
@@ -134,8 +132,9 @@ class Viewer {
   void takeOpened() {
     if (!opening_) return;
     for (const std::string& text : opening_->takeMessages()) toasts_.add(text, glfwGetTime());
-    if (auto preview = opening_->takePreview()) showPreview(*preview);
-    if (!opening_->isDone()) return;
+    const bool is_done = opening_->isDone();
+    if (auto preview = opening_->takePreview(); preview && !is_done) showPreview(*preview);
+    if (!is_done) return;
     const std::unique_ptr<Opening> done = std::move(opening_);
     try {
       const fs::path cache = done->take();
@@ -153,7 +152,7 @@ class Viewer {
       if (preview && preview->whole == cache) options.carried = view_->carried();
       show(CacheReader(cache), options, opening_files_);
     } catch (const Interrupted&) {
-    } catch (const Error& error) {
+    } catch (const std::exception& error) {  // a lack of memory, too, ends the opening only
       printMessage("warning: {}", error.what());
       toasts_.add(error.what(), glfwGetTime(), true);
     }
@@ -167,7 +166,7 @@ class Viewer {
       options.preview = preview;
       show(CacheReader(preview.cache), options, opening_files_);
       toasts_.add(fmt::format("A preview of {}; the whole follows.", preview.what), glfwGetTime());
-    } catch (const Error& error) {
+    } catch (const std::exception& error) {
       toasts_.add(fmt::format("no preview: {}", error.what()), glfwGetTime());
     }
   }
@@ -194,13 +193,6 @@ class Viewer {
     if (stops && view_ && view_->preview())
       toasts_.add(fmt::format("Stopped. What is shown is a preview of {}.", view_->preview()->what),
                   glfwGetTime());
-  }
-
-  /// Nothing reads it any longer. That of a series is the series' own cache, which has been moved.
-  static void removePreview(const Preview& preview) {
-    std::error_code ignored;
-    const fs::path folder = preview.cache.parent_path();
-    if (folder.filename() == "preview") fs::remove_all(folder, ignored);
   }
 
   WindowLayout layout() const {
