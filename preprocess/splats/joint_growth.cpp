@@ -48,6 +48,7 @@ class GrowthAxesOf {
 }  // namespace
 
 void JointGrowth::add(const NodeSplat& part) {
+  if (halves_.size() > kMaxHalves) return;  // of() ignores them all
   const InwardAxes inward = inwardAxes(part.border_code);
   if (inward.behind) return;
   const CellGrowth growth = cellGrowth(part.growth_code);
