@@ -4,6 +4,7 @@
 
 #include "preprocess/convert/scratch_folder.h"
 #include "stream/base/checksum.h"
+#include "stream/base/count_text.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 
@@ -22,9 +23,8 @@ std::string scratchName(const std::filesystem::path& cache) {
 void checkBlocks(const std::vector<GridBlock>& grid, const CacheReader& cache) {
   const std::vector<BlockInfo>& blocks = cache.manifest().blocks;
   if (grid.size() != blocks.size())
-    throw Error(
-        "{}: was made from a grid of {} block{}; this grid has {} and is not the one the cache was made from",
-        cache.path().string(), blocks.size(), blocks.size() == 1 ? "" : "s", grid.size());
+    throw Error("{}: was made from a grid of {}; this grid has {} and is not the one the cache was made from",
+                cache.path().string(), countText(blocks.size(), "block"), grid.size());
   for (size_t n = 0; n < blocks.size(); ++n) {
     const GridBlock& found = grid[n];
     const BlockInfo& expected = blocks[n];

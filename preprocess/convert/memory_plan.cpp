@@ -8,6 +8,7 @@
 #include "preprocess/convert/splat_record.h"
 #include "preprocess/grid/slabs.h"
 #include "stream/base/byte_text.h"
+#include "stream/base/count_text.h"
 #include "stream/base/error.h"
 #include "stream/base/file.h"
 #include "stream/model/brick.h"
@@ -65,8 +66,8 @@ uint64_t defaultMemory() {
 
 MemoryPlan MemoryPlan::of(uint64_t cap_bytes, size_t variables, unsigned threads) {
   if (cap_bytes < leastMemory(variables))
-    throw Error("--memory {}: conversion of {} scalar{} takes at least {}", byteText(cap_bytes), variables,
-                variables == 1 ? "" : "s", byteText(leastMemory(variables)));
+    throw Error("--memory {}: conversion of {} takes at least {}", byteText(cap_bytes),
+                countText(variables, "scalar"), byteText(leastMemory(variables)));
   const uint64_t bytes = cap_bytes - cap_bytes / kAllocatorShare - kProgramBytes;
 
   MemoryPlan plan;

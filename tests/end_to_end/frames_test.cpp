@@ -190,7 +190,7 @@ TEST_F(Frames, ImpossiblePartsAreWrongUsage) {
   for (const char* part : {"0/3", "4/3", "1", "/3", "1/", "a/3", "1/3x", "-1/3", "1/1000000"})
     expectRefused({"-o", file("p_%d.png"), "--orbit", "9", "--frames", "2", "--part", part}, 2,
                   "--part " + std::string(part));
-  expectRefused({"-o", file("p.png"), "--part", "1/2"}, 2, "there is one");
+  expectRefused({"-o", file("p.png"), "--part", "1/2"}, 2, "there is only one");
   expectRefused({"-o", file("p.mp4"), "--orbit", "9", "--part", "1/2"}, 2, "ffmpeg");
   expectRefused({"-o", file("p_%d.png"), "--orbit", "9", "--part", "1/2", "--first-image", file("f.png")}, 2,
                 "--first-image");

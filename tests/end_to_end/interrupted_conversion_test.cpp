@@ -246,7 +246,7 @@ TEST_F(InterruptedConversion, OnAFullDiskKeepsFinishedWorkForResuming) {
   const ProgramResult failed = program->wait();
   EXPECT_EQ(failed.status, 1);
   EXPECT_EQ(lineCount(failed.err), 1) << failed.err;
-  EXPECT_NE(failed.err.find("--resume goes on"), std::string::npos) << failed.err;
+  EXPECT_NE(failed.err.find("continue with --resume"), std::string::npos) << failed.err;
   disk.empty();
   expectUnfinished();
   const ProgramResult resumed = convert({"--resume"});

@@ -276,7 +276,7 @@ class MeshFiles(MeshCase):
         result = self.run_program("convert", path, "--add-scalar", "v:x", "--to", self.folder / "mesh.splats")
         self.assertEqual(result.returncode, 0, result.stderr)
         result = self.run_program("convert", path, "--add-scalar", "v:x", "--to", self.folder / "mesh.splats")
-        self.assertIn("has a scalar 'v:x' already", result.stderr)
+        self.assertIn("already has a scalar 'v:x'", result.stderr)
         write_xml(grid, self.folder / "fields.vtu")
         result = self.run_program("convert", path, self.folder / "fields.vtu", "-o", self.folder / "two.splats")
         self.assertEqual(result.returncode, 1)

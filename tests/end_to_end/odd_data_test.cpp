@@ -12,6 +12,7 @@
 
 #include "render/image/image.h"
 #include "render/image/image_file.h"
+#include "stream/base/count_text.h"
 #include "stream/base/file.h"
 #include "tests/support/cube_files.h"
 #include "tests/support/run_program.h"
@@ -74,7 +75,7 @@ TEST_F(OddDataTest, ACacheOfOneSplatIsDrawn) {
   const ProgramResult result =
       runProgram({"convert", file("one.vts"), "-o", file("cube.splats"), "--scalar", "T"});
   ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_NE(result.out.find("1 splats in 1 bricks, 1 levels"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("1 splat in 1 brick, 1 level"), std::string::npos) << result.out;
   const Image image = render({"--opacity-unit", "0.01", "--parallel-scale", "5"});
   EXPECT_LT(image.pixel(32, 32)[0], 0.9f) << said_;
   EXPECT_EQ(image.pixel(0, 0)[0], 1);

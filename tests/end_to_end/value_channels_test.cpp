@@ -212,7 +212,7 @@ TEST_F(ValueChannelsTest, TheProgramWritesThem) {
     std::string words;
   } refused[] = {
       {{"--channels", "alpha"}, "--channels alpha: unknown channel 'alpha'; expected none, or some of"},
-      {{"--channels", "depth", "--first-image", (folder_ / "b.exr").string()}, "leave --channels out"}};
+      {{"--channels", "depth", "--first-image", (folder_ / "b.exr").string()}, "leave out --channels"}};
   for (const auto& [options, words] : refused) {
     const ProgramResult result = run(options);
     EXPECT_EQ(result.status, 2) << result.err;

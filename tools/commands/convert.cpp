@@ -12,6 +12,7 @@
 #include "preprocess/convert/convert.h"
 #include "preprocess/formats/open/open_grid.h"
 #include "preprocess/grid/time_steps.h"
+#include "stream/base/count_text.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "stream/base/paths.h"
@@ -37,8 +38,9 @@ namespace {
 void printSummary(const ConvertArguments& arguments, const ConvertReport& report, double seconds) {
   const auto samples = static_cast<double>(report.nodes);
   const uint64_t bytes = totalBytes(report.files);
-  fmt::print("{}: {} samples, {} splats in {} bricks, {} levels\n", arguments.output.string(), report.nodes,
-             report.splats, report.bricks, report.levels);
+  fmt::print("{}: {}, {} in {}, {}\n", arguments.output.string(), countText(report.nodes, "sample"),
+             countText(report.splats, "splat"), countText(report.bricks, "brick"),
+             countText(report.levels, "level"));
   // The interrupted run did part of the work, so this run's time gives no rate.
   const std::string rate = report.resumed ? " since it was resumed"
                                           : fmt::format(", {:.2f} M samples/s", 1e-6 * samples / seconds);

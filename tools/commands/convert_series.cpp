@@ -10,6 +10,7 @@
 
 #include "preprocess/addition/convert_series.h"
 #include "preprocess/formats/open/series_files.h"
+#include "stream/base/count_text.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "stream/base/paths.h"
@@ -138,7 +139,7 @@ void follow(const ConvertArguments& arguments) {
     options.add = true;
     options.convert.overwrite = false;
   }
-  fmt::print("{}: {} steps\n", options.convert.output.string(), steps);
+  fmt::print("{}: {}\n", options.convert.output.string(), countText(steps, "step"));
 }
 
 }  // namespace
@@ -175,8 +176,8 @@ void runConvertSeries(ConvertArguments arguments) {
 
   const double seconds = secondsOf(progress);
   const auto samples = static_cast<double>(report.nodes * report.converted);
-  fmt::print("{}: {} steps{}, {} of them converted now, {} with a geometry of their own\n",
-             options.convert.output.string(), report.steps,
+  fmt::print("{}: {}{}, {} of them converted now, {} with a geometry of their own\n",
+             options.convert.output.string(), countText(report.steps, "step"),
              report.left_out > 0 ? fmt::format(" ({} left out)", report.left_out) : "", report.converted,
              report.new_geometries);
   if (report.converted > 0)

@@ -14,6 +14,7 @@
 #include "preprocess/faces/grid_faces_pass.h"
 #include "preprocess/grid/sample_source.h"
 #include "stream/base/byte_text.h"
+#include "stream/base/count_text.h"
 #include "stream/base/free_space.h"
 #include "stream/cache/faces_file.h"
 #include "tools/output/progress_bar.h"
@@ -105,8 +106,7 @@ void print(const Forecast& forecast, const ConvertOptions& options) {
   fmt::print("  temporary  {} in {}{}\n", byteText(forecast.temporary_bytes), temporary.string(),
              freeText(temporary));
   fmt::print("  memory     {}\n", byteText(forecast.memory_bytes));
-  fmt::print("  time       {}, {} thread{}\n", timeText(forecast.seconds), forecast.threads,
-             forecast.threads == 1 ? "" : "s");
+  fmt::print("  time       {}, {}\n", timeText(forecast.seconds), countText(forecast.threads, "thread"));
 }
 
 void finish(const Forecast& forecast, const ConvertOptions& options, const ConvertArguments& arguments) {

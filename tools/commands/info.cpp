@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "preprocess/formats/open/open_grid.h"
+#include "stream/base/count_text.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "stream/base/progress.h"
@@ -167,8 +168,8 @@ void printAsText(const CacheReader& reader, const InfoOptions& options, const Fi
   fmt::print("bounds     {} .. {}\n           {} .. {}\n           {} .. {}\n", m.lower.x, m.upper.x,
              m.lower.y, m.upper.y, m.lower.z, m.upper.z);
   fmt::print("volume     {:.8g}\n", m.volume);
-  fmt::print("samples    {} at {} in {} block{}, {} blanked\n", m.nodes, m.cells ? "cell centres" : "nodes",
-             m.blocks.size(), m.blocks.size() == 1 ? "" : "s", m.blanked_nodes);
+  fmt::print("samples    {} at {} in {}, {} blanked\n", m.nodes, m.cells ? "cell centres" : "nodes",
+             countText(m.blocks.size(), "block"), m.blanked_nodes);
   fmt::print("splats     {} at the finest level\n", m.splats);
   printSteps(reader);
   for (const VariableInfo& variable : m.variables)

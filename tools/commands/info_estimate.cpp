@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "stream/base/byte_text.h"
+#include "stream/base/count_text.h"
 
 namespace curvisplat {
 
@@ -24,9 +25,9 @@ nlohmann::ordered_json InfoEstimate::toJson() const {
 
 std::string InfoEstimate::toText() const {
   return fmt::format(
-      "a cache of about {} with one scalar, {} more per additional scalar; about {:.1f} s on {} thread{}",
-      byteText(needs_.cache_bytes), byteText(needs_.bytes_per_further_scalar), needs_.seconds, threads_,
-      threads_ == 1 ? "" : "s");
+      "a cache of about {} with one scalar, {} more per additional scalar; about {:.1f} s on {}",
+      byteText(needs_.cache_bytes), byteText(needs_.bytes_per_further_scalar), needs_.seconds,
+      countText(threads_, "thread"));
 }
 
 }  // namespace curvisplat

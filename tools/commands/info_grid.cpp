@@ -11,6 +11,7 @@
 #include "preprocess/grid/slabs.h"
 #include "preprocess/survey/block_overlap.h"
 #include "preprocess/survey/grid_statistics.h"
+#include "stream/base/count_text.h"
 #include "stream/base/progress.h"
 #include "tools/commands/info_estimate.h"
 #include "tools/commands/info_mesh.h"
@@ -218,9 +219,8 @@ void printAsText(const GridInfo& info) {
   for (const std::string& warning : description.warnings) fmt::print("warning: {}\n", warning);
   if (!info.overlaps.empty()) fmt::print("warning: {}\n", overlapWarning(description, info.overlaps));
   const BlankCounts blank = info.statistics.blank();
-  fmt::print("nodes     {} in {} block{}; {} blanked by the grid, {} not finite\n", info.nodes,
-             description.blocks.size(), description.blocks.size() == 1 ? "" : "s", blank.by_grid,
-             blank.not_finite);
+  fmt::print("nodes     {} in {}; {} blanked by the grid, {} not finite\n", info.nodes,
+             countText(description.blocks.size(), "block"), blank.by_grid, blank.not_finite);
   if (const std::string rule = blankingRule(description); !rule.empty()) fmt::print("blanking  {}\n", rule);
   printBlocks(info);
   fmt::print("cells     {}; {} degenerate, {} inverted\n", info.statistics.cells(),

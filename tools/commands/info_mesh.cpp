@@ -11,6 +11,7 @@
 
 #include "preprocess/convert/mesh_survey.h"
 #include "preprocess/gather/mesh_reader.h"
+#include "stream/base/count_text.h"
 #include "tools/commands/info_estimate.h"
 #include "tools/output/progress_bar.h"
 
@@ -123,10 +124,9 @@ void printAsText(const MeshInfo& info) {
   const GridDescription& description = *info.description;
   fmt::print("{}\n", description.format);
   for (const std::string& warning : description.warnings) fmt::print("warning: {}\n", warning);
-  fmt::print("points    {} in {} piece{}; {} in no solid cell, {} blanked by the file, {} not finite\n",
-             info.points, description.pieces.size(), description.pieces.size() == 1 ? "" : "s",
-             info.survey.unused_points, info.survey.grid.blanked.by_grid,
-             info.survey.grid.blanked.not_finite);
+  fmt::print("points    {} in {}; {} in no solid cell, {} blanked by the file, {} not finite\n", info.points,
+             countText(description.pieces.size(), "piece"), info.survey.unused_points,
+             info.survey.grid.blanked.by_grid, info.survey.grid.blanked.not_finite);
   std::string kinds;
   for (size_t kind = 1; kind < kKinds.size(); ++kind)
     if (info.survey.cells_of[kind] > 0)

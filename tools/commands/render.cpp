@@ -15,6 +15,7 @@
 #include "render/frame/frame.h"
 #include "render/frame/step_player.h"
 #include "render/image/image_file.h"
+#include "stream/base/count_text.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "stream/base/paths.h"
@@ -150,8 +151,9 @@ void printResult(const RenderReport& report) {
   }
   const FrameStatistics& last = report.frames.back().statistics;
   if (report.frames.size() == 1) {
-    fmt::print("{}: {} splats of {} in {} bricks, {:.2f} s, {}\n", report.output.string(), last.splats_drawn,
-               report.variable.name, last.bricks_drawn, last.total_s, report.backend);
+    fmt::print("{}: {} of {} in {}, {:.2f} s, {}\n", report.output.string(),
+               countText(last.splats_drawn, "splat"), report.variable.name,
+               countText(last.bricks_drawn, "brick"), last.total_s, report.backend);
     return;
   }
   double total_s = 0;

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "stream/base/count_text.h"
 #include "stream/base/error.h"
 #include "stream/base/message.h"
 #include "stream/base/progress.h"
@@ -71,9 +72,9 @@ void serve(const ServeArguments& arguments) {
     fmt::print("{}\n", address);
     std::fflush(stdout);
     printMessage(
-        "serving {} cache{} to at most {} viewer{} at a time; anyone who has the address above can look at "
+        "serving {} to at most {} at a time; anyone who has the address above can look at "
         "{}",
-        caches.size(), caches.size() == 1 ? "" : "s", options.viewers, options.viewers == 1 ? "" : "s",
+        countText(caches.size(), "cache"), countText(options.viewers, "viewer"),
         caches.size() == 1 ? "it" : "them");
   });
 }

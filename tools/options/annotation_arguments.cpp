@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "stream/base/count_text.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -74,8 +75,8 @@ std::vector<ShownFunction> shownFunctions(const AnnotationArguments& arguments, 
       break;
     }
   if (arguments.bar_titles.size() > shown.size())
-    throw UsageError("--scalar-bar-title: given {} times; the picture shows {} function{}",
-                     arguments.bar_titles.size(), shown.size(), shown.size() == 1 ? "" : "s");
+    throw UsageError("--scalar-bar-title: given {} times; the picture shows {}", arguments.bar_titles.size(),
+                     countText(shown.size(), "function"));
   for (size_t n = 0; n < arguments.bar_titles.size(); ++n) shown[n].title = arguments.bar_titles[n];
   return shown;
 }

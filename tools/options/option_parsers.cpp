@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "preprocess/convert/memory_plan.h"
+#include "stream/base/count_text.h"
 #include "stream/base/error.h"
 #include "stream/base/suggestion.h"
 #include "tools/options/choices.h"
@@ -68,8 +69,7 @@ std::vector<double> parseNumbers(std::string_view option, std::string_view text,
   }
   const size_t expected = split(form, ',').size();
   if (numbers.size() != expected)
-    throw UsageError("{} {}: expected {}, found {} number{}", option, text, form, numbers.size(),
-                     numbers.size() == 1 ? "" : "s");
+    throw UsageError("{} {}: expected {}, found {}", option, text, form, countText(numbers.size(), "number"));
   return numbers;
 }
 
@@ -88,8 +88,7 @@ std::vector<uint64_t> parseExtents(std::string_view option, std::string_view tex
     extents.push_back(*extent);
   }
   if (const size_t found = extents.size(); found != split(form, 'x').size())
-    throw UsageError("{} {}: expected {}, found {} number{}", option, text, form, found,
-                     found == 1 ? "" : "s");
+    throw UsageError("{} {}: expected {}, found {}", option, text, form, countText(found, "number"));
   return extents;
 }
 

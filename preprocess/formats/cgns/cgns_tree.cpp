@@ -13,6 +13,7 @@
 #include "preprocess/formats/cgns/cgns_steps.h"
 #include "preprocess/formats/cgns/cgns_units.h"
 #include "preprocess/grid/time_steps.h"
+#include "stream/base/count_text.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -384,8 +385,7 @@ void TreeReader::warnOfOmissions() {
     std::string names;
     for (size_t n = 0; n < std::min(kNamesListed, zones.size()); ++n) names += (n ? ", " : "") + zones[n];
     if (zones.size() > kNamesListed) names += fmt::format(" and {} more", zones.size() - kNamesListed);
-    const std::string words =
-        fmt::format("{} zone{} {}: {}", zones.size(), zones.size() == 1 ? "" : "s", reason, names);
+    const std::string words = fmt::format("{} {}: {}", countText(zones.size(), "zone"), reason, names);
     if (tree_.zones.empty()) throw Error("{}: has nothing to draw: {}", file_.path().string(), words);
     tree_.warnings.push_back("left out: " + words);
   }

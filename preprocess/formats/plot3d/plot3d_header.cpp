@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "preprocess/formats/common/stored_values.h"
+#include "stream/base/count_text.h"
 
 namespace curvisplat {
 namespace {
@@ -114,8 +115,8 @@ Plot3dHeader readPlot3dHeader(PayloadFile& payload, const Plot3dLayout& layout, 
   if (const auto bytes = reader.record(); bytes && *bytes != 4 * (numbers * count + overall)) {
     const std::string explanation = explainDimensionRecord(layout, count, *bytes);
     throw LayoutMisfit{explanation.empty() ? LayoutMisfit::kFirstRecord : LayoutMisfit::kKnownStructure,
-                       fmt::format("the dimension record has {} bytes, but {} block{} of a {} need {}{}",
-                                   *bytes, count, count == 1 ? "" : "s", describe(layout.kind),
+                       fmt::format("the dimension record has {} bytes, but {} of a {} need {}{}", *bytes,
+                                   countText(count, "block"), describe(layout.kind),
                                    4 * (numbers * count + overall), explanation)};
   }
   const std::vector<int64_t> dimensions = reader.integers(numbers * count);

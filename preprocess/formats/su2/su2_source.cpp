@@ -7,6 +7,7 @@
 #include <optional>
 #include <string_view>
 
+#include "stream/base/count_text.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -62,7 +63,7 @@ Su2Source::Su2Source(const OpenGridOptions& options) {
   zones_ = readSu2Mesh(file, options.temporary_folder);
   description_.files.push_back(file->name());
   description_.coordinate_bytes = 8;
-  description_.format = fmt::format("SU2 mesh, {} zone{}", zones_.size(), zones_.size() == 1 ? "" : "s");
+  description_.format = fmt::format("SU2 mesh, {}", countText(zones_.size(), "zone"));
   std::vector<std::string> markers;
   for (size_t n = 0; n < zones_.size(); ++n) {
     const SpooledMesh& mesh = zones_[n].mesh;

@@ -9,6 +9,7 @@
 #include "preprocess/formats/vtk/vtk_source.h"
 #include "preprocess/formats/vtk/vtk_xml.h"
 #include "preprocess/grid/time_steps.h"
+#include "stream/base/count_text.h"
 #include "stream/base/error.h"
 
 namespace curvisplat {
@@ -40,9 +41,9 @@ class Gatherer {
     if (!left_out_.empty())
       grid_.warnings.push_back(
           fmt::format("{} files without unstructured grids are left out: {}", left_out_files_, left_out_));
-    mesh_.format = fmt::format("VTK XML {}{}, {}, {} piece{}", top_type_,
-                               top_type_ == mesh_type_ ? "" : " of " + mesh_type_, mesh_encoding_,
-                               mesh_.pieces.size(), mesh_.pieces.size() == 1 ? "" : "s");
+    mesh_.format =
+        fmt::format("VTK XML {}{}, {}, {}", top_type_, top_type_ == mesh_type_ ? "" : " of " + mesh_type_,
+                    mesh_encoding_, countText(mesh_.pieces.size(), "piece"));
     mesh_.files = std::move(grid_.files);
     mesh_.times = std::move(grid_.times);
     mesh_.time_step = grid_.time_step;
@@ -56,9 +57,9 @@ class Gatherer {
     if (!left_out_.empty())
       grid_.warnings.push_back(
           fmt::format("{} files without structured grids are left out: {}", left_out_files_, left_out_));
-    grid_.format = fmt::format("VTK XML {}{}, {}, {} block{}", top_type_,
-                               top_type_ == leaf_type_ ? "" : " of " + leaf_type_, encoding_,
-                               grid_.blocks.size(), grid_.blocks.size() == 1 ? "" : "s");
+    grid_.format =
+        fmt::format("VTK XML {}{}, {}, {}", top_type_, top_type_ == leaf_type_ ? "" : " of " + leaf_type_,
+                    encoding_, countText(grid_.blocks.size(), "block"));
     return std::move(grid_);
   }
 
