@@ -244,6 +244,13 @@ FieldSampler::FieldSampler(const CacheReader& cache, size_t variable, std::vecto
     throw UsageError("a lattice's spacing must be above zero");
 }
 
+unsigned FieldSampler::threadsWithin(uint64_t bytes, const SampleLattice& lattice, uint32_t slab,
+                                     unsigned threads) {
+  const auto cores = static_cast<unsigned>(tbb::info::default_concurrency());
+  const uint64_t of_thread = kSampleBytes * slab * lattice.planePoints();
+  return static_cast<unsigned>(std::min<uint64_t>(threads > 0 ? threads : cores, bytes / of_thread));
+}
+
 FieldSamples FieldSampler::planes(uint32_t k_begin, uint32_t k_end, const Progress& progress) const {
   const Manifest& manifest = cache_.manifest();
   Sums sums(lattice_, k_begin, k_end, manifest.variables.at(variable_));

@@ -57,6 +57,9 @@ class FieldSampler {
   /// The planes k_begin .. k_end - 1. Any thread; takes kSampleBytes a point and a decoded brick. Throws as CacheReader does, and
   /// Interrupted after the progress was stopped.
   FieldSamples planes(uint32_t k_begin, uint32_t k_end, const Progress& progress) const;
+  /// How many threads (of `threads`; 0: one per core) may sample `slab` planes at a time in this memory; 0: none.
+  static unsigned threadsWithin(uint64_t bytes, const SampleLattice& lattice, uint32_t slab,
+                                unsigned threads);
   /// All planes, `slab` at a time, on `threads` threads (0: one per core); take() gets them in order, one call at a time.
   void sweep(uint32_t slab, unsigned threads, Progress& progress,
              const std::function<void(uint32_t k_begin, uint32_t k_end, const FieldSamples&)>& take) const;

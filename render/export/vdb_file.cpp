@@ -1,12 +1,14 @@
 #include "render/export/vdb_file.h"
 
-#include <openvdb/io/File.h>
+#include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
-#include <tbb/info.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
+#include <fstream>
 #include <string>
 
 #include "render/export/field_sampler.h"
@@ -32,15 +34,14 @@ SampleLattice latticeOf(const Manifest& manifest, uint32_t voxels) {
 
 /// How many threads may sample at a time, so that half of the memory is left for the grids.
 unsigned threadsFor(const SampleLattice& lattice, const VdbOptions& options) {
-  const uint64_t slab = kSampleBytes * kSlab * lattice.planePoints();
-  const uint64_t most = options.memory_bytes / 2 / slab;
-  if (most == 0)
+  const unsigned threads =
+      FieldSampler::threadsWithin(options.memory_bytes / 2, lattice, kSlab, options.threads);
+  if (threads == 0)
     throw UsageError(
         "{} x {} x {} voxels: {} MiB are too few to sample them; give --memory {}M or fewer --voxels",
-        lattice.size[0], lattice.size[1], lattice.size[2], options.memory_bytes >> 20, (2 * slab >> 20) + 1);
-  const unsigned wanted =
-      options.threads > 0 ? options.threads : static_cast<unsigned>(tbb::info::default_concurrency());
-  return static_cast<unsigned>(std::min<uint64_t>(wanted, most));
+        lattice.size[0], lattice.size[1], lattice.size[2], options.memory_bytes >> 20,
+        (2 * kSampleBytes * kSlab * lattice.planePoints() >> 20) + 1);
+  return threads;
 }
 
 class Grids {
@@ -82,14 +83,21 @@ class Grids {
   const uint64_t memory_bytes_;
 };
 
+/// By a stream of ours that throws: OpenVDB's own file does not look whether its stream has failed.
 void writeGrids(const Grids& grids, const std::filesystem::path& path) {
   TemporaryFile temporary(writableTarget(path));
+  errno = 0;
   try {
-    openvdb::io::File file(temporary.path().string());
-    file.setCompression(openvdb::io::COMPRESS_ZIP | openvdb::io::COMPRESS_ACTIVE_MASK);
-    file.write(openvdb::GridPtrVec{grids.density, grids.value});
+    std::ofstream file;
+    file.exceptions(std::ios::badbit | std::ios::failbit);
+    file.open(temporary.path(), std::ios::binary);
+    openvdb::io::Stream stream(file);
+    stream.setCompression(openvdb::io::COMPRESS_ZIP | openvdb::io::COMPRESS_ACTIVE_MASK);
+    stream.write(openvdb::GridPtrVec{grids.density, grids.value});
     file.close();
-  } catch (const std::exception& error) {  // OpenVDB's, and those of streams
+  } catch (const std::ios::failure&) {  // its words are "basic_ios::clear: iostream error"
+    throw Error("{}: cannot be written: {}", path.string(), std::strerror(errno ? errno : EIO));
+  } catch (const std::exception& error) {  // OpenVDB's
     throw Error("{}: cannot be written: {}", path.string(), temporary.aboutTarget(error.what()));
   }
   temporary.putIntoPlace();

@@ -41,6 +41,12 @@ uint64_t isoSplatBytes(const FrameOptions& options) {
   return std::max(kLeastBytes, options.memory_bytes / 8);
 }
 
+/// What finding where rays meet them may take; where it is too little fewer threads do.
+uint64_t isoTracerBytes(const FrameOptions& options) {
+  constexpr uint64_t kTracerBytes = 2 << 20;
+  return std::max(kTracerBytes * threadsOf(options), options.memory_bytes / 16);
+}
+
 tbb::task_arena arenaOf(const FrameOptions& options) {
   return tbb::task_arena(std::min(static_cast<int>(threadsOf(options)), tbb::info::default_concurrency()));
 }
@@ -54,16 +60,14 @@ uint64_t sceneBytes(const FrameOptions& options) {
   const bool peels =
       std::any_of(options.scene->surfaces.begin(), options.scene->surfaces.end(), is_translucent) ||
       std::any_of(options.scene->grid_surfaces.begin(), options.scene->grid_surfaces.end(), is_translucent);
-  constexpr uint64_t kLayerBytes = 64, kIsoTracerBytes = 2 << 20, kIsoBytesAPixel = 48, kVertexBytes = 12,
-                     kTriangleBytes = 8;
+  constexpr uint64_t kLayerBytes = 64, kIsoBytesAPixel = 48, kVertexBytes = 12, kTriangleBytes = 8;
   uint64_t bytes = kSampleTileBytes * (peels ? PixelLayers::kMostLayers : 1) * threadsOf(options) +
                    options.size.pixels() * (kLayerBytes + slice_bytes * options.scene->slices.size());
   for (const Surface& surface : options.scene->surfaces)
     bytes += surface.mesh->bytes() + kVertexBytes * surface.mesh->positions.size() +
              kTriangleBytes * surface.mesh->triangles.size();
   if (!options.scene->isovalues.empty())
-    bytes += isoSplatBytes(options) + kIsoTracerBytes * threadsOf(options) +
-             kIsoBytesAPixel * options.size.pixels();
+    bytes += isoSplatBytes(options) + isoTracerBytes(options) + kIsoBytesAPixel * options.size.pixels();
   if (!options.scene->grid_surfaces.empty())
     bytes += FaceMeshes::bytes(*options.scene, options.size.pixels());
   return bytes;
@@ -268,7 +272,8 @@ std::optional<IsoLayers> FramePipeline::isosurfaces(const FramePlan& plan, const
     const StageTimer timer(statistics.surfaces_s, "draw isosurfaces");
     arenaOf(options).execute([&] {
       splats.sort();
-      layers.draw(splats, {planner_.colours(), options.light, options.scene->iso_opacity});
+      layers.draw(splats, {planner_.colours(), options.light, options.scene->iso_opacity},
+                  isoTracerBytes(options));
     });
   }
   return layers;

@@ -2,6 +2,7 @@
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
@@ -45,6 +46,15 @@ class IsoLayers::Tracer {
         light_(look.light, view_),
         rays_(splats.settings()) {}
 
+  /// What draw() takes for a tile's splats.
+  static uint64_t bytes(std::span<const IsoSplats::Placed> splats, int y0) {
+    const std::array<size_t, kBlocks> counts = countRows(splats, y0);
+    size_t all = 0;
+    for (const size_t count : counts) all += count;
+    return kOwnBytes + all * sizeof(IsoSplats::Placed) +
+           IsoRays::bytes(*std::max_element(counts.begin(), counts.end()));
+  }
+
   void draw(size_t number, int x0, int y0, Tile& tile) {
     x0_ = x0;
     y0_ = y0;
@@ -64,15 +74,38 @@ class IsoLayers::Tracer {
   }
 
  private:
-  /// Splats by the rows of blocks that they touch.
+  static constexpr uint64_t kOwnBytes = 1 << 19;  // itself, and the layers of its pixels
+
+  struct RowRange {
+    size_t first, last;
+  };
+  /// The rows of blocks that a splat touches.
+  static RowRange rowsOf(const IsoSplat& splat, int y0) {
+    const auto rowAt = [&](float y) {
+      return static_cast<size_t>(std::clamp((y - static_cast<float>(y0)) / kBlock, 0.0f, kBlocks - 0.5f));
+    };
+    return {rowAt(splat.y0), rowAt(splat.y1)};
+  }
+  static std::array<size_t, kBlocks> countRows(std::span<const IsoSplats::Placed> splats, int y0) {
+    std::array<size_t, kBlocks> counts{};
+    for (const IsoSplats::Placed& placed : splats) {
+      const RowRange rows = rowsOf(*placed.splat, y0);
+      for (size_t row = rows.first; row <= rows.last; ++row) ++counts[row];
+    }
+    return counts;
+  }
+
   void sortRows(size_t number) {
-    for (auto& row : rows_) row.clear();
-    for (const IsoSplats::Placed& placed : splats_.inTile(number)) {
-      const auto rowAt = [&](float y) {
-        return static_cast<size_t>(std::clamp((y - static_cast<float>(y0_)) / kBlock, 0.0f, kBlocks - 0.5f));
-      };
-      for (size_t row = rowAt(placed.splat->y0); row <= rowAt(placed.splat->y1); ++row)
-        rows_[row].push_back(placed);
+    const auto splats = splats_.inTile(number);
+    const std::array<size_t, kBlocks> counts = countRows(splats, y0_);
+    for (size_t row = 0; row < rows_.size(); ++row) {
+      if (counts[row] > rows_[row].capacity()) rows_[row] = {};  // not beside the new one
+      rows_[row].clear();
+      rows_[row].reserve(counts[row]);
+    }
+    for (const IsoSplats::Placed& placed : splats) {
+      const RowRange rows = rowsOf(*placed.splat, y0_);
+      for (size_t row = rows.first; row <= rows.last; ++row) rows_[row].push_back(placed);
     }
   }
 
@@ -222,16 +255,38 @@ IsoLayers::IsoLayers(ImageSize size)
       columns_((static_cast<size_t>(size.width) + kTileSide - 1) / kTileSide),
       tiles_(TileSet::tilesOf(size)) {}
 
-void IsoLayers::draw(const IsoSplats& splats, const Look& look) {
-  tbb::enumerable_thread_specific<std::unique_ptr<Tracer>> tracers;
+void IsoLayers::drawTile(Tracer& tracer, size_t number) {
+  tracer.draw(number, static_cast<int>(number % columns_) * kTileSide,
+              static_cast<int>(number / columns_) * kTileSide, tiles_[number]);
+}
+
+/// Tiles that all threads may trace at a time, then those that half of them may, and so on. Tracers keep what they took, so each
+/// time new ones.
+void IsoLayers::draw(const IsoSplats& splats, const Look& look, uint64_t bytes) {
   const TileRange& range = splats.settings().tiles;
-  tbb::parallel_for(range.begin, range.end, [&](size_t number) {
+  std::vector<uint64_t> bytes_of(range.count());
+  tbb::parallel_for(size_t{0}, range.count(), [&](size_t n) {
+    const size_t number = range.begin + n;
     if (splats.inTile(number).empty()) return;
-    std::unique_ptr<Tracer>& tracer = tracers.local();
-    if (!tracer) tracer = std::make_unique<Tracer>(splats, look);
-    tracer->draw(number, static_cast<int>(number % columns_) * kTileSide,
-                 static_cast<int>(number / columns_) * kTileSide, tiles_[number]);
+    bytes_of[n] = Tracer::bytes(splats.inTile(number), static_cast<int>(number / columns_) * kTileSide);
   });
+  uint64_t drawn = 0;  // tiles that take no more
+  for (int threads = tbb::this_task_arena::max_concurrency(); threads > 0; threads /= 2) {
+    const uint64_t most = threads > 1 ? bytes / static_cast<uint64_t>(threads) : UINT64_MAX;
+    std::vector<size_t> tiles;
+    for (size_t n = 0; n < range.count(); ++n)
+      if (bytes_of[n] > drawn && bytes_of[n] <= most) tiles.push_back(range.begin + n);
+    drawn = most;
+    tbb::enumerable_thread_specific<std::unique_ptr<Tracer>> tracers;
+    tbb::task_arena arena(threads);
+    arena.execute([&] {
+      tbb::parallel_for(size_t{0}, tiles.size(), [&](size_t n) {
+        std::unique_ptr<Tracer>& tracer = tracers.local();
+        if (!tracer) tracer = std::make_unique<Tracer>(splats, look);
+        drawTile(*tracer, tiles[n]);
+      });
+    });
+  }
 }
 
 std::span<const PixelLayer> IsoLayers::at(int x, int y) const {

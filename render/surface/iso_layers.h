@@ -24,9 +24,9 @@ class IsoLayers {
   explicit IsoLayers(ImageSize size);
 
   size_t tiles() const { return tiles_.size(); }
-  /// Traces the tiles of the splats, which have to be complete and sorted. Parallel on the caller's TBB arena; takes
-  /// some 2 MB a thread. The same bits for any threads and ranges of tiles.
-  void draw(const IsoSplats& splats, const Look& look);
+  /// Traces the tiles of the splats, which have to be complete and sorted. Parallel on the caller's TBB arena, with as
+  /// many threads as `bytes` allow, or with one. The same bits for any threads, bytes and ranges of tiles.
+  void draw(const IsoSplats& splats, const Look& look, uint64_t bytes);
 
   /// Of a pixel: from the nearest on.
   std::span<const PixelLayer> at(int x, int y) const;
@@ -37,6 +37,8 @@ class IsoLayers {
     std::vector<PixelLayer> layers;
   };
   class Tracer;
+
+  void drawTile(Tracer& tracer, size_t number);
 
   ImageSize size_;
   size_t columns_;

@@ -89,6 +89,17 @@ bool IsoRays::crossOne(const IsoSplats::Placed& placed, Crossed& out) const {
   return out.begin < out.end && std::isfinite(out.end - out.begin) && out.step > 0;
 }
 
+/// Without the old memory beside the new.
+void IsoRays::makeRoom(size_t splats) {
+  if (splats <= crossed_.capacity()) return;
+  crossed_ = {};
+  order_ = {};
+  active_ = {};
+  crossed_.reserve(splats);
+  order_.reserve(splats);
+  active_.reserve(splats);
+}
+
 void IsoRays::cross(const IsoPacket& packet, std::span<const IsoSplats::Placed> splats) {
   const auto [x0, x1] = std::minmax_element(packet.x.begin(), packet.x.begin() + packet.count);
   const auto [y0, y1] = std::minmax_element(packet.y.begin(), packet.y.begin() + packet.count);
@@ -98,6 +109,7 @@ void IsoRays::cross(const IsoPacket& packet, std::span<const IsoSplats::Placed> 
     across_y_[ray] = across.y;
   }
   crossed_.clear();
+  makeRoom(splats.size());
   for (const IsoSplats::Placed& placed : splats) {
     const IsoSplat& s = *placed.splat;
     if (s.x1 < *x0 || s.x0 > *x1 || s.y1 < *y0 || s.y0 > *y1) continue;

@@ -56,6 +56,11 @@ class IsoRays {
   void trace(const IsoPacket& packet, std::span<const IsoSplats::Placed> splats);
   const Hits& hits(size_t ray) const { return hits_[ray]; }
 
+  /// What trace() takes for so many splats, at most.
+  static constexpr uint64_t bytes(size_t splats) {
+    return splats * (sizeof(Crossed) + sizeof(uint32_t) + sizeof(const Crossed*));
+  }
+
  private:
   static constexpr size_t kRays = IsoPacket::kRays;
   using Row = std::array<float, kRays>;
@@ -78,6 +83,7 @@ class IsoRays {
   };
   struct Point;
 
+  void makeRoom(size_t splats);
   void cross(const IsoPacket& packet, std::span<const IsoSplats::Placed> splats);
   bool crossOne(const IsoSplats::Placed& placed, Crossed& out) const;
   glm::dvec2 acrossAt(const IsoPacket& packet, size_t ray) const;

@@ -5,6 +5,7 @@
 """
 import pathlib
 import re
+import resource
 import subprocess
 import sys
 import tempfile
@@ -122,6 +123,20 @@ class VdbExport(unittest.TestCase):
         message = run("export", self.folder / "ring.splats", "-o", self.folder / "never.vdb", "--voxels", 2000, "--memory", "96M", fails=True)
         self.assertRegex(message, "give --memory .*M or fewer --voxels")
         self.assertFalse((self.folder / "never.vdb").exists())
+
+    def test_that_does_not_fit_on_the_disk_is_an_error_and_leaves_no_file(self):
+        whole = self.folder / "whole.vdb"
+        run("export", self.folder / "ring.splats", "-o", whole, "--voxels", 100)
+        # Near the end, too, where a buffer is written last.
+        for limit in (8192, whole.stat().st_size // 2, whole.stat().st_size - 1):
+            done = subprocess.run([PROGRAM, "export", str(self.folder / "ring.splats"), "-o", str(self.folder / "never.vdb"), "--voxels", "100"],
+                                  capture_output=True, text=True,
+                                  preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
+            self.assertEqual(done.returncode, 1, f"{limit} bytes: {done.stdout}")
+            self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+            self.assertRegex(done.stderr, "never.vdb: .*File too large")
+            self.assertFalse((self.folder / "never.vdb").exists())
+        self.assertEqual([p.name for p in self.folder.iterdir() if p.name.startswith(".curvisplat")], [])
 
     def test_has_a_step_and_a_scalar_and_says_what_is_wrong(self):
         run("generate", "wake", "--size", "24x20x12", "--steps", "3", "-o", self.folder / "w")

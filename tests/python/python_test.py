@@ -211,6 +211,38 @@ class Data(PythonTest):
             self.assertAlmostEqual(float(coarse.density.sum()) * 0.125, 24, delta=1)
             self.assertTrue(np.array_equal(cache.sample(size=40).value, samples.value))
 
+    def test_are_sampled_in_a_plane(self):
+        with curvisplat.open(self.ramp) as cache:
+            samples = cache.sample(size=30, box=(0, 2, 0, 3, 1, 1))
+            self.assertEqual(samples.value.shape, (1, 30, 20))
+            np.testing.assert_allclose(samples.spacing, 0.1)
+            np.testing.assert_allclose(samples.origin, (0.05, 0.05, 1))
+            y, x = np.meshgrid(*(0.05 + 0.1 * np.arange(n) for n in (30, 20)), indexing="ij")
+            self.assertLess(np.abs(samples.value[0] - (x + 2 * y + 3))[2:-2, 2:-2].max(), 0.01)
+            with self.assertRaisesRegex(curvisplat.UsageError, "empty"):
+                cache.sample(box=(1, 1, 2, 2, 0.5, 0.5))
+        # A grid of one plane has no volume, and so no density, but its box has samples.
+        k, j, i = np.meshgrid([0.5], np.linspace(0, 3, 9), np.linspace(0, 2, 9), indexing="ij")
+        path = self.folder / "plane.splats"
+        curvisplat.convert_arrays(path, curvisplat.Block(i, j, k, {"t": i + 2 * j}))
+        with curvisplat.open(path) as cache:
+            for size, shape in ((30, (1, 30, 20)), ((20, 30, 2), (2, 30, 20))):
+                samples = cache.sample(size=size)
+                self.assertEqual(samples.value.shape, shape)
+                self.assertTrue((samples.density == 0).all())
+
+    def test_are_sampled_in_little_more_memory_than_they_take(self):
+        script = ("import curvisplat, re, sys\n"
+                  "def peak(): return int(re.search(r'VmHWM:\\s+(\\d+)', open('/proc/self/status').read())[1]) >> 10\n"
+                  "with curvisplat.open(sys.argv[1]) as cache:\n"
+                  "    cache.sample(size=(8, 8, 8)); before = peak()\n"
+                  "    samples = cache.sample(size=(1000, 1000, 8))\n"
+                  "    print(peak() - before, (samples.value.nbytes + samples.density.nbytes) >> 20)")
+        words = subprocess.run([sys.executable, "-c", script, self.ramp], check=True, capture_output=True, text=True).stdout.split()
+        taken, returned = map(int, words)
+        print(f"sample(): {taken} MiB taken, {returned} returned")
+        self.assertLess(taken - returned, 64 + 32)
+
     def test_are_points(self):
         with curvisplat.open(self.ramp) as cache:
             points = cache.points()

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <glm/geometric.hpp>
+#include <thread>
 #include <vector>
 
 #include "render/project/tile_set.h"
@@ -19,6 +20,7 @@ namespace curvisplat {
 namespace {
 
 constexpr ImageSize kSize{96, 80};
+constexpr uint32_t kParts = 7;
 constexpr int kCells = 24;  // along an edge of the cube [-1, 1]³
 
 class IsoLayersTest : public testing::Test {
@@ -53,14 +55,31 @@ class IsoLayersTest : public testing::Test {
     const ColourTable colours(KnownFunction::of("smooth").table);
     IsoLayers layers(kSize);
     for (const TileRange& tiles : ranges) {
-      IsoSplats splats({view_, values, kHalfCellStyle, planes_, 0, tiles, uint64_t{1} << 30}, 1);
-      const SplatRange all{0, static_cast<uint32_t>(geometry_.size())};
-      splats.add(0, glm::dvec3(0.0), arraysOf(geometry_), arraysOf(variable_), nullptr, {&all, 1});
+      IsoSplats splats({view_, values, kHalfCellStyle, planes_, 0, tiles, uint64_t{1} << 30}, kParts);
+      addParts(splats, threads);
       splats.sort();
       tbb::task_arena arena(threads);
-      arena.execute([&] { layers.draw(splats, {colours, std::nullopt, 1}); });
+      arena.execute([&] { layers.draw(splats, {colours, std::nullopt, 1}, bytes_); });
     }
     return layers;
+  }
+  /// In order by one thread; by more of them each some parts, from the last on.
+  void addParts(IsoSplats& splats, int threads) const {
+    const auto count = static_cast<uint32_t>(geometry_.size());
+    const auto add = [&](uint32_t part) {
+      const SplatRange range{count * part / kParts, count * (part + 1) / kParts};
+      splats.add(part, glm::dvec3(0.0), arraysOf(geometry_), arraysOf(variable_), nullptr, {&range, 1});
+    };
+    if (threads == 1) {
+      for (uint32_t part = 0; part < kParts; ++part) add(part);
+      return;
+    }
+    std::vector<std::jthread> adding;
+    for (int thread = 0; thread < threads; ++thread)
+      adding.emplace_back([&, thread] {
+        for (int part = int{kParts} - 1; part >= 0; --part)
+          if (part % threads == thread) add(static_cast<uint32_t>(part));
+      });
   }
   static TileRange all() { return {0, TileSet::tilesOf(kSize)}; }
 
@@ -77,6 +96,7 @@ class IsoLayersTest : public testing::Test {
   Camera camera_;
   ScreenView view_;
   std::vector<ClipPlane> planes_;
+  uint64_t bytes_ = uint64_t{1} << 30;
   SplatGeometry geometry_;
   SplatVariable variable_;
 };
@@ -129,18 +149,26 @@ TEST_F(IsoLayersTest, ClipPlanesOpenIt) {
   EXPECT_LT(at.x, 0);  // its back, seen from within
 }
 
-TEST_F(IsoLayersTest, BitsDependNeitherOnThreadsNorOnRanges) {
+TEST_F(IsoLayersTest, BitsDependNeitherOnThreadsNorOnRangesNorOnMemory) {
   setField([](const glm::dvec3& at) { return glm::length(at) + 0.1 * std::sin(9 * at.x); });
-  const IsoLayers whole = drawn({0.5, 0.8}, {all()});
-  const size_t tiles = whole.tiles();
-  const IsoLayers parts = drawn({0.5, 0.8}, {{0, 2}, {2, 5}, {5, tiles}}, 2);
-  for (int y = 0; y < kSize.height; ++y)
-    for (int x = 0; x < kSize.width; ++x) {
-      const auto a = whole.at(x, y), b = parts.at(x, y);
-      ASSERT_EQ(a.size(), b.size()) << x << ' ' << y;
-      for (size_t n = 0; n < a.size(); ++n)
-        EXPECT_TRUE(a[n].depth == b[n].depth && a[n].colour == b[n].colour) << x << ' ' << y;
-    }
+  const std::vector<double> values{0.5, 0.8};
+  const IsoLayers whole = drawn(values, {all()});
+  const std::vector<TileRange> ranges{{0, 2}, {2, 5}, {5, whole.tiles()}};
+  const auto expect_same = [&](const IsoLayers& other) {
+    for (int y = 0; y < kSize.height; ++y)
+      for (int x = 0; x < kSize.width; ++x) {
+        const auto a = whole.at(x, y), b = other.at(x, y);
+        ASSERT_EQ(a.size(), b.size()) << x << ' ' << y;
+        for (size_t n = 0; n < a.size(); ++n)
+          EXPECT_TRUE(a[n].depth == b[n].depth && a[n].colour == b[n].colour) << x << ' ' << y;
+      }
+  };
+  expect_same(drawn(values, ranges, 2));
+  expect_same(drawn(values, {all()}, 4));
+  for (const uint64_t bytes : {uint64_t{0}, uint64_t{2} << 20, uint64_t{4} << 20}) {
+    bytes_ = bytes;
+    expect_same(drawn(values, ranges, 4));
+  }
 }
 
 TEST_F(IsoLayersTest, TooManySplatsForTheMemoryAreReported) {

@@ -180,6 +180,16 @@ class CurvisplatImageData(CacheSource):
     def GetTimestepValues(self):
         return super().GetTimestepValues()
 
+    def box(self):
+        """Along an axis without extent, as z of planar data, two points' distances wide: an image needs two points."""
+        box = super().box()
+        distance = max(box[2 * axis + 1] - box[2 * axis] for axis in range(3)) / self._resolution
+        for axis in range(3):
+            if box[2 * axis] == box[2 * axis + 1]:
+                box[2 * axis] -= distance
+                box[2 * axis + 1] += distance
+        return box
+
     def size(self):
         box = self.box()
         extent = [box[2 * axis + 1] - box[2 * axis] for axis in range(3)]

@@ -156,6 +156,12 @@ class ArraySource : public GridSource {
     }
   }
 
+  /// In whichever thread: a series frees its steps where it converts them.
+  ~ArraySource() override {
+    const py::gil_scoped_acquire locked;
+    views_.clear();
+  }
+
   const GridDescription& description() const override { return description_; }
 
   void read(uint32_t number, const NodeBox& box, std::span<const uint32_t> scalars,

@@ -1,5 +1,7 @@
 #include "tools/python/cache_arrays.h"
 
+#include <tbb/info.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/mat3x3.hpp>
@@ -19,7 +21,9 @@ namespace curvisplat::python {
 namespace {
 
 constexpr uint64_t kMaxPoints = uint64_t{1} << 31;
-constexpr uint32_t kSlab = 4;  // planes
+constexpr uint32_t kMostSlab = 4;           // planes
+constexpr uint64_t kReturnedBytes = 8;      // of a point
+constexpr uint64_t kLeastBytes = 64 << 20;  // that sampling may take; or a quarter of what is returned
 
 /// A numpy array that owns the values.
 template <typename T>
@@ -54,6 +58,22 @@ SampleLattice latticeOf(const DataChoice& choice, const std::array<uint32_t, 3>&
   }
   if (points > kMaxPoints) throw UsageError("a lattice of more than {} points", kMaxPoints);
   return lattice;
+}
+
+struct SweepPlan {
+  uint32_t slab = 1;
+  unsigned threads = 1;
+};
+
+/// Thick slabs on all threads read a brick seldom and fast; what they take is kept small beside what is returned, or
+/// to a plane at a time.
+SweepPlan sweepPlanOf(const SampleLattice& lattice) {
+  const uint64_t returned = kReturnedBytes * lattice.planePoints() * lattice.size[2];
+  const uint64_t bytes = std::max(kLeastBytes, returned / 4);
+  const auto wanted = static_cast<unsigned>(tbb::info::default_concurrency());
+  for (uint32_t slab = kMostSlab; slab > 1; slab /= 2)
+    if (FieldSampler::threadsWithin(bytes, lattice, slab, wanted) == wanted) return {slab, wanted};
+  return {1, std::max(1u, FieldSampler::threadsWithin(bytes, lattice, 1, wanted))};
 }
 
 /// The splats of a level, as they come.
@@ -106,7 +126,8 @@ py::tuple sampledArrays(const CacheReader& cache, const DataChoice& choice,
     const FieldSampler sampler(at_step, at_step.variableNamed(choice.scalar), std::move(bricks), lattice);
     all.value.reserve(lattice.planePoints() * lattice.size[2]);
     all.density.reserve(all.value.capacity());
-    sampler.sweep(kSlab, 0, of_work, [&](uint32_t, uint32_t, const FieldSamples& planes) {
+    const SweepPlan plan = sweepPlanOf(lattice);
+    sampler.sweep(plan.slab, plan.threads, of_work, [&](uint32_t, uint32_t, const FieldSamples& planes) {
       all.value.insert(all.value.end(), planes.value.begin(), planes.value.end());
       all.density.insert(all.density.end(), planes.density.begin(), planes.density.end());
     });

@@ -234,7 +234,9 @@ class Cache:
         """The scalar on a regular lattice.
 
         scalar: a name (default: the first). size: boxes along (x, y, z), or along the longest side. box: (x0, x1, y0, y1, z0,
-        z1), by default that of the grid. level: the octree's, 0 is the coarsest; by default the coarsest whose detail is half a box. step: of a series.
+        z1), by default that of the grid; along an axis without extent boxes are as wide as the widest others, with the
+        plane in their middle. level: the octree's, 0 is the coarsest; by default the coarsest whose detail is half a box. step: of a series.
+        Takes, besides what it returns, 64 MiB or a quarter of that; or a plane's 32 bytes a point where that is more.
         Raises UsageError for what makes no sense, Error if reading fails, KeyboardInterrupt after Ctrl-C.
         """
         lower, upper = self._box(box)
@@ -244,10 +246,13 @@ class Cache:
             size = tuple(int(max(1, np.ceil(size * max(side, 0) / widest - 1e-6))) for side in extent)
         if np.ndim(size) != 1 or len(size) != 3 or min(size) < 1:
             raise _core.UsageError(f"a size of {size}: expected one number or three, above zero")
-        choice = _core.DataChoice(scalar, lower, upper, level, int(step))
-        value, density = self._core.sample(choice, [int(n) for n in size], progress)
         spacing = extent / np.asarray(size)
-        return Samples(value, density, np.asarray(lower) + spacing / 2, spacing)
+        spacing[extent == 0] = spacing.max()
+        middle, half = np.add(lower, upper) / 2, np.asarray(size) * spacing / 2
+        corners = [np.where(extent == 0, middle + side * half, end) for side, end in ((-1, lower), (1, upper))]
+        choice = _core.DataChoice(scalar, *map(list, corners), level, int(step))
+        value, density = self._core.sample(choice, [int(n) for n in size], progress)
+        return Samples(value, density, corners[0] + spacing / 2, spacing)
 
     def points(self, scalar: str = "", *, level: Optional[int] = None, box: Optional[Vector] = None, step: int = 0,
                progress: Optional[Progress] = None) -> Points:
