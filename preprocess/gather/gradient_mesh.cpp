@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/task_arena.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -17,6 +15,7 @@
 #include "preprocess/gather/mesh_reader.h"
 #include "preprocess/gather/point_sums.h"
 #include "preprocess/splats/shape.h"
+#include "stream/base/nameless_file.h"
 
 namespace curvisplat {
 namespace {
@@ -109,38 +108,30 @@ class FlowMesh final : public MeshSource {
   GridDescription description_;
 };
 
-std::filesystem::path newFile(const std::filesystem::path& folder) {
-  static std::atomic<unsigned> files = 0;
-  return folder / fmt::format("gradients-{}-{}.tmp", ::getpid(), files++);
-}
-
 }  // namespace
 
 /// One quantity of all samples, on disk. A hole of the file, which reads as zeros, is NaN: the bits are stored that
 /// differ from NaN's.
 class GradientMesh::Values {
  public:
-  Values(const std::filesystem::path& folder, uint64_t samples)
-      : written_(newFile(folder)), read_(written_.path()) {
-    removeFile(written_.path());
+  Values(const std::filesystem::path& folder, uint64_t samples) : file_(folder) {
     if (samples > 0) put(samples - 1, std::vector<float>{kNone});
   }
 
   /// Any number of threads, of separate samples.
   void put(uint64_t first, std::vector<float> values) {
     for (float& value : values) value = std::bit_cast<float>(std::bit_cast<uint32_t>(value) ^ kBits);
-    written_.writeAt(first * sizeof(float), std::as_bytes(std::span(values)));
+    file_.out().writeAt(first * sizeof(float), std::as_bytes(std::span(values)));
   }
   void get(uint64_t first, std::span<float> values) const {
-    read_.readAt(first * sizeof(float), values);
+    file_.in().readAt(first * sizeof(float), values);
     for (float& value : values) value = std::bit_cast<float>(std::bit_cast<uint32_t>(value) ^ kBits);
   }
   std::unique_ptr<PointNumbers> numbers;  // of points
 
  private:
   static constexpr uint32_t kBits = std::bit_cast<uint32_t>(kNone);
-  OutputFile written_;
-  InputFile read_;
+  NamelessFile file_;
 };
 
 GradientMesh::GradientMesh(std::unique_ptr<MeshSource> source, const DerivedOptions& options,

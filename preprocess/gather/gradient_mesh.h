@@ -19,7 +19,6 @@
 #include "preprocess/formats/derived/flow_inputs.h"
 #include "preprocess/gather/point_numbers.h"
 #include "preprocess/mesh/mesh_source.h"
-#include "stream/base/file.h"
 #include "stream/base/mutex.h"
 
 namespace curvisplat {

@@ -11,7 +11,10 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kOpposite = -0.9;  // cosine
+// Faces against each other: the cosine of their normals, and how far the centre of one is from the plane of the other, in
+// the lengths of that. The sides of a sharp edge are neither.
+constexpr double kOpposite = -0.98, kApart = 0.05;
+constexpr size_t kMostCompared = 256;  // at one number, pair by pair
 
 glm::dvec3 vectorOf(const std::array<double, 3>& v) {
   return {v[0], v[1], v[2]};
@@ -21,6 +24,36 @@ glm::dvec3 vectorOf(const std::array<double, 3>& v) {
 template <typename Record>
 auto contentOf(const Record& record) {
   return std::tie(record.touches, record.inward, record.point);
+}
+
+/// A face at one number.
+struct Side {
+  uint64_t face;
+  glm::dvec3 inward, point;
+  bool closed = false;
+};
+
+/// Whether the plane of `side` has the other one's centre in it.
+bool isBeside(const Side& side, const Side& other) {
+  constexpr double kCorners = 4;  // `inward` is one corner's share of the face
+  const double area = glm::length(side.inward);
+  return std::abs(glm::dot(side.inward, other.point - side.point)) <=
+         kApart * area * std::sqrt(kCorners * area);
+}
+
+/// Those that lie against another one; all where very many meet.
+void markClosed(std::span<Side> sides) {
+  if (sides.size() > kMostCompared) {
+    for (Side& side : sides) side.closed = true;
+    return;
+  }
+  for (Side& a : sides)
+    for (Side& b : sides) {
+      if (&b == &a) break;
+      const double lengths = glm::length(a.inward) * glm::length(b.inward);
+      if (!(glm::dot(a.inward, b.inward) <= kOpposite * lengths)) continue;
+      if (isBeside(a, b) && isBeside(b, a)) a.closed = b.closed = true;
+    }
 }
 
 }  // namespace
@@ -48,20 +81,20 @@ OuterPlanes::OfRange OuterPlanes::sorted(size_t range) const {
   return planes;
 }
 
-void OuterPlanes::leaveOutClosed() {
+void OuterPlanes::leaveOutClosed(const Progress& progress) {
+  std::vector<Side> sides;
   for (size_t range = 0; range < file_.streams(); ++range) {
     const OfRange planes = sorted(range);
     const auto& records = planes.records_;
     for (size_t first = 0, end = 0; first < records.size(); first = end) {
-      while (end < records.size() && records[end].number == records[first].number) ++end;
-      for (size_t a = first; a < end; ++a)
-        for (size_t b = a + 1; b < end; ++b) {
-          if (records[a].touches == 0 || records[b].touches == 0) continue;
-          const glm::dvec3 p = vectorOf(records[a].inward), q = vectorOf(records[b].inward);
-          if (glm::dot(p, q) > kOpposite * glm::length(p) * glm::length(q)) continue;
-          closed_.push_back(records[a].face);
-          closed_.push_back(records[b].face);
-        }
+      progress.throwIfStopped();
+      sides.clear();
+      for (; end < records.size() && records[end].number == records[first].number; ++end)
+        if (records[end].touches != 0)
+          sides.push_back({records[end].face, vectorOf(records[end].inward), vectorOf(records[end].point)});
+      markClosed(sides);
+      for (const Side& side : sides)
+        if (side.closed) closed_.push_back(side.face);
     }
     std::sort(closed_.begin(), closed_.end());
     closed_.erase(std::unique(closed_.begin(), closed_.end()), closed_.end());

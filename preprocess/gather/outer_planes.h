@@ -8,6 +8,7 @@
 
 #include "preprocess/gather/streams_file.h"
 #include "preprocess/moments/mesh_borders.h"
+#include "stream/base/progress.h"
 
 namespace curvisplat {
 
@@ -19,9 +20,10 @@ class OuterPlanes {
   /// One thread. A plane without area is left out. `face`: its number, the same for all that it is added to.
   void add(uint64_t number, const OuterPlane& plane, uint64_t face = 0);
   void close() { file_.close(); }
-  /// After close(): leaves out faces that have another one behind them at one of their numbers. There are cells on both
-  /// sides, whose faces do not fit together: nodes hang. Memory: 8 bytes for each such face.
-  void leaveOutClosed();
+  /// After close(): leaves out faces that another one lies against at one of their numbers. There are cells on both sides,
+  /// whose faces do not fit together: nodes hang. Where more than 256 meet, all are left out. Memory: 8 bytes for each
+  /// such face.
+  void leaveOutClosed(const Progress& progress);
 
   /// The planes of a range; what comes out does not depend on the order in which they came in.
   class OfRange {

@@ -67,7 +67,7 @@ void PointBorders::finish(const Progress& progress) {
                 },
                 progress);
   planes_.close();
-  planes_.leaveOutClosed();
+  planes_.leaveOutClosed(progress);
 }
 
 }  // namespace curvisplat

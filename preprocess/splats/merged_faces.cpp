@@ -8,14 +8,22 @@
 namespace curvisplat {
 namespace {
 
-constexpr double kSimilar = 0.7;    // cosine: of one plane
-constexpr double kOpposite = -0.5;  // of two that close one another, or of a layer thinner than a voxel
-constexpr double kEven = 0.9;       // the length of a mean of unit vectors that are about the same
+constexpr double kSimilar = 0.7;  // cosine: of one plane
+// Of two that close one another, or of a layer thinner than a voxel. Beyond the -0.5 of the sides of a regular hexagon or a
+// triangle, which rounding would decide.
+constexpr double kOpposite = -0.55;
+constexpr double kEven = 0.9;  // the length of a mean of unit vectors that are about the same
 // How far a splat's middle is from a face that it ends at, in its lengths: a box's is 1/2, a wedge's 0.41 or 0.82.
 constexpr double kNearest = 0.37, kFarthest = 0.85;
 constexpr double kTouching = 0.3;  // what part of its section has to
 
 }  // namespace
+
+bool isClosed(const VoxelPlanes::Plane& plane, std::span<const VoxelPlanes::Plane> all) {
+  return !plane.face || std::any_of(all.begin(), all.end(), [&](const VoxelPlanes::Plane& other) {
+    return glm::dot(other.inward, plane.inward) < kOpposite;
+  });
+}
 
 void MergedFaces::clear() {
   std::fill(first_.begin(), first_.end(), kNone);
@@ -74,10 +82,7 @@ uint32_t mergedBorderCode(const VoxelPlanes& planes, const glm::dvec3& position,
   size_t count = 0;
   for (size_t n = 0; n < planes.count; ++n) {
     const auto& plane = planes.planes[n];
-    bool closed = !plane.face;
-    for (size_t m = 0; m < planes.count; ++m)
-      closed |= glm::dot(planes.planes[m].inward, plane.inward) < kOpposite;
-    if (closed) continue;
+    if (isClosed(plane, std::span(planes.planes).first(planes.count))) continue;
     const glm::dvec3 in_frame = plane.inward * merged.factor();
     const double length = glm::length(in_frame), middle = glm::dot(plane.inward, position - plane.point);
     if (!(middle > kNearest * length)) continue;

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <span>
 #include <vector>
 
 #include "preprocess/splats/shape.h"
@@ -26,6 +27,9 @@ struct VoxelPlanes {
   std::array<Plane, kMost> planes;
   size_t count = 0;
 };
+
+/// Whether a splat that ends at all these planes is not cut at this one: another one faces it, or it is too uneven.
+bool isClosed(const VoxelPlanes::Plane& plane, std::span<const VoxelPlanes::Plane> all);
 
 /// Not for several threads at once.
 class MergedFaces {
