@@ -22,6 +22,8 @@ class Toasts {
   const std::deque<Toast>& shown(double now_s);
   /// One of shown() goes now.
   void remove(size_t n);
+  /// All of them go.
+  void removeAll() { shown_.clear(); }
   /// All, the newest last; the oldest of more than 100 are forgotten.
   const std::deque<std::string>& log() const { return log_; }
 

@@ -288,6 +288,7 @@ class Viewer {
       case Command::kQuit:
       case Command::kKeys:
       case Command::kMessages:
+      case Command::kDismissMessages:
       case Command::kLightTheme:
       case Command::kLargerText:
       case Command::kSmallerText:
@@ -327,6 +328,9 @@ class Viewer {
         return;
       case Command::kMessages:
         messages_shown_ = !messages_shown_;
+        return;
+      case Command::kDismissMessages:
+        toasts_.removeAll();
         return;
       case Command::kLightTheme:
         settings_.light_theme = !settings_.light_theme;

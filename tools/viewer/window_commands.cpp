@@ -57,6 +57,8 @@ constexpr std::array kCommands{
                 kGroup},
     CommandInfo{Command::kSmallerText, "Window", "Smaller text", GLFW_KEY_MINUS, !kShift, kControl, "Ctrl+-"},
     CommandInfo{Command::kMessages, "Window", "Messages", 0, false, false, "", kGroup},
+    CommandInfo{Command::kDismissMessages, "Window", "Dismiss messages", GLFW_KEY_ESCAPE, !kShift, !kControl,
+                "Esc"},
     CommandInfo{Command::kKeys, "Help", "Keys and mouse", GLFW_KEY_F1, !kShift, !kControl, "F1 or ?"},
 };
 

@@ -47,6 +47,7 @@ enum class Command {
   kSmallerText,
   kKeys,
   kMessages,
+  kDismissMessages,
 };
 
 struct CommandInfo {
