@@ -151,9 +151,10 @@ void FramePlanner::planIsosurfaces(const FrameOptions& options, const CutOptions
   const CutTree tree{cache_.manifest().root, cache_.bricks(), cache_.brickVariables(variable_), subtrees_};
   const double reach = largestReach(plan.settings.view.low_pass_px2);
   const auto has_none = [&](const ValueBounds& bounds) {
-    const auto [low, high] = spreadOf(bounds, reach);
+    const std::pair<double, double> spread = spreadOf(bounds, reach);
     const auto& values = options.scene->isovalues;
-    return std::none_of(values.begin(), values.end(), [&](double v) { return v >= low && v <= high; });
+    return std::none_of(values.begin(), values.end(),
+                        [&](double v) { return v >= spread.first && v <= spread.second; });
   };
   Cut cut = curvisplat::chooseCut(tree, cutViewOf(plan.settings), has_none, limits);
   plan.iso_parts = std::move(cut.parts);

@@ -301,7 +301,7 @@ TEST_F(WindowOpening, AFileDroppedIsOpened) {
   placeOf("curve");
   EXPECT_EQ(kept().size(), 1u);
   drop({"a.splats"});
-  EXPECT_TRUE(eventually([this] { return titleOfWindow().starts_with("a.splats"); }));
+  EXPECT_TRUE(eventually([] { return titleOfWindow().starts_with("a.splats"); }));
   close();
 }
 

@@ -22,11 +22,7 @@ using Flow = std::function<std::array<double, 5>(const glm::dvec3&)>;  // densit
 class FlowOnMesh final : public MeshSource {
  public:
   FlowOnMesh(std::vector<ArrayPiece> pieces, const Flow& flow, Centring centring)
-      : centring_(centring),
-        pieces_(pieces),
-        flow_(flow),
-        mesh_(std::move(pieces)),
-        description_(mesh_.description()) {
+      : pieces_(pieces), flow_(flow), mesh_(std::move(pieces)), description_(mesh_.description()) {
     description_.scalars.clear();
     for (const char* const name : {"density", "velocity_x", "velocity_y", "velocity_z", "pressure"}) {
       GridScalar scalar;
@@ -61,7 +57,6 @@ class FlowOnMesh final : public MeshSource {
     for (size_t n = 0; n < scalars.size(); ++n) out[n].push_back(static_cast<float>(flow[scalars[n]]));
   }
 
-  const Centring centring_;
   const std::vector<ArrayPiece> pieces_;
   const Flow flow_;
   const ArrayMesh mesh_;
@@ -111,7 +106,9 @@ TEST_F(Gradients, OfLinearFlowsAreExact) {
   // Vorticity 2 (1, 2, -2). Q: half of |rotation|² - |strain|², 2 |omega|² = 18 and 0.5.
   const std::pair<const char*, double> expected[] = {
       {"vorticity_magnitude", 6}, {"pressure_gradient_magnitude", 3}, {"q_criterion", 9 - 0.25}};
-  for (const auto& [name, value] : expected) {
+  for (const auto& one : expected) {
+    const char* const name = one.first;
+    const double value = one.second;
     const auto expectAll = [&](const std::vector<ArrayPiece>& pieces, Centring centring, double tolerance) {
       for (const float found : valuesOf(pieces, linearFlow, centring, name))
         ASSERT_NEAR(found, value, tolerance * value) << name;
