@@ -20,7 +20,7 @@ using TakeSplat = std::function<void(const NodeSplat&, std::span<const SplatScal
 
 class PointSums {
  public:
-  /// For points with numbers below `points` and about so many cells.
+  /// `points`: how many points there are; their numbers are below it. `cells`: about how many cells will be added.
   PointSums(uint64_t points, uint64_t cells, size_t fields, uint64_t memory_bytes,
             const std::filesystem::path& folder);
   ~PointSums();

@@ -27,8 +27,8 @@ struct VdbReport {
   double voxel_size = 0;  // world units
 };
 
-/// The bricks are those whose merged detail is below half a voxel. The file appears whole or not at all. Throws UsageError if the
-/// memory is too little for so many voxels, Error as CacheReader does and if the file cannot be written.
+/// The bricks are those whose merged detail is below half a voxel. The file appears whole or not at all. Throws UsageError if
+/// options.memory_bytes is too small for the voxels that were asked for, Error as CacheReader does and if the file cannot be written.
 VdbReport writeVdb(const CacheReader& cache, size_t variable, const VdbOptions& options,
                    const std::filesystem::path& path, Progress& progress);
 

@@ -56,7 +56,7 @@ class IsoRays {
   void trace(const IsoPacket& packet, std::span<const IsoSplats::Placed> splats);
   const Hits& hits(size_t ray) const { return hits_[ray]; }
 
-  /// What trace() takes for so many splats, at most.
+  /// The most memory that trace() takes for `splats` splats, in bytes.
   static constexpr uint64_t bytes(size_t splats) {
     return splats * (sizeof(Crossed) + sizeof(uint32_t) + sizeof(const Crossed*));
   }
