@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "stream/base/check.h"
+#include "stream/base/error.h"
 
 namespace curvisplat {
 
@@ -20,9 +21,27 @@ void Ranks::wait() {
       continue;
     }
     if (check_) check_();
+    throwIfOneFailed();
     std::this_thread::sleep_for(pause);
     pause = std::min(2 * pause, kLongest);
   }
+}
+
+/// Rank 0 is the last to leave: it removes the folder in which others still remove their files.
+void Ranks::throwIfOneFailed() {
+  if (transport_->failedCount() == 0) return;
+  if (isFirst()) waitForFailures(std::chrono::seconds(3));
+  throw Error("another rank has failed");
+}
+
+bool Ranks::waitForFailures(std::chrono::milliseconds longest) {
+  if (alone()) return true;
+  const auto end = std::chrono::steady_clock::now() + longest;
+  while (transport_->failedCount() + 1 < count()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return true;
 }
 
 std::vector<Ranks::Bytes> Ranks::exchange(const std::vector<Bytes>& to) {

@@ -1,12 +1,13 @@
 // Processes that do one job together, on one machine or many, started by mpirun or srun. Each has a number, its
 // rank; most programs run as one rank alone.
 //
-// All ranks make the same calls in the same order, and each call waits for the others. A rank that fails does
-// not call any more: whoever started it ends the others (tools/output/launched_ranks.h).
+// All ranks make the same calls in the same order, and each call waits for the others. A rank that fails announces
+// it and does not call any more (tools/output/launched_ranks.h); others that wait then fail as well.
 //
 // One thread a rank. A message may be of any size; it is in memory at both ends.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -38,8 +39,8 @@ class RankTransport {
 
   /// Tells the others that this rank has failed, and waits for nobody.
   virtual void announceFailure() = 0;
-  /// A rank that has announced its failure to this one; -1: none so far.
-  virtual int failedRank() = 0;
+  /// How many other ranks have announced their failure to this one so far.
+  virtual unsigned failedCount() = 0;
 
   /// Ends the job in good order. Waits for all.
   virtual void finish() = 0;
@@ -62,8 +63,8 @@ class Ranks {
   /// Whether this rank is the one that writes and prints what there is once.
   bool isFirst() const { return rank() == 0; }
 
-  /// Called again and again while a call waits; what it throws leaves the call. Afterwards there are no more
-  /// calls.
+  /// Called again and again while a call waits; what it throws leaves the call, as does an Error where another rank
+  /// has failed. Afterwards there are no more calls.
   void whileWaiting(std::function<void()> check) { check_ = std::move(check); }
 
   /// Sends to[n] to each rank n. Returns what came from each.
@@ -78,10 +79,14 @@ class Ranks {
   void sum(std::span<int64_t> values);
   void sum(std::span<uint64_t> values);
 
+  /// Waits until all others have announced their failure, but no longer than `longest`. Returns whether they have.
+  bool waitForFailures(std::chrono::milliseconds longest);
+
   RankTransport* transport() { return transport_.get(); }
 
  private:
   void wait();
+  void throwIfOneFailed();
 
   std::unique_ptr<RankTransport> transport_;
   std::function<void()> check_;

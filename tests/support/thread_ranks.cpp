@@ -26,7 +26,8 @@ struct Meeting {
   };
   std::vector<Sent> sent GUARDED_BY(mutex);
   uint64_t came GUARDED_BY(mutex) = 0, took GUARDED_BY(mutex) = 0;
-  int failed GUARDED_BY(mutex) = -1;
+  int failed GUARDED_BY(mutex) = -1;  // the first
+  unsigned failed_count GUARDED_BY(mutex) = 0;
 };
 
 class ThreadTransport final : public RankTransport {
@@ -74,10 +75,11 @@ class ThreadTransport final : public RankTransport {
   void announceFailure() override {
     const MutexLock lock(meeting_.mutex);
     if (meeting_.failed < 0) meeting_.failed = static_cast<int>(rank_);
+    ++meeting_.failed_count;
   }
-  int failedRank() override {
+  unsigned failedCount() override {
     const MutexLock lock(meeting_.mutex);
-    return meeting_.failed;
+    return meeting_.failed_count;
   }
   void finish() override {}
   void abort(int) override { std::abort(); }

@@ -84,11 +84,14 @@ class MpiTransport final : public RankTransport {
     }
   }
 
-  int failedRank() override {
+  unsigned failedCount() override {
     int found = 0;
     MPI_Status status;
-    MPI_Iprobe(MPI_ANY_SOURCE, kFailureTag, failures_, &found, &status);
-    return found ? status.MPI_SOURCE : -1;
+    while (MPI_Iprobe(MPI_ANY_SOURCE, kFailureTag, failures_, &found, &status), found) {
+      MPI_Recv(nullptr, 0, MPI_BYTE, status.MPI_SOURCE, kFailureTag, failures_, MPI_STATUS_IGNORE);
+      ++failed_count_;
+    }
+    return failed_count_;
   }
 
   void finish() override {
@@ -113,7 +116,7 @@ class MpiTransport final : public RankTransport {
       use(at, static_cast<int>(std::min(kMaxMessage, bytes - at)));
   }
 
-  unsigned rank_ = 0, count_ = 1;
+  unsigned rank_ = 0, count_ = 1, failed_count_ = 0;
   MPI_Comm work_ = MPI_COMM_NULL, failures_ = MPI_COMM_NULL;
   std::vector<MPI_Request> requests_;  // of the call under way
 };

@@ -78,7 +78,7 @@ std::string hostName() {
 bool anotherFails(RankTransport& transport, std::chrono::milliseconds moment) {
   const auto end = std::chrono::steady_clock::now() + moment;
   do {
-    if (transport.failedRank() >= 0) return true;
+    if (transport.failedCount() > 0) return true;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   } while (std::chrono::steady_clock::now() < end);
   return false;
@@ -121,8 +121,10 @@ void endRanksAfter(const std::string& line, int status) {
     muteMessages(false);
     printMessage("rank {} of {} ({}): {}", started->rank(), started->count(), hostName(), line);
   }
-  // Others see the announcement, and remove their files, before they are ended.
-  if (!silent) std::this_thread::sleep_for(500ms);
+  // The others see the announcement and remove their files; whoever does not in this time is ended by a signal. The
+  // one that prints ends the job: those that are silent wait for it.
+  started->waitForFailures(5s);
+  if (silent) std::this_thread::sleep_for(2s);
   transport.abort(status);
 }
 
