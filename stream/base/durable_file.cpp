@@ -8,12 +8,12 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <random>
 #include <string_view>
 #include <utility>
 
 #include "stream/base/checksum.h"
 #include "stream/base/file.h"
+#include "stream/base/new_file.h"
 #include "stream/base/open_retrying.h"
 #include "stream/base/paths.h"
 
@@ -71,11 +71,13 @@ void renameDurably(const fs::path& from, const fs::path& to) {
 }
 
 TemporaryFile::TemporaryFile(fs::path target) : target_(std::move(target)) {
-  std::random_device random;
+  const auto name = [&](uint32_t random) {
+    return folderOf(target_) / fmt::format("{}{}{:08x}{}", kBegin, hostDigits(), random, kEnd);
+  };
   while (true) {
-    path_ = folderOf(target_) / fmt::format("{}{}{:08x}{}", kBegin, hostDigits(), random(), kEnd);
-    fd_ = openRetrying(path_, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW, 0666);
-    if (fd_ < 0 && errno == EEXIST) continue;
+    NewFile file = createNewFile(name, 0666);
+    path_ = std::move(file.path);
+    fd_ = file.fd;
     if (fd_ < 0) throw Error("{}: no file can be made beside it: {}", target_.string(), reason());
     // Where files cannot be locked, removeAbandonedFiles() cannot lock them either, and removes nothing.
     const bool busy = ::flock(fd_, LOCK_EX | LOCK_NB) < 0 && errno == EWOULDBLOCK;
