@@ -40,9 +40,11 @@ GridSurvey MeshOrigin::survey(Progress& progress) {
   if (reader_.points() / 8 > plan_.mesh_bytes / 4)
     throw Error("--memory: a mesh of {} points needs at least {} MiB", reader_.points(),
                 MemoryPlan::capForMesh(reader_.points() / 2) >> 20);
+  reader_.prepare(plan_.mesh_bytes, progress);
   MeshSurvey survey = surveyMesh(reader_, progress);
   used_ = std::move(survey.used);
   drawn_cells_ = survey.drawn_cells;
+  chunk_bytes_ = survey.chunk_bytes;
   numbers_.emplace(reader_, plan_.mesh_bytes / 2, scratch_, progress);
   return survey.grid;
 }
@@ -85,7 +87,8 @@ void MeshOrigin::count(const RootCube& root, CountingGrid& counts, Progress& pro
 
 ScatterCounts MeshOrigin::scatter(const SinkOfThread& sink_of_thread, Progress& progress) {
   used_ = {};
-  const uint64_t half = plan_.mesh_bytes / 2;
+  // A chunk of polyhedra takes seven times as much as one of hexahedra. Two are in memory, as one is read ahead.
+  const uint64_t half = (plan_.mesh_bytes - std::min(2 * chunk_bytes_, plan_.mesh_bytes / 2)) / 2;
   CornerGather gather(reader_, *numbers_, half, scratch_, progress);
   const TakeSplat take = [&](const NodeSplat& splat, std::span<const SplatScalar> values) {
     sink_of_thread().add(splat, values);

@@ -44,7 +44,7 @@ class MeshOrigin final : public SplatOrigin {
   std::vector<GridBlock> blocks_;
   std::optional<PointNumbers> numbers_;
   std::vector<bool> used_;  // [point]: a cell that is drawn has it
-  uint64_t drawn_cells_ = 0;
+  uint64_t drawn_cells_ = 0, chunk_bytes_ = 0;
 };
 
 }  // namespace curvisplat

@@ -15,6 +15,13 @@ void addBytes(Checksum& checksum, const std::vector<T>& values) {
   checksum.add(std::as_bytes(std::span(values)));
 }
 
+uint64_t bytesOf(const MeshCells& cells) {
+  return cells.shapes.size() + cells.hidden.size() +
+         (cells.corner_begin.size() + cells.face_begin.size()) * sizeof(size_t) +
+         cells.corners.size() * sizeof(uint64_t) + cells.faces.size() * sizeof(uint32_t) +
+         cells.scalars.size() * cells.size() * sizeof(float);
+}
+
 void widen(ScalarRange& range, float value) {
   range.min = std::min<double>(range.min, value);
   range.max = std::max<double>(range.max, value);
@@ -34,6 +41,7 @@ MeshSurvey surveyMesh(const MeshReader& reader, Progress& progress) {
   for (const MeshPiece& piece : reader.pieces()) first_points.push_back(first_points.back() + piece.points);
   reader.forEachCells([&](const LoadedCells& loaded) {
     const MeshCells& cells = loaded.cells;
+    survey.chunk_bytes = std::max(survey.chunk_bytes, bytesOf(cells));
     for (size_t n = 0; n < cells.size(); ++n) {
       ++survey.cells_of[static_cast<size_t>(cells.shapes[n])];
       if (cells.shapes[n] == CellKind::kNone) continue;

@@ -22,6 +22,13 @@ void inParts(size_t count, const Use& use) {
                     [&](const tbb::blocked_range<size_t>& part) { use(part.begin(), part.end()); });
 }
 
+uint64_t cornersDrawn(const MeshCells& cells) {
+  uint64_t corners = 0;
+  for (size_t n = 0; n < cells.size(); ++n)
+    if (cells.shapes[n] != CellKind::kNone) corners += cells.cornersOfCell(n).size();
+  return corners;
+}
+
 /// Where a corner wants its point.
 struct Reference {
   uint64_t point, slot;
@@ -58,13 +65,18 @@ CornerGather::CornerGather(const MeshReader& reader, const PointNumbers& numbers
       corner_fields_(reader.centring() == Centring::kNode ? reader.scalars() : 0),
       cell_fields_(reader.centring() == Centring::kCell ? reader.scalars() : 0) {}
 
-void CornerGather::take(const LoadedCells& loaded, GatheredCells& out) const {
+size_t CornerGather::take(const LoadedCells& loaded, size_t begin, GatheredCells& out) const {
+  out.clear();
   const MeshCells& cells = loaded.cells;
   uint64_t first_point = 0;
   for (uint32_t piece = 0; piece < loaded.range.piece; ++piece)
     first_point += reader_->pieces()[piece].points;
-  for (size_t n = 0; n < cells.size(); ++n) {
+  size_t n = begin;
+  for (; n < cells.size(); ++n) {
     if (cells.shapes[n] == CellKind::kNone) continue;
+    if (out.size() > 0 && (out.corners.size() + cells.cornersOfCell(n).size() > GatheredCells::kMostCorners ||
+                           out.faces.size() + cells.facesOfCell(n).size() > GatheredCells::kMostCorners))
+      break;
     out.numbers.push_back(loaded.range.number + n);
     out.shapes.push_back(cells.shapes[n]);
     for (const uint64_t point : cells.cornersOfCell(n))
@@ -77,6 +89,7 @@ void CornerGather::take(const LoadedCells& loaded, GatheredCells& out) const {
   }
   out.at.resize(out.corners.size());
   out.corner_values.resize(out.corners.size() * corner_fields_);
+  return n;
 }
 
 /// Makes the cells with a blanked corner degenerate, without corners: they take part in nothing.
@@ -107,17 +120,18 @@ void CornerGather::gatherInMemory(const std::function<void(const GatheredCells&)
   });
   GatheredCells cells;
   reader_->forEachCells([&](const LoadedCells& loaded) {
-    cells.clear();
-    take(loaded, cells);
-    inParts(cells.corners.size(), [&](size_t begin, size_t end) {
-      for (size_t n = begin; n < end; ++n) {
-        cells.at[n] = at[cells.corners[n]];
-        std::copy_n(&values[cells.corners[n] * corner_fields_], corner_fields_,
-                    &cells.corner_values[n * corner_fields_]);
-      }
-    });
-    dropBlanked(cells);
-    use(cells);
+    for (size_t next = 0; next < loaded.cells.size();) {
+      next = take(loaded, next, cells);
+      inParts(cells.corners.size(), [&](size_t begin, size_t end) {
+        for (size_t n = begin; n < end; ++n) {
+          cells.at[n] = at[cells.corners[n]];
+          std::copy_n(&values[cells.corners[n] * corner_fields_], corner_fields_,
+                      &cells.corner_values[n * corner_fields_]);
+        }
+      });
+      dropBlanked(cells);
+      use(cells);
+    }
     progress_->advance(loaded.range.count);
   });
 }
@@ -134,16 +148,18 @@ void CornerGather::gatherByStreams(const std::function<void(const GatheredCells&
   GatheredCells cells;
   reader_->forEachCells([&](const LoadedCells& loaded) {
     progress_->throwIfStopped();
-    cells.clear();
-    take(loaded, cells);
-    if (groups.back().slots > 0 && groups.back().slots + cells.corners.size() > group_slots)
+    const uint64_t corners = cornersDrawn(loaded.cells);
+    if (groups.back().slots > 0 && groups.back().slots + corners > group_slots)
       groups.push_back({{}, groups.back().first_slot + groups.back().slots, 0});
     Group& group = groups.back();
     uint64_t slot = group.first_slot + group.slots;
-    for (const uint64_t point : cells.corners)
-      references.appendRecord(point / range_points, Reference{point, slot++});
+    for (size_t next = 0; next < loaded.cells.size();) {
+      next = take(loaded, next, cells);
+      for (const uint64_t point : cells.corners)
+        references.appendRecord(point / range_points, Reference{point, slot++});
+    }
     group.ranges.push_back(loaded.range);
-    group.slots += cells.corners.size();
+    group.slots += corners;
   });
   references.close();
 
@@ -198,17 +214,18 @@ void CornerGather::gatherByStreams(const std::function<void(const GatheredCells&
     corners.forget(number);
     size_t slot = 0;
     reader_->forEachCells(group.ranges, [&](const LoadedCells& loaded) {
-      cells.clear();
-      take(loaded, cells);
-      for (size_t n = 0; n < cells.corners.size(); ++n, ++slot) {
-        const std::byte* from = slots.data() + slot * point_bytes;
-        std::memcpy(static_cast<void*>(&cells.at[n]), from, sizeof(glm::dvec3));
-        if (corner_fields_ > 0)
-          std::memcpy(&cells.corner_values[n * corner_fields_], from + sizeof(glm::dvec3),
-                      corner_fields_ * sizeof(float));
+      for (size_t next = 0; next < loaded.cells.size();) {
+        next = take(loaded, next, cells);
+        for (size_t n = 0; n < cells.corners.size(); ++n, ++slot) {
+          const std::byte* from = slots.data() + slot * point_bytes;
+          std::memcpy(static_cast<void*>(&cells.at[n]), from, sizeof(glm::dvec3));
+          if (corner_fields_ > 0)
+            std::memcpy(&cells.corner_values[n * corner_fields_], from + sizeof(glm::dvec3),
+                        corner_fields_ * sizeof(float));
+        }
+        dropBlanked(cells);
+        use(cells);
       }
-      dropBlanked(cells);
-      use(cells);
       progress_->advance(loaded.range.count);
     });
     CURVISPLAT_CHECK_OP(slot, ==, group.slots);

@@ -20,7 +20,8 @@
 
 namespace curvisplat {
 
-/// Cells with their corners. Only those that are drawn.
+/// Cells with their corners. Only those that are drawn. As many as have kMostCorners corners, and places of faces,
+/// together; a single cell may have more.
 struct GatheredCells {
   std::vector<uint64_t> numbers;        // [cell] in the whole mesh
   std::vector<CellKind> shapes;         // [cell]
@@ -31,6 +32,8 @@ struct GatheredCells {
   std::vector<size_t> face_begin{0};    // [cell + 1], in faces
   std::vector<uint32_t> faces;          // as MeshCells'
   std::vector<float> cell_values;       // [cell * fields + field], of cell-centred scalars
+
+  static constexpr size_t kMostCorners = size_t{1} << 17;
 
   size_t size() const { return shapes.size(); }
   CellView view(size_t n, size_t corner_fields) const;
@@ -59,8 +62,9 @@ class CornerGather {
 
   void gatherInMemory(const std::function<void(const GatheredCells&)>& use);
   void gatherByStreams(const std::function<void(const GatheredCells&)>& use);
-  /// Takes over what is drawn of the cells, without positions and values.
-  void take(const LoadedCells& loaded, GatheredCells& out) const;
+  /// Overwrites `out` with what is drawn of the cells from `begin` on, as many as go together, without positions and
+  /// values. Returns the first of the others.
+  size_t take(const LoadedCells& loaded, size_t begin, GatheredCells& out) const;
   void dropBlanked(GatheredCells& cells) const;
 
   const MeshReader* reader_;

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <bit>
@@ -13,8 +12,10 @@
 #include "preprocess/gather/cell_slopes.h"
 #include "preprocess/gather/corner_gather.h"
 #include "preprocess/gather/mesh_reader.h"
+#include "preprocess/gather/point_numbers.h"
 #include "preprocess/gather/point_sums.h"
 #include "preprocess/splats/shape.h"
+#include "stream/base/check.h"
 #include "stream/base/nameless_file.h"
 
 namespace curvisplat {
@@ -127,7 +128,22 @@ class GradientMesh::Values {
     file_.in().readAt(first * sizeof(float), values);
     for (float& value : values) value = std::bit_cast<float>(std::bit_cast<uint32_t>(value) ^ kBits);
   }
-  std::unique_ptr<PointNumbers> numbers;  // of points
+  /// Gives points that have become another one the value of that.
+  void repeat(const PointNumbers& numbers, const Progress& progress) {
+    std::vector<float> run;
+    uint64_t first = 0;
+    for (const auto& [number, same_as] : numbers.mergedPoints()) {
+      if (!run.empty() && (first + run.size() != number || run.size() == kRunSamples)) {
+        progress.throwIfStopped();
+        put(first, std::move(run));
+        run.clear();
+      }
+      if (run.empty()) first = number;
+      run.emplace_back();
+      get(same_as, std::span(run).last(1));
+    }
+    if (!run.empty()) put(first, std::move(run));
+  }
 
  private:
   static constexpr uint32_t kBits = std::bit_cast<uint32_t>(kNone);
@@ -184,23 +200,32 @@ void GradientMesh::insert(std::span<const uint32_t> scalars, uint64_t first, uin
     const Values& of_mesh = valuesOf(scalars[s] - stored);
     std::vector<float> here(count);
     of_mesh.get(first, here);
-    if (of_mesh.numbers && of_mesh.numbers->merged() > 0)
-      for (uint64_t n = 0; n < count; ++n)
-        if (const uint64_t number = (*of_mesh.numbers)(first + n); number != first + n)
-          of_mesh.get(number, std::span(here).subspan(n, 1));
     values.insert(values.begin() + static_cast<ptrdiff_t>(s), std::move(here));
+  }
+}
+
+void GradientMesh::prepare(std::span<const uint32_t> scalars, uint64_t memory_bytes,
+                           const Progress& progress) const {
+  source_->prepare(storedOf(scalars), memory_bytes, progress);
+  const auto stored = static_cast<uint32_t>(source_->description().scalars.size());
+  const MutexLock lock(mutex_);
+  for (const uint32_t scalar : scalars) {
+    if (scalar < stored) continue;
+    std::unique_ptr<Values>& known = values_[scalar - stored];
+    if (!known) known = compute(quantities_.at(scalar - stored), memory_bytes, progress);
   }
 }
 
 const GradientMesh::Values& GradientMesh::valuesOf(uint32_t number) const {
   const MutexLock lock(mutex_);
-  std::unique_ptr<Values>& found = values_[number];
-  // Isolated: no other task that reads from here may run inside, and wait for the mutex.
-  if (!found) tbb::this_task_arena::isolate([&] { found = compute(quantities_.at(number)); });
-  return *found;
+  const auto found = values_.find(number);
+  CURVISPLAT_CHECK(found != values_.end() && found->second);
+  return *found->second;
 }
 
-std::unique_ptr<GradientMesh::Values> GradientMesh::compute(const QuantityInfo& quantity) const {
+std::unique_ptr<GradientMesh::Values> GradientMesh::compute(const QuantityInfo& quantity,
+                                                            uint64_t memory_bytes,
+                                                            const Progress& outer) const {
   const FlowMesh flow_mesh(*source_, inputs_, gas_, blank_value_, quantity.needs);
   const size_t fields = flow_mesh.description().scalars.size();
   std::vector<uint32_t> all(fields);
@@ -208,8 +233,9 @@ std::unique_ptr<GradientMesh::Values> GradientMesh::compute(const QuantityInfo& 
   const MeshReader reader(flow_mesh, all, std::nullopt);
   const bool cells = inputs_.centring == Centring::kCell;
   auto values = std::make_unique<Values>(folder_, cells ? reader.cells() : reader.points());
-  Progress progress;
-  values->numbers = std::make_unique<PointNumbers>(reader, kBytes / 2, folder_, progress);
+  Progress progress;  // the outer one counts samples of another pass
+  progress.stopWith(outer);
+  const PointNumbers numbers(reader, memory_bytes / 2, folder_, progress);
 
   struct Run {  // samples that follow one another
     uint64_t first = 0;
@@ -235,19 +261,19 @@ std::unique_ptr<GradientMesh::Values> GradientMesh::compute(const QuantityInfo& 
     if (run.values.empty()) run.first = splat.node;
     run.values.push_back(static_cast<float>(flowQuantity(quantity.quantity, flow, of_flow, gas_, 0)));
   };
-  CornerGather gather(reader, *values->numbers, kBytes / 2, folder_, progress);
+  CornerGather gather(reader, numbers, memory_bytes / 2, folder_, progress);
   if (cells) {
-    CellSlopes slopes(reader.cells(), fields, kBytes / 2, folder_);
+    CellSlopes slopes(reader.cells(), fields, memory_bytes / 2, folder_);
     gather.forEach([&](const GatheredCells& some) { slopes.add(some); });
     slopes.finish(take, progress);
-    values->numbers.reset();
   } else {
-    PointSums sums(reader.points(), reader.cells(), fields, kBytes / 2, folder_);
+    PointSums sums(reader.points(), reader.cells(), fields, memory_bytes / 2, folder_);
     gather.forEach([&](const GatheredCells& some) { sums.add(some); });
     sums.finish(take, progress);
   }
   for (Run& run : runs)
     if (!run.values.empty()) values->put(run.first, std::move(run.values));
+  if (!cells) values->repeat(numbers, progress);
   return values;
 }
 

@@ -5,8 +5,8 @@
 //                                          --> quantity --> a temporary file, by sample --> whoever reads the scalar
 //
 // A gradient is the one that a splat has (preprocess/moments/mesh_splats.h): of a point by regression over its dual
-// cell, of a cell by least squares over its neighbours. It is computed for the whole mesh, once, when such a scalar is first
-// read. NaN where it is undefined: at blanked samples, and at points that no cell has.
+// cell, of a cell by least squares over its neighbours. It is computed for the whole mesh, once, by prepare(), which must
+// come before such a scalar is read. NaN where it is undefined: at blanked samples, and at points that no cell has.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,6 @@
 #include <vector>
 
 #include "preprocess/formats/derived/flow_inputs.h"
-#include "preprocess/gather/point_numbers.h"
 #include "preprocess/mesh/mesh_source.h"
 #include "stream/base/mutex.h"
 
@@ -36,9 +35,9 @@ class GradientMesh final : public MeshSource {
                   MeshPoints& out) const override;
   void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                  MeshCells& out) const override;
-
-  /// Of sums and streams while gradients are computed; other limits follow from it.
-  static constexpr uint64_t kBytes = uint64_t{64} << 20;
+  /// Reads the mesh once for each of these scalars that has gradients and is not known yet.
+  void prepare(std::span<const uint32_t> scalars, uint64_t memory_bytes,
+               const Progress& progress) const override;
 
  private:
   class Values;
@@ -48,7 +47,8 @@ class GradientMesh final : public MeshSource {
   void insert(std::span<const uint32_t> scalars, uint64_t first, uint64_t count,
               std::vector<std::vector<float>>& values) const;
   const Values& valuesOf(uint32_t quantity) const;
-  std::unique_ptr<Values> compute(const QuantityInfo& quantity) const;
+  std::unique_ptr<Values> compute(const QuantityInfo& quantity, uint64_t memory_bytes,
+                                  const Progress& progress) const;
 
   std::unique_ptr<MeshSource> source_;
   GridDescription description_;

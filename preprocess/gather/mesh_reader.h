@@ -38,6 +38,11 @@ class MeshReader {
   /// node-centred and cell-centred scalars are mixed.
   MeshReader(const MeshSource& source, std::vector<uint32_t> scalars, std::optional<double> blank_value);
 
+  /// MeshSource::prepare() of the reader's scalars.
+  void prepare(uint64_t memory_bytes, const Progress& progress) const {
+    source_->prepare(scalars_, memory_bytes, progress);
+  }
+
   const MeshSource& source() const { return *source_; }
   const std::vector<MeshPiece>& pieces() const { return source_->description().pieces; }
   size_t scalars() const { return scalars_.size(); }

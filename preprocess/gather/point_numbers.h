@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -23,6 +24,8 @@ class PointNumbers {
   uint64_t operator()(uint64_t number) const;
   /// Points that have become another one.
   uint64_t merged() const { return merged_.size(); }
+  /// Them, rising, and what each has become.
+  std::span<const std::pair<uint64_t, uint64_t>> mergedPoints() const { return merged_; }
 
  private:
   std::vector<std::pair<uint64_t, uint64_t>> merged_;  // by number

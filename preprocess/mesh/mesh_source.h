@@ -12,6 +12,7 @@
 
 #include "preprocess/grid/grid_source.h"
 #include "preprocess/mesh/mesh_cells.h"
+#include "stream/base/progress.h"
 
 namespace curvisplat {
 
@@ -33,6 +34,11 @@ class MeshSource : public DataSource {
   /// checkCells() (mesh_cells.h) refuses those that do not exist.
   virtual void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                          MeshCells& out) const = 0;
+
+  /// To be called before these scalars are read, in one thread: computes those that are made of the whole mesh,
+  /// within `memory_bytes`. May be called again. Throws Interrupted once `progress` is stopped.
+  virtual void prepare(std::span<const uint32_t> /*scalars*/, uint64_t /*memory_bytes*/,
+                       const Progress& /*progress*/) const {}
 };
 
 }  // namespace curvisplat

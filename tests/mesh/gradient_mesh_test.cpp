@@ -66,7 +66,7 @@ class FlowOnMesh final : public MeshSource {
 class Gradients : public testing::Test {
  protected:
   std::vector<float> valuesOf(std::vector<ArrayPiece> pieces, const Flow& flow, Centring centring,
-                              const std::string& name) const {
+                              const std::string& name, uint64_t memory_bytes = uint64_t{64} << 20) const {
     const GradientMesh mesh(std::make_unique<FlowOnMesh>(std::move(pieces), flow, centring), {},
                             folder_.path());
     const auto& scalars = mesh.description().scalars;
@@ -74,6 +74,7 @@ class Gradients : public testing::Test {
         std::find_if(scalars.begin(), scalars.end(), [&](const auto& s) { return s.name == name; });
     EXPECT_NE(found, scalars.end()) << name;
     const std::vector<uint32_t> wanted{static_cast<uint32_t>(found - scalars.begin()), 0};
+    mesh.prepare(wanted, memory_bytes, progress_);
     std::vector<float> values;
     for (uint32_t piece = 0; piece < mesh.description().pieces.size(); ++piece) {
       const MeshPiece& of = mesh.description().pieces[piece];
@@ -94,6 +95,7 @@ class Gradients : public testing::Test {
   const std::shared_ptr<const Scene> scene_ = makeScene("half-annulus");
   const ArrayPiece tetrahedra_ = tetrahedraOf(*scene_, 12, 6, 6), hexahedra_ = hexahedraOf(*scene_, 12, 6, 6);
   const TemporaryFolder folder_;
+  Progress progress_;
 };
 
 /// A rigid rotation about (1, 2, -2), a strain, and a pressure that rises by (2, -1, 2).
@@ -154,6 +156,28 @@ TEST_F(Gradients, AreUndefinedWhereTheFlowIs) {
     }
   }
   EXPECT_GT(defined, 100u);
+}
+
+TEST_F(Gradients, KeepToTheirMemoryAndAreTheSameInAny) {
+  const auto parts = split(tetrahedra_, 3, [](size_t cell) { return cell / 20 % 3; });
+  const auto of = [&](uint64_t memory_bytes) {
+    return valuesOf(parts, linearFlow, Centring::kNode, "vorticity_magnitude", memory_bytes);
+  };
+  const std::vector<float> ample = of(uint64_t{64} << 20);
+  EXPECT_EQ(of(uint64_t{256} << 10), ample) << "points and sums wait on disk";
+  // 16 bytes for each point that several pieces have take more than an eighth of this.
+  try {
+    of(uint64_t{4} << 10);
+    FAIL() << "shared points fit in half a KiB";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("increase --memory"), std::string::npos) << error.what();
+  }
+}
+
+TEST_F(Gradients, StopWithTheProgress) {
+  progress_.stop(2);
+  for (const Centring centring : {Centring::kNode, Centring::kCell})
+    EXPECT_THROW(valuesOf({tetrahedra_}, linearFlow, centring, "vorticity_magnitude"), Interrupted);
 }
 
 }  // namespace

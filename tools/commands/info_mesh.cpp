@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "preprocess/convert/memory_plan.h"
 #include "preprocess/convert/mesh_survey.h"
 #include "preprocess/gather/mesh_reader.h"
 #include "stream/base/count_text.h"
@@ -45,6 +46,8 @@ void measure(const MeshSource& source, Centring centring, MeshInfo& info) {
   for (uint32_t n = 0; n < info.description->scalars.size(); ++n)
     if (info.description->scalars[n].centring == centring) scalars.push_back(n);
   if (scalars.empty()) return;
+  const Progress progress;
+  source.prepare(scalars, MemoryPlan::ofOptions(0, 1, 0).mesh_bytes, progress);
   MeshPoints points;
   MeshCells cells;
   for (uint32_t piece = 0; piece < info.description->pieces.size(); ++piece) {

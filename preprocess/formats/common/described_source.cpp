@@ -52,6 +52,10 @@ class DescribedMesh final : public MeshSource {
                  MeshCells& out) const override {
     withText(text_, [&] { source_->readCells(piece, first, count, scalars, out); });
   }
+  void prepare(std::span<const uint32_t> scalars, uint64_t memory_bytes,
+               const Progress& progress) const override {
+    withText(text_, [&] { source_->prepare(scalars, memory_bytes, progress); });
+  }
 
  private:
   std::unique_ptr<MeshSource> source_;

@@ -22,6 +22,10 @@ class DerivedMeshSource final : public MeshSource {
                   MeshPoints& out) const override;
   void readCells(uint32_t piece, uint64_t first, uint64_t count, std::span<const uint32_t> scalars,
                  MeshCells& out) const override;
+  void prepare(std::span<const uint32_t> scalars, uint64_t memory_bytes,
+               const Progress& progress) const override {
+    source_->prepare(neededFor(scalars), memory_bytes, progress);
+  }
 
  private:
   /// The source's scalars that these are made of, each once.

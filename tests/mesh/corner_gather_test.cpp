@@ -1,0 +1,69 @@
+// Cells get the positions of their corners, a bounded number of corners at a time.
+#include "preprocess/gather/corner_gather.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "tests/reference/array_mesh.h"
+#include "tests/support/temporary_folder.h"
+
+namespace curvisplat {
+namespace {
+
+/// Prisms over polygons: each has the points from a number of its own on.
+ArrayPiece prisms(size_t cells, uint64_t corners) {
+  ArrayPiece piece;
+  for (uint64_t n = 0; n < cells + corners; ++n) piece.points.emplace_back(n, 2 * n, 3 * n);
+  std::vector<uint64_t> points(corners);
+  for (size_t n = 0; n < cells; ++n) {
+    std::iota(points.begin(), points.end(), n);
+    piece.cells.append(CellKind::kTetrahedron, std::span(points).first(4));
+    piece.cells.appendPrism(points);
+  }
+  setValues(piece, [](const glm::dvec3& x) { return x.x; });
+  return piece;
+}
+
+TEST(CornerGather, GivesFewPolyhedraAtATime) {
+  constexpr size_t kPrisms = 8000, kCorners = 40, kCells = 2 * kPrisms;  // less than a chunk that is read
+  const ArrayMesh mesh({prisms(kPrisms, kCorners)});
+  const MeshReader reader(mesh, {0}, std::nullopt);
+  const TemporaryFolder folder;
+  Progress progress;
+  for (const uint64_t memory_bytes : {uint64_t{1} << 30, uint64_t{1} << 16}) {
+    const PointNumbers numbers(reader, memory_bytes, folder.path(), progress);
+    CornerGather gather(reader, numbers, memory_bytes, folder.path(), progress);
+    size_t next = 0, calls = 0;
+    gather.forEach([&](const GatheredCells& cells) {
+      ++calls;
+      EXPECT_LE(cells.corners.size(), GatheredCells::kMostCorners);
+      EXPECT_LE(cells.faces.size(), GatheredCells::kMostCorners);
+      for (size_t n = 0; n < cells.size(); ++n, ++next) {
+        ASSERT_EQ(cells.numbers[n], next);
+        ASSERT_EQ(cells.cornersOfCell(n).size(), next % 2 == 0 ? 4u : kCorners);
+        for (size_t at = cells.corner_begin[n]; at < cells.corner_begin[n + 1]; ++at)
+          ASSERT_EQ(cells.at[at].x, static_cast<double>(next / 2 + at - cells.corner_begin[n]));
+      }
+    });
+    EXPECT_EQ(next, kCells);
+    EXPECT_GE(calls, kPrisms * kCorners / GatheredCells::kMostCorners);
+  }
+}
+
+TEST(CornerGather, GivesACellOfManyCornersAlone) {
+  constexpr uint64_t kCorners = GatheredCells::kMostCorners + 2;
+  const ArrayMesh mesh({prisms(2, kCorners)});
+  const MeshReader reader(mesh, {0}, std::nullopt);
+  const TemporaryFolder folder;
+  Progress progress;
+  const PointNumbers numbers(reader, 1 << 20, folder.path(), progress);
+  std::vector<size_t> sizes;
+  CornerGather(reader, numbers, uint64_t{1} << 30, folder.path(), progress)
+      .forEach([&](const GatheredCells& cells) { sizes.push_back(cells.size()); });
+  EXPECT_EQ(sizes, (std::vector<size_t>{1, 1, 1, 1}));
+}
+
+}  // namespace
+}  // namespace curvisplat
