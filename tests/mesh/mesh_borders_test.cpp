@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "preprocess/convert/convert.h"
@@ -149,33 +150,101 @@ ArrayPiece boxes(std::initializer_list<uint64_t> cells) {
   return all;
 }
 
-TEST_F(MeshBorders, HangingNodesAreInside) {
+/// Converts the scalar at points, and calls use(position, border code) for each splat of the finest level.
+template <typename Use>
+void forEachSplat(const ArrayPiece& piece, const std::filesystem::path& folder, const Use& use) {
   ConvertOptions options;
-  options.output = folder_ / "boxes.splats";
+  options.output = folder / "splats.splats";
   options.scalars = {0};
+  options.overwrite = true;
   Progress progress;
-  convert(ArrayMesh({boxes({8, 16})}), options, progress);
+  convert(ArrayMesh({piece}), options, progress);
   const CacheReader cache(options.output);
-  size_t inside = 0, cut = 0;
   for (uint32_t number = 0; number < cache.bricks().size(); ++number) {
     if (!cache.bricks()[number].isLeaf()) continue;
     SplatGeometry geometry;
     cache.readGeometry(number, geometry);
     const glm::dvec3 corner = cache.manifest().root.cellMin(cache.bricks()[number].cell);
-    for (size_t n = 0; n < geometry.size(); ++n) {
-      const glm::dvec3 x = corner + glm::dvec3(geometry.x[n], geometry.y[n], geometry.z[n]);
-      const double edge = std::min({x.x, 2 - x.x, x.y, 1 - x.y, x.z, 1 - x.z});
-      if (edge < 0.02) {
-        ++cut;
-        EXPECT_NE(geometry.border_code[n], kNoBorder) << x.x << ' ' << x.y << ' ' << x.z;
-      }
-      if (edge < 0.2 || std::abs(x.x - 1) > 0.2) continue;
-      ++inside;
-      EXPECT_EQ(geometry.border_code[n], kNoBorder) << x.x << ' ' << x.y << ' ' << x.z;
-    }
+    for (size_t n = 0; n < geometry.size(); ++n)
+      use(corner + glm::dvec3(geometry.x[n], geometry.y[n], geometry.z[n]), geometry.border_code[n]);
   }
+}
+
+TEST_F(MeshBorders, HangingNodesAreInside) {
+  size_t inside = 0, cut = 0;
+  forEachSplat(boxes({8, 16}), folder_.path(), [&](const glm::dvec3& x, uint32_t border_code) {
+    const double edge = std::min({x.x, 2 - x.x, x.y, 1 - x.y, x.z, 1 - x.z});
+    if (edge < 0.02) {
+      ++cut;
+      EXPECT_NE(border_code, kNoBorder) << x.x << ' ' << x.y << ' ' << x.z;
+    }
+    if (edge < 0.2 || std::abs(x.x - 1) > 0.2) return;
+    ++inside;
+    EXPECT_EQ(border_code, kNoBorder) << x.x << ' ' << x.y << ' ' << x.z;
+  });
   EXPECT_GT(inside, 100u);
   EXPECT_GT(cut, 500u);
+}
+
+/// The scene in hexahedra: nu x nv x nw, with every cell beyond the middle of `axis` cut into eight.
+ArrayPiece jointOf(const Scene& scene, const std::array<uint64_t, 3>& cells, size_t axis) {
+  ArrayPiece all;
+  std::map<std::array<uint64_t, 3>, uint64_t> numbers;  // points, in half cells
+  const auto point = [&](const std::array<uint64_t, 3>& at) {
+    const auto [found, is_new] = numbers.emplace(at, all.points.size());
+    glm::dvec3 place(0.0);
+    for (int n = 0; n < 3; ++n)
+      place[n] = static_cast<double>(at[static_cast<size_t>(n)]) /
+                 static_cast<double>(2 * cells[static_cast<size_t>(n)]);
+    if (is_new) all.points.push_back(scene.position(place));
+    return found->second;
+  };
+  constexpr std::array<std::array<uint64_t, 3>, 8> kCorners{
+      {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}}};
+  const auto append = [&](const std::array<uint64_t, 3>& low, uint64_t size) {
+    std::array<uint64_t, 8> corners;
+    for (size_t n = 0; n < 8; ++n)
+      corners[n] = point(
+          {low[0] + size * kCorners[n][0], low[1] + size * kCorners[n][1], low[2] + size * kCorners[n][2]});
+    all.cells.append(CellKind::kHexahedron, corners);
+  };
+  for (uint64_t k = 0; k < 2 * cells[2]; k += 2)
+    for (uint64_t j = 0; j < 2 * cells[1]; j += 2)
+      for (uint64_t i = 0; i < 2 * cells[0]; i += 2) {
+        const std::array<uint64_t, 3> low{i, j, k};
+        if (low[axis] < cells[axis])
+          append(low, 2);
+        else
+          for (const auto& corner : kCorners)
+            append({low[0] + corner[0], low[1] + corner[1], low[2] + corner[2]}, 1);
+      }
+  setValues(all, [&](const glm::dvec3& x) { return scene.scalar(x); });
+  return all;
+}
+
+TEST_F(MeshBorders, HangingNodesOnCurvedJoints) {
+  // The fine faces' hanging nodes lie on the arc, beside the plane of the coarse face.
+  const struct {
+    const char* what;
+    size_t axis;
+  } joints[] = {{"the angle", 0}, {"the radius", 1}, {"the height", 2}};
+  for (const auto& [what, axis] : joints) {
+    const ArrayPiece piece = jointOf(*scene_, {32, 16, 16}, axis);
+    size_t inside = 0, cut = 0;
+    forEachSplat(piece, folder_.path(),
+                 [&, axis_of_joint = static_cast<int>(axis)](const glm::dvec3& x, uint32_t border_code) {
+                   const std::optional<glm::dvec3> uvw = scene_->inverse(x);
+                   if (!uvw || std::abs((*uvw)[axis_of_joint] - 0.5) > 0.15) return;
+                   for (int n = 0; n < 3; ++n)
+                     if (n != axis_of_joint && std::abs((*uvw)[n] - 0.5) > 0.35) return;
+                   ++inside;
+                   cut += border_code != kNoBorder;
+                 });
+    EXPECT_GT(inside, 500u) << what;
+    EXPECT_EQ(cut, 0u) << "of " << inside << " points at a joint across " << what;
+    expectEven(fmt::format("points, joint across {}", what).c_str(), piece, 0, 49, 36.5);
+    expectEven(fmt::format("cells, joint across {}", what).c_str(), piece, 1, 48, 36);
+  }
 }
 
 }  // namespace
