@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Writes a cube of hexahedra, or of tetrahedra, as .vtu (raw, appended), plane by plane: any size, little memory.
 
-    bench/big_mesh.py OUT.vtu --size 216 [--tetrahedra]
+    bench/big_mesh.py OUT.vtu --size 216 [--tetrahedra] [--second]
 
-SIZE x SIZE x SIZE cubes, each of them a hexahedron or six tetrahedra; a scalar "f" at points and one "c" in cells, both smooth. Inner points are
+SIZE x SIZE x SIZE cubes, each of them a hexahedron or six tetrahedra; a scalar "f" at points and one "c" in cells, both smooth; a
+second one at points, "g", with --second. Inner points are
 moved by up to a tenth of a cube. Needs numpy.
 """
 import argparse
@@ -25,6 +26,7 @@ def main():
     parser.add_argument("out")
     parser.add_argument("--size", type=int, default=64)
     parser.add_argument("--tetrahedra", action="store_true")
+    parser.add_argument("--second", action="store_true")
     arguments = parser.parse_args()
     n, m = arguments.size, arguments.size + 1
     shapes = TETRAHEDRA if arguments.tetrahedra else [CORNERS]
@@ -32,13 +34,15 @@ def main():
     cells = n ** 3 * len(shapes)
     arrays = [("f", "Float32", 1, 4 * m ** 3), ("c", "Float32", 1, 4 * cells), ("points", "Float64", 3, 24 * m ** 3),
               ("connectivity", "Int64", 1, 8 * corners * cells), ("offsets", "Int64", 1, 8 * cells), ("types", "UInt8", 1, cells)]
+    if arguments.second:
+        arrays.append(("g", "Float32", 1, 4 * m ** 3))
     offset, entries = 0, {}
     for name, kind, components, length in arrays:
         entries[name] = (f'<DataArray type="{kind}" Name="{name}" NumberOfComponents="{components}" format="appended" '
                          f'offset="{offset}"/>')
         offset += 8 + length
     head = (f'<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64"><UnstructuredGrid>'
-            f'<Piece NumberOfPoints="{m ** 3}" NumberOfCells="{cells}"><PointData>{entries["f"]}</PointData>'
+            f'<Piece NumberOfPoints="{m ** 3}" NumberOfCells="{cells}"><PointData>{entries["f"]}{entries.get("g", "")}</PointData>'
             f'<CellData>{entries["c"]}</CellData><Points>{entries["points"]}</Points><Cells>{entries["connectivity"]}'
             f'{entries["offsets"]}{entries["types"]}</Cells></Piece></UnstructuredGrid><AppendedData encoding="raw">_')
     along = np.arange(m)
@@ -68,6 +72,8 @@ def main():
         ends = np.arange(1, n * n * len(shapes) + 1) * corners
         put(arrays[4][3], (ends + k * n * n * len(shapes) * corners for k in range(n)))
         put(arrays[5][3], (np.full(n * n * len(shapes), 10 if arguments.tetrahedra else 12, "u1") for k in range(n)))
+        if arguments.second:
+            put(arrays[6][3], (field(*plane(k)[:, ::-1].T) for k in range(m)))
         out.write(b"</AppendedData></VTKFile>\n")
 
 

@@ -5,7 +5,8 @@
 #
 #   tests/kill_conversion.sh [PROGRAM [SIZE [MOMENTS [FOLDER]]]]
 #
-# MOMENTS of each kind. SIZE is the generated grid's (320x250x200: 16 M nodes), FOLDER has room for 150 bytes a node.
+# MOMENTS of each kind. SIZE is the generated grid's (320x250x200: 16 M nodes), or mesh:100 for an unstructured grid of
+# 100^3 hexahedra, which needs numpy. FOLDER has room for 150 bytes a node.
 set -euo pipefail
 
 program=${1:-build/release/tools/curvisplat}
@@ -19,11 +20,23 @@ cache=$folder/work/a.splats
 log=$folder/log
 statistics=$folder/stats.json
 input=("$folder/in.xyz" "$folder/in.fun")
-convert=(convert "${input[@]}" -o "$cache" --scalar 1 --memory 512M)
-add=(convert "${input[@]}" --add-scalar i --to "$cache" --memory 512M)
+scalar=1 added=i
+if [[ $size == mesh:* ]]; then
+  input=("$folder/in.vtu") scalar=f added=g
+  if ! /usr/bin/python3 -c 'import numpy' 2> /dev/null; then
+    echo "skipped: no python3-numpy"
+    exit 77
+  fi
+fi
+convert=(convert "${input[@]}" -o "$cache" --scalar "$scalar" --memory 512M)
+add=(convert "${input[@]}" --add-scalar "$added" --to "$cache" --memory 512M)
 
 mkdir "$folder/work"
-"$program" generate wake --size "$size" -o "$folder/in" > "$log"
+if [[ $size == mesh:* ]]; then
+  /usr/bin/python3 "$(dirname "$0")/../bench/big_mesh.py" "${input[0]}" --size "${size#mesh:}" --second
+else
+  "$program" generate wake --size "$size" -o "$folder/in" > "$log"
+fi
 
 checksums() { (cd "$1" && sha256sum ./*); }
 seconds() { date +%s.%N; }

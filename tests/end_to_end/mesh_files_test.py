@@ -132,9 +132,9 @@ class MeshFiles(MeshCase):
         self.check(self.folder / "mesh.vtu.gz", grid)
         self.assertAlmostEqual(self.volume(self.folder / "mesh.vtu.gz", "c"), 1, delta=2e-3)
 
-    def write_exodus(self, path, form="NETCDF3_64BIT_OFFSET", one_coord=False, shift=0):
+    def write_exodus(self, path, form="NETCDF3_64BIT_OFFSET", one_coord=False, shift=0, n=4):
         import netCDF4
-        points, cells = lattice(4), hexahedra(4)
+        points, cells = lattice(n), hexahedra(n)
         tetrahedra = np.concatenate([cells[40:][:, t] for t in
                                      [(0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)]])
         blocks = [("HEX8", cells[:40]), ("TETRA4", tetrahedra), ("SHELL4", cells[:3, :4])]

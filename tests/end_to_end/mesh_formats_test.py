@@ -134,7 +134,8 @@ class Columns(MeshFormats):
         self.assertEqual(info["scalars"][0]["max"], self.LAYERS * len(self.nodes) - 1)
         self.assertGreater(self.cache([self.path], "t")[1], 0)
 
-    def test_icon_with_its_grid_in_a_second_file(self):
+    def write_icon(self):
+        """Returns the triangles, and their heights at the levels in metres. The grid is in a second file, icon_grid.nc."""
         triangles = [t for face in self.faces for t in ([face] if len(face) == 3 else [face[:3], [face[k] for k in (0, 2, 3)]])]
         self.t = RANDOM.random((self.LAYERS, len(triangles))).astype("f4")
         heights = RANDOM.random(len(triangles))[None] * 50 + self.levels[::-1, None]
@@ -155,10 +156,38 @@ class Columns(MeshFormats):
             z = f.createVariable("z_ifc", "f8", ("height_2", "cell"))
             z.units = "m"
             z[:] = heights
+        return triangles, heights
+
+    def test_icon_with_its_grid_in_a_second_file(self):
+        triangles, heights = self.write_icon()
         of_nodes = np.array([[np.mean([heights[l, n] for n, face in enumerate(triangles) if node in face])
                               for node in range(len(self.nodes))] for l in range(self.LAYERS + 1)]) / 1000
         self.expect_columns([self.path, self.folder / "icon_grid.nc"], self.expected(heights=of_nodes, faces=triangles))
         self.expect_line(self.path, scalar="t", words="ICON")
+
+    def write_mpas(self, nodes, faces, heights, ocean):
+        """`heights`: [level][face], in metres."""
+        count, most = len(faces), 7
+        with netCDF4.Dataset(self.path, "w", format="NETCDF3_64BIT_OFFSET") as f:
+            for name, size in (("Time", None), ("nCells", count), ("nVertices", len(nodes)), ("maxEdges", most),
+                               ("nVertLevels", self.LAYERS), ("nVertLevelsP1", self.LAYERS + 1)):
+                f.createDimension(name, size)
+            f.on_a_sphere = "YES             "
+            for name, axis in (("lonVertex", 0), ("latVertex", 1)):
+                f.createVariable(name, "f8", ("nVertices",))[:] = np.radians(nodes[:, axis])
+            f.createVariable("verticesOnCell", "i4", ("nCells", "maxEdges"))[:] = \
+                [[n + 1 for n in face] + [0] * (most - len(face)) for face in faces]
+            f.createVariable("nEdgesOnCell", "i4", ("nCells",))[:] = [len(face) for face in faces]
+            if ocean:
+                depth = f.createVariable("refBottomDepth", "f8", ("nVertLevels",))
+                depth.units = "m"
+                depth[:] = self.levels[1:]
+                f.createVariable("maxLevelCell", "i4", ("nCells",))[:] = [self.LAYERS] + [1] * (count - 1)
+            else:
+                z = f.createVariable("zgrid", "f8", ("nCells", "nVertLevelsP1"))
+                z.units = "m"
+                z[:] = heights.T
+            f.createVariable("t", "f4", ("Time", "nCells", "nVertLevels"))[0] = self.t.T
 
     def test_mpas(self):
         # Two hexagons and two triangles between them.
@@ -168,25 +197,7 @@ class Columns(MeshFormats):
         self.t = RANDOM.random((self.LAYERS, 2)).astype("f4")
         heights = np.stack([self.levels, self.levels + 30], 1)
         for ocean in (False, True):
-            with self.subTest(ocean=ocean), netCDF4.Dataset(self.path, "w", format="NETCDF3_64BIT_OFFSET") as f:
-                for name, size in (("Time", None), ("nCells", 2), ("nVertices", len(nodes)), ("maxEdges", 7), ("nVertLevels", self.LAYERS),
-                                   ("nVertLevelsP1", self.LAYERS + 1)):
-                    f.createDimension(name, size)
-                f.on_a_sphere = "YES             "
-                for name, axis in (("lonVertex", 0), ("latVertex", 1)):
-                    f.createVariable(name, "f8", ("nVertices",))[:] = np.radians(nodes[:, axis])
-                f.createVariable("verticesOnCell", "i4", ("nCells", "maxEdges"))[:] = [[n + 1 for n in face] + [0] for face in faces]
-                f.createVariable("nEdgesOnCell", "i4", ("nCells",))[:] = 6
-                if ocean:
-                    depth = f.createVariable("refBottomDepth", "f8", ("nVertLevels",))
-                    depth.units = "m"
-                    depth[:] = self.levels[1:]
-                    f.createVariable("maxLevelCell", "i4", ("nCells",))[:] = [self.LAYERS, 1]
-                else:
-                    z = f.createVariable("zgrid", "f8", ("nCells", "nVertLevelsP1"))
-                    z.units = "m"
-                    z[:] = heights.T
-                f.createVariable("t", "f4", ("Time", "nCells", "nVertLevels"))[0] = self.t.T
+            self.write_mpas(nodes, faces, heights, ocean)
             if ocean:
                 info = self.info(self.path)
                 self.assertEqual(info["cells"]["count"], 2 * self.LAYERS)

@@ -1,0 +1,124 @@
+#!/usr/bin/python3
+"""mesh_bytes_test.py CURVISPLAT
+
+Unstructured grids of every format, larger than the chunks in which they are read: the caches have the same bytes for any number
+of threads and of ranks, and any memory. Exit status 77 (skipped) without python3-vtk9.
+"""
+import hashlib
+import json
+import pathlib
+import shutil
+import subprocess
+import sys
+import unittest
+
+sys.argv.insert(1, sys.argv[1])  # the modules of both families take the program from there
+from mesh_formats import PROGRAM, Mesh, MeshFormats, np  # noqa: E402
+
+import cgns_library as cg  # noqa: E402
+import mesh_cgns_test  # noqa: E402
+import mesh_ensight_test  # noqa: E402
+import mesh_files_test  # noqa: E402
+import mesh_foam_test  # noqa: E402
+import mesh_formats_test  # noqa: E402
+import mesh_su2_test  # noqa: E402
+
+CELLS_OF_A_CHUNK = 16384  # preprocess/gather/mesh_reader.cpp
+SIDE = 26  # 17,576 cubes
+MPIRUN = ["mpirun", "--oversubscribe", "--allow-run-as-root", "--bind-to", "none", "-q", "-n", "3"]
+HAS_RANKS = shutil.which("mpirun") and pathlib.Path(PROGRAM).with_name("curvisplat-mpi.so").exists()
+
+
+class MeshBytes(MeshFormats):
+    def writer(self, kind):
+        """A test case of another module, for its writers."""
+        case = kind("run_program")
+        case.setUp()
+        self.addCleanup(case.doCleanups)
+        return case
+
+    def bytes_of(self, paths, scalar, start=(), options=()):
+        cache = self.folder / "a.splats"
+        done = subprocess.run([*start, PROGRAM, "convert", *map(str, paths), "-o", str(cache), "--scalar", scalar, "--overwrite",
+                               *options], capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertGreater(json.loads((cache / "manifest.json").read_text())["splats"], 0)
+        return {str(p.relative_to(cache)): hashlib.sha256(p.read_bytes()).hexdigest() for p in cache.rglob("*") if p.is_file()}
+
+    def expect_same_bytes(self, *paths, scalars):
+        self.assertGreater(self.info(*paths)["cells"]["count"], CELLS_OF_A_CHUNK)
+        for scalar in scalars:
+            with self.subTest(scalar=scalar):
+                first = self.bytes_of(paths, scalar, options=("--threads", "1", "--memory", "192M"))
+                self.assertEqual(self.bytes_of(paths, scalar, options=("--threads", "4", "--memory", "1G")), first)
+                if HAS_RANKS:
+                    self.assertEqual(self.bytes_of(paths, scalar, MPIRUN, ("--memory", "256M")), first)
+
+    def test_openfoam(self):
+        writer = self.writer(mesh_foam_test.MeshFoam)
+        for parts in (1, 3):
+            case = writer.foam_case(SIDE, parts, binary=True)[0]
+            self.expect_same_bytes(case / "case.foam", scalars=("p",))
+
+    @unittest.skipUnless(cg.library(), "no libcgns")
+    def test_cgns(self):
+        writer = self.writer(mesh_cgns_test.CgnsMeshes)
+        mesh = Mesh(SIDE, (8,))
+        writer.write_polyhedra(mesh)
+        self.expect_same_bytes(writer.path, scalars=("p", "c"))
+        writer.write_sections(Mesh(20))
+        self.expect_same_bytes(writer.path, scalars=("p", "c"))
+
+    def test_ensight(self):
+        writer = self.writer(mesh_ensight_test.EnsightCases)
+        writer.write(writer.rounded(Mesh(20)), "<")
+        self.expect_same_bytes(writer.path, scalars=("p", "c"))
+
+    def test_su2(self):
+        writer = self.writer(mesh_su2_test.Su2Meshes)
+        mesh = Mesh(20)
+        writer.write(mesh)
+        writer.write_restart(mesh, "binary")
+        self.expect_same_bytes(writer.path, writer.restart, scalars=("p",))
+
+    def test_exodus(self):
+        writer = self.writer(mesh_files_test.MeshFiles)
+        writer.write_exodus(self.folder / "mesh.e", n=20)
+        self.expect_same_bytes(self.folder / "mesh.e", scalars=("pressure", "density"))
+
+    def columns(self):
+        """A writer of 60 x 40 quadrangles, or triangles, in 8 layers."""
+        writer = self.writer(mesh_formats_test.Columns)
+        writer.LAYERS, wide, high = 8, 60, 40
+        y, x = np.meshgrid(np.arange(high + 1.0), np.arange(wide + 1.0), indexing="ij")
+        writer.nodes = np.stack([x.ravel() + 0.1 * y.ravel(), y.ravel()], 1)
+        first = [(wide + 1) * j + i for j in range(high) for i in range(wide)]
+        writer.faces = [[n, n + 1, n + wide + 2, n + wide + 1] for n in first]
+        writer.levels = np.linspace(0, 800, writer.LAYERS + 1)
+        writer.t = mesh_formats_test.RANDOM.random((writer.LAYERS, len(writer.faces))).astype("f4")
+        return writer
+
+    @unittest.skipUnless(mesh_formats_test.netCDF4, "no python3-netcdf4")
+    def test_ugrid(self):
+        for column_by_column in (False, True):
+            writer = self.columns()
+            writer.write_ugrid(column_by_column=column_by_column)
+            self.expect_same_bytes(writer.path, scalars=("t",))
+
+    @unittest.skipUnless(mesh_formats_test.netCDF4, "no python3-netcdf4")
+    def test_icon(self):
+        writer = self.columns()
+        writer.write_icon()
+        self.expect_same_bytes(writer.path, writer.folder / "icon_grid.nc", scalars=("t",))
+
+    @unittest.skipUnless(mesh_formats_test.netCDF4, "no python3-netcdf4")
+    def test_mpas(self):
+        writer = self.columns()
+        heights = np.repeat(writer.levels[:, None], len(writer.faces), 1)
+        for ocean in (False, True):
+            writer.write_mpas(writer.nodes, writer.faces, heights, ocean)
+            self.expect_same_bytes(writer.path, scalars=("t",))
+
+
+if __name__ == "__main__":
+    unittest.main()
