@@ -34,6 +34,10 @@ void run(std::span<const std::byte> bytes) {
     CURVISPLAT_CHECK_OP(histogram->low, <, histogram->high);
     CURVISPLAT_CHECK(!histogram->log || histogram->low > 0);
   }
+  if (const auto* const pick = std::get_if<PickRequest>(&message)) {
+    CURVISPLAT_CHECK(pick->x >= 0 && pick->x <= 1);
+    CURVISPLAT_CHECK(pick->y >= 0 && pick->y <= 1);
+  }
   const auto* const view = std::get_if<ViewRequest>(&message);
   if (!view) return;
   CURVISPLAT_CHECK_OP(view->size.width, <=, kLargestSide);
