@@ -120,7 +120,9 @@ uint64_t MemoryPlan::expectedPeak(uint64_t splats, size_t variables) const {
   const uint64_t in_buckets = std::min(splats, plannedBucketSplats() * 3 / 2);
   const uint64_t build = in_buckets * bucketBytesPerSplat(variables) + threads * brickScratchBytes(variables);
   const uint64_t slabs = 2 * std::min(slab_bytes, splats * slabBytesPerNode(variables));
-  const uint64_t scatter = slabs + std::min(chunk_buffer_bytes, splats * regularRecordBytes(variables));
+  const uint64_t buckets = 3 * splats / (2 * plannedBucketSplats()) + 1;
+  const uint64_t scatter = slabs + std::min({chunk_buffer_bytes, splats * regularRecordBytes(variables),
+                                             buckets * kMaxChunkBytes});
   // The counting grid takes half of what it may, the other half is for its coarser levels.
   return std::min(cap_bytes, kProgramBytes + std::max({build, slabs + counting_bytes / 2, scatter}));
 }
