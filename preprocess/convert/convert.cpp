@@ -17,13 +17,19 @@
 namespace curvisplat {
 namespace {
 
+/// At most.
+uint64_t samplesOf(const GridDescription& description) {
+  uint64_t samples = 0;
+  for (const GridBlock& block : description.blocks) samples += block.nodes();
+  for (const MeshPiece& piece : description.pieces) samples += std::max(piece.points, piece.cells);
+  return samples;
+}
+
 /// Some buckets for each rank, so that they can be dealt out evenly.
 uint64_t bucketSplatsOfRanks(const DataSource& source, const Ranks& ranks) {
   constexpr uint64_t kBucketsOfRank = 4;
-  uint64_t nodes = 0;
-  for (const GridBlock& block : source.description().blocks) nodes += block.nodes();
-  for (const MeshPiece& piece : source.description().pieces) nodes += std::max(piece.points, piece.cells);
-  return std::max<uint64_t>(nodes / (kBucketsOfRank * ranks.count()), 4 * kMaxBrickSplats);
+  return std::max<uint64_t>(samplesOf(source.description()) / (kBucketsOfRank * ranks.count()),
+                            4 * kMaxBrickSplats);
 }
 
 /// Whether only the traces of a finished conversion were to be removed. Throws Error if the output is in the way.
@@ -51,6 +57,7 @@ ConvertReport convert(const DataSource& source, const ConvertOptions& given, Pro
   if (options.ranks && options.ranks->alone()) options.ranks = nullptr;
   MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   const auto* const grid = dynamic_cast<const GridSource*>(&source);
+  plan.suit(samplesOf(source.description()), options.scalars.size());
   if (grid) GridOrigin::requireMemory(*grid, options.scalars, plan);
   if (options.ranks) plan.limitBuckets(bucketSplatsOfRanks(source, *options.ranks), options.scalars.size());
   if (options.mesh_bytes) plan.mesh_bytes = *options.mesh_bytes;

@@ -40,6 +40,12 @@ AbuttingFaces::Needs GridOrigin::needsOfFaces() const {
   return needs;
 }
 
+/// Of passes that read each node once. The nodes of such a slab are still in the processor's cache when they are worked on.
+uint64_t GridOrigin::smallSlabBytes() const {
+  constexpr uint64_t kBytes = uint64_t{16} << 20;
+  return std::min(plan_.slab_bytes, std::max(kBytes, leastSlabBytes(blocks(), reader_.scalars(), kNoHalo)));
+}
+
 /// So many slabs that all ranks have about as many.
 bool GridOrigin::shareWith(Ranks& ranks) {
   constexpr uint64_t kSlabsOfRank = 8;
@@ -57,7 +63,7 @@ GridSurvey GridOrigin::survey(Progress& progress) {
   if (centring() == Centring::kCell)
     faces_ = std::make_unique<AbuttingFaces>(blocks(), description().coordinate_bytes,
                                              plan_.seam_bytes - needsOfFaces().memory_bytes, scratch_);
-  GridSurvey survey = surveyGrid(reader_, plan_.slab_bytes, faces_.get(), progress, ranks_);
+  GridSurvey survey = surveyGrid(reader_, smallSlabBytes(), faces_.get(), progress, ranks_);
   if (faces_) faces_->match(progress);
   has_values_everywhere_ = survey.blanked.by_value == 0 && survey.blanked.not_finite == 0;
   if (!ranks_ || ranks_->isFirst()) overlaps_ = findOverlaps(reader_.source(), plan_.slab_bytes, progress);
@@ -83,7 +89,7 @@ std::string GridOrigin::overlap() const {
 }
 
 void GridOrigin::count(const RootCube& root, CountingGrid& counts, Progress& progress) {
-  countNodes(reader_.source(), root, plan_.slab_bytes, counts, progress, shareOf(ranks_));
+  countNodes(reader_.source(), root, smallSlabBytes(), counts, progress, shareOf(ranks_));
 }
 
 ScatterCounts GridOrigin::scatter(const SinkOfThread& sink_of_thread, Progress& progress) {

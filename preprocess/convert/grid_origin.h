@@ -45,6 +45,7 @@ class GridOrigin final : public SplatOrigin {
 
  private:
   AbuttingFaces::Needs needsOfFaces() const;
+  uint64_t smallSlabBytes() const;
 
   bool hasOwners() const { return overlap_ == Overlap::kOwner && !overlaps_.empty(); }
 

@@ -120,9 +120,20 @@ uint64_t MemoryPlan::expectedPeak(uint64_t splats, size_t variables) const {
   const uint64_t in_buckets = std::min(splats, plannedBucketSplats() * 3 / 2);
   const uint64_t build = in_buckets * bucketBytesPerSplat(variables) + threads * brickScratchBytes(variables);
   const uint64_t slabs = 2 * std::min(slab_bytes, splats * slabBytesPerNode(variables));
-  const uint64_t scatter = slabs + std::min(chunk_buffer_bytes, splats * regularRecordBytes(variables));
+  const uint64_t buckets = 3 * splats / (2 * plannedBucketSplats()) + 1;
+  const uint64_t scatter = slabs + std::min({chunk_buffer_bytes, splats * regularRecordBytes(variables),
+                                             buckets * kMaxChunkBytes});
   // The counting grid takes half of what it may, the other half is for its coarser levels.
   return std::min(cap_bytes, kProgramBytes + std::max({build, slabs + counting_bytes / 2, scatter}));
+}
+
+void MemoryPlan::suit(uint64_t samples, size_t variables) {
+  // A slab's halo is read twice, so they are fewer and larger; a cell above buckets is merged from bricks that are read back.
+  constexpr uint64_t kSlabs = 8, kLeastSlabBytes = 48 * kMiB;
+  constexpr uint64_t kBuckets = 4, kBricksOfThread = 10;
+  slab_bytes =
+      std::min(slab_bytes, std::max(kLeastSlabBytes, samples * slabBytesPerNode(variables) / kSlabs));
+  limitBuckets(std::max(samples / kBuckets, threads * kBricksOfThread * kMaxBrickSplats), variables);
 }
 
 void MemoryPlan::limitBuckets(uint64_t splats, size_t variables) {

@@ -41,6 +41,9 @@ struct MemoryPlan {
   /// Makes room for slabs of `bytes`, which long rows need. Throws Error that names a sufficient limit if there is too little.
   void requireSlabs(uint64_t bytes);
 
+  /// Makes slabs and buckets no larger than serves a grid of `samples`: then one is read while another is worked on, and
+  /// memory is used again instead of being asked for, which costs a page fault every 4 KiB.
+  void suit(uint64_t samples, size_t variables);
   /// Makes buckets smaller than they could be.
   void limitBuckets(uint64_t splats, size_t variables);
   /// The size of a bucket's write buffer in a file of `buckets`.

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "preprocess/splats/covered_part.h"
+#include "preprocess/splats/inner_nodes.h"
 #include "preprocess/splats/lq.h"
 #include "preprocess/splats/shape.h"
 #include "stream/base/check.h"
@@ -68,6 +69,8 @@ class Window {
   bool anyBlankAround(uint64_t j, uint64_t k) const;
   void stretchRow(uint64_t j, uint64_t k);
   Stretch stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, uint64_t count) const;
+  void addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighbours& neighbours);
+  void takeInnerNode(const InnerSplats& splats, size_t n, uint64_t i, ptrdiff_t at);
   void addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face, int layer);
   void cutBehindFace(NodeSplat& node, ptrdiff_t at, const Neighbours& neighbours, int layer) const;
   glm::dvec3 position(ptrdiff_t at) const { return {x_[at], y_[at], z_[at]}; }
@@ -161,8 +164,18 @@ void Window::addRow(uint64_t j, uint64_t k) {
   if (corrections_.stretch) stretchRow(j, k);
   if (!anyBlankAround(j, k)) {
     if (i0_ == 0) addNode(0, row, at_i(0), true, kNoLayer);
-    for (uint64_t i = std::max<uint64_t>(1, i0_); i < std::min(i1_, ni_ - 1); ++i)
-      addNode(i, row + static_cast<ptrdiff_t>(i), inner, on_face, layer_at(i));
+    // Those that are neither at a face nor behind one.
+    const uint64_t inner_begin = std::max<uint64_t>(2, i0_), inner_end = ni_ < 4 ? 0 : std::min(i1_, ni_ - 2);
+    const bool at_once = !on_face && layer == kNoLayer && !in_.covered && corrections_.all() &&
+                         inner_end >= inner_begin + kInnerNodesAtOnce;
+    for (uint64_t i = std::max<uint64_t>(1, i0_); i < std::min(i1_, ni_ - 1); ++i) {
+      if (at_once && i == inner_begin) {
+        addInnerNodes(inner_begin, inner_end, row, inner);
+        i = inner_end - 1;
+      } else {
+        addNode(i, row + static_cast<ptrdiff_t>(i), inner, on_face, layer_at(i));
+      }
+    }
     if (ni_ > 1 && i1_ == ni_)
       addNode(ni_ - 1, row + static_cast<ptrdiff_t>(ni_ - 1), at_i(ni_ - 1), true, kNoLayer);
     return;
@@ -242,6 +255,70 @@ Stretch Window::stretchOfNode(ptrdiff_t at, ptrdiff_t stride, uint64_t index, ui
   };
   return stretchOnLine({x_, y_, z_}, at, stride, neighbours(index, -stride),
                        neighbours(count - 1 - index, stride));
+}
+
+/// The nodes from i0 to i1 of a row without blanks around it. `row`: the element of its first node.
+void Window::addInnerNodes(uint64_t i0, uint64_t i1, ptrdiff_t row, const Neighbours& neighbours) {
+  const uint64_t in_part = i0 - i0_, count = i1 - i0;
+  const ptrdiff_t at = row + static_cast<ptrdiff_t>(i0);
+  InnerRow nodes;
+  nodes.positions = {x_, y_, z_};
+  nodes.at = at;
+  nodes.scalars = scalars_;
+  nodes.bend = kBend;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    nodes.strides[axis] = neighbours.after[axis];
+    nodes.stretch[axis] = scratch_.stretch[axis].data() + in_part;
+    nodes.drift[axis] = scratch_.drift[axis].data() + in_part;
+  }
+  const size_t first = count_, scalars = scalars_.size();
+  InnerSplats splats;
+  std::vector<SplatScalar> of_last;
+  for (uint64_t done = 0; done < count;) {
+    // The last ones come with some of those before, which stay as they are.
+    const uint64_t begin = std::min(done, count - kInnerNodesAtOnce);
+    SplatScalar* values = out_.values.data() + (first + begin) * scalars;
+    if (begin < done) of_last.resize(kInnerNodesAtOnce * scalars);
+    computeInnerNodes(nodes, begin, splats, begin < done ? of_last.data() : values);
+    for (size_t n = done - begin; n < kInnerNodesAtOnce; ++n) {
+      if (begin < done) std::copy_n(of_last.data() + n * scalars, scalars, values + n * scalars);
+      count_ = first + begin + n;
+      const uint64_t i = i0 + begin + n;
+      if (splats.is_plain[n])
+        takeInnerNode(splats, n, i, at + static_cast<ptrdiff_t>(begin + n));
+      else
+        addNode(i, at + static_cast<ptrdiff_t>(begin + n), neighbours, false, kNoLayer);
+    }
+    done = begin + kInnerNodesAtOnce;
+  }
+  count_ = first + count;
+}
+
+/// Number `n` of `splats` as the splat of node `i` of the row.
+void Window::takeInnerNode(const InnerSplats& splats, size_t n, uint64_t i, ptrdiff_t at) {
+  const auto of = [n](const InnerSplats::Row(&rows)[3]) {
+    return glm::dvec3(rows[0][n], rows[1][n], rows[2][n]);
+  };
+  const auto rotate = [&](const glm::dvec3& axis) {
+    return of(splats.rotated[axis.x != 0 ? 0 : axis.y != 0 ? 1 : 2]);
+  };
+  const uint64_t in_part = i - i0_;
+  NodeSplat& node = out_.splats[count_];
+  node.node = first_node_of_row_ + i;
+  node.splat.position = of(splats.position);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    node.splat.axis[axis] = splats.axis[axis][n];
+    node.splat.shear[axis] = splats.shear[axis][n];
+  }
+  node.splat.weight = splats.weight[n];
+  node.regular = true;
+  node.border_code = kNoBorder;
+  node.growth_code = growthCode(
+      {scratch_.growth[0][in_part], scratch_.growth[1][in_part], scratch_.growth[2][in_part]}, rotate);
+  node.on_block_face = node.behind_face = false;
+  node.node_position = position(at);
+  node.spacing = 0;
+  (splats.determinant[n] < 0 ? out_.left_handed : out_.right_handed) += 1;
 }
 
 inline void Window::addNode(uint64_t i, ptrdiff_t at, const Neighbours& neighbours, bool on_face, int layer) {

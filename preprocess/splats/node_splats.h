@@ -71,8 +71,10 @@ uint32_t growthCode(const std::array<float, 3>& growth, const Rotate& rotate) {
   constexpr float kLeast = 1.0f / 64;  // less becomes none
   if (std::max({std::abs(growth[0]), std::abs(growth[1]), std::abs(growth[2])}) < kLeast) return kNoGrowth;
   const glm::dmat3 axes(1.0);
-  return packGrowthCode({rotate(axes[0]), rotate(axes[1]), rotate(axes[2])},
-                        {growth[0], growth[1], growth[2]});
+  std::array<glm::dvec3, 3> rotated{};
+  for (int axis = 0; axis < 3; ++axis)
+    if (!(std::abs(growth[axis]) < kLeast)) rotated[axis] = rotate(axes[axis]);
+  return packGrowthCode(rotated, {growth[0], growth[1], growth[2]});
 }
 
 /// A node's splat on its way into the cache.
@@ -132,12 +134,15 @@ struct NodeSplatCorrections {
   bool bends = true;         // of the scalar
   bool stretch = true;       // else splats are as long as their cells
   bool growth = true;        // else kernels are symmetric; takes stretch
+
+  bool all() const { return border_codes && faces && middles && bends && stretch && growth; }
 };
 
 /// What computeNodeSplats() needs for a while; keeps its capacity.
 struct NodeScratch {
   std::array<std::vector<float>, 3> stretch, growth, drift;  // [axis][node of a row's part]
   std::vector<uint8_t> has_blank;                            // [row around the box]
+  std::vector<uint8_t> left_over;                            // [node of a row's part]: InnerSplats
 };
 
 /// Computes the splats of the nodes of `box` that are not blank. Overwrites `out` and keeps its capacity.

@@ -17,6 +17,12 @@ namespace {
 constexpr double kPositionError = 0.05;  // as a fraction of the smallest standard deviation
 constexpr double kLargestShearCode = 1e9;
 
+/// std::nearbyint() of numbers below 2^51, in two additions; larger ones stay large.
+double nearestInteger(double x) {
+  constexpr double kShift = 0x1.8p52;
+  return (x + kShift) - kShift;
+}
+
 int positionBits(const RootCube& root, const Cell& cell, double smallest_axis) {
   const double interval = 2 * kPositionError * kKernelSigma * smallest_axis / std::sqrt(3.0);
   const double bits = std::ceil(std::log2(root.cellSize(cell.level) / interval));
@@ -170,9 +176,10 @@ class GeometryEncoder {
     bool fits = true;
     for (size_t n = 0; n < count_; ++n) {
       const double step = step_of(n);
-      const double code = std::nearbyint(target(n) / step);
-      fits &= std::abs(code) < kLargestShearCode;  // false for NaN
-      const int32_t kept = fits ? static_cast<int32_t>(code) : 0;
+      const double code = nearestInteger(target(n) / step);
+      const bool this_fits = std::abs(code) < kLargestShearCode;  // false for NaN
+      fits &= this_fits;
+      const int32_t kept = this_fits ? static_cast<int32_t>(code) : 0;
       codes_[n] = static_cast<uint32_t>(kept);
       out[n] = kept * step;
     }
@@ -245,10 +252,7 @@ class GeometryEncoder {
 
   void addPredicted(std::span<const uint32_t> values) {
     const Predictor predictor = bestPredictor(sample_, values).predictor;
-    predictRows(predictor, decoded_.rows, values.data(), [&](uint32_t n, uint32_t predicted) {
-      residuals_[n] = zigzag(values[n] - predicted);
-      return values[n];
-    });
+    residualsOf(predictor, decoded_.rows, values.data(), residuals_.data());
     header_.arrays[arrays_++] = {predictor, planes_.add(residuals_)};
   }
 

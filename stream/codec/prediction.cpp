@@ -6,6 +6,8 @@
 #include <limits>
 #include <tuple>
 
+#include "stream/base/vector_clones.h"
+
 namespace curvisplat {
 namespace {
 
@@ -22,6 +24,66 @@ bool inGridOrder(std::span<const NodeRun> runs) {
     if (rowKey(b) < rowKey(a) || (rowKey(a) == rowKey(b) && b.i < a.i + a.count)) return false;
   }
   return true;
+}
+
+/// A row and the row above it, null if there is none. `before`: the value before the row's first.
+struct KnownRow {
+  const uint32_t* values;
+  const uint32_t* above;
+  uint32_t before, count;
+};
+
+/// out: [count]
+CURVISPLAT_VECTOR_CLONES void residualsOfRow(Predictor predictor, const KnownRow& row, uint32_t* out) {
+  const uint32_t *const v = row.values, *const up = row.above, count = row.count;
+  const auto put = [v, out](uint32_t n, uint32_t predicted) { out[n] = zigzag(v[n] - predicted); };
+  if (predictor == Predictor::kNone) {
+    for (uint32_t n = 0; n < count; ++n) put(n, 0);
+    return;
+  }
+  put(0, up ? up[0] : row.before);
+  if (predictor == Predictor::kPrevious) {
+    for (uint32_t n = 1; n < count; ++n) put(n, v[n - 1]);
+  } else if (predictor == Predictor::kLinear || !up) {
+    if (count > 1) put(1, v[0]);
+    for (uint32_t n = 2; n < count; ++n) put(n, 2 * v[n - 1] - v[n - 2]);
+  } else if (predictor == Predictor::kAbove) {
+    for (uint32_t n = 1; n < count; ++n) put(n, up[n] + (v[n - 1] - up[n - 1]));
+  } else {
+    if (count > 1) put(1, up[1] + (v[0] - up[0]));
+    for (uint32_t n = 2; n < count; ++n) put(n, up[n] + 2 * (v[n - 1] - up[n - 1]) - (v[n - 2] - up[n - 2]));
+  }
+}
+
+/// Calls use(row, first) for each row: its values, and the number of its first.
+template <typename Use>
+void forEachKnownRow(std::span<const Row> rows, const uint32_t* values, Use use) {
+  uint32_t before = 0;
+  for (const Row& row : rows) {
+    if (row.count == 0) continue;
+    use(KnownRow{values + row.first, row.above == kNoRow ? nullptr : values + row.above, before, row.count},
+        row.first);
+    before = values[row.first + row.count - 1];
+  }
+}
+
+/// The sum of std::bit_width(). From the exponents of floats, as which numbers of 31 bits are converted in vectors: without the
+/// bit below the highest none is rounded up to the next power of two.
+CURVISPLAT_VECTOR_CLONES uint64_t bitsOf(const uint32_t* numbers, uint32_t count) {
+  constexpr uint32_t kAtOnce = 1u << 20;  // whose sum has 32 bits
+  uint64_t bits = 0;
+  for (uint32_t begin = 0; begin < count; begin += kAtOnce) {
+    uint32_t sum = 0;
+    const uint32_t end = std::min(count, begin + kAtOnce);
+    for (uint32_t n = begin; n < end; ++n) {
+      const auto highest = static_cast<int32_t>(numbers[n] & ~(numbers[n] >> 1));
+      const auto exponent = static_cast<int32_t>(std::bit_cast<uint32_t>(static_cast<float>(highest)) >> 23);
+      const int32_t width = highest < 0 ? 32 : std::max(exponent - 126, 0);
+      sum += static_cast<uint32_t>(width);
+    }
+    bits += sum;
+  }
+  return bits;
 }
 
 /// Cuts runs into rows. `starts[r]` is the first splat of run r.
@@ -117,14 +179,22 @@ std::vector<Row> sampleOf(std::span<const Row> rows) {
   return sample;
 }
 
+void residualsOf(Predictor predictor, std::span<const Row> rows, const uint32_t* values, uint32_t* out) {
+  forEachKnownRow(rows, values,
+                  [&](const KnownRow& row, uint32_t first) { residualsOfRow(predictor, row, out + first); });
+}
+
 PredictorChoice bestPredictor(std::span<const Row> sample, std::span<const uint32_t> values) {
   PredictorChoice best{Predictor::kNone, std::numeric_limits<uint64_t>::max()};
+  uint32_t longest = 0;
+  for (const Row& row : sample) longest = std::max(longest, row.count);
+  std::vector<uint32_t> residuals(longest);
   for (int p = 0; p < kPredictors; ++p) {
     const auto predictor = static_cast<Predictor>(p);
     uint64_t bits = 0;
-    predictRows(predictor, sample, values.data(), [&](uint32_t n, uint32_t predicted) {
-      bits += static_cast<uint64_t>(std::bit_width(zigzag(values[n] - predicted)));
-      return values[n];
+    forEachKnownRow(sample, values.data(), [&](const KnownRow& row, uint32_t) {
+      residualsOfRow(predictor, row, residuals.data());
+      bits += bitsOf(residuals.data(), row.count);
     });
     if (bits < best.bits) best = {predictor, bits};
   }

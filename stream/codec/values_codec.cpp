@@ -131,10 +131,7 @@ class ValuesEncoder {
     if (across_rows) addRows(planes);
     for (size_t a = 0; a < codes_.size(); ++a) {
       const std::vector<uint32_t>& codes = codes_[a];
-      predictRows(predictors[a], rows, codes.data(), [&](uint32_t n, uint32_t predicted) {
-        residuals_[n] = zigzag(codes[n] - predicted);
-        return codes[n];
-      });
+      residualsOf(predictors[a], rows, codes.data(), residuals_.data());
       header_.arrays[a] = {coded(predictors[a], in_time[a]), planes.add(residuals_)};
     }
     return planes.compress(std::as_bytes(std::span(&header_, 1)));

@@ -19,11 +19,14 @@ class LargestEigenvalue {
   void add(double l00, double l10, double l11, double l20, double l21, double l22) {
     const double xx = l00 * l00, xy = l10 * l00, yy = l10 * l10 + l11 * l11;
     const double xz = l20 * l00, yz = l20 * l10 + l21 * l11, zz = l20 * l20 + l21 * l21 + l22 * l22;
-    const double q = (xx + yy + zz) / 3;
+    constexpr double kBelowOne = 1 - 1e-12;
+    // None is above the sum of all, which rules out those of the smaller splats before anything is divided.
+    const double trace = xx + yy + zz;
+    if (trace < kBelowOne * best_) return;
+    const double q = trace / 3;
     const double a = xx - q, b = yy - q, c = zz - q;
     const double p2 = (a * a + b * b + c * c + 2 * (xy * xy + xz * xz + yz * yz)) / 6;
     // The eigenvalues are q + 2 p cos(angle + 2/3 pi n): q + 2 p bounds them and rules out most, without p's root.
-    constexpr double kBelowOne = 1 - 1e-12;
     const double room = best_ - q;
     if (room > 0 && 4 * p2 < kBelowOne * room * room) return;
     const double p = std::sqrt(p2);

@@ -215,6 +215,27 @@ TEST(MemoryPlan, StaysWithinTheCap) {
   }
 }
 
+TEST(MemoryPlan, SuitsTheGrid) {
+  constexpr uint64_t kMiB = uint64_t{1} << 20;
+  const MemoryPlan whole = MemoryPlan::of(uint64_t{2} << 30, 1, 2);
+  MemoryPlan small = whole, large = whole;
+  small.suit(6'400'000, 1);
+  large.suit(500'000'000, 1);
+  EXPECT_EQ(small.slab_bytes, 48 * kMiB);
+  EXPECT_EQ(small.bucket_splats, 1'600'000u);
+  EXPECT_EQ(small.bucket_bytes, 1'600'000 * regularRecordBytes(1));
+  EXPECT_EQ(large.slab_bytes, whole.slab_bytes);
+  EXPECT_EQ(large.bucket_splats, whole.bucket_splats);
+  // A small grid keeps many threads busy, and nothing grows beyond what fits.
+  MemoryPlan of_many = MemoryPlan::of(uint64_t{4} << 30, 1, 16), least = MemoryPlan::of(leastMemory(1), 1, 1);
+  of_many.suit(6'400'000, 1);
+  EXPECT_EQ(of_many.bucket_splats, 16 * 10 * 65536u);
+  const uint64_t least_slab = least.slab_bytes, least_bucket = least.bucket_splats;
+  least.suit(500'000'000, 1);
+  EXPECT_EQ(least.slab_bytes, least_slab);
+  EXPECT_EQ(least.bucket_splats, least_bucket);
+}
+
 TEST(MemoryPlan, RefusesLessThanTheLeast) {
   EXPECT_THROW(MemoryPlan::of(leastMemory(1) - 1, 1, 1), Error);
   for (const uint64_t seams : {uint64_t{100} << 20, uint64_t{3} << 30}) {

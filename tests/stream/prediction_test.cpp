@@ -72,6 +72,44 @@ TEST(Predictor, WrapsAround) {
   }
 }
 
+TEST(Predictor, OfKnownValuesLeavesTheSame) {
+  std::mt19937 random(2);
+  for (int round = 0; round < 200; ++round) {
+    // Rows of any length, some below one another; values of any width, 0 and 32 bits among them.
+    std::vector<Row> rows;
+    std::vector<uint32_t> values;
+    const auto shift = static_cast<int>(random() % 33);
+    for (int r = 0; r < 8; ++r) {
+      const auto first = static_cast<uint32_t>(values.size());
+      Row row{first, 1 + static_cast<uint32_t>(random() % 60), kNoRow};
+      if (first > 0 && random() % 3 != 0) {
+        row.above = static_cast<uint32_t>(random() % first);
+        row.count = std::min(row.count, first - row.above);
+      }
+      rows.push_back(row);
+      for (uint32_t n = 0; n < row.count; ++n)
+        values.push_back(static_cast<uint32_t>(uint64_t{random()} >> shift));
+    }
+    PredictorChoice best{Predictor::kNone, UINT64_MAX};
+    for (int p = 0; p < kPredictors; ++p) {
+      const auto predictor = static_cast<Predictor>(p);
+      std::vector<uint32_t> expected(values.size()), found(values.size(), 1);
+      uint64_t bits = 0;
+      predictRows(predictor, rows, values.data(), [&](uint32_t n, uint32_t predicted) {
+        expected[n] = zigzag(values[n] - predicted);
+        bits += static_cast<uint64_t>(std::bit_width(expected[n]));
+        return values[n];
+      });
+      residualsOf(predictor, rows, values.data(), found.data());
+      EXPECT_EQ(found, expected) << p;
+      if (bits < best.bits) best = {predictor, bits};
+    }
+    const PredictorChoice choice = bestPredictor(rows, values);
+    EXPECT_EQ(choice.predictor, best.predictor);
+    EXPECT_EQ(choice.bits, best.bits);
+  }
+}
+
 TEST(Planes, RoundTrip) {
   PlaneWriter writer;
   const std::vector<uint32_t> none(50, 0), one(50, 255), two(50, 256), four(50, 0xfedcba98);

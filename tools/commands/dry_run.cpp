@@ -133,17 +133,17 @@ Forecast forecastOf(const ConvertReport& report, const GridDescription& whole, c
   forecast.threads = report.threads;
   forecast.cache_bytes = scale.bytesOf(report.files);
   forecast.temporary_bytes = times(report.temporary_bytes, scale.volume);
-  const MemoryPlan plan =
-      MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
+  MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
+  plan.suit(forecast.samples, options.scalars.size());
   forecast.memory_bytes = plan.expectedPeak(times(report.splats, scale.volume), options.scalars.size());
   return forecast;
 }
 
 Forecast forecastOfMesh(const GridDescription& mesh, const ConvertOptions& options) {
-  const MemoryPlan plan =
-      MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
+  MemoryPlan plan = MemoryPlan::ofOptions(options.memory_bytes, options.scalars.size(), options.threads);
   Forecast forecast;
   forecast.samples = nodesOf(mesh);
+  plan.suit(forecast.samples, options.scalars.size());
   forecast.threads = plan.threads;
   const ConversionEstimate estimate = estimateConversion(forecast.samples, plan.threads);
   const DiskNeeds needs = diskNeeds(forecast.samples, options.scalars.size());

@@ -1,0 +1,41 @@
+// Numbers of the splats of nodes that have all six neighbours and lie behind no face: nearly all nodes of a grid. Several at
+// once, by vector instructions; the same bits as one after the other (node_splats.cpp, which has the formulas' reasons),
+// whatever the instruction set: nothing is fused, and sums have the same order.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include "preprocess/splats/stretch.h"
+#include "stream/model/splats.h"
+
+namespace curvisplat {
+
+inline constexpr size_t kInnerNodesAtOnce = 8;
+
+/// Nodes that follow one another in a row.
+struct InnerRow {
+  NodePositions positions{};                       // of the window's nodes
+  ptrdiff_t at = 0;                                // the first node's element
+  std::array<ptrdiff_t, 3> strides{};              // to the next element along i, j and k
+  std::array<const float*, 3> stretch{}, drift{};  // [axis][node]
+  std::span<const float* const> scalars;           // [scalar][element]
+  double bend = 0;  // what a mean is corrected by, for a second difference of 1
+};
+
+/// Element n of each array is of the n-th node.
+struct alignas(64) InnerSplats {
+  using Row = double[kInnerNodesAtOnce];
+
+  Row position[3], axis[3], shear[3], weight, determinant;
+  Row rotated[3][3];                 // [axis of the lattice][component]: Q's image of its unit vector
+  Row lower[6];                      // a00 a10 a11 a20 a21 a22
+  bool is_plain[kInnerNodesAtOnce];  // no axis is floored; else the node's numbers are of no use
+};
+
+/// Of nodes `first` to first + kInnerNodesAtOnce - 1 of the row, with all corrections (NodeSplatCorrections). `values`: [node of
+/// these * scalars + scalar]. Pure: any thread. Never allocates.
+void computeInnerNodes(const InnerRow& row, size_t first, InnerSplats& out, SplatScalar* values);
+
+}  // namespace curvisplat

@@ -1,0 +1,116 @@
+// Nodes that are computed several at once have the same bits as one after the other, in every instruction set.
+#include "preprocess/splats/inner_nodes.h"
+
+#include <gtest/gtest.h>
+
+#include <hwy/highway.h>
+
+#include <bit>
+#include <cmath>
+#include <random>
+
+#include "tests/reference/mapped_block.h"
+
+namespace curvisplat {
+namespace {
+
+bool sameBits(double a, double b) {
+  return std::bit_cast<uint64_t>(a) == std::bit_cast<uint64_t>(b);
+}
+bool sameBits(const glm::dvec3& a, const glm::dvec3& b) {
+  return sameBits(a.x, b.x) && sameBits(a.y, b.y) && sameBits(a.z, b.z);
+}
+
+bool sameSplats(const NodeSplats& a, const NodeSplats& b) {
+  if (a.splats.size() != b.splats.size() || a.values.size() != b.values.size()) return false;
+  bool same =
+      a.degenerate == b.degenerate && a.right_handed == b.right_handed && a.left_handed == b.left_handed;
+  for (size_t n = 0; n < a.splats.size(); ++n) {
+    const NodeSplat &s = a.splats[n], &t = b.splats[n];
+    same &= s.node == t.node && s.regular == t.regular && s.border_code == t.border_code &&
+            s.growth_code == t.growth_code && s.isForSeams() == t.isForSeams() &&
+            sameBits(s.node_position, t.node_position) && sameBits(s.spacing, t.spacing) &&
+            sameBits(s.splat.position, t.splat.position) && sameBits(s.splat.weight, t.splat.weight);
+    for (size_t axis = 0; axis < 3; ++axis)
+      same &= sameBits(s.splat.axis[axis], t.splat.axis[axis]) &&
+              sameBits(s.splat.shear[axis], t.splat.shear[axis]);
+  }
+  for (size_t n = 0; n < a.values.size(); ++n)
+    same &= sameBits(a.values[n].mean, b.values[n].mean) && sameBits(a.values[n].slope, b.values[n].slope) &&
+            sameBits(a.values[n].variance, b.values[n].variance);
+  return same;
+}
+
+NodeSplats splatsOf(const BlockWindow& window) {
+  NodeScratch scratch;
+  NodeSplats splats;
+  computeNodeSplats(window, window.window, scratch, splats);
+  return splats;
+}
+
+/// Where the splat of a node may be a part, all nodes are computed one by one.
+NodeSplats oneByOne(BlockWindow window) {
+  const std::vector<uint64_t> covered(window.nodes->x.size());
+  window.covered = covered.data();
+  return splatsOf(window);
+}
+
+MappedBlock unevenBlock(uint64_t ni, double handedness, double jitter) {
+  std::mt19937_64 random(ni);
+  std::normal_distribution<double> normal(0, 1);
+  MappedBlock grid(ni, 7, 8, [&](double i, double j, double k) {
+    const glm::dvec3 even(i * (1 + 0.05 * i) + 0.3 * std::sin(j), std::exp(0.4 * j),
+                          handedness * k + 0.1 * i * j);
+    return even + jitter * glm::dvec3(normal(random), normal(random), normal(random));
+  });
+  grid.addScalar([](const glm::dvec3& p) { return std::sin(p.x) * p.y + p.z; });
+  grid.addScalar([](const glm::dvec3& p) { return p.x < 6 ? 0.0 : p.y < 3 ? -0.0 : 1.0; });
+  return grid;
+}
+
+TEST(InnerNodes, HaveTheBitsOfOneAfterTheOther) {
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    for (const uint64_t ni : {4u, 11u, 12u, 13u, 19u, 20u, 21u, 40u}) {
+      for (const double handedness : {1.0, -1.0}) {
+        const MappedBlock grid = unevenBlock(ni, handedness, 0.05);
+        EXPECT_TRUE(sameSplats(splatsOf(grid.window()), oneByOne(grid.window())))
+            << hwy::TargetName(target) << ", " << ni << " nodes";
+      }
+    }
+    hwy::SetSupportedTargetsForTest(0);
+  }
+}
+
+TEST(InnerNodes, ThatHaveCollapsedAreComputedOneByOne) {
+  // Some are flat, in the rest of a row too; some coincide with all their neighbours.
+  MappedBlock grid = unevenBlock(27, 1, 0);
+  for (const uint64_t i : {5u, 9u, 20u, 23u}) {
+    for (const ptrdiff_t axis_stride : {ptrdiff_t{1}, ptrdiff_t{27}}) {
+      const size_t at = grid.at(i, 3, 4);
+      for (const ptrdiff_t step : {-axis_stride, axis_stride}) {
+        const size_t beside = at + static_cast<size_t>(step);
+        grid.nodes.x[beside] = grid.nodes.x[at];
+        grid.nodes.y[beside] = grid.nodes.y[at];
+        grid.nodes.z[beside] = grid.nodes.z[at];
+      }
+    }
+  }
+  const NodeSplats together = splatsOf(grid.window());
+  EXPECT_GE(together.degenerate, 4u);
+  EXPECT_TRUE(sameSplats(together, oneByOne(grid.window())));
+}
+
+TEST(InnerNodes, OfPartsOfRowsAndBesideBlanksAreTheSame) {
+  MappedBlock grid = unevenBlock(61, 1, 0.02);
+  grid.nodes.blank[grid.at(30, 2, 3)] = 1;
+  for (const auto& [i0, i1] : {std::pair<uint64_t, uint64_t>{0, 30}, {1, 61}, {2, 10}, {17, 26}, {44, 60}}) {
+    BlockWindow window = grid.window();
+    window.i0 = i0;
+    window.i1 = i1;
+    EXPECT_TRUE(sameSplats(splatsOf(window), oneByOne(window))) << i0;
+  }
+}
+
+}  // namespace
+}  // namespace curvisplat
