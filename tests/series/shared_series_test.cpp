@@ -38,16 +38,17 @@ size_t entriesOf(const fs::path& folder) {
   return static_cast<size_t>(std::distance(begin(all), end(all)));
 }
 
-/// A grid that stays, one that moves at each step, one that moves now and then and comes back, and times that the files
-/// do not state.
+/// A grid that stays, one that moves at each step, one that moves now and then and comes back, and one that leaves for a
+/// step, so that groups begin elsewhere after it.
 const std::vector<StepKind> kSteady = steadyGrid(13), kMoving{{0, 0}, {1, 1}, {2, 2}, {3, 3}, {4, 4}},
                             kNowAndThen{{0},      {1},    {2, 0.5}, {3, 0.5}, {4, 0.5}, {5, 0.5},
-                                        {6, 0.5}, {7, 1}, {8},      {9},      {10}};
+                                        {6, 0.5}, {7, 1}, {8},      {9},      {10}},
+                            kOnceAway{{0}, {1}, {2, 0.5}, {3}, {4}, {5}, {6}};
 
 TEST(SharedSeries, HasTheBytesOfOneProcess) {
   // 16 ranks are more than there are groups.
   const std::pair<std::vector<StepKind>, std::vector<unsigned>> cases[] = {
-      {kSteady, {2, 7, 16}}, {kMoving, {3}}, {kNowAndThen, {2, 4}}};
+      {kSteady, {2, 7, 16}}, {kMoving, {3}}, {kNowAndThen, {2, 4}}, {kOnceAway, {2}}};
   for (const auto& [kinds, counts] : cases) {
     const TemporaryFolder folder;
     const Conversion one = convertQuietly(inputOf(kinds), optionsFor(folder / "one.splats"));
@@ -206,7 +207,10 @@ TEST(SeriesParts, ThatCannotBeJoinedAreRefused) {
   convertPart(output, kNowAndThen, {1, 3});
   EXPECT_NE(refusal().find("cannot be joined"), std::string::npos) << refusal();
   EXPECT_FALSE(fs::exists(output));
-  convertPart(output, kNowAndThen, {0, 2});
+  fs::remove_all(partsFolder(output));
+  for (const uint64_t index : {0u, 1u}) convertPart(output, kOnceAway, {index, 2});
+  EXPECT_NE(refusal().find("step 6 cannot be joined"), std::string::npos) << refusal();
+  convertPart(output, kOnceAway, {0, 3});
   EXPECT_NE(refusal().find("parts of 2 and parts of 3"), std::string::npos) << refusal();
   EXPECT_EQ(entriesOf(folder.path()), 1u) << "something is left";
 }
