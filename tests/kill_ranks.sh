@@ -1,16 +1,17 @@
 #!/usr/bin/env bash
-# Kills one rank of a conversion by several, at moments spread over its duration; has it done by another number of
-# ranks, and compares the result with one process's. Prints a table; exit status 1 if a result differs (words in
-# capitals), 77 if there is no mpirun.
+# Kills one rank of a conversion by three in every pass; has it done by another number of ranks, and compares the result with
+# one process's. Prints a table; exit status 1 if a result differs (words in capitals), 77 if there is no mpirun.
 #
-#   tests/kill_ranks.sh [PROGRAM [SIZE [MOMENTS [FOLDER]]]]
+#   tests/kill_ranks.sh [PROGRAM [SIZE [KILLS [FOLDER]]]]
 #
-# SIZE is the generated grid's (160x120x100: 2 M nodes), FOLDER has room for 250 bytes a node.
+# KILLS are those of each pass (20), at moments spread over it. SIZE is the generated grid's (160x120x100: 2 M nodes), FOLDER
+# has room for 250 bytes a node. dying_ranks lies beside PROGRAM.
 set -euo pipefail
 
 program=$(realpath "${1:-build/release/tools/curvisplat}")
+dying=$(dirname "$program")/dying_ranks
 size=${2:-160x120x100}
-moments=${3:-20}
+kills=${3:-20}
 if ! command -v mpirun > /dev/null || [ ! -e "$(dirname "$program")/curvisplat-mpi.so" ]; then
   echo "skipped: no mpirun (Debian: openmpi-bin), or built without MPI"
   exit 77
@@ -22,64 +23,54 @@ trap 'exit 1' INT TERM
 cache=$folder/work/a.splats
 log=$folder/log
 statistics=$folder/stats.json
-convert=(convert "$folder/in.xyz" "$folder/in.fun" -o "$cache" --threads 1 --memory 256M)
+grid=("$folder/in.xyz" "$folder/in.fun")
+convert=(convert "${grid[@]}" -o "$cache" --threads 1 --memory 256M)
 mpirun=(mpirun --oversubscribe --allow-run-as-root --bind-to none -q)
 
-mkdir "$folder/work" "$folder/pids"
+mkdir "$folder/work"
 "$program" generate wake --size "$size" -o "$folder/in" > "$log"
 checksums() { (cd "$1" && sha256sum ./*); }
 seconds() { date +%s.%N; }
-calculate() { awk "BEGIN { printf \"%.3f\", $1 }"; }
-
-# A rank that leaves its process's number behind.
-cat > "$folder/rank.sh" << END
-#!/bin/sh
-echo \$\$ > "$folder/pids/\$OMPI_COMM_WORLD_RANK"
-exec "$program" "\$@"
-END
-chmod +x "$folder/rank.sh"
+calculate() { awk "BEGIN { printf \"%.0f\", $1 }"; }
 
 "$program" "${convert[@]}" > "$log" 2>&1
 checksums "$cache" > "$folder/expected"
 rm -rf "$cache"
-start=$(seconds)
-"${mpirun[@]}" -n 3 "$program" "${convert[@]}" > "$log" 2>&1
-convert_s=$(calculate "$(seconds) - $start")
+"${mpirun[@]}" -n 3 "$dying" "${grid[@]}" "$cache" -1 0 0 > "$folder/passes" 2> "$log"
 checksums "$cache" | cmp - "$folder/expected"
-echo "undisturbed, 3 ranks: $convert_s s"
+echo "undisturbed, 3 ranks, seconds: $(tr '\n' ' ' < "$folder/passes")"
 
-failed=0 ended=0
-format='%5s %9s  %6s  %8s  %-12s %6s  %s\n'
-printf "$format" rank 'at [s]' status 'ends in' 'left behind' 'then by' result
-for ((n = 0; n < moments; ++n)); do
-  rm -rf "$folder/work"/* "$folder/pids"/*
-  moment=$(calculate "$convert_s * ($n + $RANDOM / 32768) / $moments")
-  victim=$((RANDOM % 3)) ranks=$((RANDOM % 4 + 1)) status=0 result=equal left=nothing
-  timeout 300 "${mpirun[@]}" -n 3 "$folder/rank.sh" "${convert[@]}" > "$log" 2>&1 &
-  job=$!
-  for ((wait = 0; wait < 100; ++wait)); do
-    [ ! -s "$folder/pids/$victim" ] || break
-    sleep 0.02
+failed=0 ended=0 resumed=0 pass=0
+format='%-8s %5s %9s  %6s  %7s  %-12s %6s  %s\n'
+printf "$format" pass rank 'at [ms]' status 'takes' 'left behind' 'then by' result
+while read -r name duration; do
+  for ((n = 0; n < kills; ++n)); do
+    rm -rf "$folder/work"/*
+    delay=$(calculate "1e6 * $duration * ($n + $RANDOM / 32768) / $kills")
+    victim=$((RANDOM % 3)) ranks=$((RANDOM % 4 + 1)) status=0 result=equal left=nothing
+    start=$(seconds)
+    timeout 300 "${mpirun[@]}" -n 3 "$dying" "${grid[@]}" "$cache" "$victim" "$pass" "$delay" > "$log" 2>&1 < /dev/null || status=$?
+    took=$(calculate "$(seconds) - $start")
+    [ "$status" = 0 ] || ended=$((ended + 1))
+    if [ "$status" = 0 ] && [ -d "$cache" ]; then
+      left='the cache'
+    else
+      [ -z "$(ls -A "$folder/work")" ] || left=unfinished
+      "${mpirun[@]}" -n "$ranks" "$program" "${convert[@]}" --resume --overwrite --stats "$statistics" > "$log" 2>&1 < /dev/null ||
+        result=FAILED
+      if grep -q '"resumed": true' "$statistics" 2> /dev/null; then
+        result="$result, resumed"
+        resumed=$((resumed + 1))
+      fi
+    fi
+    checksums "$cache" 2> /dev/null | cmp -s - "$folder/expected" || result=DIFFERENT
+    [ "$(find "$folder/work" -mindepth 1 -maxdepth 1 | wc -l)" = 1 ] || result="$result, LEFTOVERS"
+    [ "$status" != 124 ] || result="$result, DID NOT END"
+    printf "$format" "$name" "$victim" "$(calculate "$delay / 1000")" "$status" "$took" "$left" "$ranks" "$result"
+    [[ ! "$result" =~ [A-Z] ]] || failed=1
   done
-  sleep "$moment"
-  kill -KILL "$(cat "$folder/pids/$victim")" 2> /dev/null || true
-  start=$(seconds)
-  wait $job || status=$?
-  took=$(calculate "$(seconds) - $start")
-  [ "$status" = 0 ] || ended=$((ended + 1))
-  if [ -d "$cache" ] && [ "$status" = 0 ]; then
-    left='the cache'
-  else
-    [ -z "$(ls -A "$folder/work")" ] || left=unfinished
-    "${mpirun[@]}" -n "$ranks" "$program" "${convert[@]}" --resume --overwrite --stats "$statistics" > "$log" 2>&1 || result=FAILED
-    if grep -q '"resumed": true' "$statistics" 2> /dev/null; then result="$result, resumed"; fi
-  fi
-  checksums "$cache" 2> /dev/null | cmp -s - "$folder/expected" || result=DIFFERENT
-  [ "$(find "$folder/work" -mindepth 1 -maxdepth 1 | wc -l)" = 1 ] || result="$result, LEFTOVERS"
-  [ "$(calculate "$took < 30")" = 1.000 ] || result="$result, SLOW END"
-  printf "$format" "$victim" "$moment" "$status" "$took" "$left" "$ranks" "$result"
-  [[ ! "$result" =~ [A-Z] ]] || failed=1
-done
-echo "$ended of $moments were ended before they were done"
+  pass=$((pass + 1))
+done < "$folder/passes"
+echo "$ended of $((pass * kills)) were ended before they were done; $resumed were resumed"
 [ $ended -gt 0 ] || failed=1
 exit $failed

@@ -201,7 +201,7 @@ class StepAddition {
     StepWriter writer(lock_, cache);
     pass("seams", 0, "nodes", [&] { passes.mergeSeams(); });
     pass("build", cache.manifest().splats, "splats", [&] {
-      const StepReferences references(cache);
+      const StepReferences references(cache, options_.to_part);
       passes.build(writer, &references);
     });
     if (grid_)

@@ -22,6 +22,7 @@ struct AddStepOptions {
   bool check_disk_space = true;            // before the work
   bool resume = false;                     // continue an interrupted conversion of this step, if there is one
   bool expect_new_geometry = false;        // for speed only: the previous step had a new geometry
+  bool to_part = false;                    // the cache is a part of a series (series_part.h)
   std::filesystem::path temporary_folder;  // empty: the folder of the cache
 
   /// Smaller buckets than memory would allow: for tests.

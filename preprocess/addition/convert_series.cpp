@@ -3,8 +3,12 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <utility>
 
+#include "preprocess/addition/shared_series.h"
+#include "preprocess/addition/step_references.h"
 #include "stream/base/error.h"
+#include "stream/base/message.h"
 #include "stream/cache/cache_reader.h"
 #include "stream/cache/partial_folder.h"
 
@@ -20,28 +24,95 @@ class SeriesConversion {
     const bool is_cache = std::filesystem::exists(output / "manifest.json") && !hasUnfinished(output);
     if (options.add || (options.convert.resume && is_cache)) openCache();
     if (!options.add) known_ = times_.size();
+    if (options.convert.ranks && !options.convert.ranks->alone()) ranks_ = options.convert.ranks;
   }
 
   SeriesReport run() {
-    for (uint64_t number = 0; number < input_.count; ++number) {
-      try {
-        take(number);
-      } catch (const Interrupted& interrupted) {
-        throw Interrupted(interrupted.signal(), whereItStands(interrupted.what()));
-      } catch (const UsageError&) {
-        throw;
-      } catch (const Error& error) {
-        leaveOut(number, error.what());
-      }
+    try {
+      if (ranks_)
+        runTogether(*ranks_);
+      else
+        for (uint64_t number = 0; number < input_.count; ++number) takeOrLeaveOut(number);
+    } catch (const Interrupted& interrupted) {
+      throw Interrupted(interrupted.signal(), whereItStands(interrupted.what()));
     }
     if (times_.empty())
       throw Error("{}: none of the {} steps could be converted", options_.convert.output.string(),
                   input_.count);
     sums_.steps = times_.size();
-    return sums_;
+    return std::move(sums_);
   }
 
  private:
+  void takeOrLeaveOut(uint64_t number) {
+    try {
+      take(number);
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const UsageError&) {
+      throw;
+    } catch (const Error& error) {
+      leaveOut(number, error.what());
+    }
+  }
+
+  /// All ranks together up to the first step, which decides what is converted; then in rounds (shared_series.h).
+  void runTogether(Ranks& ranks) {
+    uint64_t next = 0;
+    while (next < input_.count && (times_.empty() || next_ < known_)) {
+      try {
+        take(next);
+      } catch (const Interrupted&) {
+        throw;
+      } catch (const UsageError&) {
+        throw;
+      } catch (const Error& error) {
+        throw Error("{}", refusal(next, error.what()));
+      }
+      ++next;
+    }
+    if (next == input_.count) return;
+    const SharedSteps shared(input_, stepOptions(), ranks, progress_);
+    while (next < input_.count) next = runRound(shared, ranks, next);
+  }
+
+  /// Returns the number of the first step that is left for the next round.
+  uint64_t runRound(const SharedSteps& shared, Ranks& ranks, uint64_t next) {
+    using Start = SharedSteps::Start;
+    std::vector<Start> starts(1);
+    if (ranks.isFirst()) starts[0] = startOfRound(next);
+    const Start start = fromBytes<Start>(ranks.broadcast(toBytes(starts)))[0];
+    const auto ranges = dealSteps(next, input_.count, start.in_group, ranks.count());
+    ConvertedSteps converted;
+    if (ranks.isFirst())
+      for (; next < ranges[0].end; ++next) takeOrLeaveOut(next);
+    else
+      converted = shared.convertPart(start);
+    const std::vector<Ranks::Bytes> sent = ranks.gather(toBytes(converted));
+    bool complete = true;
+    for (unsigned rank = 1; rank < sent.size() && complete; ++rank) {
+      const ConvertedSteps theirs = convertedFrom(sent[rank]);
+      complete = shared.take(rank, ranges[rank], theirs, [&](uint64_t number, const AddStepReport& added) {
+        note(number, added);
+        next = number + 1;
+      });
+      if (!theirs.error.empty() && next == ranges[rank].begin + theirs.steps.size())
+        printMessage("warning: rank {} could not convert step {} ({}): {}; rank 0 tries again", rank,
+                     input_.first_number + next, input_.name(next), theirs.error);
+    }
+    std::vector<uint64_t> nexts{next};
+    next = fromBytes<uint64_t>(ranks.broadcast(toBytes(nexts)))[0];
+    return next;
+  }
+
+  SharedSteps::Start startOfRound(uint64_t next) const {
+    const CacheReader cache(options_.convert.output);
+    const Series& series = cache.series();
+    const uint64_t steps = series.steps.size();
+    const uint64_t in_group = referenceSteps(series, series.steps.back().geometry, steps).size();
+    return {steps - 1, expect_new_geometry_, next, in_group};
+  }
+
   void openCache() {
     const CacheReader cache(options_.convert.output);
     for (const SeriesStep& step : cache.series().steps) times_.push_back(step.time);
@@ -56,13 +127,13 @@ class SeriesConversion {
     progress_.throwIfStopped();
     const std::unique_ptr<DataSource> source = input_.open(number);
     if (next_ < known_) {
-      const double last = next_ == 0 ? -1 : times_[next_ - 1];
-      const double time = timeOf(source->description()).value_or(last + 1);
+      const double time = timeFor(number, source->description());
       for (const std::string& file : source->description().files)
         if (!sources_.contains(file))
           throw Error("the cache was not made from {}; to convert anew, add --overwrite", file);
       if (time == times_[next_]) {
         ++next_;
+        noteOrigin(source->description());
         return;
       }
       throw Error("its time {:g} is not {:g}, that of step {} of the cache; to convert anew, add --overwrite",
@@ -72,7 +143,20 @@ class SeriesConversion {
       convertFirst(number, *source);
     else
       add(number, *source);
-    ++sums_.converted;
+    noteOrigin(source->description());
+  }
+
+  /// Stated, or counted on from the step before, which is `places` away.
+  double timeFor(uint64_t number, const GridDescription& description) const {
+    const auto& places = input_.places;
+    const uint64_t away = places.empty() || number == 0 ? 1 : places[number] - places[number - 1];
+    const size_t before = next_ < known_ ? next_ : times_.size();
+    const double last = before == 0 ? -1 : times_[before - 1];
+    return timeOf(description).value_or(last + static_cast<double>(away));
+  }
+
+  void noteOrigin(const GridDescription& description) {
+    if (!input_.places.empty()) sums_.origins.push_back({timeOf(description).has_value(), description.files});
   }
 
   void convertFirst(uint64_t number, const DataSource& source) {
@@ -84,10 +168,12 @@ class SeriesConversion {
     times_.push_back(*options.time);
     next_ = known_ = 1;
     sums_.nodes = converted.nodes;
-    report_event_({input_.name(number), nullptr, &converted, &source.description(), ""});
+    ++sums_.converted;
+    if (!ranks_ || ranks_->isFirst())
+      report_event_({input_.name(number), nullptr, &converted, &source.description(), ""});
   }
 
-  void add(uint64_t number, const DataSource& source) {
+  AddStepOptions stepOptions() const {
     const ConvertOptions& all = options_.convert;
     AddStepOptions options;
     options.cache = all.output;
@@ -99,7 +185,18 @@ class SeriesConversion {
     options.expect_new_geometry = expect_new_geometry_;
     options.temporary_folder = all.temporary_folder;
     options.bucket_splats = all.bucket_splats;
-    const AddStepReport added = addStep(source, options, progress_);
+    options.to_part = options_.to_part;
+    return options;
+  }
+
+  void add(uint64_t number, const DataSource& source) {
+    AddStepOptions options = stepOptions();
+    if (!times_.empty()) options.time = timeFor(number, source.description());
+    note(number, addStep(source, options, progress_));
+  }
+
+  void note(uint64_t number, const AddStepReport& added) {
+    ++sums_.converted;
     times_.push_back(added.time);
     next_ = known_ = times_.size();
     expect_new_geometry_ = added.new_geometry;
@@ -108,16 +205,25 @@ class SeriesConversion {
   }
 
   void leaveOut(uint64_t number, const std::string& reason) {
-    const std::string step = fmt::format("step {} ({})", input_.first_number + number, input_.name(number));
-    if (!options_.keep_going)
-      throw Error("{}: {} cannot be converted: {}{}", options_.convert.output.string(), step, reason,
-                  times_.empty()
-                      ? ""
-                      : fmt::format("; the cache has the {} steps before it; --keep-going leaves out "
-                                    "such steps",
-                                    times_.size()));
+    const std::string step = fmt::format("step {} ({})", numberOf(number), input_.name(number));
+    if (!options_.keep_going) throw Error("{}", refusal(number, reason));
     ++sums_.left_out;
     report_event_({step, nullptr, nullptr, nullptr, reason});
+  }
+
+  /// In messages.
+  uint64_t numberOf(uint64_t number) const {
+    return input_.places.empty() ? input_.first_number + number : input_.places[number];
+  }
+
+  std::string refusal(uint64_t number, const std::string& reason) const {
+    return fmt::format("{}: step {} ({}) cannot be converted: {}{}", options_.convert.output.string(),
+                       numberOf(number), input_.name(number), reason,
+                       times_.empty()
+                           ? ""
+                           : fmt::format("; the cache has the {} steps before it; --keep-going leaves out "
+                                         "such steps",
+                                         times_.size()));
   }
 
   std::string whereItStands(const std::string& of_first) const {
@@ -135,6 +241,7 @@ class SeriesConversion {
   uint64_t known_ = 0;             // steps of the cache that the input has to begin with
   uint64_t next_ = 0;              // of those, the next one
   bool expect_new_geometry_ = false;
+  Ranks* ranks_ = nullptr;  // null: this process alone
   SeriesReport sums_;
 };
 

@@ -10,28 +10,18 @@
 #include <vector>
 
 #include "preprocess/addition/add_step.h"
+#include "preprocess/addition/series_input.h"
 #include "preprocess/convert/convert.h"
 #include "preprocess/grid/grid_source.h"
 #include "stream/base/progress.h"
 
 namespace curvisplat {
 
-/// The steps of a series, in order.
-struct SeriesInput {
-  uint64_t count = 0;
-  uint64_t first_number = 0;  // of the first step, in messages
-  /// Names a step for messages: "q.0100" or "run.nc, time step 3".
-  std::function<std::string(uint64_t)> name;
-  /// Throws Error.
-  std::function<std::unique_ptr<DataSource>(uint64_t)> open;
-  /// Positions of the scalars to convert, for the first step. Throws Error.
-  std::function<std::vector<uint32_t>(const GridDescription&)> scalars;
-};
-
 struct SeriesOptions {
   ConvertOptions convert;   // of the first step; `scalars` is not used
   bool keep_going = false;  // leave out steps that do not fit
   bool add = false;         // to an existing cache, which has other steps
+  bool to_part = false;     // the first step is there for its geometry (series_part.h)
 };
 
 /// One step that was converted, or left out for `reason`.
@@ -43,15 +33,22 @@ struct SeriesEvent {
   std::string reason;
 };
 
+/// What takeStep() (series_part.h) needs to know of a step that was converted.
+struct StepOrigin {
+  bool states_time = true;
+  std::vector<std::string> sources;
+};
+
 struct SeriesReport {
   uint64_t steps = 0;      // of the cache now
   uint64_t converted = 0;  // by this run
   uint64_t left_out = 0;
-  uint64_t new_geometries = 0;  // of these steps, beside the first
-  uint64_t nodes = 0;           // of a step
+  uint64_t new_geometries = 0;      // of these steps, beside the first
+  uint64_t nodes = 0;               // of a step
+  std::vector<StepOrigin> origins;  // [step], those that the cache had before too; of a part of a series only
 };
 
-/// Converts a series. With options.convert.resume it continues an interrupted conversion of the same series:
+/// Converts a series. With options.convert.ranks by all ranks together (shared_series.h). With options.convert.resume it continues an interrupted conversion of the same series:
 /// steps that the cache has already, by their times, are skipped. `report` is called after each step. Throws
 /// Error that names the step that does not fit, unless options.keep_going, and Interrupted; the cache keeps the
 /// steps so far.

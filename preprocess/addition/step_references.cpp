@@ -5,23 +5,33 @@
 namespace curvisplat {
 namespace {
 
-constexpr uint64_t kGroup = 3;
 constexpr uint64_t kMaxStepsBack = 255;
 
 }  // namespace
 
-StepReferences::StepReferences(const CacheReader& cache) {
-  const Series& series = cache.series();
-  const uint32_t geometry = series.steps[cache.step()].geometry;
+std::vector<uint64_t> referenceSteps(const Series& series, uint32_t geometry, uint64_t next,
+                                     bool leaves_out_first) {
   std::vector<uint64_t> of_geometry;
-  for (uint64_t step = 0; step < series.steps.size(); ++step)
+  for (uint64_t step = leaves_out_first ? 1 : 0; step < next; ++step)
     if (series.steps[step].geometry == geometry) of_geometry.push_back(step);
-  const uint64_t in_group = of_geometry.size() % kGroup;
+  const uint64_t in_group = of_geometry.size() % kStepGroup;
+  std::vector<uint64_t> references;
   for (uint64_t n = 0; n < in_group; ++n) {
-    const uint64_t step = of_geometry[of_geometry.size() - 1 - n], back = series.steps.size() - step;
-    if (back > kMaxStepsBack) break;
-    steps_back_[n] = static_cast<uint8_t>(back);
-    readers_.push_back(cache.atStep(step));
+    const uint64_t step = of_geometry[of_geometry.size() - 1 - n];
+    if (next - step > kMaxStepsBack) break;
+    references.push_back(step);
+  }
+  return references;
+}
+
+StepReferences::StepReferences(const CacheReader& cache, bool leaves_out_first) {
+  const Series& series = cache.series();
+  const uint64_t next = series.steps.size();
+  const std::vector<uint64_t> steps =
+      referenceSteps(series, series.steps[cache.step()].geometry, next, leaves_out_first);
+  for (size_t n = 0; n < steps.size(); ++n) {
+    steps_back_[n] = static_cast<uint8_t>(next - steps[n]);
+    readers_.push_back(cache.atStep(steps[n]));
   }
 }
 

@@ -106,6 +106,13 @@ std::vector<FileInfo> StepWriter::finish(const NewStep& added) {
   return infos;
 }
 
+void addWrittenStep(const CacheLock& lock, const CacheReader& cache, SeriesStep step, const NewStep& added,
+                    std::span<const FileInfo> others) {
+  requireStillThere(lock);
+  syncDirectory(lock.cache());
+  putStep(lock, cache.seriesManifest(), cache.series(), std::move(step), added, others);
+}
+
 void addGeometryStep(const CacheLock& lock, const CacheReader& cache, const NewStep& added) {
   const Series& series = cache.series();
   const fs::path folder = cacheFolder(lock.cache(), geometryFolderName(series.geometries()));

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -64,6 +65,11 @@ class StepWriter : public ValuesWriter {
   std::vector<FileInfo> others_;
   bool in_place_ = false;
 };
+
+/// Adds a step whose files are complete in the cache's folder; `others`: those of them that the manifest lists. `cache`:
+/// opened under the lock. Throws Error as StepWriter::finish().
+void addWrittenStep(const CacheLock& lock, const CacheReader& cache, SeriesStep step, const NewStep& added,
+                    std::span<const FileInfo> others);
 
 /// Adds the step whose geometry and values the folder geometry.<g> in the cache has, g being the series' next
 /// geometry. `cache`: opened under the lock. Throws Error as StepWriter::finish().

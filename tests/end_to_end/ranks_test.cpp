@@ -130,7 +130,53 @@ TEST_F(RanksCommand, ConvertTogether) {
     EXPECT_EQ(entry.path().filename().string().find("shared.splats."), std::string::npos) << entry.path();
 }
 
-TEST_F(RanksCommand, RefuseToConvertASeries) {
+TEST_F(RanksCommand, ConvertASeriesTogether) {
+  ASSERT_EQ(runProgram({"generate", "wake", "--size", "40x30x16", "--steps", "7", "-o", file("s")}).status,
+            0);
+  std::vector<std::string> words{"convert", file("s.xyz"), file("s_%04d.fun"), "--threads", "1", "-o"};
+  const auto to = [&](const std::string& name, std::vector<std::string> more = {}) {
+    more.insert(more.begin(), words.begin(), words.end());
+    more.insert(more.begin() + static_cast<std::ptrdiff_t>(words.size()), file(name));
+    return more;
+  };
+  ASSERT_EQ(runProgram(to("s1.splats")).status, 0);
+  const Files expected = filesOf(file("s1.splats"));
+  const ProgramResult shared = runAsRanks(2, to("s2.splats", {"--stats", file("s.json")}));
+  EXPECT_EQ(shared.status, 0) << shared.err;
+  EXPECT_EQ(lineCount(shared.out), 2) << shared.out;
+  EXPECT_TRUE(filesOf(file("s2.splats")) == expected);
+  const auto json = nlohmann::json::parse(readTextFile(file("s.json")));
+  EXPECT_EQ(json["ranks"], 2);
+  EXPECT_EQ(json["each_step"].size(), 7u);
+
+  // Parts by processes that know nothing of each other; the last one has nothing to do.
+  for (const char* part : {"2/4", "4/4", "1/4"}) {
+    const ProgramResult made = runProgram(to("s3.splats", {"--part", part}));
+    EXPECT_EQ(made.status, 0) << made.err;
+    EXPECT_EQ(lineCount(made.out), 1) << made.out;
+  }
+  const std::vector<std::string> join{"convert", "--join", file("s3.splats.parts"), "-o", file("s3.splats")};
+  const ProgramResult early = runProgram(join);
+  EXPECT_EQ(early.status, 1);
+  EXPECT_EQ(lineCount(early.err), 1) << early.err;
+  EXPECT_NE(early.err.find("part 3 of 4 is missing"), std::string::npos) << early.err;
+  EXPECT_EQ(runProgram(to("s3.splats", {"--part", "3/4"})).status, 0);
+  const ProgramResult joined = runProgram(join);
+  EXPECT_EQ(joined.status, 0) << joined.err;
+  EXPECT_TRUE(filesOf(file("s3.splats")) == expected);
+  for (const std::vector<std::string>& wrong :
+       {to("w.splats", {"--part", "5/4"}),
+        to("w.splats", {"--part", "1/2", "--keep-going"}),
+        to("w.splats", {"--part", "1/2", "--dry-run"}),
+        {"convert", "--join", file("s3.splats.parts"), "-o", file("w.splats"), "--resume"}}) {
+    const ProgramResult refused = runProgram(wrong);
+    EXPECT_EQ(refused.status, 2);
+    EXPECT_EQ(lineCount(refused.err), 1) << refused.err;
+  }
+  EXPECT_FALSE(fs::exists(file("w.splats.parts")));
+}
+
+TEST_F(RanksCommand, RefuseToAddScalars) {
   const ProgramResult result =
       runAsRanks(2, {"convert", file("g.xyz"), file("g.fun"), "--add-scalar", "f", "--to", file("g.splats")});
   EXPECT_EQ(result.status, 2);

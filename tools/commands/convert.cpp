@@ -138,6 +138,16 @@ void addSeriesOptions(CLI::App& command, ConvertArguments& arguments) {
       .add_flag("--add-steps", arguments.adds_steps,
                 "Add the time steps of these files to the cache --to, after its last")
       ->group(kGroup);
+  command
+      .add_option(
+          "--part", arguments.part,
+          "Convert the i-th of n parts of the time steps (i/n, i from 1) into OUT.splats.parts, for job "
+          "arrays; --join joins the parts")
+      ->group(kGroup);
+  command
+      .add_flag("--join", arguments.joins,
+                "GRID is the folder OUT.splats.parts: join its parts to the cache -o")
+      ->group(kGroup);
   CLI::Option* const follow =
       command
           .add_flag(
@@ -216,6 +226,7 @@ void addConvert(CLI::App& app) {
   addGridOptions(*command, arguments->grid);
   addGasOptions(*command, arguments->gas);
   command->callback([arguments] {
+    if (arguments->joins) return runJoinSeries(*arguments);
     takeScalarsFromSolutions(*arguments);
     const bool series = isSeries(*arguments);
     const bool adds = !arguments->added_scalars.empty() || !arguments->to.empty();
@@ -224,9 +235,8 @@ void addConvert(CLI::App& app) {
           "--dry-run: is for a new cache; leave out --add-scalar, --add-steps, --to and --follow");
     if (arguments->dry_run && !launchedRanks().alone())
       throw UsageError("--dry-run runs in one process; start curvisplat without mpirun");
-    if ((series || adds) && !launchedRanks().alone())
-      throw UsageError("{} one process converts; start curvisplat without mpirun",
-                       series ? "a series of time steps: " : "--add-scalar:");
+    if ((adds && !series) && !launchedRanks().alone())
+      throw UsageError("--add-scalar: one process converts; start curvisplat without mpirun");
     TraceOfRun trace(arguments->trace, gridAndCaches(*arguments));
     if (series)
       runConvertSeries(*arguments);

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "preprocess/addition/convert_series.h"
+#include "preprocess/addition/join_series.h"
 #include "preprocess/formats/open/series_files.h"
 #include "stream/base/count_text.h"
 #include "stream/base/error.h"
@@ -18,8 +19,10 @@
 #include "tools/commands/dry_run.h"
 #include "tools/commands/folder_events.h"
 #include "tools/commands/written_files.h"
+#include "tools/options/frame_part.h"
 #include "tools/options/option_parsers.h"
 #include "tools/options/series_input.h"
+#include "tools/output/launched_ranks.h"
 #include "tools/output/output_paths.h"
 #include "tools/output/progress_bar.h"
 #include "tools/output/run_statistics.h"
@@ -29,10 +32,26 @@
 namespace curvisplat {
 namespace {
 
+void checkPartArguments(const ConvertArguments& arguments) {
+  parsePart(*arguments.part);
+  const auto refuse = [](bool given, const char* option, const char* reason) {
+    if (given) throw UsageError("--part cannot be combined with {}: {}", option, reason);
+  };
+  refuse(arguments.adds_steps, "--add-steps", "parts are joined to a new cache");
+  refuse(arguments.follows, "--follow", "parts are of a series that is complete");
+  refuse(arguments.keep_going, "--keep-going",
+         "steps that are left out would decide how later ones are coded");
+  refuse(arguments.dry_run, "--dry-run", "leave out one of them");
+  refuse(!launchedRanks().alone(), "mpirun", "ranks share out the steps themselves; leave out one of them");
+}
+
 void checkArguments(const ConvertArguments& arguments) {
   if (arguments.grid.time_step)
     throw UsageError("--time-step {}: chooses one step, and there are several here; use --steps {}",
                      *arguments.grid.time_step, *arguments.grid.time_step);
+  if (arguments.follows && !launchedRanks().alone())
+    throw UsageError("--follow: one process converts; start curvisplat without mpirun");
+  if (arguments.part) checkPartArguments(arguments);
   if (!arguments.adds_steps) return;
   const auto refuse = [](bool given, const char* option) {
     if (given)
@@ -85,7 +104,7 @@ class StepLog {
       printMessage("warning: left out {}: {}", event.name, event.reason);
       return;
     }
-    if (event.source)
+    if (event.source && event.converted)
       for (const std::string& warning : event.source->warnings) printMessage("warning: {}", warning);
     const std::vector<FileReport>& files = event.added ? event.added->files : event.converted->files;
     const bool is_new = !event.added || event.added->new_geometry;
@@ -142,12 +161,74 @@ void follow(const ConvertArguments& arguments) {
   fmt::print("{}: {}\n", options.convert.output.string(), countText(steps, "step"));
 }
 
+void printSums(const SeriesReport& report, const std::filesystem::path& cache) {
+  fmt::print("{}: {}{}, {} of them converted now, {} with a geometry of their own\n", cache.string(),
+             countText(report.steps, "step"),
+             report.left_out > 0 ? fmt::format(" ({} left out)", report.left_out) : "", report.converted,
+             report.new_geometries);
+}
+
+/// Steps `places` of `steps` into a part of their own.
+void convertPart(const ConvertArguments& arguments, const std::vector<StepFiles>& steps) {
+  const FramePart number = parsePart(*arguments.part);
+  const SeriesPart part{number.index, number.count};
+  const std::vector<uint64_t> places = placesOfPart(part, steps.size());
+  SeriesOptions options = seriesOptions(arguments);
+  const std::filesystem::path folder = partsFolder(options.convert.output);
+  beginPart(folder, part);
+  if (places.empty()) {
+    writePartRecord(folder, part, steps.size(), {});
+    fmt::print("{}: no steps in this part\n", folder.string());
+    return;
+  }
+  std::vector<StepFiles> own;
+  for (const uint64_t place : places) own.push_back(steps[place]);
+  SeriesInput input = seriesInput(arguments, own);
+  input.places = places;
+  options.convert.output = partCache(folder, part);
+  options.to_part = part.index > 0;
+  Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
+  StepLog log(progress);
+  const SeriesReport report =
+      convertSeries(input, options, progress, [&](const SeriesEvent& event) { log.add(event); });
+  writePartRecord(folder, part, steps.size(), report.origins);
+  printSums(report, options.convert.output);
+}
+
 }  // namespace
+
+void runJoinSeries(ConvertArguments arguments) {
+  const auto refuse = [](bool given, const char* option) {
+    if (given) throw UsageError("{} cannot be combined with --join, which joins what was converted", option);
+  };
+  refuse(!arguments.grid.solutions.empty(), "a further file");
+  refuse(!arguments.scalars.empty(), "--scalar");
+  refuse(!arguments.added_scalars.empty(), "--add-scalar");
+  refuse(arguments.steps || arguments.every, "--steps or --every");
+  refuse(arguments.part.has_value(), "--part");
+  refuse(arguments.adds_steps || !arguments.to.empty(), "--add-steps or --to");
+  refuse(arguments.follows, "--follow");
+  refuse(arguments.resume, "--resume");
+  refuse(arguments.dry_run, "--dry-run");
+  refuse(!arguments.statistics.empty(), "--stats");
+  refuse(!launchedRanks().alone(), "mpirun");
+  if (arguments.output.empty()) throw UsageError("--output is required");
+  if (!arguments.output.has_filename()) arguments.output = arguments.output.parent_path();  // "NAME.splats/"
+  checkOutputFolder("-o", arguments.output);
+  Progress progress{progressBar()};
+  const StopOnSignals stopping(progress);
+  const JoinReport report =
+      joinParts({arguments.grid.grid, linkTarget(arguments.output), arguments.overwrite}, progress);
+  fmt::print("{}: {} from {}; {} may be removed\n", arguments.output.string(),
+             countText(report.steps, "step"), countText(report.parts, "part"), arguments.grid.grid.string());
+}
 
 bool isSeries(ConvertArguments& arguments) {
   if (arguments.follows) return true;
   expandPatterns(arguments.grid);
-  return arguments.adds_steps || arguments.steps || arguments.every || hasSeveralStepFiles(arguments.grid);
+  return arguments.part || arguments.adds_steps || arguments.steps || arguments.every ||
+         hasSeveralStepFiles(arguments.grid);
 }
 
 void runConvertSeries(ConvertArguments arguments) {
@@ -162,30 +243,36 @@ void runConvertSeries(ConvertArguments arguments) {
     requireThreads(arguments.threads);
     return follow(arguments);
   }
-  const SeriesOptions options = seriesOptions(arguments);
   const std::vector<StepFiles> steps = chosenSteps(arguments);
+  if (arguments.part) {
+    requireThreads(arguments.threads);
+    return convertPart(arguments, steps);
+  }
+  SeriesOptions options = seriesOptions(arguments);
+  Ranks& ranks = launchedRanks();
+  options.convert.ranks = &ranks;
   const SeriesInput input = seriesInput(arguments, steps);
   if (arguments.dry_run) return dryRunOfSeries(input, options, arguments);
 
   requireThreads(arguments.threads);
-  Progress progress{progressBar()};
+  Progress progress{ranks.isFirst() ? progressBar() : Progress::Display{}};
   const StopOnSignals stopping(progress);
+  const StopRanksWith stopping_ranks(ranks, progress);
   StepLog log(progress);
   const SeriesReport report =
       convertSeries(input, options, progress, [&](const SeriesEvent& event) { log.add(event); });
+  if (!ranks.isFirst()) return;
 
   const double seconds = secondsOf(progress);
   const auto samples = static_cast<double>(report.nodes * report.converted);
-  fmt::print("{}: {}{}, {} of them converted now, {} with a geometry of their own\n",
-             options.convert.output.string(), countText(report.steps, "step"),
-             report.left_out > 0 ? fmt::format(" ({} left out)", report.left_out) : "", report.converted,
-             report.new_geometries);
+  printSums(report, options.convert.output);
   if (report.converted > 0)
     fmt::print("{:.1f} s, {:.2f} M samples/s, {:.1f} MiB, {:.2f} bytes per sample and step{}\n", seconds,
                1e-6 * samples / seconds, mebibytes(log.bytes()), static_cast<double>(log.bytes()) / samples,
                peakMemoryText());
   if (arguments.statistics.empty()) return;
   nlohmann::json json = runStatistics();
+  json["ranks"] = ranks.count();
   json["steps"] = report.steps;
   json["converted"] = report.converted;
   json["left_out"] = report.left_out;

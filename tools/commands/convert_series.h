@@ -11,4 +11,7 @@ bool isSeries(ConvertArguments& arguments);
 /// Converts the series, or adds its steps to the cache --to. Throws UsageError and Error.
 void runConvertSeries(ConvertArguments arguments);
 
+/// Joins the parts that --part has written. Throws as runConvertSeries().
+void runJoinSeries(ConvertArguments arguments);
+
 }  // namespace curvisplat

@@ -35,7 +35,9 @@ struct ConvertArguments {
   std::optional<std::string> steps;    // of a series
   std::optional<uint64_t> every;
   bool keep_going = false, adds_steps = false, follows = false;
-  std::optional<uint64_t> until;  // steps of a cache that follows a simulation
+  std::optional<std::string> part;  // i/n of the steps
+  bool joins = false;               // the grid is a folder of such parts
+  std::optional<uint64_t> until;    // steps of a cache that follows a simulation
 };
 
 /// Opens the grid. Temporary files go to --tmp, or beside `cache` without it.

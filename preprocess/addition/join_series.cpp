@@ -1,0 +1,217 @@
+#include "preprocess/addition/join_series.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <system_error>
+
+#include "preprocess/addition/series_part.h"
+#include "preprocess/addition/step_references.h"
+#include "stream/base/durable_file.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/base/json_document.h"
+#include "stream/cache/cache_lock.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/cache/partial_folder.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr uint64_t kMaxParts = 1'000'000, kLargestRecord = uint64_t{1} << 30;
+
+std::string nameOf(const SeriesPart& part) {
+  return fmt::format("{}of{}", part.index + 1, part.count);
+}
+
+fs::path recordPath(const fs::path& folder, const SeriesPart& part) {
+  return folder / (nameOf(part) + ".json");
+}
+
+/// What writePartRecord() has noted.
+struct PartRecord {
+  uint64_t steps = 0;  // of the whole series
+  std::vector<StepOrigin> origins;
+};
+
+PartRecord readRecord(const fs::path& folder, const SeriesPart& part) {
+  const fs::path path = recordPath(folder, part);
+  if (!fs::exists(path))
+    throw Error("{}: part {} of {} is missing or unfinished; run its command again, with --resume",
+                folder.string(), part.index + 1, part.count);
+  const JsonDocument document(readTextFile(path, kLargestRecord), path.string(), "the record of a part",
+                              "convert the part again");
+  PartRecord record;
+  record.steps = document.root().at("steps_of_series").count();
+  for (const JsonField& step : document.root().at("steps").elements())
+    record.origins.push_back({step.at("states_time").flag(), step.at("sources").texts()});
+  return record;
+}
+
+/// How many parts there are: any record's name tells.
+uint64_t countParts(const fs::path& folder) {
+  std::error_code error;
+  std::optional<uint64_t> count;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    unsigned long long index = 0, of = 0;
+    char rest = 0;
+    const std::string name = entry.path().filename().string();
+    if (std::sscanf(name.c_str(), "%lluof%llu.jso%c", &index, &of, &rest) != 3 || rest != 'n') continue;
+    if (of < 1 || of > kMaxParts || index > of) continue;
+    if (count && *count != of)
+      throw Error("{}: has parts of {} and parts of {}; remove those of another conversion", folder.string(),
+                  std::min<uint64_t>(*count, of), std::max<uint64_t>(*count, of));
+    count = of;
+  }
+  if (!count)
+    throw Error("{}: has no finished parts; expected the folder that convert --part i/n writes",
+                folder.string());
+  return *count;
+}
+
+/// See joinParts().
+class Joining {
+ public:
+  Joining(const JoinOptions& options, Progress& progress)
+      : options_(options), progress_(progress), count_(countParts(options.folder)) {
+    for (uint64_t index = 0; index < count_; ++index) {
+      records_.push_back(readRecord(options.folder, {index, count_}));
+      if (records_[index].steps != records_[0].steps)
+        throw Error("{}: part {} is of a series of {} steps, part 1 of one of {}; convert both again",
+                    options.folder.string(), index + 1, records_[index].steps, records_[0].steps);
+    }
+  }
+
+  JoinReport run() {
+    PartialFolder partial(options_.output, options_.overwrite);
+    JoinReport report{count_, 0, 0};
+    progress_.begin("join", records_[0].steps, "steps");
+    copyFirst(partial.path());
+    for (uint64_t index = 1; index < count_; ++index) add(partial.path(), index);
+    const CacheReader joined(partial.path());
+    report.steps = joined.series().steps.size();
+    report.geometries = joined.series().geometries();
+    if (report.steps != records_[0].steps)
+      throw Error("{}: the parts have {} steps together; expected {}", options_.folder.string(), report.steps,
+                  records_[0].steps);
+    partial.putIntoPlace();
+    partial.removeReplaced();
+    progress_.end();
+    return report;
+  }
+
+ private:
+  /// The first part is the beginning of the series.
+  void copyFirst(const fs::path& to) {
+    const fs::path from = partCache(options_.folder, {0, count_});
+    const CacheReader checked(from);
+    for (const auto& entry : fs::recursive_directory_iterator(from)) {
+      progress_.throwIfStopped();
+      const fs::path target = to / fs::relative(entry.path(), from);
+      if (entry.is_symlink()) throw Error("{}: is a link, which no cache has", entry.path().string());
+      if (entry.is_directory())
+        makeFolder(target);
+      else if (isChangedInPlace(target.filename().string()))
+        writeFileDurably(target, bytesOf(entry.path()));
+      else
+        linkOrCopy(entry.path(), target);
+    }
+    for (const auto& entry : fs::recursive_directory_iterator(to))
+      if (entry.is_directory()) syncDirectory(entry.path());
+    syncDirectory(to);
+    progress_.advance(checked.series().steps.size());
+  }
+
+  /// A second name would change the part with the series.
+  static bool isChangedInPlace(const std::string& name) {
+    return name == "manifest.json" || name == kStepsFileName;
+  }
+  static std::vector<std::byte> bytesOf(const fs::path& path) {
+    const InputFile file(path);
+    std::vector<std::byte> bytes(file.size());
+    file.readAt(0, std::span(bytes));
+    return bytes;
+  }
+
+  void add(const fs::path& series, uint64_t index) {
+    const SeriesPart part{index, count_};
+    if (records_[index].origins.empty()) return;
+    const CacheReader cache(partCache(options_.folder, part));
+    const std::vector<uint64_t> places = placesOfPart(part, records_[0].steps);
+    if (cache.series().steps.size() != places.size() || records_[index].origins.size() != places.size())
+      throw Error("{}: has {} steps, expected {}; convert the part again", cache.cachePath().string(),
+                  cache.series().steps.size(), places.size());
+    for (uint64_t step = 1; step < places.size(); ++step) {
+      progress_.throwIfStopped();
+      const StepOrigin& origin = records_[index].origins[step];
+      const CacheLock lock(series);  // of a manifest that each step replaces
+      if (!takeStep(lock, {cache, step, origin.sources, origin.states_time}))
+        throw Error(
+            "{}: step {} cannot be joined: its grid is that of some steps before it, or its time does not "
+            "follow theirs; convert the series in one process, or by ranks",
+            options_.folder.string(), places[step]);
+      progress_.advance(1);
+    }
+  }
+
+  const JoinOptions& options_;
+  Progress& progress_;
+  const uint64_t count_;
+  std::vector<PartRecord> records_;
+};
+
+}  // namespace
+
+std::vector<uint64_t> placesOfPart(const SeriesPart& part, uint64_t steps) {
+  const uint64_t groups = (steps + kStepGroup - 1) / kStepGroup;
+  const auto begin = [&](uint64_t index) {
+    // Rounded up, so that the first part has the first step.
+    return std::min((groups * index + part.count - 1) / part.count * kStepGroup, steps);
+  };
+  std::vector<uint64_t> places;
+  for (uint64_t step = begin(part.index); step < begin(part.index + 1); ++step) places.push_back(step);
+  if (!places.empty() && places.front() > 0) places.insert(places.begin(), 0);
+  return places;
+}
+
+fs::path partsFolder(const fs::path& cache) {
+  fs::path folder = cache;
+  folder += ".parts";
+  return folder;
+}
+
+fs::path partCache(const fs::path& folder, const SeriesPart& part) {
+  return folder / (nameOf(part) + ".splats");
+}
+
+void beginPart(const fs::path& folder, const SeriesPart& part) {
+  std::error_code error;
+  fs::create_directory(folder, error);  // another part may do so at the same time
+  if (error || !fs::is_directory(folder))
+    throw Error("{}: cannot be made: {}", folder.string(), error ? error.message() : "is not a directory");
+  if (const auto failure = removeAll(recordPath(folder, part)))
+    throw Error("{}: cannot be removed: {}", recordPath(folder, part).string(), failure.message());
+}
+
+void writePartRecord(const fs::path& folder, const SeriesPart& part, uint64_t steps,
+                     const std::vector<StepOrigin>& origins) {
+  nlohmann::ordered_json json{{"steps_of_series", steps}, {"steps", nlohmann::json::array()}};
+  for (const StepOrigin& origin : origins)
+    json["steps"].push_back({{"states_time", origin.states_time}, {"sources", origin.sources}});
+  // A name that is not in UTF-8 is no JSON: let it be an error of one line.
+  try {
+    writeFileDurably(recordPath(folder, part), json.dump(1) + "\n");
+  } catch (const nlohmann::json::exception&) {
+    throw Error("{}: a file's name is not valid UTF-8; rename it", folder.string());
+  }
+}
+
+JoinReport joinParts(const JoinOptions& options, Progress& progress) {
+  checkReplaceable(options.output, options.overwrite);
+  return Joining(options, progress).run();
+}
+
+}  // namespace curvisplat

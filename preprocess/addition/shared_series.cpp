@@ -1,0 +1,157 @@
+#include "preprocess/addition/shared_series.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <system_error>
+#include <utility>
+
+#include "preprocess/addition/series_part.h"
+#include "preprocess/addition/step_references.h"
+#include "stream/base/error.h"
+#include "stream/base/file.h"
+#include "stream/cache/cache_lock.h"
+#include "stream/cache/cache_reader.h"
+
+namespace curvisplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+uint64_t bytesOf(const std::vector<FileReport>& files) {
+  uint64_t bytes = 0;
+  for (const FileReport& file : files) bytes += file.bytes;
+  return bytes;
+}
+
+fs::path besideCache(const fs::path& cache, const char* suffix) {
+  fs::path folder = fs::absolute(cache);
+  folder += suffix;
+  return folder;
+}
+
+std::string scratchOf(const fs::path& cache, const std::string& rank) {
+  return cache.filename().string() + ".rank" + rank;
+}
+
+}  // namespace
+
+std::vector<StepRange> dealSteps(uint64_t next, uint64_t count, uint64_t in_group, unsigned ranks) {
+  std::vector<StepRange> ranges;
+  for (unsigned rank = 0; rank < ranks; ++rank) {
+    const uint64_t end = std::min(next + kStepGroup - (rank == 0 ? in_group : 0), count);
+    ranges.push_back({next, end});
+    next = end;
+  }
+  return ranges;
+}
+
+SharedSteps::SharedSteps(const SeriesInput& input, AddStepOptions add, Ranks& ranks, Progress& progress)
+    : input_(input),
+      add_(std::move(add)),
+      ranks_(ranks),
+      progress_(progress),
+      folder_(besideCache(add_.cache, ".ranks.partial")) {
+  if (ranks_.isFirst()) {
+    locked_ = std::make_unique<PartialFolder>(besideCache(add_.cache, ".ranks"), false);
+    if (!add_.temporary_folder.empty())
+      // Of killed programs: as long as the folder above is locked, no other converts this series.
+      for (const auto& entry : fs::directory_iterator(add_.temporary_folder))
+        if (entry.path().filename().string().starts_with(scratchOf(add_.cache, ""))) removeAll(entry.path());
+  }
+  ranks_.barrier();
+  if (!fs::is_directory(folder_))
+    throw Error("{}: does not exist here; several ranks need a file system that they share",
+                folder_.string());
+  if (ranks_.isFirst()) return;
+  const fs::path parent = add_.temporary_folder.empty() ? folder_ : add_.temporary_folder;
+  scratch_ = std::make_unique<ScratchFolder>(
+      ScratchFolder::newPath(parent, scratchOf(add_.cache, std::to_string(ranks_.rank()))),
+      ScratchFolder::Folder::kMake);
+  add_.temporary_folder = scratch_->path();
+}
+
+SharedSteps::~SharedSteps() {
+  if (ranks_.isFirst()) return;
+  removeAll(partOf(ranks_.rank()));
+  scratch_.reset();
+  // If rank 0 has failed, it could not remove a folder in which others still wrote: the last one does.
+  std::error_code not_empty;
+  fs::remove(folder_, not_empty);
+}
+
+fs::path SharedSteps::partOf(unsigned rank) const {
+  return folder_ / fmt::format("rank{}.splats", rank);
+}
+
+ConvertedSteps SharedSteps::convertPart(const Start& start) const {
+  const std::vector<StepRange> ranges = dealSteps(start.next, input_.count, start.in_group, ranks_.count());
+  const StepRange& own = ranges[ranks_.rank()];
+  ConvertedSteps converted;
+  if (own.begin == own.end) return converted;
+  AddStepOptions options = add_;
+  options.cache = partOf(ranks_.rank());
+  options.to_part = true;
+  options.resume = false;
+  options.expect_new_geometry = start.expects_geometry != 0;
+  try {
+    removeAll(options.cache);
+    const CacheReader series(add_.cache, start.step);
+    double last = series.series().steps[start.step].time + static_cast<double>(own.begin - start.next);
+    makePart(series, options.cache);
+    for (uint64_t number = own.begin; number < own.end; ++number) {
+      progress_.throwIfStopped();
+      const std::unique_ptr<DataSource> source = input_.open(number);
+      const std::optional<double> stated = timeOf(source->description());
+      options.time = stated.value_or(last + 1);
+      const AddStepReport added = addStep(*source, options, progress_);
+      last = added.time;
+      options.expect_new_geometry = added.new_geometry;
+      converted.steps.push_back(
+          {stated.has_value(), added.new_geometry, bytesOf(added.files), source->description().files});
+    }
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error& error) {
+    converted.error = error.what();
+  }
+  return converted;
+}
+
+bool SharedSteps::take(unsigned of, const StepRange& range, const ConvertedSteps& converted,
+                       const std::function<void(uint64_t number, const AddStepReport&)>& took) const {
+  if (range.begin == range.end || converted.steps.empty()) return converted.error.empty();
+  const CacheReader part(partOf(of));
+  for (uint64_t n = 0; n < converted.steps.size(); ++n) {
+    progress_.throwIfStopped();
+    const ConvertedSteps::Step& step = converted.steps[n];
+    const CacheLock lock(add_.cache);
+    if (!takeStep(lock, {part, n + 1, step.sources, step.states_time})) return false;
+    AddStepReport report;
+    report.time = part.series().steps[n + 1].time;
+    report.new_geometry = step.new_geometry;
+    report.nodes = part.manifest().nodes;
+    report.files = {{"", step.bytes}};
+    took(range.begin + n, report);
+  }
+  return converted.error.empty();
+}
+
+Ranks::Bytes toBytes(const ConvertedSteps& converted) {
+  nlohmann::json json{{"error", converted.error}, {"steps", nlohmann::json::array()}};
+  for (const ConvertedSteps::Step& step : converted.steps)
+    json["steps"].push_back({step.states_time, step.new_geometry, step.bytes, step.sources});
+  // Names of files may be of any bytes, which no JSON text has.
+  const std::vector<std::uint8_t> packed = nlohmann::json::to_cbor(json);
+  return toBytes(packed);
+}
+
+ConvertedSteps convertedFrom(const Ranks::Bytes& bytes) {
+  const auto json = nlohmann::json::from_cbor(fromBytes<std::uint8_t>(bytes));
+  ConvertedSteps converted;
+  converted.error = json["error"];
+  for (const auto& step : json["steps"])
+    converted.steps.push_back({step[0], step[1], step[2], step[3].get<std::vector<std::string>>()});
+  return converted;
+}
+
+}  // namespace curvisplat

@@ -1,0 +1,87 @@
+// Further steps of a series, converted by several ranks: each rank converts whole steps, a group of steps that are
+// predicted from each other (step_references.h) at a time.
+//
+//    rank 0   the rest of the group that the cache is in --> the cache
+//    rank 1   the next group --> a part (series_part.h) --+
+//    rank 2   the group after that --> a part ------------+--> rank 0 takes the steps over, in order
+//
+// So a round ends; the next begins behind the last step that was taken over. A step that does not fit what one process
+// would have added, or that a rank could not convert, ends the round's taking over: rank 0 converts it in the next one.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "preprocess/addition/add_step.h"
+#include "preprocess/addition/series_input.h"
+#include "preprocess/convert/scratch_folder.h"
+#include "stream/base/ranks.h"
+#include "stream/cache/partial_folder.h"
+
+namespace curvisplat {
+
+/// Steps [begin, end) of an input.
+struct StepRange {
+  uint64_t begin = 0, end = 0;
+};
+
+/// What a rank has converted in a round.
+struct ConvertedSteps {
+  struct Step {
+    bool states_time = true, new_geometry = false;
+    uint64_t bytes = 0;
+    std::vector<std::string> sources;
+  };
+  std::vector<Step> steps;
+  std::string error;  // that has ended it; empty: none
+};
+
+/// The ranges of all ranks, of the steps from `next` on; the last rank's may be empty. `in_group`: how many steps of its
+/// group the cache has, 0 if the next begins one.
+std::vector<StepRange> dealSteps(uint64_t next, uint64_t count, uint64_t in_group, unsigned ranks);
+
+/// Parts of a series in a folder beside it, removed in the end.
+class SharedSteps {
+ public:
+  /// `add`: the options of a step, of which the cache is set here. All ranks construct it at the same time; rank 0 makes
+  /// the folder. Throws Error.
+  SharedSteps(const SeriesInput& input, AddStepOptions add, Ranks& ranks, Progress& progress);
+  ~SharedSteps();
+  SharedSteps(const SharedSteps&) = delete;
+  SharedSteps& operator=(const SharedSteps&) = delete;
+
+  /// Where the cache is when a round begins.
+  struct Start {
+    uint64_t step = 0;  // its last
+    uint64_t expects_geometry = 0;
+    uint64_t next = 0;  // of the input
+    uint64_t in_group = 0;
+  };
+  /// At ranks other than 0: converts this rank's steps to its part. Throws Interrupted.
+  ConvertedSteps convertPart(const Start& start) const;
+  /// At rank 0: takes over what rank `of` has converted; `took` is called after each step with its number of the input.
+  /// Returns whether that was all of its range.
+  bool take(unsigned of, const StepRange& range, const ConvertedSteps& converted,
+            const std::function<void(uint64_t number, const AddStepReport&)>& took) const;
+
+ private:
+  std::filesystem::path partOf(unsigned rank) const;
+
+  const SeriesInput& input_;
+  AddStepOptions add_;  // a rank other than 0 has a folder of its own for temporary files
+  Ranks& ranks_;
+  Progress& progress_;
+  const std::filesystem::path folder_;
+  std::unique_ptr<PartialFolder> locked_;   // rank 0's
+  std::unique_ptr<ScratchFolder> scratch_;  // of the others
+};
+
+Ranks::Bytes toBytes(const ConvertedSteps& converted);
+ConvertedSteps convertedFrom(const Ranks::Bytes& bytes);
+
+}  // namespace curvisplat

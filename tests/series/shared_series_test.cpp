@@ -1,0 +1,234 @@
+// Series converted by several ranks, and in parts: the cache has the bytes of one process's.
+#include "preprocess/addition/shared_series.h"
+
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <filesystem>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "preprocess/addition/join_series.h"
+#include "preprocess/addition/series_part.h"
+#include "stream/base/error.h"
+#include "stream/cache/cache_reader.h"
+#include "stream/cache/cache_verify.h"
+#include "tests/series/step_series.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/thread_ranks.h"
+
+namespace curvisplat {
+namespace {
+
+Conversion convertBy(unsigned count, const SeriesInput& input, const SeriesOptions& options) {
+  Conversion first;
+  runRanks(count, [&](Ranks& ranks) {
+    SeriesOptions of_rank = options;
+    of_rank.convert.ranks = &ranks;
+    of_rank.convert.threads = 1;
+    const Conversion run = convertQuietly(input, of_rank);
+    if (ranks.isFirst()) first = run;
+  });
+  return first;
+}
+
+size_t entriesOf(const fs::path& folder) {
+  const fs::directory_iterator all(folder);
+  return static_cast<size_t>(std::distance(begin(all), end(all)));
+}
+
+/// A grid that stays, one that moves at each step, one that moves now and then and comes back, and one that leaves for a
+/// step, so that groups begin elsewhere after it.
+const std::vector<StepKind> kSteady = steadyGrid(13), kMoving{{0, 0}, {1, 1}, {2, 2}, {3, 3}, {4, 4}},
+                            kNowAndThen{{0},      {1},    {2, 0.5}, {3, 0.5}, {4, 0.5}, {5, 0.5},
+                                        {6, 0.5}, {7, 1}, {8},      {9},      {10}},
+                            kOnceAway{{0}, {1}, {2, 0.5}, {3}, {4}, {5}, {6}};
+
+TEST(SharedSeries, HasTheBytesOfOneProcess) {
+  // 16 ranks are more than there are groups.
+  const std::pair<std::vector<StepKind>, std::vector<unsigned>> cases[] = {
+      {kSteady, {2, 7, 16}}, {kMoving, {3}}, {kNowAndThen, {2, 4}}, {kOnceAway, {2}}};
+  for (const auto& [kinds, counts] : cases) {
+    const TemporaryFolder folder;
+    const Conversion one = convertQuietly(inputOf(kinds), optionsFor(folder / "one.splats"));
+    const auto wanted = allFilesOf(folder / "one.splats");
+    for (const unsigned count : counts) {
+      SCOPED_TRACE(fmt::format("{} steps, {} ranks", kinds.size(), count));
+      SeriesOptions options = optionsFor(folder / "shared.splats");
+      options.convert.overwrite = true;
+      const Conversion shared = convertBy(count, inputOf(kinds), options);
+      EXPECT_TRUE(allFilesOf(folder / "shared.splats") == wanted);
+      EXPECT_EQ(shared.report.converted, kinds.size());
+      EXPECT_EQ(shared.report.new_geometries, one.report.new_geometries);
+      EXPECT_EQ(entriesOf(folder.path()), 2u) << "something is left";
+    }
+  }
+}
+
+TEST(SharedSeries, AddsStepsAndResumes) {
+  const TemporaryFolder folder;
+  convertQuietly(inputOf(kSteady), optionsFor(folder / "one.splats"));
+  const auto wanted = allFilesOf(folder / "one.splats");
+  for (const size_t before : {1u, 2u, 6u}) {
+    SCOPED_TRACE(before);
+    const fs::path cache = folder / "more.splats";
+    fs::remove_all(cache);
+    convertQuietly(inputOf({kSteady.begin(), kSteady.begin() + static_cast<std::ptrdiff_t>(before)}),
+                   optionsFor(cache));
+    SeriesOptions adding = optionsFor(cache);
+    if (before % 2 == 0) {
+      adding.convert.resume = true;
+      convertBy(3, inputOf(kSteady), adding);
+    } else {
+      adding.add = true;
+      convertBy(3, inputOf({kSteady.begin() + static_cast<std::ptrdiff_t>(before), kSteady.end()}), adding);
+    }
+    EXPECT_TRUE(allFilesOf(cache) == wanted);
+  }
+}
+
+TEST(SharedSeries, LeavesOutWhatDoesNotFitOrNamesIt) {
+  std::vector<StepKind> kinds = kSteady;
+  kinds[5].lacks_scalar = kinds[6].other_blocks = true;
+  kinds[9].time = 3;
+  const TemporaryFolder folder;
+  SeriesOptions options = optionsFor(folder / "one.splats");
+  options.keep_going = true;
+  const Conversion one = convertQuietly(inputOf(kinds), options);
+  ASSERT_EQ(one.left_out.size(), 3u);
+  options.convert.output = folder / "shared.splats";
+  const Conversion shared = convertBy(3, inputOf(kinds), options);
+  ASSERT_EQ(shared.left_out.size(), one.left_out.size());
+  for (size_t n = 0; n < one.left_out.size(); ++n)
+    EXPECT_EQ(shared.left_out[n].substr(0, 30), one.left_out[n].substr(0, 30));
+  EXPECT_TRUE(allFilesOf(folder / "shared.splats") == allFilesOf(folder / "one.splats"));
+
+  try {
+    convertBy(3, inputOf(kinds), optionsFor(folder / "refused.splats"));
+    ADD_FAILURE() << "converted";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("step 5 (file 5)"), std::string::npos) << error.what();
+  }
+  EXPECT_EQ(CacheReader(folder / "refused.splats").series().steps.size(), 5u);
+  EXPECT_EQ(entriesOf(folder.path()), 3u) << "something is left";
+}
+
+TEST(SharedSeries, CanBeInterruptedInAnyRound) {
+  const TemporaryFolder folder;
+  convertQuietly(inputOf(kSteady), optionsFor(folder / "one.splats"));
+  const auto wanted = allFilesOf(folder / "one.splats");
+  for (const uint64_t stop : {1u, 5u}) {
+    SCOPED_TRACE(stop);
+    const fs::path cache = folder / "stopped.splats";
+    SeriesInput interrupted = inputOf(kSteady);
+    interrupted.open = [&](uint64_t step) -> std::unique_ptr<DataSource> {
+      if (step == stop) throw Interrupted(SIGINT, "stopped");
+      return std::make_unique<StepSource>(kSteady[step]);
+    };
+    EXPECT_THROW(convertBy(3, interrupted, optionsFor(cache)), Interrupted);
+    EXPECT_EQ(entriesOf(folder.path()), 2u) << "something is left";
+    SeriesOptions options = optionsFor(cache);
+    options.convert.resume = true;
+    convertBy(2, inputOf(kSteady), options);
+    EXPECT_TRUE(allFilesOf(cache) == wanted);
+    fs::remove_all(cache);
+  }
+}
+
+TEST(DealSteps, GivesEachRankAGroup) {
+  const auto ends = [](const std::vector<StepRange>& ranges) {
+    std::vector<uint64_t> numbers;
+    for (const StepRange& range : ranges) numbers.push_back(range.end);
+    return numbers;
+  };
+  EXPECT_EQ(ends(dealSteps(1, 100, 1, 4)), (std::vector<uint64_t>{3, 6, 9, 12}));
+  EXPECT_EQ(ends(dealSteps(3, 100, 0, 2)), (std::vector<uint64_t>{6, 9}));
+  EXPECT_EQ(ends(dealSteps(1, 5, 1, 4)), (std::vector<uint64_t>{3, 5, 5, 5}));
+}
+
+// ------------------------------------------------------------------------------------------------ parts
+
+/// Converts part `index` of `count` as `convert --part` does.
+void convertPart(const fs::path& output, const std::vector<StepKind>& kinds, const SeriesPart& part) {
+  const std::vector<uint64_t> places = placesOfPart(part, kinds.size());
+  const fs::path folder = partsFolder(output);
+  beginPart(folder, part);
+  std::vector<StepOrigin> origins;
+  if (!places.empty()) {
+    std::vector<StepKind> own;
+    for (const uint64_t place : places) own.push_back(kinds[place]);
+    SeriesInput input = inputOf(own);
+    input.places = places;
+    SeriesOptions options = optionsFor(partCache(folder, part));
+    options.to_part = part.index > 0;
+    origins = convertQuietly(input, options).report.origins;
+  }
+  writePartRecord(folder, part, kinds.size(), origins);
+}
+
+TEST(SeriesParts, AreJoinedToTheBytesOfOneProcess) {
+  for (const auto& kinds : {kSteady, kMoving}) {
+    const TemporaryFolder folder;
+    convertQuietly(inputOf(kinds), optionsFor(folder / "one.splats"));
+    const auto wanted = allFilesOf(folder / "one.splats");
+    for (const uint64_t count : {1u, 3u, 16u}) {
+      SCOPED_TRACE(fmt::format("{} steps, {} parts", kinds.size(), count));
+      const fs::path output = folder / "joined.splats";
+      for (uint64_t index = count; index-- > 0;) convertPart(output, kinds, {index, count});
+      Progress progress;
+      const auto parts = allFilesOf(partsFolder(output));
+      const JoinReport report = joinParts({partsFolder(output), output, true}, progress);
+      EXPECT_EQ(report.steps, kinds.size());
+      EXPECT_TRUE(allFilesOf(output) == wanted);
+      EXPECT_TRUE(allFilesOf(partsFolder(output)) == parts) << "the parts have changed";
+      for (const std::string& finding : verifyCache(CacheReader(output)).findings) ADD_FAILURE() << finding;
+      fs::remove_all(partsFolder(output));
+    }
+    EXPECT_EQ(entriesOf(folder.path()), 2u) << "something is left";
+  }
+}
+
+TEST(SeriesParts, ThatCannotBeJoinedAreRefused) {
+  const TemporaryFolder folder;
+  const fs::path output = folder / "a.splats";
+  Progress progress;
+  const auto refusal = [&] {
+    try {
+      joinParts({partsFolder(output), output, false}, progress);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("joined");
+  };
+  convertPart(output, kNowAndThen, {0, 3});
+  convertPart(output, kNowAndThen, {2, 3});
+  EXPECT_NE(refusal().find("part 2 of 3 is missing"), std::string::npos) << refusal();
+  convertPart(output, kNowAndThen, {1, 3});
+  EXPECT_NE(refusal().find("cannot be joined"), std::string::npos) << refusal();
+  EXPECT_FALSE(fs::exists(output));
+  fs::remove_all(partsFolder(output));
+  for (const uint64_t index : {0u, 1u}) convertPart(output, kOnceAway, {index, 2});
+  EXPECT_NE(refusal().find("step 6 cannot be joined"), std::string::npos) << refusal();
+  convertPart(output, kOnceAway, {0, 3});
+  EXPECT_NE(refusal().find("parts of 2 and parts of 3"), std::string::npos) << refusal();
+  EXPECT_EQ(entriesOf(folder.path()), 1u) << "something is left";
+}
+
+TEST(SeriesParts, HaveWholeGroupsAndTheFirstStep) {
+  EXPECT_EQ(placesOfPart({0, 2}, 7), (std::vector<uint64_t>{0, 1, 2, 3, 4, 5}));
+  EXPECT_EQ(placesOfPart({1, 2}, 7), (std::vector<uint64_t>{0, 6}));
+  EXPECT_TRUE(placesOfPart({3, 4}, 4).empty());
+  for (const uint64_t steps : {1u, 2u, 3u, 4u, 30u, 100u})
+    for (const uint64_t count : {1u, 2u, 3u, 7u, 50u}) {
+      std::vector<uint64_t> all;
+      for (uint64_t index = 0; index < count; ++index)
+        for (const uint64_t place : placesOfPart({index, count}, steps))
+          if (index == 0 || place > 0) all.push_back(place);
+      ASSERT_EQ(all.size(), steps);
+      for (uint64_t n = 0; n < steps; ++n) EXPECT_EQ(all[n], n);
+    }
+}
+
+}  // namespace
+}  // namespace curvisplat
