@@ -47,14 +47,14 @@ std::vector<fs::path> sourcesFor(const CacheReader& cache, const ViewerOptions& 
 
 }  // namespace
 
-CacheView::CacheView(CacheReader cache, const ViewerOptions& options, Window& window, Toasts& toasts,
+CacheView::CacheView(CacheReader cache, const ViewerOptions& options, Window& window, Reports& reports,
                      FileDialog& dialog, const WindowLayout& layout)
     : cache_(std::move(cache)),
       target_s_(options.target_s),
       preview_(options.preview),
       grid_files_(options.grid_files),
       window_(window),
-      toasts_(toasts),
+      reports_(reports),
       dialog_(dialog),
       state_(openingState(options, pixelsOf(layout.picture, window))),
       first_function_(state_.function),
@@ -71,6 +71,12 @@ CacheView::CacheView(CacheReader cache, const ViewerOptions& options, Window& wi
   frames_.emplace(cache_, backend_, Window::wake);
   playback_.goTo(cache_.step());
   navigation_.setBounds(state_.scale * manifest().lower, state_.scale * manifest().upper);
+}
+
+void CacheView::takePictureOf(CacheView& before) {
+  picture_.swap(before.picture_);
+  overlay_.swap(before.overlay_);
+  shown_strip_ = before.shown_strip_;
 }
 
 ViewState CacheView::openingState(const ViewerOptions& options, ImageSize picture) {
@@ -118,20 +124,17 @@ void CacheView::takeScene(const SurfaceScene& scene, const ViewerOptions& option
   state.volume = scene.volume;
 }
 
-void CacheView::say(const std::string& text, bool is_error) {
-  toasts_.add(text, clockSeconds(), is_error);
-}
-
 void CacheView::draw(const WindowLayout& layout) {
-  takeFrame();
+  reports_.attempt([&] { takeFrame(); });
   react(layout);
   const ImageSize size = pixelsOf(layout.picture, window_);
   if (size.width > 0) {
     const bool moving = navigation_.isMoving() || dragging_ || playback_.isPlaying();
-    if (changed_ || moving != was_moving_ || !same(size, picture_size_)) {
+    // A button that is pressed and has not moved anything asks for nothing: a click for a value is answered at once.
+    if (changed_ || (was_moving_ && !moving) || !same(size, picture_size_)) {
       picture_size_ = size;
       data_size_ = dataSizeOf(state_, manifest(), size);
-      ask(moving);
+      reports_.attempt([&] { ask(moving); });
     }
     showPicture(layout);
     savePictureIfFinal();
@@ -149,22 +152,40 @@ void CacheView::takeFrame() {
     if (std::optional<ShownFrame> frame = frames_->take()) {
       picture_.set(frame->bytes, frame->image.size);
       shown_ = std::move(frame);
-      frame_error_.clear();
       annotate();
+      reportDamage();
     }
     if (std::optional<ShownValues> values = frames_->takeValues()) values_ = std::move(values);
-  } catch (const UsageError& error) {
-    reportFrame(error);
-  } catch (const Error& error) {
-    reportFrame(error);
+  } catch (const UsageError&) {  // of this request only
+    giveUpSaving();
+    throw;
+  } catch (...) {
+    giveUpSaving();
     frames_failed_ = true;
+    throw;
   }
 }
 
-/// An error of a picture, such as a disk that is gone: the window and what it shows stay.
-void CacheView::reportFrame(const Error& error) {
-  if (std::exchange(frame_error_, error.what()) != error.what()) printMessage("warning: {}", error.what());
-  say(error.what(), true);
+/// What is to be saved will not come.
+void CacheView::giveUpSaving() {
+  if (std::exchange(save_to_, std::nullopt)) say("The picture was not saved, because it could not be drawn.");
+}
+
+/// Of each damaged brick once.
+void CacheView::reportDamage() {
+  const BrickFailure* first = nullptr;
+  for (const BrickFailure& failure : shown_->statistics.bricks_unreadable)
+    if (damaged_.insert(failure.brick).second && !first) first = &failure;
+  if (!first) return;
+  const size_t number = damaged_.size();
+  reports_.report(fmt::format("{} of {} bricks cannot be read; coarser data is drawn there, or none: {}",
+                              number, cache_.bricks().size(), first->reason));
+}
+
+std::string CacheView::lacks() const {
+  const size_t number = shown_ ? shown_->statistics.bricks_unreadable.size() : 0;
+  if (number == 0) return {};
+  return fmt::format(", without {} damaged brick{}", number, number == 1 ? "" : "s");
 }
 
 /// The loop has ended with an error: what is asked now is tried by a new one, whose requests are counted anew.
@@ -205,11 +226,18 @@ void CacheView::drawPanels(const WindowLayout& layout) {
   further.is_busy = adds_scalar_;
   facts.further = &further;
   const PanelActions actions = panels_.draw(state_, facts);
+  reports_.attempt([&] { apply(actions); });
+}
+
+void CacheView::apply(const PanelActions& actions) {
   if (actions.step) changed_ |= playback_.goTo(*actions.step);
   dragging_ = actions.dragging;
   changed_ |= actions.changed;
   if (actions.function_changed) ++function_version_;
   for (const Command command : actions.commands) run(command);
+  if (actions.scalar) chooseScalar(*actions.scalar);
+  if (actions.opacity_scalar) chooseOpacityScalar(*actions.opacity_scalar);
+  if (actions.automatic_function) run(Command::kResetFunction);
   if (actions.looks_for_scalars) further_.look();
   if (actions.add_scalar) wanted_scalar_ = actions.add_scalar;
   if (actions.load_function) dialog_.open(FileDialog::Purpose::kLoadFunction);
@@ -221,10 +249,13 @@ void CacheView::drawPanels(const WindowLayout& layout) {
     fs::remove(savedViewOf(whole(), *actions.remove_view), ignored);
     views_ = savedViewsOf(whole());
   }
-  if (!actions.error.empty()) say(actions.error, true);
+  if (!actions.error.empty()) reports_.report(actions.error);
 }
 
 void CacheView::ask(bool moving) {
+  was_moving_ = moving;
+  changed_ = false;  // what cannot be drawn is not tried again before it changes
+  rests_ = false;
   const ShownFunctions functions(state_, manifest());
   FrameRequest request{functions.scalars(cache_, state_), function_version_, state_.camera,
                        state_.frameOptions(data_size_)};
@@ -234,9 +265,6 @@ void CacheView::ask(bool moving) {
   if (frames_failed_) restartFrames();
   request.target_s = target_s_.value_or(frames_->drawsInSoftware() ? 0.1 : 0.033);
   request_ = frames_->request(std::move(request));
-  was_moving_ = moving;
-  changed_ = false;
-  rests_ = false;
   values_.reset();
 }
 
@@ -247,7 +275,7 @@ void CacheView::run(Command command) {
   };
   switch (command) {
     case Command::kSavePicture:
-      save_to_ = fs::path();
+      saveTo({});
       return;
     case Command::kSavePictureAs:
       return dialog_.open(FileDialog::Purpose::kSavePicture, cache_.cachePath().stem().string() + ".png");

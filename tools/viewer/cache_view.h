@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,7 @@
 #include "tools/viewer/plane_handles.h"
 #include "tools/viewer/playback.h"
 #include "tools/viewer/point_probe.h"
-#include "tools/viewer/toasts.h"
+#include "tools/viewer/reports.h"
 #include "tools/viewer/viewer_options.h"
 #include "tools/viewer/window.h"
 
@@ -41,14 +42,19 @@ struct CarriedView {
 class CacheView {
  public:
   /// `options.state`, `scalar` and `scene` are of this cache. Throws Error as reading the cache or the state does.
-  CacheView(CacheReader cache, const ViewerOptions& options, Window& window, Toasts& toasts,
+  CacheView(CacheReader cache, const ViewerOptions& options, Window& window, Reports& reports,
             FileDialog& dialog, const WindowLayout& layout);
 
+  /// Shows the picture of the view that this one replaces until its own first one comes.
+  void takePictureOf(CacheView& before);
   /// Draws one frame with the effects of all input so far.
   void draw(const WindowLayout& layout);
   /// Applies a command that is not the window's own.
   void run(Command command);
   void choose(const MenuChoice& choice);
+  void chooseScalar(const std::string& name);
+  /// An empty name: the opacities are of the same scalar.
+  void chooseOpacityScalar(const std::string& name);
   void take(const FileDialog::Chosen& chosen);
   void addTo(MenuFacts& facts);
   bool isEnabled(Command command) const;
@@ -72,10 +78,14 @@ class CacheView {
   ViewState openingState(const ViewerOptions& options, ImageSize picture);
   void takeScene(const SurfaceScene& scene, const ViewerOptions& options, ViewState& state) const;
   void takeFrame();
-  void reportFrame(const Error& error);
+  void reportDamage();
+  /// A picture, once it is final; the empty name: the next number.
+  void saveTo(const std::filesystem::path& file);
+  void giveUpSaving();
   void restartFrames();
   void react(const WindowLayout& layout);
   void drawPanels(const WindowLayout& layout);
+  void apply(const PanelActions& actions);
   void ask(bool moving);
   void annotate();
   void showPicture(const WindowLayout& layout);
@@ -96,7 +106,9 @@ class CacheView {
   std::optional<glm::dvec2> placeOf(const glm::dvec3& point, const WindowLayout& layout) const;
   bool isShown() const { return shown_ && shown_->request == request_; }
   bool isFinal() const { return isShown() && shown_->is_final; }
-  void say(const std::string& text, bool is_error = false);
+  void say(const std::string& text) { reports_.say(text); }
+  /// What the picture that is shown lacks, for a sentence: ", without 3 damaged bricks"; empty if nothing.
+  std::string lacks() const;
   const Manifest& manifest() const { return cache_.manifest(); }
 
   const CacheReader cache_;
@@ -104,7 +116,7 @@ class CacheView {
   const std::optional<Preview> preview_;
   const std::vector<std::filesystem::path> grid_files_;  // that were opened, if the cache is kept for them
   Window& window_;
-  Toasts& toasts_;
+  Reports& reports_;
   FileDialog& dialog_;
   ViewState state_;
   const EditedFunction first_function_;
@@ -117,7 +129,7 @@ class CacheView {
   const Backend backend_;
   std::optional<FrameLoop> frames_;
   bool frames_failed_ = false;  // the loop has ended
-  std::string frame_error_;     // the last that was said, until a picture comes
+  std::set<uint32_t> damaged_;  // bricks, of which the user has been told
   PictureTexture picture_, overlay_;
   std::vector<std::string> views_;
   FurtherScalarList further_;

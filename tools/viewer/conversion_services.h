@@ -24,6 +24,8 @@ struct Preview {
 struct OpeningEvents {
   std::function<void(const std::string&)> say;
   std::function<void(Preview)> preview;
+  /// The files, the grid first: they were given in another order, as a desktop drops them or a dialog sorts them.
+  std::function<void(const std::vector<std::filesystem::path>&)> reorder;
 };
 
 /// A scalar of a cache's sources that the cache lacks.

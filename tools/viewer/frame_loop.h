@@ -5,7 +5,8 @@
 //
 // While the camera moves, each picture is as fine as its time budget allows and is always completed; the next
 // one begins when it is shown. At rest, each picture draws four times the splats of the previous one, and is
-// stopped by the next request.
+// stopped by the next request. Where a brick is damaged, coarser ones are drawn in its place from then on, and each
+// picture's statistics list it (bricks_unreadable); a picture that would show nothing for that reason is an error.
 //
 //             a request whose camera moves
 //   kIdle <------------------------------> kMoving     its one picture is completed
@@ -123,7 +124,9 @@ class FrameLoop {
   struct Drawing;
 
   void loop();
+  void serveDamaged(Drawing& drawing, FrameRequest& request, const std::function<void()>& serve);
   void serve(Drawing& drawing, const FrameRequest& request, uint64_t number);
+  void preparePlayer(Drawing& drawing, const FrameRequest& request);
   void readAhead(Drawing& drawing, const FrameRequest& request);
   void findValues(Drawing& drawing, FrameRequest request, uint64_t number);
   bool superseded(uint64_t number) const;

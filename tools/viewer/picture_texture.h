@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 
 #include "render/gl/gl_functions.h"
 #include "render/image/image.h"
@@ -20,6 +21,11 @@ class PictureTexture {
   /// Uploads a picture: red, green, blue, alpha per pixel, not premultiplied; rows from the top.
   void set(std::span<const uint8_t> rgba, ImageSize size);
 
+  /// Both are of one context.
+  void swap(PictureTexture& other) {
+    std::swap(texture_, other.texture_);
+    std::swap(size_, other.size_);
+  }
   bool isEmpty() const { return size_.width == 0; }
   ImageSize size() const { return size_; }
   /// Texture identifier for Dear ImGui.

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <utility>
 
@@ -17,6 +18,7 @@
 #include "tools/viewer/further_scalar_list.h"
 #include "tools/viewer/menus.h"
 #include "tools/viewer/opening.h"
+#include "tools/viewer/reports.h"
 #include "tools/viewer/state_files.h"
 #include "tools/viewer/widget_places.h"
 #include "tools/viewer/window.h"
@@ -79,7 +81,9 @@ class Viewer {
 
   void show(CacheReader cache, const ViewerOptions& options, const std::vector<fs::path>& files) {
     if (view_) view_->remember();
-    view_ = std::make_unique<CacheView>(std::move(cache), options, window_, toasts_, dialog_, layout());
+    auto view = std::make_unique<CacheView>(std::move(cache), options, window_, reports_, dialog_, layout());
+    if (options.carried && view_) view->takePictureOf(*view_);
+    view_ = std::move(view);
     window_.setTitle(fmt::format("{} - curvisplat", files.front().filename().string()));
     std::vector<std::string> names;
     for (const fs::path& file : files) names.push_back(fs::absolute(file).string());
@@ -90,6 +94,7 @@ class Viewer {
   void open(const std::vector<fs::path>& files) {
     opening_.reset();  // the one before is given up
     opening_files_ = files;
+    opens_command_line_ = files == options_.files;
     adds_to_.reset();
     std::string names;
     for (const fs::path& file : files) names += fmt::format(" {}", file.filename().string());
@@ -120,7 +125,7 @@ class Viewer {
   /// The options of a view of what is opened now.
   ViewerOptions viewOptions() const {
     ViewerOptions options;
-    if ((!view_ || view_->preview()) && opening_files_ == options_.files) options = options_;
+    if ((!view_ || view_->preview()) && opens_command_line_) options = options_;
     options.backend = options_.backend;
     options.target_s = options_.target_s;
     options.memory_bytes = options_.memory_bytes;
@@ -131,7 +136,8 @@ class Viewer {
   /// Shows what has been opened.
   void takeOpened() {
     if (!opening_) return;
-    for (const std::string& text : opening_->takeMessages()) toasts_.add(text, glfwGetTime());
+    for (const std::string& text : opening_->takeMessages()) reports_.say(text);
+    if (auto files = opening_->takeFiles(); !files.empty()) opening_files_ = std::move(files);
     const bool is_done = opening_->isDone();
     if (auto preview = opening_->takePreview(); preview && !is_done) showPreview(*preview);
     if (!is_done) return;
@@ -153,8 +159,7 @@ class Viewer {
       show(CacheReader(cache), options, opening_files_);
     } catch (const Interrupted&) {
     } catch (const std::exception& error) {  // a lack of memory, too, ends the opening only
-      printMessage("warning: {}", error.what());
-      toasts_.add(error.what(), glfwGetTime(), true);
+      reports_.report(error);
     }
   }
 
@@ -165,9 +170,9 @@ class Viewer {
       options.grid_files = opening_files_;
       options.preview = preview;
       show(CacheReader(preview.cache), options, opening_files_);
-      toasts_.add(fmt::format("A preview of {}; the whole follows.", preview.what), glfwGetTime());
+      reports_.say(fmt::format("A preview of {}; the whole follows.", preview.what));
     } catch (const std::exception& error) {
-      toasts_.add(fmt::format("no preview: {}", error.what()), glfwGetTime());
+      reports_.say(fmt::format("no preview: {}", error.what()));
     }
   }
 
@@ -191,8 +196,7 @@ class Viewer {
     ImGui::End();
     if (stops) opening_.reset();
     if (stops && view_ && view_->preview())
-      toasts_.add(fmt::format("Stopped. What is shown is a preview of {}.", view_->preview()->what),
-                  glfwGetTime());
+      reports_.say(fmt::format("Stopped. What is shown is a preview of {}.", view_->preview()->what));
   }
 
   WindowLayout layout() const {
@@ -214,16 +218,14 @@ class Viewer {
     const WindowLayout place = layout();
     window_.setPicture(place.picture);
     if (!window_.showsClick()) pressKeys();
-    drawMenuBar();
-    if (view_)
-      view_->draw(place);
-    else
-      drawWelcome(place);
+    attempt([&] { drawMenuBar(); });
+    attempt([&] { view_ ? view_->draw(place) : drawWelcome(place); });
     drawOpening(place.picture);
     drawKeys(keys_shown_, window_);
     drawMessages(toasts_, messages_shown_, window_);
     drawToasts(toasts_, place.picture, glfwGetTime(), window_);
-    const auto chosen = dialog_.draw(window_);
+    std::optional<FileDialog::Chosen> chosen;
+    attempt([&] { chosen = dialog_.draw(window_); });
     if (window_.showsClick()) pressKeys();
     window_.endFrame(glm::vec3(0.12f));
     writeWidgetPlaces();
@@ -232,13 +234,18 @@ class Viewer {
     if (chosen && chosen->purpose == FileDialog::Purpose::kOpenData)
       open(chosen->files);
     else if (chosen && view_)
-      view_->take(*chosen);
+      reports_.attempt([&] { view_->take(*chosen); });
     if (const auto files = std::exchange(to_open_, std::nullopt)) open({files->begin(), files->end()});
     if (const auto dropped = window_.takeDropped(); !dropped.empty()) open({dropped.begin(), dropped.end()});
     const bool is_busy = opening_ != nullptr;
     if (view_)
       if (const auto scalar = view_->takeWantedScalar(is_busy)) add(*scalar);
     takeOpened();
+  }
+
+  /// Does a part of a frame; an error of it is reported, and ends only this part.
+  void attempt(const std::function<void()>& part) {
+    if (!reports_.attempt(part)) window_.closeWidgets();
   }
 
   void drawMenuBar() {
@@ -260,6 +267,7 @@ class Viewer {
     ImGui::Begin("welcome", nullptr,
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                      ImGuiWindowFlags_NoBringToFrontOnFocus);
+    window_.coverCurrent();             // what is clicked here is not for a picture to come
     if (opening_) return ImGui::End();  // its progress is shown in this place
     ImGui::TextUnformatted("Drop a cache or a grid with its solution here, or");
     if (ImGui::Button("open...")) run(Command::kOpen);
@@ -278,7 +286,7 @@ class Viewer {
     for (const Window::Key& key : window_.takeKeys()) {
       if (dialog_.isOpen()) continue;
       const auto command = commandOf(key);
-      if (command && isEnabled(*command)) run(*command);
+      if (command && isEnabled(*command)) reports_.attempt([&] { run(*command); });
     }
   }
 
@@ -367,9 +375,11 @@ class Viewer {
   WindowSettings settings_;
   Window window_;
   Toasts toasts_;
+  Reports reports_{toasts_, glfwGetTime};
   FileDialog dialog_;
   std::unique_ptr<CacheView> view_;
   std::vector<fs::path> opening_files_;  // that are being opened, or were
+  bool opens_command_line_ = false;      // they are those of the command line
   std::optional<std::string> adds_to_;   // the scalar that is being added instead
   std::unique_ptr<Opening> opening_;
   bool panels_shown_ = true, keys_shown_ = false, messages_shown_ = false, look_changed_ = false;
