@@ -47,16 +47,16 @@ std::vector<fs::path> sourcesFor(const CacheReader& cache, const ViewerOptions& 
 
 }  // namespace
 
-CacheView::CacheView(CacheReader cache, const ViewerOptions& options, Window& window, Reports& reports,
-                     FileDialog& dialog, const WindowLayout& layout)
-    : cache_(std::move(cache)),
+CacheView::CacheView(const PreparedView& prepared, const ViewerOptions& options, Window& window,
+                     Reports& reports, FileDialog& dialog, std::shared_future<void> after)
+    : cache_(prepared.cache.atStep(prepared.cache.step())),
       target_s_(options.target_s),
       preview_(options.preview),
       grid_files_(options.grid_files),
       window_(window),
       reports_(reports),
       dialog_(dialog),
-      state_(openingState(options, pixelsOf(layout.picture, window))),
+      state_(firstState(prepared, options)),
       first_function_(state_.function),
       first_state_(toJson(state_)),
       history_(options.carried ? options.carried->history : History(state_)),
@@ -67,10 +67,16 @@ CacheView::CacheView(CacheReader cache, const ViewerOptions& options, Window& wi
       overlay_(window.gl()),
       views_(savedViewsOf(whole())),
       further_(options.conversion, cache_.cachePath(), sourcesFor(cache_, options), Window::wake),
-      probe_(cache_) {
-  frames_.emplace(cache_, backend_, Window::wake);
+      probe_(cache_),
+      chooser_(cache_, Window::wake) {
+  frames_.emplace(cache_, backend_, Window::wake, std::move(after));
   playback_.goTo(cache_.step());
   navigation_.setBounds(state_.scale * manifest().lower, state_.scale * manifest().upper);
+}
+
+void CacheView::releasePictures() {
+  picture_.release();
+  overlay_.release();
 }
 
 void CacheView::takePictureOf(CacheView& before) {
@@ -79,53 +85,20 @@ void CacheView::takePictureOf(CacheView& before) {
   shown_strip_ = before.shown_strip_;
 }
 
-ViewState CacheView::openingState(const ViewerOptions& options, ImageSize picture) {
-  if (options.carried) {
-    ViewState state = options.carried->state;
-    if (options.scalar && *options.scalar != state.variable)
-      chooseVariable(state, cache_, *options.scalar);
-    else if (state.function.isAutomatic())
-      state.function = automaticFunction(cache_, state.variable);
-    return state;
-  }
-  ViewState state = firstViewOf(cache_, options.scalar.value_or(""), picture);
-  if (options.state) {
-    state = viewStateFromJson(readTextFile(*options.state), *options.state, manifest());
-  } else if (const auto remembered = rememberedStateOf(whole()); remembered && fs::exists(*remembered)) {
-    try {
-      ViewState found = viewStateFromJson(readTextFile(*remembered), *remembered, manifest());
-      loadSurfaces(found);
-      state = std::move(found);
-    } catch (const Error& error) {
-      printMessage("warning: {}; using the initial view", error.what());
-    }
-  }
-  if (options.scalar && *options.scalar != state.variable) chooseVariable(state, cache_, *options.scalar);
-  if (options.memory_bytes) state.memory_bytes = *options.memory_bytes;
-  if (options.scene) takeScene(*options.scene, options, state);
-  loadSurfaces(state);
+/// As the view before has it now. Reads only where the user has chosen another scalar since the view was prepared.
+ViewState CacheView::firstState(const PreparedView& prepared, const ViewerOptions& options) const {
+  if (!options.carried) return prepared.state;
+  ViewState state = options.carried->state;
+  if (options.scalar && *options.scalar != state.variable) chooseVariable(state, manifest(), *options.scalar);
+  if (!state.function.isAutomatic()) return state;
+  state.function =
+      state.variable == prepared.scalar ? prepared.automatic : automaticFunction(cache_, state.variable);
   return state;
-}
-
-/// Surfaces and slices of the command line take the place of those of the state.
-void CacheView::takeScene(const SurfaceScene& scene, const ViewerOptions& options, ViewState& state) const {
-  state.surfaces.clear();
-  for (size_t n = 0; n < scene.surfaces.size(); ++n)
-    state.surfaces.push_back(
-        {fs::absolute(options.surface_files.at(n)), scene.surfaces[n].colour, scene.surfaces[n].mesh});
-  state.faces.clear();
-  for (size_t n = 0; n < scene.grid_surfaces.size(); ++n)
-    state.faces.push_back({options.face_names.at(n), scene.grid_surfaces[n]});
-  state.faces_by = options.faces_by;
-  state.isovalues = scene.isovalues;
-  state.iso_opacity = scene.iso_opacity;
-  state.slices = scene.slices;
-  state.slice_opacity = scene.slice_opacity;
-  state.volume = scene.volume;
 }
 
 void CacheView::draw(const WindowLayout& layout) {
   reports_.attempt([&] { takeFrame(); });
+  reports_.attempt([&] { takeFunction(); });
   react(layout);
   const ImageSize size = pixelsOf(layout.picture, window_);
   if (size.width > 0) {
@@ -138,7 +111,8 @@ void CacheView::draw(const WindowLayout& layout) {
     }
     showPicture(layout);
     savePictureIfFinal();
-    if (std::exchange(copy_requested_, false)) copyCommand(std::exchange(copies_movie_, false));
+    if (!chooser_.busy() && std::exchange(copy_requested_, false))
+      copyCommand(std::exchange(copies_movie_, false));
     probe(layout);
     showPlanesAndMarkers(layout);
     keepHistory();
@@ -222,8 +196,7 @@ void CacheView::drawPanels(const WindowLayout& layout) {
   facts.playback = &playback_;
   facts.views = views_;
   facts.place = layout.panels;
-  FurtherScalars further = further_.known();
-  further.is_busy = adds_scalar_;
+  const FurtherScalars further = furtherScalars();
   facts.further = &further;
   const PanelActions actions = panels_.draw(state_, facts);
   reports_.attempt([&] { apply(actions); });
@@ -289,10 +262,7 @@ void CacheView::run(Command command) {
     case Command::kRedo:
       return restore(history_.redo());
     case Command::kResetFunction:
-      state_.function = automaticFunction(cache_, state_.variable);
-      ++function_version_;
-      changed_ = true;
-      return;
+      return chooser_.ask({FunctionChooser::For::kSameScalar, state_.variable});
     case Command::kSaveView:
       return saveView(fmt::format("view {}", views_.size() + 1));
     case Command::kLight:
@@ -379,8 +349,8 @@ bool CacheView::isChecked(Command command) const {
 
 double CacheView::wait() const {
   if (playback_.isPlaying() && isShown() && playback_.wait(clockSeconds()) <= 0) return 0;
-  const bool short_wait =
-      navigation_.isMoving() || ImGui::IsAnyItemActive() || playback_.isPlaying() || probe_.busy();
+  const bool short_wait = navigation_.isMoving() || ImGui::IsAnyItemActive() || playback_.isPlaying() ||
+                          probe_.busy() || chooser_.busy();
   return short_wait ? kMovingWaitSeconds : kIdleWaitSeconds;
 }
 
@@ -393,6 +363,7 @@ void CacheView::keepHistory() {
 
 void CacheView::restore(const ViewState* state) {
   if (!state) return;
+  chooser_.drop();
   state_ = *state;
   ++function_version_;
   changed_ = true;

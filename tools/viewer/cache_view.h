@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <future>
 #include <memory>
 #include <optional>
 #include <set>
@@ -12,6 +13,7 @@
 #include "stream/cache/cache_reader.h"
 #include "tools/viewer/file_dialog.h"
 #include "tools/viewer/frame_loop.h"
+#include "tools/viewer/function_chooser.h"
 #include "tools/viewer/further_scalar_list.h"
 #include "tools/viewer/history.h"
 #include "tools/viewer/menus.h"
@@ -21,6 +23,7 @@
 #include "tools/viewer/plane_handles.h"
 #include "tools/viewer/playback.h"
 #include "tools/viewer/point_probe.h"
+#include "tools/viewer/prepared_view.h"
 #include "tools/viewer/reports.h"
 #include "tools/viewer/viewer_options.h"
 #include "tools/viewer/window.h"
@@ -41,18 +44,24 @@ struct CarriedView {
 
 class CacheView {
  public:
-  /// `options.state`, `scalar` and `scene` are of this cache. Throws Error as reading the cache or the state does.
-  CacheView(CacheReader cache, const ViewerOptions& options, Window& window, Reports& reports,
-            FileDialog& dialog, const WindowLayout& layout);
+  /// `prepared` is for `options`. Draws nothing before `after` is ready, if that is valid. Throws Error as opening the
+  /// cache does.
+  CacheView(const PreparedView& prepared, const ViewerOptions& options, Window& window, Reports& reports,
+            FileDialog& dialog, std::shared_future<void> after = {});
 
   /// Shows the picture of the view that this one replaces until its own first one comes.
   void takePictureOf(CacheView& before);
+  /// Gives up what is OpenGL's. Then nothing but the destructor may be called, and that on any thread: it waits for what is
+  /// being read and drawn.
+  void releasePictures();
   /// Draws one frame with the effects of all input so far.
   void draw(const WindowLayout& layout);
   /// Applies a command that is not the window's own.
   void run(Command command);
   void choose(const MenuChoice& choice);
+  /// Where the function is chosen from the data, with the function, as soon as that is found.
   void chooseScalar(const std::string& name);
+  void showScalar(const std::string& name);
   /// An empty name: the opacities are of the same scalar.
   void chooseOpacityScalar(const std::string& name);
   void take(const FileDialog::Chosen& chosen);
@@ -75,9 +84,9 @@ class CacheView {
   const std::filesystem::path& cachePath() const { return cache_.cachePath(); }
 
  private:
-  ViewState openingState(const ViewerOptions& options, ImageSize picture);
-  void takeScene(const SurfaceScene& scene, const ViewerOptions& options, ViewState& state) const;
+  ViewState firstState(const PreparedView& prepared, const ViewerOptions& options) const;
   void takeFrame();
+  void takeFunction();
   void reportDamage();
   /// A picture, once it is final; the empty name: the next number.
   void saveTo(const std::filesystem::path& file);
@@ -100,12 +109,13 @@ class CacheView {
   void saveView(const std::string& name);
   void loadView(const std::string& name);
   std::vector<std::string> otherScalars() const;
+  FurtherScalars furtherScalars();
   /// The cache that is shown, or the one that it is a preview of: what states and views are kept for.
   const std::filesystem::path& whole() const { return preview_ ? preview_->whole : cache_.cachePath(); }
   bool isUntouchedPreview() const { return preview_ && toJson(state_) == first_state_; }
   std::optional<glm::dvec2> placeOf(const glm::dvec3& point, const WindowLayout& layout) const;
   bool isShown() const { return shown_ && shown_->request == request_; }
-  bool isFinal() const { return isShown() && shown_->is_final; }
+  bool isFinal() const { return isShown() && shown_->is_final && !chooser_.busy(); }
   void say(const std::string& text) { reports_.say(text); }
   /// What the picture that is shown lacks, for a sentence: ", without 3 damaged bricks"; empty if nothing.
   std::string lacks() const;
@@ -147,6 +157,7 @@ class CacheView {
 
   std::optional<ShownValues> values_;
   PointProbe probe_;
+  FunctionChooser chooser_;
   uint64_t values_asked_for_ = 0;  // request
   double pointed_since_s_ = 0;
   glm::dvec2 pointed_{-1.0};

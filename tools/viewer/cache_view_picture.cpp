@@ -158,6 +158,7 @@ void CacheView::drawStatus(const WindowLayout& layout) {
   nameArea("status " + text, place.x, place.y, place.width, place.height);
   const std::string state =
       (preview_ ? fmt::format("preview of {}, ", preview_->what) : "") +
+      (chooser_.busy() ? "choosing colours, " : "") +
       stateOfPicture({shown_ ? &shown_->statistics : nullptr, isFinal(), frames_->busy(), ""}) + lacks();
   ImGui::SameLine(static_cast<float>(place.width) - ImGui::CalcTextSize(state.c_str()).x -
                   2 * ImGui::GetStyle().FramePadding.x);
@@ -223,6 +224,7 @@ void CacheView::take(const FileDialog::Chosen& chosen) {
   try {
     switch (chosen.purpose) {
       case FileDialog::Purpose::kLoadFunction:
+        chooser_.drop();
         state_.function = EditedFunction(readParaViewPreset(file), state_.function.opacityUnit());
         ++function_version_;
         changed_ = true;
@@ -278,8 +280,17 @@ void CacheView::addTo(MenuFacts& facts) {
   facts.opacity_scalars = otherScalars();
   facts.opacity_scalar = state_.opacity_by ? state_.opacity_by->variable : facts.opacity_scalars.front();
   facts.views = views_;
-  facts.further = further_.known();
-  facts.further.is_busy = adds_scalar_;
+  facts.further = furtherScalars();
+}
+
+FurtherScalars CacheView::furtherScalars() {
+  FurtherScalars further = further_.known();
+  further.is_busy = adds_scalar_;
+  if (cache_.series().steps.size() > 1)
+    further.note = "for more, convert the series again with --scalar NAME";
+  else if (preview_)
+    further.note = "more when the whole is there";
+  return further;
 }
 
 void CacheView::choose(const MenuChoice& choice) {
@@ -292,17 +303,43 @@ void CacheView::choose(const MenuChoice& choice) {
 }
 
 void CacheView::chooseScalar(const std::string& name) {
-  chooseVariable(state_, cache_, name);
+  if (state_.function.isAutomatic()) return chooser_.ask({FunctionChooser::For::kScalar, name});
+  showScalar(name);
+}
+
+void CacheView::showScalar(const std::string& name) {
+  chooseVariable(state_, manifest(), name);
   if (state_.opacity_by && state_.opacity_by->variable == name) state_.opacity_by.reset();
   ++function_version_;
   changed_ = true;
 }
 
 void CacheView::chooseOpacityScalar(const std::string& name) {
-  if (name.empty() || name == state_.variable)
-    state_.opacity_by.reset();
-  else
-    state_.opacity_by = OpacityScalar{name, automaticFunction(cache_, name)};
+  if (!name.empty() && name != state_.variable) return chooser_.ask({FunctionChooser::For::kOpacities, name});
+  state_.opacity_by.reset();
+  ++function_version_;
+  changed_ = true;
+}
+
+/// What the chooser has found. What the user has edited meanwhile stays.
+void CacheView::takeFunction() {
+  const auto found = chooser_.take();
+  if (!found) return;
+  const auto& [question, function] = *found;
+  switch (question.what) {
+    case FunctionChooser::For::kScalar: {
+      const bool is_automatic = state_.function.isAutomatic();
+      showScalar(question.scalar);
+      if (is_automatic) state_.function = function;
+      return;
+    }
+    case FunctionChooser::For::kOpacities:
+      if (question.scalar != state_.variable) state_.opacity_by = OpacityScalar{question.scalar, function};
+      break;
+    case FunctionChooser::For::kSameScalar:
+      if (question.scalar == state_.variable) state_.function = function;
+      break;
+  }
   ++function_version_;
   changed_ = true;
 }

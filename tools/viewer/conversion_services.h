@@ -13,11 +13,14 @@
 
 namespace curvisplat {
 
+struct PreparedView;
+
 /// A coarse cache that is shown while the whole one is made.
 struct Preview {
   std::filesystem::path cache, whole;
-  std::string what;                    // "every 4th index plane"
-  std::shared_ptr<const void> folder;  // what keeps `cache` there while this is held
+  std::string what;                                    // "every 4th index plane"
+  std::shared_ptr<const void> folder;                  // what keeps `cache` there while this is held
+  std::shared_ptr<const PreparedView> view = nullptr;  // for the first time it is shown
 };
 
 /// Whom a conversion tells what it has.

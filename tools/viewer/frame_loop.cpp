@@ -56,10 +56,12 @@ struct FrameLoop::Drawing {
   Effort effort;
 };
 
-FrameLoop::FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake)
+FrameLoop::FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake,
+                     std::shared_future<void> after)
     : cache_(cache.atStep(cache.step())),
       backend_(backend),
       wake_(std::move(wake)),
+      after_(std::move(after)),
       thread_([this] { loop(); }) {}
 
 FrameLoop::~FrameLoop() {
@@ -130,6 +132,7 @@ void FrameLoop::publish(ShownFrame frame) {
 
 void FrameLoop::loop() {
   nameThisThread("frames");
+  if (after_.valid()) after_.wait();
   Drawing drawing(coarsestSplats(cache_));
   MutexLock lock(mutex_);
   while (true) {

@@ -25,6 +25,7 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
+#include <future>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -96,8 +97,9 @@ class Effort {
 class FrameLoop {
  public:
   /// Calls `wake` on the loop's thread whenever take() has something to return. Opens the cache for itself, since it
-  /// goes from step to step.
-  FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake);
+  /// goes from step to step. If `after` is valid, it is waited for before anything is drawn: the memory of another loop.
+  FrameLoop(const CacheReader& cache, Backend backend, std::function<void()> wake,
+            std::shared_future<void> after = {});
   /// Stops the picture being drawn.
   ~FrameLoop();
   FrameLoop(const FrameLoop&) = delete;
@@ -139,6 +141,7 @@ class FrameLoop {
   CacheReader cache_;  // at the step that is drawn; of the loop's thread
   const Backend backend_;
   const std::function<void()> wake_;
+  const std::shared_future<void> after_;
 
   mutable Mutex mutex_;
   ConditionVariable changed_;

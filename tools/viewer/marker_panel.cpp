@@ -24,6 +24,7 @@ void drawMarkers(ViewState& state, PanelActions& actions) {
     ImGui::SetNextItemWidth(6 * ImGui::GetFontSize());
     actions.changed |= ImGui::InputText("##name", &marker.name);
     nameWidget(fmt::format("marker {}", n + 1));
+    if (ImGui::IsItemActive()) nameWidget(fmt::format("editing marker {}", n + 1));
     ImGui::SameLine();
     ImGui::TextWrapped("%s", fmt::format("{} {:.5g}{}{}\n{:.5g}, {:.5g}, {:.5g}", marker.scalar, marker.value,
                                          marker.unit.empty() ? "" : " ", marker.unit, marker.point.x,

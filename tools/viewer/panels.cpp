@@ -65,7 +65,11 @@ namespace {
 
 /// What the sources have besides, at the end of the list of scalars.
 void drawFurther(const FurtherScalars& further, PanelActions& actions) {
-  if (further.from.empty()) return;
+  if (further.from.empty()) {
+    if (!further.note.empty()) ImGui::TextDisabled("%s", further.note.c_str());
+    if (!further.note.empty()) nameWidget("note " + further.note);
+    return;
+  }
   actions.looks_for_scalars = true;
   ImGui::Separator();
   ImGui::TextDisabled("%s", further.is_looking ? "looking for more ..."

@@ -10,11 +10,13 @@
 
 namespace curvisplat {
 
-/// Use on the context's thread and destroy before the context. Interpolates linearly when stretched.
+/// Use on the context's thread; destroy or release() before the context. Interpolates linearly when stretched.
 class PictureTexture {
  public:
   explicit PictureTexture(const GlFunctions& gl);
-  ~PictureTexture();
+  ~PictureTexture() { release(); }
+  /// Deletes the texture. Then only the destructor may be called, on any thread.
+  void release();
   PictureTexture(const PictureTexture&) = delete;
   PictureTexture& operator=(const PictureTexture&) = delete;
 
